@@ -1,0 +1,133 @@
+//! The one error for wrong input, whatever file or option it stands in.
+//!
+//! Promise E1: no input panics the program. Every error says what was wrong, where, and
+//! what would be right; the command ends with exit code 2 and has written nothing.
+
+use std::fmt;
+
+/// Wrong input: a file, an option, a table that does not sum to one.
+///
+/// Displayed as `place:line:column: cause`, the offending line with a caret under it where
+/// the text is known, and `help: remedy`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct InputError {
+    place: String,
+    position: Option<Position>,
+    cause: String,
+    remedy: String,
+}
+
+/// A place in a text file; lines and columns count from 1, columns in characters.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Position {
+    line: usize,
+    column: usize,
+    /// The line itself, when the text was at hand.
+    text: Option<String>,
+}
+
+impl InputError {
+    /// An error in `place` (a file's path, or an option's name as the user typed it).
+    pub fn new(
+        place: impl fmt::Display,
+        cause: impl Into<String>,
+        remedy: impl Into<String>,
+    ) -> Self {
+        Self {
+            place: place.to_string(),
+            position: None,
+            cause: cause.into(),
+            remedy: remedy.into(),
+        }
+    }
+
+    /// Names line and column (both from 1).
+    #[must_use]
+    pub fn at(mut self, line: usize, column: usize) -> Self {
+        self.position = Some(Position { line, column, text: None });
+        self
+    }
+
+    /// Finds line and column of the byte at `offset` in `text` and quotes that line.
+    #[must_use]
+    pub fn in_text(mut self, text: &str, offset: usize) -> Self {
+        let mut offset = offset.min(text.len());
+        while !text.is_char_boundary(offset) {
+            offset -= 1;
+        }
+        let start = text[..offset].rfind('\n').map_or(0, |i| i + 1);
+        let line = text[..offset].matches('\n').count() + 1;
+        let column = text[start..offset].chars().count() + 1;
+        let quoted = text[start..].lines().next().unwrap_or("").to_string();
+        self.position = Some(Position { line, column, text: Some(quoted) });
+        self
+    }
+
+    /// The file or option that is wrong.
+    pub fn place(&self) -> &str {
+        &self.place
+    }
+
+    /// Line and column, from 1, where known.
+    pub fn position(&self) -> Option<(usize, usize)> {
+        self.position.as_ref().map(|p| (p.line, p.column))
+    }
+
+    /// What is wrong.
+    pub fn cause(&self) -> &str {
+        &self.cause
+    }
+
+    /// What would be right.
+    pub fn remedy(&self) -> &str {
+        &self.remedy
+    }
+}
+
+impl fmt::Display for InputError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.place)?;
+        if let Some(p) = &self.position {
+            write!(f, ":{}:{}", p.line, p.column)?;
+        }
+        write!(f, ": {}", self.cause)?;
+        if let Some(Position { line, column, text: Some(text) }) = &self.position {
+            let number = line.to_string();
+            let shown = text.replace('\t', " ");
+            write!(
+                f,
+                "\n  {number} | {shown}\n  {:w$} | {:c$}^",
+                "",
+                "",
+                w = number.len(),
+                c = column - 1
+            )?;
+        }
+        write!(f, "\n  help: {}", self.remedy)
+    }
+}
+
+impl std::error::Error for InputError {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_quotes_the_line_and_points_at_the_column() {
+        let text = "a = 1\nbb = 2\n";
+        let error = InputError::new("x.toml", "bad value", "write 3").in_text(text, 11);
+        assert_eq!(error.position(), Some((2, 6)));
+        assert_eq!(
+            error.to_string(),
+            "x.toml:2:6: bad value\n  2 | bb = 2\n    |      ^\n  help: write 3"
+        );
+    }
+
+    #[test]
+    fn an_offset_behind_the_end_or_inside_a_character_is_no_panic() {
+        let text = "é";
+        assert_eq!(InputError::new("f", "c", "r").in_text(text, 1).position(), Some((1, 1)));
+        assert_eq!(InputError::new("f", "c", "r").in_text(text, 99).position(), Some((1, 2)));
+    }
+}

@@ -1,0 +1,10 @@
+//! What the kernel asks of the outside, each with an in-memory version and a conformance
+//! suite that every other version must pass too.
+
+pub mod clock;
+pub mod recorder;
+
+pub use clock::{Clock, ManualClock, SystemClock};
+pub use recorder::{
+    ColumnSpec, ColumnType, MemoryRecorder, RecordError, Recorder, TableSchema, Values,
+};
