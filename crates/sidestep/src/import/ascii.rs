@@ -1,6 +1,7 @@
 //! Maps drawn with characters, in a scenario or in a `.txt` file: `#` wall, `.` or a blank
 //! free, `?` unknown. The first line is the north edge; one character is one box.
 
+use std::ops::Range;
 use std::path::Path;
 
 use sidestep_kernel::InputError;
@@ -34,7 +35,25 @@ pub fn load(path: &Path, box_size_m: f64) -> Result<GridMap, InputError> {
 /// When a character means nothing, the rows differ in length, there is no row or there are too
 /// many boxes. Errors name `place` and count lines and columns in `art`.
 pub fn parse(place: &str, art: &str, box_size_m: f64) -> Result<GridMap, InputError> {
-    let source = Source { place, text: art };
+    parse_within(place, art, 0..art.len(), box_size_m)
+}
+
+/// As [`parse`], for a drawing that is the part `art` (in bytes) of a larger `document`: errors
+/// count lines and columns in the document.
+///
+/// # Errors
+/// Those of [`parse`].
+///
+/// # Panics
+/// When `art` is not a range of whole characters of `document`.
+pub fn parse_within(
+    place: &str,
+    document: &str,
+    art: Range<usize>,
+    box_size_m: f64,
+) -> Result<GridMap, InputError> {
+    let source = Source { place, text: document };
+    let art = &document[art];
     let body = art.strip_prefix("\r\n").or(art.strip_prefix('\n')).unwrap_or(art);
     let body = body.trim_end_matches(['\r', '\n']);
     let width = body.lines().next().map_or(0, |line| line.chars().count());
@@ -79,6 +98,18 @@ mod tests {
         let long = parse("map", "##\n####", 1.0).expect_err("long");
         assert_eq!(long.position(), Some((2, 3)));
         assert!(parse("map", "##\n\n##", 1.0).is_err(), "an empty row inside");
+    }
+
+    #[test]
+    fn a_drawing_within_a_document_has_its_errors_at_the_places_of_the_document() {
+        let document = "size = 1\nart = '''\n#.\n.x\n'''\n";
+        let art =
+            document.find("#.").expect("the drawing")..document.rfind("'''").expect("its end");
+        let error = parse_within("s.toml", document, art.clone(), 1.0).expect_err("an x");
+        assert_eq!((error.place(), error.position()), ("s.toml", Some((4, 2))));
+        let corrected = document.replace('x', "#");
+        let map = parse_within("s.toml", &corrected, art, 1.0);
+        assert_eq!(map, parse("art", "#.\n.#", 1.0));
     }
 
     #[test]

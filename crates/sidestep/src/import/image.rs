@@ -135,6 +135,7 @@ fn undecodable(place: &str, error: &ImageError) -> InputError {
 mod tests {
     use super::*;
     use ::image::{GrayImage, ImageFormat, Luma, LumaA, Rgb, Rgba};
+    use proptest::prelude::*;
 
     fn brightness(bytes: &[u8]) -> Vec<f64> {
         Bitmap::decode("test", bytes.to_vec()).expect("an image").map_brightness(|v| v)
@@ -197,5 +198,27 @@ mod tests {
         }
         let error = Bitmap::decode("test", b"P5 60000 60000 255\n".to_vec()).expect_err("absurd");
         assert!(error.cause().contains("60000 x 60000"), "{error}");
+    }
+
+    proptest! {
+        #[test]
+        fn no_damage_panics_the_decoder(
+            damage in proptest::collection::vec((0usize..200, any::<u8>()), 1..6),
+            which in 0usize..3,
+        ) {
+            let gray = GrayImage::from_fn(9, 9, |x, y| Luma([(x * y) as u8]));
+            let ascii = b"P2\n# comment\n3 2\n255\n0 1 2\n253 254 255\n".to_vec();
+            let mut bytes = [png(gray), ascii, b"P5 3 2 255\n\x00\x01\x02\x03\x04\x05".to_vec()][which].clone();
+            let length = bytes.len();
+            for (at, value) in damage {
+                bytes[at % length] = value;
+            }
+            // Damage may make a huge header, which is tested elsewhere and slow to allocate.
+            let is_small = decoder(bytes.clone()).is_ok_and(|d| d.dimensions().0.max(d.dimensions().1) < 5000);
+            if is_small && let Ok(image) = Bitmap::decode("test", bytes) {
+                let pixels = image.map_brightness(|v| v);
+                prop_assert!(pixels.iter().all(|v| (0.0..=255.0).contains(v)));
+            }
+        }
     }
 }

@@ -203,6 +203,7 @@ fn byte_offset(text: &str, index: usize) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
 
     const YAML: &str = "image: map.rs
 resolution: 0.05
@@ -321,6 +322,24 @@ free_thresh: 0.196
         }
         let long = parse(&"- ".repeat(MAX_LINE_BYTES)).expect_err("a long line");
         assert_eq!(long.position(), Some((1, MAX_LINE_BYTES + 1)));
+    }
+
+    proptest! {
+        #[test]
+        fn no_text_panics_the_reader(
+            head in prop_oneof![Just(YAML), Just("image: map.rs\norigin: "), Just("")],
+            pieces in proptest::collection::vec(
+                prop_oneof![
+                    Just("\n"), Just(" "), Just("image"), Just(": "), Just("["), Just("]"), Just(","),
+                    Just("{"), Just("}"), Just("0.05"), Just("- "), Just("? "), Just("'"), Just("\""),
+                    Just("# "), Just("&a "), Just("*a "), Just("!!float "), Just("|\n"), Just("\t"),
+                    Just("é"), Just("---\n"), Just("%YAML 1.2\n"), Just("\\x"), Just("<<: "),
+                ],
+                0..40,
+            ),
+        ) {
+            let _ = parse(&(head.to_owned() + &pieces.concat())).is_ok();
+        }
     }
 
     #[test]

@@ -45,6 +45,28 @@ pub struct ScenRow {
     pub optimal_length: f64,
 }
 
+impl ScenRow {
+    /// Checks that the row is about a map such as `map`; errors name `place` and the row's line.
+    ///
+    /// # Errors
+    /// When the map has another size, or the start or the goal is not free.
+    pub fn check_against(&self, place: &str, map: &GridMap) -> Result<(), InputError> {
+        let error = |cause, remedy| Err(InputError::new(place, cause, remedy).at(self.line, 1));
+        if (self.width, self.height) != (map.width(), map.height()) {
+            let (w, h) = (map.width(), map.height());
+            let cause = format!("a row for {} x {}, not {w} x {h}", self.width, self.height);
+            return error(cause, "give the map that the scenario was made for");
+        }
+        for (name, (col, row)) in [("start", self.start), ("goal", self.goal)] {
+            if map.cell(col, row) != Cell::Free {
+                let cause = format!("the {name}, column {col} and row {row}, is not free");
+                return error(cause, "give the map that the scenario was made for");
+            }
+        }
+        Ok(())
+    }
+}
+
 /// Reads a `.map` file (also with gzip); a character becomes a box with a side of `box_size_m`
 /// metres (the benchmarks have no unit; 1 is customary).
 ///
@@ -236,6 +258,7 @@ impl<'a> Fields<'a> {
 mod tests {
     use super::*;
     use Cell::{Free, Wall};
+    use proptest::prelude::*;
 
     const MAP: &str = "type octile\nheight 2\nwidth 7\nmap\n.GS@OTW\n.......\n";
 
@@ -293,6 +316,38 @@ mod tests {
             optimal_length: 2.5,
         };
         assert_eq!(rows, [expected]);
+    }
+
+    #[test]
+    fn a_row_of_another_map_is_found_out() {
+        let map = parse_map("m", MAP, 1.0).expect("a map");
+        let row = |size: &str, ends: &str| {
+            let text = format!("version 1\n0\tm\t{size}\t{ends}\t1\n");
+            parse_scen("s", &text).expect("a scenario").remove(0).check_against("s", &map)
+        };
+        assert_eq!(row("7\t2", "0\t0\t6\t1"), Ok(()));
+        for wrong in
+            [row("7\t3", "0\t1\t6\t1"), row("7\t2", "3\t0\t0\t0"), row("7\t2", "0\t0\t6\t0")]
+        {
+            assert_eq!(wrong.expect_err("another map").position(), Some((2, 1)));
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn no_text_panics_the_readers(
+            head in prop_oneof![Just("type octile\nheight 2\nwidth 2\nmap\n"), Just("version 1\n"), Just("")],
+            pieces in proptest::collection::vec(
+                prop_oneof![
+                    Just("\n"), Just("\r\n"), Just("\t"), Just(" "), Just("."), Just("@"), Just("é"),
+                    Just("map"), Just("width "), Just("7"), Just("-1"), Just("99999999999"),
+                ],
+                0..40,
+            ),
+        ) {
+            let text = head.to_owned() + &pieces.concat();
+            let _ = (parse_map("m", &text, 1.0).is_ok(), parse_scen("s", &text).is_ok());
+        }
     }
 
     fn scen_error(row: &str) -> (usize, usize) {

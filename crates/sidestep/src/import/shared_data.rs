@@ -108,11 +108,15 @@ fn every_movingai_scenario_has_the_expected_lengths() {
         let rows = movingai::load_scen(&path).expect(&name);
         assert_eq!(rows.len(), number(&expected, "rows"), "{name}");
         let map = movingai::load_map(&path.with_file_name(&rows[0].map), 1.0).expect(&name);
+        assert_eq!(rows.iter().find_map(|row| row.check_against(&name, &map).err()), None);
         let free = FreeSpace::of_map(&map);
         let checked = &rows[..number(&expected, "checked")];
-        let matching = checked.iter().filter(|row| has_octile_length(&free, row)).count();
-        assert_eq!(matching, number(&expected, "octile_matches_file"), "{name}");
+        let matching = |rows: &[movingai::ScenRow]| {
+            rows.iter().filter(|row| has_octile_length(&free, row)).count()
+        };
+        assert_eq!(matching(checked), number(&expected, "octile_matches_file"), "{name}");
         assert_eq!(expected["octile_mismatch"], Value::Array(Vec::new()), "{name}");
+        assert_eq!(matching(&rows), rows.len(), "{name}: the rows that nobody has checked yet");
         check_steps(&name, &free, checked, &expected);
         check_ends(&name, &free, &rows, &expected);
     }
