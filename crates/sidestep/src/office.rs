@@ -75,7 +75,7 @@ impl OfficeSpec {
     ///
     /// # Errors
     /// When a number is 0 or a length less than half a box, the doors are wider than the rooms,
-    /// or the building has more than [`MAX_BOXES`](crate::map::MAX_BOXES). The error's place is
+    /// or the building has more than [`MAX_BOXES`]. The error's place is
     /// `office.` and the key that is wrong.
     pub fn build(&self, box_size_m: f64) -> Result<Office, InputError> {
         Plan::new(self, check_box_size(box_size_m)?)?.build(box_size_m)
