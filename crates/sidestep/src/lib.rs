@@ -1,7 +1,10 @@
 #![deny(clippy::disallowed_methods)]
 //! placeholder
 
+pub mod import;
 pub mod map;
+pub mod office;
+pub mod planning;
 
 pub use map::{Cell, GridMap};
 pub use sidestep_kernel as kernel;
