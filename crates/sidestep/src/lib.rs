@@ -5,6 +5,8 @@ pub mod import;
 pub mod map;
 pub mod office;
 pub mod planning;
+pub mod scenario;
+pub mod worlds;
 
 pub use map::{Cell, GridMap};
 pub use sidestep_kernel as kernel;

@@ -6,6 +6,7 @@
 
 pub mod ascii;
 pub mod file;
+pub use file::read_text;
 pub mod image;
 mod map_file;
 mod map_yaml;

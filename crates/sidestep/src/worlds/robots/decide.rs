@@ -9,7 +9,7 @@ mod replay;
 mod wander;
 
 pub use goto::{Goto, Shuttle};
-pub use replay::{External, Replay};
+pub use replay::{External, ORDER, Replay};
 pub use wander::Wander;
 
 use super::effector::{ActionId, Side};

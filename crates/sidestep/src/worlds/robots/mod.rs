@@ -11,12 +11,14 @@
 
 pub mod decide;
 pub mod effector;
+pub mod metrics;
 mod perceive;
 pub mod ray;
 mod react;
 pub mod resolve;
 pub mod scenario;
 pub mod sensor;
+pub mod simulation;
 pub mod state;
 pub mod world;
 

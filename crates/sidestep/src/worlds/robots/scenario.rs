@@ -50,12 +50,12 @@ pub(super) struct RobotsFile {
     pub(super) sensors: BTreeMap<String, Spanned<SensorSection>>,
     #[serde(default)]
     pub(super) effectors: BTreeMap<String, Spanned<EffectorSection>>,
-    #[serde(default)]
-    pub(super) robots: OneOrMany<Spanned<RobotSection>>,
-    #[serde(default)]
-    pub(super) people: OneOrMany<Spanned<MoverSection>>,
-    #[serde(default)]
-    pub(super) doors: OneOrMany<Spanned<DoorSection>>,
+    #[serde(default = "none")]
+    pub(super) robots: Spanned<OneOrMany<RobotSection>>,
+    #[serde(default = "none")]
+    pub(super) people: Spanned<OneOrMany<MoverSection>>,
+    #[serde(default = "none")]
+    pub(super) doors: Spanned<OneOrMany<DoorSection>>,
     pub(super) radio: Option<Spanned<RadioSection>>,
     #[serde(default)]
     pub(super) record: RecordSection,
@@ -280,6 +280,9 @@ fn default_cycles() -> u64 {
 }
 fn spanned<T>(value: T) -> Spanned<T> {
     Spanned::new(0..0, value)
+}
+fn none<T>() -> Spanned<OneOrMany<T>> {
+    spanned(OneOrMany::default())
 }
 fn robot_kind() -> Spanned<String> {
     spanned("robot".into())

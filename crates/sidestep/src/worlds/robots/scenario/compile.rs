@@ -9,7 +9,7 @@ use super::{
 use crate::import;
 use crate::map::{Cell, GridMap, Rect};
 use crate::planning::{FlowField, FreeSpace};
-use crate::scenario::{Source, nearest};
+use crate::scenario::{OneOrMany, Source, nearest};
 use crate::worlds::robots::decide::{Behaviour, External, Goto, Replay, Sector, Shuttle, Wander};
 use crate::worlds::robots::effector::{Action, EffectorModel, Side, Transition};
 use crate::worlds::robots::resolve::ConflictPolicy;
@@ -286,18 +286,18 @@ enum TypeOf {
 
 impl Compiler<'_> {
     fn groups(&mut self) -> Result<Vec<Group>, InputError> {
-        let robots = std::mem::take(&mut self.file.robots).0;
-        let people = std::mem::take(&mut self.file.people).0;
-        let doors = std::mem::take(&mut self.file.doors).0;
+        let robots = take(&mut self.file.robots);
+        let people = take(&mut self.file.people);
+        let doors = take(&mut self.file.doors);
         let mut groups = Vec::new();
-        for section in &robots {
-            groups.push(self.robots(section)?);
+        for section in &robots.1 {
+            groups.push(self.robots(section, robots.0.clone())?);
         }
-        for section in &people {
-            groups.push(self.people(section)?);
+        for section in &people.1 {
+            groups.push(self.people(section, people.0.clone())?);
         }
-        for section in &doors {
-            groups.push(self.doors(section)?);
+        for section in &doors.1 {
+            groups.push(self.doors(section, doors.0.clone())?);
         }
         let bodies: u64 = groups.iter().map(|g| g.count).sum();
         if bodies > MAX_BODIES {
@@ -523,8 +523,7 @@ impl Compiler<'_> {
 }
 
 impl Compiler<'_> {
-    fn robots(&mut self, section: &Spanned<RobotSection>) -> Result<Group, InputError> {
-        let (s, span) = (section.get_ref(), section.span());
+    fn robots(&mut self, s: &RobotSection, span: Range<usize>) -> Result<Group, InputError> {
         if let Some(scen) = &s.scen {
             return self.robots_of_scen(s, scen, &span);
         }
@@ -653,8 +652,8 @@ impl Compiler<'_> {
         let section = self.lookup(&self.sensors, name, "sensor")?;
         let mut used = vec![false; self.kinds.len()];
         used[1] = true;
-        let people = self.file.people.0.iter().map(|p| &p.get_ref().kind);
-        let doors = self.file.doors.0.iter().map(|d| &d.get_ref().kind);
+        let people = self.file.people.get_ref().0.iter().map(|p| &p.kind);
+        let doors = self.file.doors.get_ref().0.iter().map(|d| &d.kind);
         for kind in people.chain(doors) {
             used[usize::from(self.kind(kind)?)] = true;
         }
@@ -779,8 +778,7 @@ impl Compiler<'_> {
 }
 
 impl Compiler<'_> {
-    fn people(&mut self, section: &Spanned<MoverSection>) -> Result<Group, InputError> {
-        let (s, span) = (section.get_ref(), section.span());
+    fn people(&mut self, s: &MoverSection, span: Range<usize>) -> Result<Group, InputError> {
         let (count, places, period) =
             self.common(s.count.as_ref(), &s.at, s.period.as_ref(), &span)?;
         let size = self.size(*s.size.get_ref(), s.size.span())?;
@@ -813,8 +811,7 @@ impl Compiler<'_> {
         })
     }
 
-    fn doors(&mut self, section: &Spanned<DoorSection>) -> Result<Group, InputError> {
-        let (s, span) = (section.get_ref(), section.span());
+    fn doors(&mut self, s: &DoorSection, span: Range<usize>) -> Result<Group, InputError> {
         let rects = self.door_rects(s, &span)?;
         let (mut places, mut types) = (Vec::new(), Vec::new());
         for (k, (rect, at)) in rects.iter().enumerate() {
@@ -1014,6 +1011,11 @@ fn add_all<T: Clone>(
     for (name, section) in from {
         into.insert(name.clone(), Located { section: section.clone(), source: Arc::clone(source) });
     }
+}
+
+/// Moves the sections of one key out of the file, with the key's place.
+fn take<T>(sections: &mut Spanned<OneOrMany<T>>) -> (Range<usize>, Vec<T>) {
+    (sections.span(), std::mem::take(&mut sections.get_mut().0))
 }
 
 /// Entity ids in the order of storage.
