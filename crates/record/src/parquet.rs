@@ -17,7 +17,7 @@ use sidestep_kernel::ports::{RecordError, Recorder, TableSchema, Values};
 
 use crate::disk;
 use crate::encode::ColumnEncoder;
-use crate::part::{PartWriter, cause, first_cycle, part_name};
+use crate::part::{PartWriter, cause, first_cycle, next_cycle, part_name};
 use crate::schema::{Origin, check_schema, key_values, parquet_schema};
 
 /// Rows in a row group. Only encoded rows wait in memory, a few bytes each.
@@ -55,7 +55,8 @@ impl ParquetRecorder {
     /// `cycle` must be one at which the recorder was [sealed](Recorder::seal).
     ///
     /// # Errors
-    /// A schema that cannot become a file; what the system says.
+    /// A schema that cannot become a file; a cycle at which the recorder was not sealed; what
+    /// the system says.
     pub fn resume(
         folder: &Path,
         schemas: &[TableSchema],
@@ -180,14 +181,16 @@ impl TableWriter {
 
     /// Ends the open part, if it has rows; later rows begin at `next_cycle`.
     fn seal(&mut self, next_cycle: u64) -> Result<(), RecordError> {
+        self.end_part(Some(next_cycle))?;
+        self.part_cycle = next_cycle;
+        Ok(())
+    }
+
+    fn end_part(&mut self, next_cycle: Option<u64>) -> Result<(), RecordError> {
         if self.group_rows > 0 {
             self.write_row_group()?;
         }
-        if let Some(part) = self.part.take() {
-            part.close()?;
-        }
-        self.part_cycle = next_cycle;
-        Ok(())
+        self.part.take().map_or(Ok(()), |part| part.close(next_cycle))
     }
 
     /// Ends the table and gives its folder the final name. Once is enough.
@@ -195,11 +198,11 @@ impl TableWriter {
         if self.finished {
             return Ok(());
         }
-        self.seal(self.part_cycle)?;
+        self.end_part(None)?;
         let growing = disk::partial(&self.folder);
         if parts(&growing)?.is_empty() {
             // A table without rows still has columns.
-            self.new_part()?.close()?;
+            self.new_part()?.close(None)?;
         }
         disk::rename(&growing, &self.folder)?;
         self.finished = true;
@@ -216,6 +219,8 @@ fn rewind(folder: &Path, cycle: u64) -> Result<(), RecordError> {
     }
     let failed = |e| RecordError::new(growing.display(), e);
     fs::create_dir_all(&growing).map_err(failed)?;
+    // Before anything is deleted.
+    check_sealed(&growing, cycle)?;
     for entry in fs::read_dir(&growing).map_err(failed)? {
         let path = entry.map_err(failed)?.path();
         if is_stale(&path, cycle) {
@@ -223,6 +228,17 @@ fn rewind(folder: &Path, cycle: u64) -> Result<(), RecordError> {
         }
     }
     Ok(())
+}
+
+/// The rows that stay must end before those to come begin.
+fn check_sealed(growing: &Path, cycle: u64) -> Result<(), RecordError> {
+    let kept = parts(growing)?.into_iter().rfind(|path| !is_stale(path, cycle));
+    let Some(last) = kept else { return Ok(()) };
+    if next_cycle(&last)?.is_some_and(|next| next <= cycle) {
+        return Ok(());
+    }
+    let cause = format!("the table was not sealed at cycle {cycle}: resume at its checkpoint");
+    Err(RecordError::new(last.display(), cause))
 }
 
 /// True for a part that is not whole or begins at `cycle` or later. Other files are not ours.

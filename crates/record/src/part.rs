@@ -1,12 +1,14 @@
 //! One Parquet file: `part-CYCLE.parquet.partial` until it is whole, then without `.partial`.
 
 use std::fs::File;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use parquet::errors::{ParquetError, Result};
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::{EnabledStatistics, WriterProperties};
+use parquet::file::reader::FileReader;
+use parquet::file::serialized_reader::SerializedFileReader;
 use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::TypePtr;
 use sidestep_kernel::ports::RecordError;
@@ -66,17 +68,30 @@ impl PartWriter {
         Ok(())
     }
 
-    /// Writes the footer, waits for the disk, gives the file its final name.
-    pub(crate) fn close(self) -> std::result::Result<(), RecordError> {
+    /// Writes the footer, waits for the disk, gives the file its final name. `next_cycle` is
+    /// where the rows after this part begin, none at the end of a run.
+    pub(crate) fn close(self, next_cycle: Option<u64>) -> std::result::Result<(), RecordError> {
         let Self { path, mut file, checksums } = self;
         let checksums = schema::checksums_to_text(&checksums);
-        file.append_key_value_metadata(KeyValue::new(schema::CHECKSUMS.to_string(), checksums));
+        let next_cycle = next_cycle.map_or("end".to_string(), |cycle| cycle.to_string());
+        for (key, value) in [(schema::CHECKSUMS, checksums), (schema::NEXT_CYCLE, next_cycle)] {
+            file.append_key_value_metadata(KeyValue::new(key.to_string(), value));
+        }
         let growing = disk::partial(&path);
         let failed = |cause: String| RecordError::new(growing.display(), cause);
         let file = file.into_inner().map_err(|e| failed(cause(e)))?;
         file.sync_all().map_err(|e| failed(e.to_string()))?;
         disk::rename(&growing, &path)
     }
+}
+
+/// Where the rows after the whole part at `path` begin; `None` at the end of a run.
+pub(crate) fn next_cycle(path: &Path) -> std::result::Result<Option<u64>, RecordError> {
+    let failed = |cause: String| RecordError::new(path.display(), cause);
+    let file = File::open(path).map_err(|e| failed(e.to_string()))?;
+    let file = SerializedFileReader::new(file).map_err(|e| failed(cause(e)))?;
+    let text = schema::key_value(file.metadata(), schema::NEXT_CYCLE);
+    Ok(text.and_then(|cycle| cycle.parse().ok()))
 }
 
 /// Writes a row group; the checksum of its bytes.

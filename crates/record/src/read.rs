@@ -248,9 +248,7 @@ fn bad(path: &Path, cause: impl std::fmt::Display) -> InputError {
 
 /// The key-value pair `key` of a file.
 fn text(path: &Path, metadata: &ParquetMetaData, key: &str) -> Result<String, InputError> {
-    let pairs = metadata.file_metadata().key_value_metadata();
-    let pair = pairs.into_iter().flatten().find(|pair| pair.key == key);
-    pair.and_then(|pair| pair.value.clone()).ok_or_else(|| {
+    schema::key_value(metadata, key).map(str::to_string).ok_or_else(|| {
         let remedy = "name a file that a recording wrote";
         InputError::new(path.display(), format!("the file has no key `{key}`"), remedy)
     })

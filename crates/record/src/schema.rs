@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use parquet::basic::{LogicalType, Repetition, Type as PhysicalType};
 use parquet::errors::Result;
-use parquet::file::metadata::KeyValue;
+use parquet::file::metadata::{KeyValue, ParquetMetaData};
 use parquet::schema::types::{Type, TypePtr};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::ports::{ColumnSpec, ColumnType, RecordError, TableSchema};
@@ -23,6 +23,8 @@ pub(crate) const SEED: &str = "sidestep.seed";
 pub(crate) const COLUMNS: &str = "sidestep.columns";
 /// Key of the row groups' checksums: a CRC-32 of each one's bytes, in hexadecimal.
 pub(crate) const CHECKSUMS: &str = "sidestep.crc32";
+/// Key of the cycle at which the next part begins; `end` in the last part of a run.
+pub(crate) const NEXT_CYCLE: &str = "sidestep.next_cycle";
 
 /// What every file of a run says about its origin.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -141,6 +143,12 @@ pub(crate) fn key_values(schema: &TableSchema, origin: &Origin) -> Vec<KeyValue>
         pair(SEED, origin.seed.to_string()),
         pair(COLUMNS, columns_to_json(&schema.columns)),
     ]
+}
+
+/// The value of `key` in a file's footer.
+pub(crate) fn key_value<'a>(metadata: &'a ParquetMetaData, key: &str) -> Option<&'a str> {
+    let mut pairs = metadata.file_metadata().key_value_metadata().into_iter().flatten();
+    pairs.find(|pair| pair.key == key)?.value.as_deref()
 }
 
 fn columns_to_json(columns: &[ColumnSpec]) -> String {

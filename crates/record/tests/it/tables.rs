@@ -140,6 +140,24 @@ fn a_run_killed_while_its_tables_were_finished_can_be_resumed() {
 }
 
 #[test]
+fn resuming_where_nothing_was_sealed_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut first = recorder(folder.path());
+    first.append(0, &rows(0, 20)).unwrap();
+    first.seal(20).unwrap();
+    first.append(0, &rows(20, 30)).unwrap();
+    first.seal(30).unwrap();
+    drop(first);
+    let resume =
+        |cycle| ParquetRecorder::resume(folder.path(), &[trajectories()], &origin(), cycle);
+    assert!(resume(10).err().unwrap().to_string().contains("not sealed at cycle 10"));
+    assert!(resume(30).is_ok(), "the refusal deleted nothing");
+    let table = read_table(folder.path(), "trajectories", ..).unwrap();
+    assert_eq!(table.columns, joined(&[rows(0, 20), rows(20, 30)]));
+    assert!(resume(20).is_ok());
+}
+
+#[test]
 fn a_table_that_is_there_is_not_written_over() {
     let folder = tempfile::tempdir().unwrap();
     recorder(folder.path()).finish().unwrap();
