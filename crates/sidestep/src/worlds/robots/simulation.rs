@@ -204,7 +204,7 @@ impl RobotsSimulation {
                 let (col, row, heading) = pose_of_word(frames.poses.get(k));
                 cols.push(col - super::world::BORDER);
                 rows_.push(row - super::world::BORDER);
-                headings.push(u32::from(heading) * 90);
+                headings.push(u32::from(heading));
             }
         }
         vec![
@@ -212,7 +212,7 @@ impl RobotsSimulation {
             Values::U32(bodies),
             Values::U32(cols),
             Values::U32(rows_),
-            Values::U32(headings),
+            Values::Label(headings),
         ]
     }
 
