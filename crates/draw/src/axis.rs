@@ -17,12 +17,20 @@ pub struct Axis {
     range: Option<(f64, f64)>,
     ticks: Option<Vec<f64>>,
     tight: bool,
+    counts: bool,
 }
 
 impl Axis {
     /// A linear axis; `label` names the quantity and its unit, e.g. `"trip time (s)"`.
     pub fn linear(label: impl Into<String>) -> Self {
-        Self { label: label.into(), log: false, range: None, ticks: None, tight: false }
+        Self {
+            label: label.into(),
+            log: false,
+            range: None,
+            ticks: None,
+            tight: false,
+            counts: false,
+        }
     }
 
     /// A logarithmic axis. Values of zero and below have no place on it and are left out.
@@ -49,6 +57,13 @@ impl Axis {
     #[must_use]
     pub(crate) fn tight(mut self) -> Self {
         self.tight = true;
+        self
+    }
+
+    /// Holds counts: a logarithmic axis begins at one half, so that a count of one has a height.
+    #[must_use]
+    pub(crate) fn counting(mut self) -> Self {
+        self.counts = true;
         self
     }
 
@@ -107,7 +122,10 @@ impl Axis {
         match (self.log, self.ticks.is_some(), extent) {
             (true, _, None) => (1.0, 10.0),
             (false, _, None) => (0.0, 1.0),
-            (true, false, Some((low, high))) => (round_down(low), round_up(high)),
+            (true, false, Some((_, high))) if self.counts => {
+                (0.5, round_log((1.0, high.max(1.0))).1)
+            }
+            (true, false, Some(extent)) => round_log(extent),
             (true, true, Some((low, high))) => (low / 1.1, high * 1.1),
             (false, _, Some(extent)) if self.tight => widened(extent),
             (false, given, Some(extent)) => round_linear(extent, given, most),
@@ -145,18 +163,16 @@ fn extent(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     })
 }
 
-/// The largest of 1, 2, 5 times a power of ten that is not above `value`.
-fn round_down(value: f64) -> f64 {
-    let power = pow(10.0, floor(log10(value) + 1e-12));
-    let fits = |round: &f64| *round <= value * (1.0 + 1e-9);
-    [5.0, 2.0].map(|digit| digit * power).into_iter().find(fits).unwrap_or(power)
-}
-
-/// The smallest of 1, 2, 5 times a power of ten that is above `value`: a log range is never empty.
-fn round_up(value: f64) -> f64 {
-    let power = pow(10.0, floor(log10(value) + 1e-12));
-    let fits = |round: &f64| *round >= value * (1.0 + 1e-9);
-    [2.0, 5.0].map(|digit| digit * power).into_iter().find(fits).unwrap_or(10.0 * power)
+/// Ends a log range at powers of ten, or at 1, 2, 5 times one where it is less than three decades.
+fn round_log((low, high): (f64, f64)) -> (f64, f64) {
+    let digits: &[f64] = if high / low > 1000.0 { &[1.0, 10.0] } else { &[1.0, 2.0, 5.0, 10.0] };
+    let round = |value: f64| {
+        let power = pow(10.0, floor(log10(value) + 1e-12));
+        digits.iter().map(move |digit| digit * power)
+    };
+    let below = round(low).take_while(|v| *v <= low * (1.0 + 1e-9)).last().unwrap_or(low);
+    let above = round(high).find(|v| *v >= high * (1.0 - 1e-9)).unwrap_or(high);
+    if below < above { (below, above) } else { (below / 2.0, above * 2.0) }
 }
 
 fn inside(mut ticks: Ticks, low: f64, high: f64) -> Ticks {
@@ -259,6 +275,9 @@ mod tests {
     #[test]
     fn a_log_range_ends_at_one_two_five() {
         assert_eq!(fit(&Axis::log("t"), &[0.3, 70.0, -1.0]), (0.2, 100.0));
+        assert_eq!(fit(&Axis::log("t"), &[0.3, 7000.0]), (0.1, 10_000.0));
+        assert_eq!(fit(&Axis::log("t"), &[1.0, 10.0]), (1.0, 10.0));
+        assert_eq!(fit(&Axis::log("t"), &[10.0]), (5.0, 20.0));
     }
 
     #[test]

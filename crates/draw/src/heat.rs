@@ -33,7 +33,7 @@ impl Matrix {
     ///
     /// # Errors
     /// [`DrawError::Length`] if there is not one value per row and column, [`DrawError::TooLarge`]
-    /// above 40 000 cells.
+    /// above 40 000 cells, [`DrawError::Value`] if there are none.
     pub fn new(
         title: impl Into<String>,
         rows: Vec<String>,
@@ -45,6 +45,7 @@ impl Matrix {
             let (found, limit) = (cells as u64, MOST_CELLS as u64);
             return Err(DrawError::TooLarge { what: "matrix cells", found, limit });
         }
+        DrawError::some("number of matrix cells", cells)?;
         DrawError::length("values of the matrix", cells, values.len())?;
         Ok(Self {
             title: title.into(),
@@ -141,6 +142,25 @@ impl Matrix {
         if value.is_finite() { label(value, self.digits) } else { "–".into() }
     }
 
+    /// Size of a cell where each may be `room` wide; whether the column names must read upward;
+    /// whether numbers fit.
+    fn cell_size(&self, font_px: f64, room: f64) -> ((f64, f64), bool, bool) {
+        let numbers: Vec<String> = self.values.iter().map(|&v| self.number(v)).collect();
+        let number_px = widest(numbers.iter().chain(&self.subscripts), font_px);
+        let words = self.columns.iter().flat_map(|name| name.split(' '));
+        let word_px = widest(words, font_px);
+        let upright = word_px + 8.0 > room;
+        let wanted = number_px.max(if upright { 0.0 } else { word_px }) + 14.0;
+        let width = wanted.max(3.6 * font_px).min(room);
+        let numbers_fit = number_px + 2.0 <= width;
+        let lines = if self.subscripts.is_empty() { 2.4 } else { 3.2 };
+        let height = match numbers_fit {
+            true => (0.62 * width).max(lines * font_px),
+            false => width.max(1.1 * font_px),
+        };
+        ((width, height), upright, numbers_fit)
+    }
+
     fn draw_cells(
         &self,
         svg: &mut Svg,
@@ -200,48 +220,20 @@ struct Layout {
 impl Layout {
     fn of(matrix: &Matrix, style: &Style) -> Self {
         let small = style.small_px();
-        let measure = |text: &str| text::width(text, small, Weight::Regular);
-        let rows: Vec<String> = matrix
-            .rows
-            .iter()
-            .map(|n| text::shorten(n, small, Weight::Regular, 0.25 * style.width_px))
-            .collect();
-        let row_px = rows.iter().map(|name| measure(name)).fold(0.0, f64::max);
-        let left = EDGE_PX + 1.7 * style.font_px + row_px + 8.0;
+        let most_px = 0.25 * style.width_px;
+        let shorten = |name: &String| text::shorten(name, small, Weight::Regular, most_px);
+        let rows: Vec<String> = matrix.rows.iter().map(shorten).collect();
+        let left = EDGE_PX + 1.7 * style.font_px + widest(rows.iter(), small) + 8.0;
         let right = BAR_PX + 5.0 * style.font_px + EDGE_PX;
-        let room = (style.width_px - left - right).max(60.0) / matrix.columns.len().max(1) as f64;
-        let numbers = matrix.values.iter().map(|&v| matrix.number(v));
-        let widest = numbers
-            .chain(matrix.subscripts.iter().cloned())
-            .map(|n| measure(&n))
-            .fold(0.0, f64::max);
-        let word = |name: &String| name.split_whitespace().map(measure).fold(0.0, f64::max);
-        let words = matrix.columns.iter().map(word).fold(0.0, f64::max);
-        let upright = words + 8.0 > room;
-        let wanted = if upright { widest } else { widest.max(words) } + 14.0;
-        let width = wanted.max(3.6 * small).min(room);
-        let lines = if matrix.subscripts.is_empty() { 2.4 } else { 3.2 };
-        let tall = (lines * small).max(0.62 * width).min(width.max(lines * small));
-        let numbers = widest + 2.0 <= width;
-        let height = if numbers { tall } else { width.max(small * 1.1) };
-        let columns = column_lines(matrix, small, width, upright);
-        let names = names_px(&columns, small, upright);
-        let above =
-            names + if matrix.column_title.is_empty() { 8.0 } else { 1.6 * style.font_px + 8.0 };
-        let extent = (width * matrix.columns.len() as f64, height * rows.len() as f64);
+        let room = (style.width_px - left - right).max(60.0) / matrix.columns.len() as f64;
+        let (cell, upright, numbers) = matrix.cell_size(small, room);
+        let columns = column_lines(matrix, small, cell.0, upright);
+        let title_px = if matrix.column_title.is_empty() { 0.0 } else { 1.6 * style.font_px };
+        let above = names_px(&columns, small, upright) + title_px + 8.0;
+        let extent = (cell.0 * matrix.columns.len() as f64, cell.1 * rows.len() as f64);
         // A small matrix still leaves its title some room.
-        let width_px = (left + extent.0 + right).max(0.5 * style.width_px);
-        Self {
-            width: width_px,
-            left,
-            above,
-            cell: (width, height),
-            rows,
-            columns,
-            upright,
-            numbers,
-            extent,
-        }
+        let width = (left + extent.0 + right).max(0.5 * style.width_px);
+        Self { width, left, above, cell, rows, columns, upright, numbers, extent }
     }
 
     fn grid(&self, head: f64) -> Rect {
@@ -252,6 +244,11 @@ impl Layout {
         let (width, height) = self.cell;
         Rect { x: grid.x + column as f64 * width, y: grid.y + row as f64 * height, width, height }
     }
+}
+
+/// The width of the widest of `texts`.
+fn widest(texts: impl Iterator<Item = impl AsRef<str>>, size: f64) -> f64 {
+    texts.map(|t| text::width(t.as_ref(), size, Weight::Regular)).fold(0.0, f64::max)
 }
 
 /// The lines of each column's name.
@@ -266,8 +263,7 @@ fn column_lines(matrix: &Matrix, size: f64, width: f64, upright: bool) -> Vec<Ve
 /// The height that the column names take.
 fn names_px(columns: &[Vec<String>], size: f64, upright: bool) -> f64 {
     if upright {
-        let widths = columns.iter().flatten().map(|name| text::width(name, size, Weight::Regular));
-        return widths.fold(0.0, f64::max);
+        return widest(columns.iter().flatten(), size);
     }
     columns.iter().map(Vec::len).max().unwrap_or(0) as f64 * size * 1.35
 }

@@ -30,6 +30,8 @@ mod axis;
 mod chart;
 mod error;
 mod heat;
+#[cfg(test)]
+mod layout_tests;
 mod legend;
 mod raster;
 mod scene;

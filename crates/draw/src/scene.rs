@@ -122,7 +122,7 @@ pub struct GridScene {
 ///
 /// # Errors
 /// [`DrawError::Length`] if `cells` has not one entry per box; [`DrawError::TooLarge`] above 2^28
-/// boxes; [`DrawError::Value`] if a box or a track has no positive, finite size, the origin is not
+/// boxes; [`DrawError::Value`] if there is no box, a box or a track has no positive, finite size, the origin is not
 /// finite, or the style is impossible.
 pub fn to_svg(scene: &GridScene, style: &Style) -> Result<String, DrawError> {
     style.check()?;
@@ -144,6 +144,7 @@ fn check(scene: &GridScene) -> Result<(), DrawError> {
             limit: MOST_BOXES,
         });
     }
+    DrawError::some("number of the map's boxes", boxes as usize)?;
     DrawError::length("boxes of the map", boxes as usize, scene.cells.len())?;
     DrawError::positive("box size in m", scene.box_size_m)?;
     for value in scene.origin_m {
@@ -160,8 +161,8 @@ fn check(scene: &GridScene) -> Result<(), DrawError> {
 /// The scale at which the map fits the style's room; a whole number where boxes are large, so
 /// that walls have sharp edges.
 fn pixels_per_box(scene: &GridScene, style: &Style) -> f64 {
-    let across = style.width_px / f64::from(scene.width.max(1));
-    let upward = style.height_px / f64::from(scene.height.max(1));
+    let across = style.width_px / f64::from(scene.width);
+    let upward = style.height_px / f64::from(scene.height);
     let px = across.min(upward).min(LARGEST_BOX_PX);
     if px >= 2.0 { px.floor() } else { px }
 }

@@ -51,17 +51,18 @@ impl Style {
 
     /// Refuses sizes that give no picture or an absurd one.
     pub(crate) fn check(&self) -> Result<(), DrawError> {
-        Self::within("picture width in px", self.width_px, 100.0, 20_000.0)?;
-        Self::within("picture height in px", self.height_px, 100.0, 20_000.0)?;
-        Self::within("text size in px", self.font_px, 4.0, 200.0)
-    }
-
-    fn within(what: &'static str, value: f64, low: f64, high: f64) -> Result<(), DrawError> {
-        // Written so that NaN fails.
-        if value >= low && value <= high {
-            return Ok(());
+        let refuse = |what, value, must| Err(DrawError::Value { what, value, must });
+        for (what, side) in
+            [("picture width in px", self.width_px), ("picture height in px", self.height_px)]
+        {
+            if !(100.0..=20_000.0).contains(&side) {
+                return refuse(what, side, "100 to 20000");
+            }
         }
-        Err(DrawError::Value { what, value, must: "100 to 20000 (text 4 to 200)" })
+        if !(4.0..=100.0).contains(&self.font_px) {
+            return refuse("text size in px", self.font_px, "4 to 100");
+        }
+        Ok(())
     }
 }
 

@@ -27,6 +27,8 @@ pub(crate) fn fonts() -> Arc<fontdb::Database> {
         fonts.load_font_data(dejavu::sans::regular().to_vec());
         fonts.load_font_data(dejavu::sans::bold().to_vec());
         fonts.set_sans_serif_family("DejaVu Sans");
+        // What a text falls back to when its own font is not here.
+        fonts.set_serif_family("DejaVu Sans");
         Arc::new(fonts)
     }))
 }
@@ -49,11 +51,12 @@ pub(crate) fn width(text: &str, size_px: f64, weight: Weight) -> f64 {
     thousandths * size_px / 1000.0
 }
 
-/// Breaks `text` at spaces into lines at most `room_px` wide; a word wider than that is cut short
+/// Breaks `text` at spaces (not at no-break spaces) into lines at most `room_px` wide; a word wider than that is cut short
 /// with an ellipsis. Empty text has no lines.
 pub(crate) fn wrap(text: &str, size_px: f64, weight: Weight, room_px: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
-    for word in text.split_whitespace() {
+    // Not `split_whitespace`: a no-break space holds words together.
+    for word in text.split([' ', '\t', '\n']).filter(|word| !word.is_empty()) {
         let word = shorten(word, size_px, weight, room_px);
         match lines.last_mut() {
             Some(line) if width(&format!("{line} {word}"), size_px, weight) <= room_px => {
@@ -104,6 +107,12 @@ mod tests {
         assert!(lines.len() > 1);
         assert_eq!(lines.join(" "), text);
         assert!(lines.iter().all(|line| width(line, 12.0, Weight::Regular) <= 90.0));
+    }
+
+    #[test]
+    fn a_no_break_space_holds_words_together() {
+        let lines = wrap("closer than 0.5\u{a0}m", 12.0, Weight::Regular, 90.0);
+        assert_eq!(lines, ["closer than", "0.5\u{a0}m"]);
     }
 
     #[test]

@@ -55,6 +55,27 @@ impl Ticks {
     }
 }
 
+/// Keeps labels apart: those that would touch the one before are not written.
+pub(crate) struct Spacing {
+    free_from: f64,
+}
+
+impl Spacing {
+    pub(crate) fn new() -> Self {
+        Self { free_from: f64::NEG_INFINITY }
+    }
+
+    /// Whether a label `length_px` long around `center_px` has room; if so, that room is taken.
+    /// Labels come in rising order.
+    pub(crate) fn admits(&mut self, center_px: f64, length_px: f64) -> bool {
+        let fits = center_px - length_px / 2.0 >= self.free_from;
+        if fits {
+            self.free_from = center_px + length_px / 2.0;
+        }
+        fits
+    }
+}
+
 /// A range of positive numbers.
 struct Decades {
     low: f64,

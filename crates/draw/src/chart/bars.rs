@@ -1,6 +1,6 @@
 //! Grouped bars: one group per category, in each group one bar per series.
 
-use crate::axis::{Axis, Scale};
+use crate::axis::Axis;
 use crate::chart::error_bar;
 use crate::chart::frame::{Across, Frame, Words, most_ticks};
 use crate::error::DrawError;
@@ -10,6 +10,8 @@ use crate::svg::Rect;
 
 /// The part of a category's slot that its bars fill.
 const FILLED: f64 = 0.78;
+/// Bars are never wider than this.
+const WIDEST_PX: f64 = 60.0;
 
 /// The height of a bar, perhaps with its interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -128,6 +130,8 @@ impl BarChart {
         for (index, series) in self.series.iter().enumerate() {
             self.draw_series(&mut frame, index, series);
         }
+        let (base, area) = (frame.y.base_px(), frame.area);
+        frame.svg.line((area.x, base), (area.right(), base), format_args!(r#"stroke="{INK}""#));
         frame.svg.close_group();
         Ok(frame.finish())
     }
@@ -152,26 +156,26 @@ impl BarChart {
 
     fn draw_series(&self, frame: &mut Frame, index: usize, series: &BarSeries) {
         let slot = frame.area.width / self.categories.len().max(1) as f64;
-        let width = slot * FILLED / self.series.len() as f64;
-        let first = frame.area.x + slot * (1.0 - FILLED) / 2.0 + index as f64 * width;
+        let count = self.series.len() as f64;
+        let width = (slot * FILLED / count).min(WIDEST_PX);
+        // From the middle of the slot to the middle of this series' bar.
+        let aside = (index as f64 - (count - 1.0) / 2.0) * width;
         for (category, bar) in series.bars.iter().enumerate() {
             if self.y.holds(bar.value) {
-                let x = first + category as f64 * slot;
-                draw_bar(frame, bar, (x, width.min(60.0), width), series_color(index));
+                let center = frame.area.x + (category as f64 + 0.5) * slot + aside;
+                draw_bar(frame, bar, center, width, series_color(index));
             }
         }
     }
 }
 
-/// Draws `bar` in the middle of the room `(left, bar's width, room's width)`.
-fn draw_bar(frame: &mut Frame, bar: &Bar, (left, width, room): (f64, f64, f64), color: &str) {
-    let center = left + room / 2.0;
-    let gap = (0.06 * width).min(1.5);
-    let x = center - width / 2.0 + gap / 2.0;
-    column(frame, (x, width - gap), bar.value, color);
+/// Draws `bar` around `center`; a little of its `width` stays free beside the next one.
+fn draw_bar(frame: &mut Frame, bar: &Bar, center: f64, width: f64, color: &str) {
+    let filled = width - (0.06 * width).min(1.5);
+    column(frame, (center - filled / 2.0, filled), bar.value, color);
     if let Some((low, high)) = bar.interval.filter(|(l, h)| l.is_finite() && h.is_finite()) {
-        let y: Scale = frame.y;
-        error_bar(&mut frame.svg, center, (y.px(low), y.px(high)), (0.2 * width).min(5.0), INK);
+        let ends = (frame.y.px(low), frame.y.px(high));
+        error_bar(&mut frame.svg, center, ends, (0.2 * width).min(5.0), INK);
     }
 }
 

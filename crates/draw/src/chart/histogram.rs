@@ -97,7 +97,9 @@ impl Histogram {
         style.check()?;
         let (most_across, most_up) = most_ticks(style);
         let x = self.x.clone().tight().fit(self.edges.iter().copied(), most_across)?;
-        let y = self.y.fit(self.counts.iter().map(|&n| n as f64).chain([0.0, 0.8]), most_up)?;
+        // Without any counts the axis still shows where one would be.
+        let counts = self.counts.iter().map(|&n| n as f64).chain([0.0, 1.0]);
+        let y = self.y.clone().counting().fit(counts, most_up)?;
         let words = Words {
             title: &self.title,
             note: &self.note,

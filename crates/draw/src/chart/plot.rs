@@ -182,7 +182,7 @@ impl Plot {
         self.series.iter().flat_map(|s| &s.points).filter(|p| self.holds(p))
     }
 
-    /// One entry per series and ideal line; a lone series says nothing the title does not.
+    /// One entry per series and ideal line.
     fn legend(&self) -> Vec<Entry> {
         let series = self.series.iter().enumerate().map(|(index, series)| {
             let (color, marker) = (series_color(index), Marker::of_series(index));

@@ -6,10 +6,12 @@ use crate::legend::{Entry, Legend, Symbol, paragraph, title_look};
 use crate::style::{INK, Style, series_color};
 use crate::svg::{Anchor, Rect, Svg, TextLook};
 use crate::text::{self, Weight};
-use crate::ticks::{Ticks, decimals, label, nice_step};
+use crate::ticks::{Spacing, Ticks, decimals, label, nice_step};
 
 const EDGE_PX: f64 = 10.0;
 const TICK_PX: f64 = 4.0;
+/// The length of "y (m)" in letter sizes.
+const Y_LABEL_LETTERS: f64 = 3.0;
 /// Pictures are at least this wide, in letters, for the sake of title and legend.
 const LEAST_LETTERS: f64 = 32.0;
 /// Tracks beyond this share one line of the legend.
@@ -22,6 +24,8 @@ pub(super) struct Sheet {
     /// Pixels per box.
     pub(super) px: f64,
     width: f64,
+    /// How far the label of a low map's vertical axis stands out above and below it.
+    spill: f64,
 }
 
 /// One edge of the map in meters.
@@ -37,11 +41,8 @@ impl Edge {
         let most = ((f64::from(boxes) * px / tick_room_px) as usize).clamp(1, 12);
         // Sizes that a double cannot tell apart at this origin have no ticks.
         let exact = meters > 1e-9 * origin_m.abs() && meters.is_finite();
-        let ticks = if exact && boxes > 0 {
-            Ticks::linear(origin_m, origin_m + meters, most)
-        } else {
-            Ticks::default()
-        };
+        let ticks =
+            if exact { Ticks::linear(origin_m, origin_m + meters, most) } else { Ticks::default() };
         Self { origin_m, meters, ticks }
     }
 
@@ -68,9 +69,10 @@ impl Sheet {
         let lines = text::wrap(&scene.title, style.title_px(), Weight::Bold, width - 2.0 * EDGE_PX);
         let top = paragraph(svg, &lines, (EDGE_PX, EDGE_PX), &title_look(style.title_px()));
         // Whole pixels, for sharp edges.
-        let (x, y) = (left.ceil(), (top + 8.0).ceil());
+        let spill = ((Y_LABEL_LETTERS * style.font_px - map_height) / 2.0).max(0.0);
+        let (x, y) = (left.ceil(), (top + spill + 8.0).ceil());
         let map = Rect { x, y, width: map_width, height: map_height };
-        let sheet = Self { map, px, width };
+        let sheet = Self { map, px, width, spill };
         sheet.draw_across(svg, style, &across);
         sheet.draw_upward(svg, style, &upward);
         sheet
@@ -83,7 +85,8 @@ impl Sheet {
         scene: &GridScene,
         style: &Style,
     ) -> Result<String, DrawError> {
-        let top = self.map.bottom() + TICK_PX + style.small_px() + 1.6 * style.font_px + 14.0;
+        let axis_px = TICK_PX + style.small_px() + 1.6 * style.font_px + 14.0;
+        let top = self.map.bottom() + axis_px.max(self.spill + 8.0);
         let bar_px = self.draw_scale_bar(&mut svg, scene, style, top);
         let left = self.map.x + bar_px + 2.0 * style.font_px;
         let legend = Legend::lay_out(entries(scene), style.small_px(), self.width - left - EDGE_PX);
@@ -113,10 +116,14 @@ impl Sheet {
         let bottom = self.map.bottom();
         let look = TextLook::new(style.small_px(), Anchor::Middle);
         let baseline = bottom + TICK_PX + 3.0 + look.size_px;
+        let mut spacing = Spacing::new();
         for (part, label) in edge.marks() {
             let x = self.map.x + part * self.map.width;
-            svg.line((x, bottom), (x, bottom + TICK_PX), format_args!(r#"stroke="{INK}""#));
-            svg.text(x, baseline, label, &look);
+            let label_px = text::width(label, look.size_px, Weight::Regular) + 0.5 * look.size_px;
+            if spacing.admits(x, label_px) {
+                svg.line((x, bottom), (x, bottom + TICK_PX), format_args!(r#"stroke="{INK}""#));
+                svg.text(x, baseline, label, &look);
+            }
         }
         let look = TextLook::new(style.font_px, Anchor::Middle);
         svg.text(
@@ -130,23 +137,28 @@ impl Sheet {
     fn draw_upward(&self, svg: &mut Svg, style: &Style, edge: &Edge) {
         let left = self.map.x;
         let look = TextLook::new(style.small_px(), Anchor::End);
+        let mut spacing = Spacing::new();
         for (part, label) in edge.marks() {
             let y = self.map.bottom() - part * self.map.height;
-            svg.line((left - TICK_PX, y), (left, y), format_args!(r#"stroke="{INK}""#));
-            svg.text(left - TICK_PX - 3.0, y + look.middle_px(), label, &look);
+            if spacing.admits(-y, look.size_px) {
+                svg.line((left - TICK_PX, y), (left, y), format_args!(r#"stroke="{INK}""#));
+                svg.text(left - TICK_PX - 3.0, y + look.middle_px(), label, &look);
+            }
         }
         let look = TextLook { upward: true, ..TextLook::new(style.font_px, Anchor::Middle) };
         svg.text(EDGE_PX + style.font_px, self.map.y + self.map.height / 2.0, "y (m)", &look);
     }
 
-    /// Draws a bar of round length, about a fifth of the map, and returns its width in pixels.
+    /// Draws a bar of round length, about a fifth of the map's longer side but less than half the
+    /// picture's width. Returns the room it takes, in pixels.
     fn draw_scale_bar(&self, svg: &mut Svg, scene: &GridScene, style: &Style, top: f64) -> f64 {
-        let wide_m = self.map.width / self.px * scene.box_size_m;
-        if self.map.width < 1.0 || !wide_m.is_finite() {
+        let meters_per_px = scene.box_size_m / self.px;
+        let wanted_px = (0.2 * self.map.width.max(self.map.height)).min(0.18 * self.width);
+        let length_m = nice_step(wanted_px * meters_per_px, 1);
+        let length_px = length_m / meters_per_px;
+        if !length_px.is_finite() {
             return 0.0;
         }
-        let length_m = nice_step(wide_m / 5.0, 1);
-        let length_px = length_m / scene.box_size_m * self.px;
         let words = format!("{} m", label(length_m, decimals(length_m)));
         let look = TextLook::new(style.small_px(), Anchor::Middle);
         let text_px = text::width(&words, look.size_px, Weight::Regular);
@@ -165,13 +177,17 @@ impl Sheet {
 /// The legend: only what the picture has.
 fn entries(scene: &GridScene) -> Vec<Entry> {
     let swatch = |fill, rim| Symbol::Swatch { fill, rim, opacity: 1.0 };
-    let is_person = |shade: BodyShade| shade == BodyShade::Active;
+    let is_mobile = |shade: BodyShade| shade == BodyShade::Active;
     let kinds = [
         (scene.cells.contains(&CellShade::Wall), swatch(WALL, "none"), "wall"),
         (scene.cells.contains(&CellShade::Unknown), swatch(UNKNOWN, "#CCCCCC"), "unknown"),
         (scene.doors.iter().any(|d| !d.open), swatch(ACTIVE, ACTIVE_RIM), "door, closed"),
         (scene.doors.iter().any(|d| d.open), swatch("#FFFFFF", ACTIVE_RIM), "door, open"),
-        (scene.bodies.iter().any(|b| is_person(b.shade)), swatch(ACTIVE, ACTIVE_RIM), "person"),
+        (
+            scene.bodies.iter().any(|b| is_mobile(b.shade)),
+            swatch(ACTIVE, ACTIVE_RIM),
+            "mobile object",
+        ),
         (!scene.tracks.is_empty(), Symbol::Ring, "start"),
         (!scene.tracks.is_empty(), Symbol::Disc, "end"),
     ];
