@@ -35,6 +35,9 @@ pub struct RobotsSimulation {
     tables: Vec<Table>,
 }
 
+/// Names of the headings by number.
+pub const HEADING_NAMES: [&str; 4] = ["east", "north", "west", "south"];
+
 /// The tables of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Table {
@@ -342,7 +345,11 @@ impl RobotsSimulation {
                         ColumnType::U32,
                         "row of the body's lower-left box, from the south",
                     ),
-                    column("heading_deg", ColumnType::U32, "heading, counter-clockwise from east"),
+                    label(
+                        "heading",
+                        "where the body looks",
+                        HEADING_NAMES.map(String::from).to_vec(),
+                    ),
                 ],
             ),
             Table::Events => {
