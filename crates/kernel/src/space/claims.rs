@@ -71,8 +71,8 @@ pub struct ClaimGrid {
     patches_per_row: u32,
     /// Per patch: cycle (upper half) and last registered body (lower half).
     first: Vec<AtomicU64>,
-    /// The body registered in the same patch before this one.
-    next: Column<Slot>,
+    /// Per body: its anchor (upper half), and the body registered in the same patch before it.
+    entries: Column<u64>,
 }
 
 impl ClaimGrid {
@@ -97,8 +97,8 @@ impl ClaimGrid {
         let patches_per_row = (width >> PATCH_BITS) + 1;
         let patches = patches_per_row as usize * ((height >> PATCH_BITS) + 1) as usize;
         let first = (0..patches).map(|_| AtomicU64::new(u64::MAX)).collect();
-        let next = Column::filled(bodies, NO_BODY);
-        Self { width, reach, tags, patches_per_row, first, next }
+        let entries = Column::filled(bodies, u64::from(NO_BODY));
+        Self { width, reach, tags, patches_per_row, first, entries }
     }
 
     /// The tag of a body anchored at box `anchor`.
@@ -146,25 +146,28 @@ impl ClaimGrid {
             first.swap(entry, Relaxed)
         };
         let next = if before >> 32 == stamp >> 32 { before as u32 } else { NO_BODY };
-        self.next.set(body as usize, next);
+        self.entries.set(body as usize, u64::from(anchor.word()) << 32 | u64::from(next));
     }
 
-    /// The body whose tag stands in box `at`; `anchor_of` tells the anchor of a body.
+    /// The body registered under an anchor.
     ///
     /// # Panics
-    /// When no such body was registered in this cycle, which is a bug.
-    pub fn body(&self, at: u32, tag: Tag, anchor_of: impl Fn(Slot) -> Position) -> Slot {
-        let anchor = self.anchor(at, tag);
+    /// When no body was registered there in this cycle, which is a bug: a tag always names
+    /// a registered body.
+    pub fn body(&self, anchor: Position) -> Slot {
         let mut body = self.first[self.patch(anchor)].load(Relaxed) as u32;
-        while anchor_of(body) != anchor {
-            body = self.next.get(body as usize);
+        loop {
+            let entry = self.entries.get(body as usize);
+            if (entry >> 32) as u32 == anchor.word() {
+                return body;
+            }
+            body = entry as u32;
             assert!(body != NO_BODY, "a tag names a registered body");
         }
-        body
     }
 
     /// The only anchor from which `tag` can have come into box `at`.
-    fn anchor(&self, at: u32, tag: Tag) -> Position {
+    pub fn anchor(&self, at: u32, tag: Tag) -> Position {
         let at = Position::from_index(at, self.width);
         let (mask, bits) = self.modulus();
         let nearest = |at: u32, residue: u32| {
@@ -195,7 +198,7 @@ impl ClaimGrid {
             Tags::Narrow(tags) => tags.heap_bytes(),
             Tags::Wide(tags) => tags.heap_bytes(),
         };
-        (tags + self.first.len() * 8, self.next.heap_bytes())
+        (tags + self.first.len() * 8, self.entries.heap_bytes())
     }
 }
 
@@ -229,7 +232,7 @@ mod tests {
                 slots().for_each(|s| claims(s).iter().for_each(|&b| grid.claim(b, grid.tag(anchor_of(s)))));
                 for slot in slots() {
                     for at in claims(slot) {
-                        let named = grid.body(at, grid.claimant(at), anchor_of);
+                        let named = grid.body(grid.anchor(at, grid.claimant(at)));
                         prop_assert!(claims(named).contains(&at));
                     }
                 }

@@ -97,7 +97,7 @@ pub struct MotionSample {
 pub struct Scratch {
     readings: Vec<Reading>,
     heard: Vec<decide::Heard>,
-    keys: Vec<((u8, u32, u32), Slot)>,
+    order: Vec<resolve::Place>,
     keep_events: bool,
     keep_samples: bool,
     events: Vec<Event>,
@@ -146,11 +146,15 @@ impl World for RobotsWorld {
 
     #[inline]
     fn react(&self, state: &RobotsState, now: Cycle, group: &mut [Slot], scratch: &mut Scratch) {
-        if group.len() > 1 {
-            self.order(state, now, group, scratch);
+        if let [alone] = *group {
+            let id = state.bodies[alone as usize].id;
+            return self.act(state, now, alone, self.act_words(id, now)[0], scratch);
         }
-        for &slot in &*group {
-            self.act(state, now, slot, scratch);
+        self.order(state, now, group, scratch);
+        let order = std::mem::take(&mut scratch.order);
+        for place in &order {
+            self.act(state, now, place.slot, place.word, scratch);
         }
+        scratch.order = order;
     }
 }

@@ -16,8 +16,10 @@ pub const FREE: u8 = 0;
 /// The static map's walls.
 pub const WALL: u8 = 1;
 
-/// Nothing intended; otherwise an action's id plus 1.
+/// Nothing intended; otherwise an action's id plus 1, with or without [`CLEAR`].
 pub const IDLE: u8 = 0;
+/// Added to an intent when every box that the action may sweep is free.
+pub const CLEAR: u8 = 0x80;
 
 /// The state of a robots world.
 #[derive(Debug)]
@@ -61,6 +63,12 @@ pub struct BodyCell {
     pub trip_cycles: Shared<u64>,
     /// Cycle in which the present trip began.
     pub trip_begun: Shared<u64>,
+    /// The entity, constant.
+    pub id: u32,
+    /// Its type, constant.
+    pub ty: u16,
+    /// Which of its type's actions it is about to do, see `BodyType::actions`.
+    pub action: Shared<u16>,
 }
 
 impl BodyCell {
@@ -148,7 +156,11 @@ impl RobotsState {
         Self {
             grid: world.walls.iter().copied().collect(),
             claims: ClaimGrid::new(world.stride, world.rows, n, reach, extent),
-            bodies: (0..n).map(|_| BodyCell::default()).collect(),
+            bodies: world
+                .bodies
+                .iter()
+                .map(|b| BodyCell { id: b.id, ty: b.ty, ..BodyCell::default() })
+                .collect(),
             contacts: Column::filled(n * world.kinds.len(), 0),
             voice: [radio(), radio()],
             frames: None,
