@@ -1,7 +1,38 @@
 #![deny(clippy::disallowed_methods)]
-//! placeholder
+//! How any world is simulated: no files, no sockets, no wall clock.
+//!
+//! ```text
+//! World (immutable) + State (columns)         one cycle, run by W workers
+//!   pool one : perceive, decide, claim   │ barrier │   cycle.rs knows the order
+//!   joining  : claims -> conflict groups │ barrier │   conflict.rs
+//!   pool two : groups react              │ barrier │   workers.rs knows the threads
+//! ```
+//!
+//! What the modules promise:
+//! - [`stream`]: a draw is a function of (seed, entity, cycle, purpose, index) alone.
+//! - [`workers`], [`cycle`]: the same bits for every number of workers.
+//! - [`digest`], [`checkpoint`]: a state has one digest, and continues bit for bit.
+//! - [`ports`]: recorder, transport and clock, each with an in-memory version.
 
+pub mod checkpoint;
+pub mod column;
+pub mod conflict;
+pub mod cycle;
+pub mod digest;
+pub mod distr;
 pub mod error;
+pub mod math;
 pub mod ports;
+pub mod simulation;
+pub mod space;
+pub mod stream;
+pub mod units;
+pub mod workers;
+pub mod world;
 
+pub use column::Column;
+pub use digest::Digest;
 pub use error::InputError;
+pub use simulation::Simulation;
+pub use units::{Cycle, EntityId, Seed, Slot};
+pub use world::World;

@@ -3,8 +3,10 @@
 
 pub mod clock;
 pub mod recorder;
+pub mod transport;
 
 pub use clock::{Clock, ManualClock, SystemClock};
 pub use recorder::{
     ColumnSpec, ColumnType, MemoryRecorder, RecordError, Recorder, TableSchema, Values,
 };
+pub use transport::{Envelope, Faults, MemoryTransport, Transport};

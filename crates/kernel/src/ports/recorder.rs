@@ -249,10 +249,10 @@ pub fn conformance_schemas() -> Vec<TableSchema> {
 ///
 /// # Panics
 /// When a promise is broken.
-pub fn conformance<R: Recorder>(mut recorder: R, read_back: impl Fn(R, usize, usize) -> Values)
-where
-    R: Clone,
-{
+pub fn conformance<R: Recorder + Clone>(
+    mut recorder: R,
+    read_back: impl Fn(R, usize, usize) -> Values,
+) {
     let first = |from: u64| {
         vec![
             Values::U64((from..from + 3).collect()),

@@ -1,0 +1,166 @@
+//! A state as bytes that continue a run bit for bit, or say why they cannot.
+//!
+//! ```text
+//! magic 8 | header (postcard) | state (postcard) | BLAKE3 of all before, 16 bytes
+//! ```
+
+use crate::digest::Digest;
+use crate::units::Cycle;
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
+
+const MAGIC: &[u8; 8] = b"SIDESTEP";
+
+/// Raised when the layout of checkpoints changes; older ones are then refused.
+pub const FORMAT: u32 = 1;
+
+/// What a checkpoint belongs to.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Header {
+    /// [`FORMAT`] of the writer.
+    pub format: u32,
+    /// Version of the program that wrote it; results may differ between versions.
+    pub program_version: String,
+    /// Name of the world.
+    pub world: String,
+    /// Digest of the resolved scenario's text.
+    pub scenario: [u8; 16],
+    /// Cycles done.
+    pub cycle: Cycle,
+}
+
+/// Why a checkpoint cannot be continued.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CheckpointError {
+    /// Not a checkpoint at all.
+    #[error("this is not a checkpoint")]
+    NotACheckpoint,
+    /// Cut short or changed.
+    #[error("the checkpoint is damaged: its checksum does not fit")]
+    Damaged,
+    /// Written with another layout.
+    #[error("the checkpoint has format {found}, this program reads format {FORMAT}")]
+    Format {
+        /// Its format.
+        found: u32,
+    },
+    /// Of another program version, world or scenario.
+    #[error("the checkpoint belongs to {what} `{found}`, not `{expected}`")]
+    Foreign {
+        /// What differs.
+        what: &'static str,
+        /// What the checkpoint says.
+        found: String,
+        /// What was asked for.
+        expected: String,
+    },
+}
+
+/// Encodes a state.
+///
+/// # Panics
+/// When the state cannot be serialized, which is a bug of the world.
+pub fn encode(header: &Header, state: &impl Serialize) -> Vec<u8> {
+    let mut bytes = MAGIC.to_vec();
+    bytes = postcard::to_extend(header, bytes).expect("a header is plain data");
+    bytes = postcard::to_extend(state, bytes).expect("a state is plain data");
+    let checksum = Digest::of(&bytes);
+    bytes.extend_from_slice(checksum.as_bytes());
+    bytes
+}
+
+/// Reads the header alone, after checking the whole.
+///
+/// # Errors
+/// When the bytes are no checkpoint, damaged, or of another format.
+pub fn decode_header(bytes: &[u8]) -> Result<Header, CheckpointError> {
+    split(bytes).map(|(header, _)| header)
+}
+
+/// Decodes a state written for `expected` (whose `cycle` is not compared).
+///
+/// # Errors
+/// When the bytes are no checkpoint, damaged, of another format, or of another program
+/// version, world or scenario.
+pub fn decode<S: DeserializeOwned>(
+    bytes: &[u8],
+    expected: &Header,
+) -> Result<(Cycle, S), CheckpointError> {
+    let (header, rest) = split(bytes)?;
+    belongs("version", &header.program_version, &expected.program_version)?;
+    belongs("world", &header.world, &expected.world)?;
+    belongs("scenario", &hex(&header.scenario), &hex(&expected.scenario))?;
+    let state = postcard::from_bytes(rest).map_err(|_| CheckpointError::Damaged)?;
+    Ok((header.cycle, state))
+}
+
+fn split(bytes: &[u8]) -> Result<(Header, &[u8]), CheckpointError> {
+    let body = bytes.strip_prefix(MAGIC).ok_or(CheckpointError::NotACheckpoint)?;
+    let (_, checksum) = bytes.split_last_chunk::<16>().ok_or(CheckpointError::Damaged)?;
+    let whole = &bytes[..bytes.len() - 16];
+    if body.len() < 16 || Digest::of(whole).as_bytes() != checksum {
+        return Err(CheckpointError::Damaged);
+    }
+    let body = &body[..body.len() - 16];
+    let (found, _): (u32, _) =
+        postcard::take_from_bytes(body).map_err(|_| CheckpointError::Damaged)?;
+    if found != FORMAT {
+        return Err(CheckpointError::Format { found });
+    }
+    postcard::take_from_bytes(body).map_err(|_| CheckpointError::Damaged)
+}
+
+fn belongs(what: &'static str, found: &str, expected: &str) -> Result<(), CheckpointError> {
+    if found == expected {
+        return Ok(());
+    }
+    let (found, expected) = (found.to_string(), expected.to_string());
+    Err(CheckpointError::Foreign { what, found, expected })
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|b| format!("{b:02x}")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn header() -> Header {
+        Header {
+            format: FORMAT,
+            program_version: "1.2.3".into(),
+            world: "toy".into(),
+            scenario: [7; 16],
+            cycle: 99,
+        }
+    }
+
+    #[test]
+    fn a_state_comes_back_whole() {
+        let bytes = encode(&header(), &vec![1u64, 2, 3]);
+        assert_eq!(decode::<Vec<u64>>(&bytes, &header()), Ok((99, vec![1, 2, 3])));
+        assert_eq!(decode_header(&bytes), Ok(header()));
+    }
+
+    #[test]
+    fn any_cut_and_any_changed_byte_is_noticed() {
+        let bytes = encode(&header(), &vec![1u64, 2, 3]);
+        for n in 0..bytes.len() {
+            assert!(decode::<Vec<u64>>(&bytes[..n], &header()).is_err(), "cut to {n} bytes");
+            let mut changed = bytes.clone();
+            changed[n] ^= 1;
+            assert!(decode::<Vec<u64>>(&changed, &header()).is_err(), "byte {n} changed");
+        }
+    }
+
+    #[test]
+    fn a_foreign_checkpoint_says_what_differs() {
+        let bytes = encode(&header(), &0u8);
+        let other = Header { world: "robots".into(), ..header() };
+        let error = decode::<u8>(&bytes, &other).expect_err("another world");
+        assert_eq!(error.to_string(), "the checkpoint belongs to world `toy`, not `robots`");
+        let old = encode(&Header { format: 0, ..header() }, &0u8);
+        assert_eq!(decode::<u8>(&old, &header()), Err(CheckpointError::Format { found: 0 }));
+    }
+}

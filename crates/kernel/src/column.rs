@@ -1,0 +1,132 @@
+//! A column of a state that workers share: one plain value per slot.
+//!
+//! The kernel's phases guarantee one writer per slot and phase, and a barrier between
+//! phases; so a relaxed load or store, an ordinary `mov` on every machine, is all that is
+//! needed, and no code is `unsafe`. A broken guarantee would show as a wrong value (and in
+//! the determinism tests), never as undefined behavior.
+
+use std::sync::atomic::{AtomicU8, AtomicU16, AtomicU32, AtomicU64, Ordering::Relaxed};
+
+/// A word that fits an atomic.
+pub trait Word: Copy + Default + Send + Sync + 'static {
+    /// The atomic that holds it.
+    type Cell: Send + Sync;
+    /// A cell with this value.
+    fn cell(self) -> Self::Cell;
+    /// Reads a cell.
+    fn load(cell: &Self::Cell) -> Self;
+    /// Writes a cell.
+    fn store(cell: &Self::Cell, value: Self);
+}
+
+macro_rules! word {
+    ($($t:ty, $atomic:ty;)*) => {$(
+        impl Word for $t {
+            type Cell = $atomic;
+            #[inline(always)]
+            fn cell(self) -> $atomic { <$atomic>::new(self) }
+            #[inline(always)]
+            fn load(cell: &$atomic) -> Self { cell.load(Relaxed) }
+            #[inline(always)]
+            fn store(cell: &$atomic, value: Self) { cell.store(value, Relaxed) }
+        }
+    )*};
+}
+word! { u8, AtomicU8; u16, AtomicU16; u32, AtomicU32; u64, AtomicU64; }
+
+/// One value per slot, shared by the workers.
+pub struct Column<T: Word>(Box<[T::Cell]>);
+
+impl<T: Word> Column<T> {
+    /// `n` slots that hold `value`.
+    pub fn filled(n: usize, value: T) -> Self {
+        (0..n).map(|_| value).collect()
+    }
+
+    /// The value of a slot.
+    #[inline(always)]
+    pub fn get(&self, slot: usize) -> T {
+        T::load(&self.0[slot])
+    }
+
+    /// Sets a slot; only its one writer of the phase may.
+    #[inline(always)]
+    pub fn set(&self, slot: usize, value: T) {
+        T::store(&self.0[slot], value);
+    }
+
+    /// The cells of a range of slots, for loops without bounds checks.
+    #[inline(always)]
+    pub fn cells(&self) -> &[T::Cell] {
+        &self.0
+    }
+
+    /// Number of slots.
+    pub fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    /// True without slots.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// All values in slot order.
+    pub fn iter(&self) -> impl Iterator<Item = T> + '_ {
+        self.0.iter().map(T::load)
+    }
+
+    /// Bytes on the heap.
+    pub fn heap_bytes(&self) -> usize {
+        std::mem::size_of_val(&*self.0)
+    }
+}
+
+impl<T: Word> FromIterator<T> for Column<T> {
+    fn from_iter<I: IntoIterator<Item = T>>(values: I) -> Self {
+        Self(values.into_iter().map(T::cell).collect())
+    }
+}
+
+impl<T: Word> Clone for Column<T> {
+    fn clone(&self) -> Self {
+        self.iter().collect()
+    }
+}
+
+impl<T: Word + std::fmt::Debug> std::fmt::Debug for Column<T> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_list().entries(self.iter()).finish()
+    }
+}
+
+impl Column<u32> {
+    /// Adds to a slot's counter, wrapping never in practice (2^32 events).
+    #[inline(always)]
+    pub fn add(&self, slot: usize, by: u32) {
+        self.set(slot, self.get(slot).wrapping_add(by));
+    }
+}
+
+impl Column<u64> {
+    /// Adds to a slot's counter.
+    #[inline(always)]
+    pub fn add(&self, slot: usize, by: u64) {
+        self.set(slot, self.get(slot).wrapping_add(by));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_column_keeps_what_is_set() {
+        let column: Column<u32> = [1, 2, 3].into_iter().collect();
+        column.set(1, 9);
+        column.add(2, 4);
+        assert_eq!(column.iter().collect::<Vec<_>>(), [1, 9, 7]);
+        assert_eq!((column.len(), column.heap_bytes()), (3, 12));
+        assert_eq!(format!("{:?}", column.clone()), "[1, 9, 7]");
+    }
+}

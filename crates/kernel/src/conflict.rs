@@ -1,0 +1,182 @@
+//! Conflict groups: bodies whose claims intersect, and what hangs together by that.
+//!
+//! A lock-free union-find over slots. Joining is commutative and associative, so the groups
+//! depend neither on the worker that found a conflict nor on the order of finding: a group's
+//! leader is its smallest slot, and its members are what hangs below the leader in the
+//! forest of joins. A body hangs below another at most once a cycle, so the forest needs
+//! three words per body and no allocation.
+
+use crate::column::Column;
+use crate::units::Slot;
+use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
+
+const NONE: Slot = Slot::MAX;
+
+/// The conflict groups of one cycle over slots `0..n`.
+#[derive(Debug)]
+pub struct Groups {
+    /// Towards the leader; a leader points at itself.
+    parent: Column<Slot>,
+    /// Last slot that was hung below this one.
+    first_child: Column<Slot>,
+    /// The slot that was hung below the same one before this.
+    next_sibling: Column<Slot>,
+}
+
+impl Groups {
+    /// Every one of `n` slots alone.
+    pub fn new(n: usize) -> Self {
+        Self {
+            parent: (0..n as Slot).collect(),
+            first_child: Column::filled(n, NONE),
+            next_sibling: Column::filled(n, NONE),
+        }
+    }
+
+    /// Makes `slot` alone again; by one worker, before the first join of a cycle.
+    #[inline]
+    pub fn reset(&self, slot: Slot) {
+        self.parent.set(slot as usize, slot);
+        self.first_child.set(slot as usize, NONE);
+    }
+
+    /// The leader of a slot's group: its smallest member, once all joins are done.
+    #[inline]
+    pub fn leader(&self, mut slot: Slot) -> Slot {
+        loop {
+            let parent = self.parent.get(slot as usize);
+            if parent == slot {
+                return slot;
+            }
+            let grandparent = self.parent.get(parent as usize);
+            // Path halving. A slot that hangs stays hanging and parents only shrink, so a
+            // racing store can but shorten the way less.
+            self.parent.set(slot as usize, grandparent);
+            slot = grandparent;
+        }
+    }
+
+    /// Puts two slots into one group. Any worker may, at any time between two barriers.
+    pub fn join(&self, a: Slot, b: Slot) {
+        let (mut a, mut b) = (a, b);
+        loop {
+            (a, b) = (self.leader(a), self.leader(b));
+            if a == b {
+                return;
+            }
+            let (upper, lower) = (a.min(b), a.max(b));
+            if cell(&self.parent, lower).compare_exchange(lower, upper, Relaxed, Relaxed).is_ok() {
+                let before = cell(&self.first_child, upper).swap(lower, Relaxed);
+                self.next_sibling.set(lower as usize, before);
+                return;
+            }
+        }
+    }
+
+    /// True for a slot that leads its group; read after the barrier that ends joining.
+    #[inline]
+    pub fn is_leader(&self, slot: Slot) -> bool {
+        self.parent.get(slot as usize) == slot
+    }
+
+    /// True for a leader without other members.
+    #[inline]
+    pub fn is_alone(&self, slot: Slot) -> bool {
+        self.first_child.get(slot as usize) == NONE && self.is_leader(slot)
+    }
+
+    /// Writes the members of a leader's group into `members`, in no particular order.
+    pub fn members(&self, leader: Slot, members: &mut Vec<Slot>) {
+        members.clear();
+        members.push(leader);
+        let mut read = 0;
+        while read < members.len() {
+            let mut child = self.first_child.get(members[read] as usize);
+            while child != NONE {
+                members.push(child);
+                child = self.next_sibling.get(child as usize);
+            }
+            read += 1;
+        }
+    }
+
+    /// Bytes on the heap.
+    pub fn heap_bytes(&self) -> usize {
+        self.parent.heap_bytes() + self.first_child.heap_bytes() + self.next_sibling.heap_bytes()
+    }
+}
+
+fn cell(column: &Column<Slot>, slot: Slot) -> &AtomicU32 {
+    &column.cells()[slot as usize]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn partition(n: usize, groups: &Groups) -> Vec<Vec<Slot>> {
+        let mut all = Vec::new();
+        for slot in (0..n as Slot).filter(|&s| groups.is_leader(s)) {
+            let mut members = Vec::new();
+            groups.members(slot, &mut members);
+            assert_eq!(groups.is_alone(slot), members.len() == 1);
+            members.sort_unstable();
+            assert_eq!(members[0], slot, "the leader is the smallest member");
+            all.push(members);
+        }
+        all
+    }
+
+    /// Components by repeated relabeling: slow and obviously right.
+    fn oracle(n: usize, edges: &[(usize, usize)]) -> Vec<Vec<Slot>> {
+        let mut label: Vec<usize> = (0..n).collect();
+        for _ in 0..n {
+            for &(a, b) in edges {
+                let low = label[a].min(label[b]);
+                (label[a], label[b]) = (low, low);
+            }
+        }
+        let mut groups = vec![Vec::new(); n];
+        for (slot, &l) in label.iter().enumerate() {
+            groups[l].push(slot as Slot);
+        }
+        groups.retain(|g| !g.is_empty());
+        groups
+    }
+
+    proptest! {
+        #[test]
+        fn groups_are_the_connected_components(edges in prop::collection::vec((0usize..40, 0usize..40), 0..60)) {
+            let groups = Groups::new(40);
+            for &(a, b) in &edges {
+                groups.join(a as Slot, b as Slot);
+            }
+            prop_assert_eq!(partition(40, &groups), oracle(40, &edges));
+        }
+
+        #[test]
+        fn joining_from_two_threads_gives_the_same_groups(edges in prop::collection::vec((0usize..300, 0usize..300), 0..400)) {
+            let groups = Groups::new(300);
+            std::thread::scope(|scope| {
+                for part in 0..2 {
+                    let (groups, edges) = (&groups, &edges);
+                    scope.spawn(move || {
+                        for (a, b) in edges.iter().skip(part).step_by(2) {
+                            groups.join(*a as Slot, *b as Slot);
+                        }
+                    });
+                }
+            });
+            prop_assert_eq!(partition(300, &groups), oracle(300, &edges));
+        }
+    }
+
+    #[test]
+    fn reset_takes_a_group_apart() {
+        let groups = Groups::new(3);
+        groups.join(0, 2);
+        (0..3).for_each(|s| groups.reset(s));
+        assert!((0..3).all(|s| groups.is_alone(s)));
+    }
+}

@@ -1,0 +1,194 @@
+//! Distributions that turn words of a [`crate::stream`] into outcomes, with integer
+//! thresholds, so that a draw is the same on every machine.
+
+use crate::math;
+use crate::stream::Draws;
+
+/// How far the probabilities of a row may be from summing to 1.
+pub const ROW_TOLERANCE: f64 = 1e-6;
+
+/// What is wrong with a row of probabilities.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum RowError {
+    /// No outcome at all.
+    #[error("the row is empty")]
+    Empty,
+    /// A probability outside [0, 1] or not a number.
+    #[error("entry {index} is {value}, not a probability between 0 and 1")]
+    NotAProbability {
+        /// Position in the row, from 1.
+        index: usize,
+        /// Its value.
+        value: f64,
+    },
+    /// The row sums to something else than 1 (promise L2).
+    #[error("the row sums to {sum}, {} 1 by {:.6}", if *.sum < 1.0 { "short of" } else { "above" }, (.sum - 1.0).abs())]
+    Sum {
+        /// What it sums to.
+        sum: f64,
+    },
+}
+
+/// Checks that `row` is a probability distribution (promise L2).
+///
+/// # Errors
+/// When it is empty, has an entry outside [0, 1], or does not sum to 1 within
+/// [`ROW_TOLERANCE`].
+pub fn check_row(row: &[f64]) -> Result<(), RowError> {
+    if row.is_empty() {
+        return Err(RowError::Empty);
+    }
+    for (i, &value) in row.iter().enumerate() {
+        if !(0.0..=1.0).contains(&value) {
+            return Err(RowError::NotAProbability { index: i + 1, value });
+        }
+    }
+    let sum: f64 = row.iter().sum();
+    if (sum - 1.0).abs() > ROW_TOLERANCE { Err(RowError::Sum { sum }) } else { Ok(()) }
+}
+
+/// A probability as a threshold: an event happens when a word is below it.
+///
+/// 1 is represented exactly (the event always happens), everything else within 2^-32.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Chance(u64);
+
+impl Chance {
+    /// The chance `p`, clamped to [0, 1].
+    pub fn new(p: f64) -> Self {
+        Self((p.clamp(0.0, 1.0) * (1u64 << 32) as f64).round() as u64)
+    }
+
+    /// Whether the event happens for the uniform word `u`.
+    #[inline]
+    pub fn happens(self, u: u32) -> bool {
+        u64::from(u) < self.0
+    }
+}
+
+/// A finite distribution over `0..n`, drawn with one word.
+///
+/// Outcome `i` has probability `row[i]` within 2^-32; outcomes of probability 0 are never
+/// drawn. The order of the outcomes is the order of comparison: put the likely one first.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Categorical {
+    /// Outcome of each threshold; the last one is taken when no threshold is above the word.
+    outcomes: Vec<u16>,
+    /// Cumulated probability times 2^32, strictly rising, one fewer than outcomes.
+    thresholds: Vec<u32>,
+}
+
+impl Categorical {
+    /// The distribution with these probabilities.
+    ///
+    /// # Errors
+    /// See [`check_row`].
+    pub fn new(row: &[f64]) -> Result<Self, RowError> {
+        check_row(row)?;
+        let sum: f64 = row.iter().sum();
+        let (mut outcomes, mut thresholds) = (Vec::new(), Vec::new());
+        let mut cumulated = 0.0;
+        for (i, &p) in row.iter().enumerate() {
+            cumulated += p / sum;
+            let threshold = (cumulated * (1u64 << 32) as f64).round() as u64;
+            let before = thresholds.last().map_or(0, |&t| u64::from(t));
+            if p == 0.0 || threshold <= before {
+                continue;
+            }
+            outcomes.push(i as u16);
+            match u32::try_from(threshold) {
+                Ok(t) => thresholds.push(t),
+                Err(_) => break,
+            }
+        }
+        thresholds.truncate(outcomes.len().saturating_sub(1));
+        Ok(Self { outcomes, thresholds })
+    }
+
+    /// The outcome for the uniform word `u`.
+    #[inline]
+    pub fn sample(&self, u: u32) -> usize {
+        let mut i = 0;
+        while i < self.thresholds.len() && u >= self.thresholds[i] {
+            i += 1;
+        }
+        usize::from(self.outcomes[i])
+    }
+}
+
+/// A standard normal value (Box-Muller), from two 64-bit draws.
+pub fn normal(draws: &mut Draws) -> f64 {
+    let radius = (-2.0 * math::ln(1.0 - draws.uniform())).sqrt();
+    radius * math::cos(std::f64::consts::TAU * draws.uniform())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stream::{Purpose, Streams};
+    use crate::units::Seed;
+    use proptest::prelude::*;
+
+    #[test]
+    fn a_row_that_does_not_sum_to_one_says_by_how_much() {
+        let error = check_row(&[0.5, 0.45]).expect_err("0.95 is not 1");
+        assert_eq!(error.to_string(), "the row sums to 0.95, short of 1 by 0.050000");
+        let error = check_row(&[0.5, 0.75]).expect_err("1.25 is not 1");
+        assert_eq!(error.to_string(), "the row sums to 1.25, above 1 by 0.250000");
+        assert_eq!(check_row(&[]), Err(RowError::Empty));
+        assert!(matches!(check_row(&[1.5]), Err(RowError::NotAProbability { index: 1, .. })));
+        assert!(matches!(check_row(&[f64::NAN]), Err(RowError::NotAProbability { .. })));
+    }
+
+    #[test]
+    fn certain_and_impossible_are_exact() {
+        let certain = Categorical::new(&[0.0, 1.0, 0.0]).expect("a row");
+        assert_eq!([certain.sample(0), certain.sample(u32::MAX)], [1, 1]);
+        assert!(Chance::new(1.0).happens(u32::MAX));
+        assert!(!Chance::new(0.0).happens(0));
+    }
+
+    proptest! {
+        #[test]
+        fn the_share_of_words_of_an_outcome_is_its_probability(weights in prop::collection::vec(0u32..1000, 1..12)) {
+            let sum: u32 = weights.iter().sum();
+            prop_assume!(sum > 0);
+            let row: Vec<f64> = weights.iter().map(|&w| f64::from(w) / f64::from(sum)).collect();
+            let distribution = Categorical::new(&row).expect("normalized");
+            let mut counts = vec![0u32; row.len()];
+            let n = 1u32 << 12;
+            for i in 0..n {
+                counts[distribution.sample(i << 20 | 1 << 19)] += 1;
+            }
+            for (p, c) in row.iter().zip(&counts) {
+                prop_assert!((p - f64::from(*c) / f64::from(n)).abs() <= 1.0 / f64::from(n) + 1e-9);
+                prop_assert!(*p > 0.0 || *c == 0);
+            }
+        }
+    }
+
+    const GOLDEN: &str = "[1, 2, 2, 0, 1, 2, 0, 1] [7, 2, 3, 3, 6, 2, 9, 4] \
+                          [bfdb726fa5b1d888, bfec0290ca53273e]";
+
+    #[test]
+    fn golden_values_of_every_distribution() {
+        let streams = Streams::new(Seed(42));
+        let mut draws = streams.draws(1, 2, Purpose(3));
+        let row = Categorical::new(&[0.1, 0.2, 0.3, 0.4]).expect("a row");
+        let drawn: Vec<usize> = (0..8).map(|_| row.sample(draws.next_u32())).collect();
+        let below: Vec<u32> = (0..8).map(|_| draws.below(10)).collect();
+        let normals: Vec<u64> = (0..2).map(|_| normal(&mut draws).to_bits()).collect();
+        assert_eq!(format!("{drawn:?} {below:?} {normals:x?}"), GOLDEN);
+    }
+
+    #[test]
+    fn normals_have_mean_zero_and_variance_one() {
+        let mut draws = Streams::new(Seed(9)).draws(0, 0, Purpose(0));
+        let xs: Vec<f64> = (0..20_000).map(|_| normal(&mut draws)).collect();
+        let mean = xs.iter().sum::<f64>() / 2e4;
+        let variance = xs.iter().map(|x| x * x).sum::<f64>() / 2e4;
+        // Four standard errors, fixed seed.
+        assert!(mean.abs() < 4.0 / 2e4f64.sqrt());
+        assert!((variance - 1.0).abs() < 4.0 * (2.0f64 / 2e4).sqrt());
+    }
+}

@@ -1,0 +1,163 @@
+//! Messages between agents, in lockstep with the cycle.
+//!
+//! An agent sends envelopes in one cycle and receives, in a later one, what reached it,
+//! sorted by (cycle, sender, sequence), so that the order of arrival never matters
+//! (promise D2). The in-memory version can lose, delay and duplicate, all drawn from the
+//! run's streams.
+
+use crate::distr::Chance;
+use crate::stream::{Purpose, Streams};
+use crate::units::{Cycle, EntityId};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// One message.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct Envelope {
+    /// Cycle in which it was sent.
+    pub cycle: Cycle,
+    /// Who sent it.
+    pub sender: EntityId,
+    /// Number of the message among the sender's in that cycle.
+    pub sequence: u32,
+    /// Whom it is for.
+    pub receiver: EntityId,
+    /// The content, serialized.
+    pub payload: Vec<u8>,
+}
+
+/// Delivers envelopes.
+pub trait Transport {
+    /// Takes a message; it may be received from the next cycle on.
+    fn send(&mut self, envelope: Envelope);
+
+    /// What has reached `receiver` by cycle `now` and was not received before, sorted.
+    fn receive(&mut self, receiver: EntityId, now: Cycle) -> Vec<Envelope>;
+}
+
+/// What may go wrong on the way; the default is a faultless network.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Faults {
+    /// Probability that a message is lost.
+    pub loss: f64,
+    /// Probability that a message arrives twice.
+    pub duplication: f64,
+    /// A message takes 1 cycle and up to this many more, uniformly.
+    pub max_delay_cycles: u32,
+}
+
+impl Default for Faults {
+    fn default() -> Self {
+        Self { loss: 0.0, duplication: 0.0, max_delay_cycles: 0 }
+    }
+}
+
+/// The in-memory transport; counts what it carries.
+#[derive(Debug)]
+pub struct MemoryTransport {
+    streams: Streams,
+    purpose: Purpose,
+    faults: Faults,
+    /// By receiver, then by the cycle of arrival.
+    waiting: BTreeMap<(EntityId, Cycle), Vec<Envelope>>,
+    /// Messages sent.
+    pub messages: u64,
+    /// Bytes of payload sent.
+    pub bytes: u64,
+}
+
+impl MemoryTransport {
+    /// An empty network with these faults, drawn for `purpose`.
+    pub fn new(streams: Streams, purpose: Purpose, faults: Faults) -> Self {
+        Self { streams, purpose, faults, waiting: BTreeMap::new(), messages: 0, bytes: 0 }
+    }
+
+    fn deliver(&mut self, envelope: Envelope, delay_word: u32) {
+        let choices = u64::from(self.faults.max_delay_cycles) + 1;
+        let extra = (u64::from(delay_word) * choices) >> 32;
+        let at = (envelope.receiver, envelope.cycle + 1 + extra);
+        self.waiting.entry(at).or_default().push(envelope);
+    }
+}
+
+impl Transport for MemoryTransport {
+    fn send(&mut self, envelope: Envelope) {
+        self.messages += 1;
+        self.bytes += envelope.payload.len() as u64;
+        let Envelope { cycle, sender, sequence, receiver, .. } = envelope;
+        let words = self.streams.pair(sender, receiver, cycle, self.purpose, sequence);
+        if Chance::new(self.faults.loss).happens(words[0]) {
+            return;
+        }
+        if Chance::new(self.faults.duplication).happens(words[1]) {
+            self.deliver(envelope.clone(), words[3]);
+        }
+        self.deliver(envelope, words[2]);
+    }
+
+    fn receive(&mut self, receiver: EntityId, now: Cycle) -> Vec<Envelope> {
+        let due: Vec<_> =
+            self.waiting.range((receiver, 0)..=(receiver, now)).map(|(&at, _)| at).collect();
+        let mut arrived: Vec<_> =
+            due.iter().flat_map(|at| self.waiting.remove(at).unwrap_or_default()).collect();
+        arrived.sort_unstable();
+        arrived
+    }
+}
+
+/// What every faultless [`Transport`] must hold to.
+///
+/// # Panics
+/// When a promise is broken.
+pub fn conformance(transport: &mut impl Transport) {
+    let envelope = |cycle, sender, sequence, receiver| Envelope {
+        cycle,
+        sender,
+        sequence,
+        receiver,
+        payload: vec![sequence as u8; 3],
+    };
+    for (sender, sequence) in [(2, 1), (2, 0), (1, 0), (3, 0)] {
+        transport.send(envelope(5, sender, sequence, 9));
+    }
+    transport.send(envelope(5, 1, 1, 8));
+    assert_eq!(transport.receive(9, 5), [], "nothing arrives in the cycle of sending");
+    let expected =
+        [envelope(5, 1, 0, 9), envelope(5, 2, 0, 9), envelope(5, 2, 1, 9), envelope(5, 3, 0, 9)];
+    assert_eq!(transport.receive(9, 6), expected, "sorted by (cycle, sender, sequence)");
+    assert_eq!(transport.receive(9, 7), [], "each message is received once");
+    assert_eq!(transport.receive(8, 9), [envelope(5, 1, 1, 8)], "messages wait");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::units::Seed;
+
+    fn network(faults: Faults) -> MemoryTransport {
+        MemoryTransport::new(Streams::new(Seed(1)), Purpose(9), faults)
+    }
+
+    #[test]
+    fn the_memory_transport_conforms_and_counts() {
+        let mut transport = network(Faults::default());
+        conformance(&mut transport);
+        assert_eq!((transport.messages, transport.bytes), (5, 15));
+    }
+
+    #[test]
+    fn faults_happen_as_often_as_stated() {
+        let n = 10_000;
+        let mut transport = network(Faults { loss: 0.1, duplication: 0.05, max_delay_cycles: 3 });
+        for sequence in 0..n {
+            let payload = Vec::new();
+            transport.send(Envelope { cycle: 0, sender: 1, sequence, receiver: 2, payload });
+        }
+        let by_cycle: Vec<usize> = (1..=5).map(|t| transport.receive(2, t).len()).collect();
+        let arrived: usize = by_cycle.iter().sum();
+        // Expected 0.9 * 1.05 * n = 9450; five standard deviations are about 190.
+        assert!((9260..=9640).contains(&arrived), "{arrived} arrived");
+        assert!(by_cycle[..4].iter().all(|&k| (2200..2550).contains(&k)), "{by_cycle:?}");
+        assert_eq!(by_cycle[4], 0);
+    }
+}

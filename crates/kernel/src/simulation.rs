@@ -1,0 +1,43 @@
+//! The object-safe face of a run: what the command, a server or a binding sees of any world.
+
+use crate::cycle::PhaseTimes;
+use crate::digest::Digest;
+use crate::ports::{RecordError, Recorder, TableSchema};
+use crate::units::Cycle;
+
+/// A world and a state that advances.
+pub trait Simulation: Send {
+    /// Name of the world, e.g. `robots`.
+    fn world(&self) -> &'static str;
+
+    /// Cycles done.
+    fn cycle(&self) -> Cycle;
+
+    /// Entities that act (robots, chains, airplanes).
+    fn agents(&self) -> usize;
+
+    /// Runs up to `cycles` cycles and says how many were done: fewer when a buffer for
+    /// recording is full, never 0 unless `cycles` is 0.
+    fn advance(&mut self, cycles: u64) -> u64;
+
+    /// The digest of the present state: equal for equal scenario, seed and cycle.
+    fn digest(&self) -> Digest;
+
+    /// The present state as bytes for [`crate::checkpoint::decode`].
+    fn checkpoint(&self) -> Vec<u8>;
+
+    /// The tables that [`Simulation::record`] fills.
+    fn schemas(&self) -> Vec<TableSchema>;
+
+    /// Hands everything that happened since the last call to a recorder.
+    ///
+    /// # Errors
+    /// When the recorder cannot store it.
+    fn record(&mut self, recorder: &mut dyn Recorder) -> Result<(), RecordError>;
+
+    /// What the run measured so far, as JSON (`metrics` of the summary).
+    fn metrics(&self) -> serde_json::Value;
+
+    /// Time spent per phase since the start of this process's run.
+    fn phase_times(&self) -> PhaseTimes;
+}

@@ -1,0 +1,193 @@
+//! Who claims which box of a grid, without a lock and with one byte per box.
+//!
+//! Every body writes its *tag* into each box it claims, an ordinary store; where two bodies
+//! claim a box the last writer stays. After a barrier every body reads its boxes again: a
+//! foreign tag means a conflict with the body that the tag names. All claimants of a box
+//! thus meet in its last writer, whoever that was, so the connected components are the same
+//! for every order of stores.
+//!
+//! A tag is the body's anchor modulo 16 (or 256) in both directions. Two bodies that can
+//! claim the same box stand nearer than that, so their tags differ, and box and tag
+//! together name the anchor. A list per patch of 8 x 8 boxes then names the body.
+
+use super::position::Position;
+use crate::column::Column;
+use crate::units::{Cycle, Slot};
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+
+/// Names a body among those that can claim one box.
+pub type Tag = u16;
+
+/// Side of a patch of boxes that share a list of bodies, as a power of two.
+const PATCH_BITS: u32 = 3;
+const NO_BODY: u32 = u32::MAX;
+
+#[derive(Debug, Clone)]
+enum Tags {
+    /// Anchors modulo 16.
+    Narrow(Column<u8>),
+    /// Anchors modulo 256, for bodies that reach farther.
+    Wide(Column<u16>),
+}
+
+/// The claims on a grid of `width` x `height` boxes, indexed row by row.
+#[derive(Debug)]
+pub struct ClaimGrid {
+    width: u32,
+    reach: u32,
+    tags: Tags,
+    patches_per_row: u32,
+    /// Per patch: cycle (upper half) and last registered body (lower half).
+    first: Vec<AtomicU64>,
+    /// The body registered in the same patch before this one.
+    next: Column<Slot>,
+}
+
+impl ClaimGrid {
+    /// The largest `extent` of [`ClaimGrid::new`].
+    pub const MAX_EXTENT: u32 = 256;
+
+    /// An unclaimed grid for `bodies` bodies.
+    ///
+    /// `reach` is how many boxes before its anchor (towards west or south) a body may claim;
+    /// `extent` is the length of the longest row of boxes that one body may claim.
+    ///
+    /// # Panics
+    /// When `extent` exceeds [`ClaimGrid::MAX_EXTENT`]; callers refuse such bodies first.
+    pub fn new(width: u32, height: u32, bodies: usize, reach: u32, extent: u32) -> Self {
+        assert!(extent <= Self::MAX_EXTENT, "bodies reach too far for tags");
+        let boxes = width as usize * height as usize;
+        let tags = if extent <= 16 {
+            Tags::Narrow(Column::filled(boxes, 0))
+        } else {
+            Tags::Wide(Column::filled(boxes, 0))
+        };
+        let patches_per_row = (width >> PATCH_BITS) + 1;
+        let patches = patches_per_row as usize * ((height >> PATCH_BITS) + 1) as usize;
+        let first = (0..patches).map(|_| AtomicU64::new(u64::MAX)).collect();
+        let next = Column::filled(bodies, NO_BODY);
+        Self { width, reach, tags, patches_per_row, first, next }
+    }
+
+    /// The tag of a body anchored at box `anchor`.
+    #[inline]
+    pub fn tag(&self, anchor: Position) -> Tag {
+        let (mask, bits) = self.modulus();
+        ((anchor.row() & mask) << bits | (anchor.col() & mask)) as Tag
+    }
+
+    /// Writes `tag` into the box with this index.
+    #[inline]
+    pub fn claim(&self, at: u32, tag: Tag) {
+        match &self.tags {
+            Tags::Narrow(tags) => tags.set(at as usize, tag as u8),
+            Tags::Wide(tags) => tags.set(at as usize, tag),
+        }
+    }
+
+    /// The tag in the box with this index.
+    #[inline]
+    pub fn claimant(&self, at: u32) -> Tag {
+        match &self.tags {
+            Tags::Narrow(tags) => Tag::from(tags.get(at as usize)),
+            Tags::Wide(tags) => tags.get(at as usize),
+        }
+    }
+
+    /// Lists a body under its anchor for this cycle. Every body must, once a cycle.
+    #[inline]
+    pub fn register(&self, body: Slot, anchor: Position, now: Cycle) {
+        let stamp = u64::from(now as u32) << 32;
+        let before = self.first[self.patch(anchor)].swap(stamp | u64::from(body), Relaxed);
+        let next = if before >> 32 == stamp >> 32 { before as u32 } else { NO_BODY };
+        self.next.set(body as usize, next);
+    }
+
+    /// The body whose tag stands in box `at`; `anchor_of` tells the anchor of a body.
+    ///
+    /// # Panics
+    /// When no such body was registered in this cycle, which is a bug.
+    pub fn body(&self, at: u32, tag: Tag, anchor_of: impl Fn(Slot) -> Position) -> Slot {
+        let anchor = self.anchor(at, tag);
+        let mut body = self.first[self.patch(anchor)].load(Relaxed) as u32;
+        while anchor_of(body) != anchor {
+            body = self.next.get(body as usize);
+            assert!(body != NO_BODY, "a tag names a registered body");
+        }
+        body
+    }
+
+    /// The only anchor from which `tag` can have come into box `at`.
+    fn anchor(&self, at: u32, tag: Tag) -> Position {
+        let at = Position::from_index(at, self.width);
+        let (mask, bits) = self.modulus();
+        let nearest = |at: u32, residue: u32| {
+            let last = at + self.reach;
+            last - (last.wrapping_sub(residue) & mask)
+        };
+        let tag = u32::from(tag);
+        Position::new(nearest(at.col(), tag & mask), nearest(at.row(), tag >> bits))
+    }
+
+    #[inline]
+    fn modulus(&self) -> (u32, u32) {
+        match self.tags {
+            Tags::Narrow(_) => (15, 4),
+            Tags::Wide(_) => (255, 8),
+        }
+    }
+
+    #[inline]
+    fn patch(&self, anchor: Position) -> usize {
+        let (col, row) = (anchor.col(), anchor.row());
+        ((row >> PATCH_BITS) * self.patches_per_row + (col >> PATCH_BITS)) as usize
+    }
+
+    /// Bytes on the heap that grow with the boxes, and with the bodies.
+    pub fn heap_bytes(&self) -> (usize, usize) {
+        let tags = match &self.tags {
+            Tags::Narrow(tags) => tags.heap_bytes(),
+            Tags::Wide(tags) => tags.heap_bytes(),
+        };
+        (tags + self.first.len() * 8, self.next.heap_bytes())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Bodies of extent up to `reach + size + reach` in random places: every claimed box
+        /// names one of its claimants, whatever the order of the stores.
+        #[test]
+        fn a_tag_names_the_body_that_wrote_it(
+            anchors in prop::collection::btree_set((4u32..60, 4u32..60), 1..60),
+            wide in any::<bool>(),
+        ) {
+            let anchors: Vec<Position> = anchors.iter().map(|&(c, r)| Position::new(c, r)).collect();
+            let (reach, after) = if wide { (4, 16) } else { (2, 4) };
+            let grid = ClaimGrid::new(80, 80, anchors.len(), reach, reach + after + 1);
+            let anchor_of = |slot: Slot| anchors[slot as usize];
+            let claims = |slot: Slot| {
+                let a = anchor_of(slot);
+                let side = 0..=(reach + after);
+                side.clone().flat_map(move |dy| side.clone().map(move |dx| {
+                    Position::new(a.col() - reach + dx, a.row() - reach + dy).index(80)
+                })).collect::<Vec<_>>()
+            };
+            for now in 7..9 {
+                let slots = || 0..anchors.len() as Slot;
+                slots().for_each(|s| grid.register(s, anchor_of(s), now));
+                slots().for_each(|s| claims(s).iter().for_each(|&b| grid.claim(b, grid.tag(anchor_of(s)))));
+                for slot in slots() {
+                    for at in claims(slot) {
+                        let named = grid.body(at, grid.claimant(at), anchor_of);
+                        prop_assert!(claims(named).contains(&at));
+                    }
+                }
+            }
+        }
+    }
+}

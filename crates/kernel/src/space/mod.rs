@@ -1,0 +1,7 @@
+//! Where things are: positions and claims on the boxes of a grid.
+
+pub mod claims;
+pub mod position;
+
+pub use claims::{ClaimGrid, Tag};
+pub use position::Position;

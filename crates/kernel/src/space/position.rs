@@ -1,0 +1,55 @@
+//! A box of a grid by column and row, in one word.
+
+/// Column (from the west) and row (from the south) of a box; both below 65,536.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Position(u32);
+
+impl Position {
+    /// The box in this column and row.
+    #[inline(always)]
+    pub fn new(col: u32, row: u32) -> Self {
+        debug_assert!(col < 1 << 16 && row < 1 << 16);
+        Self(row << 16 | col)
+    }
+
+    /// From the word of [`Position::word`].
+    #[inline(always)]
+    pub fn from_word(word: u32) -> Self {
+        Self(word)
+    }
+
+    /// Column and row in one word: `row << 16 | col`.
+    #[inline(always)]
+    pub fn word(self) -> u32 {
+        self.0
+    }
+
+    /// Column, from the west.
+    #[inline(always)]
+    pub fn col(self) -> u32 {
+        self.0 & 0xffff
+    }
+
+    /// Row, from the south.
+    #[inline(always)]
+    pub fn row(self) -> u32 {
+        self.0 >> 16
+    }
+
+    /// Index in a grid stored row by row, `width` boxes wide.
+    #[inline(always)]
+    pub fn index(self, width: u32) -> u32 {
+        self.row() * width + self.col()
+    }
+
+    /// The position of an index of such a grid.
+    pub fn from_index(index: u32, width: u32) -> Self {
+        Self::new(index % width, index / width)
+    }
+
+    /// The box `dx` columns east and `dy` rows north; the caller knows that it exists.
+    #[inline(always)]
+    pub fn offset(self, dx: i32, dy: i32) -> Self {
+        Self::new(self.col().wrapping_add_signed(dx), self.row().wrapping_add_signed(dy))
+    }
+}

@@ -1,0 +1,17 @@
+//! The few quantities every world shares, as types that cannot be mixed up.
+
+use serde::{Deserialize, Serialize};
+
+/// The number all randomness of a run grows from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct Seed(pub u64);
+
+/// A cycle of the synchronous loop, counted from 0.
+pub type Cycle = u64;
+
+/// The place of an entity in a state's columns. Slots may be permuted without changing any
+/// result; what a draw or a tie depends on is the entity's [`EntityId`].
+pub type Slot = u32;
+
+/// The identity of an entity: constant through a run and independent of storage.
+pub type EntityId = u32;

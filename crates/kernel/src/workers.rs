@@ -1,0 +1,252 @@
+//! The only file that names threads: W workers, their pools of tasks, and the barrier.
+//!
+//! A pool holds the numbers `0..n`. Each worker has a share of it, takes chunks of its own
+//! share first (its caches still hold those bodies) and then helps with the others' shares,
+//! so the load balances itself and nobody waits for a lock. Worker count 1 runs the very
+//! same code on the calling thread; there is no second code path.
+
+use std::num::NonZeroUsize;
+use std::ops::Range;
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering};
+use std::sync::{Condvar, Mutex, PoisonError};
+
+/// Pools that may be in use between two barriers and the one after: a pool's cursors are
+/// put back by the next pool but one, when nobody reads them any more.
+const POOLS: usize = 4;
+
+/// Spins before a waiting worker offers its processor to others, and before it sleeps.
+const SPINS_BEFORE_YIELD: u32 = 4_000;
+const YIELDS_BEFORE_SLEEP: u32 = 200;
+
+/// How many processors this process may use, at least 1.
+pub fn available() -> usize {
+    std::thread::available_parallelism().map_or(1, NonZeroUsize::get)
+}
+
+/// Runs `work` once on each of `crew.len()` workers at the same time, each with its own
+/// element of `crew`, and returns when all are done. The calling thread is worker 0.
+///
+/// # Panics
+/// When a worker panicked (a bug); the others are released first.
+pub fn run<S: Send>(crew: &mut [S], work: impl Fn(&Worker<'_>, &mut S) + Sync) {
+    let team = Team::new(crew.len());
+    let run_one = |index: usize, own: &mut S| {
+        let worker = Worker { team: &team, index };
+        let _release = ReleaseOnPanic(&team);
+        work(&worker, own);
+    };
+    let Some((first, others)) = crew.split_first_mut() else { return };
+    std::thread::scope(|scope| {
+        for (i, own) in others.iter_mut().enumerate() {
+            let run_one = &run_one;
+            std::thread::Builder::new()
+                .name(format!("worker {}", i + 1))
+                .spawn_scoped(scope, move || run_one(i + 1, own))
+                .expect("the system can start a thread");
+        }
+        run_one(0, first);
+    });
+}
+
+/// One of the workers of a [`run`].
+#[derive(Debug)]
+pub struct Worker<'a> {
+    team: &'a Team,
+    index: usize,
+}
+
+impl Worker<'_> {
+    /// This worker's number, from 0.
+    pub fn index(&self) -> usize {
+        self.index
+    }
+
+    /// How many work together.
+    pub fn team_size(&self) -> usize {
+        self.team.size
+    }
+
+    /// Takes chunks of `0..n` until none is left. All workers call it with the same `pool`
+    /// and `n`; every number is handed out exactly once. `pool` counts the calls: 0, 1, 2...
+    #[inline]
+    pub fn for_each_chunk(&self, pool: u64, n: usize, mut task: impl FnMut(Range<usize>)) {
+        let team = self.team.size;
+        self.team.cursor((pool + 2) % POOLS as u64, self.index).store(0, Ordering::Relaxed);
+        let chunk = (n / (team * 8)).clamp(1, 64);
+        for k in 0..team {
+            let owner = (self.index + k) % team;
+            let (start, end) = (n * owner / team, n * (owner + 1) / team);
+            let cursor = self.team.cursor(pool % POOLS as u64, owner);
+            loop {
+                let from = start + cursor.fetch_add(chunk, Ordering::Relaxed);
+                if from >= end {
+                    break;
+                }
+                task(from..end.min(from + chunk));
+            }
+        }
+    }
+
+    /// Waits until every worker is here; what any wrote before, all see after.
+    ///
+    /// # Panics
+    /// When another worker panicked.
+    #[inline]
+    pub fn barrier(&self) {
+        if self.team.size > 1 {
+            self.team.barrier.wait(self.team.size as u32, self.team.spins);
+        }
+    }
+}
+
+/// A counter alone on its cache lines.
+#[derive(Debug, Default)]
+#[repr(align(128))]
+struct Padded(AtomicUsize);
+
+#[derive(Debug)]
+struct Team {
+    size: usize,
+    /// `POOLS` cursors per worker.
+    cursors: Vec<Padded>,
+    barrier: Barrier,
+    /// 0 where there are more workers than processors: spinning would keep them from work.
+    spins: u32,
+}
+
+impl Team {
+    fn new(size: usize) -> Self {
+        Self {
+            size,
+            cursors: (0..size * POOLS).map(|_| Padded::default()).collect(),
+            barrier: Barrier::default(),
+            spins: if size <= available() { SPINS_BEFORE_YIELD } else { 0 },
+        }
+    }
+
+    #[inline]
+    fn cursor(&self, pool: u64, worker: usize) -> &AtomicUsize {
+        &self.cursors[worker * POOLS + pool as usize].0
+    }
+}
+
+/// Spins, then yields, then sleeps.
+#[derive(Debug, Default)]
+#[repr(align(128))]
+struct Barrier {
+    arrived: AtomicU32,
+    generation: AtomicU32,
+    broken: AtomicBool,
+    sleepers: AtomicU32,
+    sleeping: Mutex<()>,
+    wake: Condvar,
+}
+
+impl Barrier {
+    #[inline]
+    fn wait(&self, size: u32, spins: u32) {
+        let generation = self.generation.load(Ordering::Acquire);
+        if self.arrived.fetch_add(1, Ordering::AcqRel) + 1 == size {
+            self.arrived.store(0, Ordering::Relaxed);
+            self.open(generation.wrapping_add(1));
+        } else {
+            self.wait_past(generation, spins);
+        }
+        assert!(!self.broken.load(Ordering::Relaxed), "another worker panicked");
+    }
+
+    fn open(&self, next: u32) {
+        // Both sides store first and look at the other's word after (SeqCst), so either the
+        // sleeper sees the new generation or this sees the sleeper.
+        self.generation.store(next, Ordering::SeqCst);
+        if self.sleepers.load(Ordering::SeqCst) > 0 {
+            drop(self.sleeping.lock().unwrap_or_else(PoisonError::into_inner));
+            self.wake.notify_all();
+        }
+    }
+
+    fn wait_past(&self, generation: u32, spins: u32) {
+        let passed = || self.generation.load(Ordering::SeqCst) != generation;
+        for _ in 0..spins {
+            if passed() {
+                return;
+            }
+            std::hint::spin_loop();
+        }
+        for _ in 0..YIELDS_BEFORE_SLEEP {
+            if passed() {
+                return;
+            }
+            std::thread::yield_now();
+        }
+        let mut guard = self.sleeping.lock().unwrap_or_else(PoisonError::into_inner);
+        self.sleepers.fetch_add(1, Ordering::SeqCst);
+        while !passed() {
+            guard = self.wake.wait(guard).unwrap_or_else(PoisonError::into_inner);
+        }
+        self.sleepers.fetch_sub(1, Ordering::SeqCst);
+    }
+}
+
+/// Lets the others go when a worker panics, so that a bug ends the run instead of hanging it.
+struct ReleaseOnPanic<'a>(&'a Team);
+
+impl Drop for ReleaseOnPanic<'_> {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            let barrier = &self.0.barrier;
+            barrier.broken.store(true, Ordering::SeqCst);
+            barrier.open(barrier.generation.load(Ordering::SeqCst).wrapping_add(1));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::atomic::AtomicU64;
+
+    #[test]
+    fn every_task_is_done_once_in_every_pool_for_any_team() {
+        for team in [1, 2, 3, 8] {
+            for n in [0, 1, 7, 1000] {
+                let done: Vec<AtomicU64> = (0..n).map(|_| AtomicU64::new(0)).collect();
+                run(&mut vec![(); team], |worker, ()| {
+                    for pool in 0..9 {
+                        worker.for_each_chunk(pool, n, |range| {
+                            for i in range {
+                                // Barriers: all have done pool k before any starts k + 1.
+                                assert_eq!(done[i].fetch_add(1, Ordering::Relaxed), pool);
+                            }
+                        });
+                        worker.barrier();
+                    }
+                });
+                assert!(done.iter().all(|d| d.load(Ordering::Relaxed) == 9));
+            }
+        }
+    }
+
+    #[test]
+    fn a_panic_in_one_worker_ends_the_run_for_all() {
+        let outcome = std::panic::catch_unwind(|| {
+            run(&mut [(); 3], |worker, ()| {
+                assert!(worker.index() != 1, "a bug");
+                worker.barrier();
+            });
+        });
+        assert!(outcome.is_err());
+    }
+
+    #[test]
+    fn sleepers_are_woken() {
+        run(&mut [(); 2], |worker, ()| {
+            for _ in 0..3 {
+                if worker.index() == 0 {
+                    std::thread::sleep(std::time::Duration::from_millis(20));
+                }
+                worker.barrier();
+            }
+        });
+    }
+}
