@@ -2,6 +2,7 @@
 //! placeholder
 
 pub mod import;
+pub mod learn;
 pub mod map;
 pub mod statistics;
 

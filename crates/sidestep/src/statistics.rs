@@ -81,9 +81,14 @@ pub fn mean(values: &[f64]) -> Option<f64> {
 
 /// Standard deviation of a sample (divisor `n - 1`); `None` of fewer than two values.
 pub fn sample_sd(values: &[f64]) -> Option<f64> {
-    let center = mean(values)?;
-    let squares: f64 = values.iter().map(|v| (v - center) * (v - center)).sum();
+    let squares = sum_of_squares(values)?;
     (values.len() > 1).then(|| (squares / (values.len() - 1) as f64).sqrt())
+}
+
+/// Sum of squared deviations from the mean; `None` of nothing.
+fn sum_of_squares(values: &[f64]) -> Option<f64> {
+    let center = mean(values)?;
+    Some(values.iter().map(|v| (v - center) * (v - center)).sum())
 }
 
 /// Student's 95 % interval for the mean of independent, roughly normal values.
@@ -136,7 +141,7 @@ pub struct Moments {
     pub n: usize,
     /// Arithmetic mean.
     pub mean: f64,
-    /// Standard deviation of the sample; 0 of a single value.
+    /// Standard deviation of these very values (divisor `n`).
     pub sd: f64,
     /// 1st percentile.
     pub p01: f64,
@@ -158,7 +163,7 @@ impl Moments {
         Some(Self {
             n: sorted.len(),
             mean: mean(&sorted)?,
-            sd: sample_sd(&sorted).unwrap_or(0.0),
+            sd: (sum_of_squares(&sorted)? / sorted.len() as f64).sqrt(),
             p01: percentile(&sorted, 0.01)?,
             p05: percentile(&sorted, 0.05)?,
             p50: percentile(&sorted, 0.50)?,
@@ -235,7 +240,8 @@ mod tests {
         assert_eq!(percentile(&[], 0.5), None);
         let moments = Moments::of([4.0, 1.0, 2.0]).unwrap();
         assert_eq!((moments.n, moments.p50), (3, 2.0));
-        close(moments.sd, (7.0_f64 / 3.0).sqrt(), 1e-12);
+        close(moments.sd, (14.0_f64 / 9.0).sqrt(), 1e-12);
+        close(sample_sd(&[4.0, 1.0, 2.0]).unwrap(), (7.0_f64 / 3.0).sqrt(), 1e-12);
         assert!(Moments::of([]).is_none());
     }
 

@@ -128,12 +128,6 @@ impl Counts {
         thin.map(|(row, count)| ThinRow { table: self.name.clone(), row: row.clone(), count })
             .collect()
     }
-
-    /// Serializes the bare numbers, shape `(rows, columns)`.
-    pub(crate) fn as_matrix<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let rows = self.cells.iter().map(|row| row.iter().map(|&c| Count(c)).collect::<Vec<_>>());
-        serializer.collect_seq(rows)
-    }
 }
 
 /// Probabilities from counts, `alpha` added to each; all equal when there is nothing to go by.
@@ -143,6 +137,19 @@ pub(crate) fn smooth(counts: &[f64], alpha: f64) -> Vec<f64> {
         return vec![1.0 / counts.len() as f64; counts.len()];
     }
     counts.iter().map(|count| (count + alpha) / total).collect()
+}
+
+/// Probabilities with nine decimals that sum to 1: what rounding takes or gives goes to the
+/// greatest.
+pub(crate) fn rounded(probabilities: &[f64]) -> Vec<f64> {
+    let nine = |p: f64| (p * 1e9).round() / 1e9;
+    let mut row: Vec<f64> = probabilities.iter().map(|p| nine(*p)).collect();
+    let greatest = (0..row.len()).max_by(|a, b| row[*a].total_cmp(&row[*b]));
+    if let Some(greatest) = greatest {
+        let others: f64 = (0..row.len()).filter(|i| *i != greatest).map(|i| row[i]).sum();
+        row[greatest] = nine(1.0 - others);
+    }
+    row
 }
 
 /// A count is written as an integer where it is one.
@@ -155,6 +162,17 @@ impl Serialize for Count {
         } else {
             serializer.serialize_f64(self.0)
         }
+    }
+}
+
+/// A table that is serialized as its bare numbers, shape `(rows, columns)`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CountMatrix(pub Counts);
+
+impl Serialize for CountMatrix {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let rows = self.0.cells.iter();
+        serializer.collect_seq(rows.map(|row| row.iter().map(|&c| Count(c)).collect::<Vec<_>>()))
     }
 }
 
@@ -210,7 +228,10 @@ mod tests {
     fn every_estimate_has_its_count_and_interval_and_thin_rows_are_listed() {
         let estimates = small().estimates();
         assert_eq!(estimates.len(), 2);
-        assert_eq!((estimates[0].count, estimates[0].of, estimates[0].probability), (3.0, 4.0, 0.75));
+        assert_eq!(
+            (estimates[0].count, estimates[0].of, estimates[0].probability),
+            (3.0, 4.0, 0.75)
+        );
         assert_eq!(estimates[0].interval, wilson(3.0, 4.0));
         let thin = small().thin(4);
         assert_eq!((thin.len(), thin[0].row.as_str(), thin[0].count), (1, "b", 0.0));
@@ -218,7 +239,15 @@ mod tests {
     }
 
     #[test]
+    fn rounded_rows_still_sum_to_one() {
+        let row = rounded(&smooth(&[1.0, 1.0, 1.0, 4.0, 1e-7], 0.1));
+        assert!((row.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+        assert_eq!(rounded(&[1.0 / 3.0; 3])[0], 0.333_333_333);
+    }
+
+    #[test]
     fn json_names_the_filled_cells_with_whole_counts() {
         assert_eq!(serde_json::to_string(&small()).unwrap(), r#"{"a":{"x":3,"y":1}}"#);
+        assert_eq!(serde_json::to_string(&CountMatrix(small())).unwrap(), "[[3,1],[0,0]]");
     }
 }

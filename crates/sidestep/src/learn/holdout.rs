@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::counts::{Counts, smooth};
+use crate::kernel::math::ln;
 use crate::statistics::chi_square_p;
 
 /// Cells expected to hold fewer counts than this are pooled before a chi-square test.
@@ -21,8 +22,9 @@ pub struct Fit {
     pub chi_square: f64,
     /// Its degrees of freedom, after cells that expect fewer than 5 counts are pooled.
     pub degrees_of_freedom: usize,
-    /// Probability of a statistic at least this large under that hypothesis. Where an event is
-    /// spread over outcomes (phase averaging) it errs to the high side.
+    /// Probability of a statistic at least this large under that hypothesis, if events are
+    /// independent. Readings of one image are not: there a small value says no more than that.
+    /// Where an event is spread over outcomes (phase averaging) it errs to the high side.
     pub p_value: f64,
     /// Mean of `-ln P(outcome)` over the events held out, in nat, with the smoothed
     /// probabilities learned; `None` when nothing was held out or a probability was 0.
@@ -69,7 +71,8 @@ fn homogeneity(a: &[f64], b: &[f64]) -> (f64, usize) {
     }
     let share_of_smaller = n_a.min(n_b) / (n_a + n_b);
     let cells = pool_rare(a, b, EXPECTED_MIN / share_of_smaller);
-    let deviation = |observed: f64, expected: f64| (observed - expected) * (observed - expected) / expected;
+    let deviation =
+        |observed: f64, expected: f64| (observed - expected) * (observed - expected) / expected;
     let statistic = cells.iter().map(|&(in_a, in_b)| {
         let share = (in_a + in_b) / (n_a + n_b);
         deviation(in_a, n_a * share) + deviation(in_b, n_b * share)
@@ -104,14 +107,13 @@ fn log_loss(trained: &Counts, held: &Counts, alpha: f64) -> Option<f64> {
         for (count, p) in held.row(row).iter().zip(probabilities) {
             // 0 * ln 0 is 0: what did not happen costs nothing.
             if *count > 0.0 {
-                loss -= count * libm::log(p);
+                loss -= count * ln(p);
                 events += count;
             }
         }
     }
     (events > 0.0 && loss.is_finite()).then(|| loss / events)
 }
-
 
 #[cfg(test)]
 mod tests {

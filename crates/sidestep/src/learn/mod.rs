@@ -8,14 +8,18 @@
 //! ([`statistics::wilson`](crate::statistics::wilson)); a part of the events is held out to
 //! say how well the rest predicts it ([`holdout`]). Learning draws no random numbers.
 
-pub mod sensor;
 pub mod effector;
-pub mod profile;
+pub mod sensor;
+
 mod counts;
+mod display;
 pub mod holdout;
 mod track;
 
-pub use counts::{Counts, Estimate, ThinRow};
+#[cfg(test)]
+mod oracle;
+
+pub use counts::{CountMatrix, Counts, Estimate, ThinRow};
 
 use serde::Serialize;
 
