@@ -20,6 +20,7 @@ pub mod conflict;
 pub mod cycle;
 pub mod digest;
 pub mod distr;
+pub mod engine;
 pub mod error;
 pub mod math;
 pub mod ports;

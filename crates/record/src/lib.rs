@@ -1,1 +1,20 @@
-//! placeholder
+#![doc = include_str!("../README.md")]
+
+mod disk;
+mod encode;
+mod part;
+mod schema;
+mod staging;
+
+pub mod folder;
+pub mod format;
+pub mod manifest;
+pub mod parquet;
+pub mod read;
+
+pub use folder::{Existing, NewRun, ResumePoint, RunFolder, RunView};
+pub use format::FormatVersion;
+pub use manifest::{Manifest, Status};
+pub use parquet::ParquetRecorder;
+pub use read::{Table, read_table};
+pub use schema::Origin;

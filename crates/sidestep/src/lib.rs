@@ -4,7 +4,11 @@
 pub mod import;
 pub mod learn;
 pub mod map;
+pub mod office;
+pub mod planning;
+pub mod scenario;
 pub mod statistics;
+pub mod worlds;
 
 pub use map::{Cell, GridMap};
 pub use sidestep_kernel as kernel;

@@ -60,6 +60,47 @@ pub enum Values {
 }
 
 impl Values {
+    /// No values of this type.
+    pub fn empty(ty: ColumnType) -> Self {
+        match ty {
+            ColumnType::U32 => Self::U32(Vec::new()),
+            ColumnType::U64 => Self::U64(Vec::new()),
+            ColumnType::I32 => Self::I32(Vec::new()),
+            ColumnType::F64 => Self::F64(Vec::new()),
+            ColumnType::Label => Self::Label(Vec::new()),
+        }
+    }
+
+    /// Appends the values of `more`.
+    ///
+    /// # Panics
+    /// When the types differ; [`check_block`] compares them for a whole block.
+    pub fn append(&mut self, more: &Self) {
+        match (self, more) {
+            (Self::U32(a), Self::U32(b)) | (Self::Label(a), Self::Label(b)) => {
+                a.extend_from_slice(b);
+            }
+            (Self::U64(a), Self::U64(b)) => a.extend_from_slice(b),
+            (Self::I32(a), Self::I32(b)) => a.extend_from_slice(b),
+            (Self::F64(a), Self::F64(b)) => a.extend_from_slice(b),
+            (a, b) => panic!("{:?} values appended to {:?} ones", b.ty(), a.ty()),
+        }
+    }
+
+    /// Keeps the values at which `keep` (of the same length) is true.
+    pub fn retain_rows(&mut self, keep: &[bool]) {
+        fn retain<T>(values: &mut Vec<T>, keep: &[bool]) {
+            let mut keep = keep.iter();
+            values.retain(|_| keep.next().copied().unwrap_or(false));
+        }
+        match self {
+            Self::U32(v) | Self::Label(v) => retain(v, keep),
+            Self::U64(v) => retain(v, keep),
+            Self::I32(v) => retain(v, keep),
+            Self::F64(v) => retain(v, keep),
+        }
+    }
+
     /// Number of values.
     pub fn len(&self) -> usize {
         match self {
@@ -105,19 +146,33 @@ impl RecordError {
 }
 
 /// Takes a run's rows.
+///
+/// A block that does not fit its schema is refused and leaves the recording as it was. When
+/// rows cannot be stored, the recording is incomplete from then on: it stays marked so, and
+/// every later call fails too.
 pub trait Recorder: Send {
     /// Appends one block to the table with this index: one [`Values`] per column of its
     /// schema, in its order, all of one length.
     ///
     /// # Errors
-    /// When the block does not fit the schema or cannot be stored. The recording is then
-    /// incomplete and stays marked so.
+    /// When the block does not fit the schema, or when rows cannot be stored.
     fn append(&mut self, table: usize, block: &[Values]) -> Result<(), RecordError>;
+
+    /// Makes all rows so far durable, so that a checkpoint may rely on them: all of them
+    /// belong to cycles before `next_cycle`, all later ones to `next_cycle` or after it. To
+    /// be called before the checkpoint at `next_cycle` is stored; `next_cycle` rises from
+    /// call to call. It changes no row. Recorders that outlive no process have nothing to do.
+    ///
+    /// # Errors
+    /// When rows cannot be stored.
+    fn seal(&mut self, _next_cycle: u64) -> Result<(), RecordError> {
+        Ok(())
+    }
 
     /// Declares every table whole.
     ///
     /// # Errors
-    /// When the last rows cannot be stored; the recording stays marked incomplete.
+    /// When the last rows cannot be stored.
     fn finish(&mut self) -> Result<(), RecordError>;
 }
 
@@ -132,14 +187,8 @@ pub struct MemoryRecorder {
 impl MemoryRecorder {
     /// Empty tables of these schemas.
     pub fn new(schemas: &[TableSchema]) -> Self {
-        let empty = |c: &ColumnSpec| match c.ty {
-            ColumnType::U32 => Values::U32(Vec::new()),
-            ColumnType::U64 => Values::U64(Vec::new()),
-            ColumnType::I32 => Values::I32(Vec::new()),
-            ColumnType::F64 => Values::F64(Vec::new()),
-            ColumnType::Label => Values::Label(Vec::new()),
-        };
-        let tables = schemas.iter().map(|s| s.columns.iter().map(empty).collect()).collect();
+        let empty = |s: &TableSchema| s.columns.iter().map(|c| Values::empty(c.ty)).collect();
+        let tables = schemas.iter().map(empty).collect();
         Self { schemas: schemas.to_vec(), tables, finished: false }
     }
 
@@ -183,8 +232,9 @@ pub fn check_block(schema: &TableSchema, block: &[Values]) -> Result<(), RecordE
         if values.len() != block[0].len() {
             return wrong(format!("column `{}` differs in length from the first", spec.name));
         }
+        // The maximum, not the first wrong one: this runs for every row of a recorded run.
         if let Values::Label(indices) = values
-            && let Some(bad) = indices.iter().find(|&&i| i as usize >= spec.labels.len())
+            && let Some(bad) = indices.iter().max().filter(|&&i| i as usize >= spec.labels.len())
         {
             return wrong(format!("column `{}` has no label {bad}", spec.name));
         }
@@ -198,15 +248,7 @@ impl Recorder for MemoryRecorder {
             self.schemas.get(table).ok_or_else(|| RecordError::new(table, "no such table"))?;
         check_block(schema, block)?;
         for (column, values) in self.tables[table].iter_mut().zip(block) {
-            match (column, values) {
-                (Values::U32(a), Values::U32(b)) | (Values::Label(a), Values::Label(b)) => {
-                    a.extend_from_slice(b);
-                }
-                (Values::U64(a), Values::U64(b)) => a.extend_from_slice(b),
-                (Values::I32(a), Values::I32(b)) => a.extend_from_slice(b),
-                (Values::F64(a), Values::F64(b)) => a.extend_from_slice(b),
-                _ => unreachable!("check_block compared the types"),
-            }
+            column.append(values);
         }
         Ok(())
     }
@@ -244,42 +286,59 @@ pub fn conformance_schemas() -> Vec<TableSchema> {
     ]
 }
 
+/// A table's column, both by index, after the recording is finished.
+pub type ReadBack = Box<dyn Fn(usize, usize) -> Values>;
+
 /// What every [`Recorder`] must hold to. `recorder` is fresh, made with
-/// [`conformance_schemas`]; `read_back` returns all values of (table, column) after `finish`.
+/// [`conformance_schemas`]; `read_back` opens what the finished recorder has stored.
 ///
 /// # Panics
 /// When a promise is broken.
-pub fn conformance<R: Recorder + Clone>(
-    mut recorder: R,
-    read_back: impl Fn(R, usize, usize) -> Values,
-) {
-    let first = |from: u64| {
-        vec![
-            Values::U64((from..from + 3).collect()),
-            Values::U32(vec![0, 7, u32::MAX]),
-            Values::F64(vec![-0.5, 0.0, 1e300]),
-        ]
-    };
-    let second = vec![Values::I32(vec![i32::MIN, 0, i32::MAX]), Values::Label(vec![1, 0, 1])];
-    recorder.append(0, &first(10)).expect("a block that fits is stored");
-    recorder.append(1, &second).expect("tables are independent");
-    recorder.append(0, &first(u64::MAX - 3)).expect("blocks append");
-
-    assert!(recorder.append(0, &second).is_err(), "a block of another table is refused");
-    assert!(recorder.append(9, &second).is_err(), "a table that does not exist is refused");
-    let uneven = vec![Values::I32(vec![1]), Values::Label(vec![])];
-    assert!(recorder.append(1, &uneven).is_err(), "columns of unequal length are refused");
-    let unknown = vec![Values::I32(vec![1]), Values::Label(vec![2])];
-    assert!(recorder.append(1, &unknown).is_err(), "a label outside the vocabulary is refused");
+pub fn conformance<R: Recorder>(mut recorder: R, read_back: impl FnOnce(R) -> ReadBack) {
+    recorder.append(0, &first_block(10)).expect("a block that fits is stored");
+    recorder.append(1, &second_block()).expect("tables are independent");
+    recorder.append(1, &[Values::I32(vec![]), Values::Label(vec![])]).expect("no rows are fine");
+    refuses_what_does_not_fit(&mut recorder);
+    recorder.seal(13).expect("sealing succeeds after a refused block");
+    recorder.append(0, &first_block(u64::MAX - 3)).expect("blocks append after sealing");
     recorder.finish().expect("finishing succeeds");
 
+    let column = read_back(recorder);
     let big = u64::MAX - 3;
     let cycles = Values::U64(vec![10, 11, 12, big, big + 1, big + 2]);
-    assert_eq!(read_back(recorder.clone(), 0, 0), cycles, "rows keep their order");
+    assert_eq!(column(0, 0), cycles, "rows keep their order, u64 its range");
     let entities = Values::U32(vec![0, 7, u32::MAX, 0, 7, u32::MAX]);
-    assert_eq!(read_back(recorder.clone(), 0, 1), entities, "u32 keeps its range");
-    assert_eq!(read_back(recorder.clone(), 1, 0), second[0], "i32 keeps its range");
-    assert_eq!(read_back(recorder, 1, 1), second[1], "labels come back as written");
+    assert_eq!(column(0, 1), entities, "u32 keeps its range");
+    let Values::F64(places_m) = column(0, 2) else { panic!("f64 stays f64") };
+    let bits: Vec<_> = places_m.iter().map(|x| x.to_bits()).collect();
+    let expected = [-0.5, -0.0, 1e300].map(f64::to_bits).repeat(2);
+    assert_eq!(bits, expected, "f64 keeps its bits");
+    assert_eq!(vec![column(1, 0), column(1, 1)], second_block(), "i32 and labels come back");
+}
+
+/// Three rows of the first conformance table.
+fn first_block(cycle: u64) -> Vec<Values> {
+    vec![
+        Values::U64((cycle..cycle + 3).collect()),
+        Values::U32(vec![0, 7, u32::MAX]),
+        Values::F64(vec![-0.5, -0.0, 1e300]),
+    ]
+}
+
+/// Three rows of the second conformance table.
+fn second_block() -> Vec<Values> {
+    vec![Values::I32(vec![i32::MIN, 0, i32::MAX]), Values::Label(vec![1, 0, 1])]
+}
+
+fn refuses_what_does_not_fit(recorder: &mut impl Recorder) {
+    let mut refuses = |table: usize, block: &[Values], what: &str| {
+        assert!(recorder.append(table, block).is_err(), "{what} is refused");
+    };
+    refuses(0, &second_block(), "a block of another table");
+    refuses(0, &first_block(10)[..2], "a missing column");
+    refuses(9, &second_block(), "a table that does not exist");
+    refuses(1, &[Values::I32(vec![1]), Values::Label(vec![])], "a column of another length");
+    refuses(1, &[Values::I32(vec![1]), Values::Label(vec![2])], "a label without a name");
 }
 
 #[cfg(test)]
@@ -288,6 +347,9 @@ mod tests {
 
     #[test]
     fn the_memory_recorder_conforms() {
-        conformance(MemoryRecorder::new(&conformance_schemas()), |r, t, c| r.tables[t][c].clone());
+        conformance(MemoryRecorder::new(&conformance_schemas()), |r| {
+            assert!(r.is_finished());
+            Box::new(move |table, column| r.tables[table][column].clone())
+        });
     }
 }

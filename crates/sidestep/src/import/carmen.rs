@@ -11,7 +11,8 @@
 
 use std::path::Path;
 
-use super::table::{Word, data_lines, read_text, words};
+use super::read_text;
+use super::table::{MAX_TEXT_BYTES, Word, data_lines, words};
 use crate::kernel::InputError;
 
 /// Beams per scan beyond which a count is taken for damage.
@@ -47,7 +48,7 @@ pub struct Scan {
 /// # Errors
 /// When the file cannot be read, a message is damaged, or there are fewer than two scans.
 pub fn read(path: &Path) -> Result<CorrectedLog, InputError> {
-    parse(&path.display().to_string(), &read_text(path)?)
+    parse(&path.display().to_string(), &read_text(path, MAX_TEXT_BYTES)?)
 }
 
 /// Parses the text of a log; `place` is named in errors.

@@ -1,5 +1,25 @@
-//! Foreign files read into our own types; a wrong file is an [`InputError`](crate::kernel::InputError), never a panic.
+//! Foreign files, read into our own types.
+//!
+//! Every reader takes its file plain or packed with gzip, refuses absurd sizes before it
+//! allocates memory for them, and reports what is wrong as an
+//! [`InputError`](sidestep_kernel::InputError) with file, line and column.
 
+pub mod ascii;
 pub mod carmen;
+pub mod file;
+pub use file::read_text;
+pub mod image;
+mod map_file;
+mod map_yaml;
+pub mod movingai;
 pub mod mrclam;
+mod pixel_map;
+pub mod rosmap;
+mod rows;
 pub mod table;
+
+#[cfg(test)]
+mod shared_data;
+
+pub use map_file::map_file;
+pub use pixel_map::{MAX_PIXELS, PixelMap};

@@ -12,7 +12,8 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::path::Path;
 
-use super::table::{Word, find_file, read_text, rows};
+use super::read_text;
+use super::table::{MAX_TEXT_BYTES, Word, find_file, rows};
 use crate::kernel::InputError;
 
 /// Everything in one folder.
@@ -99,7 +100,7 @@ pub fn read(folder: &Path) -> Result<Dataset, InputError> {
 
 fn read_file(folder: &Path, name: &str) -> Result<(String, String), InputError> {
     let path = find_file(folder, name)?;
-    Ok((path.display().to_string(), read_text(&path)?))
+    Ok((path.display().to_string(), read_text(&path, MAX_TEXT_BYTES)?))
 }
 
 fn read_robot(folder: &Path, subject: u32) -> Result<RobotLog, InputError> {

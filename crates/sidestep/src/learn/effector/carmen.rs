@@ -50,7 +50,7 @@ pub(super) fn learn(
     let moments: [(&str, fn(&Pair) -> f64); 3] = [
         ("odometry_forward_m", |pair| pair.claimed.ahead_m),
         ("error_ahead_m", |pair| pair.corrected.ahead_m - pair.claimed.ahead_m),
-        ("error_left_m", |pair| pair.corrected.left_m - pair.claimed.left_m),
+        ("error_left_m", |pair| pair.corrected.left_m),
     ];
     for (name, value) in moments {
         let moments = Moments::of(ahead.iter().map(|pair| value(pair)));
@@ -172,7 +172,7 @@ mod tests {
     #[test]
     fn odometry_that_slips_sideways_is_warned_of() {
         let zigzag = |slip: f64| {
-            let step = |i: u32| [f64::from(i), if i % 2 == 0 { 0.0 } else { slip }, 0.0];
+            let step = |i: u32| [f64::from(i), if i.is_multiple_of(2) { 0.0 } else { slip }, 0.0];
             let odometry: Vec<[f64; 3]> = (0..20).map(step).collect();
             log(vec![scan(0.0, [0.0; 3], &odometry), scan(1.0, [19.0, 0.0, 0.0], &[])])
         };

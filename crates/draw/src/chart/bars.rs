@@ -1,0 +1,187 @@
+//! Grouped bars: one group per category, in each group one bar per series.
+
+use crate::axis::Axis;
+use crate::chart::error_bar;
+use crate::chart::frame::{Across, Frame, Words, most_ticks};
+use crate::error::DrawError;
+use crate::legend::{Entry, Symbol};
+use crate::style::{INK, Style, series_color};
+use crate::svg::Rect;
+
+/// The part of a category's slot that its bars fill.
+const FILLED: f64 = 0.78;
+/// Bars are never wider than this.
+const WIDEST_PX: f64 = 60.0;
+
+/// The height of a bar, perhaps with its interval.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bar {
+    /// Height in units of the vertical axis; a bar that is not a number is left out.
+    pub value: f64,
+    /// Lower and upper end of the error bar, in the same units.
+    pub interval: Option<(f64, f64)>,
+}
+
+impl Bar {
+    /// A bar without an error bar.
+    pub fn new(value: f64) -> Self {
+        Self { value, interval: None }
+    }
+
+    /// The same bar with an error bar from `low` to `high`, e.g. a 95 % confidence interval.
+    #[must_use]
+    pub fn with_interval(mut self, low: f64, high: f64) -> Self {
+        self.interval = Some((low, high));
+        self
+    }
+}
+
+/// The bars of one color: one per category.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BarSeries {
+    /// What the legend says.
+    pub label: String,
+    /// One bar per category, in their order.
+    pub bars: Vec<Bar>,
+}
+
+impl BarSeries {
+    /// A series of `bars`, one per category.
+    pub fn new(label: impl Into<String>, bars: Vec<Bar>) -> Self {
+        Self { label: label.into(), bars }
+    }
+}
+
+/// A chart of bars in groups, e.g. contacts by what was hit, for each regime.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BarChart {
+    title: String,
+    note: String,
+    x_label: String,
+    categories: Vec<String>,
+    y: Axis,
+    series: Vec<BarSeries>,
+}
+
+impl BarChart {
+    /// An empty chart with these categories along the horizontal axis.
+    pub fn new(
+        title: impl Into<String>,
+        categories: impl IntoIterator<Item = impl Into<String>>,
+    ) -> Self {
+        Self {
+            title: title.into(),
+            note: String::new(),
+            x_label: String::new(),
+            categories: categories.into_iter().map(Into::into).collect(),
+            y: Axis::linear(""),
+            series: vec![],
+        }
+    }
+
+    /// Sets what the categories are called together.
+    #[must_use]
+    pub fn x_label(mut self, label: impl Into<String>) -> Self {
+        self.x_label = label.into();
+        self
+    }
+
+    /// Sets the vertical axis. Bars begin at zero, or at the low end of a logarithmic axis.
+    #[must_use]
+    pub fn y_axis(mut self, axis: Axis) -> Self {
+        self.y = axis;
+        self
+    }
+
+    /// Adds a series.
+    #[must_use]
+    pub fn series(mut self, series: BarSeries) -> Self {
+        self.series.push(series);
+        self
+    }
+
+    /// Sets the small print under the chart, e.g. what the error bars mean.
+    #[must_use]
+    pub fn note(mut self, note: impl Into<String>) -> Self {
+        self.note = note.into();
+        self
+    }
+
+    /// Draws the chart.
+    ///
+    /// # Errors
+    /// [`DrawError::Length`] if a series has not one bar per category, [`DrawError::Value`] if the
+    /// style or the axis' given range is impossible.
+    pub fn to_svg(&self, style: &Style) -> Result<String, DrawError> {
+        style.check()?;
+        for series in &self.series {
+            DrawError::length("bars of a series", self.categories.len(), series.bars.len())?;
+        }
+        let y = self.y.fit(self.heights(), most_ticks(style).1)?;
+        let words = Words {
+            title: &self.title,
+            note: &self.note,
+            x_label: &self.x_label,
+            y_label: self.y.label(),
+            legend: self.legend(),
+        };
+        let mut frame = Frame::open(style, words, &Across::Categories(&self.categories), &y);
+        frame.open_data();
+        for (index, series) in self.series.iter().enumerate() {
+            self.draw_series(&mut frame, index, series);
+        }
+        let (base, area) = (frame.y.base_px(), frame.area);
+        frame.svg.line((area.x, base), (area.right(), base), format_args!(r#"stroke="{INK}""#));
+        frame.svg.close_group();
+        Ok(frame.finish())
+    }
+
+    /// All values the axis must show; zero, where bars begin, among them.
+    fn heights(&self) -> impl Iterator<Item = f64> {
+        let bars = self.series.iter().flat_map(|series| &series.bars);
+        let reach = |bar: &Bar| {
+            let (low, high) = bar.interval.unwrap_or((bar.value, bar.value));
+            [low, bar.value, high]
+        };
+        bars.flat_map(reach).chain([0.0])
+    }
+
+    fn legend(&self) -> Vec<Entry> {
+        let entry = |(index, series): (usize, &BarSeries)| {
+            let fill = series_color(index);
+            Entry::new(Symbol::Swatch { fill, rim: "none", opacity: 1.0 }, &series.label)
+        };
+        self.series.iter().enumerate().map(entry).collect()
+    }
+
+    fn draw_series(&self, frame: &mut Frame, index: usize, series: &BarSeries) {
+        let slot = frame.area.width / self.categories.len().max(1) as f64;
+        let count = self.series.len() as f64;
+        let width = (slot * FILLED / count).min(WIDEST_PX);
+        // From the middle of the slot to the middle of this series' bar.
+        let aside = (index as f64 - (count - 1.0) / 2.0) * width;
+        for (category, bar) in series.bars.iter().enumerate() {
+            if self.y.holds(bar.value) {
+                let center = frame.area.x + (category as f64 + 0.5) * slot + aside;
+                draw_bar(frame, bar, center, width, series_color(index));
+            }
+        }
+    }
+}
+
+/// Draws `bar` around `center`; a little of its `width` stays free beside the next one.
+fn draw_bar(frame: &mut Frame, bar: &Bar, center: f64, width: f64, color: &str) {
+    let filled = width - (0.06 * width).min(1.5);
+    column(frame, (center - filled / 2.0, filled), bar.value, color);
+    if let Some((low, high)) = bar.interval.filter(|(l, h)| l.is_finite() && h.is_finite()) {
+        let ends = (frame.y.px(low), frame.y.px(high));
+        error_bar(&mut frame.svg, center, ends, (0.2 * width).min(5.0), INK);
+    }
+}
+
+/// A filled column from the axis' base to `value`.
+pub(crate) fn column(frame: &mut Frame, (x, width): (f64, f64), value: f64, color: &str) {
+    let (base, end) = (frame.y.base_px(), frame.y.px(value));
+    let column = Rect { x, y: base.min(end), width, height: (base - end).abs() };
+    frame.svg.rect(column, format_args!(r#"fill="{color}""#));
+}

@@ -1,0 +1,278 @@
+//! The frame of a chart: margins that fit the labels, grid, ticks, axis labels, title, legend.
+
+use crate::axis::{Fitted, Scale};
+use crate::legend::{Entry, Legend, paragraph, title_look};
+use crate::style::{FAINT_INK, GRID, INK, Style};
+use crate::svg::{Anchor, Num, Rect, Svg, TextLook};
+use crate::text::{self, Weight};
+use crate::ticks::Spacing;
+
+const TICK_PX: f64 = 5.0;
+const EDGE_PX: f64 = 10.0;
+const LABEL_GAP_PX: f64 = 5.0;
+const NOTE_GAP_PX: f64 = 8.0;
+/// The part of the picture's height that the data have at least; the picture grows to grant it.
+const LEAST_AREA: f64 = 0.55;
+
+/// What runs along the horizontal axis.
+pub(crate) enum Across<'a> {
+    /// Numbers.
+    Values(Fitted),
+    /// Named slots of equal width.
+    Categories(&'a [String]),
+}
+
+/// All that a frame says.
+pub(crate) struct Words<'a> {
+    pub(crate) title: &'a str,
+    pub(crate) note: &'a str,
+    pub(crate) x_label: &'a str,
+    pub(crate) y_label: &'a str,
+    pub(crate) legend: Vec<Entry>,
+}
+
+/// How many labeled ticks a picture of this style has room for, across and upward.
+pub(crate) fn most_ticks(style: &Style) -> (usize, usize) {
+    let across = style.width_px / (7.0 * style.font_px);
+    let upward = style.height_px / (4.5 * style.font_px);
+    ((across as usize).clamp(2, 12), (upward as usize).clamp(2, 10))
+}
+
+/// A chart under construction: its axes stand, the data come next.
+pub(crate) struct Frame {
+    pub(crate) svg: Svg,
+    /// Where the data go.
+    pub(crate) area: Rect,
+    pub(crate) y: Scale,
+    style: Style,
+    title: String,
+    note: Vec<String>,
+    note_top: f64,
+}
+
+/// The lines of text around the area, broken for the room there is.
+struct Labels {
+    title: Vec<String>,
+    note: Vec<String>,
+    x: Vec<String>,
+    y: Vec<String>,
+    slots: SlotNames,
+}
+
+/// The names under a bar chart's slots.
+#[derive(Default)]
+struct SlotNames {
+    names: Vec<Vec<String>>,
+    /// The slots are too narrow for a word: names read upward.
+    upright: bool,
+    height_px: f64,
+}
+
+impl Labels {
+    /// Breaks all text for an area `width` pixels wide; `y` is broken already.
+    fn wrap(
+        style: &Style,
+        words: &Words<'_>,
+        across: &Across<'_>,
+        y: Vec<String>,
+        width: f64,
+    ) -> Self {
+        let whole = style.width_px - 2.0 * EDGE_PX;
+        Self {
+            title: text::wrap(words.title, style.title_px(), Weight::Bold, whole),
+            note: text::wrap(words.note, style.small_px(), Weight::Regular, whole),
+            x: text::wrap(words.x_label, style.font_px, Weight::Regular, width),
+            y,
+            slots: SlotNames::wrap(style, across, width),
+        }
+    }
+
+    /// The height of all that stands between the area and the note.
+    fn below_px(&self, style: &Style) -> f64 {
+        let ticks = TICK_PX + self.slots.height_px.max(style.small_px() * 1.35);
+        ticks + self.x.len() as f64 * line_px(style) + LABEL_GAP_PX + NOTE_GAP_PX
+    }
+}
+
+impl SlotNames {
+    fn wrap(style: &Style, across: &Across<'_>, width: f64) -> Self {
+        let Across::Categories(names) = across else { return Self::default() };
+        let size = style.small_px();
+        let room = width / names.len().max(1) as f64 - 6.0;
+        let measure = |text: &str| text::width(text, size, Weight::Regular);
+        let too_wide = |name: &String| name.split(' ').any(|word| measure(word) > room);
+        if names.iter().any(too_wide) {
+            let most = 0.4 * style.height_px;
+            let short = |name: &String| vec![text::shorten(name, size, Weight::Regular, most)];
+            let names: Vec<_> = names.iter().map(short).collect();
+            let height_px = names.iter().flatten().map(|name| measure(name)).fold(0.0, f64::max);
+            return Self { names, upright: true, height_px: height_px + 4.0 };
+        }
+        let lines = |name: &String| text::wrap(name, size, Weight::Regular, room);
+        let names: Vec<_> = names.iter().map(lines).collect();
+        let most_lines = names.iter().map(Vec::len).max().unwrap_or(0);
+        Self { names, upright: false, height_px: most_lines as f64 * size * 1.35 }
+    }
+}
+
+impl Frame {
+    /// Lays out and draws everything but the data.
+    pub(crate) fn open(style: &Style, words: Words<'_>, across: &Across<'_>, up: &Fitted) -> Self {
+        let least_height = LEAST_AREA * style.height_px;
+        let y = text::wrap(words.y_label, style.font_px, Weight::Regular, least_height);
+        let measure = |label: &str| text::width(label, style.small_px(), Weight::Regular);
+        let ticks_px = up.ticks.widest_px(measure) + TICK_PX + 8.0;
+        let left = EDGE_PX + y.len() as f64 * line_px(style) + ticks_px;
+        let width = (style.width_px - left - EDGE_PX - right_room(style, across)).max(60.0);
+        let labels = Labels::wrap(style, &words, across, y, width);
+        let legend = Legend::lay_out(words.legend, style.font_px, style.width_px - 2.0 * EDGE_PX);
+        let mut svg = Svg::default();
+        let top = draw_head(&mut svg, style, &labels.title, &legend);
+        let below = labels.below_px(style);
+        let note_px = labels.note.len() as f64 * style.small_px() * 1.35;
+        let height = (style.height_px - top - below - note_px - EDGE_PX).max(least_height);
+        let area = Rect { x: left, y: top, width, height };
+        let title = words.title.to_string();
+        let y = up.between(area.bottom(), area.y);
+        let note_top = area.bottom() + below;
+        let mut frame = Self { svg, area, y, style: *style, title, note: vec![], note_top };
+        frame.draw_axes(across, up, &labels);
+        frame.note = labels.note;
+        frame
+    }
+
+    /// The horizontal scale of `across`.
+    pub(crate) fn x_scale(&self, across: &Fitted) -> Scale {
+        across.between(self.area.x, self.area.right())
+    }
+
+    /// Opens a group for data, of which only what lies in the area is seen.
+    pub(crate) fn open_data(&mut self) {
+        self.svg.open_clip(self.area.grown(6.0));
+    }
+
+    /// The finished picture.
+    pub(crate) fn finish(mut self) -> String {
+        let look =
+            TextLook { fill: FAINT_INK, ..TextLook::new(self.style.small_px(), Anchor::Start) };
+        let end = paragraph(&mut self.svg, &self.note, (EDGE_PX, self.note_top), &look);
+        self.svg.finish(self.style.width_px, (end + EDGE_PX).max(self.style.height_px), &self.title)
+    }
+
+    fn draw_axes(&mut self, across: &Across<'_>, up: &Fitted, labels: &Labels) {
+        self.draw_y_ticks(up);
+        match across {
+            Across::Values(fitted) => self.draw_x_ticks(fitted),
+            Across::Categories(_) => self.draw_categories(&labels.slots),
+        }
+        let (left, bottom, right) = (self.area.x, self.area.bottom(), self.area.right());
+        let ink = axis_ink();
+        self.svg.line((left, bottom), (right, bottom), &ink);
+        self.svg.line((left, self.area.y), (left, bottom), &ink);
+        self.draw_axis_labels(labels);
+    }
+
+    fn draw_y_ticks(&mut self, up: &Fitted) {
+        let (left, right) = (self.area.x, self.area.right());
+        let look = TextLook::new(self.style.small_px(), Anchor::End);
+        let mut spacing = Spacing::new();
+        for (value, label) in &up.ticks.major {
+            let y = self.y.px(*value);
+            self.svg.line((left, y), (right, y), grid_ink());
+            self.svg.line((left - TICK_PX, y), (left, y), axis_ink());
+            if spacing.admits(-y, look.size_px) {
+                self.svg.text(left - TICK_PX - 3.0, y + look.middle_px(), label, &look);
+            }
+        }
+        for value in &up.ticks.minor {
+            let y = self.y.px(*value);
+            self.svg.line((left - 0.6 * TICK_PX, y), (left, y), axis_ink());
+        }
+    }
+
+    fn draw_x_ticks(&mut self, across: &Fitted) {
+        let x = self.x_scale(across);
+        let (top, bottom) = (self.area.y, self.area.bottom());
+        let look = TextLook::new(self.style.small_px(), Anchor::Middle);
+        let mut spacing = Spacing::new();
+        for (value, label) in &across.ticks.major {
+            let at = x.px(*value);
+            self.svg.line((at, top), (at, bottom), grid_ink());
+            self.svg.line((at, bottom), (at, bottom + TICK_PX), axis_ink());
+            let label_px = text::width(label, look.size_px, Weight::Regular);
+            // Given ticks may stand too close for all their labels.
+            if spacing.admits(at, label_px + 0.4 * look.size_px) {
+                self.svg.text(at, bottom + TICK_PX + 2.0 + look.size_px, label, &look);
+            }
+        }
+        for value in &across.ticks.minor {
+            let at = x.px(*value);
+            self.svg.line((at, bottom), (at, bottom + 0.6 * TICK_PX), axis_ink());
+        }
+    }
+
+    fn draw_categories(&mut self, slots: &SlotNames) {
+        let slot = self.area.width / slots.names.len().max(1) as f64;
+        let top = self.area.bottom() + TICK_PX;
+        let anchor = if slots.upright { Anchor::End } else { Anchor::Middle };
+        let look =
+            TextLook { upward: slots.upright, ..TextLook::new(self.style.small_px(), anchor) };
+        for (index, lines) in slots.names.iter().enumerate() {
+            let center = self.area.x + (index as f64 + 0.5) * slot;
+            if slots.upright {
+                self.svg.text(center + look.middle_px(), top, &lines.concat(), &look);
+            } else {
+                paragraph(&mut self.svg, lines, (center, top), &look);
+            }
+        }
+    }
+
+    fn draw_axis_labels(&mut self, labels: &Labels) {
+        let Rect { x, y, width, height } = self.area;
+        let line = line_px(&self.style);
+        let look = TextLook::new(self.style.font_px, Anchor::Middle);
+        let top = self.note_top - labels.x.len() as f64 * line - NOTE_GAP_PX;
+        paragraph(&mut self.svg, &labels.x, (x + width / 2.0, top), &look);
+        let upward = TextLook { upward: true, ..look };
+        for (row, text) in labels.y.iter().enumerate() {
+            let baseline = EDGE_PX + row as f64 * line + self.style.font_px;
+            self.svg.text(baseline, y + height / 2.0, text, &upward);
+        }
+    }
+}
+
+fn axis_ink() -> String {
+    format!(r#"stroke="{INK}""#)
+}
+
+fn grid_ink() -> String {
+    format!(r#"stroke="{GRID}""#)
+}
+
+fn line_px(style: &Style) -> f64 {
+    style.font_px * 1.35
+}
+
+/// Half of the last tick's label may stand out beyond the area.
+fn right_room(style: &Style, across: &Across<'_>) -> f64 {
+    let Across::Values(fitted) = across else { return 0.0 };
+    let last = fitted.ticks.major.last();
+    last.map_or(0.0, |(_, label)| text::width(label, style.small_px(), Weight::Regular) / 2.0)
+}
+
+/// Draws title and legend; returns where the area may begin.
+fn draw_head(svg: &mut Svg, style: &Style, title: &[String], legend: &Legend) -> f64 {
+    let top = paragraph(svg, title, (EDGE_PX, EDGE_PX), &title_look(style.title_px()));
+    legend.draw(svg, EDGE_PX, top + 2.0);
+    top + legend.height_px() + 14.0
+}
+
+/// A polyline's path data through points in pixels.
+pub(crate) fn polyline(points: impl Iterator<Item = (f64, f64)>) -> String {
+    let mut data = String::new();
+    for (x, y) in points {
+        let command = if data.is_empty() { 'M' } else { 'L' };
+        data.push_str(&format!("{command}{} {}", Num(x), Num(y)));
+    }
+    data
+}

@@ -1,0 +1,274 @@
+//! Lines and points over numeric axes.
+
+use crate::axis::{Axis, Fitted, Scale};
+use crate::chart::error_bar;
+use crate::chart::frame::{Across, Frame, Words, most_ticks, polyline};
+use crate::error::DrawError;
+use crate::legend::{Entry, Marker, Symbol, dashes};
+use crate::style::{FAINT_INK, Style, series_color};
+
+/// How many straight pieces stand for an ideal line, which is a curve if one axis is logarithmic.
+const IDEAL_PIECES: u32 = 64;
+/// Series longer than this show their line without a marker at each point.
+const MOST_MARKERS: usize = 60;
+
+/// A measured value, perhaps with its interval.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Point {
+    /// Position along the horizontal axis. A point that is not a number interrupts its line.
+    pub x: f64,
+    /// Position along the vertical axis.
+    pub y: f64,
+    /// Lower and upper end of the error bar, in units of the vertical axis.
+    pub interval: Option<(f64, f64)>,
+}
+
+impl Point {
+    /// A value without an error bar.
+    pub fn new(x: f64, y: f64) -> Self {
+        Self { x, y, interval: None }
+    }
+
+    /// The same value with an error bar from `low` to `high`, e.g. a 95 % confidence interval.
+    #[must_use]
+    pub fn with_interval(mut self, low: f64, high: f64) -> Self {
+        self.interval = Some((low, high));
+        self
+    }
+}
+
+/// How the points of a series are drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mark {
+    /// A line, with markers where the points are few.
+    Line,
+    /// Markers only.
+    Points,
+}
+
+/// Points that belong together; color and marker follow from the series' number.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Series {
+    /// What the legend says; an empty label has no place in the legend.
+    pub label: String,
+    /// The points, in the order in which the line runs.
+    pub points: Vec<Point>,
+    /// Line or points.
+    pub mark: Mark,
+}
+
+impl Series {
+    /// Points joined by a line.
+    pub fn line(label: impl Into<String>, points: Vec<Point>) -> Self {
+        Self { label: label.into(), points, mark: Mark::Line }
+    }
+
+    /// Points that are not joined.
+    pub fn points(label: impl Into<String>, points: Vec<Point>) -> Self {
+        Self { mark: Mark::Points, ..Self::line(label, points) }
+    }
+
+    fn shows_markers(&self) -> bool {
+        self.mark == Mark::Points || self.points.len() <= MOST_MARKERS
+    }
+}
+
+/// A straight line in data coordinates, such as the ideal speed-up.
+#[derive(Debug, Clone, PartialEq)]
+struct Ideal {
+    label: String,
+    intercept: f64,
+    slope: f64,
+}
+
+/// A chart of one or more [`Series`] over numeric axes.
+///
+/// Points that an axis cannot hold (NaN, or zero on a logarithmic one) are left out; without any
+/// points the picture is an empty pair of axes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plot {
+    title: String,
+    note: String,
+    x: Axis,
+    y: Axis,
+    series: Vec<Series>,
+    ideals: Vec<Ideal>,
+}
+
+impl Plot {
+    /// An empty plot with linear axes `x` and `y`. An empty title takes no room.
+    pub fn new(title: impl Into<String>) -> Self {
+        Self {
+            title: title.into(),
+            note: String::new(),
+            x: Axis::linear("x"),
+            y: Axis::linear("y"),
+            series: vec![],
+            ideals: vec![],
+        }
+    }
+
+    /// Sets the horizontal axis.
+    #[must_use]
+    pub fn x_axis(mut self, axis: Axis) -> Self {
+        self.x = axis;
+        self
+    }
+
+    /// Sets the vertical axis.
+    #[must_use]
+    pub fn y_axis(mut self, axis: Axis) -> Self {
+        self.y = axis;
+        self
+    }
+
+    /// Adds a series.
+    #[must_use]
+    pub fn series(mut self, series: Series) -> Self {
+        self.series.push(series);
+        self
+    }
+
+    /// Adds the dashed line `y = intercept + slope * x` behind the data: slope 1 for the ideal
+    /// speed-up, intercept 1 and slope 0 for the ideal efficiency. It does not widen the axes.
+    #[must_use]
+    pub fn ideal_line(mut self, label: impl Into<String>, intercept: f64, slope: f64) -> Self {
+        self.ideals.push(Ideal { label: label.into(), intercept, slope });
+        self
+    }
+
+    /// Sets the small print under the plot, e.g. what the error bars mean.
+    #[must_use]
+    pub fn note(mut self, note: impl Into<String>) -> Self {
+        self.note = note.into();
+        self
+    }
+
+    /// Draws the plot.
+    ///
+    /// # Errors
+    /// [`DrawError::Value`] if the style or an axis' given range is impossible.
+    pub fn to_svg(&self, style: &Style) -> Result<String, DrawError> {
+        style.check()?;
+        let (most_across, most_up) = most_ticks(style);
+        let x = self.x.fit(self.drawable().map(|p| p.x), most_across)?;
+        let y = self.y.fit(self.drawable().flat_map(reach), most_up)?;
+        let words = Words {
+            title: &self.title,
+            note: &self.note,
+            x_label: self.x.label(),
+            y_label: self.y.label(),
+            legend: self.legend(),
+        };
+        let across = Across::Values(x.clone());
+        let mut frame = Frame::open(style, words, &across, &y);
+        frame.open_data();
+        let x_scale = frame.x_scale(&x);
+        for ideal in &self.ideals {
+            draw_ideal(&mut frame, ideal, &x, x_scale, &self.y);
+        }
+        for (index, series) in self.series.iter().enumerate() {
+            self.draw_series(&mut frame, x_scale, index, series, style);
+        }
+        frame.svg.close_group();
+        Ok(frame.finish())
+    }
+
+    fn holds(&self, point: &Point) -> bool {
+        self.x.holds(point.x) && self.y.holds(point.y)
+    }
+
+    fn drawable(&self) -> impl Iterator<Item = &Point> {
+        self.series.iter().flat_map(|s| &s.points).filter(|p| self.holds(p))
+    }
+
+    /// One entry per series and ideal line.
+    fn legend(&self) -> Vec<Entry> {
+        let series = self.series.iter().enumerate().map(|(index, series)| {
+            let (color, marker) = (series_color(index), Marker::of_series(index));
+            let symbol = match series.mark {
+                Mark::Points => Symbol::Marker { color, marker },
+                Mark::Line => {
+                    Symbol::Line { color, marker: series.shows_markers().then_some(marker) }
+                }
+            };
+            Entry::new(symbol, &series.label)
+        });
+        let dashes = Symbol::Dashes { color: FAINT_INK };
+        series.chain(self.ideals.iter().map(|ideal| Entry::new(dashes, &ideal.label))).collect()
+    }
+
+    fn draw_series(
+        &self,
+        frame: &mut Frame,
+        x: Scale,
+        index: usize,
+        series: &Series,
+        style: &Style,
+    ) {
+        let color = series_color(index);
+        let y = frame.y;
+        if series.mark == Mark::Line {
+            for run in series.points.split(|p| !self.holds(p)).filter(|run| run.len() > 1) {
+                let data = polyline(thinned(run.iter().map(|p| (x.px(p.x), y.px(p.y)))));
+                let look = r#"fill="none" stroke-width="2" stroke-linejoin="round""#;
+                frame.svg.path(&data, format_args!(r#"stroke="{color}" {look}"#));
+            }
+        }
+        for point in series.points.iter().filter(|p| self.holds(p)) {
+            let at = (x.px(point.x), y.px(point.y));
+            if let Some((low, high)) =
+                point.interval.filter(|(l, h)| l.is_finite() && h.is_finite())
+            {
+                error_bar(
+                    &mut frame.svg,
+                    at.0,
+                    (y.px(low), y.px(high)),
+                    0.3 * style.font_px,
+                    color,
+                );
+            }
+            if series.shows_markers() {
+                Marker::of_series(index).draw(&mut frame.svg, at, 0.32 * style.font_px, color);
+            }
+        }
+    }
+}
+
+/// The vertical values a point covers.
+fn reach(point: &Point) -> impl Iterator<Item = f64> {
+    let (low, high) = point.interval.unwrap_or((point.y, point.y));
+    [low, point.y, high].into_iter()
+}
+
+/// Leaves out points less than half a pixel from the last one kept: they are not seen. The last
+/// point always stays.
+fn thinned(points: impl Iterator<Item = (f64, f64)>) -> impl Iterator<Item = (f64, f64)> {
+    let mut points = points.peekable();
+    let mut kept: Option<(f64, f64)> = None;
+    std::iter::from_fn(move || {
+        loop {
+            let point = points.next()?;
+            let far =
+                |last: (f64, f64)| (point.0 - last.0).abs().max((point.1 - last.1).abs()) >= 0.5;
+            if kept.is_none_or(far) || points.peek().is_none() {
+                kept = Some(point);
+                return kept;
+            }
+        }
+    })
+}
+
+fn draw_ideal(frame: &mut Frame, ideal: &Ideal, x: &Fitted, x_scale: Scale, y_axis: &Axis) {
+    let y_scale = frame.y;
+    let places = (0..=IDEAL_PIECES).map(|k| f64::from(k) / f64::from(IDEAL_PIECES));
+    let points = places
+        .map(|part| x.value_at(part))
+        .map(|x| (x, ideal.intercept + ideal.slope * x))
+        .filter(|(_, y)| y_axis.holds(*y))
+        .map(|(x, y)| (x_scale.px(x), y_scale.px(y)));
+    let data = polyline(points);
+    if !data.is_empty() {
+        frame.svg.path(&data, dashes(FAINT_INK));
+    }
+}

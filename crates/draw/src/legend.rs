@@ -1,0 +1,209 @@
+//! Markers, and the legend: symbols with labels, in rows as wide as the picture.
+
+use crate::style::{FAINT_INK, INK};
+use crate::svg::{Anchor, Num, Rect, Svg, TextLook};
+use crate::text::{self, Weight};
+
+/// The shape that tells a series apart besides its color.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Marker {
+    Circle,
+    Square,
+    Triangle,
+    Diamond,
+    Cross,
+}
+
+impl Marker {
+    /// The marker of the series of this number. Five shapes and seven colors are coprime, so that
+    /// 35 series differ.
+    pub(crate) fn of_series(index: usize) -> Self {
+        let all = [Self::Circle, Self::Square, Self::Triangle, Self::Diamond, Self::Cross];
+        all[index % all.len()]
+    }
+
+    /// Draws the marker around `(x, y)`, `radius` pixels large.
+    pub(crate) fn draw(self, svg: &mut Svg, (x, y): (f64, f64), radius: f64, color: &str) {
+        let rim = format!(r##"fill="{color}" stroke="#FFFFFF" stroke-width="0.8""##);
+        let polygon = |corners: &[(f64, f64)]| {
+            let at = |(dx, dy): &(f64, f64)| {
+                format!("{} {}", Num(x + dx * radius), Num(y + dy * radius))
+            };
+            format!("M{}Z", corners.iter().map(at).collect::<Vec<_>>().join("L"))
+        };
+        match self {
+            Self::Circle => svg.circle((x, y), radius, rim),
+            Self::Square => {
+                svg.path(&polygon(&[(-0.9, -0.9), (0.9, -0.9), (0.9, 0.9), (-0.9, 0.9)]), rim)
+            }
+            Self::Triangle => svg.path(&polygon(&[(0.0, -1.2), (1.1, 0.8), (-1.1, 0.8)]), rim),
+            Self::Diamond => {
+                svg.path(&polygon(&[(0.0, -1.3), (1.2, 0.0), (0.0, 1.3), (-1.2, 0.0)]), rim)
+            }
+            Self::Cross => svg.path(&polygon(&CROSS), rim),
+        }
+    }
+}
+
+/// An upright cross of bars 0.8 radii wide.
+const CROSS: [(f64, f64); 12] = [
+    (-0.4, -1.2),
+    (0.4, -1.2),
+    (0.4, -0.4),
+    (1.2, -0.4),
+    (1.2, 0.4),
+    (0.4, 0.4),
+    (0.4, 1.2),
+    (-0.4, 1.2),
+    (-0.4, 0.4),
+    (-1.2, 0.4),
+    (-1.2, -0.4),
+    (-0.4, -0.4),
+];
+
+/// What stands before a legend's label.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Symbol {
+    /// A stretch of line, perhaps with its marker.
+    Line { color: &'static str, marker: Option<Marker> },
+    /// A marker alone.
+    Marker { color: &'static str, marker: Marker },
+    /// The dashes of a reference line.
+    Dashes { color: &'static str },
+    /// A filled box.
+    Swatch { fill: &'static str, rim: &'static str, opacity: f64 },
+    /// The mark at a track's start.
+    Ring,
+    /// The mark at a track's end.
+    Disc,
+}
+
+/// A line of a legend.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Entry {
+    pub(crate) symbol: Symbol,
+    pub(crate) label: String,
+}
+
+impl Entry {
+    pub(crate) fn new(symbol: Symbol, label: impl Into<String>) -> Self {
+        Self { symbol, label: label.into() }
+    }
+}
+
+/// A legend laid out for a given width.
+#[derive(Debug)]
+pub(crate) struct Legend {
+    /// Left edge and row of each entry.
+    placed: Vec<(f64, usize, Entry)>,
+    font_px: f64,
+}
+
+impl Legend {
+    /// Flows `entries` into rows at most `room_px` wide. Entries without a label are left out.
+    pub(crate) fn lay_out(entries: Vec<Entry>, font_px: f64, room_px: f64) -> Self {
+        let (mut x, mut row) = (0.0, 0);
+        let mut placed = Vec::new();
+        for mut entry in entries.into_iter().filter(|entry| !entry.label.trim().is_empty()) {
+            let symbol_px = 2.8 * font_px;
+            entry.label =
+                text::shorten(&entry.label, font_px, Weight::Regular, room_px - symbol_px);
+            let width = symbol_px + text::width(&entry.label, font_px, Weight::Regular);
+            if x > 0.0 && x + width > room_px {
+                (x, row) = (0.0, row + 1);
+            }
+            placed.push((x, row, entry));
+            x += width + 1.5 * font_px;
+        }
+        Self { placed, font_px }
+    }
+
+    fn row_px(&self) -> f64 {
+        self.font_px * 1.6
+    }
+
+    /// The height of all rows.
+    pub(crate) fn height_px(&self) -> f64 {
+        self.placed.last().map_or(0.0, |(_, row, _)| (*row as f64 + 1.0) * self.row_px())
+    }
+
+    /// Draws the legend with its upper left corner at `(left, top)`.
+    pub(crate) fn draw(&self, svg: &mut Svg, left: f64, top: f64) {
+        let look = TextLook::new(self.font_px, Anchor::Start);
+        for (x, row, entry) in &self.placed {
+            let middle = top + (*row as f64 + 0.5) * self.row_px();
+            self.draw_symbol(svg, entry.symbol, left + x, middle);
+            let text_x = left + x + 2.4 * self.font_px;
+            svg.text(text_x, middle + look.middle_px(), &entry.label, &look);
+        }
+    }
+
+    /// Draws `symbol` two letters wide, its left end at `x`.
+    fn draw_symbol(&self, svg: &mut Svg, symbol: Symbol, x: f64, y: f64) {
+        let size = self.font_px;
+        let (end, center) = ((x + 2.0 * size, y), (x + size, y));
+        match symbol {
+            Symbol::Line { color, marker } => {
+                svg.line((x, y), end, format_args!(r#"stroke="{color}" stroke-width="2""#));
+                if let Some(marker) = marker {
+                    marker.draw(svg, center, 0.32 * size, color);
+                }
+            }
+            Symbol::Marker { color, marker } => marker.draw(svg, center, 0.32 * size, color),
+            Symbol::Dashes { color } => svg.line((x, y), end, dashes(color)),
+            Symbol::Swatch { fill, rim, opacity } => {
+                let half = 0.45 * size;
+                let swatch = Rect {
+                    x: center.0 - 2.0 * half,
+                    y: y - half,
+                    width: 4.0 * half,
+                    height: 2.0 * half,
+                };
+                svg.rect(
+                    swatch,
+                    format_args!(r#"fill="{fill}" fill-opacity="{opacity}" stroke="{rim}""#),
+                );
+            }
+            Symbol::Ring => start_mark(svg, center, 0.36 * size, FAINT_INK),
+            Symbol::Disc => end_mark(svg, center, 0.36 * size, FAINT_INK),
+        }
+    }
+}
+
+/// The look of a reference line.
+pub(crate) fn dashes(color: &str) -> String {
+    format!(r#"stroke="{color}" stroke-width="1.4" stroke-dasharray="6 4" fill="none""#)
+}
+
+/// The mark where a track begins.
+pub(crate) fn start_mark(svg: &mut Svg, center: (f64, f64), radius: f64, color: &str) {
+    svg.circle(
+        center,
+        radius,
+        format_args!(r##"fill="#FFFFFF" stroke="{color}" stroke-width="2""##),
+    );
+}
+
+/// The mark where a track ends.
+pub(crate) fn end_mark(svg: &mut Svg, center: (f64, f64), radius: f64, color: &str) {
+    svg.circle(center, radius + 1.0, format_args!(r##"fill="{color}" stroke="#FFFFFF""##));
+}
+
+/// Writes lines of text downward from `top` and returns where they end.
+pub(crate) fn paragraph(
+    svg: &mut Svg,
+    lines: &[String],
+    (x, top): (f64, f64),
+    look: &TextLook<'_>,
+) -> f64 {
+    let line_px = look.size_px * 1.35;
+    for (row, line) in lines.iter().enumerate() {
+        svg.text(x, top + row as f64 * line_px + look.size_px, line, look);
+    }
+    top + lines.len() as f64 * line_px
+}
+
+/// The look of a picture's title.
+pub(crate) fn title_look(size_px: f64) -> TextLook<'static> {
+    TextLook { weight: Weight::Bold, fill: INK, ..TextLook::new(size_px, Anchor::Start) }
+}

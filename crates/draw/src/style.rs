@@ -1,0 +1,73 @@
+//! Sizes and colors that all pictures share.
+
+use crate::error::DrawError;
+
+/// Okabe and Ito's palette without its yellow, which is unreadable on white: distinct for every
+/// common color blindness.
+pub const SERIES_COLORS: [&str; 7] =
+    ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000"];
+
+/// Text and axes.
+pub(crate) const INK: &str = "#222222";
+/// Secondary text.
+pub(crate) const FAINT_INK: &str = "#555555";
+/// Grid lines behind the data.
+pub(crate) const GRID: &str = "#E4E4E4";
+
+/// The color of the series (or track) of this number; colors repeat after seven.
+pub(crate) fn series_color(index: usize) -> &'static str {
+    SERIES_COLORS[index % SERIES_COLORS.len()]
+}
+
+/// The room a picture may take and the size of its text.
+///
+/// A chart takes the whole `width_px` x `height_px`, and grows in height where a title, a legend or
+/// labels need it. A map is scaled to fit that room, and its title, axes and legend come on top.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Style {
+    /// Width in SVG pixels.
+    pub width_px: f64,
+    /// Height in SVG pixels.
+    pub height_px: f64,
+    /// Size of ordinary text in SVG pixels; titles are a little larger, notes smaller.
+    pub font_px: f64,
+}
+
+impl Style {
+    /// A figure one column wide.
+    pub const CHART: Self = Self { width_px: 640.0, height_px: 420.0, font_px: 13.0 };
+    /// A map as large as a page.
+    pub const MAP: Self = Self { width_px: 900.0, height_px: 900.0, font_px: 13.0 };
+
+    /// Title text size in pixels.
+    pub(crate) fn title_px(&self) -> f64 {
+        self.font_px * 1.15
+    }
+
+    /// Notes, tick labels.
+    pub(crate) fn small_px(&self) -> f64 {
+        self.font_px * 0.88
+    }
+
+    /// Refuses sizes that give no picture or an absurd one.
+    pub(crate) fn check(&self) -> Result<(), DrawError> {
+        let refuse = |what, value, must| Err(DrawError::Value { what, value, must });
+        for (what, side) in
+            [("picture width in px", self.width_px), ("picture height in px", self.height_px)]
+        {
+            if !(100.0..=20_000.0).contains(&side) {
+                return refuse(what, side, "100 to 20000");
+            }
+        }
+        if !(4.0..=100.0).contains(&self.font_px) {
+            return refuse("text size in px", self.font_px, "4 to 100");
+        }
+        Ok(())
+    }
+}
+
+impl Default for Style {
+    fn default() -> Self {
+        Self::CHART
+    }
+}

@@ -1,0 +1,219 @@
+//! A writer of SVG text: the few elements the pictures need, numbers rounded, text escaped.
+
+use std::fmt::{self, Display, Write as _};
+
+use crate::style::INK;
+use crate::text::{FAMILIES, Weight};
+
+/// A number with at most two decimals and no trailing zeros, so that bytes are few and equal on
+/// every machine. What is not finite becomes 0: no picture depends on it.
+#[derive(Clone, Copy)]
+pub(crate) struct Num(pub(crate) f64);
+
+impl Display for Num {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let hundredths = (self.0 * 100.0).round();
+        let value = if hundredths.is_finite() { hundredths / 100.0 } else { 0.0 };
+        // Adding zero turns -0 into 0.
+        write!(f, "{}", value + 0.0)
+    }
+}
+
+/// A rectangle in SVG pixels, y downward.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Rect {
+    pub(crate) x: f64,
+    pub(crate) y: f64,
+    pub(crate) width: f64,
+    pub(crate) height: f64,
+}
+
+impl Rect {
+    pub(crate) fn right(&self) -> f64 {
+        self.x + self.width
+    }
+
+    pub(crate) fn bottom(&self) -> f64 {
+        self.y + self.height
+    }
+
+    /// The same rectangle with `margin` more on every side.
+    pub(crate) fn grown(&self, margin: f64) -> Self {
+        Self {
+            x: self.x - margin,
+            y: self.y - margin,
+            width: self.width + 2.0 * margin,
+            height: self.height + 2.0 * margin,
+        }
+    }
+}
+
+/// Which point of a text stands at its position.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Anchor {
+    Start,
+    Middle,
+    End,
+}
+
+/// How a text looks.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct TextLook<'a> {
+    pub(crate) size_px: f64,
+    pub(crate) anchor: Anchor,
+    pub(crate) weight: Weight,
+    pub(crate) fill: &'a str,
+    /// Reads upward instead of to the right.
+    pub(crate) upward: bool,
+    /// Has a white rim, for text on top of a drawing.
+    pub(crate) halo: bool,
+}
+
+impl TextLook<'_> {
+    /// Regular dark text of this size.
+    pub(crate) fn new(size_px: f64, anchor: Anchor) -> Self {
+        Self { size_px, anchor, weight: Weight::Regular, fill: INK, upward: false, halo: false }
+    }
+
+    /// How far the baseline lies below the middle of a capital letter.
+    pub(crate) fn middle_px(&self) -> f64 {
+        self.size_px * 0.365
+    }
+}
+
+/// An SVG picture under construction.
+#[derive(Debug, Default)]
+pub(crate) struct Svg {
+    body: String,
+}
+
+impl Svg {
+    /// Writes raw SVG; `fmt::Write` into a `String` cannot fail.
+    pub(crate) fn raw(&mut self, element: impl Display) {
+        let _ = writeln!(self.body, "{element}");
+    }
+
+    /// A rectangle with the attributes `look`.
+    pub(crate) fn rect(&mut self, r: Rect, look: impl Display) {
+        let Rect { x, y, width, height } = r;
+        let (x, y, width, height) = (Num(x), Num(y), Num(width), Num(height));
+        self.raw(format_args!(
+            r#"<rect x="{x}" y="{y}" width="{width}" height="{height}" {look}/>"#
+        ));
+    }
+
+    /// A straight line with the attributes `look`.
+    pub(crate) fn line(&mut self, from: (f64, f64), to: (f64, f64), look: impl Display) {
+        let (x1, y1, x2, y2) = (Num(from.0), Num(from.1), Num(to.0), Num(to.1));
+        self.raw(format_args!(r#"<line x1="{x1}" y1="{y1}" x2="{x2}" y2="{y2}" {look}/>"#));
+    }
+
+    /// A path of the path data `data`.
+    pub(crate) fn path(&mut self, data: &str, look: impl Display) {
+        self.raw(format_args!(r#"<path d="{data}" {look}/>"#));
+    }
+
+    /// A circle around `center`.
+    pub(crate) fn circle(&mut self, center: (f64, f64), radius: f64, look: impl Display) {
+        let (x, y, r) = (Num(center.0), Num(center.1), Num(radius));
+        self.raw(format_args!(r#"<circle cx="{x}" cy="{y}" r="{r}" {look}/>"#));
+    }
+
+    /// `text` with its baseline at `y`.
+    pub(crate) fn text(&mut self, x: f64, y: f64, text: &str, look: &TextLook<'_>) {
+        let (x, y, size, fill) = (Num(x), Num(y), Num(look.size_px), look.fill);
+        let anchor = match look.anchor {
+            Anchor::Start => "",
+            Anchor::Middle => r#" text-anchor="middle""#,
+            Anchor::End => r#" text-anchor="end""#,
+        };
+        let weight = if look.weight == Weight::Bold { r#" font-weight="bold""# } else { "" };
+        let halo = if look.halo { HALO } else { "" };
+        let turn = if look.upward {
+            format!(r#" transform="rotate(-90 {x} {y})""#)
+        } else {
+            String::new()
+        };
+        self.raw(format_args!(
+            r#"<text x="{x}" y="{y}" font-size="{size}" fill="{fill}"{anchor}{weight}{halo}{turn}>{}</text>"#,
+            Escaped(text)
+        ));
+    }
+
+    /// Opens a group that shows only what lies in `window`.
+    ///
+    /// The clip's name tells its place, so that names agree only where clips do: several pictures
+    /// may stand in one HTML page.
+    pub(crate) fn open_clip(&mut self, window: Rect) {
+        let Rect { x, y, width, height } = window;
+        let id = format!("clip_{}_{}_{}_{}", Num(x), Num(y), Num(width), Num(height));
+        self.raw(format_args!(r#"<clipPath id="{id}">"#));
+        self.rect(window, "");
+        self.raw(format_args!(r#"</clipPath><g clip-path="url(#{id})">"#));
+    }
+
+    /// Closes the innermost group.
+    pub(crate) fn close_group(&mut self) {
+        self.raw("</g>");
+    }
+
+    /// The whole document on a white ground; `title` is what screen readers say.
+    pub(crate) fn finish(self, width_px: f64, height_px: f64, title: &str) -> String {
+        let (width, height) = (Num(width_px.ceil()), Num(height_px.ceil()));
+        format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" \
+             viewBox=\"0 0 {width} {height}\" font-family=\"{FAMILIES}\" role=\"img\">\n\
+             <title>{}</title>\n\
+             <rect width=\"{width}\" height=\"{height}\" fill=\"#FFFFFF\"/>\n{}</svg>\n",
+            Escaped(title),
+            self.body
+        )
+    }
+}
+
+const HALO: &str =
+    r##" stroke="#FFFFFF" stroke-width="3" stroke-linejoin="round" paint-order="stroke""##;
+
+/// Text as XML character data; what XML 1.0 forbids becomes the replacement character.
+struct Escaped<'a>(&'a str);
+
+impl Display for Escaped<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for c in self.0.chars() {
+            match c {
+                '<' => f.write_str("&lt;")?,
+                '>' => f.write_str("&gt;")?,
+                '&' => f.write_str("&amp;")?,
+                '\n' | '\t' => f.write_char(' ')?,
+                '\0'..='\u{1f}' | '\u{fffe}' | '\u{ffff}' => f.write_char('\u{fffd}')?,
+                c => f.write_char(c)?,
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_short_and_never_nan() {
+        let shown = |v| Num(v).to_string();
+        assert_eq!(shown(1.0), "1");
+        assert_eq!(shown(1.005), "1");
+        assert_eq!(shown(-0.001), "0");
+        assert_eq!(shown(2.346), "2.35");
+        assert_eq!(shown(f64::NAN), "0");
+        assert_eq!(shown(f64::INFINITY), "0");
+    }
+
+    #[test]
+    fn any_text_is_well_formed_xml() {
+        let mut svg = Svg::default();
+        svg.text(1.0, 2.0, "a<b & \u{0} \"c\"\u{ffff}", &TextLook::new(12.0, Anchor::Start));
+        let svg = svg.finish(10.0, 10.0, "</svg>");
+        let options = resvg::usvg::Options::default();
+        assert!(resvg::usvg::Tree::from_str(&svg, &options).is_ok(), "{svg}");
+    }
+}

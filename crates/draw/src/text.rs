@@ -1,0 +1,124 @@
+//! The embedded font: how wide a text is, and how it breaks into lines.
+//!
+//! SVG viewers bring their own fonts and a bare machine has none, so pictures are laid out with
+//! the metrics of DejaVu Sans, which `to_png` also draws with. Viewers without it fall back to a
+//! sans-serif font that is, as a rule, narrower: text then has more room, not less.
+
+use std::sync::{Arc, OnceLock};
+
+use resvg::usvg::fontdb;
+use skrifa::{FontRef, MetadataProvider, instance::LocationRef, instance::Size};
+
+/// What the SVG names; the first is the embedded one.
+pub(crate) const FAMILIES: &str = "DejaVu Sans, Verdana, Helvetica, Arial, sans-serif";
+
+/// How heavy letters are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Weight {
+    Regular,
+    Bold,
+}
+
+/// The database `to_png` takes fonts from: DejaVu Sans, regular and bold, and nothing else.
+pub(crate) fn fonts() -> Arc<fontdb::Database> {
+    static FONTS: OnceLock<Arc<fontdb::Database>> = OnceLock::new();
+    Arc::clone(FONTS.get_or_init(|| {
+        let mut fonts = fontdb::Database::new();
+        fonts.load_font_data(dejavu::sans::regular().to_vec());
+        fonts.load_font_data(dejavu::sans::bold().to_vec());
+        fonts.set_sans_serif_family("DejaVu Sans");
+        // What a text falls back to when its own font is not here.
+        fonts.set_serif_family("DejaVu Sans");
+        Arc::new(fonts)
+    }))
+}
+
+/// The width of `text` in pixels at a font size of `size_px`.
+pub(crate) fn width(text: &str, size_px: f64, weight: Weight) -> f64 {
+    let data = match weight {
+        Weight::Regular => dejavu::sans::regular(),
+        Weight::Bold => dejavu::sans::bold(),
+    };
+    let Ok(font) = FontRef::new(data) else { return text.chars().count() as f64 * size_px * 0.6 };
+    let charmap = font.charmap();
+    let metrics = font.glyph_metrics(Size::new(1000.0), LocationRef::default());
+    let thousandths: f64 = text
+        .chars()
+        // A character the font lacks is some other font's: reckon with a full square.
+        .map(|c| charmap.map(c).and_then(|g| metrics.advance_width(g)).unwrap_or(1000.0))
+        .map(f64::from)
+        .sum();
+    thousandths * size_px / 1000.0
+}
+
+/// Breaks `text` at spaces (not at no-break spaces) into lines at most `room_px` wide; a word wider than that is cut short
+/// with an ellipsis. Empty text has no lines.
+pub(crate) fn wrap(text: &str, size_px: f64, weight: Weight, room_px: f64) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    // Not `split_whitespace`: a no-break space holds words together.
+    for word in text.split([' ', '\t', '\n']).filter(|word| !word.is_empty()) {
+        let word = shorten(word, size_px, weight, room_px);
+        match lines.last_mut() {
+            Some(line) if width(&format!("{line} {word}"), size_px, weight) <= room_px => {
+                line.push(' ');
+                line.push_str(&word);
+            }
+            _ => lines.push(word),
+        }
+    }
+    lines
+}
+
+/// `text` itself where it fits, else as much of it as fits before an ellipsis.
+pub(crate) fn shorten(text: &str, size_px: f64, weight: Weight, room_px: f64) -> String {
+    if width(text, size_px, weight) <= room_px {
+        return text.to_string();
+    }
+    let room_px = room_px - width("…", size_px, weight);
+    let mut used_px = 0.0;
+    let fits = |c: &char| {
+        used_px += width(c.encode_utf8(&mut [0; 4]), size_px, weight);
+        used_px <= room_px
+    };
+    text.chars().take_while(fits).chain(['…']).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_embedded_fonts_are_readable() {
+        assert_eq!(fonts().len(), 2);
+    }
+
+    #[test]
+    fn widths_grow_with_text_size_and_weight() {
+        let plain = width("Contacts", 10.0, Weight::Regular);
+        assert!((40.0..55.0).contains(&plain), "{plain}");
+        assert!((width("Contacts", 20.0, Weight::Regular) - 2.0 * plain).abs() < 1e-9);
+        assert!(width("Contacts", 10.0, Weight::Bold) > plain);
+    }
+
+    #[test]
+    fn wrapped_lines_fit_and_lose_no_short_word() {
+        let text = "unreliable sensors and unreliable effectors";
+        let lines = wrap(text, 12.0, Weight::Regular, 90.0);
+        assert!(lines.len() > 1);
+        assert_eq!(lines.join(" "), text);
+        assert!(lines.iter().all(|line| width(line, 12.0, Weight::Regular) <= 90.0));
+    }
+
+    #[test]
+    fn a_no_break_space_holds_words_together() {
+        let lines = wrap("closer than 0.5\u{a0}m", 12.0, Weight::Regular, 90.0);
+        assert_eq!(lines, ["closer than", "0.5\u{a0}m"]);
+    }
+
+    #[test]
+    fn an_overlong_word_is_cut_with_an_ellipsis() {
+        let cut = shorten("antidisestablishmentarianism", 12.0, Weight::Regular, 60.0);
+        assert!(cut.ends_with('…') && width(&cut, 12.0, Weight::Regular) <= 60.0);
+        assert_eq!(shorten("", 12.0, Weight::Regular, 0.0), "");
+    }
+}

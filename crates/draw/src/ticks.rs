@@ -1,0 +1,226 @@
+//! Where tick marks stand and what they say.
+
+use libm::{floor, log10, pow};
+
+/// The tick marks of one axis.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct Ticks {
+    /// Marks with a label.
+    pub(crate) major: Vec<(f64, String)>,
+    /// Shorter marks without one.
+    pub(crate) minor: Vec<f64>,
+}
+
+impl Ticks {
+    /// Marks at these very places.
+    pub(crate) fn at(places: &[f64]) -> Self {
+        let round_trips = |digits: &usize| places.iter().all(|v| shown_exactly(*v, *digits));
+        let digits = (0..6).find(round_trips).unwrap_or(6);
+        Self { major: places.iter().map(|&v| (v, label(v, digits))).collect(), minor: vec![] }
+    }
+
+    /// Marks at the multiples of a 1-2-5 step from `low` to `high`, `most` at most.
+    pub(crate) fn linear(low: f64, high: f64, most: usize) -> Self {
+        let step = nice_step(high - low, most);
+        let digits = decimals(step);
+        let first = -floor(1e-9 - low / step);
+        let count = (floor(high / step + 1e-9) - first).clamp(0.0, 100.0) as u32;
+        let value = |k: u32| (first + f64::from(k)) * step;
+        let major = (0..=count).map(value).map(|v| (v, label(v, digits))).collect();
+        Self { major, minor: vec![] }
+    }
+
+    /// Marks at the powers of ten, and unlabeled ones at their multiples; where there is room for
+    /// more labels, at 1, 2 and 5 times the powers of ten.
+    pub(crate) fn log(low: f64, high: f64, most: usize) -> Self {
+        let span = Decades { low, high };
+        for multiples in [&[1u8, 2, 5][..], &[1, 3], &[1]] {
+            let marks = span.multiples(multiples, 1);
+            if (2..=most.max(2)).contains(&marks.len()) {
+                let minor = span.multiples(&[1, 2, 3, 4, 5, 6, 7, 8, 9], 1);
+                return Self { major: log_labels(&marks), minor };
+            }
+        }
+        if log10(high / low) < 1.0 {
+            return Self::linear(low, high, most);
+        }
+        let stride = (span.multiples(&[1], 1).len() / most.max(2) + 1) as i32;
+        let minor = if stride > 1 { span.multiples(&[1], 1) } else { vec![] };
+        Self { major: log_labels(&span.multiples(&[1], stride)), minor }
+    }
+
+    /// The width of the widest label, by `width_px`.
+    pub(crate) fn widest_px(&self, width_px: impl Fn(&str) -> f64) -> f64 {
+        self.major.iter().map(|(_, label)| width_px(label)).fold(0.0, f64::max)
+    }
+}
+
+/// Keeps labels apart: those that would touch the one before are not written.
+pub(crate) struct Spacing {
+    free_from: f64,
+}
+
+impl Spacing {
+    pub(crate) fn new() -> Self {
+        Self { free_from: f64::NEG_INFINITY }
+    }
+
+    /// Whether a label `length_px` long around `center_px` has room; if so, that room is taken.
+    /// Labels come in rising order.
+    pub(crate) fn admits(&mut self, center_px: f64, length_px: f64) -> bool {
+        let fits = center_px - length_px / 2.0 >= self.free_from;
+        if fits {
+            self.free_from = center_px + length_px / 2.0;
+        }
+        fits
+    }
+}
+
+/// A range of positive numbers.
+struct Decades {
+    low: f64,
+    high: f64,
+}
+
+impl Decades {
+    /// `digits` times every `stride`-th power of ten, as far as in the range.
+    fn multiples(&self, digits: &[u8], stride: i32) -> Vec<f64> {
+        let first = floor(log10(self.low)) as i32;
+        let last = floor(log10(self.high)) as i32;
+        let inside = |v: &f64| *v >= self.low * (1.0 - 1e-9) && *v <= self.high * (1.0 + 1e-9);
+        (first..=last)
+            .filter(|exponent| exponent.rem_euclid(stride) == 0)
+            .flat_map(|exponent| digits.iter().map(move |&d| f64::from(d) * power(exponent)))
+            .filter(inside)
+            .collect()
+    }
+}
+
+/// Ten to the power of `exponent`, exact where a double can be.
+fn power(exponent: i32) -> f64 {
+    if exponent < 0 {
+        1.0 / pow(10.0, f64::from(-exponent))
+    } else {
+        pow(10.0, f64::from(exponent))
+    }
+}
+
+/// The smallest of 1, 2, 5 times a power of ten that cuts `span` into at most `most` parts.
+pub(crate) fn nice_step(span: f64, most: usize) -> f64 {
+    let raw = span / most.max(1) as f64;
+    let exponent = floor(log10(raw)) as i32;
+    let enough = |step: &f64| *step >= raw * (1.0 - 1e-9);
+    let steps = [1.0, 2.0, 5.0].map(|digit| digit * power(exponent));
+    steps.into_iter().find(enough).unwrap_or_else(|| power(exponent + 1))
+}
+
+/// How many decimals multiples of `step` need.
+pub(crate) fn decimals(step: f64) -> usize {
+    (-floor(log10(step) + 1e-9)).clamp(0.0, 12.0) as usize
+}
+
+fn log_labels(marks: &[f64]) -> Vec<(f64, String)> {
+    let plain = marks.iter().all(|v| (0.000_999..=10_001.0).contains(v));
+    let say = |v: f64| {
+        if plain {
+            label(v, decimals(power(floor(log10(v) + 1e-9) as i32)))
+        } else {
+            scientific(v, 0)
+        }
+    };
+    marks.iter().map(|&v| (v, say(v))).collect()
+}
+
+/// `value` with `digits` decimals; in powers of ten where that would be long.
+pub(crate) fn label(value: f64, digits: usize) -> String {
+    if value == 0.0 && digits > 5 {
+        return "0".into();
+    }
+    if value.abs() >= 999_999.5 || digits > 5 {
+        return scientific(value, 2);
+    }
+    minus(&format!("{value:.digits$}"))
+}
+
+/// `value` as mantissa (at most `digits` decimals) times a power of ten.
+fn scientific(value: f64, digits: usize) -> String {
+    let exponent = floor(log10(value.abs()) + 1e-9) as i32;
+    let mantissa = format!("{:.digits$}", value / power(exponent));
+    let mantissa = match mantissa.contains('.') {
+        true => mantissa.trim_end_matches('0').trim_end_matches('.'),
+        false => &mantissa,
+    };
+    let power = superscript(exponent);
+    match mantissa {
+        "1" if exponent == 0 => "1".into(),
+        "1" if exponent == 1 => "10".into(),
+        "1" => format!("10{power}"),
+        "-1" => format!("\u{2212}10{power}"),
+        _ => minus(&format!("{mantissa}×10{power}")),
+    }
+}
+
+/// Writes a leading hyphen as the minus sign it stands for; `-0` loses it.
+fn minus(number: &str) -> String {
+    match number.strip_prefix('-') {
+        Some(rest) if rest.chars().all(|c| matches!(c, '0' | '.')) => rest.to_string(),
+        Some(rest) => format!("\u{2212}{rest}"),
+        None => number.to_string(),
+    }
+}
+
+fn superscript(exponent: i32) -> String {
+    let raise = |c| match c {
+        '1' => '¹',
+        '2' => '²',
+        '3' => '³',
+        '-' => '⁻',
+        // The rest stand in a row: ⁰, ⁴ to ⁹.
+        digit => char::from_u32(0x2070 + u32::from(digit) - u32::from('0')).unwrap_or(digit),
+    };
+    exponent.to_string().chars().map(raise).collect()
+}
+
+fn shown_exactly(value: f64, digits: usize) -> bool {
+    format!("{value:.digits$}").parse() == Ok(value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn labels(ticks: &Ticks) -> Vec<&str> {
+        ticks.major.iter().map(|(_, label)| label.as_str()).collect()
+    }
+
+    #[test]
+    fn linear_ticks_are_round_and_inside() {
+        assert_eq!(labels(&Ticks::linear(0.0, 1.0, 5)), ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"]);
+        assert_eq!(labels(&Ticks::linear(-3.0, 7.0, 6)), ["−2", "0", "2", "4", "6"]);
+        assert_eq!(labels(&Ticks::linear(0.0, 2.0e6, 2)), ["0", "10⁶", "2×10⁶"]);
+        assert_eq!(labels(&Ticks::linear(0.0, 3e-7, 3)), ["0", "10⁻⁷", "2×10⁻⁷", "3×10⁻⁷"]);
+    }
+
+    #[test]
+    fn log_ticks_are_powers_of_ten_or_finer_where_there_is_room() {
+        assert_eq!(labels(&Ticks::log(1.0, 1000.0, 5)), ["1", "10", "100", "1000"]);
+        assert_eq!(labels(&Ticks::log(0.1, 2.0, 6)), ["0.1", "0.2", "0.5", "1", "2"]);
+        assert_eq!(labels(&Ticks::log(1e-8, 1e4, 4)), ["10⁻⁸", "10⁻⁴", "1", "10⁴"]);
+        assert_eq!(labels(&Ticks::log(3.1, 3.4, 4)), ["3.1", "3.2", "3.3", "3.4"]);
+        assert_eq!(Ticks::log(1.0, 100.0, 3).minor.len(), 19);
+    }
+
+    #[test]
+    fn given_ticks_show_all_their_digits_and_no_more() {
+        assert_eq!(labels(&Ticks::at(&[1.0, 2.0, 8.0])), ["1", "2", "8"]);
+        assert_eq!(labels(&Ticks::at(&[0.25, 0.5])), ["0.25", "0.50"]);
+    }
+
+    #[test]
+    fn steps_are_one_two_five() {
+        assert_eq!(nice_step(10.0, 5), 2.0);
+        assert_eq!(nice_step(11.0, 5), 5.0);
+        assert_eq!(nice_step(0.3, 3), 0.1);
+        assert_eq!(nice_step(99.0, 10), 10.0);
+    }
+}

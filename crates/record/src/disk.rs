@@ -1,0 +1,89 @@
+//! Files that are there in full or not at all, also after a power cut.
+
+use std::fs::{self, File};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use sidestep_kernel::ports::RecordError;
+
+/// The name under which a file or folder grows until it is whole: `NAME.partial`.
+pub(crate) fn partial(path: &Path) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".partial");
+    name.into()
+}
+
+/// Replaces the file at `path` by `bytes`: afterwards it holds the old or the new content,
+/// never a mixture. One writer at a time.
+///
+/// # Errors
+/// What the system says; the old content stays.
+pub(crate) fn replace(path: &Path, bytes: &[u8]) -> Result<(), RecordError> {
+    let growing = partial(path);
+    let written = write_through(&growing, bytes);
+    written.map_err(|e| {
+        // On a full disk the half-written copy must not keep its space.
+        let _ = fs::remove_file(&growing);
+        RecordError::new(path.display(), e)
+    })?;
+    rename(&growing, path)
+}
+
+fn write_through(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let mut file = File::create(path)?;
+    file.write_all(bytes)?;
+    file.sync_all()
+}
+
+/// Renames `from` to `to` in the same folder and makes the new name durable.
+pub(crate) fn rename(from: &Path, to: &Path) -> Result<(), RecordError> {
+    fs::rename(from, to)
+        .and_then(|()| sync_folder(parent(to)))
+        .map_err(|e| RecordError::new(to.display(), e))
+}
+
+/// The folder that holds `path`.
+pub(crate) fn parent(path: &Path) -> &Path {
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    }
+}
+
+/// Makes the names in a folder durable, where the system can.
+#[cfg(unix)]
+fn sync_folder(folder: &Path) -> io::Result<()> {
+    File::open(folder)?.sync_all()
+}
+
+/// Other systems do not open folders; the rename itself is atomic there too.
+#[cfg(not(unix))]
+fn sync_folder(_folder: &Path) -> io::Result<()> {
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn replacing_leaves_the_new_content_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.bin");
+        replace(&path, b"old").unwrap();
+        replace(&path, b"new").unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"new");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_failed_replacement_names_the_file_and_keeps_the_old_content() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.bin");
+        replace(&path, b"old").unwrap();
+        fs::create_dir(partial(&path)).unwrap();
+        let error = replace(&path, b"new").unwrap_err();
+        assert!(error.to_string().contains("a.bin"), "{error}");
+        assert_eq!(fs::read(&path).unwrap(), b"old");
+    }
+}

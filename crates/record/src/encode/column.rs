@@ -1,0 +1,148 @@
+//! One column on its way into a row group: values in, pages out.
+
+use std::ops::Range;
+
+use bytes::Bytes;
+use parquet::basic::Encoding;
+use parquet::column::writer::ColumnCloseResult;
+use parquet::errors::Result;
+use parquet::file::statistics::Statistics;
+use parquet::schema::types::ColumnDescPtr;
+use sidestep_kernel::ports::{ColumnSpec, ColumnType, Values};
+
+use super::delta::DeltaEncoder;
+use super::labels::LabelEncoder;
+use super::{ColumnChunk, PAGE_ROWS};
+
+/// Encodes a column's values, row group after row group.
+pub(crate) struct ColumnEncoder {
+    descriptor: ColumnDescPtr,
+    labels: Vec<String>,
+    encoder: Encoder,
+    rows_in_page: usize,
+    chunk: ColumnChunk,
+}
+
+/// The encoding that fits the column's type.
+enum Encoder {
+    U32(DeltaEncoder<u32>),
+    I32(DeltaEncoder<i32>),
+    U64(DeltaEncoder<u64>, Bounds),
+    /// Little-endian doubles.
+    F64(Vec<u8>),
+    Label(LabelEncoder),
+}
+
+/// The smallest and the largest counter of the row group. Only counters have bounds: rows
+/// come nearly sorted by cycle, so these let a reader skip row groups; others never would,
+/// yet cost as much as the encoding itself.
+#[derive(Default)]
+struct Bounds(Option<(u64, u64)>);
+
+impl Bounds {
+    fn extend(&mut self, values: &[u64]) {
+        let Some(&first) = values.first() else { return };
+        let (mut least, mut most) = self.0.unwrap_or((first, first));
+        for &v in values {
+            least = least.min(v);
+            most = most.max(v);
+        }
+        self.0 = Some((least, most));
+    }
+
+    /// Unsigned values are stored by their bits and compared by the column's logical type.
+    fn take(&mut self) -> Option<Statistics> {
+        let (least, most) = self.0.take()?;
+        Some(Statistics::int64(Some(least as i64), Some(most as i64), None, Some(0), false))
+    }
+}
+
+impl ColumnEncoder {
+    /// An encoder for the column `spec`, whose place in the file is `descriptor`.
+    pub(crate) fn new(spec: &ColumnSpec, descriptor: ColumnDescPtr) -> Self {
+        let encoder = match spec.ty {
+            ColumnType::U32 => Encoder::U32(DeltaEncoder::new()),
+            ColumnType::I32 => Encoder::I32(DeltaEncoder::new()),
+            ColumnType::U64 => Encoder::U64(DeltaEncoder::new(), Bounds::default()),
+            ColumnType::F64 => Encoder::F64(Vec::new()),
+            ColumnType::Label => Encoder::Label(LabelEncoder::new(spec.labels.len())),
+        };
+        let chunk = ColumnChunk::new(descriptor.clone());
+        Self { descriptor, labels: spec.labels.clone(), encoder, rows_in_page: 0, chunk }
+    }
+
+    /// Appends the values at `range`.
+    pub(crate) fn append(&mut self, values: &Values, mut range: Range<usize>) -> Result<()> {
+        while !range.is_empty() {
+            let n = (PAGE_ROWS - self.rows_in_page).min(range.len());
+            self.encoder.extend(values, range.start..range.start + n);
+            self.rows_in_page += n;
+            range.start += n;
+            if self.rows_in_page == PAGE_ROWS {
+                self.end_page()?;
+            }
+        }
+        Ok(())
+    }
+
+    fn end_page(&mut self) -> Result<()> {
+        if matches!(self.encoder, Encoder::Label(_)) && self.chunk.rows() == 0 {
+            self.chunk.add_dictionary(&self.labels)?;
+        }
+        let (page, encoding) = self.encoder.take_page();
+        self.chunk.add_page(page, self.rows_in_page as u32, encoding)?;
+        self.rows_in_page = 0;
+        Ok(())
+    }
+
+    /// Ends the row group's chunk; the next one starts empty.
+    pub(crate) fn take_chunk(&mut self) -> Result<(Bytes, ColumnCloseResult)> {
+        if self.rows_in_page > 0 {
+            self.end_page()?;
+        }
+        let empty = ColumnChunk::new(self.descriptor.clone());
+        std::mem::replace(&mut self.chunk, empty).close(self.encoder.take_statistics())
+    }
+}
+
+impl Encoder {
+    fn extend(&mut self, values: &Values, range: Range<usize>) {
+        match (self, values) {
+            (Self::U32(encoder), Values::U32(v)) => encoder.extend(&v[range]),
+            (Self::I32(encoder), Values::I32(v)) => encoder.extend(&v[range]),
+            (Self::U64(encoder, bounds), Values::U64(v)) => {
+                bounds.extend(&v[range.clone()]);
+                encoder.extend(&v[range]);
+            }
+            (Self::F64(page), Values::F64(v)) => put_doubles(&v[range], page),
+            (Self::Label(encoder), Values::Label(v)) => encoder.extend(&v[range]),
+            _ => unreachable!("`check_block` compared the types"),
+        }
+    }
+
+    fn take_page(&mut self) -> (Vec<u8>, Encoding) {
+        match self {
+            Self::U32(encoder) => (encoder.take_page(), Encoding::DELTA_BINARY_PACKED),
+            Self::I32(encoder) => (encoder.take_page(), Encoding::DELTA_BINARY_PACKED),
+            Self::U64(encoder, _) => (encoder.take_page(), Encoding::DELTA_BINARY_PACKED),
+            Self::F64(page) => (std::mem::take(page), Encoding::PLAIN),
+            Self::Label(encoder) => (encoder.take_page(), Encoding::RLE_DICTIONARY),
+        }
+    }
+
+    fn take_statistics(&mut self) -> Option<Statistics> {
+        match self {
+            Self::U64(_, bounds) => bounds.take(),
+            _ => None,
+        }
+    }
+}
+
+fn put_doubles(values: &[f64], page: &mut Vec<u8>) {
+    let start = page.len();
+    page.resize(start + size_of_val(values), 0);
+    let (cells, _) = page[start..].as_chunks_mut::<8>();
+    for (cell, v) in cells.iter_mut().zip(values) {
+        *cell = v.to_le_bytes();
+    }
+}

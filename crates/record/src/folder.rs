@@ -1,0 +1,287 @@
+//! The folder of one run: made in one step, written by one process, resumed after a stop.
+
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use sidestep_kernel::InputError;
+use sidestep_kernel::ports::{RecordError, TableSchema};
+
+use crate::disk;
+use crate::manifest::{self, Manifest, Status, json};
+use crate::parquet::ParquetRecorder;
+use crate::schema::Origin;
+use crate::staging::Staging;
+
+/// The manifest's name.
+pub(crate) const MANIFEST: &str = "run.json";
+const SCENARIO: &str = "scenario.toml";
+const SUMMARY: &str = "summary.json";
+const CHECKPOINT: &str = "checkpoint.bin";
+const LOCK: &str = "run.lock";
+
+/// What a new run is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NewRun {
+    /// The world to simulate, e.g. `robots`.
+    pub world: String,
+    /// Where its rows will come from.
+    pub origin: Origin,
+    /// Cycles that the scenario asks for.
+    pub cycles_planned: u64,
+}
+
+/// What to do about a run that is in the folder already.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Existing {
+    /// Leave it alone and fail.
+    Refuse,
+    /// Delete it. Folders that hold something else than a run are refused all the same.
+    Replace,
+}
+
+/// Where a run is to go on.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum ResumePoint {
+    /// At cycle 0: the run was stopped before its first checkpoint.
+    Start,
+    /// At the checkpoint with these bytes, whose checksum the kernel verifies.
+    Checkpoint(Vec<u8>),
+}
+
+/// A run folder that this process writes; no other process can while this value lives.
+#[derive(Debug)]
+pub struct RunFolder {
+    path: PathBuf,
+    manifest: Manifest,
+    scenario: String,
+    /// Locked; the lock ends with the process, however that ends.
+    _lock: File,
+}
+
+impl RunFolder {
+    /// Makes the folder at `path` with its manifest and scenario: all of it or nothing.
+    ///
+    /// A folder that is missing or empty is taken; so is one with a run, if `existing` says
+    /// so and no process writes it.
+    ///
+    /// # Errors
+    /// A folder that is not to be taken; a place where none can be made.
+    pub fn create(path: &Path, run: &NewRun, existing: Existing) -> Result<Self, InputError> {
+        check_vacant(path, existing)?;
+        let staging = Staging::new(path)?;
+        let Origin { program_version, scenario, seed } = &run.origin;
+        let manifest = manifest::begin(&run.world, *seed, program_version, run.cycles_planned);
+        fill(staging.path(), &manifest, scenario)
+            .map_err(|e| cannot_make(path, format!("{}: {}", e.place, e.cause)))?;
+        // Nobody may be writing the run that is about to be deleted.
+        let old_lock = if is_run(path) { Some(lock(path)?) } else { None };
+        staging.take_place_of(path)?;
+        drop(old_lock);
+        let lock = lock(path)?;
+        let scenario = scenario.clone();
+        Ok(Self { path: path.to_path_buf(), manifest, scenario, _lock: lock })
+    }
+
+    /// Opens the folder at `path` to go on with its run.
+    ///
+    /// # Errors
+    /// No run folder; a run that is complete, or that another process writes; a damaged
+    /// manifest; another major format.
+    pub fn resume(path: &Path) -> Result<(Self, ResumePoint), InputError> {
+        check_is_run(path)?;
+        let lock = lock(path)?;
+        let RunView { manifest, scenario, .. } = RunView::open(path)?;
+        if manifest.status == Status::Complete {
+            let remedy = "read its tables, or start another run in a new folder";
+            return Err(InputError::new(path.display(), "the run is complete", remedy));
+        }
+        let point = resume_point(&path.join(CHECKPOINT))?;
+        Ok((Self { path: path.to_path_buf(), manifest, scenario, _lock: lock }, point))
+    }
+
+    /// Where the folder is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// What `run.json` says.
+    pub fn manifest(&self) -> &Manifest {
+        &self.manifest
+    }
+
+    /// The scenario's text.
+    pub fn scenario(&self) -> &str {
+        &self.scenario
+    }
+
+    /// The recorder of the run's tables from `cycle` on: 0 for a new run, the checkpoint's
+    /// cycle for a resumed one, whose later rows are deleted.
+    ///
+    /// # Errors
+    /// A schema that cannot become a file; what the system says.
+    pub fn recorder(
+        &self,
+        schemas: &[TableSchema],
+        cycle: u64,
+    ) -> Result<ParquetRecorder, RecordError> {
+        let origin = Origin {
+            program_version: self.manifest.program_version.clone(),
+            scenario: self.scenario.clone(),
+            seed: self.manifest.seed,
+        };
+        ParquetRecorder::resume(&self.path, schemas, &origin, cycle)
+    }
+
+    /// Replaces the checkpoint by the state before `cycle`.
+    /// [Seal](sidestep_kernel::ports::Recorder::seal) the recorder at `cycle` first: a kill
+    /// between the two then costs rows of the next stretch only, which the resumed run
+    /// writes again.
+    ///
+    /// # Errors
+    /// What the system says; the checkpoint before this one stays valid.
+    pub fn save_checkpoint(&mut self, cycle: u64, state: &[u8]) -> Result<(), RecordError> {
+        disk::replace(&self.path.join(CHECKPOINT), state)?;
+        self.update(|m| {
+            (m.status, m.cycles_done, m.last_checkpoint) = (Status::Running, cycle, Some(cycle));
+        })
+    }
+
+    /// Writes `summary.json`.
+    ///
+    /// # Errors
+    /// What the system says, or a summary that is no JSON.
+    pub fn write_summary(&self, summary: &impl Serialize) -> Result<(), RecordError> {
+        let path = self.path.join(SUMMARY);
+        disk::replace(&path, &json(summary, &path)?)
+    }
+
+    /// Notes that the run stopped in good order after `cycles_done` cycles, to be resumed.
+    ///
+    /// # Errors
+    /// What the system says; the folder can be resumed all the same.
+    pub fn stop(mut self, cycles_done: u64) -> Result<(), RecordError> {
+        self.update(|m| (m.status, m.cycles_done) = (Status::Incomplete, cycles_done))
+    }
+
+    /// Declares the run complete, with the digest of its final state. The last step of a
+    /// run: its recorder is finished and its summary written.
+    ///
+    /// # Errors
+    /// What the system says; the run can be resumed at its last checkpoint.
+    pub fn complete(mut self, cycles_done: u64, digest: &str) -> Result<(), RecordError> {
+        self.update(|m| {
+            (m.status, m.cycles_done) = (Status::Complete, cycles_done);
+            m.digest = Some(digest.to_string());
+        })
+    }
+
+    /// Changes the manifest on disk, then here.
+    fn update(&mut self, change: impl FnOnce(&mut Manifest)) -> Result<(), RecordError> {
+        let mut changed = self.manifest.clone();
+        change(&mut changed);
+        changed.write(&self.path.join(MANIFEST))?;
+        self.manifest = changed;
+        Ok(())
+    }
+}
+
+/// A run folder to read from; its run may still be under way.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RunView {
+    /// Where the folder is.
+    pub path: PathBuf,
+    /// What `run.json` says.
+    pub manifest: Manifest,
+    /// The scenario's text.
+    pub scenario: String,
+}
+
+impl RunView {
+    /// Opens the folder at `path` without locking it.
+    ///
+    /// # Errors
+    /// No run folder; a damaged manifest; another major format.
+    pub fn open(path: &Path) -> Result<Self, InputError> {
+        check_is_run(path)?;
+        let manifest = Manifest::read(&path.join(MANIFEST))?;
+        let scenario = read(&path.join(SCENARIO), |p| fs::read_to_string(p))?;
+        Ok(Self { path: path.to_path_buf(), manifest, scenario })
+    }
+}
+
+fn read<T>(path: &Path, reader: impl FnOnce(&Path) -> std::io::Result<T>) -> Result<T, InputError> {
+    reader(path).map_err(|e| {
+        let remedy = "restore the file, or run the scenario again in a new folder";
+        InputError::new(path.display(), e.to_string(), remedy)
+    })
+}
+
+fn fill(folder: &Path, manifest: &Manifest, scenario: &str) -> Result<(), RecordError> {
+    disk::replace(&folder.join(SCENARIO), scenario.as_bytes())?;
+    manifest.write(&folder.join(MANIFEST))
+}
+
+fn resume_point(checkpoint: &Path) -> Result<ResumePoint, InputError> {
+    if !checkpoint.exists() {
+        return Ok(ResumePoint::Start);
+    }
+    read(checkpoint, |p| fs::read(p)).map(ResumePoint::Checkpoint)
+}
+
+/// True for a folder that holds a run, be its manifest damaged or not.
+fn is_run(path: &Path) -> bool {
+    path.join(MANIFEST).is_file()
+}
+
+fn check_is_run(path: &Path) -> Result<(), InputError> {
+    let cause = match fs::metadata(path) {
+        Ok(m) if m.is_dir() && is_run(path) => return Ok(()),
+        Ok(m) if m.is_dir() => format!("this is no run folder: it holds no `{MANIFEST}`"),
+        Ok(_) => "this is no folder".to_string(),
+        Err(e) => e.to_string(),
+    };
+    Err(InputError::new(path.display(), cause, "name the folder that a run was recorded to"))
+}
+
+/// Refuses a path at which a new run must not be made.
+fn check_vacant(path: &Path, existing: Existing) -> Result<(), InputError> {
+    let refuse = |cause, remedy: &str| Err(InputError::new(path.display(), cause, remedy));
+    let mut entries = match fs::read_dir(path) {
+        Ok(entries) => entries,
+        Err(_) if !path.exists() => return Ok(()),
+        Err(e) => return Err(cannot_make(path, e)),
+    };
+    match (entries.next().is_some(), is_run(path), existing) {
+        (false, _, _) | (true, true, Existing::Replace) => Ok(()),
+        (true, true, Existing::Refuse) => refuse(
+            "the folder holds a run already",
+            "resume that run, name another folder, or ask for the old run to be replaced",
+        ),
+        (true, false, _) => {
+            refuse("the folder holds something else than a run", "name a new or empty folder")
+        }
+    }
+}
+
+pub(crate) fn cannot_make(path: &Path, cause: impl std::fmt::Display) -> InputError {
+    let cause = format!("cannot make the run folder: {cause}");
+    InputError::new(path.display(), cause, "name a folder in a place where you may write")
+}
+
+fn lock(folder: &Path) -> Result<File, InputError> {
+    let path = folder.join(LOCK);
+    let file = read(&path, |p| OpenOptions::new().create(true).append(true).open(p))?;
+    match file.try_lock() {
+        Ok(()) => Ok(file),
+        Err(TryLockError::WouldBlock) => {
+            let cause = "another process is writing this run";
+            let remedy = "wait until it ends, stop it, or name another folder";
+            Err(InputError::new(folder.display(), cause, remedy))
+        }
+        Err(TryLockError::Error(e)) => {
+            let remedy = "put the run on a file system that can lock files";
+            Err(InputError::new(path.display(), e.to_string(), remedy))
+        }
+    }
+}

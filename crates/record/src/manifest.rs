@@ -1,0 +1,153 @@
+//! `run.json`: what a run is and how far it has come.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use sidestep_kernel::InputError;
+use sidestep_kernel::ports::RecordError;
+
+use crate::disk;
+use crate::format::{self, FormatVersion};
+
+/// How far a run has come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Status {
+    /// Under way; or its process was killed, which nobody could write down.
+    Running,
+    /// Ended; every table is whole.
+    Complete,
+    /// Stopped in good order before its end.
+    Incomplete,
+}
+
+/// The content of `run.json`.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Manifest {
+    /// Version of the folder's format.
+    pub format: FormatVersion,
+    /// Version of the program that made the run.
+    pub program_version: String,
+    /// The world that was simulated, e.g. `robots`.
+    pub world: String,
+    /// The seed.
+    pub seed: u64,
+    /// How far the run has come.
+    pub status: Status,
+    /// Cycles that are done for certain; for a killed run, those before its last checkpoint.
+    pub cycles_done: u64,
+    /// Cycles that the scenario asks for.
+    pub cycles_planned: u64,
+    /// Digest of the final state, once the run is complete.
+    pub digest: Option<String>,
+    /// Cycle of the last checkpoint, if there is one.
+    pub last_checkpoint: Option<u64>,
+}
+
+/// The one key that every format has.
+#[derive(Deserialize)]
+struct Probe {
+    format: FormatVersion,
+}
+
+impl Manifest {
+    /// Reads the manifest at `path`.
+    ///
+    /// # Errors
+    /// No such file, text that is no manifest (with line and column), another major format.
+    pub(crate) fn read(path: &Path) -> Result<Self, InputError> {
+        let text = std::fs::read_to_string(path).map_err(|e| {
+            InputError::new(path.display(), e.to_string(), "make the file readable, or restore it")
+        })?;
+        // The version comes first: a newer manifest need not have the keys of this one.
+        let probe: Probe = parse(path, &text)?;
+        probe.format.check_readable(path.display())?;
+        parse(path, &text)
+    }
+
+    /// Replaces the manifest at `path`.
+    pub(crate) fn write(&self, path: &Path) -> Result<(), RecordError> {
+        disk::replace(path, &json(self, path)?)
+    }
+}
+
+/// Indented JSON that ends in a newline.
+pub(crate) fn json(value: &impl Serialize, path: &Path) -> Result<Vec<u8>, RecordError> {
+    let mut text =
+        serde_json::to_vec_pretty(value).map_err(|e| RecordError::new(path.display(), e))?;
+    text.push(b'\n');
+    Ok(text)
+}
+
+fn parse<'a, T: Deserialize<'a>>(path: &Path, text: &'a str) -> Result<T, InputError> {
+    serde_json::from_str(text).map_err(|e| {
+        let remedy = "the file is damaged: restore it, or run the scenario again in a new folder";
+        let error = InputError::new(path.display(), format!("this is no manifest: {e}"), remedy);
+        if e.line() > 0 { error.at(e.line(), e.column().max(1)) } else { error }
+    })
+}
+
+/// The manifest of a run that begins now.
+pub(crate) fn begin(
+    world: &str,
+    seed: u64,
+    program_version: &str,
+    cycles_planned: u64,
+) -> Manifest {
+    Manifest {
+        format: format::CURRENT,
+        program_version: program_version.to_string(),
+        world: world.to_string(),
+        seed,
+        status: Status::Running,
+        cycles_done: 0,
+        cycles_planned,
+        digest: None,
+        last_checkpoint: None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Reads `text` as a manifest.
+    fn read(text: &str) -> Result<Manifest, InputError> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.json");
+        std::fs::write(&path, text).unwrap();
+        Manifest::read(&path)
+    }
+
+    fn text() -> String {
+        String::from_utf8(json(&begin("robots", u64::MAX, "0.1.0", 5), Path::new("x")).unwrap())
+            .unwrap()
+    }
+
+    #[test]
+    fn a_manifest_survives_its_json() {
+        assert_eq!(read(&text()).unwrap(), begin("robots", u64::MAX, "0.1.0", 5));
+    }
+
+    #[test]
+    fn a_newer_minor_with_unknown_keys_is_read() {
+        let newer = text().replace("\"1.0\"", "\"1.7\", \"mood\": 3");
+        assert_eq!(read(&newer).unwrap().format.to_string(), "1.7");
+    }
+
+    #[test]
+    fn a_newer_major_is_refused_even_without_the_keys_of_this_one() {
+        let error = read(r#"{"format": "2.0", "stages": []}"#).unwrap_err();
+        assert!(error.remedy().contains("newer version"), "{error}");
+    }
+
+    #[test]
+    fn a_damaged_manifest_is_refused_where_it_is_damaged() {
+        let whole = text();
+        let error = read(&whole[..whole.len() / 2]).unwrap_err();
+        assert!(error.position().is_some() && error.cause().contains("no manifest"), "{error}");
+        assert!(read("").is_err());
+        assert!(read("{}").is_err());
+        assert!(read(&whole.replace("running", "sleeping")).is_err());
+    }
+}

@@ -1,0 +1,265 @@
+//! Rows into Parquet files: one folder of parts for each table.
+//!
+//! A table `trajectories` is the folder `trajectories/` of files `part-CYCLE.parquet`, which
+//! pyarrow, polars and DuckDB read as one table. While the run goes on, the folder is called
+//! `trajectories.partial/`, and the part that grows in it ends in `.parquet.partial`. Each
+//! checkpoint [seals](sidestep_kernel::ports::Recorder::seal) the part; the name of the next one is the cycle at which it
+//! begins. So a folder without `.partial` holds every row of the run, and going back to a
+//! checkpoint at cycle C means to delete the parts that begin at C or later.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use parquet::file::metadata::KeyValue;
+use parquet::schema::types::{SchemaDescriptor, TypePtr};
+use sidestep_kernel::ports::recorder::check_block;
+use sidestep_kernel::ports::{RecordError, Recorder, TableSchema, Values};
+
+use crate::disk;
+use crate::encode::ColumnEncoder;
+use crate::part::{PartWriter, cause, first_cycle, next_cycle, part_name};
+use crate::schema::{Origin, check_schema, key_values, parquet_schema};
+
+/// Rows in a row group. Only encoded rows wait in memory, a few bytes each.
+const GROUP_ROWS: usize = 1 << 20;
+
+/// Writes every table to Parquet files; see the [module](self) for their names.
+pub struct ParquetRecorder {
+    tables: Vec<TableWriter>,
+    /// What broke the recording; rows are missing since then.
+    broken: Option<RecordError>,
+}
+
+impl ParquetRecorder {
+    /// Starts new tables in `folder`, for a run that begins at cycle 0.
+    ///
+    /// # Errors
+    /// A schema that cannot become a file; a table that is there already; what the system
+    /// says.
+    pub fn create(
+        folder: &Path,
+        schemas: &[TableSchema],
+        origin: &Origin,
+    ) -> Result<Self, RecordError> {
+        for table in schemas.iter().map(|s| folder.join(&s.name)) {
+            if table.exists() || disk::partial(&table).exists() {
+                return Err(RecordError::new(table.display(), "the table is there already"));
+            }
+        }
+        Self::resume(folder, schemas, origin, 0)
+    }
+
+    /// Continues the tables in `folder` at `cycle`: what they hold of that cycle and later
+    /// ones is deleted, for the run is about to write it again. Cycle 0 starts afresh.
+    ///
+    /// `cycle` must be one at which the recorder was [sealed](Recorder::seal).
+    ///
+    /// # Errors
+    /// A schema that cannot become a file; a cycle at which the recorder was not sealed; what
+    /// the system says.
+    pub fn resume(
+        folder: &Path,
+        schemas: &[TableSchema],
+        origin: &Origin,
+        cycle: u64,
+    ) -> Result<Self, RecordError> {
+        schemas.iter().try_for_each(check_schema)?;
+        let open = |schema: &TableSchema| TableWriter::open(folder, schema, origin, cycle);
+        Ok(Self { tables: schemas.iter().map(open).collect::<Result<_, _>>()?, broken: None })
+    }
+
+    /// Does `work` unless rows are missing already; remembers when it fails.
+    fn unless_broken(
+        &mut self,
+        work: impl FnOnce(&mut [TableWriter]) -> Result<(), RecordError>,
+    ) -> Result<(), RecordError> {
+        if let Some(RecordError { place, cause }) = &self.broken {
+            return Err(RecordError::new(place, format!("recording stopped earlier: {cause}")));
+        }
+        work(&mut self.tables).inspect_err(|e| {
+            self.broken = Some(RecordError::new(&e.place, &e.cause));
+        })
+    }
+}
+
+impl Recorder for ParquetRecorder {
+    fn append(&mut self, table: usize, block: &[Values]) -> Result<(), RecordError> {
+        let schema = self.tables.get(table).map(|t| &t.schema);
+        check_block(schema.ok_or_else(|| RecordError::new(table, "no such table"))?, block)?;
+        self.unless_broken(|tables| tables[table].append(block))
+    }
+
+    fn seal(&mut self, next_cycle: u64) -> Result<(), RecordError> {
+        self.unless_broken(|tables| tables.iter_mut().try_for_each(|t| t.seal(next_cycle)))
+    }
+
+    fn finish(&mut self) -> Result<(), RecordError> {
+        self.unless_broken(|tables| tables.iter_mut().try_for_each(TableWriter::finish))
+    }
+}
+
+/// One table on its way to disk.
+struct TableWriter {
+    schema: TableSchema,
+    parquet_schema: TypePtr,
+    key_values: Vec<KeyValue>,
+    /// The folder's name once the table is whole.
+    folder: PathBuf,
+    /// The first cycle of the open part, and of the next one if none is open.
+    part_cycle: u64,
+    part: Option<PartWriter>,
+    columns: Vec<ColumnEncoder>,
+    group_rows: usize,
+    finished: bool,
+}
+
+impl TableWriter {
+    fn open(
+        parent: &Path,
+        schema: &TableSchema,
+        origin: &Origin,
+        cycle: u64,
+    ) -> Result<Self, RecordError> {
+        let failed = |e| RecordError::new(&schema.name, cause(e));
+        let parquet_schema = parquet_schema(schema).map_err(failed)?;
+        let descriptor = SchemaDescriptor::new(parquet_schema.clone());
+        let columns = schema.columns.iter().zip(descriptor.columns());
+        let folder = parent.join(&schema.name);
+        rewind(&folder, cycle)?;
+        Ok(Self {
+            columns: columns.map(|(spec, d)| ColumnEncoder::new(spec, d.clone())).collect(),
+            schema: schema.clone(),
+            parquet_schema,
+            key_values: key_values(schema, origin),
+            folder,
+            part_cycle: cycle,
+            part: None,
+            group_rows: 0,
+            finished: false,
+        })
+    }
+
+    fn append(&mut self, block: &[Values]) -> Result<(), RecordError> {
+        if self.finished {
+            return Err(RecordError::new(self.folder.display(), "the table is finished"));
+        }
+        let rows = block[0].len();
+        let mut start = 0;
+        while start < rows {
+            let end = rows.min(start + GROUP_ROWS - self.group_rows);
+            for (column, values) in self.columns.iter_mut().zip(block) {
+                column
+                    .append(values, start..end)
+                    .map_err(|e| RecordError::new(self.folder.display(), cause(e)))?;
+            }
+            self.group_rows += end - start;
+            start = end;
+            if self.group_rows == GROUP_ROWS {
+                self.write_row_group()?;
+            }
+        }
+        Ok(())
+    }
+
+    fn write_row_group(&mut self) -> Result<(), RecordError> {
+        self.group_rows = 0;
+        if self.part.is_none() {
+            self.part = Some(self.new_part()?);
+        }
+        let part = self.part.as_mut().expect("opened above");
+        part.write_row_group(&mut self.columns)
+    }
+
+    fn new_part(&self) -> Result<PartWriter, RecordError> {
+        let path = disk::partial(&self.folder).join(part_name(self.part_cycle));
+        if path.exists() {
+            let cause = "sealed at this cycle already; a recorder is sealed at rising cycles";
+            return Err(RecordError::new(path.display(), cause));
+        }
+        PartWriter::create(path, self.parquet_schema.clone(), self.key_values.clone())
+    }
+
+    /// Ends the open part, if it has rows; later rows begin at `next_cycle`.
+    fn seal(&mut self, next_cycle: u64) -> Result<(), RecordError> {
+        self.end_part(Some(next_cycle))?;
+        self.part_cycle = next_cycle;
+        Ok(())
+    }
+
+    fn end_part(&mut self, next_cycle: Option<u64>) -> Result<(), RecordError> {
+        if self.group_rows > 0 {
+            self.write_row_group()?;
+        }
+        self.part.take().map_or(Ok(()), |part| part.close(next_cycle))
+    }
+
+    /// Ends the table and gives its folder the final name. Once is enough.
+    fn finish(&mut self) -> Result<(), RecordError> {
+        if self.finished {
+            return Ok(());
+        }
+        self.end_part(None)?;
+        let growing = disk::partial(&self.folder);
+        if parts(&growing)?.is_empty() {
+            // A table without rows still has columns.
+            self.new_part()?.close(None)?;
+        }
+        disk::rename(&growing, &self.folder)?;
+        self.finished = true;
+        Ok(())
+    }
+}
+
+/// Brings the table's folder back to where it was when the recorder was sealed at `cycle`.
+fn rewind(folder: &Path, cycle: u64) -> Result<(), RecordError> {
+    let growing = disk::partial(folder);
+    if folder.exists() {
+        // The run was stopped between the end of this table and the end of the last one.
+        disk::rename(folder, &growing)?;
+    }
+    let failed = |e| RecordError::new(growing.display(), e);
+    fs::create_dir_all(&growing).map_err(failed)?;
+    // Before anything is deleted.
+    check_sealed(&growing, cycle)?;
+    for entry in fs::read_dir(&growing).map_err(failed)? {
+        let path = entry.map_err(failed)?.path();
+        if is_stale(&path, cycle) {
+            fs::remove_file(&path).map_err(|e| RecordError::new(path.display(), e))?;
+        }
+    }
+    Ok(())
+}
+
+/// The rows that stay must end before those to come begin.
+fn check_sealed(growing: &Path, cycle: u64) -> Result<(), RecordError> {
+    let kept = parts(growing)?.into_iter().rfind(|path| !is_stale(path, cycle));
+    let Some(last) = kept else { return Ok(()) };
+    if next_cycle(&last)?.is_some_and(|next| next <= cycle) {
+        return Ok(());
+    }
+    let cause = format!("the table was not sealed at cycle {cycle}: resume at its checkpoint");
+    Err(RecordError::new(last.display(), cause))
+}
+
+/// True for a part that is not whole or begins at `cycle` or later. Other files are not ours.
+fn is_stale(path: &Path, cycle: u64) -> bool {
+    let Some(name) = path.file_name().and_then(|n| n.to_str()) else { return false };
+    match name.strip_suffix(".partial") {
+        Some(growing) => first_cycle(growing).is_some(),
+        None => first_cycle(name).is_some_and(|first| first >= cycle),
+    }
+}
+
+/// The whole parts in `folder`, in the order of their rows.
+pub(crate) fn parts(folder: &Path) -> Result<Vec<PathBuf>, RecordError> {
+    let failed = |e| RecordError::new(folder.display(), e);
+    let mut parts = Vec::new();
+    for entry in fs::read_dir(folder).map_err(failed)? {
+        let path = entry.map_err(failed)?.path();
+        if let Some(cycle) = path.file_name().and_then(|n| n.to_str()).and_then(first_cycle) {
+            parts.push((cycle, path));
+        }
+    }
+    parts.sort();
+    Ok(parts.into_iter().map(|(_, path)| path).collect())
+}

@@ -1,0 +1,121 @@
+//! One Parquet file: `part-CYCLE.parquet.partial` until it is whole, then without `.partial`.
+
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use parquet::errors::{ParquetError, Result};
+use parquet::file::metadata::KeyValue;
+use parquet::file::properties::{EnabledStatistics, WriterProperties};
+use parquet::file::reader::FileReader;
+use parquet::file::serialized_reader::SerializedFileReader;
+use parquet::file::writer::SerializedFileWriter;
+use parquet::schema::types::TypePtr;
+use sidestep_kernel::ports::RecordError;
+
+use crate::disk;
+use crate::encode::ColumnEncoder;
+use crate::schema;
+
+/// The name of the part whose first cycle is `cycle`; names sort as the cycles do.
+pub(crate) fn part_name(cycle: u64) -> String {
+    format!("part-{cycle:015}.parquet")
+}
+
+/// The first cycle of the part with this name; `None` for any other file.
+pub(crate) fn first_cycle(name: &str) -> Option<u64> {
+    name.strip_prefix("part-")?.strip_suffix(".parquet")?.parse().ok()
+}
+
+/// A part that is being written.
+pub(crate) struct PartWriter {
+    path: PathBuf,
+    file: SerializedFileWriter<File>,
+    /// CRC-32 of each row group's bytes.
+    checksums: Vec<u32>,
+}
+
+impl PartWriter {
+    /// Starts the file that will be called `path` once it is whole.
+    pub(crate) fn create(
+        path: PathBuf,
+        schema: TypePtr,
+        key_values: Vec<KeyValue>,
+    ) -> std::result::Result<Self, RecordError> {
+        // The pages come encoded; the properties only say what the footer holds.
+        let properties = WriterProperties::builder()
+            .set_created_by(concat!("sidestep-record ", env!("CARGO_PKG_VERSION")).into())
+            .set_statistics_enabled(EnabledStatistics::Chunk)
+            .set_offset_index_disabled(true)
+            .set_key_value_metadata(Some(key_values))
+            .build();
+        let growing = disk::partial(&path);
+        let failed = |cause: String| RecordError::new(growing.display(), cause);
+        let file = File::create(&growing).map_err(|e| failed(e.to_string()))?;
+        let file = SerializedFileWriter::new(file, schema, Arc::new(properties))
+            .map_err(|e| failed(cause(e)))?;
+        Ok(Self { path, file, checksums: Vec::new() })
+    }
+
+    /// Writes what the encoders hold as one row group.
+    pub(crate) fn write_row_group(
+        &mut self,
+        columns: &mut [ColumnEncoder],
+    ) -> std::result::Result<(), RecordError> {
+        let checksum = append_chunks(&mut self.file, columns)
+            .map_err(|e| RecordError::new(disk::partial(&self.path).display(), cause(e)))?;
+        self.checksums.push(checksum);
+        Ok(())
+    }
+
+    /// Writes the footer, waits for the disk, gives the file its final name. `next_cycle` is
+    /// where the rows after this part begin, none at the end of a run.
+    pub(crate) fn close(self, next_cycle: Option<u64>) -> std::result::Result<(), RecordError> {
+        let Self { path, mut file, checksums } = self;
+        let checksums = schema::checksums_to_text(&checksums);
+        let next_cycle = next_cycle.map_or("end".to_string(), |cycle| cycle.to_string());
+        for (key, value) in [(schema::CHECKSUMS, checksums), (schema::NEXT_CYCLE, next_cycle)] {
+            file.append_key_value_metadata(KeyValue::new(key.to_string(), value));
+        }
+        let growing = disk::partial(&path);
+        let failed = |cause: String| RecordError::new(growing.display(), cause);
+        let file = file.into_inner().map_err(|e| failed(cause(e)))?;
+        file.sync_all().map_err(|e| failed(e.to_string()))?;
+        disk::rename(&growing, &path)
+    }
+}
+
+/// Where the rows after the whole part at `path` begin; `None` at the end of a run.
+pub(crate) fn next_cycle(path: &Path) -> std::result::Result<Option<u64>, RecordError> {
+    let failed = |cause: String| RecordError::new(path.display(), cause);
+    let file = File::open(path).map_err(|e| failed(e.to_string()))?;
+    let file = SerializedFileReader::new(file).map_err(|e| failed(cause(e)))?;
+    let text = schema::key_value(file.metadata(), schema::NEXT_CYCLE);
+    Ok(text.and_then(|cycle| cycle.parse().ok()))
+}
+
+/// Writes a row group; the checksum of its bytes.
+fn append_chunks(
+    file: &mut SerializedFileWriter<File>,
+    columns: &mut [ColumnEncoder],
+) -> Result<u32> {
+    let mut checksum = crc32fast::Hasher::new();
+    let mut group = file.next_row_group()?;
+    for column in columns {
+        let (bytes, closed) = column.take_chunk()?;
+        checksum.update(&bytes);
+        group.append_column(&bytes, closed)?;
+    }
+    group.close()?;
+    // A full disk is to be noticed now, not when the next row group comes.
+    file.flush().map_err(|e| ParquetError::External(Box::new(e)))?;
+    Ok(checksum.finalize())
+}
+
+/// What the system said, without the library's wrapping.
+pub(crate) fn cause(error: ParquetError) -> String {
+    match error {
+        ParquetError::External(inner) => inner.to_string(),
+        other => other.to_string(),
+    }
+}

@@ -1,0 +1,365 @@
+//! Tables back from disk.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::ops::{Bound, RangeBounds};
+use std::path::{Path, PathBuf};
+
+use parquet::basic::Type as PhysicalType;
+use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
+use parquet::data_type::{ByteArray, DataType};
+use parquet::errors::{ParquetError, Result as ParquetResult};
+use parquet::file::metadata::{ColumnChunkMetaData, ParquetMetaData, RowGroupMetaData};
+use parquet::file::reader::{ChunkReader, FileReader, Length};
+use parquet::file::serialized_reader::SerializedFileReader;
+use parquet::file::statistics::Statistics;
+use sidestep_kernel::InputError;
+use sidestep_kernel::ports::{ColumnSpec, ColumnType, TableSchema, Values};
+
+use crate::disk;
+use crate::format::FormatVersion;
+use crate::parquet::parts;
+use crate::part::cause;
+use crate::schema::{self, Origin};
+
+/// The column by which rows are chosen.
+const CYCLE: &str = "cycle";
+/// Values decoded at a time: what a damaged file claims to hold is never reserved at once.
+const BATCH: usize = 1 << 15;
+
+/// A table read back, in the order in which its rows were recorded.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Table {
+    /// Name and columns, as they were declared.
+    pub schema: TableSchema,
+    /// The values, one entry for each column of the schema, all of one length.
+    pub columns: Vec<Values>,
+    /// What the run was.
+    pub origin: Origin,
+    /// False for a run that has not ended: the rows reach up to its last checkpoint.
+    pub complete: bool,
+}
+
+impl Table {
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.columns.first().map_or(0, Values::len)
+    }
+
+    /// The values of the column `name`, if there is one.
+    pub fn column(&self, name: &str) -> Option<&Values> {
+        Some(&self.columns[position(&self.schema, name)?])
+    }
+}
+
+fn position(schema: &TableSchema, name: &str) -> Option<usize> {
+    schema.columns.iter().position(|c| c.name == name)
+}
+
+/// Reads those rows of the table `name` in the run folder `folder` whose `cycle` lies in
+/// `cycles`; `..` reads all rows, also of a table without cycles. Parts of the files that
+/// hold no such cycle are not read.
+///
+/// # Errors
+/// No such table, or nothing of it that is whole; a damaged file; a format that this version
+/// does not read; a range of cycles for a table without the column `cycle`.
+pub fn read_table(
+    folder: &Path,
+    name: &str,
+    cycles: impl RangeBounds<u64>,
+) -> Result<Table, InputError> {
+    let cycles = Cycles { from: cycles.start_bound().cloned(), to: cycles.end_bound().cloned() };
+    let (paths, complete) = find_parts(folder, name)?;
+    let mut table: Option<Table> = None;
+    for path in &paths {
+        let part = Part::open(path, name)?;
+        let table = table.get_or_insert_with(|| part.empty_table(complete));
+        if table.schema != part.schema {
+            return Err(damaged(path, "its columns differ from those of the part before it"));
+        }
+        part.read_into(&mut table.columns, cycles)?;
+    }
+    table.ok_or_else(|| {
+        let remedy = "resume the run, or wait for its first checkpoint";
+        InputError::new(folder.join(name).display(), "no part of the table is whole yet", remedy)
+    })
+}
+
+/// The whole parts of a table, and whether they are all.
+fn find_parts(folder: &Path, name: &str) -> Result<(Vec<PathBuf>, bool), InputError> {
+    let table = folder.join(name);
+    let growing = disk::partial(&table);
+    let complete = table.is_dir();
+    if !complete && !growing.is_dir() {
+        let remedy = "name a run folder and one of the tables in it";
+        return Err(InputError::new(table.display(), "there is no such table", remedy));
+    }
+    let found = parts(if complete { &table } else { &growing })
+        .map_err(|e| InputError::new(e.place, e.cause, "make the folder readable"))?;
+    Ok((found, complete))
+}
+
+fn damaged(path: &Path, cause: impl Into<String>) -> InputError {
+    let remedy = "the file is damaged: copy it again from its source, or run the scenario again";
+    InputError::new(path.display(), cause, remedy)
+}
+
+/// The range of cycles that is asked for.
+#[derive(Debug, Clone, Copy)]
+struct Cycles {
+    from: Bound<u64>,
+    to: Bound<u64>,
+}
+
+impl Cycles {
+    fn is_all(self) -> bool {
+        (self.from, self.to) == (Bound::Unbounded, Bound::Unbounded)
+    }
+
+    fn contains(self, cycle: u64) -> bool {
+        (self.from, self.to).contains(&cycle)
+    }
+
+    /// False when nothing from `least` to `most` is asked for.
+    fn overlaps(self, least: u64, most: u64) -> bool {
+        let starts_in_time = match self.from {
+            Bound::Included(from) => most >= from,
+            Bound::Excluded(from) => most > from,
+            Bound::Unbounded => true,
+        };
+        let ends_late_enough = match self.to {
+            Bound::Included(to) => least <= to,
+            Bound::Excluded(to) => least < to,
+            Bound::Unbounded => true,
+        };
+        starts_in_time && ends_late_enough
+    }
+}
+
+/// One open file.
+struct Part<'a> {
+    path: &'a Path,
+    bytes: File,
+    file: SerializedFileReader<File>,
+    checksums: Vec<u32>,
+    schema: TableSchema,
+    origin: Origin,
+}
+
+impl<'a> Part<'a> {
+    fn open(path: &'a Path, name: &str) -> Result<Self, InputError> {
+        let bytes = File::open(path).map_err(|e| bad(path, e))?;
+        let file = bytes.try_clone().map_err(|e| bad(path, e))?;
+        let file = SerializedFileReader::new(file).map_err(|e| damaged(path, cause(e)))?;
+        let text = |key| text(path, file.metadata(), key);
+        let format: FormatVersion = text(schema::FORMAT)?.parse().map_err(|e| bad(path, e))?;
+        format.check_readable(path.display())?;
+        let columns =
+            schema::columns_from_json(&text(schema::COLUMNS)?).map_err(|e| bad(path, e))?;
+        let origin = Origin {
+            program_version: text(schema::VERSION)?,
+            scenario: text(schema::SCENARIO)?,
+            seed: text(schema::SEED)?.parse().map_err(|e| bad(path, e))?,
+        };
+        let checksums =
+            schema::checksums_from_text(&text(schema::CHECKSUMS)?).map_err(|e| bad(path, e))?;
+        let schema = TableSchema { name: name.to_string(), columns };
+        let part = Self { path, bytes, file, checksums, schema, origin };
+        part.check_types()?;
+        Ok(part)
+    }
+
+    /// The columns must be what the key-value pairs say they are.
+    fn check_types(&self) -> Result<(), InputError> {
+        let stored = self.file.metadata().file_metadata().schema_descr();
+        let fits = |(i, c): (usize, &ColumnSpec)| {
+            let column = stored.column(i);
+            column.name() == c.name
+                && column.physical_type() == physical_type(c.ty)
+                && column.max_def_level() == 0
+                && column.max_rep_level() == 0
+        };
+        let columns = &self.schema.columns;
+        if stored.num_columns() == columns.len() && columns.iter().enumerate().all(fits) {
+            return Ok(());
+        }
+        Err(damaged(self.path, format!("its columns are not those of `{}`", schema::COLUMNS)))
+    }
+
+    fn empty_table(&self, complete: bool) -> Table {
+        let columns = self.schema.columns.iter().map(|c| Values::empty(c.ty)).collect();
+        Table { schema: self.schema.clone(), columns, origin: self.origin.clone(), complete }
+    }
+
+    fn read_into(&self, columns: &mut [Values], cycles: Cycles) -> Result<(), InputError> {
+        let cycle_column = position(&self.schema, CYCLE);
+        if cycle_column.is_none() && !cycles.is_all() {
+            let cause = format!("table `{}` has no column `{CYCLE}`", self.schema.name);
+            return Err(InputError::new(self.path.display(), cause, "read the whole table"));
+        }
+        for group in 0..self.file.num_row_groups() {
+            let bounds =
+                cycle_column.and_then(|c| bounds(self.file.metadata().row_group(group), c));
+            if bounds.is_none_or(|(least, most)| cycles.overlaps(least, most)) {
+                let rows = self.read_group(group).map_err(|e| damaged(self.path, cause(e)))?;
+                append(columns, rows, cycle_column, cycles);
+            }
+        }
+        Ok(())
+    }
+
+    /// Compares a row group's bytes with their checksum: decoders may panic on damaged
+    /// pages, or return other rows.
+    fn check_bytes(&self, group: usize) -> ParquetResult<()> {
+        let wrong = |cause: &str| ParquetError::General(format!("row group {group} {cause}"));
+        let (start, length) = extent(self.file.metadata().row_group(group))
+            .ok_or_else(|| wrong("has no place in the file"))?;
+        // Checked before so much memory is taken.
+        if start + length > Length::len(&self.bytes) {
+            return Err(wrong("reaches beyond the end of the file"));
+        }
+        let bytes = self.bytes.get_bytes(start, length as usize)?;
+        if self.checksums.get(group) != Some(&crc32fast::hash(&bytes)) {
+            return Err(wrong("does not match its checksum"));
+        }
+        Ok(())
+    }
+
+    /// All rows of one row group.
+    fn read_group(&self, group: usize) -> ParquetResult<Vec<Values>> {
+        self.check_bytes(group)?;
+        let group = self.file.get_row_group(group)?;
+        let rows = group.metadata().num_rows();
+        let column = |(i, spec): (usize, &ColumnSpec)| {
+            let values = read_column(group.get_column_reader(i)?, spec)?;
+            if i64::try_from(values.len()) != Ok(rows) {
+                let cause = format!("column `{}` has not {rows} rows", spec.name);
+                return Err(ParquetError::General(cause));
+            }
+            Ok(values)
+        };
+        self.schema.columns.iter().enumerate().map(column).collect()
+    }
+}
+
+fn bad(path: &Path, cause: impl std::fmt::Display) -> InputError {
+    damaged(path, cause.to_string())
+}
+
+/// The key-value pair `key` of a file.
+fn text(path: &Path, metadata: &ParquetMetaData, key: &str) -> Result<String, InputError> {
+    schema::key_value(metadata, key).map(str::to_string).ok_or_else(|| {
+        let remedy = "name a file that a recording wrote";
+        InputError::new(path.display(), format!("the file has no key `{key}`"), remedy)
+    })
+}
+
+/// Start and length of a row group's bytes; `None` unless its columns lie one behind the
+/// other, as they were written.
+fn extent(group: &RowGroupMetaData) -> Option<(u64, u64)> {
+    let begin = |c: &ColumnChunkMetaData| {
+        u64::try_from(c.dictionary_page_offset().unwrap_or(c.data_page_offset())).ok()
+    };
+    let start = begin(group.columns().first()?)?;
+    let mut end = start;
+    for column in group.columns() {
+        if begin(column)? != end {
+            return None;
+        }
+        end = end.checked_add(column.compressed_size().try_into().ok()?)?;
+    }
+    Some((start, end - start))
+}
+
+fn physical_type(ty: ColumnType) -> PhysicalType {
+    match ty {
+        ColumnType::U32 | ColumnType::I32 => PhysicalType::INT32,
+        ColumnType::U64 => PhysicalType::INT64,
+        ColumnType::F64 => PhysicalType::DOUBLE,
+        ColumnType::Label => PhysicalType::BYTE_ARRAY,
+    }
+}
+
+/// Smallest and largest cycle of a row group, where stored.
+fn bounds(group: &RowGroupMetaData, column: usize) -> Option<(u64, u64)> {
+    match group.column(column).statistics()? {
+        Statistics::Int64(s) => Some((*s.min_opt()? as u64, *s.max_opt()? as u64)),
+        _ => None,
+    }
+}
+
+/// Appends those rows whose cycle is asked for.
+fn append(columns: &mut [Values], rows: Vec<Values>, cycle: Option<usize>, cycles: Cycles) {
+    let keep: Option<Vec<bool>> = match cycle.map(|c| &rows[c]) {
+        _ if cycles.is_all() => None,
+        Some(Values::U64(v)) => Some(v.iter().map(|&c| cycles.contains(c)).collect()),
+        Some(Values::U32(v)) => Some(v.iter().map(|&c| cycles.contains(c.into())).collect()),
+        _ => None,
+    };
+    for (column, mut values) in columns.iter_mut().zip(rows) {
+        if let Some(keep) = &keep {
+            values.retain_rows(keep);
+        }
+        column.append(&values);
+    }
+}
+
+fn read_column(reader: ColumnReader, spec: &ColumnSpec) -> ParquetResult<Values> {
+    Ok(match (reader, spec.ty) {
+        (ColumnReader::Int32ColumnReader(r), ColumnType::U32) => {
+            Values::U32(read_values(r, |v| Ok(v as u32))?)
+        }
+        (ColumnReader::Int32ColumnReader(r), _) => Values::I32(read_values(r, Ok)?),
+        (ColumnReader::Int64ColumnReader(r), _) => Values::U64(read_values(r, |v| Ok(v as u64))?),
+        (ColumnReader::DoubleColumnReader(r), _) => Values::F64(read_values(r, Ok)?),
+        (ColumnReader::ByteArrayColumnReader(r), _) => {
+            let mut index = LabelIndex::new(spec);
+            Values::Label(read_values(r, |label| index.of(&label))?)
+        }
+        _ => return Err(ParquetError::General(format!("column `{}` has another type", spec.name))),
+    })
+}
+
+/// Reads a column to its end.
+fn read_values<T: DataType, V>(
+    mut reader: ColumnReaderImpl<T>,
+    mut convert: impl FnMut(T::T) -> ParquetResult<V>,
+) -> ParquetResult<Vec<V>> {
+    let (mut values, mut batch) = (Vec::new(), Vec::new());
+    loop {
+        let (_, read, _) = reader.read_records(BATCH, None, None, &mut batch)?;
+        if read == 0 {
+            return Ok(values);
+        }
+        for value in batch.drain(..) {
+            values.push(convert(value)?);
+        }
+    }
+}
+
+/// Finds a label's index; neighboring rows mostly have the same one.
+struct LabelIndex<'a> {
+    name: &'a str,
+    indices: BTreeMap<&'a [u8], u32>,
+    last: Option<(ByteArray, u32)>,
+}
+
+impl<'a> LabelIndex<'a> {
+    fn new(spec: &'a ColumnSpec) -> Self {
+        let labels = spec.labels.iter().map(|label| label.as_bytes());
+        Self { name: &spec.name, indices: labels.zip(0..).collect(), last: None }
+    }
+
+    fn of(&mut self, label: &ByteArray) -> ParquetResult<u32> {
+        if let Some((last, index)) = &self.last
+            && last == label
+        {
+            return Ok(*index);
+        }
+        let index = self.indices.get(label.data()).copied().ok_or_else(|| {
+            ParquetError::General(format!("column `{}` has a label without a name", self.name))
+        })?;
+        self.last = Some((label.clone(), index));
+        Ok(index)
+    }
+}

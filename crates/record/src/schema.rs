@@ -1,0 +1,229 @@
+//! A table's schema as Parquet knows it, and the key-value pairs in every file.
+
+use std::sync::Arc;
+
+use parquet::basic::{LogicalType, Repetition, Type as PhysicalType};
+use parquet::errors::Result;
+use parquet::file::metadata::{KeyValue, ParquetMetaData};
+use parquet::schema::types::{Type, TypePtr};
+use serde::{Deserialize, Serialize};
+use sidestep_kernel::ports::{ColumnSpec, ColumnType, RecordError, TableSchema};
+
+use crate::format;
+
+/// Key of the [`FormatVersion`](format::FormatVersion).
+pub(crate) const FORMAT: &str = "sidestep.format";
+/// Key of the version of the program that wrote the file.
+pub(crate) const VERSION: &str = "sidestep.version";
+/// Key of the scenario's text.
+pub(crate) const SCENARIO: &str = "sidestep.scenario";
+/// Key of the seed, in decimal.
+pub(crate) const SEED: &str = "sidestep.seed";
+/// Key of the columns: a JSON list of [`ColumnEntry`].
+pub(crate) const COLUMNS: &str = "sidestep.columns";
+/// Key of the row groups' checksums: a CRC-32 of each one's bytes, in hexadecimal.
+pub(crate) const CHECKSUMS: &str = "sidestep.crc32";
+/// Key of the cycle at which the next part begins; `end` in the last part of a run.
+pub(crate) const NEXT_CYCLE: &str = "sidestep.next_cycle";
+
+/// What every file of a run says about its origin.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Origin {
+    /// Version of the program that made the run.
+    pub program_version: String,
+    /// The scenario's text, with every default and include resolved.
+    pub scenario: String,
+    /// The seed.
+    pub seed: u64,
+}
+
+/// One column in [`COLUMNS`].
+#[derive(Debug, Serialize, Deserialize)]
+struct ColumnEntry {
+    name: String,
+    #[serde(rename = "type")]
+    ty: TypeName,
+    meaning: String,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    labels: Vec<String>,
+}
+
+/// The names of the column types in [`COLUMNS`].
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum TypeName {
+    U32,
+    U64,
+    I32,
+    F64,
+    Label,
+}
+
+impl From<ColumnType> for TypeName {
+    fn from(ty: ColumnType) -> Self {
+        match ty {
+            ColumnType::U32 => Self::U32,
+            ColumnType::U64 => Self::U64,
+            ColumnType::I32 => Self::I32,
+            ColumnType::F64 => Self::F64,
+            ColumnType::Label => Self::Label,
+        }
+    }
+}
+
+impl From<TypeName> for ColumnType {
+    fn from(name: TypeName) -> Self {
+        match name {
+            TypeName::U32 => Self::U32,
+            TypeName::U64 => Self::U64,
+            TypeName::I32 => Self::I32,
+            TypeName::F64 => Self::F64,
+            TypeName::Label => Self::Label,
+        }
+    }
+}
+
+/// Refuses a schema that cannot become a file: a name that is no plain file name, no
+/// columns, two columns of one name, two labels of one text.
+pub(crate) fn check_schema(schema: &TableSchema) -> std::result::Result<(), RecordError> {
+    let wrong = |cause: String| Err(RecordError::new(&schema.name, cause));
+    let plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    if schema.name.is_empty() || !schema.name.chars().all(plain) {
+        return wrong("a table's name has letters, digits, `_` and `-` only".into());
+    }
+    if schema.columns.is_empty() {
+        return wrong("a table has at least one column".into());
+    }
+    if let Some(name) = repeated(schema.columns.iter().map(|c| &c.name)) {
+        return wrong(format!("two columns are named `{name}`"));
+    }
+    for column in &schema.columns {
+        if let Some(label) = repeated(column.labels.iter()) {
+            return wrong(format!("column `{}` has the label `{label}` twice", column.name));
+        }
+    }
+    Ok(())
+}
+
+/// The first in order of text that occurs more than once.
+fn repeated<'a>(texts: impl Iterator<Item = &'a String>) -> Option<&'a String> {
+    let mut sorted: Vec<_> = texts.collect();
+    sorted.sort();
+    sorted.windows(2).find(|pair| pair[0] == pair[1]).map(|pair| pair[0])
+}
+
+/// The Parquet schema: required columns, unsigned integers marked as such, labels as text.
+pub(crate) fn parquet_schema(schema: &TableSchema) -> Result<TypePtr> {
+    let fields = schema.columns.iter().map(field).collect::<Result<_>>()?;
+    Ok(Arc::new(Type::group_type_builder("schema").with_fields(fields).build()?))
+}
+
+fn field(column: &ColumnSpec) -> Result<TypePtr> {
+    let (physical, logical) = match column.ty {
+        ColumnType::U32 => (PhysicalType::INT32, Some(LogicalType::integer(32, false))),
+        ColumnType::I32 => (PhysicalType::INT32, Some(LogicalType::integer(32, true))),
+        ColumnType::U64 => (PhysicalType::INT64, Some(LogicalType::integer(64, false))),
+        ColumnType::F64 => (PhysicalType::DOUBLE, None),
+        ColumnType::Label => (PhysicalType::BYTE_ARRAY, Some(LogicalType::String)),
+    };
+    let field = Type::primitive_type_builder(&column.name, physical)
+        .with_repetition(Repetition::REQUIRED)
+        .with_logical_type(logical)
+        .build()?;
+    Ok(Arc::new(field))
+}
+
+/// The key-value pairs of a file of `schema`.
+pub(crate) fn key_values(schema: &TableSchema, origin: &Origin) -> Vec<KeyValue> {
+    let pair = |key: &str, value: String| KeyValue::new(key.to_string(), value);
+    vec![
+        pair(FORMAT, format::CURRENT.to_string()),
+        pair(VERSION, origin.program_version.clone()),
+        pair(SCENARIO, origin.scenario.clone()),
+        pair(SEED, origin.seed.to_string()),
+        pair(COLUMNS, columns_to_json(&schema.columns)),
+    ]
+}
+
+/// The value of `key` in a file's footer.
+pub(crate) fn key_value<'a>(metadata: &'a ParquetMetaData, key: &str) -> Option<&'a str> {
+    let mut pairs = metadata.file_metadata().key_value_metadata().into_iter().flatten();
+    pairs.find(|pair| pair.key == key)?.value.as_deref()
+}
+
+fn columns_to_json(columns: &[ColumnSpec]) -> String {
+    let entry = |c: &ColumnSpec| ColumnEntry {
+        name: c.name.clone(),
+        ty: c.ty.into(),
+        meaning: c.meaning.clone(),
+        labels: c.labels.clone(),
+    };
+    let entries: Vec<_> = columns.iter().map(entry).collect();
+    serde_json::to_string(&entries).expect("texts and lists always become JSON")
+}
+
+/// The columns that [`key_values`] wrote.
+///
+/// # Errors
+/// Text that is not a list of columns.
+pub(crate) fn columns_from_json(text: &str) -> serde_json::Result<Vec<ColumnSpec>> {
+    let entries: Vec<ColumnEntry> = serde_json::from_str(text)?;
+    let spec = |e: ColumnEntry| ColumnSpec {
+        name: e.name,
+        ty: e.ty.into(),
+        meaning: e.meaning,
+        labels: e.labels,
+    };
+    Ok(entries.into_iter().map(spec).collect())
+}
+
+/// The value of [`CHECKSUMS`].
+pub(crate) fn checksums_to_text(checksums: &[u32]) -> String {
+    checksums.iter().map(|c| format!("{c:08x}")).collect::<Vec<_>>().join(" ")
+}
+
+/// The checksums that [`checksums_to_text`] wrote.
+pub(crate) fn checksums_from_text(
+    text: &str,
+) -> std::result::Result<Vec<u32>, std::num::ParseIntError> {
+    text.split_ascii_whitespace().map(|c| u32::from_str_radix(c, 16)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use sidestep_kernel::ports::recorder::conformance_schemas;
+
+    use super::*;
+
+    #[test]
+    fn columns_survive_their_json() {
+        for schema in conformance_schemas() {
+            let text = columns_to_json(&schema.columns);
+            assert_eq!(columns_from_json(&text).unwrap(), schema.columns);
+        }
+    }
+
+    #[test]
+    fn checksums_survive_their_text() {
+        for checksums in [vec![], vec![0, u32::MAX]] {
+            let text = checksums_to_text(&checksums);
+            assert_eq!(checksums_from_text(&text).unwrap(), checksums);
+        }
+    }
+
+    #[test]
+    fn schemas_that_cannot_become_a_file_are_refused() {
+        let [good, labelled] = conformance_schemas().try_into().unwrap();
+        assert!(check_schema(&good).is_ok());
+        let with = |change: &dyn Fn(&mut TableSchema)| {
+            let mut schema = labelled.clone();
+            change(&mut schema);
+            check_schema(&schema).unwrap_err().to_string()
+        };
+        assert!(with(&|s| s.name = "../etc".into()).contains("letters"));
+        assert!(with(&|s| s.name.clear()).contains("letters"));
+        assert!(with(&|s| s.columns.clear()).contains("at least one"));
+        assert!(with(&|s| s.columns[0].name = "event".into()).contains("two columns"));
+        assert!(with(&|s| s.columns[1].labels.push("trip".into())).contains("`trip` twice"));
+    }
+}

@@ -1,0 +1,7 @@
+//! What the crate promises about files, tested through its public face.
+
+mod damage;
+mod folder;
+mod readers;
+mod support;
+mod tables;

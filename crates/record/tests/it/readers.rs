@@ -1,0 +1,53 @@
+//! Other programs read what we write.
+
+use std::process::Command;
+
+use sidestep_kernel::ports::Recorder;
+
+use crate::support::{recorder, rows};
+
+/// Prints the table's types and what it holds, in a form that is easy to compare.
+const SCRIPT: &str = "
+import sys, pyarrow.parquet as pq
+t = pq.read_table(sys.argv[1])
+print(','.join(f'{f.name}:{f.type}' for f in t.schema))
+print(t.num_rows, sum(t['cycle'].to_pylist()), sum(t['robot'].to_pylist()),
+      sum(t['col'].to_pylist()), round(sum(t['x_m'].to_pylist()), 6))
+print(','.join(t['heading'].to_pylist()[:12:4]), t['heading'].to_pylist().count('south'))
+print(pq.read_metadata(sys.argv[1] + '/part-000000000000000.parquet').metadata[b'sidestep.seed'])
+";
+
+#[test]
+fn pyarrow_reads_a_folder_of_parts_as_one_table() {
+    let has_pyarrow = Command::new("python3").args(["-c", "import pyarrow.parquet"]).output();
+    if !has_pyarrow.is_ok_and(|o| o.status.success()) {
+        println!("skipped: python3 with pyarrow is not here");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let mut recorder = recorder(folder.path());
+    recorder.append(0, &rows(0, 500)).unwrap();
+    recorder.seal(500).unwrap();
+    recorder.append(0, &rows(500, 1000)).unwrap();
+    recorder.finish().unwrap();
+    let table = folder.path().join("trajectories");
+    let output = Command::new("python3").args(["-c", SCRIPT]).arg(&table).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stdout);
+    let error = String::from_utf8_lossy(&output.stderr);
+    let lines: Vec<_> = said.lines().collect();
+    let types = "cycle:uint64,robot:uint32,col:int32,x_m:double,heading:string";
+    assert_eq!(
+        lines,
+        [types, &sums(), "east,east,north 500", "b'18446744073709551615'"],
+        "{error}"
+    );
+}
+
+/// The second line of the script, from the rows themselves.
+fn sums() -> String {
+    let cycles: u64 = (0..1000).sum();
+    let cols: u64 = (0..1000).map(|c| c % 7).sum();
+    let cols = 2 * cols as i64 - 3 * 1000;
+    let x_m: f64 = (0..1000).map(|c| f64::from(c) * 0.2 - 1.0).sum();
+    format!("2000 {} 1000 {cols} {x_m:.1}", 2 * cycles)
+}

@@ -1,0 +1,71 @@
+//! A small world's table and its rows.
+
+use std::path::Path;
+
+use sidestep_kernel::ports::{ColumnSpec, ColumnType, TableSchema, Values};
+use sidestep_record::{NewRun, Origin, ParquetRecorder};
+
+/// A column without a meaning.
+pub(crate) fn column(name: &str, ty: ColumnType, labels: &[&str]) -> ColumnSpec {
+    let labels = labels.iter().map(ToString::to_string).collect();
+    ColumnSpec { name: name.into(), ty, meaning: format!("the {name}"), labels }
+}
+
+/// Where two robots are in every cycle.
+pub(crate) fn trajectories() -> TableSchema {
+    TableSchema {
+        name: "trajectories".into(),
+        columns: vec![
+            column("cycle", ColumnType::U64, &[]),
+            column("robot", ColumnType::U32, &[]),
+            column("col", ColumnType::I32, &[]),
+            column("x_m", ColumnType::F64, &[]),
+            column("heading", ColumnType::Label, &["east", "north", "west", "south"]),
+        ],
+    }
+}
+
+/// The rows of the cycles from `from` to before `to`, robot after robot.
+pub(crate) fn rows(from: u64, to: u64) -> Vec<Values> {
+    let rows = || (0..2).flat_map(move |robot| (from..to).map(move |cycle| (robot, cycle)));
+    vec![
+        Values::U64(rows().map(|(_, c)| c).collect()),
+        Values::U32(rows().map(|(r, _)| r).collect()),
+        Values::I32(rows().map(|(r, c)| (c % 7) as i32 - 3 * r as i32).collect()),
+        Values::F64(rows().map(|(r, c)| c as f64 * 0.1 - f64::from(r)).collect()),
+        Values::Label(rows().map(|(r, c)| ((c / 5) as u32 % 4) ^ r).collect()),
+    ]
+}
+
+/// `blocks` put behind each other.
+pub(crate) fn joined(blocks: &[Vec<Values>]) -> Vec<Values> {
+    let mut all: Vec<_> = blocks[0].iter().map(|v| Values::empty(v.ty())).collect();
+    for block in blocks {
+        all.iter_mut().zip(block).for_each(|(column, values)| column.append(values));
+    }
+    all
+}
+
+/// The origin of every run in these tests.
+pub(crate) fn origin() -> Origin {
+    Origin { program_version: "0.1.0".into(), scenario: "[world]\n".into(), seed: u64::MAX }
+}
+
+/// A run to make a folder for.
+pub(crate) fn new_run() -> NewRun {
+    NewRun { world: "robots".into(), origin: origin(), cycles_planned: 100 }
+}
+
+/// A recorder of [`trajectories`] in `folder`.
+pub(crate) fn recorder(folder: &Path) -> ParquetRecorder {
+    ParquetRecorder::create(folder, &[trajectories()], &origin()).unwrap()
+}
+
+/// The names in a folder, sorted.
+pub(crate) fn names(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).unwrap();
+    let mut names: Vec<_> =
+        entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}

@@ -1,0 +1,121 @@
+//! Bounded reading of files, plain or packed with gzip.
+
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Read};
+use std::path::Path;
+
+use flate2::bufread::MultiGzDecoder;
+use sidestep_kernel::InputError;
+
+const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
+
+/// The content of the file at `path`, unpacked where it is packed with gzip (told by its first
+/// bytes, not by its name).
+///
+/// # Errors
+/// When the file cannot be read or unpacked, or has more than `max_bytes` (unpacked).
+pub fn read_bytes(path: &Path, max_bytes: u64) -> Result<Vec<u8>, InputError> {
+    let bytes = try_read(path, max_bytes.saturating_add(1)).map_err(|e| unreadable(path, &e))?;
+    if bytes.len() as u64 > max_bytes {
+        let cause = format!("is larger than the {max_bytes} bytes allowed for such a file");
+        return Err(InputError::new(path.display(), cause, "check that this is the right file"));
+    }
+    Ok(bytes)
+}
+
+/// The content of a UTF-8 text file, as [`read_bytes`] reads it, without a byte order mark.
+///
+/// # Errors
+/// Those of [`read_bytes`], and bytes that are not UTF-8, with their line and column.
+pub fn read_text(path: &Path, max_bytes: u64) -> Result<String, InputError> {
+    let text = String::from_utf8(read_bytes(path, max_bytes)?).map_err(|error| {
+        let readable = String::from_utf8_lossy(error.as_bytes());
+        InputError::new(path.display(), "is not a text file (UTF-8)", "save the file as UTF-8")
+            .in_text(&readable, error.utf8_error().valid_up_to())
+    })?;
+    Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))
+}
+
+fn try_read(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
+    let mut file = BufReader::new(File::open(path)?);
+    let is_packed = file.fill_buf()?.starts_with(&GZIP_MAGIC);
+    let mut bytes = Vec::new();
+    if is_packed {
+        MultiGzDecoder::new(file).take(limit).read_to_end(&mut bytes)?;
+    } else {
+        file.take(limit).read_to_end(&mut bytes)?;
+    }
+    Ok(bytes)
+}
+
+fn unreadable(path: &Path, error: &io::Error) -> InputError {
+    let remedy = match error.kind() {
+        io::ErrorKind::NotFound => "check the path; relative ones start at the working directory",
+        io::ErrorKind::UnexpectedEof | io::ErrorKind::InvalidInput => {
+            "the gzip file is damaged or cut short: pack or fetch it again"
+        }
+        _ => "check that this is a file and that it may be read",
+    };
+    InputError::new(path.display(), format!("cannot be read: {error}"), remedy)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write;
+
+    use super::*;
+    use flate2::{Compression, write::GzEncoder};
+
+    fn gzip(bytes: &[u8]) -> Vec<u8> {
+        let mut encoder = GzEncoder::new(Vec::new(), Compression::default());
+        encoder.write_all(bytes).expect("memory takes all");
+        encoder.finish().expect("memory takes all")
+    }
+
+    fn file_with(bytes: &[u8]) -> tempfile::NamedTempFile {
+        let mut file = tempfile::NamedTempFile::new().expect("a temporary file");
+        file.write_all(bytes).expect("written");
+        file
+    }
+
+    #[test]
+    fn plain_and_packed_files_read_the_same() {
+        for bytes in [b"text".to_vec(), gzip(b"text")] {
+            let file = file_with(&bytes);
+            assert_eq!(read_text(file.path(), 4).as_deref(), Ok("text"));
+        }
+    }
+
+    #[test]
+    fn a_file_over_its_limit_is_refused_packed_or_not() {
+        for bytes in [vec![0; 5000], gzip(&vec![0; 5000])] {
+            let file = file_with(&bytes);
+            let error = read_bytes(file.path(), 4999).expect_err("too large");
+            assert!(error.cause().contains("4999 bytes"), "{error}");
+            assert_eq!(read_bytes(file.path(), 5000).map(|b| b.len()), Ok(5000));
+        }
+    }
+
+    #[test]
+    fn a_cut_gzip_file_a_missing_file_and_a_folder_are_errors() {
+        let packed = gzip(b"some text that is packed");
+        let file = file_with(&packed[..packed.len() - 6]);
+        let error = read_bytes(file.path(), 100).expect_err("cut");
+        assert!(error.remedy().contains("gzip"), "{error}");
+        assert!(read_bytes(Path::new("/no/such/file"), 100).is_err());
+        assert!(read_bytes(&std::env::temp_dir(), 100).is_err());
+    }
+
+    #[test]
+    fn text_that_is_not_utf8_is_pointed_at() {
+        let file = file_with(b"ok\nab\xff");
+        let error = read_text(file.path(), 100).expect_err("not UTF-8");
+        assert_eq!(error.position(), Some((2, 3)));
+    }
+
+    #[test]
+    fn a_byte_order_mark_is_no_part_of_the_text() {
+        let file = file_with("\u{feff}x".as_bytes());
+        assert_eq!(read_text(file.path(), 100).as_deref(), Ok("x"));
+    }
+}

@@ -1,0 +1,130 @@
+//! Which boxes can be reached from which: the 4-connected components of a map.
+
+use super::{Cell, GridMap, UnknownPolicy};
+
+/// The 4-connected components of a map's free boxes.
+///
+/// Components are numbered from 0 in the order of their first box, row by row from the bottom.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Components {
+    width: u32,
+    /// Per box, row by row from the bottom: its component, or `BLOCKED`.
+    label: Vec<u32>,
+    /// Boxes of each component.
+    sizes: Vec<usize>,
+}
+
+/// Label of a box that is not free.
+const BLOCKED: u32 = u32::MAX;
+/// Label of a free box that no component has claimed yet.
+const UNCLAIMED: u32 = u32::MAX - 1;
+
+impl Components {
+    /// The component of a box, or `None` where it is not free.
+    pub fn of(&self, col: u32, row: u32) -> Option<u32> {
+        let label = self.label[row as usize * self.width as usize + col as usize];
+        (label != BLOCKED).then_some(label)
+    }
+
+    /// Number of boxes of each component, by component.
+    pub fn sizes(&self) -> &[usize] {
+        &self.sizes
+    }
+
+    /// The component with the most boxes; of several, the first. `None` without a free box.
+    pub fn largest(&self) -> Option<u32> {
+        let most = self.sizes.iter().max()?;
+        self.sizes.iter().position(|size| size == most).and_then(|i| u32::try_from(i).ok())
+    }
+
+    /// Number of boxes of the largest component; 0 without a free box.
+    pub fn largest_size(&self) -> usize {
+        self.sizes.iter().copied().max().unwrap_or(0)
+    }
+
+    /// Claims for a new component all boxes that are connected to the box at `seed`.
+    fn claim(&mut self, seed: usize) {
+        let component = self.sizes.len() as u32;
+        let mut pending = vec![seed];
+        let mut size = 0;
+        self.label[seed] = component;
+        while let Some(at) = pending.pop() {
+            size += 1;
+            for next in neighbors(at, self.width as usize, self.label.len()).into_iter().flatten() {
+                if self.label[next] == UNCLAIMED {
+                    self.label[next] = component;
+                    pending.push(next);
+                }
+            }
+        }
+        self.sizes.push(size);
+    }
+}
+
+/// The boxes east, north, west and south of the box at index `at`, where the map has them.
+fn neighbors(at: usize, width: usize, boxes: usize) -> [Option<usize>; 4] {
+    let col = at % width;
+    [
+        (col + 1 < width).then(|| at + 1),
+        (at + width < boxes).then(|| at + width),
+        (col > 0).then(|| at - 1),
+        at.checked_sub(width),
+    ]
+}
+
+impl GridMap {
+    /// The 4-connected components of the free boxes; `unknown` says what unknown boxes are
+    /// ([`UnknownPolicy::Keep`] keeps them apart, hence not free).
+    pub fn components(&self, unknown: UnknownPolicy) -> Components {
+        let label = |&cell| match unknown.apply(cell) {
+            Cell::Free => UNCLAIMED,
+            Cell::Wall | Cell::Unknown => BLOCKED,
+        };
+        let label = self.cells().iter().map(label).collect();
+        let mut components = Components { width: self.width(), label, sizes: Vec::new() };
+        for seed in 0..components.label.len() {
+            if components.label[seed] == UNCLAIMED {
+                components.claim(seed);
+            }
+        }
+        components
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use Cell::{Free, Unknown, Wall};
+
+    #[test]
+    fn boxes_that_touch_at_a_corner_only_are_apart() {
+        let map = GridMap::new(2, 2, 1.0, vec![Free, Wall, Wall, Free]);
+        let components = map.components(UnknownPolicy::Wall);
+        assert_eq!(components.sizes(), [1, 1]);
+        assert_eq!(components.of(0, 0), Some(0));
+        assert_eq!(components.of(1, 1), Some(1));
+        assert_eq!(components.of(1, 0), None);
+    }
+
+    #[test]
+    fn unknown_boxes_join_only_where_they_are_free() {
+        let map = GridMap::new(3, 1, 1.0, vec![Free, Unknown, Free]);
+        assert_eq!(map.components(UnknownPolicy::Wall).sizes(), [1, 1]);
+        assert_eq!(map.components(UnknownPolicy::Keep).sizes(), [1, 1]);
+        assert_eq!(map.components(UnknownPolicy::Free).sizes(), [3]);
+    }
+
+    #[test]
+    fn the_east_edge_does_not_touch_the_west_edge_of_the_next_row() {
+        let map = GridMap::new(2, 2, 1.0, vec![Wall, Free, Free, Wall]);
+        assert_eq!(map.components(UnknownPolicy::Wall).sizes(), [1, 1]);
+    }
+
+    #[test]
+    fn the_largest_of_equals_is_the_first_and_none_without_free_boxes() {
+        let map = GridMap::new(5, 1, 1.0, vec![Free, Wall, Free, Wall, Free]);
+        assert_eq!(map.components(UnknownPolicy::Wall).largest(), Some(0));
+        let walls = GridMap::new(1, 1, 1.0, vec![Wall]).components(UnknownPolicy::Wall);
+        assert_eq!((walls.largest(), walls.largest_size()), (None, 0));
+    }
+}

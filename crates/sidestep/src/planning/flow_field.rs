@@ -1,0 +1,164 @@
+//! The way to the nearest goal from everywhere, in half a byte per box.
+
+use super::{Distances, FreeSpace, STEPS};
+
+/// For every box of a grid the first step of a shortest 4-connected way to the nearest goal.
+///
+/// Of several shortest ways it takes the one whose step has the lowest direction (0 east,
+/// 1 north, 2 west, 3 south), so it depends neither on the order of the goals nor on that of
+/// the search.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FlowField {
+    width: u32,
+    height: u32,
+    /// One code per box, row by row from the bottom; even boxes in the low half of a byte.
+    codes: Vec<u8>,
+}
+
+/// Code of a goal; the codes below are directions.
+const GOAL: u8 = 4;
+/// Code of a box without a way to a goal.
+const UNREACHED: u8 = 5;
+
+impl FlowField {
+    /// The field for a body of `size` x `size` boxes that has to fit into `free` on its way to
+    /// the nearest of `goals` (column, row); boxes and goals mean its lower-left box. Goals
+    /// where the body does not fit do not count.
+    ///
+    /// # Panics
+    /// When `size` is 0.
+    pub fn towards(free: &FreeSpace, size: u32, goals: &[(u32, u32)]) -> Self {
+        Self::descending(&Distances::to_nearest(free, size, goals))
+    }
+
+    /// The field that follows `distances` down.
+    pub fn descending(distances: &Distances) -> Self {
+        let (width, height) = (distances.width(), distances.height());
+        let boxes = distances.all().len();
+        let mut field = Self { width, height, codes: vec![0; boxes.div_ceil(2)] };
+        for row in 0..height {
+            for col in 0..width {
+                field.set(col, row, code(distances, col, row));
+            }
+        }
+        field
+    }
+
+    /// The direction of the next step: 0 east, 1 north, 2 west, 3 south. `None` at a goal, where
+    /// no way leads to one, and outside the grid.
+    pub fn direction(&self, col: u32, row: u32) -> Option<u8> {
+        self.code(col, row).filter(|&code| code < GOAL)
+    }
+
+    /// Whether the box is one of the goals.
+    pub fn is_goal(&self, col: u32, row: u32) -> bool {
+        self.code(col, row) == Some(GOAL)
+    }
+
+    /// Whether a way leads from the box to a goal; a goal reaches itself.
+    pub fn reaches_goal(&self, col: u32, row: u32) -> bool {
+        self.code(col, row).is_some_and(|code| code != UNREACHED)
+    }
+
+    /// Columns of the grid.
+    pub fn width(&self) -> u32 {
+        self.width
+    }
+
+    /// Rows of the grid.
+    pub fn height(&self) -> u32 {
+        self.height
+    }
+
+    fn code(&self, col: u32, row: u32) -> Option<u8> {
+        if col >= self.width || row >= self.height {
+            return None;
+        }
+        let index = self.index(col, row);
+        Some(self.codes[index / 2] >> (index % 2 * 4) & 0xf)
+    }
+
+    /// Writes the code of a box that still has code 0.
+    fn set(&mut self, col: u32, row: u32, code: u8) {
+        let index = self.index(col, row);
+        self.codes[index / 2] |= code << (index % 2 * 4);
+    }
+
+    fn index(&self, col: u32, row: u32) -> usize {
+        row as usize * self.width as usize + col as usize
+    }
+}
+
+fn code(distances: &Distances, col: u32, row: u32) -> u8 {
+    match distances.steps(col, row) {
+        None => UNREACHED,
+        Some(0) => GOAL,
+        Some(steps) => downhill(distances, (col, row), steps - 1),
+    }
+}
+
+/// The lowest direction to a neighbor that is `steps` away.
+fn downhill(distances: &Distances, (col, row): (u32, u32), steps: u32) -> u8 {
+    let leads_down = |&(east, north): &(i32, i32)| {
+        let (col, row) = (col.wrapping_add_signed(east), row.wrapping_add_signed(north));
+        distances.steps(col, row) == Some(steps)
+    };
+    let direction = STEPS.iter().position(leads_down);
+    direction.expect("a box that is n > 0 steps away has a neighbor that is n - 1 away") as u8
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn open(width: u32, height: u32) -> FreeSpace {
+        FreeSpace::new(width, height, |_, _| true)
+    }
+
+    #[test]
+    fn of_equal_ways_the_lowest_direction_is_taken() {
+        let field = FlowField::towards(&open(3, 3), 1, &[(1, 1)]);
+        let row = |row| [0, 1, 2].map(|col| field.direction(col, row));
+        assert_eq!(row(0), [Some(0), Some(1), Some(1)]);
+        assert_eq!(row(1), [Some(0), None, Some(2)]);
+        assert_eq!(row(2), [Some(0), Some(3), Some(2)]);
+    }
+
+    #[test]
+    fn goals_unreachable_boxes_and_the_outside_have_no_direction() {
+        let free = FreeSpace::new(4, 1, |col, _| col != 2);
+        let field = FlowField::towards(&free, 1, &[(1, 0), (2, 0)]);
+        assert!(field.is_goal(1, 0) && field.reaches_goal(1, 0) && field.reaches_goal(0, 0));
+        assert!(!field.is_goal(2, 0) && !field.reaches_goal(2, 0) && !field.reaches_goal(3, 0));
+        let directions = [0, 1, 2, 3, 4].map(|col| field.direction(col, 0));
+        assert_eq!(directions, [Some(0), None, None, None, None]);
+        assert_eq!(field.direction(0, 1), None);
+    }
+
+    proptest! {
+        #[test]
+        fn following_the_field_reaches_a_goal_in_as_many_steps_as_the_distance_says(
+            width in 1u32..15, height in 1u32..15, size in 1u32..3, walls in any::<[u128; 2]>(),
+            goals in proptest::collection::vec((0u32..15, 0u32..15), 0..4),
+        ) {
+            let is_wall = |col, row| walls.iter().all(|w| w.rotate_right(row * 15 + col) & 1 == 1);
+            let free = FreeSpace::new(width, height, |col, row| !is_wall(col, row));
+            let distances = Distances::to_nearest(&free, size, &goals);
+            let field = FlowField::towards(&free, size, &goals);
+            let anchors = free.anchors(size);
+            for (col, row) in (0..width).flat_map(|col| (0..height).map(move |row| (col, row))) {
+                let (mut at, mut steps) = ((col, row), 0);
+                while let Some(direction) = field.direction(at.0, at.1) {
+                    let (east, north) = STEPS[direction as usize];
+                    at = (at.0.wrapping_add_signed(east), at.1.wrapping_add_signed(north));
+                    steps += 1;
+                    prop_assert!(anchors.is_free(at.0, at.1));
+                }
+                prop_assert_eq!(field.is_goal(at.0, at.1), goals.contains(&at) && anchors.is_free(at.0, at.1));
+                let expected = distances.steps(col, row);
+                prop_assert_eq!(field.reaches_goal(col, row).then_some(steps), expected);
+            }
+        }
+    }
+}

@@ -1,0 +1,3 @@
+//! The worlds. They stand side by side on the kernel and never import each other.
+
+pub mod robots;

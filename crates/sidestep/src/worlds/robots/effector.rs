@@ -1,0 +1,249 @@
+//! Effectors that slip: the transitions an action may end in, and what obstacles make of them.
+//!
+//! Source: the paper's action modeling (a set of transitions with probabilities per agent
+//! type and action, learned in a free place) and its adaptation to a place with obstacles.
+
+use serde::{Deserialize, Serialize};
+use sidestep_kernel::distr::{Categorical, RowError};
+
+/// An action of a body, an index into its effector's actions.
+pub type ActionId = u8;
+/// Go one box ahead.
+pub const FORWARD: ActionId = 0;
+/// Turn 90 degrees to the left.
+pub const LEFT: ActionId = 1;
+/// Turn 90 degrees to the right.
+pub const RIGHT: ActionId = 2;
+/// Do nothing.
+pub const STAY: ActionId = 3;
+/// The actions every effector has, in the order of their ids.
+pub const STANDARD_ACTIONS: [&str; 4] = ["forward", "left", "right", "stay"];
+
+/// A direction relative to a body: where a step goes, or which side is touched.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Side {
+    /// Ahead.
+    Front,
+    /// To the left.
+    Left,
+    /// Behind.
+    Back,
+    /// To the right.
+    Right,
+}
+
+impl Side {
+    /// All sides in the order of their numbers.
+    pub const ALL: [Self; 4] = [Self::Front, Self::Left, Self::Back, Self::Right];
+
+    /// The side for a letter of a path: `F`, `L`, `B` or `R`.
+    pub fn from_letter(letter: char) -> Option<Self> {
+        match letter {
+            'F' => Some(Self::Front),
+            'L' => Some(Self::Left),
+            'B' => Some(Self::Back),
+            'R' => Some(Self::Right),
+            _ => None,
+        }
+    }
+
+    /// Its name in files.
+    pub fn name(self) -> &'static str {
+        ["front", "left", "back", "right"][self as usize]
+    }
+}
+
+/// One way an action may end, in free space.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Transition {
+    /// Probability.
+    pub p: f64,
+    /// Unit steps in the frame of the heading before the turn.
+    pub path: Vec<Side>,
+    /// Quarter turns to the left, 0 to 3, made after the path.
+    pub turn: u8,
+}
+
+/// An effector type as data: per action its transitions, the intended one first.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EffectorModel {
+    /// Name in the scenario.
+    pub name: String,
+    /// Names of the actions; the first four are [`STANDARD_ACTIONS`].
+    pub actions: Vec<String>,
+    /// Transitions per action.
+    pub transitions: Vec<Vec<Transition>>,
+}
+
+impl EffectorModel {
+    /// Does what it is told: one box ahead, quarter turns, nothing.
+    pub fn perfect() -> Self {
+        let only = |path: Vec<Side>, turn| vec![Transition { p: 1.0, path, turn }];
+        Self {
+            name: "perfect".into(),
+            actions: STANDARD_ACTIONS.map(String::from).to_vec(),
+            transitions: vec![
+                only(vec![Side::Front], 0),
+                only(vec![], 1),
+                only(vec![], 3),
+                only(vec![], 0),
+            ],
+        }
+    }
+
+    /// The transitions of an action; only the intended one where `reliable`.
+    pub fn transitions_of(&self, action: ActionId, reliable: bool) -> Vec<Transition> {
+        let all = &self.transitions[usize::from(action)];
+        if reliable { vec![Transition { p: 1.0, ..all[0].clone() }] } else { all.clone() }
+    }
+}
+
+/// What becomes of a transition whose path meets something: the obstacle rule.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ObstacleRule {
+    /// The path is cut at the first box that is not free.
+    #[default]
+    Cut,
+    /// The whole transition becomes a contact in place.
+    Stay,
+    /// Blocked transitions are struck out and the rest rescaled (the paper's "inhibited");
+    /// when nothing is left, the body stays with a contact.
+    Renormalise,
+}
+
+impl ObstacleRule {
+    /// All laws.
+    pub const ALL: [Self; 3] = [Self::Cut, Self::Stay, Self::Renormalise];
+
+    /// Its name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Cut => "cut",
+            Self::Stay => "stay",
+            Self::Renormalise => "renormalise",
+        }
+    }
+}
+
+/// A unit step of a body of given size at a given heading, as box offsets from the anchor
+/// that the body had before the whole transition.
+#[derive(Debug, Clone)]
+pub struct Step {
+    /// Boxes that the body enters (index offsets).
+    pub enter: Box<[i32]>,
+    /// Boxes that it leaves.
+    pub leave: Box<[i32]>,
+    /// Move of the anchor, columns and rows.
+    pub delta: (i32, i32),
+    /// Side of the body that moves first.
+    pub side: Side,
+}
+
+/// A transition at a heading, ready to walk.
+#[derive(Debug, Clone)]
+pub struct Walk {
+    /// Its steps.
+    pub steps: Vec<Step>,
+    /// Quarter turns to the left.
+    pub turn: u8,
+}
+
+/// The boxes an action may sweep, as a tree of steps: what lies behind a wall is not claimed.
+#[derive(Debug, Clone)]
+pub struct SweepNode {
+    /// Boxes entered by this step.
+    pub enter: Box<[i32]>,
+    /// How many nodes to skip when a wall blocks this step: its whole subtree.
+    pub skip: u32,
+}
+
+/// An action of a body type at a heading.
+#[derive(Debug, Clone)]
+pub struct Action {
+    /// Probability of each walk.
+    pub distribution: Categorical,
+    /// Probabilities as given, for exact computations and for rescaling.
+    pub probabilities: Vec<f64>,
+    /// What the outcomes do.
+    pub walks: Vec<Walk>,
+    /// Everything that may be swept, depth first.
+    pub sweep: Vec<SweepNode>,
+}
+
+/// Unit vectors of the headings east, north, west, south.
+pub const HEADINGS: [(i32, i32); 4] = [(1, 0), (0, 1), (-1, 0), (0, -1)];
+
+impl Action {
+    /// Prepares an action of a `width` x `height` body for grid rows of `stride` boxes.
+    ///
+    /// # Errors
+    /// When the probabilities are no distribution; scenarios check that earlier.
+    pub fn new(
+        transitions: &[Transition],
+        heading: u8,
+        body: (u32, u32),
+        stride: u32,
+    ) -> Result<Self, RowError> {
+        let probabilities: Vec<f64> = transitions.iter().map(|t| t.p).collect();
+        let walks: Vec<Walk> = transitions
+            .iter()
+            .map(|t| Walk { steps: steps(&t.path, heading, body, stride), turn: t.turn })
+            .collect();
+        let possible: Vec<(&[Side], &[Step])> = transitions
+            .iter()
+            .zip(&walks)
+            .filter(|(t, _)| t.p > 0.0)
+            .map(|(t, w)| (&t.path[..], &w.steps[..]))
+            .collect();
+        let mut sweep = Vec::new();
+        push_sweep(&possible, 0, &mut sweep);
+        Ok(Self { distribution: Categorical::new(&probabilities)?, probabilities, walks, sweep })
+    }
+}
+
+/// Appends the tree of the paths' steps from `depth` on: paths that start alike share nodes.
+fn push_sweep(paths: &[(&[Side], &[Step])], depth: usize, sweep: &mut Vec<SweepNode>) {
+    for side in Side::ALL {
+        let along: Vec<_> =
+            paths.iter().copied().filter(|(path, _)| path.get(depth) == Some(&side)).collect();
+        let Some((_, steps)) = along.first() else { continue };
+        let node = sweep.len();
+        sweep.push(SweepNode { enter: steps[depth].enter.clone(), skip: 0 });
+        push_sweep(&along, depth + 1, sweep);
+        sweep[node].skip = (sweep.len() - node) as u32;
+    }
+}
+
+fn steps(path: &[Side], heading: u8, body: (u32, u32), stride: u32) -> Vec<Step> {
+    let mut at = (0, 0);
+    path.iter()
+        .map(|&side| {
+            let (ux, uy) = HEADINGS[usize::from((heading + side as u8) % 4)];
+            let index = |(x, y): (i32, i32)| (at.1 + y) * stride as i32 + at.0 + x;
+            let enter = edge(body, (ux, uy), true).into_iter().map(index).collect();
+            let leave = edge(body, (ux, uy), false).into_iter().map(index).collect();
+            at = (at.0 + ux, at.1 + uy);
+            Step { enter, leave, delta: (ux, uy), side }
+        })
+        .collect()
+}
+
+/// The row of boxes just outside a body in direction `u` (`ahead`), or its hindmost own row,
+/// from the left to the right as seen along `u`.
+fn edge(body: (u32, u32), (ux, uy): (i32, i32), ahead: bool) -> Vec<(i32, i32)> {
+    let (w, h) = (body.0 as i32, body.1 as i32);
+    let across = if ux != 0 { h } else { w };
+    (0..across)
+        .map(|k| {
+            let leftmost_first = across - 1 - k;
+            match (ux, uy) {
+                (1, _) => (if ahead { w } else { 0 }, leftmost_first),
+                (-1, _) => (if ahead { -1 } else { w - 1 }, k),
+                (_, 1) => (k, if ahead { h } else { 0 }),
+                _ => (leftmost_first, if ahead { -1 } else { h - 1 }),
+            }
+        })
+        .collect()
+}

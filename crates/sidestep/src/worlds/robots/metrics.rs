@@ -1,0 +1,96 @@
+//! What a run reports: per robot and in all.
+
+use super::state::RobotsState;
+use super::world::{RobotsWorld, Role};
+use crate::map::Cell;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// Counters of one robot, or their sums over all robots.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Counts {
+    /// Actions begun.
+    pub actions: u64,
+    /// Contacts in all.
+    pub contacts: u64,
+    /// Contacts by the kind touched (kinds that were touched at all).
+    pub contacts_by_kind: BTreeMap<String, u64>,
+    /// Way made, in metres.
+    pub distance_m: f64,
+    /// Trips completed.
+    pub trips: u64,
+    /// Mean cycles per completed trip; absent without trips.
+    pub trip_cycles_mean: Option<f64>,
+    /// Boxes that no robot had covered before.
+    pub first_visits: u64,
+}
+
+/// Metrics of a run so far.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Metrics {
+    /// Sums over all robots.
+    #[serde(flatten)]
+    pub total: Counts,
+    /// Share of the free boxes that some robot has covered.
+    pub coverage: f64,
+    /// Share of actions that ended in a contact.
+    pub contacts_per_action: f64,
+    /// How many conflict groups had 1, 2-3, 4-7, ... bodies, over all cycles of this process.
+    pub group_sizes: Vec<u64>,
+    /// The largest conflict group of this process's run.
+    pub largest_group: u64,
+}
+
+impl RobotsWorld {
+    /// Counters of the robot in a slot.
+    pub fn counts(&self, state: &RobotsState, slot: u32) -> Counts {
+        let (i, kinds, t) = (slot as usize, self.kinds.len(), &state.tally);
+        let by_kind = (0..kinds).map(|k| u64::from(t.contacts.get(i * kinds + k)));
+        let named = self.kinds.iter().cloned().zip(by_kind.clone());
+        let trips = u64::from(t.trips.get(i));
+        Counts {
+            actions: u64::from(t.actions.get(i)),
+            contacts: by_kind.sum(),
+            contacts_by_kind: named.filter(|(_, n)| *n > 0).collect(),
+            distance_m: f64::from(t.moves.get(i)) * self.map.box_size_m,
+            trips,
+            trip_cycles_mean: (trips > 0).then(|| t.trip_cycles.get(i) as f64 / trips as f64),
+            first_visits: u64::from(t.first_visits.get(i)),
+        }
+    }
+
+    /// Counters of all robots together.
+    pub fn totals(&self, state: &RobotsState) -> Counts {
+        let mut total = Counts::default();
+        let mut trip_cycles = 0;
+        for &slot in &self.robot_slots {
+            debug_assert!(matches!(self.body_type(slot).role, Role::Robot(_)));
+            let one = self.counts(state, slot);
+            trip_cycles += state.tally.trip_cycles.get(slot as usize);
+            total.actions += one.actions;
+            total.contacts += one.contacts;
+            total.distance_m += one.distance_m;
+            total.trips += one.trips;
+            total.first_visits += one.first_visits;
+            for (kind, n) in one.contacts_by_kind {
+                *total.contacts_by_kind.entry(kind).or_default() += n;
+            }
+        }
+        total.trip_cycles_mean = (total.trips > 0).then(|| trip_cycles as f64 / total.trips as f64);
+        total
+    }
+
+    /// Metrics of a run, with the group sizes its workers have seen.
+    pub fn metrics(&self, state: &RobotsState, group_sizes: &[u64], largest_group: u64) -> Metrics {
+        let total = self.totals(state);
+        let free = self.map.count(Cell::Free).max(1);
+        let used = group_sizes.iter().rposition(|&n| n > 0).map_or(0, |k| k + 1);
+        Metrics {
+            coverage: total.first_visits as f64 / free as f64,
+            contacts_per_action: total.contacts as f64 / total.actions.max(1) as f64,
+            group_sizes: group_sizes[..used].to_vec(),
+            largest_group,
+            total,
+        }
+    }
+}

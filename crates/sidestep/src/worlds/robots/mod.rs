@@ -1,0 +1,155 @@
+//! Stochastic situated agents on a grid: robots whose sensors lie and whose wheels slip.
+//!
+//! See `README.md` beside this file for the model, and the paper "A parallel simulation of
+//! stochastic agent/environment interaction" (2001) for its source.
+//!
+//! ```text
+//! scenario.rs -> world.rs (immutable), state.rs (columns)
+//! perceive.rs + decide.rs  ->  resolve.rs  ->  react.rs        one cycle
+//! sensor.rs, ray.rs, effector.rs: the tables behind it         metrics.rs: what came of it
+//! ```
+
+pub mod decide;
+pub mod effector;
+pub mod metrics;
+mod perceive;
+pub mod ray;
+mod react;
+pub mod resolve;
+pub mod scenario;
+pub mod sensor;
+pub mod simulation;
+pub mod state;
+pub mod world;
+
+use effector::Side;
+use sensor::Reading;
+use sidestep_kernel::conflict::Groups;
+use sidestep_kernel::{Cycle, EntityId, Slot, World};
+use state::RobotsState;
+use std::ops::Range;
+pub use world::RobotsWorld;
+
+/// Something that happened to a body.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Event {
+    /// When.
+    pub cycle: Cycle,
+    /// To whom.
+    pub body: EntityId,
+    /// What.
+    pub event: EventKind,
+}
+
+/// What can happen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum EventKind {
+    /// A robot's action met something.
+    Contact {
+        /// Kind of the thing.
+        kind: u8,
+        /// Side of the robot.
+        side: Side,
+    },
+    /// A door has opened.
+    Opened,
+    /// A door has closed.
+    Closed,
+}
+
+/// One beam's truth and report, kept where a log for learning is wanted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SensorSample {
+    /// When.
+    pub cycle: Cycle,
+    /// Whose.
+    pub robot: EntityId,
+    /// Which of its sensors.
+    pub sensor: u16,
+    /// What the beam met.
+    pub truth: Reading,
+    /// What it reported.
+    pub reported: Reading,
+}
+
+/// What one action came to, kept where a log for learning is wanted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct MotionSample {
+    /// When.
+    pub cycle: Cycle,
+    /// Whose.
+    pub robot: EntityId,
+    /// Which action.
+    pub action: u8,
+    /// Boxes moved ahead.
+    pub ahead: i32,
+    /// Boxes moved to the left.
+    pub left: i32,
+    /// Quarter turns to the left that the transition makes.
+    pub quarter_turns: u8,
+    /// Whether an obstacle cut it.
+    pub contact: bool,
+}
+
+/// What a worker keeps between tasks.
+#[derive(Debug, Default)]
+pub struct Scratch {
+    readings: Vec<Reading>,
+    heard: Vec<decide::Heard>,
+    keys: Vec<((u8, u32, u32), Slot)>,
+    keep_events: bool,
+    keep_samples: bool,
+    events: Vec<Event>,
+    sensor_samples: Vec<SensorSample>,
+    motion_samples: Vec<MotionSample>,
+}
+
+impl World for RobotsWorld {
+    type State = RobotsState;
+    type Scratch = Scratch;
+
+    fn scratch(&self) -> Scratch {
+        Scratch::default()
+    }
+
+    fn bodies(&self, _: &RobotsState) -> usize {
+        self.bodies.len()
+    }
+
+    #[inline]
+    fn perceive_and_decide(
+        &self,
+        state: &RobotsState,
+        now: Cycle,
+        bodies: Range<usize>,
+        scratch: &mut Scratch,
+    ) {
+        for slot in bodies {
+            self.perceive_one(state, now, slot as Slot, scratch);
+        }
+    }
+
+    #[inline]
+    fn find_conflicts(
+        &self,
+        state: &RobotsState,
+        _: Cycle,
+        bodies: Range<usize>,
+        groups: &Groups,
+        _: &mut Scratch,
+    ) {
+        for slot in bodies {
+            self.join_one(state, slot as Slot, groups);
+        }
+    }
+
+    #[inline]
+    fn react(&self, state: &RobotsState, now: Cycle, group: &mut [Slot], scratch: &mut Scratch) {
+        if group.len() > 1 {
+            self.order(state, now, group, scratch);
+        }
+        for &slot in &*group {
+            self.act(state, now, slot, scratch);
+        }
+    }
+}

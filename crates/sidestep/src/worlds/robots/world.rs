@@ -1,0 +1,348 @@
+//! A compiled building: everything that never changes during a run.
+
+use super::decide::{Behaviour, Sector};
+use super::effector::{Action, ObstacleRule};
+use super::ray::{crossings, turn_crossing};
+use super::resolve::ConflictPolicy;
+use super::sensor::{Reading, ReadingTable, SensorModel};
+use crate::map::GridMap;
+use serde::{Deserialize, Serialize};
+use sidestep_kernel::Cycle;
+use sidestep_kernel::distr::{Chance, RowError};
+use sidestep_kernel::space::Position;
+use sidestep_kernel::stream::Streams;
+use sidestep_kernel::{EntityId, Slot};
+use std::sync::Arc;
+
+/// What random draws of this world are for.
+pub mod purpose {
+    use sidestep_kernel::stream::Purpose;
+
+    /// Where bodies without a given place begin.
+    pub const PLACE: Purpose = Purpose(1);
+    /// Phases of periods.
+    pub const PHASE: Purpose = Purpose(2);
+    /// A behaviour's own stream.
+    pub const DECIDE: Purpose = Purpose(3);
+    /// Which transition an action ends in.
+    pub const EFFECT: Purpose = Purpose(4);
+    /// Priority in a conflict group.
+    pub const PRIORITY: Purpose = Purpose(5);
+    /// Random doors.
+    pub const DOOR: Purpose = Purpose(6);
+    /// Directions of people.
+    pub const MOVE: Purpose = Purpose(7);
+    /// Lost receptions.
+    pub const RADIO: Purpose = Purpose(8);
+    /// Readings of the sensor with this number on its robot.
+    pub const fn sense(sensor: usize) -> Purpose {
+        Purpose(16 + sensor as u16)
+    }
+}
+
+/// Rings of wall around the map: beams are read four boxes at a time and may look past the
+/// first wall.
+pub(super) const BORDER: u32 = 4;
+
+/// Which errors are switched on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Regime {
+    /// Neither sensors nor effectors err.
+    Reliable,
+    /// Effectors err.
+    Effectors,
+    /// Sensors err.
+    Sensors,
+    /// Both err.
+    #[default]
+    Both,
+}
+
+impl Regime {
+    /// The paper's four cases.
+    pub const ALL: [Self; 4] = [Self::Reliable, Self::Effectors, Self::Sensors, Self::Both];
+
+    /// Its name in files.
+    pub fn name(self) -> &'static str {
+        ["reliable", "effectors", "sensors", "both"][self as usize]
+    }
+
+    /// Whether sensors are reliable.
+    pub fn reliable_sensors(self) -> bool {
+        matches!(self, Self::Reliable | Self::Effectors)
+    }
+
+    /// Whether effectors are reliable.
+    pub fn reliable_effectors(self) -> bool {
+        matches!(self, Self::Reliable | Self::Sensors)
+    }
+}
+
+/// The immutable world that runs share.
+#[derive(Debug)]
+pub struct RobotsWorld {
+    /// The map without bodies.
+    pub map: Arc<GridMap>,
+    /// Names of the kinds by number: 0 `free`, 1 `wall`, then bodies' kinds.
+    pub kinds: Vec<String>,
+    /// Which errors are on.
+    pub regime: Regime,
+    /// The law for blocked paths.
+    pub obstacle_rule: ObstacleRule,
+    /// The order in conflict groups.
+    pub policy: ConflictPolicy,
+    /// All bodies by slot.
+    pub bodies: Vec<Body>,
+    /// What bodies have in common.
+    pub types: Vec<BodyType>,
+    pub(super) kind_rank: Vec<u8>,
+    pub(super) radio: Option<Radio>,
+    pub(super) robot_slots: Vec<Slot>,
+    pub(super) slot_of_id: Vec<Slot>,
+    pub(super) streams: Streams,
+    /// Width and height of the padded grid.
+    pub(super) stride: u32,
+    pub(super) rows: u32,
+    /// The padded grid without bodies.
+    pub(super) walls: Vec<u8>,
+    /// Reach and extent of the farthest claims, see `ClaimGrid::new`.
+    pub(super) extent: (u32, u32),
+}
+
+/// One body: who it is and when it acts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Body {
+    /// Identity, constant whatever the storage order.
+    pub id: EntityId,
+    /// Index into the types.
+    pub ty: u16,
+    /// Acts every `period` cycles,
+    pub period: u32,
+    /// in those where `(cycle + phase) % period` is 0.
+    pub phase: u32,
+}
+
+impl Body {
+    /// Whether the body acts in this cycle.
+    #[inline]
+    pub fn is_due(&self, now: Cycle) -> bool {
+        self.period == 1 || (now + u64::from(self.phase)).is_multiple_of(u64::from(self.period))
+    }
+}
+
+/// What bodies of one type share.
+#[derive(Debug, Clone)]
+pub struct BodyType {
+    /// Number of its kind.
+    pub kind: u8,
+    /// Width and height in boxes.
+    pub size: (u32, u32),
+    /// Offsets of the boxes it covers from its anchor, in the padded grid.
+    pub own: Box<[i32]>,
+    /// `VISITED` for robots: they mark the boxes they cover.
+    pub marks: u8,
+    /// What it does.
+    pub role: Role,
+}
+
+/// The three sorts of bodies.
+#[derive(Debug, Clone)]
+pub enum Role {
+    /// An agent.
+    Robot(RobotModel),
+    /// A mobile object.
+    Mover(Mover),
+    /// A door.
+    Door(Door),
+}
+
+/// A robot type: its body and its mind.
+#[derive(Debug, Clone)]
+pub struct RobotModel {
+    /// Sensors and effectors, shared by types that differ in behaviour only.
+    pub body: Arc<RobotBody>,
+    /// How it decides.
+    pub behaviour: Arc<dyn Behaviour>,
+}
+
+/// Sensors and effectors of a robot type.
+#[derive(Debug)]
+pub struct RobotBody {
+    /// Sensors in order.
+    pub sensors: Vec<MountedSensor>,
+    /// Sector of each beam of all sensors in order.
+    pub sectors: Vec<Sector>,
+    /// `actions[heading][action]`.
+    pub actions: [Vec<Action>; 4],
+    /// Names of the actions.
+    pub action_names: Vec<String>,
+}
+
+/// A sensor on a body of a given size.
+#[derive(Debug)]
+pub struct MountedSensor {
+    /// The sensor as data.
+    pub model: SensorModel,
+    pub(super) table: ReadingTable,
+    pub(super) rays: [Rays; 4],
+    /// Distance class of each crossing, for all headings alike.
+    pub(super) classes: Box<[u8]>,
+    pub(super) nothing: Reading,
+}
+
+/// The boxes of all beams at one heading.
+#[derive(Debug)]
+pub(super) struct Rays {
+    /// Index offsets from the anchor, beam after beam.
+    pub(super) offsets: Box<[i32]>,
+    /// Where each beam's boxes end.
+    pub(super) ends: Box<[u16]>,
+}
+
+impl MountedSensor {
+    /// Mounts a sensor on a `size` x `size` body.
+    ///
+    /// # Errors
+    /// When a row of its matrices is no distribution.
+    pub fn new(
+        model: SensorModel,
+        size: u32,
+        box_size_m: f64,
+        stride: u32,
+        reliable: bool,
+    ) -> Result<Self, RowError> {
+        let range = model.range_m / box_size_m;
+        let beams: Vec<_> =
+            model.bearings_deg.iter().map(|&deg| crossings(size, deg, range)).collect();
+        let rays = std::array::from_fn(|heading| {
+            let mut ends = Vec::new();
+            let mut offsets = Vec::new();
+            for beam in &beams {
+                offsets.extend(beam.iter().map(|&c| {
+                    let turned = turn_crossing(c, size, heading as u8);
+                    turned.dy * stride as i32 + turned.dx
+                }));
+                ends.push(offsets.len() as u16);
+            }
+            Rays { offsets: offsets.into(), ends: ends.into() }
+        });
+        let classes =
+            beams.iter().flatten().map(|c| model.class_of(c.distance * box_size_m)).collect();
+        let (table, nothing) = (ReadingTable::new(&model, reliable)?, model.nothing());
+        Ok(Self { model, table, rays, classes, nothing })
+    }
+
+    /// The true reading of a beam that meets `kind` at distance class `class`. What the
+    /// sensor cannot observe at all reads as nothing.
+    #[inline]
+    pub fn truth(&self, kind: u8, class: u8) -> Reading {
+        match self.model.designates[usize::from(kind)] {
+            0 => self.nothing,
+            observation => Reading { observation, class },
+        }
+    }
+}
+
+/// A mobile object: tries one box per action.
+#[derive(Debug, Clone)]
+pub struct Mover {
+    /// Chance to go on in the same direction; otherwise a new one is drawn.
+    pub straight: Chance,
+    /// The step in each direction.
+    pub steps: [Action; 4],
+}
+
+/// A door's will.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Door {
+    /// Open for `open` cycles, closed for `closed`, shifted by `phase`.
+    Periodic {
+        /// Cycles open.
+        open: u64,
+        /// Cycles closed.
+        closed: u64,
+        /// Cycles by which the schedule is ahead.
+        phase: u64,
+    },
+    /// Opens or closes by chance.
+    Random {
+        /// Chance per cycle to open when closed.
+        open: Chance,
+        /// Chance per cycle to close when open.
+        close: Chance,
+    },
+}
+
+impl Door {
+    /// Whether the door wants to be open now.
+    pub fn wants_open(&self, is_open: bool, now: Cycle, draw: impl FnOnce() -> u32) -> bool {
+        match *self {
+            Self::Periodic { open, closed, phase } => (now + phase) % (open + closed) < open,
+            Self::Random { open, close } => {
+                let toggles = if is_open { close.happens(draw()) } else { open.happens(draw()) };
+                is_open != toggles
+            }
+        }
+    }
+}
+
+/// Robots that hear each other.
+#[derive(Debug, Clone, Copy)]
+pub struct Radio {
+    /// Square of the range, in half boxes.
+    pub(super) reach2_half_boxes: u64,
+    /// Chance that a reception is lost.
+    pub(super) loss: Chance,
+}
+
+impl Radio {
+    /// Radio with this range and this chance of losing a reception.
+    pub fn new(range_m: f64, box_size_m: f64, loss: f64) -> Self {
+        let reach = 2.0 * range_m / box_size_m;
+        Self { reach2_half_boxes: (reach * reach) as u64, loss: Chance::new(loss) }
+    }
+}
+
+impl RobotsWorld {
+    /// The type of the body in a slot.
+    #[inline]
+    pub fn body_type(&self, slot: Slot) -> &BodyType {
+        &self.types[usize::from(self.bodies[slot as usize].ty)]
+    }
+
+    /// Slots of the robots.
+    pub fn robots(&self) -> &[Slot] {
+        &self.robot_slots
+    }
+
+    /// Slot of an entity.
+    pub fn slot(&self, id: EntityId) -> Slot {
+        self.slot_of_id[id as usize]
+    }
+
+    /// Map column and row of a position in the padded grid.
+    #[inline]
+    pub(super) fn map_position(&self, at: Position) -> (u32, u32) {
+        (at.col() - BORDER, at.row() - BORDER)
+    }
+
+    /// Position in the padded grid of a map column and row.
+    pub(super) fn grid_position(&self, (col, row): (u32, u32)) -> Position {
+        Position::new(col + BORDER, row + BORDER)
+    }
+
+    /// Number of boxes of the map.
+    pub(super) fn map_boxes(&self) -> usize {
+        self.map.cells().len()
+    }
+
+    /// Indices in the padded grid of the map's boxes, row by row.
+    pub(super) fn map_indices(&self) -> impl Iterator<Item = usize> + '_ {
+        let (width, height) = (self.map.width(), self.map.height());
+        (0..height).flat_map(move |row| {
+            let first = ((row + BORDER) * self.stride + BORDER) as usize;
+            first..first + width as usize
+        })
+    }
+}
