@@ -14,8 +14,11 @@ pub mod sensor;
 mod counts;
 mod display;
 pub mod holdout;
+pub mod profile;
 mod track;
 
+#[cfg(test)]
+mod closed_loop;
 #[cfg(test)]
 mod oracle;
 

@@ -14,8 +14,8 @@ use crate::learn::{Counts, EstimateOptions};
 
 /// What a robot can be told to do.
 const ACTIONS: [&str; 4] = ["forward", "left", "right", "stay"];
-/// A longer displacement is no single action.
-const BOXES_MAX: f64 = 16.0;
+/// A longer displacement is no single action; two such make the longest path of a profile.
+const BOXES_MAX: f64 = 8.0;
 /// A wider turn is none either.
 const TURN_MAX_DEG: f64 = 360.0;
 
@@ -34,8 +34,13 @@ struct Displacement {
 }
 
 impl Displacement {
+    /// Where it ends; turns that end alike, such as 270 and -90 degrees, are one outcome.
     fn outcomes(&self) -> Vec<(Outcome, f64)> {
-        outcomes(self.ahead_boxes, self.left_boxes, self.turn_deg / 90.0)
+        let mut ends = outcomes(self.ahead_boxes, self.left_boxes, self.turn_deg / 90.0);
+        for (outcome, _) in &mut ends {
+            outcome.quarters = (outcome.quarters + 1).rem_euclid(4) - 1;
+        }
+        ends
     }
 
     fn as_move(&self) -> Move {
@@ -61,10 +66,17 @@ pub(super) fn learn(
     table: &CsvTable,
     options: &EstimateOptions,
 ) -> Result<EffectorModel, InputError> {
-    let all = parse(table)?;
+    let (free, n_cut) = parse(table)?;
     let by_action: Vec<ActionLog> =
-        (0..ACTIONS.len()).map(|action| ActionLog::of(&all, action)).collect();
-    let report = report(table.place(), &by_action, options);
+        (0..ACTIONS.len()).map(|action| ActionLog::of(&free, action)).collect();
+    let mut report = report(table.place(), &by_action, options);
+    if n_cut > 0 {
+        report.rejected.insert("contact".to_string(), n_cut);
+        report.warnings.push(format!(
+            "{n_cut} actions met an obstacle and were left out: near obstacles the outcomes that \
+             lead into them are seen too rarely, so learn in the open"
+        ));
+    }
     Ok(EffectorModel { report, profile: profile(&by_action, options) })
 }
 
@@ -154,47 +166,80 @@ fn by_name(table: &Counts) -> (String, BTreeMap<String, f64>) {
 
 fn profile(logs: &[ActionLog], options: &EstimateOptions) -> EffectorProfile {
     let mut assumed = Vec::new();
-    let mut transitions = |log: &ActionLog| log.transitions(options.alpha, &mut assumed);
-    EffectorProfile {
-        box_m: None,
-        forward: transitions(&logs[0]),
-        left: transitions(&logs[1]),
-        right: transitions(&logs[2]),
-        assumed,
-        rule: RULE.to_string(),
-    }
+    let learned = |log: &&ActionLog| log.action != "stay" || !log.events.is_empty();
+    let actions = logs
+        .iter()
+        .filter(learned)
+        .map(|log| (log.action.to_string(), log.transitions(options.alpha, &mut assumed)));
+    EffectorProfile { box_m: None, actions: actions.collect(), assumed, rule: RULE.to_string() }
 }
 
-fn parse(table: &CsvTable) -> Result<Vec<Displacement>, InputError> {
-    let names = ["action", "ahead_boxes", "left_boxes", "turn_deg"];
-    let mut columns = [0; 4];
-    for (column, name) in columns.iter_mut().zip(names) {
-        *column = table.column(name)?;
-    }
+/// The rows without contact, and the number of those with.
+fn parse(table: &CsvTable) -> Result<(Vec<Displacement>, u64), InputError> {
     let place = table.place();
-    let rows: Vec<Displacement> =
-        table.rows().map(|row| parse_row(place, row, columns)).collect::<Result<_, _>>()?;
-    if rows.is_empty() {
-        return Err(InputError::new(place, "the file has no displacements", "write one a row"));
+    let columns = Columns::find(table)?;
+    let (mut free, mut n_cut) = (Vec::new(), 0);
+    for row in table.rows() {
+        let displacement = columns.displacement(place, row)?;
+        if columns.met_obstacle(place, row)? {
+            n_cut += 1;
+        } else {
+            free.push(displacement);
+        }
     }
-    Ok(rows)
+    if free.is_empty() {
+        let cause = "the file has no displacements without contact";
+        return Err(InputError::new(place, cause, "write one a row"));
+    }
+    Ok((free, n_cut))
 }
 
-fn parse_row(
-    place: &str,
-    row: CsvRow<'_>,
-    columns: [usize; 4],
-) -> Result<Displacement, InputError> {
-    let [action, ahead, left, turn] = columns.map(|column| row.field(column));
-    let known = ACTIONS.iter().position(|name| *name == action.text).ok_or_else(|| {
-        let cause = format!("`{}` is not an action", action.text);
-        action.error(&place, cause, &format!("use one of {}", ACTIONS.join(", ")))
-    })?;
-    Ok(Displacement {
-        action: known,
-        ahead_boxes: limited(place, ahead, BOXES_MAX)?,
-        left_boxes: limited(place, left, BOXES_MAX)?,
-        turn_deg: limited(place, turn, TURN_MAX_DEG)?,
+/// Where the columns are.
+struct Columns {
+    action: usize,
+    ahead: usize,
+    left: usize,
+    turn: usize,
+    contact: Option<usize>,
+}
+
+impl Columns {
+    fn find(table: &CsvTable) -> Result<Self, InputError> {
+        Ok(Self {
+            action: table.column("action")?,
+            ahead: table.column("ahead_boxes")?,
+            left: table.column("left_boxes")?,
+            turn: table.column("turn_deg")?,
+            contact: table.find("contact"),
+        })
+    }
+
+    fn displacement(&self, place: &str, row: CsvRow<'_>) -> Result<Displacement, InputError> {
+        Ok(Displacement {
+            action: action(place, row.field(self.action))?,
+            ahead_boxes: limited(place, row.field(self.ahead), BOXES_MAX)?,
+            left_boxes: limited(place, row.field(self.left), BOXES_MAX)?,
+            turn_deg: limited(place, row.field(self.turn), TURN_MAX_DEG)?,
+        })
+    }
+
+    fn met_obstacle(&self, place: &str, row: CsvRow<'_>) -> Result<bool, InputError> {
+        let Some(contact) = self.contact.map(|column| row.field(column)) else { return Ok(false) };
+        match contact.text {
+            "no" => Ok(false),
+            "yes" => Ok(true),
+            other => Err(contact.error(&place, format!("contact is `{other}`"), "write yes or no")),
+        }
+    }
+}
+
+/// An action by its name, or by the number that a recording gives it.
+fn action(place: &str, word: Word<'_>) -> Result<usize, InputError> {
+    let by_name = ACTIONS.iter().position(|name| *name == word.text);
+    let by_number = || word.text.parse().ok().filter(|number| *number < ACTIONS.len());
+    by_name.or_else(by_number).ok_or_else(|| {
+        let cause = format!("`{}` is not an action", word.text);
+        word.error(&place, cause, &format!("use one of {}", ACTIONS.join(", ")))
     })
 }
 
@@ -226,18 +271,29 @@ mod tests {
         let shares = model.report.transitions.unwrap();
         assert_eq!((shares.ahead, shares.ahead_left, shares.other), (0.5, 0.25, 0.25));
         assert_eq!((model.report.events, model.report.actions["left"]["stay"]), (4, 1.0));
-        let forward: Vec<_> =
-            model.profile.forward.iter().map(|t| (t.path.as_str(), t.turn_deg, t.p)).collect();
+        let forward: Vec<_> = model
+            .profile
+            .action("forward")
+            .unwrap()
+            .iter()
+            .map(|t| (t.path.as_str(), t.turn_deg, t.p))
+            .collect();
         assert_eq!(forward, [("F", 0, 0.5), ("", 90, 0.25), ("FL", 0, 0.25)]);
-        assert_eq!(model.profile.right.len(), 1);
+        assert_eq!(model.profile.action("right").unwrap().len(), 1);
+        assert!(model.profile.action("stay").is_some());
         assert!(model.profile.assumed.is_empty());
     }
 
     #[test]
     fn displacements_between_boxes_are_phase_averaged() {
         let model = learned("forward,1.25,0,0\n", 0.0).unwrap();
-        let forward: Vec<_> =
-            model.profile.forward.iter().map(|t| (t.path.as_str(), t.p)).collect();
+        let forward: Vec<_> = model
+            .profile
+            .action("forward")
+            .unwrap()
+            .iter()
+            .map(|t| (t.path.as_str(), t.p))
+            .collect();
         assert_eq!(forward, [("F", 0.75), ("FF", 0.25)]);
         assert_eq!(model.profile.assumed, ["left: never fails", "right: never fails"]);
     }
@@ -245,9 +301,25 @@ mod tests {
     #[test]
     fn the_intended_outcome_comes_first_though_it_was_never_seen() {
         let model = learned("forward,0,0,0\n", 0.5).unwrap();
-        let forward: Vec<_> =
-            model.profile.forward.iter().map(|t| (t.path.as_str(), t.p)).collect();
+        let forward: Vec<_> = model
+            .profile
+            .action("forward")
+            .unwrap()
+            .iter()
+            .map(|t| (t.path.as_str(), t.p))
+            .collect();
         assert_eq!(forward, [("F", 0.25), ("", 0.75)]);
+    }
+
+    #[test]
+    fn a_recorded_table_of_motions_is_read_and_contacts_are_left_out() {
+        let text = "cycle,robot,action,ahead_boxes,left_boxes,turn_deg,contact\n\
+            0,0,0,1,0,0,no\n1,0,0,0,0,0,yes\n2,0,1,0,0,90,no\n3,0,1,0,0,270,no\n4,0,1,0,0,-90,no\n";
+        let table = CsvTable::parse(&"f.csv", text).unwrap();
+        let report = learn(&table, &EstimateOptions::default()).unwrap().report;
+        assert_eq!((report.events, report.rejected["contact"]), (1, 1));
+        assert!(report.warnings[0].contains("learn in the open"));
+        assert_eq!(report.actions["left"]["turn -90"], 2.0, "270 degrees to the left end alike");
     }
 
     #[test]

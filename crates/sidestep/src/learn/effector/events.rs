@@ -84,11 +84,14 @@ impl Events {
         let mut assumed = Vec::new();
         let left = self.turn_transitions("left", options.alpha, &mut assumed);
         let right = self.turn_transitions("right", options.alpha, &mut assumed);
+        let actions = [
+            ("forward", transitions::forward(&forward, options.alpha)),
+            ("left", left),
+            ("right", right),
+        ];
         EffectorProfile {
             box_m: None,
-            forward: transitions::forward(&forward, options.alpha),
-            left,
-            right,
+            actions: actions.map(|(name, list)| (name.to_string(), list)).to_vec(),
             assumed,
             rule: rule.to_owned(),
         }
@@ -235,16 +238,17 @@ mod tests {
         assert_eq!(counts.row(0), [1.5, 0.25, 0.25, 0.0]);
         let options = EstimateOptions { alpha: 0.0, ..Default::default() };
         let profile = events.profile("", &options);
-        let p: Vec<_> = profile.left.iter().map(|t| (t.turn_deg, t.p)).collect();
+        let p: Vec<_> = profile.action("left").unwrap().iter().map(|t| (t.turn_deg, t.p)).collect();
         assert_eq!(p, [(90, 0.75), (0, 0.125), (180, 0.125)]);
-        assert_eq!(profile.right[0].turn_deg, -90);
+        assert_eq!(profile.action("right").unwrap()[0].turn_deg, -90);
         assert_eq!(profile.assumed, ["right: mirrored from turns to the other side"]);
     }
 
     #[test]
     fn without_turns_an_exact_turn_is_assumed_and_said() {
         let profile = Events::default().profile("", &EstimateOptions::default());
-        assert_eq!((profile.left.len(), profile.left[0].p), (1, 1.0));
+        let left = profile.action("left").unwrap();
+        assert_eq!((left.len(), left[0].p), (1, 1.0));
         assert_eq!(profile.assumed, ["left: never fails", "right: never fails"]);
         assert_eq!(Events::default().turn_report(), None);
     }

@@ -74,15 +74,26 @@ pub fn from_carmen(file: &Path, options: &EstimateOptions) -> Result<EffectorMod
 /// Learns any actions from a CSV file.
 ///
 /// Columns, found by name in the header:
-/// - `action`: `forward`, `left`, `right` or `stay`;
-/// - `ahead_boxes`, `left_boxes`: displacement in boxes in the start frame, at most 16;
-/// - `turn_deg`: turn in degrees, + to the left.
+/// - `action`: `forward`, `left`, `right` or `stay`, or 0 to 3 in that order;
+/// - `ahead_boxes`, `left_boxes`: displacement in boxes in the start frame, at most 8;
+/// - `turn_deg`: turn in degrees, + to the left;
+/// - optional `contact`, `yes` or `no`: whether an obstacle cut it; such rows are left out.
+///
+/// The table `motions` that a simulated run records for calibration has these columns.
 ///
 /// Whole boxes and multiples of 90 degrees are counted as they are, others are phase-averaged.
 ///
 /// # Errors
 /// When the file is missing or damaged, holds no row, or `options` mean nothing.
 pub fn from_csv(file: &Path, options: &EstimateOptions) -> Result<EffectorModel, InputError> {
+    learn_csv(&CsvTable::read(file)?, options)
+}
+
+/// Learns from a CSV table already read, see [`from_csv`].
+///
+/// # Errors
+/// When the table is damaged or `options` mean nothing.
+pub fn learn_csv(table: &CsvTable, options: &EstimateOptions) -> Result<EffectorModel, InputError> {
     options.check()?;
-    csv::learn(&CsvTable::read(file)?, options)
+    csv::learn(table, options)
 }

@@ -9,16 +9,20 @@ use crate::learn::counts::{rounded, smooth};
 pub struct EffectorProfile {
     /// Side of a box in m, where the transitions hold for boxes of that size only.
     pub box_m: Option<f64>,
-    /// One box ahead; the first transition is the intended one.
-    pub forward: Vec<Transition>,
-    /// Turn of 90 degrees to the left.
-    pub left: Vec<Transition>,
-    /// Turn of 90 degrees to the right.
-    pub right: Vec<Transition>,
+    /// What each action may do, by its name; the first transition is the intended one.
+    pub actions: Vec<(String, Vec<Transition>)>,
     /// Actions that no event speaks for, and what was assumed.
     pub assumed: Vec<String>,
     /// How events became transitions.
     pub rule: String,
+}
+
+impl EffectorProfile {
+    /// The transitions of an action.
+    pub fn action(&self, name: &str) -> Option<&[Transition]> {
+        let found = self.actions.iter().find(|(action, _)| action == name);
+        found.map(|(_, transitions)| transitions.as_slice())
+    }
 }
 
 /// One thing an action may do.

@@ -99,8 +99,8 @@ fn the_printed_report_names_the_figures_that_matter() {
     let Some(folder) = shared("logs/mrclam7") else { return };
     let model = from_mrclam(&folder, 0.25, &EstimateOptions::default()).unwrap();
     let printed = model.report.to_string();
-    println!("{printed}");
     assert!(printed.contains("498 moves of one box (0.25 m) ahead"));
-    let p: f64 = model.profile.forward.iter().map(|transition| transition.p).sum();
+    let p: f64 =
+        model.profile.action("forward").unwrap().iter().map(|transition| transition.p).sum();
     assert!((p - 1.0).abs() < 1e-9);
 }

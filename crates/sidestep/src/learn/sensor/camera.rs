@@ -18,6 +18,8 @@ pub struct SensorProfile {
     pub range_m: f64,
     /// What can be reported; the first is `nothing`.
     pub observations: Vec<String>,
+    /// Kinds of objects that are taken for another observation than their own name.
+    pub designates: Vec<(String, String)>,
     /// Edges between the distance classes in m.
     pub distance_edges_m: Vec<f64>,
     /// Names of the distance classes, near to far.
@@ -94,6 +96,10 @@ pub(super) fn camera(
         bearings_deg: options.bearings_deg.clone(),
         range_m: options.range_m,
         observations: [NOTHING, "robot", "landmark"].map(String::from).to_vec(),
+        // The arena has landmarks where a building has walls; nothing else wears a code.
+        designates: [("wall", "landmark"), ("door", NOTHING), ("person", NOTHING)]
+            .map(|(kind, observation)| (kind.to_string(), observation.to_string()))
+            .to_vec(),
         distance_edges_m: classes.edges_m.clone(),
         distance_classes: classes.names.clone(),
         confusion,

@@ -12,8 +12,8 @@ use crate::learn::holdout::{Fit, fit, split};
 use crate::learn::{CountMatrix, Counts};
 use crate::statistics::Moments;
 
-/// More observations than this are taken for a column of numbers.
-const OBSERVATIONS_MAX: usize = 256;
+/// So many observations are taken for a column of numbers.
+const OBSERVATIONS_MAX: usize = 250;
 
 /// One row of the file.
 #[derive(Debug, Clone, PartialEq)]
@@ -193,6 +193,7 @@ impl<'a> ReadingLog<'a> {
             bearings_deg: options.bearings_deg.clone(),
             range_m: options.range_m,
             observations: self.observations.clone(),
+            designates: self.unseen_kinds(),
             distance_edges_m: self.classes.edges_m.clone(),
             distance_classes: self.classes.names.clone(),
             confusion_by_class: self.rows_by_class(&confusion, alpha),
@@ -201,6 +202,14 @@ impl<'a> ReadingLog<'a> {
             assumed,
             rule: "counts of true against reported, every count plus alpha".to_string(),
         }
+    }
+
+    /// The standard kinds that the sensor was never shown: it takes them for nothing.
+    fn unseen_kinds(&self) -> Vec<(String, String)> {
+        let known = |kind: &&str| self.observations.iter().any(|name| name == kind);
+        let kinds = ["wall", "door", "person", "robot"].into_iter();
+        let unseen = kinds.filter(|kind| !known(kind));
+        unseen.map(|kind| (kind.to_string(), NOTHING.to_string())).collect()
     }
 
     fn confusion_rows(
@@ -303,8 +312,8 @@ fn observations(
             return Err(word.error(&place, "the observation is empty".to_string(), remedy));
         }
         names.insert(word.text);
-        if names.len() > OBSERVATIONS_MAX {
-            let cause = format!("more than {OBSERVATIONS_MAX} different observations");
+        if names.len() >= OBSERVATIONS_MAX {
+            let cause = format!("{OBSERVATIONS_MAX} different observations or more");
             return Err(word.error(&place, cause, "name kinds of things, not measurements"));
         }
     }

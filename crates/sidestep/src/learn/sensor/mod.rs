@@ -64,9 +64,19 @@ pub fn from_mrclam(folder: &Path, options: &SensorOptions) -> Result<SensorModel
 /// - optional `sensor`: the name of the sensor; with several in one file,
 ///   [`SensorOptions::sensor`] chooses.
 ///
+/// The table `readings` that a simulated run records for calibration has these columns.
+///
 /// # Errors
 /// When the file is missing or damaged, or `options` mean nothing.
 pub fn from_csv(file: &Path, options: &SensorOptions) -> Result<SensorModel, InputError> {
+    learn_csv(&CsvTable::read(file)?, options)
+}
+
+/// Learns from a CSV table already read, see [`from_csv`].
+///
+/// # Errors
+/// When the table is damaged or `options` mean nothing.
+pub fn learn_csv(table: &CsvTable, options: &SensorOptions) -> Result<SensorModel, InputError> {
     let classes = options.check()?;
-    csv::learn(&CsvTable::read(file)?, options, &classes)
+    csv::learn(table, options, &classes)
 }
