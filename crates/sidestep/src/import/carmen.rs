@@ -17,6 +17,8 @@ use crate::kernel::InputError;
 
 /// Beams per scan beyond which a count is taken for damage.
 const BEAMS_MAX: u32 = 100_000;
+/// Words of a message that are looked at: those of the longest scan, and more.
+const WORDS_MAX: usize = BEAMS_MAX as usize + 32;
 
 /// A pose in the world: x and y in m, heading in rad.
 pub type Pose = [f64; 3];
@@ -58,7 +60,7 @@ pub fn read(path: &Path) -> Result<CorrectedLog, InputError> {
 pub fn parse(place: &str, text: &str) -> Result<CorrectedLog, InputError> {
     let mut log = CorrectedLog { odometry_before: Vec::new(), scans: Vec::new() };
     for (line, content) in data_lines(text) {
-        let message: Vec<Word> = words(line, content).collect();
+        let message: Vec<Word> = words(line, content).take(WORDS_MAX).collect();
         match message[0].text {
             "ODOM" => {
                 let pose = parse_odometry(place, &message)?;
@@ -157,5 +159,12 @@ mod tests {
     #[test]
     fn a_log_without_scans_is_an_error() {
         assert!(parse("f", "ODOM 0 0 0 0 0 0 0 h 0\n").unwrap_err().cause().contains("FLASER"));
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn any_text_is_a_log_or_an_error(text in "((ODOM|FLASER|NEFF|#)?( -?[0-9.e]{0,4}){0,14}\n){0,8}") {
+            let _ = parse("f", &text);
+        }
     }
 }

@@ -116,7 +116,8 @@ fn read_robot(folder: &Path, subject: u32) -> Result<RobotLog, InputError> {
 
 fn parse_barcodes(place: &str, text: &str) -> Result<BTreeMap<u32, u32>, InputError> {
     let mut barcodes = BTreeMap::new();
-    for [subject, barcode] in rows(&place, text)? {
+    for row in rows(&place, text) {
+        let [subject, barcode] = row?;
         let earlier = barcodes.insert(barcode.integer(&place)?, subject.integer(&place)?);
         refuse_second(&place, earlier.is_some(), &barcode)?;
     }
@@ -125,7 +126,8 @@ fn parse_barcodes(place: &str, text: &str) -> Result<BTreeMap<u32, u32>, InputEr
 
 fn parse_landmarks(place: &str, text: &str) -> Result<BTreeMap<u32, [f64; 2]>, InputError> {
     let mut landmarks = BTreeMap::new();
-    for [subject, x, y, _, _] in rows(&place, text)? {
+    for row in rows(&place, text) {
+        let [subject, x, y, _, _] = row?;
         let position_m = [x.number(&place)?, y.number(&place)?];
         let earlier = landmarks.insert(subject.integer(&place)?, position_m);
         refuse_second(&place, earlier.is_some(), &subject)?;
@@ -142,32 +144,34 @@ fn refuse_second(place: &dyn fmt::Display, twice: bool, word: &Word) -> Result<(
 
 /// Motion capture; sorted here, because poses are looked up by time.
 fn parse_truth(place: &str, text: &str) -> Result<Vec<TruePose>, InputError> {
-    let parse = |[t, x, y, heading]: [Word; 4]| {
+    let parse = |row: Result<[Word; 4], InputError>| {
+        let [t, x, y, heading] = row?;
         Ok(TruePose {
             t_secs: t.number(&place)?,
             position_m: [x.number(&place)?, y.number(&place)?],
             heading_rad: heading.number(&place)?,
         })
     };
-    let mut truth: Vec<TruePose> =
-        rows(&place, text)?.into_iter().map(parse).collect::<Result<_, _>>()?;
+    let mut truth: Vec<TruePose> = rows(&place, text).map(parse).collect::<Result<_, _>>()?;
     truth.sort_by(|a, b| a.t_secs.total_cmp(&b.t_secs));
     Ok(truth)
 }
 
 fn parse_commands(place: &str, text: &str) -> Result<Vec<Command>, InputError> {
-    let parse = |[t, forward, turn]: [Word; 3]| {
+    let parse = |row: Result<[Word; 3], InputError>| {
+        let [t, forward, turn] = row?;
         Ok(Command {
             t_secs: t.number(&place)?,
             forward_mps: forward.number(&place)?,
             turn_radps: turn.number(&place)?,
         })
     };
-    rows(&place, text)?.into_iter().map(parse).collect()
+    rows(&place, text).map(parse).collect()
 }
 
 fn parse_measurements(place: &str, text: &str) -> Result<Vec<Measurement>, InputError> {
-    let parse = |[t, barcode, range, bearing]: [Word; 4]| {
+    let parse = |row: Result<[Word; 4], InputError>| {
+        let [t, barcode, range, bearing] = row?;
         Ok(Measurement {
             t_secs: t.number(&place)?,
             barcode: barcode.integer(&place)?,
@@ -175,7 +179,7 @@ fn parse_measurements(place: &str, text: &str) -> Result<Vec<Measurement>, Input
             bearing_rad: bearing.number(&place)?,
         })
     };
-    rows(&place, text)?.into_iter().map(parse).collect()
+    rows(&place, text).map(parse).collect()
 }
 
 #[cfg(test)]
@@ -233,5 +237,14 @@ mod tests {
         let folder = small();
         std::fs::write(folder.path().join("Barcodes.dat"), "6 14\n").unwrap();
         assert!(read(folder.path()).unwrap_err().cause().contains("robot"));
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn any_text_is_a_stream_or_an_error(text in "(( |\t)?-?[0-9.e#]{0,5}){0,5}\n?(\\PC{0,20}\n){0,4}") {
+            let _ = (parse_barcodes("f", &text), parse_landmarks("f", &text));
+            let _ = (parse_truth("f", &text), parse_commands("f", &text));
+            let _ = parse_measurements("f", &text);
+        }
     }
 }

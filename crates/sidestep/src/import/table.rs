@@ -24,6 +24,9 @@ pub fn find_file(folder: &Path, name: &str) -> Result<PathBuf, InputError> {
     })
 }
 
+/// The longest CSV table that is read, in bytes after unpacking.
+pub const MAX_CSV_BYTES: u64 = 1 << 28;
+
 /// One word of a text and where it stands.
 #[derive(Debug, Clone, Copy)]
 pub struct Word<'a> {
@@ -96,26 +99,21 @@ pub fn data_lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
 /// All data lines as rows of exactly `N` words.
 ///
 /// # Errors
-/// When a line has more or fewer words.
+/// Each item where the line has more or fewer words.
 pub fn rows<'a, const N: usize>(
     place: &dyn fmt::Display,
     text: &'a str,
-) -> Result<Vec<[Word<'a>; N]>, InputError> {
-    data_lines(text)
-        .map(|(line, content)| {
-            let found: Vec<Word> = words(line, content).collect();
-            let count = found.len();
-            let past = found.get(N).or(found.last()).map_or(1, |word| word.column);
-            found.try_into().map_err(|_| {
-                InputError::new(
-                    place,
-                    format!("the line has {count} columns instead of {N}"),
-                    "restore the file; comments start with #",
-                )
-                .at(line, past)
-            })
+) -> impl Iterator<Item = Result<[Word<'a>; N], InputError>> {
+    data_lines(text).map(move |(line, content)| {
+        // One word more than wanted is enough to see that there are too many.
+        let found: Vec<Word> = words(line, content).take(N + 1).collect();
+        let wrong = found.get(N).or(found.last()).map_or(1, |word| word.column);
+        let count = if found.len() > N { "more" } else { "fewer" };
+        found.try_into().map_err(|_| {
+            let cause = format!("the line has {count} columns than {N}");
+            InputError::new(place, cause, "restore the file; comments start with #").at(line, wrong)
         })
-        .collect()
+    })
 }
 
 /// A CSV file with a header row: fields are found by the name of their column.
@@ -125,24 +123,33 @@ pub fn rows<'a, const N: usize>(
 pub struct CsvTable {
     place: String,
     header: Vec<String>,
-    /// Line of each record, from 1, and its fields.
-    records: Vec<(usize, csv::StringRecord)>,
+    /// Line of each row, from 1.
+    lines: Vec<u32>,
+    /// All fields of all rows, one after the other.
+    fields: String,
+    /// Where each field ends in `fields`; as many per row as the header has.
+    ends: Vec<u32>,
 }
 
 impl CsvTable {
-    /// Reads a file, `.csv` or `.csv.gz`.
+    /// Reads a file, plain or packed.
     ///
     /// # Errors
     /// When it cannot be read or a row has another number of fields than the header.
     pub fn read(path: &Path) -> Result<Self, InputError> {
-        Self::parse(&path.display(), &read_text(path, MAX_TEXT_BYTES)?)
+        Self::parse(&path.display(), &read_text(path, MAX_CSV_BYTES)?)
     }
 
     /// Parses text; `place` is named in errors.
     ///
     /// # Errors
-    /// When a row has another number of fields than the header, or there is no header.
+    /// When a row has another number of fields than the header, there is no header, or the text
+    /// is longer than [`MAX_CSV_BYTES`].
     pub fn parse(place: &dyn fmt::Display, text: &str) -> Result<Self, InputError> {
+        if text.len() as u64 > MAX_CSV_BYTES {
+            let cause = format!("the table has more than {MAX_CSV_BYTES} bytes");
+            return Err(InputError::new(place, cause, "learn from a part of it"));
+        }
         let mut reader = csv::ReaderBuilder::new()
             .trim(csv::Trim::All)
             .comment(Some(b'#'))
@@ -152,12 +159,27 @@ impl CsvTable {
         if header.is_empty() {
             return Err(InputError::new(place, "the file is empty", "write a header row first"));
         }
-        let numbered = |record: csv::StringRecord| {
-            (record.position().map_or(0, |p| p.line() as usize), record)
+        let mut table = Self {
+            place: place.to_string(),
+            header,
+            lines: Vec::new(),
+            fields: String::new(),
+            ends: Vec::new(),
         };
-        let records = reader.records().map(|r| r.map(numbered)).collect::<Result<_, _>>();
-        let records = records.map_err(|e| csv_error(place, &e))?;
-        Ok(Self { place: place.to_string(), header, records })
+        let mut record = csv::StringRecord::new();
+        while reader.read_record(&mut record).map_err(|e| csv_error(place, &e))? {
+            table.push(&record);
+        }
+        Ok(table)
+    }
+
+    fn push(&mut self, record: &csv::StringRecord) {
+        self.lines.push(record.position().map_or(0, |p| p.line() as u32));
+        for field in record {
+            self.fields.push_str(field);
+            // MAX_CSV_BYTES fits.
+            self.ends.push(self.fields.len() as u32);
+        }
     }
 
     /// The file, as errors name it.
@@ -184,25 +206,34 @@ impl CsvTable {
 
     /// The rows, in the order of the file.
     pub fn rows(&self) -> impl Iterator<Item = CsvRow<'_>> {
-        self.records.iter().map(|(line, fields)| CsvRow { line: *line, fields })
+        (0..self.lines.len()).map(|index| CsvRow { table: self, index })
     }
 }
 
 /// One row of a [`CsvTable`].
 #[derive(Debug, Clone, Copy)]
 pub struct CsvRow<'a> {
-    line: usize,
-    fields: &'a csv::StringRecord,
+    table: &'a CsvTable,
+    index: usize,
 }
 
 impl<'a> CsvRow<'a> {
     /// The field in the column at `index`, which [`CsvTable::column`] gave.
+    ///
+    /// # Panics
+    /// When the header has no such column.
     pub fn field(&self, index: usize) -> Word<'a> {
-        // Quotes and trimmed blanks are not in the record, so the column may be off by those.
-        let before: usize =
-            self.fields.iter().take(index).map(|field| field.chars().count() + 1).sum();
-        let text = self.fields.get(index).unwrap_or_default();
-        Word { text, line: self.line, column: before + 1 }
+        assert!(index < self.table.header.len(), "a column of the header");
+        // Quotes and trimmed blanks are not kept, so the column may be off by those.
+        let before: usize = (0..index).map(|i| self.text(i).chars().count() + 1).sum();
+        let line = self.table.lines[self.index] as usize;
+        Word { text: self.text(index), line, column: before + 1 }
+    }
+
+    fn text(&self, index: usize) -> &'a str {
+        let slot = self.index * self.table.header.len() + index;
+        let start = slot.checked_sub(1).map_or(0, |before| self.table.ends[before]);
+        &self.table.fields[start as usize..self.table.ends[slot] as usize]
     }
 }
 
@@ -223,16 +254,17 @@ mod tests {
 
     #[test]
     fn a_wrong_column_count_names_line_and_column() {
-        let error = rows::<2>(&"f.dat", "# head\n1 2\n 1 2 3\n").unwrap_err();
+        let wrong = |text| rows::<2>(&"f.dat", text).find_map(Result::err).unwrap();
+        let error = wrong("# head\n1 2\n 1 2 3\n");
         assert_eq!(error.position(), Some((3, 6)));
-        assert!(error.cause().contains("3 columns instead of 2"));
-        assert_eq!(rows::<2>(&"f.dat", "1 \t").unwrap_err().position(), Some((1, 1)));
+        assert!(error.cause().contains("more columns than 2"));
+        assert_eq!(wrong("1 \t").position(), Some((1, 1)));
     }
 
     #[test]
     fn a_bad_number_names_line_and_column() {
-        let parsed = rows::<2>(&"f.dat", "1 2\n3 \tx4\n").unwrap();
-        let error = parsed[1][1].number(&"f.dat").unwrap_err();
+        let parsed: Vec<_> = rows::<2>(&"f.dat", "1 2\n3 \tx4\n").collect();
+        let error = parsed[1].as_ref().unwrap()[1].number(&"f.dat").unwrap_err();
         assert_eq!(error.position(), Some((2, 4)));
         for word in ["nan", "inf", "1e999", "", "-"] {
             assert!(Word { text: word, line: 1, column: 1 }.number(&"f").is_err(), "{word}");

@@ -47,15 +47,14 @@ pub(super) fn learn(
     report.lateral_slip_sd = report.lateral_slip.map(|slip| slip.sd);
     report.warnings.extend(report.lateral_slip_sd.and_then(slip_warning));
     let ahead: Vec<&Pair> = pairs.iter().filter(|pair| pair.is_ahead()).collect();
-    let moments: [(&str, fn(&Pair) -> f64); 3] = [
-        ("odometry_forward_m", |pair| pair.claimed.ahead_m),
-        ("error_ahead_m", |pair| pair.corrected.ahead_m - pair.claimed.ahead_m),
-        ("error_left_m", |pair| pair.corrected.left_m),
+    let of = |value: fn(&&Pair) -> f64| Moments::of(ahead.iter().map(value));
+    let moments = [
+        ("odometry_forward_m", of(|pair| pair.claimed.ahead_m)),
+        ("error_ahead_m", of(|pair| pair.corrected.ahead_m - pair.claimed.ahead_m)),
+        ("error_left_m", of(|pair| pair.corrected.left_m)),
     ];
-    for (name, value) in moments {
-        let moments = Moments::of(ahead.iter().map(|pair| value(pair)));
-        report.moments.extend(moments.map(|moments| (name.to_string(), moments)));
-    }
+    let known = moments.into_iter().filter_map(|(name, m)| Some((name.to_string(), m?)));
+    report.moments.extend(known);
     Ok(EffectorModel { report, profile: events.profile(RULE, options) })
 }
 

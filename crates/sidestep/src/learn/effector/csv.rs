@@ -335,4 +335,19 @@ mod tests {
         }
         assert!(learned("", 0.5).unwrap_err().cause().contains("no displacements"));
     }
+
+    proptest::proptest! {
+        #[test]
+        fn any_rows_are_learned_or_refused(
+            rows in "((forward|left|right|stay|3),-?[0-9]{1,2}(\\.[0-9])?,-?[0-9](\\.[0-9])?,-?[0-9]{0,3}\n){0,9}"
+        ) {
+            if let Ok(model) = learned(&rows, 0.5) {
+                for (action, transitions) in &model.profile.actions {
+                    let sum: f64 = transitions.iter().map(|transition| transition.p).sum();
+                    proptest::prop_assert!((sum - 1.0).abs() < 1e-9, "{}: {}", action, sum);
+                    proptest::prop_assert!(transitions.iter().all(|t| t.path.len() <= 16));
+                }
+            }
+        }
+    }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use toml_edit::{Array, InlineTable, Item, Table, Value, value};
+use toml_edit::{Array, ArrayOfTables, InlineTable, Item, Table, Value, value};
 
 use super::{implicit, words};
 use crate::learn::effector::EffectorModel;
@@ -78,7 +78,8 @@ impl Certainty<'_> {
         table["assumed"] = words(self.assumed);
         table["warnings"] = words(self.warnings);
         table["hold_out_every"] = count(self.options.hold_out_every as f64).into();
-        table["hold_out"] = value(Array::from_iter(self.hold_out.iter().map(fit)));
+        let fits = ArrayOfTables::from_iter(self.hold_out.iter().map(fit));
+        table["hold_out"] = Item::ArrayOfTables(fits);
         let mut by_table: BTreeMap<&str, BTreeMap<&str, Vec<&Estimate>>> = BTreeMap::new();
         for estimate in &self.estimates {
             let rows = by_table.entry(&estimate.table).or_default();
@@ -123,20 +124,20 @@ fn thin(row: &ThinRow) -> InlineTable {
     fields
 }
 
-fn fit(fit: &Fit) -> InlineTable {
-    let mut fields = InlineTable::new();
-    fields.insert("table", fit.table.as_str().into());
-    fields.insert("trained_on", count(fit.trained_on));
-    fields.insert("held_out", count(fit.held_out));
-    fields.insert("chi_square", significant(fit.chi_square).into());
-    fields.insert("degrees_of_freedom", count(fit.degrees_of_freedom as f64));
-    fields.insert("p_value", significant(fit.p_value).into());
+fn fit(fit: &Fit) -> Table {
+    let mut table = Table::new();
+    table["table"] = value(&fit.table);
+    table["trained_on"] = count(fit.trained_on).into();
+    table["held_out"] = count(fit.held_out).into();
+    table["chi_square"] = value(significant(fit.chi_square));
+    table["degrees_of_freedom"] = count(fit.degrees_of_freedom as f64).into();
+    table["p_value"] = value(significant(fit.p_value));
     for (name, loss) in [("log_loss", fit.log_loss), ("log_loss_floor", fit.log_loss_floor)] {
         if let Some(loss) = loss {
-            fields.insert(name, significant(loss).into());
+            table[name] = value(significant(loss));
         }
     }
-    fields
+    table
 }
 
 /// A count: whole where it is, else (events spread over outcomes) with four decimals.

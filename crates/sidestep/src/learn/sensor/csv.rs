@@ -120,7 +120,7 @@ impl<'a> ReadingLog<'a> {
     /// The confusion of what stands in each class; of `nothing` there is none.
     fn by_class(&self) -> Vec<Counts> {
         let table = |class: &String| {
-            Counts::new(&format!("confusion {class}"), &self.observations[1..], &self.observations)
+            Counts::new(&format!("confusion_{class}"), &self.observations[1..], &self.observations)
         };
         let mut tables: Vec<Counts> = self.classes.names.iter().map(table).collect();
         for reading in &self.readings {
@@ -453,5 +453,25 @@ mod tests {
         }
         assert!(learned(head, &SensorOptions::default()).is_err(), "no readings");
         assert!(learned("true,reported\na,a\n", &SensorOptions::default()).is_err());
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn any_rows_are_learned_or_refused(
+            rows in "((nothing|wall|robot),(nothing|wall|robot),[0-9]{0,2},(beyond|[0-9]{0,2}|x)\n){0,9}",
+            alpha in 0.0..2.0_f64,
+        ) {
+            let estimate = crate::learn::EstimateOptions { alpha, ..Default::default() };
+            let options = SensorOptions { estimate, ..Default::default() };
+            let head = "true,reported,true_distance_m,reported_distance_m\n";
+            if let Ok(model) = learned(&format!("{head}{rows}"), &options) {
+                let by_class = model.profile.confusion_by_class.iter().flat_map(|(_, rows)| rows);
+                let rows = model.profile.confusion.iter().chain(&model.profile.distance_confusion);
+                for row in rows.chain(by_class) {
+                    let sum: f64 = row.probabilities.iter().sum();
+                    proptest::prop_assert!((sum - 1.0).abs() < 1e-9, "{:?}", row);
+                }
+            }
+        }
     }
 }

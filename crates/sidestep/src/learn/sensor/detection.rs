@@ -96,7 +96,7 @@ fn bins(robot: &RobotLog) -> Option<(f64, usize)> {
     let (a, b, c) = (ends(truth)?, ends(commands)?, ends(readings)?);
     let start_secs = a.0.max(b.0).max(c.0);
     let n_bins = ((a.1.min(b.1).min(c.1) - start_secs) / BIN_SECS).floor();
-    (n_bins >= 1.0 && n_bins <= BINS_MAX).then_some((start_secs, n_bins as usize))
+    (1.0..=BINS_MAX).contains(&n_bins).then_some((start_secs, n_bins as usize))
 }
 
 /// First and last of the time stamps.
