@@ -25,14 +25,16 @@ impl RobotsWorld {
         let (i, now) = (slot as usize, turn.now);
         let cell = &state.bodies[i];
         let at = cell.at();
-        state.claims.register(slot, at, turn);
         if let Some(frames) = &state.frames {
             let index = i * frames.capacity + (now - frames.first) as usize;
             frames.poses.set(index, pose_word(at, cell.facing.get()));
         }
-        let body = &self.bodies[i];
-        let intent = if body.is_due(now) {
-            match &self.types[usize::from(cell.ty)].role {
+        let role = &self.types[usize::from(cell.ty)].role;
+        if !matches!(role, Role::Door(_)) {
+            state.claims.register(slot, at, turn);
+        }
+        let intent = if self.bodies[i].is_due(now) {
+            match role {
                 Role::Robot(model) => self.robot_decides(model, state, now, slot, scratch),
                 Role::Mover(mover) => self.mover_draws(mover, state, now, slot),
                 Role::Door(door) => self.door_wants(door, state, now, slot),
@@ -166,7 +168,7 @@ impl RobotsWorld {
     #[inline]
     fn claim(&self, state: &RobotsState, slot: Slot, intent: u8) -> bool {
         let at = state.at(slot);
-        let (base, tag) = (at.index(self.stride), state.claims.tag(at));
+        let (base, tag) = (at.index(self.stride), state.tag(self, slot));
         match state.claims.tags() {
             Tags::Narrow(tags) => self.claim_in(tags, state, slot, (base, tag), intent),
             Tags::Wide(tags) => self.claim_in(tags, state, slot, (base, tag), intent),

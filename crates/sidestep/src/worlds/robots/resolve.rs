@@ -5,7 +5,7 @@ use super::state::{CLEAR, IDLE, RobotsState};
 use super::world::{RobotsWorld, Role, purpose};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::conflict::Groups;
-use sidestep_kernel::space::{Position, StoredTag, Tag, Tags};
+use sidestep_kernel::space::{FIXED, Position, StoredTag, Tag, Tags};
 use sidestep_kernel::{Column, Cycle, EntityId, Slot};
 
 /// The order within a conflict group.
@@ -77,7 +77,7 @@ impl RobotsWorld {
         groups: &Groups,
     ) {
         let at = state.at(slot);
-        let (base, own) = (at.index(self.stride), T::of(state.claims.tag(at)));
+        let (base, own) = (at.index(self.stride), T::of(state.tag(self, slot)));
         let mut last_met = None;
         let mut look = |index: usize| {
             let tag = tags.get(index);
@@ -104,6 +104,9 @@ impl RobotsWorld {
         last_met: &mut Option<Position>,
         groups: &Groups,
     ) {
+        if tag == FIXED {
+            return groups.join(slot, state.claims.fixed_body(index));
+        }
         let anchor = state.claims.anchor(index, tag);
         if *last_met != Some(anchor) {
             *last_met = Some(anchor);

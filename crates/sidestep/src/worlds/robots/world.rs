@@ -108,6 +108,8 @@ pub struct RobotsWorld {
     pub(super) rows: u32,
     /// The padded grid without bodies.
     pub(super) walls: Vec<u8>,
+    /// Place and facing of each entity at the start, by id.
+    pub(super) start: Arc<[((u32, u32), u8)]>,
     /// Reach and extent of the farthest claims, see `ClaimGrid::new`.
     pub(super) extent: (u32, u32),
 }
@@ -346,6 +348,17 @@ impl RobotsWorld {
     /// Slot of an entity.
     pub fn slot(&self, id: EntityId) -> Slot {
         self.slot_of_id[id as usize]
+    }
+
+    /// Every box of every door, by index in the padded grid, and the door's slot.
+    pub(super) fn door_boxes(&self) -> impl Iterator<Item = (u32, Slot)> + '_ {
+        let is_door = |slot: &Slot| matches!(self.body_type(*slot).role, Role::Door(_));
+        (0..self.bodies.len() as Slot).filter(is_door).flat_map(|slot| {
+            let (at, _) = self.start[self.bodies[slot as usize].id as usize];
+            let base = self.grid_position(at).index(self.stride);
+            let own = &self.body_type(slot).own;
+            own.iter().map(move |&offset| (base.wrapping_add_signed(offset), slot))
+        })
     }
 
     /// Map column and row of a position in the padded grid.

@@ -94,9 +94,9 @@ struct Compiler<'a> {
     floor: Floor,
     /// Spans by id, to name the other body when two stand on each other.
     spans: Vec<Range<usize>>,
-    /// Most boxes that a claim reaches beside a body, and over all.
+    /// Most boxes that a claim reaches beside a body, and most with the body itself.
     reach: u32,
-    extent: u32,
+    longest: u32,
 }
 
 impl<'a> Compiler<'a> {
@@ -130,7 +130,7 @@ impl<'a> Compiler<'a> {
             floor,
             spans: Vec::new(),
             reach: 0,
-            extent: 1,
+            longest: 1,
             map,
             office_doors,
             file,
@@ -173,6 +173,7 @@ impl<'a> Compiler<'a> {
         let mut robot_slots: Vec<Slot> =
             (0..bodies.len() as Slot).filter(|&s| is_robot(&bodies[s as usize])).collect();
         robot_slots.sort_unstable_by_key(|&s| bodies[s as usize].id);
+        let start: Arc<[_]> = self.start.clone().into();
         let stride = self.stride();
         let rows = self.map.height() + 2 * BORDER;
         let radio = self.radio()?;
@@ -193,11 +194,12 @@ impl<'a> Compiler<'a> {
             streams: self.streams,
             stride,
             rows,
-            extent: (self.reach, self.extent),
+            start: Arc::clone(&start),
+            extent: (self.reach, self.longest + self.reach),
         };
         Ok(Compiled {
             world: Arc::new(world),
-            start: self.start.into(),
+            start,
             name: self.file.name,
             seed: self.file.seed,
             cycles: self.file.cycles,
@@ -471,11 +473,10 @@ impl Compiler<'_> {
     ) -> Result<(), InputError> {
         let reach = longest_path as u32;
         self.reach = self.reach.max(reach);
-        self.extent = self.extent.max(size.0.max(size.1) + self.reach + reach);
-        let widest = self.extent.max(size.0.max(size.1) + 2 * self.reach);
-        self.extent = widest;
-        if self.extent > ClaimGrid::MAX_EXTENT {
-            let cause = format!("bodies and paths reach over {} boxes", self.extent);
+        self.longest = self.longest.max(size.0.max(size.1) + reach);
+        let extent = self.longest + self.reach;
+        if extent > ClaimGrid::MAX_EXTENT {
+            let cause = format!("bodies and paths reach over {extent} boxes");
             return Err(self.error(
                 span.clone(),
                 cause,
