@@ -1,6 +1,6 @@
 //! Pool two: the bodies of a group act one after the other; the environment decides.
 
-use super::effector::{Action, ObstacleRule, Side, Walk};
+use super::effector::{Action, ObstacleRule, Side, Step, Walk};
 use super::state::{FREE, IDLE, KIND_BITS, RobotsState, VISITED, contact_word};
 use super::world::{Door, RobotsWorld, Role, purpose};
 use super::{Event, EventKind, MotionSample, Scratch};
@@ -68,7 +68,9 @@ impl RobotsWorld {
         };
         self.make(walk, made, state, slot);
         if scratch.keep_samples {
-            self.sample_motion(walk, verdict, now, slot, state, scratch);
+            let turn = if verdict.contact.is_none() { walk.turn } else { 0 };
+            let sample = self.motion(&walk.steps[..made], turn, verdict, now, slot, state);
+            scratch.motion_samples.push(sample);
         }
         match verdict.contact {
             None => {
@@ -195,35 +197,27 @@ impl RobotsWorld {
         }
     }
 
-    /// Notes what an action came to, for a log to learn from: displacement in boxes in the
-    /// frame of the heading before, turn in degrees.
-    fn sample_motion(
+    /// What an action came to, for a log to learn from: the steps and the turn that were
+    /// made, not those that the drawn transition would have made in a free place.
+    fn motion(
         &self,
-        walk: &Walk,
+        made: &[Step],
+        quarter_turns: u8,
         verdict: Verdict,
         now: Cycle,
         slot: Slot,
         state: &RobotsState,
-        scratch: &mut Scratch,
-    ) {
+    ) -> MotionSample {
         let i = slot as usize;
-        let (mut ahead, mut left) = (0, 0);
-        for step in &walk.steps[..verdict.steps] {
-            match step.side {
-                Side::Front => ahead += 1,
-                Side::Back => ahead -= 1,
-                Side::Left => left += 1,
-                Side::Right => left -= 1,
-            }
-        }
-        scratch.motion_samples.push(MotionSample {
+        let count = |side| made.iter().filter(|s| s.side == side).count() as i32;
+        MotionSample {
             cycle: now,
             robot: self.bodies[i].id,
             action: state.intent.get(i) - 1,
-            ahead,
-            left,
-            quarter_turns: walk.turn,
+            ahead: count(Side::Front) - count(Side::Back),
+            left: count(Side::Left) - count(Side::Right),
+            quarter_turns,
             contact: verdict.contact.is_some(),
-        });
+        }
     }
 }
