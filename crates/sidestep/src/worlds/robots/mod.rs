@@ -11,6 +11,7 @@
 
 pub mod decide;
 pub mod effector;
+pub mod exact;
 pub mod metrics;
 mod perceive;
 pub mod ray;
