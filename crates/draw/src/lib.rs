@@ -4,8 +4,9 @@
 //! [`BarChart`], [`Histogram`], [`Matrix`]); [`to_png`] rasterizes that very SVG. The crate reads
 //! no files, asks for no system font and knows nothing of worlds, runs or robots' types.
 //!
-//! The same input gives the same bytes, on every machine: numbers are rounded to a hundredth of
-//! a unit, logarithms come from `libm`, and the only font is the embedded DejaVu Sans.
+//! The same input gives the same bytes, whatever fonts and locale the machine has: numbers are
+//! rounded to a hundredth of a unit, logarithms come from `libm`, and the only font is the
+//! embedded DejaVu Sans.
 //!
 //! ```
 //! use sidestep_draw::{Axis, Plot, Point, Series, Style, to_png};

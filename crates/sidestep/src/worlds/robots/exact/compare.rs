@@ -126,6 +126,6 @@ fn pose(simulation: &RobotsSimulation) -> Pose {
     let (world, state) = (simulation.world(), simulation.state());
     let slot = world.robots()[0];
     let (col, row) = world.map_position(state.at(slot));
-    let heading = state.facing.get(slot as usize);
+    let heading = state.bodies[slot as usize].facing.get();
     Pose { col: col as i32, row: row as i32, heading }
 }

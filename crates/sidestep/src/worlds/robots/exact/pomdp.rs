@@ -185,11 +185,13 @@ fn transitions(
 }
 
 /// The observations that occur, and each state's distribution over them.
+type Observed = (Vec<Observation>, Sparse<(u32, f64)>);
+
 fn observed(
     model: &Model,
     beams: &[MountedBeam<'_>],
     order: &[State],
-) -> Result<(Vec<Observation>, Sparse<(u32, f64)>), InputError> {
+) -> Result<Observed, InputError> {
     let mut numbers: BTreeMap<Observation, u32> = BTreeMap::new();
     let mut rows = Sparse::default();
     for &(pose, contact) in order {
