@@ -1,0 +1,5 @@
+//! Promises of the whole library, seen from outside: one module per promise.
+
+mod common;
+mod distributions;
+mod obstacle_rule;
