@@ -2,4 +2,6 @@
 
 mod common;
 mod distributions;
+mod exactness;
 mod obstacle_rule;
+mod pomdp;
