@@ -1,6 +1,6 @@
 //! Pool two: the bodies of a group act one after the other; the environment decides.
 
-use super::effector::{Action, ObstacleRule, Side, Walk};
+use super::effector::{Action, ObstacleRule, Side, Step, Walk};
 use super::state::{BodyCell, CLEAR, FREE, IDLE, KIND_BITS, RobotsState, VISITED, contact_word};
 use super::world::{BodyType, RobotsWorld, Role};
 use super::{Event, EventKind, MotionSample, Scratch};
@@ -48,15 +48,9 @@ impl RobotsWorld {
         if self.is_clear(walk, state, base) {
             self.make_whole(walk, state, cell, body, base);
             if scratch.keep_samples {
-                let steps = walk.steps.len();
-                self.sample_motion(
-                    walk,
-                    Verdict { steps, contact: None },
-                    now,
-                    slot,
-                    state,
-                    scratch,
-                );
+                let verdict = Verdict { steps: walk.steps.len(), contact: None };
+                let sample = self.motion(&walk.steps, walk.turn, verdict, now, slot, state);
+                scratch.motion_samples.push(sample);
             }
         } else {
             self.blocked(walk, state, now, slot, scratch);
@@ -143,8 +137,9 @@ impl RobotsWorld {
             return;
         }
         if scratch.keep_samples {
-            let made = Verdict { steps: made, ..verdict };
-            self.sample_motion(walk, made, now, slot, state, scratch);
+            let turn = if verdict.contact.is_none() { walk.turn } else { 0 };
+            let sample = self.motion(&walk.steps[..made], turn, verdict, now, slot, state);
+            scratch.motion_samples.push(sample);
         }
         match verdict.contact {
             None => {
@@ -264,35 +259,27 @@ impl RobotsWorld {
         }
     }
 
-    /// Notes what an action came to, for a log to learn from: displacement in boxes in the
-    /// frame of the heading before, turn in degrees.
-    fn sample_motion(
+    /// What an action came to, for a log to learn from: the steps and the turn that were
+    /// made, not those that the drawn transition would have made in a free place.
+    fn motion(
         &self,
-        walk: &Walk,
+        made: &[Step],
+        quarter_turns: u8,
         verdict: Verdict,
         now: Cycle,
         slot: Slot,
         state: &RobotsState,
-        scratch: &mut Scratch,
-    ) {
+    ) -> MotionSample {
         let i = slot as usize;
-        let (mut ahead, mut left) = (0, 0);
-        for step in &walk.steps[..verdict.steps] {
-            match step.side {
-                Side::Front => ahead += 1,
-                Side::Back => ahead -= 1,
-                Side::Left => left += 1,
-                Side::Right => left -= 1,
-            }
-        }
-        scratch.motion_samples.push(MotionSample {
+        let count = |side| made.iter().filter(|s| s.side == side).count() as i32;
+        MotionSample {
             cycle: now,
             robot: self.bodies[i].id,
             action: (state.bodies[i].intent.get() & !CLEAR) - 1,
-            ahead,
-            left,
-            quarter_turns: walk.turn,
+            ahead: count(Side::Front) - count(Side::Back),
+            left: count(Side::Left) - count(Side::Right),
+            quarter_turns,
             contact: verdict.contact.is_some(),
-        });
+        }
     }
 }
