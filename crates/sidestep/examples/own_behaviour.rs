@@ -1,4 +1,4 @@
-//! A behaviour of one's own: `cargo run -p sidestep --example own_behaviour`.
+//! `cargo run -p sidestep --example own_behaviour`: robots that keep to the wall on their left.
 
 use sidestep::kernel::{InputError, Simulation, stream::Draws};
 use sidestep::scenario::Source;
@@ -8,24 +8,22 @@ use sidestep::worlds::robots::scenario::{Behaviours, Compiled, StorageOrder};
 use sidestep::worlds::robots::simulation::RobotsSimulation;
 use std::sync::Arc;
 
-const SCENARIO: &str = r#"
-format = 1
+const SCENARIO: &str = r#"format = 1
 world = "robots"
 map = { office = { corridors = 1, rooms_per_side = 3 } }
-robots = { count = 5, size = 2, sensors = ["sonar-8"], effector = "nomad", behaviour = { kind = "wall" } }
-"#;
+robots = { count = 5, size = 2, sensors = ["sonar-8"], effector = "nomad", behaviour = { kind = "wall" } }"#;
 
-/// Keeps to the wall on its left; word 0 of the memory: actions since it last turned left.
 #[derive(Debug)]
 struct FollowWall;
 
 impl Behaviour for FollowWall {
-    fn decide(&self, percept: &Percept<'_>, memory: &mut Memory, _: &mut Draws) -> Decision {
-        memory.words[0] += 1;
-        let is_blocked = percept.contact.is_some() || percept.nearest(Sector::Ahead) == Some(0);
-        let has_lost_wall = memory.words[0] > 8 && percept.nearest(Sector::Left) != Some(0);
-        memory.words[0] *= u32::from(is_blocked || !has_lost_wall);
-        if is_blocked { RIGHT } else if has_lost_wall { LEFT } else { FORWARD }.into()
+    fn decide(&self, percept: &Percept<'_>, _: &mut Memory, _: &mut Draws) -> Decision {
+        if percept.contact.is_some() || percept.nearest(Sector::Ahead) == Some(0) {
+            return RIGHT.into();
+        }
+        let has_lost_wall = percept.nearest(Sector::Left) != Some(0);
+        let may_look_for_it = percept.now.is_multiple_of(8);
+        if has_lost_wall && may_look_for_it { LEFT.into() } else { FORWARD.into() }
     }
 }
 
