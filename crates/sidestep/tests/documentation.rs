@@ -1,5 +1,8 @@
-//! ARCHITECTURE.md and README.md name files and folders; every one of them exists.
+//! ARCHITECTURE.md and README.md name files and folders; every one of them exists. Scenarios
+//! that the README shows are right.
 
+use sidestep::scenario::Source;
+use sidestep::worlds::robots::scenario::{Behaviours, Compiled, StorageOrder};
 use std::path::{Path, PathBuf};
 
 fn root() -> PathBuf {
@@ -26,8 +29,12 @@ fn linked_paths(text: &str) -> Vec<&str> {
     targets.filter(|target| !target.is_empty() && !target.contains("://")).collect()
 }
 
+fn read(document: &str) -> String {
+    std::fs::read_to_string(root().join(document)).expect("the document is there")
+}
+
 fn missing(document: &str) -> Vec<String> {
-    let text = std::fs::read_to_string(root().join(document)).expect("the document is there");
+    let text = read(document);
     let named = [named_paths(&text), linked_paths(&text)].concat();
     assert!(!named.is_empty(), "{document} names no path: the test looks for the wrong thing");
     let is_missing = |path: &&&str| !root().join(path).exists();
@@ -42,6 +49,16 @@ fn every_path_that_the_architecture_names_exists() {
 #[test]
 fn every_path_that_the_readme_names_exists() {
     assert_eq!(missing("README.md"), [""; 0]);
+}
+
+#[test]
+fn the_scenario_that_the_readme_shows_compiles() {
+    let readme = read("README.md");
+    let scenarios: Vec<&str> = readme.split("```toml\n").skip(1).collect();
+    assert_eq!(scenarios.len(), 1);
+    let text = scenarios[0].split("```").next().unwrap_or_default();
+    let source = Source::new("README.md", text, root());
+    Compiled::new(&source, &Behaviours::new(), StorageOrder::Spatial).expect("a right scenario");
 }
 
 #[test]
