@@ -123,7 +123,7 @@ pub fn contact_word(kind: u8, side: u8) -> u16 {
 pub struct BodyRecord {
     /// Column and row of the lower-left box, in map coordinates.
     pub at: (u32, u32),
-    /// See [`RobotsState::facing`].
+    /// See [`BodyCell::facing`].
     pub facing: u8,
     /// See [`contact_word`].
     pub contact: u16,
