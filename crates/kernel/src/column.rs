@@ -34,6 +34,41 @@ macro_rules! word {
 }
 word! { u8, AtomicU8; u16, AtomicU16; u32, AtomicU32; u64, AtomicU64; }
 
+/// One value that workers share; see the module.
+pub struct Shared<T: Word>(T::Cell);
+
+impl<T: Word> Shared<T> {
+    /// A cell that holds `value`.
+    #[inline(always)]
+    pub fn new(value: T) -> Self {
+        Self(value.cell())
+    }
+
+    /// The value.
+    #[inline(always)]
+    pub fn get(&self) -> T {
+        T::load(&self.0)
+    }
+
+    /// Sets the value; only the cell's one writer of the phase may.
+    #[inline(always)]
+    pub fn set(&self, value: T) {
+        T::store(&self.0, value);
+    }
+}
+
+impl<T: Word> Default for Shared<T> {
+    fn default() -> Self {
+        Self::new(T::default())
+    }
+}
+
+impl<T: Word + std::fmt::Debug> std::fmt::Debug for Shared<T> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.get().fmt(f)
+    }
+}
+
 /// One value per slot, shared by the workers.
 pub struct Column<T: Word>(Box<[T::Cell]>);
 

@@ -4,6 +4,16 @@ use crate::conflict::Groups;
 use crate::units::{Cycle, Slot};
 use std::ops::Range;
 
+/// When a phase runs, and with whom.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Turn {
+    /// The cycle.
+    pub now: Cycle,
+    /// One worker runs the whole phase, so that exchanges need not be atomic. May be used to
+    /// save time; must not change any result.
+    pub alone: bool,
+}
+
 /// A compiled, immutable world; all that changes lives in its `State`.
 ///
 /// The methods are the phases of one cycle, in order. Each is called by several workers at
@@ -28,7 +38,7 @@ pub trait World: Sync {
     fn perceive_and_decide(
         &self,
         state: &Self::State,
-        now: Cycle,
+        turn: Turn,
         bodies: Range<usize>,
         scratch: &mut Self::Scratch,
     );

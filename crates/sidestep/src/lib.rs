@@ -2,10 +2,12 @@
 //! placeholder
 
 pub mod import;
+pub mod learn;
 pub mod map;
 pub mod office;
 pub mod planning;
 pub mod scenario;
+pub mod statistics;
 pub mod worlds;
 
 pub use map::{Cell, GridMap};

@@ -11,19 +11,51 @@
 //! together name the anchor. A list per patch of 8 x 8 boxes then names the body.
 
 use super::position::Position;
-use crate::column::Column;
-use crate::units::{Cycle, Slot};
+use crate::column::{Column, Word};
+use crate::units::Slot;
+use crate::world::Turn;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 /// Names a body among those that can claim one box.
 pub type Tag = u16;
 
+/// A tag as it is stored.
+pub trait StoredTag: Word + PartialEq {
+    /// The tag, cut to what is stored; nothing is lost.
+    fn of(tag: Tag) -> Self;
+    /// The tag.
+    fn tag(self) -> Tag;
+}
+
+impl StoredTag for u8 {
+    #[inline(always)]
+    fn of(tag: Tag) -> Self {
+        tag as Self
+    }
+    #[inline(always)]
+    fn tag(self) -> Tag {
+        Tag::from(self)
+    }
+}
+
+impl StoredTag for u16 {
+    #[inline(always)]
+    fn of(tag: Tag) -> Self {
+        tag
+    }
+    #[inline(always)]
+    fn tag(self) -> Tag {
+        self
+    }
+}
+
 /// Side of a patch of boxes that share a list of bodies, as a power of two.
 const PATCH_BITS: u32 = 3;
 const NO_BODY: u32 = u32::MAX;
 
+/// The tags of all boxes; match once, then work on one of the columns.
 #[derive(Debug, Clone)]
-enum Tags {
+pub enum Tags {
     /// Anchors modulo 16.
     Narrow(Column<u8>),
     /// Anchors modulo 256, for bodies that reach farther.
@@ -76,6 +108,12 @@ impl ClaimGrid {
         ((anchor.row() & mask) << bits | (anchor.col() & mask)) as Tag
     }
 
+    /// The tags of all boxes.
+    #[inline(always)]
+    pub fn tags(&self) -> &Tags {
+        &self.tags
+    }
+
     /// Writes `tag` into the box with this index.
     #[inline]
     pub fn claim(&self, at: u32, tag: Tag) {
@@ -96,9 +134,17 @@ impl ClaimGrid {
 
     /// Lists a body under its anchor for this cycle. Every body must, once a cycle.
     #[inline]
-    pub fn register(&self, body: Slot, anchor: Position, now: Cycle) {
-        let stamp = u64::from(now as u32) << 32;
-        let before = self.first[self.patch(anchor)].swap(stamp | u64::from(body), Relaxed);
+    pub fn register(&self, body: Slot, anchor: Position, turn: Turn) {
+        let stamp = u64::from(turn.now as u32) << 32;
+        let (first, entry) = (&self.first[self.patch(anchor)], stamp | u64::from(body));
+        let before = if turn.alone {
+            // Nobody else writes: the exchange need not be atomic, which is many times faster.
+            let before = first.load(Relaxed);
+            first.store(entry, Relaxed);
+            before
+        } else {
+            first.swap(entry, Relaxed)
+        };
         let next = if before >> 32 == stamp >> 32 { before as u32 } else { NO_BODY };
         self.next.set(body as usize, next);
     }
@@ -179,7 +225,7 @@ mod tests {
             };
             for now in 7..9 {
                 let slots = || 0..anchors.len() as Slot;
-                slots().for_each(|s| grid.register(s, anchor_of(s), now));
+                slots().for_each(|s| grid.register(s, anchor_of(s), Turn { now, alone: now == 7 }));
                 slots().for_each(|s| claims(s).iter().for_each(|&b| grid.claim(b, grid.tag(anchor_of(s)))));
                 for slot in slots() {
                     for at in claims(slot) {

@@ -150,13 +150,23 @@ pub struct Walk {
     pub turn: u8,
 }
 
-/// The boxes an action may sweep, as a tree of steps: what lies behind a wall is not claimed.
-#[derive(Debug, Clone)]
+/// The boxes an action may sweep, as a tree of steps, depth first: what lies behind a wall is
+/// not claimed.
+#[derive(Debug, Clone, Default)]
+pub struct Sweep {
+    /// The steps.
+    pub nodes: Box<[SweepNode]>,
+    /// Index offsets of the boxes entered, step after step.
+    pub boxes: Box<[i32]>,
+}
+
+/// One step of a [`Sweep`].
+#[derive(Debug, Clone, Copy)]
 pub struct SweepNode {
-    /// Boxes entered by this step.
-    pub enter: Box<[i32]>,
-    /// How many nodes to skip when a wall blocks this step: its whole subtree.
-    pub skip: u32,
+    /// End of its boxes; they begin where those of the step before end.
+    pub end: u32,
+    /// The next step to look at when a wall blocks this one: behind its whole subtree.
+    pub after: u32,
 }
 
 /// An action of a body type at a heading.
@@ -168,8 +178,8 @@ pub struct Action {
     pub probabilities: Vec<f64>,
     /// What the outcomes do.
     pub walks: Vec<Walk>,
-    /// Everything that may be swept, depth first.
-    pub sweep: Vec<SweepNode>,
+    /// Everything that may be swept.
+    pub sweep: Sweep,
 }
 
 /// Unit vectors of the headings east, north, west, south.
@@ -197,22 +207,29 @@ impl Action {
             .filter(|(t, _)| t.p > 0.0)
             .map(|(t, w)| (&t.path[..], &w.steps[..]))
             .collect();
-        let mut sweep = Vec::new();
-        push_sweep(&possible, 0, &mut sweep);
+        let (mut nodes, mut boxes) = (Vec::new(), Vec::new());
+        push_sweep(&possible, 0, &mut nodes, &mut boxes);
+        let sweep = Sweep { nodes: nodes.into(), boxes: boxes.into() };
         Ok(Self { distribution: Categorical::new(&probabilities)?, probabilities, walks, sweep })
     }
 }
 
 /// Appends the tree of the paths' steps from `depth` on: paths that start alike share nodes.
-fn push_sweep(paths: &[(&[Side], &[Step])], depth: usize, sweep: &mut Vec<SweepNode>) {
+fn push_sweep(
+    paths: &[(&[Side], &[Step])],
+    depth: usize,
+    nodes: &mut Vec<SweepNode>,
+    boxes: &mut Vec<i32>,
+) {
     for side in Side::ALL {
         let along: Vec<_> =
             paths.iter().copied().filter(|(path, _)| path.get(depth) == Some(&side)).collect();
         let Some((_, steps)) = along.first() else { continue };
-        let node = sweep.len();
-        sweep.push(SweepNode { enter: steps[depth].enter.clone(), skip: 0 });
-        push_sweep(&along, depth + 1, sweep);
-        sweep[node].skip = (sweep.len() - node) as u32;
+        boxes.extend_from_slice(&steps[depth].enter);
+        let node = nodes.len();
+        nodes.push(SweepNode { end: boxes.len() as u32, after: 0 });
+        push_sweep(&along, depth + 1, nodes, boxes);
+        nodes[node].after = nodes.len() as u32;
     }
 }
 

@@ -4,6 +4,7 @@ use super::state::RobotsState;
 use super::world::{RobotsWorld, Role};
 use crate::map::Cell;
 use serde::Serialize;
+use sidestep_kernel::Cycle;
 use std::collections::BTreeMap;
 
 /// Counters of one robot, or their sums over all robots.
@@ -42,31 +43,32 @@ pub struct Metrics {
 }
 
 impl RobotsWorld {
-    /// Counters of the robot in a slot.
-    pub fn counts(&self, state: &RobotsState, slot: u32) -> Counts {
-        let (i, kinds, t) = (slot as usize, self.kinds.len(), &state.tally);
-        let by_kind = (0..kinds).map(|k| u64::from(t.contacts.get(i * kinds + k)));
+    /// Counters of the robot in a slot after `cycle` cycles.
+    pub fn counts(&self, state: &RobotsState, cycle: Cycle, slot: u32) -> Counts {
+        let (i, kinds) = (slot as usize, self.kinds.len());
+        let cell = &state.bodies[i];
+        let by_kind = (0..kinds).map(|k| u64::from(state.contacts.get(i * kinds + k)));
         let named = self.kinds.iter().cloned().zip(by_kind.clone());
-        let trips = u64::from(t.trips.get(i));
+        let trips = u64::from(cell.trips.get());
         Counts {
-            actions: u64::from(t.actions.get(i)),
+            actions: self.bodies[i].actions_before(cycle),
             contacts: by_kind.sum(),
             contacts_by_kind: named.filter(|(_, n)| *n > 0).collect(),
-            distance_m: f64::from(t.moves.get(i)) * self.map.box_size_m,
+            distance_m: f64::from(cell.moves.get()) * self.map.box_size_m,
             trips,
-            trip_cycles_mean: (trips > 0).then(|| t.trip_cycles.get(i) as f64 / trips as f64),
-            first_visits: u64::from(t.first_visits.get(i)),
+            trip_cycles_mean: (trips > 0).then(|| cell.trip_cycles.get() as f64 / trips as f64),
+            first_visits: u64::from(cell.first_visits.get()),
         }
     }
 
-    /// Counters of all robots together.
-    pub fn totals(&self, state: &RobotsState) -> Counts {
+    /// Counters of all robots together after `cycle` cycles.
+    pub fn totals(&self, state: &RobotsState, cycle: Cycle) -> Counts {
         let mut total = Counts::default();
         let mut trip_cycles = 0;
         for &slot in &self.robot_slots {
             debug_assert!(matches!(self.body_type(slot).role, Role::Robot(_)));
-            let one = self.counts(state, slot);
-            trip_cycles += state.tally.trip_cycles.get(slot as usize);
+            let one = self.counts(state, cycle, slot);
+            trip_cycles += state.bodies[slot as usize].trip_cycles.get();
             total.actions += one.actions;
             total.contacts += one.contacts;
             total.distance_m += one.distance_m;
@@ -81,8 +83,14 @@ impl RobotsWorld {
     }
 
     /// Metrics of a run, with the group sizes its workers have seen.
-    pub fn metrics(&self, state: &RobotsState, group_sizes: &[u64], largest_group: u64) -> Metrics {
-        let total = self.totals(state);
+    pub fn metrics(
+        &self,
+        state: &RobotsState,
+        cycle: Cycle,
+        group_sizes: &[u64],
+        largest_group: u64,
+    ) -> Metrics {
+        let total = self.totals(state, cycle);
         let free = self.map.count(Cell::Free).max(1);
         let used = group_sizes.iter().rposition(|&n| n > 0).map_or(0, |k| k + 1);
         Metrics {

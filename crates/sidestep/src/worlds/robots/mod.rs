@@ -25,6 +25,7 @@ pub mod world;
 use effector::Side;
 use sensor::Reading;
 use sidestep_kernel::conflict::Groups;
+use sidestep_kernel::world::Turn;
 use sidestep_kernel::{Cycle, EntityId, Slot, World};
 use state::RobotsState;
 use std::ops::Range;
@@ -120,12 +121,12 @@ impl World for RobotsWorld {
     fn perceive_and_decide(
         &self,
         state: &RobotsState,
-        now: Cycle,
+        turn: Turn,
         bodies: Range<usize>,
         scratch: &mut Scratch,
     ) {
         for slot in bodies {
-            self.perceive_one(state, now, slot as Slot, scratch);
+            self.perceive_one(state, turn, slot as Slot, scratch);
         }
     }
 

@@ -1,12 +1,15 @@
 //! Pool one: bodies that are due perceive the frozen state, decide, and claim.
 
 use super::decide::{Contact, Decision, Heard, Memory, Percept, Trip};
-use super::effector::{Action, Side};
+use super::effector::{Side, Sweep};
 use super::sensor::Reading;
-use super::state::{IDLE, KIND_BITS, RobotsState, WALL, pose_word};
+use super::state::{BodyCell, FREE, IDLE, KIND_BITS, RobotsState, WALL, pose_word};
 use super::world::{Door, Mover, RobotModel, RobotsWorld, Role, purpose};
 use super::{Scratch, SensorSample};
+use sidestep_kernel::Column;
 use sidestep_kernel::column::Word;
+use sidestep_kernel::space::{StoredTag, Tag, Tags};
+use sidestep_kernel::world::Turn;
 use sidestep_kernel::{Cycle, Slot};
 
 impl RobotsWorld {
@@ -15,16 +18,17 @@ impl RobotsWorld {
     pub(super) fn perceive_one(
         &self,
         state: &RobotsState,
-        now: Cycle,
+        turn: Turn,
         slot: Slot,
         scratch: &mut Scratch,
     ) {
-        let i = slot as usize;
-        let at = state.at(slot);
-        state.claims.register(slot, at, now);
+        let (i, now) = (slot as usize, turn.now);
+        let cell = &state.bodies[i];
+        let at = cell.at();
+        state.claims.register(slot, at, turn);
         if let Some(frames) = &state.frames {
             let index = i * frames.capacity + (now - frames.first) as usize;
-            frames.poses.set(index, pose_word(at, state.facing.get(i)));
+            frames.poses.set(index, pose_word(at, cell.facing.get()));
         }
         let body = &self.bodies[i];
         let intent = if body.is_due(now) {
@@ -36,7 +40,7 @@ impl RobotsWorld {
         } else {
             IDLE
         };
-        state.intent.set(i, intent);
+        cell.intent.set(intent);
         if intent != IDLE {
             self.claim(state, slot, intent);
         }
@@ -52,7 +56,7 @@ impl RobotsWorld {
         scratch: &mut Scratch,
     ) -> u8 {
         let i = slot as usize;
-        let id = self.bodies[i].id;
+        let (id, cell) = (self.bodies[i].id, &state.bodies[i]);
         self.sense(model, state, now, slot, scratch);
         scratch.heard.clear();
         if let Some(radio) = &self.radio {
@@ -62,15 +66,15 @@ impl RobotsWorld {
             now,
             readings: &scratch.readings,
             sectors: &model.body.sectors,
-            contact: contact_of_word(state.contact.get(i)),
-            at: self.map_position(state.at(slot)),
-            heading: state.facing.get(i),
+            contact: contact_of_word(cell.contact.get()),
+            at: self.map_position(cell.at()),
+            heading: cell.facing.get(),
             heard: &scratch.heard,
         };
-        let mut memory = memory_of(state, i);
+        let mut memory = memory_of(cell);
         let mut draws = self.streams.draws(id, now, purpose::DECIDE);
         let decision = model.behaviour.decide(&percept, &mut memory, &mut draws);
-        store_memory(state, i, memory);
+        store_memory(cell, memory);
         self.note(state, now, i, decision);
         let known = (decision.action as usize) < model.body.actions[0].len();
         debug_assert!(known, "behaviours choose among the effector's actions");
@@ -80,14 +84,13 @@ impl RobotsWorld {
     /// Counts what the decision says beside the action.
     #[inline]
     fn note(&self, state: &RobotsState, now: Cycle, i: usize, decision: Decision) {
-        let tally = &state.tally;
-        tally.actions.add(i, 1);
         if let Some(trip) = decision.trip {
+            let cell = &state.bodies[i];
             if trip == Trip::Done {
-                tally.trips.add(i, 1);
-                tally.trip_cycles.add(i, now - tally.trip_begun.get(i));
+                cell.trips.set(cell.trips.get() + 1);
+                cell.trip_cycles.set(cell.trip_cycles.get() + now - cell.trip_begun.get());
             }
-            tally.trip_begun.set(i, now);
+            cell.trip_begun.set(now);
         }
         if self.radio.is_some() {
             let (heard_now, heard_next) =
@@ -108,39 +111,33 @@ impl RobotsWorld {
     ) {
         let i = slot as usize;
         let base = state.at(slot).index(self.stride);
-        let heading = usize::from(state.facing.get(i));
+        let heading = usize::from(state.bodies[i].facing.get());
         let boxes = state.grid.cells();
         scratch.readings.clear();
         for (s, sensor) in model.body.sensors.iter().enumerate() {
             let rays = &sensor.rays[heading];
-            let mut words = [0; 4];
             let mut from = 0;
-            for (beam, &end) in rays.ends.iter().enumerate() {
-                let truth = match first_hit(boxes, base, &rays.offsets[from..usize::from(end)]) {
-                    Some((step, kind)) => sensor.truth(kind, sensor.classes[from + step]),
-                    None => sensor.nothing,
-                };
-                from = usize::from(end);
-                let reported = if sensor.table.reliable {
-                    truth
+            for (block, ends) in rays.ends.chunks(4).enumerate() {
+                let words = if sensor.table.reliable {
+                    [0; 4]
                 } else {
-                    if beam % 4 == 0 {
-                        let purpose = purpose::sense(s);
-                        words =
-                            self.streams.block(self.bodies[i].id, now, purpose, (beam / 4) as u16);
-                    }
-                    sensor.table.report(truth, words[beam % 4])
+                    let (id, purpose) = (self.bodies[i].id, purpose::sense(s));
+                    self.streams.block(id, now, purpose, block as u16)
                 };
-                scratch.readings.push(reported);
-                if scratch.keep_samples {
-                    let robot = self.bodies[i].id;
-                    scratch.sensor_samples.push(SensorSample {
-                        cycle: now,
-                        robot,
-                        sensor: s as u16,
-                        truth,
-                        reported,
-                    });
+                for (&end, word) in ends.iter().zip(words) {
+                    let end = usize::from(end);
+                    let truth = match first_hit(boxes, base, &rays.offsets[from..end]) {
+                        Some((step, kind)) => sensor.truth(kind, sensor.classes[from + step]),
+                        None => sensor.nothing,
+                    };
+                    let reported = sensor.table.report(truth, word);
+                    scratch.readings.push(reported);
+                    if scratch.keep_samples {
+                        let (robot, sensor) = (self.bodies[i].id, s as u16);
+                        let sample = SensorSample { cycle: now, robot, sensor, truth, reported };
+                        scratch.sensor_samples.push(sample);
+                    }
+                    from = end;
                 }
             }
         }
@@ -151,15 +148,14 @@ impl RobotsWorld {
         let i = slot as usize;
         let words = self.streams.block(self.bodies[i].id, now, purpose::MOVE, 0);
         if !mover.straight.happens(words[0]) {
-            state.facing.set(i, (words[1] >> 30) as u8);
+            state.bodies[i].facing.set((words[1] >> 30) as u8);
         }
-        state.tally.actions.add(i, 1);
         1
     }
 
     /// A door tries to toggle when its schedule says so; a closing that is in the way waits.
     fn door_wants(&self, door: &Door, state: &RobotsState, now: Cycle, slot: Slot) -> u8 {
-        let is_open = state.facing.get(slot as usize) == 1;
+        let is_open = state.bodies[slot as usize].facing.get() == 1;
         let wants_open = door.wants_open(is_open, now, || {
             self.streams.block(self.bodies[slot as usize].id, now, purpose::DOOR, 0)[0]
         });
@@ -172,9 +168,25 @@ impl RobotsWorld {
     fn claim(&self, state: &RobotsState, slot: Slot, intent: u8) {
         let at = state.at(slot);
         let (base, tag) = (at.index(self.stride), state.claims.tag(at));
+        match state.claims.tags() {
+            Tags::Narrow(tags) => self.claim_in(tags, state, slot, (base, tag), intent),
+            Tags::Wide(tags) => self.claim_in(tags, state, slot, (base, tag), intent),
+        }
+    }
+
+    #[inline]
+    fn claim_in<T: StoredTag>(
+        &self,
+        tags: &Column<T>,
+        state: &RobotsState,
+        slot: Slot,
+        (base, tag): (u32, Tag),
+        intent: u8,
+    ) {
+        let tag = T::of(tag);
         self.for_each_claimed(state, slot, base, intent, |index, kind| {
-            if kind == 0 {
-                state.claims.claim(index, tag);
+            if kind == FREE {
+                tags.set(index, tag);
             }
         });
     }
@@ -188,48 +200,46 @@ impl RobotsWorld {
         slot: Slot,
         base: u32,
         intent: u8,
-        mut each: impl FnMut(u32, u8),
+        each: impl FnMut(usize, u8),
     ) {
-        match &self.body_type(slot).role {
+        let body = self.body_type(slot);
+        let heading = usize::from(state.bodies[slot as usize].facing.get());
+        match &body.role {
             Role::Robot(model) => {
-                let heading = usize::from(state.facing.get(slot as usize));
-                sweep(
-                    state,
-                    &model.body.actions[heading][usize::from(intent - 1)],
-                    base,
-                    &mut each,
-                );
+                let actions = &model.body.actions[heading];
+                sweep(&state.grid, &actions[usize::from(intent - 1)].sweep, base, each);
             }
-            Role::Mover(mover) => {
-                let heading = usize::from(state.facing.get(slot as usize));
-                sweep(state, &mover.steps[heading], base, &mut each);
-            }
-            Role::Door(_) => {
-                for &offset in &self.body_type(slot).own {
-                    let index = base.wrapping_add_signed(offset);
-                    each(index, state.kind_at(index));
-                }
-            }
+            Role::Mover(mover) => sweep(&state.grid, &mover.steps[heading].sweep, base, each),
+            Role::Door(_) => sweep_own(&state.grid, &body.own, base, each),
         }
     }
 }
 
 /// Walks the tree of an action's steps; what lies behind a wall is left out.
 #[inline]
-fn sweep(state: &RobotsState, action: &Action, base: u32, each: &mut impl FnMut(u32, u8)) {
-    let mut node = 0;
-    while let Some(step) = action.sweep.get(node) {
+fn sweep(grid: &Column<u8>, sweep: &Sweep, base: u32, mut each: impl FnMut(usize, u8)) {
+    let (mut node, mut from) = (0, 0);
+    while let Some(step) = sweep.nodes.get(node) {
         let mut walled = false;
-        for &offset in &step.enter {
-            let index = base.wrapping_add_signed(offset);
-            let kind = state.kind_at(index);
+        for &offset in &sweep.boxes[from..step.end as usize] {
+            let index = base.wrapping_add_signed(offset) as usize;
+            let kind = grid.get(index) & KIND_BITS;
             if kind == WALL {
                 walled = true;
             } else {
                 each(index, kind);
             }
         }
-        node += if walled { step.skip as usize } else { 1 };
+        node = if walled { step.after as usize } else { node + 1 };
+        from = if node == 0 { 0 } else { sweep.nodes[node - 1].end as usize };
+    }
+}
+
+/// A door claims the boxes it opens or closes.
+fn sweep_own(grid: &Column<u8>, own: &[i32], base: u32, mut each: impl FnMut(usize, u8)) {
+    for &offset in own {
+        let index = base.wrapping_add_signed(offset) as usize;
+        each(index, grid.get(index) & KIND_BITS);
     }
 }
 
@@ -267,16 +277,13 @@ pub(super) fn contact_of_word(word: u16) -> Option<Contact> {
 }
 
 #[inline]
-fn memory_of(state: &RobotsState, i: usize) -> Memory {
-    let [a, b] = [state.memory[0].get(i), state.memory[1].get(i)];
-    Memory { words: [a as u32, (a >> 32) as u32, b as u32, (b >> 32) as u32] }
+fn memory_of(cell: &BodyCell) -> Memory {
+    Memory { words: std::array::from_fn(|k| cell.memory[k].get()) }
 }
 
 #[inline]
-fn store_memory(state: &RobotsState, i: usize, memory: Memory) {
-    let [a, b, c, d] = memory.words.map(u64::from);
-    state.memory[0].set(i, a | b << 32);
-    state.memory[1].set(i, c | d << 32);
+fn store_memory(cell: &BodyCell, memory: Memory) {
+    cell.memory.iter().zip(memory.words).for_each(|(word, value)| word.set(value));
 }
 
 /// A true or reported reading by name of its sensor's entries, for logs.

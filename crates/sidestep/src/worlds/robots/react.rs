@@ -21,11 +21,11 @@ impl RobotsWorld {
     #[inline]
     pub(super) fn act(&self, state: &RobotsState, now: Cycle, slot: Slot, scratch: &mut Scratch) {
         let i = slot as usize;
-        let intent = state.intent.get(i);
+        let intent = state.bodies[i].intent.get();
         if intent == IDLE {
             return;
         }
-        let heading = usize::from(state.facing.get(i));
+        let heading = usize::from(state.bodies[i].facing.get());
         match &self.body_type(slot).role {
             Role::Robot(model) => {
                 let action = &model.body.actions[heading][usize::from(intent - 1)];
@@ -72,14 +72,14 @@ impl RobotsWorld {
         }
         match verdict.contact {
             None => {
-                state.contact.set(i, 0);
+                state.bodies[i].contact.set(0);
                 if walk.turn != 0 {
-                    state.facing.set(i, (state.facing.get(i) + walk.turn) % 4);
+                    state.bodies[i].facing.set((state.bodies[i].facing.get() + walk.turn) % 4);
                 }
             }
             Some((kind, side)) => {
-                state.contact.set(i, contact_word(kind, side as u8));
-                state.tally.contacts.add(i * self.kinds.len() + usize::from(kind), 1);
+                state.bodies[i].contact.set(contact_word(kind, side as u8));
+                state.contacts.add(i * self.kinds.len() + usize::from(kind), 1);
                 if scratch.keep_events {
                     let body = self.bodies[i].id;
                     let event = EventKind::Contact { kind, side };
@@ -139,10 +139,11 @@ impl RobotsWorld {
         for &offset in &body.own {
             state.claims.claim(index.wrapping_add_signed(offset), tag);
         }
-        state.anchor.set(i, moved.word());
-        state.tally.moves.add(i, steps as u32);
+        state.bodies[i].anchor.set(moved.word());
+        let cell = &state.bodies[i];
+        cell.moves.set(cell.moves.get() + steps as u32);
         if body.marks != 0 && first_visits > 0 {
-            state.tally.first_visits.add(i, first_visits);
+            cell.first_visits.set(cell.first_visits.get() + first_visits);
         }
     }
 
@@ -175,7 +176,7 @@ impl RobotsWorld {
         let body = self.body_type(slot);
         let base = state.at(slot).index(self.stride);
         let boxes = || body.own.iter().map(|&o| base.wrapping_add_signed(o));
-        let opens = state.facing.get(i) == 0;
+        let opens = state.bodies[i].facing.get() == 0;
         if !opens && boxes().any(|b| state.kind_at(b) != FREE) {
             return;
         }
@@ -187,8 +188,7 @@ impl RobotsWorld {
         } else {
             state.occupy(self, slot);
         }
-        state.facing.set(i, u8::from(opens));
-        state.tally.actions.add(i, 1);
+        state.bodies[i].facing.set(u8::from(opens));
         if scratch.keep_events {
             let event = if opens { EventKind::Opened } else { EventKind::Closed };
             scratch.events.push(Event { cycle: now, body: self.bodies[i].id, event });
@@ -219,7 +219,7 @@ impl RobotsWorld {
         scratch.motion_samples.push(MotionSample {
             cycle: now,
             robot: self.bodies[i].id,
-            action: state.intent.get(i) - 1,
+            action: state.bodies[i].intent.get() - 1,
             ahead,
             left,
             quarter_turns: walk.turn,

@@ -5,7 +5,8 @@ use super::state::{IDLE, RobotsState};
 use super::world::{RobotsWorld, Role, purpose};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::conflict::Groups;
-use sidestep_kernel::{Cycle, Slot};
+use sidestep_kernel::space::{StoredTag, Tags};
+use sidestep_kernel::{Column, Cycle, Slot};
 
 /// The order within a conflict group.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -48,16 +49,32 @@ impl RobotsWorld {
     /// another's tag, be it of a body that stands there or of one that may come too.
     #[inline]
     pub(super) fn join_one(&self, state: &RobotsState, slot: Slot, groups: &Groups) {
-        let intent = state.intent.get(slot as usize);
+        let intent = state.bodies[slot as usize].intent.get();
         if intent == IDLE {
             return;
         }
+        match state.claims.tags() {
+            Tags::Narrow(tags) => self.join_in(tags, state, slot, intent, groups),
+            Tags::Wide(tags) => self.join_in(tags, state, slot, intent, groups),
+        }
+    }
+
+    #[inline]
+    fn join_in<T: StoredTag>(
+        &self,
+        tags: &Column<T>,
+        state: &RobotsState,
+        slot: Slot,
+        intent: u8,
+        groups: &Groups,
+    ) {
         let at = state.at(slot);
-        let own = state.claims.tag(at);
+        let own = T::of(state.claims.tag(at));
         self.for_each_claimed(state, slot, at.index(self.stride), intent, |index, _| {
-            let tag = state.claims.claimant(index);
+            let tag = tags.get(index);
             if tag != own {
-                groups.join(slot, state.claims.body(index, tag, |other| state.at(other)));
+                let other = state.claims.body(index as u32, tag.tag(), |body| state.at(body));
+                groups.join(slot, other);
             }
         });
     }
@@ -113,7 +130,7 @@ impl RobotsWorld {
     /// Doors have no heading and go first.
     fn heading_of(&self, state: &RobotsState, slot: Slot) -> Option<u8> {
         let is_door = matches!(self.body_type(slot).role, Role::Door(_));
-        (!is_door).then(|| state.facing.get(slot as usize))
+        (!is_door).then(|| state.bodies[slot as usize].facing.get())
     }
 
     /// Whoever heads `h` sees on its right those that head `h + 1` (a quarter to the left),

@@ -4,7 +4,7 @@
 //! classes with a confusion matrix of their own). Both draws, observation and class, are
 //! independent given the true pair, so they are one draw from their joint distribution.
 
-use sidestep_kernel::distr::{Categorical, RowError};
+use sidestep_kernel::distr::{RowError, check_row};
 
 /// Index of the observation `nothing`, always the first.
 pub const NOTHING: u8 = 0;
@@ -79,19 +79,26 @@ impl SensorModel {
     }
 }
 
-/// The joint distribution of readings, ready to draw from.
+/// The joint distribution of readings, ready to draw from with one word and no branch.
+///
+/// Each true reading has a row of `2^bits` columns of equal probability; a column is split
+/// between at most two reports (Walker's alias method, built by Vose's algorithm). A report
+/// has its probability within 2^-31.
 #[derive(Debug, Clone)]
 pub struct ReadingTable {
     classes: usize,
-    rows: Vec<Row>,
+    bits: u32,
+    columns: Box<[Split]>,
     /// True when every reading is the truth and no draw is needed.
     pub reliable: bool,
 }
 
-#[derive(Debug, Clone)]
-struct Row {
-    outcomes: Vec<Reading>,
-    distribution: Categorical,
+/// One column of a row: below the threshold `low` is reported, else `high`.
+#[derive(Debug, Clone, Copy)]
+struct Split {
+    threshold: u32,
+    low: Reading,
+    high: Reading,
 }
 
 impl ReadingTable {
@@ -101,31 +108,83 @@ impl ReadingTable {
     /// When a row is no distribution; scenarios check that earlier and say where.
     pub fn new(sensor: &SensorModel, reliable: bool) -> Result<Self, RowError> {
         let classes = sensor.distance_classes.len() + 1;
-        let mut rows = Vec::new();
-        for observation in 0..sensor.observations.len() as u8 {
+        let observations = sensor.observations.len();
+        let most = 1 + (observations - 1) * (classes - 1);
+        let bits = most.next_power_of_two().ilog2();
+        let mut columns = Vec::with_capacity((observations * classes) << bits);
+        for observation in 0..observations as u8 {
             for class in 0..classes as u8 {
-                rows.push(Row::new(sensor, Reading { observation, class }, reliable)?);
+                let row = sensor.reading_row(Reading { observation, class }, reliable);
+                check_row(&row.iter().map(|r| r.1).collect::<Vec<_>>())?;
+                columns.extend(alias_columns(row, 1 << bits));
             }
         }
-        Ok(Self { classes, rows, reliable })
+        Ok(Self { classes, bits, columns: columns.into(), reliable })
     }
 
     /// What is reported for `truth` with the uniform word `u`.
     #[inline]
     pub fn report(&self, truth: Reading, u: u32) -> Reading {
-        let row =
-            &self.rows[usize::from(truth.observation) * self.classes + usize::from(truth.class)];
-        row.outcomes[row.distribution.sample(u)]
+        let row = usize::from(truth.observation) * self.classes + usize::from(truth.class);
+        let column = (u64::from(u) << self.bits >> 32) as usize;
+        let split = &self.columns[row << self.bits | column];
+        if u << self.bits < split.threshold { split.low } else { split.high }
     }
 }
 
-impl Row {
-    /// The likeliest outcome comes first, since a draw compares from the front.
-    fn new(sensor: &SensorModel, truth: Reading, reliable: bool) -> Result<Self, RowError> {
-        let mut row = sensor.reading_row(truth, reliable);
-        row.sort_by(|a, b| b.1.total_cmp(&a.1));
-        let probabilities: Vec<f64> = row.iter().map(|r| r.1).collect();
-        let outcomes = row.into_iter().map(|r| r.0).collect();
-        Ok(Self { outcomes, distribution: Categorical::new(&probabilities)? })
+/// Splits a row into `n` columns of probability 1/n each.
+fn alias_columns(mut row: Vec<(Reading, f64)>, n: usize) -> Vec<Split> {
+    let padding = row[0].0;
+    row.resize(n, (padding, 0.0));
+    let mut weights: Vec<f64> = row.iter().map(|r| r.1 * n as f64).collect();
+    let (mut small, mut large): (Vec<usize>, Vec<usize>) = (0..n).partition(|&i| weights[i] < 1.0);
+    let full = |reading| Split { threshold: u32::MAX, low: reading, high: reading };
+    let mut columns: Vec<Split> = row.iter().map(|r| full(r.0)).collect();
+    while let (Some(&of), Some(from)) = (small.last(), large.last().copied()) {
+        small.pop();
+        let threshold = (weights[of] * (1u64 << 32) as f64).round() as u32;
+        columns[of] = Split { threshold, low: row[of].0, high: row[from].0 };
+        weights[from] -= 1.0 - weights[of];
+        if weights[from] < 1.0 {
+            large.pop();
+            small.push(from);
+        }
+    }
+    // What is left is full but for rounding; an impossible reading must not be among it.
+    for i in small.into_iter().filter(|&i| row[i].1 == 0.0) {
+        columns[i] = columns[(0..n).max_by(|&a, &b| row[a].1.total_cmp(&row[b].1)).unwrap_or(i)];
+        columns[i].low = columns[i].high;
+    }
+    columns
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn the_columns_of_a_row_hold_its_probabilities(weights in prop::collection::vec(0u32..100, 1..16)) {
+            let sum: u32 = weights.iter().sum();
+            prop_assume!(sum > 0);
+            let row: Vec<_> = weights
+                .iter()
+                .enumerate()
+                .map(|(i, &w)| (Reading { observation: i as u8, class: 0 }, f64::from(w) / f64::from(sum)))
+                .collect();
+            let columns = alias_columns(row.clone(), 16);
+            let mut held = [0.0; 16];
+            for split in &columns {
+                let low = f64::from(split.threshold) / (1u64 << 32) as f64;
+                let is_full = split.low == split.high;
+                held[usize::from(split.low.observation)] += if is_full { 1.0 } else { low };
+                held[usize::from(split.high.observation)] += if is_full { 0.0 } else { 1.0 - low };
+            }
+            for (i, (_, p)) in row.iter().enumerate() {
+                prop_assert!((held[i] / 16.0 - p).abs() < 1e-8);
+                prop_assert!(*p > 0.0 || held[i] == 0.0);
+            }
+        }
     }
 }

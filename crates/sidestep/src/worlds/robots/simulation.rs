@@ -142,10 +142,7 @@ impl RobotsSimulation {
     pub fn order(&mut self, robot: EntityId, action: u8) {
         use super::decide::ORDER;
         let slot = self.compiled.world.slot(robot) as usize;
-        let memory = &self.state.memory[ORDER / 2];
-        let shift = 32 * (ORDER % 2);
-        let kept = memory.get(slot) & !(u64::from(u32::MAX) << shift);
-        memory.set(slot, kept | (u64::from(action) + 1) << shift);
+        self.state.bodies[slot].memory[ORDER].set(u32::from(action) + 1);
     }
 
     /// Metrics so far.
@@ -156,7 +153,7 @@ impl RobotsSimulation {
             sizes.iter_mut().zip(mate.group_sizes).for_each(|(sum, n)| *sum += n);
             largest = largest.max(mate.largest_group);
         }
-        self.compiled.world.metrics(&self.state, &sizes, largest)
+        self.compiled.world.metrics(&self.state, self.cycle, &sizes, largest)
     }
 
     /// Bytes on the heap that grow with the boxes, and with the bodies.
@@ -422,9 +419,9 @@ impl Compiled {
             at,
             facing,
             contact: 0,
-            memory: [0; 2],
+            memory: [0; 4],
             voice: 0,
-            counts: [0; 4],
+            counts: [0; 3],
             trip: [0; 2],
             contacts: vec![0; kinds],
         };

@@ -2,6 +2,7 @@
 
 use super::world::{RobotsWorld, Role};
 use serde::{Deserialize, Serialize};
+use sidestep_kernel::column::Shared;
 use sidestep_kernel::digest::Hasher;
 use sidestep_kernel::space::{ClaimGrid, Position};
 use sidestep_kernel::{Column, Cycle, Digest, Slot};
@@ -25,18 +26,10 @@ pub struct RobotsState {
     pub grid: Column<u8>,
     /// Who claims which box this cycle.
     pub claims: ClaimGrid,
-    /// Lower-left box of each body, a [`Position`] word.
-    pub anchor: Column<u32>,
-    /// Heading (0 east, 1 north, 2 west, 3 south); of a door: 1 open, 0 closed.
-    pub facing: Column<u8>,
-    /// What each body is about to do this cycle.
-    pub intent: Column<u8>,
-    /// Outcome of the last action, see [`contact_word`].
-    pub contact: Column<u16>,
-    /// Words 0 and 1, words 2 and 3 of each robot's memory.
-    pub memory: [Column<u64>; 2],
-    /// Counters of each body.
-    pub tally: Tally,
+    /// What changes of each body, by slot.
+    pub bodies: Box<[BodyCell]>,
+    /// Contacts of each body by kind touched: `slot * kinds + kind`.
+    pub contacts: Column<u32>,
     /// Last broadcast of each robot, by parity of the cycle in which it is read; empty
     /// columns without radio.
     pub voice: [Column<u64>; 2],
@@ -44,23 +37,38 @@ pub struct RobotsState {
     pub frames: Option<Frames>,
 }
 
-/// Counters per body.
-#[derive(Debug)]
-pub struct Tally {
-    /// Actions begun.
-    pub actions: Column<u32>,
+/// One body's share of the state, in one cache line.
+#[derive(Debug, Default)]
+#[repr(align(64))]
+pub struct BodyCell {
+    /// Lower-left box, a [`Position`] word.
+    pub anchor: Shared<u32>,
+    /// Heading (0 east, 1 north, 2 west, 3 south); of a door: 1 open, 0 closed.
+    pub facing: Shared<u8>,
+    /// What the body is about to do this cycle.
+    pub intent: Shared<u8>,
+    /// Outcome of the last action, see [`contact_word`].
+    pub contact: Shared<u16>,
+    /// A robot's memory.
+    pub memory: [Shared<u32>; 4],
     /// Unit moves made, in boxes.
-    pub moves: Column<u32>,
+    pub moves: Shared<u32>,
     /// Boxes this robot was the first to cover.
-    pub first_visits: Column<u32>,
+    pub first_visits: Shared<u32>,
     /// Trips completed.
-    pub trips: Column<u32>,
+    pub trips: Shared<u32>,
     /// Cycles spent on completed trips.
-    pub trip_cycles: Column<u64>,
+    pub trip_cycles: Shared<u64>,
     /// Cycle in which the present trip began.
-    pub trip_begun: Column<u64>,
-    /// Contacts by kind touched: `slot * kinds + kind`.
-    pub contacts: Column<u32>,
+    pub trip_begun: Shared<u64>,
+}
+
+impl BodyCell {
+    /// The lower-left box.
+    #[inline(always)]
+    pub fn at(&self) -> Position {
+        Position::from_word(self.anchor.get())
+    }
 }
 
 /// Poses of all bodies over some cycles; each body's are together.
@@ -108,11 +116,11 @@ pub struct BodyRecord {
     /// See [`contact_word`].
     pub contact: u16,
     /// The robot's memory.
-    pub memory: [u64; 2],
+    pub memory: [u32; 4],
     /// Last broadcast.
     pub voice: u64,
-    /// actions, moves, first visits, trips.
-    pub counts: [u32; 4],
+    /// moves, first visits, trips.
+    pub counts: [u32; 3],
     /// Cycles of completed trips, and the cycle in which the present one began.
     pub trip: [u64; 2],
     /// Contacts by kind.
@@ -135,27 +143,13 @@ impl RobotsState {
     /// An empty building: no body stands anywhere yet.
     pub(super) fn empty(world: &RobotsWorld) -> Self {
         let n = world.bodies.len();
-        let words = || Column::filled(n, 0u32);
-        let longs = || Column::filled(n, 0u64);
         let radio = || Column::filled(if world.radio.is_some() { n } else { 0 }, 0u64);
         let (reach, extent) = world.extent;
         Self {
             grid: world.walls.iter().copied().collect(),
             claims: ClaimGrid::new(world.stride, world.rows, n, reach, extent),
-            anchor: words(),
-            facing: Column::filled(n, 0),
-            intent: Column::filled(n, IDLE),
-            contact: Column::filled(n, 0),
-            memory: [longs(), longs()],
-            tally: Tally {
-                actions: words(),
-                moves: words(),
-                first_visits: words(),
-                trips: words(),
-                trip_cycles: longs(),
-                trip_begun: longs(),
-                contacts: Column::filled(n * world.kinds.len(), 0),
-            },
+            bodies: (0..n).map(|_| BodyCell::default()).collect(),
+            contacts: Column::filled(n * world.kinds.len(), 0),
             voice: [radio(), radio()],
             frames: None,
         }
@@ -170,7 +164,7 @@ impl RobotsState {
     /// The anchor of a body.
     #[inline(always)]
     pub fn at(&self, slot: Slot) -> Position {
-        Position::from_word(self.anchor.get(slot as usize))
+        self.bodies[slot as usize].at()
     }
 
     /// The state in the order of ids after `cycle` cycles.
@@ -180,18 +174,18 @@ impl RobotsState {
     }
 
     fn record(&self, world: &RobotsWorld, i: usize, cycle: Cycle) -> BodyRecord {
-        let t = &self.tally;
+        let body = &self.bodies[i];
         let kinds = world.kinds.len();
         let voice = &self.voice[(cycle % 2) as usize];
         BodyRecord {
-            at: world.map_position(self.at(i as Slot)),
-            facing: self.facing.get(i),
-            contact: self.contact.get(i),
-            memory: [self.memory[0].get(i), self.memory[1].get(i)],
+            at: world.map_position(body.at()),
+            facing: body.facing.get(),
+            contact: body.contact.get(),
+            memory: std::array::from_fn(|k| body.memory[k].get()),
             voice: if voice.is_empty() { 0 } else { voice.get(i) },
-            counts: [t.actions.get(i), t.moves.get(i), t.first_visits.get(i), t.trips.get(i)],
-            trip: [t.trip_cycles.get(i), t.trip_begun.get(i)],
-            contacts: (0..kinds).map(|k| t.contacts.get(i * kinds + k)).collect(),
+            counts: [body.moves.get(), body.first_visits.get(), body.trips.get()],
+            trip: [body.trip_cycles.get(), body.trip_begun.get()],
+            contacts: (0..kinds).map(|k| self.contacts.get(i * kinds + k)).collect(),
         }
     }
 
@@ -220,21 +214,20 @@ impl RobotsState {
     }
 
     fn put(&self, world: &RobotsWorld, i: usize, record: &BodyRecord) {
-        let t = &self.tally;
-        self.facing.set(i, record.facing);
-        self.contact.set(i, record.contact);
-        (0..2).for_each(|k| self.memory[k].set(i, record.memory[k]));
+        let body = &self.bodies[i];
+        body.facing.set(record.facing);
+        body.contact.set(record.contact);
+        (0..4).for_each(|k| body.memory[k].set(record.memory[k]));
         self.voice.iter().filter(|v| !v.is_empty()).for_each(|v| v.set(i, record.voice));
-        for (column, &count) in
-            [&t.actions, &t.moves, &t.first_visits, &t.trips].into_iter().zip(&record.counts)
-        {
-            column.set(i, count);
-        }
-        t.trip_cycles.set(i, record.trip[0]);
-        t.trip_begun.set(i, record.trip[1]);
+        let [moves, first_visits, trips] = record.counts;
+        body.moves.set(moves);
+        body.first_visits.set(first_visits);
+        body.trips.set(trips);
+        body.trip_cycles.set(record.trip[0]);
+        body.trip_begun.set(record.trip[1]);
         let kinds = world.kinds.len();
-        record.contacts.iter().enumerate().for_each(|(k, &c)| t.contacts.set(i * kinds + k, c));
-        self.anchor.set(i, world.grid_position(record.at).word());
+        record.contacts.iter().enumerate().for_each(|(k, &c)| self.contacts.set(i * kinds + k, c));
+        body.anchor.set(world.grid_position(record.at).word());
         let is_open_door =
             matches!(world.body_type(i as Slot).role, Role::Door(_)) && record.facing == 1;
         if !is_open_door {
@@ -259,18 +252,9 @@ impl RobotsState {
     /// Bytes on the heap that grow with the boxes, and with the bodies.
     pub fn heap_bytes(&self) -> (usize, usize) {
         let (claims_boxes, claims_bodies) = self.claims.heap_bytes();
-        let t = &self.tally;
-        let words = [&t.actions, &t.moves, &t.first_visits, &t.trips, &t.contacts, &self.anchor];
-        let longs = [&self.memory[0], &self.memory[1], &t.trip_cycles, &t.trip_begun];
-        let bodies = words.iter().map(|c| c.heap_bytes()).sum::<usize>()
-            + longs
-                .iter()
-                .chain(&[&self.voice[0], &self.voice[1]])
-                .map(|c| c.heap_bytes())
-                .sum::<usize>()
-            + self.facing.heap_bytes()
-            + self.intent.heap_bytes()
-            + self.contact.heap_bytes();
+        let bodies = std::mem::size_of_val(&*self.bodies)
+            + self.contacts.heap_bytes()
+            + self.voice.iter().map(Column::heap_bytes).sum::<usize>();
         (self.grid.heap_bytes() + claims_boxes, bodies + claims_bodies)
     }
 }
@@ -286,8 +270,9 @@ impl Snapshot {
             hasher.u32(body.at.1);
             hasher.u8(body.facing);
             hasher.u32(u32::from(body.contact));
-            body.memory.iter().chain(&body.trip).chain([&body.voice]).for_each(|&w| hasher.u64(w));
-            body.counts.iter().chain(&body.contacts).for_each(|&w| hasher.u32(w));
+            body.trip.iter().chain([&body.voice]).for_each(|&w| hasher.u64(w));
+            let words = body.memory.iter().chain(&body.counts).chain(&body.contacts);
+            words.for_each(|&w| hasher.u32(w));
         }
         hasher.bytes(&self.visited);
         hasher.finish()

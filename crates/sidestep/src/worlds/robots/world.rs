@@ -124,6 +124,13 @@ pub struct Body {
 }
 
 impl Body {
+    /// How many actions the body has begun before this cycle.
+    pub fn actions_before(&self, cycle: Cycle) -> u64 {
+        let (period, phase) = (u64::from(self.period), u64::from(self.phase));
+        // Multiples of the period in `phase..cycle + phase`.
+        (cycle + phase).div_ceil(period) - phase.div_ceil(period)
+    }
+
     /// Whether the body acts in this cycle.
     #[inline]
     pub fn is_due(&self, now: Cycle) -> bool {

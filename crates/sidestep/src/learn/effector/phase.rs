@@ -1,0 +1,99 @@
+//! From a displacement in the plane to moves on a grid.
+//!
+//! The simulation knows boxes only. Where in its box a robot stood when it began to move is
+//! not told by a log; *phase averaging* takes all places as equally likely and asks how often
+//! each box is reached: a displacement of 1.2 boxes ends 1 box ahead with probability 0.8 and
+//! 2 ahead with 0.2. Ahead, left and turn are averaged independently, the turn in quarters of
+//! 90 degrees. *Rounding* instead puts the robot in the center of its box, and calls nearly
+//! every real move perfect.
+
+use serde::Serialize;
+
+/// Where a robot ends, in whole boxes and quarter turns of the start frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+pub struct Outcome {
+    /// Boxes ahead.
+    pub ahead: i32,
+    /// Boxes to the left.
+    pub left: i32,
+    /// Turns of 90 degrees to the left.
+    pub quarters: i32,
+}
+
+/// Closer to a whole number than this is taken for it: the rounding of text files.
+const WHOLE_TOLERANCE: f64 = 1e-6;
+
+/// The two whole numbers around `x` and their probabilities; one alone where `x` is whole.
+pub fn average(x: f64) -> Vec<(i32, f64)> {
+    let whole = x.round();
+    if (x - whole).abs() <= WHOLE_TOLERANCE {
+        return vec![(whole as i32, 1.0)];
+    }
+    let (below, fraction) = (x.floor(), x - x.floor());
+    vec![(below as i32, 1.0 - fraction), (below as i32 + 1, fraction)]
+}
+
+/// The outcomes of a displacement (boxes ahead, boxes left, quarter turns left) and their
+/// probabilities, which sum to 1.
+pub fn outcomes(ahead: f64, left: f64, quarters: f64) -> Vec<(Outcome, f64)> {
+    let mut outcomes = Vec::new();
+    for (ahead, p_ahead) in average(ahead) {
+        for (left, p_left) in average(left) {
+            for (quarters, p_quarters) in average(quarters) {
+                let outcome = Outcome { ahead, left, quarters };
+                outcomes.push((outcome, p_ahead * p_left * p_quarters));
+            }
+        }
+    }
+    outcomes
+}
+
+/// The nearest whole number, halves up.
+pub fn rounded(x: f64) -> i32 {
+    (x + 0.5).floor() as i32
+}
+
+/// What one box ahead may become: the classes of the paper.
+pub const FORWARD_CLASSES: [&str; 6] =
+    ["stay", "ahead", "ahead2", "ahead_left", "ahead_right", "other"];
+
+/// Index of the class of a move in [`FORWARD_CLASSES`].
+pub fn forward_class(ahead: i32, left: i32) -> usize {
+    match (ahead, left) {
+        (0, 0) => 0,
+        (1, 0) => 1,
+        (2, 0) => 2,
+        (1, 1) => 3,
+        (1, -1) => 4,
+        _ => 5,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_displacement_is_shared_by_the_boxes_around_its_end() {
+        let shares = outcomes(1.25, -0.5, 0.0);
+        let share = |ahead, left| {
+            let wanted = Outcome { ahead, left, quarters: 0 };
+            shares.iter().find(|(outcome, _)| *outcome == wanted).unwrap().1
+        };
+        assert_eq!(shares.len(), 4);
+        assert_eq!((share(1, -1), share(1, 0)), (0.375, 0.375));
+        assert_eq!((share(2, -1), share(2, 0)), (0.125, 0.125));
+    }
+
+    #[test]
+    fn whole_boxes_are_certain() {
+        assert_eq!(average(1.0), [(1, 1.0)]);
+        assert_eq!(average(-1.000_000_01), [(-1, 1.0)]);
+        assert_eq!(outcomes(0.0, 0.0, -1.0), [(Outcome { ahead: 0, left: 0, quarters: -1 }, 1.0)]);
+    }
+
+    #[test]
+    fn halves_round_up_as_the_rule_says() {
+        assert_eq!([0.5, 1.49, -0.5, -0.51].map(rounded), [1, 1, 0, -1]);
+    }
+}

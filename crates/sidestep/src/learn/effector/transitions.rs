@@ -1,0 +1,146 @@
+//! The transitions that a simulation draws a move from.
+
+use super::phase::{FORWARD_CLASSES, Outcome};
+use crate::learn::Counts;
+use crate::learn::counts::{rounded, smooth};
+
+/// An effector as a profile holds it; the probabilities of each action sum to 1.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EffectorProfile {
+    /// Side of a box in m, where the transitions hold for boxes of that size only.
+    pub box_m: Option<f64>,
+    /// What each action may do, by its name; the first transition is the intended one.
+    pub actions: Vec<(String, Vec<Transition>)>,
+    /// Actions that no event speaks for, and what was assumed.
+    pub assumed: Vec<String>,
+    /// How events became transitions.
+    pub rule: String,
+}
+
+impl EffectorProfile {
+    /// The transitions of an action.
+    pub fn action(&self, name: &str) -> Option<&[Transition]> {
+        let found = self.actions.iter().find(|(action, _)| action == name);
+        found.map(|(_, transitions)| transitions.as_slice())
+    }
+}
+
+/// One thing an action may do.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Transition {
+    /// How likely.
+    pub p: f64,
+    /// Boxes walked, in the robot's frame: `F`, `B`, `L`, `R`; empty where it stays.
+    pub path: String,
+    /// Turn in degrees, a multiple of 90, + to the left.
+    pub turn_deg: i32,
+}
+
+/// The path to an outcome: ahead first, then sideways.
+fn path(ahead: i32, left: i32) -> String {
+    let steps = |n: i32, plus: &str, minus: &str| {
+        if n < 0 { minus } else { plus }.repeat(n.unsigned_abs() as usize)
+    };
+    steps(ahead, "F", "B") + &steps(left, "L", "R")
+}
+
+/// What an outcome is called in tables.
+pub(super) fn label(outcome: &Outcome) -> String {
+    let path = path(outcome.ahead, outcome.left);
+    match (path.as_str(), 90 * outcome.quarters) {
+        ("", 0) => "stay".to_string(),
+        (_, 0) => path,
+        ("", turn_deg) => format!("turn {turn_deg}"),
+        (_, turn_deg) => format!("{path} turn {turn_deg}"),
+    }
+}
+
+/// Transitions for outcomes and their weights, the first being the intended one.
+pub(super) fn from_outcomes(outcomes: &[Outcome], weights: &[f64], alpha: f64) -> Vec<Transition> {
+    let probabilities = rounded(&smooth(weights, alpha));
+    let transition = |(outcome, p): (&Outcome, f64)| Transition {
+        p,
+        path: path(outcome.ahead, outcome.left),
+        turn_deg: 90 * outcome.quarters,
+    };
+    outcomes.iter().zip(probabilities).map(transition).collect()
+}
+
+/// Transitions of one box ahead by the paper's classes, `counts` having one row and a column
+/// per class. What is in none of the first five is spread over them in proportion.
+pub(super) fn forward(counts: &Counts, alpha: f64) -> Vec<Transition> {
+    let order = [1, 0, 2, 3, 4];
+    debug_assert_eq!(FORWARD_CLASSES[order[0]], "ahead");
+    let ends = [(1, 0), (0, 0), (2, 0), (1, 1), (1, -1)];
+    let outcomes = ends.map(|(ahead, left)| Outcome { ahead, left, quarters: 0 });
+    from_outcomes(&outcomes, &order.map(|class| counts.row(0)[class]), alpha)
+}
+
+/// What a commanded turn of 90 degrees may become.
+pub(super) const TURN_CLASSES: [&str; 4] = ["turn", "stay", "overshoot", "other"];
+
+/// Index in [`TURN_CLASSES`] of a turn by `quarters` along the command.
+pub(super) fn turn_class(quarters: i32) -> usize {
+    match quarters {
+        1 => 0,
+        0 => 1,
+        2 => 2,
+        _ => 3,
+    }
+}
+
+/// Transitions of a turn, `side` being 1 for left, -1 for right; `other` is spread.
+pub(super) fn turn(counts: &Counts, row: usize, side: i32, alpha: f64) -> Vec<Transition> {
+    let outcomes = [1, 0, 2].map(|n| Outcome { ahead: 0, left: 0, quarters: n * side });
+    from_outcomes(&outcomes, &counts.row(row)[..3], alpha)
+}
+
+/// The transition of an action that never fails.
+pub(super) fn exact(outcome: Outcome) -> Vec<Transition> {
+    from_outcomes(&[outcome], &[1.0], 0.0)
+}
+
+/// What an action is meant to do, by its name in a profile.
+pub(super) fn intended(action: &str) -> Outcome {
+    let (ahead, quarters) = match action {
+        "forward" => (1, 0),
+        "left" => (0, 1),
+        "right" => (0, -1),
+        _ => (0, 0),
+    };
+    Outcome { ahead, left: 0, quarters }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn paths_go_ahead_first_then_sideways() {
+        assert_eq!(path(0, 0), "");
+        assert_eq!(path(2, 1), "FFL");
+        assert_eq!(path(-1, -2), "BRR");
+    }
+
+    #[test]
+    fn what_is_in_no_class_is_spread_in_proportion() {
+        let columns = FORWARD_CLASSES.map(String::from);
+        let mut counts = Counts::new("forward", &["forward".to_string()], &columns);
+        for (class, weight) in [(0, 1.0), (1, 6.0), (3, 1.0), (5, 2.0)] {
+            counts.add(0, class, weight);
+        }
+        let transitions = forward(&counts, 0.0);
+        let found: Vec<_> = transitions.iter().map(|t| (t.path.as_str(), t.p)).collect();
+        assert_eq!(found, [("F", 0.75), ("", 0.125), ("FF", 0.0), ("FL", 0.125), ("FR", 0.0)]);
+    }
+
+    #[test]
+    fn a_right_turn_mirrors_a_left_one() {
+        let columns = TURN_CLASSES.map(String::from);
+        let mut counts = Counts::new("turns", &["left".to_string()], &columns);
+        counts.add(0, 0, 9.0);
+        counts.add(0, 1, 1.0);
+        let turns: Vec<_> = turn(&counts, 0, -1, 0.0).iter().map(|t| (t.turn_deg, t.p)).collect();
+        assert_eq!(turns, [(-90, 0.9), (0, 0.1), (-180, 0.0)]);
+    }
+}

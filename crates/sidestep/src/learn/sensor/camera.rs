@@ -1,0 +1,184 @@
+//! The rows that a simulation draws a sensor's reports from.
+
+use super::detection::Detection;
+use super::options::{BEYOND, DistanceClasses, SensorOptions};
+use super::tables::{LANDMARK, NOBODY, ROBOT};
+use crate::learn::Counts;
+use crate::learn::counts::{rounded, smooth};
+
+/// What is reported when nothing is.
+pub(super) const NOTHING: &str = "nothing";
+
+/// A sensor as a profile holds it; every row sums to 1.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SensorProfile {
+    /// Bearings of the beams in degrees relative to the heading, + to the left.
+    pub bearings_deg: Vec<f64>,
+    /// Range in m.
+    pub range_m: f64,
+    /// What can be reported; the first is `nothing`.
+    pub observations: Vec<String>,
+    /// Kinds of objects that are taken for another observation than their own name.
+    pub designates: Vec<(String, String)>,
+    /// Edges between the distance classes in m.
+    pub distance_edges_m: Vec<f64>,
+    /// Names of the distance classes, near to far.
+    pub distance_classes: Vec<String>,
+    /// P(reported | true): a row per observation, columns in the order of the observations.
+    pub confusion: Vec<NamedRow>,
+    /// Rows that replace those of `confusion` in a distance class.
+    pub confusion_by_class: Vec<(String, Vec<NamedRow>)>,
+    /// P(reported class | true class): a row per class and one, `beyond`, for spurious
+    /// reports; columns in the order of the classes.
+    pub distance_confusion: Vec<NamedRow>,
+    /// Rows that no count speaks for, and what was assumed.
+    pub assumed: Vec<String>,
+    /// How counts became rows.
+    pub rule: String,
+}
+
+/// One row of a table of probabilities.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NamedRow {
+    /// What is true.
+    pub name: String,
+    /// One probability per column; they sum to 1.
+    pub probabilities: Vec<f64>,
+}
+
+impl NamedRow {
+    pub(super) fn new(name: &str, probabilities: &[f64]) -> Self {
+        Self { name: name.to_owned(), probabilities: rounded(probabilities) }
+    }
+}
+
+/// How the rows of a camera come about.
+const RULE: &str = "P(nothing | subject) is 1 minus the detection rate of its kind in 1 s bins \
+    (one simulation cycle stands for one bin), per distance class; a detected subject is \
+    reported by the kind confusion, where an unknown code counts as nothing; P(spurious | \
+    nothing) is spurious readings per beam and bin without a subject; every count plus alpha";
+
+/// What a camera's rows are made of.
+pub(super) struct Looks<'a> {
+    /// True kind against decoded kind.
+    pub(super) kinds: &'a Counts,
+    /// Detection by kind and class.
+    pub(super) detection: &'a Detection,
+    /// True class against measured class.
+    pub(super) distance: &'a Counts,
+    /// Class of spurious readings.
+    pub(super) beyond: &'a Counts,
+}
+
+/// A camera that reports `nothing`, `robot` or `landmark`.
+pub(super) fn camera(
+    looks: &Looks<'_>,
+    options: &SensorOptions,
+    classes: &DistanceClasses,
+) -> SensorProfile {
+    let alpha = options.estimate.alpha;
+    let mut assumed = Vec::new();
+    let confusion = vec![
+        NamedRow::new(NOTHING, &spurious_row(looks, options)),
+        NamedRow::new("robot", &subject_row(looks, ROBOT, None, alpha)),
+        NamedRow::new("landmark", &subject_row(looks, LANDMARK, None, alpha)),
+    ];
+    let by_class = |(class, name): (usize, &String)| {
+        let row = |name, kind| NamedRow::new(name, &subject_row(looks, kind, Some(class), alpha));
+        (name.clone(), vec![row("robot", ROBOT), row("landmark", LANDMARK)])
+    };
+    for (kind, name) in [(ROBOT, "robot"), (LANDMARK, "landmark")] {
+        assumed.extend(assumed_detections(looks, kind, name));
+    }
+    let confusion_by_class = classes.names.iter().enumerate().map(by_class).collect();
+    let distance_confusion = distance_rows(looks.distance, looks.beyond, alpha, &mut assumed);
+    SensorProfile {
+        bearings_deg: options.bearings_deg.clone(),
+        range_m: options.range_m,
+        observations: [NOTHING, "robot", "landmark"].map(String::from).to_vec(),
+        // The arena has landmarks where a building has walls; nothing else wears a code.
+        designates: [("wall", "landmark"), ("door", NOTHING), ("person", NOTHING)]
+            .map(|(kind, observation)| (kind.to_string(), observation.to_string()))
+            .to_vec(),
+        distance_edges_m: classes.edges_m.clone(),
+        distance_classes: classes.names.clone(),
+        confusion,
+        confusion_by_class,
+        distance_confusion,
+        assumed,
+        rule: RULE.to_string(),
+    }
+}
+
+/// What is reported in the direction of nothing.
+fn spurious_row(looks: &Looks<'_>, options: &SensorOptions) -> Vec<f64> {
+    let beams = looks.detection.looks as f64 * options.bearings_deg.len() as f64;
+    let in_view: f64 = looks.detection.all.cells().iter().flatten().sum();
+    let spurious = looks.kinds.row(NOBODY);
+    let robot_or_landmark = spurious[ROBOT] + spurious[LANDMARK];
+    let empty = (beams - in_view - robot_or_landmark).max(1.0);
+    smooth(&[empty, spurious[ROBOT], spurious[LANDMARK]], options.estimate.alpha)
+}
+
+/// What is reported in the direction of a robot or landmark, in one class or in all.
+fn subject_row(looks: &Looks<'_>, kind: usize, class: Option<usize>, alpha: f64) -> Vec<f64> {
+    let detected = detection_rate(looks, kind, class, alpha);
+    let mut as_kind = looks.kinds.smoothed(kind, alpha).unwrap_or_else(|| {
+        let mut truly = vec![0.0; 3];
+        truly[kind] = 1.0;
+        truly
+    });
+    as_kind.iter_mut().for_each(|p| *p *= detected);
+    vec![1.0 - as_kind[ROBOT] - as_kind[LANDMARK], as_kind[ROBOT], as_kind[LANDMARK]]
+}
+
+/// Rate in a class; where none was in view there, over all classes.
+fn detection_rate(looks: &Looks<'_>, kind: usize, class: Option<usize>, alpha: f64) -> f64 {
+    let table = detection_table(looks, kind);
+    if let Some(row) = class.and_then(|class| table.smoothed(class, alpha)) {
+        return row[0];
+    }
+    let sum = |column: usize| table.cells().iter().map(|row| row[column]).sum::<f64>();
+    let pooled = [sum(0), sum(1)];
+    if pooled == [0.0, 0.0] { 1.0 } else { smooth(&pooled, alpha)[0] }
+}
+
+fn detection_table<'a>(looks: &Looks<'a>, kind: usize) -> &'a Counts {
+    if kind == ROBOT { &looks.detection.robots } else { &looks.detection.landmarks }
+}
+
+fn assumed_detections(looks: &Looks<'_>, kind: usize, name: &str) -> Vec<String> {
+    let thin = detection_table(looks, kind).thin(1);
+    let assumed = |class: String| format!("detection of {name} in {class}: as over all classes");
+    thin.into_iter().map(|row| assumed(row.row)).collect()
+}
+
+/// Rows of the distance classes and of `beyond`. A class without counts reports truly; a
+/// spurious report without counts may have any class.
+pub(super) fn distance_rows(
+    distance: &Counts,
+    beyond: &Counts,
+    alpha: f64,
+    assumed: &mut Vec<String>,
+) -> Vec<NamedRow> {
+    let mut rows = Vec::new();
+    for (class, name) in distance.rows().iter().enumerate() {
+        let row = distance.smoothed(class, alpha).unwrap_or_else(|| {
+            assumed.push(format!("distance {name}: reported truly"));
+            truly(distance.columns().len(), class)
+        });
+        rows.push(NamedRow::new(name, &row));
+    }
+    if beyond.total(0) == 0.0 {
+        assumed.push("distance of spurious reports: all classes alike".to_string());
+    }
+    rows.push(NamedRow::new(BEYOND, &smooth(beyond.row(0), alpha)));
+    rows
+}
+
+/// The row of what is always reported as it is.
+pub(super) fn truly(n: usize, column: usize) -> Vec<f64> {
+    let mut row = vec![0.0; n];
+    row[column] = 1.0;
+    row
+}
