@@ -20,11 +20,6 @@ impl Console {
         Self { json, quiet }
     }
 
-    /// Whether results are printed as JSON.
-    pub(crate) fn is_json(self) -> bool {
-        self.json
-    }
-
     /// Whether progress may be shown: to a person who has not asked for silence.
     pub(crate) fn shows_progress(self) -> bool {
         !self.quiet && std::io::stderr().is_terminal()

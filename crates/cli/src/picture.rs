@@ -14,7 +14,13 @@ const PNG_PX: u32 = 1600;
 /// # Errors
 /// When it cannot be drawn or written.
 pub(crate) fn draw_run(run: &dyn Run, folder: &RunFolder) -> Result<(), Failure> {
-    let origin = origin(run);
+    let plan = run.plan();
+    let origin = match run.cycle() < plan.cycles {
+        true => {
+            format!("{} INCOMPLETE: {} of {} cycles.", origin(run), run.cycle(), plan.cycles)
+        }
+        false => origin(run),
+    };
     let svg = run.picture(Pictured { folder: Some(folder.path()), origin: &origin })?;
     write(&folder.path().join("trajectories.svg"), svg.as_bytes())?;
     write_png(&folder.path().join("trajectories.png"), &svg)
@@ -22,12 +28,7 @@ pub(crate) fn draw_run(run: &dyn Run, folder: &RunFolder) -> Result<(), Failure>
 
 /// Small print under a picture.
 pub(crate) fn origin(run: &dyn Run) -> String {
-    let plan = run.plan();
-    let so_far = match run.cycle() < plan.cycles {
-        true => format!(" The run is incomplete: {} of {} cycles.", run.cycle(), plan.cycles),
-        false => String::new(),
-    };
-    format!("Seed {}, sidestep {}.{so_far}", plan.seed, env!("CARGO_PKG_VERSION"))
+    format!("Seed {}, sidestep {}.", run.plan().seed, env!("CARGO_PKG_VERSION"))
 }
 
 /// Writes an SVG picture as PNG.

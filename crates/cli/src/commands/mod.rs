@@ -2,6 +2,7 @@
 
 mod check;
 mod finish;
+mod learn;
 mod map;
 mod new;
 mod replay;
@@ -23,6 +24,8 @@ pub(crate) enum Command {
     New(new::NewArgs),
     /// Show a map as the program sees it, on the terminal and as PNG
     Map(map::MapArgs),
+    /// Learn the errors of a real robot's sensors and wheels from its logs
+    Learn(learn::LearnArgs),
     /// Continue a recorded run that was stopped or killed
     Resume(resume::ResumeArgs),
     /// Recompute a recorded run up to a cycle and show where everybody is
@@ -39,6 +42,7 @@ pub(crate) fn execute(command: Command, console: &Console) -> Result<ExitCode, F
         Command::Check(args) => check::check(&args, *console),
         Command::New(args) => new::new(&args, *console),
         Command::Map(args) => map::map(&args, *console),
+        Command::Learn(args) => learn::learn(&args, *console),
         Command::Resume(args) => resume::resume(&args, *console),
         Command::Replay(args) => replay::replay(&args, *console),
     }

@@ -66,6 +66,7 @@ fn robot_section(section: &Value) -> Value {
     let places = section["at"].as_array().map(|at| at.len().into());
     let or = |value: &Value, default: Value| if value.is_null() { default } else { value.clone() };
     json!({
+        "name": or(&section["name"], "robots".into()),
         "count": or(&section["count"], places.unwrap_or(Value::Null)),
         "size_boxes": or(&section["size"], 1.into()),
         "period": or(&section["period"], 1.into()),
@@ -94,7 +95,7 @@ fn sensors(simulation: &RobotsSimulation) -> Vec<Value> {
 fn text(found: &Value) -> String {
     let mut lines =
         vec![line("map", map_words(&found["map"])), line("bodies", bodies_words(&found["bodies"]))];
-    lines.extend(items(found, "robots").map(|r| line("robots", robots_words(r))));
+    lines.extend(items(found, "robots").map(|r| line(&plain(&r["name"]), robots_words(r))));
     lines.extend(items(found, "sensors").map(|s| line("sensor", sensor_words(s))));
     let plain = |key: &str| plain(&found[key]);
     lines.extend([
@@ -104,7 +105,7 @@ fn text(found: &Value) -> String {
             format!("obstacles {}, conflicts {}", plain("obstacle_rule"), plain("conflict_policy")),
         ),
         line("run", format!("{} cycles, seed {}", number(&found["cycles"]), plain("seed"))),
-        line("memory", megabytes(found["memory_bytes"].as_u64().unwrap_or(0))),
+        line("memory", memory(found["memory_bytes"].as_u64().unwrap_or(0))),
     ]);
     aligned(&lines)
 }
@@ -172,6 +173,9 @@ fn number(value: &Value) -> String {
     value.as_u64().map_or_else(|| value.to_string(), grouped)
 }
 
-fn megabytes(bytes: u64) -> String {
-    format!("about {:.1} MB", bytes as f64 / 1e6)
+fn memory(bytes: u64) -> String {
+    match bytes {
+        0..1_000_000 => format!("about {} kB", bytes.div_ceil(1000)),
+        _ => format!("about {:.1} MB", bytes as f64 / 1e6),
+    }
 }
