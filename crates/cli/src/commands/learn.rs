@@ -139,7 +139,8 @@ struct EffectorLog {
 #[derive(Debug, Args)]
 struct EstimateArgs {
     /// Added to every count before rows are normalized
-    #[arg(long, value_name = "A", default_value_t = EstimateOptions::default().alpha)]
+    #[arg(long, value_name = "A", allow_negative_numbers = true)]
+    #[arg(default_value_t = EstimateOptions::default().alpha)]
     alpha: f64,
 
     /// Hold out every so many events to test the fit
