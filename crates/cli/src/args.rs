@@ -3,17 +3,19 @@
 use crate::commands::Command;
 use clap::Parser;
 
-/// Simulate, compare and deploy decentralised multi-agent motion.
+/// Behind the options that are a command's own.
+const LAST: usize = 900;
+
+/// Simulate and compare decentralized multi-agent motion, with sensors that lie and wheels that slip.
 #[derive(Debug, Parser)]
-#[command(name = "sidestep", version, about, after_help = EXAMPLES)]
-#[command(propagate_version = false, arg_required_else_help = true)]
+#[command(name = "sidestep", version, after_help = EXAMPLES, arg_required_else_help = true)]
 pub(crate) struct Cli {
     /// Print one JSON object on standard output and nothing else
-    #[arg(long, global = true)]
+    #[arg(long, global = true, display_order = LAST)]
     pub(crate) json: bool,
 
-    /// Show no progress, and of a run only its digest
-    #[arg(long, short, global = true)]
+    /// Show no progress, and of a run nothing but its digest
+    #[arg(long, short, global = true, display_order = LAST)]
     pub(crate) quiet: bool,
 
     #[command(subcommand)]

@@ -1,7 +1,7 @@
 //! What `run` and `resume` share: the way to the end, and what is left behind there.
 
 use crate::console::Console;
-use crate::driver::drive;
+use crate::driver::{Effort, drive};
 use crate::exit::{ExitCode, Failure};
 use crate::interrupt;
 use crate::picture;
@@ -10,6 +10,7 @@ use crate::report::{Cost, Status, Summary, SummaryFile};
 use crate::worlds::Run;
 use sidestep::kernel::Cycle;
 use sidestep::kernel::ports::RecordError;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Duration;
 
 /// A run that is ready to go.
@@ -28,8 +29,7 @@ pub(super) struct Journey {
 pub(super) fn travel(journey: Journey, console: Console) -> Result<ExitCode, Failure> {
     let Journey { mut run, mut recording, workers, until } = journey;
     let until = until.unwrap_or(run.plan().cycles);
-    let effort = drive(run.as_mut(), until, recording.as_mut(), console);
-    let effort = effort.map_err(|e| broken(run.as_ref(), recording.as_ref(), &e))?;
+    let effort = drive_guarded(run.as_mut(), until, recording.as_mut(), console)?;
     let folder = recording.as_ref().map(|r| r.folder().path().to_path_buf());
     let took = recording.as_ref().map_or(Duration::ZERO, Recording::took);
     let cost = Cost { workers, effort, recording: took };
@@ -76,17 +76,38 @@ fn store(
     Ok(())
 }
 
-/// Recording failed: says what replays the run, and what saves it.
-fn broken(run: &dyn Run, recording: Option<&Recording>, error: &RecordError) -> Failure {
+/// Drives the run; whatever fails says what replays it.
+fn drive_guarded(
+    run: &mut dyn Run,
+    until: Cycle,
+    mut recording: Option<&mut Recording>,
+    console: Console,
+) -> Result<Effort, Failure> {
+    let driven =
+        catch_unwind(AssertUnwindSafe(|| drive(run, until, recording.as_deref_mut(), console)));
+    match driven {
+        Ok(driven) => driven.map_err(|e| broken(run, recording.as_deref(), &e)),
+        Err(_) => Err(bug(run)),
+    }
+}
+
+/// What replays a run up to where it failed.
+fn whereabouts(run: &dyn Run) -> String {
     let plan = run.plan();
-    let cause = format!(
-        "{error}\n  at cycle {} of {} ({}, seed {}, sidestep {})",
-        run.cycle(),
-        plan.cycles,
-        plan.name,
-        plan.seed,
-        env!("CARGO_PKG_VERSION"),
-    );
+    let (cycle, version) = (run.cycle(), env!("CARGO_PKG_VERSION"));
+    let (name, seed, cycles) = (plan.name, plan.seed, plan.cycles);
+    format!("at cycle {cycle} of {cycles} of `{name}`, seed {seed}, sidestep {version}")
+}
+
+/// Recording failed: says what saves the run.
+fn broken(run: &dyn Run, recording: Option<&Recording>, error: &RecordError) -> Failure {
     let folder = recording.map_or_else(String::new, |r| r.folder().path().display().to_string());
-    Failure::stopped(cause, format!("make room, then continue with: sidestep resume {folder}"))
+    let remedy = format!("make room, then continue with: sidestep resume {folder}");
+    Failure::stopped(format!("{error}\n  {}", whereabouts(run)), remedy)
+}
+
+/// The simulation broke a rule of its own.
+fn bug(run: &dyn Run) -> Failure {
+    let cause = format!("this is a bug in sidestep, met shortly after\n  {}", whereabouts(run));
+    Failure::stopped(cause, "please report it with the scenario and the lines above")
 }

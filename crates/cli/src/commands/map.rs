@@ -34,7 +34,7 @@ pub(crate) struct MapArgs {
     #[arg(long = "box", value_name = "B", default_value_t = 0.25)]
     box_size_m: f64,
 
-    /// What boxes that nobody has mapped become
+    /// What boxes that nobody has mapped become (in scenarios: wall, unless told otherwise)
     #[arg(long, value_enum, default_value_t = Unknown::Keep)]
     unknown: Unknown,
 
@@ -49,11 +49,8 @@ pub(crate) struct MapArgs {
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum Unknown {
-    /// Walls, as simulations take them unless told otherwise
     Wall,
-    /// Free
     Free,
-    /// Unknown, as they are
     Keep,
 }
 

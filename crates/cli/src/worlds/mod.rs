@@ -25,7 +25,7 @@ pub(crate) struct Plan {
     pub(crate) seed: u64,
     /// Cycles to run.
     pub(crate) cycles: Cycle,
-    /// Cycles between two checkpoints, at least 1.
+    /// Cycles between two checkpoints, at least 1; the largest number for none.
     pub(crate) checkpoint_every: Cycle,
 }
 

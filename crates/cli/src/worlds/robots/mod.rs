@@ -99,7 +99,10 @@ impl Run for RobotsRun {
             name: compiled.name.clone(),
             seed: compiled.seed,
             cycles: compiled.cycles,
-            checkpoint_every: compiled.record.checkpoint_every.max(1),
+            checkpoint_every: match compiled.record.checkpoint_every {
+                0 => Cycle::MAX,
+                every => every,
+            },
         }
     }
 
