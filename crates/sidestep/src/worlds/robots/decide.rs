@@ -13,7 +13,7 @@ pub use replay::{External, ORDER, Replay};
 pub use wander::Wander;
 
 use super::effector::{ActionId, Side};
-use super::sensor::{NOTHING, Reading};
+use super::sensor::Reading;
 use sidestep_kernel::Cycle;
 use sidestep_kernel::stream::Draws;
 
@@ -72,6 +72,9 @@ impl Sector {
     }
 }
 
+/// Stands for the class of a sector in which nothing is reported; greater than any class.
+pub const UNSEEN: u8 = u8::MAX;
+
 /// Everything a robot knows when it decides.
 #[derive(Debug)]
 pub struct Percept<'a> {
@@ -81,6 +84,9 @@ pub struct Percept<'a> {
     pub readings: &'a [Reading],
     /// Where each beam looks (shape: that of `readings`).
     pub sectors: &'a [Sector],
+    /// Nearest distance class reported in each sector, [`UNSEEN`] where nothing is; see
+    /// [`Percept::nearest`].
+    pub nearest_in: [u8; 4],
     /// What stopped the last action, if anything did.
     pub contact: Option<Contact>,
     /// Column and row of the robot's lower-left box: it is localized.
@@ -94,11 +100,8 @@ pub struct Percept<'a> {
 impl Percept<'_> {
     /// The nearest distance class at which something is reported in a sector, if anything.
     pub fn nearest(&self, sector: Sector) -> Option<u8> {
-        let reported = self.readings.iter().zip(self.sectors);
-        reported
-            .filter(|(r, s)| r.observation != NOTHING && **s == sector)
-            .map(|(r, _)| r.class)
-            .min()
+        let class = self.nearest_in[sector as usize];
+        (class != UNSEEN).then_some(class)
     }
 }
 

@@ -1,6 +1,6 @@
 //! Pool one: bodies that are due perceive the frozen state, decide, and claim.
 
-use super::decide::{Contact, Decision, Heard, Memory, Percept, Trip};
+use super::decide::{Contact, Decision, Heard, Memory, Percept, Trip, UNSEEN};
 use super::effector::{Side, Sweep};
 use super::sensor::Reading;
 use super::state::{BodyCell, CLEAR, FREE, IDLE, KIND_BITS, RobotsState, WALL, pose_word};
@@ -58,7 +58,7 @@ impl RobotsWorld {
         let i = slot as usize;
         let cell = &state.bodies[i];
         let id = cell.id;
-        self.sense(model, state, now, slot, scratch);
+        let nearest = self.sense(model, state, now, slot, scratch);
         scratch.heard.clear();
         if let Some(radio) = &self.radio {
             self.listen(radio, state, now, slot, &mut scratch.heard);
@@ -67,6 +67,7 @@ impl RobotsWorld {
             now,
             readings: &scratch.readings,
             sectors: &model.body.sectors,
+            nearest_in: nearest,
             contact: contact_of_word(cell.contact.get()),
             at: self.map_position(cell.at()),
             heading: cell.facing.get(),
@@ -100,7 +101,8 @@ impl RobotsWorld {
         }
     }
 
-    /// Fills `scratch.readings`: what each beam truly meets, and what it reports.
+    /// Fills `scratch.readings` with what each beam reports of what it truly meets, and
+    /// returns the nearest class reported per sector.
     #[inline]
     fn sense(
         &self,
@@ -109,12 +111,15 @@ impl RobotsWorld {
         now: Cycle,
         slot: Slot,
         scratch: &mut Scratch,
-    ) {
+    ) -> [u8; 4] {
         let i = slot as usize;
         let base = state.at(slot).index(self.stride);
         let heading = usize::from(state.bodies[i].facing.get());
         let boxes = state.grid.cells();
-        scratch.readings.clear();
+        let Scratch { readings, sensor_samples, keep_samples, .. } = scratch;
+        readings.resize(model.body.sectors.len(), Reading::default());
+        let mut nearest = [UNSEEN; 4];
+        let mut beams = readings.iter_mut().zip(&model.body.sectors);
         for (s, sensor) in model.body.sensors.iter().enumerate() {
             let rays = &sensor.rays[heading];
             let mut from = 0;
@@ -125,23 +130,27 @@ impl RobotsWorld {
                     let (id, purpose) = (state.bodies[i].id, purpose::sense(s));
                     self.streams.block(id, now, purpose, block as u16)
                 };
-                for (&end, word) in ends.iter().zip(words) {
+                for ((&end, word), (reading, &sector)) in ends.iter().zip(words).zip(&mut beams) {
                     let end = usize::from(end);
                     let truth = match first_hit(boxes, base, &rays.offsets[from..end]) {
                         Some((step, kind)) => sensor.truth(kind, sensor.classes[from + step]),
                         None => sensor.nothing,
                     };
                     let reported = sensor.table.report(truth, word);
-                    scratch.readings.push(reported);
-                    if scratch.keep_samples {
+                    *reading = reported;
+                    let class = if reported.observation == 0 { UNSEEN } else { reported.class };
+                    let nearest = &mut nearest[sector as usize];
+                    *nearest = class.min(*nearest);
+                    if *keep_samples {
                         let (robot, sensor) = (self.bodies[i].id, s as u16);
                         let sample = SensorSample { cycle: now, robot, sensor, truth, reported };
-                        scratch.sensor_samples.push(sample);
+                        sensor_samples.push(sample);
                     }
                     from = end;
                 }
             }
         }
+        nearest
     }
 
     /// People and other movers go on as before or draw a new direction.
@@ -256,10 +265,11 @@ fn sweep_own(grid: &Column<u8>, own: &[i32], base: u32, mut each: impl FnMut(usi
 /// grid's border is wide enough for that.
 #[inline]
 fn first_hit(boxes: &[<u8 as Word>::Cell], base: u32, offsets: &[i32]) -> Option<(usize, u8)> {
-    let kind = |o: i32| u8::load(&boxes[base.wrapping_add_signed(o) as usize]) & KIND_BITS;
+    let look = |o: i32| u8::load(&boxes[base.wrapping_add_signed(o) as usize]);
     for (k, four) in offsets.as_chunks::<BEAM_STEP>().0.iter().enumerate() {
-        let kinds = four.map(kind);
-        if u32::from_ne_bytes(kinds) != 0 {
+        let [a, b, c, d] = four.map(look);
+        if (a | b | c | d) & KIND_BITS != FREE {
+            let kinds = [a, b, c, d].map(|seen| seen & KIND_BITS);
             let first = kinds.iter().position(|&kind| kind != FREE)?;
             return Some((BEAM_STEP * k + first, kinds[first]));
         }

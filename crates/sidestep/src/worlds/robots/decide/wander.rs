@@ -18,9 +18,6 @@ impl Default for Wander {
     }
 }
 
-/// Class that stands for "nothing seen" when sides are compared.
-const CLEAR: u8 = u8::MAX;
-
 /// Word 0 of the memory: actions left until the next voluntary turn, plus 1; 0 = not drawn.
 const STRIDE: usize = 0;
 /// Word 1: the turn of the last avoidance plus 1, kept while the way stays blocked.
@@ -29,7 +26,8 @@ const AVOIDING: usize = 1;
 impl Behaviour for Wander {
     #[inline]
     fn decide(&self, percept: &Percept<'_>, memory: &mut Memory, draws: &mut Draws) -> Decision {
-        let [ahead, left, right] = nearest(percept);
+        let [ahead, left, right] = [Sector::Ahead, Sector::Left, Sector::Right]
+            .map(|sector| percept.nearest_in[sector as usize]);
         if ahead == 0 || percept.contact.is_some() {
             return avoid(left, right, memory, draws).into();
         }
@@ -60,22 +58,6 @@ impl Wander {
         *stride = 1 + draws.below(2 * self.turn_every) + 1;
         !first
     }
-}
-
-/// Nearest class ahead, to the left and to the right.
-#[inline]
-fn nearest(percept: &Percept<'_>) -> [u8; 3] {
-    let mut nearest = [CLEAR; 4];
-    for (reading, &sector) in percept.readings.iter().zip(percept.sectors) {
-        let class = if reading.observation == 0 { CLEAR } else { reading.class };
-        let slot = &mut nearest[sector as usize];
-        *slot = (*slot).min(class);
-    }
-    [
-        nearest[Sector::Ahead as usize],
-        nearest[Sector::Left as usize],
-        nearest[Sector::Right as usize],
-    ]
 }
 
 /// Turns to the freer side, and goes on turning that way until the way is free.
