@@ -52,6 +52,8 @@ pub struct Mate<S> {
     /// The largest group seen.
     pub largest_group: u64,
     members: Vec<Slot>,
+    /// Bodies in conflict that have not acted yet, where a world reacts in rounds.
+    pending: Vec<Slot>,
     times: PhaseTimes,
 }
 
@@ -63,6 +65,7 @@ impl<S> Mate<S> {
             group_sizes: [0; 32],
             largest_group: 0,
             members: Vec::new(),
+            pending: Vec::new(),
             times: PhaseTimes::default(),
         }
     }
@@ -121,6 +124,9 @@ fn one_cycle<W: World>(
     worker.for_each_chunk(3 * round + 2, n, |bodies| {
         bodies.for_each(|body| react_as_leader(world, state, groups, mate, (now, body as Slot)));
     });
+    if world.reacts_in_rounds() {
+        react_in_rounds(world, state, worker, mate, now);
+    }
     worker.barrier();
     mate.times.perceive_decide_ns += decided_ns - started_ns;
     mate.times.conflicts_ns += joined_ns - decided_ns;
@@ -146,6 +152,30 @@ fn react_as_leader<W: World>(
     let mut members = std::mem::take(&mut mate.members);
     groups.members(body, &mut members);
     mate.count_group(members.len());
-    world.react(state, now, &mut members, &mut mate.scratch);
+    if world.reacts_in_rounds() {
+        mate.pending.extend_from_slice(&members);
+    } else {
+        world.react(state, now, &mut members, &mut mate.scratch);
+    }
     mate.members = members;
+}
+
+/// Rounds of bidding until every body in conflict has acted. A group's bodies are all in one
+/// worker's list, so the groups spread over the workers.
+fn react_in_rounds<W: World>(
+    world: &W,
+    state: &W::State,
+    worker: &Worker<'_>,
+    mate: &mut Mate<W::Scratch>,
+    now: Cycle,
+) {
+    while worker.any(!mate.pending.is_empty()) {
+        for &body in &mate.pending {
+            world.bid(state, now, body, &mut mate.scratch);
+        }
+        worker.barrier();
+        world.act_on_bids(state, now, &mut mate.pending, &mut mate.scratch);
+        worker.barrier();
+        world.retract_bids(state, &mut mate.scratch);
+    }
 }

@@ -36,6 +36,11 @@ impl<W: World> Engine<W> {
         }
     }
 
+    /// Uses all workers from now on, even where one would be faster; for tests and benchmarks.
+    pub fn share_always(&mut self) {
+        self.pace.share_always = true;
+    }
+
     /// The workers, for what they have gathered.
     pub fn crew(&self) -> &[Mate<W::Scratch>] {
         &self.crew
@@ -84,12 +89,15 @@ struct Pace {
     alone_ns: f64,
     team_ns: f64,
     stretches: u32,
+    share_always: bool,
 }
 
 impl Pace {
     /// Workers and cycles of the next stretch.
     fn next(&self, crew: usize, left: u64) -> (usize, u64) {
-        let (expected_ns, team) = if crew == 1 || self.alone_ns == 0.0 {
+        let (expected_ns, team) = if self.share_always {
+            (self.team_ns, crew)
+        } else if crew == 1 || self.alone_ns == 0.0 {
             (self.alone_ns, 1)
         } else if self.team_ns == 0.0 {
             (self.alone_ns, crew)
@@ -116,7 +124,7 @@ mod tests {
     use super::*;
 
     fn settled(alone_ns: f64, team_ns: f64) -> Pace {
-        Pace { alone_ns, team_ns, stretches: 0 }
+        Pace { alone_ns, team_ns, ..Pace::default() }
     }
 
     #[test]

@@ -99,6 +99,23 @@ impl Worker<'_> {
     }
 }
 
+impl Worker<'_> {
+    /// Whether `own` is true for any worker. All must call it; it waits for all.
+    pub fn any(&self, own: bool) -> bool {
+        let votes = &self.team.votes;
+        if own {
+            votes.fetch_add(1, Ordering::Relaxed);
+        }
+        self.barrier();
+        let any = votes.load(Ordering::Relaxed) > 0;
+        self.barrier();
+        if own {
+            votes.fetch_sub(1, Ordering::Relaxed);
+        }
+        any
+    }
+}
+
 /// A counter alone on its cache lines.
 #[derive(Debug, Default)]
 #[repr(align(128))]
@@ -110,6 +127,8 @@ struct Team {
     /// `POOLS` cursors per worker.
     cursors: Vec<Padded>,
     barrier: Barrier,
+    /// Workers that answer yes, see [`Worker::any`].
+    votes: AtomicUsize,
     /// 0 where there are more workers than processors: spinning would keep them from work.
     spins: u32,
 }
@@ -120,6 +139,7 @@ impl Team {
             size,
             cursors: (0..size * POOLS).map(|_| Padded::default()).collect(),
             barrier: Barrier::default(),
+            votes: AtomicUsize::new(0),
             spins: if size <= available() { SPINS_BEFORE_YIELD } else { 0 },
         }
     }
@@ -224,6 +244,18 @@ mod tests {
                 });
                 assert!(done.iter().all(|d| d.load(Ordering::Relaxed) == 9));
             }
+        }
+    }
+
+    #[test]
+    fn any_is_the_same_answer_for_all() {
+        for team in [1, 2, 5] {
+            run(&mut vec![(); team], |worker, ()| {
+                for round in 0..20 {
+                    let own = round % 3 == 0 && worker.index() == round % team;
+                    assert_eq!(worker.any(own), round % 3 == 0);
+                }
+            });
         }
     }
 

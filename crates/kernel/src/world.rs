@@ -64,4 +64,28 @@ pub trait World: Sync {
         group: &mut [Slot],
         scratch: &mut Self::Scratch,
     );
+
+    /// Whether bodies in conflict react in rounds instead of group by group: in each round
+    /// those act that hold the highest bid on all they claim, until all have. Inside a large
+    /// group this is parallel, and the outcome is the same as in the order of the bids.
+    fn reacts_in_rounds(&self) -> bool {
+        false
+    }
+
+    /// Bids for all that a body claims, and notes it in the scratch.
+    fn bid(&self, _: &Self::State, _: Cycle, _: Slot, _: &mut Self::Scratch) {}
+
+    /// Lets those of `pending` act whose bids are the highest, and takes them from the list.
+    fn act_on_bids(
+        &self,
+        _: &Self::State,
+        _: Cycle,
+        pending: &mut Vec<Slot>,
+        _: &mut Self::Scratch,
+    ) {
+        pending.clear();
+    }
+
+    /// Takes back all bids noted in the scratch.
+    fn retract_bids(&self, _: &Self::State, _: &mut Self::Scratch) {}
 }

@@ -3,5 +3,5 @@
 pub mod claims;
 pub mod position;
 
-pub use claims::{ClaimGrid, StoredTag, Tag, Tags};
+pub use claims::{ClaimGrid, FIXED, StoredTag, Tag, Tags};
 pub use position::Position;

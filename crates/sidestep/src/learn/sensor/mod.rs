@@ -20,6 +20,7 @@ mod csv;
 mod detection;
 mod mrclam;
 mod options;
+mod readings;
 mod report;
 mod sighting;
 mod tables;

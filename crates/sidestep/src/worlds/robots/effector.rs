@@ -148,6 +148,47 @@ pub struct Walk {
     pub steps: Vec<Step>,
     /// Quarter turns to the left.
     pub turn: u8,
+    /// All steps together, for the many walks that meet nothing.
+    pub whole: Whole,
+}
+
+/// What a walk does that meets nothing (index offsets from the anchor before it).
+#[derive(Debug, Clone, Default)]
+pub struct Whole {
+    /// Boxes entered that the body did not cover at the start; all must be free.
+    pub enter: Box<[i32]>,
+    /// Boxes covered at the start and not at the end.
+    pub leave: Box<[i32]>,
+    /// Boxes entered and left again on the way.
+    pub pass: Box<[i32]>,
+    /// Boxes covered at the end and not at the start.
+    pub fill: Box<[i32]>,
+    /// Move of the anchor, columns and rows.
+    pub delta: (i32, i32),
+}
+
+impl Whole {
+    fn new(steps: &[Step], own: &[i32]) -> Self {
+        let delta = steps.iter().fold((0, 0), |d, s| (d.0 + s.delta.0, d.1 + s.delta.1));
+        let mut now: Vec<i32> = own.to_vec();
+        let mut enter: Vec<i32> = Vec::new();
+        for step in steps {
+            now.retain(|b| !step.leave.contains(b));
+            now.extend_from_slice(&step.enter);
+            let new = step.enter.iter().filter(|b| !own.contains(b) && !enter.contains(b));
+            enter.extend(new.copied().collect::<Vec<_>>());
+        }
+        let keep = |from: &[i32], wanted: &dyn Fn(&i32) -> bool| {
+            from.iter().copied().filter(wanted).collect::<Box<[i32]>>()
+        };
+        Self {
+            leave: keep(own, &|b| !now.contains(b)),
+            pass: keep(&enter, &|b| !now.contains(b)),
+            fill: keep(&enter, &|b| now.contains(b)),
+            enter: enter.into(),
+            delta,
+        }
+    }
 }
 
 /// The boxes an action may sweep, as a tree of steps, depth first: what lies behind a wall is
@@ -163,7 +204,9 @@ pub struct Sweep {
 /// One step of a [`Sweep`].
 #[derive(Debug, Clone, Copy)]
 pub struct SweepNode {
-    /// End of its boxes; they begin where those of the step before end.
+    /// Where its boxes begin,
+    pub first: u32,
+    /// and end.
     pub end: u32,
     /// The next step to look at when a wall blocks this one: behind its whole subtree.
     pub after: u32,
@@ -180,6 +223,8 @@ pub struct Action {
     pub walks: Vec<Walk>,
     /// Everything that may be swept.
     pub sweep: Sweep,
+    /// The boxes of `sweep`, each once.
+    pub claims: Box<[i32]>,
 }
 
 /// Unit vectors of the headings east, north, west, south.
@@ -197,9 +242,13 @@ impl Action {
         stride: u32,
     ) -> Result<Self, RowError> {
         let probabilities: Vec<f64> = transitions.iter().map(|t| t.p).collect();
+        let own = own_boxes(body, stride);
         let walks: Vec<Walk> = transitions
             .iter()
-            .map(|t| Walk { steps: steps(&t.path, heading, body, stride), turn: t.turn })
+            .map(|t| {
+                let steps = steps(&t.path, heading, body, stride);
+                Walk { whole: Whole::new(&steps, &own), steps, turn: t.turn }
+            })
             .collect();
         let possible: Vec<(&[Side], &[Step])> = transitions
             .iter()
@@ -209,9 +258,19 @@ impl Action {
             .collect();
         let (mut nodes, mut boxes) = (Vec::new(), Vec::new());
         push_sweep(&possible, 0, &mut nodes, &mut boxes);
+        let mut claims: Vec<i32> = boxes.iter().copied().filter(|b| !own.contains(b)).collect();
+        claims.sort_unstable();
+        claims.dedup();
         let sweep = Sweep { nodes: nodes.into(), boxes: boxes.into() };
-        Ok(Self { distribution: Categorical::new(&probabilities)?, probabilities, walks, sweep })
+        let (claims, distribution) = (claims.into(), Categorical::new(&probabilities)?);
+        Ok(Self { distribution, probabilities, walks, sweep, claims })
     }
+}
+
+/// Offsets of the boxes that a body covers, row by row from its anchor.
+pub fn own_boxes(body: (u32, u32), stride: u32) -> Box<[i32]> {
+    let row = |y: u32| (0..body.0).map(move |x| (y * stride + x) as i32);
+    (0..body.1).flat_map(row).collect()
 }
 
 /// Appends the tree of the paths' steps from `depth` on: paths that start alike share nodes.
@@ -225,9 +284,9 @@ fn push_sweep(
         let along: Vec<_> =
             paths.iter().copied().filter(|(path, _)| path.get(depth) == Some(&side)).collect();
         let Some((_, steps)) = along.first() else { continue };
+        let (first, node) = (boxes.len() as u32, nodes.len());
         boxes.extend_from_slice(&steps[depth].enter);
-        let node = nodes.len();
-        nodes.push(SweepNode { end: boxes.len() as u32, after: 0 });
+        nodes.push(SweepNode { first, end: boxes.len() as u32, after: 0 });
         push_sweep(&along, depth + 1, nodes, boxes);
         nodes[node].after = nodes.len() as u32;
     }

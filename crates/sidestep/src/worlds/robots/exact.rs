@@ -157,7 +157,7 @@ impl Model {
 
     /// Names of the actions, by id.
     pub fn actions(&self) -> &[String] {
-        &self.robot.body.action_names
+        &self.robot.body.effector.actions
     }
 
     /// Outcomes over all poses and actions.

@@ -9,6 +9,7 @@
 //! sensor.rs, ray.rs, effector.rs: the tables behind it         metrics.rs: what came of it
 //! ```
 
+mod audit;
 pub mod decide;
 pub mod effector;
 pub mod exact;
@@ -17,6 +18,7 @@ mod perceive;
 pub mod ray;
 mod react;
 pub mod resolve;
+mod rounds;
 pub mod scenario;
 pub mod sensor;
 pub mod simulation;
@@ -24,6 +26,7 @@ pub mod state;
 pub mod world;
 
 use effector::Side;
+use resolve::ConflictPolicy;
 use sensor::Reading;
 use sidestep_kernel::conflict::Groups;
 use sidestep_kernel::world::Turn;
@@ -98,7 +101,8 @@ pub struct MotionSample {
 pub struct Scratch {
     readings: Vec<Reading>,
     heard: Vec<decide::Heard>,
-    keys: Vec<((u8, u32, u32), Slot)>,
+    order: Vec<resolve::Place>,
+    bids: Vec<rounds::Bid>,
     keep_events: bool,
     keep_samples: bool,
     events: Vec<Event>,
@@ -147,11 +151,47 @@ impl World for RobotsWorld {
 
     #[inline]
     fn react(&self, state: &RobotsState, now: Cycle, group: &mut [Slot], scratch: &mut Scratch) {
-        if group.len() > 1 {
-            self.order(state, now, group, scratch);
+        if let [alone] = *group {
+            let id = state.bodies[alone as usize].id;
+            return self.act(state, now, alone, self.act_words(id, now)[0], scratch);
         }
-        for &slot in &*group {
-            self.act(state, now, slot, scratch);
+        self.order(state, now, group, scratch);
+        let order = std::mem::take(&mut scratch.order);
+        for place in &order {
+            self.act(state, now, place.slot, place.word, scratch);
+        }
+        scratch.order = order;
+    }
+
+    fn reacts_in_rounds(&self) -> bool {
+        self.policy == ConflictPolicy::Rounds
+    }
+
+    fn bid(&self, state: &RobotsState, now: Cycle, body: Slot, scratch: &mut Scratch) {
+        self.bid_one(state, now, body, scratch);
+    }
+
+    fn act_on_bids(
+        &self,
+        state: &RobotsState,
+        now: Cycle,
+        pending: &mut Vec<Slot>,
+        scratch: &mut Scratch,
+    ) {
+        pending.clear();
+        for k in 0..scratch.bids.len() {
+            let bid = scratch.bids[k];
+            if self.is_highest(state, bid) {
+                self.act(state, now, bid.slot, bid.word, scratch);
+            } else {
+                pending.push(bid.slot);
+            }
+        }
+    }
+
+    fn retract_bids(&self, state: &RobotsState, scratch: &mut Scratch) {
+        for bid in scratch.bids.drain(..) {
+            self.retract(state, bid);
         }
     }
 }

@@ -3,8 +3,8 @@
 use super::decide::{Contact, Decision, Heard, Memory, Percept, Trip};
 use super::effector::{Side, Sweep};
 use super::sensor::Reading;
-use super::state::{BodyCell, FREE, IDLE, KIND_BITS, RobotsState, WALL, pose_word};
-use super::world::{Door, Mover, RobotModel, RobotsWorld, Role, purpose};
+use super::state::{BodyCell, CLEAR, FREE, IDLE, KIND_BITS, RobotsState, WALL, pose_word};
+use super::world::{BEAM_STEP, Door, Mover, RobotModel, RobotsWorld, Role, purpose};
 use super::{Scratch, SensorSample};
 use sidestep_kernel::Column;
 use sidestep_kernel::column::Word;
@@ -25,14 +25,16 @@ impl RobotsWorld {
         let (i, now) = (slot as usize, turn.now);
         let cell = &state.bodies[i];
         let at = cell.at();
-        state.claims.register(slot, at, turn);
         if let Some(frames) = &state.frames {
             let index = i * frames.capacity + (now - frames.first) as usize;
             frames.poses.set(index, pose_word(at, cell.facing.get()));
         }
-        let body = &self.bodies[i];
-        let intent = if body.is_due(now) {
-            match &self.types[body.ty as usize].role {
+        let role = &self.types[usize::from(cell.ty)].role;
+        if !matches!(role, Role::Door(_)) {
+            state.claims.register(slot, at, turn);
+        }
+        let intent = if self.bodies[i].is_due(now) {
+            match role {
                 Role::Robot(model) => self.robot_decides(model, state, now, slot, scratch),
                 Role::Mover(mover) => self.mover_draws(mover, state, now, slot),
                 Role::Door(door) => self.door_wants(door, state, now, slot),
@@ -40,10 +42,8 @@ impl RobotsWorld {
         } else {
             IDLE
         };
-        cell.intent.set(intent);
-        if intent != IDLE {
-            self.claim(state, slot, intent);
-        }
+        let clear = intent != IDLE && self.claim(state, slot, intent);
+        cell.intent.set(if clear { intent | CLEAR } else { intent });
     }
 
     #[inline]
@@ -56,7 +56,8 @@ impl RobotsWorld {
         scratch: &mut Scratch,
     ) -> u8 {
         let i = slot as usize;
-        let (id, cell) = (self.bodies[i].id, &state.bodies[i]);
+        let cell = &state.bodies[i];
+        let id = cell.id;
         self.sense(model, state, now, slot, scratch);
         scratch.heard.clear();
         if let Some(radio) = &self.radio {
@@ -76,7 +77,7 @@ impl RobotsWorld {
         let decision = model.behaviour.decide(&percept, &mut memory, &mut draws);
         store_memory(cell, memory);
         self.note(state, now, i, decision);
-        let known = (decision.action as usize) < model.body.actions[0].len();
+        let known = usize::from(decision.action) < model.body.effector.actions.len();
         debug_assert!(known, "behaviours choose among the effector's actions");
         if known { decision.action + 1 } else { IDLE }
     }
@@ -121,7 +122,7 @@ impl RobotsWorld {
                 let words = if sensor.table.reliable {
                     [0; 4]
                 } else {
-                    let (id, purpose) = (self.bodies[i].id, purpose::sense(s));
+                    let (id, purpose) = (state.bodies[i].id, purpose::sense(s));
                     self.streams.block(id, now, purpose, block as u16)
                 };
                 for (&end, word) in ends.iter().zip(words) {
@@ -162,12 +163,12 @@ impl RobotsWorld {
         u8::from(wants_open != is_open)
     }
 
-    /// Writes the body's tag into every free box that it may come to cover. Boxes in which a
-    /// body stands keep that body's tag.
+    /// Writes the body's tag into every free box that it may come to cover, and says whether
+    /// all of them are free. Boxes in which a body stands keep that body's tag.
     #[inline]
-    fn claim(&self, state: &RobotsState, slot: Slot, intent: u8) {
+    fn claim(&self, state: &RobotsState, slot: Slot, intent: u8) -> bool {
         let at = state.at(slot);
-        let (base, tag) = (at.index(self.stride), state.claims.tag(at));
+        let (base, tag) = (at.index(self.stride), state.tag(self, slot));
         match state.claims.tags() {
             Tags::Narrow(tags) => self.claim_in(tags, state, slot, (base, tag), intent),
             Tags::Wide(tags) => self.claim_in(tags, state, slot, (base, tag), intent),
@@ -182,35 +183,42 @@ impl RobotsWorld {
         slot: Slot,
         (base, tag): (u32, Tag),
         intent: u8,
-    ) {
-        let tag = T::of(tag);
-        self.for_each_claimed(state, slot, base, intent, |index, kind| {
+    ) -> bool {
+        let (cell, tag) = (&state.bodies[slot as usize], T::of(tag));
+        let body = &self.types[usize::from(cell.ty)];
+        if !body.actions.is_empty() {
+            let action = body.action_index(cell.facing.get(), intent - 1);
+            cell.action.set(action);
+            let boxes = &*body.actions[usize::from(action)].claims;
+            let at = |offset: i32| base.wrapping_add_signed(offset) as usize;
+            let met = boxes.iter().fold(0, |met, &o| met | state.grid.get(at(o)));
+            if met & KIND_BITS == FREE {
+                boxes.iter().for_each(|&o| tags.set(at(o), tag));
+                return true;
+            }
+        }
+        self.for_each_claimed(state, slot, base, |index, kind| {
             if kind == FREE {
                 tags.set(index, tag);
             }
         });
+        false
     }
 
     /// Calls `each` for every box outside the body (of a door: inside) that it may come to
-    /// cover, walls excepted, with the kind that stands there now.
-    #[inline]
+    /// cover, walls excepted, with the kind that stands there now. The body is not idle.
     pub(super) fn for_each_claimed(
         &self,
         state: &RobotsState,
         slot: Slot,
         base: u32,
-        intent: u8,
         each: impl FnMut(usize, u8),
     ) {
-        let body = self.body_type(slot);
-        let heading = usize::from(state.bodies[slot as usize].facing.get());
-        match &body.role {
-            Role::Robot(model) => {
-                let actions = &model.body.actions[heading];
-                sweep(&state.grid, &actions[usize::from(intent - 1)].sweep, base, each);
-            }
-            Role::Mover(mover) => sweep(&state.grid, &mover.steps[heading].sweep, base, each),
-            Role::Door(_) => sweep_own(&state.grid, &body.own, base, each),
+        let cell = &state.bodies[slot as usize];
+        let body = &self.types[usize::from(cell.ty)];
+        match body.actions.get(usize::from(cell.action.get())) {
+            Some(action) => sweep(&state.grid, &action.sweep, base, each),
+            None => sweep_own(&state.grid, &body.own, base, each),
         }
     }
 }
@@ -218,10 +226,10 @@ impl RobotsWorld {
 /// Walks the tree of an action's steps; what lies behind a wall is left out.
 #[inline]
 fn sweep(grid: &Column<u8>, sweep: &Sweep, base: u32, mut each: impl FnMut(usize, u8)) {
-    let (mut node, mut from) = (0, 0);
+    let mut node = 0;
     while let Some(step) = sweep.nodes.get(node) {
         let mut walled = false;
-        for &offset in &sweep.boxes[from..step.end as usize] {
+        for &offset in &sweep.boxes[step.first as usize..step.end as usize] {
             let index = base.wrapping_add_signed(offset) as usize;
             let kind = grid.get(index) & KIND_BITS;
             if kind == WALL {
@@ -231,7 +239,6 @@ fn sweep(grid: &Column<u8>, sweep: &Sweep, base: u32, mut each: impl FnMut(usize
             }
         }
         node = if walled { step.after as usize } else { node + 1 };
-        from = if node == 0 { 0 } else { sweep.nodes[node - 1].end as usize };
     }
 }
 
@@ -245,27 +252,17 @@ fn sweep_own(grid: &Column<u8>, own: &[i32], base: u32, mut each: impl FnMut(usi
 
 /// The first box along a beam that holds something: its place in the list, and its kind.
 ///
-/// Boxes are read four at a time; the grid's border is wide enough for that.
+/// Boxes are read four at a time, so lists come in fours and may reach past a wall; the
+/// grid's border is wide enough for that.
 #[inline]
 fn first_hit(boxes: &[<u8 as Word>::Cell], base: u32, offsets: &[i32]) -> Option<(usize, u8)> {
-    let kind =
-        |offset: i32| u8::load(&boxes[base.wrapping_add_signed(offset) as usize]) & KIND_BITS;
-    let mut chunks = offsets.chunks_exact(4);
-    let mut step = 0;
-    for four in &mut chunks {
-        let kinds = [kind(four[0]), kind(four[1]), kind(four[2]), kind(four[3])];
-        if kinds[0] | kinds[1] | kinds[2] | kinds[3] != 0 {
-            let first = kinds.iter().position(|&k| k != 0).unwrap_or(0);
-            return Some((step + first, kinds[first]));
+    let kind = |o: i32| u8::load(&boxes[base.wrapping_add_signed(o) as usize]) & KIND_BITS;
+    for (k, four) in offsets.as_chunks::<BEAM_STEP>().0.iter().enumerate() {
+        let kinds = four.map(kind);
+        if u32::from_ne_bytes(kinds) != 0 {
+            let first = kinds.iter().position(|&kind| kind != FREE)?;
+            return Some((BEAM_STEP * k + first, kinds[first]));
         }
-        step += 4;
-    }
-    for &offset in chunks.remainder() {
-        let kind = kind(offset);
-        if kind != 0 {
-            return Some((step, kind));
-        }
-        step += 1;
     }
     None
 }

@@ -1,10 +1,11 @@
 //! Pool two: the bodies of a group act one after the other; the environment decides.
 
-use super::effector::{Action, ObstacleRule, Side, Step, Walk};
-use super::state::{FREE, IDLE, KIND_BITS, RobotsState, VISITED, contact_word};
-use super::world::{Door, RobotsWorld, Role, purpose};
+use super::effector::{Action, ObstacleRule, Side, Walk};
+use super::state::{BodyCell, CLEAR, FREE, IDLE, KIND_BITS, RobotsState, VISITED, contact_word};
+use super::world::{BodyType, RobotsWorld, Role};
 use super::{Event, EventKind, MotionSample, Scratch};
 use sidestep_kernel::distr::Categorical;
+use sidestep_kernel::space::{Position, Tags};
 use sidestep_kernel::{Cycle, Slot};
 
 /// What a walk comes to in the present state.
@@ -17,41 +18,24 @@ pub(super) struct Verdict {
 }
 
 impl RobotsWorld {
-    /// One body acts on the state as left by those before it.
+    /// One body acts on the state as left by those before it; `word` is its draw.
     #[inline]
-    pub(super) fn act(&self, state: &RobotsState, now: Cycle, slot: Slot, scratch: &mut Scratch) {
-        let i = slot as usize;
-        let intent = state.bodies[i].intent.get();
-        if intent == IDLE {
-            return;
-        }
-        let heading = usize::from(state.bodies[i].facing.get());
-        match &self.body_type(slot).role {
-            Role::Robot(model) => {
-                let action = &model.body.actions[heading][usize::from(intent - 1)];
-                self.robot_acts(action, state, now, slot, scratch);
-            }
-            Role::Mover(mover) => {
-                let walk = &mover.steps[heading].walks[0];
-                if self.judge(walk, state, slot).contact.is_none() {
-                    self.make(walk, 1, state, slot);
-                }
-            }
-            Role::Door(door) => self.toggle(door, state, now, slot, scratch),
-        }
-    }
-
-    #[inline]
-    fn robot_acts(
+    pub(super) fn act(
         &self,
-        action: &Action,
         state: &RobotsState,
         now: Cycle,
         slot: Slot,
+        word: u32,
         scratch: &mut Scratch,
     ) {
-        let i = slot as usize;
-        let word = self.streams.block(self.bodies[i].id, now, purpose::EFFECT, 0)[0];
+        let cell = &state.bodies[slot as usize];
+        if cell.intent.get() == IDLE {
+            return;
+        }
+        let body = &self.types[usize::from(cell.ty)];
+        let Some(action) = body.actions.get(usize::from(cell.action.get())) else {
+            return self.toggle(state, now, slot, scratch);
+        };
         let drawn = match self.obstacle_rule {
             ObstacleRule::Cut | ObstacleRule::Stay => action.distribution.sample(word),
             ObstacleRule::Renormalise => match self.rescaled(action, state, slot) {
@@ -60,17 +44,107 @@ impl RobotsWorld {
             },
         };
         let walk = &action.walks[drawn];
-        let verdict = self.judge(walk, state, slot);
-        let made = if self.obstacle_rule == ObstacleRule::Cut || verdict.contact.is_none() {
-            verdict.steps
+        let base = cell.at().index(self.stride);
+        if self.is_clear(walk, state, base) {
+            self.make_whole(walk, state, cell, body, base);
+            if scratch.keep_samples {
+                let steps = walk.steps.len();
+                self.sample_motion(
+                    walk,
+                    Verdict { steps, contact: None },
+                    now,
+                    slot,
+                    state,
+                    scratch,
+                );
+            }
         } else {
-            0
+            self.blocked(walk, state, now, slot, scratch);
+        }
+    }
+
+    /// Whether a walk meets nothing.
+    #[inline]
+    fn is_clear(&self, walk: &Walk, state: &RobotsState, base: u32) -> bool {
+        let at = |offset: i32| base.wrapping_add_signed(offset) as usize;
+        let met = walk.whole.enter.iter().fold(0, |met, &o| met | state.grid.get(at(o)));
+        met & KIND_BITS == FREE
+    }
+
+    /// Makes all of a walk that meets nothing.
+    #[inline]
+    fn make_whole(
+        &self,
+        walk: &Walk,
+        state: &RobotsState,
+        cell: &BodyCell,
+        body: &BodyType,
+        base: u32,
+    ) {
+        cell.contact.set(0);
+        if walk.turn != 0 {
+            cell.facing.set((cell.facing.get() + walk.turn) % 4);
+        }
+        let whole = &walk.whole;
+        if whole.delta == (0, 0) {
+            return;
+        }
+        let at = |offset: i32| base.wrapping_add_signed(offset) as usize;
+        for &offset in &whole.leave {
+            state.grid.set(at(offset), state.grid.get(at(offset)) & !KIND_BITS);
+        }
+        let mut first_visits = 0;
+        let mut enter = |offset: i32, kind: u8| {
+            let before = state.grid.get(at(offset));
+            first_visits += u32::from(!before & body.marks != 0);
+            state.grid.set(at(offset), before & VISITED | kind);
+        };
+        whole.pass.iter().for_each(|&offset| enter(offset, body.marks));
+        whole.fill.iter().for_each(|&offset| enter(offset, body.kind | body.marks));
+        let moved = cell.at().offset(whole.delta.0, whole.delta.1);
+        self.settle(state, cell, body, moved);
+        cell.moves.set(cell.moves.get() + walk.steps.len() as u32);
+        if first_visits > 0 {
+            cell.first_visits.set(cell.first_visits.get() + first_visits);
+        }
+    }
+
+    /// Sets a body's anchor and writes its new tag into the boxes it covers.
+    #[inline]
+    fn settle(&self, state: &RobotsState, cell: &BodyCell, body: &BodyType, moved: Position) {
+        let (tag, index) = (state.claims.tag(moved), moved.index(self.stride));
+        cell.anchor.set(moved.word());
+        let at = |offset: i32| index.wrapping_add_signed(offset) as usize;
+        match state.claims.tags() {
+            Tags::Narrow(tags) => body.own.iter().for_each(|&o| tags.set(at(o), tag as u8)),
+            Tags::Wide(tags) => body.own.iter().for_each(|&o| tags.set(at(o), tag)),
+        }
+    }
+
+    /// A walk that may be cut short by something in the way.
+    fn blocked(
+        &self,
+        walk: &Walk,
+        state: &RobotsState,
+        now: Cycle,
+        slot: Slot,
+        scratch: &mut Scratch,
+    ) {
+        let i = slot as usize;
+        let verdict = self.judge(walk, state, slot);
+        let is_mover = matches!(self.body_type(slot).role, Role::Mover(_));
+        let made = match self.obstacle_rule {
+            _ if verdict.contact.is_none() => verdict.steps,
+            ObstacleRule::Cut if !is_mover => verdict.steps,
+            _ => 0,
         };
         self.make(walk, made, state, slot);
+        if is_mover {
+            return;
+        }
         if scratch.keep_samples {
-            let turn = if verdict.contact.is_none() { walk.turn } else { 0 };
-            let sample = self.motion(&walk.steps[..made], turn, verdict, now, slot, state);
-            scratch.motion_samples.push(sample);
+            let made = Verdict { steps: made, ..verdict };
+            self.sample_motion(walk, made, now, slot, state, scratch);
         }
         match verdict.contact {
             None => {
@@ -118,9 +192,8 @@ impl RobotsWorld {
         if steps == 0 {
             return;
         }
-        let i = slot as usize;
-        let body = self.body_type(slot);
-        let at = state.at(slot);
+        let (cell, body) = (&state.bodies[slot as usize], self.body_type(slot));
+        let at = cell.at();
         let base = at.index(self.stride);
         let (mut moved, mut first_visits) = (at, 0);
         for step in &walk.steps[..steps] {
@@ -136,15 +209,9 @@ impl RobotsWorld {
             }
             moved = moved.offset(step.delta.0, step.delta.1);
         }
-        let tag = state.claims.tag(moved);
-        let index = moved.index(self.stride);
-        for &offset in &body.own {
-            state.claims.claim(index.wrapping_add_signed(offset), tag);
-        }
-        state.bodies[i].anchor.set(moved.word());
-        let cell = &state.bodies[i];
+        self.settle(state, cell, body, moved);
         cell.moves.set(cell.moves.get() + steps as u32);
-        if body.marks != 0 && first_visits > 0 {
+        if body.marks != 0 {
             cell.first_visits.set(cell.first_visits.get() + first_visits);
         }
     }
@@ -173,7 +240,7 @@ impl RobotsWorld {
     }
 
     /// Opens, or closes when nobody stands in the way; otherwise the closing waits.
-    fn toggle(&self, _: &Door, state: &RobotsState, now: Cycle, slot: Slot, scratch: &mut Scratch) {
+    fn toggle(&self, state: &RobotsState, now: Cycle, slot: Slot, scratch: &mut Scratch) {
         let i = slot as usize;
         let body = self.body_type(slot);
         let base = state.at(slot).index(self.stride);
@@ -197,27 +264,35 @@ impl RobotsWorld {
         }
     }
 
-    /// What an action came to, for a log to learn from: the steps and the turn that were
+    /// Notes what an action came to, for a log to learn from: the steps and the turn that were
     /// made, not those that the drawn transition would have made in a free place.
-    fn motion(
+    fn sample_motion(
         &self,
-        made: &[Step],
-        quarter_turns: u8,
+        walk: &Walk,
         verdict: Verdict,
         now: Cycle,
         slot: Slot,
         state: &RobotsState,
-    ) -> MotionSample {
+        scratch: &mut Scratch,
+    ) {
         let i = slot as usize;
-        let count = |side| made.iter().filter(|s| s.side == side).count() as i32;
-        MotionSample {
+        let (mut ahead, mut left) = (0, 0);
+        for step in &walk.steps[..verdict.steps] {
+            match step.side {
+                Side::Front => ahead += 1,
+                Side::Back => ahead -= 1,
+                Side::Left => left += 1,
+                Side::Right => left -= 1,
+            }
+        }
+        scratch.motion_samples.push(MotionSample {
             cycle: now,
             robot: self.bodies[i].id,
-            action: state.bodies[i].intent.get() - 1,
-            ahead: count(Side::Front) - count(Side::Back),
-            left: count(Side::Left) - count(Side::Right),
-            quarter_turns,
+            action: (state.bodies[i].intent.get() & !CLEAR) - 1,
+            ahead,
+            left,
+            quarter_turns: if verdict.contact.is_none() { walk.turn } else { 0 },
             contact: verdict.contact.is_some(),
-        }
+        });
     }
 }

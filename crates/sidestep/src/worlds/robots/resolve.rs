@@ -1,12 +1,12 @@
 //! Who meets whom, and in which order the bodies of a conflict group act.
 
 use super::Scratch;
-use super::state::{IDLE, RobotsState};
+use super::state::{CLEAR, IDLE, RobotsState};
 use super::world::{RobotsWorld, Role, purpose};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::conflict::Groups;
-use sidestep_kernel::space::{StoredTag, Tags};
-use sidestep_kernel::{Column, Cycle, Slot};
+use sidestep_kernel::space::{FIXED, Position, StoredTag, Tag, Tags};
+use sidestep_kernel::{Column, Cycle, EntityId, Slot};
 
 /// The order within a conflict group.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -44,6 +44,14 @@ impl ConflictPolicy {
     }
 }
 
+/// A body's place in the order of its group.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Place {
+    key: (u8, u32, u32),
+    pub(super) slot: Slot,
+    pub(super) word: u32,
+}
+
 impl RobotsWorld {
     /// Joins a body with all whose claims meet its own: a box that it may come to cover has
     /// another's tag, be it of a body that stands there or of one that may come too.
@@ -69,22 +77,50 @@ impl RobotsWorld {
         groups: &Groups,
     ) {
         let at = state.at(slot);
-        let own = T::of(state.claims.tag(at));
-        self.for_each_claimed(state, slot, at.index(self.stride), intent, |index, _| {
+        let (base, own) = (at.index(self.stride), T::of(state.tag(self, slot)));
+        let mut last_met = None;
+        let mut look = |index: usize| {
             let tag = tags.get(index);
             if tag != own {
-                let other = state.claims.body(index as u32, tag.tag(), |body| state.at(body));
-                groups.join(slot, other);
+                self.meet(state, slot, (index as u32, tag.tag()), &mut last_met, groups);
             }
-        });
+        };
+        if intent & CLEAR == 0 {
+            return self.for_each_claimed(state, slot, base, |index, _| look(index));
+        }
+        let cell = &state.bodies[slot as usize];
+        let boxes =
+            &*self.types[usize::from(cell.ty)].actions[usize::from(cell.action.get())].claims;
+        boxes.iter().for_each(|&offset| look(base.wrapping_add_signed(offset) as usize));
     }
 
-    /// Sorts a group into its order of acting.
+    /// Joins a body with the one whose tag stands in a box. A neighbor is often met in
+    /// several boxes; `last_met` saves looking it up again.
+    fn meet(
+        &self,
+        state: &RobotsState,
+        slot: Slot,
+        (index, tag): (u32, Tag),
+        last_met: &mut Option<Position>,
+        groups: &Groups,
+    ) {
+        if tag == FIXED {
+            return groups.join(slot, state.claims.fixed_body(index));
+        }
+        let anchor = state.claims.anchor(index, tag);
+        if *last_met != Some(anchor) {
+            *last_met = Some(anchor);
+            groups.join(slot, state.claims.body(anchor));
+        }
+    }
+
+    /// Fills `scratch.order` with a group in its order of acting, and each body's draw of
+    /// what its action comes to (the priority is drawn beside it).
     pub(super) fn order(
         &self,
         state: &RobotsState,
         now: Cycle,
-        group: &mut [Slot],
+        group: &[Slot],
         scratch: &mut Scratch,
     ) {
         let first = if self.policy == ConflictPolicy::RightOfWay {
@@ -92,11 +128,20 @@ impl RobotsWorld {
         } else {
             0
         };
-        let keys = &mut scratch.keys;
-        keys.clear();
-        keys.extend(group.iter().map(|&slot| (self.priority(state, now, slot, first), slot)));
-        keys.sort_unstable();
-        group.iter_mut().zip(keys).for_each(|(place, key)| *place = key.1);
+        let order = &mut scratch.order;
+        order.clear();
+        order.extend(group.iter().map(|&slot| {
+            let words = self.act_words(state.bodies[slot as usize].id, now);
+            Place { key: self.priority(state, slot, words[1], first), slot, word: words[0] }
+        }));
+        order.sort_unstable_by_key(|place| place.key);
+    }
+
+    /// The draws of a body's action: what it comes to, and its priority.
+    #[inline]
+    pub(super) fn act_words(&self, id: EntityId, now: Cycle) -> [u32; 2] {
+        let [effect, priority, ..] = self.streams.block(id, now, purpose::ACT, 0);
+        [effect, priority]
     }
 
     /// Smaller acts earlier: rank by the policy, fair draw, id. Unique per body.
@@ -104,17 +149,16 @@ impl RobotsWorld {
     pub(super) fn priority(
         &self,
         state: &RobotsState,
-        now: Cycle,
         slot: Slot,
+        draw: u32,
         first_heading: u8,
     ) -> (u8, u32, u32) {
         let id = self.bodies[slot as usize].id;
-        let draw = || self.streams.block(id, now, purpose::PRIORITY, 0)[0];
         match self.policy {
             ConflictPolicy::Fixed => (0, 0, id),
-            ConflictPolicy::Random | ConflictPolicy::Rounds => (0, draw(), id),
+            ConflictPolicy::Random | ConflictPolicy::Rounds => (0, draw, id),
             ConflictPolicy::ByKind => {
-                (self.kind_rank[usize::from(self.body_type(slot).kind)], draw(), id)
+                (self.kind_rank[usize::from(self.body_type(slot).kind)], draw, id)
             }
             ConflictPolicy::RightOfWay => {
                 let rank = match self.heading_of(state, slot) {
@@ -122,7 +166,7 @@ impl RobotsWorld {
                     Some(heading) => 1 + (4 + first_heading - heading) % 4,
                     None => 0,
                 };
-                (rank, draw(), id)
+                (rank, draw, id)
             }
         }
     }
@@ -141,7 +185,7 @@ impl RobotsWorld {
         for heading in group.iter().filter_map(|&slot| self.heading_of(state, slot)) {
             present[usize::from(heading)] = true;
         }
-        let draw = (self.streams.block(u32::MAX, now, purpose::PRIORITY, 0)[0] >> 30) as usize;
+        let draw = (self.streams.block(u32::MAX, now, purpose::ACT, 0)[1] >> 30) as usize;
         let candidates = (0..4).map(|k| (draw + k) % 4);
         let begins = |h: &usize| present[*h] && !present[(h + 1) % 4];
         candidates.clone().find(begins).unwrap_or(draw) as u8

@@ -118,6 +118,11 @@ impl RobotsSimulation {
         self.recorded = self.cycle;
     }
 
+    /// Uses all workers even where one would be faster; for tests and benchmarks.
+    pub fn share_always(&mut self) {
+        self.engine.share_always();
+    }
+
     /// The world.
     pub fn world(&self) -> &Arc<RobotsWorld> {
         &self.compiled.world

@@ -1,11 +1,13 @@
 //! All that changes in a run, in columns by slot, and its snapshot by entity id.
 
+use super::resolve::ConflictPolicy;
 use super::world::{RobotsWorld, Role};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::column::Shared;
 use sidestep_kernel::digest::Hasher;
-use sidestep_kernel::space::{ClaimGrid, Position};
+use sidestep_kernel::space::{ClaimGrid, FIXED, Position, Tag};
 use sidestep_kernel::{Column, Cycle, Digest, Slot};
+use std::sync::atomic::AtomicU64;
 
 /// A box of the grid in one byte: its kind, and whether an agent has ever been there.
 pub const KIND_BITS: u8 = 0x7f;
@@ -16,8 +18,10 @@ pub const FREE: u8 = 0;
 /// The static map's walls.
 pub const WALL: u8 = 1;
 
-/// Nothing intended; otherwise an action's id plus 1.
+/// Nothing intended; otherwise an action's id plus 1, with or without [`CLEAR`].
 pub const IDLE: u8 = 0;
+/// Added to an intent when every box that the action may sweep is free.
+pub const CLEAR: u8 = 0x80;
 
 /// The state of a robots world.
 #[derive(Debug)]
@@ -30,6 +34,8 @@ pub struct RobotsState {
     pub bodies: Box<[BodyCell]>,
     /// Contacts of each body by kind touched: `slot * kinds + kind`.
     pub contacts: Column<u32>,
+    /// Highest bid per box in the present round; empty unless the policy is `rounds`.
+    pub bids: Box<[AtomicU64]>,
     /// Last broadcast of each robot, by parity of the cycle in which it is read; empty
     /// columns without radio.
     pub voice: [Column<u64>; 2],
@@ -61,6 +67,12 @@ pub struct BodyCell {
     pub trip_cycles: Shared<u64>,
     /// Cycle in which the present trip began.
     pub trip_begun: Shared<u64>,
+    /// The entity, constant.
+    pub id: u32,
+    /// Its type, constant.
+    pub ty: u16,
+    /// Which of its type's actions it is about to do, see `BodyType::actions`.
+    pub action: Shared<u16>,
 }
 
 impl BodyCell {
@@ -145,11 +157,20 @@ impl RobotsState {
         let n = world.bodies.len();
         let radio = || Column::filled(if world.radio.is_some() { n } else { 0 }, 0u64);
         let (reach, extent) = world.extent;
+        let in_rounds = world.policy == ConflictPolicy::Rounds;
+        let bids = if in_rounds { world.walls.len() } else { 0 };
+        let mut claims = ClaimGrid::new(world.stride, world.rows, n, reach, extent);
+        world.door_boxes().for_each(|(index, door)| claims.fix(index, door));
         Self {
             grid: world.walls.iter().copied().collect(),
-            claims: ClaimGrid::new(world.stride, world.rows, n, reach, extent),
-            bodies: (0..n).map(|_| BodyCell::default()).collect(),
+            claims,
+            bodies: world
+                .bodies
+                .iter()
+                .map(|b| BodyCell { id: b.id, ty: b.ty, ..BodyCell::default() })
+                .collect(),
             contacts: Column::filled(n * world.kinds.len(), 0),
+            bids: (0..bids).map(|_| AtomicU64::new(0)).collect(),
             voice: [radio(), radio()],
             frames: None,
         }
@@ -165,6 +186,16 @@ impl RobotsState {
     #[inline(always)]
     pub fn at(&self, slot: Slot) -> Position {
         self.bodies[slot as usize].at()
+    }
+
+    /// What a body claims with.
+    #[inline]
+    pub fn tag(&self, world: &RobotsWorld, slot: Slot) -> Tag {
+        if world.body_type(slot).actions.is_empty() {
+            FIXED
+        } else {
+            self.claims.tag(self.at(slot))
+        }
     }
 
     /// The state in the order of ids after `cycle` cycles.
@@ -240,7 +271,7 @@ impl RobotsState {
         let body = world.body_type(slot);
         let at = self.at(slot);
         let index = at.index(world.stride);
-        let tag = self.claims.tag(at);
+        let tag = self.tag(world, slot);
         for &offset in &body.own {
             let at = index.wrapping_add_signed(offset);
             self.grid
@@ -255,7 +286,8 @@ impl RobotsState {
         let bodies = std::mem::size_of_val(&*self.bodies)
             + self.contacts.heap_bytes()
             + self.voice.iter().map(Column::heap_bytes).sum::<usize>();
-        (self.grid.heap_bytes() + claims_boxes, bodies + claims_bodies)
+        let boxes = self.grid.heap_bytes() + size_of_val(&*self.bids) + claims_boxes;
+        (boxes, bodies + claims_bodies)
     }
 }
 

@@ -1,8 +1,8 @@
 //! A compiled building: everything that never changes during a run.
 
 use super::decide::{Behaviour, Sector};
-use super::effector::{Action, ObstacleRule};
-use super::ray::{crossings, turn_crossing};
+use super::effector::{Action, EffectorModel, ObstacleRule};
+use super::ray::{Crossing, crossings, turn_crossing};
 use super::resolve::ConflictPolicy;
 use super::sensor::{Reading, ReadingTable, SensorModel};
 use crate::map::GridMap;
@@ -24,10 +24,9 @@ pub mod purpose {
     pub const PHASE: Purpose = Purpose(2);
     /// A behaviour's own stream.
     pub const DECIDE: Purpose = Purpose(3);
-    /// Which transition an action ends in.
-    pub const EFFECT: Purpose = Purpose(4);
-    /// Priority in a conflict group.
-    pub const PRIORITY: Purpose = Purpose(5);
+    /// An action: index 0 says which transition it ends in, index 1 is the body's priority
+    /// in its conflict group.
+    pub const ACT: Purpose = Purpose(4);
     /// Random doors.
     pub const DOOR: Purpose = Purpose(6);
     /// Directions of people.
@@ -42,7 +41,10 @@ pub mod purpose {
 
 /// Rings of wall around the map: beams are read four boxes at a time and may look past the
 /// first wall.
-pub(super) const BORDER: u32 = 4;
+pub(super) const BORDER: u32 = BEAM_STEP as u32;
+
+/// Boxes of a beam that are read together.
+pub(super) const BEAM_STEP: usize = 4;
 
 /// Which errors are switched on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -106,6 +108,8 @@ pub struct RobotsWorld {
     pub(super) rows: u32,
     /// The padded grid without bodies.
     pub(super) walls: Vec<u8>,
+    /// Place and facing of each entity at the start, by id.
+    pub(super) start: Arc<[((u32, u32), u8)]>,
     /// Reach and extent of the farthest claims, see `ClaimGrid::new`.
     pub(super) extent: (u32, u32),
 }
@@ -149,8 +153,18 @@ pub struct BodyType {
     pub own: Box<[i32]>,
     /// `VISITED` for robots: they mark the boxes they cover.
     pub marks: u8,
+    /// Its actions: `heading * actions per heading + action`; none for a door.
+    pub actions: Arc<[Action]>,
     /// What it does.
     pub role: Role,
+}
+
+impl BodyType {
+    /// Where an action at a heading stands in `actions`.
+    #[inline]
+    pub fn action_index(&self, heading: u8, action: u8) -> u16 {
+        u16::from(heading) * (self.actions.len() / 4) as u16 + u16::from(action)
+    }
 }
 
 /// The three sorts of bodies.
@@ -180,10 +194,10 @@ pub struct RobotBody {
     pub sensors: Vec<MountedSensor>,
     /// Sector of each beam of all sensors in order.
     pub sectors: Vec<Sector>,
-    /// `actions[heading][action]`.
-    pub actions: [Vec<Action>; 4],
-    /// Names of the actions.
-    pub action_names: Vec<String>,
+    /// The effector as data.
+    pub effector: EffectorModel,
+    /// The effector on this body, see [`BodyType::actions`].
+    pub actions: Arc<[Action]>,
 }
 
 /// A sensor on a body of a given size.
@@ -220,16 +234,17 @@ impl MountedSensor {
         reliable: bool,
     ) -> Result<Self, RowError> {
         let range = model.range_m / box_size_m;
-        let beams: Vec<_> =
-            model.bearings_deg.iter().map(|&deg| crossings(size, deg, range)).collect();
+        let beam = |&deg: &f64| in_fours(crossings(size, deg, range));
+        let beams: Vec<_> = model.bearings_deg.iter().map(beam).collect();
         let rays = std::array::from_fn(|heading| {
+            let offset = |c: Crossing| {
+                let turned = turn_crossing(c, size, heading as u8);
+                turned.dy * stride as i32 + turned.dx
+            };
             let mut ends = Vec::new();
             let mut offsets = Vec::new();
             for beam in &beams {
-                offsets.extend(beam.iter().map(|&c| {
-                    let turned = turn_crossing(c, size, heading as u8);
-                    turned.dy * stride as i32 + turned.dx
-                }));
+                offsets.extend(beam.iter().map(|&c| offset(c)));
                 ends.push(offsets.len() as u16);
             }
             Rays { offsets: offsets.into(), ends: ends.into() }
@@ -256,13 +271,20 @@ impl MountedSensor {
     }
 }
 
+/// Repeats the last crossing until the beam can be read [`BEAM_STEP`] boxes at a time: what is
+/// met first stays the same.
+fn in_fours(mut beam: Vec<Crossing>) -> Vec<Crossing> {
+    if let Some(&last) = beam.last() {
+        beam.resize(beam.len().next_multiple_of(BEAM_STEP), last);
+    }
+    beam
+}
+
 /// A mobile object: tries one box per action.
 #[derive(Debug, Clone)]
 pub struct Mover {
     /// Chance to go on in the same direction; otherwise a new one is drawn.
     pub straight: Chance,
-    /// The step in each direction.
-    pub steps: [Action; 4],
 }
 
 /// A door's will.
@@ -331,6 +353,17 @@ impl RobotsWorld {
     /// Slot of an entity.
     pub fn slot(&self, id: EntityId) -> Slot {
         self.slot_of_id[id as usize]
+    }
+
+    /// Every box of every door, by index in the padded grid, and the door's slot.
+    pub(super) fn door_boxes(&self) -> impl Iterator<Item = (u32, Slot)> + '_ {
+        let is_door = |slot: &Slot| matches!(self.body_type(*slot).role, Role::Door(_));
+        (0..self.bodies.len() as Slot).filter(is_door).flat_map(|slot| {
+            let (at, _) = self.start[self.bodies[slot as usize].id as usize];
+            let base = self.grid_position(at).index(self.stride);
+            let own = &self.body_type(slot).own;
+            own.iter().map(move |&offset| (base.wrapping_add_signed(offset), slot))
+        })
     }
 
     /// Map column and row of a position in the padded grid.

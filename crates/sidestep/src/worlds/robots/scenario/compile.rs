@@ -12,7 +12,7 @@ use crate::map::{Cell, GridMap, Rect};
 use crate::planning::{FlowField, FreeSpace};
 use crate::scenario::{OneOrMany, Source, nearest};
 use crate::worlds::robots::decide::{Behaviour, External, Goto, Replay, Sector, Shuttle, Wander};
-use crate::worlds::robots::effector::{Action, EffectorModel, Side, Transition};
+use crate::worlds::robots::effector::{Action, EffectorModel, Side, Transition, own_boxes};
 use crate::worlds::robots::resolve::ConflictPolicy;
 use crate::worlds::robots::sensor::SensorModel;
 use crate::worlds::robots::state::VISITED;
@@ -95,9 +95,9 @@ struct Compiler<'a> {
     floor: Floor,
     /// Spans by id, to name the other body when two stand on each other.
     spans: Vec<Range<usize>>,
-    /// Most boxes that a claim reaches beside a body, and over all.
+    /// Most boxes that a claim reaches beside a body, and most with the body itself.
     reach: u32,
-    extent: u32,
+    longest: u32,
 }
 
 impl<'a> Compiler<'a> {
@@ -131,7 +131,7 @@ impl<'a> Compiler<'a> {
             floor,
             spans: Vec::new(),
             reach: 0,
-            extent: 1,
+            longest: 1,
             map,
             office_doors,
             file,
@@ -174,6 +174,7 @@ impl<'a> Compiler<'a> {
         let mut robot_slots: Vec<Slot> =
             (0..bodies.len() as Slot).filter(|&s| is_robot(&bodies[s as usize])).collect();
         robot_slots.sort_unstable_by_key(|&s| bodies[s as usize].id);
+        let start: Arc<[_]> = self.start.clone().into();
         let stride = self.stride();
         let rows = self.map.height() + 2 * BORDER;
         let radio = self.radio()?;
@@ -194,11 +195,12 @@ impl<'a> Compiler<'a> {
             streams: self.streams,
             stride,
             rows,
-            extent: (self.reach, self.extent),
+            start: Arc::clone(&start),
+            extent: (self.reach, self.longest + self.reach),
         };
         Ok(Compiled {
             world: Arc::new(world),
-            start: self.start.into(),
+            start,
             name: self.file.name,
             seed: self.file.seed,
             cycles: self.file.cycles,
@@ -455,14 +457,12 @@ impl Compiler<'_> {
         &mut self,
         kind: &Spanned<String>,
         size: (u32, u32),
+        actions: Arc<[Action]>,
         role: Role,
     ) -> Result<BodyType, InputError> {
-        let stride = self.stride() as i32;
-        let own = (0..size.1 as i32)
-            .flat_map(|y| (0..size.0 as i32).map(move |x| y * stride + x))
-            .collect();
+        let own = own_boxes(size, self.stride());
         let marks = if matches!(role, Role::Robot(_)) { VISITED } else { 0 };
-        Ok(BodyType { kind: self.kind(kind)?, size, own, marks, role })
+        Ok(BodyType { kind: self.kind(kind)?, size, own, marks, actions, role })
     }
 
     /// Notes how far the claims of a body reach, for tags that tell bodies apart.
@@ -474,11 +474,10 @@ impl Compiler<'_> {
     ) -> Result<(), InputError> {
         let reach = longest_path as u32;
         self.reach = self.reach.max(reach);
-        self.extent = self.extent.max(size.0.max(size.1) + self.reach + reach);
-        let widest = self.extent.max(size.0.max(size.1) + 2 * self.reach);
-        self.extent = widest;
-        if self.extent > ClaimGrid::MAX_EXTENT {
-            let cause = format!("bodies and paths reach over {} boxes", self.extent);
+        self.longest = self.longest.max(size.0.max(size.1) + reach);
+        let extent = self.longest + self.reach;
+        if extent > ClaimGrid::MAX_EXTENT {
+            let cause = format!("bodies and paths reach over {extent} boxes");
             return Err(self.error(
                 span.clone(),
                 cause,
@@ -533,8 +532,9 @@ impl Compiler<'_> {
         let size = self.robot_size(s)?;
         let body = Arc::new(self.robot_body(s, size, &span)?);
         let behaviour = self.behaviour(s.behaviour.as_ref(), size, &body)?;
-        let ty =
-            self.body_type(&s.kind, (size, size), Role::Robot(RobotModel { body, behaviour }))?;
+        let actions = Arc::clone(&body.actions);
+        let role = Role::Robot(RobotModel { body, behaviour });
+        let ty = self.body_type(&s.kind, (size, size), actions, role)?;
         let ty = TypeOf::All(self.add_type(ty, &span)?);
         Ok(Group {
             count,
@@ -568,7 +568,8 @@ impl Compiler<'_> {
             let goals = vec![Arc::new(FlowField::towards(&free, size, &[row.goal]))];
             let behaviour: Arc<dyn Behaviour> = Arc::new(Goto { goals, repeat: false });
             let model = RobotModel { body: Arc::clone(&body), behaviour };
-            let ty = self.body_type(&s.kind, (size, size), Role::Robot(model))?;
+            let actions = Arc::clone(&body.actions);
+            let ty = self.body_type(&s.kind, (size, size), actions, Role::Robot(model))?;
             types.push(self.add_type(ty, span)?);
             places.push(((row.start, None), scen.span()));
         }
@@ -603,28 +604,13 @@ impl Compiler<'_> {
         let longest =
             effector.transitions.iter().flatten().map(|t| t.path.len()).max().unwrap_or(0);
         self.note_reach((size, size), longest, span)?;
-        let stride = self.stride();
-        let at_heading = |heading: usize| {
-            (0..effector.actions.len())
-                .map(|a| {
-                    Action::new(
-                        &effector.transitions_of(a as u8, reliable),
-                        heading as u8,
-                        (size, size),
-                        stride,
-                    )
-                })
-                .collect::<Result<Vec<_>, _>>()
-                .expect("the effector's rows were checked")
-        };
+        let actions =
+            (0..effector.actions.len()).map(|a| effector.transitions_of(a as u8, reliable));
+        let actions =
+            actions_at_headings(&actions.collect::<Vec<_>>(), (size, size), self.stride());
         let bearings = sensors.iter().flat_map(|m| m.model.bearings_deg.iter());
         let sectors = bearings.map(|&deg| Sector::of(deg)).collect();
-        Ok(RobotBody {
-            sectors,
-            sensors,
-            actions: std::array::from_fn(at_heading),
-            action_names: effector.actions,
-        })
+        Ok(RobotBody { sectors, sensors, actions, effector })
     }
 
     fn mounted(&self, name: &Spanned<String>, size: u32) -> Result<MountedSensor, InputError> {
@@ -748,7 +734,7 @@ impl Compiler<'_> {
                     .actions
                     .as_ref()
                     .ok_or_else(|| missing("actions", "actions = [\"forward\", \"left\"]"))?;
-                let known: Vec<&str> = body.action_names.iter().map(String::as_str).collect();
+                let known: Vec<&str> = body.effector.actions.iter().map(String::as_str).collect();
                 let id = |name: &String| {
                     known.iter().position(|k| k == name).map(|k| k as u8).ok_or_else(|| {
                         self.error(
@@ -762,7 +748,7 @@ impl Compiler<'_> {
                 Arc::new(Replay { actions, repeat: s.repeat.unwrap_or(false) })
             }
             "random" => {
-                let random = random::behaviour(s, &body.action_names);
+                let random = random::behaviour(s, &body.effector.actions);
                 Arc::new(random.map_err(|(cause, remedy)| self.error(span, cause, remedy))?)
             }
             "external" => Arc::new(External),
@@ -799,12 +785,9 @@ impl Compiler<'_> {
         }
         self.note_reach(size, 1, &span)?;
         let step = [Transition { p: 1.0, path: vec![Side::Front], turn: 0 }];
-        let stride = self.stride();
-        let steps = std::array::from_fn(|h| {
-            Action::new(&step, h as u8, size, stride).expect("one certain step")
-        });
-        let role = Role::Mover(Mover { straight: Chance::new(straight), steps });
-        let ty = self.body_type(&s.kind, size, role)?;
+        let actions = actions_at_headings(&[step.to_vec()], size, self.stride());
+        let role = Role::Mover(Mover { straight: Chance::new(straight) });
+        let ty = self.body_type(&s.kind, size, actions, role)?;
         let ty = TypeOf::All(self.add_type(ty, &span)?);
         Ok(Group {
             count,
@@ -826,7 +809,7 @@ impl Compiler<'_> {
             // Without a given phase the doors of a section do not all toggle at once.
             let door = self.door(s, &span, k as u64, rects.len() as u64)?;
             let role = Role::Door(door);
-            let ty = self.body_type(&s.kind, size, role)?;
+            let ty = self.body_type(&s.kind, size, Arc::new([]), role)?;
             types.push(self.add_type(ty, &span)?);
             places.push((((rect.col, rect.row), Some(0)), at.clone()));
         }
@@ -889,6 +872,19 @@ impl Compiler<'_> {
             _ => Err(self.error(span.clone(), "a door needs one schedule", "add periodic = { open = 200, closed = 100 } or random = { p_open = 0.01, p_close = 0.01 }")),
         }
     }
+}
+
+/// Every action at every heading, see `BodyType::actions`.
+fn actions_at_headings(
+    actions: &[Vec<Transition>],
+    size: (u32, u32),
+    stride: u32,
+) -> Arc<[Action]> {
+    let at = |heading: u8| {
+        let build = move |a| Action::new(a, heading, size, stride).expect("the rows were checked");
+        actions.iter().map(Vec::as_slice).map(build)
+    };
+    (0..4).flat_map(at).collect()
 }
 
 fn load_map(

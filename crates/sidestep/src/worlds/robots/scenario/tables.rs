@@ -12,6 +12,8 @@ use toml::Spanned;
 
 /// Most beams, observations, classes and actions; readings name them with a byte.
 const MAX_NAMES: usize = 250;
+/// Most actions; an intent holds an action and a flag in one byte.
+const MAX_ACTIONS: usize = 120;
 const MAX_BEAMS: usize = 1024;
 
 /// A section and the text it stands in (scenario, profile or presets).
@@ -309,8 +311,8 @@ pub(super) fn effector(
             }
         }
     }
-    if model.actions.len() > MAX_NAMES {
-        return Err(at.error(span, "more than 250 actions", "give fewer"));
+    if model.actions.len() > MAX_ACTIONS {
+        return Err(at.error(span, "more than 120 actions", "give fewer"));
     }
     Ok(model)
 }
