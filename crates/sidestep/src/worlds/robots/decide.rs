@@ -5,10 +5,12 @@
 //! own; what a robot remembers is in its [`Memory`], which is part of the state.
 
 mod goto;
+mod random;
 mod replay;
 mod wander;
 
 pub use goto::{Goto, Shuttle};
+pub use random::Random;
 pub use replay::{External, ORDER, Replay};
 pub use wander::Wander;
 

@@ -12,6 +12,7 @@
 mod audit;
 pub mod decide;
 pub mod effector;
+pub mod exact;
 pub mod metrics;
 mod perceive;
 pub mod ray;
@@ -89,7 +90,7 @@ pub struct MotionSample {
     pub ahead: i32,
     /// Boxes moved to the left.
     pub left: i32,
-    /// Quarter turns to the left that the transition makes.
+    /// Quarter turns to the left that were made; an action that ends in a contact makes none.
     pub quarter_turns: u8,
     /// Whether an obstacle cut it.
     pub contact: bool,

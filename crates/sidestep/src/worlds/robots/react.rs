@@ -264,8 +264,8 @@ impl RobotsWorld {
         }
     }
 
-    /// Notes what an action came to, for a log to learn from: displacement in boxes in the
-    /// frame of the heading before, turn in degrees.
+    /// Notes what an action came to, for a log to learn from: the steps and the turn that were
+    /// made, not those that the drawn transition would have made in a free place.
     fn sample_motion(
         &self,
         walk: &Walk,
@@ -291,7 +291,7 @@ impl RobotsWorld {
             action: (state.bodies[i].intent.get() & !CLEAR) - 1,
             ahead,
             left,
-            quarter_turns: walk.turn,
+            quarter_turns: if verdict.contact.is_none() { walk.turn } else { 0 },
             contact: verdict.contact.is_some(),
         });
     }

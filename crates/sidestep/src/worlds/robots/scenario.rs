@@ -2,6 +2,7 @@
 
 mod compile;
 mod placing;
+mod random;
 mod tables;
 
 pub use compile::{Behaviours, Compiled, StorageOrder, presets};
@@ -193,6 +194,8 @@ pub(super) struct BehaviourSection {
     pub(super) goals: Option<Vec<(u32, u32)>>,
     pub(super) actions: Option<Vec<String>>,
     pub(super) repeat: Option<bool>,
+    pub(super) weights: Option<BTreeMap<String, f64>>,
+    pub(super) weights_after_contact: Option<BTreeMap<String, f64>>,
 }
 
 #[derive(Debug, Deserialize)]

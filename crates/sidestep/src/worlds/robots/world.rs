@@ -82,7 +82,7 @@ impl Regime {
 }
 
 /// The immutable world that runs share.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct RobotsWorld {
     /// The map without bodies.
     pub map: Arc<GridMap>,
@@ -253,6 +253,11 @@ impl MountedSensor {
             beams.iter().flatten().map(|c| model.class_of(c.distance * box_size_m)).collect();
         let (table, nothing) = (ReadingTable::new(&model, reliable)?, model.nothing());
         Ok(Self { model, table, rays, classes, nothing })
+    }
+
+    /// Whether every reading is the truth.
+    pub fn is_reliable(&self) -> bool {
+        self.table.reliable
     }
 
     /// The true reading of a beam that meets `kind` at distance class `class`. What the

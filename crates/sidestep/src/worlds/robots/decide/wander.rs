@@ -55,7 +55,7 @@ impl Wander {
             return false;
         }
         let first = *stride == 0;
-        *stride = 1 + draws.below(2 * self.turn_every) + 1;
+        *stride = draws.below(self.turn_every.saturating_mul(2)).saturating_add(2);
         !first
     }
 }

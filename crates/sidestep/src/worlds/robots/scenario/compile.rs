@@ -1,6 +1,7 @@
 //! A scenario's text -> an immutable world and where everybody starts.
 
 use super::placing::{Floor, Obstacle};
+use super::random;
 use super::tables::{self, Kinds, Located};
 use super::{
     BehaviourSection, DoorSection, EffectorSection, MapSection, MoverSection, ProfileFile,
@@ -747,11 +748,16 @@ impl Compiler<'_> {
                 let actions = names.iter().map(id).collect::<Result<_, _>>()?;
                 Arc::new(Replay { actions, repeat: s.repeat.unwrap_or(false) })
             }
+            "random" => {
+                let random = random::behaviour(s, &body.effector.actions);
+                Arc::new(random.map_err(|(cause, remedy)| self.error(span, cause, remedy))?)
+            }
             "external" => Arc::new(External),
             other => match self.own.get(other) {
                 Some(own) => Arc::clone(own),
                 None => {
-                    let mut known = vec!["wander", "shuttle", "goto", "replay", "external"];
+                    let mut known =
+                        vec!["wander", "shuttle", "goto", "replay", "random", "external"];
                     known.extend(self.own.keys().map(String::as_str));
                     return Err(self.error(
                         span,

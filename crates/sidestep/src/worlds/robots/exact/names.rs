@@ -1,0 +1,61 @@
+//! Names as the POMDP format allows them: a letter, then letters, digits, `-` and `_`.
+
+use std::collections::BTreeSet;
+
+/// Words that mean something else in the format.
+const RESERVED: [&str; 16] = [
+    "T",
+    "O",
+    "R",
+    "discount",
+    "values",
+    "states",
+    "actions",
+    "observations",
+    "start",
+    "include",
+    "exclude",
+    "uniform",
+    "identity",
+    "reset",
+    "reward",
+    "cost",
+];
+
+/// Valid names, all different, as near to the given ones as can be.
+pub(super) fn valid(names: impl IntoIterator<Item = String>) -> Vec<String> {
+    let mut used = BTreeSet::new();
+    let unique = |name: String| {
+        let base = valid_one(&name);
+        let numbered = (2..).map(|k| format!("{base}-{k}"));
+        let free = std::iter::once(base.clone()).chain(numbered).find(|n| !used.contains(n));
+        let free = free.unwrap_or(base);
+        used.insert(free.clone());
+        free
+    };
+    names.into_iter().map(unique).collect()
+}
+
+fn valid_one(name: &str) -> String {
+    let is_valid = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+    let mut valid: String = name.chars().map(|c| if is_valid(c) { c } else { '-' }).collect();
+    if !valid.starts_with(|c: char| c.is_ascii_alphabetic()) {
+        valid.insert(0, 'n');
+    }
+    if RESERVED.contains(&valid.as_str()) {
+        valid.push('-');
+    }
+    valid
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_become_valid_and_stay_different() {
+        let names = ["forward", "spin left", "spin-left", "4x", "", "reset", "é"];
+        let valid = valid(names.map(String::from));
+        assert_eq!(valid, ["forward", "spin-left", "spin-left-2", "n4x", "n", "reset-", "n-"]);
+    }
+}
