@@ -1,7 +1,7 @@
 //! D1: same build, scenario, seed: identical bits for 1, 2, 3, 8 workers, any storage order of
 //! entities, recorded or not, resumed or not.
 
-use crate::crowd::{CROWD, simulation, source, stored};
+use crate::common::{CROWD, simulation, source, stored};
 use sidestep::worlds::robots::scenario::StorageOrder;
 use sidestep::worlds::robots::simulation::RobotsSimulation;
 use sidestep_kernel::Simulation;

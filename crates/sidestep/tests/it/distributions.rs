@@ -1,7 +1,7 @@
 //! Promise L2 in action: what robots report and how they move follows the tables of the
 //! scenario, and what is impossible never happens.
 
-use super::common::{Tiles, assert_fits, law, repeating};
+use super::tiles::{Tiles, assert_fits, law, repeating};
 use sidestep::kernel::Simulation;
 use sidestep::kernel::ports::recorder::{MemoryRecorder, Values};
 use sidestep::scenario::Source;

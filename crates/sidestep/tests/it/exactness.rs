@@ -1,7 +1,7 @@
 //! Promise: what the simulator does in the long run is what the exact Markov chain says, and
 //! the exported POMDP is that chain.
 
-use super::common::{Tiles, assert_fits, law};
+use super::tiles::{Tiles, assert_fits, law};
 use sidestep::kernel::{InputError, Simulation};
 use sidestep::scenario::Source;
 use sidestep::worlds::robots::decide::Random;

@@ -1,6 +1,6 @@
 //! L1: no two bodies in one box, nobody in a wall; no door closes on a body.
 
-use crate::crowd::{CROWD, simulation, source};
+use crate::common::{CROWD, simulation, source};
 use proptest::prelude::*;
 use sidestep::worlds::robots::simulation::RobotsSimulation;
 use sidestep_kernel::Simulation;

@@ -1,11 +1,11 @@
-//! Promises of the whole library, seen from outside: one module per promise.
+//! Promises of the library, one module each; every module begins by quoting its promise.
 
 mod closed_loop;
 mod common;
-mod crowd;
 mod determinism;
 mod distributions;
 mod exactness;
 mod laws;
 mod obstacle_rule;
 mod pomdp;
+mod tiles;

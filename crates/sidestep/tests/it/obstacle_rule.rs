@@ -5,7 +5,7 @@
 //! with 0.04, slips two boxes with 0.02, and drifts to the left or the right of the box ahead
 //! with 0.03 each.
 
-use super::common::{PERSON, Tiles, WALL, assert_fits, law, repeating};
+use super::tiles::{PERSON, Tiles, WALL, assert_fits, law, repeating};
 use proptest::prelude::*;
 use sidestep::kernel::Simulation;
 use sidestep::worlds::robots::effector::ObstacleRule::{self, Cut, Renormalise, Stay};
@@ -85,15 +85,9 @@ fn action_of(tiles: &Tiles) -> (Vec<Transition>, u32, ObstacleRule) {
     let world = &compiled.world;
     let slot = world.robots()[0];
     let Role::Robot(model) = &world.body_type(slot).role else { panic!("robots are robots") };
-    let action = usize::from(tiles.source().text.contains("actions = [\"left\"]"));
-    let prepared = &model.body.actions[action];
-    let walks = prepared.walks.iter().zip(&prepared.probabilities);
-    let transition = |(walk, &p): (&sidestep::worlds::robots::effector::Walk, &f64)| Transition {
-        p,
-        path: walk.steps.iter().map(|s| s.side).collect(),
-        turn: walk.turn,
-    };
-    (walks.map(transition).collect(), world.body_type(slot).size.0, world.obstacle_rule)
+    let action = u8::from(tiles.source().text.contains("actions = [\"left\"]"));
+    let transitions = model.body.effector.transitions_of(action, false);
+    (transitions, world.body_type(slot).size.0, world.obstacle_rule)
 }
 
 fn compile(tiles: &Tiles) -> Compiled {

@@ -1,7 +1,7 @@
 //! Promise: the exported POMDP is a valid file of Cassandra's format, whose rows sum to 1 to
 //! the last printed digit, and it says what the simulator does.
 
-use super::common::{Tiles, assert_fits};
+use super::tiles::{Tiles, assert_fits};
 use sidestep::kernel::Simulation;
 use sidestep::kernel::ports::recorder::{MemoryRecorder, Values};
 use sidestep::worlds::robots::exact::{Beam, Model, PomdpOptions};

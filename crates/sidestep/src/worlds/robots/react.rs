@@ -1,6 +1,6 @@
 //! Pool two: the bodies of a group act one after the other; the environment decides.
 
-use super::effector::{Action, ObstacleRule, Side, Step, Walk};
+use super::effector::{Action, ObstacleRule, Side, Walk};
 use super::state::{BodyCell, CLEAR, FREE, IDLE, KIND_BITS, RobotsState, VISITED, contact_word};
 use super::world::{BodyType, RobotsWorld, Role};
 use super::{Event, EventKind, MotionSample, Scratch};
@@ -48,9 +48,15 @@ impl RobotsWorld {
         if self.is_clear(walk, state, base) {
             self.make_whole(walk, state, cell, body, base);
             if scratch.keep_samples {
-                let verdict = Verdict { steps: walk.steps.len(), contact: None };
-                let sample = self.motion(&walk.steps, walk.turn, verdict, now, slot, state);
-                scratch.motion_samples.push(sample);
+                let steps = walk.steps.len();
+                self.sample_motion(
+                    walk,
+                    Verdict { steps, contact: None },
+                    now,
+                    slot,
+                    state,
+                    scratch,
+                );
             }
         } else {
             self.blocked(walk, state, now, slot, scratch);
@@ -137,9 +143,8 @@ impl RobotsWorld {
             return;
         }
         if scratch.keep_samples {
-            let turn = if verdict.contact.is_none() { walk.turn } else { 0 };
-            let sample = self.motion(&walk.steps[..made], turn, verdict, now, slot, state);
-            scratch.motion_samples.push(sample);
+            let made = Verdict { steps: made, ..verdict };
+            self.sample_motion(walk, made, now, slot, state, scratch);
         }
         match verdict.contact {
             None => {
@@ -259,27 +264,35 @@ impl RobotsWorld {
         }
     }
 
-    /// What an action came to, for a log to learn from: the steps and the turn that were
+    /// Notes what an action came to, for a log to learn from: the steps and the turn that were
     /// made, not those that the drawn transition would have made in a free place.
-    fn motion(
+    fn sample_motion(
         &self,
-        made: &[Step],
-        quarter_turns: u8,
+        walk: &Walk,
         verdict: Verdict,
         now: Cycle,
         slot: Slot,
         state: &RobotsState,
-    ) -> MotionSample {
+        scratch: &mut Scratch,
+    ) {
         let i = slot as usize;
-        let count = |side| made.iter().filter(|s| s.side == side).count() as i32;
-        MotionSample {
+        let (mut ahead, mut left) = (0, 0);
+        for step in &walk.steps[..verdict.steps] {
+            match step.side {
+                Side::Front => ahead += 1,
+                Side::Back => ahead -= 1,
+                Side::Left => left += 1,
+                Side::Right => left -= 1,
+            }
+        }
+        scratch.motion_samples.push(MotionSample {
             cycle: now,
             robot: self.bodies[i].id,
             action: (state.bodies[i].intent.get() & !CLEAR) - 1,
-            ahead: count(Side::Front) - count(Side::Back),
-            left: count(Side::Left) - count(Side::Right),
-            quarter_turns,
+            ahead,
+            left,
+            quarter_turns: if verdict.contact.is_none() { walk.turn } else { 0 },
             contact: verdict.contact.is_some(),
-        }
+        });
     }
 }

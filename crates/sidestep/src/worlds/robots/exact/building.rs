@@ -2,7 +2,7 @@
 
 use super::obstacle::Pose;
 use crate::map::{Cell, GridMap};
-use crate::worlds::robots::effector::Transition;
+use crate::worlds::robots::effector::{ActionId, Transition};
 use crate::worlds::robots::scenario::Compiled;
 use crate::worlds::robots::state::{FREE, WALL};
 use crate::worlds::robots::world::{Body, Door, RobotBody, RobotModel, Role};
@@ -108,21 +108,8 @@ fn covered(
 fn robot(compiled: &Compiled, timing: Body, model: &RobotModel, size: u32) -> Robot {
     let ((col, row), heading) = compiled.start[timing.id as usize];
     let start = Pose { col: col as i32, row: row as i32, heading };
-    Robot { start, size, timing, actions: actions(&model.body), body: Arc::clone(&model.body) }
-}
-
-/// The transitions behind the prepared walks: paths are relative to the heading, so those of
-/// one heading tell all.
-fn actions(body: &RobotBody) -> Vec<Vec<Transition>> {
-    let transitions = |action: &crate::worlds::robots::effector::Action| {
-        let walks = action.walks.iter().zip(&action.probabilities);
-        walks
-            .map(|(walk, &p)| Transition {
-                p,
-                path: walk.steps.iter().map(|s| s.side).collect(),
-                turn: walk.turn,
-            })
-            .collect()
-    };
-    body.actions[..body.actions.len() / 4].iter().map(transitions).collect()
+    let (body, reliable) = (&model.body, compiled.world.regime.reliable_effectors());
+    let ids = 0..body.effector.actions.len() as ActionId;
+    let actions = ids.map(|action| body.effector.transitions_of(action, reliable)).collect();
+    Robot { start, size, timing, actions, body: Arc::clone(body) }
 }

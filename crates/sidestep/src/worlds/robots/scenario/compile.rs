@@ -305,7 +305,8 @@ impl Compiler<'_> {
         let bodies: u64 = groups.iter().map(|g| g.count).sum();
         if bodies > MAX_BODIES {
             let cause = format!("{bodies} bodies");
-            return Err(self.error(0..0, cause, format!("give at most {MAX_BODIES}")));
+            let most = groups.iter().max_by_key(|g| g.count).map_or(0..0, |g| g.span.clone());
+            return Err(self.error(most, cause, format!("give at most {MAX_BODIES}")));
         }
         if bodies == 0 {
             return Err(self.error(

@@ -1,0 +1,261 @@
+//! `sidestep learn`: error distributions of a real robot, from its logs.
+
+use crate::console::Console;
+use crate::exit::{ExitCode, Failure};
+use clap::{Args, Subcommand};
+use serde::Serialize;
+use sidestep::import::read_text;
+use sidestep::kernel::InputError;
+use sidestep::learn::EstimateOptions;
+use sidestep::learn::effector::{self, EffectorModel};
+use sidestep::learn::profile;
+use sidestep::learn::sensor::{self, SensorModel, SensorOptions};
+use std::fmt::Display;
+use std::path::{Path, PathBuf};
+
+const EXAMPLES: &str = "\
+Examples:
+  sidestep learn sensor --mrclam logs/mrclam7 --profile create.toml --name camera
+  sidestep learn effector --mrclam logs/mrclam7 --box 0.25 --profile create.toml --name create
+  sidestep learn effector --carmen intel.log.gz --json | jq .transitions
+
+A scenario uses what was learned with profiles = [\"create.toml\"], sensors = [\"camera\"] and
+effector = \"create\". Files may be packed with gzip.";
+
+const SENSOR_EXAMPLES: &str = "\
+Examples:
+  sidestep learn sensor --mrclam logs/mrclam7
+  sidestep learn sensor --mrclam logs/mrclam7 --edges 2,4 --classes very-near,near,far
+  sidestep learn sensor --csv readings.csv --range 3.75 --profile mine.toml --name sonar
+
+CSV columns: true, reported (observations in one word; `nothing`), and true_distance_m,
+reported_distance_m, or true_class, reported_class.";
+
+const EFFECTOR_EXAMPLES: &str = "\
+Examples:
+  sidestep learn effector --mrclam logs/mrclam7 --box 0.25
+  sidestep learn effector --carmen intel.log.gz --profile intel.toml --name pioneer
+  sidestep learn effector --csv motions.csv --json
+
+CSV columns: action (forward, left, right, stay), ahead_boxes, left_boxes, turn_deg.";
+
+/// Learn the errors of a real robot's sensors and wheels from its logs.
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct LearnArgs {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Debug, Subcommand)]
+enum What {
+    /// What a sensor reports against what was there
+    Sensor(SensorArgs),
+    /// What a commanded move or turn really does
+    Effector(EffectorArgs),
+}
+
+/// The log to learn a sensor from, and how.
+#[derive(Debug, Args)]
+#[command(after_help = SENSOR_EXAMPLES)]
+struct SensorArgs {
+    #[command(flatten)]
+    log: SensorLog,
+
+    /// Edges between the distance classes in meters, e.g. 2,4
+    #[arg(long, value_name = "M,M,...", value_delimiter = ',')]
+    edges: Option<Vec<f64>>,
+
+    /// Names of the distance classes, near to far; one more than edges
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
+    classes: Vec<String>,
+
+    /// Bearings of the beams that the profile gets, in degrees, positive to the left
+    #[arg(long, value_name = "DEG,...", value_delimiter = ',', allow_negative_numbers = true)]
+    bearings: Option<Vec<f64>>,
+
+    /// Range that the profile gets, in meters
+    #[arg(long, value_name = "M")]
+    range: Option<f64>,
+
+    /// The sensor to learn, where the CSV file has several
+    #[arg(long, value_name = "SENSOR", requires = "csv")]
+    sensor: Option<String>,
+
+    #[command(flatten)]
+    estimate: EstimateArgs,
+
+    #[command(flatten)]
+    target: TargetArgs,
+}
+
+#[derive(Debug, Args)]
+#[group(required = true, multiple = false)]
+struct SensorLog {
+    /// A UTIAS MRCLAM folder
+    #[arg(long, value_name = "DIR")]
+    mrclam: Option<PathBuf>,
+
+    /// Readings whose truth is known
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+}
+
+/// The log to learn an effector from, and how.
+#[derive(Debug, Args)]
+#[command(after_help = EFFECTOR_EXAMPLES)]
+struct EffectorArgs {
+    #[command(flatten)]
+    log: EffectorLog,
+
+    /// Side of a box in meters, for --mrclam (other logs tell moves in boxes) [default: 0.25]
+    #[arg(long = "box", value_name = "B")]
+    box_size_m: Option<f64>,
+
+    #[command(flatten)]
+    estimate: EstimateArgs,
+
+    #[command(flatten)]
+    target: TargetArgs,
+}
+
+#[derive(Debug, Args)]
+#[group(required = true, multiple = false)]
+struct EffectorLog {
+    /// A UTIAS MRCLAM folder
+    #[arg(long, value_name = "DIR")]
+    mrclam: Option<PathBuf>,
+
+    /// A CARMEN log with corrected poses
+    #[arg(long, value_name = "FILE")]
+    carmen: Option<PathBuf>,
+
+    /// Displacements that were measured
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+}
+
+/// How counts become probabilities.
+#[derive(Debug, Args)]
+struct EstimateArgs {
+    /// Added to every count before rows are normalized
+    #[arg(long, value_name = "A", allow_negative_numbers = true)]
+    #[arg(default_value_t = EstimateOptions::default().alpha)]
+    alpha: f64,
+
+    /// Hold out every so many events to test the fit
+    #[arg(long, value_name = "N", default_value_t = EstimateOptions::default().hold_out_every)]
+    hold_out: usize,
+}
+
+impl EstimateArgs {
+    fn options(&self) -> EstimateOptions {
+        EstimateOptions {
+            alpha: self.alpha,
+            hold_out_every: self.hold_out,
+            ..EstimateOptions::default()
+        }
+    }
+}
+
+/// Where what was learned goes.
+#[derive(Debug, Args)]
+struct TargetArgs {
+    /// Add the result to this profile; it is made where it is missing
+    #[arg(long, value_name = "OUT.toml")]
+    profile: Option<PathBuf>,
+
+    /// Name of the result in the profile
+    #[arg(long, value_name = "NAME", default_value = "learned", requires = "profile")]
+    name: String,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// When a log, an option or the profile is wrong, or the profile cannot be written.
+pub(crate) fn learn(args: &LearnArgs, console: Console) -> Result<ExitCode, Failure> {
+    match &args.what {
+        What::Sensor(args) => {
+            let model = learn_sensor(args)?;
+            args.target.add(|place, text, name| profile::with_sensor(place, text, name, &model))?;
+            tell(&model.report, &args.target, console);
+        }
+        What::Effector(args) => {
+            let model = learn_effector(args, console)?;
+            args.target
+                .add(|place, text, name| profile::with_effector(place, text, name, &model))?;
+            tell(&model.report, &args.target, console);
+        }
+    }
+    Ok(ExitCode::Done)
+}
+
+fn tell(report: &(impl Serialize + Display), target: &TargetArgs, console: Console) {
+    let written = target.profile.as_ref().map_or_else(String::new, |path| {
+        format!("\nAdded `{}` to {}\n", target.name, path.display())
+    });
+    console.result(report, || format!("{report}{written}"));
+}
+
+fn learn_sensor(args: &SensorArgs) -> Result<SensorModel, InputError> {
+    let default = SensorOptions::default();
+    let options = SensorOptions {
+        estimate: args.estimate.options(),
+        distance_edges_m: args.edges.clone().unwrap_or(default.distance_edges_m),
+        distance_classes: args.classes.clone(),
+        bearings_deg: args.bearings.clone().unwrap_or(default.bearings_deg),
+        range_m: args.range.unwrap_or(default.range_m),
+        sensor: args.sensor.clone(),
+    };
+    match (&args.log.mrclam, &args.log.csv) {
+        (Some(folder), _) => sensor::from_mrclam(folder, &options),
+        (None, Some(file)) => sensor::from_csv(file, &options),
+        (None, None) => Err(no_log()),
+    }
+}
+
+fn learn_effector(args: &EffectorArgs, console: Console) -> Result<EffectorModel, InputError> {
+    let options = args.estimate.options();
+    if args.box_size_m.is_some() && args.log.mrclam.is_none() {
+        console.warn("--box changes nothing here: this log tells moves in units of the command");
+    }
+    match (&args.log.mrclam, &args.log.carmen, &args.log.csv) {
+        (Some(folder), ..) => {
+            effector::from_mrclam(folder, args.box_size_m.unwrap_or(0.25), &options)
+        }
+        (None, Some(file), _) => effector::from_carmen(file, &options),
+        (None, None, Some(file)) => effector::from_csv(file, &options),
+        (None, None, None) => Err(no_log()),
+    }
+}
+
+fn no_log() -> InputError {
+    InputError::new("sidestep learn", "no log is named", "see `sidestep learn --help`")
+}
+
+/// Largest profile that is read to be added to.
+const MAX_PROFILE_BYTES: u64 = 64 << 20;
+
+impl TargetArgs {
+    /// Adds to the profile, if one is named; it is replaced in one step.
+    fn add(
+        &self,
+        section: impl FnOnce(&str, &str, &str) -> Result<String, InputError>,
+    ) -> Result<(), Failure> {
+        let Some(path) = &self.profile else { return Ok(()) };
+        let text = match path.exists() {
+            true => read_text(path, MAX_PROFILE_BYTES)?,
+            false => profile::empty(&path.file_stem().unwrap_or_default().to_string_lossy()),
+        };
+        let text = section(&path.display().to_string(), &text, &self.name)?;
+        replace(path, &text).map_err(|e| Failure::write(path, &e))
+    }
+}
+
+fn replace(path: &Path, text: &str) -> std::io::Result<()> {
+    let growing = path.with_extension(format!("toml.{}", std::process::id()));
+    std::fs::write(&growing, text)
+        .and_then(|()| std::fs::rename(&growing, path))
+        .inspect_err(|_| drop(std::fs::remove_file(&growing)))
+}

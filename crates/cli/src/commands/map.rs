@@ -1,0 +1,170 @@
+//! `sidestep map`: a map as the program sees it.
+
+use crate::console::{Console, columns};
+use crate::exit::{ExitCode, Failure};
+use crate::picture::write_png;
+use crate::worlds::shade;
+use clap::{Args, ValueEnum};
+use serde::Serialize;
+use sidestep::import::{map_file, rosmap};
+use sidestep::kernel::InputError;
+use sidestep::map::{CellCounts, GridMap, UnknownPolicy};
+use sidestep_draw::{GridScene, Style, to_svg};
+use std::path::{Path, PathBuf};
+
+const EXAMPLES: &str = "\
+Examples:
+  sidestep map building.yaml --box 0.25
+  sidestep map building.yaml --box 0.25 --unknown wall --png building.png
+  sidestep map arena.map --width 60
+  sidestep map building.yaml --box 0.5 --json
+
+Reads ROS map_server (.yaml), MovingAI (.map) and character maps (.txt), each also with .gz.
+On the terminal: # wall, . free, ? unknown; a wide map is drawn smaller and loses no wall.";
+
+/// Show a map as the program sees it, on the terminal and as PNG.
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct MapArgs {
+    /// Map file
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+
+    /// Side of a box in meters
+    #[arg(long = "box", value_name = "B", default_value_t = 0.25)]
+    box_size_m: f64,
+
+    /// What boxes that nobody has mapped become (in scenarios: wall, unless told otherwise)
+    #[arg(long, value_enum, default_value_t = Unknown::Keep)]
+    unknown: Unknown,
+
+    /// Draw the boxes to this PNG file
+    #[arg(long, value_name = "OUT")]
+    png: Option<PathBuf>,
+
+    /// Columns of text at most [default: those of the terminal]
+    #[arg(long, value_name = "COLS", value_parser = clap::value_parser!(u16).range(1..))]
+    width: Option<u16>,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Unknown {
+    Wall,
+    Free,
+    Keep,
+}
+
+impl From<Unknown> for UnknownPolicy {
+    fn from(unknown: Unknown) -> Self {
+        match unknown {
+            Unknown::Wall => Self::Wall,
+            Unknown::Free => Self::Free,
+            Unknown::Keep => Self::Keep,
+        }
+    }
+}
+
+/// What is counted: pixels of the file, and boxes.
+#[derive(Debug, Serialize)]
+struct Counts {
+    width: u32,
+    height: u32,
+    free: usize,
+    occupied: usize,
+    unknown: usize,
+    resolution_m: f64,
+    origin_m: [f64; 2],
+    box_size_m: f64,
+    width_boxes: u32,
+    height_boxes: u32,
+    boxes: CellCounts,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// When the map is wrong, or the picture cannot be written.
+pub(crate) fn map(args: &MapArgs, console: Console) -> Result<ExitCode, Failure> {
+    let (counts, map) = read(args)?;
+    if let Some(png) = &args.png {
+        draw(&map, &args.file, png)?;
+    }
+    let width = args.width.unwrap_or_else(columns);
+    console.result(&counts, || map.to_text(width.into()) + &words(&counts));
+    Ok(ExitCode::Done)
+}
+
+fn read(args: &MapArgs) -> Result<(Counts, GridMap), InputError> {
+    let policy = args.unknown.into();
+    if !is_yaml(&args.file) {
+        let map = map_file(&args.file, args.box_size_m, UnknownPolicy::Keep)?;
+        let pixels = map.counts();
+        let map = map.with_unknown(policy);
+        return Ok((counts(&map, (map.width(), map.height()), pixels, map.box_size_m), map));
+    }
+    let pixels = rosmap::load(&args.file)?;
+    let map = pixels.to_boxes(args.box_size_m, policy)?;
+    let size = (pixels.width(), pixels.height());
+    Ok((counts(&map, size, pixels.counts(), pixels.resolution_m()), map))
+}
+
+/// Other maps have one character per box.
+fn is_yaml(file: &Path) -> bool {
+    let name = file.to_string_lossy().to_lowercase();
+    let name = name.strip_suffix(".gz").unwrap_or(&name);
+    name.ends_with(".yaml") || name.ends_with(".yml")
+}
+
+fn counts(
+    map: &GridMap,
+    (width, height): (u32, u32),
+    pixels: CellCounts,
+    resolution_m: f64,
+) -> Counts {
+    Counts {
+        width,
+        height,
+        free: pixels.free,
+        occupied: pixels.wall,
+        unknown: pixels.unknown,
+        resolution_m,
+        origin_m: map.origin_m,
+        box_size_m: map.box_size_m,
+        width_boxes: map.width(),
+        height_boxes: map.height(),
+        boxes: map.counts(),
+    }
+}
+
+fn words(c: &Counts) -> String {
+    format!(
+        "{} x {} pixels of {} m: {} free, {} occupied, {} unknown\n\
+         {} x {} boxes of {} m: {} free, {} wall, {} unknown\n",
+        c.width,
+        c.height,
+        c.resolution_m,
+        c.free,
+        c.occupied,
+        c.unknown,
+        c.width_boxes,
+        c.height_boxes,
+        c.box_size_m,
+        c.boxes.free,
+        c.boxes.wall,
+        c.boxes.unknown,
+    )
+}
+
+fn draw(map: &GridMap, file: &Path, png: &Path) -> Result<(), Failure> {
+    let scene = GridScene {
+        width: map.width(),
+        height: map.height(),
+        box_size_m: map.box_size_m,
+        origin_m: map.origin_m,
+        cells: map.cells().iter().map(|&cell| shade(cell)).collect(),
+        title: file.file_name().unwrap_or_default().display().to_string(),
+        caption: format!("{} x {} boxes of {} m", map.width(), map.height(), map.box_size_m),
+        ..GridScene::default()
+    };
+    write_png(png, &to_svg(&scene, &Style::MAP)?)
+}

@@ -1,0 +1,49 @@
+//! One file per command.
+
+mod check;
+mod finish;
+mod learn;
+mod map;
+mod new;
+mod replay;
+mod resume;
+mod run;
+
+use crate::console::Console;
+use crate::exit::{ExitCode, Failure};
+use clap::Subcommand;
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Run a scenario, and record it with --out
+    Run(run::RunArgs),
+    /// Say what a scenario describes, or what is wrong with it; run nothing
+    Check(check::CheckArgs),
+    /// Write a commented scenario to begin with
+    New(new::NewArgs),
+    /// Show a map as the program sees it, on the terminal and as PNG
+    Map(map::MapArgs),
+    /// Learn the errors of a real robot's sensors and wheels from its logs
+    Learn(learn::LearnArgs),
+    /// Continue a recorded run that was stopped or killed
+    Resume(resume::ResumeArgs),
+    /// Recompute a recorded run up to a cycle and show where everybody is
+    Replay(replay::ReplayArgs),
+}
+
+/// Does what was typed.
+///
+/// # Errors
+/// When it cannot be done; the failure knows its exit code.
+pub(crate) fn execute(command: Command, console: &Console) -> Result<ExitCode, Failure> {
+    match command {
+        Command::Run(args) => run::run(&args, *console),
+        Command::Check(args) => check::check(&args, *console),
+        Command::New(args) => new::new(&args, *console),
+        Command::Map(args) => map::map(&args, *console),
+        Command::Learn(args) => learn::learn(&args, *console),
+        Command::Resume(args) => resume::resume(&args, *console),
+        Command::Replay(args) => replay::replay(&args, *console),
+    }
+}

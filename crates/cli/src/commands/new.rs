@@ -1,0 +1,72 @@
+//! `sidestep new`: a commented scenario to begin with.
+
+use crate::console::Console;
+use crate::exit::{ExitCode, Failure};
+use clap::{Args, ValueEnum};
+use serde_json::json;
+use sidestep::kernel::InputError;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+const EXAMPLES: &str = "\
+Examples:
+  sidestep new robots                 writes robots.toml
+  sidestep new robots warehouse.toml
+  sidestep new robots w.toml && sidestep check w.toml";
+
+/// Write a commented scenario to begin with.
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct NewArgs {
+    /// The world
+    #[arg(value_name = "WORLD")]
+    world: World,
+
+    /// The file to write; an existing one is left alone [default: WORLD.toml]
+    #[arg(value_name = "NAME.toml")]
+    file: Option<PathBuf>,
+}
+
+/// Worlds with a scenario to begin with.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum World {
+    /// Stochastic robots on a grid
+    Robots,
+}
+
+impl World {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Robots => "robots",
+        }
+    }
+
+    fn scenario(self) -> &'static str {
+        match self {
+            Self::Robots => include_str!("../../../../scenarios/robots/default.toml"),
+        }
+    }
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// When the file is there already or cannot be written.
+pub(crate) fn new(args: &NewArgs, console: Console) -> Result<ExitCode, Failure> {
+    let default = || PathBuf::from(format!("{}.toml", args.world.name()));
+    let path = args.file.clone().unwrap_or_else(default);
+    write_new(&path, args.world.scenario())?;
+    let next = format!("Try: sidestep check {0}; sidestep run {0}\n", path.display());
+    let json = json!({ "file": path, "world": args.world.name() });
+    console.result(&json, || format!("Wrote {}. {next}", path.display()));
+    Ok(ExitCode::Done)
+}
+
+fn write_new(path: &Path, text: &str) -> Result<(), InputError> {
+    let refuse = |e: std::io::Error| {
+        let remedy = "name a file that is not there yet, in a folder where you may write";
+        InputError::new(path.display(), format!("cannot make the file: {e}"), remedy)
+    };
+    let mut file = std::fs::File::create_new(path).map_err(refuse)?;
+    file.write_all(text.as_bytes()).map_err(refuse)
+}

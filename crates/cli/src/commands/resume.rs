@@ -1,0 +1,70 @@
+//! `sidestep resume`: goes on with a run that was stopped or killed.
+
+use super::finish::{Journey, travel};
+use crate::console::{Console, grouped};
+use crate::exit::{ExitCode, Failure};
+use crate::interrupt;
+use crate::plan::WorkersArg;
+use crate::recording::{Recording, restore};
+use crate::worlds::Compiled;
+use clap::Args;
+use sidestep::kernel::{Cycle, InputError};
+use sidestep::scenario::Source;
+use sidestep_record::RunFolder;
+use std::path::{Path, PathBuf};
+
+const EXAMPLES: &str = "\
+Examples:
+  sidestep resume runs/office
+  sidestep resume runs/office --workers 8
+  sidestep resume runs/office --cycles 20000     go on to cycle 20000 only, still incomplete
+
+The result has the same digest and the same rows as a run in one go.";
+
+/// Continue a recorded run that was stopped or killed.
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct ResumeArgs {
+    /// The run folder
+    #[arg(value_name = "DIR")]
+    folder: PathBuf,
+
+    #[command(flatten)]
+    workers: WorkersArg,
+
+    /// Stop at this cycle [default: the end that was planned]
+    #[arg(long, value_name = "N")]
+    cycles: Option<Cycle>,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// When the folder holds no run that can be continued, or results cannot be stored.
+pub(crate) fn resume(args: &ResumeArgs, console: Console) -> Result<ExitCode, Failure> {
+    let (folder, point) = RunFolder::resume(&args.folder)?;
+    let workers = args.workers.count();
+    let source = Source::new(scenario_place(&args.folder), folder.scenario(), &args.folder);
+    let mut run = Compiled::new(&source)?.start(&source, workers);
+    restore(run.as_mut(), &point, &args.folder)?;
+    check_end(args.cycles, run.cycle(), run.plan().cycles)?;
+    interrupt::listen()?;
+    console.note(format!("Continuing {} at cycle {}", args.folder.display(), grouped(run.cycle())));
+    let recording = Some(Recording::begin(folder, run.as_mut())?);
+    travel(Journey { run, recording, workers, until: args.cycles }, console)
+}
+
+/// How errors name a run folder's scenario.
+pub(super) fn scenario_place(folder: &Path) -> String {
+    folder.join("scenario.toml").display().to_string()
+}
+
+fn check_end(asked: Option<Cycle>, now: Cycle, planned: Cycle) -> Result<(), InputError> {
+    let Some(end) = asked.filter(|end| !(now..=planned).contains(end)) else { return Ok(()) };
+    let cause = format!("the run stands at cycle {now} and was planned for {planned} cycles");
+    let remedy = format!(
+        "give {now} to {planned}; for a longer run: \
+         sidestep run DIR/scenario.toml --cycles N --out NEW_DIR"
+    );
+    Err(InputError::new(format!("--cycles {end}"), cause, remedy))
+}

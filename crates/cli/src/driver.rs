@@ -1,0 +1,106 @@
+//! Advances a run to its end, in slices short enough for progress and Ctrl-C.
+
+use crate::console::Console;
+use crate::interrupt;
+use crate::progress::Progress;
+use crate::recording::Recording;
+use crate::worlds::Run;
+use cpu_time::ProcessTime;
+use sidestep::kernel::Cycle;
+use sidestep::kernel::ports::RecordError;
+use std::time::{Duration, Instant};
+
+/// How long a slice lasts: nobody waits longer for Ctrl-C to work.
+const SLICE: Duration = Duration::from_millis(30);
+
+/// What a stretch of a run took in this process.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Effort {
+    /// Cycles done.
+    pub(crate) cycles: u64,
+    /// Elapsed time.
+    pub(crate) wall: Duration,
+    /// CPU time of all threads.
+    pub(crate) cpu: Duration,
+}
+
+/// Runs up to cycle `until`, or until Ctrl-C. Whether the end was reached, the run's cycle
+/// says.
+///
+/// # Errors
+/// When rows or checkpoints cannot be stored.
+pub(crate) fn drive(
+    run: &mut dyn Run,
+    until: Cycle,
+    mut recording: Option<&mut Recording>,
+    console: Console,
+) -> Result<Effort, RecordError> {
+    let (from, wall, cpu) = (run.cycle(), Instant::now(), ProcessTime::now());
+    let progress = Progress::new(console, from, until);
+    let mut pace = Pace::default();
+    while run.cycle() < until && !interrupt::requested() {
+        slice(run, until, recording.as_deref_mut(), &mut pace).inspect_err(|_| progress.clear())?;
+        progress.at(run.cycle());
+    }
+    progress.clear();
+    Ok(Effort { cycles: run.cycle() - from, wall: wall.elapsed(), cpu: cpu.elapsed() })
+}
+
+/// Advances a little, and hands rows over where they are due.
+fn slice(
+    run: &mut dyn Run,
+    until: Cycle,
+    recording: Option<&mut Recording>,
+    pace: &mut Pace,
+) -> Result<(), RecordError> {
+    let stop = recording.as_ref().map_or(until, |r| r.next_stop(run.cycle()).min(until));
+    let asked = pace.cycles().min(stop - run.cycle());
+    let started = Instant::now();
+    let done = run.advance(asked);
+    pace.note(done, started.elapsed());
+    match recording {
+        Some(recording) if done < asked || run.cycle() == stop => recording.take(run),
+        _ => Ok(()),
+    }
+}
+
+/// How many cycles make a slice.
+#[derive(Debug)]
+struct Pace(u64);
+
+impl Default for Pace {
+    fn default() -> Self {
+        Self(1)
+    }
+}
+
+impl Pace {
+    fn cycles(&self) -> u64 {
+        self.0
+    }
+
+    /// Aims at [`SLICE`], and grows at most fourfold at a time.
+    fn note(&mut self, cycles: u64, took: Duration) {
+        let per_cycle_s = took.as_secs_f64() / cycles.max(1) as f64;
+        let fitting = (SLICE.as_secs_f64() / per_cycle_s.max(1e-12)) as u64;
+        self.0 = fitting.clamp(1, self.0.saturating_mul(4));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slices_grow_towards_their_time_and_shrink_at_once() {
+        let mut pace = Pace::default();
+        pace.note(1, Duration::from_micros(1));
+        assert_eq!(pace.cycles(), 4);
+        (0..20).for_each(|_| pace.note(100, Duration::from_micros(100)));
+        assert_eq!(pace.cycles(), 30_000);
+        pace.note(30_000, Duration::from_secs(30));
+        assert_eq!(pace.cycles(), 30);
+        pace.note(1, Duration::from_secs(30));
+        assert_eq!(pace.cycles(), 1);
+    }
+}

@@ -1,0 +1,87 @@
+//! A scenario file and the options of the command line -> a scenario that is known to be right.
+
+use crate::worlds::Compiled;
+use clap::Args;
+use sidestep::kernel::{InputError, workers};
+use sidestep::scenario::Source;
+use std::path::{Path, PathBuf};
+
+/// The scenario, and what the command line changes in it.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct ScenarioArgs {
+    /// Scenario file (TOML; may be packed with gzip)
+    #[arg(value_name = "SCENARIO")]
+    pub(crate) file: PathBuf,
+
+    /// Run this many cycles [default: the scenario's `cycles`]
+    #[arg(long, value_name = "N", value_parser = toml_integer())]
+    pub(crate) cycles: Option<u64>,
+
+    /// Grow all randomness from this number [default: the scenario's `seed`]
+    #[arg(long, value_name = "S", value_parser = toml_integer())]
+    pub(crate) seed: Option<u64>,
+
+    /// Switch errors on: none, those of effectors, those of sensors, or both
+    #[arg(long, value_name = "R", value_parser = ["reliable", "effectors", "sensors", "both"])]
+    pub(crate) regime: Option<String>,
+
+    /// Replace any key of the scenario, e.g. robots.count=20; may be given often
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub(crate) overrides: Vec<String>,
+}
+
+/// How many threads work on a run.
+#[derive(Debug, Clone, Copy, Args)]
+pub(crate) struct WorkersArg {
+    /// Run on this many threads; no result depends on it [default: all processors]
+    #[arg(long, value_name = "W", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    workers: Option<u16>,
+}
+
+impl WorkersArg {
+    /// The number of threads.
+    pub(crate) fn count(self) -> usize {
+        self.workers.map_or_else(workers::available, usize::from)
+    }
+}
+
+/// TOML knows integers up to 2^63 - 1.
+fn toml_integer() -> clap::builder::RangedU64ValueParser<u64> {
+    clap::value_parser!(u64).range(..=i64::MAX as u64)
+}
+
+impl ScenarioArgs {
+    /// Reads the scenario, applies the options and compiles it.
+    ///
+    /// # Errors
+    /// When anything in it is wrong.
+    pub(crate) fn compile(&self) -> Result<(Source, Compiled), InputError> {
+        let overrides = self.all_overrides();
+        let source = Source::read(&self.file, &overrides)?;
+        match Compiled::new(&source) {
+            Ok(compiled) => Ok((source, compiled)),
+            Err(error) if overrides.is_empty() => Err(error),
+            Err(error) => Err(in_the_file_itself(&self.file, error)),
+        }
+    }
+
+    /// `--set` first, so that the options of their own win.
+    fn all_overrides(&self) -> Vec<String> {
+        let mut all = self.overrides.clone();
+        let number = |key: &str, value: Option<u64>| value.map(|v| format!("{key}={v}"));
+        all.extend(number("cycles", self.cycles));
+        all.extend(number("seed", self.seed));
+        all.extend(self.regime.as_ref().map(|r| format!("regime=\"{r}\"")));
+        all
+    }
+}
+
+/// The same error where it stands in the file, if no override has brought it in: overrides
+/// may move lines.
+fn in_the_file_itself(file: &Path, error: InputError) -> InputError {
+    let plain = Source::read(file, &[]).and_then(|source| Compiled::new(&source).map(drop));
+    match plain {
+        Err(plain) if plain.cause() == error.cause() => plain,
+        _ => error,
+    }
+}

@@ -1,0 +1,198 @@
+//! What a run says at its end: `summary.json`, the JSON on standard output, and a table.
+
+use crate::console::{aligned, duration, grouped};
+use crate::driver::Effort;
+use crate::worlds::Run;
+use serde::Serialize;
+use serde_json::Value;
+use sidestep::kernel::Cycle;
+use sidestep::kernel::cycle::PhaseTimes;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// Names and values, one per line.
+pub(crate) type Lines = Vec<(String, String)>;
+
+/// Whether a run reached its end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum Status {
+    /// All cycles are done.
+    Complete,
+    /// It was stopped before.
+    Incomplete,
+}
+
+/// The report of a run.
+#[derive(Debug, Clone, Serialize)]
+pub(crate) struct Summary {
+    /// Version of the program.
+    version: &'static str,
+    /// Name of the world.
+    world: &'static str,
+    /// Name of the scenario.
+    name: String,
+    status: Status,
+    seed: u64,
+    /// Digest of the state after `cycles` cycles, in hexadecimal.
+    digest: String,
+    /// Cycles done since the run's start.
+    cycles: Cycle,
+    cycles_planned: Cycle,
+    /// Agents; named after the first world.
+    robots: usize,
+    workers: usize,
+    /// Cycles done by this process; the times below are theirs.
+    cycles_timed: u64,
+    wall_s: f64,
+    cpu_s: f64,
+    robot_cycles_per_cpu_s: f64,
+    phases_s: Phases,
+    metrics: Value,
+    /// The run folder, if there is one.
+    folder: Option<PathBuf>,
+}
+
+/// Seconds per phase, by the clock of worker 0.
+#[derive(Debug, Clone, Copy, Serialize)]
+struct Phases {
+    perceive_decide: f64,
+    conflicts: f64,
+    react: f64,
+    record: f64,
+}
+
+impl Phases {
+    fn new(times: PhaseTimes, record: Duration) -> Self {
+        let seconds = |ns: u64| ns as f64 / 1e9;
+        Self {
+            perceive_decide: seconds(times.perceive_decide_ns),
+            conflicts: seconds(times.conflicts_ns),
+            react: seconds(times.react_ns),
+            record: record.as_secs_f64(),
+        }
+    }
+
+    /// Shares of the whole, in words.
+    fn words(self) -> String {
+        let phases = [
+            ("perceive and decide", self.perceive_decide),
+            ("conflicts", self.conflicts),
+            ("react", self.react),
+            ("record", self.record),
+        ];
+        let all: f64 = phases.iter().map(|(_, s)| s).sum();
+        let share = |(name, s): &(&str, f64)| format!("{name} {:.0} %", 100.0 * s / all.max(1e-12));
+        phases.iter().map(share).collect::<Vec<_>>().join(", ")
+    }
+}
+
+/// What a process spent on a run.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Cost {
+    pub(crate) workers: usize,
+    pub(crate) effort: Effort,
+    /// Time spent on recording.
+    pub(crate) recording: Duration,
+}
+
+impl Summary {
+    /// The report of a run as it stands.
+    pub(crate) fn new(run: &dyn Run, cost: Cost, folder: Option<&Path>) -> Self {
+        let plan = run.plan();
+        let (cycles, robots, effort) = (run.cycle(), run.agents(), cost.effort);
+        let cpu_s = effort.cpu.as_secs_f64();
+        let status = if cycles < plan.cycles { Status::Incomplete } else { Status::Complete };
+        Self {
+            version: env!("CARGO_PKG_VERSION"),
+            world: run.world(),
+            name: plan.name,
+            status,
+            seed: plan.seed,
+            digest: run.digest().to_string(),
+            cycles,
+            cycles_planned: plan.cycles,
+            robots,
+            workers: cost.workers,
+            cycles_timed: effort.cycles,
+            wall_s: effort.wall.as_secs_f64(),
+            cpu_s,
+            robot_cycles_per_cpu_s: robots as f64 * effort.cycles as f64 / cpu_s.max(1e-9),
+            phases_s: Phases::new(run.phase_times(), cost.recording),
+            metrics: run.metrics(),
+            folder: folder.map(Path::to_path_buf),
+        }
+    }
+
+    /// Whether the run reached its end.
+    pub(crate) fn status(&self) -> Status {
+        self.status
+    }
+
+    /// The digest in hexadecimal.
+    pub(crate) fn digest(&self) -> &str {
+        &self.digest
+    }
+
+    /// The report for people; `outcome` is the world's part.
+    pub(crate) fn text(&self, outcome: Lines) -> String {
+        let mut lines = vec![
+            line(&format!("{}s", self.agent()), grouped(self.robots as u64)),
+            line("cycles", self.cycles_words()),
+        ];
+        lines.extend(outcome);
+        if self.cycles_timed > 0 {
+            lines.push(line("speed", self.speed()));
+            lines.push(line("time", self.phases_s.words()));
+        }
+        lines.push(line("digest", self.digest.clone()));
+        lines.extend(self.folder.as_ref().map(|f| line("results", f.display().to_string())));
+        format!("{}\n{}", self.heading(), aligned(&lines))
+    }
+
+    fn heading(&self) -> String {
+        let name = if self.name.is_empty() { self.world } else { &self.name };
+        format!("{name}, seed {}", self.seed)
+    }
+
+    fn agent(&self) -> &str {
+        self.world.trim_end_matches('s')
+    }
+
+    fn cycles_words(&self) -> String {
+        let done = grouped(self.cycles);
+        match self.status {
+            Status::Complete => done,
+            Status::Incomplete => {
+                format!("{done} of {}: INCOMPLETE", grouped(self.cycles_planned))
+            }
+        }
+    }
+
+    fn speed(&self) -> String {
+        let per_second = self.cycles_timed as f64 / self.wall_s.max(1e-9);
+        format!(
+            "{} for {} cycles ({}/s); {:.2} million {}-cycles per CPU second on {} worker{}",
+            duration(self.wall_s),
+            grouped(self.cycles_timed),
+            grouped(per_second as u64),
+            self.robot_cycles_per_cpu_s / 1e6,
+            self.agent(),
+            self.workers,
+            if self.workers == 1 { "" } else { "s" },
+        )
+    }
+}
+
+fn line(name: &str, value: String) -> (String, String) {
+    (name.into(), value)
+}
+
+/// What `summary.json` adds to the report.
+#[derive(Debug, Serialize)]
+pub(crate) struct SummaryFile<'a> {
+    #[serde(flatten)]
+    pub(crate) summary: &'a Summary,
+    /// Metrics of every agent by itself.
+    pub(crate) per_agent: Value,
+}

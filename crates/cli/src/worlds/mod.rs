@@ -1,0 +1,138 @@
+//! The one place that knows which worlds there are, and what the command needs of each.
+
+mod robots;
+
+pub(crate) use robots::shade;
+
+use crate::exit::Failure;
+use crate::report::Lines;
+use robots::RobotsRun;
+use serde_json::Value;
+use sidestep::kernel::checkpoint::CheckpointError;
+use sidestep::kernel::{Cycle, InputError, Simulation};
+use sidestep::scenario::{Source, nearest};
+use std::path::Path;
+
+/// Names of the worlds, as scenarios give them.
+const NAMES: [&str; 1] = ["robots"];
+
+/// What a scenario asks for, whatever its world.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Plan {
+    /// The scenario's name, else its file's.
+    pub(crate) name: String,
+    /// The seed.
+    pub(crate) seed: u64,
+    /// Cycles to run.
+    pub(crate) cycles: Cycle,
+    /// Cycles between two checkpoints, at least 1; the largest number for none.
+    pub(crate) checkpoint_every: Cycle,
+}
+
+/// A scenario that needs no other file any more, and the files it has instead.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Resolved {
+    /// The TOML text.
+    pub(crate) text: String,
+    /// Files by their path relative to the scenario.
+    pub(crate) files: Vec<(String, Vec<u8>)>,
+}
+
+/// Something to say about a state: as JSON, and in words.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Said {
+    /// For machines.
+    pub(crate) json: Value,
+    /// For people.
+    pub(crate) text: String,
+}
+
+/// How a recomputed state compares with what was recorded of it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Comparison {
+    /// Nothing of this cycle is on the disk.
+    NotRecorded,
+    /// So many recorded poses, all equal.
+    Equal(usize),
+    /// The bodies whose poses differ.
+    Different(Vec<u32>),
+}
+
+/// What a picture of a run is made from.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Pictured<'a> {
+    /// The run folder with the recorded tracks.
+    pub(crate) folder: Option<&'a Path>,
+    /// Small print that says which run this is.
+    pub(crate) origin: &'a str,
+}
+
+/// A run of some world: the kernel's face, and what only the command asks for.
+pub(crate) trait Run: Simulation {
+    /// What the scenario asks for.
+    fn plan(&self) -> Plan;
+
+    /// From now on keeps what is to be recorded.
+    fn begin_recording(&mut self);
+
+    /// Continues from a checkpoint.
+    fn restore(&mut self, checkpoint: &[u8]) -> Result<(), CheckpointError>;
+
+    /// What the compiled scenario holds: for `check`.
+    fn contents(&self) -> Said;
+
+    /// What came of the run so far, in lines for people.
+    fn outcome(&self) -> Lines;
+
+    /// Metrics of every agent by itself.
+    fn agent_metrics(&self) -> Value;
+
+    /// Where every body is.
+    fn poses(&self) -> Said;
+
+    /// Compares the present state with what `folder` holds of this cycle.
+    fn compare(&self, folder: &Path) -> Result<Comparison, InputError>;
+
+    /// The present state, and the recorded tracks where there are some, as SVG.
+    fn picture(&self, of: Pictured<'_>) -> Result<String, Failure>;
+}
+
+/// A scenario that has been found right.
+pub(crate) enum Compiled {
+    /// Of the world `robots`.
+    Robots(robots::Scenario),
+}
+
+impl Compiled {
+    /// Compiles a scenario of whatever world it names.
+    ///
+    /// # Errors
+    /// When no such world is known, or the scenario is wrong.
+    pub(crate) fn new(source: &Source) -> Result<Self, InputError> {
+        let world = source.preamble()?.world;
+        match world.get_ref().as_str() {
+            "robots" => robots::Scenario::new(source).map(Self::Robots),
+            other => {
+                let cause = format!("unknown world `{other}`");
+                Err(source.error(Some(world.span()), cause, nearest(other, &NAMES)))
+            }
+        }
+    }
+
+    /// The scenario as it goes into a run folder: complete in itself.
+    ///
+    /// # Errors
+    /// When a file that it names cannot be read any more.
+    pub(crate) fn resolve(&self, source: &Source) -> Result<Resolved, InputError> {
+        match self {
+            Self::Robots(scenario) => scenario.resolve(source),
+        }
+    }
+
+    /// A run at its start. `source` names the run in checkpoints.
+    pub(crate) fn start(self, source: &Source, workers: usize) -> Box<dyn Run> {
+        match self {
+            Self::Robots(scenario) => Box::new(RobotsRun::new(scenario, source, workers)),
+        }
+    }
+}

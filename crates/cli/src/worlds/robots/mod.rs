@@ -1,0 +1,196 @@
+//! The robots world as the command sees it.
+
+mod contents;
+mod picture;
+mod poses;
+mod resolve;
+
+pub(crate) use picture::shade;
+
+use super::{Comparison, Pictured, Plan, Resolved, Run, Said};
+use crate::console::grouped;
+use crate::exit::Failure;
+use crate::report::Lines;
+use serde_json::{Value, json};
+use sidestep::kernel::checkpoint::CheckpointError;
+use sidestep::kernel::cycle::PhaseTimes;
+use sidestep::kernel::ports::{RecordError, Recorder, TableSchema};
+use sidestep::kernel::{Cycle, Digest, InputError, Simulation};
+use sidestep::scenario::Source;
+use sidestep::worlds::robots::metrics::Metrics;
+use sidestep::worlds::robots::scenario::{Behaviours, Compiled, StorageOrder};
+use sidestep::worlds::robots::simulation::RobotsSimulation;
+use std::path::Path;
+
+/// A compiled robots scenario.
+pub(crate) struct Scenario {
+    compiled: Compiled,
+    /// The sections as they stand in the file, for `check`.
+    file: Value,
+}
+
+impl Scenario {
+    /// Compiles the scenario.
+    ///
+    /// # Errors
+    /// When anything in it is wrong.
+    pub(super) fn new(source: &Source) -> Result<Self, InputError> {
+        let compiled = Compiled::new(source, &Behaviours::new(), StorageOrder::Spatial)?;
+        Ok(Self { compiled, file: source.parse()? })
+    }
+
+    /// See [`super::Compiled::resolve`].
+    pub(super) fn resolve(&self, source: &Source) -> Result<Resolved, InputError> {
+        resolve::resolve(source, &self.compiled, &self.file)
+    }
+}
+
+/// A run of a robots world.
+pub(super) struct RobotsRun {
+    simulation: RobotsSimulation,
+    file: Value,
+}
+
+impl RobotsRun {
+    /// A run at its start.
+    pub(super) fn new(scenario: Scenario, source: &Source, workers: usize) -> Self {
+        let Scenario { compiled, file } = scenario;
+        Self { simulation: RobotsSimulation::from_compiled(compiled, source, workers), file }
+    }
+}
+
+impl Simulation for RobotsRun {
+    fn world(&self) -> &'static str {
+        Simulation::world(&self.simulation)
+    }
+    fn cycle(&self) -> Cycle {
+        self.simulation.cycle()
+    }
+    fn agents(&self) -> usize {
+        self.simulation.agents()
+    }
+    fn advance(&mut self, cycles: u64) -> u64 {
+        self.simulation.advance(cycles)
+    }
+    fn digest(&self) -> Digest {
+        self.simulation.digest()
+    }
+    fn checkpoint(&self) -> Vec<u8> {
+        self.simulation.checkpoint()
+    }
+    fn schemas(&self) -> Vec<TableSchema> {
+        self.simulation.schemas()
+    }
+    fn record(&mut self, recorder: &mut dyn Recorder) -> Result<(), RecordError> {
+        self.simulation.record(recorder)
+    }
+    fn metrics(&self) -> Value {
+        self.simulation.metrics()
+    }
+    fn phase_times(&self) -> PhaseTimes {
+        self.simulation.phase_times()
+    }
+}
+
+impl Run for RobotsRun {
+    fn plan(&self) -> Plan {
+        let compiled = self.simulation.compiled();
+        Plan {
+            name: compiled.name.clone(),
+            seed: compiled.seed,
+            cycles: compiled.cycles,
+            checkpoint_every: match compiled.record.checkpoint_every {
+                0 => Cycle::MAX,
+                every => every,
+            },
+        }
+    }
+
+    fn begin_recording(&mut self) {
+        self.simulation.begin_recording();
+    }
+
+    fn restore(&mut self, checkpoint: &[u8]) -> Result<(), CheckpointError> {
+        self.simulation.restore(checkpoint)
+    }
+
+    fn contents(&self) -> Said {
+        contents::contents(&self.simulation, &self.file)
+    }
+
+    fn outcome(&self) -> Lines {
+        outcome(&self.simulation.robot_metrics())
+    }
+
+    fn agent_metrics(&self) -> Value {
+        let (world, state) = (self.simulation.world(), self.simulation.state());
+        let one = |&slot: &u32| {
+            let counts = world.counts(state, self.simulation.cycle(), slot);
+            json!({ "body": world.bodies[slot as usize].id, "counts": counts })
+        };
+        world.robots().iter().map(one).collect()
+    }
+
+    fn poses(&self) -> Said {
+        poses::said(&self.simulation)
+    }
+
+    fn compare(&self, folder: &Path) -> Result<Comparison, InputError> {
+        poses::compare(&self.simulation, folder)
+    }
+
+    fn picture(&self, of: Pictured<'_>) -> Result<String, Failure> {
+        picture::svg(&self.simulation, of)
+    }
+}
+
+fn outcome(metrics: &Metrics) -> Lines {
+    let total = &metrics.total;
+    let mut lines = vec![
+        line("contacts", contacts(metrics)),
+        line("trips", trips(total.trips, total.trip_cycles_mean)),
+        line("distance", format!("{:.1} km", total.distance_m / 1000.0)),
+        line("coverage", format!("{:.1} % of the free boxes", 100.0 * metrics.coverage)),
+    ];
+    // A continued run at its end has seen no group in this process.
+    if metrics.largest_group > 0 {
+        lines.push(line("conflict groups", groups(metrics)));
+    }
+    lines
+}
+
+fn line(name: &str, value: String) -> (String, String) {
+    (name.into(), value)
+}
+
+fn contacts(metrics: &Metrics) -> String {
+    let total = &metrics.total;
+    let by_kind: Vec<String> =
+        total.contacts_by_kind.iter().map(|(kind, n)| format!("{kind} {}", grouped(*n))).collect();
+    let share = 1000.0 * metrics.contacts_per_action;
+    match by_kind.is_empty() {
+        true => "none".into(),
+        false => format!(
+            "{} ({share:.1} in 1000 actions): {}",
+            grouped(total.contacts),
+            by_kind.join(", ")
+        ),
+    }
+}
+
+fn trips(trips: u64, mean_cycles: Option<f64>) -> String {
+    match mean_cycles {
+        Some(mean) => format!("{}, {mean:.1} cycles on average", grouped(trips)),
+        None => "none".into(),
+    }
+}
+
+/// How many conflict groups had how many bodies: index k counts those of `2^k .. 2^(k+1)`.
+fn groups(metrics: &Metrics) -> String {
+    let sizes = metrics.group_sizes.iter().enumerate().filter(|(_, n)| **n > 0);
+    let bins = sizes.map(|(k, n)| match k {
+        0 => format!("alone {}", grouped(*n)),
+        _ => format!("{}-{}: {}", 1u64 << k, (2u64 << k) - 1, grouped(*n)),
+    });
+    format!("{}; largest {}", bins.collect::<Vec<_>>().join(", "), metrics.largest_group)
+}

@@ -1,0 +1,88 @@
+//! The fixed words of `--json`: scripts rely on them.
+
+use crate::support::Place;
+use serde_json::Value;
+
+/// All of `keys` are there and none is null.
+fn assert_keys(value: &Value, keys: &[&str]) {
+    for key in keys {
+        assert!(!value[key].is_null(), "`{key}` is missing in {value:#}");
+    }
+}
+
+#[test]
+fn run_says_what_was_promised() {
+    let place = Place::new();
+    let run = place.json(&["run", "s.toml"]);
+    let words = [
+        "digest",
+        "cycles",
+        "robots",
+        "wall_s",
+        "cpu_s",
+        "robot_cycles_per_cpu_s",
+        "metrics",
+        "seed",
+        "status",
+        "world",
+        "version",
+        "workers",
+    ];
+    assert_keys(&run, &words);
+    assert_keys(&run["metrics"], &["contacts", "trips"]);
+    assert_eq!((run["cycles"].as_u64(), run["robots"].as_u64()), (Some(3000), Some(3)));
+    assert_eq!(run["status"], "complete");
+    let digest = run["digest"].as_str().expect("text");
+    assert!(digest.len() == 32 && digest.chars().all(|c| c.is_ascii_hexdigit()), "{digest}");
+    assert_eq!(place.names(), ["s.toml"], "without --out nothing is written");
+}
+
+#[test]
+fn check_says_what_it_found() {
+    let found = Place::new().json(&["check", "s.toml"]);
+    assert_keys(&found, &["name", "seed", "cycles", "regime", "map", "sensors", "memory_bytes"]);
+    assert_eq!(found["map"]["width_boxes"], 24);
+    assert_eq!(found["bodies"], serde_json::json!({ "door": 1, "person": 1, "robot": 3 }));
+    assert_eq!(found["robots"][0]["behaviour"], "shuttle");
+    assert_eq!(found["robots"][1]["behaviour"], "wander");
+}
+
+#[test]
+fn map_counts_pixels_and_boxes() {
+    let place = Place::new();
+    place.write("m.yaml", "image: m.pgm\nresolution: 0.5\norigin: [0, 0, 0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n");
+    place.write("m.pgm", "P2\n4 2\n255\n0 254 254 254\n254 254 205 254\n");
+    let map = place.json(&["map", "m.yaml", "--box", "1.0"]);
+    for (key, count) in [("width", 4), ("height", 2), ("free", 6), ("occupied", 1), ("unknown", 1)]
+    {
+        assert_eq!(map[key], count, "{key}");
+    }
+    assert_eq!(map["boxes"], serde_json::json!({ "free": 0, "wall": 1, "unknown": 1 }));
+    let walls = place.json(&["map", "m.yaml", "--box", "1.0", "--unknown", "wall"]);
+    assert_eq!(walls["boxes"]["wall"], 2);
+}
+
+#[test]
+fn replay_and_resume_speak_json_too() {
+    let place = Place::new();
+    place.json(&["run", "s.toml", "--out", "r"]);
+    let replay = place.json(&["replay", "r", "--cycle", "42"]);
+    assert_keys(&replay, &["cycle", "digest", "compared_poses", "bodies"]);
+    assert_keys(&replay["bodies"][0], &["body", "kind", "col_boxes", "row_boxes", "heading"]);
+    assert_eq!(replay["bodies"][4]["kind"], "door");
+    assert_keys(&replay["bodies"][4], &["open"]);
+}
+
+#[test]
+fn new_says_which_file_it_wrote() {
+    let place = Place::new();
+    assert_eq!(place.json(&["new", "robots"])["file"], "robots.toml");
+}
+
+#[test]
+fn in_json_mode_errors_leave_standard_output_empty() {
+    let place = Place::new();
+    let ended = place.run(&["run", "missing.toml", "--json"]);
+    assert_eq!((ended.code(), ended.out().as_str()), (2, ""));
+    assert!(ended.err().starts_with("error: missing.toml"), "{}", ended.err());
+}

@@ -1,0 +1,174 @@
+//! E1: wrong input is one error with file, line, column, cause and remedy; exit code 2,
+//! nothing written.
+
+use crate::support::{Place, SCENARIO};
+
+/// Runs, checks that it is refused and that nothing was written; returns the words.
+fn refused(place: &Place, file: &str, more: &[&str]) -> String {
+    let before = place.names();
+    let ended = place.run(&[&["run", file, "--out", "out"], more].concat());
+    let err = ended.err();
+    assert_eq!((ended.code(), ended.out().as_str()), (2, ""), "{err}");
+    assert!(err.starts_with("error: ") && err.contains("\n  help: "), "{err}");
+    assert_eq!(err.matches("error: ").count(), 1, "{err}");
+    assert_eq!(place.names(), before, "something was written");
+    err
+}
+
+/// What must be refused in [`SCENARIO`] when `find` is replaced, and what is said.
+const TABLE: [(&str, &str, &str, &[&str]); 17] = [
+    ("unknown key", "cycles = 3000", "cylces = 3000", &["did you mean `cycles`?"]),
+    ("unknown key inside", "count = 1\nsensors", "cuont = 1\nsensors", &["did you mean `count`?"]),
+    ("no TOML", "[map]", "[map", &["s.toml:7:"]),
+    ("wrong type", "seed = 5", "seed = \"five\"", &["invalid type"]),
+    ("another format", "format = 1", "format = 7", &["format 7", "format = 1"]),
+    ("unknown world", "world = \"robots\"", "world = \"robot\"", &["did you mean `robots`?"]),
+    ("unknown sensor", "sonar-8", "sonar-9", &["did you mean `sonar-8`?"]),
+    (
+        "unknown effector",
+        "effector = \"nomad\"\n\n",
+        "effector = \"nomed\"\n\n",
+        &["did you mean `nomad`?"],
+    ),
+    (
+        "body in the wall",
+        "count = 1\nsensors",
+        "at = [[0, 0]]\nsensors",
+        &["in the wall at [0, 0]"],
+    ),
+    (
+        "bodies on each other",
+        "count = 1\nsensors",
+        "at = [[5, 5], [5, 5]]\nsensors",
+        &["stands on body"],
+    ),
+    ("outside the map", "count = 1\nsensors", "at = [[500, 5]]\nsensors", &["leaves the map"]),
+    ("too many bodies", "count = 1\nsensors", "count = 4000\nsensors", &["no free place"]),
+    ("absurdly many bodies", "count = 1\nsensors", "count = 4000000000\nsensors", &["at most"]),
+    ("absurd body", "size = 2", "size = 60000", &["60000 x 60000"]),
+    ("absurd region", "a = [1, 3, 2, 2]", "a = [1, 3, 4000000000, 2]", &["leaves the map"]),
+    (
+        "map without free boxes",
+        "\n#..........#...........#",
+        "\n########################",
+        &["no free box"],
+    ),
+    (
+        "ragged map",
+        "#......................#\n#..........#",
+        "#.....#\n#..........#",
+        &["map.ascii"],
+    ),
+];
+
+#[test]
+fn a_wrong_scenario_is_refused_where_it_is_wrong() {
+    for (name, find, replace, said) in TABLE {
+        let place = Place::new();
+        assert!(SCENARIO.contains(find), "{name}");
+        let mut text = SCENARIO.replacen(find, replace, 1);
+        if name == "map without free boxes" {
+            text = SCENARIO.replace('.', "#").replace("0#25", "0.25").replace("0#0", "0.0");
+        }
+        place.write("s.toml", text);
+        let err = refused(&place, "s.toml", &[]);
+        assert!(said.iter().all(|words| err.contains(words)), "{name}: {err}");
+        assert!(has_position(&err, "s.toml") || err.contains("map.ascii"), "{name}: {err}");
+    }
+}
+
+/// `file:LINE:COLUMN: ` stands at the beginning.
+fn has_position(err: &str, file: &str) -> bool {
+    let Some((_, rest)) = err.split_once(&format!("{file}:")) else { return false };
+    let mut parts = rest.splitn(3, ':');
+    (0..2).all(|_| parts.next().is_some_and(|p| p.parse::<u32>().is_ok_and(|n| n > 0)))
+}
+
+#[test]
+fn a_row_that_does_not_sum_to_one_says_by_how_much() {
+    let place = Place::new();
+    let sensor = "\n[sensors.mine]\nbearings_deg = [0]\nrange_m = 2.0\nobservations = [\"nothing\", \"something\"]\ndesignates = { wall = \"something\", door = \"something\", person = \"something\", robot = \"something\" }\n[sensors.mine.confusion]\nnothing = [0.9, 0.2]\nsomething = [0.0, 1.0]\n";
+    place.write("s.toml", SCENARIO.replace("bumper-4", "mine") + sensor);
+    let err = refused(&place, "s.toml", &[]);
+    assert!(err.contains("row `nothing`") && err.contains("1.1") && err.contains("0.1"), "{err}");
+    assert!(has_position(&err, "s.toml"), "{err}");
+}
+
+#[test]
+fn an_error_stands_where_it_stands_in_the_file_whatever_is_set() {
+    let place = Place::new();
+    place.write("s.toml", SCENARIO.replace("seed = 5\n", "").replace("sonar-8", "sonar-9"));
+    let plain = refused(&place, "s.toml", &[]);
+    assert_eq!(refused(&place, "s.toml", &["--seed", "7"]), plain);
+    assert_eq!(refused(&place, "s.toml", &["--set", "robots.1.count=2"]), plain);
+}
+
+#[test]
+fn a_wrong_override_is_named() {
+    let place = Place::new();
+    for wrong in ["seed", "seed.x=1", "robots.9.count=1", "nothing.at.all=1"] {
+        let err = refused(&place, "s.toml", &["--set", wrong]);
+        let key = wrong.split(['.', '=']).next().unwrap_or(wrong);
+        assert!(err.contains(key), "{wrong}: {err}");
+    }
+}
+
+#[test]
+fn a_missing_file_is_named() {
+    let place = Place::new();
+    assert!(refused(&place, "missing.toml", &[]).contains("missing.toml"));
+    place.write("m.toml", with_map("nowhere.yaml"));
+    assert!(refused(&place, "m.toml", &[]).contains("nowhere.yaml"));
+    assert!(refused(&place, ".", &[]).contains("error: ."));
+}
+
+fn with_map(file: &str) -> String {
+    format!(
+        "format = 1\nworld = \"robots\"\n[map]\nfile = \"{file}\"\nbox_size_m = 0.5\n[robots]\ncount = 1\n"
+    )
+}
+
+const YAML: &str = "image: m.pgm\nresolution: 0.5\norigin: [0, 0, 0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n";
+const PGM: &str = "P2\n3 2\n255\n254 254 254\n254 254 254\n";
+
+#[test]
+fn a_damaged_map_is_refused_by_run_and_by_map() {
+    let cases = [
+        ("truncated image", YAML.to_string(), "P2\n3 2\n255\n254 254\n".to_string(), "m.pgm"),
+        ("rotated map", YAML.replace("0, 0, 0", "0, 0, 0.7"), PGM.into(), "m.yaml:3:"),
+        ("a resolution of 0", YAML.replace("0.5", "0.0"), PGM.into(), "m.yaml:2:"),
+        ("absurd image", YAML.into(), PGM.replace("3 2", "4000000000 4000000000"), "m.pgm"),
+        ("absurd boxes", YAML.replace("0.5", "1e9"), PGM.into(), "boxes"),
+        ("no image", YAML.replace("m.pgm", "gone.pgm"), PGM.into(), "gone.pgm"),
+    ];
+    for (name, yaml, pgm, said) in cases {
+        let place = Place::new();
+        place.write("m.yaml", yaml);
+        place.write("m.pgm", pgm);
+        place.write("m.toml", with_map("m.yaml"));
+        let err = refused(&place, "m.toml", &[]);
+        assert!(err.contains(said), "{name}: {err}");
+        let shown = place.run(&["map", "m.yaml", "--box", "0.5", "--png", "m.png"]);
+        assert_eq!((shown.code(), shown.out().as_str()), (2, ""), "{name}");
+        assert!(shown.err().contains(said), "{name}: {}", shown.err());
+        assert!(!place.path("m.png").exists());
+    }
+}
+
+#[test]
+fn bytes_that_are_no_text_are_refused() {
+    let place = Place::new();
+    place.write("b.toml", [0xff, 0xfe, 0x00, 0x80]);
+    assert!(refused(&place, "b.toml", &[]).contains("b.toml"));
+    place.write("e.toml", "");
+    assert!(refused(&place, "e.toml", &[]).contains("format"));
+}
+
+#[test]
+fn a_folder_that_cannot_be_made_is_an_error_of_the_option() {
+    let place = Place::new();
+    place.write("file", "");
+    let ended = place.run(&["run", "s.toml", "--out", "file/r"]);
+    assert_eq!(ended.code(), 2, "{}", ended.err());
+    assert!(ended.err().contains("file/r"), "{}", ended.err());
+}

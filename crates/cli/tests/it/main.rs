@@ -1,0 +1,11 @@
+//! The real binary, from outside: what it prints, writes and ends with.
+
+mod commands;
+mod contract;
+mod determinism;
+mod disk;
+mod help;
+mod input;
+mod learn;
+mod stops;
+mod support;

@@ -1,0 +1,151 @@
+//! Stopped runs: by Ctrl-C, by a kill; and what `resume` makes of them.
+
+use crate::support::{Ended, Place, names, signal, wait_for};
+use serde_json::Value;
+use sidestep_record::read_table;
+
+/// More cycles than anybody waits for.
+const ENDLESS: [&str; 6] = ["run", "s.toml", "--out", "r", "--cycles", "1000000000"];
+/// Long enough to be stopped on the way.
+const LONG: [&str; 4] = ["run", "s.toml", "--cycles", "60000"];
+
+fn manifest(place: &Place) -> Value {
+    serde_json::from_str(&place.read("r/run.json")).expect("JSON")
+}
+
+/// Interrupts an endless run once it has a checkpoint.
+fn interrupted(place: &Place, more: &[&str], with: &str) -> Ended {
+    let child = place.start(&[&ENDLESS, more].concat());
+    wait_for("a checkpoint", || place.path("r/checkpoint.bin").exists());
+    signal(&child, with);
+    Ended(child.wait_with_output().expect("ended"))
+}
+
+/// Kills a long recorded run once it has a checkpoint.
+fn killed(place: &Place) {
+    let mut child = place.start(&[&LONG[..], &["--out", "r"]].concat());
+    wait_for("a checkpoint", || place.path("r/checkpoint.bin").exists());
+    child.kill().expect("killed");
+    child.wait().expect("ended");
+}
+
+/// The rows of a table are the same, in the same order.
+fn assert_same_rows(place: &Place, a: &str, b: &str) {
+    for table in ["trajectories", "events"] {
+        let read = |folder: &str| read_table(&place.path(folder), table, ..).expect("a table");
+        let (a, b) = (read(a), read(b));
+        assert!(a.complete && b.complete && a.rows() > 0);
+        assert!(a.columns == b.columns, "{table} differs");
+    }
+}
+
+#[test]
+fn ctrl_c_ends_cleanly_and_marks_the_run_as_incomplete() {
+    for name in ["INT", "TERM"] {
+        let place = Place::new();
+        let ended = interrupted(&place, &["--json"], name);
+        assert_eq!(ended.code(), 130, "{}", ended.err());
+        let said = ended.json();
+        assert_eq!(said["status"], "incomplete");
+        let manifest = manifest(&place);
+        assert_eq!(manifest["status"], "incomplete");
+        assert_eq!(manifest["cycles_done"], said["cycles"]);
+        let tables = names(&place.path("r"));
+        assert!(tables.contains(&"trajectories.partial".into()), "{tables:?}");
+        assert!(place.read("r/trajectories.svg").contains("INCOMPLETE"));
+        assert!(place.read("r/summary.json").contains("\"incomplete\""));
+    }
+}
+
+#[test]
+fn ctrl_c_without_a_folder_reports_what_was_done() {
+    let place = Place::new();
+    let child = place.start(&["run", "s.toml", "--cycles", "1000000000"]);
+    std::thread::sleep(std::time::Duration::from_millis(500));
+    signal(&child, "INT");
+    let ended = Ended(child.wait_with_output().expect("ended"));
+    assert_eq!(ended.code(), 130);
+    assert!(ended.out().contains("INCOMPLETE"), "{}", ended.out());
+    assert_eq!(place.names(), ["s.toml"]);
+}
+
+#[test]
+fn a_killed_run_resumes_to_the_same_digest_and_the_same_rows() {
+    let place = Place::new();
+    killed(&place);
+    assert_eq!(manifest(&place)["status"], "running");
+    let resumed = place.json(&["resume", "r", "--workers", "3"]);
+    let whole = place.json(&[&LONG[..], &["--out", "whole"]].concat());
+    assert_eq!(resumed["digest"], whole["digest"]);
+    assert_eq!(resumed["metrics"]["contacts"], whole["metrics"]["contacts"]);
+    assert_eq!(resumed["status"], "complete");
+    assert_same_rows(&place, "r", "whole");
+}
+
+#[test]
+fn a_run_stopped_several_times_has_the_digest_of_one_in_one_go() {
+    let place = Place::new();
+    let stopped = killed_then_resumed_to(&place, &["10000", "25000"]);
+    assert_eq!(stopped["status"], "complete");
+    assert_eq!(stopped["digest"], place.json(&LONG)["digest"]);
+}
+
+fn killed_then_resumed_to(place: &Place, stops: &[&str]) -> Value {
+    killed(place);
+    for stop in stops {
+        let ended = place.run(&["resume", "r", "--cycles", stop, "--json"]);
+        // A fast machine may have been farther already.
+        assert!([0, 2].contains(&ended.code()), "{}", ended.err());
+        assert_ne!(manifest(place)["status"], "complete");
+    }
+    place.json(&["resume", "r"])
+}
+
+#[test]
+fn a_run_killed_before_its_first_checkpoint_starts_again() {
+    let place = Place::new();
+    let long = [&LONG[..], &["--out", "r", "--set", "record.checkpoint_every=1000000"]].concat();
+    let mut child = place.start(&long);
+    wait_for("the folder", || place.path("r/run.json").exists());
+    child.kill().expect("killed");
+    child.wait().expect("ended");
+    assert_eq!(place.json(&["resume", "r"])["digest"], place.json(&LONG)["digest"]);
+}
+
+#[test]
+fn what_cannot_be_resumed_is_refused_with_the_reason() {
+    let place = Place::new();
+    place.json(&["run", "s.toml", "--out", "r"]);
+    let refused = |args: &[&str], reason: &str| {
+        let ended = place.run(args);
+        assert_eq!((ended.code(), ended.out().as_str()), (2, ""), "{}", ended.err());
+        assert!(ended.err().contains(reason), "{}", ended.err());
+    };
+    refused(&["resume", "r"], "complete");
+    refused(&["resume", "nowhere"], "nowhere");
+    refused(&["resume", "."], "no run folder");
+    let other = Place::new();
+    killed(&other);
+    let mut bytes = std::fs::read(other.path("r/checkpoint.bin")).expect("bytes");
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    other.write("r/checkpoint.bin", &bytes);
+    let ended = other.run(&["resume", "r"]);
+    assert_eq!(ended.code(), 2);
+    assert!(ended.err().contains("checksum") && ended.err().contains("help:"), "{}", ended.err());
+}
+
+#[test]
+fn a_running_folder_is_not_taken_twice() {
+    let place = Place::new();
+    let mut child = place.start(&ENDLESS);
+    wait_for("a checkpoint", || place.path("r/checkpoint.bin").exists());
+    let second = place.run(&["resume", "r"]);
+    let replacing = place.run(&["run", "s.toml", "--out", "r", "--replace"]);
+    child.kill().expect("killed");
+    child.wait().expect("ended");
+    for ended in [second, replacing] {
+        assert_eq!(ended.code(), 2);
+        assert!(ended.err().contains("another process"), "{}", ended.err());
+    }
+}

@@ -1,0 +1,153 @@
+//! A workplace with the binary in it.
+
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+/// Three robots of two sizes, a person and a door in a small building.
+pub(crate) const SCENARIO: &str = r##"format = 1
+world = "robots"
+name = "small"
+seed = 5
+cycles = 3000
+
+[map]
+box_size_m = 0.25
+ascii = """
+########################
+#..........#...........#
+#..........#...........#
+#......................#
+#......................#
+#..........#...........#
+#..........#...........#
+########################
+"""
+
+[[robots]]
+count = 2
+size = 2
+sensors = ["sonar-8"]
+effector = "nomad"
+behaviour = { kind = "shuttle", a = [1, 3, 2, 2], b = [19, 3, 2, 2] }
+
+[[robots]]
+count = 1
+sensors = ["bumper-4"]
+effector = "nomad"
+
+[people]
+count = 1
+
+[doors]
+at = [[11, 3]]
+size = [1, 2]
+random = { p_open = 0.05, p_close = 0.02 }
+
+[record]
+checkpoint_every = 700
+"##;
+
+/// A folder of its own, and the binary run in it.
+pub(crate) struct Place(tempfile::TempDir);
+
+impl Place {
+    /// A place with [`SCENARIO`] as `s.toml`.
+    pub(crate) fn new() -> Self {
+        let place = Self(tempfile::tempdir().expect("a temporary folder"));
+        place.write("s.toml", SCENARIO);
+        place
+    }
+
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    pub(crate) fn write(&self, name: &str, content: impl AsRef<[u8]>) {
+        std::fs::write(self.path(name), content).expect("written");
+    }
+
+    pub(crate) fn read(&self, name: &str) -> String {
+        std::fs::read_to_string(self.path(name)).expect(name)
+    }
+
+    /// Names in the folder, sorted.
+    pub(crate) fn names(&self) -> Vec<String> {
+        names(self.0.path())
+    }
+
+    pub(crate) fn command(&self, args: &[&str]) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_sidestep"));
+        command.args(args).current_dir(self.0.path()).stdin(Stdio::null());
+        command
+    }
+
+    /// Runs to the end.
+    pub(crate) fn run(&self, args: &[&str]) -> Ended {
+        Ended(self.command(args).output().expect("the binary starts"))
+    }
+
+    /// Starts, with its words kept.
+    pub(crate) fn start(&self, args: &[&str]) -> Child {
+        let mut command = self.command(args);
+        command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the binary starts")
+    }
+
+    /// The JSON of a command that must succeed.
+    pub(crate) fn json(&self, args: &[&str]) -> Value {
+        let mut all = args.to_vec();
+        all.push("--json");
+        let ended = self.run(&all);
+        assert_eq!(ended.code(), 0, "{args:?}: {}", ended.err());
+        ended.json()
+    }
+}
+
+pub(crate) fn names(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).expect("a folder");
+    let mut names: Vec<String> =
+        entries.map(|e| e.expect("an entry").file_name().to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
+}
+
+/// What a command left.
+pub(crate) struct Ended(pub(crate) Output);
+
+impl Ended {
+    pub(crate) fn code(&self) -> i32 {
+        self.0.status.code().expect("ended by itself")
+    }
+
+    pub(crate) fn out(&self) -> String {
+        String::from_utf8(self.0.stdout.clone()).expect("text")
+    }
+
+    pub(crate) fn err(&self) -> String {
+        String::from_utf8(self.0.stderr.clone()).expect("text")
+    }
+
+    /// Standard output as exactly one JSON object.
+    pub(crate) fn json(&self) -> Value {
+        let value: Value = serde_json::from_str(&self.out()).expect("one JSON value");
+        assert!(value.is_object(), "{value}");
+        value
+    }
+}
+
+/// Waits until `ready` holds.
+pub(crate) fn wait_for(what: &str, ready: impl Fn() -> bool) {
+    let started = Instant::now();
+    while !ready() {
+        assert!(started.elapsed() < Duration::from_secs(60), "waited too long for {what}");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+/// Sends a signal, as a terminal would.
+pub(crate) fn signal(child: &Child, name: &str) {
+    let pid = child.id().to_string();
+    let sent = Command::new("kill").args([&format!("-{name}"), &pid]).status();
+    assert!(sent.expect("kill is there").success());
+}
