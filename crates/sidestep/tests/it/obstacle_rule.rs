@@ -269,6 +269,38 @@ fn a_path_that_turns_back_enters_the_boxes_it_has_left() {
     check_laws("..... ..... ..... .^...", 2, "rocking", "forward", [&rows; 3]);
 }
 
+/// The longest path a scenario may give, on a map that is shorter, at every edge.
+#[test]
+fn a_path_longer_than_the_map_is_stopped_at_its_edge() {
+    let far = format!("[effectors.far]\nforward = [{{ p = 1.0, path = \"{}\" }}]", "F".repeat(16));
+    for (start, east, north) in [(">", 2, 0), ("^", 0, 2), ("<", -2, 0), ("v", 0, -2)] {
+        let middle = format!("..... ..... ..{start}.. ..... .....");
+        let tiles = Tiles::new(&middle, 1)
+            .keys(&law(Cut))
+            .sections(&far)
+            .robots(&format!("effector = \"far\"\n{}", repeating("forward")));
+        let mut simulation = tiles.simulation();
+        simulation.advance(1);
+        let at = tiles.start();
+        let pose = Pose { col: at.col + east, row: at.row + north, ..at };
+        let outcome = Outcome { pose, contact: Some((WALL, Front)) };
+        assert_eq!(tiles.outcomes(&simulation), BTreeMap::from([(outcome, 1)]));
+    }
+}
+
+/// Out and back again is a way of two boxes, over a box that was visited.
+#[test]
+fn a_path_that_ends_where_it_began_counts_as_way_and_visit() {
+    let tiles = Tiles::new(".. .. ^.", 1)
+        .sections(EFFECTORS)
+        .robots(&format!("effector = \"rocking\"\n{}", repeating("forward")))
+        .keys("regime = \"reliable\"");
+    let mut simulation = tiles.simulation();
+    simulation.advance(1);
+    let total = simulation.robot_metrics().total;
+    assert_eq!((total.distance_m, total.first_visits), (0.5, 1));
+}
+
 /// Any effector of up to four transitions, in quarters and eighths.
 fn transitions() -> impl Strategy<Value = Vec<Transition>> {
     let side = prop::sample::select(Side::ALL.to_vec());

@@ -54,6 +54,9 @@ impl Side {
     }
 }
 
+/// Most steps of a path.
+pub const MAX_PATH: usize = 16;
+
 /// One way an action may end, in free space.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Transition {

@@ -86,7 +86,7 @@ impl RobotsWorld {
             cell.facing.set((cell.facing.get() + walk.turn) % 4);
         }
         let whole = &walk.whole;
-        if whole.delta == (0, 0) {
+        if walk.steps.is_empty() {
             return;
         }
         let at = |offset: i32| base.wrapping_add_signed(offset) as usize;

@@ -1,7 +1,7 @@
 //! A compiled building: everything that never changes during a run.
 
 use super::decide::{Behaviour, Sector};
-use super::effector::{Action, EffectorModel, ObstacleRule};
+use super::effector::{Action, EffectorModel, MAX_PATH, ObstacleRule};
 use super::ray::{Crossing, crossings, turn_crossing};
 use super::resolve::ConflictPolicy;
 use super::sensor::{Reading, ReadingTable, SensorModel};
@@ -39,9 +39,9 @@ pub mod purpose {
     }
 }
 
-/// Rings of wall around the map: beams are read four boxes at a time and may look past the
-/// first wall.
-pub(super) const BORDER: u32 = BEAM_STEP as u32;
+/// Rings of wall around the map: whole paths and [`BEAM_STEP`] boxes of a beam are read at
+/// once, and may look past the first wall.
+pub(super) const BORDER: u32 = MAX_PATH as u32;
 
 /// Boxes of a beam that are read together.
 pub(super) const BEAM_STEP: usize = 4;

@@ -2,7 +2,9 @@
 
 use super::{EffectorSection, Rows, SensorSection, TransitionSection};
 use crate::scenario::{Source, nearest};
-use crate::worlds::robots::effector::{EffectorModel, STANDARD_ACTIONS, Side, Transition};
+use crate::worlds::robots::effector::{
+    EffectorModel, MAX_PATH, STANDARD_ACTIONS, Side, Transition,
+};
 use crate::worlds::robots::sensor::SensorModel;
 use sidestep_kernel::InputError;
 use sidestep_kernel::distr::check_row;
@@ -323,7 +325,7 @@ fn transition(
     t: &TransitionSection,
 ) -> Result<Transition, InputError> {
     let path: Option<Vec<Side>> = t.path.chars().map(Side::from_letter).collect();
-    let path = path.filter(|p| p.len() <= 16).ok_or_else(|| {
+    let path = path.filter(|p| p.len() <= MAX_PATH).ok_or_else(|| {
         let cause = format!("`{}` is no path", t.path);
         at.error(span.clone(), cause, "write up to 16 letters F, L, B, R, e.g. \"FL\"")
     })?;
