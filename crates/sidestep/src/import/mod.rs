@@ -5,15 +5,18 @@
 //! [`InputError`](sidestep_kernel::InputError) with file, line and column.
 
 pub mod ascii;
+pub mod carmen;
 pub mod file;
 pub use file::read_text;
 pub mod image;
 mod map_file;
 mod map_yaml;
 pub mod movingai;
+pub mod mrclam;
 mod pixel_map;
 pub mod rosmap;
 mod rows;
+pub mod table;
 
 #[cfg(test)]
 mod shared_data;
