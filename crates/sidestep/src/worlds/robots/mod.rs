@@ -9,6 +9,7 @@
 //! sensor.rs, ray.rs, effector.rs: the tables behind it         metrics.rs: what came of it
 //! ```
 
+pub mod baseline;
 pub mod decide;
 pub mod effector;
 pub mod metrics;
