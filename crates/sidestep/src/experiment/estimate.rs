@@ -1,5 +1,6 @@
 //! A mean that says how sure it is.
 
+use super::figure::Point;
 use crate::statistics::{Interval, mean, mean_interval};
 use serde::Serialize;
 use std::fmt;
@@ -52,7 +53,7 @@ impl Estimate {
     }
 
     /// A point of a figure at `x`, if there is a mean.
-    pub fn point(&self, x: f64) -> Option<(f64, f64, Option<(f64, f64)>)> {
+    pub fn point(&self, x: f64) -> Option<Point> {
         self.mean.map(|y| (x, y, self.interval.map(|i| (i.low, i.high))))
     }
 }

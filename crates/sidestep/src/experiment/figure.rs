@@ -33,13 +33,16 @@ pub enum FigureKind {
     },
 }
 
+/// A point: x, y, and the interval of y where it has one.
+pub type Point = (f64, f64, Option<(f64, f64)>);
+
 /// A named series of points.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Series {
     /// Name in the legend.
     pub name: String,
-    /// `(x, y, interval of y)`.
-    pub points: Vec<(f64, f64, Option<(f64, f64)>)>,
+    /// The points.
+    pub points: Vec<Point>,
 }
 
 /// A table to print.

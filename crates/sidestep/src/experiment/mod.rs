@@ -14,7 +14,7 @@ pub mod estimate;
 pub mod farm;
 pub mod figure;
 pub mod least_squares;
-//pub mod loria;
+pub mod loria;
 
 pub use estimate::Estimate;
 pub use figure::{Figure, FigureKind, Series, Table};
