@@ -28,6 +28,7 @@ use super::timing::Load;
 use crate::experiment::farm::Progress;
 use crate::experiment::least_squares::Fit;
 use crate::experiment::{Figure, FigureKind, Series, Table};
+use crate::statistics::Interval;
 use crate::worlds::robots::simulation::RobotsSimulation;
 use serde::Serialize;
 use sidestep_kernel::Simulation;
@@ -62,7 +63,7 @@ pub struct Parameter {
     /// Value in ns.
     pub value_ns: f64,
     /// 95 % interval in ns.
-    pub interval_ns: Option<(f64, f64)>,
+    pub interval_ns: Option<Interval>,
 }
 
 /// The fitted model.
@@ -95,7 +96,7 @@ impl CostModel {
         let mut points = Vec::new();
         for (index, load) in loads.iter().enumerate() {
             report("cost model", index as f64 / loads.len() as f64);
-            points.push(measure(load, plan.timed_robot_cycles / 4));
+            points.push(measure(load, plan.timed_robot_cycles / 2));
         }
         Self::fit(points)
     }
@@ -134,7 +135,7 @@ impl CostModel {
         let note = format!(
             "{} runs with one worker, n = {:.0} to {:.0} robots of 1 to 3 boxes a side, m = {:.0} \
              to {:.0} people and doors, share in conflict p = {:.3} to {:.3} (counted). Least \
-             squares on the cost per body; R2 of step one {:.3}, of step two {:.3}, of whole \
+             squares on the cost per body, each time the best of {BLOCKS} blocks; R2 of step one {:.3}, of step two {:.3}, of whole \
              cycles {:.3}. t_p and t_o are told apart by n : m, c_s by crowding, e_u by body \
              size, c_d is the rest per body.",
             self.points.len(),
@@ -151,7 +152,8 @@ impl CostModel {
         let columns = ["parameter", "what", "ns", "95 % interval"];
         let mut table = Table::new("The cost model, fitted", note, &columns);
         for p in &self.parameters {
-            let interval = p.interval_ns.map_or("-".into(), |(a, b)| format!("[{a:.1}, {b:.1}]"));
+            let interval =
+                p.interval_ns.map_or("-".into(), |i| format!("[{:.1}, {:.1}]", i.low, i.high));
             table.row([p.name.clone(), p.meaning.clone(), format!("{:.1}", p.value_ns), interval]);
         }
         table
@@ -206,7 +208,7 @@ fn greatest(points: &[Point], of: fn(&Point) -> f64) -> f64 {
 fn parameters(first: &Option<Fit>, second: &Option<Fit>) -> Vec<Parameter> {
     let fits = [first, second].into_iter().flatten();
     let values = fits.flat_map(|fit| {
-        let interval = |k: usize| fit.intervals.as_ref().map(|i| (i[k].low, i[k].high));
+        let interval = |k: usize| fit.intervals.as_ref().map(|all| all[k]);
         fit.coefficients.iter().enumerate().map(move |(k, &c)| (c, interval(k)))
     });
     let named = |((name, meaning), (value_ns, interval_ns)): ((&str, &str), _)| Parameter {
@@ -251,8 +253,8 @@ fn grid(plan: &Plan) -> Vec<Load> {
     loads.into_iter().step_by(keep).collect()
 }
 
-/// Blocks in which a load is timed; the median of their times per cycle counts.
-const BLOCKS: usize = 5;
+/// Blocks in which a load is timed; the shortest time per cycle of each phase counts.
+const BLOCKS: usize = 16;
 
 /// What has happened in a run so far.
 #[derive(Debug, Clone, Copy)]
@@ -264,7 +266,7 @@ struct Totals {
 }
 
 fn measure(load: &Load, robot_cycles: u64) -> Point {
-    let cycles = (load.cycles(robot_cycles) / BLOCKS as u64).max(10);
+    let cycles = load.cycles(robot_cycles);
     let mut run = load.simulation(1);
     advance(&mut run, cycles);
     let mut totals = vec![totals(&run)];
@@ -274,11 +276,9 @@ fn measure(load: &Load, robot_cycles: u64) -> Point {
     }
     let per_cycle = |of: fn(&Totals) -> f64| {
         let block = |pair: &[Totals]| (of(&pair[1]) - of(&pair[0])) / cycles as f64;
-        let mut blocks: Vec<f64> = totals.windows(2).map(block).collect();
-        blocks.sort_by(f64::total_cmp);
-        blocks
+        totals.windows(2).map(block).collect::<Vec<f64>>()
     };
-    let median = |of| per_cycle(of)[BLOCKS / 2];
+    let best = |of| per_cycle(of).into_iter().fold(f64::INFINITY, f64::min);
     let mean = |of| per_cycle(of).iter().sum::<f64>() / BLOCKS as f64;
     let (agents, bodies) = (f64::from(load.robots), run.world().bodies.len() as f64);
     Point {
@@ -287,8 +287,8 @@ fn measure(load: &Load, robot_cycles: u64) -> Point {
         size: load.size,
         in_conflict: bodies - mean(|t| t.alone),
         boxes: mean(|t| t.boxes),
-        first_ns: median(|t| t.first_ns),
-        second_ns: median(|t| t.second_ns),
+        first_ns: best(|t| t.first_ns),
+        second_ns: best(|t| t.second_ns),
     }
 }
 

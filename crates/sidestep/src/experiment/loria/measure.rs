@@ -4,6 +4,7 @@ use super::errors::{self, Beams, Spread};
 use super::floor::{Floor, Mind};
 use crate::experiment::farm::{self, Progress};
 use crate::scenario::Source;
+use crate::worlds::robots::baseline::breach;
 use crate::worlds::robots::effector::ObstacleRule;
 use crate::worlds::robots::scenario::{Behaviours, Compiled, StorageOrder};
 use crate::worlds::robots::simulation::RobotsSimulation;
@@ -120,6 +121,9 @@ pub struct Outcome {
     pub straightness: Option<f64>,
     /// Moves with a sideways part per 1000 actions.
     pub lateral_moves: Option<f64>,
+    /// Whether every robot has acted once a cycle, and at the end no two bodies shared a box
+    /// and none stood in a wall.
+    pub lawful: bool,
 }
 
 /// A measure of an outcome.
@@ -211,6 +215,8 @@ fn outcome(simulation: &RobotsSimulation, tracks: &[Track]) -> Outcome {
         trips: Some(total.trips as f64 / tracks.len() as f64),
         straightness: straightness(tracks),
         lateral_moves: per_1000(tracks.iter().map(|track| lateral_moves(track)).sum()),
+        lawful: total.actions == simulation.cycle() * simulation.agents() as u64
+            && breach(simulation.world(), &simulation.snapshot()).is_none(),
     }
 }
 
@@ -283,5 +289,6 @@ mod tests {
         let (one, three) = (all(1), all(3));
         assert_eq!(one, three);
         assert!(one[0] != one[1] && one[1].len() == 3);
+        assert!(one.iter().flatten().all(|outcome| outcome.lawful));
     }
 }

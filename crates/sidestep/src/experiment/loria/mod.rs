@@ -57,7 +57,7 @@ pub struct Plan {
     pub robots: Vec<u32>,
     /// Operations that a decision costs in the timed loads, cheap to dear.
     pub operations: Vec<u32>,
-    /// About how many decisions one timed stretch takes.
+    /// About how many decisions of the cheapest kind a timed stretch is as long as.
     pub timed_robot_cycles: u64,
     /// Whether this is a rehearsal: fewer points, and figures without weight.
     pub quick: bool,
@@ -75,7 +75,7 @@ impl Default for Plan {
             repeats: 9,
             robots: vec![250, 1500],
             operations: vec![0, 1000, 10_000],
-            timed_robot_cycles: 200_000,
+            timed_robot_cycles: 25_000,
             quick: false,
         }
     }
@@ -96,7 +96,7 @@ impl Plan {
             repeats: 2,
             robots: vec![100],
             operations: vec![0, 1000],
-            timed_robot_cycles: 2_000,
+            timed_robot_cycles: 500,
             quick: true,
         }
     }
@@ -248,8 +248,8 @@ impl Report {
         let plan = &self.plan;
         let mut text = format!(
             "# The LORIA experiments of 2001, run anew\n\n\
-             Of {} claims {} held, {} did not hold, and {} cannot be judged, for their numbers \
-             are lost or another machine would be needed.\n\n\
+             Of {} claims {} held, {} did not hold, and {} cannot be judged: their numbers \
+             are lost, or take another or a quieter machine.\n\n\
              Version {}; seeds 1 to {} for every variant, {} cycles a run, {} repeats of every \
              timing, {} processors.{}\n",
             self.claims.len(),

@@ -171,13 +171,17 @@ pub struct Costly {
     pub operations: u32,
 }
 
+/// Does so many dependent multiply-and-adds, for nothing.
+pub fn burn(mut x: u64, operations: u32) {
+    for _ in 0..operations {
+        x = x.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+    }
+    black_box(x);
+}
+
 impl Behaviour for Costly {
     fn decide(&self, percept: &Percept<'_>, memory: &mut Memory, draws: &mut Draws) -> Decision {
-        let mut x = percept.now;
-        for _ in 0..self.operations {
-            x = x.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        }
-        black_box(x);
+        burn(percept.now, self.operations);
         self.inner.decide(percept, memory, draws)
     }
 }

@@ -2,10 +2,11 @@
 //!
 //! Time is taken as the paper does: all cycles and the recording, without initialization, whose
 //! share is given apart. Runs of all worker counts take turns, so that what else the machine
-//! does hits all alike; speed-up is a ratio of two neighbors in time.
+//! does hits all alike, and arithmetic without any world takes its turn too: its speed-up is
+//! what the machine could give at that moment.
 
 use super::floor::Floor;
-use super::timing::{Load, Timed, seconds};
+use super::timing::{Load, STRETCHES, Timed, arithmetic, race, seconds};
 use super::{NewRecorder, Plan};
 use crate::experiment::farm::Progress;
 use crate::experiment::{Estimate, Figure, FigureKind, Series, Table};
@@ -29,6 +30,8 @@ pub struct Timing {
     pub speed_up: Estimate,
     /// Speed-up by repeat, for pairs with other loads.
     pub ratios: Vec<Option<f64>>,
+    /// Speed-up of mere arithmetic with as many workers, timed in turn with this.
+    pub machine: Estimate,
 }
 
 /// What a run costs before its first cycle.
@@ -137,6 +140,14 @@ impl Performance {
         self.timings.iter().filter(move |t| t.workers == most && t.recorded == recorded)
     }
 
+    /// Whether the machine itself gave less than this share of the workers' worth: others
+    /// were using it, and times say little.
+    pub fn was_busy(&self) -> bool {
+        const SHARE: f64 = 0.85;
+        let least = SHARE * self.most_workers() as f64;
+        self.at_most_workers(false).any(|timing| timing.machine.or_zero() < least)
+    }
+
     /// Speed-up of the costliest decisions less that of the cheapest, same robots, unrecorded,
     /// with the most workers; one value per repeat and number of robots.
     pub fn gain_by_cost(&self) -> Estimate {
@@ -162,23 +173,37 @@ impl Performance {
     }
 
     fn times_table(&self) -> Table {
-        let columns = ["load", "workers", "recorded", "ms per cycle", "speed-up", "efficiency"];
+        let columns = [
+            "load",
+            "workers",
+            "recorded",
+            "ms per cycle",
+            "speed-up",
+            "efficiency",
+            "the machine's speed-up",
+            "share of it",
+        ];
         let note = format!(
-            "Mean [95 % interval] over repeats; {} processors. Time includes recording where \
-             it says so, and excludes initialization. The engine measures now and then whether \
-             all workers are faster than one, and keeps to the faster.",
+            "Mean [95 % interval] over repeats, each the best of {STRETCHES} stretches that take \
+             turns; {} processors. Time includes recording where it says so, and excludes \
+             initialization. The machine's speed-up is that of mere arithmetic, timed in turn: \
+             where it is well below the number of workers, others were using the machine. The \
+             engine measures now and then whether all workers are faster than one, and keeps \
+             to the faster.",
             self.processors
         );
         let mut table = Table::new("Execution time, speed-up and efficiency", note, &columns);
         for timing in &self.timings {
-            let efficiency = timing.speed_up.or_zero() / timing.workers as f64;
+            let speed_up = timing.speed_up.or_zero();
             table.row([
                 self.loads[timing.load].name(),
                 timing.workers.to_string(),
                 if timing.recorded { "yes" } else { "no" }.into(),
                 timing.cycle_ms.to_string(),
                 timing.speed_up.to_string(),
-                format!("{efficiency:.2}"),
+                format!("{:.2}", speed_up / timing.workers as f64),
+                timing.machine.to_string(),
+                format!("{:.2}", speed_up / timing.machine.or_zero().max(f64::MIN_POSITIVE)),
             ]);
         }
         table
@@ -249,45 +274,74 @@ impl Performance {
     }
 }
 
-/// Times one load, unrecorded and recorded, with every number of workers, in turn.
+/// What takes its turn.
+enum Contestant {
+    Run(Box<Timed>, usize, bool),
+    Arithmetic(usize),
+}
+
+/// All contestants of a load: unrecorded, recorded, and arithmetic, each with every number of
+/// workers; each has been run once.
+fn contestants(
+    plan: &Plan,
+    load: &Load,
+    recorders: &mut NewRecorder<'_>,
+) -> Result<Vec<Contestant>, RecordError> {
+    let counts = worker_counts(plan.most_workers);
+    let mut all = Vec::new();
+    for &workers in &counts {
+        let mut plain = Timed::new(load, workers);
+        let mut recorded = Timed::recorded(load, workers, recorders)?;
+        for run in [&mut plain, &mut recorded] {
+            run.run(load.cycles(plan.timed_robot_cycles))?;
+        }
+        all.push(Contestant::Run(Box::new(plain), workers, false));
+        all.push(Contestant::Run(Box::new(recorded), workers, true));
+    }
+    all.extend(counts.into_iter().map(Contestant::Arithmetic));
+    Ok(all)
+}
+
+/// Times one load, unrecorded and recorded, with every number of workers.
 fn time_load(
     plan: &Plan,
     load: &Load,
     recorders: &mut NewRecorder<'_>,
 ) -> Result<Vec<Timing>, RecordError> {
     let cycles = load.cycles(plan.timed_robot_cycles);
-    let mut runs = Vec::new();
-    for recorded in [false, true] {
-        for workers in worker_counts(plan.most_workers) {
-            let mut run = match recorded {
-                false => Timed::new(load, workers),
-                true => Timed::recorded(load, workers, recorders)?,
-            };
-            run.run(cycles / 2)?;
-            runs.push((workers, recorded, run, Vec::new()));
-        }
-    }
-    for _ in 0..plan.repeats {
-        for (_, _, run, times_s) in &mut runs {
-            times_s.push(Some(run.run(cycles)?));
-        }
-    }
-    let mut timings = Vec::new();
-    let mut alone: Vec<Option<f64>> = Vec::new();
-    for (workers, recorded, run, times_s) in runs {
-        run.finish()?;
-        if workers == 1 {
-            alone.clone_from(&times_s);
-        }
-        let ratios = alone.iter().zip(&times_s).map(|(a, b)| Some((*a)? / (*b)?)).collect();
-        timings.push(Timing {
+    let mut all = contestants(plan, load, recorders)?;
+    let times_s = race(&mut all, plan.repeats, |contestant| match contestant {
+        Contestant::Run(run, ..) => run.run(cycles),
+        Contestant::Arithmetic(workers) => Ok(arithmetic(*workers, plan.timed_robot_cycles)),
+    })?;
+    let machine = |wanted: usize| {
+        let is = |c: &Contestant| matches!(c, Contestant::Arithmetic(w) if *w == wanted);
+        all.iter().position(is).map_or(&[][..], |k| &times_s[k][..])
+    };
+    let alone = |wanted: bool| {
+        let is = |c: &Contestant| matches!(c, Contestant::Run(_, 1, r) if *r == wanted);
+        all.iter().position(is).map_or(&[][..], |k| &times_s[k][..])
+    };
+    let timing = |(contestant, times_s): (&Contestant, &Vec<Option<f64>>)| {
+        let &Contestant::Run(_, workers, recorded) = contestant else { return None };
+        let ratio = |(a, b): (&Option<f64>, &Option<f64>)| Some((*a)? / (*b)?);
+        let ratios: Vec<Option<f64>> = alone(recorded).iter().zip(times_s).map(ratio).collect();
+        Some(Timing {
             load: 0,
             workers,
             recorded,
             cycle_ms: Estimate::of(times_s.iter().map(|t| t.map(|t| 1e3 * t / cycles as f64))),
-            speed_up: Estimate::ratio(&alone, &times_s),
+            speed_up: Estimate::of(ratios.iter().copied()),
             ratios,
-        });
+            machine: Estimate::ratio(machine(1), machine(workers)),
+        })
+    };
+    let mut timings: Vec<Timing> = all.iter().zip(&times_s).filter_map(timing).collect();
+    timings.sort_by_key(|timing| (timing.recorded, timing.workers));
+    for contestant in all {
+        if let Contestant::Run(run, ..) = contestant {
+            run.finish()?;
+        }
     }
     Ok(timings)
 }
