@@ -62,7 +62,7 @@ impl Sector {
     /// the sides.
     pub fn of(bearing_deg: f64) -> Self {
         let turned = bearing_deg.rem_euclid(360.0);
-        if turned < 45.0 || turned > 315.0 {
+        if !(45.0..=315.0).contains(&turned) {
             Self::Ahead
         } else if turned <= 135.0 {
             Self::Left

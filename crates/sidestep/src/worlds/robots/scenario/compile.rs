@@ -224,7 +224,7 @@ impl<'a> Compiler<'a> {
     fn radio(&self) -> Result<Option<Radio>, InputError> {
         let Some(radio) = &self.file.radio else { return Ok(None) };
         let r = radio.get_ref();
-        if !(r.range_m > 0.0 && r.range_m < 1e6) || !(0.0..=1.0).contains(&r.loss) {
+        if !(r.range_m > 0.0 && r.range_m < 1e6 && (0.0..=1.0).contains(&r.loss)) {
             let cause = format!("range {} m with loss {}", r.range_m, r.loss);
             return Err(self.error(
                 radio.span(),
@@ -277,6 +277,9 @@ struct Group {
     period: u32,
     phase: Option<u32>,
 }
+
+/// Number of bodies, their given places, and their period.
+type Common = (u64, Vec<(Placing, Range<usize>)>, u32);
 
 /// Column and row, and the facing if it is not to be drawn.
 type Placing = ((u32, u32), Option<u8>);
@@ -394,7 +397,7 @@ impl Compiler<'_> {
         places: &[Spanned<Vec<u32>>],
         period: Option<&Spanned<u32>>,
         span: &Range<usize>,
-    ) -> Result<(u64, Vec<(Placing, Range<usize>)>, u32), InputError> {
+    ) -> Result<Common, InputError> {
         let places: Vec<_> = places
             .iter()
             .map(|p| Ok((self.placing(p)?, p.span())))
