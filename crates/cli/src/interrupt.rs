@@ -10,12 +10,26 @@ static REQUESTED: AtomicBool = AtomicBool::new(false);
 /// # Errors
 /// When the system does not let signals be caught.
 pub(crate) fn listen() -> Result<(), Failure> {
-    let stop = || {
+    catch(|| {
         if REQUESTED.swap(true, Ordering::Relaxed) {
             std::process::exit(ExitCode::Interrupted as i32);
         }
-    };
-    ctrlc::set_handler(stop).map_err(|e| {
+    })
+}
+
+/// From now on Ctrl-C (and a termination signal) ends the process after `cleanup`.
+///
+/// # Errors
+/// When the system does not let signals be caught.
+pub(crate) fn end_with(cleanup: impl Fn() + Send + 'static) -> Result<(), Failure> {
+    catch(move || {
+        cleanup();
+        std::process::exit(ExitCode::Interrupted as i32);
+    })
+}
+
+fn catch(handler: impl FnMut() + Send + 'static) -> Result<(), Failure> {
+    ctrlc::set_handler(handler).map_err(|e| {
         Failure::stopped(format!("cannot listen for Ctrl-C: {e}"), "run it in another terminal")
     })
 }

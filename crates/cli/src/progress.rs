@@ -13,13 +13,7 @@ pub(crate) struct Progress(ProgressBar);
 impl Progress {
     /// A bar from `from` to `until`; silent where nobody looks.
     pub(crate) fn new(console: Console, from: Cycle, until: Cycle) -> Self {
-        let bar = ProgressBar::new(until);
-        let shown = console.shows_progress();
-        bar.set_draw_target(if shown {
-            ProgressDrawTarget::stderr()
-        } else {
-            ProgressDrawTarget::hidden()
-        });
+        let bar = bar(console, until);
         bar.set_style(style());
         bar.set_position(from);
         // The rate is that of this process, not of what was done before.
@@ -31,6 +25,41 @@ impl Progress {
     /// Shows that `cycle` cycles are done.
     pub(crate) fn at(&self, cycle: Cycle) {
         self.0.set_position(cycle);
+    }
+
+    /// Takes the bar away.
+    pub(crate) fn clear(&self) {
+        self.0.finish_and_clear();
+    }
+}
+
+/// A bar that is silent where nobody looks.
+fn bar(console: Console, length: u64) -> ProgressBar {
+    let shown = console.shows_progress();
+    let target = if shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+    ProgressBar::with_draw_target(Some(length), target)
+}
+
+/// How far work of several stages is.
+#[derive(Debug)]
+pub(crate) struct Stages(ProgressBar);
+
+/// Steps of the bar of [`Stages`].
+const STEPS: f64 = 1000.0;
+
+impl Stages {
+    /// A bar at its beginning; silent where nobody looks.
+    pub(crate) fn new(console: Console) -> Self {
+        let bar = bar(console, STEPS as u64);
+        let style = ProgressStyle::with_template("{bar:30} {percent} %  {eta} left  {msg}");
+        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        Self(bar)
+    }
+
+    /// Shows what is being done, and the share of all that is done.
+    pub(crate) fn at(&self, what: &str, share: f64) {
+        self.0.set_position((STEPS * share) as u64);
+        self.0.set_message(what.to_string());
     }
 
     /// Takes the bar away.

@@ -7,6 +7,7 @@ mod learn;
 mod map;
 mod new;
 mod replay;
+mod reproduce;
 mod resume;
 mod run;
 
@@ -31,6 +32,8 @@ pub(crate) enum Command {
     Exact(exact::ExactArgs),
     /// Continue a recorded run that was stopped or killed
     Resume(resume::ResumeArgs),
+    /// Run a paper's experiments anew and judge its claims
+    Reproduce(reproduce::ReproduceArgs),
     /// Recompute a recorded run up to a cycle and show where everybody is
     Replay(replay::ReplayArgs),
 }
@@ -48,6 +51,7 @@ pub(crate) fn execute(command: Command, console: &Console) -> Result<ExitCode, F
         Command::Learn(args) => learn::learn(&args, *console),
         Command::Exact(args) => exact::exact(&args, *console),
         Command::Resume(args) => resume::resume(&args, *console),
+        Command::Reproduce(args) => reproduce::reproduce(&args, *console),
         Command::Replay(args) => replay::replay(&args, *console),
     }
 }

@@ -11,8 +11,9 @@ fn every_command_has_help_with_examples() {
         let examples = help.out().matches(&format!("sidestep {command} ")).count();
         assert!((2..=8).contains(&examples), "{command}: {}", help.out());
     }
-    for what in ["sensor", "effector"] {
-        assert!(place.run(&["learn", what, "--help"]).out().contains("Examples:"));
+    for words in [["learn", "sensor"], ["learn", "effector"], ["reproduce", "loria"]] {
+        let help = place.run(&[words[0], words[1], "--help"]).out();
+        assert!(help.contains("Examples:"), "{words:?}");
     }
 }
 

@@ -8,5 +8,6 @@ mod exact;
 mod help;
 mod input;
 mod learn;
+mod reproduce;
 mod stops;
 mod support;

@@ -1,0 +1,41 @@
+//! `reproduce loria`: a rehearsal leaves a report, its figures and all its numbers.
+
+use crate::support::{Ended, Place, names, signal, wait_for};
+use serde_json::Value;
+
+#[test]
+fn a_rehearsal_leaves_a_whole_report() {
+    let place = Place::new();
+    let told = place.json(&["reproduce", "loria", "--quick", "--out", "loria"]);
+    assert!(told["claims"].as_array().map(Vec::len) > Some(10));
+    assert_eq!(names(&place.path("loria")), ["figures", "report.json", "report.md"]);
+    let stored: Value = serde_json::from_str(&place.read("loria/report.json")).expect("JSON");
+    assert_eq!(stored["claims"], told["claims"]);
+    assert!(place.read("loria/report.md").contains("A rehearsal"));
+    let figures = names(&place.path("loria/figures"));
+    let kind = |end: &str| figures.iter().filter(|f| f.ends_with(end)).count();
+    assert!(kind(".svg") > 5 && kind(".svg") == kind(".png"), "{figures:?}");
+    let again = place.run(&["reproduce", "loria", "--quick", "--out", "loria"]);
+    assert_eq!(again.code(), 2, "a folder with something in it is left alone");
+}
+
+#[test]
+fn a_plan_out_of_range_is_refused_and_leaves_no_folder() {
+    let place = Place::new();
+    let ended = place.run(&["reproduce", "loria", "--seeds", "1", "--out", "loria"]);
+    assert_eq!((ended.code(), ended.out().as_str()), (2, ""), "{}", ended.err());
+    assert!(ended.err().contains("seeds"), "{}", ended.err());
+    assert_eq!(place.names(), ["s.toml"]);
+}
+
+#[test]
+fn ctrl_c_leaves_nothing_behind() {
+    let place = Place::new();
+    let child = place.start(&["reproduce", "loria", "--seeds", "1000", "--out", "loria"]);
+    wait_for("the folder", || place.path("loria/timed-runs").exists());
+    std::thread::sleep(std::time::Duration::from_millis(300));
+    signal(&child, "INT");
+    let ended = Ended(child.wait_with_output().expect("ended"));
+    assert_eq!((ended.code(), ended.out().as_str()), (130, ""));
+    assert_eq!(place.names(), ["s.toml"]);
+}
