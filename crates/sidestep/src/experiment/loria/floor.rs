@@ -128,8 +128,8 @@ impl Floor {
     pub fn describe(&self) -> String {
         let map = &self.office.map;
         format!(
-            "{}: {} x {} boxes of {BOX_SIZE_M} m, {} corridors, {} rooms with doors, {} robots, \
-             {} people",
+            "{}: {} x {} boxes of {BOX_SIZE_M} m, corridors {}, rooms with doors {}, robots {}, \
+             people {}",
             self.name,
             map.width(),
             map.height(),

@@ -2,7 +2,7 @@
 
 use super::Plan;
 use super::performance::{loads, worker_counts};
-use super::timing::{Load, STRETCHES, race, seconds};
+use super::timing::{Load, STRETCHES, arithmetic, race, seconds};
 use crate::experiment::farm::Progress;
 use crate::experiment::{Estimate, Figure, FigureKind, Series, Table};
 use crate::worlds::robots::baseline::{Baseline, Strategy, breach};
@@ -24,6 +24,10 @@ pub struct Trial {
     pub cycle_ms: Estimate,
     /// Time of the double pool with one worker by this time.
     pub speed_up: Estimate,
+    /// The same by repeat, for pairs with other strategies.
+    pub ratios: Vec<Option<f64>>,
+    /// Speed-up of mere arithmetic with as many workers, timed in turn with this.
+    pub machine: Estimate,
     /// Contacts per 1000 actions: what a robot meets depends on the strategy.
     pub contacts: f64,
     /// Share of the bodies' cycles that one worker does while all others wait.
@@ -45,11 +49,21 @@ pub struct Strategies {
 
 /// Name of the kernel's strategy.
 const DOUBLE_POOL: &str = "double pool";
+/// Name of what shows what the machine can give.
+const ARITHMETIC: &str = "arithmetic";
 
-/// A run under any of the three strategies.
+/// What takes its turn: a run under one of the three strategies, or arithmetic.
 enum Run {
     DoublePool(Box<RobotsSimulation>),
     Baseline(Box<Baseline>),
+    Arithmetic,
+}
+
+/// A run, the name of its strategy and its number of workers.
+struct Contestant {
+    strategy: &'static str,
+    workers: usize,
+    run: Run,
 }
 
 impl Run {
@@ -62,6 +76,16 @@ impl Run {
                 }
             }
             Self::Baseline(run) => run.advance(cycles),
+            Self::Arithmetic => {}
+        }
+    }
+}
+
+impl Contestant {
+    fn seconds(&mut self, cycles: u64, robot_cycles: u64) -> f64 {
+        match self.run {
+            Run::Arithmetic => arithmetic(self.workers, robot_cycles),
+            _ => seconds(|| self.run.advance(cycles)).0,
         }
     }
 }
@@ -85,6 +109,19 @@ impl Strategies {
         self.trials.iter().all(|trial| trial.valid && trial.complete)
     }
 
+    /// Speed-up of the double pool less that of another strategy, with the most workers, one
+    /// estimate per load.
+    pub fn lead_over(&self, strategy: Strategy) -> Vec<Estimate> {
+        let most = self.trials.iter().map(|t| t.workers).max().unwrap_or(1);
+        let ratios = |load: usize, name: &str| {
+            let is = |t: &&Trial| (t.load, t.workers, t.strategy.as_str()) == (load, most, name);
+            self.trials.iter().find(is).map_or(&[][..], |t| &t.ratios[..])
+        };
+        let lead =
+            |load| Estimate::paired(ratios(load, DOUBLE_POOL), ratios(load, strategy.name()));
+        (0..self.loads.len()).map(lead).collect()
+    }
+
     /// The comparison as a table.
     pub fn table(&self) -> Table {
         let columns = [
@@ -93,6 +130,7 @@ impl Strategies {
             "workers",
             "ms per cycle",
             "speed-up over double pool, 1 worker",
+            "the machine's speed-up",
             "done serially",
             "contacts / 1000 actions",
             "laws kept",
@@ -113,6 +151,7 @@ impl Strategies {
                 trial.workers.to_string(),
                 trial.cycle_ms.to_string(),
                 trial.speed_up.to_string(),
+                trial.machine.to_string(),
                 format!("{:.1} %", 100.0 * trial.serial_share),
                 format!("{:.1}", trial.contacts),
                 if trial.valid && trial.complete { "yes" } else { "NO" }.into(),
@@ -146,49 +185,60 @@ fn names() -> [&'static str; 3] {
 
 fn try_load(plan: &Plan, index: usize, load: &Load) -> Vec<Trial> {
     let cycles = load.cycles(plan.timed_robot_cycles);
-    let mut runs = contestants(plan, load);
-    runs.iter_mut().for_each(|(.., run)| run.advance(cycles));
-    let raced = race(&mut runs, plan.repeats, |(.., run)| {
-        Ok::<_, Infallible>(seconds(|| run.advance(cycles)).0)
+    let mut all = contestants(plan, load);
+    all.iter_mut().for_each(|contestant| contestant.run.advance(cycles));
+    let Ok(times_s) = race(&mut all, plan.repeats, |contestant| {
+        Ok::<_, Infallible>(contestant.seconds(cycles, plan.timed_robot_cycles))
     });
-    let Ok(times_s) = raced;
-    let finish = |((strategy, workers, run), own_s): (&(&str, usize, Run), &Vec<Option<f64>>)| {
-        let (contacts, serial_share, valid, complete) = judge(load, run);
-        Trial {
+    let times_of = |strategy: &str, workers: usize| {
+        let is = |c: &Contestant| (c.strategy, c.workers) == (strategy, workers);
+        all.iter().position(is).map_or(&[][..], |k| &times_s[k][..])
+    };
+    let trial = |(c, own_s): (&Contestant, &Vec<Option<f64>>)| {
+        let (contacts, serial_share, valid, complete) = judge(load, &c.run)?;
+        let reference = times_of(DOUBLE_POOL, 1).iter().zip(own_s);
+        let ratios: Vec<Option<f64>> = reference.map(|(a, b)| Some((*a)? / (*b)?)).collect();
+        Some(Trial {
             load: index,
-            strategy: (*strategy).into(),
-            workers: *workers,
+            strategy: c.strategy.into(),
+            workers: c.workers,
             cycle_ms: Estimate::of(own_s.iter().map(|t| t.map(|t| 1e3 * t / cycles as f64))),
-            speed_up: Estimate::ratio(&times_s[0], own_s),
+            speed_up: Estimate::of(ratios.iter().copied()),
+            ratios,
+            machine: Estimate::ratio(times_of(ARITHMETIC, 1), times_of(ARITHMETIC, c.workers)),
             contacts,
             serial_share,
             valid,
             complete,
-        }
+        })
     };
-    runs.iter().zip(&times_s).map(finish).collect()
+    all.iter().zip(&times_s).filter_map(trial).collect()
 }
 
-/// Every strategy with every number of workers; the double pool with one worker is the first.
-fn contestants(plan: &Plan, load: &Load) -> Vec<(&'static str, usize, Run)> {
-    let mut runs = Vec::new();
+/// Every strategy with every number of workers, and arithmetic.
+fn contestants(plan: &Plan, load: &Load) -> Vec<Contestant> {
+    let mut all = Vec::new();
     for workers in worker_counts(plan.most_workers) {
-        runs.push((DOUBLE_POOL, workers, Run::DoublePool(Box::new(load.simulation(workers)))));
-        runs.extend(Strategy::ALL.map(|strategy| {
+        let mut add = |strategy, run| all.push(Contestant { strategy, workers, run });
+        add(DOUBLE_POOL, Run::DoublePool(Box::new(load.simulation(workers))));
+        for strategy in Strategy::ALL {
             let run = Baseline::new(load.compiled(), strategy, workers);
-            (strategy.name(), workers, Run::Baseline(Box::new(run)))
-        }));
+            add(strategy.name(), Run::Baseline(Box::new(run)));
+        }
+        add(ARITHMETIC, Run::Arithmetic);
     }
-    runs
+    all
 }
 
 /// Contacts per 1000 actions, the serial share, and whether laws and counts were kept.
-fn judge(load: &Load, run: &Run) -> (f64, f64, bool, bool) {
+/// `None` for arithmetic.
+fn judge(load: &Load, run: &Run) -> Option<(f64, f64, bool, bool)> {
     let (metrics, snapshot, share) = match run {
         Run::DoublePool(run) => (run.robot_metrics(), run.snapshot(), 0.0),
         Run::Baseline(run) => (run.metrics(), run.snapshot(), run.serial_share()),
+        Run::Arithmetic => return None,
     };
     let valid = breach(&load.compiled().world, &snapshot).is_none();
     let complete = metrics.total.actions == u64::from(load.robots) * snapshot.cycle;
-    (1e3 * metrics.contacts_per_action, share, valid, complete)
+    Some((1e3 * metrics.contacts_per_action, share, valid, complete))
 }

@@ -1,7 +1,7 @@
 //! The paper's claims, each with our figures and a verdict that follows from them by rule.
 //!
-//! Numbers E-1 to E-15 are those of the study of the paper; a letter tells apart what one
-//! sentence claims at once.
+//! Numbers E-1 to E-15 (experiments) and P-3 (parallelization) are those of the study of the
+//! paper; a letter tells apart what one sentence claims at once.
 
 mod behaviour;
 mod setting;

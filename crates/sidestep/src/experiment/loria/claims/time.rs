@@ -1,9 +1,10 @@
-//! E-12 to E-15: time, and what takes it.
+//! E-12 to E-15 and P-3: time, and what takes it.
 
 use super::super::Report;
 use super::super::performance::{Performance, REFERENCE_CYCLES, Timing};
 use super::{Claim, Verdict};
 use crate::experiment::Estimate;
+use crate::worlds::robots::baseline::Strategy;
 
 /// Initialization is called small below this share.
 const SMALL_SHARE: f64 = 0.05;
@@ -21,6 +22,7 @@ pub(super) fn claims(report: &Report) -> Vec<Claim> {
         second_machine(),
         costly_decisions(p),
         conflicts(report),
+        rejected(report),
     ]
 }
 
@@ -182,6 +184,45 @@ fn conflicts(report: &Report) -> Claim {
         verdict: Verdict::by_sign(model.parameter("c_s").and_then(|p| p.interval_ns)),
         reason: "Held when the interval of c_s, fitted over runs of different crowding, lies \
                  above 0; not judged when it holds 0."
+            .into(),
+    }
+}
+
+/// The strategies that the paper rejects before any experiment.
+fn rejected(report: &Report) -> Claim {
+    let s = &report.strategies;
+    let leads = Strategy::ALL.map(|strategy| (strategy.name(), s.lead_over(strategy)));
+    let all = || leads.iter().flat_map(|(_, leads)| leads);
+    let shown = leads.iter().map(|(name, leads)| {
+        let ahead = leads.iter().filter(|lead| lead.is_above(0.0)).count();
+        let behind = leads.iter().filter(|lead| lead.is_below(0.0)).count();
+        let listed: Vec<String> = leads.iter().map(ToString::to_string).collect();
+        format!(
+            "over {name}: ahead at {ahead}, behind at {behind} of {} loads ({})",
+            leads.len(),
+            listed.join("; ")
+        )
+    });
+    let verdict = if all().all(|lead| lead.is_above(0.0)) {
+        Verdict::Held
+    } else if all().any(|lead| lead.is_below(0.0)) && !is_excused(&report.performance) {
+        Verdict::NotHeld
+    } else {
+        Verdict::Lost
+    };
+    Claim {
+        id: "P-3",
+        paper: "Spatial partition (unequal load, conflicts at borders) and a process per agent \
+                (conflicts made serial) are worse than merged conflicts in a double pool.",
+        ours: format!(
+            "Speed-up of the double pool with the most workers less that of the other, {}.",
+            shown.collect::<Vec<_>>().join("; ")
+        ),
+        verdict,
+        reason: "Held when the double pool is ahead of both at every load by its paired interval, \
+                 not held when behind at one; not judged otherwise, or where others were using \
+                 the machine. Only the double pool gives the same bits for every number of \
+                 workers."
             .into(),
     }
 }
