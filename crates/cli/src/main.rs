@@ -17,6 +17,7 @@ mod interrupt;
 mod picture;
 mod plan;
 mod progress;
+mod recorded;
 mod recording;
 mod report;
 mod worlds;

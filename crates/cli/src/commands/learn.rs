@@ -3,6 +3,7 @@
 use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
 use crate::files::replace;
+use crate::recorded::csv_table;
 use clap::{Args, Subcommand};
 use serde::Serialize;
 use sidestep::import::read_text;
@@ -29,6 +30,7 @@ Examples:
   sidestep learn sensor --mrclam logs/mrclam7
   sidestep learn sensor --mrclam logs/mrclam7 --edges 2,4 --classes very-near,near,far
   sidestep learn sensor --csv readings.csv --range 3.75 --profile mine.toml --name sonar
+  sidestep learn sensor --run runs/hall --edges 0.3,1.5 --classes near,medium,far
 
 CSV columns: true, reported (observations in one word; `nothing`), and true_distance_m,
 reported_distance_m, or true_class, reported_class.";
@@ -38,8 +40,10 @@ Examples:
   sidestep learn effector --mrclam logs/mrclam7 --box 0.25
   sidestep learn effector --carmen intel.log.gz --profile intel.toml --name pioneer
   sidestep learn effector --csv motions.csv --json
+  sidestep learn effector --run runs/hall       recorded with --set record.calibration=true
 
-CSV columns: action (forward, left, right, stay), ahead_boxes, left_boxes, turn_deg.";
+CSV columns: action (forward, left, right, stay), ahead_boxes, left_boxes, turn_deg.
+Moves that an obstacle cut are left out: log in an open place.";
 
 /// Learn the errors of a real robot's sensors and wheels from its logs.
 #[derive(Debug, Args)]
@@ -80,8 +84,8 @@ struct SensorArgs {
     #[arg(long, value_name = "M")]
     range: Option<f64>,
 
-    /// The sensor to learn, where the CSV file has several
-    #[arg(long, value_name = "SENSOR", requires = "csv")]
+    /// The sensor to learn, where the log has several
+    #[arg(long, value_name = "SENSOR", conflicts_with = "mrclam")]
     sensor: Option<String>,
 
     #[command(flatten)]
@@ -101,6 +105,10 @@ struct SensorLog {
     /// Readings whose truth is known
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
+
+    /// A run recorded with record.calibration = true
+    #[arg(long, value_name = "DIR")]
+    run: Option<PathBuf>,
 }
 
 /// The log to learn an effector from, and how.
@@ -135,6 +143,10 @@ struct EffectorLog {
     /// Displacements that were measured
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
+
+    /// A run recorded with record.calibration = true
+    #[arg(long, value_name = "DIR")]
+    run: Option<PathBuf>,
 }
 
 /// How counts become probabilities.
@@ -210,10 +222,12 @@ fn learn_sensor(args: &SensorArgs) -> Result<SensorModel, InputError> {
         range_m: args.range.unwrap_or(default.range_m),
         sensor: args.sensor.clone(),
     };
-    match (&args.log.mrclam, &args.log.csv) {
-        (Some(folder), _) => sensor::from_mrclam(folder, &options),
-        (None, Some(file)) => sensor::from_csv(file, &options),
-        (None, None) => Err(no_log()),
+    let log = &args.log;
+    match (&log.mrclam, &log.csv, &log.run) {
+        (Some(folder), ..) => sensor::from_mrclam(folder, &options),
+        (_, Some(file), _) => sensor::from_csv(file, &options),
+        (_, _, Some(folder)) => sensor::learn_csv(&csv_table(folder, "readings")?, &options),
+        (None, None, None) => Err(no_log()),
     }
 }
 
@@ -222,13 +236,13 @@ fn learn_effector(args: &EffectorArgs, console: Console) -> Result<EffectorModel
     if args.box_size_m.is_some() && args.log.mrclam.is_none() {
         console.warn("--box changes nothing here: this log tells moves in units of the command");
     }
-    match (&args.log.mrclam, &args.log.carmen, &args.log.csv) {
-        (Some(folder), ..) => {
-            effector::from_mrclam(folder, args.box_size_m.unwrap_or(0.25), &options)
-        }
-        (None, Some(file), _) => effector::from_carmen(file, &options),
-        (None, None, Some(file)) => effector::from_csv(file, &options),
-        (None, None, None) => Err(no_log()),
+    let (log, box_size_m) = (&args.log, args.box_size_m.unwrap_or(0.25));
+    match (&log.mrclam, &log.carmen, &log.csv, &log.run) {
+        (Some(folder), ..) => effector::from_mrclam(folder, box_size_m, &options),
+        (_, Some(file), ..) => effector::from_carmen(file, &options),
+        (_, _, Some(file), _) => effector::from_csv(file, &options),
+        (.., Some(folder)) => effector::learn_csv(&csv_table(folder, "motions")?, &options),
+        (None, None, None, None) => Err(no_log()),
     }
 }
 

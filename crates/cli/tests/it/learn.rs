@@ -121,3 +121,41 @@ fn a_wrong_log_or_profile_writes_nothing() {
     assert_eq!(place.names(), ["bad.csv", "no.toml", "readings.csv", "s.toml"]);
     assert_eq!(place.read("no.toml"), "seed = 1\n");
 }
+
+/// A hall in which robots rarely meet a wall, so that few moves are cut.
+fn hall() -> String {
+    let row = format!("{}\n", ".".repeat(80));
+    format!(
+        "format = 1\nworld = \"robots\"\ncycles = 6000\n[map]\nascii = \"\"\"\n{}\"\"\"\n\
+         [robots]\ncount = 3\nsensors = [\"sonar-8\"]\neffector = \"nomad\"\n\
+         [record]\ncalibration = true\n",
+        row.repeat(80)
+    )
+}
+
+#[test]
+fn what_a_calibrated_run_records_gives_its_tables_back() {
+    let place = Place::new();
+    place.write("hall.toml", hall());
+    place.json(&["run", "hall.toml", "--out", "r"]);
+    let wheels = place.json(&["learn", "effector", "--run", "r"]);
+    close(&wheels["transitions"]["ahead"], &0.88.into(), 0.015);
+    let edges = ["--edges", "0.3,1.5", "--classes", "near,medium,far"];
+    let eye = place.json(&[&["learn", "sensor", "--run", "r"], &edges[..]].concat());
+    let nothing = &eye["confusion"]["nothing"];
+    let reported = nothing.as_object().expect("counts").values().filter_map(Value::as_f64);
+    close(
+        &(nothing["nothing"].as_f64().expect("a count") / reported.sum::<f64>()).into(),
+        &0.97.into(),
+        0.01,
+    );
+}
+
+#[test]
+fn a_run_without_calibration_says_how_to_record_it() {
+    let place = Place::new();
+    place.json(&["run", "s.toml", "--cycles", "50", "--out", "plain"]);
+    let refused = place.run(&["learn", "effector", "--run", "plain"]);
+    assert_eq!(refused.code(), 2);
+    assert!(refused.err().contains("record.calibration=true"), "{}", refused.err());
+}

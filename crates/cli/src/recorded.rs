@@ -1,0 +1,47 @@
+//! Tables of a recorded run as CSV, the form in which logs are learned from.
+
+use sidestep::import::table::CsvTable;
+use sidestep::kernel::InputError;
+use sidestep::kernel::ports::{ColumnSpec, Values};
+use sidestep_record::{Table, read_table};
+use std::fmt::Write;
+use std::path::Path;
+
+/// The table `name` of the run in `folder`, which has it with `record.calibration = true`.
+///
+/// # Errors
+/// When the run has no such table, or it is damaged.
+pub(crate) fn csv_table(folder: &Path, name: &str) -> Result<CsvTable, InputError> {
+    let table = read_table(folder, name, ..).map_err(|e| {
+        let remedy = "record the run with --set record.calibration=true";
+        if folder.join(name).exists() { e } else { InputError::new(e.place(), e.cause(), remedy) }
+    })?;
+    CsvTable::parse(&folder.join(name).display(), &as_csv(&table))
+}
+
+/// A heading, then one line per row; a beam or an action per line.
+fn as_csv(table: &Table) -> String {
+    let columns = &table.schema.columns;
+    let names: Vec<&str> = columns.iter().map(|c| c.name.as_str()).collect();
+    let mut text = names.join(",") + "\n";
+    for row in 0..table.rows() {
+        for (k, (column, values)) in columns.iter().zip(&table.columns).enumerate() {
+            let separator = if k == 0 { "" } else { "," };
+            // Writing to a string cannot fail.
+            let _ = write!(text, "{separator}");
+            write_field(&mut text, column, values, row);
+        }
+        text.push('\n');
+    }
+    text
+}
+
+fn write_field(text: &mut String, column: &ColumnSpec, values: &Values, row: usize) {
+    let _ = match values {
+        Values::U32(v) => write!(text, "{}", v[row]),
+        Values::U64(v) => write!(text, "{}", v[row]),
+        Values::I32(v) => write!(text, "{}", v[row]),
+        Values::F64(v) => write!(text, "{}", v[row]),
+        Values::Label(v) => write!(text, "{}", column.labels[v[row] as usize]),
+    };
+}
