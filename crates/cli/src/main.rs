@@ -12,6 +12,7 @@ mod commands;
 mod console;
 mod driver;
 mod exit;
+mod files;
 mod interrupt;
 mod picture;
 mod plan;

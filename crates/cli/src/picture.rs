@@ -1,9 +1,11 @@
 //! Pictures as files.
 
 use crate::exit::Failure;
+use crate::files::replace;
 use crate::worlds::{Pictured, Run};
 use sidestep_draw::to_png;
 use sidestep_record::RunFolder;
+use std::io::Write;
 use std::path::Path;
 
 /// Longer side of a PNG.
@@ -40,5 +42,5 @@ pub(crate) fn write_png(path: &Path, svg: &str) -> Result<(), Failure> {
 }
 
 fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    std::fs::write(path, bytes).map_err(|e| Failure::write(path, &e))
+    replace(path, |file| file.write_all(bytes))
 }

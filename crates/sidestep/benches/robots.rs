@@ -1,12 +1,17 @@
 //! Speed of the robots world: robot-cycles per CPU second, speed-up, and their like.
 //!
-//! `cargo bench -p sidestep --bench robots [-- CASE]`; every figure is a ratio or a rate taken
+//! `cargo bench -p sidestep --bench robots [-- PART ...]` with the parts `rates`, `teams`,
+//! `corridor`, `loop` and `recording`; every figure is a ratio or a rate taken
 //! in one run, since the machine may be noisy. Sensors and effectors are both unreliable.
 
 use cpu_time::ProcessTime;
 use sidestep::scenario::Source;
 use sidestep::worlds::robots::simulation::RobotsSimulation;
-use sidestep_kernel::Simulation;
+use sidestep_kernel::conflict::Groups;
+use sidestep_kernel::ports::Recorder;
+use sidestep_kernel::world::Turn;
+use sidestep_kernel::{Simulation, World};
+use sidestep_record::{Origin, ParquetRecorder};
 use std::time::Instant;
 
 /// One case: bodies in a walled hall of which they cover 5 %.
@@ -84,50 +89,187 @@ beyond = [0.1, 0.3, 0.6]
 /// CPU and wall seconds of `cycles` cycles.
 fn time(simulation: &mut RobotsSimulation, cycles: u64) -> (f64, f64) {
     let (cpu, wall) = (ProcessTime::now(), Instant::now());
-    simulation.advance(cycles);
+    advance(simulation, cycles);
     (cpu.elapsed().as_secs_f64(), wall.elapsed().as_secs_f64())
+}
+
+/// Advances over recording buffers too.
+fn advance(simulation: &mut RobotsSimulation, cycles: u64) {
+    let mut done = 0;
+    while done < cycles {
+        done += simulation.advance(cycles - done);
+    }
 }
 
 /// Best rate of several repeats: what the machine gives when nobody disturbs it.
 fn rate(case: &Case) -> f64 {
     let mut simulation = case.simulation(1);
     time(&mut simulation, case.cycles() / 4);
-    let best = (0..5).map(|_| time(&mut simulation, case.cycles()).0).fold(f64::INFINITY, f64::min);
+    let best = (0..7).map(|_| time(&mut simulation, case.cycles()).0).fold(f64::INFINITY, f64::min);
     case.cycles() as f64 * f64::from(case.robots) / best
 }
 
-/// Median of wall(1 worker) / wall(`workers`), taken in turn.
-fn speed_up(case: &Case, workers: usize) -> f64 {
-    let (mut alone, mut team) = (case.simulation(1), case.simulation(workers));
-    (time(&mut alone, case.cycles() / 4), time(&mut team, case.cycles() / 4));
-    let mut ratios: Vec<f64> = (0..7)
-        .map(|_| time(&mut alone, case.cycles()).1 / time(&mut team, case.cycles()).1)
-        .collect();
+/// Median of `n` ratios, each taken in one go.
+fn median_of(n: usize, ratio: impl FnMut() -> f64) -> f64 {
+    let mut ratios: Vec<f64> = std::iter::repeat_with(ratio).take(n).collect();
     ratios.sort_by(f64::total_cmp);
-    ratios[ratios.len() / 2]
+    ratios[n / 2]
 }
 
-fn main() {
-    let filter: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
-    println!(
-        "{:<18} {:>12} {:>10} {:>10} {:>8} {:>8}",
-        "case", "M rc/cpu-s", "promised", "2 workers", "B/robot", "B/box"
-    );
+/// Median of wall(1 worker) / wall(`workers`), taken in turn.
+fn speed_up(source: &Source, workers: usize, cycles: u64) -> f64 {
+    let mut alone = RobotsSimulation::new(source, 1).expect("a valid scenario");
+    let mut team = RobotsSimulation::new(source, workers).expect("a valid scenario");
+    for simulation in [&mut alone, &mut team] {
+        time(simulation, cycles / 4);
+    }
+    median_of(9, || time(&mut alone, cycles).1 / time(&mut team, cycles).1)
+}
+
+fn rates() {
+    println!("robot-cycles per CPU second, one worker, both unreliable (promised in brackets)");
     for case in CASES {
-        if !filter.is_empty() && !filter.iter().any(|f| case.name.contains(f.as_str())) {
-            continue;
-        }
         let simulation = case.simulation(1);
         let (boxes, bodies) = simulation.heap_bytes();
-        let map_boxes = simulation.world().map.cells().len();
+        let map_boxes = simulation.world().map.cells().len() as f64;
+        let robots = f64::from(case.robots);
+        let allowed = 200.0 * robots + 2.0 * map_boxes;
         println!(
-            "{:<18} {:>12.2} {:>10.1} {:>9.2}x {:>8.0} {:>8.2}",
+            "  {:<16} {:>6.2} M  [{:>4.1} M]   {:>4.0} B per robot + {:.2} B per box = {:.0} % of the memory allowed",
             case.name,
             rate(&case) / 1e6,
             case.promised / 1e6,
-            speed_up(&case, 2),
-            bodies as f64 / f64::from(case.robots),
-            boxes as f64 / map_boxes as f64,
+            bodies as f64 / robots,
+            boxes as f64 / map_boxes,
+            100.0 * (boxes + bodies) as f64 / allowed,
         );
+    }
+}
+
+fn teams() {
+    let most = sidestep_kernel::workers::available().min(16);
+    println!("speed-up over one worker, wall time (median of 9 pairs)");
+    for case in CASES {
+        print!("  {:<16}", case.name);
+        for workers in (0..).map(|k| 1usize << k).skip(1).take_while(|w| *w <= most) {
+            let s = speed_up(&case.scenario(), workers, case.cycles());
+            print!("  {workers} workers {s:.2}x (efficiency {:.2})", s / workers as f64);
+        }
+        println!();
+    }
+}
+
+/// All robots in one corridor: large groups, the worst case of merging.
+fn corridor() {
+    let row = |c: &str| format!("{}\n", c.repeat(240));
+    let art = format!("{}{}", row("."), row(".").repeat(5));
+    for policy in ["random", "rounds"] {
+        let text = format!(
+            "format = 1\nworld = \"robots\"\nconflict_policy = \"{policy}\"\n[map]\nascii = \"\"\"\n{art}\"\"\"\n\
+             [robots]\ncount = 1000\nsensors = [\"sonar-8\"]\neffector = \"nomad\"\n"
+        );
+        let source = Source::new("corridor", text, "");
+        let ratio = speed_up(&source, 2, 2_000);
+        let mut run = RobotsSimulation::new(&source, 1).expect("a valid scenario");
+        advance(&mut run, 200);
+        let largest = run.robot_metrics().largest_group;
+        println!(
+            "corridor, 1000 robots on 1440 boxes, {policy}: 2 workers {ratio:.2}x, largest group {largest}"
+        );
+    }
+}
+
+/// The engine with one worker against a plain loop over the phases.
+fn plain_loop() {
+    for case in &CASES[..2] {
+        let source = case.scenario();
+        let mut engine = case.simulation(1);
+        let plain = case.simulation(1);
+        let (world, state) = (plain.world().clone(), plain.state());
+        let (mut scratch, groups) = (world.scratch(), Groups::new(world.bodies.len()));
+        let n = world.bodies.len();
+        let mut now = 0;
+        let mut members = Vec::new();
+        let mut plain_cycle = || {
+            let turn = Turn { now, alone: true };
+            (0..n as u32).for_each(|slot| groups.reset(slot));
+            world.perceive_and_decide(state, turn, 0..n, &mut scratch);
+            world.find_conflicts(state, now, 0..n, &groups, &mut scratch);
+            for slot in (0..n as u32).filter(|&s| groups.is_leader(s)) {
+                groups.members(slot, &mut members);
+                world.react(state, now, &mut members, &mut scratch);
+            }
+            now += 1;
+        };
+        let cycles = case.cycles() / 4;
+        let ratio = median_of(15, || {
+            let engine_s = time(&mut engine, cycles).0;
+            let started = ProcessTime::now();
+            (0..cycles).for_each(|_| plain_cycle());
+            engine_s / started.elapsed().as_secs_f64()
+        });
+        println!("{}: --workers 1 takes {ratio:.3} of a plain loop's CPU time", source.place);
+    }
+}
+
+/// CPU time with and without recording every pose to Parquet, and bytes on disk.
+fn recording() {
+    let case = &CASES[1];
+    let folder = std::env::temp_dir().join(format!("sidestep-bench-{}", std::process::id()));
+    let origin = Origin { program_version: "bench".into(), scenario: String::new(), seed: 1 };
+    let mut plain = case.simulation(1);
+    let cycles = 4096;
+    let mut bytes = 0.0;
+    let ratio = median_of(7, || {
+        let plain_s = time(&mut plain, cycles).0;
+        let mut recorded = case.simulation(1);
+        recorded.begin_recording();
+        std::fs::create_dir_all(&folder).expect("a temporary folder");
+        let mut recorder =
+            ParquetRecorder::create(&folder, &recorded.schemas(), &origin).expect("a recorder");
+        let started = ProcessTime::now();
+        while recorded.cycle() < cycles {
+            recorded.advance(cycles - recorded.cycle());
+            recorded.record(&mut recorder).expect("there is room");
+        }
+        recorder.finish().expect("there is room");
+        let recorded_s = started.elapsed().as_secs_f64();
+        bytes = size_of_folder(&folder) as f64 / (cycles as f64 * f64::from(case.robots));
+        std::fs::remove_dir_all(&folder).expect("our own folder");
+        recorded_s / plain_s
+    });
+    println!(
+        "{}: recording takes {:.1} % more CPU time and {bytes:.2} bytes per robot-cycle",
+        case.name,
+        100.0 * (ratio - 1.0)
+    );
+}
+
+fn size_of_folder(folder: &std::path::Path) -> u64 {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    entries
+        .map(|e| {
+            if e.path().is_dir() {
+                size_of_folder(&e.path())
+            } else {
+                e.metadata().map_or(0, |m| m.len())
+            }
+        })
+        .sum()
+}
+
+fn main() {
+    let asked: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
+    let parts: [(&str, fn()); 5] = [
+        ("rates", rates),
+        ("teams", teams),
+        ("corridor", corridor),
+        ("loop", plain_loop),
+        ("recording", recording),
+    ];
+    for (name, part) in parts {
+        if asked.is_empty() || asked.iter().any(|a| a == name) {
+            part();
+        }
     }
 }

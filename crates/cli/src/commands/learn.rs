@@ -2,6 +2,7 @@
 
 use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
+use crate::files::replace;
 use clap::{Args, Subcommand};
 use serde::Serialize;
 use sidestep::import::read_text;
@@ -11,7 +12,8 @@ use sidestep::learn::effector::{self, EffectorModel};
 use sidestep::learn::profile;
 use sidestep::learn::sensor::{self, SensorModel, SensorOptions};
 use std::fmt::Display;
-use std::path::{Path, PathBuf};
+use std::io::Write;
+use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -249,13 +251,6 @@ impl TargetArgs {
             false => profile::empty(&path.file_stem().unwrap_or_default().to_string_lossy()),
         };
         let text = section(&path.display().to_string(), &text, &self.name)?;
-        replace(path, &text).map_err(|e| Failure::write(path, &e))
+        replace(path, |file| file.write_all(text.as_bytes()))
     }
-}
-
-fn replace(path: &Path, text: &str) -> std::io::Result<()> {
-    let growing = path.with_extension(format!("toml.{}", std::process::id()));
-    std::fs::write(&growing, text)
-        .and_then(|()| std::fs::rename(&growing, path))
-        .inspect_err(|_| drop(std::fs::remove_file(&growing)))
 }

@@ -1,6 +1,7 @@
 //! One file per command.
 
 mod check;
+mod exact;
 mod finish;
 mod learn;
 mod map;
@@ -26,6 +27,8 @@ pub(crate) enum Command {
     Map(map::MapArgs),
     /// Learn the errors of a real robot's sensors and wheels from its logs
     Learn(learn::LearnArgs),
+    /// Compute the exact Markov chain of a scenario with one robot
+    Exact(exact::ExactArgs),
     /// Continue a recorded run that was stopped or killed
     Resume(resume::ResumeArgs),
     /// Recompute a recorded run up to a cycle and show where everybody is
@@ -43,6 +46,7 @@ pub(crate) fn execute(command: Command, console: &Console) -> Result<ExitCode, F
         Command::New(args) => new::new(&args, *console),
         Command::Map(args) => map::map(&args, *console),
         Command::Learn(args) => learn::learn(&args, *console),
+        Command::Exact(args) => exact::exact(&args, *console),
         Command::Resume(args) => resume::resume(&args, *console),
         Command::Replay(args) => replay::replay(&args, *console),
     }

@@ -129,6 +129,13 @@ impl Compiled {
         }
     }
 
+    /// The scenario itself, for commands that are about the robots world alone.
+    pub(crate) fn into_robots(self) -> sidestep::worlds::robots::scenario::Compiled {
+        match self {
+            Self::Robots(scenario) => scenario.into_compiled(),
+        }
+    }
+
     /// A run at its start. `source` names the run in checkpoints.
     pub(crate) fn start(self, source: &Source, workers: usize) -> Box<dyn Run> {
         match self {

@@ -4,6 +4,7 @@ mod commands;
 mod contract;
 mod determinism;
 mod disk;
+mod exact;
 mod help;
 mod input;
 mod learn;

@@ -39,6 +39,11 @@ impl Scenario {
         Ok(Self { compiled, file: source.parse()? })
     }
 
+    /// The scenario itself.
+    pub(super) fn into_compiled(self) -> Compiled {
+        self.compiled
+    }
+
     /// See [`super::Compiled::resolve`].
     pub(super) fn resolve(&self, source: &Source) -> Result<Resolved, InputError> {
         resolve::resolve(source, &self.compiled, &self.file)
@@ -149,7 +154,7 @@ fn outcome(metrics: &Metrics) -> Lines {
     let mut lines = vec![
         line("contacts", contacts(metrics)),
         line("trips", trips(total.trips, total.trip_cycles_mean)),
-        line("distance", format!("{:.1} km", total.distance_m / 1000.0)),
+        line("distance", distance(total.distance_m)),
         line("coverage", format!("{:.1} % of the free boxes", 100.0 * metrics.coverage)),
     ];
     // A continued run at its end has seen no group in this process.
@@ -161,6 +166,13 @@ fn outcome(metrics: &Metrics) -> Lines {
 
 fn line(name: &str, value: String) -> (String, String) {
     (name.into(), value)
+}
+
+fn distance(meters: f64) -> String {
+    match meters < 1000.0 {
+        true => format!("{meters:.1} m"),
+        false => format!("{:.1} km", meters / 1000.0),
+    }
 }
 
 fn contacts(metrics: &Metrics) -> String {

@@ -15,7 +15,7 @@ pub use replay::{External, ORDER, Replay};
 pub use wander::Wander;
 
 use super::effector::{ActionId, Side};
-use super::sensor::Reading;
+use super::sensor::{NOTHING, Reading};
 use sidestep_kernel::Cycle;
 use sidestep_kernel::stream::Draws;
 
@@ -62,7 +62,7 @@ impl Sector {
     /// the sides.
     pub fn of(bearing_deg: f64) -> Self {
         let turned = bearing_deg.rem_euclid(360.0);
-        if turned < 45.0 || turned > 315.0 {
+        if !(45.0..=315.0).contains(&turned) {
             Self::Ahead
         } else if turned <= 135.0 {
             Self::Left
@@ -97,6 +97,17 @@ pub struct Percept<'a> {
     pub heading: u8,
     /// What the robots in radio range last broadcast, by sender.
     pub heard: &'a [Heard],
+}
+
+/// The nearest class reported in each sector, for percepts that are made by hand.
+pub fn nearest_in(readings: &[Reading], sectors: &[Sector]) -> [u8; 4] {
+    let mut nearest = [UNSEEN; 4];
+    for (reading, &sector) in readings.iter().zip(sectors) {
+        if reading.observation != NOTHING {
+            nearest[sector as usize] = nearest[sector as usize].min(reading.class);
+        }
+    }
+    nearest
 }
 
 impl Percept<'_> {

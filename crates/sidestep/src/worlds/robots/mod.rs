@@ -10,6 +10,7 @@
 //! ```
 
 mod audit;
+pub mod baseline;
 pub mod decide;
 pub mod effector;
 pub mod exact;
@@ -152,8 +153,7 @@ impl World for RobotsWorld {
     #[inline]
     fn react(&self, state: &RobotsState, now: Cycle, group: &mut [Slot], scratch: &mut Scratch) {
         if let [alone] = *group {
-            let id = state.bodies[alone as usize].id;
-            return self.act(state, now, alone, self.act_words(id, now)[0], scratch);
+            return self.act_drawn(state, now, alone, scratch);
         }
         self.order(state, now, group, scratch);
         let order = std::mem::take(&mut scratch.order);

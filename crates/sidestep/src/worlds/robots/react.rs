@@ -18,6 +18,19 @@ pub(super) struct Verdict {
 }
 
 impl RobotsWorld {
+    /// One body acts with the draw of its own stream.
+    #[inline]
+    pub(super) fn act_drawn(
+        &self,
+        state: &RobotsState,
+        now: Cycle,
+        slot: Slot,
+        scratch: &mut Scratch,
+    ) {
+        let [word, _] = self.act_words(state.bodies[slot as usize].id, now);
+        self.act(state, now, slot, word, scratch);
+    }
+
     /// One body acts on the state as left by those before it; `word` is its draw.
     #[inline]
     pub(super) fn act(

@@ -1,0 +1,178 @@
+//! `sidestep exact`: the Markov chain of one robot, computed instead of simulated.
+
+use crate::console::{Console, aligned, grouped};
+use crate::exit::{ExitCode, Failure};
+use crate::files::replace;
+use crate::plan::ScenarioArgs;
+use clap::Args;
+use sidestep::kernel::InputError;
+use sidestep::worlds::robots::exact::{
+    Beam, Comparison, Model, POLICIES, PomdpOptions, PomdpSize, Summary, compare, policy,
+};
+use std::io::Write;
+use std::path::PathBuf;
+
+const EXAMPLES: &str = "\
+Examples:
+  sidestep exact scenarios/robots/one-robot.toml
+  sidestep exact office.toml --set robots.count=1 --policy bounce --json
+  sidestep exact one-robot.toml --runs 2000 --cycles 50     hold the simulator against it
+  sidestep exact one-robot.toml --pomdp model.pomdp --goal 5,3 --beam sonar-8:0
+
+The scenario has one robot; doors stay closed, and nobody else moves. The policy replaces the
+robot's behaviour: `uniform` takes each standard action alike, `forward` goes ahead, `bounce`
+goes ahead and turns after a contact. A simulator that disagrees ends with exit code 1.";
+
+/// Compute the exact Markov chain of a scenario with one robot.
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct ExactArgs {
+    #[command(flatten)]
+    scenario: ScenarioArgs,
+
+    /// How the robot chooses its actions
+    #[arg(long, value_name = "P", value_parser = POLICIES, default_value = "uniform")]
+    policy: String,
+
+    /// Name this many of the boxes where the robot is most often
+    #[arg(long, value_name = "N", default_value_t = 10)]
+    top: usize,
+
+    /// Compare with this many simulated runs of as many cycles as the scenario or --cycles says
+    #[arg(long, value_name = "R")]
+    runs: Option<u32>,
+
+    #[command(flatten)]
+    export: ExportArgs,
+}
+
+/// What is exported for planners.
+#[derive(Debug, Args)]
+struct ExportArgs {
+    /// Write the model with its observations in Cassandra's POMDP format
+    #[arg(long, value_name = "OUT.pomdp")]
+    pomdp: Option<PathBuf>,
+
+    /// Column and row that the planner is to reach, of the robot's lower-left box
+    #[arg(long, value_name = "COL,ROW", value_parser = parse_goal, requires = "pomdp")]
+    goal: Option<(u32, u32)>,
+
+    /// Discount per action
+    #[arg(long, value_name = "D", requires = "pomdp")]
+    #[arg(default_value_t = PomdpOptions::default().discount)]
+    discount: f64,
+
+    /// A beam that is observed, counted from 0; may be given often [default: the one ahead]
+    #[arg(long, value_name = "SENSOR:N", value_parser = parse_beam, requires = "pomdp")]
+    beam: Vec<Beam>,
+
+    /// Leave contacts out of what is observed, which makes the model smaller
+    #[arg(long, requires = "pomdp")]
+    no_contacts: bool,
+}
+
+fn parse_goal(text: &str) -> Result<(u32, u32), String> {
+    let parsed = text
+        .split_once(',')
+        .and_then(|(col, row)| Some((col.trim().parse().ok()?, row.trim().parse().ok()?)));
+    parsed.ok_or_else(|| "write column and row, e.g. 5,3".into())
+}
+
+fn parse_beam(text: &str) -> Result<Beam, String> {
+    let parsed = text.rsplit_once(':').and_then(|(sensor, index)| {
+        Some(Beam { sensor: sensor.into(), index: index.parse().ok()? })
+    });
+    parsed.ok_or_else(|| "write a sensor and the number of a beam, e.g. sonar-8:0".into())
+}
+
+impl ExportArgs {
+    fn options(&self) -> PomdpOptions {
+        PomdpOptions {
+            discount: self.discount,
+            goal: self.goal,
+            contacts: !self.no_contacts,
+            beams: (!self.beam.is_empty()).then(|| self.beam.clone()),
+        }
+    }
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// When the scenario is wrong or no chain, or the export cannot be written.
+pub(crate) fn exact(args: &ExactArgs, console: Console) -> Result<ExitCode, Failure> {
+    let (source, compiled) = args.scenario.compile()?;
+    let compiled = compiled.into_robots();
+    let model = Model::new(&compiled)?;
+    let chosen = policy(&args.policy)?;
+    let mut summary = model.summary(&args.policy, &chosen, args.top)?;
+    if let Some(runs) = args.runs {
+        let cycles = compiled.cycles;
+        summary.comparison = Some(compare(&compiled, &source, &chosen, cycles, runs)?);
+    }
+    summary.pomdp = export(&model, &args.export)?;
+    console.result(&summary, || text(&summary, &compiled.name));
+    Ok(match summary.comparison {
+        Some(Comparison { agrees: false, .. }) => ExitCode::Failed,
+        _ => ExitCode::Done,
+    })
+}
+
+fn export(model: &Model, args: &ExportArgs) -> Result<Option<PomdpSize>, Failure> {
+    let Some(path) = &args.pomdp else { return Ok(None) };
+    let pomdp = model.pomdp(&args.options()).map_err(named_as_typed)?;
+    replace(path, |file| write!(file, "{pomdp}"))?;
+    Ok(Some(pomdp.size()))
+}
+
+/// The library names a beam's sensor by an option that is part of --beam here.
+fn named_as_typed(error: InputError) -> InputError {
+    match error.place() {
+        "--sensor" => InputError::new("--beam", error.cause(), error.remedy()),
+        _ => error,
+    }
+}
+
+fn text(summary: &Summary, name: &str) -> String {
+    let mut lines = vec![
+        line("poses", grouped(summary.poses as u64)),
+        line("actions", summary.actions.join(", ")),
+        line("outcomes", grouped(summary.outcomes as u64)),
+        line("policy", summary.policy.clone()),
+        line("chain", format!("{} states", grouped(summary.chain_states as u64))),
+        line("most visited", visited(summary)),
+    ];
+    lines.extend(summary.pomdp.map(|size| line("POMDP", pomdp_words(size))));
+    lines.extend(summary.comparison.map(|c| line("simulator", comparison_words(&c))));
+    format!("Exact chain of {name}\n{}", aligned(&lines))
+}
+
+fn line(name: &str, value: String) -> (String, String) {
+    (name.into(), value)
+}
+
+fn visited(summary: &Summary) -> String {
+    let boxes = summary.most_visited.iter();
+    let words = boxes.map(|b| format!("[{}, {}] {:.2} %", b.col, b.row, 100.0 * b.share));
+    words.collect::<Vec<_>>().join(", ")
+}
+
+fn pomdp_words(size: PomdpSize) -> String {
+    format!(
+        "{} states, {} actions, {} observations",
+        grouped(size.states as u64),
+        size.actions,
+        grouped(size.observations as u64)
+    )
+}
+
+fn comparison_words(c: &Comparison) -> String {
+    let verdict = if c.agrees { "agrees" } else { "DISAGREES" };
+    format!(
+        "{verdict}: total variation {:.4}, limit {:.4}, over {} runs of {} cycles",
+        c.total_variation,
+        c.limit,
+        grouped(c.runs.into()),
+        grouped(c.cycles)
+    )
+}

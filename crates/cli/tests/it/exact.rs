@@ -1,0 +1,47 @@
+//! `exact`: the chain of one robot, the simulator against it, and the planners' file.
+
+use crate::support::Place;
+
+const ONE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenarios/robots/one-robot.toml");
+
+#[test]
+fn the_chain_is_told_and_the_simulator_agrees_with_it() {
+    let exact = Place::new().json(&["exact", ONE, "--runs", "1000", "--policy", "bounce"]);
+    assert!(exact["poses"].as_u64() > Some(100));
+    assert_eq!(exact["comparison"]["agrees"], true);
+    assert_eq!(exact["comparison"]["cycles"], 50);
+    assert_eq!(exact["most_visited"].as_array().map(Vec::len), Some(10));
+}
+
+#[test]
+fn a_pomdp_is_exported_whole() {
+    let place = Place::new();
+    let args = ["exact", ONE, "--pomdp", "m.pomdp", "--goal", "14,6", "--beam", "sonar-8:0"];
+    let exact = place.json(&args);
+    let text = place.read("m.pomdp");
+    assert!(text.contains("\ndiscount: 0.95\n") && text.contains("\nT: forward : "));
+    let states = text.lines().find(|l| l.starts_with("states:")).expect("states");
+    let count = states.split_whitespace().count() - 1;
+    assert_eq!(exact["pomdp"]["states"], count);
+    assert_eq!(place.names(), ["m.pomdp", "s.toml"]);
+}
+
+#[test]
+fn what_is_no_chain_is_refused_and_nothing_is_written() {
+    let place = Place::new();
+    for (args, reason) in [
+        (vec!["exact", "s.toml"], "opens"),
+        (vec!["exact", ONE, "--set", "robots.count=2"], "count"),
+        (vec!["exact", ONE, "--pomdp", "m.pomdp", "--goal", "0,0"], "--goal"),
+        (vec!["exact", ONE, "--pomdp", "m.pomdp", "--goal", "x"], "column and row"),
+        (vec!["exact", ONE, "--pomdp", "m.pomdp", "--beam", "sonar-9:0"], "--beam"),
+        (vec!["exact", ONE, "--pomdp", "m.pomdp", "--discount", "2"], "--discount"),
+        (vec!["exact", ONE, "--policy", "dance"], "uniform"),
+        (vec!["exact", ONE, "--runs", "0"], "--runs"),
+    ] {
+        let ended = place.run(&args);
+        assert_eq!((ended.code(), ended.out().as_str()), (2, ""), "{}", ended.err());
+        assert!(ended.err().contains(reason), "{}", ended.err());
+    }
+    assert_eq!(place.names(), ["s.toml"]);
+}

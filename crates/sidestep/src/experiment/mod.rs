@@ -1,0 +1,20 @@
+//! Experiments: many runs under controlled differences, told apart with intervals.
+//!
+//! ```text
+//! farm.rs            runs over workers, results by index
+//! estimate.rs        a mean with its 95 % interval and the number of runs behind it
+//! least_squares.rs   linear models fitted to measurements
+//! figure.rs          what to draw and what to print, as plain data
+//! loria/             the experiments of the robots world's source paper
+//! ```
+//!
+//! Nothing here draws a figure or writes a file: results are data, and Markdown text.
+
+pub mod estimate;
+pub mod farm;
+pub mod figure;
+pub mod least_squares;
+pub mod loria;
+
+pub use estimate::Estimate;
+pub use figure::{Figure, FigureKind, Series, Table};
