@@ -27,6 +27,8 @@ left = [{ p = 0.7, turn = 90 }, { p = 0.2, path = "L", turn = 90 }, { p = 0.1, p
 forward = [{ p = 0.5, path = "FL" }, { p = 0.3, path = "LF" }, { p = 0.2, path = "F" }]
 [effectors.slipping]
 forward = [{ p = 0.5, path = "FF" }, { p = 0.5, path = "FL" }]
+[effectors.sidling]
+forward = [{ p = 0.4, path = "L" }, { p = 0.6, path = "F" }]
 [effectors.rocking]
 forward = [{ p = 0.6, path = "FB" }, { p = 0.4, path = "F" }]
 "#;
@@ -180,9 +182,12 @@ fn in_a_dead_end_every_drift_and_slip_is_a_contact() {
 
 #[test]
 fn with_nothing_left_the_first_transition_is_the_contact() {
-    let rows = [wall(0, 0, Front, 1.0)];
-    check_laws("### #^# ###", 1, "slipping", "forward", [&rows; 3]);
-    check_laws("### #^# ###", 1, "perfect", "forward", [&rows; 3]);
+    let certain = [wall(0, 0, Front, 1.0)];
+    check_laws("### #^# ###", 1, "slipping", "forward", [&certain; 3]);
+    check_laws("### #^# ###", 1, "perfect", "forward", [&certain; 3]);
+    let both = [wall(0, 0, Left, 0.4), wall(0, 0, Front, 0.6)];
+    let first = [wall(0, 0, Left, 1.0)];
+    check_laws("### #^# ###", 1, "sidling", "forward", [&both, &both, &first]);
 }
 
 #[test]
