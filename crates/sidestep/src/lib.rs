@@ -56,6 +56,7 @@
 //! kernel          the cycle, workers, random streams, digests, checkpoints, recorder port
 //!
 //! learn           logs of a real robot -> error tables that a scenario loads
+//! experiment      many runs, estimates with intervals, and the papers' experiments
 //! statistics      intervals and tests
 //! ```
 //!
