@@ -8,8 +8,7 @@
 //!
 //! The source paper merges tasks while they are inserted into pool two and so needs two
 //! barriers, but a lock or an atomic exchange per claimed box. Here claims are plain stores
-//! and joining is a pass of its own; the third barrier costs far less (measured in
-//! `benches/`), and what one worker pays for parallelism is next to nothing.
+//! and joining is a pass of its own, for the price of one more barrier a cycle.
 
 use crate::conflict::Groups;
 use crate::ports::Clock;
