@@ -14,7 +14,7 @@ use crate::conflict::Groups;
 use crate::ports::Clock;
 use crate::units::{Cycle, Slot};
 use crate::workers::{self, Worker};
-use crate::world::{Turn, World};
+use crate::world::World;
 
 /// Time spent in each phase by worker 0, waiting at the barrier included, in nanoseconds.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -107,11 +107,10 @@ fn one_cycle<W: World>(
     clock: &impl Clock,
 ) {
     let n = world.bodies(state);
-    let turn = Turn { now, alone: worker.team_size() == 1 };
     let started_ns = clock.now_ns();
     worker.for_each_chunk(3 * round, n, |bodies| {
         bodies.clone().for_each(|body| groups.reset(body as Slot));
-        world.perceive_and_decide(state, turn, bodies, &mut mate.scratch);
+        world.perceive_and_decide(state, now, bodies, &mut mate.scratch);
     });
     worker.barrier();
     let decided_ns = clock.now_ns();

@@ -14,11 +14,16 @@ use crate::world::World;
 const STRETCH_NS: f64 = 5e6;
 /// The slower way is tried again after this many stretches.
 const LOOK_AGAIN: u32 = 40;
+/// Bodies are arranged anew after at least this many cycles: they have not gone far by then,
+/// and sorting is below 1 % of the work.
+const ARRANGE_EVERY: u64 = 64;
 
 /// What runs a world: as many workers as asked for, and what they share.
 #[derive(Debug)]
 pub struct Engine<W: World> {
     groups: Groups,
+    /// Cycles since the bodies were arranged.
+    since_arranged: u64,
     crew: Vec<Mate<W::Scratch>>,
     pace: Pace,
     times: PhaseTimes,
@@ -30,6 +35,7 @@ impl<W: World> Engine<W> {
         let crew = (0..workers.max(1)).map(|_| Mate::new(world.scratch())).collect();
         Self {
             groups: Groups::new(bodies),
+            since_arranged: ARRANGE_EVERY,
             crew,
             pace: Pace::default(),
             times: PhaseTimes::default(),
@@ -65,18 +71,23 @@ impl<W: World> Engine<W> {
     pub fn advance(
         &mut self,
         world: &W,
-        state: &W::State,
+        state: &mut W::State,
         (from, cycles): (Cycle, u64),
         clock: &impl Clock,
     ) {
         let mut done = 0;
         while done < cycles {
+            if self.since_arranged >= ARRANGE_EVERY {
+                world.arrange(state);
+                self.since_arranged = 0;
+            }
             let (team, stretch) = self.pace.next(self.crew.len(), cycles - done);
             let started_ns = clock.now_ns();
             let crew = &mut self.crew[..team];
             let span = (from + done, stretch);
             self.times.add(advance(world, state, &self.groups, crew, span, clock));
             self.pace.note(team, stretch, clock.now_ns() - started_ns);
+            self.since_arranged += stretch;
             done += stretch;
         }
     }
@@ -95,10 +106,10 @@ struct Pace {
 impl Pace {
     /// Workers and cycles of the next stretch.
     fn next(&self, crew: usize, left: u64) -> (usize, u64) {
-        let (expected_ns, team) = if self.share_always {
-            (self.team_ns, crew)
-        } else if crew == 1 || self.alone_ns == 0.0 {
+        let (expected_ns, team) = if crew == 1 || (self.alone_ns == 0.0 && !self.share_always) {
             (self.alone_ns, 1)
+        } else if self.share_always {
+            (self.team_ns, crew)
         } else if self.team_ns == 0.0 {
             (self.alone_ns, crew)
         } else {

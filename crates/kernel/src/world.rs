@@ -4,16 +4,6 @@ use crate::conflict::Groups;
 use crate::units::{Cycle, Slot};
 use std::ops::Range;
 
-/// When a phase runs, and with whom.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Turn {
-    /// The cycle.
-    pub now: Cycle,
-    /// One worker runs the whole phase, so that exchanges need not be atomic. May be used to
-    /// save time; must not change any result.
-    pub alone: bool,
-}
-
 /// A compiled, immutable world; all that changes lives in its `State`.
 ///
 /// The methods are the phases of one cycle, in order. Each is called by several workers at
@@ -33,12 +23,17 @@ pub trait World: Sync {
     /// How many tasks the pools hold.
     fn bodies(&self, state: &Self::State) -> usize;
 
+    /// Called between cycles now and then: may move bodies to other slots, so that what is
+    /// near in the world is near in memory and each worker keeps to a part of both. No result
+    /// may depend on it.
+    fn arrange(&self, _: &mut Self::State) {}
+
     /// *Pool one*: each body of `bodies` that is due perceives the frozen state, decides,
     /// and publishes what it claims. Writes only the intents and claims of these bodies.
     fn perceive_and_decide(
         &self,
         state: &Self::State,
-        turn: Turn,
+        now: Cycle,
         bodies: Range<usize>,
         scratch: &mut Self::Scratch,
     );

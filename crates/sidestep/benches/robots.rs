@@ -9,7 +9,6 @@ use sidestep::scenario::Source;
 use sidestep::worlds::robots::simulation::RobotsSimulation;
 use sidestep_kernel::conflict::Groups;
 use sidestep_kernel::ports::Recorder;
-use sidestep_kernel::world::Turn;
 use sidestep_kernel::{Simulation, World};
 use sidestep_record::{Origin, ParquetRecorder};
 use std::time::Instant;
@@ -191,9 +190,8 @@ fn plain_loop() {
         let mut now = 0;
         let mut members = Vec::new();
         let mut plain_cycle = || {
-            let turn = Turn { now, alone: true };
             (0..n as u32).for_each(|slot| groups.reset(slot));
-            world.perceive_and_decide(state, turn, 0..n, &mut scratch);
+            world.perceive_and_decide(state, now, 0..n, &mut scratch);
             world.find_conflicts(state, now, 0..n, &groups, &mut scratch);
             for slot in (0..n as u32).filter(|&s| groups.is_leader(s)) {
                 groups.members(slot, &mut members);

@@ -1,7 +1,9 @@
-//! Where things are: positions and claims on the boxes of a grid.
+//! Where things are on a grid: positions, who stands in or claims which box, marked boxes.
 
-pub mod claims;
+pub mod floor;
+pub mod marks;
 pub mod position;
 
-pub use claims::{ClaimGrid, FIXED, StoredTag, Tag, Tags};
+pub use floor::{BoxWord, Floor, Occupant};
+pub use marks::Marks;
 pub use position::Position;

@@ -85,11 +85,11 @@ fn action_of(tiles: &Tiles) -> (Vec<Transition>, u32, ObstacleRule) {
     use sidestep::worlds::robots::world::Role;
     let compiled = compile(&tiles.single());
     let world = &compiled.world;
-    let slot = world.robots()[0];
-    let Role::Robot(model) = &world.body_type(slot).role else { panic!("robots are robots") };
+    let ty = world.type_of(world.robots()[0]);
+    let Role::Robot(model) = &ty.role else { panic!("robots are robots") };
     let action = u8::from(tiles.source().text.contains("actions = [\"left\"]"));
     let transitions = model.body.effector.transitions_of(action, false);
-    (transitions, world.body_type(slot).size.0, world.obstacle_rule)
+    (transitions, ty.size.0, world.obstacle_rule)
 }
 
 fn compile(tiles: &Tiles) -> Compiled {

@@ -45,8 +45,8 @@ fn map(simulation: &RobotsSimulation) -> Value {
 fn bodies(simulation: &RobotsSimulation) -> BTreeMap<&str, u64> {
     let world = simulation.world();
     let mut count = BTreeMap::new();
-    for slot in 0..world.bodies.len() as u32 {
-        let kind = &world.kinds[usize::from(world.body_type(slot).kind)];
+    for id in 0..world.bodies.len() as u32 {
+        let kind = &world.kinds[usize::from(world.type_of(id).kind)];
         *count.entry(kind.as_str()).or_default() += 1;
     }
     count

@@ -129,9 +129,9 @@ impl Run for RobotsRun {
 
     fn agent_metrics(&self) -> Value {
         let (world, state) = (self.simulation.world(), self.simulation.state());
-        let one = |&slot: &u32| {
-            let counts = world.counts(state, self.simulation.cycle(), slot);
-            json!({ "body": world.bodies[slot as usize].id, "counts": counts })
+        let one = |&id: &u32| {
+            let counts = world.counts(state, self.simulation.cycle(), id);
+            json!({ "body": id, "counts": counts })
         };
         world.robots().iter().map(one).collect()
     }

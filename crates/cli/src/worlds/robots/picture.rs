@@ -78,7 +78,7 @@ fn add_body(
     record: &BodyRecord,
     shown: &[u32],
 ) {
-    let ty = world.body_type(world.slot(id));
+    let ty = world.type_of(id);
     let ((col, row), (width, height)) = (record.at, ty.size);
     let (shade, heading) = match &ty.role {
         Role::Door(_) => {
@@ -96,7 +96,7 @@ fn add_body(
 
 /// Entity ids of the robots.
 fn robots(world: &RobotsWorld) -> Vec<u32> {
-    world.robots().iter().map(|&slot| world.bodies[slot as usize].id).collect()
+    world.robots().to_vec()
 }
 
 /// At most `most` of `ids`, at equal steps, the first among them.
@@ -162,7 +162,7 @@ impl Ways {
     fn shared(&self, world: &RobotsWorld) -> f64 {
         let mut robots_in = BTreeMap::<(u32, u32), u32>::new();
         for (index, (id, way)) in self.of.iter().enumerate() {
-            let (width, height) = world.body_type(world.slot(*id)).size;
+            let (width, height) = world.type_of(*id).size;
             for ((col, row), _) in way {
                 let boxes = (0..height).flat_map(|y| (0..width).map(move |x| (col + x, row + y)));
                 boxes.for_each(|at| *robots_in.entry(at).or_default() |= 1 << index);
@@ -175,7 +175,7 @@ impl Ways {
 
 /// The ribbon of a robot's way.
 fn track(world: &RobotsWorld, id: u32, way: &[Place]) -> Track {
-    let (width, height) = world.body_type(world.slot(id)).size;
+    let (width, height) = world.type_of(id).size;
     let center = |(col, row): (u32, u32)| {
         (f64::from(col) + f64::from(width) / 2.0, f64::from(row) + f64::from(height) / 2.0)
     };

@@ -6,7 +6,6 @@ use sidestep::kernel::ports::Values;
 use sidestep::kernel::{InputError, Simulation};
 use sidestep::worlds::robots::simulation::{HEADING_NAMES, RobotsSimulation};
 use sidestep::worlds::robots::state::BodyRecord;
-use sidestep::worlds::robots::world::Role;
 use sidestep_record::{Table, read_table};
 use std::path::Path;
 
@@ -36,12 +35,12 @@ struct Body<'a> {
 impl Body<'_> {
     fn kind(&self) -> &str {
         let world = self.simulation.world();
-        &world.kinds[usize::from(world.body_type(world.slot(self.id)).kind)]
+        &world.kinds[usize::from(world.type_of(self.id).kind)]
     }
 
     fn is_door(&self) -> bool {
         let world = self.simulation.world();
-        matches!(world.body_type(world.slot(self.id)).role, Role::Door(_))
+        world.is_door(self.id)
     }
 
     fn heading(&self) -> &'static str {

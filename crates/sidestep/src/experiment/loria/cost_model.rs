@@ -301,10 +301,11 @@ fn advance(run: &mut RobotsSimulation, cycles: u64) {
 
 fn totals(run: &RobotsSimulation) -> Totals {
     let times = run.phase_times();
-    let moves = run.state().bodies.iter().map(|body| body.moves.get()).zip(0..);
     // A step enters a row of boxes and leaves one; bodies that move are square.
-    let boxes =
-        moves.map(|(n, slot)| f64::from(2 * n) * f64::from(run.world().body_type(slot).size.0));
+    let boxes = run.state().bodies.iter().map(|body| {
+        let side = run.world().types[usize::from(body.ty)].size.0;
+        f64::from(2 * body.moves.get()) * f64::from(side)
+    });
     Totals {
         first_ns: times.perceive_decide_ns as f64,
         second_ns: (times.conflicts_ns + times.react_ns) as f64,

@@ -1,8 +1,9 @@
 //! A check of the whole state against the world's laws (promise L1), for tests and doubt.
 
-use super::state::{FREE, KIND_BITS, RobotsState};
-use super::world::{RobotsWorld, Role};
+use super::state::{FREE, RobotsState};
+use super::world::RobotsWorld;
 use sidestep_kernel::Slot;
+use sidestep_kernel::space::Occupant;
 
 impl RobotsWorld {
     /// Checks that no two bodies share a box, nobody stands in a wall, and the grid shows
@@ -13,18 +14,19 @@ impl RobotsWorld {
     pub fn audit(&self, state: &RobotsState) -> Result<(), String> {
         let mut owner = vec![None; self.walls.len()];
         for slot in 0..self.bodies.len() as Slot {
-            let body = self.body_type(slot);
-            let is_open =
-                matches!(body.role, Role::Door(_)) && state.bodies[slot as usize].facing.get() == 1;
-            if !is_open {
+            if !state.is_open_door(self, slot) {
                 self.audit_body(state, slot, &mut owner)?;
             }
         }
         for (index, (&wall, owner)) in self.walls.iter().zip(&owner).enumerate() {
-            let kind = state.grid.get(index) & KIND_BITS;
-            let expected = owner.map_or(wall, |slot| self.body_type(slot).kind);
-            if kind != expected {
-                return Err(format!("box {index} shows kind {kind} instead of {expected}"));
+            let expected = match owner {
+                Some(slot) => Occupant::Body(*slot),
+                None if wall == FREE => Occupant::Nobody,
+                None => Occupant::Wall,
+            };
+            let shown = state.floor.occupant(index);
+            if shown != expected {
+                return Err(format!("box {index} shows {shown:?} instead of {expected:?}"));
             }
         }
         Ok(())
@@ -37,7 +39,7 @@ impl RobotsWorld {
         owner: &mut [Option<Slot>],
     ) -> Result<(), String> {
         let at = state.at(slot);
-        for &offset in &self.body_type(slot).own {
+        for &offset in &state.type_in(self, slot).own {
             let index = at.index(self.stride).wrapping_add_signed(offset) as usize;
             let is_wall = self.walls.get(index).is_none_or(|&w| w != FREE);
             if is_wall {

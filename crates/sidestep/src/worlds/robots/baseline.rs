@@ -21,10 +21,10 @@ use super::Scratch;
 use super::metrics::Metrics;
 use super::scenario::Compiled;
 use super::state::{IDLE, RobotsState, Snapshot};
-use super::world::{RobotsWorld, Role};
+use super::world::RobotsWorld;
 use crate::map::Cell;
+use sidestep_kernel::space::Floor;
 use sidestep_kernel::workers::{self, Worker};
-use sidestep_kernel::world::Turn;
 use sidestep_kernel::{Cycle, EntityId, Slot};
 use std::ops::Range;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -131,12 +131,7 @@ impl Baseline {
                 worker.for_each_chunk(pool, world.bodies.len(), |bodies| {
                     for slot in bodies {
                         let _turn = lock(&the_world);
-                        world.perceive_one(
-                            state,
-                            Turn { now, alone: false },
-                            slot as Slot,
-                            &mut hand.scratch,
-                        );
+                        world.perceive_one(state, now, slot as Slot, &mut hand.scratch);
                         world.act_drawn(state, now, slot as Slot, &mut hand.scratch);
                     }
                 });
@@ -167,8 +162,7 @@ fn partition_cycle(
     now: Cycle,
 ) {
     let Hand { scratch, own, serial_acts } = hand;
-    own.iter()
-        .for_each(|&slot| world.perceive_one(state, Turn { now, alone: false }, slot, scratch));
+    own.iter().for_each(|&slot| world.perceive_one(state, now, slot, scratch));
     worker.barrier();
     let band = &borders.bands[worker.index()];
     own.retain(|&slot| {
@@ -229,8 +223,8 @@ impl RobotsWorld {
 
     /// Whether all boxes that a body covers, and may come to cover, lie in these columns.
     fn stays_inside(&self, state: &RobotsState, slot: Slot, band: &Range<u32>) -> bool {
-        let (col, width) = (state.at(slot).col(), self.body_type(slot).size.0);
-        let reach = self.extent.0;
+        let (col, width) = (state.at(slot).col(), state.type_in(self, slot).size.0);
+        let reach = self.reach;
         if col >= band.start.saturating_add(reach) && col + width + reach <= band.end {
             return true;
         }
@@ -240,10 +234,11 @@ impl RobotsWorld {
             return covers;
         }
         let mut inside = true;
-        let base = state.at(slot).index(self.stride);
-        self.for_each_claimed(state, slot, base, |index, _| {
-            inside &= band.contains(&(index as u32 % self.stride));
-        });
+        let mut look = |index: usize| inside &= band.contains(&(index as u32 % self.stride));
+        match &state.floor {
+            Floor::Narrow(floor) => self.for_each_claimed(floor, state, slot, |i, _| look(i)),
+            Floor::Wide(floor) => self.for_each_claimed(floor, state, slot, |i, _| look(i)),
+        }
         inside
     }
 }
@@ -253,8 +248,8 @@ pub fn breach(world: &RobotsWorld, snapshot: &Snapshot) -> Option<String> {
     let width = world.map.width();
     let mut owner: Vec<Option<EntityId>> = vec![None; world.map.cells().len()];
     for (id, body) in (0..).zip(&snapshot.bodies) {
-        let ty = world.body_type(world.slot(id));
-        if matches!(ty.role, Role::Door(_)) && body.facing == 1 {
+        let ty = world.type_of(id);
+        if world.is_door(id) && body.facing == 1 {
             continue;
         }
         let (cols, rows) = (body.at.0..body.at.0 + ty.size.0, body.at.1..body.at.1 + ty.size.1);

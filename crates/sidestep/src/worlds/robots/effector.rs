@@ -162,8 +162,6 @@ pub struct Whole {
     pub enter: Box<[i32]>,
     /// Boxes covered at the start and not at the end.
     pub leave: Box<[i32]>,
-    /// Boxes entered and left again on the way.
-    pub pass: Box<[i32]>,
     /// Boxes covered at the end and not at the start.
     pub fill: Box<[i32]>,
     /// Move of the anchor, columns and rows.
@@ -186,7 +184,6 @@ impl Whole {
         };
         Self {
             leave: keep(own, &|b| !now.contains(b)),
-            pass: keep(&enter, &|b| !now.contains(b)),
             fill: keep(&enter, &|b| now.contains(b)),
             enter: enter.into(),
             delta,

@@ -1,10 +1,10 @@
 //! What a run reports: per robot and in all.
 
 use super::state::RobotsState;
-use super::world::{RobotsWorld, Role};
+use super::world::RobotsWorld;
 use crate::map::Cell;
 use serde::Serialize;
-use sidestep_kernel::Cycle;
+use sidestep_kernel::{Cycle, EntityId};
 use std::collections::BTreeMap;
 
 /// Counters of one robot, or their sums over all robots.
@@ -43,10 +43,10 @@ pub struct Metrics {
 }
 
 impl RobotsWorld {
-    /// Counters of the robot in a slot after `cycle` cycles.
-    pub fn counts(&self, state: &RobotsState, cycle: Cycle, slot: u32) -> Counts {
-        let (i, kinds) = (slot as usize, self.kinds.len());
-        let cell = &state.bodies[i];
+    /// Counters of a robot after `cycle` cycles.
+    pub fn counts(&self, state: &RobotsState, cycle: Cycle, id: EntityId) -> Counts {
+        let (i, kinds) = (id as usize, self.kinds.len());
+        let cell = state.body(id);
         let by_kind = (0..kinds).map(|k| u64::from(state.contacts.get(i * kinds + k)));
         let named = self.kinds.iter().cloned().zip(by_kind.clone());
         let trips = u64::from(cell.trips.get());
@@ -65,10 +65,9 @@ impl RobotsWorld {
     pub fn totals(&self, state: &RobotsState, cycle: Cycle) -> Counts {
         let mut total = Counts::default();
         let mut trip_cycles = 0;
-        for &slot in &self.robot_slots {
-            debug_assert!(matches!(self.body_type(slot).role, Role::Robot(_)));
-            let one = self.counts(state, cycle, slot);
-            trip_cycles += state.bodies[slot as usize].trip_cycles.get();
+        for &id in &self.robots {
+            let one = self.counts(state, cycle, id);
+            trip_cycles += state.body(id).trip_cycles.get();
             total.actions += one.actions;
             total.contacts += one.contacts;
             total.distance_m += one.distance_m;
@@ -104,8 +103,8 @@ impl RobotsWorld {
 
     /// Boxes under robots at the start; nobody visits them for the first time.
     fn covered_at_start(&self) -> u64 {
-        let boxes = |&slot: &u32| self.body_type(slot).own.len() as u64;
-        self.robot_slots.iter().map(boxes).sum()
+        let boxes = |&id: &EntityId| self.type_of(id).own.len() as u64;
+        self.robots.iter().map(boxes).sum()
     }
 }
 

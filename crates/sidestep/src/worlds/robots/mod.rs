@@ -28,9 +28,9 @@ pub mod world;
 
 use effector::Side;
 use resolve::ConflictPolicy;
+use scenario::StorageOrder;
 use sensor::Reading;
 use sidestep_kernel::conflict::Groups;
-use sidestep_kernel::world::Turn;
 use sidestep_kernel::{Cycle, EntityId, Slot, World};
 use state::RobotsState;
 use std::ops::Range;
@@ -123,16 +123,22 @@ impl World for RobotsWorld {
         self.bodies.len()
     }
 
+    fn arrange(&self, state: &mut RobotsState) {
+        if self.storage == StorageOrder::Spatial {
+            state.arrange(self);
+        }
+    }
+
     #[inline]
     fn perceive_and_decide(
         &self,
         state: &RobotsState,
-        turn: Turn,
+        now: Cycle,
         bodies: Range<usize>,
         scratch: &mut Scratch,
     ) {
         for slot in bodies {
-            self.perceive_one(state, turn, slot as Slot, scratch);
+            self.perceive_one(state, now, slot as Slot, scratch);
         }
     }
 

@@ -3,13 +3,11 @@
 use super::decide::{Contact, Decision, Heard, Memory, Percept, Trip, UNSEEN};
 use super::effector::{Side, Sweep};
 use super::sensor::Reading;
-use super::state::{BodyCell, CLEAR, FREE, IDLE, KIND_BITS, RobotsState, WALL, pose_word};
+use super::state::{BodyCell, CLEAR, IDLE, RobotsState, pose_word};
 use super::world::{BEAM_STEP, Door, Mover, RobotModel, RobotsWorld, Role, purpose};
 use super::{Scratch, SensorSample};
 use sidestep_kernel::Column;
-use sidestep_kernel::column::Word;
-use sidestep_kernel::space::{StoredTag, Tag, Tags};
-use sidestep_kernel::world::Turn;
+use sidestep_kernel::space::{BoxWord, Floor};
 use sidestep_kernel::{Cycle, Slot};
 
 impl RobotsWorld {
@@ -18,47 +16,56 @@ impl RobotsWorld {
     pub(super) fn perceive_one(
         &self,
         state: &RobotsState,
-        turn: Turn,
+        now: Cycle,
         slot: Slot,
         scratch: &mut Scratch,
     ) {
-        let (i, now) = (slot as usize, turn.now);
-        let cell = &state.bodies[i];
-        let at = cell.at();
+        match &state.floor {
+            Floor::Narrow(floor) => self.perceive_on(floor, state, now, slot, scratch),
+            Floor::Wide(floor) => self.perceive_on(floor, state, now, slot, scratch),
+        }
+    }
+
+    #[inline]
+    fn perceive_on<T: BoxWord>(
+        &self,
+        floor: &Column<T>,
+        state: &RobotsState,
+        now: Cycle,
+        slot: Slot,
+        scratch: &mut Scratch,
+    ) {
+        let cell = &state.bodies[slot as usize];
         if let Some(frames) = &state.frames {
-            let index = i * frames.capacity + (now - frames.first) as usize;
-            frames.poses.set(index, pose_word(at, cell.facing.get()));
+            let index = cell.id as usize * frames.capacity + (now - frames.first) as usize;
+            frames.poses.set(index, pose_word(cell.at(), cell.facing.get()));
         }
         let role = &self.types[usize::from(cell.ty)].role;
-        if !matches!(role, Role::Door(_)) {
-            state.claims.register(slot, at, turn);
-        }
-        let intent = if self.bodies[i].is_due(now) {
+        let intent = if cell.is_due(now) {
             match role {
-                Role::Robot(model) => self.robot_decides(model, state, now, slot, scratch),
+                Role::Robot(model) => self.robot_decides(model, (floor, state), now, slot, scratch),
                 Role::Mover(mover) => self.mover_draws(mover, state, now, slot),
                 Role::Door(door) => self.door_wants(door, state, now, slot),
             }
         } else {
             IDLE
         };
-        let clear = intent != IDLE && self.claim(state, slot, intent);
+        let clear = intent != IDLE && self.claim(floor, state, slot, intent);
         cell.intent.set(if clear { intent | CLEAR } else { intent });
     }
 
     #[inline]
-    fn robot_decides(
+    fn robot_decides<T: BoxWord>(
         &self,
         model: &RobotModel,
-        state: &RobotsState,
+        (floor, state): (&Column<T>, &RobotsState),
         now: Cycle,
         slot: Slot,
         scratch: &mut Scratch,
     ) -> u8 {
-        let i = slot as usize;
-        let cell = &state.bodies[i];
+        let cell = &state.bodies[slot as usize];
         let id = cell.id;
-        let nearest = self.sense(model, state, now, slot, scratch);
+        let nearest = self.sense(model, (floor, state), now, cell, scratch);
         scratch.heard.clear();
         if let Some(radio) = &self.radio {
             self.listen(radio, state, now, slot, &mut scratch.heard);
@@ -77,7 +84,7 @@ impl RobotsWorld {
         let mut draws = self.streams.draws(id, now, purpose::DECIDE);
         let decision = model.behaviour.decide(&percept, &mut memory, &mut draws);
         store_memory(cell, memory);
-        self.note(state, now, i, decision);
+        self.note(state, now, cell, decision);
         let known = usize::from(decision.action) < model.body.effector.actions.len();
         debug_assert!(known, "behaviours choose among the effector's actions");
         if known { decision.action + 1 } else { IDLE }
@@ -85,9 +92,8 @@ impl RobotsWorld {
 
     /// Counts what the decision says beside the action.
     #[inline]
-    fn note(&self, state: &RobotsState, now: Cycle, i: usize, decision: Decision) {
+    fn note(&self, state: &RobotsState, now: Cycle, cell: &BodyCell, decision: Decision) {
         if let Some(trip) = decision.trip {
-            let cell = &state.bodies[i];
             if trip == Trip::Done {
                 cell.trips.set(cell.trips.get() + 1);
                 cell.trip_cycles.set(cell.trip_cycles.get() + now - cell.trip_begun.get());
@@ -97,6 +103,7 @@ impl RobotsWorld {
         if self.radio.is_some() {
             let (heard_now, heard_next) =
                 (&state.voice[(now % 2) as usize], &state.voice[((now + 1) % 2) as usize]);
+            let i = cell.id as usize;
             heard_next.set(i, decision.broadcast.unwrap_or_else(|| heard_now.get(i)));
         }
     }
@@ -104,46 +111,47 @@ impl RobotsWorld {
     /// Fills `scratch.readings` with what each beam reports of what it truly meets, and
     /// returns the nearest class reported per sector.
     #[inline]
-    fn sense(
+    fn sense<T: BoxWord>(
         &self,
         model: &RobotModel,
-        state: &RobotsState,
+        (floor, state): (&Column<T>, &RobotsState),
         now: Cycle,
-        slot: Slot,
+        cell: &BodyCell,
         scratch: &mut Scratch,
     ) -> [u8; 4] {
-        let i = slot as usize;
-        let base = state.at(slot).index(self.stride);
-        let heading = usize::from(state.bodies[i].facing.get());
-        let boxes = state.grid.cells();
+        let (id, heading) = (cell.id, usize::from(cell.facing.get()));
+        let base = cell.at().index(self.stride);
         let Scratch { readings, sensor_samples, keep_samples, .. } = scratch;
         readings.resize(model.body.sectors.len(), Reading::default());
         let mut nearest = [UNSEEN; 4];
-        let mut beams = readings.iter_mut().zip(&model.body.sectors);
+        let mut reports = readings.iter_mut().zip(&model.body.sectors);
         for (s, sensor) in model.body.sensors.iter().enumerate() {
             let rays = &sensor.rays[heading];
+            let nothing = sensor.table.row(sensor.nothing);
             let mut from = 0;
             for (block, ends) in rays.ends.chunks(4).enumerate() {
                 let words = if sensor.table.reliable {
                     [0; 4]
                 } else {
-                    let (id, purpose) = (state.bodies[i].id, purpose::sense(s));
-                    self.streams.block(id, now, purpose, block as u16)
+                    self.streams.block(id, now, purpose::sense(s), block as u16)
                 };
-                for ((&end, word), (reading, &sector)) in ends.iter().zip(words).zip(&mut beams) {
+                for ((&end, word), (reading, &sector)) in ends.iter().zip(words).zip(&mut reports) {
                     let end = usize::from(end);
-                    let truth = match first_hit(boxes, base, &rays.offsets[from..end]) {
-                        Some((step, kind)) => sensor.truth(kind, sensor.classes[from + step]),
-                        None => sensor.nothing,
+                    let truth = match first_hit(floor, base, &rays.offsets[from..end]) {
+                        Some((step, word)) => {
+                            let kind = state.kind_of(word);
+                            sensor.table.row(sensor.truth(kind, sensor.classes[from + step]))
+                        }
+                        None => nothing,
                     };
-                    let reported = sensor.table.report(truth, word);
-                    *reading = reported;
-                    let class = if reported.observation == 0 { UNSEEN } else { reported.class };
+                    *reading = sensor.table.report(truth, word);
                     let nearest = &mut nearest[sector as usize];
-                    *nearest = class.min(*nearest);
+                    *nearest = reading.nearness().min(*nearest);
                     if *keep_samples {
-                        let (robot, sensor) = (self.bodies[i].id, s as u16);
-                        let sample = SensorSample { cycle: now, robot, sensor, truth, reported };
+                        let (truth, sensor) = (sensor.table.truth(truth), s as u16);
+                        let reported = *reading;
+                        let sample =
+                            SensorSample { cycle: now, robot: id, sensor, truth, reported };
                         sensor_samples.push(sample);
                     }
                     from = end;
@@ -156,7 +164,7 @@ impl RobotsWorld {
     /// People and other movers go on as before or draw a new direction.
     fn mover_draws(&self, mover: &Mover, state: &RobotsState, now: Cycle, slot: Slot) -> u8 {
         let i = slot as usize;
-        let words = self.streams.block(self.bodies[i].id, now, purpose::MOVE, 0);
+        let words = self.streams.block(state.bodies[i].id, now, purpose::MOVE, 0);
         if !mover.straight.happens(words[0]) {
             state.bodies[i].facing.set((words[1] >> 30) as u8);
         }
@@ -167,111 +175,104 @@ impl RobotsWorld {
     fn door_wants(&self, door: &Door, state: &RobotsState, now: Cycle, slot: Slot) -> u8 {
         let is_open = state.bodies[slot as usize].facing.get() == 1;
         let wants_open = door.wants_open(is_open, now, || {
-            self.streams.block(self.bodies[slot as usize].id, now, purpose::DOOR, 0)[0]
+            self.streams.block(state.bodies[slot as usize].id, now, purpose::DOOR, 0)[0]
         });
         u8::from(wants_open != is_open)
     }
 
-    /// Writes the body's tag into every free box that it may come to cover, and says whether
-    /// all of them are free. Boxes in which a body stands keep that body's tag.
+    /// Claims every free box that the body may come to cover, and says whether all of them
+    /// are free.
     #[inline]
-    fn claim(&self, state: &RobotsState, slot: Slot, intent: u8) -> bool {
-        let at = state.at(slot);
-        let (base, tag) = (at.index(self.stride), state.tag(self, slot));
-        match state.claims.tags() {
-            Tags::Narrow(tags) => self.claim_in(tags, state, slot, (base, tag), intent),
-            Tags::Wide(tags) => self.claim_in(tags, state, slot, (base, tag), intent),
-        }
-    }
-
-    #[inline]
-    fn claim_in<T: StoredTag>(
+    fn claim<T: BoxWord>(
         &self,
-        tags: &Column<T>,
+        floor: &Column<T>,
         state: &RobotsState,
         slot: Slot,
-        (base, tag): (u32, Tag),
         intent: u8,
     ) -> bool {
-        let (cell, tag) = (&state.bodies[slot as usize], T::of(tag));
+        let cell = &state.bodies[slot as usize];
+        let (base, claim) = (cell.at().index(self.stride), T::claimed(slot));
         let body = &self.types[usize::from(cell.ty)];
         if !body.actions.is_empty() {
             let action = body.action_index(cell.facing.get(), intent - 1);
             cell.action.set(action);
             let boxes = &*body.actions[usize::from(action)].claims;
-            let at = |offset: i32| base.wrapping_add_signed(offset) as usize;
-            let met = boxes.iter().fold(0, |met, &o| met | state.grid.get(at(o)));
-            if met & KIND_BITS == FREE {
-                boxes.iter().for_each(|&o| tags.set(at(o), tag));
+            if all_free(floor, base, boxes) {
+                let at = |offset: i32| base.wrapping_add_signed(offset) as usize;
+                boxes.iter().for_each(|&offset| floor.set(at(offset), claim));
                 return true;
             }
         }
-        self.for_each_claimed(state, slot, base, |index, kind| {
-            if kind == FREE {
-                tags.set(index, tag);
+        self.for_each_claimed(floor, state, slot, |index, word| {
+            if word.is_free() {
+                floor.set(index, claim);
             }
         });
         false
     }
 
-    /// Calls `each` for every box outside the body (of a door: inside) that it may come to
-    /// cover, walls excepted, with the kind that stands there now. The body is not idle.
-    pub(super) fn for_each_claimed(
+    /// Calls `each` for every box that the body may come to cover, walls excepted, with what
+    /// it holds now: boxes outside the body, of a door its own. The body is not idle.
+    pub(super) fn for_each_claimed<T: BoxWord>(
         &self,
+        floor: &Column<T>,
         state: &RobotsState,
         slot: Slot,
-        base: u32,
-        each: impl FnMut(usize, u8),
+        mut each: impl FnMut(usize, T),
     ) {
         let cell = &state.bodies[slot as usize];
+        let base = cell.at().index(self.stride);
         let body = &self.types[usize::from(cell.ty)];
         match body.actions.get(usize::from(cell.action.get())) {
-            Some(action) => sweep(&state.grid, &action.sweep, base, each),
-            None => sweep_own(&state.grid, &body.own, base, each),
+            Some(action) => sweep(floor, &action.sweep, base, each),
+            None => body.own.iter().for_each(|&offset| {
+                let index = base.wrapping_add_signed(offset) as usize;
+                each(index, floor.get(index));
+            }),
         }
     }
 }
 
+/// Whether nothing stands in any of some boxes.
+#[inline]
+pub(super) fn all_free<T: BoxWord>(floor: &Column<T>, base: u32, offsets: &[i32]) -> bool {
+    let at = |offset: i32| base.wrapping_add_signed(offset) as usize;
+    offsets.iter().fold(T::FREE, |all, &offset| all & floor.get(at(offset))).is_free()
+}
+
 /// Walks the tree of an action's steps; what lies behind a wall is left out.
 #[inline]
-fn sweep(grid: &Column<u8>, sweep: &Sweep, base: u32, mut each: impl FnMut(usize, u8)) {
+fn sweep<T: BoxWord>(floor: &Column<T>, sweep: &Sweep, base: u32, mut each: impl FnMut(usize, T)) {
     let mut node = 0;
     while let Some(step) = sweep.nodes.get(node) {
         let mut walled = false;
         for &offset in &sweep.boxes[step.first as usize..step.end as usize] {
             let index = base.wrapping_add_signed(offset) as usize;
-            let kind = grid.get(index) & KIND_BITS;
-            if kind == WALL {
+            let word = floor.get(index);
+            if word == T::WALL {
                 walled = true;
             } else {
-                each(index, kind);
+                each(index, word);
             }
         }
         node = if walled { step.after as usize } else { node + 1 };
     }
 }
 
-/// A door claims the boxes it opens or closes.
-fn sweep_own(grid: &Column<u8>, own: &[i32], base: u32, mut each: impl FnMut(usize, u8)) {
-    for &offset in own {
-        let index = base.wrapping_add_signed(offset) as usize;
-        each(index, grid.get(index) & KIND_BITS);
-    }
-}
-
-/// The first box along a beam that holds something: its place in the list, and its kind.
+/// The first box along a beam that holds something: its place in the list, and what it holds.
 ///
-/// Boxes are read four at a time, so lists come in fours and may reach past a wall; the
-/// grid's border is wide enough for that.
+/// Boxes are read four at a time, so lists come in fours and may reach past a wall, even past
+/// the grid's end.
 #[inline]
-fn first_hit(boxes: &[<u8 as Word>::Cell], base: u32, offsets: &[i32]) -> Option<(usize, u8)> {
-    let look = |o: i32| u8::load(&boxes[base.wrapping_add_signed(o) as usize]);
+fn first_hit<T: BoxWord>(floor: &Column<T>, base: u32, offsets: &[i32]) -> Option<(usize, T)> {
+    let boxes = floor.cells();
+    let look = |o: i32| boxes.get(base.wrapping_add_signed(o) as usize).map_or(T::FREE, T::load);
     for (k, four) in offsets.as_chunks::<BEAM_STEP>().0.iter().enumerate() {
         let [a, b, c, d] = four.map(look);
-        if (a | b | c | d) & KIND_BITS != FREE {
-            let kinds = [a, b, c, d].map(|seen| seen & KIND_BITS);
-            let first = kinds.iter().position(|&kind| kind != FREE)?;
-            return Some((BEAM_STEP * k + first, kinds[first]));
+        if !(a & b & c & d).is_free() {
+            let words = [a, b, c, d];
+            let first = words.iter().position(|word| !word.is_free())?;
+            return Some((BEAM_STEP * k + first, words[first]));
         }
     }
     None
@@ -310,19 +311,18 @@ impl RobotsWorld {
         slot: Slot,
         heard: &mut Vec<Heard>,
     ) {
-        let id = self.bodies[slot as usize].id;
+        let id = state.bodies[slot as usize].id;
         let voice = &state.voice[(now % 2) as usize];
-        for &other in &self.robot_slots {
+        for &sender in &self.robots {
+            let other = state.slot_of_id[sender as usize];
             if other == slot || !self.in_radio_range(radio, state, slot, other) {
                 continue;
             }
-            let sender = self.bodies[other as usize].id;
             let words = self.streams.pair(id, sender, now, purpose::RADIO, 0);
             if !radio.loss.happens(words[0]) {
-                heard.push(Heard { sender, word: voice.get(other as usize) });
+                heard.push(Heard { sender, word: voice.get(sender as usize) });
             }
         }
-        heard.sort_unstable_by_key(|h| h.sender);
     }
 
     fn in_radio_range(
@@ -334,7 +334,7 @@ impl RobotsWorld {
     ) -> bool {
         // Twice the distance between centers, so that all is integer.
         let center = |slot: Slot| {
-            let (at, size) = (state.at(slot), self.body_type(slot).size);
+            let (at, size) = (state.at(slot), state.type_in(self, slot).size);
             (
                 2 * i64::from(at.col()) + i64::from(size.0),
                 2 * i64::from(at.row()) + i64::from(size.1),

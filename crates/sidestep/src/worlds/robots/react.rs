@@ -1,12 +1,16 @@
 //! Pool two: the bodies of a group act one after the other; the environment decides.
 
 use super::effector::{Action, ObstacleRule, Side, Walk};
-use super::state::{BodyCell, CLEAR, FREE, IDLE, KIND_BITS, RobotsState, VISITED, contact_word};
+use super::perceive::all_free;
+use super::state::{CLEAR, IDLE, RobotsState, contact_word};
 use super::world::{BodyType, RobotsWorld, Role};
 use super::{Event, EventKind, MotionSample, Scratch};
 use sidestep_kernel::distr::Categorical;
-use sidestep_kernel::space::{Position, Tags};
-use sidestep_kernel::{Cycle, Slot};
+use sidestep_kernel::space::{BoxWord, Floor};
+use sidestep_kernel::{Column, Cycle, Slot};
+
+/// A state with its floor, whatever the width of its words.
+type On<'a, T> = (&'a Column<T>, &'a RobotsState);
 
 /// What a walk comes to in the present state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,25 +45,40 @@ impl RobotsWorld {
         word: u32,
         scratch: &mut Scratch,
     ) {
+        match &state.floor {
+            Floor::Narrow(floor) => self.act_on((floor, state), now, slot, word, scratch),
+            Floor::Wide(floor) => self.act_on((floor, state), now, slot, word, scratch),
+        }
+    }
+
+    #[inline]
+    fn act_on<T: BoxWord>(
+        &self,
+        (floor, state): On<'_, T>,
+        now: Cycle,
+        slot: Slot,
+        word: u32,
+        scratch: &mut Scratch,
+    ) {
         let cell = &state.bodies[slot as usize];
         if cell.intent.get() == IDLE {
             return;
         }
         let body = &self.types[usize::from(cell.ty)];
         let Some(action) = body.actions.get(usize::from(cell.action.get())) else {
-            return self.toggle(state, now, slot, scratch);
+            return self.toggle((floor, state), now, slot, scratch);
         };
         let drawn = match self.obstacle_rule {
             ObstacleRule::Cut | ObstacleRule::Stay => action.distribution.sample(word),
-            ObstacleRule::Renormalise => match self.rescaled(action, state, slot) {
+            ObstacleRule::Renormalise => match self.rescaled(action, (floor, state), slot) {
                 Ok(distribution) => distribution.sample(word),
                 Err(blocked) => blocked,
             },
         };
         let walk = &action.walks[drawn];
         let base = cell.at().index(self.stride);
-        if self.is_clear(walk, state, base) {
-            self.make_whole(walk, state, cell, body, base);
+        if all_free(floor, base, &walk.whole.enter) {
+            self.make_whole(walk, (floor, state), slot, body, base);
             if scratch.keep_samples {
                 let steps = walk.steps.len();
                 self.sample_motion(
@@ -72,86 +91,59 @@ impl RobotsWorld {
                 );
             }
         } else {
-            self.blocked(walk, state, now, slot, scratch);
+            self.blocked(walk, (floor, state), now, slot, scratch);
         }
-    }
-
-    /// Whether a walk meets nothing.
-    #[inline]
-    fn is_clear(&self, walk: &Walk, state: &RobotsState, base: u32) -> bool {
-        let at = |offset: i32| base.wrapping_add_signed(offset) as usize;
-        let met = walk.whole.enter.iter().fold(0, |met, &o| met | state.grid.get(at(o)));
-        met & KIND_BITS == FREE
     }
 
     /// Makes all of a walk that meets nothing.
     #[inline]
-    fn make_whole(
+    fn make_whole<T: BoxWord>(
         &self,
         walk: &Walk,
-        state: &RobotsState,
-        cell: &BodyCell,
+        (floor, state): On<'_, T>,
+        slot: Slot,
         body: &BodyType,
         base: u32,
     ) {
+        let cell = &state.bodies[slot as usize];
         cell.contact.set(0);
         if walk.turn != 0 {
             cell.facing.set((cell.facing.get() + walk.turn) % 4);
         }
-        let whole = &walk.whole;
         if walk.steps.is_empty() {
             return;
         }
+        let whole = &walk.whole;
         let at = |offset: i32| base.wrapping_add_signed(offset) as usize;
-        for &offset in &whole.leave {
-            state.grid.set(at(offset), state.grid.get(at(offset)) & !KIND_BITS);
-        }
-        let mut first_visits = 0;
-        let mut enter = |offset: i32, kind: u8| {
-            let before = state.grid.get(at(offset));
-            first_visits += u32::from(!before & body.marks != 0);
-            state.grid.set(at(offset), before & VISITED | kind);
-        };
-        whole.pass.iter().for_each(|&offset| enter(offset, body.marks));
-        whole.fill.iter().for_each(|&offset| enter(offset, body.kind | body.marks));
-        let moved = cell.at().offset(whole.delta.0, whole.delta.1);
-        self.settle(state, cell, body, moved);
+        whole.leave.iter().for_each(|&offset| floor.set(at(offset), T::FREE));
+        whole.fill.iter().for_each(|&offset| floor.set(at(offset), T::standing(slot)));
+        cell.anchor.set(cell.at().offset(whole.delta.0, whole.delta.1).word());
         cell.moves.set(cell.moves.get() + walk.steps.len() as u32);
-        if first_visits > 0 {
-            cell.first_visits.set(cell.first_visits.get() + first_visits);
-        }
-    }
-
-    /// Sets a body's anchor and writes its new tag into the boxes it covers.
-    #[inline]
-    fn settle(&self, state: &RobotsState, cell: &BodyCell, body: &BodyType, moved: Position) {
-        let (tag, index) = (state.claims.tag(moved), moved.index(self.stride));
-        cell.anchor.set(moved.word());
-        let at = |offset: i32| index.wrapping_add_signed(offset) as usize;
-        match state.claims.tags() {
-            Tags::Narrow(tags) => body.own.iter().for_each(|&o| tags.set(at(o), tag as u8)),
-            Tags::Wide(tags) => body.own.iter().for_each(|&o| tags.set(at(o), tag)),
+        if body.marks {
+            let new = |&offset: &i32| state.visited.insert(at(offset));
+            let first_visits = whole.enter.iter().filter(|offset| new(offset)).count();
+            cell.first_visits.set(cell.first_visits.get() + first_visits as u32);
         }
     }
 
     /// A walk that may be cut short by something in the way.
-    fn blocked(
+    fn blocked<T: BoxWord>(
         &self,
         walk: &Walk,
-        state: &RobotsState,
+        (floor, state): On<'_, T>,
         now: Cycle,
         slot: Slot,
         scratch: &mut Scratch,
     ) {
         let i = slot as usize;
-        let verdict = self.judge(walk, state, slot);
-        let is_mover = matches!(self.body_type(slot).role, Role::Mover(_));
+        let verdict = self.judge(walk, (floor, state), slot);
+        let is_mover = matches!(state.type_in(self, slot).role, Role::Mover(_));
         let made = match self.obstacle_rule {
             _ if verdict.contact.is_none() => verdict.steps,
             ObstacleRule::Cut if !is_mover => verdict.steps,
             _ => 0,
         };
-        self.make(walk, made, state, slot);
+        self.make(walk, made, (floor, state), slot);
         if is_mover {
             return;
         }
@@ -168,9 +160,9 @@ impl RobotsWorld {
             }
             Some((kind, side)) => {
                 state.bodies[i].contact.set(contact_word(kind, side as u8));
-                state.contacts.add(i * self.kinds.len() + usize::from(kind), 1);
+                let body = state.bodies[i].id;
+                state.contacts.add(body as usize * self.kinds.len() + usize::from(kind), 1);
                 if scratch.keep_events {
-                    let body = self.bodies[i].id;
                     let event = EventKind::Contact { kind, side };
                     scratch.events.push(Event { cycle: now, body, event });
                 }
@@ -180,64 +172,52 @@ impl RobotsWorld {
 
     /// How far a walk gets: to the first step that enters a box that is not free.
     #[inline]
-    pub(super) fn judge(&self, walk: &Walk, state: &RobotsState, slot: Slot) -> Verdict {
+    fn judge<T: BoxWord>(&self, walk: &Walk, (floor, state): On<'_, T>, slot: Slot) -> Verdict {
         let base = state.at(slot).index(self.stride);
         for (steps, step) in walk.steps.iter().enumerate() {
             for &offset in &step.enter {
-                let kind = state.kind_at(base.wrapping_add_signed(offset));
-                if kind != FREE && !self.is_own(walk, steps, offset) {
-                    return Verdict { steps, contact: Some((kind, step.side)) };
+                let word = floor.get(base.wrapping_add_signed(offset) as usize);
+                // A path that turns back enters boxes that the body itself still covers.
+                if !word.is_free() && word.slot() != slot {
+                    return Verdict { steps, contact: Some((state.kind_of(word), step.side)) };
                 }
             }
         }
         Verdict { steps: walk.steps.len(), contact: None }
     }
 
-    /// A path that turns back enters boxes that the body itself still covers in the state.
-    #[inline]
-    fn is_own(&self, walk: &Walk, steps: usize, offset: i32) -> bool {
-        walk.steps[..steps].iter().any(|earlier| earlier.leave.contains(&offset))
-    }
-
     /// Makes the first `steps` steps of a walk.
     #[inline]
-    fn make(&self, walk: &Walk, steps: usize, state: &RobotsState, slot: Slot) {
+    fn make<T: BoxWord>(&self, walk: &Walk, steps: usize, (floor, state): On<'_, T>, slot: Slot) {
         if steps == 0 {
             return;
         }
-        let (cell, body) = (&state.bodies[slot as usize], self.body_type(slot));
-        let at = cell.at();
-        let base = at.index(self.stride);
-        let (mut moved, mut first_visits) = (at, 0);
+        let (cell, body) = (&state.bodies[slot as usize], state.type_in(self, slot));
+        let base = cell.at().index(self.stride);
+        let at = |offset: i32| base.wrapping_add_signed(offset) as usize;
+        let (mut moved, mut first_visits) = (cell.at(), 0);
         for step in &walk.steps[..steps] {
-            for &offset in &step.leave {
-                let index = base.wrapping_add_signed(offset) as usize;
-                state.grid.set(index, state.grid.get(index) & !KIND_BITS);
-            }
+            step.leave.iter().for_each(|&offset| floor.set(at(offset), T::FREE));
             for &offset in &step.enter {
-                let index = base.wrapping_add_signed(offset) as usize;
-                let before = state.grid.get(index);
-                first_visits += u32::from(before & VISITED == 0);
-                state.grid.set(index, before & VISITED | body.kind | body.marks);
+                floor.set(at(offset), T::standing(slot));
+                first_visits += u32::from(body.marks && state.visited.insert(at(offset)));
             }
             moved = moved.offset(step.delta.0, step.delta.1);
         }
-        self.settle(state, cell, body, moved);
+        cell.anchor.set(moved.word());
         cell.moves.set(cell.moves.get() + steps as u32);
-        if body.marks != 0 {
-            cell.first_visits.set(cell.first_visits.get() + first_visits);
-        }
+        cell.first_visits.set(cell.first_visits.get() + first_visits);
     }
 
     /// The distribution over the walks that are not blocked here, or the first blocked one
     /// when none is left.
-    fn rescaled(
+    fn rescaled<T: BoxWord>(
         &self,
         action: &Action,
-        state: &RobotsState,
+        on: On<'_, T>,
         slot: Slot,
     ) -> Result<Categorical, usize> {
-        let free = |walk: &Walk| self.judge(walk, state, slot).contact.is_none();
+        let free = |walk: &Walk| self.judge(walk, on, slot).contact.is_none();
         let mut row: Vec<f64> = action
             .probabilities
             .iter()
@@ -253,27 +233,27 @@ impl RobotsWorld {
     }
 
     /// Opens, or closes when nobody stands in the way; otherwise the closing waits.
-    fn toggle(&self, state: &RobotsState, now: Cycle, slot: Slot, scratch: &mut Scratch) {
+    fn toggle<T: BoxWord>(
+        &self,
+        (floor, state): On<'_, T>,
+        now: Cycle,
+        slot: Slot,
+        scratch: &mut Scratch,
+    ) {
         let i = slot as usize;
-        let body = self.body_type(slot);
+        let body = state.type_in(self, slot);
         let base = state.at(slot).index(self.stride);
-        let boxes = || body.own.iter().map(|&o| base.wrapping_add_signed(o));
         let opens = state.bodies[i].facing.get() == 0;
-        if !opens && boxes().any(|b| state.kind_at(b) != FREE) {
+        if !opens && !all_free(floor, base, &body.own) {
             return;
         }
-        if opens {
-            for b in boxes() {
-                let index = b as usize;
-                state.grid.set(index, state.grid.get(index) & !KIND_BITS);
-            }
-        } else {
-            state.occupy(self, slot);
-        }
+        let word = if opens { T::FREE } else { T::standing(slot) };
+        let at = |offset: i32| base.wrapping_add_signed(offset) as usize;
+        body.own.iter().for_each(|&offset| floor.set(at(offset), word));
         state.bodies[i].facing.set(u8::from(opens));
         if scratch.keep_events {
             let event = if opens { EventKind::Opened } else { EventKind::Closed };
-            scratch.events.push(Event { cycle: now, body: self.bodies[i].id, event });
+            scratch.events.push(Event { cycle: now, body: state.bodies[i].id, event });
         }
     }
 
@@ -300,7 +280,7 @@ impl RobotsWorld {
         }
         scratch.motion_samples.push(MotionSample {
             cycle: now,
-            robot: self.bodies[i].id,
+            robot: state.bodies[i].id,
             action: (state.bodies[i].intent.get() & !CLEAR) - 1,
             ahead,
             left,

@@ -5,7 +5,7 @@ use super::state::{CLEAR, IDLE, RobotsState};
 use super::world::{RobotsWorld, Role, purpose};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::conflict::Groups;
-use sidestep_kernel::space::{FIXED, Position, StoredTag, Tag, Tags};
+use sidestep_kernel::space::{BoxWord, Floor};
 use sidestep_kernel::{Column, Cycle, EntityId, Slot};
 
 /// The order within a conflict group.
@@ -53,65 +53,46 @@ pub(super) struct Place {
 }
 
 impl RobotsWorld {
-    /// Joins a body with all whose claims meet its own: a box that it may come to cover has
-    /// another's tag, be it of a body that stands there or of one that may come too.
+    /// Joins a body with all whose claims meet its own: a box that it may come to cover names
+    /// another, be it one that stands there or one that may come too.
     #[inline]
     pub(super) fn join_one(&self, state: &RobotsState, slot: Slot, groups: &Groups) {
         let intent = state.bodies[slot as usize].intent.get();
         if intent == IDLE {
             return;
         }
-        match state.claims.tags() {
-            Tags::Narrow(tags) => self.join_in(tags, state, slot, intent, groups),
-            Tags::Wide(tags) => self.join_in(tags, state, slot, intent, groups),
+        match &state.floor {
+            Floor::Narrow(floor) => self.join_on(floor, state, slot, intent, groups),
+            Floor::Wide(floor) => self.join_on(floor, state, slot, intent, groups),
         }
     }
 
     #[inline]
-    fn join_in<T: StoredTag>(
+    fn join_on<T: BoxWord>(
         &self,
-        tags: &Column<T>,
+        floor: &Column<T>,
         state: &RobotsState,
         slot: Slot,
         intent: u8,
         groups: &Groups,
     ) {
-        let at = state.at(slot);
-        let (base, own) = (at.index(self.stride), T::of(state.tag(self, slot)));
-        let mut last_met = None;
-        let mut look = |index: usize| {
-            let tag = tags.get(index);
-            if tag != own {
-                self.meet(state, slot, (index as u32, tag.tag()), &mut last_met, groups);
+        // A neighbor is often met in several boxes.
+        let mut last_met = slot;
+        let mut meet = |word: T| {
+            let other = word.slot();
+            if other != slot && other != last_met {
+                last_met = other;
+                groups.join(slot, other);
             }
         };
         if intent & CLEAR == 0 {
-            return self.for_each_claimed(state, slot, base, |index, _| look(index));
+            return self.for_each_claimed(floor, state, slot, |_, word| meet(word));
         }
         let cell = &state.bodies[slot as usize];
-        let boxes =
-            &*self.types[usize::from(cell.ty)].actions[usize::from(cell.action.get())].claims;
-        boxes.iter().for_each(|&offset| look(base.wrapping_add_signed(offset) as usize));
-    }
-
-    /// Joins a body with the one whose tag stands in a box. A neighbor is often met in
-    /// several boxes; `last_met` saves looking it up again.
-    fn meet(
-        &self,
-        state: &RobotsState,
-        slot: Slot,
-        (index, tag): (u32, Tag),
-        last_met: &mut Option<Position>,
-        groups: &Groups,
-    ) {
-        if tag == FIXED {
-            return groups.join(slot, state.claims.fixed_body(index));
-        }
-        let anchor = state.claims.anchor(index, tag);
-        if *last_met != Some(anchor) {
-            *last_met = Some(anchor);
-            groups.join(slot, state.claims.body(anchor));
-        }
+        let base = cell.at().index(self.stride);
+        let body = &self.types[usize::from(cell.ty)];
+        let boxes = &*body.actions[usize::from(cell.action.get())].claims;
+        boxes.iter().for_each(|&o| meet(floor.get(base.wrapping_add_signed(o) as usize)));
     }
 
     /// Fills `scratch.order` with a group in its order of acting, and each body's draw of
@@ -153,12 +134,12 @@ impl RobotsWorld {
         draw: u32,
         first_heading: u8,
     ) -> (u8, u32, u32) {
-        let id = self.bodies[slot as usize].id;
+        let id = state.bodies[slot as usize].id;
         match self.policy {
             ConflictPolicy::Fixed => (0, 0, id),
             ConflictPolicy::Random | ConflictPolicy::Rounds => (0, draw, id),
             ConflictPolicy::ByKind => {
-                (self.kind_rank[usize::from(self.body_type(slot).kind)], draw, id)
+                (self.kind_rank[usize::from(state.type_in(self, slot).kind)], draw, id)
             }
             ConflictPolicy::RightOfWay => {
                 let rank = match self.heading_of(state, slot) {
@@ -173,7 +154,7 @@ impl RobotsWorld {
 
     /// Doors have no heading and go first.
     fn heading_of(&self, state: &RobotsState, slot: Slot) -> Option<u8> {
-        let is_door = matches!(self.body_type(slot).role, Role::Door(_));
+        let is_door = matches!(state.type_in(self, slot).role, Role::Door(_));
         (!is_door).then(|| state.bodies[slot as usize].facing.get())
     }
 

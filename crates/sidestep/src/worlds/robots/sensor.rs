@@ -4,6 +4,7 @@
 //! classes with a confusion matrix of their own). Both draws, observation and class, are
 //! independent given the true pair, so they are one draw from their joint distribution.
 
+use super::decide::UNSEEN;
 use sidestep_kernel::distr::{RowError, check_row};
 
 /// Index of the observation `nothing`, always the first.
@@ -16,6 +17,14 @@ pub struct Reading {
     pub observation: u8,
     /// Distance class, 0 the nearest; the number of classes stands for `beyond`.
     pub class: u8,
+}
+
+impl Reading {
+    /// The class, or [`UNSEEN`] where nothing is reported.
+    #[inline]
+    pub fn nearness(self) -> u8 {
+        self.class | u8::from(self.observation == NOTHING) * UNSEEN
+    }
 }
 
 /// A sensor type as data.
@@ -93,12 +102,15 @@ pub struct ReadingTable {
     pub reliable: bool,
 }
 
-/// One column of a row: below the threshold `low` is reported, else `high`.
+/// A true reading's row in a [`ReadingTable`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Row(u32);
+
+/// One column of a row: below the threshold the first is reported, else the second.
 #[derive(Debug, Clone, Copy)]
 struct Split {
     threshold: u32,
-    low: Reading,
-    high: Reading,
+    reports: [Reading; 2],
 }
 
 impl ReadingTable {
@@ -122,13 +134,25 @@ impl ReadingTable {
         Ok(Self { classes, bits, columns: columns.into(), reliable })
     }
 
-    /// What is reported for `truth` with the uniform word `u`.
+    /// The row of a true reading.
     #[inline]
-    pub fn report(&self, truth: Reading, u: u32) -> Reading {
+    pub fn row(&self, truth: Reading) -> Row {
         let row = usize::from(truth.observation) * self.classes + usize::from(truth.class);
+        Row((row << self.bits) as u32)
+    }
+
+    /// The true reading of a row.
+    pub fn truth(&self, row: Row) -> Reading {
+        let row = row.0 as usize >> self.bits;
+        Reading { observation: (row / self.classes) as u8, class: (row % self.classes) as u8 }
+    }
+
+    /// What is reported for the true reading of `row` with the uniform word `u`.
+    #[inline]
+    pub fn report(&self, row: Row, u: u32) -> Reading {
         let column = (u64::from(u) << self.bits >> 32) as usize;
-        let split = &self.columns[row << self.bits | column];
-        if u << self.bits < split.threshold { split.low } else { split.high }
+        let split = &self.columns[row.0 as usize | column];
+        split.reports[usize::from(u << self.bits >= split.threshold)]
     }
 }
 
@@ -138,12 +162,12 @@ fn alias_columns(mut row: Vec<(Reading, f64)>, n: usize) -> Vec<Split> {
     row.resize(n, (padding, 0.0));
     let mut weights: Vec<f64> = row.iter().map(|r| r.1 * n as f64).collect();
     let (mut small, mut large): (Vec<usize>, Vec<usize>) = (0..n).partition(|&i| weights[i] < 1.0);
-    let full = |reading| Split { threshold: u32::MAX, low: reading, high: reading };
+    let full = |reading| Split { threshold: u32::MAX, reports: [reading; 2] };
     let mut columns: Vec<Split> = row.iter().map(|r| full(r.0)).collect();
     while let (Some(&of), Some(from)) = (small.last(), large.last().copied()) {
         small.pop();
         let threshold = (weights[of] * (1u64 << 32) as f64).round() as u32;
-        columns[of] = Split { threshold, low: row[of].0, high: row[from].0 };
+        columns[of] = Split { threshold, reports: [row[of].0, row[from].0] };
         weights[from] -= 1.0 - weights[of];
         if weights[from] < 1.0 {
             large.pop();
@@ -153,7 +177,7 @@ fn alias_columns(mut row: Vec<(Reading, f64)>, n: usize) -> Vec<Split> {
     // What is left is full but for rounding; an impossible reading must not be among it.
     for i in small.into_iter().filter(|&i| row[i].1 == 0.0) {
         columns[i] = columns[(0..n).max_by(|&a, &b| row[a].1.total_cmp(&row[b].1)).unwrap_or(i)];
-        columns[i].low = columns[i].high;
+        columns[i].reports[0] = columns[i].reports[1];
     }
     columns
 }
@@ -177,9 +201,10 @@ mod tests {
             let mut held = [0.0; 16];
             for split in &columns {
                 let low = f64::from(split.threshold) / (1u64 << 32) as f64;
-                let is_full = split.low == split.high;
-                held[usize::from(split.low.observation)] += if is_full { 1.0 } else { low };
-                held[usize::from(split.high.observation)] += if is_full { 0.0 } else { 1.0 - low };
+                let [below, above] = split.reports.map(|r| usize::from(r.observation));
+                let is_full = below == above;
+                held[below] += if is_full { 1.0 } else { low };
+                held[above] += if is_full { 0.0 } else { 1.0 - low };
             }
             for (i, (_, p)) in row.iter().enumerate() {
                 prop_assert!((held[i] / 16.0 - p).abs() < 1e-8);

@@ -14,7 +14,7 @@ use sidestep_kernel::engine::Engine;
 use sidestep_kernel::ports::{
     ColumnSpec, ColumnType, RecordError, Recorder, SystemClock, TableSchema, Values,
 };
-use sidestep_kernel::{Cycle, Digest, EntityId, InputError, Simulation, Slot};
+use sidestep_kernel::{Cycle, Digest, EntityId, InputError, Simulation};
 use std::sync::Arc;
 
 /// Poses kept at most before they must be recorded.
@@ -146,8 +146,7 @@ impl RobotsSimulation {
     /// Orders an action for the next cycle of a robot with the behaviour `external`.
     pub fn order(&mut self, robot: EntityId, action: u8) {
         use super::decide::ORDER;
-        let slot = self.compiled.world.slot(robot) as usize;
-        self.state.bodies[slot].memory[ORDER].set(u32::from(action) + 1);
+        self.state.body(robot).memory[ORDER].set(u32::from(action) + 1);
     }
 
     /// Metrics so far.
@@ -167,7 +166,7 @@ impl RobotsSimulation {
         let world = &self.compiled.world;
         let per_body = std::mem::size_of_val(&*world.bodies)
             + std::mem::size_of_val(&*self.compiled.start)
-            + 4 * world.bodies.len() * 2;
+            + std::mem::size_of_val(&*world.robots);
         (boxes, bodies + self.engine.heap_bytes() + per_body)
     }
 
@@ -190,25 +189,20 @@ impl RobotsSimulation {
         let world = &self.compiled.world;
         let Some(frames) = &self.state.frames else { return Vec::new() };
         let cycles = (self.cycle - self.recorded) as usize;
-        let moving: Vec<Slot> = world
-            .slot_of_id
-            .iter()
-            .copied()
-            .filter(|&s| !matches!(world.body_type(s).role, Role::Door(_)))
-            .collect();
+        let moving: Vec<EntityId> =
+            (0..world.bodies.len() as EntityId).filter(|&id| !world.is_door(id)).collect();
         let rows = cycles * moving.len();
         let [mut bodies, mut cols, mut rows_, mut headings] =
             std::array::from_fn(|_| Vec::with_capacity(rows));
         let mut at_cycle = Vec::with_capacity(rows);
-        for &slot in &moving {
-            let from = slot as usize * frames.capacity + (self.recorded - frames.first) as usize;
-            let id = world.bodies[slot as usize].id;
+        for &id in &moving {
+            let from = id as usize * frames.capacity + (self.recorded - frames.first) as usize;
             bodies.extend(std::iter::repeat_n(id, cycles));
             at_cycle.extend(self.recorded..self.cycle);
             for k in from..from + cycles {
                 let (col, row, heading) = pose_of_word(frames.poses.get(k));
-                cols.push(col - super::world::BORDER);
-                rows_.push(row - super::world::BORDER);
+                cols.push(col - world.border);
+                rows_.push(row - world.border);
                 headings.push(u32::from(heading));
             }
         }
@@ -271,7 +265,7 @@ impl RobotsSimulation {
         let mut columns: [Vec<u32>; 6] = std::array::from_fn(|_| Vec::with_capacity(samples.len()));
         for s in &samples {
             let world = &self.compiled.world;
-            let Role::Robot(model) = &world.body_type(world.slot(s.robot)).role else { continue };
+            let Role::Robot(model) = &world.type_of(s.robot).role else { continue };
             let sensor = &model.body.sensors[usize::from(s.sensor)].model;
             let (truth, reported) = (name_of(s.truth, sensor), name_of(s.reported, sensor));
             let row = [
@@ -453,7 +447,7 @@ impl Simulation for RobotsSimulation {
     }
 
     fn agents(&self) -> usize {
-        self.compiled.world.robot_slots.len()
+        self.compiled.world.robots.len()
     }
 
     fn advance(&mut self, cycles: u64) -> u64 {
@@ -463,7 +457,8 @@ impl Simulation for RobotsSimulation {
             .as_ref()
             .map_or(u64::MAX, |f| f.first + f.capacity as u64 - self.cycle);
         let cycles = cycles.min(room);
-        self.engine.advance(&*self.compiled.world, &self.state, (self.cycle, cycles), &self.clock);
+        let span = (self.cycle, cycles);
+        self.engine.advance(&*self.compiled.world, &mut self.state, span, &self.clock);
         self.cycle += cycles;
         cycles
     }

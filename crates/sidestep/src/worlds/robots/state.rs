@@ -1,21 +1,17 @@
 //! All that changes in a run, in columns by slot, and its snapshot by entity id.
 
 use super::resolve::ConflictPolicy;
-use super::world::{RobotsWorld, Role};
+use super::world::{Body, BodyType, RobotsWorld};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::column::Shared;
 use sidestep_kernel::digest::Hasher;
-use sidestep_kernel::space::{ClaimGrid, FIXED, Position, Tag};
-use sidestep_kernel::{Column, Cycle, Digest, Slot};
+use sidestep_kernel::space::{BoxWord, Floor, Marks, Position};
+use sidestep_kernel::{Column, Cycle, Digest, EntityId, Slot};
 use std::sync::atomic::AtomicU64;
 
-/// A box of the grid in one byte: its kind, and whether an agent has ever been there.
-pub const KIND_BITS: u8 = 0x7f;
-/// Set in a box's byte once a robot has covered it.
-pub const VISITED: u8 = 0x80;
-/// Nothing stands here.
+/// The kind of a box in which nothing stands.
 pub const FREE: u8 = 0;
-/// The static map's walls.
+/// The kind of the static map's walls.
 pub const WALL: u8 = 1;
 
 /// Nothing intended; otherwise an action's id plus 1, with or without [`CLEAR`].
@@ -26,18 +22,22 @@ pub const CLEAR: u8 = 0x80;
 /// The state of a robots world.
 #[derive(Debug)]
 pub struct RobotsState {
-    /// Kind and visited bit per box of the padded grid.
-    pub grid: Column<u8>,
-    /// Who claims which box this cycle.
-    pub claims: ClaimGrid,
+    /// Who stands in each box of the padded grid, or claims it.
+    pub floor: Floor,
+    /// Boxes that a robot has ever covered.
+    pub visited: Marks,
     /// What changes of each body, by slot.
     pub bodies: Box<[BodyCell]>,
-    /// Contacts of each body by kind touched: `slot * kinds + kind`.
+    /// Kind of each body, by slot.
+    pub kinds: Box<[u8]>,
+    /// Slot of each entity, by id.
+    pub slot_of_id: Box<[Slot]>,
+    /// Contacts of each body by kind touched: `id * kinds + kind`.
     pub contacts: Column<u32>,
     /// Highest bid per box in the present round; empty unless the policy is `rounds`.
     pub bids: Box<[AtomicU64]>,
-    /// Last broadcast of each robot, by parity of the cycle in which it is read; empty
-    /// columns without radio.
+    /// Last broadcast of each robot by id, for either parity of the cycle in which it is read;
+    /// empty columns without radio.
     pub voice: [Column<u64>; 2],
     /// Poses at the start of each cycle, while a run is recorded.
     pub frames: Option<Frames>,
@@ -57,6 +57,10 @@ pub struct BodyCell {
     pub contact: Shared<u16>,
     /// A robot's memory.
     pub memory: [Shared<u32>; 4],
+    /// Acts every `period` cycles, constant,
+    pub period: u16,
+    /// in those where `(cycle + phase) % period` is 0, constant.
+    pub phase: u16,
     /// Unit moves made, in boxes.
     pub moves: Shared<u32>,
     /// Boxes this robot was the first to cover.
@@ -76,10 +80,21 @@ pub struct BodyCell {
 }
 
 impl BodyCell {
+    fn of(body: &Body) -> Self {
+        let &Body { id, ty, period, phase } = body;
+        Self { id, ty, period, phase, ..Self::default() }
+    }
+
     /// The lower-left box.
     #[inline(always)]
     pub fn at(&self) -> Position {
         Position::from_word(self.anchor.get())
+    }
+
+    /// Whether the body acts in this cycle.
+    #[inline]
+    pub fn is_due(&self, now: Cycle) -> bool {
+        self.period == 1 || (now + u64::from(self.phase)).is_multiple_of(u64::from(self.period))
     }
 }
 
@@ -90,7 +105,7 @@ pub struct Frames {
     pub first: Cycle,
     /// Room for this many cycles.
     pub capacity: usize,
-    /// `slot * capacity + cycle - first`, see [`pose_word`].
+    /// `id * capacity + cycle - first`, see [`pose_word`].
     pub poses: Column<u32>,
 }
 
@@ -155,20 +170,18 @@ impl RobotsState {
     /// An empty building: no body stands anywhere yet.
     pub(super) fn empty(world: &RobotsWorld) -> Self {
         let n = world.bodies.len();
+        let ids = world.storage.ids(world);
+        let mut slot_of_id: Box<[Slot]> = vec![0; n].into();
+        (0..).zip(&ids).for_each(|(slot, &id)| slot_of_id[id as usize] = slot);
         let radio = || Column::filled(if world.radio.is_some() { n } else { 0 }, 0u64);
-        let (reach, extent) = world.extent;
         let in_rounds = world.policy == ConflictPolicy::Rounds;
         let bids = if in_rounds { world.walls.len() } else { 0 };
-        let mut claims = ClaimGrid::new(world.stride, world.rows, n, reach, extent);
-        world.door_boxes().for_each(|(index, door)| claims.fix(index, door));
         Self {
-            grid: world.walls.iter().copied().collect(),
-            claims,
-            bodies: world
-                .bodies
-                .iter()
-                .map(|b| BodyCell { id: b.id, ty: b.ty, ..BodyCell::default() })
-                .collect(),
+            floor: Floor::new(world.walls.iter().map(|&kind| kind == WALL), n),
+            visited: Marks::none(world.walls.len()),
+            kinds: ids.iter().map(|&id| world.type_of(id).kind).collect(),
+            bodies: ids.iter().map(|&id| BodyCell::of(&world.bodies[id as usize])).collect(),
+            slot_of_id,
             contacts: Column::filled(n * world.kinds.len(), 0),
             bids: (0..bids).map(|_| AtomicU64::new(0)).collect(),
             voice: [radio(), radio()],
@@ -176,37 +189,63 @@ impl RobotsState {
         }
     }
 
-    /// Kind that stands in the box with this index.
+    /// Kind of what a word of the floor stands for.
     #[inline(always)]
-    pub fn kind_at(&self, index: u32) -> u8 {
-        self.grid.get(index as usize) & KIND_BITS
+    pub fn kind_of<T: BoxWord>(&self, word: T) -> u8 {
+        match word {
+            _ if word.is_free() => FREE,
+            _ if word == T::WALL => WALL,
+            _ => self.kinds[word.slot() as usize],
+        }
     }
 
-    /// The anchor of a body.
+    /// What changes of the body with this id.
+    pub fn body(&self, id: EntityId) -> &BodyCell {
+        &self.bodies[self.slot_of_id[id as usize] as usize]
+    }
+
+    /// The anchor of the body in a slot.
     #[inline(always)]
     pub fn at(&self, slot: Slot) -> Position {
         self.bodies[slot as usize].at()
     }
 
-    /// What a body claims with.
+    /// The type of the body in a slot.
     #[inline]
-    pub fn tag(&self, world: &RobotsWorld, slot: Slot) -> Tag {
-        if world.body_type(slot).actions.is_empty() {
-            FIXED
-        } else {
-            self.claims.tag(self.at(slot))
+    pub fn type_in<'a>(&self, world: &'a RobotsWorld, slot: Slot) -> &'a BodyType {
+        &world.types[usize::from(self.bodies[slot as usize].ty)]
+    }
+
+    /// Stores what is near on the map near in memory: bands of eight rows, each from west to
+    /// east.
+    pub(super) fn arrange(&mut self, world: &RobotsWorld) {
+        let place = |cell: &BodyCell| (cell.at().row() >> 3, cell.at().col(), cell.id);
+        self.bodies.sort_unstable_by_key(place);
+        for slot in 0..self.bodies.len() {
+            let cell = &self.bodies[slot];
+            self.kinds[slot] = world.types[usize::from(cell.ty)].kind;
+            self.slot_of_id[cell.id as usize] = slot as Slot;
+            if !self.is_open_door(world, slot as Slot) {
+                self.occupy(world, slot as Slot);
+            }
         }
+    }
+
+    /// Whether the body in a slot is a door through which one may go.
+    pub(super) fn is_open_door(&self, world: &RobotsWorld, slot: Slot) -> bool {
+        let cell = &self.bodies[slot as usize];
+        world.is_door(cell.id) && cell.facing.get() == 1
     }
 
     /// The state in the order of ids after `cycle` cycles.
     pub fn snapshot(&self, world: &RobotsWorld, cycle: Cycle) -> Snapshot {
-        let bodies = world.slot_of_id.iter().map(|&slot| self.record(world, slot as usize, cycle));
+        let bodies = self.slot_of_id.iter().map(|&slot| self.record(world, slot, cycle));
         Snapshot { cycle, bodies: bodies.collect(), visited: self.visited(world) }
     }
 
-    fn record(&self, world: &RobotsWorld, i: usize, cycle: Cycle) -> BodyRecord {
-        let body = &self.bodies[i];
-        let kinds = world.kinds.len();
+    fn record(&self, world: &RobotsWorld, slot: Slot, cycle: Cycle) -> BodyRecord {
+        let body = &self.bodies[slot as usize];
+        let (i, kinds) = (body.id as usize, world.kinds.len());
         let voice = &self.voice[(cycle % 2) as usize];
         BodyRecord {
             at: world.map_position(body.at()),
@@ -223,7 +262,7 @@ impl RobotsState {
     fn visited(&self, world: &RobotsWorld) -> Vec<u8> {
         let mut bits = vec![0u8; world.map_boxes().div_ceil(8)];
         for (k, index) in world.map_indices().enumerate() {
-            if self.grid.get(index) & VISITED != 0 {
+            if self.visited.contains(index) {
                 bits[k / 8] |= 1 << (k % 8);
             }
         }
@@ -235,17 +274,18 @@ impl RobotsState {
         let state = Self::empty(world);
         for (k, index) in world.map_indices().enumerate() {
             if snapshot.visited[k / 8] >> (k % 8) & 1 == 1 {
-                state.grid.set(index, state.grid.get(index) | VISITED);
+                state.visited.insert(index);
             }
         }
-        for (record, &slot) in snapshot.bodies.iter().zip(&world.slot_of_id) {
-            state.put(world, slot as usize, record);
+        for (record, &slot) in snapshot.bodies.iter().zip(&state.slot_of_id) {
+            state.put(world, slot, record);
         }
         state
     }
 
-    fn put(&self, world: &RobotsWorld, i: usize, record: &BodyRecord) {
-        let body = &self.bodies[i];
+    fn put(&self, world: &RobotsWorld, slot: Slot, record: &BodyRecord) {
+        let body = &self.bodies[slot as usize];
+        let i = body.id as usize;
         body.facing.set(record.facing);
         body.contact.set(record.contact);
         (0..4).for_each(|k| body.memory[k].set(record.memory[k]));
@@ -259,35 +299,33 @@ impl RobotsState {
         let kinds = world.kinds.len();
         record.contacts.iter().enumerate().for_each(|(k, &c)| self.contacts.set(i * kinds + k, c));
         body.anchor.set(world.grid_position(record.at).word());
-        let is_open_door =
-            matches!(world.body_type(i as Slot).role, Role::Door(_)) && record.facing == 1;
-        if !is_open_door {
-            self.occupy(world, i as Slot);
+        if !self.is_open_door(world, slot) {
+            self.occupy(world, slot);
         }
     }
 
-    /// Writes a body's kind and tag into the boxes it covers.
+    /// Lets a body stand in the boxes it covers.
     pub(super) fn occupy(&self, world: &RobotsWorld, slot: Slot) {
-        let body = world.body_type(slot);
-        let at = self.at(slot);
-        let index = at.index(world.stride);
-        let tag = self.tag(world, slot);
+        let body = self.type_in(world, slot);
+        let base = self.at(slot).index(world.stride);
         for &offset in &body.own {
-            let at = index.wrapping_add_signed(offset);
-            self.grid
-                .set(at as usize, self.grid.get(at as usize) & VISITED | body.kind | body.marks);
-            self.claims.claim(at, tag);
+            let index = base.wrapping_add_signed(offset) as usize;
+            self.floor.stand(index, slot);
+            if body.marks {
+                self.visited.insert(index);
+            }
         }
     }
 
     /// Bytes on the heap that grow with the boxes, and with the bodies.
     pub fn heap_bytes(&self) -> (usize, usize) {
-        let (claims_boxes, claims_bodies) = self.claims.heap_bytes();
         let bodies = std::mem::size_of_val(&*self.bodies)
+            + std::mem::size_of_val(&*self.kinds)
+            + std::mem::size_of_val(&*self.slot_of_id)
             + self.contacts.heap_bytes()
             + self.voice.iter().map(Column::heap_bytes).sum::<usize>();
-        let boxes = self.grid.heap_bytes() + size_of_val(&*self.bids) + claims_boxes;
-        (boxes, bodies + claims_bodies)
+        let boxes = self.floor.heap_bytes() + self.visited.heap_bytes() + size_of_val(&*self.bids);
+        (boxes, bodies)
     }
 }
 

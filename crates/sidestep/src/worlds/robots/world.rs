@@ -1,17 +1,18 @@
 //! A compiled building: everything that never changes during a run.
 
 use super::decide::{Behaviour, Sector};
-use super::effector::{Action, EffectorModel, MAX_PATH, ObstacleRule};
+use super::effector::{Action, EffectorModel, ObstacleRule};
 use super::ray::{Crossing, crossings, turn_crossing};
 use super::resolve::ConflictPolicy;
+use super::scenario::StorageOrder;
 use super::sensor::{Reading, ReadingTable, SensorModel};
 use crate::map::GridMap;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::Cycle;
+use sidestep_kernel::EntityId;
 use sidestep_kernel::distr::{Chance, RowError};
 use sidestep_kernel::space::Position;
 use sidestep_kernel::stream::Streams;
-use sidestep_kernel::{EntityId, Slot};
 use std::sync::Arc;
 
 /// What random draws of this world are for.
@@ -38,10 +39,6 @@ pub mod purpose {
         Purpose(16 + sensor as u16)
     }
 }
-
-/// Rings of wall around the map: whole paths and [`BEAM_STEP`] boxes of a beam are read at
-/// once, and may look past the first wall.
-pub(super) const BORDER: u32 = MAX_PATH as u32;
 
 /// Boxes of a beam that are read together.
 pub(super) const BEAM_STEP: usize = 4;
@@ -94,37 +91,38 @@ pub struct RobotsWorld {
     pub obstacle_rule: ObstacleRule,
     /// The order in conflict groups.
     pub policy: ConflictPolicy,
-    /// All bodies by slot.
+    /// All bodies by id.
     pub bodies: Vec<Body>,
     /// What bodies have in common.
     pub types: Vec<BodyType>,
     pub(super) kind_rank: Vec<u8>,
     pub(super) radio: Option<Radio>,
-    pub(super) robot_slots: Vec<Slot>,
-    pub(super) slot_of_id: Vec<Slot>,
+    pub(super) robots: Vec<EntityId>,
+    /// In which order states keep the bodies.
+    pub(super) storage: StorageOrder,
     pub(super) streams: Streams,
-    /// Width and height of the padded grid.
+    /// Rings of wall around the map: as many as a path has steps, since whole paths are read
+    /// at once.
+    pub(super) border: u32,
+    /// Width of the padded grid.
     pub(super) stride: u32,
-    pub(super) rows: u32,
     /// The padded grid without bodies.
     pub(super) walls: Vec<u8>,
-    /// Place and facing of each entity at the start, by id.
-    pub(super) start: Arc<[((u32, u32), u8)]>,
-    /// Reach and extent of the farthest claims, see `ClaimGrid::new`.
-    pub(super) extent: (u32, u32),
+    /// Most boxes that a claim reaches beside a body.
+    pub(super) reach: u32,
 }
 
 /// One body: who it is and when it acts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Body {
-    /// Identity, constant whatever the storage order.
+    /// Identity: its place in the list of bodies.
     pub id: EntityId,
     /// Index into the types.
     pub ty: u16,
     /// Acts every `period` cycles,
-    pub period: u32,
+    pub period: u16,
     /// in those where `(cycle + phase) % period` is 0.
-    pub phase: u32,
+    pub phase: u16,
 }
 
 impl Body {
@@ -133,12 +131,6 @@ impl Body {
         let (period, phase) = (u64::from(self.period), u64::from(self.phase));
         // Multiples of the period in `phase..cycle + phase`.
         (cycle + phase).div_ceil(period) - phase.div_ceil(period)
-    }
-
-    /// Whether the body acts in this cycle.
-    #[inline]
-    pub fn is_due(&self, now: Cycle) -> bool {
-        self.period == 1 || (now + u64::from(self.phase)).is_multiple_of(u64::from(self.period))
     }
 }
 
@@ -151,8 +143,8 @@ pub struct BodyType {
     pub size: (u32, u32),
     /// Offsets of the boxes it covers from its anchor, in the padded grid.
     pub own: Box<[i32]>,
-    /// `VISITED` for robots: they mark the boxes they cover.
-    pub marks: u8,
+    /// Robots mark the boxes they cover as visited.
+    pub marks: bool,
     /// Its actions: `heading * actions per heading + action`; none for a door.
     pub actions: Arc<[Action]>,
     /// What it does.
@@ -339,42 +331,30 @@ impl Radio {
 }
 
 impl RobotsWorld {
-    /// The type of the body in a slot.
-    #[inline]
-    pub fn body_type(&self, slot: Slot) -> &BodyType {
-        &self.types[usize::from(self.bodies[slot as usize].ty)]
+    /// The type of a body.
+    pub fn type_of(&self, id: EntityId) -> &BodyType {
+        &self.types[usize::from(self.bodies[id as usize].ty)]
     }
 
-    /// Slots of the robots.
-    pub fn robots(&self) -> &[Slot] {
-        &self.robot_slots
+    /// The robots.
+    pub fn robots(&self) -> &[EntityId] {
+        &self.robots
     }
 
-    /// Slot of an entity.
-    pub fn slot(&self, id: EntityId) -> Slot {
-        self.slot_of_id[id as usize]
-    }
-
-    /// Every box of every door, by index in the padded grid, and the door's slot.
-    pub(super) fn door_boxes(&self) -> impl Iterator<Item = (u32, Slot)> + '_ {
-        let is_door = |slot: &Slot| matches!(self.body_type(*slot).role, Role::Door(_));
-        (0..self.bodies.len() as Slot).filter(is_door).flat_map(|slot| {
-            let (at, _) = self.start[self.bodies[slot as usize].id as usize];
-            let base = self.grid_position(at).index(self.stride);
-            let own = &self.body_type(slot).own;
-            own.iter().map(move |&offset| (base.wrapping_add_signed(offset), slot))
-        })
+    /// Whether a body is a door.
+    pub fn is_door(&self, id: EntityId) -> bool {
+        matches!(self.type_of(id).role, Role::Door(_))
     }
 
     /// Map column and row of a position in the padded grid.
     #[inline]
     pub(super) fn map_position(&self, at: Position) -> (u32, u32) {
-        (at.col() - BORDER, at.row() - BORDER)
+        (at.col() - self.border, at.row() - self.border)
     }
 
     /// Position in the padded grid of a map column and row.
     pub(super) fn grid_position(&self, (col, row): (u32, u32)) -> Position {
-        Position::new(col + BORDER, row + BORDER)
+        Position::new(col + self.border, row + self.border)
     }
 
     /// Number of boxes of the map.
@@ -386,7 +366,7 @@ impl RobotsWorld {
     pub(super) fn map_indices(&self) -> impl Iterator<Item = usize> + '_ {
         let (width, height) = (self.map.width(), self.map.height());
         (0..height).flat_map(move |row| {
-            let first = ((row + BORDER) * self.stride + BORDER) as usize;
+            let first = ((row + self.border) * self.stride + self.border) as usize;
             first..first + width as usize
         })
     }

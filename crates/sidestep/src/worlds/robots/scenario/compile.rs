@@ -18,18 +18,18 @@ use crate::map::{Cell, GridMap, Rect};
 use crate::planning::{FlowField, FreeSpace};
 use crate::scenario::{OneOrMany, Source, nearest};
 use crate::worlds::robots::decide::{Behaviour, External, Goto, Replay, Sector, Shuttle, Wander};
-use crate::worlds::robots::effector::{Action, EffectorModel, Side, Transition, own_boxes};
+use crate::worlds::robots::effector::{
+    Action, EffectorModel, MAX_PATH, Side, Transition, own_boxes,
+};
 use crate::worlds::robots::resolve::ConflictPolicy;
 use crate::worlds::robots::sensor::SensorModel;
-use crate::worlds::robots::state::VISITED;
 use crate::worlds::robots::world::{
-    BORDER, Body, BodyType, Door, MountedSensor, Mover, Radio, RobotBody, RobotModel, RobotsWorld,
-    Role, purpose,
+    Body, BodyType, Door, MountedSensor, Mover, Radio, RobotBody, RobotModel, RobotsWorld, Role,
+    purpose,
 };
 use sidestep_kernel::distr::Chance;
-use sidestep_kernel::space::ClaimGrid;
 use sidestep_kernel::stream::{Purpose, Streams};
-use sidestep_kernel::{EntityId, InputError, Seed, Slot};
+use sidestep_kernel::{EntityId, InputError, Seed};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
@@ -47,7 +47,7 @@ pub type Behaviours = BTreeMap<String, Arc<dyn Behaviour>>;
 /// The order in which bodies are stored; no result depends on it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum StorageOrder {
-    /// Neighbors at the start are neighbors in memory.
+    /// Neighbors on the map are neighbors in memory; arranged anew now and then.
     #[default]
     Spatial,
     /// By entity id.
@@ -99,9 +99,10 @@ struct Compiler<'a> {
     floor: Floor,
     /// Spans by id, to name the other body when two stand on each other.
     spans: Vec<Range<usize>>,
-    /// Most boxes that a claim reaches beside a body, and most with the body itself.
+    /// Rings of wall to put around the map.
+    border: u32,
+    /// Most boxes that a claim reaches beside a body.
     reach: u32,
-    longest: u32,
 }
 
 impl<'a> Compiler<'a> {
@@ -122,6 +123,7 @@ impl<'a> Compiler<'a> {
         let kinds = kinds(&source, &file)?;
         let streams = Streams::new(Seed(file.seed));
         let floor = Floor::new(&map);
+        let border = border(&file, &effectors);
         Ok(Self {
             source,
             own,
@@ -134,8 +136,8 @@ impl<'a> Compiler<'a> {
             start: Vec::new(),
             floor,
             spans: Vec::new(),
+            border,
             reach: 0,
-            longest: 1,
             map,
             office_doors,
             file,
@@ -170,41 +172,33 @@ impl<'a> Compiler<'a> {
     }
 
     fn finish(self, order: StorageOrder) -> Result<Compiled, InputError> {
-        let slots = storage(&self.start, self.map.width(), order);
-        let mut slot_of_id = vec![0; slots.len()];
-        slots.iter().enumerate().for_each(|(slot, &id)| slot_of_id[id as usize] = slot as Slot);
-        let bodies: Vec<Body> = slots.iter().map(|&id| self.bodies[id as usize]).collect();
-        let is_robot = |b: &Body| matches!(self.types[usize::from(b.ty)].role, Role::Robot(_));
-        let mut robot_slots: Vec<Slot> =
-            (0..bodies.len() as Slot).filter(|&s| is_robot(&bodies[s as usize])).collect();
-        robot_slots.sort_unstable_by_key(|&s| bodies[s as usize].id);
-        let start: Arc<[_]> = self.start.clone().into();
+        let is_robot = |b: &&Body| matches!(self.types[usize::from(b.ty)].role, Role::Robot(_));
+        let robots = self.bodies.iter().filter(is_robot).map(|b| b.id).collect();
         let stride = self.stride();
-        let rows = self.map.height() + 2 * BORDER;
+        let rows = self.map.height() + 2 * self.border;
         let radio = self.radio()?;
         let kind_rank = self.kind_rank()?;
         let world = RobotsWorld {
-            walls: padded(&self.map, stride, rows),
+            walls: padded(&self.map, self.border, stride, rows),
             regime: self.file.regime,
             obstacle_rule: self.file.obstacle_rule,
             policy: self.file.conflict_policy,
             kinds: self.kinds,
             map: self.map,
             types: self.types,
-            bodies,
+            bodies: self.bodies,
             kind_rank,
             radio,
-            robot_slots,
-            slot_of_id,
+            robots,
+            storage: order,
             streams: self.streams,
+            border: self.border,
             stride,
-            rows,
-            start: Arc::clone(&start),
-            extent: (self.reach, self.longest + self.reach),
+            reach: self.reach,
         };
         Ok(Compiled {
             world: Arc::new(world),
-            start,
+            start: self.start.into(),
             name: self.file.name,
             seed: self.file.seed,
             cycles: self.file.cycles,
@@ -213,7 +207,7 @@ impl<'a> Compiler<'a> {
     }
 
     fn stride(&self) -> u32 {
-        self.map.width() + 2 * BORDER
+        self.map.width() + 2 * self.border
     }
 
     fn error(
@@ -268,6 +262,15 @@ impl<'a> Compiler<'a> {
             },
         )
     }
+}
+
+/// As many rings of wall as the longest path has steps, at least 1.
+fn border(file: &RobotsFile, effectors: &BTreeMap<String, Located<EffectorSection>>) -> u32 {
+    let named = file.robots.get_ref().0.iter().filter_map(|robots| robots.effector.as_ref());
+    let known = named.filter_map(|name| effectors.get(name.get_ref()));
+    let transitions = known.flat_map(|e| e.section.get_ref().actions.values());
+    let steps = transitions.flat_map(|list| list.get_ref()).map(|t| t.path.chars().count());
+    steps.max().unwrap_or(1).clamp(1, MAX_PATH) as u32
 }
 
 /// Every action at every heading, see `BodyType::actions`.
@@ -343,21 +346,20 @@ fn take<T>(sections: &mut Spanned<OneOrMany<T>>) -> (Range<usize>, Vec<T>) {
     (sections.span(), std::mem::take(&mut sections.get_mut().0))
 }
 
-/// Entity ids in the order of storage.
-fn storage(start: &[((u32, u32), u8)], width: u32, order: StorageOrder) -> Vec<EntityId> {
-    let mut ids: Vec<EntityId> = (0..start.len() as EntityId).collect();
-    match order {
-        StorageOrder::ById => {}
-        StorageOrder::Spatial => ids.sort_by_key(|&id| {
-            let ((col, row), _) = start[id as usize];
-            ((row / 16) * (width / 16 + 1) + col / 16, row, col)
-        }),
-        StorageOrder::Shuffled(by) => {
-            let streams = Streams::new(Seed(by));
-            ids.sort_by_key(|&id| streams.block(id, 0, Purpose(0), 0));
+impl StorageOrder {
+    /// Entity ids in the order of storage.
+    pub(in super::super) fn ids(self, world: &RobotsWorld) -> Vec<EntityId> {
+        let mut ids: Vec<EntityId> = (0..world.bodies.len() as EntityId).collect();
+        match self {
+            // Arranged as it goes.
+            Self::ById | Self::Spatial => {}
+            Self::Shuffled(by) => {
+                let streams = Streams::new(Seed(by));
+                ids.sort_by_key(|&id| streams.block(id, 0, Purpose(0), 0));
+            }
         }
+        ids
     }
-    ids
 }
 
 /// The presets as text, for `sidestep new` and the documentation.

@@ -10,12 +10,12 @@ pub(super) struct Group {
     pub(super) region: Option<[u32; 4]>,
     pub(super) span: Range<usize>,
     pub(super) ty: TypeOf,
-    pub(super) period: u32,
+    pub(super) period: u16,
     pub(super) phase: Option<u32>,
 }
 
 /// Number of bodies, their given places, and their period.
-pub(super) type Common = (u64, Vec<(Placing, Range<usize>)>, u32);
+pub(super) type Common = (u64, Vec<(Placing, Range<usize>)>, u16);
 
 /// Column and row, and the facing if it is not to be drawn.
 pub(super) type Placing = ((u32, u32), Option<u8>);
@@ -94,11 +94,11 @@ impl Compiler<'_> {
             let facing = facing.unwrap_or_else(|| {
                 self.streams.block(id, 0, purpose::PLACE, u16::MAX)[0] as u8 % 4
             });
-            let phase = group.phase.unwrap_or_else(|| draw(purpose::PHASE, group.period));
+            let phase = group.phase.unwrap_or_else(|| draw(purpose::PHASE, group.period.into()));
             self.start[id as usize] = (at, facing);
             self.spans[id as usize] = span;
-            self.bodies[id as usize] =
-                Body { id, ty, period: group.period, phase: phase % group.period };
+            let phase = (phase % u32::from(group.period)) as u16;
+            self.bodies[id as usize] = Body { id, ty, period: group.period, phase };
         }
         Ok(())
     }
@@ -157,16 +157,16 @@ impl Compiler<'_> {
                 ));
             }
         };
-        let steps = period.map_or(1, |p| *p.get_ref());
-        if steps == 0 {
-            let span = period.map_or(span.clone(), Spanned::span);
-            return Err(self.error(
-                span,
-                "a period of 0 cycles",
-                "give 1 (acts every cycle) or more",
-            ));
-        }
-        Ok((count, places, steps))
+        Ok((count, places, self.period(period)?))
+    }
+
+    /// The cycles from one action to the next.
+    pub(super) fn period(&self, period: Option<&Spanned<u32>>) -> Result<u16, InputError> {
+        let Some(period) = period else { return Ok(1) };
+        u16::try_from(*period.get_ref()).ok().filter(|p| *p > 0).ok_or_else(|| {
+            let cause = format!("a period of {} cycles", period.get_ref());
+            self.error(period.span(), cause, "give 1 (acts every cycle) to 65535")
+        })
     }
 
     pub(super) fn placing(&self, place: &Spanned<Vec<u32>>) -> Result<Placing, InputError> {
@@ -205,30 +205,8 @@ impl Compiler<'_> {
         role: Role,
     ) -> Result<BodyType, InputError> {
         let own = own_boxes(size, self.stride());
-        let marks = if matches!(role, Role::Robot(_)) { VISITED } else { 0 };
+        let marks = matches!(role, Role::Robot(_));
         Ok(BodyType { kind: self.kind(kind)?, size, own, marks, actions, role })
-    }
-
-    /// Notes how far the claims of a body reach, for tags that tell bodies apart.
-    pub(super) fn note_reach(
-        &mut self,
-        size: (u32, u32),
-        longest_path: usize,
-        span: &Range<usize>,
-    ) -> Result<(), InputError> {
-        let reach = longest_path as u32;
-        self.reach = self.reach.max(reach);
-        self.longest = self.longest.max(size.0.max(size.1) + reach);
-        let extent = self.longest + self.reach;
-        if extent > ClaimGrid::MAX_EXTENT {
-            let cause = format!("bodies and paths reach over {extent} boxes");
-            return Err(self.error(
-                span.clone(),
-                cause,
-                format!("keep size plus twice the longest path below {}", ClaimGrid::MAX_EXTENT),
-            ));
-        }
-        Ok(())
     }
 
     pub(super) fn size(

@@ -3,7 +3,7 @@
 use super::*;
 
 /// Farthest corner of a map: poses are recorded with 15 bits per coordinate.
-const MAX_SIDE: u32 = (1 << 15) - 2 * BORDER;
+const MAX_SIDE: u32 = (1 << 15) - 2 * MAX_PATH as u32;
 
 /// The map of a scenario, and the doors that a generated office has.
 ///
@@ -70,12 +70,12 @@ pub(super) fn load_map(
 }
 
 /// The map with its border, one byte per box, as states begin.
-pub(super) fn padded(map: &GridMap, stride: u32, rows: u32) -> Vec<u8> {
+pub(super) fn padded(map: &GridMap, border: u32, stride: u32, rows: u32) -> Vec<u8> {
     use crate::worlds::robots::state::{FREE, WALL};
     let mut grid = vec![WALL; stride as usize * rows as usize];
     let width = map.width() as usize;
     for (row, cells) in map.cells().chunks(width.max(1)).enumerate() {
-        let first = (row + BORDER as usize) * stride as usize + BORDER as usize;
+        let first = (row + border as usize) * stride as usize + border as usize;
         for (to, &cell) in grid[first..first + width].iter_mut().zip(cells) {
             *to = if cell == Cell::Free { FREE } else { WALL };
         }

@@ -21,7 +21,7 @@ impl Compiler<'_> {
                 "give a probability between 0 and 1",
             ));
         }
-        self.note_reach(size, 1, &span)?;
+        self.reach = self.reach.max(1);
         let step = [Transition { p: 1.0, path: vec![Side::Front], turn: 0 }];
         let actions = actions_at_headings(&[step.to_vec()], size, self.stride());
         let role = Role::Mover(Mover { straight: Chance::new(straight) });
@@ -47,7 +47,6 @@ impl Compiler<'_> {
         let (mut places, mut types) = (Vec::new(), Vec::new());
         for (k, (rect, at)) in rects.iter().enumerate() {
             let size = self.size([rect.width, rect.height], at.clone())?;
-            self.note_reach(size, 0, &span)?;
             // Without a given phase the doors of a section do not all toggle at once.
             let door = self.door(s, &span, k as u64, rects.len() as u64)?;
             let role = Role::Door(door);

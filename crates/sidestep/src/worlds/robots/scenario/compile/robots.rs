@@ -15,7 +15,7 @@ impl Compiler<'_> {
         let (count, places, period) =
             self.common(s.count.as_ref(), &s.at, s.period.as_ref(), &span)?;
         let size = self.robot_size(s)?;
-        let body = Arc::new(self.robot_body(s, size, &span)?);
+        let body = Arc::new(self.robot_body(s, size)?);
         let behaviour = self.behaviour(s.behaviour.as_ref(), size, &body)?;
         let actions = Arc::clone(&body.actions);
         let role = Role::Robot(RobotModel { body, behaviour });
@@ -46,7 +46,7 @@ impl Compiler<'_> {
             return Err(self.error(scen.span(), cause, "give a smaller count"));
         }
         let size = self.robot_size(s)?;
-        let body = Arc::new(self.robot_body(s, size, span)?);
+        let body = Arc::new(self.robot_body(s, size)?);
         let free = FreeSpace::of_map(&self.map);
         let (mut places, mut types) = (Vec::new(), Vec::new());
         for row in &rows[..count] {
@@ -58,7 +58,7 @@ impl Compiler<'_> {
             types.push(self.add_type(ty, span)?);
             places.push(((row.start, None), scen.span()));
         }
-        let period = s.period.as_ref().map_or(1, |p| *p.get_ref()).max(1);
+        let period = self.period(s.period.as_ref())?;
         Ok(Group {
             count: count as u64,
             places,
@@ -76,19 +76,14 @@ impl Compiler<'_> {
         self.size([side, side], span).map(|size| size.0)
     }
 
-    fn robot_body(
-        &mut self,
-        s: &RobotSection,
-        size: u32,
-        span: &Range<usize>,
-    ) -> Result<RobotBody, InputError> {
+    fn robot_body(&mut self, s: &RobotSection, size: u32) -> Result<RobotBody, InputError> {
         let sensors =
             s.sensors.iter().map(|name| self.mounted(name, size)).collect::<Result<Vec<_>, _>>()?;
         let effector = self.effector(s.effector.as_ref())?;
         let reliable = self.file.regime.reliable_effectors();
         let longest =
             effector.transitions.iter().flatten().map(|t| t.path.len()).max().unwrap_or(0);
-        self.note_reach((size, size), longest, span)?;
+        self.reach = self.reach.max(longest as u32);
         let actions =
             (0..effector.actions.len()).map(|a| effector.transitions_of(a as u8, reliable));
         let actions =

@@ -1,0 +1,165 @@
+//! Who stands in each box of a grid, or claims it: one word per box, and no lock.
+//!
+//! A box is free, a wall, or has a body standing in it. Bodies that may come to a free box
+//! write a *claim* into it, an ordinary store; where several do, the last writer stays. To
+//! whoever perceives, a claimed box is a free one. After a barrier every body reads its boxes
+//! again: any other body's number, of one that stands there or of one that claims, means a
+//! conflict with that body. All claimants of a box thus meet in its last writer, whoever that
+//! was, so the connected components are the same for every order of stores.
+//!
+//! Claims are not taken back: a claim of an earlier cycle is only ever read by a body that
+//! has written its own over it.
+
+use crate::column::{Column, Word};
+use crate::units::Slot;
+use std::ops::BitAnd;
+
+/// What a box holds, in one word. The highest bit says that nothing stands there, so the
+/// conjunction of several boxes is free when all are.
+pub trait BoxWord: Word + Eq + BitAnd<Output = Self> {
+    /// Nothing stands here, nobody claims it.
+    const FREE: Self;
+    /// Here stands a wall.
+    const WALL: Self;
+    /// Bodies that can be told apart.
+    const MAX_BODIES: usize;
+    /// The body in `slot` stands here.
+    fn standing(slot: Slot) -> Self;
+    /// Nothing stands here; the body in `slot` claims it.
+    fn claimed(slot: Slot) -> Self;
+    /// Whether nothing stands here.
+    fn is_free(self) -> bool;
+    /// The slot of the body that stands here or claims it; of no body for a wall or where
+    /// nobody claims.
+    fn slot(self) -> Slot;
+}
+
+macro_rules! box_word {
+    ($t:ty) => {
+        impl BoxWord for $t {
+            const FREE: Self = <$t>::MAX;
+            const WALL: Self = <$t>::MAX >> 1;
+            const MAX_BODIES: usize = (<$t>::MAX >> 1) as usize;
+            #[inline(always)]
+            fn standing(slot: Slot) -> Self {
+                slot as Self
+            }
+            #[inline(always)]
+            fn claimed(slot: Slot) -> Self {
+                slot as Self | !(Self::MAX >> 1)
+            }
+            #[inline(always)]
+            fn is_free(self) -> bool {
+                self > Self::MAX >> 1
+            }
+            #[inline(always)]
+            fn slot(self) -> Slot {
+                Slot::from(self & Self::MAX >> 1)
+            }
+        }
+    };
+}
+box_word! { u16 }
+box_word! { u32 }
+
+/// The boxes of a grid, row by row; match once, then work on one of the columns.
+#[derive(Debug, Clone)]
+pub enum Floor {
+    /// For up to 32,767 bodies.
+    Narrow(Column<u16>),
+    /// For more.
+    Wide(Column<u32>),
+}
+
+/// What stands in a box.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Occupant {
+    /// Nothing.
+    Nobody,
+    /// A wall.
+    Wall,
+    /// The body in this slot.
+    Body(Slot),
+}
+
+impl Floor {
+    /// A floor for `bodies` bodies, none of which stands on it yet; one entry of `walls` per
+    /// box.
+    pub fn new(walls: impl Iterator<Item = bool>, bodies: usize) -> Self {
+        fn column<T: BoxWord>(walls: impl Iterator<Item = bool>) -> Column<T> {
+            walls.map(|wall| if wall { T::WALL } else { T::FREE }).collect()
+        }
+        if bodies <= u16::MAX_BODIES {
+            Self::Narrow(column(walls))
+        } else {
+            Self::Wide(column(walls))
+        }
+    }
+
+    /// What stands in the box with this index.
+    pub fn occupant(&self, index: usize) -> Occupant {
+        fn of<T: BoxWord>(word: T) -> Occupant {
+            match word {
+                _ if word.is_free() => Occupant::Nobody,
+                _ if word == T::WALL => Occupant::Wall,
+                _ => Occupant::Body(word.slot()),
+            }
+        }
+        match self {
+            Self::Narrow(boxes) => of(boxes.get(index)),
+            Self::Wide(boxes) => of(boxes.get(index)),
+        }
+    }
+
+    /// Lets the body in `slot` stand in the box with this index.
+    pub fn stand(&self, index: usize, slot: Slot) {
+        match self {
+            Self::Narrow(boxes) => boxes.set(index, BoxWord::standing(slot)),
+            Self::Wide(boxes) => boxes.set(index, BoxWord::standing(slot)),
+        }
+    }
+
+    /// Bytes on the heap.
+    pub fn heap_bytes(&self) -> usize {
+        match self {
+            Self::Narrow(boxes) => boxes.heap_bytes(),
+            Self::Wide(boxes) => boxes.heap_bytes(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn words_tell_all_states_apart<T: BoxWord + std::fmt::Debug>(slot: Slot) {
+        let (standing, claimed) = (T::standing(slot), T::claimed(slot));
+        assert!(!standing.is_free() && !T::WALL.is_free());
+        assert!(claimed.is_free() && T::FREE.is_free());
+        assert_eq!((standing.slot(), claimed.slot()), (slot, slot));
+        assert!(standing != T::WALL && claimed != T::FREE);
+        assert!((T::FREE & claimed).is_free());
+        assert!(!(T::FREE & standing & claimed).is_free());
+    }
+
+    proptest! {
+        #[test]
+        fn a_box_is_free_claimed_walled_or_stood_in(slot in 0..(u16::MAX_BODIES as Slot)) {
+            words_tell_all_states_apart::<u16>(slot);
+            words_tell_all_states_apart::<u32>(slot);
+            words_tell_all_states_apart::<u32>(slot << 15);
+        }
+    }
+
+    #[test]
+    fn a_floor_shows_who_stands_on_it_whatever_its_width() {
+        for bodies in [2, u16::MAX_BODIES, u16::MAX_BODIES + 1] {
+            let floor = Floor::new([false, true, false].into_iter(), bodies);
+            let last = bodies as Slot - 1;
+            floor.stand(2, last);
+            let seen = [0, 1, 2].map(|index| floor.occupant(index));
+            assert_eq!(seen, [Occupant::Nobody, Occupant::Wall, Occupant::Body(last)]);
+        }
+    }
+}

@@ -1,0 +1,51 @@
+//! A set of boxes that only grows, one bit per box.
+
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+
+/// Marked boxes of a grid, by index.
+#[derive(Debug)]
+pub struct Marks(Box<[AtomicU64]>);
+
+impl Marks {
+    /// None of `boxes` boxes.
+    pub fn none(boxes: usize) -> Self {
+        Self((0..boxes.div_ceil(64)).map(|_| AtomicU64::new(0)).collect())
+    }
+
+    /// Whether a box is marked.
+    #[inline]
+    pub fn contains(&self, index: usize) -> bool {
+        self.0[index / 64].load(Relaxed) >> (index % 64) & 1 == 1
+    }
+
+    /// Marks a box, and says whether it was not marked before. Workers may mark boxes at the
+    /// same time; of those who mark the same one, one is told so.
+    #[inline]
+    pub fn insert(&self, index: usize) -> bool {
+        let (word, bit) = (&self.0[index / 64], 1 << (index % 64));
+        // Almost always it is marked already, and looking is far cheaper than exchanging.
+        word.load(Relaxed) & bit == 0 && word.fetch_or(bit, Relaxed) & bit == 0
+    }
+
+    /// Bytes on the heap.
+    pub fn heap_bytes(&self) -> usize {
+        size_of_val(&*self.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_box_is_new_once_even_to_two_threads() {
+        let marks = Marks::none(1000);
+        let new = |from: usize| (from..1000).filter(|&i| marks.insert(i)).count();
+        let total: usize = std::thread::scope(|scope| {
+            let workers = [scope.spawn(|| new(0)), scope.spawn(|| new(500))];
+            workers.into_iter().map(|w| w.join().expect("no panic")).sum()
+        });
+        assert_eq!(total, 1000);
+        assert!((0..1000).all(|i| marks.contains(i)));
+    }
+}
