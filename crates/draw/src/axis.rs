@@ -147,7 +147,7 @@ fn round_linear(extent: (f64, f64), ticks_given: bool, most: usize) -> (f64, f64
 }
 
 /// An extent that is more than one point.
-fn widened((low, high): (f64, f64)) -> (f64, f64) {
+pub(crate) fn widened((low, high): (f64, f64)) -> (f64, f64) {
     let size = low.abs().max(high.abs());
     if high - low > 1e-9 * size && high - low > 1.0 / MOST {
         return (low, high);

@@ -1,5 +1,6 @@
 //! A matrix as a picture: colored cells with their numbers, e.g. a confusion matrix.
 
+use crate::axis::widened;
 use crate::error::DrawError;
 use crate::legend::{paragraph, title_look};
 use crate::style::{FAINT_INK, INK, Style};
@@ -135,7 +136,7 @@ impl Matrix {
         let low = finite().fold(0.0, f64::min);
         let high = finite().fold(low, f64::max);
         let unit = low >= 0.0 && high <= 1.0;
-        Ok(if unit || low >= high { (low, low + 1.0) } else { (low, high) })
+        Ok(if unit { (low, low + 1.0) } else { widened((low, high)) })
     }
 
     fn number(&self, value: f64) -> String {

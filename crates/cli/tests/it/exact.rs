@@ -30,7 +30,7 @@ fn a_pomdp_is_exported_whole() {
 fn what_is_no_chain_is_refused_and_nothing_is_written() {
     let place = Place::new();
     for (args, reason) in [
-        (vec!["exact", "s.toml"], "opens"),
+        (vec!["exact", "s.toml"], "moves by itself"),
         (vec!["exact", ONE, "--set", "robots.count=2"], "count"),
         (vec!["exact", ONE, "--pomdp", "m.pomdp", "--goal", "0,0"], "--goal"),
         (vec!["exact", ONE, "--pomdp", "m.pomdp", "--goal", "x"], "column and row"),

@@ -101,6 +101,8 @@ pub struct MotionSample {
 #[derive(Debug, Default)]
 pub struct Scratch {
     readings: Vec<Reading>,
+    /// What a sensor's beams truly meet.
+    truths: Vec<sensor::Row>,
     heard: Vec<decide::Heard>,
     order: Vec<resolve::Place>,
     bids: Vec<rounds::Bid>,

@@ -1,10 +1,10 @@
 //! Pool one: bodies that are due perceive the frozen state, decide, and claim.
 
-use super::decide::{Contact, Decision, Heard, Memory, Percept, Trip, UNSEEN};
+use super::decide::{Contact, Decision, Heard, Memory, Percept, Sector, Trip, UNSEEN};
 use super::effector::{Side, Sweep};
-use super::sensor::Reading;
+use super::sensor::{Reading, Row};
 use super::state::{BodyCell, CLEAR, IDLE, RobotsState, pose_word};
-use super::world::{BEAM_STEP, Door, Mover, RobotModel, RobotsWorld, Role, purpose};
+use super::world::{Crossed, Door, MountedSensor, Mover, RobotModel, RobotsWorld, Role, purpose};
 use super::{Scratch, SensorSample};
 use sidestep_kernel::Column;
 use sidestep_kernel::space::{BoxWord, Floor};
@@ -37,11 +37,11 @@ impl RobotsWorld {
     ) {
         let cell = &state.bodies[slot as usize];
         if let Some(frames) = &state.frames {
-            let index = cell.id as usize * frames.capacity + (now - frames.first) as usize;
+            let index = (now - frames.first) as usize * frames.bodies + cell.id as usize;
             frames.poses.set(index, pose_word(cell.at(), cell.facing.get()));
         }
         let role = &self.types[usize::from(cell.ty)].role;
-        let intent = if cell.is_due(now) {
+        let intent = if cell.period == 1 || self.bodies[cell.id as usize].is_due(now) {
             match role {
                 Role::Robot(model) => self.robot_decides(model, (floor, state), now, slot, scratch),
                 Role::Mover(mover) => self.mover_draws(mover, state, now, slot),
@@ -121,41 +121,23 @@ impl RobotsWorld {
     ) -> [u8; 4] {
         let (id, heading) = (cell.id, usize::from(cell.facing.get()));
         let base = cell.at().index(self.stride);
-        let Scratch { readings, sensor_samples, keep_samples, .. } = scratch;
+        let Scratch { readings, truths, .. } = scratch;
         readings.resize(model.body.sectors.len(), Reading::default());
         let mut nearest = [UNSEEN; 4];
-        let mut reports = readings.iter_mut().zip(&model.body.sectors);
+        let mut first = 0;
         for (s, sensor) in model.body.sensors.iter().enumerate() {
-            let rays = &sensor.rays[heading];
-            let nothing = sensor.table.row(sensor.nothing);
-            let mut from = 0;
-            for (block, ends) in rays.ends.chunks(4).enumerate() {
-                let words = if sensor.table.reliable {
-                    [0; 4]
-                } else {
-                    self.streams.block(id, now, purpose::sense(s), block as u16)
-                };
-                for ((&end, word), (reading, &sector)) in ends.iter().zip(words).zip(&mut reports) {
-                    let end = usize::from(end);
-                    let truth = match first_hit(floor, base, &rays.offsets[from..end]) {
-                        Some((step, word)) => {
-                            let kind = state.kind_of(word);
-                            sensor.table.row(sensor.truth(kind, sensor.classes[from + step]))
-                        }
-                        None => nothing,
-                    };
-                    *reading = sensor.table.report(truth, word);
-                    let nearest = &mut nearest[sector as usize];
-                    *nearest = reading.nearness().min(*nearest);
-                    if *keep_samples {
-                        let (truth, sensor) = (sensor.table.truth(truth), s as u16);
-                        let reported = *reading;
-                        let sample =
-                            SensorSample { cycle: now, robot: id, sensor, truth, reported };
-                        sensor_samples.push(sample);
-                    }
-                    from = end;
-                }
+            let beams = first..first + sensor.ends.len();
+            first = beams.end;
+            let (readings, sectors) = (&mut readings[beams.clone()], &model.body.sectors[beams]);
+            cast(sensor, floor, state, (base, heading), truths);
+            let words = |block| self.streams.block(id, now, purpose::sense(s), block);
+            report(sensor, truths, words, readings.iter_mut().zip(sectors), &mut nearest);
+            if scratch.keep_samples {
+                let samples = truths.iter().zip(&*readings).map(|(&row, &reported)| {
+                    let (truth, sensor) = (sensor.table.truth(row), s as u16);
+                    SensorSample { cycle: now, robot: id, sensor, truth, reported }
+                });
+                scratch.sensor_samples.extend(samples);
             }
         }
         nearest
@@ -259,23 +241,65 @@ fn sweep<T: BoxWord>(floor: &Column<T>, sweep: &Sweep, base: u32, mut each: impl
     }
 }
 
-/// The first box along a beam that holds something: its place in the list, and what it holds.
+/// Writes the row of what each beam truly meets.
 ///
-/// Boxes are read four at a time, so lists come in fours and may reach past a wall, even past
-/// the grid's end.
+/// This and [`report`] are two small loops, each with a function to itself, since together
+/// they would run out of registers.
+#[inline(never)]
+fn cast<T: BoxWord>(
+    sensor: &MountedSensor,
+    floor: &Column<T>,
+    state: &RobotsState,
+    (base, heading): (u32, usize),
+    truths: &mut Vec<Row>,
+) {
+    let boxes = &*sensor.boxes[heading];
+    truths.clear();
+    let mut from = 0;
+    truths.extend(sensor.ends.iter().map(|&end| {
+        let beam = &boxes[from..usize::from(end)];
+        from = usize::from(end);
+        match first_hit(floor, base, beam) {
+            Some((word, class)) => sensor.table.row(sensor.truth(state.kind_of(word), class)),
+            None => sensor.nothing_row,
+        }
+    }));
+}
+
+/// The first box along a beam that holds something: what it holds, and its distance class.
 #[inline]
-fn first_hit<T: BoxWord>(floor: &Column<T>, base: u32, offsets: &[i32]) -> Option<(usize, T)> {
-    let boxes = floor.cells();
-    let look = |o: i32| boxes.get(base.wrapping_add_signed(o) as usize).map_or(T::FREE, T::load);
-    for (k, four) in offsets.as_chunks::<BEAM_STEP>().0.iter().enumerate() {
-        let [a, b, c, d] = four.map(look);
+fn first_hit<T: BoxWord>(floor: &Column<T>, base: u32, beam: &[Crossed]) -> Option<(T, u8)> {
+    let look = |offset: i32| floor.get(base.wrapping_add_signed(offset) as usize);
+    for Crossed { offsets: [a, b, c, d], classes } in beam {
+        let four = [look(*a), look(*b), look(*c), look(*d)];
+        let [a, b, c, d] = four;
         if !(a & b & c & d).is_free() {
-            let words = [a, b, c, d];
-            let first = words.iter().position(|word| !word.is_free())?;
-            return Some((BEAM_STEP * k + first, words[first]));
+            let first = four.iter().position(|word| !word.is_free())?;
+            return Some((four[first], classes[first]));
         }
     }
     None
+}
+
+/// Draws what each beam reports of what it truly meets, and notes the nearest per sector;
+/// `words` are the sensor's draws, four at a time.
+#[inline(never)]
+fn report<'a>(
+    sensor: &MountedSensor,
+    truths: &[Row],
+    words: impl Fn(u16) -> [u32; 4],
+    mut readings: impl Iterator<Item = (&'a mut Reading, &'a Sector)>,
+    nearest: &mut [u8; 4],
+) {
+    for (block, truths) in (0..).zip(truths.chunks(4)) {
+        let words = if sensor.table.reliable { [0; 4] } else { words(block) };
+        for ((&truth, word), (reading, &sector)) in truths.iter().zip(words).zip(&mut readings) {
+            let reported = sensor.table.report(truth, word);
+            *reading = reported.reading;
+            let nearest = &mut nearest[sector as usize];
+            *nearest = reported.nearness.min(*nearest);
+        }
+    }
 }
 
 /// The contact of a [`super::state::contact_word`].

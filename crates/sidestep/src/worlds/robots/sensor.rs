@@ -19,14 +19,6 @@ pub struct Reading {
     pub class: u8,
 }
 
-impl Reading {
-    /// The class, or [`UNSEEN`] where nothing is reported.
-    #[inline]
-    pub fn nearness(self) -> u8 {
-        self.class | u8::from(self.observation == NOTHING) * UNSEEN
-    }
-}
-
 /// A sensor type as data.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SensorModel {
@@ -110,7 +102,23 @@ pub struct Row(u32);
 #[derive(Debug, Clone, Copy)]
 struct Split {
     threshold: u32,
-    reports: [Reading; 2],
+    reports: [Report; 2],
+}
+
+/// What a beam reports.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Report {
+    /// The reading.
+    pub reading: Reading,
+    /// Its class, or [`UNSEEN`] where nothing is reported.
+    pub nearness: u8,
+}
+
+impl From<Reading> for Report {
+    fn from(reading: Reading) -> Self {
+        let nearness = if reading.observation == NOTHING { UNSEEN } else { reading.class };
+        Self { reading, nearness }
+    }
 }
 
 impl ReadingTable {
@@ -149,7 +157,7 @@ impl ReadingTable {
 
     /// What is reported for the true reading of `row` with the uniform word `u`.
     #[inline]
-    pub fn report(&self, row: Row, u: u32) -> Reading {
+    pub fn report(&self, row: Row, u: u32) -> Report {
         let column = (u64::from(u) << self.bits >> 32) as usize;
         let split = &self.columns[row.0 as usize | column];
         split.reports[usize::from(u << self.bits >= split.threshold)]
@@ -162,12 +170,12 @@ fn alias_columns(mut row: Vec<(Reading, f64)>, n: usize) -> Vec<Split> {
     row.resize(n, (padding, 0.0));
     let mut weights: Vec<f64> = row.iter().map(|r| r.1 * n as f64).collect();
     let (mut small, mut large): (Vec<usize>, Vec<usize>) = (0..n).partition(|&i| weights[i] < 1.0);
-    let full = |reading| Split { threshold: u32::MAX, reports: [reading; 2] };
+    let full = |reading| Split { threshold: u32::MAX, reports: [Report::from(reading); 2] };
     let mut columns: Vec<Split> = row.iter().map(|r| full(r.0)).collect();
     while let (Some(&of), Some(from)) = (small.last(), large.last().copied()) {
         small.pop();
         let threshold = (weights[of] * (1u64 << 32) as f64).round() as u32;
-        columns[of] = Split { threshold, reports: [row[of].0, row[from].0] };
+        columns[of] = Split { threshold, reports: [row[of].0.into(), row[from].0.into()] };
         weights[from] -= 1.0 - weights[of];
         if weights[from] < 1.0 {
             large.pop();
@@ -201,7 +209,7 @@ mod tests {
             let mut held = [0.0; 16];
             for split in &columns {
                 let low = f64::from(split.threshold) / (1u64 << 32) as f64;
-                let [below, above] = split.reports.map(|r| usize::from(r.observation));
+                let [below, above] = split.reports.map(|r| usize::from(r.reading.observation));
                 let is_full = below == above;
                 held[below] += if is_full { 1.0 } else { low };
                 held[above] += if is_full { 0.0 } else { 1.0 - low };

@@ -17,8 +17,14 @@ use sidestep_kernel::ports::{
 use sidestep_kernel::{Cycle, Digest, EntityId, InputError, Simulation};
 use std::sync::Arc;
 
-/// Poses kept at most before they must be recorded.
-const MAX_POSES: usize = 1 << 21;
+/// Poses kept before they must be recorded: what a processor's cache holds,
+const FEW_POSES: usize = 1 << 18;
+/// or more for very many bodies, so that cycles run at least sixteen in a row,
+const CYCLES_IN_A_ROW: usize = 16;
+/// but never more than this.
+const MAX_POSES: usize = 1 << 24;
+/// Bodies whose poses are brought together at a time: a cache line of each cycle.
+const TRANSPOSED: usize = 16;
 
 /// A run of a robots world.
 #[derive(Debug)]
@@ -112,7 +118,8 @@ impl RobotsSimulation {
         }
         if record.trajectories {
             let bodies = self.compiled.world.bodies.len();
-            let capacity = (MAX_POSES / bodies).clamp(1, 4096);
+            let wanted = (FEW_POSES / bodies).max(CYCLES_IN_A_ROW);
+            let capacity = wanted.min(MAX_POSES / bodies).clamp(1, 4096);
             self.state.frames = Some(Frames::new(self.cycle, capacity, bodies));
         }
         self.recorded = self.cycle;
@@ -191,26 +198,33 @@ impl RobotsSimulation {
         let cycles = (self.cycle - self.recorded) as usize;
         let moving: Vec<EntityId> =
             (0..world.bodies.len() as EntityId).filter(|&id| !world.is_door(id)).collect();
-        let rows = cycles * moving.len();
-        let [mut bodies, mut cols, mut rows_, mut headings] =
-            std::array::from_fn(|_| Vec::with_capacity(rows));
-        let mut at_cycle = Vec::with_capacity(rows);
-        for &id in &moving {
-            let from = id as usize * frames.capacity + (self.recorded - frames.first) as usize;
-            bodies.extend(std::iter::repeat_n(id, cycles));
-            at_cycle.extend(self.recorded..self.cycle);
-            for k in from..from + cycles {
-                let (col, row, heading) = pose_of_word(frames.poses.get(k));
-                cols.push(col - world.border);
-                rows_.push(row - world.border);
-                headings.push(u32::from(heading));
+        let [mut bodies, mut cols, mut rows, mut headings] =
+            std::array::from_fn(|_| Vec::with_capacity(cycles * moving.len()));
+        let mut at_cycle = Vec::with_capacity(cycles * moving.len());
+        let from = (self.recorded - frames.first) as usize;
+        // Poses come by cycle and leave by body: a few bodies at a time, so that what is read
+        // of a cycle lies together.
+        let mut ways = vec![Vec::with_capacity(cycles); TRANSPOSED];
+        for some in moving.chunks(TRANSPOSED) {
+            ways.iter_mut().for_each(Vec::clear);
+            for cycle in from..from + cycles {
+                for (way, &id) in ways.iter_mut().zip(some) {
+                    way.push(frames.poses.get(cycle * frames.bodies + id as usize));
+                }
+            }
+            for (way, &id) in ways.iter().zip(some) {
+                bodies.extend(std::iter::repeat_n(id, cycles));
+                at_cycle.extend(self.recorded..self.cycle);
+                cols.extend(way.iter().map(|&pose| pose_of_word(pose).0 - world.border));
+                rows.extend(way.iter().map(|&pose| pose_of_word(pose).1 - world.border));
+                headings.extend(way.iter().map(|&pose| u32::from(pose_of_word(pose).2)));
             }
         }
         vec![
             Values::U64(at_cycle),
             Values::U32(bodies),
             Values::U32(cols),
-            Values::U32(rows_),
+            Values::U32(rows),
             Values::Label(headings),
         ]
     }

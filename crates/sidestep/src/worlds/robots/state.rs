@@ -57,10 +57,8 @@ pub struct BodyCell {
     pub contact: Shared<u16>,
     /// A robot's memory.
     pub memory: [Shared<u32>; 4],
-    /// Acts every `period` cycles, constant,
-    pub period: u16,
-    /// in those where `(cycle + phase) % period` is 0, constant.
-    pub phase: u16,
+    /// Cycles from one action to the next, constant.
+    pub period: u32,
     /// Unit moves made, in boxes.
     pub moves: Shared<u32>,
     /// Boxes this robot was the first to cover.
@@ -81,8 +79,8 @@ pub struct BodyCell {
 
 impl BodyCell {
     fn of(body: &Body) -> Self {
-        let &Body { id, ty, period, phase } = body;
-        Self { id, ty, period, phase, ..Self::default() }
+        let &Body { id, ty, period, .. } = body;
+        Self { id, ty, period, ..Self::default() }
     }
 
     /// The lower-left box.
@@ -90,29 +88,25 @@ impl BodyCell {
     pub fn at(&self) -> Position {
         Position::from_word(self.anchor.get())
     }
-
-    /// Whether the body acts in this cycle.
-    #[inline]
-    pub fn is_due(&self, now: Cycle) -> bool {
-        self.period == 1 || (now + u64::from(self.phase)).is_multiple_of(u64::from(self.period))
-    }
 }
 
-/// Poses of all bodies over some cycles; each body's are together.
+/// Poses of all bodies over some cycles; those of a cycle are together.
 #[derive(Debug)]
 pub struct Frames {
     /// Cycle of the first pose.
     pub first: Cycle,
     /// Room for this many cycles.
     pub capacity: usize,
-    /// `id * capacity + cycle - first`, see [`pose_word`].
+    /// Poses of one cycle.
+    pub bodies: usize,
+    /// `(cycle - first) * bodies + id`, see [`pose_word`].
     pub poses: Column<u32>,
 }
 
 impl Frames {
     /// Room for `capacity` cycles of `bodies` bodies, from `first` on.
     pub fn new(first: Cycle, capacity: usize, bodies: usize) -> Self {
-        Self { first, capacity, poses: Column::filled(capacity * bodies, 0) }
+        Self { first, capacity, bodies, poses: Column::filled(capacity * bodies, 0) }
     }
 }
 

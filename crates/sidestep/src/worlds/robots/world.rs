@@ -5,7 +5,7 @@ use super::effector::{Action, EffectorModel, ObstacleRule};
 use super::ray::{Crossing, crossings, turn_crossing};
 use super::resolve::ConflictPolicy;
 use super::scenario::StorageOrder;
-use super::sensor::{Reading, ReadingTable, SensorModel};
+use super::sensor::{Reading, ReadingTable, Row, SensorModel};
 use crate::map::GridMap;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::Cycle;
@@ -40,7 +40,7 @@ pub mod purpose {
     }
 }
 
-/// Boxes of a beam that are read together.
+/// Boxes of a beam that are read together, even past a wall.
 pub(super) const BEAM_STEP: usize = 4;
 
 /// Which errors are switched on.
@@ -101,8 +101,8 @@ pub struct RobotsWorld {
     /// In which order states keep the bodies.
     pub(super) storage: StorageOrder,
     pub(super) streams: Streams,
-    /// Rings of wall around the map: as many as a path has steps, since whole paths are read
-    /// at once.
+    /// Rings of wall around the map, since whole paths, and [`BEAM_STEP`] boxes of a beam, are
+    /// read at once.
     pub(super) border: u32,
     /// Width of the padded grid.
     pub(super) stride: u32,
@@ -120,12 +120,18 @@ pub struct Body {
     /// Index into the types.
     pub ty: u16,
     /// Acts every `period` cycles,
-    pub period: u16,
+    pub period: u32,
     /// in those where `(cycle + phase) % period` is 0.
-    pub phase: u16,
+    pub phase: u32,
 }
 
 impl Body {
+    /// Whether the body acts in this cycle.
+    #[inline]
+    pub fn is_due(&self, now: Cycle) -> bool {
+        (now + u64::from(self.phase)).is_multiple_of(u64::from(self.period))
+    }
+
     /// How many actions the body has begun before this cycle.
     pub fn actions_before(&self, cycle: Cycle) -> u64 {
         let (period, phase) = (u64::from(self.period), u64::from(self.phase));
@@ -198,19 +204,22 @@ pub struct MountedSensor {
     /// The sensor as data.
     pub model: SensorModel,
     pub(super) table: ReadingTable,
-    pub(super) rays: [Rays; 4],
-    /// Distance class of each crossing, for all headings alike.
-    pub(super) classes: Box<[u8]>,
+    /// The boxes that its beams cross, at each heading.
+    pub(super) boxes: [Box<[Crossed]>; 4],
+    /// Where each beam's boxes end in the lists of `boxes`.
+    pub(super) ends: Box<[u16]>,
+    /// The row of each beam's report where there is nothing.
+    pub(super) nothing_row: Row,
     pub(super) nothing: Reading,
 }
 
-/// The boxes of all beams at one heading.
-#[derive(Debug)]
-pub(super) struct Rays {
-    /// Index offsets from the anchor, beam after beam.
-    pub(super) offsets: Box<[i32]>,
-    /// Where each beam's boxes end.
-    pub(super) ends: Box<[u16]>,
+/// Some boxes in a row on a beam's way.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Crossed {
+    /// Index offsets from the anchor.
+    pub(super) offsets: [i32; BEAM_STEP],
+    /// Distance class of what stands there.
+    pub(super) classes: [u8; BEAM_STEP],
 }
 
 impl MountedSensor {
@@ -228,23 +237,24 @@ impl MountedSensor {
         let range = model.range_m / box_size_m;
         let beam = |&deg: &f64| in_fours(crossings(size, deg, range));
         let beams: Vec<_> = model.bearings_deg.iter().map(beam).collect();
-        let rays = std::array::from_fn(|heading| {
-            let offset = |c: Crossing| {
-                let turned = turn_crossing(c, size, heading as u8);
+        let crossed = |four: [Crossing; BEAM_STEP], heading| Crossed {
+            offsets: four.map(|c| {
+                let turned = turn_crossing(c, size, heading);
                 turned.dy * stride as i32 + turned.dx
-            };
-            let mut ends = Vec::new();
-            let mut offsets = Vec::new();
-            for beam in &beams {
-                offsets.extend(beam.iter().map(|&c| offset(c)));
-                ends.push(offsets.len() as u16);
-            }
-            Rays { offsets: offsets.into(), ends: ends.into() }
+            }),
+            classes: four.map(|c| model.class_of(c.distance * box_size_m)),
+        };
+        let boxes = [0, 1, 2, 3]
+            .map(|heading| beams.iter().flatten().map(|&four| crossed(four, heading)).collect());
+        let mut end = 0;
+        let ends = beams.iter().map(|beam| {
+            end += beam.len() as u16;
+            end
         });
-        let classes =
-            beams.iter().flatten().map(|c| model.class_of(c.distance * box_size_m)).collect();
+        let ends = ends.collect();
         let (table, nothing) = (ReadingTable::new(&model, reliable)?, model.nothing());
-        Ok(Self { model, table, rays, classes, nothing })
+        let nothing_row = table.row(nothing);
+        Ok(Self { model, table, boxes, ends, nothing_row, nothing })
     }
 
     /// Whether every reading is the truth.
@@ -263,13 +273,13 @@ impl MountedSensor {
     }
 }
 
-/// Repeats the last crossing until the beam can be read [`BEAM_STEP`] boxes at a time: what is
-/// met first stays the same.
-fn in_fours(mut beam: Vec<Crossing>) -> Vec<Crossing> {
+/// A beam's crossings in fours; the last one is repeated, so that what is met first stays the
+/// same.
+fn in_fours(mut beam: Vec<Crossing>) -> Vec<[Crossing; BEAM_STEP]> {
     if let Some(&last) = beam.last() {
         beam.resize(beam.len().next_multiple_of(BEAM_STEP), last);
     }
-    beam
+    beam.as_chunks().0.to_vec()
 }
 
 /// A mobile object: tries one box per action.

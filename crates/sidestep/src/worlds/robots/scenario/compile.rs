@@ -24,8 +24,8 @@ use crate::worlds::robots::effector::{
 use crate::worlds::robots::resolve::ConflictPolicy;
 use crate::worlds::robots::sensor::SensorModel;
 use crate::worlds::robots::world::{
-    Body, BodyType, Door, MountedSensor, Mover, Radio, RobotBody, RobotModel, RobotsWorld, Role,
-    purpose,
+    BEAM_STEP, Body, BodyType, Door, MountedSensor, Mover, Radio, RobotBody, RobotModel,
+    RobotsWorld, Role, purpose,
 };
 use sidestep_kernel::distr::Chance;
 use sidestep_kernel::stream::{Purpose, Streams};
@@ -264,13 +264,13 @@ impl<'a> Compiler<'a> {
     }
 }
 
-/// As many rings of wall as the longest path has steps, at least 1.
+/// As many rings of wall as the longest path has steps, and as a beam may be read past a wall.
 fn border(file: &RobotsFile, effectors: &BTreeMap<String, Located<EffectorSection>>) -> u32 {
     let named = file.robots.get_ref().0.iter().filter_map(|robots| robots.effector.as_ref());
     let known = named.filter_map(|name| effectors.get(name.get_ref()));
     let transitions = known.flat_map(|e| e.section.get_ref().actions.values());
     let steps = transitions.flat_map(|list| list.get_ref()).map(|t| t.path.chars().count());
-    steps.max().unwrap_or(1).clamp(1, MAX_PATH) as u32
+    steps.max().unwrap_or(1).clamp(BEAM_STEP, MAX_PATH) as u32
 }
 
 /// Every action at every heading, see `BodyType::actions`.

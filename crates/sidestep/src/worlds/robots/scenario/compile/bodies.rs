@@ -10,12 +10,12 @@ pub(super) struct Group {
     pub(super) region: Option<[u32; 4]>,
     pub(super) span: Range<usize>,
     pub(super) ty: TypeOf,
-    pub(super) period: u16,
+    pub(super) period: u32,
     pub(super) phase: Option<u32>,
 }
 
 /// Number of bodies, their given places, and their period.
-pub(super) type Common = (u64, Vec<(Placing, Range<usize>)>, u16);
+pub(super) type Common = (u64, Vec<(Placing, Range<usize>)>, u32);
 
 /// Column and row, and the facing if it is not to be drawn.
 pub(super) type Placing = ((u32, u32), Option<u8>);
@@ -94,11 +94,11 @@ impl Compiler<'_> {
             let facing = facing.unwrap_or_else(|| {
                 self.streams.block(id, 0, purpose::PLACE, u16::MAX)[0] as u8 % 4
             });
-            let phase = group.phase.unwrap_or_else(|| draw(purpose::PHASE, group.period.into()));
+            let phase = group.phase.unwrap_or_else(|| draw(purpose::PHASE, group.period));
             self.start[id as usize] = (at, facing);
             self.spans[id as usize] = span;
-            let phase = (phase % u32::from(group.period)) as u16;
-            self.bodies[id as usize] = Body { id, ty, period: group.period, phase };
+            self.bodies[id as usize] =
+                Body { id, ty, period: group.period, phase: phase % group.period };
         }
         Ok(())
     }
@@ -161,12 +161,15 @@ impl Compiler<'_> {
     }
 
     /// The cycles from one action to the next.
-    pub(super) fn period(&self, period: Option<&Spanned<u32>>) -> Result<u16, InputError> {
-        let Some(period) = period else { return Ok(1) };
-        u16::try_from(*period.get_ref()).ok().filter(|p| *p > 0).ok_or_else(|| {
-            let cause = format!("a period of {} cycles", period.get_ref());
-            self.error(period.span(), cause, "give 1 (acts every cycle) to 65535")
-        })
+    pub(super) fn period(&self, period: Option<&Spanned<u32>>) -> Result<u32, InputError> {
+        match period {
+            None => Ok(1),
+            Some(period) if *period.get_ref() == 0 => {
+                let remedy = "give 1 (acts every cycle) or more";
+                Err(self.error(period.span(), "a period of 0 cycles", remedy))
+            }
+            Some(period) => Ok(*period.get_ref()),
+        }
     }
 
     pub(super) fn placing(&self, place: &Spanned<Vec<u32>>) -> Result<Placing, InputError> {
