@@ -65,6 +65,7 @@
 //! [`kernel::Simulation::record`] a [`kernel::ports::Recorder`]: the one in memory is here, the
 //! one that writes Parquet is in the crate `sidestep-record`.
 
+pub mod collectives;
 pub mod experiment;
 pub mod import;
 pub mod learn;

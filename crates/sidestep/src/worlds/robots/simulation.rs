@@ -204,7 +204,7 @@ impl RobotsSimulation {
         let from = (self.recorded - frames.first) as usize;
         // Poses come by cycle and leave by body: a few bodies at a time, so that what is read
         // of a cycle lies together.
-        let mut ways = vec![Vec::with_capacity(cycles); TRANSPOSED];
+        let mut ways = vec![Vec::new(); TRANSPOSED];
         for some in moving.chunks(TRANSPOSED) {
             ways.iter_mut().for_each(Vec::clear);
             for cycle in from..from + cycles {

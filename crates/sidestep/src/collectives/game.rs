@@ -1,0 +1,201 @@
+//! What is optimized.
+
+/// A finite game of common cost.
+pub trait Game {
+    /// Number of strategies of each player (shape: players), at least 1 each.
+    fn strategies(&self) -> &[usize];
+
+    /// The cost `G(x)` of a joint move, a strategy per player (eq. 1).
+    fn cost(&self, joint: &[usize]) -> f64;
+
+    /// The part of the cost that player `i` has a hand in; what it leaves out must not depend
+    /// on `joint[i]`. The same minimum for `i` with less noise from what others do among
+    /// themselves.
+    fn private_cost(&self, joint: &[usize], _player: usize) -> f64 {
+        self.cost(joint)
+    }
+
+    /// The game as a sum over pairs, if it is one: then expectations need no samples.
+    fn as_pairwise(&self) -> Option<&PairwiseGame> {
+        None
+    }
+}
+
+/// A cost that is a sum over players and pairs of players:
+/// `G(x) = sum_i own_i(x_i) + sum_{i<j} pair_ij(x_i, x_j)`.
+#[derive(Debug, Clone, Default)]
+pub struct PairwiseGame {
+    strategies: Vec<usize>,
+    own: Vec<Vec<f64>>,
+    pairs: Vec<Pair>,
+    /// Per player: its pairs, by index.
+    of_player: Vec<Vec<usize>>,
+}
+
+/// The costs of two players' strategies together.
+#[derive(Debug, Clone)]
+struct Pair {
+    a: usize,
+    b: usize,
+    /// `costs[x_a * strategies_b + x_b]`.
+    costs: Vec<f64>,
+}
+
+impl PairwiseGame {
+    /// A game of players who pay for their own strategies alone; `own[i][x]` is what strategy
+    /// `x` costs player `i`.
+    ///
+    /// # Panics
+    /// When a player has no strategy.
+    pub fn new(own: Vec<Vec<f64>>) -> Self {
+        assert!(own.iter().all(|costs| !costs.is_empty()), "every player needs a strategy");
+        let strategies: Vec<usize> = own.iter().map(Vec::len).collect();
+        Self { of_player: vec![Vec::new(); own.len()], strategies, own, pairs: Vec::new() }
+    }
+
+    /// Adds what the strategies of players `a` and `b` cost together: `costs[x_a][x_b]`, row by
+    /// row in one list. A pair that never costs anything is left out.
+    ///
+    /// # Panics
+    /// When `a` is `b`, one of them does not exist, or the list has another length.
+    pub fn add_pair(&mut self, a: usize, b: usize, costs: Vec<f64>) {
+        assert!(a != b, "a pair is two players");
+        assert_eq!(
+            costs.len(),
+            self.strategies[a] * self.strategies[b],
+            "one cost per two strategies"
+        );
+        if costs.iter().any(|&cost| cost != 0.0) {
+            self.of_player[a].push(self.pairs.len());
+            self.of_player[b].push(self.pairs.len());
+            self.pairs.push(Pair { a, b, costs });
+        }
+    }
+
+    /// Writes `E[G | x_i = x]`, less a part that is the same for all `x`, into `expected` (shape:
+    /// strategies of player `i`), where the others play `q`: the closed form of eq. 3.
+    pub fn expect(&self, player: usize, q: &[Vec<f64>], expected: &mut Vec<f64>) {
+        expected.clear();
+        expected.extend_from_slice(&self.own[player]);
+        for &index in &self.of_player[player] {
+            let Pair { a, b, costs } = &self.pairs[index];
+            let columns = self.strategies[*b];
+            if *a == player {
+                for (sum, row) in expected.iter_mut().zip(costs.chunks_exact(columns)) {
+                    *sum += row.iter().zip(&q[*b]).map(|(cost, p)| cost * p).sum::<f64>();
+                }
+            } else {
+                for (row, p) in costs.chunks_exact(columns).zip(&q[*a]) {
+                    expected.iter_mut().zip(row).for_each(|(sum, cost)| *sum += cost * p);
+                }
+            }
+        }
+    }
+
+    /// Whether players `a` and `b` can cost each other anything.
+    pub fn are_coupled(&self, a: usize, b: usize) -> bool {
+        self.of_player[a].iter().any(|&index| self.pairs[index].a == b || self.pairs[index].b == b)
+    }
+
+    fn pair_cost(&self, index: usize, joint: &[usize]) -> f64 {
+        let Pair { a, b, costs } = &self.pairs[index];
+        costs[joint[*a] * self.strategies[*b] + joint[*b]]
+    }
+}
+
+impl Game for PairwiseGame {
+    fn strategies(&self) -> &[usize] {
+        &self.strategies
+    }
+
+    fn cost(&self, joint: &[usize]) -> f64 {
+        let own: f64 = self.own.iter().zip(joint).map(|(costs, &x)| costs[x]).sum();
+        own + (0..self.pairs.len()).map(|index| self.pair_cost(index, joint)).sum::<f64>()
+    }
+
+    fn private_cost(&self, joint: &[usize], player: usize) -> f64 {
+        let pairs = self.of_player[player].iter().map(|&index| self.pair_cost(index, joint));
+        self.own[player][joint[player]] + pairs.sum::<f64>()
+    }
+
+    fn as_pairwise(&self) -> Option<&PairwiseGame> {
+        Some(self)
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// A game of any shape with costs from `costs`, repeated.
+    pub(crate) fn game(sizes: &[usize], costs: &[f64]) -> PairwiseGame {
+        let mut costs = costs.iter().copied().cycle();
+        let mut some = |n: usize| costs.by_ref().take(n).collect::<Vec<f64>>();
+        let mut game = PairwiseGame::new(sizes.iter().map(|&n| some(n)).collect());
+        for a in 0..sizes.len() {
+            for b in a + 1..sizes.len() {
+                game.add_pair(a, b, some(sizes[a] * sizes[b]));
+            }
+        }
+        game
+    }
+
+    /// All joint moves.
+    pub(crate) fn joints(sizes: &[usize]) -> Vec<Vec<usize>> {
+        sizes.iter().fold(vec![vec![]], |all, &n| {
+            let longer = |joint: &Vec<usize>| {
+                (0..n).map(|x| [joint.as_slice(), &[x]].concat()).collect::<Vec<_>>()
+            };
+            all.iter().flat_map(longer).collect()
+        })
+    }
+
+    proptest! {
+        /// Eq. 3 by enumeration of all joint moves.
+        #[test]
+        fn the_closed_form_is_the_expectation(
+            sizes in prop::collection::vec(1usize..4, 1..5),
+            costs in prop::collection::vec(-5.0f64..5.0, 7..40),
+            weights in prop::collection::vec(0.01f64..1.0, 16),
+        ) {
+            let game = game(&sizes, &costs);
+            let mut weights = weights.iter().copied().cycle();
+            let q: Vec<Vec<f64>> = sizes.iter().map(|&n| {
+                let row: Vec<f64> = weights.by_ref().take(n).collect();
+                let sum: f64 = row.iter().sum();
+                row.iter().map(|w| w / sum).collect()
+            }).collect();
+            for player in 0..sizes.len() {
+                let mut closed = Vec::new();
+                game.expect(player, &q, &mut closed);
+                let mut enumerated = vec![0.0; sizes[player]];
+                for joint in joints(&sizes) {
+                    let others = (0..sizes.len()).filter(|&j| j != player);
+                    let p: f64 = others.map(|j| q[j][joint[j]]).product();
+                    enumerated[joint[player]] += p * game.private_cost(&joint, player);
+                }
+                for (a, b) in closed.iter().zip(&enumerated) {
+                    prop_assert!((a - b).abs() < 1e-9, "{closed:?} {enumerated:?}");
+                }
+            }
+        }
+
+        /// What the private cost leaves out does not depend on the player.
+        #[test]
+        fn private_and_joint_costs_differ_by_what_others_pay(
+            sizes in prop::collection::vec(1usize..4, 2..4),
+            costs in prop::collection::vec(-5.0f64..5.0, 7..40),
+        ) {
+            let game = game(&sizes, &costs);
+            for joint in joints(&sizes) {
+                for player in 0..sizes.len() {
+                    let rest = |joint: &[usize]| game.cost(joint) - game.private_cost(joint, player);
+                    let mut other = joint.clone();
+                    other[player] = 0;
+                    prop_assert!((rest(&joint) - rest(&other)).abs() < 1e-9);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,296 @@
+//! The rounds: estimate, update, cool, until no distribution moves any more.
+
+use super::game::Game;
+use super::player::{Choice, Player, Update, Utility};
+use serde::{Deserialize, Serialize};
+
+/// How `E[G | x_i]` is found.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", tag = "kind")]
+pub enum Estimator {
+    /// From blocks of joint samples (the paper's).
+    Sampled {
+        /// Samples per block, `N_SB`.
+        block: usize,
+        /// What a block weighs after each further one, in [0, 1].
+        ageing: f64,
+    },
+    /// In closed form, for games that are sums over pairs.
+    Exact,
+}
+
+/// When the players update.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Order {
+    /// All at once, on the distributions of the round before.
+    #[default]
+    Parallel,
+    /// One after the other, each on what those before it have come to.
+    Sequence,
+}
+
+/// How to optimize.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Settings {
+    /// How expectations are found.
+    pub estimator: Estimator,
+    /// How distributions move.
+    pub update: Update,
+    /// When they move.
+    pub order: Order,
+    /// Whose cost the samples show.
+    pub utility: Utility,
+    /// Factor on the temperature after each round, in (0, 1].
+    pub cooling: f64,
+    /// When to stop.
+    pub stop: Stop,
+    /// How final strategies follow from distributions.
+    pub choice: Choice,
+}
+
+/// When to stop.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Stop {
+    /// Converged when no probability moves by more than this,
+    pub threshold: f64,
+    /// so many rounds in a row.
+    pub calm_rounds: u32,
+    /// Ends here even if not converged; the outcome says so.
+    pub max_rounds: u32,
+}
+
+impl Stop {
+    /// Counts calm rounds: the number in a row after one in which probabilities moved by at
+    /// most `change`.
+    pub fn calm(&self, so_far: u32, change: f64) -> u32 {
+        if change <= self.threshold { so_far + 1 } else { 0 }
+    }
+}
+
+/// What an optimization came to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outcome {
+    /// The chosen strategy of each player.
+    pub joint: Vec<usize>,
+    /// The distributions in the end.
+    pub q: Vec<Vec<f64>>,
+    /// Each player's estimate of `E[G | x]` in the end, up to a constant: how bad other
+    /// strategies would be.
+    pub expected: Vec<Vec<f64>>,
+    /// Rounds made.
+    pub rounds: u32,
+    /// Whether the distributions had settled, rather than the rounds run out.
+    pub converged: bool,
+}
+
+/// Optimizes a game. `uniform(player, k)` is the `k`-th uniform number in [0, 1) of a player's
+/// own stream: samples take them in order, and the one after the last makes the final draw.
+///
+/// # Panics
+/// When the estimator is exact and the game is no sum over pairs.
+pub fn optimize(
+    game: &impl Game,
+    settings: &Settings,
+    uniform: impl Fn(usize, u64) -> f64,
+) -> Outcome {
+    let mut table = RoundTable::new(game, settings, uniform);
+    let (mut rounds, mut calm) = (0, 0);
+    while calm < settings.stop.calm_rounds && rounds < settings.stop.max_rounds {
+        let change = match settings.estimator {
+            Estimator::Sampled { block, ageing } => table.sampled_round(block, ageing),
+            Estimator::Exact => table.exact_round(),
+        };
+        calm = settings.stop.calm(calm, change);
+        rounds += 1;
+    }
+    let joint = table.final_joint();
+    let converged = calm >= settings.stop.calm_rounds;
+    let expected = table.players.iter().map(|p| p.expected().to_vec()).collect();
+    let q = table.players.into_iter().map(|p| p.q).collect();
+    Outcome { joint, q, expected, rounds, converged }
+}
+
+/// The players at one table.
+struct RoundTable<'g, G, U> {
+    game: &'g G,
+    settings: &'g Settings,
+    uniform: U,
+    players: Vec<Player>,
+    /// Distributions that the players see.
+    q: Vec<Vec<f64>>,
+    /// Samples drawn by each player.
+    drawn: u64,
+}
+
+impl<'g, G: Game, U: Fn(usize, u64) -> f64> RoundTable<'g, G, U> {
+    fn new(game: &'g G, settings: &'g Settings, uniform: U) -> Self {
+        let players: Vec<Player> = game.strategies().iter().map(|&n| Player::new(n)).collect();
+        let q = players.iter().map(|p| p.q.clone()).collect();
+        Self { game, settings, uniform, players, q, drawn: 0 }
+    }
+
+    /// Returns the largest change of a probability.
+    fn exact_round(&mut self) -> f64 {
+        let game = self.game.as_pairwise().expect("exact expectations need a sum over pairs");
+        let mut change: f64 = 0.0;
+        for i in 0..self.players.len() {
+            let player = &mut self.players[i];
+            player.know(|expected| game.expect(i, &self.q, expected));
+            change = change.max(player.update(self.settings.update, self.settings.cooling));
+            if self.settings.order == Order::Sequence {
+                self.q[i].clone_from(&player.q);
+            }
+        }
+        self.q.iter_mut().zip(&self.players).for_each(|(q, p)| q.clone_from(&p.q));
+        change
+    }
+
+    /// A block of joint samples, sample `k` of all players being joint move `k`. In sequence,
+    /// each player draws a block anew with those before it.
+    fn sampled_round(&mut self, block: usize, ageing: f64) -> f64 {
+        let mut samples = self.draw_block(block);
+        let mut change: f64 = 0.0;
+        for i in 0..self.players.len() {
+            let costs: Vec<f64> = (0..block).map(|k| self.sample_cost(&samples, k, i)).collect();
+            let player = &mut self.players[i];
+            player.learn(&samples[i], &costs, ageing);
+            change = change.max(player.update(self.settings.update, self.settings.cooling));
+            if self.settings.order == Order::Sequence {
+                samples = self.draw_block(block);
+            }
+        }
+        change
+    }
+
+    /// Per player, its next `block` samples.
+    fn draw_block(&mut self, block: usize) -> Vec<Vec<usize>> {
+        let from = self.drawn;
+        self.drawn += block as u64;
+        let uniform = &self.uniform;
+        let of = |(i, player): (usize, &Player)| {
+            (from..from + block as u64).map(|k| player.draw(uniform(i, k))).collect()
+        };
+        self.players.iter().enumerate().map(of).collect()
+    }
+
+    fn sample_cost(&self, samples: &[Vec<usize>], k: usize, player: usize) -> f64 {
+        let joint: Vec<usize> = samples.iter().map(|of_player| of_player[k]).collect();
+        match self.settings.utility {
+            Utility::Joint => self.game.cost(&joint),
+            Utility::Private => self.game.private_cost(&joint, player),
+        }
+    }
+
+    fn final_joint(&self) -> Vec<usize> {
+        let choose = |(i, player): (usize, &Player)| {
+            player.choose(self.settings.choice, (self.uniform)(i, self.drawn))
+        };
+        self.players.iter().enumerate().map(choose).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::game::tests::{game, joints};
+    use super::*;
+    use sidestep_kernel::Seed;
+    use sidestep_kernel::stream::{Purpose, Streams};
+
+    const EXACT: Settings = Settings {
+        estimator: Estimator::Exact,
+        update: Update::NearestNewton { step: 0.5 },
+        order: Order::Sequence,
+        utility: Utility::Joint,
+        cooling: 0.8,
+        stop: Stop { threshold: 1e-3, calm_rounds: 3, max_rounds: 200 },
+        choice: Choice::Argmax,
+    };
+
+    fn uniform(seed: u64) -> impl Fn(usize, u64) -> f64 {
+        let streams = Streams::new(Seed(seed));
+        move |player, k| {
+            let words = streams.block(player as u32, k / 2, Purpose(1), 0);
+            f64::from(words[(k % 2) as usize]) / 4_294_967_296.0
+        }
+    }
+
+    /// Costs in which strategy 1 is best for every player whatever the others do.
+    fn easy() -> super::super::PairwiseGame {
+        let mut game = game(&[3, 3, 3], &[2.0, 0.0, 3.0]);
+        game.add_pair(0, 1, vec![1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0]);
+        game
+    }
+
+    #[test]
+    fn every_combination_finds_an_easy_minimum() {
+        let sampled = Estimator::Sampled { block: 20, ageing: 0.7 };
+        for estimator in [Estimator::Exact, sampled] {
+            for update in [Update::NearestNewton { step: 0.5 }, Update::Brouwer { step: 0.5 }] {
+                for order in [Order::Parallel, Order::Sequence] {
+                    for utility in [Utility::Joint, Utility::Private] {
+                        let settings = Settings { estimator, update, order, utility, ..EXACT };
+                        let outcome = optimize(&easy(), &settings, uniform(3));
+                        assert_eq!(outcome.joint, [1, 1, 1], "{settings:?}");
+                        assert!(outcome.converged, "{settings:?}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_exact_optimum_is_at_least_a_local_minimum() {
+        for salt in 0..40 {
+            let costs: Vec<f64> = (0..53).map(|k| uniform(salt)(1, k)).collect();
+            let sizes = [3, 4, 2, 3];
+            let game = game(&sizes, &costs);
+            let outcome = optimize(&game, &EXACT, uniform(salt));
+            let found = game.cost(&outcome.joint);
+            for joint in joints(&sizes) {
+                let apart = joint.iter().zip(&outcome.joint).filter(|(a, b)| a != b).count();
+                assert!(apart != 1 || game.cost(&joint) >= found - 1e-9, "salt {salt}");
+            }
+        }
+    }
+
+    #[test]
+    fn rounds_that_run_out_are_told() {
+        let stop = Stop { max_rounds: 2, ..EXACT.stop };
+        let outcome = optimize(&easy(), &Settings { stop, ..EXACT }, uniform(1));
+        assert_eq!((outcome.rounds, outcome.converged), (2, false));
+    }
+
+    /// The error of the estimates falls as one over the root of the number of samples: the
+    /// slope of its logarithm is -1/2, within 0.1 (fixed seeds, 64 blocks per size).
+    #[test]
+    fn sampled_estimates_approach_the_exact_ones_as_one_over_the_root_of_the_samples() {
+        let costs: Vec<f64> = (0..53).map(|k| uniform(7)(1, k)).collect();
+        let sizes = [3, 3, 3, 3];
+        let game = game(&sizes, &costs);
+        let q: Vec<Vec<f64>> = sizes.iter().map(|&n| vec![1.0 / n as f64; n]).collect();
+        let mut exact = Vec::new();
+        game.expect(0, &q, &mut exact);
+        let rms = |block: usize| {
+            let mut squares = 0.0;
+            for seed in 0..64 {
+                let players: Vec<Player> = sizes.iter().map(|&n| Player::new(n)).collect();
+                let draw = |i: usize, k: usize| players[i].draw(uniform(100 + seed)(i, k as u64));
+                let samples: Vec<usize> = (0..block).map(|k| draw(0, k)).collect();
+                let cost = |k: usize| {
+                    let joint: Vec<usize> = (0..sizes.len()).map(|i| draw(i, k)).collect();
+                    game.private_cost(&joint, 0)
+                };
+                let costs: Vec<f64> = (0..block).map(cost).collect();
+                let mut player = Player::new(3);
+                player.learn(&samples, &costs, 1.0);
+                let errors = player.expected().iter().zip(&exact).map(|(a, b)| a - b);
+                squares += errors.map(|e| e * e).sum::<f64>();
+            }
+            (squares / 64.0).sqrt()
+        };
+        let (few, many) = (rms(64), rms(4096));
+        let slope = (many / few).log2() / (4096f64 / 64.0).log2();
+        assert!((slope + 0.5).abs() < 0.1, "errors {few} and {many}: slope {slope}");
+    }
+}

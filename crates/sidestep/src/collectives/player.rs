@@ -1,0 +1,243 @@
+//! One player: its distribution over strategies, what it has learned, and how it updates.
+
+use serde::{Deserialize, Serialize};
+use sidestep_kernel::math;
+
+/// Probabilities never fall below this, so that every strategy may come back.
+const LEAST: f64 = 1e-9;
+/// Temperatures never fall below this part of the costs' scale.
+const COLDEST: f64 = 1e-12;
+
+/// How a distribution moves towards the minimum of eq. 7.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", tag = "kind")]
+pub enum Update {
+    /// `q <- q - s q [ (E[G|x] - E_q G) / T + S(q) + ln q ]`, clipped and scaled to sum 1: a
+    /// step `s` of Newton's method on the quadratic nearest to the Lagrangian.
+    NearestNewton {
+        /// Step `s`, in (0, 1].
+        step: f64,
+    },
+    /// `q <- (1 - s) q + s softmax(-E[G|x] / T)`.
+    Brouwer {
+        /// Step `s`, in (0, 1].
+        step: f64,
+    },
+}
+
+/// Whose cost a player learns from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Utility {
+    /// The cost of all (the paper's).
+    #[default]
+    Joint,
+    /// The part of it that the player has a hand in: less noise.
+    Private,
+}
+
+/// How the final strategy follows from the distribution.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Choice {
+    /// The likeliest; among equals the first.
+    #[default]
+    Argmax,
+    /// A draw from the distribution (the paper's line 27).
+    Draw,
+}
+
+/// A player of a game.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Player {
+    /// Probability of each strategy.
+    pub q: Vec<f64>,
+    /// Temperature; 0 until the first estimate says on which scale costs are.
+    pub temperature: f64,
+    /// Per strategy the aged sum of costs seen with it, and the aged number of samples.
+    sums: Vec<f64>,
+    counts: Vec<f64>,
+    expected: Vec<f64>,
+}
+
+impl Player {
+    /// A player that knows nothing: every strategy is as likely.
+    pub fn new(strategies: usize) -> Self {
+        Self {
+            q: vec![1.0 / strategies as f64; strategies],
+            temperature: 0.0,
+            sums: vec![0.0; strategies],
+            counts: vec![0.0; strategies],
+            expected: Vec::with_capacity(strategies),
+        }
+    }
+
+    /// The strategy that the uniform number `u` in [0, 1) stands for under `q`.
+    pub fn draw(&self, u: f64) -> usize {
+        let mut cumulated = 0.0;
+        let below = |p: &f64| {
+            cumulated += p;
+            u < cumulated
+        };
+        self.q.iter().position(below).unwrap_or(self.q.len() - 1)
+    }
+
+    /// The final strategy; `u` as in [`Player::draw`].
+    pub fn choose(&self, choice: Choice, u: f64) -> usize {
+        match choice {
+            Choice::Draw => self.draw(u),
+            Choice::Argmax => {
+                let better =
+                    |best: usize, x: usize| if self.q[x] > self.q[best] { x } else { best };
+                (0..self.q.len()).fold(0, better)
+            }
+        }
+    }
+
+    /// Estimates from a block of samples: strategies tried and what each cost. Estimates of
+    /// earlier blocks weigh `ageing` times as much as before; a strategy without any sample
+    /// yet is given the mean of all.
+    pub fn learn(&mut self, samples: &[usize], costs: &[f64], ageing: f64) {
+        self.sums.iter_mut().chain(&mut self.counts).for_each(|v| *v *= ageing);
+        for (&x, &cost) in samples.iter().zip(costs) {
+            self.sums[x] += cost;
+            self.counts[x] += 1.0;
+        }
+        let mean = self.sums.iter().sum::<f64>() / self.counts.iter().sum::<f64>().max(LEAST);
+        self.expected.clear();
+        let each = self.sums.iter().zip(&self.counts);
+        self.expected.extend(each.map(|(sum, n)| if *n > 0.0 { sum / n } else { mean }));
+    }
+
+    /// Takes `E[G | x]` as known; `write` fills it in.
+    pub fn know(&mut self, write: impl FnOnce(&mut Vec<f64>)) {
+        write(&mut self.expected);
+    }
+
+    /// The present estimate of `E[G | x]`, up to a constant.
+    pub fn expected(&self) -> &[f64] {
+        &self.expected
+    }
+
+    /// Moves `q` by the present estimate and then cools by the factor `cooling`. The first
+    /// temperature is the spread of the estimates. Returns the largest change of a probability.
+    pub fn update(&mut self, update: Update, cooling: f64) -> f64 {
+        let (low, high) = self
+            .expected
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &e| (l.min(e), h.max(e)));
+        let spread = high - low;
+        if self.temperature == 0.0 {
+            self.temperature = spread;
+        }
+        if spread <= 0.0 {
+            // Nothing is better than anything else.
+            return 0.0;
+        }
+        let t = self.temperature.max(COLDEST * (low.abs().max(high.abs()) + 1.0));
+        let change = match update {
+            Update::NearestNewton { step } => self.newton(step, t),
+            Update::Brouwer { step } => self.brouwer(step, t, low),
+        };
+        self.temperature *= cooling;
+        change
+    }
+
+    fn newton(&mut self, step: f64, t: f64) -> f64 {
+        let mean: f64 = self.q.iter().zip(&self.expected).map(|(q, e)| q * e).sum();
+        let entropy = -self.q.iter().map(|q| q * math::ln(*q)).sum::<f64>();
+        let expected = &self.expected;
+        let moved = |(x, q): (usize, &f64)| {
+            let force = (expected[x] - mean) / t + entropy + math::ln(*q);
+            (q - step * q * force).max(LEAST)
+        };
+        let new: Vec<f64> = self.q.iter().enumerate().map(moved).collect();
+        self.settle(&new)
+    }
+
+    fn brouwer(&mut self, step: f64, t: f64, low: f64) -> f64 {
+        let weights: Vec<f64> = self.expected.iter().map(|e| math::exp((low - e) / t)).collect();
+        let sum: f64 = weights.iter().sum();
+        let towards = |(q, w): (&f64, &f64)| ((1.0 - step) * q + step * w / sum).max(LEAST);
+        let new: Vec<f64> = self.q.iter().zip(&weights).map(towards).collect();
+        self.settle(&new)
+    }
+
+    fn settle(&mut self, new: &[f64]) -> f64 {
+        let sum: f64 = new.iter().sum();
+        let mut change: f64 = 0.0;
+        for (q, new) in self.q.iter_mut().zip(new) {
+            change = change.max((new / sum - *q).abs());
+            *q = new / sum;
+        }
+        change
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const BOTH: [Update; 2] = [Update::NearestNewton { step: 0.5 }, Update::Brouwer { step: 0.5 }];
+
+    proptest! {
+        #[test]
+        fn a_distribution_stays_one_and_prefers_what_costs_less(
+            costs in prop::collection::vec(-1e6f64..1e6, 2..12),
+            rounds in 1usize..60,
+        ) {
+            for update in BOTH {
+                let mut player = Player::new(costs.len());
+                for _ in 0..rounds {
+                    player.know(|e| e.clone_from(&costs));
+                    player.update(update, 0.8);
+                    prop_assert!((player.q.iter().sum::<f64>() - 1.0).abs() < 1e-9);
+                    prop_assert!(player.q.iter().all(|q| *q > 0.0 && q.is_finite()));
+                }
+                let best = player.choose(Choice::Argmax, 0.0);
+                prop_assert!(costs.iter().all(|&c| c >= costs[best] - 1e-9 * costs[best].abs()));
+            }
+        }
+
+        /// Where both rest, q is the Boltzmann distribution, the minimum of eq. 7.
+        #[test]
+        fn without_cooling_both_updates_rest_at_the_minimum_of_the_lagrangian(
+            costs in prop::collection::vec(0.0f64..3.0, 2..8),
+        ) {
+            let spread = costs.iter().fold(0.0f64, |m, c| m.max(*c))
+                - costs.iter().fold(f64::INFINITY, |m, c| m.min(*c));
+            prop_assume!(spread > 1e-3);
+            let weights: Vec<f64> = costs.iter().map(|c| math::exp(-c / spread)).collect();
+            let sum: f64 = weights.iter().sum();
+            for update in BOTH {
+                let mut player = Player::new(costs.len());
+                for _ in 0..200 {
+                    player.know(|e| e.clone_from(&costs));
+                    player.update(update, 1.0);
+                }
+                for (q, w) in player.q.iter().zip(&weights) {
+                    prop_assert!((q - w / sum).abs() < 1e-6, "{update:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn old_blocks_weigh_less_and_unseen_strategies_get_the_mean() {
+        let mut player = Player::new(3);
+        player.learn(&[0, 0, 1], &[1.0, 3.0, 8.0], 0.5);
+        assert_eq!(player.expected(), [2.0, 8.0, 4.0]);
+        player.learn(&[0], &[8.0], 0.5);
+        assert_eq!(player.expected(), [(2.0 + 8.0) / 2.0, 8.0, 14.0 / 2.5]);
+    }
+
+    #[test]
+    fn draws_follow_the_distribution() {
+        let mut player = Player::new(3);
+        player.q = vec![0.25, 0.5, 0.25];
+        let drawn: Vec<usize> = [0.0, 0.24, 0.25, 0.74, 0.75, 0.999].map(|u| player.draw(u)).into();
+        assert_eq!(drawn, [0, 0, 1, 1, 2, 2]);
+        assert_eq!(player.choose(Choice::Argmax, 0.9), 1);
+    }
+}

@@ -1,0 +1,311 @@
+//! Airplanes: how they move, what they are to reach, what they may do, where that leads.
+//!
+//! Plane metres, x east and y north; headings in radians, counter-clockwise from east; a
+//! positive turn rate turns left. Source: section 3 of the paper; the step is exact.
+
+use serde::{Deserialize, Serialize};
+use sidestep_kernel::math;
+
+/// A point of the plane, metres.
+pub type Point = [f64; 2];
+
+/// Distance of two points in metres.
+#[inline]
+pub fn distance_m(a: Point, b: Point) -> f64 {
+    math::hypot(a[0] - b[0], a[1] - b[1])
+}
+
+/// What an airplane can do and must keep.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Model {
+    /// Airspeed, constant.
+    pub v_m_s: f64,
+    /// Largest rate of turn.
+    pub omega_max_rad_s: f64,
+    /// Nobody else should come nearer than this.
+    pub separation_m: f64,
+    /// Number of evenly spaced turn rates, odd and at least 3.
+    pub turns: usize,
+}
+
+impl Model {
+    /// Radius of the tightest turn.
+    pub fn turn_radius_m(&self) -> f64 {
+        self.v_m_s / self.omega_max_rad_s
+    }
+}
+
+/// Where an airplane is and where it heads.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Pose {
+    /// Position.
+    pub at: Point,
+    /// Heading.
+    pub psi_rad: f64,
+}
+
+impl Pose {
+    /// The pose after `dtau_s` seconds at the turn rate `omega_rad_s`: exactly, in chord form,
+    /// which stays exact as the turn rate goes to 0.
+    #[inline]
+    pub fn step(self, v_m_s: f64, omega_rad_s: f64, dtau_s: f64) -> Self {
+        let half = 0.5 * omega_rad_s * dtau_s;
+        let chord = v_m_s * dtau_s * sinc(half);
+        let along = self.psi_rad + half;
+        Self {
+            at: [self.at[0] + chord * math::cos(along), self.at[1] + chord * math::sin(along)],
+            psi_rad: self.psi_rad + omega_rad_s * dtau_s,
+        }
+    }
+
+    /// The turn rate that would head for `goal` after `dtau_s`, within the limits.
+    #[inline]
+    pub fn steer(self, goal: Point, omega_max_rad_s: f64, dtau_s: f64) -> f64 {
+        let bearing = math::atan2(goal[1] - self.at[1], goal[0] - self.at[0]);
+        let wanted = math::wrap_angle(bearing - self.psi_rad) / dtau_s;
+        wanted.clamp(-omega_max_rad_s, omega_max_rad_s)
+    }
+}
+
+/// sin(a) / a.
+#[inline]
+fn sinc(a: f64) -> f64 {
+    if a.abs() < 1e-4 { 1.0 - a * a / 6.0 } else { math::sin(a) / a }
+}
+
+/// How time is cut and when a way-point counts as reached.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Timing {
+    /// Time between two optimizations.
+    pub dt_s: f64,
+    /// Time between two points of a prediction; divides `dt_s`.
+    pub dtau_s: f64,
+    /// Points of a prediction.
+    pub horizon: usize,
+}
+
+impl Timing {
+    /// Points of a prediction within one `dt_s`.
+    pub fn points_per_dt(&self) -> usize {
+        (self.dt_s / self.dtau_s).round() as usize
+    }
+}
+
+/// What an airplane does after its last way-point, in predictions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum After {
+    /// Flies straight on.
+    #[default]
+    Straight,
+    /// Goes on steering for the last way-point.
+    Pursue,
+}
+
+/// A way-point that an airplane flies past counts as reached when the airplane cannot get
+/// nearer to it without turning round: it is behind, and within [`Passing`] of the track.
+///
+/// Without that, an airplane whose way-point lies inside its own turning circle would orbit it
+/// for ever: the circle's centre is never within the tolerance of the circle. So an airplane
+/// also has *passed* a way-point that lies inside one of its two tightest turning circles,
+/// since steering for it would keep it on that circle.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Passing {
+    /// A way-point nearer than this is reached.
+    pub tolerance_m: f64,
+    /// Whether a way-point inside a turning circle is passed.
+    pub passes: bool,
+}
+
+impl Passing {
+    /// Whether an airplane at `pose` has done with the way-point `goal`.
+    #[inline]
+    pub fn is_done(&self, pose: Pose, goal: Point, radius_m: f64) -> bool {
+        let (dx, dy) = (goal[0] - pose.at[0], goal[1] - pose.at[1]);
+        let square = dx * dx + dy * dy;
+        if square < self.tolerance_m * self.tolerance_m {
+            return true;
+        }
+        // No point farther than a diameter lies in a turning circle.
+        if !self.passes || square >= 4.0 * radius_m * radius_m {
+            return false;
+        }
+        // The circles' centres are a radius to the left and right: the goal is inside when its
+        // distance to the nearer centre is below the radius.
+        let left = -math::sin(pose.psi_rad) * dx + math::cos(pose.psi_rad) * dy;
+        square < 2.0 * radius_m * left.abs()
+    }
+}
+
+/// An action: a turn rate, held for some time, and then proceeding to the way-point.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum Action {
+    /// The turn rate, for the whole horizon (the paper's g = 0).
+    Hold {
+        /// Turn rate.
+        omega_rad_s: f64,
+    },
+    /// The turn rate for `hold_s` (the paper's g = 1 has dt) and then proceed.
+    Then {
+        /// Turn rate.
+        omega_rad_s: f64,
+        /// How long it is held.
+        hold_s: f64,
+    },
+    /// Proceed from the start: the optimal action.
+    Proceed,
+}
+
+/// The action set of a model: `2 m + 1` actions, ordered by turn rate, then by how long it is
+/// held (for ever last of each), the optimal one last. `holds_s` are further hold times.
+pub fn actions(model: &Model, dt_s: f64, holds_s: &[f64]) -> Vec<Action> {
+    let m = model.turns;
+    let mut all = Vec::with_capacity(m * (2 + holds_s.len()) + 1);
+    for k in 0..m {
+        let part = 2.0 * k as f64 / (m - 1) as f64 - 1.0;
+        // The middle one is exactly straight.
+        let omega_rad_s = if 2 * k + 1 == m { 0.0 } else { part * model.omega_max_rad_s };
+        all.push(Action::Hold { omega_rad_s });
+        all.push(Action::Then { omega_rad_s, hold_s: dt_s });
+        all.extend(holds_s.iter().map(|&hold_s| Action::Then { omega_rad_s, hold_s }));
+    }
+    all.push(Action::Proceed);
+    all
+}
+
+/// Where an action leads.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Prediction {
+    /// Positions after 1, 2, ... steps of `dtau`.
+    pub points: Vec<Point>,
+    /// How many points count against others: those up to arrival at the last way-point.
+    pub counted: usize,
+    /// The airplane after the points of the first `dt`, and its next way-point then.
+    pub after_dt: Option<(Pose, usize)>,
+}
+
+/// Flies step by step: an action, the way-points, what comes after the last.
+#[derive(Debug, Clone, Copy)]
+pub struct Pilot<'a> {
+    /// The airplane's model.
+    pub model: &'a Model,
+    /// Its way-points.
+    pub mission: &'a [Point],
+    /// When way-points count as reached.
+    pub passing: Passing,
+    /// What comes after the last.
+    pub after: After,
+    /// Seconds per step.
+    pub dtau_s: f64,
+}
+
+impl Pilot<'_> {
+    /// The turn rate of an action in the step that begins after `flown_s` seconds of it.
+    #[inline]
+    pub fn omega_rad_s(&self, action: Action, pose: Pose, next: usize, flown_s: f64) -> f64 {
+        match action {
+            Action::Hold { omega_rad_s } => omega_rad_s,
+            Action::Then { omega_rad_s, hold_s } if flown_s < hold_s - 1e-9 => omega_rad_s,
+            _ => match (self.mission.get(next), self.after) {
+                (Some(&goal), _) => pose.steer(goal, self.model.omega_max_rad_s, self.dtau_s),
+                (None, After::Pursue) => {
+                    let last = *self.mission.last().unwrap_or(&pose.at);
+                    pose.steer(last, self.model.omega_max_rad_s, self.dtau_s)
+                }
+                (None, After::Straight) => 0.0,
+            },
+        }
+    }
+
+    /// The way-point after those that are done with at `pose`.
+    #[inline]
+    pub fn next(&self, pose: Pose, mut next: usize) -> usize {
+        while let Some(&goal) = self.mission.get(next) {
+            if !self.passing.is_done(pose, goal, self.model.turn_radius_m()) {
+                break;
+            }
+            next += 1;
+        }
+        next
+    }
+
+    /// Predicts `timing.horizon` points of an action from `pose` towards way-point `next`.
+    pub fn predict(&self, action: Action, pose: Pose, next: usize, timing: &Timing) -> Prediction {
+        let mut points = Vec::with_capacity(timing.horizon);
+        let (mut pose, mut next, mut counted) = (pose, next, timing.horizon);
+        let mut after_dt = None;
+        for k in 0..timing.horizon {
+            let omega = self.omega_rad_s(action, pose, next, k as f64 * self.dtau_s);
+            pose = pose.step(self.model.v_m_s, omega, self.dtau_s);
+            points.push(pose.at);
+            if next < self.mission.len() {
+                next = self.next(pose, next);
+                if next == self.mission.len() {
+                    counted = k + 1;
+                }
+            }
+            if k + 1 == timing.points_per_dt() {
+                after_dt = Some((pose, next));
+            }
+        }
+        Prediction { points, counted, after_dt }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn model() -> Model {
+        Model {
+            v_m_s: 35.0,
+            omega_max_rad_s: 4f64.to_radians(),
+            separation_m: 500.0,
+            turns: 5,
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn two_half_steps_are_one_step(
+            x in -1e4f64..1e4, psi_rad in -3.0f64..3.0, omega in -0.1f64..0.1, dtau_s in 0.1f64..5.0,
+        ) {
+            let pose = Pose { at: [x, -x], psi_rad };
+            let once = pose.step(35.0, omega, dtau_s);
+            let twice = pose.step(35.0, omega, dtau_s / 2.0).step(35.0, omega, dtau_s / 2.0);
+            prop_assert!(distance_m(once.at, twice.at) < 1e-8);
+            prop_assert!((once.psi_rad - twice.psi_rad).abs() < 1e-12);
+        }
+
+        /// Wherever a way-point lies, an airplane that proceeds has done with it before long.
+        #[test]
+        fn nobody_orbits_a_way_point_for_ever(
+            psi_rad in -3.2f64..3.2, x in -3000.0f64..3000.0, y in -3000.0f64..3000.0,
+            tolerance_m in 1.0f64..100.0,
+        ) {
+            let model = model();
+            let mission = [[x, y]];
+            let pilot = Pilot {
+                model: &model,
+                mission: &mission,
+                passing: Passing { tolerance_m, passes: true },
+                after: After::Straight,
+                dtau_s: 1.0,
+            };
+            let pose = Pose { at: [0.0, 0.0], psi_rad };
+            let timing = Timing { dt_s: 5.0, dtau_s: 1.0, horizon: 400 };
+            let flown = pilot.predict(Action::Proceed, pose, 0, &timing);
+            prop_assert!(flown.counted < 400, "still flying to {mission:?}");
+        }
+    }
+
+    #[test]
+    fn the_action_set_is_ordered_and_contains_straight_flight() {
+        let all = actions(&model(), 5.0, &[30.0]);
+        assert_eq!(all.len(), 5 * 3 + 1);
+        assert_eq!(all[6], Action::Hold { omega_rad_s: 0.0 });
+        assert_eq!(all[8], Action::Then { omega_rad_s: 0.0, hold_s: 30.0 });
+        assert_eq!(all[15], Action::Proceed);
+    }
+}

@@ -1,0 +1,3 @@
+//! Airplanes that avoid each other by probability collectives.
+pub mod airplane;
+pub mod objective;

@@ -1,0 +1,239 @@
+//! The objective of the paper (eq. 8 to 11): separation against deviation.
+//!
+//! ```text
+//! G(x)       = sum_{i != j} Gcol_i(x_i, x_j) + alpha sum_i Gdev_i(x_i)                (8, 9, 10)
+//! Gcol_i     = sum_k beta^(k-1) max(R_i - |f_i(x_i, k) - f_j(x_j, k)|, 0)^2           (9)
+//! Gdev_i     = |f_i(x_i, kmax) - f_i(x_i_opt, kmax)|^2                                (10)
+//! ```
+
+use super::airplane::{Point, Prediction};
+use crate::collectives::PairwiseGame;
+use serde::{Deserialize, Serialize};
+
+/// What is weighed against what.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Objective {
+    /// Weight of deviations from the optimal way.
+    pub alpha: f64,
+    /// Factor on penalties per step into the future, in (0, 1].
+    pub beta: f64,
+    /// Factor on separations in the objective: above 1, some margin is asked for.
+    pub inflation: f64,
+    /// Whether steps after either has arrived do not count.
+    pub mask: bool,
+}
+
+impl Objective {
+    /// `Gcol_i` and `Gcol_j` of two predictions, for separations `r` of `i` and `j` (eq. 9).
+    pub fn collision(&self, a: &Prediction, b: &Prediction, r: [f64; 2]) -> [f64; 2] {
+        let most = if self.mask { a.counted.min(b.counted) } else { a.points.len() };
+        let [ra, rb] = r.map(|r| r * self.inflation);
+        let widest = ra.max(rb) * ra.max(rb);
+        let (mut sums, mut weight) = ([0.0; 2], 1.0);
+        for (p, q) in a.points[..most].iter().zip(&b.points[..most]) {
+            let (dx, dy) = (p[0] - q[0], p[1] - q[1]);
+            let square = dx * dx + dy * dy;
+            if square < widest {
+                let d = square.sqrt();
+                let miss = |r: f64| (r - d).max(0.0);
+                sums[0] += weight * miss(ra) * miss(ra);
+                sums[1] += weight * miss(rb) * miss(rb);
+            }
+            weight *= self.beta;
+        }
+        sums
+    }
+
+    /// `Gdev_i`, from the ends of a prediction and of the optimal one (eq. 10).
+    pub fn deviation(&self, of: &Prediction, optimal: &Prediction) -> f64 {
+        match (of.points.last(), optimal.points.last()) {
+            (Some(p), Some(q)) => {
+                let (dx, dy) = (p[0] - q[0], p[1] - q[1]);
+                dx * dx + dy * dy
+            }
+            _ => 0.0,
+        }
+    }
+}
+
+/// An airplane's predictions, one per action, the optimal action last.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// One prediction per action.
+    pub predictions: Vec<Prediction>,
+    /// Separation asked for.
+    pub separation_m: f64,
+    boxes: Vec<Bounds>,
+}
+
+impl Options {
+    /// Options with their bounds.
+    pub fn new(predictions: Vec<Prediction>, separation_m: f64) -> Self {
+        let boxes = predictions.iter().map(|p| Bounds::of(&p.points)).collect();
+        Self { predictions, separation_m, boxes }
+    }
+}
+
+/// The smallest upright rectangle around some points.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Bounds {
+    low: Point,
+    high: Point,
+}
+
+impl Bounds {
+    fn of(points: &[Point]) -> Self {
+        let start = Self { low: [f64::INFINITY; 2], high: [f64::NEG_INFINITY; 2] };
+        points.iter().fold(start, |b, p| Self {
+            low: [b.low[0].min(p[0]), b.low[1].min(p[1])],
+            high: [b.high[0].max(p[0]), b.high[1].max(p[1])],
+        })
+    }
+
+    fn is_within(&self, other: &Self, gap_m: f64) -> bool {
+        (0..2).all(|k| {
+            self.low[k] - gap_m <= other.high[k] && other.low[k] - gap_m <= self.high[k]
+        })
+    }
+}
+
+/// The objective of a group as a game: players are airplanes, strategies actions, and
+/// `G = sum own + sum pairs` with `own_i = alpha Gdev_i` and `pair_ij = Gcol_i + Gcol_j`.
+///
+/// All that does not change during an optimization is computed here, once.
+pub fn game(objective: &Objective, group: &[Options]) -> PairwiseGame {
+    let own = group.iter().map(|options| {
+        let optimal = options.predictions.last().expect("every airplane has an optimal action");
+        let deviation = |p: &Prediction| objective.alpha * objective.deviation(p, optimal);
+        options.predictions.iter().map(deviation).collect()
+    });
+    let mut game = PairwiseGame::new(own.collect());
+    for (i, a) in group.iter().enumerate() {
+        for (j, b) in group.iter().enumerate().skip(i + 1) {
+            game.add_pair(i, j, pair_costs(objective, a, b));
+        }
+    }
+    game
+}
+
+fn pair_costs(objective: &Objective, a: &Options, b: &Options) -> Vec<f64> {
+    let r = [a.separation_m, b.separation_m];
+    let gap_m = objective.inflation * r[0].max(r[1]);
+    let mut costs = Vec::with_capacity(a.predictions.len() * b.predictions.len());
+    for (p, p_box) in a.predictions.iter().zip(&a.boxes) {
+        for (q, q_box) in b.predictions.iter().zip(&b.boxes) {
+            // Most pairs of ways never come near each other.
+            let [of_a, of_b] = match p_box.is_within(q_box, gap_m) {
+                true => objective.collision(p, q, r),
+                false => [0.0; 2],
+            };
+            costs.push(of_a + of_b);
+        }
+    }
+    costs
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::airplane::{Action, After, Model, Passing, Pilot, Pose, Timing};
+    use super::*;
+    use crate::collectives::Game;
+    use serde_json::Value;
+    use std::path::Path;
+
+    /// Independent numbers of the shared data, to 1e-9 relative.
+    #[test]
+    fn the_objective_and_its_parts_are_those_of_the_oracle() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../..");
+        let path = root.join("shared/data/oracle/collectives_cases.json");
+        let Ok(text) = std::fs::read_to_string(&path) else {
+            println!("skipped: {} is not there", path.display());
+            return;
+        };
+        let cases: Vec<Value> = serde_json::from_str(&text).expect("JSON");
+        assert_eq!(cases.len(), 5);
+        cases.iter().for_each(check);
+    }
+
+    fn near(found: f64, expected: &Value, what: &str) {
+        let expected = expected.as_f64().expect(what);
+        let error = (found - expected).abs();
+        assert!(error <= 1e-9 * expected.abs().max(1e-3), "{what}: {found} is not {expected}");
+    }
+
+    fn point(value: &Value) -> Point {
+        [value[0].as_f64().expect("x"), value[1].as_f64().expect("y")]
+    }
+
+    fn check(case: &Value) {
+        let name = case["name"].as_str().expect("a name");
+        let params = &case["params"];
+        let number = |key: &str| params[key].as_f64().expect("a number");
+        let timing = Timing {
+            dt_s: number("dt"),
+            dtau_s: number("dtau"),
+            horizon: number("kmax") as usize,
+        };
+        let objective = Objective {
+            alpha: number("alpha"),
+            beta: number("beta"),
+            inflation: 1.0,
+            mask: params["mask"] == true,
+        };
+        let after =
+            if params["after"] == "pursue" { After::Pursue } else { After::Straight };
+        let passing = Passing { tolerance_m: number("tol"), passes: false };
+        let expected = &case["expected"];
+        let mut predictions = Vec::new();
+        let planes = case["planes"].as_array().expect("planes");
+        let actions = case["actions"].as_array().expect("actions");
+        for (i, (plane, action)) in planes.iter().zip(actions).enumerate() {
+            let number = |key: &str| plane[key].as_f64().expect("a number");
+            let model = Model {
+                v_m_s: number("v"),
+                omega_max_rad_s: number("omega_max"),
+                separation_m: number("R"),
+                turns: 5,
+            };
+            let mission: Vec<Point> =
+                plane["wps"].as_array().expect("way-points").iter().map(point).collect();
+            let pilot =
+                Pilot { model: &model, mission: &mission, passing, after, dtau_s: timing.dtau_s };
+            let pose = Pose { at: [number("x"), number("y")], psi_rad: number("psi") };
+            let chosen = match action["omega"].as_f64() {
+                None => Action::Proceed,
+                Some(omega_rad_s) if action["g"] == 0 => Action::Hold { omega_rad_s },
+                Some(omega_rad_s) => Action::Then { omega_rad_s, hold_s: timing.dt_s },
+            };
+            let optimal = pilot.predict(Action::Proceed, pose, 0, &timing);
+            let prediction = pilot.predict(chosen, pose, 0, &timing);
+            for (key, k) in [("f_k1", 0), ("f_k10", 9), ("f_kmax", timing.horizon - 1)] {
+                (0..2).for_each(|c| near(prediction.points[k][c], &expected[key][i][c], name));
+            }
+            assert_eq!(expected["ka"][i].as_u64(), Some(prediction.counted as u64), "{name}");
+            near(objective.deviation(&prediction, &optimal), &expected["G_dev_i"][i], name);
+            predictions.push((prediction, optimal, model.separation_m));
+        }
+        let mut total = [0.0; 2];
+        for (i, (a, optimal, ra)) in predictions.iter().enumerate() {
+            let mut own = objective.alpha * objective.deviation(a, optimal);
+            total[1] += objective.deviation(a, optimal);
+            for (j, (b, _, rb)) in predictions.iter().enumerate().filter(|(j, _)| *j != i) {
+                let [of_a, _] = objective.collision(a, b, [*ra, *rb]);
+                near(of_a, &expected["G_col_ij"][i][j], name);
+                own += of_a;
+                total[0] += of_a;
+            }
+            near(own, &expected["G_i"][i], name);
+        }
+        near(total[0], &expected["G_col"], name);
+        near(total[1], &expected["G_dev"], name);
+        near(total[0] + objective.alpha * total[1], &expected["G"], name);
+        let options: Vec<Options> = predictions
+            .iter()
+            .map(|(p, optimal, r)| Options::new(vec![p.clone(), optimal.clone()], *r))
+            .collect();
+        let game = game(&objective, &options);
+        near(game.cost(&vec![0; options.len()]), &expected["G"], name);
+    }
+}
