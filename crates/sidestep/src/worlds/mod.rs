@@ -1,3 +1,4 @@
 //! The worlds. They stand side by side on the kernel and never import each other.
 
+pub mod airspace;
 pub mod robots;

@@ -258,12 +258,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn model() -> Model {
-        Model {
-            v_m_s: 35.0,
-            omega_max_rad_s: 4f64.to_radians(),
-            separation_m: 500.0,
-            turns: 5,
-        }
+        Model { v_m_s: 35.0, omega_max_rad_s: 4f64.to_radians(), separation_m: 500.0, turns: 5 }
     }
 
     proptest! {

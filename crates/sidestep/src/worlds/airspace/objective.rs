@@ -91,9 +91,7 @@ impl Bounds {
     }
 
     fn is_within(&self, other: &Self, gap_m: f64) -> bool {
-        (0..2).all(|k| {
-            self.low[k] - gap_m <= other.high[k] && other.low[k] - gap_m <= self.high[k]
-        })
+        (0..2).all(|k| self.low[k] - gap_m <= other.high[k] && other.low[k] - gap_m <= self.high[k])
     }
 }
 
@@ -169,19 +167,15 @@ mod tests {
         let name = case["name"].as_str().expect("a name");
         let params = &case["params"];
         let number = |key: &str| params[key].as_f64().expect("a number");
-        let timing = Timing {
-            dt_s: number("dt"),
-            dtau_s: number("dtau"),
-            horizon: number("kmax") as usize,
-        };
+        let timing =
+            Timing { dt_s: number("dt"), dtau_s: number("dtau"), horizon: number("kmax") as usize };
         let objective = Objective {
             alpha: number("alpha"),
             beta: number("beta"),
             inflation: 1.0,
             mask: params["mask"] == true,
         };
-        let after =
-            if params["after"] == "pursue" { After::Pursue } else { After::Straight };
+        let after = if params["after"] == "pursue" { After::Pursue } else { After::Straight };
         let passing = Passing { tolerance_m: number("tol"), passes: false };
         let expected = &case["expected"];
         let mut predictions = Vec::new();
