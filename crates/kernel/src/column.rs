@@ -34,6 +34,22 @@ macro_rules! word {
 }
 word! { u8, AtomicU8; u16, AtomicU16; u32, AtomicU32; u64, AtomicU64; }
 
+impl Word for f64 {
+    type Cell = AtomicU64;
+    #[inline(always)]
+    fn cell(self) -> AtomicU64 {
+        AtomicU64::new(self.to_bits())
+    }
+    #[inline(always)]
+    fn load(cell: &AtomicU64) -> Self {
+        Self::from_bits(cell.load(Relaxed))
+    }
+    #[inline(always)]
+    fn store(cell: &AtomicU64, value: Self) {
+        cell.store(value.to_bits(), Relaxed);
+    }
+}
+
 /// One value that workers share; see the module.
 pub struct Shared<T: Word>(T::Cell);
 

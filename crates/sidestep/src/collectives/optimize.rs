@@ -195,6 +195,7 @@ mod tests {
     use super::super::game::tests::{game, joints};
     use super::*;
     use sidestep_kernel::Seed;
+    use sidestep_kernel::math;
     use sidestep_kernel::stream::{Purpose, Streams};
 
     const EXACT: Settings = Settings {
@@ -290,7 +291,7 @@ mod tests {
             (squares / 64.0).sqrt()
         };
         let (few, many) = (rms(64), rms(4096));
-        let slope = (many / few).log2() / (4096f64 / 64.0).log2();
+        let slope = math::log2(many / few) / math::log2(4096.0 / 64.0);
         assert!((slope + 0.5).abs() < 0.1, "errors {few} and {many}: slope {slope}");
     }
 }

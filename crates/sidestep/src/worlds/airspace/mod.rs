@@ -1,4 +1,101 @@
 //! Airplanes that avoid each other by probability collectives.
+//!
+//! See `README.md` beside this file for the model, and the paper "Integration of Probability
+//! Collectives for Collision Avoidance in AGENTFLY" (2009) for its source.
+//!
+//! ```text
+//! scenario.rs, generate.rs -> world.rs (immutable), state.rs (cells)
+//! near each other -> groups;  decide.rs -> shield.rs -> react.rs          one cycle of dt
+//! airplane.rs, objective.rs: motion and cost behind it     metrics.rs: what came of it
+//! ```
+
 pub mod airplane;
+mod decide;
+mod generate;
+pub mod metrics;
 pub mod objective;
+mod react;
+pub mod scenario;
 pub mod shield;
+pub mod simulation;
+pub mod state;
+pub mod world;
+
+pub use decide::Effort;
+pub use react::LOOKS_PER_STEP;
+use sidestep_kernel::conflict::Groups;
+use sidestep_kernel::{Cycle, Slot, World};
+use state::{AirspaceState, PairRecord};
+use std::collections::BTreeMap;
+pub use world::AirspaceWorld;
+
+/// What a worker keeps between tasks.
+#[derive(Debug, Default)]
+pub struct Scratch {
+    /// Pairs that came near each other.
+    pairs: BTreeMap<(Slot, Slot), PairRecord>,
+    effort: Effort,
+    /// Time spent deciding: told beside the results, never part of them.
+    decide_ns: u64,
+    flying: Vec<Slot>,
+}
+
+impl World for AirspaceWorld {
+    type State = AirspaceState;
+    type Scratch = Scratch;
+
+    fn scratch(&self) -> Scratch {
+        Scratch::default()
+    }
+
+    fn bodies(&self, _: &AirspaceState) -> usize {
+        self.airplanes.len()
+    }
+
+    fn perceive_and_decide(
+        &self,
+        state: &AirspaceState,
+        now: Cycle,
+        bodies: std::ops::Range<usize>,
+        _: &mut Scratch,
+    ) {
+        for slot in bodies {
+            let cell = &state.airplanes[slot];
+            if cell.is_flying() {
+                state.neighborhood.enter(slot as Slot, cell.pose().at, now);
+            }
+        }
+    }
+
+    fn find_conflicts(
+        &self,
+        state: &AirspaceState,
+        now: Cycle,
+        bodies: std::ops::Range<usize>,
+        groups: &Groups,
+        _: &mut Scratch,
+    ) {
+        for slot in bodies.map(|slot| slot as Slot) {
+            let cell = &state.airplanes[slot as usize];
+            if !cell.is_flying() {
+                continue;
+            }
+            state.neighborhood.around(cell.pose().at, now, |other| {
+                if other < slot && state.is_near(self, slot, other) {
+                    groups.join(slot, other);
+                }
+            });
+        }
+    }
+
+    fn react(&self, state: &AirspaceState, now: Cycle, group: &mut [Slot], scratch: &mut Scratch) {
+        let mut flying = std::mem::take(&mut scratch.flying);
+        flying.clear();
+        flying.extend(group.iter().filter(|&&slot| state.airplanes[slot as usize].is_flying()));
+        flying.sort_unstable();
+        if !flying.is_empty() {
+            self.fly(state, now, &flying, scratch);
+        }
+        scratch.flying = flying;
+    }
+}

@@ -1,0 +1,170 @@
+//! What the airplanes of a group want to do: by the method of the world.
+
+use super::airplane::{Action, Pilot, Point, Pose};
+use super::objective::{Options, game};
+use super::shield::Way;
+use super::world::{AirspaceWorld, Method, purpose};
+use crate::collectives::{Estimator, optimize};
+use sidestep_kernel::{Cycle, Slot};
+
+/// An airplane of a group, as the group knows it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Known {
+    pub(super) slot: Slot,
+    pub(super) pose: Pose,
+    pub(super) next: usize,
+}
+
+/// What one optimization took.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Effort {
+    /// Optimizations.
+    pub optimizations: u64,
+    /// Their rounds.
+    pub rounds: u64,
+    /// Those that ended before they had converged.
+    pub unconverged: u64,
+}
+
+impl Effort {
+    /// Adds another.
+    pub fn add(&mut self, other: Self) {
+        self.optimizations += other.optimizations;
+        self.rounds += other.rounds;
+        self.unconverged += other.unconverged;
+    }
+}
+
+impl AirspaceWorld {
+    /// The ways that each airplane of a group may fly in the next `dt`, the wanted one first.
+    pub(super) fn wanted(&self, group: &[Known], now: Cycle, effort: &mut Effort) -> Vec<Vec<Way>> {
+        let wishes = match self.method {
+            Method::Pc if group.len() > 1 => self.optimized(group, now, effort),
+            _ => group.iter().map(|known| self.straight(*known)).collect(),
+        };
+        group.iter().zip(wishes).map(|(known, wishes)| self.ways(*known, &wishes)).collect()
+    }
+
+    /// Straight to the way-point, and the other actions by how little they differ from that.
+    fn straight(&self, known: Known) -> Vec<Action> {
+        let i = known.slot as usize;
+        let mission = &self.airplanes[i].mission;
+        let wanted = self.steer(&self.pilot(i, mission), known.pose, known.next);
+        let mut others: Vec<Action> = self.actions[i].clone();
+        let turn = |action: &Action| match *action {
+            Action::Hold { omega_rad_s } | Action::Then { omega_rad_s, .. } => {
+                (omega_rad_s - wanted).abs()
+            }
+            Action::Proceed => -1.0,
+        };
+        others.sort_by(|a, b| turn(a).total_cmp(&turn(b)));
+        others
+    }
+
+    /// By probability collectives: the chosen action, and the others by what the optimizer
+    /// expects of them.
+    fn optimized(&self, group: &[Known], now: Cycle, effort: &mut Effort) -> Vec<Vec<Action>> {
+        let options: Vec<Options> = group.iter().map(|known| self.options(*known)).collect();
+        let game = game(&self.objective, &options);
+        let uniform = |player: usize, k: u64| {
+            let words =
+                self.streams.block(group[player].slot, now, purpose::SAMPLE, (k / 4) as u16);
+            f64::from(words[(k % 4) as usize]) / 4_294_967_296.0
+        };
+        let outcome = optimize(&game, &self.settings, uniform);
+        effort.add(Effort {
+            optimizations: 1,
+            rounds: u64::from(outcome.rounds),
+            unconverged: u64::from(!outcome.converged),
+        });
+        let ranked = |(player, known): (usize, &Known)| {
+            let (chosen, expected) = (outcome.joint[player], &outcome.expected[player]);
+            let mut order: Vec<usize> = (0..expected.len()).collect();
+            order.sort_by(|&a, &b| {
+                (a != chosen, expected[a])
+                    .partial_cmp(&(b != chosen, expected[b]))
+                    .unwrap_or(std::cmp::Ordering::Equal)
+            });
+            order.iter().map(|&k| self.actions[known.slot as usize][k]).collect()
+        };
+        group.iter().enumerate().map(ranked).collect()
+    }
+
+    /// Where each action would lead an airplane. In the air, way-points drift against the
+    /// wind; over one horizon they are taken where they will be met on a straight way.
+    fn options(&self, known: Known) -> Options {
+        let i = known.slot as usize;
+        let mission = self.drifted(i, known);
+        let pilot = self.pilot(i, &mission);
+        let predict =
+            |action: &Action| pilot.predict(*action, known.pose, known.next, &self.timing);
+        let predictions = self.actions[i].iter().map(predict).collect();
+        Options::new(predictions, self.airplanes[i].model.separation_m)
+    }
+
+    /// The mission as seen from the moving air: each way-point where it will be when the
+    /// airplane comes to it.
+    fn drifted(&self, i: usize, known: Known) -> Vec<Point> {
+        let airplane = &self.airplanes[i];
+        let [wx, wy] = self.wind_m_s;
+        if wx == 0.0 && wy == 0.0 {
+            return airplane.mission.clone();
+        }
+        let (mut at, mut flown_s) = (known.pose.at, 0.0);
+        let mut drifted = airplane.mission.clone();
+        for goal in drifted.iter_mut().skip(known.next) {
+            let heading = self.aim(at, *goal, airplane.model.v_m_s);
+            let ground = [heading[0] - at[0] + wx, heading[1] - at[1] + wy];
+            let speed_m_s = sidestep_kernel::math::hypot(ground[0], ground[1]).max(1e-3);
+            flown_s += super::airplane::distance_m(at, *goal) / speed_m_s;
+            at = *goal;
+            *goal = [goal[0] - wx * flown_s, goal[1] - wy * flown_s];
+        }
+        drifted
+    }
+
+    /// The different motions of the next `dt` among some actions, in their order.
+    fn ways(&self, known: Known, wishes: &[Action]) -> Vec<Way> {
+        let mut ways: Vec<Way> = Vec::new();
+        for &action in wishes {
+            let way = self.way(known, action);
+            if !ways.contains(&way) {
+                ways.push(way);
+            }
+        }
+        ways
+    }
+
+    fn way(&self, known: Known, action: Action) -> Way {
+        let i = known.slot as usize;
+        let airplane = &self.airplanes[i];
+        let pilot: Pilot<'_> = self.pilot(i, &airplane.mission);
+        let (mut pose, mut next) = (known.pose, known.next);
+        let mut omegas_rad_s = Vec::new();
+        for k in 0..self.timing.points_per_dt() {
+            let omega = match action {
+                Action::Hold { omega_rad_s } => omega_rad_s,
+                Action::Then { omega_rad_s, hold_s }
+                    if (k as f64) * self.timing.dtau_s < hold_s - 1e-9 =>
+                {
+                    omega_rad_s
+                }
+                _ => self.steer(&pilot, pose, next),
+            };
+            omegas_rad_s.push(omega);
+            pose = self.blown(pose.step(airplane.model.v_m_s, omega, self.timing.dtau_s));
+            next = pilot.next(pose, next);
+        }
+        Way { omegas_rad_s }
+    }
+
+    /// Samples that one optimization may draw per airplane: what a stream holds.
+    pub(super) fn most_samples(&self) -> u64 {
+        match self.settings.estimator {
+            Estimator::Exact => 1,
+            Estimator::Sampled { block, .. } => {
+                block as u64 * u64::from(self.settings.stop.max_rounds)
+            }
+        }
+    }
+}

@@ -1,0 +1,100 @@
+//! Traffic that is made up: the super-conflict, random crossings, converging streams.
+
+use super::airplane::{Model, Point, Pose, distance_m};
+use super::scenario::GeneratorKind;
+use super::world::{Airplane, purpose};
+use sidestep_kernel::math;
+use sidestep_kernel::stream::{Draws, Streams};
+use std::f64::consts::TAU;
+
+/// Draws until a place is far enough from all others, at most this often per airplane.
+const TRIES: usize = 2_000;
+
+/// What is to be generated.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Order<'a> {
+    pub(super) kind: GeneratorKind,
+    pub(super) n: usize,
+    pub(super) radius_m: f64,
+    pub(super) jitter_m: f64,
+    pub(super) model: &'a Model,
+}
+
+/// The airplanes, or how many found a place before there was none left.
+pub(super) fn generate(order: &Order<'_>, streams: &Streams) -> Result<Vec<Airplane>, usize> {
+    match order.kind {
+        GeneratorKind::Superconflict => Ok(superconflict(order, streams)),
+        GeneratorKind::Random => random(order, streams),
+        GeneratorKind::Streams => Ok(converging(order, streams)),
+    }
+}
+
+fn airplane(order: &Order<'_>, from: Point, to: Vec<Point>) -> Airplane {
+    let first = to.first().copied().unwrap_or(from);
+    let psi_rad = math::atan2(first[1] - from[1], first[0] - from[0]);
+    Airplane { model: order.model.clone(), start: Pose { at: from, psi_rad }, mission: to }
+}
+
+fn on_circle(radius_m: f64, angle_rad: f64) -> Point {
+    [radius_m * math::cos(angle_rad), radius_m * math::sin(angle_rad)]
+}
+
+fn draws(streams: &Streams, id: usize) -> Draws {
+    streams.draws(id as u32, 0, purpose::PLACE)
+}
+
+/// Evenly spread on a circle, each to the opposite point. The seed turns the circle, and moves
+/// each airplane along it by up to the jitter.
+fn superconflict(order: &Order<'_>, streams: &Streams) -> Vec<Airplane> {
+    let turned = TAU * draws(streams, order.n).uniform();
+    let place = |k: usize| {
+        let jitter = order.jitter_m * (2.0 * draws(streams, k).uniform() - 1.0);
+        turned + TAU * k as f64 / order.n as f64 + jitter / order.radius_m
+    };
+    (0..order.n)
+        .map(|k| {
+            let (from, to) = (place(k), place(k) + TAU / 2.0);
+            airplane(order, on_circle(order.radius_m, from), vec![on_circle(order.radius_m, to)])
+        })
+        .collect()
+}
+
+/// Anywhere in a disc, each to a point of the disc at least half its radius away. Starts are so
+/// far apart that first fallbacks are: an orbit's diameter each, and the separation.
+fn random(order: &Order<'_>, streams: &Streams) -> Result<Vec<Airplane>, usize> {
+    let gap_m = 4.0 * order.model.turn_radius_m() + order.model.separation_m + 1.0;
+    let mut starts: Vec<Point> = Vec::new();
+    let mut all = Vec::new();
+    for id in 0..order.n {
+        let mut draws = draws(streams, id);
+        let free = |at: &Point| starts.iter().all(|other| distance_m(*at, *other) >= gap_m);
+        let from = (0..TRIES).map(|_| in_disc(order.radius_m, &mut draws)).find(free);
+        let from = from.ok_or(id)?;
+        let far = |to: &Point| distance_m(from, *to) >= 0.5 * order.radius_m;
+        let to = (0..TRIES).map(|_| in_disc(order.radius_m, &mut draws)).find(far);
+        starts.push(from);
+        all.push(airplane(order, from, vec![to.unwrap_or([-from[0], -from[1]])]));
+    }
+    Ok(all)
+}
+
+fn in_disc(radius_m: f64, draws: &mut Draws) -> Point {
+    let r = radius_m * draws.uniform().sqrt();
+    on_circle(r, TAU * draws.uniform())
+}
+
+/// Three streams that meet at the centre and go on together; airplanes of a stream follow each
+/// other at four separations, and streams are shifted against each other.
+fn converging(order: &Order<'_>, streams: &Streams) -> Vec<Airplane> {
+    let spacing_m = 4.0 * order.model.separation_m;
+    (0..order.n)
+        .map(|k| {
+            let (stream, place) = (k % 3, (k / 3) as f64);
+            let jitter = order.jitter_m * (2.0 * draws(streams, k).uniform() - 1.0);
+            let behind_m = (place + stream as f64 / 3.0) * spacing_m + jitter;
+            let angle = TAU / 2.0 + (stream as f64 - 1.0) * TAU / 12.0;
+            let from = on_circle(order.radius_m + behind_m, angle);
+            airplane(order, from, vec![[0.0, 0.0], [order.radius_m, 0.0]])
+        })
+        .collect()
+}

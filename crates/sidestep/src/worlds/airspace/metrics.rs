@@ -1,0 +1,130 @@
+//! What came of a run.
+
+use super::decide::Effort;
+use super::react::LOOKS_PER_STEP;
+use super::state::{AirspaceState, PairRecord};
+use super::world::AirspaceWorld;
+use serde::{Deserialize, Serialize};
+use sidestep_kernel::{Cycle, EntityId};
+use std::collections::BTreeMap;
+
+/// Everything that a run books beside its state, and that a checkpoint keeps.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Ledger {
+    /// Pairs that came near each other, by ids.
+    pub pairs: BTreeMap<(EntityId, EntityId), PairRecord>,
+    /// Optimizations, rounds, and how many had not converged.
+    pub effort: [u64; 3],
+}
+
+impl Ledger {
+    pub(super) fn add_effort(&mut self, effort: Effort) {
+        let more = [effort.optimizations, effort.rounds, effort.unconverged];
+        self.effort.iter_mut().zip(more).for_each(|(sum, n)| *sum += n);
+    }
+
+    pub(super) fn add_pair(&mut self, pair: (EntityId, EntityId), record: PairRecord) {
+        self.pairs.entry(pair).and_modify(|r| r.add(record)).or_insert(record);
+    }
+}
+
+/// Metrics of a run.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Metrics {
+    /// Closest approach of any two airplanes; none if no two came near each other.
+    pub min_separation_m: Option<f64>,
+    /// How often two airplanes have come nearer than their separation.
+    pub losses_of_separation: u64,
+    /// Seconds that pairs spent nearer than their separation.
+    pub lost_s: f64,
+    /// Airplanes that have reached their last way-point.
+    pub arrived: u64,
+    /// All airplanes.
+    pub airplanes: u64,
+    /// Mean over those that have arrived: time beyond what the flight takes alone, percent of
+    /// that.
+    pub mean_delay_percent: Option<f64>,
+    /// Messages between agents; none where one process decides for all.
+    pub messages: u64,
+    /// Bytes of those messages.
+    pub bytes: u64,
+    /// Optimizations run.
+    pub optimisations: u64,
+    /// Their rounds on average.
+    pub rounds_mean: Option<f64>,
+    /// Optimizations whose rounds ran out.
+    pub unconverged: u64,
+    /// Time spent deciding in this process's run, all workers together.
+    pub optimise_cpu_s: f64,
+    /// Times that the shield changed what an airplane wanted,
+    pub shield_overrides: u64,
+    /// of these, falls back to an orbit for one `dt`.
+    pub shield_orbits: u64,
+}
+
+/// What came of one airplane.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct AirplaneMetrics {
+    /// Its id.
+    pub airplane: EntityId,
+    /// Seconds from the start to its arrival, if it has arrived.
+    pub flown_s: Option<f64>,
+    /// Seconds that the flight takes alone.
+    pub alone_s: f64,
+    /// Time beyond that, percent of it.
+    pub delay_percent: Option<f64>,
+    /// Times that the shield changed what it wanted,
+    pub shield_overrides: u32,
+    /// of these, falls back to its orbit.
+    pub shield_orbits: u32,
+}
+
+impl AirspaceWorld {
+    /// Metrics of one airplane.
+    pub fn airplane_metrics(&self, state: &AirspaceState, id: EntityId) -> AirplaneMetrics {
+        let (cell, alone_s) = (&state.airplanes[id as usize], self.alone_s[id as usize]);
+        let flown_s = (!cell.is_flying()).then(|| cell.arrived.get() as f64 * self.timing.dtau_s);
+        AirplaneMetrics {
+            airplane: id,
+            flown_s,
+            alone_s,
+            delay_percent: flown_s
+                .filter(|_| alone_s > 0.0)
+                .map(|s| 100.0 * (s - alone_s) / alone_s),
+            shield_overrides: cell.overrides.get(),
+            shield_orbits: cell.orbits.get(),
+        }
+    }
+
+    /// Metrics of a run so far; `decide_s` is the time spent deciding.
+    pub fn metrics(&self, state: &AirspaceState, ledger: &Ledger, decide_s: f64) -> Metrics {
+        let all = (0..self.airplanes.len() as EntityId).map(|id| self.airplane_metrics(state, id));
+        let all: Vec<AirplaneMetrics> = all.collect();
+        let delays: Vec<f64> = all.iter().filter_map(|a| a.delay_percent).collect();
+        let mean = |sum: f64, n: usize| (n > 0).then(|| sum / n as f64);
+        let nearest = ledger.pairs.values().map(|r| r.nearest_m).min_by(f64::total_cmp);
+        let looks: u64 = ledger.pairs.values().map(|r| r.lost_looks).sum();
+        let [optimisations, rounds, unconverged] = ledger.effort;
+        Metrics {
+            min_separation_m: nearest,
+            losses_of_separation: ledger.pairs.values().map(|r| u64::from(r.losses)).sum(),
+            lost_s: looks as f64 * self.timing.dtau_s / LOOKS_PER_STEP as f64,
+            arrived: all.iter().filter(|a| a.flown_s.is_some()).count() as u64,
+            airplanes: all.len() as u64,
+            mean_delay_percent: mean(delays.iter().sum(), delays.len()),
+            messages: 0,
+            bytes: 0,
+            optimisations,
+            rounds_mean: mean(rounds as f64, optimisations as usize),
+            unconverged,
+            optimise_cpu_s: decide_s,
+            shield_overrides: all.iter().map(|a| u64::from(a.shield_overrides)).sum(),
+            shield_orbits: all.iter().map(|a| u64::from(a.shield_orbits)).sum(),
+        }
+    }
+
+    /// Whether everybody has arrived by now.
+    pub fn is_over(&self, state: &AirspaceState, _: Cycle) -> bool {
+        state.airplanes.iter().all(|cell| !cell.is_flying())
+    }
+}

@@ -1,0 +1,490 @@
+//! The text of an airspace scenario, and what it compiles to.
+
+use super::airplane::{Model, Passing, Point, Pose, Timing};
+use super::generate::{Order as Wanted, generate};
+use super::objective::Objective;
+use super::shield::{Flyer, Side, first_fallbacks};
+use super::state::{AirplaneRecord, FLYING, Snapshot};
+use super::world::{Airplane, AirspaceWorld, Disturbance, Method};
+use crate::collectives::{Choice, Estimator, Order, Settings, Stop, Update, Utility};
+use crate::scenario::{OneOrMany, Source};
+use serde::{Deserialize, Serialize};
+use sidestep_kernel::stream::Streams;
+use sidestep_kernel::{InputError, Seed};
+use std::sync::Arc;
+use toml::Spanned;
+
+/// Most airplanes of a scenario.
+const MAX_AIRPLANES: usize = 1_000_000;
+
+/// Kinds of made-up traffic.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum GeneratorKind {
+    /// On a circle, each to the opposite point.
+    Superconflict,
+    /// From anywhere to anywhere in a disc.
+    Random,
+    /// Three streams that meet.
+    Streams,
+}
+
+/// Sets of parameters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Preset {
+    /// The safe one: exact expectations, hardly any weight on deviations, a margin on the
+    /// separation, further hold times.
+    #[default]
+    Default,
+    /// The paper's numbers, sampled.
+    Paper,
+}
+
+/// A switch in files.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Switch {
+    /// On.
+    On,
+    /// Off.
+    Off,
+}
+
+/// Where the optimizer runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Deployment {
+    /// One process decides for all.
+    #[default]
+    Direct,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct AirspaceFile {
+    #[serde(rename = "format")]
+    _format: u32,
+    #[serde(rename = "world")]
+    _world: String,
+    #[serde(default)]
+    name: String,
+    #[serde(default = "one")]
+    seed: u64,
+    #[serde(default = "many_cycles")]
+    cycles: u64,
+    #[serde(default)]
+    airspace: AirspaceSection,
+    airplane: Option<Spanned<ModelSection>>,
+    #[serde(default = "no_airplanes")]
+    airplanes: Spanned<OneOrMany<Spanned<AirplaneSection>>>,
+    #[serde(default)]
+    record: RecordSection,
+}
+
+fn one() -> u64 {
+    1
+}
+
+fn many_cycles() -> u64 {
+    400
+}
+
+fn no_airplanes() -> Spanned<OneOrMany<Spanned<AirplaneSection>>> {
+    Spanned::new(0..0, OneOrMany(Vec::new()))
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct AirspaceSection {
+    preset: Preset,
+    method: Method,
+    shield: Option<Switch>,
+    #[serde(rename = "deployment")]
+    _deployment: Deployment,
+    generator: Option<Spanned<GeneratorSection>>,
+    dt_s: Option<Spanned<f64>>,
+    dtau_s: Option<Spanned<f64>>,
+    horizon: Option<Spanned<usize>>,
+    tolerance_m: Option<Spanned<f64>>,
+    alpha: Option<Spanned<f64>>,
+    beta: Option<Spanned<f64>>,
+    inflation: Option<Spanned<f64>>,
+    holds_s: Option<Vec<f64>>,
+    estimator: Option<Estimator>,
+    update: Option<Update>,
+    order: Option<Order>,
+    utility: Option<Utility>,
+    cooling: Option<Spanned<f64>>,
+    max_rounds: Option<u32>,
+    choice: Option<Choice>,
+    wind_m_s: Point,
+    position_noise_m: f64,
+    heading_noise_deg: f64,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct GeneratorSection {
+    kind: GeneratorKind,
+    n: usize,
+    radius_m: Option<f64>,
+    jitter_m: Option<f64>,
+}
+
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct ModelSection {
+    v_m_s: Option<f64>,
+    omega_max_deg_s: Option<f64>,
+    separation_m: Option<f64>,
+    turns: Option<usize>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct AirplaneSection {
+    at_m: Point,
+    heading_deg: f64,
+    way_points_m: Vec<Point>,
+    v_m_s: Option<f64>,
+    omega_max_deg_s: Option<f64>,
+    separation_m: Option<f64>,
+    turns: Option<usize>,
+}
+
+/// What a run keeps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct RecordSection {
+    /// A row per airplane and cycle.
+    pub trajectories: bool,
+    /// Cycles between two checkpoints; 0 for none.
+    pub checkpoint_every: u64,
+}
+
+impl Default for RecordSection {
+    fn default() -> Self {
+        Self { trajectories: true, checkpoint_every: 1000 }
+    }
+}
+
+/// What a scenario compiles to.
+#[derive(Debug, Clone)]
+pub struct Compiled {
+    /// The immutable world.
+    pub world: Arc<AirspaceWorld>,
+    /// Name of the scenario, may be empty.
+    pub name: String,
+    /// The seed.
+    pub seed: u64,
+    /// Cycles at most; a run ends when all have arrived.
+    pub cycles: u64,
+    /// What to keep.
+    pub record: RecordSection,
+    /// Sides of the first fallbacks.
+    pub fallbacks: Vec<Side>,
+    /// Pairs whose first fallbacks are not apart: the shield promises nothing for them.
+    pub too_close: Vec<(u32, u32)>,
+}
+
+impl Compiled {
+    /// Compiles a scenario.
+    ///
+    /// # Errors
+    /// With place, line, column, cause and remedy for anything that is wrong in it.
+    pub fn new(source: &Source) -> Result<Self, InputError> {
+        let file: AirspaceFile = source.parse()?;
+        Compiler { source, file: &file }.compile()
+    }
+
+    /// The state at the start.
+    pub fn start_snapshot(&self) -> Snapshot {
+        let record = |(airplane, &fallback): (&Airplane, &Side)| AirplaneRecord {
+            pose: airplane.start,
+            arrived: FLYING,
+            counts: [0; 4],
+            fallback,
+        };
+        let airplanes = self.world.airplanes.iter().zip(&self.fallbacks).map(record).collect();
+        Snapshot { cycle: 0, airplanes }
+    }
+}
+
+struct Compiler<'a> {
+    source: &'a Source,
+    file: &'a AirspaceFile,
+}
+
+impl Compiler<'_> {
+    fn compile(&self) -> Result<Compiled, InputError> {
+        let section = &self.file.airspace;
+        let streams = Streams::new(Seed(self.file.seed));
+        let airplanes = self.airplanes(&streams)?;
+        let timing = self.timing()?;
+        let radius_m = airplanes.iter().map(|a| a.model.separation_m).fold(0.0, f64::max);
+        let tolerance_m = self.positive(section.tolerance_m.as_ref(), (radius_m / 5.0).max(1.0))?;
+        let noise = [section.position_noise_m, section.heading_noise_deg];
+        let numbers = noise.into_iter().chain(section.wind_m_s);
+        if numbers.clone().any(|v| !v.is_finite()) || noise.iter().any(|v| *v < 0.0) {
+            let cause = "a wind or noise that is negative or no number";
+            return Err(self.error(None, cause, "give finite values, noise 0 or more"));
+        }
+        let slowest = airplanes.iter().map(|a| a.model.v_m_s).fold(f64::INFINITY, f64::min);
+        let wind = sidestep_kernel::math::hypot(section.wind_m_s[0], section.wind_m_s[1]);
+        if wind >= slowest {
+            let cause = format!("a wind of {wind} m/s, and airplanes of {slowest} m/s");
+            return Err(self.error(None, cause, "give a wind that all airplanes can fly against"));
+        }
+        let world = AirspaceWorld {
+            airplanes,
+            timing,
+            passing: Passing { tolerance_m, passes: true },
+            objective: self.objective()?,
+            settings: self.settings()?,
+            holds_s: self.holds()?,
+            method: section.method,
+            shield: section.shield != Some(Switch::Off),
+            wind_m_s: section.wind_m_s,
+            disturbance: Disturbance {
+                position_m: section.position_noise_m,
+                heading_rad: section.heading_noise_deg.to_radians(),
+            },
+            streams,
+            actions: Vec::new(),
+            alone_s: Vec::new(),
+        }
+        .prepared();
+        if world.most_samples() > u64::from(u16::MAX) * 4 {
+            let cause = "more samples than a random stream holds";
+            return Err(self.error(None, cause, "give smaller blocks or fewer rounds"));
+        }
+        let (fallbacks, too_close) = first(&world);
+        Ok(Compiled {
+            world: Arc::new(world),
+            name: self.file.name.clone(),
+            seed: self.file.seed,
+            cycles: self.file.cycles,
+            record: self.file.record,
+            fallbacks,
+            too_close,
+        })
+    }
+
+    fn is_paper(&self) -> bool {
+        self.file.airspace.preset == Preset::Paper
+    }
+
+    fn timing(&self) -> Result<Timing, InputError> {
+        let section = &self.file.airspace;
+        let dt_s = self.positive(section.dt_s.as_ref(), 5.0)?;
+        let dtau_s = self.positive(section.dtau_s.as_ref(), 1.0)?;
+        let parts = dt_s / dtau_s;
+        if (parts - parts.round()).abs() > 1e-9 || parts < 1.0 {
+            let cause = format!("dt_s = {dt_s} is no multiple of dtau_s = {dtau_s}");
+            let span = section.dtau_s.as_ref().or(section.dt_s.as_ref()).map(Spanned::span);
+            return Err(self.error(span, cause, "give a dtau_s that divides dt_s"));
+        }
+        let horizon = section.horizon.as_ref().map_or(125, |h| *h.get_ref());
+        if !((parts.round() as usize)..=10_000).contains(&horizon) {
+            let cause = format!("a horizon of {horizon} steps");
+            let span = section.horizon.as_ref().map(Spanned::span);
+            return Err(self.error(span, cause, "give at least dt_s / dtau_s and at most 10000"));
+        }
+        Ok(Timing { dt_s, dtau_s, horizon })
+    }
+
+    fn objective(&self) -> Result<Objective, InputError> {
+        let section = &self.file.airspace;
+        let paper = self.is_paper();
+        let beta = self.positive(section.beta.as_ref(), 0.995)?;
+        if beta > 1.0 {
+            let span = section.beta.as_ref().map(Spanned::span);
+            return Err(self.error(span, format!("beta = {beta}"), "give at most 1"));
+        }
+        Ok(Objective {
+            alpha: self.positive(section.alpha.as_ref(), if paper { 1.0 } else { 0.001 })?,
+            beta,
+            inflation: self.positive(section.inflation.as_ref(), if paper { 1.0 } else { 1.05 })?,
+            mask: true,
+        })
+    }
+
+    fn settings(&self) -> Result<Settings, InputError> {
+        let section = &self.file.airspace;
+        let paper = self.is_paper();
+        let estimator =
+            if paper { Estimator::Sampled { block: 20, ageing: 0.7 } } else { Estimator::Exact };
+        let cooling = self.positive(section.cooling.as_ref(), 0.8)?;
+        if cooling > 1.0 {
+            let span = section.cooling.as_ref().map(Spanned::span);
+            return Err(self.error(span, format!("cooling = {cooling}"), "give at most 1"));
+        }
+        let choice = if paper { Choice::Draw } else { Choice::Argmax };
+        let order = if paper { Order::Parallel } else { Order::Sequence };
+        Ok(Settings {
+            estimator: section.estimator.unwrap_or(estimator),
+            update: section.update.unwrap_or(Update::NearestNewton { step: 0.5 }),
+            order: section.order.unwrap_or(order),
+            utility: section.utility.unwrap_or_default(),
+            cooling,
+            stop: Stop {
+                threshold: 1e-3,
+                calm_rounds: 3,
+                max_rounds: section.max_rounds.unwrap_or(200),
+            },
+            choice: section.choice.unwrap_or(choice),
+        })
+    }
+
+    fn holds(&self) -> Result<Vec<f64>, InputError> {
+        let preset = if self.is_paper() { vec![] } else { vec![30.0, 90.0] };
+        let holds_s = self.file.airspace.holds_s.clone().unwrap_or(preset);
+        if holds_s.iter().any(|h| !(*h > 0.0 && h.is_finite())) || holds_s.len() > 20 {
+            return Err(self.error(
+                None,
+                format!("holds_s = {holds_s:?}"),
+                "give up to 20 positive times in seconds",
+            ));
+        }
+        Ok(holds_s)
+    }
+
+    fn airplanes(&self, streams: &Streams) -> Result<Vec<Airplane>, InputError> {
+        let (span, common) = match &self.file.airplane {
+            Some(model) => (Some(model.span()), model.get_ref().clone()),
+            None => (None, ModelSection::default()),
+        };
+        let model = self.model(&common, span)?;
+        let mut all = match &self.file.airspace.generator {
+            Some(generator) => self.generated(generator, &model, streams)?,
+            None => Vec::new(),
+        };
+        for section in &self.file.airplanes.get_ref().0 {
+            all.push(self.airplane(section, &common)?);
+        }
+        if all.is_empty() {
+            let remedy = "add [airspace.generator] with kind and n, or [[airplanes]]";
+            return Err(self.error(None, "the scenario has no airplanes", remedy));
+        }
+        Ok(all)
+    }
+
+    fn generated(
+        &self,
+        section: &Spanned<GeneratorSection>,
+        model: &Model,
+        streams: &Streams,
+    ) -> Result<Vec<Airplane>, InputError> {
+        let s = section.get_ref();
+        let at = Some(section.span());
+        if !(1..=MAX_AIRPLANES).contains(&s.n) {
+            return Err(self.error(at, format!("{} airplanes", s.n), "give 1 to 1000000"));
+        }
+        // Random traffic is as dense as ten airplanes in the paper's circle, whatever their number.
+        let radius_m = s.radius_m.unwrap_or(match s.kind {
+            GeneratorKind::Random => 6_500.0 * (s.n as f64 / 5.0).max(1.0).sqrt(),
+            _ => 6_500.0,
+        });
+        let jitter_m = s.jitter_m.unwrap_or(20.0);
+        if !(radius_m > 0.0 && radius_m < 1e9 && (0.0..1e6).contains(&jitter_m)) {
+            let cause = format!("radius_m = {radius_m}, jitter_m = {jitter_m}");
+            return Err(self.error(at, cause, "give a positive radius and a jitter of 0 or more"));
+        }
+        let order = Wanted { kind: s.kind, n: s.n, radius_m, jitter_m, model };
+        generate(&order, streams).map_err(|placed| {
+            let cause = format!("no place is left after {placed} of {} airplanes", s.n);
+            self.error(at, cause, "give a larger radius_m or a smaller n")
+        })
+    }
+
+    fn airplane(
+        &self,
+        section: &Spanned<AirplaneSection>,
+        common: &ModelSection,
+    ) -> Result<Airplane, InputError> {
+        let s = section.get_ref();
+        let at = Some(section.span());
+        let own = ModelSection {
+            v_m_s: s.v_m_s.or(common.v_m_s),
+            omega_max_deg_s: s.omega_max_deg_s.or(common.omega_max_deg_s),
+            separation_m: s.separation_m.or(common.separation_m),
+            turns: s.turns.or(common.turns),
+        };
+        let model = self.model(&own, at.clone())?;
+        let places = s.way_points_m.iter().chain([&s.at_m]).flatten();
+        if places.chain([&s.heading_deg]).any(|v| !v.is_finite() || v.abs() > 1e9) {
+            let cause = "a position or heading that is no number, or absurdly large";
+            return Err(self.error(at, cause, "give metres below 1e9 and degrees"));
+        }
+        if s.way_points_m.is_empty() {
+            let remedy = "add way_points_m = [[x, y], ...]";
+            return Err(self.error(at, "an airplane without way-points", remedy));
+        }
+        let psi_rad = sidestep_kernel::math::wrap_angle(s.heading_deg.to_radians());
+        let start = Pose { at: s.at_m, psi_rad };
+        Ok(Airplane { model, start, mission: s.way_points_m.clone() })
+    }
+
+    fn model(
+        &self,
+        s: &ModelSection,
+        span: Option<std::ops::Range<usize>>,
+    ) -> Result<Model, InputError> {
+        let model = Model {
+            v_m_s: s.v_m_s.unwrap_or(35.0),
+            omega_max_rad_s: s.omega_max_deg_s.unwrap_or(4.0).to_radians(),
+            separation_m: s.separation_m.unwrap_or(500.0),
+            turns: s.turns.unwrap_or(5),
+        };
+        let numbers = [
+            ("v_m_s", model.v_m_s),
+            ("omega_max_deg_s", model.omega_max_rad_s),
+            ("separation_m", model.separation_m),
+        ];
+        if let Some((name, _)) = numbers.iter().find(|(_, v)| !(*v > 0.0 && *v < 1e6)) {
+            return Err(self.error(span, format!("{name} is not positive"), "give more than 0"));
+        }
+        if model.turns < 3 || model.turns.is_multiple_of(2) || model.turns > 99 {
+            let cause = format!("turns = {}", model.turns);
+            let remedy = "give an odd number from 3 to 99, so that straight flight is among them";
+            return Err(self.error(span, cause, remedy));
+        }
+        Ok(model)
+    }
+
+    fn positive(&self, value: Option<&Spanned<f64>>, preset: f64) -> Result<f64, InputError> {
+        match value {
+            None => Ok(preset),
+            Some(v) if *v.get_ref() > 0.0 && v.get_ref().is_finite() => Ok(*v.get_ref()),
+            Some(v) => {
+                let cause = format!("{} is not positive", v.get_ref());
+                Err(self.error(Some(v.span()), cause, "give a number above 0"))
+            }
+        }
+    }
+
+    fn error(
+        &self,
+        span: Option<std::ops::Range<usize>>,
+        cause: impl Into<String>,
+        remedy: impl Into<String>,
+    ) -> InputError {
+        self.source.error(span, cause, remedy)
+    }
+}
+
+/// First fallbacks that are apart as far as there are any, and the pairs that are not.
+fn first(world: &AirspaceWorld) -> (Vec<Side>, Vec<(u32, u32)>) {
+    let flyer = |(i, airplane): (usize, &Airplane)| Flyer {
+        pose: airplane.start,
+        v_m_s: airplane.model.v_m_s,
+        omega_max_rad_s: airplane.model.omega_max_rad_s,
+        separation_m: airplane.model.separation_m,
+        fallback: Side::Left,
+        rank: i as u64,
+    };
+    let flyers: Vec<Flyer> = world.airplanes.iter().enumerate().map(flyer).collect();
+    let (sides, pairs) = first_fallbacks(&flyers);
+    (sides, pairs.into_iter().map(|(i, j)| (i as u32, j as u32)).collect())
+}

@@ -1,0 +1,227 @@
+//! All that changes in a run, and its snapshot.
+
+use super::airplane::{Point, Pose, distance_m};
+use super::shield::Side;
+use super::world::AirspaceWorld;
+use serde::{Deserialize, Serialize};
+use sidestep_kernel::column::Shared;
+use sidestep_kernel::digest::Hasher;
+use sidestep_kernel::{Column, Cycle, Digest, Slot};
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+
+/// Not arrived yet.
+pub const FLYING: u64 = u64::MAX;
+const NOBODY: u32 = u32::MAX;
+
+/// The state of an airspace; slots are ids.
+#[derive(Debug)]
+pub struct AirspaceState {
+    /// What changes of each airplane.
+    pub airplanes: Box<[Cell]>,
+    pub(super) neighborhood: Neighborhood,
+}
+
+/// One airplane's share of the state.
+#[derive(Debug, Default)]
+#[repr(align(64))]
+pub struct Cell {
+    /// Position east, metres,
+    pub x_m: Shared<f64>,
+    /// and north.
+    pub y_m: Shared<f64>,
+    /// Heading.
+    pub psi_rad: Shared<f64>,
+    /// Steps of `dtau` flown when it arrived, or [`FLYING`].
+    pub arrived: Shared<u64>,
+    /// Way-points done with.
+    pub next: Shared<u32>,
+    /// Times that the shield changed what it wanted,
+    pub overrides: Shared<u32>,
+    /// of these, falls back to its orbit,
+    pub orbits: Shared<u32>,
+    /// and how many of those in a row just now.
+    pub waiting: Shared<u32>,
+    /// Stored fallback: 0 left, 1 right.
+    pub fallback: Shared<u8>,
+}
+
+impl Cell {
+    /// Where it is.
+    pub fn pose(&self) -> Pose {
+        Pose { at: [self.x_m.get(), self.y_m.get()], psi_rad: self.psi_rad.get() }
+    }
+
+    /// Puts it somewhere.
+    pub fn set_pose(&self, pose: Pose) {
+        self.x_m.set(pose.at[0]);
+        self.y_m.set(pose.at[1]);
+        self.psi_rad.set(pose.psi_rad);
+    }
+
+    /// Whether it has not arrived yet.
+    pub fn is_flying(&self) -> bool {
+        self.arrived.get() == FLYING
+    }
+
+    /// The stored fallback.
+    pub fn side(&self) -> Side {
+        Side::BOTH[usize::from(self.fallback.get() & 1)]
+    }
+
+    /// Stores a fallback.
+    pub fn set_side(&self, side: Side) {
+        self.fallback.set(side as u8);
+    }
+}
+
+/// Who is near whom: lists of airplanes by square of the plane, built anew each cycle.
+#[derive(Debug)]
+pub(super) struct Neighborhood {
+    side_m: f64,
+    /// Per bucket: cycle (upper half) and last airplane listed (lower half).
+    first: Box<[AtomicU64]>,
+    /// Per airplane: the one listed before it.
+    next: Column<u32>,
+}
+
+impl Neighborhood {
+    /// For `n` airplanes that mind each other up to `side_m` away.
+    fn new(n: usize, side_m: f64) -> Self {
+        let buckets = (2 * n).next_power_of_two();
+        Self {
+            side_m,
+            first: (0..buckets).map(|_| AtomicU64::new(u64::MAX)).collect(),
+            next: Column::filled(n, NOBODY),
+        }
+    }
+
+    fn square(&self, at: Point) -> [i64; 2] {
+        at.map(|v| (v / self.side_m).floor() as i64)
+    }
+
+    fn bucket(&self, [x, y]: [i64; 2]) -> &AtomicU64 {
+        let mixed = (x as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15)
+            ^ (y as u64).wrapping_mul(0xC2B2_AE3D_27D4_EB4F);
+        &self.first[(mixed >> 32) as usize & (self.first.len() - 1)]
+    }
+
+    /// Lists an airplane for this cycle.
+    pub(super) fn enter(&self, slot: Slot, at: Point, now: Cycle) {
+        let stamp = u64::from(now as u32) << 32;
+        let before = self.bucket(self.square(at)).swap(stamp | u64::from(slot), Relaxed);
+        let listed = before >> 32 == stamp >> 32;
+        self.next.set(slot as usize, if listed { before as u32 } else { NOBODY });
+    }
+
+    /// Calls `meet` for every airplane listed in this cycle in the squares around `at`, and
+    /// maybe for others.
+    pub(super) fn around(&self, at: Point, now: Cycle, mut meet: impl FnMut(Slot)) {
+        let [x, y] = self.square(at);
+        for square in (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| [x + dx, y + dy])) {
+            let first = self.bucket(square).load(Relaxed);
+            let mut slot = if first >> 32 == u64::from(now as u32) { first as u32 } else { NOBODY };
+            while slot != NOBODY {
+                meet(slot);
+                slot = self.next.get(slot as usize);
+            }
+        }
+    }
+}
+
+/// One airplane in a snapshot.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct AirplaneRecord {
+    /// Where it is.
+    pub pose: Pose,
+    /// See [`Cell::arrived`].
+    pub arrived: u64,
+    /// Way-points done with, overrides, orbits, orbits in a row.
+    pub counts: [u32; 4],
+    /// Stored fallback.
+    pub fallback: Side,
+}
+
+/// What a pair of airplanes has come to.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct PairRecord {
+    /// Closest approach.
+    pub nearest_m: f64,
+    /// Looks at which they were nearer than their separation, see
+    /// [`super::react::LOOKS_PER_STEP`].
+    pub lost_looks: u64,
+    /// Separate losses of separation.
+    pub losses: u32,
+}
+
+impl PairRecord {
+    /// Adds another record of the same pair, in any order.
+    pub fn add(&mut self, other: Self) {
+        self.nearest_m = self.nearest_m.min(other.nearest_m);
+        self.lost_looks += other.lost_looks;
+        self.losses += other.losses;
+    }
+}
+
+/// A state by id: what a checkpoint holds and a digest covers.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Snapshot {
+    /// Cycles done.
+    pub cycle: Cycle,
+    /// The airplanes by id.
+    pub airplanes: Vec<AirplaneRecord>,
+}
+
+impl AirspaceState {
+    /// The state that a snapshot describes.
+    pub(super) fn restore(world: &AirspaceWorld, snapshot: &Snapshot) -> Self {
+        let n = snapshot.airplanes.len();
+        let all = 0..n;
+        let farthest = all.clone().map(|i| world.look_m(i, i)).fold(1.0, f64::max);
+        let airplanes: Box<[Cell]> = all.map(|_| Cell::default()).collect();
+        for (cell, record) in airplanes.iter().zip(&snapshot.airplanes) {
+            cell.set_pose(record.pose);
+            cell.arrived.set(record.arrived);
+            let [next, overrides, orbits, waiting] = record.counts;
+            cell.next.set(next);
+            cell.overrides.set(overrides);
+            cell.orbits.set(orbits);
+            cell.waiting.set(waiting);
+            cell.set_side(record.fallback);
+        }
+        Self { airplanes, neighborhood: Neighborhood::new(n, farthest) }
+    }
+
+    /// The state after `cycle` cycles.
+    pub fn snapshot(&self, cycle: Cycle) -> Snapshot {
+        let record = |cell: &Cell| AirplaneRecord {
+            pose: cell.pose(),
+            arrived: cell.arrived.get(),
+            counts: [cell.next.get(), cell.overrides.get(), cell.orbits.get(), cell.waiting.get()],
+            fallback: cell.side(),
+        };
+        Snapshot { cycle, airplanes: self.airplanes.iter().map(record).collect() }
+    }
+
+    /// Whether two airplanes have to mind each other.
+    pub(super) fn is_near(&self, world: &AirspaceWorld, a: Slot, b: Slot) -> bool {
+        let at = |slot: Slot| self.airplanes[slot as usize].pose().at;
+        distance_m(at(a), at(b)) <= world.look_m(a as usize, b as usize)
+    }
+}
+
+impl Snapshot {
+    /// The digest of this state (promise D1): every value by id.
+    pub fn digest(&self) -> Digest {
+        let mut hasher = Hasher::default();
+        hasher.u64(self.cycle);
+        hasher.u64(self.airplanes.len() as u64);
+        for airplane in &self.airplanes {
+            let Pose { at: [x, y], psi_rad } = airplane.pose;
+            [x, y, psi_rad].iter().for_each(|v| hasher.u64(v.to_bits()));
+            hasher.u64(airplane.arrived);
+            airplane.counts.iter().for_each(|&n| hasher.u32(n));
+            hasher.u8(airplane.fallback as u8);
+        }
+        hasher.finish()
+    }
+}
