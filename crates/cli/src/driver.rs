@@ -38,7 +38,7 @@ pub(crate) fn drive(
     let (from, wall, cpu) = (run.cycle(), Instant::now(), ProcessTime::now());
     let progress = Progress::new(console, from, until);
     let mut pace = Pace::default();
-    while run.cycle() < until && !interrupt::requested() {
+    while run.cycle() < until && !run.is_over() && !interrupt::requested() {
         slice(run, until, recording.as_deref_mut(), &mut pace).inspect_err(|_| progress.clear())?;
         progress.at(run.cycle());
     }

@@ -20,7 +20,7 @@ const PNG_PX: u32 = 1600;
 /// When it cannot be drawn or written.
 pub(crate) fn draw_run(run: &dyn Run, folder: &RunFolder) -> Result<(), Failure> {
     let plan = run.plan();
-    let origin = match run.cycle() < plan.cycles {
+    let origin = match run.cycle() < plan.cycles && !run.is_over() {
         true => {
             format!("{} INCOMPLETE: {} of {} cycles.", origin(run), run.cycle(), plan.cycles)
         }

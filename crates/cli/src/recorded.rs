@@ -1,4 +1,4 @@
-//! Tables of a recorded run as CSV, the form in which logs are learned from.
+//! Tables of a recorded run, also as CSV, the form in which logs are learned from.
 
 use sidestep::import::table::CsvTable;
 use sidestep::kernel::InputError;
@@ -44,4 +44,13 @@ fn write_field(text: &mut String, column: &ColumnSpec, values: &Values, row: usi
         Values::F64(v) => write!(text, "{}", v[row]),
         Values::Label(v) => write!(text, "{}", column.labels[v[row] as usize]),
     };
+}
+
+/// Whether some part of the table is whole: a run that was killed early has none.
+pub(crate) fn has_rows(folder: &Path, table: &str) -> bool {
+    let is_part = |name: &std::ffi::OsStr| Path::new(name).extension() == Some("parquet".as_ref());
+    [table.to_string(), format!("{table}.partial")].iter().any(|table| {
+        let entries = std::fs::read_dir(folder.join(table));
+        entries.is_ok_and(|mut all| all.any(|e| e.is_ok_and(|e| is_part(&e.file_name()))))
+    })
 }

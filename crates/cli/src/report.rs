@@ -30,6 +30,8 @@ pub(crate) struct Summary {
     version: &'static str,
     /// Name of the world.
     world: &'static str,
+    #[serde(skip)]
+    agent: &'static str,
     /// Name of the scenario.
     name: String,
     status: Status,
@@ -102,10 +104,14 @@ impl Summary {
         let plan = run.plan();
         let (cycles, robots, effort) = (run.cycle(), run.agents(), cost.effort);
         let cpu_s = effort.cpu.as_secs_f64();
-        let status = if cycles < plan.cycles { Status::Incomplete } else { Status::Complete };
+        let status = match cycles < plan.cycles && !run.is_over() {
+            true => Status::Incomplete,
+            false => Status::Complete,
+        };
         Self {
             version: env!("CARGO_PKG_VERSION"),
             world: run.world(),
+            agent: run.agent(),
             name: plan.name,
             status,
             seed: plan.seed,
@@ -137,7 +143,7 @@ impl Summary {
     /// The report for people; `outcome` is the world's part.
     pub(crate) fn text(&self, outcome: Lines) -> String {
         let mut lines = vec![
-            line(&format!("{}s", self.agent()), grouped(self.robots as u64)),
+            line(&format!("{}s", self.agent), grouped(self.robots as u64)),
             line("cycles", self.cycles_words()),
         ];
         lines.extend(outcome);
@@ -153,10 +159,6 @@ impl Summary {
     fn heading(&self) -> String {
         let name = if self.name.is_empty() { self.world } else { &self.name };
         format!("{name}, seed {}", self.seed)
-    }
-
-    fn agent(&self) -> &str {
-        self.world.trim_end_matches('s')
     }
 
     fn cycles_words(&self) -> String {
@@ -177,7 +179,7 @@ impl Summary {
             grouped(self.cycles_timed),
             grouped(per_second as u64),
             self.robot_cycles_per_cpu_s / 1e6,
-            self.agent(),
+            self.agent,
             self.workers,
             if self.workers == 1 { "" } else { "s" },
         )

@@ -16,8 +16,14 @@ pub trait Simulation: Send {
     /// Entities that act (robots, chains, airplanes).
     fn agents(&self) -> usize;
 
+    /// Whether nothing can happen any more, e.g. when everybody has arrived: then a run is
+    /// complete before its planned number of cycles.
+    fn is_over(&self) -> bool {
+        false
+    }
+
     /// Runs up to `cycles` cycles and says how many were done: fewer when a buffer for
-    /// recording is full, never 0 unless `cycles` is 0.
+    /// recording is full or the run is over, never 0 unless `cycles` is 0.
     fn advance(&mut self, cycles: u64) -> u64;
 
     /// The digest of the present state: equal for equal scenario, seed and cycle.

@@ -102,7 +102,7 @@ impl ExportArgs {
 /// When the scenario is wrong or no chain, or the export cannot be written.
 pub(crate) fn exact(args: &ExactArgs, console: Console) -> Result<ExitCode, Failure> {
     let (source, compiled) = args.scenario.compile()?;
-    let compiled = compiled.into_robots();
+    let compiled = compiled.into_robots(&source)?;
     let model = Model::new(&compiled)?;
     let chosen = policy(&args.policy)?;
     let mut summary = model.summary(&args.policy, &chosen, args.top)?;

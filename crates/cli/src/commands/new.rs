@@ -32,18 +32,22 @@ pub(crate) struct NewArgs {
 enum World {
     /// Stochastic robots on a grid
     Robots,
+    /// Airplanes that avoid each other
+    Airspace,
 }
 
 impl World {
     fn name(self) -> &'static str {
         match self {
             Self::Robots => "robots",
+            Self::Airspace => "airspace",
         }
     }
 
     fn scenario(self) -> &'static str {
         match self {
             Self::Robots => include_str!("../../../../scenarios/robots/default.toml"),
+            Self::Airspace => include_str!("../../../../scenarios/airspace/default.toml"),
         }
     }
 }

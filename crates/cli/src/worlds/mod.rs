@@ -1,11 +1,13 @@
 //! The one place that knows which worlds there are, and what the command needs of each.
 
+mod airspace;
 mod robots;
 
 pub(crate) use robots::shade;
 
 use crate::exit::Failure;
 use crate::report::Lines;
+use airspace::AirspaceRun;
 use robots::RobotsRun;
 use serde_json::Value;
 use sidestep::kernel::checkpoint::CheckpointError;
@@ -14,7 +16,7 @@ use sidestep::scenario::{Source, nearest};
 use std::path::Path;
 
 /// Names of the worlds, as scenarios give them.
-const NAMES: [&str; 1] = ["robots"];
+const NAMES: [&str; 2] = ["robots", "airspace"];
 
 /// What a scenario asks for, whatever its world.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -69,6 +71,9 @@ pub(crate) struct Pictured<'a> {
 
 /// A run of some world: the kernel's face, and what only the command asks for.
 pub(crate) trait Run: Simulation {
+    /// What one of its agents is called.
+    fn agent(&self) -> &'static str;
+
     /// What the scenario asks for.
     fn plan(&self) -> Plan;
 
@@ -101,6 +106,8 @@ pub(crate) trait Run: Simulation {
 pub(crate) enum Compiled {
     /// Of the world `robots`.
     Robots(robots::Scenario),
+    /// Of the world `airspace`.
+    Airspace(airspace::Scenario),
 }
 
 impl Compiled {
@@ -112,6 +119,7 @@ impl Compiled {
         let world = source.preamble()?.world;
         match world.get_ref().as_str() {
             "robots" => robots::Scenario::new(source).map(Self::Robots),
+            "airspace" => airspace::Scenario::new(source).map(Self::Airspace),
             other => {
                 let cause = format!("unknown world `{other}`");
                 Err(source.error(Some(world.span()), cause, nearest(other, &NAMES)))
@@ -126,13 +134,24 @@ impl Compiled {
     pub(crate) fn resolve(&self, source: &Source) -> Result<Resolved, InputError> {
         match self {
             Self::Robots(scenario) => scenario.resolve(source),
+            Self::Airspace(_) => Ok(airspace::Scenario::resolve(source)),
         }
     }
 
     /// The scenario itself, for commands that are about the robots world alone.
-    pub(crate) fn into_robots(self) -> sidestep::worlds::robots::scenario::Compiled {
+    ///
+    /// # Errors
+    /// When it is of another world.
+    pub(crate) fn into_robots(
+        self,
+        source: &Source,
+    ) -> Result<sidestep::worlds::robots::scenario::Compiled, InputError> {
         match self {
-            Self::Robots(scenario) => scenario.into_compiled(),
+            Self::Robots(scenario) => Ok(scenario.into_compiled()),
+            Self::Airspace(_) => {
+                let remedy = "give a scenario with world = \"robots\"";
+                Err(InputError::new(&source.place, "this command is about robots alone", remedy))
+            }
         }
     }
 
@@ -140,6 +159,7 @@ impl Compiled {
     pub(crate) fn start(self, source: &Source, workers: usize) -> Box<dyn Run> {
         match self {
             Self::Robots(scenario) => Box::new(RobotsRun::new(scenario, source, workers)),
+            Self::Airspace(scenario) => Box::new(AirspaceRun::new(scenario, source, workers)),
         }
     }
 }

@@ -98,6 +98,10 @@ impl Simulation for RobotsRun {
 }
 
 impl Run for RobotsRun {
+    fn agent(&self) -> &'static str {
+        "robot"
+    }
+
     fn plan(&self) -> Plan {
         let compiled = self.simulation.compiled();
         Plan {

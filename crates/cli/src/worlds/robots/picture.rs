@@ -4,6 +4,7 @@ use super::Pictured;
 use super::poses;
 use crate::console::grouped;
 use crate::exit::Failure;
+use crate::recorded::has_rows;
 use sidestep::Cell;
 use sidestep::kernel::{Cycle, InputError, Simulation};
 use sidestep::worlds::robots::RobotsWorld;
@@ -31,7 +32,7 @@ pub(super) fn svg(simulation: &RobotsSimulation, of: Pictured<'_>) -> Result<Str
     let snapshot = simulation.snapshot();
     let robots = robots(simulation.world());
     let shown = evenly_chosen(&robots, MOST_TRACKS);
-    let ways = match of.folder.filter(|f| poses::has_rows(f)) {
+    let ways = match of.folder.filter(|f| has_rows(f, poses::TABLE)) {
         Some(folder) => Ways::read(simulation, folder, &shown)?.shortened(simulation.world()),
         None => Ways::default(),
     };

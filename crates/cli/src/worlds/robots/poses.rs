@@ -1,6 +1,7 @@
 //! Where every body is, and whether that is what was recorded.
 
 use super::{Comparison, Said};
+use crate::recorded::has_rows;
 use serde_json::{Value, json};
 use sidestep::kernel::ports::Values;
 use sidestep::kernel::{InputError, Simulation};
@@ -77,7 +78,7 @@ pub(super) fn compare(
     folder: &Path,
 ) -> Result<Comparison, InputError> {
     let cycle = simulation.cycle();
-    if !has_rows(folder) {
+    if !has_rows(folder, TABLE) {
         return Ok(Comparison::NotRecorded);
     }
     let table = read_table(folder, TABLE, cycle..=cycle)?;
@@ -94,15 +95,6 @@ pub(super) fn compare(
     Ok(match different.is_empty() {
         true => Comparison::Equal(recorded.len()),
         false => Comparison::Different(different),
-    })
-}
-
-/// Whether some part of the table is whole: a run that was killed early has none.
-pub(super) fn has_rows(folder: &Path) -> bool {
-    let is_part = |name: &std::ffi::OsStr| Path::new(name).extension() == Some("parquet".as_ref());
-    [TABLE.to_string(), format!("{TABLE}.partial")].iter().any(|table| {
-        let entries = std::fs::read_dir(folder.join(table));
-        entries.is_ok_and(|mut all| all.any(|e| e.is_ok_and(|e| is_part(&e.file_name()))))
     })
 }
 

@@ -5,7 +5,7 @@ use super::react::LOOKS_PER_STEP;
 use super::state::{AirspaceState, PairRecord};
 use super::world::AirspaceWorld;
 use serde::{Deserialize, Serialize};
-use sidestep_kernel::{Cycle, EntityId};
+use sidestep_kernel::EntityId;
 use std::collections::BTreeMap;
 
 /// Everything that a run books beside its state, and that a checkpoint keeps.
@@ -124,7 +124,7 @@ impl AirspaceWorld {
     }
 
     /// Whether everybody has arrived by now.
-    pub fn is_over(&self, state: &AirspaceState, _: Cycle) -> bool {
+    pub fn is_over(&self, state: &AirspaceState) -> bool {
         state.airplanes.iter().all(|cell| !cell.is_flying())
     }
 }

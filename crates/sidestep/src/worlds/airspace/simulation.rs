@@ -14,6 +14,9 @@ use sidestep_kernel::ports::{
 use sidestep_kernel::{Cycle, Digest, InputError, Simulation};
 use std::sync::Arc;
 
+/// Rows kept at most before they must be recorded.
+const MAX_ROWS: usize = 1 << 20;
+
 /// A run of an airspace.
 #[derive(Debug)]
 pub struct AirspaceSimulation {
@@ -117,11 +120,6 @@ impl AirspaceSimulation {
         self.state.snapshot(self.cycle)
     }
 
-    /// Whether everybody has arrived.
-    pub fn is_over(&self) -> bool {
-        self.compiled.world.is_over(&self.state, self.cycle)
-    }
-
     /// Metrics so far.
     pub fn airspace_metrics(&self) -> Metrics {
         self.compiled.world.metrics(&self.state, &self.ledger, self.decide_ns as f64 / 1e9)
@@ -135,6 +133,11 @@ impl AirspaceSimulation {
             scenario: self.scenario,
             cycle: self.cycle,
         }
+    }
+
+    /// Whether rows must be recorded before more can be kept.
+    fn is_full(&self) -> bool {
+        self.rows.as_ref().is_some_and(|rows| rows.cycle.len() >= MAX_ROWS)
     }
 
     fn keep_rows(&mut self) {
@@ -175,17 +178,22 @@ impl Simulation for AirspaceSimulation {
     }
 
     fn advance(&mut self, cycles: u64) -> u64 {
-        // Poses are kept at the start of each cycle, so a recorded run goes one by one: a
-        // cycle of airplanes costs far more than that.
-        let cycles = if self.rows.is_some() { cycles.min(1) } else { cycles };
-        if cycles > 0 {
+        // One by one: poses are kept at the start of each cycle, and a run may be over after
+        // any. A cycle of airplanes costs far more than that.
+        let mut done = 0;
+        while done < cycles && (done == 0 || !self.is_over()) && !self.is_full() {
             self.keep_rows();
+            let span = (self.cycle, 1);
+            self.engine.advance(&*self.compiled.world, &mut self.state, span, &self.clock);
+            self.cycle += 1;
+            done += 1;
         }
-        let span = (self.cycle, cycles);
-        self.engine.advance(&*self.compiled.world, &mut self.state, span, &self.clock);
-        self.cycle += cycles;
         self.gather();
-        cycles
+        done
+    }
+
+    fn is_over(&self) -> bool {
+        self.compiled.world.is_over(&self.state)
     }
 
     fn digest(&self) -> Digest {
