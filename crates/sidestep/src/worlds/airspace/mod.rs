@@ -24,6 +24,7 @@ pub mod world;
 pub use decide::Effort;
 pub use react::LOOKS_PER_STEP;
 use sidestep_kernel::conflict::Groups;
+use sidestep_kernel::ports::SystemClock;
 use sidestep_kernel::{Cycle, Slot, World};
 use state::{AirspaceState, PairRecord};
 use std::collections::BTreeMap;
@@ -37,6 +38,7 @@ pub struct Scratch {
     effort: Effort,
     /// Time spent deciding: told beside the results, never part of them.
     decide_ns: u64,
+    clock: SystemClock,
     flying: Vec<Slot>,
 }
 

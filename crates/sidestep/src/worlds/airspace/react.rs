@@ -7,8 +7,8 @@ use super::shield::{Flyer, Side, Way, filter};
 use super::state::{AirspaceState, PairRecord};
 use super::world::{AirspaceWorld, purpose};
 use sidestep_kernel::distr::normal;
+use sidestep_kernel::ports::Clock;
 use sidestep_kernel::{Cycle, Slot};
-use std::time::Instant;
 
 /// Looks at the distance of a pair in one step of `dtau`.
 pub const LOOKS_PER_STEP: usize = 10;
@@ -35,9 +35,9 @@ impl AirspaceWorld {
         scratch: &mut Scratch,
     ) {
         let known: Vec<Known> = group.iter().map(|&slot| self.known(state, now, slot)).collect();
-        let began = Instant::now();
+        let began_ns = scratch.clock.now_ns();
         let candidates = self.wanted(&known, now, &mut scratch.effort);
-        scratch.decide_ns += began.elapsed().as_nanos() as u64;
+        scratch.decide_ns += scratch.clock.now_ns() - began_ns;
         let ways = if self.shield {
             self.shielded(state, group, &candidates)
         } else {
