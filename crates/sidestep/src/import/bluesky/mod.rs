@@ -11,7 +11,8 @@
 //! What is acted on: `CRE`, `DEL`, `DEFWPT`, `ADDWPT`, `AFTER .. ADDWPT`, `ORIG`, `DEST`, `HDG`,
 //! `SPD`, `ALT`, `VS`, `LNAV`, `VNAV`, `SYN SUPER|WALL|MATRIX`, `ASAS`, `CDMETHOD`, `RESO`,
 //! `ZONER`, `ZONEDH`, `DTLOOK`, `WIND` and `NOISE`. Nothing is dropped in silence: any other
-//! command is counted, and what is wrong or needs a navigation database is listed.
+//! command is counted, and what is wrong or needs a navigation database is listed. Arguments
+//! behind those that are named at each command are not read.
 
 mod interpreter;
 mod lines;
