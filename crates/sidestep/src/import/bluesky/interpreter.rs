@@ -8,8 +8,8 @@ use super::values::{
     Arguments, altitude_ft, heading_deg, is_latitude, number, positive, speed, switch,
 };
 use super::{
-    Change, MAX_AIRCRAFT, Place, Resolution, ScnAircraft, ScnFile, Speed, UnplacedAircraft,
-    UnresolvedPlace, WayPoint, Wind, synthetic,
+    Change, MAX_AIRCRAFT, MAX_WAY_POINTS, Place, Resolution, ScnAircraft, ScnFile, Speed,
+    UnplacedAircraft, UnresolvedPlace, WayPoint, Wind, synthetic,
 };
 use crate::import::local_plane::LatLon;
 use crate::import::table::Word;
@@ -25,6 +25,7 @@ const AIRCRAFT_COMMANDS: [&str; 27] = [
 /// Commands that change or ask for a display.
 const DISPLAY_COMMANDS: [&str; 12] = [
     "ECHO",
+    "FILTERALT",
     "LABEL",
     "LISTRTE",
     "PAN",
@@ -35,7 +36,6 @@ const DISPLAY_COMMANDS: [&str; 12] = [
     "TRAIL",
     "TRAILS",
     "ZOOM",
-    "FILTERALT",
 ];
 
 /// Modes that `ADDWPT` takes in the place of a way-point. All are flown by, so both say nothing.
@@ -152,6 +152,10 @@ impl<'p> Interpreter<'p> {
                 self.set(name, arguments)
             }
             "WIND" => self.add_wind(arguments),
+            "" => {
+                let cause = "the command has no name".to_string();
+                Err(arguments.command.error(self.place, cause, "remove the comma").into())
+            }
             _ => Ok(Outcome::NotUnderstood(name.to_string())),
         }
     }
@@ -286,6 +290,10 @@ impl<'p> Interpreter<'p> {
         (command, id): (Word, Option<&str>),
     ) -> Done {
         let route = &self.drafts[index].aircraft.way_points;
+        if route.len() >= MAX_WAY_POINTS {
+            let cause = format!("the route has more than {MAX_WAY_POINTS} way-points");
+            return Err(self.refused(command, cause, "write fewer"));
+        }
         let mut slot = route.len();
         if let Some(after) = after {
             let name = upper(after);

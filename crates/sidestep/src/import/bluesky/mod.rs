@@ -39,6 +39,9 @@ pub const MAX_SCN_BYTES: u64 = 1 << 24;
 /// The most aircraft that one scenario may create.
 pub const MAX_AIRCRAFT: usize = 100_000;
 
+/// The most way-points that one aircraft's route may have.
+pub const MAX_WAY_POINTS: usize = 10_000;
+
 /// What a scenario file says.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ScnFile {

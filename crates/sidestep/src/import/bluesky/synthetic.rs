@@ -2,7 +2,8 @@
 //!
 //! Sizes are those of the simulator the scenarios are written for, and so are identifiers.
 //! Every aircraft flies at FL200 with a calibrated airspeed of 200 m/s and goes straight to the
-//! mirror image of its start, which is also its destination.
+//! mirror image of its start, which is also its destination. Aircraft that are there already
+//! stay.
 
 use std::f64::consts::TAU;
 

@@ -265,12 +265,21 @@ fn the_goals_of_a_pattern_are_straight_ahead() {
 }
 
 #[test]
+fn a_route_without_end_is_refused() {
+    let file = scenario(&format!("CRE A B744 0 0{}", "\nADDWPT A 1 1".repeat(MAX_WAY_POINTS + 1)));
+    assert_eq!(file.traffic.aircraft[0].way_points.len(), MAX_WAY_POINTS);
+    assert_eq!(file.refused.len(), 1);
+}
+
+#[test]
 fn absurd_patterns_are_refused() {
     for command in ["SYN SUPER 0", "SYN SUPER 100001", "SYN MATRIX 90000", "SYN MATRIX 2000"] {
         let file = scenario(command);
         assert_eq!((file.refused.len(), file.traffic.aircraft.len()), (1, 0), "{command}");
     }
-    for command in ["SYN", "SYN SUPER", "SYN SUPER x", "ZONER -1", "NOISE maybe", "WIND 0,0,9"] {
+    for command in
+        [",HOLD", "SYN", "SYN SUPER", "SYN SUPER x", "ZONER -1", "NOISE maybe", "WIND 0,0,9"]
+    {
         assert_eq!(scenario(command).unparsed.len(), 1, "{command}");
     }
 }

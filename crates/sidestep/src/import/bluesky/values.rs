@@ -1,6 +1,7 @@
 //! The values that arguments of commands have.
 
 use std::fmt;
+use std::ops::RangeInclusive;
 
 use super::Speed;
 use crate::import::local_plane::{LatLon, wrap_deg};
@@ -75,6 +76,12 @@ struct Axis {
 
 const LATITUDE: Axis = Axis { positive: 'N', negative: 'S', max_deg: 90.0 };
 const LONGITUDE: Axis = Axis { positive: 'E', negative: 'W', max_deg: 360.0 };
+
+/// The altitudes that are flown; true airspeeds are finite at all of them.
+const ALTITUDES_FT: RangeInclusive<f64> = -10_000.0..=300_000.0;
+
+const MAX_SPEED_KT: f64 = 10_000.0;
+const MAX_MACH: f64 = 20.0;
 
 /// What separates degrees, minutes and seconds.
 const DEGREE_SIGNS: [char; 3] = ['\'', '"', '°'];
@@ -154,6 +161,10 @@ pub(super) fn altitude_ft(place: &dyn fmt::Display, word: Word) -> Result<f64, I
         let cause = format!("`{}` is no altitude", word.text);
         word.error(place, cause, "write feet such as 20000, or a flight level such as FL200")
     })?;
+    if !ALTITUDES_FT.contains(&(value * unit_ft)) {
+        let cause = format!("`{}` is out of the air", word.text);
+        return Err(word.error(place, cause, "write an altitude from -10000 to 300000 ft"));
+    }
     Ok(value * unit_ft)
 }
 
@@ -163,19 +174,19 @@ pub(super) fn speed(place: &dyn fmt::Display, word: Word) -> Result<Speed, Input
         let cause = format!("`{}` is no speed", word.text);
         word.error(place, cause, "write knots such as 250, or a Mach number such as M0.8")
     };
-    let finite = |text: &str| {
+    let up_to = |max: f64, text: &str| {
         let value = Word { text, ..word }.number(place);
-        value.ok().filter(|value| *value >= 0.0).ok_or_else(wrong)
+        value.ok().filter(|value| (0.0..=max).contains(value)).ok_or_else(wrong)
     };
     let Some(mach) = word.text.strip_prefix(['M', 'm']) else {
-        let value = finite(word.text)?;
+        let value = up_to(MAX_SPEED_KT, word.text)?;
         // Nobody flies with less than a knot: a number below 1 is meant as a Mach number.
         let is_mach = 0.1 < value && value < 1.0;
         return Ok(if is_mach { Speed::Mach(value) } else { Speed::CasKt(value) });
     };
     // Without a point the digits stand behind it.
-    let mach = if mach.contains('.') { finite(mach)? } else { finite(&format!(".{mach}"))? };
-    Ok(Speed::Mach(mach))
+    let digits = if mach.contains('.') { mach.to_owned() } else { format!(".{mach}") };
+    Ok(Speed::Mach(up_to(MAX_MACH, &digits)?))
 }
 
 /// A number that must be larger than 0.
@@ -271,7 +282,7 @@ mod tests {
         {
             assert_eq!(altitude_ft(&"f", word(text)), Ok(expected), "{text}");
         }
-        for text in ["FL", "F200", "high", "é€"] {
+        for text in ["FL", "F200", "high", "é€", "FL9999", "-1e5", "1e300"] {
             assert!(altitude_ft(&"f", word(text)).is_err(), "{text}");
         }
     }
@@ -285,7 +296,7 @@ mod tests {
         for (text, knots) in [("250", 250.0), ("0", 0.0), ("1", 1.0), ("0.05", 0.05)] {
             assert_eq!(speed(&"f", word(text)), Ok(Speed::CasKt(knots)), "{text}");
         }
-        for text in ["M", "fast", "-250", "inf", "M-1"] {
+        for text in ["M", "fast", "-250", "inf", "M-1", "1e5", "M99.9", "M1e3"] {
             assert!(speed(&"f", word(text)).is_err(), "{text}");
         }
     }
