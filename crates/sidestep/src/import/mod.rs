@@ -5,10 +5,12 @@
 //! [`InputError`](sidestep_kernel::InputError) with file, line and column.
 
 pub mod ascii;
+pub mod bluesky;
 pub mod carmen;
 pub mod file;
 pub use file::read_text;
 pub mod image;
+pub mod local_plane;
 mod map_file;
 mod map_yaml;
 pub mod movingai;
@@ -17,6 +19,7 @@ mod pixel_map;
 pub mod rosmap;
 mod rows;
 pub mod table;
+pub mod traffic;
 
 #[cfg(test)]
 mod shared_data;
