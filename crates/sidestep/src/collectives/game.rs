@@ -37,8 +37,10 @@ pub struct PairwiseGame {
 struct Pair {
     a: usize,
     b: usize,
-    /// `costs[x_a * strategies_b + x_b]`.
+    /// What the strategies cost both together: `costs[x_a * strategies_b + x_b]`.
     costs: Vec<f64>,
+    /// The same, as the parts of `a` and of `b`.
+    parts: Vec<[f64; 2]>,
 }
 
 impl PairwiseGame {
@@ -59,17 +61,47 @@ impl PairwiseGame {
     /// # Panics
     /// When `a` is `b`, one of them does not exist, or the list has another length.
     pub fn add_pair(&mut self, a: usize, b: usize, costs: Vec<f64>) {
+        self.add_pair_in_parts(a, b, costs.into_iter().map(|cost| [cost, 0.0]).collect());
+    }
+
+    /// Adds a pair of which each bears a part: `parts[x_a][x_b]` are those of `a` and `b`. The
+    /// cost of a joint move is summed player by player, each player's own costs and parts by
+    /// rising number of the others, so that players who sum apart come to the same bits.
+    ///
+    /// # Panics
+    /// See [`PairwiseGame::add_pair`].
+    pub fn add_pair_in_parts(&mut self, a: usize, b: usize, parts: Vec<[f64; 2]>) {
         assert!(a != b, "a pair is two players");
         assert_eq!(
-            costs.len(),
+            parts.len(),
             self.strategies[a] * self.strategies[b],
             "one cost per two strategies"
         );
-        if costs.iter().any(|&cost| cost != 0.0) {
-            self.of_player[a].push(self.pairs.len());
-            self.of_player[b].push(self.pairs.len());
-            self.pairs.push(Pair { a, b, costs });
+        if parts.iter().any(|part| *part != [0.0; 2]) {
+            let index = self.pairs.len();
+            let costs = parts.iter().map(|[of_a, of_b]| of_a + of_b).collect();
+            self.pairs.push(Pair { a, b, costs, parts });
+            self.enlist(a, b, index);
+            self.enlist(b, a, index);
         }
+    }
+
+    /// Keeps a player's pairs by rising number of the other.
+    fn enlist(&mut self, player: usize, other: usize, index: usize) {
+        let pairs = &self.pairs;
+        let of_player = &mut self.of_player[player];
+        let place = of_player.partition_point(|&k| pairs[k].a + pairs[k].b - player < other);
+        of_player.insert(place, index);
+    }
+
+    /// The part of a joint move's cost that a player bears.
+    pub fn part(&self, joint: &[usize], player: usize) -> f64 {
+        let own = self.own[player][joint[player]];
+        self.of_player[player].iter().fold(own, |sum, &index| {
+            let Pair { a, b, parts, .. } = &self.pairs[index];
+            let parts = parts[joint[*a] * self.strategies[*b] + joint[*b]];
+            sum + parts[usize::from(*b == player)]
+        })
     }
 
     /// Writes `E[G | x_i = x]`, less a part that is the same for all `x`, into `expected` (shape:
@@ -78,7 +110,7 @@ impl PairwiseGame {
         expected.clear();
         expected.extend_from_slice(&self.own[player]);
         for &index in &self.of_player[player] {
-            let Pair { a, b, costs } = &self.pairs[index];
+            let Pair { a, b, costs, .. } = &self.pairs[index];
             let columns = self.strategies[*b];
             if *a == player {
                 for (sum, row) in expected.iter_mut().zip(costs.chunks_exact(columns)) {
@@ -98,7 +130,7 @@ impl PairwiseGame {
     }
 
     fn pair_cost(&self, index: usize, joint: &[usize]) -> f64 {
-        let Pair { a, b, costs } = &self.pairs[index];
+        let Pair { a, b, costs, .. } = &self.pairs[index];
         costs[joint[*a] * self.strategies[*b] + joint[*b]]
     }
 }
@@ -109,8 +141,7 @@ impl Game for PairwiseGame {
     }
 
     fn cost(&self, joint: &[usize]) -> f64 {
-        let own: f64 = self.own.iter().zip(joint).map(|(costs, &x)| costs[x]).sum();
-        own + (0..self.pairs.len()).map(|index| self.pair_cost(index, joint)).sum::<f64>()
+        (0..self.strategies.len()).fold(0.0, |sum, player| sum + self.part(joint, player))
     }
 
     fn private_cost(&self, joint: &[usize], player: usize) -> f64 {

@@ -102,13 +102,12 @@ pub enum After {
     Pursue,
 }
 
-/// A way-point that an airplane flies past counts as reached when the airplane cannot get
-/// nearer to it without turning round: it is behind, and within [`Passing`] of the track.
+/// When an airplane has done with a way-point.
 ///
-/// Without that, an airplane whose way-point lies inside its own turning circle would orbit it
-/// for ever: the circle's centre is never within the tolerance of the circle. So an airplane
-/// also has *passed* a way-point that lies inside one of its two tightest turning circles,
-/// since steering for it would keep it on that circle.
+/// It is reached within a tolerance. But an airplane whose way-point lies inside one of its two
+/// tightest turning circles would orbit it for ever: steering for it keeps the airplane on that
+/// circle. Such a way-point counts as *passed*: the airplane has come as near as it can without
+/// flying away first.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Passing {
     /// A way-point nearer than this is reached.
@@ -174,14 +173,12 @@ pub fn actions(model: &Model, dt_s: f64, holds_s: &[f64]) -> Vec<Action> {
 }
 
 /// Where an action leads.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Prediction {
     /// Positions after 1, 2, ... steps of `dtau`.
     pub points: Vec<Point>,
     /// How many points count against others: those up to arrival at the last way-point.
     pub counted: usize,
-    /// The airplane after the points of the first `dt`, and its next way-point then.
-    pub after_dt: Option<(Pose, usize)>,
 }
 
 /// Flies step by step: an action, the way-points, what comes after the last.
@@ -233,7 +230,6 @@ impl Pilot<'_> {
     pub fn predict(&self, action: Action, pose: Pose, next: usize, timing: &Timing) -> Prediction {
         let mut points = Vec::with_capacity(timing.horizon);
         let (mut pose, mut next, mut counted) = (pose, next, timing.horizon);
-        let mut after_dt = None;
         for k in 0..timing.horizon {
             let omega = self.omega_rad_s(action, pose, next, k as f64 * self.dtau_s);
             pose = pose.step(self.model.v_m_s, omega, self.dtau_s);
@@ -244,11 +240,8 @@ impl Pilot<'_> {
                     counted = k + 1;
                 }
             }
-            if k + 1 == timing.points_per_dt() {
-                after_dt = Some((pose, next));
-            }
         }
-        Prediction { points, counted, after_dt }
+        Prediction { points, counted }
     }
 }
 

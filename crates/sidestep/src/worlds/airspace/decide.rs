@@ -1,10 +1,12 @@
 //! What the airplanes of a group want to do: by the method of the world.
 
 use super::airplane::{Action, Pilot, Point, Pose};
+use super::deploy::{Decided, Deployment, Traffic};
 use super::objective::{Options, game};
 use super::shield::Way;
-use super::world::{AirspaceWorld, Method, purpose};
+use super::world::{AirspaceWorld, Method};
 use crate::collectives::{Estimator, optimize};
+use serde::{Deserialize, Serialize};
 use sidestep_kernel::{Cycle, Slot};
 
 /// An airplane of a group, as the group knows it.
@@ -16,7 +18,7 @@ pub(super) struct Known {
 }
 
 /// What one optimization took.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Effort {
     /// Optimizations.
     pub optimizations: u64,
@@ -24,6 +26,8 @@ pub struct Effort {
     pub rounds: u64,
     /// Those that ended before they had converged.
     pub unconverged: u64,
+    /// What went over the network.
+    pub traffic: Traffic,
 }
 
 impl Effort {
@@ -32,6 +36,7 @@ impl Effort {
         self.optimizations += other.optimizations;
         self.rounds += other.rounds;
         self.unconverged += other.unconverged;
+        self.traffic.add(other.traffic);
     }
 }
 
@@ -64,37 +69,49 @@ impl AirspaceWorld {
     /// By probability collectives: the chosen action, and the others by what the optimizer
     /// expects of them.
     fn optimized(&self, group: &[Known], now: Cycle, effort: &mut Effort) -> Vec<Vec<Action>> {
-        let options: Vec<Options> = group.iter().map(|known| self.options(*known)).collect();
-        let game = game(&self.objective, &options);
-        let uniform = |player: usize, k: u64| {
-            let words =
-                self.streams.block(group[player].slot, now, purpose::SAMPLE, (k / 4) as u16);
-            f64::from(words[(k % 4) as usize]) / 4_294_967_296.0
+        let (decided, traffic) = match self.deployment {
+            Deployment::Direct => (self.direct(group, now), Traffic::default()),
+            _ => self.deployed(group, now),
         };
-        let outcome = optimize(&game, &self.settings, uniform);
+        let Some(first) = decided.first() else { return Vec::new() };
         effort.add(Effort {
             optimizations: 1,
-            rounds: u64::from(outcome.rounds),
-            unconverged: u64::from(!outcome.converged),
+            rounds: u64::from(first.rounds),
+            unconverged: u64::from(!first.converged),
+            traffic,
         });
-        let ranked = |(player, known): (usize, &Known)| {
-            let (chosen, expected) = (outcome.joint[player], &outcome.expected[player]);
+        let ranked = |(Decided { chosen, expected, .. }, known): (&Decided, &Known)| {
+            let chosen = *chosen;
             let mut order: Vec<usize> = (0..expected.len()).collect();
             order.sort_by(|&a, &b| {
-                (a != chosen, expected[a])
-                    .partial_cmp(&(b != chosen, expected[b]))
-                    .unwrap_or(std::cmp::Ordering::Equal)
+                (a != chosen).cmp(&(b != chosen)).then(expected[a].total_cmp(&expected[b]))
             });
-            order.iter().map(|&k| self.actions[known.slot as usize][k]).collect()
+            order.iter().map(|&k| self.actions_of(known.slot)[k]).collect()
         };
-        group.iter().enumerate().map(ranked).collect()
+        decided.iter().zip(group).map(ranked).collect()
+    }
+
+    /// One process decides for all.
+    fn direct(&self, group: &[Known], now: Cycle) -> Vec<Decided> {
+        let options: Vec<Options> = group.iter().map(|known| self.options(*known)).collect();
+        let game = game(&self.objective, &options);
+        let uniform = |player: usize, k: u64| self.uniform(group[player].slot, now, k);
+        let outcome = optimize(&game, &self.settings, uniform);
+        let (rounds, converged) = (outcome.rounds, outcome.converged);
+        let each = outcome.joint.into_iter().zip(outcome.expected);
+        each.map(|(chosen, expected)| Decided { chosen, expected, rounds, converged }).collect()
     }
 
     /// Where each action would lead an airplane. In the air, way-points drift against the
     /// wind; over one horizon they are taken where they will be met on a straight way.
-    fn options(&self, known: Known) -> Options {
+    pub(super) fn options(&self, known: Known) -> Options {
+        self.options_towards(known, &self.airplanes[known.slot as usize].mission)
+    }
+
+    /// The same for a mission that was told.
+    pub(super) fn options_towards(&self, known: Known, mission: &[Point]) -> Options {
         let i = known.slot as usize;
-        let mission = self.drifted(i, known);
+        let mission = self.drifted(mission, known);
         let pilot = self.pilot(i, &mission);
         let predict =
             |action: &Action| pilot.predict(*action, known.pose, known.next, &self.timing);
@@ -104,14 +121,14 @@ impl AirspaceWorld {
 
     /// The mission as seen from the moving air: each way-point where it will be when the
     /// airplane comes to it.
-    fn drifted(&self, i: usize, known: Known) -> Vec<Point> {
-        let airplane = &self.airplanes[i];
+    fn drifted(&self, mission: &[Point], known: Known) -> Vec<Point> {
+        let airplane = &self.airplanes[known.slot as usize];
         let [wx, wy] = self.wind_m_s;
         if wx == 0.0 && wy == 0.0 {
-            return airplane.mission.clone();
+            return mission.to_vec();
         }
         let (mut at, mut flown_s) = (known.pose.at, 0.0);
-        let mut drifted = airplane.mission.clone();
+        let mut drifted = mission.to_vec();
         for goal in drifted.iter_mut().skip(known.next) {
             let heading = self.aim(at, *goal, airplane.model.v_m_s);
             let ground = [heading[0] - at[0] + wx, heading[1] - at[1] + wy];

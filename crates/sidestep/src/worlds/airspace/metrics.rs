@@ -13,16 +13,11 @@ use std::collections::BTreeMap;
 pub struct Ledger {
     /// Pairs that came near each other, by ids.
     pub pairs: BTreeMap<(EntityId, EntityId), PairRecord>,
-    /// Optimizations, rounds, and how many had not converged.
-    pub effort: [u64; 3],
+    /// What optimizations took.
+    pub effort: Effort,
 }
 
 impl Ledger {
-    pub(super) fn add_effort(&mut self, effort: Effort) {
-        let more = [effort.optimizations, effort.rounds, effort.unconverged];
-        self.effort.iter_mut().zip(more).for_each(|(sum, n)| *sum += n);
-    }
-
     pub(super) fn add_pair(&mut self, pair: (EntityId, EntityId), record: PairRecord) {
         self.pairs.entry(pair).and_modify(|r| r.add(record)).or_insert(record);
     }
@@ -44,10 +39,15 @@ pub struct Metrics {
     /// Mean over those that have arrived: time beyond what the flight takes alone, percent of
     /// that.
     pub mean_delay_percent: Option<f64>,
-    /// Messages between agents; none where one process decides for all.
+    /// Messages between agents, or migrations of a coordinator; none where one process decides
+    /// for all.
     pub messages: u64,
     /// Bytes of those messages.
     pub bytes: u64,
+    /// Messages, if one could reach all of a group,
+    pub multicasts: u64,
+    /// and their bytes.
+    pub multicast_bytes: u64,
     /// Optimizations run.
     pub optimisations: u64,
     /// Their rounds on average.
@@ -104,7 +104,7 @@ impl AirspaceWorld {
         let mean = |sum: f64, n: usize| (n > 0).then(|| sum / n as f64);
         let nearest = ledger.pairs.values().map(|r| r.nearest_m).min_by(f64::total_cmp);
         let looks: u64 = ledger.pairs.values().map(|r| r.lost_looks).sum();
-        let [optimisations, rounds, unconverged] = ledger.effort;
+        let Effort { optimizations: optimisations, rounds, unconverged, traffic } = ledger.effort;
         Metrics {
             min_separation_m: nearest,
             losses_of_separation: ledger.pairs.values().map(|r| u64::from(r.losses)).sum(),
@@ -112,8 +112,10 @@ impl AirspaceWorld {
             arrived: all.iter().filter(|a| a.flown_s.is_some()).count() as u64,
             airplanes: all.len() as u64,
             mean_delay_percent: mean(delays.iter().sum(), delays.len()),
-            messages: 0,
-            bytes: 0,
+            messages: traffic.messages,
+            bytes: traffic.bytes,
+            multicasts: traffic.multicasts,
+            multicast_bytes: traffic.multicast_bytes,
             optimisations,
             rounds_mean: mean(rounds as f64, optimisations as usize),
             unconverged,

@@ -11,6 +11,7 @@
 
 pub mod airplane;
 mod decide;
+pub mod deploy;
 mod generate;
 pub mod metrics;
 pub mod objective;

@@ -100,32 +100,35 @@ impl Bounds {
 ///
 /// All that does not change during an optimization is computed here, once.
 pub fn game(objective: &Objective, group: &[Options]) -> PairwiseGame {
-    let own = group.iter().map(|options| {
-        let optimal = options.predictions.last().expect("every airplane has an optimal action");
-        let deviation = |p: &Prediction| objective.alpha * objective.deviation(p, optimal);
-        options.predictions.iter().map(deviation).collect()
-    });
-    let mut game = PairwiseGame::new(own.collect());
+    let own = group.iter().map(|options| own_costs(objective, options)).collect();
+    let mut game = PairwiseGame::new(own);
     for (i, a) in group.iter().enumerate() {
         for (j, b) in group.iter().enumerate().skip(i + 1) {
-            game.add_pair(i, j, pair_costs(objective, a, b));
+            game.add_pair_in_parts(i, j, pair_costs(objective, a, b));
         }
     }
     game
 }
 
-fn pair_costs(objective: &Objective, a: &Options, b: &Options) -> Vec<f64> {
+/// `alpha Gdev` of every action.
+pub(super) fn own_costs(objective: &Objective, options: &Options) -> Vec<f64> {
+    let optimal = options.predictions.last().expect("every airplane has an optimal action");
+    let deviation = |p: &Prediction| objective.alpha * objective.deviation(p, optimal);
+    options.predictions.iter().map(deviation).collect()
+}
+
+/// `Gcol` of both for every two actions.
+pub(super) fn pair_costs(objective: &Objective, a: &Options, b: &Options) -> Vec<[f64; 2]> {
     let r = [a.separation_m, b.separation_m];
     let gap_m = objective.inflation * r[0].max(r[1]);
     let mut costs = Vec::with_capacity(a.predictions.len() * b.predictions.len());
     for (p, p_box) in a.predictions.iter().zip(&a.boxes) {
         for (q, q_box) in b.predictions.iter().zip(&b.boxes) {
             // Most pairs of ways never come near each other.
-            let [of_a, of_b] = match p_box.is_within(q_box, gap_m) {
+            costs.push(match p_box.is_within(q_box, gap_m) {
                 true => objective.collision(p, q, r),
                 false => [0.0; 2],
-            };
-            costs.push(of_a + of_b);
+            });
         }
     }
     costs

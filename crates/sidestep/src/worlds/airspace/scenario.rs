@@ -1,6 +1,7 @@
 //! The text of an airspace scenario, and what it compiles to.
 
 use super::airplane::{Model, Passing, Point, Pose, Timing};
+use super::deploy::{Deployment, refuses};
 use super::generate::{Order as Wanted, generate};
 use super::objective::Objective;
 use super::shield::{Flyer, Side, first_fallbacks};
@@ -51,15 +52,6 @@ pub enum Switch {
     Off,
 }
 
-/// Where the optimizer runs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Deployment {
-    /// One process decides for all.
-    #[default]
-    Direct,
-}
-
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct AirspaceFile {
@@ -100,8 +92,7 @@ struct AirspaceSection {
     preset: Preset,
     method: Method,
     shield: Option<Switch>,
-    #[serde(rename = "deployment")]
-    _deployment: Deployment,
+    deployment: Deployment,
     generator: Option<Spanned<GeneratorSection>>,
     dt_s: Option<Spanned<f64>>,
     dtau_s: Option<Spanned<f64>>,
@@ -244,6 +235,7 @@ impl Compiler<'_> {
             settings: self.settings()?,
             holds_s: self.holds()?,
             method: section.method,
+            deployment: section.deployment,
             shield: section.shield != Some(Switch::Off),
             wind_m_s: section.wind_m_s,
             disturbance: Disturbance {
@@ -255,6 +247,11 @@ impl Compiler<'_> {
             alone_s: Vec::new(),
         }
         .prepared();
+        if let Some(reason) = refuses(world.deployment, &world.settings) {
+            let cause = format!("deployment {}: {reason}", world.deployment.name());
+            let remedy = "set order = \"parallel\" and utility = \"joint\", or estimator = { kind = \"exact\" }";
+            return Err(self.error(None, cause, remedy));
+        }
         if world.most_samples() > u64::from(u16::MAX) * 4 {
             let cause = "more samples than a random stream holds";
             return Err(self.error(None, cause, "give smaller blocks or fewer rounds"));

@@ -158,7 +158,7 @@ impl AirspaceSimulation {
             for (pair, record) in std::mem::take(&mut scratch.pairs) {
                 self.ledger.add_pair(pair, record);
             }
-            self.ledger.add_effort(std::mem::take(&mut scratch.effort));
+            self.ledger.effort.add(std::mem::take(&mut scratch.effort));
             self.decide_ns += std::mem::take(&mut scratch.decide_ns);
         }
     }

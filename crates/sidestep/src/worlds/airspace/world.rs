@@ -1,10 +1,12 @@
 //! A compiled airspace: everything that never changes during a run.
 
 use super::airplane::{Action, After, Model, Passing, Pilot, Point, Pose, Timing, actions};
+use super::deploy::Deployment;
 use super::objective::Objective;
 use crate::collectives::Settings;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::stream::Streams;
+use sidestep_kernel::{Cycle, Slot};
 
 /// What random draws of this world are for.
 pub mod purpose {
@@ -78,6 +80,8 @@ pub struct AirspaceWorld {
     pub holds_s: Vec<f64>,
     /// Who decides.
     pub method: Method,
+    /// Where the optimizer runs.
+    pub deployment: Deployment,
     /// Whether the shield filters decisions.
     pub shield: bool,
     /// A wind that all know.
@@ -95,6 +99,12 @@ pub struct AirspaceWorld {
 const ENDLESS_STEPS: usize = 1_000_000;
 
 impl AirspaceWorld {
+    /// The `k`-th uniform number in [0, 1) of an airplane's samples in a cycle.
+    pub(super) fn uniform(&self, slot: Slot, now: Cycle, k: u64) -> f64 {
+        let words = self.streams.block(slot, now, purpose::SAMPLE, (k / 4) as u16);
+        f64::from(words[(k % 4) as usize]) / 4_294_967_296.0
+    }
+
     /// Prepares what follows from the fields.
     #[must_use]
     pub(super) fn prepared(mut self) -> Self {
