@@ -1,6 +1,6 @@
 //! A scenario file and the options of the command line -> a scenario that is known to be right.
 
-use crate::worlds::Compiled;
+use crate::worlds::{self, Compiled};
 use clap::Args;
 use sidestep::kernel::{InputError, workers};
 use sidestep::scenario::Source;
@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 /// The scenario, and what the command line changes in it.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct ScenarioArgs {
-    /// Scenario file (TOML; may be packed with gzip)
+    /// Scenario file (TOML, BlueSky .scn or recorded traffic .csv; may be packed with gzip)
     #[arg(value_name = "SCENARIO")]
     pub(crate) file: PathBuf,
 
@@ -57,7 +57,12 @@ impl ScenarioArgs {
     /// When anything in it is wrong.
     pub(crate) fn compile(&self) -> Result<(Source, Compiled), InputError> {
         let overrides = self.all_overrides();
-        let source = Source::read(&self.file, &overrides)?;
+        let source = match worlds::translated(&self.file)? {
+            Some(text) => {
+                Source::new(self.file.display().to_string(), text, "").with(&overrides)?
+            }
+            None => Source::read(&self.file, &overrides)?,
+        };
         match Compiled::new(&source) {
             Ok(compiled) => Ok((source, compiled)),
             Err(error) if overrides.is_empty() => Err(error),
@@ -79,6 +84,9 @@ impl ScenarioArgs {
 /// The same error where it stands in the file, if no override has brought it in: overrides
 /// may move lines.
 fn in_the_file_itself(file: &Path, error: InputError) -> InputError {
+    if !matches!(worlds::translated(file), Ok(None)) {
+        return error;
+    }
     let plain = Source::read(file, &[]).and_then(|source| Compiled::new(&source).map(drop));
     match plain {
         Err(plain) if plain.cause() == error.cause() => plain,

@@ -3,7 +3,9 @@
 use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
 use crate::plan::ScenarioArgs;
+use crate::worlds;
 use clap::Args;
+use serde_json::Value;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -25,7 +27,13 @@ pub(crate) struct CheckArgs {
 /// When the scenario is wrong.
 pub(crate) fn check(args: &CheckArgs, console: Console) -> Result<ExitCode, Failure> {
     let (source, compiled) = args.scenario.compile()?;
-    let found = compiled.start(&source, 1).contents();
+    let mut found = compiled.start(&source, 1).contents();
+    if let Some(told) = worlds::told_of(&args.scenario.file)? {
+        if let (Some(all), Value::Object(more)) = (found.json.as_object_mut(), told.json) {
+            all.extend(more);
+        }
+        found.text.push_str(&told.text);
+    }
     let heading = format!("{} is a valid scenario\n", args.scenario.file.display());
     console.result(&found.json, || heading + &found.text);
     Ok(ExitCode::Done)

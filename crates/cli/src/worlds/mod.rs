@@ -102,6 +102,23 @@ pub(crate) trait Run: Simulation {
     fn picture(&self, of: Pictured<'_>) -> Result<String, Failure>;
 }
 
+/// The scenario that a file of another form stands for: BlueSky traffic (`.scn`) or recorded
+/// tracks (`.csv`); `None` for files of our own.
+///
+/// # Errors
+/// When it cannot be read, or has no airplane.
+pub(crate) fn translated(file: &Path) -> Result<Option<String>, InputError> {
+    airspace::translated(file)
+}
+
+/// What `check` says beside the scenario's contents of a file of another form.
+///
+/// # Errors
+/// When it cannot be read.
+pub(crate) fn told_of(file: &Path) -> Result<Option<Said>, InputError> {
+    airspace::told_of(file)
+}
+
 /// A scenario that has been found right.
 pub(crate) enum Compiled {
     /// Of the world `robots`.

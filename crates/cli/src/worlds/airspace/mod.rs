@@ -1,6 +1,9 @@
 //! The airspace world as the command sees it.
 
+mod foreign;
 mod picture;
+
+pub(super) use foreign::{told_of, translated};
 
 use super::{Comparison, Pictured, Plan, Resolved, Run, Said};
 use crate::console::grouped;

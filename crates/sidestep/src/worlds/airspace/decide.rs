@@ -4,7 +4,7 @@ use super::airplane::{Action, Pilot, Point, Pose};
 use super::deploy::{Decided, Deployment, Traffic};
 use super::objective::{Options, game};
 use super::shield::Way;
-use super::world::{AirspaceWorld, Method};
+use super::world::{Airplane, AirspaceWorld, Method};
 use crate::collectives::{Estimator, optimize};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::{Cycle, Slot};
@@ -116,7 +116,8 @@ impl AirspaceWorld {
         let predict =
             |action: &Action| pilot.predict(*action, known.pose, known.next, &self.timing);
         let predictions = self.actions[i].iter().map(predict).collect();
-        Options::new(predictions, self.airplanes[i].model.separation_m)
+        let Airplane { model, altitude_m, .. } = &self.airplanes[i];
+        Options::new(predictions, model.separation_m, *altitude_m)
     }
 
     /// The mission as seen from the moving air: each way-point where it will be when the

@@ -32,7 +32,13 @@ pub(super) fn generate(order: &Order<'_>, streams: &Streams) -> Result<Vec<Airpl
 fn airplane(order: &Order<'_>, from: Point, to: Vec<Point>) -> Airplane {
     let first = to.first().copied().unwrap_or(from);
     let psi_rad = math::atan2(first[1] - from[1], first[0] - from[0]);
-    Airplane { model: order.model.clone(), start: Pose { at: from, psi_rad }, mission: to }
+    Airplane {
+        model: order.model.clone(),
+        start: Pose { at: from, psi_rad },
+        mission: to,
+        altitude_m: 0.0,
+        appears_s: 0.0,
+    }
 }
 
 fn on_circle(radius_m: f64, angle_rad: f64) -> Point {

@@ -67,7 +67,7 @@ pub struct Metrics {
 pub struct AirplaneMetrics {
     /// Its id.
     pub airplane: EntityId,
-    /// Seconds from the start to its arrival, if it has arrived.
+    /// Seconds from its appearance to its arrival, if it has arrived.
     pub flown_s: Option<f64>,
     /// Seconds that the flight takes alone.
     pub alone_s: f64,
@@ -83,7 +83,9 @@ impl AirspaceWorld {
     /// Metrics of one airplane.
     pub fn airplane_metrics(&self, state: &AirspaceState, id: EntityId) -> AirplaneMetrics {
         let (cell, alone_s) = (&state.airplanes[id as usize], self.alone_s[id as usize]);
-        let flown_s = (!cell.is_flying()).then(|| cell.arrived.get() as f64 * self.timing.dtau_s);
+        let appeared_s = self.appears_in(id as usize) as f64 * self.timing.dt_s;
+        let arrived_s = || cell.arrived.get() as f64 * self.timing.dtau_s;
+        let flown_s = (!cell.is_flying()).then(|| arrived_s() - appeared_s);
         AirplaneMetrics {
             airplane: id,
             flown_s,

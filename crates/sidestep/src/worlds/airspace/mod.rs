@@ -20,6 +20,7 @@ pub mod scenario;
 pub mod shield;
 pub mod simulation;
 pub mod state;
+pub mod traffic;
 pub mod world;
 
 pub use decide::Effort;
@@ -63,9 +64,9 @@ impl World for AirspaceWorld {
         _: &mut Scratch,
     ) {
         for slot in bodies {
-            let cell = &state.airplanes[slot];
-            if cell.is_flying() {
-                state.neighborhood.enter(slot as Slot, cell.pose().at, now);
+            if state.is_there(self, slot as Slot, now) {
+                let at = state.airplanes[slot].pose().at;
+                state.neighborhood.enter(slot as Slot, at, now);
             }
         }
     }
@@ -80,7 +81,7 @@ impl World for AirspaceWorld {
     ) {
         for slot in bodies.map(|slot| slot as Slot) {
             let cell = &state.airplanes[slot as usize];
-            if !cell.is_flying() {
+            if !state.is_there(self, slot, now) {
                 continue;
             }
             state.neighborhood.around(cell.pose().at, now, |other| {
@@ -94,7 +95,7 @@ impl World for AirspaceWorld {
     fn react(&self, state: &AirspaceState, now: Cycle, group: &mut [Slot], scratch: &mut Scratch) {
         let mut flying = std::mem::take(&mut scratch.flying);
         flying.clear();
-        flying.extend(group.iter().filter(|&&slot| state.airplanes[slot as usize].is_flying()));
+        flying.extend(group.iter().filter(|&&slot| state.is_there(self, slot, now)));
         flying.sort_unstable();
         if !flying.is_empty() {
             self.fly(state, now, &flying, scratch);

@@ -21,6 +21,8 @@ pub struct Objective {
     pub inflation: f64,
     /// Whether steps after either has arrived do not count.
     pub mask: bool,
+    /// Airplanes at least this far above each other cost each other nothing.
+    pub vertical_m: f64,
 }
 
 impl Objective {
@@ -63,14 +65,16 @@ pub struct Options {
     pub predictions: Vec<Prediction>,
     /// Separation asked for.
     pub separation_m: f64,
+    /// The level it keeps.
+    pub altitude_m: f64,
     boxes: Vec<Bounds>,
 }
 
 impl Options {
     /// Options with their bounds.
-    pub fn new(predictions: Vec<Prediction>, separation_m: f64) -> Self {
+    pub fn new(predictions: Vec<Prediction>, separation_m: f64, altitude_m: f64) -> Self {
         let boxes = predictions.iter().map(|p| Bounds::of(&p.points)).collect();
-        Self { predictions, separation_m, boxes }
+        Self { predictions, separation_m, altitude_m, boxes }
     }
 }
 
@@ -121,6 +125,9 @@ pub(super) fn own_costs(objective: &Objective, options: &Options) -> Vec<f64> {
 pub(super) fn pair_costs(objective: &Objective, a: &Options, b: &Options) -> Vec<[f64; 2]> {
     let r = [a.separation_m, b.separation_m];
     let gap_m = objective.inflation * r[0].max(r[1]);
+    if (a.altitude_m - b.altitude_m).abs() >= objective.vertical_m {
+        return vec![[0.0; 2]; a.predictions.len() * b.predictions.len()];
+    }
     let mut costs = Vec::with_capacity(a.predictions.len() * b.predictions.len());
     for (p, p_box) in a.predictions.iter().zip(&a.boxes) {
         for (q, q_box) in b.predictions.iter().zip(&b.boxes) {
@@ -177,6 +184,7 @@ mod tests {
             beta: number("beta"),
             inflation: 1.0,
             mask: params["mask"] == true,
+            vertical_m: 1.0,
         };
         let after = if params["after"] == "pursue" { After::Pursue } else { After::Straight };
         let passing = Passing { tolerance_m: number("tol"), passes: false };
@@ -228,7 +236,7 @@ mod tests {
         near(total[0] + objective.alpha * total[1], &expected["G"], name);
         let options: Vec<Options> = predictions
             .iter()
-            .map(|(p, optimal, r)| Options::new(vec![p.clone(), optimal.clone()], *r))
+            .map(|(p, optimal, r)| Options::new(vec![p.clone(), optimal.clone()], *r, 0.0))
             .collect();
         let game = game(&objective, &options);
         near(game.cost(&vec![0; options.len()]), &expected["G"], name);

@@ -71,6 +71,8 @@ impl AirspaceWorld {
                 v_m_s: model.v_m_s,
                 omega_max_rad_s: model.omega_max_rad_s,
                 separation_m: model.separation_m,
+                altitude_m: self.airplanes[slot as usize].altitude_m,
+                vertical_m: self.vertical_m,
                 fallback: cell.side(),
                 // Whoever has waited longest goes first, then the smaller id.
                 rank: u64::from(cell.waiting.get()) << 32 | u64::from(!slot),
@@ -149,7 +151,8 @@ impl AirspaceWorld {
     fn look(&self, flights: &[Flight], (now, k): (Cycle, usize), scratch: &mut Scratch) {
         let dtau_s = self.timing.dtau_s;
         for (i, a) in flights.iter().enumerate().filter(|(_, f)| f.arrived.is_none()) {
-            for b in flights[i + 1..].iter().filter(|f| f.arrived.is_none()) {
+            let minds = |b: &&Flight| b.arrived.is_none() && self.on_one_level(a.slot, b.slot);
+            for b in flights[i + 1..].iter().filter(minds) {
                 let model = |f: &Flight| &self.airplanes[f.slot as usize].model;
                 let gap_m = model(a).separation_m.max(model(b).separation_m);
                 let step_m = (model(a).v_m_s + model(b).v_m_s) * dtau_s;
@@ -159,9 +162,11 @@ impl AirspaceWorld {
                 let at = |f: &Flight, t_s: f64| {
                     f.pose.step(model(f).v_m_s, f.way.omegas_rad_s[k], t_s).at
                 };
-                // A loss goes on where the step before has ended; only at the very start of
-                // a run there is none before.
-                let begins = now == 0 && k == 0;
+                // A loss goes on where the step before has ended; only when one of the two
+                // has just appeared there is none before.
+                let appeared =
+                    self.appears_in(a.slot as usize).max(self.appears_in(b.slot as usize));
+                let begins = now == appeared && k == 0;
                 let mut was_lost = !begins && distance_m(a.pose.at, b.pose.at) < gap_m;
                 let mut record = PairRecord { nearest_m: f64::INFINITY, lost_looks: 0, losses: 0 };
                 for look in 1..=LOOKS_PER_STEP {

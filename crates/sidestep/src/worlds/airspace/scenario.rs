@@ -109,6 +109,7 @@ struct AirspaceSection {
     cooling: Option<Spanned<f64>>,
     max_rounds: Option<u32>,
     choice: Option<Choice>,
+    vertical_m: Option<Spanned<f64>>,
     wind_m_s: Point,
     position_noise_m: f64,
     heading_noise_deg: f64,
@@ -138,6 +139,10 @@ struct AirplaneSection {
     at_m: Point,
     heading_deg: f64,
     way_points_m: Vec<Point>,
+    #[serde(default)]
+    altitude_m: f64,
+    #[serde(default)]
+    appears_s: f64,
     v_m_s: Option<f64>,
     omega_max_deg_s: Option<f64>,
     separation_m: Option<f64>,
@@ -215,6 +220,7 @@ impl Compiler<'_> {
         let timing = self.timing()?;
         let radius_m = airplanes.iter().map(|a| a.model.separation_m).fold(0.0, f64::max);
         let tolerance_m = self.positive(section.tolerance_m.as_ref(), (radius_m / 5.0).max(1.0))?;
+        let vertical_m = self.positive(section.vertical_m.as_ref(), 300.0)?;
         let noise = [section.position_noise_m, section.heading_noise_deg];
         let numbers = noise.into_iter().chain(section.wind_m_s);
         if numbers.clone().any(|v| !v.is_finite()) || noise.iter().any(|v| *v < 0.0) {
@@ -231,12 +237,13 @@ impl Compiler<'_> {
             airplanes,
             timing,
             passing: Passing { tolerance_m, passes: true },
-            objective: self.objective()?,
+            objective: self.objective(vertical_m)?,
             settings: self.settings()?,
             holds_s: self.holds()?,
             method: section.method,
             deployment: section.deployment,
             shield: section.shield != Some(Switch::Off),
+            vertical_m,
             wind_m_s: section.wind_m_s,
             disturbance: Disturbance {
                 position_m: section.position_noise_m,
@@ -291,7 +298,7 @@ impl Compiler<'_> {
         Ok(Timing { dt_s, dtau_s, horizon })
     }
 
-    fn objective(&self) -> Result<Objective, InputError> {
+    fn objective(&self, vertical_m: f64) -> Result<Objective, InputError> {
         let section = &self.file.airspace;
         let paper = self.is_paper();
         let beta = self.positive(section.beta.as_ref(), 0.995)?;
@@ -304,6 +311,7 @@ impl Compiler<'_> {
             beta,
             inflation: self.positive(section.inflation.as_ref(), if paper { 1.0 } else { 1.05 })?,
             mask: true,
+            vertical_m,
         })
     }
 
@@ -410,9 +418,11 @@ impl Compiler<'_> {
         };
         let model = self.model(&own, at.clone())?;
         let places = s.way_points_m.iter().chain([&s.at_m]).flatten();
-        if places.chain([&s.heading_deg]).any(|v| !v.is_finite() || v.abs() > 1e9) {
-            let cause = "a position or heading that is no number, or absurdly large";
-            return Err(self.error(at, cause, "give metres below 1e9 and degrees"));
+        let negative = s.appears_s < 0.0;
+        let others = [&s.heading_deg, &s.altitude_m, &s.appears_s];
+        if negative || places.chain(others).any(|v| !v.is_finite() || v.abs() > 1e9) {
+            let cause = "a position, heading or time that is no number, or absurd";
+            return Err(self.error(at, cause, "give metres and seconds below 1e9, and degrees"));
         }
         if s.way_points_m.is_empty() {
             let remedy = "add way_points_m = [[x, y], ...]";
@@ -420,7 +430,8 @@ impl Compiler<'_> {
         }
         let psi_rad = sidestep_kernel::math::wrap_angle(s.heading_deg.to_radians());
         let start = Pose { at: s.at_m, psi_rad };
-        Ok(Airplane { model, start, mission: s.way_points_m.clone() })
+        let mission = s.way_points_m.clone();
+        Ok(Airplane { model, start, mission, altitude_m: s.altitude_m, appears_s: s.appears_s })
     }
 
     fn model(
@@ -478,6 +489,8 @@ fn first(world: &AirspaceWorld) -> (Vec<Side>, Vec<(u32, u32)>) {
         v_m_s: airplane.model.v_m_s,
         omega_max_rad_s: airplane.model.omega_max_rad_s,
         separation_m: airplane.model.separation_m,
+        altitude_m: airplane.altitude_m,
+        vertical_m: world.vertical_m,
         fallback: Side::Left,
         rank: i as u64,
     };

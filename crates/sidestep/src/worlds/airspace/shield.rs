@@ -80,10 +80,20 @@ pub struct Flyer {
     pub omega_max_rad_s: f64,
     /// Its separation; of two airplanes the larger one counts.
     pub separation_m: f64,
+    /// The level it keeps,
+    pub altitude_m: f64,
+    /// and how far above each other airplanes need not mind each other.
+    pub vertical_m: f64,
     /// Its stored fallback.
     pub fallback: Side,
     /// Higher ranks keep what they want; unique.
     pub rank: u64,
+}
+
+impl Flyer {
+    fn minds(&self, other: &Self) -> bool {
+        (self.altitude_m - other.altitude_m).abs() < self.vertical_m.max(other.vertical_m)
+    }
 }
 
 /// Motion for one `dt`: a turn rate per step of `dtau`.
@@ -231,6 +241,9 @@ impl Plan {
 
     /// Whether two plans stay apart during `dt` and on the orbits ever after.
     fn is_compatible(&self, other: &Self) -> bool {
+        if !self.flyer.minds(&other.flyer) {
+            return true;
+        }
         let gap_m = self.flyer.separation_m.max(other.flyer.separation_m) + SLACK_M;
         let reach = |plan: &Self| {
             let dt_s = plan.dtau_s * plan.omegas_rad_s.len() as f64;
@@ -382,7 +395,12 @@ pub fn first_fallbacks(flyers: &[Flyer]) -> (Vec<Side>, Vec<(usize, usize)>) {
     };
     let clash = |i: usize, a: Side, j: usize, b: Side| {
         let gap_m = flyers[i].separation_m.max(flyers[j].separation_m) + SLACK_M;
-        !orbit(i, a).stays_apart(&orbit(j, b), gap_m)
+        let diameter_m = |f: &Flyer| 2.0 * f.v_m_s / f.omega_max_rad_s;
+        let far_m = gap_m + diameter_m(&flyers[i]) + diameter_m(&flyers[j]);
+        if distance_m(flyers[i].pose.at, flyers[j].pose.at) >= far_m {
+            return false;
+        }
+        flyers[i].minds(&flyers[j]) && !orbit(i, a).stays_apart(&orbit(j, b), gap_m)
     };
     let mut sides: Vec<Side> = flyers.iter().map(|flyer| flyer.fallback).collect();
     let clashes = |sides: &[Side], i: usize, side: Side| {
@@ -422,6 +440,8 @@ mod tests {
             v_m_s: 35.0,
             omega_max_rad_s: 4f64.to_radians(),
             separation_m: 500.0,
+            altitude_m: 0.0,
+            vertical_m: 300.0,
             fallback: Side::Left,
             rank,
         }

@@ -142,7 +142,10 @@ impl AirspaceSimulation {
 
     fn keep_rows(&mut self) {
         let Some(rows) = &mut self.rows else { return };
-        for (id, cell) in (0..).zip(&self.state.airplanes).filter(|(_, cell)| cell.is_flying()) {
+        for (id, cell) in (0..)
+            .zip(&self.state.airplanes)
+            .filter(|(id, _)| self.state.is_there(&self.compiled.world, *id, self.cycle))
+        {
             let pose = cell.pose();
             rows.cycle.push(self.cycle);
             rows.airplane.push(id);

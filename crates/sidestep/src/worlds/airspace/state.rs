@@ -202,10 +202,15 @@ impl AirspaceState {
         Snapshot { cycle, airplanes: self.airplanes.iter().map(record).collect() }
     }
 
+    /// Whether an airplane is there in a cycle: it has appeared and has not arrived.
+    pub(super) fn is_there(&self, world: &AirspaceWorld, slot: Slot, now: Cycle) -> bool {
+        self.airplanes[slot as usize].is_flying() && world.appears_in(slot as usize) <= now
+    }
+
     /// Whether two airplanes have to mind each other.
     pub(super) fn is_near(&self, world: &AirspaceWorld, a: Slot, b: Slot) -> bool {
         let at = |slot: Slot| self.airplanes[slot as usize].pose().at;
-        distance_m(at(a), at(b)) <= world.look_m(a as usize, b as usize)
+        world.on_one_level(a, b) && distance_m(at(a), at(b)) <= world.look_m(a as usize, b as usize)
     }
 }
 

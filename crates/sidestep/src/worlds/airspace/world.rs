@@ -61,6 +61,10 @@ pub struct Airplane {
     pub start: Pose,
     /// What it is to reach.
     pub mission: Vec<Point>,
+    /// The level it keeps.
+    pub altitude_m: f64,
+    /// When it appears, seconds after the start.
+    pub appears_s: f64,
 }
 
 /// The immutable world that runs share.
@@ -84,6 +88,8 @@ pub struct AirspaceWorld {
     pub deployment: Deployment,
     /// Whether the shield filters decisions.
     pub shield: bool,
+    /// Airplanes at least this far above each other do not mind each other.
+    pub vertical_m: f64,
     /// A wind that all know.
     pub wind_m_s: Point,
     /// What nobody knows.
@@ -170,6 +176,17 @@ impl AirspaceWorld {
         let dtau_s = self.timing.dtau_s;
         let at = [pose.at[0] + self.wind_m_s[0] * dtau_s, pose.at[1] + self.wind_m_s[1] * dtau_s];
         Pose { at, ..pose }
+    }
+
+    /// The cycle in which an airplane appears.
+    pub fn appears_in(&self, i: usize) -> Cycle {
+        (self.airplanes[i].appears_s / self.timing.dt_s).ceil() as Cycle
+    }
+
+    /// Whether two airplanes are on levels so near that they have to mind each other.
+    pub fn on_one_level(&self, a: Slot, b: Slot) -> bool {
+        let altitude_m = |slot: Slot| self.airplanes[slot as usize].altitude_m;
+        (altitude_m(a) - altitude_m(b)).abs() < self.vertical_m
     }
 
     /// How far apart two airplanes may be and still have to mind each other: they could come

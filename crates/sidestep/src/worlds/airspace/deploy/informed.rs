@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) enum Message {
     /// The ways of all the sender's actions, and its separation.
-    Ways { ways: Vec<Prediction>, separation_m: f64 },
+    Ways { ways: Vec<Prediction>, separation_m: f64, altitude_m: f64 },
     /// From which the others predict its ways themselves.
     Model { pose: Pose, next: u32, mission: Vec<Point>, airplane: u32 },
     /// The numbers of the round's samples, and how far the sender has moved in the round before.
@@ -62,8 +62,8 @@ impl<'a> Agent<'a> {
 
     fn announcement(&self) -> Message {
         if !self.by_model {
-            let ways = self.own.options.predictions.clone();
-            return Message::Ways { ways, separation_m: self.own.options.separation_m };
+            let Options { predictions, separation_m, altitude_m, .. } = self.own.options.clone();
+            return Message::Ways { ways: predictions, separation_m, altitude_m };
         }
         let Known { slot, pose, next } = self.own.known;
         let mission = self.own.airplane().mission.clone();
@@ -228,8 +228,8 @@ impl network::Agent for Agent<'_> {
 
     fn on_message(&mut self, from: usize, message: Message) -> Vec<Message> {
         match message {
-            Message::Ways { ways, separation_m } => {
-                self.options.insert(from, Options::new(ways, separation_m));
+            Message::Ways { ways, separation_m, altitude_m } => {
+                self.options.insert(from, Options::new(ways, separation_m, altitude_m));
             }
             Message::Model { pose, next, mission, airplane } => {
                 let known = Known { slot: airplane, pose, next: next as usize };

@@ -25,6 +25,7 @@ struct Coordinator {
     samples: Vec<Vec<usize>>,
     own_costs: Vec<Vec<f64>>,
     separations_m: Vec<f64>,
+    altitudes_m: Vec<f64>,
     /// Parts of the costs of joint samples, by airplane.
     parts: Vec<Vec<f64>>,
     chosen: Vec<usize>,
@@ -41,6 +42,7 @@ impl Coordinator {
             samples: vec![Vec::new(); group],
             own_costs: vec![Vec::new(); group],
             separations_m: vec![0.0; group],
+            altitudes_m: vec![0.0; group],
             parts: vec![Vec::new(); group],
             chosen: Vec::new(),
             converged: false,
@@ -84,10 +86,13 @@ fn exact(coordinator: &mut Coordinator, hosts: &[Own<'_>], traffic: &mut Traffic
         coordinator.ways[*me].clone_from(&options.predictions);
         coordinator.own_costs[*me] = own_costs(&host.world.objective, options);
         coordinator.separations_m[*me] = options.separation_m;
+        coordinator.altitudes_m[*me] = options.altitude_m;
         *coordinator = migrate(coordinator.clone(), traffic);
     }
-    let ways = coordinator.ways.iter().zip(&coordinator.separations_m);
-    let all: Vec<Options> = ways.map(|(ways, r)| Options::new(ways.clone(), *r)).collect();
+    let levels = coordinator.separations_m.iter().zip(&coordinator.altitudes_m);
+    let options =
+        |(ways, (r, z)): (&Vec<Prediction>, (&f64, &f64))| Options::new(ways.clone(), *r, *z);
+    let all: Vec<Options> = coordinator.ways.iter().zip(levels).map(options).collect();
     let mut game = PairwiseGame::new(coordinator.own_costs.clone());
     let world = hosts[0].world;
     for i in 0..all.len() {
@@ -141,6 +146,7 @@ fn visit(coordinator: &mut Coordinator, host: &Own<'_>, (drawn, block): (u64, us
     let own = own_costs(&host.world.objective, &host.options);
     coordinator.parts[me] = samples.iter().map(|&x| own[x]).collect();
     coordinator.separations_m[me] = host.options.separation_m;
+    coordinator.altitudes_m[me] = host.options.altitude_m;
     coordinator.samples[me] = samples;
 }
 
@@ -152,7 +158,9 @@ fn learn(coordinator: &mut Coordinator, hosts: &[Own<'_>], (block, ageing): (usi
     for (k, sum) in total.iter_mut().enumerate() {
         for i in 0..n {
             let r = coordinator.separations_m[i];
-            let others = (0..n).filter(|&j| j != i);
+            let z = &coordinator.altitudes_m;
+            let near = |j: &usize| *j != i && (z[*j] - z[i]).abs() < objective.vertical_m;
+            let others = (0..n).filter(near);
             *sum += others.fold(coordinator.parts[i][k], |part, j| {
                 let (a, b) = (&coordinator.ways[i][k], &coordinator.ways[j][k]);
                 part + objective.collision(a, b, [r, r])[0]

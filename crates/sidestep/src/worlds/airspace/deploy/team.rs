@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 pub(super) enum Message {
     /// Lines 6 to 9: the predicted ways of the round's samples, and how far the sender's
     /// probabilities have moved in the round before.
-    Predictions { round: u32, change: f64, ways: Vec<Prediction> },
+    Predictions { round: u32, change: f64, altitude_m: f64, ways: Vec<Prediction> },
     /// Line 17: the sender's part of the cost of each joint sample (eq. 11).
     Costs { round: u32, costs: Vec<f64> },
 }
@@ -34,6 +34,7 @@ pub(super) struct Agent<'a> {
     ways: BTreeMap<(u32, usize), Vec<Prediction>>,
     changes: BTreeMap<(u32, usize), f64>,
     costs: BTreeMap<(u32, usize), Vec<f64>>,
+    altitudes_m: BTreeMap<usize, f64>,
     decided: Option<Decided>,
 }
 
@@ -53,6 +54,7 @@ impl<'a> Agent<'a> {
             ways: BTreeMap::new(),
             changes: BTreeMap::new(),
             costs: BTreeMap::new(),
+            altitudes_m: BTreeMap::new(),
             decided: None,
         }
     }
@@ -65,7 +67,12 @@ impl<'a> Agent<'a> {
         self.samples = self.own.samples(&self.player, self.drawn(), self.block);
         self.costed = false;
         let ways = self.samples.iter().map(|&x| self.own.options.predictions[x].clone());
-        Message::Predictions { round: self.round, change: self.change, ways: ways.collect() }
+        Message::Predictions {
+            round: self.round,
+            change: self.change,
+            altitude_m: self.own.options.altitude_m,
+            ways: ways.collect(),
+        }
     }
 
     fn others(&self) -> impl Iterator<Item = usize> + use<> {
@@ -115,7 +122,10 @@ impl<'a> Agent<'a> {
             .map(|k| {
                 let x = self.samples[k];
                 let way = &self.own.options.predictions[x];
-                self.others().fold(self.own_costs[x], |sum, j| {
+                let own_altitude_m = self.own.options.altitude_m;
+                let near =
+                    |j: &usize| (self.altitudes_m[j] - own_altitude_m).abs() < objective.vertical_m;
+                self.others().filter(near).fold(self.own_costs[x], |sum, j| {
                     let [own, _] =
                         objective.collision(way, &self.ways[&(self.round, j)][k], [r, r]);
                     sum + own
@@ -165,7 +175,8 @@ impl network::Agent for Agent<'_> {
 
     fn on_message(&mut self, from: usize, message: Message) -> Vec<Message> {
         match message {
-            Message::Predictions { round, change, ways } => {
+            Message::Predictions { round, change, altitude_m, ways } => {
+                self.altitudes_m.insert(from, altitude_m);
                 self.changes.insert((round, from), change);
                 self.ways.insert((round, from), ways);
             }
