@@ -1,12 +1,14 @@
 //! What the airplanes of a group want to do: by the method of the world.
 
 use super::airplane::{Action, Pilot, Point, Pose};
+use super::baseline::{Moving, mvp, orca};
 use super::deploy::{Decided, Deployment, Traffic};
 use super::objective::{Options, game};
 use super::shield::Way;
 use super::world::{Airplane, AirspaceWorld, Method};
 use crate::collectives::{Estimator, optimize};
 use serde::{Deserialize, Serialize};
+use sidestep_kernel::math;
 use sidestep_kernel::{Cycle, Slot};
 
 /// An airplane of a group, as the group knows it.
@@ -44,18 +46,68 @@ impl AirspaceWorld {
     /// The ways that each airplane of a group may fly in the next `dt`, the wanted one first.
     pub(super) fn wanted(&self, group: &[Known], now: Cycle, effort: &mut Effort) -> Vec<Vec<Way>> {
         let wishes = match self.method {
-            Method::Pc if group.len() > 1 => self.optimized(group, now, effort),
-            _ => group.iter().map(|known| self.straight(*known)).collect(),
+            _ if group.len() < 2 => group.iter().map(|known| self.straight(*known)).collect(),
+            Method::None => group.iter().map(|known| self.straight(*known)).collect(),
+            Method::Pc => self.optimized(group, now, effort),
+            Method::Mvp | Method::Orca => self.by_velocity(group),
         };
         group.iter().zip(wishes).map(|(known, wishes)| self.ways(*known, &wishes)).collect()
+    }
+
+    /// By a method that tells each airplane a velocity of which the direction is taken.
+    fn by_velocity(&self, group: &[Known]) -> Vec<Vec<Action>> {
+        let all: Vec<Moving> = group.iter().map(|known| self.moving(*known)).collect();
+        let horizon_s = self.timing.horizon as f64 * self.timing.dtau_s;
+        let margin = self.objective.inflation;
+        let toward = |(k, own): (usize, &Moving)| {
+            let near = |other: &Moving| (other.altitude_m - own.altitude_m).abs() < self.vertical_m;
+            let others = all.iter().enumerate().filter(|(j, m)| *j != k && near(m)).map(|(_, m)| m);
+            let [vx, vy] = match self.method {
+                Method::Orca => orca::velocity(own, others, horizon_s, self.timing.dt_s, margin),
+                _ => mvp::velocity(own, others, horizon_s, margin),
+            };
+            if [vx, vy] == own.preferred {
+                return self.straight(group[k]);
+            }
+            let pose = group[k].pose;
+            let omega_max = self.airplanes[group[k].slot as usize].model.omega_max_rad_s;
+            let goal = [pose.at[0] + vx, pose.at[1] + vy];
+            let omega_rad_s = pose.steer(goal, omega_max, self.timing.dt_s);
+            let turn = Action::Then { omega_rad_s, hold_s: self.timing.dt_s };
+            let mut wishes = vec![turn];
+            wishes.extend(self.by_turn(group[k], omega_rad_s));
+            wishes
+        };
+        all.iter().enumerate().map(toward).collect()
+    }
+
+    fn moving(&self, known: Known) -> Moving {
+        let Airplane { model, mission, altitude_m, .. } = &self.airplanes[known.slot as usize];
+        let Pose { at, psi_rad } = known.pose;
+        let v = model.v_m_s;
+        let toward = mission.get(known.next).map_or(psi_rad, |&goal| {
+            let aim = self.aim(at, goal, v);
+            math::atan2(aim[1] - at[1], aim[0] - at[0])
+        });
+        Moving {
+            at,
+            velocity: [v * math::cos(psi_rad), v * math::sin(psi_rad)],
+            preferred: [v * math::cos(toward), v * math::sin(toward)],
+            separation_m: model.separation_m,
+            altitude_m: *altitude_m,
+        }
     }
 
     /// Straight to the way-point, and the other actions by how little they differ from that.
     fn straight(&self, known: Known) -> Vec<Action> {
         let i = known.slot as usize;
         let mission = &self.airplanes[i].mission;
-        let wanted = self.steer(&self.pilot(i, mission), known.pose, known.next);
-        let mut others: Vec<Action> = self.actions[i].clone();
+        self.by_turn(known, self.steer(&self.pilot(i, mission), known.pose, known.next))
+    }
+
+    /// Proceeding, and the other actions by how little they differ from a turn rate.
+    fn by_turn(&self, known: Known, wanted: f64) -> Vec<Action> {
+        let mut others: Vec<Action> = self.actions[known.slot as usize].clone();
         let turn = |action: &Action| match *action {
             Action::Hold { omega_rad_s } | Action::Then { omega_rad_s, .. } => {
                 (omega_rad_s - wanted).abs()

@@ -10,6 +10,7 @@
 //! ```
 
 pub mod airplane;
+mod baseline;
 mod decide;
 pub mod deploy;
 mod generate;

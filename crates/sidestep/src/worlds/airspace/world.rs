@@ -29,15 +29,24 @@ pub enum Method {
     /// Probability collectives.
     #[default]
     Pc,
+    /// Optimal reciprocal collision avoidance.
+    Orca,
+    /// Modified voltage potential.
+    Mvp,
     /// Straight to the way-point, whoever is there.
     None,
 }
 
 impl Method {
+    /// All methods.
+    pub const ALL: [Self; 4] = [Self::Pc, Self::Orca, Self::Mvp, Self::None];
+
     /// Its name in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Pc => "pc",
+            Self::Orca => "orca",
+            Self::Mvp => "mvp",
             Self::None => "none",
         }
     }

@@ -1,0 +1,19 @@
+//! Other methods under the same limits, to compare with: every one is asked for a heading, and
+//! the airplane turns towards it as fast as it can.
+
+pub(super) mod mvp;
+pub(super) mod orca;
+
+use super::airplane::Point;
+
+/// What a method is told of an airplane.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Moving {
+    pub(super) at: Point,
+    /// Metres per second.
+    pub(super) velocity: Point,
+    /// Where it would fly if it were alone, metres per second.
+    pub(super) preferred: Point,
+    pub(super) separation_m: f64,
+    pub(super) altitude_m: f64,
+}
