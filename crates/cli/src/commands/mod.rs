@@ -1,6 +1,7 @@
 //! One file per command.
 
 mod check;
+mod compare;
 mod exact;
 mod finish;
 mod learn;
@@ -30,6 +31,8 @@ pub(crate) enum Command {
     Learn(learn::LearnArgs),
     /// Compute the exact Markov chain of a scenario with one robot
     Exact(exact::ExactArgs),
+    /// Run methods of avoiding each other on the same traffic
+    Compare(compare::CompareArgs),
     /// Continue a recorded run that was stopped or killed
     Resume(resume::ResumeArgs),
     /// Run a paper's experiments anew and judge its claims
@@ -50,6 +53,7 @@ pub(crate) fn execute(command: Command, console: &Console) -> Result<ExitCode, F
         Command::Map(args) => map::map(&args, *console),
         Command::Learn(args) => learn::learn(&args, *console),
         Command::Exact(args) => exact::exact(&args, *console),
+        Command::Compare(args) => compare::compare(&args, *console),
         Command::Resume(args) => resume::resume(&args, *console),
         Command::Reproduce(args) => reproduce::reproduce(&args, *console),
         Command::Replay(args) => replay::replay(&args, *console),

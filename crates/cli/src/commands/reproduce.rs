@@ -7,9 +7,9 @@ use crate::interrupt;
 use crate::picture::{chart_svg, write_png};
 use crate::progress::Stages;
 use clap::{Args, Subcommand};
-use sidestep::experiment::Figure;
 use sidestep::experiment::loria::claims::{Claim, Verdict};
 use sidestep::experiment::loria::{LoriaError, NewRecorder, Plan, Report, in_memory, run_recorded};
+use sidestep::experiment::{Figure, agentfly};
 use sidestep::kernel::InputError;
 use sidestep::kernel::ports::{RecordError, Recorder, TableSchema};
 use sidestep_record::{Origin, ParquetRecorder};
@@ -20,7 +20,8 @@ const EXAMPLES: &str = "\
 Examples:
   sidestep reproduce loria --quick              a rehearsal of seconds
   sidestep reproduce loria --out runs/loria     some minutes: report, figures, all numbers
-  sidestep reproduce loria --seeds 40 --json > loria.json";
+  sidestep reproduce loria --seeds 40 --json > loria.json
+  sidestep reproduce agentfly --quick";
 
 /// Run a paper's experiments anew and judge its claims.
 #[derive(Debug, Args)]
@@ -33,6 +34,25 @@ pub(crate) struct ReproduceArgs {
 enum Paper {
     /// A parallel simulation of stochastic agent/environment interaction (LORIA, 2001)
     Loria(LoriaArgs),
+    /// Probability collectives for collision avoidance in AGENTFLY (2009)
+    Agentfly(AgentflyArgs),
+}
+
+/// How much to run.
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
+struct AgentflyArgs {
+    /// Write report.md, report.json and the figures to this new or empty folder
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+
+    /// Rehearse: run everything once, measure nothing well
+    #[arg(long)]
+    quick: bool,
+
+    /// Seeds per number of airplanes
+    #[arg(long, value_name = "N")]
+    seeds: Option<usize>,
 }
 
 /// How much to run.
@@ -78,7 +98,10 @@ impl LoriaArgs {
 /// # Errors
 /// When the plan or the folder is wrong, or results cannot be stored.
 pub(crate) fn reproduce(args: &ReproduceArgs, console: Console) -> Result<ExitCode, Failure> {
-    let Paper::Loria(args) = &args.paper;
+    let args = match &args.paper {
+        Paper::Loria(args) => args,
+        Paper::Agentfly(args) => return agentfly(args, console),
+    };
     let report = match &args.out {
         None => run(&args.plan(), &mut in_memory, console)?,
         Some(folder) => {
@@ -89,6 +112,24 @@ pub(crate) fn reproduce(args: &ReproduceArgs, console: Console) -> Result<ExitCo
         }
     };
     console.result(&report, || text(&report, args.out.as_deref()));
+    Ok(ExitCode::Done)
+}
+
+fn agentfly(args: &AgentflyArgs, console: Console) -> Result<ExitCode, Failure> {
+    let default = if args.quick { agentfly::Plan::quick() } else { agentfly::Plan::default() };
+    let plan = agentfly::Plan { seeds: args.seeds.unwrap_or(default.seeds), ..default };
+    if let Some(folder) = &args.out {
+        check_vacant(folder)?;
+    }
+    let stages = Stages::new(console);
+    let report = agentfly::run(&plan, &mut |what, share| stages.at(what, share));
+    stages.clear();
+    let report = report?;
+    if let Some(folder) = &args.out {
+        let json = serde_json::to_vec_pretty(&report).expect("a report is plain data");
+        store_parts(&report.figures(), &json, &report.to_markdown(), folder)?;
+    }
+    console.result(&report, || report.to_markdown());
     Ok(ExitCode::Done)
 }
 
@@ -150,14 +191,18 @@ fn check_vacant(folder: &Path) -> Result<(), InputError> {
 
 /// Figures first: where the report is, everything is.
 fn store(report: &Report, folder: &Path) -> Result<(), Failure> {
+    let json = serde_json::to_vec_pretty(report).expect("a report is plain data");
+    store_parts(&report.figures(), &json, &report.to_markdown(), folder)
+}
+
+fn store_parts(all: &[Figure], json: &[u8], markdown: &str, folder: &Path) -> Result<(), Failure> {
     let figures = folder.join("figures");
     std::fs::create_dir_all(&figures).map_err(|e| Failure::write(&figures, &e))?;
-    for (k, figure) in report.figures().iter().enumerate() {
+    for (k, figure) in all.iter().enumerate() {
         draw(figure, &figures.join(format!("{:02}-{}", k + 1, file_name(&figure.title))))?;
     }
-    let json = serde_json::to_vec_pretty(report).expect("a report is plain data");
-    replace(&folder.join("report.json"), |file| file.write_all(&json))?;
-    replace(&folder.join("report.md"), |file| file.write_all(report.to_markdown().as_bytes()))
+    replace(&folder.join("report.json"), |file| file.write_all(json))?;
+    replace(&folder.join("report.md"), |file| file.write_all(markdown.as_bytes()))
 }
 
 fn draw(figure: &Figure, stem: &Path) -> Result<(), Failure> {

@@ -172,6 +172,23 @@ impl Compiled {
         }
     }
 
+    /// The scenario itself, for commands that are about the airspace world alone.
+    ///
+    /// # Errors
+    /// When it is of another world.
+    pub(crate) fn into_airspace(
+        self,
+        source: &Source,
+    ) -> Result<sidestep::worlds::airspace::scenario::Compiled, InputError> {
+        match self {
+            Self::Airspace(scenario) => Ok(scenario.into_compiled()),
+            Self::Robots(_) => {
+                let remedy = "give a scenario with world = \"airspace\"";
+                Err(InputError::new(&source.place, "this command is about airplanes alone", remedy))
+            }
+        }
+    }
+
     /// A run at its start. `source` names the run in checkpoints.
     pub(crate) fn start(self, source: &Source, workers: usize) -> Box<dyn Run> {
         match self {

@@ -1,5 +1,6 @@
 //! Promises of the library, one module each; every module begins by quoting its promise.
 
+mod airspace;
 mod closed_loop;
 mod common;
 mod determinism;

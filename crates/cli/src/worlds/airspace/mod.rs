@@ -35,6 +35,11 @@ impl Scenario {
         Ok(Self { compiled: Compiled::new(source)? })
     }
 
+    /// The scenario itself.
+    pub(super) fn into_compiled(self) -> Compiled {
+        self.compiled
+    }
+
     /// See [`super::Compiled::resolve`]: such a scenario names no other file.
     pub(super) fn resolve(source: &Source) -> Resolved {
         Resolved { text: source.text.clone(), files: Vec::new() }

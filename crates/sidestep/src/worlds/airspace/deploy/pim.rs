@@ -62,7 +62,7 @@ pub(super) fn run(hosts: Vec<Own<'_>>) -> (Vec<Decided>, Traffic) {
     };
     // It stands on the first airplane and brings the others their controls.
     for _ in 1..hosts.len() {
-        coordinator = migrate(coordinator, &mut traffic);
+        migrate(&mut coordinator, &mut traffic);
     }
     let decided = coordinator.chosen.iter().zip(expected).map(|(&chosen, expected)| Decided {
         chosen,
@@ -74,10 +74,10 @@ pub(super) fn run(hosts: Vec<Own<'_>>) -> (Vec<Decided>, Traffic) {
 }
 
 /// One hop.
-fn migrate(coordinator: Coordinator, traffic: &mut Traffic) -> Coordinator {
-    let bytes = bytes_of(&coordinator);
+fn migrate(coordinator: &mut Coordinator, traffic: &mut Traffic) {
+    let bytes = bytes_of(coordinator);
     traffic.count(1, bytes.len());
-    postcard::from_bytes(&bytes).expect("the state can be read")
+    *coordinator = postcard::from_bytes(&bytes).expect("the state can be read");
 }
 
 fn exact(coordinator: &mut Coordinator, hosts: &[Own<'_>], traffic: &mut Traffic) -> Vec<Vec<f64>> {
@@ -87,7 +87,7 @@ fn exact(coordinator: &mut Coordinator, hosts: &[Own<'_>], traffic: &mut Traffic
         coordinator.own_costs[*me] = own_costs(&host.world.objective, options);
         coordinator.separations_m[*me] = options.separation_m;
         coordinator.altitudes_m[*me] = options.altitude_m;
-        *coordinator = migrate(coordinator.clone(), traffic);
+        migrate(coordinator, traffic);
     }
     let levels = coordinator.separations_m.iter().zip(&coordinator.altitudes_m);
     let options =
@@ -123,7 +123,7 @@ fn sampled(
         let drawn = u64::from(coordinator.round) * block as u64;
         for host in hosts {
             visit(coordinator, host, (drawn, block));
-            *coordinator = migrate(coordinator.clone(), traffic);
+            migrate(coordinator, traffic);
         }
         let change = learn(coordinator, hosts, (block, ageing));
         coordinator.calm = settings.stop.calm(coordinator.calm, change);

@@ -6,6 +6,7 @@ use super::{Decided, Own, network};
 use crate::collectives::Player;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::rc::Rc;
 
 /// What agents tell each other.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -31,7 +32,8 @@ pub(super) struct Agent<'a> {
     samples: Vec<usize>,
     /// Whether this round's own costs are out.
     costed: bool,
-    ways: BTreeMap<(u32, usize), Vec<Prediction>>,
+    /// Messages with predictions, by round and sender.
+    heard: BTreeMap<(u32, usize), Rc<Message>>,
     changes: BTreeMap<(u32, usize), f64>,
     costs: BTreeMap<(u32, usize), Vec<f64>>,
     altitudes_m: BTreeMap<usize, f64>,
@@ -51,7 +53,7 @@ impl<'a> Agent<'a> {
             change: f64::INFINITY,
             samples: Vec::new(),
             costed: false,
-            ways: BTreeMap::new(),
+            heard: BTreeMap::new(),
             changes: BTreeMap::new(),
             costs: BTreeMap::new(),
             altitudes_m: BTreeMap::new(),
@@ -85,7 +87,7 @@ impl<'a> Agent<'a> {
         let mut said = Vec::new();
         while self.decided.is_none() {
             let round = self.round;
-            let heard_ways = self.others().all(|j| self.ways.contains_key(&(round, j)));
+            let heard_ways = self.others().all(|j| self.heard.contains_key(&(round, j)));
             if !self.costed && heard_ways {
                 if self.is_settled() {
                     self.decide();
@@ -126,8 +128,7 @@ impl<'a> Agent<'a> {
                 let near =
                     |j: &usize| (self.altitudes_m[j] - own_altitude_m).abs() < objective.vertical_m;
                 self.others().filter(near).fold(self.own_costs[x], |sum, j| {
-                    let [own, _] =
-                        objective.collision(way, &self.ways[&(self.round, j)][k], [r, r]);
+                    let [own, _] = objective.collision(way, self.way(j, k), [r, r]);
                     sum + own
                 })
             })
@@ -135,6 +136,14 @@ impl<'a> Agent<'a> {
         self.costs.insert((self.round, self.own.me), costs.clone());
         self.costed = true;
         Message::Costs { round: self.round, costs }
+    }
+
+    /// The way of the `k`-th sample of agent `j` in this round.
+    fn way(&self, j: usize, k: usize) -> &Prediction {
+        match &*self.heard[&(self.round, j)] {
+            Message::Predictions { ways, .. } => &ways[k],
+            Message::Costs { .. } => unreachable!("only predictions are kept"),
+        }
     }
 
     /// Lines 18 to 24: sums in the order of the airplanes, so that all come to the same bits.
@@ -148,7 +157,7 @@ impl<'a> Agent<'a> {
         let settings = self.own.settings();
         self.change = self.player.update(settings.update, settings.cooling);
         let old = self.round;
-        self.ways.retain(|(round, _), _| *round > old);
+        self.heard.retain(|(round, _), _| *round > old);
         self.costs.retain(|(round, _), _| *round > old);
         self.changes.retain(|(round, _), _| *round > old);
         self.round += 1;
@@ -173,14 +182,16 @@ impl network::Agent for Agent<'_> {
         vec![self.predictions()]
     }
 
-    fn on_message(&mut self, from: usize, message: Message) -> Vec<Message> {
-        match message {
-            Message::Predictions { round, change, altitude_m, ways } => {
-                self.altitudes_m.insert(from, altitude_m);
-                self.changes.insert((round, from), change);
-                self.ways.insert((round, from), ways);
+    fn on_message(&mut self, from: usize, message: &Rc<Message>) -> Vec<Message> {
+        match &**message {
+            Message::Predictions { round, change, altitude_m, .. } => {
+                self.altitudes_m.insert(from, *altitude_m);
+                self.changes.insert((*round, from), *change);
+                self.heard.insert((*round, from), Rc::clone(message));
             }
-            Message::Costs { round, costs } => drop(self.costs.insert((round, from), costs)),
+            Message::Costs { round, costs } => {
+                self.costs.insert((*round, from), costs.clone());
+            }
         }
         self.go_on()
     }

@@ -1,0 +1,76 @@
+//! `sidestep compare`: methods on the same traffic, side by side.
+
+use crate::console::Console;
+use crate::exit::{ExitCode, Failure};
+use crate::plan::{ScenarioArgs, WorkersArg};
+use crate::progress::Stages;
+use clap::{Args, ValueEnum};
+use sidestep::experiment::methods::{compare as run_all, table};
+use sidestep::worlds::airspace::world::Method;
+
+const EXAMPLES: &str = "\
+Examples:
+  sidestep compare scenarios/airspace/superconflict.toml --runs 20
+  sidestep compare superconflict.toml --methods pc,mvp --set airspace.shield=off --json";
+
+/// Run methods of avoiding each other on the same traffic.
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct CompareArgs {
+    #[command(flatten)]
+    scenario: ScenarioArgs,
+
+    #[command(flatten)]
+    workers: WorkersArg,
+
+    /// The methods
+    #[arg(long, value_delimiter = ',', default_value = "pc,orca,mvp,none")]
+    methods: Vec<Name>,
+
+    /// Runs of each, by seed from the scenario's on
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..))]
+    runs: u32,
+}
+
+/// Methods by name.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Name {
+    /// Probability collectives
+    Pc,
+    /// Optimal reciprocal collision avoidance
+    Orca,
+    /// Modified voltage potential
+    Mvp,
+    /// Straight on
+    None,
+}
+
+impl Name {
+    fn method(self) -> Method {
+        match self {
+            Self::Pc => Method::Pc,
+            Self::Orca => Method::Orca,
+            Self::Mvp => Method::Mvp,
+            Self::None => Method::None,
+        }
+    }
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// When the scenario is wrong, or of another world.
+pub(crate) fn compare(args: &CompareArgs, console: Console) -> Result<ExitCode, Failure> {
+    let (source, compiled) = args.scenario.compile()?;
+    let compiled = compiled.into_airspace(&source)?;
+    let methods: Vec<Method> = args.methods.iter().map(|name| name.method()).collect();
+    let stages = Stages::new(console);
+    let span = (compiled.seed, args.runs as usize);
+    let workers = args.workers.count();
+    let results =
+        run_all(&source, &methods, span, workers, &mut |what, share| stages.at(what, share));
+    stages.clear();
+    let results = results?;
+    console.result(&results, || table(&compiled.name, &results).to_string());
+    Ok(ExitCode::Done)
+}

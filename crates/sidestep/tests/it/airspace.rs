@@ -1,0 +1,116 @@
+//! D1 for the airspace: the same build, scenario and seed give identical bits for 1, 2, 3 and 8
+//! workers, recorded or not, resumed or not. L1 for airplanes: with the shield nobody comes
+//! nearer than the separation, whatever the method, once the first fallbacks are apart.
+
+use sidestep::kernel::Simulation;
+use sidestep::kernel::ports::MemoryRecorder;
+use sidestep::scenario::Source;
+use sidestep::worlds::airspace::simulation::AirspaceSimulation;
+
+/// Random traffic in which several groups form and part, with everything that can err.
+fn traffic(more: &str) -> Source {
+    let text = format!(
+        "format = 1\nworld = \"airspace\"\nseed = 7\n[airspace]\n{more}\n\
+         [airspace.generator]\nkind = \"random\"\nn = 24\nradius_m = 16000.0\n"
+    );
+    Source::new("traffic", text, "")
+}
+
+fn run(source: &Source, workers: usize) -> AirspaceSimulation {
+    let mut run = AirspaceSimulation::new(source, workers).expect("a valid scenario");
+    run.share_always();
+    run
+}
+
+const ERRING: &str = "position_noise_m = 20.0\nheading_noise_deg = 1.0\nwind_m_s = [5.0, -3.0]";
+
+#[test]
+fn any_number_of_workers_gives_the_same_bits() {
+    for more in ["", ERRING, "preset = \"paper\"\nmax_rounds = 20", "method = \"orca\""] {
+        let source = traffic(more);
+        let mut alone = run(&source, 1);
+        alone.advance(40);
+        for workers in [2, 3, 8] {
+            let mut team = run(&source, workers);
+            team.advance(40);
+            assert_eq!(team.digest(), alone.digest(), "{workers} workers, {more}");
+            assert_eq!(team.ledger(), alone.ledger(), "{workers} workers, {more}");
+        }
+    }
+}
+
+#[test]
+fn a_resumed_or_recorded_run_gives_the_same_bits() {
+    let source = traffic(ERRING);
+    let mut whole = run(&source, 2);
+    whole.advance(30);
+    let mut first = run(&source, 1);
+    first.begin_recording();
+    first.advance(13);
+    let mut recorder = MemoryRecorder::new(&first.schemas());
+    first.record(&mut recorder).expect("memory has room");
+    let mut second = run(&source, 2);
+    second.restore(&first.checkpoint()).expect("its own checkpoint");
+    second.advance(17);
+    assert_eq!(second.digest(), whole.digest());
+    assert_eq!(second.ledger(), whole.ledger());
+}
+
+#[test]
+fn with_the_shield_no_method_loses_separation_and_everybody_arrives() {
+    for method in ["pc", "orca", "mvp", "none"] {
+        for (kind, n) in [("superconflict", 9), ("streams", 9), ("random", 12)] {
+            let text = format!(
+                "format = 1\nworld = \"airspace\"\nseed = 3\n[airspace]\nmethod = \"{method}\"\n\
+                 wind_m_s = [4.0, 6.0]\n\
+                 [airspace.generator]\nkind = \"{kind}\"\nn = {n}\n"
+            );
+            let mut run = run(&Source::new(kind, text, ""), 2);
+            assert!(run.compiled().too_close.is_empty(), "{kind}");
+            while run.cycle() < 1000 && !run.is_over() {
+                run.advance(50);
+            }
+            let metrics = run.airspace_metrics();
+            assert_eq!(metrics.losses_of_separation, 0, "{method}, {kind}");
+            assert_eq!(metrics.arrived, metrics.airplanes, "{method}, {kind}");
+        }
+    }
+}
+
+#[test]
+fn doing_nothing_loses_separation_and_says_so() {
+    let text = "format = 1\nworld = \"airspace\"\n[airspace]\nmethod = \"none\"\nshield = \"off\"\n\
+                [airspace.generator]\nkind = \"superconflict\"\nn = 6\n";
+    let mut run = run(&Source::new("s", text, ""), 1);
+    run.advance(100);
+    let metrics = run.airspace_metrics();
+    assert_eq!(metrics.losses_of_separation, 15, "every pair meets once");
+    assert!(metrics.min_separation_m.is_some_and(|d| d < 100.0) && metrics.lost_s > 10.0);
+}
+
+#[test]
+fn wrong_scenarios_are_refused_with_a_remedy() {
+    let wrong = [
+        ("[airplane]\nturns = 4\n", "odd"),
+        ("[airplane]\nturns = 1\n", "odd"),
+        ("[airplane]\nseparation_m = 0.0\n", "separation_m"),
+        ("[airplane]\nv_m_s = -3.0\n", "v_m_s"),
+        ("[[airplanes]]\nat_m = [0, 0]\nheading_deg = 0\nway_points_m = []\n", "way-points"),
+        ("[[airplanes]]\nat_m = [nan, 0]\nheading_deg = 0\nway_points_m = [[1, 1]]\n", "number"),
+        ("[airspace]\nmethod = \"magic\"\n", "unknown"),
+        ("[airspace]\ndt_s = 5.0\ndtau_s = 2.0\n", "divides"),
+        ("[airspace]\nwind_m_s = [40.0, 0.0]\n", "wind"),
+        ("[airspace.generator]\nkind = \"random\"\nn = 500\nradius_m = 3000.0\n", "no place"),
+        ("", "no airplanes"),
+    ];
+    for (section, cause) in wrong {
+        let mut text = format!("format = 1\nworld = \"airspace\"\n{section}");
+        if !section.contains("airplanes]") && !section.contains("generator") && !section.is_empty()
+        {
+            text.push_str("[airspace.generator]\nkind = \"superconflict\"\nn = 3\n");
+        }
+        let error =
+            AirspaceSimulation::new(&Source::new("w.toml", text, ""), 1).expect_err(section);
+        assert!(error.to_string().contains(cause), "{section}: {error}");
+    }
+}
