@@ -163,8 +163,12 @@ fn judge(cells: &[Cell]) -> Vec<Claim> {
         reason,
     };
     let bytes = |cell: &Cell| cell.bytes.or_zero();
-    let ratio = |pair: Option<(&Cell, &Cell)>| pair.map_or(0.0, |(t, p)| bytes(p) / bytes(t));
-    let (first, last) = (ratio(pairs(cells).next()), ratio(pairs(cells).last()));
+    let ratios = |team_bytes: fn(&Cell) -> f64| {
+        let ratio = |(team, pim): (&Cell, &Cell)| bytes(pim) / team_bytes(team);
+        (pairs(cells).next().map_or(0.0, ratio), pairs(cells).last().map_or(0.0, ratio))
+    };
+    let (first, last) = ratios(|cell| cell.bytes.or_zero());
+    let (first_multi, last_multi) = ratios(|cell| cell.multicast_bytes.or_zero());
     let grows = if last > first { Verdict::Held } else { Verdict::NotHeld };
     vec![
         claim(
@@ -183,8 +187,11 @@ fn judge(cells: &[Cell]) -> Vec<Claim> {
             "pim's bytes grow faster with the number of airplanes (figure 7)",
             (
                 grows,
-                format!("pim / team: {first:.2} at first, {last:.2} at last"),
-                "the ratio rises".into(),
+                format!(
+                    "pim / team: {first:.2} at first, {last:.2} at last; against a team that \
+                     multicasts {first_multi:.2} and {last_multi:.2}"
+                ),
+                "the first ratio rises; the paper does not say which team it counts".into(),
             ),
         ),
         claim("A-5", "multicast saves the team further bandwidth, most with many airplanes", {
