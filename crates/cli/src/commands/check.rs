@@ -26,9 +26,19 @@ pub(crate) struct CheckArgs {
 /// # Errors
 /// When the scenario is wrong.
 pub(crate) fn check(args: &CheckArgs, console: Console) -> Result<ExitCode, Failure> {
-    let (source, compiled) = args.scenario.compile()?;
+    let told = worlds::told_of(&args.scenario.file)?;
+    let compiled = args.scenario.compile();
+    if let (Err(error), Some(told)) = (&compiled, &told) {
+        // A file of another program may be right and still hold nobody whom we can place.
+        let mut json = told.json.clone();
+        json["airplanes"] = 0.into();
+        json["no_scenario"] = error.to_string().into();
+        console.result(&json, || format!("{error}\n{}", told.text));
+        return Ok(ExitCode::Done);
+    }
+    let (source, compiled) = compiled?;
     let mut found = compiled.start(&source, 1).contents();
-    if let Some(told) = worlds::told_of(&args.scenario.file)? {
+    if let Some(told) = told {
         if let (Some(all), Value::Object(more)) = (found.json.as_object_mut(), told.json) {
             all.extend(more);
         }

@@ -5,6 +5,7 @@ use crate::exit::{ExitCode, Failure};
 use crate::plan::{ScenarioArgs, WorkersArg};
 use crate::progress::Stages;
 use clap::{Args, ValueEnum};
+use serde_json::json;
 use sidestep::experiment::methods::{compare as run_all, table};
 use sidestep::worlds::airspace::world::Method;
 
@@ -71,6 +72,7 @@ pub(crate) fn compare(args: &CompareArgs, console: Console) -> Result<ExitCode, 
         run_all(&source, &methods, span, workers, &mut |what, share| stages.at(what, share));
     stages.clear();
     let results = results?;
-    console.result(&results, || table(&compiled.name, &results).to_string());
+    let json = json!({ "name": compiled.name, "seed": compiled.seed, "methods": results });
+    console.result(&json, || table(&compiled.name, &results).to_string());
     Ok(ExitCode::Done)
 }

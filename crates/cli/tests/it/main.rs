@@ -1,5 +1,6 @@
 //! The real binary, from outside: what it prints, writes and ends with.
 
+mod airspace;
 mod commands;
 mod contract;
 mod determinism;
