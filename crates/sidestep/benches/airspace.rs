@@ -134,7 +134,9 @@ fn best_s(n: usize, mut work: impl FnMut()) -> f64 {
 fn exact() {
     let objective =
         Objective { alpha: 0.001, beta: 0.995, inflation: 1.05, mask: true, vertical_m: 300.0 };
-    for (name, holds_s) in [("2m + 1 actions", &[][..]), ("with two more hold times", &[30.0, 90.0])] {
+    for (name, holds_s) in
+        [("2m + 1 actions", &[][..]), ("with two more hold times", &[30.0, 90.0])]
+    {
         let conflict = Conflict::new(10, holds_s, objective);
         let predict_s = best_s(20, || drop(conflict.options()));
         let options = conflict.options();
@@ -182,7 +184,8 @@ fn many() {
              radius_m = {radius_m}\n"
         );
         let workers = sidestep_kernel::workers::available();
-        let mut run = AirspaceSimulation::new(&Source::new("many", text, ""), workers).expect("valid");
+        let mut run =
+            AirspaceSimulation::new(&Source::new("many", text, ""), workers).expect("valid");
         run.advance(4);
         let (cpu, wall, cycles) = (ProcessTime::now(), Instant::now(), 10);
         run.advance(cycles);

@@ -181,6 +181,55 @@ pub struct Prediction {
     pub counted: usize,
 }
 
+/// An airplane on a predicted way: a pose, and what saves computing its sine and cosine anew in
+/// every step. Equal to [`Pose::step`] but for rounding (a test holds them together).
+#[derive(Debug, Clone, Copy)]
+struct Flight {
+    pose: Pose,
+    /// Cosine and sine of the heading.
+    along: Point,
+    /// The turn rate of the last step and, for half of its turn, cosine, sine and sinc.
+    omega_rad_s: f64,
+    half_turn: [f64; 3],
+}
+
+impl Flight {
+    fn new(pose: Pose) -> Self {
+        let along = [math::cos(pose.psi_rad), math::sin(pose.psi_rad)];
+        Self { pose, along, omega_rad_s: 0.0, half_turn: [1.0, 0.0, 1.0] }
+    }
+
+    /// Whether the goal lies dead ahead, so that steering for it changes nothing any more.
+    #[inline]
+    fn heads_for(&self, goal: Point) -> bool {
+        let [dx, dy] = [goal[0] - self.pose.at[0], goal[1] - self.pose.at[1]];
+        let [c, s] = self.along;
+        let (ahead, across) = (dx * c + dy * s, dy * c - dx * s);
+        ahead > 0.0 && across.abs() <= 1e-12 * ahead
+    }
+
+    #[inline]
+    fn step(&mut self, v_m_s: f64, omega_rad_s: f64, dtau_s: f64) {
+        if omega_rad_s != self.omega_rad_s {
+            let half = 0.5 * omega_rad_s * dtau_s;
+            self.omega_rad_s = omega_rad_s;
+            self.half_turn = match omega_rad_s {
+                0.0 => [1.0, 0.0, 1.0],
+                _ => [math::cos(half), math::sin(half), sinc(half)],
+            };
+        }
+        let [c, s, sinc] = self.half_turn;
+        let turned = |[x, y]: Point| [x * c - y * s, x * s + y * c];
+        let chord_m = v_m_s * dtau_s * sinc;
+        let middle = turned(self.along);
+        self.along = turned(middle);
+        self.pose = Pose {
+            at: [self.pose.at[0] + chord_m * middle[0], self.pose.at[1] + chord_m * middle[1]],
+            psi_rad: self.pose.psi_rad + omega_rad_s * dtau_s,
+        };
+    }
+}
+
 /// Flies step by step: an action, the way-points, what comes after the last.
 #[derive(Debug, Clone, Copy)]
 pub struct Pilot<'a> {
@@ -214,6 +263,16 @@ impl Pilot<'_> {
         }
     }
 
+    /// Whether an action proceeds to the way-point in step `k`.
+    #[inline]
+    fn proceeds(&self, action: Action, k: usize) -> bool {
+        match action {
+            Action::Hold { .. } => false,
+            Action::Then { hold_s, .. } => k as f64 * self.dtau_s >= hold_s - 1e-9,
+            Action::Proceed => true,
+        }
+    }
+
     /// The way-point after those that are done with at `pose`.
     #[inline]
     pub fn next(&self, pose: Pose, mut next: usize) -> usize {
@@ -229,13 +288,23 @@ impl Pilot<'_> {
     /// Predicts `timing.horizon` points of an action from `pose` towards way-point `next`.
     pub fn predict(&self, action: Action, pose: Pose, next: usize, timing: &Timing) -> Prediction {
         let mut points = Vec::with_capacity(timing.horizon);
-        let (mut pose, mut next, mut counted) = (pose, next, timing.horizon);
+        let (mut flight, mut next, mut counted) = (Flight::new(pose), next, timing.horizon);
         for k in 0..timing.horizon {
-            let omega = self.omega_rad_s(action, pose, next, k as f64 * self.dtau_s);
-            pose = pose.step(self.model.v_m_s, omega, self.dtau_s);
-            points.push(pose.at);
+            let goal = self.mission.get(next);
+            if self.after == After::Pursue {
+                // One that comes back to its last way-point turns to the side that rounding
+                // says, so it must be the rounding of the motion itself.
+                let omega = self.omega_rad_s(action, flight.pose, next, k as f64 * self.dtau_s);
+                flight.pose = flight.pose.step(self.model.v_m_s, omega, self.dtau_s);
+            } else if goal.is_some_and(|&g| self.proceeds(action, k) && flight.heads_for(g)) {
+                flight.step(self.model.v_m_s, 0.0, self.dtau_s);
+            } else {
+                let omega = self.omega_rad_s(action, flight.pose, next, k as f64 * self.dtau_s);
+                flight.step(self.model.v_m_s, omega, self.dtau_s);
+            }
+            points.push(flight.pose.at);
             if next < self.mission.len() {
-                next = self.next(pose, next);
+                next = self.next(flight.pose, next);
                 if next == self.mission.len() {
                     counted = k + 1;
                 }
@@ -264,6 +333,32 @@ mod tests {
             let twice = pose.step(35.0, omega, dtau_s / 2.0).step(35.0, omega, dtau_s / 2.0);
             prop_assert!(distance_m(once.at, twice.at) < 1e-8);
             prop_assert!((once.psi_rad - twice.psi_rad).abs() < 1e-12);
+        }
+
+        /// The prediction is the motion, step by step.
+        #[test]
+        fn a_predicted_way_is_the_one_that_is_flown(
+            psi_rad in -3.2f64..3.2, x in -6000.0f64..6000.0, y in -6000.0f64..6000.0, which in 0usize..16,
+        ) {
+            let model = model();
+            let mission = [[x, y], [-y, x]];
+            let pilot = Pilot {
+                model: &model,
+                mission: &mission,
+                passing: Passing { tolerance_m: 100.0, passes: true },
+                after: After::Straight,
+                dtau_s: 1.0,
+            };
+            let timing = Timing { dt_s: 5.0, dtau_s: 1.0, horizon: 200 };
+            let action = actions(&model, 5.0, &[30.0])[which];
+            let (mut pose, mut next) = (Pose { at: [0.0, 0.0], psi_rad }, 0);
+            let predicted = pilot.predict(action, pose, next, &timing);
+            for (k, point) in predicted.points.iter().enumerate() {
+                let omega = pilot.omega_rad_s(action, pose, next, k as f64);
+                pose = pose.step(model.v_m_s, omega, 1.0);
+                next = pilot.next(pose, next);
+                prop_assert!(distance_m(*point, pose.at) < 1e-6, "step {k}");
+            }
         }
 
         /// Wherever a way-point lies, an airplane that proceeds has done with it before long.
