@@ -68,13 +68,16 @@ pub struct Options {
     /// The level it keeps.
     pub altitude_m: f64,
     boxes: Vec<Bounds>,
+    /// Around all of `boxes`.
+    all: Bounds,
 }
 
 impl Options {
     /// Options with their bounds.
     pub fn new(predictions: Vec<Prediction>, separation_m: f64, altitude_m: f64) -> Self {
-        let boxes = predictions.iter().map(|p| Bounds::of(&p.points)).collect();
-        Self { predictions, separation_m, altitude_m, boxes }
+        let boxes: Vec<Bounds> = predictions.iter().map(|p| Bounds::of(&p.points)).collect();
+        let corners: Vec<Point> = boxes.iter().flat_map(|b| [b.low, b.high]).collect();
+        Self { predictions, separation_m, altitude_m, boxes, all: Bounds::of(&corners) }
     }
 }
 
@@ -108,7 +111,7 @@ pub fn game(objective: &Objective, group: &[Options]) -> PairwiseGame {
     let mut game = PairwiseGame::new(own);
     for (i, a) in group.iter().enumerate() {
         for (j, b) in group.iter().enumerate().skip(i + 1) {
-            game.add_pair_in_parts(i, j, pair_costs(objective, a, b));
+            couple(&mut game, objective, (i, a), (j, b));
         }
     }
     game
@@ -121,13 +124,24 @@ pub(super) fn own_costs(objective: &Objective, options: &Options) -> Vec<f64> {
     options.predictions.iter().map(deviation).collect()
 }
 
+/// Adds what two airplanes cost each other to a game, if anything.
+pub(super) fn couple(
+    game: &mut PairwiseGame,
+    objective: &Objective,
+    (i, a): (usize, &Options),
+    (j, b): (usize, &Options),
+) {
+    let gap_m = objective.inflation * a.separation_m.max(b.separation_m);
+    let on_one_level = (a.altitude_m - b.altitude_m).abs() < objective.vertical_m;
+    if on_one_level && a.all.is_within(&b.all, gap_m) {
+        game.add_pair_in_parts(i, j, pair_costs(objective, a, b));
+    }
+}
+
 /// `Gcol` of both for every two actions.
-pub(super) fn pair_costs(objective: &Objective, a: &Options, b: &Options) -> Vec<[f64; 2]> {
+fn pair_costs(objective: &Objective, a: &Options, b: &Options) -> Vec<[f64; 2]> {
     let r = [a.separation_m, b.separation_m];
     let gap_m = objective.inflation * r[0].max(r[1]);
-    if (a.altitude_m - b.altitude_m).abs() >= objective.vertical_m {
-        return vec![[0.0; 2]; a.predictions.len() * b.predictions.len()];
-    }
     let mut costs = Vec::with_capacity(a.predictions.len() * b.predictions.len());
     for (p, p_box) in a.predictions.iter().zip(&a.boxes) {
         for (q, q_box) in b.predictions.iter().zip(&b.boxes) {

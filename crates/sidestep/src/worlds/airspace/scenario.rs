@@ -496,5 +496,7 @@ fn first(world: &AirspaceWorld) -> (Vec<Side>, Vec<(u32, u32)>) {
     };
     let flyers: Vec<Flyer> = world.airplanes.iter().enumerate().map(flyer).collect();
     let (sides, pairs) = first_fallbacks(&flyers);
-    (sides, pairs.into_iter().map(|(i, j)| (i as u32, j as u32)).collect())
+    // Airplanes that appear at other times do not meet at the start.
+    let together = |&(i, j): &(usize, usize)| world.appears_in(i) == world.appears_in(j);
+    (sides, pairs.into_iter().filter(together).map(|(i, j)| (i as u32, j as u32)).collect())
 }

@@ -395,16 +395,12 @@ pub fn first_fallbacks(flyers: &[Flyer]) -> (Vec<Side>, Vec<(usize, usize)>) {
     };
     let clash = |i: usize, a: Side, j: usize, b: Side| {
         let gap_m = flyers[i].separation_m.max(flyers[j].separation_m) + SLACK_M;
-        let diameter_m = |f: &Flyer| 2.0 * f.v_m_s / f.omega_max_rad_s;
-        let far_m = gap_m + diameter_m(&flyers[i]) + diameter_m(&flyers[j]);
-        if distance_m(flyers[i].pose.at, flyers[j].pose.at) >= far_m {
-            return false;
-        }
-        flyers[i].minds(&flyers[j]) && !orbit(i, a).stays_apart(&orbit(j, b), gap_m)
+        !orbit(i, a).stays_apart(&orbit(j, b), gap_m)
     };
+    let near = near_each_other(flyers);
     let mut sides: Vec<Side> = flyers.iter().map(|flyer| flyer.fallback).collect();
     let clashes = |sides: &[Side], i: usize, side: Side| {
-        (0..sides.len()).filter(|&j| j != i && clash(i, side, j, sides[j])).count()
+        near[i].iter().filter(|&&j| clash(i, side, j, sides[j])).count()
     };
     // Whoever has fewer clashes on the other side changes over; clashes only become fewer.
     let mut changed = true;
@@ -420,10 +416,32 @@ pub fn first_fallbacks(flyers: &[Flyer]) -> (Vec<Side>, Vec<(usize, usize)>) {
             }
         }
     }
-    let n = sides.len();
-    let pairs = (0..n).flat_map(|i| (i + 1..n).map(move |j| (i, j)));
-    let left = pairs.filter(|&(i, j)| clash(i, sides[i], j, sides[j])).collect();
+    let pairs = near.iter().enumerate().flat_map(|(i, near)| near.iter().map(move |&j| (i, j)));
+    let left = pairs.filter(|&(i, j)| i < j && clash(i, sides[i], j, sides[j])).collect();
     (sides, left)
+}
+
+/// Per airplane all others whose orbits might come too near its own, by rising number. Sorted by
+/// x, only neighbors in that order have to be looked at.
+fn near_each_other(flyers: &[Flyer]) -> Vec<Vec<usize>> {
+    let reach_m = |f: &Flyer| 2.0 * f.v_m_s / f.omega_max_rad_s + f.separation_m + SLACK_M;
+    let widest_m = flyers.iter().map(reach_m).fold(0.0, f64::max);
+    let x = |i: usize| flyers[i].pose.at[0];
+    let mut by_x: Vec<usize> = (0..flyers.len()).collect();
+    by_x.sort_unstable_by(|&a, &b| x(a).total_cmp(&x(b)));
+    let mut near = vec![Vec::new(); flyers.len()];
+    for (k, &i) in by_x.iter().enumerate() {
+        let beside = by_x[k + 1..].iter().take_while(|&&j| x(j) - x(i) < 2.0 * widest_m);
+        for &j in beside {
+            let apart_m = distance_m(flyers[i].pose.at, flyers[j].pose.at);
+            if flyers[i].minds(&flyers[j]) && apart_m < reach_m(&flyers[i]) + reach_m(&flyers[j]) {
+                near[i].push(j);
+                near[j].push(i);
+            }
+        }
+    }
+    near.iter_mut().for_each(|all| all.sort_unstable());
+    near
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 
 use super::super::airplane::{Point, Pose, Prediction};
 use super::super::decide::Known;
-use super::super::objective::{Options, own_costs, pair_costs};
+use super::super::objective::{Options, couple, own_costs};
 use super::{Decided, Own, network};
 use crate::collectives::{Estimator, Game, Order, PairwiseGame, Player};
 use serde::{Deserialize, Serialize};
@@ -100,7 +100,7 @@ impl<'a> Agent<'a> {
             for j in i + 1..all.len() {
                 // An exact player needs only its own pairs.
                 if !exact || i == self.own.me || j == self.own.me {
-                    game.add_pair_in_parts(i, j, pair_costs(objective, all[i], all[j]));
+                    couple(&mut game, objective, (i, all[i]), (j, all[j]));
                 }
             }
         }

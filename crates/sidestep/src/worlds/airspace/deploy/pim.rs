@@ -8,7 +8,7 @@
 //! rounds wherever it is. A last tour brings each airplane its control.
 
 use super::super::airplane::Prediction;
-use super::super::objective::{Options, own_costs, pair_costs};
+use super::super::objective::{Options, couple, own_costs};
 use super::network::{Traffic, bytes_of};
 use super::{Decided, Own};
 use crate::collectives::{Estimator, PairwiseGame, Player, optimize};
@@ -97,7 +97,7 @@ fn exact(coordinator: &mut Coordinator, hosts: &[Own<'_>], traffic: &mut Traffic
     let world = hosts[0].world;
     for i in 0..all.len() {
         for j in i + 1..all.len() {
-            game.add_pair_in_parts(i, j, pair_costs(&world.objective, &all[i], &all[j]));
+            couple(&mut game, &world.objective, (i, &all[i]), (j, &all[j]));
         }
     }
     let outcome = optimize(&game, &world.settings, |player, k| hosts[player].uniform(k));
