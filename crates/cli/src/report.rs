@@ -174,15 +174,23 @@ impl Summary {
     fn speed(&self) -> String {
         let per_second = self.cycles_timed as f64 / self.wall_s.max(1e-9);
         format!(
-            "{} for {} cycles ({}/s); {:.2} million {}-cycles per CPU second on {} worker{}",
+            "{} for {} cycles ({}/s); {} {}-cycles per CPU second on {} worker{}",
             duration(self.wall_s),
             grouped(self.cycles_timed),
             grouped(per_second as u64),
-            self.robot_cycles_per_cpu_s / 1e6,
+            rate(self.robot_cycles_per_cpu_s),
             self.agent,
             self.workers,
             if self.workers == 1 { "" } else { "s" },
         )
+    }
+}
+
+/// A rate with as many digits as tell it apart.
+fn rate(per_second: f64) -> String {
+    match per_second < 1e5 {
+        true => grouped(per_second as u64),
+        false => format!("{:.2} million", per_second / 1e6),
     }
 }
 

@@ -106,12 +106,6 @@ impl<T: Word> Column<T> {
         T::store(&self.0[slot], value);
     }
 
-    /// Sets a range of slots; only their one writer of the phase may.
-    #[inline(always)]
-    pub fn fill(&self, slots: std::ops::Range<usize>, value: T) {
-        self.0[slots].iter().for_each(|cell| T::store(cell, value));
-    }
-
     /// All cells, for loops without bounds checks.
     #[inline(always)]
     pub fn cells(&self) -> &[T::Cell] {

@@ -51,8 +51,8 @@ struct AgentflyArgs {
     quick: bool,
 
     /// Seeds per number of airplanes
-    #[arg(long, value_name = "N")]
-    seeds: Option<usize>,
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    seeds: Option<u32>,
 }
 
 /// How much to run.
@@ -117,7 +117,8 @@ pub(crate) fn reproduce(args: &ReproduceArgs, console: Console) -> Result<ExitCo
 
 fn agentfly(args: &AgentflyArgs, console: Console) -> Result<ExitCode, Failure> {
     let default = if args.quick { agentfly::Plan::quick() } else { agentfly::Plan::default() };
-    let plan = agentfly::Plan { seeds: args.seeds.unwrap_or(default.seeds), ..default };
+    let plan =
+        agentfly::Plan { seeds: args.seeds.map_or(default.seeds, |n| n as usize), ..default };
     if let Some(folder) = &args.out {
         check_vacant(folder)?;
     }

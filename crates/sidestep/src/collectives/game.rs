@@ -124,11 +124,6 @@ impl PairwiseGame {
         }
     }
 
-    /// Whether players `a` and `b` can cost each other anything.
-    pub fn are_coupled(&self, a: usize, b: usize) -> bool {
-        self.of_player[a].iter().any(|&index| self.pairs[index].a == b || self.pairs[index].b == b)
-    }
-
     fn pair_cost(&self, index: usize, joint: &[usize]) -> f64 {
         let Pair { a, b, costs, .. } = &self.pairs[index];
         costs[joint[*a] * self.strategies[*b] + joint[*b]]

@@ -181,7 +181,16 @@ fn judge(cells: &[Cell]) -> Vec<Claim> {
             "pim needs fewer messages than the team (figure 6)",
             everywhere(|c| c.messages.or_zero(), false),
         ),
-        claim("A-3", "pim moves far more bytes than the team (figure 7)", everywhere(bytes, true)),
+        claim("A-3", "pim moves far more bytes than the team (figure 7)", {
+            let twice = |(team, pim): (&Cell, &Cell)| bytes(pim) >= 2.0 * bytes(team);
+            let (_, ours, _) = everywhere(bytes, true);
+            let multicast = pairs(cells)
+                .map(|(team, pim)| format!("{:.2}", bytes(pim) / team.multicast_bytes.or_zero()));
+            let multicast = multicast.collect::<Vec<_>>().join(", ");
+            let ours = format!("{ours}; against a team that multicasts: {multicast}");
+            let verdict = if pairs(cells).all(twice) { Verdict::Held } else { Verdict::NotHeld };
+            (verdict, ours, "far more: at least twice, at every number of airplanes".into())
+        }),
         claim(
             "A-4",
             "pim's bytes grow faster with the number of airplanes (figure 7)",

@@ -129,8 +129,9 @@ impl AirspaceWorld {
         self
     }
 
-    /// How airplane `i` flies. Where a wind blows, the air moves with it: poses are in the
-    /// air, and way-points drift against it.
+    /// How airplane `i` flies through still air. In a wind, predictions are made in the moving
+    /// air, towards way-points that drift; what is flown is flown over the ground, see
+    /// [`AirspaceWorld::steer`] and [`AirspaceWorld::blown`].
     pub(super) fn pilot<'a>(&'a self, i: usize, mission: &'a [Point]) -> Pilot<'a> {
         Pilot {
             model: &self.airplanes[i].model,

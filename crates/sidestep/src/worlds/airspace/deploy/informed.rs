@@ -8,7 +8,6 @@ use super::{Decided, Own, network};
 use crate::collectives::{Estimator, Game, Order, PairwiseGame, Player};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::rc::Rc;
 
 /// What agents tell each other.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -227,8 +226,8 @@ impl network::Agent for Agent<'_> {
         said
     }
 
-    fn on_message(&mut self, from: usize, message: &Rc<Message>) -> Vec<Message> {
-        match Message::clone(message) {
+    fn on_message(&mut self, from: usize, message: Message) -> Vec<Message> {
+        match message {
             Message::Ways { ways, separation_m, altitude_m } => {
                 self.options.insert(from, Options::new(ways, separation_m, altitude_m));
             }

@@ -170,13 +170,13 @@ mod tests {
         }
     }
 
-    /// The paper's figures 6 and 7, and what compact messages save.
+    /// Parts of the paper's figures 6 and 7, and what compact messages save.
     #[test]
-    fn a_coordinator_sends_fewer_messages_and_far_more_bytes_than_a_team() {
+    fn a_coordinator_sends_fewer_messages_than_a_team_and_more_bytes_than_one_that_multicasts() {
         let [team, compact, pim] =
             ["team", "compact-team", "pim"].map(|deployment| flown("paper", deployment, "").1);
         assert!(pim.messages < team.messages);
-        assert!(pim.bytes > team.multicast_bytes);
+        assert!(pim.bytes > 2 * team.multicast_bytes);
         assert!(compact.bytes * 20 < team.bytes, "{} {}", compact.bytes, team.bytes);
     }
 

@@ -3,7 +3,6 @@
 use super::Decided;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use std::rc::Rc;
 
 /// What went over the network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -45,7 +44,7 @@ pub(super) trait Agent {
     fn start(&mut self) -> Vec<Self::Message>;
 
     /// Takes a message of agent `from`, and says what it has to say to all others then.
-    fn on_message(&mut self, from: usize, message: &Rc<Self::Message>) -> Vec<Self::Message>;
+    fn on_message(&mut self, from: usize, message: Self::Message) -> Vec<Self::Message>;
 
     /// What it has decided, when it has.
     fn decided(&self) -> Option<Decided>;
@@ -65,11 +64,10 @@ pub(super) fn run<A: Agent>(mut agents: Vec<A>) -> (Vec<Decided>, Traffic) {
         let mut next = Vec::new();
         for (from, bytes) in std::mem::take(&mut sent) {
             traffic.count(agents.len() - 1, bytes.len());
-            // All receivers read the same bytes, so they are read once.
-            let message = postcard::from_bytes(&bytes).expect("what was sent can be read");
-            let message = Rc::new(message);
             for (i, agent) in agents.iter_mut().enumerate().filter(|(i, _)| *i != from) {
-                post(i, agent.on_message(from, &message), &mut next);
+                // Each reads for itself, as it would on a network: that is part of its time.
+                let message = postcard::from_bytes(&bytes).expect("what was sent can be read");
+                post(i, agent.on_message(from, message), &mut next);
             }
         }
         sent = next;

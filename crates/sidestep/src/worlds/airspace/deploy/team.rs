@@ -6,7 +6,6 @@ use super::{Decided, Own, network};
 use crate::collectives::Player;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::rc::Rc;
 
 /// What agents tell each other.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -32,8 +31,8 @@ pub(super) struct Agent<'a> {
     samples: Vec<usize>,
     /// Whether this round's own costs are out.
     costed: bool,
-    /// Messages with predictions, by round and sender.
-    heard: BTreeMap<(u32, usize), Rc<Message>>,
+    /// Ways heard of, by round and sender.
+    heard: BTreeMap<(u32, usize), Vec<Prediction>>,
     changes: BTreeMap<(u32, usize), f64>,
     costs: BTreeMap<(u32, usize), Vec<f64>>,
     altitudes_m: BTreeMap<usize, f64>,
@@ -128,7 +127,8 @@ impl<'a> Agent<'a> {
                 let near =
                     |j: &usize| (self.altitudes_m[j] - own_altitude_m).abs() < objective.vertical_m;
                 self.others().filter(near).fold(self.own_costs[x], |sum, j| {
-                    let [own, _] = objective.collision(way, self.way(j, k), [r, r]);
+                    let [own, _] =
+                        objective.collision(way, &self.heard[&(self.round, j)][k], [r, r]);
                     sum + own
                 })
             })
@@ -136,14 +136,6 @@ impl<'a> Agent<'a> {
         self.costs.insert((self.round, self.own.me), costs.clone());
         self.costed = true;
         Message::Costs { round: self.round, costs }
-    }
-
-    /// The way of the `k`-th sample of agent `j` in this round.
-    fn way(&self, j: usize, k: usize) -> &Prediction {
-        match &*self.heard[&(self.round, j)] {
-            Message::Predictions { ways, .. } => &ways[k],
-            Message::Costs { .. } => unreachable!("only predictions are kept"),
-        }
     }
 
     /// Lines 18 to 24: sums in the order of the airplanes, so that all come to the same bits.
@@ -182,15 +174,15 @@ impl network::Agent for Agent<'_> {
         vec![self.predictions()]
     }
 
-    fn on_message(&mut self, from: usize, message: &Rc<Message>) -> Vec<Message> {
-        match &**message {
-            Message::Predictions { round, change, altitude_m, .. } => {
-                self.altitudes_m.insert(from, *altitude_m);
-                self.changes.insert((*round, from), *change);
-                self.heard.insert((*round, from), Rc::clone(message));
+    fn on_message(&mut self, from: usize, message: Message) -> Vec<Message> {
+        match message {
+            Message::Predictions { round, change, altitude_m, ways } => {
+                self.altitudes_m.insert(from, altitude_m);
+                self.changes.insert((round, from), change);
+                self.heard.insert((round, from), ways);
             }
             Message::Costs { round, costs } => {
-                self.costs.insert((*round, from), costs.clone());
+                self.costs.insert((round, from), costs);
             }
         }
         self.go_on()
