@@ -58,41 +58,7 @@ impl AirspaceRun {
     }
 }
 
-impl Simulation for AirspaceRun {
-    fn world(&self) -> &'static str {
-        Simulation::world(&self.simulation)
-    }
-    fn cycle(&self) -> Cycle {
-        self.simulation.cycle()
-    }
-    fn agents(&self) -> usize {
-        self.simulation.agents()
-    }
-    fn is_over(&self) -> bool {
-        Simulation::is_over(&self.simulation)
-    }
-    fn advance(&mut self, cycles: u64) -> u64 {
-        self.simulation.advance(cycles)
-    }
-    fn digest(&self) -> Digest {
-        self.simulation.digest()
-    }
-    fn checkpoint(&self) -> Vec<u8> {
-        self.simulation.checkpoint()
-    }
-    fn schemas(&self) -> Vec<TableSchema> {
-        self.simulation.schemas()
-    }
-    fn record(&mut self, recorder: &mut dyn Recorder) -> Result<(), RecordError> {
-        self.simulation.record(recorder)
-    }
-    fn metrics(&self) -> Value {
-        self.simulation.metrics()
-    }
-    fn phase_times(&self) -> PhaseTimes {
-        self.simulation.phase_times()
-    }
-}
+delegates_simulation!(AirspaceRun);
 
 impl Run for AirspaceRun {
     fn agent(&self) -> &'static str {
