@@ -72,6 +72,11 @@ impl MemoryTransport {
         Self { streams, purpose, faults, waiting: BTreeMap::new(), messages: 0, bytes: 0 }
     }
 
+    /// The first cycle in which anything arrives.
+    pub fn next_arrival(&self) -> Option<Cycle> {
+        self.waiting.keys().map(|&(_, at)| at).min()
+    }
+
     fn deliver(&mut self, envelope: Envelope, delay_word: u32) {
         let choices = u64::from(self.faults.max_delay_cycles) + 1;
         let extra = (u64::from(delay_word) * choices) >> 32;
@@ -143,6 +148,10 @@ mod tests {
         let mut transport = network(Faults::default());
         conformance(&mut transport);
         assert_eq!((transport.messages, transport.bytes), (5, 15));
+        assert_eq!(transport.next_arrival(), None, "everything was received");
+        let payload = Vec::new();
+        transport.send(Envelope { cycle: 7, sender: 1, sequence: 0, receiver: 2, payload });
+        assert_eq!(transport.next_arrival(), Some(8));
     }
 
     #[test]

@@ -1,7 +1,9 @@
 //! What the airplanes of a group want to do: by the method of the world.
 
+use super::Scratch;
 use super::airplane::{Action, Pilot, Point, Pose};
 use super::baseline::{Moving, mvp, orca};
+use super::deploy::contact::Contacts;
 use super::deploy::{Decided, Deployment, Traffic};
 use super::objective::{Options, game};
 use super::shield::Way;
@@ -9,7 +11,7 @@ use super::world::{Airplane, AirspaceWorld, Method};
 use crate::collectives::{Estimator, optimize};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::math;
-use sidestep_kernel::{Cycle, Slot};
+use sidestep_kernel::{Cycle, EntityId, Slot};
 
 /// An airplane of a group, as the group knows it.
 #[derive(Debug, Clone, Copy)]
@@ -19,7 +21,24 @@ pub(super) struct Known {
     pub(super) next: usize,
 }
 
-/// What one optimization took.
+/// One optimization: of a group, in a cycle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Optimization {
+    /// When.
+    pub cycle: Cycle,
+    /// The member of the group with the smallest id,
+    pub airplane: EntityId,
+    /// and how many they are.
+    pub airplanes: u32,
+    /// Rounds, of that airplane's agent.
+    pub rounds: u32,
+    /// Whether the distributions had settled.
+    pub converged: bool,
+    /// What went over the network.
+    pub traffic: Traffic,
+}
+
+/// What optimizations took.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Effort {
     /// Optimizations.
@@ -28,27 +47,33 @@ pub struct Effort {
     pub rounds: u64,
     /// Those that ended before they had converged.
     pub unconverged: u64,
-    /// What went over the network.
+    /// What went over the network, the shield's exchanges included.
     pub traffic: Traffic,
 }
 
 impl Effort {
-    /// Adds another.
-    pub fn add(&mut self, other: Self) {
-        self.optimizations += other.optimizations;
-        self.rounds += other.rounds;
-        self.unconverged += other.unconverged;
-        self.traffic.add(other.traffic);
+    /// Adds one optimization.
+    pub fn add(&mut self, one: &Optimization) {
+        self.optimizations += 1;
+        self.rounds += u64::from(one.rounds);
+        self.unconverged += u64::from(!one.converged);
+        self.traffic.add(one.traffic);
     }
 }
 
 impl AirspaceWorld {
     /// The ways that each airplane of a group may fly in the next `dt`, the wanted one first.
-    pub(super) fn wanted(&self, group: &[Known], now: Cycle, effort: &mut Effort) -> Vec<Vec<Way>> {
+    pub(super) fn wanted(
+        &self,
+        group: &[Known],
+        now: Cycle,
+        contacts: &mut [Contacts],
+        scratch: &mut Scratch,
+    ) -> Vec<Vec<Way>> {
         let wishes = match self.method {
             _ if group.len() < 2 => group.iter().map(|known| self.straight(*known)).collect(),
             Method::None => group.iter().map(|known| self.straight(*known)).collect(),
-            Method::Pc => self.optimized(group, now, effort),
+            Method::Pc => self.optimized(group, now, contacts, scratch),
             Method::Mvp | Method::Orca => self.by_velocity(group),
         };
         group.iter().zip(wishes).map(|(known, wishes)| self.ways(*known, &wishes)).collect()
@@ -120,38 +145,54 @@ impl AirspaceWorld {
 
     /// By probability collectives: the chosen action, and the others by what the optimizer
     /// expects of them.
-    fn optimized(&self, group: &[Known], now: Cycle, effort: &mut Effort) -> Vec<Vec<Action>> {
+    fn optimized(
+        &self,
+        group: &[Known],
+        now: Cycle,
+        contacts: &mut [Contacts],
+        scratch: &mut Scratch,
+    ) -> Vec<Vec<Action>> {
         let (decided, traffic) = match self.deployment {
             Deployment::Direct => (self.direct(group, now), Traffic::default()),
-            _ => self.deployed(group, now),
+            _ => self.deployed(group, now, contacts, &mut scratch.events),
         };
-        let Some(first) = decided.first() else { return Vec::new() };
-        effort.add(Effort {
-            optimizations: 1,
-            rounds: u64::from(first.rounds),
-            unconverged: u64::from(!first.converged),
+        let first = decided.iter().flatten().next();
+        scratch.optimizations.push(Optimization {
+            cycle: now,
+            airplane: group[0].slot,
+            airplanes: group.len() as u32,
+            rounds: first.map_or(0, |decided| decided.rounds),
+            converged: decided.iter().all(|d| d.as_ref().is_some_and(|d| d.converged)),
             traffic,
         });
-        let ranked = |(Decided { chosen, expected, .. }, known): (&Decided, &Known)| {
-            let chosen = *chosen;
-            let mut order: Vec<usize> = (0..expected.len()).collect();
-            order.sort_by(|&a, &b| {
-                (a != chosen).cmp(&(b != chosen)).then(expected[a].total_cmp(&expected[b]))
-            });
-            order.iter().map(|&k| self.actions_of(known.slot)[k]).collect()
+        let ranked = |(decided, known): (&Option<Decided>, &Known)| match decided {
+            Some(decided) => self.ranked(decided, *known),
+            // Nobody has told it what to do.
+            None => self.straight(*known),
         };
         decided.iter().zip(group).map(ranked).collect()
     }
 
+    /// The chosen action, and then the others, what is expected of them rising.
+    fn ranked(&self, Decided { chosen, expected, .. }: &Decided, known: Known) -> Vec<Action> {
+        let chosen = *chosen;
+        let mut order: Vec<usize> = (0..expected.len()).collect();
+        order.sort_by(|&a, &b| {
+            (a != chosen).cmp(&(b != chosen)).then(expected[a].total_cmp(&expected[b]))
+        });
+        order.iter().map(|&k| self.actions_of(known.slot)[k]).collect()
+    }
+
     /// One process decides for all.
-    fn direct(&self, group: &[Known], now: Cycle) -> Vec<Decided> {
+    fn direct(&self, group: &[Known], now: Cycle) -> Vec<Option<Decided>> {
         let options: Vec<Options> = group.iter().map(|known| self.options(*known)).collect();
         let game = game(&self.objective, &options);
         let uniform = |player: usize, k: u64| self.uniform(group[player].slot, now, k);
         let outcome = optimize(&game, &self.settings, uniform);
         let (rounds, converged) = (outcome.rounds, outcome.converged);
         let each = outcome.joint.into_iter().zip(outcome.expected);
-        each.map(|(chosen, expected)| Decided { chosen, expected, rounds, converged }).collect()
+        each.map(|(chosen, expected)| Some(Decided { chosen, expected, rounds, converged }))
+            .collect()
     }
 
     /// Where each action would lead an airplane. In the air, way-points drift against the

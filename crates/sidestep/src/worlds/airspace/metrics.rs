@@ -1,6 +1,7 @@
 //! What came of a run.
 
 use super::decide::Effort;
+use super::events::{Event, EventKind};
 use super::react::LOOKS_PER_STEP;
 use super::state::{AirspaceState, PairRecord};
 use super::world::AirspaceWorld;
@@ -15,11 +16,21 @@ pub struct Ledger {
     pub pairs: BTreeMap<(EntityId, EntityId), PairRecord>,
     /// What optimizations took.
     pub effort: Effort,
+    /// How often what happened.
+    pub events: BTreeMap<EventKind, u64>,
 }
 
 impl Ledger {
     pub(super) fn add_pair(&mut self, pair: (EntityId, EntityId), record: PairRecord) {
         self.pairs.entry(pair).and_modify(|r| r.add(record)).or_insert(record);
+    }
+
+    pub(super) fn add_event(&mut self, event: &Event) {
+        *self.events.entry(event.kind).or_default() += 1;
+    }
+
+    fn count(&self, kind: EventKind) -> u64 {
+        self.events.get(&kind).copied().unwrap_or(0)
     }
 }
 
@@ -58,8 +69,14 @@ pub struct Metrics {
     pub optimise_cpu_s: f64,
     /// Times that the shield changed what an airplane wanted,
     pub shield_overrides: u64,
-    /// of these, falls back to an orbit for one `dt`.
+    /// of these, falls back to an orbit for one `dt`,
     pub shield_orbits: u64,
+    /// and of these, since not everybody had agreed in time.
+    pub shield_held_back: u64,
+    /// Times that an airplane lost contact with another one.
+    pub contacts_lost: u64,
+    /// Times that an airplane's agent ran out of time.
+    pub deadlines_missed: u64,
 }
 
 /// What came of one airplane.
@@ -77,6 +94,13 @@ pub struct AirplaneMetrics {
     pub shield_overrides: u32,
     /// of these, falls back to its orbit.
     pub shield_orbits: u32,
+}
+
+impl AirplaneMetrics {
+    /// Seconds beyond what the flight takes alone.
+    pub(super) fn delay_s(&self) -> Option<f64> {
+        self.flown_s.map(|flown_s| flown_s - self.alone_s)
+    }
 }
 
 impl AirspaceWorld {
@@ -124,6 +148,9 @@ impl AirspaceWorld {
             optimise_cpu_s: decide_s,
             shield_overrides: all.iter().map(|a| u64::from(a.shield_overrides)).sum(),
             shield_orbits: all.iter().map(|a| u64::from(a.shield_orbits)).sum(),
+            shield_held_back: ledger.count(EventKind::HeldBack),
+            contacts_lost: ledger.count(EventKind::Unheard),
+            deadlines_missed: ledger.count(EventKind::Deadline),
         }
     }
 

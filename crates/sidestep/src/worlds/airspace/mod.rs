@@ -13,10 +13,12 @@ pub mod airplane;
 mod baseline;
 mod decide;
 pub mod deploy;
+pub mod events;
 mod generate;
 pub mod metrics;
 pub mod objective;
 mod react;
+mod rows;
 pub mod scenario;
 pub mod shield;
 pub mod simulation;
@@ -24,7 +26,9 @@ pub mod state;
 pub mod traffic;
 pub mod world;
 
-pub use decide::Effort;
+pub use decide::{Effort, Optimization};
+use deploy::Traffic;
+use events::Event;
 pub use react::LOOKS_PER_STEP;
 use sidestep_kernel::conflict::Groups;
 use sidestep_kernel::ports::SystemClock;
@@ -38,7 +42,10 @@ pub use world::AirspaceWorld;
 pub struct Scratch {
     /// Pairs that came near each other.
     pairs: BTreeMap<(Slot, Slot), PairRecord>,
-    effort: Effort,
+    optimizations: Vec<Optimization>,
+    /// What the shield has sent.
+    exchanged: Traffic,
+    events: Vec<Event>,
     /// Time spent deciding: told beside the results, never part of them.
     decide_ns: u64,
     clock: SystemClock,

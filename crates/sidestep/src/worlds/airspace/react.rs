@@ -3,7 +3,9 @@
 use super::Scratch;
 use super::airplane::{Pose, distance_m};
 use super::decide::Known;
-use super::shield::{Flyer, Side, Way, filter};
+use super::deploy::contact::Contacts;
+use super::events::{Event, EventKind};
+use super::shield::{Flyer, Side, Way};
 use super::state::{AirspaceState, PairRecord};
 use super::world::{AirspaceWorld, purpose};
 use sidestep_kernel::distr::normal;
@@ -36,13 +38,15 @@ impl AirspaceWorld {
     ) {
         let known: Vec<Known> = group.iter().map(|&slot| self.known(state, now, slot)).collect();
         let began_ns = scratch.clock.now_ns();
-        let candidates = self.wanted(&known, now, &mut scratch.effort);
+        let mut contacts = state.take_contacts(group);
+        let candidates = self.wanted(&known, now, &mut contacts, scratch);
         scratch.decide_ns += scratch.clock.now_ns() - began_ns;
         let ways = if self.shield {
-            self.shielded(state, group, &candidates)
+            self.shielded(state, (now, group), &candidates, &mut contacts, scratch)
         } else {
             candidates.into_iter().map(|ways| ways.into_iter().next().unwrap_or_default()).collect()
         };
+        state.put_contacts(group, contacts);
         let flights = group.iter().zip(ways).map(|(&slot, way)| {
             let cell = &state.airplanes[slot as usize];
             let (pose, next) = (cell.pose(), cell.next.get() as usize);
@@ -62,24 +66,18 @@ impl AirspaceWorld {
         Known { slot, pose, next: cell.next.get() as usize }
     }
 
-    fn shielded(&self, state: &AirspaceState, group: &[Slot], candidates: &[Vec<Way>]) -> Vec<Way> {
-        let flyer = |&slot: &Slot| {
-            let (cell, model) =
-                (&state.airplanes[slot as usize], &self.airplanes[slot as usize].model);
-            Flyer {
-                pose: cell.pose(),
-                v_m_s: model.v_m_s,
-                omega_max_rad_s: model.omega_max_rad_s,
-                separation_m: model.separation_m,
-                altitude_m: self.airplanes[slot as usize].altitude_m,
-                vertical_m: self.vertical_m,
-                fallback: cell.side(),
-                // Whoever has waited longest goes first, then the smaller id.
-                rank: u64::from(cell.waiting.get()) << 32 | u64::from(!slot),
-            }
-        };
-        let flyers: Vec<Flyer> = group.iter().map(flyer).collect();
-        let decisions = filter(&flyers, candidates, self.timing.dtau_s);
+    fn shielded(
+        &self,
+        state: &AirspaceState,
+        (now, group): (Cycle, &[Slot]),
+        candidates: &[Vec<Way>],
+        contacts: &mut [Contacts],
+        scratch: &mut Scratch,
+    ) -> Vec<Way> {
+        let flyers: Vec<Flyer> = group.iter().map(|&slot| self.flyer(state, slot)).collect();
+        let (decisions, traffic) =
+            self.exchanged(&flyers, candidates, now, contacts, &mut scratch.events);
+        scratch.exchanged.add(traffic);
         let mut ways = Vec::with_capacity(group.len());
         for ((decision, &slot), (flyer, wishes)) in
             decisions.iter().zip(group).zip(flyers.iter().zip(candidates))
@@ -92,16 +90,38 @@ impl AirspaceWorld {
             ways.push(match decision.candidate {
                 Some(k) => {
                     cell.waiting.set(0);
+                    if k > 0 {
+                        let event = Event::of(now, EventKind::Override, slot);
+                        scratch.events.push(event.with(k as f64));
+                    }
                     wishes[k].clone()
                 }
                 None => {
                     cell.orbits.set(cell.orbits.get() + 1);
                     cell.waiting.set(cell.waiting.get() + 1);
+                    scratch.events.push(Event::of(now, EventKind::Orbit, slot));
                     self.orbit(flyer.fallback, flyer.omega_max_rad_s)
                 }
             });
         }
         ways
+    }
+
+    /// An airplane as the shield sees it.
+    fn flyer(&self, state: &AirspaceState, slot: Slot) -> Flyer {
+        let (cell, airplane) = (&state.airplanes[slot as usize], &self.airplanes[slot as usize]);
+        Flyer {
+            id: slot,
+            pose: cell.pose(),
+            v_m_s: airplane.model.v_m_s,
+            omega_max_rad_s: airplane.model.omega_max_rad_s,
+            separation_m: airplane.model.separation_m,
+            altitude_m: airplane.altitude_m,
+            vertical_m: self.vertical_m,
+            fallback: cell.side(),
+            // Whoever has waited longest goes first, then the smaller id.
+            rank: u64::from(cell.waiting.get()) << 32 | u64::from(!slot),
+        }
     }
 
     fn orbit(&self, side: Side, omega_max_rad_s: f64) -> Way {
@@ -143,6 +163,9 @@ impl AirspaceWorld {
             cell.next.set(flight.next as u32);
             if let Some(k) = flight.arrived {
                 cell.arrived.set(now * steps as u64 + k as u64);
+                let delay_s = self.airplane_metrics(state, flight.slot).delay_s();
+                let event = Event::of(now, EventKind::Arrival, flight.slot);
+                scratch.events.push(event.with(delay_s.unwrap_or(0.0)));
             }
         }
     }
@@ -175,7 +198,12 @@ impl AirspaceWorld {
                     let is_lost = apart_m < gap_m;
                     record.nearest_m = record.nearest_m.min(apart_m);
                     record.lost_looks += u64::from(is_lost);
-                    record.losses += u32::from(is_lost && !was_lost);
+                    if is_lost && !was_lost {
+                        record.losses += 1;
+                        let kind = EventKind::LossOfSeparation;
+                        let event = Event::of_pair(now, kind, a.slot, b.slot).with(apart_m);
+                        scratch.events.push(event);
+                    }
                     was_lost = is_lost;
                 }
                 scratch

@@ -1,7 +1,7 @@
 //! The text of an airspace scenario, and what it compiles to.
 
 use super::airplane::{Model, Passing, Point, Pose, Timing};
-use super::deploy::{Deployment, refuses};
+use super::deploy::{Deployment, Network, Silence, refuses};
 use super::generate::{Order as Wanted, generate};
 use super::objective::Objective;
 use super::shield::{Flyer, Side, first_fallbacks};
@@ -93,6 +93,7 @@ struct AirspaceSection {
     method: Method,
     shield: Option<Switch>,
     deployment: Deployment,
+    network: Option<Spanned<NetworkSection>>,
     generator: Option<Spanned<GeneratorSection>>,
     dt_s: Option<Spanned<f64>>,
     dtau_s: Option<Spanned<f64>>,
@@ -113,6 +114,18 @@ struct AirspaceSection {
     wind_m_s: Point,
     position_noise_m: f64,
     heading_noise_deg: f64,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct NetworkSection {
+    loss: f64,
+    duplication: f64,
+    latency_s: Option<f64>,
+    max_delay_s: f64,
+    patience_s: Option<f64>,
+    deadline_s: Option<f64>,
+    silent: Vec<Silence>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -155,13 +168,17 @@ struct AirplaneSection {
 pub struct RecordSection {
     /// A row per airplane and cycle.
     pub trajectories: bool,
+    /// A row per event, see [`super::events`].
+    pub events: bool,
+    /// A row per optimization.
+    pub optimizations: bool,
     /// Cycles between two checkpoints; 0 for none.
     pub checkpoint_every: u64,
 }
 
 impl Default for RecordSection {
     fn default() -> Self {
-        Self { trajectories: true, checkpoint_every: 1000 }
+        Self { trajectories: true, events: true, optimizations: true, checkpoint_every: 1000 }
     }
 }
 
@@ -203,7 +220,7 @@ impl Compiled {
             fallback,
         };
         let airplanes = self.world.airplanes.iter().zip(&self.fallbacks).map(record).collect();
-        Snapshot { cycle: 0, airplanes }
+        Snapshot { cycle: 0, airplanes, contacts: Vec::new() }
     }
 }
 
@@ -233,9 +250,11 @@ impl Compiler<'_> {
             let cause = format!("a wind of {wind} m/s, and airplanes of {slowest} m/s");
             return Err(self.error(None, cause, "give a wind that all airplanes can fly against"));
         }
-        let world = AirspaceWorld {
+        let network = self.network(&timing, airplanes.len())?;
+        let mut world = AirspaceWorld {
             airplanes,
             timing,
+            network,
             passing: Passing { tolerance_m, passes: true },
             objective: self.objective(vertical_m)?,
             settings: self.settings()?,
@@ -252,6 +271,7 @@ impl Compiler<'_> {
             streams,
             actions: Vec::new(),
             alone_s: Vec::new(),
+            first_fallbacks: Vec::new(),
         }
         .prepared();
         if let Some(reason) = refuses(world.deployment, &world.settings) {
@@ -264,6 +284,7 @@ impl Compiler<'_> {
             return Err(self.error(None, cause, "give smaller blocks or fewer rounds"));
         }
         let (fallbacks, too_close) = first(&world);
+        world.first_fallbacks.clone_from(&fallbacks);
         Ok(Compiled {
             world: Arc::new(world),
             name: self.file.name.clone(),
@@ -273,6 +294,55 @@ impl Compiler<'_> {
             fallbacks,
             too_close,
         })
+    }
+
+    fn network(&self, timing: &Timing, airplanes: usize) -> Result<Option<Network>, InputError> {
+        let Some(section) = &self.file.airspace.network else { return Ok(None) };
+        let at = || Some(section.span());
+        let s = section.get_ref();
+        if self.file.airspace.deployment == Deployment::Direct {
+            let cause = "a network, but one process decides for all (deployment = \"direct\")";
+            let remedy = "set deployment to team, compact-team, pim or hierarchical-pim, \
+                          or leave [airspace.network] out";
+            return Err(self.error(at(), cause, remedy));
+        }
+        let latency_s = s.latency_s.unwrap_or(0.001);
+        let network = Network {
+            loss: s.loss,
+            duplication: s.duplication,
+            latency_s,
+            max_delay_s: s.max_delay_s,
+            patience_s: s.patience_s.unwrap_or(3.0 * (latency_s + s.max_delay_s)),
+            deadline_s: s.deadline_s.unwrap_or(0.45 * timing.dt_s),
+            silences: s.silent.clone(),
+        };
+        let chances = [("loss", s.loss), ("duplication", s.duplication)];
+        if let Some((name, p)) = chances.iter().find(|(_, p)| !(0.0..1.0).contains(p)) {
+            let cause = format!("{name} = {p} is no probability below 1");
+            return Err(self.error(at(), cause, "give 0 or more and less than 1"));
+        }
+        let times = [latency_s, network.patience_s, network.deadline_s];
+        let sane = times.iter().all(|t| *t > 0.0 && t.is_finite()) && s.max_delay_s >= 0.0;
+        let fits =
+            2.0 * network.deadline_s <= timing.dt_s && network.patience_s < network.deadline_s;
+        if !(sane && fits && latency_s >= 1e-6 && s.max_delay_s.is_finite()) {
+            let cause = format!(
+                "latency_s = {latency_s}, max_delay_s = {}, patience_s = {}, deadline_s = {}",
+                s.max_delay_s, network.patience_s, network.deadline_s
+            );
+            let remedy = "give times above 0 (latency at least 1e-6, delay 0 or more), a patience \
+                          below the deadline, and a deadline of at most half of dt_s: it holds for \
+                          the optimization and again for the shield's exchange";
+            return Err(self.error(at(), cause, remedy));
+        }
+        if let Some(wrong) = s.silent.iter().find(|one| {
+            one.airplane as usize >= airplanes || one.from_s.is_nan() || one.until_s.is_nan()
+        }) {
+            let cause = format!("airplane {} is to be silent", wrong.airplane);
+            let remedy = format!("give ids from 0 to {} and times in seconds", airplanes - 1);
+            return Err(self.error(at(), cause, remedy));
+        }
+        Ok(Some(network))
     }
 
     fn is_paper(&self) -> bool {
@@ -493,6 +563,7 @@ fn first(world: &AirspaceWorld) -> (Vec<Side>, Vec<(u32, u32)>) {
         vertical_m: world.vertical_m,
         fallback: Side::Left,
         rank: i as u64,
+        id: i as u32,
     };
     let flyers: Vec<Flyer> = world.airplanes.iter().enumerate().map(flyer).collect();
     let (sides, pairs) = first_fallbacks(&flyers);

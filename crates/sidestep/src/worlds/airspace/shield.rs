@@ -38,7 +38,7 @@
 
 use super::airplane::{Point, Pose, distance_m};
 use serde::{Deserialize, Serialize};
-use sidestep_kernel::math;
+use sidestep_kernel::{EntityId, math};
 
 /// Metres that new plans keep beyond the separation.
 pub const SLACK_M: f64 = 0.01;
@@ -72,6 +72,9 @@ impl Side {
 /// What the shield knows of an airplane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Flyer {
+    /// Whose orbit this is. Where it is not sure on which of several an airplane is, it takes
+    /// part with each of them.
+    pub id: EntityId,
     /// Where it is.
     pub pose: Pose,
     /// Airspeed.
@@ -92,12 +95,13 @@ pub struct Flyer {
 
 impl Flyer {
     fn minds(&self, other: &Self) -> bool {
-        (self.altitude_m - other.altitude_m).abs() < self.vertical_m.max(other.vertical_m)
+        let apart_m = (self.altitude_m - other.altitude_m).abs();
+        self.id != other.id && apart_m < self.vertical_m.max(other.vertical_m)
     }
 }
 
 /// Motion for one `dt`: a turn rate per step of `dtau`.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Way {
     /// Turn rate in each step.
     pub omegas_rad_s: Vec<f64>,
@@ -105,7 +109,7 @@ pub struct Way {
 
 /// What an airplane flies, and where it can wait after that.
 #[derive(Debug, Clone, PartialEq)]
-struct Plan {
+pub(super) struct Plan {
     flyer: Flyer,
     /// Poses at the beginning of each step, and at the end.
     poses: Vec<Pose>,
@@ -217,12 +221,12 @@ fn halve(
 }
 
 impl Plan {
-    fn new(
-        flyer: Flyer,
-        omegas_rad_s: Vec<f64>,
-        dtau_s: f64,
-        orbit: (Option<usize>, Side),
-    ) -> Self {
+    /// A way, and then an orbit to a side.
+    pub(super) fn new(flyer: Flyer, way: &Way, dtau_s: f64, side: Side) -> Self {
+        Self::of(flyer, way.omegas_rad_s.clone(), dtau_s, (None, side))
+    }
+
+    fn of(flyer: Flyer, omegas_rad_s: Vec<f64>, dtau_s: f64, orbit: (Option<usize>, Side)) -> Self {
         let mut poses = vec![flyer.pose];
         for &omega in &omegas_rad_s {
             let last = poses[poses.len() - 1];
@@ -234,13 +238,24 @@ impl Plan {
         Self { flyer, poses, omegas_rad_s, dtau_s, orbit, candidate, side }
     }
 
-    fn fallback(flyer: Flyer, steps: usize, dtau_s: f64) -> Self {
+    /// The stored fallback, for some steps and ever after.
+    pub(super) fn fallback(flyer: Flyer, steps: usize, dtau_s: f64) -> Self {
         let omega = flyer.fallback.sign() * flyer.omega_max_rad_s;
-        Self::new(flyer, vec![omega; steps], dtau_s, (None, flyer.fallback))
+        Self::of(flyer, vec![omega; steps], dtau_s, (None, flyer.fallback))
+    }
+
+    /// Where `dt` ends.
+    pub(super) fn end(&self) -> Pose {
+        self.poses[self.poses.len() - 1]
+    }
+
+    /// The side of the orbit.
+    pub(super) fn side(&self) -> Side {
+        self.side
     }
 
     /// Whether two plans stay apart during `dt` and on the orbits ever after.
-    fn is_compatible(&self, other: &Self) -> bool {
+    pub(super) fn is_compatible(&self, other: &Self) -> bool {
         if !self.flyer.minds(&other.flyer) {
             return true;
         }
@@ -281,10 +296,26 @@ pub struct Decision {
     pub fallback: Side,
 }
 
+/// How sure it is that everybody will fly the plan it is given.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Certainty {
+    /// Everybody will.
+    Sure,
+    /// Each may fly its stored fallback instead: plans have to keep apart from those of others
+    /// too. They are compatible in whatever mixture they are flown.
+    Mixable,
+}
+
 /// Decides for airplanes whose stored fallbacks are pairwise apart. `candidates[i]` are the ways
-/// that airplane `i` may fly, the one it wants first; all have as many steps of `dtau_s`.
-pub fn filter(flyers: &[Flyer], candidates: &[Vec<Way>], dtau_s: f64) -> Vec<Decision> {
-    let mut search = Search::new(flyers, candidates, dtau_s);
+/// that airplane `i` may fly, the one it wants first, `steps` of `dtau_s` each; with none it
+/// stays on its fallback.
+pub fn filter(
+    flyers: &[Flyer],
+    candidates: &[Vec<Way>],
+    frame: (usize, f64),
+    certainty: Certainty,
+) -> Vec<Decision> {
+    let mut search = Search::new(flyers, candidates, frame, certainty);
     search.until_compatible();
     search.better_again();
     search.plans.iter().map(|p| Decision { candidate: p.candidate, fallback: p.side }).collect()
@@ -294,38 +325,50 @@ struct Search<'a> {
     flyers: &'a [Flyer],
     candidates: &'a [Vec<Way>],
     dtau_s: f64,
+    certainty: Certainty,
     plans: Vec<Plan>,
+    fallbacks: Vec<Plan>,
     /// Airplanes by rising rank.
     by_rank: Vec<usize>,
 }
 
 impl<'a> Search<'a> {
-    fn new(flyers: &'a [Flyer], candidates: &'a [Vec<Way>], dtau_s: f64) -> Self {
-        let first = |(flyer, ways): (&Flyer, &Vec<Way>)| match ways.first() {
+    fn new(
+        flyers: &'a [Flyer],
+        candidates: &'a [Vec<Way>],
+        (steps, dtau_s): (usize, f64),
+        certainty: Certainty,
+    ) -> Self {
+        let fallbacks: Vec<Plan> =
+            flyers.iter().map(|flyer| Plan::fallback(*flyer, steps, dtau_s)).collect();
+        let first = |((flyer, ways), fallback): ((&Flyer, &Vec<Way>), &Plan)| match ways.first() {
             Some(way) => {
-                Plan::new(*flyer, way.omegas_rad_s.clone(), dtau_s, (Some(0), flyer.fallback))
+                Plan::of(*flyer, way.omegas_rad_s.clone(), dtau_s, (Some(0), flyer.fallback))
             }
-            None => Plan::fallback(*flyer, 1, dtau_s),
+            None => fallback.clone(),
         };
-        let plans = flyers.iter().zip(candidates).map(first).collect();
+        let plans = flyers.iter().zip(candidates).zip(&fallbacks).map(first).collect();
         let mut by_rank: Vec<usize> = (0..flyers.len()).collect();
         by_rank.sort_unstable_by_key(|&i| flyers[i].rank);
-        Self { flyers, candidates, dtau_s, plans, by_rank }
+        Self { flyers, candidates, dtau_s, certainty, plans, fallbacks, by_rank }
+    }
+
+    /// Whether a plan of airplane `i` goes with what `j` may fly.
+    fn fits(&self, i: usize, plan: &Plan, j: usize) -> bool {
+        plan.is_compatible(&self.plans[j])
+            && (self.certainty == Certainty::Sure
+                || (plan.is_compatible(&self.fallbacks[j])
+                    && self.fallbacks[i].is_compatible(&self.plans[j])))
     }
 
     fn until_compatible(&mut self) {
         let mut pairs = self.incompatible_pairs();
         while let Some(loser) = self.loser(&pairs) {
             let other = self.another_plan(loser);
-            self.plans[loser] = other.unwrap_or_else(|| self.fallback_of(loser));
+            self.plans[loser] = other.unwrap_or_else(|| self.fallbacks[loser].clone());
             pairs.retain(|&(i, j)| i != loser && j != loser);
             pairs.extend(self.incompatible_with(loser));
         }
-    }
-
-    fn fallback_of(&self, i: usize) -> Plan {
-        let steps = self.candidates[i].first().map_or(1, |way| way.omegas_rad_s.len());
-        Plan::fallback(self.flyers[i], steps, self.dtau_s)
     }
 
     /// The airplane of lowest rank that has to give way in some pair.
@@ -345,25 +388,23 @@ impl<'a> Search<'a> {
     fn incompatible_pairs(&self) -> Vec<(usize, usize)> {
         let n = self.plans.len();
         let all = (0..n).flat_map(|i| (i + 1..n).map(move |j| (i, j)));
-        all.filter(|&(i, j)| !self.plans[i].is_compatible(&self.plans[j])).collect()
+        all.filter(|&(i, j)| !self.fits(i, &self.plans[i], j)).collect()
     }
 
     fn incompatible_with(&self, i: usize) -> Vec<(usize, usize)> {
         let others = (0..self.plans.len()).filter(|&j| j != i);
-        others.filter(|&j| !self.plans[i].is_compatible(&self.plans[j])).map(|j| (i, j)).collect()
+        others.filter(|&j| !self.fits(i, &self.plans[i], j)).map(|j| (i, j)).collect()
     }
 
     /// The first plan of an airplane that is compatible with all present ones.
     fn another_plan(&self, i: usize) -> Option<Plan> {
         let flyer = self.flyers[i];
         let others: Vec<usize> = (0..self.plans.len()).filter(|&j| j != i).collect();
-        let fits = |plan: &Plan| others.iter().all(|&j| plan.is_compatible(&self.plans[j]));
+        let fits = |plan: &Plan| others.iter().all(|&j| self.fits(i, plan, j));
         self.candidates[i].iter().enumerate().find_map(|(k, way)| {
             Side::BOTH
                 .into_iter()
-                .map(|side| {
-                    Plan::new(flyer, way.omegas_rad_s.clone(), self.dtau_s, (Some(k), side))
-                })
+                .map(|side| Plan::of(flyer, way.omegas_rad_s.clone(), self.dtau_s, (Some(k), side)))
                 .find(|plan| fits(plan))
         })
     }
@@ -454,6 +495,7 @@ mod tests {
 
     fn flyer(x: f64, y: f64, psi_rad: f64, rank: u64) -> Flyer {
         Flyer {
+            id: rank as u32,
             pose: Pose { at: [x, y], psi_rad },
             v_m_s: 35.0,
             omega_max_rad_s: 4f64.to_radians(),
@@ -552,26 +594,28 @@ mod tests {
         }
 
         /// Steps 2 to 4: whatever is wanted, what is flown keeps apart, and what is stored
-        /// keeps the invariant.
+        /// keeps the invariant. Mixable plans do in every mixture with fallbacks.
         #[test]
         fn a_filtered_step_keeps_separation_and_the_invariant(
             flyers in some_flyers(),
             wishes in prop::collection::vec(prop::collection::vec(-1.0f64..1.0, 0..4), 9),
+            follow in prop::collection::vec(any::<bool>(), 9),
+            mixable in any::<bool>(),
         ) {
             let flyers = with_fallbacks(flyers);
             let candidates: Vec<Vec<Way>> = flyers.iter().zip(&wishes).map(|(f, wishes)| {
                 let way = |part: &f64| Way { omegas_rad_s: vec![part * f.omega_max_rad_s; STEPS] };
                 wishes.iter().map(way).collect()
             }).collect();
-            // An airplane without candidates falls back with as many steps as the others.
-            let candidates: Vec<Vec<Way>> = candidates.into_iter().zip(&flyers).map(|(ways, f)| {
-                if ways.is_empty() {
-                    vec![Way { omegas_rad_s: vec![f.fallback.sign() * f.omega_max_rad_s; STEPS] }]
-                } else {
-                    ways
+            let certainty = if mixable { Certainty::Mixable } else { Certainty::Sure };
+            let mut decisions = filter(&flyers, &candidates, (STEPS, DTAU_S), certainty);
+            if mixable {
+                for ((decision, follows), flyer) in decisions.iter_mut().zip(follow).zip(&flyers) {
+                    if !follows {
+                        *decision = Decision { candidate: None, fallback: flyer.fallback };
+                    }
                 }
-            }).collect();
-            let decisions = filter(&flyers, &candidates, DTAU_S);
+            }
             let omega = |i: usize, k: usize| match decisions[i].candidate {
                 Some(c) => candidates[i][c].omegas_rad_s[k],
                 None => flyers[i].fallback.sign() * flyers[i].omega_max_rad_s,
@@ -601,7 +645,8 @@ mod tests {
         fn nobody_falls_back_without_need(x in 20_000.0f64..1e6, part in -1.0f64..1.0) {
             let flyers = [flyer(0.0, 0.0, 0.0, 0), flyer(x, 0.0, 3.0, 1)];
             let way = || Way { omegas_rad_s: vec![part * flyers[0].omega_max_rad_s; STEPS] };
-            let decisions = filter(&flyers, &[vec![way()], vec![way()]], DTAU_S);
+            let wishes = [vec![way()], vec![way()]];
+            let decisions = filter(&flyers, &wishes, (STEPS, DTAU_S), Certainty::Sure);
             prop_assert!(decisions.iter().all(|d| d.candidate == Some(0)));
         }
     }

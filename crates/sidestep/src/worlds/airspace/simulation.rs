@@ -1,6 +1,9 @@
 //! A run of an airspace: the compiled world, the state, the engine, and what is recorded.
 
+use super::Optimization;
+use super::events::Event;
 use super::metrics::{Ledger, Metrics};
+use super::rows::{Rows, Table};
 use super::scenario::Compiled;
 use super::state::{AirspaceState, Snapshot};
 use super::world::AirspaceWorld;
@@ -8,14 +11,9 @@ use crate::scenario::Source;
 use sidestep_kernel::checkpoint::{self, CheckpointError, Header};
 use sidestep_kernel::cycle::PhaseTimes;
 use sidestep_kernel::engine::Engine;
-use sidestep_kernel::ports::{
-    ColumnSpec, ColumnType, RecordError, Recorder, SystemClock, TableSchema, Values,
-};
+use sidestep_kernel::ports::{RecordError, Recorder, SystemClock, TableSchema};
 use sidestep_kernel::{Cycle, Digest, InputError, Simulation};
 use std::sync::Arc;
-
-/// Rows kept at most before they must be recorded.
-const MAX_ROWS: usize = 1 << 20;
 
 /// A run of an airspace.
 #[derive(Debug)]
@@ -28,17 +26,8 @@ pub struct AirspaceSimulation {
     ledger: Ledger,
     decide_ns: u64,
     clock: SystemClock,
-    /// Poses to be recorded, one row each; `None` without recording.
-    rows: Option<Rows>,
-}
-
-#[derive(Debug, Default)]
-struct Rows {
-    cycle: Vec<u64>,
-    airplane: Vec<u32>,
-    x_m: Vec<f64>,
-    y_m: Vec<f64>,
-    heading_rad: Vec<f64>,
+    /// What is to be recorded; nothing without recording.
+    rows: Rows,
 }
 
 impl AirspaceSimulation {
@@ -64,7 +53,7 @@ impl AirspaceSimulation {
             ledger: Ledger::default(),
             decide_ns: 0,
             clock: SystemClock::default(),
-            rows: None,
+            rows: Rows::default(),
         }
     }
 
@@ -85,9 +74,10 @@ impl AirspaceSimulation {
 
     /// From now on keeps what [`Simulation::record`] hands over.
     pub fn begin_recording(&mut self) {
-        if self.compiled.record.trajectories {
-            self.rows = Some(Rows::default());
-        }
+        let record = &self.compiled.record;
+        let asked = [record.trajectories, record.events, record.optimizations];
+        self.rows
+            .begin(Table::ALL.into_iter().zip(asked).filter(|(_, asked)| *asked).map(|(t, _)| t));
     }
 
     /// Uses all workers even where one would be faster; for tests and benchmarks.
@@ -135,34 +125,38 @@ impl AirspaceSimulation {
         }
     }
 
-    /// Whether rows must be recorded before more can be kept.
-    fn is_full(&self) -> bool {
-        self.rows.as_ref().is_some_and(|rows| rows.cycle.len() >= MAX_ROWS)
-    }
-
-    fn keep_rows(&mut self) {
-        let Some(rows) = &mut self.rows else { return };
-        for (id, cell) in (0..)
-            .zip(&self.state.airplanes)
-            .filter(|(id, _)| self.state.is_there(&self.compiled.world, *id, self.cycle))
-        {
-            let pose = cell.pose();
-            rows.cycle.push(self.cycle);
-            rows.airplane.push(id);
-            rows.x_m.push(pose.at[0]);
-            rows.y_m.push(pose.at[1]);
-            rows.heading_rad.push(pose.psi_rad);
+    fn keep_poses(&mut self) {
+        let (state, world) = (&self.state, &self.compiled.world);
+        for (id, cell) in (0..).zip(&state.airplanes) {
+            if state.is_there(world, id, self.cycle) {
+                self.rows.pose(self.cycle, id, cell.pose());
+            }
         }
     }
 
+    /// Takes over what the workers have gathered in a cycle, in an order that does not depend on
+    /// who has gathered what.
     fn gather(&mut self) {
+        let (mut events, mut optimizations) = (Vec::new(), Vec::new());
         for mate in self.engine.crew_mut() {
             let scratch = &mut mate.scratch;
             for (pair, record) in std::mem::take(&mut scratch.pairs) {
                 self.ledger.add_pair(pair, record);
             }
-            self.ledger.effort.add(std::mem::take(&mut scratch.effort));
+            events.append(&mut scratch.events);
+            optimizations.append(&mut scratch.optimizations);
+            self.ledger.effort.traffic.add(std::mem::take(&mut scratch.exchanged));
             self.decide_ns += std::mem::take(&mut scratch.decide_ns);
+        }
+        events.sort_unstable_by_key(Event::key);
+        optimizations.sort_unstable_by_key(|one: &Optimization| (one.cycle, one.airplane));
+        for event in events {
+            self.ledger.add_event(&event);
+            self.rows.event(event);
+        }
+        for optimization in optimizations {
+            self.ledger.effort.add(&optimization);
+            self.rows.optimization(optimization);
         }
     }
 }
@@ -184,14 +178,14 @@ impl Simulation for AirspaceSimulation {
         // One by one: poses are kept at the start of each cycle, and a run may be over after
         // any. A cycle of airplanes costs far more than that.
         let mut done = 0;
-        while done < cycles && (done == 0 || !self.is_over()) && !self.is_full() {
-            self.keep_rows();
+        while done < cycles && (done == 0 || !self.is_over()) && !self.rows.is_full() {
+            self.keep_poses();
             let span = (self.cycle, 1);
             self.engine.advance(&*self.compiled.world, &mut self.state, span, &self.clock);
             self.cycle += 1;
             done += 1;
+            self.gather();
         }
-        self.gather();
         done
     }
 
@@ -208,38 +202,11 @@ impl Simulation for AirspaceSimulation {
     }
 
     fn schemas(&self) -> Vec<TableSchema> {
-        if self.rows.is_none() {
-            return Vec::new();
-        }
-        let column = |name: &str, ty, meaning: &str| ColumnSpec {
-            name: name.into(),
-            ty,
-            meaning: meaning.into(),
-            labels: Vec::new(),
-        };
-        vec![TableSchema {
-            name: "trajectories".into(),
-            columns: vec![
-                column("cycle", ColumnType::U64, "cycle of dt at whose start this holds"),
-                column("airplane", ColumnType::U32, "entity id"),
-                column("x_m", ColumnType::F64, "position east"),
-                column("y_m", ColumnType::F64, "position north"),
-                column("heading_rad", ColumnType::F64, "heading, counter-clockwise from east"),
-            ],
-        }]
+        self.rows.schemas()
     }
 
     fn record(&mut self, recorder: &mut dyn Recorder) -> Result<(), RecordError> {
-        let Some(rows) = &mut self.rows else { return Ok(()) };
-        let Rows { cycle, airplane, x_m, y_m, heading_rad } = std::mem::take(rows);
-        let block = [
-            Values::U64(cycle),
-            Values::U32(airplane),
-            Values::F64(x_m),
-            Values::F64(y_m),
-            Values::F64(heading_rad),
-        ];
-        recorder.append(0, &block)
+        self.rows.record(recorder)
     }
 
     fn metrics(&self) -> serde_json::Value {

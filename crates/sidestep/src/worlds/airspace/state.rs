@@ -1,6 +1,7 @@
 //! All that changes in a run, and its snapshot.
 
 use super::airplane::{Point, Pose, distance_m};
+use super::deploy::contact::Contacts;
 use super::shield::Side;
 use super::world::AirspaceWorld;
 use serde::{Deserialize, Serialize};
@@ -8,6 +9,7 @@ use sidestep_kernel::column::Shared;
 use sidestep_kernel::digest::Hasher;
 use sidestep_kernel::{Column, Cycle, Digest, Slot};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::sync::{Mutex, PoisonError};
 
 /// Not arrived yet.
 pub const FLYING: u64 = u64::MAX;
@@ -19,6 +21,8 @@ pub struct AirspaceState {
     /// What changes of each airplane.
     pub airplanes: Box<[Cell]>,
     pub(super) neighborhood: Neighborhood,
+    /// What each airplane knows of others; nothing where the network can be relied on.
+    contacts: Box<[Mutex<Contacts>]>,
 }
 
 /// One airplane's share of the state.
@@ -128,6 +132,10 @@ impl Neighborhood {
     }
 }
 
+fn held(contacts: &Mutex<Contacts>) -> std::sync::MutexGuard<'_, Contacts> {
+    contacts.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 /// One airplane in a snapshot.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct AirplaneRecord {
@@ -169,6 +177,8 @@ pub struct Snapshot {
     pub cycle: Cycle,
     /// The airplanes by id.
     pub airplanes: Vec<AirplaneRecord>,
+    /// What each knows of others; empty where the network can be relied on.
+    pub contacts: Vec<Contacts>,
 }
 
 impl AirspaceState {
@@ -188,7 +198,29 @@ impl AirspaceState {
             cell.waiting.set(waiting);
             cell.set_side(record.fallback);
         }
-        Self { airplanes, neighborhood: Neighborhood::new(n, farthest) }
+        let contacts = match world.network {
+            Some(_) => (0..n).map(|i| snapshot.contacts.get(i).cloned()).collect(),
+            None => Vec::new(),
+        };
+        let contacts = contacts.into_iter().map(|c| Mutex::new(c.unwrap_or_default())).collect();
+        Self { airplanes, neighborhood: Neighborhood::new(n, farthest), contacts }
+    }
+
+    /// Takes out what the airplanes of a group know of others. Groups share no airplane, so
+    /// nobody else asks for the same.
+    pub(super) fn take_contacts(&self, group: &[Slot]) -> Vec<Contacts> {
+        let take =
+            |&slot: &Slot| self.contacts.get(slot as usize).map(|c| std::mem::take(&mut *held(c)));
+        group.iter().map(|slot| take(slot).unwrap_or_default()).collect()
+    }
+
+    /// Puts it back.
+    pub(super) fn put_contacts(&self, group: &[Slot], known: Vec<Contacts>) {
+        for (&slot, known) in group.iter().zip(known) {
+            if let Some(contacts) = self.contacts.get(slot as usize) {
+                *held(contacts) = known;
+            }
+        }
     }
 
     /// The state after `cycle` cycles.
@@ -199,7 +231,8 @@ impl AirspaceState {
             counts: [cell.next.get(), cell.overrides.get(), cell.orbits.get(), cell.waiting.get()],
             fallback: cell.side(),
         };
-        Snapshot { cycle, airplanes: self.airplanes.iter().map(record).collect() }
+        let contacts = self.contacts.iter().map(|contacts| held(contacts).clone()).collect();
+        Snapshot { cycle, airplanes: self.airplanes.iter().map(record).collect(), contacts }
     }
 
     /// Whether an airplane is there in a cycle: it has appeared and has not arrived.
@@ -226,6 +259,10 @@ impl Snapshot {
             hasher.u64(airplane.arrived);
             airplane.counts.iter().for_each(|&n| hasher.u32(n));
             hasher.u8(airplane.fallback as u8);
+        }
+        if !self.contacts.is_empty() {
+            let known = postcard::to_stdvec(&self.contacts).expect("contacts are plain data");
+            known.iter().for_each(|&byte| hasher.u8(byte));
         }
         hasher.finish()
     }

@@ -1,8 +1,9 @@
 //! A compiled airspace: everything that never changes during a run.
 
 use super::airplane::{Action, After, Model, Passing, Pilot, Point, Pose, Timing, actions};
-use super::deploy::Deployment;
+use super::deploy::{Deployment, Network};
 use super::objective::Objective;
+use super::shield::Side;
 use crate::collectives::Settings;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::stream::Streams;
@@ -20,6 +21,8 @@ pub mod purpose {
     pub const POSITION: Purpose = Purpose(3);
     /// Disturbed headings.
     pub const HEADING: Purpose = Purpose(4);
+    /// What happens to messages.
+    pub const NETWORK: Purpose = Purpose(5);
 }
 
 /// How airplanes choose what to do.
@@ -95,6 +98,8 @@ pub struct AirspaceWorld {
     pub method: Method,
     /// Where the optimizer runs.
     pub deployment: Deployment,
+    /// What its messages go over, if that is not to be relied on.
+    pub network: Option<Network>,
     /// Whether the shield filters decisions.
     pub shield: bool,
     /// Airplanes at least this far above each other do not mind each other.
@@ -108,6 +113,8 @@ pub struct AirspaceWorld {
     pub(super) actions: Vec<Vec<Action>>,
     /// Seconds that each airplane would need alone.
     pub(super) alone_s: Vec<f64>,
+    /// Sides of the first fallbacks.
+    pub(super) first_fallbacks: Vec<Side>,
 }
 
 /// A flight alone that takes longer than this many steps is not expected to end.

@@ -1,10 +1,12 @@
 //! Agents that first tell each other all they may do, and then only what they make of it:
 //! samples' numbers, or distributions.
 
-use super::super::airplane::{Point, Pose, Prediction};
+use super::super::airplane::{Point, Prediction};
 use super::super::decide::Known;
 use super::super::objective::{Options, couple, own_costs};
-use super::{Decided, Own, network};
+use super::contact::Beacon;
+use super::link;
+use super::{Came, Decided, Own};
 use crate::collectives::{Estimator, Game, Order, PairwiseGame, Player};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -12,14 +14,58 @@ use std::collections::BTreeMap;
 /// What agents tell each other.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) enum Message {
-    /// The ways of all the sender's actions, and its separation.
-    Ways { ways: Vec<Prediction>, separation_m: f64, altitude_m: f64 },
+    /// The ways of all the sender's actions.
+    Ways { beacon: Beacon, ways: Vec<Prediction> },
     /// From which the others predict its ways themselves.
-    Model { pose: Pose, next: u32, mission: Vec<Point>, airplane: u32 },
+    Model { beacon: Beacon, next: u32, mission: Vec<Point>, airplane: u32 },
     /// The numbers of the round's samples, and how far the sender has moved in the round before.
     Samples { round: u32, change: f64, samples: Vec<u16> },
     /// The sender's distribution after a round, and how far it has moved in it.
     Distribution { round: u32, change: f64, q: Vec<f64> },
+}
+
+/// A member of the group, as an agent knows it.
+#[derive(Debug, Default)]
+struct Member {
+    beacon: Option<Beacon>,
+    options: Option<Options>,
+    /// Distributions after each round; round 0 is the beginning.
+    q: BTreeMap<u32, Vec<f64>>,
+    samples: BTreeMap<u32, Vec<usize>>,
+    changes: BTreeMap<u32, f64>,
+    /// Nothing more comes of it: its last word holds for all later rounds.
+    gone: bool,
+}
+
+impl Member {
+    /// What holds in a round, if that is known.
+    fn at<'a, T>(&self, of_rounds: &'a BTreeMap<u32, T>, round: u32) -> Option<&'a T> {
+        match of_rounds.get(&round) {
+            None if self.gone => of_rounds.range(..round).next_back().map(|(_, value)| value),
+            known => known,
+        }
+    }
+
+    fn q(&self, round: u32) -> Option<&Vec<f64>> {
+        self.at(&self.q, round)
+    }
+
+    fn samples(&self, round: u32) -> Option<&Vec<usize>> {
+        self.at(&self.samples, round)
+    }
+
+    /// How far it has moved in a round.
+    fn change(&self, round: u32) -> f64 {
+        self.changes.get(&round).copied().unwrap_or(0.0)
+    }
+
+    fn forget_before(&mut self, round: u32) {
+        if !self.gone {
+            self.q.retain(|r, _| *r >= round);
+            self.samples.retain(|r, _| *r >= round);
+            self.changes.retain(|r, _| *r >= round);
+        }
+    }
 }
 
 /// One agent.
@@ -27,198 +73,202 @@ pub(super) enum Message {
 pub(super) struct Agent<'a> {
     own: Own<'a>,
     by_model: bool,
-    options: BTreeMap<usize, Options>,
+    members: Vec<Member>,
     game: Option<PairwiseGame>,
     player: Player,
+    /// Rounds made.
     round: u32,
     calm: u32,
-    change: f64,
-    /// Distributions after each round, by round and agent; round 0 is the beginning.
-    q: BTreeMap<(u32, usize), Vec<f64>>,
-    samples: BTreeMap<(u32, usize), Vec<usize>>,
-    changes: BTreeMap<(u32, usize), f64>,
-    decided: Option<Decided>,
+    decided: Option<Came>,
 }
 
 impl<'a> Agent<'a> {
     pub(super) fn new(own: Own<'a>, by_model: bool) -> Self {
+        let mut members: Vec<Member> = (0..own.group.len()).map(|_| Member::default()).collect();
+        members[own.me].options = Some(own.options.clone());
         let player = Player::new(own.options.predictions.len());
-        let options = BTreeMap::from([(own.me, own.options.clone())]);
-        Self {
-            own,
-            by_model,
-            options,
-            game: None,
-            player,
-            round: 0,
-            calm: 0,
-            change: f64::INFINITY,
-            q: BTreeMap::new(),
-            samples: BTreeMap::new(),
-            changes: BTreeMap::new(),
-            decided: None,
-        }
+        Self { own, by_model, members, game: None, player, round: 0, calm: 0, decided: None }
     }
 
     fn announcement(&self) -> Message {
+        let beacon = self.own.beacon();
         if !self.by_model {
-            let Options { predictions, separation_m, altitude_m, .. } = self.own.options.clone();
-            return Message::Ways { ways: predictions, separation_m, altitude_m };
+            return Message::Ways { beacon, ways: self.own.options.predictions.clone() };
         }
-        let Known { slot, pose, next } = self.own.known;
+        let Known { slot, next, .. } = self.own.known;
         let mission = self.own.airplane().mission.clone();
-        Message::Model { pose, next: next as u32, mission, airplane: slot }
+        Message::Model { beacon, next: next as u32, mission, airplane: slot }
+    }
+
+    fn is_exact(&self) -> bool {
+        self.own.settings().estimator == Estimator::Exact
     }
 
     /// Goes on as far as what has been heard allows.
     fn go_on(&mut self) -> Vec<Message> {
+        let mut said = Vec::new();
         if self.game.is_none() {
-            if self.options.len() < self.own.group {
-                return Vec::new();
-            }
-            self.meet();
-            if let Estimator::Sampled { block, .. } = self.own.settings().estimator {
-                let mut said = vec![self.draw(block)];
-                said.extend(self.sampled_rounds(block));
+            if self.members.iter().any(|m| m.options.is_none()) {
                 return said;
             }
+            self.meet();
         }
-        match self.own.settings().estimator {
-            Estimator::Exact => self.exact_rounds(),
-            Estimator::Sampled { block, .. } => self.sampled_rounds(block),
+        while self.decided.is_none() && self.awaits_in_round().is_empty() {
+            said.extend(if self.is_exact() { self.exact_step() } else { self.sampled_step() });
         }
+        said
     }
 
     /// Everybody's options are known: the game, and the distributions at the beginning.
     fn meet(&mut self) {
         let objective = &self.own.world.objective;
-        let all: Vec<&Options> = self.options.values().collect();
+        let all: Vec<&Options> = self.members.iter().filter_map(|m| m.options.as_ref()).collect();
         let mut game = PairwiseGame::new(all.iter().map(|o| own_costs(objective, o)).collect());
-        let exact = self.own.settings().estimator == Estimator::Exact;
         for i in 0..all.len() {
             for j in i + 1..all.len() {
                 // An exact player needs only its own pairs.
-                if !exact || i == self.own.me || j == self.own.me {
+                if !self.is_exact() || i == self.own.me || j == self.own.me {
                     couple(&mut game, objective, (i, all[i]), (j, all[j]));
                 }
             }
         }
-        for (j, options) in all.iter().enumerate() {
-            let n = options.predictions.len();
-            self.q.insert((0, j), vec![1.0 / n as f64; n]);
+        for member in &mut self.members {
+            let n = member.options.as_ref().map_or(1, |options| options.predictions.len());
+            member.q.insert(0, vec![1.0 / n as f64; n]);
+            if member.gone {
+                member.samples.insert(0, Vec::new());
+            }
         }
         self.game = Some(game);
     }
 
-    /// Rounds are numbered from 1 here: round `r` updates to the distributions `q_r`.
-    fn exact_rounds(&mut self) -> Vec<Message> {
-        let mut said = Vec::new();
-        while self.decided.is_none() {
-            let (me, round) = (self.own.me, self.round + 1);
-            if !self.q.contains_key(&(round, me)) {
-                let sequence = self.own.settings().order == Order::Sequence;
-                let seen: Vec<_> = (0..self.own.group)
-                    .map(|j| if sequence && j < me { (round, j) } else { (round - 1, j) })
-                    .collect();
-                if !seen.iter().all(|key| self.q.contains_key(key)) {
-                    break;
-                }
-                said.push(self.exact_round(round, &seen));
-            }
-            if !(0..self.own.group).all(|j| self.q.contains_key(&(round, j))) {
-                break;
-            }
-            let most = (0..self.own.group).map(|j| self.changes[&(round, j)]).fold(0.0, f64::max);
-            self.end_round(most, round);
-        }
-        said
+    /// Whose word is missing for the next step. With exact expectations round `r` leads to the
+    /// distributions `q_r`, and steps are one's own update and everybody's; samples are those of
+    /// the round after `round` rounds.
+    fn awaits_in_round(&self) -> Vec<usize> {
+        let (me, sequence) = (self.own.me, self.own.settings().order == Order::Sequence);
+        let (round, all) = (self.round, self.members.iter().enumerate());
+        let has_drawn = self.members[me].samples.contains_key(&round);
+        let missing = |(j, member): (usize, &Member)| match (self.is_exact(), self.has_moved()) {
+            (false, _) => has_drawn && member.samples(round).is_none(),
+            (true, true) => member.q(round + 1).is_none(),
+            (true, false) => member.q(if sequence && j < me { round + 1 } else { round }).is_none(),
+        };
+        all.filter(|(j, member)| missing((*j, member))).map(|(j, _)| j).collect()
     }
 
-    fn exact_round(&mut self, round: u32, seen: &[(u32, usize)]) -> Message {
+    /// Whether its own update of this round is made.
+    fn has_moved(&self) -> bool {
+        self.members[self.own.me].q.contains_key(&(self.round + 1))
+    }
+
+    fn exact_step(&mut self) -> Option<Message> {
+        let round = self.round + 1;
+        if !self.has_moved() {
+            return Some(self.exact_update(round));
+        }
+        let most = self.members.iter().map(|m| m.change(round)).fold(0.0, f64::max);
+        let stop = self.own.settings().stop;
+        self.calm = stop.calm(self.calm, most);
+        self.round = round;
+        self.members.iter_mut().for_each(|m| m.forget_before(round));
+        if self.calm >= stop.calm_rounds || round >= stop.max_rounds {
+            self.decide();
+        }
+        None
+    }
+
+    fn exact_update(&mut self, round: u32) -> Message {
         let (me, settings) = (self.own.me, *self.own.settings());
-        let q: Vec<Vec<f64>> = seen.iter().map(|key| self.q[key].clone()).collect();
+        let sequence = settings.order == Order::Sequence;
+        let seen = |(j, member): (usize, &Member)| {
+            member.q(if sequence && j < me { round } else { round - 1 }).cloned()
+        };
+        let q: Vec<Vec<f64>> = self.members.iter().enumerate().filter_map(seen).collect();
         if let Some(game) = &self.game {
             self.player.know(|expected| game.expect(me, &q, expected));
         }
         let change = self.player.update(settings.update, settings.cooling);
         let q = self.player.q.clone();
-        self.q.insert((round, me), q.clone());
-        self.changes.insert((round, me), change);
+        self.members[me].q.insert(round, q.clone());
+        self.members[me].changes.insert(round, change);
         Message::Distribution { round, change, q }
     }
 
-    fn draw(&mut self, block: usize) -> Message {
-        let drawn = u64::from(self.round) * block as u64;
-        let samples = self.own.samples(&self.player, drawn, block);
-        self.samples.insert((self.round, self.own.me), samples.clone());
-        self.changes.insert((self.round, self.own.me), self.change);
-        let samples = samples.iter().map(|&x| x as u16).collect();
-        Message::Samples { round: self.round, change: self.change, samples }
-    }
-
-    fn sampled_rounds(&mut self, block: usize) -> Vec<Message> {
-        let mut said = Vec::new();
-        let everybody = 0..self.own.group;
-        while self.decided.is_none() {
-            let round = self.round;
-            if !everybody.clone().all(|j| self.samples.contains_key(&(round, j))) {
-                break;
-            }
-            if round > 0 {
-                let moved = everybody.clone().map(|j| self.changes[&(round, j)]);
-                let most = moved.fold(0.0, f64::max);
-                let stop = self.own.settings().stop;
-                self.calm = stop.calm(self.calm, most);
-                if self.calm >= stop.calm_rounds || round >= stop.max_rounds {
-                    self.decide(u64::from(round) * block as u64);
-                    break;
-                }
-            }
-            self.learn(block);
-            self.round += 1;
-            said.push(self.draw(block));
+    /// Draws, if it has not; else learns from what all have drawn.
+    fn sampled_step(&mut self) -> Option<Message> {
+        let Estimator::Sampled { block, ageing } = self.own.settings().estimator else {
+            return None;
+        };
+        let (me, round) = (self.own.me, self.round);
+        if !self.members[me].samples.contains_key(&round) {
+            return Some(self.draw(block));
         }
-        said
+        if round > 0 {
+            let most = self.members.iter().map(|m| m.change(round)).fold(0.0, f64::max);
+            let stop = self.own.settings().stop;
+            self.calm = stop.calm(self.calm, most);
+            if self.calm >= stop.calm_rounds || round >= stop.max_rounds {
+                self.decide();
+                return None;
+            }
+        }
+        let change = self.learn(block, ageing);
+        self.round += 1;
+        self.members[me].changes.insert(self.round, change);
+        self.members.iter_mut().for_each(|m| m.forget_before(round));
+        Some(self.draw(block))
     }
 
-    fn learn(&mut self, block: usize) {
-        let Estimator::Sampled { ageing, .. } = self.own.settings().estimator else { return };
-        let Some(game) = &self.game else { return };
-        let of = |j: usize| &self.samples[&(self.round, j)];
+    fn draw(&mut self, block: usize) -> Message {
+        let (me, round) = (self.own.me, self.round);
+        let samples = self.own.samples(&self.player, u64::from(round) * block as u64, block);
+        let change = *self.members[me].changes.entry(round).or_insert(f64::INFINITY);
+        self.members[me].samples.insert(round, samples.clone());
+        Message::Samples { round, change, samples: samples.iter().map(|&x| x as u16).collect() }
+    }
+
+    fn learn(&mut self, block: usize, ageing: f64) -> f64 {
+        let Some(game) = &self.game else { return 0.0 };
+        let of = |m: &Member, k: usize| {
+            // One that is only presumed has nothing to choose from.
+            m.samples(self.round).and_then(|all| all.get(k)).copied().unwrap_or(0)
+        };
         let cost = |k: usize| {
-            let joint: Vec<usize> = (0..self.own.group).map(|j| of(j)[k]).collect();
+            let joint: Vec<usize> = self.members.iter().map(|m| of(m, k)).collect();
             game.cost(&joint)
         };
         let costs: Vec<f64> = (0..block).map(cost).collect();
-        let own = of(self.own.me).clone();
+        let own: Vec<usize> = (0..block).map(|k| of(&self.members[self.own.me], k)).collect();
         self.player.learn(&own, &costs, ageing);
         let settings = *self.own.settings();
-        self.change = self.player.update(settings.update, settings.cooling);
+        self.player.update(settings.update, settings.cooling)
     }
 
-    fn end_round(&mut self, most: f64, round: u32) {
-        let stop = self.own.settings().stop;
-        self.calm = stop.calm(self.calm, most);
-        self.round = round;
-        self.q.retain(|(r, _), _| *r >= round);
-        if self.calm >= stop.calm_rounds || round >= stop.max_rounds {
-            self.decide(0);
-        }
-    }
-
-    fn decide(&mut self, drawn: u64) {
+    fn decide(&mut self) {
         let settings = self.own.settings();
-        self.decided = Some(Decided {
+        let drawn = match settings.estimator {
+            Estimator::Exact => 0,
+            Estimator::Sampled { block, .. } => u64::from(self.round) * block as u64,
+        };
+        let decided = Decided {
             chosen: self.player.choose(settings.choice, self.own.uniform(drawn)),
             expected: self.player.expected().to_vec(),
             rounds: self.round,
             converged: self.calm >= settings.stop.calm_rounds,
-        });
+        };
+        self.come_to(Some(decided));
+    }
+
+    fn come_to(&mut self, decided: Option<Decided>) {
+        let beacons = self.members.iter_mut().map(|m| m.beacon.take()).collect();
+        self.decided = Some(Came { decided, beacons });
     }
 }
 
-impl network::Agent for Agent<'_> {
+impl link::Agent for Agent<'_> {
     type Message = Message;
+    type Outcome = Came;
 
     fn start(&mut self) -> Vec<Message> {
         let mut said = vec![self.announcement()];
@@ -227,29 +277,66 @@ impl network::Agent for Agent<'_> {
     }
 
     fn on_message(&mut self, from: usize, message: Message) -> Vec<Message> {
+        let member = &mut self.members[from];
         match message {
-            Message::Ways { ways, separation_m, altitude_m } => {
-                self.options.insert(from, Options::new(ways, separation_m, altitude_m));
+            Message::Ways { beacon, ways } => {
+                let options = Options::new(ways, beacon.separation_m, beacon.altitude_m);
+                member.options.get_or_insert(options);
+                member.beacon = Some(beacon);
             }
-            Message::Model { pose, next, mission, airplane } => {
-                let known = Known { slot: airplane, pose, next: next as usize };
+            Message::Model { beacon, next, mission, airplane } => {
+                let known = Known { slot: airplane, pose: beacon.pose, next: next as usize };
                 let options = self.own.world.options_towards(known, &mission);
-                self.options.insert(from, options);
+                member.options.get_or_insert(options);
+                member.beacon = Some(beacon);
             }
+            // What it comes to after it was given up concerns nobody.
+            _ if member.gone => {}
             Message::Samples { round, change, samples } => {
                 let samples = samples.iter().map(|&x| usize::from(x)).collect();
-                self.samples.insert((round, from), samples);
-                self.changes.insert((round, from), change);
+                member.samples.insert(round, samples);
+                member.changes.insert(round, change);
             }
             Message::Distribution { round, change, q } => {
-                self.q.insert((round, from), q);
-                self.changes.insert((round, from), change);
+                member.q.insert(round, q);
+                member.changes.insert(round, change);
             }
         }
         self.go_on()
     }
 
-    fn decided(&self) -> Option<Decided> {
+    fn awaits(&self) -> Vec<usize> {
+        if self.decided.is_some() {
+            return Vec::new();
+        }
+        if self.game.is_some() {
+            return self.awaits_in_round();
+        }
+        let unknown = |j: &usize| self.members[*j].options.is_none();
+        (0..self.members.len()).filter(unknown).collect()
+    }
+
+    fn without(&mut self, other: usize) -> Vec<Message> {
+        let member = &mut self.members[other];
+        member.gone = true;
+        if member.options.is_none() {
+            member.options = Some(self.own.presumed(other));
+        }
+        // Who was heard of, but said nothing yet of what it samples.
+        if self.game.is_some() && member.samples.is_empty() {
+            member.samples.insert(0, Vec::new());
+        }
+        self.go_on()
+    }
+
+    fn at_deadline(&mut self) {
+        match self.player.expected() {
+            [] => self.come_to(None),
+            _ => self.decide(),
+        }
+    }
+
+    fn outcome(&self) -> Option<Came> {
         self.decided.clone()
     }
 }

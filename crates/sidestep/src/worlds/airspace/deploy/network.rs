@@ -1,8 +1,14 @@
-//! A network in memory, in lockstep, that counts what it carries.
+//! The network of the agents, in memory: what may go wrong on it, and what it has carried.
+//!
+//! Time on it goes by in ticks: a message takes one, or more when it is delayed. Every draw
+//! depends on who sends to whom in which tick, never on the order in which agents are looked at.
 
-use super::Decided;
-use serde::de::DeserializeOwned;
+use super::super::world::purpose;
+use super::link::{Agent, Endpoint, Outgoing};
 use serde::{Deserialize, Serialize};
+use sidestep_kernel::ports::{Envelope, Faults, MemoryTransport, Transport};
+use sidestep_kernel::stream::Streams;
+use sidestep_kernel::{Cycle, EntityId};
 
 /// What went over the network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -35,52 +41,198 @@ impl Traffic {
     }
 }
 
-/// An agent as a state machine: messages in, messages to all others out.
-pub(super) trait Agent {
-    /// What it sends and receives.
-    type Message: Serialize + DeserializeOwned;
-
-    /// What it says before it has heard anything.
-    fn start(&mut self) -> Vec<Self::Message>;
-
-    /// Takes a message of agent `from`, and says what it has to say to all others then.
-    fn on_message(&mut self, from: usize, message: Self::Message) -> Vec<Self::Message>;
-
-    /// What it has decided, when it has.
-    fn decided(&self) -> Option<Decided>;
+/// A network that is not to be relied on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Network {
+    /// Probability that a message is lost on its way to a receiver.
+    pub loss: f64,
+    /// Probability that it arrives twice.
+    pub duplication: f64,
+    /// Time that every message takes: one tick.
+    pub latency_s: f64,
+    /// Further delay at most, drawn uniformly: messages overtake each other.
+    pub max_delay_s: f64,
+    /// An agent that has heard nothing new for so long asks those it waits for.
+    pub patience_s: f64,
+    /// An optimization ends after this, and so does what the shield exchanges after it.
+    pub deadline_s: f64,
+    /// Whose radio is dead, and when.
+    pub silences: Vec<Silence>,
 }
 
-/// Runs agents until all have decided.
-///
-/// # Panics
-/// When they fall silent undecided, which is a bug on a network that loses nothing.
-pub(super) fn run<A: Agent>(mut agents: Vec<A>) -> (Vec<Decided>, Traffic) {
-    let mut traffic = Traffic::default();
-    let mut sent: Vec<(usize, Vec<u8>)> = Vec::new();
-    for (i, agent) in agents.iter_mut().enumerate() {
-        post(i, agent.start(), &mut sent);
+/// An airplane whose radio is dead for a while: it sends nothing, it hears nothing, and it knows.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Silence {
+    /// Its id.
+    pub airplane: EntityId,
+    /// From when on, seconds after the start.
+    #[serde(default)]
+    pub from_s: f64,
+    /// Until when; for ever, if not said.
+    #[serde(default = "for_ever")]
+    pub until_s: f64,
+}
+
+fn for_ever() -> f64 {
+    f64::INFINITY
+}
+
+impl Network {
+    /// Whether an airplane is silent at a time.
+    pub fn is_silent(&self, id: EntityId, at_s: f64) -> bool {
+        let now = |s: &&Silence| s.from_s <= at_s && at_s < s.until_s;
+        self.silences.iter().filter(now).any(|s| s.airplane == id)
     }
-    while !sent.is_empty() {
-        let mut next = Vec::new();
-        for (from, bytes) in std::mem::take(&mut sent) {
-            traffic.count(agents.len() - 1, bytes.len());
-            for (i, agent) in agents.iter_mut().enumerate().filter(|(i, _)| *i != from) {
-                // Each reads for itself, as it would on a network: that is part of its time.
-                let message = postcard::from_bytes(&bytes).expect("what was sent can be read");
-                post(i, agent.on_message(from, message), &mut next);
-            }
+
+    fn ticks(&self, seconds: f64) -> u64 {
+        (seconds / self.latency_s).round().max(1.0) as u64
+    }
+
+    pub(super) fn deadline_ticks(&self) -> u64 {
+        self.ticks(self.deadline_s)
+    }
+
+    pub(super) fn patience_ticks(&self) -> u64 {
+        self.ticks(self.patience_s)
+    }
+
+    pub(super) fn faults(&self) -> Faults {
+        Faults {
+            loss: self.loss,
+            duplication: self.duplication,
+            max_delay_cycles: (self.max_delay_s / self.latency_s).round() as u32,
         }
-        sent = next;
     }
-    let decided = agents.iter().map(|a| a.decided().expect("everybody decides")).collect();
-    (decided, traffic)
 }
 
-fn post<M: Serialize>(from: usize, messages: Vec<M>, sent: &mut Vec<(usize, Vec<u8>)>) {
-    sent.extend(messages.iter().map(|m| (from, bytes_of(m))));
+/// What agents talk about in a `dt`, one after the other: each has ticks of its own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Topic {
+    /// What to do.
+    Optimization,
+    /// Whether that is safe.
+    Shield,
 }
 
-/// A message as it goes over the wire.
-pub(super) fn bytes_of<M: Serialize>(message: &M) -> Vec<u8> {
-    postcard::to_stdvec(message).expect("messages are plain data")
+/// A network for one talk of a group.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Talk<'a> {
+    /// `None`: it loses nothing, and agents wait for each other as long as it takes.
+    pub(super) network: Option<&'a Network>,
+    pub(super) streams: Streams,
+    pub(super) topic: Topic,
+    pub(super) now: Cycle,
+    pub(super) at_s: f64,
+}
+
+impl Talk<'_> {
+    /// The tick in which the talk begins, and the one in which it ends at the latest.
+    pub(super) fn ticks(&self) -> (u64, u64) {
+        let Some(network) = self.network else { return (0, u64::MAX) };
+        let long = network.deadline_ticks();
+        let talk = 2 * self.now + self.topic as u64;
+        (talk * (long + 1), talk * (long + 1) + long)
+    }
+
+    pub(super) fn is_silent(&self, id: EntityId) -> bool {
+        self.network.is_some_and(|network| network.is_silent(id, self.at_s))
+    }
+}
+
+/// How a talk has ended for one agent.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Ended<O> {
+    /// What it has come to, if anything.
+    pub(super) outcome: Option<O>,
+    /// The others, by place, of whom it has heard nothing in spite of asking.
+    pub(super) unheard: Vec<usize>,
+    /// Whether time was up before it was done.
+    pub(super) late: bool,
+}
+
+/// Lets agents talk until all are done or time is up; `ids[i]` is whose agent `agents[i]` is.
+pub(super) fn run<A: Agent>(
+    talk: &Talk<'_>,
+    ids: &[EntityId],
+    agents: Vec<A>,
+) -> (Vec<Ended<A::Outcome>>, Traffic) {
+    let (begin, end) = talk.ticks();
+    let faults = talk.network.map(Network::faults).unwrap_or_default();
+    let patience = talk.network.map_or(u64::MAX, Network::patience_ticks);
+    let mut post = Post {
+        ids,
+        silent: ids.iter().map(|&id| talk.is_silent(id)).collect(),
+        transport: MemoryTransport::new(talk.streams, purpose::NETWORK, faults),
+        traffic: Traffic::default(),
+        sent: vec![0; ids.len()],
+        tick: begin,
+    };
+    let mut endpoints: Vec<Endpoint<A>> = Vec::with_capacity(agents.len());
+    for (i, agent) in agents.into_iter().enumerate() {
+        let (endpoint, said) = Endpoint::new(agent, (i, ids.len()), patience, begin);
+        endpoints.push(endpoint);
+        post.send(i, said);
+    }
+    for i in (0..ids.len()).filter(|&i| post.silent[i]) {
+        // It knows that nobody hears it.
+        endpoints[i].is_alone();
+    }
+    while !endpoints.iter().all(Endpoint::is_done) {
+        let timers = endpoints.iter().filter_map(Endpoint::next_timer);
+        let next = timers.chain(post.transport.next_arrival()).min().unwrap_or(end);
+        if next >= end {
+            break;
+        }
+        post.tick = next;
+        for (i, endpoint) in endpoints.iter_mut().enumerate() {
+            for envelope in post.transport.receive(ids[i], next) {
+                let from = ids.binary_search(&envelope.sender).expect("a member of the group");
+                let said = endpoint.on_packet(from, &envelope.payload, next);
+                post.send(i, said);
+            }
+            let said = endpoint.on_timer(next);
+            post.send(i, said);
+        }
+    }
+    (endpoints.into_iter().map(Endpoint::end).collect(), post.traffic)
+}
+
+/// Hands packets to the network, and counts them.
+struct Post<'a> {
+    ids: &'a [EntityId],
+    silent: Vec<bool>,
+    transport: MemoryTransport,
+    traffic: Traffic,
+    /// Packets sent so far, by place: what tells those of one tick apart.
+    sent: Vec<u32>,
+    tick: u64,
+}
+
+impl Post<'_> {
+    fn send(&mut self, from: usize, said: Vec<Outgoing>) {
+        for Outgoing { to, payload } in said {
+            if self.silent[from] {
+                continue;
+            }
+            let receivers = match to {
+                Some(place) => place..place + 1,
+                None => 0..self.ids.len(),
+            };
+            let n = if to.is_some() { 1 } else { self.ids.len() - 1 };
+            self.traffic.count(n, payload.len());
+            for place in receivers.filter(|&place| place != from) {
+                if !self.silent[place] {
+                    self.transport.send(Envelope {
+                        cycle: self.tick,
+                        sender: self.ids[from],
+                        sequence: self.sent[from],
+                        receiver: self.ids[place],
+                        payload: payload.clone(),
+                    });
+                }
+            }
+            self.sent[from] += 1;
+        }
+    }
 }

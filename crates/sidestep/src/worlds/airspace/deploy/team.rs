@@ -1,8 +1,10 @@
 //! The paper's Algorithm 1: an agent per airplane that samples, predicts, and shares both.
 
 use super::super::airplane::Prediction;
-use super::super::objective::own_costs;
-use super::{Decided, Own, network};
+use super::super::objective::{Options, own_costs};
+use super::contact::Beacon;
+use super::link;
+use super::{Came, Decided, Own};
 use crate::collectives::Player;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -12,9 +14,46 @@ use std::collections::BTreeMap;
 pub(super) enum Message {
     /// Lines 6 to 9: the predicted ways of the round's samples, and how far the sender's
     /// probabilities have moved in the round before.
-    Predictions { round: u32, change: f64, altitude_m: f64, ways: Vec<Prediction> },
+    Predictions { round: u32, change: f64, beacon: Beacon, ways: Vec<Prediction> },
     /// Line 17: the sender's part of the cost of each joint sample (eq. 11).
     Costs { round: u32, costs: Vec<f64> },
+}
+
+/// A member of the group, as an agent knows it.
+#[derive(Debug, Default)]
+struct Member {
+    beacon: Option<Beacon>,
+    /// The ways of its samples, by round,
+    ways: BTreeMap<u32, Vec<Prediction>>,
+    /// how far it has moved in the round before,
+    changes: BTreeMap<u32, f64>,
+    /// and its part of the costs.
+    costs: BTreeMap<u32, Vec<f64>>,
+    /// Where it is taken to fly since nothing more comes of it.
+    presumed: Option<Options>,
+}
+
+impl Member {
+    fn is_gone(&self) -> bool {
+        self.presumed.is_some()
+    }
+
+    fn way(&self, round: u32, k: usize) -> Option<&Prediction> {
+        let presumed = || self.presumed.as_ref().and_then(|options| options.predictions.first());
+        self.ways.get(&round).and_then(|ways| ways.get(k)).or_else(presumed)
+    }
+
+    fn altitude_m(&self) -> Option<f64> {
+        let presumed = || self.presumed.as_ref().map(|options| options.altitude_m);
+        self.beacon.as_ref().map(|beacon| beacon.altitude_m).or_else(presumed)
+    }
+
+    /// Keeps the ways of the round before: they may be the last ones heard of.
+    fn forget_before(&mut self, round: u32) {
+        self.ways.retain(|r, _| *r + 1 >= round);
+        self.changes.retain(|r, _| *r >= round);
+        self.costs.retain(|r, _| *r >= round);
+    }
 }
 
 /// One agent.
@@ -29,14 +68,8 @@ pub(super) struct Agent<'a> {
     calm: u32,
     change: f64,
     samples: Vec<usize>,
-    /// Whether this round's own costs are out.
-    costed: bool,
-    /// Ways heard of, by round and sender.
-    heard: BTreeMap<(u32, usize), Vec<Prediction>>,
-    changes: BTreeMap<(u32, usize), f64>,
-    costs: BTreeMap<(u32, usize), Vec<f64>>,
-    altitudes_m: BTreeMap<usize, f64>,
-    decided: Option<Decided>,
+    members: Vec<Member>,
+    decided: Option<Came>,
 }
 
 impl<'a> Agent<'a> {
@@ -44,6 +77,7 @@ impl<'a> Agent<'a> {
         Self {
             own_costs: own_costs(&own.world.objective, &own.options),
             player: Player::new(own.options.predictions.len()),
+            members: own.group.iter().map(|_| Member::default()).collect(),
             own,
             block,
             ageing,
@@ -51,11 +85,6 @@ impl<'a> Agent<'a> {
             calm: 0,
             change: f64::INFINITY,
             samples: Vec::new(),
-            costed: false,
-            heard: BTreeMap::new(),
-            changes: BTreeMap::new(),
-            costs: BTreeMap::new(),
-            altitudes_m: BTreeMap::new(),
             decided: None,
         }
     }
@@ -66,40 +95,38 @@ impl<'a> Agent<'a> {
 
     fn predictions(&mut self) -> Message {
         self.samples = self.own.samples(&self.player, self.drawn(), self.block);
-        self.costed = false;
         let ways = self.samples.iter().map(|&x| self.own.options.predictions[x].clone());
         Message::Predictions {
             round: self.round,
             change: self.change,
-            altitude_m: self.own.options.altitude_m,
+            beacon: self.own.beacon(),
             ways: ways.collect(),
         }
     }
 
-    fn others(&self) -> impl Iterator<Item = usize> + use<> {
-        let me = self.own.me;
-        (0..self.own.group).filter(move |&j| j != me)
+    fn others(&self) -> impl Iterator<Item = (usize, &Member)> {
+        self.members.iter().enumerate().filter(|(j, _)| *j != self.own.me)
+    }
+
+    /// Whether this round's own costs are out.
+    fn has_costed(&self) -> bool {
+        self.members[self.own.me].costs.contains_key(&self.round)
     }
 
     /// Goes on as far as what has been heard allows.
     fn go_on(&mut self) -> Vec<Message> {
         let mut said = Vec::new();
-        while self.decided.is_none() {
-            let round = self.round;
-            let heard_ways = self.others().all(|j| self.heard.contains_key(&(round, j)));
-            if !self.costed && heard_ways {
+        while self.decided.is_none() && link::Agent::awaits(self).is_empty() {
+            if !self.has_costed() {
                 if self.is_settled() {
                     self.decide();
                     break;
                 }
                 said.push(self.cost());
+            } else {
+                self.learn();
+                said.push(self.predictions());
             }
-            let heard_costs = self.others().all(|j| self.costs.contains_key(&(round, j)));
-            if !(self.costed && heard_costs) {
-                break;
-            }
-            self.learn();
-            said.push(self.predictions());
         }
         said
     }
@@ -108,7 +135,7 @@ impl<'a> Agent<'a> {
     fn is_settled(&mut self) -> bool {
         let stop = self.own.settings().stop;
         if self.round > 0 {
-            let heard = self.others().map(|j| self.changes[&(self.round, j)]);
+            let heard = self.others().filter_map(|(_, m)| m.changes.get(&self.round).copied());
             let most = heard.fold(self.change, f64::max);
             self.calm = stop.calm(self.calm, most);
         }
@@ -117,78 +144,118 @@ impl<'a> Agent<'a> {
 
     /// Lines 10 to 15.
     fn cost(&mut self) -> Message {
-        let objective = &self.own.world.objective;
-        let r = self.own.options.separation_m;
-        let costs: Vec<f64> = (0..self.block)
-            .map(|k| {
-                let x = self.samples[k];
-                let way = &self.own.options.predictions[x];
-                let own_altitude_m = self.own.options.altitude_m;
-                let near =
-                    |j: &usize| (self.altitudes_m[j] - own_altitude_m).abs() < objective.vertical_m;
-                self.others().filter(near).fold(self.own_costs[x], |sum, j| {
-                    let [own, _] =
-                        objective.collision(way, &self.heard[&(self.round, j)][k], [r, r]);
-                    sum + own
-                })
-            })
-            .collect();
-        self.costs.insert((self.round, self.own.me), costs.clone());
-        self.costed = true;
+        let costs: Vec<f64> = (0..self.block).map(|k| self.cost_of(k)).collect();
+        self.members[self.own.me].costs.insert(self.round, costs.clone());
         Message::Costs { round: self.round, costs }
+    }
+
+    /// The own part of the cost of joint sample `k`.
+    fn cost_of(&self, k: usize) -> f64 {
+        let objective = &self.own.world.objective;
+        let Own { options, .. } = &self.own;
+        let x = self.samples[k];
+        let way = &options.predictions[x];
+        let on_level = |(_, member): &(usize, &Member)| {
+            let apart_m = member.altitude_m().map_or(0.0, |z| (z - options.altitude_m).abs());
+            apart_m < objective.vertical_m
+        };
+        self.others().filter(on_level).fold(self.own_costs[x], |sum, (_, member)| {
+            let Some(theirs) = member.way(self.round, k) else { return sum };
+            let wanted_m = member.presumed.as_ref().map_or(0.0, |options| options.separation_m);
+            let r = options.separation_m.max(wanted_m);
+            sum + objective.collision(way, theirs, [r, r])[0]
+        })
     }
 
     /// Lines 18 to 24: sums in the order of the airplanes, so that all come to the same bits.
     fn learn(&mut self) {
-        let parts = (0..self.own.group).map(|j| &self.costs[&(self.round, j)]);
         let mut total = vec![0.0; self.block];
-        for part in parts {
-            total.iter_mut().zip(part).for_each(|(sum, cost)| *sum += cost);
+        for costs in self.members.iter().filter_map(|m| m.costs.get(&self.round)) {
+            total.iter_mut().zip(costs).for_each(|(sum, cost)| *sum += cost);
         }
         self.player.learn(&self.samples, &total, self.ageing);
         let settings = self.own.settings();
         self.change = self.player.update(settings.update, settings.cooling);
-        let old = self.round;
-        self.heard.retain(|(round, _), _| *round > old);
-        self.costs.retain(|(round, _), _| *round > old);
-        self.changes.retain(|(round, _), _| *round > old);
         self.round += 1;
+        let round = self.round;
+        self.members.iter_mut().for_each(|m| m.forget_before(round));
     }
 
     fn decide(&mut self) {
         let settings = self.own.settings();
-        let chosen = self.player.choose(settings.choice, self.own.uniform(self.drawn()));
-        self.decided = Some(Decided {
-            chosen,
+        let decided = Decided {
+            chosen: self.player.choose(settings.choice, self.own.uniform(self.drawn())),
             expected: self.player.expected().to_vec(),
             rounds: self.round,
             converged: self.calm >= settings.stop.calm_rounds,
-        });
+        };
+        self.come_to(Some(decided));
+    }
+
+    fn come_to(&mut self, decided: Option<Decided>) {
+        let beacons = self.members.iter_mut().map(|m| m.beacon.take()).collect();
+        self.decided = Some(Came { decided, beacons });
     }
 }
 
-impl network::Agent for Agent<'_> {
+impl link::Agent for Agent<'_> {
     type Message = Message;
+    type Outcome = Came;
 
     fn start(&mut self) -> Vec<Message> {
-        vec![self.predictions()]
+        let mut said = vec![self.predictions()];
+        said.extend(self.go_on());
+        said
     }
 
     fn on_message(&mut self, from: usize, message: Message) -> Vec<Message> {
+        let member = &mut self.members[from];
         match message {
-            Message::Predictions { round, change, altitude_m, ways } => {
-                self.altitudes_m.insert(from, altitude_m);
-                self.changes.insert((round, from), change);
-                self.heard.insert((round, from), ways);
+            Message::Predictions { round, change, beacon, ways } => {
+                member.beacon = Some(beacon);
+                member.changes.insert(round, change);
+                member.ways.insert(round, ways);
             }
             Message::Costs { round, costs } => {
-                self.costs.insert((round, from), costs);
+                member.costs.insert(round, costs);
             }
         }
         self.go_on()
     }
 
-    fn decided(&self) -> Option<Decided> {
+    fn awaits(&self) -> Vec<usize> {
+        if self.decided.is_some() {
+            return Vec::new();
+        }
+        let missing = |member: &Member| match self.has_costed() {
+            false => !member.ways.contains_key(&self.round),
+            true => !member.costs.contains_key(&self.round),
+        };
+        self.others().filter(|(_, m)| !m.is_gone() && missing(m)).map(|(j, _)| j).collect()
+    }
+
+    /// Its part of the costs is left out from now on; the last way it told of stands for it, or
+    /// where it is presumed.
+    fn without(&mut self, other: usize) -> Vec<Message> {
+        let member = &mut self.members[other];
+        let last = member.ways.values().next_back().and_then(|ways| ways.first());
+        member.presumed = Some(match (&member.beacon, last) {
+            (Some(beacon), Some(way)) => {
+                Options::new(vec![way.clone()], beacon.separation_m, beacon.altitude_m)
+            }
+            _ => self.own.presumed(other),
+        });
+        self.go_on()
+    }
+
+    fn at_deadline(&mut self) {
+        match self.player.expected() {
+            [] => self.come_to(None),
+            _ => self.decide(),
+        }
+    }
+
+    fn outcome(&self) -> Option<Came> {
         self.decided.clone()
     }
 }

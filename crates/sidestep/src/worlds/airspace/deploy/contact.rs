@@ -1,0 +1,150 @@
+//! What airplanes know of each other when messages get lost.
+
+use super::super::airplane::{Point, Pose, Prediction, distance_m};
+use super::super::decide::Known;
+use super::super::objective::Options;
+use super::super::shield::{Flyer, Side};
+use super::super::world::AirspaceWorld;
+use serde::{Deserialize, Serialize};
+use sidestep_kernel::{Cycle, EntityId, math};
+use std::collections::BTreeMap;
+
+/// Factor on the separation from an airplane of which nothing is heard.
+const WIDER: f64 = 1.5;
+
+/// What an airplane tells of itself.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Beacon {
+    /// Where it is.
+    pub pose: Pose,
+    /// Its next way-point.
+    pub goal: Option<Point>,
+    /// Its airspeed.
+    pub v_m_s: f64,
+    /// Its largest turn rate.
+    pub omega_max_rad_s: f64,
+    /// The separation it asks for.
+    pub separation_m: f64,
+    /// The level it keeps.
+    pub altitude_m: f64,
+}
+
+/// An orbit that somebody may be on: where, to which side, and when that was.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Orbiting {
+    /// Where it is at the beginning of a cycle,
+    pub pose: Pose,
+    /// of this one.
+    pub as_of: Cycle,
+    /// The side it turns to.
+    pub side: Side,
+}
+
+/// What one airplane knows of another one.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Contact {
+    /// When it was last heard of.
+    pub heard_in: Cycle,
+    /// What it told then.
+    pub beacon: Beacon,
+    /// The orbits it may be on since then, under the shield.
+    pub possible: Vec<Orbiting>,
+    /// Talks of the shield in a row in which it was not heard.
+    pub unheard: u32,
+}
+
+/// What an airplane knows of others, by id.
+pub type Contacts = BTreeMap<EntityId, Contact>;
+
+impl Orbiting {
+    /// Where it is at the beginning of cycle `now`.
+    pub(super) fn pose(&self, world: &AirspaceWorld, beacon: &Beacon, now: Cycle) -> Pose {
+        let gone_s = now.saturating_sub(self.as_of) as f64 * world.timing.dt_s;
+        let omega_rad_s = self.side.sign() * beacon.omega_max_rad_s;
+        let Pose { at: [x, y], psi_rad } = self.pose.step(beacon.v_m_s, omega_rad_s, gone_s);
+        let [wx, wy] = world.wind_m_s;
+        Pose { at: [x + wx * gone_s, y + wy * gone_s], psi_rad: math::wrap_angle(psi_rad) }
+    }
+
+    /// One that flies this orbit whatever others do, as the shield sees it.
+    pub(super) fn flyer(
+        &self,
+        world: &AirspaceWorld,
+        (id, beacon): (EntityId, &Beacon),
+        now: Cycle,
+    ) -> Flyer {
+        Flyer {
+            id,
+            pose: self.pose(world, beacon, now),
+            v_m_s: beacon.v_m_s,
+            omega_max_rad_s: beacon.omega_max_rad_s,
+            separation_m: beacon.separation_m,
+            altitude_m: beacon.altitude_m,
+            vertical_m: world.vertical_m,
+            fallback: self.side,
+            rank: u64::MAX - u64::from(id),
+        }
+    }
+}
+
+impl Contact {
+    /// Where one that is not heard is taken to fly: on the orbit on which the shield keeps it,
+    /// or else straight to the way-point it had. Others keep farther away from it.
+    pub(super) fn options(&self, world: &AirspaceWorld, now: Cycle) -> Options {
+        let points = match self.possible.first() {
+            Some(orbiting) if world.shield => self.on_orbit(world, orbiting, now),
+            _ => self.straight(world, now),
+        };
+        let prediction = Prediction { counted: points.len(), points };
+        let separation_m = WIDER * self.beacon.separation_m;
+        Options::new(vec![prediction], separation_m, self.beacon.altitude_m)
+    }
+
+    fn on_orbit(&self, world: &AirspaceWorld, orbiting: &Orbiting, now: Cycle) -> Vec<Point> {
+        let Beacon { v_m_s, omega_max_rad_s, .. } = self.beacon;
+        let pose = orbiting.pose(world, &self.beacon, now);
+        let omega_rad_s = orbiting.side.sign() * omega_max_rad_s;
+        let point = |k: usize| pose.step(v_m_s, omega_rad_s, k as f64 * world.timing.dtau_s).at;
+        (1..=world.timing.horizon).map(point).collect()
+    }
+
+    fn straight(&self, world: &AirspaceWorld, now: Cycle) -> Vec<Point> {
+        let Beacon { pose: Pose { at, psi_rad }, goal, v_m_s, .. } = self.beacon;
+        let toward = match goal.map(|goal| world.aim(at, goal, v_m_s)) {
+            Some(aim) if distance_m(at, aim) > 0.0 => math::atan2(aim[1] - at[1], aim[0] - at[0]),
+            _ => psi_rad,
+        };
+        let [vx, vy] = [v_m_s * math::cos(toward), v_m_s * math::sin(toward)];
+        let [wx, wy] = world.wind_m_s;
+        let gone_s = now.saturating_sub(self.heard_in) as f64 * world.timing.dt_s;
+        let from = [at[0] + (vx + wx) * gone_s, at[1] + (vy + wy) * gone_s];
+        let point = |k: usize| {
+            let t_s = k as f64 * world.timing.dtau_s;
+            [from[0] + vx * t_s, from[1] + vy * t_s]
+        };
+        (1..=world.timing.horizon).map(point).collect()
+    }
+}
+
+impl AirspaceWorld {
+    /// What all know of a flight before they have heard of it: how it was filed.
+    pub(super) fn filed(&self, id: EntityId) -> Contact {
+        let i = id as usize;
+        let heard_in = self.appears_in(i);
+        let pose = self.airplanes[i].start;
+        let orbiting = Orbiting { pose, as_of: heard_in, side: self.first_fallbacks[i] };
+        let beacon = self.beacon(Known { slot: id, pose, next: 0 });
+        Contact { heard_in, beacon, possible: vec![orbiting], unheard: 0 }
+    }
+}
+
+/// Notes what another has told of itself in cycle `now`.
+pub(super) fn note(contacts: &mut Contacts, id: EntityId, beacon: Beacon, now: Cycle) {
+    match contacts.get_mut(&id) {
+        Some(contact) => (contact.beacon, contact.heard_in) = (beacon, now),
+        None => {
+            let contact = Contact { heard_in: now, beacon, possible: Vec::new(), unheard: 0 };
+            contacts.insert(id, contact);
+        }
+    }
+}
