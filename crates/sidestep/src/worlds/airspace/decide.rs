@@ -162,7 +162,7 @@ impl AirspaceWorld {
             airplane: group[0].slot,
             airplanes: group.len() as u32,
             rounds: first.map_or(0, |decided| decided.rounds),
-            converged: decided.iter().all(|d| d.as_ref().is_some_and(|d| d.converged)),
+            converged: first.is_some() && decided.iter().flatten().all(|d| d.converged),
             traffic,
         });
         let ranked = |(decided, known): (&Option<Decided>, &Known)| match decided {

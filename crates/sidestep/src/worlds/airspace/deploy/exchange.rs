@@ -29,7 +29,7 @@
 //! it to accept anything. After [`SILENT_AFTER`] exchanges in a row without hearing from it they
 //! take its radio to be dead, and fly without its consent what keeps apart from every orbit it
 //! may be on: the one it was on when it was last heard, or the start of its flight as filed. Were
-//! its radio alive, some twenty questions in a row, or the answers to them, would have been lost;
+//! its radio alive, dozens of questions in a row, or the answers to them, would have been lost;
 //! that is the one chance which is taken here.
 
 use super::super::events::{Event, EventKind};
@@ -37,7 +37,7 @@ use super::super::shield::{Certainty, Decision, Flyer, Plan, Side, Way, filter};
 use super::super::world::AirspaceWorld;
 use super::contact::{Beacon, Contact, Contacts, Orbiting, note};
 use super::network::{Ended, Topic, Traffic, run};
-use super::{Deployment, link, tell};
+use super::{Deployment, link};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::{Cycle, EntityId};
 
@@ -378,7 +378,7 @@ impl AirspaceWorld {
         let (ended, traffic) = run(&self.talk(Topic::Shield, now), &ids, agents);
         let mut decisions = Vec::with_capacity(ids.len());
         for (me, end) in ended.into_iter().enumerate() {
-            tell(&end, (ids[me], &ids), now, events);
+            self.tell(&end, (ids[me], &ids), now, &contacts[me], events);
             let fallback = Decision { candidate: None, fallback: flyers[me].fallback };
             // An airplane whose radio is dead stays on its fallback, whatever it would like.
             let is_silent = self.is_silent(ids[me], now);

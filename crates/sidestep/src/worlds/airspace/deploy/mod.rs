@@ -167,7 +167,7 @@ impl AirspaceWorld {
         let (ended, traffic) = self.talk_of(own, &self.talk(Topic::Optimization, now));
         if self.network.is_some() {
             for (me, end) in ended.iter().enumerate() {
-                tell(end, (ids[me], &ids), now, events);
+                self.tell(end, (ids[me], &ids), now, &contacts[me], events);
                 let beacons = end.outcome.iter().flat_map(|came| came.beacons.iter().zip(&ids));
                 for (beacon, &id) in beacons {
                     if let Some(beacon) = beacon {
@@ -232,19 +232,25 @@ impl AirspaceWorld {
     pub(super) fn actions_of(&self, slot: u32) -> &[Action] {
         &self.actions[slot as usize]
     }
-}
 
-/// Books how a talk has ended for an airplane.
-fn tell<O>(
-    end: &Ended<O>,
-    (id, ids): (EntityId, &[EntityId]),
-    now: Cycle,
-    events: &mut Vec<Event>,
-) {
-    let unheard = |&place: &usize| Event::of_pair(now, EventKind::Unheard, id, ids[place]);
-    events.extend(end.unheard.iter().map(unheard));
-    if end.late {
-        events.push(Event::of(now, EventKind::Deadline, id));
+    /// Books how a talk has ended for an airplane, and of whom nothing is heard any more.
+    fn tell<O>(
+        &self,
+        end: &Ended<O>,
+        (id, ids): (EntityId, &[EntityId]),
+        now: Cycle,
+        contacts: &Contacts,
+        events: &mut Vec<Event>,
+    ) {
+        let heard_in = |other: &EntityId| match contacts.get(other) {
+            Some(contact) => contact.heard_in,
+            None => self.appears_in(*other as usize),
+        };
+        let lost = end.unheard.iter().map(|&place| ids[place]).filter(|id| heard_in(id) + 1 >= now);
+        events.extend(lost.map(|other| Event::of_pair(now, EventKind::Unheard, id, other)));
+        if end.late {
+            events.push(Event::of(now, EventKind::Deadline, id));
+        }
     }
 }
 
@@ -291,6 +297,87 @@ mod tests {
         assert!(pim.messages < team.messages);
         assert!(pim.bytes > 2 * team.multicast_bytes);
         assert!(compact.bytes * 20 < team.bytes, "{} {}", compact.bytes, team.bytes);
+    }
+
+    const FAULTS: &str = "network = { loss = 0.1, duplication = 0.05, max_delay_s = 0.003, \
+         silent = [{ airplane = 2, from_s = 60.0 }] }";
+
+    fn over_a_bad_network(
+        preset: &str,
+        deployment: &str,
+        more: &str,
+        seed: u64,
+    ) -> AirspaceSimulation {
+        let text = format!(
+            "format = 1\nworld = \"airspace\"\nseed = {seed}\n[airspace]\npreset = \"{preset}\"\n\
+             deployment = \"{deployment}\"\nmax_rounds = 40\n{more}\n\
+             [airspace.generator]\nkind = \"superconflict\"\nn = 5\n"
+        );
+        AirspaceSimulation::new(&Source::new("s", text, ""), 1).expect("a scenario")
+    }
+
+    /// Whatever is lost, everybody ends in time, nobody comes too near, and all arrive but the
+    /// one that nobody hears, which waits on its orbit.
+    #[test]
+    fn on_a_network_that_loses_messages_and_an_airplane_the_shield_keeps_all_apart() {
+        for deployment in ["team", "compact-team", "pim", "hierarchical-pim"] {
+            for (preset, seed) in [("default", 1), ("default", 2), ("paper", 1)] {
+                let mut run = over_a_bad_network(preset, deployment, FAULTS, seed);
+                run.advance(300);
+                let metrics = run.airspace_metrics();
+                let what = format!("{deployment}, {preset}, seed {seed}: {metrics:?}");
+                assert_eq!(metrics.losses_of_separation, 0, "{what}");
+                assert_eq!(metrics.arrived, 4, "{what}");
+                assert!(metrics.contacts_lost >= 4, "{what}");
+            }
+        }
+    }
+
+    /// Also where most messages are lost, and where time is up before anything is agreed.
+    #[test]
+    fn with_hardly_any_message_or_any_time_the_shield_keeps_all_apart() {
+        let worse = [
+            "network = { loss = 0.7, duplication = 0.2, max_delay_s = 0.02 }",
+            "network = { loss = 0.2, latency_s = 0.05, deadline_s = 0.4 }",
+        ];
+        for (deployment, more) in [("team", worse[0]), ("pim", worse[0]), ("team", worse[1])] {
+            let mut run = over_a_bad_network("default", deployment, more, 3);
+            run.advance(60);
+            let metrics = run.airspace_metrics();
+            assert_eq!(metrics.losses_of_separation, 0, "{deployment}, {more}: {metrics:?}");
+            assert!(metrics.deadlines_missed + metrics.contacts_lost > 0, "{more}: {metrics:?}");
+        }
+    }
+
+    /// Without the shield too nobody waits for ever; whoever is not heard flies on.
+    #[test]
+    fn without_the_shield_a_silent_airplane_stops_nobody() {
+        for deployment in ["team", "compact-team", "pim", "hierarchical-pim"] {
+            let more = format!("shield = \"off\"\n{FAULTS}");
+            let mut run = over_a_bad_network("default", deployment, &more, 1);
+            run.advance(300);
+            assert_eq!(run.airspace_metrics().arrived, 5, "{deployment}");
+        }
+    }
+
+    #[test]
+    fn a_network_needs_agents_that_use_it_and_sane_numbers() {
+        let wrong = [
+            ("direct", "loss = 0.1", "one process decides for all"),
+            ("team", "loss = 1.5", "no probability"),
+            ("team", "deadline_s = 4.0", "at most half of dt_s"),
+            ("team", "silent = [{ airplane = 9 }]", "ids from 0 to 2"),
+        ];
+        for (deployment, network, cause) in wrong {
+            let text = format!(
+                "format = 1\nworld = \"airspace\"\n[airspace]\ndeployment = \"{deployment}\"\n\
+                 [airspace.network]\n{network}\n\
+                 [airspace.generator]\nkind = \"superconflict\"\nn = 3\n"
+            );
+            let error =
+                AirspaceSimulation::new(&Source::new("s", text, ""), 1).expect_err("refused");
+            assert!(error.to_string().contains(cause), "{error}");
+        }
     }
 
     #[test]
