@@ -9,6 +9,7 @@ use super::figure::{Figure, FigureKind, Series, Table};
 use super::loria::claims::{Claim, Verdict};
 use super::{Estimate, farm};
 use crate::scenario::Source;
+use crate::worlds::airspace::airplane::Point as AirPoint;
 use crate::worlds::airspace::deploy::Deployment;
 use crate::worlds::airspace::metrics::Metrics;
 use crate::worlds::airspace::simulation::AirspaceSimulation;
@@ -77,6 +78,8 @@ pub struct Report {
     pub cells: Vec<Cell>,
     /// The paper's claims and our verdicts.
     pub claims: Vec<Claim>,
+    /// Where the airplanes of the largest team flew with the first seed, metres.
+    pub tracks_m: Vec<Vec<AirPoint>>,
 }
 
 const BOTH: [Deployment; 2] = [Deployment::Team, Deployment::Pim];
@@ -101,11 +104,44 @@ pub fn run(plan: &Plan, progress: &mut farm::Progress<'_>) -> Result<Report, Inp
         }
     }
     let claims = judge(&cells);
-    Ok(Report { plan: plan.clone(), cells, claims })
+    let largest = plan.airplanes.iter().copied().max().unwrap_or(0);
+    let tracks_m = tracks_m(plan, largest)?;
+    Ok(Report { plan: plan.clone(), cells, claims, tracks_m })
+}
+
+/// Where `n` airplanes fly with the first seed.
+fn tracks_m(plan: &Plan, n: usize) -> Result<Vec<Vec<AirPoint>>, InputError> {
+    let mut run = begun(plan, n, Deployment::Direct, 1)?;
+    let mut tracks = vec![Vec::new(); n];
+    loop {
+        for (track, cell) in tracks.iter_mut().zip(&run.state().airplanes) {
+            let at = cell.pose().at;
+            if track.last() != Some(&at) {
+                track.push(at);
+            }
+        }
+        if run.cycle() >= plan.cycles || run.is_over() {
+            return Ok(tracks);
+        }
+        run.advance(1);
+    }
+}
+
+fn flown(plan: &Plan, n: usize, deployment: Deployment, seed: u64) -> Result<Metrics, InputError> {
+    let mut run = begun(plan, n, deployment, seed)?;
+    while run.cycle() < plan.cycles && !run.is_over() {
+        run.advance(plan.cycles - run.cycle());
+    }
+    Ok(run.airspace_metrics())
 }
 
 /// The paper's numbers: its preset, and no shield.
-fn flown(plan: &Plan, n: usize, deployment: Deployment, seed: u64) -> Result<Metrics, InputError> {
+fn begun(
+    plan: &Plan,
+    n: usize,
+    deployment: Deployment,
+    seed: u64,
+) -> Result<AirspaceSimulation, InputError> {
     let text = format!(
         "format = 1\nworld = \"airspace\"\nname = \"Super-conflict\"\nseed = {seed}\n\
          cycles = {}\n[airspace]\npreset = \"paper\"\nshield = \"off\"\ndeployment = \"{}\"\n\
@@ -113,11 +149,7 @@ fn flown(plan: &Plan, n: usize, deployment: Deployment, seed: u64) -> Result<Met
         plan.cycles,
         deployment.name(),
     );
-    let mut run = AirspaceSimulation::new(&Source::new("agentfly", text, ""), 1)?;
-    while run.cycle() < plan.cycles && !run.is_over() {
-        run.advance(plan.cycles - run.cycle());
-    }
-    Ok(run.airspace_metrics())
+    AirspaceSimulation::new(&Source::new("agentfly", text, ""), 1)
 }
 
 fn cell(airplanes: usize, deployment: Deployment, all: &[Metrics]) -> Cell {
@@ -215,7 +247,7 @@ fn judge(cells: &[Cell]) -> Vec<Claim> {
 }
 
 impl Report {
-    /// Figures 5 to 7.
+    /// Figures 4 to 7.
     pub fn figures(&self) -> Vec<Figure> {
         let figure = |title: &str, y_label: &str, value: fn(&Cell) -> &Estimate| Figure {
             title: title.into(),
@@ -234,7 +266,15 @@ impl Report {
                 })
                 .into(),
         };
+        let flights = Figure {
+            title: format!("Flights of {} airplanes", self.tracks_m.len()),
+            x_label: "east, km".into(),
+            y_label: "north, km".into(),
+            kind: FigureKind::Lines,
+            series: self.tracks_m.iter().map(|track| flight(track)).collect(),
+        };
         vec![
+            flights,
             figure("Time spent in all optimizations", "seconds", |c| &c.elapsed_s),
             figure("Messages of a whole flight", "messages", |c| &c.messages),
             figure("Bytes of a whole flight", "bytes", |c| &c.bytes),
@@ -291,6 +331,11 @@ impl Report {
     }
 }
 
+fn flight(track_m: &[AirPoint]) -> Series {
+    let km = |at: &AirPoint| (at[0] / 1000.0, at[1] / 1000.0, None);
+    Series { name: String::new(), points: track_m.iter().map(km).collect() }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -300,6 +345,7 @@ mod tests {
         let report = run(&Plan::quick(), &mut |_, _| ()).expect("a valid plan");
         assert_eq!((report.cells.len(), report.claims.len()), (6, 5));
         assert!(report.to_markdown().contains("| A-2 |"));
-        assert_eq!(report.figures().len(), 3);
+        assert_eq!(report.figures().len(), 4);
+        assert_eq!(report.figures()[0].series.len(), 5);
     }
 }
