@@ -6,7 +6,7 @@ use crate::exit::{ExitCode, Failure};
 use crate::interrupt;
 use crate::plan::{ScenarioArgs, WorkersArg};
 use crate::recording::Recording;
-use crate::worlds::{Compiled, Run};
+use crate::worlds::{self, Compiled, Run};
 use clap::Args;
 use sidestep::scenario::Source;
 use sidestep_record::Existing;
@@ -47,6 +47,7 @@ pub(crate) struct RunArgs {
 /// When the scenario or the folder is wrong, or results cannot be stored.
 pub(crate) fn run(args: &RunArgs, console: Console) -> Result<ExitCode, Failure> {
     let (source, compiled) = args.scenario.compile()?;
+    let told = worlds::told_of(&args.scenario.file)?;
     let workers = args.workers.count();
     interrupt::listen()?;
     let (run, recording) = match &args.out {
@@ -57,7 +58,7 @@ pub(crate) fn run(args: &RunArgs, console: Console) -> Result<ExitCode, Failure>
             (run, Some(recording))
         }
     };
-    travel(Journey { run, recording, workers, until: None }, console)
+    travel(Journey { run, recording, workers, until: None, told }, console)
 }
 
 /// A run and the new folder that it is recorded to.

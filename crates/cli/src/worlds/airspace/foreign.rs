@@ -1,9 +1,10 @@
 //! Traffic in other programs' files, taken as scenarios.
 
-use super::Said;
+use super::Told;
 use crate::console::grouped;
 use serde_json::json;
-use sidestep::import::{bluesky, traffic};
+use sidestep::import::bluesky::{self, ScnFile};
+use sidestep::import::traffic;
 use sidestep::kernel::InputError;
 use sidestep::worlds::airspace::traffic::{from_bluesky, from_tracks};
 use std::collections::BTreeMap;
@@ -42,31 +43,40 @@ pub(crate) fn translated(file: &Path) -> Result<Option<String>, InputError> {
 }
 
 /// See [`crate::worlds::told_of`].
-pub(crate) fn told_of(file: &Path) -> Result<Option<Said>, InputError> {
-    let Form::Bluesky = form(file) else { return Ok(None) };
-    let scn = bluesky::read(file)?;
+pub(crate) fn told_of(file: &Path) -> Result<Option<Told>, InputError> {
+    match form(file) {
+        Form::Bluesky => Ok(Some(told_of_bluesky(&bluesky::read(file)?))),
+        Form::Tracks | Form::Other => Ok(None),
+    }
+}
+
+fn told_of_bluesky(scn: &ScnFile) -> Told {
+    let words = |errors: &[InputError]| errors.iter().map(ToString::to_string).collect::<Vec<_>>();
     let json = json!({
         "command_lines": scn.command_lines,
         "unparsed_lines": scn.unparsed.len(),
-        "unparsed": scn.unparsed.iter().map(ToString::to_string).collect::<Vec<_>>(),
+        "unparsed": words(&scn.unparsed),
+        "refused": words(&scn.refused),
         "commands": scn.commands,
         "not_understood": scn.not_understood,
         "ignored": scn.ignored,
         "unresolved_places": scn.unresolved_places.len(),
     });
-    let mut text = format!("  command lines    {}\n", grouped(scn.command_lines));
-    text.push_str(&listed("not acted on", &scn.not_understood));
-    text.push_str(&listed("display only", &scn.ignored));
-    for error in &scn.unparsed {
-        text.push_str(&format!("  unparsed         {error}\n"));
-    }
-    Ok(Some(Said { json, text }))
+    let mut lines = vec![("command lines".to_string(), grouped(scn.command_lines))];
+    lines.extend(counted("not acted on", &scn.not_understood));
+    lines.extend(counted("display only", &scn.ignored));
+    lines.extend(listed("unparsed", &scn.unparsed));
+    lines.extend(listed("not carried out", &scn.refused));
+    Told { json, lines }
 }
 
-fn listed(name: &str, counts: &BTreeMap<String, u64>) -> String {
-    if counts.is_empty() {
-        return String::new();
-    }
+/// Names with their counts on one line; no line for none.
+fn counted(name: &str, counts: &BTreeMap<String, u64>) -> Option<(String, String)> {
     let words: Vec<String> = counts.iter().map(|(name, n)| format!("{name} {n}")).collect();
-    format!("  {name:<15}  {}\n", words.join(", "))
+    (!words.is_empty()).then(|| (name.to_string(), words.join(", ")))
+}
+
+/// A line per error, which says where in the file it is.
+fn listed(name: &str, errors: &[InputError]) -> impl Iterator<Item = (String, String)> {
+    errors.iter().map(move |error| (name.to_string(), error.to_string()))
 }

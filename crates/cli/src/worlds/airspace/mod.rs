@@ -5,7 +5,7 @@ mod picture;
 
 pub(super) use foreign::{told_of, translated};
 
-use super::{Comparison, Pictured, Plan, Resolved, Run, Said};
+use super::{Comparison, Pictured, Plan, Resolved, Run, Said, Told};
 use crate::console::grouped;
 use crate::exit::Failure;
 use crate::report::Lines;
