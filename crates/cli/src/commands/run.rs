@@ -18,6 +18,8 @@ Examples:
   sidestep run office.toml --cycles 50000 --seed 7 --workers 4
   sidestep run office.toml --regime sensors --set robots.0.count=40 --set map.box_size_m=0.2
   sidestep run office.toml --json | jq .metrics.contacts
+  sidestep run tracks.csv                                   replay recorded traffic
+  sidestep run tracks.csv --set airspace.replay_until_s=600 fly it anew from then on
 
 Without --out nothing is written. The folder holds scenario.toml (resolved), summary.json,
 trajectories/ and events/ (Parquet), trajectories.svg and .png, and a checkpoint.";

@@ -4,9 +4,9 @@ use super::Told;
 use crate::console::grouped;
 use serde_json::json;
 use sidestep::import::bluesky::{self, ScnFile};
-use sidestep::import::traffic;
+use sidestep::import::traffic::{self, RecordedTraffic};
 use sidestep::kernel::InputError;
-use sidestep::worlds::airspace::traffic::{from_bluesky, from_tracks};
+use sidestep::worlds::airspace::traffic::{from_bluesky, from_tracks, has_length, not_flown};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -46,7 +46,8 @@ pub(crate) fn translated(file: &Path) -> Result<Option<String>, InputError> {
 pub(crate) fn told_of(file: &Path) -> Result<Option<Told>, InputError> {
     match form(file) {
         Form::Bluesky => Ok(Some(told_of_bluesky(&bluesky::read(file)?))),
-        Form::Tracks | Form::Other => Ok(None),
+        Form::Tracks => Ok(Some(told_of_tracks(&traffic::read(file)?))),
+        Form::Other => Ok(None),
     }
 }
 
@@ -59,14 +60,37 @@ fn told_of_bluesky(scn: &ScnFile) -> Told {
         "refused": words(&scn.refused),
         "commands": scn.commands,
         "not_understood": scn.not_understood,
+        "not_flown": not_flown(scn),
         "ignored": scn.ignored,
         "unresolved_places": scn.unresolved_places.len(),
     });
     let mut lines = vec![("command lines".to_string(), grouped(scn.command_lines))];
     lines.extend(counted("not acted on", &scn.not_understood));
+    lines.extend(counted("not flown", &not_flown(scn)));
     lines.extend(counted("display only", &scn.ignored));
     lines.extend(listed("unparsed", &scn.unparsed));
     lines.extend(listed("not carried out", &scn.refused));
+    Told { json, lines }
+}
+
+fn told_of_tracks(recorded: &RecordedTraffic) -> Told {
+    let (rows, repeated) = (recorded.rows as u64, recorded.repeated_rows as u64);
+    let single = recorded.tracks.iter().filter(|track| !has_length(track)).count() as u64;
+    let json = json!({
+        "rows": rows,
+        "aircraft": recorded.tracks.len(),
+        "repeated_rows": repeated,
+        "aircraft_of_one_row": single,
+    });
+    let aircraft = grouped(recorded.tracks.len() as u64);
+    let mut lines = vec![("rows".to_string(), format!("{} of {aircraft} aircraft", grouped(rows)))];
+    let mut left_out = |name: &str, n: u64| {
+        if n > 0 {
+            lines.push((name.to_string(), format!("{}, left out", grouped(n))));
+        }
+    };
+    left_out("repeated rows", repeated);
+    left_out("aircraft of one row", single);
     Told { json, lines }
 }
 

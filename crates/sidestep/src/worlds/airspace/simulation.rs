@@ -55,13 +55,15 @@ impl AirspaceSimulation {
         let state = AirspaceState::restore(&compiled.world, &compiled.start_snapshot());
         let engine = Engine::new(&*compiled.world, compiled.world.airplanes.len(), workers);
         let scenario = *Digest::of(source.text.as_bytes()).as_bytes();
+        let too_close = compiled.too_close.iter().map(|&(a, b)| (0, a, b)).collect();
+        let ledger = Ledger { too_close, ..Ledger::default() };
         Self {
             compiled,
             scenario,
             state,
             engine,
             cycle: 0,
-            ledger: Ledger::default(),
+            ledger,
             decide_ns: 0,
             clock: SystemClock::default(),
             rows: None,
@@ -161,6 +163,7 @@ impl AirspaceSimulation {
             for (pair, record) in std::mem::take(&mut scratch.pairs) {
                 self.ledger.add_pair(pair, record);
             }
+            self.ledger.too_close.extend(std::mem::take(&mut scratch.too_close));
             self.ledger.effort.add(std::mem::take(&mut scratch.effort));
             self.decide_ns += std::mem::take(&mut scratch.decide_ns);
         }

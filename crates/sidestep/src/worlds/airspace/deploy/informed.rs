@@ -15,7 +15,14 @@ pub(super) enum Message {
     /// The ways of all the sender's actions, and its separation.
     Ways { ways: Vec<Prediction>, separation_m: f64, altitude_m: f64 },
     /// From which the others predict its ways themselves.
-    Model { pose: Pose, next: u32, mission: Vec<Point>, airplane: u32 },
+    Model {
+        pose: Pose,
+        next: u32,
+        mission: Vec<Point>,
+        airplane: u32,
+        orders: u32,
+        altitude_m: f64,
+    },
     /// The numbers of the round's samples, and how far the sender has moved in the round before.
     Samples { round: u32, change: f64, samples: Vec<u16> },
     /// The sender's distribution after a round, and how far it has moved in it.
@@ -65,9 +72,9 @@ impl<'a> Agent<'a> {
             let Options { predictions, separation_m, altitude_m, .. } = self.own.options.clone();
             return Message::Ways { ways: predictions, separation_m, altitude_m };
         }
-        let Known { slot, pose, next } = self.own.known;
-        let mission = self.own.airplane().mission.clone();
-        Message::Model { pose, next: next as u32, mission, airplane: slot }
+        let Known { slot, pose, next, orders, altitude_m } = self.own.known;
+        let mission = self.own.mission().to_vec();
+        Message::Model { pose, next: next as u32, mission, airplane: slot, orders, altitude_m }
     }
 
     /// Goes on as far as what has been heard allows.
@@ -231,8 +238,8 @@ impl network::Agent for Agent<'_> {
             Message::Ways { ways, separation_m, altitude_m } => {
                 self.options.insert(from, Options::new(ways, separation_m, altitude_m));
             }
-            Message::Model { pose, next, mission, airplane } => {
-                let known = Known { slot: airplane, pose, next: next as usize };
+            Message::Model { pose, next, mission, airplane: slot, orders, altitude_m } => {
+                let known = Known { slot, pose, next: next as usize, orders, altitude_m };
                 let options = self.own.world.options_towards(known, &mission);
                 self.options.insert(from, options);
             }

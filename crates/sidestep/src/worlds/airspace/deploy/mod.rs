@@ -18,10 +18,10 @@ mod network;
 mod pim;
 mod team;
 
-use super::airplane::Action;
+use super::airplane::{Action, Point};
 use super::decide::Known;
 use super::objective::Options;
-use super::world::{Airplane, AirspaceWorld};
+use super::world::AirspaceWorld;
 use crate::collectives::{Estimator, Order, Player, Settings, Utility};
 pub use network::Traffic;
 use serde::{Deserialize, Serialize};
@@ -86,8 +86,8 @@ impl Own<'_> {
         self.world.uniform(self.known.slot, self.now, k)
     }
 
-    fn airplane(&self) -> &Airplane {
-        &self.world.airplanes[self.known.slot as usize]
+    fn mission(&self) -> &[Point] {
+        self.world.stage(self.known.slot, self.known.orders).mission
     }
 
     /// The next `block` samples of a player after `drawn`.
