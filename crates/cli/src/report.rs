@@ -2,7 +2,7 @@
 
 use crate::console::{aligned, duration, grouped};
 use crate::driver::Effort;
-use crate::worlds::Run;
+use crate::worlds::{Run, Told};
 use serde::Serialize;
 use serde_json::Value;
 use sidestep::kernel::Cycle;
@@ -53,6 +53,11 @@ pub(crate) struct Summary {
     metrics: Value,
     /// The run folder, if there is one.
     folder: Option<PathBuf>,
+    /// What was found in the file of another program's form that the scenario was made from.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    file: Option<Value>,
+    #[serde(skip)]
+    file_lines: Lines,
 }
 
 /// Seconds per phase, by the clock of worker 0.
@@ -127,7 +132,15 @@ impl Summary {
             phases_s: Phases::new(run.phase_times(), cost.recording),
             metrics: run.metrics(),
             folder: folder.map(Path::to_path_buf),
+            file: None,
+            file_lines: Vec::new(),
         }
+    }
+
+    /// Adds what was found in the file that the scenario was made from.
+    pub(crate) fn tell_of_file(&mut self, told: Told) {
+        self.file = Some(told.json);
+        self.file_lines = told.lines;
     }
 
     /// Whether the run reached its end.
@@ -147,6 +160,7 @@ impl Summary {
             line("cycles", self.cycles_words()),
         ];
         lines.extend(outcome);
+        lines.extend(self.file_lines.iter().cloned());
         if self.cycles_timed > 0 {
             lines.push(line("speed", self.speed()));
             lines.push(line("time", self.phases_s.words()));

@@ -1,6 +1,6 @@
 //! `sidestep check`: what a scenario describes, or what is wrong with it.
 
-use crate::console::Console;
+use crate::console::{Console, aligned};
 use crate::exit::{ExitCode, Failure};
 use crate::plan::ScenarioArgs;
 use crate::worlds;
@@ -33,7 +33,7 @@ pub(crate) fn check(args: &CheckArgs, console: Console) -> Result<ExitCode, Fail
         let mut json = told.json.clone();
         json["airplanes"] = 0.into();
         json["no_scenario"] = error.to_string().into();
-        console.result(&json, || format!("{error}\n{}", told.text));
+        console.result(&json, || format!("{error}\n{}", aligned(&told.lines)));
         return Ok(ExitCode::Done);
     }
     let (source, compiled) = compiled?;
@@ -42,7 +42,7 @@ pub(crate) fn check(args: &CheckArgs, console: Console) -> Result<ExitCode, Fail
         if let (Some(all), Value::Object(more)) = (found.json.as_object_mut(), told.json) {
             all.extend(more);
         }
-        found.text.push_str(&told.text);
+        found.text.push_str(&aligned(&told.lines));
     }
     let heading = format!("{} is a valid scenario\n", args.scenario.file.display());
     console.result(&found.json, || heading + &found.text);

@@ -7,7 +7,7 @@ use crate::interrupt;
 use crate::picture;
 use crate::recording::Recording;
 use crate::report::{Cost, Status, Summary, SummaryFile};
-use crate::worlds::Run;
+use crate::worlds::{Run, Told};
 use sidestep::kernel::Cycle;
 use sidestep::kernel::ports::RecordError;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -20,6 +20,8 @@ pub(super) struct Journey {
     pub(super) workers: usize,
     /// Where to stop, if before the planned end.
     pub(super) until: Option<Cycle>,
+    /// What to report of the file that the scenario was made from.
+    pub(super) told: Option<Told>,
 }
 
 /// Goes to the end (or until Ctrl-C), stores and prints the report.
@@ -27,13 +29,16 @@ pub(super) struct Journey {
 /// # Errors
 /// When something cannot be stored.
 pub(super) fn travel(journey: Journey, console: Console) -> Result<ExitCode, Failure> {
-    let Journey { mut run, mut recording, workers, until } = journey;
+    let Journey { mut run, mut recording, workers, until, told } = journey;
     let until = until.unwrap_or(run.plan().cycles);
     let effort = drive_guarded(run.as_mut(), until, recording.as_mut(), console)?;
     let folder = recording.as_ref().map(|r| r.folder().path().to_path_buf());
     let took = recording.as_ref().map_or(Duration::ZERO, Recording::took);
     let cost = Cost { workers, effort, recording: took };
-    let summary = Summary::new(run.as_ref(), cost, folder.as_deref());
+    let mut summary = Summary::new(run.as_ref(), cost, folder.as_deref());
+    if let Some(told) = told {
+        summary.tell_of_file(told);
+    }
     if let Some(recording) = recording {
         store(run.as_mut(), recording, &summary, console)?;
     }

@@ -6,7 +6,7 @@ use crate::exit::{ExitCode, Failure};
 use crate::interrupt;
 use crate::plan::{ScenarioArgs, WorkersArg};
 use crate::recording::Recording;
-use crate::worlds::{Compiled, Run};
+use crate::worlds::{self, Compiled, Run};
 use clap::Args;
 use sidestep::scenario::Source;
 use sidestep_record::Existing;
@@ -18,6 +18,8 @@ Examples:
   sidestep run office.toml --cycles 50000 --seed 7 --workers 4
   sidestep run office.toml --regime sensors --set robots.0.count=40 --set map.box_size_m=0.2
   sidestep run office.toml --json | jq .metrics.contacts
+  sidestep run tracks.csv                                   replay recorded traffic
+  sidestep run tracks.csv --set airspace.replay_until_s=600 fly it anew from then on
 
 Without --out nothing is written. The folder holds scenario.toml (resolved), summary.json,
 trajectories/ and events/ (Parquet), trajectories.svg and .png, and a checkpoint.";
@@ -47,6 +49,7 @@ pub(crate) struct RunArgs {
 /// When the scenario or the folder is wrong, or results cannot be stored.
 pub(crate) fn run(args: &RunArgs, console: Console) -> Result<ExitCode, Failure> {
     let (source, compiled) = args.scenario.compile()?;
+    let told = worlds::told_of(&args.scenario.file)?;
     let workers = args.workers.count();
     interrupt::listen()?;
     let (run, recording) = match &args.out {
@@ -57,7 +60,7 @@ pub(crate) fn run(args: &RunArgs, console: Console) -> Result<ExitCode, Failure>
             (run, Some(recording))
         }
     };
-    travel(Journey { run, recording, workers, until: None }, console)
+    travel(Journey { run, recording, workers, until: None, told }, console)
 }
 
 /// A run and the new folder that it is recorded to.

@@ -90,6 +90,15 @@ pub(crate) struct Said {
     pub(crate) text: String,
 }
 
+/// What a file of another program's form holds beside the scenario that it stands for.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Told {
+    /// For machines.
+    pub(crate) json: Value,
+    /// For people.
+    pub(crate) lines: Lines,
+}
+
 /// How a recomputed state compares with what was recorded of it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Comparison {
@@ -152,11 +161,12 @@ pub(crate) fn translated(file: &Path) -> Result<Option<String>, InputError> {
     airspace::translated(file)
 }
 
-/// What `check` says beside the scenario's contents of a file of another form.
+/// What `check` and `run` say beside the scenario of a file of another form: which of its
+/// commands are not acted on, and what in it cannot be read.
 ///
 /// # Errors
 /// When it cannot be read.
-pub(crate) fn told_of(file: &Path) -> Result<Option<Said>, InputError> {
+pub(crate) fn told_of(file: &Path) -> Result<Option<Told>, InputError> {
     airspace::told_of(file)
 }
 

@@ -101,4 +101,10 @@ fn a_bluesky_file_is_a_scenario_and_check_counts_its_commands() {
     let ran = place.json(&["run", "two.scn", "--cycles", "5", "--out", "two"]);
     assert_eq!(ran["metrics"]["airplanes"], 2);
     assert!(place.read("two/scenario.toml").contains("[[airplanes]]"));
+    assert_eq!(ran["file"]["not_understood"]["MCRE"], 1, "{ran}");
+    assert_eq!(ran["file"]["unparsed_lines"], 1, "{ran}");
+    let report = place.run(&["run", "two.scn", "--cycles", "5"]).out();
+    for expected in ["not acted on", "MCRE 1", "display only", "PAN 1", "two.scn:5:13"] {
+        assert!(report.contains(expected), "{expected} is missing in\n{report}");
+    }
 }

@@ -1,6 +1,7 @@
 //! Promises of the library, one module each; every module begins by quoting its promise.
 
 mod airspace;
+mod airspace_traffic;
 mod closed_loop;
 mod common;
 mod determinism;

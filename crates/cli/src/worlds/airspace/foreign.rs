@@ -1,11 +1,12 @@
 //! Traffic in other programs' files, taken as scenarios.
 
-use super::Said;
+use super::Told;
 use crate::console::grouped;
 use serde_json::json;
-use sidestep::import::{bluesky, traffic};
+use sidestep::import::bluesky::{self, ScnFile};
+use sidestep::import::traffic::{self, RecordedTraffic};
 use sidestep::kernel::InputError;
-use sidestep::worlds::airspace::traffic::{from_bluesky, from_tracks};
+use sidestep::worlds::airspace::traffic::{from_bluesky, from_tracks, has_length, not_flown};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -42,31 +43,64 @@ pub(crate) fn translated(file: &Path) -> Result<Option<String>, InputError> {
 }
 
 /// See [`crate::worlds::told_of`].
-pub(crate) fn told_of(file: &Path) -> Result<Option<Said>, InputError> {
-    let Form::Bluesky = form(file) else { return Ok(None) };
-    let scn = bluesky::read(file)?;
+pub(crate) fn told_of(file: &Path) -> Result<Option<Told>, InputError> {
+    match form(file) {
+        Form::Bluesky => Ok(Some(told_of_bluesky(&bluesky::read(file)?))),
+        Form::Tracks => Ok(Some(told_of_tracks(&traffic::read(file)?))),
+        Form::Other => Ok(None),
+    }
+}
+
+fn told_of_bluesky(scn: &ScnFile) -> Told {
+    let words = |errors: &[InputError]| errors.iter().map(ToString::to_string).collect::<Vec<_>>();
     let json = json!({
         "command_lines": scn.command_lines,
         "unparsed_lines": scn.unparsed.len(),
-        "unparsed": scn.unparsed.iter().map(ToString::to_string).collect::<Vec<_>>(),
+        "unparsed": words(&scn.unparsed),
+        "refused": words(&scn.refused),
         "commands": scn.commands,
         "not_understood": scn.not_understood,
+        "not_flown": not_flown(scn),
         "ignored": scn.ignored,
         "unresolved_places": scn.unresolved_places.len(),
     });
-    let mut text = format!("  command lines    {}\n", grouped(scn.command_lines));
-    text.push_str(&listed("not acted on", &scn.not_understood));
-    text.push_str(&listed("display only", &scn.ignored));
-    for error in &scn.unparsed {
-        text.push_str(&format!("  unparsed         {error}\n"));
-    }
-    Ok(Some(Said { json, text }))
+    let mut lines = vec![("command lines".to_string(), grouped(scn.command_lines))];
+    lines.extend(counted("not acted on", &scn.not_understood));
+    lines.extend(counted("not flown", &not_flown(scn)));
+    lines.extend(counted("display only", &scn.ignored));
+    lines.extend(listed("unparsed", &scn.unparsed));
+    lines.extend(listed("not carried out", &scn.refused));
+    Told { json, lines }
 }
 
-fn listed(name: &str, counts: &BTreeMap<String, u64>) -> String {
-    if counts.is_empty() {
-        return String::new();
-    }
+fn told_of_tracks(recorded: &RecordedTraffic) -> Told {
+    let (rows, repeated) = (recorded.rows as u64, recorded.repeated_rows as u64);
+    let single = recorded.tracks.iter().filter(|track| !has_length(track)).count() as u64;
+    let json = json!({
+        "rows": rows,
+        "aircraft": recorded.tracks.len(),
+        "repeated_rows": repeated,
+        "aircraft_of_one_row": single,
+    });
+    let aircraft = grouped(recorded.tracks.len() as u64);
+    let mut lines = vec![("rows".to_string(), format!("{} of {aircraft} aircraft", grouped(rows)))];
+    let mut left_out = |name: &str, n: u64| {
+        if n > 0 {
+            lines.push((name.to_string(), format!("{}, left out", grouped(n))));
+        }
+    };
+    left_out("repeated rows", repeated);
+    left_out("aircraft of one row", single);
+    Told { json, lines }
+}
+
+/// Names with their counts on one line; no line for none.
+fn counted(name: &str, counts: &BTreeMap<String, u64>) -> Option<(String, String)> {
     let words: Vec<String> = counts.iter().map(|(name, n)| format!("{name} {n}")).collect();
-    format!("  {name:<15}  {}\n", words.join(", "))
+    (!words.is_empty()).then(|| (name.to_string(), words.join(", ")))
+}
+
+/// A line per error, which says where in the file it is.
+fn listed(name: &str, errors: &[InputError]) -> impl Iterator<Item = (String, String)> {
+    errors.iter().map(move |error| (name.to_string(), error.to_string()))
 }

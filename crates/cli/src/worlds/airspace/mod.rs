@@ -5,7 +5,7 @@ mod picture;
 
 pub(super) use foreign::{told_of, translated};
 
-use super::{Comparison, Pictured, Plan, Resolved, Run, Said};
+use super::{Comparison, Pictured, Plan, Resolved, Run, Said, Told};
 use crate::console::grouped;
 use crate::exit::Failure;
 use crate::report::Lines;
@@ -15,7 +15,7 @@ use sidestep::kernel::cycle::PhaseTimes;
 use sidestep::kernel::ports::{RecordError, Recorder, TableSchema};
 use sidestep::kernel::{Cycle, Digest, InputError, Simulation};
 use sidestep::scenario::Source;
-use sidestep::worlds::airspace::metrics::Metrics;
+use sidestep::worlds::airspace::metrics::{Metrics, TooClose};
 use sidestep::worlds::airspace::scenario::Compiled;
 use sidestep::worlds::airspace::simulation::AirspaceSimulation;
 use sidestep::worlds::airspace::state::AirplaneRecord;
@@ -89,30 +89,40 @@ impl Run for AirspaceRun {
     fn contents(&self) -> Said {
         let (compiled, world) = (self.simulation.compiled(), self.simulation.world());
         let shield = if world.shield { "on" } else { "off" };
+        let recorded = world.airplanes.iter().filter(|a| a.track.is_some()).count() as u64;
+        // The JSON of a time that never comes is null.
+        let until_s = match world.replay_cycles {
+            Cycle::MAX => f64::INFINITY,
+            cycles => world.starts_s(cycles),
+        };
         let json = json!({
             "airplanes": world.airplanes.len(),
             "method": world.method.name(),
             "shield": shield,
             "dt_s": world.timing.dt_s,
             "too_close": compiled.too_close,
+            "recorded": recorded,
+            "replay_until_s": (recorded > 0).then_some(until_s),
         });
         let mut text = format!(
             "  airplanes        {}\n  method           {}, shield {shield}\n",
             grouped(world.airplanes.len() as u64),
             world.method.name(),
         );
+        if recorded > 0 {
+            let until =
+                if until_s.is_finite() { format!("until {until_s} s") } else { "all".into() };
+            text.push_str(&format!("  recorded         {}, replayed {until}\n", grouped(recorded)));
+        }
         text.push_str(&too_close(&compiled.too_close));
         Said { json, text }
     }
 
     fn outcome(&self) -> Lines {
-        let mut lines = outcome(&self.simulation.airspace_metrics());
-        let too_close = &self.simulation.compiled().too_close;
-        if !too_close.is_empty() {
-            let pairs: Vec<String> =
-                too_close.iter().take(5).map(|(a, b)| format!("{a} and {b}")).collect();
-            lines.push(line("WARNING", format!("start too close: {}", pairs.join(", "))));
-        }
+        let metrics = self.simulation.airspace_metrics();
+        let mut lines = outcome(&metrics);
+        lines.extend(on_the_way(&metrics));
+        lines.extend(warning(&metrics.too_close));
         lines
     }
 
@@ -149,6 +159,36 @@ fn too_close(pairs: &[(u32, u32)]) -> String {
         format!("  warning          airplanes {a} and {b} start too close for the shield\n")
     };
     pairs.iter().map(warn).collect()
+}
+
+/// What was recorded, told or removed; no lines where there was nothing of that.
+fn on_the_way(m: &Metrics) -> Lines {
+    let mut lines = Vec::new();
+    if m.replayed > 0 {
+        lines.push(line("replayed", format!("{} to the end of their tracks", grouped(m.replayed))));
+    }
+    if m.left > 0 {
+        lines.push(line("left", format!("{} before they had arrived", grouped(m.left))));
+    }
+    if m.orders + m.orders_delayed > 0 {
+        let (done, waits) = (grouped(m.orders), grouped(m.orders_delayed));
+        lines.push(line("orders", format!("{done} carried out, delayed {waits} times by one dt")));
+    }
+    lines
+}
+
+/// Names the first pairs that came in too close, and counts the others.
+fn warning(too_close: &[TooClose]) -> Option<(String, String)> {
+    const NAMED: usize = 5;
+    let named = too_close.iter().take(NAMED).map(|TooClose { at_s, airplanes: [a, b] }| {
+        if *at_s > 0.0 { format!("{a} and {b} at {at_s} s") } else { format!("{a} and {b}") }
+    });
+    let mut pairs: Vec<String> = named.collect();
+    if too_close.len() > NAMED {
+        pairs.push(format!("and {} more", grouped((too_close.len() - NAMED) as u64)));
+    }
+    let told = || line("WARNING", format!("start too close for the shield: {}", pairs.join(", ")));
+    (!too_close.is_empty()).then(told)
 }
 
 fn line(name: &str, value: String) -> (String, String) {

@@ -143,7 +143,7 @@ impl<'p> Interpreter<'p> {
             "DEFWPT" => self.define(arguments),
             "ADDWPT" => self.add_way_point(time_s, arguments),
             "AFTER" => self.add_way_point_after(time_s, arguments),
-            "ORIG" | "DEST" => self.set_end(name, arguments),
+            "ORIG" | "DEST" => self.set_end(name, time_s, arguments),
             "HDG" | "HEADING" | "TURN" | "SPD" | "SPEED" | "ALT" | "VS" | "LNAV" | "VNAV" => {
                 self.change(name, time_s, arguments)
             }
@@ -177,6 +177,7 @@ impl<'p> Interpreter<'p> {
             way_points: Vec::new(),
             origin: None,
             destination: None,
+            destination_s: None,
             changes: Vec::new(),
             deleted_s: None,
         };
@@ -310,7 +311,7 @@ impl<'p> Interpreter<'p> {
     }
 
     /// `ORIG aircraft,place` and `DEST aircraft,place`
-    fn set_end(&mut self, name: &str, arguments: &mut Arguments) -> Done {
+    fn set_end(&mut self, name: &str, time_s: f64, arguments: &mut Arguments) -> Done {
         let id = arguments.peek();
         let index = self.existing(arguments)?;
         if arguments.remaining() == 0 {
@@ -319,8 +320,11 @@ impl<'p> Interpreter<'p> {
         let place = self.place(arguments)?;
         self.note_unresolved(arguments.command, id, &place);
         let aircraft = &mut self.drafts[index].aircraft;
-        let end = if name == "ORIG" { &mut aircraft.origin } else { &mut aircraft.destination };
-        *end = Some(place);
+        if name == "ORIG" {
+            aircraft.origin = Some(place);
+        } else {
+            (aircraft.destination, aircraft.destination_s) = (Some(place), Some(time_s));
+        }
         Ok(Outcome::Done)
     }
 

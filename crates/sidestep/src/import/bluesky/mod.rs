@@ -173,6 +173,8 @@ pub struct ScnAircraft {
     pub origin: Option<Place>,
     /// Where it goes after the last way-point.
     pub destination: Option<Place>,
+    /// When it was told so, in s.
+    pub destination_s: Option<f64>,
     /// What it is told at a time in s, sorted by time.
     pub changes: Vec<(f64, Change)>,
     /// When it vanishes, in s.

@@ -115,6 +115,7 @@ impl Pattern {
             way_points: Vec::new(),
             origin: None,
             destination: Some(Place::At(goal)),
+            destination_s: Some(self.created_s),
             changes: Vec::new(),
             deleted_s: None,
         }

@@ -6,8 +6,9 @@ use super::baseline::{Moving, mvp, orca};
 use super::deploy::contact::Contacts;
 use super::deploy::{Decided, Deployment, Traffic};
 use super::objective::{Options, game};
+use super::orders::Stage;
 use super::shield::Way;
-use super::world::{Airplane, AirspaceWorld, Method};
+use super::world::{AirspaceWorld, Method};
 use crate::collectives::{Estimator, optimize};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::math;
@@ -19,6 +20,9 @@ pub(super) struct Known {
     pub(super) slot: Slot,
     pub(super) pose: Pose,
     pub(super) next: usize,
+    /// Orders carried out.
+    pub(super) orders: u32,
+    pub(super) altitude_m: f64,
 }
 
 /// One optimization: of a group, in a cycle.
@@ -107,7 +111,7 @@ impl AirspaceWorld {
     }
 
     fn moving(&self, known: Known) -> Moving {
-        let Airplane { model, mission, altitude_m, .. } = &self.airplanes[known.slot as usize];
+        let Stage { model, mission, .. } = self.stage(known.slot, known.orders);
         let Pose { at, psi_rad } = known.pose;
         let v = model.v_m_s;
         let toward = mission.get(known.next).map_or(psi_rad, |&goal| {
@@ -119,15 +123,14 @@ impl AirspaceWorld {
             velocity: [v * math::cos(psi_rad), v * math::sin(psi_rad)],
             preferred: [v * math::cos(toward), v * math::sin(toward)],
             separation_m: model.separation_m,
-            altitude_m: *altitude_m,
+            altitude_m: known.altitude_m,
         }
     }
 
     /// Straight to the way-point, and the other actions by how little they differ from that.
     fn straight(&self, known: Known) -> Vec<Action> {
-        let i = known.slot as usize;
-        let mission = &self.airplanes[i].mission;
-        self.by_turn(known, self.steer(&self.pilot(i, mission), known.pose, known.next))
+        let Stage { model, mission, .. } = self.stage(known.slot, known.orders);
+        self.by_turn(known, self.steer(&self.pilot(model, mission), known.pose, known.next))
     }
 
     /// Proceeding, and the other actions by how little they differ from a turn rate.
@@ -198,25 +201,24 @@ impl AirspaceWorld {
     /// Where each action would lead an airplane. In the air, way-points drift against the
     /// wind; over one horizon they are taken where they will be met on a straight way.
     pub(super) fn options(&self, known: Known) -> Options {
-        self.options_towards(known, &self.airplanes[known.slot as usize].mission)
+        self.options_towards(known, self.stage(known.slot, known.orders).mission)
     }
 
     /// The same for a mission that was told.
     pub(super) fn options_towards(&self, known: Known, mission: &[Point]) -> Options {
-        let i = known.slot as usize;
+        let model = self.stage(known.slot, known.orders).model;
         let mission = self.drifted(mission, known);
-        let pilot = self.pilot(i, &mission);
+        let pilot = self.pilot(model, &mission);
         let predict =
             |action: &Action| pilot.predict(*action, known.pose, known.next, &self.timing);
-        let predictions = self.actions[i].iter().map(predict).collect();
-        let Airplane { model, altitude_m, .. } = &self.airplanes[i];
-        Options::new(predictions, model.separation_m, *altitude_m)
+        let predictions = self.actions_of(known.slot).iter().map(predict).collect();
+        Options::new(predictions, model.separation_m, known.altitude_m)
     }
 
     /// The mission as seen from the moving air: each way-point where it will be when the
     /// airplane comes to it.
     fn drifted(&self, mission: &[Point], known: Known) -> Vec<Point> {
-        let airplane = &self.airplanes[known.slot as usize];
+        let model = self.stage(known.slot, known.orders).model;
         let [wx, wy] = self.wind_m_s;
         if wx == 0.0 && wy == 0.0 {
             return mission.to_vec();
@@ -224,7 +226,7 @@ impl AirspaceWorld {
         let (mut at, mut flown_s) = (known.pose.at, 0.0);
         let mut drifted = mission.to_vec();
         for goal in drifted.iter_mut().skip(known.next) {
-            let heading = self.aim(at, *goal, airplane.model.v_m_s);
+            let heading = self.aim(at, *goal, model.v_m_s);
             let ground = [heading[0] - at[0] + wx, heading[1] - at[1] + wy];
             let speed_m_s = sidestep_kernel::math::hypot(ground[0], ground[1]).max(1e-3);
             flown_s += super::airplane::distance_m(at, *goal) / speed_m_s;
@@ -247,9 +249,8 @@ impl AirspaceWorld {
     }
 
     fn way(&self, known: Known, action: Action) -> Way {
-        let i = known.slot as usize;
-        let airplane = &self.airplanes[i];
-        let pilot: Pilot<'_> = self.pilot(i, &airplane.mission);
+        let Stage { model, mission, .. } = self.stage(known.slot, known.orders);
+        let pilot: Pilot<'_> = self.pilot(model, mission);
         let (mut pose, mut next) = (known.pose, known.next);
         let mut omegas_rad_s = Vec::new();
         for k in 0..self.timing.points_per_dt() {
@@ -263,7 +264,7 @@ impl AirspaceWorld {
                 _ => self.steer(&pilot, pose, next),
             };
             omegas_rad_s.push(omega);
-            pose = self.blown(pose.step(airplane.model.v_m_s, omega, self.timing.dtau_s));
+            pose = self.blown(pose.step(model.v_m_s, omega, self.timing.dtau_s));
             next = pilot.next(pose, next);
         }
         Way { omegas_rad_s }

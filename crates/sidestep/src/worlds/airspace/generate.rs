@@ -38,6 +38,9 @@ fn airplane(order: &Order<'_>, from: Point, to: Vec<Point>) -> Airplane {
         mission: to,
         altitude_m: 0.0,
         appears_s: 0.0,
+        leaves_s: f64::INFINITY,
+        orders: Vec::new(),
+        track: None,
     }
 }
 

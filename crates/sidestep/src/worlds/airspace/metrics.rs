@@ -1,19 +1,22 @@
 //! What came of a run.
 
+use super::books::LOOKS_PER_STEP;
 use super::decide::Effort;
 use super::events::{Event, EventKind};
-use super::react::LOOKS_PER_STEP;
-use super::state::{AirspaceState, PairRecord};
+use super::state::{AirspaceState, Cell, PairRecord};
 use super::world::AirspaceWorld;
 use serde::{Deserialize, Serialize};
-use sidestep_kernel::EntityId;
-use std::collections::BTreeMap;
+use sidestep_kernel::{Cycle, EntityId};
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Everything that a run books beside its state, and that a checkpoint keeps.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Ledger {
     /// Pairs that came near each other, by ids.
     pub pairs: BTreeMap<(EntityId, EntityId), PairRecord>,
+    /// Pairs without fallbacks that are apart when the later one of them came under the method,
+    /// after the cycle in which that was.
+    pub too_close: BTreeSet<(Cycle, EntityId, EntityId)>,
     /// What optimizations took.
     pub effort: Effort,
     /// How often what happened.
@@ -77,6 +80,25 @@ pub struct Metrics {
     pub contacts_lost: u64,
     /// Times that an airplane's agent ran out of time.
     pub deadlines_missed: u64,
+    /// Airplanes that were removed before they had arrived.
+    pub left: u64,
+    /// Airplanes that arrived at the end of their recorded way, which nobody changed.
+    pub replayed: u64,
+    /// Orders carried out.
+    pub orders: u64,
+    /// Times that an order waited for the next `dt`, because no orbit was apart from those of others.
+    pub orders_delayed: u64,
+    /// Pairs for which the shield promises nothing.
+    pub too_close: Vec<TooClose>,
+}
+
+/// Two airplanes that were too near each other for the shield when the later one came in.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct TooClose {
+    /// When that was, seconds after the start.
+    pub at_s: f64,
+    /// The two.
+    pub airplanes: [EntityId; 2],
 }
 
 /// What came of one airplane.
@@ -84,9 +106,10 @@ pub struct Metrics {
 pub struct AirplaneMetrics {
     /// Its id.
     pub airplane: EntityId,
-    /// Seconds from its appearance to its arrival, if it has arrived.
+    /// Seconds from its appearance to its arrival, if it has arrived; of a recorded one, from
+    /// when it was handed over.
     pub flown_s: Option<f64>,
-    /// Seconds that the flight takes alone.
+    /// Seconds that the flight takes alone; 0 where it flew its recorded way to the end.
     pub alone_s: f64,
     /// Time beyond that, percent of it.
     pub delay_percent: Option<f64>,
@@ -94,6 +117,12 @@ pub struct AirplaneMetrics {
     pub shield_overrides: u32,
     /// of these, falls back to its orbit.
     pub shield_orbits: u32,
+    /// Whether it was removed before it had arrived.
+    pub left: bool,
+    /// Orders carried out.
+    pub orders: u16,
+    /// Times that one had to wait for the next `dt`.
+    pub orders_delayed: u16,
 }
 
 impl AirplaneMetrics {
@@ -107,9 +136,9 @@ impl AirspaceWorld {
     /// Metrics of one airplane.
     pub fn airplane_metrics(&self, state: &AirspaceState, id: EntityId) -> AirplaneMetrics {
         let (cell, alone_s) = (&state.airplanes[id as usize], self.alone_s[id as usize]);
-        let appeared_s = self.appears_in(id as usize) as f64 * self.timing.dt_s;
-        let arrived_s = || cell.arrived.get() as f64 * self.timing.dtau_s;
-        let flown_s = (!cell.is_flying()).then(|| arrived_s() - appeared_s);
+        let joined_s = self.starts_s(self.joins_in(id as usize));
+        let arrived_s = cell.arrived_step().map(|step| step as f64 * self.timing.dtau_s);
+        let flown_s = arrived_s.map(|s| s - joined_s).filter(|_| !self.is_replayed_to_the_end(id));
         AirplaneMetrics {
             airplane: id,
             flown_s,
@@ -119,7 +148,16 @@ impl AirspaceWorld {
                 .map(|s| 100.0 * (s - alone_s) / alone_s),
             shield_overrides: cell.overrides.get(),
             shield_orbits: cell.orbits.get(),
+            left: cell.has_left(),
+            orders: cell.orders.get(),
+            orders_delayed: cell.waits.get(),
         }
+    }
+
+    fn is_replayed_to_the_end(&self, id: EntityId) -> bool {
+        let joined_s = self.starts_s(self.joins_in(id as usize));
+        let track = &self.airplanes[id as usize].track;
+        track.as_ref().is_some_and(|track| track.ends_s() <= joined_s)
     }
 
     /// Metrics of a run so far; `decide_s` is the time spent deciding.
@@ -127,6 +165,11 @@ impl AirspaceWorld {
         let all = (0..self.airplanes.len() as EntityId).map(|id| self.airplane_metrics(state, id));
         let all: Vec<AirplaneMetrics> = all.collect();
         let delays: Vec<f64> = all.iter().filter_map(|a| a.delay_percent).collect();
+        let count =
+            |is: &dyn Fn(&Cell) -> bool| state.airplanes.iter().filter(|c| is(c)).count() as u64;
+        let ended =
+            |a: &&AirplaneMetrics| state.airplanes[a.airplane as usize].arrived_step().is_some();
+        let replayed = all.iter().filter(ended).filter(|a| self.is_replayed_to_the_end(a.airplane));
         let mean = |sum: f64, n: usize| (n > 0).then(|| sum / n as f64);
         let nearest = ledger.pairs.values().map(|r| r.nearest_m).min_by(f64::total_cmp);
         let looks: u64 = ledger.pairs.values().map(|r| r.lost_looks).sum();
@@ -135,7 +178,7 @@ impl AirspaceWorld {
             min_separation_m: nearest,
             losses_of_separation: ledger.pairs.values().map(|r| u64::from(r.losses)).sum(),
             lost_s: looks as f64 * self.timing.dtau_s / LOOKS_PER_STEP as f64,
-            arrived: all.iter().filter(|a| a.flown_s.is_some()).count() as u64,
+            arrived: count(&|cell| cell.arrived_step().is_some()),
             airplanes: all.len() as u64,
             mean_delay_percent: mean(delays.iter().sum(), delays.len()),
             messages: traffic.messages,
@@ -151,10 +194,19 @@ impl AirspaceWorld {
             shield_held_back: ledger.count(EventKind::HeldBack),
             contacts_lost: ledger.count(EventKind::Unheard),
             deadlines_missed: ledger.count(EventKind::Deadline),
+            left: count(&Cell::has_left),
+            replayed: replayed.count() as u64,
+            orders: all.iter().map(|a| u64::from(a.orders)).sum(),
+            orders_delayed: all.iter().map(|a| u64::from(a.orders_delayed)).sum(),
+            too_close: ledger.too_close.iter().map(|pair| self.too_close(pair)).collect(),
         }
     }
 
-    /// Whether everybody has arrived by now.
+    fn too_close(&self, &(cycle, a, b): &(Cycle, EntityId, EntityId)) -> TooClose {
+        TooClose { at_s: self.starts_s(cycle), airplanes: [a, b] }
+    }
+
+    /// Whether everybody has arrived or left by now.
     pub fn is_over(&self, state: &AirspaceState) -> bool {
         state.airplanes.iter().all(|cell| !cell.is_flying())
     }

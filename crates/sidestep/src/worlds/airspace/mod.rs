@@ -4,32 +4,40 @@
 //! Collectives for Collision Avoidance in AGENTFLY" (2009) for its source.
 //!
 //! ```text
-//! scenario.rs, generate.rs -> world.rs (immutable), state.rs (cells)
-//! near each other -> groups;  decide.rs -> shield.rs -> react.rs          one cycle of dt
-//! airplane.rs, objective.rs: motion and cost behind it     metrics.rs: what came of it
+//! scenario.rs, flight_plan.rs, generate.rs -> world.rs (immutable), state.rs (cells)
+//! near each other -> groups;  entry.rs, orders.rs, track.rs: who comes in, and what it is told
+//! decide.rs -> shield.rs -> react.rs                                      one cycle of dt
+//! airplane.rs, levels.rs, objective.rs: motion and cost behind it
+//! books.rs: how near pairs come     metrics.rs: what came of it
 //! ```
 
 pub mod airplane;
 mod baseline;
+mod books;
 mod decide;
 pub mod deploy;
+mod entry;
 pub mod events;
+mod flight_plan;
 mod generate;
+pub mod levels;
 pub mod metrics;
 pub mod objective;
+pub mod orders;
 mod react;
 mod rows;
 pub mod scenario;
 pub mod shield;
 pub mod simulation;
 pub mod state;
+pub mod track;
 pub mod traffic;
 pub mod world;
 
+pub use books::LOOKS_PER_STEP;
 pub use decide::{Effort, Optimization};
 use deploy::Traffic;
 use events::Event;
-pub use react::LOOKS_PER_STEP;
 use sidestep_kernel::conflict::Groups;
 use sidestep_kernel::ports::SystemClock;
 use sidestep_kernel::{Cycle, Slot, World};
@@ -46,6 +54,8 @@ pub struct Scratch {
     /// What the shield has sent.
     exchanged: Traffic,
     events: Vec<Event>,
+    /// Pairs without fallbacks that are apart, of which one came in: cycle and both.
+    too_close: Vec<(Cycle, Slot, Slot)>,
     /// Time spent deciding: told beside the results, never part of them.
     decide_ns: u64,
     clock: SystemClock,
@@ -93,7 +103,7 @@ impl World for AirspaceWorld {
                 continue;
             }
             state.neighborhood.around(cell.pose().at, now, |other| {
-                if other < slot && state.is_near(self, slot, other) {
+                if other < slot && state.is_near(self, (slot, other), now) {
                     groups.join(slot, other);
                 }
             });

@@ -1,34 +1,85 @@
 //! Pool two: the airplanes of a group decide together and fly for `dt`.
 
 use super::Scratch;
-use super::airplane::{Pose, distance_m};
+use super::airplane::{Point, Pose};
 use super::decide::Known;
 use super::deploy::contact::Contacts;
 use super::events::{Event, EventKind};
+use super::levels::Levels;
+use super::orders::Stage;
 use super::shield::{Flyer, Side, Way};
-use super::state::{AirspaceState, PairRecord};
+use super::state::{AirspaceState, LEFT};
+use super::track::Track;
 use super::world::{AirspaceWorld, purpose};
 use sidestep_kernel::distr::normal;
 use sidestep_kernel::ports::Clock;
 use sidestep_kernel::{Cycle, Slot};
 
-/// Looks at the distance of a pair in one step of `dtau`.
-pub const LOOKS_PER_STEP: usize = 10;
-/// Pairs farther apart than this many separations are not kept in the books.
-const WORTH_NOTING: f64 = 4.0;
-
-/// What one airplane flies in this `dt`.
-struct Flight {
-    slot: Slot,
-    way: Way,
-    pose: Pose,
+/// One airplane in this `dt`.
+pub(super) struct Flight<'a> {
+    pub(super) slot: Slot,
+    pub(super) course: Course<'a>,
+    pub(super) pose: Pose,
+    pub(super) altitude_m: f64,
+    /// When it came into the air, seconds after the start.
+    pub(super) since_s: f64,
     next: usize,
-    /// Steps flown until it arrived.
-    arrived: Option<usize>,
+    /// How it ended, as [`super::state::Cell::arrived`] says it.
+    pub(super) ended: Option<u64>,
+}
+
+/// What it follows.
+pub(super) enum Course<'a> {
+    /// What has been decided.
+    Way(Way, Stage<'a>),
+    /// Its recorded way.
+    Track(&'a Track),
+}
+
+impl Flight<'_> {
+    /// Its altitude some seconds after `altitude_m`, on a decided way.
+    fn altitude_after_m(&self, stage: &Stage<'_>, seconds: f64) -> f64 {
+        let most_m = stage.climb_m_s * seconds;
+        self.altitude_m + (stage.altitude_m - self.altitude_m).clamp(-most_m, most_m)
+    }
+
+    /// Where and how high it is `t_s` after the begin of step `k` at `step_s`; `None` where it
+    /// is not in the air.
+    pub(super) fn at(
+        &self,
+        world: &AirspaceWorld,
+        (step_s, k): (f64, usize),
+        t_s: f64,
+    ) -> Option<(Point, f64)> {
+        match &self.course {
+            Course::Way(way, stage) => {
+                let omega = way.omegas_rad_s[k];
+                let [x, y] = self.pose.step(stage.model.v_m_s, omega, t_s).at;
+                let [wx, wy] = world.wind_m_s;
+                Some(([x + wx * t_s, y + wy * t_s], self.altitude_after_m(stage, t_s)))
+            }
+            Course::Track(track) => {
+                let now_s = step_s + t_s;
+                let at = || (track.pose_at(now_s).at, track.altitude_at_m(now_s));
+                track.covers(now_s).then(at)
+            }
+        }
+    }
+
+    /// All levels that it is on during one step.
+    pub(super) fn levels(&self, dtau_s: f64) -> Levels {
+        match &self.course {
+            Course::Way(_, stage) => {
+                Levels::between(self.altitude_m, self.altitude_after_m(stage, dtau_s))
+            }
+            Course::Track(_) => Levels::ALL,
+        }
+    }
 }
 
 impl AirspaceWorld {
-    /// A group decides, the shield filters, all fly; `group` are flying airplanes by id.
+    /// A group decides, the shield filters, all fly, those on recorded ways beside them; `group`
+    /// are the airplanes in the air, by id.
     pub(super) fn fly(
         &self,
         state: &AirspaceState,
@@ -36,23 +87,41 @@ impl AirspaceWorld {
         group: &[Slot],
         scratch: &mut Scratch,
     ) {
-        let known: Vec<Known> = group.iter().map(|&slot| self.known(state, now, slot)).collect();
+        let flown: Vec<Slot> =
+            group.iter().copied().filter(|&slot| !self.is_replayed(slot, now)).collect();
+        if self.shield {
+            self.admit(state, now, &flown, scratch);
+        }
+        self.carry_out(state, now, &flown);
+        let known: Vec<Known> = flown.iter().map(|&slot| self.known(state, now, slot)).collect();
         let began_ns = scratch.clock.now_ns();
-        let mut contacts = state.take_contacts(group);
+        let mut contacts = state.take_contacts(&flown);
         let candidates = self.wanted(&known, now, &mut contacts, scratch);
         scratch.decide_ns += scratch.clock.now_ns() - began_ns;
         let ways = if self.shield {
-            self.shielded(state, (now, group), &candidates, &mut contacts, scratch)
+            self.shielded(state, (now, &flown), &candidates, &mut contacts, scratch)
         } else {
             candidates.into_iter().map(|ways| ways.into_iter().next().unwrap_or_default()).collect()
         };
-        state.put_contacts(group, contacts);
-        let flights = group.iter().zip(ways).map(|(&slot, way)| {
-            let cell = &state.airplanes[slot as usize];
-            let (pose, next) = (cell.pose(), cell.next.get() as usize);
-            Flight { slot, way, pose, next, arrived: None }
+        state.put_contacts(&flown, contacts);
+        let mut ways = ways.into_iter();
+        let flights = group.iter().map(|&slot| {
+            let course = match &self.airplanes[slot as usize].track {
+                Some(track) if self.is_replayed(slot, now) => Course::Track(track),
+                _ => Course::Way(ways.next().unwrap_or_default(), self.stage_now(state, slot)),
+            };
+            self.flight(state, slot, course)
         });
         self.step_all(state, now, flights.collect(), scratch);
+    }
+
+    fn flight<'a>(&self, state: &AirspaceState, slot: Slot, course: Course<'a>) -> Flight<'a> {
+        let cell = &state.airplanes[slot as usize];
+        let recorded_s = self.airplanes[slot as usize].track.as_ref().map_or(0.0, Track::begins_s);
+        let since_s = self.starts_s(self.appears_in(slot as usize)).max(recorded_s);
+        let (pose, altitude_m) = (cell.pose(), cell.altitude_m.get());
+        let next = cell.next.get() as usize;
+        Flight { slot, course, pose, altitude_m, since_s, next, ended: None }
     }
 
     /// What the group knows of an airplane: its position with an error.
@@ -63,7 +132,25 @@ impl AirspaceWorld {
             let mut draws = self.streams.draws(slot, now, purpose::POSITION);
             pose.at.iter_mut().for_each(|v| *v += self.disturbance.position_m * normal(&mut draws));
         }
-        Known { slot, pose, next: cell.next.get() as usize }
+        let (orders, altitude_m) = (u32::from(cell.orders.get()), cell.altitude_m.get());
+        Known { slot, pose, next: cell.next.get() as usize, orders, altitude_m }
+    }
+
+    /// What the shield knows of an airplane.
+    pub(super) fn flyer(&self, state: &AirspaceState, slot: Slot) -> Flyer {
+        let (cell, stage) = (&state.airplanes[slot as usize], self.stage_now(state, slot));
+        Flyer {
+            id: slot,
+            pose: cell.pose(),
+            v_m_s: stage.model.v_m_s,
+            omega_max_rad_s: stage.model.omega_max_rad_s,
+            separation_m: stage.model.separation_m,
+            levels: Levels::between(cell.altitude_m.get(), stage.altitude_m),
+            vertical_m: self.vertical_m,
+            fallback: cell.side(),
+            // Whoever has waited longest goes first, then the smaller id.
+            rank: u64::from(cell.waiting.get()) << 32 | u64::from(!slot),
+        }
     }
 
     fn shielded(
@@ -107,23 +194,6 @@ impl AirspaceWorld {
         ways
     }
 
-    /// An airplane as the shield sees it.
-    fn flyer(&self, state: &AirspaceState, slot: Slot) -> Flyer {
-        let (cell, airplane) = (&state.airplanes[slot as usize], &self.airplanes[slot as usize]);
-        Flyer {
-            id: slot,
-            pose: cell.pose(),
-            v_m_s: airplane.model.v_m_s,
-            omega_max_rad_s: airplane.model.omega_max_rad_s,
-            separation_m: airplane.model.separation_m,
-            altitude_m: airplane.altitude_m,
-            vertical_m: self.vertical_m,
-            fallback: cell.side(),
-            // Whoever has waited longest goes first, then the smaller id.
-            rank: u64::from(cell.waiting.get()) << 32 | u64::from(!slot),
-        }
-    }
-
     fn orbit(&self, side: Side, omega_max_rad_s: f64) -> Way {
         let omega = side.sign() * omega_max_rad_s;
         Way { omegas_rad_s: vec![omega; self.timing.points_per_dt()] }
@@ -133,84 +203,67 @@ impl AirspaceWorld {
         &self,
         state: &AirspaceState,
         now: Cycle,
-        mut flights: Vec<Flight>,
+        mut flights: Vec<Flight<'_>>,
         scratch: &mut Scratch,
     ) {
         let steps = self.timing.points_per_dt();
         for k in 0..steps {
-            self.look(&flights, (now, k), scratch);
-            for flight in flights.iter_mut().filter(|f| f.arrived.is_none()) {
-                let airplane = &self.airplanes[flight.slot as usize];
-                let omega = flight.way.omegas_rad_s[k];
-                let pose = flight.pose.step(airplane.model.v_m_s, omega, self.timing.dtau_s);
-                flight.pose = self.blown(pose);
-                let pilot = self.pilot(flight.slot as usize, &airplane.mission);
-                flight.next = pilot.next(flight.pose, flight.next);
-                if flight.next == airplane.mission.len() {
-                    flight.arrived = Some(k + 1);
-                }
+            let step = now * steps as u64 + k as u64;
+            let step_s = step as f64 * self.timing.dtau_s;
+            for flight in flights.iter_mut().filter(|f| f.ended.is_none()) {
+                let leaves_s = self.airplanes[flight.slot as usize].leaves_s;
+                flight.ended = (leaves_s <= step_s).then_some(LEFT | step);
+            }
+            self.look(&flights, (step_s, k), scratch);
+            for flight in flights.iter_mut().filter(|f| f.ended.is_none()) {
+                self.step(flight, step, k);
             }
         }
         for flight in flights {
-            let cell = &state.airplanes[flight.slot as usize];
-            let mut pose = flight.pose;
-            if self.disturbance.heading_rad > 0.0 {
-                let mut draws = self.streams.draws(flight.slot, now, purpose::HEADING);
-                pose.psi_rad += self.disturbance.heading_rad * normal(&mut draws);
-            }
-            pose.psi_rad = sidestep_kernel::math::wrap_angle(pose.psi_rad);
-            cell.set_pose(pose);
-            cell.next.set(flight.next as u32);
-            if let Some(k) = flight.arrived {
-                cell.arrived.set(now * steps as u64 + k as u64);
-                let delay_s = self.airplane_metrics(state, flight.slot).delay_s();
-                let event = Event::of(now, EventKind::Arrival, flight.slot);
-                scratch.events.push(event.with(delay_s.unwrap_or(0.0)));
-            }
+            self.store(state, now, flight, scratch);
         }
     }
 
-    /// Books the distances of all pairs during step `k`.
-    fn look(&self, flights: &[Flight], (now, k): (Cycle, usize), scratch: &mut Scratch) {
+    /// Flies step `k` of this `dt`, which is step `step` of the run.
+    fn step(&self, flight: &mut Flight<'_>, step: u64, k: usize) {
         let dtau_s = self.timing.dtau_s;
-        for (i, a) in flights.iter().enumerate().filter(|(_, f)| f.arrived.is_none()) {
-            let minds = |b: &&Flight| b.arrived.is_none() && self.on_one_level(a.slot, b.slot);
-            for b in flights[i + 1..].iter().filter(minds) {
-                let model = |f: &Flight| &self.airplanes[f.slot as usize].model;
-                let gap_m = model(a).separation_m.max(model(b).separation_m);
-                let step_m = (model(a).v_m_s + model(b).v_m_s) * dtau_s;
-                if distance_m(a.pose.at, b.pose.at) > WORTH_NOTING * gap_m + step_m {
-                    continue;
-                }
-                let at = |f: &Flight, t_s: f64| {
-                    f.pose.step(model(f).v_m_s, f.way.omegas_rad_s[k], t_s).at
-                };
-                // A loss goes on where the step before has ended; only when one of the two
-                // has just appeared there is none before.
-                let appeared =
-                    self.appears_in(a.slot as usize).max(self.appears_in(b.slot as usize));
-                let begins = now == appeared && k == 0;
-                let mut was_lost = !begins && distance_m(a.pose.at, b.pose.at) < gap_m;
-                let mut record = PairRecord { nearest_m: f64::INFINITY, lost_looks: 0, losses: 0 };
-                for look in 1..=LOOKS_PER_STEP {
-                    let t_s = dtau_s * look as f64 / LOOKS_PER_STEP as f64;
-                    let apart_m = distance_m(at(a, t_s), at(b, t_s));
-                    let is_lost = apart_m < gap_m;
-                    record.nearest_m = record.nearest_m.min(apart_m);
-                    record.lost_looks += u64::from(is_lost);
-                    if is_lost && !was_lost {
-                        record.losses += 1;
-                        let kind = EventKind::LossOfSeparation;
-                        let event = Event::of_pair(now, kind, a.slot, b.slot).with(apart_m);
-                        scratch.events.push(event);
-                    }
-                    was_lost = is_lost;
-                }
-                scratch
-                    .pairs
-                    .entry((a.slot, b.slot))
-                    .and_modify(|r| r.add(record))
-                    .or_insert(record);
+        let is_at_end = match &flight.course {
+            Course::Way(way, stage) => {
+                let omega = way.omegas_rad_s[k];
+                let altitude_m = flight.altitude_after_m(stage, dtau_s);
+                flight.altitude_m = altitude_m;
+                flight.pose = self.blown(flight.pose.step(stage.model.v_m_s, omega, dtau_s));
+                let pilot = self.pilot(stage.model, stage.mission);
+                flight.next = pilot.next(flight.pose, flight.next);
+                flight.next == stage.mission.len()
+            }
+            Course::Track(track) => {
+                let after_s = (step + 1) as f64 * dtau_s;
+                flight.pose = track.pose_at(after_s);
+                flight.altitude_m = track.altitude_at_m(after_s);
+                track.ends_s() <= after_s
+            }
+        };
+        flight.ended = is_at_end.then_some(step + 1);
+    }
+
+    fn store(&self, state: &AirspaceState, now: Cycle, flight: Flight<'_>, scratch: &mut Scratch) {
+        let cell = &state.airplanes[flight.slot as usize];
+        let mut pose = flight.pose;
+        let is_disturbed = matches!(flight.course, Course::Way(..));
+        if is_disturbed && self.disturbance.heading_rad > 0.0 {
+            let mut draws = self.streams.draws(flight.slot, now, purpose::HEADING);
+            pose.psi_rad += self.disturbance.heading_rad * normal(&mut draws);
+        }
+        pose.psi_rad = sidestep_kernel::math::wrap_angle(pose.psi_rad);
+        cell.set_pose(pose);
+        cell.altitude_m.set(flight.altitude_m);
+        cell.next.set(flight.next as u32);
+        if let Some(ended) = flight.ended {
+            cell.arrived.set(ended);
+            if let Some(delay_s) = self.airplane_metrics(state, flight.slot).delay_s() {
+                let event = Event::of(now, EventKind::Arrival, flight.slot);
+                scratch.events.push(event.with(delay_s));
             }
         }
     }

@@ -2,10 +2,14 @@
 
 use super::airplane::{Model, Passing, Point, Pose, Timing};
 use super::deploy::{Deployment, Network, Silence, refuses};
+use super::flight_plan::AirplaneSection;
 use super::generate::{Order as Wanted, generate};
+use super::levels::Levels;
 use super::objective::Objective;
+use super::orders::Task;
 use super::shield::{Flyer, Side, first_fallbacks};
 use super::state::{AirplaneRecord, FLYING, Snapshot};
+use super::track::Track;
 use super::world::{Airplane, AirspaceWorld, Disturbance, Method};
 use crate::collectives::{Choice, Estimator, Order, Settings, Stop, Update, Utility};
 use crate::scenario::{OneOrMany, Source};
@@ -15,6 +19,8 @@ use sidestep_kernel::{InputError, Seed};
 use std::sync::Arc;
 use toml::Spanned;
 
+/// Levels that are apart by what is asked for may seem nearer by this when they were rounded.
+const ROUNDED_M: f64 = 1e-6;
 /// Most airplanes of a scenario.
 const MAX_AIRPLANES: usize = 1_000_000;
 
@@ -111,6 +117,7 @@ struct AirspaceSection {
     max_rounds: Option<u32>,
     choice: Option<Choice>,
     vertical_m: Option<Spanned<f64>>,
+    replay_until_s: Option<Spanned<f64>>,
     wind_m_s: Point,
     position_noise_m: f64,
     heading_noise_deg: f64,
@@ -140,22 +147,6 @@ struct GeneratorSection {
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct ModelSection {
-    v_m_s: Option<f64>,
-    omega_max_deg_s: Option<f64>,
-    separation_m: Option<f64>,
-    turns: Option<usize>,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct AirplaneSection {
-    at_m: Point,
-    heading_deg: f64,
-    way_points_m: Vec<Point>,
-    #[serde(default)]
-    altitude_m: f64,
-    #[serde(default)]
-    appears_s: f64,
     v_m_s: Option<f64>,
     omega_max_deg_s: Option<f64>,
     separation_m: Option<f64>,
@@ -218,6 +209,11 @@ impl Compiled {
             arrived: FLYING,
             counts: [0; 4],
             fallback,
+            altitude_m: match &airplane.track {
+                Some(track) => track.altitude_at_m(airplane.appears_s),
+                None => airplane.altitude_m,
+            },
+            orders: [0; 2],
         };
         let airplanes = self.world.airplanes.iter().zip(&self.fallbacks).map(record).collect();
         Snapshot { cycle: 0, airplanes, contacts: Vec::new() }
@@ -233,18 +229,19 @@ impl Compiler<'_> {
     fn compile(&self) -> Result<Compiled, InputError> {
         let section = &self.file.airspace;
         let streams = Streams::new(Seed(self.file.seed));
-        let airplanes = self.airplanes(&streams)?;
         let timing = self.timing()?;
+        let replay = self.replay(&timing)?;
+        let airplanes = self.airplanes(&streams, replay)?;
         let radius_m = airplanes.iter().map(|a| a.model.separation_m).fold(0.0, f64::max);
         let tolerance_m = self.positive(section.tolerance_m.as_ref(), (radius_m / 5.0).max(1.0))?;
-        let vertical_m = self.positive(section.vertical_m.as_ref(), 300.0)?;
+        let vertical_m = self.positive(section.vertical_m.as_ref(), 300.0)? - ROUNDED_M;
         let noise = [section.position_noise_m, section.heading_noise_deg];
         let numbers = noise.into_iter().chain(section.wind_m_s);
         if numbers.clone().any(|v| !v.is_finite()) || noise.iter().any(|v| *v < 0.0) {
             let cause = "a wind or noise that is negative or no number";
             return Err(self.error(None, cause, "give finite values, noise 0 or more"));
         }
-        let slowest = airplanes.iter().map(|a| a.model.v_m_s).fold(f64::INFINITY, f64::min);
+        let slowest = airplanes.iter().flat_map(speeds_m_s).fold(f64::INFINITY, f64::min);
         let wind = sidestep_kernel::math::hypot(section.wind_m_s[0], section.wind_m_s[1]);
         if wind >= slowest {
             let cause = format!("a wind of {wind} m/s, and airplanes of {slowest} m/s");
@@ -263,6 +260,7 @@ impl Compiler<'_> {
             deployment: section.deployment,
             shield: section.shield != Some(Switch::Off),
             vertical_m,
+            replay_cycles: replay.cycles,
             wind_m_s: section.wind_m_s,
             disturbance: Disturbance {
                 position_m: section.position_noise_m,
@@ -270,6 +268,8 @@ impl Compiler<'_> {
             },
             streams,
             actions: Vec::new(),
+            later: Vec::new(),
+            top_m_s: Vec::new(),
             alone_s: Vec::new(),
             first_fallbacks: Vec::new(),
         }
@@ -425,7 +425,7 @@ impl Compiler<'_> {
         Ok(holds_s)
     }
 
-    fn airplanes(&self, streams: &Streams) -> Result<Vec<Airplane>, InputError> {
+    fn airplanes(&self, streams: &Streams, replay: Replay) -> Result<Vec<Airplane>, InputError> {
         let (span, common) = match &self.file.airplane {
             Some(model) => (Some(model.span()), model.get_ref().clone()),
             None => (None, ModelSection::default()),
@@ -436,7 +436,7 @@ impl Compiler<'_> {
             None => Vec::new(),
         };
         for section in &self.file.airplanes.get_ref().0 {
-            all.push(self.airplane(section, &common)?);
+            all.push(self.airplane(section, &common, replay)?);
         }
         if all.is_empty() {
             let remedy = "add [airspace.generator] with kind and n, or [[airplanes]]";
@@ -477,31 +477,69 @@ impl Compiler<'_> {
         &self,
         section: &Spanned<AirplaneSection>,
         common: &ModelSection,
+        replay: Replay,
     ) -> Result<Airplane, InputError> {
         let s = section.get_ref();
-        let at = Some(section.span());
         let own = ModelSection {
             v_m_s: s.v_m_s.or(common.v_m_s),
             omega_max_deg_s: s.omega_max_deg_s.or(common.omega_max_deg_s),
             separation_m: s.separation_m.or(common.separation_m),
             turns: s.turns.or(common.turns),
         };
-        let model = self.model(&own, at.clone())?;
-        let places = s.way_points_m.iter().chain([&s.at_m]).flatten();
-        let negative = s.appears_s < 0.0;
-        let others = [&s.heading_deg, &s.altitude_m, &s.appears_s];
-        if negative || places.chain(others).any(|v| !v.is_finite() || v.abs() > 1e9) {
+        match s.track(self.source)? {
+            Some(track) => {
+                let v_m_s =
+                    s.v_m_s.unwrap_or_else(|| track.mean_speed_m_s(replay.until_s).max(1.0));
+                let own = ModelSection { v_m_s: Some(v_m_s), ..own };
+                let model = self.model(&own, Some(section.span()))?;
+                Ok(recorded(track, model, replay))
+            }
+            None => self.planned(section, self.model(&own, Some(section.span()))?),
+        }
+    }
+
+    /// An airplane with a flight plan of its own.
+    fn planned(
+        &self,
+        section: &Spanned<AirplaneSection>,
+        model: Model,
+    ) -> Result<Airplane, InputError> {
+        let s = section.get_ref();
+        let at = Some(section.span());
+        let (Some(at_m), Some(heading_deg)) = (s.at_m, s.heading_deg) else {
+            let remedy = "add at_m = [x, y] and heading_deg, or a track";
+            return Err(self.error(at, "an airplane that begins nowhere", remedy));
+        };
+        let mission = s.way_points_m.clone().unwrap_or_default();
+        let (altitude_m, appears_s) = (s.altitude_m.unwrap_or(0.0), s.appears_s.unwrap_or(0.0));
+        let places = mission.iter().chain([&at_m]).flatten();
+        let others = [&heading_deg, &altitude_m, &appears_s];
+        if appears_s < 0.0 || places.chain(others).any(|v| !v.is_finite() || v.abs() > 1e9) {
             let cause = "a position, heading or time that is no number, or absurd";
             return Err(self.error(at, cause, "give metres and seconds below 1e9, and degrees"));
         }
-        if s.way_points_m.is_empty() {
+        if mission.is_empty() {
             let remedy = "add way_points_m = [[x, y], ...]";
             return Err(self.error(at, "an airplane without way-points", remedy));
         }
-        let psi_rad = sidestep_kernel::math::wrap_angle(s.heading_deg.to_radians());
-        let start = Pose { at: s.at_m, psi_rad };
-        let mission = s.way_points_m.clone();
-        Ok(Airplane { model, start, mission, altitude_m: s.altitude_m, appears_s: s.appears_s })
+        let psi_rad = sidestep_kernel::math::wrap_angle(heading_deg.to_radians());
+        let start = Pose { at: at_m, psi_rad };
+        let (orders, leaves_s) = s.orders(self.source)?;
+        Ok(Airplane { model, start, mission, altitude_m, appears_s, leaves_s, orders, track: None })
+    }
+
+    /// How long recorded airplanes follow their tracks.
+    fn replay(&self, timing: &Timing) -> Result<Replay, InputError> {
+        let section = self.file.airspace.replay_until_s.as_ref();
+        let until_s = section.map_or(f64::INFINITY, |s| *s.get_ref());
+        if until_s.is_nan() || until_s < 0.0 {
+            let remedy = "give seconds after the start, 0 to fly all anew, or inf to replay all";
+            let span = section.map(Spanned::span);
+            return Err(self.error(span, format!("replay_until_s = {until_s}"), remedy));
+        }
+        // Beyond the largest number of cycles this is that number.
+        let cycles = (until_s / timing.dt_s).ceil() as u64;
+        Ok(Replay { cycles, until_s: cycles as f64 * timing.dt_s, dt_s: timing.dt_s })
     }
 
     fn model(
@@ -552,22 +590,67 @@ impl Compiler<'_> {
     }
 }
 
+/// How long recorded airplanes follow their tracks.
+#[derive(Debug, Clone, Copy)]
+struct Replay {
+    cycles: u64,
+    /// The end of these cycles.
+    until_s: f64,
+    dt_s: f64,
+}
+
+/// An airplane that follows its track, and then flies on along what is left of it.
+fn recorded(track: Track, model: Model, replay: Replay) -> Airplane {
+    let begins_s = track.begins_s();
+    // One that appears later comes in at the start of a cycle.
+    let appears_s = if (begins_s / replay.dt_s).floor() < replay.cycles as f64 {
+        begins_s
+    } else {
+        (begins_s / replay.dt_s).ceil() * replay.dt_s
+    };
+    let joins_s = replay.until_s.max(appears_s);
+    Airplane {
+        model,
+        start: track.pose_at(appears_s),
+        mission: track.rest(joins_s),
+        altitude_m: track.altitude_at_m(joins_s),
+        appears_s,
+        leaves_s: f64::INFINITY,
+        orders: Vec::new(),
+        track: Some(track),
+    }
+}
+
+/// All speeds that an airplane is to fly with.
+fn speeds_m_s(airplane: &Airplane) -> impl Iterator<Item = f64> {
+    let told = airplane.orders.iter().filter_map(|order| match order.task {
+        Task::Speed(v_m_s) => Some(v_m_s),
+        _ => None,
+    });
+    told.chain([airplane.model.v_m_s])
+}
+
 /// First fallbacks that are apart as far as there are any, and the pairs that are not.
 fn first(world: &AirspaceWorld) -> (Vec<Side>, Vec<(u32, u32)>) {
-    let flyer = |(i, airplane): (usize, &Airplane)| Flyer {
-        pose: airplane.start,
-        v_m_s: airplane.model.v_m_s,
-        omega_max_rad_s: airplane.model.omega_max_rad_s,
-        separation_m: airplane.model.separation_m,
-        altitude_m: airplane.altitude_m,
-        vertical_m: world.vertical_m,
-        fallback: Side::Left,
-        rank: i as u64,
-        id: i as u32,
+    let mut sides = vec![Side::default(); world.airplanes.len()];
+    // Airplanes that come in at other times do not meet at the start.
+    let starts: Vec<usize> = (0..sides.len()).filter(|&i| world.joins_in(i) == 0).collect();
+    let flyer = |(rank, &i): (usize, &usize)| {
+        let airplane = &world.airplanes[i];
+        Flyer {
+            pose: airplane.start,
+            v_m_s: airplane.model.v_m_s,
+            omega_max_rad_s: airplane.model.omega_max_rad_s,
+            separation_m: airplane.model.separation_m,
+            levels: Levels::at(airplane.altitude_m),
+            vertical_m: world.vertical_m,
+            fallback: Side::Left,
+            rank: rank as u64,
+            id: i as u32,
+        }
     };
-    let flyers: Vec<Flyer> = world.airplanes.iter().enumerate().map(flyer).collect();
-    let (sides, pairs) = first_fallbacks(&flyers);
-    // Airplanes that appear at other times do not meet at the start.
-    let together = |&(i, j): &(usize, usize)| world.appears_in(i) == world.appears_in(j);
-    (sides, pairs.into_iter().filter(together).map(|(i, j)| (i as u32, j as u32)).collect())
+    let flyers: Vec<Flyer> = starts.iter().enumerate().map(flyer).collect();
+    let (chosen, pairs) = first_fallbacks(&flyers);
+    starts.iter().zip(chosen).for_each(|(&i, side)| sides[i] = side);
+    (sides, pairs.into_iter().map(|(i, j)| (starts[i] as u32, starts[j] as u32)).collect())
 }

@@ -37,6 +37,7 @@
 //! never adds up to a loss.
 
 use super::airplane::{Point, Pose, distance_m};
+use super::levels::Levels;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::{EntityId, math};
 
@@ -83,8 +84,8 @@ pub struct Flyer {
     pub omega_max_rad_s: f64,
     /// Its separation; of two airplanes the larger one counts.
     pub separation_m: f64,
-    /// The level it keeps,
-    pub altitude_m: f64,
+    /// The levels it keeps or passes in the next `dt`,
+    pub levels: Levels,
     /// and how far above each other airplanes need not mind each other.
     pub vertical_m: f64,
     /// Its stored fallback.
@@ -95,8 +96,8 @@ pub struct Flyer {
 
 impl Flyer {
     fn minds(&self, other: &Self) -> bool {
-        let apart_m = (self.altitude_m - other.altitude_m).abs();
-        self.id != other.id && apart_m < self.vertical_m.max(other.vertical_m)
+        let vertical_m = self.vertical_m.max(other.vertical_m);
+        self.id != other.id && self.levels.meets(&other.levels, vertical_m)
     }
 }
 
@@ -430,6 +431,15 @@ impl<'a> Search<'a> {
 /// Sides for first fallbacks that are pairwise apart, as far as there are any, and the pairs that
 /// are not: they start too close.
 pub fn first_fallbacks(flyers: &[Flyer]) -> (Vec<Side>, Vec<(usize, usize)>) {
+    entry_fallbacks(flyers, |_| true)
+}
+
+/// The same among airplanes some of which have their fallbacks already and keep them: only those
+/// that `enters` choose, and only pairs with one of them are named.
+pub fn entry_fallbacks(
+    flyers: &[Flyer],
+    enters: impl Fn(usize) -> bool,
+) -> (Vec<Side>, Vec<(usize, usize)>) {
     let orbit = |i: usize, side: Side| {
         let flyer = &flyers[i];
         Orbit::from(flyer.pose, flyer.v_m_s, side.sign() * flyer.omega_max_rad_s)
@@ -447,7 +457,7 @@ pub fn first_fallbacks(flyers: &[Flyer]) -> (Vec<Side>, Vec<(usize, usize)>) {
     let mut changed = true;
     while changed {
         changed = false;
-        for i in 0..sides.len() {
+        for i in (0..sides.len()).filter(|&i| enters(i)) {
             let better = Side::BOTH.into_iter().min_by_key(|&side| clashes(&sides, i, side));
             if let Some(better) = better
                 && clashes(&sides, i, better) < clashes(&sides, i, sides[i])
@@ -458,8 +468,27 @@ pub fn first_fallbacks(flyers: &[Flyer]) -> (Vec<Side>, Vec<(usize, usize)>) {
         }
     }
     let pairs = near.iter().enumerate().flat_map(|(i, near)| near.iter().map(move |&j| (i, j)));
-    let left = pairs.filter(|&(i, j)| i < j && clash(i, sides[i], j, sides[j])).collect();
+    let left = pairs
+        .filter(|&(i, j)| i < j && (enters(i) || enters(j)) && clash(i, sides[i], j, sides[j]))
+        .collect();
     (sides, left)
+}
+
+/// The side on which an airplane that is about to fly otherwise has an orbit apart from the stored
+/// fallbacks of others, if there is one; rather the one it has stored.
+pub fn side_apart(changed: &Flyer, others: impl Iterator<Item = Flyer>) -> Option<Side> {
+    let orbit = |flyer: &Flyer, side: Side| {
+        Orbit::from(flyer.pose, flyer.v_m_s, side.sign() * flyer.omega_max_rad_s)
+    };
+    let minded: Vec<Flyer> = others.filter(|other| changed.minds(other)).collect();
+    let is_apart = |side: &Side| {
+        minded.iter().all(|other| {
+            let gap_m = changed.separation_m.max(other.separation_m) + SLACK_M;
+            orbit(changed, *side).stays_apart(&orbit(other, other.fallback), gap_m)
+        })
+    };
+    let sides = Side::BOTH.into_iter().filter(|&side| side != changed.fallback);
+    [changed.fallback].into_iter().chain(sides).find(is_apart)
 }
 
 /// Per airplane all others whose orbits might come too near its own, by rising number. Sorted by
@@ -500,7 +529,7 @@ mod tests {
             v_m_s: 35.0,
             omega_max_rad_s: 4f64.to_radians(),
             separation_m: 500.0,
-            altitude_m: 0.0,
+            levels: Levels::at(0.0),
             vertical_m: 300.0,
             fallback: Side::Left,
             rank,
@@ -649,6 +678,33 @@ mod tests {
             let decisions = filter(&flyers, &wishes, (STEPS, DTAU_S), Certainty::Sure);
             prop_assert!(decisions.iter().all(|d| d.candidate == Some(0)));
         }
+    }
+
+    #[test]
+    fn who_enters_chooses_a_side_apart_from_the_stored_ones_and_nobody_else_does() {
+        // On its left the newcomer would orbit over the other, on its right it would not.
+        let stored = flyer(0.0, 2002.0, std::f64::consts::PI, 0);
+        let flyers = [stored, flyer(0.0, 0.0, 0.0, 1)];
+        let (sides, too_close) = entry_fallbacks(&flyers, |i| i == 1);
+        assert_eq!((sides, too_close), (vec![Side::Left, Side::Right], vec![]));
+        let near = [stored, flyer(100.0, 2002.0, 0.0, 1), flyer(50.0, 2030.0, 0.0, 2)];
+        let (sides, too_close) = entry_fallbacks(&near, |i| i == 2);
+        assert_eq!(sides[..2], [Side::Left; 2]);
+        assert_eq!(too_close, [(0, 2), (1, 2)], "the pair that was there before is not named");
+    }
+
+    #[test]
+    fn a_change_is_refused_when_neither_orbit_is_apart() {
+        let quick_turns = 6f64.to_radians();
+        let other = Flyer { omega_max_rad_s: quick_turns, ..flyer(1500.0, -100.0, 0.0, 0) };
+        let slow = flyer(0.0, 0.0, 0.0, 1);
+        let beside = |v_m_s: f64| side_apart(&Flyer { v_m_s, ..slow }, [other].into_iter());
+        assert_eq!(beside(35.0), Some(Side::Left));
+        assert_eq!(beside(150.0), None);
+        let above = Flyer { levels: Levels::at(1000.0), v_m_s: 150.0, ..slow };
+        assert_eq!(side_apart(&above, [other].into_iter()), Some(Side::Left));
+        let climbing = Flyer { levels: Levels::between(0.0, 1000.0), ..above };
+        assert_eq!(side_apart(&climbing, [other].into_iter()), None);
     }
 
     #[test]

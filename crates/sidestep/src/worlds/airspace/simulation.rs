@@ -44,13 +44,15 @@ impl AirspaceSimulation {
         let state = AirspaceState::restore(&compiled.world, &compiled.start_snapshot());
         let engine = Engine::new(&*compiled.world, compiled.world.airplanes.len(), workers);
         let scenario = *Digest::of(source.text.as_bytes()).as_bytes();
+        let too_close = compiled.too_close.iter().map(|&(a, b)| (0, a, b)).collect();
+        let ledger = Ledger { too_close, ..Ledger::default() };
         Self {
             compiled,
             scenario,
             state,
             engine,
             cycle: 0,
-            ledger: Ledger::default(),
+            ledger,
             decide_ns: 0,
             clock: SystemClock::default(),
             rows: Rows::default(),
@@ -146,6 +148,7 @@ impl AirspaceSimulation {
             events.append(&mut scratch.events);
             optimizations.append(&mut scratch.optimizations);
             self.ledger.effort.traffic.add(std::mem::take(&mut scratch.exchanged));
+            self.ledger.too_close.extend(std::mem::take(&mut scratch.too_close));
             self.decide_ns += std::mem::take(&mut scratch.decide_ns);
         }
         events.sort_unstable_by_key(Event::key);

@@ -2,6 +2,7 @@
 
 use super::airplane::{Point, Pose, distance_m};
 use super::deploy::contact::Contacts;
+use super::levels::Levels;
 use super::shield::Side;
 use super::world::AirspaceWorld;
 use serde::{Deserialize, Serialize};
@@ -13,6 +14,8 @@ use std::sync::{Mutex, PoisonError};
 
 /// Not arrived yet.
 pub const FLYING: u64 = u64::MAX;
+/// Set beside the time at which an airplane was removed, rather than arrived.
+pub(super) const LEFT: u64 = 1 << 63;
 const NOBODY: u32 = u32::MAX;
 
 /// The state of an airspace; slots are ids.
@@ -35,7 +38,10 @@ pub struct Cell {
     pub y_m: Shared<f64>,
     /// Heading.
     pub psi_rad: Shared<f64>,
-    /// Steps of `dtau` flown when it arrived, or [`FLYING`].
+    /// Altitude, metres.
+    pub altitude_m: Shared<f64>,
+    /// Steps of `dtau` since the run's start when it arrived, or [`FLYING`]; with the highest bit
+    /// set, when it was removed.
     pub arrived: Shared<u64>,
     /// Way-points done with.
     pub next: Shared<u32>,
@@ -45,6 +51,10 @@ pub struct Cell {
     pub orbits: Shared<u32>,
     /// and how many of those in a row just now.
     pub waiting: Shared<u32>,
+    /// Orders carried out,
+    pub orders: Shared<u16>,
+    /// and times that one had to wait for the next `dt`.
+    pub waits: Shared<u16>,
     /// Stored fallback: 0 left, 1 right.
     pub fallback: Shared<u8>,
 }
@@ -65,6 +75,16 @@ impl Cell {
     /// Whether it has not arrived yet.
     pub fn is_flying(&self) -> bool {
         self.arrived.get() == FLYING
+    }
+
+    /// Steps of `dtau` since the run's start when it arrived, if it has.
+    pub fn arrived_step(&self) -> Option<u64> {
+        Some(self.arrived.get()).filter(|step| step & LEFT == 0)
+    }
+
+    /// Whether it was removed before it arrived.
+    pub fn has_left(&self) -> bool {
+        !self.is_flying() && self.arrived.get() & LEFT != 0
     }
 
     /// The stored fallback.
@@ -147,6 +167,10 @@ pub struct AirplaneRecord {
     pub counts: [u32; 4],
     /// Stored fallback.
     pub fallback: Side,
+    /// Altitude.
+    pub altitude_m: f64,
+    /// Orders carried out, and times that one had to wait.
+    pub orders: [u16; 2],
 }
 
 /// What a pair of airplanes has come to.
@@ -155,7 +179,7 @@ pub struct PairRecord {
     /// Closest approach.
     pub nearest_m: f64,
     /// Looks at which they were nearer than their separation, see
-    /// [`super::react::LOOKS_PER_STEP`].
+    /// [`super::LOOKS_PER_STEP`].
     pub lost_looks: u64,
     /// Separate losses of separation.
     pub losses: u32,
@@ -197,6 +221,10 @@ impl AirspaceState {
             cell.orbits.set(orbits);
             cell.waiting.set(waiting);
             cell.set_side(record.fallback);
+            cell.altitude_m.set(record.altitude_m);
+            let [orders, waits] = record.orders;
+            cell.orders.set(orders);
+            cell.waits.set(waits);
         }
         let contacts = match world.network {
             Some(_) => (0..n).map(|i| snapshot.contacts.get(i).cloned()).collect(),
@@ -230,6 +258,8 @@ impl AirspaceState {
             arrived: cell.arrived.get(),
             counts: [cell.next.get(), cell.overrides.get(), cell.orbits.get(), cell.waiting.get()],
             fallback: cell.side(),
+            altitude_m: cell.altitude_m.get(),
+            orders: [cell.orders.get(), cell.waits.get()],
         };
         let contacts = self.contacts.iter().map(|contacts| held(contacts).clone()).collect();
         Snapshot { cycle, airplanes: self.airplanes.iter().map(record).collect(), contacts }
@@ -241,9 +271,14 @@ impl AirspaceState {
     }
 
     /// Whether two airplanes have to mind each other.
-    pub(super) fn is_near(&self, world: &AirspaceWorld, a: Slot, b: Slot) -> bool {
+    pub(super) fn is_near(&self, world: &AirspaceWorld, (a, b): (Slot, Slot), now: Cycle) -> bool {
         let at = |slot: Slot| self.airplanes[slot as usize].pose().at;
-        world.on_one_level(a, b) && distance_m(at(a), at(b)) <= world.look_m(a as usize, b as usize)
+        let levels = |slot: Slot| match world.is_replayed(slot, now) {
+            true => Levels::ALL,
+            false => world.claimed_levels(&self.airplanes[slot as usize], slot, now),
+        };
+        distance_m(at(a), at(b)) <= world.look_m(a as usize, b as usize)
+            && levels(a).meets(&levels(b), world.vertical_m)
     }
 }
 
@@ -259,6 +294,12 @@ impl Snapshot {
             hasher.u64(airplane.arrived);
             airplane.counts.iter().for_each(|&n| hasher.u32(n));
             hasher.u8(airplane.fallback as u8);
+            // Without orders the altitude is the scenario's, or that of the track at this time.
+            let [orders, waits] = airplane.orders;
+            if orders > 0 || waits > 0 {
+                hasher.u64(airplane.altitude_m.to_bits());
+                hasher.u32(u32::from(orders) << 16 | u32::from(waits));
+            }
         }
         if !self.contacts.is_empty() {
             let known = postcard::to_stdvec(&self.contacts).expect("contacts are plain data");

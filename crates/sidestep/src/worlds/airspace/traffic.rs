@@ -2,14 +2,22 @@
 //!
 //! The text that comes out is a scenario like any other, complete in itself: it goes into the run
 //! folder and can be edited. Latitude and longitude become a plane about the traffic's centre.
-//! Airplanes keep the level and the true airspeed with which they begin; their turn rate is that
-//! of a turn at 25 degrees of bank. One that has nowhere to go flies half an hour ahead.
+//! Turn rates are those of a turn at 25 degrees of bank at the airplane's greatest speed.
+//!
+//! Aircraft of BlueSky files fly their routes, and what they are told on the way (`HDG`, `SPD`,
+//! `ALT`, `LNAV ON`, `DEL`). One that has nowhere to go flies half an hour ahead. A true airspeed
+//! stays as it is until the next `SPD`, also in climbs. [`not_flown`] counts what else they say.
+//!
+//! Recorded tracks are replayed as they are; from `airspace.replay_until_s` on, which stands at
+//! infinity, they are flown anew.
 
 use super::airplane::Point;
-use crate::import::bluesky::{ScnAircraft, ScnFile};
-use crate::import::local_plane::{LatLon, LocalPlane};
+use super::flight_plan::CLIMB_M_S;
+use crate::import::bluesky::{Change, ScnAircraft, ScnFile};
+use crate::import::local_plane::LocalPlane;
 use crate::import::traffic::{RecordedTraffic, Track};
 use sidestep_kernel::math;
+use std::collections::BTreeMap;
 use std::fmt::Write;
 
 const NAUTICAL_MILE_M: f64 = 1852.0;
@@ -19,102 +27,226 @@ const KNOT_M_S: f64 = NAUTICAL_MILE_M / 3600.0;
 const BANKED_M_S2: f64 = 9.80665 * 0.466_307_658_154_998_6;
 /// How far ahead an airplane flies that has nowhere to go.
 const AHEAD_S: f64 = 1800.0;
+/// Time between two decisions: a route that is told no later than this counts as known at once.
+const DT_S: f64 = 10.0;
 /// Separation of recorded traffic: five nautical miles and a thousand feet.
 const ZONE: (f64, f64) = (5.0 * NAUTICAL_MILE_M, 1000.0 * FOOT_M);
-
-/// One airplane of a scenario.
-struct Entry {
-    at_m: Point,
-    heading_deg: f64,
-    way_points_m: Vec<Point>,
-    altitude_m: f64,
-    appears_s: f64,
-    v_m_s: f64,
-}
 
 /// The scenario of a BlueSky file; `None` when no aircraft of it has a place.
 pub fn from_bluesky(name: &str, file: &ScnFile) -> Option<String> {
     let traffic = &file.traffic;
     let plane = LocalPlane::about_all(traffic.aircraft.iter().map(ScnAircraft::position))?;
     let zone = (traffic.zone_radius_nm * NAUTICAL_MILE_M, traffic.zone_half_height_ft * FOOT_M);
-    let entries = traffic.aircraft.iter().map(|aircraft| {
-        let v_m_s = aircraft.speed.true_airspeed_mps(aircraft.altitude_ft).max(1.0);
-        let goals: Vec<Point> = aircraft.known_goals().map(|at| plane.to_plane_m(at)).collect();
-        Entry {
-            at_m: plane.to_plane_m(aircraft.position()),
-            heading_deg: 90.0 - aircraft.heading_deg,
-            way_points_m: goals,
-            altitude_m: aircraft.altitude_ft * FOOT_M,
-            appears_s: aircraft.created_s,
-            v_m_s,
-        }
-    });
-    Some(scenario(name, zone, entries))
+    let mut text = heading(name, zone, "");
+    for aircraft in &traffic.aircraft {
+        write_aircraft(&mut text, aircraft, &plane);
+    }
+    Some(text)
 }
 
-/// The scenario of recorded tracks: each airplane flies from its first place through its places
-/// every two minutes to its last, at its mean speed. `None` without any track.
+/// What a BlueSky file tells its aircraft and the scenario leaves out, with counts.
+pub fn not_flown(file: &ScnFile) -> BTreeMap<String, u64> {
+    let mut counts = BTreeMap::new();
+    let mut count = |what: &str, n: usize| {
+        if n > 0 {
+            *counts.entry(what.to_string()).or_default() += n as u64;
+        }
+    };
+    count("WIND", file.traffic.wind.len());
+    count("NOISE ON", usize::from(file.traffic.noise));
+    for aircraft in &file.traffic.aircraft {
+        let points = &aircraft.way_points;
+        count("ADDWPT altitude", points.iter().filter(|p| p.altitude_ft.is_some()).count());
+        count("ADDWPT speed", points.iter().filter(|p| p.speed.is_some()).count());
+        let told = |is: fn(&Change) -> bool| aircraft.changes.iter().filter(|(_, c)| is(c)).count();
+        count("VNAV", told(|c| matches!(c, Change::VerticalNavigation(_))));
+        count("LNAV OFF", told(|c| matches!(c, Change::LateralNavigation(false))));
+        if told(|c| matches!(c, Change::AltitudeFt(_))) == 0 {
+            count("VS", told(|c| matches!(c, Change::VerticalSpeedFpm(_))));
+        }
+    }
+    counts
+}
+
+/// What an airplane is told, as a scenario says it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Told {
+    /// Degrees counter-clockwise from east.
+    Heading(f64),
+    Speed(f64),
+    /// Metres, and metres per second.
+    Altitude(f64, f64),
+    Proceeds,
+    Leaves,
+}
+
+impl Told {
+    fn text(self) -> String {
+        match self {
+            Self::Heading(deg) => format!("heading_deg = {deg:?}"),
+            Self::Speed(v_m_s) => format!("speed_m_s = {v_m_s:?}"),
+            Self::Altitude(altitude_m, climb_m_s) => {
+                format!("altitude_m = {altitude_m:?}, climb_m_s = {climb_m_s:?}")
+            }
+            Self::Proceeds => "proceeds = true".into(),
+            Self::Leaves => "leaves = true".into(),
+        }
+    }
+}
+
+fn write_aircraft(text: &mut String, aircraft: &ScnAircraft, plane: &LocalPlane) {
+    let at_m = plane.to_plane_m(aircraft.position());
+    let heading_deg = 90.0 - aircraft.heading_deg;
+    let v_m_s = aircraft.speed.true_airspeed_mps(aircraft.altitude_ft).max(1.0);
+    let mut way_points_m: Vec<Point> =
+        aircraft.known_goals().map(|at| plane.to_plane_m(at)).collect();
+    let orders = orders(aircraft, !way_points_m.is_empty());
+    if way_points_m.is_empty() {
+        let (psi_rad, ahead_m) = (heading_deg.to_radians(), AHEAD_S * v_m_s);
+        let goal = [at_m[0] + ahead_m * math::cos(psi_rad), at_m[1] + ahead_m * math::sin(psi_rad)];
+        way_points_m.push(goal);
+    }
+    let told_m_s = orders.iter().filter_map(|(_, told)| match told {
+        Told::Speed(v_m_s) => Some(*v_m_s),
+        _ => None,
+    });
+    let omega_deg_s = banked_deg_s(told_m_s.fold(v_m_s, f64::max));
+    let (altitude_m, appears_s) = (aircraft.altitude_ft * FOOT_M, aircraft.created_s);
+    // Writing to a string cannot fail.
+    let _ = write!(
+        text,
+        "\n[[airplanes]]\nat_m = {at_m:?}\nheading_deg = {heading_deg:?}\n\
+         way_points_m = {way_points_m:?}\naltitude_m = {altitude_m:?}\n\
+         appears_s = {appears_s:?}\nv_m_s = {v_m_s:?}\nomega_max_deg_s = {omega_deg_s:?}\n"
+    );
+    if orders.is_empty() {
+        return;
+    }
+    text.push_str("orders = [\n");
+    for (at_s, told) in orders {
+        let _ = writeln!(text, "  {{ at_s = {at_s:?}, {} }},", told.text());
+    }
+    text.push_str("]\n");
+}
+
+/// What an aircraft is told on its way, by rising time.
+fn orders(aircraft: &ScnAircraft, has_route: bool) -> Vec<(f64, Told)> {
+    let mut orders: Vec<(f64, Told)> = Vec::new();
+    let mut routed_s: Vec<f64> = route_times_s(aircraft);
+    if has_route && routed_s.first().is_some_and(|first_s| *first_s > aircraft.created_s + DT_S) {
+        orders.push((aircraft.created_s, Told::Heading(90.0 - aircraft.heading_deg)));
+    }
+    routed_s.retain(|at_s| has_route && *at_s > aircraft.created_s);
+    // Whoever gets a way-point flies there, whatever heading it was told before.
+    orders.extend(routed_s.into_iter().map(|at_s| (at_s, Told::Proceeds)));
+    orders.extend(changes(aircraft, has_route));
+    orders.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut keeps_heading = false;
+    // Proceeding changes nothing for an airplane that does.
+    orders.retain(|(_, told)| match told {
+        Told::Heading(_) => {
+            keeps_heading = true;
+            true
+        }
+        Told::Proceeds => std::mem::take(&mut keeps_heading),
+        _ => true,
+    });
+    let last_s = orders.last().map_or(aircraft.created_s, |(at_s, _)| *at_s);
+    let ends_s = aircraft.deleted_s.or(keeps_heading.then_some(last_s + AHEAD_S));
+    if let Some(ends_s) = ends_s {
+        orders.retain(|(at_s, _)| *at_s < ends_s);
+        orders.push((ends_s, Told::Leaves));
+    }
+    orders
+}
+
+/// When an aircraft was told where to go, rising.
+fn route_times_s(aircraft: &ScnAircraft) -> Vec<f64> {
+    let known = aircraft.way_points.iter().filter(|p| p.place.position().is_some());
+    let destination = aircraft.destination.as_ref().filter(|place| place.position().is_some());
+    let destination_s = destination.and(aircraft.destination_s);
+    let mut all: Vec<f64> = known.map(|p| p.added_s).chain(destination_s).collect();
+    all.sort_by(f64::total_cmp);
+    all
+}
+
+fn changes(aircraft: &ScnAircraft, has_route: bool) -> Vec<(f64, Told)> {
+    let (mut altitude_ft, mut climb_m_s) = (aircraft.altitude_ft, CLIMB_M_S);
+    let mut told: Vec<(f64, Told)> = Vec::new();
+    for &(at_s, change) in &aircraft.changes {
+        match change {
+            Change::HeadingDeg(deg) => told.push((at_s, Told::Heading(90.0 - deg))),
+            Change::Speed(speed) => {
+                let v_m_s = speed.true_airspeed_mps(altitude_ft).max(1.0);
+                told.push((at_s, Told::Speed(v_m_s)));
+            }
+            Change::AltitudeFt(to_ft) => {
+                altitude_ft = to_ft;
+                told.push((at_s, Told::Altitude(to_ft * FOOT_M, climb_m_s)));
+            }
+            Change::VerticalSpeedFpm(fpm) if fpm != 0.0 => {
+                climb_m_s = fpm.abs() * FOOT_M / 60.0;
+                // Behind an ALT of the same time it is meant for that one.
+                if let Some((last_s, Told::Altitude(_, rate_m_s))) = told.last_mut()
+                    && *last_s == at_s
+                {
+                    *rate_m_s = climb_m_s;
+                }
+            }
+            Change::LateralNavigation(true) if has_route => told.push((at_s, Told::Proceeds)),
+            _ => {}
+        }
+    }
+    told
+}
+
+/// The scenario of recorded tracks, which replays them. `None` without any track.
 pub fn from_tracks(name: &str, traffic: &RecordedTraffic) -> Option<String> {
     let samples = || traffic.tracks.iter().flat_map(|track| &track.samples);
     let plane = LocalPlane::about_all(samples().map(|s| s.position))?;
     let begins_s = samples().map(|s| s.time_s).fold(f64::INFINITY, f64::min);
-    let entries = traffic.tracks.iter().filter_map(|track| entry(track, &plane, begins_s));
-    Some(scenario(name, ZONE, entries))
+    let replay = "# seconds after which recorded airplanes are flown anew; inf: never\n\
+                  replay_until_s = inf\n";
+    let mut text = heading(name, ZONE, replay);
+    let tracks = || traffic.tracks.iter().filter(|track| has_length(track));
+    tracks().for_each(|track| write_track(&mut text, track, &plane, begins_s));
+    tracks().next().map(|_| text)
 }
 
-fn entry(track: &Track, plane: &LocalPlane, begins_s: f64) -> Option<Entry> {
-    let (first, rest) = track.samples.split_first()?;
-    let last = rest.last()?;
-    let at = |position: LatLon| plane.to_plane_m(position);
-    let mut way_points_m: Vec<Point> = Vec::new();
-    let mut due_s = first.time_s + 120.0;
-    for sample in rest {
-        if sample.time_s >= due_s || sample.time_s >= last.time_s {
-            way_points_m.push(at(sample.position));
-            due_s = sample.time_s + 120.0;
-        }
-    }
-    let n = track.samples.len() as f64;
-    let speed_kt = track.samples.iter().map(|s| s.ground_speed_kt).sum::<f64>() / n;
-    Some(Entry {
-        at_m: at(first.position),
-        heading_deg: 90.0 - first.track_deg,
-        way_points_m,
-        altitude_m: first.altitude_ft * FOOT_M,
-        appears_s: first.time_s - begins_s,
-        v_m_s: (speed_kt * KNOT_M_S).max(1.0),
-    })
+/// Whether a track has the two samples of which a way can be made.
+pub fn has_length(track: &Track) -> bool {
+    track.samples.len() >= 2
 }
 
-fn scenario(
-    name: &str,
-    (separation_m, vertical_m): (f64, f64),
-    entries: impl Iterator<Item = Entry>,
-) -> String {
-    let mut text = format!(
-        "format = 1\nworld = \"airspace\"\nname = {name:?}\ncycles = 4000\n\n\
-         [airspace]\nvertical_m = {vertical_m:?}\nhorizon = 60\ndt_s = 10.0\ndtau_s = 5.0\n\
-         holds_s = [60.0]\n\n[airplane]\nseparation_m = {separation_m:?}\n"
+fn write_track(text: &mut String, track: &Track, plane: &LocalPlane, begins_s: f64) {
+    let speed_kt =
+        track.samples.iter().map(|s| s.ground_speed_kt).sum::<f64>() / track.samples.len() as f64;
+    let omega_deg_s = banked_deg_s((speed_kt * KNOT_M_S).max(1.0));
+    let label = format!("{} {}", track.icao24, track.callsign);
+    // Writing to a string cannot fail. A name with a line end would end the comment.
+    let _ = write!(
+        text,
+        "\n[[airplanes]] # {}\nomega_max_deg_s = {omega_deg_s:?}\ntrack = [\n",
+        label.trim().escape_debug()
     );
-    for mut entry in entries {
-        if entry.way_points_m.is_empty() {
-            let psi_rad = entry.heading_deg.to_radians();
-            let ahead_m = AHEAD_S * entry.v_m_s;
-            let [x, y] = entry.at_m;
-            let goal = [x + ahead_m * math::cos(psi_rad), y + ahead_m * math::sin(psi_rad)];
-            entry.way_points_m.push(goal);
-        }
-        let Entry { at_m, heading_deg, way_points_m, altitude_m, appears_s, v_m_s } = entry;
-        let omega_deg_s = (BANKED_M_S2 / v_m_s).to_degrees();
-        // Writing to a string cannot fail.
-        let _ = write!(
-            text,
-            "\n[[airplanes]]\nat_m = {at_m:?}\nheading_deg = {heading_deg:?}\n\
-             way_points_m = {way_points_m:?}\naltitude_m = {altitude_m:?}\n\
-             appears_s = {appears_s:?}\nv_m_s = {v_m_s:?}\nomega_max_deg_s = {omega_deg_s:?}\n"
-        );
+    for sample in &track.samples {
+        let [x, y] = plane.to_plane_m(sample.position);
+        let (t_s, altitude_m) = (sample.time_s - begins_s, sample.altitude_ft * FOOT_M);
+        let _ = writeln!(text, "  [{t_s:?}, {x:?}, {y:?}, {altitude_m:?}],");
     }
-    text
+    text.push_str("]\n");
+}
+
+fn banked_deg_s(v_m_s: f64) -> f64 {
+    (BANKED_M_S2 / v_m_s).to_degrees()
+}
+
+fn heading(name: &str, (separation_m, vertical_m): (f64, f64), more: &str) -> String {
+    format!(
+        "format = 1\nworld = \"airspace\"\nname = {name:?}\ncycles = 4000\n\n\
+         [airspace]\nvertical_m = {vertical_m:?}\nhorizon = 60\ndt_s = {DT_S:?}\ndtau_s = 5.0\n\
+         holds_s = [60.0]\n{more}\n[airplane]\nseparation_m = {separation_m:?}\n"
+    )
 }
 
 #[cfg(test)]

@@ -3,7 +3,9 @@
 use super::airplane::{Action, After, Model, Passing, Pilot, Point, Pose, Timing, actions};
 use super::deploy::{Deployment, Network};
 use super::objective::Objective;
+use super::orders::{FlightOrder, Later, Stage, Task, later};
 use super::shield::Side;
+use super::track::Track;
 use crate::collectives::Settings;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::stream::Streams;
@@ -73,10 +75,16 @@ pub struct Airplane {
     pub start: Pose,
     /// What it is to reach.
     pub mission: Vec<Point>,
-    /// The level it keeps.
+    /// The level with which the method takes it over.
     pub altitude_m: f64,
     /// When it appears, seconds after the start.
     pub appears_s: f64,
+    /// When it vanishes, seconds after the start; infinite for never.
+    pub leaves_s: f64,
+    /// What it is told on its way, by rising time.
+    pub orders: Vec<FlightOrder>,
+    /// The way that it is recorded to have flown, and follows until it is handed over.
+    pub track: Option<Track>,
 }
 
 /// The immutable world that runs share.
@@ -102,8 +110,11 @@ pub struct AirspaceWorld {
     pub network: Option<Network>,
     /// Whether the shield filters decisions.
     pub shield: bool,
-    /// Airplanes at least this far above each other do not mind each other.
+    /// Airplanes at least this far above each other do not mind each other: what the scenario
+    /// asks for, less a hair, so that levels in feet are apart when they say they are.
     pub vertical_m: f64,
+    /// Cycles in which recorded airplanes follow their tracks; after these the method flies them.
+    pub replay_cycles: Cycle,
     /// A wind that all know.
     pub wind_m_s: Point,
     /// What nobody knows.
@@ -111,6 +122,10 @@ pub struct AirspaceWorld {
     pub(super) streams: Streams,
     /// Actions of each airplane.
     pub(super) actions: Vec<Vec<Action>>,
+    /// What each airplane flies after each of its orders.
+    pub(super) later: Vec<Vec<Later>>,
+    /// The greatest speed that each airplane flies.
+    pub(super) top_m_s: Vec<f64>,
     /// Seconds that each airplane would need alone.
     pub(super) alone_s: Vec<f64>,
     /// Sides of the first fallbacks.
@@ -132,16 +147,28 @@ impl AirspaceWorld {
     pub(super) fn prepared(mut self) -> Self {
         let (dt_s, holds_s) = (self.timing.dt_s, &self.holds_s);
         self.actions = self.airplanes.iter().map(|a| actions(&a.model, dt_s, holds_s)).collect();
+        self.later = self.airplanes.iter().map(later).collect();
+        self.top_m_s = (0..self.airplanes.len()).map(|i| self.top_m_s(i)).collect();
         self.alone_s = (0..self.airplanes.len()).map(|i| self.alone_s(i)).collect();
         self
     }
 
-    /// How airplane `i` flies through still air. In a wind, predictions are made in the moving
+    fn top_m_s(&self, i: usize) -> f64 {
+        let airplane = &self.airplanes[i];
+        let recorded = airplane.track.as_ref().map_or(0.0, Track::top_speed_m_s);
+        let told = airplane.orders.iter().filter_map(|order| match order.task {
+            Task::Speed(v_m_s) => Some(v_m_s),
+            _ => None,
+        });
+        told.fold(airplane.model.v_m_s.max(recorded), f64::max)
+    }
+
+    /// How an airplane flies through still air. In a wind, predictions are made in the moving
     /// air, towards way-points that drift; what is flown is flown over the ground, see
     /// [`AirspaceWorld::steer`] and [`AirspaceWorld::blown`].
-    pub(super) fn pilot<'a>(&'a self, i: usize, mission: &'a [Point]) -> Pilot<'a> {
+    pub(super) fn pilot<'a>(&self, model: &'a Model, mission: &'a [Point]) -> Pilot<'a> {
         Pilot {
-            model: &self.airplanes[i].model,
+            model,
             mission,
             passing: self.passing,
             after: After::Straight,
@@ -149,16 +176,30 @@ impl AirspaceWorld {
         }
     }
 
+    /// From when the method takes it over; infinite where it never would come to its end.
     fn alone_s(&self, i: usize) -> f64 {
         let airplane = &self.airplanes[i];
-        let (mut pose, mut next) = (airplane.start, 0);
+        let joins_s = self.starts_s(self.joins_in(i));
+        if airplane.track.as_ref().is_some_and(|track| track.ends_s() <= joins_s) {
+            return 0.0;
+        }
+        if airplane.keeps_a_heading() && airplane.leaves_s == f64::INFINITY {
+            return f64::INFINITY;
+        }
+        let mut pose = airplane.track.as_ref().map_or(airplane.start, |t| t.pose_at(joins_s));
+        let (mut orders, mut next) = (0, 0);
         for step in 0..ENDLESS_STEPS {
-            if next == airplane.mission.len() {
-                return step as f64 * self.timing.dtau_s;
+            let flown_s = step as f64 * self.timing.dtau_s;
+            if step % self.timing.points_per_dt() == 0 {
+                (orders, next) = self.after_orders(i, orders, next, joins_s + flown_s);
             }
-            let pilot = self.pilot(i, &airplane.mission);
+            let Stage { model, mission, .. } = self.stage(i as Slot, orders);
+            if next == mission.len() || joins_s + flown_s >= airplane.leaves_s {
+                return flown_s;
+            }
+            let pilot = self.pilot(model, mission);
             let omega = self.steer(&pilot, pose, next);
-            pose = self.blown(pose.step(airplane.model.v_m_s, omega, self.timing.dtau_s));
+            pose = self.blown(pose.step(model.v_m_s, omega, self.timing.dtau_s));
             next = pilot.next(pose, next);
         }
         f64::INFINITY
@@ -195,28 +236,46 @@ impl AirspaceWorld {
         Pose { at, ..pose }
     }
 
-    /// The cycle in which an airplane appears.
-    pub fn appears_in(&self, i: usize) -> Cycle {
-        (self.airplanes[i].appears_s / self.timing.dt_s).ceil() as Cycle
+    /// When a cycle starts, seconds after the start.
+    pub fn starts_s(&self, now: Cycle) -> f64 {
+        now as f64 * self.timing.dt_s
     }
 
-    /// Whether two airplanes are on levels so near that they have to mind each other.
-    pub fn on_one_level(&self, a: Slot, b: Slot) -> bool {
-        let altitude_m = |slot: Slot| self.airplanes[slot as usize].altitude_m;
-        (altitude_m(a) - altitude_m(b)).abs() < self.vertical_m
+    /// The cycle in which an airplane appears: at its start, or within it on a recorded way.
+    pub fn appears_in(&self, i: usize) -> Cycle {
+        let airplane = &self.airplanes[i];
+        let cycles = airplane.appears_s / self.timing.dt_s;
+        let is_on_track =
+            airplane.track.is_some() && (cycles.floor() as Cycle) < self.replay_cycles;
+        (if is_on_track { cycles.floor() } else { cycles.ceil() }) as Cycle
+    }
+
+    /// The cycle from which the method flies an airplane.
+    pub fn joins_in(&self, i: usize) -> Cycle {
+        let recorded = if self.airplanes[i].track.is_some() { self.replay_cycles } else { 0 };
+        self.appears_in(i).max(recorded)
+    }
+
+    /// Whether an airplane follows its recorded way in a cycle.
+    pub fn is_replayed(&self, slot: Slot, now: Cycle) -> bool {
+        self.airplanes[slot as usize].track.is_some() && now < self.joins_in(slot as usize)
     }
 
     /// How far apart two airplanes may be and still have to mind each other: they could come
     /// too near within the horizon, or on orbits after the next `dt`.
     pub fn look_m(&self, a: usize, b: usize) -> f64 {
-        let (a, b) = (&self.airplanes[a].model, &self.airplanes[b].model);
+        let ((a, a_m_s), (b, b_m_s)) = (self.fastest(a), self.fastest(b));
         let horizon_s = self.timing.horizon as f64 * self.timing.dtau_s;
-        let reach = |model: &Model| {
-            let orbit_m = model.v_m_s * self.timing.dt_s + 2.0 * model.turn_radius_m();
-            (model.v_m_s * horizon_s).max(orbit_m)
+        let reach = |model: &Model, v_m_s: f64| {
+            let orbit_m = v_m_s * self.timing.dt_s + 2.0 * (v_m_s / model.omega_max_rad_s);
+            (v_m_s * horizon_s).max(orbit_m)
         };
         let gap_m = a.separation_m.max(b.separation_m) * self.objective.inflation.max(1.0);
-        reach(a) + reach(b) + gap_m + 1.0
+        reach(a, a_m_s) + reach(b, b_m_s) + gap_m + 1.0
+    }
+
+    fn fastest(&self, i: usize) -> (&Model, f64) {
+        (&self.airplanes[i].model, self.top_m_s[i])
     }
 }
 

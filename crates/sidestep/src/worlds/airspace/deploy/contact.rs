@@ -2,6 +2,7 @@
 
 use super::super::airplane::{Point, Pose, Prediction, distance_m};
 use super::super::decide::Known;
+use super::super::levels::Levels;
 use super::super::objective::Options;
 use super::super::shield::{Flyer, Side};
 use super::super::world::AirspaceWorld;
@@ -25,8 +26,10 @@ pub struct Beacon {
     pub omega_max_rad_s: f64,
     /// The separation it asks for.
     pub separation_m: f64,
-    /// The level it keeps.
+    /// How high it is,
     pub altitude_m: f64,
+    /// and all levels that it takes or may come through.
+    pub levels: Levels,
 }
 
 /// An orbit that somebody may be on: where, to which side, and when that was.
@@ -79,7 +82,7 @@ impl Orbiting {
             v_m_s: beacon.v_m_s,
             omega_max_rad_s: beacon.omega_max_rad_s,
             separation_m: beacon.separation_m,
-            altitude_m: beacon.altitude_m,
+            levels: beacon.levels,
             vertical_m: world.vertical_m,
             fallback: self.side,
             rank: u64::MAX - u64::from(id),
@@ -133,7 +136,9 @@ impl AirspaceWorld {
         let heard_in = self.appears_in(i);
         let pose = self.airplanes[i].start;
         let orbiting = Orbiting { pose, as_of: heard_in, side: self.first_fallbacks[i] };
-        let beacon = self.beacon(Known { slot: id, pose, next: 0 });
+        let altitude_m = self.airplanes[i].altitude_m;
+        let known = Known { slot: id, pose, next: 0, orders: 0, altitude_m };
+        let beacon = self.beacon(known);
         Contact { heard_in, beacon, possible: vec![orbiting], unheard: 0 }
     }
 }

@@ -121,7 +121,7 @@ impl Agent<'_> {
             v_m_s: beacon.v_m_s,
             omega_max_rad_s: beacon.omega_max_rad_s,
             separation_m: beacon.separation_m,
-            altitude_m: beacon.altitude_m,
+            levels: beacon.levels,
             vertical_m: self.world.vertical_m,
             fallback: *fallback,
             rank: *rank,
@@ -234,11 +234,10 @@ impl Agent<'_> {
         if member.accepts.as_ref().is_some_and(|accepted| accepted.contains(&me)) {
             return true;
         }
-        let theirs = member.proposal.as_ref().map(|proposal| proposal.beacon.altitude_m);
         let contact = self.contact(place);
-        let altitude_m = theirs.unwrap_or(contact.beacon.altitude_m);
-        let on_one_level = (altitude_m - self.flyer.altitude_m).abs() < self.flyer.vertical_m;
-        !on_one_level || (member.proposal.is_none() && contact.unheard >= SILENT_AFTER)
+        let beacon = member.proposal.as_ref().map_or(&contact.beacon, |proposal| &proposal.beacon);
+        let minds = self.flyer.levels.meets(&beacon.levels, self.flyer.vertical_m);
+        !minds || (member.proposal.is_none() && contact.unheard >= SILENT_AFTER)
     }
 
     /// The end: flies its plan, or its fallback.
@@ -421,7 +420,8 @@ fn proposal(flyer: &Flyer, ways: &[Way], contacts: &Contacts) -> Proposal {
         v_m_s: flyer.v_m_s,
         omega_max_rad_s: flyer.omega_max_rad_s,
         separation_m: flyer.separation_m,
-        altitude_m: flyer.altitude_m,
+        altitude_m: flyer.levels.low_m,
+        levels: flyer.levels,
     };
     let unheard = contacts.iter().filter(|(_, contact)| contact.unheard > 0);
     Proposal {

@@ -17,7 +17,14 @@ pub(super) enum Message {
     /// The ways of all the sender's actions.
     Ways { beacon: Beacon, ways: Vec<Prediction> },
     /// From which the others predict its ways themselves.
-    Model { beacon: Beacon, next: u32, mission: Vec<Point>, airplane: u32 },
+    Model {
+        beacon: Beacon,
+        next: u32,
+        mission: Vec<Point>,
+        airplane: u32,
+        orders: u32,
+        altitude_m: f64,
+    },
     /// The numbers of the round's samples, and how far the sender has moved in the round before.
     Samples { round: u32, change: f64, samples: Vec<u16> },
     /// The sender's distribution after a round, and how far it has moved in it.
@@ -95,9 +102,9 @@ impl<'a> Agent<'a> {
         if !self.by_model {
             return Message::Ways { beacon, ways: self.own.options.predictions.clone() };
         }
-        let Known { slot, next, .. } = self.own.known;
-        let mission = self.own.airplane().mission.clone();
-        Message::Model { beacon, next: next as u32, mission, airplane: slot }
+        let Known { slot, next, orders, altitude_m, .. } = self.own.known;
+        let mission = self.own.mission().to_vec();
+        Message::Model { beacon, next: next as u32, mission, airplane: slot, orders, altitude_m }
     }
 
     fn is_exact(&self) -> bool {
@@ -284,8 +291,9 @@ impl link::Agent for Agent<'_> {
                 member.options.get_or_insert(options);
                 member.beacon = Some(beacon);
             }
-            Message::Model { beacon, next, mission, airplane } => {
-                let known = Known { slot: airplane, pose: beacon.pose, next: next as usize };
+            Message::Model { beacon, next, mission, airplane: slot, orders, altitude_m } => {
+                let (pose, next) = (beacon.pose, next as usize);
+                let known = Known { slot, pose, next, orders, altitude_m };
                 let options = self.own.world.options_towards(known, &mission);
                 member.options.get_or_insert(options);
                 member.beacon = Some(beacon);

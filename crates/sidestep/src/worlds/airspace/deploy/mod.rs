@@ -26,11 +26,12 @@ mod network;
 mod pim;
 mod team;
 
-use super::airplane::Action;
+use super::airplane::{Action, Point};
 use super::decide::Known;
 use super::events::{Event, EventKind};
+use super::levels::Levels;
 use super::objective::Options;
-use super::world::{Airplane, AirspaceWorld};
+use super::world::AirspaceWorld;
 use crate::collectives::{Estimator, Order, Player, Settings, Utility};
 use contact::{Beacon, Contacts};
 use network::{Ended, Talk, Topic};
@@ -111,8 +112,8 @@ impl Own<'_> {
         self.world.uniform(self.known.slot, self.now, k)
     }
 
-    fn airplane(&self) -> &Airplane {
-        &self.world.airplanes[self.known.slot as usize]
+    fn mission(&self) -> &[Point] {
+        self.world.stage(self.known.slot, self.known.orders).mission
     }
 
     /// The next `block` samples of a player after `drawn`.
@@ -217,14 +218,15 @@ impl AirspaceWorld {
 
     /// What an airplane tells of itself.
     fn beacon(&self, known: Known) -> Beacon {
-        let Airplane { model, mission, altitude_m, .. } = &self.airplanes[known.slot as usize];
+        let stage = self.stage(known.slot, known.orders);
         Beacon {
             pose: known.pose,
-            goal: mission.get(known.next).copied(),
-            v_m_s: model.v_m_s,
-            omega_max_rad_s: model.omega_max_rad_s,
-            separation_m: model.separation_m,
-            altitude_m: *altitude_m,
+            goal: stage.mission.get(known.next).copied(),
+            v_m_s: stage.model.v_m_s,
+            omega_max_rad_s: stage.model.omega_max_rad_s,
+            separation_m: stage.model.separation_m,
+            altitude_m: known.altitude_m,
+            levels: Levels::between(known.altitude_m, stage.altitude_m),
         }
     }
 

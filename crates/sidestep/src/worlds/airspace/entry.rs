@@ -1,0 +1,35 @@
+//! Airplanes that come under the method during a run: they appear, or their recorded way is
+//! handed over.
+
+use super::Scratch;
+use super::shield::{Flyer, entry_fallbacks};
+use super::state::AirspaceState;
+use super::world::AirspaceWorld;
+use sidestep_kernel::{Cycle, Slot};
+
+impl AirspaceWorld {
+    /// Airplanes of a group that come in now choose fallbacks apart from the stored ones, which
+    /// nobody changes for them. Pairs for which there are none are noted: the shield promises
+    /// nothing for them. `flown` are the group's airplanes that the method flies, by id.
+    ///
+    /// Whoever could be too near an airplane that comes in is in its group, so this is complete.
+    pub(super) fn admit(
+        &self,
+        state: &AirspaceState,
+        now: Cycle,
+        flown: &[Slot],
+        scratch: &mut Scratch,
+    ) {
+        // First fallbacks at the start are the compiled scenario's.
+        let enters = |slot: &Slot| now > 0 && self.joins_in(*slot as usize) == now;
+        if !flown.iter().any(enters) {
+            return;
+        }
+        let flyers: Vec<Flyer> = flown.iter().map(|&slot| self.flyer(state, slot)).collect();
+        let (sides, too_close) = entry_fallbacks(&flyers, |i| enters(&flown[i]));
+        for (&slot, side) in flown.iter().zip(sides) {
+            state.airplanes[slot as usize].set_side(side);
+        }
+        scratch.too_close.extend(too_close.into_iter().map(|(i, j)| (now, flown[i], flown[j])));
+    }
+}
