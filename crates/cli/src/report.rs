@@ -217,6 +217,9 @@ fn line(name: &str, value: String) -> (String, String) {
 pub(crate) struct SummaryFile<'a> {
     #[serde(flatten)]
     pub(crate) summary: &'a Summary,
-    /// Metrics of every agent by itself.
+    /// Metrics of every agent by itself,
     pub(crate) per_agent: Value,
+    /// and of pairs of agents, in worlds that have any.
+    #[serde(skip_serializing_if = "Value::is_null")]
+    pub(crate) per_pair: Value,
 }

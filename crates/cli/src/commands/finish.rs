@@ -73,7 +73,8 @@ fn store(
     if let Err(failure) = picture::draw_run(run, &folder) {
         console.warn(failure);
     }
-    folder.write_summary(&SummaryFile { summary, per_agent: run.agent_metrics() })?;
+    let (per_agent, per_pair) = (run.agent_metrics(), run.pair_metrics());
+    folder.write_summary(&SummaryFile { summary, per_agent, per_pair })?;
     match summary.status() {
         Status::Complete => folder.complete(run.cycle(), summary.digest())?,
         Status::Incomplete => folder.stop(run.cycle())?,

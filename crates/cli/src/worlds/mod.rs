@@ -142,6 +142,11 @@ pub(crate) trait Run: Simulation {
     /// Metrics of every agent by itself.
     fn agent_metrics(&self) -> Value;
 
+    /// Metrics of pairs of agents, in worlds that have any.
+    fn pair_metrics(&self) -> Value {
+        Value::Null
+    }
+
     /// Where every body is.
     fn poses(&self) -> Said;
 

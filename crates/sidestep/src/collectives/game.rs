@@ -44,6 +44,9 @@ struct Pair {
 }
 
 impl PairwiseGame {
+    /// Bytes that a pair takes for every two strategies.
+    pub const BYTES_PER_ENTRY: u64 = 3 * size_of::<f64>() as u64;
+
     /// A game of players who pay for their own strategies alone; `own[i][x]` is what strategy
     /// `x` costs player `i`.
     ///

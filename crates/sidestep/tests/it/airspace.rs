@@ -88,6 +88,18 @@ fn doing_nothing_loses_separation_and_says_so() {
     assert!(metrics.min_separation_m.is_some_and(|d| d < 100.0) && metrics.lost_s > 10.0);
 }
 
+/// Two that meet later than at the start, and may not take 100 kB then.
+#[test]
+fn a_group_too_large_for_memory_is_not_optimized_and_that_is_said() {
+    let text = "format = 1\nworld = \"airspace\"\n[airspace]\ngroup_memory_gib = 0.00005\n\
+                [airspace.generator]\nkind = \"superconflict\"\nn = 2\n";
+    let mut run = run(&Source::new("s", text, ""), 1);
+    run.advance(200);
+    let metrics = run.airspace_metrics();
+    assert!(metrics.groups_too_large > 0 && metrics.optimisations == 0, "{metrics:?}");
+    assert_eq!((metrics.losses_of_separation, metrics.arrived), (0, 2));
+}
+
 #[test]
 fn wrong_scenarios_are_refused_with_a_remedy() {
     let wrong = [
@@ -98,6 +110,11 @@ fn wrong_scenarios_are_refused_with_a_remedy() {
         ("[[airplanes]]\nat_m = [0, 0]\nheading_deg = 0\nway_points_m = []\n", "way-points"),
         ("[[airplanes]]\nat_m = [nan, 0]\nheading_deg = 0\nway_points_m = [[1, 1]]\n", "number"),
         ("[airspace]\nmethod = \"magic\"\n", "unknown"),
+        (
+            "[airspace]\ngroup_memory_gib = 0.0001\n\
+             [airspace.generator]\nkind = \"superconflict\"\nn = 30\n",
+            "30 airplanes near each other need",
+        ),
         ("[airspace]\ndt_s = 5.0\ndtau_s = 2.0\n", "divides"),
         ("[airspace]\nwind_m_s = [40.0, 0.0]\n", "wind"),
         ("[airspace.generator]\nkind = \"random\"\nn = 500\nradius_m = 3000.0\n", "no place"),

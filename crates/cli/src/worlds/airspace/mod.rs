@@ -132,6 +132,11 @@ impl Run for AirspaceRun {
         (0..self.agents() as u32).map(|id| one(id).unwrap_or_default()).collect()
     }
 
+    fn pair_metrics(&self) -> Value {
+        let pairs = self.simulation.world().pair_metrics(self.simulation.ledger());
+        serde_json::to_value(pairs).unwrap_or_default()
+    }
+
     fn poses(&self) -> Said {
         let snapshot = self.simulation.snapshot();
         let json = serde_json::to_value(&snapshot.airplanes).unwrap_or_default();

@@ -5,6 +5,7 @@ use super::airplane::{Action, Pilot, Point, Pose};
 use super::baseline::{Moving, mvp, orca};
 use super::deploy::contact::Contacts;
 use super::deploy::{Decided, Deployment, Traffic};
+use super::events::{Event, EventKind};
 use super::objective::{Options, game};
 use super::orders::Stage;
 use super::shield::Way;
@@ -155,6 +156,11 @@ impl AirspaceWorld {
         contacts: &mut [Contacts],
         scratch: &mut Scratch,
     ) -> Vec<Vec<Action>> {
+        if self.table_bytes(group) > self.group_bytes {
+            let event = Event::of(now, EventKind::GroupTooLarge, group[0].slot);
+            scratch.events.push(event.with(group.len() as f64));
+            return group.iter().map(|known| self.straight(*known)).collect();
+        }
         let (decided, traffic) = match self.deployment {
             Deployment::Direct => (self.direct(group, now), Traffic::default()),
             _ => self.deployed(group, now, contacts, &mut scratch.events),

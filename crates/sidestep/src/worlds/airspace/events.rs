@@ -23,11 +23,14 @@ pub enum EventKind {
     Deadline,
     /// An airplane stays on its orbit since not everybody has agreed to what it wanted.
     HeldBack,
+    /// A group is too large for the memory allowed: its airplanes fly straight on, as far as the
+    /// shield lets them; the value is how many they are.
+    GroupTooLarge,
 }
 
 impl EventKind {
     /// All kinds.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::LossOfSeparation,
         Self::Arrival,
         Self::Override,
@@ -35,6 +38,7 @@ impl EventKind {
         Self::Unheard,
         Self::Deadline,
         Self::HeldBack,
+        Self::GroupTooLarge,
     ];
 
     /// Its name in files.
@@ -47,6 +51,7 @@ impl EventKind {
             Self::Unheard => "unheard",
             Self::Deadline => "deadline",
             Self::HeldBack => "held-back",
+            Self::GroupTooLarge => "group-too-large",
         }
     }
 }

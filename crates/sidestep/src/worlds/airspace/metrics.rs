@@ -68,7 +68,7 @@ pub struct Metrics {
     pub rounds_mean: Option<f64>,
     /// Optimizations whose rounds ran out.
     pub unconverged: u64,
-    /// Time spent deciding in this process's run, all workers together.
+    /// Processor time spent deciding in this process's run, all workers together.
     pub optimise_cpu_s: f64,
     /// Times that the shield changed what an airplane wanted,
     pub shield_overrides: u64,
@@ -80,6 +80,8 @@ pub struct Metrics {
     pub contacts_lost: u64,
     /// Times that an airplane's agent ran out of time.
     pub deadlines_missed: u64,
+    /// Times that a group was too large to be optimized.
+    pub groups_too_large: u64,
     /// Airplanes that were removed before they had arrived.
     pub left: u64,
     /// Airplanes that arrived at the end of their recorded way, which nobody changed.
@@ -125,6 +127,21 @@ pub struct AirplaneMetrics {
     pub orders_delayed: u16,
 }
 
+/// What came of two airplanes that came near each other.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct PairMetrics {
+    /// Their ids.
+    pub airplanes: [EntityId; 2],
+    /// Closest approach.
+    pub nearest_m: f64,
+    /// How often they have come nearer than their separation,
+    pub losses: u32,
+    /// seconds spent so,
+    pub lost_s: f64,
+    /// and the part of the separation that was lost at most, from 0 to 1.
+    pub severity: f64,
+}
+
 impl AirplaneMetrics {
     /// Seconds beyond what the flight takes alone.
     pub(super) fn delay_s(&self) -> Option<f64> {
@@ -160,6 +177,23 @@ impl AirspaceWorld {
         track.as_ref().is_some_and(|track| track.ends_s() <= joined_s)
     }
 
+    /// Metrics of all pairs that came near each other, by ids.
+    pub fn pair_metrics(&self, ledger: &Ledger) -> Vec<PairMetrics> {
+        let separation_m = |id: EntityId| self.airplanes[id as usize].model.separation_m;
+        let one = |(&(a, b), record): (&(EntityId, EntityId), &PairRecord)| PairMetrics {
+            airplanes: [a, b],
+            nearest_m: record.nearest_m,
+            losses: record.losses,
+            lost_s: self.lost_s(record.lost_looks),
+            severity: (1.0 - record.nearest_m / separation_m(a).max(separation_m(b))).max(0.0),
+        };
+        ledger.pairs.iter().map(one).collect()
+    }
+
+    fn lost_s(&self, looks: u64) -> f64 {
+        looks as f64 * self.timing.dtau_s / LOOKS_PER_STEP as f64
+    }
+
     /// Metrics of a run so far; `decide_s` is the time spent deciding.
     pub fn metrics(&self, state: &AirspaceState, ledger: &Ledger, decide_s: f64) -> Metrics {
         let all = (0..self.airplanes.len() as EntityId).map(|id| self.airplane_metrics(state, id));
@@ -177,7 +211,7 @@ impl AirspaceWorld {
         Metrics {
             min_separation_m: nearest,
             losses_of_separation: ledger.pairs.values().map(|r| u64::from(r.losses)).sum(),
-            lost_s: looks as f64 * self.timing.dtau_s / LOOKS_PER_STEP as f64,
+            lost_s: self.lost_s(looks),
             arrived: count(&|cell| cell.arrived_step().is_some()),
             airplanes: all.len() as u64,
             mean_delay_percent: mean(delays.iter().sum(), delays.len()),
@@ -194,6 +228,7 @@ impl AirspaceWorld {
             shield_held_back: ledger.count(EventKind::HeldBack),
             contacts_lost: ledger.count(EventKind::Unheard),
             deadlines_missed: ledger.count(EventKind::Deadline),
+            groups_too_large: ledger.count(EventKind::GroupTooLarge),
             left: count(&Cell::has_left),
             replayed: replayed.count() as u64,
             orders: all.iter().map(|a| u64::from(a.orders)).sum(),

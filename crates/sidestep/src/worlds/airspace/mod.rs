@@ -21,6 +21,7 @@ pub mod events;
 mod flight_plan;
 mod generate;
 pub mod levels;
+mod memory;
 pub mod metrics;
 pub mod objective;
 pub mod orders;
@@ -39,7 +40,6 @@ pub use decide::{Effort, Optimization};
 use deploy::Traffic;
 use events::Event;
 use sidestep_kernel::conflict::Groups;
-use sidestep_kernel::ports::SystemClock;
 use sidestep_kernel::{Cycle, Slot, World};
 use state::{AirspaceState, PairRecord};
 use std::collections::BTreeMap;
@@ -56,9 +56,8 @@ pub struct Scratch {
     events: Vec<Event>,
     /// Pairs without fallbacks that are apart, of which one came in: cycle and both.
     too_close: Vec<(Cycle, Slot, Slot)>,
-    /// Time spent deciding: told beside the results, never part of them.
+    /// Processor time spent deciding: told beside the results, never part of them.
     decide_ns: u64,
-    clock: SystemClock,
     flying: Vec<Slot>,
 }
 

@@ -11,8 +11,8 @@ use super::shield::{Flyer, Side, Way};
 use super::state::{AirspaceState, LEFT};
 use super::track::Track;
 use super::world::{AirspaceWorld, purpose};
+use cpu_time::ThreadTime;
 use sidestep_kernel::distr::normal;
-use sidestep_kernel::ports::Clock;
 use sidestep_kernel::{Cycle, Slot};
 
 /// One airplane in this `dt`.
@@ -94,10 +94,10 @@ impl AirspaceWorld {
         }
         self.carry_out(state, now, &flown);
         let known: Vec<Known> = flown.iter().map(|&slot| self.known(state, now, slot)).collect();
-        let began_ns = scratch.clock.now_ns();
+        let began = ThreadTime::now();
         let mut contacts = state.take_contacts(&flown);
         let candidates = self.wanted(&known, now, &mut contacts, scratch);
-        scratch.decide_ns += scratch.clock.now_ns() - began_ns;
+        scratch.decide_ns += began.elapsed().as_nanos() as u64;
         let ways = if self.shield {
             self.shielded(state, (now, &flown), &candidates, &mut contacts, scratch)
         } else {
@@ -125,7 +125,7 @@ impl AirspaceWorld {
     }
 
     /// What the group knows of an airplane: its position with an error.
-    fn known(&self, state: &AirspaceState, now: Cycle, slot: Slot) -> Known {
+    pub(super) fn known(&self, state: &AirspaceState, now: Cycle, slot: Slot) -> Known {
         let cell = &state.airplanes[slot as usize];
         let mut pose = cell.pose();
         if self.disturbance.position_m > 0.0 {

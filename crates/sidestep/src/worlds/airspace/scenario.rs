@@ -8,7 +8,7 @@ use super::levels::Levels;
 use super::objective::Objective;
 use super::orders::Task;
 use super::shield::{Flyer, Side, first_fallbacks};
-use super::state::{AirplaneRecord, FLYING, Snapshot};
+use super::state::{AirplaneRecord, AirspaceState, FLYING, Snapshot};
 use super::track::Track;
 use super::world::{Airplane, AirspaceWorld, Disturbance, Method};
 use crate::collectives::{Choice, Estimator, Order, Settings, Stop, Update, Utility};
@@ -118,6 +118,7 @@ struct AirspaceSection {
     choice: Option<Choice>,
     vertical_m: Option<Spanned<f64>>,
     replay_until_s: Option<Spanned<f64>>,
+    group_memory_gib: Option<Spanned<f64>>,
     wind_m_s: Point,
     position_noise_m: f64,
     heading_noise_deg: f64,
@@ -248,6 +249,7 @@ impl Compiler<'_> {
             return Err(self.error(None, cause, "give a wind that all airplanes can fly against"));
         }
         let network = self.network(&timing, airplanes.len())?;
+        let group_memory_gib = self.positive(section.group_memory_gib.as_ref(), 2.0)?;
         let mut world = AirspaceWorld {
             airplanes,
             timing,
@@ -258,6 +260,7 @@ impl Compiler<'_> {
             holds_s: self.holds()?,
             method: section.method,
             deployment: section.deployment,
+            group_bytes: (group_memory_gib * f64::from(1 << 30)) as u64,
             shield: section.shield != Some(Switch::Off),
             vertical_m,
             replay_cycles: replay.cycles,
@@ -285,7 +288,7 @@ impl Compiler<'_> {
         }
         let (fallbacks, too_close) = first(&world);
         world.first_fallbacks.clone_from(&fallbacks);
-        Ok(Compiled {
+        let compiled = Compiled {
             world: Arc::new(world),
             name: self.file.name.clone(),
             seed: self.file.seed,
@@ -293,7 +296,32 @@ impl Compiler<'_> {
             record: self.file.record,
             fallbacks,
             too_close,
-        })
+        };
+        self.fits(&compiled)?;
+        Ok(compiled)
+    }
+
+    /// Whether the groups at the start can be optimized in the memory allowed.
+    fn fits(&self, compiled: &Compiled) -> Result<(), InputError> {
+        let world = &compiled.world;
+        if world.method != Method::Pc {
+            return Ok(());
+        }
+        let state = AirspaceState::restore(world, &compiled.start_snapshot());
+        let (airplanes, bytes) = world.largest_at_start(&state);
+        if bytes <= world.group_bytes {
+            return Ok(());
+        }
+        let gib = bytes as f64 / f64::from(1 << 30);
+        let cause = format!(
+            "{airplanes} airplanes near each other need up to {gib:.1} GiB to be optimized together"
+        );
+        let allowed = world.group_bytes as f64 / f64::from(1 << 30);
+        let remedy = format!(
+            "give fewer airplanes, a shorter horizon, fewer turns or holds_s, or a group_memory_gib \
+             above {allowed}"
+        );
+        Err(self.error(None, cause, remedy))
     }
 
     fn network(&self, timing: &Timing, airplanes: usize) -> Result<Option<Network>, InputError> {

@@ -108,6 +108,8 @@ pub struct AirspaceWorld {
     pub deployment: Deployment,
     /// What its messages go over, if that is not to be relied on.
     pub network: Option<Network>,
+    /// Bytes that the pair tables of a group may take; larger groups are not optimized.
+    pub group_bytes: u64,
     /// Whether the shield filters decisions.
     pub shield: bool,
     /// Airplanes at least this far above each other do not mind each other: what the scenario
