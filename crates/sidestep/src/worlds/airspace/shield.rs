@@ -672,12 +672,10 @@ mod tests {
         let wanted = filter(&flyers, &[straight(), straight()], DTAU_S);
         assert!(wanted.iter().all(|d| d.candidate == Some(0)), "{wanted:?}");
         // In each other's way, but with fallbacks that are apart.
-        let mut apart = [close(0.0, 0), close(1200.0, 1)];
-        apart[1].pose.psi_rad = std::f64::consts::PI;
-        apart[1].fallback = Side::Right;
-        let first = first_fallbacks(&apart);
-        assert_eq!(first.1, []);
-        apart.iter_mut().zip(first.0).for_each(|(f, side)| f.fallback = side);
+        let mut apart = [close(0.0, 0), close(0.0, 1)];
+        apart[1].pose = Pose { at: [0.0, 620.0], psi_rad: -std::f64::consts::FRAC_PI_2 };
+        apart.iter_mut().for_each(|f| f.fallback = Side::Right);
+        assert!(nearest_on_orbits(&apart, 400) > 500.0);
         let kept = filter(&apart, &[straight(), straight()], DTAU_S);
         assert!(kept.iter().any(|d| d.candidate.is_none()), "{kept:?}");
     }
