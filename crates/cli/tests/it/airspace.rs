@@ -192,3 +192,14 @@ fn commands_of_a_bluesky_file_are_flown_at_their_times() {
         assert!(report.contains(expected), "{expected} is missing in\n{report}");
     }
 }
+
+/// A run is driven in slices, the first of one cycle.
+#[test]
+fn a_run_that_is_over_where_a_slice_ends_is_recorded_all_the_same() {
+    let place = Place::new();
+    let rows: Vec<String> = head_on_csv().lines().take(5).map(|row| format!("{row}\n")).collect();
+    place.write("short.csv", &rows.concat());
+    assert_eq!(place.json(&["run", "short.csv", "--out", "short"])["cycles"], 1);
+    let replayed = place.run(&["replay", "short", "--cycle", "0"]);
+    assert!(replayed.out().contains("equal to the 2 recorded poses"), "{}", replayed.out());
+}
