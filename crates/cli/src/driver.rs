@@ -59,7 +59,10 @@ fn slice(
     let done = run.advance(asked);
     pace.note(done, started.elapsed());
     match recording {
-        Some(recording) if done < asked || run.cycle() == stop => recording.take(run),
+        // A run may be over just where a slice ends: then there is no further one.
+        Some(recording) if done < asked || run.cycle() == stop || run.is_over() => {
+            recording.take(run)
+        }
         _ => Ok(()),
     }
 }

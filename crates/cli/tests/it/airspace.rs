@@ -108,3 +108,98 @@ fn a_bluesky_file_is_a_scenario_and_check_counts_its_commands() {
         assert!(report.contains(expected), "{expected} is missing in\n{report}");
     }
 }
+
+/// Rows of two airplanes on one level over the equator that meet head on after 400 s.
+fn head_on_csv() -> String {
+    let header = "time_s,icao24,callsign,lat_deg,lon_deg,alt_ft,gs_kt,track_deg,vs_fpm\n";
+    let row = |k: i32, (name, sign, track): (&str, f64, u32)| {
+        let lon_deg = sign * (-1.0 + f64::from(k) / 40.0);
+        format!("{},{name},,0.0,{lon_deg},35000,540,{track},\n", 1_000_000 + 10 * k)
+    };
+    let both = |k: i32| [("a", 1.0, 90), ("b", -1.0, 270)].map(|who| row(k, who)).concat();
+    (0..=80).map(both).fold(header.to_string(), |text, rows| text + &rows)
+}
+
+#[test]
+fn recorded_tracks_are_replayed_or_flown_anew_from_a_chosen_time() {
+    let place = Place::new();
+    place.write("tracks.csv", &(head_on_csv() + "1000000,c,,1.0,0.0,35000,540,90,\n"));
+    let replayed = place.json(&["run", "tracks.csv", "--out", "replayed"]);
+    let metrics = &replayed["metrics"];
+    assert_eq!((&metrics["airplanes"], &metrics["replayed"]), (&2.into(), &2.into()), "{replayed}");
+    assert_eq!(
+        (&metrics["losses_of_separation"], &metrics["optimisations"]),
+        (&1.into(), &0.into())
+    );
+    assert!(metrics["mean_delay_percent"].is_null());
+    assert_eq!(
+        (&replayed["file"]["rows"], &replayed["file"]["aircraft_of_one_row"]),
+        (&163.into(), &1.into())
+    );
+    assert!(place.read("replayed/scenario.toml").contains("replay_until_s = inf"));
+    let again = place.run(&["replay", "replayed", "--cycle", "20"]);
+    assert!(
+        again.out().contains("equal to the 2 recorded poses"),
+        "{}{}",
+        again.out(),
+        again.err()
+    );
+    for until in ["0", "100"] {
+        let set = format!("airspace.replay_until_s={until}");
+        let anew = place.json(&["run", "tracks.csv", "--set", &set]);
+        let metrics = &anew["metrics"];
+        assert_eq!(metrics["losses_of_separation"], 0, "{anew}");
+        assert_eq!((&metrics["arrived"], &metrics["replayed"]), (&2.into(), &0.into()), "{anew}");
+        assert!(metrics["mean_delay_percent"].is_number(), "{anew}");
+    }
+    let late = place.run(&["run", "tracks.csv", "--set", "airspace.replay_until_s=390"]);
+    assert!(
+        late.out().contains("start too close for the shield: 0 and 1 at 390 s"),
+        "{}",
+        late.out()
+    );
+    let told = place.run(&["check", "tracks.csv"]);
+    assert!(told.out().contains("replayed all") && told.out().contains("163 of 3 aircraft"));
+}
+
+#[test]
+fn commands_of_a_bluesky_file_are_flown_at_their_times() {
+    let place = Place::new();
+    place.write(
+        "told.scn",
+        "00:00:00.00>CRE A1,B744,0,0,90,FL200,250\n00:00:00.00>DEST A1 0,1.0\n\
+         00:01:00.00>A1 HDG 180\n00:02:00.00>A1 SPD 300\n00:03:00.00>ALT A1 FL210 2000\n\
+         00:05:00.00>A1 LNAV ON\n00:06:00.00>A1 VNAV ON\n\
+         00:00:00.00>CRE B2,B744,5,5,90,FL200,250\n00:04:00.00>DEL B2\n\
+         00:00:00.00>CRE C3,B744,-5,5,0,FL200,250\n00:02:00.00>ADDWPT C3 -5,6\n",
+    );
+    let ran = place.json(&["run", "told.scn", "--out", "told"]);
+    let metrics = &ran["metrics"];
+    assert_eq!((&metrics["arrived"], &metrics["left"]), (&2.into(), &1.into()), "{ran}");
+    // Three changes and the way-point again for A1; a heading and its route for C3.
+    assert_eq!((&metrics["orders"], &metrics["orders_delayed"]), (&6.into(), &0.into()), "{ran}");
+    assert_eq!(ran["file"]["not_flown"]["VNAV"], 1, "{ran}");
+    let scenario = place.read("told/scenario.toml");
+    for order in [
+        "{ at_s = 60.0, heading_deg = -90.0 }",
+        "climb_m_s = 10.16",
+        "{ at_s = 240.0, leaves = true }",
+    ] {
+        assert!(scenario.contains(order), "{order} is missing in\n{scenario}");
+    }
+    let report = place.run(&["run", "told.scn"]).out();
+    for expected in ["6 carried out", "1 before they had arrived", "not flown", "VNAV 1"] {
+        assert!(report.contains(expected), "{expected} is missing in\n{report}");
+    }
+}
+
+/// A run is driven in slices, the first of one cycle.
+#[test]
+fn a_run_that_is_over_where_a_slice_ends_is_recorded_all_the_same() {
+    let place = Place::new();
+    let rows: Vec<String> = head_on_csv().lines().take(5).map(|row| format!("{row}\n")).collect();
+    place.write("short.csv", &rows.concat());
+    assert_eq!(place.json(&["run", "short.csv", "--out", "short"])["cycles"], 1);
+    let replayed = place.run(&["replay", "short", "--cycle", "0"]);
+    assert!(replayed.out().contains("equal to the 2 recorded poses"), "{}", replayed.out());
+}

@@ -201,8 +201,10 @@ fn appearing() -> impl Strategy<Value = String> {
     prop::collection::vec(one, 2..10).prop_map(|all| all.concat())
 }
 
+type Pairs = BTreeSet<(u32, u32)>;
+
 /// Pairs that lost separation, and pairs that were told to be too close when they came in.
-fn lost_and_told(run: &AirspaceSimulation) -> (BTreeSet<(u32, u32)>, BTreeSet<(u32, u32)>) {
+fn lost_and_told(run: &AirspaceSimulation) -> (Pairs, Pairs) {
     let ledger = run.ledger();
     let lost = ledger.pairs.iter().filter(|(_, record)| record.losses > 0).map(|(pair, _)| *pair);
     (lost.collect(), ledger.too_close.iter().map(|&(_, a, b)| (a, b)).collect())

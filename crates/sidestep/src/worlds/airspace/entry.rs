@@ -30,6 +30,10 @@ impl AirspaceWorld {
         for (&slot, side) in flown.iter().zip(sides) {
             state.airplanes[slot as usize].set_side(side);
         }
-        scratch.too_close.extend(too_close.into_iter().map(|(i, j)| (now, flown[i], flown[j])));
+        for (i, j) in too_close {
+            let pair = [flown[i], flown[j]];
+            pair.iter().for_each(|&slot| state.airplanes[slot as usize].set_too_close());
+            scratch.too_close.push((now, pair[0], pair[1]));
+        }
     }
 }

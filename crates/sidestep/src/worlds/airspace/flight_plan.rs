@@ -48,7 +48,7 @@ pub(super) struct OrderSection {
 type Orders = (Vec<FlightOrder>, f64);
 
 fn is_absurd(value: f64) -> bool {
-    value.is_nan() || value.abs() > MOST
+    !value.is_finite() || value.abs() > MOST
 }
 
 impl AirplaneSection {

@@ -148,6 +148,7 @@ impl AirspaceWorld {
             levels: Levels::between(cell.altitude_m.get(), stage.altitude_m),
             vertical_m: self.vertical_m,
             fallback: cell.side(),
+            came_too_close: cell.came_too_close(),
             // Whoever has waited longest goes first, then the smaller id.
             rank: u64::from(cell.waiting.get()) << 32 | u64::from(!slot),
         }

@@ -16,6 +16,7 @@ use crate::scenario::{OneOrMany, Source};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{InputError, Seed};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use toml::Spanned;
 
@@ -205,19 +206,21 @@ impl Compiled {
 
     /// The state at the start.
     pub fn start_snapshot(&self) -> Snapshot {
-        let record = |(airplane, &fallback): (&Airplane, &Side)| AirplaneRecord {
+        let close: BTreeSet<u32> = self.too_close.iter().flat_map(|&(a, b)| [a, b]).collect();
+        let record = |(id, (airplane, &fallback)): (u32, (&Airplane, &Side))| AirplaneRecord {
             pose: airplane.start,
             arrived: FLYING,
             counts: [0; 4],
             fallback,
+            came_too_close: close.contains(&id),
             altitude_m: match &airplane.track {
                 Some(track) => track.altitude_at_m(airplane.appears_s),
                 None => airplane.altitude_m,
             },
             orders: [0; 2],
         };
-        let airplanes = self.world.airplanes.iter().zip(&self.fallbacks).map(record).collect();
-        Snapshot { cycle: 0, airplanes, contacts: Vec::new() }
+        let airplanes = (0..).zip(self.world.airplanes.iter().zip(&self.fallbacks)).map(record);
+        Snapshot { cycle: 0, airplanes: airplanes.collect(), contacts: Vec::new() }
     }
 }
 
@@ -673,6 +676,7 @@ fn first(world: &AirspaceWorld) -> (Vec<Side>, Vec<(u32, u32)>) {
             levels: Levels::at(airplane.altitude_m),
             vertical_m: world.vertical_m,
             fallback: Side::Left,
+            came_too_close: false,
             rank: rank as u64,
             id: i as u32,
         }

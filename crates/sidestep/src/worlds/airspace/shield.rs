@@ -26,7 +26,8 @@
 //!    invariant.
 //!
 //! By induction over `dt` there is never a loss of separation once the first fallbacks are apart
-//! ([`first_fallbacks`] chooses them). An airplane that leaves the world keeps every other pair
+//! ([`first_fallbacks`] chooses them). Where they are not, the pair is left to the method until
+//! they are, and the induction is about all other pairs. An airplane that leaves the world keeps every other pair
 //! as it was. A wind that all know moves everybody alike and changes no distance. Each step is
 //! a property test below.
 //!
@@ -90,14 +91,29 @@ pub struct Flyer {
     pub vertical_m: f64,
     /// Its stored fallback.
     pub fallback: Side,
+    /// Whether it came in too close to another: see [`Flyer::is_left_alone_with`].
+    pub came_too_close: bool,
     /// Higher ranks keep what they want; unique.
     pub rank: u64,
 }
 
 impl Flyer {
+    /// Whether two airplanes that came in too close are still without fallbacks that are apart.
+    /// Falling back would bring these two together, so they are left to the method until they
+    /// have such fallbacks. For all other pairs the invariant holds all the same.
+    fn is_left_alone_with(&self, other: &Self) -> bool {
+        let orbit = |f: &Self| Orbit::from(f.pose, f.v_m_s, f.fallback.sign() * f.omega_max_rad_s);
+        let gap_m = self.separation_m.max(other.separation_m);
+        self.came_too_close
+            && other.came_too_close
+            && !orbit(self).stays_apart(&orbit(other), gap_m)
+    }
+
     fn minds(&self, other: &Self) -> bool {
         let vertical_m = self.vertical_m.max(other.vertical_m);
-        self.id != other.id && self.levels.meets(&other.levels, vertical_m)
+        self.id != other.id
+            && self.levels.meets(&other.levels, vertical_m)
+            && !self.is_left_alone_with(other)
     }
 }
 
@@ -532,6 +548,7 @@ mod tests {
             levels: Levels::at(0.0),
             vertical_m: 300.0,
             fallback: Side::Left,
+            came_too_close: false,
             rank,
         }
     }
@@ -691,6 +708,22 @@ mod tests {
         let (sides, too_close) = entry_fallbacks(&near, |i| i == 2);
         assert_eq!(sides[..2], [Side::Left; 2]);
         assert_eq!(too_close, [(0, 2), (1, 2)], "the pair that was there before is not named");
+    }
+
+    #[test]
+    fn two_that_came_in_too_close_are_left_to_the_method_and_nobody_else_is() {
+        let close = |x: f64, rank: u64| Flyer { came_too_close: true, ..flyer(x, 0.0, 0.0, rank) };
+        let flyers = [close(0.0, 0), close(100.0, 1)];
+        let straight = || vec![Way { omegas_rad_s: vec![0.0; STEPS] }];
+        let wanted = filter(&flyers, &[straight(), straight()], (STEPS, DTAU_S), Certainty::Sure);
+        assert!(wanted.iter().all(|d| d.candidate == Some(0)), "{wanted:?}");
+        // In each other's way, but with fallbacks that are apart.
+        let mut apart = [close(0.0, 0), close(0.0, 1)];
+        apart[1].pose = Pose { at: [0.0, 620.0], psi_rad: -std::f64::consts::FRAC_PI_2 };
+        apart.iter_mut().for_each(|f| f.fallback = Side::Right);
+        assert!(nearest_on_orbits(&apart, 400) > 500.0);
+        let kept = filter(&apart, &[straight(), straight()], (STEPS, DTAU_S), Certainty::Sure);
+        assert!(kept.iter().any(|d| d.candidate.is_none()), "{kept:?}");
     }
 
     #[test]

@@ -16,6 +16,8 @@ use std::sync::{Mutex, PoisonError};
 pub const FLYING: u64 = u64::MAX;
 /// Set beside the time at which an airplane was removed, rather than arrived.
 pub(super) const LEFT: u64 = 1 << 63;
+/// See [`Cell::fallback`].
+const TOO_CLOSE: u8 = 2;
 const NOBODY: u32 = u32::MAX;
 
 /// The state of an airspace; slots are ids.
@@ -55,7 +57,7 @@ pub struct Cell {
     pub orders: Shared<u16>,
     /// and times that one had to wait for the next `dt`.
     pub waits: Shared<u16>,
-    /// Stored fallback: 0 left, 1 right.
+    /// Stored fallback, 0 left, 1 right; and 2 for having come in too close to another.
     pub fallback: Shared<u8>,
 }
 
@@ -92,9 +94,19 @@ impl Cell {
         Side::BOTH[usize::from(self.fallback.get() & 1)]
     }
 
+    /// Whether it came in too close to another for the shield.
+    pub fn came_too_close(&self) -> bool {
+        self.fallback.get() & TOO_CLOSE != 0
+    }
+
+    /// Notes that it did.
+    pub(super) fn set_too_close(&self) {
+        self.fallback.set(self.fallback.get() | TOO_CLOSE);
+    }
+
     /// Stores a fallback.
     pub fn set_side(&self, side: Side) {
-        self.fallback.set(side as u8);
+        self.fallback.set(self.fallback.get() & TOO_CLOSE | side as u8);
     }
 }
 
@@ -167,6 +179,8 @@ pub struct AirplaneRecord {
     pub counts: [u32; 4],
     /// Stored fallback.
     pub fallback: Side,
+    /// Whether it came in too close to another for the shield.
+    pub came_too_close: bool,
     /// Altitude.
     pub altitude_m: f64,
     /// Orders carried out, and times that one had to wait.
@@ -221,6 +235,9 @@ impl AirspaceState {
             cell.orbits.set(orbits);
             cell.waiting.set(waiting);
             cell.set_side(record.fallback);
+            if record.came_too_close {
+                cell.set_too_close();
+            }
             cell.altitude_m.set(record.altitude_m);
             let [orders, waits] = record.orders;
             cell.orders.set(orders);
@@ -258,6 +275,7 @@ impl AirspaceState {
             arrived: cell.arrived.get(),
             counts: [cell.next.get(), cell.overrides.get(), cell.orbits.get(), cell.waiting.get()],
             fallback: cell.side(),
+            came_too_close: cell.came_too_close(),
             altitude_m: cell.altitude_m.get(),
             orders: [cell.orders.get(), cell.waits.get()],
         };
@@ -293,7 +311,8 @@ impl Snapshot {
             [x, y, psi_rad].iter().for_each(|v| hasher.u64(v.to_bits()));
             hasher.u64(airplane.arrived);
             airplane.counts.iter().for_each(|&n| hasher.u32(n));
-            hasher.u8(airplane.fallback as u8);
+            let too_close = if airplane.came_too_close { TOO_CLOSE } else { 0 };
+            hasher.u8(airplane.fallback as u8 | too_close);
             // Without orders the altitude is the scenario's, or that of the track at this time.
             let [orders, waits] = airplane.orders;
             if orders > 0 || waits > 0 {

@@ -85,6 +85,7 @@ impl Orbiting {
             levels: beacon.levels,
             vertical_m: world.vertical_m,
             fallback: self.side,
+            came_too_close: false,
             rank: u64::MAX - u64::from(id),
         }
     }

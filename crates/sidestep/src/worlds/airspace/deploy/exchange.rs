@@ -59,6 +59,7 @@ enum Message {
 struct Proposal {
     beacon: Beacon,
     fallback: Side,
+    came_too_close: bool,
     rank: u64,
     ways: Vec<Way>,
     unheard: Vec<(EntityId, Contact)>,
@@ -114,7 +115,7 @@ impl Agent<'_> {
     }
 
     fn flyer_of(&self, place: usize, proposal: &Proposal) -> Flyer {
-        let Proposal { beacon, fallback, rank, .. } = proposal;
+        let Proposal { beacon, fallback, came_too_close, rank, .. } = proposal;
         Flyer {
             id: self.ids[place],
             pose: beacon.pose,
@@ -124,6 +125,7 @@ impl Agent<'_> {
             levels: beacon.levels,
             vertical_m: self.world.vertical_m,
             fallback: *fallback,
+            came_too_close: *came_too_close,
             rank: *rank,
         }
     }
@@ -427,6 +429,7 @@ fn proposal(flyer: &Flyer, ways: &[Way], contacts: &Contacts) -> Proposal {
     Proposal {
         beacon,
         fallback: flyer.fallback,
+        came_too_close: flyer.came_too_close,
         rank: flyer.rank,
         ways: ways.to_vec(),
         unheard: unheard.map(|(&id, contact)| (id, contact.clone())).collect(),
