@@ -123,7 +123,7 @@ fn head_on_csv() -> String {
 #[test]
 fn recorded_tracks_are_replayed_or_flown_anew_from_a_chosen_time() {
     let place = Place::new();
-    place.write("tracks.csv", &(head_on_csv() + "1000000,c,,1.0,0.0,35000,540,90,\n"));
+    place.write("tracks.csv", head_on_csv() + "1000000,c,,1.0,0.0,35000,540,90,\n");
     let replayed = place.json(&["run", "tracks.csv", "--out", "replayed"]);
     let metrics = &replayed["metrics"];
     assert_eq!((&metrics["airplanes"], &metrics["replayed"]), (&2.into(), &2.into()), "{replayed}");
@@ -198,7 +198,7 @@ fn commands_of_a_bluesky_file_are_flown_at_their_times() {
 fn a_run_that_is_over_where_a_slice_ends_is_recorded_all_the_same() {
     let place = Place::new();
     let rows: Vec<String> = head_on_csv().lines().take(5).map(|row| format!("{row}\n")).collect();
-    place.write("short.csv", &rows.concat());
+    place.write("short.csv", rows.concat());
     assert_eq!(place.json(&["run", "short.csv", "--out", "short"])["cycles"], 1);
     let replayed = place.run(&["replay", "short", "--cycle", "0"]);
     assert!(replayed.out().contains("equal to the 2 recorded poses"), "{}", replayed.out());

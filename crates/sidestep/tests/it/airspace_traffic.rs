@@ -406,5 +406,6 @@ fn the_recording_over_switzerland_replays_with_its_losses_and_is_flown_anew_with
             metrics.mean_delay_percent,
         );
         assert!(until_s > 0.0 || lost.is_subset(&told), "{lost:?} {told:?}");
+        assert!(metrics.lost_s < 0.6 * replayed.airspace_metrics().lost_s);
     }
 }

@@ -102,5 +102,7 @@ fn counted(name: &str, counts: &BTreeMap<String, u64>) -> Option<(String, String
 
 /// A line per error, which says where in the file it is.
 fn listed(name: &str, errors: &[InputError]) -> impl Iterator<Item = (String, String)> {
-    errors.iter().map(move |error| (name.to_string(), error.to_string()))
+    // The remedy stands on a line of its own, which would look like a line of the report.
+    let in_one_line = |error: &InputError| error.to_string().replace("\n  help: ", "; ");
+    errors.iter().map(move |error| (name.to_string(), in_one_line(error)))
 }

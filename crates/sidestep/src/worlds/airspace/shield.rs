@@ -91,7 +91,8 @@ pub struct Flyer {
     pub vertical_m: f64,
     /// Its stored fallback.
     pub fallback: Side,
-    /// Whether it came in too close to another: see [`Flyer::is_left_alone_with`].
+    /// Whether it came in too close to another: with that one it is left to the method until
+    /// their fallbacks are apart.
     pub came_too_close: bool,
     /// Higher ranks keep what they want; unique.
     pub rank: u64,
