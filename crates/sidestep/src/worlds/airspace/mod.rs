@@ -6,7 +6,7 @@
 //! ```text
 //! scenario.rs, generate.rs -> world.rs (immutable), state.rs (cells)
 //! near each other -> groups;  decide.rs -> shield.rs -> react.rs          one cycle of dt
-//! airplane.rs, objective.rs: motion and cost behind it     metrics.rs: what came of it
+//! airplane.rs, objective.rs, orbit.rs: motion and cost behind it   metrics.rs: what came of it
 //! ```
 
 pub mod airplane;
@@ -16,6 +16,7 @@ pub mod deploy;
 mod generate;
 pub mod metrics;
 pub mod objective;
+mod orbit;
 mod react;
 pub mod scenario;
 pub mod shield;

@@ -5,7 +5,7 @@ use super::airplane::{Pose, distance_m};
 use super::decide::Known;
 use super::shield::{Flyer, Side, Way, filter};
 use super::state::{AirspaceState, PairRecord};
-use super::world::{AirspaceWorld, purpose};
+use super::world::{Airplane, AirspaceWorld, purpose};
 use sidestep_kernel::distr::normal;
 use sidestep_kernel::ports::Clock;
 use sidestep_kernel::{Cycle, Slot};
@@ -14,6 +14,11 @@ use sidestep_kernel::{Cycle, Slot};
 pub const LOOKS_PER_STEP: usize = 10;
 /// Pairs farther apart than this many separations are not kept in the books.
 const WORTH_NOTING: f64 = 4.0;
+/// Goals farther away than this rank alike.
+const FARTHEST_M: f64 = 2e9;
+/// To be refused what it wants for `dt` brings an airplane forward as if it had flown this part
+/// of the way meanwhile.
+const REFUSED_PART: f64 = 0.125;
 
 /// What one airplane flies in this `dt`.
 struct Flight {
@@ -74,8 +79,7 @@ impl AirspaceWorld {
                 altitude_m: self.airplanes[slot as usize].altitude_m,
                 vertical_m: self.vertical_m,
                 fallback: cell.side(),
-                // Whoever has waited longest goes first, then the smaller id.
-                rank: u64::from(cell.waiting.get()) << 32 | u64::from(!slot),
+                rank: self.rank(state, slot),
             }
         };
         let flyers: Vec<Flyer> = group.iter().map(flyer).collect();
@@ -102,6 +106,22 @@ impl AirspaceWorld {
             });
         }
         ways
+    }
+
+    /// Who goes first: whoever is nearer to its goal, so that it is soon out of the others' way;
+    /// and whoever has often been refused what it wanted, so that nobody waits for ever. Whole
+    /// metres in the upper half, unique by the id in the lower one.
+    fn rank(&self, state: &AirspaceState, slot: Slot) -> u64 {
+        let cell = &state.airplanes[slot as usize];
+        let Airplane { model, mission, .. } = &self.airplanes[slot as usize];
+        let ahead = &mission[(cell.next.get() as usize).min(mission.len())..];
+        let legs = ahead
+            .iter()
+            .scan(cell.pose().at, |from, &to| Some(distance_m(std::mem::replace(from, to), to)));
+        let refused_m = f64::from(cell.overrides.get()) * model.v_m_s * self.timing.dt_s;
+        // A conversion of what is out of range ends at the range.
+        let first = (FARTHEST_M + REFUSED_PART * refused_m - legs.sum::<f64>()) as u32;
+        u64::from(first) << 32 | u64::from(!slot)
     }
 
     fn orbit(&self, side: Side, omega_max_rad_s: f64) -> Way {
