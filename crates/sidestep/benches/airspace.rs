@@ -9,7 +9,7 @@ use sidestep::collectives::{
 };
 use sidestep::scenario::Source;
 use sidestep::worlds::airspace::airplane::{
-    Action, After, Model, Passing, Pilot, Point, Pose, Timing, actions,
+    Action, After, Legs, Model, Passing, Pilot, Point, Pose, Timing, actions,
 };
 use sidestep::worlds::airspace::objective::{Objective, Options, game};
 use sidestep::worlds::airspace::simulation::AirspaceSimulation;
@@ -25,11 +25,12 @@ struct Conflict {
     poses: Vec<Pose>,
     goals: Vec<[Point; 1]>,
     actions: Vec<Action>,
+    timing: Timing,
     objective: Objective,
 }
 
 impl Conflict {
-    fn new(n: usize, holds_s: &[f64], objective: Objective) -> Self {
+    fn new(n: usize, horizon: usize, legs: &Legs, objective: Objective) -> Self {
         let model = Model {
             v_m_s: 35.0,
             omega_max_rad_s: 4f64.to_radians(),
@@ -46,7 +47,8 @@ impl Conflict {
         Self {
             poses: (0..n).map(pose).collect(),
             goals: (0..n).map(|k| [on(6500.0, angle(k) + turn)]).collect(),
-            actions: actions(&model, TIMING.dt_s, holds_s),
+            actions: actions(&model, TIMING.dt_s, &[], legs),
+            timing: Timing { horizon, ..TIMING },
             model,
             objective,
         }
@@ -64,7 +66,7 @@ impl Conflict {
 
     fn options(&self) -> Vec<Options> {
         let of = |i: usize| {
-            let predict = |a: &Action| self.pilot(i).predict(*a, self.poses[i], 0, &TIMING);
+            let predict = |a: &Action| self.pilot(i).predict(*a, self.poses[i], 0, &self.timing);
             let predictions = self.actions.iter().map(predict).collect();
             Options::new(predictions, self.model.separation_m, 0.0)
         };
@@ -84,16 +86,16 @@ impl Game for Anew<'_> {
     }
 
     fn cost(&self, joint: &[usize]) -> f64 {
-        let Conflict { objective, model, poses, actions, .. } = self.conflict;
+        let Conflict { objective, model, poses, actions, timing, .. } = self.conflict;
         let ways: Vec<_> = joint
             .iter()
             .enumerate()
-            .map(|(i, &x)| self.conflict.pilot(i).predict(actions[x], poses[i], 0, &TIMING))
+            .map(|(i, &x)| self.conflict.pilot(i).predict(actions[x], poses[i], 0, timing))
             .collect();
         let r = [model.separation_m; 2];
         let mut sum = 0.0;
         for (i, a) in ways.iter().enumerate() {
-            let best = self.conflict.pilot(i).predict(Action::Proceed, poses[i], 0, &TIMING);
+            let best = self.conflict.pilot(i).predict(Action::Proceed, poses[i], 0, timing);
             sum += objective.alpha * objective.deviation(a, &best);
             for b in &ways[i + 1..] {
                 sum += objective.collision(a, b, r).iter().sum::<f64>();
@@ -103,14 +105,14 @@ impl Game for Anew<'_> {
     }
 }
 
-fn settings(estimator: Estimator, max_rounds: u32) -> Settings {
+fn settings(estimator: Estimator, cooling: f64, max_rounds: u32) -> Settings {
     let exact = estimator == Estimator::Exact;
     Settings {
         estimator,
         update: Update::NearestNewton { step: 0.5 },
         order: if exact { Order::Sequence } else { Order::Parallel },
         utility: Utility::Joint,
-        cooling: 0.8,
+        cooling,
         stop: Stop { threshold: 1e-3, calm_rounds: 3, max_rounds },
         choice: Choice::Argmax,
     }
@@ -132,17 +134,24 @@ fn best_s(n: usize, mut work: impl FnMut()) -> f64 {
 }
 
 fn exact() {
-    let objective =
-        Objective { alpha: 0.001, beta: 0.995, inflation: 1.05, mask: true, vertical_m: 300.0 };
-    for (name, holds_s) in
-        [("2m + 1 actions", &[][..]), ("with two more hold times", &[30.0, 90.0])]
-    {
-        let conflict = Conflict::new(10, holds_s, objective);
+    let preset = |inflation| Objective {
+        alpha: 0.001,
+        beta: 0.995,
+        inflation,
+        mask: true,
+        vertical_m: 300.0,
+    };
+    for (name, horizon, legs, inflation, cooling) in [
+        ("the paper's actions", 125, Legs::default(), 1.05, 0.8),
+        ("the default preset", 90, Legs::usual(), 1.1, 0.5),
+    ] {
+        let objective = preset(inflation);
+        let conflict = Conflict::new(10, horizon, &legs, objective);
         let predict_s = best_s(20, || drop(conflict.options()));
         let options = conflict.options();
         let tables_s = best_s(20, || drop(game(&objective, &options)));
         let built = game(&objective, &options);
-        let settings = settings(Estimator::Exact, 200);
+        let settings = settings(Estimator::Exact, cooling, 200);
         let rounds_s = best_s(20, || drop(optimize(&built, &settings, uniform)));
         let rounds = optimize(&built, &settings, uniform).rounds;
         println!(
@@ -158,8 +167,8 @@ fn exact() {
 fn sampled() {
     let objective =
         Objective { alpha: 1.0, beta: 0.995, inflation: 1.0, mask: true, vertical_m: 300.0 };
-    let conflict = Conflict::new(10, &[], objective);
-    let settings = settings(Estimator::Sampled { block: 20, ageing: 0.7 }, 50);
+    let conflict = Conflict::new(10, 125, &Legs::default(), objective);
+    let settings = settings(Estimator::Sampled { block: 20, ageing: 0.7 }, 0.8, 50);
     let shared_s = best_s(5, || {
         let built = game(&objective, &conflict.options());
         drop(optimize(&built, &settings, uniform));

@@ -37,10 +37,41 @@ pub struct PairwiseGame {
 struct Pair {
     a: usize,
     b: usize,
-    /// What the strategies cost both together: `costs[x_a * strategies_b + x_b]`.
-    costs: Vec<f64>,
-    /// The same, as the parts of `a` and of `b`.
+    /// What the strategies cost both together: a row per strategy of `a`,
+    given_a: Table,
+    /// and a row per strategy of `b`.
+    given_b: Table,
+    /// The same, as the parts of `a` and of `b`: `parts[x_a * strategies_b + x_b]`.
     parts: Vec<[f64; 2]>,
+}
+
+/// What strategies of one player cost, a row per strategy of another.
+#[derive(Debug, Clone)]
+struct Table {
+    width: usize,
+    costs: Vec<f64>,
+    /// Rows in which anything costs anything, rising.
+    rows: Vec<usize>,
+}
+
+impl Table {
+    fn new(width: usize, costs: Vec<f64>) -> Self {
+        let costly = costs.chunks_exact(width).map(|row| row.iter().any(|cost| *cost != 0.0));
+        let rows = costly.enumerate().filter_map(|(row, costly)| costly.then_some(row)).collect();
+        Self { width, costs, rows }
+    }
+
+    fn row(&self, row: usize) -> &[f64] {
+        &self.costs[row * self.width..][..self.width]
+    }
+
+    /// Adds what is expected if rows have the probabilities `q`.
+    fn expect(&self, q: &[f64], expected: &mut [f64]) {
+        for &row in &self.rows {
+            let p = q[row];
+            expected.iter_mut().zip(self.row(row)).for_each(|(sum, cost)| *sum += cost * p);
+        }
+    }
 }
 
 impl PairwiseGame {
@@ -82,8 +113,12 @@ impl PairwiseGame {
         );
         if parts.iter().any(|part| *part != [0.0; 2]) {
             let index = self.pairs.len();
-            let costs = parts.iter().map(|[of_a, of_b]| of_a + of_b).collect();
-            self.pairs.push(Pair { a, b, costs, parts });
+            let [rows, width] = [self.strategies[a], self.strategies[b]];
+            let cost = |[of_a, of_b]: &[f64; 2]| of_a + of_b;
+            let column = |x: usize| parts[x..].iter().step_by(width).map(cost);
+            let given_a = Table::new(width, parts.iter().map(cost).collect());
+            let given_b = Table::new(rows, (0..width).flat_map(column).collect());
+            self.pairs.push(Pair { a, b, given_a, given_b, parts });
             self.enlist(a, b, index);
             self.enlist(b, a, index);
         }
@@ -113,23 +148,18 @@ impl PairwiseGame {
         expected.clear();
         expected.extend_from_slice(&self.own[player]);
         for &index in &self.of_player[player] {
-            let Pair { a, b, costs, .. } = &self.pairs[index];
-            let columns = self.strategies[*b];
+            let Pair { a, b, given_a, given_b, .. } = &self.pairs[index];
             if *a == player {
-                for (sum, row) in expected.iter_mut().zip(costs.chunks_exact(columns)) {
-                    *sum += row.iter().zip(&q[*b]).map(|(cost, p)| cost * p).sum::<f64>();
-                }
+                given_b.expect(&q[*b], expected);
             } else {
-                for (row, p) in costs.chunks_exact(columns).zip(&q[*a]) {
-                    expected.iter_mut().zip(row).for_each(|(sum, cost)| *sum += cost * p);
-                }
+                given_a.expect(&q[*a], expected);
             }
         }
     }
 
     fn pair_cost(&self, index: usize, joint: &[usize]) -> f64 {
-        let Pair { a, b, costs, .. } = &self.pairs[index];
-        costs[joint[*a] * self.strategies[*b] + joint[*b]]
+        let Pair { a, b, given_a, .. } = &self.pairs[index];
+        given_a.row(joint[*a])[joint[*b]]
     }
 }
 

@@ -145,13 +145,12 @@ impl Player {
 
     fn newton(&mut self, step: f64, t: f64) -> f64 {
         let mean: f64 = self.q.iter().zip(&self.expected).map(|(q, e)| q * e).sum();
-        let entropy = -self.q.iter().map(|q| q * math::ln(*q)).sum::<f64>();
-        let expected = &self.expected;
-        let moved = |(x, q): (usize, &f64)| {
-            let force = (expected[x] - mean) / t + entropy + math::ln(*q);
-            (q - step * q * force).max(LEAST)
-        };
-        let new: Vec<f64> = self.q.iter().enumerate().map(moved).collect();
+        let mut new: Vec<f64> = self.q.iter().map(|q| math::ln(*q)).collect();
+        let entropy = -self.q.iter().zip(&new).map(|(q, ln)| q * ln).sum::<f64>();
+        for ((new, q), expected) in new.iter_mut().zip(&self.q).zip(&self.expected) {
+            let force = (expected - mean) / t + entropy + *new;
+            *new = (q - step * q * force).max(LEAST);
+        }
         self.settle(&new)
     }
 

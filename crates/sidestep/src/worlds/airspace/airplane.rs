@@ -151,22 +151,93 @@ pub enum Action {
         /// How long it is held.
         hold_s: f64,
     },
+    /// The turn rate, then straight on, and then proceed: a leg to one side.
+    Leg {
+        /// Turn rate.
+        omega_rad_s: f64,
+        /// How long it is turned.
+        turn_s: f64,
+        /// When the leg ends, from the start of the turn.
+        until_s: f64,
+    },
     /// Proceed from the start: the optimal action.
     Proceed,
 }
 
-/// The action set of a model: `2 m + 1` actions, ordered by turn rate, then by how long it is
-/// held (for ever last of each), the optimal one last. `holds_s` are further hold times.
-pub fn actions(model: &Model, dt_s: f64, holds_s: &[f64]) -> Vec<Action> {
+impl Action {
+    /// The turn rate that the action asks for after `flown_s` seconds of it, if it does not
+    /// proceed to the way-point by then.
+    #[inline]
+    pub fn held_rad_s(self, flown_s: f64) -> Option<f64> {
+        // Rounding of step times must not decide.
+        let before = |end_s: f64| flown_s < end_s - 1e-9;
+        match self {
+            Self::Hold { omega_rad_s } => Some(omega_rad_s),
+            Self::Then { omega_rad_s, hold_s } => before(hold_s).then_some(omega_rad_s),
+            Self::Leg { omega_rad_s, turn_s, .. } if before(turn_s) => Some(omega_rad_s),
+            Self::Leg { until_s, .. } => before(until_s).then_some(0.0),
+            Self::Proceed => None,
+        }
+    }
+}
+
+/// Ways around others: a turn, a straight leg, and then proceeding.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Legs {
+    /// How long the turns may last.
+    pub turns_s: Vec<f64>,
+    /// When the legs may end, from the start of the turn.
+    pub until_s: Vec<f64>,
+}
+
+impl Legs {
+    /// Those of the default preset: heading changes of 10 to 60 degrees at the paper's turn
+    /// rates, held for as long as most conflicts take to pass.
+    pub fn usual() -> Self {
+        Self { turns_s: vec![5.0, 10.0, 15.0], until_s: vec![60.0] }
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.turns_s.is_empty() || self.until_s.is_empty()
+    }
+
+    /// Those that begin at a turn rate; straight on, how long one turns makes no difference.
+    fn of(&self, omega_rad_s: f64) -> Vec<Action> {
+        let straight = |&hold_s: &f64| Action::Then { omega_rad_s: 0.0, hold_s };
+        if omega_rad_s == 0.0 {
+            return self.until_s.iter().map(straight).collect();
+        }
+        let leg = |(&turn_s, &until_s): (&f64, &f64)| Action::Leg { omega_rad_s, turn_s, until_s };
+        self.turns_s
+            .iter()
+            .flat_map(|turn_s| self.until_s.iter().map(move |until_s| leg((turn_s, until_s))))
+            .collect()
+    }
+}
+
+/// The action set of a model, ordered by turn rate, the optimal one last. Without legs it is the
+/// paper's: `2 m + 1` actions, every rate held for ever and for `dt_s`. With legs, which never
+/// begin a turn only to undo it, these take the place of the held turns; straight on for ever
+/// remains. `holds_s` are further times for which turns are held.
+pub fn actions(model: &Model, dt_s: f64, holds_s: &[f64], legs: &Legs) -> Vec<Action> {
     let m = model.turns;
-    let mut all = Vec::with_capacity(m * (2 + holds_s.len()) + 1);
-    for k in 0..m {
-        let part = 2.0 * k as f64 / (m - 1) as f64 - 1.0;
+    let rate = |k: usize| match 2.0 * k as f64 / (m - 1) as f64 - 1.0 {
         // The middle one is exactly straight.
-        let omega_rad_s = if 2 * k + 1 == m { 0.0 } else { part * model.omega_max_rad_s };
-        all.push(Action::Hold { omega_rad_s });
-        all.push(Action::Then { omega_rad_s, hold_s: dt_s });
+        _ if 2 * k + 1 == m => 0.0,
+        part => part * model.omega_max_rad_s,
+    };
+    let mut all = Vec::new();
+    for omega_rad_s in (0..m).map(rate) {
+        if legs.is_empty() || omega_rad_s == 0.0 {
+            all.push(Action::Hold { omega_rad_s });
+        }
+        if legs.is_empty() {
+            all.push(Action::Then { omega_rad_s, hold_s: dt_s });
+        }
         all.extend(holds_s.iter().map(|&hold_s| Action::Then { omega_rad_s, hold_s }));
+        all.extend(legs.of(omega_rad_s));
     }
     all.push(Action::Proceed);
     all
@@ -249,10 +320,9 @@ impl Pilot<'_> {
     /// The turn rate of an action in the step that begins after `flown_s` seconds of it.
     #[inline]
     pub fn omega_rad_s(&self, action: Action, pose: Pose, next: usize, flown_s: f64) -> f64 {
-        match action {
-            Action::Hold { omega_rad_s } => omega_rad_s,
-            Action::Then { omega_rad_s, hold_s } if flown_s < hold_s - 1e-9 => omega_rad_s,
-            _ => match (self.mission.get(next), self.after) {
+        match action.held_rad_s(flown_s) {
+            Some(omega_rad_s) => omega_rad_s,
+            None => match (self.mission.get(next), self.after) {
                 (Some(&goal), _) => pose.steer(goal, self.model.omega_max_rad_s, self.dtau_s),
                 (None, After::Pursue) => {
                     let last = *self.mission.last().unwrap_or(&pose.at);
@@ -260,16 +330,6 @@ impl Pilot<'_> {
                 }
                 (None, After::Straight) => 0.0,
             },
-        }
-    }
-
-    /// Whether an action proceeds to the way-point in step `k`.
-    #[inline]
-    fn proceeds(&self, action: Action, k: usize) -> bool {
-        match action {
-            Action::Hold { .. } => false,
-            Action::Then { hold_s, .. } => k as f64 * self.dtau_s >= hold_s - 1e-9,
-            Action::Proceed => true,
         }
     }
 
@@ -290,16 +350,17 @@ impl Pilot<'_> {
         let mut points = Vec::with_capacity(timing.horizon);
         let (mut flight, mut next, mut counted) = (Flight::new(pose), next, timing.horizon);
         for k in 0..timing.horizon {
-            let goal = self.mission.get(next);
+            let flown_s = k as f64 * self.dtau_s;
+            let goal = self.mission.get(next).filter(|_| action.held_rad_s(flown_s).is_none());
             if self.after == After::Pursue {
                 // One that comes back to its last way-point turns to the side that rounding
                 // says, so it must be the rounding of the motion itself.
-                let omega = self.omega_rad_s(action, flight.pose, next, k as f64 * self.dtau_s);
+                let omega = self.omega_rad_s(action, flight.pose, next, flown_s);
                 flight.pose = flight.pose.step(self.model.v_m_s, omega, self.dtau_s);
-            } else if goal.is_some_and(|&g| self.proceeds(action, k) && flight.heads_for(g)) {
+            } else if goal.is_some_and(|&g| flight.heads_for(g)) {
                 flight.step(self.model.v_m_s, 0.0, self.dtau_s);
             } else {
-                let omega = self.omega_rad_s(action, flight.pose, next, k as f64 * self.dtau_s);
+                let omega = self.omega_rad_s(action, flight.pose, next, flown_s);
                 flight.step(self.model.v_m_s, omega, self.dtau_s);
             }
             points.push(flight.pose.at);
@@ -338,7 +399,7 @@ mod tests {
         /// The prediction is the motion, step by step.
         #[test]
         fn a_predicted_way_is_the_one_that_is_flown(
-            psi_rad in -3.2f64..3.2, x in -6000.0f64..6000.0, y in -6000.0f64..6000.0, which in 0usize..16,
+            psi_rad in -3.2f64..3.2, x in -6000.0f64..6000.0, y in -6000.0f64..6000.0, which in 0usize..36,
         ) {
             let model = model();
             let mission = [[x, y], [-y, x]];
@@ -350,7 +411,10 @@ mod tests {
                 dtau_s: 1.0,
             };
             let timing = Timing { dt_s: 5.0, dtau_s: 1.0, horizon: 200 };
-            let action = actions(&model, 5.0, &[30.0])[which];
+            let some = Legs { turns_s: vec![5.0, 15.0], until_s: vec![20.0, 60.0] };
+            let held = actions(&model, 5.0, &[30.0], &Legs::default());
+            let all = [held, actions(&model, 5.0, &[], &some)].concat();
+            let action = all[which % all.len()];
             let (mut pose, mut next) = (Pose { at: [0.0, 0.0], psi_rad }, 0);
             let predicted = pilot.predict(action, pose, next, &timing);
             for (k, point) in predicted.points.iter().enumerate() {
@@ -385,10 +449,24 @@ mod tests {
 
     #[test]
     fn the_action_set_is_ordered_and_contains_straight_flight() {
-        let all = actions(&model(), 5.0, &[30.0]);
+        let all = actions(&model(), 5.0, &[30.0], &Legs::default());
         assert_eq!(all.len(), 5 * 3 + 1);
         assert_eq!(all[6], Action::Hold { omega_rad_s: 0.0 });
         assert_eq!(all[8], Action::Then { omega_rad_s: 0.0, hold_s: 30.0 });
         assert_eq!(all[15], Action::Proceed);
+    }
+
+    #[test]
+    fn legs_take_the_place_of_turns_that_are_undone() {
+        let legs = Legs { turns_s: vec![5.0, 15.0], until_s: vec![60.0] };
+        let all = actions(&model(), 5.0, &[], &legs);
+        let omega_rad_s = -4f64.to_radians();
+        assert_eq!(all.len(), 4 * 2 + 2 + 1);
+        assert_eq!(all[1], Action::Leg { omega_rad_s, turn_s: 15.0, until_s: 60.0 });
+        assert_eq!(all[4], Action::Hold { omega_rad_s: 0.0 });
+        assert_eq!(all[5], Action::Then { omega_rad_s: 0.0, hold_s: 60.0 });
+        assert_eq!(all[10], Action::Proceed);
+        let rates: Vec<_> = [0.0, 14.0, 15.0, 59.0, 60.0].map(|t| all[1].held_rad_s(t)).into();
+        assert_eq!(rates, [Some(omega_rad_s), Some(omega_rad_s), Some(0.0), Some(0.0), None]);
     }
 }

@@ -138,9 +138,9 @@ impl AirspaceWorld {
     fn by_turn(&self, known: Known, wanted: f64) -> Vec<Action> {
         let mut others: Vec<Action> = self.actions[known.slot as usize].clone();
         let turn = |action: &Action| match *action {
-            Action::Hold { omega_rad_s } | Action::Then { omega_rad_s, .. } => {
-                (omega_rad_s - wanted).abs()
-            }
+            Action::Hold { omega_rad_s }
+            | Action::Then { omega_rad_s, .. }
+            | Action::Leg { omega_rad_s, .. } => (omega_rad_s - wanted).abs(),
             Action::Proceed => -1.0,
         };
         others.sort_by(|a, b| turn(a).total_cmp(&turn(b)));
@@ -260,15 +260,8 @@ impl AirspaceWorld {
         let (mut pose, mut next) = (known.pose, known.next);
         let mut omegas_rad_s = Vec::new();
         for k in 0..self.timing.points_per_dt() {
-            let omega = match action {
-                Action::Hold { omega_rad_s } => omega_rad_s,
-                Action::Then { omega_rad_s, hold_s }
-                    if (k as f64) * self.timing.dtau_s < hold_s - 1e-9 =>
-                {
-                    omega_rad_s
-                }
-                _ => self.steer(&pilot, pose, next),
-            };
+            let held = action.held_rad_s(k as f64 * self.timing.dtau_s);
+            let omega = held.unwrap_or_else(|| self.steer(&pilot, pose, next));
             omegas_rad_s.push(omega);
             pose = self.blown(pose.step(model.v_m_s, omega, self.timing.dtau_s));
             next = pilot.next(pose, next);

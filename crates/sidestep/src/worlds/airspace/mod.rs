@@ -8,7 +8,7 @@
 //! near each other -> groups;  entry.rs, orders.rs, track.rs: who comes in, and what it is told
 //! decide.rs -> shield.rs -> react.rs                                      one cycle of dt
 //! airplane.rs, levels.rs, objective.rs: motion and cost behind it
-//! books.rs: how near pairs come     metrics.rs: what came of it
+//! orbit.rs: what is flown for ever     books.rs: how near pairs come     metrics.rs: what came of it
 //! ```
 
 pub mod airplane;
@@ -24,6 +24,7 @@ pub mod levels;
 mod memory;
 pub mod metrics;
 pub mod objective;
+mod orbit;
 pub mod orders;
 mod react;
 mod rows;

@@ -26,13 +26,27 @@ pub struct Objective {
 }
 
 impl Objective {
-    /// `Gcol_i` and `Gcol_j` of two predictions, for separations `r` of `i` and `j` (eq. 9).
+    /// `Gcol_i` and `Gcol_j` of two predictions, for separations `r` of `i` and `j` (eq. 9):
+    /// slice by slice of time, so that whoever knows slices apart comes to the same bits.
     pub fn collision(&self, a: &Prediction, b: &Prediction, r: [f64; 2]) -> [f64; 2] {
-        let most = if self.mask { a.counted.min(b.counted) } else { a.points.len() };
+        let counted = |way: &Prediction| if self.mask { way.counted } else { way.points.len() };
+        let most = counted(a).min(counted(b));
+        let (mut sums, mut weight) = ([0.0; 2], 1.0);
+        let slices = a.points[..most].chunks(SLICE).zip(b.points[..most].chunks(SLICE));
+        for (of_a, of_b) in slices {
+            let parts = self.slice_collision(of_a, of_b, weight, r);
+            (0..2).for_each(|k| sums[k] += parts[k]);
+            weight = self.aged(weight);
+        }
+        sums
+    }
+
+    /// The same over the points of one slice, of which the first weighs `weight`.
+    fn slice_collision(&self, a: &[Point], b: &[Point], mut weight: f64, r: [f64; 2]) -> [f64; 2] {
         let [ra, rb] = r.map(|r| r * self.inflation);
         let widest = ra.max(rb) * ra.max(rb);
-        let (mut sums, mut weight) = ([0.0; 2], 1.0);
-        for (p, q) in a.points[..most].iter().zip(&b.points[..most]) {
+        let mut sums = [0.0; 2];
+        for (p, q) in a.iter().zip(b) {
             let (dx, dy) = (p[0] - q[0], p[1] - q[1]);
             let square = dx * dx + dy * dy;
             if square < widest {
@@ -44,6 +58,11 @@ impl Objective {
             weight *= self.beta;
         }
         sums
+    }
+
+    /// What the first point of a slice weighs if that of the slice before weighs `weight`.
+    fn aged(&self, weight: f64) -> f64 {
+        (0..SLICE).fold(weight, |weight, _| weight * self.beta)
     }
 
     /// `Gdev_i`, from the ends of a prediction and of the optimal one (eq. 10).
@@ -58,6 +77,9 @@ impl Objective {
     }
 }
 
+/// Points of a slice of time. Within a slice ways move little, so bounds around it are tight.
+const SLICE: usize = 16;
+
 /// An airplane's predictions, one per action, the optimal action last.
 #[derive(Debug, Clone)]
 pub struct Options {
@@ -67,17 +89,67 @@ pub struct Options {
     pub separation_m: f64,
     /// The level it keeps.
     pub altitude_m: f64,
-    boxes: Vec<Bounds>,
-    /// Around all of `boxes`.
-    all: Bounds,
+    slices: Vec<Slice>,
 }
 
 impl Options {
-    /// Options with their bounds.
+    /// Options with their slices.
     pub fn new(predictions: Vec<Prediction>, separation_m: f64, altitude_m: f64) -> Self {
-        let boxes: Vec<Bounds> = predictions.iter().map(|p| Bounds::of(&p.points)).collect();
-        let corners: Vec<Point> = boxes.iter().flat_map(|b| [b.low, b.high]).collect();
-        Self { predictions, separation_m, altitude_m, boxes, all: Bounds::of(&corners) }
+        let longest = predictions.iter().map(|p| p.points.len()).max().unwrap_or(0);
+        let slices = (0..longest).step_by(SLICE).map(|from| Slice::new(&predictions, from));
+        let slices = slices.collect();
+        Self { predictions, separation_m, altitude_m, slices }
+    }
+
+    fn piece(&self, piece: &Piece, from: usize, mask: bool) -> &[Point] {
+        let way = &self.predictions[piece.actions[0]];
+        let end = if mask { piece.counted } else { way.points.len().min(from + SLICE) };
+        &way.points[from.min(end)..end]
+    }
+}
+
+/// What all actions of an airplane come to in one slice of time.
+#[derive(Debug, Clone)]
+struct Slice {
+    pieces: Vec<Piece>,
+    /// Around all of them.
+    all: Bounds,
+}
+
+/// Points of a slice that some actions share: those that turn alike differ only later.
+#[derive(Debug, Clone)]
+struct Piece {
+    /// The actions, at least one.
+    actions: Vec<usize>,
+    /// Point of the prediction at which the counted part of the slice ends.
+    counted: usize,
+    bounds: Bounds,
+}
+
+impl Slice {
+    fn new(predictions: &[Prediction], from: usize) -> Self {
+        let mut pieces: Vec<Piece> = Vec::new();
+        for (action, way) in predictions.iter().enumerate() {
+            let end = way.points.len().min(from + SLICE);
+            let points = &way.points[from.min(end)..end];
+            let counted = way.counted.clamp(from.min(end), end);
+            // Most ways that differ do so at the end.
+            let is_alike = |piece: &&mut Piece| {
+                let other = &predictions[piece.actions[0]].points;
+                let other = &other[from.min(other.len())..other.len().min(from + SLICE)];
+                piece.counted == counted && points.last() == other.last() && points == other
+            };
+            match pieces.iter_mut().find(is_alike) {
+                Some(piece) => piece.actions.push(action),
+                None => {
+                    let bounds = Bounds::of(points);
+                    pieces.push(Piece { actions: vec![action], counted, bounds });
+                }
+            }
+        }
+        let corners: Vec<Point> =
+            pieces.iter().flat_map(|p| [p.bounds.low, p.bounds.high]).collect();
+        Self { pieces, all: Bounds::of(&corners) }
     }
 }
 
@@ -131,28 +203,55 @@ pub(super) fn couple(
     (i, a): (usize, &Options),
     (j, b): (usize, &Options),
 ) {
-    let gap_m = objective.inflation * a.separation_m.max(b.separation_m);
-    let on_one_level = (a.altitude_m - b.altitude_m).abs() < objective.vertical_m;
-    if on_one_level && a.all.is_within(&b.all, gap_m) {
-        game.add_pair_in_parts(i, j, pair_costs(objective, a, b));
+    if (a.altitude_m - b.altitude_m).abs() < objective.vertical_m
+        && let Some(costs) = pair_costs(objective, a, b)
+    {
+        game.add_pair_in_parts(i, j, costs);
     }
 }
 
-/// `Gcol` of both for every two actions.
-fn pair_costs(objective: &Objective, a: &Options, b: &Options) -> Vec<[f64; 2]> {
+/// `Gcol` of both for every two actions, if any two cost anything. Most slices of ways never
+/// come near each other, and what several actions share is computed once.
+fn pair_costs(objective: &Objective, a: &Options, b: &Options) -> Option<Vec<[f64; 2]>> {
     let r = [a.separation_m, b.separation_m];
-    let gap_m = objective.inflation * r[0].max(r[1]);
-    let mut costs = Vec::with_capacity(a.predictions.len() * b.predictions.len());
-    for (p, p_box) in a.predictions.iter().zip(&a.boxes) {
-        for (q, q_box) in b.predictions.iter().zip(&b.boxes) {
-            // Most pairs of ways never come near each other.
-            costs.push(match p_box.is_within(q_box, gap_m) {
-                true => objective.collision(p, q, r),
-                false => [0.0; 2],
-            });
+    // A hair more, so that no rounding of bounds leaves out what costs anything.
+    let gap_m = objective.inflation * r[0].max(r[1]) * (1.0 + 1e-9);
+    let columns = b.predictions.len();
+    let mut costs = None;
+    let mut weight = 1.0;
+    for (k, (of_a, of_b)) in a.slices.iter().zip(&b.slices).enumerate() {
+        let near = |p: &&Piece| p.bounds.is_within(&of_b.all, gap_m);
+        let rows = of_a.pieces.iter().filter(|_| of_a.all.is_within(&of_b.all, gap_m));
+        for p in rows.filter(near) {
+            let of_p = a.piece(p, k * SLICE, objective.mask);
+            for q in of_b.pieces.iter().filter(|q| p.bounds.is_within(&q.bounds, gap_m)) {
+                let of_q = b.piece(q, k * SLICE, objective.mask);
+                let parts = objective.slice_collision(of_p, of_q, weight, r);
+                if parts != [0.0; 2] {
+                    let costs =
+                        costs.get_or_insert_with(|| vec![[0.0; 2]; a.predictions.len() * columns]);
+                    add_to_all(costs, columns, (&p.actions, &q.actions), parts);
+                }
+            }
         }
+        weight = objective.aged(weight);
     }
     costs
+}
+
+/// Adds `parts` for every two of some actions.
+fn add_to_all(
+    costs: &mut [[f64; 2]],
+    columns: usize,
+    (rows, others): (&[usize], &[usize]),
+    parts: [f64; 2],
+) {
+    for row in rows {
+        for other in others {
+            let sums = &mut costs[row * columns + other];
+            (0..2).for_each(|k| sums[k] += parts[k]);
+        }
+    }
 }
 
 #[cfg(test)]

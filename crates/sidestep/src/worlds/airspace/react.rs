@@ -1,19 +1,25 @@
 //! Pool two: the airplanes of a group decide together and fly for `dt`.
 
 use super::Scratch;
-use super::airplane::{Point, Pose};
+use super::airplane::{Point, Pose, distance_m};
 use super::decide::Known;
 use super::deploy::contact::Contacts;
 use super::events::{Event, EventKind};
 use super::levels::Levels;
 use super::orders::Stage;
 use super::shield::{Flyer, Side, Way};
-use super::state::{AirspaceState, LEFT};
+use super::state::{AirspaceState, Cell, LEFT};
 use super::track::Track;
 use super::world::{AirspaceWorld, purpose};
 use cpu_time::ThreadTime;
 use sidestep_kernel::distr::normal;
 use sidestep_kernel::{Cycle, Slot};
+
+/// Goals farther away than this rank alike.
+const FARTHEST_M: f64 = 2e9;
+/// To be refused what it wants for `dt` brings an airplane forward as if it had flown this part
+/// of the way meanwhile.
+const REFUSED_PART: f64 = 0.125;
 
 /// One airplane in this `dt`.
 pub(super) struct Flight<'a> {
@@ -149,9 +155,22 @@ impl AirspaceWorld {
             vertical_m: self.vertical_m,
             fallback: cell.side(),
             came_too_close: cell.came_too_close(),
-            // Whoever has waited longest goes first, then the smaller id.
-            rank: u64::from(cell.waiting.get()) << 32 | u64::from(!slot),
+            rank: self.rank(cell, &stage, slot),
         }
+    }
+
+    /// Who goes first: whoever is nearer to its goal, so that it is soon out of the others' way;
+    /// and whoever has often been refused what it wanted, so that nobody waits for ever. Whole
+    /// metres in the upper half, unique by the id in the lower one.
+    fn rank(&self, cell: &Cell, stage: &Stage<'_>, slot: Slot) -> u64 {
+        let ahead = &stage.mission[(cell.next.get() as usize).min(stage.mission.len())..];
+        let legs = ahead
+            .iter()
+            .scan(cell.pose().at, |from, &to| Some(distance_m(std::mem::replace(from, to), to)));
+        let refused_m = f64::from(cell.overrides.get()) * stage.model.v_m_s * self.timing.dt_s;
+        // A conversion of what is out of range ends at the range.
+        let first = (FARTHEST_M + REFUSED_PART * refused_m - legs.sum::<f64>()) as u32;
+        u64::from(first) << 32 | u64::from(!slot)
     }
 
     fn shielded(

@@ -1,6 +1,6 @@
 //! The text of an airspace scenario, and what it compiles to.
 
-use super::airplane::{Model, Passing, Point, Pose, Timing};
+use super::airplane::{Legs, Model, Passing, Point, Pose, Timing};
 use super::deploy::{Deployment, Network, Silence, refuses};
 use super::flight_plan::AirplaneSection;
 use super::generate::{Order as Wanted, generate};
@@ -42,7 +42,7 @@ pub enum GeneratorKind {
 #[serde(rename_all = "kebab-case")]
 pub enum Preset {
     /// The safe one: exact expectations, hardly any weight on deviations, a margin on the
-    /// separation, further hold times.
+    /// separation, legs around others.
     #[default]
     Default,
     /// The paper's numbers, sampled.
@@ -109,7 +109,8 @@ struct AirspaceSection {
     alpha: Option<Spanned<f64>>,
     beta: Option<Spanned<f64>>,
     inflation: Option<Spanned<f64>>,
-    holds_s: Option<Vec<f64>>,
+    holds_s: Vec<f64>,
+    legs: Option<Legs>,
     estimator: Option<Estimator>,
     update: Option<Update>,
     order: Option<Order>,
@@ -260,7 +261,8 @@ impl Compiler<'_> {
             passing: Passing { tolerance_m, passes: true },
             objective: self.objective(vertical_m)?,
             settings: self.settings()?,
-            holds_s: self.holds()?,
+            holds_s: self.times(&section.holds_s, "holds_s")?,
+            legs: self.legs()?,
             method: section.method,
             deployment: section.deployment,
             group_bytes: (group_memory_gib * f64::from(1 << 30)) as u64,
@@ -390,7 +392,8 @@ impl Compiler<'_> {
             let span = section.dtau_s.as_ref().or(section.dt_s.as_ref()).map(Spanned::span);
             return Err(self.error(span, cause, "give a dtau_s that divides dt_s"));
         }
-        let horizon = section.horizon.as_ref().map_or(125, |h| *h.get_ref());
+        let preset = if self.is_paper() { 125 } else { 90 };
+        let horizon = section.horizon.as_ref().map_or(preset, |h| *h.get_ref());
         if !((parts.round() as usize)..=10_000).contains(&horizon) {
             let cause = format!("a horizon of {horizon} steps");
             let span = section.horizon.as_ref().map(Spanned::span);
@@ -410,7 +413,7 @@ impl Compiler<'_> {
         Ok(Objective {
             alpha: self.positive(section.alpha.as_ref(), if paper { 1.0 } else { 0.001 })?,
             beta,
-            inflation: self.positive(section.inflation.as_ref(), if paper { 1.0 } else { 1.05 })?,
+            inflation: self.positive(section.inflation.as_ref(), if paper { 1.0 } else { 1.1 })?,
             mask: true,
             vertical_m,
         })
@@ -421,7 +424,8 @@ impl Compiler<'_> {
         let paper = self.is_paper();
         let estimator =
             if paper { Estimator::Sampled { block: 20, ageing: 0.7 } } else { Estimator::Exact };
-        let cooling = self.positive(section.cooling.as_ref(), 0.8)?;
+        let preset = if paper { 0.8 } else { 0.5 };
+        let cooling = self.positive(section.cooling.as_ref(), preset)?;
         if cooling > 1.0 {
             let span = section.cooling.as_ref().map(Spanned::span);
             return Err(self.error(span, format!("cooling = {cooling}"), "give at most 1"));
@@ -443,17 +447,23 @@ impl Compiler<'_> {
         })
     }
 
-    fn holds(&self) -> Result<Vec<f64>, InputError> {
-        let preset = if self.is_paper() { vec![] } else { vec![30.0, 90.0] };
-        let holds_s = self.file.airspace.holds_s.clone().unwrap_or(preset);
-        if holds_s.iter().any(|h| !(*h > 0.0 && h.is_finite())) || holds_s.len() > 20 {
-            return Err(self.error(
-                None,
-                format!("holds_s = {holds_s:?}"),
-                "give up to 20 positive times in seconds",
-            ));
+    fn legs(&self) -> Result<Legs, InputError> {
+        let legs = match &self.file.airspace.legs {
+            Some(legs) => legs.clone(),
+            None if self.is_paper() => Legs::default(),
+            None => Legs::usual(),
+        };
+        self.times(&legs.turns_s, "legs.turns_s")?;
+        self.times(&legs.until_s, "legs.until_s")?;
+        Ok(legs)
+    }
+
+    fn times(&self, times_s: &[f64], key: &str) -> Result<Vec<f64>, InputError> {
+        if times_s.iter().any(|t| !(*t > 0.0 && t.is_finite())) || times_s.len() > 20 {
+            let cause = format!("{key} = {times_s:?}");
+            return Err(self.error(None, cause, "give up to 20 positive times in seconds"));
         }
-        Ok(holds_s)
+        Ok(times_s.to_vec())
     }
 
     fn airplanes(&self, streams: &Streams, replay: Replay) -> Result<Vec<Airplane>, InputError> {

@@ -1,6 +1,6 @@
 //! A compiled airspace: everything that never changes during a run.
 
-use super::airplane::{Action, After, Model, Passing, Pilot, Point, Pose, Timing, actions};
+use super::airplane::{Action, After, Legs, Model, Passing, Pilot, Point, Pose, Timing, actions};
 use super::deploy::{Deployment, Network};
 use super::objective::Objective;
 use super::orders::{FlightOrder, Later, Stage, Task, later};
@@ -102,6 +102,8 @@ pub struct AirspaceWorld {
     pub settings: Settings,
     /// Further hold times of actions.
     pub holds_s: Vec<f64>,
+    /// Legs to the sides, which take the place of held turns.
+    pub legs: Legs,
     /// Who decides.
     pub method: Method,
     /// Where the optimizer runs.
@@ -147,8 +149,8 @@ impl AirspaceWorld {
     /// Prepares what follows from the fields.
     #[must_use]
     pub(super) fn prepared(mut self) -> Self {
-        let (dt_s, holds_s) = (self.timing.dt_s, &self.holds_s);
-        self.actions = self.airplanes.iter().map(|a| actions(&a.model, dt_s, holds_s)).collect();
+        let of = |a: &Airplane| actions(&a.model, self.timing.dt_s, &self.holds_s, &self.legs);
+        self.actions = self.airplanes.iter().map(of).collect();
         self.later = self.airplanes.iter().map(later).collect();
         self.top_m_s = (0..self.airplanes.len()).map(|i| self.top_m_s(i)).collect();
         self.alone_s = (0..self.airplanes.len()).map(|i| self.alone_s(i)).collect();
