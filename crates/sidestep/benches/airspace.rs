@@ -143,7 +143,7 @@ fn exact() {
     };
     for (name, horizon, legs, inflation, cooling) in [
         ("the paper's actions", 125, Legs::default(), 1.05, 0.8),
-        ("the default preset", 90, Legs::usual(), 1.1, 0.5),
+        ("the default preset", 90, Legs::usual(), 1.12, 0.7),
     ] {
         let objective = preset(inflation);
         let conflict = Conflict::new(10, horizon, &legs, objective);

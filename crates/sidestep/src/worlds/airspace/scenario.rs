@@ -413,7 +413,7 @@ impl Compiler<'_> {
         Ok(Objective {
             alpha: self.positive(section.alpha.as_ref(), if paper { 1.0 } else { 0.001 })?,
             beta,
-            inflation: self.positive(section.inflation.as_ref(), if paper { 1.0 } else { 1.1 })?,
+            inflation: self.positive(section.inflation.as_ref(), if paper { 1.0 } else { 1.12 })?,
             mask: true,
             vertical_m,
         })
@@ -424,7 +424,7 @@ impl Compiler<'_> {
         let paper = self.is_paper();
         let estimator =
             if paper { Estimator::Sampled { block: 20, ageing: 0.7 } } else { Estimator::Exact };
-        let preset = if paper { 0.8 } else { 0.5 };
+        let preset = if paper { 0.8 } else { 0.7 };
         let cooling = self.positive(section.cooling.as_ref(), preset)?;
         if cooling > 1.0 {
             let span = section.cooling.as_ref().map(Spanned::span);
