@@ -88,10 +88,10 @@ fn doing_nothing_loses_separation_and_says_so() {
     assert!(metrics.min_separation_m.is_some_and(|d| d < 100.0) && metrics.lost_s > 10.0);
 }
 
-/// Two that meet later than at the start, and may not take 100 kB then.
+/// Two that meet later than at the start, and may not take 20 kB then.
 #[test]
 fn a_group_too_large_for_memory_is_not_optimized_and_that_is_said() {
-    let text = "format = 1\nworld = \"airspace\"\n[airspace]\ngroup_memory_gib = 0.00005\n\
+    let text = "format = 1\nworld = \"airspace\"\n[airspace]\ngroup_memory_gib = 0.00002\n\
                 [airspace.generator]\nkind = \"superconflict\"\nn = 2\n";
     let mut run = run(&Source::new("s", text, ""), 1);
     run.advance(200);

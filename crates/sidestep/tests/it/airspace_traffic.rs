@@ -244,6 +244,8 @@ fn everything() -> Source {
         );
         airplanes.push_str(&plane([x, sign * 4000.0], -90.0 * sign, [x, -sign * 4000.0], &more));
     }
+    // Right behind the first one: whoever comes in there is too close.
+    airplanes.push_str(&plane([-5000.0, 4000.0], -90.0, [-5000.0, -4000.0], "appears_s = 5.0"));
     let more = "replay_until_s = 62.0\n[airspace.generator]\nkind = \"random\"\nn = 8\nradius_m = 9000.0\n";
     scenario(more, &airplanes)
 }
