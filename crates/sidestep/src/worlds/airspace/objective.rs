@@ -354,4 +354,40 @@ mod tests {
         let game = game(&objective, &options);
         near(game.cost(&vec![0; options.len()]), &expected["G"], name);
     }
+
+    /// What slices, bounds and shared pieces leave out is what costs nothing, to the bit.
+    #[test]
+    fn tables_hold_what_two_predictions_cost_to_the_bit() {
+        use super::super::airplane::{Legs, actions};
+        let model = Model { v_m_s: 35.0, omega_max_rad_s: 0.07, separation_m: 500.0, turns: 5 };
+        let timing = Timing { dt_s: 5.0, dtau_s: 1.0, horizon: 90 };
+        let passing = Passing { tolerance_m: 100.0, passes: true };
+        let all = [Legs::default(), Legs::usual()].map(|legs| actions(&model, 5.0, &[], &legs));
+        let mut meetings = 0;
+        for (k, mask) in (0..12).flat_map(|k| [(k, true), (k, false)]) {
+            let options = [0.0, 1.0].map(|side| {
+                let angle = side * 0.5 * f64::from(k);
+                let pose = Pose { at: [900.0 * side, 700.0 * side], psi_rad: angle + 3.0 * side };
+                let mission = [[2000.0 - 2500.0 * side, 300.0]];
+                let after = After::Straight;
+                let pilot = Pilot { model: &model, mission: &mission, passing, after, dtau_s: 1.0 };
+                let predict = |action: &Action| pilot.predict(*action, pose, 0, &timing);
+                let ways = all[k as usize % 2].iter().map(predict).collect();
+                Options::new(ways, model.separation_m * (1.0 - 0.1 * side), 0.0)
+            });
+            let [a, b] = &options;
+            let objective =
+                Objective { alpha: 1.0, beta: 0.995, inflation: 1.05, mask, vertical_m: 300.0 };
+            let free = vec![[0.0; 2]; a.predictions.len() * b.predictions.len()];
+            let table = pair_costs(&objective, a, b).unwrap_or(free);
+            let pairs =
+                a.predictions.iter().flat_map(|p| b.predictions.iter().map(move |q| (p, q)));
+            let r = [a.separation_m, b.separation_m];
+            for ((p, q), found) in pairs.zip(&table) {
+                assert_eq!(*found, objective.collision(p, q, r));
+                meetings += usize::from(*found != [0.0; 2]);
+            }
+        }
+        assert!(meetings > 500, "{meetings}");
+    }
 }
