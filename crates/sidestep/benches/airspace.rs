@@ -11,6 +11,7 @@ use sidestep::scenario::Source;
 use sidestep::worlds::airspace::airplane::{
     Action, After, Legs, Model, Passing, Pilot, Point, Pose, Timing, actions,
 };
+use sidestep::worlds::airspace::levels::Levels;
 use sidestep::worlds::airspace::objective::{Objective, Options, game};
 use sidestep::worlds::airspace::simulation::AirspaceSimulation;
 use sidestep_kernel::stream::{Purpose, Streams};
@@ -68,7 +69,7 @@ impl Conflict {
         let of = |i: usize| {
             let predict = |a: &Action| self.pilot(i).predict(*a, self.poses[i], 0, &self.timing);
             let predictions = self.actions.iter().map(predict).collect();
-            Options::new(predictions, self.model.separation_m, 0.0)
+            Options::new(predictions, self.model.separation_m, Levels::at(0.0))
         };
         (0..self.poses.len()).map(of).collect()
     }

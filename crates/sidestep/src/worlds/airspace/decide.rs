@@ -6,6 +6,7 @@ use super::baseline::{Moving, mvp, orca};
 use super::deploy::contact::Contacts;
 use super::deploy::{Decided, Deployment, Traffic};
 use super::events::{Event, EventKind};
+use super::levels::Levels;
 use super::objective::{Options, game};
 use super::orders::Stage;
 use super::shield::Way;
@@ -90,7 +91,7 @@ impl AirspaceWorld {
         let horizon_s = self.timing.horizon as f64 * self.timing.dtau_s;
         let margin = self.objective.inflation;
         let toward = |(k, own): (usize, &Moving)| {
-            let near = |other: &Moving| (other.altitude_m - own.altitude_m).abs() < self.vertical_m;
+            let near = |other: &Moving| other.levels.meets(&own.levels, self.vertical_m);
             let others = all.iter().enumerate().filter(|(j, m)| *j != k && near(m)).map(|(_, m)| m);
             let [vx, vy] = match self.method {
                 Method::Orca => orca::velocity(own, others, horizon_s, self.timing.dt_s, margin),
@@ -124,7 +125,7 @@ impl AirspaceWorld {
             velocity: [v * math::cos(psi_rad), v * math::sin(psi_rad)],
             preferred: [v * math::cos(toward), v * math::sin(toward)],
             separation_m: model.separation_m,
-            altitude_m: known.altitude_m,
+            levels: self.levels(known),
         }
     }
 
@@ -210,6 +211,11 @@ impl AirspaceWorld {
         self.options_towards(known, self.stage(known.slot, known.orders).mission)
     }
 
+    /// The levels that an airplane is on and comes to.
+    pub(super) fn levels(&self, known: Known) -> Levels {
+        Levels::between(known.altitude_m, self.stage(known.slot, known.orders).altitude_m)
+    }
+
     /// The same for a mission that was told.
     pub(super) fn options_towards(&self, known: Known, mission: &[Point]) -> Options {
         let model = self.stage(known.slot, known.orders).model;
@@ -218,7 +224,7 @@ impl AirspaceWorld {
         let predict =
             |action: &Action| pilot.predict(*action, known.pose, known.next, &self.timing);
         let predictions = self.actions_of(known.slot).iter().map(predict).collect();
-        Options::new(predictions, model.separation_m, known.altitude_m)
+        Options::new(predictions, model.separation_m, self.levels(known))
     }
 
     /// The mission as seen from the moving air: each way-point where it will be when the

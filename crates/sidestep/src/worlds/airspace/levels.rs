@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 /// The levels that an airplane is on or passes while it changes its level.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Levels {
     /// The lowest, metres.
     pub low_m: f64,

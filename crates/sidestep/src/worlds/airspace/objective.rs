@@ -7,6 +7,7 @@
 //! ```
 
 use super::airplane::{Point, Prediction};
+use super::levels::Levels;
 use crate::collectives::PairwiseGame;
 use serde::{Deserialize, Serialize};
 
@@ -87,18 +88,18 @@ pub struct Options {
     pub predictions: Vec<Prediction>,
     /// Separation asked for.
     pub separation_m: f64,
-    /// The level it keeps.
-    pub altitude_m: f64,
+    /// The levels it takes.
+    pub levels: Levels,
     slices: Vec<Slice>,
 }
 
 impl Options {
     /// Options with their slices.
-    pub fn new(predictions: Vec<Prediction>, separation_m: f64, altitude_m: f64) -> Self {
+    pub fn new(predictions: Vec<Prediction>, separation_m: f64, levels: Levels) -> Self {
         let longest = predictions.iter().map(|p| p.points.len()).max().unwrap_or(0);
         let slices = (0..longest).step_by(SLICE).map(|from| Slice::new(&predictions, from));
         let slices = slices.collect();
-        Self { predictions, separation_m, altitude_m, slices }
+        Self { predictions, separation_m, levels, slices }
     }
 
     fn piece(&self, piece: &Piece, from: usize, mask: bool) -> &[Point] {
@@ -203,7 +204,7 @@ pub(super) fn couple(
     (i, a): (usize, &Options),
     (j, b): (usize, &Options),
 ) {
-    if (a.altitude_m - b.altitude_m).abs() < objective.vertical_m
+    if a.levels.meets(&b.levels, objective.vertical_m)
         && let Some(costs) = pair_costs(objective, a, b)
     {
         game.add_pair_in_parts(i, j, costs);
@@ -349,7 +350,9 @@ mod tests {
         near(total[0] + objective.alpha * total[1], &expected["G"], name);
         let options: Vec<Options> = predictions
             .iter()
-            .map(|(p, optimal, r)| Options::new(vec![p.clone(), optimal.clone()], *r, 0.0))
+            .map(|(p, optimal, r)| {
+                Options::new(vec![p.clone(), optimal.clone()], *r, Levels::at(0.0))
+            })
             .collect();
         let game = game(&objective, &options);
         near(game.cost(&vec![0; options.len()]), &expected["G"], name);
@@ -373,7 +376,7 @@ mod tests {
                 let pilot = Pilot { model: &model, mission: &mission, passing, after, dtau_s: 1.0 };
                 let predict = |action: &Action| pilot.predict(*action, pose, 0, &timing);
                 let ways = all[k as usize % 2].iter().map(predict).collect();
-                Options::new(ways, model.separation_m * (1.0 - 0.1 * side), 0.0)
+                Options::new(ways, model.separation_m * (1.0 - 0.1 * side), Levels::at(0.0))
             });
             let [a, b] = &options;
             let objective =

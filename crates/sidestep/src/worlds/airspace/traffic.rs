@@ -245,7 +245,7 @@ fn heading(name: &str, (separation_m, vertical_m): (f64, f64), more: &str) -> St
     format!(
         "format = 1\nworld = \"airspace\"\nname = {name:?}\ncycles = 4000\n\n\
          [airspace]\nvertical_m = {vertical_m:?}\nhorizon = 60\ndt_s = {DT_S:?}\ndtau_s = 5.0\n\
-         holds_s = [60.0]\n{more}\n[airplane]\nseparation_m = {separation_m:?}\n"
+         legs = {{ turns_s = [20.0, 40.0, 60.0], until_s = [240.0] }}\n{more}\n[airplane]\nseparation_m = {separation_m:?}\n"
     )
 }
 

@@ -5,6 +5,7 @@ pub(super) mod mvp;
 pub(super) mod orca;
 
 use super::airplane::Point;
+use super::levels::Levels;
 
 /// What a method is told of an airplane.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -15,5 +16,5 @@ pub(super) struct Moving {
     /// Where it would fly if it were alone, metres per second.
     pub(super) preferred: Point,
     pub(super) separation_m: f64,
-    pub(super) altitude_m: f64,
+    pub(super) levels: Levels,
 }

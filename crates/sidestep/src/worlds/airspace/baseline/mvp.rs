@@ -58,10 +58,17 @@ fn shift(own: &Moving, other: &Moving, look_ahead_s: f64, margin: f64) -> Option
 
 #[cfg(test)]
 mod tests {
+    use super::super::super::levels::Levels;
     use super::*;
 
     fn moving(x: f64, y: f64, velocity: Point) -> Moving {
-        Moving { at: [x, y], velocity, preferred: velocity, separation_m: 500.0, altitude_m: 0.0 }
+        Moving {
+            at: [x, y],
+            velocity,
+            preferred: velocity,
+            separation_m: 500.0,
+            levels: Levels::at(0.0),
+        }
     }
 
     #[test]

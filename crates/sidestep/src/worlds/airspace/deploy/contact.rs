@@ -26,9 +26,7 @@ pub struct Beacon {
     pub omega_max_rad_s: f64,
     /// The separation it asks for.
     pub separation_m: f64,
-    /// How high it is,
-    pub altitude_m: f64,
-    /// and all levels that it takes or may come through.
+    /// The levels that it is on and comes to.
     pub levels: Levels,
 }
 
@@ -101,7 +99,7 @@ impl Contact {
         };
         let prediction = Prediction { counted: points.len(), points };
         let separation_m = WIDER * self.beacon.separation_m;
-        Options::new(vec![prediction], separation_m, self.beacon.altitude_m)
+        Options::new(vec![prediction], separation_m, self.beacon.levels)
     }
 
     fn on_orbit(&self, world: &AirspaceWorld, orbiting: &Orbiting, now: Cycle) -> Vec<Point> {

@@ -422,7 +422,6 @@ fn proposal(flyer: &Flyer, ways: &[Way], contacts: &Contacts) -> Proposal {
         v_m_s: flyer.v_m_s,
         omega_max_rad_s: flyer.omega_max_rad_s,
         separation_m: flyer.separation_m,
-        altitude_m: flyer.levels.low_m,
         levels: flyer.levels,
     };
     let unheard = contacts.iter().filter(|(_, contact)| contact.unheard > 0);

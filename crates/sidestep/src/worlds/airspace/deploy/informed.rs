@@ -287,7 +287,7 @@ impl link::Agent for Agent<'_> {
         let member = &mut self.members[from];
         match message {
             Message::Ways { beacon, ways } => {
-                let options = Options::new(ways, beacon.separation_m, beacon.altitude_m);
+                let options = Options::new(ways, beacon.separation_m, beacon.levels);
                 member.options.get_or_insert(options);
                 member.beacon = Some(beacon);
             }

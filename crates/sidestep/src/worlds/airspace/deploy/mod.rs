@@ -29,7 +29,6 @@ mod team;
 use super::airplane::{Action, Point};
 use super::decide::Known;
 use super::events::{Event, EventKind};
-use super::levels::Levels;
 use super::objective::Options;
 use super::world::AirspaceWorld;
 use crate::collectives::{Estimator, Order, Player, Settings, Utility};
@@ -225,8 +224,7 @@ impl AirspaceWorld {
             v_m_s: stage.model.v_m_s,
             omega_max_rad_s: stage.model.omega_max_rad_s,
             separation_m: stage.model.separation_m,
-            altitude_m: known.altitude_m,
-            levels: Levels::between(known.altitude_m, stage.altitude_m),
+            levels: self.levels(known),
         }
     }
 

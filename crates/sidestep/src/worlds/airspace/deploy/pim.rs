@@ -19,6 +19,7 @@
 //! itself. When time is up, whoever has not been told yet decides for itself too.
 
 use super::super::airplane::{Prediction, distance_m};
+use super::super::levels::Levels;
 use super::super::objective::{Options, couple, own_costs};
 use super::super::world::purpose;
 use super::contact::Beacon;
@@ -49,7 +50,7 @@ struct Visited {
     /// What the ways cost the airplane itself.
     own_costs: Vec<f64>,
     separation_m: f64,
-    altitude_m: f64,
+    levels: Levels,
     /// It could not be reached: its only way is presumed.
     is_presumed: bool,
     decided: Option<Decided>,
@@ -194,7 +195,7 @@ impl Visited {
         let options = &host.options;
         self.is_presumed = false;
         self.beacon = Some(host.beacon());
-        (self.separation_m, self.altitude_m) = (options.separation_m, options.altitude_m);
+        (self.separation_m, self.levels) = (options.separation_m, options.levels);
         let costs = own_costs(&host.world.objective, options);
         let Some(block) = block else {
             self.ways.clone_from(&options.predictions);
@@ -211,7 +212,7 @@ impl Visited {
     fn presume(&mut self, from: &Own<'_>, block: Option<usize>) {
         let options = from.presumed(self.place);
         self.is_presumed = true;
-        (self.separation_m, self.altitude_m) = (options.separation_m, options.altitude_m);
+        (self.separation_m, self.levels) = (options.separation_m, options.levels);
         self.ways = vec![options.predictions[0].clone(); block.unwrap_or(1)];
         self.own_costs = vec![0.0; block.unwrap_or(1)];
         self.samples.clear();
@@ -273,7 +274,7 @@ fn hand_back(mut above: Coordinator, team: &mut [Coordinator], carrier: &mut Car
 fn exact(team: &mut [Coordinator], carrier: &mut Carrier<'_>) {
     let mut above = gather(team, carrier, None);
     let hosts = carrier.hosts;
-    let options = |a: &Visited| Options::new(a.ways.clone(), a.separation_m, a.altitude_m);
+    let options = |a: &Visited| Options::new(a.ways.clone(), a.separation_m, a.levels);
     let all: Vec<Options> = above.airplanes.iter().map(options).collect();
     let mut game = PairwiseGame::new(above.airplanes.iter().map(|a| a.own_costs.clone()).collect());
     let world = hosts[0].world;
@@ -327,8 +328,7 @@ fn learn(above: &mut Coordinator, host: &Own<'_>, (block, ageing): (usize, f64))
     let part = |i: usize, k: usize| {
         let own = &all[i];
         let minds = |other: &&Visited| {
-            other.place != own.place
-                && (other.altitude_m - own.altitude_m).abs() < objective.vertical_m
+            other.place != own.place && other.levels.meets(&own.levels, objective.vertical_m)
         };
         all.iter().filter(minds).fold(own.own_costs[k], |sum, other| {
             // One that is presumed wants to be kept farther away from.

@@ -1,6 +1,7 @@
 //! The paper's Algorithm 1: an agent per airplane that samples, predicts, and shares both.
 
 use super::super::airplane::Prediction;
+use super::super::levels::Levels;
 use super::super::objective::{Options, own_costs};
 use super::contact::Beacon;
 use super::link;
@@ -43,9 +44,9 @@ impl Member {
         self.ways.get(&round).and_then(|ways| ways.get(k)).or_else(presumed)
     }
 
-    fn altitude_m(&self) -> Option<f64> {
-        let presumed = || self.presumed.as_ref().map(|options| options.altitude_m);
-        self.beacon.as_ref().map(|beacon| beacon.altitude_m).or_else(presumed)
+    fn levels(&self) -> Option<Levels> {
+        let presumed = || self.presumed.as_ref().map(|options| options.levels);
+        self.beacon.as_ref().map(|beacon| beacon.levels).or_else(presumed)
     }
 
     /// Keeps the ways of the round before: they may be the last ones heard of.
@@ -156,8 +157,8 @@ impl<'a> Agent<'a> {
         let x = self.samples[k];
         let way = &options.predictions[x];
         let on_level = |(_, member): &(usize, &Member)| {
-            let apart_m = member.altitude_m().map_or(0.0, |z| (z - options.altitude_m).abs());
-            apart_m < objective.vertical_m
+            let theirs = member.levels();
+            theirs.is_none_or(|levels| levels.meets(&options.levels, objective.vertical_m))
         };
         self.others().filter(on_level).fold(self.own_costs[x], |sum, (_, member)| {
             let Some(theirs) = member.way(self.round, k) else { return sum };
@@ -241,7 +242,7 @@ impl link::Agent for Agent<'_> {
         let last = member.ways.values().next_back().and_then(|ways| ways.first());
         member.presumed = Some(match (&member.beacon, last) {
             (Some(beacon), Some(way)) => {
-                Options::new(vec![way.clone()], beacon.separation_m, beacon.altitude_m)
+                Options::new(vec![way.clone()], beacon.separation_m, beacon.levels)
             }
             _ => self.own.presumed(other),
         });
