@@ -98,6 +98,7 @@ impl Run for AirspaceRun {
         let json = json!({
             "airplanes": world.airplanes.len(),
             "method": world.method.name(),
+            "deployment": world.deployment.name(),
             "shield": shield,
             "dt_s": world.timing.dt_s,
             "too_close": compiled.too_close,
@@ -105,9 +106,10 @@ impl Run for AirspaceRun {
             "replay_until_s": (recorded > 0).then_some(until_s),
         });
         let mut text = format!(
-            "  airplanes        {}\n  method           {}, shield {shield}\n",
+            "  airplanes        {}\n  method           {}, {}, shield {shield}\n",
             grouped(world.airplanes.len() as u64),
             world.method.name(),
+            world.deployment.name(),
         );
         if recorded > 0 {
             let until =
@@ -121,6 +123,7 @@ impl Run for AirspaceRun {
     fn outcome(&self) -> Lines {
         let metrics = self.simulation.airspace_metrics();
         let mut lines = outcome(&metrics);
+        lines.extend(network(&metrics));
         lines.extend(on_the_way(&metrics));
         lines.extend(warning(&metrics.too_close));
         lines
@@ -164,6 +167,27 @@ fn too_close(pairs: &[(u32, u32)]) -> String {
         format!("  warning          airplanes {a} and {b} start too close for the shield\n")
     };
     pairs.iter().map(warn).collect()
+}
+
+/// What went over the network, and what went wrong on it.
+fn network(m: &Metrics) -> Lines {
+    let mut lines = Lines::new();
+    if m.messages > 0 {
+        let sent = format!("{}, {} bytes", grouped(m.messages), grouped(m.bytes));
+        lines.push(line("messages", sent));
+    }
+    let counts = [
+        (m.contacts_lost, "contacts lost"),
+        (m.deadlines_missed, "agents out of time"),
+        (m.shield_held_back, "plans held back"),
+        (m.groups_too_large, "groups too large to optimize"),
+    ];
+    let said = counts.iter().filter(|(n, _)| *n > 0);
+    let said: Vec<String> = said.map(|(n, what)| format!("{} {what}", grouped(*n))).collect();
+    if !said.is_empty() {
+        lines.push(line("trouble", said.join(", ")));
+    }
+    lines
 }
 
 /// What was recorded, told or removed; no lines where there was nothing of that.
