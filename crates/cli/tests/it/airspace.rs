@@ -47,9 +47,37 @@ fn every_deployment_gives_the_digest_of_one_process() {
             ["run", "six.toml", "--cycles", "12", "--set", &set, "--set", "airspace.generator.n=3"];
         place.json(&args)["digest"].clone()
     };
-    for deployment in ["team", "compact-team", "pim"] {
+    for deployment in ["team", "compact-team", "pim", "hierarchical-pim"] {
         assert_eq!(digest(deployment), digest("direct"), "{deployment}");
     }
+}
+
+/// One airplane's radio is dead from half-way, every tenth message is lost; the run is stopped
+/// by its number of cycles, since nobody can call that airplane off its orbit.
+#[test]
+fn trouble_on_the_network_is_told_and_recorded_and_nobody_comes_too_near() {
+    let place = Place::new();
+    place.write("six.toml", SIX);
+    let silent = "airspace.network.silent=[{airplane=2,from_s=150.0}]";
+    let set = |key: &'static str| ["--set", key];
+    let args = [
+        &["run", "six.toml", "--cycles", "150", "--out", "six"][..],
+        &set("airspace.deployment=compact-team"),
+        &set("airspace.network.loss=0.1"),
+        &set(silent),
+    ]
+    .concat();
+    let told = place.run(&args);
+    assert_eq!(told.code(), 0, "{}", told.err());
+    for words in ["losses of separation  none", "contacts lost", "arrived               5 of 6"] {
+        assert!(told.out().contains(words), "{}", told.out());
+    }
+    let written = names(&place.path("six"));
+    for table in ["events", "optimizations"] {
+        assert!(written.contains(&table.to_string()), "{written:?}");
+    }
+    let summary: Value = serde_json::from_str(&place.read("six/summary.json")).expect("JSON");
+    assert!(summary["per_pair"].as_array().is_some_and(|pairs| !pairs.is_empty()));
 }
 
 #[test]
