@@ -106,20 +106,22 @@ pub enum After {
 ///
 /// It is reached within a tolerance. But an airplane whose way-point lies inside one of its two
 /// tightest turning circles would orbit it for ever: steering for it keeps the airplane on that
-/// circle. Such a way-point counts as *passed*: the airplane has come as near as it can without
-/// flying away first.
+/// circle. Such a way-point counts as *passed* when it is abeam on the near side: within one turn
+/// round the circle that is so, and there the airplane is as near as it comes without flying away
+/// first.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Passing {
     /// A way-point nearer than this is reached.
     pub tolerance_m: f64,
-    /// Whether a way-point inside a turning circle is passed.
+    /// Whether a way-point inside a turning circle can be passed.
     pub passes: bool,
 }
 
 impl Passing {
-    /// Whether an airplane at `pose` has done with the way-point `goal`.
+    /// Whether an airplane at `pose` has done with the way-point `goal`; its tightest turn has
+    /// this radius, and it flies `step_m` from one look to the next.
     #[inline]
-    pub fn is_done(&self, pose: Pose, goal: Point, radius_m: f64) -> bool {
+    pub fn is_done(&self, pose: Pose, goal: Point, radius_m: f64, step_m: f64) -> bool {
         let (dx, dy) = (goal[0] - pose.at[0], goal[1] - pose.at[1]);
         let square = dx * dx + dy * dy;
         if square < self.tolerance_m * self.tolerance_m {
@@ -131,8 +133,11 @@ impl Passing {
         }
         // The circles' centres are a radius to the left and right: the goal is inside when its
         // distance to the nearer centre is below the radius.
-        let left = -math::sin(pose.psi_rad) * dx + math::cos(pose.psi_rad) * dy;
-        square < 2.0 * radius_m * left.abs()
+        let (sin, cos) = (math::sin(pose.psi_rad), math::cos(pose.psi_rad));
+        let (ahead, left) = (cos * dx + sin * dy, cos * dy - sin * dx);
+        let is_inside = square < 2.0 * radius_m * left.abs();
+        // Abeam since the last look: on a circle, ahead changes by less than a step per step.
+        is_inside && left.abs() < radius_m && (-step_m..=0.0).contains(&ahead)
     }
 }
 
@@ -336,8 +341,9 @@ impl Pilot<'_> {
     /// The way-point after those that are done with at `pose`.
     #[inline]
     pub fn next(&self, pose: Pose, mut next: usize) -> usize {
+        let (radius_m, step_m) = (self.model.turn_radius_m(), self.model.v_m_s * self.dtau_s);
         while let Some(&goal) = self.mission.get(next) {
-            if !self.passing.is_done(pose, goal, self.model.turn_radius_m()) {
+            if !self.passing.is_done(pose, goal, radius_m, step_m) {
                 break;
             }
             next += 1;
@@ -444,6 +450,11 @@ mod tests {
             let timing = Timing { dt_s: 5.0, dtau_s: 1.0, horizon: 400 };
             let flown = pilot.predict(Action::Proceed, pose, 0, &timing);
             prop_assert!(flown.counted < 400, "still flying to {mission:?}");
+            // It ends within the tolerance, or where it was about as near as it came at all.
+            let apart_m = |k: usize| distance_m(flown.points[k], mission[0]);
+            let last = flown.counted - 1;
+            let nearest_m = (0..=last).map(apart_m).fold(f64::INFINITY, f64::min);
+            prop_assert!(apart_m(last) < tolerance_m || apart_m(last) < nearest_m + 35.0);
         }
     }
 

@@ -287,6 +287,26 @@ impl AirspaceWorld {
 mod tests {
     use super::super::scenario::Compiled;
     use crate::scenario::Source;
+    use proptest::prelude::*;
+    use sidestep_kernel::math;
+
+    proptest! {
+        /// Wherever a way-point lies and however the wind blows, flying to it ends.
+        #[test]
+        fn nobody_circles_in_the_wind_for_ever(
+            speed in 0.0f64..30.0, from_rad in -3.2f64..3.2, x in -2000.0f64..2000.0,
+            y in -2000.0f64..2000.0,
+        ) {
+            let wind = [speed * math::cos(from_rad), speed * math::sin(from_rad)];
+            let text = format!(
+                "format = 1\nworld = \"airspace\"\n[airspace]\nwind_m_s = {wind:?}\n\
+                 tolerance_m = 20.0\n\
+                 [[airplanes]]\nat_m = [0, 0]\nheading_deg = 90\nway_points_m = [[{x}, {y}]]\n"
+            );
+            let world = Compiled::new(&Source::new("w", text, "")).expect("a scenario").world;
+            prop_assert!(world.alone_s[0] < 3000.0, "{wind:?}: {}", world.alone_s[0]);
+        }
+    }
 
     #[test]
     fn against_any_wind_an_airplane_tracks_its_way() {
