@@ -212,12 +212,13 @@ impl AirspaceWorld {
             return Some(cell.side());
         }
         let stage = self.stage(slot, u32::from(cell.orders.get()) + 1);
+        let now = self.flyer(state, slot);
         let changed = Flyer {
             v_m_s: stage.model.v_m_s,
             levels: Levels::between(cell.altitude_m.get(), stage.altitude_m),
-            ..self.flyer(state, slot)
+            ..now
         };
         let others = flown.iter().filter(|&&other| other != slot);
-        side_apart(&changed, others.map(|&other| self.flyer(state, other)))
+        side_apart(&now, &changed, others.map(|&other| self.flyer(state, other)))
     }
 }

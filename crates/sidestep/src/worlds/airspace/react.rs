@@ -3,6 +3,7 @@
 use super::Scratch;
 use super::airplane::{Point, Pose, distance_m};
 use super::decide::Known;
+use super::deploy::Seen;
 use super::deploy::contact::Contacts;
 use super::events::{Event, EventKind};
 use super::levels::Levels;
@@ -181,13 +182,17 @@ impl AirspaceWorld {
         contacts: &mut [Contacts],
         scratch: &mut Scratch,
     ) -> Vec<Way> {
-        let flyers: Vec<Flyer> = group.iter().map(|&slot| self.flyer(state, slot)).collect();
+        let seen = |&slot: &Slot| Seen {
+            flyer: self.flyer(state, slot),
+            orbits: state.airplanes[slot as usize].orbiting.get() > 0,
+        };
+        let seen: Vec<Seen> = group.iter().map(seen).collect();
         let (decisions, traffic) =
-            self.exchanged(&flyers, candidates, now, contacts, &mut scratch.events);
+            self.exchanged(&seen, candidates, now, contacts, &mut scratch.events);
         scratch.exchanged.add(traffic);
         let mut ways = Vec::with_capacity(group.len());
-        for ((decision, &slot), (flyer, wishes)) in
-            decisions.iter().zip(group).zip(flyers.iter().zip(candidates))
+        for ((decision, &slot), (Seen { flyer, .. }, wishes)) in
+            decisions.iter().zip(group).zip(seen.iter().zip(candidates))
         {
             let cell = &state.airplanes[slot as usize];
             cell.set_side(decision.fallback);
@@ -196,7 +201,7 @@ impl AirspaceWorld {
             }
             ways.push(match decision.candidate {
                 Some(k) => {
-                    cell.waiting.set(0);
+                    cell.orbiting.set(0);
                     if k > 0 {
                         let event = Event::of(now, EventKind::Override, slot);
                         scratch.events.push(event.with(k as f64));
@@ -205,7 +210,7 @@ impl AirspaceWorld {
                 }
                 None => {
                     cell.orbits.set(cell.orbits.get() + 1);
-                    cell.waiting.set(cell.waiting.get() + 1);
+                    cell.orbiting.set(cell.orbiting.get() + 1);
                     scratch.events.push(Event::of(now, EventKind::Orbit, slot));
                     self.orbit(flyer.fallback, flyer.omega_max_rad_s)
                 }

@@ -6,7 +6,7 @@ use super::flight_plan::AirplaneSection;
 use super::generate::{Order as Wanted, generate};
 use super::levels::Levels;
 use super::objective::Objective;
-use super::orders::Task;
+use super::orders::{FlightOrder, Task};
 use super::shield::{Flyer, Side, first_fallbacks};
 use super::state::{AirplaneRecord, AirspaceState, FLYING, Snapshot};
 use super::track::Track;
@@ -252,7 +252,7 @@ impl Compiler<'_> {
             let cause = format!("a wind of {wind} m/s, and airplanes of {slowest} m/s");
             return Err(self.error(None, cause, "give a wind that all airplanes can fly against"));
         }
-        let network = self.network(&timing, airplanes.len())?;
+        let network = self.network(&timing, &airplanes)?;
         let group_memory_gib = self.positive(section.group_memory_gib.as_ref(), 2.0)?;
         let mut world = AirspaceWorld {
             airplanes,
@@ -329,7 +329,15 @@ impl Compiler<'_> {
         Err(self.error(None, cause, remedy))
     }
 
-    fn network(&self, timing: &Timing, airplanes: usize) -> Result<Option<Network>, InputError> {
+    fn network(
+        &self,
+        timing: &Timing,
+        airplanes: &[Airplane],
+    ) -> Result<Option<Network>, InputError> {
+        let changes =
+            |order: &FlightOrder| matches!(order.task, Task::Speed(_) | Task::Altitude { .. });
+        let orders_change_safety = airplanes.iter().any(|a| a.orders.iter().any(changes));
+        let airplanes = airplanes.len();
         let Some(section) = &self.file.airspace.network else { return Ok(None) };
         let at = || Some(section.span());
         let s = section.get_ref();
@@ -337,6 +345,12 @@ impl Compiler<'_> {
             let cause = "a network, but one process decides for all (deployment = \"direct\")";
             let remedy = "set deployment to team, compact-team, pim or hierarchical-pim, \
                           or leave [airspace.network] out";
+            return Err(self.error(at(), cause, remedy));
+        }
+        if self.file.airspace.shield != Some(Switch::Off) && orders_change_safety {
+            let cause = "orders of speed or level, over a network that is not to be relied on";
+            let remedy = "nobody could be sure who knows of them: leave them out, or \
+                          [airspace.network], or set shield = \"off\"";
             return Err(self.error(at(), cause, remedy));
         }
         let latency_s = s.latency_s.unwrap_or(0.001);
@@ -356,15 +370,15 @@ impl Compiler<'_> {
         }
         let times = [latency_s, network.patience_s, network.deadline_s];
         let sane = times.iter().all(|t| *t > 0.0 && t.is_finite()) && s.max_delay_s >= 0.0;
-        let fits =
-            2.0 * network.deadline_s <= timing.dt_s && network.patience_s < network.deadline_s;
+        let fits = 2.0 * network.deadline_s <= timing.dt_s
+            && 8.0 * network.patience_s.max(latency_s + s.max_delay_s) <= network.deadline_s;
         if !(sane && fits && latency_s >= 1e-6 && s.max_delay_s.is_finite()) {
             let cause = format!(
                 "latency_s = {latency_s}, max_delay_s = {}, patience_s = {}, deadline_s = {}",
                 s.max_delay_s, network.patience_s, network.deadline_s
             );
-            let remedy = "give times above 0 (latency at least 1e-6, delay 0 or more), a patience \
-                          below the deadline, and a deadline of at most half of dt_s: it holds for \
+            let remedy = "give times above 0 (latency at least 1e-6, delay 0 or more), a patience of at \
+                          most an eighth of the deadline, and a deadline of at most half of dt_s: it holds for \
                           the optimization and again for the shield's exchange";
             return Err(self.error(at(), cause, remedy));
         }

@@ -83,11 +83,14 @@ impl Flyer {
             && !orbit(self).stays_apart(&orbit(other), gap_m)
     }
 
-    fn minds(&self, other: &Self) -> bool {
+    fn is_on_level(&self, other: &Self) -> bool {
         let vertical_m = self.vertical_m.max(other.vertical_m);
-        self.id != other.id
-            && self.levels.meets(&other.levels, vertical_m)
-            && !self.is_left_alone_with(other)
+        self.id != other.id && self.levels.meets(&other.levels, vertical_m)
+    }
+
+    /// Whether the shield keeps two airplanes apart.
+    pub(super) fn minds(&self, other: &Self) -> bool {
+        self.is_on_level(other) && !self.is_left_alone_with(other)
     }
 }
 
@@ -365,13 +368,19 @@ pub fn entry_fallbacks(
     (sides, left)
 }
 
-/// The side on which an airplane that is about to fly otherwise has an orbit apart from the stored
+/// The side on which an airplane that flies as `now` and is about to fly as `changed` has an orbit apart from the stored
 /// fallbacks of others, if there is one; rather the one it has stored.
-pub fn side_apart(changed: &Flyer, others: impl Iterator<Item = Flyer>) -> Option<Side> {
+pub fn side_apart(
+    now: &Flyer,
+    changed: &Flyer,
+    others: impl Iterator<Item = Flyer>,
+) -> Option<Side> {
     let orbit = |flyer: &Flyer, side: Side| {
         Orbit::from(flyer.pose, flyer.v_m_s, side.sign() * flyer.omega_max_rad_s)
     };
-    let minded: Vec<Flyer> = others.filter(|other| changed.minds(other)).collect();
+    // A pair that came in too close is so as it is now, not as it would be.
+    let minds = |other: &Flyer| changed.is_on_level(other) && !now.is_left_alone_with(other);
+    let minded: Vec<Flyer> = others.filter(minds).collect();
     let is_apart = |side: &Side| {
         minded.iter().all(|other| {
             let gap_m = changed.separation_m.max(other.separation_m) + SLACK_M;
@@ -580,13 +589,18 @@ mod tests {
         let quick_turns = 6f64.to_radians();
         let other = Flyer { omega_max_rad_s: quick_turns, ..flyer(1500.0, -100.0, 0.0, 0) };
         let slow = flyer(0.0, 0.0, 0.0, 1);
-        let beside = |v_m_s: f64| side_apart(&Flyer { v_m_s, ..slow }, [other].into_iter());
+        let beside = |v_m_s: f64| side_apart(&slow, &Flyer { v_m_s, ..slow }, [other].into_iter());
         assert_eq!(beside(35.0), Some(Side::Left));
         assert_eq!(beside(150.0), None);
         let above = Flyer { levels: Levels::at(1000.0), v_m_s: 150.0, ..slow };
-        assert_eq!(side_apart(&above, [other].into_iter()), Some(Side::Left));
+        assert_eq!(side_apart(&slow, &above, [other].into_iter()), Some(Side::Left));
+        // Both came in too close, but not to each other.
+        let came_too_close = |f: Flyer| Flyer { came_too_close: true, ..f };
+        let fast = came_too_close(Flyer { v_m_s: 150.0, ..slow });
+        let others = [came_too_close(other)].into_iter();
+        assert_eq!(side_apart(&came_too_close(slow), &fast, others), None);
         let climbing = Flyer { levels: Levels::between(0.0, 1000.0), ..above };
-        assert_eq!(side_apart(&climbing, [other].into_iter()), None);
+        assert_eq!(side_apart(&slow, &climbing, [other].into_iter()), None);
     }
 
     #[test]

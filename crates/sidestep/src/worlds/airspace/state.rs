@@ -52,7 +52,7 @@ pub struct Cell {
     /// of these, falls back to its orbit,
     pub orbits: Shared<u32>,
     /// and how many of those in a row just now.
-    pub waiting: Shared<u32>,
+    pub orbiting: Shared<u32>,
     /// Orders carried out,
     pub orders: Shared<u16>,
     /// and times that one had to wait for the next `dt`.
@@ -229,11 +229,11 @@ impl AirspaceState {
         for (cell, record) in airplanes.iter().zip(&snapshot.airplanes) {
             cell.set_pose(record.pose);
             cell.arrived.set(record.arrived);
-            let [next, overrides, orbits, waiting] = record.counts;
+            let [next, overrides, orbits, orbiting] = record.counts;
             cell.next.set(next);
             cell.overrides.set(overrides);
             cell.orbits.set(orbits);
-            cell.waiting.set(waiting);
+            cell.orbiting.set(orbiting);
             cell.set_side(record.fallback);
             if record.came_too_close {
                 cell.set_too_close();
@@ -273,7 +273,7 @@ impl AirspaceState {
         let record = |cell: &Cell| AirplaneRecord {
             pose: cell.pose(),
             arrived: cell.arrived.get(),
-            counts: [cell.next.get(), cell.overrides.get(), cell.orbits.get(), cell.waiting.get()],
+            counts: [cell.next.get(), cell.overrides.get(), cell.orbits.get(), cell.orbiting.get()],
             fallback: cell.side(),
             came_too_close: cell.came_too_close(),
             altitude_m: cell.altitude_m.get(),

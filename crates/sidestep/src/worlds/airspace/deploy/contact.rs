@@ -50,8 +50,10 @@ pub struct Contact {
     pub beacon: Beacon,
     /// The orbits it may be on since then, under the shield.
     pub possible: Vec<Orbiting>,
-    /// Talks of the shield in a row in which it was not heard.
+    /// Exchanges of the shield in a row in which it was there and not heard,
     pub unheard: u32,
+    /// up to this one.
+    pub met_in: Cycle,
 }
 
 /// What an airplane knows of others, by id.
@@ -59,37 +61,35 @@ pub type Contacts = BTreeMap<EntityId, Contact>;
 
 impl Orbiting {
     /// Where it is at the beginning of cycle `now`.
-    pub(super) fn pose(&self, world: &AirspaceWorld, beacon: &Beacon, now: Cycle) -> Pose {
+    fn pose(&self, world: &AirspaceWorld, beacon: &Beacon, now: Cycle) -> Pose {
         let gone_s = now.saturating_sub(self.as_of) as f64 * world.timing.dt_s;
         let omega_rad_s = self.side.sign() * beacon.omega_max_rad_s;
         let Pose { at: [x, y], psi_rad } = self.pose.step(beacon.v_m_s, omega_rad_s, gone_s);
         let [wx, wy] = world.wind_m_s;
         Pose { at: [x + wx * gone_s, y + wy * gone_s], psi_rad: math::wrap_angle(psi_rad) }
     }
+}
 
-    /// One that flies this orbit whatever others do, as the shield sees it.
-    pub(super) fn flyer(
-        &self,
-        world: &AirspaceWorld,
-        (id, beacon): (EntityId, &Beacon),
-        now: Cycle,
-    ) -> Flyer {
-        Flyer {
-            id,
-            pose: self.pose(world, beacon, now),
-            v_m_s: beacon.v_m_s,
-            omega_max_rad_s: beacon.omega_max_rad_s,
-            separation_m: beacon.separation_m,
-            levels: beacon.levels,
-            vertical_m: world.vertical_m,
-            fallback: self.side,
-            came_too_close: false,
-            rank: u64::MAX - u64::from(id),
+impl Beacon {
+    /// What can be told of one without knowing where it wants to go.
+    pub(super) fn of(flyer: &Flyer) -> Self {
+        Self {
+            pose: flyer.pose,
+            goal: None,
+            v_m_s: flyer.v_m_s,
+            omega_max_rad_s: flyer.omega_max_rad_s,
+            separation_m: flyer.separation_m,
+            levels: flyer.levels,
         }
     }
 }
 
 impl Contact {
+    /// One that has just been heard.
+    pub(super) fn heard(beacon: Beacon, now: Cycle) -> Self {
+        Self { heard_in: now, beacon, possible: Vec::new(), unheard: 0, met_in: now }
+    }
+
     /// Where one that is not heard is taken to fly: on the orbit on which the shield keeps it,
     /// or else straight to the way-point it had. Others keep farther away from it.
     pub(super) fn options(&self, world: &AirspaceWorld, now: Cycle) -> Options {
@@ -138,7 +138,7 @@ impl AirspaceWorld {
         let altitude_m = self.airplanes[i].altitude_m;
         let known = Known { slot: id, pose, next: 0, orders: 0, altitude_m };
         let beacon = self.beacon(known);
-        Contact { heard_in, beacon, possible: vec![orbiting], unheard: 0 }
+        Contact { heard_in, beacon, possible: vec![orbiting], unheard: 0, met_in: heard_in }
     }
 }
 
@@ -146,9 +146,6 @@ impl AirspaceWorld {
 pub(super) fn note(contacts: &mut Contacts, id: EntityId, beacon: Beacon, now: Cycle) {
     match contacts.get_mut(&id) {
         Some(contact) => (contact.beacon, contact.heard_in) = (beacon, now),
-        None => {
-            let contact = Contact { heard_in: now, beacon, possible: Vec::new(), unheard: 0 };
-            contacts.insert(id, contact);
-        }
+        None => drop(contacts.insert(id, Contact::heard(beacon, now))),
     }
 }

@@ -6,31 +6,34 @@
 //! On one that loses messages nobody can be sure what others know. So plans must stay safe
 //! whichever of them are flown, and nobody flies one of which others may not know:
 //!
-//! 1. Everybody tells its *proposal* as above, and what it knows of those it does not hear.
+//! 1. Everybody tells its *proposal* as above.
 //! 2. From the proposals it has heard each works out plans by [`filter`] that are *mixable*: each
 //!    plan keeps apart from every other one's plan and from its fallback too. Whoever was not
 //!    heard is taken to be on any orbit it may be on. Each tells its own *plan*.
 //! 3. Each *accepts* the plans of others that keep apart from its own plan and its own fallback,
 //!    and tells whom it accepts.
-//! 4. An airplane flies its plan if all those near it have accepted it, else its fallback.
+//! 4. An airplane flies its plan if all others near it have accepted it, else its fallback.
+//!
+//! Who is near can be seen, heard or not: where it is, and to which side it turns if it is on an
+//! orbit. What cannot be seen is what it wants, and the fallback of one that flies a way. So the
+//! orbits that an unheard airplane may be on are: those that follow from what was heard in the
+//! exchange before; or the one on which it is seen; or else both from where it is seen.
 //!
 //! **Invariant.** For any two airplanes, every orbit that the one may be on as far as the other
-//! knows keeps apart from every orbit that the other may be on as far as the one knows; and each
-//! is on one of those that the other knows.
+//! knows includes the one it is on, and those that they are on keep apart.
 //!
 //! *Why it is kept.* Take `i` and `j`. If `i` has accepted `j`'s plan, it knows that `j` is on
 //! that plan's orbit or on its fallback; both keep apart from `i`'s plan and from its fallback,
 //! as it has checked both. If it has not, `j` flies its fallback, which `i` knows of: from the
-//! proposal, or, if it has not heard it, as one of the orbits possible so far, from all of which
-//! `i`'s plan keeps apart. The same holds the other way round. So both are on orbits that the
-//! other knows of, and all these keep apart.
+//! proposal, or, if it has not heard it, as one of the orbits possible, from all of which `i`'s
+//! plan keeps apart. The same holds the other way round. So both are on orbits that the other
+//! knows of, and those that they are on keep apart.
 //!
 //! An airplane whose radio is dead knows it, and stays on its fallback. Others wait in vain for
-//! it to accept anything. After [`SILENT_AFTER`] exchanges in a row without hearing from it they
-//! take its radio to be dead, and fly without its consent what keeps apart from every orbit it
-//! may be on: the one it was on when it was last heard, or the start of its flight as filed. Were
-//! its radio alive, dozens of questions in a row, or the answers to them, would have been lost;
-//! that is the one chance which is taken here.
+//! it to accept anything. After some exchanges in a row without hearing from it they take its radio
+//! to be dead, and fly without its consent what keeps apart from every orbit it may be on. That it
+//! is alive all the same, and everything was lost, is the one chance which is taken here: below
+//! 1e-12 each time ([`super::Network::silent_after`]).
 
 use super::super::events::{Event, EventKind};
 use super::super::shield::{Certainty, Decision, Flyer, Plan, Side, Way, filter};
@@ -41,13 +44,10 @@ use super::{Deployment, link};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::{Cycle, EntityId};
 
-/// So many exchanges in a row without a word from another one: its radio is dead.
-pub(super) const SILENT_AFTER: u32 = 3;
-
 /// What airplanes tell each other.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 enum Message {
-    /// Where the sender is, what it would do, and whom it has not heard of late.
+    /// Where the sender is, and what it would do.
     Proposal(Proposal),
     /// The way it will fly if all agree, and the side it turns to then; `None`: its fallback.
     Plan(Option<(Way, Side)>),
@@ -62,7 +62,6 @@ struct Proposal {
     came_too_close: bool,
     rank: u64,
     ways: Vec<Way>,
-    unheard: Vec<(EntityId, Contact)>,
 }
 
 /// Another member of the group.
@@ -94,6 +93,10 @@ struct Agent<'a> {
     me: usize,
     ids: &'a [EntityId],
     flyer: Flyer,
+    /// All of the group as they can be seen.
+    seen: &'a [Seen],
+    /// See [`super::Network::silent_after`].
+    silent_after: u32,
     own: Proposal,
     contacts: Contacts,
     members: Vec<Member>,
@@ -130,17 +133,19 @@ impl Agent<'_> {
         }
     }
 
-    /// What it knows of a member: what it has heard, or the flight as it was filed.
-    fn contact(&self, place: usize) -> Contact {
-        let id = self.ids[place];
-        self.contacts.get(&id).cloned().unwrap_or_else(|| self.world.filed(id))
-    }
-
     /// All orbits that an unheard airplane may be on.
     fn possible(&self, place: usize) -> Vec<Flyer> {
-        let (id, contact) = (self.ids[place], self.contact(place));
-        let flyer = |o: &Orbiting| o.flyer(self.world, (id, &contact.beacon), self.now);
-        contact.possible.iter().map(flyer).collect()
+        let Seen { flyer, orbits } = self.seen[place];
+        let told = self.contacts.get(&flyer.id).map_or(&[][..], |contact| &contact.possible);
+        let fresh = told.iter().filter(|orbiting| orbiting.as_of == self.now);
+        let at =
+            |orbiting: &Orbiting| Flyer { pose: orbiting.pose, fallback: orbiting.side, ..flyer };
+        let heard: Vec<Flyer> = fresh.map(at).collect();
+        match heard.is_empty() {
+            false => heard,
+            true if orbits => vec![flyer],
+            true => Side::BOTH.map(|fallback| Flyer { fallback, ..flyer }).into(),
+        }
     }
 
     /// Goes on as far as what has been heard allows.
@@ -148,7 +153,6 @@ impl Agent<'_> {
         let mut said = Vec::new();
         while self.agreed.is_none() && link::Agent::awaits(self).is_empty() {
             if self.decision.is_none() {
-                self.learn_of_unheard();
                 said.push(self.plan());
             } else if self.members[self.me].accepts.is_none() {
                 said.push(self.accept());
@@ -157,20 +161,6 @@ impl Agent<'_> {
             }
         }
         said
-    }
-
-    /// Takes over what others know of those that it has not heard.
-    fn learn_of_unheard(&mut self) {
-        let told = self.members.iter().flat_map(|m| m.proposal.iter().flat_map(|p| &p.unheard));
-        let told: Vec<(EntityId, Contact)> = told.cloned().collect();
-        for (id, contact) in told.into_iter().filter(|(id, _)| *id != self.ids[self.me]) {
-            match self.contacts.get_mut(&id) {
-                Some(own) if own.heard_in >= contact.heard_in => {}
-                _ => {
-                    self.contacts.insert(id, contact);
-                }
-            }
-        }
     }
 
     /// Works out plans for all, and tells its own.
@@ -236,10 +226,14 @@ impl Agent<'_> {
         if member.accepts.as_ref().is_some_and(|accepted| accepted.contains(&me)) {
             return true;
         }
-        let contact = self.contact(place);
-        let beacon = member.proposal.as_ref().map_or(&contact.beacon, |proposal| &proposal.beacon);
-        let minds = self.flyer.levels.meets(&beacon.levels, self.flyer.vertical_m);
-        !minds || (member.proposal.is_none() && contact.unheard >= SILENT_AFTER)
+        !self.flyer.minds(&self.seen[place].flyer)
+            || (member.proposal.is_none() && self.unheard_before(place) >= self.silent_after)
+    }
+
+    /// Exchanges in a row up to the one before in which a member was there and not heard.
+    fn unheard_before(&self, place: usize) -> u32 {
+        let contact = self.contacts.get(&self.ids[place]);
+        contact.filter(|c| c.met_in + 1 == self.now).map_or(0, |contact| contact.unheard)
     }
 
     /// The end: flies its plan, or its fallback.
@@ -261,9 +255,11 @@ impl Agent<'_> {
         for (place, member) in self.members.iter().enumerate().filter(|(k, _)| *k != self.me) {
             let id = self.ids[place];
             let Some(proposal) = &member.proposal else {
-                let mut contact = self.contact(place);
-                contact.unheard += 1;
-                contacts.insert(id, contact);
+                let unheard = self.unheard_before(place) + 1;
+                // Seen, if never heard.
+                let sighted = || Contact::heard(Beacon::of(&self.seen[place].flyer), self.now);
+                let contact = contacts.entry(id).or_insert_with(sighted);
+                (contact.unheard, contact.met_in) = (unheard, self.now);
                 continue;
             };
             let flyer = self.flyer_of(place, proposal);
@@ -273,7 +269,7 @@ impl Agent<'_> {
             }
             note(&mut contacts, id, proposal.beacon.clone(), self.now);
             if let Some(contact) = contacts.get_mut(&id) {
-                contact.unheard = 0;
+                (contact.unheard, contact.met_in) = (0, self.now);
                 contact.possible = plans.iter().map(|plan| self.orbiting(plan)).collect();
             }
         }
@@ -313,6 +309,10 @@ impl link::Agent for Agent<'_> {
         self.go_on()
     }
 
+    fn expects(&self, other: usize) -> bool {
+        self.unheard_before(other) == 0
+    }
+
     fn awaits(&self) -> Vec<usize> {
         if self.agreed.is_some() {
             return Vec::new();
@@ -327,7 +327,7 @@ impl link::Agent for Agent<'_> {
         others.filter(|&j| !self.members[j].gone && missing(&self.members[j])).collect()
     }
 
-    fn without(&mut self, other: usize) -> Vec<Message> {
+    fn without(&mut self, other: usize, _: bool) -> Vec<Message> {
         self.members[other].gone = true;
         self.go_on()
     }
@@ -344,6 +344,15 @@ impl link::Agent for Agent<'_> {
     }
 }
 
+/// An airplane as others see it.
+#[derive(Debug, Clone, Copy)]
+pub(in super::super) struct Seen {
+    /// Its place, its model, and its stored fallback.
+    pub(in super::super) flyer: Flyer,
+    /// Whether it is seen to be on that fallback.
+    pub(in super::super) orbits: bool,
+}
+
 /// What the shield decides for each of a group, and what went over the network.
 pub(in super::super) type Shielded = (Vec<Decision>, Traffic);
 
@@ -351,17 +360,18 @@ impl AirspaceWorld {
     /// Filters wishes over the network of the deployment.
     pub(in super::super) fn exchanged(
         &self,
-        flyers: &[Flyer],
+        seen: &[Seen],
         candidates: &[Vec<Way>],
         now: Cycle,
         contacts: &mut [Contacts],
         events: &mut Vec<Event>,
     ) -> Shielded {
+        let flyers: Vec<Flyer> = seen.iter().map(|seen| seen.flyer).collect();
         let frame = (self.timing.points_per_dt(), self.timing.dtau_s);
-        if self.network.is_none() {
-            let decisions = filter(flyers, candidates, frame, Certainty::Sure);
-            return (decisions, self.proposals(flyers, candidates));
-        }
+        let Some(network) = &self.network else {
+            let decisions = filter(&flyers, candidates, frame, Certainty::Sure);
+            return (decisions, self.proposals(&flyers, candidates));
+        };
         let ids: Vec<EntityId> = flyers.iter().map(|flyer| flyer.id).collect();
         let agent = |(me, (flyer, ways)): (usize, (&Flyer, &Vec<Way>))| Agent {
             world: self,
@@ -369,7 +379,9 @@ impl AirspaceWorld {
             me,
             ids: &ids,
             flyer: *flyer,
-            own: proposal(flyer, ways, &contacts[me]),
+            seen,
+            silent_after: network.silent_after(),
+            own: proposal(flyer, ways),
             contacts: contacts[me].clone(),
             members: ids.iter().map(|_| Member::default()).collect(),
             decision: None,
@@ -408,29 +420,19 @@ impl AirspaceWorld {
             return traffic;
         }
         for (flyer, ways) in flyers.iter().zip(candidates) {
-            let message = Message::Proposal(proposal(flyer, ways, &Contacts::new()));
+            let message = Message::Proposal(proposal(flyer, ways));
             traffic.count(flyers.len() - 1, link::bytes_of(&message).len());
         }
         traffic
     }
 }
 
-fn proposal(flyer: &Flyer, ways: &[Way], contacts: &Contacts) -> Proposal {
-    let beacon = Beacon {
-        pose: flyer.pose,
-        goal: None,
-        v_m_s: flyer.v_m_s,
-        omega_max_rad_s: flyer.omega_max_rad_s,
-        separation_m: flyer.separation_m,
-        levels: flyer.levels,
-    };
-    let unheard = contacts.iter().filter(|(_, contact)| contact.unheard > 0);
+fn proposal(flyer: &Flyer, ways: &[Way]) -> Proposal {
     Proposal {
-        beacon,
+        beacon: Beacon::of(flyer),
         fallback: flyer.fallback,
         came_too_close: flyer.came_too_close,
         rank: flyer.rank,
         ways: ways.to_vec(),
-        unheard: unheard.map(|(&id, contact)| (id, contact.clone())).collect(),
     }
 }

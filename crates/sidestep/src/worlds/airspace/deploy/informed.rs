@@ -324,10 +324,16 @@ impl link::Agent for Agent<'_> {
         (0..self.members.len()).filter(unknown).collect()
     }
 
-    fn without(&mut self, other: usize) -> Vec<Message> {
+    fn expects(&self, other: usize) -> bool {
+        self.own.expects(other)
+    }
+
+    fn without(&mut self, other: usize, _: bool) -> Vec<Message> {
         let member = &mut self.members[other];
         member.gone = true;
         if member.options.is_none() {
+            // What it may have said of options that nobody knows means nothing.
+            *member = Member { gone: true, beacon: member.beacon.take(), ..Member::default() };
             member.options = Some(self.own.presumed(other));
         }
         // Who was heard of, but said nothing yet of what it samples.

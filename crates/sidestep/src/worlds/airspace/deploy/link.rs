@@ -2,8 +2,9 @@
 //!
 //! Every agent says all it says to all the others of its group. An [`Endpoint`] numbers what its
 //! agent says and keeps it; whoever misses something asks for it again. One that does not answer
-//! although it was asked [`TRIES`] times is given up for this talk: the agent goes on with what
-//! it knows of it. So nobody waits for ever, and a loss costs time instead of agreement.
+//! although it was asked several times is given up for this talk: the agent goes on with what it
+//! knows of it. Whoever was not heard in the talk before is asked once. So nobody waits for ever,
+//! and a loss costs time instead of agreement.
 //!
 //! Endpoints and agents are state machines without input or output of their own.
 
@@ -11,9 +12,6 @@ use super::network::Ended;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
-
-/// How often somebody is asked before it is given up.
-const TRIES: u32 = 12;
 
 /// An agent as a state machine: messages in, messages to all others out. Others are known by
 /// their place in the group.
@@ -33,8 +31,14 @@ pub(super) trait Agent {
     /// Whose messages it needs in order to go on.
     fn awaits(&self) -> Vec<usize>;
 
-    /// Nothing more will come of agent `other`: goes on with what is known of it.
-    fn without(&mut self, other: usize) -> Vec<Self::Message>;
+    /// Whether an answer of agent `other` can be expected.
+    fn expects(&self, _other: usize) -> bool {
+        true
+    }
+
+    /// Nothing more will come of agent `other`: goes on with what is known of it. It is settled
+    /// if it has come to an end itself, rather than fallen silent.
+    fn without(&mut self, other: usize, is_settled: bool) -> Vec<Self::Message>;
 
     /// Time is up: makes the best of what it knows.
     fn at_deadline(&mut self);
@@ -71,10 +75,18 @@ pub(super) struct Endpoint<A> {
     /// What it has said, serialized, by number.
     said: Vec<Vec<u8>>,
     others: Vec<Other>,
-    /// Ticks without anything new after which it asks.
-    patience: u64,
+    patience: Patience,
     quiet_since: u64,
     late: bool,
+}
+
+/// How long and how often an endpoint asks.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Patience {
+    /// Ticks without anything new after which it asks.
+    pub(super) ticks: u64,
+    /// How often somebody is asked before it is given up.
+    pub(super) tries: u32,
 }
 
 /// What an endpoint knows of another one.
@@ -110,7 +122,7 @@ impl<A: Agent> Endpoint<A> {
     pub(super) fn new(
         mut agent: A,
         (me, group): (usize, usize),
-        patience: u64,
+        patience: Patience,
         tick: u64,
     ) -> (Self, Vec<Outgoing>) {
         let first = agent.start();
@@ -146,7 +158,7 @@ impl<A: Agent> Endpoint<A> {
             Packet::Said(..) | Packet::Wait => Vec::new(),
             Packet::Ask(number) => self.answer(from, number),
             // Whoever says so was asked for what had not come: all of it has come.
-            Packet::Done => self.go_on_without(from),
+            Packet::Done => self.go_on_without(from, true),
         }
     }
 
@@ -160,12 +172,12 @@ impl<A: Agent> Endpoint<A> {
         vec![again(&bytes_of(&nothing))]
     }
 
-    fn go_on_without(&mut self, other: usize) -> Vec<Outgoing> {
+    fn go_on_without(&mut self, other: usize, is_settled: bool) -> Vec<Outgoing> {
         if self.others[other].gone {
             return Vec::new();
         }
         self.others[other].gone = true;
-        let said = self.agent.without(other);
+        let said = self.agent.without(other, is_settled);
         self.say(said)
     }
 
@@ -177,14 +189,15 @@ impl<A: Agent> Endpoint<A> {
         self.quiet_since = tick;
         let mut out = Vec::new();
         for j in self.agent.awaits() {
+            let tries = if self.agent.expects(j) { self.patience.tries } else { 1 };
             let other = &mut self.others[j];
-            if other.unanswered < TRIES {
+            if other.unanswered < tries {
                 other.unanswered += 1;
                 let payload = bytes_of(&Packet::<A::Message>::Ask(other.next));
                 out.push(Outgoing { to: Some(j), payload });
             } else {
                 other.unheard = true;
-                out.extend(self.go_on_without(j));
+                out.extend(self.go_on_without(j, false));
             }
         }
         out
@@ -192,7 +205,7 @@ impl<A: Agent> Endpoint<A> {
 
     /// The tick in which its patience ends.
     pub(super) fn next_timer(&self) -> Option<u64> {
-        (!self.is_done()).then(|| self.quiet_since.saturating_add(self.patience))
+        (!self.is_done()).then(|| self.quiet_since.saturating_add(self.patience.ticks))
     }
 
     /// Nobody hears it, and it hears nobody.
@@ -200,7 +213,7 @@ impl<A: Agent> Endpoint<A> {
         let me = self.me;
         for j in (0..self.others.len()).filter(|&j| j != me) {
             self.others[j].unheard = true;
-            self.go_on_without(j);
+            self.go_on_without(j, false);
         }
     }
 
@@ -287,7 +300,7 @@ mod tests {
             others.filter(|&j| told[j].is_none()).collect()
         }
 
-        fn without(&mut self, other: usize) -> Vec<Self::Message> {
+        fn without(&mut self, other: usize, _: bool) -> Vec<Self::Message> {
             for told in &mut self.told[self.round as usize..] {
                 told[other].get_or_insert(1000);
             }

@@ -32,7 +32,8 @@ use super::events::{Event, EventKind};
 use super::objective::Options;
 use super::world::AirspaceWorld;
 use crate::collectives::{Estimator, Order, Player, Settings, Utility};
-use contact::{Beacon, Contacts};
+use contact::{Beacon, Contact, Contacts};
+pub(super) use exchange::Seen;
 use network::{Ended, Talk, Topic};
 pub use network::{Network, Silence, Traffic};
 use serde::{Deserialize, Serialize};
@@ -125,11 +126,22 @@ impl Own<'_> {
         self.world.beacon(self.known)
     }
 
+    /// Whether another one was heard of late, or never yet.
+    fn expects(&self, other: usize) -> bool {
+        let contact = self.contacts.get(&self.group[other]);
+        contact.is_none_or(|contact| contact.heard_in + 1 >= self.now)
+    }
+
     /// Where another one is taken to fly that is not heard.
     fn presumed(&self, other: usize) -> Options {
         let id = self.group[other];
         let contact = self.contacts.get(&id).cloned().unwrap_or_else(|| self.world.filed(id));
         contact.options(self.world, self.now)
+    }
+
+    /// The same of one that was heard a moment ago.
+    fn presumed_from(&self, beacon: &Beacon) -> Options {
+        Contact::heard(beacon.clone(), self.now).options(self.world, self.now)
     }
 }
 
@@ -259,6 +271,7 @@ mod tests {
     use super::super::metrics::Metrics;
     use super::super::simulation::AirspaceSimulation;
     use crate::scenario::Source;
+    use proptest::prelude::*;
     use sidestep_kernel::{Digest, Simulation};
 
     fn flown(preset: &str, deployment: &str, more: &str) -> (Digest, Metrics) {
@@ -338,7 +351,7 @@ mod tests {
     fn with_hardly_any_message_or_any_time_the_shield_keeps_all_apart() {
         let worse = [
             "network = { loss = 0.7, duplication = 0.2, max_delay_s = 0.02 }",
-            "network = { loss = 0.2, latency_s = 0.05, deadline_s = 0.4 }",
+            "network = { loss = 0.2, latency_s = 0.02, deadline_s = 0.5 }",
         ];
         for (deployment, more) in [("team", worse[0]), ("pim", worse[0]), ("team", worse[1])] {
             let mut run = over_a_bad_network("default", deployment, more, 3);
@@ -346,6 +359,62 @@ mod tests {
             let metrics = run.airspace_metrics();
             assert_eq!(metrics.losses_of_separation, 0, "{deployment}, {more}: {metrics:?}");
             assert!(metrics.deadlines_missed + metrics.contacts_lost > 0, "{more}: {metrics:?}");
+        }
+    }
+
+    /// Delays that leave time for few questions only: whoever is silent is given up soon enough.
+    #[test]
+    fn a_silent_airplane_stops_nobody_where_messages_are_slow() {
+        for deployment in ["team", "pim"] {
+            let network = "network = { loss = 0.1, max_delay_s = 0.05, \
+                           silent = [{ airplane = 1, from_s = 60.0 }] }";
+            let mut run = over_a_bad_network("default", deployment, network, 1);
+            run.advance(300);
+            let metrics = run.airspace_metrics();
+            assert_eq!((metrics.losses_of_separation, metrics.arrived), (0, 4), "{metrics:?}");
+        }
+    }
+
+    /// Distributions of others mean nothing where their options are only presumed.
+    #[test]
+    fn agents_that_never_hear_a_model_do_not_mind_what_it_samples() {
+        for seed in 1..4 {
+            let more = "network = { loss = 0.9 }";
+            let mut run = over_a_bad_network("paper", "compact-team", more, seed);
+            run.advance(40);
+            assert_eq!(run.airspace_metrics().losses_of_separation, 0);
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(12))]
+        /// Whoever falls silent wherever and whenever, met before or not, whoever comes in later:
+        /// all whose orbits were apart when they came in stay apart.
+        #[test]
+        fn nobody_comes_near_a_silent_airplane(
+            seed in any::<u32>(), n in 3usize..9, loss in 0.0f64..0.6, deployment in 0usize..2,
+            silent in prop::collection::vec((0usize..9, 0.0f64..200.0), 0..3),
+            appears_s in 0.0f64..100.0, x in -4000.0f64..4000.0,
+        ) {
+            let silent: Vec<String> = silent.iter()
+                .map(|(k, from_s)| format!("{{ airplane = {}, from_s = {from_s:?} }}", k % n))
+                .collect();
+            let text = format!(
+                "format = 1\nworld = \"airspace\"\nseed = {seed}\n[airspace]\nmethod = \"none\"\n\
+                 deployment = \"{}\"\n\
+                 network = {{ loss = {loss:?}, max_delay_s = 0.01, silent = [{}] }}\n\
+                 [airspace.generator]\nkind = \"random\"\nn = {n}\nradius_m = 7000.0\n\
+                 [[airplanes]]\nat_m = [{x}, 6000]\nheading_deg = -90\nappears_s = {appears_s:?}\n\
+                 way_points_m = [[{x}, -6000]]\n",
+                ["team", "pim"][deployment], silent.join(", "),
+            );
+            let mut run = AirspaceSimulation::new(&Source::new("s", text, ""), 1).expect("valid");
+            run.advance(90);
+            let metrics = run.airspace_metrics();
+            let told = &metrics.too_close;
+            prop_assert!(
+                metrics.losses_of_separation == 0 || !told.is_empty(), "{metrics:?}"
+            );
         }
     }
 

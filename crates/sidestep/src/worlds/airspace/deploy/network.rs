@@ -4,11 +4,11 @@
 //! depends on who sends to whom in which tick, never on the order in which agents are looked at.
 
 use super::super::world::purpose;
-use super::link::{Agent, Endpoint, Outgoing};
+use super::link::{Agent, Endpoint, Outgoing, Patience};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::ports::{Envelope, Faults, MemoryTransport, Transport};
 use sidestep_kernel::stream::Streams;
-use sidestep_kernel::{Cycle, EntityId};
+use sidestep_kernel::{Cycle, EntityId, math};
 
 /// What went over the network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -93,8 +93,26 @@ impl Network {
         self.ticks(self.deadline_s)
     }
 
-    pub(super) fn patience_ticks(&self) -> u64 {
-        self.ticks(self.patience_s)
+    /// How long and how often somebody is asked: whoever is silent is given up in a quarter of
+    /// the time, so that enough is left to go on without it.
+    pub(super) fn patience(&self) -> Patience {
+        let tries = (self.deadline_s / (4.0 * self.patience_s)).clamp(2.0, 12.0) as u32;
+        Patience { ticks: self.ticks(self.patience_s), tries }
+    }
+
+    /// Talks in a row without a word from somebody after which its radio is taken to be dead:
+    /// at least three, and so many that the chance is below 1e-12 that all it has said was lost,
+    /// and all questions to it or the answers.
+    pub(super) fn silent_after(&self) -> u32 {
+        const CHANCE: f64 = 1e-12;
+        let unanswered = 1.0 - (1.0 - self.loss) * (1.0 - self.loss);
+        let tries = f64::from(self.patience().tries);
+        // In the first of these talks all questions are asked, and one in each later one.
+        let first = math::ln(self.loss) + tries * math::ln(unanswered);
+        let later = math::ln(self.loss * unanswered);
+        let talks = 1.0 + ((math::ln(CHANCE) - first) / later).ceil().max(0.0);
+        // Without losses the logarithms are infinite, and three talks are enough.
+        if talks.is_finite() { (talks as u32).max(3) } else { 3 }
     }
 
     pub(super) fn faults(&self) -> Faults {
@@ -159,7 +177,8 @@ pub(super) fn run<A: Agent>(
 ) -> (Vec<Ended<A::Outcome>>, Traffic) {
     let (begin, end) = talk.ticks();
     let faults = talk.network.map(Network::faults).unwrap_or_default();
-    let patience = talk.network.map_or(u64::MAX, Network::patience_ticks);
+    let for_ever = Patience { ticks: u64::MAX, tries: 1 };
+    let patience = talk.network.map_or(for_ever, Network::patience);
     let mut post = Post {
         ids,
         silent: ids.iter().map(|&id| talk.is_silent(id)).collect(),

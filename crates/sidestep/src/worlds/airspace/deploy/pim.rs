@@ -23,16 +23,14 @@ use super::super::levels::Levels;
 use super::super::objective::{Options, couple, own_costs};
 use super::super::world::purpose;
 use super::contact::Beacon;
-use super::link::bytes_of;
-use super::network::{Ended, Talk, Traffic};
+use super::link::{Patience, bytes_of};
+use super::network::{Ended, Network, Talk, Traffic};
 use super::{Came, Decided, Own};
 use crate::collectives::{Estimator, PairwiseGame, Player, optimize};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::distr::Chance;
 
-/// How often a hop is tried.
-const TRIES: u32 = 16;
 /// Bytes of an acknowledgement.
 const ACKNOWLEDGED: usize = 1;
 
@@ -105,9 +103,11 @@ impl<'a> Carrier<'a> {
     /// Takes a coordinator's state from one airplane to another. Whether it has arrived.
     fn hop<S: Serialize + DeserializeOwned>(&mut self, state: &mut S, way: [usize; 2]) -> bool {
         let bytes = bytes_of(state);
-        let patience = self.talk.network.map_or(0, |network| network.patience_ticks());
+        let one = Patience { ticks: 0, tries: 1 };
+        let patience = self.talk.network.map_or(one, Network::patience);
+        let expected = self.hosts[way[0]].expects(way[1]);
         let mut arrived = false;
-        for _ in 0..TRIES {
+        for _ in 0..if expected { patience.tries } else { 1 } {
             if self.is_late() {
                 break;
             }
@@ -119,7 +119,7 @@ impl<'a> Carrier<'a> {
             if arrived && (is_ideal || self.sends(way[1], way[0], ACKNOWLEDGED).is_some()) {
                 break;
             }
-            self.gone += patience;
+            self.gone += patience.ticks;
         }
         if arrived {
             // On the other side it is read back.
@@ -142,9 +142,10 @@ pub(super) fn run(talk: &Talk<'_>, hosts: &[Own<'_>], parts: Vec<Vec<usize>>) ->
         Estimator::Exact => exact(&mut team, &mut carrier),
         Estimator::Sampled { block, ageing } => sampled(&mut team, (block, ageing), &mut carrier),
     }
-    let late = carrier.is_late();
-    let mut told = vec![Ended { outcome: None, unheard: Vec::new(), late }; hosts.len()];
+    let mut told = vec![Ended { outcome: None, unheard: Vec::new(), late: false }; hosts.len()];
     deliver(team, &mut carrier, &mut told);
+    let late = carrier.is_late();
+    told.iter_mut().filter(|ended| ended.outcome.is_none()).for_each(|ended| ended.late = late);
     (told, carrier.traffic)
 }
 
@@ -372,7 +373,7 @@ fn deliver(team: Vec<Coordinator>, carrier: &mut Carrier<'_>, told: &mut [Ended<
             told[place] = Ended {
                 unheard: presumed.map(|a| a.place).collect(),
                 outcome: Some(Came { decided: part.airplanes[k].decided.clone(), beacons }),
-                late: told[place].late,
+                late: false,
             };
         }
     }

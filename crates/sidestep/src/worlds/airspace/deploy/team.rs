@@ -235,15 +235,20 @@ impl link::Agent for Agent<'_> {
         self.others().filter(|(_, m)| !m.is_gone() && missing(m)).map(|(j, _)| j).collect()
     }
 
-    /// Its part of the costs is left out from now on; the last way it told of stands for it, or
-    /// where it is presumed.
-    fn without(&mut self, other: usize) -> Vec<Message> {
+    fn expects(&self, other: usize) -> bool {
+        self.own.expects(other)
+    }
+
+    /// Its part of the costs is left out from now on. One that is settled goes on as it last
+    /// said; one that is silent is presumed where it was.
+    fn without(&mut self, other: usize, is_settled: bool) -> Vec<Message> {
         let member = &mut self.members[other];
         let last = member.ways.values().next_back().and_then(|ways| ways.first());
         member.presumed = Some(match (&member.beacon, last) {
-            (Some(beacon), Some(way)) => {
+            (Some(beacon), Some(way)) if is_settled => {
                 Options::new(vec![way.clone()], beacon.separation_m, beacon.levels)
             }
+            (Some(beacon), _) => self.own.presumed_from(beacon),
             _ => self.own.presumed(other),
         });
         self.go_on()
