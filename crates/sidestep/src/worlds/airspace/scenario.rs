@@ -22,6 +22,11 @@ use toml::Spanned;
 
 /// Levels that are apart by what is asked for may seem nearer by this when they were rounded.
 const ROUNDED_M: f64 = 1e-6;
+/// A run whose length is not given may take so many cycles,
+const FEWEST_CYCLES: u64 = 400;
+/// or so many times what the last airplane to come in would need alone, if that is more: room for
+/// detours and orbits.
+const TIMES_ALONE: f64 = 3.0;
 /// Most airplanes of a scenario.
 const MAX_AIRPLANES: usize = 1_000_000;
 
@@ -70,8 +75,7 @@ struct AirspaceFile {
     name: String,
     #[serde(default = "one")]
     seed: u64,
-    #[serde(default = "many_cycles")]
-    cycles: u64,
+    cycles: Option<u64>,
     #[serde(default)]
     airspace: AirspaceSection,
     airplane: Option<Spanned<ModelSection>>,
@@ -83,10 +87,6 @@ struct AirspaceFile {
 
 fn one() -> u64 {
     1
-}
-
-fn many_cycles() -> u64 {
-    400
 }
 
 fn no_airplanes() -> Spanned<OneOrMany<Spanned<AirplaneSection>>> {
@@ -293,11 +293,12 @@ impl Compiler<'_> {
         }
         let (fallbacks, too_close) = first(&world);
         world.first_fallbacks.clone_from(&fallbacks);
+        let cycles = self.file.cycles.unwrap_or_else(|| enough_cycles(&world));
         let compiled = Compiled {
             world: Arc::new(world),
             name: self.file.name.clone(),
             seed: self.file.seed,
-            cycles: self.file.cycles,
+            cycles,
             record: self.file.record,
             fallbacks,
             too_close,
@@ -671,6 +672,13 @@ fn speeds_m_s(airplane: &Airplane) -> impl Iterator<Item = f64> {
     told.chain([airplane.model.v_m_s])
 }
 
+/// Cycles in which everybody should arrive. Flights that never end do not count.
+fn enough_cycles(world: &AirspaceWorld) -> u64 {
+    let ends = (0..world.airplanes.len()).map(|i| world.ends_alone_s(i));
+    let longest_s = ends.filter(|s| s.is_finite()).fold(0.0, f64::max);
+    FEWEST_CYCLES.max((TIMES_ALONE * longest_s / world.timing.dt_s).ceil() as u64)
+}
+
 /// First fallbacks that are apart as far as there are any, and the pairs that are not.
 fn first(world: &AirspaceWorld) -> (Vec<Side>, Vec<(u32, u32)>) {
     let mut sides = vec![Side::default(); world.airplanes.len()];
@@ -695,4 +703,31 @@ fn first(world: &AirspaceWorld) -> (Vec<Side>, Vec<(u32, u32)>) {
     let (chosen, pairs) = first_fallbacks(&flyers);
     starts.iter().zip(chosen).for_each(|(&i, side)| sides[i] = side);
     (sides, pairs.into_iter().map(|(i, j)| (starts[i] as u32, starts[j] as u32)).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn compiled(more: &str) -> Compiled {
+        let text = format!("format = 1\nworld = \"airspace\"\n{more}");
+        Compiled::new(&Source::new("test", text, "")).expect("a scenario")
+    }
+
+    #[test]
+    fn without_a_number_of_cycles_there_are_enough_for_everybody_to_arrive() {
+        let short = "[airspace.generator]\nkind = \"superconflict\"\nn = 2\n";
+        assert_eq!(compiled(short).cycles, 400);
+        assert_eq!(compiled(&format!("cycles = 7\n{short}")).cycles, 7);
+        // 70 km at 35 m/s from 500 s on.
+        let long = "[[airplanes]]\nat_m = [0, 0]\nheading_deg = 0\nway_points_m = [[70000, 0]]\n\
+                    appears_s = 500.0\n";
+        let cycles = compiled(long).cycles;
+        assert!((1495..=1500).contains(&cycles), "{cycles}");
+        let endless = "[[airplanes]]\nat_m = [0, 0]\nheading_deg = 0\nway_points_m = [[7000, 0]]\n\
+                       orders = [{ at_s = 10.0, heading_deg = 90.0 }]\n";
+        assert_eq!(compiled(endless).cycles, 400);
+        let track = "[[airplanes]]\ntrack = [[0, 0, 0, 0], [3000, 100000, 0, 0]]\n";
+        assert_eq!(compiled(track).cycles, 1800);
+    }
 }

@@ -209,6 +209,16 @@ impl AirspaceWorld {
         f64::INFINITY
     }
 
+    /// When an airplane would come to its end if it were alone, seconds after the start of the
+    /// run.
+    pub(super) fn ends_alone_s(&self, i: usize) -> f64 {
+        let joins_s = self.starts_s(self.joins_in(i));
+        match &self.airplanes[i].track {
+            Some(track) if track.ends_s() <= joins_s => track.ends_s(),
+            _ => joins_s + self.alone_s[i],
+        }
+    }
+
     /// The turn rate that leads to way-point `next` on the ground, wind allowed for.
     pub(super) fn steer(&self, pilot: &Pilot<'_>, pose: Pose, next: usize) -> f64 {
         let Some(&goal) = pilot.mission.get(next) else { return 0.0 };
