@@ -88,6 +88,22 @@ fn doing_nothing_loses_separation_and_says_so() {
     assert!(metrics.min_separation_m.is_some_and(|d| d < 100.0) && metrics.lost_s > 10.0);
 }
 
+#[test]
+fn streams_meet_where_they_merge() {
+    let lost = |shield: &str| {
+        let text = format!(
+            "format = 1\nworld = \"airspace\"\n[airspace]\nmethod = \"none\"\nshield = \"{shield}\"\n\
+             [airspace.generator]\nkind = \"streams\"\nn = 9\n"
+        );
+        let mut run = run(&Source::new("s", text, ""), 1);
+        run.advance(150);
+        run.airspace_metrics().losses_of_separation
+    };
+    // Three pairs at each of the three places.
+    assert!(lost("off") >= 9, "{}", lost("off"));
+    assert_eq!(lost("on"), 0);
+}
+
 /// Two that meet later than at the start, and may not take 20 kB then.
 #[test]
 fn a_group_too_large_for_memory_is_not_optimized_and_that_is_said() {
