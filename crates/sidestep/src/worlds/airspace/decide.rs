@@ -157,7 +157,7 @@ impl AirspaceWorld {
         contacts: &mut [Contacts],
         scratch: &mut Scratch,
     ) -> Vec<Vec<Action>> {
-        if self.table_bytes(group) > self.group_bytes {
+        if self.group_takes_bytes(group) > self.group_bytes {
             let event = Event::of(now, EventKind::GroupTooLarge, group[0].slot);
             scratch.events.push(event.with(group.len() as f64));
             return group.iter().map(|known| self.straight(*known)).collect();
