@@ -56,6 +56,23 @@ fn a_resumed_or_recorded_run_gives_the_same_bits() {
     assert_eq!(second.ledger(), whole.ledger());
 }
 
+/// Wherever this is run, the bits must be these (D3); a change needs a line in the CHANGELOG
+/// (D4), and the lines that this prints in the file.
+#[test]
+fn the_golden_digests_of_the_super_conflict_are_what_every_machine_gets() {
+    let digest = |preset: &str| {
+        let text = format!(
+            "format = 1\nworld = \"airspace\"\n[airspace]\npreset = \"{preset}\"\n\
+             [airspace.generator]\nkind = \"superconflict\"\nn = 8\n"
+        );
+        let mut run = run(&Source::new("golden", text, ""), 2);
+        run.advance(60);
+        format!("{preset} {}\n", run.digest())
+    };
+    let found = digest("default") + &digest("paper");
+    assert_eq!(found, include_str!("golden/superconflict.txt"), "found:\n{found}");
+}
+
 #[test]
 fn with_the_shield_no_method_loses_separation_and_everybody_arrives() {
     for method in ["pc", "orca", "mvp", "none"] {
