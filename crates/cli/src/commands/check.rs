@@ -28,8 +28,11 @@ pub(crate) struct CheckArgs {
 pub(crate) fn check(args: &CheckArgs, console: Console) -> Result<ExitCode, Failure> {
     let told = worlds::told_of(&args.scenario.file)?;
     let compiled = args.scenario.compile();
-    if let (Err(error), Some(told)) = (&compiled, &told) {
-        // A file of another program may be right and still hold nobody whom we can place.
+    if compiled.is_err()
+        && let (Err(error), Some(told)) = (worlds::translated(&args.scenario.file), &told)
+    {
+        // A file of another program that can be read may be right and still hold nobody whom we
+        // can place. Whatever else is wrong is wrong as in any scenario.
         let mut json = told.json.clone();
         json["airplanes"] = 0.into();
         json["no_scenario"] = error.to_string().into();

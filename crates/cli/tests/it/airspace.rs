@@ -126,6 +126,11 @@ fn a_bluesky_file_is_a_scenario_and_check_counts_its_commands() {
     let nowhere = place.json(&["check", "nowhere.scn"]);
     assert_eq!((&nowhere["airplanes"], &nowhere["commands"]["CRE"]), (&0.into(), &1.into()));
     assert_eq!(place.run(&["run", "nowhere.scn"]).code(), 2);
+    for wrong in ["airspace.method=magic", "airspace.dt_s=-1.0", "airspce.dt_s=1.0"] {
+        let ended = place.run(&["check", "two.scn", "--set", wrong]);
+        assert_eq!((ended.code(), ended.out().as_str()), (2, ""), "{wrong}: {}", ended.err());
+        assert!(ended.err().contains("help: "), "{wrong}: {}", ended.err());
+    }
     let ran = place.json(&["run", "two.scn", "--cycles", "5", "--out", "two"]);
     assert_eq!(ran["metrics"]["airplanes"], 2);
     assert!(place.read("two/scenario.toml").contains("[[airplanes]]"));

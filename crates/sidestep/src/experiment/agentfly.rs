@@ -39,9 +39,9 @@ impl Default for Plan {
 }
 
 impl Plan {
-    /// A rehearsal of seconds.
+    /// A rehearsal of seconds, long enough for airplanes to meet.
     pub fn quick() -> Self {
-        Self { airplanes: vec![2, 3, 5], seeds: 2, cycles: 10, quick: true, ..Self::default() }
+        Self { airplanes: vec![2, 3, 5], seeds: 2, cycles: 60, quick: true, ..Self::default() }
     }
 }
 
@@ -55,6 +55,8 @@ pub struct Cell {
     /// Seconds spent deciding per run, if every agent has a processor of its own: of a team the
     /// time of all agents divided by their number, of a coordinator all of it.
     pub elapsed_s: Estimate,
+    /// The same per optimization.
+    pub optimization_s: Estimate,
     /// Messages, or migrations, per run.
     pub messages: Estimate,
     /// Bytes per run, one message per receiver,
@@ -82,6 +84,10 @@ pub struct Report {
     pub tracks_m: Vec<Vec<AirPoint>>,
 }
 
+/// Time between two optimizations.
+const DT_S: f64 = 5.0;
+/// From so many airplanes on the paper finds its coordinator slow.
+const MANY: usize = 5;
 const BOTH: [Deployment; 2] = [Deployment::Team, Deployment::Pim];
 
 /// Runs the experiments.
@@ -145,6 +151,7 @@ fn begun(
     let text = format!(
         "format = 1\nworld = \"airspace\"\nname = \"Super-conflict\"\nseed = {seed}\n\
          cycles = {}\n[airspace]\npreset = \"paper\"\nshield = \"off\"\ndeployment = \"{}\"\n\
+         dt_s = {DT_S:?}\n\
          [airspace.generator]\nkind = \"superconflict\"\nn = {n}\njitter_m = 0.0\n",
         plan.cycles,
         deployment.name(),
@@ -155,10 +162,12 @@ fn begun(
 fn cell(airplanes: usize, deployment: Deployment, all: &[Metrics]) -> Cell {
     let of = |value: &dyn Fn(&Metrics) -> Option<f64>| Estimate::of(all.iter().map(value));
     let processors = if deployment == Deployment::Team { airplanes as f64 } else { 1.0 };
+    let elapsed_s = |m: &Metrics| Some(m.optimise_cpu_s / processors);
     Cell {
         airplanes,
         deployment: deployment.name(),
-        elapsed_s: of(&|m| Some(m.optimise_cpu_s / processors)),
+        elapsed_s: of(&elapsed_s),
+        optimization_s: of(&|m| Some(elapsed_s(m)? / m.optimisations as f64)),
         messages: of(&|m| Some(m.messages as f64)),
         bytes: of(&|m| Some(m.bytes as f64)),
         multicast_bytes: of(&|m| Some(m.multicast_bytes as f64)),
@@ -168,82 +177,151 @@ fn cell(airplanes: usize, deployment: Deployment, all: &[Metrics]) -> Cell {
     }
 }
 
-/// Team and coordinator at each number of airplanes.
+/// Team and coordinator at each number of airplanes at which either had anything to say.
 fn pairs(cells: &[Cell]) -> impl Iterator<Item = (&Cell, &Cell)> {
-    cells.chunks_exact(2).map(|pair| (&pair[0], &pair[1]))
+    let talks = |cell: &Cell| cell.messages.or_zero() > 0.0;
+    let both = cells.chunks_exact(2).map(|pair| (&pair[0], &pair[1]));
+    both.filter(move |(team, pim)| talks(team) && talks(pim))
+}
+
+type Value = fn(&Cell) -> &Estimate;
+
+/// A value of the coordinator over one of the team, wherever there are both and any.
+fn ratios(cells: &[Cell], of_pim: Value, of_team: Value) -> Vec<f64> {
+    let ratio = |(team, pim): (&Cell, &Cell)| {
+        let (pim, team) = (of_pim(pim).mean?, of_team(team).mean?);
+        (pim > 0.0 && team > 0.0).then_some(pim / team)
+    };
+    pairs(cells).filter_map(ratio).collect()
+}
+
+/// Held if it is so at every number of airplanes; lost if nothing was measured at any.
+fn everywhere(ratios: &[f64], holds: impl Fn(f64) -> bool) -> Verdict {
+    match ratios.iter().all(|ratio| holds(*ratio)) {
+        _ if ratios.is_empty() => Verdict::Lost,
+        true => Verdict::Held,
+        false => Verdict::NotHeld,
+    }
+}
+
+/// Held if each is more than the one before; lost if there are no two.
+fn rising(values: &[f64]) -> Verdict {
+    match values.windows(2).all(|two| two[0] < two[1]) {
+        _ if values.len() < 2 => Verdict::Lost,
+        true => Verdict::Held,
+        false => Verdict::NotHeld,
+    }
+}
+
+/// Numbers one after the other, or that there are none.
+fn listed(values: &[f64]) -> String {
+    match values {
+        [] => "nothing measured".into(),
+        _ => values.iter().map(|v| format!("{v:.2}")).collect::<Vec<_>>().join(", "),
+    }
 }
 
 fn judge(cells: &[Cell]) -> Vec<Claim> {
-    let everywhere = |value: fn(&Cell) -> f64, more: bool| {
-        let holds = |(team, pim): &(&Cell, &Cell)| (value(pim) > value(team)) == more;
-        let holding = pairs(cells).filter(holds).count();
-        let all = pairs(cells).count();
-        let ratios: Vec<String> =
-            pairs(cells).map(|(t, p)| format!("{:.2}", value(p) / value(t))).collect();
-        let verdict = if holding == all { Verdict::Held } else { Verdict::NotHeld };
-        (
-            verdict,
-            format!("pim / team: {}", ratios.join(", ")),
-            format!("{holding} of {all} numbers of airplanes"),
-        )
+    vec![
+        takes_more_time(cells),
+        needs_fewer_messages(cells),
+        moves_far_more_bytes(cells),
+        bytes_grow_faster(cells),
+        multicast_saves(cells),
+        hardly_in_time(cells),
+    ]
+}
+
+fn takes_more_time(cells: &[Cell]) -> Claim {
+    let ratios = ratios(cells, |c| &c.elapsed_s, |c| &c.elapsed_s);
+    Claim {
+        id: "A-1",
+        paper: "pim takes more time than the team (figure 5)",
+        ours: format!("pim / team: {}", listed(&ratios)),
+        verdict: everywhere(&ratios, |ratio| ratio > 1.0),
+        reason: "above 1 at every number of airplanes".into(),
+    }
+}
+
+fn needs_fewer_messages(cells: &[Cell]) -> Claim {
+    let ratios = ratios(cells, |c| &c.messages, |c| &c.messages);
+    Claim {
+        id: "A-2",
+        paper: "pim needs fewer messages than the team (figure 6)",
+        ours: format!("pim / team: {}", listed(&ratios)),
+        verdict: everywhere(&ratios, |ratio| ratio < 1.0),
+        reason: "below 1 at every number of airplanes".into(),
+    }
+}
+
+fn moves_far_more_bytes(cells: &[Cell]) -> Claim {
+    let unicast = ratios(cells, |c| &c.bytes, |c| &c.bytes);
+    let multicast = ratios(cells, |c| &c.bytes, |c| &c.multicast_bytes);
+    Claim {
+        id: "A-3",
+        paper: "pim moves far more bytes than the team (figure 7)",
+        ours: format!(
+            "pim / team: {}; against a team that multicasts: {}",
+            listed(&unicast),
+            listed(&multicast)
+        ),
+        verdict: everywhere(&unicast, |ratio| ratio > 2.0),
+        reason: "far more: more than twice, at every number of airplanes".into(),
+    }
+}
+
+fn bytes_grow_faster(cells: &[Cell]) -> Claim {
+    let ends = |ratios: &[f64]| match ratios {
+        [first, .., last] => vec![*first, *last],
+        _ => Vec::new(),
     };
-    let claim = |id, paper, (verdict, ours, reason): (Verdict, String, String)| Claim {
-        id,
-        paper,
+    let unicast = ends(&ratios(cells, |c| &c.bytes, |c| &c.bytes));
+    let multicast = ends(&ratios(cells, |c| &c.bytes, |c| &c.multicast_bytes));
+    Claim {
+        id: "A-4",
+        paper: "pim's bytes grow faster with the number of airplanes (figure 7)",
+        ours: format!(
+            "pim / team with the fewest and the most airplanes: {}; against a team that \
+             multicasts: {}",
+            listed(&unicast),
+            listed(&multicast)
+        ),
+        verdict: rising(&unicast),
+        reason: "the first ratio rises; the paper does not say which team it counts".into(),
+    }
+}
+
+fn multicast_saves(cells: &[Cell]) -> Claim {
+    let saved = |(team, _): (&Cell, &Cell)| Some(team.bytes.mean? / team.multicast_bytes.mean?);
+    let saved: Vec<f64> = pairs(cells).filter_map(saved).filter(|s| s.is_finite()).collect();
+    Claim {
+        id: "A-5",
+        paper: "multicast saves the team further bandwidth, most with many airplanes",
+        ours: format!("unicast / multicast: {}", listed(&saved)),
+        verdict: rising(&saved),
+        reason: "the ratio rises with every airplane".into(),
+    }
+}
+
+fn hardly_in_time(cells: &[Cell]) -> Claim {
+    let coordinators = pairs(cells).map(|(_, pim)| pim).filter(|pim| pim.airplanes >= MANY);
+    let times_s: Vec<f64> = coordinators.filter_map(|pim| pim.optimization_s.mean).collect();
+    let longest_s = times_s.iter().copied().fold(0.0, f64::max);
+    let (verdict, ours) = match times_s.is_empty() {
+        true => (Verdict::Lost, listed(&[])),
+        false => {
+            let verdict = if longest_s > DT_S { Verdict::Held } else { Verdict::NotHeld };
+            (verdict, format!("at most {:.1} ms per optimization of {DT_S} s", 1e3 * longest_s))
+        }
+    };
+    Claim {
+        id: "A-6",
+        paper: "with five and more airplanes pim can hardly compute the optimum in reasonable time",
         ours,
         verdict,
-        reason,
-    };
-    let bytes = |cell: &Cell| cell.bytes.or_zero();
-    let ratios = |team_bytes: fn(&Cell) -> f64| {
-        let ratio = |(team, pim): (&Cell, &Cell)| bytes(pim) / team_bytes(team);
-        (pairs(cells).next().map_or(0.0, ratio), pairs(cells).last().map_or(0.0, ratio))
-    };
-    let (first, last) = ratios(|cell| cell.bytes.or_zero());
-    let (first_multi, last_multi) = ratios(|cell| cell.multicast_bytes.or_zero());
-    let grows = if last > first { Verdict::Held } else { Verdict::NotHeld };
-    vec![
-        claim(
-            "A-1",
-            "pim takes more time than the team (figure 5)",
-            everywhere(|c| c.elapsed_s.or_zero(), true),
-        ),
-        claim(
-            "A-2",
-            "pim needs fewer messages than the team (figure 6)",
-            everywhere(|c| c.messages.or_zero(), false),
-        ),
-        claim("A-3", "pim moves far more bytes than the team (figure 7)", {
-            let twice = |(team, pim): (&Cell, &Cell)| bytes(pim) >= 2.0 * bytes(team);
-            let (_, ours, _) = everywhere(bytes, true);
-            let multicast = pairs(cells)
-                .map(|(team, pim)| format!("{:.2}", bytes(pim) / team.multicast_bytes.or_zero()));
-            let multicast = multicast.collect::<Vec<_>>().join(", ");
-            let ours = format!("{ours}; against a team that multicasts: {multicast}");
-            let verdict = if pairs(cells).all(twice) { Verdict::Held } else { Verdict::NotHeld };
-            (verdict, ours, "far more: at least twice, at every number of airplanes".into())
-        }),
-        claim(
-            "A-4",
-            "pim's bytes grow faster with the number of airplanes (figure 7)",
-            (
-                grows,
-                format!(
-                    "pim / team: {first:.2} at first, {last:.2} at last; against a team that \
-                     multicasts {first_multi:.2} and {last_multi:.2}"
-                ),
-                "the first ratio rises; the paper does not say which team it counts".into(),
-            ),
-        ),
-        claim("A-5", "multicast saves the team further bandwidth, most with many airplanes", {
-            let saved = |cell: &Cell| cell.bytes.or_zero() / cell.multicast_bytes.or_zero();
-            let teams: Vec<f64> = pairs(cells).map(|(team, _)| saved(team)).collect();
-            let rises = teams.is_sorted() && teams.last() > teams.first();
-            let ours = teams.iter().map(|s| format!("{s:.1}")).collect::<Vec<_>>().join(", ");
-            let verdict = if rises { Verdict::Held } else { Verdict::NotHeld };
-            (verdict, format!("unicast / multicast: {ours}"), "the ratio rises".into())
-        }),
-    ]
+        reason: "an optimization takes longer than the time between two, with any such number"
+            .into(),
+    }
 }
 
 impl Report {
@@ -289,6 +367,7 @@ impl Report {
             "airplanes",
             "deployment",
             "time, s",
+            "per optimization, s",
             "messages",
             "bytes",
             "multicast bytes",
@@ -300,6 +379,7 @@ impl Report {
         for c in &self.cells {
             let numbers = [
                 &c.elapsed_s,
+                &c.optimization_s,
                 &c.messages,
                 &c.bytes,
                 &c.multicast_bytes,
@@ -343,9 +423,46 @@ mod tests {
     #[test]
     fn a_rehearsal_judges_every_claim() {
         let report = run(&Plan::quick(), &mut |_, _| ()).expect("a valid plan");
-        assert_eq!((report.cells.len(), report.claims.len()), (6, 5));
-        assert!(report.to_markdown().contains("| A-2 |"));
+        assert_eq!((report.cells.len(), report.claims.len()), (6, 6));
+        assert!(report.cells.iter().all(|cell| cell.messages.or_zero() > 0.0), "all have met");
+        assert!(report.claims.iter().all(|claim| claim.verdict != Verdict::Lost));
+        assert!(report.to_markdown().contains("| A-6 |"));
         assert_eq!(report.figures().len(), 4);
         assert_eq!(report.figures()[0].series.len(), 5);
+    }
+
+    /// Team and coordinator with the same value everywhere.
+    fn alike(airplanes: usize, value: f64) -> [Cell; 2] {
+        BOTH.map(|deployment| {
+            let same = || Estimate::of([Some(value), Some(value)]);
+            Cell {
+                airplanes,
+                deployment: deployment.name(),
+                elapsed_s: same(),
+                optimization_s: same(),
+                messages: same(),
+                bytes: same(),
+                multicast_bytes: same(),
+                rounds: same(),
+                losses: same(),
+                delay_percent: same(),
+            }
+        })
+    }
+
+    fn verdicts(cells: &[[Cell; 2]]) -> Vec<Verdict> {
+        judge(&cells.concat()).iter().map(|claim| claim.verdict).collect()
+    }
+
+    #[test]
+    fn what_is_equal_is_not_held_and_what_is_not_there_is_lost() {
+        assert_eq!(verdicts(&[alike(5, 5.0), alike(6, 5.0)]), [Verdict::NotHeld; 6]);
+        assert_eq!(verdicts(&[alike(5, 0.0), alike(6, 0.0)]), [Verdict::Lost; 6]);
+        // Numbers of airplanes that never met are left out of all ratios.
+        let some = judge(&[alike(2, 0.0), alike(5, 6.0)].concat());
+        assert_eq!(some[0].ours, "pim / team: 1.00");
+        let verdicts: Vec<Verdict> = some.iter().map(|claim| claim.verdict).collect();
+        use Verdict::{Held, Lost, NotHeld};
+        assert_eq!(verdicts, [NotHeld, NotHeld, NotHeld, Lost, Lost, Held]);
     }
 }

@@ -56,6 +56,23 @@ fn a_resumed_or_recorded_run_gives_the_same_bits() {
     assert_eq!(second.ledger(), whole.ledger());
 }
 
+/// Wherever this is run, the bits must be these (D3); a change needs a line in the CHANGELOG
+/// (D4), and the lines that this prints in the file.
+#[test]
+fn the_golden_digests_of_the_super_conflict_are_what_every_machine_gets() {
+    let digest = |preset: &str| {
+        let text = format!(
+            "format = 1\nworld = \"airspace\"\n[airspace]\npreset = \"{preset}\"\n\
+             [airspace.generator]\nkind = \"superconflict\"\nn = 8\n"
+        );
+        let mut run = run(&Source::new("golden", text, ""), 2);
+        run.advance(60);
+        format!("{preset} {}\n", run.digest())
+    };
+    let found = digest("default") + &digest("paper");
+    assert_eq!(found, include_str!("golden/superconflict.txt"), "found:\n{found}");
+}
+
 #[test]
 fn with_the_shield_no_method_loses_separation_and_everybody_arrives() {
     for method in ["pc", "orca", "mvp", "none"] {
@@ -88,6 +105,22 @@ fn doing_nothing_loses_separation_and_says_so() {
     assert!(metrics.min_separation_m.is_some_and(|d| d < 100.0) && metrics.lost_s > 10.0);
 }
 
+#[test]
+fn streams_meet_where_they_merge() {
+    let lost = |shield: &str| {
+        let text = format!(
+            "format = 1\nworld = \"airspace\"\n[airspace]\nmethod = \"none\"\nshield = \"{shield}\"\n\
+             [airspace.generator]\nkind = \"streams\"\nn = 9\n"
+        );
+        let mut run = run(&Source::new("s", text, ""), 1);
+        run.advance(150);
+        run.airspace_metrics().losses_of_separation
+    };
+    // Three pairs at each of the three places.
+    assert!(lost("off") >= 9, "{}", lost("off"));
+    assert_eq!(lost("on"), 0);
+}
+
 /// Two that meet later than at the start, and may not take 20 kB then.
 #[test]
 fn a_group_too_large_for_memory_is_not_optimized_and_that_is_said() {
@@ -116,6 +149,33 @@ fn wrong_scenarios_are_refused_with_a_remedy() {
             "30 airplanes near each other need",
         ),
         ("[airspace]\ndt_s = 5.0\ndtau_s = 2.0\n", "divides"),
+        ("[airspace]\nmax_rounds = 0\n", "give 1 or more"),
+        ("[airspace]\nestimator = { kind = \"sampled\", block = 0, ageing = 0.7 }\n", "1 to 10000"),
+        (
+            "[airspace]\nestimator = { kind = \"sampled\", block = 10001, ageing = 0.7 }\n",
+            "1 to 10",
+        ),
+        (
+            "[airspace]\nestimator = { kind = \"sampled\", block = 20, ageing = nan }\n",
+            "from 0 to 1",
+        ),
+        (
+            "[airspace]\nestimator = { kind = \"sampled\", block = 20, ageing = 1.5 }\n",
+            "from 0 to 1",
+        ),
+        ("[airspace]\nupdate = { kind = \"brouwer\", step = nan }\n", "above 0 and at most 1"),
+        ("[airspace]\nupdate = { kind = \"nearest-newton\", step = 0.0 }\n", "above 0 and at most"),
+        ("[airspace]\nposition_noise_m = 1e300\n", "give 0 to 1000000"),
+        ("[airspace]\nshield = false\n", "give \"on\" or \"off\""),
+        ("[airspace]\npreset = \"paper\"\nmax_rounds = 4000000000\n", "fewer rounds"),
+        (
+            "[airspace]\npreset = \"paper\"\norder = \"sequence\"\nmax_rounds = 4000\n",
+            "order = \"parallel\"",
+        ),
+        ("[airplane]\nomega_max_deg_s = 1e-9\n", "0.001 to 360"),
+        ("[airplane]\nomega_max_deg_s = 400.0\n", "0.001 to 360"),
+        ("[airplane]\nv_m_s = inf\n", "less than 1e6"),
+        ("[airplane]\nv_m_s = 1e7\n", "less than 1e6"),
         ("[airspace]\nwind_m_s = [40.0, 0.0]\n", "wind"),
         ("[airspace.generator]\nkind = \"random\"\nn = 500\nradius_m = 3000.0\n", "no place"),
         ("", "no airplanes"),

@@ -11,7 +11,7 @@ use super::objective::{Options, game};
 use super::orders::Stage;
 use super::shield::Way;
 use super::world::{AirspaceWorld, Method};
-use crate::collectives::{Estimator, optimize};
+use crate::collectives::{Estimator, Order, optimize};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::math;
 use sidestep_kernel::{Cycle, EntityId, Slot};
@@ -157,7 +157,7 @@ impl AirspaceWorld {
         contacts: &mut [Contacts],
         scratch: &mut Scratch,
     ) -> Vec<Vec<Action>> {
-        if self.table_bytes(group) > self.group_bytes {
+        if self.group_takes_bytes(group) > self.group_bytes {
             let event = Event::of(now, EventKind::GroupTooLarge, group[0].slot);
             scratch.events.push(event.with(group.len() as f64));
             return group.iter().map(|known| self.straight(*known)).collect();
@@ -275,13 +275,17 @@ impl AirspaceWorld {
         Way { omegas_rad_s }
     }
 
-    /// Samples that one optimization may draw per airplane: what a stream holds.
-    pub(super) fn most_samples(&self) -> u64 {
-        match self.settings.estimator {
-            Estimator::Exact => 1,
-            Estimator::Sampled { block, .. } => {
-                block as u64 * u64::from(self.settings.stop.max_rounds)
-            }
-        }
+    /// Numbers that one optimization may draw from an airplane's stream at most; none if that
+    /// is beyond all counting.
+    pub(super) fn most_samples(&self) -> Option<u64> {
+        let Estimator::Sampled { block, .. } = self.settings.estimator else { return Some(1) };
+        let blocks_per_round = match self.settings.order {
+            Order::Parallel => 1,
+            // One at the beginning of a round, and one after each player of the largest group.
+            Order::Sequence => self.airplanes.len() as u64 + 1,
+        };
+        let per_round = (block as u64).checked_mul(blocks_per_round)?;
+        // And the final draw.
+        per_round.checked_mul(self.settings.stop.max_rounds.into())?.checked_add(1)
     }
 }

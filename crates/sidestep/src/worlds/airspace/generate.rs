@@ -93,14 +93,15 @@ fn in_disc(radius_m: f64, draws: &mut Draws) -> Point {
 }
 
 /// Three streams that meet at the centre and go on together; airplanes of a stream follow each
-/// other at four separations, and streams are shifted against each other.
+/// other at four separations, and the first of each stream come to the centre at once, so do the
+/// second, and so on.
 fn converging(order: &Order<'_>, streams: &Streams) -> Vec<Airplane> {
     let spacing_m = 4.0 * order.model.separation_m;
     (0..order.n)
         .map(|k| {
             let (stream, place) = (k % 3, (k / 3) as f64);
             let jitter = order.jitter_m * (2.0 * draws(streams, k).uniform() - 1.0);
-            let behind_m = (place + stream as f64 / 3.0) * spacing_m + jitter;
+            let behind_m = place * spacing_m + jitter;
             let angle = TAU / 2.0 + (stream as f64 - 1.0) * TAU / 12.0;
             let from = on_circle(order.radius_m + behind_m, angle);
             airplane(order, from, vec![[0.0, 0.0], [order.radius_m, 0.0]])

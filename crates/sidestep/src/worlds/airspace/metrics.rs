@@ -51,7 +51,7 @@ pub struct Metrics {
     /// All airplanes.
     pub airplanes: u64,
     /// Mean over those that have arrived: time beyond what the flight takes alone, percent of
-    /// that.
+    /// that. Those whose flight alone would never end are left out.
     pub mean_delay_percent: Option<f64>,
     /// Messages between agents, or migrations of a coordinator; none where one process decides
     /// for all.
@@ -111,7 +111,8 @@ pub struct AirplaneMetrics {
     /// Seconds from its appearance to its arrival, if it has arrived; of a recorded one, from
     /// when it was handed over.
     pub flown_s: Option<f64>,
-    /// Seconds that the flight takes alone; 0 where it flew its recorded way to the end.
+    /// Seconds that the flight takes alone; 0 where it flew its recorded way to the end, infinite
+    /// where it would never end.
     pub alone_s: f64,
     /// Time beyond that, percent of it.
     pub delay_percent: Option<f64>,
@@ -143,9 +144,9 @@ pub struct PairMetrics {
 }
 
 impl AirplaneMetrics {
-    /// Seconds beyond what the flight takes alone.
+    /// Seconds beyond what the flight takes alone; none where alone it would never end.
     pub(super) fn delay_s(&self) -> Option<f64> {
-        self.flown_s.map(|flown_s| flown_s - self.alone_s)
+        self.flown_s.map(|flown_s| flown_s - self.alone_s).filter(|delay_s| delay_s.is_finite())
     }
 }
 
@@ -161,7 +162,7 @@ impl AirspaceWorld {
             flown_s,
             alone_s,
             delay_percent: flown_s
-                .filter(|_| alone_s > 0.0)
+                .filter(|_| alone_s > 0.0 && alone_s.is_finite())
                 .map(|s| 100.0 * (s - alone_s) / alone_s),
             shield_overrides: cell.overrides.get(),
             shield_orbits: cell.orbits.get(),
@@ -244,5 +245,32 @@ impl AirspaceWorld {
     /// Whether everybody has arrived or left by now.
     pub fn is_over(&self, state: &AirspaceState) -> bool {
         state.airplanes.iter().all(|cell| !cell.is_flying())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::scenario::Source;
+    use crate::worlds::airspace::simulation::AirspaceSimulation;
+    use sidestep_kernel::Simulation;
+
+    /// Alone, the first is told to keep a heading before it comes to its way-point. In traffic an
+    /// order may have to wait, and so it may arrive after all.
+    #[test]
+    fn a_flight_that_alone_would_never_end_has_no_delay() {
+        let text = "format = 1\nworld = \"airspace\"\n\
+                    [[airplanes]]\nat_m = [0, 0]\nheading_deg = 0\nway_points_m = [[700, 0]]\n\
+                    orders = [{ at_s = 5.0, heading_deg = 0.0 }]\n\
+                    [[airplanes]]\nat_m = [0, 9000]\nheading_deg = 0\nway_points_m = [[700, 9000]]\n";
+        let source = Source::new("n", text, "");
+        let mut run = AirspaceSimulation::new(&source, 1).expect("a scenario");
+        run.advance(30);
+        let world = run.world();
+        assert_eq!(world.alone_s[0], f64::INFINITY);
+        run.state().airplanes[0].arrived.set(20);
+        let first = world.airplane_metrics(run.state(), 0);
+        assert_eq!((first.flown_s, first.delay_s(), first.delay_percent), (Some(20.0), None, None));
+        let metrics = run.airspace_metrics();
+        assert!(metrics.mean_delay_percent.is_some_and(f64::is_finite), "{metrics:?}");
     }
 }

@@ -17,11 +17,23 @@ use serde::{Deserialize, Serialize};
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{InputError, Seed};
 use std::collections::BTreeSet;
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 use toml::Spanned;
 
 /// Levels that are apart by what is asked for may seem nearer by this when they were rounded.
 const ROUNDED_M: f64 = 1e-6;
+/// A run whose length is not given may take so many cycles,
+const FEWEST_CYCLES: u64 = 400;
+/// or so many times what the last airplane to come in would need alone, if that is more: room for
+/// detours and orbits.
+const TIMES_ALONE: f64 = 3.0;
+/// Larger errors of known positions than this mean nothing.
+const MOST_NOISE_M: f64 = 1e6;
+/// Most samples of a block.
+const MOST_SAMPLES: usize = 10_000;
+/// Turn rates of airplanes, degrees per second: slower ones would make orbits without end.
+const TURNS_DEG_S: RangeInclusive<f64> = 1e-3..=360.0;
 /// Most airplanes of a scenario.
 const MAX_AIRPLANES: usize = 1_000_000;
 
@@ -49,16 +61,6 @@ pub enum Preset {
     Paper,
 }
 
-/// A switch in files.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Switch {
-    /// On.
-    On,
-    /// Off.
-    Off,
-}
-
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct AirspaceFile {
@@ -70,8 +72,7 @@ struct AirspaceFile {
     name: String,
     #[serde(default = "one")]
     seed: u64,
-    #[serde(default = "many_cycles")]
-    cycles: u64,
+    cycles: Option<u64>,
     #[serde(default)]
     airspace: AirspaceSection,
     airplane: Option<Spanned<ModelSection>>,
@@ -85,10 +86,6 @@ fn one() -> u64 {
     1
 }
 
-fn many_cycles() -> u64 {
-    400
-}
-
 fn no_airplanes() -> Spanned<OneOrMany<Spanned<AirplaneSection>>> {
     Spanned::new(0..0, OneOrMany(Vec::new()))
 }
@@ -98,7 +95,7 @@ fn no_airplanes() -> Spanned<OneOrMany<Spanned<AirplaneSection>>> {
 struct AirspaceSection {
     preset: Preset,
     method: Method,
-    shield: Option<Switch>,
+    shield: Option<Spanned<toml::Value>>,
     deployment: Deployment,
     network: Option<Spanned<NetworkSection>>,
     generator: Option<Spanned<GeneratorSection>>,
@@ -111,12 +108,12 @@ struct AirspaceSection {
     inflation: Option<Spanned<f64>>,
     holds_s: Vec<f64>,
     legs: Option<Legs>,
-    estimator: Option<Estimator>,
-    update: Option<Update>,
+    estimator: Option<Spanned<Estimator>>,
+    update: Option<Spanned<Update>>,
     order: Option<Order>,
     utility: Option<Utility>,
     cooling: Option<Spanned<f64>>,
-    max_rounds: Option<u32>,
+    max_rounds: Option<Spanned<u32>>,
     choice: Option<Choice>,
     vertical_m: Option<Spanned<f64>>,
     replay_until_s: Option<Spanned<f64>>,
@@ -246,6 +243,10 @@ impl Compiler<'_> {
             let cause = "a wind or noise that is negative or no number";
             return Err(self.error(None, cause, "give finite values, noise 0 or more"));
         }
+        if section.position_noise_m > MOST_NOISE_M {
+            let cause = format!("position_noise_m = {}", section.position_noise_m);
+            return Err(self.error(None, cause, format!("give 0 to {MOST_NOISE_M}")));
+        }
         let slowest = airplanes.iter().flat_map(speeds_m_s).fold(f64::INFINITY, f64::min);
         let wind = sidestep_kernel::math::hypot(section.wind_m_s[0], section.wind_m_s[1]);
         if wind >= slowest {
@@ -266,7 +267,7 @@ impl Compiler<'_> {
             method: section.method,
             deployment: section.deployment,
             group_bytes: (group_memory_gib * f64::from(1 << 30)) as u64,
-            shield: section.shield != Some(Switch::Off),
+            shield: self.has_shield()?,
             vertical_m,
             replay_cycles: replay.cycles,
             wind_m_s: section.wind_m_s,
@@ -287,17 +288,20 @@ impl Compiler<'_> {
             let remedy = "set order = \"parallel\" and utility = \"joint\", or estimator = { kind = \"exact\" }";
             return Err(self.error(None, cause, remedy));
         }
-        if world.most_samples() > u64::from(u16::MAX) * 4 {
+        if world.most_samples().is_none_or(|most| most > u64::from(u16::MAX) * 4) {
             let cause = "more samples than a random stream holds";
-            return Err(self.error(None, cause, "give smaller blocks or fewer rounds"));
+            let remedy = "give smaller blocks or fewer rounds, or order = \"parallel\": in \
+                          sequence each airplane draws a block anew after every other";
+            return Err(self.error(None, cause, remedy));
         }
         let (fallbacks, too_close) = first(&world);
         world.first_fallbacks.clone_from(&fallbacks);
+        let cycles = self.file.cycles.unwrap_or_else(|| enough_cycles(&world));
         let compiled = Compiled {
             world: Arc::new(world),
             name: self.file.name.clone(),
             seed: self.file.seed,
-            cycles: self.file.cycles,
+            cycles,
             record: self.file.record,
             fallbacks,
             too_close,
@@ -447,18 +451,61 @@ impl Compiler<'_> {
         let choice = if paper { Choice::Draw } else { Choice::Argmax };
         let order = if paper { Order::Parallel } else { Order::Sequence };
         Ok(Settings {
-            estimator: section.estimator.unwrap_or(estimator),
-            update: section.update.unwrap_or(Update::NearestNewton { step: 0.5 }),
+            estimator: self.estimator()?.unwrap_or(estimator),
+            update: self.update()?.unwrap_or(Update::NearestNewton { step: 0.5 }),
             order: section.order.unwrap_or(order),
             utility: section.utility.unwrap_or_default(),
             cooling,
             stop: Stop {
                 threshold: 1e-3,
                 calm_rounds: 3,
-                max_rounds: section.max_rounds.unwrap_or(200),
+                max_rounds: self.max_rounds()?.unwrap_or(200),
             },
             choice: section.choice.unwrap_or(choice),
         })
+    }
+
+    fn has_shield(&self) -> Result<bool, InputError> {
+        let Some(given) = &self.file.airspace.shield else { return Ok(true) };
+        match given.get_ref().as_str() {
+            Some("on") => Ok(true),
+            Some("off") => Ok(false),
+            _ => {
+                let cause = format!("shield = {}", given.get_ref());
+                Err(self.error(Some(given.span()), cause, "give \"on\" or \"off\""))
+            }
+        }
+    }
+
+    fn estimator(&self) -> Result<Option<Estimator>, InputError> {
+        let Some(given) = &self.file.airspace.estimator else { return Ok(None) };
+        if let Estimator::Sampled { block, ageing } = *given.get_ref()
+            && !((1..=MOST_SAMPLES).contains(&block) && (0.0..=1.0).contains(&ageing))
+        {
+            let cause = format!("an estimator with block = {block}, ageing = {ageing}");
+            let remedy = format!("give a block of 1 to {MOST_SAMPLES} samples, ageing from 0 to 1");
+            return Err(self.error(Some(given.span()), cause, remedy));
+        }
+        Ok(Some(*given.get_ref()))
+    }
+
+    fn update(&self) -> Result<Option<Update>, InputError> {
+        let Some(given) = &self.file.airspace.update else { return Ok(None) };
+        let (Update::NearestNewton { step } | Update::Brouwer { step }) = *given.get_ref();
+        if step > 0.0 && step <= 1.0 {
+            return Ok(Some(*given.get_ref()));
+        }
+        let cause = format!("an update with step = {step}");
+        Err(self.error(Some(given.span()), cause, "give a step above 0 and at most 1"))
+    }
+
+    fn max_rounds(&self) -> Result<Option<u32>, InputError> {
+        match &self.file.airspace.max_rounds {
+            Some(given) if *given.get_ref() == 0 => {
+                Err(self.error(Some(given.span()), "max_rounds = 0", "give 1 or more"))
+            }
+            given => Ok(given.as_ref().map(|rounds| *rounds.get_ref())),
+        }
     }
 
     fn legs(&self) -> Result<Legs, InputError> {
@@ -602,19 +649,23 @@ impl Compiler<'_> {
         s: &ModelSection,
         span: Option<std::ops::Range<usize>>,
     ) -> Result<Model, InputError> {
+        let omega_max_deg_s = s.omega_max_deg_s.unwrap_or(4.0);
         let model = Model {
             v_m_s: s.v_m_s.unwrap_or(35.0),
-            omega_max_rad_s: s.omega_max_deg_s.unwrap_or(4.0).to_radians(),
+            omega_max_rad_s: omega_max_deg_s.to_radians(),
             separation_m: s.separation_m.unwrap_or(500.0),
             turns: s.turns.unwrap_or(5),
         };
-        let numbers = [
-            ("v_m_s", model.v_m_s),
-            ("omega_max_deg_s", model.omega_max_rad_s),
-            ("separation_m", model.separation_m),
-        ];
-        if let Some((name, _)) = numbers.iter().find(|(_, v)| !(*v > 0.0 && *v < 1e6)) {
-            return Err(self.error(span, format!("{name} is not positive"), "give more than 0"));
+        let numbers = [("v_m_s", model.v_m_s), ("separation_m", model.separation_m)];
+        if let Some((name, v)) = numbers.iter().find(|(_, v)| !(*v > 0.0 && *v < 1e6)) {
+            let remedy = "give more than 0 and less than 1e6";
+            return Err(self.error(span, format!("{name} = {v}"), remedy));
+        }
+        if !TURNS_DEG_S.contains(&omega_max_deg_s) {
+            let cause = format!("omega_max_deg_s = {omega_max_deg_s}");
+            let remedy =
+                format!("give {} to {} degrees per second", TURNS_DEG_S.start(), TURNS_DEG_S.end());
+            return Err(self.error(span, cause, remedy));
         }
         if model.turns < 3 || model.turns.is_multiple_of(2) || model.turns > 99 {
             let cause = format!("turns = {}", model.turns);
@@ -685,6 +736,13 @@ fn speeds_m_s(airplane: &Airplane) -> impl Iterator<Item = f64> {
     told.chain([airplane.model.v_m_s])
 }
 
+/// Cycles in which everybody should arrive. Flights that never end do not count.
+fn enough_cycles(world: &AirspaceWorld) -> u64 {
+    let ends = (0..world.airplanes.len()).map(|i| world.ends_alone_s(i));
+    let longest_s = ends.filter(|s| s.is_finite()).fold(0.0, f64::max);
+    FEWEST_CYCLES.max((TIMES_ALONE * longest_s / world.timing.dt_s).ceil() as u64)
+}
+
 /// First fallbacks that are apart as far as there are any, and the pairs that are not.
 fn first(world: &AirspaceWorld) -> (Vec<Side>, Vec<(u32, u32)>) {
     let mut sides = vec![Side::default(); world.airplanes.len()];
@@ -709,4 +767,31 @@ fn first(world: &AirspaceWorld) -> (Vec<Side>, Vec<(u32, u32)>) {
     let (chosen, pairs) = first_fallbacks(&flyers);
     starts.iter().zip(chosen).for_each(|(&i, side)| sides[i] = side);
     (sides, pairs.into_iter().map(|(i, j)| (starts[i] as u32, starts[j] as u32)).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn compiled(more: &str) -> Compiled {
+        let text = format!("format = 1\nworld = \"airspace\"\n{more}");
+        Compiled::new(&Source::new("test", text, "")).expect("a scenario")
+    }
+
+    #[test]
+    fn without_a_number_of_cycles_there_are_enough_for_everybody_to_arrive() {
+        let short = "[airspace.generator]\nkind = \"superconflict\"\nn = 2\n";
+        assert_eq!(compiled(short).cycles, 400);
+        assert_eq!(compiled(&format!("cycles = 7\n{short}")).cycles, 7);
+        // 70 km at 35 m/s from 500 s on.
+        let long = "[[airplanes]]\nat_m = [0, 0]\nheading_deg = 0\nway_points_m = [[70000, 0]]\n\
+                    appears_s = 500.0\n";
+        let cycles = compiled(long).cycles;
+        assert!((1495..=1500).contains(&cycles), "{cycles}");
+        let endless = "[[airplanes]]\nat_m = [0, 0]\nheading_deg = 0\nway_points_m = [[7000, 0]]\n\
+                       orders = [{ at_s = 10.0, heading_deg = 90.0 }]\n";
+        assert_eq!(compiled(endless).cycles, 400);
+        let track = "[[airplanes]]\ntrack = [[0, 0, 0, 0], [3000, 100000, 0, 0]]\n";
+        assert_eq!(compiled(track).cycles, 1800);
+    }
 }

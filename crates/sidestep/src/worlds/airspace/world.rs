@@ -187,9 +187,7 @@ impl AirspaceWorld {
         if airplane.track.as_ref().is_some_and(|track| track.ends_s() <= joins_s) {
             return 0.0;
         }
-        if airplane.keeps_a_heading() && airplane.leaves_s == f64::INFINITY {
-            return f64::INFINITY;
-        }
+        let is_endless = airplane.keeps_a_heading() && airplane.leaves_s == f64::INFINITY;
         let mut pose = airplane.track.as_ref().map_or(airplane.start, |t| t.pose_at(joins_s));
         let (mut orders, mut next) = (0, 0);
         for step in 0..ENDLESS_STEPS {
@@ -201,12 +199,26 @@ impl AirspaceWorld {
             if next == mission.len() || joins_s + flown_s >= airplane.leaves_s {
                 return flown_s;
             }
+            // It may come to its end before it is told to keep a heading.
+            if is_endless && orders as usize == airplane.orders.len() {
+                return f64::INFINITY;
+            }
             let pilot = self.pilot(model, mission);
             let omega = self.steer(&pilot, pose, next);
             pose = self.blown(pose.step(model.v_m_s, omega, self.timing.dtau_s));
             next = pilot.next(pose, next);
         }
         f64::INFINITY
+    }
+
+    /// When an airplane would come to its end if it were alone, seconds after the start of the
+    /// run.
+    pub(super) fn ends_alone_s(&self, i: usize) -> f64 {
+        let joins_s = self.starts_s(self.joins_in(i));
+        match &self.airplanes[i].track {
+            Some(track) if track.ends_s() <= joins_s => track.ends_s(),
+            _ => joins_s + self.alone_s[i],
+        }
     }
 
     /// The turn rate that leads to way-point `next` on the ground, wind allowed for.
@@ -306,6 +318,20 @@ mod tests {
             let world = Compiled::new(&Source::new("w", text, "")).expect("a scenario").world;
             prop_assert!(world.alone_s[0] < 3000.0, "{wind:?}: {}", world.alone_s[0]);
         }
+    }
+
+    #[test]
+    fn an_order_after_the_arrival_makes_no_flight_endless() {
+        let alone_s = |at_s: f64| {
+            let text = format!(
+                "format = 1\nworld = \"airspace\"\n[[airplanes]]\nat_m = [0, 0]\n\
+                 heading_deg = 0\nway_points_m = [[3500, 0]]\n\
+                 orders = [{{ at_s = {at_s:?}, heading_deg = 90.0 }}]\n"
+            );
+            Compiled::new(&Source::new("o", text, "")).expect("a scenario").world.alone_s[0]
+        };
+        assert!((90.0..=100.0).contains(&alone_s(500.0)), "{}", alone_s(500.0));
+        assert_eq!(alone_s(50.0), f64::INFINITY);
     }
 
     #[test]
