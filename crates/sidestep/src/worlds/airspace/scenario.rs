@@ -351,7 +351,7 @@ impl Compiler<'_> {
                           or leave [airspace.network] out";
             return Err(self.error(at(), cause, remedy));
         }
-        if self.file.airspace.shield != Some(Switch::Off) && orders_change_safety {
+        if self.has_shield()? && orders_change_safety {
             let cause = "orders of speed or level, over a network that is not to be relied on";
             let remedy = "nobody could be sure who knows of them: leave them out, or \
                           [airspace.network], or set shield = \"off\"";
