@@ -126,6 +126,19 @@ fn a_bluesky_file_is_a_scenario_and_check_counts_its_commands() {
     let nowhere = place.json(&["check", "nowhere.scn"]);
     assert_eq!((&nowhere["airplanes"], &nowhere["commands"]["CRE"]), (&0.into(), &1.into()));
     assert_eq!(place.run(&["run", "nowhere.scn"]).code(), 2);
+    let lost = (1..=7).map(|k| format!("00:00:00.00>CRE X{k},B744,EHAM,RWY18L,90,FL200,250\n"));
+    let settings = "00:00:00.00>ASAS ON\n00:00:00.00>RESO MVP\n00:00:00.00>CDMETHOD STATEBASED\n\
+                    00:00:00.00>DTLOOK 120\n00:00:00.00>CRE A1,B744,0,-0.4,90,FL200,250\n\
+                    00:00:00.00>ADDWPT A1 ARTIP\n00:00:00.00>ADDWPT A1 ARTIP\n";
+    place.write("lost.scn", settings.to_string() + &lost.collect::<String>());
+    let told = place.json(&["check", "lost.scn"]);
+    for name in ["ASAS", "RESO", "CDMETHOD", "DTLOOK"] {
+        assert_eq!(told["not_flown"][name], 1, "{name}: {told}");
+    }
+    assert_eq!(told["unresolved_names"][0], "ARTIP", "{told}");
+    let words = place.run(&["check", "lost.scn"]).out();
+    assert!(words.contains("X5 at EHAM RWY18L and 2 more"), "{words}");
+    assert!(words.contains("unknown way-points") && !words.contains("X6"), "{words}");
     for wrong in ["airspace.method=magic", "airspace.dt_s=-1.0", "airspce.dt_s=1.0"] {
         let ended = place.run(&["check", "two.scn", "--set", wrong]);
         assert_eq!((ended.code(), ended.out().as_str()), (2, ""), "{wrong}: {}", ended.err());

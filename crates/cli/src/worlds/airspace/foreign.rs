@@ -7,7 +7,7 @@ use sidestep::import::bluesky::{self, ScnFile};
 use sidestep::import::traffic::{self, RecordedTraffic};
 use sidestep::kernel::InputError;
 use sidestep::worlds::airspace::traffic::{from_bluesky, from_tracks, has_length, not_flown};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 /// Forms of files, by their names' ends.
@@ -63,14 +63,32 @@ fn told_of_bluesky(scn: &ScnFile) -> Told {
         "not_flown": not_flown(scn),
         "ignored": scn.ignored,
         "unresolved_places": scn.unresolved_places.len(),
+        "unresolved_names": unresolved_names(scn),
+        "aircraft_without_place": without_place(scn),
     });
     let mut lines = vec![("command lines".to_string(), grouped(scn.command_lines))];
     lines.extend(counted("not acted on", &scn.not_understood));
     lines.extend(counted("not flown", &not_flown(scn)));
     lines.extend(counted("display only", &scn.ignored));
+    lines.extend(first_named("left out, place unknown", &without_place(scn)));
+    lines.extend(first_named("unknown way-points", &unresolved_names(scn)));
     lines.extend(listed("unparsed", &scn.unparsed));
     lines.extend(listed("not carried out", &scn.refused));
     Told { json, lines }
+}
+
+/// Aircraft that begin where only a navigation database knows, with the names of these places.
+fn without_place(scn: &ScnFile) -> Vec<String> {
+    let unplaced = scn.traffic.unplaced.iter();
+    unplaced.map(|one| format!("{} at {}", one.aircraft.id, one.place)).collect()
+}
+
+/// Names that the file does not define of places to fly to, each once.
+fn unresolved_names(scn: &ScnFile) -> Vec<String> {
+    let creates = |command: &str| matches!(command, "CRE" | "CREATE");
+    let uses = scn.unresolved_places.iter().filter(|used| !creates(&used.command));
+    let names: BTreeSet<&String> = uses.map(|used| &used.name).collect();
+    names.into_iter().cloned().collect()
 }
 
 fn told_of_tracks(recorded: &RecordedTraffic) -> Told {
@@ -98,6 +116,16 @@ fn told_of_tracks(recorded: &RecordedTraffic) -> Told {
 fn counted(name: &str, counts: &BTreeMap<String, u64>) -> Option<(String, String)> {
     let words: Vec<String> = counts.iter().map(|(name, n)| format!("{name} {n}")).collect();
     (!words.is_empty()).then(|| (name.to_string(), words.join(", ")))
+}
+
+/// The first few names, and how many more there are; no line for none.
+fn first_named(name: &str, all: &[String]) -> Option<(String, String)> {
+    const NAMED: usize = 5;
+    let mut words = all[..all.len().min(NAMED)].join(", ");
+    if all.len() > NAMED {
+        words.push_str(&format!(" and {} more", grouped((all.len() - NAMED) as u64)));
+    }
+    (!all.is_empty()).then(|| (name.to_string(), words))
 }
 
 /// A line per error, which says where in the file it is.

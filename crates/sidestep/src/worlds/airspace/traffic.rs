@@ -44,6 +44,9 @@ pub fn from_bluesky(name: &str, file: &ScnFile) -> Option<String> {
     Some(text)
 }
 
+/// Settings of conflict detection and resolution: here that is the scenario's method.
+const SETTINGS: [&str; 4] = ["ASAS", "CDMETHOD", "DTLOOK", "RESO"];
+
 /// What a BlueSky file tells its aircraft and the scenario leaves out, with counts.
 pub fn not_flown(file: &ScnFile) -> BTreeMap<String, u64> {
     let mut counts = BTreeMap::new();
@@ -54,6 +57,9 @@ pub fn not_flown(file: &ScnFile) -> BTreeMap<String, u64> {
     };
     count("WIND", file.traffic.wind.len());
     count("NOISE ON", usize::from(file.traffic.noise));
+    for name in SETTINGS {
+        count(name, file.commands.get(name).map_or(0, |n| *n as usize));
+    }
     for aircraft in &file.traffic.aircraft {
         let points = &aircraft.way_points;
         count("ADDWPT altitude", points.iter().filter(|p| p.altitude_ft.is_some()).count());

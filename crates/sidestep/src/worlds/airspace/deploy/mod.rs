@@ -12,11 +12,11 @@
 //! - `hierarchical-pim`: a coordinator for each part of the group, and one above them.
 //!
 //! Agents are state machines without input or output of their own: messages in, messages out
-//! ([`link`]). Here they are run on a network in memory ([`network`]), which counts every message
+//! (`link.rs`). Here they are run on a network in memory (`network.rs`), which counts every message
 //! in its serialized form and can lose, delay, double and reorder them, and silence an airplane.
 //! Nobody waits for ever: who is not heard is presumed where it was last heard of ([`contact`]),
 //! and every talk has a deadline. What the shield needs to know goes over the same network
-//! ([`exchange`]).
+//! (`exchange.rs`).
 
 pub mod contact;
 mod exchange;
