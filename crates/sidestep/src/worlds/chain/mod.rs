@@ -1,0 +1,3 @@
+//! The chain world: serpentine motion, manipulators and swarms of rods and connectors.
+
+pub mod kinematics;
