@@ -17,8 +17,11 @@ fn shared_chain(name: &str, tip: Option<&str>) -> Option<SerialChain> {
     Some(chain_of(&model, tip))
 }
 
-/// A robot of a serial chain: kind, xyz, rpy, axis and limits of each joint.
-fn serial(joints: &[(&str, [f64; 3], [f64; 3], [f64; 3], [f64; 2])]) -> SerialChain {
+/// Kind, xyz, rpy, axis and limits of a joint.
+type Row = (&'static str, [f64; 3], [f64; 3], [f64; 3], [f64; 2]);
+
+/// A robot of a serial chain.
+fn serial(joints: &[Row]) -> SerialChain {
     let words = |v: &[f64; 3]| format!("{} {} {}", v[0], v[1], v[2]);
     let mut text = String::from("<robot name='r'><link name='l0'/>");
     for (i, (kind, xyz, rpy, axis, [lower, upper])) in joints.iter().enumerate() {
