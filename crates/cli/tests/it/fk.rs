@@ -78,7 +78,7 @@ fn tips_postures_and_words_for_people() {
 fn wrong_input_is_answered_with_what_would_be_right() {
     let place = place();
     place.write("arm.xacro", ARM);
-    place.write("bad.urdf", &ARM.replace("xyz=\"0 0 1\"", "xyz=\"0 0 0\""));
+    place.write("bad.urdf", ARM.replace("xyz=\"0 0 1\"", "xyz=\"0 0 0\""));
     for (args, reasons) in [
         (&["fk", "arm.urdf", "--joints", "1,2"][..], ["2 values", "shoulder, elbow, slide"]),
         (&["fk", "arm.urdf", "--joints", "1,2,3"], ["`slide`", "0.1 and 0.5"]),
