@@ -209,6 +209,8 @@ fn joint_values_come_back_from_connectors_where_they_are_determined() {
         ("chain/ur5.urdf", None),
         ("chain/snake16_own.urdf", None),
         ("RSNAKE_snake.urdf", None),
+        ("REU_snake.urdf", None),
+        ("z1.urdf", None),
         ("pendulum5.urdf", None),
     ];
     for (name, tip) in arms {
