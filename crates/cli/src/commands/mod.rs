@@ -4,6 +4,7 @@ mod check;
 mod compare;
 mod exact;
 mod finish;
+mod fk;
 mod learn;
 mod map;
 mod new;
@@ -33,6 +34,8 @@ pub(crate) enum Command {
     Exact(exact::ExactArgs),
     /// Run methods of avoiding each other on the same traffic
     Compare(compare::CompareArgs),
+    /// Compute where a robot arm's tip and connectors are
+    Fk(fk::FkArgs),
     /// Continue a recorded run that was stopped or killed
     Resume(resume::ResumeArgs),
     /// Run a paper's experiments anew and judge its claims
@@ -54,6 +57,7 @@ pub(crate) fn execute(command: Command, console: &Console) -> Result<ExitCode, F
         Command::Learn(args) => learn::learn(&args, *console),
         Command::Exact(args) => exact::exact(&args, *console),
         Command::Compare(args) => compare::compare(&args, *console),
+        Command::Fk(args) => fk::fk(&args, *console),
         Command::Resume(args) => resume::resume(&args, *console),
         Command::Reproduce(args) => reproduce::reproduce(&args, *console),
         Command::Replay(args) => replay::replay(&args, *console),

@@ -6,6 +6,7 @@ mod contract;
 mod determinism;
 mod disk;
 mod exact;
+mod fk;
 mod help;
 mod input;
 mod learn;

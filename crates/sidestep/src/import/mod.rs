@@ -20,6 +20,8 @@ pub mod rosmap;
 mod rows;
 pub mod table;
 pub mod traffic;
+pub mod urdf;
+mod xml;
 
 #[cfg(test)]
 mod shared_data;

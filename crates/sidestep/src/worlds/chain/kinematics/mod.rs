@@ -1,0 +1,34 @@
+//! Arms as chains of rods: forward kinematics, connectors from joint axes, and joint values back
+//! from connectors.
+//!
+//! ```text
+//! pose        vectors, rotations and frames
+//! serial      model -> joints from base to tip, their values and limits; forward kinematics
+//! skeleton    joint axes -> connectors and rods
+//! bend        joint limits -> bend limits, where one joint alone bends a connector
+//! recover     connectors -> joint values
+//! ```
+//!
+//! A **connector** of an arm is a point that is fixed in two or more links at once: where axes
+//! meet, or the foot of their common perpendicular. The origins that a URDF gives its joints are
+//! not such points; they may lie anywhere on an axis. Two connectors that are fixed in a common
+//! link have a constant distance: a rod of fixed length. Two on either side of a prismatic joint
+//! have the distance sqrt(offset^2 + (a + q)^2): a rod of variable length.
+//!
+//! A point says nothing about the twist of a rod about itself. [`recover`](SerialChain::recover)
+//! says which joints that leaves open, and refuses with a reason where points do not determine
+//! the joints at all.
+
+mod bend;
+mod pose;
+mod recover;
+mod serial;
+mod skeleton;
+#[cfg(test)]
+mod tests;
+
+pub use bend::BendLimit;
+pub use pose::{Pose, Vector};
+pub use recover::{RecoverError, Recovered};
+pub use serial::{Frames, Motion, SerialChain, Variable};
+pub use skeleton::{Rod, Skeleton};
