@@ -1,0 +1,34 @@
+//! Chains of connectors and rods that creep among obstacles.
+//!
+//! Source: "Serpentine motion" (Birbilis and Aspragathos, 2005); the design page says where and
+//! why this world does otherwise. One code for two and three dimensions.
+//!
+//! ```text
+//! chain.rs, obstacle.rs: what there is          geometry.rs: points and distances
+//! veto.rs: requests and outcomes                rules.rs: named options
+//! propagate.rs -> candidates.rs -> scene.rs     one motion: sweeps, a slave's choices, their judge
+//!                 interval.rs, search.rs        free directions: exact in the plane, searched in space
+//!                 sweep.rs, own_body.rs         nothing is passed through; the chain's own parts
+//! ```
+
+mod candidates;
+pub mod chain;
+pub mod geometry;
+pub mod interval;
+pub mod obstacle;
+mod own_body;
+pub mod propagate;
+pub mod rules;
+mod scene;
+#[cfg(test)]
+mod scenes;
+mod search;
+pub mod sweep;
+pub mod veto;
+
+pub use chain::{Chain, Connector, Mobility, Rod};
+pub use obstacle::{Obstacle, Obstacles};
+pub use propagate::Propagator;
+pub use rules::{Rotation, Rules};
+pub use scene::{BEND_TOLERANCE_RAD, SKIN_M, TOLERANCE_M};
+pub use veto::{Mode, Motion, Moved, Outcome, Reason, Request, Source, Veto};
