@@ -26,7 +26,9 @@ pub(super) struct Candidate<const D: usize> {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Work<const D: usize> {
     blocks: Vec<Block<D>>,
-    arcs: Vec<Arc>,
+    arcs: Arcs,
+    /// Whether a rod that turns tries all its lengths, or others only where its own is blocked.
+    pub(super) all_lengths: bool,
     /// What [`Scene::candidates`] found, best first.
     pub(super) found: Vec<Candidate<D>>,
 }
@@ -176,7 +178,9 @@ impl<const D: usize> Scene<'_, D> {
         let mut why = None;
         let mut inside = None;
         for &length_m in &lengths_m[..n] {
-            inside = inside.or(self.turns(step, length_m, work, &mut why));
+            if work.found.is_empty() || work.all_lengths {
+                inside = inside.or(self.turns(step, length_m, work, &mut why));
+            }
         }
         sort(step, &mut work.found);
         if !work.found.is_empty() {
@@ -194,7 +198,7 @@ impl<const D: usize> Scene<'_, D> {
         why: &mut Option<Refusal>,
     ) -> Option<Refusal> {
         let u0 = guide_line(step);
-        let Work { blocks, arcs, found } = work;
+        let Work { blocks, arcs, found, .. } = work;
         let mut add = |u: Point<D>| {
             let at = along(step.mn, u, length_m);
             match self.judge_place(step, at) {
@@ -212,11 +216,12 @@ impl<const D: usize> Scene<'_, D> {
             }
         };
         if D == 2 {
-            let inside = plane_arcs(step, length_m, blocks, arcs);
-            for u in nearest_free(arcs, u0).into_iter().flatten() {
+            let plane = Plane { step, length_m, u0: plane(u0), blocks };
+            let free = plane.nearest_free(arcs);
+            for u in free.into_iter().flatten() {
                 add(u);
             }
-            return inside;
+            return arcs.inside;
         }
         // A master inside something cannot turn out of it.
         let mut inside = None;
@@ -262,45 +267,94 @@ fn sort<const D: usize>(step: &Step<D>, found: &mut [Candidate<D>]) {
     });
 }
 
-/// Fills `arcs` with all blocked directions; returns what the master is inside of.
-fn plane_arcs<const D: usize>(
-    step: &Step<D>,
+/// Blocked directions, as far as anybody asked.
+#[derive(Debug, Clone, Default)]
+struct Arcs {
+    arcs: Vec<Arc>,
+    /// Of which blocks the arcs are there.
+    known: Vec<bool>,
+    /// What the master is inside of.
+    inside: Option<Refusal>,
+}
+
+/// A plane rod of one length that looks for a free direction near `u0`.
+struct Plane<'a, const D: usize> {
+    step: &'a Step<D>,
     length_m: f64,
-    blocks: &[Block<D>],
-    arcs: &mut Vec<Arc>,
-) -> Option<Refusal> {
-    arcs.clear();
-    let reach = Reach { master: plane(step.mn), length_m };
-    let mut inside = None;
-    for block in blocks {
+    u0: Point<2>,
+    blocks: &'a [Block<D>],
+}
+
+impl<const D: usize> Plane<'_, D> {
+    /// The nearest free directions to the left and to the right.
+    ///
+    /// Only blocks that are met on the way are turned into arcs: the first direction that is in
+    /// no arc, and where the rod meets no other block, is the first that is in no arc of any.
+    fn nearest_free(&self, known: &mut Arcs) -> [Option<Point<D>>; 2] {
+        known.arcs.clear();
+        known.known.clear();
+        known.known.resize(self.blocks.len(), false);
+        known.inside = None;
+        let step = self.step;
+        if let Some(prev) = step.prev.filter(|_| step.max_bend_rad < PI) {
+            known.arcs.push(beyond_bend(plane(sub(step.mn, prev)), step.max_bend_rad));
+        }
+        [Side::Left, Side::Right].map(|side| {
+            let u = self.first_free(side, known)?;
+            Some(std::array::from_fn(|i| u[i]))
+        })
+    }
+
+    fn first_free(&self, side: Side, known: &mut Arcs) -> Option<Point<2>> {
+        let start_rad = interval::direction_rad(self.u0);
+        loop {
+            let turn_rad = least_turn_rad(&known.arcs, start_rad, side)?;
+            let u = interval::turned(self.u0, turn_rad, side);
+            if !self.learns(u, known) {
+                return Some(u);
+            }
+        }
+    }
+
+    /// Adds the arcs of all blocks that a rod in a direction meets; whether there were any.
+    fn learns(&self, u: Point<2>, known: &mut Arcs) -> bool {
+        let u: Point<D> = std::array::from_fn(|i| u[i]);
+        let s = along(self.step.mn, u, self.length_m);
+        let mut learns = false;
+        for (k, block) in self.blocks.iter().enumerate() {
+            if !known.known[k] && self.meets(s, block) {
+                known.known[k] = true;
+                self.block(block, known);
+                learns = true;
+            }
+        }
+        learns
+    }
+
+    fn meets(&self, s: Point<D>, block: &Block<D>) -> bool {
+        let near_m = block.radius_m + 2.0 * SKIN_M;
+        let rod = [self.step.mn, s];
+        block.stops_rod && !block.core.is_clear_of_segment(rod, near_m + self.step.rod.radius_m)
+            || block.stops_tip && !block.core.is_clear_of_point(s, near_m + self.step.tip_radius_m)
+    }
+
+    /// All directions that one block blocks.
+    fn block(&self, block: &Block<D>, known: &mut Arcs) {
+        let step = self.step;
+        let reach = Reach { master: plane(step.mn), length_m: self.length_m };
         let core = plane_core(&block.core);
         let apart_m = core.nearest_to_point(reach.master).distance_m;
         let rod_m = block.radius_m + step.rod.radius_m;
         // Within the skin of a surface the master blocks the half-plane behind it.
         let skinned_m = if apart_m >= rod_m { (rod_m + SKIN_M).min(apart_m) } else { rod_m };
-        if block.stops_rod && !block_rod(&reach, &core, skinned_m, arcs) {
-            inside = inside.or(Some(Refusal::by(Reason::Inside, block.name)));
+        if block.stops_rod && !block_rod(&reach, &core, skinned_m, &mut known.arcs) {
+            known.inside = known.inside.or(Some(Refusal::by(Reason::Inside, block.name)));
         }
         if block.stops_tip && (!block.stops_rod || step.tip_radius_m > step.rod.radius_m) {
             let tip_m = block.radius_m + step.tip_radius_m + SKIN_M;
-            block_tip(&reach, &core, tip_m, arcs);
+            block_tip(&reach, &core, tip_m, &mut known.arcs);
         }
     }
-    if let Some(prev) = step.prev.filter(|_| step.max_bend_rad < PI) {
-        arcs.push(beyond_bend(plane(sub(step.mn, prev)), step.max_bend_rad));
-    }
-    inside
-}
-
-/// The nearest free directions to the left and to the right.
-fn nearest_free<const D: usize>(arcs: &[Arc], u0: Point<D>) -> [Option<Point<D>>; 2] {
-    let u0 = plane(u0);
-    let start_rad = interval::direction_rad(u0);
-    [Side::Left, Side::Right].map(|side| {
-        let turn_rad = least_turn_rad(arcs, start_rad, side)?;
-        let u = interval::turned(u0, turn_rad, side);
-        Some(std::array::from_fn(|i| u[i]))
-    })
 }
 
 fn plane<const D: usize>(p: Point<D>) -> Point<2> {

@@ -260,10 +260,6 @@ impl<const D: usize> Chain<D> {
         0.25 * self.still.least_m
     }
 
-    pub(super) fn longest_rod_m(&self) -> f64 {
-        self.still.longest_m
-    }
-
     /// Whether every connector is free and bends at will.
     pub fn is_plain(&self) -> bool {
         self.special == 0
@@ -282,16 +278,6 @@ impl<const D: usize> Chain<D> {
         check_mobility(i, &mobility)?;
         self.change(i, |c| c.mobility = mobility);
         Ok(())
-    }
-
-    pub(super) fn release(&mut self, i: usize) -> Mobility<D> {
-        let was = self.connectors[i].mobility;
-        self.change(i, |c| c.mobility = Mobility::Free);
-        was
-    }
-
-    pub(super) fn hold(&mut self, i: usize, mobility: Mobility<D>) {
-        self.change(i, |c| c.mobility = mobility);
     }
 
     /// Gives a connector another bend limit, in (0, pi].

@@ -9,15 +9,20 @@
 //! propagate.rs -> candidates.rs -> scene.rs     one motion: sweeps, a slave's choices, their judge
 //!                 interval.rs, search.rs        free directions: exact in the plane, searched in space
 //!                 sweep.rs, own_body.rs         nothing is passed through; the chain's own parts
+//! reach.rs: an arm with a fixed base
+//! wavefront.rs: many motions at once            rebuild.rs: broken chains
 //! ```
 
 mod candidates;
+#[expect(clippy::module_inception, reason = "the chain itself, of the world of chains")]
 pub mod chain;
 pub mod geometry;
 pub mod interval;
 pub mod obstacle;
 mod own_body;
 pub mod propagate;
+pub mod reach;
+pub mod rebuild;
 pub mod rules;
 mod scene;
 #[cfg(test)]
@@ -25,6 +30,7 @@ mod scenes;
 mod search;
 pub mod sweep;
 pub mod veto;
+pub mod wavefront;
 
 pub use chain::{Chain, Connector, Mobility, Rod};
 pub use obstacle::{Obstacle, Obstacles};

@@ -66,6 +66,11 @@ impl<const D: usize> Heads<D> {
     fn indices(&self) -> std::ops::Range<usize> {
         self.first..self.first + self.n
     }
+
+    /// Where they are.
+    fn places(&self, chain: &Chain<D>) -> [Point<D>; 2] {
+        [chain.points()[self.first], chain.points()[self.first + self.n - 1]]
+    }
 }
 
 /// An objection and who raised it.
@@ -90,7 +95,7 @@ impl<const D: usize> Propagator<D> {
     ) -> Result<Outcome<D>, InputError> {
         let mut heads = Heads::of(&request.motion);
         check(chain, &heads)?;
-        let from = self.from_of(chain, &heads);
+        let from = heads.places(chain);
         self.tally = Tally::default();
         self.before.start(chain.points().len(), heads.first);
         if let Some(reason) = self.project(chain, &mut heads, request.mode) {
@@ -107,10 +112,6 @@ impl<const D: usize> Propagator<D> {
             }
         }
         Ok(Outcome::Moved(self.moved(None)))
-    }
-
-    fn from_of(&self, chain: &Chain<D>, heads: &Heads<D>) -> [Point<D>; 2] {
-        [chain.points()[heads.first], chain.points()[heads.first + heads.n - 1]]
     }
 
     /// Brings the targets to where the heads may be; the reason where that is not enough.
@@ -198,8 +199,8 @@ impl<const D: usize> Propagator<D> {
         self.place_heads(chain, obstacles, &heads)?;
         let rotated = self.tally.rotated;
         let followed = self
-            .follow(chain, obstacles, heads.first + heads.n - 1, Direction::Up)
-            .and_then(|()| self.follow(chain, obstacles, heads.first, Direction::Down));
+            .sweep(chain, obstacles, heads.first + heads.n - 1, Direction::Up)
+            .and_then(|()| self.sweep(chain, obstacles, heads.first, Direction::Down));
         match followed {
             Ok(()) => self.commit(chain, &heads),
             Err(_) => self.tally.rotated = rotated,
@@ -238,6 +239,28 @@ impl<const D: usize> Propagator<D> {
     fn scene<'a>(&'a self, chain: &'a Chain<D>, obstacles: &'a Obstacles<D>) -> Scene<'a, D> {
         let Self { rules, overlay, own, .. } = self;
         Scene { chain, obstacles, rules, overlay, own }
+    }
+
+    /// From a head outward. Rods keep their lengths when they turn, which is cheap and nearly
+    /// always enough; where that ends in a veto, all over again with every length they may have.
+    fn sweep(
+        &mut self,
+        chain: &Chain<D>,
+        obstacles: &Obstacles<D>,
+        head: usize,
+        direction: Direction,
+    ) -> Result<(), Objection> {
+        let rotated = self.tally.rotated;
+        self.work.all_lengths = false;
+        let followed = self.follow(chain, obstacles, head, direction);
+        let Some(first) = direction.next(head, chain.points().len()) else { return followed };
+        if followed.is_ok() || self.rules.rotation != Rotation::Union {
+            return followed;
+        }
+        self.take_back(chain, first, direction);
+        self.tally.rotated = rotated;
+        self.work.all_lengths = true;
+        self.follow(chain, obstacles, head, direction)
     }
 
     /// From a head outward, until a slave need not move or the chain ends.

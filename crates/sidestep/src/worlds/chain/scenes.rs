@@ -6,6 +6,7 @@ use super::obstacle::{Obstacle, Obstacles};
 use sidestep_kernel::Seed;
 use sidestep_kernel::math::{cos, sin};
 use sidestep_kernel::stream::{Purpose, Streams};
+use std::f64::consts::PI;
 
 /// Numbers in [0, 1) by (seed, index).
 pub(super) struct Numbers {
@@ -123,7 +124,7 @@ pub(super) fn ball_field<const D: usize>(
     keep_m: f64,
 ) -> Vec<Obstacle<D>> {
     let mut numbers = Numbers::new(seed);
-    let ball_size = if D == 2 { 3.141_592 } else { 4.188_79 * radius_m } * radius_m * radius_m;
+    let ball_size = if D == 2 { PI } else { 4.0 / 3.0 * PI * radius_m } * radius_m * radius_m;
     let n = (part * (0..D).fold(1.0, |v, _| v * 2.0 * half_m) / ball_size) as u32;
     (0..n)
         .map(|id| Obstacle::ball(id, numbers.point(half_m), radius_m))
