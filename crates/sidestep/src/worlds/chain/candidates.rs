@@ -1,0 +1,412 @@
+//! Where a slave may go when its master has moved: push, pull, resize, rotate (slides A1 to A8).
+
+use super::chain::{Mobility, Rod};
+use super::geometry::{
+    Core, Cuboid, Point, add, along, angle_rad, between, distance, dot, first_axis, norm, scaled,
+    sub, unit,
+};
+use super::interval::{self, Arc, Reach, Side, beyond_bend, block_rod, block_tip, least_turn_rad};
+use super::obstacle::around;
+use super::rules::Rotation;
+use super::scene::{Block, Refusal, SKIN_M, Scene, Step, fits};
+use super::search::{Search, away, cosine_of_half_angle};
+use super::veto::Reason;
+use std::f64::consts::PI;
+
+/// A place for a slave.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Candidate<const D: usize> {
+    pub(super) at: Point<D>,
+    /// Whether the rod turned from the guide line.
+    pub(super) rotated: bool,
+    turn_rad: f64,
+}
+
+/// Buffers that live from one slave to the next.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Work<const D: usize> {
+    blocks: Vec<Block<D>>,
+    arcs: Arcs,
+    /// Whether a rod that turns tries all its lengths, or others only where its own is blocked.
+    pub(super) all_lengths: bool,
+    /// What [`Scene::candidates`] found, best first.
+    pub(super) found: Vec<Candidate<D>>,
+}
+
+/// The push, pull or resize of one rod: the slave's new place, bit-identical where it stays.
+#[inline]
+pub(super) fn guided<const D: usize>(
+    [mo, mn, so]: [Point<D>; 3],
+    rod: Rod,
+    least_move_m: f64,
+) -> Point<D> {
+    let g = sub(so, mn);
+    let d = norm(g);
+    let t = d.max(rod.min_m).min(rod.max_m);
+    if (t - d).abs() <= least_move_m {
+        so
+    } else if d > 0.0 {
+        along(mn, g, t / d)
+    } else {
+        along(mn, unit(sub(so, mo)).unwrap_or(first_axis()), t)
+    }
+}
+
+/// Direction of the guide line (A1); that of the old rod where the master is at the slave's place.
+fn guide_line<const D: usize>(step: &Step<D>) -> Point<D> {
+    unit(sub(step.so, step.mn)).or(unit(sub(step.so, step.mo))).unwrap_or(first_axis())
+}
+
+impl<const D: usize> Scene<'_, D> {
+    /// All good places for a slave, best first, into `work.found`: the one on the guide line
+    /// alone if it is good.
+    pub(super) fn candidates(&self, step: &Step<D>, work: &mut Work<D>) -> Result<(), Refusal> {
+        work.found.clear();
+        let connector = &self.chain.connectors()[step.slave];
+        if connector.is_still() {
+            return self.stay(step, work);
+        }
+        if matches!(connector.mobility, Mobility::OnSegment(_) | Mobility::OnPlane { .. }) {
+            return self.on_its_line(step, work);
+        }
+        let guided = guided([step.mo, step.mn, step.so], step.rod, self.chain.least_move_m());
+        let refusal = match self.judge_place(step, guided) {
+            Ok(()) => {
+                work.found.push(Candidate { at: guided, rotated: false, turn_rad: 0.0 });
+                return Ok(());
+            }
+            Err(refusal) => refusal,
+        };
+        match self.rules.rotation {
+            Rotation::Never => Err(refusal),
+            Rotation::Literal => self.rotate_once(step, guided, work),
+            Rotation::Union => self.rotate(step, guided, refusal, work),
+        }
+    }
+
+    fn judge_place(&self, step: &Step<D>, at: Point<D>) -> Result<(), Refusal> {
+        if !self.may_be_at(step.slave, at) {
+            return Err(Refusal::of(Reason::Mobility));
+        }
+        self.judge(step, at)
+    }
+
+    /// A slave that never moves: it objects unless the rod is good as it is.
+    fn stay(&self, step: &Step<D>, work: &mut Work<D>) -> Result<(), Refusal> {
+        let has_failed = self.chain.connectors()[step.slave].failed;
+        if !fits(step.rod, distance(step.mn, step.so)) {
+            return Err(Refusal::of(if has_failed { Reason::Failed } else { Reason::Fixed }));
+        }
+        self.judge(step, step.so)?;
+        work.found.push(Candidate { at: step.so, rotated: false, turn_rad: 0.0 });
+        Ok(())
+    }
+
+    /// A slave on a line or in a plane: the nearest places there that the rod allows.
+    fn on_its_line(&self, step: &Step<D>, work: &mut Work<D>) -> Result<(), Refusal> {
+        let d = distance(step.mn, step.so);
+        let t = d.max(step.rod.min_m).min(step.rod.max_m);
+        let places = if (t - d).abs() <= self.chain.least_move_m() {
+            [Some(step.so), None]
+        } else {
+            match self.chain.connectors()[step.slave].mobility {
+                Mobility::OnSegment(ends) => on_segment_at(step.mn, t, ends),
+                Mobility::OnPlane { normal, offset_m } => {
+                    on_plane_at(step.mn, t, step.so, normal, offset_m)
+                }
+                _ => [None; 2],
+            }
+        };
+        let mut refusal = Refusal::of(Reason::Mobility);
+        for at in places.into_iter().flatten() {
+            match self.judge(step, at) {
+                Ok(()) => work.found.push(Candidate { at, rotated: false, turn_rad: 0.0 }),
+                Err(objection) => refusal = objection,
+            }
+        }
+        sort(step, &mut work.found);
+        if work.found.is_empty() { Err(refusal) } else { Ok(()) }
+    }
+
+    /// The slides' rule, literally: one turn to the tangent of what is hit nearest the master.
+    fn rotate_once(
+        &self,
+        step: &Step<D>,
+        guided: Point<D>,
+        work: &mut Work<D>,
+    ) -> Result<(), Refusal> {
+        self.collect(step, distance(step.mn, guided), work);
+        let rod = [step.mn, guided];
+        let hit = work
+            .blocks
+            .iter()
+            .map(|b| (b.core.nearest_to_segment(rod), b.radius_m + step.rod.radius_m))
+            .filter(|(nearest, radius_m)| nearest.distance_m < *radius_m)
+            .min_by(|(a, _), (b, _)| {
+                distance(a.on_body, step.mn).total_cmp(&distance(b.on_body, step.mn))
+            });
+        let length_m = distance(step.mn, guided);
+        let at = hit
+            .and_then(|(nearest, radius_m)| {
+                let to = sub(nearest.on_core, step.mn);
+                let cosine = cosine_of_half_angle(norm(to), radius_m, length_m, false)?;
+                let u = away(guide_line(step), unit(to)?, cosine);
+                Some(along(step.mn, u, length_m))
+            })
+            .unwrap_or(guided);
+        if !self.may_be_at(step.slave, at) {
+            return Err(Refusal::of(Reason::Mobility));
+        }
+        work.found.push(Candidate { at, rotated: true, turn_rad: 0.0 });
+        Ok(())
+    }
+
+    /// The union rule: for the rod's length, and for others it may have, the nearest directions
+    /// that are free of everything.
+    fn rotate(
+        &self,
+        step: &Step<D>,
+        guided: Point<D>,
+        refusal: Refusal,
+        work: &mut Work<D>,
+    ) -> Result<(), Refusal> {
+        let Rod { min_m, max_m, .. } = step.rod;
+        self.collect(step, max_m, work);
+        let own_m = distance(step.mn, guided);
+        let lengths_m = [own_m, min_m, max_m, 0.5 * (min_m + max_m)];
+        let n = if min_m < max_m { 4 } else { 1 };
+        let mut why = None;
+        let mut inside = None;
+        for &length_m in &lengths_m[..n] {
+            if work.found.is_empty() || work.all_lengths {
+                inside = inside.or(self.turns(step, length_m, work, &mut why));
+            }
+        }
+        sort(step, &mut work.found);
+        if !work.found.is_empty() {
+            return Ok(());
+        }
+        Err(why.or(inside).unwrap_or(refusal))
+    }
+
+    /// Adds the good places for one length of the rod; returns what the master is inside of.
+    fn turns(
+        &self,
+        step: &Step<D>,
+        length_m: f64,
+        work: &mut Work<D>,
+        why: &mut Option<Refusal>,
+    ) -> Option<Refusal> {
+        let u0 = guide_line(step);
+        let Work { blocks, arcs, found, .. } = work;
+        let mut add = |u: Point<D>| {
+            let at = along(step.mn, u, length_m);
+            match self.judge_place(step, at) {
+                Ok(()) => {
+                    found.push(Candidate { at, rotated: true, turn_rad: angle_rad(u0, u) });
+                    true
+                }
+                Err(refusal) => {
+                    // What speaks against a free direction says more than that the first was not.
+                    if !matches!(refusal.reason, Reason::BothSidesBlocked | Reason::BendLimit) {
+                        *why = why.or(Some(refusal));
+                    }
+                    false
+                }
+            }
+        };
+        if D == 2 {
+            let plane = Plane { step, length_m, u0: plane(u0), blocks };
+            let free = plane.nearest_free(arcs);
+            for u in free.into_iter().flatten() {
+                add(u);
+            }
+            return arcs.inside;
+        }
+        // A master inside something cannot turn out of it.
+        let mut inside = None;
+        blocks.sort_by_key(|b| !contains_master(step, b));
+        let n_inside = blocks.partition_point(|b| contains_master(step, b));
+        if let Some(block) = blocks[..n_inside].first() {
+            inside = Some(Refusal::by(Reason::Inside, block.name));
+        }
+        let search = Search { step, length_m, blocks: &blocks[n_inside..] };
+        let turned = search.turn_away(u0);
+        if !turned.is_some_and(&mut add) {
+            let is_good = |u| self.judge_place(step, along(step.mn, u, length_m)).is_ok();
+            if let Some(u) = search.rings(u0, is_good) {
+                add(u);
+            }
+        }
+        inside
+    }
+
+    /// All that a rod of a length may meet on any side, in a fixed order.
+    fn collect(&self, step: &Step<D>, length_m: f64, work: &mut Work<D>) {
+        let reach_m = length_m + step.rod.radius_m.max(step.tip_radius_m) + 2.0 * SKIN_M;
+        work.blocks.clear();
+        let rod = step.master.min(step.slave);
+        self.visit_blocks(&around(step.mn, reach_m), (Some(rod), step.slave), |block| {
+            work.blocks.push(*block);
+        });
+        // Ties go to the lower name, wherever the grid or the tree found it first.
+        work.blocks.sort_by_key(|b| b.name);
+    }
+}
+
+fn contains_master<const D: usize>(step: &Step<D>, block: &Block<D>) -> bool {
+    let radius_m = block.radius_m + step.rod.radius_m;
+    block.stops_rod && block.core.nearest_to_point(step.mn).distance_m < radius_m
+}
+
+fn sort<const D: usize>(step: &Step<D>, found: &mut [Candidate<D>]) {
+    // Stable: of equals the one found first stays first, which is the counter-clockwise one.
+    found.sort_by(|a, b| {
+        let way = |c: &Candidate<D>| distance(c.at, step.so);
+        way(a).total_cmp(&way(b)).then(a.turn_rad.total_cmp(&b.turn_rad))
+    });
+}
+
+/// Blocked directions, as far as anybody asked.
+#[derive(Debug, Clone, Default)]
+struct Arcs {
+    arcs: Vec<Arc>,
+    /// Of which blocks the arcs are there.
+    known: Vec<bool>,
+    /// What the master is inside of.
+    inside: Option<Refusal>,
+}
+
+/// A plane rod of one length that looks for a free direction near `u0`.
+struct Plane<'a, const D: usize> {
+    step: &'a Step<D>,
+    length_m: f64,
+    u0: Point<2>,
+    blocks: &'a [Block<D>],
+}
+
+impl<const D: usize> Plane<'_, D> {
+    /// The nearest free directions to the left and to the right.
+    ///
+    /// Only blocks that are met on the way are turned into arcs: the first direction that is in
+    /// no arc, and where the rod meets no other block, is the first that is in no arc of any.
+    fn nearest_free(&self, known: &mut Arcs) -> [Option<Point<D>>; 2] {
+        known.arcs.clear();
+        known.known.clear();
+        known.known.resize(self.blocks.len(), false);
+        known.inside = None;
+        let step = self.step;
+        if let Some(prev) = step.prev.filter(|_| step.max_bend_rad < PI) {
+            known.arcs.push(beyond_bend(plane(sub(step.mn, prev)), step.max_bend_rad));
+        }
+        [Side::Left, Side::Right].map(|side| {
+            let u = self.first_free(side, known)?;
+            Some(std::array::from_fn(|i| u[i]))
+        })
+    }
+
+    fn first_free(&self, side: Side, known: &mut Arcs) -> Option<Point<2>> {
+        let start_rad = interval::direction_rad(self.u0);
+        loop {
+            let turn_rad = least_turn_rad(&known.arcs, start_rad, side)?;
+            let u = interval::turned(self.u0, turn_rad, side);
+            if !self.learns(u, known) {
+                return Some(u);
+            }
+        }
+    }
+
+    /// Adds the arcs of all blocks that a rod in a direction meets; whether there were any.
+    fn learns(&self, u: Point<2>, known: &mut Arcs) -> bool {
+        let u: Point<D> = std::array::from_fn(|i| u[i]);
+        let s = along(self.step.mn, u, self.length_m);
+        let mut learns = false;
+        for (k, block) in self.blocks.iter().enumerate() {
+            if !known.known[k] && self.meets(s, block) {
+                known.known[k] = true;
+                self.block(block, known);
+                learns = true;
+            }
+        }
+        learns
+    }
+
+    fn meets(&self, s: Point<D>, block: &Block<D>) -> bool {
+        let near_m = block.radius_m + 2.0 * SKIN_M;
+        let rod = [self.step.mn, s];
+        block.stops_rod && !block.core.is_clear_of_segment(rod, near_m + self.step.rod.radius_m)
+            || block.stops_tip && !block.core.is_clear_of_point(s, near_m + self.step.tip_radius_m)
+    }
+
+    /// All directions that one block blocks.
+    fn block(&self, block: &Block<D>, known: &mut Arcs) {
+        let step = self.step;
+        let reach = Reach { master: plane(step.mn), length_m: self.length_m };
+        let core = plane_core(&block.core);
+        let apart_m = core.nearest_to_point(reach.master).distance_m;
+        let rod_m = block.radius_m + step.rod.radius_m;
+        // Within the skin of a surface the master blocks the half-plane behind it.
+        let skinned_m = if apart_m >= rod_m { (rod_m + SKIN_M).min(apart_m) } else { rod_m };
+        if block.stops_rod && !block_rod(&reach, &core, skinned_m, &mut known.arcs) {
+            known.inside = known.inside.or(Some(Refusal::by(Reason::Inside, block.name)));
+        }
+        if block.stops_tip && (!block.stops_rod || step.tip_radius_m > step.rod.radius_m) {
+            let tip_m = block.radius_m + step.tip_radius_m + SKIN_M;
+            block_tip(&reach, &core, tip_m, &mut known.arcs);
+        }
+    }
+}
+
+fn plane<const D: usize>(p: Point<D>) -> Point<2> {
+    [p[0], p[1]]
+}
+
+fn plane_core<const D: usize>(core: &Core<D>) -> Core<2> {
+    match core {
+        Core::Point(c) => Core::Point(plane(*c)),
+        Core::Segment([a, b]) => Core::Segment([plane(*a), plane(*b)]),
+        Core::Cuboid(c) => Core::Cuboid(Cuboid {
+            center: plane(c.center),
+            axes: [plane(c.axes[0]), plane(c.axes[1])],
+            half_m: plane(c.half_m),
+        }),
+    }
+}
+
+/// The points of a segment at a distance from `m`.
+fn on_segment_at<const D: usize>(
+    m: Point<D>,
+    t: f64,
+    [a, b]: [Point<D>; 2],
+) -> [Option<Point<D>>; 2] {
+    let (d, r) = (sub(b, a), sub(a, m));
+    let (dd, dr) = (dot(d, d), dot(d, r));
+    let inside = dr * dr - dd * (dot(r, r) - t * t);
+    if inside < 0.0 || dd <= 0.0 {
+        return [None; 2];
+    }
+    [-inside.sqrt(), inside.sqrt()].map(|root| {
+        let part = (-dr + root) / dd;
+        (0.0..=1.0).contains(&part).then(|| between(a, b, part))
+    })
+}
+
+/// The points of a plane at a distance from `m` that are nearest to and furthest from `so`.
+fn on_plane_at<const D: usize>(
+    m: Point<D>,
+    t: f64,
+    so: Point<D>,
+    normal: Point<D>,
+    offset_m: f64,
+) -> [Option<Point<D>>; 2] {
+    let height_m = offset_m - dot(normal, m);
+    let foot = along(m, normal, height_m);
+    let radius2 = t * t - height_m * height_m;
+    if radius2 < 0.0 {
+        return [None; 2];
+    }
+    let flat = sub(so, foot);
+    let flat = along(flat, normal, -dot(normal, flat));
+    let u = unit(flat).unwrap_or_else(|| super::geometry::perpendicular(normal));
+    [1.0, -1.0].map(|side| Some(add(foot, scaled(u, side * radius2.sqrt()))))
+}

@@ -1,0 +1,148 @@
+//! Scenes that several tests share.
+
+use super::chain::{Chain, Connector, Rod};
+use super::geometry::{Point, distance};
+use super::obstacle::{Obstacle, Obstacles};
+use sidestep_kernel::Seed;
+use sidestep_kernel::math::{cos, sin};
+use sidestep_kernel::stream::{Purpose, Streams};
+use std::f64::consts::PI;
+
+/// Numbers in [0, 1) by (seed, index).
+pub(super) struct Numbers {
+    streams: Streams,
+    next: u64,
+}
+
+impl Numbers {
+    pub(super) fn new(seed: u64) -> Self {
+        Self { streams: Streams::new(Seed(seed)), next: 0 }
+    }
+
+    pub(super) fn unit(&mut self) -> f64 {
+        self.next += 1;
+        f64::from(self.streams.block(0, self.next, Purpose(1), 0)[0]) / 4_294_967_296.0
+    }
+
+    pub(super) fn within(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.unit()
+    }
+
+    pub(super) fn point<const D: usize>(&mut self, half_m: f64) -> Point<D> {
+        std::array::from_fn(|_| self.within(-half_m, half_m))
+    }
+}
+
+/// Poses along the center line of the pinned corridor (design page, section 2): 14 m straight,
+/// 90 degrees left r = 2, 90 right r = 1.5, U-turn r = 1.6, S of r = 1.3, U-turn r = 2, 8 m.
+pub(super) fn corridor_line(step_m: f64) -> Vec<([f64; 2], f64)> {
+    let legs: [(f64, f64); 9] = [
+        (0.0, 14.0),
+        (2.0, 90.0),
+        (1.5, -90.0),
+        (1.6, 180.0),
+        (1.3, 60.0),
+        (1.3, -120.0),
+        (1.3, 60.0),
+        (2.0, -180.0),
+        (0.0, 8.0),
+    ];
+    let mut line = vec![([0.0, 0.0], 0.0)];
+    for (radius_m, amount) in legs {
+        let (length_m, turn_rad) = if radius_m == 0.0 {
+            (amount, 0.0)
+        } else {
+            let turn_rad = f64::to_radians(amount);
+            (radius_m * turn_rad.abs(), turn_rad)
+        };
+        let n = (length_m / step_m).ceil() as usize;
+        for _ in 0..n {
+            let ([x, y], heading) = line[line.len() - 1];
+            let (ds, turn) = (length_m / n as f64, turn_rad / n as f64);
+            let middle = heading + 0.5 * turn;
+            line.push(([x + ds * cos(middle), y + ds * sin(middle)], heading + turn));
+        }
+    }
+    line
+}
+
+/// Walls of zero thickness, pieces of 0.16 m, on both sides of the center line.
+pub(super) fn corridor_walls(width_m: f64) -> Vec<Obstacle<2>> {
+    let line = corridor_line(0.16);
+    let beside = |k: usize, side: f64| {
+        let ([x, y], heading) = line[k];
+        [x - side * 0.5 * width_m * sin(heading), y + side * 0.5 * width_m * cos(heading)]
+    };
+    let mut walls = Vec::new();
+    for side in [-1.0, 1.0] {
+        for k in 0..line.len() - 1 {
+            let ends = [beside(k, side), beside(k + 1, side)];
+            walls.push(Obstacle::capsule(walls.len() as u32, ends, 0.0));
+        }
+    }
+    walls
+}
+
+/// Robots behind each other in the first, straight part of the corridor, the leader first.
+pub(super) fn convoy(followers: usize, rod: Rod, radius_m: f64) -> Chain<2> {
+    let lead_m = 0.3 + rod.max_m * followers as f64;
+    let points = (0..=followers).map(|i| [lead_m - rod.max_m * i as f64, 0.0]).collect();
+    let connectors = vec![Connector::free(radius_m); followers + 1];
+    Chain::new(points, connectors, vec![rod; followers]).expect("a straight chain is right")
+}
+
+/// A leader's wandering: at every step somewhere into a cone around where it goes.
+pub(super) struct Wanderer<const D: usize> {
+    numbers: Numbers,
+    u: Point<D>,
+}
+
+impl<const D: usize> Wanderer<D> {
+    pub(super) fn new(seed: u64) -> Self {
+        Self { numbers: Numbers::new(seed), u: super::geometry::first_axis() }
+    }
+
+    pub(super) fn next(&mut self, from: Point<D>, step_m: f64) -> Point<D> {
+        let by = self.numbers.point(0.3);
+        self.u = super::geometry::unit(super::geometry::add(self.u, by)).expect("not zero");
+        super::geometry::along(from, self.u, step_m)
+    }
+
+    /// Anywhere else, after a veto.
+    pub(super) fn turn(&mut self) {
+        let by = self.numbers.point(1.0);
+        self.u = super::geometry::unit(by).unwrap_or(self.u);
+    }
+}
+
+/// Random balls that fill a part of a cube, none near the first axis behind the origin.
+pub(super) fn ball_field<const D: usize>(
+    seed: u64,
+    half_m: f64,
+    part: f64,
+    radius_m: f64,
+    keep_m: f64,
+) -> Vec<Obstacle<D>> {
+    let mut numbers = Numbers::new(seed);
+    let ball_size = if D == 2 { PI } else { 4.0 / 3.0 * PI * radius_m } * radius_m * radius_m;
+    let n = (part * (0..D).fold(1.0, |v, _| v * 2.0 * half_m) / ball_size) as u32;
+    (0..n)
+        .map(|id| Obstacle::ball(id, numbers.point(half_m), radius_m))
+        .filter(|o: &Obstacle<D>| {
+            let super::geometry::Core::Point(c) = o.core else { return false };
+            let mut foot = [0.0; D];
+            foot[0] = c[0].min(0.0);
+            distance(c, foot) > radius_m + keep_m
+        })
+        .collect()
+}
+
+/// The least clearance of any connector and any rod from obstacles, up to 1 m.
+pub(super) fn clearance_m<const D: usize>(chain: &Chain<D>, obstacles: &Obstacles<D>) -> f64 {
+    let points = chain.points();
+    let tip = |i: usize| obstacles.clearance_m([points[i]; 2], chain.connectors()[i].radius_m, 1.0);
+    let rod =
+        |i: usize| obstacles.clearance_m([points[i], points[i + 1]], chain.rods()[i].radius_m, 1.0);
+    let tips = (0..points.len()).map(tip).fold(1.0, f64::min);
+    (0..chain.rods().len()).map(rod).fold(tips, f64::min)
+}

@@ -1,0 +1,182 @@
+//! The direction of a rod in space that is free of everything near: a search, since the blocked
+//! directions on a sphere have no order (design page, 5.4).
+//!
+//! First the rod turns away from the worst obstacle, again and again; that is nearly always
+//! enough. Where it is not, rings of directions around the wanted one are tried from the
+//! narrowest on, and the first free one is brought as near as it stays free.
+
+use super::geometry::{Point, add, along, angle_rad, dot, norm, perpendicular, scaled, sub, unit};
+use super::scene::{Block, SKIN_M, Step, needed_m};
+use sidestep_kernel::math;
+use std::f64::consts::{PI, TAU};
+
+/// Turns away from single obstacles before the rings.
+const MAX_TURNS: usize = 24;
+/// Cosine of the turn after which turning away has lost its way: 100 degrees.
+const LOST_COSINE: f64 = -0.173_648;
+/// Directions on a ring.
+const AZIMUTHS: usize = 24;
+/// The widest ring.
+const MAX_RING_RAD: f64 = 2.0;
+/// Halvings that bring a free direction near the wanted one.
+const HALVINGS: usize = 20;
+
+/// A rod of one length at its master, and what may be in its way. The master is inside none of
+/// the blocks.
+pub(super) struct Search<'a, const D: usize> {
+    pub(super) step: &'a Step<D>,
+    pub(super) length_m: f64,
+    pub(super) blocks: &'a [Block<D>],
+}
+
+/// The point to turn away from.
+struct Hit<const D: usize> {
+    depth_m: f64,
+    point: Point<D>,
+    radius_m: f64,
+    by_tip: bool,
+}
+
+impl<const D: usize> Search<'_, D> {
+    /// A free direction near `wanted` by turning away from the worst, if that leads to one.
+    pub(super) fn turn_away(&self, wanted: Point<D>) -> Option<Point<D>> {
+        let mut u = self.within_bend(wanted);
+        for _ in 0..MAX_TURNS {
+            let Some(hit) = self.worst(u) else { return Some(u) };
+            u = self.within_bend(self.turned_from(u, &hit)?);
+            if dot(u, wanted) < LOST_COSINE {
+                return None;
+            }
+        }
+        None
+    }
+
+    /// The first free direction on rings around `wanted`, brought near.
+    pub(super) fn rings(
+        &self,
+        wanted: Point<D>,
+        is_good: impl Fn(Point<D>) -> bool,
+    ) -> Option<Point<D>> {
+        let e1 = perpendicular(wanted);
+        let e2 = other_perpendicular(wanted, e1);
+        let is_free = |u: Point<D>| self.bends(u) && self.worst(u).is_none() && is_good(u);
+        let (mut inner_rad, mut ring_rad) = (0.0, 0.02);
+        while ring_rad <= MAX_RING_RAD {
+            for k in 0..AZIMUTHS {
+                let azimuth_rad = TAU * k as f64 / AZIMUTHS as f64;
+                let (c, s) = (math::cos(azimuth_rad), math::sin(azimuth_rad));
+                let side = add(scaled(e1, c), scaled(e2, s));
+                let at =
+                    |rad: f64| add(scaled(wanted, math::cos(rad)), scaled(side, math::sin(rad)));
+                if is_free(at(ring_rad)) {
+                    return Some(at(nearest_free_rad(inner_rad, ring_rad, |rad| is_free(at(rad)))));
+                }
+            }
+            (inner_rad, ring_rad) = (ring_rad, ring_rad * 1.15 + 0.005);
+        }
+        None
+    }
+
+    fn bends(&self, u: Point<D>) -> bool {
+        self.step.bends_at(along(self.step.mn, u, self.length_m))
+    }
+
+    /// The direction itself, or the nearest on the cone of the bend limit.
+    fn within_bend(&self, u: Point<D>) -> Point<D> {
+        let Some(prev) = self.step.prev.filter(|_| self.step.max_bend_rad < PI) else { return u };
+        let Some(into) = unit(sub(self.step.mn, prev)) else { return u };
+        if angle_rad(into, u) <= self.step.max_bend_rad {
+            return u;
+        }
+        let side = side_of(into, u);
+        let (c, s) = (math::cos(self.step.max_bend_rad), math::sin(self.step.max_bend_rad));
+        add(scaled(into, c), scaled(side, s))
+    }
+
+    /// What a rod in a direction is deepest in.
+    fn worst(&self, u: Point<D>) -> Option<Hit<D>> {
+        let s = along(self.step.mn, u, self.length_m);
+        let mut worst: Option<Hit<D>> = None;
+        let mut note = |hit: Hit<D>| {
+            if hit.depth_m > 0.0 && worst.as_ref().is_none_or(|w| hit.depth_m > w.depth_m) {
+                worst = Some(hit);
+            }
+        };
+        for block in self.blocks {
+            let rod_m = block.radius_m + self.step.rod.radius_m;
+            if block.stops_rod
+                && !block.core.is_clear_of_segment([self.step.mn, s], needed_m(rod_m))
+            {
+                let nearest = block.core.nearest_to_segment([self.step.mn, s]);
+                let depth_m = needed_m(rod_m) - nearest.distance_m;
+                note(Hit { depth_m, point: nearest.on_core, radius_m: rod_m, by_tip: false });
+            }
+            let tip_m = block.radius_m + self.step.tip_radius_m;
+            if block.stops_tip && !block.core.is_clear_of_point(s, needed_m(tip_m)) {
+                let nearest = block.core.nearest_to_point(s);
+                let depth_m = needed_m(tip_m) - nearest.distance_m;
+                note(Hit { depth_m, point: nearest.on_core, radius_m: tip_m, by_tip: true });
+            }
+        }
+        worst
+    }
+
+    fn turned_from(&self, u: Point<D>, hit: &Hit<D>) -> Option<Point<D>> {
+        let to = sub(hit.point, self.step.mn);
+        let apart_m = norm(to);
+        let radius_m = hit.radius_m + SKIN_M;
+        let cosine = cosine_of_half_angle(apart_m, radius_m, self.length_m, hit.by_tip)?;
+        Some(away(u, scaled(to, 1.0 / apart_m), cosine))
+    }
+}
+
+/// The direction at an angle from `d`, in the plane of both, on the side of `u`.
+pub(super) fn away<const D: usize>(u: Point<D>, d: Point<D>, cosine: f64) -> Point<D> {
+    let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
+    let turned = add(scaled(d, cosine), scaled(side_of(d, u), sine));
+    unit(turned).unwrap_or(u)
+}
+
+/// The unit vector perpendicular to `d` on the side of `u`.
+fn side_of<const D: usize>(d: Point<D>, u: Point<D>) -> Point<D> {
+    let across = along(u, d, -dot(u, d));
+    if norm(across) > 1e-9 { unit(across).unwrap_or(across) } else { perpendicular(d) }
+}
+
+/// Cosine of half the angle under which a ball blocks a rod or its end; `None` where there is no
+/// such direction.
+pub(super) fn cosine_of_half_angle(
+    apart_m: f64,
+    radius_m: f64,
+    length_m: f64,
+    by_tip: bool,
+) -> Option<f64> {
+    if apart_m <= 0.0 {
+        return None;
+    }
+    let tangent2 = apart_m * apart_m - radius_m * radius_m;
+    if !by_tip && tangent2 <= length_m * length_m {
+        return Some(tangent2.max(0.0).sqrt() / apart_m);
+    }
+    let cosine = (length_m * length_m + tangent2) / (2.0 * apart_m * length_m);
+    (cosine >= -1.0).then_some(cosine.min(1.0))
+}
+
+fn other_perpendicular<const D: usize>(u: Point<D>, e1: Point<D>) -> Point<D> {
+    if D == 2 {
+        return scaled(e1, -1.0);
+    }
+    std::array::from_fn(|i| {
+        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+        u[j] * e1[k] - u[k] * e1[j]
+    })
+}
+
+/// The least angle that is still free, between one that is not and one that is.
+fn nearest_free_rad(mut blocked_rad: f64, mut free_rad: f64, is_free: impl Fn(f64) -> bool) -> f64 {
+    for _ in 0..HALVINGS {
+        let middle_rad = 0.5 * (blocked_rad + free_rad);
+        *(if is_free(middle_rad) { &mut free_rad } else { &mut blocked_rad }) = middle_rad;
+    }
+    free_rad
+}

@@ -1,0 +1,177 @@
+//! Requests to move, and what comes of them: a move, or a veto that says who objects and why.
+//!
+//! A veto is an outcome, not an error (slides R1, R6 to R9). Who asked decides what follows: an
+//! autonomous mover plans anew, a planner or an operator is told.
+
+use super::geometry::Point;
+use std::fmt;
+use std::ops::Range;
+
+/// Who wants the motion (slide R4).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Source {
+    /// The connector itself.
+    Autonomous,
+    /// A planner.
+    Planner,
+    /// A person.
+    Operator,
+}
+
+/// What a veto on the way means.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mode {
+    /// All the way or not at all.
+    Exact,
+    /// As far as goes.
+    AsFarAsPossible,
+}
+
+/// What moves where.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Motion<const D: usize> {
+    /// One connector.
+    Connector {
+        /// Its index.
+        k: usize,
+        /// Where it shall be.
+        to: Point<D>,
+    },
+    /// A rod: both its connectors in one request.
+    Rod {
+        /// Its index.
+        i: usize,
+        /// Where connectors `i` and `i + 1` shall be.
+        to: [Point<D>; 2],
+    },
+}
+
+/// An order to a chain.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Request<const D: usize> {
+    /// What moves where.
+    pub motion: Motion<D>,
+    /// Who wants it.
+    pub source: Source,
+    /// What a veto on the way means.
+    pub mode: Mode,
+}
+
+impl<const D: usize> Request<D> {
+    /// An operator's order that connector `k` goes to `to`, or nothing moves.
+    pub fn exact(k: usize, to: Point<D>) -> Self {
+        Self { motion: Motion::Connector { k, to }, source: Source::Operator, mode: Mode::Exact }
+    }
+}
+
+/// Which constraint speaks against a motion.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Reason {
+    /// A fixed connector would have to move.
+    Fixed,
+    /// A failed connector would have to move.
+    Failed,
+    /// A connector would leave the line, plane or box that it belongs on.
+    Mobility,
+    /// Something is where the initiator wants to go.
+    TargetBlocked,
+    /// Every direction of a rod is blocked.
+    BothSidesBlocked,
+    /// The part was in an obstacle before, and would be deeper in it.
+    Inside,
+    /// A rod would pass through an obstacle between two good positions.
+    WouldTunnel,
+    /// A bend would be sharper than its limit.
+    BendLimit,
+    /// The chain would run into itself.
+    SelfCollision,
+    /// A slave would have to move further in one step than it may.
+    StepLimit,
+    /// The search for a way out was given up.
+    Limit,
+}
+
+impl fmt::Display for Reason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Fixed => "it is fixed",
+            Self::Failed => "it has failed",
+            Self::Mobility => "it would leave the place where it may be",
+            Self::TargetBlocked => "its target is blocked",
+            Self::BothSidesBlocked => "its rod is blocked on both sides",
+            Self::Inside => "it would go deeper into an obstacle",
+            Self::WouldTunnel => "its rod would pass through an obstacle",
+            Self::BendLimit => "its rod would bend too far",
+            Self::SelfCollision => "the chain would run into itself",
+            Self::StepLimit => "it would have to move too far in one step",
+            Self::Limit => "the search for a way out was given up",
+        })
+    }
+}
+
+/// An objection.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Veto<const D: usize> {
+    /// The connector that objects; the path of the veto is from the initiator to it.
+    pub by: usize,
+    /// The initiator.
+    pub from: usize,
+    /// Why.
+    pub reason: Reason,
+    /// The obstacle that it is about, if it is about one.
+    pub obstacle: Option<u32>,
+    /// How far the initiator could have gone.
+    pub reached: Point<D>,
+}
+
+impl<const D: usize> fmt::Display for Veto<D> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "connector {} objects: {}", self.by, self.reason)?;
+        if let Some(id) = self.obstacle {
+            write!(f, " (obstacle {id})")?;
+        }
+        write!(f, "; connector {} could go as far as {:?}", self.from, self.reached)
+    }
+}
+
+/// A motion that took place.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Moved<const D: usize> {
+    /// Connectors that reacted, initiator included.
+    pub touched: Range<usize>,
+    /// How many connectors are elsewhere than before, sums over the sub-steps.
+    pub changed: usize,
+    /// How many times a rod was turned to avoid something.
+    pub rotated: usize,
+    /// The longest way of a connector other than the initiator in one sub-step.
+    pub max_slave_step_m: f64,
+    /// Why the motion ended early, where the mode allows that.
+    pub cut_short: Option<Veto<D>>,
+}
+
+/// What came of a request.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Outcome<const D: usize> {
+    /// The chain moved.
+    Moved(Moved<D>),
+    /// Nothing moved; every bit is as before.
+    Vetoed(Veto<D>),
+}
+
+impl<const D: usize> Outcome<D> {
+    /// The motion, if there was one.
+    pub fn moved(&self) -> Option<&Moved<D>> {
+        match self {
+            Self::Moved(moved) => Some(moved),
+            Self::Vetoed(_) => None,
+        }
+    }
+
+    /// The veto, if nothing moved.
+    pub fn veto(&self) -> Option<&Veto<D>> {
+        match self {
+            Self::Moved(_) => None,
+            Self::Vetoed(veto) => Some(veto),
+        }
+    }
+}
