@@ -1,7 +1,7 @@
 //! Speed of the chain world's core.
 //!
 //! `cargo bench -p sidestep --bench chain [-- PART ...]` with the parts `open`, `wavefront`,
-//! `field` and `corridor`; CPU time. In brackets what the prototype took (design page, 5.9).
+//! `field` and `corridor`; CPU time. In brackets what the prototype took.
 
 use cpu_time::ProcessTime;
 use sidestep::worlds::chain::geometry::{Point, add, along, first_axis, scaled, unit};
@@ -157,7 +157,7 @@ fn clearance_m<const D: usize>(chain: &Chain<D>, obstacles: &Obstacles<D>) -> f6
     (0..p.len() - 1).map(rod).fold(tips, f64::min)
 }
 
-/// The center line of the pinned corridor (design page, section 2): radius and degrees of a bend,
+/// The center line of the pinned corridor: radius and degrees of a bend,
 /// or 0 and meters.
 const CORRIDOR: [(f64, f64); 9] = [
     (0.0, 14.0),

@@ -249,7 +249,7 @@ impl<const D: usize> Chain<D> {
         })
     }
 
-    /// A move that is shorter than this changes nothing (design page, 5.1).
+    /// A move that is shorter than this changes nothing.
     pub fn least_move_m(&self) -> f64 {
         1e-12 * self.still.longest_m
     }

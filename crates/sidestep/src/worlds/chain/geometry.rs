@@ -3,7 +3,7 @@
 //! Distances between segments are the least of the four distances from an end to the other
 //! segment and, where both feet are inside, of the distance of the lines. The usual clamped
 //! formula is off by up to 4e-8 for nearly parallel segments, which a promise of 1e-9 m cannot
-//! afford (design page, pitfall 14).
+//! afford.
 
 use sidestep_kernel::math;
 

@@ -1,4 +1,4 @@
-//! The directions in which a plane rod is blocked, exactly: the union rule (design page, 5.4).
+//! The directions in which a plane rod is blocked, exactly: the union rule.
 //!
 //! A rod turns about its master. The directions in which a rod of one length meets one convex
 //! obstacle are one interval: how wide the obstacle, grown by the rod's radius and cut to the

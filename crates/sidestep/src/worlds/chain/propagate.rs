@@ -1,4 +1,4 @@
-//! One motion through the whole chain, or not at all (slides R1 to R7; design page, 5.3).
+//! One motion through the whole chain, or not at all (slides R1 to R7).
 //!
 //! The initiator moves; from it two sweeps go outward, each slave reacting to its master and
 //! becoming the next one's master. New positions are kept apart until both sweeps have agreed: a

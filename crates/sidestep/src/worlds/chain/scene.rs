@@ -252,7 +252,7 @@ fn objection<const D: usize>(
     }
     let (now_m, before_m) =
         (depth_m(step.mn, s, step, block), depth_m(step.mo, step.so, step, block));
-    // Who starts inside may not go deeper (design page, 5.6).
+    // Who starts inside may not go deeper.
     if before_m > TOLERANCE_M && now_m <= before_m {
         return None;
     }

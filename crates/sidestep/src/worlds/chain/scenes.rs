@@ -33,7 +33,7 @@ impl Numbers {
     }
 }
 
-/// Poses along the center line of the pinned corridor (design page, section 2): 14 m straight,
+/// Poses along the center line of the pinned corridor: 14 m straight,
 /// 90 degrees left r = 2, 90 right r = 1.5, U-turn r = 1.6, S of r = 1.3, U-turn r = 2, 8 m.
 pub(super) fn corridor_line(step_m: f64) -> Vec<([f64; 2], f64)> {
     let legs: [(f64, f64); 9] = [

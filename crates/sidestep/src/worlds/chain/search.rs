@@ -1,5 +1,5 @@
 //! The direction of a rod in space that is free of everything near: a search, since the blocked
-//! directions on a sphere have no order (design page, 5.4).
+//! directions on a sphere have no order.
 //!
 //! First the rod turns away from the worst obstacle, again and again; that is nearly always
 //! enough. Where it is not, rings of directions around the wanted one are tried from the

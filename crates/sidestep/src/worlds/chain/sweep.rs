@@ -1,4 +1,4 @@
-//! Whether a rod passes through something between two good positions (design page, 5.4).
+//! Whether a rod passes through something between two good positions.
 //!
 //! Both ends go straight from their old to their new place. In the plane the test is exact: the
 //! rod passes a core only where its moving end crosses it, or where an end of the core crosses

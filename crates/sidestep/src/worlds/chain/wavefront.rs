@@ -3,7 +3,7 @@
 //! One motion is a chain of dependent square roots and divisions, and a processor that waits.
 //! Motion `w` can be at connector `j - w` while motion 0 is at connector `j`: all lanes are
 //! independent, and every one computes what the motions one after the other would compute, to
-//! the bit (design page, 2.8).
+//! the bit.
 
 #![expect(
     clippy::needless_range_loop,

@@ -1,4 +1,4 @@
-//! The invariants of the design page, section 5.8, on motions of whole chains.
+//! Invariants of motions of whole chains.
 
 use super::*;
 use crate::worlds::chain::chain::{Connector, Mobility, Rod};
