@@ -1,18 +1,21 @@
 //! The text of an airspace scenario, and what it compiles to.
 
+mod network;
+mod settings;
+
 use super::airplane::{Legs, Model, Passing, Point, Pose, Timing};
-use super::deploy::{Deployment, Network, Silence, refuses};
+use super::deploy::{Deployment, refuses};
 use super::flight_plan::AirplaneSection;
 use super::generate::{Order as Wanted, generate};
 use super::levels::Levels;
-use super::objective::Objective;
-use super::orders::{FlightOrder, Task};
+use super::orders::Task;
 use super::shield::{Flyer, Side, first_fallbacks};
 use super::state::{AirplaneRecord, AirspaceState, FLYING, Snapshot};
 use super::track::Track;
 use super::world::{Airplane, AirspaceWorld, Disturbance, Method};
-use crate::collectives::{Choice, Estimator, Order, Settings, Stop, Update, Utility};
+use crate::collectives::{Choice, Estimator, Order, Update, Utility};
 use crate::scenario::{OneOrMany, Source};
+use network::NetworkSection;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{InputError, Seed};
@@ -30,8 +33,6 @@ const FEWEST_CYCLES: u64 = 400;
 const TIMES_ALONE: f64 = 3.0;
 /// Larger errors of known positions than this mean nothing.
 const MOST_NOISE_M: f64 = 1e6;
-/// Most samples of a block.
-const MOST_SAMPLES: usize = 10_000;
 /// Turn rates of airplanes, degrees per second: slower ones would make orbits without end.
 const TURNS_DEG_S: RangeInclusive<f64> = 1e-3..=360.0;
 /// Most airplanes of a scenario.
@@ -121,18 +122,6 @@ struct AirspaceSection {
     wind_m_s: Point,
     position_noise_m: f64,
     heading_noise_deg: f64,
-}
-
-#[derive(Debug, Default, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-struct NetworkSection {
-    loss: f64,
-    duplication: f64,
-    latency_s: Option<f64>,
-    max_delay_s: f64,
-    patience_s: Option<f64>,
-    deadline_s: Option<f64>,
-    silent: Vec<Silence>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -333,69 +322,6 @@ impl Compiler<'_> {
         Err(self.error(None, cause, remedy))
     }
 
-    fn network(
-        &self,
-        timing: &Timing,
-        airplanes: &[Airplane],
-    ) -> Result<Option<Network>, InputError> {
-        let changes =
-            |order: &FlightOrder| matches!(order.task, Task::Speed(_) | Task::Altitude { .. });
-        let orders_change_safety = airplanes.iter().any(|a| a.orders.iter().any(changes));
-        let airplanes = airplanes.len();
-        let Some(section) = &self.file.airspace.network else { return Ok(None) };
-        let at = || Some(section.span());
-        let s = section.get_ref();
-        if self.file.airspace.deployment == Deployment::Direct {
-            let cause = "a network, but one process decides for all (deployment = \"direct\")";
-            let remedy = "set deployment to team, compact-team, pim or hierarchical-pim, \
-                          or leave [airspace.network] out";
-            return Err(self.error(at(), cause, remedy));
-        }
-        if self.has_shield()? && orders_change_safety {
-            let cause = "orders of speed or level, over a network that is not to be relied on";
-            let remedy = "nobody could be sure who knows of them: leave them out, or \
-                          [airspace.network], or set shield = \"off\"";
-            return Err(self.error(at(), cause, remedy));
-        }
-        let latency_s = s.latency_s.unwrap_or(0.001);
-        let network = Network {
-            loss: s.loss,
-            duplication: s.duplication,
-            latency_s,
-            max_delay_s: s.max_delay_s,
-            patience_s: s.patience_s.unwrap_or(3.0 * (latency_s + s.max_delay_s)),
-            deadline_s: s.deadline_s.unwrap_or(0.45 * timing.dt_s),
-            silences: s.silent.clone(),
-        };
-        let chances = [("loss", s.loss), ("duplication", s.duplication)];
-        if let Some((name, p)) = chances.iter().find(|(_, p)| !(0.0..1.0).contains(p)) {
-            let cause = format!("{name} = {p} is no probability below 1");
-            return Err(self.error(at(), cause, "give 0 or more and less than 1"));
-        }
-        let times = [latency_s, network.patience_s, network.deadline_s];
-        let sane = times.iter().all(|t| *t > 0.0 && t.is_finite()) && s.max_delay_s >= 0.0;
-        let fits = 2.0 * network.deadline_s <= timing.dt_s
-            && 8.0 * network.patience_s.max(latency_s + s.max_delay_s) <= network.deadline_s;
-        if !(sane && fits && latency_s >= 1e-6 && s.max_delay_s.is_finite()) {
-            let cause = format!(
-                "latency_s = {latency_s}, max_delay_s = {}, patience_s = {}, deadline_s = {}",
-                s.max_delay_s, network.patience_s, network.deadline_s
-            );
-            let remedy = "give times above 0 (latency at least 1e-6, delay 0 or more), a patience of at \
-                          most an eighth of the deadline, and a deadline of at most half of dt_s: it holds for \
-                          the optimization and again for the shield's exchange";
-            return Err(self.error(at(), cause, remedy));
-        }
-        if let Some(wrong) = s.silent.iter().find(|one| {
-            one.airplane as usize >= airplanes || one.from_s.is_nan() || one.until_s.is_nan()
-        }) {
-            let cause = format!("airplane {} is to be silent", wrong.airplane);
-            let remedy = format!("give ids from 0 to {} and times in seconds", airplanes - 1);
-            return Err(self.error(at(), cause, remedy));
-        }
-        Ok(Some(network))
-    }
-
     fn is_paper(&self) -> bool {
         self.file.airspace.preset == Preset::Paper
     }
@@ -418,113 +344,6 @@ impl Compiler<'_> {
             return Err(self.error(span, cause, "give at least dt_s / dtau_s and at most 10000"));
         }
         Ok(Timing { dt_s, dtau_s, horizon })
-    }
-
-    fn objective(&self, vertical_m: f64) -> Result<Objective, InputError> {
-        let section = &self.file.airspace;
-        let paper = self.is_paper();
-        let beta = self.positive(section.beta.as_ref(), 0.995)?;
-        if beta > 1.0 {
-            let span = section.beta.as_ref().map(Spanned::span);
-            return Err(self.error(span, format!("beta = {beta}"), "give at most 1"));
-        }
-        Ok(Objective {
-            alpha: self.positive(section.alpha.as_ref(), if paper { 1.0 } else { 0.001 })?,
-            beta,
-            inflation: self.positive(section.inflation.as_ref(), if paper { 1.0 } else { 1.12 })?,
-            mask: true,
-            vertical_m,
-        })
-    }
-
-    fn settings(&self) -> Result<Settings, InputError> {
-        let section = &self.file.airspace;
-        let paper = self.is_paper();
-        let estimator =
-            if paper { Estimator::Sampled { block: 20, ageing: 0.7 } } else { Estimator::Exact };
-        let preset = if paper { 0.8 } else { 0.7 };
-        let cooling = self.positive(section.cooling.as_ref(), preset)?;
-        if cooling > 1.0 {
-            let span = section.cooling.as_ref().map(Spanned::span);
-            return Err(self.error(span, format!("cooling = {cooling}"), "give at most 1"));
-        }
-        let choice = if paper { Choice::Draw } else { Choice::Argmax };
-        let order = if paper { Order::Parallel } else { Order::Sequence };
-        Ok(Settings {
-            estimator: self.estimator()?.unwrap_or(estimator),
-            update: self.update()?.unwrap_or(Update::NearestNewton { step: 0.5 }),
-            order: section.order.unwrap_or(order),
-            utility: section.utility.unwrap_or_default(),
-            cooling,
-            stop: Stop {
-                threshold: 1e-3,
-                calm_rounds: 3,
-                max_rounds: self.max_rounds()?.unwrap_or(200),
-            },
-            choice: section.choice.unwrap_or(choice),
-        })
-    }
-
-    fn has_shield(&self) -> Result<bool, InputError> {
-        let Some(given) = &self.file.airspace.shield else { return Ok(true) };
-        match given.get_ref().as_str() {
-            Some("on") => Ok(true),
-            Some("off") => Ok(false),
-            _ => {
-                let cause = format!("shield = {}", given.get_ref());
-                Err(self.error(Some(given.span()), cause, "give \"on\" or \"off\""))
-            }
-        }
-    }
-
-    fn estimator(&self) -> Result<Option<Estimator>, InputError> {
-        let Some(given) = &self.file.airspace.estimator else { return Ok(None) };
-        if let Estimator::Sampled { block, ageing } = *given.get_ref()
-            && !((1..=MOST_SAMPLES).contains(&block) && (0.0..=1.0).contains(&ageing))
-        {
-            let cause = format!("an estimator with block = {block}, ageing = {ageing}");
-            let remedy = format!("give a block of 1 to {MOST_SAMPLES} samples, ageing from 0 to 1");
-            return Err(self.error(Some(given.span()), cause, remedy));
-        }
-        Ok(Some(*given.get_ref()))
-    }
-
-    fn update(&self) -> Result<Option<Update>, InputError> {
-        let Some(given) = &self.file.airspace.update else { return Ok(None) };
-        let (Update::NearestNewton { step } | Update::Brouwer { step }) = *given.get_ref();
-        if step > 0.0 && step <= 1.0 {
-            return Ok(Some(*given.get_ref()));
-        }
-        let cause = format!("an update with step = {step}");
-        Err(self.error(Some(given.span()), cause, "give a step above 0 and at most 1"))
-    }
-
-    fn max_rounds(&self) -> Result<Option<u32>, InputError> {
-        match &self.file.airspace.max_rounds {
-            Some(given) if *given.get_ref() == 0 => {
-                Err(self.error(Some(given.span()), "max_rounds = 0", "give 1 or more"))
-            }
-            given => Ok(given.as_ref().map(|rounds| *rounds.get_ref())),
-        }
-    }
-
-    fn legs(&self) -> Result<Legs, InputError> {
-        let legs = match &self.file.airspace.legs {
-            Some(legs) => legs.clone(),
-            None if self.is_paper() => Legs::default(),
-            None => Legs::usual(),
-        };
-        self.times(&legs.turns_s, "legs.turns_s")?;
-        self.times(&legs.until_s, "legs.until_s")?;
-        Ok(legs)
-    }
-
-    fn times(&self, times_s: &[f64], key: &str) -> Result<Vec<f64>, InputError> {
-        if times_s.iter().any(|t| !(*t > 0.0 && t.is_finite())) || times_s.len() > 20 {
-            let cause = format!("{key} = {times_s:?}");
-            return Err(self.error(None, cause, "give up to 20 positive times in seconds"));
-        }
-        Ok(times_s.to_vec())
     }
 
     fn airplanes(&self, streams: &Streams, replay: Replay) -> Result<Vec<Airplane>, InputError> {

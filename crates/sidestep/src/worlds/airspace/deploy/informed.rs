@@ -6,7 +6,7 @@ use super::super::decide::Known;
 use super::super::objective::{Options, couple, own_costs};
 use super::contact::Beacon;
 use super::link;
-use super::{Came, Decided, Own};
+use super::{Came, Own};
 use crate::collectives::{Estimator, Game, Order, PairwiseGame, Player};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -253,21 +253,7 @@ impl<'a> Agent<'a> {
     }
 
     fn decide(&mut self) {
-        let settings = self.own.settings();
-        let drawn = match settings.estimator {
-            Estimator::Exact => 0,
-            Estimator::Sampled { block, .. } => u64::from(self.round) * block as u64,
-        };
-        let decided = Decided {
-            chosen: self.player.choose(settings.choice, self.own.uniform(drawn)),
-            expected: self.player.expected().to_vec(),
-            rounds: self.round,
-            converged: self.calm >= settings.stop.calm_rounds,
-        };
-        self.come_to(Some(decided));
-    }
-
-    fn come_to(&mut self, decided: Option<Decided>) {
+        let decided = self.own.decided(&self.player, self.round, self.calm);
         let beacons = self.members.iter_mut().map(|m| m.beacon.take()).collect();
         self.decided = Some(Came { decided, beacons });
     }
@@ -344,10 +330,7 @@ impl link::Agent for Agent<'_> {
     }
 
     fn at_deadline(&mut self) {
-        match self.player.expected() {
-            [] => self.come_to(None),
-            _ => self.decide(),
-        }
+        self.decide();
     }
 
     fn outcome(&self) -> Option<Came> {

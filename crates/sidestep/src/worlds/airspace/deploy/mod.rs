@@ -121,6 +121,22 @@ impl Own<'_> {
         (drawn..drawn + block as u64).map(|k| player.draw(self.uniform(k))).collect()
     }
 
+    /// What a player of samples or of distributions comes to after some rounds, of which the
+    /// last `calm` were calm; nothing, if it has not learned anything.
+    fn decided(&self, player: &Player, rounds: u32, calm: u32) -> Option<Decided> {
+        let Settings { estimator, choice, stop, .. } = *self.settings();
+        let drawn = match estimator {
+            Estimator::Exact => 0,
+            Estimator::Sampled { block, .. } => u64::from(rounds) * block as u64,
+        };
+        (!player.expected().is_empty()).then(|| Decided {
+            chosen: player.choose(choice, self.uniform(drawn)),
+            expected: player.expected().to_vec(),
+            rounds,
+            converged: calm >= stop.calm_rounds,
+        })
+    }
+
     /// What it tells of itself.
     fn beacon(&self) -> Beacon {
         self.world.beacon(self.known)

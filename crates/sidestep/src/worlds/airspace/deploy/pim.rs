@@ -306,13 +306,9 @@ fn sampled(team: &mut [Coordinator], (block, ageing): (usize, f64), carrier: &mu
         let converged = above.calm >= settings.stop.calm_rounds;
         let ends = converged || above.round >= settings.stop.max_rounds || carrier.is_late();
         if ends {
-            let drawn = u64::from(above.round) * block as u64;
             for airplane in above.airplanes.iter_mut().filter(|a| !a.is_presumed) {
                 let Some(player) = &airplane.player else { continue };
-                let chosen = player.choose(settings.choice, hosts[airplane.place].uniform(drawn));
-                let expected = player.expected().to_vec();
-                let rounds = above.round;
-                airplane.decided = Some(Decided { chosen, expected, rounds, converged });
+                airplane.decided = hosts[airplane.place].decided(player, above.round, above.calm);
             }
         }
         hand_back(above, team, carrier);

@@ -5,7 +5,7 @@ use super::super::levels::Levels;
 use super::super::objective::{Options, own_costs};
 use super::contact::Beacon;
 use super::link;
-use super::{Came, Decided, Own};
+use super::{Came, Own};
 use crate::collectives::Player;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -183,17 +183,7 @@ impl<'a> Agent<'a> {
     }
 
     fn decide(&mut self) {
-        let settings = self.own.settings();
-        let decided = Decided {
-            chosen: self.player.choose(settings.choice, self.own.uniform(self.drawn())),
-            expected: self.player.expected().to_vec(),
-            rounds: self.round,
-            converged: self.calm >= settings.stop.calm_rounds,
-        };
-        self.come_to(Some(decided));
-    }
-
-    fn come_to(&mut self, decided: Option<Decided>) {
+        let decided = self.own.decided(&self.player, self.round, self.calm);
         let beacons = self.members.iter_mut().map(|m| m.beacon.take()).collect();
         self.decided = Some(Came { decided, beacons });
     }
@@ -255,10 +245,7 @@ impl link::Agent for Agent<'_> {
     }
 
     fn at_deadline(&mut self) {
-        match self.player.expected() {
-            [] => self.come_to(None),
-            _ => self.decide(),
-        }
+        self.decide();
     }
 
     fn outcome(&self) -> Option<Came> {
