@@ -2,8 +2,8 @@
 
 /// A run is the simulation it holds, in all that the kernel asks.
 macro_rules! delegates_simulation {
-    ($run:ty) => {
-        impl Simulation for $run {
+    ([$($generics:tt)*] $run:ty) => {
+        impl<$($generics)*> Simulation for $run {
             fn world(&self) -> &'static str {
                 Simulation::world(&self.simulation)
             }
@@ -39,9 +39,13 @@ macro_rules! delegates_simulation {
             }
         }
     };
+    ($run:ty) => {
+        delegates_simulation!([] $run);
+    };
 }
 
 mod airspace;
+mod chain;
 mod robots;
 
 pub(crate) use robots::shade;
@@ -57,7 +61,7 @@ use sidestep::scenario::{Source, nearest};
 use std::path::Path;
 
 /// Names of the worlds, as scenarios give them.
-const NAMES: [&str; 2] = ["robots", "airspace"];
+const NAMES: [&str; 3] = ["robots", "airspace", "chain"];
 
 /// What a scenario asks for, whatever its world.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -181,6 +185,8 @@ pub(crate) enum Compiled {
     Robots(robots::Scenario),
     /// Of the world `airspace`.
     Airspace(airspace::Scenario),
+    /// Of the world `chain`.
+    Chain(chain::Scenario),
 }
 
 impl Compiled {
@@ -193,6 +199,7 @@ impl Compiled {
         match world.get_ref().as_str() {
             "robots" => robots::Scenario::new(source).map(Self::Robots),
             "airspace" => airspace::Scenario::new(source).map(Self::Airspace),
+            "chain" => chain::Scenario::new(source).map(Self::Chain),
             other => {
                 let cause = format!("unknown world `{other}`");
                 Err(source.error(Some(world.span()), cause, nearest(other, &NAMES)))
@@ -208,6 +215,7 @@ impl Compiled {
         match self {
             Self::Robots(scenario) => scenario.resolve(source),
             Self::Airspace(_) => Ok(airspace::Scenario::resolve(source)),
+            Self::Chain(_) => Ok(chain::Scenario::resolve(source)),
         }
     }
 
@@ -221,7 +229,7 @@ impl Compiled {
     ) -> Result<sidestep::worlds::robots::scenario::Compiled, InputError> {
         match self {
             Self::Robots(scenario) => Ok(scenario.into_compiled()),
-            Self::Airspace(_) => {
+            Self::Airspace(_) | Self::Chain(_) => {
                 let remedy = "give a scenario with world = \"robots\"";
                 Err(InputError::new(&source.place, "this command is about robots alone", remedy))
             }
@@ -238,7 +246,7 @@ impl Compiled {
     ) -> Result<sidestep::worlds::airspace::scenario::Compiled, InputError> {
         match self {
             Self::Airspace(scenario) => Ok(scenario.into_compiled()),
-            Self::Robots(_) => {
+            Self::Robots(_) | Self::Chain(_) => {
                 let remedy = "give a scenario with world = \"airspace\"";
                 Err(InputError::new(&source.place, "this command is about airplanes alone", remedy))
             }
@@ -250,6 +258,7 @@ impl Compiled {
         match self {
             Self::Robots(scenario) => Box::new(RobotsRun::new(scenario, source, workers)),
             Self::Airspace(scenario) => Box::new(AirspaceRun::new(scenario, source, workers)),
+            Self::Chain(scenario) => scenario.start(source, workers),
         }
     }
 }

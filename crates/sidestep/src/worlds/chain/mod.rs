@@ -14,27 +14,39 @@
 //! kinematics/: arms of joints, as chains        script/: a turtle language that drives an initiator
 //! ```
 
+mod act;
+mod broken;
 mod candidates;
 #[expect(clippy::module_inception, reason = "the chain itself, of the world of chains")]
 pub mod chain;
+pub mod driver;
+pub mod events;
 pub mod geometry;
 mod grid;
+pub mod ground;
 pub mod interval;
 pub mod kinematics;
+mod measure;
+pub mod metrics;
 pub mod obstacle;
 mod own_body;
 pub mod propagate;
 pub mod reach;
 pub mod rebuild;
+mod rows;
 pub mod rules;
+pub mod scenario;
 mod scene;
 #[cfg(test)]
 mod scenes;
 pub mod script;
 mod search;
+pub mod simulation;
+pub mod state;
 pub mod sweep;
 pub mod veto;
 pub mod wavefront;
+pub mod world;
 
 pub use chain::{Chain, Connector, Mobility, Rod};
 pub use obstacle::{Obstacle, Obstacles};

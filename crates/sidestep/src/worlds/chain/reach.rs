@@ -9,7 +9,7 @@ use super::geometry::{Bounds, Point, distance};
 use super::obstacle::Obstacles;
 use super::propagate::Propagator;
 use super::sweep::Sweep;
-use super::veto::{Mode, Motion, Outcome, Reason, Request, Source, Veto};
+use super::veto::{Mode, Motion, Moved, Outcome, Reason, Request, Source, Veto};
 use sidestep_kernel::InputError;
 
 /// Double passes before it is given up.
@@ -47,6 +47,51 @@ pub enum Reached<const D: usize> {
         /// The objection, if there was one; otherwise the passes came no nearer.
         veto: Option<Veto<D>>,
     },
+}
+
+/// Moves a chain as requested; where a base that is fixed objects, by [`reach()`].
+///
+/// # Errors
+/// As [`Propagator::propagate`].
+pub fn go<const D: usize>(
+    propagator: &mut Propagator<D>,
+    chain: &mut Chain<D>,
+    obstacles: &Obstacles<D>,
+    request: &Request<D>,
+) -> Result<Outcome<D>, InputError> {
+    let outcome = propagator.propagate(chain, obstacles, request)?;
+    let (Outcome::Vetoed(veto), Motion::Connector { k, to }) = (&outcome, request.motion) else {
+        return Ok(outcome);
+    };
+    let is_base = matches!(veto.reason, Reason::Fixed | Reason::Failed) && veto.by != k;
+    if !is_base {
+        return Ok(outcome);
+    }
+    let order = Reach { k, target: to, base: veto.by, tolerance_m: TOLERANCE_M };
+    let before = chain.points().to_vec();
+    Ok(match reach(propagator, chain, obstacles, &order)? {
+        Reached::There { .. } => Outcome::Moved(moved_since(&before, chain, k)),
+        Reached::Short { veto: Some(veto), .. } => Outcome::Vetoed(veto),
+        Reached::Short { nearest, veto: None } => {
+            Outcome::Vetoed(Veto { reached: nearest, ..*veto })
+        }
+    })
+}
+
+/// How near counts as there, for a connector that goes a step.
+const TOLERANCE_M: f64 = 1e-7;
+
+/// What has moved, by comparison.
+fn moved_since<const D: usize>(before: &[Point<D>], chain: &Chain<D>, k: usize) -> Moved<D> {
+    let ways_m = before.iter().zip(chain.points()).map(|(a, b)| distance(*a, *b));
+    let slaves = ways_m.enumerate().filter(|(i, _)| *i != k);
+    Moved {
+        touched: 0..before.len(),
+        changed: before.iter().zip(chain.points()).filter(|(a, b)| a != b).count(),
+        rotated: 0,
+        max_slave_step_m: slaves.map(|(_, way_m)| way_m).fold(0.0, f64::max),
+        cut_short: None,
+    }
 }
 
 /// Moves a connector to a target while the base keeps its place, bit for bit.

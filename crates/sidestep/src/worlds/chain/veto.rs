@@ -91,6 +91,40 @@ pub enum Reason {
     Limit,
 }
 
+impl Reason {
+    /// All reasons.
+    pub const ALL: [Self; 11] = [
+        Self::Fixed,
+        Self::Failed,
+        Self::Mobility,
+        Self::TargetBlocked,
+        Self::BothSidesBlocked,
+        Self::Inside,
+        Self::WouldTunnel,
+        Self::BendLimit,
+        Self::SelfCollision,
+        Self::StepLimit,
+        Self::Limit,
+    ];
+
+    /// Its name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Fixed => "fixed",
+            Self::Failed => "failed",
+            Self::Mobility => "mobility",
+            Self::TargetBlocked => "target-blocked",
+            Self::BothSidesBlocked => "both-sides-blocked",
+            Self::Inside => "inside",
+            Self::WouldTunnel => "would-tunnel",
+            Self::BendLimit => "bend-limit",
+            Self::SelfCollision => "self-collision",
+            Self::StepLimit => "step-limit",
+            Self::Limit => "limit",
+        }
+    }
+}
+
 impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {

@@ -1,0 +1,199 @@
+//! The world of chains as the command sees it.
+
+mod picture;
+
+use super::{Comparison, Pictured, Plan, Resolved, Run, Said};
+use crate::console::grouped;
+use crate::exit::Failure;
+use crate::report::Lines;
+use serde_json::{Value, json};
+use sidestep::kernel::checkpoint::CheckpointError;
+use sidestep::kernel::cycle::PhaseTimes;
+use sidestep::kernel::ports::{RecordError, Recorder, TableSchema};
+use sidestep::kernel::{Cycle, Digest, InputError, Simulation};
+use sidestep::scenario::Source;
+use sidestep::worlds::chain::metrics::{ChainGivenUp, Metrics};
+use sidestep::worlds::chain::scenario::{AnyCompiled, Compiled};
+use sidestep::worlds::chain::simulation::ChainSimulation;
+use std::path::Path;
+
+/// A compiled scenario of chains.
+pub(crate) struct Scenario {
+    compiled: AnyCompiled,
+}
+
+impl Scenario {
+    /// Compiles the scenario.
+    ///
+    /// # Errors
+    /// When anything in it is wrong.
+    pub(super) fn new(source: &Source) -> Result<Self, InputError> {
+        Ok(Self { compiled: AnyCompiled::new(source)? })
+    }
+
+    /// See [`super::Compiled::resolve`].
+    pub(super) fn resolve(source: &Source) -> Resolved {
+        Resolved { text: source.text.clone(), files: Vec::new() }
+    }
+
+    /// A run at its start.
+    pub(super) fn start(self, source: &Source, workers: usize) -> Box<dyn Run> {
+        match self.compiled {
+            AnyCompiled::Plane(compiled) => Box::new(ChainRun::new(compiled, source, workers)),
+            AnyCompiled::Space(compiled) => Box::new(ChainRun::new(compiled, source, workers)),
+        }
+    }
+}
+
+/// A run of chains in `D` dimensions.
+struct ChainRun<const D: usize> {
+    simulation: ChainSimulation<D>,
+}
+
+impl<const D: usize> ChainRun<D> {
+    fn new(compiled: Compiled<D>, source: &Source, workers: usize) -> Self {
+        Self { simulation: ChainSimulation::new(compiled, source, workers) }
+    }
+}
+
+delegates_simulation!([const D: usize] ChainRun<D>);
+
+impl<const D: usize> Run for ChainRun<D> {
+    fn agent(&self) -> &'static str {
+        "connector"
+    }
+
+    fn plan(&self) -> Plan {
+        let compiled = self.simulation.compiled();
+        Plan {
+            name: compiled.name.clone(),
+            seed: compiled.seed,
+            cycles: compiled.cycles,
+            checkpoint_every: match compiled.record.checkpoint_every {
+                0 => Cycle::MAX,
+                every => every,
+            },
+        }
+    }
+
+    fn begin_recording(&mut self) {
+        self.simulation.begin_recording();
+    }
+
+    fn restore(&mut self, checkpoint: &[u8]) -> Result<(), CheckpointError> {
+        self.simulation.restore(checkpoint)
+    }
+
+    fn contents(&self) -> Said {
+        let world = self.simulation.world();
+        let rods: usize = world.chains.iter().map(|spec| spec.start.rods().len()).sum();
+        let json = json!({
+            "chains": world.chains.len(),
+            "connectors": self.simulation.agents(),
+            "rods": rods,
+            "obstacles": world.obstacles.still().len(),
+            "movers": world.movers.len(),
+            "dimensions": D,
+            "dt_s": world.dt_s,
+        });
+        let text = format!(
+            "  chains           {}, of {} connectors in {D} dimensions\n  \
+             obstacles        {}, and {} that move\n",
+            grouped(world.chains.len() as u64),
+            grouped(self.simulation.agents() as u64),
+            grouped(world.obstacles.still().len() as u64),
+            grouped(world.movers.len() as u64),
+        );
+        Said { json, text }
+    }
+
+    fn outcome(&self) -> Lines {
+        outcome(&self.simulation.chain_metrics())
+    }
+
+    fn agent_metrics(&self) -> Value {
+        let one = |slot| serde_json::to_value(self.simulation.metrics_of(slot));
+        (0..self.simulation.state().len()).map(|slot| one(slot).unwrap_or_default()).collect()
+    }
+
+    fn poses(&self) -> Said {
+        let snapshot = self.simulation.snapshot();
+        let mut rows = Vec::new();
+        let mut text = "  chain  connector         x_m         y_m         z_m\n".to_string();
+        for (chain, record) in snapshot.chains.iter().enumerate() {
+            for (connector, at) in record.points_m.chunks_exact(D).enumerate() {
+                rows.push(json!({ "chain": chain, "connector": connector, "at_m": at }));
+                let at = at.iter().map(|x| format!("{x:>12.4}")).collect::<String>();
+                text.push_str(&format!("  {chain:<5}  {connector:<9}{at}\n"));
+            }
+        }
+        Said { json: Value::Array(rows), text }
+    }
+
+    fn compare(&self, folder: &Path) -> Result<Comparison, InputError> {
+        picture::compare(&self.simulation, folder)
+    }
+
+    fn picture(&self, of: Pictured<'_>) -> Result<String, Failure> {
+        picture::svg(&self.simulation, of)
+    }
+}
+
+fn line(name: &str, value: String) -> (String, String) {
+    (name.into(), value)
+}
+
+/// What came of a run, in words.
+fn outcome(m: &Metrics) -> Lines {
+    let clearance = m.min_clearance_m.map_or("nothing came near".into(), |c| format!("{c:.4} m"));
+    let penetrations = match m.penetrations {
+        0 => "none".into(),
+        n => format!("{} steps with a part in an obstacle", grouped(n)),
+    };
+    let mut lines = vec![
+        line("progress", format!("{:.1} %", 100.0 * m.progress)),
+        line("vetoes", vetoes(m)),
+        line("penetrations", penetrations),
+        line("least clearance", clearance),
+        line("rods", format!("within their limits to {:.1e} m", m.max_rod_violation_m)),
+        line(
+            "effort",
+            format!(
+                "{:.1} connectors moved per step, {} rods turned",
+                m.moved_per_step,
+                grouped(m.rotations)
+            ),
+        ),
+        line("greatest speed", format!("{:.3} m/s", m.max_speed_m_s)),
+    ];
+    if m.reformed > 0 {
+        lines.push(line("re-formed", format!("{} times", grouped(m.reformed))));
+    }
+    lines.extend(m.given_up.iter().take(MOST_TOLD).map(given_up));
+    lines
+}
+
+/// More that was given up is only counted.
+const MOST_TOLD: usize = 5;
+
+fn vetoes(m: &Metrics) -> String {
+    if m.vetoes == 0 {
+        return "none".into();
+    }
+    let reasons = m.vetoes_by_reason.iter().map(|(reason, n)| format!("{reason} {}", grouped(*n)));
+    format!("{}: {}", grouped(m.vetoes), reasons.collect::<Vec<_>>().join(", "))
+}
+
+fn given_up(told: &ChainGivenUp) -> (String, String) {
+    let what = &told.what;
+    let why = match (&what.by, &what.reason) {
+        (Some(by), Some(reason)) => format!("connector {by} objected: {reason}"),
+        _ => "nobody objected".into(),
+    };
+    let nearest = match what.nearest_m.is_finite() {
+        true => format!(", came within {:.4} m", what.nearest_m),
+        false => String::new(),
+    };
+    let who = format!("chain {}, task {}, part {}", told.chain, what.task, what.part);
+    line("given up", format!("{who}{nearest}; {why}"))
+}

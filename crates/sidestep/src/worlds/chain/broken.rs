@@ -1,0 +1,106 @@
+//! What happens to chains: parts that fail, and chains that break and are joined again (slides R8,
+//! R10, F3).
+
+use super::act::Turn;
+use super::driver::towards;
+use super::events::EventKind;
+use super::rebuild::{MayCome, Reformed, reform};
+use super::state::{Body, Scattered, flat};
+use super::world::{ChainWorld, Scratch, What, purpose};
+use sidestep_kernel::distr::normal;
+use std::ops::RangeInclusive;
+
+impl<const D: usize> ChainWorld<D> {
+    /// What happens to a chain at the begin of a cycle.
+    pub(super) fn change(&self, body: &mut Body<D>, turn: Turn<'_, D>, scratch: &mut Scratch<D>) {
+        for change in turn.spec.changes.iter().filter(|change| change.cycle == turn.now) {
+            change.constrain(&mut body.chain);
+            match &change.what {
+                What::Failed { connector, .. }
+                | What::Mobility { connector, .. }
+                | What::MaxBend { connector, .. } => {
+                    scratch.events.push(turn.event(EventKind::Changed, *connector, 0.0));
+                }
+                What::Scatter { connectors, by_m } => {
+                    self.scatter(body, turn, connectors, *by_m);
+                    let n = connectors.clone().count() as f64;
+                    scratch.events.push(turn.event(EventKind::Broken, *connectors.start(), n));
+                }
+                What::Reform { may_come, speed_m_s } => {
+                    self.begin_reform(body, turn, (*may_come, *speed_m_s), scratch);
+                }
+            }
+        }
+    }
+
+    fn scatter(
+        &self,
+        body: &mut Body<D>,
+        turn: Turn<'_, D>,
+        connectors: &RangeInclusive<usize>,
+        by_m: f64,
+    ) {
+        let draws = &mut self.streams.draws(turn.slot, turn.now, purpose::SCATTER);
+        for point in &mut body.chain.points_mut()[connectors.clone()] {
+            point.iter_mut().for_each(|x| *x += by_m * normal(draws));
+        }
+        body.scattered = Some(Scattered {
+            first: *connectors.start() as u32,
+            last: *connectors.end() as u32,
+            speed_m_s: 0.0,
+            goals_m: Vec::new(),
+        });
+    }
+
+    /// Finds where the scattered parts have to be.
+    fn begin_reform(
+        &self,
+        body: &mut Body<D>,
+        turn: Turn<'_, D>,
+        (may_come, speed_m_s): (MayCome, f64),
+        scratch: &mut Scratch<D>,
+    ) {
+        let Some(scattered) = &mut body.scattered else { return };
+        let mut whole = body.chain.clone();
+        let (first, last) = (scattered.first as usize, scattered.last as usize);
+        let came = reform(&mut whole, first..=last, may_come)
+            .expect("the scattered connectors were checked when the scenario was compiled");
+        let event = match came {
+            Reformed::Whole { double_passes } => {
+                scattered.goals_m = flat(whole.points());
+                scattered.speed_m_s = speed_m_s;
+                turn.event(EventKind::Reformed, first, double_passes as f64)
+            }
+            Reformed::GapTooLong { have_m, need_m } => {
+                turn.event(EventKind::GapTooLong, first, need_m - have_m)
+            }
+            Reformed::NotReached { off_m } => turn.event(EventKind::GapTooLong, first, off_m),
+        };
+        scratch.events.push(event);
+    }
+
+    /// Scattered parts go to where they are joined again, each straight, and the chain is whole
+    /// when all are there.
+    pub(super) fn come_together(
+        &self,
+        body: &mut Body<D>,
+        _: Turn<'_, D>,
+        _: &mut Scratch<D>,
+    ) {
+        let Some(scattered) = body.scattered.as_ref().filter(|s| !s.goals_m.is_empty()) else {
+            return;
+        };
+        let step_m = scattered.speed_m_s * self.dt_s;
+        let goals = scattered.goals_m.chunks_exact(D);
+        let mut all_there = true;
+        for (point, goal) in body.chain.points_mut().iter_mut().zip(goals) {
+            let goal = std::array::from_fn(|i| goal[i]);
+            *point = towards(*point, goal, step_m);
+            all_there &= *point == goal;
+        }
+        if all_there {
+            body.scattered = None;
+            body.tally.reformed += 1;
+        }
+    }
+}

@@ -1,0 +1,224 @@
+//! Who moves a chain, and where to: tasks that its initiator carries out one after the other
+//! (slides R4, R9).
+
+use super::geometry::{Bounds, Point, along, distance, unit};
+use super::script::{Motion, Script, Turtle};
+use super::veto::Source;
+use serde::{Deserialize, Serialize};
+use sidestep_kernel::distr::normal;
+use sidestep_kernel::stream::Draws;
+use sidestep_kernel::{Cycle, InputError, math};
+use std::sync::Arc;
+
+/// Motions that a script may come to.
+pub const MAX_MOTIONS: usize = 1_000_000;
+
+/// One task.
+#[derive(Debug, Clone)]
+pub struct Task<const D: usize> {
+    /// The connector that moves.
+    pub agent: usize,
+    /// How fast.
+    pub speed_m_s: f64,
+    /// What it is to do.
+    pub driver: Driver<D>,
+    /// For how long at most; infinite for as long as it takes.
+    pub lasts_s: f64,
+    /// How long it tries what is vetoed before it gives up.
+    pub patience_s: f64,
+}
+
+/// What an initiator is to do.
+#[derive(Debug, Clone)]
+pub enum Driver<const D: usize> {
+    /// Nothing: it moves only to get out of the way.
+    Rest,
+    /// Go anywhere, autonomously.
+    Wander(Wander<D>),
+    /// Go where a script says, as an operator would.
+    Script(Arc<Script>),
+    /// Go to places one after the other, as a planner would, but around what is in the way.
+    Targets(Targets<D>),
+}
+
+/// Going anywhere: ahead, and a little to any side.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wander<const D: usize> {
+    /// Standard deviation of the change of direction per square root of a meter gone.
+    pub turn_rad: f64,
+    /// Where it stays, if it is to stay somewhere: outside it turns back.
+    pub within: Option<Bounds<D>>,
+}
+
+/// Places to go to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Targets<const D: usize> {
+    /// The places.
+    pub places: Vec<Point<D>>,
+    /// How near counts as there, meters.
+    pub tolerance_m: f64,
+}
+
+impl<const D: usize> Task<D> {
+    /// Who asks for its motions.
+    pub fn source(&self) -> Source {
+        match self.driver {
+            Driver::Script(_) => Source::Operator,
+            _ => Source::Autonomous,
+        }
+    }
+}
+
+/// Where an initiator is in its tasks: a part of the state.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Driving {
+    /// The present task.
+    pub task: u32,
+    /// Cycles since it began,
+    pub cycles: Cycle,
+    /// of these, without a motion to the end.
+    pub idle: u32,
+    /// Motions of the script, or targets, that are done with.
+    pub next: u32,
+    /// Cycles that it has rested on order of the script.
+    pub rested: u32,
+    /// Where the task began: position, ahead, left.
+    pub start: [[f64; 3]; 3],
+    /// The direction ahead, a unit vector.
+    pub ahead: [f64; 3],
+    /// The nearest that it came to its present target.
+    pub nearest_m: f64,
+    /// Way that it wanted to go, and way that it went, in all tasks.
+    pub way_m: [f64; 2],
+}
+
+impl Driving {
+    /// At the begin of the first task.
+    pub fn new<const D: usize>(agent: usize, points: &[Point<D>]) -> Self {
+        let mut driving = Self {
+            task: 0,
+            cycles: 0,
+            idle: 0,
+            next: 0,
+            rested: 0,
+            start: [[0.0; 3]; 3],
+            ahead: [0.0; 3],
+            nearest_m: f64::INFINITY,
+            way_m: [0.0; 2],
+        };
+        driving.begin(agent, points);
+        driving
+    }
+
+    /// Begins a task where its initiator is.
+    fn begin<const D: usize>(&mut self, agent: usize, points: &[Point<D>]) {
+        let turtle = turtle(agent, points);
+        self.start = [turtle.position_m, turtle.ahead, turtle.left];
+        self.ahead = turtle.ahead;
+        (self.cycles, self.idle, self.next, self.rested) = (0, 0, 0, 0);
+        self.nearest_m = f64::INFINITY;
+    }
+
+    /// Goes on to the next task, which `agent` carries out.
+    pub fn next_task<const D: usize>(&mut self, agent: usize, points: &[Point<D>]) {
+        self.task += 1;
+        self.begin(agent, points);
+    }
+
+    /// All motions of a script that began here.
+    ///
+    /// # Errors
+    /// What the script comes to that is no motion, or too many of them.
+    pub fn motions(&self, script: &Script) -> Result<Vec<Motion>, InputError> {
+        let [position_m, ahead, left] = self.start;
+        let motions = script.motions(Turtle { position_m, ahead, left });
+        let motions: Vec<Motion> = motions.take(MAX_MOTIONS + 1).collect::<Result<_, _>>()?;
+        if motions.len() > MAX_MOTIONS {
+            let cause = format!("comes to more than {MAX_MOTIONS} motions");
+            return Err(InputError::new("script", cause, "repeat less often"));
+        }
+        Ok(motions)
+    }
+}
+
+/// A turtle at a connector, looking away from the chain.
+fn turtle<const D: usize>(agent: usize, points: &[Point<D>]) -> Turtle {
+    let at = points[agent];
+    let behind = match agent {
+        0 => points.get(1),
+        _ => points.get(agent - 1),
+    };
+    let ahead = behind.and_then(|b| unit(std::array::from_fn::<f64, D, _>(|i| at[i] - b[i])));
+    let ahead = ahead.map_or([1.0, 0.0, 0.0], in_space);
+    // Left is level: across the upward axis, or along y where that is ahead.
+    let across = math::hypot(ahead[0], ahead[1]);
+    let left = match across > 1e-9 {
+        true => [-ahead[1] / across, ahead[0] / across, 0.0],
+        false => [0.0, 1.0, 0.0],
+    };
+    Turtle { position_m: in_space(at), ahead, left }
+}
+
+/// A point with as many coordinates as three.
+pub fn in_space<const D: usize>(p: Point<D>) -> [f64; 3] {
+    std::array::from_fn(|i| p.get(i).copied().unwrap_or(0.0))
+}
+
+/// The first coordinates of a point.
+pub fn out_of_space<const D: usize>(p: [f64; 3]) -> Point<D> {
+    std::array::from_fn(|i| p[i])
+}
+
+/// At most `step_m` towards a place.
+pub fn towards<const D: usize>(from: Point<D>, to: Point<D>, step_m: f64) -> Point<D> {
+    let far_m = distance(from, to);
+    if far_m <= step_m { to } else { along(from, std::array::from_fn(|i| to[i] - from[i]), step_m / far_m) }
+}
+
+/// The direction of a wandering initiator for the next step.
+pub(super) fn wander<const D: usize>(
+    rule: &Wander<D>,
+    at: Point<D>,
+    ahead: Point<D>,
+    step_m: f64,
+    draws: &mut Draws,
+) -> Point<D> {
+    let by_m = rule.turn_rad * step_m.sqrt();
+    let turned = std::array::from_fn(|i| ahead[i] + by_m * normal(draws) + rule.home(at)[i]);
+    unit(turned).unwrap_or(ahead)
+}
+
+impl<const D: usize> Wander<D> {
+    /// Towards the inside, where `at` is outside.
+    fn home(&self, at: Point<D>) -> Point<D> {
+        let Some(within) = &self.within else { return [0.0; D] };
+        let inside: Point<D> = std::array::from_fn(|i| at[i].clamp(within.lo[i], within.hi[i]));
+        let back = unit(std::array::from_fn::<f64, D, _>(|i| inside[i] - at[i]));
+        back.map_or([0.0; D], |u| u.map(|x| HOMESICK * x))
+    }
+}
+
+/// How fast a wandering initiator turns back that is outside, per step.
+const HOMESICK: f64 = 0.1;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_turtle_looks_away_from_the_chain() {
+        let points = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]];
+        assert_eq!(turtle(2, &points).ahead, [0.0, 1.0, 0.0]);
+        assert_eq!(turtle(0, &points).ahead, [-1.0, 0.0, 0.0]);
+        assert_eq!(turtle(0, &points[..1]).ahead, [1.0, 0.0, 0.0]);
+        let upward = turtle(1, &[[0.0, 0.0, 0.0], [0.0, 0.0, 2.0]]);
+        assert_eq!((upward.ahead, upward.left), ([0.0, 0.0, 1.0], [0.0, 1.0, 0.0]));
+    }
+
+    #[test]
+    fn a_step_never_goes_beyond_its_goal() {
+        assert_eq!(towards([0.0, 0.0], [3.0, 4.0], 10.0), [3.0, 4.0]);
+        assert_eq!(towards([0.0, 0.0], [3.0, 4.0], 2.5), [1.5, 2.0]);
+        assert_eq!(towards([1.0], [1.0], 0.0), [1.0]);
+    }
+}

@@ -1,0 +1,88 @@
+//! What is measured of a chain at the end of each of its cycles.
+
+use super::act::Turn;
+use super::chain::Chain;
+use super::events::EventKind;
+use super::geometry::{Bounds, distance};
+use super::metrics::{PENETRATION_M, Tally};
+use super::obstacle::Obstacles;
+use super::state::Body;
+use super::veto::{Moved, Reason};
+use super::world::{ChainWorld, Scratch};
+
+impl Tally {
+    /// Adds a motion.
+    pub(super) fn add_moved<const D: usize>(&mut self, moved: &Moved<D>) {
+        self.rotations += moved.rotated as u64;
+        self.moved += moved.changed as u64;
+        self.max_slave_step_m = self.max_slave_step_m.max(moved.max_slave_step_m);
+    }
+
+    /// Adds a veto.
+    pub(super) fn add_veto(&mut self, reason: Reason) {
+        let k = Reason::ALL.iter().position(|&all| all == reason);
+        self.vetoes[k.unwrap_or_default()] += 1;
+    }
+}
+
+impl<const D: usize> ChainWorld<D> {
+    /// Looks at a chain as it is after its cycle.
+    pub(super) fn measure(
+        &self,
+        body: &mut Body<D>,
+        turn: Turn<'_, D>,
+        scratch: &mut Scratch<D>,
+    ) {
+        let (chain, tally) = (&body.chain, &mut body.tally);
+        tally.steps += 1;
+        let ways_m = scratch.before.iter().zip(chain.points()).map(|(a, b)| distance(*a, *b));
+        tally.max_speed_m_s = tally.max_speed_m_s.max(ways_m.fold(0.0, f64::max) / self.dt_s);
+        if body.scattered.is_some() {
+            return;
+        }
+        tally.max_rod_violation_m = tally.max_rod_violation_m.max(chain.max_rod_violation_m());
+        let (least_m, part) = least_clearance(chain, &scratch.obstacles, self.look_m);
+        if least_m < self.look_m {
+            tally.min_clearance_m = tally.min_clearance_m.min(least_m);
+        }
+        let is_inside = least_m < -PENETRATION_M;
+        tally.penetrations += u64::from(is_inside);
+        if is_inside != tally.is_inside {
+            let kind = if is_inside { EventKind::Penetration } else { EventKind::Clear };
+            scratch.events.push(turn.event(kind, part, (-least_m).max(0.0)));
+        }
+        tally.is_inside = is_inside;
+    }
+}
+
+/// The least distance of any part of a chain from obstacles, up to `look_m`, and the connector at
+/// or before that part.
+fn least_clearance<const D: usize>(
+    chain: &Chain<D>,
+    obstacles: &Obstacles<D>,
+    look_m: f64,
+) -> (f64, usize) {
+    if obstacles.is_empty() {
+        return (look_m, 0);
+    }
+    let points = chain.points();
+    let mut least = (look_m, 0);
+    let mut tell = |apart_m: f64, part: usize| {
+        if apart_m < least.0 {
+            least = (apart_m, part);
+        }
+    };
+    // One query for a rod and its ends: what is near to one of them mostly is near to all.
+    for k in 0..points.len() {
+        let end = (k + 1).min(points.len() - 1);
+        let radii_m = [k, end].map(|i| chain.connectors()[i].radius_m);
+        let rod_m = chain.rods().get(k).map_or(0.0, |rod| rod.radius_m);
+        let near = Bounds::of(&[points[k], points[end]]).grown(radii_m[0].max(radii_m[1]) + look_m);
+        obstacles.visit(&near, |o| {
+            let ball_m = o.core.nearest_to_point(points[k]).distance_m - radii_m[0];
+            let rod_m = o.core.nearest_to_segment([points[k], points[end]]).distance_m - rod_m;
+            tell(ball_m.min(rod_m) - o.radius_m, k);
+        });
+    }
+    least
+}

@@ -1,0 +1,167 @@
+//! What came of a run.
+
+use super::veto::Reason;
+use serde::{Deserialize, Serialize};
+use sidestep_kernel::EntityId;
+use std::collections::BTreeMap;
+
+/// A part that is deeper than this in an obstacle counts as a penetration, meters.
+pub const PENETRATION_M: f64 = 1e-6;
+
+/// What came of one chain: counts that a run keeps beside its state.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Tally {
+    /// Cycles in which it could act.
+    pub steps: u64,
+    /// Vetoes that drivers met with, by [`Reason::ALL`].
+    pub vetoes: [u64; Reason::ALL.len()],
+    /// Steps at whose end some part was in an obstacle,
+    pub penetrations: u64,
+    /// and whether it was so at the end of the last step.
+    pub is_inside: bool,
+    /// The least distance of any part from obstacles; infinite where none came near.
+    pub min_clearance_m: f64,
+    /// The greatest amount by which a rod was outside its limits while the chain was whole.
+    pub max_rod_violation_m: f64,
+    /// The longest way of a connector, other than the initiator's, in one sub-step.
+    pub max_slave_step_m: f64,
+    /// The greatest speed of any connector.
+    pub max_speed_m_s: f64,
+    /// Rods turned to avoid something.
+    pub rotations: u64,
+    /// Connectors moved, sums over the sub-steps.
+    pub moved: u64,
+    /// Tasks done, targets reached.
+    pub done: u64,
+    /// Tasks and targets that were given up.
+    pub given_up: Vec<GivenUp>,
+    /// How often broken parts were joined again.
+    pub reformed: u64,
+}
+
+impl Default for Tally {
+    fn default() -> Self {
+        Self {
+            steps: 0,
+            vetoes: [0; Reason::ALL.len()],
+            penetrations: 0,
+            is_inside: false,
+            min_clearance_m: f64::INFINITY,
+            max_rod_violation_m: 0.0,
+            max_slave_step_m: 0.0,
+            max_speed_m_s: 0.0,
+            rotations: 0,
+            moved: 0,
+            done: 0,
+            given_up: Vec::new(),
+            reformed: 0,
+        }
+    }
+}
+
+/// Something that an initiator gave up.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct GivenUp {
+    /// The task.
+    pub task: u32,
+    /// The motion of its script, or the target.
+    pub part: u32,
+    /// The nearest that the initiator came to it, meters.
+    pub nearest_m: f64,
+    /// Who objected at last, if somebody did,
+    pub by: Option<u32>,
+    /// and why.
+    pub reason: Option<String>,
+}
+
+/// Metrics of a run. The names of the first seven are fixed: others' scripts rely on them.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Metrics {
+    /// Cycles of all chains together.
+    pub steps: u64,
+    /// Vetoes that drivers met with.
+    pub vetoes: u64,
+    /// Steps at whose end some part of a chain was in an obstacle.
+    pub penetrations: u64,
+    /// The least distance of any part from obstacles; none where nothing came near.
+    pub min_clearance_m: Option<f64>,
+    /// The greatest amount by which a rod was outside its limits.
+    pub max_rod_violation_m: f64,
+    /// The part of their tasks that the chains have done, 0 to 1, on average; see
+    /// [`super::world::ChainWorld::progress`].
+    pub progress: f64,
+    /// Steps per second of processor time, of this process's part of the run.
+    pub steps_per_cpu_s: f64,
+    /// Vetoes by reason; those that did not occur are left out.
+    pub vetoes_by_reason: BTreeMap<&'static str, u64>,
+    /// Rods turned to avoid something.
+    pub rotations: u64,
+    /// Connectors moved per step, sums over the sub-steps.
+    pub moved_per_step: f64,
+    /// The longest way of a connector, other than an initiator's, in one sub-step.
+    pub max_slave_step_m: f64,
+    /// The greatest speed of any connector.
+    pub max_speed_m_s: f64,
+    /// Tasks done, targets reached.
+    pub done: u64,
+    /// How often broken parts were joined again.
+    pub reformed: u64,
+    /// What was given up, by chain.
+    pub given_up: Vec<ChainGivenUp>,
+}
+
+/// Something that a chain's initiator gave up.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ChainGivenUp {
+    /// The chain.
+    pub chain: EntityId,
+    /// What.
+    #[serde(flatten)]
+    pub what: GivenUp,
+}
+
+/// What came of one chain.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ChainMetrics {
+    /// Its id.
+    pub chain: EntityId,
+    /// Its name, may be empty.
+    pub name: String,
+    /// See [`Metrics::progress`].
+    pub progress: f64,
+    /// What was counted.
+    #[serde(flatten)]
+    pub tally: Tally,
+}
+
+impl Metrics {
+    /// Sums over chains; `progress` of each.
+    pub(super) fn of(tallies: &[Tally], progress: &[f64], cpu_s: f64, timed_steps: u64) -> Self {
+        let sum = |count: fn(&Tally) -> u64| tallies.iter().map(count).sum::<u64>();
+        let most = |value: fn(&Tally) -> f64| tallies.iter().map(value).fold(0.0, f64::max);
+        let vetoes_of = |k: usize| tallies.iter().map(|t| t.vetoes[k]).sum::<u64>();
+        let least = tallies.iter().map(|t| t.min_clearance_m).fold(f64::INFINITY, f64::min);
+        let steps = sum(|t| t.steps);
+        let by_reason = (0..Reason::ALL.len()).map(|k| (Reason::ALL[k].name(), vetoes_of(k)));
+        let given_up = (0..).zip(tallies).flat_map(|(chain, tally)| {
+            tally.given_up.iter().map(move |what| ChainGivenUp { chain, what: what.clone() })
+        });
+        Self {
+            steps,
+            vetoes: (0..Reason::ALL.len()).map(vetoes_of).sum(),
+            penetrations: sum(|t| t.penetrations),
+            min_clearance_m: Some(least).filter(|m| m.is_finite()),
+            max_rod_violation_m: most(|t| t.max_rod_violation_m),
+            progress: progress.iter().sum::<f64>() / progress.len().max(1) as f64,
+            steps_per_cpu_s: timed_steps as f64 / cpu_s.max(1e-9),
+            vetoes_by_reason: by_reason.filter(|(_, n)| *n > 0).collect(),
+            rotations: sum(|t| t.rotations),
+            moved_per_step: sum(|t| t.moved) as f64 / steps.max(1) as f64,
+            max_slave_step_m: most(|t| t.max_slave_step_m),
+            max_speed_m_s: most(|t| t.max_speed_m_s),
+            done: sum(|t| t.done),
+            reformed: sum(|t| t.reformed),
+            given_up: given_up.collect(),
+        }
+    }
+}

@@ -1,0 +1,288 @@
+//! Chains: their shape, their limits, and where they begin.
+
+use super::super::chain::{Chain, Connector, Mobility, Rod};
+use super::super::geometry::{Point, along, first_axis, unit};
+use super::super::world::{ChainSpec, What};
+use super::changes::ChangeSection;
+use super::tasks::TaskSection;
+use super::Compiler;
+use crate::scenario::OneOrMany;
+use serde::Deserialize;
+use sidestep_kernel::{InputError, math};
+use std::ops::Range;
+use toml::Spanned;
+
+/// Most connectors of a chain.
+const MAX_CONNECTORS: usize = 10_000_000;
+
+/// A length, or the least and the greatest.
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(untagged)]
+enum Length {
+    Fixed(f64),
+    Between([f64; 2]),
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ChainSection {
+    #[serde(default)]
+    name: String,
+    #[serde(default = "one_chain")]
+    count: usize,
+    apart_m: Option<Spanned<Vec<f64>>>,
+    connectors: Option<usize>,
+    at_m: Option<Spanned<Vec<f64>>>,
+    along: Option<Spanned<Vec<f64>>>,
+    heading_deg: Option<f64>,
+    points_m: Option<Spanned<Vec<Vec<f64>>>>,
+    rod_m: Option<Spanned<Length>>,
+    radius_m: Option<f64>,
+    rod_radius_m: Option<f64>,
+    max_bend_deg: Option<f64>,
+    #[serde(default)]
+    limits: OneOrMany<Spanned<LimitSection>>,
+    #[serde(default)]
+    tasks: OneOrMany<Spanned<TaskSection>>,
+    #[serde(default)]
+    changes: OneOrMany<Spanned<ChangeSection>>,
+}
+
+fn one_chain() -> usize {
+    1
+}
+
+/// What is special about one connector.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct LimitSection {
+    connector: usize,
+    mobility: Option<Spanned<MobilitySection>>,
+    max_bend_deg: Option<f64>,
+    radius_m: Option<f64>,
+    #[serde(default)]
+    failed: bool,
+}
+
+/// Where a connector may be.
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub(super) enum MobilitySection {
+    Free,
+    Fixed,
+    OnSegment([Vec<f64>; 2]),
+    OnPlane { normal: Vec<f64>, offset_m: f64 },
+    InBox([Vec<f64>; 2]),
+}
+
+impl Compiler<'_> {
+    /// All chains.
+    pub(super) fn chains<const D: usize>(
+        &self,
+        dt_s: f64,
+    ) -> Result<Vec<ChainSpec<D>>, InputError> {
+        let mut all = Vec::new();
+        for section in &self.file.chains.0 {
+            let spec = self.chain::<D>(section, dt_s)?;
+            for copy in 0..section.get_ref().count {
+                all.push(self.copied(&spec, section, copy)?);
+            }
+        }
+        if all.is_empty() {
+            let remedy = "add [[chains]] with connectors, rod_m and [[chains.tasks]]";
+            return Err(self.error(None, "the scenario has no chains", remedy));
+        }
+        Ok(all)
+    }
+
+    /// One more chain like `spec`, so many times `apart_m` further.
+    fn copied<const D: usize>(
+        &self,
+        spec: &ChainSpec<D>,
+        section: &Spanned<ChainSection>,
+        copy: usize,
+    ) -> Result<ChainSpec<D>, InputError> {
+        let s = section.get_ref();
+        let apart_m: Point<D> = match &s.apart_m {
+            Some(given) => self.point(given.get_ref(), "apart_m", given.span())?,
+            None if s.count > 1 => {
+                let remedy = "add apart_m = [...], the way from one to the next";
+                return Err(self.error(
+                    Some(section.span()),
+                    format!("{} chains at one place", s.count),
+                    remedy,
+                ));
+            }
+            None => [0.0; D],
+        };
+        let by = apart_m.map(|x| x * copy as f64);
+        let chain = &spec.start;
+        let points = chain.points().iter().map(|p| along(*p, by, 1.0)).collect();
+        let start = Chain::new(points, chain.connectors().to_vec(), chain.rods().to_vec())
+            .map_err(|error| self.at(section.span(), &error))?;
+        Ok(ChainSpec { start, ..spec.clone() })
+    }
+
+    fn chain<const D: usize>(
+        &self,
+        section: &Spanned<ChainSection>,
+        dt_s: f64,
+    ) -> Result<ChainSpec<D>, InputError> {
+        let (s, at) = (section.get_ref(), section.span());
+        let start = self.shape::<D>(s, at.clone())?;
+        let n = start.points().len();
+        let tasks = s.tasks.0.iter().map(|task| self.task(task, n)).collect::<Result<Vec<_>, _>>()?;
+        if tasks.is_empty() {
+            let remedy = "add [[chains.tasks]] with a kind: rest, wander, script or targets";
+            return Err(self.error(Some(at), "a chain without a task", remedy));
+        }
+        let changes = s.changes.0.iter().map(|change| self.change(change, &start, dt_s));
+        let mut changes = changes.collect::<Result<Vec<_>, _>>()?;
+        changes.sort_by_key(|change| change.cycle);
+        let is_broken = |change: &super::super::world::Change<D>| {
+            matches!(change.what, What::Scatter { .. })
+        };
+        if changes.iter().filter(|change| is_broken(change)).count() > 1 {
+            let remedy = "let it break once";
+            return Err(self.error(Some(at), "a chain that breaks more than once", remedy));
+        }
+        Ok(ChainSpec { name: s.name.clone(), start, tasks, changes })
+    }
+
+    fn shape<const D: usize>(
+        &self,
+        s: &ChainSection,
+        at: Range<usize>,
+    ) -> Result<Chain<D>, InputError> {
+        let radius_m = s.radius_m.unwrap_or(0.05);
+        let rod = self.rod(s, radius_m, at.clone())?;
+        let points = self.points::<D>(s, rod.max_m, at.clone())?;
+        let mut connectors = vec![Connector::free(radius_m); points.len()];
+        if let Some(deg) = s.max_bend_deg {
+            connectors.iter_mut().for_each(|c| c.max_bend_rad = deg.to_radians());
+        }
+        for limit in &s.limits.0 {
+            self.limit(&mut connectors, limit)?;
+        }
+        let rods = vec![rod; points.len() - 1];
+        Chain::new(points, connectors, rods).map_err(|error| self.at(at, &error))
+    }
+
+    fn rod(&self, s: &ChainSection, radius_m: f64, at: Range<usize>) -> Result<Rod, InputError> {
+        // Thick rods make slaves jump: those of a swarm are virtual anyway.
+        let rod_radius_m = s.rod_radius_m.unwrap_or(0.2 * radius_m);
+        match &s.rod_m {
+            Some(length) => {
+                let [min_m, max_m] = match *length.get_ref() {
+                    Length::Fixed(length_m) => [length_m; 2],
+                    Length::Between(limits) => limits,
+                };
+                Ok(Rod { min_m, max_m, radius_m: rod_radius_m })
+            }
+            None => {
+                let remedy = "add rod_m = 0.5, or rod_m = [least, greatest]";
+                Err(self.error(Some(at), "a chain without the length of its rods", remedy))
+            }
+        }
+    }
+
+    /// Where the connectors are: one by one, or on a line from the first one.
+    fn points<const D: usize>(
+        &self,
+        s: &ChainSection,
+        length_m: f64,
+        at: Range<usize>,
+    ) -> Result<Vec<Point<D>>, InputError> {
+        if let Some(given) = &s.points_m {
+            if s.connectors.is_some() || s.at_m.is_some() {
+                let remedy = "give points_m alone, or connectors and at_m";
+                return Err(self.error(Some(at), "a chain placed in two ways", remedy));
+            }
+            let point = |p: &Vec<f64>| self.point(p, "points_m", given.span());
+            let points = given.get_ref().iter().map(point).collect::<Result<Vec<_>, _>>()?;
+            if points.is_empty() {
+                return Err(self.error(Some(at), "points_m = []", "give one point or more"));
+            }
+            return Ok(points);
+        }
+        let n = match s.connectors {
+            Some(n) if (1..=MAX_CONNECTORS).contains(&n) => n,
+            given => {
+                let cause = format!("connectors = {}", given.map_or("nothing".into(), |n| n.to_string()));
+                let remedy = "give a number from 1 to 10000000, or points_m";
+                return Err(self.error(Some(at), cause, remedy));
+            }
+        };
+        let start: Point<D> = match &s.at_m {
+            Some(given) => self.point(given.get_ref(), "at_m", given.span())?,
+            None => [0.0; D],
+        };
+        let u = self.direction::<D>(s)?;
+        Ok((0..n).map(|k| along(start, u, length_m * k as f64)).collect())
+    }
+
+    /// The direction from the first connector to the last.
+    fn direction<const D: usize>(&self, s: &ChainSection) -> Result<Point<D>, InputError> {
+        match (&s.along, s.heading_deg) {
+            (None, None) => Ok(first_axis().map(|x: f64| -x)),
+            (None, Some(deg)) => {
+                let rad = deg.to_radians();
+                // The first connector leads, the others are behind it.
+                let ahead = [math::cos(rad), math::sin(rad), 0.0];
+                Ok(std::array::from_fn(|i| -ahead[i]))
+            }
+            (Some(given), None) => {
+                let direction = self.point::<D>(given.get_ref(), "along", given.span())?;
+                unit(direction).ok_or_else(|| {
+                    let remedy = "give a direction that is not zero";
+                    self.error(Some(given.span()), "along has no length", remedy)
+                })
+            }
+            (Some(given), Some(_)) => {
+                let remedy = "give along, the way from the first connector to the last, or heading_deg";
+                Err(self.error(Some(given.span()), "two directions", remedy))
+            }
+        }
+    }
+
+    fn limit<const D: usize>(
+        &self,
+        connectors: &mut [Connector<D>],
+        limit: &Spanned<LimitSection>,
+    ) -> Result<(), InputError> {
+        let s = limit.get_ref();
+        let n = connectors.len();
+        let Some(connector) = connectors.get_mut(s.connector) else {
+            let cause = format!("connector = {} of a chain of {n}", s.connector);
+            return Err(self.error(Some(limit.span()), cause, "count from 0"));
+        };
+        connector.failed = s.failed;
+        if let Some(given) = &s.mobility {
+            connector.mobility = self.mobility(given)?;
+        }
+        if let Some(deg) = s.max_bend_deg {
+            connector.max_bend_rad = deg.to_radians();
+        }
+        if let Some(radius_m) = s.radius_m {
+            connector.radius_m = radius_m;
+        }
+        Ok(())
+    }
+
+    /// Where a connector may be.
+    pub(super) fn mobility<const D: usize>(
+        &self,
+        given: &Spanned<MobilitySection>,
+    ) -> Result<Mobility<D>, InputError> {
+        let point = |p: &[f64]| self.point::<D>(p, "mobility", given.span());
+        Ok(match given.get_ref() {
+            MobilitySection::Free => Mobility::Free,
+            MobilitySection::Fixed => Mobility::Fixed,
+            MobilitySection::OnSegment([a, b]) => Mobility::OnSegment([point(a)?, point(b)?]),
+            MobilitySection::OnPlane { normal, offset_m } => {
+                Mobility::OnPlane { normal: point(normal)?, offset_m: *offset_m }
+            }
+            MobilitySection::InBox([lo, hi]) => Mobility::InBox { lo: point(lo)?, hi: point(hi)? },
+        })
+    }
+}

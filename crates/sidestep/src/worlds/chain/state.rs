@@ -1,0 +1,221 @@
+//! All that changes in a run, and its snapshot.
+
+use super::chain::Chain;
+use super::driver::Driving;
+use super::geometry::{Bounds, Point};
+use super::metrics::Tally;
+use super::script::Motion;
+use super::world::{ChainSpec, ChainWorld};
+use serde::{Deserialize, Serialize};
+use sidestep_kernel::checkpoint::CheckpointError;
+use sidestep_kernel::digest::Hasher;
+use sidestep_kernel::{Cycle, Digest, InputError};
+use std::sync::{Mutex, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
+
+/// The state of a world of chains; slots are ids.
+#[derive(Debug)]
+pub struct ChainState<const D: usize> {
+    cells: Box<[Cell<D>]>,
+}
+
+/// One chain's share of the state. Locks are never waited for: in the first phase all only read
+/// the bodies, in the last one those who write a body are of one group, which one worker has.
+#[derive(Debug)]
+struct Cell<const D: usize> {
+    body: RwLock<Body<D>>,
+    /// The box that the chain may come to be in during this cycle.
+    claim: Mutex<Bounds<D>>,
+}
+
+/// One chain as it is now.
+#[derive(Debug, Clone)]
+pub struct Body<const D: usize> {
+    /// Its connectors and rods.
+    pub chain: Chain<D>,
+    /// Where its initiator is in its tasks.
+    pub driving: Driving,
+    /// Connectors that were scattered, and where they go to be joined again; none while the chain
+    /// is whole.
+    pub scattered: Option<Scattered>,
+    /// What came of it so far.
+    pub tally: Tally,
+    /// The motions of the present script: they follow from where it began.
+    pub(super) motions: Vec<Motion>,
+}
+
+/// Parts of a broken chain.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Scattered {
+    /// The first scattered connector,
+    pub first: u32,
+    /// and the last.
+    pub last: u32,
+    /// How fast each goes,
+    pub speed_m_s: f64,
+    /// and where all connectors go to be joined again, coordinate after coordinate; empty while the
+    /// parts lie where they are.
+    pub goals_m: Vec<f64>,
+}
+
+/// One chain in a snapshot.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ChainRecord {
+    /// Positions of the connectors, coordinate after coordinate.
+    pub points_m: Vec<f64>,
+    /// See [`Body::driving`].
+    pub driving: Driving,
+    /// See [`Body::scattered`].
+    pub scattered: Option<Scattered>,
+}
+
+/// A state by id: what a checkpoint holds and a digest covers.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Snapshot {
+    /// Cycles done.
+    pub cycle: Cycle,
+    /// The chains by id.
+    pub chains: Vec<ChainRecord>,
+}
+
+impl<const D: usize> Body<D> {
+    /// A chain at its start.
+    pub(super) fn new(spec: &ChainSpec<D>) -> Result<Self, InputError> {
+        let chain = spec.start.clone();
+        let agent = spec.tasks[0].agent;
+        let mut body = Self {
+            driving: Driving::new(agent, chain.points()),
+            chain,
+            scattered: None,
+            tally: Tally::default(),
+            motions: Vec::new(),
+        };
+        body.motions = spec.motions(&body.driving)?;
+        Ok(body)
+    }
+
+    fn record(&self) -> ChainRecord {
+        ChainRecord {
+            points_m: flat(self.chain.points()),
+            driving: self.driving.clone(),
+            scattered: self.scattered.clone(),
+        }
+    }
+
+    /// The body that a record describes, after `cycle` cycles.
+    fn restore(
+        spec: &ChainSpec<D>,
+        record: &ChainRecord,
+        tally: Tally,
+        cycle: Cycle,
+    ) -> Result<Self, CheckpointError> {
+        let mut chain = spec.start.clone();
+        let n = chain.points().len();
+        if record.points_m.len() != n * D || record.driving.task as usize > spec.tasks.len() {
+            return Err(CheckpointError::Damaged);
+        }
+        for change in spec.changes.iter().filter(|change| change.cycle < cycle) {
+            change.constrain(&mut chain);
+        }
+        for (point, at) in chain.points_mut().iter_mut().zip(record.points_m.chunks_exact(D)) {
+            point.copy_from_slice(at);
+        }
+        let motions = spec.motions(&record.driving).map_err(|_| CheckpointError::Damaged)?;
+        let (driving, scattered) = (record.driving.clone(), record.scattered.clone());
+        Ok(Self { chain, driving, scattered, tally, motions })
+    }
+}
+
+/// Coordinate after coordinate.
+pub(super) fn flat<const D: usize>(points: &[Point<D>]) -> Vec<f64> {
+    points.iter().flatten().copied().collect()
+}
+
+impl<const D: usize> ChainState<D> {
+    fn of(bodies: impl Iterator<Item = Body<D>>) -> Self {
+        let cell = |body| Cell { body: RwLock::new(body), claim: Mutex::new(Bounds::nothing()) };
+        Self { cells: bodies.map(cell).collect() }
+    }
+
+    /// The state at the start.
+    ///
+    /// # Errors
+    /// A script that comes to no motions.
+    pub fn new(world: &ChainWorld<D>) -> Result<Self, InputError> {
+        let bodies = world.chains.iter().map(Body::new).collect::<Result<Vec<_>, _>>()?;
+        Ok(Self::of(bodies.into_iter()))
+    }
+
+    /// The state that a snapshot describes.
+    ///
+    /// # Errors
+    /// When it is of other chains.
+    pub(super) fn restore(
+        world: &ChainWorld<D>,
+        snapshot: &Snapshot,
+        tallies: Vec<Tally>,
+    ) -> Result<Self, CheckpointError> {
+        if snapshot.chains.len() != world.chains.len() || tallies.len() != world.chains.len() {
+            return Err(CheckpointError::Damaged);
+        }
+        let all = world.chains.iter().zip(&snapshot.chains).zip(tallies);
+        let bodies = all.map(|((spec, record), tally)| {
+            Body::restore(spec, record, tally, snapshot.cycle)
+        });
+        let bodies = bodies.collect::<Result<Vec<_>, _>>()?;
+        Ok(Self::of(bodies.into_iter()))
+    }
+
+    /// How many chains there are.
+    pub fn len(&self) -> usize {
+        self.cells.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.cells.is_empty()
+    }
+
+    /// One chain, to look at.
+    pub fn body(&self, slot: usize) -> RwLockReadGuard<'_, Body<D>> {
+        self.cells[slot].body.read().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// One chain, to change.
+    pub(super) fn body_mut(&self, slot: usize) -> RwLockWriteGuard<'_, Body<D>> {
+        self.cells[slot].body.write().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The box that a chain has claimed for this cycle.
+    pub(super) fn claim(&self, slot: usize) -> Bounds<D> {
+        *self.cells[slot].claim.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(super) fn set_claim(&self, slot: usize, claim: Bounds<D>) {
+        *self.cells[slot].claim.lock().unwrap_or_else(PoisonError::into_inner) = claim;
+    }
+
+    /// The state after `cycle` cycles.
+    pub fn snapshot(&self, cycle: Cycle) -> Snapshot {
+        Snapshot { cycle, chains: (0..self.len()).map(|slot| self.body(slot).record()).collect() }
+    }
+
+    /// What came of each chain so far.
+    pub(super) fn tallies(&self) -> Vec<Tally> {
+        (0..self.len()).map(|slot| self.body(slot).tally.clone()).collect()
+    }
+}
+
+impl Snapshot {
+    /// The digest of this state (promise D1): every value by id.
+    pub fn digest(&self) -> Digest {
+        let mut hasher = Hasher::default();
+        let bytes = postcard::to_stdvec(self).expect("a snapshot is plain data");
+        bytes.chunks(8).for_each(|chunk| {
+            let mut word = [0; 8];
+            word[..chunk.len()].copy_from_slice(chunk);
+            hasher.u64(u64::from_le_bytes(word));
+        });
+        hasher.u64(bytes.len() as u64);
+        hasher.finish()
+    }
+}

@@ -1,0 +1,301 @@
+//! A compiled world of chains: everything that never changes during a run.
+
+use super::chain::{Chain, Mobility};
+use super::driver::{Driver, Driving, Task};
+use super::events::Event;
+use super::geometry::{Bounds, Point};
+use super::ground::Movers;
+use super::obstacle::{Obstacle, Obstacles};
+use super::propagate::Propagator;
+use super::rebuild::MayCome;
+use super::rules::Rules;
+use super::script::Motion;
+use super::state::{Body, ChainState};
+use cpu_time::ThreadTime;
+use sidestep_kernel::conflict::Groups;
+use sidestep_kernel::stream::Streams;
+use sidestep_kernel::{Cycle, InputError, Slot, World};
+use std::ops::RangeInclusive;
+
+/// What random draws of this world are for.
+pub mod purpose {
+    use sidestep_kernel::stream::Purpose;
+
+    /// Where generated obstacles are.
+    pub const FIELD: Purpose = Purpose(1);
+    /// How a wandering initiator turns.
+    pub const WANDER: Purpose = Purpose(2);
+    /// Where the parts of a broken chain lie.
+    pub const SCATTER: Purpose = Purpose(3);
+    /// Errors of a laser.
+    pub const LASER: Purpose = Purpose(4);
+}
+
+/// From this id on, obstacles are parts of other chains: its number is added.
+pub const OTHER_CHAIN: u32 = 1 << 31;
+
+/// The immutable world that runs share.
+#[derive(Debug, Clone)]
+pub struct ChainWorld<const D: usize> {
+    /// The chains by id.
+    pub chains: Vec<ChainSpec<D>>,
+    /// Obstacles that stand still.
+    pub obstacles: Obstacles<D>,
+    /// Obstacles that move.
+    pub movers: Movers<D>,
+    /// What a cycle takes.
+    pub dt_s: f64,
+    /// How chains react.
+    pub rules: Rules,
+    /// How far around its parts a chain looks for its least distance from obstacles.
+    pub look_m: f64,
+    pub(super) streams: Streams,
+}
+
+/// One chain, and what it is to do.
+#[derive(Debug, Clone)]
+pub struct ChainSpec<const D: usize> {
+    /// Its name, may be empty.
+    pub name: String,
+    /// The chain at the start.
+    pub start: Chain<D>,
+    /// What its initiators do, one task after the other; at least one.
+    pub tasks: Vec<Task<D>>,
+    /// What happens to it, by cycle.
+    pub changes: Vec<Change<D>>,
+}
+
+/// Something that happens to a chain at the begin of a cycle (slides R8, R10, F3).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Change<const D: usize> {
+    /// The cycle.
+    pub cycle: Cycle,
+    /// What happens.
+    pub what: What<D>,
+}
+
+/// What happens to a chain.
+#[derive(Debug, Clone, PartialEq)]
+pub enum What<const D: usize> {
+    /// A connector breaks down, or works again.
+    Failed {
+        /// Which one.
+        connector: usize,
+        /// Whether it has failed.
+        failed: bool,
+    },
+    /// A connector gets another mobility.
+    Mobility {
+        /// Which one.
+        connector: usize,
+        /// Where it may be.
+        mobility: Mobility<D>,
+    },
+    /// A connector gets another bend limit.
+    MaxBend {
+        /// Which one.
+        connector: usize,
+        /// The greatest angle.
+        max_bend_rad: f64,
+    },
+    /// The chain breaks: connectors are thrown about.
+    Scatter {
+        /// Which ones.
+        connectors: RangeInclusive<usize>,
+        /// Standard deviation of each coordinate.
+        by_m: f64,
+    },
+    /// The scattered connectors come back, at most so fast.
+    Reform {
+        /// Which whole end may come along.
+        may_come: MayCome,
+        /// Speed of each part.
+        speed_m_s: f64,
+    },
+}
+
+impl<const D: usize> Change<D> {
+    /// Applies what is a constraint.
+    pub(super) fn constrain(&self, chain: &mut Chain<D>) {
+        let done = match &self.what {
+            What::Failed { connector, failed } => {
+                chain.set_failed(*connector, *failed);
+                Ok(())
+            }
+            What::Mobility { connector, mobility } => chain.set_mobility(*connector, *mobility),
+            What::MaxBend { connector, max_bend_rad } => {
+                chain.set_max_bend_rad(*connector, *max_bend_rad)
+            }
+            What::Scatter { .. } | What::Reform { .. } => Ok(()),
+        };
+        done.expect("a change was checked when the scenario was compiled");
+    }
+}
+
+impl<const D: usize> ChainSpec<D> {
+    /// The motions of the script that a driver is in; none where it is in no script.
+    pub(super) fn motions(&self, driving: &Driving) -> Result<Vec<Motion>, InputError> {
+        match self.tasks.get(driving.task as usize).map(|task| &task.driver) {
+            Some(Driver::Script(script)) => driving.motions(script),
+            _ => Ok(Vec::new()),
+        }
+    }
+}
+
+impl<const D: usize> ChainWorld<D> {
+    /// Seconds from the start to the begin of a cycle.
+    pub fn starts_s(&self, now: Cycle) -> f64 {
+        now as f64 * self.dt_s
+    }
+
+    /// The box in which a chain may come to be during one cycle.
+    fn reach(&self, spec: &ChainSpec<D>, body: &Body<D>) -> Bounds<D> {
+        let chain = &body.chain;
+        let radius_m = chain.connectors().iter().map(|c| c.radius_m).fold(0.0, f64::max);
+        let longest_m = chain.rods().iter().map(|r| r.max_m).fold(0.0, f64::max);
+        let speed_m_s = spec.tasks.iter().map(|t| t.speed_m_s).fold(0.0, f64::max);
+        let way_m = 2.0 * (longest_m + speed_m_s * self.dt_s);
+        Bounds::of(chain.points()).grown(radius_m + way_m)
+    }
+
+    /// The part of its tasks that a chain has done, from 0 to 1: of scripts by motions, of targets
+    /// by targets, of tasks that take a time by time; of wandering the part of the way wanted that
+    /// was gone. Several tasks count alike.
+    pub fn progress(&self, slot: usize, body: &Body<D>) -> f64 {
+        let spec = &self.chains[slot];
+        let Some(task) = spec.tasks.get(body.driving.task as usize) else { return 1.0 };
+        let part = match &task.driver {
+            _ if task.lasts_s.is_finite() => self.starts_s(body.driving.cycles) / task.lasts_s,
+            Driver::Rest => 1.0,
+            Driver::Wander(_) => {
+                let [wanted_m, gone_m] = body.driving.way_m;
+                if wanted_m > 0.0 { gone_m / wanted_m } else { 0.0 }
+            }
+            Driver::Script(_) => f64::from(body.driving.next) / body.motions.len().max(1) as f64,
+            Driver::Targets(targets) => {
+                f64::from(body.driving.next) / targets.places.len().max(1) as f64
+            }
+        };
+        (f64::from(body.driving.task) + part.clamp(0.0, 1.0)) / spec.tasks.len() as f64
+    }
+
+    /// Whether all tasks of all chains are done and everything is whole.
+    pub(super) fn is_over(&self, state: &ChainState<D>) -> bool {
+        self.chains.iter().enumerate().all(|(slot, spec)| {
+            let body = state.body(slot);
+            let is_done = body.driving.task as usize >= spec.tasks.len();
+            is_done && body.scattered.is_none()
+        })
+    }
+}
+
+/// What a worker keeps between tasks.
+#[derive(Debug, Clone)]
+pub struct Scratch<const D: usize> {
+    pub(super) propagator: Propagator<D>,
+    /// The world's obstacles, with those that move where they are at `moved_to`.
+    pub(super) obstacles: Obstacles<D>,
+    moved_to: Option<Cycle>,
+    /// Obstacles that move, and parts of other chains.
+    guests: Vec<Obstacle<D>>,
+    has_others: bool,
+    /// Positions before a cycle.
+    pub(super) before: Vec<Point<D>>,
+    /// What happened.
+    pub(super) events: Vec<Event>,
+    /// Processor time spent: told beside the results, never part of them.
+    pub(super) cpu_ns: u64,
+}
+
+impl<const D: usize> Scratch<D> {
+    /// Puts the movers where they are at the end of a cycle, and the other chains of a group
+    /// where they are now.
+    fn gather(&mut self, world: &ChainWorld<D>, state: &ChainState<D>, now: Cycle, others: impl Iterator<Item = Slot>) {
+        let mut others = others.peekable();
+        let has_others = others.peek().is_some();
+        if self.moved_to == Some(now) && !self.has_others && !has_others {
+            return;
+        }
+        self.guests.clear();
+        let ends_s = world.starts_s(now + 1);
+        self.guests.extend(world.movers.at(ends_s));
+        for slot in others {
+            push_parts(&mut self.guests, slot, &state.body(slot as usize).chain);
+        }
+        self.obstacles
+            .set_moving(&self.guests)
+            .expect("movers and chains were checked when the scenario was compiled");
+        (self.moved_to, self.has_others) = (Some(now), has_others);
+    }
+}
+
+/// The parts of a chain as obstacles to others.
+fn push_parts<const D: usize>(parts: &mut Vec<Obstacle<D>>, slot: Slot, chain: &Chain<D>) {
+    let (id, points) = (OTHER_CHAIN + slot, chain.points());
+    let connectors = points.iter().zip(chain.connectors());
+    parts.extend(connectors.map(|(at, connector)| Obstacle::ball(id, *at, connector.radius_m)));
+    let rods = points.windows(2).zip(chain.rods());
+    parts.extend(rods.map(|(ends, rod)| Obstacle::capsule(id, [ends[0], ends[1]], rod.radius_m)));
+}
+
+impl<const D: usize> World for ChainWorld<D> {
+    type State = ChainState<D>;
+    type Scratch = Scratch<D>;
+
+    fn scratch(&self) -> Scratch<D> {
+        Scratch {
+            propagator: Propagator::new(self.rules),
+            obstacles: self.obstacles.clone(),
+            moved_to: None,
+            guests: Vec::new(),
+            has_others: false,
+            before: Vec::new(),
+            events: Vec::new(),
+            cpu_ns: 0,
+        }
+    }
+
+    fn bodies(&self, state: &ChainState<D>) -> usize {
+        state.len()
+    }
+
+    fn perceive_and_decide(
+        &self,
+        state: &ChainState<D>,
+        _: Cycle,
+        bodies: std::ops::Range<usize>,
+        _: &mut Scratch<D>,
+    ) {
+        for slot in bodies {
+            let claim = self.reach(&self.chains[slot], &state.body(slot));
+            state.set_claim(slot, claim);
+        }
+    }
+
+    fn find_conflicts(
+        &self,
+        state: &ChainState<D>,
+        _: Cycle,
+        bodies: std::ops::Range<usize>,
+        groups: &Groups,
+        _: &mut Scratch<D>,
+    ) {
+        for slot in bodies {
+            let claim = state.claim(slot);
+            for other in (0..slot).filter(|&other| state.claim(other).meets(&claim)) {
+                groups.join(slot as Slot, other as Slot);
+            }
+        }
+    }
+
+    fn react(&self, state: &ChainState<D>, now: Cycle, group: &mut [Slot], scratch: &mut Scratch<D>) {
+        let began = ThreadTime::now();
+        group.sort_unstable();
+        for &slot in &*group {
+            scratch.gather(self, state, now, group.iter().copied().filter(|&s| s != slot));
+            let mut body = state.body_mut(slot as usize);
+            self.act(&mut body, (slot, now), &state.claim(slot as usize), scratch);
+        }
+        scratch.cpu_ns += began.elapsed().as_nanos() as u64;
+    }
+}
