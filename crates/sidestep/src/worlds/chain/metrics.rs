@@ -129,6 +129,12 @@ pub struct ChainMetrics {
     pub name: String,
     /// See [`Metrics::progress`].
     pub progress: f64,
+    /// Joint values of an arm that bring its connectors where they are, rad or m, by name.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub joints: Option<BTreeMap<String, f64>>,
+    /// Why there are none, if an arm has none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub joints_error: Option<String>,
     /// What was counted.
     #[serde(flatten)]
     pub tally: Tally,

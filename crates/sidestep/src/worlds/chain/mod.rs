@@ -15,6 +15,7 @@
 //! ```
 
 mod act;
+pub mod arm;
 mod broken;
 mod candidates;
 #[expect(clippy::module_inception, reason = "the chain itself, of the world of chains")]

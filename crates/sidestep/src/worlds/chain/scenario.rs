@@ -1,5 +1,6 @@
 //! The text of a scenario of chains, and what it compiles to.
 
+mod arms;
 mod chains;
 mod changes;
 mod obstacles;

@@ -1,7 +1,10 @@
 //! A run of chains: the compiled world, the state, the engine, and what is recorded.
 
+use super::arm::Arm;
+use super::driver::in_space;
 use super::events::Event;
 use super::geometry::Core;
+use super::kinematics::Recovered;
 use super::metrics::{ChainMetrics, Metrics, Tally};
 use super::rows::{Rows, Table};
 use super::scenario::Compiled;
@@ -109,9 +112,23 @@ impl<const D: usize> ChainSimulation<D> {
     /// Metrics of one chain.
     pub fn metrics_of(&self, slot: usize) -> ChainMetrics {
         let body = self.state.body(slot);
+        let spec = &self.compiled.world.chains[slot];
+        let points: Vec<_> = body.chain.points().iter().map(|p| in_space(*p)).collect();
+        let joints = spec.arm.as_ref().map(|arm| (arm, arm.joints(&points)));
+        let named = |(arm, recovered): (&Arm, Recovered)| {
+            let names = arm.serial.variables.iter().map(|variable| variable.name.clone());
+            names.zip(recovered.values).collect()
+        };
+        let (joints, joints_error) = match joints {
+            None => (None, None),
+            Some((arm, Ok(recovered))) => (Some(named((arm, recovered))), None),
+            Some((_, Err(error))) => (None, Some(error.to_string())),
+        };
         ChainMetrics {
             chain: slot as EntityId,
-            name: self.compiled.world.chains[slot].name.clone(),
+            name: spec.name.clone(),
+            joints,
+            joints_error,
             progress: self.compiled.world.progress(slot, &body),
             tally: body.tally.clone(),
         }

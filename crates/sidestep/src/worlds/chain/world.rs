@@ -1,5 +1,6 @@
 //! A compiled world of chains: everything that never changes during a run.
 
+use super::arm::Arm;
 use super::chain::{Chain, Mobility};
 use super::driver::{Driver, Driving, Task};
 use super::events::Event;
@@ -16,6 +17,7 @@ use sidestep_kernel::conflict::Groups;
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{Cycle, InputError, Slot, World};
 use std::ops::RangeInclusive;
+use std::sync::Arc;
 
 /// What random draws of this world are for.
 pub mod purpose {
@@ -63,6 +65,8 @@ pub struct ChainSpec<const D: usize> {
     pub tasks: Vec<Task<D>>,
     /// What happens to it, by cycle.
     pub changes: Vec<Change<D>>,
+    /// The arm that it stands for, if it stands for one.
+    pub arm: Option<Arc<Arm>>,
 }
 
 /// Something that happens to a chain at the begin of a cycle (slides R8, R10, F3).

@@ -190,6 +190,16 @@ impl SerialChain {
         Frames { tip: link.then(&self.to_tip), links }
     }
 
+    /// The values of a named posture of `model`, by joint; joints that it leaves out are at rest.
+    /// Of several values for one joint the last one holds.
+    pub fn with_posture(&self, model: &Model, posture: &[(usize, f64)]) -> Vec<f64> {
+        let said = |variable: &Variable| {
+            posture.iter().rfind(|(joint, _)| model.joints[*joint].name == variable.name)
+        };
+        let at_rest = self.variables.iter().zip(self.rest());
+        at_rest.map(|(variable, rest)| said(variable).map_or(rest, |(_, value)| *value)).collect()
+    }
+
     /// The values nearest to zero that are inside the limits.
     pub fn rest(&self) -> Vec<f64> {
         let nearest = |v: &Variable| v.limits.map_or(0.0, |l| 0f64.clamp(l.lower, l.upper));

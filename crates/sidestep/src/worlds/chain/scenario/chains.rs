@@ -1,8 +1,11 @@
 //! Chains: their shape, their limits, and where they begin.
 
 use super::super::chain::{Chain, Connector, Mobility, Rod};
+use super::super::arm::Arm;
+use super::super::driver::out_of_space;
 use super::super::geometry::{Point, along, first_axis, unit};
 use super::super::world::{ChainSpec, What};
+use super::arms::ArmSection;
 use super::changes::ChangeSection;
 use super::tasks::TaskSection;
 use super::Compiler;
@@ -10,6 +13,7 @@ use crate::scenario::OneOrMany;
 use serde::Deserialize;
 use sidestep_kernel::{InputError, math};
 use std::ops::Range;
+use std::sync::Arc;
 use toml::Spanned;
 
 /// Most connectors of a chain.
@@ -36,6 +40,7 @@ pub(super) struct ChainSection {
     along: Option<Spanned<Vec<f64>>>,
     heading_deg: Option<f64>,
     points_m: Option<Spanned<Vec<Vec<f64>>>>,
+    arm: Option<Spanned<ArmSection>>,
     rod_m: Option<Spanned<Length>>,
     radius_m: Option<f64>,
     rod_radius_m: Option<f64>,
@@ -129,7 +134,7 @@ impl Compiler<'_> {
         dt_s: f64,
     ) -> Result<ChainSpec<D>, InputError> {
         let (s, at) = (section.get_ref(), section.span());
-        let start = self.shape::<D>(s, at.clone())?;
+        let (start, arm) = self.shape::<D>(s, at.clone())?;
         let n = start.points().len();
         let tasks = s.tasks.0.iter().map(|task| self.task(task, n)).collect::<Result<Vec<_>, _>>()?;
         if tasks.is_empty() {
@@ -146,15 +151,18 @@ impl Compiler<'_> {
             let remedy = "let it break once";
             return Err(self.error(Some(at), "a chain that breaks more than once", remedy));
         }
-        Ok(ChainSpec { name: s.name.clone(), start, tasks, changes })
+        Ok(ChainSpec { name: s.name.clone(), start, tasks, changes, arm })
     }
 
     fn shape<const D: usize>(
         &self,
         s: &ChainSection,
         at: Range<usize>,
-    ) -> Result<Chain<D>, InputError> {
+    ) -> Result<(Chain<D>, Option<Arc<Arm>>), InputError> {
         let radius_m = s.radius_m.unwrap_or(0.05);
+        if let Some(section) = &s.arm {
+            return self.arm_shape(s, section, radius_m, at);
+        }
         let rod = self.rod(s, radius_m, at.clone())?;
         let points = self.points::<D>(s, rod.max_m, at.clone())?;
         let mut connectors = vec![Connector::free(radius_m); points.len()];
@@ -165,7 +173,45 @@ impl Compiler<'_> {
             self.limit(&mut connectors, limit)?;
         }
         let rods = vec![rod; points.len() - 1];
-        Chain::new(points, connectors, rods).map_err(|error| self.at(at, &error))
+        let chain = Chain::new(points, connectors, rods).map_err(|error| self.at(at, &error))?;
+        Ok((chain, None))
+    }
+
+    /// The chain that an arm stands for.
+    fn arm_shape<const D: usize>(
+        &self,
+        s: &ChainSection,
+        section: &Spanned<ArmSection>,
+        radius_m: f64,
+        at: Range<usize>,
+    ) -> Result<(Chain<D>, Option<Arc<Arm>>), InputError> {
+        let is_shaped = s.connectors.is_some() || s.points_m.is_some() || s.rod_m.is_some();
+        let is_turned = s.along.is_some() || s.heading_deg.is_some() || s.max_bend_deg.is_some();
+        if D != 3 || is_shaped || is_turned || s.count != 1 {
+            let remedy = "set chain.dimensions = 3, and leave out connectors, points_m, rod_m, \
+                          along, heading_deg, max_bend_deg and count";
+            return Err(self.error(Some(at), "an arm has its shape from its URDF file", remedy));
+        }
+        let base_m = match &s.at_m {
+            Some(given) => self.point::<3>(given.get_ref(), "at_m", given.span())?,
+            None => [0.0; 3],
+        };
+        let arm = self.arm(section, base_m)?;
+        let solid = arm.chain(radius_m, s.rod_radius_m.unwrap_or(0.8 * radius_m));
+        let solid = solid.map_err(|error| self.at(section.span(), &error))?;
+        // The same in as many dimensions as asked for, which are three.
+        let points = solid.points().iter().map(|p| out_of_space(*p)).collect();
+        let connector = |c: &Connector<3>| Connector {
+            mobility: if c.is_still() { Mobility::Fixed } else { Mobility::Free },
+            max_bend_rad: c.max_bend_rad,
+            ..Connector::free(c.radius_m)
+        };
+        let mut connectors: Vec<_> = solid.connectors().iter().map(connector).collect();
+        for limit in &s.limits.0 {
+            self.limit(&mut connectors, limit)?;
+        }
+        let chain = Chain::new(points, connectors, solid.rods().to_vec());
+        Ok((chain.map_err(|error| self.at(at, &error))?, Some(Arc::new(arm))))
     }
 
     fn rod(&self, s: &ChainSection, radius_m: f64, at: Range<usize>) -> Result<Rod, InputError> {
