@@ -49,9 +49,9 @@ impl<const D: usize> ChainWorld<D> {
         scratch: &mut Scratch<D>,
     ) {
         let turn = Turn { spec: &self.chains[slot as usize], slot, now };
+        self.change(body, turn, scratch);
         scratch.before.clear();
         scratch.before.extend_from_slice(body.chain.points());
-        self.change(body, turn, scratch);
         if body.scattered.is_some() {
             self.come_together(body, turn, scratch);
         } else {

@@ -71,7 +71,11 @@ impl<const D: usize> ChainSimulation<D> {
     pub fn begin_recording(&mut self) {
         let asked = self.compiled.record.tables();
         let tables = Table::ALL.into_iter().zip(asked).filter(|(_, asked)| *asked);
-        self.rows.begin(D, tables.map(|(table, _)| table));
+        let has_rows = |table: &Table| match table {
+            Table::Movers => !self.compiled.world.movers.is_empty(),
+            _ => true,
+        };
+        self.rows.begin(D, tables.map(|(table, _)| table).filter(has_rows));
     }
 
     /// Uses all workers even where one would be faster; for tests and benchmarks.
