@@ -83,12 +83,11 @@ pub(super) fn corridor_walls(width_m: f64) -> Vec<Obstacle<2>> {
     walls
 }
 
-/// Robots behind each other in the first, straight part of the corridor, the leader first.
-pub(super) fn convoy(followers: usize, rod: Rod, radius_m: f64) -> Chain<2> {
-    let lead_m = 0.3 + rod.max_m * followers as f64;
-    let points = (0..=followers).map(|i| [lead_m - rod.max_m * i as f64, 0.0]).collect();
-    let connectors = vec![Connector::free(radius_m); followers + 1];
-    Chain::new(points, connectors, vec![rod; followers]).expect("a straight chain is right")
+/// Robots behind each other on the first axis, the leader at `lead_m`; the tail of a long convoy
+/// is still outside of the corridor.
+pub(super) fn convoy(lead_m: f64, followers: usize, rod: Rod, radius_m: f64) -> Chain<2> {
+    Chain::straight([lead_m, 0.0], [-1.0, 0.0], followers, rod, Connector::free(radius_m))
+        .expect("a straight chain is right")
 }
 
 /// A leader's wandering: at every step somewhere into a cone around where it goes.

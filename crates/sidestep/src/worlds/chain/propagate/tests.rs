@@ -4,10 +4,10 @@ use super::*;
 use crate::worlds::chain::chain::{Connector, Mobility, Rod};
 use crate::worlds::chain::geometry::{add, cross_each_other, norm, scaled, sub};
 use crate::worlds::chain::obstacle::Obstacle;
-use crate::worlds::chain::scenes::{
-    Numbers, Wanderer, ball_field, clearance_m, convoy, corridor_line, corridor_walls,
-};
+use crate::worlds::chain::scenes::{Numbers, Wanderer, ball_field, clearance_m};
 use proptest::prelude::*;
+
+mod corridor;
 
 fn bits<const D: usize>(chain: &Chain<D>) -> Vec<[u64; D]> {
     chain.points().iter().map(|p| p.map(f64::to_bits)).collect()
@@ -32,107 +32,6 @@ fn crooked<const D: usize>(seed: u64, n_rods: usize, rod: Rod, radius_m: f64) ->
         points.push(walk.next(points[points.len() - 1], length_m));
     }
     Chain::new(points, vec![Connector::free(radius_m); n_rods + 1], vec![rod; n_rods]).unwrap()
-}
-
-struct Run {
-    arrived: bool,
-    vetoes: usize,
-    least_clearance_m: f64,
-    worst_rod_m: f64,
-    longest_slave_step_m: f64,
-}
-
-/// Pulls a convoy along the middle of the corridor.
-fn through_the_corridor(width_m: f64, followers: usize, rod: Rod, step_m: f64) -> Run {
-    let mut chain = convoy(followers, rod, 0.25);
-    let obstacles = Obstacles::new(corridor_walls(width_m), rod.max_m + 0.5).unwrap();
-    let mut propagator = Propagator::default();
-    let mut run = Run {
-        arrived: true,
-        vetoes: 0,
-        least_clearance_m: 1.0,
-        worst_rod_m: 0.0,
-        longest_slave_step_m: 0.0,
-    };
-    let line = corridor_line(step_m);
-    let lead_m = chain.points()[0][0];
-    let last = line.len() - (1.0 / step_m) as usize;
-    for (at, _) in line[..last].iter().filter(|(at, _)| at[0] > lead_m || at[1] != 0.0) {
-        let outcome =
-            propagator.propagate(&mut chain, &obstacles, &Request::exact(0, *at)).unwrap();
-        match outcome {
-            Outcome::Moved(moved) => {
-                run.longest_slave_step_m = run.longest_slave_step_m.max(moved.max_slave_step_m);
-            }
-            Outcome::Vetoed(_) => {
-                run.vetoes += 1;
-                run.arrived = false;
-            }
-        }
-        run.least_clearance_m = run.least_clearance_m.min(clearance_m(&chain, &obstacles));
-        run.worst_rod_m = run.worst_rod_m.max(chain.max_rod_violation_m());
-    }
-    run
-}
-
-fn assert_clean(run: &Run, what: &str) {
-    assert!(run.arrived && run.vetoes == 0, "{what}: {} vetoes", run.vetoes);
-    assert!(run.least_clearance_m >= -1e-9, "{what}: {}", run.least_clearance_m);
-    assert!(run.worst_rod_m <= 1e-9, "{what}: {}", run.worst_rod_m);
-}
-
-#[test]
-fn a_pulled_chain_never_objects_in_the_pinned_corridor() {
-    for width_m in [1.2, 2.0, 3.0] {
-        let rod = Rod { min_m: 0.6, max_m: 0.8, radius_m: 0.05 };
-        let run = through_the_corridor(width_m, 15, rod, 0.05);
-        assert_clean(&run, &format!("width {width_m}"));
-        println!("width {width_m}: longest slave step {}", run.longest_slave_step_m);
-    }
-}
-
-#[test]
-#[ignore = "open: 10 vetoes at 1.2 m with rods of 1 m; three widths run every day"]
-fn a_pulled_chain_never_objects_in_any_corridor() {
-    for width_m in [1.2, 1.6, 2.0, 2.5, 3.0] {
-        for (min_m, max_m) in [(0.6, 0.8), (1.0, 1.0), (1.5, 1.5)] {
-            for (followers, radius_m, step_m) in
-                [(15, 0.05, 0.01), (15, 0.25, 0.01), (40, 0.05, 0.01), (15, 0.05, 0.2)]
-            {
-                // Rods as thick as the robots cannot go round the narrowest bend.
-                if (width_m, min_m, radius_m) == (1.2, 1.5, 0.25) {
-                    continue;
-                }
-                let rod = Rod { min_m, max_m, radius_m };
-                // Longer convoys start with their tail outside, which is open ground.
-                let run = through_the_corridor(
-                    width_m,
-                    followers.min((13.0 / max_m) as usize),
-                    rod,
-                    step_m,
-                );
-                println!(
-                    "{width_m} {rod:?} {step_m}: {} vetoes, {:e}, slave step {}",
-                    run.vetoes, run.least_clearance_m, run.longest_slave_step_m
-                );
-                assert_clean(&run, &format!("width {width_m}, {rod:?}, step {step_m}"));
-            }
-        }
-    }
-}
-
-#[test]
-fn the_literal_rule_runs_into_walls_where_the_union_does_not() {
-    let rod = Rod { min_m: 0.6, max_m: 0.8, radius_m: 0.05 };
-    let mut chain = convoy(15, rod, 0.25);
-    let obstacles = Obstacles::new(corridor_walls(2.0), 1.3).unwrap();
-    let mut propagator = Propagator::new(Rules { rotation: Rotation::Literal, ..Rules::default() });
-    let mut least_m: f64 = 1.0;
-    for (at, _) in corridor_line(0.05).iter().filter(|(at, _)| at[0] > 12.3 || at[1] != 0.0) {
-        let _ = propagator.propagate(&mut chain, &obstacles, &Request::exact(0, *at)).unwrap();
-        least_m = least_m.min(clearance_m(&chain, &obstacles));
-    }
-    assert!(least_m < -0.005, "{least_m}");
 }
 
 /// Wanders through a field of balls; the laws hold at every step.
