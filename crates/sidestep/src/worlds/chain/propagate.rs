@@ -5,8 +5,8 @@
 //! veto leaves every bit of the chain as it was.
 
 use super::candidates::{Candidate, Work, guided};
-use super::chain::Chain;
-use super::geometry::{Bounds, Point, between, distance, is_finite};
+use super::chain::{Chain, is_in_range, out_of_range};
+use super::geometry::{Bounds, Point, between, distance};
 use super::obstacle::{Obstacles, swept};
 use super::own_body::OwnBody;
 use super::rules::{Rotation, Rules};
@@ -85,7 +85,7 @@ impl<const D: usize> Propagator<D> {
     /// Moves a chain as requested, in sub-steps where something may be in the way.
     ///
     /// # Errors
-    /// A target that is not finite or absurdly far, an index that the chain does not have. A
+    /// A target that is not finite or more than 1e6 m from the origin, an index that the chain does not have. A
     /// motion that cannot be is no error but a veto.
     pub fn propagate(
         &mut self,
@@ -530,10 +530,7 @@ fn check<const D: usize>(chain: &Chain<D>, heads: &Heads<D>) -> Result<(), Input
             "count from 0",
         ));
     }
-    if !heads.to.iter().all(is_finite) {
-        return Err(InputError::new("target", "is not finite", "give finite coordinates"));
-    }
-    Ok(())
+    heads.to.iter().find(|to| !is_in_range(to)).map_or(Ok(()), |to| Err(out_of_range(to)))
 }
 
 #[cfg(test)]

@@ -1,8 +1,35 @@
-//! Invariants of motions of whole chains.
+//! Motions of whole chains. What must hold of them (design 5.8), and the tests that say so:
+//!
+//! 1. rods keep their limits: [`laws`] `rods_bends_clearances_and_bases_keep_the_laws_in_any_world`
+//! 2. nobody comes nearer than 1e-9 m, or goes deeper: the same;
+//!    `who_starts_inside_goes_no_deeper_in_any_world`
+//! 3. who is fixed or failed keeps every bit: the same; `fixed_and_failed_connectors_object_and_stay`
+//! 4. a veto leaves every bit: the same
+//! 5. a rod that only changes its length leaves every bit beyond, and `touched` is what changed:
+//!    `a_rod_that_only_changes_its_length_leaves_every_bit_beyond`
+//! 6. bends keep their limits: as 1; `a_bend_limit_stops_what_would_fold`
+//! 7. what is far does not matter: [`symmetry`] `far_obstacles_change_no_bit`
+//! 8. mirrored, turned, scaled: [`symmetry`] `a_chain_turned_round_moves_as_its_mirror`,
+//!    `a_world_moved_rigidly_gives_the_same_motion`, `a_chain_twice_as_large_moves_twice_as_far`
+//! 9. halves are independent: [`symmetry`] `the_two_halves_move_on_their_own`
+//! 10. lanes are motions one by one: `wavefront.rs`, `lanes_are_motions_one_after_the_other`
+//! 11. the same seed gives the same bytes on any number of threads: [`laws`]
+//!     `the_same_seed_gives_the_same_bytes_on_any_number_of_threads`
+//! 12. nobody passes a wall of a millimeter: [`tunnel`]
+//! 13. a pull and a base pass are a FABRIK iteration to 1e-15: [`symmetry`]
+//!     `a_pull_and_a_base_pass_are_one_fabrik_iteration`
+//! 14. blocked intervals are what distances say: `interval.rs`, a million cases on request
+//! 15. a veto names what matters: [`laws`]
+//!     `a_veto_names_a_constraint_without_which_it_is_gone_or_elsewhere`
+//! 16. pushed, no chain runs into itself; pulled through a corridor, none objects: [`laws`]
+//!     `a_chain_that_is_pushed_never_runs_into_itself`, [`corridor`]
+//! 17. joints to connectors and back: `kinematics/tests.rs`,
+//!     `joint_values_come_back_from_connectors_where_they_are_determined`
+//! 18. one connector, one rod, coincidence, no motion, NaN, a base inside: [`degenerate`]
 
 use super::*;
 use crate::worlds::chain::chain::{Connector, Mobility, Rod};
-use crate::worlds::chain::geometry::{add, cross_each_other, norm, scaled, sub};
+use crate::worlds::chain::geometry::{add, norm, scaled, sub};
 use crate::worlds::chain::obstacle::Obstacle;
 use crate::worlds::chain::scenes::{Numbers, Wanderer, ball_field, clearance_m, own_clearance_m};
 use crate::worlds::chain::veto::Source;
