@@ -3,11 +3,26 @@
 //! A rod's length is never stored: it is the distance of its ends (V7).
 
 use super::geometry::{self, Point, angle_rad, distance, dot, norm, sub};
+use super::veto::Reason;
 use sidestep_kernel::InputError;
 use std::f64::consts::PI;
 
 /// Rods are within their lengths to this, meters.
 pub const LENGTH_TOLERANCE_M: f64 = 1e-9;
+
+/// Further from the origin, rounding is no longer small against the tolerances.
+const MAX_COORDINATE_M: f64 = 1e6;
+
+/// Whether a connector may be at a point at all: finite, and at most 1e6 m from the origin along
+/// every axis.
+pub(super) fn is_in_range<const D: usize>(point: &Point<D>) -> bool {
+    point.iter().all(|x| x.abs() <= MAX_COORDINATE_M)
+}
+
+/// A target that no connector can be sent to.
+pub(super) fn out_of_range<const D: usize>(target: &Point<D>) -> InputError {
+    InputError::new("target", format!("is {target:?}"), "give finite coordinates up to 1e6 m")
+}
 
 /// Where a connector may be (slide K1).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -76,6 +91,11 @@ impl<const D: usize> Connector<D> {
     /// Whether it never moves: fixed, or failed.
     pub fn is_still(&self) -> bool {
         self.failed || self.mobility == Mobility::Fixed
+    }
+
+    /// What a connector that never moves objects with.
+    pub(super) fn why_still(&self) -> Reason {
+        if self.failed { Reason::Failed } else { Reason::Fixed }
     }
 
     fn is_plain(&self) -> bool {
@@ -328,8 +348,8 @@ fn check_connector<const D: usize>(
     let wrong = |cause: String, remedy: &str| {
         Err(InputError::new(format!("chain, connector {i}"), cause, remedy))
     };
-    if !geometry::is_finite(point) || point.iter().any(|x| x.abs() > 1e7) {
-        return wrong(format!("is at {point:?}"), "give finite coordinates up to 1e7 m");
+    if !is_in_range(point) {
+        return wrong(format!("is at {point:?}"), "give finite coordinates up to 1e6 m");
     }
     if !(0.0..=1e6).contains(&connector.radius_m) {
         return wrong(format!("has radius {} m", connector.radius_m), "give 0 to 1e6 m");

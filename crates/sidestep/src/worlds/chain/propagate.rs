@@ -5,8 +5,8 @@
 //! veto leaves every bit of the chain as it was.
 
 use super::candidates::{Candidate, Work, guided};
-use super::chain::Chain;
-use super::geometry::{Bounds, Point, between, distance, is_finite};
+use super::chain::{Chain, is_in_range, out_of_range};
+use super::geometry::{Bounds, Point, between, distance};
 use super::obstacle::{Obstacles, swept};
 use super::own_body::OwnBody;
 use super::rules::{Rotation, Rules};
@@ -85,7 +85,7 @@ impl<const D: usize> Propagator<D> {
     /// Moves a chain as requested, in sub-steps where something may be in the way.
     ///
     /// # Errors
-    /// A target that is not finite or absurdly far, an index that the chain does not have. A
+    /// A target that is not finite or more than 1e6 m from the origin, an index that the chain does not have. A
     /// motion that cannot be is no error but a veto.
     pub fn propagate(
         &mut self,
@@ -98,8 +98,8 @@ impl<const D: usize> Propagator<D> {
         let from = heads.places(chain);
         self.tally = Tally::default();
         self.before.start(chain.points().len(), heads.first);
-        if let Some(reason) = self.project(chain, &mut heads, request.mode) {
-            return Ok(Outcome::Vetoed(veto(chain, heads.first, heads.first, Refusal::of(reason))));
+        if let Err((by, refusal)) = project(chain, &mut heads, request.mode) {
+            return Ok(Outcome::Vetoed(veto(chain, heads.first, by, refusal)));
         }
         let n = self.sub_steps(chain, obstacles, &heads, from)?;
         for k in 1..=n {
@@ -112,26 +112,6 @@ impl<const D: usize> Propagator<D> {
             }
         }
         Ok(Outcome::Moved(self.moved(None)))
-    }
-
-    /// Brings the targets to where the heads may be; the reason where that is not enough.
-    fn project(&self, chain: &Chain<D>, heads: &mut Heads<D>, mode: Mode) -> Option<Reason> {
-        for (h, k) in heads.indices().enumerate() {
-            let (connector, at) = (&chain.connectors()[k], chain.points()[k]);
-            if heads.to[h] == at {
-                continue;
-            }
-            if connector.is_still() && distance(heads.to[h], at) > chain.least_move_m() {
-                return Some(if connector.failed { Reason::Failed } else { Reason::Fixed });
-            }
-            if !connector.mobility.allows(heads.to[h], at) {
-                if mode == Mode::Exact || heads.n > 1 {
-                    return Some(Reason::Mobility);
-                }
-                heads.to[h] = connector.mobility.project(heads.to[h], at);
-            }
-        }
-        None
     }
 
     fn sub_steps(
@@ -360,7 +340,9 @@ impl<const D: usize> Propagator<D> {
     }
 
     fn commit(&mut self, chain: &mut Chain<D>, heads: &Heads<D>) {
-        for i in self.overlay.from..self.overlay.to {
+        // Outward from the head, so that the run of old positions has no gap.
+        let (from, to) = (self.overlay.from, self.overlay.to);
+        for i in (heads.first..to).chain((from..heads.first).rev()) {
             let old = chain.points()[i];
             let new = self.overlay.get(i).unwrap_or(old);
             self.write(chain, i, old, new, heads.indices().contains(&i));
@@ -497,6 +479,30 @@ impl<const D: usize> Scene<'_, D> {
     }
 }
 
+/// Brings the targets to where the heads may be, or says who may not be there.
+fn project<const D: usize>(
+    chain: &Chain<D>,
+    heads: &mut Heads<D>,
+    mode: Mode,
+) -> Result<(), Objection> {
+    for (h, k) in heads.indices().enumerate() {
+        let (connector, at) = (&chain.connectors()[k], chain.points()[k]);
+        if heads.to[h] == at {
+            continue;
+        }
+        if connector.is_still() && distance(heads.to[h], at) > chain.least_move_m() {
+            return Err((k, Refusal::of(connector.why_still())));
+        }
+        if !connector.mobility.allows(heads.to[h], at) {
+            if mode == Mode::Exact || heads.n > 1 {
+                return Err((k, Refusal::of(Reason::Mobility)));
+            }
+            heads.to[h] = connector.mobility.project(heads.to[h], at);
+        }
+    }
+    Ok(())
+}
+
 fn rod_box<const D: usize>(
     chain: &Chain<D>,
     i: usize,
@@ -524,10 +530,7 @@ fn check<const D: usize>(chain: &Chain<D>, heads: &Heads<D>) -> Result<(), Input
             "count from 0",
         ));
     }
-    if !heads.to.iter().all(is_finite) {
-        return Err(InputError::new("target", "is not finite", "give finite coordinates"));
-    }
-    Ok(())
+    heads.to.iter().find(|to| !is_in_range(to)).map_or(Ok(()), |to| Err(out_of_range(to)))
 }
 
 #[cfg(test)]

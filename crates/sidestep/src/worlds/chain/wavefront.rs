@@ -11,8 +11,8 @@
 )]
 
 use super::candidates::guided;
-use super::chain::{Chain, Rod};
-use super::geometry::{Point, is_finite};
+use super::chain::{Chain, Rod, is_in_range, out_of_range};
+use super::geometry::Point;
 use super::propagate::Propagator;
 use super::veto::Request;
 use super::{Obstacles, Rules};
@@ -37,8 +37,8 @@ pub fn pull_first<const D: usize>(
             "move it by single requests",
         ));
     }
-    if !heads.iter().all(is_finite) {
-        return Err(InputError::new("target", "is not finite", "give finite coordinates"));
+    if let Some(head) = heads.iter().find(|head| !is_in_range(head)) {
+        return Err(out_of_range(head));
     }
     let mut groups = heads.chunks_exact(LANES);
     for group in &mut groups {
