@@ -11,6 +11,7 @@
 //!                 sweep.rs, own_body.rs         nothing is passed through; the chain's own parts
 //! reach.rs: an arm with a fixed base
 //! wavefront.rs: many motions at once            rebuild.rs: broken chains
+//! ground/: where obstacles come from
 //! kinematics/: arms of joints, as chains        script/: a turtle language that drives an initiator
 //! ```
 
@@ -18,6 +19,7 @@ mod candidates;
 #[expect(clippy::module_inception, reason = "the chain itself, of the world of chains")]
 pub mod chain;
 pub mod geometry;
+pub mod ground;
 pub mod interval;
 pub mod kinematics;
 pub mod obstacle;
