@@ -3,15 +3,20 @@
 //! ```text
 //! corridor.rs: winding corridors          fields.rs: balls and capsules at random
 //! pixels.rs:   floors of pixels           courses.rs: where what moves is at a time
-//! route.rs:    where a chain has room on a floor
+//! site.rs:     maps and Stage worlds       route.rs:   where a chain has room there
 //! ```
 
 pub mod corridor;
 pub mod courses;
 pub mod fields;
+pub mod pixels;
+pub mod route;
+pub mod site;
 
 pub use corridor::{Corridor, Leg};
 pub use courses::{Course, Mover, Movers};
+pub use pixels::Floor;
+pub use site::Site;
 
 use super::geometry::Point;
 use sidestep_kernel::stream::Purpose;
@@ -31,4 +36,5 @@ mod purposes {
 
     pub(super) const STILL: Purpose = Purpose(101);
     pub(super) const MOVING: Purpose = Purpose(102);
+    pub(super) const ROUTE: Purpose = Purpose(103);
 }
