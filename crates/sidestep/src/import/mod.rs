@@ -18,13 +18,14 @@ pub mod mrclam;
 mod pixel_map;
 pub mod rosmap;
 mod rows;
+pub mod stage;
 pub mod table;
 pub mod traffic;
 pub mod urdf;
 mod xml;
 
 #[cfg(test)]
-mod shared_data;
+pub(crate) mod shared_data;
 
 pub use map_file::map_file;
 pub use pixel_map::{MAX_PIXELS, PixelMap};

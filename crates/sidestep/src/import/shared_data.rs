@@ -11,7 +11,7 @@ use crate::map::{Cell, GridMap, UnknownPolicy};
 use crate::planning::{Distances, FreeSpace, octile_distance};
 
 /// A file of the shared data, or `None` (said once) where that folder is not at hand.
-fn shared(name: &str) -> Option<PathBuf> {
+pub(crate) fn shared(name: &str) -> Option<PathBuf> {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data");
     let path = PathBuf::from(folder).join(name);
     if !path.exists() {

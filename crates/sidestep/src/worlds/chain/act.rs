@@ -179,12 +179,8 @@ impl<const D: usize> ChainWorld<D> {
         let at = body.chain.points()[task.agent];
         let motion = Motion::Connector { k: task.agent, to };
         let request = Request { motion, source: task.source(), mode: Mode::Exact };
-        let outcome = reach::go(
-            &mut scratch.propagator,
-            &mut body.chain,
-            &scratch.obstacles,
-            &request,
-        );
+        let outcome =
+            reach::go(&mut scratch.propagator, &mut body.chain, &scratch.obstacles, &request);
         let outcome = outcome.expect("targets are finite and near");
         body.driving.way_m[0] += distance(at, to);
         body.driving.way_m[1] += distance(at, body.chain.points()[task.agent]);

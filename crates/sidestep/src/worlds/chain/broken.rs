@@ -81,12 +81,7 @@ impl<const D: usize> ChainWorld<D> {
 
     /// Scattered parts go to where they are joined again, each straight, and the chain is whole
     /// when all are there.
-    pub(super) fn come_together(
-        &self,
-        body: &mut Body<D>,
-        _: Turn<'_, D>,
-        _: &mut Scratch<D>,
-    ) {
+    pub(super) fn come_together(&self, body: &mut Body<D>, _: Turn<'_, D>, _: &mut Scratch<D>) {
         let Some(scattered) = body.scattered.as_ref().filter(|s| !s.goals_m.is_empty()) else {
             return;
         };

@@ -172,7 +172,11 @@ pub fn out_of_space<const D: usize>(p: [f64; 3]) -> Point<D> {
 /// At most `step_m` towards a place.
 pub fn towards<const D: usize>(from: Point<D>, to: Point<D>, step_m: f64) -> Point<D> {
     let far_m = distance(from, to);
-    if far_m <= step_m { to } else { along(from, std::array::from_fn(|i| to[i] - from[i]), step_m / far_m) }
+    if far_m <= step_m {
+        to
+    } else {
+        along(from, std::array::from_fn(|i| to[i] - from[i]), step_m / far_m)
+    }
 }
 
 /// The direction of a wandering initiator for the next step.

@@ -11,6 +11,7 @@
 //!                 sweep.rs, own_body.rs         nothing is passed through; the chain's own parts
 //! reach.rs: an arm with a fixed base
 //! wavefront.rs: many motions at once            rebuild.rs: broken chains
+//! ground/: where obstacles come from
 //! kinematics/: arms of joints, as chains        script/: a turtle language that drives an initiator
 //! ```
 

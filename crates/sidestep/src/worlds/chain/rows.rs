@@ -199,7 +199,9 @@ impl Rows {
 
 fn events(rows: Vec<Event>) -> Vec<Values> {
     let label = |reason: Option<Reason>| {
-        reason.and_then(|r| Reason::ALL.iter().position(|&all| all == r)).map_or(0, |k| k as u32 + 1)
+        reason
+            .and_then(|r| Reason::ALL.iter().position(|&all| all == r))
+            .map_or(0, |k| k as u32 + 1)
     };
     let kind = |kind: EventKind| {
         EventKind::ALL.iter().position(|&all| all == kind).unwrap_or_default() as u32

@@ -185,8 +185,9 @@ impl Compiler<'_> {
         let section = &self.file.chain;
         let dt_s = self.positive(section.dt_s.as_ref(), "dt_s", 0.02)?;
         let streams = Streams::new(Seed(self.file.seed));
-        let chains = self.chains::<D>(dt_s)?;
-        let ground = self.ground(&chains)?;
+        let site = self.site()?;
+        let chains = self.chains::<D>(dt_s, site.as_ref())?;
+        let ground = self.ground(site.as_ref(), &chains)?;
         let radius_m = chains.iter().flat_map(|spec| spec.start.connectors()).map(|c| c.radius_m);
         let look_m = 4.0 * radius_m.fold(0.05, f64::max);
         let world = ChainWorld {

@@ -1,12 +1,12 @@
 //! Scenes that several tests share.
 
 use super::chain::{Chain, Connector, Rod};
-use super::geometry::{Point, between_segments, distance, nearest_on_segment};
+use super::geometry::{Bounds, Core, Point, between_segments, distance, nearest_on_segment};
+use super::ground::Corridor;
+use super::ground::fields::Field;
 use super::obstacle::{Obstacle, Obstacles};
 use sidestep_kernel::Seed;
-use sidestep_kernel::math::{cos, sin};
 use sidestep_kernel::stream::{Purpose, Streams};
-use std::f64::consts::PI;
 
 /// Numbers in [0, 1) by (seed, index).
 pub(super) struct Numbers {
@@ -33,54 +33,15 @@ impl Numbers {
     }
 }
 
-/// Poses along the center line of the pinned corridor: 14 m straight,
-/// 90 degrees left r = 2, 90 right r = 1.5, U-turn r = 1.6, S of r = 1.3, U-turn r = 2, 8 m.
+/// Poses along the center line of the corridor of the measurements.
 pub(super) fn corridor_line(step_m: f64) -> Vec<([f64; 2], f64)> {
-    let legs: [(f64, f64); 9] = [
-        (0.0, 14.0),
-        (2.0, 90.0),
-        (1.5, -90.0),
-        (1.6, 180.0),
-        (1.3, 60.0),
-        (1.3, -120.0),
-        (1.3, 60.0),
-        (2.0, -180.0),
-        (0.0, 8.0),
-    ];
-    let mut line = vec![([0.0, 0.0], 0.0)];
-    for (radius_m, amount) in legs {
-        let (length_m, turn_rad) = if radius_m == 0.0 {
-            (amount, 0.0)
-        } else {
-            let turn_rad = f64::to_radians(amount);
-            (radius_m * turn_rad.abs(), turn_rad)
-        };
-        let n = (length_m / step_m).ceil() as usize;
-        for _ in 0..n {
-            let ([x, y], heading) = line[line.len() - 1];
-            let (ds, turn) = (length_m / n as f64, turn_rad / n as f64);
-            let middle = heading + 0.5 * turn;
-            line.push(([x + ds * cos(middle), y + ds * sin(middle)], heading + turn));
-        }
-    }
-    line
+    let line = Corridor::pinned(1.0).expect("a width").line(step_m);
+    line.into_iter().map(|pose| (pose.at, pose.heading_rad)).collect()
 }
 
-/// Walls of zero thickness, pieces of 0.16 m, on both sides of the center line.
+/// The walls of that corridor.
 pub(super) fn corridor_walls(width_m: f64) -> Vec<Obstacle<2>> {
-    let line = corridor_line(0.16);
-    let beside = |k: usize, side: f64| {
-        let ([x, y], heading) = line[k];
-        [x - side * 0.5 * width_m * sin(heading), y + side * 0.5 * width_m * cos(heading)]
-    };
-    let mut walls = Vec::new();
-    for side in [-1.0, 1.0] {
-        for k in 0..line.len() - 1 {
-            let ends = [beside(k, side), beside(k + 1, side)];
-            walls.push(Obstacle::capsule(walls.len() as u32, ends, 0.0));
-        }
-    }
-    walls
+    Corridor::pinned(width_m).expect("a width").walls(0)
 }
 
 /// Robots behind each other on the first axis, the leader at `lead_m`; the tail of a long convoy
@@ -122,18 +83,17 @@ pub(super) fn ball_field<const D: usize>(
     radius_m: f64,
     keep_m: f64,
 ) -> Vec<Obstacle<D>> {
-    let mut numbers = Numbers::new(seed);
-    let ball_size = if D == 2 { PI } else { 4.0 / 3.0 * PI * radius_m } * radius_m * radius_m;
-    let n = (part * (0..D).fold(1.0, |v, _| v * 2.0 * half_m) / ball_size) as u32;
-    (0..n)
-        .map(|id| Obstacle::ball(id, numbers.point(half_m), radius_m))
-        .filter(|o: &Obstacle<D>| {
-            let super::geometry::Core::Point(c) = o.core else { return false };
-            let mut foot = [0.0; D];
-            foot[0] = c[0].min(0.0);
-            distance(c, foot) > radius_m + keep_m
-        })
-        .collect()
+    let mut tail = [0.0; D];
+    tail[0] = -half_m;
+    let field = Field {
+        room: Bounds { lo: [-half_m; D], hi: [half_m; D] },
+        part,
+        radius_m,
+        length_m: 0.0,
+        keep_clear: vec![Core::Segment([[0.0; D], tail])],
+        keep_m,
+    };
+    field.fill(Seed(seed), 0).expect("a field")
 }
 
 /// The least clearance of any connector and any rod from obstacles, up to 1 m.

@@ -37,8 +37,8 @@ pub struct ChainSimulation<const D: usize> {
 impl<const D: usize> ChainSimulation<D> {
     /// A run of a compiled scenario at its start; the world is shared, not copied.
     pub fn new(compiled: Compiled<D>, source: &Source, workers: usize) -> Self {
-        let state = ChainState::new(&compiled.world)
-            .expect("scripts are tried when they are compiled");
+        let state =
+            ChainState::new(&compiled.world).expect("scripts are tried when they are compiled");
         let engine = Engine::new(&*compiled.world, compiled.world.chains.len(), workers);
         let scenario = *Digest::of(source.text.as_bytes()).as_bytes();
         Self {

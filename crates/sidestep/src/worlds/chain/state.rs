@@ -158,9 +158,8 @@ impl<const D: usize> ChainState<D> {
             return Err(CheckpointError::Damaged);
         }
         let all = world.chains.iter().zip(&snapshot.chains).zip(tallies);
-        let bodies = all.map(|((spec, record), tally)| {
-            Body::restore(spec, record, tally, snapshot.cycle)
-        });
+        let bodies =
+            all.map(|((spec, record), tally)| Body::restore(spec, record, tally, snapshot.cycle));
         let bodies = bodies.collect::<Result<Vec<_>, _>>()?;
         Ok(Self::of(bodies.into_iter()))
     }

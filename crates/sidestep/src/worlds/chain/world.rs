@@ -214,7 +214,13 @@ pub struct Scratch<const D: usize> {
 impl<const D: usize> Scratch<D> {
     /// Puts the movers where they are at the end of a cycle, and the other chains of a group
     /// where they are now.
-    fn gather(&mut self, world: &ChainWorld<D>, state: &ChainState<D>, now: Cycle, others: impl Iterator<Item = Slot>) {
+    fn gather(
+        &mut self,
+        world: &ChainWorld<D>,
+        state: &ChainState<D>,
+        now: Cycle,
+        others: impl Iterator<Item = Slot>,
+    ) {
         let mut others = others.peekable();
         let has_others = others.peek().is_some();
         if self.moved_to == Some(now) && !self.has_others && !has_others {
@@ -292,7 +298,13 @@ impl<const D: usize> World for ChainWorld<D> {
         }
     }
 
-    fn react(&self, state: &ChainState<D>, now: Cycle, group: &mut [Slot], scratch: &mut Scratch<D>) {
+    fn react(
+        &self,
+        state: &ChainState<D>,
+        now: Cycle,
+        group: &mut [Slot],
+        scratch: &mut Scratch<D>,
+    ) {
         let began = ThreadTime::now();
         group.sort_unstable();
         for &slot in &*group {

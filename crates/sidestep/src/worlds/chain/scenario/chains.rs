@@ -1,21 +1,26 @@
 //! Chains: their shape, their limits, and where they begin.
 
-use super::super::chain::{Chain, Connector, Mobility, Rod};
 use super::super::arm::Arm;
+use super::super::chain::{Chain, Connector, Mobility, Rod};
 use super::super::driver::out_of_space;
 use super::super::geometry::{Point, along, first_axis, unit};
+use super::super::ground::Site;
+use super::super::ground::route::{Wanted, find};
+use super::super::obstacle::Obstacles;
 use super::super::world::{ChainSpec, What};
+use super::Compiler;
 use super::arms::ArmSection;
 use super::changes::ChangeSection;
 use super::tasks::TaskSection;
-use super::Compiler;
 use crate::scenario::OneOrMany;
 use serde::Deserialize;
-use sidestep_kernel::{InputError, math};
+use sidestep_kernel::{InputError, Seed, math};
 use std::ops::Range;
 use std::sync::Arc;
 use toml::Spanned;
 
+/// A chain that starts anywhere has this many times its radius of room around its parts.
+const ROOM: f64 = 1.2;
 /// Most connectors of a chain.
 const MAX_CONNECTORS: usize = 10_000_000;
 
@@ -40,6 +45,8 @@ pub(super) struct ChainSection {
     along: Option<Spanned<Vec<f64>>>,
     heading_deg: Option<f64>,
     points_m: Option<Spanned<Vec<Vec<f64>>>>,
+    #[serde(default)]
+    anywhere: bool,
     arm: Option<Spanned<ArmSection>>,
     rod_m: Option<Spanned<Length>>,
     radius_m: Option<f64>,
@@ -85,10 +92,11 @@ impl Compiler<'_> {
     pub(super) fn chains<const D: usize>(
         &self,
         dt_s: f64,
+        site: Option<&Site>,
     ) -> Result<Vec<ChainSpec<D>>, InputError> {
         let mut all = Vec::new();
         for section in &self.file.chains.0 {
-            let spec = self.chain::<D>(section, dt_s)?;
+            let spec = self.chain::<D>(section, dt_s, site)?;
             for copy in 0..section.get_ref().count {
                 all.push(self.copied(&spec, section, copy)?);
             }
@@ -132,11 +140,13 @@ impl Compiler<'_> {
         &self,
         section: &Spanned<ChainSection>,
         dt_s: f64,
+        site: Option<&Site>,
     ) -> Result<ChainSpec<D>, InputError> {
         let (s, at) = (section.get_ref(), section.span());
-        let (start, arm) = self.shape::<D>(s, at.clone())?;
+        let (start, arm) = self.shape::<D>(s, site, at.clone())?;
         let n = start.points().len();
-        let tasks = s.tasks.0.iter().map(|task| self.task(task, n)).collect::<Result<Vec<_>, _>>()?;
+        let tasks =
+            s.tasks.0.iter().map(|task| self.task(task, n)).collect::<Result<Vec<_>, _>>()?;
         if tasks.is_empty() {
             let remedy = "add [[chains.tasks]] with a kind: rest, wander, script or targets";
             return Err(self.error(Some(at), "a chain without a task", remedy));
@@ -144,9 +154,8 @@ impl Compiler<'_> {
         let changes = s.changes.0.iter().map(|change| self.change(change, &start, dt_s));
         let mut changes = changes.collect::<Result<Vec<_>, _>>()?;
         changes.sort_by_key(|change| change.cycle);
-        let is_broken = |change: &super::super::world::Change<D>| {
-            matches!(change.what, What::Scatter { .. })
-        };
+        let is_broken =
+            |change: &super::super::world::Change<D>| matches!(change.what, What::Scatter { .. });
         if changes.iter().filter(|change| is_broken(change)).count() > 1 {
             let remedy = "let it break once";
             return Err(self.error(Some(at), "a chain that breaks more than once", remedy));
@@ -157,6 +166,7 @@ impl Compiler<'_> {
     fn shape<const D: usize>(
         &self,
         s: &ChainSection,
+        site: Option<&Site>,
         at: Range<usize>,
     ) -> Result<(Chain<D>, Option<Arc<Arm>>), InputError> {
         let radius_m = s.radius_m.unwrap_or(0.05);
@@ -164,7 +174,10 @@ impl Compiler<'_> {
             return self.arm_shape(s, section, radius_m, at);
         }
         let rod = self.rod(s, radius_m, at.clone())?;
-        let points = self.points::<D>(s, rod.max_m, at.clone())?;
+        let points = match s.anywhere {
+            true => self.anywhere(s, &rod, radius_m, site, at.clone())?,
+            false => self.points::<D>(s, rod.max_m, at.clone())?,
+        };
         let mut connectors = vec![Connector::free(radius_m); points.len()];
         if let Some(deg) = s.max_bend_deg {
             connectors.iter_mut().for_each(|c| c.max_bend_rad = deg.to_radians());
@@ -232,6 +245,38 @@ impl Compiler<'_> {
         }
     }
 
+    /// Some place on the ground where the chain has room; another seed, another place.
+    fn anywhere<const D: usize>(
+        &self,
+        s: &ChainSection,
+        rod: &Rod,
+        radius_m: f64,
+        site: Option<&Site>,
+        at: Range<usize>,
+    ) -> Result<Vec<Point<D>>, InputError> {
+        let (Some(site), Some(connectors)) = (site, s.connectors) else {
+            let remedy = "name a ground.map or a ground.stage, and give connectors";
+            return Err(self.error(Some(at), "a chain anywhere on no map", remedy));
+        };
+        if s.at_m.is_some() || s.points_m.is_some() || s.along.is_some() || s.heading_deg.is_some()
+        {
+            let remedy = "leave out at_m, points_m, along and heading_deg";
+            return Err(self.error(Some(at), "a chain placed in two ways", remedy));
+        }
+        let obstacles = Obstacles::new(site.obstacles(0), rod.max_m.max(1e-3))
+            .map_err(|error| self.at(at.clone(), &error))?;
+        let wanted = Wanted {
+            connectors,
+            spacing_m: rod.max_m,
+            clearance_m: ROOM * radius_m,
+            rod_clearance_m: ROOM * rod.radius_m,
+            ahead_m: rod.max_m,
+        };
+        let start = find(site, &obstacles, &wanted, Seed(self.file.seed))
+            .map_err(|error| self.at(at, &error))?;
+        Ok(start.points.iter().map(|p| std::array::from_fn(|i| p[i])).collect())
+    }
+
     /// Where the connectors are: one by one, or on a line from the first one.
     fn points<const D: usize>(
         &self,
@@ -254,7 +299,8 @@ impl Compiler<'_> {
         let n = match s.connectors {
             Some(n) if (1..=MAX_CONNECTORS).contains(&n) => n,
             given => {
-                let cause = format!("connectors = {}", given.map_or("nothing".into(), |n| n.to_string()));
+                let cause =
+                    format!("connectors = {}", given.map_or("nothing".into(), |n| n.to_string()));
                 let remedy = "give a number from 1 to 10000000, or points_m";
                 return Err(self.error(Some(at), cause, remedy));
             }
@@ -285,7 +331,8 @@ impl Compiler<'_> {
                 })
             }
             (Some(given), Some(_)) => {
-                let remedy = "give along, the way from the first connector to the last, or heading_deg";
+                let remedy =
+                    "give along, the way from the first connector to the last, or heading_deg";
                 Err(self.error(Some(given.span()), "two directions", remedy))
             }
         }

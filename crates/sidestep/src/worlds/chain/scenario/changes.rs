@@ -67,8 +67,7 @@ impl Compiler<'_> {
             s.reform == Some(true),
         ];
         if given.iter().filter(|&&is_given| is_given).count() != 1 {
-            let remedy =
-                "give one of failed, max_bend_deg, mobility, scatter = [first, last], reform = true";
+            let remedy = "give one of failed, max_bend_deg, mobility, scatter = [first, last], reform = true";
             return Err(self.error(Some(at), "a change that is not one thing", remedy));
         }
         if let Some([first, last]) = s.scatter {
@@ -90,9 +89,7 @@ impl Compiler<'_> {
         let what = match (s.failed, s.max_bend_deg, &s.mobility) {
             (Some(failed), ..) => What::Failed { connector, failed },
             (_, Some(deg), _) => What::MaxBend { connector, max_bend_rad: deg.to_radians() },
-            (_, _, Some(given)) => {
-                What::Mobility { connector, mobility: self.mobility(given)? }
-            }
+            (_, _, Some(given)) => What::Mobility { connector, mobility: self.mobility(given)? },
             _ => unreachable!("one of them is given"),
         };
         self.try_constraint(&what, chain, at)?;

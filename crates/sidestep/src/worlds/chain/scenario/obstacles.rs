@@ -3,10 +3,12 @@
 use super::super::chain::Chain;
 use super::super::geometry::{Bounds, Core, Cuboid, Point};
 use super::super::ground::fields::{Crowd, Field};
-use super::super::ground::{Corridor, Course, Leg, Mover, Movers};
+use super::super::ground::{Corridor, Course, Leg, Mover, Movers, Site};
 use super::super::obstacle::{Obstacle, Obstacles, outline};
 use super::super::world::ChainSpec;
 use super::Compiler;
+use crate::import::{rosmap, stage};
+use crate::map::UnknownPolicy;
 use serde::Deserialize;
 use sidestep_kernel::{InputError, Seed, math};
 use std::ops::Range;
@@ -19,6 +21,21 @@ const KEEP_M: f64 = 0.1;
 #[serde(deny_unknown_fields)]
 pub(super) struct GroundSection {
     corridor: Option<Spanned<CorridorSection>>,
+    /// A map of ROS (`.yaml`).
+    map: Option<Spanned<String>>,
+    #[serde(default)]
+    unknown: UnknownWord,
+    /// A world of Stage (`.world`).
+    stage: Option<Spanned<String>>,
+}
+
+/// What unknown pixels of a map are.
+#[derive(Debug, Clone, Copy, Default, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum UnknownWord {
+    #[default]
+    Solid,
+    Free,
 }
 
 #[derive(Debug, Deserialize)]
@@ -112,11 +129,13 @@ impl Compiler<'_> {
     /// All obstacles.
     pub(super) fn ground<const D: usize>(
         &self,
+        site: Option<&Site>,
         chains: &[ChainSpec<D>],
     ) -> Result<Ground<D>, InputError> {
         let mut all = Gathered { still: Vec::new(), movers: Vec::new(), next_id: 0 };
-        if let Some(section) = &self.file.ground {
-            self.add_ground(section, &mut all)?;
+        self.add_corridor(&mut all)?;
+        if let Some(site) = site {
+            all.add_still(site.obstacles(0).iter().map(lifted));
         }
         for section in &self.file.obstacles.0 {
             self.add_obstacle(section, &mut all)?;
@@ -140,19 +159,44 @@ impl Compiler<'_> {
         })
     }
 
-    fn add_ground<const D: usize>(
-        &self,
-        section: &Spanned<GroundSection>,
-        all: &mut Gathered<D>,
-    ) -> Result<(), InputError> {
-        let corridor = section.get_ref().corridor.as_ref();
-        let Some(given) = corridor else { return Ok(()) };
-        let corridor = self.corridor(given)?;
-        if D != 2 {
-            let remedy = "set chain.dimensions = 2";
-            return Err(self.error(Some(given.span()), "corridors lie in the plane", remedy));
+    /// The floors of a map or of a Stage world, if the scenario names one.
+    pub(super) fn site(&self) -> Result<Option<Site>, InputError> {
+        let Some(section) = &self.file.ground else { return Ok(None) };
+        let (s, at) = (section.get_ref(), section.span());
+        let given = [s.corridor.is_some(), s.map.is_some(), s.stage.is_some()]
+            .iter()
+            .filter(|g| **g)
+            .count();
+        if given != 1 {
+            let remedy = "give one of corridor, map and stage";
+            return Err(self.error(Some(at), format!("{given} grounds"), remedy));
         }
-        let walls = corridor.walls(all.next_id);
+        if self.file.chain.dimensions.as_ref().is_some_and(|n| *n.get_ref() != 2) {
+            let remedy = "set chain.dimensions = 2, or leave [ground] out";
+            return Err(self.error(Some(at), "a ground lies in the plane", remedy));
+        }
+        let unknown = match s.unknown {
+            UnknownWord::Solid => UnknownPolicy::Wall,
+            UnknownWord::Free => UnknownPolicy::Free,
+        };
+        Ok(match (&s.map, &s.stage) {
+            (Some(map), _) => {
+                let map = rosmap::load(&self.source.path(map.get_ref().as_ref()))?;
+                Some(Site::of_map(&map, unknown))
+            }
+            (_, Some(world)) => {
+                let world = stage::load(&self.source.path(world.get_ref().as_ref()))?;
+                Some(Site::of_stage(&world))
+            }
+            _ => None,
+        })
+    }
+
+    fn add_corridor<const D: usize>(&self, all: &mut Gathered<D>) -> Result<(), InputError> {
+        let section =
+            self.file.ground.as_ref().and_then(|ground| ground.get_ref().corridor.as_ref());
+        let Some(given) = section else { return Ok(()) };
+        let walls = self.corridor(given)?.walls(all.next_id);
         all.add_still(walls.iter().map(lifted));
         Ok(())
     }
@@ -253,8 +297,7 @@ impl Compiler<'_> {
                 Ok(Some(Course::Straight { velocity_m_s: point(v, "velocity_m_s")? }))
             }
             (Some(v), Some([lo, hi]), None) => {
-                let room =
-                    Bounds { lo: point(lo, "bounces_m")?, hi: point(hi, "bounces_m")? };
+                let room = Bounds { lo: point(lo, "bounces_m")?, hi: point(hi, "bounces_m")? };
                 Ok(Some(Course::Bouncing { velocity_m_s: point(v, "velocity_m_s")?, room }))
             }
             (None, None, Some(way_points)) => Ok(Some(Course::Patrol {
@@ -306,7 +349,11 @@ impl Compiler<'_> {
             _ => {
                 let remedy = "give part, one radius_m and maybe length_m for obstacles that stand \
                               still, or n and speed_m_s for balls that move";
-                return Err(self.error(Some(at), "a field that is neither still nor moving", remedy));
+                return Err(self.error(
+                    Some(at),
+                    "a field that is neither still nor moving",
+                    remedy,
+                ));
             }
         }
         Ok(())

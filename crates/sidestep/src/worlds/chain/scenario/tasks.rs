@@ -102,7 +102,10 @@ impl Compiler<'_> {
             }
             (None, Some(file)) => {
                 let path = self.source.path(file.get_ref().as_ref());
-                let text = crate::import::file::read_text(&path, crate::worlds::chain::script::MAX_BYTES as u64)?;
+                let text = crate::import::file::read_text(
+                    &path,
+                    crate::worlds::chain::script::MAX_BYTES as u64,
+                )?;
                 Script::parse(&path.display().to_string(), &text)
             }
             _ => {

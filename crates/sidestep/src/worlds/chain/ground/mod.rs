@@ -1,0 +1,40 @@
+//! Where chains move: what obstacles there are, and where.
+//!
+//! ```text
+//! corridor.rs: winding corridors          fields.rs: balls and capsules at random
+//! pixels.rs:   floors of pixels           courses.rs: where what moves is at a time
+//! site.rs:     maps and Stage worlds       route.rs:   where a chain has room there
+//! ```
+
+pub mod corridor;
+pub mod courses;
+pub mod fields;
+pub mod pixels;
+pub mod route;
+pub mod site;
+
+pub use corridor::{Corridor, Leg};
+pub use courses::{Course, Mover, Movers};
+pub use pixels::Floor;
+pub use site::Site;
+
+use super::geometry::Point;
+use sidestep_kernel::stream::Purpose;
+
+/// A place in the plane and a direction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pose {
+    /// Where.
+    pub at: Point<2>,
+    /// Counter-clockwise from the first axis.
+    pub heading_rad: f64,
+}
+
+/// What random numbers are for here; entities are obstacles or attempts.
+mod purposes {
+    use super::Purpose;
+
+    pub(super) const STILL: Purpose = Purpose(101);
+    pub(super) const MOVING: Purpose = Purpose(102);
+    pub(super) const ROUTE: Purpose = Purpose(103);
+}
