@@ -93,9 +93,8 @@ impl<const D: usize> Scene<'_, D> {
 
     /// A slave that never moves: it objects unless the rod is good as it is.
     fn stay(&self, step: &Step<D>, work: &mut Work<D>) -> Result<(), Refusal> {
-        let has_failed = self.chain.connectors()[step.slave].failed;
         if !fits(step.rod, distance(step.mn, step.so)) {
-            return Err(Refusal::of(if has_failed { Reason::Failed } else { Reason::Fixed }));
+            return Err(Refusal::of(self.chain.connectors()[step.slave].why_still()));
         }
         self.judge(step, step.so)?;
         work.found.push(Candidate { at: step.so, rotated: false, turn_rad: 0.0 });

@@ -3,6 +3,7 @@
 //! A rod's length is never stored: it is the distance of its ends (V7).
 
 use super::geometry::{self, Point, angle_rad, distance, dot, norm, sub};
+use super::veto::Reason;
 use sidestep_kernel::InputError;
 use std::f64::consts::PI;
 
@@ -76,6 +77,11 @@ impl<const D: usize> Connector<D> {
     /// Whether it never moves: fixed, or failed.
     pub fn is_still(&self) -> bool {
         self.failed || self.mobility == Mobility::Fixed
+    }
+
+    /// What a connector that never moves objects with.
+    pub(super) fn why_still(&self) -> Reason {
+        if self.failed { Reason::Failed } else { Reason::Fixed }
     }
 
     fn is_plain(&self) -> bool {

@@ -271,6 +271,8 @@ pub fn least_turn_rad(arcs: &[Arc], start_rad: f64, side: Side) -> Option<f64> {
                 Side::Right => arc.from_rad + arc.width_rad - (start_rad - turn_rad),
             };
             let into_rad = into_rad.rem_euclid(TAU);
+            // An arc that begins where another ends leaves no gap, however both were rounded.
+            let into_rad = if into_rad > TAU - ARC_TOLERANCE_RAD { 0.0 } else { into_rad };
             if into_rad < arc.width_rad {
                 next_rad = next_rad.max(turn_rad + (arc.width_rad - into_rad));
             }
@@ -286,7 +288,8 @@ pub fn least_turn_rad(arcs: &[Arc], start_rad: f64, side: Side) -> Option<f64> {
     None
 }
 
-/// Rounding at the end of an arc may leave us inside by this; the skin is far larger.
+/// Rounding may leave the end of an arc inside of it, or two arcs that touch apart, by this; the
+/// skin is far larger.
 const ARC_TOLERANCE_RAD: f64 = 1e-13;
 
 /// The direction of a turn from a unit vector.
@@ -401,6 +404,63 @@ mod tests {
     #[ignore = "minutes; the quick one runs every day"]
     fn a_million_intervals_are_what_distances_say() {
         run(cases(1_000_000));
+    }
+
+    /// What speaks against a direction: how deep the rod, or its end, would be in any core.
+    fn depth_m(reach: &Reach, cores: &[Core<2>], [rod_m, tip_m]: [f64; 2], angle_rad: f64) -> f64 {
+        let end = tip(reach, angle_rad);
+        let depth_m = |core: &Core<2>| {
+            let rod_m = rod_m - core.nearest_to_segment([reach.master, end]).distance_m;
+            rod_m.max(tip_m - core.nearest_to_point(end).distance_m)
+        };
+        cores.iter().map(depth_m).fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    proptest! {
+        #![proptest_config(Config { failure_persistence: None, ..Config::default() })]
+
+        #[test]
+        fn the_least_turn_is_the_first_that_distances_allow(
+            master in prop::array::uniform2(-1.0..1.0f64),
+            length_m in 0.3..1.5f64,
+            corners in prop::collection::vec(prop::array::uniform2(-2.0..2.0f64), 2..7),
+            rod_m in 0.01..0.2f64, more_m in 0.01..0.3f64, start_rad in 0.0..TAU,
+        ) {
+            // Walls in a row: where one ends the next begins.
+            let reach = Reach { master, length_m };
+            let cores: Vec<_> =
+                corners.windows(2).map(|ends| Core::Segment([ends[0], ends[1]])).collect();
+            let (mut arcs, radii_m) = (Vec::new(), [rod_m, rod_m + more_m]);
+            for core in &cores {
+                prop_assume!(block_rod(&reach, core, rod_m, &mut arcs));
+                block_tip(&reach, core, radii_m[1], &mut arcs);
+            }
+            for (side, sign) in [(Side::Left, 1.0), (Side::Right, -1.0)] {
+                let turn_rad = least_turn_rad(&arcs, start_rad, side);
+                if let Some(turn_rad) = turn_rad {
+                    let depth_m = depth_m(&reach, &cores, radii_m, start_rad + sign * turn_rad);
+                    prop_assert!(depth_m < 1e-9, "{side:?} {turn_rad}: {depth_m}");
+                }
+                for k in 0..600 {
+                    let earlier_rad = TAU * f64::from(k) / 600.0;
+                    if earlier_rad < turn_rad.unwrap_or(TAU) {
+                        let angle_rad = start_rad + sign * earlier_rad;
+                        prop_assert!(depth_m(&reach, &cores, radii_m, angle_rad) > -1e-9);
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn two_arcs_that_touch_are_left_together() {
+        // The second begins at the direction 1 rad up to rounding, where the first ends.
+        for gap_rad in [0.0, 1e-16, 2e-16, 1e-15] {
+            let second = Arc { from_rad: 1.0 + gap_rad, width_rad: 1.0 };
+            let arcs = [Arc { from_rad: 0.3, width_rad: 0.7 }, second];
+            assert!(least_turn_rad(&arcs, 0.5, Side::Left).unwrap() > 1.4);
+            assert!(least_turn_rad(&arcs, 1.5, Side::Right).unwrap() > 1.1);
+        }
     }
 
     #[test]

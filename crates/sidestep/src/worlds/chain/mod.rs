@@ -4,7 +4,7 @@
 //! why. One code for two and three dimensions.
 //!
 //! ```text
-//! chain.rs, obstacle.rs: what there is          geometry.rs: points and distances
+//! chain.rs, obstacle.rs: what there is          geometry.rs, grid.rs: distances, and what is near
 //! veto.rs: requests and outcomes                rules.rs: named options
 //! propagate.rs -> candidates.rs -> scene.rs     one motion: sweeps, a slave's choices, their judge
 //!                 interval.rs, search.rs        free directions: exact in the plane, searched in space
@@ -18,6 +18,7 @@ mod candidates;
 #[expect(clippy::module_inception, reason = "the chain itself, of the world of chains")]
 pub mod chain;
 pub mod geometry;
+mod grid;
 pub mod interval;
 pub mod kinematics;
 pub mod obstacle;

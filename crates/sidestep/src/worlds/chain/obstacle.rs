@@ -1,11 +1,13 @@
 //! Obstacles: what they are, and which of them are near.
 //!
-//! Obstacles that stand still lie in a uniform grid; those that move are a list. A query names a
-//! box and visits every obstacle whose own box meets it exactly once, without allocating (slide
-//! P3: proximity is sensed locally).
+//! Obstacles that stand still lie in a uniform grid, which copies share; those that move are a
+//! list, with a grid of its own where they are many. A query names a box and visits every obstacle
+//! whose own box meets it exactly once, without allocating (slide P3: proximity is sensed locally).
 
 use super::geometry::{self, Bounds, Core, Point, add, scaled};
+use super::grid::Grid;
 use sidestep_kernel::InputError;
+use std::sync::Arc;
 
 /// Something in the way: all points within a radius of a convex core.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -78,19 +80,26 @@ pub fn outline(id: u32, corners: &[Point<2>], radius_m: f64) -> Vec<Obstacle<2>>
 /// Beyond this, rounding is no longer small against the tolerances.
 const MAX_EXTENT_M: f64 = 1e7;
 
-/// All obstacles of a world.
-#[derive(Debug, Clone)]
+/// All obstacles of a world. A copy shares those that stand still with the original and has
+/// moving ones of its own, so every worker may have one.
+#[derive(Debug, Clone, Default)]
 pub struct Obstacles<const D: usize> {
-    still: Vec<Obstacle<D>>,
-    grid: Grid<D>,
+    still: Arc<Still<D>>,
     moving: Vec<Obstacle<D>>,
+    /// Where those that move are, if they are many.
+    moving_grid: Grid<D>,
+    reach_m: f64,
 }
 
-impl<const D: usize> Default for Obstacles<D> {
-    fn default() -> Self {
-        Self { still: Vec::new(), grid: Grid::build(&[], 1.0), moving: Vec::new() }
-    }
+/// What never moves.
+#[derive(Debug, Default)]
+struct Still<const D: usize> {
+    all: Vec<Obstacle<D>>,
+    grid: Grid<D>,
 }
+
+/// As many moving obstacles are looked at one by one sooner than by a grid.
+const FEW: usize = 12;
 
 impl<const D: usize> Obstacles<D> {
     /// Obstacles for chains whose longest rod, with its ends, measures about `reach_m`; that
@@ -102,19 +111,22 @@ impl<const D: usize> Obstacles<D> {
         all.iter().try_for_each(Obstacle::check)?;
         all.sort_by_key(|o| o.id);
         let (moving, still): (Vec<_>, Vec<_>) = all.into_iter().partition(Obstacle::is_moving);
-        let bounds: Vec<_> = still.iter().map(Obstacle::bounds).collect();
-        let grid = Grid::build(&bounds, reach_m);
-        Ok(Self { still, grid, moving })
+        let mut grid = Grid::default();
+        grid.rebuild(still.iter().map(Obstacle::bounds), reach_m);
+        let still = Arc::new(Still { all: still, grid });
+        let mut obstacles = Self { still, moving, moving_grid: Grid::default(), reach_m };
+        obstacles.index_moving();
+        Ok(obstacles)
     }
 
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
-        self.still.is_empty() && self.moving.is_empty()
+        self.still.all.is_empty() && self.moving.is_empty()
     }
 
     /// Those that stand still, by id.
     pub fn still(&self) -> &[Obstacle<D>] {
-        &self.still
+        &self.still.all
     }
 
     /// Those that move, by id.
@@ -122,9 +134,20 @@ impl<const D: usize> Obstacles<D> {
         &self.moving
     }
 
-    /// Gives one of [`Self::moving`] a new place or velocity.
-    pub fn moving_mut(&mut self) -> &mut [Obstacle<D>] {
-        &mut self.moving
+    /// Replaces those that move, in the memory they have. Their velocities may be zero: parts of
+    /// other chains rest at times.
+    ///
+    /// # Errors
+    /// As [`Self::new`]; nothing has changed then.
+    pub fn set_moving(&mut self, moving: &[Obstacle<D>]) -> Result<(), InputError> {
+        moving.iter().try_for_each(Obstacle::check)?;
+        self.moving.clear();
+        self.moving.extend_from_slice(moving);
+        if !self.moving.is_sorted_by_key(|o| o.id) {
+            self.moving.sort_by_key(|o| o.id);
+        }
+        self.index_moving();
+        Ok(())
     }
 
     /// Moves those that move along their velocities.
@@ -132,12 +155,23 @@ impl<const D: usize> Obstacles<D> {
         for obstacle in &mut self.moving {
             obstacle.core = obstacle.core.shifted(scaled(obstacle.velocity_m_s, dt_s));
         }
+        self.index_moving();
     }
 
-    /// Visits every obstacle whose box meets `near`, each once.
+    fn index_moving(&mut self) {
+        if self.moving.len() > FEW {
+            self.moving_grid.rebuild(self.moving.iter().map(Obstacle::bounds), self.reach_m);
+        }
+    }
+
+    /// Visits every obstacle whose box meets `near`, each once: those that stand still first, in
+    /// an order that depends on nothing but the obstacles and the box.
     #[inline]
     pub fn visit<'a>(&'a self, near: &Bounds<D>, mut look: impl FnMut(&'a Obstacle<D>)) {
-        self.grid.visit(near, |k| look(&self.still[k]));
+        self.still.grid.visit(near, |k| look(&self.still.all[k]));
+        if self.moving.len() > FEW {
+            return self.moving_grid.visit(near, |k| look(&self.moving[k]));
+        }
         for obstacle in self.moving.iter().filter(|o| o.bounds().meets(near)) {
             look(obstacle);
         }
@@ -152,144 +186,6 @@ impl<const D: usize> Obstacles<D> {
             least_m = least_m.min(apart_m);
         });
         least_m
-    }
-}
-
-/// A uniform grid over boxes; every cell lists the boxes that meet it.
-#[derive(Debug, Clone)]
-struct Grid<const D: usize> {
-    origin: Point<D>,
-    per_m: f64,
-    cells: [usize; D],
-    starts: Vec<u32>,
-    entries: Vec<u32>,
-    bounds: Vec<Bounds<D>>,
-    /// The lowest cell of every box.
-    first: Vec<[usize; D]>,
-}
-
-/// The grid gets coarser until a box has at most this many entries on average.
-const ENTRIES_PER_BOX: usize = 64;
-const CELLS_PER_BOX: usize = 64;
-
-impl<const D: usize> Grid<D> {
-    fn build(bounds: &[Bounds<D>], reach_m: f64) -> Self {
-        let around = bounds.iter().fold(Bounds::nothing(), |all, b| all.joined(b));
-        let mut grid = Self {
-            origin: if bounds.is_empty() { [0.0; D] } else { around.lo },
-            per_m: 1.0,
-            cells: [if bounds.is_empty() { 0 } else { 1 }; D],
-            starts: vec![0],
-            entries: Vec::new(),
-            bounds: bounds.to_vec(),
-            first: Vec::new(),
-        };
-        if !bounds.is_empty() {
-            grid.choose_cells(&around, reach_m);
-            grid.fill();
-        }
-        grid
-    }
-
-    fn choose_cells(&mut self, around: &Bounds<D>, reach_m: f64) {
-        let extent = |b: &Bounds<D>| (0..D).map(|i| b.hi[i] - b.lo[i]).fold(0.0, f64::max);
-        let mean_m = self.bounds.iter().map(extent).sum::<f64>() / self.bounds.len() as f64;
-        let mut cell_m = (0.5 * mean_m).max(0.7 * reach_m).max(extent(around) * 1e-4).max(1e-6);
-        loop {
-            self.per_m = 1.0 / cell_m;
-            self.cells =
-                std::array::from_fn(|i| ((around.hi[i] - around.lo[i]) * self.per_m) as usize + 1);
-            let n_cells = self.cells.iter().product::<usize>();
-            let n = self.bounds.len();
-            if n_cells <= CELLS_PER_BOX * n + 4096 && self.n_entries() <= ENTRIES_PER_BOX * n + 64 {
-                return;
-            }
-            cell_m *= 1.5;
-        }
-    }
-
-    fn n_entries(&self) -> usize {
-        let count = |b: &Bounds<D>| {
-            let (lo, hi) = (self.cell_of(b.lo), self.cell_of(b.hi));
-            (0..D).map(|i| hi[i] - lo[i] + 1).product::<usize>()
-        };
-        self.bounds.iter().map(count).sum()
-    }
-
-    #[inline]
-    fn cell_of(&self, p: Point<D>) -> [usize; D] {
-        // A float cast saturates: what lies below the grid is in its first cell.
-        std::array::from_fn(|i| {
-            (((p[i] - self.origin[i]) * self.per_m) as usize).min(self.cells[i] - 1)
-        })
-    }
-
-    #[inline]
-    fn index(&self, cell: [usize; D]) -> usize {
-        (0..D).rev().fold(0, |index, i| index * self.cells[i] + cell[i])
-    }
-
-    fn fill(&mut self) {
-        let n_cells: usize = self.cells.iter().product();
-        self.first = self.bounds.iter().map(|b| self.cell_of(b.lo)).collect();
-        let mut counts = vec![0u32; n_cells + 1];
-        let range = |b: &Bounds<D>| (self.cell_of(b.lo), self.cell_of(b.hi));
-        for b in &self.bounds {
-            let (lo, hi) = range(b);
-            for_cells(lo, hi, |cell| counts[self.index(cell) + 1] += 1);
-        }
-        for k in 0..n_cells {
-            counts[k + 1] += counts[k];
-        }
-        let mut next = counts.clone();
-        let mut entries = vec![0u32; counts[n_cells] as usize];
-        for (k, b) in self.bounds.iter().enumerate() {
-            let (lo, hi) = range(b);
-            for_cells(lo, hi, |cell| {
-                let slot = &mut next[self.index(cell)];
-                entries[*slot as usize] = k as u32;
-                *slot += 1;
-            });
-        }
-        (self.starts, self.entries) = (counts, entries);
-    }
-
-    #[inline]
-    fn visit(&self, near: &Bounds<D>, mut look: impl FnMut(usize)) {
-        if self.bounds.is_empty() {
-            return;
-        }
-        let (lo, hi) = (self.cell_of(near.lo), self.cell_of(near.hi));
-        for_cells(lo, hi, |cell| {
-            let index = self.index(cell);
-            let (from, to) = (self.starts[index] as usize, self.starts[index + 1] as usize);
-            for &k in &self.entries[from..to] {
-                let k = k as usize;
-                // A box in several cells is told in the first that both share.
-                let first = (0..D).all(|i| cell[i] == self.first[k][i].max(lo[i]));
-                if first && self.bounds[k].meets(near) {
-                    look(k);
-                }
-            }
-        });
-    }
-}
-
-/// Visits the cells of a block in the order of their indices.
-#[inline]
-fn for_cells<const D: usize>(lo: [usize; D], hi: [usize; D], mut look: impl FnMut([usize; D])) {
-    let mut cell = lo;
-    loop {
-        look(cell);
-        let mut axis = 0;
-        while cell[axis] == hi[axis] {
-            cell[axis] = lo[axis];
-            axis += 1;
-            if axis == D {
-                return;
-            }
-        }
-        cell[axis] += 1;
     }
 }
 
@@ -310,24 +206,83 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    type Ball = ([f64; 2], f64);
+
+    fn balls() -> impl Strategy<Value = Vec<Ball>> {
+        let ball = (prop::array::uniform2(-9.0..9.0f64), 0.0..2.0f64);
+        prop::collection::vec(ball, 0..60)
+    }
+
+    fn named(balls: &[Ball], from: u32) -> Vec<Obstacle<2>> {
+        (from..).zip(balls).map(|(id, (c, r))| Obstacle::ball(id, *c, *r)).collect()
+    }
+
+    fn seen(obstacles: &Obstacles<2>, near: &Bounds<2>) -> Vec<u32> {
+        let mut seen = Vec::new();
+        obstacles.visit(near, |o| seen.push(o.id));
+        seen.sort_unstable();
+        seen
+    }
+
     proptest! {
         #[test]
         fn a_query_visits_exactly_what_is_near(
-            balls in prop::collection::vec((prop::array::uniform2(-9.0..9.0f64), 0.0..2.0f64), 0..60),
+            still in balls(),
+            moving in balls(),
+            by in prop::array::uniform2(-9.0..9.0f64),
             at in prop::array::uniform2(-12.0..12.0f64),
             half_m in 0.0..4.0f64,
             reach_m in 0.01..5.0f64,
         ) {
-            let all: Vec<_> =
-                (0u32..).zip(&balls).map(|(id, (c, r))| Obstacle::ball(id, *c, *r)).collect();
+            let (still, moving) = (named(&still, 0), named(&moving, 100));
+            let moving: Vec<_> =
+                moving.into_iter().map(|o| Obstacle { velocity_m_s: by, ..o }).collect();
             let near = around(at, half_m);
-            let expected: Vec<u32> =
-                all.iter().filter(|o| o.bounds().meets(&near)).map(|o| o.id).collect();
-            let mut seen = Vec::new();
-            Obstacles::new(all, reach_m).unwrap().visit(&near, |o| seen.push(o.id));
-            seen.sort_unstable();
-            prop_assert_eq!(seen, expected);
+            let expected = |moving: &[Obstacle<2>]| -> Vec<u32> {
+                let near_by = |o: &&Obstacle<2>| o.bounds().meets(&near);
+                still.iter().chain(moving).filter(near_by).map(|o| o.id).collect()
+            };
+            let mut obstacles = Obstacles::new(still.clone(), reach_m).unwrap();
+            let copy = obstacles.clone();
+            obstacles.set_moving(&moving).unwrap();
+            prop_assert_eq!(seen(&obstacles, &near), expected(&moving));
+            obstacles.advance(0.5);
+            prop_assert_eq!(seen(&obstacles, &near), expected(obstacles.moving()));
+            prop_assert_eq!(seen(&copy, &near), expected(&[]));
+            obstacles.set_moving(&moving[..moving.len() / 4]).unwrap();
+            prop_assert_eq!(seen(&obstacles, &near), expected(&moving[..moving.len() / 4]));
         }
+
+        #[test]
+        fn those_that_move_are_visited_in_an_order_that_follows_from_their_names(
+            moving in balls(), from in 0usize..60, half_m in 0.0..9.0f64,
+        ) {
+            let moving = named(&moving, 0);
+            let mut other_order = moving.clone();
+            other_order.rotate_left(from.min(moving.len()));
+            let order = |moving: &[Obstacle<2>]| {
+                let mut obstacles = Obstacles::default();
+                obstacles.set_moving(moving).unwrap();
+                let mut seen = Vec::new();
+                obstacles.visit(&around([0.0; 2], half_m), |o| seen.push(o.id));
+                seen
+            };
+            prop_assert_eq!(order(&moving), order(&other_order));
+        }
+    }
+
+    #[test]
+    fn copies_share_what_stands_still() {
+        let obstacles = Obstacles::new(named(&[([0.0; 2], 1.0); 9], 0), 1.0).unwrap();
+        assert!(std::ptr::eq(obstacles.still(), obstacles.clone().still()));
+    }
+
+    #[test]
+    fn wrong_moving_obstacles_change_nothing() {
+        let mut obstacles = Obstacles::<2>::default();
+        obstacles.set_moving(&[Obstacle::ball(1, [0.0; 2], 1.0)]).unwrap();
+        assert!(obstacles.set_moving(&[Obstacle::ball(2, [f64::NAN; 2], 1.0)]).is_err());
+        assert_eq!(obstacles.moving()[0].id, 1);
     }
 
     #[test]

@@ -98,8 +98,8 @@ impl<const D: usize> Propagator<D> {
         let from = heads.places(chain);
         self.tally = Tally::default();
         self.before.start(chain.points().len(), heads.first);
-        if let Some(reason) = self.project(chain, &mut heads, request.mode) {
-            return Ok(Outcome::Vetoed(veto(chain, heads.first, heads.first, Refusal::of(reason))));
+        if let Err((by, refusal)) = project(chain, &mut heads, request.mode) {
+            return Ok(Outcome::Vetoed(veto(chain, heads.first, by, refusal)));
         }
         let n = self.sub_steps(chain, obstacles, &heads, from)?;
         for k in 1..=n {
@@ -112,26 +112,6 @@ impl<const D: usize> Propagator<D> {
             }
         }
         Ok(Outcome::Moved(self.moved(None)))
-    }
-
-    /// Brings the targets to where the heads may be; the reason where that is not enough.
-    fn project(&self, chain: &Chain<D>, heads: &mut Heads<D>, mode: Mode) -> Option<Reason> {
-        for (h, k) in heads.indices().enumerate() {
-            let (connector, at) = (&chain.connectors()[k], chain.points()[k]);
-            if heads.to[h] == at {
-                continue;
-            }
-            if connector.is_still() && distance(heads.to[h], at) > chain.least_move_m() {
-                return Some(if connector.failed { Reason::Failed } else { Reason::Fixed });
-            }
-            if !connector.mobility.allows(heads.to[h], at) {
-                if mode == Mode::Exact || heads.n > 1 {
-                    return Some(Reason::Mobility);
-                }
-                heads.to[h] = connector.mobility.project(heads.to[h], at);
-            }
-        }
-        None
     }
 
     fn sub_steps(
@@ -360,7 +340,9 @@ impl<const D: usize> Propagator<D> {
     }
 
     fn commit(&mut self, chain: &mut Chain<D>, heads: &Heads<D>) {
-        for i in self.overlay.from..self.overlay.to {
+        // Outward from the head, so that the run of old positions has no gap.
+        let (from, to) = (self.overlay.from, self.overlay.to);
+        for i in (heads.first..to).chain((from..heads.first).rev()) {
             let old = chain.points()[i];
             let new = self.overlay.get(i).unwrap_or(old);
             self.write(chain, i, old, new, heads.indices().contains(&i));
@@ -495,6 +477,30 @@ impl<const D: usize> Scene<'_, D> {
         });
         worst.map_or(Ok(()), |(_, refusal)| Err(refusal))
     }
+}
+
+/// Brings the targets to where the heads may be, or says who may not be there.
+fn project<const D: usize>(
+    chain: &Chain<D>,
+    heads: &mut Heads<D>,
+    mode: Mode,
+) -> Result<(), Objection> {
+    for (h, k) in heads.indices().enumerate() {
+        let (connector, at) = (&chain.connectors()[k], chain.points()[k]);
+        if heads.to[h] == at {
+            continue;
+        }
+        if connector.is_still() && distance(heads.to[h], at) > chain.least_move_m() {
+            return Err((k, Refusal::of(connector.why_still())));
+        }
+        if !connector.mobility.allows(heads.to[h], at) {
+            if mode == Mode::Exact || heads.n > 1 {
+                return Err((k, Refusal::of(Reason::Mobility)));
+            }
+            heads.to[h] = connector.mobility.project(heads.to[h], at);
+        }
+    }
+    Ok(())
 }
 
 fn rod_box<const D: usize>(

@@ -37,7 +37,9 @@ impl<const D: usize> Overlay<D> {
         (self.from, self.to) = (first, first);
     }
 
+    /// Gives a connector of the run, or one beside it, a position.
     pub(super) fn set(&mut self, i: usize, p: Point<D>) {
+        debug_assert!(self.from <= i + 1 && i <= self.to, "the run would have a gap");
         self.points[i] = p;
         (self.from, self.to) = (self.from.min(i), self.to.max(i + 1));
     }

@@ -1,7 +1,7 @@
 //! Scenes that several tests share.
 
 use super::chain::{Chain, Connector, Rod};
-use super::geometry::{Point, distance};
+use super::geometry::{Point, between_segments, distance, nearest_on_segment};
 use super::obstacle::{Obstacle, Obstacles};
 use sidestep_kernel::Seed;
 use sidestep_kernel::math::{cos, sin};
@@ -83,12 +83,11 @@ pub(super) fn corridor_walls(width_m: f64) -> Vec<Obstacle<2>> {
     walls
 }
 
-/// Robots behind each other in the first, straight part of the corridor, the leader first.
-pub(super) fn convoy(followers: usize, rod: Rod, radius_m: f64) -> Chain<2> {
-    let lead_m = 0.3 + rod.max_m * followers as f64;
-    let points = (0..=followers).map(|i| [lead_m - rod.max_m * i as f64, 0.0]).collect();
-    let connectors = vec![Connector::free(radius_m); followers + 1];
-    Chain::new(points, connectors, vec![rod; followers]).expect("a straight chain is right")
+/// Robots behind each other on the first axis, the leader at `lead_m`; the tail of a long convoy
+/// is still outside of the corridor.
+pub(super) fn convoy(lead_m: f64, followers: usize, rod: Rod, radius_m: f64) -> Chain<2> {
+    Chain::straight([lead_m, 0.0], [-1.0, 0.0], followers, rod, Connector::free(radius_m))
+        .expect("a straight chain is right")
 }
 
 /// A leader's wandering: at every step somewhere into a cone around where it goes.
@@ -145,4 +144,30 @@ pub(super) fn clearance_m<const D: usize>(chain: &Chain<D>, obstacles: &Obstacle
         |i: usize| obstacles.clearance_m([points[i], points[i + 1]], chain.rods()[i].radius_m, 1.0);
     let tips = (0..points.len()).map(tip).fold(1.0, f64::min);
     (0..chain.rods().len()).map(rod).fold(tips, f64::min)
+}
+
+/// The least clearance of a chain to itself: of discs further apart than one index, rods further
+/// than two, and discs from rods that are no neighbors.
+pub(super) fn own_clearance_m<const D: usize>(chain: &Chain<D>) -> f64 {
+    let (points, rods, connectors) = (chain.points(), chain.rods(), chain.connectors());
+    let rod = |i: usize| [points[i], points[i + 1]];
+    let mut least_m = f64::INFINITY;
+    for i in 0..points.len() {
+        for j in i + 2..points.len() {
+            let apart_m = distance(points[i], points[j]);
+            least_m = least_m.min(apart_m - connectors[i].radius_m - connectors[j].radius_m);
+        }
+        for j in (0..rods.len()).filter(|&j| i + 1 < j || i > j + 2) {
+            let apart_m =
+                distance(nearest_on_segment(points[i], points[j], points[j + 1]), points[i]);
+            least_m = least_m.min(apart_m - connectors[i].radius_m - rods[j].radius_m);
+        }
+    }
+    for i in 0..rods.len() {
+        for j in i + 3..rods.len() {
+            let apart_m = between_segments(rod(i), rod(j)).distance_m;
+            least_m = least_m.min(apart_m - rods[i].radius_m - rods[j].radius_m);
+        }
+    }
+    least_m
 }

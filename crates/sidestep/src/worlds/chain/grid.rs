@@ -1,0 +1,152 @@
+//! Which boxes are near: a uniform grid.
+
+use super::geometry::{Bounds, Point};
+
+/// Boxes, and for every cell the list of those that meet it.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Grid<const D: usize> {
+    cells: Cells<D>,
+    starts: Vec<u32>,
+    entries: Vec<u32>,
+    bounds: Vec<Bounds<D>>,
+    /// The lowest cell of every box.
+    first: Vec<[usize; D]>,
+}
+
+/// The grid gets coarser until a box has at most this many entries on average.
+const ENTRIES_PER_BOX: usize = 64;
+const CELLS_PER_BOX: usize = 64;
+
+impl<const D: usize> Grid<D> {
+    /// Builds the grid anew, in the memory it has. Queries measure about `reach_m`; that sets
+    /// the size of the cells, never the result.
+    pub(super) fn rebuild(&mut self, bounds: impl Iterator<Item = Bounds<D>>, reach_m: f64) {
+        self.bounds.clear();
+        self.bounds.extend(bounds);
+        if !self.bounds.is_empty() {
+            self.cells = Cells::choose(&self.bounds, reach_m);
+            self.fill();
+        }
+    }
+
+    /// Lists the boxes of every cell by counting: `starts` holds the counts first, then where to
+    /// write next, and in the end where each list begins.
+    fn fill(&mut self) {
+        let Self { cells, starts, entries, bounds, first } = self;
+        first.clear();
+        first.extend(bounds.iter().map(|b| cells.at(b.lo)));
+        let n_cells = cells.len();
+        starts.clear();
+        starts.resize(n_cells + 2, 0);
+        for b in &*bounds {
+            cells.for_those_of(b, |_, index| starts[index + 2] += 1);
+        }
+        for k in 0..n_cells {
+            starts[k + 2] += starts[k + 1];
+        }
+        entries.clear();
+        entries.resize(starts[n_cells + 1] as usize, 0);
+        for (k, b) in (0u32..).zip(&*bounds) {
+            cells.for_those_of(b, |_, index| {
+                entries[starts[index + 1] as usize] = k;
+                starts[index + 1] += 1;
+            });
+        }
+    }
+
+    /// Visits every box that meets `near`, each once.
+    #[inline]
+    pub(super) fn visit(&self, near: &Bounds<D>, mut look: impl FnMut(usize)) {
+        if self.bounds.is_empty() {
+            return;
+        }
+        let lowest = self.cells.at(near.lo);
+        self.cells.for_those_of(near, |cell, index| {
+            let (from, to) = (self.starts[index] as usize, self.starts[index + 1] as usize);
+            for &k in &self.entries[from..to] {
+                let k = k as usize;
+                // A box in several cells is told in the first that both share.
+                let is_first = (0..D).all(|i| cell[i] == self.first[k][i].max(lowest[i]));
+                if is_first && self.bounds[k].meets(near) {
+                    look(k);
+                }
+            }
+        });
+    }
+}
+
+/// How space is cut into cells. What lies outside belongs to the nearest cell.
+#[derive(Debug, Clone, Copy)]
+struct Cells<const D: usize> {
+    origin: Point<D>,
+    per_m: f64,
+    n: [usize; D],
+}
+
+impl<const D: usize> Default for Cells<D> {
+    fn default() -> Self {
+        Self { origin: [0.0; D], per_m: 1.0, n: [1; D] }
+    }
+}
+
+impl<const D: usize> Cells<D> {
+    /// Cells for boxes, of which there is at least one, and queries of about `reach_m`.
+    fn choose(bounds: &[Bounds<D>], reach_m: f64) -> Self {
+        let n = bounds.len();
+        let around = bounds.iter().fold(Bounds::nothing(), |all, b| all.joined(b));
+        let extent = |b: &Bounds<D>| (0..D).map(|i| b.hi[i] - b.lo[i]).fold(0.0, f64::max);
+        let mean_m = bounds.iter().map(extent).sum::<f64>() / n as f64;
+        let mut cell_m = (0.5 * mean_m).max(0.7 * reach_m).max(extent(&around) * 1e-4).max(1e-6);
+        loop {
+            let per_m = 1.0 / cell_m;
+            let along = |i: usize| ((around.hi[i] - around.lo[i]) * per_m) as usize + 1;
+            let cells = Self { origin: around.lo, per_m, n: std::array::from_fn(along) };
+            let entries = || bounds.iter().map(|b| cells.n_of(b)).sum::<usize>();
+            if cells.len() <= CELLS_PER_BOX * (n + 1) && entries() <= ENTRIES_PER_BOX * (n + 1) {
+                return cells;
+            }
+            cell_m *= 1.5;
+        }
+    }
+
+    fn len(&self) -> usize {
+        self.n.iter().product()
+    }
+
+    fn n_of(&self, b: &Bounds<D>) -> usize {
+        let (lo, hi) = (self.at(b.lo), self.at(b.hi));
+        (0..D).map(|i| hi[i] - lo[i] + 1).product()
+    }
+
+    #[inline]
+    fn at(&self, p: Point<D>) -> [usize; D] {
+        // A float cast saturates: what lies below the grid is in its first cell.
+        std::array::from_fn(|i| {
+            (((p[i] - self.origin[i]) * self.per_m) as usize).min(self.n[i] - 1)
+        })
+    }
+
+    #[inline]
+    fn index(&self, cell: [usize; D]) -> usize {
+        (0..D).rev().fold(0, |index, i| index * self.n[i] + cell[i])
+    }
+
+    /// Visits the cells that a box meets, and their indices, in the order of the indices.
+    #[inline]
+    fn for_those_of(&self, b: &Bounds<D>, mut look: impl FnMut([usize; D], usize)) {
+        let (lo, hi) = (self.at(b.lo), self.at(b.hi));
+        let mut cell = lo;
+        loop {
+            look(cell, self.index(cell));
+            let mut axis = 0;
+            while cell[axis] == hi[axis] {
+                cell[axis] = lo[axis];
+                axis += 1;
+                if axis == D {
+                    return;
+                }
+            }
+            cell[axis] += 1;
+        }
+    }
+}

@@ -1,0 +1,46 @@
+//! Nobody passes through anything, however thin.
+
+use super::*;
+
+#[test]
+fn nobody_passes_a_thin_wall() {
+    for seed in 0..20 {
+        let mut numbers = Numbers::new(seed);
+        let mut walls = Vec::new();
+        for id in 0..40 {
+            let a: Point<2> = numbers.point(3.0);
+            let ends = [a, add(a, numbers.point(0.7))];
+            // Nothing near where the chain starts.
+            if ends.iter().all(|p| p[1].abs() > 0.75 || p[0] > 0.4) && ends[0][1] * ends[1][1] > 0.0
+            {
+                walls.push(Obstacle::capsule(id, ends, 0.0005));
+            }
+        }
+        let obstacles = Obstacles::new(walls.clone(), 0.8).unwrap();
+        let rod = Rod { min_m: 0.5, max_m: 0.6, radius_m: 0.002 };
+        let mut chain =
+            Chain::straight([0.0, 0.0], [-1.0, 0.0], 8, rod, Connector::free(0.01)).unwrap();
+        let mut propagator = Propagator::new(Rules { step_m: Some(0.12), ..Rules::default() });
+        let mut walk = Wanderer::new(seed);
+        for _ in 0..200 {
+            let before = chain.points().to_vec();
+            let to = walk.next(before[0], 0.119);
+            let outcome =
+                propagator.propagate(&mut chain, &obstacles, &Request::exact(0, to)).unwrap();
+            if outcome.veto().is_some() {
+                walk.turn();
+            }
+            for wall in &walls {
+                let crate::worlds::chain::geometry::Core::Segment(core) = wall.core else {
+                    continue;
+                };
+                for (old, new) in before.iter().zip(chain.points()) {
+                    assert!(!cross_each_other([*old, *new], core), "seed {seed}");
+                }
+                for rod in chain.points().windows(2) {
+                    assert!(!cross_each_other([rod[0], rod[1]], core), "seed {seed}");
+                }
+            }
+        }
+    }
+}
