@@ -32,6 +32,8 @@ const BENDS: [(f64, f64); 7] = [
     (2.0, -180.0),
 ];
 
+type Measure = fn() -> Result<(), Box<dyn Error>>;
+
 /// Points and headings along the middle of the corridor.
 fn center_line() -> Vec<Pose> {
     let piece_m = 0.16;
@@ -126,9 +128,6 @@ fn run(plan: &Plan, course: &Course) -> Result<Run, Box<dyn Error>> {
         let mut noise = streams.draws(0, cycle, LASER_NOISE);
         let tick = convoy.tick(&course.obstacles, course.target, &mut noise)?;
         measures.note(&convoy, &course.obstacles, &tick);
-        if std::env::var("TRACE").is_ok() && cycle % 10 == 0 {
-            println!("{cycle} {:?} {:?} {:?}", convoy.leader(), tick.layer, tick.veto);
-        }
         if distance(convoy.leader().pose.at, course.finish) <= course.finish_radius_m {
             return Ok(Run { arrived: true, measures });
         }
@@ -142,7 +141,9 @@ fn yes(arrived: bool) -> &'static str {
 
 /// A leader alone: every reading, sector and width.
 fn leader() -> Result<(), Box<dyn Error>> {
-    println!("\n| sector | reading | arrived | least clearance m | mean speed m/s at 1.6 m | at 2 m |");
+    println!(
+        "\n| sector | reading | arrived | least clearance m | mean speed m/s at 1.6 m | at 2 m |"
+    );
     println!("| --- | --- | --- | --- | --- | --- |");
     let mut total = [0, 0];
     for sector in [[0.0, 90.0], [15.0, 90.0], [30.0, 90.0], [45.0, 90.0], [0.0, 60.0], [15.0, 60.0]]
@@ -189,14 +190,15 @@ fn fields() -> Result<(), Box<dyn Error>> {
                 let (mut arrived, mut touched, mut ticks) = (0, 0, 0);
                 for seed in 0..30 {
                     let run = run(&plan, &field(seed, discs)?)?;
-                    if !run.arrived && std::env::var("WHO").is_ok() { println!("{seed} {:?}", run.measures); }
                     arrived += usize::from(run.arrived);
                     touched += usize::from(run.measures.vetoes > 0);
                     ticks += if run.arrived { run.measures.ticks } else { 0 };
                 }
                 let mean_s = ticks as f64 * plan.dt_s / arrived.max(1) as f64;
                 let rule = yes(leave_rule.is_some());
-                println!("| {discs} | {leaving:?} | {rule} | {arrived} | {touched} | {mean_s:.0} |");
+                println!(
+                    "| {discs} | {leaving:?} | {rule} | {arrived} | {touched} | {mean_s:.0} |"
+                );
             }
         }
     }
@@ -205,7 +207,9 @@ fn fields() -> Result<(), Box<dyn Error>> {
 
 /// A leader and followers that are where their connectors are.
 fn chain() -> Result<(), Box<dyn Error>> {
-    println!("\n| width m | followers | rods m | arrived | vetoes | leader clearance m | connector clearance m | fastest connector, leader = 1 |");
+    println!(
+        "\n| width m | followers | rods m | arrived | vetoes | leader clearance m | connector clearance m | fastest connector, leader = 1 |"
+    );
     println!("| --- | --- | --- | --- | --- | --- | --- | --- |");
     for width_m in [1.2, 1.6, 2.0, 2.5, 3.0] {
         for followers in [15, 40] {
@@ -217,7 +221,11 @@ fn chain() -> Result<(), Box<dyn Error>> {
                 let Run { arrived, measures: m } = run(&plan, &corridor(width_m, start_m)?)?;
                 println!(
                     "| {width_m} | {followers} | {min_m} to {max_m} | {} | {} | {:.3} | {:.1e} | {:.2} |",
-                    yes(arrived), m.vetoes, m.leader_clearance_m, m.connector_clearance_m, m.fastest
+                    yes(arrived),
+                    m.vetoes,
+                    m.leader_clearance_m,
+                    m.connector_clearance_m,
+                    m.fastest
                 );
             }
         }
@@ -227,7 +235,9 @@ fn chain() -> Result<(), Box<dyn Error>> {
 
 /// Followers on real wheels: margins and spare speed.
 fn wheels() -> Result<(), Box<dyn Error>> {
-    println!("\n| width m | margin m | wheels | arrived | vetoes | bumped % | held % | lag mean, max m | clearance m | pairs m |");
+    println!(
+        "\n| width m | margin m | wheels | arrived | vetoes | bumped % | held % | lag mean, max m | clearance m | pairs m |"
+    );
     println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |");
     let followers = 15;
     for width_m in [1.2, 1.6, 2.0, 2.5] {
@@ -240,8 +250,15 @@ fn wheels() -> Result<(), Box<dyn Error>> {
                 let percent = |n: usize| 100.0 * n as f64 / (m.ticks * followers) as f64;
                 println!(
                     "| {width_m} | {margin_m} | {q} | {} | {} | {:.2} | {:.2} | {:.3}, {:.3} | {:.3} | {:.2} to {:.2} |",
-                    yes(arrived), m.vetoes, percent(m.bumped), percent(m.held),
-                    m.mean_lag_m(followers), m.max_lag_m, m.follower_clearance_m, m.pairs_m[0], m.pairs_m[1]
+                    yes(arrived),
+                    m.vetoes,
+                    percent(m.bumped),
+                    percent(m.held),
+                    m.mean_lag_m(followers),
+                    m.max_lag_m,
+                    m.follower_clearance_m,
+                    m.pairs_m[0],
+                    m.pairs_m[1]
                 );
             }
         }
@@ -251,7 +268,9 @@ fn wheels() -> Result<(), Box<dyn Error>> {
 
 /// Where there is no room to swing round.
 fn narrow() -> Result<(), Box<dyn Error>> {
-    println!("\n| width m | turning | near, far m | arrived | vetoes | leader clearance m | seconds |");
+    println!(
+        "\n| width m | turning | near, far m | arrived | vetoes | leader clearance m | seconds |"
+    );
     println!("| --- | --- | --- | --- | --- | --- | --- |");
     for width_m in [0.8, 0.9, 1.0, 1.1, 1.2] {
         for turning in [Turning::AboutAWheel, Turning::OnTheSpotWhereBlocked] {
@@ -262,7 +281,10 @@ fn narrow() -> Result<(), Box<dyn Error>> {
                 let Run { arrived, measures: m } = run(&plan, &corridor(width_m, 2.0)?)?;
                 println!(
                     "| {width_m} | {turning:?} | {near_m}, {far_m} | {} | {} | {:.3} | {:.0} |",
-                    yes(arrived), m.vetoes, m.leader_clearance_m, m.ticks as f64 * plan.dt_s
+                    yes(arrived),
+                    m.vetoes,
+                    m.leader_clearance_m,
+                    m.ticks as f64 * plan.dt_s
                 );
             }
         }
@@ -272,13 +294,17 @@ fn narrow() -> Result<(), Box<dyn Error>> {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let parts: Vec<String> = std::env::args().skip(1).collect();
-    let wanted = |part: &str| parts.is_empty() || parts.iter().any(|p| p == part);
-    let all: [(&str, fn() -> Result<(), Box<dyn Error>>); 5] =
-        [("leader", leader), ("narrow", narrow), ("field", fields), ("chain", chain), ("wheels", wheels)];
-    for (part, measure) in all {
-        if wanted(part) {
-            measure()?;
-        }
+    let all: [(&str, Measure); 5] = [
+        ("leader", leader),
+        ("narrow", narrow),
+        ("field", fields),
+        ("chain", chain),
+        ("wheels", wheels),
+    ];
+    for (_, measure) in
+        all.iter().filter(|(part, _)| parts.is_empty() || parts.iter().any(|p| p == part))
+    {
+        measure()?;
     }
     Ok(())
 }

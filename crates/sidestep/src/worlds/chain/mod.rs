@@ -11,6 +11,7 @@
 //!                 sweep.rs, own_body.rs         nothing is passed through; the chain's own parts
 //! reach.rs: an arm with a fixed base
 //! wavefront.rs: many motions at once            rebuild.rs: broken chains
+//! swarm/: robots on wheels, one that navigates and those that follow
 //! kinematics/: arms of joints, as chains        script/: a turtle language that drives an initiator
 //! ```
 
@@ -32,6 +33,7 @@ mod scene;
 mod scenes;
 pub mod script;
 mod search;
+pub mod swarm;
 pub mod sweep;
 pub mod veto;
 pub mod wavefront;

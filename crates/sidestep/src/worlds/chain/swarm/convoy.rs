@@ -90,8 +90,9 @@ impl Convoy {
     /// A convoy that stands in line behind its leader, rods at their greatest length.
     ///
     /// # Errors
-    /// As [`Chain::new`]; a tick or margin out of range.
+    /// As [`Chain::new`] and [`Leader::check`]; a tick out of range.
     pub fn new(plan: Plan, start: Pose) -> Result<Self, InputError> {
+        plan.leader.check()?;
         if !(plan.dt_s > 0.0 && plan.dt_s <= 1.0) {
             let cause = format!("takes {} s", plan.dt_s);
             return Err(InputError::new("tick", cause, "give more than 0, up to 1 s"));
@@ -203,7 +204,8 @@ impl Convoy {
         let command = follower.decide(&pose, &goal, &gaps, *dt_s);
         let next = follower.drive.step(pose, command.wheels, *dt_s);
         let radius_m = follower.ring.radius_m;
-        let to_robot = |b: Body| b.core.nearest_to_point(next.at).distance_m - b.radius_m - radius_m;
+        let to_robot =
+            |b: Body| b.core.nearest_to_point(next.at).distance_m - b.radius_m - radius_m;
         let apart_m = others().map(to_robot).fold(1.0, f64::min);
         let gap_m = obstacles.clearance_m([next.at; 2], radius_m, 1.0).min(apart_m);
         self.followers[i] = next;

@@ -74,9 +74,8 @@ impl Follower {
         let off_rad = wrap_angle(atan2(wanted[1], wanted[0]) - pose.heading_rad);
         let is_backward = off_rad.abs() > BACKWARD_RAD;
         let off_rad = if is_backward { wrap_angle(off_rad - PI) } else { off_rad };
-        let wheels = self
-            .drive
-            .wheels(speed_m_s * cos(off_rad).max(0.0), self.turn_gain_per_s * off_rad);
+        let wheels =
+            self.drive.wheels(speed_m_s * cos(off_rad).max(0.0), self.turn_gain_per_s * off_rad);
         self.held(wheels, is_backward, gaps, dt_s)
     }
 

@@ -9,6 +9,7 @@ use sidestep_kernel::distr::normal;
 use sidestep_kernel::math::{cos, sin, wrap_angle};
 use sidestep_kernel::stream::{Draws, Purpose};
 use std::f64::consts::{PI, TAU};
+use std::ops::RangeInclusive;
 
 /// Draws of the errors of a laser's ranges: one stream per chain and cycle.
 pub const LASER_NOISE: Purpose = Purpose(1);
@@ -191,19 +192,29 @@ impl Laser {
     }
 
     /// The least range within a sector of beams, given by its ends relative to the heading, left
-    /// positive; `None` where the sector is not wholly in the field or has no beam.
-    pub fn least_m(&self, scan: &Scan, [from_rad, to_rad]: [f64; 2]) -> Option<f64> {
-        let (n, step) = (self.directions.len() as isize, self.step_rad());
+    /// positive; `None` where [`Self::sees`] says no.
+    pub fn least_m(&self, scan: &Scan, sector_rad: [f64; 2]) -> Option<f64> {
+        let n = self.directions.len() as isize;
+        let range_m = |k: isize| scan.ranges_m[k.rem_euclid(n) as usize];
+        let beams = self.sector(sector_rad)?;
+        Some(beams.map(range_m).fold(self.range_m, f64::min))
+    }
+
+    /// Whether a sector is wholly in the field and has a beam.
+    pub fn sees(&self, sector_rad: [f64; 2]) -> bool {
+        self.sector(sector_rad).is_some()
+    }
+
+    /// The beams of a sector; negative ones are to the right.
+    fn sector(&self, [from_rad, to_rad]: [f64; 2]) -> Option<RangeInclusive<isize>> {
         // Ends that are multiples of the step count as inside, whatever their rounding.
-        let first = (from_rad / step - 1e-9).ceil() as isize;
-        let last = (to_rad / step + 1e-9).floor() as isize;
-        let sees_all = 2 * self.beams_per_side + 1 >= self.directions.len();
-        let field = -(self.beams_per_side as isize)..=self.beams_per_side as isize;
-        if first > last || !(sees_all || field.contains(&first) && field.contains(&last)) {
-            return None;
-        }
-        let range = |k: isize| scan.ranges_m[k.rem_euclid(n) as usize];
-        Some((first..=last).map(range).fold(self.range_m, f64::min))
+        let first = (from_rad / self.step_rad() - 1e-9).ceil() as isize;
+        let last = (to_rad / self.step_rad() + 1e-9).floor() as isize;
+        let side = self.beams_per_side as isize;
+        let n = self.directions.len() as isize;
+        let sees_all = 2 * side + 1 >= n && last.saturating_sub(first) < n;
+        let is_seen = sees_all || (-side <= first && last <= side);
+        (first <= last && is_seen).then_some(first..=last)
     }
 }
 

@@ -124,14 +124,7 @@ impl Leader {
     /// # Errors
     /// A speed that is not above 0.
     pub fn new(speed_m_s: f64) -> Result<Self, InputError> {
-        if !(speed_m_s > 0.0 && speed_m_s.is_finite()) {
-            return Err(InputError::new(
-                "leader",
-                format!("has a speed of {speed_m_s} m/s"),
-                "give more than 0",
-            ));
-        }
-        Ok(Self {
+        let leader = Self {
             laser: Laser::new(180, 3.2, std::f64::consts::PI, 0.0)?,
             sector_rad: [0.0, std::f64::consts::FRAC_PI_2],
             speed_m_s,
@@ -142,7 +135,34 @@ impl Leader {
             leave_rule: Some(LeaveRule::default()),
             target_sense: TargetSense::default(),
             turning: Turning::default(),
-        })
+        };
+        leader.check()?;
+        Ok(leader)
+    }
+
+    /// Whether its numbers make sense together.
+    ///
+    /// # Errors
+    /// A speed that is not above 0; distances that are not 0 < near <= far <= lost <= the
+    /// laser's range; a sector that the laser does not see.
+    pub fn check(&self) -> Result<(), InputError> {
+        let wrong = |cause: String, remedy: &str| Err(InputError::new("leader", cause, remedy));
+        let Self { speed_m_s, near_m, far_m, lost_m, sector_rad: [from, to], .. } = *self;
+        if !(speed_m_s > 0.0 && speed_m_s.is_finite()) {
+            return wrong(format!("has a speed of {speed_m_s} m/s"), "give more than 0");
+        }
+        let range_m = self.laser.range_m();
+        if !(0.0 < near_m && near_m <= far_m && far_m <= lost_m && lost_m <= range_m) {
+            return wrong(
+                format!("has walls near at {near_m}, far at {far_m}, lost at {lost_m} m"),
+                "give 0 < near <= far <= lost <= the laser's range",
+            );
+        }
+        if !self.laser.sees([from, to]) || !self.laser.sees([-to, -from]) {
+            let cause = format!("looks for walls from {from} to {to} rad, where it has no beams");
+            return wrong(cause, "widen the laser's field, or the sector");
+        }
+        Ok(())
     }
 }
 
@@ -222,7 +242,6 @@ impl Leader {
     ) -> Percept {
         self.laser.scan(pose, around.obstacles, around.bodies.iter().copied(), noise, scan);
         let [from, to] = self.sector_rad;
-        // A sector beyond the laser's field sees nothing.
         let least_m = |sector| self.laser.least_m(scan, sector).unwrap_or(self.laser.range_m());
         let walls_m = Sides { left: least_m([from, to]), right: least_m([-to, -from]) };
         let target = around.target.filter(|&target| self.detects(pose, around, target));
@@ -276,8 +295,7 @@ impl Leader {
 
     fn wall(&self, was_followed: bool, wall_m: f64, leaves_walls: bool) -> Wall {
         let is_far = wall_m > self.far_m;
-        let is_followed =
-            !leaves_walls && (!is_far || was_followed && wall_m <= self.lost_m);
+        let is_followed = !leaves_walls && (!is_far || was_followed && wall_m <= self.lost_m);
         let is_left_behind = is_far
             && !leaves_walls
             && match self.leaving {
@@ -360,6 +378,17 @@ mod tests {
     }
 
     #[test]
+    fn a_leader_that_cannot_work_is_refused() {
+        let right = leader(Leaving::Latched);
+        assert!(right.check().is_ok());
+        assert!(Leader::new(f64::NAN).is_err());
+        assert!(Leader { near_m: 1.0, ..right.clone() }.check().is_err());
+        assert!(Leader { lost_m: 4.0, ..right.clone() }.check().is_err());
+        let narrow = Laser::new(180, 3.2, 0.5, 0.0).unwrap();
+        assert!(Leader { laser: narrow, ..right }.check().is_err());
+    }
+
+    #[test]
     fn a_lost_wall_is_forgotten() {
         let leader = leader(Leaving::Latched);
         let near = leader.decide(Sides::default(), &percept(0.8, 3.2)).followed;
@@ -387,8 +416,7 @@ mod tests {
         use sidestep_kernel::{Seed, stream::Streams};
         let wall = Obstacle::capsule(0, [[2.0, -1.0], [2.0, 1.0]], 0.0);
         let obstacles = Obstacles::new(vec![wall], 1.0).unwrap();
-        let around =
-            Surroundings { obstacles: &obstacles, bodies: &[], target: Some([4.0, 0.0]) };
+        let around = Surroundings { obstacles: &obstacles, bodies: &[], target: Some([4.0, 0.0]) };
         let pose = Pose { at: [0.0, 0.0], heading_rad: 0.0 };
         let mut noise = Streams::new(Seed(1)).draws(0, 0, super::super::laser::LASER_NOISE);
         let mut sees = |needs_line_of_sight, range_m| {

@@ -17,6 +17,8 @@ pub mod laser;
 pub mod leader;
 pub mod proximity;
 pub mod ray;
+#[cfg(test)]
+mod tests;
 
 pub use convoy::{Convoy, Plan};
 pub use drive::{Drive, Pose, Wheels};
