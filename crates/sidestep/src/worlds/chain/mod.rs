@@ -12,6 +12,7 @@
 //! reach.rs: an arm with a fixed base
 //! wavefront.rs: many motions at once            rebuild.rs: broken chains
 //! ground/: where obstacles come from
+//! swarm/: robots on wheels, one that navigates and those that follow
 //! kinematics/: arms of joints, as chains        script/: a turtle language that drives an initiator
 //! ```
 
@@ -45,6 +46,7 @@ pub mod script;
 mod search;
 pub mod simulation;
 pub mod state;
+pub mod swarm;
 pub mod sweep;
 pub mod veto;
 pub mod wavefront;

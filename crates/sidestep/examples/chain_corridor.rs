@@ -1,0 +1,310 @@
+//! A swarm that passes narrow corridors and open fields, in numbers (slides E2, N6).
+//!
+//! `cargo run --release -p sidestep --example chain_corridor [-- PART ...]` with the parts
+//! `leader` (alone in the corridor), `field` (discs and a target), `chain` (a leader and the
+//! chain behind it), `wheels` (followers on real wheels) and `narrow` (1.0 m).
+
+use sidestep::kernel::Seed;
+use sidestep::kernel::math::{cos, sin};
+use sidestep::kernel::stream::Streams;
+use sidestep::worlds::chain::geometry::{Point, distance};
+use sidestep::worlds::chain::swarm::convoy::Measures;
+use sidestep::worlds::chain::swarm::drive::Drive;
+use sidestep::worlds::chain::swarm::laser::LASER_NOISE;
+use sidestep::worlds::chain::swarm::leader::{LeaveRule, Turning};
+use sidestep::worlds::chain::swarm::{Convoy, Follower, Leaving, Plan, Pose};
+use sidestep::worlds::chain::{Obstacle, Obstacles, Rod};
+use std::error::Error;
+use std::f64::consts::PI;
+
+const SPEED_M_S: f64 = 0.5;
+const WIDTHS_M: [f64; 8] = [1.2, 1.4, 1.6, 1.8, 2.0, 2.2, 2.5, 3.0];
+const READINGS: [Leaving; 3] = [Leaving::Latched, Leaving::Range, Leaving::Level];
+
+/// 14 m straight, then bends by their radius in meters and turn in degrees, then 8 m.
+const BENDS: [(f64, f64); 7] = [
+    (2.0, 90.0),
+    (1.5, -90.0),
+    (1.6, 180.0),
+    (1.3, 60.0),
+    (1.3, -120.0),
+    (1.3, 60.0),
+    (2.0, -180.0),
+];
+
+type Measure = fn() -> Result<(), Box<dyn Error>>;
+
+/// Points and headings along the middle of the corridor.
+fn center_line() -> Vec<Pose> {
+    let piece_m = 0.16;
+    let mut line = vec![Pose { at: [0.0, 0.0], heading_rad: 0.0 }];
+    let mut go = |length_m: f64, turn_rad: f64| {
+        let n = (length_m / piece_m).ceil();
+        for _ in 0..n as usize {
+            let Pose { at: [x, y], heading_rad } = line[line.len() - 1];
+            let (ds, middle) = (length_m / n, heading_rad + 0.5 * turn_rad / n);
+            let at = [x + ds * cos(middle), y + ds * sin(middle)];
+            line.push(Pose { at, heading_rad: heading_rad + turn_rad / n });
+        }
+    };
+    go(14.0, 0.0);
+    for (radius_m, degrees) in BENDS {
+        let turn_rad = f64::to_radians(degrees);
+        go(radius_m * turn_rad.abs(), turn_rad);
+    }
+    go(8.0, 0.0);
+    line
+}
+
+/// A scene and where it is done.
+struct Course {
+    obstacles: Obstacles<2>,
+    target: Option<Point<2>>,
+    finish: Point<2>,
+    finish_radius_m: f64,
+    start: Pose,
+    limit_s: f64,
+}
+
+/// Thin walls on both sides of the middle; the start is 0.8 m from the right wall, or in the
+/// middle where there is no such place, and the finish is 1 m before the end.
+fn corridor(width_m: f64, start_m: f64) -> Result<Course, Box<dyn Error>> {
+    let line = center_line();
+    let beside = |pose: &Pose, side: f64| {
+        let [x, y] = pose.at;
+        let out_m = side * 0.5 * width_m;
+        [x - out_m * sin(pose.heading_rad), y + out_m * cos(pose.heading_rad)]
+    };
+    let mut walls = Vec::new();
+    for side in [-1.0, 1.0] {
+        for pair in line.windows(2) {
+            let ends = [beside(&pair[0], side), beside(&pair[1], side)];
+            walls.push(Obstacle::capsule(walls.len() as u32, ends, 0.0));
+        }
+    }
+    Ok(Course {
+        obstacles: Obstacles::new(walls, 1.3)?,
+        target: None,
+        finish: line[line.len() - 7].at,
+        finish_radius_m: 0.5 * width_m,
+        start: Pose { at: [start_m, (0.8 - 0.5 * width_m).min(0.0)], heading_rad: 0.0 },
+        limit_s: 400.0,
+    })
+}
+
+/// Discs of 0.2 to 0.5 m anywhere in 20 m x 20 m, but 1.5 m away from start and target, which
+/// lie in opposite corners.
+fn field(seed: u64, discs: u32) -> Result<Course, Box<dyn Error>> {
+    let mut draws = Streams::new(Seed(seed)).draws(0, 0, LASER_NOISE);
+    let (start, target) = ([-8.5, -8.5], [8.5, 8.5]);
+    let mut all = Vec::new();
+    while all.len() < discs as usize {
+        let at = [20.0 * draws.uniform() - 10.0, 20.0 * draws.uniform() - 10.0];
+        let radius_m = 0.2 + 0.3 * draws.uniform();
+        if distance(at, start).min(distance(at, target)) > radius_m + 1.5 {
+            all.push(Obstacle::ball(all.len() as u32, at, radius_m));
+        }
+    }
+    Ok(Course {
+        obstacles: Obstacles::new(all, 1.3)?,
+        target: Some(target),
+        finish: target,
+        finish_radius_m: 0.5,
+        start: Pose { at: start, heading_rad: 2.0 * PI * draws.uniform() },
+        limit_s: 300.0,
+    })
+}
+
+struct Run {
+    arrived: bool,
+    measures: Measures,
+}
+
+fn run(plan: &Plan, course: &Course) -> Result<Run, Box<dyn Error>> {
+    let mut convoy = Convoy::new(plan.clone(), course.start)?;
+    let streams = Streams::new(Seed(1));
+    let mut measures = Measures::default();
+    for cycle in 0..(course.limit_s / plan.dt_s) as u64 {
+        let mut noise = streams.draws(0, cycle, LASER_NOISE);
+        let tick = convoy.tick(&course.obstacles, course.target, &mut noise)?;
+        measures.note(&convoy, &course.obstacles, &tick);
+        if distance(convoy.leader().pose.at, course.finish) <= course.finish_radius_m {
+            return Ok(Run { arrived: true, measures });
+        }
+    }
+    Ok(Run { arrived: false, measures })
+}
+
+fn yes(arrived: bool) -> &'static str {
+    if arrived { "yes" } else { "NO" }
+}
+
+/// A leader alone: every reading, sector and width.
+fn leader() -> Result<(), Box<dyn Error>> {
+    println!(
+        "\n| sector | reading | arrived | least clearance m | mean speed m/s at 1.6 m | at 2 m |"
+    );
+    println!("| --- | --- | --- | --- | --- | --- |");
+    let mut total = [0, 0];
+    for sector in [[0.0, 90.0], [15.0, 90.0], [30.0, 90.0], [45.0, 90.0], [0.0, 60.0], [15.0, 60.0]]
+    {
+        for leaving in READINGS {
+            let mut plan = Plan::new(0, SPEED_M_S)?;
+            plan.leader.leaving = leaving;
+            plan.leader.sector_rad = sector.map(f64::to_radians);
+            let runs = WIDTHS_M
+                .map(|width_m| run(&plan, &corridor(width_m, 2.0)?))
+                .into_iter()
+                .collect::<Result<Vec<_>, _>>()?;
+            let stuck: Vec<_> =
+                runs.iter().zip(WIDTHS_M).filter(|(r, _)| !r.arrived).map(|(_, w)| w).collect();
+            let arrived = runs.len() - stuck.len();
+            total = [total[0] + arrived, total[1] + runs.len()];
+            let least_m = runs.iter().map(|r| r.measures.leader_clearance_m).fold(1.0, f64::min);
+            let vetoes: usize = runs.iter().map(|r| r.measures.vetoes).sum();
+            let speed = |k: usize| {
+                let m = &runs[k].measures;
+                m.way_m / (m.ticks as f64 * plan.dt_s)
+            };
+            println!(
+                "| {sector:?} | {leaving:?} | {arrived} of {} {stuck:?} | {least_m:.3} ({vetoes} vetoes) | {:.2} | {:.2} |",
+                runs.len(),
+                speed(2),
+                speed(4)
+            );
+        }
+    }
+    println!("\n{} of {} arrived", total[0], total[1]);
+    Ok(())
+}
+
+/// A leader and a target in a field of discs, 30 runs a cell.
+fn fields() -> Result<(), Box<dyn Error>> {
+    println!("\n| discs | reading | leave rule | arrived of 30 | runs with a veto | mean s |");
+    println!("| --- | --- | --- | --- | --- | --- |");
+    for leave_rule in [Some(LeaveRule::default()), None] {
+        for leaving in READINGS {
+            for discs in [0, 10, 25, 40] {
+                let mut plan = Plan::new(0, SPEED_M_S)?;
+                (plan.leader.leaving, plan.leader.leave_rule) = (leaving, leave_rule);
+                let (mut arrived, mut touched, mut ticks) = (0, 0, 0);
+                for seed in 0..30 {
+                    let run = run(&plan, &field(seed, discs)?)?;
+                    arrived += usize::from(run.arrived);
+                    touched += usize::from(run.measures.vetoes > 0);
+                    ticks += if run.arrived { run.measures.ticks } else { 0 };
+                }
+                let mean_s = ticks as f64 * plan.dt_s / arrived.max(1) as f64;
+                let rule = yes(leave_rule.is_some());
+                println!(
+                    "| {discs} | {leaving:?} | {rule} | {arrived} | {touched} | {mean_s:.0} |"
+                );
+            }
+        }
+    }
+    Ok(())
+}
+
+/// A leader and followers that are where their connectors are.
+fn chain() -> Result<(), Box<dyn Error>> {
+    println!(
+        "\n| width m | followers | rods m | arrived | vetoes | leader clearance m | connector clearance m | fastest connector, leader = 1 |"
+    );
+    println!("| --- | --- | --- | --- | --- | --- | --- | --- |");
+    for width_m in [1.2, 1.6, 2.0, 2.5, 3.0] {
+        for followers in [15, 40] {
+            for (min_m, max_m) in [(0.6, 0.8), (1.0, 1.0)] {
+                let mut plan = Plan::new(followers, SPEED_M_S)?;
+                plan.rod = Rod { min_m, max_m, radius_m: 0.05 };
+                plan.margin_m = 0.0;
+                let start_m = 0.3 + max_m * 15.0_f64.min(13.5 / max_m).floor();
+                let Run { arrived, measures: m } = run(&plan, &corridor(width_m, start_m)?)?;
+                println!(
+                    "| {width_m} | {followers} | {min_m} to {max_m} | {} | {} | {:.3} | {:.1e} | {:.2} |",
+                    yes(arrived),
+                    m.vetoes,
+                    m.leader_clearance_m,
+                    m.connector_clearance_m,
+                    m.fastest
+                );
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Followers on real wheels: margins and spare speed.
+fn wheels() -> Result<(), Box<dyn Error>> {
+    println!(
+        "\n| width m | margin m | wheels | arrived | vetoes | bumped % | held % | lag mean, max m | clearance m | pairs m |"
+    );
+    println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |");
+    let followers = 15;
+    for width_m in [1.2, 1.6, 2.0, 2.5] {
+        for margin_m in [0.0, 0.05, 0.08, 0.1] {
+            for q in [1.0, 1.2, 1.5] {
+                let mut plan = Plan::new(followers, SPEED_M_S)?;
+                plan.margin_m = margin_m;
+                plan.follower = Follower::new(Drive::new(0.4, q * SPEED_M_S)?, 0.25)?;
+                let Run { arrived, measures: m } = run(&plan, &corridor(width_m, 12.3)?)?;
+                let percent = |n: usize| 100.0 * n as f64 / (m.ticks * followers) as f64;
+                println!(
+                    "| {width_m} | {margin_m} | {q} | {} | {} | {:.2} | {:.2} | {:.3}, {:.3} | {:.3} | {:.2} to {:.2} |",
+                    yes(arrived),
+                    m.vetoes,
+                    percent(m.bumped),
+                    percent(m.held),
+                    m.mean_lag_m(followers),
+                    m.max_lag_m,
+                    m.follower_clearance_m,
+                    m.pairs_m[0],
+                    m.pairs_m[1]
+                );
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Where there is no room to swing round.
+fn narrow() -> Result<(), Box<dyn Error>> {
+    println!(
+        "\n| width m | turning | near, far m | arrived | vetoes | leader clearance m | seconds |"
+    );
+    println!("| --- | --- | --- | --- | --- | --- | --- |");
+    for width_m in [0.8, 0.9, 1.0, 1.1, 1.2] {
+        for turning in [Turning::AboutAWheel, Turning::OnTheSpotWhereBlocked] {
+            for (near_m, far_m) in [(0.7, 0.9), (0.45, 0.65)] {
+                let mut plan = Plan::new(0, SPEED_M_S)?;
+                plan.leader.turning = turning;
+                (plan.leader.near_m, plan.leader.far_m) = (near_m, far_m);
+                let Run { arrived, measures: m } = run(&plan, &corridor(width_m, 2.0)?)?;
+                println!(
+                    "| {width_m} | {turning:?} | {near_m}, {far_m} | {} | {} | {:.3} | {:.0} |",
+                    yes(arrived),
+                    m.vetoes,
+                    m.leader_clearance_m,
+                    m.ticks as f64 * plan.dt_s
+                );
+            }
+        }
+    }
+    Ok(())
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let parts: Vec<String> = std::env::args().skip(1).collect();
+    let all: [(&str, Measure); 5] = [
+        ("leader", leader),
+        ("narrow", narrow),
+        ("field", fields),
+        ("chain", chain),
+        ("wheels", wheels),
+    ];
+    for (_, measure) in
+        all.iter().filter(|(part, _)| parts.is_empty() || parts.iter().any(|p| p == part))
+    {
+        measure()?;
+    }
+    Ok(())
+}

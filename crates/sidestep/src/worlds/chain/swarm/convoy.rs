@@ -1,0 +1,291 @@
+//! A leader and its followers, a tick at a time.
+//!
+//! Each tick the leader perceives, decides and proposes where its wheels would take it; the chain
+//! moves there or objects. Then every follower steers toward its own connector. All perceive the
+//! robots as they were before the tick.
+
+use super::drive::{Drive, Pose};
+use super::follower::{Follower, Goal};
+use super::laser::{Body, Scan};
+use super::leader::{Layer, Leader, LeaderState, Surroundings};
+use crate::worlds::chain::geometry::{Point, distance, scaled, sub};
+use crate::worlds::chain::veto::{Mode, Motion, Request, Source, Veto};
+use crate::worlds::chain::{Chain, Connector, Obstacles, Propagator, Rod, Rules};
+use sidestep_kernel::InputError;
+use sidestep_kernel::math::{cos, sin};
+use sidestep_kernel::stream::Draws;
+
+/// What a convoy is.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// How the first robot behaves.
+    pub leader: Leader,
+    /// Its wheels.
+    pub drive: Drive,
+    /// How the others behave.
+    pub follower: Follower,
+    /// How many others there are.
+    pub followers: usize,
+    /// The distances that neighbors keep.
+    pub rod: Rod,
+    /// By how much followers' connectors are larger than their bodies.
+    pub margin_m: f64,
+    /// How the chain reacts.
+    pub rules: Rules,
+    /// Length of a tick.
+    pub dt_s: f64,
+}
+
+impl Plan {
+    /// The convoy of the slides: robots of radius 0.25 m on wheels 0.4 m apart, 0.6 to 0.8 m
+    /// behind each other, connectors 0.08 m larger, wheels 20 % faster than the leader's.
+    ///
+    /// # Errors
+    /// A speed that is not above 0.
+    pub fn new(followers: usize, speed_m_s: f64) -> Result<Self, InputError> {
+        Ok(Self {
+            leader: Leader::new(speed_m_s)?,
+            drive: Drive::new(0.4, speed_m_s)?,
+            follower: Follower::new(Drive::new(0.4, 1.2 * speed_m_s)?, 0.25)?,
+            followers,
+            rod: Rod { min_m: 0.6, max_m: 0.8, radius_m: 0.05 },
+            margin_m: 0.08,
+            rules: Rules::default(),
+            dt_s: 0.02,
+        })
+    }
+}
+
+/// A convoy on its way.
+#[derive(Debug, Clone)]
+pub struct Convoy {
+    plan: Plan,
+    chain: Chain<2>,
+    propagator: Propagator<2>,
+    leader: LeaderState,
+    followers: Vec<Pose>,
+    scan: Scan,
+    /// Connectors before the tick, and bodies of the followers.
+    before: Vec<Point<2>>,
+    bodies: Vec<Body>,
+}
+
+/// What happened in a tick.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tick {
+    /// The leader's layer that acted.
+    pub layer: Layer,
+    /// The chain's objection to the leader's way.
+    pub veto: Option<Veto<2>>,
+    /// Followers that were held back by their sensors.
+    pub held: usize,
+    /// Followers whose bumper is pressed.
+    pub bumped: usize,
+}
+
+impl Convoy {
+    /// A convoy that stands in line behind its leader, rods at their greatest length.
+    ///
+    /// # Errors
+    /// As [`Chain::new`] and [`Leader::check`]; a tick out of range.
+    pub fn new(plan: Plan, start: Pose) -> Result<Self, InputError> {
+        plan.leader.check()?;
+        if !(plan.dt_s > 0.0 && plan.dt_s <= 1.0) {
+            let cause = format!("takes {} s", plan.dt_s);
+            return Err(InputError::new("tick", cause, "give more than 0, up to 1 s"));
+        }
+        let radius_m = plan.follower.ring.radius_m;
+        // The leader is where its connector is, so that needs no margin.
+        let mut connectors = vec![Connector::free(radius_m + plan.margin_m); plan.followers + 1];
+        connectors[0] = Connector::free(radius_m);
+        let back = [-cos(start.heading_rad), -sin(start.heading_rad)];
+        let at = |i: usize| {
+            let behind_m = plan.rod.max_m * i as f64;
+            [start.at[0] + back[0] * behind_m, start.at[1] + back[1] * behind_m]
+        };
+        let points: Vec<_> = (0..=plan.followers).map(at).collect();
+        let followers = points[1..].iter().map(|&at| Pose { at, ..start }).collect();
+        let chain = Chain::new(points, connectors, vec![plan.rod; plan.followers])?;
+        Ok(Self {
+            chain,
+            propagator: Propagator::new(plan.rules),
+            leader: LeaderState::at(start),
+            followers,
+            scan: Scan::default(),
+            before: Vec::new(),
+            bodies: Vec::new(),
+            plan,
+        })
+    }
+
+    /// The chain that the robots keep to.
+    pub fn chain(&self) -> &Chain<2> {
+        &self.chain
+    }
+
+    /// The first robot.
+    pub fn leader(&self) -> &LeaderState {
+        &self.leader
+    }
+
+    /// The other robots; robot `i` keeps to connector `i + 1`.
+    pub fn followers(&self) -> &[Pose] {
+        &self.followers
+    }
+
+    /// What it is.
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// One tick. `noise` is where the errors of the laser come from in this tick.
+    ///
+    /// # Errors
+    /// As [`Propagator::propagate`].
+    pub fn tick(
+        &mut self,
+        obstacles: &Obstacles<2>,
+        target: Option<Point<2>>,
+        noise: &mut Draws,
+    ) -> Result<Tick, InputError> {
+        let radius_m = self.plan.follower.ring.radius_m;
+        self.bodies.clear();
+        self.bodies.extend(self.followers.iter().map(|f| Body::disc(f.at, radius_m)));
+        let leader_was = self.leader.pose.at;
+        let (layer, veto) = self.lead(obstacles, target, noise)?;
+        self.bodies.push(Body::disc(leader_was, radius_m));
+        let (mut held, mut bumped) = (0, 0);
+        for i in 0..self.followers.len() {
+            let (is_held, is_bumped) = self.follow(i, obstacles);
+            held += usize::from(is_held);
+            bumped += usize::from(is_bumped);
+        }
+        Ok(Tick { layer, veto, held, bumped })
+    }
+
+    fn lead(
+        &mut self,
+        obstacles: &Obstacles<2>,
+        target: Option<Point<2>>,
+        noise: &mut Draws,
+    ) -> Result<(Layer, Option<Veto<2>>), InputError> {
+        let Self { plan, leader, scan, bodies, .. } = self;
+        let around = Surroundings { obstacles, bodies, target };
+        let percept = plan.leader.perceive(&leader.pose, &around, noise, scan);
+        let decision = plan.leader.decide(leader.followed, &percept);
+        leader.followed = decision.followed;
+        let proposed = plan.drive.step(leader.pose, decision.wheels, plan.dt_s);
+        self.before.clear();
+        self.before.extend_from_slice(self.chain.points());
+        let motion = Motion::Connector { k: 0, to: proposed.at };
+        let request = Request { motion, source: Source::Autonomous, mode: Mode::Exact };
+        let outcome = self.propagator.propagate(&mut self.chain, obstacles, &request)?;
+        let veto = outcome.veto().copied();
+        self.leader.pose = if veto.is_none() {
+            Pose { at: self.chain.points()[0], ..proposed }
+        } else {
+            let wheels = plan.leader.when_blocked(decision.wheels);
+            plan.drive.step(self.leader.pose, wheels, plan.dt_s)
+        };
+        Ok((decision.layer, veto))
+    }
+
+    /// Moves a follower; whether it was held back, and whether its bumper is pressed.
+    fn follow(&mut self, i: usize, obstacles: &Obstacles<2>) -> (bool, bool) {
+        let Plan { follower, dt_s, .. } = &self.plan;
+        let (was, at) = (self.before[i + 1], self.chain.points()[i + 1]);
+        let goal = Goal { at, velocity_m_s: scaled(sub(at, was), 1.0 / dt_s) };
+        let pose = self.followers[i];
+        let others = || self.bodies.iter().enumerate().filter(|&(k, _)| k != i).map(|(_, b)| *b);
+        let followed = follower.follow(&pose, &goal, (obstacles, others()), *dt_s);
+        self.followers[i] = followed.pose;
+        (followed.is_held, followed.is_bumped)
+    }
+}
+
+/// What came of a run, so far.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Measures {
+    /// Ticks so far.
+    pub ticks: usize,
+    /// Ticks in which each layer acted, layer 1 first.
+    pub layers: [usize; 6],
+    /// Ticks in which the chain objected.
+    pub vetoes: usize,
+    /// The way of the leader.
+    pub way_m: f64,
+    /// The least air between the leader's body and anything, up to 1 m.
+    pub leader_clearance_m: f64,
+    /// The least air between a connector and anything, up to 1 m.
+    pub connector_clearance_m: f64,
+    /// The same of the followers' bodies.
+    pub follower_clearance_m: f64,
+    /// Robot-ticks with a pressed bumper, and with sensors that held a robot back.
+    pub bumped: usize,
+    /// See [`Self::bumped`].
+    pub held: usize,
+    /// Distances of followers from their connectors, summed over followers and ticks.
+    pub lag_sum_m: f64,
+    /// The greatest such distance.
+    pub max_lag_m: f64,
+    /// The least and greatest distance of neighbors.
+    pub pairs_m: [f64; 2],
+    /// The fastest connector, as a multiple of the leader's speed.
+    pub fastest: f64,
+}
+
+impl Default for Measures {
+    fn default() -> Self {
+        Self {
+            ticks: 0,
+            layers: [0; 6],
+            vetoes: 0,
+            way_m: 0.0,
+            leader_clearance_m: 1.0,
+            connector_clearance_m: 1.0,
+            follower_clearance_m: 1.0,
+            bumped: 0,
+            held: 0,
+            lag_sum_m: 0.0,
+            max_lag_m: 0.0,
+            pairs_m: [f64::INFINITY, 0.0],
+            fastest: 0.0,
+        }
+    }
+}
+
+impl Measures {
+    /// Adds the state after a tick.
+    pub fn note(&mut self, convoy: &Convoy, obstacles: &Obstacles<2>, tick: &Tick) {
+        self.ticks += 1;
+        self.layers[tick.layer as usize - 1] += 1;
+        self.vetoes += usize::from(tick.veto.is_some());
+        self.bumped += tick.bumped;
+        self.held += tick.held;
+        self.way_m += distance(convoy.before[0], convoy.chain.points()[0]);
+        let radius_m = convoy.plan.follower.ring.radius_m;
+        let air_m = |at: Point<2>, radius_m| obstacles.clearance_m([at; 2], radius_m, 1.0);
+        let points = convoy.chain.points();
+        self.leader_clearance_m = self.leader_clearance_m.min(air_m(points[0], radius_m));
+        for (i, follower) in convoy.followers.iter().enumerate() {
+            let connector = points[i + 1];
+            let body_m = air_m(follower.at, radius_m);
+            self.follower_clearance_m = self.follower_clearance_m.min(body_m);
+            let connector_m = air_m(connector, convoy.chain.connectors()[i + 1].radius_m);
+            self.connector_clearance_m = self.connector_clearance_m.min(connector_m);
+            let lag_m = distance(follower.at, connector);
+            self.lag_sum_m += lag_m;
+            self.max_lag_m = self.max_lag_m.max(lag_m);
+            let ahead = if i == 0 { convoy.leader.pose } else { convoy.followers[i - 1] };
+            let pair_m = distance(follower.at, ahead.at);
+            self.pairs_m = [self.pairs_m[0].min(pair_m), self.pairs_m[1].max(pair_m)];
+            let speed_m_s = distance(convoy.before[i + 1], connector) / convoy.plan.dt_s;
+            self.fastest = self.fastest.max(speed_m_s / convoy.plan.leader.speed_m_s);
+        }
+    }
+
+    /// The mean distance of followers from their connectors.
+    pub fn mean_lag_m(&self, followers: usize) -> f64 {
+        self.lag_sum_m / (self.ticks * followers).max(1) as f64
+    }
+}
