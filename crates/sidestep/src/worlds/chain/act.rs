@@ -6,6 +6,8 @@ use super::geometry::{Bounds, distance, sub, unit};
 use super::metrics::GivenUp;
 use super::reach;
 use super::script::Motion as ScriptMotion;
+use super::swarm::drive::Pose;
+use super::swarm::leader::Decision;
 use super::state::Body;
 use super::veto::{Mode, Motion, Moved, Outcome, Reason, Request, Veto};
 use super::world::{ChainWorld, Scratch, purpose};
@@ -19,6 +21,8 @@ enum Wish<const D: usize> {
     Rest,
     /// The initiator elsewhere.
     Go(Point<D>),
+    /// The same of a robot on wheels.
+    Steer(Pose),
     /// Its task is done.
     Done,
 }
@@ -29,6 +33,8 @@ pub(super) struct Turn<'a, const D: usize> {
     pub(super) spec: &'a ChainSpec<D>,
     pub(super) slot: Slot,
     pub(super) now: Cycle,
+    /// What its navigator has decided.
+    pub(super) decision: Option<Decision>,
 }
 
 impl<const D: usize> Turn<'_, D> {
@@ -44,11 +50,10 @@ impl<const D: usize> ChainWorld<D> {
     pub(super) fn act(
         &self,
         body: &mut Body<D>,
-        (slot, now): (Slot, Cycle),
+        turn: Turn<'_, D>,
         claim: &Bounds<D>,
         scratch: &mut Scratch<D>,
     ) {
-        let turn = Turn { spec: &self.chains[slot as usize], slot, now };
         self.change(body, turn, scratch);
         scratch.before.clear();
         scratch.before.extend_from_slice(body.chain.points());
@@ -58,6 +63,7 @@ impl<const D: usize> ChainWorld<D> {
             self.drive(body, turn, scratch);
             self.keep_to_claim(body, turn, claim, scratch);
         }
+        self.follow(body, turn, scratch);
         self.measure(body, turn, scratch);
     }
 
@@ -88,7 +94,10 @@ impl<const D: usize> ChainWorld<D> {
         body.driving.cycles += 1;
         match self.wish(body, task, turn, scratch) {
             Wish::Rest => {}
-            Wish::Go(to) => self.go(body, (task, to), turn, scratch),
+            Wish::Go(to) => {
+                self.go(body, (task, to), turn, scratch);
+            }
+            Wish::Steer(pose) => self.go_on_wheels(body, (task, pose), turn, scratch),
             Wish::Done => return self.next_task(body, turn, EventKind::Done, scratch),
         }
         if is_late {
@@ -108,6 +117,12 @@ impl<const D: usize> ChainWorld<D> {
         let step_m = task.speed_m_s * self.dt_s;
         match &task.driver {
             Driver::Rest => Wish::Rest,
+            Driver::Navigate(navigator) => {
+                if Self::has_arrived(body, task, navigator) {
+                    return Wish::Done;
+                }
+                self.steered(body, task, navigator, turn).map_or(Wish::Rest, Wish::Steer)
+            }
             Driver::Wander(rule) => {
                 let draws = &mut self.streams.draws(turn.slot, turn.now, purpose::WANDER);
                 let ahead = wander(rule, at, out_of_space(body.driving.ahead), step_m, draws);
@@ -168,14 +183,30 @@ impl<const D: usize> ChainWorld<D> {
         body.driving.nearest_m = f64::INFINITY;
     }
 
-    /// Moves the initiator, or meets with a veto.
+    /// Moves an initiator on wheels; one whose way is blocked may turn where it stands.
+    fn go_on_wheels(
+        &self,
+        body: &mut Body<D>,
+        (task, pose): (&Task<D>, Pose),
+        turn: Turn<'_, D>,
+        scratch: &mut Scratch<D>,
+    ) {
+        let Driver::Navigate(navigator) = &task.driver else { return };
+        if self.go(body, (task, Self::place(pose.at)), turn, scratch) {
+            self.has_steered(body, task, navigator, pose.heading_rad);
+        } else {
+            self.turn_where_blocked(body, task, navigator, turn);
+        }
+    }
+
+    /// Moves the initiator, or meets with a veto; whether it moved.
     fn go(
         &self,
         body: &mut Body<D>,
         (task, to): (&Task<D>, Point<D>),
         turn: Turn<'_, D>,
         scratch: &mut Scratch<D>,
-    ) {
+    ) -> bool {
         let at = body.chain.points()[task.agent];
         let motion = Motion::Connector { k: task.agent, to };
         let request = Request { motion, source: task.source(), mode: Mode::Exact };
@@ -185,10 +216,14 @@ impl<const D: usize> ChainWorld<D> {
         body.driving.way_m[0] += distance(at, to);
         body.driving.way_m[1] += distance(at, body.chain.points()[task.agent]);
         match outcome {
-            Outcome::Moved(moved) => self.moved(body, &moved, sub(to, at)),
+            Outcome::Moved(moved) => {
+                self.moved(body, &moved, sub(to, at));
+                true
+            }
             Outcome::Vetoed(veto) => {
                 self.vetoed(body, turn, &veto, scratch);
                 self.lose_patience(body, (task, &veto), turn, scratch);
+                false
             }
         }
     }

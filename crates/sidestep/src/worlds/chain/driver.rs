@@ -2,7 +2,9 @@
 //! (slides R4, R9).
 
 use super::geometry::{Bounds, Point, along, distance, unit};
+use super::navigate::Navigator;
 use super::script::{Motion, Script, Turtle};
+use super::swarm::leader::LeaderState;
 use super::veto::Source;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::distr::normal;
@@ -39,6 +41,8 @@ pub enum Driver<const D: usize> {
     Script(Arc<Script>),
     /// Go to places one after the other, as a planner would, but around what is in the way.
     Targets(Targets<D>),
+    /// Find the way on wheels, with a laser; in the plane.
+    Navigate(Arc<Navigator>),
 }
 
 /// Going anywhere: ahead, and a little to any side.
@@ -88,6 +92,8 @@ pub struct Driving {
     pub ahead: [f64; 3],
     /// The nearest that it came to its present target.
     pub nearest_m: f64,
+    /// What it remembers as a navigator on wheels.
+    pub leader: Option<LeaderState>,
     /// Way that it wanted to go, and way that it went, in all tasks.
     pub way_m: [f64; 2],
 }
@@ -104,6 +110,7 @@ impl Driving {
             start: [[0.0; 3]; 3],
             ahead: [0.0; 3],
             nearest_m: f64::INFINITY,
+            leader: None,
             way_m: [0.0; 2],
         };
         driving.begin(agent, points);
@@ -116,7 +123,7 @@ impl Driving {
         self.start = [turtle.position_m, turtle.ahead, turtle.left];
         self.ahead = turtle.ahead;
         (self.cycles, self.idle, self.next, self.rested) = (0, 0, 0, 0);
-        self.nearest_m = f64::INFINITY;
+        (self.nearest_m, self.leader) = (f64::INFINITY, None);
     }
 
     /// Goes on to the next task, which `agent` carries out.

@@ -19,8 +19,6 @@ pub enum EventKind {
     Escape,
     /// A robot's body touches something; the value is its distance from its connector in meters.
     Bumper,
-    /// The leader's layer has changed; the value is its number, 1 to 6.
-    Layer,
     /// The initiator goes on in another direction after a veto; the value is the turn in radians.
     Sideways,
     /// The other end has taken over the initiative, to pull the chain back.
@@ -46,13 +44,12 @@ pub enum EventKind {
 
 impl EventKind {
     /// All kinds.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 15] = [
         Self::Veto,
         Self::Penetration,
         Self::Clear,
         Self::Escape,
         Self::Bumper,
-        Self::Layer,
         Self::Sideways,
         Self::PulledBack,
         Self::Stuck,
@@ -73,7 +70,6 @@ impl EventKind {
             Self::Clear => "clear",
             Self::Escape => "escape",
             Self::Bumper => "bumper",
-            Self::Layer => "layer",
             Self::Sideways => "sideways",
             Self::PulledBack => "pulled-back",
             Self::Stuck => "stuck",

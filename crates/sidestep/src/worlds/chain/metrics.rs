@@ -37,6 +37,57 @@ pub struct Tally {
     pub given_up: Vec<GivenUp>,
     /// How often broken parts were joined again.
     pub reformed: u64,
+    /// Steps in which each layer of a navigator acted, layer 1 first.
+    pub layers: [u64; 6],
+    /// What came of the robots on wheels.
+    pub robots: RobotTally,
+}
+
+/// What came of robots that keep to connectors.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct RobotTally {
+    /// Steps of all of them.
+    pub steps: u64,
+    /// Times that a bumper was pressed,
+    pub bumper_events: u64,
+    /// and steps with a pressed bumper.
+    pub bumper_steps: u64,
+    /// Steps in which sensors made a robot slower.
+    pub held_steps: u64,
+    /// Distances from their connectors, summed over steps,
+    pub lag_sum_m: f64,
+    /// and the greatest.
+    pub max_lag_m: f64,
+    /// The least air between a body and anything, up to 1 m.
+    pub min_gap_m: f64,
+}
+
+impl Default for RobotTally {
+    fn default() -> Self {
+        Self {
+            steps: 0,
+            bumper_events: 0,
+            bumper_steps: 0,
+            held_steps: 0,
+            lag_sum_m: 0.0,
+            max_lag_m: 0.0,
+            min_gap_m: 1.0,
+        }
+    }
+}
+
+impl RobotTally {
+    fn add(self, other: &Self) -> Self {
+        Self {
+            steps: self.steps + other.steps,
+            bumper_events: self.bumper_events + other.bumper_events,
+            bumper_steps: self.bumper_steps + other.bumper_steps,
+            held_steps: self.held_steps + other.held_steps,
+            lag_sum_m: self.lag_sum_m + other.lag_sum_m,
+            max_lag_m: self.max_lag_m.max(other.max_lag_m),
+            min_gap_m: self.min_gap_m.min(other.min_gap_m),
+        }
+    }
 }
 
 impl Default for Tally {
@@ -55,6 +106,8 @@ impl Default for Tally {
             done: 0,
             given_up: Vec::new(),
             reformed: 0,
+            layers: [0; 6],
+            robots: RobotTally::default(),
         }
     }
 }
@@ -108,6 +161,40 @@ pub struct Metrics {
     pub reformed: u64,
     /// What was given up, by chain.
     pub given_up: Vec<ChainGivenUp>,
+    /// What came of robots on wheels, where there are any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub robots: Option<RobotMetrics>,
+}
+
+/// What came of the robots on wheels of all swarms.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RobotMetrics {
+    /// Times that a bumper was pressed,
+    pub bumper_events: u64,
+    /// and the part of all robots' steps with a pressed bumper.
+    pub bumper_part: f64,
+    /// The part of all steps in which sensors made a robot slower.
+    pub held_part: f64,
+    /// Mean distance of robots from their connectors,
+    pub mean_lag_m: f64,
+    /// and the greatest.
+    pub max_lag_m: f64,
+    /// The least air between a body and anything, up to 1 m.
+    pub min_gap_m: f64,
+}
+
+impl RobotMetrics {
+    fn of(tally: &RobotTally) -> Option<Self> {
+        let part = |count: u64| count as f64 / tally.steps as f64;
+        (tally.steps > 0).then(|| Self {
+            bumper_events: tally.bumper_events,
+            bumper_part: part(tally.bumper_steps),
+            held_part: part(tally.held_steps),
+            mean_lag_m: tally.lag_sum_m / tally.steps as f64,
+            max_lag_m: tally.max_lag_m,
+            min_gap_m: tally.min_gap_m,
+        })
+    }
 }
 
 /// Something that a chain's initiator gave up.
@@ -168,6 +255,9 @@ impl Metrics {
             done: sum(|t| t.done),
             reformed: sum(|t| t.reformed),
             given_up: given_up.collect(),
+            robots: RobotMetrics::of(
+                &tallies.iter().fold(RobotTally::default(), |all, t| all.add(&t.robots)),
+            ),
         }
     }
 }

@@ -3,6 +3,7 @@
 mod arms;
 mod chains;
 mod changes;
+mod navigators;
 mod obstacles;
 mod tasks;
 

@@ -9,6 +9,7 @@ use super::metrics::{ChainMetrics, Metrics, Tally};
 use super::rows::{Rows, Table};
 use super::scenario::Compiled;
 use super::state::{ChainState, Snapshot};
+use super::swarm::drive::Pose;
 use super::world::ChainWorld;
 use crate::scenario::Source;
 use sidestep_kernel::checkpoint::{self, CheckpointError, Header};
@@ -73,6 +74,7 @@ impl<const D: usize> ChainSimulation<D> {
         let tables = Table::ALL.into_iter().zip(asked).filter(|(_, asked)| *asked);
         let has_rows = |table: &Table| match table {
             Table::Movers => !self.compiled.world.movers.is_empty(),
+            Table::Robots => self.compiled.world.chains.iter().any(|spec| spec.robots.is_some()),
             _ => true,
         };
         self.rows.begin(D, tables.map(|(table, _)| table).filter(has_rows));
@@ -157,6 +159,14 @@ impl<const D: usize> ChainSimulation<D> {
             for slot in 0..self.state.len() {
                 let body = self.state.body(slot);
                 self.rows.connectors(now, slot as EntityId, body.chain.points());
+            }
+        }
+        if self.rows.keeps(Table::Robots) {
+            for slot in 0..self.state.len() {
+                for (k, robot) in (0..).zip(&self.state.body(slot).robots) {
+                    let Pose { at: [x, y], heading_rad } = robot.pose;
+                    self.rows.robot(now, slot as EntityId, k, [x, y, heading_rad]);
+                }
             }
         }
         if self.rows.keeps(Table::Movers) {

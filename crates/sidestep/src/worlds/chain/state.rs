@@ -2,9 +2,11 @@
 
 use super::chain::Chain;
 use super::driver::Driving;
+use super::formation::Robot;
 use super::geometry::{Bounds, Point};
 use super::metrics::Tally;
 use super::script::Motion;
+use super::swarm::leader::Decision;
 use super::world::{ChainSpec, ChainWorld};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::checkpoint::CheckpointError;
@@ -25,6 +27,8 @@ struct Cell<const D: usize> {
     body: RwLock<Body<D>>,
     /// The box that the chain may come to be in during this cycle.
     claim: Mutex<Bounds<D>>,
+    /// What its navigator has decided in this cycle.
+    decision: Mutex<Option<Decision>>,
 }
 
 /// One chain as it is now.
@@ -37,6 +41,10 @@ pub struct Body<const D: usize> {
     /// Connectors that were scattered, and where they go to be joined again; none while the chain
     /// is whole.
     pub scattered: Option<Scattered>,
+    /// The robots that keep to its connectors; none where nothing is on wheels.
+    pub robots: Vec<Robot>,
+    /// Radius of their bodies.
+    pub(super) robot_radius_m: f64,
     /// What came of it so far.
     pub tally: Tally,
     /// The motions of the present script: they follow from where it began.
@@ -66,6 +74,8 @@ pub struct ChainRecord {
     pub driving: Driving,
     /// See [`Body::scattered`].
     pub scattered: Option<Scattered>,
+    /// See [`Body::robots`].
+    pub robots: Vec<Robot>,
 }
 
 /// A state by id: what a checkpoint holds and a digest covers.
@@ -81,9 +91,11 @@ impl<const D: usize> Body<D> {
     /// A chain at its start.
     pub(super) fn new(spec: &ChainSpec<D>) -> Result<Self, InputError> {
         let chain = spec.start.clone();
-        let agent = spec.tasks[0].agent;
+        let driving = Driving::new(spec.tasks[0].agent, chain.points());
         let mut body = Self {
-            driving: Driving::new(agent, chain.points()),
+            robots: spec.robots_at(chain.points(), &driving),
+            robot_radius_m: spec.robot_radius_m(),
+            driving,
             chain,
             scattered: None,
             tally: Tally::default(),
@@ -98,6 +110,7 @@ impl<const D: usize> Body<D> {
             points_m: flat(self.chain.points()),
             driving: self.driving.clone(),
             scattered: self.scattered.clone(),
+            robots: self.robots.clone(),
         }
     }
 
@@ -110,7 +123,8 @@ impl<const D: usize> Body<D> {
     ) -> Result<Self, CheckpointError> {
         let mut chain = spec.start.clone();
         let n = chain.points().len();
-        if record.points_m.len() != n * D || record.driving.task as usize > spec.tasks.len() {
+        let robots = if spec.robots.is_some() { n } else { 0 };
+        if record.robots.len() != robots || record.points_m.len() != n * D || record.driving.task as usize > spec.tasks.len() {
             return Err(CheckpointError::Damaged);
         }
         for change in spec.changes.iter().filter(|change| change.cycle < cycle) {
@@ -121,7 +135,8 @@ impl<const D: usize> Body<D> {
         }
         let motions = spec.motions(&record.driving).map_err(|_| CheckpointError::Damaged)?;
         let (driving, scattered) = (record.driving.clone(), record.scattered.clone());
-        Ok(Self { chain, driving, scattered, tally, motions })
+        let (robots, robot_radius_m) = (record.robots.clone(), spec.robot_radius_m());
+        Ok(Self { chain, driving, scattered, robots, robot_radius_m, tally, motions })
     }
 }
 
@@ -132,7 +147,11 @@ pub(super) fn flat<const D: usize>(points: &[Point<D>]) -> Vec<f64> {
 
 impl<const D: usize> ChainState<D> {
     fn of(bodies: impl Iterator<Item = Body<D>>) -> Self {
-        let cell = |body| Cell { body: RwLock::new(body), claim: Mutex::new(Bounds::nothing()) };
+        let cell = |body| Cell {
+            body: RwLock::new(body),
+            claim: Mutex::new(Bounds::nothing()),
+            decision: Mutex::new(None),
+        };
         Self { cells: bodies.map(cell).collect() }
     }
 
@@ -191,6 +210,15 @@ impl<const D: usize> ChainState<D> {
 
     pub(super) fn set_claim(&self, slot: usize, claim: Bounds<D>) {
         *self.cells[slot].claim.lock().unwrap_or_else(PoisonError::into_inner) = claim;
+    }
+
+    /// What a chain's navigator has decided.
+    pub(super) fn decision(&self, slot: usize) -> Option<Decision> {
+        *self.cells[slot].decision.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(super) fn set_decision(&self, slot: usize, decision: Option<Decision>) {
+        *self.cells[slot].decision.lock().unwrap_or_else(PoisonError::into_inner) = decision;
     }
 
     /// The state after `cycle` cycles.

@@ -1,19 +1,26 @@
 //! A compiled world of chains: everything that never changes during a run.
 
+use super::act::Turn;
 use super::arm::Arm;
 use super::chain::{Chain, Mobility};
 use super::driver::{Driver, Driving, Task};
 use super::events::Event;
+use super::formation::Robot;
 use super::geometry::{Bounds, Point};
 use super::ground::Movers;
+use super::navigate::plane_point;
 use super::obstacle::{Obstacle, Obstacles};
 use super::propagate::Propagator;
 use super::rebuild::MayCome;
 use super::rules::Rules;
 use super::script::Motion;
 use super::state::{Body, ChainState};
+use super::swarm::drive::Pose;
+use super::swarm::follower::Follower;
+use super::swarm::laser::{Body as Seen, Scan};
 use cpu_time::ThreadTime;
 use sidestep_kernel::conflict::Groups;
+use sidestep_kernel::math::atan2;
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{Cycle, InputError, Slot, World};
 use std::ops::RangeInclusive;
@@ -67,6 +74,8 @@ pub struct ChainSpec<const D: usize> {
     pub changes: Vec<Change<D>>,
     /// The arm that it stands for, if it stands for one.
     pub arm: Option<Arc<Arm>>,
+    /// How the robots behave that keep to its connectors, if it is a swarm on wheels.
+    pub robots: Option<Follower>,
 }
 
 /// Something that happens to a chain at the begin of a cycle (slides R8, R10, F3).
@@ -137,6 +146,19 @@ impl<const D: usize> Change<D> {
 }
 
 impl<const D: usize> ChainSpec<D> {
+    /// The robots of a swarm at their connectors, all looking ahead of their chain.
+    pub(super) fn robots_at(&self, points: &[Point<D>], driving: &Driving) -> Vec<Robot> {
+        let [x, y, _] = driving.ahead;
+        let heading_rad = atan2(y, x);
+        let robot =
+            |p: &Point<D>| Robot { pose: Pose { at: plane_point(*p), heading_rad }, is_bumped: false };
+        self.robots.iter().flat_map(|_| points.iter().map(robot)).collect()
+    }
+
+    pub(super) fn robot_radius_m(&self) -> f64 {
+        self.robots.as_ref().map_or(0.0, |follower| follower.ring.radius_m)
+    }
+
     /// The motions of the script that a driver is in; none where it is in no script.
     pub(super) fn motions(&self, driving: &Driving) -> Result<Vec<Motion>, InputError> {
         match self.tasks.get(driving.task as usize).map(|task| &task.driver) {
@@ -171,14 +193,18 @@ impl<const D: usize> ChainWorld<D> {
         let part = match &task.driver {
             _ if task.lasts_s.is_finite() => self.starts_s(body.driving.cycles) / task.lasts_s,
             Driver::Rest => 1.0,
-            Driver::Wander(_) => {
-                let [wanted_m, gone_m] = body.driving.way_m;
-                if wanted_m > 0.0 { gone_m / wanted_m } else { 0.0 }
-            }
+            Driver::Wander(_) => way_part(body.driving.way_m),
             Driver::Script(_) => f64::from(body.driving.next) / body.motions.len().max(1) as f64,
             Driver::Targets(targets) => {
                 f64::from(body.driving.next) / targets.places.len().max(1) as f64
             }
+            Driver::Navigate(navigator) => match &navigator.goal {
+                Some(goal) => {
+                    let start = plane_point(body.driving.start[0]);
+                    goal.progress(body.driving.next as usize, start, body.driving.nearest_m)
+                }
+                None => way_part(body.driving.way_m),
+            },
         };
         (f64::from(body.driving.task) + part.clamp(0.0, 1.0)) / spec.tasks.len() as f64
     }
@@ -193,16 +219,27 @@ impl<const D: usize> ChainWorld<D> {
     }
 }
 
+/// The part that was gone of a way that was wanted.
+fn way_part([wanted_m, gone_m]: [f64; 2]) -> f64 {
+    if wanted_m > 0.0 { gone_m / wanted_m } else { 0.0 }
+}
+
 /// What a worker keeps between tasks.
 #[derive(Debug, Clone)]
 pub struct Scratch<const D: usize> {
     pub(super) propagator: Propagator<D>,
-    /// The world's obstacles, with those that move where they are at `moved_to`.
+    /// The world's obstacles, with those that move where they are at the begin of `moment`, and
+    /// the parts of other chains.
     pub(super) obstacles: Obstacles<D>,
-    moved_to: Option<Cycle>,
+    /// The same without other chains, where there are any.
+    solid: Obstacles<D>,
+    moment: Option<Cycle>,
     /// Obstacles that move, and parts of other chains.
     guests: Vec<Obstacle<D>>,
     has_others: bool,
+    /// Robots around a robot.
+    pub(super) seen: Vec<Seen>,
+    pub(super) scan: Scan,
     /// Positions before a cycle.
     pub(super) before: Vec<Point<D>>,
     /// What happened.
@@ -212,30 +249,36 @@ pub struct Scratch<const D: usize> {
 }
 
 impl<const D: usize> Scratch<D> {
-    /// Puts the movers where they are at the end of a cycle, and the other chains of a group
-    /// where they are now.
-    fn gather(
+    /// Puts the movers where they are at the begin of cycle `moment`, and other chains where they
+    /// are now.
+    pub(super) fn gather(
         &mut self,
         world: &ChainWorld<D>,
         state: &ChainState<D>,
-        now: Cycle,
+        moment: Cycle,
         others: impl Iterator<Item = Slot>,
     ) {
+        const CHECKED: &str = "movers and chains were checked when the scenario was compiled";
         let mut others = others.peekable();
         let has_others = others.peek().is_some();
-        if self.moved_to == Some(now) && !self.has_others && !has_others {
+        if self.moment == Some(moment) && !self.has_others && !has_others {
             return;
         }
         self.guests.clear();
-        let ends_s = world.starts_s(now + 1);
-        self.guests.extend(world.movers.at(ends_s));
+        self.guests.extend(world.movers.at(world.starts_s(moment)));
+        if has_others {
+            self.solid.set_moving(&self.guests).expect(CHECKED);
+        }
         for slot in others {
             push_parts(&mut self.guests, slot, &state.body(slot as usize).chain);
         }
-        self.obstacles
-            .set_moving(&self.guests)
-            .expect("movers and chains were checked when the scenario was compiled");
-        (self.moved_to, self.has_others) = (Some(now), has_others);
+        self.obstacles.set_moving(&self.guests).expect(CHECKED);
+        (self.moment, self.has_others) = (Some(moment), has_others);
+    }
+
+    /// What is solid to robots: other chains are their robots, not their rods.
+    pub(super) fn solid(&self) -> &Obstacles<D> {
+        if self.has_others { &self.solid } else { &self.obstacles }
     }
 }
 
@@ -256,9 +299,12 @@ impl<const D: usize> World for ChainWorld<D> {
         Scratch {
             propagator: Propagator::new(self.rules),
             obstacles: self.obstacles.clone(),
-            moved_to: None,
+            solid: self.obstacles.clone(),
+            moment: None,
             guests: Vec::new(),
             has_others: false,
+            seen: Vec::new(),
+            scan: Scan::default(),
             before: Vec::new(),
             events: Vec::new(),
             cpu_ns: 0,
@@ -272,13 +318,15 @@ impl<const D: usize> World for ChainWorld<D> {
     fn perceive_and_decide(
         &self,
         state: &ChainState<D>,
-        _: Cycle,
+        now: Cycle,
         bodies: std::ops::Range<usize>,
-        _: &mut Scratch<D>,
+        scratch: &mut Scratch<D>,
     ) {
         for slot in bodies {
             let claim = self.reach(&self.chains[slot], &state.body(slot));
             state.set_claim(slot, claim);
+            let decision = self.look_around(state, (slot as Slot, now), scratch);
+            state.set_decision(slot, decision);
         }
     }
 
@@ -308,9 +356,11 @@ impl<const D: usize> World for ChainWorld<D> {
         let began = ThreadTime::now();
         group.sort_unstable();
         for &slot in &*group {
-            scratch.gather(self, state, now, group.iter().copied().filter(|&s| s != slot));
+            scratch.gather(self, state, now + 1, group.iter().copied().filter(|&s| s != slot));
+            let decision = state.decision(slot as usize);
+            let turn = Turn { spec: &self.chains[slot as usize], slot, now, decision };
             let mut body = state.body_mut(slot as usize);
-            self.act(&mut body, (slot, now), &state.claim(slot as usize), scratch);
+            self.act(&mut body, turn, &state.claim(slot as usize), scratch);
         }
         scratch.cpu_ns += began.elapsed().as_nanos() as u64;
     }

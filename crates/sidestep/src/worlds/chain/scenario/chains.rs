@@ -11,6 +11,7 @@ use super::super::world::{ChainSpec, What};
 use super::Compiler;
 use super::arms::ArmSection;
 use super::changes::ChangeSection;
+use super::navigators::RobotsSection;
 use super::tasks::TaskSection;
 use crate::scenario::OneOrMany;
 use serde::Deserialize;
@@ -21,6 +22,8 @@ use toml::Spanned;
 
 /// A chain that starts anywhere has this many times its radius of room around its parts.
 const ROOM: f64 = 1.2;
+/// Room for robots that follow their connectors on wheels, meters.
+const MARGIN_M: f64 = 0.08;
 /// Most connectors of a chain.
 const MAX_CONNECTORS: usize = 10_000_000;
 
@@ -48,6 +51,7 @@ pub(super) struct ChainSection {
     #[serde(default)]
     anywhere: bool,
     arm: Option<Spanned<ArmSection>>,
+    robots: Option<Spanned<RobotsSection>>,
     rod_m: Option<Spanned<Length>>,
     radius_m: Option<f64>,
     rod_radius_m: Option<f64>,
@@ -160,7 +164,13 @@ impl Compiler<'_> {
             let remedy = "let it break once";
             return Err(self.error(Some(at), "a chain that breaks more than once", remedy));
         }
-        Ok(ChainSpec { name: s.name.clone(), start, tasks, changes, arm })
+        let speed_m_s = tasks.iter().map(|task| task.speed_m_s).fold(0.0, f64::max);
+        let robots = s.robots.as_ref().map(|robots| self.robots(robots, speed_m_s)).transpose()?;
+        if D != 2 && robots.is_some() {
+            let remedy = "set chain.dimensions = 2, or leave robots out";
+            return Err(self.error(Some(at), "robots on wheels in space", remedy));
+        }
+        Ok(ChainSpec { name: s.name.clone(), start, tasks, changes, arm, robots })
     }
 
     fn shape<const D: usize>(
@@ -169,7 +179,7 @@ impl Compiler<'_> {
         site: Option<&Site>,
         at: Range<usize>,
     ) -> Result<(Chain<D>, Option<Arc<Arm>>), InputError> {
-        let radius_m = s.radius_m.unwrap_or(0.05);
+        let radius_m = self.radius_m(s, at.clone())?;
         if let Some(section) = &s.arm {
             return self.arm_shape(s, section, radius_m, at);
         }
@@ -179,6 +189,7 @@ impl Compiler<'_> {
             false => self.points::<D>(s, rod.max_m, at.clone())?,
         };
         let mut connectors = vec![Connector::free(radius_m); points.len()];
+        self.trim_leaders(s, &mut connectors);
         if let Some(deg) = s.max_bend_deg {
             connectors.iter_mut().for_each(|c| c.max_bend_rad = deg.to_radians());
         }
@@ -188,6 +199,31 @@ impl Compiler<'_> {
         let rods = vec![rod; points.len() - 1];
         let chain = Chain::new(points, connectors, rods).map_err(|error| self.at(at, &error))?;
         Ok((chain, None))
+    }
+
+    /// Radius of the connectors: of robots, with the margin that those need who follow.
+    fn radius_m(&self, s: &ChainSection, at: Range<usize>) -> Result<f64, InputError> {
+        match (&s.robots, s.radius_m) {
+            (None, given) => Ok(given.unwrap_or(0.05)),
+            (Some(robots), None) => {
+                let robots = robots.get_ref();
+                Ok(self.robot_radius_m(robots) + robots.margin_m.unwrap_or(MARGIN_M))
+            }
+            (Some(_), Some(_)) => {
+                let remedy = "give robots.radius_m and robots.margin_m instead";
+                Err(self.error(Some(at), "radius_m beside robots", remedy))
+            }
+        }
+    }
+
+    /// Who navigates is where its connector is, so that needs no margin.
+    fn trim_leaders<const D: usize>(&self, s: &ChainSection, connectors: &mut [Connector<D>]) {
+        let Some(robots) = &s.robots else { return };
+        for task in s.tasks.0.iter().map(Spanned::get_ref).filter(|task| task.navigates()) {
+            if let Some(connector) = connectors.get_mut(task.connector()) {
+                connector.radius_m = self.robot_radius_m(robots.get_ref());
+            }
+        }
     }
 
     /// The chain that an arm stands for.

@@ -4,12 +4,15 @@ use super::super::driver::{Driver, Targets, Task, Wander};
 use super::super::geometry::Bounds;
 use super::super::script::Script;
 use super::Compiler;
+use super::navigators::NavigatorSection;
 use serde::Deserialize;
 use sidestep_kernel::InputError;
 use std::ops::Range;
 use std::sync::Arc;
 use toml::Spanned;
 
+/// How fast initiators go, unless it is said.
+const SPEED_M_S: f64 = 0.5;
 /// How near counts as at a target, meters.
 const TOLERANCE_M: f64 = 1e-3;
 
@@ -20,6 +23,7 @@ enum Kind {
     Wander,
     Script,
     Targets,
+    Navigate,
 }
 
 #[derive(Debug, Deserialize)]
@@ -37,6 +41,19 @@ pub(super) struct TaskSection {
     script_file: Option<Spanned<String>>,
     targets_m: Option<Spanned<Vec<Vec<f64>>>>,
     tolerance_m: Option<Spanned<f64>>,
+    navigator: Option<Spanned<NavigatorSection>>,
+}
+
+impl TaskSection {
+    /// The connector that moves.
+    pub(super) fn connector(&self) -> usize {
+        self.connector
+    }
+
+    /// Whether it drives on wheels.
+    pub(super) fn navigates(&self) -> bool {
+        self.kind == Kind::Navigate
+    }
 }
 
 impl Compiler<'_> {
@@ -54,10 +71,10 @@ impl Compiler<'_> {
         self.has_only_its_own(s, at.clone())?;
         Ok(Task {
             agent: s.connector,
-            speed_m_s: self.positive(s.speed_m_s.as_ref(), "speed_m_s", 0.5)?,
+            speed_m_s: self.positive(s.speed_m_s.as_ref(), "speed_m_s", SPEED_M_S)?,
             lasts_s: self.positive(s.lasts_s.as_ref(), "lasts_s", f64::INFINITY)?,
             patience_s: self.positive(s.patience_s.as_ref(), "patience_s", 5.0)?,
-            driver: self.driver(s, at)?,
+            driver: self.driver::<D>(s, at)?,
         })
     }
 
@@ -74,6 +91,14 @@ impl Compiler<'_> {
             }),
             Kind::Script => Driver::Script(Arc::new(self.script(s, at)?)),
             Kind::Targets => Driver::Targets(self.targets(s, at)?),
+            Kind::Navigate if D != 2 => {
+                let remedy = "set chain.dimensions = 2, or give another kind";
+                return Err(self.error(Some(at), "only who drives in the plane navigates", remedy));
+            }
+            Kind::Navigate => {
+                let speed_m_s = self.positive(s.speed_m_s.as_ref(), "speed_m_s", SPEED_M_S)?;
+                Driver::Navigate(Arc::new(self.navigator(s.navigator.as_ref(), speed_m_s)?))
+            }
         })
     }
 
@@ -140,6 +165,7 @@ impl Compiler<'_> {
             ("script_file", s.script_file.is_some(), Kind::Script),
             ("targets_m", s.targets_m.is_some(), Kind::Targets),
             ("tolerance_m", s.tolerance_m.is_some(), Kind::Targets),
+            ("navigator", s.navigator.is_some(), Kind::Navigate),
         ];
         let foreign = keys.iter().find(|(_, is_given, kind)| *is_given && *kind != s.kind);
         match foreign {

@@ -1,0 +1,160 @@
+//! Initiators on wheels, and the robots that follow them.
+
+use super::super::geometry::Point;
+use super::super::navigate::{Goal, Navigator};
+use super::super::swarm::drive::Drive;
+use super::super::swarm::follower::Follower;
+use super::super::swarm::laser::Laser;
+use super::super::swarm::leader::{Leader, LeaveRule, Leaving, TargetSense, Turning};
+use super::Compiler;
+use serde::Deserialize;
+use sidestep_kernel::InputError;
+use std::f64::consts::PI;
+use toml::Spanned;
+
+/// A point of a corridor's middle so often.
+const LINE_STEP_M: f64 = 0.1;
+/// Distance of the wheels of a robot, unless it is said.
+const WHEELBASE_M: f64 = 0.4;
+
+#[derive(Debug, Clone, Copy, Default, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum LeavingWord {
+    #[default]
+    Latched,
+    Range,
+    Level,
+}
+
+#[derive(Debug, Clone, Copy, Default, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum TurningWord {
+    #[default]
+    AboutAWheel,
+    OnTheSpotWhereBlocked,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct NavigatorSection {
+    near_m: Option<f64>,
+    far_m: Option<f64>,
+    lost_m: Option<f64>,
+    sector_deg: Option<[f64; 2]>,
+    leaving: LeavingWord,
+    leave_rule: Option<bool>,
+    turning: TurningWord,
+    beams: Option<usize>,
+    range_m: Option<f64>,
+    field_deg: Option<f64>,
+    noise_m: Option<f64>,
+    wheelbase_m: Option<f64>,
+    target_m: Option<Point<2>>,
+    tolerance_m: Option<f64>,
+    detects_from_m: Option<f64>,
+    needs_line_of_sight: bool,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct RobotsSection {
+    pub(super) radius_m: Option<f64>,
+    pub(super) margin_m: Option<f64>,
+    wheelbase_m: Option<f64>,
+    wheel_speed_m_s: Option<f64>,
+    sensors_m: Option<f64>,
+    gain_per_s: Option<f64>,
+    turn_gain_per_s: Option<f64>,
+}
+
+impl Compiler<'_> {
+    /// A navigator that drives with `speed_m_s`.
+    pub(super) fn navigator(
+        &self,
+        section: Option<&Spanned<NavigatorSection>>,
+        speed_m_s: f64,
+    ) -> Result<Navigator, InputError> {
+        let preset = NavigatorSection::default();
+        let (s, at) = match section {
+            Some(section) => (section.get_ref(), Some(section.span())),
+            None => (&preset, None),
+        };
+        let told = |error: InputError| match at.clone() {
+            Some(at) => self.at(at, &error),
+            None => error,
+        };
+        let usual = Leader::new(speed_m_s).map_err(told)?;
+        let laser = Laser::new(
+            s.beams.unwrap_or(180),
+            s.range_m.unwrap_or(usual.laser.range_m()),
+            s.field_deg.map_or(PI, |deg| 0.5 * deg.to_radians()),
+            s.noise_m.unwrap_or(0.0),
+        );
+        let leader = Leader {
+            laser: laser.map_err(told)?,
+            sector_rad: s.sector_deg.map_or(usual.sector_rad, |deg| deg.map(f64::to_radians)),
+            speed_m_s,
+            near_m: s.near_m.unwrap_or(usual.near_m),
+            far_m: s.far_m.unwrap_or(usual.far_m),
+            lost_m: s.lost_m.unwrap_or(usual.lost_m),
+            leaving: match s.leaving {
+                LeavingWord::Latched => Leaving::Latched,
+                LeavingWord::Range => Leaving::Range,
+                LeavingWord::Level => Leaving::Level,
+            },
+            leave_rule: s.leave_rule.unwrap_or(true).then(LeaveRule::default),
+            target_sense: TargetSense {
+                range_m: s.detects_from_m.unwrap_or(f64::INFINITY),
+                needs_line_of_sight: s.needs_line_of_sight,
+            },
+            turning: match s.turning {
+                TurningWord::AboutAWheel => Turning::AboutAWheel,
+                TurningWord::OnTheSpotWhereBlocked => Turning::OnTheSpotWhereBlocked,
+            },
+        };
+        leader.check().map_err(told)?;
+        let drive = Drive::new(s.wheelbase_m.unwrap_or(WHEELBASE_M), speed_m_s).map_err(told)?;
+        Ok(Navigator { leader, drive, goal: self.goal(s)? })
+    }
+
+    /// The target, or the end of the corridor that the scenario has.
+    fn goal(&self, s: &NavigatorSection) -> Result<Option<Goal>, InputError> {
+        if let Some(at) = s.target_m {
+            let tolerance_m = s.tolerance_m.unwrap_or(0.5);
+            if !(at.iter().all(|x| x.is_finite()) && tolerance_m > 0.0) {
+                let cause = format!("target_m = {at:?}, tolerance_m = {tolerance_m}");
+                return Err(self.error(None, cause, "give a finite place and a tolerance above 0"));
+            }
+            return Ok(Some(Goal::Target { at, tolerance_m }));
+        }
+        let line = self.corridor_line(LINE_STEP_M)?;
+        Ok(line.map(Goal::EndOf))
+    }
+
+    /// How the robots of a swarm behave whose leader drives with `speed_m_s`.
+    pub(super) fn robots(
+        &self,
+        section: &Spanned<RobotsSection>,
+        speed_m_s: f64,
+    ) -> Result<Follower, InputError> {
+        let s = section.get_ref();
+        let told = |error: InputError| self.at(section.span(), &error);
+        let wheel_m_s = s.wheel_speed_m_s.unwrap_or(1.2 * speed_m_s);
+        let drive = Drive::new(s.wheelbase_m.unwrap_or(WHEELBASE_M), wheel_m_s).map_err(told)?;
+        let mut follower = Follower::new(drive, self.robot_radius_m(s)).map_err(told)?;
+        let gains = [s.gain_per_s, s.turn_gain_per_s, s.sensors_m];
+        if gains.iter().flatten().any(|gain| !(*gain > 0.0 && gain.is_finite())) {
+            let remedy = "give gains and the range of sensors above 0";
+            return Err(self.error(Some(section.span()), "a gain that is not above 0", remedy));
+        }
+        follower.gain_per_s = s.gain_per_s.unwrap_or(follower.gain_per_s);
+        follower.turn_gain_per_s = s.turn_gain_per_s.unwrap_or(follower.turn_gain_per_s);
+        follower.ring.range_m = s.sensors_m.unwrap_or(follower.ring.range_m);
+        Ok(follower)
+    }
+
+    /// Radius of a robot's body.
+    pub(super) fn robot_radius_m(&self, s: &RobotsSection) -> f64 {
+        s.radius_m.unwrap_or(0.25)
+    }
+}
