@@ -42,7 +42,7 @@ pub(super) fn guided<const D: usize>(
 ) -> Point<D> {
     let g = sub(so, mn);
     let d = norm(g);
-    let t = d.max(rod.min_m).min(rod.max_m);
+    let t = clamped(d, rod.min_m, rod.max_m);
     if (t - d).abs() <= least_move_m {
         so
     } else if d > 0.0 {
@@ -50,6 +50,14 @@ pub(super) fn guided<const D: usize>(
     } else {
         along(mn, unit(sub(so, mo)).unwrap_or(first_axis()), t)
     }
+}
+
+/// The length within a rod's limits that is nearest to `d`. Unlike `f64::clamp` it takes no care of
+/// what is no number, and so takes two instructions.
+#[inline]
+pub(super) fn clamped(d: f64, min_m: f64, max_m: f64) -> f64 {
+    let t = if d > min_m { d } else { min_m };
+    if t < max_m { t } else { max_m }
 }
 
 /// Direction of the guide line (A1); that of the old rod where the master is at the slave's place.

@@ -10,7 +10,8 @@
 //!                 interval.rs, search.rs        free directions: exact in the plane, searched in space
 //!                 sweep.rs, own_body.rs         nothing is passed through; the chain's own parts
 //! reach.rs: an arm with a fixed base
-//! wavefront.rs: many motions at once            rebuild.rs: broken chains
+//! open.rs: nothing in the way                   wavefront.rs: many motions at once, then
+//! rebuild.rs: broken chains
 //! kinematics/: arms of joints, as chains        script/: a turtle language that drives an initiator
 //! ```
 
@@ -22,6 +23,7 @@ mod grid;
 pub mod interval;
 pub mod kinematics;
 pub mod obstacle;
+mod open;
 mod own_body;
 pub mod propagate;
 pub mod reach;
