@@ -34,11 +34,13 @@ pub struct Propagator<const D: usize> {
     tally: Tally,
 }
 
-/// A candidate that an earlier slave did not need.
+/// What an earlier slave might do instead.
 #[derive(Debug, Clone, Copy)]
-struct Untried<const D: usize> {
-    slave: usize,
-    candidate: Candidate<D>,
+enum Untried<const D: usize> {
+    /// Go to another place.
+    Place { slave: usize, candidate: Candidate<D> },
+    /// Turn its rod to the other side, where nobody has looked yet.
+    OtherSide { slave: usize, tried: Point<D> },
 }
 
 /// What a request has done so far.
@@ -277,28 +279,11 @@ impl<const D: usize> Propagator<D> {
         let mut left = self.rules.backtracks;
         let mut master = head;
         while let Some(slave) = direction.next(master, chain.points().len()) {
-            let so = chain.points()[slave];
-            let Self { rules, overlay, own, work, untried, .. } = &mut *self;
-            let scene = Scene { chain, obstacles, rules, overlay, own };
-            let step = scene.step(master, slave, direction, so);
-            let (at_slave, chosen) = match scene.candidates(&step, work) {
-                Ok(()) => {
-                    let rest = work.found[1..].iter().rev();
-                    untried.extend(rest.map(|&candidate| Untried { slave, candidate }));
-                    (slave, work.found[0])
-                }
+            let (at_slave, chosen) = match self.react(chain, obstacles, slave, direction) {
+                Ok(chosen) => (slave, chosen),
                 Err(refusal) => {
                     let objection = *first_objection.get_or_insert((slave, refusal));
-                    let Some(untried) = untried.pop() else { return Err(objection) };
-                    if left == 0 {
-                        return Err((
-                            objection.0,
-                            Refusal { reason: Reason::Limit, ..objection.1 },
-                        ));
-                    }
-                    left -= 1;
-                    self.take_back(chain, untried.slave, direction);
-                    (untried.slave, untried.candidate)
+                    self.step_back(chain, obstacles, direction, &mut left, objection)?
                 }
             };
             let so = chain.points()[at_slave];
@@ -311,6 +296,73 @@ impl<const D: usize> Propagator<D> {
             master = at_slave;
         }
         Ok(())
+    }
+
+    /// The best place for a slave; what else it might do is remembered.
+    fn react(
+        &mut self,
+        chain: &Chain<D>,
+        obstacles: &Obstacles<D>,
+        slave: usize,
+        direction: Direction,
+    ) -> Result<Candidate<D>, Refusal> {
+        self.look(chain, obstacles, slave, direction)?;
+        let Self { work, untried, .. } = self;
+        let chosen = work.found[0];
+        let rest = work.found[1..].iter().rev();
+        untried.extend(rest.map(|&candidate| Untried::Place { slave, candidate }));
+        if work.has_other_side {
+            untried.push(Untried::OtherSide { slave, tried: chosen.at });
+        }
+        Ok(chosen)
+    }
+
+    /// Fills `work.found` with places for a slave.
+    fn look(
+        &mut self,
+        chain: &Chain<D>,
+        obstacles: &Obstacles<D>,
+        slave: usize,
+        direction: Direction,
+    ) -> Result<(), Refusal> {
+        let Self { rules, overlay, own, work, .. } = self;
+        let scene = Scene { chain, obstacles, rules, overlay, own };
+        let master = direction.before(slave);
+        scene.candidates(&scene.step(master, slave, direction, chain.points()[slave]), work)
+    }
+
+    /// After an objection: the latest of the earlier slaves that might do something else does it.
+    fn step_back(
+        &mut self,
+        chain: &Chain<D>,
+        obstacles: &Obstacles<D>,
+        direction: Direction,
+        left: &mut usize,
+        objection: Objection,
+    ) -> Result<(usize, Candidate<D>), Objection> {
+        while let Some(untried) = self.untried.pop() {
+            if *left == 0 {
+                return Err((objection.0, Refusal { reason: Reason::Limit, ..objection.1 }));
+            }
+            *left -= 1;
+            match untried {
+                Untried::Place { slave, candidate } => {
+                    self.take_back(chain, slave, direction);
+                    return Ok((slave, candidate));
+                }
+                Untried::OtherSide { slave, tried } => {
+                    self.take_back(chain, slave, direction);
+                    self.work.both_sides = true;
+                    let found = self.look(chain, obstacles, slave, direction);
+                    self.work.both_sides = false;
+                    let other = self.work.found.iter().find(|c| c.at != tried);
+                    if let (Ok(()), Some(&candidate)) = (found, other) {
+                        return Ok((slave, candidate));
+                    }
+                }
+            }
+        }
+        Err(objection)
     }
 
     /// Whether the rest of the chain has nothing to react to: this slave stays, and the bend at
@@ -389,6 +441,14 @@ pub(super) enum Direction {
 }
 
 impl Direction {
+    /// The master of a slave.
+    fn before(self, slave: usize) -> usize {
+        match self {
+            Self::Up => slave - 1,
+            Self::Down => slave + 1,
+        }
+    }
+
     #[inline]
     pub(super) fn next(self, i: usize, n: usize) -> Option<usize> {
         match self {
