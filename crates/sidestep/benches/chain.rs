@@ -1,6 +1,6 @@
 //! Speed of the chain world's core.
 //!
-//! `cargo bench -p sidestep --bench chain [-- PART ...]` with the parts `open`, `wavefront`,
+//! `cargo bench -p sidestep --bench chain [-- PART ...]` with the parts `open`, `middle`, `wavefront`,
 //! `field`, `corridor`, and `corridors` for the table of all pinned corridors; CPU time. In brackets what the prototype took.
 
 use cpu_time::ProcessTime;
@@ -43,11 +43,13 @@ fn best_s(n: usize, mut work: impl FnMut()) -> f64 {
 const SIZES: [(usize, usize, f64, f64); 3] =
     [(450, 2000, 8.7, 1.75), (10_000, 100, 191.0, 38.5), (1_000_000, 2, 18_900.0, 3_800.0)];
 
-/// A slightly bent chain, so that every connector moves at every step.
+/// A slightly bent chain, so that every connector moves at every step: a bend lets through only
+/// its cosine, so the longer the chain the less it is bent.
 fn snake(n: usize) -> Chain<3> {
     let mut points = vec![[0.0; 3]];
+    let bent = 90.0 / n as f64;
     for i in 1..n {
-        let u = [-1.0, 0.2 * sin(i as f64 * 0.1), 0.2 * cos(i as f64 * 0.07)];
+        let u = [-1.0, bent * sin(i as f64 * 0.1), bent * cos(i as f64 * 0.07)];
         points.push(along(points[i - 1], unit(u).expect("not zero"), 0.1));
     }
     let rod = Rod::fixed(0.1, 0.01);
@@ -61,25 +63,49 @@ fn head(k: usize) -> Point<3> {
 
 fn open() {
     for (n, motions, single_us, _) in SIZES {
-        let mut chain = snake(n);
-        let mut propagator = Propagator::default();
-        let (nothing, mut k) = (Obstacles::default(), 0);
-        let s = best_s(7, || {
-            for _ in 0..motions {
-                k += 1;
-                let request = Request::exact(0, head(k));
-                let _ = propagator.propagate(&mut chain, &nothing, &request).expect("right");
-            }
-        });
-        let us = 1e6 * s / motions as f64;
-        println!(
-            "open, {n} connectors: {us:.2} us per motion, {:.1} ns each [{single_us} us]",
-            1e3 * us / n as f64
-        );
+        pull_open("open", n, 0, motions, single_us, |_, k| head(k));
     }
 }
 
-fn wavefront_of_eight() {
+/// The same by a connector in the middle: both sweeps in one loop.
+fn middle() {
+    for ((n, motions, ..), before_us) in SIZES.into_iter().zip([4.5, 100.0, 10_100.0]) {
+        pull_open("middle", n, n / 2, motions, before_us, |home, k| {
+            let t = k as f64 * 0.05;
+            add(home, [0.05 * sin(t), 0.3 * sin(0.7 * t), 0.3 * cos(t)])
+        });
+    }
+}
+
+fn pull_open(
+    name: &str,
+    n: usize,
+    by: usize,
+    motions: usize,
+    before_us: f64,
+    to: impl Fn(Point<3>, usize) -> Point<3>,
+) {
+    let mut chain = snake(n);
+    let home = chain.points()[by];
+    let mut propagator = Propagator::default();
+    let (nothing, mut k, mut touched) = (Obstacles::default(), 0, 0);
+    let s = best_s(7, || {
+        for _ in 0..motions {
+            k += 1;
+            let request = Request::exact(by, to(home, k));
+            let outcome = propagator.propagate(&mut chain, &nothing, &request).expect("right");
+            touched += outcome.moved().map_or(0, |moved| moved.touched.len());
+        }
+    });
+    let (us, touched) = (1e6 * s / motions as f64, touched as f64 / k as f64);
+    println!(
+        "{name}, {n} connectors: {us:.2} us per motion, {:.1} ns for each of the {:.0} % that move [{before_us} us]",
+        1e3 * us / touched,
+        100.0 * touched / n as f64
+    );
+}
+
+fn lanes() {
     for (n, motions, _, us_before) in SIZES {
         let mut chain = snake(n);
         let motions = motions.max(wavefront::LANES);
@@ -283,9 +309,10 @@ fn corridors() {
 
 fn main() {
     let asked: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
-    let parts: [(&str, fn()); 5] = [
+    let parts: [(&str, fn()); 6] = [
         ("open", open),
-        ("wavefront", wavefront_of_eight),
+        ("middle", middle),
+        ("wavefront", lanes),
         ("field", field),
         ("corridor", corridor),
         ("corridors", corridors),

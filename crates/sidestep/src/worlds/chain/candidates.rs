@@ -29,8 +29,13 @@ pub(super) struct Work<const D: usize> {
     arcs: Arcs,
     /// Whether a rod that turns tries all its lengths, or others only where its own is blocked.
     pub(super) all_lengths: bool,
+    /// Whether a plane rod looks for a way on both sides, or on the further one only where the
+    /// nearer has none.
+    pub(super) both_sides: bool,
     /// What [`Scene::candidates`] found, best first.
     pub(super) found: Vec<Candidate<D>>,
+    /// Whether a side is left that nobody has looked at.
+    pub(super) has_other_side: bool,
 }
 
 /// The push, pull or resize of one rod: the slave's new place, bit-identical where it stays.
@@ -42,7 +47,7 @@ pub(super) fn guided<const D: usize>(
 ) -> Point<D> {
     let g = sub(so, mn);
     let d = norm(g);
-    let t = d.max(rod.min_m).min(rod.max_m);
+    let t = clamped(d, rod.min_m, rod.max_m);
     if (t - d).abs() <= least_move_m {
         so
     } else if d > 0.0 {
@@ -50,6 +55,14 @@ pub(super) fn guided<const D: usize>(
     } else {
         along(mn, unit(sub(so, mo)).unwrap_or(first_axis()), t)
     }
+}
+
+/// The length within a rod's limits that is nearest to `d`. Unlike `f64::clamp` it takes no care of
+/// what is no number, and so takes two instructions.
+#[inline]
+pub(super) fn clamped(d: f64, min_m: f64, max_m: f64) -> f64 {
+    let t = if d > min_m { d } else { min_m };
+    if t < max_m { t } else { max_m }
 }
 
 /// Direction of the guide line (A1); that of the old rod where the master is at the slave's place.
@@ -62,6 +75,7 @@ impl<const D: usize> Scene<'_, D> {
     /// alone if it is good.
     pub(super) fn candidates(&self, step: &Step<D>, work: &mut Work<D>) -> Result<(), Refusal> {
         work.found.clear();
+        work.has_other_side = false;
         let connector = &self.chain.connectors()[step.slave];
         if connector.is_still() {
             return self.stay(step, work);
@@ -197,7 +211,8 @@ impl<const D: usize> Scene<'_, D> {
         why: &mut Option<Refusal>,
     ) -> Option<Refusal> {
         let u0 = guide_line(step);
-        let Work { blocks, arcs, found, .. } = work;
+        let Work { blocks, arcs, found, has_other_side, .. } = work;
+        let look_on = work.all_lengths || work.both_sides;
         let mut add = |u: Point<D>| {
             let at = along(step.mn, u, length_m);
             match self.judge_place(step, at) {
@@ -216,9 +231,12 @@ impl<const D: usize> Scene<'_, D> {
         };
         if D == 2 {
             let plane = Plane { step, length_m, u0: plane(u0), blocks };
-            let free = plane.nearest_free(arcs);
-            for u in free.into_iter().flatten() {
-                add(u);
+            let mut sides = plane.sides(arcs);
+            while let Some(u) = sides.next() {
+                if add(u) && !look_on {
+                    *has_other_side = sides.has_more();
+                    break;
+                }
             }
             return arcs.inside;
         }
@@ -285,11 +303,8 @@ struct Plane<'a, const D: usize> {
 }
 
 impl<const D: usize> Plane<'_, D> {
-    /// The nearest free directions to the left and to the right.
-    ///
-    /// Only blocks that are met on the way are turned into arcs: the first direction that is in
-    /// no arc, and where the rod meets no other block, is the first that is in no arc of any.
-    fn nearest_free(&self, known: &mut Arcs) -> [Option<Point<D>>; 2] {
+    /// The nearest free directions to the left and to the right, the nearer one first.
+    fn sides<'a>(&'a self, known: &'a mut Arcs) -> Sides<'a, D> {
         known.arcs.clear();
         known.known.clear();
         known.known.resize(self.blocks.len(), false);
@@ -298,21 +313,8 @@ impl<const D: usize> Plane<'_, D> {
         if let Some(prev) = step.prev.filter(|_| step.max_bend_rad < PI) {
             known.arcs.push(beyond_bend(plane(sub(step.mn, prev)), step.max_bend_rad));
         }
-        [Side::Left, Side::Right].map(|side| {
-            let u = self.first_free(side, known)?;
-            Some(std::array::from_fn(|i| u[i]))
-        })
-    }
-
-    fn first_free(&self, side: Side, known: &mut Arcs) -> Option<Point<2>> {
         let start_rad = interval::direction_rad(self.u0);
-        loop {
-            let turn_rad = least_turn_rad(&known.arcs, start_rad, side)?;
-            let u = interval::turned(self.u0, turn_rad, side);
-            if !self.learns(u, known) {
-                return Some(u);
-            }
-        }
+        Sides { plane: self, known, start_rad, is_open: [true; 2] }
     }
 
     /// Adds the arcs of all blocks that a rod in a direction meets; whether there were any.
@@ -352,6 +354,45 @@ impl<const D: usize> Plane<'_, D> {
         if block.stops_tip && (!block.stops_rod || step.tip_radius_m > step.rod.radius_m) {
             let tip_m = block.radius_m + step.tip_radius_m + SKIN_M;
             block_tip(&reach, &core, tip_m, &mut known.arcs);
+        }
+    }
+}
+
+/// The free directions on both sides, the nearer one first.
+///
+/// Only blocks that are met on the way are turned into arcs: the first direction that is in no
+/// arc, and where the rod meets no other block, is the first that is in no arc of any.
+struct Sides<'a, const D: usize> {
+    plane: &'a Plane<'a, D>,
+    known: &'a mut Arcs,
+    start_rad: f64,
+    /// Whether there may be a direction to the left, and to the right.
+    is_open: [bool; 2],
+}
+
+impl<const D: usize> Sides<'_, D> {
+    fn has_more(&self) -> bool {
+        self.is_open != [false; 2]
+    }
+
+    fn next(&mut self) -> Option<Point<D>> {
+        loop {
+            let turns_rad = [Side::Left, Side::Right].map(|side| {
+                let is_open = self.is_open[side as usize];
+                is_open.then(|| least_turn_rad(&self.known.arcs, self.start_rad, side)).flatten()
+            });
+            self.is_open = turns_rad.map(|turn| turn.is_some());
+            let (side, turn_rad) = match turns_rad {
+                [Some(left), Some(right)] if right < left => (Side::Right, right),
+                [Some(left), _] => (Side::Left, left),
+                [None, Some(right)] => (Side::Right, right),
+                [None, None] => return None,
+            };
+            let u = interval::turned(self.plane.u0, turn_rad, side);
+            if !self.plane.learns(u, self.known) {
+                self.is_open[side as usize] = false;
+                return Some(std::array::from_fn(|i| u[i]));
+            }
         }
     }
 }

@@ -224,6 +224,11 @@ impl<const D: usize> Chain<D> {
         &mut self.points
     }
 
+    /// The positions, to be changed, and the rods.
+    pub(super) fn parts_mut(&mut self) -> (&mut [Point<D>], &[Rod]) {
+        (&mut self.points, &self.rods)
+    }
+
     /// The connectors.
     pub fn connectors(&self) -> &[Connector<D>] {
         &self.connectors

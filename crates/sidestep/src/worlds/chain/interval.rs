@@ -27,7 +27,7 @@ impl Arc {
 
     /// Whether a direction is inside.
     pub fn contains(&self, angle_rad: f64) -> bool {
-        (angle_rad - self.from_rad).rem_euclid(TAU) < self.width_rad
+        wrapped_rad(angle_rad - self.from_rad) < self.width_rad
     }
 }
 
@@ -194,7 +194,7 @@ struct Borders {
 
 impl Borders {
     fn push(&mut self, angle_rad: f64) {
-        self.angles_rad[self.n] = angle_rad.rem_euclid(TAU);
+        self.angles_rad[self.n] = wrapped_rad(angle_rad);
         self.n += 1;
     }
 
@@ -250,6 +250,18 @@ pub fn beyond_bend(into: Point<2>, max_bend_rad: f64) -> Arc {
     Arc { from_rad: into_rad + max_bend_rad, width_rad: (TAU - 2.0 * max_bend_rad).max(0.0) }
 }
 
+/// The same direction in [0, 2 pi]: `rem_euclid` without a division, for angles that are at most a
+/// few turns away.
+fn wrapped_rad(mut angle_rad: f64) -> f64 {
+    while angle_rad < 0.0 {
+        angle_rad += TAU;
+    }
+    while angle_rad >= TAU {
+        angle_rad -= TAU;
+    }
+    angle_rad
+}
+
 /// Which way round.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Side {
@@ -270,7 +282,7 @@ pub fn least_turn_rad(arcs: &[Arc], start_rad: f64, side: Side) -> Option<f64> {
                 Side::Left => start_rad + turn_rad - arc.from_rad,
                 Side::Right => arc.from_rad + arc.width_rad - (start_rad - turn_rad),
             };
-            let into_rad = into_rad.rem_euclid(TAU);
+            let into_rad = wrapped_rad(into_rad);
             // An arc that begins where another ends leaves no gap, however both were rounded.
             let into_rad = if into_rad > TAU - ARC_TOLERANCE_RAD { 0.0 } else { into_rad };
             if into_rad < arc.width_rad {

@@ -13,6 +13,8 @@
 //! wavefront.rs: many motions at once            rebuild.rs: broken chains
 //! ground/: where obstacles come from
 //! swarm/: robots on wheels, one that navigates and those that follow
+//! open.rs: nothing in the way                   wavefront.rs: many motions at once, then
+//! rebuild.rs: broken chains
 //! kinematics/: arms of joints, as chains        script/: a turtle language that drives an initiator
 //! ```
 
@@ -34,6 +36,7 @@ mod measure;
 pub mod metrics;
 pub mod navigate;
 pub mod obstacle;
+mod open;
 mod own_body;
 pub mod propagate;
 pub mod reach;

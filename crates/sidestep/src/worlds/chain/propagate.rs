@@ -4,15 +4,17 @@
 //! becoming the next one's master. New positions are kept apart until both sweeps have agreed: a
 //! veto leaves every bit of the chain as it was.
 
-use super::candidates::{Candidate, Work, guided};
+use super::candidates::{Candidate, Work};
 use super::chain::{Chain, is_in_range, out_of_range};
 use super::geometry::{Bounds, Point, between, distance};
 use super::obstacle::{Obstacles, swept};
+use super::open;
 use super::own_body::OwnBody;
 use super::rules::{Rotation, Rules};
 use super::scene::{Overlay, Refusal, Scene, Step, TOLERANCE_M, fits, needed_m};
 use super::veto::{Mode, Motion, Moved, Outcome, Reason, Request, Veto};
 use sidestep_kernel::InputError;
+use std::ops::Range;
 
 /// A request that would take more sub-steps is refused.
 const MAX_SUB_STEPS: f64 = 1e6;
@@ -32,19 +34,41 @@ pub struct Propagator<const D: usize> {
     tally: Tally,
 }
 
-/// A candidate that an earlier slave did not need.
+/// What an earlier slave might do instead.
 #[derive(Debug, Clone, Copy)]
-struct Untried<const D: usize> {
-    slave: usize,
-    candidate: Candidate<D>,
+enum Untried<const D: usize> {
+    /// Go to another place.
+    Place { slave: usize, candidate: Candidate<D> },
+    /// Turn its rod to the other side, where nobody has looked yet.
+    OtherSide { slave: usize, tried: Point<D> },
 }
 
 /// What a request has done so far.
 #[derive(Debug, Clone, Copy, Default)]
-struct Tally {
-    changed: usize,
+pub(super) struct Tally {
+    /// First and one past the last connector that reacted.
+    from: usize,
+    to: usize,
+    pub(super) changed: usize,
     rotated: usize,
     max_slave_step_m: f64,
+}
+
+impl Tally {
+    fn start(first: usize) -> Self {
+        Self { from: first, to: first, ..Self::default() }
+    }
+
+    /// Connectors around the initiator have reacted.
+    pub(super) fn touch(&mut self, run: Range<usize>) {
+        (self.from, self.to) = (self.from.min(run.start), self.to.max(run.end));
+    }
+
+    /// A connector other than the initiator went some way.
+    #[inline]
+    pub(super) fn slave_went(&mut self, way_m: f64) {
+        self.max_slave_step_m = self.max_slave_step_m.max(way_m);
+    }
 }
 
 /// The connectors that are moved from outside: one, or the two of a rod.
@@ -63,7 +87,7 @@ impl<const D: usize> Heads<D> {
         }
     }
 
-    fn indices(&self) -> std::ops::Range<usize> {
+    fn indices(&self) -> Range<usize> {
         self.first..self.first + self.n
     }
 
@@ -96,7 +120,7 @@ impl<const D: usize> Propagator<D> {
         let mut heads = Heads::of(&request.motion);
         check(chain, &heads)?;
         let from = heads.places(chain);
-        self.tally = Tally::default();
+        self.tally = Tally::start(heads.first);
         self.before.start(chain.points().len(), heads.first);
         if let Err((by, refusal)) = project(chain, &mut heads, request.mode) {
             return Ok(Outcome::Vetoed(veto(chain, heads.first, by, refusal)));
@@ -149,9 +173,8 @@ impl<const D: usize> Propagator<D> {
     }
 
     fn moved(&self, cut_short: Option<Veto<D>>) -> Moved<D> {
-        let Tally { changed, rotated, max_slave_step_m } = self.tally;
-        let touched = self.before.from..self.before.to;
-        Moved { touched, changed, rotated, max_slave_step_m, cut_short }
+        let Tally { from, to, changed, rotated, max_slave_step_m } = self.tally;
+        Moved { touched: from..to, changed, rotated, max_slave_step_m, cut_short }
     }
 
     /// One short motion: all of it, or none.
@@ -168,7 +191,7 @@ impl<const D: usize> Propagator<D> {
             return Ok(());
         }
         if obstacles.is_empty() && !self.rules.self_collision && chain.is_plain() && heads.n == 1 {
-            self.sub_step_in_the_open(chain, heads);
+            open::pull(chain, heads.first, heads.to[0], &mut self.tally);
             return Ok(());
         }
         self.overlay.start(chain.points().len(), heads.first);
@@ -256,28 +279,11 @@ impl<const D: usize> Propagator<D> {
         let mut left = self.rules.backtracks;
         let mut master = head;
         while let Some(slave) = direction.next(master, chain.points().len()) {
-            let so = chain.points()[slave];
-            let Self { rules, overlay, own, work, untried, .. } = &mut *self;
-            let scene = Scene { chain, obstacles, rules, overlay, own };
-            let step = scene.step(master, slave, direction, so);
-            let (at_slave, chosen) = match scene.candidates(&step, work) {
-                Ok(()) => {
-                    let rest = work.found[1..].iter().rev();
-                    untried.extend(rest.map(|&candidate| Untried { slave, candidate }));
-                    (slave, work.found[0])
-                }
+            let (at_slave, chosen) = match self.react(chain, obstacles, slave, direction) {
+                Ok(chosen) => (slave, chosen),
                 Err(refusal) => {
                     let objection = *first_objection.get_or_insert((slave, refusal));
-                    let Some(untried) = untried.pop() else { return Err(objection) };
-                    if left == 0 {
-                        return Err((
-                            objection.0,
-                            Refusal { reason: Reason::Limit, ..objection.1 },
-                        ));
-                    }
-                    left -= 1;
-                    self.take_back(chain, untried.slave, direction);
-                    (untried.slave, untried.candidate)
+                    self.step_back(chain, obstacles, direction, &mut left, objection)?
                 }
             };
             let so = chain.points()[at_slave];
@@ -290,6 +296,73 @@ impl<const D: usize> Propagator<D> {
             master = at_slave;
         }
         Ok(())
+    }
+
+    /// The best place for a slave; what else it might do is remembered.
+    fn react(
+        &mut self,
+        chain: &Chain<D>,
+        obstacles: &Obstacles<D>,
+        slave: usize,
+        direction: Direction,
+    ) -> Result<Candidate<D>, Refusal> {
+        self.look(chain, obstacles, slave, direction)?;
+        let Self { work, untried, .. } = self;
+        let chosen = work.found[0];
+        let rest = work.found[1..].iter().rev();
+        untried.extend(rest.map(|&candidate| Untried::Place { slave, candidate }));
+        if work.has_other_side {
+            untried.push(Untried::OtherSide { slave, tried: chosen.at });
+        }
+        Ok(chosen)
+    }
+
+    /// Fills `work.found` with places for a slave.
+    fn look(
+        &mut self,
+        chain: &Chain<D>,
+        obstacles: &Obstacles<D>,
+        slave: usize,
+        direction: Direction,
+    ) -> Result<(), Refusal> {
+        let Self { rules, overlay, own, work, .. } = self;
+        let scene = Scene { chain, obstacles, rules, overlay, own };
+        let master = direction.before(slave);
+        scene.candidates(&scene.step(master, slave, direction, chain.points()[slave]), work)
+    }
+
+    /// After an objection: the latest of the earlier slaves that might do something else does it.
+    fn step_back(
+        &mut self,
+        chain: &Chain<D>,
+        obstacles: &Obstacles<D>,
+        direction: Direction,
+        left: &mut usize,
+        objection: Objection,
+    ) -> Result<(usize, Candidate<D>), Objection> {
+        while let Some(untried) = self.untried.pop() {
+            if *left == 0 {
+                return Err((objection.0, Refusal { reason: Reason::Limit, ..objection.1 }));
+            }
+            *left -= 1;
+            match untried {
+                Untried::Place { slave, candidate } => {
+                    self.take_back(chain, slave, direction);
+                    return Ok((slave, candidate));
+                }
+                Untried::OtherSide { slave, tried } => {
+                    self.take_back(chain, slave, direction);
+                    self.work.both_sides = true;
+                    let found = self.look(chain, obstacles, slave, direction);
+                    self.work.both_sides = false;
+                    let other = self.work.found.iter().find(|c| c.at != tried);
+                    if let (Ok(()), Some(&candidate)) = (found, other) {
+                        return Ok((slave, candidate));
+                    }
+                }
+            }
+        }
+        Err(objection)
     }
 
     /// Whether the rest of the chain has nothing to react to: this slave stays, and the bend at
@@ -345,63 +418,16 @@ impl<const D: usize> Propagator<D> {
         for i in (heads.first..to).chain((from..heads.first).rev()) {
             let old = chain.points()[i];
             let new = self.overlay.get(i).unwrap_or(old);
-            self.write(chain, i, old, new, heads.indices().contains(&i));
-        }
-    }
-
-    /// Writes one new position, and keeps the old one for the case that a later sub-step fails.
-    #[inline]
-    fn write(
-        &mut self,
-        chain: &mut Chain<D>,
-        i: usize,
-        old: Point<D>,
-        new: Point<D>,
-        is_head: bool,
-    ) {
-        if self.before.get(i).is_none() {
-            self.before.set(i, old);
-        }
-        self.tally.changed += usize::from(old != new);
-        if !is_head {
-            let way_m = distance(old, new);
-            self.tally.max_slave_step_m = self.tally.max_slave_step_m.max(way_m);
-        }
-        chain.points_mut()[i] = new;
-    }
-
-    /// The same motion where nothing can object: straight into the chain.
-    fn sub_step_in_the_open(&mut self, chain: &mut Chain<D>, heads: Heads<D>) {
-        let k = heads.first;
-        let old = chain.points()[k];
-        self.write(chain, k, old, heads.to[0], true);
-        for direction in [Direction::Up, Direction::Down] {
-            self.follow_in_the_open(chain, [old, heads.to[0]], k, direction);
-        }
-    }
-
-    fn follow_in_the_open(
-        &mut self,
-        chain: &mut Chain<D>,
-        [mut mo, mut mn]: [Point<D>; 2],
-        head: usize,
-        direction: Direction,
-    ) {
-        let least_move_m = chain.least_move_m();
-        let mut master = head;
-        while let Some(slave) = direction.next(master, chain.points().len()) {
-            let so = chain.points()[slave];
-            let new = guided([mo, mn, so], chain.rod_between(master, slave), least_move_m);
-            if new == so {
-                let Some(next) = direction.next(slave, chain.points().len()) else { return };
-                let beyond_m = distance(so, chain.points()[next]);
-                if fits(chain.rod_between(slave, next), beyond_m) {
-                    return;
-                }
+            if self.before.get(i).is_none() {
+                self.before.set(i, old);
             }
-            self.write(chain, slave, so, new, false);
-            (mo, mn, master) = (so, new, slave);
+            self.tally.changed += usize::from(old != new);
+            if !heads.indices().contains(&i) {
+                self.tally.slave_went(distance(old, new));
+            }
+            chain.points_mut()[i] = new;
         }
+        self.tally.touch(from..to);
     }
 }
 
@@ -415,6 +441,14 @@ pub(super) enum Direction {
 }
 
 impl Direction {
+    /// The master of a slave.
+    fn before(self, slave: usize) -> usize {
+        match self {
+            Self::Up => slave - 1,
+            Self::Down => slave + 1,
+        }
+    }
+
     #[inline]
     pub(super) fn next(self, i: usize, n: usize) -> Option<usize> {
         match self {

@@ -10,7 +10,7 @@
     reason = "an index is a lane or a coordinate of several arrays"
 )]
 
-use super::candidates::guided;
+use super::candidates::{clamped, guided};
 use super::chain::{Chain, Rod, is_in_range, out_of_range};
 use super::geometry::Point;
 use super::propagate::Propagator;
@@ -18,8 +18,11 @@ use super::veto::Request;
 use super::{Obstacles, Rules};
 use sidestep_kernel::InputError;
 
-/// Motions at once. Eight keep the units for roots and divisions busy.
-pub const LANES: usize = 8;
+/// Motions at once: enough that the units for roots and divisions wait for nobody.
+pub const LANES: usize = 12;
+
+/// Fewer motions are made sooner one by one.
+const WORTH_IT: usize = 3;
 
 /// Moves the first connector through `heads`, one after the other, as as many requests would.
 ///
@@ -40,126 +43,145 @@ pub fn pull_first<const D: usize>(
     if let Some(head) = heads.iter().find(|head| !is_in_range(head)) {
         return Err(out_of_range(head));
     }
-    let mut groups = heads.chunks_exact(LANES);
-    for group in &mut groups {
-        pull_lanes(chain, group);
-    }
     let mut propagator = Propagator::new(Rules::default());
-    for head in groups.remainder() {
-        propagator.propagate(chain, &Obstacles::default(), &Request::exact(0, *head))?;
+    for group in heads.chunks(LANES) {
+        if group.len() >= WORTH_IT {
+            pull_lanes(chain, group);
+            continue;
+        }
+        for head in group {
+            propagator.propagate(chain, &Obstacles::default(), &Request::exact(0, *head))?;
+        }
     }
     Ok(())
 }
 
-/// One coordinate of every lane.
-type Lane = [f64; LANES];
+/// One coordinate of the connectors that lanes are at: lane `w` has its slave at `w` and its
+/// master at `w + 1`, which is where lane `w + 1` has its slave.
+type Row = [f64; LANES + 1];
 
-/// What every lane knows: lane `w` is `w` connectors behind lane 0.
-struct Lanes<const D: usize> {
-    /// The master's new place.
-    master: [Lane; D],
-    /// The slave's old place, and the master's.
-    slave: [Lane; D],
-    was: [Lane; D],
-    min_m: Lane,
-    max_m: Lane,
+/// Where the connectors are that lanes are at, lane 0 furthest along the chain.
+#[derive(Clone, Copy)]
+struct Front<const D: usize> {
+    rows: [Row; D],
 }
 
-impl<const D: usize> Lanes<D> {
-    /// Hands every lane's connector to the next lane, and a new one to the first.
-    #[inline]
-    fn shift(&mut self, next: Point<D>, rod: Rod) {
-        for i in 0..D {
-            self.was[i] = self.slave[i];
-            self.slave[i] = shifted(&self.master[i], next[i]);
-        }
-        self.min_m = shifted(&self.min_m, rod.min_m);
-        self.max_m = shifted(&self.max_m, rod.max_m);
+impl<const D: usize> Front<D> {
+    /// Places apart from each other, which nobody reads.
+    fn nobody() -> Self {
+        Self { rows: [std::array::from_fn(|w| -4.0 * w as f64); D] }
     }
 
-    /// The reaction of every lane's slave: [`guided`], lane by lane.
-    #[inline]
-    fn react(&mut self, least_move_m: f64) {
-        let mut g = [[0.0; LANES]; D];
-        let mut square = [0.0; LANES];
-        for i in 0..D {
-            for w in 0..LANES {
-                g[i][w] = self.slave[i][w] - self.master[i][w];
-                square[w] += g[i][w] * g[i][w];
-            }
-        }
-        let d = square.map(f64::sqrt);
-        if d.contains(&0.0) {
-            return self.react_one_by_one(least_move_m);
-        }
-        let (mut part, mut stays) = ([0.0; LANES], [false; LANES]);
-        for w in 0..LANES {
-            let t = d[w].max(self.min_m[w]).min(self.max_m[w]);
-            stays[w] = (t - d[w]).abs() <= least_move_m;
-            part[w] = t / d[w];
-        }
-        for i in 0..D {
-            for w in 0..LANES {
-                let moved = self.master[i][w] + g[i][w] * part[w];
-                self.master[i][w] = if stays[w] { self.slave[i][w] } else { moved };
-            }
-        }
+    fn get(&self, k: usize) -> Point<D> {
+        std::array::from_fn(|i| self.rows[i][k])
     }
 
-    #[cold]
-    fn react_one_by_one(&mut self, least_move_m: f64) {
-        for w in 0..LANES {
-            let of = |lanes: &[Lane; D]| -> Point<D> { std::array::from_fn(|i| lanes[i][w]) };
-            let places = [of(&self.was), of(&self.master), of(&self.slave)];
-            let rod = Rod { min_m: self.min_m[w], max_m: self.max_m[w], radius_m: 0.0 };
-            let new = guided(places, rod, least_move_m);
-            for i in 0..D {
-                self.master[i][w] = new[i];
-            }
+    fn set(&mut self, k: usize, p: Point<D>) {
+        for i in 0..D {
+            self.rows[i][k] = p[i];
         }
     }
 }
 
+/// Limits of the rods that lanes are at.
+struct Limits {
+    min_m: [f64; LANES],
+    max_m: [f64; LANES],
+    /// How many rods in a row were as the last.
+    alike: usize,
+}
+
+impl Limits {
+    /// Hands every lane's rod to the next lane, and a new one to the first.
+    #[inline]
+    fn shift(&mut self, next: Rod) {
+        let is_as_last = next.min_m == self.min_m[0] && next.max_m == self.max_m[0];
+        self.alike = if is_as_last { self.alike + 1 } else { 0 };
+        if self.alike < LANES {
+            self.min_m.copy_within(..LANES - 1, 1);
+            self.max_m.copy_within(..LANES - 1, 1);
+            (self.min_m[0], self.max_m[0]) = (next.min_m, next.max_m);
+        }
+    }
+}
+
+/// The reaction of every lane's slave: [`guided`], lane by lane. Before, `next` holds where
+/// everybody was one connector ago; after, where the slaves are that now become masters.
 #[inline]
-fn shifted(lane: &Lane, first: f64) -> Lane {
-    std::array::from_fn(|w| if w == 0 { first } else { lane[w - 1] })
+fn react<const D: usize>(now: &Front<D>, next: &mut Front<D>, limits: &Limits, least_move_m: f64) {
+    let mut g = [[0.0; LANES]; D];
+    let mut square = [0.0; LANES];
+    for i in 0..D {
+        for w in 0..LANES {
+            g[i][w] = now.rows[i][w] - now.rows[i][w + 1];
+            square[w] += g[i][w] * g[i][w];
+        }
+    }
+    let d = square.map(f64::sqrt);
+    if any(d.map(|d| d == 0.0)) {
+        return react_one_by_one(now, next, limits, least_move_m);
+    }
+    let (mut part, mut stays) = ([0.0; LANES], [false; LANES]);
+    for w in 0..LANES {
+        let t = clamped(d[w], limits.min_m[w], limits.max_m[w]);
+        stays[w] = (t - d[w]).abs() <= least_move_m;
+        part[w] = t / d[w];
+    }
+    for i in 0..D {
+        for w in 0..LANES {
+            next.rows[i][w + 1] = now.rows[i][w + 1] + g[i][w] * part[w];
+        }
+    }
+    if any(stays) {
+        for w in (0..LANES).filter(|&w| stays[w]) {
+            next.set(w + 1, now.get(w));
+        }
+    }
 }
 
-/// Eight motions: lanes that are not at a connector yet, or past the last, compute on rods of
-/// length 1 that nobody reads.
+/// Looks at all lanes at once, where a search would branch at each.
+#[inline]
+fn any(lanes: [bool; LANES]) -> bool {
+    lanes.iter().fold(false, |any, &is| any | is)
+}
+
+#[cold]
+fn react_one_by_one<const D: usize>(
+    now: &Front<D>,
+    next: &mut Front<D>,
+    limits: &Limits,
+    least_move_m: f64,
+) {
+    // Downward: lane w - 1 still needs where lane w - 1's master was, at w - 1.
+    for w in (0..LANES).rev() {
+        let places = [next.get(w), now.get(w + 1), now.get(w)];
+        let rod = Rod { min_m: limits.min_m[w], max_m: limits.max_m[w], radius_m: 0.0 };
+        next.set(w + 1, guided(places, rod, least_move_m));
+    }
+}
+
+/// As many motions as there are heads, at most one for each lane. Lanes that have no head, are not
+/// at a connector yet, or are past the last, compute what nobody reads.
 fn pull_lanes<const D: usize>(chain: &mut Chain<D>, heads: &[Point<D>]) {
-    let n = chain.points().len();
     let least_move_m = chain.least_move_m();
+    let (points, rods) = chain.parts_mut();
     let nobody = Rod { min_m: 1.0, max_m: 1.0, radius_m: 0.0 };
-    let mut lanes = Lanes {
-        master: [[0.0; LANES]; D],
-        slave: [[0.0; LANES]; D],
-        was: [[0.0; LANES]; D],
-        min_m: [1.0; LANES],
-        max_m: [1.0; LANES],
-    };
-    let mut beyond = super::geometry::first_axis();
-    for j in 0..n + LANES - 1 {
-        let (point, rod) = if j < n {
-            (chain.points()[j], chain.rods()[..n - 1].get(j.wrapping_sub(1)).copied())
-        } else {
-            // Never at the place before, so that nobody's rod has no length.
-            beyond[0] += 4.0;
-            (beyond, None)
-        };
-        lanes.shift(point, rod.unwrap_or(nobody));
-        let head = (j < LANES).then(|| heads[j]);
-        lanes.react(least_move_m);
-        if let Some(head) = head {
-            // Lane j is at connector 0: it goes where it is told.
-            for i in 0..D {
-                lanes.master[i][j] = head[i];
-            }
+    let mut limits = Limits { min_m: [1.0; LANES], max_m: [1.0; LANES], alike: LANES };
+    let (mut now, mut next) = (Front::nobody(), Front::nobody());
+    for j in 0..points.len() + heads.len() - 1 {
+        // Past the last, never at the place before, so that nobody's rod has no length.
+        let beyond = || super::geometry::scaled(super::geometry::first_axis(), 4.0 * j as f64);
+        now.set(0, points.get(j).copied().unwrap_or_else(beyond));
+        limits.shift(rods.get(j.wrapping_sub(1)).copied().unwrap_or(nobody));
+        react(&now, &mut next, &limits, least_move_m);
+        if let Some(head) = heads.get(j) {
+            // Lane j is at connector 0, which goes where it is told.
+            next.set(j + 1, *head);
         }
-        if j + 1 >= LANES {
-            let done = std::array::from_fn(|i| lanes.master[i][LANES - 1]);
-            chain.points_mut()[j + 1 - LANES] = done;
+        if j + 1 >= heads.len() {
+            points[j + 1 - heads.len()] = next.get(heads.len());
         }
+        std::mem::swap(&mut now, &mut next);
     }
 }
 

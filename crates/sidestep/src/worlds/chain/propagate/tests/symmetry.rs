@@ -55,8 +55,9 @@ fn moves_as_its_mirror<const D: usize>(seed: u64, k: usize) -> Result<(), TestCa
 }
 
 /// A motion from the middle is what the two halves do with the same head, if neither objects.
-fn halves_move_on_their_own<const D: usize>(seed: u64) -> Result<(), TestCaseError> {
+fn halves_move_on_their_own<const D: usize>(seed: u64, open: bool) -> Result<(), TestCaseError> {
     let (mut whole, balls) = among_balls::<D>(seed, 10);
+    let balls = if open { Obstacles::default() } else { balls };
     let half = |range: std::ops::Range<usize>| {
         let rods = whole.rods()[range.start..range.end - 1].to_vec();
         let connectors = whole.connectors()[range.clone()].to_vec();
@@ -64,10 +65,16 @@ fn halves_move_on_their_own<const D: usize>(seed: u64) -> Result<(), TestCaseErr
     };
     let (mut low, mut high) = (half(0..5), half(4..11));
     let to = add(whole.points()[4], Numbers::new(seed + 1).point(0.1));
-    let came = go(&mut whole, &balls, 4, to).moved().is_some();
+    let whole_came = go(&mut whole, &balls, 4, to);
+    let came = whole_came.moved().is_some();
     let halves = [go(&mut low, &balls, 4, to), go(&mut high, &balls, 0, to)];
     prop_assert_eq!(came, halves.iter().all(|h| h.moved().is_some()));
     if came {
+        let changed = |outcome: &Outcome<D>| outcome.moved().map_or(0, |moved| moved.changed);
+        // The head counts once in the whole, and once in either half, if it was cut up.
+        prop_assert!(
+            !open || changed(&whole_came) + 1 == changed(&halves[0]) + changed(&halves[1])
+        );
         prop_assert_eq!(&whole.points()[..=4], low.points());
         prop_assert_eq!(&whole.points()[4..], high.points());
     }
@@ -122,9 +129,9 @@ proptest! {
     }
 
     #[test]
-    fn the_two_halves_move_on_their_own(seed in 0u64..1000) {
-        halves_move_on_their_own::<2>(seed)?;
-        halves_move_on_their_own::<3>(seed)?;
+    fn the_two_halves_move_on_their_own(seed in 0u64..1000, open in any::<bool>()) {
+        halves_move_on_their_own::<2>(seed, open)?;
+        halves_move_on_their_own::<3>(seed, open)?;
     }
 
     #[test]
