@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 use std::{env, error::Error, fs};
 
 use sidestep_draw::{
-    Axis, Bar, BarChart, BarSeries, BodyRect, BodyShade, CellShade, DoorRect, GridScene, Histogram,
-    Matrix, Plot, Point, Series, Style, Track, to_png, to_svg,
+    Axis, Bar, BarChart, BarSeries, BodyRect, BodyScene, BodyShade, CellShade, DoorRect, GridScene,
+    Histogram, Matrix, Obstacle, Plot, Point, Series, Shape, Strand, Style, Track, Trail, to_png,
+    to_svg,
 };
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -16,6 +17,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let (chart, map) = (Style::CHART, Style::MAP);
     save(&folder, "tracks", &to_svg(&corridor(), &map)?)?;
     save(&folder, "city", &to_svg(&city(), &map)?)?;
+    save(&folder, "convoy", &convoy().to_svg(&map)?)?;
+    save(&folder, "snake", &snake().to_svg(&map)?)?;
     save(&folder, "speed-up", &speed_up().to_svg(&chart)?)?;
     save(&folder, "density", &density().to_svg(&chart)?)?;
     save(&folder, "contacts", &contacts().to_svg(&chart)?)?;
@@ -267,4 +270,93 @@ fn confusion() -> Result<Matrix, Box<dyn Error>> {
         .titles("true", "reported")
         .subscripts(counts)?
         .note("Small: counts. No robot was seen in the log."))
+}
+
+/// Numbers from 0 to 1 that look random (the mixing step of splitmix64).
+fn scatter(k: u32, stream: u32) -> f64 {
+    let mut z = (u64::from(k) << 8 | u64::from(stream)).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    (z >> 40) as f64 / f64::from(1 << 24)
+}
+
+/// Sixteen robots in a bent corridor, and two discs that cross their way.
+fn convoy() -> BodyScene<2> {
+    // A quarter of a circle of 4 m around the origin, then straight on.
+    let line = |s_m: f64, aside_m: f64| {
+        let angle = s_m / 4.0 - std::f64::consts::FRAC_PI_2;
+        let (r, turned) = (4.0 - aside_m, angle.min(0.0));
+        let on = 4.0 * angle.max(0.0);
+        [r * turned.cos(), r * turned.sin() + on]
+    };
+    let wall = |aside_m: f64| {
+        let piece = move |k: u32| {
+            let ends = [k, k + 1].map(|k| line(0.2 * f64::from(k), aside_m));
+            Obstacle { shape: Shape::Capsule { ends, radius_m: 0.0 }, velocity_m_s: [0.0; 2] }
+        };
+        (0..70).map(piece)
+    };
+    let disc = |center, velocity_m_s| Obstacle {
+        shape: Shape::Ball { center, radius_m: 0.3 },
+        velocity_m_s,
+    };
+    let box_ =
+        Shape::Cuboid { center: [1.0, 2.5], axes: [[0.8, 0.6], [-0.6, 0.8]], half_m: [0.8, 0.4] };
+    let column = Shape::Capsule { ends: [[0.0, 6.0], [1.5, 6.5]], radius_m: 0.2 };
+    let still = [box_, column].map(|shape| Obstacle { shape, velocity_m_s: [0.0; 2] });
+    let moving = [disc([1.2, 0.4], [0.5, 0.4]), disc([4.4, 6.6], [-0.3, -0.9])];
+    BodyScene {
+        obstacles: wall(-1.0).chain(wall(1.0)).chain(still).chain(moving).collect(),
+        strands: vec![Strand {
+            points: (0..16).map(|k| line(12.0 - 0.7 * f64::from(k), 0.0)).collect(),
+            connector_radius_m: 0.25,
+            rod_radius_m: 0.05,
+            label: "leader and 15 followers".into(),
+        }],
+        trails: vec![Trail {
+            points: (0..120)
+                .map(|k| line(0.1 * f64::from(k), 0.2 * (0.4 * f64::from(k)).sin()))
+                .collect(),
+            color: 1,
+            label: "way of the leader".into(),
+        }],
+        title: "A convoy in a bent corridor".into(),
+        caption: "Made-up places. Seed 1.".into(),
+        ..BodyScene::default()
+    }
+}
+
+/// 450 connectors among 1000 spheres.
+fn snake() -> BodyScene<3> {
+    let at = |k: u32| {
+        let t = f64::from(k) * 0.03;
+        [5.5 * (0.5 * t).cos(), 5.0 * (0.37 * t).sin(), 4.5 * (0.23 * t).sin()]
+    };
+    let sphere = |k: u32| Obstacle {
+        shape: Shape::Ball {
+            center: [0, 1, 2].map(|axis| 12.0 * scatter(k, axis) - 6.0),
+            radius_m: 0.35,
+        },
+        velocity_m_s: if k.is_multiple_of(100) { [0.8, 0.5, 0.6] } else { [0.0; 3] },
+    };
+    let boxes = [[-5.0, 5.0, 5.5], [5.0, -5.0, -3.0]].map(|center| Obstacle {
+        shape: Shape::Cuboid {
+            center,
+            axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            half_m: [0.8, 0.6, 1.0],
+        },
+        velocity_m_s: [0.0; 3],
+    });
+    BodyScene {
+        obstacles: (0..1000).map(sphere).chain(boxes).collect(),
+        strands: vec![Strand {
+            points: (0..450).map(at).collect(),
+            connector_radius_m: 0.06,
+            rod_radius_m: 0.04,
+            label: "450 connectors".into(),
+        }],
+        title: "A snake in space".into(),
+        caption: "Made-up places.".into(),
+        ..BodyScene::default()
+    }
 }

@@ -81,6 +81,28 @@ fn scene(width: u32, height: u32) -> GridScene {
     GridScene { width, height, box_size_m: 0.1, cells, title, ..GridScene::default() }
 }
 
+fn bodies<const D: usize>(n: u32) -> BodyScene<D> {
+    let at = |k: u32| std::array::from_fn(|i| f64::from(k) * (1.0 - 0.3 * i as f64));
+    let ball = |k| Obstacle {
+        shape: Shape::Ball { center: at(k), radius_m: 0.3 },
+        velocity_m_s: [f64::from(k % 2); D],
+    };
+    let strand = |k: u32| Strand {
+        points: (0..k + 1).map(at).collect(),
+        connector_radius_m: 0.2,
+        rod_radius_m: 0.1,
+        label: format!("a chain with a long name {k}"),
+    };
+    BodyScene {
+        obstacles: (0..n).map(ball).collect(),
+        strands: (0..n).map(strand).collect(),
+        trails: vec![],
+        view_m: None,
+        title: "A title that wraps where the picture is small, as it is here".into(),
+        caption: "Small print.".into(),
+    }
+}
+
 fn gallery() -> Vec<(&'static str, String)> {
     let (chart, map) = (Style::CHART, Style::MAP);
     let small = Style { width_px: 240.0, height_px: 180.0, font_px: 9.0 };
@@ -108,6 +130,12 @@ fn gallery() -> Vec<(&'static str, String)> {
         ("low map", to_svg(&scene(300, 1), &map).unwrap()),
         ("narrow map", to_svg(&scene(1, 400), &map).unwrap()),
         ("large map", to_svg(&scene(1500, 900), &map).unwrap()),
+        ("bodies", bodies::<2>(7).to_svg(&map).unwrap()),
+        ("small bodies", bodies::<2>(7).to_svg(&small).unwrap()),
+        ("no bodies", bodies::<2>(0).to_svg(&map).unwrap()),
+        ("bodies in space", bodies::<3>(7).to_svg(&map).unwrap()),
+        ("small bodies in space", bodies::<3>(7).to_svg(&small).unwrap()),
+        ("no bodies in space", bodies::<3>(0).to_svg(&map).unwrap()),
     ]
 }
 
@@ -243,5 +271,53 @@ proptest! {
         if let Ok(svg) = to_svg(&scene, &Style::MAP) {
             prop_assert!(parse(&svg).is_ok());
         }
+    }
+
+    #[test]
+    fn bodies_of_any_numbers_are_a_picture_or_an_error(
+        points in prop::collection::vec(prop::array::uniform3(number()), 3..12),
+        (radius_m, half_m, speed) in (number(), number(), number()),
+        has_view in any::<bool>(),
+    ) {
+        let [a, b, c] = [points[0], points[1], points[2]];
+        let plane = |p: [f64; 3]| [p[0], p[1]];
+        let shapes_2 = [
+            Shape::Ball { center: plane(a), radius_m },
+            Shape::Capsule { ends: [plane(a), plane(b)], radius_m },
+            Shape::Cuboid { center: plane(a), axes: [plane(b), plane(c)], half_m: [half_m; 2] },
+        ];
+        let shapes_3 = [
+            Shape::Ball { center: a, radius_m },
+            Shape::Capsule { ends: [a, b], radius_m },
+            Shape::Cuboid { center: a, axes: [a, b, c], half_m: [half_m; 3] },
+        ];
+        let view_2 = has_view.then_some([plane(b), plane(c)]);
+        let view_3 = has_view.then_some([b, c]);
+        let in_plane = any_bodies(&shapes_2, speed, points.iter().map(|p| plane(*p)), view_2);
+        let in_space = any_bodies(&shapes_3, speed, points.iter().copied(), view_3);
+        for svg in [in_plane.to_svg(&Style::MAP), in_space.to_svg(&Style::MAP)].iter().flatten() {
+            prop_assert!(parse(svg).is_ok());
+        }
+    }
+}
+
+fn any_bodies<const D: usize>(
+    shapes: &[Shape<D>],
+    speed: f64,
+    points: impl Iterator<Item = [f64; D]> + Clone,
+    view_m: Option<[[f64; D]; 2]>,
+) -> BodyScene<D> {
+    let obstacle = |&shape| Obstacle { shape, velocity_m_s: [speed; D] };
+    BodyScene {
+        obstacles: shapes.iter().map(obstacle).collect(),
+        strands: vec![Strand {
+            points: points.clone().collect(),
+            connector_radius_m: 0.1,
+            rod_radius_m: 0.0,
+            label: "s".into(),
+        }],
+        trails: vec![Trail { points: points.collect(), color: 9, label: "t".into() }],
+        view_m,
+        ..BodyScene::default()
     }
 }

@@ -1,8 +1,9 @@
 //! Pictures of maps, trajectories and measurements: plain numbers in, SVG text and PNG bytes out.
 //!
-//! There is one drawing path. Every picture is first an SVG ([`GridScene`], [`Plot`],
-//! [`BarChart`], [`Histogram`], [`Matrix`]); [`to_png`] rasterizes that very SVG. The crate reads
-//! no files, asks for no system font and knows nothing of worlds, runs or robots' types.
+//! There is one drawing path. Every picture is first an SVG ([`GridScene`], [`BodyScene`],
+//! [`Plot`], [`BarChart`], [`Histogram`], [`Matrix`]); [`to_png`] rasterizes that very SVG. The
+//! crate reads no files, asks for no system font and knows nothing of worlds, runs or robots'
+//! types.
 //!
 //! The same input gives the same bytes, whatever fonts and locale the machine has: numbers are
 //! rounded to a hundredth of a unit, logarithms come from `libm`, and the only font is the
@@ -28,6 +29,7 @@
 //! ```
 
 mod axis;
+mod bodies;
 mod chart;
 mod error;
 mod heat;
@@ -42,6 +44,7 @@ mod text;
 mod ticks;
 
 pub use axis::Axis;
+pub use bodies::{BodyScene, Obstacle, Shape, Strand, Trail};
 pub use chart::bars::{Bar, BarChart, BarSeries};
 pub use chart::histogram::Histogram;
 pub use chart::plot::{Mark, Plot, Point, Series};

@@ -1,14 +1,14 @@
 //! A map seen from above: walls, doors, bodies, and the tracks that robots left on it.
 
 mod cells;
-mod furniture;
+pub(crate) mod furniture;
 mod ribbon;
 
 use crate::error::DrawError;
 use crate::legend::{end_mark, start_mark};
 use crate::style::{FAINT_INK, INK, Style, series_color};
 use crate::svg::{Anchor, Num, Rect, Svg, TextLook};
-use furniture::Sheet;
+use furniture::{Area, Sheet};
 
 /// The most boxes a map may have: 16384 x 16384.
 const MOST_BOXES: u64 = 1 << 28;
@@ -128,11 +128,18 @@ pub fn to_svg(scene: &GridScene, style: &Style) -> Result<String, DrawError> {
     style.check()?;
     check(scene)?;
     let px = pixels_per_box(scene, style);
+    let area = Area {
+        origin_m: scene.origin_m,
+        boxes: [scene.width, scene.height].map(f64::from),
+        box_size_m: scene.box_size_m,
+        title: &scene.title,
+        caption: &scene.caption,
+    };
     let mut svg = Svg::default();
-    let sheet = Sheet::open(&mut svg, scene, style, px);
+    let sheet = Sheet::open(&mut svg, &area, style, px);
     draw_map(&mut svg, scene, &sheet);
     draw_marks(&mut svg, scene, &sheet, style);
-    sheet.close(svg, scene, style)
+    sheet.close(svg, &area, furniture::entries(scene), style)
 }
 
 fn check(scene: &GridScene) -> Result<(), DrawError> {

@@ -17,10 +17,21 @@ const LEAST_LETTERS: f64 = 32.0;
 /// Tracks beyond this share one line of the legend.
 const MOST_TRACKS_NAMED: usize = 10;
 
+/// What a sheet shows: a rectangle in boxes, and the words around it.
+pub(crate) struct Area<'a> {
+    /// World coordinates of its lower left corner.
+    pub(crate) origin_m: [f64; 2],
+    /// Width and height in boxes.
+    pub(crate) boxes: [f64; 2],
+    pub(crate) box_size_m: f64,
+    pub(crate) title: &'a str,
+    pub(crate) caption: &'a str,
+}
+
 /// Where the map stands in the picture.
-pub(super) struct Sheet {
+pub(crate) struct Sheet {
     /// The map in pixels.
-    pub(super) map: Rect,
+    pub(crate) map: Rect,
     /// Pixels per box.
     pub(super) px: f64,
     width: f64,
@@ -36,9 +47,9 @@ struct Edge {
 }
 
 impl Edge {
-    fn new(origin_m: f64, boxes: u32, box_size_m: f64, px: f64, tick_room_px: f64) -> Self {
-        let meters = f64::from(boxes) * box_size_m;
-        let most = ((f64::from(boxes) * px / tick_room_px) as usize).clamp(1, 12);
+    fn new(origin_m: f64, boxes: f64, box_size_m: f64, px: f64, tick_room_px: f64) -> Self {
+        let meters = boxes * box_size_m;
+        let most = ((boxes * px / tick_room_px) as usize).clamp(1, 12);
         // Sizes that a double cannot tell apart at this origin have no ticks.
         let exact = meters > 1e-9 * origin_m.abs() && meters.is_finite();
         let ticks =
@@ -57,16 +68,16 @@ impl Edge {
 
 impl Sheet {
     /// Draws title and axes, and says where the map goes.
-    pub(super) fn open(svg: &mut Svg, scene: &GridScene, style: &Style, px: f64) -> Self {
+    pub(crate) fn open(svg: &mut Svg, area: &Area<'_>, style: &Style, px: f64) -> Self {
         let size = style.small_px();
-        let [x0, y0] = scene.origin_m;
-        let across = Edge::new(x0, scene.width, scene.box_size_m, px, 6.0 * size);
-        let upward = Edge::new(y0, scene.height, scene.box_size_m, px, 4.0 * size);
+        let ([x0, y0], [width, height]) = (area.origin_m, area.boxes);
+        let across = Edge::new(x0, width, area.box_size_m, px, 6.0 * size);
+        let upward = Edge::new(y0, height, area.box_size_m, px, 4.0 * size);
         let labels = upward.ticks.widest_px(|label| text::width(label, size, Weight::Regular));
         let left = EDGE_PX + 1.5 * style.font_px + labels + TICK_PX + 4.0;
-        let (map_width, map_height) = (f64::from(scene.width) * px, f64::from(scene.height) * px);
+        let (map_width, map_height) = (width * px, height * px);
         let width = (left + map_width + 2.0 * EDGE_PX + size).max(LEAST_LETTERS * style.font_px);
-        let lines = text::wrap(&scene.title, style.title_px(), Weight::Bold, width - 2.0 * EDGE_PX);
+        let lines = text::wrap(area.title, style.title_px(), Weight::Bold, width - 2.0 * EDGE_PX);
         let top = paragraph(svg, &lines, (EDGE_PX, EDGE_PX), &title_look(style.title_px()));
         // Whole pixels, for sharp edges.
         let spill = ((Y_LABEL_LETTERS * style.font_px - map_height) / 2.0).max(0.0);
@@ -79,27 +90,28 @@ impl Sheet {
     }
 
     /// Draws what stands under the map and ends the picture.
-    pub(super) fn close(
+    pub(crate) fn close(
         &self,
         mut svg: Svg,
-        scene: &GridScene,
+        area: &Area<'_>,
+        entries: Vec<Entry>,
         style: &Style,
     ) -> Result<String, DrawError> {
         let axis_px = TICK_PX + style.small_px() + 1.6 * style.font_px + 14.0;
         let top = self.map.bottom() + axis_px.max(self.spill + 8.0);
-        let bar_px = self.draw_scale_bar(&mut svg, scene, style, top);
+        let bar_px = self.draw_scale_bar(&mut svg, area, style, top);
         let left = self.map.x + bar_px + 2.0 * style.font_px;
-        let legend = Legend::lay_out(entries(scene), style.small_px(), self.width - left - EDGE_PX);
+        let legend = Legend::lay_out(entries, style.small_px(), self.width - left - EDGE_PX);
         legend.draw(&mut svg, left, top - 4.0);
         let top = top + legend.height_px().max(2.4 * style.small_px()) + 6.0;
         let size = style.small_px();
-        let lines = text::wrap(&scene.caption, size, Weight::Regular, self.width - 2.0 * EDGE_PX);
+        let lines = text::wrap(area.caption, size, Weight::Regular, self.width - 2.0 * EDGE_PX);
         let end = paragraph(&mut svg, &lines, (EDGE_PX, top), &faint(size));
-        Ok(svg.finish(self.width, end + EDGE_PX, &scene.title))
+        Ok(svg.finish(self.width, end + EDGE_PX, area.title))
     }
 
     /// The pixel of a point in boxes; far outside the map distances shrink to 100 000 px.
-    pub(super) fn at(&self, (col, row): (f64, f64)) -> (f64, f64) {
+    pub(crate) fn at(&self, (col, row): (f64, f64)) -> (f64, f64) {
         let x = (col * self.px).clamp(-1e5, 1e5);
         let y = (row * self.px).clamp(-1e5, 1e5);
         (self.map.x + x, self.map.bottom() - y)
@@ -151,8 +163,8 @@ impl Sheet {
 
     /// Draws a bar of round length, about a fifth of the map's longer side but less than half the
     /// picture's width. Returns the room it takes, in pixels.
-    fn draw_scale_bar(&self, svg: &mut Svg, scene: &GridScene, style: &Style, top: f64) -> f64 {
-        let meters_per_px = scene.box_size_m / self.px;
+    fn draw_scale_bar(&self, svg: &mut Svg, area: &Area<'_>, style: &Style, top: f64) -> f64 {
+        let meters_per_px = area.box_size_m / self.px;
         let wanted_px = (0.2 * self.map.width.max(self.map.height)).min(0.18 * self.width);
         let length_m = nice_step(wanted_px * meters_per_px, 1);
         let length_px = length_m / meters_per_px;
@@ -175,7 +187,7 @@ impl Sheet {
 }
 
 /// The legend: only what the picture has.
-fn entries(scene: &GridScene) -> Vec<Entry> {
+pub(super) fn entries(scene: &GridScene) -> Vec<Entry> {
     let swatch = |fill, rim| Symbol::Swatch { fill, rim, opacity: 1.0 };
     let is_mobile = |shade: BodyShade| shade == BodyShade::Active;
     let kinds = [

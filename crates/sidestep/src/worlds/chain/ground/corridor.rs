@@ -43,6 +43,7 @@ impl Leg {
     /// What is wrong with it.
     fn fault(self) -> Option<String> {
         let is_good = |x: f64| x > 0.0 && x <= MAX_LENGTH_M;
+        let is_good_turn = |deg: f64| deg != 0.0 && deg.abs() <= 3600.0;
         match self {
             Self::Straight { length_m } if !is_good(length_m) => {
                 Some(format!("has a length of {length_m} m"))
@@ -50,7 +51,7 @@ impl Leg {
             Self::Bend { radius_m, .. } if !is_good(radius_m) => {
                 Some(format!("has a radius of {radius_m} m"))
             }
-            Self::Bend { turn_deg, .. } if turn_deg == 0.0 || !(turn_deg.abs() <= 3600.0) => {
+            Self::Bend { turn_deg, .. } if !is_good_turn(turn_deg) => {
                 Some(format!("turns by {turn_deg} degrees"))
             }
             _ => None,

@@ -2,11 +2,11 @@
 //!
 //! A floor becomes walls without thickness along the edges between free and solid pixels, each as
 //! long as the edge is straight. That is exact: for a body outside, the nearest point of what is
-//! solid lies on such an edge. It is also cheap: a straight wall is one segment, which blocks
-//! directions at a quarter of a box's cost, and the inside of what is solid costs nothing. Nobody
-//! gets there: walls that meet share their corners bit for bit, and no motion passes through a
-//! wall, however thin (see [`sweep`](crate::worlds::chain::sweep)). Who starts inside what is
-//! solid is not noticed by the walls; [`Floor::is_free`] tells.
+//! solid lies on such an edge. It is also little: a straight wall is one segment where a box would
+//! have four sides, and the inside of what is solid is nothing at all. Nobody gets there: walls
+//! that meet share their corners bit for bit, and no motion passes through a wall, however thin
+//! (see [`sweep`](crate::worlds::chain::sweep)). Who starts inside what is solid is not noticed by
+//! the walls; [`Floor::is_free`] tells.
 
 use crate::import::PixelMap;
 use crate::map::{Cell, UnknownPolicy};

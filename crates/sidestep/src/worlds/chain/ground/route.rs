@@ -2,7 +2,7 @@
 
 use super::{Pose, Site, purposes};
 use crate::planning::{Distances, FreeSpace, STEPS};
-use crate::worlds::chain::geometry::{Point, along, between, distance, dot, sub, unit};
+use crate::worlds::chain::geometry::{Bounds, Point, along, between, distance, dot, sub, unit};
 use crate::worlds::chain::obstacle::Obstacles;
 use sidestep_kernel::math::atan2;
 use sidestep_kernel::stream::Streams;
@@ -28,6 +28,9 @@ pub struct Wanted {
     pub rod_clearance_m: f64,
     /// The way ahead of the leader that has to be free as well.
     pub ahead_m: f64,
+    /// Where the leader starts: anywhere on the site where not given. Many sites have insides of
+    /// blocks that are free and lead nowhere.
+    pub within: Option<Bounds<2>>,
 }
 
 /// Where a chain starts.
@@ -64,7 +67,7 @@ pub fn find(
     wanted.check()?;
     let search = Search { site, obstacles, wanted };
     let (streams, mut wanting) = (Streams::new(seed), Wanting::default());
-    let bounds = site.bounds();
+    let bounds = wanted.within.unwrap_or_else(|| site.bounds());
     for place in 0..PLACES {
         let mut draws = streams.draws(0, place, purposes::ROUTE);
         let leader =
@@ -96,7 +99,10 @@ impl Wanted {
 
     fn check(&self) -> Result<(), InputError> {
         let lengths = [self.clearance_m, self.rod_clearance_m, self.ahead_m];
-        let is_good = self.connectors > 0
+        let has_place =
+            self.within.is_none_or(|b| (0..2).all(|i| b.lo[i] <= b.hi[i] && b.hi[i].is_finite()));
+        let is_good = has_place
+            && self.connectors > 0
             && self.spacing_m > 0.0
             && self.clearance_m > 0.0
             && self.length_m() <= 1e5
@@ -264,6 +270,7 @@ mod tests {
         clearance_m: 0.33,
         rod_clearance_m: 0.05,
         ahead_m: 1.0,
+        within: None,
     };
 
     /// A corridor with a bend: `#` is solid, a pixel has a side of 0.5 m.
@@ -288,6 +295,8 @@ mod tests {
             let start = find(site, &obstacles, wanted, Seed(seed)).expect(name);
             assert_eq!(start, find(site, &obstacles, wanted, Seed(seed)).unwrap());
             assert_eq!((start.points.len(), start.points[0]), (wanted.connectors, start.leader.at));
+            let within = wanted.within.unwrap_or_else(|| site.bounds());
+            assert!(within.meets(&Bounds::of(&[start.leader.at])));
             for rod in start.points.windows(2) {
                 assert!((distance(rod[0], rod[1]) - wanted.spacing_m).abs() < 1e-9);
                 let apart_m = obstacles.clearance_m([rod[0], rod[1]], 0.0, 1.0);
@@ -350,6 +359,7 @@ mod tests {
         }
         let path = shared("worlds/stage/SFU.world").expect("there");
         let world = stage::load(&path).expect("SFU");
-        check("SFU", &Site::of_stage(&world), &WANTED, 3);
+        let within = Some(Bounds { lo: [-20.0, -10.0], hi: [5.0, 10.0] });
+        check("SFU", &Site::of_stage(&world), &Wanted { within, ..WANTED }, 3);
     }
 }

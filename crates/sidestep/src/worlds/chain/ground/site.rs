@@ -113,7 +113,7 @@ mod tests {
 
     #[test]
     fn robots_of_real_worlds_stand_free() {
-        for name in ["stage/simple", "willow/willow-erratic"] {
+        for name in ["stage/simple", "stage/SFU", "willow/willow-erratic"] {
             let Some(path) = shared(&format!("worlds/{name}.world")) else { return };
             let world = stage::load(&path).expect(name);
             let site = Site::of_stage(&world);
