@@ -216,7 +216,7 @@ fn chain() -> Result<(), Box<dyn Error>> {
             for (min_m, max_m) in [(0.6, 0.8), (1.0, 1.0)] {
                 let mut plan = Plan::new(followers, SPEED_M_S)?;
                 plan.rod = Rod { min_m, max_m, radius_m: 0.05 };
-                plan.margin_m = 0.0;
+                (plan.margin_m, plan.lag_limit_m) = (0.0, f64::INFINITY);
                 let start_m = 0.3 + max_m * 15.0_f64.min(13.5 / max_m).floor();
                 let Run { arrived, measures: m } = run(&plan, &corridor(width_m, start_m)?)?;
                 println!(
@@ -233,37 +233,47 @@ fn chain() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Followers on real wheels: margins and spare speed.
+/// Followers on real wheels: margins and spare speed, with a leader that waits for late ones and
+/// one that does not.
 fn wheels() -> Result<(), Box<dyn Error>> {
     println!(
-        "\n| width m | margin m | wheels | arrived | vetoes | bumped % | held % | lag mean, max m | clearance m | pairs m |"
+        "\n| width m | margin m | wheels, leader = 1 | waits | arrived in s | vetoes | bumped % | held % | lag mean, max m | clearance m | pairs m |"
     );
-    println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |");
-    let followers = 15;
-    for width_m in [1.2, 1.6, 2.0, 2.5] {
+    println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |");
+    for width_m in [1.2, 1.6, 2.0, 2.5, 3.0] {
         for margin_m in [0.0, 0.05, 0.08, 0.1] {
             for q in [1.0, 1.2, 1.5] {
-                let mut plan = Plan::new(followers, SPEED_M_S)?;
-                plan.margin_m = margin_m;
-                plan.follower = Follower::new(Drive::new(0.4, q * SPEED_M_S)?, 0.25)?;
-                let Run { arrived, measures: m } = run(&plan, &corridor(width_m, 12.3)?)?;
-                let percent = |n: usize| 100.0 * n as f64 / (m.ticks * followers) as f64;
-                println!(
-                    "| {width_m} | {margin_m} | {q} | {} | {} | {:.2} | {:.2} | {:.3}, {:.3} | {:.3} | {:.2} to {:.2} |",
-                    yes(arrived),
-                    m.vetoes,
-                    percent(m.bumped),
-                    percent(m.held),
-                    m.mean_lag_m(followers),
-                    m.max_lag_m,
-                    m.follower_clearance_m,
-                    m.pairs_m[0],
-                    m.pairs_m[1]
-                );
+                for lag_limit_m in [f64::INFINITY, 0.15] {
+                    let mut plan = Plan::new(15, SPEED_M_S)?;
+                    (plan.margin_m, plan.lag_limit_m) = (margin_m, lag_limit_m);
+                    plan.follower = Follower::new(Drive::new(0.4, q * SPEED_M_S)?, 0.25)?;
+                    let run = run(&plan, &corridor(width_m, 12.3)?)?;
+                    let waits = yes(lag_limit_m.is_finite());
+                    println!(
+                        "| {width_m} | {margin_m} | {q} | {waits} | {}",
+                        wheel_row(&plan, &run)
+                    );
+                }
             }
         }
     }
     Ok(())
+}
+
+fn wheel_row(plan: &Plan, Run { arrived, measures: m }: &Run) -> String {
+    let percent = |n: usize| 100.0 * n as f64 / (m.ticks * plan.followers) as f64;
+    let time = if *arrived { format!("{:.0}", m.ticks as f64 * plan.dt_s) } else { "never".into() };
+    format!(
+        "{time} | {} | {:.2} | {:.2} | {:.3}, {:.3} | {:.3} | {:.2} to {:.2} |",
+        m.vetoes,
+        percent(m.bumped),
+        percent(m.held),
+        m.mean_lag_m(plan.followers),
+        m.max_lag_m,
+        m.follower_clearance_m,
+        m.pairs_m[0],
+        m.pairs_m[1]
+    )
 }
 
 /// Where there is no room to swing round.

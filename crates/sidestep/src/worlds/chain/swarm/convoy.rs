@@ -3,6 +3,10 @@
 //! Each tick the leader perceives, decides and proposes where its wheels would take it; the chain
 //! moves there or objects. Then every follower steers toward its own connector. All perceive the
 //! robots as they were before the tick.
+//!
+//! A connector that is pulled round a sharp corner goes up to three times as fast as the leader,
+//! which wheels cannot. A follower that is late cuts the corner and hangs on it. So each tells the
+//! robot before it how late it is, as it would tell a veto, and the leader slows down.
 
 use super::drive::{Drive, Pose};
 use super::follower::{Follower, Goal};
@@ -30,6 +34,9 @@ pub struct Plan {
     pub rod: Rod,
     /// By how much followers' connectors are larger than their bodies.
     pub margin_m: f64,
+    /// The leader slows down from half this distance of a follower from its connector on, and
+    /// stands when it is reached; infinite for a leader that does not care.
+    pub lag_limit_m: f64,
     /// How the chain reacts.
     pub rules: Rules,
     /// Length of a tick.
@@ -50,6 +57,7 @@ impl Plan {
             followers,
             rod: Rod { min_m: 0.6, max_m: 0.8, radius_m: 0.05 },
             margin_m: 0.08,
+            lag_limit_m: 0.15,
             rules: Rules::default(),
             dt_s: 0.02,
         })
@@ -75,6 +83,8 @@ pub struct Convoy {
 pub struct Tick {
     /// The leader's layer that acted.
     pub layer: Layer,
+    /// The part of its speed to which followers slow the leader down; 1 for all of it.
+    pub pace: f64,
     /// The chain's objection to the leader's way.
     pub veto: Option<Veto<2>>,
     /// Followers that were held back by their sensors.
@@ -90,6 +100,10 @@ impl Convoy {
     /// As [`Chain::new`] and [`Leader::check`]; a tick out of range.
     pub fn new(plan: Plan, start: Pose) -> Result<Self, InputError> {
         plan.leader.check()?;
+        if plan.lag_limit_m.is_nan() || plan.lag_limit_m <= 0.0 {
+            let cause = format!("is {} m", plan.lag_limit_m);
+            return Err(InputError::new("lag limit", cause, "give more than 0, or infinity"));
+        }
         if !(plan.dt_s > 0.0 && plan.dt_s <= 1.0) {
             let cause = format!("takes {} s", plan.dt_s);
             return Err(InputError::new("tick", cause, "give more than 0, up to 1 s"));
@@ -152,7 +166,8 @@ impl Convoy {
         self.bodies.clear();
         self.bodies.extend(self.followers.iter().map(|f| Body::disc(f.at, radius_m)));
         let leader_was = self.leader.pose.at;
-        let (layer, veto) = self.lead(obstacles, target, noise)?;
+        let pace = self.pace();
+        let (layer, veto) = self.lead(obstacles, target, noise, pace)?;
         self.bodies.push(Body::disc(leader_was, radius_m));
         let (mut held, mut bumped) = (0, 0);
         for i in 0..self.followers.len() {
@@ -160,7 +175,7 @@ impl Convoy {
             held += usize::from(is_held);
             bumped += usize::from(is_bumped);
         }
-        Ok(Tick { layer, veto, held, bumped })
+        Ok(Tick { layer, pace, veto, held, bumped })
     }
 
     fn lead(
@@ -168,13 +183,15 @@ impl Convoy {
         obstacles: &Obstacles<2>,
         target: Option<Point<2>>,
         noise: &mut Draws,
+        pace: f64,
     ) -> Result<(Layer, Option<Veto<2>>), InputError> {
         let Self { plan, leader, scan, bodies, .. } = self;
         let around = Surroundings { obstacles, bodies, target };
         let percept = plan.leader.perceive(&leader.pose, &around, noise, scan);
         let decision = plan.leader.decide(leader.followed, &percept);
         leader.followed = decision.followed;
-        let proposed = plan.drive.step(leader.pose, decision.wheels, plan.dt_s);
+        let wheels = decision.wheels.slowed(pace);
+        let proposed = plan.drive.step(leader.pose, wheels, plan.dt_s);
         self.before.clear();
         self.before.extend_from_slice(self.chain.points());
         let motion = Motion::Connector { k: 0, to: proposed.at };
@@ -184,10 +201,18 @@ impl Convoy {
         self.leader.pose = if veto.is_none() {
             Pose { at: self.chain.points()[0], ..proposed }
         } else {
-            let wheels = plan.leader.when_blocked(decision.wheels);
-            plan.drive.step(self.leader.pose, wheels, plan.dt_s)
+            let instead = plan.leader.when_blocked(wheels);
+            plan.drive.step(self.leader.pose, instead, plan.dt_s)
         };
         Ok((decision.layer, veto))
+    }
+
+    /// What part of its speed the leader may go for the sake of the latest follower.
+    fn pace(&self) -> f64 {
+        let lag_m = |(f, at): (&Pose, &Point<2>)| distance(f.at, *at);
+        let connectors = &self.chain.points()[1..];
+        let worst_m = self.followers.iter().zip(connectors).map(lag_m).fold(0.0, f64::max);
+        (2.0 - 2.0 * worst_m / self.plan.lag_limit_m).clamp(0.0, 1.0)
     }
 
     /// Moves a follower; whether it was held back, and whether its bumper is pressed.
@@ -212,6 +237,8 @@ pub struct Measures {
     pub layers: [usize; 6],
     /// Ticks in which the chain objected.
     pub vetoes: usize,
+    /// Ticks in which followers slowed the leader down.
+    pub slowed: usize,
     /// The way of the leader.
     pub way_m: f64,
     /// The least air between the leader's body and anything, up to 1 m.
@@ -240,6 +267,7 @@ impl Default for Measures {
             ticks: 0,
             layers: [0; 6],
             vetoes: 0,
+            slowed: 0,
             way_m: 0.0,
             leader_clearance_m: 1.0,
             connector_clearance_m: 1.0,
@@ -260,6 +288,7 @@ impl Measures {
         self.ticks += 1;
         self.layers[tick.layer as usize - 1] += 1;
         self.vetoes += usize::from(tick.veto.is_some());
+        self.slowed += usize::from(tick.pace < 1.0);
         self.bumped += tick.bumped;
         self.held += tick.held;
         self.way_m += distance(convoy.before[0], convoy.chain.points()[0]);

@@ -44,6 +44,12 @@ impl Wheels {
         0.5 * (self.left_m_s + self.right_m_s)
     }
 
+    /// The same arc, slower.
+    #[must_use]
+    pub fn slowed(self, pace: f64) -> Self {
+        Self::new(pace * self.left_m_s, pace * self.right_m_s)
+    }
+
     /// The same turn with the middle at rest.
     #[must_use]
     pub fn on_the_spot(self) -> Self {
