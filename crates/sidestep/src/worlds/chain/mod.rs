@@ -9,7 +9,7 @@
 //! propagate.rs -> candidates.rs -> scene.rs     one motion: sweeps, a slave's choices, their judge
 //!                 interval.rs, search.rs        free directions: exact in the plane, searched in space
 //!                 sweep.rs, own_body.rs         nothing is passed through; the chain's own parts
-//! reach.rs: an arm with a fixed base
+//! reach.rs: an arm with a fixed base             ik/: postures for targets
 //! wavefront.rs: many motions at once            rebuild.rs: broken chains
 //! kinematics/: arms of joints, as chains        script/: a turtle language that drives an initiator
 //! ```
@@ -18,6 +18,7 @@ mod candidates;
 #[expect(clippy::module_inception, reason = "the chain itself, of the world of chains")]
 pub mod chain;
 pub mod geometry;
+pub mod ik;
 pub mod interval;
 pub mod kinematics;
 pub mod obstacle;
