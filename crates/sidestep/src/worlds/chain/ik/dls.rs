@@ -20,13 +20,19 @@ use crate::worlds::chain::geometry::{
 };
 
 /// Newton steps, also those that did not help, before the posture becomes the new reference.
-const STEPS: usize = 24;
+const STEPS: usize = 4;
 /// New references before it is given up.
-const REFERENCES: usize = 6;
+const REFERENCES: usize = 32;
+/// Every how many of them the limb is bowed anew, should it lie in a line with the target.
+const BOW_EVERY: usize = 6;
 /// The first damping, in parts of the mean of the matrix' diagonal.
 const FIRST_DAMPING: f64 = 1e-3;
-/// Part of the greatest length beyond which a limb is straight.
-const STRAIGHT: f64 = 1.0 - 1e-6;
+/// A step that did not help is shortened to this part of it at least.
+const LEAST_PART: f64 = 0.1;
+/// Part of the greatest length beyond which a limb is straight, and buckles to no certain side.
+const STRAIGHT: f64 = 0.9;
+/// Part of the greatest length that a straight limb must have to go to be bowed first.
+const FAR: f64 = 0.03;
 
 /// Where a multiplier brings the tip.
 struct Pulled<const D: usize> {
@@ -49,14 +55,14 @@ pub(super) fn solve<const D: usize>(
     let mut steps = 0;
     let mut error_m = f64::INFINITY;
     for reference in 0..REFERENCES {
-        let start = pulled(vectors, spans, [0.0; D], target);
-        let is_straight = norm(sub(target, start.error)) > STRAIGHT * longest_m;
-        let start = if start.error_m > tolerance_m && (is_straight || reference > 1) {
+        let mut start = pulled(vectors, spans, [0.0; D], target);
+        let is_straight = norm(sub(target, start.error)) > STRAIGHT * longest_m
+            && start.error_m > FAR * longest_m;
+        let is_stuck = reference % BOW_EVERY == BOW_EVERY / 2;
+        if is_stuck || (reference == 0 && is_straight) {
             bow(vectors, target);
-            pulled(vectors, spans, [0.0; D], target)
-        } else {
-            start
-        };
+            start = pulled(vectors, spans, [0.0; D], target);
+        }
         let (y, left_m) = pull(vectors, spans, target, tolerance_m, start, &mut steps);
         settle(vectors, spans, y);
         error_m = left_m;
@@ -77,17 +83,20 @@ fn pull<const D: usize>(
     steps: &mut usize,
 ) -> (Point<D>, f64) {
     let (mut y, mut at, mut damping) = ([0.0; D], start, FIRST_DAMPING);
+    let mut step = damped(&at.slope, at.error, damping);
     for _ in 0..STEPS {
         if at.error_m <= tolerance_m {
             break;
         }
         *steps += 1;
-        let next_y = add(y, damped(&at.slope, at.error, damping));
+        let next_y = add(y, step);
         let next = pulled(vectors, spans, next_y, target);
         if next.error_m < at.error_m {
             (y, at, damping) = (next_y, next, 0.3 * damping);
+            step = damped(&at.slope, at.error, damping);
         } else {
-            damping *= 4.0;
+            let (before, after) = (at.error_m * at.error_m, next.error_m * next.error_m);
+            step = scaled(step, (before / (before + after)).max(LEAST_PART));
         }
     }
     (y, at.error_m)
