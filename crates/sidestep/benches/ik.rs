@@ -131,13 +131,7 @@ fn free_in<const D: usize>() {
             print!("{D}-D, {n} rods, {part} reach:");
             for engine in [Engine::Chain, Engine::Dls, Engine::Auto] {
                 let row = measure(&chain, &targets, engine);
-                print!(
-                    "  {} {:.1} %/{}/{:.2} us",
-                    engine.name(),
-                    row.success,
-                    row.steps,
-                    row.us
-                );
+                print!("  {} {:.1} %/{}/{:.2} us", engine.name(), row.success, row.steps, row.us);
             }
             println!("  rebirth-ik {:.1} %/{}/{:.2} us", other.success, other.steps, other.us);
         }

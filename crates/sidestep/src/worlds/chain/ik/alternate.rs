@@ -5,8 +5,8 @@
 //! push and the pull of the chain (slides A2 and A3; design 3.1). With rods of variable length
 //! those that need not change keep their length (A4), and far fewer passes are needed.
 
-use super::limb::Span;
 use super::dls::bow;
+use super::limb::Span;
 use crate::worlds::chain::geometry::{Point, add, along, distance, first_axis, norm, sub};
 
 /// Double passes before it is given up.

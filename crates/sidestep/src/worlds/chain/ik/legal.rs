@@ -20,7 +20,8 @@ impl<const D: usize> Judge<'_, D> {
     /// The first objection to a posture, in the order of the connectors. What is where it was in
     /// the chain is not judged.
     pub(super) fn objection(&self, points: &[Point<D>], k: usize) -> Option<Veto<D>> {
-        let veto = |(by, reason, obstacle)| Veto { by, from: k, reason, obstacle, reached: points[k] };
+        let veto =
+            |(by, reason, obstacle)| Veto { by, from: k, reason, obstacle, reached: points[k] };
         (0..points.len())
             .find_map(|i| self.connector(points, i))
             .or_else(|| (0..self.chain.rods().len()).find_map(|i| self.rod(points, i)))
@@ -46,8 +47,11 @@ impl<const D: usize> Judge<'_, D> {
         let bends = connector.max_bend_rad < PI
             && around.len() == 3
             && around.clone().any(|j| self.has_moved(points, j));
-        (bends && bend_rad(points, i) > connector.max_bend_rad + BEND_TOLERANCE_RAD)
-            .then_some((i, Reason::BendLimit, None))
+        (bends && bend_rad(points, i) > connector.max_bend_rad + BEND_TOLERANCE_RAD).then_some((
+            i,
+            Reason::BendLimit,
+            None,
+        ))
     }
 
     fn rod(&self, points: &[Point<D>], i: usize) -> Option<(usize, Reason, Option<u32>)> {

@@ -62,12 +62,7 @@ pub(super) fn relax<const D: usize>(
     Relaxed { rounds: MAX_ROUNDS, veto }
 }
 
-fn lay<const D: usize>(
-    limb: &Limb<D>,
-    points: &mut [Point<D>],
-    judge: &Judge<D>,
-    goal: &Goal<D>,
-) {
+fn lay<const D: usize>(limb: &Limb<D>, points: &mut [Point<D>], judge: &Judge<D>, goal: &Goal<D>) {
     let mut at = points[goal.base];
     for (i, v) in limb::path(goal.base, goal.k).skip(1).zip(&limb.vectors) {
         at = add(at, *v);
@@ -116,9 +111,8 @@ impl<const D: usize> Pusher<'_, D> {
         let (a, b) = (distance(points[i - 1], points[i]), distance(points[i], points[i + 1]));
         let chord_m = (a * a + b * b + 2.0 * a * b * math::cos(allowed_rad)).max(0.0).sqrt();
         let between = sub(points[i + 1], points[i - 1]);
-        let u = unit(between).unwrap_or(perpendicular(
-            unit(sub(points[i], points[i - 1])).unwrap_or([1.0; D]),
-        ));
+        let u = unit(between)
+            .unwrap_or(perpendicular(unit(sub(points[i], points[i - 1])).unwrap_or([1.0; D])));
         let weights = [self.weight(i - 1), self.weight(i + 1)];
         let missing_m = chord_m - norm(between);
         self.deepest += missing_m.max(0.0);
@@ -169,7 +163,9 @@ impl<const D: usize> Pusher<'_, D> {
             return;
         }
         let away = unit(sub(nearest.on_body, nearest.on_core)).unwrap_or_else(|| {
-            perpendicular(unit(sub(rod[1], rod[0])).unwrap_or(crate::worlds::chain::geometry::first_axis()))
+            perpendicular(
+                unit(sub(rod[1], rod[0])).unwrap_or(crate::worlds::chain::geometry::first_axis()),
+            )
         });
         let part = if i == j { 0.0 } else { part_of(nearest.on_body, [points[i], points[j]]) };
         let weights = [self.weight(i) * (1.0 - part), self.weight(j) * part];

@@ -3,9 +3,7 @@
 use super::Goal;
 use super::limb;
 use crate::worlds::chain::chain::Chain;
-use crate::worlds::chain::geometry::{
-    Point, add, along, dot, first_axis, scaled, sub, unit,
-};
+use crate::worlds::chain::geometry::{Point, add, along, dot, first_axis, scaled, sub, unit};
 use sidestep_kernel::Seed;
 use sidestep_kernel::distr::normal;
 use sidestep_kernel::stream::{Draws, Purpose, Streams};
@@ -15,7 +13,11 @@ const START: Purpose = Purpose(0x1C);
 
 /// The start number `index`: 0 is the present posture, 1 its mirror image across the line from
 /// base to target, the others are random walks of random stiffness.
-pub(super) fn start<const D: usize>(chain: &Chain<D>, goal: &Goal<D>, index: usize) -> Vec<Point<D>> {
+pub(super) fn start<const D: usize>(
+    chain: &Chain<D>,
+    goal: &Goal<D>,
+    index: usize,
+) -> Vec<Point<D>> {
     let mut points = chain.points().to_vec();
     let end = if goal.k > goal.base { points.len() - 1 } else { 0 };
     match index {
