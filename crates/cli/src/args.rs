@@ -28,4 +28,5 @@ Begin with:
   sidestep check first.toml           see what it describes
   sidestep run first.toml --out runs/first
 
-Exit codes: 0 done, 1 the command failed, 2 the input is wrong, 130 interrupted.";
+Exit codes: 0 done, 1 the command failed or the answer is no, 2 the input is wrong,
+130 interrupted.";

@@ -10,7 +10,8 @@ use sidestep_draw::DrawError;
 pub(crate) enum ExitCode {
     /// The command did what was asked.
     Done = 0,
-    /// It could not be finished: a full disk, a replay that differs from its record.
+    /// It could not be finished, or the answer is no: a full disk, a replay that differs from its
+    /// record, a target that no posture reaches.
     Failed = 1,
     /// An option, a file or a folder is wrong. Nothing was written.
     WrongInput = 2,

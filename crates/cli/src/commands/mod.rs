@@ -1,10 +1,12 @@
 //! One file per command.
 
+mod arm;
 mod check;
 mod compare;
 mod exact;
 mod finish;
 mod fk;
+mod ik;
 mod learn;
 mod map;
 mod new;
@@ -36,6 +38,8 @@ pub(crate) enum Command {
     Compare(compare::CompareArgs),
     /// Compute where a robot arm's tip and connectors are
     Fk(fk::FkArgs),
+    /// Compute joint values that bring a robot arm's tip to a target
+    Ik(ik::IkArgs),
     /// Continue a recorded run that was stopped or killed
     Resume(resume::ResumeArgs),
     /// Run a paper's experiments anew and judge its claims
@@ -58,6 +62,7 @@ pub(crate) fn execute(command: Command, console: &Console) -> Result<ExitCode, F
         Command::Exact(args) => exact::exact(&args, *console),
         Command::Compare(args) => compare::compare(&args, *console),
         Command::Fk(args) => fk::fk(&args, *console),
+        Command::Ik(args) => ik::ik(&args, *console),
         Command::Resume(args) => resume::resume(&args, *console),
         Command::Reproduce(args) => reproduce::reproduce(&args, *console),
         Command::Replay(args) => replay::replay(&args, *console),

@@ -5,7 +5,8 @@ use crate::support::Place;
 #[test]
 fn every_command_has_help_with_examples() {
     let place = Place::new();
-    for command in ["run", "check", "new", "map", "learn", "exact", "fk", "resume", "replay"] {
+    for command in ["run", "check", "new", "map", "learn", "exact", "fk", "ik", "resume", "replay"]
+    {
         let help = place.run(&[command, "--help"]);
         assert_eq!(help.code(), 0);
         let examples = help.out().matches(&format!("sidestep {command} ")).count();

@@ -119,6 +119,51 @@ impl Semantics {
             InputError::new(place, format!("there is no group `{name}`"), nearest(name, &known))
         })
     }
+
+    /// The links that the group `name` leads from and to: its chain, or the ends of the way that
+    /// its joints and those of its parts lie on. `place` is the option that names it.
+    ///
+    /// # Errors
+    /// When there is no such group, or it is no single way.
+    pub fn ends(
+        &self,
+        place: &str,
+        name: &str,
+        model: &Model,
+    ) -> Result<(usize, usize), InputError> {
+        if let [chain] = self.group(place, name)?.chains[..] {
+            return Ok(chain);
+        }
+        let mut names = vec![name];
+        let mut joints = Vec::new();
+        // Groups that name each other in a circle are each looked at once.
+        let mut next = 0;
+        while let Some(name) = names.get(next) {
+            let group = self.group(place, name)?;
+            joints.extend(group.joints.iter().copied());
+            joints.extend(group.links.iter().filter_map(|&link| model.joint_above(link)));
+            for part in &group.groups {
+                if !names.contains(&part.as_str()) {
+                    names.push(part);
+                }
+            }
+            next += 1;
+        }
+        way_of(&joints, model).ok_or_else(|| {
+            let cause = format!("the joints of group `{name}` do not lie on one way");
+            InputError::new(place, cause, "name base and tip with --base and --tip")
+        })
+    }
+}
+
+/// The ends of the way that holds all of these joints.
+fn way_of(joints: &[usize], model: &Model) -> Option<(usize, usize)> {
+    let depth = |&joint: &usize| model.way(model.root, model.joints[joint].child).map(|w| w.len());
+    let first = *joints.iter().min_by_key(|j| depth(j))?;
+    let last = *joints.iter().max_by_key(|j| depth(j))?;
+    let (base, tip) = (model.joints[first].parent, model.joints[last].child);
+    let way = model.way(base, tip)?;
+    joints.iter().all(|joint| way.contains(joint)).then_some((base, tip))
 }
 
 struct Reader<'a> {

@@ -9,13 +9,14 @@
 //! propagate.rs -> candidates.rs -> scene.rs     one motion: sweeps, a slave's choices, their judge
 //!                 interval.rs, search.rs        free directions: exact in the plane, searched in space
 //!                 sweep.rs, own_body.rs         nothing is passed through; the chain's own parts
-//! reach.rs: an arm with a fixed base
-//! wavefront.rs: many motions at once            rebuild.rs: broken chains
-//! ground/: where obstacles come from
-//! swarm/: robots on wheels, one that navigates and those that follow
 //! open.rs: nothing in the way                   wavefront.rs: many motions at once, then
-//! rebuild.rs: broken chains
-//! kinematics/: arms of joints, as chains        script/: a turtle language that drives an initiator
+//! reach.rs: an arm with a fixed base            rebuild.rs: broken chains
+//! ground/: where obstacles come from            script/: a turtle language that drives an initiator
+//! swarm/: robots on wheels, one that navigates and those that follow
+//! kinematics/: arms of joints, as chains        ik/: postures that reach a target
+//!
+//! scenario.rs -> world.rs (immutable), state.rs (bodies), driver.rs (tasks), simulation.rs
+//! act.rs: a chain's cycle: broken.rs, navigate.rs, formation.rs, measure.rs -> metrics.rs, rows.rs
 //! ```
 
 mod act;
@@ -30,6 +31,7 @@ pub mod formation;
 pub mod geometry;
 mod grid;
 pub mod ground;
+pub mod ik;
 pub mod interval;
 pub mod kinematics;
 mod measure;

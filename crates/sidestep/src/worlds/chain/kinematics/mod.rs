@@ -7,6 +7,7 @@
 //! skeleton    joint axes -> connectors and rods
 //! bend        joint limits -> bend limits, where one joint alone bends a connector
 //! recover     connectors -> joint values
+//! inverse/    a target -> joint values, inside limits
 //! ```
 //!
 //! A **connector** of an arm is a point that is fixed in two or more links at once: where axes
@@ -20,6 +21,7 @@
 //! the joints at all.
 
 mod bend;
+mod inverse;
 mod pose;
 mod recover;
 mod serial;
@@ -28,6 +30,7 @@ mod skeleton;
 mod tests;
 
 pub use bend::BendLimit;
+pub use inverse::{ArmAnswer, ArmGoal, ArmReason, Hit, Sphere};
 pub use pose::{Pose, Vector};
 pub use recover::{RecoverError, Recovered};
 pub use serial::{Frames, Motion, SerialChain, Variable};

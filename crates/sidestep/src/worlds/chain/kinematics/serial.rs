@@ -237,18 +237,45 @@ impl SerialChain {
     /// # Errors
     /// When one is outside: its name and its limits.
     pub fn check_limits(&self, place: &str, values: &[f64]) -> Result<(), InputError> {
-        let of_variables =
-            self.variables.iter().zip(values).map(|(v, &x)| (&v.name, v.motion, v.limits, x));
-        let of_joints =
-            self.joints.iter().map(|j| (&j.name, j.motion, j.limits, j.drive.value(values)));
-        for (name, motion, limits, value) in of_variables.chain(of_joints) {
-            let Some(limits) = limits.filter(|limits| !limits.contain(value)) else { continue };
-            let unit = motion.unit();
-            let cause = format!("joint `{name}` cannot be at {value} {unit}");
-            let remedy = format!("stay between {} and {} {unit}", limits.lower, limits.upper);
-            return Err(InputError::new(place, cause, remedy));
+        match self.outside(values).next() {
+            None => Ok(()),
+            Some((name, motion, limits, value)) => {
+                let unit = motion.unit();
+                let cause = format!("joint `{name}` cannot be at {value} {unit}");
+                let remedy = format!("stay between {} and {} {unit}", limits.lower, limits.upper);
+                Err(InputError::new(place, cause, remedy))
+            }
         }
-        Ok(())
+    }
+
+    /// Names of the joints outside their limits, those that mimic others too, each once.
+    pub fn outside_limits<'a>(&'a self, values: &'a [f64]) -> Vec<&'a str> {
+        let mut names = Vec::new();
+        for (name, ..) in self.outside(values) {
+            if !names.contains(&name) {
+                names.push(name);
+            }
+        }
+        names
+    }
+
+    fn outside<'a>(
+        &'a self,
+        values: &'a [f64],
+    ) -> impl Iterator<Item = (&'a str, Motion, Limits, f64)> {
+        let of_variables = self
+            .variables
+            .iter()
+            .zip(values)
+            .map(|(v, &x)| (v.name.as_str(), v.motion, v.limits, x));
+        let of_joints = self
+            .joints
+            .iter()
+            .map(|j| (j.name.as_str(), j.motion, j.limits, j.drive.value(values)));
+        of_variables.chain(of_joints).filter_map(|(name, motion, limits, value)| {
+            let limits = limits.filter(|limits| !limits.contain(value))?;
+            Some((name, motion, limits, value))
+        })
     }
 }
 

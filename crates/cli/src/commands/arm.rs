@@ -1,0 +1,224 @@
+//! Arms of robot models: what names one, which posture it is in, and how both are said.
+
+use crate::console::aligned;
+use clap::Args;
+use serde::Serialize;
+use sidestep::import::urdf::Model;
+use sidestep::import::urdf::srdf::Semantics;
+use sidestep::kernel::InputError;
+use sidestep::worlds::chain::kinematics::{Pose, Rod, SerialChain, Variable, Vector};
+use std::path::PathBuf;
+
+/// An arm and its posture, as typed.
+#[derive(Debug, Args)]
+pub(crate) struct ArmArgs {
+    /// Robot model
+    #[arg(value_name = "URDF")]
+    urdf: PathBuf,
+
+    /// The link that positions are relative to [default: the root]
+    #[arg(long, value_name = "LINK")]
+    base: Option<String>,
+
+    /// The link whose place is wanted [default: the end of the longest arm]
+    #[arg(long, value_name = "LINK")]
+    tip: Option<String>,
+
+    /// File with groups and named postures
+    #[arg(long, value_name = "FILE")]
+    srdf: Option<PathBuf>,
+
+    /// Take base and tip from this group of the SRDF file
+    #[arg(long, value_name = "NAME", requires = "srdf", conflicts_with_all = ["base", "tip"])]
+    group: Option<String>,
+
+    /// The posture: a value for each moving joint from base to tip, in rad or m
+    #[arg(long, value_name = "Q1,Q2,...", allow_hyphen_values = true)]
+    joints: Option<String>,
+
+    /// Take the values from this named posture of the SRDF file
+    #[arg(long, value_name = "NAME", requires = "srdf", conflicts_with = "joints")]
+    posture: Option<String>,
+}
+
+/// An arm in a posture.
+pub(crate) struct Arm {
+    pub(crate) robot: String,
+    pub(crate) chain: SerialChain,
+    pub(crate) values: Vec<f64>,
+}
+
+impl ArmArgs {
+    /// Reads the files.
+    ///
+    /// # Errors
+    /// When a file, a link, a group, the posture or the values are wrong.
+    pub(crate) fn load(&self) -> Result<Arm, InputError> {
+        let model = Model::load(&self.urdf)?;
+        let semantics = self.srdf.as_ref().map(|path| Semantics::load(path, &model)).transpose()?;
+        let chain = self.chain(&model, semantics.as_ref())?;
+        let (place, values) = match (&self.joints, &self.posture, &semantics) {
+            (Some(text), ..) => ("--joints", numbers("--joints", text)?),
+            (None, Some(name), Some(semantics)) => {
+                let posture = semantics.posture("--posture", name)?;
+                ("--posture", in_posture(&posture, &model, &chain))
+            }
+            _ => ("--joints", chain.rest()),
+        };
+        chain.check_count(place, &values)?;
+        Ok(Arm { robot: model.name, chain, values })
+    }
+
+    fn chain(
+        &self,
+        model: &Model,
+        semantics: Option<&Semantics>,
+    ) -> Result<SerialChain, InputError> {
+        if let (Some(name), Some(semantics)) = (&self.group, semantics) {
+            let (base, tip) = semantics.ends("--group", name, model)?;
+            return SerialChain::new(model, base, tip, "--group");
+        }
+        let link = |option, name: &Option<String>, otherwise| match name {
+            Some(name) => model.link(option, name),
+            None => Ok(otherwise),
+        };
+        let base = link("--base", &self.base, model.root)?;
+        let tip = link("--tip", &self.tip, model.default_tip())?;
+        let place = match (&self.tip, &self.base) {
+            (Some(_), _) => "--tip".into(),
+            (None, Some(_)) => "--base".into(),
+            (None, None) => self.urdf.display().to_string(),
+        };
+        SerialChain::new(model, base, tip, &place)
+    }
+}
+
+/// Numbers with commas between.
+///
+/// # Errors
+/// A word that is no number.
+pub(crate) fn numbers(option: &str, text: &str) -> Result<Vec<f64>, InputError> {
+    let words = text.split(',').map(str::trim).filter(|_| !text.trim().is_empty());
+    let number = |word: &str| {
+        word.parse().map_err(|_| {
+            let cause = format!("`{word}` is no number");
+            InputError::new(option, cause, "write numbers with commas between: 0.1,-0.2")
+        })
+    };
+    words.map(number).collect()
+}
+
+/// The values of a posture; joints that it leaves out are at rest.
+fn in_posture(posture: &[(usize, f64)], model: &Model, chain: &SerialChain) -> Vec<f64> {
+    let mut values = chain.rest();
+    for (variable, value) in chain.variables.iter().zip(&mut values) {
+        // Of several postures with one name the last one holds.
+        let said = posture.iter().rfind(|(joint, _)| model.joints[*joint].name == variable.name);
+        if let Some((_, said)) = said {
+            *value = *said;
+        }
+    }
+    values
+}
+
+/// Where an arm is.
+#[derive(Debug, Serialize)]
+pub(crate) struct Placed {
+    robot: String,
+    base_link: String,
+    tip_link: String,
+    /// Position of the tip in m.
+    tip: Vector,
+    /// Rows of the tip's rotation matrix.
+    rotation: [Vector; 3],
+    joints: Vec<JointPlaced>,
+    /// Names of joints outside their limits, also of those that mimic others.
+    pub(crate) outside_limits: Vec<String>,
+    /// Positions in m, from the base out.
+    connectors: Vec<Vector>,
+    rods: Vec<RodSize>,
+}
+
+#[derive(Debug, Serialize)]
+struct JointPlaced {
+    name: String,
+    value: f64,
+    unit: &'static str,
+    /// Lowest and highest value; null where there are none.
+    limits: Option<[f64; 2]>,
+}
+
+/// Lengths that the rod between two connectors can have; null where there is no longest.
+#[derive(Debug, Serialize)]
+struct RodSize {
+    min_m: f64,
+    max_m: Option<f64>,
+}
+
+impl Arm {
+    /// Where it is at `values`.
+    pub(crate) fn at(&self, values: &[f64]) -> Placed {
+        let chain = &self.chain;
+        let frames = chain.forward(values);
+        let skeleton = chain.skeleton();
+        let Pose { rotation, origin_m } = frames.tip;
+        Placed {
+            robot: self.robot.clone(),
+            base_link: chain.base.clone(),
+            tip_link: chain.tip.clone(),
+            tip: origin_m,
+            rotation,
+            joints: chain.variables.iter().zip(values).map(|(v, &value)| joint(v, value)).collect(),
+            outside_limits: chain.outside_limits(values).into_iter().map(str::to_owned).collect(),
+            connectors: chain.connectors(&skeleton, &frames),
+            rods: skeleton.rods.iter().map(rod).collect(),
+        }
+    }
+}
+
+fn joint(variable: &Variable, value: f64) -> JointPlaced {
+    JointPlaced {
+        name: variable.name.clone(),
+        value,
+        unit: variable.motion.unit(),
+        limits: variable.limits.map(|limits| [limits.lower, limits.upper]),
+    }
+}
+
+fn rod(rod: &Rod) -> RodSize {
+    RodSize { min_m: rod.min_m, max_m: rod.max_m.is_finite().then_some(rod.max_m) }
+}
+
+impl Placed {
+    /// Words for people.
+    pub(crate) fn text(&self) -> String {
+        let joints: Vec<_> = self.joints.iter().map(|j| (j.name.clone(), joint_words(j))).collect();
+        let last = self.connectors.len() - 1;
+        let name = |i: usize| if i == last { "tip".into() } else { format!("connector {}", i + 1) };
+        let points = self.connectors.iter().enumerate().map(|(i, p)| (name(i), meters(p)));
+        let points: Vec<_> = points.collect();
+        format!(
+            "{} from {} to {}\n{}Connectors\n{}",
+            self.robot,
+            self.base_link,
+            self.tip_link,
+            aligned(&joints),
+            aligned(&points)
+        )
+    }
+}
+
+fn joint_words(joint: &JointPlaced) -> String {
+    let limits = match joint.limits {
+        Some([lower, upper]) => format!("{lower:.4} to {upper:.4}"),
+        None => "no limits".into(),
+    };
+    format!("{:>9.4} {:<3}  ({limits})", joint.value, joint.unit)
+}
+
+/// A position in aligned columns.
+pub(crate) fn meters(p: &Vector) -> String {
+    // Adding zero turns the -0 of rounding into 0.
+    let rounded = p.map(|x| (x * 1e6).round() / 1e6 + 0.0);
+    format!("{:>10.6} {:>10.6} {:>10.6} m", rounded[0], rounded[1], rounded[2])
+}
