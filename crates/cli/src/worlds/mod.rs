@@ -215,7 +215,7 @@ impl Compiled {
         match self {
             Self::Robots(scenario) => scenario.resolve(source),
             Self::Airspace(_) => Ok(airspace::Scenario::resolve(source)),
-            Self::Chain(_) => Ok(chain::Scenario::resolve(source)),
+            Self::Chain(scenario) => scenario.resolve(source),
         }
     }
 

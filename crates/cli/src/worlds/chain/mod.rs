@@ -1,11 +1,13 @@
 //! The world of chains as the command sees it.
 
 mod picture;
+mod resolve;
 
 use super::{Comparison, Pictured, Plan, Resolved, Run, Said};
 use crate::console::grouped;
 use crate::exit::Failure;
 use crate::report::Lines;
+use picture::Drawn;
 use serde_json::{Value, json};
 use sidestep::kernel::checkpoint::CheckpointError;
 use sidestep::kernel::cycle::PhaseTimes;
@@ -15,6 +17,7 @@ use sidestep::scenario::Source;
 use sidestep::worlds::chain::metrics::{ChainGivenUp, Metrics};
 use sidestep::worlds::chain::scenario::{AnyCompiled, Compiled};
 use sidestep::worlds::chain::simulation::ChainSimulation;
+use sidestep_draw::BodyScene;
 use std::path::Path;
 
 /// A compiled scenario of chains.
@@ -32,8 +35,12 @@ impl Scenario {
     }
 
     /// See [`super::Compiled::resolve`].
-    pub(super) fn resolve(source: &Source) -> Resolved {
-        Resolved { text: source.text.clone(), files: Vec::new() }
+    pub(super) fn resolve(&self, source: &Source) -> Result<Resolved, InputError> {
+        let said = match &self.compiled {
+            AnyCompiled::Plane(compiled) => (compiled.seed, compiled.cycles),
+            AnyCompiled::Space(compiled) => (compiled.seed, compiled.cycles),
+        };
+        resolve::resolve(source, said)
     }
 
     /// A run at its start.
@@ -58,7 +65,10 @@ impl<const D: usize> ChainRun<D> {
 
 delegates_simulation!([const D: usize] ChainRun<D>);
 
-impl<const D: usize> Run for ChainRun<D> {
+impl<const D: usize> Run for ChainRun<D>
+where
+    BodyScene<D>: Drawn,
+{
     fn agent(&self) -> &'static str {
         "connector"
     }
@@ -166,6 +176,19 @@ fn outcome(m: &Metrics) -> Lines {
         ),
         line("greatest speed", format!("{:.3} m/s", m.max_speed_m_s)),
     ];
+    if let Some(robots) = &m.robots {
+        let bumpers = match robots.bumper_events {
+            0 => "no bumper pressed".into(),
+            n => format!("bumpers pressed {} times", grouped(n)),
+        };
+        lines.push(line(
+            "robots",
+            format!(
+                "{bumpers}; behind their connectors by {:.2} m on average, {:.2} m at most",
+                robots.mean_lag_m, robots.max_lag_m
+            ),
+        ));
+    }
     if m.reformed > 0 {
         lines.push(line("re-formed", format!("{} times", grouped(m.reformed))));
     }

@@ -124,7 +124,10 @@ impl<const D: usize> Body<D> {
         let mut chain = spec.start.clone();
         let n = chain.points().len();
         let robots = if spec.robots.is_some() { n } else { 0 };
-        if record.robots.len() != robots || record.points_m.len() != n * D || record.driving.task as usize > spec.tasks.len() {
+        if record.robots.len() != robots
+            || record.points_m.len() != n * D
+            || record.driving.task as usize > spec.tasks.len()
+        {
             return Err(CheckpointError::Damaged);
         }
         for change in spec.changes.iter().filter(|change| change.cycle < cycle) {

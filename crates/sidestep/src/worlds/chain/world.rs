@@ -150,8 +150,10 @@ impl<const D: usize> ChainSpec<D> {
     pub(super) fn robots_at(&self, points: &[Point<D>], driving: &Driving) -> Vec<Robot> {
         let [x, y, _] = driving.ahead;
         let heading_rad = atan2(y, x);
-        let robot =
-            |p: &Point<D>| Robot { pose: Pose { at: plane_point(*p), heading_rad }, is_bumped: false };
+        let robot = |p: &Point<D>| Robot {
+            pose: Pose { at: plane_point(*p), heading_rad },
+            is_bumped: false,
+        };
         self.robots.iter().flat_map(|_| points.iter().map(robot)).collect()
     }
 

@@ -50,6 +50,7 @@ pub(super) struct ChainSection {
     points_m: Option<Spanned<Vec<Vec<f64>>>>,
     #[serde(default)]
     anywhere: bool,
+    within_m: Option<Spanned<[Vec<f64>; 2]>>,
     arm: Option<Spanned<ArmSection>>,
     robots: Option<Spanned<RobotsSection>>,
     rod_m: Option<Spanned<Length>>,
@@ -184,6 +185,14 @@ impl Compiler<'_> {
             return self.arm_shape(s, section, radius_m, at);
         }
         let rod = self.rod(s, radius_m, at.clone())?;
+        if let Some(within) = s.within_m.as_ref().filter(|_| !s.anywhere) {
+            let remedy = "leave it out, or set anywhere = true";
+            return Err(self.error(
+                Some(within.span()),
+                "within_m of a chain that has its place",
+                remedy,
+            ));
+        }
         let points = match s.anywhere {
             true => self.anywhere(s, &rod, radius_m, site, at.clone())?,
             false => self.points::<D>(s, rod.max_m, at.clone())?,
@@ -307,6 +316,7 @@ impl Compiler<'_> {
             clearance_m: ROOM * radius_m,
             rod_clearance_m: ROOM * rod.radius_m,
             ahead_m: rod.max_m,
+            within: s.within_m.as_ref().map(|within| self.within(within)).transpose()?,
         };
         let start = find(site, &obstacles, &wanted, Seed(self.file.seed))
             .map_err(|error| self.at(at, &error))?;

@@ -203,7 +203,8 @@ impl Compiler<'_> {
 
     /// The middle of the corridor, if the scenario has one.
     pub(super) fn corridor_line(&self, step_m: f64) -> Result<Option<Vec<Point<2>>>, InputError> {
-        let section = self.file.ground.as_ref().and_then(|ground| ground.get_ref().corridor.as_ref());
+        let section =
+            self.file.ground.as_ref().and_then(|ground| ground.get_ref().corridor.as_ref());
         let line = |given| self.corridor(given).map(|corridor| corridor.line(step_m));
         let line = section.map(line).transpose()?;
         Ok(line.map(|line| line.iter().map(|pose| pose.at).collect()))

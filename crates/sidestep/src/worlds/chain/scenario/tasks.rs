@@ -102,7 +102,8 @@ impl Compiler<'_> {
         })
     }
 
-    fn within<const D: usize>(
+    /// A box by two corners.
+    pub(super) fn within<const D: usize>(
         &self,
         given: &Spanned<[Vec<f64>; 2]>,
     ) -> Result<Bounds<D>, InputError> {

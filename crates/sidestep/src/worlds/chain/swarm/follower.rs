@@ -5,8 +5,8 @@
 //! walls: its connector's radius exceeds its own by a margin (pitfall 17).
 
 use super::drive::{Drive, Pose, Wheels};
-use super::proximity::{Gaps, Ring, safe_speed_m_s};
 use super::laser::Body;
+use super::proximity::{Gaps, Ring, safe_speed_m_s};
 use crate::worlds::chain::geometry::{Point, along, norm, sub};
 use crate::worlds::chain::obstacle::Obstacles;
 use sidestep_kernel::InputError;
@@ -110,7 +110,8 @@ impl Follower {
         let command = self.decide(pose, goal, &gaps, dt_s);
         let pose = self.drive.step(*pose, command.wheels, dt_s);
         let radius_m = self.ring.radius_m;
-        let to_robot = |b: Body| b.core.nearest_to_point(pose.at).distance_m - b.radius_m - radius_m;
+        let to_robot =
+            |b: Body| b.core.nearest_to_point(pose.at).distance_m - b.radius_m - radius_m;
         let apart_m = others.map(to_robot).fold(1.0, f64::min);
         let gap_m = obstacles.clearance_m([pose.at; 2], radius_m, 1.0).min(apart_m);
         Followed { pose, is_held: command.is_held, is_bumped: gap_m < BUMPER_M, gap_m }
