@@ -10,6 +10,7 @@
 //!                 interval.rs, search.rs        free directions: exact in the plane, searched in space
 //!                 sweep.rs, own_body.rs         nothing is passed through; the chain's own parts
 //! reach.rs: an arm with a fixed base
+//! escape.rs: out of the way of what moves       replan.rs: what a vetoed initiator tries next
 //! wavefront.rs: many motions at once            rebuild.rs: broken chains
 //! kinematics/: arms of joints, as chains        script/: a turtle language that drives an initiator
 //! ```
@@ -17,6 +18,7 @@
 mod candidates;
 #[expect(clippy::module_inception, reason = "the chain itself, of the world of chains")]
 pub mod chain;
+pub mod escape;
 pub mod geometry;
 pub mod interval;
 pub mod kinematics;
@@ -25,6 +27,7 @@ mod own_body;
 pub mod propagate;
 pub mod reach;
 pub mod rebuild;
+pub mod replan;
 pub mod rules;
 mod scene;
 #[cfg(test)]
@@ -36,8 +39,10 @@ pub mod veto;
 pub mod wavefront;
 
 pub use chain::{Chain, Connector, Mobility, Rod};
+pub use escape::{Escape, Escaped, Escaper};
 pub use obstacle::{Obstacle, Obstacles};
 pub use propagate::Propagator;
+pub use replan::{Climbed, Ladder, Rungs, Situation};
 pub use rules::{Rotation, Rules};
 pub use scene::{BEND_TOLERANCE_RAD, SKIN_M, TOLERANCE_M};
 pub use veto::{Mode, Motion, Moved, Outcome, Reason, Request, Source, Veto};
