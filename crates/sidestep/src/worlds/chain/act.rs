@@ -2,16 +2,18 @@
 
 use super::driver::{Driver, Task, in_space, out_of_space, towards, wander};
 use super::events::{Event, EventKind};
-use super::geometry::{Bounds, distance, sub, unit};
+use super::geometry::{Bounds, distance, first_axis, norm, sub, unit};
 use super::metrics::GivenUp;
-use super::reach;
+use super::obstacle::Obstacle;
+use super::replan::{Climbed, Ladder, Situation};
 use super::script::Motion as ScriptMotion;
 use super::state::Body;
 use super::swarm::drive::Pose;
 use super::swarm::leader::Decision;
-use super::veto::{Mode, Motion, Moved, Outcome, Reason, Request, Veto};
+use super::veto::{Mode, Motion, Moved, Reason, Request, Veto};
 use super::world::{ChainWorld, Scratch, purpose};
 use super::{geometry::Point, world::ChainSpec};
+use sidestep_kernel::distr::normal;
 use sidestep_kernel::{Cycle, Slot};
 
 /// What a driver wants in a cycle.
@@ -26,6 +28,16 @@ enum Wish<const D: usize> {
     /// Its task is done.
     Done,
 }
+
+/// Whether an initiator went where it wanted, or near it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Went {
+    Ahead,
+    Nowhere,
+}
+
+/// What moves so much further away than a chain looks may still come near.
+const MOVER_NEAR_M: f64 = 1.0;
 
 /// A chain in a cycle.
 #[derive(Debug, Clone, Copy)]
@@ -60,11 +72,28 @@ impl<const D: usize> ChainWorld<D> {
         if body.scattered.is_some() {
             self.come_together(body, turn, scratch);
         } else {
+            self.get_out_of_the_way(body, turn, scratch);
             self.drive(body, turn, scratch);
             self.keep_to_claim(body, turn, claim, scratch);
         }
         self.follow(body, turn, scratch);
         self.measure(body, turn, scratch);
+    }
+
+    /// Parts that something comes too near to move away, whoever leads.
+    fn get_out_of_the_way(&self, body: &mut Body<D>, turn: Turn<'_, D>, scratch: &mut Scratch<D>) {
+        let Some(escaper) = &mut scratch.escaper else { return };
+        let escaped = escaper.escape(
+            &mut body.chain,
+            &scratch.obstacles,
+            &mut scratch.propagator,
+            &scratch.before,
+        );
+        let escaped = escaped.expect("the rules were checked when the scenario was compiled");
+        body.tally.escapes.add(&escaped);
+        if escaped.moves > 0 {
+            scratch.events.push(turn.event(EventKind::Escape, 0, escaped.moves as f64));
+        }
     }
 
     /// What would leave the claim is taken back: nobody else counts on the chain there.
@@ -192,44 +221,129 @@ impl<const D: usize> ChainWorld<D> {
         scratch: &mut Scratch<D>,
     ) {
         let Driver::Navigate(navigator) = &task.driver else { return };
-        if self.go(body, (task, Self::place(pose.at)), turn, scratch) {
-            self.has_steered(body, task, navigator, pose.heading_rad);
-        } else {
-            self.turn_where_blocked(body, task, navigator, turn);
+        match self.go(body, (task, Self::place(pose.at)), turn, scratch) {
+            Went::Ahead => self.has_steered(body, task, navigator, pose.heading_rad),
+            Went::Nowhere => self.turn_where_blocked(body, task, navigator, turn),
         }
     }
 
-    /// Moves the initiator, or meets with a veto; whether it moved.
+    /// Moves the initiator, as it wants or as the ladder allows.
     fn go(
         &self,
         body: &mut Body<D>,
         (task, to): (&Task<D>, Point<D>),
         turn: Turn<'_, D>,
         scratch: &mut Scratch<D>,
-    ) -> bool {
+    ) -> Went {
         let at = body.chain.points()[task.agent];
         let motion = Motion::Connector { k: task.agent, to };
         let request = Request { motion, source: task.source(), mode: Mode::Exact };
-        let outcome =
-            reach::go(&mut scratch.propagator, &mut body.chain, &scratch.obstacles, &request);
-        let outcome = outcome.expect("targets are finite and near");
+        let situation = self.situation(body, task, scratch);
+        let mut ladder =
+            Ladder { rungs: self.rungs, memory: std::mem::take(&mut body.driving.ladder) };
+        let climbed = ladder.climb(
+            &mut body.chain,
+            &scratch.obstacles,
+            &mut scratch.propagator,
+            &request,
+            &situation,
+        );
+        body.driving.ladder = ladder.memory;
+        let climbed = climbed.expect("targets are finite and near");
+        let way = sub(body.chain.points()[task.agent], at);
         body.driving.way_m[0] += distance(at, to);
-        body.driving.way_m[1] += distance(at, body.chain.points()[task.agent]);
-        match outcome {
-            Outcome::Moved(moved) => {
-                self.moved(body, &moved, sub(to, at));
-                true
+        body.driving.way_m[1] += norm(way);
+        self.take_note(body, (task, &climbed, way), turn, scratch)
+    }
+
+    /// What an initiator knows beside its neighborhood.
+    fn situation(&self, body: &Body<D>, task: &Task<D>, scratch: &Scratch<D>) -> Situation {
+        let at = body.chain.points()[task.agent];
+        let is_near = |o: &Obstacle<D>| {
+            o.core.nearest_to_point(at).distance_m - o.radius_m < self.look_m + MOVER_NEAR_M
+        };
+        let goal_distance_m = match &task.driver {
+            Driver::Targets(targets) => {
+                targets.places.get(body.driving.next as usize).map(|place| distance(at, *place))
             }
-            Outcome::Vetoed(veto) => {
-                self.vetoed(body, turn, &veto, scratch);
-                self.lose_patience(body, (task, &veto), turn, scratch);
-                false
+            _ => None,
+        };
+        let (can_turn, keeps_heading) = match &task.driver {
+            Driver::Navigate(navigator) => (navigator.can_turn_on_the_spot(), true),
+            _ => (false, false),
+        };
+        let movers_near = scratch.obstacles.moving().iter().any(is_near);
+        Situation { goal_distance_m, movers_near, can_turn, keeps_heading }
+    }
+
+    /// Books what came of a motion; whether the initiator moved.
+    fn take_note(
+        &self,
+        body: &mut Body<D>,
+        (task, climbed, way): (&Task<D>, &Climbed<D>, Point<D>),
+        turn: Turn<'_, D>,
+        scratch: &mut Scratch<D>,
+    ) -> Went {
+        body.tally.rungs.count(climbed);
+        match climbed {
+            Climbed::Straight(moved) => {
+                body.driving.idle = 0;
+                self.moved(body, moved, way);
+                return Went::Ahead;
             }
+            Climbed::Shorter { moved, .. } => self.moved(body, moved, way),
+            Climbed::Sideways { moved, turn_rad, .. } => {
+                self.tell_once(
+                    body,
+                    turn.event(EventKind::Sideways, task.agent, *turn_rad),
+                    scratch,
+                );
+                self.moved(body, moved, way);
+            }
+            Climbed::PulledBack { by, moved } => {
+                self.tell_once(body, turn.event(EventKind::PulledBack, *by, 0.0), scratch);
+                self.moved(body, moved, [0.0; D]);
+            }
+            Climbed::TurnOnTheSpot { .. } | Climbed::Waiting { .. } => {}
+            Climbed::Stuck { vetoes } => {
+                self.tell_once(body, turn.event(EventKind::Stuck, task.agent, 0.0), scratch);
+                self.look_elsewhere(body, task, turn);
+                if let Some(veto) = vetoes.first() {
+                    self.vetoed(body, turn, veto, scratch);
+                    self.lose_patience(body, (task, veto), turn, scratch);
+                    return Went::Nowhere;
+                }
+            }
+            Climbed::Vetoed(veto) => {
+                self.vetoed(body, turn, veto, scratch);
+                self.lose_patience(body, (task, veto), turn, scratch);
+                return Went::Nowhere;
+            }
+        }
+        body.driving.idle = body.driving.idle.saturating_add(1);
+        if norm(way) > 0.0 && !matches!(climbed, Climbed::PulledBack { .. }) {
+            return Went::Ahead;
+        }
+        Went::Nowhere
+    }
+
+    /// Of what happens in cycles in a row only the first is an event.
+    fn tell_once(&self, body: &Body<D>, event: Event, scratch: &mut Scratch<D>) {
+        if body.driving.idle == 0 {
+            scratch.events.push(event);
+        }
+    }
+
+    /// Who wanders and is stuck goes on in any direction.
+    fn look_elsewhere(&self, body: &mut Body<D>, task: &Task<D>, turn: Turn<'_, D>) {
+        if matches!(task.driver, Driver::Wander(_)) {
+            let draws = &mut self.streams.draws(turn.slot, turn.now, purpose::TURN_AWAY);
+            let any: Point<D> = std::array::from_fn(|_| normal(draws));
+            body.driving.ahead = in_space(unit(any).unwrap_or(first_axis()));
         }
     }
 
     fn moved(&self, body: &mut Body<D>, moved: &Moved<D>, way: Point<D>) {
-        body.driving.idle = 0;
         if let Some(ahead) = unit(way) {
             body.driving.ahead = in_space(ahead);
         }

@@ -3,6 +3,7 @@
 
 use super::geometry::{Bounds, Point, along, distance, unit};
 use super::navigate::Navigator;
+use super::replan::Memory;
 use super::script::{Motion, Script, Turtle};
 use super::swarm::leader::LeaderState;
 use super::veto::Source;
@@ -92,6 +93,8 @@ pub struct Driving {
     pub ahead: [f64; 3],
     /// The nearest that it came to its present target.
     pub nearest_m: f64,
+    /// Where it is on the ladder after vetoes.
+    pub ladder: Memory,
     /// What it remembers as a navigator on wheels.
     pub leader: Option<LeaderState>,
     /// Way that it wanted to go, and way that it went, in all tasks.
@@ -110,6 +113,7 @@ impl Driving {
             start: [[0.0; 3]; 3],
             ahead: [0.0; 3],
             nearest_m: f64::INFINITY,
+            ladder: Memory::default(),
             leader: None,
             way_m: [0.0; 2],
         };
@@ -124,6 +128,7 @@ impl Driving {
         self.ahead = turtle.ahead;
         (self.cycles, self.idle, self.next, self.rested) = (0, 0, 0, 0);
         (self.nearest_m, self.leader) = (f64::INFINITY, None);
+        self.ladder = Memory::default();
     }
 
     /// Goes on to the next task, which `agent` carries out.

@@ -1,5 +1,7 @@
 //! What came of a run.
 
+use super::escape::Escaped;
+use super::replan::Climbed;
 use super::veto::Reason;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::EntityId;
@@ -41,6 +43,82 @@ pub struct Tally {
     pub layers: [u64; 6],
     /// What came of the robots on wheels.
     pub robots: RobotTally,
+    /// How initiators went on after vetoes.
+    pub rungs: RungTally,
+    /// How parts got out of the way.
+    pub escapes: EscapeTally,
+}
+
+/// How often each rung of the ladder ended a climb.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct RungTally {
+    /// Shorter steps.
+    pub shorter: u64,
+    /// Other headings.
+    pub sideways: u64,
+    /// Turns on the spot.
+    pub turned: u64,
+    /// Cycles waited.
+    pub waited: u64,
+    /// Cycles in which the other end led.
+    pub pulled_back: u64,
+    /// Ends of the ladder.
+    pub stuck: u64,
+}
+
+impl RungTally {
+    /// Counts a climb.
+    pub(super) fn count<const D: usize>(&mut self, climbed: &Climbed<D>) {
+        let rung = match climbed {
+            Climbed::Straight(_) | Climbed::Vetoed(_) => return,
+            Climbed::Shorter { .. } => &mut self.shorter,
+            Climbed::Sideways { .. } => &mut self.sideways,
+            Climbed::TurnOnTheSpot { .. } => &mut self.turned,
+            Climbed::Waiting { .. } => &mut self.waited,
+            Climbed::PulledBack { .. } => &mut self.pulled_back,
+            Climbed::Stuck { .. } => &mut self.stuck,
+        };
+        *rung += 1;
+    }
+
+    fn add(self, other: &Self) -> Self {
+        Self {
+            shorter: self.shorter + other.shorter,
+            sideways: self.sideways + other.sideways,
+            turned: self.turned + other.turned,
+            waited: self.waited + other.waited,
+            pulled_back: self.pulled_back + other.pulled_back,
+            stuck: self.stuck + other.stuck,
+        }
+    }
+}
+
+/// What getting out of the way came to.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct EscapeTally {
+    /// Parts that moved.
+    pub moves: u64,
+    /// Parts that could not,
+    pub vetoes: u64,
+    /// of these, because of their speed limit alone.
+    pub capped: u64,
+}
+
+impl EscapeTally {
+    /// Adds what a cycle came to.
+    pub(super) fn add<const D: usize>(&mut self, escaped: &Escaped<D>) {
+        self.moves += escaped.moves as u64;
+        self.vetoes += escaped.vetoes as u64;
+        self.capped += escaped.capped as u64;
+    }
+
+    fn joined(self, other: &Self) -> Self {
+        Self {
+            moves: self.moves + other.moves,
+            vetoes: self.vetoes + other.vetoes,
+            capped: self.capped + other.capped,
+        }
+    }
 }
 
 /// What came of robots that keep to connectors.
@@ -108,6 +186,8 @@ impl Default for Tally {
             reformed: 0,
             layers: [0; 6],
             robots: RobotTally::default(),
+            rungs: RungTally::default(),
+            escapes: EscapeTally::default(),
         }
     }
 }
@@ -161,6 +241,10 @@ pub struct Metrics {
     pub reformed: u64,
     /// What was given up, by chain.
     pub given_up: Vec<ChainGivenUp>,
+    /// How initiators went on after vetoes.
+    pub rungs: RungTally,
+    /// How parts got out of the way.
+    pub escapes: EscapeTally,
     /// What came of robots on wheels, where there are any.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub robots: Option<RobotMetrics>,
@@ -255,6 +339,8 @@ impl Metrics {
             done: sum(|t| t.done),
             reformed: sum(|t| t.reformed),
             given_up: given_up.collect(),
+            rungs: tallies.iter().fold(RungTally::default(), |all, t| all.add(&t.rungs)),
+            escapes: tallies.iter().fold(EscapeTally::default(), |all, t| all.joined(&t.escapes)),
             robots: RobotMetrics::of(
                 &tallies.iter().fold(RobotTally::default(), |all, t| all.add(&t.robots)),
             ),

@@ -16,7 +16,8 @@
 //! kinematics/: arms of joints, as chains        ik/: postures that reach a target
 //!
 //! scenario.rs -> world.rs (immutable), state.rs (bodies), driver.rs (tasks), simulation.rs
-//! act.rs: a chain's cycle: broken.rs, navigate.rs, formation.rs, measure.rs -> metrics.rs, rows.rs
+//! act.rs: a chain's cycle: escape.rs, replan.rs, broken.rs, navigate.rs, formation.rs,
+//!                         measure.rs -> metrics.rs, rows.rs
 //! ```
 
 mod act;
@@ -26,6 +27,7 @@ mod candidates;
 #[expect(clippy::module_inception, reason = "the chain itself, of the world of chains")]
 pub mod chain;
 pub mod driver;
+pub mod escape;
 pub mod events;
 pub mod formation;
 pub mod geometry;
@@ -43,6 +45,7 @@ mod own_body;
 pub mod propagate;
 pub mod reach;
 pub mod rebuild;
+pub mod replan;
 mod rows;
 pub mod rules;
 pub mod scenario;
@@ -60,8 +63,10 @@ pub mod wavefront;
 pub mod world;
 
 pub use chain::{Chain, Connector, Mobility, Rod};
+pub use escape::{Escape, Escaped, Escaper};
 pub use obstacle::{Obstacle, Obstacles};
 pub use propagate::Propagator;
+pub use replan::{Climbed, Ladder, Rungs, Situation};
 pub use rules::{Rotation, Rules};
 pub use scene::{BEND_TOLERANCE_RAD, SKIN_M, TOLERANCE_M};
 pub use veto::{Mode, Motion, Moved, Outcome, Reason, Request, Source, Veto};

@@ -8,7 +8,7 @@ use super::obstacle::Obstacles;
 use super::state::{Body, ChainState};
 use super::swarm::drive::{Drive, Pose};
 use super::swarm::laser::Body as Seen;
-use super::swarm::leader::{Decision, Leader, LeaderState, Surroundings};
+use super::swarm::leader::{Decision, Leader, LeaderState, Surroundings, Turning};
 use super::world::{ChainWorld, Scratch, purpose};
 use sidestep_kernel::math::{atan2, cos, sin};
 use sidestep_kernel::{Cycle, Slot};
@@ -40,6 +40,13 @@ pub enum Goal {
     },
     /// To the end of a line, such as the middle of a corridor, which it does not know of.
     EndOf(Vec<Point<2>>),
+}
+
+impl Navigator {
+    /// Whether it may turn without going.
+    pub(super) fn can_turn_on_the_spot(&self) -> bool {
+        self.leader.turning == Turning::OnTheSpotWhereBlocked
+    }
 }
 
 impl Goal {

@@ -7,9 +7,12 @@ mod navigators;
 mod obstacles;
 mod tasks;
 
-use super::geometry::Point;
+use super::escape::Escape;
+use super::geometry::{Point, norm};
+use super::ground::Movers;
+use super::replan::Rungs;
 use super::rules::{Rotation, Rules};
-use super::world::ChainWorld;
+use super::world::{ChainSpec, ChainWorld};
 use crate::scenario::{OneOrMany, Source};
 use chains::ChainSection;
 use obstacles::{FieldSection, GroundSection, ObstacleSection};
@@ -76,6 +79,21 @@ struct RulesSection {
     step_m: Option<Spanned<f64>>,
     backtracks: Option<usize>,
     look_m: Option<Spanned<f64>>,
+    escape: EscapeWord,
+    escape_speed_m_s: Option<Spanned<f64>>,
+}
+
+/// How chains get out of the way of what moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum EscapeWord {
+    /// Before they are touched.
+    #[default]
+    LookAhead,
+    /// When they are touched.
+    Touch,
+    /// Not at all.
+    Off,
 }
 
 /// What a run keeps.
@@ -191,8 +209,11 @@ impl Compiler<'_> {
         let ground = self.ground(site.as_ref(), &chains)?;
         let radius_m = chains.iter().flat_map(|spec| spec.start.connectors()).map(|c| c.radius_m);
         let look_m = 4.0 * radius_m.fold(0.05, f64::max);
+        let escape = self.escape(&chains, &ground.movers, dt_s)?;
         let world = ChainWorld {
             chains,
+            escape,
+            rungs: Rungs::default(),
             obstacles: ground.obstacles,
             movers: ground.movers,
             dt_s,
@@ -217,6 +238,29 @@ impl Compiler<'_> {
     /// Whether the scripts come to motions, so that they cannot fail while a run goes on.
     fn try_out<const D: usize>(&self, compiled: &Compiled<D>) -> Result<(), InputError> {
         super::state::ChainState::new(&compiled.world).map(drop)
+    }
+
+    /// How chains escape; not at all where nothing moves. Unless it is said, they may do so twice
+    /// as fast as they are led, or as the fastest that moves.
+    fn escape<const D: usize>(
+        &self,
+        chains: &[ChainSpec<D>],
+        movers: &Movers<D>,
+        dt_s: f64,
+    ) -> Result<Option<Escape>, InputError> {
+        let section = &self.file.chain;
+        if section.escape == EscapeWord::Off || movers.is_empty() {
+            return Ok(None);
+        }
+        let led = chains.iter().flat_map(|spec| &spec.tasks).map(|task| task.speed_m_s);
+        let fastest = movers.at(0.0).map(|mover| norm(mover.velocity_m_s)).fold(0.0, f64::max);
+        let usual_m_s = 2.0 * led.fold(fastest, f64::max);
+        let given = section.escape_speed_m_s.as_ref();
+        let speed_max_m_s = self.positive(given, "escape_speed_m_s", usual_m_s)?;
+        let look_ahead = section.escape == EscapeWord::LookAhead;
+        let usual = Escape::new(dt_s, speed_max_m_s);
+        let ticks_ahead = if look_ahead { usual.ticks_ahead } else { 0.0 };
+        Ok(Some(Escape { ticks_ahead, ..usual }))
     }
 
     fn rules(&self) -> Result<Rules, InputError> {

@@ -4,6 +4,7 @@ use super::act::Turn;
 use super::arm::Arm;
 use super::chain::{Chain, Mobility};
 use super::driver::{Driver, Driving, Task};
+use super::escape::{Escape, Escaper};
 use super::events::Event;
 use super::formation::Robot;
 use super::geometry::{Bounds, Point};
@@ -12,6 +13,7 @@ use super::navigate::plane_point;
 use super::obstacle::{Obstacle, Obstacles};
 use super::propagate::Propagator;
 use super::rebuild::MayCome;
+use super::replan::Rungs;
 use super::rules::Rules;
 use super::script::Motion;
 use super::state::{Body, ChainState};
@@ -36,6 +38,8 @@ pub mod purpose {
     pub const WANDER: Purpose = Purpose(2);
     /// Where the parts of a broken chain lie.
     pub const SCATTER: Purpose = Purpose(3);
+    /// Where a wandering initiator goes that is stuck.
+    pub const TURN_AWAY: Purpose = Purpose(5);
     /// Errors of a laser.
     pub const LASER: Purpose = Purpose(4);
 }
@@ -56,6 +60,10 @@ pub struct ChainWorld<const D: usize> {
     pub dt_s: f64,
     /// How chains react.
     pub rules: Rules,
+    /// How they get out of the way of what moves, if they do.
+    pub escape: Option<Escape>,
+    /// How long initiators try on each rung of the ladder after a veto.
+    pub rungs: Rungs,
     /// How far around its parts a chain looks for its least distance from obstacles.
     pub look_m: f64,
     pub(super) streams: Streams,
@@ -181,7 +189,8 @@ impl<const D: usize> ChainWorld<D> {
         let chain = &body.chain;
         let radius_m = chain.connectors().iter().map(|c| c.radius_m).fold(0.0, f64::max);
         let longest_m = chain.rods().iter().map(|r| r.max_m).fold(0.0, f64::max);
-        let speed_m_s = spec.tasks.iter().map(|t| t.speed_m_s).fold(0.0, f64::max);
+        let escape_m_s = self.escape.map_or(0.0, |escape| escape.speed_max_m_s);
+        let speed_m_s = spec.tasks.iter().map(|t| t.speed_m_s).fold(escape_m_s, f64::max);
         let way_m = 2.0 * (longest_m + speed_m_s * self.dt_s);
         Bounds::of(chain.points()).grown(radius_m + way_m)
     }
@@ -230,6 +239,7 @@ fn way_part([wanted_m, gone_m]: [f64; 2]) -> f64 {
 #[derive(Debug, Clone)]
 pub struct Scratch<const D: usize> {
     pub(super) propagator: Propagator<D>,
+    pub(super) escaper: Option<Escaper<D>>,
     /// The world's obstacles, with those that move where they are at the begin of `moment`, and
     /// the parts of other chains.
     pub(super) obstacles: Obstacles<D>,
@@ -300,6 +310,7 @@ impl<const D: usize> World for ChainWorld<D> {
     fn scratch(&self) -> Scratch<D> {
         Scratch {
             propagator: Propagator::new(self.rules),
+            escaper: self.escape.map(Escaper::new),
             obstacles: self.obstacles.clone(),
             solid: self.obstacles.clone(),
             moment: None,

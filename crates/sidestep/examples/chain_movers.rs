@@ -1,0 +1,293 @@
+//! Sixteen robots in a chain on open ground, among discs that move.
+//!
+//! `cargo run --release -p sidestep --example chain_movers [-- RUNS]` prints, for numbers and
+//! speeds of discs, for reactions and for limits of the robots' speed, how often a part of the
+//! chain is more than 1 mm in a disc after it has reacted.
+
+use sidestep::kernel::stream::{Purpose, Streams};
+use sidestep::kernel::{InputError, Seed, math};
+use sidestep::worlds::chain::geometry::{
+    Bounds, Point, along, distance, dot, norm, scaled, sub, unit,
+};
+use sidestep::worlds::chain::{
+    Chain, Connector, Escape, Escaper, Obstacle, Obstacles, Outcome, Propagator, Request, Rod,
+    Rules,
+};
+use std::f64::consts::TAU;
+
+const DT_S: f64 = 0.02;
+const TICKS: usize = 4000;
+const ROBOTS: usize = 16;
+const LEADER_M_S: f64 = 0.5;
+/// The discs stay in a square of 20 m.
+const HALF_M: f64 = 10.0;
+/// Discs that keep apart leave so much between them that a robot fits through.
+const APART_M: f64 = 0.7;
+const PENETRATION_M: f64 = 1e-3;
+
+/// Numbers in [0, 1), by (seed, index).
+struct Numbers {
+    streams: Streams,
+    next: u64,
+}
+
+impl Numbers {
+    fn within(&mut self, low: f64, high: f64) -> f64 {
+        self.next += 1;
+        let word = self.streams.block(0, self.next, Purpose(1), 0)[0];
+        low + (high - low) * f64::from(word) / 4_294_967_296.0
+    }
+
+    fn direction(&mut self) -> Point<2> {
+        toward(self.within(0.0, TAU))
+    }
+}
+
+fn toward(heading_rad: f64) -> Point<2> {
+    [math::cos(heading_rad), math::sin(heading_rad)]
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Reaction {
+    None,
+    /// With so many ticks of look-ahead.
+    Escape(f64),
+}
+
+/// One cell of the table.
+#[derive(Debug, Clone, Copy)]
+struct Cell {
+    discs: u32,
+    disc_m_s: f64,
+    leader_moves: bool,
+    /// Whether the discs turn back from each other; otherwise they pass through each other.
+    keep_apart: bool,
+    reaction: Reaction,
+    limit_m_s: f64,
+}
+
+/// What a cell's runs came to.
+#[derive(Debug, Clone, Copy, Default)]
+struct Tally {
+    ticks: usize,
+    /// Ticks in which a robot, or a rod or a robot, was in a disc.
+    robots_in: usize,
+    parts_in: usize,
+    deepest_m: f64,
+    steps: usize,
+    vetoes: usize,
+    capped: usize,
+    fastest_m_s: f64,
+}
+
+fn chain() -> Result<Chain<2>, InputError> {
+    let rod = Rod { min_m: 0.6, max_m: 0.8, radius_m: 0.05 };
+    let half_m = 0.5 * rod.max_m * (ROBOTS - 1) as f64;
+    Chain::straight([half_m, 0.0], [-1.0, 0.0], ROBOTS - 1, rod, Connector::free(0.25))
+}
+
+/// Discs anywhere but on the chain.
+fn discs(cell: &Cell, chain: &Chain<2>, numbers: &mut Numbers) -> Vec<Obstacle<2>> {
+    let mut disc = |id: u32| loop {
+        let center = [0; 2].map(|_| numbers.within(-HALF_M, HALF_M));
+        let radius_m = numbers.within(0.2, 0.5);
+        let velocity_m_s = scaled(numbers.direction(), cell.disc_m_s);
+        let is_free = chain.points().iter().all(|p| distance(*p, center) > radius_m + 0.75);
+        if is_free {
+            return Obstacle { velocity_m_s, ..Obstacle::ball(id, center, radius_m) };
+        }
+    };
+    (0..cell.discs).map(&mut disc).collect()
+}
+
+/// Turns back the discs that leave the square.
+fn reflect(obstacles: &mut Obstacles<2>) {
+    for disc in obstacles.moving_mut() {
+        let at = center(disc);
+        for (i, middle_m) in at.into_iter().enumerate() {
+            if middle_m.abs() > HALF_M && middle_m * disc.velocity_m_s[i] > 0.0 {
+                disc.velocity_m_s[i] = -disc.velocity_m_s[i];
+            }
+        }
+    }
+}
+
+/// Turns two discs that come nearer to each other than [`APART_M`] away from each other.
+fn keep_apart(obstacles: &mut Obstacles<2>) {
+    let discs = obstacles.moving_mut();
+    for a in 0..discs.len() {
+        for b in a + 1..discs.len() {
+            let (from, to) = (center(&discs[a]), center(&discs[b]));
+            let apart_m = distance(from, to) - discs[a].radius_m - discs[b].radius_m;
+            let Some(u) = unit(sub(to, from)) else { continue };
+            let (va, vb) = (dot(discs[a].velocity_m_s, u), dot(discs[b].velocity_m_s, u));
+            if apart_m < APART_M && va > vb {
+                // Each keeps its speed: what leads it towards the other is turned round.
+                if va > 0.0 {
+                    discs[a].velocity_m_s = along(discs[a].velocity_m_s, u, -2.0 * va);
+                }
+                if vb < 0.0 {
+                    discs[b].velocity_m_s = along(discs[b].velocity_m_s, u, -2.0 * vb);
+                }
+            }
+        }
+    }
+}
+
+fn center(disc: &Obstacle<2>) -> Point<2> {
+    let Bounds { lo, hi } = disc.bounds();
+    [0.5 * (lo[0] + hi[0]), 0.5 * (lo[1] + hi[1])]
+}
+
+/// A leader that wanders and stays in the square.
+struct Leader {
+    heading_rad: f64,
+}
+
+impl Leader {
+    fn target(&mut self, from: Point<2>, numbers: &mut Numbers) -> Point<2> {
+        self.heading_rad += numbers.within(-0.1, 0.1);
+        if from.iter().any(|x| x.abs() > HALF_M - 1.0) {
+            let home_rad = math::atan2(-from[1], -from[0]);
+            self.heading_rad += 0.05 * math::wrap_angle(home_rad - self.heading_rad);
+        }
+        along(from, toward(self.heading_rad), LEADER_M_S * DT_S)
+    }
+
+    fn turn(&mut self, numbers: &mut Numbers) {
+        self.heading_rad += numbers.within(-1.5, 1.5);
+    }
+}
+
+fn run(cell: &Cell, seed: u64, tally: &mut Tally) -> Result<(), InputError> {
+    let mut numbers = Numbers { streams: Streams::new(Seed(seed)), next: 0 };
+    let mut chain = chain()?;
+    let mut obstacles = Obstacles::new(discs(cell, &chain, &mut numbers), 1.0)?;
+    let slave_step_max_m = cell.limit_m_s * DT_S;
+    let mut propagator = Propagator::new(Rules { slave_step_max_m, ..Rules::default() });
+    let ticks_ahead = match cell.reaction {
+        Reaction::None => 0.0,
+        Reaction::Escape(ticks) => ticks,
+    };
+    let mut escaper = Escaper::new(Escape { ticks_ahead, ..Escape::new(DT_S, cell.limit_m_s) });
+    let mut leader = Leader { heading_rad: 0.0 };
+    for _ in 0..TICKS {
+        let start = chain.points().to_vec();
+        if cell.leader_moves {
+            let to = leader.target(start[0], &mut numbers);
+            let came = propagator.propagate(&mut chain, &obstacles, &Request::exact(0, to))?;
+            tally.steps += 1;
+            if let Outcome::Vetoed(_) = came {
+                tally.vetoes += 1;
+                leader.turn(&mut numbers);
+            }
+        }
+        obstacles.advance(DT_S);
+        reflect(&mut obstacles);
+        if cell.keep_apart {
+            keep_apart(&mut obstacles);
+        }
+        if cell.reaction != Reaction::None {
+            let escaped = escaper.escape(&mut chain, &obstacles, &mut propagator, &start)?;
+            tally.capped += escaped.capped;
+        }
+        measure(&chain, &obstacles, &start, tally);
+    }
+    Ok(())
+}
+
+fn measure(chain: &Chain<2>, obstacles: &Obstacles<2>, start: &[Point<2>], tally: &mut Tally) {
+    let points = chain.points();
+    let clear_m = |body, radius_m| obstacles.clearance_m(body, radius_m, 0.5);
+    let robot_m = points
+        .iter()
+        .zip(chain.connectors())
+        .map(|(p, c)| clear_m([*p; 2], c.radius_m))
+        .fold(1.0, f64::min);
+    let rod_m = points
+        .windows(2)
+        .zip(chain.rods())
+        .map(|(ends, rod)| clear_m([ends[0], ends[1]], rod.radius_m))
+        .fold(1.0, f64::min);
+    tally.ticks += 1;
+    tally.robots_in += usize::from(robot_m < -PENETRATION_M);
+    tally.parts_in += usize::from(robot_m.min(rod_m) < -PENETRATION_M);
+    tally.deepest_m = tally.deepest_m.max(-robot_m.min(rod_m));
+    let ways_m = start.iter().zip(points).map(|(s, p)| norm([p[0] - s[0], p[1] - s[1]]));
+    tally.fastest_m_s = ways_m.fold(tally.fastest_m_s, |most, way_m| most.max(way_m / DT_S));
+}
+
+fn percent(part: usize, of: usize) -> f64 {
+    100.0 * part as f64 / of.max(1) as f64
+}
+
+/// Runs a cell and prints its row.
+fn row(cell: &Cell, runs: u64) -> Result<(), InputError> {
+    let mut tally = Tally::default();
+    for seed in 1..=runs {
+        run(cell, seed, &mut tally)?;
+    }
+    println!(
+        "{:>2} {:>5.3} {:<5} {:<10} {:>5.2} | {:>7.3} {:>7.3} {:>6.1} {:>7.3} {:>6.2} {:>6}",
+        cell.discs,
+        cell.disc_m_s,
+        if cell.leader_moves { "moves" } else { "rests" },
+        match cell.reaction {
+            Reaction::None => "none".to_string(),
+            Reaction::Escape(ticks) => format!("ahead {ticks}"),
+        },
+        cell.limit_m_s,
+        percent(tally.parts_in, tally.ticks),
+        percent(tally.robots_in, tally.ticks),
+        1e3 * tally.deepest_m,
+        percent(tally.vetoes, tally.steps),
+        tally.fastest_m_s,
+        tally.capped,
+    );
+    Ok(())
+}
+
+fn main() -> Result<(), InputError> {
+    let runs = std::env::args().nth(1).and_then(|n| n.parse().ok()).unwrap_or(6);
+    for keep_apart in [false, true] {
+        println!(
+            "\nDiscs {}. {runs} runs of {} s a row.",
+            if keep_apart { "turn back 0.7 m before another" } else { "pass through each other" },
+            TICKS as f64 * DT_S
+        );
+        println!("discs m/s, leader, reaction, limit m/s | % of ticks in a disc, robots alone,");
+        println!("    deepest mm, leader's vetoes %, fastest m/s, times held back by the limit");
+        for (discs, times, leader_moves) in cells() {
+            let disc_m_s = times * LEADER_M_S;
+            for (reaction, limit_m_s) in reactions(disc_m_s) {
+                let cell = Cell { discs, disc_m_s, leader_moves, keep_apart, reaction, limit_m_s };
+                row(&cell, runs)?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Number of discs, their speed as a multiple of the leader's, whether the leader moves.
+fn cells() -> impl Iterator<Item = (u32, f64, bool)> {
+    [8, 16].into_iter().flat_map(|discs| {
+        [0.25, 0.5, 1.0, 2.0, 4.0]
+            .into_iter()
+            .flat_map(move |times| [true, false].map(|moves| (discs, times, moves)))
+    })
+}
+
+/// Reactions and limits of the robots' speed, the tightest last.
+fn reactions(disc_m_s: f64) -> Vec<(Reaction, f64)> {
+    let limits_m_s = [3.0, 2.0, 1.5].map(|times| f64::max(1.0, times * disc_m_s));
+    let mut all = vec![
+        (Reaction::None, f64::INFINITY),
+        (Reaction::Escape(0.0), f64::INFINITY),
+        (Reaction::Escape(2.0), f64::INFINITY),
+        (Reaction::Escape(2.0), limits_m_s[0]),
+    ];
+    all.extend(limits_m_s.map(|limit_m_s| (Reaction::Escape(20.0), limit_m_s)));
+    all.push((Reaction::Escape(20.0), 1.0));
+    all.dedup();
+    all
+}
