@@ -33,11 +33,22 @@ impl<const D: usize> Sweep<D> {
     /// `keep_m`, the distance that it must keep at rest.
     pub fn is_clear(&self, core: &Core<D>, keep_m: f64) -> bool {
         let way_m = self.longest_way_m();
-        let kept_m = if D == 2 { 0.0 } else { PART_KEPT * keep_m };
-        // No point of the rod can have been nearer than where it ends, less its way.
-        if core.is_clear_of_segment(self.to, way_m + kept_m + TOUCH_M) {
-            return true;
-        }
+        core.is_clear_of_segment(self.to, Self::sure_m(way_m, keep_m))
+            || self.is_clear_on_the_way(core, keep_m, way_m)
+    }
+
+    /// A rod whose points go at most `way_m`, and end this far from a core or further, is clear of
+    /// it: no point can have been nearer than where it ends, less its way.
+    pub(super) fn sure_m(way_m: f64, keep_m: f64) -> f64 {
+        way_m + Self::kept_m(keep_m) + TOUCH_M
+    }
+
+    fn kept_m(keep_m: f64) -> f64 {
+        if D == 2 { 0.0 } else { PART_KEPT * keep_m }
+    }
+
+    /// The same without the look at where it ends.
+    pub(super) fn is_clear_on_the_way(&self, core: &Core<D>, keep_m: f64, way_m: f64) -> bool {
         match core {
             Core::Point(c) if D == 2 => !self.is_crossed_by(*c),
             Core::Segment([a, b]) if D == 2 => {
@@ -46,7 +57,7 @@ impl<const D: usize> Sweep<D> {
             Core::Cuboid(cuboid) if D == 2 => {
                 cuboid.edges_2d().iter().all(|e| !self.crosses(*e) && !self.is_crossed_by(e[0]))
             }
-            _ => self.stays_away(core, kept_m, way_m),
+            _ => self.stays_away(core, Self::kept_m(keep_m), way_m),
         }
     }
 
