@@ -206,7 +206,8 @@ impl<'a, const D: usize> Scene<'a, D> {
         if !step.bends_at(s) {
             return Err(Refusal::of(Reason::BendLimit));
         }
-        if distance(step.so, s) > self.rules.slave_step_max_m {
+        let longest_m = self.rules.slave_step_max_m;
+        if longest_m < f64::INFINITY && distance(step.so, s) > longest_m {
             return Err(Refusal::of(Reason::StepLimit));
         }
         let reach_m = step.rod.radius_m.max(step.tip_radius_m);

@@ -5,9 +5,7 @@
 //! the rod. In space a rod may go round anything, so what counts is how near it comes: at no time
 //! nearer to the core than half of what it must keep at rest.
 
-use super::geometry::{
-    Core, Point, along, between, cross_2d, cross_each_other, distance, dot, sub,
-};
+use super::geometry::{Core, Point, along, between, cross_2d, cross_each_other, dot, sub};
 
 /// A rod on its way: master and slave, before and after.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,7 +24,11 @@ const MAX_ADVANCES: usize = 64;
 impl<const D: usize> Sweep<D> {
     /// The longest way of any point of the rod.
     pub fn longest_way_m(&self) -> f64 {
-        distance(self.from[0], self.to[0]).max(distance(self.from[1], self.to[1]))
+        let way2 = |end: usize| {
+            let way = sub(self.to[end], self.from[end]);
+            dot(way, way)
+        };
+        way2(0).max(way2(1)).sqrt()
     }
 
     /// Whether the rod passes no core point on its way, resp. stays half as far away in space as
