@@ -9,9 +9,9 @@
 //! propagate.rs -> candidates.rs -> scene.rs     one motion: sweeps, a slave's choices, their judge
 //!                 interval.rs, search.rs        free directions: exact in the plane, searched in space
 //!                 sweep.rs, own_body.rs         nothing is passed through; the chain's own parts
-//! reach.rs: an arm with a fixed base
-//! open.rs: nothing in the way                   wavefront.rs: many motions at once, then
-//! rebuild.rs: broken chains
+//!                 open.rs                       the same where nothing is in the way
+//! wavefront.rs: many motions at once            passage.rs: who passed through what, between states
+//! reach.rs: an arm with a fixed base            rebuild.rs: broken chains
 //! kinematics/: arms of joints, as chains        script/: a turtle language that drives an initiator
 //! ```
 
@@ -25,6 +25,7 @@ pub mod kinematics;
 pub mod obstacle;
 mod open;
 mod own_body;
+pub mod passage;
 pub mod propagate;
 pub mod reach;
 pub mod rebuild;

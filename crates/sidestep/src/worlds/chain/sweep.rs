@@ -3,7 +3,8 @@
 //! Both ends go straight from their old to their new place. In the plane the test is exact: the
 //! rod passes a core only where its moving end crosses it, or where an end of the core crosses
 //! the rod. In space a rod may go round anything, so what counts is how near it comes: at no time
-//! nearer to the core than half of what it must keep at rest.
+//! nearer to the core than half of what it must keep at rest. What that guarantees, and what not,
+//! is in [`super::passage`].
 
 use super::geometry::{Core, Point, along, between, cross_2d, cross_each_other, dot, sub};
 
