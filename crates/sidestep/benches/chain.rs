@@ -249,13 +249,12 @@ fn pull(width_m: f64, followers: usize, rod: Rod, look_at_every_step: bool) -> P
     let line = corridor_line(0.01);
     let is_ahead = |at: &Point<2>| at[0] > LEAD_M || at[1] != 0.0;
     let (mut steps, mut turns, mut vetoes) = (0, 0, 0);
-    let (mut longest_slave_steps, mut least_m, mut busy_s) = (0.0f64, 1.0f64, 0.0);
+    let (mut longest_slave_steps, mut least_m) = (0.0f64, 1.0f64);
+    let started = ProcessTime::now();
     for (at, _) in line[..line.len() - 100].iter().filter(|(at, _)| is_ahead(at)) {
         let way_m = norm(sub(*at, chain.points()[0]));
-        let started = ProcessTime::now();
-        let outcome =
-            propagator.propagate(&mut chain, &obstacles, &Request::exact(0, *at)).expect("right");
-        busy_s += started.elapsed().as_secs_f64();
+        let request = Request::exact(0, *at);
+        let outcome = propagator.propagate(&mut chain, &obstacles, &request).expect("right");
         steps += 1;
         match outcome {
             Outcome::Moved(moved) => {
@@ -269,7 +268,7 @@ fn pull(width_m: f64, followers: usize, rod: Rod, look_at_every_step: bool) -> P
         }
     }
     Pulled {
-        us_per_step: 1e6 * busy_s / f64::from(steps),
+        us_per_step: 1e6 * started.elapsed().as_secs_f64() / f64::from(steps),
         turns_per_step: turns as f64 / f64::from(steps),
         vetoes,
         longest_slave_steps,

@@ -8,7 +8,7 @@ use super::geometry::{
 use super::interval::{self, Arc, Reach, Side, beyond_bend, block_rod, block_tip, least_turn_rad};
 use super::obstacle::around;
 use super::rules::Rotation;
-use super::scene::{Block, Refusal, SKIN_M, Scene, Step, fits};
+use super::scene::{Block, Name, Refusal, SKIN_M, Scene, Step, fits};
 use super::search::{Search, away, cosine_of_half_angle};
 use super::veto::Reason;
 use std::f64::consts::PI;
@@ -153,14 +153,15 @@ impl<const D: usize> Scene<'_, D> {
         let hit = work
             .blocks
             .iter()
-            .map(|b| (b.core.nearest_to_segment(rod), b.radius_m + step.rod.radius_m))
-            .filter(|(nearest, radius_m)| nearest.distance_m < *radius_m)
-            .min_by(|(a, _), (b, _)| {
-                distance(a.on_body, step.mn).total_cmp(&distance(b.on_body, step.mn))
+            .map(|b| (b.core.nearest_to_segment(rod), b.radius_m + step.rod.radius_m, b.name))
+            .filter(|(nearest, radius_m, _)| nearest.distance_m < *radius_m)
+            .min_by(|(a, _, a_name), (b, _, b_name)| {
+                let (a_m, b_m) = (distance(a.on_body, step.mn), distance(b.on_body, step.mn));
+                a_m.total_cmp(&b_m).then(a_name.cmp(b_name))
             });
         let length_m = distance(step.mn, guided);
         let at = hit
-            .and_then(|(nearest, radius_m)| {
+            .and_then(|(nearest, radius_m, _)| {
                 let to = sub(nearest.on_core, step.mn);
                 let cosine = cosine_of_half_angle(norm(to), radius_m, length_m, false)?;
                 let u = away(guide_line(step), unit(to)?, cosine);
@@ -199,6 +200,7 @@ impl<const D: usize> Scene<'_, D> {
         if !work.found.is_empty() {
             return Ok(());
         }
+        let inside = inside.map(|name| Refusal::by(Reason::Inside, name));
         Err(why.or(inside).unwrap_or(refusal))
     }
 
@@ -209,7 +211,7 @@ impl<const D: usize> Scene<'_, D> {
         length_m: f64,
         work: &mut Work<D>,
         why: &mut Option<Refusal>,
-    ) -> Option<Refusal> {
+    ) -> Option<Name> {
         let u0 = guide_line(step);
         let Work { blocks, arcs, found, has_other_side, .. } = work;
         let look_on = work.all_lengths || work.both_sides;
@@ -241,13 +243,9 @@ impl<const D: usize> Scene<'_, D> {
             return arcs.inside;
         }
         // A master inside something cannot turn out of it.
-        let mut inside = None;
-        blocks.sort_by_key(|b| !contains_master(step, b));
-        let n_inside = blocks.partition_point(|b| contains_master(step, b));
-        if let Some(block) = blocks[..n_inside].first() {
-            inside = Some(Refusal::by(Reason::Inside, block.name));
-        }
-        let search = Search { step, length_m, blocks: &blocks[n_inside..] };
+        let inside = blocks.iter().filter(|b| contains_master(step, b)).map(|b| b.name).min();
+        blocks.retain(|b| !contains_master(step, b));
+        let search = Search { step, length_m, blocks };
         let turned = search.turn_away(u0);
         if !turned.is_some_and(&mut add) {
             let is_good = |u| self.judge_place(step, along(step.mn, u, length_m)).is_ok();
@@ -258,16 +256,17 @@ impl<const D: usize> Scene<'_, D> {
         inside
     }
 
-    /// All that a rod of a length may meet on any side, in a fixed order.
+    /// All that a rod of a length may meet on any side. The order is that of the grid or the tree,
+    /// and must not matter: ties go to the lower name.
     fn collect(&self, step: &Step<D>, length_m: f64, work: &mut Work<D>) {
         let reach_m = length_m + step.rod.radius_m.max(step.tip_radius_m) + 2.0 * SKIN_M;
         work.blocks.clear();
         let rod = step.master.min(step.slave);
         self.visit_blocks(&around(step.mn, reach_m), (Some(rod), step.slave), |block| {
-            work.blocks.push(*block);
+            if !block.core.is_clear_of_point(step.mn, reach_m + block.radius_m) {
+                work.blocks.push(*block);
+            }
         });
-        // Ties go to the lower name, wherever the grid or the tree found it first.
-        work.blocks.sort_by_key(|b| b.name);
     }
 }
 
@@ -291,7 +290,7 @@ struct Arcs {
     /// Of which blocks the arcs are there.
     known: Vec<bool>,
     /// What the master is inside of.
-    inside: Option<Refusal>,
+    inside: Option<Name>,
 }
 
 /// A plane rod of one length that looks for a free direction near `u0`.
@@ -349,7 +348,7 @@ impl<const D: usize> Plane<'_, D> {
         // Within the skin of a surface the master blocks the half-plane behind it.
         let skinned_m = if apart_m >= rod_m { (rod_m + SKIN_M).min(apart_m) } else { rod_m };
         if block.stops_rod && !block_rod(&reach, &core, skinned_m, &mut known.arcs) {
-            known.inside = known.inside.or(Some(Refusal::by(Reason::Inside, block.name)));
+            known.inside = Some(known.inside.map_or(block.name, |name| name.min(block.name)));
         }
         if block.stops_tip && (!block.stops_rod || step.tip_radius_m > step.rod.radius_m) {
             let tip_m = block.radius_m + step.tip_radius_m + SKIN_M;

@@ -65,7 +65,7 @@ impl<const D: usize> Mobility<D> {
 
     /// Whether `p` is allowed, to 1e-9 m.
     pub fn allows(&self, p: Point<D>, at: Point<D>) -> bool {
-        distance(self.project(p, at), p) <= LENGTH_TOLERANCE_M
+        matches!(self, Self::Free) || distance(self.project(p, at), p) <= LENGTH_TOLERANCE_M
     }
 }
 

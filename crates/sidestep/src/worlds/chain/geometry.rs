@@ -314,12 +314,19 @@ impl<const D: usize> Core<D> {
     /// the distance gives, sooner in the usual case.
     #[inline]
     pub fn is_clear_of_segment(&self, [p, q]: [Point<D>; 2], reach_m: f64) -> bool {
+        if reach_m <= 0.0 {
+            return true;
+        }
         match self {
-            Self::Point(c) => {
-                let r = sub(*c, nearest_on_segment(*c, p, q));
-                reach_m <= 0.0 || dot(r, r) >= reach_m * reach_m
+            Self::Point(c) => is_far_from_segment(*c, [p, q], reach_m),
+            Self::Segment([a, b]) if D == 2 => {
+                is_beside(*a, *b, p, q, reach_m)
+                    || is_far_from_segment(*a, [p, q], reach_m)
+                        && is_far_from_segment(*b, [p, q], reach_m)
+                        && is_far_from_segment(p, [*a, *b], reach_m)
+                        && is_far_from_segment(q, [*a, *b], reach_m)
+                        && !cross_each_other([p, q], [*a, *b])
             }
-            Self::Segment([a, b]) if D == 2 && is_beside(*a, *b, p, q, reach_m) => true,
             _ => self.nearest_to_segment([p, q]).distance_m >= reach_m,
         }
     }
@@ -327,12 +334,17 @@ impl<const D: usize> Core<D> {
     /// Whether no point of the core is nearer than `reach_m` to a point.
     #[inline]
     pub fn is_clear_of_point(&self, p: Point<D>, reach_m: f64) -> bool {
-        let r = match self {
-            Self::Point(c) => sub(p, *c),
-            Self::Segment([a, b]) => sub(p, nearest_on_segment(p, *a, *b)),
-            Self::Cuboid(_) => return self.nearest_to_point(p).distance_m >= reach_m,
-        };
-        reach_m <= 0.0 || dot(r, r) >= reach_m * reach_m
+        if reach_m <= 0.0 {
+            return true;
+        }
+        match self {
+            Self::Point(c) => {
+                let r = sub(p, *c);
+                dot(r, r) >= reach_m * reach_m
+            }
+            Self::Segment(ends) => is_far_from_segment(p, *ends, reach_m),
+            Self::Cuboid(_) => self.nearest_to_point(p).distance_m >= reach_m,
+        }
     }
 
     /// The box around the core.
@@ -364,6 +376,27 @@ impl<const D: usize> Core<D> {
             }
         }
     }
+}
+
+/// Whether a point is at least `reach_m` from a segment: no division, no root.
+#[inline]
+fn is_far_from_segment<const D: usize>(c: Point<D>, [p, q]: [Point<D>; 2], reach_m: f64) -> bool {
+    let (d, r) = (sub(q, p), sub(c, p));
+    let (part, whole, reach2) = (dot(r, d), dot(d, d), reach_m * reach_m);
+    if part <= 0.0 {
+        return dot(r, r) >= reach2;
+    }
+    if part >= whole {
+        let r = sub(c, q);
+        return dot(r, r) >= reach2;
+    }
+    let across2 = if D == 2 { cross_2d(d, r) * cross_2d(d, r) } else { norm2(cross_3d(d, r)) };
+    across2 >= reach2 * whole
+}
+
+#[inline]
+fn norm2(a: [f64; 3]) -> f64 {
+    dot(a, a)
 }
 
 /// Whether a plane segment `a b` lies on one side of the line `p q`, further than `reach_m`.
@@ -490,6 +523,19 @@ mod tests {
             prop_assert!(nearest.distance_m >= sampled - 5e-3);
             let clear = core.is_clear_of_segment([p, q], reach_m);
             prop_assert!(clear == (nearest.distance_m >= reach_m));
+        }
+
+        #[test]
+        fn clear_is_what_the_distance_says(
+            p in point::<3>(), q in point::<3>(), a in point::<3>(), b in point::<3>(),
+            reach_m in -0.1..3.0f64,
+        ) {
+            for core in [Core::Point(a), Core::Segment([a, b])] {
+                let apart_m = core.nearest_to_segment([p, q]).distance_m;
+                prop_assert_eq!(core.is_clear_of_segment([p, q], reach_m), apart_m >= reach_m);
+                let apart_m = core.nearest_to_point(p).distance_m;
+                prop_assert_eq!(core.is_clear_of_point(p, reach_m), apart_m >= reach_m);
+            }
         }
 
         #[test]

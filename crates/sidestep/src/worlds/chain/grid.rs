@@ -10,7 +10,7 @@ pub(super) struct Grid<const D: usize> {
     entries: Vec<u32>,
     bounds: Vec<Bounds<D>>,
     /// The lowest cell of every box.
-    first: Vec<[usize; D]>,
+    first: Vec<Cell<D>>,
 }
 
 /// The grid gets coarser until a box has at most this many entries on average.
@@ -39,7 +39,7 @@ impl<const D: usize> Grid<D> {
         starts.clear();
         starts.resize(n_cells + 2, 0);
         for b in &*bounds {
-            cells.for_those_of(b, |_, index| starts[index + 2] += 1);
+            cells.for_each(cells.range(b), |_, index| starts[index + 2] += 1);
         }
         for k in 0..n_cells {
             starts[k + 2] += starts[k + 1];
@@ -47,7 +47,7 @@ impl<const D: usize> Grid<D> {
         entries.clear();
         entries.resize(starts[n_cells + 1] as usize, 0);
         for (k, b) in (0u32..).zip(&*bounds) {
-            cells.for_those_of(b, |_, index| {
+            cells.for_each(cells.range(b), |_, index| {
                 entries[starts[index + 1] as usize] = k;
                 starts[index + 1] += 1;
             });
@@ -60,13 +60,13 @@ impl<const D: usize> Grid<D> {
         if self.bounds.is_empty() {
             return;
         }
-        let lowest = self.cells.at(near.lo);
-        self.cells.for_those_of(near, |cell, index| {
+        let range = self.cells.range(near);
+        self.cells.for_each(range, |cell, index| {
             let (from, to) = (self.starts[index] as usize, self.starts[index + 1] as usize);
             for &k in &self.entries[from..to] {
                 let k = k as usize;
                 // A box in several cells is told in the first that both share.
-                let is_first = (0..D).all(|i| cell[i] == self.first[k][i].max(lowest[i]));
+                let is_first = (0..D).all(|i| cell[i] == self.first[k][i].max(range[0][i]));
                 if is_first && self.bounds[k].meets(near) {
                     look(k);
                 }
@@ -75,12 +75,15 @@ impl<const D: usize> Grid<D> {
     }
 }
 
+/// A cell's number along every axis.
+type Cell<const D: usize> = [u32; D];
+
 /// How space is cut into cells. What lies outside belongs to the nearest cell.
 #[derive(Debug, Clone, Copy)]
 struct Cells<const D: usize> {
     origin: Point<D>,
     per_m: f64,
-    n: [usize; D],
+    n: Cell<D>,
 }
 
 impl<const D: usize> Default for Cells<D> {
@@ -99,7 +102,7 @@ impl<const D: usize> Cells<D> {
         let mut cell_m = (0.5 * mean_m).max(0.7 * reach_m).max(extent(&around) * 1e-4).max(1e-6);
         loop {
             let per_m = 1.0 / cell_m;
-            let along = |i: usize| ((around.hi[i] - around.lo[i]) * per_m) as usize + 1;
+            let along = |i: usize| ((around.hi[i] - around.lo[i]) * per_m) as u32 + 1;
             let cells = Self { origin: around.lo, per_m, n: std::array::from_fn(along) };
             let entries = || bounds.iter().map(|b| cells.n_of(b)).sum::<usize>();
             if cells.len() <= CELLS_PER_BOX * (n + 1) && entries() <= ENTRIES_PER_BOX * (n + 1) {
@@ -110,31 +113,34 @@ impl<const D: usize> Cells<D> {
     }
 
     fn len(&self) -> usize {
-        self.n.iter().product()
+        self.n.iter().map(|&n| n as usize).product()
     }
 
     fn n_of(&self, b: &Bounds<D>) -> usize {
-        let (lo, hi) = (self.at(b.lo), self.at(b.hi));
-        (0..D).map(|i| hi[i] - lo[i] + 1).product()
+        let [lo, hi] = self.range(b);
+        (0..D).map(|i| (hi[i] - lo[i]) as usize + 1).product()
     }
 
     #[inline]
-    fn at(&self, p: Point<D>) -> [usize; D] {
-        // A float cast saturates: what lies below the grid is in its first cell.
-        std::array::from_fn(|i| {
-            (((p[i] - self.origin[i]) * self.per_m) as usize).min(self.n[i] - 1)
-        })
+    fn at(&self, p: Point<D>) -> Cell<D> {
+        // The cast saturates: what lies below the grid is in its first cell.
+        std::array::from_fn(|i| (((p[i] - self.origin[i]) * self.per_m) as u32).min(self.n[i] - 1))
+    }
+
+    /// The lowest and the highest cell that a box meets.
+    #[inline]
+    fn range(&self, b: &Bounds<D>) -> [Cell<D>; 2] {
+        [self.at(b.lo), self.at(b.hi)]
     }
 
     #[inline]
-    fn index(&self, cell: [usize; D]) -> usize {
-        (0..D).rev().fold(0, |index, i| index * self.n[i] + cell[i])
+    fn index(&self, cell: Cell<D>) -> usize {
+        (0..D).rev().fold(0, |index, i| index * self.n[i] as usize + cell[i] as usize)
     }
 
-    /// Visits the cells that a box meets, and their indices, in the order of the indices.
+    /// Visits the cells of a block, and their indices, in the order of the indices.
     #[inline]
-    fn for_those_of(&self, b: &Bounds<D>, mut look: impl FnMut([usize; D], usize)) {
-        let (lo, hi) = (self.at(b.lo), self.at(b.hi));
+    fn for_each(&self, [lo, hi]: [Cell<D>; 2], mut look: impl FnMut(Cell<D>, usize)) {
         let mut cell = lo;
         loop {
             look(cell, self.index(cell));

@@ -9,7 +9,8 @@
 //! propagate.rs -> candidates.rs -> scene.rs     one motion: sweeps, a slave's choices, their judge
 //!                 interval.rs, search.rs        free directions: exact in the plane, searched in space
 //!                 sweep.rs, own_body.rs         nothing is passed through; the chain's own parts
-//! open.rs: nothing in the way                   wavefront.rs: many motions at once, then
+//!                 open.rs                       the same where nothing is in the way
+//! wavefront.rs: many motions at once            passage.rs: who passed through what, between states
 //! reach.rs: an arm with a fixed base            rebuild.rs: broken chains
 //! ground/: where obstacles come from            script/: a turtle language that drives an initiator
 //! swarm/: robots on wheels, one that navigates and those that follow
@@ -42,6 +43,7 @@ pub mod navigate;
 pub mod obstacle;
 mod open;
 mod own_body;
+pub mod passage;
 pub mod propagate;
 pub mod reach;
 pub mod rebuild;

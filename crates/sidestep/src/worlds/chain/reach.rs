@@ -5,10 +5,10 @@
 //! and the check of the whole way are one transaction.
 
 use super::chain::{Chain, Mobility};
-use super::geometry::{Bounds, Point, distance};
+use super::geometry::{Point, distance};
 use super::obstacle::Obstacles;
+use super::passage::passed;
 use super::propagate::Propagator;
-use super::sweep::Sweep;
 use super::veto::{Mode, Motion, Moved, Outcome, Reason, Request, Source, Veto};
 use sidestep_kernel::InputError;
 
@@ -172,24 +172,12 @@ fn blocked_way<const D: usize>(
     before: &[Point<D>],
     order: &Reach<D>,
 ) -> Option<Veto<D>> {
-    (0..chain.rods().len()).find_map(|i| {
-        let (from, to) = ([before[i], before[i + 1]], [chain.points()[i], chain.points()[i + 1]]);
-        let sweep = Sweep { from, to };
-        let near = Bounds::of(&[from[0], from[1], to[0], to[1]]).grown(chain.rods()[i].radius_m);
-        let mut hit = None;
-        obstacles.visit(&near, |o| {
-            let keep_m = o.radius_m + chain.rods()[i].radius_m;
-            if hit.is_none_or(|id| o.id < id) && !sweep.is_clear(&o.core, keep_m) {
-                hit = Some(o.id);
-            }
-        });
-        hit.map(|id| Veto {
-            by: i + 1,
-            from: order.k,
-            reason: Reason::WouldTunnel,
-            obstacle: Some(id),
-            reached: before[order.k],
-        })
+    passed(chain, before, obstacles, 0.0).map(|passed| Veto {
+        by: passed.rod + 1,
+        from: order.k,
+        reason: Reason::WouldTunnel,
+        obstacle: Some(passed.obstacle),
+        reached: before[order.k],
     })
 }
 

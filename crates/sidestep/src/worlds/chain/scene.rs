@@ -206,15 +206,17 @@ impl<'a, const D: usize> Scene<'a, D> {
         if !step.bends_at(s) {
             return Err(Refusal::of(Reason::BendLimit));
         }
-        if distance(step.so, s) > self.rules.slave_step_max_m {
+        let longest_m = self.rules.slave_step_max_m;
+        if longest_m < f64::INFINITY && distance(step.so, s) > longest_m {
             return Err(Refusal::of(Reason::StepLimit));
         }
         let reach_m = step.rod.radius_m.max(step.tip_radius_m);
         let near = swept([step.mo, step.so, step.mn, s], reach_m);
         let mut worst: Option<(f64, Name, Reason)> = None;
         let rod = step.master.min(step.slave);
+        let way_m = step.sweep(s).longest_way_m();
         self.visit_blocks(&near, (Some(rod), step.slave), |block| {
-            if let Some((depth_m, reason)) = objection(step, s, block) {
+            if let Some((depth_m, reason)) = objection(step, s, way_m, block) {
                 let deeper = worst
                     .is_none_or(|(w, name, _)| depth_m > w || (depth_m == w && block.name < name));
                 if deeper {
@@ -236,20 +238,25 @@ impl<'a, const D: usize> Scene<'a, D> {
 }
 
 /// How deep a rod or its end is in a block, and what that is called; `None` where all is well.
+/// No point of the rod goes further than `way_m`.
 fn objection<const D: usize>(
     step: &Step<D>,
     s: Point<D>,
+    way_m: f64,
     block: &Block<D>,
 ) -> Option<(f64, Reason)> {
+    let (rod, core) = ([step.mn, s], &block.core);
     let rod_m = block.radius_m + step.rod.radius_m;
     let tip_m = block.radius_m + step.tip_radius_m;
-    let rod_is_clear =
-        !block.stops_rod || block.core.is_clear_of_segment([step.mn, s], needed_m(rod_m));
-    let tip_is_clear = !block.stops_tip || block.core.is_clear_of_point(s, needed_m(tip_m));
+    let tip_is_clear = !block.stops_tip || core.is_clear_of_point(s, needed_m(tip_m));
+    let sure_m = needed_m(rod_m).max(Sweep::<D>::sure_m(way_m, rod_m));
+    if tip_is_clear && (!block.stops_rod || core.is_clear_of_segment(rod, sure_m)) {
+        return None;
+    }
+    let rod_is_clear = !block.stops_rod || core.is_clear_of_segment(rod, needed_m(rod_m));
     if rod_is_clear && tip_is_clear {
-        let passes = !block.stops_rod
-            || step.sweep(s).is_clear(&block.core, rod_m)
-            || was_inside(step, block);
+        let passes =
+            step.sweep(s).is_clear_on_the_way(core, rod_m, way_m) || was_inside(step, block);
         return (!passes).then_some((0.0, Reason::WouldTunnel));
     }
     let (now_m, before_m) =

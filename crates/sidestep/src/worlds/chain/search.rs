@@ -6,7 +6,7 @@
 //! narrowest on, and the first free one is brought as near as it stays free.
 
 use super::geometry::{Point, add, along, angle_rad, dot, norm, perpendicular, scaled, sub, unit};
-use super::scene::{Block, SKIN_M, Step, needed_m};
+use super::scene::{Block, Name, SKIN_M, Step, needed_m};
 use sidestep_kernel::math;
 use std::f64::consts::{PI, TAU};
 
@@ -35,6 +35,7 @@ struct Hit<const D: usize> {
     point: Point<D>,
     radius_m: f64,
     by_tip: bool,
+    name: Name,
 }
 
 impl<const D: usize> Search<'_, D> {
@@ -98,7 +99,10 @@ impl<const D: usize> Search<'_, D> {
         let s = along(self.step.mn, u, self.length_m);
         let mut worst: Option<Hit<D>> = None;
         let mut note = |hit: Hit<D>| {
-            if hit.depth_m > 0.0 && worst.as_ref().is_none_or(|w| hit.depth_m > w.depth_m) {
+            let is_worse = |w: &Hit<D>| {
+                hit.depth_m > w.depth_m || hit.depth_m == w.depth_m && hit.name < w.name
+            };
+            if hit.depth_m > 0.0 && worst.as_ref().is_none_or(is_worse) {
                 worst = Some(hit);
             }
         };
@@ -109,13 +113,15 @@ impl<const D: usize> Search<'_, D> {
             {
                 let nearest = block.core.nearest_to_segment([self.step.mn, s]);
                 let depth_m = needed_m(rod_m) - nearest.distance_m;
-                note(Hit { depth_m, point: nearest.on_core, radius_m: rod_m, by_tip: false });
+                let (point, name) = (nearest.on_core, block.name);
+                note(Hit { depth_m, point, radius_m: rod_m, by_tip: false, name });
             }
             let tip_m = block.radius_m + self.step.tip_radius_m;
             if block.stops_tip && !block.core.is_clear_of_point(s, needed_m(tip_m)) {
                 let nearest = block.core.nearest_to_point(s);
                 let depth_m = needed_m(tip_m) - nearest.distance_m;
-                note(Hit { depth_m, point: nearest.on_core, radius_m: tip_m, by_tip: true });
+                let (point, name) = (nearest.on_core, block.name);
+                note(Hit { depth_m, point, radius_m: tip_m, by_tip: true, name });
             }
         }
         worst

@@ -3,11 +3,10 @@
 //! Both ends go straight from their old to their new place. In the plane the test is exact: the
 //! rod passes a core only where its moving end crosses it, or where an end of the core crosses
 //! the rod. In space a rod may go round anything, so what counts is how near it comes: at no time
-//! nearer to the core than half of what it must keep at rest.
+//! nearer to the core than half of what it must keep at rest. What that guarantees, and what not,
+//! is in [`super::passage`].
 
-use super::geometry::{
-    Core, Point, along, between, cross_2d, cross_each_other, distance, dot, sub,
-};
+use super::geometry::{Core, Point, along, between, cross_2d, cross_each_other, dot, sub};
 
 /// A rod on its way: master and slave, before and after.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,18 +25,33 @@ const MAX_ADVANCES: usize = 64;
 impl<const D: usize> Sweep<D> {
     /// The longest way of any point of the rod.
     pub fn longest_way_m(&self) -> f64 {
-        distance(self.from[0], self.to[0]).max(distance(self.from[1], self.to[1]))
+        let way2 = |end: usize| {
+            let way = sub(self.to[end], self.from[end]);
+            dot(way, way)
+        };
+        way2(0).max(way2(1)).sqrt()
     }
 
     /// Whether the rod passes no core point on its way, resp. stays half as far away in space as
     /// `keep_m`, the distance that it must keep at rest.
     pub fn is_clear(&self, core: &Core<D>, keep_m: f64) -> bool {
         let way_m = self.longest_way_m();
-        let kept_m = if D == 2 { 0.0 } else { PART_KEPT * keep_m };
-        // No point of the rod can have been nearer than where it ends, less its way.
-        if core.is_clear_of_segment(self.to, way_m + kept_m + TOUCH_M) {
-            return true;
-        }
+        core.is_clear_of_segment(self.to, Self::sure_m(way_m, keep_m))
+            || self.is_clear_on_the_way(core, keep_m, way_m)
+    }
+
+    /// A rod whose points go at most `way_m`, and end this far from a core or further, is clear of
+    /// it: no point can have been nearer than where it ends, less its way.
+    pub(super) fn sure_m(way_m: f64, keep_m: f64) -> f64 {
+        way_m + Self::kept_m(keep_m) + TOUCH_M
+    }
+
+    fn kept_m(keep_m: f64) -> f64 {
+        if D == 2 { 0.0 } else { PART_KEPT * keep_m }
+    }
+
+    /// The same without the look at where it ends.
+    pub(super) fn is_clear_on_the_way(&self, core: &Core<D>, keep_m: f64, way_m: f64) -> bool {
         match core {
             Core::Point(c) if D == 2 => !self.is_crossed_by(*c),
             Core::Segment([a, b]) if D == 2 => {
@@ -46,7 +60,7 @@ impl<const D: usize> Sweep<D> {
             Core::Cuboid(cuboid) if D == 2 => {
                 cuboid.edges_2d().iter().all(|e| !self.crosses(*e) && !self.is_crossed_by(e[0]))
             }
-            _ => self.stays_away(core, kept_m, way_m),
+            _ => self.stays_away(core, Self::kept_m(keep_m), way_m),
         }
     }
 
