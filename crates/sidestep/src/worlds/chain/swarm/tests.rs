@@ -201,7 +201,7 @@ fn followers_that_only_stop_hang_on_walls_that_they_shall_graze() {
 
 #[test]
 fn followers_that_slide_graze_walls_and_arrive() {
-    for width_m in [1.2, 2.0, 3.0] {
+    for width_m in [1.2, 2.0, 2.5] {
         let plan = Plan { margin_m: 0.0, ..Plan::new(15, 0.5).unwrap() };
         let Run { arrived, measures, .. } = run(plan, at(12.3, 0.0), &corridor(width_m), 1);
         assert!(arrived && measures.max_lag_m < 0.15, "{width_m}: {measures:?}");
