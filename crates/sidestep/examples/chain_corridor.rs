@@ -233,24 +233,28 @@ fn chain() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Followers on real wheels: margins and spare speed, with a leader that waits for late ones and
-/// one that does not.
+/// Followers on real wheels: margins and spare speed. Plain followers only stop before what they
+/// would touch, and their leader does not wait for them; the others slide, and are waited for.
 fn wheels() -> Result<(), Box<dyn Error>> {
     println!(
-        "\n| width m | margin m | wheels, leader = 1 | waits | arrived in s | vetoes | bumped % | held % | lag mean, max m | clearance m | pairs m |"
+        "\n| width m | margin m | wheels, leader = 1 | kind | arrived in s | vetoes | bumped % | held % | lag mean, max m | clearance m | pairs m |"
     );
     println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |");
     for width_m in [1.2, 1.6, 2.0, 2.5, 3.0] {
         for margin_m in [0.0, 0.05, 0.08, 0.1] {
             for q in [1.0, 1.2, 1.5] {
-                for lag_limit_m in [f64::INFINITY, 0.15] {
+                for (kind, slide_m, lag_limit_m) in [
+                    ("plain", 0.0, f64::INFINITY),
+                    ("waits", 0.0, 0.15),
+                    ("slides, waits", 0.08, 0.15),
+                ] {
                     let mut plan = Plan::new(15, SPEED_M_S)?;
                     (plan.margin_m, plan.lag_limit_m) = (margin_m, lag_limit_m);
                     plan.follower = Follower::new(Drive::new(0.4, q * SPEED_M_S)?, 0.25)?;
+                    plan.follower.slide_m = slide_m;
                     let run = run(&plan, &corridor(width_m, 12.3)?)?;
-                    let waits = yes(lag_limit_m.is_finite());
                     println!(
-                        "| {width_m} | {margin_m} | {q} | {waits} | {}",
+                        "| {width_m} | {margin_m} | {q} | {kind} | {}",
                         wheel_row(&plan, &run)
                     );
                 }

@@ -1,16 +1,21 @@
 //! A robot on wheels that keeps to its connector (slide E2).
 //!
 //! The chain says where the robot shall be; wheels get there late, and look elsewhere on the way.
-//! Short-range sensors hold it back from what it would touch. It must not be asked to graze
-//! walls: its connector's radius exceeds its own by a margin (pitfall 17).
+//! Short-range sensors let it slide along what is near and hold it back from what it would touch.
+//! Robots that only stop hang on walls when they are asked to graze them: their connectors'
+//! radius has to exceed their own by a margin (pitfall 17).
 
 use super::drive::{Drive, Pose, Wheels};
 use super::laser::Body;
 use super::proximity::{Gaps, Ring, safe_speed_m_s};
 use crate::worlds::chain::geometry::{Point, along, norm, sub};
 use crate::worlds::chain::obstacle::Obstacles;
+    }
+
+use super::proximity::{Gaps, Ring, SECTOR_RAD, safe_speed_m_s};
+use crate::worlds::chain::geometry::{Point, along, dot, norm, sub};
 use sidestep_kernel::InputError;
-use sidestep_kernel::math::{atan2, cos, wrap_angle};
+use sidestep_kernel::math::{atan2, cos, sin, wrap_angle};
 use std::f64::consts::PI;
 
 /// What a follower is.
@@ -26,6 +31,8 @@ pub struct Follower {
     pub turn_gain_per_s: f64,
     /// It goes no faster than to where a collision is so far away in time.
     pub horizon_s: f64,
+    /// It slides along what is nearer than this; 0 for a robot that only stops.
+    pub slide_m: f64,
 }
 
 /// Where the connector is that a follower keeps to.
@@ -78,22 +85,30 @@ impl Follower {
             return Err(InputError::new("follower", cause, "give more than 0"));
         }
         let ring = Ring { radius_m, range_m: 0.15 };
-        Ok(Self { drive, ring, gain_per_s: 3.0, turn_gain_per_s: 6.0, horizon_s: 0.1 })
+        Ok(Self {
+            drive,
+            ring,
+            gain_per_s: 3.0,
+            turn_gain_per_s: 6.0,
+            horizon_s: 0.1,
+            slide_m: 0.08,
+        })
     }
 
     /// Speeds of the wheels that keep to a connector, held back by what the sensors read. Its
     /// wheels will turn for `dt_s`.
     pub fn decide(&self, pose: &Pose, goal: &Goal, gaps: &Gaps, dt_s: f64) -> Command {
-        let wanted = along(goal.velocity_m_s, sub(goal.at, pose.at), self.gain_per_s);
+        let wished = along(goal.velocity_m_s, sub(goal.at, pose.at), self.gain_per_s);
+        let wanted = self.aside(wished, pose.heading_rad, gaps);
         let speed_m_s = norm(wanted);
         if speed_m_s <= STANDING_M_S {
-            return Command { wheels: Wheels::default(), is_held: false };
+            return Command { wheels: Wheels::default(), is_held: norm(wished) > STANDING_M_S };
         }
         let off_rad = wrap_angle(atan2(wanted[1], wanted[0]) - pose.heading_rad);
         let is_backward = off_rad.abs() > BACKWARD_RAD;
         let off_rad = if is_backward { wrap_angle(off_rad - PI) } else { off_rad };
-        let wheels =
-            self.drive.wheels(speed_m_s * cos(off_rad).max(0.0), self.turn_gain_per_s * off_rad);
+        let ahead_m_s = speed_m_s * cos(off_rad).max(0.0);
+        let wheels = self.drive.wheels(ahead_m_s, self.turn_gain_per_s * off_rad);
         self.held(wheels, is_backward, gaps, dt_s)
     }
 
@@ -115,6 +130,18 @@ impl Follower {
         let apart_m = others.map(to_robot).fold(1.0, f64::min);
         let gap_m = obstacles.clearance_m([pose.at; 2], radius_m, 1.0).min(apart_m);
         Followed { pose, is_held: command.is_held, is_bumped: gap_m < BUMPER_M, gap_m }
+    }
+
+    /// What is left of a wish when its part toward what is near is taken away, the nearer the
+    /// more: the robot slides along.
+    fn aside(&self, mut wished: Point<2>, heading_rad: f64, gaps: &Gaps) -> Point<2> {
+        for (k, gap_m) in gaps.iter().enumerate().filter(|&(_, &gap_m)| gap_m < self.slide_m) {
+            let toward = heading_rad + k as f64 * SECTOR_RAD;
+            let u = [cos(toward), sin(toward)];
+            let closing_m_s = dot(wished, u).max(0.0);
+            wished = along(wished, u, closing_m_s * (gap_m / self.slide_m - 1.0));
+        }
+        wished
     }
 
     /// Slows the middle, never the turn: a round body that turns on the spot touches nothing.

@@ -170,7 +170,8 @@ fn fifteen_followers_pass_the_corridor_and_no_bumper_is_pressed() {
 /// times as fast as the leader goes.
 #[test]
 fn a_leader_waits_for_late_followers_and_would_lose_them_otherwise() {
-    let cared = Plan::new(15, 0.5).unwrap();
+    let mut cared = Plan::new(15, 0.5).unwrap();
+    cared.follower.slide_m = 0.0;
     let careless = Plan { lag_limit_m: f64::INFINITY, ..cared.clone() };
     let [cared, careless] =
         [cared, careless].map(|plan| run(plan, at(12.3, 0.0), &corridor(3.0), 1).measures);
@@ -188,13 +189,27 @@ fn wheels_as_fast_as_the_leaders_are_enough_for_a_leader_that_waits() {
 }
 
 #[test]
-fn followers_that_are_asked_to_graze_hang_on_walls() {
-    let plan = Plan::new(15, 0.5).unwrap();
-    let plan = Plan { margin_m: 0.0, lag_limit_m: f64::INFINITY, ..plan };
+fn followers_that_only_stop_hang_on_walls_that_they_shall_graze() {
+    let mut plan =
+        Plan { margin_m: 0.0, lag_limit_m: f64::INFINITY, ..Plan::new(15, 0.5).unwrap() };
+    plan.follower.slide_m = 0.0;
     let Run { measures, .. } = run(plan, at(12.3, 0.0), &corridor(2.0), 1);
     assert!(measures.bumped > measures.ticks, "{measures:?}");
     // They stand there, and do not go through.
     assert!(measures.follower_clearance_m > -1e-3, "{measures:?}");
+}
+
+#[test]
+fn followers_that_slide_graze_walls_and_arrive() {
+    for width_m in [1.2, 2.0, 2.5] {
+        let plan = Plan { margin_m: 0.0, ..Plan::new(15, 0.5).unwrap() };
+        let Run { arrived, measures, .. } = run(plan, at(12.3, 0.0), &corridor(width_m), 1);
+        assert!(arrived && measures.max_lag_m < 0.15, "{width_m}: {measures:?}");
+        assert!(
+            measures.bumped == 0 && measures.follower_clearance_m > 0.0,
+            "{width_m}: {measures:?}"
+        );
+    }
 }
 
 #[test]
