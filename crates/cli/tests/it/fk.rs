@@ -81,7 +81,6 @@ fn wrong_input_is_answered_with_what_would_be_right() {
     place.write("bad.urdf", ARM.replace("xyz=\"0 0 1\"", "xyz=\"0 0 0\""));
     for (args, reasons) in [
         (&["fk", "arm.urdf", "--joints", "1,2"][..], ["2 values", "shoulder, elbow, slide"]),
-        (&["fk", "arm.urdf", "--joints", "1,2,3"], ["`slide`", "0.1 and 0.5"]),
         (&["fk", "arm.urdf", "--joints", "1,x,0.2"], ["`x`", "commas"]),
         (&["fk", "arm.urdf", "--joints", "1,NaN,0.2"], ["elbow", "finite"]),
         (&["fk", "arm.urdf", "--tip", "hnad"], ["`hnad`", "`hand`?"]),
@@ -95,8 +94,41 @@ fn wrong_input_is_answered_with_what_would_be_right() {
         assert_eq!((ended.code(), ended.out().as_str()), (2, ""), "{args:?}");
         assert!(reasons.iter().all(|r| ended.err().contains(r)), "{args:?}: {}", ended.err());
     }
-    let beyond = place.json(&["fk", "arm.urdf", "--joints", "0,0,3", "--ignore-limits"]);
-    assert_near(&beyond["tip"], [5.0, 0.0, 0.0]);
+}
+
+#[test]
+fn what_limits_forbid_is_computed_with_a_warning() {
+    let place = place();
+    let beyond = place.run(&["fk", "arm.urdf", "--joints", "2.5,0,3", "--json"]);
+    assert_eq!(beyond.code(), 0);
+    assert_eq!(beyond.json()["outside_limits"], json!(["shoulder", "slide"]));
+    assert!(beyond.err().contains("outside limits: shoulder, slide"), "{}", beyond.err());
+    let straight = place.json(&["fk", "arm.urdf", "--joints", "0,0,3"]);
+    assert_near(&straight["tip"], [5.0, 0.0, 0.0]);
+    let inside = place.run(&["fk", "arm.urdf", "--joints", "0,0,0.3", "--json"]);
+    assert_eq!((inside.json()["outside_limits"].clone(), inside.err().as_str()), (json!([]), ""));
+}
+
+#[test]
+fn groups_and_bases_choose_a_part_of_the_robot() {
+    let place = place();
+    place.write(
+        "parts.srdf",
+        r#"<robot name="arm"><group name="upper"><joint name="shoulder"/><joint name="elbow"/></group>
+        <group name="end"><joint name="slide"/></group>
+        <group name="all"><group name="end"/><group name="upper"/></group></robot>"#,
+    );
+    let links = |group: &str| {
+        let fk = place.json(&["fk", "arm.urdf", "--srdf", "parts.srdf", "--group", group]);
+        [fk["base_link"].clone(), fk["tip_link"].clone()]
+    };
+    assert_eq!(links("upper"), ["base", "lower"]);
+    assert_eq!(links("end"), ["lower", "hand"]);
+    assert_eq!(links("all"), ["base", "hand"]);
+    let from = place.json(&["fk", "arm.urdf", "--base", "lower", "--joints", "0.2"]);
+    assert_near(&from["tip"], [1.2, 0.0, 0.0]);
+    let backward = place.run(&["fk", "arm.urdf", "--base", "hand", "--tip", "base"]);
+    assert_eq!(backward.code(), 2);
 }
 
 #[test]
@@ -112,7 +144,7 @@ fn shared_models_are_where_others_computed_them() {
         let values = expected["q_test"].as_array().expect("values").iter();
         let joints = values.map(Value::to_string).collect::<Vec<_>>().join(",");
         let path = format!("{data}/{name}");
-        let fk = place.json(&["fk", &path, "--joints", &joints, "--ignore-limits"]);
+        let fk = place.json(&["fk", &path, "--joints", &joints]);
         let row = |i: usize| expected["fk_test"][i][3].as_f64().expect("a number");
         assert_near(&fk["tip"], [row(0), row(1), row(2)]);
         assert_eq!(fk["tip_link"], expected["tip"], "{name}");

@@ -8,6 +8,7 @@ mod disk;
 mod exact;
 mod fk;
 mod help;
+mod ik;
 mod input;
 mod learn;
 mod reproduce;

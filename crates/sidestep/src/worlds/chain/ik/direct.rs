@@ -8,7 +8,7 @@
 
 use super::limb::{Shell, Span};
 use crate::worlds::chain::geometry::{
-    Point, along, distance, first_axis, norm, perpendicular, scaled, sub, unit,
+    Point, along, dot, first_axis, norm, perpendicular, scaled, sub, unit,
 };
 
 /// Lays `vectors` so that their sum is `target`, or as near as they can come. Lengths of rods are
@@ -91,11 +91,5 @@ fn apex<const D: usize>(
 
 /// The unit vector across `u` in the plane of `toward` and `side`, so that the bends turn one way.
 fn turned<const D: usize>(u: Point<D>, toward: Point<D>, side: Point<D>) -> Point<D> {
-    let (x, y) = (
-        crate::worlds::chain::geometry::dot(u, toward),
-        crate::worlds::chain::geometry::dot(u, side),
-    );
-    let across = along(scaled(toward, -y), side, x);
-    debug_assert!(distance(across, [0.0; D]) > 0.0);
-    across
+    along(scaled(toward, -dot(u, side)), side, dot(u, toward))
 }

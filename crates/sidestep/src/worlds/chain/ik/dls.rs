@@ -19,8 +19,10 @@ use crate::worlds::chain::geometry::{
     Point, add, along, first_axis, norm, perpendicular, scaled, sub, unit,
 };
 
-/// Newton steps, also those that did not help, before the posture becomes the new reference.
-const STEPS: usize = 4;
+/// Newton steps that hardly helped before the posture becomes the new reference.
+const POOR_STEPS: usize = 3;
+/// The part of the error that a step must leave at most not to be a poor one.
+const GOOD: f64 = 0.5;
 /// New references before it is given up.
 const REFERENCES: usize = 32;
 /// Every how many of them the limb is bowed anew, should it lie in a line with the target.
@@ -84,13 +86,12 @@ fn pull<const D: usize>(
 ) -> (Point<D>, f64) {
     let (mut y, mut at, mut damping) = ([0.0; D], start, FIRST_DAMPING);
     let mut step = damped(&at.slope, at.error, damping);
-    for _ in 0..STEPS {
-        if at.error_m <= tolerance_m {
-            break;
-        }
+    let mut poor = 0;
+    while at.error_m > tolerance_m && poor < POOR_STEPS {
         *steps += 1;
         let next_y = add(y, step);
         let next = pulled(vectors, spans, next_y, target);
+        poor += usize::from(next.error_m > GOOD * at.error_m);
         if next.error_m < at.error_m {
             (y, at, damping) = (next_y, next, 0.3 * damping);
             step = damped(&at.slope, at.error, damping);

@@ -62,7 +62,7 @@ impl<const D: usize> Judge<'_, D> {
             return Some((i + 1, Reason::Mobility, None));
         }
         let mut hit: Option<u32> = None;
-        self.visit_near(points, i, 0.0, |o| {
+        self.visit_near(&points[i..i + 2], i, 0.0, |o| {
             if hit.is_none_or(|id| o.id < id) && self.meets(points, i, o) {
                 hit = Some(o.id);
             }
@@ -85,22 +85,21 @@ impl<const D: usize> Judge<'_, D> {
         !o.core.is_clear_of_segment([points[i], points[i + 1]], keep_m) || end(i) || end(i + 1)
     }
 
-    /// Visits the obstacles that a rod and its connectors may meet.
+    /// Visits the obstacles that rod `i` and its connectors at `ends` may meet.
     pub(super) fn visit_near<'a>(
         &'a self,
-        points: &[Point<D>],
+        ends: &[Point<D>],
         i: usize,
         margin_m: f64,
         look: impl FnMut(&'a Obstacle<D>),
     ) {
         let connectors = self.chain.connectors();
         let by_m = connectors[i].radius_m.max(connectors[i + 1].radius_m) + margin_m;
-        self.obstacles.visit(&Bounds::of(&[points[i], points[i + 1]]).grown(by_m), look);
+        self.obstacles.visit(&Bounds::of(ends).grown(by_m), look);
     }
 
     /// The later parts of the chain that rod `i` and its inner connector may run into: rods
-    /// further than two apart, connectors further than one. Connectors are no thinner than rods,
-    /// so that a rod's end that may meet another rod counts with the connector's radius.
+    /// further than two apart, connectors further than one.
     pub(super) fn own_pairs<'a>(
         &'a self,
         points: &'a [Point<D>],
@@ -108,10 +107,10 @@ impl<const D: usize> Judge<'_, D> {
         margin_m: f64,
     ) -> impl Iterator<Item = OwnPair<D>> + 'a {
         let near = self.bounds(points, i).grown(margin_m);
-        let rods = (i + 2..self.chain.rods().len())
+        let rods = (i + 1..self.chain.rods().len())
             .filter(move |&j| self.bounds(points, j).meets(&near))
             .flat_map(move |j| self.own_pairs_of(points, i, j));
-        rods.into_iter()
+        rods
     }
 
     fn bounds(&self, points: &[Point<D>], i: usize) -> Bounds<D> {
@@ -133,14 +132,11 @@ impl<const D: usize> Judge<'_, D> {
                     (b, at_b, rb): ([usize; 2], [Point<D>; 2], f64)| {
             OwnPair { ends: [a, b], at: [at_a, at_b], keep_m: ra + rb }
         };
-        let far = |c: usize, r: usize| c + 1 < r || c > r + 2;
         [
             (j > i + 2).then(|| pair(rod(i), rod(j))),
-            far(j + 1, i).then(|| pair(rod(i), ball(j + 1))),
-            far(i, j).then(|| pair(ball(i), rod(j))),
-            (j + 1 > i + 1).then(|| pair(ball(i), ball(j))),
-            (j > i + 1).then(|| pair(ball(i + 1), ball(j + 1))),
-            (j + 1 > i + 1).then(|| pair(ball(i), ball(j + 1))),
+            (j > i + 1).then(|| pair(rod(i), ball(j + 1))),
+            (j > i + 1).then(|| pair(ball(i), rod(j))),
+            Some(pair(ball(i), ball(j + 1))),
         ]
         .into_iter()
         .flatten()

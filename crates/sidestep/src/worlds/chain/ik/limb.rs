@@ -2,7 +2,7 @@
 //! target, in that order.
 
 use crate::worlds::chain::chain::{Chain, Mobility, Rod};
-use crate::worlds::chain::geometry::{Point, distance, scaled, sub};
+use crate::worlds::chain::geometry::{Point, first_axis, norm, scaled, sub};
 
 /// Rods from a base outward, and where the tip is wanted, seen from the base.
 #[derive(Debug, Clone, Default)]
@@ -51,7 +51,7 @@ impl Shell {
 
     /// The point nearest to `target` that a tip can come to, from a base at the origin.
     pub(super) fn nearest<const D: usize>(&self, target: Point<D>) -> Point<D> {
-        let far_m = distance(target, [0.0; D]);
+        let far_m = norm(target);
         if far_m > self.reach_m {
             scaled(target, self.reach_m / far_m)
         } else if far_m >= self.hole_m {
@@ -59,7 +59,7 @@ impl Shell {
         } else if far_m > 0.0 {
             scaled(target, self.hole_m / far_m)
         } else {
-            scaled(crate::worlds::chain::geometry::first_axis(), self.hole_m)
+            scaled(first_axis(), self.hole_m)
         }
     }
 }

@@ -15,9 +15,9 @@ use sidestep_kernel::{InputError, math};
 /// Headings to either side of the target's, in rad (design 5.5).
 const FAN_RAD: [f64; 5] = [0.4, 0.8, 1.2, 1.6, 2.0];
 /// Steps that bring the tip no nearer before it is given up.
-const PATIENCE: usize = 24;
+const PATIENCE: usize = 10;
 /// Attempts to move, over all steps.
-const MAX_ATTEMPTS: usize = 600;
+const MAX_ATTEMPTS: usize = 120;
 /// Part of the shortest rod that the tip goes at once.
 const STEP: f64 = 0.5;
 

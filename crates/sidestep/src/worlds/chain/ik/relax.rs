@@ -7,8 +7,8 @@ use super::legal::{Judge, OwnPair, bend_rad};
 use super::limb::{self, Limb};
 use super::{Goal, dls, follow_beyond};
 use crate::worlds::chain::geometry::{
-    Nearest, Point, add, along, between_segments, distance, dot, norm, perpendicular, scaled, sub,
-    unit,
+    Nearest, Point, add, along, between_segments, distance, dot, first_axis, norm, perpendicular,
+    scaled, sub, unit,
 };
 use crate::worlds::chain::veto::Veto;
 use sidestep_kernel::math;
@@ -41,7 +41,7 @@ pub(super) fn relax<const D: usize>(
 ) -> Relaxed<D> {
     let longest_m = judge.chain.rods().iter().map(|r| r.max_m).fold(0.0, f64::max);
     let home = points[goal.base];
-    let mut pusher = Pusher { judge, goal, margin_m: MARGIN * longest_m, deepest: 0.0 };
+    let mut pusher = Pusher { judge, goal, margin_m: MARGIN * longest_m, broken_m: 0.0 };
     let (mut best, mut best_round) = (f64::INFINITY, 0);
     let mut veto = None;
     for round in 0..MAX_ROUNDS {
@@ -55,8 +55,8 @@ pub(super) fn relax<const D: usize>(
             return Relaxed { rounds: round + 1, veto };
         }
         pusher.push(points);
-        if pusher.deepest < 0.98 * best {
-            (best, best_round) = (pusher.deepest, round);
+        if pusher.broken_m < 0.98 * best {
+            (best, best_round) = (pusher.broken_m, round);
         }
     }
     Relaxed { rounds: MAX_ROUNDS, veto }
@@ -76,13 +76,13 @@ struct Pusher<'a, const D: usize> {
     judge: &'a Judge<'a, D>,
     goal: &'a Goal<D>,
     margin_m: f64,
-    /// The sum of all pushes of a round, in meters.
-    deepest: f64,
+    /// The sum of all that was broken in a round, in meters.
+    broken_m: f64,
 }
 
 impl<const D: usize> Pusher<'_, D> {
     fn push(&mut self, points: &mut [Point<D>]) {
-        self.deepest = 0.0;
+        self.broken_m = 0.0;
         for i in 1..points.len() - 1 {
             self.unbend(points, i);
         }
@@ -115,7 +115,7 @@ impl<const D: usize> Pusher<'_, D> {
             .unwrap_or(perpendicular(unit(sub(points[i], points[i - 1])).unwrap_or([1.0; D])));
         let weights = [self.weight(i - 1), self.weight(i + 1)];
         let missing_m = chord_m - norm(between);
-        self.deepest += missing_m.max(0.0);
+        self.broken_m += missing_m.max(0.0);
         let sum = weights[0] + weights[1];
         if sum > 0.0 {
             points[i - 1] = along(points[i - 1], u, -PUSH * missing_m * weights[0] / sum);
@@ -127,7 +127,7 @@ impl<const D: usize> Pusher<'_, D> {
         let (judge, margin_m) = (self.judge, self.margin_m);
         let (rods, connectors) = (judge.chain.rods(), judge.chain.connectors());
         let before = [points[i], points[i + 1]];
-        judge.visit_near(&*points.to_owned(), i, margin_m, |o| {
+        judge.visit_near(&before, i, margin_m, |o| {
             let nearest = o.core.nearest_to_segment([points[i], points[i + 1]]);
             self.shift(points, [i, i + 1], before, &nearest, o.radius_m + rods[i].radius_m);
             for j in [i, i + 1] {
@@ -162,16 +162,12 @@ impl<const D: usize> Pusher<'_, D> {
         if depth_m <= 0.0 {
             return;
         }
-        let away = unit(sub(nearest.on_body, nearest.on_core)).unwrap_or_else(|| {
-            perpendicular(
-                unit(sub(rod[1], rod[0])).unwrap_or(crate::worlds::chain::geometry::first_axis()),
-            )
-        });
+        let away = unit(sub(nearest.on_body, nearest.on_core)).unwrap_or_else(|| across(rod));
         let part = if i == j { 0.0 } else { part_of(nearest.on_body, [points[i], points[j]]) };
         let weights = [self.weight(i) * (1.0 - part), self.weight(j) * part];
         let square = weights[0] * (1.0 - part) + weights[1] * part;
         if nearest.distance_m < keep_m {
-            self.deepest += depth_m;
+            self.broken_m += depth_m;
         }
         if square > 1e-3 {
             points[i] = along(points[i], away, PUSH * depth_m * weights[0] / square);
@@ -180,6 +176,11 @@ impl<const D: usize> Pusher<'_, D> {
             }
         }
     }
+}
+
+/// A direction across a rod.
+fn across<const D: usize>(rod: [Point<D>; 2]) -> Point<D> {
+    perpendicular(unit(sub(rod[1], rod[0])).unwrap_or(first_axis()))
 }
 
 /// Where on a segment a point of it is.

@@ -16,13 +16,14 @@ const LONGEST: f64 = 4.0;
 const RESTARTS: usize = 20;
 
 /// Joint values inside the limits at which the connectors are where the chain engine brings them;
-/// none where it does not reach the target, or points do not determine the joints.
+/// none where it does not reach the target, or points do not determine the joints. With it, the
+/// iterations that it took.
 pub(super) fn posture(
     arm: &SerialChain,
     skeleton: &Skeleton,
     goal: &ArmGoal,
     start: &[f64],
-) -> Option<Vec<f64>> {
+) -> Option<(Vec<f64>, usize)> {
     let connectors = arm.connectors(skeleton, &arm.forward(start));
     let (chain, before) = chain_of(arm, skeleton, goal, &connectors).ok()?;
     let balls =
@@ -39,7 +40,8 @@ pub(super) fn posture(
     if !answer.reached {
         return None;
     }
-    arm.recover(skeleton, &answer.points[before..], start).ok().map(|recovered| recovered.values)
+    let recovered = arm.recover(skeleton, &answer.points[before..], start).ok()?;
+    Some((recovered.values, answer.iterations))
 }
 
 /// The arm as a chain: its connectors, with a fixed one before the first from which the bend there

@@ -26,6 +26,7 @@ pub use goal::{ArmAnswer, ArmGoal, ArmReason, Hit, Sphere};
 use super::pose::{Vector, length, sub};
 use super::serial::{Motion, SerialChain};
 use super::skeleton::Skeleton;
+use crate::kernel::math::wrap_angle;
 use crate::kernel::{InputError, Seed};
 use crate::worlds::chain::ik::Engine;
 use rows::{Errors, Scene};
@@ -37,7 +38,11 @@ use step::Bounds;
 const START: Purpose = Purpose(0x1D);
 /// Steps from one start, also those that did not help.
 const STEPS: usize = 200;
-/// Steps without a gain of 1 % before the next start.
+/// Restarts where no answer can be expected, to come near or to find out why.
+const FEW: usize = 8;
+/// The part of the errors that a step must take away to count as gain.
+const LEAST_GAIN: f64 = 1e-3;
+/// Steps without gain before the next start.
 const PATIENCE: usize = 16;
 /// The first damping, in parts of the mean of the matrix' diagonal.
 const FIRST_DAMPING: f64 = 1e-3;
@@ -82,14 +87,14 @@ struct Search<'a> {
 impl Search<'_> {
     fn run(&self, skeleton: &Skeleton, start: &[f64]) -> ArmAnswer {
         let mut best: Option<Descent> = None;
-        let mut steps = 0;
         let guided = (self.goal.engine == Engine::Chain)
             .then(|| guide::posture(self.chain, skeleton, self.goal, start))
             .flatten();
         let engine = if guided.is_some() { Engine::Chain } else { Engine::Dls };
-        let first = guided.unwrap_or_else(|| start.to_vec());
+        let (first, mut steps) = guided.unwrap_or_else(|| (start.to_vec(), 0));
         let out_of_reach = self.out_of_reach(skeleton, start);
-        let restarts = if out_of_reach.is_some() { 0 } else { self.goal.restarts };
+        let most = if out_of_reach.is_some() { FEW } else { usize::MAX };
+        let restarts = self.goal.restarts.min(most);
         for k in 0..=restarts {
             let values = if k == 0 { first.clone() } else { self.random(k) };
             let came = self.descend(values, steps);
@@ -146,11 +151,25 @@ impl Search<'_> {
                 damping *= 4.0;
             }
             since += 1;
-            if errors.merit() < 0.99 * mark {
+            if errors.merit() < (1.0 - LEAST_GAIN) * mark {
                 (mark, since) = (errors.merit(), 0);
             }
         }
+        self.unwind(&mut values);
         Descent { values, errors, steps }
+    }
+
+    /// Brings turns without limits to less than half a turn from zero.
+    fn unwind(&self, values: &mut [f64]) {
+        let is_whole = |i: usize| {
+            let mut driven = self.chain.joints.iter().filter(|j| j.drive.variable == i);
+            driven.all(|j| j.motion == Motion::Turn && j.drive.is_own())
+        };
+        for (i, value) in values.iter_mut().enumerate() {
+            if self.bounds.ranges[i] == Bounds::ANY && is_whole(i) {
+                *value = wrap_angle(*value);
+            }
+        }
     }
 
     /// A posture inside the limits.
@@ -190,7 +209,7 @@ impl Search<'_> {
     /// The constraint without which there would be an answer.
     fn why_not(&self, skeleton: &Skeleton, best: &Descent, starts: usize) -> ArmReason {
         let without = |ignore_limits: bool, spheres: Vec<Sphere>| {
-            let restarts = self.goal.restarts.min(8);
+            let restarts = self.goal.restarts.min(FEW);
             let ignore_limits = ignore_limits || self.goal.ignore_limits;
             ArmGoal { ignore_limits, spheres, restarts, engine: Engine::Dls, ..self.goal.clone() }
         };

@@ -9,7 +9,8 @@ pub(super) struct Bounds {
 }
 
 impl Bounds {
-    const ANY: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
+    /// No limits.
+    pub(super) const ANY: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
 
     /// Anything goes.
     pub(super) fn none(chain: &SerialChain) -> Self {
