@@ -99,7 +99,7 @@ fn strand<const D: usize>(simulation: &ChainSimulation<D>, slot: usize) -> Stran
     Strand {
         points,
         connector_radius_m: match &spec.robots {
-            Some(robots) => robots.ring.radius_m,
+            Some(robots) => robots.follower.ring.radius_m,
             None => connectors.fold(0.0, f64::max),
         },
         rod_radius_m: body.chain.rods().iter().map(|rod| rod.radius_m).fold(0.0, f64::max),

@@ -6,11 +6,22 @@ use super::events::EventKind;
 use super::geometry::{Point, distance, scaled, sub};
 use super::navigate::{Solid, in_plane, plane_point};
 use super::state::Body;
+use super::swarm::convoy;
 use super::swarm::drive::Pose;
 use super::swarm::follower::{Follower, Goal};
 use super::swarm::laser::Body as Seen;
 use super::world::{ChainWorld, Scratch};
 use serde::{Deserialize, Serialize};
+
+/// The robots of a swarm.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Robots {
+    /// How each behaves.
+    pub follower: Follower,
+    /// A leader on wheels waits for a robot that is so far from its connector, and is slower from
+    /// half of that on; infinite for never.
+    pub lag_limit_m: f64,
+}
 
 /// A robot of a swarm.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -39,7 +50,7 @@ impl<const D: usize> ChainWorld<D> {
     /// Moves the robots of a swarm after their connectors. All perceive each other as they were
     /// before.
     pub(super) fn follow(&self, body: &mut Body<D>, turn: Turn<'_, D>, scratch: &mut Scratch<D>) {
-        let Some(follower) = &turn.spec.robots else { return };
+        let Some(Robots { follower, .. }) = &turn.spec.robots else { return };
         let agent = turn.spec.tasks.get(body.driving.task as usize).map(|task| task.agent);
         let mut others = std::mem::take(&mut scratch.seen);
         others.clear();
@@ -52,6 +63,14 @@ impl<const D: usize> ChainWorld<D> {
             }
         }
         scratch.seen = others;
+    }
+
+    /// What part of its speed a leader may go for the sake of the latest robot.
+    pub(super) fn pace(&self, body: &Body<D>, turn: Turn<'_, D>) -> f64 {
+        let Some(robots) = &turn.spec.robots else { return 1.0 };
+        let lag_m = |(robot, at): (&Robot, &Point<D>)| distance(robot.pose.at, plane_point(*at));
+        let lags_m = body.robots.iter().zip(body.chain.points()).map(lag_m);
+        convoy::pace(lags_m.fold(0.0, f64::max), robots.lag_limit_m)
     }
 
     /// The initiator is where its connector is.

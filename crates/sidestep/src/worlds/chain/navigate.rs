@@ -149,7 +149,8 @@ impl<const D: usize> ChainWorld<D> {
         leader.followed = decision.followed;
         body.driving.leader = Some(leader);
         body.tally.layers[decision.layer as usize - 1] += 1;
-        Some(navigator.drive.step(leader.pose, decision.wheels, self.dt_s))
+        let wheels = decision.wheels.slowed(self.pace(body, turn));
+        Some(navigator.drive.step(leader.pose, wheels, self.dt_s))
     }
 
     /// A navigator that has moved, by a heading that the chain did not object to.

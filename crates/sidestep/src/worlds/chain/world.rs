@@ -6,7 +6,7 @@ use super::chain::{Chain, Mobility};
 use super::driver::{Driver, Driving, Task};
 use super::escape::{Escape, Escaper};
 use super::events::Event;
-use super::formation::Robot;
+use super::formation::{Robot, Robots};
 use super::geometry::{Bounds, Point};
 use super::ground::Movers;
 use super::navigate::plane_point;
@@ -18,7 +18,6 @@ use super::rules::Rules;
 use super::script::Motion;
 use super::state::{Body, ChainState};
 use super::swarm::drive::Pose;
-use super::swarm::follower::Follower;
 use super::swarm::laser::{Body as Seen, Scan};
 use cpu_time::ThreadTime;
 use sidestep_kernel::conflict::Groups;
@@ -83,7 +82,7 @@ pub struct ChainSpec<const D: usize> {
     /// The arm that it stands for, if it stands for one.
     pub arm: Option<Arc<Arm>>,
     /// How the robots behave that keep to its connectors, if it is a swarm on wheels.
-    pub robots: Option<Follower>,
+    pub robots: Option<Robots>,
 }
 
 /// Something that happens to a chain at the begin of a cycle (slides R8, R10, F3).
@@ -166,7 +165,7 @@ impl<const D: usize> ChainSpec<D> {
     }
 
     pub(super) fn robot_radius_m(&self) -> f64 {
-        self.robots.as_ref().map_or(0.0, |follower| follower.ring.radius_m)
+        self.robots.as_ref().map_or(0.0, |robots| robots.follower.ring.radius_m)
     }
 
     /// The motions of the script that a driver is in; none where it is in no script.

@@ -1,5 +1,6 @@
 //! Initiators on wheels, and the robots that follow them.
 
+use super::super::formation::Robots;
 use super::super::geometry::Point;
 use super::super::navigate::{Goal, Navigator};
 use super::super::swarm::drive::Drive;
@@ -14,6 +15,8 @@ use toml::Spanned;
 
 /// A point of a corridor's middle so often.
 const LINE_STEP_M: f64 = 0.1;
+/// A leader waits for a robot that is so late, unless it is said, meters.
+const LAG_LIMIT_M: f64 = 0.15;
 /// Distance of the wheels of a robot, unless it is said.
 const WHEELBASE_M: f64 = 0.4;
 
@@ -63,6 +66,7 @@ pub(super) struct RobotsSection {
     wheelbase_m: Option<f64>,
     wheel_speed_m_s: Option<f64>,
     sensors_m: Option<f64>,
+    lag_limit_m: Option<f64>,
     gain_per_s: Option<f64>,
     turn_gain_per_s: Option<f64>,
 }
@@ -136,21 +140,23 @@ impl Compiler<'_> {
         &self,
         section: &Spanned<RobotsSection>,
         speed_m_s: f64,
-    ) -> Result<Follower, InputError> {
+    ) -> Result<Robots, InputError> {
         let s = section.get_ref();
         let told = |error: InputError| self.at(section.span(), &error);
         let wheel_m_s = s.wheel_speed_m_s.unwrap_or(1.2 * speed_m_s);
         let drive = Drive::new(s.wheelbase_m.unwrap_or(WHEELBASE_M), wheel_m_s).map_err(told)?;
         let mut follower = Follower::new(drive, self.robot_radius_m(s)).map_err(told)?;
+        let lag_limit_m = s.lag_limit_m.unwrap_or(LAG_LIMIT_M);
         let gains = [s.gain_per_s, s.turn_gain_per_s, s.sensors_m];
-        if gains.iter().flatten().any(|gain| !(*gain > 0.0 && gain.is_finite())) {
-            let remedy = "give gains and the range of sensors above 0";
-            return Err(self.error(Some(section.span()), "a gain that is not above 0", remedy));
+        let is_wrong = |gain: &f64| !(*gain > 0.0 && gain.is_finite());
+        if gains.iter().flatten().any(is_wrong) || lag_limit_m.is_nan() || lag_limit_m <= 0.0 {
+            let remedy = "give gains, the range of sensors and lag_limit_m above 0";
+            return Err(self.error(Some(section.span()), "a number that is not above 0", remedy));
         }
         follower.gain_per_s = s.gain_per_s.unwrap_or(follower.gain_per_s);
         follower.turn_gain_per_s = s.turn_gain_per_s.unwrap_or(follower.turn_gain_per_s);
         follower.ring.range_m = s.sensors_m.unwrap_or(follower.ring.range_m);
-        Ok(follower)
+        Ok(Robots { follower, lag_limit_m })
     }
 
     /// Radius of a robot's body.

@@ -64,6 +64,12 @@ impl Plan {
     }
 }
 
+/// What part of its speed a leader may go whose latest follower is so far from its connector: it
+/// slows down from half the limit on.
+pub fn pace(worst_lag_m: f64, limit_m: f64) -> f64 {
+    (2.0 - 2.0 * worst_lag_m / limit_m).clamp(0.0, 1.0)
+}
+
 /// A convoy on its way.
 #[derive(Debug, Clone)]
 pub struct Convoy {
@@ -212,7 +218,7 @@ impl Convoy {
         let lag_m = |(f, at): (&Pose, &Point<2>)| distance(f.at, *at);
         let connectors = &self.chain.points()[1..];
         let worst_m = self.followers.iter().zip(connectors).map(lag_m).fold(0.0, f64::max);
-        (2.0 - 2.0 * worst_m / self.plan.lag_limit_m).clamp(0.0, 1.0)
+        pace(worst_m, self.plan.lag_limit_m)
     }
 
     /// Moves a follower; whether it was held back, and whether its bumper is pressed.

@@ -7,13 +7,9 @@
 
 use super::drive::{Drive, Pose, Wheels};
 use super::laser::Body;
-use super::proximity::{Gaps, Ring, safe_speed_m_s};
-use crate::worlds::chain::geometry::{Point, along, norm, sub};
-use crate::worlds::chain::obstacle::Obstacles;
-    }
-
 use super::proximity::{Gaps, Ring, SECTOR_RAD, safe_speed_m_s};
 use crate::worlds::chain::geometry::{Point, along, dot, norm, sub};
+use crate::worlds::chain::obstacle::Obstacles;
 use sidestep_kernel::InputError;
 use sidestep_kernel::math::{atan2, cos, sin, wrap_angle};
 use std::f64::consts::PI;
