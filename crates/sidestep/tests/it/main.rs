@@ -2,6 +2,7 @@
 
 mod airspace;
 mod airspace_traffic;
+mod chain_distances;
 mod closed_loop;
 mod common;
 mod determinism;
