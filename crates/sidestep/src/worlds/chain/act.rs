@@ -4,6 +4,7 @@ use super::driver::{Driver, Task, in_space, out_of_space, towards, wander};
 use super::events::{Event, EventKind};
 use super::geometry::{Bounds, distance, first_axis, norm, sub, unit};
 use super::metrics::GivenUp;
+use super::navigate::plane_point;
 use super::obstacle::Obstacle;
 use super::replan::{Climbed, Ladder, Situation};
 use super::script::Motion as ScriptMotion;
@@ -112,6 +113,9 @@ impl<const D: usize> ChainWorld<D> {
         body.chain.points_mut().copy_from_slice(&scratch.before);
         let from = turn.spec.tasks.get(body.driving.task as usize).map_or(0, |task| task.agent);
         let reached = body.chain.points()[from];
+        if let Some(leader) = &mut body.driving.leader {
+            leader.pose.at = plane_point(reached);
+        }
         let veto = Veto { by, from, reason: Reason::StepLimit, obstacle: None, reached };
         self.vetoed(body, turn, &veto, scratch);
     }
