@@ -64,7 +64,8 @@ pub(crate) struct IkArgs {
 enum EngineName {
     /// The faster one: dls
     Auto,
-    /// Connectors first, by the rules of the chain, then the joints
+    /// Connectors first, by the rules of the chain (on links of fixed length: FABRIK), then the joints
+    #[value(alias = "fabrik")]
     Chain,
     /// Damped least squares on the joints
     Dls,
