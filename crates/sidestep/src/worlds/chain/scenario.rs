@@ -81,6 +81,7 @@ struct RulesSection {
     look_m: Option<Spanned<f64>>,
     escape: EscapeWord,
     escape_speed_m_s: Option<Spanned<f64>>,
+    escape_ahead_s: Option<Spanned<f64>>,
 }
 
 /// How chains get out of the way of what moves.
@@ -259,7 +260,9 @@ impl Compiler<'_> {
         let speed_max_m_s = self.positive(given, "escape_speed_m_s", usual_m_s)?;
         let look_ahead = section.escape == EscapeWord::LookAhead;
         let usual = Escape::new(dt_s, speed_max_m_s);
-        let ticks_ahead = if look_ahead { usual.ticks_ahead } else { 0.0 };
+        let usual_s = usual.ticks_ahead * dt_s;
+        let ahead_s = self.positive(section.escape_ahead_s.as_ref(), "escape_ahead_s", usual_s)?;
+        let ticks_ahead = if look_ahead { ahead_s / dt_s } else { 0.0 };
         Ok(Some(Escape { ticks_ahead, ..usual }))
     }
 
