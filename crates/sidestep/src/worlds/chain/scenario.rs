@@ -218,7 +218,7 @@ impl Compiler<'_> {
             obstacles: ground.obstacles,
             movers: ground.movers,
             dt_s,
-            rules: self.rules()?,
+            rules: self.rules(escape.as_ref())?,
             look_m: self.positive(section.look_m.as_ref(), "look_m", look_m)?,
             streams,
         };
@@ -266,7 +266,7 @@ impl Compiler<'_> {
         Ok(Some(Escape { ticks_ahead, ..usual }))
     }
 
-    fn rules(&self) -> Result<Rules, InputError> {
+    fn rules(&self, escape: Option<&Escape>) -> Result<Rules, InputError> {
         let section = &self.file.chain;
         let step_m = match &section.step_m {
             None => None,
@@ -283,7 +283,10 @@ impl Compiler<'_> {
                 RotationWord::Never => Rotation::Never,
             },
             self_collision: section.self_collision.unwrap_or(true),
-            slave_step_max_m,
+            // Who escapes is no faster than it may be, and neither is who is led.
+            slave_step_max_m: escape.map_or(slave_step_max_m, |escape| {
+                slave_step_max_m.min(escape.speed_max_m_s * escape.dt_s)
+            }),
             backtracks: section.backtracks.unwrap_or(Rules::default().backtracks),
             step_m,
         })
