@@ -236,6 +236,7 @@ impl Compiler<'_> {
             return self.add_outline(s, corners, at, all);
         }
         let body = Obstacle::still(id, self.core(s, at.clone())?, s.radius_m);
+        body.check().map_err(|error| self.at(at.clone(), &error))?;
         all.next_id += 1;
         match self.course(s, at.clone())? {
             None => all.still.push(body),
