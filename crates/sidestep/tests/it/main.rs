@@ -2,6 +2,8 @@
 
 mod airspace;
 mod airspace_traffic;
+mod chain;
+mod chain_input;
 mod closed_loop;
 mod common;
 mod determinism;
