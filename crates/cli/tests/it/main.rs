@@ -1,6 +1,8 @@
 //! The real binary, from outside: what it prints, writes and ends with.
 
 mod airspace;
+mod chain;
+mod chain_input;
 mod commands;
 mod contract;
 mod determinism;

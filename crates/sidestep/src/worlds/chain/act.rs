@@ -93,7 +93,8 @@ impl<const D: usize> ChainWorld<D> {
             &mut scratch.propagator,
             &scratch.before,
         );
-        let escaped = escaped.expect("the rules were checked when the scenario was compiled");
+        // Out of the world nobody escapes.
+        let Ok(escaped) = escaped else { return };
         body.tally.escapes.add(&escaped);
         scratch.escaped.copy_from_slice(body.chain.points());
         if escaped.moves > 0 {
@@ -263,7 +264,15 @@ impl<const D: usize> ChainWorld<D> {
             &situation,
         );
         body.driving.ladder = ladder.memory;
-        let climbed = climbed.expect("targets are finite and near");
+        // Out of the world there is no way.
+        let beyond = Veto {
+            by: task.agent,
+            from: task.agent,
+            reason: Reason::Limit,
+            obstacle: None,
+            reached: at,
+        };
+        let climbed = climbed.unwrap_or(Climbed::Vetoed(beyond));
         let way = sub(body.chain.points()[task.agent], at);
         body.driving.way_m[0] += distance(at, to);
         body.driving.way_m[1] += norm(way);
@@ -396,10 +405,15 @@ impl<const D: usize> ChainWorld<D> {
         if self.starts_s(u64::from(body.driving.idle)) <= task.patience_s {
             return;
         }
+        let undone = match &task.driver {
+            Driver::Targets(targets) => 1.0 / targets.places.len() as f64,
+            _ => 1.0 - self.part_done(body, task),
+        };
         body.tally.given_up.push(GivenUp {
             task: body.driving.task,
             part: body.driving.next,
             nearest_m: body.driving.nearest_m,
+            undone,
             by: Some(veto.by as u32),
             reason: Some(veto.reason.name().into()),
         });

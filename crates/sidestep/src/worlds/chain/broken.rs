@@ -63,8 +63,9 @@ impl<const D: usize> ChainWorld<D> {
         let Some(scattered) = &mut body.scattered else { return };
         let mut whole = body.chain.clone();
         let (first, last) = (scattered.first as usize, scattered.last as usize);
+        // An end cannot come out of the world.
         let came = reform(&mut whole, first..=last, may_come)
-            .expect("the scattered connectors were checked when the scenario was compiled");
+            .unwrap_or(Reformed::NotReached { off_m: body.chain.max_rod_violation_m() });
         let event = match came {
             Reformed::Whole { double_passes } => {
                 scattered.goals_m = flat(whole.points());

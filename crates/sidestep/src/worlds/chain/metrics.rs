@@ -201,6 +201,8 @@ pub struct GivenUp {
     pub part: u32,
     /// The nearest that the initiator came to it, meters.
     pub nearest_m: f64,
+    /// The part of the task that is not done because of it, 0 to 1.
+    pub undone: f64,
     /// Who objected at last, if somebody did,
     pub by: Option<u32>,
     /// and why.

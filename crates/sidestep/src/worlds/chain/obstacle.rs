@@ -48,7 +48,13 @@ impl<const D: usize> Obstacle<D> {
         self.core.bounds().grown(self.radius_m)
     }
 
-    fn check(&self) -> Result<(), InputError> {
+    /// Whether it is where obstacles may be: what flies on and on leaves the world in the end.
+    pub(super) fn is_in_range(&self) -> bool {
+        self.check().is_ok()
+    }
+
+    /// Refuses numbers that are not finite or out of range.
+    pub(super) fn check(&self) -> Result<(), InputError> {
         let wrong = |cause: String, remedy: &str| {
             Err(InputError::new(format!("obstacle {}", self.id), cause, remedy))
         };

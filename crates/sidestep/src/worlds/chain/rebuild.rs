@@ -6,7 +6,7 @@
 //! parts that are left, one end must come, and only an end that may.
 
 use super::candidates::guided;
-use super::chain::Chain;
+use super::chain::{Chain, LENGTH_TOLERANCE_M, Rod};
 use super::geometry::{Point, between, distance};
 use super::obstacle::Obstacles;
 use super::propagate::{Direction, Propagator};
@@ -17,6 +17,8 @@ use std::ops::RangeInclusive;
 
 /// Double passes before it is given up. The worst case measured took 120.
 const MAX_DOUBLE_PASSES: usize = 1_000;
+/// A gap of this part of what the scattered parts reach stretches them out.
+const STRETCHED: f64 = 0.999;
 /// An end that comes leaves a gap of this part of what the scattered parts reach.
 const SLACK_LEFT: f64 = 0.95;
 
@@ -77,13 +79,14 @@ pub fn reform<const D: usize>(
     let (low, high) = (first - 1, last + 1);
     let have_m: f64 = chain.rods()[low..high].iter().map(|r| r.max_m).sum();
     let need_m = distance(chain.points()[low], chain.points()[high]);
-    if need_m > have_m {
+    if need_m > have_m + LENGTH_TOLERANCE_M {
         match may_come {
             MayCome::Nobody => return Ok(Reformed::GapTooLong { have_m, need_m }),
             MayCome::First => pull_end(chain, 0..=low, high, have_m)?,
             MayCome::Last => pull_end(chain, high..=chain.points().len() - 1, low, have_m)?,
         }
     }
+    lay_out(chain, low, high, have_m);
     for double_passes in 0..=MAX_DOUBLE_PASSES {
         if (low..high).all(|i| fits(chain.rods()[i], chain.length_m(i))) {
             return Ok(Reformed::Whole { double_passes });
@@ -94,6 +97,22 @@ pub fn reform<const D: usize>(
     let off_m = chain.max_rod_violation_m();
     chain.points_mut().copy_from_slice(&before);
     Ok(Reformed::NotReached { off_m })
+}
+
+/// Where the parts reach across the gap only just, they lie on the straight line between the
+/// stubs: passes would come near that for ever.
+fn lay_out<const D: usize>(chain: &mut Chain<D>, low: usize, high: usize, have_m: f64) {
+    let [a, b] = [chain.points()[low], chain.points()[high]];
+    let part = distance(a, b) / have_m;
+    let fit = |rod: &Rod| fits(*rod, part * rod.max_m);
+    if part < STRETCHED || !chain.rods()[low..high].iter().all(fit) {
+        return;
+    }
+    let mut way_m = 0.0;
+    for i in low..high - 1 {
+        way_m += chain.rods()[i].max_m;
+        chain.points_mut()[i + 1] = between(a, b, way_m / have_m);
+    }
 }
 
 /// From one stub to the connector before the other.
@@ -135,7 +154,7 @@ fn pull_end<const D: usize>(
 
 #[cfg(test)]
 mod tests {
-    use super::super::chain::{Connector, Rod};
+    use super::super::chain::Connector;
     use super::super::geometry::add;
     use super::super::scenes::Numbers;
     use super::*;
@@ -172,6 +191,23 @@ mod tests {
                 chain.points()[scattered.end() + 1..],
                 before.points()[scattered.end() + 1..]
             );
+        }
+    }
+
+    /// As a chain is laid out by a scenario: every rod at its greatest length.
+    #[test]
+    fn parts_that_only_just_reach_across_lie_on_a_line() {
+        for (rod_m, n) in [(1.1, 40), (0.3, 30), (0.7, 12)] {
+            let rod = Rod { min_m: 0.9 * rod_m, max_m: rod_m, radius_m: 0.0 };
+            let mut chain =
+                Chain::straight([0.0; 2], [1.0, 0.0], n - 1, rod, Connector::free(0.0)).unwrap();
+            let mut numbers = Numbers::new(n as u64);
+            for p in &mut chain.points_mut()[3..n - 2] {
+                *p = add(*p, numbers.point(5.0));
+            }
+            let came = reform(&mut chain, 3..=n - 3, MayCome::Nobody).unwrap();
+            assert_eq!(came, Reformed::Whole { double_passes: 0 });
+            assert!(chain.max_rod_violation_m() <= 1e-9);
         }
     }
 

@@ -5,6 +5,7 @@ mod chains;
 mod changes;
 mod navigators;
 mod obstacles;
+mod starts;
 mod tasks;
 
 use super::escape::Escape;
@@ -82,6 +83,7 @@ struct RulesSection {
     escape: EscapeWord,
     escape_speed_m_s: Option<Spanned<f64>>,
     escape_ahead_s: Option<Spanned<f64>>,
+    may_start_inside: bool,
 }
 
 /// How chains get out of the way of what moves.
@@ -208,6 +210,7 @@ impl Compiler<'_> {
         let site = self.site()?;
         let chains = self.chains::<D>(dt_s, site.as_ref())?;
         let ground = self.ground(site.as_ref(), &chains)?;
+        self.starts(&chains, &ground)?;
         let radius_m = chains.iter().flat_map(|spec| spec.start.connectors()).map(|c| c.radius_m);
         let look_m = 4.0 * radius_m.fold(0.05, f64::max);
         let escape = self.escape(&chains, &ground.movers, dt_s)?;

@@ -194,12 +194,20 @@ impl<const D: usize> ChainWorld<D> {
         Bounds::of(chain.points()).grown(radius_m + way_m)
     }
 
-    /// The part of its tasks that a chain has done, from 0 to 1: of scripts by motions, of targets
-    /// by targets, of tasks that take a time by time; of wandering the part of the way wanted that
-    /// was gone. Several tasks count alike.
+    /// The part of its tasks that a chain has done, from 0 to 1. Several tasks count alike; what
+    /// was given up is not done.
     pub fn progress(&self, slot: usize, body: &Body<D>) -> f64 {
-        let spec = &self.chains[slot];
-        let Some(task) = spec.tasks.get(body.driving.task as usize) else { return 1.0 };
+        let tasks = &self.chains[slot].tasks;
+        let part = tasks.get(body.driving.task as usize).map(|task| self.part_done(body, task));
+        let undone: f64 = body.tally.given_up.iter().map(|what| what.undone).sum();
+        let done = f64::from(body.driving.task) + part.unwrap_or(0.0) - undone;
+        (done / tasks.len() as f64).clamp(0.0, 1.0)
+    }
+
+    /// The part of its present task that an initiator is through with: of scripts by motions, of
+    /// targets by targets, of tasks that take a time by time; of wandering the part of the way
+    /// wanted that was gone.
+    pub(super) fn part_done(&self, body: &Body<D>, task: &Task<D>) -> f64 {
         let part = match &task.driver {
             _ if task.lasts_s.is_finite() => self.starts_s(body.driving.cycles) / task.lasts_s,
             Driver::Rest => 1.0,
@@ -216,7 +224,7 @@ impl<const D: usize> ChainWorld<D> {
                 None => way_part(body.driving.way_m),
             },
         };
-        (f64::from(body.driving.task) + part.clamp(0.0, 1.0)) / spec.tasks.len() as f64
+        part.clamp(0.0, 1.0)
     }
 
     /// Whether all tasks of all chains are done and everything is whole.
@@ -278,7 +286,8 @@ impl<const D: usize> Scratch<D> {
             return;
         }
         self.guests.clear();
-        self.guests.extend(world.movers.at(world.starts_s(moment)));
+        let movers = world.movers.at(world.starts_s(moment));
+        self.guests.extend(movers.filter(Obstacle::is_in_range));
         if has_others {
             self.solid.set_moving(&self.guests).expect(CHECKED);
         }
@@ -296,7 +305,11 @@ impl<const D: usize> Scratch<D> {
 }
 
 /// The parts of a chain as obstacles to others.
-fn push_parts<const D: usize>(parts: &mut Vec<Obstacle<D>>, slot: Slot, chain: &Chain<D>) {
+pub(super) fn push_parts<const D: usize>(
+    parts: &mut Vec<Obstacle<D>>,
+    slot: Slot,
+    chain: &Chain<D>,
+) {
     let (id, points) = (OTHER_CHAIN + slot, chain.points());
     let connectors = points.iter().zip(chain.connectors());
     parts.extend(connectors.map(|(at, connector)| Obstacle::ball(id, *at, connector.radius_m)));

@@ -109,6 +109,10 @@ impl<const D: usize> Crowd<D> {
     /// A room that is too small for them, or has no place away from `keep_clear`; sizes or
     /// speeds that are not finite and positive.
     pub fn gather(&self, seed: Seed, first_id: u32) -> Result<Vec<Mover<D>>, InputError> {
+        if f64::from(self.n) > MAX_OBSTACLES {
+            let cause = format!("{} moving obstacles", self.n);
+            return Err(InputError::new("crowd", cause, "give at most 1e7"));
+        }
         let streams = Streams::new(seed);
         (0..self.n).map(|k| self.one(&streams, k, first_id + k)).collect()
     }

@@ -24,7 +24,9 @@ use toml::Spanned;
 const ROOM: f64 = 1.2;
 /// Room for robots that follow their connectors on wheels, meters.
 const MARGIN_M: f64 = 0.08;
-/// Most connectors of a chain.
+/// Most sub-steps of an initiator in a cycle.
+const MAX_STEPS: f64 = 1e5;
+/// Most connectors of all chains together: some 3 GB.
 const MAX_CONNECTORS: usize = 10_000_000;
 
 /// A length, or the least and the greatest.
@@ -41,7 +43,7 @@ pub(super) struct ChainSection {
     #[serde(default)]
     name: String,
     #[serde(default = "one_chain")]
-    count: usize,
+    pub(super) count: usize,
     apart_m: Option<Spanned<Vec<f64>>>,
     connectors: Option<usize>,
     at_m: Option<Spanned<Vec<f64>>>,
@@ -99,6 +101,7 @@ impl Compiler<'_> {
         dt_s: f64,
         site: Option<&Site>,
     ) -> Result<Vec<ChainSpec<D>>, InputError> {
+        self.check_total()?;
         let mut all = Vec::new();
         for section in &self.file.chains.0 {
             let spec = self.chain::<D>(section, dt_s, site)?;
@@ -111,6 +114,23 @@ impl Compiler<'_> {
             return Err(self.error(None, "the scenario has no chains", remedy));
         }
         Ok(all)
+    }
+
+    /// Refuses more connectors than memory is for, before any is made.
+    fn check_total(&self) -> Result<(), InputError> {
+        let mut total: usize = 0;
+        for section in &self.file.chains.0 {
+            let s = section.get_ref();
+            let given = s.points_m.as_ref().map(|points| points.get_ref().len());
+            let n = s.connectors.or(given).unwrap_or(1).max(1);
+            total = total.saturating_add(n.saturating_mul(s.count));
+            if total > MAX_CONNECTORS {
+                let cause = format!("{total} connectors in all");
+                let remedy = format!("give at most {MAX_CONNECTORS}: connectors times count");
+                return Err(self.error(Some(section.span()), cause, remedy));
+            }
+        }
+        Ok(())
     }
 
     /// One more chain like `spec`, so many times `apart_m` further.
@@ -166,12 +186,30 @@ impl Compiler<'_> {
             return Err(self.error(Some(at), "a chain that breaks more than once", remedy));
         }
         let speed_m_s = tasks.iter().map(|task| task.speed_m_s).fold(0.0, f64::max);
+        self.check_steps(&start, speed_m_s * dt_s, at.clone())?;
         let robots = s.robots.as_ref().map(|robots| self.robots(robots, speed_m_s)).transpose()?;
         if D != 2 && robots.is_some() {
             let remedy = "set chain.dimensions = 2, or leave robots out";
             return Err(self.error(Some(at), "robots on wheels in space", remedy));
         }
         Ok(ChainSpec { name: s.name.clone(), start, tasks, changes, arm, robots })
+    }
+
+    /// Refuses a way per cycle that would take more sub-steps than anybody waits for.
+    fn check_steps<const D: usize>(
+        &self,
+        chain: &Chain<D>,
+        way_m: f64,
+        at: Range<usize>,
+    ) -> Result<(), InputError> {
+        let step_m = self.rules()?.step_m.unwrap_or(chain.step_m());
+        if way_m <= MAX_STEPS * step_m {
+            return Ok(());
+        }
+        let cause = format!("its initiator goes {way_m:e} m in a cycle, in steps of {step_m:e} m");
+        let remedy = "give a shorter chain.dt_s, a lower speed_m_s, larger connectors and rods, \
+                      or a longer chain.step_m";
+        Err(self.error(Some(at), cause, remedy))
     }
 
     fn shape<const D: usize>(

@@ -6,7 +6,7 @@ use super::super::ground::fields::{Crowd, Field};
 use super::super::ground::{Corridor, Course, Leg, Mover, Movers, Site};
 use super::super::obstacle::{Obstacle, Obstacles, outline};
 use super::super::world::ChainSpec;
-use super::Compiler;
+use super::{Compiler, MOST};
 use crate::import::{rosmap, stage};
 use crate::map::UnknownPolicy;
 use serde::Deserialize;
@@ -236,6 +236,7 @@ impl Compiler<'_> {
             return self.add_outline(s, corners, at, all);
         }
         let body = Obstacle::still(id, self.core(s, at.clone())?, s.radius_m);
+        body.check().map_err(|error| self.at(at.clone(), &error))?;
         all.next_id += 1;
         match self.course(s, at.clone())? {
             None => all.still.push(body),
@@ -309,6 +310,10 @@ impl Compiler<'_> {
                 let room = Bounds { lo: point(lo, "bounces_m")?, hi: point(hi, "bounces_m")? };
                 Ok(Some(Course::Bouncing { velocity_m_s: point(v, "velocity_m_s")?, room }))
             }
+            (None, None, Some(_)) if s.speed_m_s.is_some_and(|speed_m_s| speed_m_s > MOST) => {
+                let cause = format!("speed_m_s = {:?}", s.speed_m_s.unwrap_or_default());
+                Err(self.error(Some(at), cause, "give at most 1e6 m/s"))
+            }
             (None, None, Some(way_points)) => Ok(Some(Course::Patrol {
                 way_points: way_points
                     .iter()
@@ -350,6 +355,11 @@ impl Compiler<'_> {
             }
             (None, Some(n)) if s.length_m.is_none() && s.speed_m_s.is_some() => {
                 let speed_m_s = s.speed_m_s.map_or(0.0..=0.0, Range1::range);
+                let ends = [&radius_m, &speed_m_s].map(|range| [*range.start(), *range.end()]);
+                if let Some(x) = ends.iter().flatten().find(|x| !(0.0..=MOST).contains(*x)) {
+                    let cause = format!("a radius_m or a speed_m_s of {x}");
+                    return Err(self.error(Some(at), cause, "give numbers from 0 to 1e6"));
+                }
                 let crowd = Crowd { room, n, radius_m, speed_m_s, keep_clear, keep_m };
                 let gathered = crowd.gather(seed, all.next_id);
                 all.movers.extend(gathered.map_err(|error| self.at(at, &error))?);

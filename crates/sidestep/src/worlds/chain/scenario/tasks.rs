@@ -1,10 +1,10 @@
 //! What initiators are to do.
 
-use super::super::driver::{Driver, Targets, Task, Wander};
+use super::super::driver::{Driver, MAX_MOTIONS, Targets, Task, Wander};
 use super::super::geometry::Bounds;
-use super::super::script::Script;
-use super::Compiler;
+use super::super::script::{Motion, Script, Turtle};
 use super::navigators::NavigatorSection;
+use super::{Compiler, MOST};
 use serde::Deserialize;
 use sidestep_kernel::InputError;
 use std::ops::Range;
@@ -89,7 +89,11 @@ impl Compiler<'_> {
                 turn_rad: self.positive(s.turn_deg.as_ref(), "turn_deg", 30.0)?.to_radians(),
                 within: s.within_m.as_ref().map(|w| self.within(w)).transpose()?,
             }),
-            Kind::Script => Driver::Script(Arc::new(self.script(s, at)?)),
+            Kind::Script => {
+                let script = self.script(s, at.clone())?;
+                self.try_script(&script, at)?;
+                Driver::Script(Arc::new(script))
+            }
             Kind::Targets => Driver::Targets(self.targets(s, at)?),
             Kind::Navigate if D != 2 => {
                 let remedy = "set chain.dimensions = 2, or give another kind";
@@ -139,6 +143,25 @@ impl Compiler<'_> {
                 Err(self.error(Some(at), "a task of kind script needs one script", remedy))
             }
         }
+    }
+
+    /// Carries a script out once, so that it cannot fail while a run goes on: whether it comes to
+    /// motions does not depend on where it begins, but for places beyond all numbers.
+    fn try_script(&self, script: &Script, at: Range<usize>) -> Result<(), InputError> {
+        for (n, motion) in script.motions(Turtle::default()).enumerate() {
+            let is_far = match motion? {
+                Motion::MoveTo { position_m } => position_m.iter().any(|x| x.abs() > MOST),
+                _ => false,
+            };
+            if is_far || n >= MAX_MOTIONS {
+                let cause = match is_far {
+                    true => "the script leads further than 1e6 m".into(),
+                    false => format!("the script comes to more than {MAX_MOTIONS} motions"),
+                };
+                return Err(self.error(Some(at), cause, "go less far, or repeat less often"));
+            }
+        }
+        Ok(())
     }
 
     fn targets<const D: usize>(

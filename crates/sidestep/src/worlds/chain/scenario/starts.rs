@@ -1,0 +1,100 @@
+//! Whether chains have their places to themselves at the start.
+
+use super::super::chain::Chain;
+use super::super::geometry::Bounds;
+use super::super::metrics::PENETRATION_M;
+use super::super::obstacle::{Obstacle, Obstacles};
+use super::super::world::{ChainSpec, OTHER_CHAIN, push_parts};
+use super::Compiler;
+use super::obstacles::Ground;
+use sidestep_kernel::{InputError, Slot};
+use std::ops::Range;
+
+/// A part of a chain that is in something.
+#[derive(Debug, Clone, Copy)]
+struct Inside {
+    /// The part's connector; of a rod the one before it.
+    connector: usize,
+    id: u32,
+    depth_m: f64,
+}
+
+impl Compiler<'_> {
+    /// Refuses chains that begin in obstacles, or in each other: no motion leads out of there
+    /// without passing through something.
+    pub(super) fn starts<const D: usize>(
+        &self,
+        chains: &[ChainSpec<D>],
+        ground: &Ground<D>,
+    ) -> Result<(), InputError> {
+        if self.file.chain.may_start_inside {
+            return Ok(());
+        }
+        let mut obstacles = ground.obstacles.clone();
+        let moving: Vec<_> = ground.movers.at(0.0).filter(Obstacle::is_in_range).collect();
+        obstacles.set_moving(&moving)?;
+        for (slot, spec) in chains.iter().enumerate() {
+            if let Some(inside) = deepest(&spec.start, &obstacles, None) {
+                return Err(self.starts_in(slot, inside, &format!("obstacle {}", inside.id)));
+            }
+        }
+        if chains.len() < 2 {
+            return Ok(());
+        }
+        let mut parts = Vec::new();
+        let with_slots = || (0..).zip(chains);
+        with_slots().for_each(|(slot, spec)| push_parts(&mut parts, slot, &spec.start));
+        let longest_m = chains.iter().flat_map(|spec| spec.start.rods()).map(|rod| rod.max_m);
+        let parts = Obstacles::new(parts, longest_m.fold(1e-3, f64::max))?;
+        let met = with_slots().find_map(|(slot, spec)| {
+            deepest(&spec.start, &parts, Some(OTHER_CHAIN + slot)).map(|inside| (slot, inside))
+        });
+        met.map_or(Ok(()), |(slot, inside): (Slot, _)| {
+            let other = format!("chain {}", inside.id - OTHER_CHAIN);
+            Err(self.starts_in(slot as usize, inside, &other))
+        })
+    }
+
+    fn starts_in(&self, slot: usize, inside: Inside, what: &str) -> InputError {
+        let Inside { connector, depth_m, .. } = inside;
+        let cause = format!(
+            "chain {slot} begins {depth_m:.3e} m deep in {what}, with connector {connector} or \
+             the rod behind it"
+        );
+        let remedy = "move one of them, or set chain.may_start_inside = true";
+        self.error(self.section_of(slot), cause, remedy)
+    }
+
+    /// Where the section stands that a chain comes from.
+    fn section_of(&self, slot: usize) -> Option<Range<usize>> {
+        let sections = self.file.chains.0.iter();
+        let mut spans = sections.flat_map(|s| std::iter::repeat_n(s.span(), s.get_ref().count));
+        spans.nth(slot)
+    }
+}
+
+/// Where a chain is deepest in anything that is not called `own`.
+fn deepest<const D: usize>(
+    chain: &Chain<D>,
+    obstacles: &Obstacles<D>,
+    own: Option<u32>,
+) -> Option<Inside> {
+    let points = chain.points();
+    let mut deepest: Option<Inside> = None;
+    for connector in 0..points.len() {
+        let end = (connector + 1).min(points.len() - 1);
+        let radius_m = chain.connectors()[connector].radius_m;
+        let rod_radius_m = chain.rods().get(connector).map_or(0.0, |rod| rod.radius_m);
+        let near = Bounds::of(&[points[connector], points[end]]).grown(radius_m.max(rod_radius_m));
+        obstacles.visit(&near, |o| {
+            let ball_m = o.core.nearest_to_point(points[connector]).distance_m - radius_m;
+            let rod_m = o.core.nearest_to_segment([points[connector], points[end]]).distance_m;
+            let depth_m = o.radius_m - ball_m.min(rod_m - rod_radius_m);
+            let most_m = deepest.map_or(PENETRATION_M, |inside| inside.depth_m);
+            if depth_m > most_m && own != Some(o.id) {
+                deepest = Some(Inside { connector, id: o.id, depth_m });
+            }
+        });
+    }
+    deepest
+}
