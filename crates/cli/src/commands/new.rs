@@ -34,6 +34,8 @@ enum World {
     Robots,
     /// Airplanes that avoid each other
     Airspace,
+    /// Chains that creep among obstacles
+    Chain,
 }
 
 impl World {
@@ -41,6 +43,7 @@ impl World {
         match self {
             Self::Robots => "robots",
             Self::Airspace => "airspace",
+            Self::Chain => "chain",
         }
     }
 
@@ -48,6 +51,7 @@ impl World {
         match self {
             Self::Robots => include_str!("../../../../scenarios/robots/default.toml"),
             Self::Airspace => include_str!("../../../../scenarios/airspace/default.toml"),
+            Self::Chain => include_str!("../../../../scenarios/chain/serpentine.toml"),
         }
     }
 }
