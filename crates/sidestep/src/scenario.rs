@@ -8,6 +8,7 @@ use serde::de::DeserializeOwned;
 use sidestep_kernel::InputError;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use toml::Spanned;
 use toml_edit::{DocumentMut, Item, Value};
 
 /// Version of the scenario format that this program reads.
@@ -268,6 +269,65 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for OneOrMany<T> {
     }
 }
 
+/// The same of tables that know where they stand.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sections<T>(pub Vec<Spanned<T>>);
+
+impl<T> Default for Sections<T> {
+    fn default() -> Self {
+        Self(Vec::new())
+    }
+}
+
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for Sections<T> {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let spanned = Spanned::<OneOrEach<T>>::deserialize(deserializer)?;
+        let span = spanned.span();
+        Ok(Self(match spanned.into_inner() {
+            OneOrEach::One(one) => vec![Spanned::new(span, one)],
+            OneOrEach::Each(many) => many,
+        }))
+    }
+}
+
+/// What stands in a table's place: where it stands is told of the whole, and of tables in an array
+/// of each.
+enum OneOrEach<T> {
+    One(T),
+    Each(Vec<Spanned<T>>),
+}
+
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for OneOrEach<T> {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Visitor<T>(std::marker::PhantomData<T>);
+
+        impl<'de, T: Deserialize<'de>> serde::de::Visitor<'de> for Visitor<T> {
+            type Value = OneOrEach<T>;
+
+            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str("a table or an array of tables")
+            }
+
+            fn visit_map<A: serde::de::MapAccess<'de>>(
+                self,
+                map: A,
+            ) -> Result<Self::Value, A::Error> {
+                T::deserialize(serde::de::value::MapAccessDeserializer::new(map))
+                    .map(OneOrEach::One)
+            }
+
+            fn visit_seq<A: serde::de::SeqAccess<'de>>(
+                self,
+                seq: A,
+            ) -> Result<Self::Value, A::Error> {
+                Vec::deserialize(serde::de::value::SeqAccessDeserializer::new(seq))
+                    .map(OneOrEach::Each)
+            }
+        }
+        deserializer.deserialize_any(Visitor(std::marker::PhantomData))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -293,6 +353,35 @@ mod tests {
         for bad in ["seed", "=1", "a..b=1", "seed.x=1", "robots.5.count=1"] {
             let error = with("seed = 1\n[[robots]]\n[[robots]]\n", &[bad]).expect_err(bad);
             assert_eq!(error.place(), format!("--set {bad}"));
+        }
+    }
+
+    #[test]
+    fn sections_stand_alone_or_in_an_array_and_know_where() {
+        #[derive(Debug, Deserialize)]
+        struct File {
+            #[serde(default)]
+            a: Sections<Section>,
+        }
+        #[derive(Debug, Deserialize)]
+        #[serde(deny_unknown_fields)]
+        struct Section {
+            n: u32,
+        }
+        let read = |text: &str| Source::new("s.toml", text, "").parse::<File>();
+        for (text, starts) in [
+            ("[a]\nn = 1\n", vec![(1, 0)]),
+            ("[[a]]\nn = 1\n[[a]]\nn = 2\n", vec![(1, 0), (2, 12)]),
+            ("a = [{ n = 1 }, { n = 2 }]", vec![(1, 5), (2, 16)]),
+            ("", vec![]),
+        ] {
+            let file = read(text).expect(text);
+            let told: Vec<_> = file.a.0.iter().map(|s| (s.get_ref().n, s.span().start)).collect();
+            assert_eq!(told, starts, "{text}");
+        }
+        for text in ["[a]\nm = 1\n", "[[a]]\nn = 1\n[[a]]\nm = 1\n"] {
+            let error = read(text).expect_err(text).to_string();
+            assert!(error.contains("unknown key `m`"), "{error}");
         }
     }
 

@@ -276,5 +276,5 @@ fn a_run_of_no_cycles_and_a_chain_of_one_connector_are_runs() {
     let place = place();
     assert_eq!(place.json(&["run", "two.toml", "--cycles", "0"])["metrics"]["steps"], 0);
     let one = place.json(&["run", "two.toml", "--set", "chains.1.connectors=1"]);
-    assert_eq!(one["connectors"], 7, "{one}");
+    assert_eq!(one["robots"], 7, "{one}");
 }

@@ -94,14 +94,16 @@ fn a_replay_of_changed_rows_says_so() {
 
 #[test]
 fn new_writes_a_scenario_that_runs_and_overwrites_nothing() {
-    let place = Place::new();
-    assert_eq!(place.run(&["new", "robots", "n.toml"]).code(), 0);
-    assert_eq!(place.run(&["check", "n.toml"]).code(), 0);
-    assert_eq!(place.run(&["run", "n.toml", "--cycles", "20"]).code(), 0);
-    let text = place.read("n.toml");
-    let again = place.run(&["new", "robots", "n.toml"]);
-    assert_eq!((again.code(), place.read("n.toml")), (2, text));
-    assert!(again.err().contains("n.toml"));
+    for world in ["robots", "airspace", "chain"] {
+        let place = Place::new();
+        assert_eq!(place.run(&["new", world, "n.toml"]).code(), 0);
+        assert_eq!(place.run(&["check", "n.toml"]).code(), 0);
+        assert_eq!(place.run(&["run", "n.toml", "--cycles", "20"]).code(), 0);
+        let text = place.read("n.toml");
+        let again = place.run(&["new", world, "n.toml"]);
+        assert_eq!((again.code(), place.read("n.toml")), (2, text));
+        assert!(again.err().contains("n.toml"));
+    }
 }
 
 #[test]

@@ -12,7 +12,9 @@ const COUNTS: [i64; 5] = [0, -1, 1_000_000_000_000, i64::MAX, i64::MIN];
 
 /// All scenarios that there are of a number, each with another one in its place.
 fn mutants(value: &Value) -> Vec<Value> {
-    let put = |of: Vec<Value>, whole: &dyn Fn(Value) -> Value| of.into_iter().map(whole).collect();
+    fn put(of: Vec<Value>, whole: impl Fn(Value) -> Value) -> Vec<Value> {
+        of.into_iter().map(whole).collect()
+    }
     match value {
         Value::Float(_) => NUMBERS.map(Value::Float).to_vec(),
         Value::Integer(_) => {
@@ -20,26 +22,30 @@ fn mutants(value: &Value) -> Vec<Value> {
         }
         Value::Array(items) => {
             let at = |k: usize| {
-                put(mutants(&items[k]), &|changed| {
+                put(mutants(&items[k]), |changed| {
                     let mut items = items.clone();
                     items[k] = changed;
                     Value::Array(items)
                 })
             };
-            (0..items.len()).flat_map(at).collect::<Vec<_>>()
+            (0..items.len()).flat_map(at).collect()
         }
         Value::Table(table) => {
             let at = |(key, item): (&String, &Value)| {
-                put(mutants(item), &|changed| {
+                put(mutants(item), |changed| {
                     let mut table = table.clone();
                     table.insert(key.clone(), changed);
                     Value::Table(table)
                 })
             };
-            table.iter().flat_map(at).collect::<Vec<_>>()
+            table.iter().flat_map(at).collect()
         }
         _ => Vec::new(),
     }
+}
+
+fn text_of(mutant: &Value) -> String {
+    toml::to_string(mutant).expect("a table")
 }
 
 fn run<const D: usize>(compiled: Compiled<D>, source: &Source) {
@@ -55,7 +61,7 @@ fn try_all(text: &str) -> [usize; 2] {
     let table: toml::Table = text.parse().expect("a right scenario");
     let mut told = [0; 2];
     for mutant in mutants(&Value::Table(table)) {
-        let source = Source::new("s.toml", mutant.to_string(), FOLDER);
+        let source = Source::new("s.toml", text_of(&mutant), FOLDER);
         match AnyCompiled::new(&source) {
             Err(error) => {
                 assert!(!error.cause().is_empty() && !error.remedy().is_empty(), "{error}");

@@ -97,7 +97,11 @@ where
     fn contents(&self) -> Said {
         let world = self.simulation.world();
         let rods: usize = world.chains.iter().map(|spec| spec.start.rods().len()).sum();
+        let plan = self.plan();
         let json = json!({
+            "name": plan.name,
+            "seed": plan.seed,
+            "cycles": plan.cycles,
             "chains": world.chains.len(),
             "connectors": self.simulation.agents(),
             "rods": rods,

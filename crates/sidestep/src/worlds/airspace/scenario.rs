@@ -14,7 +14,7 @@ use super::state::{AirplaneRecord, AirspaceState, FLYING, Snapshot};
 use super::track::Track;
 use super::world::{Airplane, AirspaceWorld, Disturbance, Method};
 use crate::collectives::{Choice, Estimator, Order, Update, Utility};
-use crate::scenario::{OneOrMany, Source};
+use crate::scenario::{Sections, Source};
 use network::NetworkSection;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::stream::Streams;
@@ -78,7 +78,7 @@ struct AirspaceFile {
     airspace: AirspaceSection,
     airplane: Option<Spanned<ModelSection>>,
     #[serde(default = "no_airplanes")]
-    airplanes: Spanned<OneOrMany<Spanned<AirplaneSection>>>,
+    airplanes: Spanned<Sections<AirplaneSection>>,
     #[serde(default)]
     record: RecordSection,
 }
@@ -87,8 +87,8 @@ fn one() -> u64 {
     1
 }
 
-fn no_airplanes() -> Spanned<OneOrMany<Spanned<AirplaneSection>>> {
-    Spanned::new(0..0, OneOrMany(Vec::new()))
+fn no_airplanes() -> Spanned<Sections<AirplaneSection>> {
+    Spanned::new(0..0, Sections::default())
 }
 
 #[derive(Debug, Default, Deserialize)]

@@ -179,6 +179,10 @@ impl<const D: usize> ChainWorld<D> {
                     return Wish::Done;
                 };
                 let left_m = distance(at, target);
+                body.driving.late = match left_m < body.driving.nearest_m {
+                    true => 0,
+                    false => body.driving.late.saturating_add(1),
+                };
                 body.driving.nearest_m = body.driving.nearest_m.min(left_m);
                 if left_m > targets.tolerance_m {
                     return Wish::Go(towards(at, target, step_m));
@@ -224,7 +228,7 @@ impl<const D: usize> ChainWorld<D> {
     fn next_part(&self, body: &mut Body<D>) {
         body.driving.next += 1;
         (body.driving.rested, body.driving.idle) = (0, 0);
-        body.driving.nearest_m = f64::INFINITY;
+        (body.driving.nearest_m, body.driving.late) = (f64::INFINITY, 0);
     }
 
     /// Moves an initiator on wheels; one whose way is blocked may turn where it stands.
@@ -331,15 +335,16 @@ impl<const D: usize> ChainWorld<D> {
             Climbed::Stuck { vetoes } => {
                 self.tell_once(body, turn.event(EventKind::Stuck, task.agent, 0.0), scratch);
                 self.look_elsewhere(body, task, turn);
-                if let Some(veto) = vetoes.first() {
-                    self.vetoed(body, turn, veto, scratch);
-                    self.lose_patience(body, (task, veto), turn, scratch);
-                    return Went::Nowhere;
+                match vetoes.first() {
+                    Some(veto) => self.vetoed(body, turn, veto, scratch),
+                    None => body.driving.idle = body.driving.idle.saturating_add(1),
                 }
+                self.lose_patience(body, (task, vetoes.first()), turn, scratch);
+                return Went::Nowhere;
             }
             Climbed::Vetoed(veto) => {
                 self.vetoed(body, turn, veto, scratch);
-                self.lose_patience(body, (task, veto), turn, scratch);
+                self.lose_patience(body, (task, Some(veto)), turn, scratch);
                 return Went::Nowhere;
             }
         }
@@ -394,15 +399,17 @@ impl<const D: usize> ChainWorld<D> {
         body.driving.idle = body.driving.idle.saturating_add(1);
     }
 
-    /// A task that met with vetoes for too long is given up.
+    /// A task that met with vetoes for too long is given up. Around a target there is always some
+    /// way to go: there it counts for how long none of them led nearer.
     fn lose_patience(
         &self,
         body: &mut Body<D>,
-        (task, veto): (&Task<D>, &Veto<D>),
+        (task, veto): (&Task<D>, Option<&Veto<D>>),
         turn: Turn<'_, D>,
         scratch: &mut Scratch<D>,
     ) {
-        if self.starts_s(u64::from(body.driving.idle)) <= task.patience_s {
+        let tried = body.driving.idle.max(body.driving.late);
+        if self.starts_s(u64::from(tried)) <= task.patience_s {
             return;
         }
         let undone = match &task.driver {
@@ -414,13 +421,14 @@ impl<const D: usize> ChainWorld<D> {
             part: body.driving.next,
             nearest_m: body.driving.nearest_m,
             undone,
-            by: Some(veto.by as u32),
-            reason: Some(veto.reason.name().into()),
+            by: veto.map(|veto| veto.by as u32),
+            reason: veto.map(|veto| veto.reason.name().into()),
         });
         match task.driver {
             Driver::Targets(_) => {
-                let event = turn.event(EventKind::GivenUp, veto.by, f64::from(body.driving.task));
-                scratch.events.push(Event { reason: Some(veto.reason), ..event });
+                let by = veto.map_or(task.agent, |veto| veto.by);
+                let event = turn.event(EventKind::GivenUp, by, f64::from(body.driving.task));
+                scratch.events.push(Event { reason: veto.map(|veto| veto.reason), ..event });
                 self.next_part(body);
             }
             _ => self.next_task(body, turn, EventKind::GivenUp, scratch),

@@ -83,6 +83,8 @@ pub struct Driving {
     pub cycles: Cycle,
     /// of these, without a motion to the end.
     pub idle: u32,
+    /// Cycles since it came nearer to its present target than ever.
+    pub late: u32,
     /// Motions of the script, or targets, that are done with.
     pub next: u32,
     /// Cycles that it has rested on order of the script.
@@ -108,6 +110,7 @@ impl Driving {
             task: 0,
             cycles: 0,
             idle: 0,
+            late: 0,
             next: 0,
             rested: 0,
             start: [[0.0; 3]; 3],
@@ -127,7 +130,7 @@ impl Driving {
         self.start = [turtle.position_m, turtle.ahead, turtle.left];
         self.ahead = turtle.ahead;
         (self.cycles, self.idle, self.next, self.rested) = (0, 0, 0, 0);
-        (self.nearest_m, self.leader) = (f64::INFINITY, None);
+        (self.nearest_m, self.late, self.leader) = (f64::INFINITY, 0, None);
         self.ladder = Memory::default();
     }
 

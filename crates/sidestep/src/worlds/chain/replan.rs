@@ -102,7 +102,8 @@ pub enum Climbed<const D: usize> {
     },
     /// Nothing moved, and no rung is left; all objections, each once.
     Stuck {
-        /// From the wanted motion to the last rung.
+        /// From the wanted motion to the last rung; none where the wanted motion would now be free,
+        /// and only detours have led here.
         vetoes: Vec<Veto<D>>,
     },
     /// Nothing moved: a planner or an operator wanted it, and is told.
@@ -258,10 +259,10 @@ impl Ladder {
         let (k, way) = climb.wanted_way();
         let begins = self.memory.pulling_back == self.rungs.pull_back;
         if begins && self.memory.hand_overs >= self.rungs.hand_overs {
-            return Ok(self.stuck(climb));
+            return self.stuck(climb);
         }
         self.memory.hand_overs += u32::from(begins);
-        let Some((by, u)) = other_end(climb.chain, k) else { return Ok(self.stuck(climb)) };
+        let Some((by, u)) = other_end(climb.chain, k) else { return self.stuck(climb) };
         let at = climb.chain.points()[by];
         let axes = axes_across(u);
         let step = scaled(u, norm(way));
@@ -273,12 +274,22 @@ impl Ladder {
                 return Ok(Climbed::PulledBack { by, moved });
             }
         }
-        Ok(self.stuck(climb))
+        self.stuck(climb)
     }
 
-    fn stuck<const D: usize>(&mut self, climb: &mut Climb<'_, D>) -> Climbed<D> {
+    fn stuck<const D: usize>(
+        &mut self,
+        climb: &mut Climb<'_, D>,
+    ) -> Result<Climbed<D>, InputError> {
         self.memory.starts_afresh();
-        Climbed::Stuck { vetoes: std::mem::take(&mut climb.vetoes) }
+        if climb.vetoes.is_empty() {
+            // Its detours have led nowhere, and it has tried nothing since: what is in the way?
+            let request = Request { mode: Mode::Exact, ..climb.wanted };
+            let mut chain = climb.chain.clone();
+            let tried = reach::go(climb.propagator, &mut chain, climb.obstacles, &request)?;
+            tried.veto().into_iter().for_each(|veto| climb.note(*veto));
+        }
+        Ok(Climbed::Stuck { vetoes: std::mem::take(&mut climb.vetoes) })
     }
 }
 

@@ -14,7 +14,7 @@ use super::ground::Movers;
 use super::replan::Rungs;
 use super::rules::{Rotation, Rules};
 use super::world::{ChainSpec, ChainWorld};
-use crate::scenario::{OneOrMany, Source};
+use crate::scenario::{Sections, Source};
 use chains::ChainSection;
 use obstacles::{FieldSection, GroundSection, ObstacleSection};
 use serde::Deserialize;
@@ -46,13 +46,12 @@ struct ChainFile {
     #[serde(default)]
     ground: Option<Spanned<GroundSection>>,
     #[serde(default)]
-    obstacles: OneOrMany<Spanned<ObstacleSection>>,
+    obstacles: Sections<ObstacleSection>,
     #[serde(default)]
-    fields: OneOrMany<Spanned<FieldSection>>,
+    fields: Sections<FieldSection>,
     #[serde(default)]
-    chains: OneOrMany<Spanned<ChainSection>>,
-    #[serde(default)]
-    record: RecordSection,
+    chains: Sections<ChainSection>,
+    record: Option<Spanned<RecordSection>>,
 }
 
 fn one() -> u64 {
@@ -225,15 +224,16 @@ impl Compiler<'_> {
             look_m: self.positive(section.look_m.as_ref(), "look_m", look_m)?,
             streams,
         };
-        if self.file.record.every == 0 {
-            return Err(self.error(None, "record.every = 0", "give 1 or more"));
+        let record = self.file.record.as_ref();
+        if let Some(record) = record.filter(|record| record.get_ref().every == 0) {
+            return Err(self.error(Some(record.span()), "record.every = 0", "give 1 or more"));
         }
         let compiled = Compiled {
             world: Arc::new(world),
             name: self.file.name.clone(),
             seed: self.file.seed,
             cycles: self.file.cycles.unwrap_or(CYCLES),
-            record: self.file.record,
+            record: record.map_or(RecordSection::default(), |record| *record.get_ref()),
         };
         self.try_out(&compiled)?;
         Ok(compiled)

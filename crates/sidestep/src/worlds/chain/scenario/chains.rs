@@ -13,7 +13,7 @@ use super::arms::ArmSection;
 use super::changes::ChangeSection;
 use super::navigators::RobotsSection;
 use super::tasks::TaskSection;
-use crate::scenario::OneOrMany;
+use crate::scenario::Sections;
 use serde::Deserialize;
 use sidestep_kernel::{InputError, Seed, math};
 use std::ops::Range;
@@ -60,11 +60,11 @@ pub(super) struct ChainSection {
     rod_radius_m: Option<f64>,
     max_bend_deg: Option<f64>,
     #[serde(default)]
-    limits: OneOrMany<Spanned<LimitSection>>,
+    limits: Sections<LimitSection>,
     #[serde(default)]
-    tasks: OneOrMany<Spanned<TaskSection>>,
+    tasks: Sections<TaskSection>,
     #[serde(default)]
-    changes: OneOrMany<Spanned<ChangeSection>>,
+    changes: Sections<ChangeSection>,
 }
 
 fn one_chain() -> usize {

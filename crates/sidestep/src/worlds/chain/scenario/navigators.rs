@@ -7,10 +7,11 @@ use super::super::swarm::drive::Drive;
 use super::super::swarm::follower::Follower;
 use super::super::swarm::laser::Laser;
 use super::super::swarm::leader::{Leader, LeaveRule, Leaving, TargetSense, Turning};
-use super::Compiler;
+use super::{Compiler, MOST};
 use serde::Deserialize;
 use sidestep_kernel::InputError;
 use std::f64::consts::PI;
+use std::ops::Range;
 use toml::Spanned;
 
 /// A point of a corridor's middle so often.
@@ -87,6 +88,8 @@ impl Compiler<'_> {
             Some(at) => self.at(at, &error),
             None => error,
         };
+        let numbers = [("range_m", s.range_m), ("wheelbase_m", s.wheelbase_m)];
+        self.has_measures(at.clone(), &numbers)?;
         let usual = Leader::new(speed_m_s).map_err(told)?;
         let laser = Laser::new(
             s.beams.unwrap_or(180),
@@ -121,6 +124,22 @@ impl Compiler<'_> {
         Ok(Navigator { leader, drive, goal: self.goal(s)? })
     }
 
+    /// Refuses numbers that no robot has: their squares and quotients would be none at all.
+    fn has_measures(
+        &self,
+        at: Option<Range<usize>>,
+        numbers: &[(&str, Option<f64>)],
+    ) -> Result<(), InputError> {
+        let is_wrong = |given: &Option<f64>| given.is_some_and(|x| !(1e-6..=MOST).contains(&x));
+        match numbers.iter().find(|(_, given)| is_wrong(given)) {
+            None => Ok(()),
+            Some((key, given)) => {
+                let cause = format!("{key} = {}", given.unwrap_or_default());
+                Err(self.error(at, cause, "give a number from 1e-6 to 1e6"))
+            }
+        }
+    }
+
     /// The target, or the end of the corridor that the scenario has.
     fn goal(&self, s: &NavigatorSection) -> Result<Option<Goal>, InputError> {
         if let Some(at) = s.target_m {
@@ -143,15 +162,22 @@ impl Compiler<'_> {
     ) -> Result<Robots, InputError> {
         let s = section.get_ref();
         let told = |error: InputError| self.at(section.span(), &error);
+        let numbers = [
+            ("radius_m", s.radius_m),
+            ("wheelbase_m", s.wheelbase_m),
+            ("wheel_speed_m_s", s.wheel_speed_m_s),
+            ("sensors_m", s.sensors_m),
+            ("gain_per_s", s.gain_per_s),
+            ("turn_gain_per_s", s.turn_gain_per_s),
+        ];
+        self.has_measures(Some(section.span()), &numbers)?;
         let wheel_m_s = s.wheel_speed_m_s.unwrap_or(1.2 * speed_m_s);
         let drive = Drive::new(s.wheelbase_m.unwrap_or(WHEELBASE_M), wheel_m_s).map_err(told)?;
         let mut follower = Follower::new(drive, self.robot_radius_m(s)).map_err(told)?;
         let lag_limit_m = s.lag_limit_m.unwrap_or(LAG_LIMIT_M);
-        let gains = [s.gain_per_s, s.turn_gain_per_s, s.sensors_m];
-        let is_wrong = |gain: &f64| !(*gain > 0.0 && gain.is_finite());
-        if gains.iter().flatten().any(is_wrong) || lag_limit_m.is_nan() || lag_limit_m <= 0.0 {
-            let remedy = "give gains, the range of sensors and lag_limit_m above 0";
-            return Err(self.error(Some(section.span()), "a number that is not above 0", remedy));
+        if lag_limit_m.is_nan() || lag_limit_m <= 0.0 {
+            let cause = format!("lag_limit_m = {lag_limit_m}");
+            return Err(self.error(Some(section.span()), cause, "give meters above 0, or inf"));
         }
         follower.gain_per_s = s.gain_per_s.unwrap_or(follower.gain_per_s);
         follower.turn_gain_per_s = s.turn_gain_per_s.unwrap_or(follower.turn_gain_per_s);
