@@ -186,7 +186,7 @@ impl Placed {
         let joints: Vec<_> =
             self.joint_info.iter().map(|j| (j.name.clone(), joint_words(j))).collect();
         let last = self.connectors.len() - 1;
-        let name = |i: usize| if i == last { "tip".into() } else { format!("connector {}", i + 1) };
+        let name = |i: usize| if i == last { "tip".into() } else { format!("connector {i}") };
         let points = self.connectors.iter().enumerate().map(|(i, p)| (name(i), meters(p)));
         let points: Vec<_> = points.collect();
         format!(

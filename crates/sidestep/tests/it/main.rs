@@ -2,8 +2,8 @@
 
 mod airspace;
 mod airspace_traffic;
-mod chain_distances;
 mod chain;
+mod chain_distances;
 mod chain_input;
 mod closed_loop;
 mod common;

@@ -133,7 +133,9 @@ where
     fn poses(&self) -> Said {
         let snapshot = self.simulation.snapshot();
         let mut rows = Vec::new();
-        let mut text = "  chain  connector         x_m         y_m         z_m\n".to_string();
+        let axes: String =
+            ["x_m", "y_m", "z_m"][..D].iter().map(|axis| format!("{axis:>12}")).collect();
+        let mut text = format!("  chain  connector{axes}\n");
         for (chain, record) in snapshot.chains.iter().enumerate() {
             for (connector, at) in record.points_m.chunks_exact(D).enumerate() {
                 rows.push(json!({ "chain": chain, "connector": connector, "at_m": at }));
@@ -159,7 +161,11 @@ fn line(name: &str, value: String) -> (String, String) {
 
 /// What came of a run, in words.
 fn outcome(m: &Metrics) -> Lines {
-    let clearance = m.min_clearance_m.map_or("nothing came near".into(), |c| format!("{c:.4} m"));
+    let clearance = match m.min_clearance_m {
+        None => "nothing came near".into(),
+        Some(c) if c.abs() < TOUCH_M => "touched".into(),
+        Some(c) => format!("{c:.4} m"),
+    };
     let penetrations = match m.penetrations {
         0 => "none".into(),
         n => format!("{} steps with a part in an obstacle", grouped(n)),
@@ -193,13 +199,52 @@ fn outcome(m: &Metrics) -> Lines {
             ),
         ));
     }
+    lines.extend(after_vetoes(m));
     if m.reformed > 0 {
         lines.push(line("re-formed", format!("{} times", grouped(m.reformed))));
     }
+    if m.not_reformed > 0 {
+        lines.push(line("NOT re-formed", format!("{} times", grouped(m.not_reformed))));
+    }
+    lines.extend(m.joints_errors.iter().map(|(chain, error)| {
+        line("joints", format!("of chain {chain} cannot follow its connectors: {error}"))
+    }));
     lines.extend(m.given_up.iter().take(MOST_TOLD).map(given_up));
+    if m.given_up.len() > MOST_TOLD {
+        let more = grouped((m.given_up.len() - MOST_TOLD) as u64);
+        lines.push(line("given up", format!("and {more} more")));
+    }
     lines
 }
 
+/// How initiators went on after vetoes, and what getting out of the way came to; no lines where
+/// there was nothing of that.
+fn after_vetoes(m: &Metrics) -> Lines {
+    let some = |counts: &[(u64, &str)]| {
+        let said = counts.iter().filter(|(n, _)| *n > 0);
+        let said: Vec<String> = said.map(|(n, what)| format!("{} {what}", grouped(*n))).collect();
+        (!said.is_empty()).then(|| said.join(", "))
+    };
+    let (rungs, escapes) = (&m.rungs, &m.escapes);
+    let went_on = some(&[
+        (rungs.shorter, "shorter steps"),
+        (rungs.sideways, "to the side"),
+        (rungs.turned, "turns on the spot"),
+        (rungs.waited, "waited"),
+        (rungs.pulled_back, "pulled by the other end"),
+        (rungs.stuck, "stuck"),
+    ]);
+    let escaped = some(&[
+        (escapes.moves, "parts moved away"),
+        (escapes.vetoes, "could not"),
+        (escapes.capped, "of these too slow"),
+    ]);
+    let went_on = went_on.map(|said| line("after vetoes", said));
+    went_on.into_iter().chain(escaped.map(|said| line("escapes", said))).collect()
+}
+
+/// What is nearer than this touches, meters.
+const TOUCH_M: f64 = 1e-6;
 /// More that was given up is only counted.
 const MOST_TOLD: usize = 5;
 

@@ -80,6 +80,7 @@ impl<const D: usize> ChainWorld<D> {
             self.drive(body, turn, scratch);
             self.keep_to_bounds(body, turn, claim, scratch);
         }
+        scratch.robots_gap_m = f64::INFINITY;
         self.follow(body, turn, scratch);
         self.measure(body, turn, scratch);
     }
@@ -97,6 +98,7 @@ impl<const D: usize> ChainWorld<D> {
         let Ok(escaped) = escaped else { return };
         body.tally.escapes.add(&escaped);
         scratch.escaped.copy_from_slice(body.chain.points());
+        self.take_leader_along(body, turn);
         if escaped.moves > 0 {
             scratch.events.push(turn.event(EventKind::Escape, 0, escaped.moves as f64));
         }
@@ -124,11 +126,17 @@ impl<const D: usize> ChainWorld<D> {
         body.chain.points_mut().copy_from_slice(&scratch.escaped);
         let from = turn.spec.tasks.get(body.driving.task as usize).map_or(0, |task| task.agent);
         let reached = body.chain.points()[from];
-        if let Some(leader) = &mut body.driving.leader {
-            leader.pose.at = plane_point(reached);
-        }
+        self.take_leader_along(body, turn);
         let veto = Veto { by, from, reason: Reason::StepLimit, obstacle: None, reached };
         self.vetoed(body, turn, &veto, scratch);
+    }
+
+    /// A leader on wheels is where its connector is, wherever that was moved to.
+    fn take_leader_along(&self, body: &mut Body<D>, turn: Turn<'_, D>) {
+        let agent = turn.spec.tasks.get(body.driving.task as usize).map(|task| task.agent);
+        if let (Some(leader), Some(agent)) = (&mut body.driving.leader, agent) {
+            leader.pose.at = plane_point(body.chain.points()[agent]);
+        }
     }
 
     /// The present task, for one cycle.
@@ -228,6 +236,7 @@ impl<const D: usize> ChainWorld<D> {
     fn next_part(&self, body: &mut Body<D>) {
         body.driving.next += 1;
         (body.driving.rested, body.driving.idle) = (0, 0);
+        (body.driving.told, body.driving.objection) = (None, None);
         (body.driving.nearest_m, body.driving.late) = (f64::INFINITY, 0);
     }
 
@@ -260,7 +269,7 @@ impl<const D: usize> ChainWorld<D> {
         let situation = self.situation(body, task, scratch);
         let mut ladder =
             Ladder { rungs: self.rungs, memory: std::mem::take(&mut body.driving.ladder) };
-        let climbed = ladder.climb(
+        let climbed = ladder.climb_told(
             &mut body.chain,
             &scratch.obstacles,
             &mut scratch.propagator,
@@ -276,7 +285,10 @@ impl<const D: usize> ChainWorld<D> {
             obstacle: None,
             reached: at,
         };
-        let climbed = climbed.unwrap_or(Climbed::Vetoed(beyond));
+        let (climbed, objection) = climbed.unwrap_or((Climbed::Vetoed(beyond), Some(beyond)));
+        if let Some(veto) = &objection {
+            self.vetoed(body, turn, veto, scratch);
+        }
         let way = sub(body.chain.points()[task.agent], at);
         body.driving.way_m[0] += distance(at, to);
         body.driving.way_m[1] += norm(way);
@@ -312,52 +324,48 @@ impl<const D: usize> ChainWorld<D> {
         scratch: &mut Scratch<D>,
     ) -> Went {
         body.tally.rungs.count(climbed);
-        match climbed {
+        let went = match climbed {
             Climbed::Straight(moved) => {
-                body.driving.idle = 0;
+                (body.driving.idle, body.driving.told) = (0, None);
                 self.moved(body, moved, way);
                 return Went::Ahead;
             }
-            Climbed::Shorter { moved, .. } => self.moved(body, moved, way),
-            Climbed::Sideways { moved, turn_rad, .. } => {
-                self.tell_once(
-                    body,
-                    turn.event(EventKind::Sideways, task.agent, *turn_rad),
-                    scratch,
-                );
+            Climbed::Shorter { moved, .. } => {
                 self.moved(body, moved, way);
+                Went::Ahead
+            }
+            Climbed::Sideways { moved, turn_rad, .. } => {
+                let event = turn.event(EventKind::Sideways, task.agent, *turn_rad);
+                self.tell_once(body, event, scratch);
+                self.moved(body, moved, way);
+                Went::Ahead
             }
             Climbed::PulledBack { by, moved } => {
                 self.tell_once(body, turn.event(EventKind::PulledBack, *by, 0.0), scratch);
                 self.moved(body, moved, [0.0; D]);
+                Went::Nowhere
             }
-            Climbed::TurnOnTheSpot { .. } | Climbed::Waiting { .. } => {}
-            Climbed::Stuck { vetoes } => {
+            Climbed::Stuck { .. } => {
                 self.tell_once(body, turn.event(EventKind::Stuck, task.agent, 0.0), scratch);
                 self.look_elsewhere(body, task, turn);
-                match vetoes.first() {
-                    Some(veto) => self.vetoed(body, turn, veto, scratch),
-                    None => body.driving.idle = body.driving.idle.saturating_add(1),
-                }
-                self.lose_patience(body, (task, vetoes.first()), turn, scratch);
-                return Went::Nowhere;
+                Went::Nowhere
             }
-            Climbed::Vetoed(veto) => {
-                self.vetoed(body, turn, veto, scratch);
-                self.lose_patience(body, (task, Some(veto)), turn, scratch);
-                return Went::Nowhere;
+            Climbed::TurnOnTheSpot { .. } | Climbed::Waiting { .. } | Climbed::Vetoed(_) => {
+                Went::Nowhere
             }
-        }
-        body.driving.idle = body.driving.idle.saturating_add(1);
-        if norm(way) > 0.0 && !matches!(climbed, Climbed::PulledBack { .. }) {
-            return Went::Ahead;
-        }
-        Went::Nowhere
+        };
+        body.driving.idle = match went {
+            Went::Ahead => 0,
+            Went::Nowhere => body.driving.idle.saturating_add(1),
+        };
+        self.lose_patience(body, task, turn, scratch);
+        went
     }
 
-    /// Of what happens in cycles in a row only the first is an event.
-    fn tell_once(&self, body: &Body<D>, event: Event, scratch: &mut Scratch<D>) {
-        if body.driving.idle == 0 {
+    /// Of events of a kind in a row, between two motions as wanted, only the first is told.
+    fn tell_once(&self, body: &mut Body<D>, event: Event, scratch: &mut Scratch<D>) {
+        if body.driving.told != Some(event.kind) {
+            body.driving.told = Some(event.kind);
             scratch.events.push(event);
         }
     }
@@ -378,7 +386,7 @@ impl<const D: usize> ChainWorld<D> {
         body.tally.add_moved(moved);
     }
 
-    /// Counts a veto; of those in a row only the first is an event.
+    /// Counts a veto; of those of one connector and reason in a row only the first is an event.
     fn vetoed(
         &self,
         body: &mut Body<D>,
@@ -387,24 +395,23 @@ impl<const D: usize> ChainWorld<D> {
         scratch: &mut Scratch<D>,
     ) {
         body.tally.add_veto(veto.reason);
-        if body.driving.idle == 0 {
+        let objection = Some((veto.by as u32, veto.reason));
+        if body.driving.told.is_none() || body.driving.objection != objection {
             let way_m = distance(veto.reached, scratch.before[veto.from]);
             let event = turn.event(EventKind::Veto, veto.by, way_m);
-            scratch.events.push(Event {
-                reason: Some(veto.reason),
-                obstacle: veto.obstacle,
-                ..event
-            });
+            let (reason, obstacle) = (Some(veto.reason), veto.obstacle);
+            scratch.events.push(Event { reason, obstacle, ..event });
+            body.driving.told = body.driving.told.or(Some(EventKind::Veto));
         }
-        body.driving.idle = body.driving.idle.saturating_add(1);
+        body.driving.objection = objection;
     }
 
-    /// A task that met with vetoes for too long is given up. Around a target there is always some
+    /// A task that came no further for too long is given up. Around a target there is always some
     /// way to go: there it counts for how long none of them led nearer.
     fn lose_patience(
         &self,
         body: &mut Body<D>,
-        (task, veto): (&Task<D>, Option<&Veto<D>>),
+        task: &Task<D>,
         turn: Turn<'_, D>,
         scratch: &mut Scratch<D>,
     ) {
@@ -412,6 +419,8 @@ impl<const D: usize> ChainWorld<D> {
         if self.starts_s(u64::from(tried)) <= task.patience_s {
             return;
         }
+        let objection = body.driving.objection;
+        let reason = objection.map(|(_, reason)| reason);
         let undone = match &task.driver {
             Driver::Targets(targets) => 1.0 / targets.places.len() as f64,
             _ => 1.0 - self.part_done(body, task),
@@ -421,14 +430,14 @@ impl<const D: usize> ChainWorld<D> {
             part: body.driving.next,
             nearest_m: body.driving.nearest_m,
             undone,
-            by: veto.map(|veto| veto.by as u32),
-            reason: veto.map(|veto| veto.reason.name().into()),
+            by: objection.map(|(by, _)| by),
+            reason: reason.map(|reason| reason.name().into()),
         });
         match task.driver {
             Driver::Targets(_) => {
-                let by = veto.map_or(task.agent, |veto| veto.by);
+                let by = objection.map_or(task.agent, |(by, _)| by as usize);
                 let event = turn.event(EventKind::GivenUp, by, f64::from(body.driving.task));
-                scratch.events.push(Event { reason: veto.map(|veto| veto.reason), ..event });
+                scratch.events.push(Event { reason, ..event });
                 self.next_part(body);
             }
             _ => self.next_task(body, turn, EventKind::GivenUp, scratch),

@@ -4,11 +4,15 @@
 use super::act::Turn;
 use super::driver::towards;
 use super::events::EventKind;
+use super::geometry::{Point, add, distance};
 use super::rebuild::{MayCome, Reformed, reform};
 use super::state::{Body, Scattered, flat};
-use super::world::{ChainWorld, Scratch, What, purpose};
+use super::world::{ChainWorld, FARTHEST_THROW, Scratch, What, purpose};
 use sidestep_kernel::distr::normal;
 use std::ops::RangeInclusive;
+
+/// How often a free place is looked for where a part may fall.
+const THROWS: usize = 100;
 
 impl<const D: usize> ChainWorld<D> {
     /// What happens to a chain at the begin of a cycle.
@@ -21,8 +25,11 @@ impl<const D: usize> ChainWorld<D> {
                 | What::MaxBend { connector, .. } => {
                     scratch.events.push(turn.event(EventKind::Changed, *connector, 0.0));
                 }
-                What::Scatter { connectors, by_m } => {
-                    self.scatter(body, turn, connectors, *by_m);
+                What::Scatter { connectors, by_m, apart_m } => {
+                    self.scatter(body, turn, (connectors, *by_m), scratch);
+                    for point in &mut body.chain.points_mut()[connectors.end() + 1..] {
+                        *point = add(*point, *apart_m);
+                    }
                     let n = connectors.clone().count() as f64;
                     scratch.events.push(turn.event(EventKind::Broken, *connectors.start(), n));
                 }
@@ -33,16 +40,27 @@ impl<const D: usize> ChainWorld<D> {
         }
     }
 
+    /// Throws parts about: each to some place near where it is that is free, if there is one. Who
+    /// is fixed or has failed stays.
     fn scatter(
         &self,
         body: &mut Body<D>,
         turn: Turn<'_, D>,
-        connectors: &RangeInclusive<usize>,
-        by_m: f64,
+        (connectors, by_m): (&RangeInclusive<usize>, f64),
+        scratch: &Scratch<D>,
     ) {
         let draws = &mut self.streams.draws(turn.slot, turn.now, purpose::SCATTER);
-        for point in &mut body.chain.points_mut()[connectors.clone()] {
-            point.iter_mut().for_each(|x| *x += by_m * normal(draws));
+        for k in connectors.clone() {
+            if body.chain.connectors()[k].is_still() {
+                continue;
+            }
+            let (at, radius_m) = (body.chain.points()[k], body.chain.connectors()[k].radius_m);
+            let mut throw = || normal(draws).clamp(-FARTHEST_THROW, FARTHEST_THROW);
+            let mut place = || at.map(|x| x + by_m * throw());
+            let is_free =
+                |p: &Point<D>| scratch.obstacles.clearance_m([*p; 2], radius_m, 1.0) > 0.0;
+            let free = (0..THROWS).map(|_| place()).find(is_free);
+            body.chain.points_mut()[k] = free.unwrap_or(at);
         }
         body.scattered = Some(Scattered {
             first: *connectors.start() as u32,
@@ -66,23 +84,41 @@ impl<const D: usize> ChainWorld<D> {
         // An end cannot come out of the world.
         let came = reform(&mut whole, first..=last, may_come)
             .unwrap_or(Reformed::NotReached { off_m: body.chain.max_rod_violation_m() });
+        let stays = |k: &usize| body.chain.connectors()[*k].is_still();
+        let would_move = |k: usize| whole.points()[k] != body.chain.points()[k];
+        let came = match (0..whole.points().len()).filter(stays).find(|&k| would_move(k)) {
+            None => came,
+            Some(k) => {
+                let off_m = distance(whole.points()[k], body.chain.points()[k]);
+                Reformed::NotReached { off_m }
+            }
+        };
         let event = match came {
             Reformed::Whole { double_passes } => {
                 scattered.goals_m = flat(whole.points());
                 scattered.speed_m_s = speed_m_s;
-                turn.event(EventKind::Reformed, first, double_passes as f64)
+                turn.event(EventKind::Reforming, first, double_passes as f64)
             }
             Reformed::GapTooLong { have_m, need_m } => {
+                body.tally.not_reformed += 1;
                 turn.event(EventKind::GapTooLong, first, need_m - have_m)
             }
-            Reformed::NotReached { off_m } => turn.event(EventKind::GapTooLong, first, off_m),
+            Reformed::NotReached { off_m } => {
+                body.tally.not_reformed += 1;
+                turn.event(EventKind::NotReformed, first, off_m)
+            }
         };
         scratch.events.push(event);
     }
 
     /// Scattered parts go to where they are joined again, each straight, and the chain is whole
     /// when all are there.
-    pub(super) fn come_together(&self, body: &mut Body<D>, _: Turn<'_, D>, _: &mut Scratch<D>) {
+    pub(super) fn come_together(
+        &self,
+        body: &mut Body<D>,
+        turn: Turn<'_, D>,
+        scratch: &mut Scratch<D>,
+    ) {
         let Some(scattered) = body.scattered.as_ref().filter(|s| !s.goals_m.is_empty()) else {
             return;
         };
@@ -95,6 +131,7 @@ impl<const D: usize> ChainWorld<D> {
             all_there &= *point == goal;
         }
         if all_there {
+            scratch.events.push(turn.event(EventKind::Reformed, scattered.first as usize, 0.0));
             body.scattered = None;
             body.tally.reformed += 1;
         }

@@ -65,6 +65,9 @@ pub(super) fn clamped(d: f64, min_m: f64, max_m: f64) -> f64 {
     if t < max_m { t } else { max_m }
 }
 
+/// How often a place is brought into a box and back onto a rod's lengths.
+const TURNS_INTO_A_BOX: usize = 200;
+
 /// Direction of the guide line (A1); that of the old rod where the master is at the slave's place.
 fn guide_line<const D: usize>(step: &Step<D>) -> Point<D> {
     unit(sub(step.so, step.mn)).or(unit(sub(step.so, step.mo))).unwrap_or(first_axis())
@@ -91,11 +94,35 @@ impl<const D: usize> Scene<'_, D> {
             }
             Err(refusal) => refusal,
         };
+        if refusal.reason == Reason::Mobility
+            && let Some(at) = self.in_its_box(step, guided)
+            && self.judge(step, at).is_ok()
+        {
+            work.found.push(Candidate { at, rotated: false, turn_rad: 0.0 });
+            return Ok(());
+        }
         match self.rules.rotation {
             Rotation::Never => Err(refusal),
             Rotation::Literal => self.rotate_once(step, guided, work),
             Rotation::Union => self.rotate(step, guided, refusal, work),
         }
+    }
+
+    /// A slave that may leave its box nowhere: a place in it that the rod allows, by turns back into
+    /// the box and onto the rod's lengths.
+    fn in_its_box(&self, step: &Step<D>, guided: Point<D>) -> Option<Point<D>> {
+        let mobility = &self.chain.connectors()[step.slave].mobility;
+        let mut at = guided;
+        for _ in 0..TURNS_INTO_A_BOX {
+            at = mobility.project(at, step.so);
+            let d = distance(at, step.mn);
+            if fits(step.rod, d) {
+                return Some(at);
+            }
+            let t = d.max(step.rod.min_m).min(step.rod.max_m);
+            at = along(step.mn, sub(at, step.mn), t / d.max(f64::MIN_POSITIVE));
+        }
+        None
     }
 
     fn judge_place(&self, step: &Step<D>, at: Point<D>) -> Result<(), Refusal> {

@@ -1,12 +1,13 @@
 //! Who moves a chain, and where to: tasks that its initiator carries out one after the other
 //! (slides R4, R9).
 
+use super::events::EventKind;
 use super::geometry::{Bounds, Point, along, distance, unit};
 use super::navigate::Navigator;
 use super::replan::Memory;
 use super::script::{Motion, Script, Turtle};
 use super::swarm::leader::LeaderState;
-use super::veto::Source;
+use super::veto::{Reason, Source};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::distr::normal;
 use sidestep_kernel::stream::Draws;
@@ -81,7 +82,7 @@ pub struct Driving {
     pub task: u32,
     /// Cycles since it began,
     pub cycles: Cycle,
-    /// of these, without a motion to the end.
+    /// of these, the last ones in which it came nowhere.
     pub idle: u32,
     /// Cycles since it came nearer to its present target than ever.
     pub late: u32,
@@ -95,11 +96,15 @@ pub struct Driving {
     pub ahead: [f64; 3],
     /// The nearest that it came to its present target.
     pub nearest_m: f64,
+    /// The kind of event that was told last since a motion as wanted.
+    pub told: Option<EventKind>,
+    /// Who objected last in this part of the task, and why.
+    pub objection: Option<(u32, Reason)>,
     /// Where it is on the ladder after vetoes.
     pub ladder: Memory,
     /// What it remembers as a navigator on wheels.
     pub leader: Option<LeaderState>,
-    /// Way that it wanted to go, and way that it went, in all tasks.
+    /// Way that it wanted to go, and way that it went, in this task.
     pub way_m: [f64; 2],
 }
 
@@ -116,6 +121,8 @@ impl Driving {
             start: [[0.0; 3]; 3],
             ahead: [0.0; 3],
             nearest_m: f64::INFINITY,
+            told: None,
+            objection: None,
             ladder: Memory::default(),
             leader: None,
             way_m: [0.0; 2],
@@ -131,7 +138,8 @@ impl Driving {
         self.ahead = turtle.ahead;
         (self.cycles, self.idle, self.next, self.rested) = (0, 0, 0, 0);
         (self.nearest_m, self.late, self.leader) = (f64::INFINITY, 0, None);
-        self.ladder = Memory::default();
+        (self.told, self.objection) = (None, None);
+        (self.ladder, self.way_m) = (Memory::default(), [0.0; 2]);
     }
 
     /// Goes on to the next task, which `agent` carries out.

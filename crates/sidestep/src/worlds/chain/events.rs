@@ -29,11 +29,17 @@ pub enum EventKind {
     Changed,
     /// Parts of the chain were scattered; the value is how many.
     Broken,
-    /// The scattered parts are joined again; the value is the number of double passes.
+    /// The scattered parts set out to be joined again; the value is the number of double passes
+    /// that it took to find where to.
+    Reforming,
+    /// They are joined again.
     Reformed,
     /// The gap between the whole ends is longer than the parts; the value is what is wanting, in
     /// meters.
     GapTooLong,
+    /// No places were found where the scattered parts are joined; the value is by how much the
+    /// worst rod was off, in meters.
+    NotReformed,
     /// A target has been reached; the value is its number.
     Target,
     /// A task is done; the value is its number.
@@ -44,7 +50,7 @@ pub enum EventKind {
 
 impl EventKind {
     /// All kinds.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 17] = [
         Self::Veto,
         Self::Penetration,
         Self::Clear,
@@ -55,8 +61,10 @@ impl EventKind {
         Self::Stuck,
         Self::Changed,
         Self::Broken,
+        Self::Reforming,
         Self::Reformed,
         Self::GapTooLong,
+        Self::NotReformed,
         Self::Target,
         Self::Done,
         Self::GivenUp,
@@ -75,8 +83,10 @@ impl EventKind {
             Self::Stuck => "stuck",
             Self::Changed => "changed",
             Self::Broken => "broken",
+            Self::Reforming => "reforming",
             Self::Reformed => "reformed",
             Self::GapTooLong => "gap-too-long",
+            Self::NotReformed => "not-reformed",
             Self::Target => "target",
             Self::Done => "done",
             Self::GivenUp => "given-up",

@@ -102,6 +102,7 @@ impl<const D: usize> ChainWorld<D> {
         tally.held_steps += u64::from(followed.is_held);
         tally.bumper_steps += u64::from(followed.is_bumped);
         tally.min_gap_m = tally.min_gap_m.min(followed.gap_m);
+        scratch.robots_gap_m = scratch.robots_gap_m.min(followed.gap_m);
         if followed.is_bumped && !body.robots[k].is_bumped {
             tally.bumper_events += 1;
             scratch.events.push(turn.event(EventKind::Bumper, k, lag_m));

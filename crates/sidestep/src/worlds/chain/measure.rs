@@ -32,15 +32,16 @@ impl<const D: usize> ChainWorld<D> {
         tally.steps += 1;
         let ways_m = scratch.before.iter().zip(chain.points()).map(|(a, b)| distance(*a, *b));
         tally.max_speed_m_s = tally.max_speed_m_s.max(ways_m.fold(0.0, f64::max) / self.dt_s);
-        if body.scattered.is_some() {
-            return;
+        // Of a broken chain the parts count, and no rods.
+        let is_whole = body.scattered.is_none();
+        if is_whole {
+            tally.max_rod_violation_m = tally.max_rod_violation_m.max(chain.max_rod_violation_m());
         }
-        tally.max_rod_violation_m = tally.max_rod_violation_m.max(chain.max_rod_violation_m());
-        let (least_m, part) = least_clearance(chain, &scratch.obstacles, self.look_m);
+        let (least_m, part) = least_clearance(chain, &scratch.obstacles, self.look_m, is_whole);
         if least_m < self.look_m {
             tally.min_clearance_m = tally.min_clearance_m.min(least_m);
         }
-        let is_inside = least_m < -PENETRATION_M;
+        let is_inside = least_m.min(scratch.robots_gap_m) < -PENETRATION_M;
         tally.penetrations += u64::from(is_inside);
         if is_inside != tally.is_inside {
             let kind = if is_inside { EventKind::Penetration } else { EventKind::Clear };
@@ -50,12 +51,13 @@ impl<const D: usize> ChainWorld<D> {
     }
 }
 
-/// The least distance of any part of a chain from obstacles, up to `look_m`, and the connector at
-/// or before that part.
+/// The least distance of any connector, and of any rod if they count, from obstacles, up to
+/// `look_m`, and the connector at or before that part.
 fn least_clearance<const D: usize>(
     chain: &Chain<D>,
     obstacles: &Obstacles<D>,
     look_m: f64,
+    with_rods: bool,
 ) -> (f64, usize) {
     if obstacles.is_empty() {
         return (look_m, 0);
@@ -69,7 +71,7 @@ fn least_clearance<const D: usize>(
     };
     // One query for a rod and its ends: what is near to one of them mostly is near to all.
     for k in 0..points.len() {
-        let end = (k + 1).min(points.len() - 1);
+        let end = if with_rods { (k + 1).min(points.len() - 1) } else { k };
         let radii_m = [k, end].map(|i| chain.connectors()[i].radius_m);
         let rod_m = chain.rods().get(k).map_or(0.0, |rod| rod.radius_m);
         let near = Bounds::of(&[points[k], points[end]]).grown(radii_m[0].max(radii_m[1]) + look_m);

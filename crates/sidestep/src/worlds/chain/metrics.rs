@@ -37,8 +37,10 @@ pub struct Tally {
     pub done: u64,
     /// Tasks and targets that were given up.
     pub given_up: Vec<GivenUp>,
-    /// How often broken parts were joined again.
+    /// How often broken parts were joined again,
     pub reformed: u64,
+    /// and how often they could not be.
+    pub not_reformed: u64,
     /// Steps in which each layer of a navigator acted, layer 1 first.
     pub layers: [u64; 6],
     /// What came of the robots on wheels.
@@ -184,6 +186,7 @@ impl Default for Tally {
             done: 0,
             given_up: Vec::new(),
             reformed: 0,
+            not_reformed: 0,
             layers: [0; 6],
             robots: RobotTally::default(),
             rungs: RungTally::default(),
@@ -239,8 +242,13 @@ pub struct Metrics {
     pub max_speed_m_s: f64,
     /// Tasks done, targets reached.
     pub done: u64,
-    /// How often broken parts were joined again.
+    /// How often broken parts were joined again,
     pub reformed: u64,
+    /// and how often they could not be: the gap was too long, or no way was found.
+    pub not_reformed: u64,
+    /// Arms whose joints cannot bring their connectors where they are, and why; by chain.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub joints_errors: BTreeMap<EntityId, String>,
     /// What was given up, by chain.
     pub given_up: Vec<ChainGivenUp>,
     /// How initiators went on after vetoes.
@@ -340,6 +348,8 @@ impl Metrics {
             max_speed_m_s: most(|t| t.max_speed_m_s),
             done: sum(|t| t.done),
             reformed: sum(|t| t.reformed),
+            not_reformed: sum(|t| t.not_reformed),
+            joints_errors: BTreeMap::new(),
             given_up: given_up.collect(),
             rungs: tallies.iter().fold(RungTally::default(), |all, t| all.add(&t.rungs)),
             escapes: tallies.iter().fold(EscapeTally::default(), |all, t| all.joined(&t.escapes)),

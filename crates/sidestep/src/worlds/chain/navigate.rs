@@ -96,7 +96,7 @@ pub(super) fn plane_point<const D: usize>(p: Point<D>) -> Point<2> {
 }
 
 /// The other way round.
-fn lifted<const D: usize>(p: Point<2>) -> Point<D> {
+pub(super) fn lifted<const D: usize>(p: Point<2>) -> Point<D> {
     std::array::from_fn(|i| p.get(i).copied().unwrap_or(0.0))
 }
 

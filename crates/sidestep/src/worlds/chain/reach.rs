@@ -6,9 +6,11 @@
 
 use super::chain::{Chain, Mobility};
 use super::geometry::{Point, distance};
+use super::ik::{Engine, Goal, Solver, Unreached};
 use super::obstacle::Obstacles;
 use super::passage::passed;
 use super::propagate::Propagator;
+use super::rules::Rules;
 use super::veto::{Mode, Motion, Moved, Outcome, Reason, Request, Source, Veto};
 use sidestep_kernel::InputError;
 
@@ -73,10 +75,52 @@ pub fn go<const D: usize>(
         Reached::There { .. } => Outcome::Moved(moved_since(&before, chain, k)),
         Reached::Short { veto: Some(veto), .. } => Outcome::Vetoed(veto),
         Reached::Short { nearest, veto: None } => {
-            Outcome::Vetoed(Veto { reached: nearest, ..*veto })
+            let objection = Veto { reached: nearest, ..*veto };
+            by_posture(propagator.rules, chain, obstacles, &order, objection)?
         }
     })
 }
+
+/// Passes crawl where a chain is nearly straight. Damped least squares find the nearest posture
+/// that gets there, and the chain goes straight to it if nothing is in the way of it and on the
+/// way. What is out of reach is told as that.
+fn by_posture<const D: usize>(
+    rules: Rules,
+    chain: &mut Chain<D>,
+    obstacles: &Obstacles<D>,
+    order: &Reach<D>,
+    objection: Veto<D>,
+) -> Result<Outcome<D>, InputError> {
+    let Reach { k, target, base, tolerance_m } = *order;
+    let goal = Goal { engine: Engine::Dls, restarts: 0, tolerance_m, ..Goal::new(k, base, target) };
+    let answer = Solver::new(rules).solve(chain, obstacles, &goal)?;
+    if matches!(answer.reason, Some(Unreached::TooFar { .. } | Unreached::TooNear { .. })) {
+        return Ok(Outcome::Vetoed(Veto { by: k, reason: Reason::OutOfReach, ..objection }));
+    }
+    let before = chain.points().to_vec();
+    let longest_m = chain.rods().iter().map(|rod| rod.max_m).fold(0.0, f64::max);
+    let most_m = rules.slave_step_max_m.min(LONGEST_JUMP * longest_m);
+    let is_near = |(a, b): (&Point<D>, &Point<D>)| distance(*a, *b) <= most_m;
+    if !answer.reached || !before.iter().zip(&answer.points).all(is_near) {
+        return Ok(Outcome::Vetoed(objection));
+    }
+    chain.points_mut().copy_from_slice(&answer.points);
+    if let Some(passed) = passed(chain, &before, obstacles, 0.0) {
+        chain.points_mut().copy_from_slice(&before);
+        let (by, obstacle) = (passed.rod, Some(passed.obstacle));
+        return Ok(Outcome::Vetoed(Veto {
+            by,
+            obstacle,
+            reason: Reason::WouldTunnel,
+            ..objection
+        }));
+    }
+    Ok(Outcome::Moved(moved_since(&before, chain, k)))
+}
+
+/// A posture is taken as a motion where no connector goes further than this part of the longest
+/// rod.
+const LONGEST_JUMP: f64 = 0.5;
 
 /// How near counts as there, for a connector that goes a step.
 const TOLERANCE_M: f64 = 1e-7;

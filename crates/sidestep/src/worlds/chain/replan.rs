@@ -184,30 +184,56 @@ impl Ladder {
         wanted: &Request<D>,
         situation: &Situation,
     ) -> Result<Climbed<D>, InputError> {
+        let told = self.climb_told(chain, obstacles, propagator, wanted, situation);
+        told.map(|(climbed, _)| climbed)
+    }
+
+    /// The same, and the objection to the wanted motion itself, if there was one.
+    ///
+    /// # Errors
+    /// As [`Propagator::propagate`].
+    pub fn climb_told<const D: usize>(
+        &mut self,
+        chain: &mut Chain<D>,
+        obstacles: &Obstacles<D>,
+        propagator: &mut Propagator<D>,
+        wanted: &Request<D>,
+        situation: &Situation,
+    ) -> Result<(Climbed<D>, Option<Veto<D>>), InputError> {
         if wanted.source != Source::Autonomous {
             return Ok(match reach::go(propagator, chain, obstacles, wanted)? {
-                Outcome::Moved(moved) => Climbed::Straight(moved),
-                Outcome::Vetoed(veto) => Climbed::Vetoed(veto),
+                Outcome::Moved(moved) => (Climbed::Straight(moved), None),
+                Outcome::Vetoed(veto) => (Climbed::Vetoed(veto), Some(veto)),
             });
         }
         let vetoes = Vec::new();
         let mut climb = Climb { chain, obstacles, propagator, wanted: *wanted, vetoes };
         self.memory.note_goal(situation.goal_distance_m);
         if self.memory.pulling_back > 0 {
-            return self.pull_back(&mut climb);
+            return Ok((self.pull_back(&mut climb)?, None));
         }
         if let Some(moved) = climb.attempt(wanted.motion)? {
             self.memory.went_straight(self.rungs.straight);
-            return Ok(Climbed::Straight(moved));
+            return Ok((Climbed::Straight(moved), None));
         }
-        if let Some(came) = shorter(&mut climb)? {
+        let objection = climb.vetoes.first().copied();
+        Ok((self.after_a_veto(&mut climb, situation)?, objection))
+    }
+
+    /// The rungs one after the other.
+    fn after_a_veto<const D: usize>(
+        &mut self,
+        climb: &mut Climb<'_, D>,
+        situation: &Situation,
+    ) -> Result<Climbed<D>, InputError> {
+        if let Some(came) = shorter(climb)? {
             self.memory.moved_on();
             return Ok(came);
         }
-        if let Some(came) = self.sideways(&mut climb, situation)? {
-            return Ok(came);
+        match self.sideways(climb, situation)? {
+            Some(came) => Ok(came),
+            None => self.without_a_way(climb, situation),
         }
-        self.without_a_way(&mut climb, situation)
     }
 
     /// Other headings, first those on the side where one was good.

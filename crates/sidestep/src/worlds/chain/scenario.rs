@@ -215,6 +215,7 @@ impl Compiler<'_> {
         let escape = self.escape(&chains, &ground.movers, dt_s)?;
         let world = ChainWorld {
             chains,
+            cycles: self.file.cycles.unwrap_or(CYCLES),
             escape,
             rungs: Rungs::default(),
             obstacles: ground.obstacles,

@@ -12,6 +12,7 @@ use super::state::{ChainState, Snapshot};
 use super::swarm::drive::Pose;
 use super::world::ChainWorld;
 use crate::scenario::Source;
+use cpu_time::ThreadTime;
 use sidestep_kernel::checkpoint::{self, CheckpointError, Header};
 use sidestep_kernel::cycle::PhaseTimes;
 use sidestep_kernel::engine::Engine;
@@ -112,7 +113,12 @@ impl<const D: usize> ChainSimulation<D> {
             .map(|slot| self.compiled.world.progress(slot, &self.state.body(slot)))
             .collect();
         let steps = tallies.iter().map(|t| t.steps).sum::<u64>() - self.steps_before;
-        Metrics::of(&tallies, &progress, self.cpu_ns as f64 / 1e9, steps)
+        let told = |chain: EntityId| Some((chain, self.metrics_of(chain as usize).joints_error?));
+        let is_arm = |chain: &EntityId| self.compiled.world.chains[*chain as usize].arm.is_some();
+        Metrics {
+            joints_errors: (0..tallies.len() as EntityId).filter(is_arm).filter_map(told).collect(),
+            ..Metrics::of(&tallies, &progress, self.cpu_ns as f64 / 1e9, steps)
+        }
     }
 
     /// Metrics of one chain.
@@ -216,7 +222,9 @@ impl<const D: usize> Simulation for ChainSimulation<D> {
         // One by one: places are kept at the start of a cycle, and a run may be over after any.
         let mut done = 0;
         while done < cycles && (done == 0 || !self.is_over()) && !self.rows.is_full() {
+            let began = ThreadTime::now();
             self.keep_places();
+            self.cpu_ns += began.elapsed().as_nanos() as u64;
             let span = (self.cycle, 1);
             self.engine.advance(&*self.compiled.world, &mut self.state, span, &self.clock);
             self.cycle += 1;

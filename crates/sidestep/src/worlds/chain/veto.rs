@@ -4,6 +4,7 @@
 //! autonomous mover plans anew, a planner or an operator is told.
 
 use super::geometry::Point;
+use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::ops::Range;
 
@@ -65,7 +66,7 @@ impl<const D: usize> Request<D> {
 }
 
 /// Which constraint speaks against a motion.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Reason {
     /// A fixed connector would have to move.
     Fixed,
@@ -89,11 +90,13 @@ pub enum Reason {
     StepLimit,
     /// The search for a way out was given up.
     Limit,
+    /// No posture of the chain reaches the target, or none was found.
+    OutOfReach,
 }
 
 impl Reason {
     /// All reasons.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::Fixed,
         Self::Failed,
         Self::Mobility,
@@ -105,6 +108,7 @@ impl Reason {
         Self::SelfCollision,
         Self::StepLimit,
         Self::Limit,
+        Self::OutOfReach,
     ];
 
     /// Its name in files.
@@ -121,6 +125,7 @@ impl Reason {
             Self::SelfCollision => "self-collision",
             Self::StepLimit => "step-limit",
             Self::Limit => "limit",
+            Self::OutOfReach => "out-of-reach",
         }
     }
 }
@@ -139,6 +144,7 @@ impl fmt::Display for Reason {
             Self::SelfCollision => "the chain would run into itself",
             Self::StepLimit => "it would have to move too far in one step",
             Self::Limit => "the search for a way out was given up",
+            Self::OutOfReach => "no posture of the chain reaches there",
         })
     }
 }

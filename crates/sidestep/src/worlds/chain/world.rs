@@ -7,9 +7,9 @@ use super::driver::{Driver, Driving, Task};
 use super::escape::{Escape, Escaper};
 use super::events::Event;
 use super::formation::{Robot, Robots};
-use super::geometry::{Bounds, Point};
+use super::geometry::{Bounds, Point, norm};
 use super::ground::Movers;
-use super::navigate::plane_point;
+use super::navigate::{Solid, lifted, plane_point};
 use super::obstacle::{Obstacle, Obstacles};
 use super::propagate::Propagator;
 use super::rebuild::MayCome;
@@ -43,6 +43,9 @@ pub mod purpose {
     pub const LASER: Purpose = Purpose(4);
 }
 
+/// Nothing is thrown further than so many standard deviations.
+pub(super) const FARTHEST_THROW: f64 = 8.0;
+
 /// From this id on, obstacles are parts of other chains: its number is added.
 pub const OTHER_CHAIN: u32 = 1 << 31;
 
@@ -57,6 +60,8 @@ pub struct ChainWorld<const D: usize> {
     pub movers: Movers<D>,
     /// What a cycle takes.
     pub dt_s: f64,
+    /// Cycles that a run has: what an endless task is measured by.
+    pub cycles: Cycle,
     /// How chains react.
     pub rules: Rules,
     /// How they get out of the way of what moves, if they do.
@@ -124,6 +129,8 @@ pub enum What<const D: usize> {
         connectors: RangeInclusive<usize>,
         /// Standard deviation of each coordinate.
         by_m: f64,
+        /// The whole end behind them is moved by this: then parts are wanting.
+        apart_m: Point<D>,
     },
     /// The scattered connectors come back, at most so fast.
     Reform {
@@ -135,6 +142,16 @@ pub enum What<const D: usize> {
 }
 
 impl<const D: usize> Change<D> {
+    /// How far it may throw parts in a cycle.
+    fn throws_m(&self, now: Cycle) -> f64 {
+        match &self.what {
+            What::Scatter { by_m, apart_m, .. } if self.cycle == now => {
+                FARTHEST_THROW * by_m + norm(*apart_m)
+            }
+            _ => 0.0,
+        }
+    }
+
     /// Applies what is a constraint.
     pub(super) fn constrain(&self, chain: &mut Chain<D>) {
         let done = match &self.what {
@@ -183,15 +200,20 @@ impl<const D: usize> ChainWorld<D> {
         now as f64 * self.dt_s
     }
 
-    /// The box in which a chain may come to be during one cycle.
-    fn reach(&self, spec: &ChainSpec<D>, body: &Body<D>) -> Bounds<D> {
+    /// The box in which a chain may come to be during one cycle: nobody of it leaves that box.
+    fn reach(&self, spec: &ChainSpec<D>, body: &Body<D>, now: Cycle) -> Bounds<D> {
         let chain = &body.chain;
         let radius_m = chain.connectors().iter().map(|c| c.radius_m).fold(0.0, f64::max);
         let longest_m = chain.rods().iter().map(|r| r.max_m).fold(0.0, f64::max);
-        let escape_m_s = self.escape.map_or(0.0, |escape| escape.speed_max_m_s);
-        let speed_m_s = spec.tasks.iter().map(|t| t.speed_m_s).fold(escape_m_s, f64::max);
-        let way_m = 2.0 * (longest_m + speed_m_s * self.dt_s);
-        Bounds::of(chain.points()).grown(radius_m + way_m)
+        let fastest_m_s = spec.tasks.iter().map(|t| t.speed_m_s).fold(0.0, f64::max);
+        let way_m = match &self.escape {
+            Some(escape) => escape.speed_max_m_s * self.dt_s,
+            // Who turns round what is in its way goes as far as its rod reaches to both sides.
+            None => 2.0 * longest_m.min(self.rules.slave_step_max_m) + fastest_m_s * self.dt_s,
+        };
+        let thrown_m = spec.changes.iter().map(|change| change.throws_m(now)).fold(0.0, f64::max);
+        let back_m = body.scattered.as_ref().map_or(0.0, |s| s.speed_m_s * self.dt_s);
+        Bounds::of(chain.points()).grown(radius_m + way_m + thrown_m + back_m)
     }
 
     /// The part of its tasks that a chain has done, from 0 to 1. Several tasks count alike; what
@@ -205,13 +227,13 @@ impl<const D: usize> ChainWorld<D> {
     }
 
     /// The part of its present task that an initiator is through with: of scripts by motions, of
-    /// targets by targets, of tasks that take a time by time; of wandering the part of the way
-    /// wanted that was gone.
+    /// targets by targets, of tasks that take a time by time; of going anywhere the part that was
+    /// gone of the way that its speed allows in the whole run; of resting the part of the run.
     pub(super) fn part_done(&self, body: &Body<D>, task: &Task<D>) -> f64 {
         let part = match &task.driver {
             _ if task.lasts_s.is_finite() => self.starts_s(body.driving.cycles) / task.lasts_s,
-            Driver::Rest => 1.0,
-            Driver::Wander(_) => way_part(body.driving.way_m),
+            Driver::Rest => body.driving.cycles as f64 / self.cycles.max(1) as f64,
+            Driver::Wander(_) => self.way_part(body, task),
             Driver::Script(_) => f64::from(body.driving.next) / body.motions.len().max(1) as f64,
             Driver::Targets(targets) => {
                 f64::from(body.driving.next) / targets.places.len().max(1) as f64
@@ -221,10 +243,14 @@ impl<const D: usize> ChainWorld<D> {
                     let start = plane_point(body.driving.start[0]);
                     goal.progress(body.driving.next as usize, start, body.driving.nearest_m)
                 }
-                None => way_part(body.driving.way_m),
+                None => self.way_part(body, task),
             },
         };
         part.clamp(0.0, 1.0)
+    }
+
+    fn way_part(&self, body: &Body<D>, task: &Task<D>) -> f64 {
+        body.driving.way_m[1] / (task.speed_m_s * self.starts_s(self.cycles.max(1)))
     }
 
     /// Whether all tasks of all chains are done and everything is whole.
@@ -235,11 +261,6 @@ impl<const D: usize> ChainWorld<D> {
             is_done && body.scattered.is_none()
         })
     }
-}
-
-/// The part that was gone of a way that was wanted.
-fn way_part([wanted_m, gone_m]: [f64; 2]) -> f64 {
-    if wanted_m > 0.0 { gone_m / wanted_m } else { 0.0 }
 }
 
 /// What a worker keeps between tasks.
@@ -261,6 +282,8 @@ pub struct Scratch<const D: usize> {
     pub(super) scan: Scan,
     /// Positions before a cycle.
     pub(super) before: Vec<Point<D>>,
+    /// The least air around a robot in this cycle.
+    pub(super) robots_gap_m: f64,
     /// Positions after parts got out of the way.
     pub(super) escaped: Vec<Point<D>>,
     /// What happened.
@@ -288,8 +311,12 @@ impl<const D: usize> Scratch<D> {
         self.guests.clear();
         let movers = world.movers.at(world.starts_s(moment));
         self.guests.extend(movers.filter(Obstacle::is_in_range));
+        let movers = self.guests.len();
+        let others: Vec<Slot> = others.collect();
         if has_others {
+            others.iter().for_each(|&slot| push_robots(&mut self.guests, slot, state));
             self.solid.set_moving(&self.guests).expect(CHECKED);
+            self.guests.truncate(movers);
         }
         for slot in others {
             push_parts(&mut self.guests, slot, &state.body(slot as usize).chain);
@@ -302,6 +329,16 @@ impl<const D: usize> Scratch<D> {
     pub(super) fn solid(&self) -> &Obstacles<D> {
         if self.has_others { &self.solid } else { &self.obstacles }
     }
+}
+
+/// What of a chain robots can touch: its robots, or its parts where it has none.
+fn push_robots<const D: usize>(parts: &mut Vec<Obstacle<D>>, slot: Slot, state: &ChainState<D>) {
+    let body = state.body(slot as usize);
+    if body.robots.is_empty() {
+        return push_parts(parts, slot, &body.chain);
+    }
+    let solid = |solid: Solid| Obstacle::ball(OTHER_CHAIN + slot, lifted(solid.at), solid.radius_m);
+    parts.extend(body.solids().map(|(_, robot)| solid(robot)));
 }
 
 /// The parts of a chain as obstacles to others.
@@ -333,6 +370,7 @@ impl<const D: usize> World for ChainWorld<D> {
             seen: Vec::new(),
             scan: Scan::default(),
             before: Vec::new(),
+            robots_gap_m: f64::INFINITY,
             escaped: Vec::new(),
             events: Vec::new(),
             cpu_ns: 0,
@@ -350,12 +388,14 @@ impl<const D: usize> World for ChainWorld<D> {
         bodies: std::ops::Range<usize>,
         scratch: &mut Scratch<D>,
     ) {
+        let began = ThreadTime::now();
         for slot in bodies {
-            let claim = self.reach(&self.chains[slot], &state.body(slot));
+            let claim = self.reach(&self.chains[slot], &state.body(slot), now);
             state.set_claim(slot, claim);
             let decision = self.look_around(state, (slot as Slot, now), scratch);
             state.set_decision(slot, decision);
         }
+        scratch.cpu_ns += began.elapsed().as_nanos() as u64;
     }
 
     fn find_conflicts(
@@ -384,11 +424,13 @@ impl<const D: usize> World for ChainWorld<D> {
         let began = ThreadTime::now();
         group.sort_unstable();
         for &slot in &*group {
-            scratch.gather(self, state, now + 1, group.iter().copied().filter(|&s| s != slot));
+            let claim = state.claim(slot as usize);
+            let meets = |s: &Slot| *s != slot && state.claim(*s as usize).meets(&claim);
+            scratch.gather(self, state, now + 1, group.iter().copied().filter(meets));
             let decision = state.decision(slot as usize);
             let turn = Turn { spec: &self.chains[slot as usize], slot, now, decision };
             let mut body = state.body_mut(slot as usize);
-            self.act(&mut body, turn, &state.claim(slot as usize), scratch);
+            self.act(&mut body, turn, &claim, scratch);
         }
         scratch.cpu_ns += began.elapsed().as_nanos() as u64;
     }

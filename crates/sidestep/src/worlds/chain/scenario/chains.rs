@@ -2,7 +2,8 @@
 
 use super::super::arm::Arm;
 use super::super::chain::{Chain, Connector, Mobility, Rod};
-use super::super::driver::out_of_space;
+use super::super::driver::{Driver, Task, out_of_space};
+use super::super::formation::Robots;
 use super::super::geometry::{Point, along, first_axis, unit};
 use super::super::ground::Site;
 use super::super::ground::route::{Wanted, find};
@@ -79,8 +80,7 @@ pub(super) struct LimitSection {
     mobility: Option<Spanned<MobilitySection>>,
     max_bend_deg: Option<f64>,
     radius_m: Option<f64>,
-    #[serde(default)]
-    failed: bool,
+    failed: Option<bool>,
 }
 
 /// Where a connector may be.
@@ -172,6 +172,19 @@ impl Compiler<'_> {
         let n = start.points().len();
         let tasks =
             s.tasks.0.iter().map(|task| self.task(task, n)).collect::<Result<Vec<_>, _>>()?;
+        let is_endless = |task: &Task<D>| {
+            let has_an_end = match &task.driver {
+                Driver::Rest | Driver::Wander(_) => false,
+                Driver::Navigate(navigator) => navigator.goal.is_some(),
+                Driver::Script(_) | Driver::Targets(_) => true,
+            };
+            !has_an_end && task.lasts_s.is_infinite()
+        };
+        if let Some(k) = tasks.iter().position(is_endless).filter(|k| k + 1 < tasks.len()) {
+            let remedy = "add lasts_s";
+            let span = s.tasks.0[k].span();
+            return Err(self.error(Some(span), "this task never ends, and others follow", remedy));
+        }
         if tasks.is_empty() {
             let remedy = "add [[chains.tasks]] with a kind: rest, wander, script or targets";
             return Err(self.error(Some(at), "a chain without a task", remedy));
@@ -188,6 +201,9 @@ impl Compiler<'_> {
         let speed_m_s = tasks.iter().map(|task| task.speed_m_s).fold(0.0, f64::max);
         self.check_steps(&start, speed_m_s * dt_s, at.clone())?;
         let robots = s.robots.as_ref().map(|robots| self.robots(robots, speed_m_s)).transpose()?;
+        if let Some(robots) = &robots {
+            self.check_room(robots, &start, at.clone())?;
+        }
         if D != 2 && robots.is_some() {
             let remedy = "set chain.dimensions = 2, or leave robots out";
             return Err(self.error(Some(at), "robots on wheels in space", remedy));
@@ -210,6 +226,26 @@ impl Compiler<'_> {
         let remedy = "give a shorter chain.dt_s, a lower speed_m_s, larger connectors and rods, \
                       or a longer chain.step_m";
         Err(self.error(Some(at), cause, remedy))
+    }
+
+    /// Refuses robots that overlap where their rods are shortest, and a margin below 0.
+    fn check_room<const D: usize>(
+        &self,
+        robots: &Robots,
+        chain: &Chain<D>,
+        at: Range<usize>,
+    ) -> Result<(), InputError> {
+        let radius_m = robots.follower.ring.radius_m;
+        let least_m = chain.rods().iter().map(|rod| rod.min_m).fold(f64::INFINITY, f64::min);
+        if least_m < 2.0 * radius_m {
+            let cause = format!("robots of radius {radius_m} m as near as {least_m} m");
+            return Err(self.error(Some(at), cause, "give longer rods, or smaller robots"));
+        }
+        if chain.connectors().iter().any(|connector| connector.radius_m < radius_m) {
+            let remedy = "give robots.margin_m of 0 or more";
+            return Err(self.error(Some(at), "connectors smaller than their robots", remedy));
+        }
+        Ok(())
     }
 
     fn shape<const D: usize>(
@@ -283,9 +319,10 @@ impl Compiler<'_> {
     ) -> Result<(Chain<D>, Option<Arc<Arm>>), InputError> {
         let is_shaped = s.connectors.is_some() || s.points_m.is_some() || s.rod_m.is_some();
         let is_turned = s.along.is_some() || s.heading_deg.is_some() || s.max_bend_deg.is_some();
+        let is_turned = is_turned || s.anywhere || s.within_m.is_some() || s.robots.is_some();
         if D != 3 || is_shaped || is_turned || s.count != 1 {
             let remedy = "set chain.dimensions = 3, and leave out connectors, points_m, rod_m, \
-                          along, heading_deg, max_bend_deg and count";
+                          along, heading_deg, max_bend_deg, anywhere, robots and count";
             return Err(self.error(Some(at), "an arm has its shape from its URDF file", remedy));
         }
         let base_m = match &s.at_m {
@@ -433,7 +470,7 @@ impl Compiler<'_> {
             let cause = format!("connector = {} of a chain of {n}", s.connector);
             return Err(self.error(Some(limit.span()), cause, "count from 0"));
         };
-        connector.failed = s.failed;
+        connector.failed = s.failed.unwrap_or(connector.failed);
         if let Some(given) = &s.mobility {
             connector.mobility = self.mobility(given)?;
         }

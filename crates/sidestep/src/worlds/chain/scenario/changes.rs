@@ -30,9 +30,9 @@ pub(super) struct ChangeSection {
     mobility: Option<Spanned<MobilitySection>>,
     scatter: Option<[usize; 2]>,
     by_m: Option<f64>,
+    apart_m: Option<Vec<f64>>,
     reform: Option<bool>,
-    #[serde(default)]
-    may_come: MayComeWord,
+    may_come: Option<MayComeWord>,
     speed_m_s: Option<Spanned<f64>>,
 }
 
@@ -70,11 +70,12 @@ impl Compiler<'_> {
             let remedy = "give one of failed, max_bend_deg, mobility, scatter = [first, last], reform = true";
             return Err(self.error(Some(at), "a change that is not one thing", remedy));
         }
+        self.is_one_thing(s, at.clone())?;
         if let Some([first, last]) = s.scatter {
-            return self.scatter((first, last), s.by_m, n, at);
+            return self.scatter((first, last), (s.by_m, s.apart_m.as_deref()), n, at);
         }
         if s.reform == Some(true) {
-            let may_come = match s.may_come {
+            let may_come = match s.may_come.unwrap_or_default() {
                 MayComeWord::Nobody => MayCome::Nobody,
                 MayComeWord::First => MayCome::First,
                 MayComeWord::Last => MayCome::Last,
@@ -94,6 +95,26 @@ impl Compiler<'_> {
         };
         self.try_constraint(&what, chain, at)?;
         Ok(what)
+    }
+
+    /// Refuses keys that do nothing beside what happens.
+    fn is_one_thing(&self, s: &ChangeSection, at: Range<usize>) -> Result<(), InputError> {
+        let (throws, joins) = (s.scatter.is_some(), s.reform == Some(true));
+        let keys = [
+            ("connector", s.connector.is_some(), !throws && !joins),
+            ("by_m", s.by_m.is_some(), throws),
+            ("apart_m", s.apart_m.is_some(), throws),
+            ("may_come", s.may_come.is_some(), joins),
+            ("speed_m_s", s.speed_m_s.is_some(), joins),
+        ];
+        match keys.iter().find(|(_, is_given, does_something)| *is_given && !does_something) {
+            None => Ok(()),
+            Some((key, ..)) => Err(self.error(
+                Some(at),
+                format!("`{key}` does nothing in this change"),
+                "leave it out",
+            )),
+        }
     }
 
     /// Tries a constraint on a copy, so that it cannot fail while a run goes on.
@@ -117,7 +138,7 @@ impl Compiler<'_> {
     fn scatter<const D: usize>(
         &self,
         (first, last): (usize, usize),
-        by_m: Option<f64>,
+        (by_m, apart_m): (Option<f64>, Option<&[f64]>),
         n: usize,
         at: Range<usize>,
     ) -> Result<What<D>, InputError> {
@@ -130,6 +151,10 @@ impl Compiler<'_> {
         if !(by_m > 0.0 && by_m < 1e4) {
             return Err(self.error(Some(at), format!("by_m = {by_m}"), "give meters above 0"));
         }
-        Ok(What::Scatter { connectors: first..=last, by_m })
+        let apart_m = match apart_m {
+            Some(given) => self.point(given, "apart_m", at)?,
+            None => [0.0; D],
+        };
+        Ok(What::Scatter { connectors: first..=last, by_m, apart_m })
     }
 }

@@ -232,6 +232,7 @@ impl Compiler<'_> {
     ) -> Result<(), InputError> {
         let (s, at) = (section.get_ref(), section.span());
         let id = all.next_id;
+        self.shapes_one_thing(s, at.clone())?;
         if let Some(corners) = &s.corners_m {
             return self.add_outline(s, corners, at, all);
         }
@@ -246,6 +247,25 @@ impl Compiler<'_> {
             }
         }
         Ok(())
+    }
+
+    /// Refuses keys that do nothing for a shape or a way to move.
+    fn shapes_one_thing(&self, s: &ObstacleSection, at: Range<usize>) -> Result<(), InputError> {
+        let is_box = s.size_m.is_some() && s.corners_m.is_none();
+        let keys = [
+            ("size_m", s.size_m.is_some(), is_box),
+            ("turn_deg", s.turn_deg.is_some(), is_box),
+            ("bounces_m", s.bounces_m.is_some(), s.velocity_m_s.is_some()),
+            ("closed", s.closed.is_some(), s.patrol_m.is_some()),
+            ("speed_m_s", s.speed_m_s.is_some(), s.patrol_m.is_some()),
+        ];
+        match keys.iter().find(|(_, is_given, does_something)| *is_given && !does_something) {
+            None => Ok(()),
+            Some((key, ..)) => {
+                let cause = format!("`{key}` does nothing for this obstacle");
+                Err(self.error(Some(at), cause, "leave it out, or give what it belongs to"))
+            }
+        }
     }
 
     fn add_outline<const D: usize>(
