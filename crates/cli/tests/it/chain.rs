@@ -176,7 +176,7 @@ fn a_killed_run_resumes_to_the_same_digest_and_the_same_rows() {
         "--cycles",
         "20000",
         "--set",
-        "record.checkpoint_every=50",
+        "record.checkpoint_every=4000",
         "--set",
         "chains.1.tasks.lasts_s=900",
     ];
