@@ -3,7 +3,8 @@
 //! `cargo bench -p sidestep --bench ik [-- PART ...]` with the parts `free` (the default),
 //! `guarded` and `arms` (slow; arms need `../shared/data`); CPU time. The yardstick of the first is
 //! the FABRIK of the crate `rebirth-ik`, in single precision, on the same chains and targets in the
-//! same run. In brackets what the prototype reached.
+//! same run; `itself` is the success without the closed form that every engine falls back on. In
+//! brackets what the prototype reached.
 
 use cpu_time::ProcessTime;
 use sidestep::import::urdf::Model;
@@ -142,7 +143,14 @@ fn free_in<const D: usize>() {
             print!("{D}-D, {n} rods, {part} reach:");
             for engine in [Engine::Chain, Engine::Dls, Engine::Direct] {
                 let row = measure(&chain, &targets, engine);
-                print!("  {} {:.1} %/{}/{:.2} us", engine.name(), row.success, row.steps, row.us);
+                print!(
+                    "  {} {:.1} % (itself {:.1})/{}/{:.2} us",
+                    engine.name(),
+                    row.success,
+                    row.itself,
+                    row.steps,
+                    row.us
+                );
             }
             println!("  rebirth-ik {:.1} %/{}/{:.2} us", other.success, other.steps, other.us);
         }

@@ -1,14 +1,12 @@
 //! Sixteen robots in a chain on open ground, among discs that move.
 //!
-//! `cargo run --release -p sidestep --example chain_movers [-- RUNS]` prints, for numbers and
+//! `cargo run --release -p sidestep --example chain_movers [-- RUNS [through|apart]]` prints, for numbers and
 //! speeds of discs, for reactions and for limits of the robots' speed, how often a part of the
 //! chain is more than 1 mm in a disc after it has reacted.
 
 use sidestep::kernel::stream::{Purpose, Streams};
 use sidestep::kernel::{InputError, Seed, math};
-use sidestep::worlds::chain::geometry::{
-    Bounds, Point, along, distance, dot, norm, scaled, sub, unit,
-};
+use sidestep::worlds::chain::geometry::{Bounds, Point, along, distance, dot, scaled, sub, unit};
 use sidestep::worlds::chain::{
     Chain, Connector, Escape, Escaper, Obstacle, Obstacles, Outcome, Propagator, Request, Rod,
     Rules,
@@ -16,6 +14,8 @@ use sidestep::worlds::chain::{
 use std::f64::consts::TAU;
 
 const DT_S: f64 = 0.02;
+const ROBOT_M: f64 = 0.25;
+const ROD_M: f64 = 0.05;
 const TICKS: usize = 4000;
 const ROBOTS: usize = 16;
 const LEADER_M_S: f64 = 0.5;
@@ -78,12 +78,17 @@ struct Tally {
     vetoes: usize,
     capped: usize,
     fastest_m_s: f64,
+    /// How often a part got into a disc, and how often of those there was another disc less than a
+    /// robot away from that one, and near the chain too.
+    episodes: usize,
+    squeezed: usize,
+    is_in: bool,
 }
 
 fn chain() -> Result<Chain<2>, InputError> {
-    let rod = Rod { min_m: 0.6, max_m: 0.8, radius_m: 0.05 };
+    let rod = Rod { min_m: 0.6, max_m: 0.8, radius_m: ROD_M };
     let half_m = 0.5 * rod.max_m * (ROBOTS - 1) as f64;
-    Chain::straight([half_m, 0.0], [-1.0, 0.0], ROBOTS - 1, rod, Connector::free(0.25))
+    Chain::straight([half_m, 0.0], [-1.0, 0.0], ROBOTS - 1, rod, Connector::free(ROBOT_M))
 }
 
 /// Discs anywhere but on the chain.
@@ -196,24 +201,38 @@ fn run(cell: &Cell, seed: u64, tally: &mut Tally) -> Result<(), InputError> {
     Ok(())
 }
 
-fn measure(chain: &Chain<2>, obstacles: &Obstacles<2>, start: &[Point<2>], tally: &mut Tally) {
+/// Least distance of a disc's surface from robots and from rods.
+fn gaps_m(chain: &Chain<2>, disc: &Obstacle<2>) -> [f64; 2] {
     let points = chain.points();
-    let clear_m = |body, radius_m| obstacles.clearance_m(body, radius_m, 0.5);
-    let robot_m = points
-        .iter()
-        .zip(chain.connectors())
-        .map(|(p, c)| clear_m([*p; 2], c.radius_m))
-        .fold(1.0, f64::min);
-    let rod_m = points
-        .windows(2)
-        .zip(chain.rods())
-        .map(|(ends, rod)| clear_m([ends[0], ends[1]], rod.radius_m))
-        .fold(1.0, f64::min);
+    let robots = points.iter().map(|p| disc.core.nearest_to_point(*p).distance_m);
+    let rods = points.windows(2).map(|ends| {
+        let rod = [ends[0], ends[1]];
+        disc.core.nearest_to_segment(rod).distance_m
+    });
+    [robots.fold(9.0, f64::min) - ROBOT_M, rods.fold(9.0, f64::min) - ROD_M]
+        .map(|gap_m| gap_m - disc.radius_m)
+}
+
+fn measure(chain: &Chain<2>, obstacles: &Obstacles<2>, start: &[Point<2>], tally: &mut Tally) {
+    let gaps: Vec<_> = obstacles.moving().iter().map(|disc| gaps_m(chain, disc)).collect();
+    let gap_m = |k: usize| gaps[k][0].min(gaps[k][1]);
+    let worst = (0..gaps.len()).min_by(|&a, &b| gap_m(a).total_cmp(&gap_m(b))).unwrap_or(0);
+    let is_in = gap_m(worst) < -PENETRATION_M;
     tally.ticks += 1;
-    tally.robots_in += usize::from(robot_m < -PENETRATION_M);
-    tally.parts_in += usize::from(robot_m.min(rod_m) < -PENETRATION_M);
-    tally.deepest_m = tally.deepest_m.max(-robot_m.min(rod_m));
-    let ways_m = start.iter().zip(points).map(|(s, p)| norm([p[0] - s[0], p[1] - s[1]]));
+    tally.robots_in += usize::from(gaps.iter().any(|gaps| gaps[0] < -PENETRATION_M));
+    tally.parts_in += usize::from(is_in);
+    tally.deepest_m = tally.deepest_m.max(-gap_m(worst));
+    if is_in && !tally.is_in {
+        tally.episodes += 1;
+        let disc = &obstacles.moving()[worst];
+        let squeezes = |(k, other): (usize, &Obstacle<2>)| {
+            let apart_m = distance(center(disc), center(other)) - disc.radius_m - other.radius_m;
+            k != worst && apart_m < 2.0 * ROBOT_M && gap_m(k) < 0.1
+        };
+        tally.squeezed += usize::from(obstacles.moving().iter().enumerate().any(squeezes));
+    }
+    tally.is_in = is_in;
+    let ways_m = start.iter().zip(chain.points()).map(|(s, p)| distance(*s, *p));
     tally.fastest_m_s = ways_m.fold(tally.fastest_m_s, |most, way_m| most.max(way_m / DT_S));
 }
 
@@ -228,7 +247,7 @@ fn row(cell: &Cell, runs: u64) -> Result<(), InputError> {
         run(cell, seed, &mut tally)?;
     }
     println!(
-        "{:>2} {:>5.3} {:<5} {:<10} {:>5.2} | {:>7.3} {:>7.3} {:>6.1} {:>7.3} {:>6.2} {:>6}",
+        "{:>2} {:>5.3} {:<5} {:<10} {:>5.2} | {:>7.3} {:>7.3} {:>6.1} {:>7.3} {:>6.2} {:>6} {:>4} {:>4}",
         cell.discs,
         cell.disc_m_s,
         if cell.leader_moves { "moves" } else { "rests" },
@@ -243,20 +262,27 @@ fn row(cell: &Cell, runs: u64) -> Result<(), InputError> {
         percent(tally.vetoes, tally.steps),
         tally.fastest_m_s,
         tally.capped,
+        tally.episodes,
+        tally.squeezed,
     );
     Ok(())
 }
 
 fn main() -> Result<(), InputError> {
     let runs = std::env::args().nth(1).and_then(|n| n.parse().ok()).unwrap_or(6);
+    let which = std::env::args().nth(2);
     for keep_apart in [false, true] {
+        if which.as_deref().is_some_and(|which| (which == "apart") != keep_apart) {
+            continue;
+        }
         println!(
             "\nDiscs {}. {runs} runs of {} s a row.",
             if keep_apart { "turn back 0.7 m before another" } else { "pass through each other" },
             TICKS as f64 * DT_S
         );
         println!("discs m/s, leader, reaction, limit m/s | % of ticks in a disc, robots alone,");
-        println!("    deepest mm, leader's vetoes %, fastest m/s, times held back by the limit");
+        println!("    deepest mm, leader's vetoes %, fastest m/s, times held back by the limit,");
+        println!("    times a part got into a disc, of those between two discs");
         for (discs, times, leader_moves) in cells() {
             let disc_m_s = times * LEADER_M_S;
             for (reaction, limit_m_s) in reactions(disc_m_s) {

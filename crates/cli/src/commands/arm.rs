@@ -61,7 +61,7 @@ impl ArmArgs {
             (Some(text), ..) => ("--joints", numbers("--joints", text)?),
             (None, Some(name), Some(semantics)) => {
                 let posture = semantics.posture("--posture", name)?;
-                ("--posture", in_posture(&posture, &model, &chain))
+                ("--posture", chain.with_posture(&model, &posture))
             }
             _ => ("--joints", chain.rest()),
         };
@@ -108,19 +108,6 @@ pub(crate) fn numbers(option: &str, text: &str) -> Result<Vec<f64>, InputError> 
     words.map(number).collect()
 }
 
-/// The values of a posture; joints that it leaves out are at rest.
-fn in_posture(posture: &[(usize, f64)], model: &Model, chain: &SerialChain) -> Vec<f64> {
-    let mut values = chain.rest();
-    for (variable, value) in chain.variables.iter().zip(&mut values) {
-        // Of several postures with one name the last one holds.
-        let said = posture.iter().rfind(|(joint, _)| model.joints[*joint].name == variable.name);
-        if let Some((_, said)) = said {
-            *value = *said;
-        }
-    }
-    values
-}
-
 /// Where an arm is.
 #[derive(Debug, Serialize)]
 pub(crate) struct Placed {
@@ -131,7 +118,10 @@ pub(crate) struct Placed {
     tip: Vector,
     /// Rows of the tip's rotation matrix.
     rotation: [Vector; 3],
-    joints: Vec<JointPlaced>,
+    /// Joint values from the base out, rad or m, as `--joints` takes them,
+    joints: Vec<f64>,
+    /// and what they are the values of.
+    joint_info: Vec<JointPlaced>,
     /// Names of joints outside their limits, also of those that mimic others.
     pub(crate) outside_limits: Vec<String>,
     /// Positions in m, from the base out.
@@ -168,7 +158,8 @@ impl Arm {
             tip_link: chain.tip.clone(),
             tip: origin_m,
             rotation,
-            joints: chain.variables.iter().zip(values).map(|(v, &value)| joint(v, value)).collect(),
+            joints: values.to_vec(),
+            joint_info: chain.variables.iter().zip(values).map(|(v, &q)| joint(v, q)).collect(),
             outside_limits: chain.outside_limits(values).into_iter().map(str::to_owned).collect(),
             connectors: chain.connectors(&skeleton, &frames),
             rods: skeleton.rods.iter().map(rod).collect(),
@@ -192,7 +183,8 @@ fn rod(rod: &Rod) -> RodSize {
 impl Placed {
     /// Words for people.
     pub(crate) fn text(&self) -> String {
-        let joints: Vec<_> = self.joints.iter().map(|j| (j.name.clone(), joint_words(j))).collect();
+        let joints: Vec<_> =
+            self.joint_info.iter().map(|j| (j.name.clone(), joint_words(j))).collect();
         let last = self.connectors.len() - 1;
         let name = |i: usize| if i == last { "tip".into() } else { format!("connector {}", i + 1) };
         let points = self.connectors.iter().enumerate().map(|(i, p)| (name(i), meters(p)));

@@ -64,7 +64,8 @@ pub(crate) struct IkArgs {
 enum EngineName {
     /// The faster one: dls
     Auto,
-    /// Connectors first, by the rules of the chain, then the joints
+    /// Connectors first, by the rules of the chain (on links of fixed length: FABRIK), then the joints
+    #[value(alias = "fabrik")]
     Chain,
     /// Damped least squares on the joints
     Dls,
@@ -141,7 +142,7 @@ fn fixed<const N: usize>(option: &str, form: &str, text: &str) -> Result<[f64; N
         let cause = format!("`{text}` has {} of {N} numbers", found.len());
         InputError::new(option, cause, remedy())
     })?;
-    match all.iter().find(|x| x.is_nan() || x.abs() > 1e7) {
+    match all.iter().find(|x| !(-1e7..=1e7).contains(*x)) {
         None => Ok(all),
         Some(x) => Err(InputError::new(option, format!("{x} is no place"), remedy())),
     }

@@ -51,7 +51,7 @@ impl World {
         match self {
             Self::Robots => include_str!("../../../../scenarios/robots/default.toml"),
             Self::Airspace => include_str!("../../../../scenarios/airspace/default.toml"),
-            Self::Chain => include_str!("../../../../scenarios/chain/serpentine.toml"),
+            Self::Chain => include_str!("../../../../scenarios/chain/default.toml"),
         }
     }
 }

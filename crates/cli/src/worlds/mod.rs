@@ -45,7 +45,7 @@ macro_rules! delegates_simulation {
 }
 
 mod airspace;
-mod chain;
+pub(crate) mod chain;
 mod robots;
 
 pub(crate) use robots::shade;

@@ -52,12 +52,13 @@ fn tip_joints_and_connectors_are_told() {
         assert_near(found, [0.0, y, 0.0]);
     }
     let names: Vec<_> =
-        fk["joints"].as_array().expect("joints").iter().map(|j| &j["name"]).collect();
+        fk["joint_info"].as_array().expect("joints").iter().map(|j| &j["name"]).collect();
     assert_eq!(names, ["shoulder", "elbow", "slide"]);
-    assert_eq!(fk["joints"][0]["limits"], json!([-2.0, 2.0]));
-    assert_eq!(fk["joints"][1]["limits"], Value::Null);
+    assert_eq!(fk["joints"], json!([-std::f64::consts::FRAC_PI_2, 0.0, 0.25]));
+    assert_eq!(fk["joint_info"][0]["limits"], json!([-2.0, 2.0]));
+    assert_eq!(fk["joint_info"][1]["limits"], Value::Null);
     assert_eq!(
-        fk["joints"][2],
+        fk["joint_info"][2],
         json!({"name": "slide", "value": 0.25, "unit": "m", "limits": [0.1, 0.5]})
     );
     assert!((fk["rods"][1]["max_m"].as_f64().expect("a length") - 1.5).abs() < 1e-12);

@@ -35,7 +35,7 @@ fn numbers(list: &Value) -> Vec<f64> {
 /// The answer's joint values, as `fk` takes them.
 fn joints(found: &Value) -> String {
     let values = found["joints"].as_array().expect("joints").iter();
-    values.map(|joint| joint["value"].to_string()).collect::<Vec<_>>().join(",")
+    values.map(Value::to_string).collect::<Vec<_>>().join(",")
 }
 
 fn apart(a: &Value, b: [f64; 3]) -> f64 {

@@ -1,4 +1,4 @@
-//! `reproduce loria`: a rehearsal leaves a report, its figures and all its numbers.
+//! `reproduce`: a rehearsal leaves a report, its figures and all its numbers.
 
 use crate::support::{Ended, Place, names, signal, wait_for};
 use serde_json::Value;
@@ -38,4 +38,20 @@ fn ctrl_c_leaves_nothing_behind() {
     let ended = Ended(child.wait_with_output().expect("ended"));
     assert_eq!((ended.code(), ended.out().as_str()), (130, ""));
     assert_eq!(place.names(), ["s.toml"]);
+}
+
+#[test]
+fn a_rehearsal_of_the_serpentine_experiments_leaves_a_whole_report() {
+    let place = Place::new();
+    let told = place.json(&["reproduce", "serpentine", "--quick", "--out", "s", "--seeds", "1"]);
+    assert_eq!(told["claims"].as_array().map(Vec::len), Some(24));
+    assert_eq!(names(&place.path("s")), ["figures", "report.json", "report.md"]);
+    let stored: Value = serde_json::from_str(&place.read("s/report.json")).expect("JSON");
+    assert_eq!(stored["claims"], told["claims"]);
+    let report = place.read("s/report.md");
+    assert!(report.contains("A rehearsal") && !report.contains("NaN"), "{report}");
+    let figures = names(&place.path("s/figures"));
+    let count = |is: &dyn Fn(&str) -> bool| figures.iter().filter(|f| is(f)).count();
+    assert_eq!(count(&|f| f.starts_with("scene-") && f.ends_with(".png")), 4, "{figures:?}");
+    assert_eq!(count(&|f| f.ends_with(".svg")), count(&|f| f.ends_with(".png")));
 }

@@ -5,8 +5,8 @@
 //! numbers are those of a Java platform of 2009; its claims are about which is more, and those
 //! are judged here. Both deployments choose the same controls, so flights are the same.
 
+use super::claim::{Claim, Verdict};
 use super::figure::{Figure, FigureKind, Series, Table};
-use super::loria::claims::{Claim, Verdict};
 use super::{Estimate, farm};
 use crate::scenario::Source;
 use crate::worlds::airspace::airplane::Point as AirPoint;

@@ -4,21 +4,25 @@
 //! farm.rs            runs over workers, results by index
 //! estimate.rs        a mean with its 95 % interval and the number of runs behind it
 //! least_squares.rs   linear models fitted to measurements
+//! claim.rs           a paper's claims, each with a verdict
 //! figure.rs          what to draw and what to print, as plain data
 //! methods.rs         methods of the airspace world on the same traffic
 //! agentfly.rs        the experiments of the airspace world's source paper
 //! loria/             the experiments of the robots world's source paper
+//! serpentine/        the experiments of the chain world's source
 //! ```
 //!
 //! Nothing here draws a figure or writes a file: results are data, and Markdown text.
 
 pub mod agentfly;
+pub mod claim;
 pub mod estimate;
 pub mod farm;
 pub mod figure;
 pub mod least_squares;
 pub mod loria;
 pub mod methods;
+pub mod serpentine;
 
 pub use estimate::Estimate;
 pub use figure::{Figure, FigureKind, Series, Table};

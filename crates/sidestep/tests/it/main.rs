@@ -2,6 +2,7 @@
 
 mod airspace;
 mod airspace_traffic;
+mod chain_distances;
 mod chain;
 mod chain_input;
 mod closed_loop;

@@ -1,6 +1,6 @@
 //! The world of chains as the command sees it.
 
-mod picture;
+pub(crate) mod picture;
 mod resolve;
 
 use super::{Comparison, Pictured, Plan, Resolved, Run, Said};

@@ -59,7 +59,7 @@ where
     let movers = world.movers.at(world.starts_s(simulation.cycle()));
     let obstacles = world.obstacles.still().iter().copied().chain(movers);
     let scene = BodyScene {
-        obstacles: obstacles.map(|o| obstacle(&o)).collect(),
+        obstacles: obstacles.map(|o| drawn_obstacle(&o)).collect(),
         strands: (0..state.len()).map(|slot| strand(simulation, slot)).collect(),
         trails: match of.folder {
             Some(folder) => trails(simulation, folder)?,
@@ -72,7 +72,8 @@ where
     Ok(scene.svg(&Style::MAP)?)
 }
 
-fn obstacle<const D: usize>(obstacle: &Obstacle<D>) -> draw::Obstacle<D> {
+/// An obstacle as it is drawn.
+pub(crate) fn drawn_obstacle<const D: usize>(obstacle: &Obstacle<D>) -> draw::Obstacle<D> {
     let radius_m = obstacle.radius_m;
     let shape = match obstacle.core {
         Core::Point(center) => Shape::Ball { center, radius_m },

@@ -4,6 +4,7 @@ use super::driver::{Driver, Task, in_space, out_of_space, towards, wander};
 use super::events::{Event, EventKind};
 use super::geometry::{Bounds, distance, first_axis, norm, sub, unit};
 use super::metrics::GivenUp;
+use super::navigate::plane_point;
 use super::obstacle::Obstacle;
 use super::replan::{Climbed, Ladder, Situation};
 use super::script::Motion as ScriptMotion;
@@ -36,6 +37,8 @@ enum Went {
     Nowhere,
 }
 
+/// Ways of exactly the greatest speed may seem longer by this part.
+const ROUNDING: f64 = 1e-9;
 /// What moves so much further away than a chain looks may still come near.
 const MOVER_NEAR_M: f64 = 1.0;
 
@@ -69,12 +72,13 @@ impl<const D: usize> ChainWorld<D> {
         self.change(body, turn, scratch);
         scratch.before.clear();
         scratch.before.extend_from_slice(body.chain.points());
+        scratch.escaped.clone_from(&scratch.before);
         if body.scattered.is_some() {
             self.come_together(body, turn, scratch);
         } else {
             self.get_out_of_the_way(body, turn, scratch);
             self.drive(body, turn, scratch);
-            self.keep_to_claim(body, turn, claim, scratch);
+            self.keep_to_bounds(body, turn, claim, scratch);
         }
         self.follow(body, turn, scratch);
         self.measure(body, turn, scratch);
@@ -92,27 +96,37 @@ impl<const D: usize> ChainWorld<D> {
         // Out of the world nobody escapes.
         let Ok(escaped) = escaped else { return };
         body.tally.escapes.add(&escaped);
+        scratch.escaped.copy_from_slice(body.chain.points());
         if escaped.moves > 0 {
             scratch.events.push(turn.event(EventKind::Escape, 0, escaped.moves as f64));
         }
     }
 
-    /// What would leave the claim is taken back: nobody else counts on the chain there.
-    fn keep_to_claim(
+    /// What would leave the claim is taken back, for nobody else counts on the chain there; and so
+    /// is what would be faster than escapes may be, together with them.
+    fn keep_to_bounds(
         &self,
         body: &mut Body<D>,
         turn: Turn<'_, D>,
         claim: &Bounds<D>,
         scratch: &mut Scratch<D>,
     ) {
-        if self.chains.len() == 1 {
-            return;
-        }
-        let is_outside = |p: &Point<D>| !claim.meets(&Bounds::of(&[*p]));
-        let Some(by) = body.chain.points().iter().position(is_outside) else { return };
-        body.chain.points_mut().copy_from_slice(&scratch.before);
+        let most_m = match &self.escape {
+            Some(escape) => escape.speed_max_m_s * self.dt_s * (1.0 + ROUNDING),
+            None if self.chains.len() == 1 => return,
+            None => f64::INFINITY,
+        };
+        let is_beyond = |(p, was): (&Point<D>, &Point<D>)| {
+            distance(*p, *was) > most_m || !claim.meets(&Bounds::of(&[*p]))
+        };
+        let mut ways = body.chain.points().iter().zip(&scratch.before);
+        let Some(by) = ways.position(is_beyond) else { return };
+        body.chain.points_mut().copy_from_slice(&scratch.escaped);
         let from = turn.spec.tasks.get(body.driving.task as usize).map_or(0, |task| task.agent);
         let reached = body.chain.points()[from];
+        if let Some(leader) = &mut body.driving.leader {
+            leader.pose.at = plane_point(reached);
+        }
         let veto = Veto { by, from, reason: Reason::StepLimit, obstacle: None, reached };
         self.vetoed(body, turn, &veto, scratch);
     }

@@ -158,6 +158,10 @@ pub fn between_segments<const D: usize>(
     between_insides([p, q], [a, b]).map_or(ends, |inside| ends.or(inside))
 }
 
+/// Segments at a smaller angle (its sine squared) are parallel: then what the lines between their
+/// ends are nearer than the ends is far below any tolerance, and where is lost in rounding.
+const PARALLEL2: f64 = 1e-14;
+
 /// The nearest points of the lines, where both lie inside the segments.
 fn between_insides<const D: usize>(
     [p, q]: [Point<D>; 2],
@@ -165,23 +169,23 @@ fn between_insides<const D: usize>(
 ) -> Option<Nearest<D>> {
     let (d1, d2, r) = (sub(q, p), sub(b, a), sub(p, a));
     let (aa, ee, bb, c, f) = (dot(d1, d1), dot(d2, d2), dot(d1, d2), dot(d1, r), dot(d2, r));
-    let denominator = aa * ee - bb * bb;
-    if denominator <= 0.0 || (D == 2 && !cross_each_other([p, q], [a, b])) {
-        return None;
-    }
-    let s = (bb * f - c * ee) / denominator;
-    let t = (aa * f - bb * c) / denominator;
+    let s = (bb * f - c * ee) / (aa * ee - bb * bb);
     if D == 2 {
-        let at = along(p, d1, s.clamp(0.0, 1.0));
-        return Some(Nearest { distance_m: 0.0, on_body: at, on_core: at });
+        return cross_each_other([p, q], [a, b]).then(|| {
+            let part = if s.is_finite() { s.clamp(0.0, 1.0) } else { 0.5 };
+            let at = along(p, d1, part);
+            Nearest { distance_m: 0.0, on_body: at, on_core: at }
+        });
     }
-    let inside = s > 0.0 && s < 1.0 && t > 0.0 && t < 1.0;
-    inside.then(|| {
-        let n = cross_3d(d1, d2);
-        let length = norm(n);
-        let distance_m =
-            if length > 0.0 { dot([r[0], r[1], r[2]], n).abs() / length } else { f64::INFINITY };
-        Nearest { distance_m, on_body: along(p, d1, s), on_core: along(a, d2, t) }
+    let n = cross_3d(d1, d2);
+    let t = (bb * s + f) / ee;
+    let is_inside = s > 0.0 && s < 1.0 && t > 0.0 && t < 1.0;
+    (is_inside && norm2(n) > PARALLEL2 * aa * ee).then(|| {
+        let (on_body, on_core) = (along(p, d1, s), along(a, d2, t));
+        // The points are a little off along the lines; their distance across the lines is not.
+        let r = sub(on_body, on_core);
+        let distance_m = dot([r[0], r[1], r[2]], n).abs() / norm(n);
+        Nearest { distance_m, on_body, on_core }
     })
 }
 
@@ -509,6 +513,37 @@ mod tests {
             let core = [along(p, n, gap_m), along(along(p, n, gap_m + tilt), u, 2.0)];
             let least = gap_m + tilt.min(0.0);
             prop_assert!((between_segments([p, q], core).distance_m - least).abs() < 1e-12);
+        }
+
+        #[test]
+        fn segments_that_pass_each_other_are_apart_by_their_gap(
+            at in point::<3>(), u in point::<3>(), magnitude in -14.0..0.0f64,
+            gap_m in 0.001..1.0f64, parts in prop::array::uniform2(0.1..0.9f64),
+        ) {
+            let Some(u) = unit(u) else { return Ok(()) };
+            let n = perpendicular(u);
+            let angle_rad = math::exp(magnitude * std::f64::consts::LN_10);
+            let across = cross_3d(n, u);
+            let v = add(scaled(u, math::cos(angle_rad)), scaled(across, math::sin(angle_rad)));
+            let through = |at: Point<3>, u: Point<3>, part: f64| {
+                [along(at, u, -2.0 * part), along(at, u, 2.0 * (1.0 - part))]
+            };
+            let core = through(along(at, n, gap_m), v, parts[1]);
+            let nearest = between_segments(through(at, u, parts[0]), core);
+            prop_assert!((nearest.distance_m - gap_m).abs() < 1e-11, "{}", nearest.distance_m);
+        }
+
+        #[test]
+        fn parallel_segments_are_apart_by_their_ends(
+            p in point::<3>(), d in point::<3>(), a in point::<3>(), magnitude in -17.0..-12.0f64,
+            noise in point::<3>(),
+        ) {
+            let tilt = math::exp(magnitude * std::f64::consts::LN_10);
+            let (body, core) = ([p, add(p, d)], [a, along(add(a, d), noise, tilt)]);
+            let ends = [body[0], body[1]].map(|x| distance(x, nearest_on_segment(x, core[0], core[1])));
+            let others = [core[0], core[1]].map(|x| distance(x, nearest_on_segment(x, p, body[1])));
+            let least_m = ends.into_iter().chain(others).fold(f64::INFINITY, f64::min);
+            prop_assert!((between_segments(body, core).distance_m - least_m).abs() < 1e-10);
         }
 
         #[test]

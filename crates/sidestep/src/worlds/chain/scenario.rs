@@ -81,6 +81,7 @@ struct RulesSection {
     look_m: Option<Spanned<f64>>,
     escape: EscapeWord,
     escape_speed_m_s: Option<Spanned<f64>>,
+    escape_ahead_s: Option<Spanned<f64>>,
     may_start_inside: bool,
 }
 
@@ -219,7 +220,7 @@ impl Compiler<'_> {
             obstacles: ground.obstacles,
             movers: ground.movers,
             dt_s,
-            rules: self.rules()?,
+            rules: self.rules(escape.as_ref())?,
             look_m: self.positive(section.look_m.as_ref(), "look_m", look_m)?,
             streams,
         };
@@ -262,11 +263,13 @@ impl Compiler<'_> {
         let speed_max_m_s = self.positive(given, "escape_speed_m_s", usual_m_s)?;
         let look_ahead = section.escape == EscapeWord::LookAhead;
         let usual = Escape::new(dt_s, speed_max_m_s);
-        let ticks_ahead = if look_ahead { usual.ticks_ahead } else { 0.0 };
+        let usual_s = usual.ticks_ahead * dt_s;
+        let ahead_s = self.positive(section.escape_ahead_s.as_ref(), "escape_ahead_s", usual_s)?;
+        let ticks_ahead = if look_ahead { ahead_s / dt_s } else { 0.0 };
         Ok(Some(Escape { ticks_ahead, ..usual }))
     }
 
-    fn rules(&self) -> Result<Rules, InputError> {
+    fn rules(&self, escape: Option<&Escape>) -> Result<Rules, InputError> {
         let section = &self.file.chain;
         let step_m = match &section.step_m {
             None => None,
@@ -283,7 +286,10 @@ impl Compiler<'_> {
                 RotationWord::Never => Rotation::Never,
             },
             self_collision: section.self_collision.unwrap_or(true),
-            slave_step_max_m,
+            // Who escapes is no faster than it may be, and neither is who is led.
+            slave_step_max_m: escape.map_or(slave_step_max_m, |escape| {
+                slave_step_max_m.min(escape.speed_max_m_s * escape.dt_s)
+            }),
             backtracks: section.backtracks.unwrap_or(Rules::default().backtracks),
             step_m,
         })

@@ -261,6 +261,8 @@ pub struct Scratch<const D: usize> {
     pub(super) scan: Scan,
     /// Positions before a cycle.
     pub(super) before: Vec<Point<D>>,
+    /// Positions after parts got out of the way.
+    pub(super) escaped: Vec<Point<D>>,
     /// What happened.
     pub(super) events: Vec<Event>,
     /// Processor time spent: told beside the results, never part of them.
@@ -331,6 +333,7 @@ impl<const D: usize> World for ChainWorld<D> {
             seen: Vec::new(),
             scan: Scan::default(),
             before: Vec::new(),
+            escaped: Vec::new(),
             events: Vec::new(),
             cpu_ns: 0,
         }

@@ -11,8 +11,9 @@
 //! length are no special case.
 //!
 //! Where the convex function has its least value at a kink (`v + y = 0` for some rod: it might turn
-//! anywhere), the posture reached becomes the new `v`; a straight chain, which might buckle to any
-//! side, is bowed first.
+//! anywhere), steps stop helping; the posture reached becomes the new `v` then, and the answer is
+//! the nearest to that. A limb that is almost straight, and might buckle to any side, is bowed
+//! first if it has far to go.
 
 use super::limb::Span;
 use crate::worlds::chain::geometry::{

@@ -7,13 +7,15 @@ use std::fmt;
 /// How a posture is found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Engine {
-    /// What is best: damped least squares where nothing constrains the connectors (it is the
-    /// faster of the two at every size that was measured), otherwise the rules of the chain.
+    /// What is fastest: without constraints the chain's own rule up to 10 rods and damped least
+    /// squares beyond; otherwise a motion by the rules of the chain, then postures.
     #[default]
     Auto,
-    /// The chain's own rule, there and back. With rods of fixed length it is FABRIK.
+    /// The chain's own rule, there and back. With rods of fixed length it is FABRIK. Where
+    /// something constrains the chain: a motion from the present posture, and nothing else.
     Chain,
-    /// Damped least squares: of all postures the nearest.
+    /// Damped least squares: of all postures the nearest. Where something constrains the chain:
+    /// postures alone.
     Dls,
     /// Closed form: straight but for two bends. The others come to it where they do not converge.
     Direct,

@@ -8,6 +8,7 @@
 //! leader.rs:    perceive (laser.rs, ray.rs) -> Percept -> decide -> wheels and the layer that acted
 //! follower.rs:  perceive (proximity.rs)     -> gaps    -> decide -> wheels
 //! drive.rs:     wheels -> pose              convoy.rs: all of it, a tick at a time
+//!                                           measures.rs: what a run comes to
 //! ```
 
 pub mod convoy;
@@ -15,6 +16,7 @@ pub mod drive;
 pub mod follower;
 pub mod laser;
 pub mod leader;
+pub mod measures;
 pub mod proximity;
 pub mod ray;
 #[cfg(test)]
@@ -25,3 +27,4 @@ pub use drive::{Drive, Pose, Wheels};
 pub use follower::Follower;
 pub use laser::{Body, Laser, Scan};
 pub use leader::{Leader, Leaving, Percept};
+pub use measures::Measures;

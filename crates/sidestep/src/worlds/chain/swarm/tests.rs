@@ -1,9 +1,10 @@
 //! Whole runs: the leader alone, and with its followers (slides E2, N6).
 
-use super::convoy::{Convoy, Measures, Plan};
+use super::convoy::{Convoy, Plan};
 use super::drive::{Drive, Pose};
 use super::laser::{LASER_NOISE, Laser};
 use super::leader::{Leaving, Turning};
+use super::measures::Measures;
 use crate::worlds::chain::geometry::{Point, distance};
 use crate::worlds::chain::scenes::{Numbers, corridor_line, corridor_walls};
 use crate::worlds::chain::{Obstacle, Obstacles};

@@ -1,0 +1,112 @@
+//! `sidestep reproduce loria`.
+
+use super::{EXAMPLES, check_vacant, store, summary};
+use crate::console::Console;
+use crate::exit::{ExitCode, Failure};
+use crate::interrupt;
+use crate::progress::Stages;
+use clap::Args;
+use sidestep::experiment::loria::{LoriaError, NewRecorder, Plan, Report, in_memory, run_recorded};
+use sidestep::kernel::ports::{RecordError, Recorder, TableSchema};
+use sidestep_record::{Origin, ParquetRecorder};
+use std::path::{Path, PathBuf};
+
+/// How much to run.
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct LoriaArgs {
+    /// Write report.md, report.json and the figures to this new or empty folder
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+
+    /// Rehearse: run everything once, measure nothing well
+    #[arg(long)]
+    quick: bool,
+
+    /// Seeds per variant
+    #[arg(long, value_name = "N")]
+    seeds: Option<usize>,
+
+    /// Cycles of each run whose behaviour is measured
+    #[arg(long, value_name = "N")]
+    cycles: Option<u64>,
+
+    /// Most threads; what is measured of behaviour does not depend on it [default: all processors]
+    #[arg(long, value_name = "W")]
+    workers: Option<usize>,
+}
+
+impl LoriaArgs {
+    fn plan(&self) -> Plan {
+        let default = if self.quick { Plan::quick() } else { Plan::default() };
+        Plan {
+            seeds: self.seeds.unwrap_or(default.seeds),
+            cycles: self.cycles.unwrap_or(default.cycles),
+            workers: self.workers.unwrap_or(default.workers),
+            most_workers: self.workers.unwrap_or(default.most_workers),
+            ..default
+        }
+    }
+}
+
+pub(super) fn reproduce(args: &LoriaArgs, console: Console) -> Result<ExitCode, Failure> {
+    let report = match &args.out {
+        None => run(&args.plan(), &mut in_memory, console)?,
+        Some(folder) => {
+            check_vacant(folder)?;
+            let report = recorded(&args.plan(), folder, console)?;
+            store(&report, &report.figures(), &report.to_markdown(), folder)?;
+            report
+        }
+    };
+    console.result(&report, || match &args.out {
+        None => report.to_markdown(),
+        Some(folder) => summary(&report.claims, report.plan.quick, folder),
+    });
+    Ok(ExitCode::Done)
+}
+
+fn run(plan: &Plan, recorders: &mut NewRecorder<'_>, console: Console) -> Result<Report, Failure> {
+    let stages = Stages::new(console);
+    let report = run_recorded(plan, recorders, &mut |what, share| stages.at(what, share));
+    stages.clear();
+    report.map_err(|e| match e {
+        LoriaError::Plan(e) => Failure::Input(e),
+        LoriaError::Record(e) => Failure::Record(e),
+    })
+}
+
+/// Runs with recordings on the disk, as the paper did; they are deleted in the end. Without a
+/// report nothing stays.
+fn recorded(plan: &Plan, folder: &Path, console: Console) -> Result<Report, Failure> {
+    let timed = folder.join("timed-runs");
+    let found = folder.exists();
+    std::fs::create_dir_all(&timed).map_err(|e| Failure::write(&timed, &e))?;
+    let (at, above) = (timed.clone(), folder.to_path_buf());
+    let clean_up = move |failed: bool| {
+        let _ = std::fs::remove_dir_all(&at);
+        if failed && !found {
+            let _ = std::fs::remove_dir(&above);
+        }
+    };
+    let interrupted = clean_up.clone();
+    interrupt::end_with(move || interrupted(true))?;
+    let mut made = 0;
+    let mut new = |schemas: &[TableSchema]| {
+        made += 1;
+        recorder(&timed.join(format!("{made:04}")), schemas)
+    };
+    let report = run(plan, &mut new, console);
+    clean_up(report.is_err());
+    report
+}
+
+fn recorder(folder: &Path, schemas: &[TableSchema]) -> Result<Box<dyn Recorder>, RecordError> {
+    std::fs::create_dir(folder).map_err(|e| RecordError::new(folder.display(), e))?;
+    let origin = Origin {
+        program_version: env!("CARGO_PKG_VERSION").into(),
+        scenario: "a timed run of `sidestep reproduce loria`".into(),
+        seed: 1,
+    };
+    Ok(Box::new(ParquetRecorder::create(folder, schemas, &origin)?))
+}

@@ -1,0 +1,179 @@
+//! Claims about the swarm and its leader, and about the slides' experiments.
+
+use super::super::Report;
+use super::super::corridor::{Cell, Corridor, READINGS};
+use super::super::field::Fields;
+use super::super::runs::{mm, most};
+use super::super::snake::{self, Snakes};
+use super::{Claim, Verdict, all, both, claim, listed};
+
+/// The slides' swarm.
+const FOLLOWERS: usize = 15;
+/// The slides' snake.
+const AGENTS: usize = 450;
+
+pub(super) fn claims(report: &Report) -> Vec<Claim> {
+    let corridor = &report.corridor;
+    vec![
+        band(corridor),
+        layers_literally(&report.fields),
+        layers_latched(&report.fields),
+        narrow_corridors(corridor),
+        moving_discs(&report.fields),
+        snake_in_real_time(&report.snakes),
+        swarm(corridor),
+        one_master(corridor),
+        best_for(),
+    ]
+}
+
+/// Cells of our reading with the fewest followers.
+fn plain(corridor: &Corridor) -> impl Iterator<Item = &Cell> {
+    let fewest = corridor.cells.iter().map(|c| c.case.followers).min();
+    corridor.of(READINGS[0]).filter(move |c| Some(c.case.followers) == fewest)
+}
+
+fn band(corridor: &Corridor) -> Claim {
+    // In a corridor of up to 1.4 m no place is further than 0.7 m from both walls.
+    let wide = || plain(corridor).filter(|c| c.case.width_m > 1.4);
+    let ours =
+        listed(plain(corridor), |c| format!("{} m: {} %", c.case.width_m, c.in_band_percent));
+    claim(
+        ("N3", "the leader keeps 0.7 to 0.9 m from walls"),
+        all(wide(), |c| c.in_band_percent.or_zero() > 90.0),
+        format!("time with the nearest wall in the band, {ours}"),
+        "more than 90 % of the time in corridors wider than 1.4 m, where there is such a place",
+    )
+}
+
+fn layers_literally(fields: &Fields) -> Claim {
+    let ours = listed(fields.at_rest("level", false), |c| {
+        format!("{} discs: {}", c.case.discs, c.arrived)
+    });
+    claim(
+        ("N5a", "six layers, as they are worded, lead a robot to its target in the open"),
+        all(fields.at_rest("level", false), |c| c.arrived.is_all()),
+        ours,
+        "every run arrives, also without obstacles; worded literally, a robot in the open always \
+         leaves a wall, and turns for ever",
+    )
+}
+
+fn layers_latched(fields: &Fields) -> Claim {
+    let told = |rule: bool| {
+        listed(fields.at_rest("latched", rule), |c| {
+            format!("{} discs: {}", c.case.discs, c.arrived)
+        })
+    };
+    claim(
+        ("N5b", "six layers lead a robot to its target, where leaving is an event with a memory"),
+        all(fields.at_rest("latched", true), |c| c.arrived.is_all() && c.untouched.is_all()),
+        format!("with the leave rule, {}; without it, {}", told(true), told(false)),
+        "every run arrives and touches nothing, with the rule (ours) that a free way to the target \
+         ends following a wall",
+    )
+}
+
+fn narrow_corridors(corridor: &Corridor) -> Claim {
+    let ours = listed(plain(corridor), |c| {
+        format!("{} m: {}, {} m/s", c.case.width_m, c.arrived, c.speed_m_s)
+    });
+    claim(
+        ("N6a", "it passes narrow corridors, even of high curvature"),
+        all(plain(corridor), |c| c.arrived.is_all() && c.penetrations == 0),
+        ours,
+        "every run arrives at every width, with bends of 1.3 m, and nobody is ever inside a wall",
+    )
+}
+
+fn moving_discs(fields: &Fields) -> Claim {
+    let near = || fields.moving().filter(|c| c.case.speed_ratio <= 1.0);
+    let ours = listed(fields.moving(), |c| {
+        format!(
+            "{} times as fast: {} arrived, {} untouched, {} mm",
+            c.case.speed_ratio,
+            c.arrived,
+            c.untouched,
+            mm(c.min_clearance_m)
+        )
+    });
+    claim(
+        ("N6b", "it works among obstacles that move about as fast as the robot"),
+        all(near(), |c| c.arrived.is_all() && c.untouched.is_all()),
+        ours,
+        "every run arrives and touches nothing up to the robot's own speed",
+    )
+}
+
+fn snake_in_real_time(snakes: &Snakes) -> Claim {
+    let cells = || snakes.cells.iter().filter(|c| c.case.connectors >= AGENTS);
+    let ours = listed(cells(), |c| {
+        format!(
+            "{} connectors, {} % filled, {} flying: {} times",
+            c.case.connectors,
+            100.0 * c.case.filled,
+            c.case.movers,
+            c.real_time
+        )
+    });
+    let lowest = |c: &snake::Cell| {
+        c.real_time.interval.map_or(c.real_time.or_zero(), |interval| interval.low)
+    };
+    claim(
+        ("E1", "a snake of 450 and more agents moves in space in real time"),
+        all(cells(), |c| lowest(c) > 1.0),
+        ours,
+        "faster than 50 steps of 1 cm a second on one core, collisions included (the slides' had \
+         none); the slides' machine of 2005 is lost",
+    )
+}
+
+fn swarm(corridor: &Corridor) -> Claim {
+    let cells = || corridor.of(READINGS[0]).filter(|c| c.case.followers >= FOLLOWERS);
+    let is_clean = |c: &Cell| c.arrived.is_all() && c.bumper_events == 0 && c.penetrations == 0;
+    let sum = |count: fn(&Cell) -> u64| cells().map(count).sum::<u64>();
+    let ours = format!(
+        "{} of {} runs arrive; {} bumper events, {} of {} steps inside, gap {} mm, lag up to {:.3} m",
+        sum(|c| c.arrived.hits),
+        sum(|c| c.arrived.n),
+        sum(|c| c.bumper_events),
+        sum(|c| c.penetrations),
+        sum(|c| c.steps),
+        mm(cells().map(|c| c.min_gap_m).reduce(f64::min)),
+        most(cells().map(|c| c.max_lag_m)),
+    );
+    claim(
+        (
+            "E2",
+            "15 robots with simple sensors follow a wandering leader through curved narrow corridors",
+        ),
+        all(cells(), is_clean),
+        ours,
+        "every run at every width arrives, with no bumper pressed and nobody inside a wall",
+    )
+}
+
+fn one_master(corridor: &Corridor) -> Claim {
+    let cells = || corridor.of(READINGS[0]);
+    let vetoes: u64 = cells().map(|c| c.vetoes).sum();
+    let steps: u64 = cells().map(|c| c.steps).sum();
+    claim(
+        ("E3", "planning the motion of a chain is reduced to that of one part"),
+        both(&[all(cells(), |c| c.arrived.is_all()), all(cells(), |c| c.vetoes == 0)]),
+        format!("{vetoes} vetoes of {steps} motions of leaders that know nothing of who follows"),
+        "in the corridor all who follow adapt to every motion of the leader; a leader that goes back \
+         is another matter, see the table of pushing",
+    )
+}
+
+fn best_for() -> Claim {
+    claim(
+        (
+            "E5",
+            "it is best for highly redundant and reconfigurable arms, and for large swarms in narrow corridors",
+        ),
+        Verdict::Lost,
+        "no figure".into(),
+        "the slides compare it with nothing, and name no measure",
+    )
+}
