@@ -176,7 +176,7 @@ fn a_killed_run_resumes_to_the_same_digest_and_the_same_rows() {
         "--cycles",
         "20000",
         "--set",
-        "record.checkpoint_every=50",
+        "record.checkpoint_every=4000",
         "--set",
         "chains.1.tasks.lasts_s=900",
     ];
@@ -241,7 +241,8 @@ fn a_run_folder_needs_no_other_file() {
         let cycles = told["cycles"].to_string();
         let replay = place.json(&["replay", "moved", "--cycle", &cycles]);
         assert_eq!(replay["digest"], told["digest"], "{name}");
-        assert_eq!(place.json(&["replay", "moved", "--cycle", "3"])["compared_poses"], 3, "{name}");
+        let compared = &place.json(&["replay", "moved", "--cycle", "3"])["compared_poses"];
+        assert_eq!(compared, &told["robots"], "{name}");
         assert_eq!(place.json(&["run", "moved/scenario.toml"])["digest"], told["digest"], "{name}");
     }
 }

@@ -29,15 +29,16 @@ speed_m_s = 0.5
 /// Runs, checks that it is refused and that nothing was written; returns the words.
 fn refused(place: &Place, name: &str, more: &[&str]) -> String {
     let before = place.names();
+    let mut told = String::new();
     for command in [&["run", "c.toml", "--out", "out"][..], &["check", "c.toml"]] {
         let ended = place.run(&[command, more].concat());
-        let err = ended.err();
-        assert_eq!((ended.code(), ended.out().as_str()), (2, ""), "{name}: {err}");
-        assert!(err.starts_with("error: ") && err.contains("\n  help: "), "{name}: {err}");
-        assert_eq!(err.matches("error: ").count(), 1, "{name}: {err}");
+        told = ended.err();
+        assert_eq!((ended.code(), ended.out().as_str()), (2, ""), "{name}: {told}");
+        assert!(told.starts_with("error: ") && told.contains("\n  help: "), "{name}: {told}");
+        assert_eq!(told.matches("error: ").count(), 1, "{name}: {told}");
         assert_eq!(place.names(), before, "{name}: something was written");
     }
-    place.run(&[&["check", "c.toml"], more].concat()).err()
+    told
 }
 
 /// `file:LINE:COLUMN: ` stands at the beginning.
@@ -159,8 +160,7 @@ fn a_wrong_script_is_refused_where_it_is_wrong() {
         ("forward 1\\n  turn left", "script:2:8"),
         ("forward 1 / 0", "script:1:9"),
         ("to go forward 0 go end go", "motions"),
-        ("to go wait 0 go end go", "motions"),
-        ("to go repeat 1 [ go ] end go", "in each other"),
+        ("to go go turn 1 end go", "in each other"),
         ("repeat 10000000 [ repeat 10000000 [ ] ]", "repeat less often"),
         ("repeat -1 [ forward 1 ]", "whole number"),
         ("goto 1e300, 0", "1e6 m"),
@@ -171,10 +171,13 @@ fn a_wrong_script_is_refused_where_it_is_wrong() {
         place.write("c.toml", format!("{SCRIPTED}script = \"{script}\"\n"));
         let err = refused(&place, script, &[]);
         assert!(err.contains(said), "{script}: {err}");
+        if !said.starts_with("script:") {
+            continue;
+        }
         place.write("way.txt", script.replace("\\n", "\n"));
         place.write("c.toml", format!("{SCRIPTED}script_file = \"way.txt\"\n"));
         let err = refused(&place, script, &[]);
-        assert!(has_position(&err, "way.txt") || has_position(&err, "c.toml"), "{script}: {err}");
+        assert!(has_position(&err, "way.txt"), "{script}: {err}");
     }
     let place = Place::new();
     place.write("c.toml", SCRIPTED);

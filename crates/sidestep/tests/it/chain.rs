@@ -330,6 +330,13 @@ fn between<const D: usize>(one: [[f64; D]; 2], two: [[f64; D]; 2]) -> f64 {
     at(lo).min(at(hi))
 }
 
+/// Whether the boxes of two segments are half a meter apart.
+fn are_far<const D: usize>(one: [[f64; D]; 2], two: [[f64; D]; 2]) -> bool {
+    let lo = |[a, b]: [[f64; D]; 2], i: usize| a[i].min(b[i]);
+    let hi = |[a, b]: [[f64; D]; 2], i: usize| a[i].max(b[i]);
+    (0..D).any(|i| lo(one, i) > hi(two, i) + 0.5 || lo(two, i) > hi(one, i) + 0.5)
+}
+
 /// Connectors and rods of a chain as capsules.
 fn parts<const D: usize>(run: &ChainSimulation<D>, slot: usize) -> Vec<([[f64; D]; 2], f64)> {
     let body = run.state().body(slot);
@@ -427,12 +434,12 @@ patience_s = 1000.0
 /// L1 for chains.
 #[test]
 fn among_what_stands_still_nothing_is_ever_penetrated_and_the_metrics_are_true() {
-    for seed in 0..25 {
-        assert_eq!(assert_recount::<2>(seed, STILL, 120), 0, "seed {seed}");
+    for seed in 0..60 {
+        assert_eq!(assert_recount::<2>(seed, STILL, 200), 0, "seed {seed}");
     }
     let still = SNAKE.replace("n = 10\n", "n = 0\n");
-    for seed in 0..6 {
-        assert_eq!(assert_recount::<3>(seed, &still, 60), 0, "seed {seed}");
+    for seed in 0..12 {
+        assert_eq!(assert_recount::<3>(seed, &still, 100), 0, "seed {seed}");
     }
 }
 
@@ -455,6 +462,9 @@ fn chains_that_meet_never_overlap() {
             for (a, b) in (0..4).flat_map(|b| (0..b).map(move |a| (a, b))) {
                 for (one, r) in &all[a] {
                     for (two, s) in &all[b] {
+                        if are_far(*one, *two) {
+                            continue;
+                        }
                         let apart_m = between(*one, *two) - r - s;
                         assert!(apart_m > -1e-6, "seed {seed}, cycle {cycle}: {a}, {b}: {apart_m}");
                         nearest_m = nearest_m.min(apart_m);
