@@ -141,7 +141,7 @@ fn fixed<const N: usize>(option: &str, form: &str, text: &str) -> Result<[f64; N
         let cause = format!("`{text}` has {} of {N} numbers", found.len());
         InputError::new(option, cause, remedy())
     })?;
-    match all.iter().find(|x| !(x.abs() <= 1e7)) {
+    match all.iter().find(|x| x.is_nan() || x.abs() > 1e7) {
         None => Ok(all),
         Some(x) => Err(InputError::new(option, format!("{x} is no place"), remedy())),
     }

@@ -107,10 +107,9 @@ impl<const D: usize> Judge<'_, D> {
         margin_m: f64,
     ) -> impl Iterator<Item = OwnPair<D>> + 'a {
         let near = self.bounds(points, i).grown(margin_m);
-        let rods = (i + 1..self.chain.rods().len())
+        (i + 1..self.chain.rods().len())
             .filter(move |&j| self.bounds(points, j).meets(&near))
-            .flat_map(move |j| self.own_pairs_of(points, i, j));
-        rods
+            .flat_map(move |j| self.own_pairs_of(points, i, j))
     }
 
     fn bounds(&self, points: &[Point<D>], i: usize) -> Bounds<D> {
