@@ -9,8 +9,9 @@ use crate::worlds::chain::metrics::Metrics;
 use serde::Serialize;
 use sidestep_kernel::InputError;
 
-/// Ways to react, in the words of scenarios.
-pub(super) const ESCAPES: [&str; 3] = ["off", "touch", "look-ahead"];
+/// Ways to react: not at all, when touched, before, and before without the limits that robots
+/// have: parts pass through each other, as fast as they need.
+pub(super) const ESCAPES: [&str; 4] = ["off", "touch", "look-ahead", "look-ahead, no limits"];
 /// Half the side of the ground.
 const HALF_M: f64 = 8.0;
 
@@ -37,8 +38,14 @@ impl Case {
             true => format!("kind = \"wander\"\nturn_deg = 30\nwithin_m = {inner:?}"),
             false => "kind = \"rest\"".into(),
         };
+        let reaction = match *escape == ESCAPES[3] {
+            true => {
+                "escape = \"look-ahead\"\nself_collision = false\nescape_speed_m_s = 1000.0".into()
+            }
+            false => format!("escape = \"{escape}\""),
+        };
         format!(
-            "{}dt_s = {DT_S:?}\nescape = \"{escape}\"\n\
+            "{}dt_s = {DT_S:?}\n{reaction}\n\
              [[fields]]\nlo_m = {lo:?}\nhi_m = {hi:?}\nn = {discs}\nradius_m = [0.2, 0.5]\n\
              speed_m_s = [{speed:?}, {speed:?}]\n\
              [[chains]]\nconnectors = 16\nat_m = [5.0, 0.0]\nrod_m = [0.6, 0.8]\nradius_m = 0.25\n\
@@ -102,7 +109,8 @@ impl Movers {
         let note = "16 connectors of 0.25 m on 16 m x 16 m; discs of 0.2 to 0.5 m, each at the \
                     speed given, which is that over the leader's 0.5 m/s whether it wanders or \
                     rests. A part counts as inside from 1 um on. Parts that get out of the way \
-                    do so at most twice as fast as the faster of leader and discs.";
+                    do so at most twice as fast as the faster of leader and discs, but for `no \
+                    limits`, where the chain may also pass through itself.";
         let columns = [
             "leader",
             "reaction",

@@ -49,7 +49,8 @@ fn moving_obstacles(movers: &Movers) -> Claim {
         all(movers.of(ESCAPES[2]), |c| c.inside_percent.or_zero() == 0.0),
         listed(ESCAPES, told),
         "no step with a part inside at any speed and number of discs, for a chain that looks ahead \
-         (ours); the slides only have parts that react when touched",
+         (ours; the slides' parts react when touched) and keeps to a speed limit and out of itself; \
+         without these limits parts jump",
     )
 }
 
@@ -194,9 +195,9 @@ fn one_turn(rotations: &Rotations) -> Claim {
 
 fn bend_limits(initiators: &Initiators) -> Claim {
     let ours = listed(&initiators.bends, |b| {
-        let place = if b.in_space { "space" } else { "plane" };
+        let place = if b.in_space { "in space" } else { "in the plane" };
         format!(
-            "{}\u{b0} in the {place}: {} beyond, sharpest {:.3}\u{b0}",
+            "{}\u{b0} {place}: {} beyond, sharpest {:.3}\u{b0}",
             b.limit_deg, b.exceeded, b.sharpest_deg
         )
     });
