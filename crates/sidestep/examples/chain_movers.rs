@@ -107,7 +107,8 @@ fn discs(cell: &Cell, chain: &Chain<2>, numbers: &mut Numbers) -> Vec<Obstacle<2
 
 /// Turns back the discs that leave the square.
 fn reflect(obstacles: &mut Obstacles<2>) {
-    for disc in obstacles.moving_mut() {
+    let mut discs = obstacles.moving().to_vec();
+    for disc in &mut discs {
         let at = center(disc);
         for (i, middle_m) in at.into_iter().enumerate() {
             if middle_m.abs() > HALF_M && middle_m * disc.velocity_m_s[i] > 0.0 {
@@ -115,11 +116,12 @@ fn reflect(obstacles: &mut Obstacles<2>) {
             }
         }
     }
+    obstacles.set_moving(&discs).expect("discs are finite");
 }
 
 /// Turns two discs that come nearer to each other than [`APART_M`] away from each other.
 fn keep_apart(obstacles: &mut Obstacles<2>) {
-    let discs = obstacles.moving_mut();
+    let mut discs = obstacles.moving().to_vec();
     for a in 0..discs.len() {
         for b in a + 1..discs.len() {
             let (from, to) = (center(&discs[a]), center(&discs[b]));
@@ -137,6 +139,7 @@ fn keep_apart(obstacles: &mut Obstacles<2>) {
             }
         }
     }
+    obstacles.set_moving(&discs).expect("discs are finite");
 }
 
 fn center(disc: &Obstacle<2>) -> Point<2> {
