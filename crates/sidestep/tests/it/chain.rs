@@ -556,14 +556,14 @@ fn a_vetoed_order_is_told_and_leaves_every_bit_until_patience_ends() {
     assert_eq!(told.len(), 2, "{told:?}");
     assert_eq!(
         (told[0].0, told[0].1.as_str(), told[0].2, told[0].3.as_str()),
-        (0, "veto", 5, "fixed")
+        (0, "veto", 5, "out-of-reach")
     );
     // It is tried for 2 s of 0.1 s, and once more.
     assert_eq!((told[1].0, told[1].1.as_str()), (20, "given-up"));
     assert!((0..6).all(|k| track(&rows, k).iter().all(|at| *at == [-f64::from(k), 0.0])));
     assert!(run.is_over() && run.cycle() == 21, "{}", run.cycle());
     let metrics = run.chain_metrics();
-    assert_eq!((metrics.vetoes, metrics.vetoes_by_reason["fixed"]), (21, 21));
+    assert_eq!((metrics.vetoes, metrics.vetoes_by_reason["out-of-reach"]), (21, 21));
     let given_up = &metrics.given_up[0].what;
     assert_eq!(
         (given_up.task, given_up.by, given_up.reason.as_deref()),
@@ -653,7 +653,7 @@ fn a_run_is_over_when_all_tasks_of_all_chains_are_done() {
     assert!(metrics.max_rod_violation_m <= 1e-9 && metrics.given_up.is_empty(), "{metrics:?}");
 }
 
-/// Of a time by time, of a script by motions, of targets by targets, of a way by way.
+/// Of a time by time, of a script by motions, of targets by targets, without an end by the run.
 #[test]
 fn progress_means_what_the_task_asks_for() {
     let progress = |task: &str, cycles: u64| {
@@ -664,8 +664,9 @@ fn progress_means_what_the_task_asks_for() {
     let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-9, "{a}, not {b}");
     near(progress("kind = \"rest\"\nlasts_s = 4.0", 10), 0.25);
     near(progress("kind = \"wander\"\nlasts_s = 4.0", 10), 0.25);
-    near(progress("kind = \"wander\"\nturn_deg = 1", 10), 1.0);
-    near(progress("kind = \"rest\"", 10), 1.0);
+    // Without an end, by what can be done in the 2000 cycles of the run.
+    near(progress("kind = \"wander\"\nturn_deg = 1", 10), 0.005);
+    near(progress("kind = \"rest\"", 10), 0.005);
     let script = "kind = \"script\"\nscript = \"forward 0.5 turn 10 wait 100 forward 1\"";
     near(progress(script, 30), 0.5);
     near(progress("kind = \"targets\"\ntargets_m = [[0.5, 0.0], [9.0, 0.0]]", 30), 0.5);

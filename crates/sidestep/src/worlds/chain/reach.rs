@@ -94,8 +94,10 @@ fn by_posture<const D: usize>(
     let Reach { k, target, base, tolerance_m } = *order;
     let goal = Goal { engine: Engine::Dls, restarts: 0, tolerance_m, ..Goal::new(k, base, target) };
     let answer = Solver::new(rules).solve(chain, obstacles, &goal)?;
-    if matches!(answer.reason, Some(Unreached::TooFar { .. } | Unreached::TooNear { .. })) {
-        return Ok(Outcome::Vetoed(Veto { by: k, reason: Reason::OutOfReach, ..objection }));
+    let is_beyond =
+        matches!(answer.reason, Some(Unreached::TooFar { .. } | Unreached::TooNear { .. }));
+    if is_beyond && objection.reason == Reason::Fixed {
+        return Ok(Outcome::Vetoed(Veto { reason: Reason::OutOfReach, ..objection }));
     }
     let before = chain.points().to_vec();
     let longest_m = chain.rods().iter().map(|rod| rod.max_m).fold(0.0, f64::max);
