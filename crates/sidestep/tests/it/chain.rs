@@ -567,7 +567,7 @@ fn a_vetoed_order_is_told_and_leaves_every_bit_until_patience_ends() {
     let given_up = &metrics.given_up[0].what;
     assert_eq!(
         (given_up.task, given_up.by, given_up.reason.as_deref()),
-        (0, Some(5), Some("fixed"))
+        (0, Some(5), Some("out-of-reach"))
     );
     assert_eq!(given_up.nearest_m, 1.0);
     assert_eq!(metrics.progress, 0.0, "what was given up is not done");

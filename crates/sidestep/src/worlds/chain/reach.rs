@@ -103,7 +103,8 @@ fn by_posture<const D: usize>(
     let longest_m = chain.rods().iter().map(|rod| rod.max_m).fold(0.0, f64::max);
     let most_m = rules.slave_step_max_m.min(LONGEST_JUMP * longest_m);
     let is_near = |(a, b): (&Point<D>, &Point<D>)| distance(*a, *b) <= most_m;
-    if !answer.reached || !before.iter().zip(&answer.points).all(is_near) {
+    let is_way = is_stretched(chain, order) && before.iter().zip(&answer.points).all(is_near);
+    if !answer.reached || !is_way {
         return Ok(Outcome::Vetoed(objection));
     }
     chain.points_mut().copy_from_slice(&answer.points);
@@ -119,6 +120,16 @@ fn by_posture<const D: usize>(
     }
     Ok(Outcome::Moved(moved_since(&before, chain, k)))
 }
+
+/// Whether a chain is nearly straight from its base to the connector that is to move.
+fn is_stretched<const D: usize>(chain: &Chain<D>, order: &Reach<D>) -> bool {
+    let [from, to] = [order.base.min(order.k), order.base.max(order.k)];
+    let reach_m: f64 = chain.rods()[from..to].iter().map(|rod| rod.max_m).sum();
+    distance(chain.points()[from], chain.points()[to]) > STRETCHED * reach_m
+}
+
+/// From this part of its reach on a chain counts as nearly straight.
+const STRETCHED: f64 = 0.95;
 
 /// A posture is taken as a motion where no connector goes further than this part of the longest
 /// rod.
