@@ -86,7 +86,7 @@ fn ride(case: &Case, seed: u64, cycles: u64) -> Result<Ride, InputError> {
     let mut run = begun::<2>(case.text(seed, cycles))?;
     let mut in_band = 0;
     finish(&mut run, |run| in_band += u64::from(is_in_band(run)));
-    let way_m = run.state().body(0).driving.way_m[1];
+    let way_m = run.state().body(0).tally.way_m;
     Ok(Ride { metrics: run.chain_metrics(), way_m, in_band })
 }
 

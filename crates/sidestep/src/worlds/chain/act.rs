@@ -292,6 +292,7 @@ impl<const D: usize> ChainWorld<D> {
         let way = sub(body.chain.points()[task.agent], at);
         body.driving.way_m[0] += distance(at, to);
         body.driving.way_m[1] += norm(way);
+        body.tally.way_m += norm(way);
         self.take_note(body, (task, &climbed, way), turn, scratch)
     }
 

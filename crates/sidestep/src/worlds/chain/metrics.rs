@@ -29,6 +29,8 @@ pub struct Tally {
     pub max_slave_step_m: f64,
     /// The greatest speed of any connector.
     pub max_speed_m_s: f64,
+    /// The way of its initiators.
+    pub way_m: f64,
     /// Rods turned to avoid something.
     pub rotations: u64,
     /// Connectors moved, sums over the sub-steps.
@@ -181,6 +183,7 @@ impl Default for Tally {
             max_rod_violation_m: 0.0,
             max_slave_step_m: 0.0,
             max_speed_m_s: 0.0,
+            way_m: 0.0,
             rotations: 0,
             moved: 0,
             done: 0,
