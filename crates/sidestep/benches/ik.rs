@@ -3,8 +3,9 @@
 //! `cargo bench -p sidestep --bench ik [-- PART ...]` with the parts `free` (the default),
 //! `guarded` and `arms` (slow; arms need `../shared/data`); CPU time. The yardstick of the first is
 //! the FABRIK of the crate `rebirth-ik`, in single precision, on the same chains and targets in the
-//! same run; `itself` is the success without the closed form that every engine falls back on. In
-//! brackets what the prototype reached.
+//! same run, and where it is bearable the Jacobian solver of the crate `k` on a joint per rod (two
+//! in space) and the first twenty targets; `itself` is the success without the closed form that
+//! every engine falls back on. In brackets what the prototype reached.
 
 use cpu_time::ProcessTime;
 use sidestep::import::urdf::Model;
@@ -132,6 +133,67 @@ fn measure_rebirth<const D: usize>(chain: &Chain<D>, targets: &[Point<D>]) -> Ro
     Row { success, itself: success, steps: steps[steps.len() / 2], us }
 }
 
+/// Targets for the crate `k`, and the longest chain that it is asked about.
+const FEW_TARGETS: usize = 20;
+const MOST_RODS_OF_K: usize = 100;
+
+/// The crate `k` knows joints: one about z for each rod, in space one about y as well. It starts
+/// from a posture that is bent a little.
+fn measure_k<const D: usize>(n: usize, targets: &[Point<D>]) -> (f64, f64) {
+    use k::{InverseKinematicsSolver, nalgebra as na};
+    let mut nodes: Vec<k::Node<f64>> = Vec::new();
+    for i in 0..n {
+        let axes = [na::Vector3::z_axis(), na::Vector3::y_axis()];
+        for (j, axis) in axes.into_iter().take(D - 1).enumerate() {
+            let along_m = if i > 0 && j == 0 { 1.0 } else { 0.0 };
+            let node = k::NodeBuilder::new()
+                .name(&format!("{i}-{j}"))
+                .translation(na::Translation3::new(along_m, 0.0, 0.0))
+                .joint_type(k::JointType::Rotational { axis })
+                .into_node();
+            nodes.push(node);
+        }
+    }
+    let tip = k::NodeBuilder::new()
+        .name("tip")
+        .translation(na::Translation3::new(1.0, 0.0, 0.0))
+        .joint_type(k::JointType::Fixed)
+        .into_node();
+    nodes.push(tip.clone());
+    for pair in nodes.windows(2) {
+        pair[1].set_parent(&pair[0]);
+    }
+    let arm = k::SerialChain::from_end(&tip);
+    let tolerance_m = 1e-4 * n as f64;
+    let solver = k::JacobianIkSolver::new(tolerance_m, 1.0, 0.5, 1000);
+    let position_only = k::Constraints {
+        rotation_x: false,
+        rotation_y: false,
+        rotation_z: false,
+        ..Default::default()
+    };
+    let bent = vec![0.05; arm.dof()];
+    let solve = |target: &Point<D>| {
+        let z_m = target.get(2).copied().unwrap_or(0.0);
+        let pose = na::Isometry3::translation(target[0], target[1], z_m);
+        arm.set_joint_positions(&bent).expect("no limits");
+        let constraints = k::Constraints { position_z: D == 3, ..position_only.clone() };
+        solver.solve_with_constraints(&arm, &pose, &constraints).is_ok()
+    };
+    let few = &targets[..FEW_TARGETS.min(targets.len())];
+    let met = few.iter().filter(|target| solve(target)).count();
+    let mut all: Vec<f64> = few
+        .iter()
+        .map(|target| {
+            let started = ProcessTime::now();
+            let _ = std::hint::black_box(solve(target));
+            started.elapsed().as_secs_f64() * 1e6
+        })
+        .collect();
+    all.sort_by(f64::total_cmp);
+    (percent(met, few.len()), all[all.len() / 2])
+}
+
 fn free_in<const D: usize>() {
     for part in [0.9, 1.0] {
         for n in [7, 25, 100, 450] {
@@ -152,7 +214,12 @@ fn free_in<const D: usize>() {
                     row.us
                 );
             }
-            println!("  rebirth-ik {:.1} %/{}/{:.2} us", other.success, other.steps, other.us);
+            print!("  rebirth-ik {:.1} %/{}/{:.2} us", other.success, other.steps, other.us);
+            if n <= MOST_RODS_OF_K {
+                let (success, us) = measure_k(n, &targets);
+                print!("  k {success:.0} %/{us:.0} us");
+            }
+            println!();
         }
     }
 }
