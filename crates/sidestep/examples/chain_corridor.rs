@@ -5,9 +5,9 @@
 //! chain behind it), `wheels` (followers on real wheels) and `narrow` (1.0 m).
 
 use sidestep::kernel::Seed;
-use sidestep::kernel::math::{cos, sin};
 use sidestep::kernel::stream::Streams;
 use sidestep::worlds::chain::geometry::{Point, distance};
+use sidestep::worlds::chain::ground::corridor::{Corridor, WALL_PIECE_M};
 use sidestep::worlds::chain::swarm::drive::Drive;
 use sidestep::worlds::chain::swarm::laser::LASER_NOISE;
 use sidestep::worlds::chain::swarm::leader::{LeaveRule, Turning};
@@ -20,40 +20,7 @@ const SPEED_M_S: f64 = 0.5;
 const WIDTHS_M: [f64; 8] = [1.2, 1.4, 1.6, 1.8, 2.0, 2.2, 2.5, 3.0];
 const READINGS: [Leaving; 3] = [Leaving::Latched, Leaving::Range, Leaving::Level];
 
-/// 14 m straight, then bends by their radius in meters and turn in degrees, then 8 m.
-const BENDS: [(f64, f64); 7] = [
-    (2.0, 90.0),
-    (1.5, -90.0),
-    (1.6, 180.0),
-    (1.3, 60.0),
-    (1.3, -120.0),
-    (1.3, 60.0),
-    (2.0, -180.0),
-];
-
 type Measure = fn() -> Result<(), Box<dyn Error>>;
-
-/// Points and headings along the middle of the corridor.
-fn center_line() -> Vec<Pose> {
-    let piece_m = 0.16;
-    let mut line = vec![Pose { at: [0.0, 0.0], heading_rad: 0.0 }];
-    let mut go = |length_m: f64, turn_rad: f64| {
-        let n = (length_m / piece_m).ceil();
-        for _ in 0..n as usize {
-            let Pose { at: [x, y], heading_rad } = line[line.len() - 1];
-            let (ds, middle) = (length_m / n, heading_rad + 0.5 * turn_rad / n);
-            let at = [x + ds * cos(middle), y + ds * sin(middle)];
-            line.push(Pose { at, heading_rad: heading_rad + turn_rad / n });
-        }
-    };
-    go(14.0, 0.0);
-    for (radius_m, degrees) in BENDS {
-        let turn_rad = f64::to_radians(degrees);
-        go(radius_m * turn_rad.abs(), turn_rad);
-    }
-    go(8.0, 0.0);
-    line
-}
 
 /// A scene and where it is done.
 struct Course {
@@ -68,19 +35,8 @@ struct Course {
 /// Thin walls on both sides of the middle; the start is 0.8 m from the right wall, or in the
 /// middle where there is no such place, and the finish is 1 m before the end.
 fn corridor(width_m: f64, start_m: f64) -> Result<Course, Box<dyn Error>> {
-    let line = center_line();
-    let beside = |pose: &Pose, side: f64| {
-        let [x, y] = pose.at;
-        let out_m = side * 0.5 * width_m;
-        [x - out_m * sin(pose.heading_rad), y + out_m * cos(pose.heading_rad)]
-    };
-    let mut walls = Vec::new();
-    for side in [-1.0, 1.0] {
-        for pair in line.windows(2) {
-            let ends = [beside(&pair[0], side), beside(&pair[1], side)];
-            walls.push(Obstacle::capsule(walls.len() as u32, ends, 0.0));
-        }
-    }
+    let corridor = Corridor::pinned(width_m)?;
+    let (line, walls) = (corridor.line(WALL_PIECE_M), corridor.walls(0));
     Ok(Course {
         obstacles: Obstacles::new(walls, 1.3)?,
         target: None,

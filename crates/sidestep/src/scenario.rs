@@ -237,35 +237,10 @@ impl<T> Default for OneOrMany<T> {
 
 impl<'de, T: Deserialize<'de>> Deserialize<'de> for OneOrMany<T> {
     fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Visitor<T>(std::marker::PhantomData<T>);
-
-        impl<'de, T: Deserialize<'de>> serde::de::Visitor<'de> for Visitor<T> {
-            type Value = OneOrMany<T>;
-
-            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-                f.write_str("a table or an array of tables")
-            }
-
-            fn visit_map<A: serde::de::MapAccess<'de>>(
-                self,
-                map: A,
-            ) -> Result<Self::Value, A::Error> {
-                T::deserialize(serde::de::value::MapAccessDeserializer::new(map))
-                    .map(|one| OneOrMany(vec![one]))
-            }
-
-            fn visit_seq<A: serde::de::SeqAccess<'de>>(
-                self,
-                mut seq: A,
-            ) -> Result<Self::Value, A::Error> {
-                let mut many = Vec::new();
-                while let Some(one) = seq.next_element()? {
-                    many.push(one);
-                }
-                Ok(OneOrMany(many))
-            }
-        }
-        deserializer.deserialize_any(Visitor(std::marker::PhantomData))
+        Ok(Self(match OneOrEach::<T, T>::deserialize(deserializer)? {
+            OneOrEach::One(one) => vec![one],
+            OneOrEach::Each(many) => many,
+        }))
     }
 }
 
@@ -281,7 +256,7 @@ impl<T> Default for Sections<T> {
 
 impl<'de, T: Deserialize<'de>> Deserialize<'de> for Sections<T> {
     fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let spanned = Spanned::<OneOrEach<T>>::deserialize(deserializer)?;
+        let spanned = Spanned::<OneOrEach<T, Spanned<T>>>::deserialize(deserializer)?;
         let span = spanned.span();
         Ok(Self(match spanned.into_inner() {
             OneOrEach::One(one) => vec![Spanned::new(span, one)],
@@ -290,19 +265,20 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for Sections<T> {
     }
 }
 
-/// What stands in a table's place: where it stands is told of the whole, and of tables in an array
-/// of each.
-enum OneOrEach<T> {
-    One(T),
-    Each(Vec<Spanned<T>>),
+/// What stands in a table's place: one table, or an array of them.
+enum OneOrEach<One, Each> {
+    One(One),
+    Each(Vec<Each>),
 }
 
-impl<'de, T: Deserialize<'de>> Deserialize<'de> for OneOrEach<T> {
+impl<'de, One: Deserialize<'de>, Each: Deserialize<'de>> Deserialize<'de> for OneOrEach<One, Each> {
     fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Visitor<T>(std::marker::PhantomData<T>);
+        struct Visitor<One, Each>(std::marker::PhantomData<(One, Each)>);
 
-        impl<'de, T: Deserialize<'de>> serde::de::Visitor<'de> for Visitor<T> {
-            type Value = OneOrEach<T>;
+        impl<'de, One: Deserialize<'de>, Each: Deserialize<'de>> serde::de::Visitor<'de>
+            for Visitor<One, Each>
+        {
+            type Value = OneOrEach<One, Each>;
 
             fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
                 f.write_str("a table or an array of tables")
@@ -312,16 +288,19 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for OneOrEach<T> {
                 self,
                 map: A,
             ) -> Result<Self::Value, A::Error> {
-                T::deserialize(serde::de::value::MapAccessDeserializer::new(map))
+                One::deserialize(serde::de::value::MapAccessDeserializer::new(map))
                     .map(OneOrEach::One)
             }
 
             fn visit_seq<A: serde::de::SeqAccess<'de>>(
                 self,
-                seq: A,
+                mut seq: A,
             ) -> Result<Self::Value, A::Error> {
-                Vec::deserialize(serde::de::value::SeqAccessDeserializer::new(seq))
-                    .map(OneOrEach::Each)
+                let mut many = Vec::new();
+                while let Some(one) = seq.next_element()? {
+                    many.push(one);
+                }
+                Ok(OneOrEach::Each(many))
             }
         }
         deserializer.deserialize_any(Visitor(std::marker::PhantomData))

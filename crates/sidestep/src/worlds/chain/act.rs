@@ -99,9 +99,11 @@ impl<const D: usize> ChainWorld<D> {
         body.tally.escapes.add(&escaped);
         scratch.escaped.copy_from_slice(body.chain.points());
         self.take_leader_along(body, turn);
-        if escaped.moves > 0 {
-            scratch.events.push(turn.event(EventKind::Escape, 0, escaped.moves as f64));
+        if let Some((connector, obstacle)) = escaped.first.filter(|_| !body.tally.is_escaping) {
+            let event = turn.event(EventKind::Escape, connector, escaped.moves as f64);
+            scratch.events.push(Event { obstacle: Some(obstacle), ..event });
         }
+        body.tally.is_escaping = escaped.moves > 0;
     }
 
     /// What would leave the claim is taken back, for nobody else counts on the chain there; and so

@@ -82,6 +82,9 @@ pub struct Escaped<const D: usize> {
     pub deepest_m: f64,
     /// That part.
     pub left: Option<Left<D>>,
+    /// The first part that got away: its connector, or the one at the begin of its rod, and from
+    /// which obstacle.
+    pub first: Option<(usize, u32)>,
 }
 
 /// A part that is still in a moving obstacle.
@@ -182,7 +185,8 @@ impl<const D: usize> Escaper<D> {
         let reach_m = 2.0 * self.longest_way_m(tick);
         let within_m = |o: &Obstacle<D>| ahead.around(o) + reach_m;
         collect(tick.chain, tick.obstacles, &mut self.body, within_m, &mut self.threats);
-        let mut told = Escaped { moves: 0, vetoes: 0, capped: 0, deepest_m: 0.0, left: None };
+        let mut told =
+            Escaped { moves: 0, vetoes: 0, capped: 0, deepest_m: 0.0, left: None, first: None };
         if self.threats.is_empty() {
             return Ok(told);
         }
@@ -227,7 +231,12 @@ impl<const D: usize> Escaper<D> {
             let Some(deepest) = self.deepest() else { break };
             *tries -= 1;
             match self.relieve(tick, margin, deepest)? {
-                Ok(()) => told.moves += 1,
+                Ok(()) => {
+                    told.moves += 1;
+                    let Threat { part, mover, .. } = self.threats[deepest];
+                    let obstacle = tick.obstacles.moving()[mover].id;
+                    told.first = told.first.or(Some((part.connector(), obstacle)));
+                }
                 Err(veto) => {
                     told.vetoes += 1;
                     told.capped += usize::from(veto.reason == Reason::StepLimit);

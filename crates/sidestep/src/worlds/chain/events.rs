@@ -15,7 +15,8 @@ pub enum EventKind {
     Penetration,
     /// The chain is clear of obstacles again.
     Clear,
-    /// A part got out of the way of something; the value is how many parts moved.
+    /// A part got out of the way of something, after a cycle in which none had to; the value is how
+    /// many motions that took.
     Escape,
     /// A robot's body touches something; the value is its distance from its connector in meters.
     Bumper,

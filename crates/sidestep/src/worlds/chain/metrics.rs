@@ -21,6 +21,8 @@ pub struct Tally {
     pub penetrations: u64,
     /// and whether it was so at the end of the last step.
     pub is_inside: bool,
+    /// Whether parts got out of the way in the last step.
+    pub is_escaping: bool,
     /// The least distance of any part from obstacles; infinite where none came near.
     pub min_clearance_m: f64,
     /// The greatest amount by which a rod was outside its limits while the chain was whole.
@@ -179,6 +181,7 @@ impl Default for Tally {
             vetoes: [0; Reason::ALL.len()],
             penetrations: 0,
             is_inside: false,
+            is_escaping: false,
             min_clearance_m: f64::INFINITY,
             max_rod_violation_m: 0.0,
             max_slave_step_m: 0.0,

@@ -6,7 +6,7 @@
 
 use super::chain::{Chain, Mobility};
 use super::geometry::{Point, distance};
-use super::ik::{Engine, Goal, Solver, Unreached};
+use super::ik::{Engine, Goal, Solver};
 use super::obstacle::Obstacles;
 use super::passage::passed;
 use super::propagate::Propagator;
@@ -81,9 +81,9 @@ pub fn go<const D: usize>(
     })
 }
 
-/// Passes crawl where a chain is nearly straight. Damped least squares find the nearest posture
-/// that gets there, and the chain goes straight to it if nothing is in the way of it and on the
-/// way. What is out of reach is told as that.
+/// What is out of reach is told as that. Passes crawl where a chain is nearly straight: there damped
+/// least squares find the nearest posture that gets there, and the chain goes straight to it if
+/// nothing is in the way of it and on the way.
 fn by_posture<const D: usize>(
     rules: Rules,
     chain: &mut Chain<D>,
@@ -92,19 +92,22 @@ fn by_posture<const D: usize>(
     objection: Veto<D>,
 ) -> Result<Outcome<D>, InputError> {
     let Reach { k, target, base, tolerance_m } = *order;
-    let goal = Goal { engine: Engine::Dls, restarts: 0, tolerance_m, ..Goal::new(k, base, target) };
-    let answer = Solver::new(rules).solve(chain, obstacles, &goal)?;
-    let is_beyond =
-        matches!(answer.reason, Some(Unreached::TooFar { .. } | Unreached::TooNear { .. }));
-    if is_beyond && objection.reason == Reason::Fixed {
+    let [from, to] = [base.min(k), base.max(k)];
+    let reach_m: f64 = chain.rods()[from..to].iter().map(|rod| rod.max_m).sum();
+    let far_m = |p: Point<D>| distance(chain.points()[base], p);
+    if far_m(target) > reach_m + tolerance_m && objection.reason == Reason::Fixed {
         return Ok(Outcome::Vetoed(Veto { reason: Reason::OutOfReach, ..objection }));
     }
+    if far_m(chain.points()[k]) <= STRETCHED * reach_m {
+        return Ok(Outcome::Vetoed(objection));
+    }
+    let goal = Goal { engine: Engine::Dls, restarts: 0, tolerance_m, ..Goal::new(k, base, target) };
+    let answer = Solver::new(rules).solve(chain, obstacles, &goal)?;
     let before = chain.points().to_vec();
     let longest_m = chain.rods().iter().map(|rod| rod.max_m).fold(0.0, f64::max);
     let most_m = rules.slave_step_max_m.min(LONGEST_JUMP * longest_m);
     let is_near = |(a, b): (&Point<D>, &Point<D>)| distance(*a, *b) <= most_m;
-    let is_way = is_stretched(chain, order) && before.iter().zip(&answer.points).all(is_near);
-    if !answer.reached || !is_way {
+    if !answer.reached || !before.iter().zip(&answer.points).all(is_near) {
         return Ok(Outcome::Vetoed(objection));
     }
     chain.points_mut().copy_from_slice(&answer.points);
@@ -119,13 +122,6 @@ fn by_posture<const D: usize>(
         }));
     }
     Ok(Outcome::Moved(moved_since(&before, chain, k)))
-}
-
-/// Whether a chain is nearly straight from its base to the connector that is to move.
-fn is_stretched<const D: usize>(chain: &Chain<D>, order: &Reach<D>) -> bool {
-    let [from, to] = [order.base.min(order.k), order.base.max(order.k)];
-    let reach_m: f64 = chain.rods()[from..to].iter().map(|rod| rod.max_m).sum();
-    distance(chain.points()[from], chain.points()[to]) > STRETCHED * reach_m
 }
 
 /// From this part of its reach on a chain counts as nearly straight.

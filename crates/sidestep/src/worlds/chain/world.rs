@@ -31,8 +31,6 @@ use std::sync::Arc;
 pub mod purpose {
     use sidestep_kernel::stream::Purpose;
 
-    /// Where generated obstacles are.
-    pub const FIELD: Purpose = Purpose(1);
     /// How a wandering initiator turns.
     pub const WANDER: Purpose = Purpose(2);
     /// Where the parts of a broken chain lie.

@@ -14,6 +14,14 @@ pub enum Part {
     Rod(usize),
 }
 
+impl Part {
+    /// The connector, or the one at the begin of the rod.
+    pub fn connector(self) -> usize {
+        let (Self::Connector(k) | Self::Rod(k)) = self;
+        k
+    }
+}
+
 /// A part and a moving obstacle that may get too near to each other in this tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Threat {
