@@ -1,9 +1,10 @@
 //! A run's folder while it is being written.
 
 use crate::exit::Failure;
-use crate::worlds::{Resolved, Run};
+use crate::worlds::Run;
 use sidestep::kernel::ports::{RecordError, Recorder};
 use sidestep::kernel::{Cycle, InputError};
+use sidestep::scenario::Resolved;
 use sidestep_record::{Existing, NewRun, Origin, ParquetRecorder, ResumePoint, RunFolder};
 use std::path::Path;
 use std::time::{Duration, Instant};

@@ -14,6 +14,9 @@ use toml_edit::{DocumentMut, Item, Value};
 /// Version of the scenario format that this program reads.
 pub const FORMAT: u32 = 1;
 
+/// What the place of a changed scenario ends in.
+const WITH_OVERRIDES: &str = " (with --set)";
+
 /// The text of a scenario, where it came from, and the folder its paths are relative to.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Source {
@@ -23,6 +26,15 @@ pub struct Source {
     pub text: String,
     /// Files named in the scenario are relative to this folder.
     pub folder: PathBuf,
+}
+
+/// A scenario that needs no other file any more, and the files it has instead.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Resolved {
+    /// The TOML text.
+    pub text: String,
+    /// Files by their path relative to the scenario.
+    pub files: Vec<(String, Vec<u8>)>,
 }
 
 /// What every scenario begins with.
@@ -71,7 +83,9 @@ impl Source {
             set(&mut document, override_text)?;
         }
         self.text = document.to_string();
-        self.place = format!("{} (with --set)", self.place);
+        if !self.place.ends_with(WITH_OVERRIDES) {
+            self.place.push_str(WITH_OVERRIDES);
+        }
         Ok(self)
     }
 
@@ -111,6 +125,13 @@ impl Source {
             Some(span) => error.in_text(&self.text, span.start),
             None => error,
         }
+    }
+
+    /// The first line of a resolved scenario: what it was made from, and by whom.
+    pub(crate) fn heading(&self) -> String {
+        let place = self.place.trim_end_matches(WITH_OVERRIDES);
+        let name = Path::new(place).file_name().unwrap_or_default().display();
+        format!("# {name}, resolved by sidestep {}\n", env!("CARGO_PKG_VERSION"))
     }
 
     /// A path of the scenario, relative to its folder.

@@ -57,11 +57,9 @@ use robots::RobotsRun;
 use serde_json::Value;
 use sidestep::kernel::checkpoint::CheckpointError;
 use sidestep::kernel::{Cycle, InputError, Simulation};
-use sidestep::scenario::{Source, nearest};
+use sidestep::scenario::{Resolved, Source};
+use sidestep::worlds::any::AnyCompiled;
 use std::path::Path;
-
-/// Names of the worlds, as scenarios give them.
-const NAMES: [&str; 3] = ["robots", "airspace", "chain"];
 
 /// What a scenario asks for, whatever its world.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -74,15 +72,6 @@ pub(crate) struct Plan {
     pub(crate) cycles: Cycle,
     /// Cycles between two checkpoints, at least 1; the largest number for none.
     pub(crate) checkpoint_every: Cycle,
-}
-
-/// A scenario that needs no other file any more, and the files it has instead.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Resolved {
-    /// The TOML text.
-    pub(crate) text: String,
-    /// Files by their path relative to the scenario.
-    pub(crate) files: Vec<(String, Vec<u8>)>,
 }
 
 /// Something to say about a state: as JSON, and in words.
@@ -180,14 +169,8 @@ pub(crate) fn told_of(file: &Path) -> Result<Option<Told>, InputError> {
 }
 
 /// A scenario that has been found right.
-pub(crate) enum Compiled {
-    /// Of the world `robots`.
-    Robots(robots::Scenario),
-    /// Of the world `airspace`.
-    Airspace(airspace::Scenario),
-    /// Of the world `chain`.
-    Chain(chain::Scenario),
-}
+#[derive(Clone)]
+pub(crate) struct Compiled(AnyCompiled);
 
 impl Compiled {
     /// Compiles a scenario of whatever world it names.
@@ -195,16 +178,7 @@ impl Compiled {
     /// # Errors
     /// When no such world is known, or the scenario is wrong.
     pub(crate) fn new(source: &Source) -> Result<Self, InputError> {
-        let world = source.preamble()?.world;
-        match world.get_ref().as_str() {
-            "robots" => robots::Scenario::new(source).map(Self::Robots),
-            "airspace" => airspace::Scenario::new(source).map(Self::Airspace),
-            "chain" => chain::Scenario::new(source).map(Self::Chain),
-            other => {
-                let cause = format!("unknown world `{other}`");
-                Err(source.error(Some(world.span()), cause, nearest(other, &NAMES)))
-            }
-        }
+        AnyCompiled::new(source).map(Self)
     }
 
     /// The scenario as it goes into a run folder: complete in itself.
@@ -212,11 +186,7 @@ impl Compiled {
     /// # Errors
     /// When a file that it names cannot be read any more.
     pub(crate) fn resolve(&self, source: &Source) -> Result<Resolved, InputError> {
-        match self {
-            Self::Robots(scenario) => scenario.resolve(source),
-            Self::Airspace(_) => Ok(airspace::Scenario::resolve(source)),
-            Self::Chain(scenario) => scenario.resolve(source),
-        }
+        self.0.resolve(source)
     }
 
     /// The scenario itself, for commands that are about the robots world alone.
@@ -227,9 +197,9 @@ impl Compiled {
         self,
         source: &Source,
     ) -> Result<sidestep::worlds::robots::scenario::Compiled, InputError> {
-        match self {
-            Self::Robots(scenario) => Ok(scenario.into_compiled()),
-            Self::Airspace(_) | Self::Chain(_) => {
+        match self.0 {
+            AnyCompiled::Robots(compiled) => Ok(compiled),
+            AnyCompiled::Airspace(_) | AnyCompiled::Chain(_) => {
                 let remedy = "give a scenario with world = \"robots\"";
                 Err(InputError::new(&source.place, "this command is about robots alone", remedy))
             }
@@ -244,9 +214,9 @@ impl Compiled {
         self,
         source: &Source,
     ) -> Result<sidestep::worlds::airspace::scenario::Compiled, InputError> {
-        match self {
-            Self::Airspace(scenario) => Ok(scenario.into_compiled()),
-            Self::Robots(_) | Self::Chain(_) => {
+        match self.0 {
+            AnyCompiled::Airspace(compiled) => Ok(compiled),
+            AnyCompiled::Robots(_) | AnyCompiled::Chain(_) => {
                 let remedy = "give a scenario with world = \"airspace\"";
                 Err(InputError::new(&source.place, "this command is about airplanes alone", remedy))
             }
@@ -255,10 +225,12 @@ impl Compiled {
 
     /// A run at its start. `source` names the run in checkpoints.
     pub(crate) fn start(self, source: &Source, workers: usize) -> Box<dyn Run> {
-        match self {
-            Self::Robots(scenario) => Box::new(RobotsRun::new(scenario, source, workers)),
-            Self::Airspace(scenario) => Box::new(AirspaceRun::new(scenario, source, workers)),
-            Self::Chain(scenario) => scenario.start(source, workers),
+        match self.0 {
+            AnyCompiled::Robots(compiled) => Box::new(RobotsRun::new(compiled, source, workers)),
+            AnyCompiled::Airspace(compiled) => {
+                Box::new(AirspaceRun::new(compiled, source, workers))
+            }
+            AnyCompiled::Chain(compiled) => chain::start(compiled, source, workers),
         }
     }
 }

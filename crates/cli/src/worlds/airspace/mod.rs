@@ -5,7 +5,7 @@ mod picture;
 
 pub(super) use foreign::{told_of, translated};
 
-use super::{Comparison, Pictured, Plan, Resolved, Run, Said, Told};
+use super::{Comparison, Pictured, Plan, Run, Said, Told};
 use crate::console::grouped;
 use crate::exit::Failure;
 use crate::report::Lines;
@@ -21,31 +21,6 @@ use sidestep::worlds::airspace::simulation::AirspaceSimulation;
 use sidestep::worlds::airspace::state::AirplaneRecord;
 use std::path::Path;
 
-/// A compiled airspace scenario.
-pub(crate) struct Scenario {
-    compiled: Compiled,
-}
-
-impl Scenario {
-    /// Compiles the scenario.
-    ///
-    /// # Errors
-    /// When anything in it is wrong.
-    pub(super) fn new(source: &Source) -> Result<Self, InputError> {
-        Ok(Self { compiled: Compiled::new(source)? })
-    }
-
-    /// The scenario itself.
-    pub(super) fn into_compiled(self) -> Compiled {
-        self.compiled
-    }
-
-    /// See [`super::Compiled::resolve`]: such a scenario names no other file.
-    pub(super) fn resolve(source: &Source) -> Resolved {
-        Resolved { text: source.text.clone(), files: Vec::new() }
-    }
-}
-
 /// A run of an airspace.
 pub(super) struct AirspaceRun {
     simulation: AirspaceSimulation,
@@ -53,8 +28,8 @@ pub(super) struct AirspaceRun {
 
 impl AirspaceRun {
     /// A run at its start.
-    pub(super) fn new(scenario: Scenario, source: &Source, workers: usize) -> Self {
-        Self { simulation: AirspaceSimulation::from_compiled(scenario.compiled, source, workers) }
+    pub(super) fn new(compiled: Compiled, source: &Source, workers: usize) -> Self {
+        Self { simulation: AirspaceSimulation::from_compiled(compiled, source, workers) }
     }
 }
 

@@ -1,9 +1,8 @@
 //! The world of chains as the command sees it.
 
 pub(crate) mod picture;
-mod resolve;
 
-use super::{Comparison, Pictured, Plan, Resolved, Run, Said};
+use super::{Comparison, Pictured, Plan, Run, Said};
 use crate::console::grouped;
 use crate::exit::Failure;
 use crate::report::Lines;
@@ -20,35 +19,11 @@ use sidestep::worlds::chain::simulation::ChainSimulation;
 use sidestep_draw::BodyScene;
 use std::path::Path;
 
-/// A compiled scenario of chains.
-pub(crate) struct Scenario {
-    compiled: AnyCompiled,
-}
-
-impl Scenario {
-    /// Compiles the scenario.
-    ///
-    /// # Errors
-    /// When anything in it is wrong.
-    pub(super) fn new(source: &Source) -> Result<Self, InputError> {
-        Ok(Self { compiled: AnyCompiled::new(source)? })
-    }
-
-    /// See [`super::Compiled::resolve`].
-    pub(super) fn resolve(&self, source: &Source) -> Result<Resolved, InputError> {
-        let said = match &self.compiled {
-            AnyCompiled::Plane(compiled) => (compiled.seed, compiled.cycles),
-            AnyCompiled::Space(compiled) => (compiled.seed, compiled.cycles),
-        };
-        resolve::resolve(source, said)
-    }
-
-    /// A run at its start.
-    pub(super) fn start(self, source: &Source, workers: usize) -> Box<dyn Run> {
-        match self.compiled {
-            AnyCompiled::Plane(compiled) => Box::new(ChainRun::new(compiled, source, workers)),
-            AnyCompiled::Space(compiled) => Box::new(ChainRun::new(compiled, source, workers)),
-        }
+/// A run of chains at its start.
+pub(super) fn start(compiled: AnyCompiled, source: &Source, workers: usize) -> Box<dyn Run> {
+    match compiled {
+        AnyCompiled::Plane(compiled) => Box::new(ChainRun::new(compiled, source, workers)),
+        AnyCompiled::Space(compiled) => Box::new(ChainRun::new(compiled, source, workers)),
     }
 }
 

@@ -3,11 +3,10 @@
 mod contents;
 mod picture;
 mod poses;
-mod resolve;
 
 pub(crate) use picture::shade;
 
-use super::{Comparison, Pictured, Plan, Resolved, Run, Said};
+use super::{Comparison, Pictured, Plan, Run, Said};
 use crate::console::grouped;
 use crate::exit::Failure;
 use crate::report::Lines;
@@ -18,48 +17,21 @@ use sidestep::kernel::ports::{RecordError, Recorder, TableSchema};
 use sidestep::kernel::{Cycle, Digest, InputError, Simulation};
 use sidestep::scenario::Source;
 use sidestep::worlds::robots::metrics::Metrics;
-use sidestep::worlds::robots::scenario::{Behaviours, Compiled, StorageOrder};
+use sidestep::worlds::robots::scenario::Compiled;
 use sidestep::worlds::robots::simulation::RobotsSimulation;
 use std::path::Path;
-
-/// A compiled robots scenario.
-pub(crate) struct Scenario {
-    compiled: Compiled,
-    /// The sections as they stand in the file, for `check`.
-    file: Value,
-}
-
-impl Scenario {
-    /// Compiles the scenario.
-    ///
-    /// # Errors
-    /// When anything in it is wrong.
-    pub(super) fn new(source: &Source) -> Result<Self, InputError> {
-        let compiled = Compiled::new(source, &Behaviours::new(), StorageOrder::Spatial)?;
-        Ok(Self { compiled, file: source.parse()? })
-    }
-
-    /// The scenario itself.
-    pub(super) fn into_compiled(self) -> Compiled {
-        self.compiled
-    }
-
-    /// See [`super::Compiled::resolve`].
-    pub(super) fn resolve(&self, source: &Source) -> Result<Resolved, InputError> {
-        resolve::resolve(source, &self.compiled, &self.file)
-    }
-}
 
 /// A run of a robots world.
 pub(super) struct RobotsRun {
     simulation: RobotsSimulation,
+    /// The sections as they stand in the file, for `check`.
     file: Value,
 }
 
 impl RobotsRun {
     /// A run at its start.
-    pub(super) fn new(scenario: Scenario, source: &Source, workers: usize) -> Self {
-        let Scenario { compiled, file } = scenario;
+    pub(super) fn new(compiled: Compiled, source: &Source, workers: usize) -> Self {
+        let file = source.parse().unwrap_or_default();
         Self { simulation: RobotsSimulation::from_compiled(compiled, source, workers), file }
     }
 }

@@ -24,6 +24,7 @@
 mod act;
 pub mod arm;
 mod broken;
+pub(crate) mod bundle;
 mod candidates;
 #[expect(clippy::module_inception, reason = "the chain itself, of the world of chains")]
 pub mod chain;

@@ -11,6 +11,7 @@
 
 mod audit;
 pub mod baseline;
+pub(crate) mod bundle;
 pub mod decide;
 pub mod effector;
 pub mod exact;

@@ -3,13 +3,12 @@
 //! The map goes along as the program saw it, one pixel per box, so that a later version of
 //! an importer cannot change what is replayed. Profiles and lists of starts go along as they are.
 
-use super::Resolved;
+use super::scenario::Compiled;
+use crate::import::file::read_bytes;
+use crate::scenario::{Resolved, Source};
+use crate::{Cell, GridMap};
 use serde_json::Value;
-use sidestep::import::file::read_bytes;
-use sidestep::kernel::InputError;
-use sidestep::scenario::Source;
-use sidestep::worlds::robots::scenario::Compiled;
-use sidestep::{Cell, GridMap};
+use sidestep_kernel::InputError;
 use std::path::Path;
 
 /// Where the files are, seen from the scenario.
@@ -17,18 +16,18 @@ const FOLDER: &str = "inputs";
 /// Largest profile or list of starts, unpacked.
 const MAX_BYTES: u64 = 64 << 20;
 
-/// See [`super::super::Compiled::resolve`].
-pub(super) fn resolve(
-    source: &Source,
-    compiled: &Compiled,
-    file: &Value,
-) -> Result<Resolved, InputError> {
+/// The scenario with every file that it names beside it.
+///
+/// # Errors
+/// When such a file cannot be read any more.
+pub(crate) fn resolve(source: &Source, compiled: &Compiled) -> Result<Resolved, InputError> {
+    let file: &Value = &source.parse()?;
     let mut bundle = Bundle { source, overrides: said_outright(compiled), files: Vec::new() };
     bundle.add_map(file, &compiled.world.map);
     bundle.add_profiles(file)?;
     bundle.add_starts(file)?;
     let text = source.clone().with(&bundle.overrides)?.text;
-    Ok(Resolved { text: format!("{}{text}", heading(source)), files: bundle.files })
+    Ok(Resolved { text: format!("{}{text}", source.heading()), files: bundle.files })
 }
 
 /// What a run depends on is said even where it is the default.
@@ -39,12 +38,6 @@ fn said_outright(compiled: &Compiled) -> Vec<String> {
         format!("cycles={}", compiled.cycles),
         format!("regime=\"{regime}\""),
     ]
-}
-
-fn heading(source: &Source) -> String {
-    let place = source.place.trim_end_matches(" (with --set)");
-    let name = Path::new(place).file_name().unwrap_or_default().display();
-    format!("# {name}, resolved by sidestep {}\n", env!("CARGO_PKG_VERSION"))
 }
 
 struct Bundle<'a> {
@@ -135,8 +128,8 @@ fn map_pgm(map: &GridMap) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sidestep::import::map_file;
-    use sidestep::map::UnknownPolicy;
+    use crate::import::map_file;
+    use crate::map::UnknownPolicy;
 
     #[test]
     fn the_map_comes_back_as_it_was() {

@@ -3,14 +3,13 @@
 //! Floors go along as the program saw them, so that a later version of an importer cannot change
 //! what is replayed. Scripts and models of arms go along as they are.
 
-use super::super::Resolved;
+use crate::Cell;
+use crate::import::file::read_bytes;
+use crate::import::stage::{self, Body, FloorPlan, Pose};
+use crate::import::{PixelMap, rosmap};
+use crate::scenario::{Resolved, Source};
 use serde_json::Value;
-use sidestep::Cell;
-use sidestep::import::file::read_bytes;
-use sidestep::import::stage::{self, Body, FloorPlan, Pose};
-use sidestep::import::{PixelMap, rosmap};
-use sidestep::kernel::InputError;
-use sidestep::scenario::Source;
+use sidestep_kernel::InputError;
 use std::path::Path;
 
 /// Where the files are, seen from the scenario.
@@ -20,8 +19,11 @@ const MAX_BYTES: u64 = 64 << 20;
 /// Keys whose values name files that go along as they are.
 const PLAIN: [&str; 3] = ["script_file", "urdf", "srdf"];
 
-/// See [`super::super::Compiled::resolve`].
-pub(super) fn resolve(source: &Source, (seed, cycles): (u64, u64)) -> Result<Resolved, InputError> {
+/// The scenario, of this seed and number of cycles, with every file that it names beside it.
+///
+/// # Errors
+/// When such a file cannot be read any more.
+pub(crate) fn resolve(source: &Source, (seed, cycles): (u64, u64)) -> Result<Resolved, InputError> {
     let file: Value = source.parse()?;
     let said = vec![format!("seed={seed}"), format!("cycles={cycles}")];
     let mut bundle = Bundle { source, overrides: said, files: Vec::new() };
@@ -29,10 +31,7 @@ pub(super) fn resolve(source: &Source, (seed, cycles): (u64, u64)) -> Result<Res
     bundle.add_map(&file["ground"]["map"])?;
     bundle.add_stage(&file["ground"]["stage"])?;
     let text = source.clone().with(&bundle.overrides)?.text;
-    let place = source.place.trim_end_matches(" (with --set)");
-    let name = Path::new(place).file_name().unwrap_or_default().display();
-    let heading = format!("# {name}, resolved by sidestep {}\n", env!("CARGO_PKG_VERSION"));
-    Ok(Resolved { text: format!("{heading}{text}"), files: bundle.files })
+    Ok(Resolved { text: format!("{}{text}", source.heading()), files: bundle.files })
 }
 
 struct Bundle<'a> {
