@@ -10,6 +10,7 @@
 //! agentfly.rs        the experiments of the airspace world's source paper
 //! loria/             the experiments of the robots world's source paper
 //! serpentine/        the experiments of the chain world's source
+//! sweep/             many variants of one scenario, each with many seeds
 //! ```
 //!
 //! Nothing here draws a figure or writes a file: results are data, and Markdown text.
@@ -23,6 +24,7 @@ pub mod least_squares;
 pub mod loria;
 pub mod methods;
 pub mod serpentine;
+pub mod sweep;
 
 pub use estimate::Estimate;
 pub use figure::{Figure, FigureKind, Series, Table};

@@ -63,6 +63,22 @@ impl AnyCompiled {
         Plan { name: name.clone(), seed, cycles }
     }
 
+    /// Bodies and agents that are simulated: what a run's size is told by.
+    pub fn agents(&self) -> u64 {
+        use chain::scenario::AnyCompiled::{Plane, Space};
+        let agents = match self {
+            Self::Robots(c) => c.world.bodies.len(),
+            Self::Airspace(c) => c.world.airplanes.len(),
+            Self::Chain(Plane(c)) => {
+                c.world.chains.iter().map(|s| s.start.connectors().len()).sum()
+            }
+            Self::Chain(Space(c)) => {
+                c.world.chains.iter().map(|s| s.start.connectors().len()).sum()
+            }
+        };
+        agents as u64
+    }
+
     /// The scenario as it goes into a run folder: complete in itself.
     ///
     /// # Errors

@@ -122,8 +122,8 @@ fn distance(meters: f64) -> String {
 
 fn contacts(metrics: &Metrics) -> String {
     let total = &metrics.total;
-    let by_kind: Vec<String> =
-        total.contacts_by_kind.iter().map(|(kind, n)| format!("{kind} {}", grouped(*n))).collect();
+    let touched = total.contacts_by_kind.iter().filter(|(_, n)| **n > 0);
+    let by_kind: Vec<String> = touched.map(|(kind, n)| format!("{kind} {}", grouped(*n))).collect();
     let share = 1000.0 * metrics.contacts_per_action;
     match by_kind.is_empty() {
         true => "none".into(),

@@ -14,7 +14,7 @@ pub struct Counts {
     pub actions: u64,
     /// Contacts in all.
     pub contacts: u64,
-    /// Contacts by the kind touched (kinds that were touched at all).
+    /// Contacts by the kind touched; 0 for kinds that nobody touched.
     pub contacts_by_kind: BTreeMap<String, u64>,
     /// Way made, in metres.
     pub distance_m: f64,
@@ -53,7 +53,7 @@ impl RobotsWorld {
         Counts {
             actions: self.bodies[i].actions_before(cycle),
             contacts: by_kind.sum(),
-            contacts_by_kind: named.filter(|(_, n)| *n > 0).collect(),
+            contacts_by_kind: named.collect(),
             distance_m: f64::from(cell.moves.get()) * self.map.box_size_m,
             trips,
             trip_cycles_mean: (trips > 0).then(|| cell.trip_cycles.get() as f64 / trips as f64),

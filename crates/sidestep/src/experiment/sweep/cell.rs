@@ -1,0 +1,166 @@
+//! One cell -> one row.
+
+use super::plan::Cell;
+use crate::scenario::Source;
+use crate::worlds::any::AnyCompiled;
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+use sidestep_kernel::{Cycle, InputError, Simulation};
+
+/// Cycles between two looks at whether to go on.
+const SLICE: Cycle = 256;
+
+/// How a metric's name ends that a clock has measured: it is told beside the results, for it is not
+/// the same when the cell is run again.
+const BY_CLOCK: [&str; 2] = ["cpu_s", "wall_s"];
+
+/// What came of a cell.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Outcome {
+    /// Number of the cell.
+    pub cell: u64,
+    /// Cycles that were run.
+    pub cycles: Cycle,
+    /// Digest of the last state, in hexadecimal; empty where the run failed.
+    pub digest: String,
+    /// Why the run failed: a bug, for wrong scenarios are found before.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub failure: Option<String>,
+    /// The metrics, by dotted name: numbers, truth values and text.
+    pub metrics: Map<String, Value>,
+    /// What it took, by dotted name, in seconds; not the same when it is run again.
+    pub costs: Map<String, Value>,
+}
+
+/// Runs a cell of the variant `source` to its end on `workers` workers; `None` as soon as `go_on`
+/// says so.
+///
+/// # Errors
+/// When the scenario is wrong with this seed.
+pub fn run(
+    cell: Cell,
+    source: &Source,
+    workers: usize,
+    go_on: &dyn Fn() -> bool,
+) -> Result<Option<Outcome>, InputError> {
+    let source = source.clone().with(&[format!("seed={}", cell.seed)])?;
+    let compiled = AnyCompiled::new(&source)?;
+    let until = compiled.plan().cycles;
+    let mut simulation = compiled.start(&source, workers);
+    while simulation.cycle() < until && !simulation.is_over() {
+        if !go_on() {
+            return Ok(None);
+        }
+        simulation.advance(SLICE.min(until - simulation.cycle()));
+    }
+    Ok(Some(Outcome::of(cell, simulation.as_ref())))
+}
+
+impl Outcome {
+    /// What came of a simulation that has ended.
+    pub fn of(cell: Cell, simulation: &dyn Simulation) -> Self {
+        let (costs, metrics) = flat(&simulation.metrics())
+            .into_iter()
+            .partition(|(name, _)| BY_CLOCK.iter().any(|end| name.ends_with(end)));
+        Self {
+            cell: cell.id,
+            cycles: simulation.cycle(),
+            digest: simulation.digest().to_string(),
+            failure: None,
+            metrics,
+            costs,
+        }
+    }
+
+    /// A cell whose simulation broke a rule of its own.
+    pub fn failed(cell: Cell, why: impl Into<String>) -> Self {
+        Self {
+            cell: cell.id,
+            cycles: 0,
+            digest: String::new(),
+            failure: Some(why.into()),
+            metrics: Map::new(),
+            costs: Map::new(),
+        }
+    }
+}
+
+/// Nested tables as dotted names. Lists of tables become their number (`NAME_count`); lists of
+/// numbers (histograms) are left out, for they are no single figure.
+fn flat(value: &Value) -> Map<String, Value> {
+    let mut found = Map::new();
+    add(&mut found, "", value);
+    found
+}
+
+fn add(found: &mut Map<String, Value>, name: &str, value: &Value) {
+    match value {
+        Value::Object(table) => {
+            for (key, value) in table {
+                let name = if name.is_empty() { key.clone() } else { format!("{name}.{key}") };
+                add(found, &name, value);
+            }
+        }
+        Value::Array(items) if items.iter().any(Value::is_number) => {}
+        Value::Array(items) => {
+            found.insert(format!("{name}_count"), items.len().into());
+        }
+        value => {
+            found.insert(name.into(), value.clone());
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    const ROBOTS: &str = "format = 1\nworld = \"robots\"\ncycles = 300\n[map]\n\
+                          office = { corridors = 1, rooms_per_side = 2 }\n[robots]\ncount = 3\n\
+                          effector = \"nomad\"\nbehaviour = { kind = \"wander\" }\n";
+    const AIRSPACE: &str = "format = 1\nworld = \"airspace\"\n[airspace.generator]\n\
+                            kind = \"superconflict\"\nn = 3\n";
+
+    fn cell(seed: u64) -> Cell {
+        Cell { id: 5, variant: 0, replicate: 0, seed }
+    }
+
+    fn outcome(text: &str, seed: u64, workers: usize) -> Outcome {
+        let source = Source::new("s.toml", text, "");
+        run(cell(seed), &source, workers, &|| true).expect("valid").expect("not stopped")
+    }
+
+    #[test]
+    fn a_row_is_a_function_of_its_cell_alone() {
+        for text in [ROBOTS, AIRSPACE] {
+            let one = outcome(text, 3, 1);
+            let again = outcome(text, 3, 2);
+            assert_eq!((&one.digest, &one.metrics), (&again.digest, &again.metrics));
+            assert_ne!(one.digest, outcome(text, 4, 1).digest);
+        }
+    }
+
+    #[test]
+    fn what_a_clock_measured_stands_apart() {
+        let outcome = outcome(AIRSPACE, 1, 1);
+        assert!(outcome.costs.contains_key("optimise_cpu_s"));
+        assert!(!outcome.metrics.keys().any(|name| name.ends_with("cpu_s")));
+        assert_eq!(outcome.metrics["arrived"], json!(3));
+    }
+
+    #[test]
+    fn a_run_that_is_to_stop_is_no_row() {
+        let source = Source::new("s.toml", ROBOTS, "");
+        assert_eq!(run(cell(1), &source, 1, &|| false), Ok(None));
+    }
+
+    #[test]
+    fn nested_metrics_have_dotted_names_and_lists_are_counted() {
+        let value = json!({ "a": { "b": 1, "c": null }, "d": [1, 2], "e": [{ "f": 1 }], "g": [] });
+        let names: Vec<(String, Value)> = flat(&value).into_iter().collect();
+        let expected =
+            [("a.b", json!(1)), ("a.c", json!(null)), ("e_count", json!(1)), ("g_count", json!(0))];
+        assert_eq!(names, expected.map(|(name, value)| (name.to_string(), value)));
+    }
+}

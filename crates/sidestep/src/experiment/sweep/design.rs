@@ -1,0 +1,308 @@
+//! Which variants of a scenario are run.
+
+use serde::{Deserialize, Serialize};
+use sidestep_kernel::math::{exp, ln};
+use sidestep_kernel::{InputError, Seed, stream::Purpose, stream::Streams};
+use toml::Value;
+
+/// Variants that a sweep may have.
+pub const MAX_VARIANTS: usize = 1_000_000;
+
+/// The stream of a hypercube's permutations and places.
+const PLACES: Purpose = Purpose(0);
+
+/// A key of the scenario, and what it is set to.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Setting {
+    /// Path of the key, e.g. `robots.count`.
+    pub key: String,
+    /// The value.
+    pub value: Value,
+}
+
+impl Setting {
+    /// As an override of a scenario, see [`Source::with`](crate::scenario::Source::with).
+    pub fn to_override(&self) -> String {
+        format!("{}={}", self.key, self.value)
+    }
+}
+
+/// A key and all values that it takes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Factor {
+    /// Path of the key.
+    pub key: String,
+    /// Its values, at least one.
+    pub values: Vec<Value>,
+}
+
+impl Factor {
+    /// Parses `robots.count=10,20,40` or `regime=both,sensors`. Values are TOML; what is not is
+    /// taken as text.
+    ///
+    /// # Errors
+    /// Without `=`, key or value.
+    pub fn parse(text: &str) -> Result<Self, InputError> {
+        let place = format!("--vary {text}");
+        let remedy = "write --vary key=value,value, e.g. --vary robots.count=10,20,40";
+        let wrong = |cause: &str| InputError::new(&place, cause, remedy);
+        let (key, values) = text.split_once('=').ok_or_else(|| wrong("there is no `=`"))?;
+        let key = key.trim();
+        if key.is_empty() || key.split('.').any(str::is_empty) {
+            return Err(wrong("a part of the key is empty"));
+        }
+        if values.trim().is_empty() {
+            return Err(wrong("there is no value"));
+        }
+        Ok(Self { key: key.into(), values: parse_values(values) })
+    }
+}
+
+/// A list of TOML values, else of words between commas.
+fn parse_values(text: &str) -> Vec<Value> {
+    if let Ok(table) = format!("v = [{text}]").parse::<toml::Table>()
+        && let Some(Value::Array(values)) = table.get("v")
+    {
+        return values.clone();
+    }
+    let one = |word: &str| match format!("v = {word}").parse::<toml::Table>() {
+        Ok(table) => table["v"].clone(),
+        Err(_) => Value::String(word.into()),
+    };
+    text.split(',').map(|word| one(word.trim())).collect()
+}
+
+/// Samples that fill a box evenly: of each range every n-th part is met once (McKay, Beckman,
+/// Conover, "A comparison of three methods for selecting values of input variables", 1979).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Hypercube {
+    /// Number of samples, at least 1.
+    pub samples: usize,
+    /// From which places and pairings grow.
+    pub seed: u64,
+    /// The sides.
+    pub ranges: Vec<Range>,
+}
+
+/// A side of a hypercube.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Range {
+    /// Path of the key.
+    pub key: String,
+    /// Its least value.
+    pub low: f64,
+    /// Its greatest value; `low` < `high`.
+    pub high: f64,
+    /// Whether parts are equal in the logarithm; both ends are above 0 then.
+    pub is_log: bool,
+    /// Whether the values are whole numbers, both ends included.
+    pub is_integer: bool,
+}
+
+impl Range {
+    /// The value at `share` (from 0 up to, not including, 1) of the way from `low` to `high`.
+    fn at(&self, share: f64) -> Value {
+        // Each whole number has an equal part of the way.
+        let (low, high) =
+            if self.is_integer { (self.low, self.high + 1.0) } else { (self.low, self.high) };
+        let value = match self.is_log {
+            true => exp(ln(low) + share * (ln(high) - ln(low))),
+            false => low + share * (high - low),
+        };
+        let value = value.clamp(self.low, self.high);
+        match self.is_integer {
+            true => Value::Integer(value.floor().clamp(self.low, self.high) as i64),
+            false => Value::Float(value),
+        }
+    }
+}
+
+impl Hypercube {
+    /// All samples, in order.
+    fn samples(&self) -> Vec<Vec<Setting>> {
+        let streams = Streams::new(Seed(self.seed));
+        let sides: Vec<Vec<Value>> = (0u32..)
+            .zip(&self.ranges)
+            .map(|(side, range)| {
+                // One stream a side and sample: a stream has 2^18 words, samples may be more.
+                let mut parts: Vec<usize> = (0..self.samples).collect();
+                for k in (1..self.samples).rev() {
+                    let mut draws = streams.draws(side, 2 * k as u64, PLACES);
+                    parts.swap(k, draws.below(k as u32 + 1) as usize);
+                }
+                let place = |(k, part): (usize, usize)| {
+                    let u = streams.draws(side, 2 * k as u64 + 1, PLACES).uniform();
+                    range.at((part as f64 + u) / self.samples as f64)
+                };
+                parts.into_iter().enumerate().map(place).collect()
+            })
+            .collect();
+        let setting = |k: usize, (range, side): (&Range, &Vec<Value>)| Setting {
+            key: range.key.clone(),
+            value: side[k].clone(),
+        };
+        (0..self.samples)
+            .map(|k| self.ranges.iter().zip(&sides).map(|pair| setting(k, pair)).collect())
+            .collect()
+    }
+}
+
+/// All variants of a sweep: every entry of the list (or sample of the hypercube) with every
+/// combination of the factors' values. Without any of them, the scenario as it is.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Design {
+    /// Variants that are listed one by one.
+    pub list: Vec<Vec<Setting>>,
+    /// Samples of a box.
+    pub hypercube: Option<Hypercube>,
+    /// Keys that are varied each by itself; the last one changes first.
+    pub factors: Vec<Factor>,
+}
+
+impl Design {
+    /// Number of variants, or `None` beyond what a number holds.
+    fn len(&self) -> Option<usize> {
+        let samples = self.hypercube.as_ref().map_or(1, |h| h.samples);
+        let start = self.list.len().max(1).checked_mul(samples)?;
+        self.factors.iter().try_fold(start, |n, factor| n.checked_mul(factor.values.len()))
+    }
+
+    /// The settings of each variant.
+    ///
+    /// # Errors
+    /// When a key is set twice in a variant, or there are more than [`MAX_VARIANTS`].
+    pub fn variants(&self, place: &str) -> Result<Vec<Vec<Setting>>, InputError> {
+        let wrong = |cause: String, remedy: &str| InputError::new(place, cause, remedy);
+        match self.len() {
+            Some(1..=MAX_VARIANTS) => {}
+            Some(0) => return Err(wrong("a key has no values".into(), "give at least one")),
+            n => {
+                let n = n.map_or("too many".into(), |n| n.to_string());
+                let cause = format!("there are {n} variants");
+                return Err(wrong(cause, "vary less: at most a million variants"));
+            }
+        }
+        let mut variants = product(vec![Vec::new()], &self.list);
+        if let Some(hypercube) = &self.hypercube {
+            variants = product(variants, &hypercube.samples());
+        }
+        for factor in &self.factors {
+            let setting =
+                |value: &Value| vec![Setting { key: factor.key.clone(), value: value.clone() }];
+            variants = product(variants, &factor.values.iter().map(setting).collect::<Vec<_>>());
+        }
+        for variant in &variants {
+            check_keys(variant).map_err(|key| {
+                wrong(format!("`{key}` is set twice in one variant"), "vary every key in one place")
+            })?;
+        }
+        Ok(variants)
+    }
+}
+
+/// Every one of `firsts` with every one of `seconds`; the firsts where there are no seconds.
+fn product(firsts: Vec<Vec<Setting>>, seconds: &[Vec<Setting>]) -> Vec<Vec<Setting>> {
+    if seconds.is_empty() {
+        return firsts;
+    }
+    let joined = |a: &Vec<Setting>, b: &Vec<Setting>| [a.clone(), b.clone()].concat();
+    firsts.iter().flat_map(|a| seconds.iter().map(move |b| joined(a, b))).collect()
+}
+
+/// The first key that is set twice.
+fn check_keys(variant: &[Setting]) -> Result<(), &str> {
+    let twice = |k: &usize| variant[..*k].iter().any(|s| s.key == variant[*k].key);
+    match (0..variant.len()).find(twice) {
+        Some(k) => Err(&variant[k].key),
+        None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn keys(design: &Design) -> Vec<String> {
+        let variants = design.variants("test").expect("valid");
+        let words = |v: &Vec<Setting>| v.iter().map(Setting::to_override).collect::<Vec<_>>();
+        variants.iter().map(|v| words(v).join(" ")).collect()
+    }
+
+    fn factors(texts: &[&str]) -> Design {
+        let factors = texts.iter().map(|t| Factor::parse(t).expect("valid")).collect();
+        Design { factors, ..Design::default() }
+    }
+
+    #[test]
+    fn a_grid_has_every_combination_and_the_last_key_changes_first() {
+        let design = factors(&["a.n=1,2", "b=x,y"]);
+        assert_eq!(
+            keys(&design),
+            ["a.n=1 b=\"x\"", "a.n=1 b=\"y\"", "a.n=2 b=\"x\"", "a.n=2 b=\"y\""]
+        );
+        assert_eq!(keys(&Design::default()), [""], "the scenario as it is");
+    }
+
+    #[test]
+    fn values_are_toml_where_they_can_be_and_words_elsewhere() {
+        let of = |text: &str| Factor::parse(text).expect(text).values;
+        assert_eq!(of("a=1,2.5"), [Value::Integer(1), Value::Float(2.5)]);
+        assert_eq!(of("a=both,3"), [Value::String("both".into()), Value::Integer(3)]);
+        assert_eq!(of("a=[1, 2],[3]").len(), 2, "commas inside of brackets do not separate");
+        assert_eq!(of("a=\"x,y\""), [Value::String("x,y".into())]);
+        assert_eq!(of("a=true,off"), [Value::Boolean(true), Value::String("off".into())]);
+        for bad in ["a", "=1", "a=", "a..b=1"] {
+            assert!(Factor::parse(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn a_list_is_combined_with_a_grid() {
+        let list = [("a", 1), ("a", 2)]
+            .map(|(key, n)| vec![Setting { key: key.into(), value: Value::Integer(n) }]);
+        let design = Design { list: list.to_vec(), ..factors(&["b=3,4"]) };
+        assert_eq!(keys(&design), ["a=1 b=3", "a=1 b=4", "a=2 b=3", "a=2 b=4"]);
+    }
+
+    #[test]
+    fn a_hypercube_meets_every_part_of_every_side_once() {
+        let range = |key: &str, is_log, is_integer| Range {
+            key: key.into(),
+            low: 1.0,
+            high: 10.0,
+            is_log,
+            is_integer,
+        };
+        let n = 50;
+        let ranges =
+            vec![range("a", false, false), range("b", true, false), range("c", false, true)];
+        let design = Design {
+            hypercube: Some(Hypercube { samples: n, seed: 3, ranges }),
+            ..Design::default()
+        };
+        let variants = design.variants("test").expect("valid");
+        let column = |k: usize| variants.iter().map(move |v| &v[k].value);
+        let part = |x: f64| (x * n as f64) as usize;
+        let mut a: Vec<_> =
+            column(0).map(|v| part((v.as_float().expect("float") - 1.0) / 9.0)).collect();
+        let mut b: Vec<_> = column(1).map(|v| part(v.as_float().expect("float").log10())).collect();
+        assert_ne!(a, b, "the sides are paired at random");
+        a.sort_unstable();
+        b.sort_unstable();
+        let all: Vec<usize> = (0..n).collect();
+        assert_eq!((a, b), (all.clone(), all));
+        let counts = (1..=10).map(|n| column(2).filter(|v| v.as_integer() == Some(n)).count());
+        assert_eq!(counts.collect::<Vec<_>>(), [5; 10], "whole numbers are equally frequent");
+        assert_eq!(design.variants("test"), Ok(variants), "the same seed, the same samples");
+    }
+
+    #[test]
+    fn a_key_is_set_once_and_variants_are_not_without_number() {
+        let error = factors(&["a=1", "a=2"]).variants("here").expect_err("twice");
+        assert!(error.to_string().contains("`a` is set twice"), "{error}");
+        let wide = format!("a={}", vec!["1"; 2000].join(","));
+        let texts = [wide.clone(), wide.replace('a', "b")];
+        let design = factors(&[&texts[0], &texts[1]]);
+        assert!(design.variants("here").expect_err("many").cause().contains("4000000"));
+    }
+}

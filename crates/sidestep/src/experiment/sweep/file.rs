@@ -1,0 +1,429 @@
+//! A sweep file: which scenario, what differs, how often it is run.
+
+use super::design::{self, Design, Factor, Hypercube, Setting};
+use crate::scenario::{FORMAT, Source};
+use serde::{Deserialize, Serialize};
+use sidestep_kernel::InputError;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+use toml::{Spanned, Value};
+
+/// Runs of each variant, unless it is said.
+const REPLICATES: u32 = 10;
+/// Runs of each variant at most, where a wanted precision ends them, unless it is said.
+pub const MAX_RUNS: u32 = 1000;
+/// Samples of a hypercube and runs of a variant are at most so many.
+const MOST: u64 = 1_000_000;
+
+/// A sweep as it is asked for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sweep {
+    /// How errors name it.
+    pub place: String,
+    /// Its name; may be empty.
+    pub name: String,
+    /// The scenario's file.
+    pub scenario: PathBuf,
+    /// What every variant sets, before its own settings.
+    pub fixed: Vec<Setting>,
+    /// What differs.
+    pub design: Design,
+    /// Runs of each variant, at most; at least 1.
+    pub replicates: u32,
+    /// The first run's seed, if not the scenario's.
+    pub first_seed: Option<u64>,
+    /// When a variant has been run often enough, if not after all its replicates.
+    pub until: Option<Until>,
+    /// The metrics to report; all that vary if none are named.
+    pub metrics: Vec<String>,
+    /// Settings of the variant that others are compared with; none for no comparison.
+    pub baseline: Vec<Setting>,
+    /// Whether every run is recorded to a folder of its own.
+    pub record: bool,
+}
+
+/// A wanted precision: a variant is run until 95 % intervals of means are so narrow.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Until {
+    /// Half the width of the interval, at most; above 0.
+    pub half_width: f64,
+    /// Whether that is a share of the mean.
+    pub is_relative: bool,
+    /// Of which metrics; of all that vary if none are named.
+    pub metrics: Vec<String>,
+}
+
+/// `ci=0.05` is a share of the mean, `abs=2.5` is in the metric's unit.
+impl FromStr for Until {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || {
+            format!("`{text}` is no precision: write ci=0.05 (of the mean) or abs=2.5 (in units)")
+        };
+        let (kind, number) = text.split_once('=').ok_or_else(wrong)?;
+        let half_width: f64 = number.trim().parse().map_err(|_| wrong())?;
+        let is_relative = match kind.trim() {
+            "ci" => true,
+            "abs" => false,
+            _ => return Err(wrong()),
+        };
+        let is_right = half_width > 0.0 && half_width.is_finite();
+        is_right.then_some(Self { half_width, is_relative, metrics: Vec::new() }).ok_or_else(wrong)
+    }
+}
+
+/// The file as it stands.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SweepFile {
+    format: Spanned<u32>,
+    scenario: PathBuf,
+    #[serde(default)]
+    name: String,
+    replicates: Option<Spanned<u64>>,
+    first_seed: Option<u64>,
+    #[serde(default)]
+    set: toml::Table,
+    vary: Option<Spanned<toml::Table>>,
+    #[serde(default)]
+    variant: Vec<Spanned<toml::Table>>,
+    latin_hypercube: Option<Spanned<HypercubeSection>>,
+    until: Option<Spanned<UntilSection>>,
+    #[serde(default)]
+    metrics: Vec<String>,
+    #[serde(default)]
+    baseline: toml::Table,
+    #[serde(default)]
+    record: bool,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct HypercubeSection {
+    samples: Spanned<u64>,
+    #[serde(default)]
+    seed: u64,
+    range: Spanned<toml::Table>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RangeSection {
+    low: f64,
+    high: f64,
+    #[serde(default)]
+    log: bool,
+    #[serde(default)]
+    integer: bool,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct UntilSection {
+    ci: Option<f64>,
+    abs: Option<f64>,
+    #[serde(default)]
+    metrics: Vec<String>,
+    max_runs: Option<u64>,
+}
+
+impl Sweep {
+    /// A sweep of the scenario as it is, [`REPLICATES`] times.
+    pub fn of_scenario(scenario: impl Into<PathBuf>) -> Self {
+        let scenario = scenario.into();
+        Self {
+            place: scenario.display().to_string(),
+            name: String::new(),
+            scenario,
+            fixed: Vec::new(),
+            design: Design::default(),
+            replicates: REPLICATES,
+            first_seed: None,
+            until: None,
+            metrics: Vec::new(),
+            baseline: Vec::new(),
+            record: false,
+        }
+    }
+
+    /// Reads a sweep file; a scenario file stands for [`Sweep::of_scenario`]. Which it is, the key
+    /// `scenario` says.
+    ///
+    /// # Errors
+    /// When it cannot be read, or anything in it is wrong.
+    pub fn read(path: &Path) -> Result<Self, InputError> {
+        let is_toml = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
+        if !is_toml {
+            return Ok(Self::of_scenario(path));
+        }
+        let source = Source::read(path, &[])?;
+        let table: toml::Table = source.parse()?;
+        if table.contains_key("scenario") {
+            Self::parse(&source)
+        } else {
+            Ok(Self::of_scenario(path))
+        }
+    }
+
+    /// A sweep from the text of a sweep file.
+    ///
+    /// # Errors
+    /// When anything in it is wrong.
+    pub fn parse(source: &Source) -> Result<Self, InputError> {
+        let file: SweepFile = source.parse()?;
+        if *file.format.get_ref() != FORMAT {
+            let cause = format!("sweep format {} is not known", file.format.get_ref());
+            let remedy = format!("write `format = {FORMAT}`");
+            return Err(source.error(Some(file.format.span()), cause, remedy));
+        }
+        let reader = Reader { source };
+        let until = file.until.as_ref().map(|section| reader.until(section)).transpose()?;
+        let replicates = match (&file.replicates, &file.until) {
+            (Some(n), Some(_)) => {
+                let cause = "`replicates` and `until` both say how often to run";
+                let remedy = "leave `replicates` out; `until.max_runs` is the limit";
+                return Err(source.error(Some(n.span()), cause, remedy));
+            }
+            (Some(n), None) => reader.count(*n.get_ref(), n.span(), "replicates")?,
+            (None, Some(until)) => {
+                let max = until.get_ref().max_runs.unwrap_or(MAX_RUNS.into());
+                reader.count(max, until.span(), "max_runs")?
+            }
+            (None, None) => REPLICATES,
+        };
+        Ok(Self {
+            place: source.place.clone(),
+            scenario: source.path(&file.scenario),
+            fixed: settings(&file.set),
+            design: Design {
+                list: file.variant.iter().map(|table| settings(table.get_ref())).collect(),
+                hypercube: file
+                    .latin_hypercube
+                    .as_ref()
+                    .map(|s| reader.hypercube(s))
+                    .transpose()?,
+                factors: file
+                    .vary
+                    .as_ref()
+                    .map_or(Ok(Vec::new()), |table| reader.factors(table))?,
+            },
+            replicates,
+            first_seed: file.first_seed,
+            until,
+            metrics: file.metrics,
+            baseline: settings(&file.baseline),
+            name: file.name,
+            record: file.record,
+        })
+    }
+
+    /// Checks what no scenario can be swept over.
+    ///
+    /// # Errors
+    /// When seeds are varied as if they were a parameter.
+    pub fn check(&self) -> Result<(), InputError> {
+        let design = &self.design;
+        let listed = design.list.iter().flatten().chain(&self.fixed).map(|s| &s.key);
+        let ranges = design.hypercube.iter().flat_map(|h| &h.ranges).map(|r| &r.key);
+        let mut keys = listed.chain(ranges).chain(design.factors.iter().map(|f| &f.key));
+        if keys.any(|key| key == "seed") {
+            let cause = "`seed` is set: each variant is run with the same seeds";
+            let remedy = "give `replicates` and `first_seed` instead";
+            return Err(InputError::new(&self.place, cause, remedy));
+        }
+        Ok(())
+    }
+}
+
+/// Nested tables as dotted keys.
+fn settings(table: &toml::Table) -> Vec<Setting> {
+    leaves(table, &|_| false).into_iter().map(|(key, value)| Setting { key, value }).collect()
+}
+
+/// All values below a table with their dotted keys; tables of which `is_leaf` holds are values.
+fn leaves(table: &toml::Table, is_leaf: &impl Fn(&toml::Table) -> bool) -> Vec<(String, Value)> {
+    let mut found = Vec::new();
+    for (key, value) in table {
+        match value {
+            Value::Table(inner) if !is_leaf(inner) => {
+                let inner = leaves(inner, is_leaf).into_iter();
+                found.extend(inner.map(|(rest, value)| (format!("{key}.{rest}"), value)));
+            }
+            value => found.push((key.clone(), value.clone())),
+        }
+    }
+    found
+}
+
+struct Reader<'a> {
+    source: &'a Source,
+}
+
+impl Reader<'_> {
+    fn factors(&self, table: &Spanned<toml::Table>) -> Result<Vec<Factor>, InputError> {
+        let factor = |(key, value): (String, Value)| match value {
+            Value::Array(values) if !values.is_empty() => Ok(Factor { key, values }),
+            _ => {
+                let cause = format!("`{key}` has no list of values");
+                let remedy = "give a list, e.g. robots.count = [10, 20]; what does not vary \
+                              belongs under [set]";
+                Err(self.source.error(Some(table.span()), cause, remedy))
+            }
+        };
+        leaves(table.get_ref(), &|_| false).into_iter().map(factor).collect()
+    }
+
+    fn hypercube(&self, section: &Spanned<HypercubeSection>) -> Result<Hypercube, InputError> {
+        let HypercubeSection { samples, seed, range } = section.get_ref();
+        let is_range = |t: &toml::Table| t.contains_key("low") && !t["low"].is_table();
+        let found = leaves(range.get_ref(), &is_range);
+        let wrong = |cause: String, remedy: &str| {
+            self.source.error(Some(range.span()), cause, remedy.to_string())
+        };
+        if found.is_empty() {
+            return Err(wrong(
+                "no key has a range".into(),
+                "give e.g. a.b = { low = 1, high = 5 }",
+            ));
+        }
+        let one = |(key, value): (String, Value)| {
+            let section: RangeSection = value.try_into().map_err(|e: toml::de::Error| {
+                let remedy = "give { low = 1, high = 5 }, with log = true or integer = true";
+                wrong(format!("the range of `{key}`: {}", e.message()), remedy)
+            })?;
+            let RangeSection { low, high, log: is_log, integer: is_integer } = section;
+            let is_right = low < high && low.is_finite() && high.is_finite();
+            if !is_right || (is_log && low <= 0.0) {
+                let remedy = "low is below high, and above 0 where log = true";
+                return Err(wrong(format!("the range of `{key}` is {low} to {high}"), remedy));
+            }
+            Ok(design::Range { key, low, high, is_log, is_integer })
+        };
+        let ranges = found.into_iter().map(one).collect::<Result<_, _>>()?;
+        let samples = self.count(*samples.get_ref(), samples.span(), "samples")? as usize;
+        Ok(Hypercube { samples, seed: *seed, ranges })
+    }
+
+    fn until(&self, section: &Spanned<UntilSection>) -> Result<Until, InputError> {
+        let UntilSection { ci, abs, metrics, .. } = section.get_ref();
+        let (half_width, is_relative) = match (ci, abs) {
+            (Some(ci), None) => (*ci, true),
+            (None, Some(abs)) => (*abs, false),
+            _ => {
+                let remedy = "give either ci = 0.05 (of the mean) or abs = 2.5 (in its unit)";
+                return Err(self.source.error(Some(section.span()), "no single precision", remedy));
+            }
+        };
+        if !(half_width > 0.0 && half_width.is_finite()) {
+            let cause = format!("a precision of {half_width}");
+            return Err(self.source.error(Some(section.span()), cause, "give a number above 0"));
+        }
+        Ok(Until { half_width, is_relative, metrics: metrics.clone() })
+    }
+
+    fn count(&self, n: u64, span: Range<usize>, key: &str) -> Result<u32, InputError> {
+        match n {
+            1..=MOST => Ok(n as u32),
+            _ => {
+                let cause = format!("{key} = {n}");
+                Err(self.source.error(Some(span), cause, format!("give 1 to {MOST}")))
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FILE: &str = r#"
+format = 1
+scenario = "s.toml"
+name = "methods"
+metrics = ["losses_of_separation"]
+baseline = { airspace.method = "none" }
+
+[set]
+airspace.shield = "off"
+
+[vary]
+airspace.generator.n = [2, 4]
+airspace.method = ["none", "pc"]
+
+[until]
+ci = 0.05
+max_runs = 200
+"#;
+
+    fn parse(text: &str) -> Result<Sweep, InputError> {
+        Sweep::parse(&Source::new("sweep.toml", text, "dir"))
+    }
+
+    #[test]
+    fn a_sweep_file_says_what_to_vary_and_how_often() {
+        let sweep = parse(FILE).expect("valid");
+        assert_eq!(sweep.scenario, Path::new("dir/s.toml"));
+        assert_eq!(sweep.fixed[0].to_override(), "airspace.shield=\"off\"");
+        let keys: Vec<&str> = sweep.design.factors.iter().map(|f| f.key.as_str()).collect();
+        assert_eq!(keys, ["airspace.generator.n", "airspace.method"]);
+        assert_eq!((sweep.replicates, sweep.until.map(|u| u.half_width)), (200, Some(0.05)));
+        assert_eq!(sweep.baseline[0].key, "airspace.method");
+    }
+
+    #[test]
+    fn ranges_of_a_hypercube_are_found_below_dotted_keys() {
+        let text = "format = 1\nscenario = \"s.toml\"\n[latin_hypercube]\nsamples = 5\n\
+                    [latin_hypercube.range]\na.b = { low = 1, high = 2 }\n\
+                    c = { low = 1, high = 100, log = true, integer = true }\n";
+        let hypercube = parse(text).expect("valid").design.hypercube.expect("there");
+        let told: Vec<_> = hypercube.ranges.iter().map(|r| (r.key.as_str(), r.is_log)).collect();
+        assert_eq!((hypercube.samples, told), (5, vec![("a.b", false), ("c", true)]));
+    }
+
+    #[test]
+    fn what_is_wrong_is_told_with_its_place() {
+        let head = "format = 1\nscenario = \"s.toml\"\n";
+        for (text, cause) in [
+            ("replicates = 0\n", "replicates = 0"),
+            ("replicates = 5\n[until]\nci = 0.1\n", "both say how often"),
+            ("[until]\nci = 0.1\nabs = 1.0\n", "no single precision"),
+            ("[until]\nci = -1.0\n", "a precision of -1"),
+            ("[vary]\nseeds = 3\n", "`seeds` has no list"),
+            ("[latin_hypercube]\nsamples = 3\nrange = {}\n", "no key has a range"),
+            ("[latin_hypercube]\nsamples = 3\nrange.a = { low = 2, high = 1 }\n", "2 to 1"),
+            (
+                "[latin_hypercube]\nsamples = 3\nrange.a = { low = 0, high = 1, log = true }\n",
+                "0 to 1",
+            ),
+            ("repliactes = 3\n", "unknown key `repliactes`"),
+        ] {
+            let error = parse(&format!("{head}{text}")).expect_err(text);
+            assert!(error.cause().contains(cause), "{error}");
+            assert!(error.position().is_some(), "{error}");
+        }
+    }
+
+    #[test]
+    fn seeds_are_no_parameter() {
+        let mut sweep = Sweep::of_scenario("s.toml");
+        sweep.design.factors.push(Factor::parse("seed=1,2").expect("valid"));
+        assert!(sweep.check().expect_err("refused").remedy().contains("first_seed"));
+    }
+
+    #[test]
+    fn precisions_are_written_as_shares_or_in_units() {
+        assert_eq!(
+            "ci=0.05".parse::<Until>().map(|u| (u.half_width, u.is_relative)),
+            Ok((0.05, true))
+        );
+        assert_eq!(
+            "abs=2".parse::<Until>().map(|u| (u.half_width, u.is_relative)),
+            Ok((2.0, false))
+        );
+        for bad in ["ci", "ci=0", "ci=x", "sd=1", "abs=inf"] {
+            assert!(bad.parse::<Until>().is_err(), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,272 @@
+//! The cells of a sweep, and who runs which.
+
+use super::design::Setting;
+use super::file::{Sweep, Until};
+use serde::{Deserialize, Serialize};
+use sidestep_kernel::InputError;
+use std::fmt;
+use std::str::FromStr;
+
+/// Everything that is to be run: variants times replicates.
+///
+/// Cell `variant * replicates + replicate`, so rows sorted by cell are sorted by variant. They are
+/// run replicate by replicate: what is done first is a small whole experiment.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Plan {
+    /// Name of the sweep; may be empty.
+    pub name: String,
+    /// Name of the world.
+    pub world: String,
+    /// Keys that differ between variants, in the order of their columns.
+    pub parameters: Vec<String>,
+    /// The variants.
+    pub variants: Vec<Variant>,
+    /// Runs of each variant, at most.
+    pub replicates: u32,
+    /// The seed of replicate 0; replicate `k` has this plus `k`.
+    pub first_seed: u64,
+    /// When a variant has been run often enough, if not after all its replicates.
+    pub until: Option<Until>,
+    /// The metrics to report; all that vary if none are named.
+    pub metrics: Vec<String>,
+    /// The variant that others are compared with.
+    pub baseline: Option<u32>,
+    /// Agents of the largest variant.
+    pub agents: u64,
+}
+
+/// One variant of the scenario.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Variant {
+    /// What it sets, beside what all variants have in common.
+    pub settings: Vec<Setting>,
+}
+
+impl Variant {
+    /// The value of a parameter, if this variant sets it.
+    pub fn value(&self, key: &str) -> Option<&toml::Value> {
+        self.settings.iter().find(|s| s.key == key).map(|s| &s.value)
+    }
+}
+
+/// In words: `robots.count = 10, regime = "both"`.
+impl fmt::Display for Variant {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.settings.is_empty() {
+            return f.write_str("the scenario as it is");
+        }
+        for (k, Setting { key, value }) in self.settings.iter().enumerate() {
+            let separator = if k == 0 { "" } else { ", " };
+            write!(f, "{separator}{key} = {value}")?;
+        }
+        Ok(())
+    }
+}
+
+/// The unit of work: a variant with a seed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct Cell {
+    /// Its number.
+    pub id: u64,
+    /// Number of its variant.
+    pub variant: u32,
+    /// Number of the run among those of its variant.
+    pub replicate: u32,
+    /// The seed.
+    pub seed: u64,
+}
+
+impl Plan {
+    /// A plan of these variants, which are known to be right.
+    ///
+    /// # Errors
+    /// When seeds run over, or the baseline is no variant or not one alone.
+    pub fn new(
+        sweep: &Sweep,
+        variants: Vec<Vec<Setting>>,
+        (world, seed): (&str, u64),
+    ) -> Result<Self, InputError> {
+        let mut parameters: Vec<String> = Vec::new();
+        for setting in variants.iter().flatten() {
+            if !parameters.contains(&setting.key) {
+                parameters.push(setting.key.clone());
+            }
+        }
+        let first_seed = sweep.first_seed.unwrap_or(seed);
+        let last = first_seed.checked_add(u64::from(sweep.replicates));
+        if last.is_none_or(|last| last > i64::MAX as u64) {
+            let cause = format!("{} seeds from {first_seed} on run over", sweep.replicates);
+            return Err(InputError::new(&sweep.place, cause, "begin with a smaller seed"));
+        }
+        let variants: Vec<Variant> =
+            variants.into_iter().map(|settings| Variant { settings }).collect();
+        let baseline = baseline(&sweep.baseline, &variants, &sweep.place)?;
+        Ok(Self {
+            name: sweep.name.clone(),
+            world: world.into(),
+            parameters,
+            variants,
+            replicates: sweep.replicates,
+            first_seed,
+            until: sweep.until.clone(),
+            metrics: sweep.metrics.clone(),
+            baseline,
+            agents: 0,
+        })
+    }
+
+    /// Number of cells, at most.
+    pub fn len(&self) -> u64 {
+        self.variants.len() as u64 * u64::from(self.replicates)
+    }
+
+    /// True without cells; a plan has some.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The cell of a variant and a replicate.
+    pub fn cell(&self, variant: u32, replicate: u32) -> Cell {
+        Cell {
+            id: u64::from(variant) * u64::from(self.replicates) + u64::from(replicate),
+            variant,
+            replicate,
+            seed: self.first_seed + u64::from(replicate),
+        }
+    }
+
+    /// The cell with this number, if it is one.
+    pub fn cell_of(&self, id: u64) -> Option<Cell> {
+        let replicates = u64::from(self.replicates);
+        let cell = || self.cell((id / replicates) as u32, (id % replicates) as u32);
+        (id < self.len()).then(cell)
+    }
+
+    /// The cells of a share, in the order in which they are run: every `count`-th cell, counted
+    /// over variants and replicates alike, so that no share has the costly variants alone.
+    pub fn share(&self, shard: Shard) -> impl Iterator<Item = Cell> + '_ {
+        let (index, count) = (u64::from(shard.index), u64::from(shard.count));
+        let variants = self.variants.len() as u32;
+        let cells = (0..self.replicates)
+            .flat_map(move |replicate| (0..variants).map(move |v| self.cell(v, replicate)));
+        cells.filter(move |c| (u64::from(c.variant) + u64::from(c.replicate)) % count == index)
+    }
+}
+
+/// The variant that has all these settings.
+fn baseline(
+    wanted: &[Setting],
+    variants: &[Variant],
+    place: &str,
+) -> Result<Option<u32>, InputError> {
+    if wanted.is_empty() {
+        return Ok(None);
+    }
+    let fits = |v: &Variant| wanted.iter().all(|s| v.value(&s.key) == Some(&s.value));
+    let found: Vec<usize> = (0..variants.len()).filter(|&k| fits(&variants[k])).collect();
+    match found[..] {
+        [one] => Ok(Some(one as u32)),
+        [] => {
+            let cause = "no variant has the settings of the baseline";
+            Err(InputError::new(place, cause, "give values that are varied"))
+        }
+        _ => {
+            let cause = format!("{} variants have the settings of the baseline", found.len());
+            Err(InputError::new(place, cause, "give the value of every key that is varied"))
+        }
+    }
+}
+
+/// A share of the cells: number `index` of `count`, from 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Shard {
+    /// Its number.
+    pub index: u32,
+    /// Of how many.
+    pub count: u32,
+}
+
+impl Shard {
+    /// All cells.
+    pub const ALL: Self = Self { index: 0, count: 1 };
+}
+
+/// `0/4` is the first of four.
+impl FromStr for Shard {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || format!("`{text}` is no share: write I/N with I from 0 to N-1, e.g. 0/4");
+        let (index, count) = text.split_once('/').ok_or_else(wrong)?;
+        let number = |t: &str| t.trim().parse::<u32>().map_err(|_| wrong());
+        let shard = Self { index: number(index)?, count: number(count)? };
+        if shard.index < shard.count { Ok(shard) } else { Err(wrong()) }
+    }
+}
+
+impl fmt::Display for Shard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.index, self.count)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiment::sweep::Factor;
+    use proptest::prelude::*;
+    use std::collections::BTreeSet;
+
+    fn plan(variants: usize, replicates: u32) -> Plan {
+        let values = (0..variants).map(|n| n.to_string()).collect::<Vec<_>>().join(",");
+        let mut sweep = Sweep::of_scenario("s.toml");
+        sweep.design.factors = vec![Factor::parse(&format!("n={values}")).expect("valid")];
+        sweep.replicates = replicates;
+        let variants = sweep.design.variants("test").expect("valid");
+        Plan::new(&sweep, variants, ("robots", 7)).expect("valid")
+    }
+
+    proptest! {
+        #[test]
+        fn shares_are_disjoint_and_together_are_all_cells(
+            variants in 1usize..12, replicates in 1u32..12, count in 1u32..9,
+        ) {
+            let plan = plan(variants, replicates);
+            let mut seen = BTreeSet::new();
+            for index in 0..count {
+                for cell in plan.share(Shard { index, count }) {
+                    prop_assert_eq!(plan.cell_of(cell.id), Some(cell));
+                    prop_assert!(seen.insert(cell.id), "cell {} is in two shares", cell.id);
+                }
+            }
+            prop_assert_eq!(seen.len() as u64, plan.len());
+            prop_assert_eq!(plan.cell_of(plan.len()), None);
+        }
+    }
+
+    #[test]
+    fn replicates_of_all_variants_have_the_same_seeds() {
+        let plan = plan(3, 4);
+        for cell in plan.share(Shard::ALL) {
+            assert_eq!(cell.seed, 7 + u64::from(cell.replicate));
+        }
+        let first: Vec<u32> = plan.share(Shard::ALL).take(3).map(|c| c.replicate).collect();
+        assert_eq!(first, [0, 0, 0], "the first replicate of every variant comes first");
+    }
+
+    #[test]
+    fn a_share_has_variants_and_replicates_of_all_kinds() {
+        let plan = plan(2, 6);
+        let half: Vec<Cell> = plan.share(Shard { index: 0, count: 2 }).collect();
+        assert_eq!(half.iter().filter(|c| c.variant == 0).count(), 3);
+        assert_eq!(half.len(), 6);
+    }
+
+    #[test]
+    fn shares_are_written_as_index_of_count() {
+        assert_eq!("1/4".parse(), Ok(Shard { index: 1, count: 4 }));
+        for bad in ["4/4", "1", "a/2", "-1/2", "0/0", ""] {
+            assert!(bad.parse::<Shard>().is_err(), "{bad}");
+        }
+    }
+}
