@@ -245,7 +245,7 @@ fn check_is_run(path: &Path) -> Result<(), InputError> {
 }
 
 /// Refuses a path at which a new run must not be made.
-fn check_vacant(path: &Path, existing: Existing) -> Result<(), InputError> {
+pub(crate) fn check_vacant(path: &Path, existing: Existing) -> Result<(), InputError> {
     let refuse = |cause, remedy: &str| Err(InputError::new(path.display(), cause, remedy));
     let mut entries = match fs::read_dir(path) {
         Ok(entries) => entries,

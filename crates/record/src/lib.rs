@@ -9,8 +9,10 @@ mod staging;
 pub mod folder;
 pub mod format;
 pub mod manifest;
+pub mod nullable;
 pub mod parquet;
 pub mod read;
+pub mod sweep;
 
 pub use folder::{Existing, NewRun, ResumePoint, RunFolder, RunView};
 pub use format::FormatVersion;

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::InputError;
 use sidestep_kernel::ports::RecordError;
@@ -56,19 +57,27 @@ impl Manifest {
     /// # Errors
     /// No such file, text that is no manifest (with line and column), another major format.
     pub(crate) fn read(path: &Path) -> Result<Self, InputError> {
-        let text = std::fs::read_to_string(path).map_err(|e| {
-            InputError::new(path.display(), e.to_string(), "make the file readable, or restore it")
-        })?;
-        // The version comes first: a newer manifest need not have the keys of this one.
-        let probe: Probe = parse(path, &text)?;
-        probe.format.check_readable(path.display())?;
-        parse(path, &text)
+        read_json(path)
     }
 
     /// Replaces the manifest at `path`.
     pub(crate) fn write(&self, path: &Path) -> Result<(), RecordError> {
         disk::replace(path, &json(self, path)?)
     }
+}
+
+/// Reads the manifest at `path`, of a run or a sweep.
+///
+/// # Errors
+/// No such file, text that is no manifest (with line and column), another major format.
+pub(crate) fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, InputError> {
+    let text = std::fs::read_to_string(path).map_err(|e| {
+        InputError::new(path.display(), e.to_string(), "make the file readable, or restore it")
+    })?;
+    // The version comes first: a newer manifest need not have the keys of this one.
+    let probe: Probe = parse(path, &text)?;
+    probe.format.check_readable(path.display())?;
+    parse(path, &text)
 }
 
 /// Indented JSON that ends in a newline.

@@ -99,7 +99,7 @@ fn find_parts(folder: &Path, name: &str) -> Result<(Vec<PathBuf>, bool), InputEr
     Ok((found, complete))
 }
 
-fn damaged(path: &Path, cause: impl Into<String>) -> InputError {
+pub(crate) fn damaged(path: &Path, cause: impl Into<String>) -> InputError {
     let remedy = "the file is damaged: copy it again from its source, or run the scenario again";
     InputError::new(path.display(), cause, remedy)
 }
@@ -208,26 +208,9 @@ impl<'a> Part<'a> {
         Ok(())
     }
 
-    /// Compares a row group's bytes with their checksum: decoders may panic on damaged
-    /// pages, or return other rows.
-    fn check_bytes(&self, group: usize) -> ParquetResult<()> {
-        let wrong = |cause: &str| ParquetError::General(format!("row group {group} {cause}"));
-        let (start, length) = extent(self.file.metadata().row_group(group))
-            .ok_or_else(|| wrong("has no place in the file"))?;
-        // Checked before so much memory is taken.
-        if start + length > Length::len(&self.bytes) {
-            return Err(wrong("reaches beyond the end of the file"));
-        }
-        let bytes = self.bytes.get_bytes(start, length as usize)?;
-        if self.checksums.get(group) != Some(&crc32fast::hash(&bytes)) {
-            return Err(wrong("does not match its checksum"));
-        }
-        Ok(())
-    }
-
     /// All rows of one row group.
     fn read_group(&self, group: usize) -> ParquetResult<Vec<Values>> {
-        self.check_bytes(group)?;
+        check_bytes(&self.bytes, self.file.metadata(), group, &self.checksums)?;
         let group = self.file.get_row_group(group)?;
         let rows = group.metadata().num_rows();
         let column = |(i, spec): (usize, &ColumnSpec)| {
@@ -247,11 +230,37 @@ fn bad(path: &Path, cause: impl std::fmt::Display) -> InputError {
 }
 
 /// The key-value pair `key` of a file.
-fn text(path: &Path, metadata: &ParquetMetaData, key: &str) -> Result<String, InputError> {
+pub(crate) fn text(
+    path: &Path,
+    metadata: &ParquetMetaData,
+    key: &str,
+) -> Result<String, InputError> {
     schema::key_value(metadata, key).map(str::to_string).ok_or_else(|| {
         let remedy = "name a file that a recording wrote";
         InputError::new(path.display(), format!("the file has no key `{key}`"), remedy)
     })
+}
+
+/// Compares a row group's bytes with their checksum: decoders may panic on damaged pages, or
+/// return other rows.
+pub(crate) fn check_bytes(
+    bytes: &File,
+    metadata: &ParquetMetaData,
+    group: usize,
+    checksums: &[u32],
+) -> ParquetResult<()> {
+    let wrong = |cause: &str| ParquetError::General(format!("row group {group} {cause}"));
+    let (start, length) =
+        extent(metadata.row_group(group)).ok_or_else(|| wrong("has no place in the file"))?;
+    // Checked before so much memory is taken.
+    if start + length > Length::len(bytes) {
+        return Err(wrong("reaches beyond the end of the file"));
+    }
+    let bytes = bytes.get_bytes(start, length as usize)?;
+    if checksums.get(group) != Some(&crc32fast::hash(&bytes)) {
+        return Err(wrong("does not match its checksum"));
+    }
+    Ok(())
 }
 
 /// Start and length of a row group's bytes; `None` unless its columns lie one behind the

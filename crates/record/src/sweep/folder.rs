@@ -1,0 +1,382 @@
+//! The folder itself: made in one step, then only added to.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use sidestep_kernel::InputError;
+use sidestep_kernel::ports::RecordError;
+
+use super::journal::{Journal, read_journal};
+use crate::disk;
+use crate::folder::check_vacant;
+use crate::format::{self, FormatVersion};
+use crate::manifest::{self, json};
+use crate::nullable::{self, NullableColumn, NullableTable};
+use crate::staging::Staging;
+
+/// The manifest's name.
+pub(crate) const MANIFEST: &str = "sweep.json";
+const CELLS: &str = "cells.parquet";
+const RESULTS: &str = "results.parquet";
+const TIMINGS: &str = "timings.parquet";
+const SHARES: &str = "shares";
+const VARIANTS: &str = "variants";
+const RUNS: &str = "runs";
+const SCENARIO: &str = "scenario.toml";
+
+/// The content of `sweep.json`.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SweepManifest<P> {
+    /// Version of the folder's format.
+    pub format: FormatVersion,
+    /// Version of the program that made the plan; the same makes the runs.
+    pub program_version: String,
+    /// Of all scenarios and files of the variants, in hexadecimal.
+    pub fingerprint: String,
+    /// The plan.
+    pub plan: P,
+}
+
+/// A share of the cells: number `index` of `count`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Share {
+    /// Its number, from 0.
+    pub index: u32,
+    /// Of how many.
+    pub count: u32,
+}
+
+/// The folder of a sweep.
+#[derive(Debug, Clone)]
+pub struct SweepFolder<P> {
+    path: PathBuf,
+    manifest: SweepManifest<P>,
+}
+
+impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
+    /// Makes the folder at `path`, all of it or nothing. `fill` writes the variants into what will
+    /// become the folder (see [`write_variant`](Self::write_variant)) and returns the plan, its
+    /// fingerprint and the table of its cells.
+    ///
+    /// # Errors
+    /// When something else is there, no folder can be made there, or `fill` fails.
+    pub fn create<E: From<InputError> + From<RecordError>>(
+        path: &Path,
+        program_version: &str,
+        fill: impl FnOnce(&Path) -> Result<(P, String, Vec<NullableColumn>), E>,
+    ) -> Result<Self, E> {
+        check_vacant(path, crate::Existing::Refuse)?;
+        let staging = Staging::new(path)?;
+        let (plan, fingerprint, cells) = fill(staging.path())?;
+        let manifest = SweepManifest {
+            format: format::CURRENT,
+            program_version: program_version.into(),
+            fingerprint,
+            plan,
+        };
+        make_folder(&staging.path().join(SHARES))?;
+        nullable::write(&staging.path().join(CELLS), &cells, program_version, &[])?;
+        let file = staging.path().join(MANIFEST);
+        disk::replace(&file, &json(&manifest, &file)?)?;
+        staging.take_place_of(path)?;
+        Ok(Self { path: path.to_path_buf(), manifest })
+    }
+
+    /// Writes the scenario of a variant, and the files it names, into a folder that
+    /// [`create`](Self::create) makes.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn write_variant(
+        folder: &Path,
+        variant: u32,
+        text: &str,
+        files: &[(String, Vec<u8>)],
+    ) -> Result<(), RecordError> {
+        let folder = variant_folder(folder, variant);
+        make_folder(&folder)?;
+        for (name, bytes) in files {
+            let file = folder.join(name);
+            make_folder(disk::parent(&file))?;
+            disk::replace(&file, bytes)?;
+        }
+        disk::replace(&folder.join(SCENARIO), text.as_bytes())
+    }
+
+    /// True for a folder that holds a sweep, be its manifest damaged or not.
+    pub fn is_at(path: &Path) -> bool {
+        path.join(MANIFEST).is_file()
+    }
+
+    /// Opens the folder at `path`.
+    ///
+    /// # Errors
+    /// No sweep; a damaged manifest; another major format.
+    pub fn open(path: &Path) -> Result<Self, InputError> {
+        if !Self::is_at(path) {
+            let cause = format!("this is no sweep: it holds no `{MANIFEST}`");
+            let remedy = "name the folder that a sweep was written to";
+            return Err(InputError::new(path.display(), cause, remedy));
+        }
+        let manifest = manifest::read_json(&path.join(MANIFEST))?;
+        Ok(Self { path: path.to_path_buf(), manifest })
+    }
+
+    /// Where the folder is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// What `sweep.json` says.
+    pub fn manifest(&self) -> &SweepManifest<P> {
+        &self.manifest
+    }
+
+    /// The plan.
+    pub fn plan(&self) -> &P {
+        &self.manifest.plan
+    }
+
+    /// The scenario file of a variant.
+    pub fn scenario(&self, variant: u32) -> PathBuf {
+        variant_folder(&self.path, variant).join(SCENARIO)
+    }
+
+    /// Where the run of a cell is recorded, if it is.
+    pub fn run_folder(&self, cell: u64) -> PathBuf {
+        self.path.join(RUNS).join(format!("{cell:06}"))
+    }
+
+    /// Opens the journal of a share to write, and reads what it has; `None` if the share is done.
+    ///
+    /// # Errors
+    /// When another process writes it, or it is damaged.
+    pub fn journal<T: DeserializeOwned>(
+        &self,
+        share: Share,
+    ) -> Result<Option<(Journal, Vec<T>)>, InputError> {
+        if self.share_file(share, "parquet").is_file() {
+            return Ok(None);
+        }
+        let path = self.share_file(share, "journal");
+        Journal::open(&path, &self.manifest.program_version).map(Some)
+    }
+
+    /// Writes the runs of a share as its part, and takes the journal away.
+    ///
+    /// # Errors
+    /// What the system says; the journal stays then.
+    pub fn end_share(
+        &self,
+        share: Share,
+        journal: Journal,
+        runs: &[NullableColumn],
+    ) -> Result<(), RecordError> {
+        let version = &self.manifest.program_version;
+        nullable::write(&self.share_file(share, "parquet"), runs, version, &[])?;
+        drop(journal);
+        let path = self.share_file(share, "journal");
+        fs::remove_file(&path).map_err(|e| RecordError::new(path.display(), e))
+    }
+
+    /// The parts of shares that are done.
+    ///
+    /// # Errors
+    /// When one of them cannot be read.
+    pub fn parts(&self) -> Result<Vec<(Share, NullableTable)>, InputError> {
+        let shares = self.shares_with("parquet")?;
+        shares
+            .into_iter()
+            .map(|share| {
+                let path = self.share_file(share, "parquet");
+                let table = nullable::read(&path)?;
+                self.check_version(&path, &table)?;
+                Ok((share, table))
+            })
+            .collect()
+    }
+
+    /// The runs of shares that are under way or were stopped; not of those with a part.
+    ///
+    /// # Errors
+    /// When a journal cannot be read.
+    pub fn journals<T: DeserializeOwned>(&self) -> Result<Vec<(Share, Vec<T>)>, InputError> {
+        let done = self.shares_with("parquet")?;
+        let growing = self.shares_with("journal")?.into_iter().filter(|s| !done.contains(s));
+        let version = &self.manifest.program_version;
+        growing
+            .map(|share| Ok((share, read_journal(&self.share_file(share, "journal"), version)?)))
+            .collect()
+    }
+
+    /// Writes the table of all runs, and that of what they took first: where the results are, the
+    /// sweep is done.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn complete(
+        &self,
+        results: &[NullableColumn],
+        timings: &[NullableColumn],
+    ) -> Result<(), RecordError> {
+        let plan = serde_json::to_string(self.plan())
+            .map_err(|e| RecordError::new(self.path.display(), e))?;
+        let extra =
+            [("sidestep.plan", plan), ("sidestep.fingerprint", self.manifest.fingerprint.clone())];
+        let version = &self.manifest.program_version;
+        nullable::write(&self.path.join(TIMINGS), timings, version, &extra)?;
+        nullable::write(&self.path.join(RESULTS), results, version, &extra)
+    }
+
+    /// Whether the table of all runs is there.
+    pub fn is_complete(&self) -> bool {
+        self.results_file().is_file()
+    }
+
+    /// Where the table of all runs is, or will be.
+    pub fn results_file(&self) -> PathBuf {
+        self.path.join(RESULTS)
+    }
+
+    /// The table of all runs.
+    ///
+    /// # Errors
+    /// When the sweep is not done, or the table is damaged.
+    pub fn results(&self) -> Result<NullableTable, InputError> {
+        if !self.is_complete() {
+            let remedy = "go on with `sidestep resume DIR`, or run its shares and \
+                          `sidestep sweep collect DIR`";
+            return Err(InputError::new(self.path.display(), "the sweep is not done yet", remedy));
+        }
+        nullable::read(&self.results_file())
+    }
+
+    /// The table of what the runs took.
+    ///
+    /// # Errors
+    /// When the sweep is not done, or the table is damaged.
+    pub fn timings(&self) -> Result<NullableTable, InputError> {
+        nullable::read(&self.path.join(TIMINGS))
+    }
+
+    fn check_version(&self, path: &Path, table: &NullableTable) -> Result<(), InputError> {
+        let (wrote, ours) = (&table.program_version, &self.manifest.program_version);
+        if wrote == ours {
+            return Ok(());
+        }
+        let cause = format!("its runs are of sidestep {wrote}, the sweep is of {ours}");
+        Err(InputError::new(path.display(), cause, "delete it, and run this share again"))
+    }
+
+    fn share_file(&self, share: Share, extension: &str) -> PathBuf {
+        let Share { index, count } = share;
+        self.path.join(SHARES).join(format!("{index}-of-{count}.{extension}"))
+    }
+
+    /// The shares that have a file of this kind, in order.
+    fn shares_with(&self, extension: &str) -> Result<Vec<Share>, InputError> {
+        let folder = self.path.join(SHARES);
+        let failed = |e: std::io::Error| {
+            InputError::new(folder.display(), e.to_string(), "make the folder readable")
+        };
+        let mut shares = Vec::new();
+        for entry in fs::read_dir(&folder).map_err(failed)? {
+            let name = entry.map_err(failed)?.file_name();
+            shares.extend(name.to_str().and_then(|name| share_of(name, extension)));
+        }
+        shares.sort();
+        Ok(shares)
+    }
+}
+
+/// The share whose file has this name.
+fn share_of(name: &str, extension: &str) -> Option<Share> {
+    let (index, count) = name.strip_suffix(extension)?.strip_suffix('.')?.split_once("-of-")?;
+    Some(Share { index: index.parse().ok()?, count: count.parse().ok()? })
+}
+
+fn variant_folder(folder: &Path, variant: u32) -> PathBuf {
+    folder.join(VARIANTS).join(format!("{variant:04}"))
+}
+
+fn make_folder(path: &Path) -> Result<(), RecordError> {
+    fs::create_dir_all(path).map_err(|e| RecordError::new(path.display(), e))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::nullable::NullableValues;
+
+    type Folder = SweepFolder<Vec<u32>>;
+
+    #[derive(Debug, thiserror::Error)]
+    #[error("{0}")]
+    struct Failed(String);
+
+    impl From<InputError> for Failed {
+        fn from(e: InputError) -> Self {
+            Self(e.to_string())
+        }
+    }
+
+    impl From<RecordError> for Failed {
+        fn from(e: RecordError) -> Self {
+            Self(e.to_string())
+        }
+    }
+
+    fn cells() -> Vec<NullableColumn> {
+        let values = NullableValues::Int(vec![Some(0), Some(1)]);
+        vec![NullableColumn { name: "cell".into(), role: "cell".into(), values }]
+    }
+
+    fn create(path: &Path) -> Result<Folder, Failed> {
+        Folder::create(path, "0.1.0", |staging| {
+            let files = [("inputs/a.txt".to_string(), b"a".to_vec())];
+            Folder::write_variant(staging, 0, "seed = 1\n", &files)?;
+            Ok((vec![4, 5], "f".into(), cells()))
+        })
+    }
+
+    #[test]
+    fn a_sweep_goes_from_plan_over_shares_to_one_table() {
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join("sweep");
+        let folder = create(&path).unwrap();
+        assert_eq!(fs::read_to_string(folder.scenario(0)).unwrap(), "seed = 1\n");
+        let share = Share { index: 1, count: 2 };
+        let (mut journal, runs) = folder.journal::<u32>(share).unwrap().unwrap();
+        assert_eq!(runs, Vec::<u32>::new());
+        journal.append(&7u32).unwrap();
+        assert_eq!(folder.journals::<u32>().unwrap(), [(share, vec![7])]);
+        folder.end_share(share, journal, &cells()).unwrap();
+        assert!(folder.journal::<u32>(share).unwrap().is_none(), "a share that is done is done");
+        assert!(folder.journals::<u32>().unwrap().is_empty());
+        assert_eq!(folder.parts().unwrap()[0].1.columns, cells());
+        assert!(folder.results().unwrap_err().cause().contains("not done"));
+        folder.complete(&cells(), &cells()).unwrap();
+        let again = Folder::open(&path).unwrap();
+        assert_eq!((again.plan(), again.is_complete()), (&vec![4, 5], true));
+        assert_eq!(again.results().unwrap().columns, cells());
+    }
+
+    #[test]
+    fn a_plan_that_fails_leaves_nothing() {
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join("a/sweep");
+        let made = Folder::create(&path, "0.1.0", |_| Err(Failed("no".into())));
+        assert!(made.is_err());
+        assert_eq!(fs::read_dir(place.path()).unwrap().count(), 0);
+    }
+
+    #[test]
+    fn nothing_of_yours_is_overwritten() {
+        let place = tempfile::tempdir().unwrap();
+        fs::write(place.path().join("letter.txt"), "dear").unwrap();
+        assert!(create(place.path()).is_err());
+        assert!(Folder::open(place.path()).unwrap_err().cause().contains("no sweep"));
+    }
+}

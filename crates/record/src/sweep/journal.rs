@@ -1,0 +1,243 @@
+//! Finished runs, one line each, appended by one process.
+//!
+//! A line is the CRC-32 of a JSON text in hexadecimal, a space, the text, a newline. The first line
+//! says which version wrote it. What a kill left of a line has no newline, or a wrong checksum at
+//! the very end; it is taken away when the journal is opened to write. A wrong checksum elsewhere
+//! is damage, and an error.
+
+use std::fs::{File, OpenOptions, TryLockError};
+use std::io::{BufRead, BufReader, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use sidestep_kernel::InputError;
+use sidestep_kernel::ports::RecordError;
+
+use crate::format::{self, FormatVersion};
+
+/// Lines that a power cut may cost are at most this old: they are run again. A kill costs none.
+const SYNC_EVERY: Duration = Duration::from_millis(200);
+
+/// The first line.
+#[derive(Debug, Serialize, Deserialize)]
+struct Head {
+    format: FormatVersion,
+    program_version: String,
+}
+
+/// A journal that this process writes; no other can while this value lives.
+#[derive(Debug)]
+pub struct Journal {
+    path: PathBuf,
+    file: File,
+    /// Bytes of whole lines.
+    length: u64,
+    synced: Instant,
+}
+
+impl Journal {
+    /// Opens the journal at `path`, or makes it, and takes away half a line at its end. The second
+    /// value has its entries.
+    ///
+    /// # Errors
+    /// When another process writes it, it is damaged, or another version of the program wrote it.
+    pub fn open<T: DeserializeOwned>(
+        path: &Path,
+        program_version: &str,
+    ) -> Result<(Self, Vec<T>), InputError> {
+        let failed = |e: std::io::Error| {
+            let remedy = "make the folder writable, and see that the disk has space";
+            InputError::new(path.display(), e.to_string(), remedy)
+        };
+        let file = OpenOptions::new().read(true).append(true).create(true).open(path);
+        let file = file.map_err(failed)?;
+        lock(&file, path)?;
+        let Content { entries, length } = content(path, program_version)?;
+        file.set_len(length).map_err(failed)?;
+        let mut journal = Self { path: path.to_path_buf(), file, length, synced: Instant::now() };
+        journal.file.seek(SeekFrom::End(0)).map_err(failed)?;
+        if length == 0 {
+            let head = Head { format: format::CURRENT, program_version: program_version.into() };
+            journal
+                .append(&head)
+                .and_then(|()| journal.sync())
+                .map_err(|e| InputError::new(e.place, e.cause, "make room on the disk"))?;
+        }
+        Ok((journal, entries))
+    }
+
+    /// Appends an entry. When this returns, no kill of the process can lose it.
+    ///
+    /// # Errors
+    /// What the system says; the journal has the entries before this one then.
+    pub fn append(&mut self, entry: &impl Serialize) -> Result<(), RecordError> {
+        let line = line(entry).map_err(|e| RecordError::new(self.path.display(), e))?;
+        let written = self.file.write_all(line.as_bytes());
+        if let Err(error) = written {
+            // Half a line must not stand before later ones.
+            let _ = self.file.set_len(self.length);
+            return Err(RecordError::new(self.path.display(), error));
+        }
+        self.length += line.len() as u64;
+        if self.synced.elapsed() < SYNC_EVERY { Ok(()) } else { self.sync() }
+    }
+
+    /// Makes all entries durable against a power cut.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn sync(&mut self) -> Result<(), RecordError> {
+        self.file.sync_data().map_err(|e| RecordError::new(self.path.display(), e))?;
+        self.synced = Instant::now();
+        Ok(())
+    }
+}
+
+fn lock(file: &File, path: &Path) -> Result<(), InputError> {
+    let cause = match file.try_lock() {
+        Ok(()) => return Ok(()),
+        Err(TryLockError::WouldBlock) => "another process is running this share".to_string(),
+        // Some network file systems know no locks: then the user's scheduler sees to it.
+        Err(TryLockError::Error(e)) if e.kind() == std::io::ErrorKind::Unsupported => return Ok(()),
+        Err(TryLockError::Error(e)) => e.to_string(),
+    };
+    Err(InputError::new(path.display(), cause, "wait for it, or run another share"))
+}
+
+fn line(entry: &impl Serialize) -> serde_json::Result<String> {
+    let json = serde_json::to_string(entry)?;
+    Ok(format!("{:08x} {json}\n", crc32fast::hash(json.as_bytes())))
+}
+
+/// Reads the entries of the journal at `path`, which may be growing: up to the last whole line.
+///
+/// # Errors
+/// When it cannot be read, is damaged, or another version of the program wrote it.
+pub fn read_journal<T: DeserializeOwned>(
+    path: &Path,
+    program_version: &str,
+) -> Result<Vec<T>, InputError> {
+    Ok(content(path, program_version)?.entries)
+}
+
+struct Content<T> {
+    entries: Vec<T>,
+    /// Bytes of whole lines.
+    length: u64,
+}
+
+fn content<T: DeserializeOwned>(
+    path: &Path,
+    program_version: &str,
+) -> Result<Content<T>, InputError> {
+    let damaged = |line: usize, cause: String| {
+        let remedy = "the file is damaged: delete it, and its runs are made again";
+        InputError::new(path.display(), cause, remedy).at(line, 1)
+    };
+    let file = File::open(path).map_err(|e| damaged(1, e.to_string()))?;
+    let mut content = Content { entries: Vec::new(), length: 0 };
+    let mut reader = BufReader::new(file);
+    let (mut bytes, mut number) = (Vec::new(), 0);
+    loop {
+        bytes.clear();
+        let n = reader.read_until(b'\n', &mut bytes).map_err(|e| damaged(number, e.to_string()))?;
+        number += 1;
+        let Some(json) = json(&bytes) else {
+            // Half a line is what a kill leaves, at the end and nowhere else.
+            let is_last = reader.fill_buf().is_ok_and(<[u8]>::is_empty);
+            if is_last {
+                return Ok(content);
+            }
+            return Err(damaged(number, "the line does not match its checksum".into()));
+        };
+        if number == 1 {
+            check_head(path, json, program_version)?;
+        } else {
+            let entry = serde_json::from_slice(json).map_err(|e| damaged(number, e.to_string()))?;
+            content.entries.push(entry);
+        }
+        content.length += n as u64;
+    }
+}
+
+/// The text of a line that is whole.
+fn json(line: &[u8]) -> Option<&[u8]> {
+    let (checksum, json) = line.strip_suffix(b"\n")?.split_at_checked(9)?;
+    let checksum = std::str::from_utf8(checksum).ok()?.strip_suffix(' ')?;
+    let checksum = u32::from_str_radix(checksum, 16).ok()?;
+    (crc32fast::hash(json) == checksum).then_some(json)
+}
+
+fn check_head(path: &Path, json: &[u8], program_version: &str) -> Result<(), InputError> {
+    let head: Head = serde_json::from_slice(json).map_err(|e| {
+        InputError::new(path.display(), format!("this is no journal: {e}"), "delete it")
+    })?;
+    head.format.check_readable(path.display())?;
+    if head.program_version == program_version {
+        return Ok(());
+    }
+    let cause =
+        format!("its runs are of sidestep {}, this is {program_version}", head.program_version);
+    let remedy =
+        format!("go on with sidestep {}, or sweep into a new folder", head.program_version);
+    Err(InputError::new(path.display(), cause, remedy))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn opened(path: &Path) -> (Journal, Vec<u32>) {
+        Journal::open(path, "0.1.0").unwrap()
+    }
+
+    #[test]
+    fn entries_survive_and_half_a_line_is_taken_away() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("j");
+        let (mut journal, entries) = opened(&path);
+        assert_eq!(entries, Vec::<u32>::new());
+        (0..5u32).for_each(|n| journal.append(&n).unwrap());
+        drop(journal);
+        let whole = std::fs::read(&path).unwrap();
+        // Killed at any byte: what is whole stays, what is not is gone, and more can be appended.
+        for cut in 0..=whole.len() {
+            std::fs::write(&path, &whole[..cut]).unwrap();
+            let lines = whole[..cut].iter().filter(|b| **b == b'\n').count();
+            let (mut journal, entries) = opened(&path);
+            let kept: Vec<u32> = (0..lines.saturating_sub(1) as u32).collect();
+            assert_eq!(entries, kept, "cut at {cut}");
+            journal.append(&77u32).unwrap();
+            drop(journal);
+            let all: Vec<u32> = read_journal(&path, "0.1.0").unwrap();
+            assert_eq!(all, [kept, vec![77]].concat(), "cut at {cut}");
+        }
+    }
+
+    #[test]
+    fn damage_in_the_middle_is_told_with_its_line() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("j");
+        let (mut journal, _) = opened(&path);
+        (0..5u32).for_each(|n| journal.append(&n).unwrap());
+        drop(journal);
+        let changed = std::fs::read_to_string(&path).unwrap().replace(" 1\n", " 7\n");
+        std::fs::write(&path, changed).unwrap();
+        let error = Journal::open::<u32>(&path, "0.1.0").unwrap_err();
+        assert_eq!(error.position(), Some((3, 1)), "{error}");
+    }
+
+    #[test]
+    fn one_process_writes_and_one_version() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("j");
+        let journal = opened(&path);
+        let error = Journal::open::<u32>(&path, "0.1.0").unwrap_err();
+        assert!(error.cause().contains("another process"), "{error}");
+        drop(journal);
+        let error = Journal::open::<u32>(&path, "0.2.0").unwrap_err();
+        assert!(error.cause().contains("sidestep 0.1.0"), "{error}");
+    }
+}
