@@ -149,19 +149,21 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         self.path.join(RUNS).join(format!("{cell:06}"))
     }
 
-    /// Opens the journal of a share to write, and reads what it has; `None` if the share is done.
+    /// Opens the journal of a share to write, and hands over what it has; `None` if the share is
+    /// done.
     ///
     /// # Errors
     /// When another process writes it, or it is damaged.
     pub fn journal<T: DeserializeOwned>(
         &self,
         share: Share,
-    ) -> Result<Option<(Journal, Vec<T>)>, InputError> {
+        each: impl FnMut(T),
+    ) -> Result<Option<Journal>, InputError> {
         if self.share_file(share, "parquet").is_file() {
             return Ok(None);
         }
         let path = self.share_file(share, "journal");
-        Journal::open(&path, &self.manifest.program_version).map(Some)
+        Journal::open(&path, &self.manifest.program_version, each).map(Some)
     }
 
     /// Writes the runs of a share as its part, and takes the journal away.
@@ -181,34 +183,38 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         fs::remove_file(&path).map_err(|e| RecordError::new(path.display(), e))
     }
 
-    /// The parts of shares that are done.
+    /// Hands over the parts of shares that are done, one by one.
     ///
     /// # Errors
     /// When one of them cannot be read.
-    pub fn parts(&self) -> Result<Vec<(Share, NullableTable)>, InputError> {
-        let shares = self.shares_with("parquet")?;
-        shares
-            .into_iter()
-            .map(|share| {
-                let path = self.share_file(share, "parquet");
-                let table = nullable::read(&path)?;
-                self.check_version(&path, &table)?;
-                Ok((share, table))
-            })
-            .collect()
+    pub fn parts(&self, mut each: impl FnMut(NullableTable)) -> Result<(), InputError> {
+        for share in self.shares_with("parquet")? {
+            let path = self.share_file(share, "parquet");
+            let table = nullable::read(&path)?;
+            self.check_version(&path, &table)?;
+            each(table);
+        }
+        Ok(())
     }
 
-    /// The runs of shares that are under way or were stopped; not of those with a part.
+    /// Hands over the runs of shares that are under way or were stopped; not of those with a part,
+    /// nor of `but`.
     ///
     /// # Errors
     /// When a journal cannot be read.
-    pub fn journals<T: DeserializeOwned>(&self) -> Result<Vec<(Share, Vec<T>)>, InputError> {
+    pub fn journals<T: DeserializeOwned>(
+        &self,
+        but: Option<Share>,
+        mut each: impl FnMut(T),
+    ) -> Result<(), InputError> {
         let done = self.shares_with("parquet")?;
-        let growing = self.shares_with("journal")?.into_iter().filter(|s| !done.contains(s));
-        let version = &self.manifest.program_version;
-        growing
-            .map(|share| Ok((share, read_journal(&self.share_file(share, "journal"), version)?)))
-            .collect()
+        for share in self.shares_with("journal")? {
+            if !done.contains(&share) && Some(share) != but {
+                let path = self.share_file(share, "journal");
+                read_journal(&path, &self.manifest.program_version, &mut each)?;
+            }
+        }
+        Ok(())
     }
 
     /// Writes the table of all runs, and that of what they took first: where the results are, the
@@ -348,14 +354,21 @@ mod tests {
         let folder = create(&path).unwrap();
         assert_eq!(fs::read_to_string(folder.scenario(0)).unwrap(), "seed = 1\n");
         let share = Share { index: 1, count: 2 };
-        let (mut journal, runs) = folder.journal::<u32>(share).unwrap().unwrap();
-        assert_eq!(runs, Vec::<u32>::new());
+        let mut journal = folder.journal(share, |_: u32| panic!("a run")).unwrap().unwrap();
         journal.append(&7u32).unwrap();
-        assert_eq!(folder.journals::<u32>().unwrap(), [(share, vec![7])]);
+        let runs = |but| {
+            let mut runs: Vec<u32> = Vec::new();
+            folder.journals(but, |run| runs.push(run)).unwrap();
+            runs
+        };
+        assert_eq!((runs(None), runs(Some(share))), (vec![7], vec![]));
         folder.end_share(share, journal, &cells()).unwrap();
-        assert!(folder.journal::<u32>(share).unwrap().is_none(), "a share that is done is done");
-        assert!(folder.journals::<u32>().unwrap().is_empty());
-        assert_eq!(folder.parts().unwrap()[0].1.columns, cells());
+        let again = folder.journal(share, |_: u32| ()).unwrap();
+        assert!(again.is_none(), "a share that is done is done");
+        assert!(runs(None).is_empty());
+        let mut parts = Vec::new();
+        folder.parts(|part| parts.push(part.columns)).unwrap();
+        assert_eq!(parts, [cells()]);
         assert!(folder.results().unwrap_err().cause().contains("not done"));
         folder.complete(&cells(), &cells()).unwrap();
         let again = Folder::open(&path).unwrap();

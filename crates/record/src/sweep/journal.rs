@@ -38,15 +38,16 @@ pub struct Journal {
 }
 
 impl Journal {
-    /// Opens the journal at `path`, or makes it, and takes away half a line at its end. The second
-    /// value has its entries.
+    /// Opens the journal at `path`, or makes it, takes away half a line at its end, and hands
+    /// over its entries one by one.
     ///
     /// # Errors
     /// When another process writes it, it is damaged, or another version of the program wrote it.
     pub fn open<T: DeserializeOwned>(
         path: &Path,
         program_version: &str,
-    ) -> Result<(Self, Vec<T>), InputError> {
+        each: impl FnMut(T),
+    ) -> Result<Self, InputError> {
         let failed = |e: std::io::Error| {
             let remedy = "make the folder writable, and see that the disk has space";
             InputError::new(path.display(), e.to_string(), remedy)
@@ -54,7 +55,7 @@ impl Journal {
         let file = OpenOptions::new().read(true).append(true).create(true).open(path);
         let file = file.map_err(failed)?;
         lock(&file, path)?;
-        let Content { entries, length } = content(path, program_version)?;
+        let length = whole_lines(path, program_version, each)?;
         file.set_len(length).map_err(failed)?;
         let mut journal = Self { path: path.to_path_buf(), file, length, synced: Instant::now() };
         journal.file.seek(SeekFrom::End(0)).map_err(failed)?;
@@ -65,7 +66,7 @@ impl Journal {
                 .and_then(|()| journal.sync())
                 .map_err(|e| InputError::new(e.place, e.cause, "make room on the disk"))?;
         }
-        Ok((journal, entries))
+        Ok(journal)
     }
 
     /// Appends an entry. When this returns, no kill of the process can lose it.
@@ -111,55 +112,50 @@ fn line(entry: &impl Serialize) -> serde_json::Result<String> {
     Ok(format!("{:08x} {json}\n", crc32fast::hash(json.as_bytes())))
 }
 
-/// Reads the entries of the journal at `path`, which may be growing: up to the last whole line.
+/// Hands over the entries of the journal at `path`, which may be growing: up to the last whole line.
 ///
 /// # Errors
 /// When it cannot be read, is damaged, or another version of the program wrote it.
 pub fn read_journal<T: DeserializeOwned>(
     path: &Path,
     program_version: &str,
-) -> Result<Vec<T>, InputError> {
-    Ok(content(path, program_version)?.entries)
+    each: impl FnMut(T),
+) -> Result<(), InputError> {
+    whole_lines(path, program_version, each).map(drop)
 }
 
-struct Content<T> {
-    entries: Vec<T>,
-    /// Bytes of whole lines.
-    length: u64,
-}
-
-fn content<T: DeserializeOwned>(
+/// Hands over the entries, and returns the bytes of whole lines.
+fn whole_lines<T: DeserializeOwned>(
     path: &Path,
     program_version: &str,
-) -> Result<Content<T>, InputError> {
+    mut each: impl FnMut(T),
+) -> Result<u64, InputError> {
     let damaged = |line: usize, cause: String| {
         let remedy = "the file is damaged: delete it, and its runs are made again";
         InputError::new(path.display(), cause, remedy).at(line, 1)
     };
     let file = File::open(path).map_err(|e| damaged(1, e.to_string()))?;
-    let mut content = Content { entries: Vec::new(), length: 0 };
     let mut reader = BufReader::new(file);
-    let (mut bytes, mut number) = (Vec::new(), 0);
-    loop {
+    let (mut bytes, mut length) = (Vec::new(), 0);
+    for number in 1.. {
         bytes.clear();
         let n = reader.read_until(b'\n', &mut bytes).map_err(|e| damaged(number, e.to_string()))?;
-        number += 1;
         let Some(json) = json(&bytes) else {
             // Half a line is what a kill leaves, at the end and nowhere else.
             let is_last = reader.fill_buf().is_ok_and(<[u8]>::is_empty);
             if is_last {
-                return Ok(content);
+                break;
             }
             return Err(damaged(number, "the line does not match its checksum".into()));
         };
         if number == 1 {
             check_head(path, json, program_version)?;
         } else {
-            let entry = serde_json::from_slice(json).map_err(|e| damaged(number, e.to_string()))?;
-            content.entries.push(entry);
+            each(serde_json::from_slice(json).map_err(|e| damaged(number, e.to_string()))?);
         }
-        content.length += n as u64;
+        length += n as u64;
     }
+    Ok(length)
 }
 
 /// The text of a line that is whole.
@@ -190,7 +186,13 @@ mod tests {
     use super::*;
 
     fn opened(path: &Path) -> (Journal, Vec<u32>) {
-        Journal::open(path, "0.1.0").unwrap()
+        let mut entries = Vec::new();
+        let journal = Journal::open(path, "0.1.0", |n| entries.push(n)).unwrap();
+        (journal, entries)
+    }
+
+    fn refused(path: &Path, program_version: &str) -> InputError {
+        Journal::open::<u32>(path, program_version, |_| ()).unwrap_err()
     }
 
     #[test]
@@ -211,7 +213,8 @@ mod tests {
             assert_eq!(entries, kept, "cut at {cut}");
             journal.append(&77u32).unwrap();
             drop(journal);
-            let all: Vec<u32> = read_journal(&path, "0.1.0").unwrap();
+            let mut all: Vec<u32> = Vec::new();
+            read_journal(&path, "0.1.0", |n| all.push(n)).unwrap();
             assert_eq!(all, [kept, vec![77]].concat(), "cut at {cut}");
         }
     }
@@ -225,7 +228,7 @@ mod tests {
         drop(journal);
         let changed = std::fs::read_to_string(&path).unwrap().replace(" 1\n", " 7\n");
         std::fs::write(&path, changed).unwrap();
-        let error = Journal::open::<u32>(&path, "0.1.0").unwrap_err();
+        let error = refused(&path, "0.1.0");
         assert_eq!(error.position(), Some((3, 1)), "{error}");
     }
 
@@ -234,10 +237,10 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("j");
         let journal = opened(&path);
-        let error = Journal::open::<u32>(&path, "0.1.0").unwrap_err();
+        let error = refused(&path, "0.1.0");
         assert!(error.cause().contains("another process"), "{error}");
         drop(journal);
-        let error = Journal::open::<u32>(&path, "0.2.0").unwrap_err();
+        let error = refused(&path, "0.2.0");
         assert!(error.cause().contains("sidestep 0.1.0"), "{error}");
     }
 }

@@ -32,28 +32,36 @@ pub struct Outcome {
     pub costs: Map<String, Value>,
 }
 
-/// Runs a cell of the variant `source` to its end on `workers` workers; `None` as soon as `go_on`
-/// says so.
+/// A cell's simulation.
+pub struct Started {
+    cell: Cell,
+    simulation: Box<dyn Simulation>,
+    until: Cycle,
+}
+
+/// The simulation of a cell of the variant `source`, at its start.
 ///
 /// # Errors
 /// When the scenario is wrong with this seed.
-pub fn run(
-    cell: Cell,
-    source: &Source,
-    workers: usize,
-    go_on: &dyn Fn() -> bool,
-) -> Result<Option<Outcome>, InputError> {
+pub fn start(cell: Cell, source: &Source, workers: usize) -> Result<Started, InputError> {
     let source = source.clone().with(&[format!("seed={}", cell.seed)])?;
     let compiled = AnyCompiled::new(&source)?;
     let until = compiled.plan().cycles;
-    let mut simulation = compiled.start(&source, workers);
-    while simulation.cycle() < until && !simulation.is_over() {
-        if !go_on() {
-            return Ok(None);
+    Ok(Started { cell, simulation: compiled.start(&source, workers), until })
+}
+
+impl Started {
+    /// Runs to the end; `None` as soon as `go_on` says no.
+    pub fn run(mut self, go_on: &dyn Fn() -> bool) -> Option<Outcome> {
+        let simulation = self.simulation.as_mut();
+        while simulation.cycle() < self.until && !simulation.is_over() {
+            if !go_on() {
+                return None;
+            }
+            simulation.advance(SLICE.min(self.until - simulation.cycle()));
         }
-        simulation.advance(SLICE.min(until - simulation.cycle()));
+        Some(Outcome::of(self.cell, simulation))
     }
-    Ok(Some(Outcome::of(cell, simulation.as_ref())))
 }
 
 impl Outcome {
@@ -128,7 +136,8 @@ mod tests {
 
     fn outcome(text: &str, seed: u64, workers: usize) -> Outcome {
         let source = Source::new("s.toml", text, "");
-        run(cell(seed), &source, workers, &|| true).expect("valid").expect("not stopped")
+        let started = start(cell(seed), &source, workers).expect("valid");
+        started.run(&|| true).expect("not stopped")
     }
 
     #[test]
@@ -152,7 +161,7 @@ mod tests {
     #[test]
     fn a_run_that_is_to_stop_is_no_row() {
         let source = Source::new("s.toml", ROBOTS, "");
-        assert_eq!(run(cell(1), &source, 1, &|| false), Ok(None));
+        assert_eq!(start(cell(1), &source, 1).expect("valid").run(&|| false), None);
     }
 
     #[test]

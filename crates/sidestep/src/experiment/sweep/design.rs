@@ -21,6 +21,21 @@ pub struct Setting {
 }
 
 impl Setting {
+    /// Parses `key=value`, where the value is TOML, or else text.
+    ///
+    /// # Errors
+    /// Without `=` or key.
+    pub fn parse(text: &str) -> Result<Self, InputError> {
+        let remedy = "write key=value, e.g. robots.count=20";
+        let wrong = |cause: &str| InputError::new(text, cause, remedy);
+        let (key, value) = text.split_once('=').ok_or_else(|| wrong("there is no `=`"))?;
+        let key = key.trim();
+        if key.split('.').any(str::is_empty) {
+            return Err(wrong("a part of the key is empty"));
+        }
+        Ok(Self { key: key.into(), value: parse_value(value.trim()) })
+    }
+
     /// As an override of a scenario, see [`Source::with`](crate::scenario::Source::with).
     pub fn to_override(&self) -> String {
         format!("{}={}", self.key, self.value)
@@ -65,11 +80,14 @@ fn parse_values(text: &str) -> Vec<Value> {
     {
         return values.clone();
     }
-    let one = |word: &str| match format!("v = {word}").parse::<toml::Table>() {
-        Ok(table) => table["v"].clone(),
-        Err(_) => Value::String(word.into()),
-    };
-    text.split(',').map(|word| one(word.trim())).collect()
+    text.split(',').map(|word| parse_value(word.trim())).collect()
+}
+
+/// A TOML value, else a word.
+fn parse_value(word: &str) -> Value {
+    let table = format!("v = {word}").parse::<toml::Table>().ok();
+    let only = table.filter(|t| t.len() == 1).and_then(|mut t| t.remove("v"));
+    only.unwrap_or_else(|| Value::String(word.into()))
 }
 
 /// Samples that fill a box evenly: of each range every n-th part is met once (McKay, Beckman,

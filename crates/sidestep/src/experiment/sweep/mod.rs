@@ -17,7 +17,7 @@ pub mod design;
 pub mod file;
 pub mod plan;
 
-pub use cell::{Outcome, run};
+pub use cell::{Outcome, Started, start};
 pub use design::{Design, Factor, Hypercube, Range, Setting};
 pub use file::{Sweep, Until};
 pub use plan::{Cell, Plan, Shard, Variant};
