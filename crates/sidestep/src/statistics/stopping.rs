@@ -9,13 +9,21 @@
 //! no look before [`StoppingRule::min_runs`], looks only at the ends of rounds, and rounds that
 //! grow by at least a half and at most to twice of what has been run, towards the number that
 //! the present spread predicts, so that there are few looks. Measured by the tests of this
-//! module, nominal 95 %, first look at 10 runs:
+//! module over 4,000 sweeps each (standard error 0.4 %), nominal 95 %:
 //!
-//! | values | target | coverage |
-//! |---|---|---|
-//! | normal | half-width of a quarter sd, absolute | MEASURED_A |
-//! | normal, mean 10 sd | 2 % of the mean | MEASURED_B |
-//! | exponential | 20 % of the mean | MEASURED_C |
+//! | values | target | first look | runs | coverage |
+//! |---|---|---|---|---|
+//! | normal | a quarter sd | 10 | 76 | 94.7 % |
+//! | normal | half an sd | 10 | 21 | 93.8 % |
+//! | normal, mean 10 sd | 2 % of the mean | 10 | 117 | 94.4 % |
+//! | exponential | 20 % of the mean | 10 | 117 | 94.8 % |
+//! | exponential | 50 % of the mean | 10 | 20 | 90.4 % |
+//! | exponential | 50 % of the mean | 20 | 23 | 91.7 % |
+//! | exponential | none, 20 runs | | 20 | 91.7 % |
+//! | exponential | none, 100 runs | | 100 | 95.0 % |
+//!
+//! So the loss is small, and what is lost with few runs of skewed values is lost without any
+//! stopping too: 20 runs are few. A first round of 20 costs little.
 //!
 //! Where that matters, take a larger first round, or run a fixed number of runs.
 
