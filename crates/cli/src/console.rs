@@ -20,6 +20,11 @@ impl Console {
         Self { json, quiet }
     }
 
+    /// A console for nobody: what is part of something larger.
+    pub(crate) fn silent() -> Self {
+        Self { json: false, quiet: true }
+    }
+
     /// Whether progress may be shown: to a person who has not asked for silence.
     pub(crate) fn shows_progress(self) -> bool {
         !self.quiet && std::io::stderr().is_terminal()

@@ -4,6 +4,7 @@
 //! args.rs      what can be typed                commands/*.rs   one file per command
 //! plan.rs      scenario + options -> a run      worlds/         the only place that knows worlds
 //! driver.rs    advances, records, checkpoints   report.rs       what a run says at its end
+//! sweep/       many runs of one scenario                  recording.rs    a run folder that grows
 //! exit.rs      how the command ends             console.rs      what it prints, and where
 //! ```
 
@@ -20,6 +21,7 @@ mod progress;
 mod recorded;
 mod recording;
 mod report;
+mod sweep;
 mod worlds;
 
 use clap::Parser;

@@ -57,12 +57,7 @@ impl ScenarioArgs {
     /// When anything in it is wrong.
     pub(crate) fn compile(&self) -> Result<(Source, Compiled), InputError> {
         let overrides = self.all_overrides();
-        let source = match worlds::translated(&self.file)? {
-            Some(text) => {
-                Source::new(self.file.display().to_string(), text, "").with(&overrides)?
-            }
-            None => Source::read(&self.file, &overrides)?,
-        };
+        let source = source_of(&self.file, &overrides)?;
         match Compiled::new(&source) {
             Ok(compiled) => Ok((source, compiled)),
             Err(error) if overrides.is_empty() => Err(error),
@@ -72,12 +67,28 @@ impl ScenarioArgs {
 
     /// `--set` first, so that the options of their own win.
     fn all_overrides(&self) -> Vec<String> {
+        let mut all = self.settings();
+        all.extend(self.seed.map(|seed| format!("seed={seed}")));
+        all
+    }
+
+    /// All overrides but for the seed.
+    pub(crate) fn settings(&self) -> Vec<String> {
         let mut all = self.overrides.clone();
-        let number = |key: &str, value: Option<u64>| value.map(|v| format!("{key}={v}"));
-        all.extend(number("cycles", self.cycles));
-        all.extend(number("seed", self.seed));
+        all.extend(self.cycles.map(|cycles| format!("cycles={cycles}")));
         all.extend(self.regime.as_ref().map(|r| format!("regime=\"{r}\"")));
         all
+    }
+}
+
+/// The scenario in a file, or that a file of another form stands for, with overrides.
+///
+/// # Errors
+/// When it cannot be read, or an override does not fit.
+pub(crate) fn source_of(file: &Path, overrides: &[String]) -> Result<Source, InputError> {
+    match worlds::translated(file)? {
+        Some(text) => Source::new(file.display().to_string(), text, "").with(overrides),
+        None => Source::read(file, overrides),
     }
 }
 

@@ -6,7 +6,7 @@ use std::fmt::Write;
 
 use crate::console::{Console, grouped};
 
-/// How far a run is.
+/// How far a run is, or many of them.
 #[derive(Debug)]
 pub(crate) struct Progress(ProgressBar);
 
@@ -22,9 +22,22 @@ impl Progress {
         Self(bar)
     }
 
-    /// Shows that `cycle` cycles are done.
-    pub(crate) fn at(&self, cycle: Cycle) {
-        self.0.set_position(cycle);
+    /// A bar of runs, of which `before` were done before.
+    pub(crate) fn of_runs(console: Console, before: u64, all: u64) -> Self {
+        let bar = bar(console, all);
+        bar.set_style(
+            ProgressStyle::with_template("{bar:30} {pos} of {len} runs  {eta} left")
+                .unwrap_or_else(|_| ProgressStyle::default_bar()),
+        );
+        bar.set_position(before);
+        bar.reset_elapsed();
+        bar.reset_eta();
+        Self(bar)
+    }
+
+    /// Shows that so many cycles (or runs) are done.
+    pub(crate) fn at(&self, done: u64) {
+        self.0.set_position(done);
     }
 
     /// Takes the bar away.

@@ -24,6 +24,25 @@ pub(super) struct Journey {
     pub(super) told: Option<Told>,
 }
 
+/// Goes to the end of a recorded run and stores all that belongs to it; whether it got there.
+///
+/// # Errors
+/// When something cannot be stored.
+pub(crate) fn recorded_run(
+    run: &mut dyn Run,
+    mut recording: Recording,
+    workers: usize,
+    console: Console,
+) -> Result<bool, Failure> {
+    let until = run.plan().cycles;
+    let effort = drive_guarded(run, until, Some(&mut recording), console)?;
+    let folder = recording.folder().path().to_path_buf();
+    let cost = Cost { workers, effort, recording: recording.took() };
+    let summary = Summary::new(run, cost, Some(&folder));
+    store(run, recording, &summary, console)?;
+    Ok(summary.status() == Status::Complete)
+}
+
 /// Goes to the end (or until Ctrl-C), stores and prints the report.
 ///
 /// # Errors

@@ -4,7 +4,7 @@ mod arm;
 mod check;
 mod compare;
 mod exact;
-mod finish;
+pub(crate) mod finish;
 mod fk;
 mod ik;
 mod learn;
@@ -14,6 +14,7 @@ mod replay;
 mod reproduce;
 mod resume;
 mod run;
+mod sweep;
 
 use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
@@ -34,13 +35,15 @@ pub(crate) enum Command {
     Learn(learn::LearnArgs),
     /// Compute the exact Markov chain of a scenario with one robot
     Exact(exact::ExactArgs),
+    /// Run many variants of a scenario, each with many seeds, and sum them up
+    Sweep(sweep::SweepArgs),
     /// Run methods of avoiding each other on the same traffic
     Compare(compare::CompareArgs),
     /// Compute where a robot arm's tip and connectors are
     Fk(fk::FkArgs),
     /// Compute joint values that bring a robot arm's tip to a target
     Ik(ik::IkArgs),
-    /// Continue a recorded run that was stopped or killed
+    /// Continue a recorded run or a sweep that was stopped or killed
     Resume(resume::ResumeArgs),
     /// Run a paper's experiments anew and judge its claims
     Reproduce(reproduce::ReproduceArgs),
@@ -60,6 +63,7 @@ pub(crate) fn execute(command: Command, console: &Console) -> Result<ExitCode, F
         Command::Map(args) => map::map(&args, *console),
         Command::Learn(args) => learn::learn(&args, *console),
         Command::Exact(args) => exact::exact(&args, *console),
+        Command::Sweep(args) => sweep::sweep(&args, *console),
         Command::Compare(args) => compare::compare(&args, *console),
         Command::Fk(args) => fk::fk(&args, *console),
         Command::Ik(args) => ik::ik(&args, *console),

@@ -6,6 +6,7 @@ use crate::exit::{ExitCode, Failure};
 use crate::interrupt;
 use crate::plan::WorkersArg;
 use crate::recording::{Recording, restore};
+use crate::sweep::{Folder, go_on};
 use crate::worlds::Compiled;
 use clap::Args;
 use sidestep::kernel::{Cycle, InputError};
@@ -16,16 +17,17 @@ use std::path::{Path, PathBuf};
 const EXAMPLES: &str = "\
 Examples:
   sidestep resume runs/office
+  sidestep resume sweeps/methods
   sidestep resume runs/office --workers 8
   sidestep resume runs/office --cycles 20000     go on to cycle 20000 only, still incomplete
 
 The result has the same digest and the same rows as a run in one go.";
 
-/// Continue a recorded run that was stopped or killed.
+/// Continue a recorded run or a sweep that was stopped or killed.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct ResumeArgs {
-    /// The run folder
+    /// The folder of a run or a sweep
     #[arg(value_name = "DIR")]
     folder: PathBuf,
 
@@ -42,6 +44,9 @@ pub(crate) struct ResumeArgs {
 /// # Errors
 /// When the folder holds no run that can be continued, or results cannot be stored.
 pub(crate) fn resume(args: &ResumeArgs, console: Console) -> Result<ExitCode, Failure> {
+    if Folder::is_at(&args.folder) {
+        return resume_sweep(args, console);
+    }
     let (folder, point) = RunFolder::resume(&args.folder)?;
     let workers = args.workers.count();
     let source = Source::new(scenario_place(&args.folder), folder.scenario(), &args.folder);
@@ -52,6 +57,19 @@ pub(crate) fn resume(args: &ResumeArgs, console: Console) -> Result<ExitCode, Fa
     console.note(format!("Continuing {} at cycle {}", args.folder.display(), grouped(run.cycle())));
     let recording = Some(Recording::begin(folder, run.as_mut())?);
     travel(Journey { run, recording, workers, until: args.cycles, told: None }, console)
+}
+
+fn resume_sweep(args: &ResumeArgs, console: Console) -> Result<ExitCode, Failure> {
+    if args.cycles.is_some() {
+        let remedy = "leave --cycles out: the runs of a sweep go to their ends";
+        return Err(InputError::new("--cycles", "this is the folder of a sweep", remedy).into());
+    }
+    let folder = Folder::open(&args.folder)?;
+    if folder.is_complete() {
+        let remedy = "read results.parquet, or see `sidestep report DIR`";
+        return Err(InputError::new(args.folder.display(), "the sweep is done", remedy).into());
+    }
+    go_on(&folder, args.workers.count(), console)
 }
 
 /// How errors name a run folder's scenario.

@@ -1,11 +1,13 @@
 //! `sidestep run`: scenario -> cycles -> report.
 
 use super::finish::{Journey, travel};
+use super::sweep::many_runs;
 use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
 use crate::interrupt;
 use crate::plan::{ScenarioArgs, WorkersArg};
 use crate::recording::Recording;
+use crate::sweep::ManyArgs;
 use crate::worlds::{self, Compiled, Run};
 use clap::Args;
 use sidestep::scenario::Source;
@@ -17,6 +19,7 @@ Examples:
   sidestep run scenarios/robots/office.toml --out runs/office
   sidestep run office.toml --cycles 50000 --seed 7 --workers 4
   sidestep run office.toml --regime sensors --set robots.0.count=40 --set map.box_size_m=0.2
+  sidestep run office.toml --replicate 100 --vary regime=reliable,both   see `sidestep sweep`
   sidestep run office.toml --json | jq .metrics.contacts
   sidestep run tracks.csv                                   replay recorded traffic
   sidestep run tracks.csv --set airspace.replay_until_s=600 fly it anew from then on
@@ -30,6 +33,9 @@ trajectories/ and events/ (Parquet), trajectories.svg and .png, and a checkpoint
 pub(crate) struct RunArgs {
     #[command(flatten)]
     scenario: ScenarioArgs,
+
+    #[command(flatten)]
+    many: ManyArgs,
 
     #[command(flatten)]
     workers: WorkersArg,
@@ -48,6 +54,10 @@ pub(crate) struct RunArgs {
 /// # Errors
 /// When the scenario or the folder is wrong, or results cannot be stored.
 pub(crate) fn run(args: &RunArgs, console: Console) -> Result<ExitCode, Failure> {
+    if args.many.is_asked() {
+        let workers = args.workers.count();
+        return many_runs(&args.scenario, &args.many, args.out.as_ref(), workers, console);
+    }
     let (source, compiled) = args.scenario.compile()?;
     let told = worlds::told_of(&args.scenario.file)?;
     let workers = args.workers.count();

@@ -6,6 +6,7 @@
 //! least_squares.rs   linear models fitted to measurements
 //! claim.rs           a paper's claims, each with a verdict
 //! figure.rs          what to draw and what to print, as plain data
+//! sweep/             a table of many runs summed up: intervals, comparisons, effects
 //! methods.rs         methods of the airspace world on the same traffic
 //! agentfly.rs        the experiments of the airspace world's source paper
 //! loria/             the experiments of the robots world's source paper

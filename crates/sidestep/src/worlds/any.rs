@@ -51,6 +51,15 @@ impl AnyCompiled {
         }
     }
 
+    /// Name of its world.
+    pub fn world(&self) -> &'static str {
+        match self {
+            Self::Robots(_) => NAMES[0],
+            Self::Airspace(_) => NAMES[1],
+            Self::Chain(_) => NAMES[2],
+        }
+    }
+
     /// What the scenario asks for.
     pub fn plan(&self) -> Plan {
         use chain::scenario::AnyCompiled::{Plane, Space};

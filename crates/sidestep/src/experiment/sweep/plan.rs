@@ -33,6 +33,8 @@ pub struct Plan {
     pub baseline: Option<u32>,
     /// Agents of the largest variant.
     pub agents: u64,
+    /// Whether every run is recorded to a folder of its own.
+    pub record: bool,
 }
 
 /// One variant of the scenario.
@@ -112,6 +114,7 @@ impl Plan {
             metrics: sweep.metrics.clone(),
             baseline,
             agents: 0,
+            record: sweep.record,
         })
     }
 

@@ -1,13 +1,11 @@
-//! Intervals, moments and tests with which every reported number is qualified.
-//!
-//! Intervals are two-sided at 95 % unless a function says otherwise. Nothing here draws
-//! random numbers.
+//! Intervals of shares and of means.
 
+use super::moments::{mean, sample_sd};
 use serde::Serialize;
-use statrs::distribution::{Beta, ChiSquared, ContinuousCDF, StudentsT};
+use statrs::distribution::{Beta, ContinuousCDF, StudentsT};
 
 /// The 0.975 quantile of the standard normal distribution.
-const Z_975: f64 = 1.959_963_984_540_054;
+pub(super) const Z_975: f64 = 1.959_963_984_540_054;
 
 /// A closed interval; written as `[low, high]`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -25,7 +23,12 @@ impl Interval {
         self.low <= value && value <= self.high
     }
 
-    fn around(center: f64, half_width: f64) -> Self {
+    /// Half the distance of its ends.
+    pub fn half_width(&self) -> f64 {
+        0.5 * self.high - 0.5 * self.low
+    }
+
+    pub(super) fn around(center: f64, half_width: f64) -> Self {
         Self { low: center - half_width, high: center + half_width }
     }
 }
@@ -74,31 +77,36 @@ pub fn clopper_pearson(successes: u64, n: u64) -> Interval {
     }
 }
 
-/// Arithmetic mean; `None` of nothing.
-pub fn mean(values: &[f64]) -> Option<f64> {
-    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
-}
-
-/// Standard deviation of a sample (divisor `n - 1`); `None` of fewer than two values.
-pub fn sample_sd(values: &[f64]) -> Option<f64> {
-    let squares = sum_of_squares(values)?;
-    (values.len() > 1).then(|| (squares / (values.len() - 1) as f64).sqrt())
-}
-
-/// Sum of squared deviations from the mean; `None` of nothing.
-fn sum_of_squares(values: &[f64]) -> Option<f64> {
-    let center = mean(values)?;
-    Some(values.iter().map(|v| (v - center) * (v - center)).sum())
+/// The 0.975 quantile of Student's t with this freedom, at least 1.
+///
+/// From 100 on by its expansion around the normal's (Abramowitz and Stegun 26.7.5), right to
+/// 1e-9 there; the library's inverse stops too early and is 7e-6 off at 100,000.
+pub(super) fn student_t(freedom: usize) -> f64 {
+    let n = freedom.max(1) as f64;
+    if freedom < 100 {
+        return StudentsT::new(0.0, 1.0, n).expect("positive freedom").inverse_cdf(0.975);
+    }
+    let (z, z2) = (Z_975, Z_975 * Z_975);
+    let terms = [
+        (z2 + 1.0) / 4.0,
+        ((5.0 * z2 + 16.0) * z2 + 3.0) / 96.0,
+        (((3.0 * z2 + 19.0) * z2 + 17.0) * z2 - 15.0) / 384.0,
+        ((((79.0 * z2 + 776.0) * z2 + 1482.0) * z2 - 1920.0) * z2 - 945.0) / 92_160.0,
+    ];
+    z * (1.0 + terms.iter().rev().fold(0.0, |rest, term| (rest + term) / n))
 }
 
 /// Student's 95 % interval for the mean of independent, roughly normal values.
 ///
-/// `None` of fewer than two values.
+/// `None` of fewer than two values, and where some value is not finite. An end past the largest
+/// number is infinite.
 pub fn mean_interval(values: &[f64]) -> Option<Interval> {
-    let n = values.len() as f64;
+    if !values.iter().all(|v| v.is_finite()) {
+        return None;
+    }
     let (center, sd) = (mean(values)?, sample_sd(values)?);
-    let t = StudentsT::new(0.0, 1.0, n - 1.0).expect("positive freedom").inverse_cdf(0.975);
-    Some(Interval::around(center, t * sd / n.sqrt()))
+    let t = student_t(values.len() - 1);
+    Some(Interval::around(center, t * (sd / (values.len() as f64).sqrt())))
 }
 
 /// Student's 95 % interval for the mean of `a[i] - b[i]`: two treatments of the same cases.
@@ -113,73 +121,33 @@ pub fn paired_difference(a: &[f64], b: &[f64]) -> Option<Interval> {
     mean_interval(&differences)
 }
 
-/// The value below which a fraction `q` of `sorted` lies, between two order statistics by
-/// linear interpolation (type 7 of Hyndman and Fan); `None` of nothing.
-pub fn percentile(sorted: &[f64], q: f64) -> Option<f64> {
-    let last = sorted.len().checked_sub(1)?;
-    let position = q.clamp(0.0, 1.0) * last as f64;
-    let below = position.floor() as usize;
-    let above = (below + 1).min(last);
-    Some(sorted[below] + (position - below as f64) * (sorted[above] - sorted[below]))
-}
-
-/// Probability of a chi-square statistic at least this large when the model holds.
+/// The smallest number of runs whose mean is expected to have an interval of at most
+/// `half_width` to either side, if runs vary by `sd`: `t(n - 1) * sd / sqrt(n) <= half_width`.
 ///
-/// Without freedom nothing can deviate: 1.
-pub fn chi_square_p(statistic: f64, degrees_of_freedom: usize) -> f64 {
-    if degrees_of_freedom == 0 {
-        return 1.0;
+/// An expectation, not a promise: `sd` is itself estimated, and at this number about half of
+/// all samples are a little wider. `None` where no number of runs (below 2^53) would do.
+pub fn runs_for_half_width(sd: f64, half_width: f64) -> Option<u64> {
+    if !(sd >= 0.0 && sd.is_finite() && half_width >= 0.0) {
+        return None;
     }
-    let law = ChiSquared::new(degrees_of_freedom as f64).expect("positive freedom");
-    law.sf(statistic.max(0.0))
-}
-
-/// Size, mean, spread and percentiles of a set of measurements, in their unit.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Moments {
-    /// Number of values.
-    pub n: usize,
-    /// Arithmetic mean.
-    pub mean: f64,
-    /// Standard deviation of these very values (divisor `n`).
-    pub sd: f64,
-    /// 1st percentile.
-    pub p01: f64,
-    /// 5th percentile.
-    pub p05: f64,
-    /// Median.
-    pub p50: f64,
-    /// 95th percentile.
-    pub p95: f64,
-    /// 99th percentile.
-    pub p99: f64,
-}
-
-impl Moments {
-    /// The moments of `values`; `None` of nothing.
-    pub fn of(values: impl IntoIterator<Item = f64>) -> Option<Self> {
-        let mut sorted: Vec<f64> = values.into_iter().collect();
-        sorted.sort_by(f64::total_cmp);
-        Some(Self {
-            n: sorted.len(),
-            mean: mean(&sorted)?,
-            sd: (sum_of_squares(&sorted)? / sorted.len() as f64).sqrt(),
-            p01: percentile(&sorted, 0.01)?,
-            p05: percentile(&sorted, 0.05)?,
-            p50: percentile(&sorted, 0.50)?,
-            p95: percentile(&sorted, 0.95)?,
-            p99: percentile(&sorted, 0.99)?,
-        })
+    let enough = |n: u64| student_t(n as usize - 1) * sd <= half_width * (n as f64).sqrt();
+    let mut high = 2_u64;
+    while !enough(high) {
+        high = high.checked_mul(2).filter(|n| *n < 1 << 53)?;
     }
+    let mut low = high / 2;
+    while high - low > 1 {
+        let middle = low + (high - low) / 2;
+        if enough(middle) { high = middle } else { low = middle }
+    }
+    Some(high)
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::testing::close;
     use super::*;
-
-    fn close(a: f64, b: f64, tolerance: f64) {
-        assert!((a - b).abs() <= tolerance, "{a} is not {b}");
-    }
+    use proptest::prelude::*;
 
     #[test]
     fn wilson_gives_the_published_interval() {
@@ -209,6 +177,25 @@ mod tests {
     }
 
     #[test]
+    fn students_quantiles_are_those_of_the_tables() {
+        // Abramowitz and Stegun, table 26.10; R: qt(0.975, c(1, 2, 4, 9, 29, 120)).
+        let table = [
+            (1, 12.706_205),
+            (2, 4.302_653),
+            (4, 2.776_445),
+            (9, 2.262_157),
+            (29, 2.045_230),
+            (120, 1.979_930),
+        ];
+        table.iter().for_each(|&(freedom, t)| close(student_t(freedom), t, 1e-6));
+        // The library's inverse and the expansion meet: R gives qt(0.975, 99:100).
+        close(student_t(99), 1.984_216_95, 2e-8);
+        close(student_t(100), 1.983_971_52, 2e-8);
+        close(student_t(100_000), 1.959_987_71, 1e-8);
+        close(student_t(usize::MAX), Z_975, 1e-12);
+    }
+
+    #[test]
     fn the_mean_of_five_values_has_students_interval() {
         // t(4, 0.975) = 2.776445; sd = sqrt(2.5).
         let interval = mean_interval(&[1.0, 2.0, 3.0, 4.0, 5.0]).unwrap();
@@ -216,6 +203,11 @@ mod tests {
         close(3.0 - interval.low, interval.high - 3.0, 1e-12);
         assert_eq!(mean_interval(&[1.0]), None);
         assert_eq!(mean_interval(&[2.0, 2.0]), Some(Interval { low: 2.0, high: 2.0 }));
+        assert_eq!(mean_interval(&[0.1; 7]), Some(Interval { low: 0.1, high: 0.1 }));
+        assert_eq!(mean_interval(&[1.0, f64::NAN, 2.0]), None);
+        assert_eq!(mean_interval(&[1.0, f64::INFINITY]), None);
+        let huge = mean_interval(&[f64::MAX, -f64::MAX]).unwrap();
+        assert_eq!((huge.low, huge.high), (f64::NEG_INFINITY, f64::INFINITY));
     }
 
     #[test]
@@ -225,29 +217,38 @@ mod tests {
     }
 
     #[test]
-    fn chi_square_tails_match_the_tables() {
-        close(chi_square_p(3.841_459, 1), 0.05, 1e-7);
-        close(chi_square_p(18.307_038, 10), 0.05, 1e-7);
-        close(chi_square_p(1000.0, 2), 0.0, 1e-100);
-        assert_eq!(chi_square_p(5.0, 0), 1.0);
-    }
-
-    #[test]
-    fn percentiles_interpolate_between_order_statistics() {
-        let sorted = [1.0, 2.0, 4.0];
-        assert_eq!(percentile(&sorted, 0.25), Some(1.5));
-        assert_eq!(percentile(&sorted, 1.0), Some(4.0));
-        assert_eq!(percentile(&[], 0.5), None);
-        let moments = Moments::of([4.0, 1.0, 2.0]).unwrap();
-        assert_eq!((moments.n, moments.p50), (3, 2.0));
-        close(moments.sd, (14.0_f64 / 9.0).sqrt(), 1e-12);
-        close(sample_sd(&[4.0, 1.0, 2.0]).unwrap(), (7.0_f64 / 3.0).sqrt(), 1e-12);
-        assert!(Moments::of([]).is_none());
+    fn the_number_of_runs_for_a_half_width_is_the_smallest() {
+        // t(17, 0.975) = 2.109816, / sqrt(18) = 0.4973; t(16) / sqrt(17) = 0.5142.
+        assert_eq!(runs_for_half_width(1.0, 0.5), Some(18));
+        assert_eq!(runs_for_half_width(0.0, 0.0), Some(2));
+        assert_eq!(runs_for_half_width(1.0, 0.0), None);
+        assert_eq!(runs_for_half_width(f64::NAN, 1.0), None);
+        assert_eq!(runs_for_half_width(1.0, f64::NAN), None);
+        assert_eq!(runs_for_half_width(1.0, 0.01).unwrap(), 38_418);
     }
 
     #[test]
     fn an_interval_is_written_as_a_pair() {
         let written = serde_json::to_string(&Interval { low: 0.25, high: 0.5 }).unwrap();
         assert_eq!(written, "[0.25,0.5]");
+    }
+
+    proptest! {
+        #[test]
+        fn students_interval_holds_the_mean_and_never_panics(
+            values in prop::collection::vec(prop::num::f64::ANY, 0..12),
+        ) {
+            if let Some(interval) = mean_interval(&values) {
+                prop_assert!(interval.contains(mean(&values).unwrap()));
+            }
+        }
+
+        #[test]
+        fn one_run_less_would_not_do(sd in 0.01_f64..100.0, half_width in 0.05_f64..100.0) {
+            let n = runs_for_half_width(sd, half_width).unwrap();
+            let width = |n: u64| student_t(n as usize - 1) * sd / (n as f64).sqrt();
+            prop_assert!(width(n) <= half_width * (1.0 + 1e-12));
+            prop_assert!(n == 2 || width(n - 1) > half_width * (1.0 - 1e-12));
+        }
     }
 }

@@ -1,0 +1,163 @@
+//! `sidestep sweep`: many variants of a scenario, each with many seeds.
+
+use crate::console::{Console, aligned, grouped};
+use crate::exit::{ExitCode, Failure};
+use crate::plan::{ScenarioArgs, WorkersArg};
+use crate::sweep::{self, Folder, ManyArgs};
+use clap::{Args, Subcommand};
+use serde_json::json;
+use sidestep::experiment::sweep::Shard;
+use sidestep::kernel::InputError;
+use std::path::PathBuf;
+
+const EXAMPLES: &str = "\
+Examples:
+  sidestep sweep methods.toml --out sweeps/methods       a sweep file
+  sidestep sweep office.toml --vary robots.0.count=10,20,40 --replicate 20 --out sweeps/office
+  sidestep sweep superconflict.toml --vary airspace.method=none,mvp,pc --baseline airspace.method=none
+  sidestep sweep office.toml --until ci=0.05 --max 1000 --metrics contacts_per_action
+
+On a cluster (docs/clusters.md has a Slurm array and a Kubernetes job):
+  sidestep sweep plan methods.toml --out sweeps/methods
+  sidestep sweep run sweeps/methods --shard 0/8          any scheduler runs 0/8 to 7/8
+  sidestep sweep collect sweeps/methods
+
+A sweep file is TOML: format = 1, scenario = \"FILE\", replicates, [set], [vary], [[variant]],
+[latin_hypercube], [until], metrics, baseline; scenarios/sweeps/ has commented ones. Replicate k of
+every variant has the same seed. DIR/results.parquet has a row a run. The same command again goes
+on where a killed one stopped, as does `sidestep resume DIR`; no finished run is made again.";
+
+/// Run many variants of a scenario, each with many seeds, and sum them up.
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLES, args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+pub(crate) struct SweepArgs {
+    #[command(subcommand)]
+    step: Option<Step>,
+
+    #[command(flatten)]
+    all: Option<AllArgs>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Step {
+    /// Check all variants and write what is to be run
+    Plan(PlanArgs),
+    /// Run a share of a planned sweep
+    Run(ShareArgs),
+    /// Join the shares of a sweep into one table
+    Collect(CollectArgs),
+}
+
+/// A sweep file, or a scenario and options.
+#[derive(Debug, Args)]
+struct AllArgs {
+    #[command(flatten)]
+    scenario: ScenarioArgs,
+
+    #[command(flatten)]
+    many: ManyArgs,
+
+    #[command(flatten)]
+    workers: WorkersArg,
+
+    /// Keep all runs in this folder, which must be new, empty, or hold this very sweep
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+struct PlanArgs {
+    #[command(flatten)]
+    scenario: ScenarioArgs,
+
+    #[command(flatten)]
+    many: ManyArgs,
+
+    /// The sweep's folder, which must be new or empty
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+}
+
+#[derive(Debug, Args)]
+struct ShareArgs {
+    /// The sweep's folder
+    #[arg(value_name = "DIR")]
+    folder: PathBuf,
+
+    /// Run share I of N, I from 0 to N-1
+    #[arg(long, value_name = "I/N")]
+    shard: Shard,
+
+    #[command(flatten)]
+    workers: WorkersArg,
+}
+
+#[derive(Debug, Args)]
+struct CollectArgs {
+    /// The sweep's folder
+    #[arg(value_name = "DIR")]
+    folder: PathBuf,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// When the sweep or a folder is wrong, runs are missing, or results cannot be stored.
+pub(crate) fn sweep(args: &SweepArgs, console: Console) -> Result<ExitCode, Failure> {
+    match (&args.step, &args.all) {
+        (Some(Step::Plan(args)), _) => plan(args, console),
+        (Some(Step::Run(args)), _) => {
+            sweep::share(&Folder::open(&args.folder)?, args.shard, args.workers.count(), console)
+        }
+        (Some(Step::Collect(args)), _) => sweep::collect(&Folder::open(&args.folder)?, console),
+        (None, Some(args)) => {
+            let AllArgs { scenario, many, workers, out } = args;
+            many_runs(scenario, many, out.as_ref(), workers.count(), console)
+        }
+        (None, None) => {
+            let remedy = "name a sweep file or a scenario; see `sidestep sweep --help`";
+            Err(InputError::new("sidestep sweep", "there is nothing to run", remedy).into())
+        }
+    }
+}
+
+/// All runs that a file and options ask for.
+///
+/// # Errors
+/// When the sweep or the folder is wrong, or results cannot be stored.
+pub(super) fn many_runs(
+    scenario: &ScenarioArgs,
+    many: &ManyArgs,
+    out: Option<&PathBuf>,
+    workers: usize,
+    console: Console,
+) -> Result<ExitCode, Failure> {
+    let wanted = many.sweep(scenario)?;
+    match out {
+        None => sweep::in_memory(&wanted, workers, console),
+        Some(out) => sweep::in_folder(&wanted, out, workers, console),
+    }
+}
+
+fn plan(args: &PlanArgs, console: Console) -> Result<ExitCode, Failure> {
+    let folder = sweep::planned(&args.many.sweep(&args.scenario)?, &args.out, console)?;
+    let plan = folder.plan();
+    let json = json!({
+        "folder": args.out,
+        "variants": plan.variants.len(),
+        "replicates": plan.replicates,
+        "cells": plan.len(),
+        "agents": plan.agents,
+    });
+    console.result(&json, || {
+        let dir = args.out.display();
+        let lines = [
+            ("variants", grouped(plan.variants.len() as u64)),
+            ("runs", format!("{} of each, {} in all", plan.replicates, grouped(plan.len()))),
+            ("run them", format!("sidestep sweep run {dir} --shard 0/1")),
+            ("join them", format!("sidestep sweep collect {dir}")),
+        ];
+        aligned(&lines.map(|(name, value)| (name.to_string(), value)))
+    });
+    Ok(ExitCode::Done)
+}

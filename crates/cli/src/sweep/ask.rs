@@ -1,0 +1,83 @@
+//! What was typed -> a sweep.
+
+use crate::plan::ScenarioArgs;
+use clap::Args;
+use sidestep::experiment::sweep::file::MAX_RUNS;
+use sidestep::experiment::sweep::{Factor, Setting, Sweep, Until};
+use sidestep::kernel::InputError;
+
+/// What makes many runs of one.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Many runs")]
+pub(crate) struct ManyArgs {
+    /// Run every variant this often, with the seeds S, S+1, ... [default of a sweep: 10]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub(crate) replicate: Option<u32>,
+
+    /// Run with each of these values; given often: with every combination
+    #[arg(long, value_name = "KEY=V,V,...")]
+    pub(crate) vary: Vec<String>,
+
+    /// Run each variant until 95 % intervals of means are so narrow: ci=0.05 (half a width, of the
+    /// mean) or abs=2.5 (in the metric's unit)
+    #[arg(long, value_name = "PRECISION", conflicts_with = "replicate")]
+    pub(crate) until: Option<Until>,
+
+    /// Runs of each variant at most, with --until [default: 1000]
+    #[arg(long, value_name = "N", requires = "until", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub(crate) max: Option<u32>,
+
+    /// Report these metrics, and apply --until to them [default: all that vary]
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
+    pub(crate) metrics: Vec<String>,
+
+    /// Compare every variant with the one of these values, seed by seed
+    #[arg(long, value_name = "KEY=V")]
+    pub(crate) baseline: Vec<String>,
+
+    /// Record every run to a folder of its own, in DIR/runs
+    #[arg(long)]
+    pub(crate) record_runs: bool,
+}
+
+impl ManyArgs {
+    /// Whether many runs are asked for.
+    pub(crate) fn is_asked(&self) -> bool {
+        self.replicate.is_some() || !self.vary.is_empty() || self.until.is_some()
+    }
+
+    /// The sweep that the file asks for, with what the options change in it.
+    ///
+    /// # Errors
+    /// When the file or an option is wrong.
+    pub(crate) fn sweep(&self, scenario: &ScenarioArgs) -> Result<Sweep, InputError> {
+        let mut sweep = Sweep::read(&scenario.file)?;
+        sweep.fixed.extend(settings(&scenario.settings())?);
+        for text in &self.vary {
+            sweep.design.factors.push(Factor::parse(text)?);
+        }
+        if let Some(until) = &self.until {
+            sweep.until = Some(until.clone());
+            sweep.replicates = self.max.unwrap_or(MAX_RUNS);
+        } else if let Some(n) = self.replicate {
+            (sweep.until, sweep.replicates) = (None, n);
+        }
+        if !self.metrics.is_empty() {
+            sweep.metrics.clone_from(&self.metrics);
+        }
+        if let Some(until) = sweep.until.as_mut().filter(|until| until.metrics.is_empty()) {
+            until.metrics.clone_from(&sweep.metrics);
+        }
+        if !self.baseline.is_empty() {
+            sweep.baseline = settings(&self.baseline)?;
+        }
+        sweep.first_seed = scenario.seed.or(sweep.first_seed);
+        sweep.record |= self.record_runs;
+        sweep.check()?;
+        Ok(sweep)
+    }
+}
+
+fn settings(texts: &[String]) -> Result<Vec<Setting>, InputError> {
+    texts.iter().map(|text| Setting::parse(text)).collect()
+}

@@ -1,0 +1,69 @@
+//! Every variant of a sweep, compiled once: what is wrong in any of them is told before any runs.
+
+use crate::exit::Failure;
+use crate::plan::source_of;
+use crate::progress::Stages;
+use sidestep::experiment::sweep::{Plan, Setting, Sweep, Variant};
+use sidestep::kernel::{Digest, InputError};
+use sidestep::scenario::Source;
+use sidestep::worlds::any::AnyCompiled;
+
+/// A sweep that is known to be right.
+pub(super) struct Prepared {
+    pub(super) plan: Plan,
+    /// Of all scenarios and the files they name.
+    pub(super) fingerprint: String,
+}
+
+/// Compiles every variant, hands it to `each` with its number, and makes the plan.
+///
+/// # Errors
+/// When the design or a variant is wrong, or `each` fails.
+pub(super) fn prepare(
+    sweep: &Sweep,
+    stages: &Stages,
+    mut each: impl FnMut(u32, &Source, &AnyCompiled) -> Result<(), Failure>,
+) -> Result<Prepared, Failure> {
+    let fixed: Vec<String> = sweep.fixed.iter().map(Setting::to_override).collect();
+    let base = source_of(&sweep.scenario, &fixed)?;
+    let variants = sweep.design.variants(&sweep.place)?;
+    let (mut agents, mut first, mut prints) = (0, None, String::new());
+    let count = variants.len();
+    for (k, settings) in (0u32..).zip(&variants) {
+        stages.at("checking variants", f64::from(k) / count as f64);
+        let (source, compiled) = variant(&base, settings)?;
+        agents = agents.max(compiled.agents());
+        first.get_or_insert((compiled.world(), compiled.plan().seed));
+        prints.push_str(&print(&source, &compiled)?);
+        each(k, &source, &compiled)?;
+    }
+    let first = first.expect("a design has at least one variant");
+    let plan = Plan { agents, ..Plan::new(sweep, variants, first)? };
+    Ok(Prepared { plan, fingerprint: Digest::of(prints.as_bytes()).to_string() })
+}
+
+/// A variant's scenario; an error says which variant it is.
+fn variant(base: &Source, settings: &[Setting]) -> Result<(Source, AnyCompiled), InputError> {
+    let overrides: Vec<String> = settings.iter().map(Setting::to_override).collect();
+    let compiled = base.clone().with(&overrides).and_then(|source| {
+        let compiled = AnyCompiled::new(&source)?;
+        Ok((source, compiled))
+    });
+    compiled.map_err(|e| {
+        if settings.is_empty() {
+            return e;
+        }
+        let variant = Variant { settings: settings.to_vec() };
+        let place = format!("{}, where {variant}", e.place());
+        let error = InputError::new(place, e.cause(), e.remedy());
+        e.position().map_or(error.clone(), |(line, column)| error.at(line, column))
+    })
+}
+
+/// A digest of a scenario and its files.
+fn print(source: &Source, compiled: &AnyCompiled) -> Result<String, InputError> {
+    let resolved = compiled.resolve(source)?;
+    let files = resolved.files.iter().map(|(_, bytes)| Digest::of(bytes).to_string());
+    let text = Digest::of(resolved.text.as_bytes()).to_string();
+    Ok(std::iter::once(text).chain(files).collect())
+}

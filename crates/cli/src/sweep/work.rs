@@ -1,0 +1,148 @@
+//! Cells -> outcomes: many at once, or one after the other on all workers.
+
+use crate::commands::finish::recorded_run;
+use crate::console::Console;
+use crate::exit::Failure;
+use crate::interrupt;
+use crate::progress::Progress;
+use crate::recording::Recording;
+use crate::worlds::Compiled;
+use serde_json::json;
+use sidestep::experiment::sweep::{Cell, Outcome, Plan, start};
+use sidestep::kernel::{InputError, workers};
+use sidestep::scenario::Source;
+use sidestep_record::Existing;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
+
+/// Worlds of so many agents fill the caches by themselves: they are run one after the other, each
+/// on all workers, which also bounds the memory.
+const LARGE: u64 = 20_000;
+
+/// What cells are run with.
+pub(super) struct Work<'a> {
+    pub(super) plan: &'a Plan,
+    /// The scenario of a variant.
+    pub(super) source: &'a (dyn Fn(u32) -> Result<Source, InputError> + Sync),
+    /// Where the run of a cell is recorded, if it is.
+    pub(super) record: Option<&'a (dyn Fn(u64) -> PathBuf + Sync)>,
+    pub(super) workers: usize,
+    pub(super) console: Console,
+}
+
+/// Takes an outcome: when it returns, the run is finished.
+pub(super) type Take<'a> = dyn FnMut(Outcome) -> Result<(), Failure> + Send + 'a;
+
+/// What all workers share.
+struct Shared<'a, 'b> {
+    take: &'a mut Take<'b>,
+    done: u64,
+    failure: Option<Failure>,
+}
+
+impl Work<'_> {
+    /// Runs the cells, in their order as far as there are workers, until all are done, something
+    /// fails, or somebody asks to stop. `before` and `total` are for the progress bar: runs that
+    /// were done before, and all.
+    ///
+    /// # Errors
+    /// What `take` returns; no cell is begun after that.
+    pub(super) fn run(
+        &self,
+        cells: &[Cell],
+        (before, total): (u64, u64),
+        take: &mut Take<'_>,
+    ) -> Result<(), Failure> {
+        let at_once = self.at_once(cells.len());
+        let each = (self.workers / at_once).max(1);
+        let next = AtomicUsize::new(0);
+        let shared = Mutex::new(Shared { take, done: before, failure: None });
+        let progress = Progress::of_runs(self.console, before, total);
+        let mut crew = vec![(); at_once];
+        workers::run(&mut crew, |_, ()| {
+            while let Some(cell) = cells.get(next.fetch_add(1, Ordering::Relaxed)) {
+                // Nobody holds the lock while a run is under way.
+                let broken = lock(&shared).failure.is_some();
+                let outcome = if broken { None } else { self.cell(*cell, each) };
+                let Some(outcome) = outcome else { return };
+                let shared = &mut *lock(&shared);
+                if let Err(failure) = outcome.and_then(|outcome| (shared.take)(outcome)) {
+                    shared.failure.get_or_insert(failure);
+                    return;
+                }
+                shared.done += 1;
+                progress.at(shared.done);
+            }
+        });
+        progress.clear();
+        let failure = lock(&shared).failure.take();
+        failure.map_or(Ok(()), Err)
+    }
+
+    /// How many of so many runs are under way at once; each has its part of the workers.
+    pub(super) fn at_once(&self, runs: usize) -> usize {
+        let most = if self.plan.agents >= LARGE { 1 } else { self.workers };
+        most.min(runs).max(1)
+    }
+
+    /// Runs a cell; `None` when it was broken off.
+    fn cell(&self, cell: Cell, workers: usize) -> Option<Result<Outcome, Failure>> {
+        if interrupt::requested() {
+            return None;
+        }
+        let run = || match self.record {
+            None => self.plain(cell, workers),
+            Some(folder) => self.recorded(cell, workers, &folder(cell.id)),
+        };
+        match catch_unwind(AssertUnwindSafe(run)) {
+            Ok(Ok(outcome)) => outcome.map(Ok),
+            // A seed for which a scenario has no start, say: the others go on.
+            Ok(Err(Failure::Input(e))) => Some(Ok(Outcome::failed(cell, e.to_string()))),
+            Ok(Err(failure)) => Some(Err(failure)),
+            Err(_) => Some(Ok(Outcome::failed(cell, "a bug in sidestep: see standard error"))),
+        }
+    }
+
+    fn plain(&self, cell: Cell, workers: usize) -> Result<Option<Outcome>, Failure> {
+        let begun = Instant::now();
+        let started = start(cell, &(self.source)(cell.variant)?, workers)?;
+        let compiled = Instant::now();
+        let outcome = started.run(&|| !interrupt::requested());
+        Ok(outcome.map(|outcome| timed(outcome, [compiled - begun, compiled.elapsed()])))
+    }
+
+    /// As `plain`, with a run folder of its own. One that a kill has left is begun anew.
+    fn recorded(
+        &self,
+        cell: Cell,
+        workers: usize,
+        folder: &Path,
+    ) -> Result<Option<Outcome>, Failure> {
+        let begun = Instant::now();
+        let seed = format!("seed={}", cell.seed);
+        let source = (self.source)(cell.variant)?.with(&[seed])?;
+        let compiled = Compiled::new(&source)?;
+        let resolved = compiled.resolve(&source)?;
+        let itself = Source::new("scenario.toml", &*resolved.text, folder);
+        let mut run = compiled.start(&itself, workers);
+        let recording = Recording::create(folder, &resolved, run.as_mut(), Existing::Replace)?;
+        let compiled = Instant::now();
+        let is_complete = recorded_run(run.as_mut(), recording, workers, Console::silent())?;
+        let outcome = is_complete.then(|| Outcome::of(cell, run.as_ref()));
+        Ok(outcome.map(|outcome| timed(outcome, [compiled - begun, compiled.elapsed()])))
+    }
+}
+
+fn timed(mut outcome: Outcome, [compiling, running]: [std::time::Duration; 2]) -> Outcome {
+    outcome.costs.insert("compile_wall_s".into(), json!(compiling.as_secs_f64()));
+    outcome.costs.insert("run_wall_s".into(), json!(running.as_secs_f64()));
+    outcome
+}
+
+/// A worker that panicked outside of a run has left whole values behind.
+fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}

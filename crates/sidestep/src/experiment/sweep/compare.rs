@@ -1,0 +1,95 @@
+//! A variant against the baseline, on the same replicates.
+
+use super::groups::Groups;
+use super::table::{RunColumn, RunValues};
+use crate::statistics::{Bootstrap, Interval, Pairs, holm};
+use serde::Serialize;
+
+/// How a variant differs from the baseline in one metric, pair by pair of equal replicates.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Comparison {
+    /// The variant.
+    pub variant: String,
+    /// Pairs of which both have a value.
+    pub pairs: usize,
+    /// Replicates of which one has a value and the other none.
+    pub incomplete: usize,
+    /// Mean of variant minus baseline.
+    pub difference: Option<f64>,
+    /// Student's 95 % interval of it.
+    pub interval: Option<Interval>,
+    /// The bootstrap's 95 % interval of it.
+    pub bootstrap: Option<Interval>,
+    /// Mean of the variant over mean of the baseline; where no value is negative and the
+    /// baseline's mean is well away from 0.
+    pub ratio: Option<f64>,
+    /// Fieller's 95 % interval of it.
+    pub ratio_interval: Option<Interval>,
+    /// The bootstrap's 95 % interval of it.
+    pub ratio_bootstrap: Option<Interval>,
+    /// Pairs in which the variant is lower,
+    pub lower: usize,
+    /// equal,
+    pub equal: usize,
+    /// and higher.
+    pub higher: usize,
+    /// P-value of no difference: Student's paired test; of a share the exact sign test, which
+    /// is McNemar's.
+    pub p: Option<f64>,
+    /// The same, adjusted by Holm over all variants compared in this metric.
+    pub p_holm: Option<f64>,
+    /// P-value of the exact sign test, which assumes nothing of the distribution; not adjusted.
+    pub p_sign: Option<f64>,
+}
+
+/// All other variants against `baseline` in one metric.
+pub(super) fn comparisons(
+    groups: &Groups<'_>,
+    metric: &RunColumn,
+    baseline: usize,
+    bootstrap: Option<&Bootstrap>,
+) -> Vec<Comparison> {
+    let base = groups.by_replicate(metric, baseline);
+    let is_share = matches!(metric.values, RunValues::Bool(_));
+    let others = (0..groups.variants.len()).filter(|v| *v != baseline);
+    let mut all: Vec<Comparison> = others
+        .map(|variant| {
+            // Replicates that neither has are no pairs.
+            let own = groups.by_replicate(metric, variant);
+            let there = own.iter().zip(&base).filter(|(a, b)| a.is_some() || b.is_some());
+            let (own, base): (Vec<_>, Vec<_>) = there.map(|(a, b)| (*a, *b)).unzip();
+            let pairs = Pairs::of(&own, &base);
+            compared(groups.variants[variant].clone(), &pairs, is_share, bootstrap)
+        })
+        .collect();
+    let adjusted = holm(&all.iter().map(|c| c.p).collect::<Vec<_>>());
+    all.iter_mut().zip(adjusted).for_each(|(c, p)| c.p_holm = p);
+    all
+}
+
+fn compared(
+    variant: String,
+    pairs: &Pairs,
+    is_share: bool,
+    bootstrap: Option<&Bootstrap>,
+) -> Comparison {
+    let (lower, equal, higher) = pairs.signs();
+    let ratio = pairs.ratio();
+    Comparison {
+        variant,
+        pairs: pairs.n(),
+        incomplete: pairs.incomplete(),
+        difference: pairs.difference(),
+        interval: pairs.difference_interval(),
+        bootstrap: bootstrap.and_then(|b| pairs.difference_bootstrap(b)),
+        ratio: ratio.map(|(ratio, _)| ratio),
+        ratio_interval: ratio.map(|(_, interval)| interval),
+        ratio_bootstrap: bootstrap.and_then(|b| pairs.ratio_bootstrap(b)),
+        lower,
+        equal,
+        higher,
+        p: if is_share { pairs.sign_p_value() } else { pairs.p_value() },
+        p_holm: None,
+        p_sign: pairs.sign_p_value(),
+    }
+}

@@ -1,0 +1,230 @@
+//! Runs by variant and replicate.
+
+use super::table::{Role, RunColumn, RunTable, RunValues};
+use crate::experiment::Estimate;
+use crate::statistics::{Sample, wilson};
+use serde::Serialize;
+use sidestep_kernel::InputError;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// A value of a parameter.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum Level {
+    /// A number.
+    Number(f64),
+    /// Words; empty where the parameter is not given.
+    Text(String),
+}
+
+impl Level {
+    pub(super) fn name(&self) -> String {
+        match self {
+            Self::Number(value) => value.to_string(),
+            Self::Text(text) if text.is_empty() => "(default)".into(),
+            Self::Text(text) => text.clone(),
+        }
+    }
+}
+
+/// A parameter that differs between variants.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Parameter {
+    /// Path of its key.
+    pub name: String,
+    /// Whether all its values are numbers.
+    pub numeric: bool,
+    /// Its values: numbers ascending, words in the order they first come.
+    pub levels: Vec<Level>,
+    /// The level of every variant, by its place in `levels`.
+    #[serde(skip)]
+    pub(super) of_variant: Vec<usize>,
+}
+
+/// The runs of a table, found by variant and replicate.
+pub(super) struct Groups<'a> {
+    pub(super) table: &'a RunTable,
+    /// Names of the variants, in the order of their first runs.
+    pub(super) variants: Vec<String>,
+    /// All replicates that any variant has.
+    pub(super) replicates: Vec<i64>,
+    /// Whether the same replicate of two variants has something in common.
+    pub(super) paired: bool,
+    pub(super) parameters: Vec<Parameter>,
+    /// The run of each variant and replicate.
+    run: BTreeMap<(usize, i64), usize>,
+}
+
+impl<'a> Groups<'a> {
+    /// Sorts the runs of `table`.
+    pub(super) fn of(table: &'a RunTable) -> Result<Self, InputError> {
+        table.check()?;
+        let runs = ordered(table);
+        let label = |run: usize| variant_name(table, run);
+        let replicate = table.of_role(Role::Replicate).next();
+        let mut variants: Vec<String> = Vec::new();
+        let mut places: BTreeMap<String, usize> = BTreeMap::new();
+        let mut counts: Vec<i64> = Vec::new();
+        let mut run_of = BTreeMap::new();
+        for run in runs {
+            let name = label(run);
+            let variant = *places.entry(name.clone()).or_insert_with(|| {
+                variants.push(name.clone());
+                counts.push(0);
+                variants.len() - 1
+            });
+            let number =
+                replicate.and_then(|c| c.values.number(run)).map_or(counts[variant], |v| v as i64);
+            counts[variant] += 1;
+            if run_of.insert((variant, number), run).is_some() {
+                let cause = format!("variant `{name}` has two runs of replicate {number}");
+                let remedy = "number the replicates of a variant, each run once";
+                return Err(InputError::new("the table of runs", cause, remedy));
+            }
+        }
+        let replicates: BTreeSet<i64> = run_of.keys().map(|(_, r)| *r).collect();
+        let parameters = parameters(table, &run_of, variants.len());
+        let paired = replicate.is_some();
+        let replicates = replicates.into_iter().collect();
+        Ok(Self { table, variants, replicates, paired, parameters, run: run_of })
+    }
+
+    /// Number of runs of a variant.
+    pub(super) fn runs_of(&self, variant: usize) -> usize {
+        self.run.range((variant, i64::MIN)..=(variant, i64::MAX)).count()
+    }
+
+    /// Rows of a variant, by replicate.
+    pub(super) fn rows(&self, variant: usize) -> impl Iterator<Item = usize> {
+        self.run.range((variant, i64::MIN)..=(variant, i64::MAX)).map(|(_, run)| *run)
+    }
+
+    /// Values of a variant, one for each of its runs.
+    pub(super) fn values(&self, metric: &RunColumn, variant: usize) -> Vec<Option<f64>> {
+        self.rows(variant).map(|run| metric.values.number(run)).collect()
+    }
+
+    /// Values of a variant, one for each replicate of the whole table.
+    pub(super) fn by_replicate(&self, metric: &RunColumn, variant: usize) -> Vec<Option<f64>> {
+        let value = |r: &i64| metric.values.number(*self.run.get(&(variant, *r))?);
+        self.replicates.iter().map(value).collect()
+    }
+
+    /// The mean over a group of variants.
+    ///
+    /// Of one variant it is the mean of its runs, with Wilson's interval for a share. Of several
+    /// each replicate gives one number, the mean over the group, and Student's interval is that
+    /// of these numbers: replicates are independent, the variants of one replicate are not.
+    /// Replicates of which a variant has no value do not count.
+    pub(super) fn mean_over(&self, metric: &RunColumn, group: &[usize]) -> Estimate {
+        if let [variant] = group {
+            let values = self.values(metric, *variant);
+            if matches!(metric.values, RunValues::Bool(_)) {
+                return share(&values);
+            }
+            return Estimate::of(values);
+        }
+        let columns: Vec<_> = group.iter().map(|v| self.by_replicate(metric, *v)).collect();
+        let finite = |value: Option<f64>| value.filter(|v| v.is_finite());
+        let mean = |r: usize| {
+            let of_all: Option<Vec<f64>> = columns.iter().map(|c| finite(c[r])).collect();
+            crate::statistics::mean(&of_all?)
+        };
+        Estimate::of((0..self.replicates.len()).map(mean))
+    }
+
+    /// Whether every level of `parameter` meets the same levels of all others, as in a full
+    /// grid: only then does a mean over the others compare like with like.
+    pub(super) fn is_balanced(&self, parameter: usize) -> bool {
+        let mut others = vec![Vec::new(); self.parameters[parameter].levels.len()];
+        for variant in 0..self.variants.len() {
+            let rest: Vec<usize> = (0..self.parameters.len())
+                .filter(|p| *p != parameter)
+                .map(|p| self.parameters[p].of_variant[variant])
+                .collect();
+            others[self.parameters[parameter].of_variant[variant]].push(rest);
+        }
+        others.iter_mut().for_each(|o| o.sort());
+        others.windows(2).all(|pair| pair[0] == pair[1])
+    }
+
+    /// Variants that have this level.
+    pub(super) fn with_level(&self, parameter: usize, level: usize) -> Vec<usize> {
+        let of = &self.parameters[parameter].of_variant;
+        (0..of.len()).filter(|v| of[*v] == level).collect()
+    }
+}
+
+fn share(values: &[Option<f64>]) -> Estimate {
+    let values = Sample::of(values.iter().copied()).values;
+    let (yes, n) = (values.iter().sum::<f64>(), values.len());
+    let interval = (n > 0).then(|| wilson(yes, n as f64));
+    Estimate { mean: crate::statistics::mean(&values), interval, n }
+}
+
+/// Rows in the order of their cells.
+fn ordered(table: &RunTable) -> Vec<usize> {
+    let mut rows: Vec<usize> = (0..table.runs()).collect();
+    if let Some(cell) = table.of_role(Role::Cell).next() {
+        match &cell.values {
+            RunValues::Int(numbers) => rows.sort_by_key(|&run| numbers[run]),
+            values => rows.sort_by_key(|&run| values.text(run)),
+        }
+    }
+    rows
+}
+
+/// The variant's name, or where the table has none what its parameters are.
+fn variant_name(table: &RunTable, run: usize) -> String {
+    if let Some(column) = table.of_role(Role::Variant).next() {
+        return column.values.text(run);
+    }
+    let parts: Vec<String> = table
+        .of_role(Role::Parameter)
+        .map(|p| format!("{}={}", p.name, p.values.text(run)))
+        .collect();
+    if parts.is_empty() { "all runs".into() } else { parts.join(", ") }
+}
+
+/// The parameters that differ between variants and not within one.
+fn parameters(
+    table: &RunTable,
+    run_of: &BTreeMap<(usize, i64), usize>,
+    variants: usize,
+) -> Vec<Parameter> {
+    let varied = |column: &RunColumn| {
+        let mut of_variant: Vec<Option<String>> = vec![None; variants];
+        let mut numbers: Vec<Option<f64>> = vec![None; variants];
+        for ((variant, _), run) in run_of {
+            let text = column.values.text(*run);
+            if of_variant[*variant].as_ref().is_some_and(|first| *first != text) {
+                return None;
+            }
+            numbers[*variant] = column.values.number(*run).filter(|v| v.is_finite());
+            of_variant[*variant] = Some(text);
+        }
+        let numeric = column.values.is_numeric() && numbers.iter().all(Option::is_some);
+        let level = |variant: usize| match numbers[variant] {
+            Some(number) if numeric => Level::Number(number),
+            _ => Level::Text(of_variant[variant].clone().unwrap_or_default()),
+        };
+        let mut levels: Vec<Level> = Vec::new();
+        for variant in 0..variants {
+            let level = level(variant);
+            if !levels.contains(&level) {
+                levels.push(level);
+            }
+        }
+        if let [Level::Number(_), ..] = levels[..] {
+            levels.sort_by(|a, b| match (a, b) {
+                (Level::Number(a), Level::Number(b)) => a.total_cmp(b),
+                _ => std::cmp::Ordering::Equal,
+            });
+        }
+        let place = |variant| levels.iter().position(|l| *l == level(variant)).unwrap_or(0);
+        let of_variant = (0..variants).map(place).collect();
+        let name = column.name.clone();
+        (levels.len() > 1).then_some(Parameter { name, numeric, levels, of_variant })
+    };
+    table.of_role(Role::Parameter).filter_map(varied).collect()
+}

@@ -1,0 +1,198 @@
+//! Which cells are next, where a wanted precision says when a variant has been run enough.
+
+use super::cell::Outcome;
+use super::file::Until;
+use super::plan::{Cell, Plan};
+use crate::statistics::{Next, Reason, StoppingRule};
+use serde::Serialize;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Runs of each variant before the first look.
+const MIN_RUNS: usize = 10;
+
+/// What the metrics of the variants are so far: all that the decision rests on.
+///
+/// A function of the outcomes alone, whatever their order: so it does not matter how many workers
+/// there are, or whether the sweep was killed in between.
+#[derive(Debug)]
+pub struct Rounds<'a> {
+    plan: &'a Plan,
+    until: &'a Until,
+    /// Per variant, by metric, the values by replicate.
+    values: Vec<BTreeMap<String, BTreeMap<u32, Option<f64>>>>,
+    /// Per variant the replicates that have an outcome.
+    done: Vec<BTreeSet<u32>>,
+}
+
+/// Why a variant is not run any more.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Stopped {
+    /// Number of the variant.
+    pub variant: u32,
+    /// Its runs.
+    pub runs: usize,
+    /// Why they are enough.
+    pub reason: Reason,
+}
+
+impl<'a> Rounds<'a> {
+    /// Nothing is run yet.
+    pub fn new(plan: &'a Plan, until: &'a Until) -> Self {
+        let n = plan.variants.len();
+        Self { plan, until, values: vec![BTreeMap::new(); n], done: vec![BTreeSet::new(); n] }
+    }
+
+    /// Takes note of an outcome.
+    pub fn note(&mut self, outcome: &Outcome) {
+        let Some(cell) = self.plan.cell_of(outcome.cell) else { return };
+        let variant = cell.variant as usize;
+        self.done[variant].insert(cell.replicate);
+        for (name, value) in &outcome.metrics {
+            if self.until.metrics.is_empty() || self.until.metrics.contains(name) {
+                let number = value.as_f64().or_else(|| value.as_bool().map(f64::from));
+                let of_metric = self.values[variant].entry(name.clone()).or_default();
+                of_metric.insert(cell.replicate, number);
+            }
+        }
+    }
+
+    /// The cells of the next round that have no outcome yet; none when all variants are done.
+    pub fn next(&self) -> Vec<Cell> {
+        let mut cells = Vec::new();
+        for variant in 0..self.plan.variants.len() as u32 {
+            if let Next::Run(total) = self.ask(variant) {
+                let done = &self.done[variant as usize];
+                let open = (0..total as u32).filter(|replicate| !done.contains(replicate));
+                cells.extend(open.map(|replicate| self.plan.cell(variant, replicate)));
+            }
+        }
+        cells.sort_by_key(|c| (c.replicate, c.variant));
+        cells
+    }
+
+    /// Why variants are done.
+    pub fn stopped(&self) -> Vec<Stopped> {
+        let of = |variant: u32| match self.ask(variant) {
+            Next::Enough(runs, reason) => Some(Stopped { variant, runs, reason }),
+            Next::Run(_) => None,
+        };
+        (0..self.plan.variants.len() as u32).filter_map(of).collect()
+    }
+
+    fn ask(&self, variant: u32) -> Next {
+        let rule = StoppingRule {
+            half_width: self.until.half_width,
+            relative: self.until.is_relative,
+            min_runs: MIN_RUNS,
+            max_runs: self.plan.replicates as usize,
+        };
+        let done = &self.done[variant as usize];
+        // Only what has no gap: a round that was broken off is gone on with.
+        let whole = (0u32..).zip(done).take_while(|(k, replicate)| k == *replicate).count();
+        let column = |values: &BTreeMap<u32, Option<f64>>| -> Vec<Option<f64>> {
+            (0..whole as u32).map(|k| values.get(&k).copied().flatten()).collect()
+        };
+        let named = !self.until.metrics.is_empty();
+        let columns: Vec<Vec<Option<f64>>> = self.values[variant as usize]
+            .values()
+            .map(column)
+            .filter(|values| named || varies(&values[..whole.min(MIN_RUNS)]))
+            .collect();
+        if columns.is_empty() {
+            // Nothing varies, or nothing is there: the first round says so.
+            let first = MIN_RUNS.min(rule.max_runs);
+            return match whole >= first {
+                true => Next::Enough(first, Reason::Constant),
+                false => Next::Run(first),
+            };
+        }
+        let columns: Vec<&[Option<f64>]> = columns.iter().map(Vec::as_slice).collect();
+        rule.next_of(&columns)
+    }
+}
+
+/// Whether two of the values differ.
+fn varies(values: &[Option<f64>]) -> bool {
+    values.windows(2).any(|pair| pair[0] != pair[1])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiment::sweep::{Factor, Sweep};
+    use serde_json::json;
+
+    fn plan(max_runs: u32) -> Plan {
+        let mut sweep = Sweep::of_scenario("s.toml");
+        sweep.design.factors = vec![Factor::parse("n=1,2").expect("valid")];
+        sweep.replicates = max_runs;
+        let variants = sweep.design.variants("test").expect("valid");
+        Plan::new(&sweep, variants, ("robots", 1)).expect("valid")
+    }
+
+    /// Variant 0 is sure at once, variant 1 varies a lot.
+    fn outcome(cell: Cell) -> Outcome {
+        let wave = f64::from(cell.replicate * 7 % 10) - 4.5;
+        let value = 100.0 + if cell.variant == 0 { 0.1 } else { 10.0 } * wave;
+        let mut outcome = Outcome::failed(cell, "");
+        outcome.metrics.insert("m".into(), json!(value));
+        outcome.metrics.insert("constant".into(), json!(3));
+        outcome
+    }
+
+    fn until(metrics: &[&str]) -> Until {
+        let metrics = metrics.iter().map(ToString::to_string).collect();
+        Until { metrics, ..("ci=0.05".parse().expect("valid")) }
+    }
+
+    /// Runs rounds until none is left; how many runs each variant had.
+    fn all(plan: &Plan, until: &Until, order: impl Fn(&mut Vec<Cell>)) -> [usize; 2] {
+        let mut rounds = Rounds::new(plan, until);
+        loop {
+            let mut cells = rounds.next();
+            if cells.is_empty() {
+                let stopped = rounds.stopped();
+                assert_eq!(stopped.len(), 2);
+                return [stopped[0].runs, stopped[1].runs];
+            }
+            order(&mut cells);
+            cells.iter().for_each(|c| rounds.note(&outcome(*c)));
+        }
+    }
+
+    #[test]
+    fn a_variant_that_varies_more_is_run_more_often() {
+        let plan = plan(1000);
+        let runs = all(&plan, &until(&[]), |_| ());
+        assert!(runs[0] == MIN_RUNS && (60..400).contains(&runs[1]), "{runs:?}");
+        assert_eq!(runs, all(&plan, &until(&["m"]), |_| ()), "what is constant asks for nothing");
+    }
+
+    #[test]
+    fn order_and_interruptions_change_no_decision() {
+        let plan = plan(1000);
+        let straight = all(&plan, &until(&[]), |_| ());
+        assert_eq!(straight, all(&plan, &until(&[]), |cells| cells.reverse()));
+        // Killed in the middle of every round: only some cells of it are done.
+        let some = |cells: &mut Vec<Cell>| {
+            let n = cells.len().div_ceil(2);
+            cells.reverse();
+            cells.truncate(n);
+        };
+        assert_eq!(straight, all(&plan, &until(&[]), some));
+    }
+
+    #[test]
+    fn the_limit_ends_what_is_never_precise_and_says_so() {
+        let plan = plan(20);
+        let until = until(&["m"]);
+        let mut rounds = Rounds::new(&plan, &until);
+        while let cells = rounds.next()
+            && !cells.is_empty()
+        {
+            cells.iter().for_each(|c| rounds.note(&outcome(*c)));
+        }
+        let told = rounds.stopped();
+        assert_eq!((told[1].runs, told[1].reason), (20, Reason::Maximum));
+    }
+}

@@ -1,0 +1,247 @@
+//! A summary as tables.
+
+use super::Label;
+use super::compare::Comparison;
+use super::summary::{Described, MetricSummary, Numbers, Quantile, Share, Summary, VariantMetric};
+use crate::experiment::{Estimate, Table};
+use crate::statistics::Interval;
+use sidestep_kernel::math;
+
+pub(super) fn tables(summary: &Summary) -> Vec<Table> {
+    let mut tables = Vec::new();
+    for metric in &summary.metrics {
+        tables.push(values(metric));
+        if let Some(baseline) = &summary.baseline {
+            tables.push(differences(metric, baseline));
+        }
+        if !metric.effects.is_empty() {
+            tables.push(effects(metric));
+        }
+    }
+    if !summary.left_out.is_empty() {
+        tables.push(left_out(summary));
+    }
+    tables
+}
+
+fn values(metric: &MetricSummary) -> Table {
+    if metric.is_share { shares(metric) } else { numbers(metric) }
+}
+
+fn numbers(metric: &MetricSummary) -> Table {
+    let note = "95 % intervals in brackets: of the mean by Student's t and by the bootstrap (BCa), \
+                of quantiles by order statistics; `-` where n is too small for one. n: runs with a \
+                value. sd, min and max describe these very runs. `for ±5 %`: runs that would narrow \
+                Student's interval to 5 % of the mean to either side, if runs go on to vary by this \
+                sd.";
+    let columns = [
+        "variant",
+        "n",
+        "missing",
+        "mean",
+        "bootstrap",
+        "median",
+        "5 %",
+        "25 %",
+        "75 %",
+        "95 %",
+        "sd",
+        "min",
+        "max",
+        "for ±5 %",
+    ];
+    let mut table = Table::new(sentence(&metric.label), note, &columns);
+    for variant in &metric.variants {
+        if let Described::Numbers(numbers) = &variant.values {
+            table.row(number_row(variant, numbers));
+        }
+    }
+    table
+}
+
+fn number_row(variant: &VariantMetric, numbers: &Numbers) -> Vec<String> {
+    let width = numbers.interval.map(|i| i.half_width());
+    let plain = |value: Option<f64>| value.map_or("-".into(), |v| number(v, width));
+    let quantile = |k: usize| numbers.quantiles.get(k).map_or("-".into(), |q| quantile(q, width));
+    let bootstrap = numbers.bootstrap.map_or("-".into(), |i| brackets(i));
+    let needed = numbers.runs_for_5_percent.map_or("-".into(), |n| n.to_string());
+    vec![
+        variant.variant.clone(),
+        variant.n.to_string(),
+        variant.missing.to_string(),
+        with_interval(numbers.mean, numbers.interval),
+        bootstrap,
+        quantile(2),
+        quantile(0),
+        quantile(1),
+        quantile(3),
+        quantile(4),
+        plain(numbers.sd),
+        plain(numbers.min),
+        plain(numbers.max),
+        needed,
+    ]
+}
+
+fn quantile(quantile: &Quantile, width: Option<f64>) -> String {
+    match quantile.interval {
+        Some(found) => with_interval(Some(quantile.value), Some(found.interval)),
+        None => format!("{} [-]", number(quantile.value, width)),
+    }
+}
+
+fn shares(metric: &MetricSummary) -> Table {
+    let note =
+        "Share of runs of which it is true, with Wilson's 95 % interval. n: runs with a value.";
+    let columns = ["variant", "n", "missing", "runs", "share"];
+    let mut table = Table::new(sentence(&metric.label), note, &columns);
+    for variant in &metric.variants {
+        if let Described::Share(Share { yes, share, interval }) = variant.values {
+            let counts = [variant.n, variant.missing, yes].map(|count| count.to_string());
+            let share = with_interval(share, Some(interval));
+            table.row([variant.variant.clone()].into_iter().chain(counts).chain([share]));
+        }
+    }
+    table
+}
+
+fn differences(metric: &MetricSummary, baseline: &str) -> Table {
+    let family = metric.comparisons.iter().filter(|c| c.p.is_some()).count();
+    let test =
+        if metric.is_share { "the exact sign test (McNemar's)" } else { "Student's paired test" };
+    let note = format!(
+        "Variant minus `{baseline}`, replicate by replicate on the same seeds. 95 % intervals in \
+         brackets: by Student's t, then by the bootstrap (BCa); of the ratio of means by Fieller's \
+         method, where no value is negative and the baseline's mean is well away from 0. `lower`, \
+         `higher`: pairs in which the variant is. p: of no difference by {test}, adjusted by Holm over \
+         the {family} comparisons of this metric; over several metrics chances add up. `-`: the pairs \
+         do not give it."
+    );
+    let columns = [
+        "variant",
+        "pairs",
+        "incomplete",
+        "difference",
+        "bootstrap",
+        "ratio",
+        "bootstrap",
+        "lower",
+        "higher",
+        "p (Holm)",
+    ];
+    let mut table =
+        Table::new(format!("{}: against {baseline}", sentence(&metric.label)), note, &columns);
+    metric.comparisons.iter().for_each(|c| table.row(difference_row(c)));
+    table
+}
+
+fn difference_row(comparison: &Comparison) -> Vec<String> {
+    let interval = |i: Option<Interval>| i.map_or("-".into(), brackets);
+    let of_pairs = |count: usize| format!("{count} of {}", comparison.pairs);
+    vec![
+        comparison.variant.clone(),
+        comparison.pairs.to_string(),
+        comparison.incomplete.to_string(),
+        with_interval(comparison.difference, comparison.interval),
+        interval(comparison.bootstrap),
+        with_interval(comparison.ratio, comparison.ratio_interval),
+        interval(comparison.ratio_bootstrap),
+        of_pairs(comparison.lower),
+        of_pairs(comparison.higher),
+        comparison.p_holm.map_or("-".into(), p_value),
+    ]
+}
+
+fn effects(metric: &MetricSummary) -> Table {
+    let note = "Means over all variants that have the level, with 95 % intervals; n: replicates of \
+                which all these variants have a value. Each replicate counts as one, since its \
+                variants share their seeds.";
+    let columns = ["parameter", "level", "variants", "marginal mean", "n"];
+    let mut table =
+        Table::new(format!("{}: main effects", sentence(&metric.label)), note, &columns);
+    for effect in &metric.effects {
+        for level in &effect.levels {
+            let Estimate { mean, interval, n } = level.estimate;
+            let cells = [effect.parameter.clone(), level.level.name(), level.variants.to_string()];
+            table.row(cells.into_iter().chain([with_interval(mean, interval), n.to_string()]));
+        }
+    }
+    table
+}
+
+fn left_out(summary: &Summary) -> Table {
+    let mut table = Table::new("Metrics not shown", "", &["metric", "why"]);
+    summary.left_out.iter().for_each(|l| table.row([l.metric.clone(), l.reason.clone()]));
+    table
+}
+
+/// With a capital.
+pub(super) fn sentence(label: &Label) -> String {
+    let text = label.to_string();
+    let mut letters = text.chars();
+    let first = letters.next().map(|c| c.to_uppercase().to_string()).unwrap_or_default();
+    first + letters.as_str()
+}
+
+/// `12.3 [11.9, 12.7]`; `-` for what is absent.
+pub(super) fn with_interval(value: Option<f64>, interval: Option<Interval>) -> String {
+    let Some(value) = value else { return "-".into() };
+    match interval {
+        Some(interval) => {
+            let width = interval.half_width();
+            format!("{} {}", number(value, Some(width)), brackets(interval))
+        }
+        None => format!("{} [-]", number(value, None)),
+    }
+}
+
+fn brackets(interval: Interval) -> String {
+    let end = |value| number(value, Some(interval.half_width()));
+    format!("[{}, {}]", end(interval.low), end(interval.high))
+}
+
+/// A number to two digits of the half-width of its interval: more would be noise, fewer would
+/// hide the interval. Without a width it has four digits.
+fn number(value: f64, half_width: Option<f64>) -> String {
+    let width = half_width.filter(|w| *w > 0.0 && w.is_finite());
+    let scale = width.unwrap_or(value.abs() * 0.01);
+    if value == 0.0 && width.is_none() {
+        return "0".into();
+    }
+    let decimals = 1.0 - math::log10(scale).floor();
+    let text = if !value.is_finite() || decimals > 8.0 || value.abs() >= 1e9 {
+        format!("{value:.3e}")
+    } else {
+        format!("{value:.*}", decimals.max(0.0) as usize)
+    };
+    // A width of 0 is no precision: what is constant is written as it is.
+    if half_width == Some(0.0) && text.contains('.') && !text.contains('e') {
+        return text.trim_end_matches('0').trim_end_matches('.').into();
+    }
+    if text.trim_matches(['-', '0', '.']).is_empty() { text.replace('-', "") } else { text }
+}
+
+fn p_value(p: f64) -> String {
+    if p < 0.0001 { "< 0.0001".into() } else { format!("{p:.4}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_the_digits_that_their_interval_leaves() {
+        let shown = |value, low, high| with_interval(Some(value), Some(Interval { low, high }));
+        assert_eq!(shown(100.123, 100.112, 100.134), "100.123 [100.112, 100.134]");
+        assert_eq!(shown(1234.5, 1100.0, 1369.0), "1234 [1100, 1369]");
+        assert_eq!(shown(0.333_33, 0.0, 0.7), "0.33 [0.00, 0.70]");
+        assert_eq!(shown(-0.001, -0.8, 0.8), "0.00 [-0.80, 0.80]");
+        assert_eq!(shown(2.5, 2.5, 2.5), "2.5 [2.5, 2.5]");
+        assert_eq!(shown(0.0, 0.0, 0.0), "0 [0, 0]");
+        assert_eq!(with_interval(Some(12.345), None), "12.35 [-]");
+        assert_eq!(with_interval(None, None), "-");
+        assert_eq!(shown(0.0, f64::NEG_INFINITY, f64::INFINITY), "0 [-inf, inf]");
+        assert_eq!(p_value(0.00001), "< 0.0001");
+        assert_eq!(p_value(0.0312), "0.0312");
+    }
+}

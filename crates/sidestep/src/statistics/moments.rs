@@ -1,0 +1,216 @@
+//! Mean, spread and percentiles, summed so that magnitudes do no harm.
+
+use super::quantile::percentile;
+use serde::Serialize;
+
+/// What there is of a metric over runs: its finite values, in the order of the runs, and how
+/// many runs have none.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Sample {
+    /// The finite values, in the order they came.
+    pub values: Vec<f64>,
+    /// Runs without a value, or with one that is infinite or not a number.
+    pub missing: usize,
+    /// Of these, runs whose value is infinite or not a number.
+    pub not_finite: usize,
+}
+
+impl Sample {
+    /// The sample of these runs.
+    pub fn of(runs: impl IntoIterator<Item = Option<f64>>) -> Self {
+        let mut sample = Self::default();
+        for value in runs {
+            match value {
+                Some(value) if value.is_finite() => sample.values.push(value),
+                Some(_) => {
+                    sample.missing += 1;
+                    sample.not_finite += 1;
+                }
+                None => sample.missing += 1,
+            }
+        }
+        sample
+    }
+
+    /// The values from the smallest to the largest.
+    pub fn sorted(&self) -> Vec<f64> {
+        let mut sorted = self.values.clone();
+        sorted.sort_by(f64::total_cmp);
+        sorted
+    }
+}
+
+/// A power of two near the largest magnitude: what is divided by it can be squared and summed
+/// without overflow, and loses no digit by the division.
+fn scale(values: &[f64]) -> f64 {
+    let largest = values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+    let power = f64::from_bits(largest.to_bits() & 0x7ff0_0000_0000_0000);
+    if power > 0.0 && power.is_finite() { power } else { 1.0 }
+}
+
+/// Neumaier's compensated sum: the error does not grow with the number of terms.
+pub(super) fn sum(terms: impl IntoIterator<Item = f64>) -> f64 {
+    let (mut total, mut lost) = (0.0_f64, 0.0);
+    for term in terms {
+        let next = total + term;
+        lost +=
+            if total.abs() >= term.abs() { (total - next) + term } else { (term - next) + total };
+        total = next;
+    }
+    // Past the range of numbers the compensation is no number either.
+    if lost.is_finite() { total + lost } else { total }
+}
+
+/// Whether all values are equal; true of nothing.
+pub(super) fn is_constant(values: &[f64]) -> bool {
+    values.windows(2).all(|pair| pair[0] == pair[1])
+}
+
+/// Arithmetic mean; `None` of nothing. Of equal values it is that value, to the bit.
+pub fn mean(values: &[f64]) -> Option<f64> {
+    let first = *values.first()?;
+    if is_constant(values) {
+        return Some(first);
+    }
+    let scale = scale(values);
+    Some(sum(values.iter().map(|v| v / scale)) / values.len() as f64 * scale)
+}
+
+/// Standard deviation of a sample (divisor `n - 1`); `None` of fewer than two values. Of equal
+/// values it is exactly 0.
+pub fn sample_sd(values: &[f64]) -> Option<f64> {
+    let (squares, scale) = squares(values)?;
+    (values.len() > 1).then(|| (squares / (values.len() - 1) as f64).sqrt() * scale)
+}
+
+/// Sum of squared deviations from the mean in units of `scale * scale`, and that scale; `None`
+/// of nothing.
+fn squares(values: &[f64]) -> Option<(f64, f64)> {
+    if is_constant(values) {
+        return values.first().map(|_| (0.0, 1.0));
+    }
+    let center = mean(values)?;
+    // Halves, since two values may lie further apart than the largest number.
+    let deviations: Vec<f64> = values.iter().map(|v| 0.5 * v - 0.5 * center).collect();
+    let scale = scale(&deviations);
+    let square = sum(deviations.iter().map(|d| (d / scale) * (d / scale)));
+    // What the rounding of the mean adds to every deviation.
+    let off = sum(deviations.iter().map(|d| d / scale));
+    Some(((square - off * off / values.len() as f64).max(0.0) * 4.0, scale))
+}
+
+/// Size, mean, spread and percentiles of a set of measurements, in their unit.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Moments {
+    /// Number of values.
+    pub n: usize,
+    /// Arithmetic mean.
+    pub mean: f64,
+    /// Standard deviation of these very values (divisor `n`).
+    pub sd: f64,
+    /// 1st percentile.
+    pub p01: f64,
+    /// 5th percentile.
+    pub p05: f64,
+    /// Median.
+    pub p50: f64,
+    /// 95th percentile.
+    pub p95: f64,
+    /// 99th percentile.
+    pub p99: f64,
+}
+
+impl Moments {
+    /// The moments of `values`; `None` of nothing.
+    pub fn of(values: impl IntoIterator<Item = f64>) -> Option<Self> {
+        let mut sorted: Vec<f64> = values.into_iter().collect();
+        sorted.sort_by(f64::total_cmp);
+        let (squares, scale) = squares(&sorted)?;
+        Some(Self {
+            n: sorted.len(),
+            mean: mean(&sorted)?,
+            sd: (squares / sorted.len() as f64).sqrt() * scale,
+            p01: percentile(&sorted, 0.01)?,
+            p05: percentile(&sorted, 0.05)?,
+            p50: percentile(&sorted, 0.50)?,
+            p95: percentile(&sorted, 0.95)?,
+            p99: percentile(&sorted, 0.99)?,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::close;
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn moments_have_their_divisors() {
+        let moments = Moments::of([4.0, 1.0, 2.0]).unwrap();
+        assert_eq!((moments.n, moments.p50), (3, 2.0));
+        close(moments.sd, (14.0_f64 / 9.0).sqrt(), 1e-12);
+        close(sample_sd(&[4.0, 1.0, 2.0]).unwrap(), (7.0_f64 / 3.0).sqrt(), 1e-12);
+        assert!(Moments::of([]).is_none());
+        assert_eq!((mean(&[]), sample_sd(&[1.0])), (None, None));
+    }
+
+    /// NIST Statistical Reference Datasets, NumAcc3 and NumAcc4 (univariate, certified values):
+    /// 1000000.2 and 10000000.2, then 500 pairs of .1 and .3 beyond them; mean as the first
+    /// value, sd 0.1.
+    #[test]
+    fn the_certified_values_of_nist_are_met() {
+        for base in [1_000_000.0, 10_000_000.0] {
+            let mut values = vec![base + 0.2];
+            (0..500).for_each(|_| values.extend([base + 0.1, base + 0.3]));
+            close(mean(&values).unwrap(), base + 0.2, 2e-9);
+            close(sample_sd(&values).unwrap(), 0.1, 1e-8);
+        }
+    }
+
+    #[test]
+    fn huge_and_tiny_magnitudes_keep_their_digits() {
+        assert_eq!(mean(&[1e16, 1.0, -1e16]), Some(1.0 / 3.0));
+        assert_eq!(mean(&[f64::MAX, f64::MAX, -f64::MAX]), Some(f64::MAX / 3.0));
+        for unit in [1e-300, 1.0, 1e300] {
+            let values = [1.0 * unit, 2.0 * unit, 4.0 * unit];
+            close(mean(&values).unwrap() / unit, 7.0 / 3.0, 1e-15 * 3.0);
+            close(sample_sd(&values).unwrap() / unit, (7.0_f64 / 3.0).sqrt(), 1e-15 * 3.0);
+        }
+    }
+
+    #[test]
+    fn what_is_no_finite_number_is_counted_as_missing() {
+        let runs = [Some(1.0), None, Some(f64::NAN), Some(f64::INFINITY), Some(3.0)];
+        let sample = Sample::of(runs);
+        assert_eq!(
+            (sample.values.as_slice(), sample.missing, sample.not_finite),
+            (&[1.0, 3.0][..], 3, 2)
+        );
+        assert_eq!(Sample::of([Some(2.0), Some(-1.0)]).sorted(), [-1.0, 2.0]);
+    }
+
+    proptest! {
+        #[test]
+        fn no_values_make_the_moments_panic(values in prop::collection::vec(prop::num::f64::ANY, 0..20)) {
+            let _ = (mean(&values), sample_sd(&values), Moments::of(values.iter().copied()));
+            let sample = Sample::of(values.iter().map(|v| Some(*v)));
+            if let Some(mean) = mean(&sample.values) {
+                prop_assert!(mean.is_finite());
+                prop_assert!(sample_sd(&sample.values).is_none_or(|sd| sd >= 0.0));
+            }
+        }
+
+        #[test]
+        fn the_mean_lies_between_the_extremes_and_equal_values_have_no_spread(
+            value in -1e9_f64..1e9, more in prop::collection::vec(-1e9_f64..1e9, 1..30), n in 1_usize..40,
+        ) {
+            let equal = vec![value; n];
+            prop_assert_eq!(mean(&equal), Some(value));
+            prop_assert!(n < 2 || sample_sd(&equal) == Some(0.0));
+            let sorted = Sample::of(more.iter().map(|v| Some(*v))).sorted();
+            let mean = mean(&more).unwrap();
+            prop_assert!(sorted[0] <= mean && mean <= sorted[sorted.len() - 1]);
+        }
+    }
+}

@@ -1,0 +1,256 @@
+//! Two treatments of the same cases.
+
+use super::Bootstrap;
+use super::interval::{Interval, mean_interval, student_t};
+use super::moments::{mean, sample_sd, sum};
+use super::quantile::at_most;
+use statrs::function::beta::checked_beta_reg;
+
+/// Values of a treatment and of a baseline on the same cases (runs of the same seed), so that
+/// what the cases have in common cancels.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Pairs {
+    pairs: Vec<(f64, f64)>,
+    incomplete: usize,
+}
+
+impl Pairs {
+    /// The pairs `(a[i], b[i])` of which both have a finite value; the others, and what one has
+    /// beyond the other's end, count as incomplete.
+    pub fn of(a: &[Option<f64>], b: &[Option<f64>]) -> Self {
+        let finite = |value: &Option<f64>| value.filter(|v| v.is_finite());
+        let complete = |(a, b)| Some((finite(a)?, finite(b)?));
+        let pairs: Vec<(f64, f64)> = a.iter().zip(b).filter_map(complete).collect();
+        let incomplete = a.len().max(b.len()) - pairs.len();
+        Self { pairs, incomplete }
+    }
+
+    /// Complete pairs.
+    pub fn n(&self) -> usize {
+        self.pairs.len()
+    }
+
+    /// Cases of which one or both have no value.
+    pub fn incomplete(&self) -> usize {
+        self.incomplete
+    }
+
+    /// `a - b`, pair by pair.
+    pub fn differences(&self) -> Vec<f64> {
+        self.pairs.iter().map(|(a, b)| a - b).collect()
+    }
+
+    /// Mean of `a - b`; `None` without pairs.
+    pub fn difference(&self) -> Option<f64> {
+        mean(&self.differences())
+    }
+
+    /// Student's 95 % interval of the mean difference; `None` of fewer than two pairs.
+    pub fn difference_interval(&self) -> Option<Interval> {
+        mean_interval(&self.differences())
+    }
+
+    /// The mean of `a` over the mean of `b`, with its 95 % interval.
+    ///
+    /// The interval is Fieller's (1954) for pairs: exact where both are normal. `None` where a
+    /// value is negative (a ratio of signed quantities says little), with fewer than two pairs,
+    /// and where the interval of the baseline's mean holds 0, so that no factor is excluded.
+    pub fn ratio(&self) -> Option<(f64, Interval)> {
+        let (a, b) = self.sides();
+        if self.n() < 2 || self.pairs.iter().any(|(a, b)| *a < 0.0 || *b < 0.0) {
+            return None;
+        }
+        let (center_a, center_b) = (mean(&a)?, mean(&b)?);
+        if center_b <= 0.0 {
+            return None;
+        }
+        // In units of the baseline's mean: the equation is then about 1.
+        let (unit, t) = (center_b, student_t(self.n() - 1));
+        let relative = |values: &[f64], center: f64| -> Vec<f64> {
+            values.iter().map(|v| (v - center) / unit).collect()
+        };
+        let (u, v) = (relative(&a, center_a), relative(&b, center_b));
+        let n = self.n() as f64;
+        let covariance = |x: &[f64], y: &[f64]| {
+            t * t * sum(x.iter().zip(y).map(|(x, y)| x * y)) / ((n - 1.0) * n)
+        };
+        let ratio = center_a / unit;
+        let (aa, ab, bb) = (covariance(&u, &u), covariance(&u, &v), covariance(&v, &v));
+        // The ratios r with (ratio - r)^2 <= aa - 2 r ab + r^2 bb lie between two roots.
+        let curve = 1.0 - bb;
+        let root = ((ratio - ab) * (ratio - ab) - curve * (ratio * ratio - aa)).max(0.0).sqrt();
+        let interval =
+            Interval { low: (ratio - ab - root) / curve, high: (ratio - ab + root) / curve };
+        (curve > 0.0 && ratio.is_finite()).then_some((ratio, interval))
+    }
+
+    /// The bootstrap's 95 % interval of the mean difference.
+    pub fn difference_bootstrap(&self, bootstrap: &Bootstrap) -> Option<Interval> {
+        bootstrap.mean(&self.differences())
+    }
+
+    /// The bootstrap's 95 % interval of the ratio of means; where there is a [`Self::ratio`].
+    pub fn ratio_bootstrap(&self, bootstrap: &Bootstrap) -> Option<Interval> {
+        self.ratio()?;
+        bootstrap.interval(&self.pairs, |pairs| {
+            let total = |side: fn(&(f64, f64)) -> f64| pairs.iter().map(side).sum::<f64>();
+            Some(total(|p| p.0) / total(|p| p.1)).filter(|r| r.is_finite())
+        })
+    }
+
+    /// Pairs in which `a` is lower than `b`, equal, and higher.
+    pub fn signs(&self) -> (usize, usize, usize) {
+        let lower = self.pairs.iter().filter(|(a, b)| a < b).count();
+        let higher = self.pairs.iter().filter(|(a, b)| a > b).count();
+        (lower, self.n() - lower - higher, higher)
+    }
+
+    /// Two-sided p-value of Student's paired test of no difference.
+    ///
+    /// 1 where no pair differs at all. `None` of fewer than two pairs, and where all differ by
+    /// the same amount: the test needs a spread.
+    pub fn p_value(&self) -> Option<f64> {
+        let differences = self.differences();
+        let (center, sd) = (mean(&differences)?, sample_sd(&differences)?);
+        if sd == 0.0 {
+            return (center == 0.0).then_some(1.0);
+        }
+        let freedom = (self.n() - 1) as f64;
+        let t = center / sd * (self.n() as f64).sqrt();
+        let x = freedom / (freedom + t * t);
+        checked_beta_reg(0.5 * freedom, 0.5, x).ok().filter(|p| p.is_finite())
+    }
+
+    /// Two-sided p-value of the exact sign test: of pairs that differ, `a` is as often lower as
+    /// higher. 1 where none differs; `None` without pairs.
+    pub fn sign_p_value(&self) -> Option<f64> {
+        let (lower, _, higher) = self.signs();
+        let rarer = at_most(lower.min(higher), lower + higher, 0.5);
+        (self.n() > 0).then_some((2.0 * rarer).min(1.0))
+    }
+
+    fn sides(&self) -> (Vec<f64>, Vec<f64>) {
+        self.pairs.iter().copied().unzip()
+    }
+}
+
+/// Holm's adjustment ("A simple sequentially rejective multiple test procedure", Scandinavian
+/// Journal of Statistics 6, 1979) of the p-values of one family: to call those below 0.05
+/// different is wrong anywhere in the family with at most 5 %, however the tests depend on each
+/// other. Absent values are no part of the family and stay absent.
+pub fn holm(p_values: &[Option<f64>]) -> Vec<Option<f64>> {
+    let known = |i: &usize| p_values[*i].is_some_and(|p| !p.is_nan());
+    let mut order: Vec<usize> = (0..p_values.len()).filter(known).collect();
+    order
+        .sort_by(|i, j| f64::total_cmp(&p_values[*i].unwrap_or(1.0), &p_values[*j].unwrap_or(1.0)));
+    let mut adjusted = vec![None; p_values.len()];
+    let mut largest = 0.0_f64;
+    for (rank, &i) in order.iter().enumerate() {
+        let factor = (order.len() - rank) as f64;
+        largest = largest.max((factor * p_values[i].unwrap_or(1.0)).min(1.0));
+        adjusted[i] = Some(largest);
+    }
+    adjusted
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::close;
+    use super::*;
+    use proptest::prelude::*;
+
+    fn some(values: &[f64]) -> Vec<Option<f64>> {
+        values.iter().map(|v| Some(*v)).collect()
+    }
+
+    /// Student 1908, additional hours of sleep; R's data set `sleep`.
+    fn sleep() -> Pairs {
+        let a = [0.7, -1.6, -0.2, -1.2, -0.1, 3.4, 3.7, 0.8, 0.0, 2.0];
+        let b = [1.9, 0.8, 1.1, 0.1, -0.1, 4.4, 5.5, 1.6, 4.6, 3.4];
+        Pairs::of(&some(&a), &some(&b))
+    }
+
+    #[test]
+    fn students_sleep_gives_what_r_gives() {
+        // R: t.test(extra ~ group, data = sleep, paired = TRUE); binom.test(0, 9).
+        let pairs = sleep();
+        close(pairs.difference().unwrap(), -1.58, 1e-12);
+        let interval = pairs.difference_interval().unwrap();
+        close(interval.low, -2.459_885_8, 1e-7);
+        close(interval.high, -0.700_114_2, 1e-7);
+        close(pairs.p_value().unwrap(), 0.002_832_89, 1e-7);
+        assert_eq!(pairs.signs(), (9, 1, 0));
+        close(pairs.sign_p_value().unwrap(), 0.003_906_25, 1e-12);
+        assert_eq!(pairs.ratio(), None, "some are negative");
+        let bootstrap = pairs.difference_bootstrap(&Bootstrap::default()).unwrap();
+        assert!(bootstrap.contains(-1.58) && bootstrap.high < 0.0);
+    }
+
+    #[test]
+    fn only_complete_finite_pairs_count() {
+        let a = [Some(1.0), None, Some(f64::NAN), Some(4.0), Some(9.0)];
+        let b = [Some(2.0), Some(1.0), Some(1.0), Some(f64::INFINITY)];
+        let pairs = Pairs::of(&a, &b);
+        assert_eq!((pairs.n(), pairs.incomplete(), pairs.signs()), (1, 4, (1, 0, 0)));
+        assert_eq!(
+            (pairs.p_value(), pairs.difference_interval(), pairs.ratio()),
+            (None, None, None)
+        );
+        assert_eq!(Pairs::of(&[], &[]).sign_p_value(), None);
+    }
+
+    #[test]
+    fn differences_without_spread_have_no_p_value_but_none() {
+        assert_eq!(Pairs::of(&some(&[1.0; 5]), &some(&[1.0; 5])).p_value(), Some(1.0));
+        assert_eq!(Pairs::of(&some(&[1.0; 5]), &some(&[2.0; 5])).p_value(), None);
+        let sure = Pairs::of(&some(&[1.0; 5]), &some(&[2.0; 5])).ratio().unwrap();
+        assert_eq!(sure, (0.5, Interval { low: 0.5, high: 0.5 }));
+    }
+
+    #[test]
+    fn holm_gives_what_r_gives() {
+        // R: p.adjust(c(0.01, 0.04, 0.03, 0.005), "holm").
+        let adjusted = holm(&[Some(0.01), Some(0.04), None, Some(0.03), Some(0.005)]);
+        let expected = [Some(0.03), Some(0.06), None, Some(0.06), Some(0.02)];
+        for (a, e) in adjusted.iter().zip(expected) {
+            assert_eq!(a.is_some(), e.is_some());
+            close(a.unwrap_or(0.0), e.unwrap_or(0.0), 1e-12);
+        }
+        assert_eq!(holm(&[Some(f64::NAN), None]), [None, None]);
+        assert_eq!(holm(&[Some(0.9), Some(0.8)]), [Some(1.0), Some(1.0)]);
+    }
+
+    proptest! {
+        #[test]
+        fn fieller_of_the_inverse_is_the_inverse(
+            pairs in prop::collection::vec((50.0_f64..60.0, 80.0_f64..100.0), 3..30),
+        ) {
+            let (a, b): (Vec<_>, Vec<_>) = pairs.into_iter().map(|(a, b)| (Some(a), Some(b))).unzip();
+            let (ratio, interval) = Pairs::of(&a, &b).ratio().unwrap();
+            let (other, inverse) = Pairs::of(&b, &a).ratio().unwrap();
+            prop_assert!((ratio * other - 1.0).abs() < 1e-12 && interval.contains(ratio));
+            prop_assert!((interval.low * inverse.high - 1.0).abs() < 1e-9);
+            prop_assert!((interval.high * inverse.low - 1.0).abs() < 1e-9);
+        }
+
+        #[test]
+        fn no_pairs_make_a_comparison_panic(
+            a in prop::collection::vec(prop::option::of(prop::num::f64::ANY), 0..8),
+            b in prop::collection::vec(prop::option::of(prop::num::f64::ANY), 0..8),
+        ) {
+            let pairs = Pairs::of(&a, &b);
+            let few = Bootstrap { resamples: 50, ..Bootstrap::default() };
+            let _ = (pairs.difference(), pairs.difference_interval(), pairs.ratio(), pairs.p_value());
+            let _ = (pairs.difference_bootstrap(&few), pairs.ratio_bootstrap(&few), pairs.sign_p_value());
+        }
+
+        #[test]
+        fn adjusted_p_values_keep_their_order_and_only_grow(p in prop::collection::vec(0.0_f64..1.0, 0..12)) {
+            let adjusted = holm(&some(&p));
+            for (i, a) in adjusted.iter().enumerate() {
+                prop_assert!(a.unwrap() >= p[i] && a.unwrap() <= 1.0);
+                prop_assert!((0..p.len()).all(|j| p[i] > p[j] || adjusted[i] <= adjusted[j]));
+            }
+        }
+    }
+}

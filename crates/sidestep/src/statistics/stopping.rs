@@ -1,0 +1,322 @@
+//! How many runs are enough.
+//!
+//! # What stopping early does to an interval
+//!
+//! Who looks again and again and stops as soon as the interval is narrow stops when the spread
+//! happens to look small, and with a relative target when the mean happens to look large. The
+//! interval then holds the truth a little less often than 95 % (Anscombe 1953; Chow and Robbins
+//! 1965: the loss vanishes as the target gets narrower, not before). Three rules keep it small:
+//! no look before [`StoppingRule::min_runs`], looks only at the ends of rounds, and rounds that
+//! grow by at least a half and at most to twice of what has been run, towards the number that
+//! the present spread predicts, so that there are few looks. Measured by the tests of this
+//! module over 4,000 sweeps each (standard error 0.4 %), nominal 95 %:
+//!
+//! | values | target | first look | runs | coverage |
+//! |---|---|---|---|---|
+//! | normal | a quarter sd | 10 | 76 | 94.7 % |
+//! | normal | half an sd | 10 | 21 | 93.8 % |
+//! | normal, mean 10 sd | 2 % of the mean | 10 | 117 | 94.4 % |
+//! | exponential | 20 % of the mean | 10 | 117 | 94.8 % |
+//! | exponential | 50 % of the mean | 10 | 20 | 90.4 % |
+//! | exponential | 50 % of the mean | 20 | 23 | 91.7 % |
+//! | exponential | none, 20 runs | | 20 | 91.7 % |
+//! | exponential | none, 100 runs | | 100 | 95.0 % |
+//!
+//! So the loss is small, and what is lost with few runs of skewed values is lost without any
+//! stopping too: 20 runs are few. A first round of 20 costs little.
+//!
+//! Where that matters, take a larger first round, or run a fixed number of runs.
+
+use super::interval::runs_for_half_width;
+use super::mean_interval;
+use super::moments::{Sample, is_constant, mean, sample_sd};
+use serde::Serialize;
+
+/// Equal values are believed from this many on: by the rule of three (`3 / n`) at most about 5 %
+/// of all runs then differ. Before, an interval without width is no evidence of anything.
+const CONSTANT: usize = 60;
+
+/// When to stop running: at the half-width of Student's 95 % interval of the mean.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct StoppingRule {
+    /// The half-width wanted, in the metric's unit, or as a share of the mean.
+    pub half_width: f64,
+    /// Whether it is a share of the mean's magnitude.
+    pub relative: bool,
+    /// Runs of the first round; below 2 it is 2.
+    pub min_runs: usize,
+    /// Runs never exceeded.
+    pub max_runs: usize,
+}
+
+/// What a [`StoppingRule`] says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Next {
+    /// Run until there are this many runs in total, then ask again.
+    Run(usize),
+    /// The first so many runs are the result; those beyond are no part of it.
+    Enough(usize, Reason),
+}
+
+/// Why runs are enough.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Reason {
+    /// The interval is as narrow as wanted.
+    Reached,
+    /// All values are equal, and there are enough of them (60) to believe it.
+    Constant,
+    /// The maximum of runs is reached, and the interval is wider than wanted.
+    Maximum,
+    /// The maximum of runs is reached, and the interval holds 0: no share of a mean that may be
+    /// 0 is narrow enough. Ask for an absolute half-width instead.
+    MeanNearZero,
+    /// The maximum of runs is reached, and fewer than two have a value.
+    TooFewValues,
+}
+
+impl Reason {
+    /// In words.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Reached => "the interval is as narrow as wanted",
+            Self::Constant => "all values are equal",
+            Self::Maximum => "the maximum of runs is reached; the interval is wider than wanted",
+            Self::MeanNearZero => {
+                "the maximum of runs is reached; the mean may be 0, of which no share is narrow \
+                 enough: ask for an absolute half-width"
+            }
+            Self::TooFewValues => "the maximum of runs is reached; fewer than two have a value",
+        }
+    }
+}
+
+impl StoppingRule {
+    /// What to do after these runs, one value each, in the order of the runs.
+    ///
+    /// A function of the values alone: rounds are gone through from the first run on, whatever
+    /// number of values is there. So it does not matter how many workers there are, how far
+    /// they ran ahead, or whether a sweep was killed in the middle of a round.
+    pub fn next(&self, values: &[Option<f64>]) -> Next {
+        self.next_of(&[values])
+    }
+
+    /// What to do for several columns at once (metrics, or variants that are run side by side):
+    /// enough when all are, with the worst reason. Only runs that all columns have count.
+    ///
+    /// Without columns nothing is asked for: enough after the first round.
+    pub fn next_of(&self, columns: &[&[Option<f64>]]) -> Next {
+        let there = columns.iter().map(|c| c.len()).min().unwrap_or(usize::MAX);
+        let mut total = self.min_runs.max(2).min(self.max_runs);
+        loop {
+            if there < total {
+                return Next::Run(total);
+            }
+            let looks: Vec<Next> = columns.iter().map(|c| self.look(&c[..total])).collect();
+            let more = looks.iter().filter_map(|look| match look {
+                Next::Run(total) => Some(*total),
+                Next::Enough(..) => None,
+            });
+            let reasons = looks.iter().filter_map(|look| match look {
+                Next::Enough(_, reason) => Some(*reason),
+                Next::Run(_) => None,
+            });
+            match more.max() {
+                Some(more) => total = more,
+                None => return Next::Enough(total, reasons.max().unwrap_or(Reason::Reached)),
+            }
+        }
+    }
+
+    /// One look at the end of a round.
+    fn look(&self, values: &[Option<f64>]) -> Next {
+        let runs = values.len();
+        let sample = Sample::of(values.iter().copied()).values;
+        match self.verdict(&sample) {
+            Some(reason) => Next::Enough(runs, reason),
+            None if runs >= self.max_runs => Next::Enough(runs, self.excuse(&sample)),
+            None => Next::Run(self.round(runs, &sample)),
+        }
+    }
+
+    fn verdict(&self, sample: &[f64]) -> Option<Reason> {
+        let interval = mean_interval(sample)?;
+        if is_constant(sample) {
+            return (sample.len() >= CONSTANT).then_some(Reason::Constant);
+        }
+        let reached = interval.half_width() <= self.target(sample);
+        // A target of 0 is only reached by what never varies.
+        reached.then_some(Reason::Reached)
+    }
+
+    fn excuse(&self, sample: &[f64]) -> Reason {
+        match mean_interval(sample) {
+            None => Reason::TooFewValues,
+            // No width at all: narrow enough, but of too few runs to be called constant.
+            Some(interval) if self.relative && interval.contains(0.0) => Reason::MeanNearZero,
+            Some(_) => Reason::Maximum,
+        }
+    }
+
+    /// The half-width wanted, in the metric's unit.
+    fn target(&self, sample: &[f64]) -> f64 {
+        let of = if self.relative { mean(sample).unwrap_or(0.0).abs() } else { 1.0 };
+        self.half_width * of
+    }
+
+    /// The end of the next round: what the spread so far predicts, at least half as much again
+    /// and at most twice what there is.
+    fn round(&self, runs: usize, sample: &[f64]) -> usize {
+        let values = if is_constant(sample) {
+            Some(CONSTANT as u64)
+        } else {
+            sample_sd(sample).and_then(|sd| runs_for_half_width(sd, self.target(sample)))
+        };
+        // Runs without a value have to be made up for.
+        let share = sample.len() as f64 / runs as f64;
+        let predicted = values.map_or(usize::MAX, |n| (n as f64 / share).ceil() as usize);
+        let (least, most) = (runs + runs.div_ceil(2), runs.saturating_mul(2));
+        predicted.clamp(least, most).min(self.max_runs)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use sidestep_kernel::distr::normal;
+    use sidestep_kernel::stream::{Draws, Purpose, Streams};
+    use sidestep_kernel::{Seed, math};
+
+    const ABSOLUTE: StoppingRule =
+        StoppingRule { half_width: 0.25, relative: false, min_runs: 10, max_runs: 1000 };
+
+    fn drawn(case: u32, n: usize, draw: impl Fn(&mut Draws) -> f64) -> Vec<Option<f64>> {
+        let mut draws = Streams::new(Seed(3)).draws(case, 0, Purpose(0));
+        (0..n).map(|_| Some(draw(&mut draws))).collect()
+    }
+
+    #[test]
+    fn the_first_look_is_after_the_first_round() {
+        assert_eq!(ABSOLUTE.next(&[]), Next::Run(10));
+        assert_eq!(ABSOLUTE.next(&[Some(1.0); 9]), Next::Run(10));
+        assert_eq!(StoppingRule { min_runs: 0, ..ABSOLUTE }.next(&[]), Next::Run(2));
+        assert_eq!(StoppingRule { max_runs: 5, ..ABSOLUTE }.next(&[]), Next::Run(5));
+        assert_eq!(
+            StoppingRule { max_runs: 0, ..ABSOLUTE }.next(&[]),
+            Next::Enough(0, Reason::TooFewValues)
+        );
+        assert_eq!(ABSOLUTE.next_of(&[]), Next::Enough(10, Reason::Reached));
+    }
+
+    #[test]
+    fn equal_values_are_believed_after_sixty() {
+        assert_eq!(ABSOLUTE.next(&[Some(1.0); 59]), Next::Run(60));
+        assert_eq!(ABSOLUTE.next(&[Some(1.0); 60]), Next::Enough(60, Reason::Constant));
+        let relative = StoppingRule { relative: true, max_runs: 20, ..ABSOLUTE };
+        assert_eq!(relative.next(&[Some(0.0); 20]), Next::Enough(20, Reason::MeanNearZero));
+        assert_eq!(relative.next(&[Some(2.0); 20]), Next::Enough(20, Reason::Maximum));
+    }
+
+    #[test]
+    fn a_mean_near_zero_runs_to_the_maximum_and_says_so() {
+        let rule = StoppingRule { half_width: 0.05, relative: true, min_runs: 10, max_runs: 300 };
+        let values: Vec<_> = (0..300).map(|i| Some(if i % 2 == 0 { 1.0 } else { -1.0 })).collect();
+        assert_eq!(rule.next(&values), Next::Enough(300, Reason::MeanNearZero));
+    }
+
+    #[test]
+    fn runs_without_a_value_are_made_up_for() {
+        let nothing = vec![None; 1000];
+        assert_eq!(ABSOLUTE.next(&nothing), Next::Enough(1000, Reason::TooFewValues));
+        let half: Vec<_> = drawn(1, 1000, normal)
+            .into_iter()
+            .enumerate()
+            .map(|(i, v)| v.filter(|_| i % 2 == 0))
+            .collect();
+        let Next::Enough(runs, Reason::Reached) = ABSOLUTE.next(&half) else {
+            panic!("not reached")
+        };
+        assert!((100..=300).contains(&runs), "{runs}");
+    }
+
+    #[test]
+    fn columns_go_on_until_the_last_of_them_is_narrow() {
+        let (wide, narrow) = (drawn(1, 1000, normal), drawn(2, 1000, |d| 0.01 * normal(d)));
+        let Next::Enough(alone, Reason::Reached) = ABSOLUTE.next(&narrow) else { panic!() };
+        let both = ABSOLUTE.next_of(&[&narrow, &wide]);
+        assert_eq!(alone, 10);
+        assert_eq!(both, ABSOLUTE.next(&wide));
+    }
+
+    /// How often the interval at the stop holds the mean, over 4,000 sweeps, and their mean
+    /// number of runs.
+    fn coverage(rule: StoppingRule, truth: f64, draw: impl Fn(&mut Draws) -> f64) -> (f64, f64) {
+        let (mut held, mut total) = (0, 0);
+        let sweeps = 4000;
+        for case in 0..sweeps {
+            let values = drawn(case, rule.max_runs, &draw);
+            let Next::Enough(runs, _) = rule.next(&values) else { panic!("all runs are there") };
+            let sample = Sample::of(values[..runs].iter().copied()).values;
+            held += usize::from(mean_interval(&sample).unwrap().contains(truth));
+            total += runs;
+        }
+        (held as f64 / f64::from(sweeps), total as f64 / f64::from(sweeps))
+    }
+
+    /// Fixed seed. The standard error of a coverage is 0.0036; the bounds are three errors below
+    /// the measured values, so a rule as good as ours fails at about one seed in 700.
+    #[test]
+    fn stopping_early_costs_little_coverage() {
+        let normal_rule = |half_width| StoppingRule { half_width, max_runs: 400, ..ABSOLUTE };
+        let relative = |half_width| StoppingRule { relative: true, ..normal_rule(half_width) };
+        let exponential = |d: &mut Draws| -math::ln(1.0 - d.uniform());
+        let fixed = |n| StoppingRule { min_runs: n, max_runs: n, ..ABSOLUTE };
+        let later = |half_width| StoppingRule { min_runs: 20, ..relative(half_width) };
+        let measured = [
+            ("normal, 0.25 sd", 0.925, coverage(normal_rule(0.25), 0.0, normal)),
+            ("normal, 0.5 sd", 0.925, coverage(normal_rule(0.5), 0.0, normal)),
+            ("normal, 2 %", 0.925, coverage(relative(0.02), 10.0, |d| 10.0 + normal(d))),
+            ("exponential, 20 %", 0.925, coverage(relative(0.2), 1.0, exponential)),
+            ("exponential, 50 %", 0.89, coverage(relative(0.5), 1.0, exponential)),
+            ("exponential, 50 %, from 20", 0.90, coverage(later(0.5), 1.0, exponential)),
+            ("exponential, 20 runs", 0.90, coverage(fixed(20), 1.0, exponential)),
+            ("exponential, 100 runs", 0.92, coverage(fixed(100), 1.0, exponential)),
+        ];
+        for (name, at_least, (held, runs)) in measured {
+            println!("{name}: {held} at {runs} runs");
+            assert!(held > at_least, "{name}: {held}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn the_decision_does_not_depend_on_when_one_looks(
+            values in prop::collection::vec(prop::option::of(-10.0_f64..30.0), 200), half_width in 0.1_f64..5.0,
+            relative: bool,
+        ) {
+            let rule = StoppingRule { half_width, relative, min_runs: 10, max_runs: 200 };
+            let last = rule.next(&values);
+            let Next::Enough(end, _) = last else { panic!("all runs are there") };
+            for there in 0..=200 {
+                match rule.next(&values[..there]) {
+                    Next::Run(total) => prop_assert!(there < total && total <= end),
+                    enough => prop_assert!(there >= end && enough == last),
+                }
+            }
+        }
+
+        #[test]
+        fn no_rule_and_no_values_make_it_panic_or_hang(
+            values in prop::collection::vec(prop::option::of(prop::num::f64::ANY), 0..40),
+            half_width in prop::num::f64::ANY, relative: bool, min_runs in 0_usize..50, max_runs in 0_usize..50,
+        ) {
+            let rule = StoppingRule { half_width, relative, min_runs, max_runs };
+            match rule.next(&values) {
+                Next::Run(total) => prop_assert!(total > values.len() && total <= max_runs),
+                Next::Enough(runs, _) => prop_assert!(runs <= values.len()),
+            }
+        }
+    }
+}
