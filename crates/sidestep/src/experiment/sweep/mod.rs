@@ -19,6 +19,7 @@ pub mod table;
 mod text;
 
 pub use compare::Comparison;
+pub use groups::{Level, Parameter};
 pub use label::Label;
 pub use summary::{Summary, SummaryOptions};
 pub use table::{Role, RunColumn, RunTable, RunValues};
