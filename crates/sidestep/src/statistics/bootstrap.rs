@@ -9,7 +9,7 @@
 use super::Interval;
 use super::moments::{is_constant, mean, sum};
 use super::quantile::percentile;
-use sidestep_kernel::stream::{Draws, Purpose, Streams};
+use sidestep_kernel::stream::{Purpose, Streams};
 use sidestep_kernel::{EntityId, Seed};
 use statrs::distribution::{ContinuousCDF, Normal};
 
@@ -51,9 +51,7 @@ impl Bootstrap {
         }
         // The mean of deviations: it loses no digits, and the jackknife has a closed form.
         let deviations: Vec<f64> = values.iter().map(|v| v - center).collect();
-        let mean_of = |chosen: &mut dyn Iterator<Item = &f64>| {
-            Some(chosen.sum::<f64>() / deviations.len() as f64)
-        };
+        let mean_of = |chosen: &[f64]| Some(chosen.iter().sum::<f64>() / chosen.len() as f64);
         let interval = self.corrected(&deviations, 0.0, acceleration(&deviations), mean_of)?;
         Some(Interval { low: center + interval.low, high: center + interval.high })
     }
@@ -81,23 +79,25 @@ impl Bootstrap {
         let jackknife: Vec<f64> = (0..items.len()).map(without).collect::<Option<_>>()?;
         let center = mean(&jackknife)?;
         let influences: Vec<f64> = jackknife.iter().map(|v| center - v).collect();
-        let of =
-            |chosen: &mut dyn Iterator<Item = &T>| statistic(&chosen.copied().collect::<Vec<T>>());
-        self.corrected(items, estimate, acceleration(&influences), of)
+        self.corrected(items, estimate, acceleration(&influences), statistic)
     }
 
     /// The corrected percentiles of what `statistic` says of the resamples.
-    fn corrected<T>(
+    fn corrected<T: Copy>(
         &self,
         items: &[T],
         estimate: f64,
         acceleration: f64,
-        statistic: impl Fn(&mut dyn Iterator<Item = &T>) -> Option<f64>,
+        statistic: impl Fn(&[T]) -> Option<f64>,
     ) -> Option<Interval> {
         if items.len() < 3 || u32::try_from(items.len()).is_err() {
             return None;
         }
-        let of = |resample| statistic(&mut self.resample(items, resample));
+        let mut chosen = Vec::with_capacity(items.len());
+        let of = |resample| {
+            self.resample(items, resample, &mut chosen);
+            statistic(&chosen)
+        };
         let mut resampled: Vec<f64> = (0..self.resamples).map(of).collect::<Option<_>>()?;
         if is_constant(&resampled) || !resampled.iter().all(|v| v.is_finite()) {
             return None;
@@ -120,18 +120,15 @@ impl Bootstrap {
         Some(Interval { low: end(tail)?, high: end(1.0 - tail)? })
     }
 
-    /// As many of `items` as there are, each drawn from all.
-    fn resample<'a, T>(&self, items: &'a [T], resample: EntityId) -> impl Iterator<Item = &'a T> {
-        let streams = Streams::new(self.seed);
-        let n = items.len() as u32;
-        let stream = move |k: usize| streams.draws(resample, k as u64, RESAMPLE);
-        let chosen = move |(draws, count): (Draws, usize)| {
-            let mut draws = draws;
-            (0..count).map(move |_| &items[draws.below(n) as usize])
-        };
-        let starts = (0..items.len()).step_by(STREAM).enumerate();
-        let rest = move |(k, start): (usize, usize)| (stream(k), STREAM.min(items.len() - start));
-        starts.map(rest).flat_map(chosen)
+    /// As many of `items` as there are, each drawn from all, in place of what is in `chosen`.
+    fn resample<T: Copy>(&self, items: &[T], resample: EntityId, chosen: &mut Vec<T>) {
+        chosen.clear();
+        let (streams, n) = (Streams::new(self.seed), items.len() as u32);
+        for (k, start) in (0..items.len()).step_by(STREAM).enumerate() {
+            let mut draws = streams.draws(resample, k as u64, RESAMPLE);
+            let count = STREAM.min(items.len() - start);
+            chosen.extend((0..count).map(|_| items[draws.below(n) as usize]));
+        }
     }
 }
 
@@ -164,6 +161,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
     use sidestep_kernel::math;
+    use sidestep_kernel::stream::Draws;
 
     /// Efron and Tibshirani 1993, table 14.1, measurement A of the spatial test.
     const SPATIAL: [f64; 26] = [
@@ -238,7 +236,8 @@ mod tests {
     #[test]
     fn more_values_than_a_stream_has_words_for_are_drawn_from_several() {
         let items: Vec<u32> = (0..(3 * STREAM as u32 + 5)).collect();
-        let chosen: Vec<u32> = Bootstrap::default().resample(&items, 4).copied().collect();
+        let mut chosen = Vec::new();
+        Bootstrap::default().resample(&items, 4, &mut chosen);
         assert_eq!(chosen.len(), items.len());
         assert_ne!(chosen[..100], chosen[STREAM..STREAM + 100]);
         let mut distinct = chosen;

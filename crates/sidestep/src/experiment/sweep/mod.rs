@@ -40,6 +40,7 @@ pub use cell::{Outcome, Started, start};
 pub use compare::Comparison;
 pub use design::{Design, Factor, Hypercube, Range, Setting};
 pub use file::{Sweep, Until};
+pub use groups::{Level, Parameter};
 pub use label::Label;
 pub use plan::{Cell, Plan, Shard, Variant};
 pub use rows::Rows;

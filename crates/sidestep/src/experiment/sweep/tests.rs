@@ -276,12 +276,11 @@ proptest! {
             column("x_s", Role::Metric, RunValues::Float(rows.iter().map(|r| r.2).collect())),
             column("ok", Role::Metric, RunValues::Bool(rows.iter().map(|r| r.3).collect())),
         ];
-        let int = |of: fn(&(i64, i64, Option<f64>, Option<bool>)) -> i64| {
-            RunValues::Int(rows.iter().map(|r| Some(of(r))).collect())
-        };
-        if cell { columns.push(column("cell", Role::Cell, int(|r| r.1))); }
-        if variant { columns.push(column("variant", Role::Variant, int(|r| r.0))); }
-        if replicate { columns.push(column("replicate", Role::Replicate, int(|r| r.1))); }
+        let int = |numbers: Vec<i64>| RunValues::Int(numbers.into_iter().map(Some).collect());
+        let (first, second) = (rows.iter().map(|r| r.0), rows.iter().map(|r| r.1));
+        if cell { columns.push(column("cell", Role::Cell, int(second.clone().collect()))); }
+        if variant { columns.push(column("variant", Role::Variant, int(first.collect()))); }
+        if replicate { columns.push(column("replicate", Role::Replicate, int(second.collect()))); }
         let bootstrap = Bootstrap { resamples: 60, ..Bootstrap::default() };
         let options = SummaryOptions { bootstrap, ..Default::default() };
         if let Ok(summary) = Summary::of(&RunTable { columns }, &options) {

@@ -63,7 +63,7 @@ fn number_row(variant: &VariantMetric, numbers: &Numbers) -> Vec<String> {
     let width = numbers.interval.map(|i| i.half_width());
     let plain = |value: Option<f64>| value.map_or("-".into(), |v| number(v, width));
     let quantile = |k: usize| numbers.quantiles.get(k).map_or("-".into(), |q| quantile(q, width));
-    let bootstrap = numbers.bootstrap.map_or("-".into(), |i| brackets(i));
+    let bootstrap = numbers.bootstrap.map_or("-".into(), brackets);
     let needed = numbers.runs_for_5_percent.map_or("-".into(), |n| n.to_string());
     vec![
         variant.variant.clone(),
