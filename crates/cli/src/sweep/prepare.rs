@@ -3,9 +3,10 @@
 use crate::exit::Failure;
 use crate::plan::source_of;
 use crate::progress::Stages;
+use sidestep::experiment::sweep::cell::metric_names;
 use sidestep::experiment::sweep::{Plan, Setting, Sweep, Variant};
 use sidestep::kernel::{Digest, InputError};
-use sidestep::scenario::Source;
+use sidestep::scenario::{Source, nearest};
 use sidestep::worlds::any::AnyCompiled;
 
 /// A sweep that is known to be right.
@@ -33,13 +34,30 @@ pub(super) fn prepare(
         stages.at("checking variants", f64::from(k) / count as f64);
         let (source, compiled) = variant(&base, settings)?;
         agents = agents.max(compiled.agents());
-        first.get_or_insert((compiled.world(), compiled.plan().seed));
+        if first.is_none() {
+            first = Some((compiled.world(), compiled.plan().seed));
+            check_metrics(sweep, &source, &compiled)?;
+        }
         prints.push_str(&print(&source, &compiled)?);
         each(k, &source, &compiled)?;
     }
     let first = first.expect("a design has at least one variant");
     let plan = Plan { agents, ..Plan::new(sweep, variants, first)? };
     Ok(Prepared { plan, fingerprint: Digest::of(prints.as_bytes()).to_string() })
+}
+
+/// The metrics that are named must be there: better told now than after all runs.
+fn check_metrics(sweep: &Sweep, source: &Source, compiled: &AnyCompiled) -> Result<(), InputError> {
+    let of_until = sweep.until.iter().flat_map(|until| &until.metrics);
+    let mut wanted = sweep.metrics.iter().chain(of_until).peekable();
+    if wanted.peek().is_none() {
+        return Ok(());
+    }
+    let known = metric_names(compiled.clone().start(source, 1).as_ref());
+    let Some(unknown) = wanted.find(|name| !known.contains(name)) else { return Ok(()) };
+    let known: Vec<&str> = known.iter().map(String::as_str).collect();
+    let cause = format!("`{unknown}` is no metric of the world `{}`", compiled.world());
+    Err(InputError::new(&sweep.place, cause, nearest(unknown, &known)))
 }
 
 /// A variant's scenario; an error says which variant it is.

@@ -1,34 +1,6 @@
 //! A full disk: the run fails with what replays it, and goes on when there is room.
 
-use crate::support::Place;
-use std::path::Path;
-use std::process::Command;
-
-/// A small file system of its own, as long as this lives.
-struct SmallDisk<'a>(&'a Path);
-
-impl<'a> SmallDisk<'a> {
-    /// `None` where this user may not mount.
-    fn mount(at: &'a Path, size: &str) -> Option<Self> {
-        std::fs::create_dir(at).expect("made");
-        mount(&["-t", "tmpfs", "-o", &format!("size={size}"), "tmpfs"], at).then_some(Self(at))
-    }
-
-    fn grow(&self, size: &str) {
-        assert!(mount(&["-o", &format!("remount,size={size}")], self.0));
-    }
-}
-
-impl Drop for SmallDisk<'_> {
-    fn drop(&mut self) {
-        let _ = Command::new("umount").arg(self.0).status();
-    }
-}
-
-fn mount(options: &[&str], at: &Path) -> bool {
-    let tried = Command::new("mount").args(options).arg(at).output();
-    tried.is_ok_and(|o| o.status.success())
-}
+use crate::support::{Place, SmallDisk};
 
 #[test]
 fn a_full_disk_fails_the_run_which_resumes_when_there_is_room() {

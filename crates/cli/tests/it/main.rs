@@ -14,5 +14,8 @@ mod ik;
 mod input;
 mod learn;
 mod reproduce;
+mod slurm;
 mod stops;
 mod support;
+mod sweep;
+mod sweep_faults;

@@ -151,3 +151,37 @@ pub(crate) fn signal(child: &Child, name: &str) {
     let sent = Command::new("kill").args([&format!("-{name}"), &pid]).status();
     assert!(sent.expect("kill is there").success());
 }
+
+/// A small file system of its own, as long as this lives.
+pub(crate) struct SmallDisk<'a>(&'a Path);
+
+impl<'a> SmallDisk<'a> {
+    /// `None` where this user may not mount.
+    pub(crate) fn mount(at: &'a Path, size: &str) -> Option<Self> {
+        std::fs::create_dir(at).expect("made");
+        mount(&["-t", "tmpfs", "-o", &format!("size={size}"), "tmpfs"], at).then_some(Self(at))
+    }
+
+    pub(crate) fn grow(&self, size: &str) {
+        assert!(mount(&["-o", &format!("remount,size={size}")], self.0));
+    }
+}
+
+impl Drop for SmallDisk<'_> {
+    fn drop(&mut self) {
+        let _ = Command::new("umount").arg(self.0).status();
+    }
+}
+
+fn mount(options: &[&str], at: &Path) -> bool {
+    let tried = Command::new("mount").args(options).arg(at).output();
+    tried.is_ok_and(|o| o.status.success())
+}
+
+/// A test that needs `what`, which is not here: skips it with a word, or fails where
+/// `SIDESTEP_REQUIRE` names it.
+pub(crate) fn requires(what: &str, why: &str) {
+    let required = std::env::var("SIDESTEP_REQUIRE").unwrap_or_default();
+    assert!(!required.split(',').any(|word| word.trim() == what), "{what} is required: {why}");
+    println!("skipped: {why}");
+}

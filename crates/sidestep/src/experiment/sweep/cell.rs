@@ -50,6 +50,16 @@ pub fn start(cell: Cell, source: &Source, workers: usize) -> Result<Started, Inp
     Ok(Started { cell, simulation: compiled.start(&source, workers), until })
 }
 
+/// Names of the metrics that runs of a scenario have, in order.
+pub fn metric_names(simulation: &dyn Simulation) -> Vec<String> {
+    let names = flat(&simulation.metrics()).into_iter().map(|(name, _)| name);
+    names.filter(|name| !is_by_clock(name)).collect()
+}
+
+fn is_by_clock(name: &str) -> bool {
+    BY_CLOCK.iter().any(|end| name.ends_with(end))
+}
+
 impl Started {
     /// Runs to the end; `None` as soon as `go_on` says no.
     pub fn run(mut self, go_on: &dyn Fn() -> bool) -> Option<Outcome> {
@@ -67,9 +77,8 @@ impl Started {
 impl Outcome {
     /// What came of a simulation that has ended.
     pub fn of(cell: Cell, simulation: &dyn Simulation) -> Self {
-        let (costs, metrics) = flat(&simulation.metrics())
-            .into_iter()
-            .partition(|(name, _)| BY_CLOCK.iter().any(|end| name.ends_with(end)));
+        let (costs, metrics) =
+            flat(&simulation.metrics()).into_iter().partition(|(name, _)| is_by_clock(name));
         Self {
             cell: cell.id,
             cycles: simulation.cycle(),
