@@ -15,6 +15,7 @@ mod driver;
 mod exit;
 mod files;
 mod interrupt;
+mod pages;
 mod picture;
 mod plan;
 mod progress;

@@ -8,6 +8,7 @@ use clap::{Args, ValueEnum};
 use serde_json::json;
 use sidestep::experiment::methods::{compare as run_all, table};
 use sidestep::worlds::airspace::world::Method;
+use sidestep_report::markdown;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -73,6 +74,6 @@ pub(crate) fn compare(args: &CompareArgs, console: Console) -> Result<ExitCode, 
     stages.clear();
     let results = results?;
     let json = json!({ "name": compiled.name, "seed": compiled.seed, "methods": results });
-    console.result(&json, || table(&compiled.name, &results).to_string());
+    console.result(&json, || markdown::table(&table(&compiled.name, &results)));
     Ok(ExitCode::Done)
 }

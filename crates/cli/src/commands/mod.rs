@@ -11,6 +11,7 @@ mod learn;
 mod map;
 mod new;
 mod replay;
+mod report;
 mod reproduce;
 mod resume;
 mod run;
@@ -45,6 +46,8 @@ pub(crate) enum Command {
     Ik(ik::IkArgs),
     /// Continue a recorded run or a sweep that was stopped or killed
     Resume(resume::ResumeArgs),
+    /// Write a report of a run folder: one HTML file, and Markdown
+    Report(report::ReportArgs),
     /// Run a paper's experiments anew and judge its claims
     Reproduce(reproduce::ReproduceArgs),
     /// Recompute a recorded run up to a cycle and show where everybody is
@@ -68,6 +71,7 @@ pub(crate) fn execute(command: Command, console: &Console) -> Result<ExitCode, F
         Command::Fk(args) => fk::fk(&args, *console),
         Command::Ik(args) => ik::ik(&args, *console),
         Command::Resume(args) => resume::resume(&args, *console),
+        Command::Report(args) => report::report(&args, *console),
         Command::Reproduce(args) => reproduce::reproduce(&args, *console),
         Command::Replay(args) => replay::replay(&args, *console),
     }

@@ -5,8 +5,7 @@ use crate::console::{Console, aligned, duration, grouped};
 use crate::exit::{ExitCode, Failure};
 use serde_json::json;
 use sidestep::experiment::sweep::rounds::Stopped;
-use sidestep::experiment::sweep::{Outcome, Plan, RunTable, Shard, Summary, SummaryOptions};
-use sidestep::kernel::InputError;
+use sidestep::experiment::sweep::{Outcome, Plan, RunTable, Shard, Summary};
 use std::fmt::Write;
 use std::time::Instant;
 
@@ -93,7 +92,7 @@ pub(super) fn say(
     folder: Option<&Folder>,
     console: Console,
 ) -> Result<ExitCode, Failure> {
-    let summary = summary(plan, table)?;
+    let summary = plan.summary(table)?;
     let failed = failures(plan, table, folder, console);
     let json = json!({
         "name": plan.name,
@@ -109,19 +108,6 @@ pub(super) fn say(
     });
     console.result(&json, || text(plan, table, &summary, stopped, effort, folder));
     Ok(if failed == 0 { ExitCode::Done } else { ExitCode::Failed })
-}
-
-/// The runs of a sweep, summed up as its plan says.
-///
-/// # Errors
-/// When a metric that is to be reported does not exist.
-pub(crate) fn summary(plan: &Plan, table: &RunTable) -> Result<Summary, InputError> {
-    let options = SummaryOptions {
-        metrics: (!plan.metrics.is_empty()).then(|| plan.metrics.clone()),
-        baseline: plan.baseline.map(|variant| variant.to_string()),
-        ..SummaryOptions::default()
-    };
-    Summary::of(table, &options)
 }
 
 fn text(
@@ -141,7 +127,7 @@ fn text(
     );
     for table in summary.tables() {
         // Writing to a string cannot fail.
-        let _ = write!(text, "\n{table}");
+        let _ = write!(text, "\n{}", markdown::table(&table));
     }
     let mut lines = Vec::new();
     for Stopped { variant, runs, reason } in stopped {

@@ -42,6 +42,8 @@ impl Point {
 pub enum Mark {
     /// A line, with markers where the points are few.
     Line,
+    /// A line alone, within a band of the intervals.
+    Band,
     /// Markers only.
     Points,
 }
@@ -63,13 +65,22 @@ impl Series {
         Self { label: label.into(), points, mark: Mark::Line }
     }
 
+    /// Points joined by a line, their intervals as a band around it.
+    pub fn band(label: impl Into<String>, points: Vec<Point>) -> Self {
+        Self { mark: Mark::Band, ..Self::line(label, points) }
+    }
+
     /// Points that are not joined.
     pub fn points(label: impl Into<String>, points: Vec<Point>) -> Self {
         Self { mark: Mark::Points, ..Self::line(label, points) }
     }
 
     fn shows_markers(&self) -> bool {
-        self.mark == Mark::Points || self.points.len() <= MOST_MARKERS
+        match self.mark {
+            Mark::Points => true,
+            Mark::Line => self.points.len() <= MOST_MARKERS,
+            Mark::Band => false,
+        }
     }
 }
 
@@ -188,7 +199,7 @@ impl Plot {
             let (color, marker) = (series_color(index), Marker::of_series(index));
             let symbol = match series.mark {
                 Mark::Points => Symbol::Marker { color, marker },
-                Mark::Line => {
+                Mark::Line | Mark::Band => {
                     Symbol::Line { color, marker: series.shows_markers().then_some(marker) }
                 }
             };
@@ -208,7 +219,10 @@ impl Plot {
     ) {
         let color = series_color(index);
         let y = frame.y;
-        if series.mark == Mark::Line {
+        if series.mark == Mark::Band {
+            self.draw_band(frame, x, color, series);
+        }
+        if series.mark != Mark::Points {
             for run in series.points.split(|p| !self.holds(p)).filter(|run| run.len() > 1) {
                 let data = polyline(thinned(run.iter().map(|p| (x.px(p.x), y.px(p.y)))));
                 let look = r#"fill="none" stroke-width="2" stroke-linejoin="round""#;
@@ -217,9 +231,7 @@ impl Plot {
         }
         for point in series.points.iter().filter(|p| self.holds(p)) {
             let at = (x.px(point.x), y.px(point.y));
-            if let Some((low, high)) =
-                point.interval.filter(|(l, h)| l.is_finite() && h.is_finite())
-            {
+            if let Some((low, high)) = bounds(point).filter(|_| series.mark != Mark::Band) {
                 error_bar(
                     &mut frame.svg,
                     at.0,
@@ -233,6 +245,24 @@ impl Plot {
             }
         }
     }
+
+    /// Fills what lies between the ends of the intervals, over each stretch that has them.
+    fn draw_band(&self, frame: &mut Frame, x: Scale, color: &str, series: &Series) {
+        let y = frame.y;
+        let is_out = |p: &Point| !self.holds(p) || bounds(p).is_none();
+        for run in series.points.split(is_out).filter(|run| run.len() > 1) {
+            let ends = |p: &Point| bounds(p).unwrap_or((p.y, p.y));
+            let upper = run.iter().map(|p| (x.px(p.x), y.px(ends(p).1)));
+            let lower = run.iter().rev().map(|p| (x.px(p.x), y.px(ends(p).0)));
+            let data = polyline(upper.chain(lower)) + "Z";
+            frame.svg.path(&data, format_args!(r#"fill="{color}" fill-opacity="0.2""#));
+        }
+    }
+}
+
+/// A point's interval, where it can be drawn.
+fn bounds(point: &Point) -> Option<(f64, f64)> {
+    point.interval.filter(|(low, high)| low.is_finite() && high.is_finite())
 }
 
 /// The vertical values a point covers.

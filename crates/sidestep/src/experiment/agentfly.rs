@@ -5,8 +5,9 @@
 //! numbers are those of a Java platform of 2009; its claims are about which is more, and those
 //! are judged here. Both deployments choose the same controls, so flights are the same.
 
-use super::claim::{Claim, Verdict};
-use super::figure::{Figure, FigureKind, Series, Table};
+use super::claim::{self, Claim, Verdict};
+use super::document::{Block, Document, Text};
+use super::figure::{Figure, FigureKind, Point, Series, Table};
 use super::{Estimate, farm};
 use crate::scenario::Source;
 use crate::worlds::airspace::airplane::Point as AirPoint;
@@ -237,6 +238,7 @@ fn takes_more_time(cells: &[Cell]) -> Claim {
     Claim {
         id: "A-1",
         paper: "pim takes more time than the team (figure 5)",
+        papers_figure: None,
         ours: format!("pim / team: {}", listed(&ratios)),
         verdict: everywhere(&ratios, |ratio| ratio > 1.0),
         reason: "above 1 at every number of airplanes".into(),
@@ -248,6 +250,7 @@ fn needs_fewer_messages(cells: &[Cell]) -> Claim {
     Claim {
         id: "A-2",
         paper: "pim needs fewer messages than the team (figure 6)",
+        papers_figure: None,
         ours: format!("pim / team: {}", listed(&ratios)),
         verdict: everywhere(&ratios, |ratio| ratio < 1.0),
         reason: "below 1 at every number of airplanes".into(),
@@ -260,6 +263,7 @@ fn moves_far_more_bytes(cells: &[Cell]) -> Claim {
     Claim {
         id: "A-3",
         paper: "pim moves far more bytes than the team (figure 7)",
+        papers_figure: None,
         ours: format!(
             "pim / team: {}; against a team that multicasts: {}",
             listed(&unicast),
@@ -280,6 +284,7 @@ fn bytes_grow_faster(cells: &[Cell]) -> Claim {
     Claim {
         id: "A-4",
         paper: "pim's bytes grow faster with the number of airplanes (figure 7)",
+        papers_figure: None,
         ours: format!(
             "pim / team with the fewest and the most airplanes: {}; against a team that \
              multicasts: {}",
@@ -297,6 +302,7 @@ fn multicast_saves(cells: &[Cell]) -> Claim {
     Claim {
         id: "A-5",
         paper: "multicast saves the team further bandwidth, most with many airplanes",
+        papers_figure: None,
         ours: format!("unicast / multicast: {}", listed(&saved)),
         verdict: rising(&saved),
         reason: "the ratio rises with every airplane".into(),
@@ -317,6 +323,7 @@ fn hardly_in_time(cells: &[Cell]) -> Claim {
     Claim {
         id: "A-6",
         paper: "with five and more airplanes pim can hardly compute the optimum in reasonable time",
+        papers_figure: Some("from 5 airplanes on; one optimization every 5 s"),
         ours,
         verdict,
         reason: "an optimization takes longer than the time between two, with any such number"
@@ -343,13 +350,15 @@ impl Report {
                         .collect(),
                 })
                 .into(),
+            ..Figure::default()
         };
         let flights = Figure {
             title: format!("Flights of {} airplanes", self.tracks_m.len()),
             x_label: "east, km".into(),
             y_label: "north, km".into(),
-            kind: FigureKind::Lines,
+            kind: FigureKind::Ways,
             series: self.tracks_m.iter().map(|track| flight(track)).collect(),
+            ..Figure::default()
         };
         vec![
             flights,
@@ -393,26 +402,34 @@ impl Report {
         table
     }
 
-    /// The report as Markdown.
-    pub fn to_markdown(&self) -> String {
-        let rehearsal = if self.plan.quick { " A rehearsal: without weight." } else { "" };
-        let seeds = self.plan.seeds;
-        let mut claims =
-            Table::new("Claims of the paper", "", &["claim", "paper", "ours", "verdict", "rule"]);
-        for c in &self.claims {
-            let cells = [c.id, c.paper, &c.ours, c.verdict.name(), &c.reason];
-            claims.row(cells.map(String::from));
+    /// The report, the claims first.
+    pub fn document(&self) -> Document {
+        let plan = &self.plan;
+        let setting = format!(
+            "The super-conflict with the paper's numbers, {} seeds for each number of airplanes, up \
+             to {} cycles of {DT_S} s, no shield. Version {}.",
+            plan.seeds,
+            plan.cycles,
+            env!("CARGO_PKG_VERSION"),
+        );
+        let lead = format!("{} {setting}", claim::tally(&self.claims));
+        let mut document = Document::new("Probability collectives in AGENTFLY, run anew", lead);
+        if plan.quick {
+            document.warning(Text::marked(claim::REHEARSAL));
         }
-        format!(
-            "# Probability collectives in AGENTFLY, run anew\n\nSuper-conflict, the paper's numbers, \
-             {seeds} seeds each, no shield.{rehearsal}\n\n{claims}\n{}",
-            self.table()
-        )
+        document.section("Claims").push(Block::Claims(self.claims.clone()));
+        document.section("Team and migrating coordinator").tables([self.table()]);
+        document.figures(self.figures().into_iter().map(Figure::with_intervals_told));
+        let quick = if plan.quick { " --quick" } else { "" };
+        let command =
+            format!("sidestep reproduce agentfly{quick} --seeds {} --out DIR", plan.seeds);
+        document.section("How to run it again").commands("In a shell", command);
+        document
     }
 }
 
 fn flight(track_m: &[AirPoint]) -> Series {
-    let km = |at: &AirPoint| (at[0] / 1000.0, at[1] / 1000.0, None);
+    let km = |at: &AirPoint| Point::new(at[0] / 1000.0, at[1] / 1000.0);
     Series { name: String::new(), points: track_m.iter().map(km).collect() }
 }
 
@@ -428,8 +445,10 @@ mod tests {
         assert_eq!((report.cells.len(), report.claims.len()), (6, 6));
         assert!(report.cells.iter().all(|cell| cell.messages.or_zero() > 0.0), "all have talked");
         assert!(report.claims.iter().all(|claim| claim.verdict != Verdict::Lost));
-        assert!(report.to_markdown().contains("| A-6 |"));
-        assert_eq!(report.figures().len(), 4);
+        let document = report.document();
+        assert!(document.blocks.contains(&Block::Claims(report.claims.clone())));
+        let figures = document.blocks.iter().filter(|block| matches!(block, Block::Figure(_)));
+        assert_eq!(figures.count(), 4);
         assert_eq!(report.figures()[0].series.len(), 5);
     }
 

@@ -1,8 +1,11 @@
 //! Claims of a paper, and what came of them.
 
-use super::Table;
 use crate::statistics::Interval;
 use serde::Serialize;
+
+/// What stands above a report of little weight.
+pub const REHEARSAL: &str = "**A rehearsal: its figures have no weight.** Everything was run, with \
+                             too few runs to measure anything. Run it without `--quick`.";
 
 /// What we say of a claim.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -18,6 +21,9 @@ pub enum Verdict {
 }
 
 impl Verdict {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Held, Self::NotHeld, Self::Lost];
+
     /// Its name in tables.
     pub fn name(self) -> &'static str {
         ["held", "not held", "lost"][self as usize]
@@ -46,6 +52,9 @@ pub struct Claim {
     pub id: &'static str,
     /// What the paper says, in our words.
     pub paper: &'static str,
+    /// The paper's own figure, where it states one. None of the three papers gives an interval.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub papers_figure: Option<&'static str>,
     /// Our figures.
     pub ours: String,
     /// The verdict.
@@ -54,19 +63,34 @@ pub struct Claim {
     pub reason: String,
 }
 
-/// The claims as a table.
-pub fn table(claims: &[Claim]) -> Table {
-    let note = "`lost`: what the paper measured is lost, takes another machine, or a quieter one. \
-                Every verdict follows from the figures by the rule in its row; an interval is \
-                95 %.";
-    let columns = ["claim", "the paper, in our words", "our figures", "verdict", "why"];
-    let mut table = Table::new("Claims", note, &columns);
-    for c in claims {
-        let verdict = c.verdict.name().to_string();
-        table.row([c.id.into(), c.paper.into(), c.ours.clone(), verdict, c.reason.clone()]);
+impl Claim {
+    /// The same claim beside the figure that the paper states.
+    #[must_use]
+    pub fn with_papers_figure(self, figure: &'static str) -> Self {
+        Self { papers_figure: Some(figure), ..self }
     }
-    table
 }
+
+/// How many of the claims have this verdict.
+pub fn count(claims: &[Claim], verdict: Verdict) -> usize {
+    claims.iter().filter(|claim| claim.verdict == verdict).count()
+}
+
+/// What came of all the claims, in a sentence.
+pub fn tally(claims: &[Claim]) -> String {
+    format!(
+        "Of {} claims {} held, {} did not hold, and {} cannot be judged.",
+        claims.len(),
+        count(claims, Verdict::Held),
+        count(claims, Verdict::NotHeld),
+        count(claims, Verdict::Lost),
+    )
+}
+
+/// How to read a list of claims.
+pub const NOTE: &str = "Every verdict follows from the figures by the rule in its row; intervals are \
+                        95 %. `lost`: what the paper measured is lost, takes another machine, or a \
+                        quieter one.";
 
 #[cfg(test)]
 mod tests {

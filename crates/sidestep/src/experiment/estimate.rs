@@ -54,7 +54,8 @@ impl Estimate {
 
     /// A point of a figure at `x`, if there is a mean.
     pub fn point(&self, x: f64) -> Option<Point> {
-        self.mean.map(|y| (x, y, self.interval.map(|i| (i.low, i.high))))
+        let interval = self.interval.map(|i| (i.low, i.high));
+        self.mean.map(|y| Point::new(x, y).with_interval(interval).of_runs(self.n))
     }
 }
 

@@ -1,31 +1,52 @@
 //! Figures and tables as plain data; others draw them.
 
 use serde::Serialize;
-use std::fmt::{self, Write};
 
 /// A figure to draw.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Figure {
     /// What it shows.
     pub title: String,
+    /// What the intervals are, how many runs there were; may be empty.
+    pub note: String,
     /// The horizontal quantity, with its unit.
     pub x_label: String,
     /// The vertical quantity, with its unit.
     pub y_label: String,
+    /// How `x` runs along its axis.
+    pub x_scale: Scale,
+    /// How `y` runs along its axis.
+    pub y_scale: Scale,
     /// How to draw the points.
     pub kind: FigureKind,
     /// The series, in the order of the legend.
     pub series: Vec<Series>,
 }
 
+/// How values run along an axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Scale {
+    /// Equal steps are equal differences.
+    #[default]
+    Linear,
+    /// Equal steps are equal ratios; values of 0 and below have no place.
+    Log,
+}
+
 /// How the points of a figure are drawn.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum FigureKind {
-    /// Points joined by lines.
+    /// Points joined by lines, intervals as error bars.
+    #[default]
     Lines,
+    /// Points joined by lines, intervals as a band around them.
+    Bands,
     /// Points alone.
     Points,
+    /// Ways in the plane: points joined by lines, both axes to one scale.
+    Ways,
     /// Bars side by side; `x` is the number of a category.
     Bars {
         /// Names of the categories, from 0.
@@ -33,13 +54,60 @@ pub enum FigureKind {
     },
 }
 
-/// A point: x, y, and the interval of y where it has one.
-pub type Point = (f64, f64, Option<(f64, f64)>);
+/// A point of a figure.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Point {
+    /// Place along the horizontal axis.
+    pub x: f64,
+    /// The value.
+    pub y: f64,
+    /// Lower and upper end of the value's interval, where it has one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub interval: Option<(f64, f64)>,
+    /// Number of runs that the value rests on, where it is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub n: Option<usize>,
+}
+
+impl Figure {
+    /// Whether some point has an interval.
+    pub fn has_intervals(&self) -> bool {
+        self.series.iter().flat_map(|s| &s.points).any(|p| p.interval.is_some())
+    }
+
+    /// Says what its intervals are: those that an [`Estimate`](super::Estimate) gives.
+    #[must_use]
+    pub fn with_intervals_told(mut self) -> Self {
+        if self.note.is_empty() && self.has_intervals() {
+            self.note = "Error bars are 95 % intervals of the mean.".into();
+        }
+        self
+    }
+}
+
+impl Point {
+    /// A value without an interval.
+    pub fn new(x: f64, y: f64) -> Self {
+        Self { x, y, interval: None, n: None }
+    }
+
+    /// The same value with its interval.
+    #[must_use]
+    pub fn with_interval(self, interval: Option<(f64, f64)>) -> Self {
+        Self { interval, ..self }
+    }
+
+    /// The same value, resting on `n` runs.
+    #[must_use]
+    pub fn of_runs(self, n: usize) -> Self {
+        Self { n: Some(n), ..self }
+    }
+}
 
 /// A named series of points.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Series {
-    /// Name in the legend.
+    /// Name in the legend; one without a name has no place there.
     pub name: String,
     /// The points.
     pub points: Vec<Point>,
@@ -50,7 +118,8 @@ pub struct Series {
 pub struct Table {
     /// What it shows.
     pub title: String,
-    /// What the numbers are: units, number of runs, how they were taken.
+    /// What the numbers are: units, number of runs, how they were taken. Marked as
+    /// [`Text::marked`](super::document::Text::marked) reads it.
     pub note: String,
     /// Heads of the columns.
     pub columns: Vec<String>,
@@ -69,45 +138,9 @@ impl Table {
     pub fn row(&mut self, cells: impl IntoIterator<Item = String>) {
         self.rows.push(cells.into_iter().collect());
     }
-}
 
-/// Cells must not end their column: bars inside are escaped.
-fn line(f: &mut fmt::Formatter<'_>, cells: &[String], columns: usize) -> fmt::Result {
-    f.write_char('|')?;
-    for k in 0..columns {
-        let cell = cells.get(k).map_or("", String::as_str);
-        write!(f, " {} |", cell.replace('|', "\\|").replace('\n', " "))?;
-    }
-    f.write_char('\n')
-}
-
-/// As Markdown, with the title as a heading of the third level.
-impl fmt::Display for Table {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let n = self.columns.len();
-        writeln!(f, "### {}\n", self.title)?;
-        line(f, &self.columns, n)?;
-        writeln!(f, "|{}", "---|".repeat(n))?;
-        self.rows.iter().try_for_each(|row| line(f, row, n))?;
-        if !self.note.is_empty() {
-            writeln!(f, "\n{}", self.note)?;
-        }
-        Ok(())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_table_prints_as_markdown() {
-        let mut table = Table::new("Title", "A note.", &["a", "b"]);
-        table.row(["1".into(), "x|y".into()]);
-        table.row(["2".into()]);
-        assert_eq!(
-            table.to_string(),
-            "### Title\n\n| a | b |\n|---|---|\n| 1 | x\\|y |\n| 2 |  |\n\nA note.\n"
-        );
+    /// The cells of a row, one per column.
+    pub fn cells<'a>(&'a self, row: &'a [String]) -> impl Iterator<Item = &'a str> {
+        (0..self.columns.len()).map(|k| row.get(k).map_or("", String::as_str))
     }
 }

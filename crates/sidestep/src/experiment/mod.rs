@@ -6,7 +6,7 @@
 //! least_squares.rs   linear models fitted to measurements
 //! claim.rs           a paper's claims, each with a verdict
 //! figure.rs          what to draw and what to print, as plain data
-//! sweep/             a table of many runs summed up: intervals, comparisons, effects
+//! document.rs        a report: text, tables, figures, pictures and claims in their order
 //! methods.rs         methods of the airspace world on the same traffic
 //! agentfly.rs        the experiments of the airspace world's source paper
 //! loria/             the experiments of the robots world's source paper
@@ -14,10 +14,11 @@
 //! sweep/             many variants of one scenario, each with many seeds
 //! ```
 //!
-//! Nothing here draws a figure or writes a file: results are data, and Markdown text.
+//! Nothing here draws a figure or writes a file: results are data, reports are documents.
 
 pub mod agentfly;
 pub mod claim;
+pub mod document;
 pub mod estimate;
 pub mod farm;
 pub mod figure;
@@ -27,5 +28,6 @@ pub mod methods;
 pub mod serpentine;
 pub mod sweep;
 
+pub use document::Document;
 pub use estimate::Estimate;
 pub use figure::{Figure, FigureKind, Series, Table};

@@ -1,6 +1,6 @@
 //! `sidestep reproduce agentfly`.
 
-use super::{EXAMPLES, check_vacant, store};
+use super::{EXAMPLES, Outcome, check_vacant, deliver};
 use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
 use crate::progress::Stages;
@@ -12,7 +12,7 @@ use std::path::PathBuf;
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct AgentflyArgs {
-    /// Write report.md, report.json and the figures to this new or empty folder
+    /// Write report.html, report.md, report.json and the figures to this new or empty folder
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 
@@ -36,9 +36,6 @@ pub(super) fn reproduce(args: &AgentflyArgs, console: Console) -> Result<ExitCod
     let report = agentfly::run(&plan, &mut |what, share| stages.at(what, share));
     stages.clear();
     let report = report?;
-    if let Some(folder) = &args.out {
-        store(&report, &report.figures(), &report.to_markdown(), folder)?;
-    }
-    console.result(&report, || report.to_markdown());
-    Ok(ExitCode::Done)
+    let (document, claims, quick) = (report.document(), &report.claims, plan.quick);
+    deliver(&report, &Outcome { document, claims, quick }, args.out.as_deref(), console)
 }

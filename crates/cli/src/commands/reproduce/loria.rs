@@ -1,6 +1,6 @@
 //! `sidestep reproduce loria`.
 
-use super::{EXAMPLES, check_vacant, store, summary};
+use super::{EXAMPLES, Outcome, check_vacant, deliver};
 use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
 use crate::interrupt;
@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct LoriaArgs {
-    /// Write report.md, report.json and the figures to this new or empty folder
+    /// Write report.html, report.md, report.json and the figures to this new or empty folder
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 
@@ -54,16 +54,11 @@ pub(super) fn reproduce(args: &LoriaArgs, console: Console) -> Result<ExitCode, 
         None => run(&args.plan(), &mut in_memory, console)?,
         Some(folder) => {
             check_vacant(folder)?;
-            let report = recorded(&args.plan(), folder, console)?;
-            store(&report, &report.figures(), &report.to_markdown(), folder)?;
-            report
+            recorded(&args.plan(), folder, console)?
         }
     };
-    console.result(&report, || match &args.out {
-        None => report.to_markdown(),
-        Some(folder) => summary(&report.claims, report.plan.quick, folder),
-    });
-    Ok(ExitCode::Done)
+    let (document, claims, quick) = (report.document(), &report.claims, report.plan.quick);
+    deliver(&report, &Outcome { document, claims, quick }, args.out.as_deref(), console)
 }
 
 fn run(plan: &Plan, recorders: &mut NewRecorder<'_>, console: Console) -> Result<Report, Failure> {

@@ -7,14 +7,15 @@ mod serpentine;
 use crate::console::{Console, aligned};
 use crate::exit::{ExitCode, Failure};
 use crate::files::replace;
-use crate::picture::{chart_svg, write_png};
+use crate::pages::{Pages, Raster};
 use clap::{Args, Subcommand};
 use serde::Serialize;
-use sidestep::experiment::Figure;
-use sidestep::experiment::claim::{Claim, Verdict};
+use sidestep::experiment::Document;
+use sidestep::experiment::claim::{Claim, tally};
 use sidestep::kernel::InputError;
+use sidestep_report::markdown::without_pictures;
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -64,68 +65,46 @@ fn check_vacant(folder: &Path) -> Result<(), InputError> {
     Err(InputError::new(folder.display(), "there is something already", "name a new folder"))
 }
 
-/// Figures first: where the report is, everything is.
-fn store(
+/// What came of a paper's experiments.
+struct Outcome<'a> {
+    document: Document,
+    claims: &'a [Claim],
+    quick: bool,
+}
+
+/// Stores the report where it was asked for, and says what came out.
+fn deliver(
     report: &impl Serialize,
-    all: &[Figure],
-    markdown: &str,
-    folder: &Path,
-) -> Result<(), Failure> {
-    let json = serde_json::to_vec_pretty(report).expect("a report is plain data");
-    let figures = folder_of_figures(folder)?;
-    for (k, figure) in all.iter().enumerate() {
-        let stem = figures.join(format!("{:02}-{}", k + 1, file_name(&figure.title)));
-        store_svg(&chart_svg(figure)?, &stem)?;
+    outcome: &Outcome<'_>,
+    out: Option<&Path>,
+    console: Console,
+) -> Result<ExitCode, Failure> {
+    if let Some(folder) = out {
+        let json = serde_json::to_vec_pretty(report).expect("a report is plain data");
+        let pages = Pages { html: folder.join("report.html"), pictures: "figures".into() };
+        std::fs::create_dir_all(folder).map_err(|e| Failure::write(folder, &e))?;
+        replace(&folder.join("report.json"), |file| file.write_all(&json))?;
+        pages.store(&outcome.document, Raster::AlsoPng)?;
     }
-    replace(&folder.join("report.json"), |file| file.write_all(&json))?;
-    replace(&folder.join("report.md"), |file| file.write_all(markdown.as_bytes()))
-}
-
-fn folder_of_figures(folder: &Path) -> Result<PathBuf, Failure> {
-    let figures = folder.join("figures");
-    std::fs::create_dir_all(&figures).map_err(|e| Failure::write(&figures, &e))?;
-    Ok(figures)
-}
-
-/// Writes a picture as SVG and PNG.
-fn store_svg(svg: &str, stem: &Path) -> Result<(), Failure> {
-    replace(&stem.with_extension("svg"), |file| file.write_all(svg.as_bytes()))?;
-    write_png(&stem.with_extension("png"), svg)
-}
-
-/// A title as a file name: `Trip times, by regime` becomes `trip-times-by-regime`.
-fn file_name(title: &str) -> String {
-    let words = title.split(|c: char| !c.is_ascii_alphanumeric()).filter(|w| !w.is_empty());
-    words.map(str::to_ascii_lowercase).take(8).collect::<Vec<_>>().join("-")
+    console.result(report, || match out {
+        None => without_pictures(&outcome.document),
+        Some(folder) => summary(outcome, folder),
+    });
+    Ok(ExitCode::Done)
 }
 
 /// Verdicts in few lines, and where the rest is.
-fn summary(claims: &[Claim], quick: bool, folder: &Path) -> String {
-    let lines: Vec<_> = claims.iter().map(claim_line).collect();
-    let count = |verdict| claims.iter().filter(|c| c.verdict == verdict).count();
+fn summary(outcome: &Outcome<'_>, folder: &Path) -> String {
+    let lines: Vec<_> = outcome.claims.iter().map(claim_line).collect();
     format!(
-        "{} claims: {} held, {} not held, {} cannot be judged{}\n{}Report: {}\n",
-        lines.len(),
-        count(Verdict::Held),
-        count(Verdict::NotHeld),
-        count(Verdict::Lost),
-        if quick { " (a rehearsal: without weight)" } else { "" },
+        "{}{}\n{}Report: {}\n",
+        tally(outcome.claims),
+        if outcome.quick { " A rehearsal: without weight." } else { "" },
         aligned(&lines),
-        folder.join("report.md").display()
+        folder.join("report.html").display()
     )
 }
 
 fn claim_line(claim: &Claim) -> (String, String) {
     (format!("{:<5} {}", claim.id, claim.verdict.name()), claim.paper.to_string())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn titles_become_file_names() {
-        assert_eq!(file_name("Trip times, by regime"), "trip-times-by-regime");
-        assert_eq!(file_name("1/2 (s)"), "1-2-s");
-    }
 }

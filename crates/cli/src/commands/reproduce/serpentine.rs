@@ -1,21 +1,22 @@
 //! `sidestep reproduce serpentine`.
 
-use super::{EXAMPLES, check_vacant, folder_of_figures, store, store_svg, summary};
+use super::{EXAMPLES, Outcome, check_vacant, deliver};
 use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
 use crate::progress::Stages;
 use crate::worlds::chain::picture::drawn_obstacle;
 use clap::Args;
+use sidestep::experiment::document::Picture;
 use sidestep::experiment::serpentine::scenes::{Scene, View};
 use sidestep::experiment::serpentine::{self, Plan};
-use sidestep_draw::{BodyScene, Strand, Style, Trail};
-use std::path::{Path, PathBuf};
+use sidestep_draw::{BodyScene, DrawError, Strand, Style, Trail};
+use std::path::PathBuf;
 
 /// How much to run.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct SerpentineArgs {
-    /// Write report.md, report.json, the figures and pictures to this new or empty folder
+    /// Write report.html, report.md, report.json, figures and pictures to this new or empty folder
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 
@@ -46,27 +47,24 @@ pub(super) fn reproduce(args: &SerpentineArgs, console: Console) -> Result<ExitC
     let report = serpentine::run(&args.plan(), &mut |what, share| stages.at(what, share));
     stages.clear();
     let report = report?;
-    if let Some(folder) = &args.out {
-        // Pictures first: where the report is, everything is.
-        for (k, scene) in report.scenes.iter().enumerate() {
-            draw(scene, k + 1, folder)?;
-        }
-        store(&report, &report.figures(), &report.to_markdown(), folder)?;
-    }
-    console.result(&report, || match &args.out {
-        None => report.to_markdown(),
-        Some(folder) => summary(&report.claims, report.plan.quick, folder),
-    });
-    Ok(ExitCode::Done)
+    let pictures: Vec<Picture> = report.scenes.iter().map(drawn).collect::<Result<_, _>>()?;
+    let (document, claims) = (report.document(pictures), &report.claims);
+    let quick = report.plan.quick;
+    deliver(&report, &Outcome { document, claims, quick }, args.out.as_deref(), console)
 }
 
-fn draw(scene: &Scene, number: usize, folder: &Path) -> Result<(), Failure> {
-    let (title, svg) = match scene {
-        Scene::Plane(view) => (&view.title, body_scene(view).to_svg(&Style::MAP)?),
-        Scene::Space(view) => (&view.title, body_scene(view).to_svg(&Style::MAP)?),
-    };
-    let figures = folder_of_figures(folder)?;
-    store_svg(&svg, &figures.join(format!("scene-{number}-{}", super::file_name(title))))
+fn drawn(scene: &Scene) -> Result<Picture, DrawError> {
+    match scene {
+        Scene::Plane(view) => picture(view, body_scene(view).to_svg(&Style::MAP)),
+        Scene::Space(view) => picture(view, body_scene(view).to_svg(&Style::MAP)),
+    }
+}
+
+fn picture<const D: usize>(
+    view: &View<D>,
+    svg: Result<String, DrawError>,
+) -> Result<Picture, DrawError> {
+    Ok(Picture { title: view.title.clone(), caption: view.caption.clone(), svg: svg? })
 }
 
 fn body_scene<const D: usize>(view: &View<D>) -> BodyScene<D> {

@@ -26,6 +26,7 @@ use super::Plan;
 use super::floor::Floor;
 use super::timing::Load;
 use crate::experiment::farm::Progress;
+use crate::experiment::figure::Point as FigurePoint;
 use crate::experiment::least_squares::Fit;
 use crate::experiment::{Figure, FigureKind, Series, Table};
 use crate::statistics::Interval;
@@ -172,7 +173,7 @@ impl CostModel {
                 .points
                 .iter()
                 .filter(|p| p.size == size)
-                .map(|p| (1e-6 * (p.first_ns + p.second_ns), 1e-6 * predict(p), None))
+                .map(|p| FigurePoint::new(1e-6 * (p.first_ns + p.second_ns), 1e-6 * predict(p)))
                 .collect(),
         };
         Figure {
@@ -181,6 +182,7 @@ impl CostModel {
             y_label: "predicted ms per cycle".into(),
             kind: FigureKind::Points,
             series: SIZES.map(of_size).into(),
+            ..Figure::default()
         }
     }
 }

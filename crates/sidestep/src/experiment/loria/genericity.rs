@@ -114,6 +114,7 @@ impl Genericity {
             y_label: "contacts per 1000 actions".into(),
             kind: FigureKind::Lines,
             series: series.into(),
+            ..Figure::default()
         }
     }
 }

@@ -24,9 +24,11 @@ pub mod reliability;
 pub mod strategies;
 pub mod timing;
 
+use super::claim::{REHEARSAL, tally};
+use super::document::{Block, Document, Text};
 use super::farm::Progress;
 use super::{Figure, Table};
-use claims::{Claim, Verdict};
+use claims::Claim;
 use cost_model::CostModel;
 use genericity::Genericity;
 use performance::Performance;
@@ -35,7 +37,6 @@ use serde::Serialize;
 use sidestep_kernel::InputError;
 use sidestep_kernel::ports::{MemoryRecorder, RecordError, Recorder, TableSchema};
 use sidestep_kernel::workers::available;
-use std::fmt::Write;
 use strategies::Strategies;
 
 /// How much to run.
@@ -221,53 +222,55 @@ fn stage(progress: &mut Progress<'_>, from: f64, to: f64) -> impl FnMut(&str, f6
 }
 
 impl Report {
-    /// All tables, the claims first.
-    pub fn tables(&self) -> Vec<Table> {
-        let mut tables = vec![claims::table(&self.claims)];
-        tables.extend(self.reliability.tables());
-        tables.push(self.genericity.table());
-        tables.extend(self.performance.tables());
-        tables.push(self.strategies.table());
-        tables.push(self.cost_model.table());
-        tables
+    /// The experiments by name, with their tables and figures.
+    fn sections(&self) -> [(&'static str, Vec<Table>, Vec<Figure>); 5] {
+        let (reliability, performance) = (&self.reliability, &self.performance);
+        let (genericity, strategies) = (&self.genericity, &self.strategies);
+        let cost_model = &self.cost_model;
+        [
+            ("Reliability", reliability.tables(), reliability.figures()),
+            ("Genericity", vec![genericity.table()], vec![genericity.figure()]),
+            ("Performance", performance.tables(), performance.figures()),
+            ("Rejected strategies", vec![strategies.table()], strategies.figures()),
+            ("Cost model", vec![cost_model.table()], vec![cost_model.figure()]),
+        ]
     }
 
-    /// All figures.
-    pub fn figures(&self) -> Vec<Figure> {
-        let mut figures = self.reliability.figures();
-        figures.push(self.genericity.figure());
-        figures.extend(self.performance.figures());
-        figures.extend(self.strategies.figures());
-        figures.push(self.cost_model.figure());
-        figures
-    }
-
-    /// The report as text.
-    pub fn to_markdown(&self) -> String {
-        let count = |verdict| self.claims.iter().filter(|c| c.verdict == verdict).count();
+    /// The report, the claims first.
+    pub fn document(&self) -> Document {
         let plan = &self.plan;
-        let mut text = format!(
-            "# The LORIA experiments of 2001, run anew\n\n\
-             Of {} claims {} held, {} did not hold, and {} cannot be judged: their numbers \
-             are lost, or take another or a quieter machine.\n\n\
-             Version {}; seeds 1 to {} for every variant, {} cycles a run, {} repeats of every \
-             timing, {} processors.{}\n",
-            self.claims.len(),
-            count(Verdict::Held),
-            count(Verdict::NotHeld),
-            count(Verdict::Lost),
+        let lead = format!(
+            "{} The paper's tables are lost; every number here is ours. Version {}; seeds 1 to {} \
+             for every variant, {} cycles a run, {} repeats of every timing, {} processors.",
+            tally(&self.claims),
             self.program_version,
             plan.seeds,
             plan.cycles,
             plan.repeats,
             self.performance.processors,
-            if plan.quick { " **A rehearsal: its figures have no weight.**" } else { "" },
         );
-        for table in self.tables() {
-            // Writing to a string cannot fail.
-            let _ = write!(text, "\n{table}");
+        let mut document = Document::new("The LORIA experiments of 2001, run anew", lead);
+        if plan.quick {
+            document.warning(Text::marked(REHEARSAL));
         }
-        text
+        document.section("Claims").push(Block::Claims(self.claims.clone()));
+        for (name, tables, figures) in self.sections() {
+            document.section(name).figures(figures.into_iter().map(Figure::with_intervals_told));
+            document.tables(tables);
+        }
+        document.section("How to run it again").commands("In a shell", self.command());
+        document
+    }
+
+    fn command(&self) -> String {
+        let plan = &self.plan;
+        format!(
+            "sidestep reproduce loria{} --seeds {} --cycles {} --workers {} --out DIR",
+            if plan.quick { " --quick" } else { "" },
+            plan.seeds,
+            plan.cycles,
+            plan.workers,
+        )
     }
 }
 
@@ -287,9 +290,11 @@ mod tests {
             assert!(!claim.ours.is_empty() && !claim.reason.is_empty(), "{id}");
         }
         assert!(report.strategies.all_valid() && report.performance.is_deterministic());
-        let text = report.to_markdown();
-        assert!(text.contains("| E-9 |") && text.contains("A rehearsal") && !text.contains("NaN"));
-        for figure in report.figures() {
+        let document = report.document();
+        assert!(document.blocks.iter().any(|block| matches!(block, Block::Warning(_))));
+        let text = format!("{document:?}");
+        assert!(text.contains("E-9") && !text.contains("NaN"));
+        for figure in report.sections().into_iter().flat_map(|(_, _, figures)| figures) {
             assert!(!figure.series.is_empty(), "{}", figure.title);
             assert!(figure.series.iter().any(|s| !s.points.is_empty()), "{}", figure.title);
         }

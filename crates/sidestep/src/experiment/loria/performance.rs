@@ -270,6 +270,7 @@ impl Performance {
             y_label: y_label.into(),
             kind: FigureKind::Lines,
             series: self.loads.iter().enumerate().map(line).collect(),
+            ..Figure::default()
         }
     }
 }

@@ -275,6 +275,7 @@ impl Reliability {
             y_label: y_label.into(),
             kind: FigureKind::Bars { categories },
             series: series.into(),
+            ..Figure::default()
         }
     }
 
@@ -295,6 +296,7 @@ impl Reliability {
                 line("sensors only, even", Regime::Sensors, Spread::Even),
                 line("sensors only, blind", Regime::Sensors, Spread::Blind),
             ],
+            ..Figure::default()
         }
     }
 }

@@ -168,6 +168,7 @@ impl Strategies {
             y_label: "speed-up over the double pool with 1 worker".into(),
             kind: FigureKind::Lines,
             series: names().iter().map(|name| self.series(index, name)).collect(),
+            ..Figure::default()
         };
         self.loads.iter().enumerate().map(figure).collect()
     }

@@ -182,6 +182,7 @@ impl Corridor {
                         .collect(),
                 })
                 .into(),
+            ..Figure::default()
         };
         vec![
             figure("Speed of a leader that wants 0.5 m/s", "m/s", |c| c.speed_m_s),

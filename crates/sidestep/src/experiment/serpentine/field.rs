@@ -182,6 +182,7 @@ impl Fields {
             y_label: "arrived, %".into(),
             kind: FigureKind::Lines,
             series: series.into(),
+            ..Figure::default()
         }
     }
 }

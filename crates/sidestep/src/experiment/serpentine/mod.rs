@@ -30,13 +30,13 @@ pub mod snake;
 
 pub use runs::Share;
 
-use super::claim::{Claim, Verdict, table};
+use super::claim::{Claim, REHEARSAL, tally};
+use super::document::{Block, Document, Picture, Text};
 use super::farm::Progress;
 use super::{Figure, Table};
 use serde::Serialize;
 use sidestep_kernel::InputError;
 use sidestep_kernel::workers::available;
-use std::fmt::Write;
 
 /// How much to run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -238,60 +238,54 @@ fn stage(progress: &mut Progress<'_>, from: f64, to: f64) -> impl FnMut(&str, f6
 }
 
 impl Report {
-    /// All tables, the claims first.
-    pub fn tables(&self) -> Vec<Table> {
-        let mut tables = vec![
-            table(&self.claims),
-            self.corridor.table(),
-            self.rotations.table(),
-            self.fields.table(),
-            self.pushing.table(),
-            self.movers.table(),
-            self.snakes.table(),
+    /// The experiments by name, with their figures and tables.
+    fn sections(&self) -> Vec<(&'static str, Vec<Figure>, Vec<Table>)> {
+        let one = |figure: Figure, table: Table| (vec![figure], vec![table]);
+        let (scaling, initiators) = (&self.scaling, &self.initiators);
+        let sections = [
+            ("The swarm in the corridor", (self.corridor.figures(), vec![self.corridor.table()])),
+            ("Rules of rotation", one(self.rotations.figure(), self.rotations.table())),
+            ("A robot in the open", one(self.fields.figure(), self.fields.table())),
+            ("A chain that goes back", one(self.pushing.figure(), self.pushing.table())),
+            ("Obstacles that move", one(self.movers.figure(), self.movers.table())),
+            ("A snake in space", (Vec::new(), vec![self.snakes.table()])),
+            ("What motions cost", (vec![scaling.figure()], scaling.tables().into())),
+            ("Broken chains", (Vec::new(), vec![self.broken.table()])),
+            ("Targets of tips", one(self.postures.figure(), self.postures.table())),
+            ("Who begins, and who objects", (Vec::new(), initiators.tables().into())),
         ];
-        tables.extend(self.scaling.tables());
-        tables.push(self.broken.table());
-        tables.push(self.postures.table());
-        tables.extend(self.initiators.tables());
-        tables
+        sections.map(|(name, (figures, tables))| (name, figures, tables)).into()
     }
 
-    /// All figures.
-    pub fn figures(&self) -> Vec<Figure> {
-        let mut figures = self.corridor.figures();
-        figures.extend([
-            self.rotations.figure(),
-            self.fields.figure(),
-            self.pushing.figure(),
-            self.movers.figure(),
-            self.scaling.figure(),
-            self.postures.figure(),
-        ]);
-        figures
-    }
-
-    /// The report as text.
-    pub fn to_markdown(&self) -> String {
-        let count = |verdict| self.claims.iter().filter(|c| c.verdict == verdict).count();
-        let mut text = format!(
-            "# Multi-agent serpentine motion of 2005, run anew\n\n\
-             Of {} claims {} held, {} did not hold, and {} cannot be judged.\n\n\
-             Version {}; seeds 1 to {} ({} in the open field, {} of the snake), {} workers.{}\n",
-            self.claims.len(),
-            count(Verdict::Held),
-            count(Verdict::NotHeld),
-            count(Verdict::Lost),
+    /// The report, the claims first; `pictures` are those of the [scenes](Self::scenes), drawn.
+    pub fn document(&self, pictures: Vec<Picture>) -> Document {
+        let plan = &self.plan;
+        let lead = format!(
+            "{} The slides show pictures and hardly a number; every figure here is ours. Version \
+             {}; seeds 1 to {} ({} in the open field, {} of the snake), {} workers.",
+            tally(&self.claims),
             self.program_version,
-            self.plan.seeds,
-            self.plan.field_seeds,
-            self.plan.snake_seeds,
-            self.plan.workers,
-            if self.plan.quick { " **A rehearsal: its figures have no weight.**" } else { "" },
+            plan.seeds,
+            plan.field_seeds,
+            plan.snake_seeds,
+            plan.workers,
         );
-        for table in self.tables() {
-            // Writing to a string cannot fail.
-            let _ = write!(text, "\n{table}");
+        let mut document = Document::new("Multi-agent serpentine motion of 2005, run anew", lead);
+        if plan.quick {
+            document.warning(Text::marked(REHEARSAL));
         }
-        text
+        document.section("Claims").push(Block::Claims(self.claims.clone()));
+        if !pictures.is_empty() {
+            document.section("Pictures").pictures(pictures);
+        }
+        for (name, figures, tables) in self.sections() {
+            document.section(name).figures(figures.into_iter().map(Figure::with_intervals_told));
+            document.tables(tables);
+        }
+        let quick = if plan.quick { " --quick" } else { "" };
+        let seeds = plan.seeds;
+        let command = format!("sidestep reproduce serpentine{quick} --seeds {seeds} --out DIR");
+        document.section("How to run it again").commands("In a shell", command);
+        document
     }
 }

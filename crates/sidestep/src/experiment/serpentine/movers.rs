@@ -4,6 +4,7 @@
 use super::Plan;
 use super::runs::{DT_S, SPEED_M_S, begun, finish, grid, head, most};
 use crate::experiment::farm::Progress;
+use crate::experiment::figure::Scale;
 use crate::experiment::{Estimate, Figure, FigureKind, Series, Table};
 use crate::worlds::chain::metrics::Metrics;
 use serde::Serialize;
@@ -156,8 +157,10 @@ impl Movers {
             title: "Steps with a part of the chain in a moving disc".into(),
             x_label: "speed of the discs over the leader's".into(),
             y_label: "steps inside, %".into(),
+            x_scale: Scale::Log,
             kind: FigureKind::Lines,
             series,
+            ..Figure::default()
         }
     }
 }

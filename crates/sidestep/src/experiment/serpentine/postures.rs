@@ -4,6 +4,7 @@
 use super::Plan;
 use super::runs::{Share, draws, grid, median};
 use crate::experiment::farm::Progress;
+use crate::experiment::figure::{Point as FigurePoint, Scale};
 use crate::experiment::{Figure, FigureKind, Series, Table};
 use crate::worlds::chain::geometry::{Point, along, distance, scaled, unit};
 use crate::worlds::chain::ik::{Engine, Goal, Solver};
@@ -188,7 +189,7 @@ impl Postures {
         links.dedup();
         let series = |way: Way, slack: f64| {
             let cells = self.of(way).filter(move |c| c.case.slack == slack);
-            let points = (0..).zip(cells).map(|(k, c)| (f64::from(k), c.median_us, None));
+            let points = (0..).zip(cells).map(|(k, c)| FigurePoint::new(f64::from(k), c.median_us));
             let rods = if slack == 0.0 {
                 "fixed rods".into()
             } else {
@@ -200,6 +201,7 @@ impl Postures {
             title: "Time to bring a tip to its target".into(),
             x_label: "links".into(),
             y_label: "median, microseconds".into(),
+            y_scale: Scale::Log,
             kind: FigureKind::Bars { categories: links.iter().map(ToString::to_string).collect() },
             series: vec![
                 series(Way::ThereAndBack, 0.0),
@@ -207,6 +209,7 @@ impl Postures {
                 series(Way::LeastSquares, 0.0),
                 series(Way::LeastSquares, 0.1),
             ],
+            ..Figure::default()
         }
     }
 }

@@ -166,6 +166,7 @@ impl Pushing {
             y_label: "way of 12 m, m".into(),
             kind: FigureKind::Bars { categories: self.of(true).map(category).collect() },
             series: vec![series("pushed by the head", true), series("pulled by the tail", false)],
+            ..Figure::default()
         }
     }
 }

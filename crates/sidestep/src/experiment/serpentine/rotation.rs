@@ -4,6 +4,7 @@
 use super::Plan;
 use super::runs::{SPEED_M_S, Share, begun, finish, grid, head, least, mm, most};
 use crate::experiment::farm::Progress;
+use crate::experiment::figure::Point;
 use crate::experiment::{Estimate, Figure, FigureKind, Series, Table};
 use crate::worlds::chain::metrics::Metrics;
 use serde::Serialize;
@@ -156,7 +157,7 @@ impl Rotations {
         };
         let series = RULES.map(|rule| Series {
             name: rule.into(),
-            points: steps_m.iter().map(|&s| (1e3 * s, deepest(rule, s), None)).collect(),
+            points: steps_m.iter().map(|&s| Point::new(1e3 * s, deepest(rule, s))).collect(),
         });
         Figure {
             title: "How deep parts get into walls, by rule of rotation".into(),
@@ -164,6 +165,7 @@ impl Rotations {
             y_label: "deepest, mm".into(),
             kind: FigureKind::Lines,
             series: series.into(),
+            ..Figure::default()
         }
     }
 }

@@ -101,7 +101,8 @@ impl Share {
     /// A point of a figure at `x`, in percent.
     pub(super) fn point(&self, x: f64) -> FigurePoint {
         let Interval { low, high } = self.interval;
-        (x, self.percent(), Some((100.0 * low, 100.0 * high)))
+        let interval = Some((100.0 * low, 100.0 * high));
+        FigurePoint::new(x, self.percent()).with_interval(interval).of_runs(self.n as usize)
     }
 }
 

@@ -4,6 +4,7 @@
 use super::Plan;
 use super::runs::{draws, median};
 use crate::experiment::farm::Progress;
+use crate::experiment::figure::{Point as FigurePoint, Scale};
 use crate::experiment::{Figure, FigureKind, Series, Table};
 use crate::worlds::chain::geometry::{Point, along, unit};
 use crate::worlds::chain::{Chain, Connector, Obstacle, Obstacles, Propagator, Request, Rod};
@@ -182,17 +183,24 @@ impl Scaling {
     pub(super) fn figure(&self) -> Figure {
         let series = |name: &str, ns: fn(&Size) -> f64| Series {
             name: name.into(),
-            points: self.sizes.iter().map(|s| (s.connectors as f64, ns(s), None)).collect(),
+            points: self
+                .sizes
+                .iter()
+                .map(|s| FigurePoint::new(s.connectors as f64, ns(s)))
+                .collect(),
         };
         Figure {
             title: "Time of a motion by the length of the chain".into(),
             x_label: "connectors".into(),
             y_label: "microseconds".into(),
+            x_scale: Scale::Log,
+            y_scale: Scale::Log,
             kind: FigureKind::Lines,
             series: vec![
                 series("fixed rods: all move", |s| s.fixed_us),
                 series("slack rods: it soon ends", |s| s.slack_us),
             ],
+            ..Figure::default()
         }
     }
 }

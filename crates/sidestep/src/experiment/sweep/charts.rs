@@ -10,6 +10,7 @@ use super::groups::Groups;
 use super::table::RunColumn;
 use super::text::sentence;
 use super::{Label, RunValues};
+use crate::experiment::figure::Point;
 use crate::experiment::{Figure, FigureKind, Series};
 use crate::statistics::{Sample, wilson};
 use std::collections::BTreeMap;
@@ -155,7 +156,9 @@ fn distribution(groups: &Groups<'_>, metric: &RunColumn) -> Option<Figure> {
     let point = |k: usize| {
         let below = ((k + 1) * n).div_ceil(steps);
         let interval = wilson(below as f64, n as f64);
-        (sorted[below - 1], below as f64 / n as f64, Some((interval.low, interval.high)))
+        Point::new(sorted[below - 1], below as f64 / n as f64)
+            .with_interval(Some((interval.low, interval.high)))
+            .of_runs(n)
     };
     let title = format!(
         "Distribution of {} over runs (95 % intervals, n = {n})",
@@ -166,8 +169,8 @@ fn distribution(groups: &Groups<'_>, metric: &RunColumn) -> Option<Figure> {
         title,
         x_label: Label::of(&metric.name).to_string(),
         y_label: "share of runs up to it".into(),
-        kind: FigureKind::Lines,
         series: vec![Series { name: String::new(), points }],
+        ..Figure::default()
     })
 }
 
@@ -181,7 +184,7 @@ fn figure(
     let share = matches!(metric.values, RunValues::Bool(_));
     let label = Label::of(&metric.name);
     let y_label = if share { format!("{label}: share of runs") } else { label.to_string() };
-    Figure { title, x_label, y_label, kind, series }
+    Figure { title, x_label, y_label, kind, series, ..Figure::default() }
 }
 
 /// How many runs the variants have.

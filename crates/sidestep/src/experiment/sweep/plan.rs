@@ -2,6 +2,8 @@
 
 use super::design::Setting;
 use super::file::{Sweep, Until};
+use super::summary::{Summary, SummaryOptions};
+use super::table::{Role, RunTable, RunValues};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::InputError;
 use std::fmt;
@@ -116,6 +118,49 @@ impl Plan {
             agents: 0,
             record: sweep.record,
         })
+    }
+
+    /// What the variants are called in tables and figures: their parameters, in short
+    /// (`method=pc, n=8`).
+    pub fn names(&self) -> Vec<String> {
+        let last = |key: &str| key.rsplit('.').next().unwrap_or(key).to_string();
+        let is_alone =
+            |key: &str| self.parameters.iter().filter(|k| last(k) == last(key)).count() == 1;
+        let named = |s: &Setting| {
+            let key = if is_alone(&s.key) { last(&s.key) } else { s.key.clone() };
+            let value = s.value.as_str().map_or_else(|| s.value.to_string(), str::to_string);
+            format!("{key}={value}")
+        };
+        let name = |v: &Variant| v.settings.iter().map(named).collect::<Vec<_>>().join(", ");
+        let mut names: Vec<String> = self.variants.iter().map(name).collect();
+        if let [only] = &mut names[..]
+            && only.is_empty()
+        {
+            *only = "all runs".into();
+        }
+        names
+    }
+
+    /// The runs of this plan, summed up as it says.
+    ///
+    /// # Errors
+    /// When a metric that is to be reported does not exist, or the table is not of this plan.
+    pub fn summary(&self, runs: &RunTable) -> Result<Summary, InputError> {
+        let names = self.names();
+        let mut named = runs.clone();
+        for column in named.columns.iter_mut().filter(|c| c.role == Role::Variant) {
+            let name = |k: usize| {
+                let variant = column.values.number(k)? as usize;
+                names.get(variant).cloned()
+            };
+            column.values = RunValues::Text((0..runs.runs()).map(name).collect());
+        }
+        let options = SummaryOptions {
+            metrics: (!self.metrics.is_empty()).then(|| self.metrics.clone()),
+            baseline: self.baseline.map(|variant| names[variant as usize].clone()),
+            ..SummaryOptions::default()
+        };
+        Summary::of(&named, &options)
     }
 
     /// Number of cells, at most.

@@ -22,6 +22,7 @@ fn zigzag(r: &Reliability) -> Claim {
         id: "E-8",
         paper: "With unreliable sensors and effectors trajectories are not straight but slightly \
                 zigzag.",
+        papers_figure: None,
         ours: format!(
             "Straightness: {means}; both - reliable {bent}. Sideways moves per 1000 actions: \
              both {lateral}, reliable 0."
@@ -52,6 +53,7 @@ fn collisions(r: &Reliability) -> Claim {
         id: "E-9",
         paper: "Errors of sensors cause more collisions than errors of effectors; both more than \
                 none.",
+        papers_figure: None,
         ours: format!(
             "Presets, rule cut, per 1000 actions: {}; sensors - effectors {}. Sensors are above \
              effectors at {above} of {} places (floors, rules, behaviours), and effectors above \
@@ -94,6 +96,7 @@ fn slowest_trips(r: &Reliability) -> Claim {
     Claim {
         id: "E-10a",
         paper: "A trip to and fro takes longest when sensors and effectors are both unreliable.",
+        papers_figure: None,
         ours: format!(
             "Cycles per trip: {}. Both are slowest at {held} of {} places.",
             by_regime(|regime| r.estimate(Key::BASE, regime, TRIP)),
@@ -120,6 +123,7 @@ fn trip_ratios(r: &Reliability) -> Claim {
     Claim {
         id: "E-10b",
         paper: "It takes some times, and a half, as long as in another case.",
+        papers_figure: None,
         ours: format!("Seed by seed: {}.", pairs.map(ratio).join("; ")),
         verdict: Verdict::Lost,
         reason: "Factor and the pair of cases are lost; these are the ratios.".into(),
@@ -134,6 +138,7 @@ fn behaviours(r: &Reliability) -> Claim {
         id: "E-11",
         paper: "Behaviours are harder to design for unreliable sensors and effectors; simple ones \
                 do where all is reliable.",
+        papers_figure: None,
         ours: format!(
             "A filter (two reports before a robot believes its side beams) saves cycles per \
              trip: reliable {}, both {}, the second less the first {more}. It costs contacts per \

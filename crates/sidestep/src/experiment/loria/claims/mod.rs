@@ -8,7 +8,7 @@ mod setting;
 mod time;
 
 use super::Report;
-pub use crate::experiment::claim::{Claim, Verdict, table};
+pub use crate::experiment::claim::{Claim, Verdict};
 
 /// All claims, judged.
 pub fn judge(report: &Report) -> Vec<Claim> {

@@ -24,6 +24,7 @@ fn suites(report: &Report) -> Claim {
         id: "E-1",
         paper: "The experiments are to show that the simulator is easy and general, that its \
                 parallel model is efficient, and that its stochastic model is valid.",
+        papers_figure: None,
         ours: format!(
             "{runs} reliability runs, {builds} genericity runs, {timed} timed series, {fitted} \
              runs for the cost model."
@@ -38,6 +39,7 @@ fn floors(report: &Report) -> Claim {
         id: "E-2",
         paper: "It ran on a real floor and on virtual ones of various sizes, with various numbers \
                 of robots, doors and mobile objects.",
+        papers_figure: None,
         ours: report.reliability.floors.join("; "),
         verdict: Verdict::Held,
         reason: "Three generated floors ran all four regimes. The paper's sizes and its real \
@@ -52,6 +54,7 @@ fn processors(report: &Report) -> Claim {
     Claim {
         id: "E-3",
         paper: "It ran on up to sixteen processors.",
+        papers_figure: Some("16 processors"),
         ours: format!("Workers {}: {}.", workers.join(", "), digests(report)),
         verdict: Verdict::of(p.is_deterministic()),
         reason: format!(
@@ -68,6 +71,7 @@ fn sequential(report: &Report) -> Claim {
         id: "E-4",
         paper: "The same program runs sequentially and on parallel machines, and its user need \
                 not know parallel programming.",
+        papers_figure: None,
         ours: format!(
             "With 1 worker, with more, and recorded: {}, {}.",
             digests(report),
@@ -105,6 +109,7 @@ fn sizes(report: &Report) -> Claim {
         id: "E-5",
         paper: "Robots of other sizes needed no change but the number of boxes, and it was in \
                 the source.",
+        papers_figure: None,
         ours: format!("{ours}."),
         verdict,
         reason: format!("{GENERIC}; only `size` of the scenario changes, no source."),
@@ -118,6 +123,7 @@ fn camera(report: &Report) -> Claim {
         id: "E-6",
         paper: "A camera with its confusion matrix was easily added, with changes to source and \
                 behaviour.",
+        papers_figure: None,
         ours: format!("{ours}; contacts per 1000 actions with the camera less without: {effect}."),
         verdict,
         reason: format!("{GENERIC}; only `sensors` of the scenario changes, no source."),
@@ -129,6 +135,7 @@ fn regimes(report: &Report) -> Claim {
     Claim {
         id: "E-7",
         paper: "Four cases: all reliable; effectors, sensors, or both unreliable.",
+        papers_figure: None,
         ours: format!(
             "{} variants x {} seeds, four regimes at each of {} places.",
             r.cells.len(),

@@ -32,6 +32,7 @@ fn initialization(p: &Performance) -> Claim {
         id: "E-12",
         paper: "Time is that of the cycles with recording to disk; initialization is not parallel \
                 and a small share of the whole.",
+        papers_figure: None,
         ours: format!(
             "Initialization takes up to {:.2} % of a run of {REFERENCE_CYCLES} cycles with one \
              worker (largest of {} loads).",
@@ -60,6 +61,7 @@ fn time_falls(report: &Report) -> Claim {
     Claim {
         id: "E-13a",
         paper: "Execution time falls as processors are added.",
+        papers_figure: None,
         ours: format!(
             "Speed-up with {most} workers: {} unrecorded, {} recorded ({} loads, {} repeats of \
              each; mere arithmetic in turn with them: {machine}).",
@@ -93,6 +95,7 @@ fn efficiency_falls(p: &Performance) -> Claim {
     Claim {
         id: "E-13b",
         paper: "Speed-up rises slowly and efficiency falls quickly.",
+        papers_figure: None,
         ours: format!(
             "Efficiency with {most} workers, unrecorded, by load: {}; below {LOW_EFFICIENCY} for \
              {low} of {n}.",
@@ -113,6 +116,7 @@ fn lost_speed_up(p: &Performance) -> Claim {
         id: "E-13c",
         paper: "The first parallel version reached a certain speed-up on a certain number of \
                 processors.",
+        papers_figure: None,
         ours: format!("With {} workers: {}.", p.most_workers(), range(p.at_most_workers(false))),
         verdict: Verdict::Lost,
         reason: "Both numbers are lost.".into(),
@@ -124,6 +128,7 @@ fn second_machine() -> Claim {
         id: "E-14",
         paper: "A small machine under another system gives equivalent results with the same \
                 number of processors.",
+        papers_figure: None,
         ours: "One machine was used.".into(),
         verdict: Verdict::Lost,
         reason: "The paper's table is lost, and it takes a second machine; the digests of this \
@@ -143,6 +148,7 @@ fn costly_decisions(p: &Performance) -> Claim {
     Claim {
         id: "E-15a",
         paper: "Costlier behaviours are expected to give better parallel performance.",
+        papers_figure: None,
         ours: format!(
             "Speed-up with {} workers: {} at {least} operations per decision, {} at {most}; \
              difference {gain}.",
@@ -170,6 +176,7 @@ fn conflicts(report: &Report) -> Claim {
     Claim {
         id: "E-15b",
         paper: "Conflicts, the more so with many agents, cost time in the second step.",
+        papers_figure: None,
         ours: format!(
             "Per body in conflict c_s = {}, besides c_d = {} for every body; p = {:.3} to {:.3}; \
              {} runs, R2 of the second step {:.3}.",
@@ -213,6 +220,7 @@ fn rejected(report: &Report) -> Claim {
         id: "P-3",
         paper: "Spatial partition (unequal load, conflicts at borders) and a process per agent \
                 (conflicts made serial) are worse than merged conflicts in a double pool.",
+        papers_figure: None,
         ours: format!(
             "Speed-up of the double pool with the most workers less that of the other, {}.",
             shown.collect::<Vec<_>>().join("; ")

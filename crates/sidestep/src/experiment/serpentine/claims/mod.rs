@@ -10,7 +10,7 @@ mod swarms;
 mod tests;
 
 use super::Report;
-pub use crate::experiment::claim::{Claim, Verdict, table};
+pub use crate::experiment::claim::{Claim, Verdict};
 
 /// All claims, judged.
 pub fn judge(report: &Report) -> Vec<Claim> {
@@ -26,7 +26,7 @@ fn claim(
     ours: String,
     reason: &str,
 ) -> Claim {
-    Claim { id, paper, ours, verdict, reason: reason.into() }
+    Claim { id, paper, papers_figure: None, ours, verdict, reason: reason.into() }
 }
 
 /// Held if it is so in all of them; lost where there is none.

@@ -1,0 +1,61 @@
+//! Reports as files: the page, its Markdown twin, and the pictures of that.
+
+use crate::exit::Failure;
+use crate::files::replace;
+use crate::picture::write_png;
+use sidestep::experiment::Document;
+use sidestep_report::{Rendered, SvgFile, render};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// Where a report goes.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Pages {
+    /// The page; its Markdown twin has the same name with the ending `md`.
+    pub(crate) html: PathBuf,
+    /// Name of the folder beside it for pictures.
+    pub(crate) pictures: String,
+}
+
+/// What pictures are stored as.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Raster {
+    /// SVG alone.
+    None,
+    /// SVG, and PNG beside it.
+    AlsoPng,
+}
+
+impl Pages {
+    /// The Markdown twin.
+    pub(crate) fn markdown(&self) -> PathBuf {
+        self.html.with_extension("md")
+    }
+
+    /// Writes a report. Every file is replaced as a whole, the page last: where it is new,
+    /// everything is.
+    ///
+    /// # Errors
+    /// When a figure cannot be drawn, or something cannot be written.
+    pub(crate) fn store(&self, document: &Document, raster: Raster) -> Result<(), Failure> {
+        let Rendered { html, markdown, pictures } = render(document, &self.pictures)?;
+        self.store_pictures(&pictures, raster)?;
+        replace(&self.markdown(), |file| file.write_all(markdown.as_bytes()))?;
+        replace(&self.html, |file| file.write_all(html.as_bytes()))
+    }
+
+    fn store_pictures(&self, pictures: &[SvgFile], raster: Raster) -> Result<(), Failure> {
+        if pictures.is_empty() {
+            return Ok(());
+        }
+        let folder = self.html.parent().unwrap_or(Path::new("")).join(&self.pictures);
+        std::fs::create_dir_all(&folder).map_err(|e| Failure::write(&folder, &e))?;
+        for SvgFile { stem, svg } in pictures {
+            replace(&folder.join(format!("{stem}.svg")), |file| file.write_all(svg.as_bytes()))?;
+            if raster == Raster::AlsoPng {
+                write_png(&folder.join(format!("{stem}.png")), svg)?;
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,42 @@
+//! The parts of a document.
+
+use super::{Part, figures, tables, text};
+use maud::{Markup, html};
+use sidestep::experiment::document::{Block, Code, Text};
+
+/// Text of more lines than this is shown when it is asked for.
+const LONG_LINES: usize = 24;
+
+pub(super) fn markup(part: &Part<'_>) -> Markup {
+    match part.block {
+        Block::Section(_) => html! {},
+        Block::Paragraph(words) => html! { p { (text(words)) } },
+        Block::Warning(words) => html! { p .warning role="note" { (text(words)) } },
+        Block::Code(it) => code(it),
+        Block::Facts(them) => facts(them),
+        Block::Table(table) => tables::table(table, &part.id),
+        Block::Claims(claims) => tables::claims(claims),
+        Block::Figure(figure) => figures::figure(figure, &part.id, part.picture),
+        Block::Picture(picture) => figures::picture(picture, &part.id),
+    }
+}
+
+fn code(it: &Code) -> Markup {
+    // What scrolls can be reached by keyboard.
+    let text = html! { pre tabindex="0" { code .{ "language-" (it.language) } { (it.text) } } };
+    html! {
+        @if it.text.lines().count() > LONG_LINES {
+            details { summary { (it.title) } (text) }
+        } @else {
+            figure .code { figcaption { (it.title) } (text) }
+        }
+    }
+}
+
+fn facts(facts: &[(String, Text)]) -> Markup {
+    html! {
+        dl .facts {
+            @for (name, value) in facts { div { dt { (name) } dd { (text(value)) } } }
+        }
+    }
+}

@@ -1,0 +1,136 @@
+//! Figures that answer the mouse, with their still form beneath, and pictures.
+
+use super::tables;
+use crate::SvgFile;
+use maud::{Markup, PreEscaped, html};
+use serde_json::json;
+use sidestep::experiment::document::Picture;
+use sidestep::experiment::{Figure, FigureKind, Table};
+use sidestep_draw::SERIES_COLORS;
+
+/// A figure of more points than this has no table of its numbers.
+const MOST_ROWS: usize = 200;
+
+pub(super) fn figure(figure: &Figure, id: &str, still: Option<&SvgFile>) -> Markup {
+    let data = json!({ "figure": figure, "colors": SERIES_COLORS });
+    html! {
+        figure .plot id=(id) {
+            figcaption { (figure.title) }
+            @if let Some(still) = still {
+                img .still src=(data_address(&still.svg)) alt=(words(figure));
+            }
+            div .drawn hidden role="img" aria-label=(words(figure)) {}
+            script type="application/json" { (PreEscaped(safe_json(&data))) }
+            @if !figure.note.is_empty() { p .note { (figure.note) } }
+            @if let Some(numbers) = numbers(figure) {
+                details .numbers {
+                    summary { "Numbers" }
+                    div .scrolled role="region" tabindex="0" aria-label={ "Numbers of: " (figure.title) } {
+                        (tables::grid(&numbers, None))
+                    }
+                }
+            }
+        }
+    }
+}
+
+pub(super) fn picture(picture: &Picture, id: &str) -> Markup {
+    html! {
+        figure .picture id=(id) {
+            figcaption { (picture.title) }
+            img src=(data_address(&picture.svg)) alt={ (picture.title) ". " (picture.caption) };
+            @if !picture.caption.is_empty() { p .note { (picture.caption) } }
+        }
+    }
+}
+
+/// A figure for those who do not see it.
+fn words(figure: &Figure) -> String {
+    let names: Vec<&str> =
+        figure.series.iter().map(|s| s.name.as_str()).filter(|n| !n.is_empty()).collect();
+    let of = if names.is_empty() { String::new() } else { format!(": {}", names.join(", ")) };
+    format!("{}. {} over {}{of}.", figure.title, figure.y_label, figure.x_label)
+}
+
+/// The figure's points as a table, if they are few.
+fn numbers(figure: &Figure) -> Option<Table> {
+    let count: usize = figure.series.iter().map(|s| s.points.len()).sum();
+    if count > MOST_ROWS || figure.kind == FigureKind::Ways {
+        return None;
+    }
+    let mut table = Table::new("", "", &["series"]);
+    table.columns.push(figure.x_label.clone());
+    table.columns.push(figure.y_label.clone());
+    table.columns.extend(["from", "to", "n"].map(String::from));
+    for series in &figure.series {
+        for point in &series.points {
+            let x = match &figure.kind {
+                FigureKind::Bars { categories } => {
+                    categories.get(point.x as usize).cloned().unwrap_or_default()
+                }
+                _ => point.x.to_string(),
+            };
+            let end =
+                |of: fn((f64, f64)) -> f64| point.interval.map_or(String::new(), |i| short(of(i)));
+            let n = point.n.map_or(String::new(), |n| n.to_string());
+            let (low, high) = (end(|i| i.0), end(|i| i.1));
+            table.row([series.name.clone(), x, short(point.y), low, high, n]);
+        }
+    }
+    Some(table)
+}
+
+/// Six digits tell any two measurements apart.
+fn short(value: f64) -> String {
+    let digits = format!("{value:.5e}").parse::<f64>();
+    digits.map_or_else(|_| value.to_string(), |rounded| rounded.to_string())
+}
+
+/// JSON for a script: no text in it can end the script.
+fn safe_json(value: &serde_json::Value) -> String {
+    value.to_string().replace('<', "\\u003c").replace('\u{2028}', "\\u2028")
+}
+
+/// An SVG as the address of an image.
+fn data_address(svg: &str) -> String {
+    let mut address = String::with_capacity(svg.len() + svg.len() / 4);
+    address.push_str("data:image/svg+xml;charset=utf-8,");
+    for c in svg.chars() {
+        match c {
+            '%' => address.push_str("%25"),
+            '#' => address.push_str("%23"),
+            '<' => address.push_str("%3C"),
+            '>' => address.push_str("%3E"),
+            // Shorter than the entity that it would become in an attribute.
+            '"' => address.push_str("%22"),
+            '&' => address.push_str("%26"),
+            '\n' => address.push_str("%0A"),
+            _ => address.push(c),
+        }
+    }
+    address
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_text_ends_the_script_that_it_stands_in() {
+        let json = safe_json(&json!({ "name": "</script><!--\u{2028}" }));
+        assert_eq!(json, r#"{"name":"\u003c/script>\u003c!--\u2028"}"#);
+        assert_eq!(
+            serde_json::from_str::<serde_json::Value>(&json).unwrap()["name"],
+            "</script><!--\u{2028}"
+        );
+    }
+
+    #[test]
+    fn an_address_holds_no_mark_of_html() {
+        let address = data_address("<a b=\"#1\">50 % &amp;</a>\n");
+        assert_eq!(
+            address,
+            "data:image/svg+xml;charset=utf-8,%3Ca b=%22%231%22%3E50 %25 %26amp;%3C/a%3E%0A"
+        );
+    }
+}

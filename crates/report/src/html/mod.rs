@@ -1,0 +1,161 @@
+//! Documents as a page that needs nothing but itself.
+//!
+//! ```text
+//! blocks.rs    the parts of a document       figures.rs   figures and pictures
+//! tables.rs    tables and claims             plotly.rs    the script that draws figures
+//! page.css     looks                         page.js      figures, and sorting of tables
+//! ```
+
+mod blocks;
+mod figures;
+mod plotly;
+mod tables;
+
+use crate::{SvgFile, slug};
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+use sidestep::experiment::Document;
+use sidestep::experiment::document::{Block, Span, Text};
+
+const STYLE: &str = include_str!("page.css");
+const SCRIPT: &str = include_str!("page.js");
+
+/// Nothing may be loaded; what is inside may be shown and run.
+const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; \
+                      img-src data: blob:; font-src data:; base-uri 'none'; form-action 'none'";
+
+/// From so many sections on there is a table of contents.
+const LONG: usize = 3;
+
+/// The page; `pictures` has one for each figure and picture, in their order.
+pub(crate) fn page(document: &Document, pictures: &[SvgFile]) -> String {
+    let sections = Section::all(document, pictures);
+    let has_contents = sections.iter().filter(|s| s.title.is_some()).count() >= LONG;
+    let has_figures = document.blocks.iter().any(|block| matches!(block, Block::Figure(_)));
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta http-equiv="Content-Security-Policy" content=(POLICY);
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta name="color-scheme" content="light dark";
+                meta name="description" content=(document.lead.words());
+                meta name="generator" content={ "sidestep " (env!("CARGO_PKG_VERSION")) };
+                title { (document.title) }
+                style { (PreEscaped(STYLE)) }
+            }
+            body .has-contents[has_contents] {
+                header {
+                    h1 { (document.title) }
+                    p .lead { (text(&document.lead)) }
+                }
+                @if has_contents { (contents(&sections)) }
+                main { @for section in &sections { (section.markup()) } }
+                footer {
+                    p { "Made by sidestep " (env!("CARGO_PKG_VERSION"))
+                        ". This file is complete in itself and loads nothing." }
+                }
+                @if has_figures { script { (PreEscaped(plotly::SCRIPT.as_str())) } }
+                script { (PreEscaped(SCRIPT)) }
+            }
+        }
+    };
+    page.into_string()
+}
+
+/// A part of the page under one head.
+struct Section<'a> {
+    title: Option<&'a str>,
+    id: String,
+    blocks: Vec<Part<'a>>,
+}
+
+/// A block, its place in the page, and its picture if it is one.
+struct Part<'a> {
+    block: &'a Block,
+    id: String,
+    picture: Option<&'a SvgFile>,
+}
+
+impl<'a> Section<'a> {
+    /// The blocks of a document by the sections that they stand in.
+    fn all(document: &'a Document, pictures: &'a [SvgFile]) -> Vec<Self> {
+        let mut sections = vec![Self { title: None, id: String::new(), blocks: Vec::new() }];
+        let mut pictures = pictures.iter();
+        for (k, block) in document.blocks.iter().enumerate() {
+            let id = |title: &str| format!("{}-{}", slug(title), k + 1);
+            if let Block::Section(title) = block {
+                let (title, id) = (Some(title.as_str()), id(title));
+                sections.push(Self { title, id, blocks: Vec::new() });
+                continue;
+            }
+            let is_picture = matches!(block, Block::Figure(_) | Block::Picture(_));
+            let picture = if is_picture { pictures.next() } else { None };
+            let id = id(title_of(block).unwrap_or("part"));
+            if let Some(section) = sections.last_mut() {
+                section.blocks.push(Part { block, id, picture });
+            }
+        }
+        sections.retain(|s| s.title.is_some() || !s.blocks.is_empty());
+        sections
+    }
+
+    fn markup(&self) -> Markup {
+        let parts = html! { @for part in &self.blocks { (blocks::markup(part)) } };
+        html! {
+            @match self.title {
+                None => section { (parts) },
+                Some(title) => section aria-labelledby=(self.id) {
+                    h2 id=(self.id) { (title) }
+                    (parts)
+                },
+            }
+        }
+    }
+}
+
+/// What a block is called in the table of contents.
+fn title_of(block: &Block) -> Option<&str> {
+    match block {
+        Block::Table(table) => Some(&table.title),
+        Block::Figure(figure) => Some(&figure.title),
+        Block::Picture(picture) => Some(&picture.title),
+        _ => None,
+    }
+}
+
+fn contents(sections: &[Section<'_>]) -> Markup {
+    let link = |id: &str, title: &str| html! { a href={ "#" (id) } { (title) } };
+    html! {
+        nav .contents aria-label="Contents" {
+            ol {
+                @for section in sections {
+                    @if let Some(title) = section.title {
+                        li {
+                            (link(&section.id, title))
+                            @let titled: Vec<_> = section.blocks.iter()
+                                .filter_map(|part| Some((&part.id, title_of(part.block)?)))
+                                .collect();
+                            @if titled.len() > 1 {
+                                ol { @for (id, title) in titled { li { (link(id, title)) } } }
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Words with their marks.
+fn text(text: &Text) -> Markup {
+    html! {
+        @for span in &text.0 {
+            @match span {
+                Span::Plain(words) => (words),
+                Span::Code(words) => code { (words) },
+                Span::Strong(words) => strong { (words) },
+            }
+        }
+    }
+}

@@ -1,0 +1,110 @@
+//! Tables of numbers, and of claims.
+
+use super::text;
+use maud::{Markup, html};
+use sidestep::experiment::Table;
+use sidestep::experiment::claim::{self, Claim, Verdict};
+use sidestep::experiment::document::Text;
+
+/// A table that is sorted by a click on a head and scrolls inside itself.
+pub(super) fn table(table: &Table, id: &str) -> Markup {
+    html! {
+        div .table id=(id) {
+            (scrolled(&table.title, grid(table, Some(&table.title))))
+            @if !table.note.is_empty() { p .note { (text(&Text::marked(&table.note))) } }
+        }
+    }
+}
+
+/// Columns and rows, with the title as caption.
+pub(super) fn grid(table: &Table, caption: Option<&str>) -> Markup {
+    let numbers: Vec<bool> = (0..table.columns.len()).map(|k| holds_numbers(table, k)).collect();
+    html! {
+        table .sortable {
+            @if let Some(caption) = caption { caption { (caption) } }
+            thead { tr {
+                @for (head, number) in table.columns.iter().zip(&numbers) {
+                    th scope="col" .number[*number] { (head) }
+                }
+            } }
+            tbody {
+                @for row in &table.rows {
+                    tr {
+                        @for (k, cell) in table.cells(row).enumerate() {
+                            @if k == 0 { th scope="row" .number[numbers[k]] { (cell) } }
+                            @else { td .number[numbers[k]] { (cell) } }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// What scrolls by itself can be reached by keyboard, and has a name.
+fn scrolled(name: &str, inside: Markup) -> Markup {
+    html! { div .scrolled role="region" tabindex="0" aria-label=(name) { (inside) } }
+}
+
+/// Whether every cell that says something begins like a number.
+fn holds_numbers(table: &Table, k: usize) -> bool {
+    let cells = || table.rows.iter().filter_map(|row| row.get(k));
+    let is_number = |cell: &str| {
+        let digits = cell.trim_start_matches(['-', '+', '\u{2212}']);
+        cell.is_empty() || cell == "-" || digits.starts_with(|c: char| c.is_ascii_digit())
+    };
+    cells().any(|cell| !cell.is_empty()) && cells().all(|cell| is_number(cell))
+}
+
+/// Claims, with how many of them held above.
+pub(super) fn claims(claims: &[Claim]) -> Markup {
+    let has_figure = claims.iter().any(|c| c.papers_figure.is_some());
+    let heads = html! {
+        th scope="col" { "claim" }
+        th scope="col" { "verdict" }
+        th scope="col" { "the paper, in our words" }
+        @if has_figure { th scope="col" { "the paper's figure" } }
+        th scope="col" { "our figures" }
+        th scope="col" { "why" }
+    };
+    let rows = html! {
+        @for claim in claims {
+            tr id={ "claim-" (claim.id.replace([' ', ','], "")) } {
+                th scope="row" { (claim.id) }
+                td { (badge(claim.verdict)) }
+                td { (text(&Text::marked(claim.paper))) }
+                @if has_figure { td { (claim.papers_figure.unwrap_or("none")) } }
+                td { (text(&Text::marked(&claim.ours))) }
+                td .why { (text(&Text::marked(&claim.reason))) }
+            }
+        }
+    };
+    let table = html! {
+        table .claims .sortable {
+            caption { "Claims of the paper, and what came of them" }
+            thead { tr { (heads) } }
+            tbody { (rows) }
+        }
+    };
+    html! {
+        p .tally {
+            @for verdict in Verdict::ALL {
+                (badge(verdict)) " " strong { (claim::count(claims, verdict)) } " "
+            }
+        }
+        (scrolled("Claims", table))
+        p .note { (text(&Text::marked(claim::NOTE))) }
+    }
+}
+
+/// A verdict by color, sign and word.
+fn badge(verdict: Verdict) -> Markup {
+    let (class, sign) = match verdict {
+        Verdict::Held => ("held", "\u{2713}"),
+        Verdict::NotHeld => ("not-held", "\u{2717}"),
+        Verdict::Lost => ("lost", "?"),
+    };
+    html! {
+        span .badge .(class) { span aria-hidden="true" { (sign) } " " (verdict.name()) }
+    }
+}

@@ -1,0 +1,69 @@
+#![doc = include_str!("../README.md")]
+
+mod chart;
+mod html;
+pub mod markdown;
+
+pub use chart::chart_svg;
+
+use sidestep::experiment::Document;
+use sidestep::experiment::document::Block;
+use sidestep_draw::DrawError;
+
+/// A report, ready to be stored.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Rendered {
+    /// The page; complete in itself.
+    pub html: String,
+    /// The Markdown twin; it shows the pictures below.
+    pub markdown: String,
+    /// Every figure and picture, in the order of the document.
+    pub pictures: Vec<SvgFile>,
+}
+
+/// A picture and what its file is called.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SvgFile {
+    /// Name without its ending, e.g. `03-speed-up`.
+    pub stem: String,
+    /// The picture as SVG.
+    pub svg: String,
+}
+
+/// Makes page, text and pictures of a document. `folder` is where the pictures will be, as seen
+/// from the Markdown file.
+///
+/// # Errors
+/// When a figure cannot be drawn.
+pub fn render(document: &Document, folder: &str) -> Result<Rendered, DrawError> {
+    let pictures = pictures(document)?;
+    Ok(Rendered {
+        html: html::page(document, &pictures),
+        markdown: markdown::text(document, folder, &pictures),
+        pictures,
+    })
+}
+
+/// All that is to be drawn, numbered in its order.
+fn pictures(document: &Document) -> Result<Vec<SvgFile>, DrawError> {
+    let drawn = document.blocks.iter().filter_map(|block| match block {
+        Block::Figure(figure) => Some((&figure.title, chart_svg(figure))),
+        Block::Picture(picture) => Some((&picture.title, Ok(picture.svg.clone()))),
+        _ => None,
+    });
+    let numbered = (1..).zip(drawn);
+    let file = |(k, (title, svg)): (usize, (&String, Result<String, DrawError>))| {
+        Ok(SvgFile { stem: format!("{k:02}-{}", slug(title)), svg: svg? })
+    };
+    numbered.map(file).collect()
+}
+
+/// A title as part of a file name or an address: `Trip times, by regime` becomes
+/// `trip-times-by-regime`.
+fn slug(title: &str) -> String {
+    let words = title.split(|c: char| !c.is_ascii_alphanumeric()).filter(|w| !w.is_empty());
+    words.map(str::to_ascii_lowercase).take(8).collect::<Vec<_>>().join("-")
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,143 @@
+//! Documents as Markdown.
+
+use crate::SvgFile;
+use sidestep::experiment::Document;
+use sidestep::experiment::Table;
+use sidestep::experiment::claim::{self, Claim};
+use sidestep::experiment::document::{Block, Code, Span, Text};
+use std::fmt::Write;
+
+/// A document as text; `folder` holds the `pictures`, one for each figure and picture.
+pub(crate) fn text(document: &Document, folder: &str, pictures: &[SvgFile]) -> String {
+    let mut parts = vec![format!("# {}", plain(&document.title)), spans(&document.lead)];
+    let mut pictures = pictures.iter();
+    for block in &document.blocks {
+        parts.push(match block {
+            Block::Section(title) => format!("## {}", plain(title)),
+            Block::Paragraph(text) => spans(text),
+            Block::Warning(text) => format!("> {}", spans(text)),
+            Block::Code(code) => fenced(code),
+            Block::Facts(facts) => listed(facts),
+            Block::Table(table) => self::table(table).trim_end().into(),
+            Block::Claims(claims) => claims_table(claims),
+            Block::Figure(f) => pictured(&f.title, &f.note, folder, pictures.next()),
+            Block::Picture(p) => pictured(&p.title, &p.caption, folder, pictures.next()),
+        });
+    }
+    parts.retain(|part| !part.is_empty());
+    parts.join("\n\n") + "\n"
+}
+
+/// A document as text for a place that shows no pictures, such as a terminal.
+pub fn without_pictures(document: &Document) -> String {
+    text(document, "", &[])
+}
+
+/// A table, with its title as a heading of the third level.
+pub fn table(table: &Table) -> String {
+    let columns: Vec<String> = table.columns.iter().map(|c| cell(c)).collect();
+    let rows = table.rows.iter().map(|row| table.cells(row).map(cell).collect());
+    let mut text = format!("### {}\n\n{}", plain(&table.title), grid(&columns, rows));
+    if !table.note.is_empty() {
+        // Writing to a string cannot fail.
+        let _ = write!(text, "\n{}\n", spans(&Text::marked(&table.note)));
+    }
+    text
+}
+
+/// Cells that are Markdown already, in their columns.
+fn grid(columns: &[String], rows: impl Iterator<Item = Vec<String>>) -> String {
+    let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
+    let rule = format!("|{}\n", "---|".repeat(columns.len()));
+    std::iter::once(line(columns)).chain([rule]).chain(rows.map(|row| line(&row))).collect()
+}
+
+fn claims_table(claims: &[Claim]) -> String {
+    let has_figure = claims.iter().any(|c| c.papers_figure.is_some());
+    let mut columns = vec!["claim", "the paper, in our words", "our figures", "verdict", "why"];
+    if has_figure {
+        columns.insert(2, "the paper's figure");
+    }
+    let columns: Vec<String> = columns.into_iter().map(cell).collect();
+    let row = |c: &Claim| {
+        let verdict = format!("**{}**", c.verdict.name());
+        let mut row =
+            vec![cell(c.id), marked(c.paper), marked(&c.ours), verdict, marked(&c.reason)];
+        if has_figure {
+            row.insert(2, cell(c.papers_figure.unwrap_or("none")));
+        }
+        row
+    };
+    let note = spans(&Text::marked(claim::NOTE));
+    format!("{}\n{note}", grid(&columns, claims.iter().map(row)))
+}
+
+fn listed(facts: &[(String, Text)]) -> String {
+    let line = |(name, value): &(String, Text)| format!("- {}: {}", plain(name), spans(value));
+    facts.iter().map(line).collect::<Vec<_>>().join("\n")
+}
+
+fn pictured(title: &str, note: &str, folder: &str, picture: Option<&SvgFile>) -> String {
+    let Some(picture) = picture else { return String::new() };
+    let note = if note.is_empty() { String::new() } else { format!("\n\n{}", plain(note)) };
+    format!("### {0}\n\n![{0}]({folder}/{1}.svg){note}", plain(title), picture.stem)
+}
+
+/// A fence is longer than every row of backticks in the text.
+fn fenced(code: &Code) -> String {
+    let rows = code.text.split(|c| c != '`').map(str::len);
+    let fence = "`".repeat(rows.max().unwrap_or(0).max(2) + 1);
+    let text = code.text.trim_end();
+    format!("{}:\n\n{fence}{}\n{text}\n{fence}", plain(&code.title), code.language)
+}
+
+fn spans(text: &Text) -> String {
+    let of = |span: &Span| match span {
+        Span::Plain(words) => plain(words),
+        Span::Strong(words) => format!("**{}**", plain(words)),
+        Span::Code(code) => code_span(code),
+    };
+    text.0.iter().map(of).collect()
+}
+
+/// Code that holds backticks stands between more of them.
+fn code_span(code: &str) -> String {
+    let code = code.replace('\n', " ");
+    let most = code.split(|c| c != '`').map(str::len).max().unwrap_or(0);
+    let mark = "`".repeat(most + 1);
+    if most == 0 { format!("{mark}{code}{mark}") } else { format!("{mark} {code} {mark}") }
+}
+
+/// Words of our own, with marks, in a cell.
+fn marked(text: &str) -> String {
+    let text = spans(&Text::marked(text));
+    text.replace('|', "\\|")
+}
+
+/// Words in a cell: a bar would end it.
+fn cell(words: &str) -> String {
+    plain(words).replace('|', "\\|")
+}
+
+/// Words without anything that Markdown or HTML inside it would read as a mark.
+fn plain(words: &str) -> String {
+    let mut text = String::with_capacity(words.len());
+    let is_word = |c: Option<char>| c.is_some_and(char::is_alphanumeric);
+    let mut before = None;
+    let mut rest = words.chars().peekable();
+    while let Some(c) = rest.next() {
+        let next = rest.peek().copied();
+        match c {
+            '\n' | '\r' => text.push(' '),
+            '&' => text.push_str("&amp;"),
+            '<' => text.push_str("&lt;"),
+            // Inside a word it is no mark; brackets are one only before an address.
+            '_' if is_word(before) && is_word(next) => text.push(c),
+            ']' if !matches!(next, Some('(' | '[' | ':')) => text.push(c),
+            '\\' | '`' | '*' | '_' | ']' | '~' => text.extend(['\\', c]),
+            _ => text.push(c),
+        }
+        before = Some(c);
+    }
+    text
+}

@@ -1,0 +1,161 @@
+//! What both renderers promise of every document.
+
+use super::*;
+use sidestep::experiment::claim::{Claim, Verdict};
+use sidestep::experiment::document::{Picture, Text};
+use sidestep::experiment::figure::{Point, Scale};
+use sidestep::experiment::{Figure, FigureKind, Series, Table};
+
+/// What each language would read as its own.
+const HOSTILE: &str = "</script><img src=x onerror=alert(1)> | `a` **b** [c](d) & \"e\"";
+
+/// A document with every block, and [`HOSTILE`] words wherever there are words.
+fn whole() -> Document {
+    let mut document = Document::new(HOSTILE, Text::from(HOSTILE));
+    document.warning(Text::marked("**Mind** the `gap`."));
+    document
+        .section("Claims")
+        .push(Block::Claims(vec![claim("C-1", Some("3 m")), claim("C-2", None)]));
+    document.section(HOSTILE).paragraph(HOSTILE).commands("Again", "sidestep run a ``` b");
+    document.push(Block::Facts(vec![("seed".into(), Text::code(HOSTILE))]));
+    let mut table = Table::new(HOSTILE, "Note with `code`.", &["name", "value"]);
+    table.row([HOSTILE.into(), "1.5".into()]);
+    table.row(["short".into()]);
+    document.section("Numbers").tables([table]).figures(every_kind());
+    let svg = "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"9\" height=\"9\"></svg>".into();
+    let (title, caption) = (HOSTILE.into(), "Small print.".into());
+    document.section("Pictures").pictures([Picture { title, caption, svg }]);
+    document
+}
+
+fn claim(id: &'static str, papers_figure: Option<&'static str>) -> Claim {
+    Claim {
+        id,
+        paper: HOSTILE,
+        papers_figure,
+        ours: "2.9 [2.8, 3.1] n=4".into(),
+        verdict: Verdict::NotHeld,
+        reason: "by the rule `r`".into(),
+    }
+}
+
+fn every_kind() -> Vec<Figure> {
+    let categories = vec![HOSTILE.to_string(), "b".into()];
+    let kinds = [
+        FigureKind::Lines,
+        FigureKind::Bands,
+        FigureKind::Points,
+        FigureKind::Ways,
+        FigureKind::Bars { categories },
+    ];
+    let point =
+        |x: f64, y: f64| Point::new(x, y).with_interval(Some((0.5 * y, 2.0 * y))).of_runs(4);
+    let series = Series { name: HOSTILE.into(), points: vec![point(0.0, 1.0), point(1.0, 30.0)] };
+    let figure = |kind| Figure {
+        title: "A figure".into(),
+        note: "Bars are intervals.".into(),
+        x_label: HOSTILE.into(),
+        y_label: "value".into(),
+        y_scale: Scale::Log,
+        kind,
+        series: vec![series.clone()],
+        ..Figure::default()
+    };
+    kinds.map(figure).into()
+}
+
+/// The page without the scripts at its end.
+fn before_library(html: &str) -> &str {
+    html.split("<script>").next().unwrap()
+}
+
+#[test]
+fn the_same_document_gives_the_same_bytes() {
+    assert_eq!(render(&whole(), "figures"), render(&whole(), "figures"));
+}
+
+#[test]
+fn every_figure_and_picture_is_a_file_and_is_shown_by_both() {
+    let Rendered { html, markdown, pictures } = render(&whole(), "figures").unwrap();
+    assert_eq!(pictures.len(), 6);
+    assert_eq!(pictures[0].stem, "01-a-figure");
+    for picture in &pictures {
+        assert!(picture.svg.contains("<svg"), "{}", picture.stem);
+        assert!(markdown.contains(&format!("(figures/{}.svg)", picture.stem)), "{markdown}");
+    }
+    let own = before_library(&html);
+    assert_eq!(own.matches("data:image/svg+xml").count(), 6);
+    assert_eq!(own.matches("<figure class=\"plot\"").count(), 5);
+    assert_eq!(own.matches("application/json").count(), 5);
+}
+
+#[test]
+fn words_stay_words_in_html() {
+    let html = render(&whole(), "figures").unwrap().html;
+    let own = before_library(&html);
+    assert!(!own.contains("<img src=x") && !own.contains("</script><img"));
+    // Of scripts: one for each figure, the library's and the page's own.
+    assert_eq!(html.matches("</script>").count(), 5 + 2);
+    assert!(own.contains("&lt;/script&gt;&lt;img src=x onerror=alert(1)&gt;"));
+    assert!(own.contains("<strong>Mind</strong> the <code>gap</code>"));
+}
+
+#[test]
+fn words_stay_words_in_markdown() {
+    let text = render(&whole(), "figures").unwrap().markdown;
+    let escaped =
+        "&lt;/script>&lt;img src=x onerror=alert(1)> | \\`a\\` \\*\\*b\\*\\* [c\\](d) &amp; \"e\"";
+    assert!(
+        text.starts_with(&format!("# {escaped}\n\n{escaped}\n\n> **Mind** the `gap`.\n\n")),
+        "{text}"
+    );
+    assert!(text.contains("\n````sh\nsidestep run a ``` b\n````\n"), "{text}");
+    let row = format!("\n| {} | 1.5 |\n| short |  |\n", escaped.replace('|', "\\|"));
+    assert!(text.contains(&row), "{text}");
+}
+
+#[test]
+fn claims_stand_with_the_papers_figure_beside_ours_and_a_verdict_in_words() {
+    let Rendered { html, markdown, .. } = render(&whole(), "figures").unwrap();
+    assert!(
+        markdown.contains("| 3 m | 2.9 [2.8, 3.1] n=4 | **not held** | by the rule `r` |"),
+        "{markdown}"
+    );
+    assert!(markdown.contains("| none | 2.9 [2.8, 3.1]"), "{markdown}");
+    assert!(html.contains("<td>3 m</td><td>2.9 [2.8, 3.1] n=4</td>"));
+    assert_eq!(html.matches("class=\"badge not-held\"").count(), 3, "two claims and their count");
+}
+
+#[test]
+fn a_page_is_accessible_and_forbids_the_network() {
+    let html = render(&whole(), "figures").unwrap().html;
+    for part in [
+        "<html lang=\"en\">",
+        "default-src 'none'",
+        "<meta name=\"description\"",
+        "<meta name=\"viewport\"",
+        "<nav class=\"contents\" aria-label=\"Contents\">",
+        "<th class=\"number\" scope=\"col\">value</th>",
+        "<th scope=\"row\">short</th>",
+        "<caption>",
+    ] {
+        assert!(html.contains(part), "{part}");
+    }
+    let own = before_library(&html);
+    assert_eq!(own.matches("<h1>").count(), 1);
+    assert_eq!(own.matches("<img ").count(), own.matches(" alt=\"").count());
+}
+
+#[test]
+fn a_report_without_figures_carries_no_library() {
+    let rendered = render(&Document::new("T", "Nothing more."), "figures").unwrap();
+    assert!(rendered.html.len() < 40_000, "{}", rendered.html.len());
+    assert_eq!(rendered.markdown, "# T\n\nNothing more.\n");
+    assert!(rendered.pictures.is_empty());
+}
+
+#[test]
+fn titles_become_parts_of_file_names() {
+    assert_eq!(slug("Trip times, by regime"), "trip-times-by-regime");
+    assert_eq!(slug("1/2 (s)"), "1-2-s");
+}

@@ -1,0 +1,241 @@
+//! A report as plain data: what it says, in which order. It knows no file and no markup; others
+//! make a page or a text of it.
+
+use super::claim::Claim;
+use super::{Figure, Table};
+use serde::Serialize;
+
+/// A report.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Document {
+    /// What it is about.
+    pub title: String,
+    /// What came out, in a sentence or two.
+    pub lead: Text,
+    /// Everything else, from top to bottom.
+    pub blocks: Vec<Block>,
+}
+
+/// A part of a report.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Block {
+    /// The head of all that follows, up to the next one.
+    Section(String),
+    /// Some sentences.
+    Paragraph(Text),
+    /// What must not be overlooked: a rehearsal, a run that has not ended.
+    Warning(Text),
+    /// Text to be kept as it is: commands, a scenario.
+    Code(Code),
+    /// Names and values.
+    Facts(Vec<(String, Text)>),
+    /// Numbers.
+    Table(Table),
+    /// A figure to draw.
+    Figure(Figure),
+    /// A picture that is drawn already.
+    Picture(Picture),
+    /// Claims of a paper, and what came of them.
+    Claims(Vec<Claim>),
+}
+
+/// Text to be kept as it is.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Code {
+    /// What it is; where it is long, the page shows this until it is opened.
+    pub title: String,
+    /// `sh`, `toml`, ...
+    pub language: &'static str,
+    /// The text.
+    pub text: String,
+}
+
+/// A picture that is drawn already.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Picture {
+    /// What it shows.
+    pub title: String,
+    /// Small print.
+    pub caption: String,
+    /// The picture itself, as SVG.
+    #[serde(skip)]
+    pub svg: String,
+}
+
+/// Some sentences.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
+pub struct Text(pub Vec<Span>);
+
+/// Words that look alike.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Span {
+    /// Ordinary words.
+    Plain(String),
+    /// A name from a scenario, a command, a digest.
+    Code(String),
+    /// What the eye is to find.
+    Strong(String),
+}
+
+impl Text {
+    /// Reads marks: `` `code` `` and `**strong**`. A mark that is not closed is plain text. For
+    /// words of our own only; what comes from elsewhere is plain: `Text::from`.
+    pub fn marked(text: &str) -> Self {
+        let mut spans = Vec::new();
+        let mut rest = text;
+        while let Some((before, inside, mark, after)) = next_mark(rest) {
+            push_plain(&mut spans, before);
+            spans.push(match mark {
+                CODE => Span::Code(inside.into()),
+                _ => Span::Strong(inside.into()),
+            });
+            rest = after;
+        }
+        push_plain(&mut spans, rest);
+        Self(spans)
+    }
+
+    /// A name or a command alone.
+    pub fn code(text: impl Into<String>) -> Self {
+        Self(vec![Span::Code(text.into())])
+    }
+
+    /// The same text, and more of it.
+    #[must_use]
+    pub fn and(mut self, more: impl Into<Text>) -> Self {
+        self.0.extend(more.into().0);
+        self
+    }
+
+    /// The words without their marks.
+    pub fn words(&self) -> String {
+        let words = |span: &Span| match span {
+            Span::Plain(text) | Span::Code(text) | Span::Strong(text) => text.clone(),
+        };
+        self.0.iter().map(words).collect()
+    }
+}
+
+impl From<&str> for Text {
+    fn from(text: &str) -> Self {
+        Self::from(text.to_string())
+    }
+}
+
+impl From<String> for Text {
+    fn from(text: String) -> Self {
+        let mut spans = Vec::new();
+        push_plain(&mut spans, &text);
+        Self(spans)
+    }
+}
+
+const CODE: &str = "`";
+const STRONG: &str = "**";
+
+/// What is before the first pair of marks, in it, the mark, and what is after.
+fn next_mark(text: &str) -> Option<(&str, &str, &'static str, &str)> {
+    let pair = |mark: &'static str| {
+        let start = text.find(mark)?;
+        let inside = start + mark.len();
+        let length = text[inside..].find(mark).filter(|length| *length > 0)?;
+        let after = inside + length + mark.len();
+        Some((&text[..start], &text[inside..inside + length], mark, &text[after..]))
+    };
+    [CODE, STRONG].into_iter().filter_map(pair).min_by_key(|(before, ..)| before.len())
+}
+
+fn push_plain(spans: &mut Vec<Span>, text: &str) {
+    if !text.is_empty() {
+        spans.push(Span::Plain(text.into()));
+    }
+}
+
+impl Document {
+    /// A report that says no more than its title and `lead`.
+    pub fn new(title: impl Into<String>, lead: impl Into<Text>) -> Self {
+        Self { title: title.into(), lead: lead.into(), blocks: Vec::new() }
+    }
+
+    /// Begins a section.
+    pub fn section(&mut self, title: impl Into<String>) -> &mut Self {
+        self.push(Block::Section(title.into()))
+    }
+
+    /// Appends a part.
+    pub fn push(&mut self, block: Block) -> &mut Self {
+        self.blocks.push(block);
+        self
+    }
+
+    /// Appends some sentences.
+    pub fn paragraph(&mut self, text: impl Into<Text>) -> &mut Self {
+        self.push(Block::Paragraph(text.into()))
+    }
+
+    /// Appends what must not be overlooked.
+    pub fn warning(&mut self, text: impl Into<Text>) -> &mut Self {
+        self.push(Block::Warning(text.into()))
+    }
+
+    /// Appends commands to type.
+    pub fn commands(&mut self, title: impl Into<String>, text: impl Into<String>) -> &mut Self {
+        self.push(Block::Code(Code { title: title.into(), language: "sh", text: text.into() }))
+    }
+
+    /// Appends tables.
+    pub fn tables(&mut self, tables: impl IntoIterator<Item = Table>) -> &mut Self {
+        self.blocks.extend(tables.into_iter().map(Block::Table));
+        self
+    }
+
+    /// Appends figures.
+    pub fn figures(&mut self, figures: impl IntoIterator<Item = Figure>) -> &mut Self {
+        self.blocks.extend(figures.into_iter().map(Block::Figure));
+        self
+    }
+
+    /// Appends pictures.
+    pub fn pictures(&mut self, pictures: impl IntoIterator<Item = Picture>) -> &mut Self {
+        self.blocks.extend(pictures.into_iter().map(Block::Picture));
+        self
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn marks_become_spans_and_a_mark_alone_stays_a_character() {
+        let plain = |text: &str| Span::Plain(text.into());
+        let text = Text::marked("a `b**` and **c**, 2 ** 3 and `");
+        let spans = vec![
+            plain("a "),
+            Span::Code("b**".into()),
+            plain(" and "),
+            Span::Strong("c".into()),
+            plain(", 2 ** 3 and `"),
+        ];
+        assert_eq!(text, Text(spans));
+        assert_eq!(text.words(), "a b** and c, 2 ** 3 and `");
+        assert_eq!(Text::marked("````").words(), "````");
+        assert_eq!(Text::marked(""), Text::default());
+    }
+
+    #[test]
+    fn what_comes_from_elsewhere_is_not_read_for_marks() {
+        assert_eq!(Text::from("**x** `y`").0, [Span::Plain("**x** `y`".into())]);
+    }
+
+    #[test]
+    fn a_document_keeps_the_order_in_which_it_is_told() {
+        let mut document = Document::new("T", "lead");
+        document.section("S").paragraph("p").commands("again", "sidestep run");
+        let kinds: Vec<bool> =
+            document.blocks.iter().map(|b| matches!(b, Block::Section(_))).collect();
+        assert_eq!(kinds, [true, false, false]);
+    }
+}
