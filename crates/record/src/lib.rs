@@ -9,12 +9,14 @@ mod staging;
 pub mod folder;
 pub mod format;
 pub mod manifest;
+pub mod mcap;
 pub mod parquet;
 pub mod read;
 
 pub use folder::{Existing, NewRun, ResumePoint, RunFolder, RunView};
 pub use format::FormatVersion;
 pub use manifest::{Manifest, Status};
+pub use mcap::{McapEnd, McapOrigin, McapRecorder, McapRun, is_mcap};
 pub use parquet::ParquetRecorder;
 pub use read::{Table, read_table};
 pub use schema::Origin;

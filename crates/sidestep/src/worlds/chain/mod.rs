@@ -61,6 +61,7 @@ pub mod state;
 pub mod swarm;
 pub mod sweep;
 pub mod veto;
+mod view;
 pub mod wavefront;
 pub mod world;
 
