@@ -4,6 +4,7 @@
 //! args.rs      what can be typed                commands/*.rs   one file per command
 //! plan.rs      scenario + options -> a run      worlds/         the only place that knows worlds
 //! driver.rs    advances, records, checkpoints   report.rs       what a run says at its end
+//! film/        frames into files                rerun.rs        recorded runs, computed again
 //! exit.rs      how the command ends             console.rs      what it prints, and where
 //! ```
 
@@ -13,6 +14,7 @@ mod console;
 mod driver;
 mod exit;
 mod files;
+mod film;
 mod interrupt;
 mod picture;
 mod plan;
@@ -20,6 +22,7 @@ mod progress;
 mod recorded;
 mod recording;
 mod report;
+mod rerun;
 mod worlds;
 
 use clap::Parser;
