@@ -5,6 +5,7 @@ mod encode;
 mod part;
 mod schema;
 mod staging;
+mod table_file;
 
 pub mod folder;
 pub mod format;
@@ -18,5 +19,6 @@ pub use format::FormatVersion;
 pub use manifest::{Manifest, Status};
 pub use mcap::{McapEnd, McapOrigin, McapRecorder, McapRun, is_mcap};
 pub use parquet::ParquetRecorder;
-pub use read::{Table, read_table};
+pub use read::{Table, for_each_block, read_table, tables};
 pub use schema::Origin;
+pub use table_file::TableFile;

@@ -3,7 +3,7 @@
 use crate::console::Console;
 use crate::driver::{Effort, Sinks, drive};
 use crate::exit::{ExitCode, Failure};
-use crate::film::{Film, McapFilm};
+use crate::film::{Ending, Film, McapFilm};
 use crate::interrupt;
 use crate::picture;
 use crate::recording::Recording;
@@ -48,7 +48,11 @@ pub(super) fn travel(journey: Journey, console: Console) -> Result<ExitCode, Fai
         summary.tell_of_file(told);
     }
     if let Some(film) = film {
-        let path = film.finish(run.as_ref(), summary.status() == Status::Complete);
+        let ending = match summary.status() {
+            Status::Complete => Ending::Complete,
+            Status::Incomplete => Ending::Stopped,
+        };
+        let path = film.finish(run.as_ref(), ending);
         let path = path.map_err(|e| broken_by(e, run.as_ref(), recording.as_ref()))?;
         summary.tell_of_mcap(path);
     }

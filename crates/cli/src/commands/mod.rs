@@ -4,6 +4,7 @@ mod arm;
 mod check;
 mod compare;
 mod exact;
+mod export;
 mod finish;
 mod fk;
 mod ik;
@@ -44,8 +45,10 @@ pub(crate) enum Command {
     Resume(resume::ResumeArgs),
     /// Run a paper's experiments anew and judge its claims
     Reproduce(reproduce::ReproduceArgs),
-    /// Recompute a recorded run up to a cycle and show where everybody is
+    /// Compute a recorded run again and compare it with what was recorded
     Replay(replay::ReplayArgs),
+    /// Write a recorded run as tables, pictures, films or recordings for viewers
+    Export(export::ExportArgs),
 }
 
 /// Does what was typed.
@@ -66,5 +69,6 @@ pub(crate) fn execute(command: Command, console: &Console) -> Result<ExitCode, F
         Command::Resume(args) => resume::resume(&args, *console),
         Command::Reproduce(args) => reproduce::reproduce(&args, *console),
         Command::Replay(args) => replay::replay(&args, *console),
+        Command::Export(args) => export::export(&args, *console),
     }
 }

@@ -13,6 +13,17 @@ use std::time::{Duration, Instant};
 /// for it costs what the simulation does.
 const LOOK: Look = Look { scanning_bodies: 64 };
 
+/// Why a recording ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Ending {
+    /// The run is complete.
+    Complete,
+    /// No more of the run is wanted.
+    Extract,
+    /// The run was stopped: the file keeps `.partial` at its end.
+    Stopped,
+}
+
 /// An MCAP file that grows with a run.
 pub(crate) struct McapFilm {
     recorder: McapRecorder,
@@ -52,10 +63,17 @@ impl McapFilm {
     ///
     /// # Errors
     /// What the system says.
-    pub(crate) fn finish(self, run: &dyn Run, is_complete: bool) -> Result<PathBuf, Failure> {
-        let status = if is_complete { Status::Complete } else { Status::Incomplete };
+    pub(crate) fn finish(self, run: &dyn Run, ending: Ending) -> Result<PathBuf, Failure> {
+        let status = match ending {
+            Ending::Complete => Status::Complete,
+            Ending::Extract | Ending::Stopped => Status::Incomplete,
+        };
         let (cycles_done, digest) = (run.cycle(), run.digest().to_string());
-        Ok(self.recorder.finish(&McapEnd { status, cycles_done, digest })?)
+        let end = McapEnd { status, cycles_done, digest };
+        Ok(match ending {
+            Ending::Stopped => self.recorder.stop(&end)?,
+            Ending::Complete | Ending::Extract => self.recorder.finish(&end)?,
+        })
     }
 
     /// Time spent so far.

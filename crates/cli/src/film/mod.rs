@@ -1,8 +1,13 @@
 //! What is made of frames while a run goes on: recordings for viewers, and films.
 
+mod gif;
 mod mcap;
+mod pictures;
+mod stage;
 
-pub(crate) use mcap::McapFilm;
+pub(crate) use gif::write_gif;
+pub(crate) use mcap::{Ending, McapFilm};
+pub(crate) use pictures::Pictures;
 
 use crate::exit::Failure;
 use crate::worlds::Run;

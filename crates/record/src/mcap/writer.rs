@@ -167,28 +167,33 @@ impl McapRecorder {
         Ok(())
     }
 
-    /// Ends the file: waits for the disk, and gives a recording of a whole run its name. One of a
-    /// run that was stopped can be opened too, but keeps `.partial` at its end.
+    /// Ends the file: waits for the disk, and gives it its name.
     ///
     /// # Errors
     /// What the system says.
-    pub fn finish(mut self, end: &McapEnd) -> Result<PathBuf, RecordError> {
+    pub fn finish(self, end: &McapEnd) -> Result<PathBuf, RecordError> {
+        let path = self.path.clone();
+        disk::rename(&self.stop(end)?, &path)?;
+        Ok(path)
+    }
+
+    /// Ends the file of a run that was stopped: it can be opened, but keeps `.partial` at its end.
+    /// Says what it is called.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn stop(mut self, end: &McapEnd) -> Result<PathBuf, RecordError> {
         let metadata = Metadata { name: METADATA.into(), metadata: self.metadata(end) };
         self.with(|writer| writer.write_metadata(&metadata))?;
         self.with(|writer| writer.finish().map(drop))?;
         let growing = disk::partial(&self.path);
-        let failed = |cause: String| RecordError::new(self.path.display(), cause);
         let Some(writer) = self.writer.take() else { return Ok(growing) };
         let ended = writer.into_inner().into_inner().map_err(|e| e.into_error());
         ended.and_then(|file| file.sync_all()).map_err(|e| {
             let _ = fs::remove_file(&growing);
-            failed(e.to_string())
+            RecordError::new(self.path.display(), e)
         })?;
-        if end.status != Status::Complete {
-            return Ok(growing);
-        }
-        disk::rename(&growing, &self.path)?;
-        Ok(self.path.clone())
+        Ok(growing)
     }
 
     fn metadata(&self, end: &McapEnd) -> BTreeMap<String, String> {
