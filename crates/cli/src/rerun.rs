@@ -2,7 +2,7 @@
 
 use crate::exit::Failure;
 use crate::recording::{restore, write_inputs};
-use crate::worlds::{Compiled, Run};
+use crate::worlds::{Compiled, Resolved, Run};
 use sidestep::kernel::checkpoint::decode_header;
 use sidestep::kernel::{Cycle, InputError};
 use sidestep::scenario::Source;
@@ -25,9 +25,14 @@ pub(crate) struct Recorded {
     /// The run folder, where it is one.
     pub(crate) folder: Option<PathBuf>,
     source: Source,
-    /// Where the files of a recording are as long as it is used.
-    _files: Option<tempfile::TempDir>,
+    /// The folder that the scenario's files lie in.
+    base: PathBuf,
+    /// The same, where it lasts only as long as this.
+    _unpacked: Option<tempfile::TempDir>,
 }
+
+/// Where resolved scenarios have their files.
+const INPUTS: &str = "inputs";
 
 impl Recorded {
     /// Opens a run folder or an MCAP file of ours.
@@ -49,7 +54,8 @@ impl Recorded {
             digest: view.manifest.digest,
             folder: Some(path.to_path_buf()),
             source: Source::new(place, view.scenario, path),
-            _files: None,
+            base: path.to_path_buf(),
+            _unpacked: None,
         })
     }
 
@@ -66,13 +72,30 @@ impl Recorded {
             digest: Some(run.digest),
             folder: None,
             source: Source::new(place, run.scenario, files.path()),
-            _files: Some(files),
+            base: files.path().to_path_buf(),
+            _unpacked: Some(files),
         })
     }
 
-    /// The scenario.
-    pub(crate) fn source(&self) -> &Source {
-        &self.source
+    /// The scenario as it was recorded, and its files.
+    ///
+    /// # Errors
+    /// When a file cannot be read any more.
+    pub(crate) fn resolved(&self) -> Result<Resolved, InputError> {
+        let folder = self.base.join(INPUTS);
+        let mut files = Vec::new();
+        if folder.is_dir() {
+            let unreadable = |e: std::io::Error| {
+                let remedy = "make the folder readable, or run the scenario again";
+                InputError::new(folder.display(), e.to_string(), remedy)
+            };
+            for entry in std::fs::read_dir(&folder).map_err(unreadable)? {
+                let entry = entry.map_err(unreadable)?;
+                let name = format!("{INPUTS}/{}", entry.file_name().display());
+                files.push((name, std::fs::read(entry.path()).map_err(unreadable)?));
+            }
+        }
+        Ok(Resolved { text: self.source.text.clone(), files })
     }
 
     /// The run at its start.

@@ -22,6 +22,8 @@ const MOST_PX: u32 = 4096;
 const CAPTION_PX: u32 = 24;
 /// Thinner lines would be hard to see.
 const LEAST_LINE_PX: f64 = 1.0;
+/// The layer of the ground.
+const GROUND: u8 = 0;
 /// Smaller things are drawn this large.
 const LEAST_RADIUS_PX: f64 = 1.5;
 
@@ -63,7 +65,8 @@ pub struct Figure {
     pub color: [u8; 3],
     /// 0 to be seen through entirely, 1 for not at all.
     pub opacity: f64,
-    /// Things of a higher layer cover those of a lower one, however far they are.
+    /// Things of a higher layer cover those of a lower one, however far they are. Layer 0 is the
+    /// ground: its edges are hard, so that tiles join.
     pub layer: u8,
 }
 
@@ -182,7 +185,8 @@ impl Stage {
 
     fn draw(&self, figure: &Figure, onto: &mut Pixmap) {
         let ([r, g, b], alpha) = (figure.color, (255.0 * figure.opacity.clamp(0.0, 1.0)) as u8);
-        let mut paint = Paint { anti_alias: true, ..Paint::default() };
+        // Tiles of the ground meet without a seam only where their edges are hard.
+        let mut paint = Paint { anti_alias: figure.layer > GROUND, ..Paint::default() };
         paint.set_color_rgba8(r, g, b, alpha);
         let mut path = PathBuilder::new();
         match &figure.form {

@@ -43,6 +43,8 @@ impl McapFilm {
         run: &mut dyn Run,
     ) -> Result<Self, Failure> {
         let plan = run.plan();
+        let mut files = resolved.files;
+        files.sort();
         let about = McapOrigin {
             world: run.world().into(),
             origin: Origin {
@@ -50,7 +52,7 @@ impl McapFilm {
                 scenario: resolved.text,
                 seed: plan.seed,
             },
-            files: resolved.files,
+            files,
             cycles_planned: plan.cycles,
             every,
         };

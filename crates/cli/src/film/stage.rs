@@ -151,6 +151,8 @@ fn look(body: &Body) -> ([u8; 3], f64) {
         (Kind::Door, Condition::Open) => (DOOR, 0.25),
         (Kind::Door, _) => (DOOR, 1.0),
         (Kind::Person, _) => (PERSON, 1.0),
+        // Balls are of worlds in space, where they would hide what is behind them.
+        (Kind::Obstacle, _) if matches!(body.shape, Shape::Sphere { .. }) => (OBSTACLE, 0.06),
         (Kind::Obstacle, _) => (OBSTACLE, 0.7),
         (Kind::Goal, _) => (own, 0.35),
         (Kind::Robot | Kind::Connector | Kind::Rods | Kind::Airplane, _) => (own, 1.0),

@@ -26,6 +26,29 @@ fn a_whole_run_is_computed_again_and_its_digest_confirmed() {
 }
 
 #[test]
+fn a_recording_brings_the_files_of_its_scenario_along() {
+    let place = Place::new();
+    place.write("floor.pgm", [&b"P5\n40 30\n255\n"[..], &[254; 40 * 30]].concat());
+    place.write(
+        "floor.yaml",
+        "image: floor.pgm\nresolution: 0.1\norigin: [0.0, 0.0, 0.0]\nnegate: 0\n\
+         occupied_thresh: 0.65\nfree_thresh: 0.196\n",
+    );
+    let text = "format = 1\nworld = \"robots\"\ncycles = 50\n[map]\nfile = \"floor.yaml\"\n\
+                box_size_m = 0.2\n[robots]\ncount = 3\nsensors = [\"sonar-8\"]\neffector = \"nomad\"\n";
+    place.write("map.toml", text);
+    let run = place.json(&["run", "map.toml", "--out", "r", "--mcap", "m.mcap"]);
+    for name in ["floor.pgm", "floor.yaml", "map.toml"] {
+        std::fs::remove_file(place.path(name)).expect("removed");
+    }
+    assert_eq!(place.json(&["replay", "m.mcap"])["digest"], run["digest"]);
+    place.json(&["export", "r", "--to", "mcap", "--out", "e.mcap"]);
+    place.json(&["export", "m.mcap", "--to", "mcap", "--out", "again.mcap"]);
+    let bytes = |name: &str| std::fs::read(place.path(name)).expect("read");
+    assert!(bytes("e.mcap") == bytes("m.mcap") && bytes("again.mcap") == bytes("m.mcap"));
+}
+
+#[test]
 fn another_digest_than_the_recorded_one_fails() {
     let place = recorded();
     let manifest = place.read("r/run.json");

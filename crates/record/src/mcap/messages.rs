@@ -73,6 +73,10 @@ fn color_of(body: &Body) -> Option<Color> {
         (_, Condition::Open) => color([0x80, 0x80, 0x80], 0.3),
         (Kind::Door, _) => color([0x8B, 0x5A, 0x2B], 1.0),
         (Kind::Person, _) => color([0xE6, 0x9F, 0x00], 1.0),
+        // Balls are of worlds in space, where they would hide what is behind them.
+        (Kind::Obstacle, _) if matches!(body.shape, Shape::Sphere { .. }) => {
+            color([0x60, 0x60, 0x60], 0.25)
+        }
         (Kind::Obstacle, _) => color([0x60, 0x60, 0x60], 1.0),
         (Kind::Goal, _) => color(own, 0.35),
         (Kind::Robot | Kind::Connector | Kind::Rods | Kind::Airplane, _) => color(own, 1.0),

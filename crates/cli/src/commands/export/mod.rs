@@ -11,7 +11,7 @@ use crate::film::{Ending, McapFilm};
 use crate::interrupt;
 use crate::plan::WorkersArg;
 use crate::rerun::Recorded;
-use crate::worlds::{Compiled, Run};
+use crate::worlds::Run;
 use clap::{Args, ValueEnum};
 use serde_json::json;
 use sidestep::kernel::{Cycle, InputError};
@@ -207,7 +207,7 @@ fn export_mcap(
     console: Console,
 ) -> Result<ExitCode, Failure> {
     let target = Target::file(args, ".mcap")?;
-    let resolved = Compiled::new(recorded.source())?.resolve(recorded.source())?;
+    let resolved = recorded.resolved()?;
     let Some(mut run) = run_up_to(recorded, span.from, args.workers, console)? else {
         return Ok(ExitCode::Interrupted);
     };
