@@ -1,13 +1,14 @@
 //! Advances a run to its end, in slices short enough for progress and Ctrl-C.
 
 use crate::console::Console;
+use crate::exit::Failure;
+use crate::film::Film;
 use crate::interrupt;
 use crate::progress::Progress;
 use crate::recording::Recording;
 use crate::worlds::Run;
 use cpu_time::ProcessTime;
 use sidestep::kernel::Cycle;
-use sidestep::kernel::ports::RecordError;
 use std::time::{Duration, Instant};
 
 /// How long a slice lasts: nobody waits longer for Ctrl-C to work.
@@ -24,47 +25,71 @@ pub(crate) struct Effort {
     pub(crate) cpu: Duration,
 }
 
+/// Who is given what a run brings forth.
+#[derive(Default)]
+pub(crate) struct Sinks<'a> {
+    /// Rows and checkpoints.
+    pub(crate) recording: Option<&'a mut Recording>,
+    /// What can be seen.
+    pub(crate) film: Option<&'a mut dyn Film>,
+}
+
 /// Runs up to cycle `until`, or until Ctrl-C. Whether the end was reached, the run's cycle
-/// says.
+/// says. A film begins with the run as it is.
 ///
 /// # Errors
-/// When rows or checkpoints cannot be stored.
+/// When rows, checkpoints or frames cannot be stored.
 pub(crate) fn drive(
     run: &mut dyn Run,
     until: Cycle,
-    mut recording: Option<&mut Recording>,
+    mut sinks: Sinks<'_>,
     console: Console,
-) -> Result<Effort, RecordError> {
+) -> Result<Effort, Failure> {
     let (from, wall, cpu) = (run.cycle(), Instant::now(), ProcessTime::now());
     let progress = Progress::new(console, from, until);
     let mut pace = Pace::default();
+    if let Some(film) = &mut sinks.film {
+        film.shoot(run).inspect_err(|_| progress.clear())?;
+    }
     while run.cycle() < until && !run.is_over() && !interrupt::requested() {
-        slice(run, until, recording.as_deref_mut(), &mut pace).inspect_err(|_| progress.clear())?;
+        slice(run, until, &mut sinks, &mut pace).inspect_err(|_| progress.clear())?;
         progress.at(run.cycle());
     }
     progress.clear();
     Ok(Effort { cycles: run.cycle() - from, wall: wall.elapsed(), cpu: cpu.elapsed() })
 }
 
-/// Advances a little, and hands rows over where they are due.
+/// Advances a little, and hands over what is due.
 fn slice(
     run: &mut dyn Run,
     until: Cycle,
-    recording: Option<&mut Recording>,
+    sinks: &mut Sinks<'_>,
     pace: &mut Pace,
-) -> Result<(), RecordError> {
-    let stop = recording.as_ref().map_or(until, |r| r.next_stop(run.cycle()).min(until));
-    let asked = pace.cycles().min(stop - run.cycle());
+) -> Result<(), Failure> {
+    let rows_due = sinks.recording.as_ref().map_or(until, |r| r.next_stop(run.cycle()).min(until));
+    let frame_due = sinks.film.as_ref().map_or(until, |f| next(f.every(), run.cycle()).min(until));
+    let asked = pace.cycles().min(rows_due.min(frame_due) - run.cycle());
     let started = Instant::now();
     let done = run.advance(asked);
     pace.note(done, started.elapsed());
-    match recording {
-        // A run may be over just where a slice ends: then there is no further one.
-        Some(recording) if done < asked || run.cycle() == stop || run.is_over() => {
-            recording.take(run)
-        }
-        _ => Ok(()),
+    // A run may be over just where a slice ends: then there is no further one.
+    let is_due = |due: Cycle, run: &dyn Run| run.cycle() == due || run.is_over();
+    if let Some(recording) = &mut sinks.recording
+        && (done < asked || is_due(rows_due, run))
+    {
+        recording.take(run)?;
     }
+    if let Some(film) = &mut sinks.film
+        && is_due(frame_due, run)
+    {
+        film.shoot(run)?;
+    }
+    Ok(())
+}
+
+/// The first multiple of `every` after `cycle`.
+pub(crate) fn next(every: Cycle, cycle: Cycle) -> Cycle {
+    (cycle / every + 1).saturating_mul(every)
 }
 
 /// How many cycles make a slice.

@@ -26,7 +26,8 @@ pub(crate) fn replace(
 fn fill(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> Result<()>) -> Result<()> {
     let mut file = BufWriter::new(File::create(path)?);
     write(&mut file)?;
-    file.flush()
+    file.flush()?;
+    file.get_ref().sync_all()
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@
 //! plan.rs      scenario + options -> a run      worlds/         the only place that knows worlds
 //! driver.rs    advances, records, checkpoints   report.rs       what a run says at its end
 //! sweep/       many runs of one scenario                  recording.rs    a run folder that grows
+//! film/        frames into files                rerun.rs        recorded runs, computed again
 //! exit.rs      how the command ends             console.rs      what it prints, and where
 //! ```
 
@@ -14,6 +15,7 @@ mod console;
 mod driver;
 mod exit;
 mod files;
+mod film;
 mod interrupt;
 mod pages;
 mod picture;
@@ -22,6 +24,7 @@ mod progress;
 mod recorded;
 mod recording;
 mod report;
+mod rerun;
 mod sweep;
 mod worlds;
 

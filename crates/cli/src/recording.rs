@@ -1,5 +1,6 @@
 //! A run's folder while it is being written.
 
+use crate::driver::next;
 use crate::exit::Failure;
 use crate::worlds::Run;
 use sidestep::kernel::ports::{RecordError, Recorder};
@@ -44,7 +45,7 @@ impl Recording {
             cycles_planned: plan.cycles,
         };
         let folder = RunFolder::create(path, &new, existing)?;
-        write_inputs(path, resolved)?;
+        write_inputs(path, &resolved.files)?;
         Ok(Self::begin(folder, run)?)
     }
 
@@ -61,8 +62,7 @@ impl Recording {
 
     /// The first cycle after `cycle` at which rows must be handed over.
     pub(crate) fn next_stop(&self, cycle: Cycle) -> Cycle {
-        let next = |every: Cycle| (cycle / every + 1).saturating_mul(every);
-        next(BLOCK_CYCLES).min(next(self.checkpoint_every))
+        next(BLOCK_CYCLES, cycle).min(next(self.checkpoint_every, cycle))
     }
 
     /// Takes the rows, and a checkpoint where one is due.
@@ -118,9 +118,12 @@ impl Recording {
     }
 }
 
-/// Puts the files that the resolved scenario names beside it.
-fn write_inputs(folder: &Path, resolved: &Resolved) -> Result<(), RecordError> {
-    for (name, bytes) in &resolved.files {
+/// Puts the files that a resolved scenario names beside it.
+///
+/// # Errors
+/// What the system says.
+pub(crate) fn write_inputs(folder: &Path, files: &[(String, Vec<u8>)]) -> Result<(), RecordError> {
+    for (name, bytes) in files {
         let path = folder.join(name);
         let parent = path.parent().unwrap_or(folder);
         std::fs::create_dir_all(parent)

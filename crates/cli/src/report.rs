@@ -53,6 +53,9 @@ pub(crate) struct Summary {
     metrics: Value,
     /// The run folder, if there is one.
     folder: Option<PathBuf>,
+    /// The recording for viewers, if there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    mcap: Option<PathBuf>,
     /// What was found in the file of another program's form that the scenario was made from.
     #[serde(skip_serializing_if = "Option::is_none")]
     file: Option<Value>,
@@ -132,6 +135,7 @@ impl Summary {
             phases_s: Phases::new(run.phase_times(), cost.recording),
             metrics: run.metrics(),
             folder: folder.map(Path::to_path_buf),
+            mcap: None,
             file: None,
             file_lines: Vec::new(),
         }
@@ -141,6 +145,11 @@ impl Summary {
     pub(crate) fn tell_of_file(&mut self, told: Told) {
         self.file = Some(told.json);
         self.file_lines = told.lines;
+    }
+
+    /// Adds where the recording for viewers is.
+    pub(crate) fn tell_of_mcap(&mut self, path: PathBuf) {
+        self.mcap = Some(path);
     }
 
     /// Whether the run reached its end.
@@ -167,6 +176,7 @@ impl Summary {
         }
         lines.push(line("digest", self.digest.clone()));
         lines.extend(self.folder.as_ref().map(|f| line("results", f.display().to_string())));
+        lines.extend(self.mcap.as_ref().map(|f| line("viewers", f.display().to_string())));
         format!("{}\n{}", self.heading(), aligned(&lines))
     }
 

@@ -1,6 +1,6 @@
 //! Pictures of maps, trajectories and measurements: plain numbers in, SVG text and PNG bytes out.
 //!
-//! There is one drawing path. Every picture is first an SVG ([`GridScene`], [`BodyScene`],
+//! There is one drawing path, but for films ([`Stage`]), which skip the SVG. Every picture is first an SVG ([`GridScene`], [`BodyScene`],
 //! [`Plot`], [`BarChart`], [`Histogram`], [`Matrix`]); [`to_png`] rasterizes that very SVG. The
 //! crate reads no files, asks for no system font and knows nothing of worlds, runs or robots'
 //! types.
@@ -32,6 +32,7 @@ mod axis;
 mod bodies;
 mod chart;
 mod error;
+mod film;
 mod heat;
 #[cfg(test)]
 mod layout_tests;
@@ -49,6 +50,7 @@ pub use chart::bars::{Bar, BarChart, BarSeries};
 pub use chart::histogram::Histogram;
 pub use chart::plot::{Mark, Plot, Point, Series};
 pub use error::DrawError;
+pub use film::{Camera, Figure, Form, Picture, Stage};
 pub use heat::Matrix;
 pub use raster::to_png;
 pub use scene::{BodyRect, BodyShade, CellShade, DoorRect, GridScene, Track, to_svg};

@@ -12,6 +12,7 @@
 //! - [`stream`]: a draw is a function of (seed, entity, cycle, purpose, index) alone.
 //! - [`workers`], [`cycle`]: the same bits for every number of workers.
 //! - [`digest`], [`checkpoint`]: a state has one digest, and continues bit for bit.
+//! - [`view`]: what can be seen of any world; looking changes nothing.
 //! - [`ports`]: recorder, transport and clock, each with an in-memory version.
 
 pub mod checkpoint;
@@ -28,6 +29,7 @@ pub mod simulation;
 pub mod space;
 pub mod stream;
 pub mod units;
+pub mod view;
 pub mod workers;
 pub mod world;
 

@@ -4,6 +4,7 @@ use crate::cycle::PhaseTimes;
 use crate::digest::Digest;
 use crate::ports::{RecordError, Recorder, TableSchema};
 use crate::units::Cycle;
+use crate::view::{Frame, Look, Scenery};
 
 /// A world and a state that advances.
 pub trait Simulation: Send {
@@ -40,6 +41,16 @@ pub trait Simulation: Send {
     /// # Errors
     /// When the recorder cannot store it.
     fn record(&mut self, recorder: &mut dyn Recorder) -> Result<(), RecordError>;
+
+    /// What stays as it is during the run.
+    fn scenery(&self) -> Scenery;
+
+    /// From now on keeps what happens for the next [`Simulation::frame`]; no result depends on it.
+    fn watch(&mut self);
+
+    /// How things are now, and what happened since the last call (nothing without
+    /// [`Simulation::watch`]). It changes no result.
+    fn frame(&mut self, look: Look) -> Frame;
 
     /// What the run measured so far, as JSON (`metrics` of the summary).
     fn metrics(&self) -> serde_json::Value;

@@ -21,7 +21,7 @@ use crate::part::{PartWriter, cause, first_cycle, next_cycle, part_name};
 use crate::schema::{Origin, check_schema, key_values, parquet_schema};
 
 /// Rows in a row group. Only encoded rows wait in memory, a few bytes each.
-const GROUP_ROWS: usize = 1 << 20;
+pub(crate) const GROUP_ROWS: usize = 1 << 20;
 
 /// Writes every table to Parquet files; see the [module](self) for their names.
 pub struct ParquetRecorder {

@@ -79,10 +79,71 @@ pub fn read_table(
         }
         part.read_into(&mut table.columns, cycles)?;
     }
-    table.ok_or_else(|| {
-        let remedy = "resume the run, or wait for its first checkpoint";
-        InputError::new(folder.join(name).display(), "no part of the table is whole yet", remedy)
-    })
+    table.ok_or_else(|| nothing_whole(folder, name))
+}
+
+/// Reads a table as [`read_table`] does, but a block of rows at a time, in their order: for tables
+/// that are larger than memory. A table without such rows comes as one block without rows.
+///
+/// # Errors
+/// As [`read_table`], and what `each` returns.
+pub fn for_each_block<E: From<InputError>>(
+    folder: &Path,
+    name: &str,
+    cycles: impl RangeBounds<u64>,
+    mut each: impl FnMut(Table) -> Result<(), E>,
+) -> Result<(), E> {
+    let cycles = Cycles { from: cycles.start_bound().cloned(), to: cycles.end_bound().cloned() };
+    let (paths, complete) = find_parts(folder, name)?;
+    let mut empty: Option<Table> = None;
+    let mut has_rows = false;
+    for path in &paths {
+        let part = Part::open(path, name)?;
+        let empty = &*empty.get_or_insert_with(|| part.empty_table(complete));
+        if empty.schema != part.schema {
+            let cause = "its columns differ from those of the part before it";
+            return Err(damaged(path, cause).into());
+        }
+        for group in 0..part.file.num_row_groups() {
+            let mut block = empty.clone();
+            part.read_group_into(group, &mut block.columns, cycles)?;
+            if block.rows() > 0 {
+                has_rows = true;
+                each(block)?;
+            }
+        }
+    }
+    match empty {
+        Some(empty) if !has_rows => each(empty),
+        Some(_) => Ok(()),
+        None => Err(nothing_whole(folder, name).into()),
+    }
+}
+
+/// Names of the tables in a run folder of which something is whole, sorted.
+///
+/// # Errors
+/// When the folder cannot be read.
+pub fn tables(folder: &Path) -> Result<Vec<String>, InputError> {
+    let unreadable = |e: std::io::Error| {
+        InputError::new(folder.display(), e.to_string(), "make the folder readable")
+    };
+    let mut names = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(unreadable)? {
+        let path = entry.map_err(unreadable)?.path();
+        let Some(name) = path.file_name().and_then(|name| name.to_str()) else { continue };
+        if path.is_dir() && parts(&path).is_ok_and(|parts| !parts.is_empty()) {
+            names.push(name.strip_suffix(".partial").unwrap_or(name).to_string());
+        }
+    }
+    names.sort();
+    names.dedup();
+    Ok(names)
+}
+
+fn nothing_whole(folder: &Path, name: &str) -> InputError {
+    let remedy = "resume the run, or wait for its first checkpoint";
+    InputError::new(folder.join(name).display(), "no part of the table is whole yet", remedy)
 }
 
 /// The whole parts of a table, and whether they are all.
@@ -192,18 +253,26 @@ impl<'a> Part<'a> {
     }
 
     fn read_into(&self, columns: &mut [Values], cycles: Cycles) -> Result<(), InputError> {
+        (0..self.file.num_row_groups())
+            .try_for_each(|group| self.read_group_into(group, columns, cycles))
+    }
+
+    /// Appends those rows of a row group that are asked for.
+    fn read_group_into(
+        &self,
+        group: usize,
+        columns: &mut [Values],
+        cycles: Cycles,
+    ) -> Result<(), InputError> {
         let cycle_column = position(&self.schema, CYCLE);
         if cycle_column.is_none() && !cycles.is_all() {
             let cause = format!("table `{}` has no column `{CYCLE}`", self.schema.name);
             return Err(InputError::new(self.path.display(), cause, "read the whole table"));
         }
-        for group in 0..self.file.num_row_groups() {
-            let bounds =
-                cycle_column.and_then(|c| bounds(self.file.metadata().row_group(group), c));
-            if bounds.is_none_or(|(least, most)| cycles.overlaps(least, most)) {
-                let rows = self.read_group(group).map_err(|e| damaged(self.path, cause(e)))?;
-                append(columns, rows, cycle_column, cycles);
-            }
+        let bounds = cycle_column.and_then(|c| bounds(self.file.metadata().row_group(group), c));
+        if bounds.is_none_or(|(least, most)| cycles.overlaps(least, most)) {
+            let rows = self.read_group(group).map_err(|e| damaged(self.path, cause(e)))?;
+            append(columns, rows, cycle_column, cycles);
         }
         Ok(())
     }

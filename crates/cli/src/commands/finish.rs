@@ -1,8 +1,9 @@
 //! What `run` and `resume` share: the way to the end, and what is left behind there.
 
 use crate::console::Console;
-use crate::driver::{Effort, drive};
+use crate::driver::{Effort, Sinks, drive};
 use crate::exit::{ExitCode, Failure};
+use crate::film::{Ending, Film, McapFilm};
 use crate::interrupt;
 use crate::picture;
 use crate::recording::Recording;
@@ -17,6 +18,7 @@ use std::time::Duration;
 pub(super) struct Journey {
     pub(super) run: Box<dyn Run>,
     pub(super) recording: Option<Recording>,
+    pub(super) film: Option<McapFilm>,
     pub(super) workers: usize,
     /// Where to stop, if before the planned end.
     pub(super) until: Option<Cycle>,
@@ -48,15 +50,30 @@ pub(crate) fn recorded_run(
 /// # Errors
 /// When something cannot be stored.
 pub(super) fn travel(journey: Journey, console: Console) -> Result<ExitCode, Failure> {
-    let Journey { mut run, mut recording, workers, until, told } = journey;
+    let Journey { mut run, mut recording, mut film, workers, until, told } = journey;
     let until = until.unwrap_or(run.plan().cycles);
-    let effort = drive_guarded(run.as_mut(), until, recording.as_mut(), console)?;
+    let sinks = Sinks {
+        recording: recording.as_mut(),
+        film: film.as_mut().map(|film| film as &mut dyn Film),
+    };
+    let driven = drive_guarded(run.as_mut(), until, sinks, console);
+    let effort = driven.map_err(|e| broken_by(e, run.as_ref(), recording.as_ref()))?;
     let folder = recording.as_ref().map(|r| r.folder().path().to_path_buf());
-    let took = recording.as_ref().map_or(Duration::ZERO, Recording::took);
+    let took = recording.as_ref().map_or(Duration::ZERO, Recording::took)
+        + film.as_ref().map_or(Duration::ZERO, McapFilm::took);
     let cost = Cost { workers, effort, recording: took };
     let mut summary = Summary::new(run.as_ref(), cost, folder.as_deref());
     if let Some(told) = told {
         summary.tell_of_file(told);
+    }
+    if let Some(film) = film {
+        let ending = match summary.status() {
+            Status::Complete => Ending::Complete,
+            Status::Incomplete => Ending::Stopped,
+        };
+        let path = film.finish(run.as_ref(), ending);
+        let path = path.map_err(|e| broken_by(e, run.as_ref(), recording.as_ref()))?;
+        summary.tell_of_mcap(path);
     }
     if let Some(recording) = recording {
         store(run.as_mut(), recording, &summary, console)?;
@@ -101,18 +118,22 @@ fn store(
     Ok(())
 }
 
-/// Drives the run; whatever fails says what replays it.
+/// Drives the run; a bug says what replays it.
 fn drive_guarded(
     run: &mut dyn Run,
     until: Cycle,
-    mut recording: Option<&mut Recording>,
+    sinks: Sinks<'_>,
     console: Console,
 ) -> Result<Effort, Failure> {
-    let driven =
-        catch_unwind(AssertUnwindSafe(|| drive(run, until, recording.as_deref_mut(), console)));
-    match driven {
-        Ok(driven) => driven.map_err(|e| broken(run, recording.as_deref(), &e)),
-        Err(_) => Err(bug(run)),
+    let driven = catch_unwind(AssertUnwindSafe(|| drive(run, until, sinks, console)));
+    driven.unwrap_or_else(|_| Err(bug(run)))
+}
+
+/// Adds what saves the run where something could not be stored.
+fn broken_by(failure: Failure, run: &dyn Run, recording: Option<&Recording>) -> Failure {
+    match failure {
+        Failure::Record(error) => broken(run, recording, &error),
+        other => other,
     }
 }
 
@@ -126,8 +147,10 @@ fn whereabouts(run: &dyn Run) -> String {
 
 /// Recording failed: says what saves the run.
 fn broken(run: &dyn Run, recording: Option<&Recording>, error: &RecordError) -> Failure {
-    let folder = recording.map_or_else(String::new, |r| r.folder().path().display().to_string());
-    let remedy = format!("make room, then continue with: sidestep resume {folder}");
+    let remedy = match recording.map(|r| r.folder().path().display()) {
+        Some(folder) => format!("make room, then continue with: sidestep resume {folder}"),
+        None => "make room, then run it again; without --out nothing can be continued".into(),
+    };
     Failure::stopped(format!("{error}\n  {}", whereabouts(run)), remedy)
 }
 

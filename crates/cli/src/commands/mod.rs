@@ -4,6 +4,7 @@ mod arm;
 mod check;
 mod compare;
 mod exact;
+mod export;
 pub(crate) mod finish;
 mod fk;
 mod ik;
@@ -50,8 +51,10 @@ pub(crate) enum Command {
     Report(report::ReportArgs),
     /// Run a paper's experiments anew and judge its claims
     Reproduce(reproduce::ReproduceArgs),
-    /// Recompute a recorded run up to a cycle and show where everybody is
+    /// Compute a recorded run again and compare it with what was recorded
     Replay(replay::ReplayArgs),
+    /// Write a recorded run as tables, pictures, films or recordings for viewers
+    Export(export::ExportArgs),
 }
 
 /// Does what was typed.
@@ -74,5 +77,6 @@ pub(crate) fn execute(command: Command, console: &Console) -> Result<ExitCode, F
         Command::Report(args) => report::report(&args, *console),
         Command::Reproduce(args) => reproduce::reproduce(&args, *console),
         Command::Replay(args) => replay::replay(&args, *console),
+        Command::Export(args) => export::export(&args, *console),
     }
 }

@@ -1,42 +1,42 @@
-//! `sidestep replay`: the state of a recorded run at any cycle, recomputed.
+//! `sidestep replay`: a recorded run computed again, to its end or up to any cycle.
 
-use super::resume::scenario_place;
 use crate::console::{Console, grouped};
-use crate::driver::drive;
+use crate::driver::{Sinks, drive};
 use crate::exit::{ExitCode, Failure};
 use crate::interrupt;
 use crate::picture::{origin, write_png};
 use crate::plan::WorkersArg;
-use crate::recording::restore;
-use crate::worlds::{Comparison, Compiled, Pictured, Run};
+use crate::rerun::Recorded;
+use crate::worlds::{Comparison, Pictured, Run};
 use clap::Args;
 use serde_json::json;
-use sidestep::kernel::checkpoint::decode_header;
 use sidestep::kernel::{Cycle, InputError};
-use sidestep::scenario::Source;
-use sidestep_record::{ResumePoint, RunView};
 use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
 Examples:
+  sidestep replay runs/office                       run it again and compare the digests
+  sidestep replay office.mcap                       the same, from a recording for viewers
   sidestep replay runs/office --cycle 1234
   sidestep replay runs/office --cycle 1234 --png moment.png
   sidestep replay runs/office --cycle 1234 --json | jq '.bodies[0]'
 
-The state is recomputed from the last checkpoint before the cycle, else from the start, and
-compared with the recorded poses of that cycle; a difference ends with exit code 1.";
+Without --cycle the whole run is computed again from the recorded scenario, and the digest of
+its last state compared with the recorded one. With --cycle the state is computed from the
+last checkpoint before the cycle, else from the start, and compared with the recorded poses of
+that cycle. A difference ends with exit code 1.";
 
-/// Recompute a recorded run up to a cycle and show where everybody is.
+/// Compute a recorded run again, and compare it with what was recorded.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct ReplayArgs {
-    /// The run folder
-    #[arg(value_name = "DIR")]
-    folder: PathBuf,
+    /// The run folder, or an MCAP file
+    #[arg(value_name = "DIR|FILE")]
+    recorded: PathBuf,
 
-    /// Show the state at the beginning of this cycle
+    /// Show the state at the beginning of this cycle [default: confirm the whole run]
     #[arg(long, value_name = "N")]
-    cycle: Cycle,
+    cycle: Option<Cycle>,
 
     #[command(flatten)]
     workers: WorkersArg,
@@ -51,29 +51,78 @@ pub(crate) struct ReplayArgs {
 /// # Errors
 /// When the folder or the cycle is wrong, or the state differs from what was recorded.
 pub(crate) fn replay(args: &ReplayArgs, console: Console) -> Result<ExitCode, Failure> {
-    let view = RunView::open(&args.folder)?;
-    let source = Source::new(scenario_place(&args.folder), &*view.scenario, &args.folder);
-    let mut run = Compiled::new(&source)?.start(&source, args.workers.count());
-    check_version(&view)?;
-    check_cycle(args.cycle, run.plan().cycles)?;
-    start_near(run.as_mut(), &args.folder, args.cycle)?;
-    interrupt::listen()?;
-    drive(run.as_mut(), args.cycle, None, console)?;
-    if run.cycle() < args.cycle {
-        return Ok(ExitCode::Interrupted);
+    let recorded = Recorded::open(&args.recorded)?;
+    match args.cycle {
+        Some(cycle) => replay_to(&recorded, cycle, args, console),
+        None => replay_all(&recorded, args, console),
     }
-    show(run.as_ref(), args, console)
 }
 
-/// Results may change between versions, so only the writer's own can be replayed.
-fn check_version(view: &RunView) -> Result<(), InputError> {
-    let (wrote, reads) = (&view.manifest.program_version, env!("CARGO_PKG_VERSION"));
-    if wrote == reads {
-        return Ok(());
+/// Computes the whole run again.
+fn replay_all(
+    recorded: &Recorded,
+    args: &ReplayArgs,
+    console: Console,
+) -> Result<ExitCode, Failure> {
+    if recorded.digest.is_none() {
+        let remedy = "end it with `sidestep resume DIR`, or give a --cycle";
+        let cause = "the run is not complete: no digest of it is recorded";
+        return Err(InputError::new(recorded.path.display(), cause, remedy).into());
     }
-    let cause = format!("the run is of sidestep {wrote}, this is {reads}");
-    let remedy = format!("replay it with sidestep {wrote}, or run its scenario again");
-    Err(InputError::new(view.path.display(), cause, remedy))
+    let mut run = recorded.start(args.workers.count())?;
+    interrupt::listen()?;
+    let effort = drive(run.as_mut(), recorded.cycles_done, Sinks::default(), console)?;
+    if interrupt::requested() && run.cycle() < recorded.cycles_done {
+        return Ok(ExitCode::Interrupted);
+    }
+    if run.cycle() != recorded.cycles_done {
+        let cause = format!(
+            "the run is over after {} cycles, recorded are {}",
+            run.cycle(),
+            recorded.cycles_done
+        );
+        let remedy = "the recording was changed, or this is a bug: please report it";
+        return Err(Failure::stopped(cause, remedy));
+    }
+    recorded.confirm(run.as_ref())?;
+    draw(run.as_ref(), recorded, args)?;
+    let digest = run.digest().to_string();
+    let json = json!({
+        "cycle": run.cycle(),
+        "digest": digest,
+        "confirmed": true,
+        "complete": recorded.is_complete,
+        "wall_s": effort.wall.as_secs_f64(),
+    });
+    let short = || format!("{digest}\n");
+    console.result_or_short(&json, short, || {
+        let cycles = grouped(run.cycle());
+        format!("Confirmed: {cycles} cycles come to the recorded digest\n  digest {digest}\n")
+    });
+    Ok(ExitCode::Done)
+}
+
+/// Computes the state at a cycle.
+fn replay_to(
+    recorded: &Recorded,
+    cycle: Cycle,
+    args: &ReplayArgs,
+    console: Console,
+) -> Result<ExitCode, Failure> {
+    let mut run = recorded.start_near(cycle, args.workers.count())?;
+    check_cycle(cycle, run.plan().cycles)?;
+    interrupt::listen()?;
+    drive(run.as_mut(), cycle, Sinks::default(), console)?;
+    if run.cycle() < cycle {
+        return Ok(ExitCode::Interrupted);
+    }
+    let compared = match &recorded.folder {
+        Some(folder) => compare(run.as_ref(), folder)?,
+        None => 0,
+    };
+    draw(run.as_ref(), recorded, args)?;
+    show(run.as_ref(), compared, console);
+    Ok(ExitCode::Done)
 }
 
 fn check_cycle(cycle: Cycle, planned: Cycle) -> Result<(), InputError> {
@@ -84,20 +133,14 @@ fn check_cycle(cycle: Cycle, planned: Cycle) -> Result<(), InputError> {
     Err(InputError::new(format!("--cycle {cycle}"), cause, format!("give 0 to {planned}")))
 }
 
-/// Begins at the checkpoint, if it lies before the cycle.
-fn start_near(run: &mut dyn Run, folder: &Path, cycle: Cycle) -> Result<(), InputError> {
-    let Ok(bytes) = std::fs::read(folder.join("checkpoint.bin")) else { return Ok(()) };
-    let is_near = decode_header(&bytes).is_ok_and(|header| header.cycle <= cycle);
-    if is_near { restore(run, &ResumePoint::Checkpoint(bytes), folder) } else { Ok(()) }
+fn draw(run: &dyn Run, recorded: &Recorded, args: &ReplayArgs) -> Result<(), Failure> {
+    let Some(png) = &args.png else { return Ok(()) };
+    let origin = origin(run);
+    let svg = run.picture(Pictured { folder: recorded.folder.as_deref(), origin: &origin })?;
+    write_png(png, &svg)
 }
 
-fn show(run: &dyn Run, args: &ReplayArgs, console: Console) -> Result<ExitCode, Failure> {
-    let compared = compare(run, &args.folder)?;
-    if let Some(png) = &args.png {
-        let origin = origin(run);
-        let svg = run.picture(Pictured { folder: Some(&args.folder), origin: &origin })?;
-        write_png(png, &svg)?;
-    }
+fn show(run: &dyn Run, compared: usize, console: Console) {
     let poses = run.poses();
     let digest = run.digest().to_string();
     let json = json!({
@@ -114,7 +157,6 @@ fn show(run: &dyn Run, args: &ReplayArgs, console: Console) -> Result<ExitCode, 
         };
         format!("Cycle {}: {compared}\n{}  digest {digest}\n", grouped(run.cycle()), poses.text)
     });
-    Ok(ExitCode::Done)
 }
 
 /// Number of recorded poses that were compared.

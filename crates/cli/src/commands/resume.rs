@@ -56,7 +56,8 @@ pub(crate) fn resume(args: &ResumeArgs, console: Console) -> Result<ExitCode, Fa
     interrupt::listen()?;
     console.note(format!("Continuing {} at cycle {}", args.folder.display(), grouped(run.cycle())));
     let recording = Some(Recording::begin(folder, run.as_mut())?);
-    travel(Journey { run, recording, workers, until: args.cycles, told: None }, console)
+    let journey = Journey { run, recording, film: None, workers, until: args.cycles, told: None };
+    travel(journey, console)
 }
 
 fn resume_sweep(args: &ResumeArgs, console: Console) -> Result<ExitCode, Failure> {

@@ -4,15 +4,17 @@ use super::finish::{Journey, travel};
 use super::sweep::many_runs;
 use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
+use crate::film::McapFilm;
 use crate::interrupt;
 use crate::plan::{ScenarioArgs, WorkersArg};
 use crate::recording::Recording;
 use crate::sweep::ManyArgs;
-use crate::worlds::{self, Compiled, Run};
-use clap::Args;
+use crate::worlds;
+use clap::{ArgGroup, Args};
+use sidestep::kernel::{Cycle, InputError};
 use sidestep::scenario::Source;
-use sidestep_record::Existing;
-use std::path::{Path, PathBuf};
+use sidestep_record::{Existing, McapRecorder};
+use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -21,15 +23,17 @@ Examples:
   sidestep run office.toml --regime sensors --set robots.0.count=40 --set map.box_size_m=0.2
   sidestep run office.toml --replicate 100 --vary regime=reliable,both   see `sidestep sweep`
   sidestep run office.toml --json | jq .metrics.contacts
+  sidestep run office.toml --mcap office.mcap               for Foxglove and other viewers
   sidestep run tracks.csv                                   replay recorded traffic
   sidestep run tracks.csv --set airspace.replay_until_s=600 fly it anew from then on
 
-Without --out nothing is written. The folder holds scenario.toml (resolved), summary.json,
+Without --out and --mcap nothing is written. The folder holds scenario.toml (resolved), summary.json,
 trajectories/ and events/ (Parquet), trajectories.svg and .png, and a checkpoint.";
 
 /// Run a scenario, and record it with --out.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
+#[command(group = ArgGroup::new("written").args(["out", "mcap"]).multiple(true))]
 pub(crate) struct RunArgs {
     #[command(flatten)]
     scenario: ScenarioArgs,
@@ -44,8 +48,17 @@ pub(crate) struct RunArgs {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 
-    /// Delete the run that DIR holds already
-    #[arg(long, requires = "out")]
+    /// Record what can be seen to this MCAP file, for viewers: bodies, scans, events
+    #[arg(long, value_name = "FILE")]
+    mcap: Option<PathBuf>,
+
+    /// Cycles from frame to frame of the MCAP file
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "mcap",
+        value_parser = clap::value_parser!(u64).range(1..))]
+    mcap_every: Cycle,
+
+    /// Delete the run that DIR holds already, and FILE
+    #[arg(long, requires = "written")]
     replace: bool,
 }
 
@@ -55,35 +68,40 @@ pub(crate) struct RunArgs {
 /// When the scenario or the folder is wrong, or results cannot be stored.
 pub(crate) fn run(args: &RunArgs, console: Console) -> Result<ExitCode, Failure> {
     if args.many.is_asked() {
+        if args.mcap.is_some() || args.replace {
+            let remedy = "record the runs with --record-runs, then `sidestep export DIR/runs/N`";
+            let cause = "many runs have no one film, and a sweep is never replaced";
+            return Err(InputError::new("--mcap or --replace", cause, remedy).into());
+        }
         let workers = args.workers.count();
         return many_runs(&args.scenario, &args.many, args.out.as_ref(), workers, console);
     }
     let (source, compiled) = args.scenario.compile()?;
     let told = worlds::told_of(&args.scenario.file)?;
     let workers = args.workers.count();
+    let existing = if args.replace { Existing::Replace } else { Existing::Refuse };
+    if let Some(file) = &args.mcap {
+        McapRecorder::check_vacant(file, existing)?;
+    }
     interrupt::listen()?;
-    let (run, recording) = match &args.out {
+    if args.out.is_none() && args.mcap.is_none() {
+        let run = compiled.start(&source, workers);
+        let journey = Journey { run, recording: None, film: None, workers, until: None, told };
+        return travel(journey, console);
+    }
+    let resolved = compiled.resolve(&source)?;
+    let (mut run, recording) = match &args.out {
         None => (compiled.start(&source, workers), None),
         Some(folder) => {
-            let existing = if args.replace { Existing::Replace } else { Existing::Refuse };
-            let (run, recording) = recorded(&source, compiled, workers, folder, existing)?;
+            let itself = Source::new("scenario.toml", &*resolved.text, folder);
+            let mut run = compiled.start(&itself, workers);
+            let recording = Recording::create(folder, &resolved, run.as_mut(), existing)?;
             (run, Some(recording))
         }
     };
-    travel(Journey { run, recording, workers, until: None, told }, console)
-}
-
-/// A run and the new folder that it is recorded to.
-fn recorded(
-    source: &Source,
-    compiled: Compiled,
-    workers: usize,
-    folder: &Path,
-    existing: Existing,
-) -> Result<(Box<dyn Run>, Recording), Failure> {
-    let resolved = compiled.resolve(source)?;
-    let itself = Source::new("scenario.toml", &*resolved.text, folder);
-    let mut run = compiled.start(&itself, workers);
-    let recording = Recording::create(folder, &resolved, run.as_mut(), existing)?;
-    Ok((run, recording))
+    let film = match &args.mcap {
+        None => None,
+        Some(file) => Some(McapFilm::begin(file, args.mcap_every, resolved, run.as_mut())?),
+    };
+    travel(Journey { run, recording, film, workers, until: None, told }, console)
 }

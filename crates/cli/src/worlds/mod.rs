@@ -31,6 +31,15 @@ macro_rules! delegates_simulation {
             fn record(&mut self, recorder: &mut dyn Recorder) -> Result<(), RecordError> {
                 self.simulation.record(recorder)
             }
+            fn scenery(&self) -> Scenery {
+                self.simulation.scenery()
+            }
+            fn watch(&mut self) {
+                self.simulation.watch();
+            }
+            fn frame(&mut self, look: Look) -> Frame {
+                self.simulation.frame(look)
+            }
             fn metrics(&self) -> Value {
                 self.simulation.metrics()
             }

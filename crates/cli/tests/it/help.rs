@@ -5,7 +5,8 @@ use crate::support::Place;
 #[test]
 fn every_command_has_help_with_examples() {
     let place = Place::new();
-    for command in ["run", "check", "new", "map", "learn", "exact", "fk", "ik", "resume", "replay"]
+    for command in
+        ["run", "check", "new", "map", "learn", "exact", "fk", "ik", "resume", "replay", "export"]
     {
         let help = place.run(&[command, "--help"]);
         assert_eq!(help.code(), 0);
@@ -43,6 +44,8 @@ fn wrong_words_are_wrong_input() {
         &["new", "mars"],
         &["learn", "sensor"],
         &["replay", "r"],
+        &["export", "r"],
+        &["run", "s.toml", "--mcap-every", "2"],
     ];
     for args in wrong {
         let ended = place.run(args);

@@ -8,6 +8,8 @@
 mod plane;
 mod space;
 
+pub(crate) use space::{RIGHT, TO_EYE, UP};
+
 use crate::error::DrawError;
 use crate::legend::{Entry, Symbol};
 use crate::style::{Style, series_color};

@@ -11,9 +11,9 @@ use crate::ticks::{decimals, label, nice_step};
 
 /// Directions of the picture in space: to the right, up, and toward the eye. 37 degrees about the
 /// vertical and 37 degrees above the horizon, in numbers that doubles nearly hold.
-const RIGHT: [f64; 3] = [0.8, 0.6, 0.0];
-const UP: [f64; 3] = [-0.36, 0.48, 0.8];
-const TO_EYE: [f64; 3] = [0.48, -0.64, 0.6];
+pub(crate) const RIGHT: [f64; 3] = [0.8, 0.6, 0.0];
+pub(crate) const UP: [f64; 3] = [-0.36, 0.48, 0.8];
+pub(crate) const TO_EYE: [f64; 3] = [0.48, -0.64, 0.6];
 
 const EDGE_PX: f64 = 10.0;
 const LEAST_LINE_PX: f64 = 1.6;

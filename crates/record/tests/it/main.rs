@@ -2,6 +2,7 @@
 
 mod damage;
 mod folder;
+mod mcap;
 mod readers;
 mod support;
 mod tables;

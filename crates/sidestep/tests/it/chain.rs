@@ -55,7 +55,7 @@ patience_s = 1000.0
 ";
 
 /// Robots on wheels in a corridor with a bend, and somebody who walks to and fro in it.
-const SWARM: &str = "
+pub(crate) const SWARM: &str = "
 [ground]
 corridor = { width_m = 2.4, legs = [{ straight_m = 6 }, { radius_m = 2, turn_deg = 90 }, { straight_m = 4 }] }
 [[obstacles]]

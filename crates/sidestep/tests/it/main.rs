@@ -10,6 +10,7 @@ mod common;
 mod determinism;
 mod distributions;
 mod exactness;
+mod frames;
 mod laws;
 mod obstacle_rule;
 mod pomdp;

@@ -14,6 +14,7 @@ use serde_json::{Value, json};
 use sidestep::kernel::checkpoint::CheckpointError;
 use sidestep::kernel::cycle::PhaseTimes;
 use sidestep::kernel::ports::{RecordError, Recorder, TableSchema};
+use sidestep::kernel::view::{Frame, Look, Scenery};
 use sidestep::kernel::{Cycle, Digest, InputError, Simulation};
 use sidestep::scenario::Source;
 use sidestep::worlds::robots::metrics::Metrics;

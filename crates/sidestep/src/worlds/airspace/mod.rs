@@ -34,6 +34,7 @@ pub mod simulation;
 pub mod state;
 pub mod track;
 pub mod traffic;
+mod view;
 pub mod world;
 
 pub use books::LOOKS_PER_STEP;

@@ -6,12 +6,14 @@ use super::metrics::{Ledger, Metrics};
 use super::rows::{Rows, Table};
 use super::scenario::Compiled;
 use super::state::{AirspaceState, Snapshot};
+use super::view::entry;
 use super::world::AirspaceWorld;
 use crate::scenario::Source;
 use sidestep_kernel::checkpoint::{self, CheckpointError, Header};
 use sidestep_kernel::cycle::PhaseTimes;
 use sidestep_kernel::engine::Engine;
 use sidestep_kernel::ports::{RecordError, Recorder, SystemClock, TableSchema};
+use sidestep_kernel::view::{Frame, Log, Look, Scenery};
 use sidestep_kernel::{Cycle, Digest, InputError, Simulation};
 use std::sync::Arc;
 
@@ -28,6 +30,8 @@ pub struct AirspaceSimulation {
     clock: SystemClock,
     /// What is to be recorded; nothing without recording.
     rows: Rows,
+    /// Events that wait for the next frame.
+    log: Log<Event>,
 }
 
 impl AirspaceSimulation {
@@ -56,6 +60,7 @@ impl AirspaceSimulation {
             decide_ns: 0,
             clock: SystemClock::default(),
             rows: Rows::default(),
+            log: Log::default(),
         }
     }
 
@@ -155,6 +160,7 @@ impl AirspaceSimulation {
         optimizations.sort_unstable_by_key(|one: &Optimization| (one.cycle, one.airplane));
         for event in events {
             self.ledger.add_event(&event);
+            self.log.push(event);
             self.rows.event(event);
         }
         for optimization in optimizations {
@@ -210,6 +216,26 @@ impl Simulation for AirspaceSimulation {
 
     fn record(&mut self, recorder: &mut dyn Recorder) -> Result<(), RecordError> {
         self.rows.record(recorder)
+    }
+
+    fn scenery(&self) -> Scenery {
+        self.compiled.world.scenery(&self.compiled.name)
+    }
+
+    fn watch(&mut self) {
+        self.log.is_kept = true;
+    }
+
+    fn frame(&mut self, _: Look) -> Frame {
+        let (events, log_left_out) = self.log.take();
+        Frame {
+            cycle: self.cycle,
+            time_s: self.compiled.world.starts_s(self.cycle),
+            bodies: self.compiled.world.visible_bodies(&self.state, self.cycle),
+            scans: Vec::new(),
+            log: events.iter().map(entry).collect(),
+            log_left_out,
+        }
     }
 
     fn metrics(&self) -> serde_json::Value {

@@ -62,6 +62,7 @@ pub mod state;
 pub mod swarm;
 pub mod sweep;
 pub mod veto;
+mod view;
 pub mod wavefront;
 pub mod world;
 

@@ -8,7 +8,7 @@ use super::obstacle::Obstacles;
 use super::state::{Body, ChainState};
 use super::swarm::drive::{Drive, Pose};
 use super::swarm::laser::Body as Seen;
-use super::swarm::leader::{Decision, Leader, LeaderState, Surroundings, Turning};
+use super::swarm::leader::{Decision, Leader, LeaderState, Percept, Surroundings, Turning};
 use super::world::{ChainWorld, Scratch, purpose};
 use sidestep_kernel::math::{atan2, cos, sin};
 use sidestep_kernel::{Cycle, Slot};
@@ -85,6 +85,15 @@ impl Goal {
     }
 }
 
+/// What a navigator perceives at the begin of a cycle.
+pub(super) struct Sight<'a> {
+    pub(super) navigator: &'a Navigator,
+    /// The connector that it is.
+    pub(super) agent: usize,
+    pub(super) leader: LeaderState,
+    pub(super) percept: Percept,
+}
+
 /// The obstacles of a plane world; none where `D` is not 2.
 pub(super) fn in_plane<const D: usize>(obstacles: &Obstacles<D>) -> Option<&Obstacles<2>> {
     (obstacles as &dyn Any).downcast_ref()
@@ -101,14 +110,25 @@ pub(super) fn lifted<const D: usize>(p: Point<2>) -> Point<D> {
 }
 
 impl<const D: usize> ChainWorld<D> {
-    /// What a navigator perceives and decides; none of other drivers. Everybody else is where
-    /// they are at the begin of the cycle.
+    /// What a navigator perceives and decides; none of other drivers.
     pub(super) fn look_around(
         &self,
         state: &ChainState<D>,
         (slot, now): (Slot, Cycle),
         scratch: &mut Scratch<D>,
     ) -> Option<Decision> {
+        let sight = self.sight(state, (slot, now), scratch)?;
+        Some(sight.navigator.leader.decide(sight.leader.followed, &sight.percept))
+    }
+
+    /// What a navigator perceives; its laser's ranges are in the scratch. Everybody else is where
+    /// they are at the begin of the cycle.
+    pub(super) fn sight(
+        &self,
+        state: &ChainState<D>,
+        (slot, now): (Slot, Cycle),
+        scratch: &mut Scratch<D>,
+    ) -> Option<Sight<'_>> {
         let body = state.body(slot as usize);
         let task = self.chains[slot as usize].tasks.get(body.driving.task as usize)?;
         let Driver::Navigate(navigator) = &task.driver else { return None };
@@ -133,7 +153,7 @@ impl<const D: usize> ChainWorld<D> {
         let around = Surroundings { obstacles: in_plane(obstacles)?, bodies: &seen, target };
         let percept = navigator.leader.perceive(&leader.pose, &around, noise, scan);
         scratch.seen = seen;
-        Some(navigator.leader.decide(leader.followed, &percept))
+        Some(Sight { navigator, agent: task.agent, leader, percept })
     }
 
     /// Where its wheels would take a navigator.

@@ -10,6 +10,7 @@ use super::rows::{Rows, Table};
 use super::scenario::Compiled;
 use super::state::{ChainState, Snapshot};
 use super::swarm::drive::Pose;
+use super::view::entry;
 use super::world::ChainWorld;
 use crate::scenario::Source;
 use cpu_time::ThreadTime;
@@ -17,6 +18,7 @@ use sidestep_kernel::checkpoint::{self, CheckpointError, Header};
 use sidestep_kernel::cycle::PhaseTimes;
 use sidestep_kernel::engine::Engine;
 use sidestep_kernel::ports::{RecordError, Recorder, SystemClock, TableSchema};
+use sidestep_kernel::view::{Frame, Log, Look, Scenery};
 use sidestep_kernel::{Cycle, Digest, EntityId, Simulation};
 use std::sync::Arc;
 
@@ -34,6 +36,8 @@ pub struct ChainSimulation<const D: usize> {
     clock: SystemClock,
     /// What is to be recorded; nothing without recording.
     rows: Rows,
+    /// Events that wait for the next frame.
+    log: Log<Event>,
 }
 
 impl<const D: usize> ChainSimulation<D> {
@@ -53,6 +57,7 @@ impl<const D: usize> ChainSimulation<D> {
             steps_before: 0,
             clock: SystemClock::default(),
             rows: Rows::default(),
+            log: Log::default(),
         }
     }
 
@@ -192,7 +197,10 @@ impl<const D: usize> ChainSimulation<D> {
         }
         // One chain's events are in their order already.
         events.sort_by_key(|event| (event.cycle, event.chain));
-        events.into_iter().for_each(|event| self.rows.event(event));
+        for event in events {
+            self.log.push(event);
+            self.rows.event(event);
+        }
     }
 }
 
@@ -252,6 +260,27 @@ impl<const D: usize> Simulation for ChainSimulation<D> {
 
     fn record(&mut self, recorder: &mut dyn Recorder) -> Result<(), RecordError> {
         self.rows.record(recorder)
+    }
+
+    fn scenery(&self) -> Scenery {
+        self.compiled.world.scenery(&self.compiled.name)
+    }
+
+    fn watch(&mut self) {
+        self.log.is_kept = true;
+    }
+
+    fn frame(&mut self, look: Look) -> Frame {
+        let (events, log_left_out) = self.log.take();
+        let (world, state) = (&self.compiled.world, &self.state);
+        Frame {
+            cycle: self.cycle,
+            time_s: world.starts_s(self.cycle),
+            bodies: world.visible_bodies(state, self.cycle),
+            scans: world.scans(state, self.cycle, look.scanning_bodies),
+            log: events.iter().map(entry).collect(),
+            log_left_out,
+        }
     }
 
     fn metrics(&self) -> serde_json::Value {

@@ -25,6 +25,7 @@ pub mod scenario;
 pub mod sensor;
 pub mod simulation;
 pub mod state;
+mod view;
 pub mod world;
 
 use effector::Side;

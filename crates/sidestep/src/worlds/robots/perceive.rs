@@ -111,7 +111,7 @@ impl RobotsWorld {
     /// Fills `scratch.readings` with what each beam reports of what it truly meets, and
     /// returns the nearest class reported per sector.
     #[inline]
-    fn sense<T: BoxWord>(
+    pub(super) fn sense<T: BoxWord>(
         &self,
         model: &RobotModel,
         (floor, state): (&Column<T>, &RobotsState),

@@ -5,6 +5,7 @@ use super::metrics::Metrics;
 use super::perceive::name_of;
 use super::scenario::{Behaviours, Compiled, StorageOrder};
 use super::state::{BodyRecord, Frames, RobotsState, Snapshot, pose_of_word};
+use super::view::CYCLE_S;
 use super::world::{RobotsWorld, Role};
 use super::{Event, EventKind, MotionSample, Scratch, SensorSample};
 use crate::scenario::Source;
@@ -14,6 +15,7 @@ use sidestep_kernel::engine::Engine;
 use sidestep_kernel::ports::{
     ColumnSpec, ColumnType, RecordError, Recorder, SystemClock, TableSchema, Values,
 };
+use sidestep_kernel::view::{Frame, Log, Look, Scenery};
 use sidestep_kernel::{Cycle, Digest, EntityId, InputError, Simulation};
 use std::sync::Arc;
 
@@ -39,6 +41,10 @@ pub struct RobotsSimulation {
     clock: SystemClock,
     /// What the recorder is given; empty without recording.
     tables: Vec<Table>,
+    /// Events that wait for being recorded,
+    unrecorded: Vec<Event>,
+    /// and those that wait for the next frame.
+    log: Log<Event>,
 }
 
 /// Names of the headings by number.
@@ -78,6 +84,8 @@ impl RobotsSimulation {
             recorded: 0,
             clock: SystemClock::default(),
             tables: Vec::new(),
+            unrecorded: Vec::new(),
+            log: Log::default(),
         }
     }
 
@@ -111,9 +119,8 @@ impl RobotsSimulation {
             (record.calibration, Table::Motions),
         ];
         self.tables = wanted.iter().filter(|w| w.0).map(|w| w.1).collect();
-        let (events, samples) = (record.events, record.calibration);
+        let samples = record.calibration;
         for mate in self.engine.crew_mut() {
-            mate.scratch.keep_events = events;
             mate.scratch.keep_samples = samples;
         }
         if record.trajectories {
@@ -123,6 +130,23 @@ impl RobotsSimulation {
             self.state.frames = Some(Frames::new(self.cycle, capacity, bodies));
         }
         self.recorded = self.cycle;
+        self.keep_events();
+    }
+
+    /// Lets the workers keep events where anybody wants them.
+    fn keep_events(&mut self) {
+        let wanted = self.log.is_kept || self.tables.contains(&Table::Events);
+        self.engine.crew_mut().iter_mut().for_each(|mate| mate.scratch.keep_events = wanted);
+    }
+
+    /// Takes the workers' events over, in an order that does not depend on who has seen what.
+    fn gather_events(&mut self) {
+        let mut events = self.gather(|s| &mut s.events);
+        events.sort_unstable_by_key(|e: &Event| (e.cycle, e.body));
+        events.iter().for_each(|&event| self.log.push(event));
+        if self.tables.contains(&Table::Events) {
+            self.unrecorded.append(&mut events);
+        }
     }
 
     /// Uses all workers even where one would be faster; for tests and benchmarks.
@@ -230,8 +254,8 @@ impl RobotsSimulation {
     }
 
     fn events(&mut self) -> Vec<Values> {
-        let mut events = self.gather(|s| &mut s.events);
-        events.sort_unstable_by_key(|e: &Event| (e.cycle, e.body));
+        self.gather_events();
+        let events = std::mem::take(&mut self.unrecorded);
         let none = self.compiled.world.kinds.len() as u32;
         let label = |e: &Event| match e.event {
             EventKind::Contact { .. } => 0,
@@ -504,6 +528,29 @@ impl Simulation for RobotsSimulation {
             frames.first = self.cycle;
         }
         Ok(())
+    }
+
+    fn scenery(&self) -> Scenery {
+        self.compiled.world.scenery(&self.compiled.name)
+    }
+
+    fn watch(&mut self) {
+        self.log.is_kept = true;
+        self.keep_events();
+    }
+
+    fn frame(&mut self, look: Look) -> Frame {
+        self.gather_events();
+        let (events, log_left_out) = self.log.take();
+        let (world, state) = (&self.compiled.world, &self.state);
+        Frame {
+            cycle: self.cycle,
+            time_s: self.cycle as f64 * CYCLE_S,
+            bodies: world.visible_bodies(state),
+            scans: world.scans(state, self.cycle, look.scanning_bodies),
+            log: events.iter().map(|event| world.entry(event)).collect(),
+            log_left_out,
+        }
     }
 
     fn metrics(&self) -> serde_json::Value {

@@ -191,6 +191,14 @@ impl Laser {
         }
     }
 
+    /// Bearing, left positive, and range of every beam that it reads, from the rightmost on.
+    pub fn readings<'a>(&'a self, scan: &'a Scan) -> impl Iterator<Item = (f64, f64)> + 'a {
+        let rightmost = -(self.beams_per_side as f64);
+        let bearing_rad = move |k: usize| (rightmost + k as f64) * self.step_rad();
+        let ranges_m = self.read_beams().filter_map(|beam| scan.ranges_m.get(beam).copied());
+        ranges_m.enumerate().map(move |(k, range_m)| (bearing_rad(k), range_m))
+    }
+
     /// The least range within a sector of beams, given by its ends relative to the heading, left
     /// positive; `None` where [`Self::sees`] says no.
     pub fn least_m(&self, scan: &Scan, sector_rad: [f64; 2]) -> Option<f64> {

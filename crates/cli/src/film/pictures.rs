@@ -1,0 +1,83 @@
+//! Frames of a run, kept until all are there, then drawn: the view depends on all of them.
+
+use super::{Film, stage};
+use crate::console::grouped;
+use crate::exit::Failure;
+use crate::worlds::Run;
+use sidestep::kernel::view::{Frame, Look, Scenery};
+use sidestep::kernel::{Cycle, InputError};
+use sidestep_draw::{Picture, Stage};
+
+/// More bodies in all frames would take too much memory.
+const MOST_BODIES: usize = 4_000_000;
+/// Frames before a picture in which ways are shown.
+const TRAIL: usize = 30;
+
+/// The frames of a film.
+pub(crate) struct Pictures {
+    scenery: Scenery,
+    every: Cycle,
+    frames: Vec<Frame>,
+    bodies: usize,
+}
+
+impl Pictures {
+    /// A film of a run with a picture every so many cycles.
+    pub(crate) fn new(run: &dyn Run, every: Cycle) -> Self {
+        Self { scenery: run.scenery(), every, frames: Vec::new(), bodies: 0 }
+    }
+
+    /// How many pictures there are.
+    pub(crate) fn len(&self) -> usize {
+        self.frames.len()
+    }
+
+    /// The stage on which all pictures are drawn.
+    ///
+    /// # Errors
+    /// When it cannot be drawn.
+    pub(crate) fn stage(&self, width_px: u32) -> Result<Stage, Failure> {
+        Ok(stage::stage(&self.scenery, &self.frames, width_px)?)
+    }
+
+    /// One picture.
+    ///
+    /// # Errors
+    /// When it cannot be drawn.
+    pub(crate) fn draw(&self, stage: &Stage, index: usize) -> Result<Picture, Failure> {
+        let frame = &self.frames[index];
+        let mut figures = stage::trails(&self.frames[index.saturating_sub(TRAIL)..=index]);
+        figures.extend(frame.bodies.iter().flat_map(stage::figures));
+        Ok(stage.picture(&figures, &self.caption(frame))?)
+    }
+
+    fn caption(&self, frame: &Frame) -> String {
+        let cycle = grouped(frame.cycle);
+        let when = match self.scenery.cycle_s {
+            1.0 => format!("cycle {cycle}"),
+            _ => format!("{:.1} s, cycle {cycle}", frame.time_s),
+        };
+        match self.scenery.name.as_str() {
+            "" => when,
+            name => format!("{name}: {when}"),
+        }
+    }
+}
+
+impl Film for Pictures {
+    fn every(&self) -> Cycle {
+        self.every
+    }
+
+    fn shoot(&mut self, run: &mut dyn Run) -> Result<(), Failure> {
+        let frame = run.frame(Look::BODIES);
+        self.bodies += frame.bodies.len();
+        if self.bodies > MOST_BODIES {
+            let cause = format!("more than {MOST_BODIES} bodies on all pictures together");
+            let remedy = "take fewer pictures: a larger --every, or a part with --from and --until";
+            return Err(InputError::new(format!("--every {}", self.every), cause, remedy).into());
+        }
+        self.frames.push(frame);
+        Ok(())
+    }
+}

@@ -1,0 +1,187 @@
+//! Other people's programs read what we write: `mcap`, `pyarrow` and `polars` of Python. The
+//! interpreter is that of SIDESTEP_PYTHON, else `python3`; where it or its modules are not here
+//! these tests are skipped, unless SIDESTEP_REQUIRE names `python`.
+
+use crate::support::Place;
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Chains of a few connectors that wander among moving balls.
+const CHAIN: &str = r#"format = 1
+world = "chain"
+name = "wanderers"
+seed = 3
+cycles = 60
+[chain]
+dt_s = 0.05
+[[fields]]
+lo_m = [-4.0, -4.0]
+hi_m = [4.0, 4.0]
+n = 6
+radius_m = [0.1, 0.3]
+speed_m_s = [0.2, 0.6]
+[[chains]]
+connectors = 8
+at_m = [2.0, 0.0]
+rod_m = [0.3, 0.4]
+radius_m = 0.08
+[[chains.tasks]]
+kind = "wander"
+speed_m_s = 0.4
+within_m = [[-3.0, -3.0], [3.0, 3.0]]
+"#;
+
+/// Six airplanes that fly to where another one comes from.
+const AIRSPACE: &str = r#"format = 1
+world = "airspace"
+name = "six"
+seed = 3
+cycles = 80
+[airspace]
+method = "mvp"
+[airspace.generator]
+kind = "superconflict"
+n = 6
+"#;
+
+fn python() -> PathBuf {
+    std::env::var_os("SIDESTEP_PYTHON").map_or("python3".into(), PathBuf::from)
+}
+
+/// Whether the modules are here; says why not, or fails where they must be.
+fn has(modules: &str) -> bool {
+    let tried = Command::new(python()).args(["-c", &format!("import {modules}")]).output();
+    let said = match tried {
+        Ok(output) if output.status.success() => return true,
+        Ok(output) => String::from_utf8_lossy(&output.stderr).lines().last().unwrap_or("").into(),
+        Err(error) => error.to_string(),
+    };
+    let required = std::env::var("SIDESTEP_REQUIRE").unwrap_or_default();
+    let is_required = required.split(',').any(|word| word.trim() == "python");
+    assert!(!is_required, "python with {modules} is required: {said}");
+    println!("skipped: python with {modules} is not here: {said}");
+    false
+}
+
+/// What a script says.
+fn script(name: &str, args: &[&Path]) -> Value {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python").join(name);
+    let output = Command::new(python()).arg(path).args(args).output().expect("python starts");
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{name}: {error}");
+    serde_json::from_slice(&output.stdout).expect("one JSON object")
+}
+
+/// Runs a scenario, recorded in both ways, and reads the recording for viewers.
+fn recorded(place: &Place, scenario: &str, more: &[&str]) -> (Value, Value) {
+    place.write("any.toml", scenario);
+    let run = place.json(&["run", "any.toml", "--out", "r", "--mcap", "r.mcap"]);
+    let (recording, table) = (place.path("r.mcap"), place.path("r/trajectories"));
+    let mut args = vec![recording.as_path(), table.as_path()];
+    args.extend(more.iter().map(Path::new));
+    (run, script("read_mcap.py", &args))
+}
+
+/// What holds of the recording of any world.
+fn check(run: &Value, read: &Value, cycles: u64) {
+    let metadata = &read["metadata"];
+    assert_eq!(metadata["digest"], run["digest"]);
+    assert_eq!(metadata["cycles_done"], run["cycles"].to_string());
+    assert_eq!((&metadata["status"], &metadata["format"]), (&json!("complete"), &json!("1.0")));
+    assert_eq!(metadata["program_version"], env!("CARGO_PKG_VERSION"));
+    assert_eq!(metadata["frames"], (cycles + 1).to_string());
+    assert_eq!(metadata["seed"], run["seed"].to_string());
+    let frames: Vec<u64> = (0..=cycles).collect();
+    assert_eq!(read["cycles"], json!(frames), "a frame for the begin of each cycle, and the end");
+    for (topic, schema) in [("/scene", "SceneUpdate"), ("/tf", "FrameTransforms")] {
+        let expected = json!({ "schema": format!("foxglove.{schema}"), "messages": cycles + 1 });
+        assert_eq!(read["topics"][topic], expected);
+    }
+    assert_eq!(read["topics"]["/scenery"]["messages"], 1);
+    let counted: u64 = read["topics"]
+        .as_object()
+        .expect("topics")
+        .values()
+        .map(|topic| topic["messages"].as_u64().expect("a number"))
+        .sum();
+    assert_eq!(read["messages"], counted, "all messages decode");
+    assert!(read["scenario"].as_str().is_some_and(|text| text.contains("world = ")));
+}
+
+const FOR_MCAP: &str = "mcap.reader, mcap_protobuf.decoder, pyarrow.parquet";
+
+#[test]
+fn the_mcap_library_reads_robots_where_the_table_has_them() {
+    if !has(FOR_MCAP) {
+        return;
+    }
+    let place = Place::new();
+    let scenario = crate::support::SCENARIO.replace("cycles = 3000", "cycles = 200");
+    // Robots 0 and 1 have two boxes a side, robot 2 one.
+    let (run, read) = recorded(&place, &scenario, &["0.25", r#"{"0": 2, "1": 2, "2": 1}"#]);
+    check(&run, &read, 200);
+    assert_eq!(read["compared"], 200 * 3, "people are no agents");
+    assert_eq!(read["pose_counts"], json!({ "/poses/robot": [3] }));
+    assert_eq!(read["topics"]["/map"]["cells"], 24 * 8);
+    assert_eq!(read["topics"]["/scan/robot/0/sonar-8"]["messages"], 201);
+    assert_eq!(read["entities"], 5, "three robots, a person and a door");
+    let events = place.json(&["run", "any.toml"])["metrics"]["contacts"].clone();
+    let warnings = read["levels"]["3"].as_u64().unwrap_or(0);
+    assert_eq!(json!(warnings), events, "every contact is told as a warning");
+}
+
+#[test]
+fn the_mcap_library_reads_chains_where_the_table_has_them() {
+    if !has(FOR_MCAP) {
+        return;
+    }
+    let place = Place::new();
+    let (run, read) = recorded(&place, CHAIN, &[]);
+    check(&run, &read, 60);
+    assert_eq!((&read["compared"], &read["rows"]), (&json!(60 * 8), &json!(60 * 8)));
+    assert_eq!(read["pose_counts"], json!({ "/poses/connector": [8] }));
+}
+
+#[test]
+fn the_mcap_library_reads_airplanes_where_the_table_has_them() {
+    if !has(FOR_MCAP) {
+        return;
+    }
+    let place = Place::new();
+    let (run, read) = recorded(&place, AIRSPACE, &[]);
+    check(&run, &read, run["cycles"].as_u64().expect("a number"));
+    assert_eq!(read["compared"], read["rows"]);
+    assert_eq!(read["topics"]["/poses/airplane"]["schema"], "foxglove.PosesInFrame");
+}
+
+#[test]
+fn pyarrow_and_polars_read_tables_and_their_exports_alike() {
+    if !has("polars, pyarrow.parquet") {
+        return;
+    }
+    let place = Place::new();
+    place.json(&["run", "s.toml", "--out", "r"]);
+    place.json(&["export", "r", "--to", "parquet"]);
+    place.json(&["export", "r", "--to", "csv"]);
+    let read = script(
+        "read_tables.py",
+        &[
+            &place.path("r/trajectories"),
+            &place.path("r-parquet/trajectories.parquet"),
+            &place.path("r-csv/trajectories.csv"),
+        ],
+    );
+    assert_eq!(read["rows"], 3000 * 4);
+    assert_eq!(read["rows_per_body"], json!([3000, 3000, 3000, 3000]));
+    assert_eq!(read["last_cycles"], json!([2999, 2999, 2999, 2999]));
+    let types = json!({
+        "cycle": "uint64", "body": "uint32", "col_boxes": "uint32", "row_boxes": "uint32",
+        "heading": "string",
+    });
+    assert_eq!(read["types"], types);
+    let keys = &read["keys"];
+    assert_eq!((&keys["sidestep.seed"], &keys["sidestep.format"]), (&json!("5"), &json!("1.0")));
+    assert_eq!(keys["sidestep.scenario"], place.read("r/scenario.toml"));
+    assert_eq!(keys["sidestep.next_cycle"], "end");
+}

@@ -1,0 +1,349 @@
+//! Frames in the words of Foxglove's schemas.
+
+use std::collections::BTreeSet;
+
+use foxglove::messages::{
+    ArrowPrimitive, Color, CubePrimitive, CylinderPrimitive, FrameTransform, FrameTransforms, Grid,
+    LaserScan, LinePrimitive, Log, PackedElementField, Point3, Pose, PosesInFrame, Quaternion,
+    SceneEntity, SceneEntityDeletion, SceneUpdate, SpherePrimitive, Timestamp, Vector2, Vector3,
+    line_primitive, log, packed_element_field, scene_entity_deletion,
+};
+use sidestep_kernel::view::{
+    Body, Condition, Floor, Frame, Kind, Level, Occupancy, Place, Pose as ViewPose, Scan, Scenery,
+    Shape,
+};
+
+use super::WORLD;
+
+const NS_PER_S: u64 = 1_000_000_000;
+/// Colors by which numbered bodies are told apart: Okabe and Ito's, without yellow and black.
+const COLORS: [[u8; 3]; 6] = [
+    [0x00, 0x72, 0xB2],
+    [0xD5, 0x5E, 0x00],
+    [0x00, 0x9E, 0x73],
+    [0xCC, 0x79, 0xA7],
+    [0xE6, 0x9F, 0x00],
+    [0x56, 0xB4, 0xE9],
+];
+const ALERT: [u8; 3] = [0xD0, 0x10, 0x10];
+/// Beams whose steps differ by less count as evenly spaced.
+const EVEN_RAD: f64 = 1e-6;
+/// Beams that are not evenly spaced go into a raster of this step.
+const RASTER_RAD: f64 = std::f64::consts::PI / 180.0;
+
+/// Simulated seconds as nanoseconds.
+pub(super) fn to_ns(time_s: f64) -> u64 {
+    (time_s.max(0.0) * NS_PER_S as f64).round() as u64
+}
+
+fn timestamp(ns: u64) -> Option<Timestamp> {
+    let seconds = u32::try_from(ns / NS_PER_S).unwrap_or(u32::MAX);
+    Some(Timestamp::new(seconds, (ns % NS_PER_S) as u32))
+}
+
+/// When a log entry happened.
+pub(super) fn nanoseconds(entry: &Log) -> u64 {
+    entry.timestamp.map_or(0, |t| u64::from(t.sec()) * NS_PER_S + u64::from(t.nsec()))
+}
+
+fn vector([x, y, z]: Place) -> Option<Vector3> {
+    Some(Vector3 { x, y, z })
+}
+
+fn rotation(pose: &ViewPose) -> Option<Quaternion> {
+    let [x, y, z, w] = pose.turn;
+    Some(Quaternion { x, y, z, w })
+}
+
+fn pose(pose: &ViewPose) -> Option<Pose> {
+    Some(Pose { position: vector(pose.at_m), orientation: rotation(pose) })
+}
+
+fn color([r, g, b]: [u8; 3], a: f64) -> Option<Color> {
+    let part = |byte: u8| f64::from(byte) / 255.0;
+    Some(Color { r: part(r), g: part(g), b: part(b), a })
+}
+
+fn color_of(body: &Body) -> Option<Color> {
+    let own = COLORS[body.number as usize % COLORS.len()];
+    match (body.kind, body.state) {
+        (Kind::Zone, Condition::Touching) => color(ALERT, 0.4),
+        (Kind::Zone, _) => color(own, 0.2),
+        (_, Condition::Touching | Condition::Failed) => color(ALERT, 1.0),
+        (_, Condition::Open) => color([0x80, 0x80, 0x80], 0.3),
+        (Kind::Door, _) => color([0x8B, 0x5A, 0x2B], 1.0),
+        (Kind::Person, _) => color([0xE6, 0x9F, 0x00], 1.0),
+        // Balls are of worlds in space, where they would hide what is behind them.
+        (Kind::Obstacle, _) if matches!(body.shape, Shape::Sphere { .. }) => {
+            color([0x60, 0x60, 0x60], 0.25)
+        }
+        (Kind::Obstacle, _) => color([0x60, 0x60, 0x60], 1.0),
+        (Kind::Goal, _) => color(own, 0.35),
+        (Kind::Robot | Kind::Connector | Kind::Rods | Kind::Airplane, _) => color(own, 1.0),
+    }
+}
+
+/// The floor as bytes: 0 free, 100 wall, 255 unknown.
+pub(super) fn grid(floor: &Floor) -> Grid {
+    let byte = |occupancy: &Occupancy| match occupancy {
+        Occupancy::Free => 0,
+        Occupancy::Wall => 100,
+        Occupancy::Unknown => 255,
+    };
+    let data: Vec<u8> = floor.boxes.iter().map(byte).collect();
+    let [x_m, y_m] = floor.origin_m;
+    Grid {
+        timestamp: timestamp(0),
+        frame_id: WORLD.into(),
+        pose: pose(&ViewPose::at([x_m, y_m, 0.0])),
+        column_count: floor.width,
+        cell_size: Some(Vector2 { x: floor.box_m, y: floor.box_m }),
+        row_stride: floor.width,
+        cell_stride: 1,
+        fields: vec![PackedElementField {
+            name: "occupancy".into(),
+            offset: 0,
+            r#type: packed_element_field::NumericType::Uint8 as i32,
+        }],
+        data: data.into(),
+    }
+}
+
+/// All that never moves, as one thing to show or hide.
+pub(super) fn scenery(scenery: &Scenery) -> SceneUpdate {
+    let mut whole = entity("scenery", 0);
+    scenery.bodies.iter().for_each(|body| add(&mut whole, body));
+    SceneUpdate { deletions: Vec::new(), entities: vec![whole] }
+}
+
+/// Bodies that are there; those of the frame before that are not are deleted.
+pub(super) fn scene(frame: &Frame, shown: &mut BTreeSet<String>) -> SceneUpdate {
+    let now_ns = to_ns(frame.time_s);
+    let mut entities: Vec<SceneEntity> = Vec::new();
+    for body in &frame.bodies {
+        let name = entity_name(body);
+        // Parts of a thing are next to each other.
+        match entities.last_mut().filter(|last| last.id == name) {
+            Some(last) => add(last, body),
+            None => {
+                let mut new = entity(&name, now_ns);
+                add(&mut new, body);
+                entities.push(new);
+            }
+        }
+    }
+    let here: BTreeSet<String> = entities.iter().map(|entity| entity.id.clone()).collect();
+    let deletion = |name: &String| SceneEntityDeletion {
+        timestamp: timestamp(now_ns),
+        r#type: scene_entity_deletion::Type::MatchingId as i32,
+        id: name.clone(),
+    };
+    let deletions = shown.difference(&here).map(deletion).collect();
+    *shown = here;
+    SceneUpdate { deletions, entities }
+}
+
+/// Connectors of a chain are one thing in a viewer, as its rods are.
+fn entity_name(body: &Body) -> String {
+    format!("{}/{}", body.kind, body.number)
+}
+
+fn entity(id: &str, now_ns: u64) -> SceneEntity {
+    SceneEntity {
+        timestamp: timestamp(now_ns),
+        frame_id: WORLD.into(),
+        id: id.into(),
+        ..SceneEntity::default()
+    }
+}
+
+fn add(entity: &mut SceneEntity, body: &Body) {
+    let (color, at) = (color_of(body), pose(&body.pose));
+    match &body.shape {
+        Shape::Cuboid { size_m } => {
+            entity.cubes.push(CubePrimitive { pose: at, size: vector(*size_m), color });
+        }
+        Shape::Cylinder { radius_m, height_m } => entity.cylinders.push(CylinderPrimitive {
+            pose: at,
+            size: vector([2.0 * radius_m, 2.0 * radius_m, *height_m]),
+            bottom_scale: 1.0,
+            top_scale: 1.0,
+            color,
+        }),
+        Shape::Sphere { radius_m } => entity.spheres.push(SpherePrimitive {
+            pose: at,
+            size: vector([2.0 * radius_m; 3]),
+            color,
+        }),
+        Shape::Line { points_m, thickness_m } => entity.lines.push(LinePrimitive {
+            r#type: line_primitive::Type::LineStrip as i32,
+            pose: at,
+            // A line without thickness is as thin as the screen allows, near and far.
+            thickness: if *thickness_m > 0.0 { *thickness_m } else { 1.0 },
+            scale_invariant: *thickness_m <= 0.0,
+            points: points_m.iter().map(|&[x, y, z]| Point3 { x, y, z }).collect(),
+            color,
+            ..LinePrimitive::default()
+        }),
+        Shape::Dart { length_m, width_m } => entity.arrows.push(dart(body, *length_m, *width_m)),
+    }
+    if body.kind == Kind::Robot {
+        entity.arrows.extend(heading(body));
+    }
+}
+
+/// An arrow whose middle is at the body's place: nearly all head.
+fn dart(body: &Body, length_m: f64, width_m: f64) -> ArrowPrimitive {
+    let tail = ViewPose { at_m: body.pose.place([-0.5 * length_m, 0.0, 0.0]), ..body.pose };
+    ArrowPrimitive {
+        pose: pose(&tail),
+        shaft_length: 0.4 * length_m,
+        shaft_diameter: 0.3 * width_m,
+        head_length: 0.6 * length_m,
+        head_diameter: width_m,
+        color: color_of(body),
+    }
+}
+
+/// An arrow on top of a body that shows where it looks.
+fn heading(body: &Body) -> Option<ArrowPrimitive> {
+    let (half_m, top_m) = match body.shape {
+        Shape::Cuboid { size_m: [x, _, z] } => (0.5 * x, 0.5 * z),
+        Shape::Cylinder { radius_m, height_m } => (radius_m, 0.5 * height_m),
+        _ => return None,
+    };
+    let from = ViewPose { at_m: body.pose.place([0.0, 0.0, top_m]), ..body.pose };
+    Some(ArrowPrimitive {
+        pose: pose(&from),
+        shaft_length: 0.5 * half_m,
+        shaft_diameter: 0.25 * half_m,
+        head_length: 0.5 * half_m,
+        head_diameter: 0.6 * half_m,
+        color: color([0x20, 0x20, 0x20], 1.0),
+    })
+}
+
+fn agents(frame: &Frame) -> impl Iterator<Item = &Body> {
+    frame.bodies.iter().filter(|body| body.kind.is_agent())
+}
+
+/// Where each agent is, as the frame of reference of its name.
+pub(super) fn transforms(frame: &Frame) -> FrameTransforms {
+    let now = timestamp(to_ns(frame.time_s));
+    let transform = |body: &Body| FrameTransform {
+        timestamp: now,
+        parent_frame_id: WORLD.into(),
+        child_frame_id: body.name(),
+        translation: vector(body.pose.at_m),
+        rotation: rotation(&body.pose),
+    };
+    FrameTransforms { transforms: agents(frame).map(transform).collect() }
+}
+
+/// Where the agents of a kind are; `None` where there are none.
+pub(super) fn poses(frame: &Frame, kind: Kind) -> Option<PosesInFrame> {
+    let poses: Vec<Pose> = agents(frame)
+        .filter(|body| body.kind == kind)
+        .filter_map(|body| pose(&body.pose))
+        .collect();
+    let timestamp = timestamp(to_ns(frame.time_s));
+    (!poses.is_empty()).then(|| PosesInFrame { timestamp, frame_id: WORLD.into(), poses })
+}
+
+/// A scan with evenly spaced beams, as the schema has it.
+pub(super) fn laser_scan(scan: &Scan, now_ns: u64) -> LaserScan {
+    let (start_angle, end_angle, ranges) = evenly_spaced(&scan.bearings_rad, &scan.ranges_m);
+    LaserScan {
+        timestamp: timestamp(now_ns),
+        frame_id: WORLD.into(),
+        pose: pose(&scan.pose),
+        start_angle,
+        end_angle,
+        ranges,
+        intensities: Vec::new(),
+    }
+}
+
+/// First and last bearing, and ranges at equal steps between them. Other beams are put into a
+/// raster of degrees, in which directions without a beam see nothing.
+fn evenly_spaced(bearings_rad: &[f64], ranges_m: &[f64]) -> (f64, f64, Vec<f64>) {
+    let (Some(&first), Some(&last)) = (bearings_rad.first(), bearings_rad.last()) else {
+        return (0.0, 0.0, Vec::new());
+    };
+    let step_rad = (last - first) / (bearings_rad.len().max(2) - 1) as f64;
+    let is_even = (0..).zip(bearings_rad).all(|(k, bearing_rad): (u32, &f64)| {
+        (first + f64::from(k) * step_rad - bearing_rad).abs() < EVEN_RAD
+    });
+    if is_even {
+        return (first, last, ranges_m.to_vec());
+    }
+    let low = bearings_rad.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = bearings_rad.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let place = |bearing_rad: f64| ((bearing_rad - low) / RASTER_RAD).round() as usize;
+    let mut raster = vec![f64::INFINITY; place(high) + 1];
+    for (&bearing_rad, &range_m) in bearings_rad.iter().zip(ranges_m) {
+        let seen_m = &mut raster[place(bearing_rad)];
+        *seen_m = seen_m.min(range_m);
+    }
+    (low, low + (raster.len() - 1) as f64 * RASTER_RAD, raster)
+}
+
+/// What happened, and how much of it is not told.
+pub(super) fn log(frame: &Frame, cycle_s: f64) -> Vec<Log> {
+    let level = |level: Level| match level {
+        Level::Info => log::Level::Info,
+        Level::Warning => log::Level::Warning,
+        Level::Error => log::Level::Error,
+    };
+    let entry = |time_s: f64, of: Level, name: String, message: String| Log {
+        timestamp: timestamp(to_ns(time_s)),
+        level: level(of) as i32,
+        message,
+        name,
+        ..Log::default()
+    };
+    let told = frame.log.iter().map(|e| {
+        let words = format!("{} {}", e.who, e.words);
+        entry(e.cycle as f64 * cycle_s, e.level, e.who.clone(), words)
+    });
+    let more = (frame.log_left_out > 0).then(|| {
+        let words = format!("{} more events are not told", frame.log_left_out);
+        entry(frame.time_s, Level::Warning, "log".into(), words)
+    });
+    told.chain(more).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::FRAC_PI_2;
+
+    #[test]
+    fn evenly_spaced_beams_stay_as_they_are() {
+        let bearings: Vec<f64> = (0..4).map(|k| f64::from(k) * FRAC_PI_2).collect();
+        let (first, last, ranges) = evenly_spaced(&bearings, &[1.0, 2.0, 3.0, 4.0]);
+        assert_eq!((first, last), (0.0, 3.0 * FRAC_PI_2));
+        assert_eq!(ranges, [1.0, 2.0, 3.0, 4.0]);
+        assert_eq!(evenly_spaced(&[0.5], &[1.0]), (0.5, 0.5, vec![1.0]));
+        assert_eq!(evenly_spaced(&[], &[]).2, Vec::<f64>::new());
+    }
+
+    #[test]
+    fn other_beams_keep_their_direction_in_a_raster_of_degrees() {
+        let bearings = [90.0, 0.0, -10.0].map(f64::to_radians);
+        let (first, last, ranges) = evenly_spaced(&bearings, &[3.0, 2.0, 1.0]);
+        assert!((first + 10f64.to_radians()).abs() < 1e-12);
+        assert!((last - 90f64.to_radians()).abs() < 1e-12);
+        assert_eq!((ranges.len(), ranges[0], ranges[10], ranges[100]), (101, 1.0, 2.0, 3.0));
+        assert_eq!(ranges.iter().filter(|r| r.is_finite()).count(), 3);
+    }
+
+    #[test]
+    fn times_are_told_in_nanoseconds_without_loss() {
+        assert_eq!(to_ns(1.5), 1_500_000_000);
+        assert_eq!(to_ns(0.1 * 3.0), 300_000_000);
+        assert_eq!(to_ns(-1.0), 0);
+        let entry = Log { timestamp: timestamp(7_000_000_001), ..Log::default() };
+        assert_eq!(nanoseconds(&entry), 7_000_000_001);
+    }
+}

@@ -1,0 +1,32 @@
+//! Recordings for viewers: MCAP files with the schemas of Foxglove.
+//!
+//! | topic | schema | when |
+//! | --- | --- | --- |
+//! | `/map` | `foxglove.Grid` | once: the floor, `occupancy` 0 free, 100 wall, 255 unknown |
+//! | `/scenery` | `foxglove.SceneUpdate` | once: what never moves |
+//! | `/scene` | `foxglove.SceneUpdate` | each frame: one entity per body; those that left are deleted |
+//! | `/tf` | `foxglove.FrameTransforms` | each frame: from `world` to each agent, by its name |
+//! | `/poses/KIND` | `foxglove.PosesInFrame` | each frame: agents of a kind, in the order of `/tf` |
+//! | `/scan/BODY/SENSOR` | `foxglove.LaserScan` | each frame: ranges in the frame `world` |
+//! | `/log` | `foxglove.Log` | each event, at its own time |
+//!
+//! What never moves has a topic of its own because a viewer that jumps to a moment takes the last
+//! message of each topic before it.
+//!
+//! `log_time` is simulated time in nanoseconds. The scenario and its files are attachments; the
+//! metadata record `sidestep` says what the run was and how it ended. While it grows, the file is
+//! called `NAME.partial`. Equal runs give equal bytes.
+
+mod messages;
+mod reader;
+mod writer;
+
+pub use reader::{McapRun, is_mcap};
+pub use writer::{McapEnd, McapOrigin, McapRecorder};
+
+/// The name of the metadata record.
+const METADATA: &str = "sidestep";
+/// The attachment with the scenario.
+const SCENARIO: &str = "scenario.toml";
+/// The frame of reference that all others are in.
+const WORLD: &str = "world";

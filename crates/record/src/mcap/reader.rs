@@ -1,0 +1,196 @@
+//! What our recordings say of themselves.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom};
+use std::path::{Component, Path, PathBuf};
+
+use ::mcap::read::{attachment, metadata};
+use ::mcap::records::{AttachmentIndex, MetadataIndex};
+use ::mcap::sans_io::{SummaryReadEvent, SummaryReader, SummaryReaderOptions};
+use ::mcap::{McapError, Summary};
+use sidestep_kernel::InputError;
+
+use super::{METADATA, SCENARIO};
+use crate::format::FormatVersion;
+use crate::manifest::Status;
+
+/// The first bytes of every MCAP file.
+const MAGIC: [u8; 8] = [0x89, b'M', b'C', b'A', b'P', 0x30, b'\r', b'\n'];
+
+/// Whether a file begins as MCAP files do.
+pub fn is_mcap(path: &Path) -> bool {
+    let mut begin = [0; MAGIC.len()];
+    File::open(path).and_then(|mut file| file.read_exact(&mut begin)).is_ok() && begin == MAGIC
+}
+
+/// A recording of ours: what the run was, without its messages.
+#[derive(Debug, Clone, PartialEq)]
+pub struct McapRun {
+    /// Where it is.
+    pub path: PathBuf,
+    /// Version of its format.
+    pub format: FormatVersion,
+    /// Version of the program that made it.
+    pub program_version: String,
+    /// The world.
+    pub world: String,
+    /// The seed.
+    pub seed: u64,
+    /// Whether the run came to its end.
+    pub status: Status,
+    /// Cycles done.
+    pub cycles_done: u64,
+    /// Cycles that the scenario asks for.
+    pub cycles_planned: u64,
+    /// Cycles from frame to frame.
+    pub every: u64,
+    /// Digest of the last state.
+    pub digest: String,
+    /// The scenario's text.
+    pub scenario: String,
+    /// Files that it names, by their path relative to it.
+    pub files: Vec<(String, Vec<u8>)>,
+    /// Messages by topic.
+    pub messages: BTreeMap<String, u64>,
+}
+
+impl McapRun {
+    /// Reads what a recording says of itself.
+    ///
+    /// # Errors
+    /// No such file; none of ours; one that is cut off or damaged; another major format.
+    pub fn open(path: &Path) -> Result<Self, InputError> {
+        let mut source = Source::open(path)?;
+        let summary = source.summary()?;
+        let index = summary.metadata_indexes.iter().find(|index| index.name == METADATA);
+        let index = index.ok_or_else(|| foreign(path))?;
+        let said = source.metadata(index)?;
+        let text = |key: &str| {
+            said.get(key).ok_or_else(|| damaged(path, format!("its metadata has no `{key}`")))
+        };
+        let number = |key: &str| -> Result<u64, InputError> {
+            let value = text(key)?;
+            value.parse().map_err(|_| damaged(path, format!("`{key}` is `{value}`")))
+        };
+        let format: FormatVersion = text("format")?.parse().map_err(|e| damaged(path, e))?;
+        format.check_readable(path.display())?;
+        let mut files = source.attachments(&summary)?;
+        let at = files.iter().position(|(name, _)| name == SCENARIO);
+        let (_, scenario) = files.remove(at.ok_or_else(|| foreign(path))?);
+        let scenario = String::from_utf8(scenario).map_err(|e| damaged(path, e))?;
+        let is_complete = text("status")? == "complete";
+        Ok(Self {
+            path: path.to_path_buf(),
+            format,
+            program_version: text("program_version")?.clone(),
+            world: text("world")?.clone(),
+            seed: number("seed")?,
+            status: if is_complete { Status::Complete } else { Status::Incomplete },
+            cycles_done: number("cycles_done")?,
+            cycles_planned: number("cycles_planned")?,
+            every: number("every")?,
+            digest: text("digest")?.clone(),
+            scenario,
+            files,
+            messages: messages(&summary),
+        })
+    }
+}
+
+fn messages(summary: &Summary) -> BTreeMap<String, u64> {
+    let Some(stats) = &summary.stats else { return BTreeMap::new() };
+    let counts = stats.channel_message_counts.iter();
+    counts.filter_map(|(id, n)| Some((summary.channels.get(id)?.topic.clone(), *n))).collect()
+}
+
+/// An open file.
+struct Source<'a> {
+    path: &'a Path,
+    file: File,
+    length: u64,
+}
+
+impl<'a> Source<'a> {
+    fn open(path: &'a Path) -> Result<Self, InputError> {
+        let opened = File::open(path).and_then(|file| Ok((file.metadata()?.len(), file)));
+        let (length, file) = opened.map_err(|e| {
+            InputError::new(path.display(), e.to_string(), "name a recording that can be read")
+        })?;
+        Ok(Self { path, file, length })
+    }
+
+    /// The end of the file, which says where everything is.
+    fn summary(&mut self) -> Result<Summary, InputError> {
+        let path = self.path;
+        let summary = self.read_summary().map_err(|e| damaged(path, e))?;
+        summary.ok_or_else(|| damaged(path, "it has no summary"))
+    }
+
+    fn read_summary(&mut self) -> Result<Option<Summary>, McapError> {
+        let options = SummaryReaderOptions::default()
+            .with_file_size(self.length)
+            .with_record_length_limit(usize::try_from(self.length).unwrap_or(usize::MAX));
+        let mut reader = SummaryReader::new_with_options(options);
+        while let Some(event) = reader.next_event() {
+            match event? {
+                SummaryReadEvent::ReadRequest(n) => {
+                    let read = self.file.read(reader.insert(n))?;
+                    reader.notify_read(read);
+                }
+                SummaryReadEvent::SeekRequest(to) => {
+                    let at = self.file.seek(to)?;
+                    reader.notify_seeked(at);
+                }
+            }
+        }
+        Ok(reader.finish())
+    }
+
+    /// The bytes of a record; no more is reserved than the file has.
+    fn record(&mut self, offset: u64, length: u64) -> Result<Vec<u8>, InputError> {
+        if offset.checked_add(length).is_none_or(|end| end > self.length) {
+            return Err(damaged(self.path, "an index points beyond its end"));
+        }
+        let mut bytes = vec![0; length as usize];
+        let read = self.file.seek(SeekFrom::Start(offset));
+        read.and_then(|_| self.file.read_exact(&mut bytes)).map_err(|e| damaged(self.path, e))?;
+        Ok(bytes)
+    }
+
+    fn metadata(&mut self, index: &MetadataIndex) -> Result<BTreeMap<String, String>, InputError> {
+        let bytes = self.record(index.offset, index.length)?;
+        let own = MetadataIndex { offset: 0, ..index.clone() };
+        let record = metadata(&bytes, &own).map_err(|e| damaged(self.path, e))?;
+        Ok(record.metadata)
+    }
+
+    fn attachments(&mut self, summary: &Summary) -> Result<Vec<(String, Vec<u8>)>, InputError> {
+        let mut files = Vec::new();
+        for index in &summary.attachment_indexes {
+            let bytes = self.record(index.offset, index.length)?;
+            let own = AttachmentIndex { offset: 0, ..index.clone() };
+            let found = attachment(&bytes, &own).map_err(|e| damaged(self.path, e))?;
+            // Files are put beside a scenario by these names: none may lead out of there.
+            let parts = Path::new(&found.name).components();
+            let is_inside = parts.clone().count() > 0
+                && parts.into_iter().all(|part| matches!(part, Component::Normal(_)));
+            if !is_inside {
+                let cause = format!("it has a file named `{}`", found.name);
+                return Err(damaged(self.path, cause));
+            }
+            files.push((found.name, found.data.into_owned()));
+        }
+        Ok(files)
+    }
+}
+
+fn foreign(path: &Path) -> InputError {
+    let remedy = "name a recording that `sidestep run --mcap` or `sidestep export --to mcap` made";
+    InputError::new(path.display(), "the file says nothing of a run of sidestep", remedy)
+}
+
+fn damaged(path: &Path, cause: impl std::fmt::Display) -> InputError {
+    let remedy = "the recording is cut off or damaged: copy it again, or run the scenario again";
+    InputError::new(path.display(), cause.to_string(), remedy)
+}

@@ -1,0 +1,281 @@
+//! Frames into a file.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::{self, File};
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+
+use ::mcap::records::{MessageHeader, Metadata};
+use ::mcap::{Attachment, Compression, McapError, WriteOptions, Writer};
+use foxglove::Encode;
+use foxglove::messages::{FrameTransforms, Grid, LaserScan, Log, PosesInFrame, SceneUpdate};
+use sidestep_kernel::InputError;
+use sidestep_kernel::ports::RecordError;
+use sidestep_kernel::view::{Frame, Kind, Scenery};
+
+use super::{METADATA, SCENARIO, messages};
+use crate::disk;
+use crate::folder::Existing;
+use crate::format;
+use crate::manifest::Status;
+use crate::schema::Origin;
+
+/// Uncompressed bytes of a chunk: what a viewer reads to show a moment.
+const CHUNK_BYTES: u64 = 1 << 20;
+
+/// What a recording is of.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct McapOrigin {
+    /// The world, e.g. `robots`.
+    pub world: String,
+    /// Where its frames come from.
+    pub origin: Origin,
+    /// Files that the scenario names, by their path relative to it.
+    pub files: Vec<(String, Vec<u8>)>,
+    /// Cycles that the scenario asks for.
+    pub cycles_planned: u64,
+    /// Cycles from frame to frame.
+    pub every: u64,
+}
+
+/// How a recorded run ended.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct McapEnd {
+    /// Whether it came to its end.
+    pub status: Status,
+    /// Cycles done.
+    pub cycles_done: u64,
+    /// Digest of the last state.
+    pub digest: String,
+}
+
+/// Writes frames to an MCAP file. Dropped before it is finished, it takes the file away again.
+pub struct McapRecorder {
+    path: PathBuf,
+    /// None once the file is ended.
+    writer: Option<Writer<BufWriter<File>>>,
+    origin: McapOrigin,
+    cycle_s: f64,
+    /// Channels by topic.
+    channels: BTreeMap<String, u16>,
+    /// Bodies of the frame before, by name.
+    shown: BTreeSet<String>,
+    frames: u32,
+    buffer: Vec<u8>,
+}
+
+impl McapRecorder {
+    /// Refuses a path at which no recording may be made.
+    ///
+    /// # Errors
+    /// Something is there that is not to be replaced, or that is no file.
+    pub fn check_vacant(path: &Path, existing: Existing) -> Result<(), InputError> {
+        let refuse = |cause, remedy| Err(InputError::new(path.display(), cause, remedy));
+        match fs::metadata(path) {
+            Ok(found) if !found.is_file() => refuse("this is no file", "name a new file"),
+            Ok(_) if existing == Existing::Refuse => {
+                refuse("the file exists already", "name another file, or ask for it to be replaced")
+            }
+            _ if path.file_name().is_none() => refuse("this is no file name", "name a new file"),
+            _ => Ok(()),
+        }
+    }
+
+    /// Starts the file that will be called `path` once it is whole, with the scenario and what
+    /// never moves in it.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn create(path: &Path, origin: McapOrigin, scenery: &Scenery) -> Result<Self, RecordError> {
+        let growing = disk::partial(path);
+        let failed = |cause: String| RecordError::new(path.display(), cause);
+        let file = fs::create_dir_all(disk::parent(path)).and_then(|()| File::create(&growing));
+        let file = file.map_err(|e| failed(e.to_string()))?;
+        // Several threads would compress to other bytes than one.
+        let options = WriteOptions::new()
+            .compression(Some(Compression::Zstd))
+            .compression_threads(0)
+            .chunk_size(Some(CHUNK_BYTES))
+            .library(format!("sidestep {}", origin.origin.program_version));
+        let writer = options.create(BufWriter::new(file)).map_err(|e| failed(said(e)));
+        let writer = writer.inspect_err(|_| drop(fs::remove_file(&growing)))?;
+        let mut recorder = Self {
+            path: path.to_path_buf(),
+            writer: Some(writer),
+            origin,
+            cycle_s: scenery.cycle_s,
+            channels: BTreeMap::new(),
+            shown: BTreeSet::new(),
+            frames: 0,
+            buffer: Vec::new(),
+        };
+        recorder.begin(scenery)?;
+        Ok(recorder)
+    }
+
+    /// The file's name once it is whole.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    fn begin(&mut self, scenery: &Scenery) -> Result<(), RecordError> {
+        let scenario = self.origin.origin.scenario.clone().into_bytes();
+        self.attach(SCENARIO, "application/toml", &scenario)?;
+        let files = std::mem::take(&mut self.origin.files);
+        files
+            .iter()
+            .try_for_each(|(name, bytes)| self.attach(name, "application/octet-stream", bytes))?;
+        if let Some(floor) = &scenery.floor {
+            self.write::<Grid>("/map", 0, &messages::grid(floor))?;
+        }
+        self.write::<SceneUpdate>("/scenery", 0, &messages::scenery(scenery))
+    }
+
+    fn attach(&mut self, name: &str, media_type: &str, data: &[u8]) -> Result<(), RecordError> {
+        let attachment = Attachment {
+            log_time: 0,
+            create_time: 0,
+            name: name.into(),
+            media_type: media_type.into(),
+            data: data.into(),
+        };
+        self.with(|writer| writer.attach(&attachment))
+    }
+
+    /// Appends a frame; frames come by rising time.
+    ///
+    /// # Errors
+    /// What the system says; the recording is over then.
+    pub fn frame(&mut self, frame: &Frame) -> Result<(), RecordError> {
+        for entry in messages::log(frame, self.cycle_s) {
+            self.write::<Log>("/log", messages::nanoseconds(&entry), &entry)?;
+        }
+        let now_ns = messages::to_ns(frame.time_s);
+        let scene = messages::scene(frame, &mut self.shown);
+        self.write::<SceneUpdate>("/scene", now_ns, &scene)?;
+        self.write::<FrameTransforms>("/tf", now_ns, &messages::transforms(frame))?;
+        for kind in [Kind::Robot, Kind::Connector, Kind::Airplane] {
+            if let Some(poses) = messages::poses(frame, kind) {
+                self.write::<PosesInFrame>(&format!("/poses/{kind}"), now_ns, &poses)?;
+            }
+        }
+        for scan in &frame.scans {
+            let topic = format!("/scan/{}", scan.name());
+            self.write::<LaserScan>(&topic, now_ns, &messages::laser_scan(scan, now_ns))?;
+        }
+        self.frames += 1;
+        Ok(())
+    }
+
+    /// Ends the file: waits for the disk, and gives it its name.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn finish(self, end: &McapEnd) -> Result<PathBuf, RecordError> {
+        let path = self.path.clone();
+        disk::rename(&self.stop(end)?, &path)?;
+        Ok(path)
+    }
+
+    /// Ends the file of a run that was stopped: it can be opened, but keeps `.partial` at its end.
+    /// Says what it is called.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn stop(mut self, end: &McapEnd) -> Result<PathBuf, RecordError> {
+        let metadata = Metadata { name: METADATA.into(), metadata: self.metadata(end) };
+        self.with(|writer| writer.write_metadata(&metadata))?;
+        self.with(|writer| writer.finish().map(drop))?;
+        let growing = disk::partial(&self.path);
+        let Some(writer) = self.writer.take() else { return Ok(growing) };
+        let ended = writer.into_inner().into_inner().map_err(|e| e.into_error());
+        ended.and_then(|file| file.sync_all()).map_err(|e| {
+            let _ = fs::remove_file(&growing);
+            RecordError::new(self.path.display(), e)
+        })?;
+        Ok(growing)
+    }
+
+    fn metadata(&self, end: &McapEnd) -> BTreeMap<String, String> {
+        let McapOrigin { world, origin, cycles_planned, every, .. } = &self.origin;
+        let status = match end.status {
+            Status::Complete => "complete",
+            Status::Running | Status::Incomplete => "incomplete",
+        };
+        let pairs = [
+            ("format", format::CURRENT.to_string()),
+            ("program_version", origin.program_version.clone()),
+            ("world", world.clone()),
+            ("seed", origin.seed.to_string()),
+            ("cycles_planned", cycles_planned.to_string()),
+            ("cycles_done", end.cycles_done.to_string()),
+            ("cycle_s", self.cycle_s.to_string()),
+            ("every", every.to_string()),
+            ("frames", self.frames.to_string()),
+            ("status", status.into()),
+            ("digest", end.digest.clone()),
+        ];
+        pairs.into_iter().map(|(key, value)| (key.to_string(), value)).collect()
+    }
+
+    /// Appends a message, to a channel that is made where the topic is new.
+    fn write<T: Encode>(
+        &mut self,
+        topic: &str,
+        log_time: u64,
+        message: &T,
+    ) -> Result<(), RecordError> {
+        let channel_id = match self.channels.get(topic) {
+            Some(&id) => id,
+            None => self.open_channel::<T>(topic)?,
+        };
+        let mut bytes = std::mem::take(&mut self.buffer);
+        bytes.clear();
+        message.encode(&mut bytes).map_err(|e| RecordError::new(self.path.display(), e))?;
+        let header =
+            MessageHeader { channel_id, sequence: self.frames, log_time, publish_time: log_time };
+        let written = self.with(|writer| writer.write_to_known_channel(&header, &bytes));
+        self.buffer = bytes;
+        written
+    }
+
+    fn open_channel<T: Encode>(&mut self, topic: &str) -> Result<u16, RecordError> {
+        let schema = T::get_schema();
+        let id = self.with(|writer| {
+            let schema_id = match &schema {
+                Some(schema) => writer.add_schema(&schema.name, &schema.encoding, &schema.data)?,
+                None => 0,
+            };
+            writer.add_channel(schema_id, topic, &T::get_message_encoding(), &BTreeMap::new())
+        })?;
+        self.channels.insert(topic.into(), id);
+        Ok(id)
+    }
+
+    fn with<T>(
+        &mut self,
+        work: impl FnOnce(&mut Writer<BufWriter<File>>) -> Result<T, McapError>,
+    ) -> Result<T, RecordError> {
+        let failed = |cause: String| RecordError::new(self.path.display(), cause);
+        let writer = self.writer.as_mut().ok_or_else(|| failed("the recording is over".into()))?;
+        work(writer).map_err(|e| failed(said(e)))
+    }
+}
+
+impl Drop for McapRecorder {
+    fn drop(&mut self) {
+        if let Some(writer) = self.writer.take() {
+            drop(writer.into_inner());
+            // What is not whole, or was refused by a full disk, must not keep its space.
+            let _ = fs::remove_file(disk::partial(&self.path));
+        }
+    }
+}
+
+/// What the system said, without the library's wrapping.
+fn said(error: McapError) -> String {
+    match error {
+        McapError::Io(error) => error.to_string(),
+        other => other.to_string(),
+    }
+}

@@ -1,0 +1,94 @@
+//! A table as one Parquet file, for people who want to take it elsewhere.
+
+use std::path::{Path, PathBuf};
+
+use sidestep_kernel::ports::recorder::check_block;
+use sidestep_kernel::ports::{RecordError, TableSchema, Values};
+
+use crate::disk;
+use crate::encode::ColumnEncoder;
+use crate::parquet::GROUP_ROWS;
+use crate::part::{PartWriter, cause};
+use crate::schema::{Origin, check_schema, key_values, parquet_schema};
+use parquet::schema::types::SchemaDescriptor;
+
+/// A table on its way into one file, with the same key-value pairs as a run's own parts. Dropped
+/// before it is finished, it takes the file away again.
+pub struct TableFile {
+    path: PathBuf,
+    schema: TableSchema,
+    columns: Vec<ColumnEncoder>,
+    group_rows: usize,
+    /// None once the file is ended.
+    part: Option<PartWriter>,
+}
+
+impl TableFile {
+    /// Starts the file that will be called `path` once it is whole.
+    ///
+    /// # Errors
+    /// A schema that cannot become a file; what the system says.
+    pub fn create(path: &Path, schema: &TableSchema, origin: &Origin) -> Result<Self, RecordError> {
+        check_schema(schema)?;
+        let failed = |e| RecordError::new(&schema.name, cause(e));
+        let stored = parquet_schema(schema).map_err(failed)?;
+        let descriptor = SchemaDescriptor::new(stored.clone());
+        let columns = schema.columns.iter().zip(descriptor.columns());
+        Ok(Self {
+            columns: columns.map(|(spec, d)| ColumnEncoder::new(spec, d.clone())).collect(),
+            part: Some(PartWriter::create(path.to_path_buf(), stored, key_values(schema, origin))?),
+            path: path.to_path_buf(),
+            schema: schema.clone(),
+            group_rows: 0,
+        })
+    }
+
+    /// Appends rows: one [`Values`] per column, all of one length.
+    ///
+    /// # Errors
+    /// A block that does not fit; what the system says.
+    pub fn append(&mut self, block: &[Values]) -> Result<(), RecordError> {
+        check_block(&self.schema, block)?;
+        let rows = block.first().map_or(0, Values::len);
+        let mut start = 0;
+        while start < rows {
+            let end = rows.min(start + GROUP_ROWS - self.group_rows);
+            for (column, values) in self.columns.iter_mut().zip(block) {
+                column
+                    .append(values, start..end)
+                    .map_err(|e| RecordError::new(self.path.display(), cause(e)))?;
+            }
+            self.group_rows += end - start;
+            start = end;
+            if self.group_rows == GROUP_ROWS {
+                self.write_row_group()?;
+            }
+        }
+        Ok(())
+    }
+
+    fn write_row_group(&mut self) -> Result<(), RecordError> {
+        self.group_rows = 0;
+        self.part.as_mut().map_or(Ok(()), |part| part.write_row_group(&mut self.columns))
+    }
+
+    /// Ends the file: waits for the disk and gives it its name.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn finish(mut self) -> Result<(), RecordError> {
+        if self.group_rows > 0 {
+            self.write_row_group()?;
+        }
+        let ended = self.part.take().map_or(Ok(()), |part| part.close(None));
+        ended.inspect_err(|_| drop(std::fs::remove_file(disk::partial(&self.path))))
+    }
+}
+
+impl Drop for TableFile {
+    fn drop(&mut self) {
+        if self.part.take().is_some() {
+            let _ = std::fs::remove_file(disk::partial(&self.path));
+        }
+    }
+}

@@ -1,0 +1,175 @@
+//! Recordings for viewers: whole or not there, the same bytes for the same run, read back.
+
+use std::path::Path;
+
+use sidestep_kernel::view::{
+    Body, Condition, Entry, Floor, Frame, Kind, Level, Occupancy, Pose, Scan, Scenery, Shape,
+};
+use sidestep_record::{Existing, McapEnd, McapOrigin, McapRecorder, McapRun, Status, is_mcap};
+
+use crate::support::{names, origin};
+
+fn about() -> McapOrigin {
+    let files = vec![("maps/floor.pgm".to_string(), vec![7; 1000])];
+    McapOrigin { world: "robots".into(), origin: origin(), files, cycles_planned: 100, every: 2 }
+}
+
+fn scenery() -> Scenery {
+    let boxes = vec![Occupancy::Free, Occupancy::Wall, Occupancy::Unknown, Occupancy::Free];
+    let floor = Floor { width: 2, height: 2, box_m: 0.5, origin_m: [1.0, -1.0], boxes };
+    let wall = Shape::Line { points_m: vec![[0.0; 3], [1.0, 0.0, 0.0]], thickness_m: 0.0 };
+    Scenery {
+        name: "small".into(),
+        dimensions: 2,
+        cycle_s: 0.1,
+        floor: Some(floor),
+        bodies: vec![Body::new(Kind::Obstacle, 0, Pose::at([0.0; 3]), wall)],
+    }
+}
+
+/// Bodies of every kind; the airplane leaves after cycle 4.
+fn frame(cycle: u64) -> Frame {
+    let at_m = [0.1 * cycle as f64, 1.0, 0.0];
+    let body = |kind, number, shape| Body::new(kind, number, Pose::heading(at_m, 0.3), shape);
+    let mut bodies = vec![
+        body(Kind::Robot, 0, Shape::Cuboid { size_m: [0.5, 0.5, 0.2] }),
+        body(Kind::Connector, 0, Shape::Sphere { radius_m: 0.1 }).part(0),
+        body(Kind::Zone, 0, Shape::Cylinder { radius_m: 5.0, height_m: 0.1 })
+            .when(true, Condition::Touching),
+    ];
+    if cycle <= 4 {
+        bodies.push(body(Kind::Airplane, 0, Shape::Dart { length_m: 2.0, width_m: 1.0 }));
+    }
+    let scan = Scan {
+        of: (Kind::Robot, 0, None),
+        sensor: "sonar".into(),
+        pose: Pose::at(at_m),
+        bearings_rad: vec![-0.5, 0.0, 0.5],
+        ranges_m: vec![1.0, f64::INFINITY, 2.0],
+        range_m: 3.0,
+    };
+    let entry = |cycle| Entry {
+        cycle,
+        level: Level::Warning,
+        who: "robot/0".into(),
+        words: "touches a wall".into(),
+    };
+    let log = cycle.checked_sub(1).map(entry).into_iter().collect();
+    Frame { cycle, time_s: cycle as f64 * 0.1, bodies, scans: vec![scan], log, log_left_out: 3 }
+}
+
+fn end(status: Status) -> McapEnd {
+    McapEnd { status, cycles_done: 10, digest: "abc".into() }
+}
+
+fn started(path: &Path) -> McapRecorder {
+    let mut recorder = McapRecorder::create(path, about(), &scenery()).unwrap();
+    (0..=10).step_by(2).for_each(|cycle| recorder.frame(&frame(cycle)).unwrap());
+    recorder
+}
+
+#[test]
+fn a_recording_says_what_the_run_was_and_what_is_in_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let recorder = started(&path);
+    assert_eq!(names(folder.path()), ["run.mcap.partial"], "it grows under another name");
+    assert_eq!(recorder.finish(&end(Status::Complete)).unwrap(), path);
+    assert_eq!(names(folder.path()), ["run.mcap"]);
+    let run = McapRun::open(&path).unwrap();
+    assert!(is_mcap(&path));
+    assert_eq!((run.world.as_str(), run.seed, run.every), ("robots", u64::MAX, 2));
+    assert_eq!((run.status, run.cycles_done, run.cycles_planned), (Status::Complete, 10, 100));
+    assert_eq!((run.digest.as_str(), run.scenario), ("abc", origin().scenario));
+    assert_eq!(run.files, about().files);
+    let counts: Vec<_> = run.messages.iter().map(|(topic, n)| (topic.as_str(), *n)).collect();
+    let expected = [
+        // One per event, and one in each frame for those that were left out.
+        ("/log", 5 + 6),
+        ("/map", 1),
+        ("/poses/airplane", 3),
+        ("/poses/connector", 6),
+        ("/poses/robot", 6),
+        ("/scan/robot/0/sonar", 6),
+        ("/scene", 6),
+        ("/scenery", 1),
+        ("/tf", 6),
+    ];
+    assert_eq!(counts, expected);
+}
+
+#[test]
+fn equal_runs_give_equal_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let bytes = |name: &str| {
+        let path = folder.path().join(name);
+        started(&path).finish(&end(Status::Complete)).unwrap();
+        std::fs::read(path).unwrap()
+    };
+    assert!(bytes("a.mcap") == bytes("b.mcap"));
+}
+
+#[test]
+fn a_stopped_run_keeps_partial_and_a_failed_one_leaves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let stopped = started(&path).stop(&end(Status::Incomplete)).unwrap();
+    assert_eq!(names(folder.path()), ["run.mcap.partial"]);
+    assert_eq!(McapRun::open(&stopped).unwrap().status, Status::Incomplete);
+    drop(started(&path));
+    assert_eq!(names(folder.path()), [""; 0]);
+}
+
+#[test]
+fn an_existing_file_is_kept_unless_it_is_to_be_replaced() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    assert!(McapRecorder::check_vacant(&path, Existing::Refuse).is_ok());
+    std::fs::write(&path, "mine").unwrap();
+    assert!(McapRecorder::check_vacant(&path, Existing::Refuse).is_err());
+    assert!(McapRecorder::check_vacant(&path, Existing::Replace).is_ok());
+    assert!(McapRecorder::check_vacant(folder.path(), Existing::Replace).is_err());
+    // Until the new one is whole, the old one stays.
+    let recorder = started(&path);
+    assert_eq!(std::fs::read(&path).unwrap(), b"mine");
+    recorder.finish(&end(Status::Complete)).unwrap();
+    assert!(is_mcap(&path));
+}
+
+#[test]
+fn files_that_lead_out_of_their_folder_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["../up.pgm", "/tmp/root.pgm", "a/../../b", ""] {
+        let path = folder.path().join("run.mcap");
+        let files = vec![(name.to_string(), vec![1])];
+        let recorder = McapRecorder::create(&path, McapOrigin { files, ..about() }, &scenery());
+        recorder.unwrap().finish(&end(Status::Complete)).unwrap();
+        let error = McapRun::open(&path).unwrap_err();
+        assert!(error.cause().contains("a file named"), "{name}: {error}");
+    }
+}
+
+#[test]
+fn damage_is_an_error_and_never_a_panic() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    started(&path).finish(&end(Status::Complete)).unwrap();
+    let whole = std::fs::read(&path).unwrap();
+    for length in (0..whole.len()).step_by(97) {
+        std::fs::write(&path, &whole[..length]).unwrap();
+        assert!(McapRun::open(&path).is_err(), "{length} bytes of {}", whole.len());
+    }
+    // A changed byte may lie where nothing is read from; then what is read is as it was.
+    let sound = {
+        std::fs::write(&path, &whole).unwrap();
+        McapRun::open(&path).unwrap()
+    };
+    for at in (0..whole.len()).step_by(31) {
+        let mut changed = whole.clone();
+        changed[at] ^= 0x55;
+        std::fs::write(&path, &changed).unwrap();
+        if let Ok(run) = McapRun::open(&path) {
+            assert_eq!((run.scenario, run.files), (sound.scenario.clone(), sound.files.clone()));
+        }
+    }
+}

@@ -1,0 +1,231 @@
+//! What can be seen of chains: connectors and rods, robots on wheels, what is in the way.
+
+use super::chain::Chain;
+use super::driver::{Driver, Task, in_space};
+use super::events::{Event, EventKind};
+use super::geometry::{Core, Cuboid};
+use super::navigate::Goal;
+use super::obstacle::Obstacle;
+use super::state::{Body as ChainBody, ChainState};
+use super::world::{ChainSpec, ChainWorld, OTHER_CHAIN, Scratch};
+use sidestep_kernel::view::{
+    Body, Condition, Entry, Kind, Level, Place, Pose, Scan, Scenery, Shape,
+};
+use sidestep_kernel::{Cycle, EntityId, Slot, World};
+use std::ops::RangeInclusive;
+
+/// Connectors without a body are drawn so large, compared with the longest rod.
+const POINT_OF_ROD: f64 = 0.05;
+/// What has a place in the plane only is drawn so high, meters.
+const HEIGHT_M: f64 = 0.1;
+/// The name of a leader's laser.
+const LASER: &str = "laser";
+
+impl<const D: usize> ChainWorld<D> {
+    /// What stands still, and the places to go to.
+    pub(super) fn scenery(&self, name: &str) -> Scenery {
+        // Walls of one room share their number.
+        let still = (0..).zip(self.obstacles.still());
+        let still = still.map(|(part, obstacle)| seen(obstacle).part(part));
+        let goals = (0..).zip(&self.chains).flat_map(|(id, spec)| goals(id, spec));
+        Scenery {
+            name: name.into(),
+            dimensions: D as u8,
+            cycle_s: self.dt_s,
+            floor: None,
+            bodies: still.chain(goals).collect(),
+        }
+    }
+
+    /// All chains by id, then what moves among them.
+    pub(super) fn visible_bodies(&self, state: &ChainState<D>, now: Cycle) -> Vec<Body> {
+        let mut bodies = Vec::new();
+        for (id, spec) in (0..).zip(&self.chains) {
+            push_chain(&mut bodies, id, spec, &state.body(id as usize));
+        }
+        bodies.extend(self.movers.at(self.starts_s(now)).map(|mover| seen(&mover)));
+        bodies
+    }
+
+    /// What the leaders on wheels of the first chains are about to see.
+    pub(super) fn scans(&self, state: &ChainState<D>, now: Cycle, leaders: usize) -> Vec<Scan> {
+        let mut scratch = self.scratch();
+        let slots = 0..state.len() as Slot;
+        slots
+            .filter_map(|slot| self.scan_of(state, (slot, now), &mut scratch))
+            .take(leaders)
+            .collect()
+    }
+
+    fn scan_of(
+        &self,
+        state: &ChainState<D>,
+        (slot, now): (Slot, Cycle),
+        scratch: &mut Scratch<D>,
+    ) -> Option<Scan> {
+        let sight = self.sight(state, (slot, now), scratch)?;
+        let (laser, [x_m, y_m]) = (&sight.navigator.leader.laser, sight.leader.pose.at);
+        let beams = laser.readings(&scratch.scan);
+        let beyond = |range_m: f64| if range_m < laser.range_m() { range_m } else { f64::INFINITY };
+        let (bearings_rad, ranges_m) = beams.map(|(b, range_m)| (b, beyond(range_m))).unzip();
+        Some(Scan {
+            of: (Kind::Connector, slot, Some(sight.agent as u32)),
+            sensor: LASER.into(),
+            pose: Pose::heading([x_m, y_m, 0.0], sight.leader.pose.heading_rad),
+            bearings_rad,
+            ranges_m,
+            range_m: laser.range_m(),
+        })
+    }
+}
+
+/// The places that a chain is to reach.
+fn goals<const D: usize>(id: EntityId, spec: &ChainSpec<D>) -> Vec<Body> {
+    let of_task = |task: &Task<D>| -> Vec<(Place, f64)> {
+        match &task.driver {
+            Driver::Targets(targets) => {
+                targets.places.iter().map(|at| (in_space(*at), targets.tolerance_m)).collect()
+            }
+            Driver::Navigate(navigator) => match &navigator.goal {
+                Some(Goal::Target { at, tolerance_m }) => vec![([at[0], at[1], 0.0], *tolerance_m)],
+                _ => Vec::new(),
+            },
+            _ => Vec::new(),
+        }
+    };
+    let least_m = point_radius_m(&spec.start);
+    let goal = |(part, (at_m, radius_m)): (u32, (Place, f64))| {
+        let ball = Shape::Sphere { radius_m: radius_m.max(least_m) };
+        Body::new(Kind::Goal, id, Pose::at(at_m), ball).part(part)
+    };
+    (0..).zip(spec.tasks.iter().flat_map(of_task)).map(goal).collect()
+}
+
+/// How large a point of a chain is drawn.
+fn point_radius_m<const D: usize>(chain: &Chain<D>) -> f64 {
+    POINT_OF_ROD * chain.rods().iter().map(|rod| rod.max_m).fold(0.0, f64::max)
+}
+
+/// A chain: its rods, its connectors, the robots that keep to these.
+fn push_chain<const D: usize>(
+    bodies: &mut Vec<Body>,
+    id: EntityId,
+    spec: &ChainSpec<D>,
+    body: &ChainBody<D>,
+) {
+    let (chain, least_m) = (&body.chain, point_radius_m(&spec.start));
+    let points_m: Vec<Place> = chain.points().iter().map(|p| in_space(*p)).collect();
+    let radius_m = chain.rods().iter().map(|rod| rod.radius_m).fold(0.0, f64::max);
+    for (part, whole) in (0..).zip(whole_parts(chain)) {
+        let points_m = points_m[whole].to_vec();
+        let line = Shape::Line { points_m, thickness_m: 2.0 * radius_m };
+        bodies.push(Body::new(Kind::Rods, id, Pose::at([0.0; 3]), line).part(part));
+    }
+    let connectors = (0..).zip(chain.connectors()).zip(&points_m);
+    bodies.extend(connectors.map(|((part, connector), at_m)| {
+        let radius_m = if connector.radius_m > 0.0 { connector.radius_m } else { least_m };
+        Body::new(Kind::Connector, id, Pose::at(*at_m), Shape::Sphere { radius_m })
+            .part(part)
+            .when(connector.failed, Condition::Failed)
+    }));
+    bodies.extend((0..).zip(&body.robots).map(|(part, robot)| {
+        let [x_m, y_m] = robot.pose.at;
+        let pose = Pose::heading([x_m, y_m, 0.0], robot.pose.heading_rad);
+        let disc = Shape::Cylinder { radius_m: body.robot_radius_m, height_m: HEIGHT_M };
+        Body::new(Kind::Robot, id, pose, disc).part(part).when(robot.is_bumped, Condition::Touching)
+    }));
+}
+
+/// Connectors that hang together: a broken chain has rods that hold nothing.
+fn whole_parts<const D: usize>(chain: &Chain<D>) -> Vec<RangeInclusive<usize>> {
+    let (mut parts, mut first) = (Vec::new(), 0);
+    for rod in 0..chain.rods().len() {
+        if !chain.is_rod_within(rod) {
+            parts.push(first..=rod);
+            first = rod + 1;
+        }
+    }
+    parts.push(first..=chain.rods().len());
+    parts.retain(|part| part.end() > part.start());
+    parts
+}
+
+/// An obstacle as it is.
+fn seen<const D: usize>(obstacle: &Obstacle<D>) -> Body {
+    let radius_m = obstacle.radius_m;
+    let (pose, shape) = match &obstacle.core {
+        Core::Point(at) if D == 2 => {
+            (Pose::at(in_space(*at)), Shape::Cylinder { radius_m, height_m: HEIGHT_M })
+        }
+        Core::Point(at) => (Pose::at(in_space(*at)), Shape::Sphere { radius_m }),
+        Core::Segment(ends) => {
+            let points_m = ends.iter().map(|p| in_space(*p)).collect();
+            let line = Shape::Line { points_m, thickness_m: 2.0 * radius_m };
+            (Pose::at([0.0; 3]), line)
+        }
+        Core::Cuboid(cuboid) => (cuboid_pose(cuboid), cuboid_shape(cuboid, radius_m)),
+    };
+    Body::new(Kind::Obstacle, obstacle.id, pose, shape)
+}
+
+fn cuboid_shape<const D: usize>(cuboid: &Cuboid<D>, radius_m: f64) -> Shape {
+    let side_m = |i: usize| match i < D {
+        true => 2.0 * (cuboid.half_m[i] + radius_m),
+        false => HEIGHT_M,
+    };
+    Shape::Cuboid { size_m: std::array::from_fn(side_m) }
+}
+
+fn cuboid_pose<const D: usize>(cuboid: &Cuboid<D>) -> Pose {
+    let axis = |i: usize| cuboid.axes.get(i).map_or([0.0; 3], |axis| in_space(*axis));
+    let (x, y) = (axis(0), axis(1));
+    // Two axes say what the third is, or is opposite to: a box looks the same both ways.
+    let cross = |i: usize| {
+        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+        x[j] * y[k] - x[k] * y[j]
+    };
+    Pose::axes(in_space(cuboid.center), [x, y, std::array::from_fn(cross)])
+}
+
+/// An event in words.
+pub(super) fn entry(event: &Event) -> Entry {
+    let value = event.value;
+    let what = event.obstacle.map(obstacle_in_words);
+    let because = what.as_ref().map_or(String::new(), |what| format!(", because of {what}"));
+    let reason = event.reason.map_or("", |reason| reason.name());
+    let (level, words) = match event.kind {
+        EventKind::Veto => (Level::Warning, format!("objects: {reason}{because}")),
+        EventKind::Penetration => {
+            let what = what.unwrap_or_else(|| "an obstacle".into());
+            (Level::Error, format!("is {value:.4} m inside {what}"))
+        }
+        EventKind::Clear => (Level::Info, "is clear of obstacles again".into()),
+        EventKind::Escape => (Level::Info, format!("gets out of the way{because}")),
+        EventKind::Bumper => (Level::Warning, "touches something with its bumper".into()),
+        EventKind::Sideways => (Level::Info, format!("goes on {value:.2} rad to the side")),
+        EventKind::PulledBack => (Level::Info, "is pulled back by the other end".into()),
+        EventKind::Stuck => (Level::Warning, "is stuck".into()),
+        EventKind::Changed => (Level::Info, "has changed".into()),
+        EventKind::Broken => (Level::Error, format!("breaks, {value} parts are scattered")),
+        EventKind::Reforming => (Level::Info, "sets out to be joined again".into()),
+        EventKind::Reformed => (Level::Info, "is joined again".into()),
+        EventKind::GapTooLong => {
+            (Level::Warning, format!("has a gap that is {value:.3} m too long"))
+        }
+        EventKind::NotReformed => {
+            (Level::Warning, format!("cannot be joined, off by {value:.3} m"))
+        }
+        EventKind::Target => (Level::Info, format!("has reached target {value}")),
+        EventKind::Done => (Level::Info, format!("has done task {value}")),
+        EventKind::GivenUp => (Level::Warning, format!("has given up task {value}")),
+    };
+    let who = format!("connector/{}/{}", event.chain, event.connector);
+    Entry { cycle: event.cycle, level, who, words }
+}
+
+fn obstacle_in_words(id: u32) -> String {
+    match id.checked_sub(OTHER_CHAIN) {
+        Some(chain) => format!("chain {chain}"),
+        None => format!("obstacle/{id}"),
+    }
+}

@@ -1,0 +1,152 @@
+//! D1 for those who look on: frames change no result, of no world, and say what is so.
+
+use crate::chain::{SEVERAL, SWARM};
+use crate::common::{CROWD, source};
+use sidestep::kernel::Simulation;
+use sidestep::kernel::ports::MemoryRecorder;
+use sidestep::kernel::view::{Kind, Look, Shape};
+use sidestep::scenario::Source;
+use sidestep::worlds::airspace::simulation::AirspaceSimulation;
+use sidestep::worlds::chain::scenario::Compiled;
+use sidestep::worlds::chain::simulation::ChainSimulation;
+use sidestep::worlds::robots::simulation::RobotsSimulation;
+
+const LOOK: Look = Look { scanning_bodies: usize::MAX };
+
+fn traffic() -> Source {
+    let text = "format = 1\nworld = \"airspace\"\nseed = 7\n[airspace]\nmethod = \"none\"\n\
+                shield = false\n[airspace.generator]\nkind = \"superconflict\"\nn = 6\n";
+    Source::new("traffic", text, "")
+}
+
+fn robots(workers: usize) -> Box<dyn Simulation> {
+    Box::new(RobotsSimulation::new(&source(CROWD, &[]), workers).expect("a valid scenario"))
+}
+
+fn chains(text: &str, workers: usize) -> Box<dyn Simulation> {
+    let text = format!("format = 1\nworld = \"chain\"\nseed = 9\n{text}");
+    let source = Source::new("chains", text, "");
+    let compiled = Compiled::<2>::new(&source).unwrap_or_else(|e| panic!("{e}"));
+    Box::new(ChainSimulation::new(compiled, &source, workers))
+}
+
+fn airplanes(workers: usize) -> Box<dyn Simulation> {
+    Box::new(AirspaceSimulation::new(&traffic(), workers).expect("a valid scenario"))
+}
+
+fn worlds(workers: usize) -> Vec<Box<dyn Simulation>> {
+    vec![robots(workers), chains(SEVERAL, workers), chains(SWARM, workers), airplanes(workers)]
+}
+
+#[test]
+fn looking_changes_no_result_whoever_computes_it() {
+    for (mut plain, mut watched) in worlds(1).into_iter().zip(worlds(2)) {
+        watched.watch();
+        let mut frames = Vec::new();
+        for _ in 0..40 {
+            frames.push(watched.frame(LOOK));
+            watched.advance(3);
+        }
+        while plain.cycle() < watched.cycle() {
+            plain.advance(watched.cycle() - plain.cycle());
+        }
+        assert_eq!(plain.digest(), watched.digest(), "{}", plain.world());
+        assert_eq!(plain.checkpoint(), watched.checkpoint(), "{}", plain.world());
+        let again = plain.frame(LOOK);
+        let now = watched.frame(LOOK);
+        assert_eq!((again.bodies, again.scans), (now.bodies, now.scans), "{}", plain.world());
+        assert!(again.log.is_empty(), "nobody watched");
+        let told: Vec<u64> = frames.iter().flat_map(|f| &f.log).map(|e| e.cycle).collect();
+        assert!(told.is_sorted(), "{}", plain.world());
+        assert!(frames.iter().all(|f| f.log.iter().all(|e| e.cycle < f.cycle)));
+    }
+}
+
+#[test]
+fn events_reach_the_log_and_the_table_alike() {
+    let mut run = RobotsSimulation::new(&source(CROWD, &[]), 2).expect("a valid scenario");
+    let mut plain = RobotsSimulation::new(&source(CROWD, &[]), 1).expect("a valid scenario");
+    let (mut told, mut tables) = (0, Vec::new());
+    for (run, watches) in [(&mut run, true), (&mut plain, false)] {
+        run.begin_recording();
+        if watches {
+            run.watch();
+        }
+        let mut recorder = MemoryRecorder::new(&run.schemas());
+        for _ in 0..30 {
+            run.advance(10);
+            if watches {
+                told += run.frame(Look::BODIES).log.len();
+            }
+        }
+        run.record(&mut recorder).expect("kept");
+        tables.push(recorder);
+    }
+    assert!(told > 100);
+    assert_eq!(told, tables[0].rows("events"));
+    assert_eq!(tables[0], tables[1], "watching changes no row");
+}
+
+#[test]
+fn bodies_keep_their_names_and_are_where_the_world_has_them() {
+    for mut run in worlds(1) {
+        let first: Vec<String> = run.frame(LOOK).bodies.iter().map(|b| b.name()).collect();
+        let mut unique = first.clone();
+        unique.sort();
+        unique.dedup();
+        assert_eq!(unique.len(), first.len(), "{}", run.world());
+        run.advance(5);
+        let later: Vec<String> = run.frame(LOOK).bodies.iter().map(|b| b.name()).collect();
+        assert_eq!(first, later, "{}", run.world());
+        let scenery = run.scenery();
+        assert!(scenery.cycle_s > 0.0 && scenery.dimensions == 2);
+        let frame = run.frame(LOOK);
+        assert_eq!((frame.cycle, frame.time_s), (5, 5.0 * scenery.cycle_s));
+    }
+    let agents = robots(1).frame(LOOK).bodies.iter().filter(|b| b.kind == Kind::Robot).count();
+    assert_eq!(agents, robots(1).agents());
+}
+
+#[test]
+fn sensors_see_the_floor_around_them() {
+    let text = "format = 1\nworld = \"robots\"\nregime = \"reliable\"\n[map]\nbox_size_m = 0.5\n\
+                ascii = \"\"\"\n########\n#......#\n########\n\"\"\"\n[[robots]]\ncount = 1\n\
+                size = 1\nsensors = [\"bumper-4\"]\neffector = \"nomad\"\nat = [[3, 1]]\n";
+    let source = Source::new("narrow", text, "");
+    let mut run = RobotsSimulation::new(&source, 1).unwrap_or_else(|e| panic!("{e}"));
+    let frame = run.frame(LOOK);
+    let [scan] = &frame.scans[..] else { panic!("one robot has one sensor") };
+    assert_eq!(scan.name(), "robot/0/bumper-4");
+    let heading =
+        |k: usize| scan.pose.turned([scan.bearings_rad[k].cos(), scan.bearings_rad[k].sin(), 0.0]);
+    for k in 0..4 {
+        let looks_along_the_corridor = heading(k)[0].abs() > 0.9;
+        assert_eq!(scan.ranges_m[k].is_infinite(), looks_along_the_corridor, "beam {k}");
+        assert!(looks_along_the_corridor || (0.25..=scan.range_m).contains(&scan.ranges_m[k]));
+    }
+    let leader = chains(SWARM, 1).frame(LOOK);
+    let [laser] = &leader.scans[..] else { panic!("one leader has a laser") };
+    assert!(laser.ranges_m.iter().any(|range_m| range_m.is_finite()));
+    assert_eq!(laser.ranges_m.len(), laser.bearings_rad.len());
+    assert!(robots(1).frame(Look::BODIES).scans.is_empty());
+}
+
+#[test]
+fn airplanes_that_are_too_near_are_marked_until_they_are_apart() {
+    let mut run = airplanes(1);
+    run.watch();
+    let (mut marked, mut losses) = (0, 0);
+    while !run.is_over() && run.cycle() < 400 {
+        run.advance(1);
+        let frame = run.frame(LOOK);
+        let is_marked = |b: &&sidestep::kernel::view::Body| {
+            b.kind == Kind::Zone && b.state == sidestep::kernel::view::Condition::Touching
+        };
+        marked += frame.bodies.iter().filter(is_marked).count();
+        losses += frame.log.iter().filter(|e| e.words.contains("loses separation")).count();
+        let zones = frame.bodies.iter().filter(|b| b.kind == Kind::Zone);
+        assert!(zones.clone().all(|b| matches!(b.shape, Shape::Cylinder { .. })));
+        assert_eq!(frame.bodies.len(), 2 * zones.count(), "each airplane has its zone");
+    }
+    assert!(marked > 0 && losses > 0, "{marked} marked, {losses} losses");
+}
