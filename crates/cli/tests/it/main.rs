@@ -1,6 +1,7 @@
 //! The real binary, from outside: what it prints, writes and ends with.
 
 mod airspace;
+mod browser;
 mod chain;
 mod chain_input;
 mod commands;
@@ -13,6 +14,7 @@ mod help;
 mod ik;
 mod input;
 mod learn;
+mod report;
 mod reproduce;
 mod stops;
 mod support;

@@ -1,6 +1,6 @@
 //! Numbers of `summary.json` as tables.
 
-use crate::console::grouped;
+use super::count;
 use serde_json::{Map, Value};
 use sidestep::experiment::Table;
 
@@ -31,16 +31,18 @@ const UNITS: [(&str, &str); 18] = [
     ("_s", "s"),
 ];
 
-/// The unit that a name ends in, or nothing.
-pub(super) fn unit(name: &str) -> &'static str {
-    UNITS.iter().find(|(end, _)| name.ends_with(end)).map_or("", |(_, unit)| unit)
+/// The unit that a name ends in, or nothing: `steps_per_cpu_s` are so many in a second.
+pub(super) fn unit(name: &str) -> String {
+    let unit = UNITS.iter().find(|(end, _)| name.ends_with(end)).map_or("", |(_, unit)| unit);
+    let is_rate = name.contains("_per_") && !unit.is_empty();
+    if is_rate { format!("1/{unit}") } else { unit.into() }
 }
 
 /// A tree of values as a row for each leaf, by its path; `None` without any.
 pub(super) fn flat(title: &str, tree: &Value) -> Option<Table> {
     let mut table = Table::new(title, "", &["metric", "value", "unit"]);
     for (path, value) in leaves(tree) {
-        let unit = unit(&path).to_string();
+        let unit = unit(&path);
         table.row([path, value, unit]);
     }
     (!table.rows.is_empty()).then_some(table)
@@ -73,9 +75,9 @@ pub(super) fn left_out(all: usize, shown: usize) -> String {
         0 => String::new(),
         n => format!(
             "The first {} of {} rows; {} are left out.",
-            grouped(shown as u64),
-            grouped(all as u64),
-            grouped(n as u64)
+            count(shown as u64),
+            count(all as u64),
+            count(n as u64)
         ),
     }
 }
@@ -106,6 +108,7 @@ fn word(value: &Value) -> String {
         Value::Null => "-".into(),
         Value::String(text) => text.clone(),
         Value::Number(number) => self::number(number),
+        Value::Array(list) if list.is_empty() => "none".into(),
         Value::Array(list) if list.iter().any(|v| v.is_array() || v.is_object()) => {
             format!("{} entries", list.len())
         }
@@ -150,7 +153,9 @@ mod tests {
             ["none", "-", ""],
         ];
         assert_eq!(table.rows, rows.map(|row| row.map(String::from).to_vec()));
-        assert_eq!((unit("speed_m_s"), unit("min_separation_m"), unit("losses")), ("m/s", "m", ""));
+        let names =
+            ["speed_m_s", "min_separation_m", "losses", "steps_per_cpu_s", "contacts_per_action"];
+        assert_eq!(names.map(unit), ["m/s", "m", "", "1/s", ""]);
         assert_eq!(flat("t", &Value::Null), None);
     }
 
