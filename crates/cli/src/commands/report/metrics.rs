@@ -61,12 +61,26 @@ pub(super) fn listed(title: &str, list: &Value) -> Option<Table> {
     if columns.is_empty() {
         return None;
     }
-    let mut table = Table::new(title, left_out(rows.len(), shown.len()), &columns);
+    let note = left_out(rows.len(), shown.len());
+    let mut table = Table::new(title, note, &without_shared_head(&columns));
     for row in shown {
         let cell = |column: &&str| row.iter().find(|(path, _)| path == column);
         table.row(columns.iter().map(|c| cell(c).map_or("-".into(), |(_, value)| value.clone())));
     }
     Some(table)
+}
+
+/// Paths without the first step that all longer ones share, where they stay apart without it.
+fn without_shared_head<'a>(paths: &[&'a str]) -> Vec<&'a str> {
+    let head = |path: &&'a str| path.split_once('.').map(|(head, _)| head);
+    let mut heads: Vec<&str> = paths.iter().filter_map(head).collect();
+    heads.dedup();
+    let tail = |path: &&'a str| path.split_once('.').map_or(*path, |(_, tail)| tail);
+    let tails: Vec<&str> = paths.iter().map(tail).collect();
+    let mut apart = tails.clone();
+    apart.sort_unstable();
+    apart.dedup();
+    if heads.len() == 1 && apart.len() == paths.len() { tails } else { paths.to_vec() }
 }
 
 /// How many rows are not shown, in words; nothing if all are.
@@ -162,8 +176,11 @@ mod tests {
     #[test]
     fn rows_that_differ_share_their_columns_and_what_is_left_out_is_told() {
         let table = listed("t", &json!([{"a": 1}, {"a": 2, "b": {"c": true}}])).unwrap();
-        assert_eq!(table.columns, ["a", "b.c"]);
+        assert_eq!(table.columns, ["a", "c"]);
         assert_eq!(table.rows, [["1", "-"], ["2", "true"]]);
+        assert_eq!(without_shared_head(&["id", "n.a", "n.b.c"]), ["id", "a", "b.c"]);
+        assert_eq!(without_shared_head(&["a", "n.a"]), ["a", "n.a"]);
+        assert_eq!(without_shared_head(&["m.a", "n.b"]), ["m.a", "n.b"]);
         let many = listed("t", &json!(vec![json!({"a": 1}); 250])).unwrap();
         assert_eq!((many.rows.len(), many.note.contains("50 are left out")), (MOST_ROWS, true));
         assert_eq!(listed("t", &json!([])), None);
