@@ -53,7 +53,7 @@ fn ways(figure: &Figure) -> Plot {
     let (x, y) = (extent(points().map(|p| p.x)), extent(points().map(|p| p.y)));
     let (Some(x), Some(y)) = (x, y) else { return plot };
     let half = 0.54 * (x.1 - x.0).max(y.1 - y.0);
-    if !(half > 0.0) {
+    if half <= 0.0 || !half.is_finite() {
         return plot;
     }
     let around = |(low, high): (f64, f64)| (0.5 * (low + high) - half, 0.5 * (low + high) + half);

@@ -1,6 +1,7 @@
 //! The real binary, from outside: what it prints, writes and ends with.
 
 mod airspace;
+mod browser;
 mod chain;
 mod chain_input;
 mod commands;
@@ -15,6 +16,7 @@ mod ik;
 mod input;
 mod learn;
 mod readers;
+mod report;
 mod reproduce;
 mod slurm;
 mod stops;

@@ -1,20 +1,25 @@
 //! `reproduce`: a rehearsal leaves a report, its figures and all its numbers.
 
+use crate::browser::{assert_sound, chromium};
 use crate::support::{Ended, Place, names, signal, wait_for};
 use serde_json::Value;
+
+/// What stands in the folder of a report.
+const WHOLE: [&str; 4] = ["figures", "report.html", "report.json", "report.md"];
 
 #[test]
 fn a_rehearsal_leaves_a_whole_report() {
     let place = Place::new();
     let told = place.json(&["reproduce", "loria", "--quick", "--out", "loria"]);
     assert!(told["claims"].as_array().map(Vec::len) > Some(10));
-    assert_eq!(names(&place.path("loria")), ["figures", "report.json", "report.md"]);
+    assert_eq!(names(&place.path("loria")), WHOLE);
     let stored: Value = serde_json::from_str(&place.read("loria/report.json")).expect("JSON");
     assert_eq!(stored["claims"], told["claims"]);
     assert!(place.read("loria/report.md").contains("A rehearsal"));
     let figures = names(&place.path("loria/figures"));
     let kind = |end: &str| figures.iter().filter(|f| f.ends_with(end)).count();
     assert!(kind(".svg") > 5 && kind(".svg") == kind(".png"), "{figures:?}");
+    assert_eq!(figures.len() / 2, place.read("loria/report.md").matches("](figures/").count());
     let again = place.run(&["reproduce", "loria", "--quick", "--out", "loria"]);
     assert_eq!(again.code(), 2, "a folder with something in it is left alone");
 }
@@ -45,13 +50,21 @@ fn a_rehearsal_of_the_serpentine_experiments_leaves_a_whole_report() {
     let place = Place::new();
     let told = place.json(&["reproduce", "serpentine", "--quick", "--out", "s", "--seeds", "1"]);
     assert_eq!(told["claims"].as_array().map(Vec::len), Some(24));
-    assert_eq!(names(&place.path("s")), ["figures", "report.json", "report.md"]);
+    assert_eq!(names(&place.path("s")), WHOLE);
     let stored: Value = serde_json::from_str(&place.read("s/report.json")).expect("JSON");
     assert_eq!(stored["claims"], told["claims"]);
     let report = place.read("s/report.md");
     assert!(report.contains("A rehearsal") && !report.contains("NaN"), "{report}");
     let figures = names(&place.path("s/figures"));
     let count = |is: &dyn Fn(&str) -> bool| figures.iter().filter(|f| is(f)).count();
-    assert_eq!(count(&|f| f.starts_with("scene-") && f.ends_with(".png")), 4, "{figures:?}");
     assert_eq!(count(&|f| f.ends_with(".svg")), count(&|f| f.ends_with(".png")));
+    let Some(browser) = chromium() else { return };
+    let found = assert_sound(&browser, &place.path("s/report.html"));
+    assert_eq!(found["pictures"].as_array().map(Vec::len), Some(4), "the scenes");
+    assert_eq!(found["figures"].as_u64(), Some(count(&|f| f.ends_with(".svg")) as u64 - 4));
+    assert_eq!(found["badges"].as_array().map(Vec::len), Some(24), "a verdict for every claim");
+    assert_eq!(found["hidden_by_legend"], 1, "a click in the legend hides a series");
+    assert!(found["hover"].as_str().is_some_and(|words| words.contains("n =")), "{found}");
+    let [as_told, rising, falling, again] = [0, 1, 2, 3].map(|k| &found["sorted"][k]);
+    assert!(as_told == again && rising != falling, "a head sorts up, down, and as it was");
 }

@@ -76,6 +76,24 @@
     });
   }
 
+  // Ticks where there are values, if they are few and far enough apart to be read.
+  function ticksAtValues(figure) {
+    const all = figure.series.flatMap((s) => s.points.map((p) => p.x));
+    const values = [...new Set(all)].sort((a, b) => a - b);
+    const places = figure.x_scale === "log" ? values.map(Math.log10) : values;
+    const span = places.at(-1) - places[0];
+    const gaps = places.slice(1).map((place, k) => (place - places[k]) / span);
+    const fits = values.length > 1 && values.length < 11 && Math.min(...gaps) > 0.07;
+    return fits ? { tickmode: "array", tickvals: values, ticktext: values.map(digits) } : {};
+  }
+
+  // A tick for each power of ten, and between them only where there are few.
+  function logTicks(values) {
+    const sizes = values.filter((value) => value > 0);
+    const wide = Math.max(...sizes) / Math.min(...sizes) > 100;
+    return { dtick: wide ? 1 : "D2" };
+  }
+
   function layout(figure) {
     const look = looks();
     const axis = (label, scale) => ({
@@ -84,8 +102,13 @@
       tickcolor: look.faint, exponentformat: "power", minexponent: 5,
     });
     const isBars = typeof figure.kind !== "string";
-    const x = { ...axis(figure.x_label, figure.x_scale), ...(isBars && { type: "category" }) };
+    const points = figure.series.flatMap((s) => s.points);
+    const x = axis(figure.x_label, figure.x_scale);
     const y = axis(figure.y_label, figure.y_scale);
+    if (figure.x_scale === "log") Object.assign(x, logTicks(points.map((p) => p.x)));
+    if (figure.y_scale === "log") Object.assign(y, logTicks(points.map((p) => p.y)));
+    if (isBars) x.type = "category";
+    if (figure.kind === "lines" || figure.kind === "bands") Object.assign(x, ticksAtValues(figure));
     if (figure.kind === "ways") y.scaleanchor = "x";
     const named = figure.series.filter((s) => s.name !== "").length;
     return {

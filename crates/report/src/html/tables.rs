@@ -24,21 +24,38 @@ pub(super) fn grid(table: &Table, caption: Option<&str>) -> Markup {
             @if let Some(caption) = caption { caption { (caption) } }
             thead { tr {
                 @for (head, number) in table.columns.iter().zip(&numbers) {
-                    th scope="col" .number[*number] { (head) }
+                    th scope="col" .number[*number] { (breakable(head)) }
                 }
             } }
             tbody {
                 @for row in &table.rows {
                     tr {
                         @for (k, cell) in table.cells(row).enumerate() {
-                            @if k == 0 { th scope="row" .number[numbers[k]] { (cell) } }
-                            @else { td .number[numbers[k]] { (cell) } }
+                            @if k == 0 { th scope="row" .number[numbers[k]] { (breakable(cell)) } }
+                            @else { td .number[numbers[k]] { (kept(cell)) } }
                         }
                     }
                 }
             }
         }
     }
+}
+
+/// Names may break where their words meet; numbers never do.
+fn breakable(name: &str) -> Markup {
+    let ends_word = |part: &str| {
+        part.ends_with(['_', '.', '/']) && part.starts_with(|c: char| c.is_ascii_alphabetic())
+    };
+    html! {
+        @for part in name.split_inclusive(['_', '.', '/']) {
+            (part) @if ends_word(part) { wbr; }
+        }
+    }
+}
+
+/// The two ends of an interval stay on one line.
+fn kept(cell: &str) -> String {
+    if cell.contains('[') { cell.replace(", ", ",\u{a0}") } else { cell.into() }
 }
 
 /// What scrolls by itself can be reached by keyboard, and has a name.
@@ -73,7 +90,12 @@ pub(super) fn claims(claims: &[Claim]) -> Markup {
                 th scope="row" { (claim.id) }
                 td { (badge(claim.verdict)) }
                 td { (text(&Text::marked(claim.paper))) }
-                @if has_figure { td { (claim.papers_figure.unwrap_or("none")) } }
+                @if has_figure {
+                    @match claim.papers_figure {
+                        Some(figure) => td { (figure) },
+                        None => td .none { "none" },
+                    }
+                }
                 td { (text(&Text::marked(&claim.ours))) }
                 td .why { (text(&Text::marked(&claim.reason))) }
             }

@@ -418,7 +418,7 @@ impl Report {
             document.warning(Text::marked(claim::REHEARSAL));
         }
         document.section("Claims").push(Block::Claims(self.claims.clone()));
-        document.section("Team and migrating coordinator").tables([self.table()]);
+        document.section("Results").tables([self.table()]);
         document.figures(self.figures().into_iter().map(Figure::with_intervals_told));
         let quick = if plan.quick { " --quick" } else { "" };
         let command =

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 /// What stands above a report of little weight.
 pub const REHEARSAL: &str = "**A rehearsal: its figures have no weight.** Everything was run, with \
-                             too few runs to measure anything. Run it without `--quick`.";
+                             too few runs to measure anything; without `--quick` it is measured.";
 
 /// What we say of a claim.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]

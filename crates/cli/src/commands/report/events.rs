@@ -36,7 +36,8 @@ pub(super) fn tell(document: &mut Document, folder: &Path, name: &str) -> Result
         return Ok(());
     }
     let partial = if table.complete { "" } else { ", of those cycles that are on the disk" };
-    document.paragraph(Text::from(format!("{} of `{name}`{partial}.", rows(table.rows()))));
+    let words = Text::from(format!("{} of ", rows(table.rows())));
+    document.paragraph(words.and(Text::code(name)).and(format!("{partial}.")));
     document.tables([events.counts()]).figures(events.over_time());
     document.tables([first_rows(&table)]);
     Ok(())

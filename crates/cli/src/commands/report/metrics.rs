@@ -1,6 +1,6 @@
 //! Numbers of `summary.json` as tables.
 
-use crate::console::grouped;
+use super::count;
 use serde_json::{Map, Value};
 use sidestep::experiment::Table;
 
@@ -31,16 +31,18 @@ const UNITS: [(&str, &str); 18] = [
     ("_s", "s"),
 ];
 
-/// The unit that a name ends in, or nothing.
-pub(super) fn unit(name: &str) -> &'static str {
-    UNITS.iter().find(|(end, _)| name.ends_with(end)).map_or("", |(_, unit)| unit)
+/// The unit that a name ends in, or nothing: `steps_per_cpu_s` are so many in a second.
+pub(super) fn unit(name: &str) -> String {
+    let unit = UNITS.iter().find(|(end, _)| name.ends_with(end)).map_or("", |(_, unit)| unit);
+    let is_rate = name.contains("_per_") && !unit.is_empty();
+    if is_rate { format!("1/{unit}") } else { unit.into() }
 }
 
 /// A tree of values as a row for each leaf, by its path; `None` without any.
 pub(super) fn flat(title: &str, tree: &Value) -> Option<Table> {
     let mut table = Table::new(title, "", &["metric", "value", "unit"]);
     for (path, value) in leaves(tree) {
-        let unit = unit(&path).to_string();
+        let unit = unit(&path);
         table.row([path, value, unit]);
     }
     (!table.rows.is_empty()).then_some(table)
@@ -59,12 +61,26 @@ pub(super) fn listed(title: &str, list: &Value) -> Option<Table> {
     if columns.is_empty() {
         return None;
     }
-    let mut table = Table::new(title, left_out(rows.len(), shown.len()), &columns);
+    let note = left_out(rows.len(), shown.len());
+    let mut table = Table::new(title, note, &without_shared_head(&columns));
     for row in shown {
         let cell = |column: &&str| row.iter().find(|(path, _)| path == column);
         table.row(columns.iter().map(|c| cell(c).map_or("-".into(), |(_, value)| value.clone())));
     }
     Some(table)
+}
+
+/// Paths without the first step that all longer ones share, where they stay apart without it.
+fn without_shared_head<'a>(paths: &[&'a str]) -> Vec<&'a str> {
+    let head = |path: &&'a str| path.split_once('.').map(|(head, _)| head);
+    let mut heads: Vec<&str> = paths.iter().filter_map(head).collect();
+    heads.dedup();
+    let tail = |path: &&'a str| path.split_once('.').map_or(*path, |(_, tail)| tail);
+    let tails: Vec<&str> = paths.iter().map(tail).collect();
+    let mut apart = tails.clone();
+    apart.sort_unstable();
+    apart.dedup();
+    if heads.len() == 1 && apart.len() == paths.len() { tails } else { paths.to_vec() }
 }
 
 /// How many rows are not shown, in words; nothing if all are.
@@ -73,9 +89,9 @@ pub(super) fn left_out(all: usize, shown: usize) -> String {
         0 => String::new(),
         n => format!(
             "The first {} of {} rows; {} are left out.",
-            grouped(shown as u64),
-            grouped(all as u64),
-            grouped(n as u64)
+            count(shown as u64),
+            count(all as u64),
+            count(n as u64)
         ),
     }
 }
@@ -106,6 +122,7 @@ fn word(value: &Value) -> String {
         Value::Null => "-".into(),
         Value::String(text) => text.clone(),
         Value::Number(number) => self::number(number),
+        Value::Array(list) if list.is_empty() => "none".into(),
         Value::Array(list) if list.iter().any(|v| v.is_array() || v.is_object()) => {
             format!("{} entries", list.len())
         }
@@ -150,15 +167,20 @@ mod tests {
             ["none", "-", ""],
         ];
         assert_eq!(table.rows, rows.map(|row| row.map(String::from).to_vec()));
-        assert_eq!((unit("speed_m_s"), unit("min_separation_m"), unit("losses")), ("m/s", "m", ""));
+        let names =
+            ["speed_m_s", "min_separation_m", "losses", "steps_per_cpu_s", "contacts_per_action"];
+        assert_eq!(names.map(unit), ["m/s", "m", "", "1/s", ""]);
         assert_eq!(flat("t", &Value::Null), None);
     }
 
     #[test]
     fn rows_that_differ_share_their_columns_and_what_is_left_out_is_told() {
         let table = listed("t", &json!([{"a": 1}, {"a": 2, "b": {"c": true}}])).unwrap();
-        assert_eq!(table.columns, ["a", "b.c"]);
+        assert_eq!(table.columns, ["a", "c"]);
         assert_eq!(table.rows, [["1", "-"], ["2", "true"]]);
+        assert_eq!(without_shared_head(&["id", "n.a", "n.b.c"]), ["id", "a", "b.c"]);
+        assert_eq!(without_shared_head(&["a", "n.a"]), ["a", "n.a"]);
+        assert_eq!(without_shared_head(&["m.a", "n.b"]), ["m.a", "n.b"]);
         let many = listed("t", &json!(vec![json!({"a": 1}); 250])).unwrap();
         assert_eq!((many.rows.len(), many.note.contains("50 are left out")), (MOST_ROWS, true));
         assert_eq!(listed("t", &json!([])), None);

@@ -10,7 +10,7 @@ mod metrics;
 mod recorded;
 mod run;
 
-use crate::console::Console;
+use crate::console::{Console, grouped};
 use crate::exit::{ExitCode, Failure};
 use crate::pages::{Pages, Raster};
 use clap::Args;
@@ -58,6 +58,11 @@ pub(crate) fn report(args: &ReportArgs, console: Console) -> Result<ExitCode, Fa
 /// What there is to say about a folder. The one place that tells sorts of folders apart.
 fn document(folder: &Path) -> Result<Document, InputError> {
     run::document(folder)
+}
+
+/// A number whose groups of digits stay on one line.
+fn count(number: u64) -> String {
+    grouped(number).replace(' ', "\u{a0}")
 }
 
 /// Where the report goes; its Markdown twin must not be the page itself.

@@ -1,7 +1,6 @@
 //! What the tables of a run folder hold, by their schemas.
 
 use super::metrics::unit;
-use crate::console::grouped;
 use crate::recorded::has_rows;
 use sidestep::experiment::{Document, Table};
 use sidestep::kernel::InputError;
@@ -42,7 +41,7 @@ pub(super) fn tell(document: &mut Document, folder: &Path) -> Result<(), InputEr
         // Its first rows tell the schema; the whole may be large.
         let first = read_table(folder, &name, ..1).or_else(|_| read_table(folder, &name, ..))?;
         for column in &first.schema.columns {
-            let unit = unit(&column.name).to_string();
+            let unit = unit(&column.name);
             let ty = type_name(column.ty).to_string();
             table.row([name.clone(), column.name.clone(), ty, unit, column.meaning.clone()]);
         }
@@ -77,6 +76,6 @@ pub(super) fn cell(values: &Values, labels: &[String], row: usize) -> String {
 }
 
 /// A number of rows in words.
-pub(super) fn rows(count: usize) -> String {
-    format!("{} row{}", grouped(count as u64), if count == 1 { "" } else { "s" })
+pub(super) fn rows(rows: usize) -> String {
+    format!("{} row{}", super::count(rows as u64), if rows == 1 { "" } else { "s" })
 }

@@ -1,8 +1,8 @@
 //! A run folder as a document. Nothing here knows worlds: metrics are what `summary.json` holds,
 //! everything else follows from the schemas of the recorded tables.
 
-use super::{events, metrics, recorded};
-use crate::console::{duration, grouped};
+use super::{count, events, metrics, recorded};
+use crate::console::duration;
 use serde_json::Value;
 use sidestep::experiment::Document;
 use sidestep::experiment::document::{Block, Code, Picture, Text};
@@ -28,7 +28,7 @@ pub(super) fn document(folder: &Path) -> Result<Document, InputError> {
     }
     document.section("What was run").push(Block::Facts(facts(&view, summary.as_ref())));
     document.push(Block::Code(Code {
-        title: "The scenario, with every default".into(),
+        title: "The scenario, complete in itself (scenario.toml)".into(),
         language: "toml",
         text: view.scenario.clone(),
     }));
@@ -53,13 +53,15 @@ fn name(view: &RunView, summary: Option<&Value>) -> String {
 }
 
 fn lead(view: &RunView) -> Text {
-    let Manifest { world, cycles_done, cycles_planned, program_version, .. } = &view.manifest;
-    let cycles = match cycles_done == cycles_planned {
-        true => grouped(*cycles_done),
-        false => format!("{} of {}", grouped(*cycles_done), grouped(*cycles_planned)),
+    let Manifest { world, status, cycles_done, cycles_planned, program_version, .. } =
+        &view.manifest;
+    let (done, planned) = (count(*cycles_done), count(*cycles_planned));
+    let cycles = match (cycles_done == cycles_planned, status) {
+        (true, _) => format!("{done} cycles"),
+        (false, Status::Complete) => format!("over after {done} of at most {planned} cycles"),
+        (false, _) => format!("{done} of {planned} cycles"),
     };
-    let text =
-        format!("A run of the world `{world}` by sidestep {program_version}: {cycles} cycles.");
+    let text = format!("A run of the world `{world}` by sidestep {program_version}, {cycles}.");
     Text::marked(&text)
 }
 
@@ -73,9 +75,10 @@ fn unfinished(view: &RunView) -> Option<Text> {
     };
     let text = format!(
         "**This run is not complete.** {how}; what is below is of its first {} cycles at most. ",
-        grouped(*cycles_done)
+        count(*cycles_done)
     );
-    let resume = Text::code(format!("sidestep resume {}", view.path.display()));
+    let resume =
+        Text::code(format!("sidestep resume {}", quoted(&view.path.display().to_string())));
     Some(Text::marked(&text).and(resume).and(" goes on with it."))
 }
 
@@ -90,15 +93,15 @@ fn facts(view: &RunView, summary: Option<&Value>) -> Vec<(String, Text)> {
         ("World".into(), Text::code(&*manifest.world)),
         ("Status".into(), status.into()),
         ("Seed".into(), manifest.seed.to_string().into()),
-        ("Cycles".into(), grouped(manifest.cycles_done).into()),
-        ("Cycles planned".into(), grouped(manifest.cycles_planned).into()),
+        ("Cycles".into(), count(manifest.cycles_done).into()),
+        ("Cycles planned".into(), count(manifest.cycles_planned).into()),
         ("Version".into(), format!("sidestep {}", manifest.program_version).into()),
     ];
     let number = |key: &str| summary.and_then(|s| s.get(key)).and_then(Value::as_f64);
     let mut fact = |name: &str, value: Option<String>| {
         facts.extend(value.map(|value| (name.to_string(), Text::from(value))));
     };
-    fact("Agents", number("robots").map(|n| grouped(n as u64)));
+    fact("Agents", number("robots").map(|n| count(n as u64)));
     fact("Took", number("wall_s").map(duration));
     fact("Workers", number("workers").map(|n| n.to_string()));
     let digest = manifest.digest.clone();
@@ -141,7 +144,7 @@ fn summary(folder: &Path) -> Result<Option<Value>, InputError> {
 
 fn tell_metrics(document: &mut Document, manifest: &Manifest, summary: &Value) {
     let cycles = summary.get("cycles").and_then(Value::as_u64).unwrap_or(manifest.cycles_done);
-    let of = format!(" After {} cycles.", grouped(cycles));
+    let of = format!(" After {} cycles.", count(cycles));
     document.section("Results").paragraph(Text::marked(&format!("{ONE_RUN}{of}")));
     let get = |key| summary.get(key).unwrap_or(&Value::Null);
     document.tables(metrics::flat("Metrics", get("metrics")));

@@ -81,7 +81,8 @@ fn body_scene<const D: usize>(view: &View<D>) -> BodyScene<D> {
         strands: view.strands.iter().map(strand).collect(),
         trails: view.trails.iter().map(trail).collect(),
         view_m: None,
-        title: view.title.clone(),
-        caption: view.caption.clone(),
+        // Both stand beside the picture.
+        title: String::new(),
+        caption: String::new(),
     }
 }

@@ -1,0 +1,102 @@
+//! `report`: a run folder of any world becomes a page that keeps to itself, and Markdown.
+
+use crate::browser::{assert_sound, chromium};
+use crate::support::{Place, names};
+use serde_json::Value;
+
+const SIX: &str = "format = 1\nworld = \"airspace\"\nname = \"Six </script> **of** them\"\n\
+                   cycles = 150\n[airspace]\ndeployment = \"team\"\n\
+                   [airspace.generator]\nkind = \"superconflict\"\nn = 6\n";
+
+const CHAIN: &str = "format = 1\nworld = \"chain\"\nname = \"Wanderer\"\nseed = 5\ncycles = 400\n\
+                     [[obstacles]]\nat_m = [1.5, 0.3]\nradius_m = 0.2\n\
+                     [[obstacles]]\nat_m = [-1.5, 0.3]\nradius_m = 0.2\n\
+                     [[chains]]\nconnectors = 12\nat_m = [0.0, 0.0]\nrod_m = 0.3\n\
+                     radius_m = 0.05\n\
+                     [[chains.tasks]]\nkind = \"wander\"\nspeed_m_s = 0.6\n";
+
+/// A place with a recorded run of each world and its report.
+fn reported(scenario: &str) -> Place {
+    let place = Place::new();
+    place.write("x.toml", scenario);
+    place.json(&["run", "x.toml", "--out", "r"]);
+    let told = place.json(&["report", "r"]);
+    assert_eq!(told["html"], "r/report.html");
+    place
+}
+
+#[test]
+fn a_run_of_every_world_becomes_a_page_and_its_twin() {
+    for (scenario, name) in [(crate::support::SCENARIO, "small"), (SIX, "Six"), (CHAIN, "Wanderer")]
+    {
+        let place = reported(scenario);
+        let text = place.read("r/report.md");
+        assert!(text.starts_with(&format!("# {name}")), "{text}");
+        for words in ["n = 1", "sidestep run r/scenario.toml", "sidestep replay r", "## Results"] {
+            assert!(text.contains(words), "{words}: {text}");
+        }
+        assert!(!text.contains("not complete") && !text.contains("NaN"), "{text}");
+        let pictures = names(&place.path("r/report-figures"));
+        for picture in &pictures {
+            assert!(text.contains(&format!("(report-figures/{picture})")), "{picture}");
+        }
+        let Some(browser) = chromium() else { continue };
+        let found = assert_sound(&browser, &place.path("r/report.html"));
+        let is_drawn = |width: &Value| width.as_u64().is_some_and(|px| px > 100);
+        assert!(
+            found["pictures"]
+                .as_array()
+                .is_some_and(|all| all.len() == 1 && all.iter().all(is_drawn))
+        );
+        let captions = found["captions"].to_string();
+        for caption in ["Metrics", "Metrics of every agent", "Columns"] {
+            assert!(captions.contains(caption), "{captions}");
+        }
+        assert!(found["heads"].to_string().contains("Results"));
+    }
+}
+
+#[test]
+fn the_same_run_gives_the_same_report_and_leaves_no_half_file() {
+    let place = reported(SIX);
+    let first = (place.read("r/report.html"), place.read("r/report.md"));
+    place.json(&["report", "r"]);
+    assert_eq!((place.read("r/report.html"), place.read("r/report.md")), first);
+    let left = names(&place.path("r"));
+    assert!(!left.iter().any(|name| name.ends_with(".partial")), "{left:?}");
+    // The run can be read, replayed and checked as before.
+    assert_eq!(place.run(&["replay", "r", "--cycle", "20"]).code(), 0);
+}
+
+#[test]
+fn a_run_that_was_stopped_is_marked_and_says_how_to_go_on() {
+    let place = Place::new();
+    place.json(&["run", "s.toml", "--out", "r"]);
+    let whole = place.read("r/run.json");
+    place.write("r/run.json", whole.replace("\"complete\"", "\"running\""));
+    place.json(&["report", "r", "--out", "page.html"]);
+    let text = place.read("page.md");
+    assert!(text.contains("> **This run is not complete.**"), "{text}");
+    assert!(text.contains("`sidestep resume r`"), "{text}");
+    assert!(place.path("page-figures").is_dir() && !place.path("r/report.html").exists());
+}
+
+#[test]
+fn what_is_no_run_or_no_page_is_refused_and_nothing_is_written() {
+    let place = Place::new();
+    for args in [
+        &["report", "."][..],
+        &["report", "nowhere"],
+        &["report", ".", "--out", "report.md"],
+        &["report", "s.toml"],
+    ] {
+        let ended = place.run(args);
+        assert_eq!((ended.code(), ended.out().as_str()), (2, ""), "{args:?}: {}", ended.err());
+    }
+    let broken = reported(SIX);
+    broken.write("r/summary.json", "{ \"metrics\": ");
+    let ended = broken.run(&["report", "r", "--out", "x.html"]);
+    assert_eq!(ended.code(), 2);
+    assert!(ended.err().contains("summary.json"), "{}", ended.err());
+    assert!(!broken.path("x.html").exists());
+}
