@@ -21,3 +21,25 @@ fn a_full_disk_fails_the_run_which_resumes_when_there_is_room() {
     let resumed = place.json(&["resume", "disk/r"]);
     assert_eq!(resumed["digest"], place.json(&run)["digest"]);
 }
+
+#[test]
+fn a_full_disk_fails_a_recording_for_viewers_and_keeps_no_space() {
+    let place = Place::new();
+    let at = place.path("disk");
+    let Some(_disk) = SmallDisk::mount(&at, "200k") else {
+        println!("skipped: this user may not mount a small disk");
+        return;
+    };
+    let ended = place.run(&["run", "s.toml", "--cycles", "60000", "--mcap", "disk/x.mcap"]);
+    assert_eq!((ended.code(), ended.out().as_str()), (1, ""), "{}", ended.err());
+    for word in ["disk/x.mcap", "No space", "cycle", "seed 5", "run it again"] {
+        assert!(ended.err().contains(word), "{word}: {}", ended.err());
+    }
+    assert_eq!(std::fs::read_dir(&at).expect("a folder").count(), 0);
+    place.json(&["run", "s.toml", "--out", "r"]);
+    let exported = place.run(&["export", "r", "--to", "parquet", "--out", "disk/tables"]);
+    assert_eq!(exported.code(), 0, "small tables fit: {}", exported.err());
+    let exported = place.run(&["export", "r", "--to", "mp4-frames", "--out", "disk/frames"]);
+    assert_eq!((exported.code(), exported.out().as_str()), (1, ""), "{}", exported.err());
+    assert!(!at.join("frames").exists() && !at.join("frames.partial").exists());
+}

@@ -149,3 +149,20 @@ fn a_running_folder_is_not_taken_twice() {
         assert!(ended.err().contains("another process"), "{}", ended.err());
     }
 }
+
+#[test]
+fn a_recording_of_a_stopped_run_can_be_opened_but_is_not_called_whole() {
+    let place = Place::new();
+    let endless = ["run", "s.toml", "--mcap", "x.mcap", "--cycles", "1000000000", "--json"];
+    let child = place.start(&endless);
+    let grown = || std::fs::metadata(place.path("x.mcap.partial")).is_ok_and(|m| m.len() > 200_000);
+    wait_for("some frames", grown);
+    signal(&child, "INT");
+    let ended = Ended(child.wait_with_output().expect("ended"));
+    assert_eq!(ended.code(), 130, "{}", ended.err());
+    assert_eq!(ended.json()["mcap"], "x.mcap.partial");
+    assert_eq!(place.names(), ["s.toml", "x.mcap.partial"]);
+    let replayed = place.json(&["replay", "x.mcap.partial"]);
+    assert_eq!(replayed["complete"], false);
+    assert_eq!(replayed["digest"], ended.json()["digest"]);
+}
