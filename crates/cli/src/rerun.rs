@@ -2,7 +2,8 @@
 
 use crate::exit::Failure;
 use crate::recording::{restore, write_inputs};
-use crate::worlds::{Compiled, Resolved, Run};
+use crate::worlds::{Compiled, Run};
+use sidestep::scenario::Resolved;
 use sidestep::kernel::checkpoint::decode_header;
 use sidestep::kernel::{Cycle, InputError};
 use sidestep::scenario::Source;

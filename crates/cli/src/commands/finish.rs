@@ -37,7 +37,8 @@ pub(crate) fn recorded_run(
     console: Console,
 ) -> Result<bool, Failure> {
     let until = run.plan().cycles;
-    let effort = drive_guarded(run, until, Some(&mut recording), console)?;
+    let sinks = Sinks { recording: Some(&mut recording), film: None };
+    let effort = drive_guarded(run, until, sinks, console)?;
     let folder = recording.folder().path().to_path_buf();
     let cost = Cost { workers, effort, recording: recording.took() };
     let summary = Summary::new(run, cost, Some(&folder));

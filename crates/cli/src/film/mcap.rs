@@ -2,7 +2,8 @@
 
 use super::Film;
 use crate::exit::Failure;
-use crate::worlds::{Resolved, Run};
+use crate::worlds::Run;
+use sidestep::scenario::Resolved;
 use sidestep::kernel::Cycle;
 use sidestep::kernel::view::Look;
 use sidestep_record::{McapEnd, McapOrigin, McapRecorder, Origin, Status};

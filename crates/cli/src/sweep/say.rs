@@ -6,6 +6,7 @@ use crate::exit::{ExitCode, Failure};
 use serde_json::json;
 use sidestep::experiment::sweep::rounds::Stopped;
 use sidestep::experiment::sweep::{Outcome, Plan, RunTable, Shard, Summary};
+use sidestep_report::markdown;
 use std::fmt::Write;
 use std::time::Instant;
 
