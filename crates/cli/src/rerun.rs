@@ -3,9 +3,9 @@
 use crate::exit::Failure;
 use crate::recording::{restore, write_inputs};
 use crate::worlds::{Compiled, Run};
-use sidestep::scenario::Resolved;
 use sidestep::kernel::checkpoint::decode_header;
 use sidestep::kernel::{Cycle, InputError};
+use sidestep::scenario::Resolved;
 use sidestep::scenario::Source;
 use sidestep_record::{McapRun, ResumePoint, RunView, Status, is_mcap};
 use std::path::{Path, PathBuf};

@@ -3,9 +3,9 @@
 use super::Film;
 use crate::exit::Failure;
 use crate::worlds::Run;
-use sidestep::scenario::Resolved;
 use sidestep::kernel::Cycle;
 use sidestep::kernel::view::Look;
+use sidestep::scenario::Resolved;
 use sidestep_record::{McapEnd, McapOrigin, McapRecorder, Origin, Status};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};

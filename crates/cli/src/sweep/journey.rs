@@ -226,7 +226,7 @@ fn show(folder: &Folder, console: Console) -> Result<ExitCode, Failure> {
 }
 
 /// Hands over all finished runs, but for those of the share `but`.
-fn gather(
+pub(super) fn gather(
     folder: &Folder,
     but: Option<Shard>,
     mut each: impl FnMut(Outcome),

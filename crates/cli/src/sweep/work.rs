@@ -95,7 +95,7 @@ impl Work<'_> {
         }
         let run = || match self.record {
             None => self.plain(cell, workers),
-            Some(folder) => self.recorded(cell, workers, &folder(cell.id)),
+            Some(folder) => recorded(cell, (self.source)(cell.variant)?, workers, &folder(cell.id)),
         };
         match catch_unwind(AssertUnwindSafe(run)) {
             Ok(Ok(outcome)) => outcome.map(Ok),
@@ -113,27 +113,30 @@ impl Work<'_> {
         let outcome = started.run(&|| !interrupt::requested());
         Ok(outcome.map(|outcome| timed(outcome, [compiled - begun, compiled.elapsed()])))
     }
+}
 
-    /// As `plain`, with a run folder of its own. One that a kill has left is begun anew.
-    fn recorded(
-        &self,
-        cell: Cell,
-        workers: usize,
-        folder: &Path,
-    ) -> Result<Option<Outcome>, Failure> {
-        let begun = Instant::now();
-        let seed = format!("seed={}", cell.seed);
-        let source = (self.source)(cell.variant)?.with(&[seed])?;
-        let compiled = Compiled::new(&source)?;
-        let resolved = compiled.resolve(&source)?;
-        let itself = Source::new("scenario.toml", &*resolved.text, folder);
-        let mut run = compiled.start(&itself, workers);
-        let recording = Recording::create(folder, &resolved, run.as_mut(), Existing::Replace)?;
-        let compiled = Instant::now();
-        let is_complete = recorded_run(run.as_mut(), recording, workers, Console::silent())?;
-        let outcome = is_complete.then(|| Outcome::of(cell, run.as_ref()));
-        Ok(outcome.map(|outcome| timed(outcome, [compiled - begun, compiled.elapsed()])))
-    }
+/// Runs a cell into a run folder of its own; `None` when it was broken off. A folder that a kill
+/// has left is begun anew.
+///
+/// # Errors
+/// When the scenario is wrong with this seed, or something cannot be stored.
+pub(super) fn recorded(
+    cell: Cell,
+    variant: Source,
+    workers: usize,
+    folder: &Path,
+) -> Result<Option<Outcome>, Failure> {
+    let begun = Instant::now();
+    let source = variant.with(&[format!("seed={}", cell.seed)])?;
+    let compiled = Compiled::new(&source)?;
+    let resolved = compiled.resolve(&source)?;
+    let itself = Source::new("scenario.toml", &*resolved.text, folder);
+    let mut run = compiled.start(&itself, workers);
+    let recording = Recording::create(folder, &resolved, run.as_mut(), Existing::Replace)?;
+    let compiled = Instant::now();
+    let is_complete = recorded_run(run.as_mut(), recording, workers, Console::silent())?;
+    let outcome = is_complete.then(|| Outcome::of(cell, run.as_ref()));
+    Ok(outcome.map(|outcome| timed(outcome, [compiled - begun, compiled.elapsed()])))
 }
 
 fn timed(mut outcome: Outcome, [compiling, running]: [std::time::Duration; 2]) -> Outcome {

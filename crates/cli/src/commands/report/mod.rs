@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! run.rs        a run folder -> a document       metrics.rs   numbers of a summary -> tables
+//! sweep.rs      the folder of a sweep -> a document
 //! recorded.rs   its tables: what is in them      events.rs    what happened, and when
 //! ```
 
@@ -9,10 +10,12 @@ mod events;
 mod metrics;
 mod recorded;
 mod run;
+mod sweep;
 
 use crate::console::{Console, grouped};
 use crate::exit::{ExitCode, Failure};
 use crate::pages::{Pages, Raster};
+use crate::sweep::Folder;
 use clap::Args;
 use serde_json::json;
 use sidestep::experiment::Document;
@@ -23,15 +26,16 @@ const EXAMPLES: &str = "\
 Examples:
   sidestep report runs/office                  runs/office/report.html and report.md
   sidestep report runs/office --out office.html
+  sidestep report sweeps/methods               of all runs: intervals, comparisons, figures
 
 The page is one file that needs no network. A run that has not ended can be reported too; the
 report says so.";
 
-/// Write a report of a run folder: one HTML file, and Markdown.
+/// Write a report of a run or a sweep: one HTML file, and Markdown.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct ReportArgs {
-    /// The folder that a run was recorded to
+    /// The folder of a run or a sweep
     #[arg(value_name = "DIR")]
     folder: PathBuf,
 
@@ -56,8 +60,11 @@ pub(crate) fn report(args: &ReportArgs, console: Console) -> Result<ExitCode, Fa
 }
 
 /// What there is to say about a folder. The one place that tells sorts of folders apart.
-fn document(folder: &Path) -> Result<Document, InputError> {
-    run::document(folder)
+fn document(folder: &Path) -> Result<Document, Failure> {
+    match Folder::is_at(folder) {
+        true => sweep::document(&Folder::open(folder)?),
+        false => Ok(run::document(folder)?),
+    }
 }
 
 /// A number whose groups of digits stay on one line.

@@ -197,7 +197,18 @@ pub struct Summary {
     /// What a reader must know.
     pub notes: Vec<String>,
     #[serde(skip)]
-    figures: Vec<Figure>,
+    figures: Vec<(String, Figure)>,
+}
+
+/// What there is to say about a metric.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Section {
+    /// The metric, in words.
+    pub title: String,
+    /// Its figures.
+    pub figures: Vec<Figure>,
+    /// Its tables.
+    pub tables: Vec<Table>,
 }
 
 impl Summary {
@@ -213,7 +224,11 @@ impl Summary {
         let baseline = baseline(&groups, options, scattered)?;
         let metric = |c: &&RunColumn| summed(&groups, c, baseline, &options.bootstrap);
         let metrics: Vec<MetricSummary> = columns.iter().map(metric).collect();
-        let figures = columns.iter().flat_map(|c| charts::figures(&groups, c)).collect();
+        let named = |c: &&RunColumn, f: Figure| (c.name.clone(), f);
+        let figures = columns
+            .iter()
+            .flat_map(|c| charts::figures(&groups, c).into_iter().map(move |f| named(c, f)))
+            .collect();
         let mut summary = Self {
             runs: table.runs(),
             variants: (0..groups.variants.len()).map(|v| variant(&groups, v)).collect(),
@@ -233,9 +248,29 @@ impl Summary {
         text::tables(self)
     }
 
+    /// The summary metric by metric.
+    pub fn sections(&self) -> Vec<Section> {
+        let section = |metric: &MetricSummary| Section {
+            title: text::sentence(&Label { unit: None, ..metric.label.clone() }),
+            figures: self
+                .figures
+                .iter()
+                .filter(|(of, _)| *of == metric.name)
+                .map(|(_, f)| f.clone())
+                .collect(),
+            tables: text::of_metric(self, metric),
+        };
+        self.metrics.iter().map(section).collect()
+    }
+
+    /// The metrics that are not shown, if there are any.
+    pub fn left_out(&self) -> Option<Table> {
+        text::left_out(self)
+    }
+
     /// The summary as figures: each metric over each parameter.
     pub fn figures(&self) -> Vec<Figure> {
-        self.figures.clone()
+        self.figures.iter().map(|(_, figure)| figure.clone()).collect()
     }
 }
 

@@ -8,18 +8,18 @@ use crate::statistics::Interval;
 use sidestep_kernel::math;
 
 pub(super) fn tables(summary: &Summary) -> Vec<Table> {
-    let mut tables = Vec::new();
-    for metric in &summary.metrics {
-        tables.push(values(metric));
-        if let Some(baseline) = &summary.baseline {
-            tables.push(differences(metric, baseline));
-        }
-        if !metric.effects.is_empty() {
-            tables.push(effects(metric));
-        }
+    let of_metrics = summary.metrics.iter().flat_map(|metric| of_metric(summary, metric));
+    of_metrics.chain(left_out(summary)).collect()
+}
+
+/// The tables of a metric.
+pub(super) fn of_metric(summary: &Summary, metric: &MetricSummary) -> Vec<Table> {
+    let mut tables = vec![values(metric)];
+    if let Some(baseline) = &summary.baseline {
+        tables.push(differences(metric, baseline));
     }
-    if !summary.left_out.is_empty() {
-        tables.push(left_out(summary));
+    if !metric.effects.is_empty() {
+        tables.push(effects(metric));
     }
     tables
 }
@@ -169,10 +169,11 @@ fn effects(metric: &MetricSummary) -> Table {
     table
 }
 
-fn left_out(summary: &Summary) -> Table {
+/// Why metrics are not shown, if any are not.
+pub(super) fn left_out(summary: &Summary) -> Option<Table> {
     let mut table = Table::new("Metrics not shown", "", &["metric", "why"]);
     summary.left_out.iter().for_each(|l| table.row([l.metric.clone(), l.reason.clone()]));
-    table
+    (!table.rows.is_empty()).then_some(table)
 }
 
 /// With a capital.
