@@ -44,7 +44,7 @@ pub(crate) fn page(document: &Document, pictures: &[SvgFile]) -> String {
                 title { (document.title) }
                 style { (PreEscaped(STYLE)) }
             }
-            body .has-contents[has_contents] {
+            body class=[has_contents.then_some("has-contents")] {
                 header {
                     h1 { (document.title) }
                     p .lead { (text(&document.lead)) }

@@ -24,21 +24,26 @@ pub(super) fn grid(table: &Table, caption: Option<&str>) -> Markup {
             @if let Some(caption) = caption { caption { (caption) } }
             thead { tr {
                 @for (head, number) in table.columns.iter().zip(&numbers) {
-                    th scope="col" .number[*number] { (breakable(head)) }
+                    th scope="col" class=[class(*number)] { (breakable(head)) }
                 }
             } }
             tbody {
                 @for row in &table.rows {
                     tr {
                         @for (k, cell) in table.cells(row).enumerate() {
-                            @if k == 0 { th scope="row" .number[numbers[k]] { (breakable(cell)) } }
-                            @else { td .number[numbers[k]] { (kept(cell)) } }
+                            @if k == 0 { th scope="row" class=[class(numbers[k])] { (breakable(cell)) } }
+                            @else { td class=[class(numbers[k])] { (kept(cell)) } }
                         }
                     }
                 }
             }
         }
     }
+}
+
+/// Numbers stand to the right.
+fn class(is_number: bool) -> Option<&'static str> {
+    is_number.then_some("number")
 }
 
 /// Names may break where their words meet; numbers never do.
