@@ -15,7 +15,7 @@ const LOOK: Look = Look { scanning_bodies: usize::MAX };
 
 fn traffic() -> Source {
     let text = "format = 1\nworld = \"airspace\"\nseed = 7\n[airspace]\nmethod = \"none\"\n\
-                shield = false\n[airspace.generator]\nkind = \"superconflict\"\nn = 6\n";
+                shield = \"off\"\n[airspace.generator]\nkind = \"superconflict\"\nn = 6\n";
     Source::new("traffic", text, "")
 }
 
