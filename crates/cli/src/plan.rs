@@ -13,6 +13,13 @@ pub(crate) struct ScenarioArgs {
     #[arg(value_name = "SCENARIO")]
     pub(crate) file: PathBuf,
 
+    #[command(flatten)]
+    pub(crate) changes: ChangeArgs,
+}
+
+/// What the command line changes in a scenario.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct ChangeArgs {
     /// Run this many cycles [default: the scenario's `cycles`]
     #[arg(long, value_name = "N", value_parser = toml_integer())]
     pub(crate) cycles: Option<u64>,
@@ -65,14 +72,15 @@ impl ScenarioArgs {
         }
     }
 
-    /// `--set` first, so that the options of their own win.
     fn all_overrides(&self) -> Vec<String> {
-        let mut all = self.settings();
-        all.extend(self.seed.map(|seed| format!("seed={seed}")));
+        let mut all = self.changes.settings();
+        all.extend(self.changes.seed.map(|seed| format!("seed={seed}")));
         all
     }
+}
 
-    /// All overrides but for the seed.
+impl ChangeArgs {
+    /// All overrides but for the seed: `--set` first, so that the options of their own win.
     pub(crate) fn settings(&self) -> Vec<String> {
         let mut all = self.overrides.clone();
         all.extend(self.cycles.map(|cycles| format!("cycles={cycles}")));

@@ -74,7 +74,8 @@ pub(crate) fn run(args: &RunArgs, console: Console) -> Result<ExitCode, Failure>
             return Err(InputError::new("--mcap or --replace", cause, remedy).into());
         }
         let workers = args.workers.count();
-        return many_runs(&args.scenario, &args.many, args.out.as_ref(), workers, console);
+        let ScenarioArgs { file, changes } = &args.scenario;
+        return many_runs((file, changes), &args.many, args.out.as_deref(), workers, console);
     }
     let (source, compiled) = args.scenario.compile()?;
     let told = worlds::told_of(&args.scenario.file)?;

@@ -2,13 +2,13 @@
 
 use crate::console::{Console, aligned, grouped};
 use crate::exit::{ExitCode, Failure};
-use crate::plan::{ScenarioArgs, WorkersArg};
+use crate::plan::{ChangeArgs, WorkersArg};
 use crate::sweep::{self, Folder, ManyArgs};
 use clap::{Args, Subcommand};
 use serde_json::json;
 use sidestep::experiment::sweep::Shard;
 use sidestep::kernel::InputError;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -29,30 +29,17 @@ on where a killed one stopped, as does `sidestep resume DIR`; no finished run is
 
 /// Run many variants of a scenario, each with many seeds, and sum them up.
 #[derive(Debug, Args)]
-#[command(after_help = EXAMPLES, args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+#[command(after_help = EXAMPLES, args_conflicts_with_subcommands = true)]
 pub(crate) struct SweepArgs {
     #[command(subcommand)]
     step: Option<Step>,
 
-    #[command(flatten)]
-    all: Option<AllArgs>,
-}
+    /// Sweep file or scenario
+    #[arg(value_name = "FILE")]
+    file: Option<PathBuf>,
 
-#[derive(Debug, Subcommand)]
-enum Step {
-    /// Check all variants and write what is to be run
-    Plan(PlanArgs),
-    /// Run a share of a planned sweep
-    Run(ShareArgs),
-    /// Join the shares of a sweep into one table
-    Collect(CollectArgs),
-}
-
-/// A sweep file, or a scenario and options.
-#[derive(Debug, Args)]
-struct AllArgs {
     #[command(flatten)]
-    scenario: ScenarioArgs,
+    changes: ChangeArgs,
 
     #[command(flatten)]
     many: ManyArgs,
@@ -65,10 +52,24 @@ struct AllArgs {
     out: Option<PathBuf>,
 }
 
+#[derive(Debug, Subcommand)]
+enum Step {
+    /// Check all variants and write what is to be run
+    Plan(PlanArgs),
+    /// Run a share of a planned sweep
+    Run(ShareArgs),
+    /// Join the shares of a sweep into one table
+    Collect(CollectArgs),
+}
+
 #[derive(Debug, Args)]
 struct PlanArgs {
+    /// Sweep file or scenario
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+
     #[command(flatten)]
-    scenario: ScenarioArgs,
+    changes: ChangeArgs,
 
     #[command(flatten)]
     many: ManyArgs,
@@ -104,15 +105,15 @@ struct CollectArgs {
 /// # Errors
 /// When the sweep or a folder is wrong, runs are missing, or results cannot be stored.
 pub(crate) fn sweep(args: &SweepArgs, console: Console) -> Result<ExitCode, Failure> {
-    match (&args.step, &args.all) {
+    let SweepArgs { step, file, changes, many, workers, out } = args;
+    match (step, file) {
         (Some(Step::Plan(args)), _) => plan(args, console),
         (Some(Step::Run(args)), _) => {
             sweep::share(&Folder::open(&args.folder)?, args.shard, args.workers.count(), console)
         }
         (Some(Step::Collect(args)), _) => sweep::collect(&Folder::open(&args.folder)?, console),
-        (None, Some(args)) => {
-            let AllArgs { scenario, many, workers, out } = args;
-            many_runs(scenario, many, out.as_ref(), workers.count(), console)
+        (None, Some(file)) => {
+            many_runs((file, changes), many, out.as_deref(), workers.count(), console)
         }
         (None, None) => {
             let remedy = "name a sweep file or a scenario; see `sidestep sweep --help`";
@@ -126,13 +127,13 @@ pub(crate) fn sweep(args: &SweepArgs, console: Console) -> Result<ExitCode, Fail
 /// # Errors
 /// When the sweep or the folder is wrong, or results cannot be stored.
 pub(super) fn many_runs(
-    scenario: &ScenarioArgs,
+    (file, changes): (&Path, &ChangeArgs),
     many: &ManyArgs,
-    out: Option<&PathBuf>,
+    out: Option<&Path>,
     workers: usize,
     console: Console,
 ) -> Result<ExitCode, Failure> {
-    let wanted = many.sweep(scenario)?;
+    let wanted = many.sweep(file, changes)?;
     match out {
         None => sweep::in_memory(&wanted, workers, console),
         Some(out) => sweep::in_folder(&wanted, out, workers, console),
@@ -140,7 +141,7 @@ pub(super) fn many_runs(
 }
 
 fn plan(args: &PlanArgs, console: Console) -> Result<ExitCode, Failure> {
-    let folder = sweep::planned(&args.many.sweep(&args.scenario)?, &args.out, console)?;
+    let folder = sweep::planned(&args.many.sweep(&args.file, &args.changes)?, &args.out, console)?;
     let plan = folder.plan();
     let json = json!({
         "folder": args.out,

@@ -1,10 +1,11 @@
 //! What was typed -> a sweep.
 
-use crate::plan::ScenarioArgs;
+use crate::plan::ChangeArgs;
 use clap::Args;
 use sidestep::experiment::sweep::file::MAX_RUNS;
 use sidestep::experiment::sweep::{Factor, Setting, Sweep, Until};
 use sidestep::kernel::InputError;
+use std::path::Path;
 
 /// What makes many runs of one.
 #[derive(Debug, Clone, Args)]
@@ -50,9 +51,9 @@ impl ManyArgs {
     ///
     /// # Errors
     /// When the file or an option is wrong.
-    pub(crate) fn sweep(&self, scenario: &ScenarioArgs) -> Result<Sweep, InputError> {
-        let mut sweep = Sweep::read(&scenario.file)?;
-        sweep.fixed.extend(settings(&scenario.settings())?);
+    pub(crate) fn sweep(&self, file: &Path, changes: &ChangeArgs) -> Result<Sweep, InputError> {
+        let mut sweep = Sweep::read(file)?;
+        sweep.fixed.extend(settings(&changes.settings())?);
         for text in &self.vary {
             sweep.design.factors.push(Factor::parse(text)?);
         }
@@ -71,7 +72,7 @@ impl ManyArgs {
         if !self.baseline.is_empty() {
             sweep.baseline = settings(&self.baseline)?;
         }
-        sweep.first_seed = scenario.seed.or(sweep.first_seed);
+        sweep.first_seed = changes.seed.or(sweep.first_seed);
         sweep.record |= self.record_runs;
         sweep.check()?;
         Ok(sweep)

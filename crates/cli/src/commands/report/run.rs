@@ -113,12 +113,11 @@ fn facts(view: &RunView, summary: Option<&Value>) -> Vec<(String, Text)> {
 fn again(view: &RunView) -> String {
     let folder = quoted(&view.path.display().to_string());
     let scenario = quoted(&view.path.join("scenario.toml").display().to_string());
-    let cycle = view.manifest.cycles_done;
     format!(
         "# the same run, with the same rows and the same digest\n\
          sidestep run {scenario} --out NEW_DIR\n\
          # its state at a cycle, computed anew and compared with what was recorded\n\
-         sidestep replay {folder} --cycle {cycle}\n"
+         sidestep replay {folder}\n"
     )
 }
 
