@@ -126,7 +126,7 @@ fn text(
         grouped(plan.variants.len() as u64),
         plan.first_seed
     );
-    for table in summary.tables() {
+    for table in summary.brief() {
         // Writing to a string cannot fail.
         let _ = write!(text, "\n{}", markdown::table(&table));
     }

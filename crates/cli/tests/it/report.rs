@@ -82,6 +82,34 @@ fn a_run_that_was_stopped_is_marked_and_says_how_to_go_on() {
 }
 
 #[test]
+fn a_sweep_becomes_a_page_with_intervals_figures_and_pictures() {
+    let place = crate::sweep::place();
+    place.json(&["sweep", "sweep.toml", "--out", "d"]);
+    place.json(&["report", "d"]);
+    let text = place.read("d/report.md");
+    for words in ["# crowds", "18 runs of 6 variants", "## Contacts", "## Coverage", "minus"] {
+        assert!(text.to_lowercase().contains(&words.to_lowercase()), "{words}: {text}");
+    }
+    assert!(text.contains("sidestep run d/variants/0000/scenario.toml --seed 5"), "{text}");
+    let Some(browser) = chromium() else { return };
+    let found = assert_sound(&browser, &place.path("d/report.html"));
+    assert_eq!(found["pictures"].as_array().map(Vec::len), Some(4), "a run of each of four variants");
+    let captions = found["captions"].to_string();
+    assert!(captions.contains("Variants") && captions.contains("against"), "{captions}");
+}
+
+#[test]
+fn a_sweep_that_is_not_done_is_marked() {
+    let place = crate::sweep::place();
+    place.json(&["sweep", "plan", "sweep.toml", "--out", "d"]);
+    assert_eq!(place.run(&["report", "d"]).code(), 2, "there is nothing to report yet");
+    place.json(&["sweep", "run", "d", "--shard", "0/3"]);
+    place.json(&["report", "d"]);
+    let text = place.read("d/report.md");
+    assert!(text.contains("**This sweep is not done.** 6 of at most 18 runs"), "{text}");
+}
+
+#[test]
 fn what_is_no_run_or_no_page_is_refused_and_nothing_is_written() {
     let place = Place::new();
     for args in [

@@ -30,6 +30,9 @@ pub const QUANTILES: [f64; 5] = [0.05, 0.25, 0.5, 0.75, 0.95];
 /// Above this many runs of a variant no bootstrap is drawn: Student's interval is as good there.
 const BOOTSTRAP_RUNS: usize = 10_000;
 
+/// Why a metric is not shown where others are named.
+pub(super) const NOT_ASKED_FOR: &str = "not asked for";
+
 /// What to sum up, and how.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SummaryOptions {
@@ -248,6 +251,11 @@ impl Summary {
         text::tables(self)
     }
 
+    /// The summary in short, for a terminal: means and differences with their intervals.
+    pub fn brief(&self) -> Vec<Table> {
+        text::brief(self)
+    }
+
     /// The summary metric by metric.
     pub fn sections(&self) -> Vec<Section> {
         let section = |metric: &MetricSummary| Section {
@@ -348,7 +356,7 @@ fn named<'a>(all: &[&'a RunColumn], names: &[String]) -> Result<Chosen<'a>, Inpu
     }
     let others = all.iter().filter(|c| !names.contains(&c.name));
     let left_out =
-        |c: &&RunColumn| LeftOut { metric: c.name.clone(), reason: "not asked for".into() };
+        |c: &&RunColumn| LeftOut { metric: c.name.clone(), reason: NOT_ASKED_FOR.into() };
     Ok((shown, others.map(left_out).collect()))
 }
 

@@ -2,7 +2,10 @@
 
 use super::Label;
 use super::compare::Comparison;
-use super::summary::{Described, MetricSummary, Numbers, Quantile, Share, Summary, VariantMetric};
+use super::summary::{
+    Described, LeftOut, MetricSummary, NOT_ASKED_FOR, Numbers, Quantile, Share, Summary,
+    VariantMetric,
+};
 use crate::experiment::{Estimate, Table};
 use crate::statistics::Interval;
 use sidestep_kernel::math;
@@ -10,6 +13,34 @@ use sidestep_kernel::math;
 pub(super) fn tables(summary: &Summary) -> Vec<Table> {
     let of_metrics = summary.metrics.iter().flat_map(|metric| of_metric(summary, metric));
     of_metrics.chain(left_out(summary)).collect()
+}
+
+/// A table a metric with what a reader looks for first: means and differences, each with its
+/// interval and number of runs.
+pub(super) fn brief(summary: &Summary) -> Vec<Table> {
+    summary.metrics.iter().map(|metric| brief_of(summary, metric)).collect()
+}
+
+fn brief_of(summary: &Summary, metric: &MetricSummary) -> Table {
+    let against = summary.baseline.as_ref().map(|name| format!("minus `{name}`"));
+    let mean = if metric.is_share { "share of runs" } else { "mean" };
+    let mut columns = vec!["variant", "n", mean];
+    columns.extend(against.as_deref());
+    columns.extend(against.as_ref().map(|_| "p (Holm)"));
+    let mut table = Table::new(sentence(&metric.label), "", &columns);
+    for variant in &metric.variants {
+        let value = match &variant.values {
+            Described::Numbers(numbers) => with_interval(numbers.mean, numbers.interval),
+            Described::Share(share) => with_interval(share.share, Some(share.interval)),
+        };
+        let mut row = vec![variant.variant.clone(), variant.n.to_string(), value];
+        if let Some(c) = metric.comparisons.iter().find(|c| c.variant == variant.variant) {
+            row.push(with_interval(c.difference, c.interval));
+            row.push(c.p_holm.map_or("-".into(), p_value));
+        }
+        table.row(row);
+    }
+    table
 }
 
 /// The tables of a metric.
@@ -172,7 +203,12 @@ fn effects(metric: &MetricSummary) -> Table {
 /// Why metrics are not shown, if any are not.
 pub(super) fn left_out(summary: &Summary) -> Option<Table> {
     let mut table = Table::new("Metrics not shown", "", &["metric", "why"]);
-    summary.left_out.iter().for_each(|l| table.row([l.metric.clone(), l.reason.clone()]));
+    let asked = |l: &&LeftOut| l.reason != NOT_ASKED_FOR;
+    summary
+        .left_out
+        .iter()
+        .filter(asked)
+        .for_each(|l| table.row([l.metric.clone(), l.reason.clone()]));
     (!table.rows.is_empty()).then_some(table)
 }
 
@@ -210,6 +246,8 @@ fn number(value: f64, half_width: Option<f64>) -> String {
         return "0".into();
     }
     let decimals = 1.0 - math::log10(scale).floor();
+    // Where runs agree to the last bits, more than six decimals of a usual number tell nothing.
+    let decimals = if value.abs() >= 1e-3 { decimals.min(6.0) } else { decimals };
     let text = if !value.is_finite() || decimals > 8.0 || value.abs() >= 1e9 {
         format!("{value:.3e}")
     } else {
