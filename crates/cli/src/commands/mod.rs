@@ -38,7 +38,7 @@ pub(crate) enum Command {
     /// Compute the exact Markov chain of a scenario with one robot
     Exact(exact::ExactArgs),
     /// Run many variants of a scenario, each with many seeds, and sum them up
-    Sweep(sweep::SweepArgs),
+    Sweep(Box<sweep::SweepArgs>),
     /// Run methods of avoiding each other on the same traffic
     Compare(compare::CompareArgs),
     /// Compute where a robot arm's tip and connectors are

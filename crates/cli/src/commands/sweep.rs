@@ -55,7 +55,7 @@ pub(crate) struct SweepArgs {
 #[derive(Debug, Subcommand)]
 enum Step {
     /// Check all variants and write what is to be run
-    Plan(PlanArgs),
+    Plan(Box<PlanArgs>),
     /// Run a share of a planned sweep
     Run(ShareArgs),
     /// Join the shares of a sweep into one table

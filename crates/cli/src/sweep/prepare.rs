@@ -53,7 +53,10 @@ fn check_metrics(sweep: &Sweep, source: &Source, compiled: &AnyCompiled) -> Resu
     if wanted.peek().is_none() {
         return Ok(());
     }
-    let known = metric_names(compiled.clone().start(source, 1).as_ref());
+    let mut simulation = compiled.clone().start(source, 1);
+    // Some metrics are there only once something has happened.
+    simulation.advance(1);
+    let known = metric_names(simulation.as_ref());
     let Some(unknown) = wanted.find(|name| !known.contains(name)) else { return Ok(()) };
     let known: Vec<&str> = known.iter().map(String::as_str).collect();
     let cause = format!("`{unknown}` is no metric of the world `{}`", compiled.world());

@@ -5,13 +5,14 @@ use crate::support::Place;
 #[test]
 fn every_command_has_help_with_examples() {
     let place = Place::new();
-    for command in
-        ["run", "check", "new", "map", "learn", "exact", "fk", "ik", "resume", "replay", "export"]
-    {
+    for command in [
+        "run", "check", "new", "map", "learn", "exact", "fk", "ik", "resume", "replay", "export",
+        "sweep", "report",
+    ] {
         let help = place.run(&[command, "--help"]);
         assert_eq!(help.code(), 0);
         let examples = help.out().matches(&format!("sidestep {command} ")).count();
-        assert!((2..=8).contains(&examples), "{command}: {}", help.out());
+        assert!((2..=9).contains(&examples), "{command}: {}", help.out());
     }
     for words in [["learn", "sensor"], ["learn", "effector"], ["reproduce", "loria"]] {
         let help = place.run(&[words[0], words[1], "--help"]).out();

@@ -93,7 +93,11 @@ fn a_sweep_becomes_a_page_with_intervals_figures_and_pictures() {
     assert!(text.contains("sidestep run d/variants/0000/scenario.toml --seed 5"), "{text}");
     let Some(browser) = chromium() else { return };
     let found = assert_sound(&browser, &place.path("d/report.html"));
-    assert_eq!(found["pictures"].as_array().map(Vec::len), Some(4), "a run of each of four variants");
+    assert_eq!(
+        found["pictures"].as_array().map(Vec::len),
+        Some(4),
+        "a run of each of four variants"
+    );
     let captions = found["captions"].to_string();
     assert!(captions.contains("Variants") && captions.contains("against"), "{captions}");
 }

@@ -76,7 +76,7 @@ fn many_runs_of_one_scenario_need_no_file_and_leave_nothing_behind() {
     assert_eq!((&run["runs"], &run["parameters"][0]), (&8.into(), &"regime".into()));
     assert_eq!(place.names(), ["s.toml", "sweep.toml"]);
     let words = place.run(&[&["sweep", "s.toml"][..], &args[..]].concat()).out();
-    assert!(words.contains("8 runs of 2 variants") && words.contains("n="), "{words}");
+    assert!(words.contains("8 runs of 2 variants") && words.contains("| n | mean |"), "{words}");
 }
 
 #[test]

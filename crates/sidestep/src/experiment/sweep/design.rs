@@ -239,6 +239,7 @@ fn check_keys(variant: &[Setting]) -> Result<(), &str> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use sidestep_kernel::math::log10;
 
     fn keys(design: &Design) -> Vec<String> {
         let variants = design.variants("test").expect("valid");
@@ -303,7 +304,7 @@ mod tests {
         let part = |x: f64| (x * n as f64) as usize;
         let mut a: Vec<_> =
             column(0).map(|v| part((v.as_float().expect("float") - 1.0) / 9.0)).collect();
-        let mut b: Vec<_> = column(1).map(|v| part(v.as_float().expect("float").log10())).collect();
+        let mut b: Vec<_> = column(1).map(|v| part(log10(v.as_float().expect("float")))).collect();
         assert_ne!(a, b, "the sides are paired at random");
         a.sort_unstable();
         b.sort_unstable();

@@ -141,9 +141,15 @@ fn figures_are_lines_over_numbers_bars_over_words_and_points_where_nothing_is_on
     assert_eq!(lines.kind, FigureKind::Lines);
     let names: Vec<&str> = lines.series.iter().map(|s| s.name.as_str()).collect();
     assert_eq!(names, ["regime = calm", "regime = rush"]);
-    let x: Vec<f64> = lines.series[0].points.iter().map(|p| p.0).collect();
+    let x: Vec<f64> = lines.series[0].points.iter().map(|p| p.x).collect();
     assert_eq!(x, [10.0, 20.0, 40.0]);
-    assert!(figures.iter().flat_map(|f| &f.series).flat_map(|s| &s.points).all(|p| p.2.is_some()));
+    assert!(
+        figures
+            .iter()
+            .flat_map(|f| &f.series)
+            .flat_map(|s| &s.points)
+            .all(|p| p.interval.is_some())
+    );
     assert_eq!(lines.y_label, "mean delay (%)");
     assert_eq!(
         lines.title,
@@ -183,7 +189,7 @@ fn one_variant_is_shown_as_its_distribution() {
     assert!(summary.baseline.is_none() && summary.metrics[0].comparisons.is_empty());
     let figures = summary.figures();
     assert_eq!(figures.len(), 2, "a share has no distribution");
-    assert_eq!(figures[0].series[0].points.last().unwrap().1, 1.0);
+    assert_eq!(figures[0].series[0].points.last().unwrap().y, 1.0);
 }
 
 #[test]
