@@ -130,7 +130,7 @@ struct UntilSection {
 }
 
 impl Sweep {
-    /// A sweep of the scenario as it is, [`REPLICATES`] times.
+    /// A sweep of the scenario as it is, ten times.
     pub fn of_scenario(scenario: impl Into<PathBuf>) -> Self {
         let scenario = scenario.into();
         Self {
