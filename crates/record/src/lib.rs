@@ -2,6 +2,7 @@
 
 mod disk;
 mod encode;
+mod group;
 mod part;
 mod schema;
 mod staging;

@@ -11,17 +11,14 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use parquet::file::metadata::KeyValue;
-use parquet::schema::types::{SchemaDescriptor, TypePtr};
+use parquet::schema::types::TypePtr;
 use sidestep_kernel::ports::recorder::check_block;
 use sidestep_kernel::ports::{RecordError, Recorder, TableSchema, Values};
 
 use crate::disk;
-use crate::encode::ColumnEncoder;
+use crate::group::RowGroup;
 use crate::part::{PartWriter, cause, first_cycle, next_cycle, part_name};
 use crate::schema::{Origin, check_schema, key_values, parquet_schema};
-
-/// Rows in a row group. Only encoded rows wait in memory, a few bytes each.
-pub(crate) const GROUP_ROWS: usize = 1 << 20;
 
 /// Writes every table to Parquet files; see the [module](self) for their names.
 pub struct ParquetRecorder {
@@ -108,8 +105,7 @@ struct TableWriter {
     /// The first cycle of the open part, and of the next one if none is open.
     part_cycle: u64,
     part: Option<PartWriter>,
-    columns: Vec<ColumnEncoder>,
-    group_rows: usize,
+    group: RowGroup,
     finished: bool,
 }
 
@@ -122,19 +118,16 @@ impl TableWriter {
     ) -> Result<Self, RecordError> {
         let failed = |e| RecordError::new(&schema.name, cause(e));
         let parquet_schema = parquet_schema(schema).map_err(failed)?;
-        let descriptor = SchemaDescriptor::new(parquet_schema.clone());
-        let columns = schema.columns.iter().zip(descriptor.columns());
         let folder = parent.join(&schema.name);
         rewind(&folder, cycle)?;
         Ok(Self {
-            columns: columns.map(|(spec, d)| ColumnEncoder::new(spec, d.clone())).collect(),
+            group: RowGroup::new(schema, &parquet_schema),
             schema: schema.clone(),
             parquet_schema,
             key_values: key_values(schema, origin),
             folder,
             part_cycle: cycle,
             part: None,
-            group_rows: 0,
             finished: false,
         })
     }
@@ -146,15 +139,9 @@ impl TableWriter {
         let rows = block[0].len();
         let mut start = 0;
         while start < rows {
-            let end = rows.min(start + GROUP_ROWS - self.group_rows);
-            for (column, values) in self.columns.iter_mut().zip(block) {
-                column
-                    .append(values, start..end)
-                    .map_err(|e| RecordError::new(self.folder.display(), cause(e)))?;
-            }
-            self.group_rows += end - start;
-            start = end;
-            if self.group_rows == GROUP_ROWS {
+            let filled = self.group.fill(block, start);
+            start = filled.map_err(|e| RecordError::new(self.folder.display(), cause(e)))?;
+            if self.group.is_full() {
                 self.write_row_group()?;
             }
         }
@@ -162,12 +149,11 @@ impl TableWriter {
     }
 
     fn write_row_group(&mut self) -> Result<(), RecordError> {
-        self.group_rows = 0;
         if self.part.is_none() {
             self.part = Some(self.new_part()?);
         }
         let part = self.part.as_mut().expect("opened above");
-        part.write_row_group(&mut self.columns)
+        part.write_row_group(self.group.take())
     }
 
     fn new_part(&self) -> Result<PartWriter, RecordError> {
@@ -187,7 +173,7 @@ impl TableWriter {
     }
 
     fn end_part(&mut self, next_cycle: Option<u64>) -> Result<(), RecordError> {
-        if self.group_rows > 0 {
+        if !self.group.is_empty() {
             self.write_row_group()?;
         }
         self.part.take().map_or(Ok(()), |part| part.close(next_cycle))

@@ -6,19 +6,16 @@ use sidestep_kernel::ports::recorder::check_block;
 use sidestep_kernel::ports::{RecordError, TableSchema, Values};
 
 use crate::disk;
-use crate::encode::ColumnEncoder;
-use crate::parquet::GROUP_ROWS;
+use crate::group::RowGroup;
 use crate::part::{PartWriter, cause};
 use crate::schema::{Origin, check_schema, key_values, parquet_schema};
-use parquet::schema::types::SchemaDescriptor;
 
 /// A table on its way into one file, with the same key-value pairs as a run's own parts. Dropped
 /// before it is finished, it takes the file away again.
 pub struct TableFile {
     path: PathBuf,
     schema: TableSchema,
-    columns: Vec<ColumnEncoder>,
-    group_rows: usize,
+    group: RowGroup,
     /// None once the file is ended.
     part: Option<PartWriter>,
 }
@@ -32,14 +29,11 @@ impl TableFile {
         check_schema(schema)?;
         let failed = |e| RecordError::new(&schema.name, cause(e));
         let stored = parquet_schema(schema).map_err(failed)?;
-        let descriptor = SchemaDescriptor::new(stored.clone());
-        let columns = schema.columns.iter().zip(descriptor.columns());
         Ok(Self {
-            columns: columns.map(|(spec, d)| ColumnEncoder::new(spec, d.clone())).collect(),
+            group: RowGroup::new(schema, &stored),
             part: Some(PartWriter::create(path.to_path_buf(), stored, key_values(schema, origin))?),
             path: path.to_path_buf(),
             schema: schema.clone(),
-            group_rows: 0,
         })
     }
 
@@ -52,15 +46,9 @@ impl TableFile {
         let rows = block.first().map_or(0, Values::len);
         let mut start = 0;
         while start < rows {
-            let end = rows.min(start + GROUP_ROWS - self.group_rows);
-            for (column, values) in self.columns.iter_mut().zip(block) {
-                column
-                    .append(values, start..end)
-                    .map_err(|e| RecordError::new(self.path.display(), cause(e)))?;
-            }
-            self.group_rows += end - start;
-            start = end;
-            if self.group_rows == GROUP_ROWS {
+            let filled = self.group.fill(block, start);
+            start = filled.map_err(|e| RecordError::new(self.path.display(), cause(e)))?;
+            if self.group.is_full() {
                 self.write_row_group()?;
             }
         }
@@ -68,8 +56,8 @@ impl TableFile {
     }
 
     fn write_row_group(&mut self) -> Result<(), RecordError> {
-        self.group_rows = 0;
-        self.part.as_mut().map_or(Ok(()), |part| part.write_row_group(&mut self.columns))
+        let group = self.group.take();
+        self.part.as_mut().map_or(Ok(()), |part| part.write_row_group(group))
     }
 
     /// Ends the file: waits for the disk and gives it its name.
@@ -77,7 +65,7 @@ impl TableFile {
     /// # Errors
     /// What the system says.
     pub fn finish(mut self) -> Result<(), RecordError> {
-        if self.group_rows > 0 {
+        if !self.group.is_empty() {
             self.write_row_group()?;
         }
         let ended = self.part.take().map_or(Ok(()), |part| part.close(None));

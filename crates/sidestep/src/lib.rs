@@ -56,8 +56,8 @@
 //! kernel          the cycle, workers, random streams, digests, checkpoints, recorder port
 //!
 //! learn           logs of a real robot -> error tables that a scenario loads
-//! experiment      many runs, estimates with intervals, and the papers' experiments
-//! statistics      intervals and tests
+//! experiment      many runs and sweeps, what they come to with intervals, the papers' experiments
+//! statistics      intervals, tests, and when there are runs enough
 //! ```
 //!
 //! A behavior of your own is one trait, [`worlds::robots::decide::Behaviour`]; the example

@@ -47,6 +47,23 @@ impl ManyArgs {
         self.replicate.is_some() || !self.vary.is_empty() || self.until.is_some()
     }
 
+    /// Refuses options that say something of many runs where one is asked for.
+    ///
+    /// # Errors
+    /// Names the first such option.
+    pub(crate) fn check_one_run(&self) -> Result<(), InputError> {
+        let given = [
+            (!self.metrics.is_empty(), "--metrics"),
+            (!self.baseline.is_empty(), "--baseline"),
+            (self.record_runs, "--record-runs"),
+        ];
+        let Some((_, option)) = given.into_iter().find(|(is_given, _)| *is_given) else {
+            return Ok(());
+        };
+        let remedy = "give --replicate N or --vary KEY=V,V as well, or leave it out";
+        Err(InputError::new(option, "it is about many runs, and this is one", remedy))
+    }
+
     /// The sweep that the file asks for, with what the options change in it.
     ///
     /// # Errors

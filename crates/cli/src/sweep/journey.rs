@@ -1,14 +1,14 @@
 //! From a sweep to the table of its runs: in memory, in a folder, or share by share.
 
 use super::columns::{cells, from_file, share as share_of, to_file};
-use super::prepare::{Prepared, prepare};
+use super::prepare::{Fingerprint, prepare};
 use super::say::{Effort, say, say_share};
 use super::work::{Take, Work};
 use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
 use crate::interrupt;
 use crate::progress::Stages;
-use sidestep::experiment::sweep::rounds::{Rounds, Stopped};
+use sidestep::experiment::sweep::rounds::Rounds;
 use sidestep::experiment::sweep::{Cell, Outcome, Plan, Rows, Shard, Sweep};
 use sidestep::kernel::InputError;
 use sidestep::scenario::Source;
@@ -35,23 +35,22 @@ pub(crate) fn in_memory(
     }
     let stages = Stages::new(console);
     let mut sources: Vec<Source> = Vec::new();
-    let prepared = prepare(sweep, &stages, |_, source, _| {
+    let plan = prepare(sweep, &stages, |_, source, _| {
         sources.push(source.clone());
         Ok(())
     });
     stages.clear();
-    let plan = prepared?.plan;
+    let plan = plan?;
     let source = |variant: u32| Ok(sources[variant as usize].clone());
     let work = Work { plan: &plan, source: &source, record: None, workers, console };
     interrupt::listen()?;
     let mut log = Log::new(&plan);
     let effort = log.run_all(&work, &mut |_| Ok(()))?;
-    let stopped = log.stopped();
     if interrupt::requested() {
         console.note("Interrupted; nothing is kept without --out DIR.");
         return Ok(ExitCode::Interrupted);
     }
-    say(&plan, &log.rows.table(&plan)?, &stopped, effort, None, console)
+    say(&plan, &log.rows.table(&plan)?, effort, None, console)
 }
 
 /// Plans a sweep into a folder: all of it or nothing.
@@ -61,12 +60,14 @@ pub(crate) fn in_memory(
 pub(crate) fn planned(sweep: &Sweep, out: &Path, console: Console) -> Result<Folder, Failure> {
     let stages = Stages::new(console);
     let folder = Folder::create(out, VERSION, |staging| {
-        let prepared = prepare(sweep, &stages, |k, source, compiled| {
+        let mut fingerprint = Fingerprint::default();
+        let plan = prepare(sweep, &stages, |k, source, compiled| {
             let resolved = compiled.resolve(source)?;
+            fingerprint.add(&resolved);
             Ok(Folder::write_variant(staging, k, &resolved.text, &resolved.files)?)
         })?;
-        let cells = cells(&prepared.plan);
-        Ok::<_, Failure>((prepared.plan, prepared.fingerprint, cells))
+        let cells = cells(&plan);
+        Ok::<_, Failure>((plan, fingerprint.finish(), cells))
     });
     stages.clear();
     folder
@@ -93,11 +94,14 @@ pub(crate) fn in_folder(
 fn the_same(sweep: &Sweep, out: &Path, console: Console) -> Result<Folder, Failure> {
     let folder = Folder::open(out)?;
     let stages = Stages::new(console);
-    let prepared = prepare(sweep, &stages, |_, _, _| Ok(()));
+    let mut fingerprint = Fingerprint::default();
+    let plan = prepare(sweep, &stages, |_, source, compiled| {
+        fingerprint.add(&compiled.resolve(source)?);
+        Ok(())
+    });
     stages.clear();
-    let Prepared { plan, fingerprint } = prepared?;
     let manifest = folder.manifest();
-    if (&plan, &fingerprint) == (&manifest.plan, &manifest.fingerprint) {
+    if (&plan?, &fingerprint.finish()) == (&manifest.plan, &manifest.fingerprint) {
         check_version(&folder)?;
         return Ok(folder);
     }
@@ -145,10 +149,9 @@ pub(crate) fn go_on(
     if interrupt::requested() {
         return Ok(interrupted(folder, log.rows.len(), console));
     }
-    let stopped = log.stopped();
     let table = log.rows.table(folder.plan())?;
     folder.complete(&to_file(table.results()), &to_file(table.timings()))?;
-    say(folder.plan(), &table, &stopped, effort, Some(folder), console)
+    say(folder.plan(), &table, effort, Some(folder), console)
 }
 
 /// Runs a share of the cells and writes its part.
@@ -216,13 +219,13 @@ pub(crate) fn collect(folder: &Folder, console: Console) -> Result<ExitCode, Fai
     }
     let table = log.rows.table(plan)?;
     folder.complete(&to_file(table.results()), &to_file(table.timings()))?;
-    say(plan, &table, &[], Effort::default(), Some(folder), console)
+    say(plan, &table, Effort::default(), Some(folder), console)
 }
 
 /// What came of a sweep that is done.
 fn show(folder: &Folder, console: Console) -> Result<ExitCode, Failure> {
     let table = from_file(folder.results()?);
-    say(folder.plan(), &table, &[], Effort::default(), Some(folder), console)
+    say(folder.plan(), &table, Effort::default(), Some(folder), console)
 }
 
 /// Hands over all finished runs, but for those of the share `but`.
@@ -303,11 +306,6 @@ impl<'a> Log<'a> {
         let mut finished = self.rows.cells().to_vec();
         finished.sort_unstable();
         cells.filter(|cell| finished.binary_search(&cell.id).is_err()).collect()
-    }
-
-    /// Why variants were run no more.
-    fn stopped(&self) -> Vec<Stopped> {
-        self.rounds.as_ref().map_or_else(Vec::new, Rounds::stopped)
     }
 
     /// Runs all that is open, round by round where a precision is wanted.

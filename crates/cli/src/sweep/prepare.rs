@@ -6,15 +6,8 @@ use crate::progress::Stages;
 use sidestep::experiment::sweep::cell::metric_names;
 use sidestep::experiment::sweep::{Plan, Setting, Sweep, Variant};
 use sidestep::kernel::{Digest, InputError};
-use sidestep::scenario::{Source, nearest};
+use sidestep::scenario::{Resolved, Source, nearest};
 use sidestep::worlds::any::AnyCompiled;
-
-/// A sweep that is known to be right.
-pub(super) struct Prepared {
-    pub(super) plan: Plan,
-    /// Of all scenarios and the files they name.
-    pub(super) fingerprint: String,
-}
 
 /// Compiles every variant, hands it to `each` with its number, and makes the plan.
 ///
@@ -24,11 +17,11 @@ pub(super) fn prepare(
     sweep: &Sweep,
     stages: &Stages,
     mut each: impl FnMut(u32, &Source, &AnyCompiled) -> Result<(), Failure>,
-) -> Result<Prepared, Failure> {
+) -> Result<Plan, Failure> {
     let fixed: Vec<String> = sweep.fixed.iter().map(Setting::to_override).collect();
     let base = source_of(&sweep.scenario, &fixed)?;
     let variants = sweep.design.variants(&sweep.place)?;
-    let (mut agents, mut first, mut prints) = (0, None, String::new());
+    let (mut agents, mut first) = (0, None);
     let count = variants.len();
     for (k, settings) in (0u32..).zip(&variants) {
         stages.at("checking variants", f64::from(k) / count as f64);
@@ -38,12 +31,10 @@ pub(super) fn prepare(
             first = Some((compiled.world(), compiled.plan().seed));
             check_metrics(sweep, &source, &compiled)?;
         }
-        prints.push_str(&print(&source, &compiled)?);
         each(k, &source, &compiled)?;
     }
     let first = first.expect("a design has at least one variant");
-    let plan = Plan { agents, ..Plan::new(sweep, variants, first)? };
-    Ok(Prepared { plan, fingerprint: Digest::of(prints.as_bytes()).to_string() })
+    Ok(Plan { agents, ..Plan::new(sweep, variants, first)? })
 }
 
 /// The metrics that are named must be there: better told now than after all runs.
@@ -81,10 +72,21 @@ fn variant(base: &Source, settings: &[Setting]) -> Result<(Source, AnyCompiled),
     })
 }
 
-/// A digest of a scenario and its files.
-fn print(source: &Source, compiled: &AnyCompiled) -> Result<String, InputError> {
-    let resolved = compiled.resolve(source)?;
-    let files = resolved.files.iter().map(|(_, bytes)| Digest::of(bytes).to_string());
-    let text = Digest::of(resolved.text.as_bytes()).to_string();
-    Ok(std::iter::once(text).chain(files).collect())
+/// A digest of the scenarios of all variants, and of the files they name.
+#[derive(Debug, Default)]
+pub(super) struct Fingerprint(String);
+
+impl Fingerprint {
+    /// Adds the scenario of the next variant.
+    pub(super) fn add(&mut self, resolved: &Resolved) {
+        let files = resolved.files.iter().map(|(_, bytes)| bytes.as_slice());
+        for bytes in std::iter::once(resolved.text.as_bytes()).chain(files) {
+            self.0.push_str(&Digest::of(bytes).to_string());
+        }
+    }
+
+    /// Of all of them, in hexadecimal.
+    pub(super) fn finish(self) -> String {
+        Digest::of(self.0.as_bytes()).to_string()
+    }
 }

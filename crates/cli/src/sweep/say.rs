@@ -4,7 +4,7 @@ use super::journey::Folder;
 use crate::console::{Console, aligned, duration, grouped};
 use crate::exit::{ExitCode, Failure};
 use serde_json::json;
-use sidestep::experiment::sweep::rounds::Stopped;
+use sidestep::experiment::sweep::rounds::{Stopped, stopped};
 use sidestep::experiment::sweep::{Outcome, Plan, RunTable, Shard, Summary};
 use sidestep_report::markdown;
 use std::fmt::Write;
@@ -88,12 +88,12 @@ impl Effort {
 pub(super) fn say(
     plan: &Plan,
     table: &RunTable,
-    stopped: &[Stopped],
     effort: Effort,
     folder: Option<&Folder>,
     console: Console,
 ) -> Result<ExitCode, Failure> {
     let summary = plan.summary(table)?;
+    let stopped = stopped(plan, table);
     let failed = failures(plan, table, folder, console);
     let json = json!({
         "name": plan.name,
@@ -107,7 +107,7 @@ pub(super) fn say(
         "results": folder.map(Folder::results_file),
         "summary": summary,
     });
-    console.result(&json, || text(plan, table, &summary, stopped, effort, folder));
+    console.result(&json, || text(plan, table, &summary, &stopped, effort, folder));
     Ok(if failed == 0 { ExitCode::Done } else { ExitCode::Failed })
 }
 

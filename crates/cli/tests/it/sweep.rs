@@ -89,6 +89,9 @@ fn a_sweep_runs_until_it_is_precise_and_shares_of_it_are_refused() {
     assert!((10..=60).contains(&runs) && done["runs"] == runs, "{done}");
     let again = place.json(&args);
     assert_eq!(again["summary"], done["summary"], "nothing is run again");
+    assert_eq!(again["stopped"], done["stopped"], "why it was enough is still told");
+    place.json(&["report", "d"]);
+    assert!(place.read("d/report.md").contains("Why so many runs"));
     let planned = [&["sweep", "plan"], &args[1..]].concat();
     let planned: Vec<&str> = planned.iter().map(|a| if *a == "d" { "p" } else { a }).collect();
     place.json(&planned);
@@ -119,6 +122,16 @@ fn what_is_wrong_in_any_variant_is_told_before_anything_is_run() {
 }
 
 #[test]
+fn options_about_many_runs_are_refused_where_there_is_one() {
+    let place = place();
+    for option in [&["--metrics", "contacts"][..], &["--baseline", "seed=1"], &["--record-runs"]] {
+        let ended = place.run(&[&["run", "s.toml"], option].concat());
+        assert_eq!(ended.code(), 2, "{option:?}");
+        assert!(ended.err().contains(option[0]), "{}", ended.err());
+    }
+}
+
+#[test]
 fn a_folder_holds_one_sweep() {
     let place = place();
     place.json(&["sweep", "sweep.toml", "--out", "d"]);
@@ -127,6 +140,8 @@ fn a_folder_holds_one_sweep() {
     assert!(other.err().contains("another sweep"), "{}", other.err());
     let done = place.run(&["resume", "d"]);
     assert!(done.code() == 2 && done.err().contains("done"), "{}", done.err());
+    let planned = place.run(&["sweep", "plan", "sweep.toml", "--out", "d"]);
+    assert!(planned.err().contains("holds a sweep already"), "{}", planned.err());
     let none = place.run(&["sweep", "collect", "."]);
     assert!(none.code() == 2 && none.err().contains("no sweep"), "{}", none.err());
 }

@@ -67,6 +67,11 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         program_version: &str,
         fill: impl FnOnce(&Path) -> Result<(P, String, Vec<NullableColumn>), E>,
     ) -> Result<Self, E> {
+        if Self::is_at(path) {
+            let remedy = "name another folder, or go on with what is there: sidestep resume DIR";
+            let cause = "the folder holds a sweep already";
+            return Err(InputError::new(path.display(), cause, remedy).into());
+        }
         check_vacant(path, crate::Existing::Refuse)?;
         let staging = Staging::new(path)?;
         let (plan, fingerprint, cells) = fill(staging.path())?;

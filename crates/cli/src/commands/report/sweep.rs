@@ -7,6 +7,7 @@ use crate::exit::Failure;
 use crate::sweep::{Finished, Folder, finished, picture_of};
 use sidestep::experiment::Table;
 use sidestep::experiment::document::{Block, Code, Document, Picture, Text};
+use sidestep::experiment::sweep::rounds::{Stopped, stopped};
 use sidestep::experiment::sweep::{Plan, RunTable, RunValues, Summary};
 
 /// Variants of which a run is drawn.
@@ -30,6 +31,7 @@ pub(super) fn document(folder: &Folder) -> Result<Document, Failure> {
     }
     document.section("What was run").push(Block::Facts(facts(folder, &table)));
     document.tables(variants(plan, &table));
+    document.tables(why_enough(plan, &table));
     document.commands("How to run it again", again(folder));
     let scenario = std::fs::read_to_string(folder.scenario(0));
     if let Ok(text) = scenario {
@@ -128,6 +130,18 @@ fn variants(plan: &Plan, table: &RunTable) -> Option<Table> {
         rows.row(first.into_iter().chain(plan.parameters.iter().map(value)));
     }
     Some(rows)
+}
+
+/// Why variants were run no more, where a precision ends them.
+fn why_enough(plan: &Plan, table: &RunTable) -> Option<Table> {
+    let stopped = stopped(plan, table);
+    let names = plan.names();
+    let mut rows = Table::new("Why so many runs", "", &["variant", "runs", "why"]);
+    for Stopped { variant, runs, reason } in &stopped {
+        let name = names[*variant as usize].clone();
+        rows.row([name, runs.to_string(), reason.words().to_string()]);
+    }
+    (!stopped.is_empty()).then_some(rows)
 }
 
 /// Commands that give the same again.

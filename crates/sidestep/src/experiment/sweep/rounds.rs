@@ -3,6 +3,7 @@
 use super::cell::Outcome;
 use super::file::Until;
 use super::plan::{Cell, Plan};
+use super::table::RunTable;
 use crate::statistics::{Next, Reason, StoppingRule};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
@@ -33,6 +34,14 @@ pub struct Stopped {
     pub runs: usize,
     /// Why they are enough.
     pub reason: Reason,
+}
+
+/// Why the variants of a plan were run no more, if a precision ended them.
+pub fn stopped(plan: &Plan, runs: &RunTable) -> Vec<Stopped> {
+    let Some(until) = &plan.until else { return Vec::new() };
+    let mut rounds = Rounds::new(plan, until);
+    runs.outcomes(|outcome| rounds.note(&outcome));
+    rounds.stopped()
 }
 
 impl<'a> Rounds<'a> {
