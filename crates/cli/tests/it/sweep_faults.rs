@@ -4,7 +4,8 @@
 use crate::support::{Place, SmallDisk, signal, wait_for};
 use crate::sweep::place;
 use std::collections::BTreeSet;
-use std::time::Duration;
+use std::process::Child;
+use std::time::{Duration, Instant};
 
 /// Lines of the journal that are whole; the first is its head.
 fn finished(place: &Place, folder: &str) -> Vec<String> {
@@ -19,11 +20,24 @@ fn cell(line: &str) -> u64 {
     row["cell"].as_u64().expect("a number")
 }
 
-/// The same delays in every run of the tests, spread over `most_ms`.
-fn delays(most_ms: u64) -> impl Iterator<Item = Duration> {
+/// The same numbers in every run of the tests, spread over 0 to 1.
+fn fractions() -> impl Iterator<Item = f64> {
     let next = |x: &u64| Some(x.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1));
     let states = std::iter::successors(Some(1u64), next).skip(1);
-    states.map(move |x| Duration::from_millis((x >> 33) % most_ms))
+    states.map(|x| (x >> 11) as f64 / (1u64 << 53) as f64)
+}
+
+/// Waits until `ready`, or until the process is over; whether it still runs then.
+fn runs_until(child: &mut Child, mut ready: impl FnMut() -> bool) -> bool {
+    loop {
+        if child.try_wait().expect("a child of ours").is_some() {
+            return false;
+        }
+        if ready() {
+            return true;
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
 }
 
 #[test]
@@ -36,26 +50,34 @@ fn fifty_kills_at_any_time_lose_no_finished_run_and_repeat_none() {
         let words = words(text);
         place.json(&words.iter().map(String::as_str).collect::<Vec<_>>())
     };
+    let began = Instant::now();
     run(&sweep("whole"));
+    let a_sweep = began.elapsed();
     let whole = std::fs::read(place.path("whole/results.parquet")).expect("there");
     let all = finished(&place, "whole").len();
     assert_eq!(all, 48);
     let (mut kills, mut broken) = (0, 0);
-    let mut delays = delays(250);
+    let mut fractions = fractions();
     for k in 0.. {
         if kills >= 50 {
             break;
         }
         let folder = format!("d{k}");
         let mut before = Vec::new();
-        // Each sweep is killed up to three times, and then goes to its end.
-        for delay in delays.by_ref().take(3) {
+        // Each sweep is killed up to three times, and then goes to its end. The first kill comes at
+        // any time, be it before a folder is there; the others when so and so many runs are made.
+        for (again, fraction) in fractions.by_ref().take(3).enumerate() {
             let line = words(&sweep(&folder));
             let mut child = place.start(&line.iter().map(String::as_str).collect::<Vec<_>>());
-            std::thread::sleep(delay);
+            let started = Instant::now();
+            let runs = before.len() + (fraction * (all - before.len()) as f64) as usize;
+            let moment = || match again {
+                0 => started.elapsed() >= a_sweep.mul_f64(fraction),
+                _ => finished(&place, &folder).len() > runs,
+            };
+            kills += usize::from(runs_until(&mut child, moment));
             child.kill().expect("killed or over");
             child.wait().expect("gone");
-            kills += 1;
             let after = finished(&place, &folder);
             assert_eq!(after[..before.len()], before, "a finished run was lost");
             broken += usize::from(!after.is_empty() && after.len() < all);
@@ -70,7 +92,7 @@ fn fifty_kills_at_any_time_lose_no_finished_run_and_repeat_none() {
         assert!(results.expect("there") == whole, "after kills the table differs");
     }
     println!("{kills} kills, {broken} of them between the first and the last run");
-    assert!(broken >= 5, "kills must meet sweeps at work: {broken} of {kills} did");
+    assert!(broken >= 10, "kills must meet sweeps at work: {broken} of {kills} did");
 }
 
 #[test]
