@@ -463,6 +463,16 @@ impl<const D: usize> Bounds<D> {
         }
     }
 
+    /// Whether all of the other box is in this one.
+    #[inline]
+    pub fn contains(&self, other: &Self) -> bool {
+        let mut contains = true;
+        for i in 0..D {
+            contains &= self.lo[i] <= other.lo[i] && self.hi[i] >= other.hi[i];
+        }
+        contains
+    }
+
     /// Whether the boxes touch.
     #[inline]
     pub fn meets(&self, other: &Self) -> bool {

@@ -1,7 +1,8 @@
 //! Which parts of the chain itself are near: a tree of boxes over the rods.
 //!
 //! Neighbors along the chain are neighbors in space, so the tree over the index needs no sorting
-//! and never changes its shape; a rod that moves updates its box and those above it.
+//! and never changes its shape. A rod that moves has its own box at once; those above it grow as
+//! far as they must and shrink when the tree is built anew, which every motion does.
 
 use super::geometry::Bounds;
 
@@ -42,12 +43,11 @@ impl<const D: usize> OwnBody<D> {
     /// A rod is elsewhere.
     pub(super) fn set(&mut self, rod: usize, bounds: Bounds<D>) {
         self.rods[rod] = bounds;
-        let leaf = rod / LEAF;
-        let mut node = self.leaves + leaf;
-        self.nodes[node] = self.around_leaf(leaf);
-        while node > 1 {
+        let mut node = self.leaves + rod / LEAF;
+        // A node that holds the box is held by all above it.
+        while node > 0 && !self.nodes[node].contains(&bounds) {
+            self.nodes[node] = self.nodes[node].joined(&bounds);
             node /= 2;
-            self.nodes[node] = self.nodes[2 * node].joined(&self.nodes[2 * node + 1]);
         }
     }
 

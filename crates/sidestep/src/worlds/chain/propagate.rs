@@ -257,7 +257,10 @@ impl<const D: usize> Propagator<D> {
         self.work.all_lengths = false;
         let followed = self.follow(chain, obstacles, head, direction);
         let Some(first) = direction.next(head, chain.points().len()) else { return followed };
-        if followed.is_ok() || self.rules.rotation != Rotation::Union {
+        if followed.is_ok()
+            || self.rules.rotation != Rotation::Union
+            || !may_go_elsewhere(chain, head, direction)
+        {
             return followed;
         }
         self.take_back(chain, first, direction);
@@ -438,6 +441,16 @@ pub(super) enum Direction {
     Up,
     /// To lower ones.
     Down,
+}
+
+/// Whether a second look finds slaves more places: rods of other lengths, and in the plane also
+/// the other side.
+fn may_go_elsewhere<const D: usize>(chain: &Chain<D>, head: usize, direction: Direction) -> bool {
+    let rods = match direction {
+        Direction::Up => &chain.rods()[head..],
+        Direction::Down => &chain.rods()[..head],
+    };
+    D == 2 || rods.iter().any(|rod| rod.min_m < rod.max_m)
 }
 
 impl Direction {
