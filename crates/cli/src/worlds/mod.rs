@@ -55,7 +55,7 @@ macro_rules! delegates_simulation {
 
 mod airspace;
 pub(crate) mod chain;
-mod robots;
+pub(crate) mod robots;
 
 pub(crate) use robots::shade;
 

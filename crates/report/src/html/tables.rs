@@ -84,10 +84,10 @@ pub(super) fn claims(claims: &[Claim]) -> Markup {
     let heads = html! {
         th scope="col" { "claim" }
         th scope="col" { "verdict" }
-        th scope="col" { "the paper, in our words" }
-        @if has_figure { th scope="col" { "the paper's figure" } }
-        th scope="col" { "our figures" }
-        th scope="col" { "why" }
+        th scope="col" .words { "the paper, in our words" }
+        @if has_figure { th scope="col" .papers { "the paper's figure" } }
+        th scope="col" .ours { "our figures" }
+        th scope="col" .why { "why" }
     };
     let rows = html! {
         @for claim in claims {

@@ -6,7 +6,7 @@
 //! are judged here. Both deployments choose the same controls, so flights are the same.
 
 use super::claim::{self, Claim, Verdict};
-use super::document::{Block, Document, Text};
+use super::document::{Block, Document, Experiment, Text};
 use super::figure::{Figure, FigureKind, Point, Series, Table};
 use super::{Estimate, farm};
 use crate::scenario::Source;
@@ -418,8 +418,16 @@ impl Report {
             document.warning(Text::marked(claim::REHEARSAL));
         }
         document.section("Claims").push(Block::Claims(self.claims.clone()));
-        document.section("Results").tables([self.table()]);
-        document.figures(self.figures().into_iter().map(Figure::with_intervals_told));
+        document.experiment(Experiment {
+            title: "Results",
+            about: "Airplanes on a circle fly towards its other side and would all meet in the \
+                    middle. They choose how to turn by probability collectives, every time anew: \
+                    as a team of agents that send messages (`team`), or by one coordinator that \
+                    migrates from airplane to airplane (`pim`). Both choose the same, so flights are \
+                    the same, and time, messages and bytes tell them apart.",
+            figures: self.figures(),
+            tables: vec![self.table()],
+        });
         let quick = if plan.quick { " --quick" } else { "" };
         let command =
             format!("sidestep reproduce agentfly{quick} --seeds {} --out DIR", plan.seeds);

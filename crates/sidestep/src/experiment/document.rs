@@ -40,6 +40,19 @@ pub enum Block {
     Claims(Vec<Claim>),
 }
 
+/// One experiment of a report: what was done, and what came of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Experiment {
+    /// Its name.
+    pub title: &'static str,
+    /// What was run, and what to look for. Marked as [`Text::marked`] reads it.
+    pub about: &'static str,
+    /// Its figures.
+    pub figures: Vec<Figure>,
+    /// Its numbers.
+    pub tables: Vec<Table>,
+}
+
 /// Text to be kept as it is.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Code {
@@ -183,6 +196,12 @@ impl Document {
     /// Appends commands to type.
     pub fn commands(&mut self, title: impl Into<String>, text: impl Into<String>) -> &mut Self {
         self.push(Block::Code(Code { title: title.into(), language: "sh", text: text.into() }))
+    }
+
+    /// Appends a section about an experiment.
+    pub fn experiment(&mut self, of: Experiment) -> &mut Self {
+        self.section(of.title).paragraph(Text::marked(of.about));
+        self.figures(of.figures.into_iter().map(Figure::with_intervals_told)).tables(of.tables)
     }
 
     /// Appends tables.

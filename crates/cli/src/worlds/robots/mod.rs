@@ -1,7 +1,7 @@
 //! The robots world as the command sees it.
 
 mod contents;
-mod picture;
+pub(crate) mod picture;
 mod poses;
 
 pub(crate) use picture::shade;

@@ -29,22 +29,34 @@ const MOST_SHARED: f64 = 0.3;
 
 /// The state of `simulation` with the tracks that led to it.
 pub(super) fn svg(simulation: &RobotsSimulation, of: Pictured<'_>) -> Result<String, Failure> {
-    let snapshot = simulation.snapshot();
-    let robots = robots(simulation.world());
-    let shown = evenly_chosen(&robots, MOST_TRACKS);
     let ways = match of.folder.filter(|f| has_rows(f, poses::TABLE)) {
-        Some(folder) => Ways::read(simulation, folder, &shown)?.shortened(simulation.world()),
+        Some(folder) => Ways::read(simulation, folder, &shown(simulation.world()))?,
         None => Ways::default(),
     };
-    let tracks: Vec<Track> =
-        ways.of.iter().map(|(id, way)| track(simulation.world(), *id, way)).collect();
-    let scene = GridScene {
-        caption: caption(tracks.len(), robots.len(), ways.from..simulation.cycle(), of.origin),
-        tracks,
-        title: simulation.compiled().name.clone(),
-        ..scene(simulation.world(), &snapshot, &shown)
-    };
+    let title = simulation.compiled().name.clone();
+    let scene = GridScene { title, ..with_ways(simulation, ways, of.origin) };
     Ok(to_svg(&scene, &Style::MAP)?)
+}
+
+/// The state of `simulation` with the last part of some of the `ways` that led to it, and a
+/// caption about them that ends with `origin`.
+pub(crate) fn with_ways(simulation: &RobotsSimulation, mut ways: Ways, origin: &str) -> GridScene {
+    let world = simulation.world();
+    let shown = shown(world);
+    ways.of.retain(|(id, _)| shown.contains(id));
+    let ways = ways.shortened(world);
+    let tracks: Vec<Track> = ways.of.iter().map(|(id, way)| track(world, *id, way)).collect();
+    let cycles = ways.from..simulation.cycle();
+    GridScene {
+        caption: caption(tracks.len(), world.robots().len(), cycles, origin),
+        tracks,
+        ..scene(world, &simulation.snapshot(), &shown)
+    }
+}
+
+/// Entity ids of the robots that have a color.
+fn shown(world: &RobotsWorld) -> Vec<u32> {
+    evenly_chosen(world.robots(), MOST_TRACKS)
 }
 
 /// Map, doors and bodies.
@@ -95,11 +107,6 @@ fn add_body(
     scene.bodies.push(BodyRect { col, row, width, height, heading, shade });
 }
 
-/// Entity ids of the robots.
-fn robots(world: &RobotsWorld) -> Vec<u32> {
-    world.robots().to_vec()
-}
-
 /// At most `most` of `ids`, at equal steps, the first among them.
 fn evenly_chosen(ids: &[u32], most: usize) -> Vec<u32> {
     let chosen = ids.len().min(most);
@@ -108,13 +115,15 @@ fn evenly_chosen(ids: &[u32], most: usize) -> Vec<u32> {
 
 /// The ways of some robots up to now: places, and the headings in which they were left.
 #[derive(Debug, Clone, Default, PartialEq)]
-struct Ways {
-    from: Cycle,
-    of: Vec<(u32, Vec<Place>)>,
+pub(crate) struct Ways {
+    /// The cycle at which they begin.
+    pub(crate) from: Cycle,
+    /// By entity id.
+    pub(crate) of: Vec<(u32, Vec<Place>)>,
 }
 
 /// Column and row, and the heading.
-type Place = ((u32, u32), u32);
+pub(crate) type Place = ((u32, u32), u32);
 
 impl Ways {
     /// Reads the recorded poses of the last [`LENGTHS`]`[0]` cycles.

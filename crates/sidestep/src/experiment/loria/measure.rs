@@ -163,16 +163,27 @@ pub fn measure_all(
 
 /// Runs one variant once, on one worker.
 pub fn measure(variant: &Variant, behaviours: &Behaviours, seed: u64, cycles: u64) -> Outcome {
+    let (simulation, tracks) = recorded(variant, behaviours, seed, cycles);
+    outcome(&simulation, &tracks)
+}
+
+/// A variant's run at its end, and the poses of its robots by entity id.
+pub(super) fn recorded(
+    variant: &Variant,
+    behaviours: &Behaviours,
+    seed: u64,
+    cycles: u64,
+) -> (RobotsSimulation, Vec<Track>) {
     let source = Source::new("reproduce loria", variant.scenario(seed), "");
     let compiled = Compiled::new(&source, behaviours, StorageOrder::Spatial)
         .expect("the experiments' scenarios are valid");
     let mut simulation = RobotsSimulation::from_compiled(compiled, &source, 1);
     let tracks = record(&mut simulation, cycles);
-    outcome(&simulation, &tracks)
+    (simulation, tracks)
 }
 
 /// Column, row and heading by cycle.
-type Track = Vec<(i32, i32, u8)>;
+pub(super) type Track = Vec<(u32, u32, u8)>;
 
 /// Runs and keeps the poses of the robots, by entity id.
 fn record(simulation: &mut RobotsSimulation, cycles: u64) -> Vec<Track> {
@@ -198,7 +209,7 @@ fn append(tracks: &mut [Track], recorder: &MemoryRecorder) {
     let places = column("col_boxes").iter().zip(column("row_boxes")).zip(column("heading"));
     for (&body, ((&col, &row), &heading)) in column("body").iter().zip(places) {
         if let Some(track) = tracks.get_mut(body as usize) {
-            track.push((col as i32, row as i32, heading as u8));
+            track.push((col, row, heading as u8));
         }
     }
 }
@@ -228,9 +239,9 @@ fn straightness(tracks: &[Track]) -> Option<f64> {
     crate::statistics::mean(&shares)
 }
 
-fn straightness_of(window: &[(i32, i32, u8)]) -> Option<f64> {
-    let distance = |a: (i32, i32, u8), b: (i32, i32, u8)| {
-        let (dx, dy) = (f64::from(b.0 - a.0), f64::from(b.1 - a.1));
+fn straightness_of(window: &[(u32, u32, u8)]) -> Option<f64> {
+    let distance = |a: (u32, u32, u8), b: (u32, u32, u8)| {
+        let (dx, dy) = (f64::from(b.0.abs_diff(a.0)), f64::from(b.1.abs_diff(a.1)));
         (dx * dx + dy * dy).sqrt()
     };
     let path: f64 = window.windows(2).map(|pair| distance(pair[0], pair[1])).sum();
@@ -239,8 +250,8 @@ fn straightness_of(window: &[(i32, i32, u8)]) -> Option<f64> {
 }
 
 /// Moves between two cycles that lead aside from the heading before.
-fn lateral_moves(track: &[(i32, i32, u8)]) -> u64 {
-    let aside = |pair: &&[(i32, i32, u8)]| {
+fn lateral_moves(track: &[(u32, u32, u8)]) -> u64 {
+    let aside = |pair: &&[(u32, u32, u8)]| {
         let ((x, y, heading), (u, v, _)) = (pair[0], pair[1]);
         if heading % 2 == 0 { v != y } else { u != x }
     };
@@ -256,7 +267,7 @@ mod tests {
         let line: Track = (0..42).map(|x| (x, 0, 0)).collect();
         assert_eq!(straightness(std::slice::from_ref(&line)), Some(1.0));
         assert_eq!(lateral_moves(&line), 0);
-        let stairs: Track = (0..42).map(|k| ((k + 1) / 2, k / 2, 0)).collect();
+        let stairs: Track = (0..42u32).map(|k| (k.div_ceil(2), k / 2, 0)).collect();
         let share = straightness(std::slice::from_ref(&stairs)).unwrap();
         assert!((share - 0.5_f64.sqrt()).abs() < 1e-3, "{share}");
         assert_eq!(lateral_moves(&stairs), 20);

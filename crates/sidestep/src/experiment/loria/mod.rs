@@ -9,6 +9,7 @@
 //! floor.rs, patrol.rs, errors.rs   the buildings, the behaviours, the error tables
 //! measure.rs   -> reliability.rs, genericity.rs               what runs come to
 //! timing.rs    -> performance.rs, strategies.rs, cost_model.rs   how long they take
+//! scenes.rs                        where robots go, as a picture shows it
 //! claims.rs                                                   what follows from all that
 //! ```
 
@@ -21,13 +22,13 @@ pub mod measure;
 pub mod patrol;
 pub mod performance;
 pub mod reliability;
+pub mod scenes;
 pub mod strategies;
 pub mod timing;
 
 use super::claim::{REHEARSAL, tally};
-use super::document::{Block, Document, Text};
+use super::document::{Block, Document, Experiment, Picture, Text};
 use super::farm::Progress;
-use super::{Figure, Table};
 use claims::Claim;
 use cost_model::CostModel;
 use genericity::Genericity;
@@ -222,22 +223,60 @@ fn stage(progress: &mut Progress<'_>, from: f64, to: f64) -> impl FnMut(&str, f6
 }
 
 impl Report {
-    /// The experiments by name, with their tables and figures.
-    fn sections(&self) -> [(&'static str, Vec<Table>, Vec<Figure>); 5] {
-        let (reliability, performance) = (&self.reliability, &self.performance);
-        let (genericity, strategies) = (&self.genericity, &self.strategies);
-        let cost_model = &self.cost_model;
+    /// The experiments in the order of the report.
+    fn experiments(&self) -> [Experiment; 5] {
+        let (performance, cost_model) = (&self.performance, &self.cost_model);
         [
-            ("Reliability", reliability.tables(), reliability.figures()),
-            ("Genericity", vec![genericity.table()], vec![genericity.figure()]),
-            ("Performance", performance.tables(), performance.figures()),
-            ("Rejected strategies", vec![strategies.table()], strategies.figures()),
-            ("Cost model", vec![cost_model.table()], vec![cost_model.figure()]),
+            Experiment {
+                title: "Reliability",
+                about: "Robots go to and fro along the corridors of an office floor, among people \
+                        and doors, under each of the four regimes: all reliable; errors of \
+                        effectors, of sensors, or of both. Runs of one seed begin alike and share \
+                        every draw that the regime does not change. `rule` is what an effector does \
+                        that would end in a wall: `cut` stops before it, `stay` does not move, \
+                        `renormalise` chooses among what is free. Sensors and effectors are then \
+                        compared at equal error level, because a preset makes either look worse.",
+                figures: self.reliability.figures(),
+                tables: self.reliability.tables(),
+            },
+            Experiment {
+                title: "Genericity",
+                about: "The same floor with robots of 1 to 5 boxes a side, with and without a \
+                        camera beside the sonar ring. Only the scenario differs, no source.",
+                figures: vec![self.genericity.figure()],
+                tables: vec![self.genericity.table()],
+            },
+            Experiment {
+                title: "Performance",
+                about: "The time of all cycles, recorded to disk as in the paper or not, with 1 to \
+                        as many workers as the machine has processors, for few and many robots and \
+                        cheap and dear decisions. Runs of all worker counts take turns, and mere \
+                        arithmetic takes its turn too: its speed-up is what the machine could give \
+                        at that moment.",
+                figures: performance.figures(),
+                tables: performance.tables(),
+            },
+            Experiment {
+                title: "Rejected strategies",
+                about: "The double pool beside the two strategies that the paper rejects: a part of \
+                        the floor for each worker, and a process for each agent, whose actions one \
+                        lock makes serial.",
+                figures: self.strategies.figures(),
+                tables: vec![self.strategies.table()],
+            },
+            Experiment {
+                title: "Cost model",
+                about: "The paper's model of a cycle's time, fitted to measured phases of runs that \
+                        differ in robots, people, crowding and size of bodies. Where points \
+                        lie on the diagonal the model foretells the time.",
+                figures: vec![cost_model.figure()],
+                tables: vec![cost_model.table()],
+            },
         ]
     }
 
-    /// The report, the claims first.
-    pub fn document(&self) -> Document {
+    /// The report, the claims first; `pictures` are those of the [scenes](scenes::all), drawn.
+    pub fn document(&self, pictures: Vec<Picture>) -> Document {
         let plan = &self.plan;
         let lead = format!(
             "{} The paper's tables are lost; every number here is ours. Version {}; seeds 1 to {} \
@@ -254,9 +293,11 @@ impl Report {
             document.warning(Text::marked(REHEARSAL));
         }
         document.section("Claims").push(Block::Claims(self.claims.clone()));
-        for (name, tables, figures) in self.sections() {
-            document.section(name).figures(figures.into_iter().map(Figure::with_intervals_told));
-            document.tables(tables);
+        if !pictures.is_empty() {
+            document.section("Pictures").pictures(pictures);
+        }
+        for experiment in self.experiments() {
+            document.experiment(experiment);
         }
         document.section("How to run it again").commands("In a shell", self.command());
         document
@@ -290,11 +331,11 @@ mod tests {
             assert!(!claim.ours.is_empty() && !claim.reason.is_empty(), "{id}");
         }
         assert!(report.strategies.all_valid() && report.performance.is_deterministic());
-        let document = report.document();
+        let document = report.document(Vec::new());
         assert!(document.blocks.iter().any(|block| matches!(block, Block::Warning(_))));
         let text = format!("{document:?}");
         assert!(text.contains("E-9") && !text.contains("NaN"));
-        for figure in report.sections().into_iter().flat_map(|(_, _, figures)| figures) {
+        for figure in report.experiments().into_iter().flat_map(|e| e.figures) {
             assert!(!figure.series.is_empty(), "{}", figure.title);
             assert!(figure.series.iter().any(|s| !s.points.is_empty()), "{}", figure.title);
         }

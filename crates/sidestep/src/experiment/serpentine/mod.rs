@@ -31,9 +31,8 @@ pub mod snake;
 pub use runs::Share;
 
 use super::claim::{Claim, REHEARSAL, tally};
-use super::document::{Block, Document, Picture, Text};
+use super::document::{Block, Document, Experiment, Picture, Text};
 use super::farm::Progress;
-use super::{Figure, Table};
 use serde::Serialize;
 use sidestep_kernel::InputError;
 use sidestep_kernel::workers::available;
@@ -90,7 +89,7 @@ pub struct Plan {
 }
 
 impl Default for Plan {
-    /// Some minutes on two processors.
+    /// Half an hour on two processors, most of it for snakes among balls that fly.
     fn default() -> Self {
         Self {
             seeds: 10,
@@ -238,23 +237,86 @@ fn stage(progress: &mut Progress<'_>, from: f64, to: f64) -> impl FnMut(&str, f6
 }
 
 impl Report {
-    /// The experiments by name, with their figures and tables.
-    fn sections(&self) -> Vec<(&'static str, Vec<Figure>, Vec<Table>)> {
-        let one = |figure: Figure, table: Table| (vec![figure], vec![table]);
-        let (scaling, initiators) = (&self.scaling, &self.initiators);
-        let sections = [
-            ("The swarm in the corridor", (self.corridor.figures(), vec![self.corridor.table()])),
-            ("Rules of rotation", one(self.rotations.figure(), self.rotations.table())),
-            ("A robot in the open", one(self.fields.figure(), self.fields.table())),
-            ("A chain that goes back", one(self.pushing.figure(), self.pushing.table())),
-            ("Obstacles that move", one(self.movers.figure(), self.movers.table())),
-            ("A snake in space", (Vec::new(), vec![self.snakes.table()])),
-            ("What motions cost", (vec![scaling.figure()], scaling.tables().into())),
-            ("Broken chains", (Vec::new(), vec![self.broken.table()])),
-            ("Targets of tips", one(self.postures.figure(), self.postures.table())),
-            ("Who begins, and who objects", (Vec::new(), initiators.tables().into())),
-        ];
-        sections.map(|(name, (figures, tables))| (name, figures, tables)).into()
+    /// The experiments in the order of the report.
+    fn experiments(&self) -> [Experiment; 10] {
+        let (scaling, corridor) = (&self.scaling, &self.corridor);
+        [
+            Experiment {
+                title: "The swarm in the corridor",
+                about: "A leader finds its way through a winding corridor by a laser, and a line of \
+                        robots on wheels follows as a snake: corridors of several widths, several \
+                        numbers of followers, and three readings of when a wall is being left.",
+                figures: corridor.figures(),
+                tables: vec![corridor.table()],
+            },
+            Experiment {
+                title: "Rules of rotation",
+                about: "What a rod does that would hit a wall: turn until it is free of everything, \
+                        turn once to the tangent as the slides say, or do not turn. How deep parts \
+                        get into walls tells the rules apart, the more so the longer the steps.",
+                figures: vec![self.rotations.figure()],
+                tables: vec![self.rotations.table()],
+            },
+            Experiment {
+                title: "A robot in the open",
+                about: "The leader alone among discs that stand or move, its target in the opposite \
+                        corner: readings of leaving a wall, with and without the rule that a free \
+                        way to the target ends the following of a wall.",
+                figures: vec![self.fields.figure()],
+                tables: vec![self.fields.table()],
+            },
+            Experiment {
+                title: "A chain that goes back",
+                about: "In a straight corridor a chain is pushed back by its head or pulled back by \
+                        its tail, until some part objects or all of the way is gone.",
+                figures: vec![self.pushing.figure()],
+                tables: vec![self.pushing.table()],
+            },
+            Experiment {
+                title: "Obstacles that move",
+                about: "Discs run into a chain that rests or wanders, slower and faster than it: \
+                        without a reaction, with one when touched, and with one before that.",
+                figures: vec![self.movers.figure()],
+                tables: vec![self.movers.table()],
+            },
+            Experiment {
+                title: "A snake in space",
+                about: "A chain of hundreds of connectors creeps at random among balls that stand \
+                        and balls that fly, every part of it looked at in every step.",
+                figures: Vec::new(),
+                tables: vec![self.snakes.table()],
+            },
+            Experiment {
+                title: "What motions cost",
+                about: "Processor time of one motion by the length of the chain, by how much of it \
+                        the motion reaches, and by obstacles that nobody is near to.",
+                figures: vec![scaling.figure()],
+                tables: scaling.tables().into(),
+            },
+            Experiment {
+                title: "Broken chains",
+                about: "Chains whose middle parts are thrown about, or partly gone, are joined again \
+                        between their two whole ends.",
+                figures: Vec::new(),
+                tables: vec![self.broken.table()],
+            },
+            Experiment {
+                title: "Targets of tips",
+                about: "Inverse kinematics by the chain's own rules: the tip is pulled to a target \
+                        while the base objects, while it is free, and there and back; damped least \
+                        squares stand beside it.",
+                figures: vec![self.postures.figure()],
+                tables: vec![self.postures.table()],
+            },
+            Experiment {
+                title: "Who begins, and who objects",
+                about: "Every connector of a chain in space begins a motion in turn: with nothing \
+                        fixed, with one end fixed, with parts that have failed, and with limits to \
+                        how sharply the chain may bend.",
+                figures: Vec::new(),
+                tables: self.initiators.tables().into(),
+            },
+        ]
     }
 
     /// The report, the claims first; `pictures` are those of the [scenes](Self::scenes), drawn.
@@ -278,9 +340,8 @@ impl Report {
         if !pictures.is_empty() {
             document.section("Pictures").pictures(pictures);
         }
-        for (name, figures, tables) in self.sections() {
-            document.section(name).figures(figures.into_iter().map(Figure::with_intervals_told));
-            document.tables(tables);
+        for experiment in self.experiments() {
+            document.experiment(experiment);
         }
         let quick = if plan.quick { " --quick" } else { "" };
         let seeds = plan.seeds;
