@@ -1,6 +1,7 @@
 //! What the command prints: results on standard output, everything else on standard error.
 
 use serde::Serialize;
+use sidestep::experiment::Table;
 use std::fmt::Display;
 use std::io::{IsTerminal, Write};
 
@@ -93,6 +94,26 @@ pub(crate) fn grouped(number: u64) -> String {
 pub(crate) fn aligned(rows: &[(String, String)]) -> String {
     let width = rows.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0);
     rows.iter().map(|(name, value)| format!("  {name:<width$}  {value}\n")).collect()
+}
+
+/// A table in columns, numbers to the right; what its cells say is left as it is.
+pub(crate) fn in_columns(table: &Table) -> String {
+    let rows: Vec<Vec<&str>> = table.rows.iter().map(|row| table.cells(row).collect()).collect();
+    let head: Vec<&str> = table.columns.iter().map(String::as_str).collect();
+    let width = |k: usize| {
+        let all = std::iter::once(&head).chain(&rows);
+        all.map(|row| row[k].chars().count()).max().unwrap_or(0)
+    };
+    let widths: Vec<usize> = (0..head.len()).map(width).collect();
+    let line = |row: &Vec<&str>| {
+        let cell = |(k, text): (usize, &&str)| match k {
+            0 => format!("{text:<width$}", width = widths[k]),
+            _ => format!("{text:>width$}", width = widths[k]),
+        };
+        let cells: Vec<String> = row.iter().enumerate().map(cell).collect();
+        format!("  {}\n", cells.join("   ").trim_end())
+    };
+    std::iter::once(&head).chain(&rows).map(line).collect()
 }
 
 /// Seconds as people say them: `0.83 s`, `4 min 12 s`, `2 h 05 min`.

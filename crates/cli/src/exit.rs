@@ -37,6 +37,9 @@ pub(crate) enum Failure {
     /// A picture could not be drawn.
     #[error("the picture cannot be drawn: {0}")]
     Draw(#[from] DrawError),
+    /// Stopped by Ctrl-C before there was anything to keep.
+    #[error("interrupted; nothing was written")]
+    Interrupted,
     /// Anything else that stopped the work, with what helps.
     #[error("{cause}\n  help: {remedy}")]
     Stopped {
@@ -63,6 +66,7 @@ impl Failure {
     pub(crate) fn exit_code(&self) -> ExitCode {
         match self {
             Self::Input(_) => ExitCode::WrongInput,
+            Self::Interrupted => ExitCode::Interrupted,
             Self::Record(_) | Self::Draw(_) | Self::Stopped { .. } => ExitCode::Failed,
         }
     }

@@ -4,12 +4,16 @@ use crate::exit::{ExitCode, Failure};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 static REQUESTED: AtomicBool = AtomicBool::new(false);
+static LISTENING: AtomicBool = AtomicBool::new(false);
 
 /// From now on Ctrl-C (and a termination signal) is noted instead of killing the process.
 ///
 /// # Errors
 /// When the system does not let signals be caught.
 pub(crate) fn listen() -> Result<(), Failure> {
+    if LISTENING.swap(true, Ordering::Relaxed) {
+        return Ok(());
+    }
     catch(|| {
         if REQUESTED.swap(true, Ordering::Relaxed) {
             std::process::exit(ExitCode::Interrupted as i32);

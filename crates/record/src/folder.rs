@@ -259,7 +259,11 @@ pub(crate) fn check_vacant(path: &Path, existing: Existing) -> Result<(), InputE
             "resume that run, name another folder, or ask for the old run to be replaced",
         ),
         (true, false, _) => {
-            refuse("the folder holds something else than a run", "name a new or empty folder")
+            let what = match crate::sweep::SweepFolder::<()>::is_at(path) {
+                true => "the folder holds a sweep",
+                false => "the folder holds something else than a run",
+            };
+            refuse(what, "name a new or empty folder")
         }
     }
 }

@@ -105,6 +105,13 @@ impl Source {
     /// # Errors
     /// When either is missing or the format is another.
     pub fn preamble(&self) -> Result<Preamble, InputError> {
+        if let Ok(table) = self.text.parse::<toml::Table>()
+            && table.contains_key("scenario")
+            && !table.contains_key("world")
+        {
+            let remedy = "run it with `sidestep sweep`, or name the scenario that it names";
+            return Err(self.error(None, "this is a sweep, not a scenario", remedy));
+        }
         let preamble: Preamble = self.parse()?;
         if *preamble.format.get_ref() == FORMAT {
             return Ok(preamble);
@@ -158,7 +165,10 @@ fn explain(message: &str) -> (String, String) {
     {
         return (format!("the key `{missing}` is missing"), format!("add `{missing} = ...`"));
     }
-    (message.replace('\n', " "), "see `sidestep new robots` for a commented example".into())
+    (
+        message.replace('\n', " "),
+        "see what `sidestep new robots` (or airspace, chain) writes".into(),
+    )
 }
 
 fn quoted(text: &str) -> Vec<&str> {

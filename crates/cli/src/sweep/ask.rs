@@ -25,7 +25,7 @@ pub(crate) struct ManyArgs {
     pub(crate) until: Option<Until>,
 
     /// Runs of each variant at most, with --until [default: 1000]
-    #[arg(long, value_name = "N", requires = "until", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub(crate) max: Option<u32>,
 
     /// Report these metrics, and apply --until to them [default: all that vary]
@@ -56,6 +56,7 @@ impl ManyArgs {
             (!self.metrics.is_empty(), "--metrics"),
             (!self.baseline.is_empty(), "--baseline"),
             (self.record_runs, "--record-runs"),
+            (self.max.is_some(), "--max"),
         ];
         let Some((_, option)) = given.into_iter().find(|(is_given, _)| *is_given) else {
             return Ok(());
@@ -75,15 +76,26 @@ impl ManyArgs {
             sweep.design.factors.push(Factor::parse(text)?);
         }
         if let Some(until) = &self.until {
-            sweep.until = Some(until.clone());
-            sweep.replicates = self.max.unwrap_or(MAX_RUNS);
-        } else if let Some(n) = self.replicate {
+            // What else the file says of it stays.
+            let metrics = sweep.until.take().map(|of_file| of_file.metrics);
+            sweep.replicates = if metrics.is_some() { sweep.replicates } else { MAX_RUNS };
+            sweep.until = Some(Until { metrics: metrics.unwrap_or_default(), ..until.clone() });
+        }
+        if let Some(n) = self.replicate {
             (sweep.until, sweep.replicates) = (None, n);
+        }
+        if let Some(max) = self.max {
+            if sweep.until.is_none() {
+                let cause = "it bounds the runs of a sweep that goes on until it is precise";
+                return Err(InputError::new("--max", cause, "give --until ci=0.05 as well"));
+            }
+            sweep.replicates = max;
         }
         if !self.metrics.is_empty() {
             sweep.metrics.clone_from(&self.metrics);
         }
-        if let Some(until) = sweep.until.as_mut().filter(|until| until.metrics.is_empty()) {
+        let applies_to = |until: &Until| until.metrics.is_empty() || !self.metrics.is_empty();
+        if let Some(until) = sweep.until.as_mut().filter(|until| applies_to(until)) {
             until.metrics.clone_from(&sweep.metrics);
         }
         if !self.baseline.is_empty() {

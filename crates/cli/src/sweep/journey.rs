@@ -1,19 +1,22 @@
 //! From a sweep to the table of its runs: in memory, in a folder, or share by share.
 
 use super::columns::{cells, from_file, share as share_of, to_file};
-use super::prepare::{Fingerprint, prepare};
+use super::prepare::prepare;
 use super::say::{Effort, say, say_share};
 use super::work::{Take, Work};
 use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
 use crate::interrupt;
 use crate::progress::Stages;
+use serde_json::json;
 use sidestep::experiment::sweep::rounds::Rounds;
-use sidestep::experiment::sweep::{Cell, Outcome, Plan, Rows, Shard, Sweep};
+use sidestep::experiment::sweep::{Cell, Outcome, Plan, Rows, RunTable, Shard, Sweep};
 use sidestep::kernel::InputError;
 use sidestep::scenario::Source;
-use sidestep_record::sweep::SweepFolder;
+use sidestep_record::sweep::{SweepFolder, fingerprint};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The folder of a sweep.
 pub(crate) type Folder = SweepFolder<Plan>;
@@ -48,6 +51,8 @@ pub(crate) fn in_memory(
     let effort = log.run_all(&work, &mut |_| Ok(()))?;
     if interrupt::requested() {
         console.note("Interrupted; nothing is kept without --out DIR.");
+        let json = json!({ "status": "interrupted", "runs": log.rows.len(), "folder": null });
+        console.result(&json, String::new);
         return Ok(ExitCode::Interrupted);
     }
     say(&plan, &log.rows.table(&plan)?, effort, None, console)
@@ -58,16 +63,20 @@ pub(crate) fn in_memory(
 /// # Errors
 /// When the sweep is wrong, or the folder taken.
 pub(crate) fn planned(sweep: &Sweep, out: &Path, console: Console) -> Result<Folder, Failure> {
+    interrupt::listen()?;
     let stages = Stages::new(console);
     let folder = Folder::create(out, VERSION, |staging| {
-        let mut fingerprint = Fingerprint::default();
+        let mut fingerprints = Vec::new();
         let plan = prepare(sweep, &stages, |k, source, compiled| {
+            if interrupt::requested() {
+                return Err(Failure::Interrupted);
+            }
             let resolved = compiled.resolve(source)?;
-            fingerprint.add(&resolved);
+            fingerprints.push(fingerprint(resolved.text.as_bytes(), &resolved.files));
             Ok(Folder::write_variant(staging, k, &resolved.text, &resolved.files)?)
         })?;
         let cells = cells(&plan);
-        Ok::<_, Failure>((plan, fingerprint.finish(), cells))
+        Ok::<_, Failure>((plan, fingerprints, cells))
     });
     stages.clear();
     folder
@@ -94,14 +103,15 @@ pub(crate) fn in_folder(
 fn the_same(sweep: &Sweep, out: &Path, console: Console) -> Result<Folder, Failure> {
     let folder = Folder::open(out)?;
     let stages = Stages::new(console);
-    let mut fingerprint = Fingerprint::default();
+    let mut fingerprints = Vec::new();
     let plan = prepare(sweep, &stages, |_, source, compiled| {
-        fingerprint.add(&compiled.resolve(source)?);
+        let resolved = compiled.resolve(source)?;
+        fingerprints.push(fingerprint(resolved.text.as_bytes(), &resolved.files));
         Ok(())
     });
     stages.clear();
     let manifest = folder.manifest();
-    if (&plan?, &fingerprint.finish()) == (&manifest.plan, &manifest.fingerprint) {
+    if (&plan?, &fingerprints) == (&manifest.plan, &manifest.fingerprints) {
         check_version(&folder)?;
         return Ok(folder);
     }
@@ -179,10 +189,13 @@ pub(crate) fn share(
     };
     let Some(mut journal) = journal else {
         console.note(format!("Share {shard} is finished already."));
-        return Ok(ExitCode::Done);
+        return say_share(&finished_of(folder, shard)?, shard, Effort::default(), folder, console);
     };
     interrupt::listen()?;
-    let cells: Vec<Cell> = plan.share(shard).collect();
+    // Shares of another count, or a sweep that went on here, may have made some of its runs.
+    let mut elsewhere = BTreeSet::new();
+    gather(folder, Some(shard), |outcome| _ = elsewhere.insert(outcome.cell))?;
+    let cells: Vec<Cell> = plan.share(shard).filter(|c| !elsewhere.contains(&c.id)).collect();
     let mut effort = Effort::default();
     with_work(folder, workers, console, |work| {
         let mut keep = |outcome: &Outcome| Ok(journal.append(outcome)?);
@@ -196,6 +209,22 @@ pub(crate) fn share(
     let table = log.rows.table(plan)?;
     folder.end_share(share_of(shard), journal, &to_file(table.clone()))?;
     say_share(&table, shard, effort, folder, console)
+}
+
+/// The finished runs of the cells of a share, whoever made them.
+fn finished_of(folder: &Folder, shard: Shard) -> Result<RunTable, Failure> {
+    let own: BTreeSet<u64> = folder.plan().share(shard).map(|c| c.id).collect();
+    let mut rows = Rows::default();
+    let mut take = |outcome: Outcome| {
+        if own.contains(&outcome.cell) {
+            rows.push(outcome);
+        }
+    };
+    match folder.is_complete() {
+        true => from_file(folder.results()?).outcomes(&mut take),
+        false => gather(folder, None, &mut take)?,
+    }
+    Ok(rows.table(folder.plan())?)
 }
 
 /// Joins the shares into one table.
@@ -245,9 +274,18 @@ fn with_work(
     console: Console,
     run: impl FnOnce(&Work<'_>) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
-    let source = |variant: u32| Source::read(&folder.scenario(variant), &[]);
-    let place = |cell: u64| -> PathBuf { folder.run_folder(cell) };
     let plan = folder.plan();
+    let checked: Vec<AtomicBool> = plan.variants.iter().map(|_| AtomicBool::new(false)).collect();
+    let source = |variant: u32| {
+        // Runs of a scenario that somebody has changed would be runs of another sweep.
+        let checked = &checked[variant as usize];
+        if !checked.load(Ordering::Relaxed) {
+            folder.check_variant(variant)?;
+            checked.store(true, Ordering::Relaxed);
+        }
+        Source::read(&folder.scenario(variant), &[])
+    };
+    let place = |cell: u64| -> PathBuf { folder.run_folder(cell) };
     let record: Option<&(dyn Fn(u64) -> PathBuf + Sync)> =
         if plan.record { Some(&place) } else { None };
     run(&Work { plan, source: &source, record, workers, console })
@@ -268,6 +306,8 @@ fn interrupted(folder: &Folder, finished: usize, console: Console) -> ExitCode {
     let (all, path) = (folder.plan().len(), folder.path().display());
     let of = if folder.plan().until.is_some() { String::new() } else { format!(" of {all}") };
     console.note(format!("{finished}{of} runs are finished; `sidestep resume {path}` goes on."));
+    let json = json!({ "status": "interrupted", "runs": finished, "folder": folder.path() });
+    console.result(&json, String::new);
     ExitCode::Interrupted
 }
 

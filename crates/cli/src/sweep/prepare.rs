@@ -5,8 +5,8 @@ use crate::plan::source_of;
 use crate::progress::Stages;
 use sidestep::experiment::sweep::cell::metric_names;
 use sidestep::experiment::sweep::{Plan, Setting, Sweep, Variant};
-use sidestep::kernel::{Digest, InputError};
-use sidestep::scenario::{Resolved, Source, nearest};
+use sidestep::kernel::InputError;
+use sidestep::scenario::{Source, nearest};
 use sidestep::worlds::any::AnyCompiled;
 
 /// Compiles every variant, hands it to `each` with its number, and makes the plan.
@@ -21,6 +21,7 @@ pub(super) fn prepare(
     let fixed: Vec<String> = sweep.fixed.iter().map(Setting::to_override).collect();
     let base = source_of(&sweep.scenario, &fixed)?;
     let variants = sweep.design.variants(&sweep.place)?;
+    Plan::check_size(variants.len(), sweep.replicates, &sweep.place)?;
     let (mut agents, mut first) = (0, None);
     let count = variants.len();
     for (k, settings) in (0u32..).zip(&variants) {
@@ -70,23 +71,4 @@ fn variant(base: &Source, settings: &[Setting]) -> Result<(Source, AnyCompiled),
         let error = InputError::new(place, e.cause(), e.remedy());
         e.position().map_or(error.clone(), |(line, column)| error.at(line, column))
     })
-}
-
-/// A digest of the scenarios of all variants, and of the files they name.
-#[derive(Debug, Default)]
-pub(super) struct Fingerprint(String);
-
-impl Fingerprint {
-    /// Adds the scenario of the next variant.
-    pub(super) fn add(&mut self, resolved: &Resolved) {
-        let files = resolved.files.iter().map(|(_, bytes)| bytes.as_slice());
-        for bytes in std::iter::once(resolved.text.as_bytes()).chain(files) {
-            self.0.push_str(&Digest::of(bytes).to_string());
-        }
-    }
-
-    /// Of all of them, in hexadecimal.
-    pub(super) fn finish(self) -> String {
-        Digest::of(self.0.as_bytes()).to_string()
-    }
 }

@@ -1,12 +1,11 @@
 //! What a sweep came to, in words and as JSON.
 
 use super::journey::Folder;
-use crate::console::{Console, aligned, duration, grouped};
+use crate::console::{Console, aligned, duration, grouped, in_columns};
 use crate::exit::{ExitCode, Failure};
 use serde_json::json;
 use sidestep::experiment::sweep::rounds::{Stopped, stopped};
-use sidestep::experiment::sweep::{Outcome, Plan, RunTable, Shard, Summary};
-use sidestep_report::markdown;
+use sidestep::experiment::sweep::{LeftOut, Outcome, Plan, RunTable, Shard, Summary};
 use std::fmt::Write;
 use std::time::Instant;
 
@@ -96,6 +95,7 @@ pub(super) fn say(
     let stopped = stopped(plan, table);
     let failed = failures(plan, table, folder, console);
     let json = json!({
+        "status": "complete",
         "name": plan.name,
         "world": plan.world,
         "parameters": plan.parameters,
@@ -128,9 +128,13 @@ fn text(
     );
     for table in summary.brief() {
         // Writing to a string cannot fail.
-        let _ = write!(text, "\n{}", markdown::table(&table));
+        let _ = write!(text, "\n{}\n{}", table.title, in_columns(&table));
     }
     let mut lines = Vec::new();
+    if let Some(words) = left_out(summary) {
+        lines.push(("not shown".to_string(), words));
+    }
+    lines.extend(summary.notes.iter().map(|note| ("note".to_string(), note.clone())));
     for Stopped { variant, runs, reason } in stopped {
         let words =
             format!("{} after {runs} runs: {}", plan.variants[*variant as usize], reason.words());
@@ -145,6 +149,25 @@ fn text(
         lines.push(("look at it".to_string(), report));
     }
     format!("{text}\n{}", aligned(&lines))
+}
+
+/// Metrics that have no table, by the reason.
+fn left_out(summary: &Summary) -> Option<String> {
+    let mut reasons: Vec<(&str, Vec<&str>)> = Vec::new();
+    for LeftOut { metric, reason } in &summary.left_out {
+        match reasons.iter_mut().find(|(known, _)| known == reason) {
+            Some((_, metrics)) => metrics.push(metric),
+            None => reasons.push((reason, vec![metric])),
+        }
+    }
+    let words = |(reason, metrics): &(&str, Vec<&str>)| {
+        let more = metrics.len().saturating_sub(NAMED);
+        let first = metrics[..metrics.len() - more].join(", ");
+        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+        format!("{first}{more} ({reason})")
+    };
+    let all: Vec<String> = reasons.iter().map(words).collect();
+    (!all.is_empty()).then(|| all.join("; "))
 }
 
 /// Tells the first runs that failed, and how to run them again; their number.

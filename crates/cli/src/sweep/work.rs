@@ -93,9 +93,14 @@ impl Work<'_> {
         if interrupt::requested() {
             return None;
         }
+        // What is wrong with the folder is no outcome of a run: it may be mended.
+        let source = match (self.source)(cell.variant) {
+            Ok(source) => source,
+            Err(e) => return Some(Err(e.into())),
+        };
         let run = || match self.record {
-            None => self.plain(cell, workers),
-            Some(folder) => recorded(cell, (self.source)(cell.variant)?, workers, &folder(cell.id)),
+            None => plain(cell, &source, workers),
+            Some(folder) => recorded(cell, source, workers, &folder(cell.id)),
         };
         match catch_unwind(AssertUnwindSafe(run)) {
             Ok(Ok(outcome)) => outcome.map(Ok),
@@ -105,14 +110,14 @@ impl Work<'_> {
             Err(_) => Some(Ok(Outcome::failed(cell, "a bug in sidestep: see standard error"))),
         }
     }
+}
 
-    fn plain(&self, cell: Cell, workers: usize) -> Result<Option<Outcome>, Failure> {
-        let begun = Instant::now();
-        let started = start(cell, &(self.source)(cell.variant)?, workers)?;
-        let compiled = Instant::now();
-        let outcome = started.run(&|| !interrupt::requested());
-        Ok(outcome.map(|outcome| timed(outcome, [compiled - begun, compiled.elapsed()])))
-    }
+fn plain(cell: Cell, variant: &Source, workers: usize) -> Result<Option<Outcome>, Failure> {
+    let begun = Instant::now();
+    let started = start(cell, variant, workers)?;
+    let compiled = Instant::now();
+    let outcome = started.run(&|| !interrupt::requested());
+    Ok(outcome.map(|outcome| timed(outcome, [compiled - begun, compiled.elapsed()])))
 }
 
 /// Runs a cell into a run folder of its own; `None` when it was broken off. A folder that a kill
@@ -132,11 +137,20 @@ pub(super) fn recorded(
     let resolved = compiled.resolve(&source)?;
     let itself = Source::new("scenario.toml", &*resolved.text, folder);
     let mut run = compiled.start(&itself, workers);
-    let recording = Recording::create(folder, &resolved, run.as_mut(), Existing::Replace)?;
+    let recording = Recording::create(folder, &resolved, run.as_mut(), Existing::Replace)
+        .map_err(no_outcome)?;
     let compiled = Instant::now();
     let is_complete = recorded_run(run.as_mut(), recording, workers, Console::silent())?;
     let outcome = is_complete.then(|| Outcome::of(cell, run.as_ref()));
     Ok(outcome.map(|outcome| timed(outcome, [compiled - begun, compiled.elapsed()])))
+}
+
+/// A folder that cannot be taken is nothing that a run comes to.
+fn no_outcome(failure: Failure) -> Failure {
+    match failure {
+        Failure::Input(e) => Failure::stopped(format!("{}: {}", e.place(), e.cause()), e.remedy()),
+        other => other,
+    }
 }
 
 fn timed(mut outcome: Outcome, [compiling, running]: [std::time::Duration; 2]) -> Outcome {

@@ -76,7 +76,14 @@ fn many_runs_of_one_scenario_need_no_file_and_leave_nothing_behind() {
     assert_eq!((&run["runs"], &run["parameters"][0]), (&8.into(), &"regime".into()));
     assert_eq!(place.names(), ["s.toml", "sweep.toml"]);
     let words = place.run(&[&["sweep", "s.toml"][..], &args[..]].concat()).out();
-    assert!(words.contains("8 runs of 2 variants") && words.contains("| n | mean |"), "{words}");
+    assert!(words.contains("8 runs of 2 variants") && words.contains("  mean  "), "{words}");
+    assert!(
+        words.contains("regime=both       4  ") && words.contains(" n=4 "),
+        "in columns: {words}"
+    );
+    for markup in ["|", "&lt;", "`"] {
+        assert!(!words.contains(markup), "{markup}: {words}");
+    }
 }
 
 #[test]
@@ -110,7 +117,7 @@ fn what_is_wrong_in_any_variant_is_told_before_anything_is_run() {
         (vec!["--vary", "seed=1,2"], "`seed` is set"),
         (vec!["--vary", "regime"], "there is no `=`"),
         (vec!["--vary", "regime=both", "--vary", "regime=reliable"], "`regime` is set twice"),
-        (vec!["--replicate", "2", "--baseline", "regime=both"], "no variant has the settings"),
+        (vec!["--replicate", "2", "--baseline", "regime=both"], "which is not varied"),
         (vec!["--replicate", "2", "--metrics", "contcats"], "contcats"),
     ] {
         let ended = place.run(&[&["sweep", "s.toml", "--out", "d"], &args[..]].concat());
@@ -129,6 +136,16 @@ fn options_about_many_runs_are_refused_where_there_is_one() {
         assert_eq!(ended.code(), 2, "{option:?}");
         assert!(ended.err().contains(option[0]), "{}", ended.err());
     }
+}
+
+#[test]
+fn a_sweep_and_a_scenario_are_not_taken_for_each_other() {
+    let place = place();
+    let ended = place.run(&["run", "sweep.toml"]);
+    assert!(ended.code() == 2 && ended.err().contains("sidestep sweep"), "{}", ended.err());
+    place.write("typo.toml", SWEEP.replace("scenario =", "scenaro ="));
+    let ended = place.run(&["sweep", "typo.toml"]);
+    assert!(ended.code() == 2 && ended.err().contains("scenaro"), "{}", ended.err());
 }
 
 #[test]
@@ -155,4 +172,98 @@ fn the_shipped_sweeps_are_right() {
         let planned = place.json(&["sweep", "plan", &file, "--out", &name]);
         assert!(planned["cells"].as_u64() > Some(10), "{name}");
     }
+}
+
+const SNAKE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenarios/chain/snake3d.toml");
+
+/// A chain in space with few balls: some of its vetoes are rare.
+const RARE: [&str; 10] = [
+    "--cycles",
+    "150",
+    "--seed",
+    "2",
+    "--replicate",
+    "8",
+    "--set",
+    "fields.0.part=0.05",
+    "--set",
+    "chains.0.connectors=60",
+];
+
+#[test]
+fn what_happens_rarely_is_zero_elsewhere_and_shares_join_to_the_same_table() {
+    let place = place();
+    let args = [&[SNAKE][..], &RARE].concat();
+    place.json(&[&["sweep"], &args[..], &["--out", "one"]].concat());
+    place.json(&[&["sweep", "plan"], &args[..], &["--out", "shared"]].concat());
+    for shard in ["4/5", "0/5", "1/5", "3/5", "2/5"] {
+        place.json(&["sweep", "run", "shared", "--shard", shard]);
+    }
+    place.json(&["sweep", "collect", "shared"]);
+    assert!(bytes(&place, "one/results.parquet") == bytes(&place, "shared/results.parquet"));
+    let journal = place.read("one/shares/0-of-1.journal");
+    let counted = journal.matches("\"vetoes_by_reason.target-blocked\":").count();
+    assert_eq!(counted, 8, "a reason that nobody had is 0, not missing");
+}
+
+#[test]
+fn a_share_makes_no_run_that_another_has_made_and_a_finished_one_is_told_again() {
+    let place = place();
+    place.json(&["sweep", "plan", "s.toml", "--replicate", "4", "--out", "d"]);
+    for shard in ["0/2", "1/2"] {
+        place.json(&["sweep", "run", "d", "--shard", shard]);
+    }
+    let all = place.json(&["sweep", "run", "d", "--shard", "0/1"]);
+    assert_eq!(all["runs"], 0, "all are made already");
+    let again = place.json(&["sweep", "run", "d", "--shard", "0/2"]);
+    assert_eq!(again["runs"], 2, "a finished share is told again");
+}
+
+#[test]
+fn a_variant_that_was_changed_or_is_gone_stops_the_sweep_until_it_is_back() {
+    let place = place();
+    place.json(&["sweep", "plan", "sweep.toml", "--out", "d"]);
+    let path = place.path("d/variants/0001/scenario.toml");
+    let planned = std::fs::read_to_string(&path).expect("there");
+    std::fs::write(&path, planned.replace("cycles = 400", "cycles = 50")).expect("written");
+    let ended = place.run(&["resume", "d", "--workers", "1"]);
+    assert_eq!(ended.code(), 2);
+    assert!(ended.err().contains("not as it was planned"), "{}", ended.err());
+    std::fs::remove_file(&path).expect("removed");
+    assert_eq!(place.run(&["resume", "d"]).code(), 2);
+    std::fs::write(&path, planned).expect("written");
+    let done = place.json(&["resume", "d"]);
+    assert_eq!((&done["runs"], &done["failed"]), (&18.into(), &0.into()), "none has failed for it");
+}
+
+#[test]
+fn a_wanted_precision_on_the_command_line_keeps_what_else_the_file_says_of_it() {
+    let place = place();
+    let file = "format = 1\nscenario = \"s.toml\"\n[set]\ncycles = 100\n\
+                [until]\nci = 0.5\nmetrics = [\"contacts\"]\nmax_runs = 12\n";
+    place.write("until.toml", file);
+    let done = place.json(&["sweep", "until.toml", "--until", "ci=0.0001"]);
+    assert_eq!(done["runs"], 12);
+    let done = place.json(&["sweep", "until.toml", "--until", "ci=0.0001", "--max", "11"]);
+    assert_eq!(done["runs"], 11);
+    let ended = place.run(&["sweep", "s.toml", "--max", "11"]);
+    assert!(ended.code() == 2 && ended.err().contains("--until"), "{}", ended.err());
+}
+
+#[test]
+fn a_wrong_baseline_is_answered_with_what_there_is() {
+    let place = place();
+    let wrong = [
+        ("regime=sensors", "which no variant has", "\"reliable\", \"both\""),
+        ("regme=both", "which is not varied", "did you mean `regime`"),
+    ];
+    for (baseline, cause, remedy) in wrong {
+        let vary = ["sweep", "s.toml", "--vary", "regime=reliable,both", "--baseline", baseline];
+        let ended = place.run(&vary);
+        assert_eq!(ended.code(), 2);
+        assert!(ended.err().contains(cause) && ended.err().contains(remedy), "{}", ended.err());
+    }
+    let twice = place.run(&["sweep", "s.toml", "--vary", "regime=both,both", "--out", "d"]);
+    assert!(twice.code() == 2 && twice.err().contains("is there twice"), "{}", twice.err());
+    assert!(!place.path("d").exists());
 }

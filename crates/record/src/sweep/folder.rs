@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use sidestep_kernel::InputError;
 use sidestep_kernel::ports::RecordError;
+use sidestep_kernel::{Digest, InputError};
 
 use super::journal::{Journal, read_journal};
 use crate::disk;
@@ -33,8 +33,8 @@ pub struct SweepManifest<P> {
     pub format: FormatVersion,
     /// Version of the program that made the plan; the same makes the runs.
     pub program_version: String,
-    /// Of all scenarios and files of the variants, in hexadecimal.
-    pub fingerprint: String,
+    /// Of the scenario of each variant and the files it names, see [`fingerprint`].
+    pub fingerprints: Vec<String>,
     /// The plan.
     pub plan: P,
 }
@@ -58,14 +58,14 @@ pub struct SweepFolder<P> {
 impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
     /// Makes the folder at `path`, all of it or nothing. `fill` writes the variants into what will
     /// become the folder (see [`write_variant`](Self::write_variant)) and returns the plan, its
-    /// fingerprint and the table of its cells.
+    /// fingerprints of its variants and the table of its cells.
     ///
     /// # Errors
     /// When something else is there, no folder can be made there, or `fill` fails.
     pub fn create<E: From<InputError> + From<RecordError>>(
         path: &Path,
         program_version: &str,
-        fill: impl FnOnce(&Path) -> Result<(P, String, Vec<NullableColumn>), E>,
+        fill: impl FnOnce(&Path) -> Result<(P, Vec<String>, Vec<NullableColumn>), E>,
     ) -> Result<Self, E> {
         if Self::is_at(path) {
             let remedy = "name another folder, or go on with what is there: sidestep resume DIR";
@@ -74,11 +74,11 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         }
         check_vacant(path, crate::Existing::Refuse)?;
         let staging = Staging::new(path)?;
-        let (plan, fingerprint, cells) = fill(staging.path())?;
+        let (plan, fingerprints, cells) = fill(staging.path())?;
         let manifest = SweepManifest {
             format: format::CURRENT,
             program_version: program_version.into(),
-            fingerprint,
+            fingerprints,
             plan,
         };
         make_folder(&staging.path().join(SHARES))?;
@@ -147,6 +147,33 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
     /// The scenario file of a variant.
     pub fn scenario(&self, variant: u32) -> PathBuf {
         variant_folder(&self.path, variant).join(SCENARIO)
+    }
+
+    /// That the scenario of a variant and its files are as they were planned.
+    ///
+    /// # Errors
+    /// When they are not, or cannot be read.
+    pub fn check_variant(&self, variant: u32) -> Result<(), InputError> {
+        let folder = variant_folder(&self.path, variant);
+        let mut files = Vec::new();
+        read_files(&folder, "", &mut files).map_err(|(path, e)| {
+            let remedy = "put it back, or sweep into a new folder";
+            InputError::new(path.display(), format!("cannot be read: {e}"), remedy)
+        })?;
+        let is_scenario = |(name, _): &(String, Vec<u8>)| name == SCENARIO;
+        let scenario = files.iter().position(is_scenario).map(|k| files.swap_remove(k).1);
+        let found = fingerprint(&scenario.unwrap_or_default(), &files);
+        if self.manifest.fingerprints.get(variant as usize) == Some(&found) {
+            return Ok(());
+        }
+        let cause = "the scenario of this variant is not as it was planned";
+        let remedy = "put it back as it was, or sweep into a new folder";
+        Err(InputError::new(folder.display(), cause, remedy))
+    }
+
+    /// One digest of all variants, in hexadecimal.
+    pub fn fingerprint(&self) -> String {
+        Digest::of(self.manifest.fingerprints.concat().as_bytes()).to_string()
     }
 
     /// Where the run of a cell is recorded, if it is.
@@ -234,8 +261,7 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
     ) -> Result<(), RecordError> {
         let plan = serde_json::to_string(self.plan())
             .map_err(|e| RecordError::new(self.path.display(), e))?;
-        let extra =
-            [("sidestep.plan", plan), ("sidestep.fingerprint", self.manifest.fingerprint.clone())];
+        let extra = [("sidestep.plan", plan), ("sidestep.fingerprint", self.fingerprint())];
         let version = &self.manifest.program_version;
         nullable::write(&self.path.join(TIMINGS), timings, version, &extra)?;
         nullable::write(&self.path.join(RESULTS), results, version, &extra)
@@ -261,7 +287,11 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
                           `sidestep sweep collect DIR`";
             return Err(InputError::new(self.path.display(), "the sweep is not done yet", remedy));
         }
-        nullable::read(&self.results_file())
+        nullable::read(&self.results_file()).map_err(|e| {
+            let remedy =
+                "delete it; `sidestep resume DIR` makes it again from the runs in `shares`";
+            InputError::new(e.place(), e.cause(), remedy)
+        })
     }
 
     /// The table of what the runs took.
@@ -300,6 +330,38 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         shares.sort();
         Ok(shares)
     }
+}
+
+/// A digest of a scenario and the files it names, in hexadecimal; their order does not matter.
+pub fn fingerprint(scenario: &[u8], files: &[(String, Vec<u8>)]) -> String {
+    let mut sorted: Vec<_> = files.iter().collect();
+    sorted.sort();
+    let print = |bytes: &[u8]| Digest::of(bytes).to_string();
+    let files = sorted.into_iter().flat_map(|(name, bytes)| [name.clone(), print(bytes)]);
+    let all: Vec<String> = std::iter::once(print(scenario)).chain(files).collect();
+    print(all.join("\n").as_bytes())
+}
+
+/// All files below a folder, by their path in it.
+fn read_files(
+    folder: &Path,
+    under: &str,
+    files: &mut Vec<(String, Vec<u8>)>,
+) -> Result<(), (PathBuf, std::io::Error)> {
+    let failed = |path: &Path| {
+        let path = path.to_path_buf();
+        move |e| (path, e)
+    };
+    for entry in fs::read_dir(folder).map_err(failed(folder))? {
+        let path = entry.map_err(failed(folder))?.path();
+        let name = path.file_name().map(|name| name.to_string_lossy().into_owned());
+        let name = format!("{under}{}", name.unwrap_or_default());
+        match path.is_dir() {
+            true => read_files(&path, &format!("{name}/"), files)?,
+            false => files.push((name, fs::read(&path).map_err(failed(&path))?)),
+        }
+    }
+    Ok(())
 }
 
 /// The share whose file has this name.
@@ -348,7 +410,7 @@ mod tests {
         Folder::create(path, "0.1.0", |staging| {
             let files = [("inputs/a.txt".to_string(), b"a".to_vec())];
             Folder::write_variant(staging, 0, "seed = 1\n", &files)?;
-            Ok((vec![4, 5], "f".into(), cells()))
+            Ok((vec![4, 5], vec!["f".into()], cells()))
         })
     }
 

@@ -18,5 +18,5 @@
 mod folder;
 mod journal;
 
-pub use folder::{Share, SweepFolder, SweepManifest};
+pub use folder::{Share, SweepFolder, SweepManifest, fingerprint};
 pub use journal::{Journal, read_journal};

@@ -6,7 +6,7 @@
 //! are judged here. Both deployments choose the same controls, so flights are the same.
 
 use super::claim::{self, Claim, Verdict};
-use super::document::{Block, Document, Experiment, Text};
+use super::document::{Document, Experiment};
 use super::figure::{Figure, FigureKind, Point, Series, Table};
 use super::{Estimate, farm};
 use crate::scenario::Source;
@@ -96,20 +96,22 @@ const BOTH: [Deployment; 2] = [Deployment::Team, Deployment::Pim];
 /// # Errors
 /// When the plan asks for what no scenario can be.
 pub fn run(plan: &Plan, progress: &mut farm::Progress<'_>) -> Result<Report, InputError> {
-    let mut cells = Vec::new();
-    for &n in &plan.airplanes {
-        for deployment in BOTH {
-            let what = format!("{n} airplanes, {}", deployment.name());
-            let all = farm::in_batches(
-                plan.workers,
-                plan.seeds,
-                |share| progress(&what, share),
-                |k| flown(plan, n, deployment, k as u64 + 1),
-            );
-            let all: Vec<Metrics> = all.into_iter().collect::<Result<_, InputError>>()?;
-            cells.push(cell(n, deployment, &all));
-        }
-    }
+    let cases = plan.airplanes.iter().flat_map(|&n| BOTH.map(|deployment| (n, deployment)));
+    let cases: Vec<(usize, Deployment)> = cases.collect();
+    // Seed by seed, so that what else the machine does meets all cases alike.
+    let run = |i: usize| {
+        let (n, deployment) = cases[i % cases.len()];
+        flown(plan, n, deployment, (i / cases.len()) as u64 + 1)
+    };
+    let total = cases.len() * plan.seeds;
+    let report = |share| progress("super-conflicts", share);
+    let runs = farm::in_batches(plan.workers, total, report, run);
+    let runs: Vec<Metrics> = runs.into_iter().collect::<Result<_, InputError>>()?;
+    let of_case = |(k, &(n, deployment)): (usize, &(usize, Deployment))| {
+        let all: Vec<&Metrics> = runs.iter().skip(k).step_by(cases.len()).collect();
+        cell(n, deployment, &all)
+    };
+    let cells: Vec<Cell> = cases.iter().enumerate().map(of_case).collect();
     let claims = judge(&cells);
     let largest = plan.airplanes.iter().copied().max().unwrap_or(0);
     let tracks_m = tracks_m(plan, largest)?;
@@ -160,8 +162,8 @@ fn begun(
     AirspaceSimulation::new(&Source::new("agentfly", text, ""), 1)
 }
 
-fn cell(airplanes: usize, deployment: Deployment, all: &[Metrics]) -> Cell {
-    let of = |value: &dyn Fn(&Metrics) -> Option<f64>| Estimate::of(all.iter().map(value));
+fn cell(airplanes: usize, deployment: Deployment, all: &[&Metrics]) -> Cell {
+    let of = |value: &dyn Fn(&Metrics) -> Option<f64>| Estimate::of(all.iter().map(|m| value(m)));
     let processors = if deployment == Deployment::Team { airplanes as f64 } else { 1.0 };
     let elapsed_s = |m: &Metrics| Some(m.optimise_cpu_s / processors);
     Cell {
@@ -413,11 +415,8 @@ impl Report {
             env!("CARGO_PKG_VERSION"),
         );
         let lead = format!("{} {setting}", claim::tally(&self.claims));
-        let mut document = Document::new("Probability collectives in AGENTFLY, run anew", lead);
-        if plan.quick {
-            document.warning(Text::marked(claim::REHEARSAL));
-        }
-        document.section("Claims").push(Block::Claims(self.claims.clone()));
+        let title = "Probability collectives in AGENTFLY, run anew";
+        let mut document = claim::document(title, lead, plan.quick, &self.claims);
         document.experiment(Experiment {
             title: "Results",
             about: "Airplanes on a circle fly towards its other side and would all meet in the \
@@ -444,6 +443,7 @@ fn flight(track_m: &[AirPoint]) -> Series {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::experiment::document::Block;
 
     #[test]
     fn a_rehearsal_judges_every_claim() {

@@ -1,10 +1,11 @@
 //! Claims of a paper, and what came of them.
 
+use super::document::{Block, Document, Text};
 use crate::statistics::Interval;
 use serde::Serialize;
 
 /// What stands above a report of little weight.
-pub const REHEARSAL: &str = "**A rehearsal: its figures have no weight.** Everything was run, with \
+const REHEARSAL: &str = "**A rehearsal: its figures have no weight.** Everything was run, with \
                              too few runs to measure anything; without `--quick` it is measured.";
 
 /// What we say of a claim.
@@ -85,6 +86,16 @@ pub fn tally(claims: &[Claim]) -> String {
         count(claims, Verdict::NotHeld),
         count(claims, Verdict::Lost),
     )
+}
+
+/// The begin of a paper's report: its lead, and the claims before all else.
+pub(super) fn document(title: &str, lead: String, quick: bool, claims: &[Claim]) -> Document {
+    let mut document = Document::new(title, lead);
+    if quick {
+        document.warning(Text::marked(REHEARSAL));
+    }
+    document.section("Claims").push(Block::Claims(claims.to_vec()));
+    document
 }
 
 /// How to read a list of claims.

@@ -8,6 +8,11 @@ const BATCH: usize = 8;
 /// Told how far an experiment is: what is being done, and the share done, from 0 to 1.
 pub type Progress<'a> = dyn FnMut(&str, f64) + 'a;
 
+/// Progress of a part of the whole that goes from share `from` to share `to`.
+pub fn stage(progress: &mut Progress<'_>, from: f64, to: f64) -> impl FnMut(&str, f64) {
+    move |what, share| progress(what, from + (to - from) * share)
+}
+
 /// Does runs `0..runs` on up to `workers` workers, each run on one of them. The results come
 /// back by index, so they do not depend on the number of workers.
 pub fn in_parallel<T: Send>(

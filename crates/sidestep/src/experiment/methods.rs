@@ -107,7 +107,7 @@ pub fn table(title: &str, results: &[MethodResult]) -> Table {
         "method",
         "runs without loss",
         "losses",
-        "nearest, m",
+        "nearest of all runs, m",
         "arrived",
         "delay, %",
         "deciding, s",

@@ -74,6 +74,8 @@ pub enum Reason {
     MeanNearZero,
     /// The maximum of runs is reached, and fewer than two have a value.
     TooFewValues,
+    /// No run of the first round has come to a value.
+    NoValues,
 }
 
 impl Reason {
@@ -88,6 +90,7 @@ impl Reason {
                  enough: ask for an absolute half-width"
             }
             Self::TooFewValues => "the maximum of runs is reached; fewer than two have a value",
+            Self::NoValues => "none of them has come to a value",
         }
     }
 }

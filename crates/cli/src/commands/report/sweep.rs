@@ -83,7 +83,7 @@ fn facts(folder: &Folder, table: &RunTable) -> Vec<(String, Text)> {
         ("Variants".into(), count(plan.variants.len() as u64).into()),
         ("First seed".into(), plan.first_seed.to_string().into()),
         ("Version".into(), format!("sidestep {}", manifest.program_version).into()),
-        ("Fingerprint of all scenarios".into(), Text::code(&*manifest.fingerprint)),
+        ("Fingerprint of all scenarios".into(), Text::code(folder.fingerprint())),
     ];
     if let Some(until) = &plan.until {
         let unit = if until.is_relative { "of the mean" } else { "in the metric's unit" };
@@ -151,10 +151,10 @@ fn again(folder: &Folder) -> String {
         "# one run of the table: the scenario of its variant, and its seed\n\
          sidestep run {} --seed {}\n\
          # all runs as one table: a row a run, parameters and metrics in typed columns\n\
-         python3 -c 'import polars; print(polars.read_parquet(\"{}\"))'\n",
+         python3 -c 'import polars, sys; print(polars.read_parquet(sys.argv[1]))' {}\n",
         at("variants/0000/scenario.toml"),
         folder.plan().first_seed,
-        folder.results_file().display(),
+        quoted(&folder.results_file().display().to_string()),
     )
 }
 

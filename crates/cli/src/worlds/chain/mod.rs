@@ -228,7 +228,8 @@ fn vetoes(m: &Metrics) -> String {
     if m.vetoes == 0 {
         return "none".into();
     }
-    let reasons = m.vetoes_by_reason.iter().map(|(reason, n)| format!("{reason} {}", grouped(*n)));
+    let reasons = m.vetoes_by_reason.iter().filter(|(_, n)| **n > 0);
+    let reasons = reasons.map(|(reason, n)| format!("{reason} {}", grouped(*n)));
     format!("{}: {}", grouped(m.vetoes), reasons.collect::<Vec<_>>().join(", "))
 }
 

@@ -26,9 +26,9 @@ pub mod scenes;
 pub mod strategies;
 pub mod timing;
 
-use super::claim::{REHEARSAL, tally};
-use super::document::{Block, Document, Experiment, Picture, Text};
-use super::farm::Progress;
+use super::claim::{self, tally};
+use super::document::{Document, Experiment, Picture};
+use super::farm::{Progress, stage};
 use claims::Claim;
 use cost_model::CostModel;
 use genericity::Genericity;
@@ -217,11 +217,6 @@ pub fn run_recorded(
     Ok(report)
 }
 
-/// Progress of a part of the whole that goes from share `from` to share `to`.
-fn stage(progress: &mut Progress<'_>, from: f64, to: f64) -> impl FnMut(&str, f64) {
-    move |what, share| progress(what, from + (to - from) * share)
-}
-
 impl Report {
     /// The experiments in the order of the report.
     fn experiments(&self) -> [Experiment; 5] {
@@ -288,11 +283,8 @@ impl Report {
             plan.repeats,
             self.performance.processors,
         );
-        let mut document = Document::new("The LORIA experiments of 2001, run anew", lead);
-        if plan.quick {
-            document.warning(Text::marked(REHEARSAL));
-        }
-        document.section("Claims").push(Block::Claims(self.claims.clone()));
+        let title = "The LORIA experiments of 2001, run anew";
+        let mut document = claim::document(title, lead, plan.quick, &self.claims);
         if !pictures.is_empty() {
             document.section("Pictures").pictures(pictures);
         }
@@ -318,6 +310,7 @@ impl Report {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::experiment::document::Block;
 
     #[test]
     fn a_quick_plan_judges_every_claim_and_gives_text_figures_and_json() {

@@ -30,9 +30,9 @@ pub mod snake;
 
 pub use runs::Share;
 
-use super::claim::{Claim, REHEARSAL, tally};
-use super::document::{Block, Document, Experiment, Picture, Text};
-use super::farm::Progress;
+use super::claim::{self, Claim, tally};
+use super::document::{Document, Experiment, Picture};
+use super::farm::{Progress, stage};
 use serde::Serialize;
 use sidestep_kernel::InputError;
 use sidestep_kernel::workers::available;
@@ -231,11 +231,6 @@ pub fn run(plan: &Plan, progress: &mut Progress<'_>) -> Result<Report, InputErro
     Ok(report)
 }
 
-/// Progress of a part of the whole that goes from share `from` to share `to`.
-fn stage(progress: &mut Progress<'_>, from: f64, to: f64) -> impl FnMut(&str, f64) {
-    move |what, share| progress(what, from + (to - from) * share)
-}
-
 impl Report {
     /// The experiments in the order of the report.
     fn experiments(&self) -> [Experiment; 10] {
@@ -332,11 +327,8 @@ impl Report {
             plan.snake_seeds,
             plan.workers,
         );
-        let mut document = Document::new("Multi-agent serpentine motion of 2005, run anew", lead);
-        if plan.quick {
-            document.warning(Text::marked(REHEARSAL));
-        }
-        document.section("Claims").push(Block::Claims(self.claims.clone()));
+        let title = "Multi-agent serpentine motion of 2005, run anew";
+        let mut document = claim::document(title, lead, plan.quick, &self.claims);
         if !pictures.is_empty() {
             document.section("Pictures").pictures(pictures);
         }

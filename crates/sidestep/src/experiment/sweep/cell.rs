@@ -53,7 +53,8 @@ pub fn start(cell: Cell, source: &Source, workers: usize) -> Result<Started, Inp
 /// Names of the metrics that runs of a scenario have, in order.
 pub fn metric_names(simulation: &dyn Simulation) -> Vec<String> {
     let names = flat(&simulation.metrics()).into_iter().map(|(name, _)| name);
-    names.filter(|name| !is_by_clock(name)).collect()
+    let names = names.filter(|name| !is_by_clock(name));
+    std::iter::once("cycles_run".to_string()).chain(names).collect()
 }
 
 fn is_by_clock(name: &str) -> bool {

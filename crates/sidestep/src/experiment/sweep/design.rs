@@ -200,6 +200,12 @@ impl Design {
                 return Err(wrong(cause, "vary less: at most a million variants"));
             }
         }
+        self.check_different().map_err(|what| {
+            wrong(
+                format!("{what} is there twice"),
+                "give every value once; --replicate runs it again",
+            )
+        })?;
         let mut variants = product(vec![Vec::new()], &self.list);
         if let Some(hypercube) = &self.hypercube {
             variants = product(variants, &hypercube.samples());
@@ -215,6 +221,26 @@ impl Design {
             })?;
         }
         Ok(variants)
+    }
+}
+
+impl Design {
+    /// What is asked for twice, if anything. Samples of a hypercube may meet: whole numbers are few.
+    fn check_different(&self) -> Result<(), String> {
+        for (k, entry) in self.list.iter().enumerate() {
+            if self.list[..k].contains(entry) {
+                let words: Vec<String> = entry.iter().map(Setting::to_override).collect();
+                return Err(format!("the variant `{}`", words.join(", ")));
+            }
+        }
+        for Factor { key, values } in &self.factors {
+            for (k, value) in values.iter().enumerate() {
+                if values[..k].contains(value) {
+                    return Err(format!("`{key}` = {value}"));
+                }
+            }
+        }
+        Ok(())
     }
 }
 
@@ -316,10 +342,20 @@ mod tests {
     }
 
     #[test]
+    fn what_is_asked_for_twice_is_refused() {
+        let error = factors(&["m=none,pc,none"]).variants("here").expect_err("twice");
+        assert!(error.cause().contains("`m` = \"none\" is there twice"), "{error}");
+        let entry = || vec![Setting { key: "a".into(), value: Value::Integer(1) }];
+        let design = Design { list: vec![entry(), entry()], ..Design::default() };
+        assert!(design.variants("here").expect_err("twice").cause().contains("`a=1`"));
+    }
+
+    #[test]
     fn a_key_is_set_once_and_variants_are_not_without_number() {
         let error = factors(&["a=1", "a=2"]).variants("here").expect_err("twice");
         assert!(error.to_string().contains("`a` is set twice"), "{error}");
-        let wide = format!("a={}", vec!["1"; 2000].join(","));
+        let numbers: Vec<String> = (0..2000).map(|n| n.to_string()).collect();
+        let wide = format!("a={}", numbers.join(","));
         let texts = [wide.clone(), wide.replace('a', "b")];
         let design = factors(&[&texts[0], &texts[1]]);
         assert!(design.variants("here").expect_err("many").cause().contains("4000000"));

@@ -129,6 +129,10 @@ struct UntilSection {
     max_runs: Option<u64>,
 }
 
+/// Keys that no scenario has.
+const OF_SWEEPS: [&str; 6] =
+    ["replicates", "vary", "variant", "latin_hypercube", "until", "baseline"];
+
 impl Sweep {
     /// A sweep of the scenario as it is, ten times.
     pub fn of_scenario(scenario: impl Into<PathBuf>) -> Self {
@@ -160,7 +164,9 @@ impl Sweep {
         }
         let source = Source::read(path, &[])?;
         let table: toml::Table = source.parse()?;
-        if table.contains_key("scenario") {
+        // A misspelled `scenario` is better told by the reader of sweeps.
+        let is_sweep = |t: &toml::Table| OF_SWEEPS.iter().any(|key| t.contains_key(*key));
+        if table.contains_key("scenario") || (!table.contains_key("world") && is_sweep(&table)) {
             Self::parse(&source)
         } else {
             Ok(Self::of_scenario(path))
@@ -298,6 +304,10 @@ impl Reader<'_> {
             if !is_right || (is_log && low <= 0.0) {
                 let remedy = "low is below high, and above 0 where log = true";
                 return Err(wrong(format!("the range of `{key}` is {low} to {high}"), remedy));
+            }
+            if is_integer && (low.fract() != 0.0 || high.fract() != 0.0) {
+                let cause = format!("the range of `{key}` is {low} to {high}, with integer = true");
+                return Err(wrong(cause, "give whole numbers; both ends are included"));
             }
             Ok(design::Range { key, low, high, is_log, is_integer })
         };

@@ -44,7 +44,7 @@ pub use groups::{Level, Parameter};
 pub use label::Label;
 pub use plan::{Cell, Plan, Shard, Variant};
 pub use rows::Rows;
-pub use summary::{Summary, SummaryOptions};
+pub use summary::{LeftOut, Summary, SummaryOptions};
 pub use table::{Role, RunColumn, RunTable, RunValues};
 
 #[cfg(test)]

@@ -4,8 +4,10 @@ use super::design::Setting;
 use super::file::{Sweep, Until};
 use super::summary::{Summary, SummaryOptions};
 use super::table::{Role, RunTable, RunValues};
+use crate::scenario::nearest;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::InputError;
+use std::collections::BTreeMap;
 use std::fmt;
 use std::str::FromStr;
 
@@ -46,10 +48,22 @@ pub struct Variant {
     pub settings: Vec<Setting>,
 }
 
+/// Runs of a sweep: the table of ten million takes some gigabytes where it is joined.
+const MOST_RUNS: u64 = 10_000_000;
+
 impl Variant {
     /// The value of a parameter, if this variant sets it.
     pub fn value(&self, key: &str) -> Option<&toml::Value> {
         self.settings.iter().find(|s| s.key == key).map(|s| &s.value)
+    }
+
+    /// Whether it sets this; 2 and 2.0 are the same.
+    fn has(&self, setting: &Setting) -> bool {
+        let number = |v: &toml::Value| v.as_float().or(v.as_integer().map(|n| n as f64));
+        self.value(&setting.key).is_some_and(|value| {
+            *value == setting.value
+                || number(value).is_some_and(|n| Some(n) == number(&setting.value))
+        })
     }
 }
 
@@ -133,11 +147,9 @@ impl Plan {
         };
         let name = |v: &Variant| v.settings.iter().map(named).collect::<Vec<_>>().join(", ");
         let mut names: Vec<String> = self.variants.iter().map(name).collect();
-        if let [only] = &mut names[..]
-            && only.is_empty()
-        {
-            *only = "all runs".into();
-        }
+        let plain = if names.len() == 1 { "all runs" } else { "as in the scenario" };
+        names.iter_mut().filter(|name| name.is_empty()).for_each(|name| *name = plain.into());
+        number_twins(&mut names);
         names
     }
 
@@ -157,10 +169,27 @@ impl Plan {
         }
         let options = SummaryOptions {
             metrics: (!self.metrics.is_empty()).then(|| self.metrics.clone()),
-            baseline: self.baseline.map(|variant| names[variant as usize].clone()),
+            // A sweep under way may have no run of it yet.
+            baseline: self
+                .baseline
+                .filter(|variant| has_runs(runs, *variant))
+                .map(|variant| names[variant as usize].clone()),
             ..SummaryOptions::default()
         };
         Summary::of(&named, &options)
+    }
+
+    /// Whether there are no more runs than a machine can keep in mind.
+    ///
+    /// # Errors
+    /// When there are.
+    pub fn check_size(variants: usize, replicates: u32, place: &str) -> Result<(), InputError> {
+        let runs = variants as u64 * u64::from(replicates);
+        if runs <= MOST_RUNS {
+            return Ok(());
+        }
+        let remedy = format!("sweep over less: up to {MOST_RUNS} runs, or several sweeps");
+        Err(InputError::new(place, format!("there are {runs} runs"), remedy))
     }
 
     /// Number of cells, at most.
@@ -201,6 +230,24 @@ impl Plan {
     }
 }
 
+/// Whether the table has a run of a variant.
+fn has_runs(runs: &RunTable, variant: u32) -> bool {
+    let mut columns = runs.of_role(Role::Variant);
+    columns.any(|c| (0..runs.runs()).any(|k| c.values.number(k) == Some(f64::from(variant))))
+}
+
+/// Samples of whole numbers may meet: from the second on they are numbered.
+fn number_twins(names: &mut [String]) {
+    let mut seen: BTreeMap<String, u32> = BTreeMap::new();
+    for name in names {
+        let count = seen.entry(name.clone()).or_default();
+        *count += 1;
+        if *count > 1 {
+            *name = format!("{name} ({count})");
+        }
+    }
+}
+
 /// The variant that has all these settings.
 fn baseline(
     wanted: &[Setting],
@@ -210,20 +257,51 @@ fn baseline(
     if wanted.is_empty() {
         return Ok(None);
     }
-    let fits = |v: &Variant| wanted.iter().all(|s| v.value(&s.key) == Some(&s.value));
+    let fits = |v: &Variant| wanted.iter().all(|s| v.has(s));
     let found: Vec<usize> = (0..variants.len()).filter(|&k| fits(&variants[k])).collect();
     match found[..] {
         [one] => Ok(Some(one as u32)),
-        [] => {
-            let cause = "no variant has the settings of the baseline";
-            Err(InputError::new(place, cause, "give values that are varied"))
-        }
+        [] => Err(no_baseline(wanted, variants, place)),
         _ => {
             let cause = format!("{} variants have the settings of the baseline", found.len());
             Err(InputError::new(place, cause, "give the value of every key that is varied"))
         }
     }
 }
+
+/// Which of the settings no variant has, and what there is.
+fn no_baseline(wanted: &[Setting], variants: &[Variant], place: &str) -> InputError {
+    let is_missing = |s: &&Setting| !variants.iter().any(|v| v.has(s));
+    let Some(Setting { key, value }) = wanted.iter().find(is_missing) else {
+        let cause = "no variant has all settings of the baseline at once";
+        return InputError::new(place, cause, "give those of one variant");
+    };
+    let mut values: Vec<String> = Vec::new();
+    for value in variants.iter().filter_map(|v| v.value(key)).map(toml::Value::to_string) {
+        if !values.contains(&value) && values.len() < MOST_NAMED {
+            values.push(value);
+        }
+    }
+    if !values.is_empty() {
+        let cause = format!("the baseline has `{key}` = {value}, which no variant has");
+        return InputError::new(place, cause, format!("it is varied over {}", values.join(", ")));
+    }
+    let mut keys: Vec<&str> = Vec::new();
+    for setting in variants.iter().flat_map(|v| &v.settings) {
+        if !keys.contains(&setting.key.as_str()) {
+            keys.push(&setting.key);
+        }
+    }
+    let cause = format!("the baseline has `{key}`, which is not varied");
+    let remedy = match keys.is_empty() {
+        true => format!("vary it, e.g. --vary {key}={value},..."),
+        false => nearest(key, &keys),
+    };
+    InputError::new(place, cause, remedy)
+}
+
+/// Values that an error lists at most.
+const MOST_NAMED: usize = 20;
 
 /// A share of the cells: number `index` of `count`, from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -20,7 +20,7 @@ pub struct Rounds<'a> {
     plan: &'a Plan,
     until: &'a Until,
     /// Per variant, by metric, the values by replicate.
-    values: Vec<BTreeMap<String, BTreeMap<u32, Option<f64>>>>,
+    values: Vec<BTreeMap<String, Values>>,
     /// Per variant the replicates that have an outcome.
     done: Vec<BTreeSet<u32>>,
 }
@@ -98,31 +98,51 @@ impl<'a> Rounds<'a> {
         let done = &self.done[variant as usize];
         // Only what has no gap: a round that was broken off is gone on with.
         let whole = (0u32..).zip(done).take_while(|(k, replicate)| k == *replicate).count();
-        let column = |values: &BTreeMap<u32, Option<f64>>| -> Vec<Option<f64>> {
+        let column = |values: &Values| -> Vec<Option<f64>> {
             (0..whole as u32).map(|k| values.get(&k).copied().flatten()).collect()
         };
+        let of_variant = &self.values[variant as usize];
         let named = !self.until.metrics.is_empty();
-        let columns: Vec<Vec<Option<f64>>> = self.values[variant as usize]
-            .values()
-            .map(column)
-            .filter(|values| named || varies(&values[..whole.min(MIN_RUNS)]))
-            .collect();
+        let there: Vec<_> =
+            of_variant.iter().filter(|(_, values)| named || first(values).any(is_there)).collect();
+        let asks = |name: &str| named || self.varies(name);
+        // Where nothing varies, it takes as many runs to believe it as of a single metric.
+        let any_asks = there.iter().any(|(name, _)| asks(name));
+        let asking = there.iter().filter(|(name, _)| !any_asks || asks(name));
+        let columns: Vec<Vec<Option<f64>>> = asking.map(|(_, values)| column(values)).collect();
         if columns.is_empty() {
-            // Nothing varies, or nothing is there: the first round says so.
             let first = MIN_RUNS.min(rule.max_runs);
             return match whole >= first {
-                true => Next::Enough(first, Reason::Constant),
+                true => Next::Enough(first, Reason::NoValues),
                 false => Next::Run(first),
             };
         }
         let columns: Vec<&[Option<f64>]> = columns.iter().map(Vec::as_slice).collect();
         rule.next_of(&columns)
     }
+
+    /// Whether a metric differs between two runs of a variant's first round, of any variant: what
+    /// happens rarely is then looked for in those too that have not seen it.
+    fn varies(&self, name: &str) -> bool {
+        let differ = |values: &Values| {
+            let mut all = first(values);
+            let one = all.next();
+            all.any(|value| Some(value) != one)
+        };
+        self.values.iter().filter_map(|of_variant| of_variant.get(name)).any(differ)
+    }
 }
 
-/// Whether two of the values differ.
-fn varies(values: &[Option<f64>]) -> bool {
-    values.windows(2).any(|pair| pair[0] != pair[1])
+/// Values of a metric by replicate.
+type Values = BTreeMap<u32, Option<f64>>;
+
+/// Those of the first round.
+fn first(values: &Values) -> impl Iterator<Item = &Option<f64>> {
+    (0..MIN_RUNS as u32).filter_map(|k| values.get(&k))
+}
+
+fn is_there(value: &Option<f64>) -> bool {
+    value.is_some()
 }
 
 #[cfg(test)]
@@ -175,6 +195,40 @@ mod tests {
         let runs = all(&plan, &until(&[]), |_| ());
         assert!(runs[0] == MIN_RUNS && (60..400).contains(&runs[1]), "{runs:?}");
         assert_eq!(runs, all(&plan, &until(&["m"]), |_| ()), "what is constant asks for nothing");
+    }
+
+    #[test]
+    fn what_one_variant_has_seen_is_looked_for_in_the_others_too() {
+        let plan = plan(1000);
+        let until = Until { half_width: 0.3, ..until(&[]) };
+        let mut rounds = Rounds::new(&plan, &until);
+        while let cells = rounds.next()
+            && !cells.is_empty()
+        {
+            for cell in cells {
+                let rare = u32::from(cell.variant == 1 && cell.replicate % 2 == 0);
+                let mut outcome = Outcome::failed(cell, "");
+                outcome.metrics.insert("rare".into(), json!(rare));
+                rounds.note(&outcome);
+            }
+        }
+        let told = rounds.stopped();
+        assert_eq!((told[0].runs, told[0].reason), (60, Reason::Constant), "0 of 10 is not 0");
+        assert_eq!(told[1].reason, Reason::Reached);
+    }
+
+    #[test]
+    fn runs_that_come_to_nothing_are_not_made_for_ever() {
+        let plan = plan(1000);
+        let until = until(&[]);
+        let mut rounds = Rounds::new(&plan, &until);
+        while let cells = rounds.next()
+            && !cells.is_empty()
+        {
+            cells.iter().for_each(|c| rounds.note(&Outcome::failed(*c, "no start")));
+        }
+        let told = rounds.stopped();
+        assert_eq!((told[0].runs, told[0].reason), (MIN_RUNS, Reason::NoValues));
     }
 
     #[test]

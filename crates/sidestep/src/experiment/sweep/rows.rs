@@ -24,7 +24,8 @@ pub struct Rows {
 #[derive(Debug)]
 struct Growing {
     column: RunColumn,
-    /// The first cell that has it, and its place there: the order of columns.
+    /// The first cell in which it has a value, and its place there: the order of columns, whatever
+    /// shares they come in. Columns without any value come last.
     first: (u64, usize),
 }
 
@@ -69,10 +70,11 @@ impl Rows {
         let k = *self.index.entry(key).or_insert_with(|| {
             let values = RunValues::Float(Vec::new());
             let column = RunColumn { name: name.into(), role, values };
-            self.columns.push(Growing { column, first: (cell, place) });
+            self.columns.push(Growing { column, first: (u64::MAX, usize::MAX) });
             self.columns.len() - 1
         });
         let growing = &mut self.columns[k];
+        let cell = if value.is_null() { u64::MAX } else { cell };
         growing.first = growing.first.min((cell, place));
         fill(&mut growing.column.values, row);
         add(&mut growing.column.values, value);
@@ -320,8 +322,8 @@ mod tests {
             "cycles_run",
             "always",
             "wider",
-            "none",
             "sometimes",
+            "none",
             "digest",
             "run_wall_s",
         ];
@@ -353,6 +355,18 @@ mod tests {
         let mut rows = Rows::default();
         whole.outcomes(|outcome| rows.push(outcome));
         assert_eq!(rows.table(&plan()), Ok(whole));
+    }
+
+    proptest! {
+        #[test]
+        fn shares_join_to_the_table_of_one_process(count in 1u64..7) {
+            let mut rows = Rows::default();
+            for index in (0..count).rev() {
+                let share = table((0..12).filter(|cell| cell % count == index));
+                share.outcomes(|outcome| rows.push(outcome));
+            }
+            prop_assert_eq!(rows.table(&plan()), Ok(table(0..12)));
+        }
     }
 
     #[test]

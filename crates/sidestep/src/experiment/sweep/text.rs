@@ -22,7 +22,7 @@ pub(super) fn brief(summary: &Summary) -> Vec<Table> {
 }
 
 fn brief_of(summary: &Summary, metric: &MetricSummary) -> Table {
-    let against = summary.baseline.as_ref().map(|name| format!("minus `{name}`"));
+    let against = summary.baseline.as_ref().map(|name| format!("minus {name}"));
     let mean = if metric.is_share { "share of runs" } else { "mean" };
     let mut columns = vec!["variant", "n", mean];
     columns.extend(against.as_deref());
@@ -35,7 +35,7 @@ fn brief_of(summary: &Summary, metric: &MetricSummary) -> Table {
         };
         let mut row = vec![variant.variant.clone(), variant.n.to_string(), value];
         if let Some(c) = metric.comparisons.iter().find(|c| c.variant == variant.variant) {
-            row.push(with_interval(c.difference, c.interval));
+            row.push(format!("{} n={}", with_interval(c.difference, c.interval), c.pairs));
             row.push(c.p_holm.map_or("-".into(), p_value));
         }
         table.row(row);

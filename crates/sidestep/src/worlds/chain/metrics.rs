@@ -347,7 +347,7 @@ impl Metrics {
             max_rod_violation_m: most(|t| t.max_rod_violation_m),
             progress: progress.iter().sum::<f64>() / progress.len().max(1) as f64,
             steps_per_cpu_s: timed_steps as f64 / cpu_s.max(1e-9),
-            vetoes_by_reason: by_reason.filter(|(_, n)| *n > 0).collect(),
+            vetoes_by_reason: by_reason.collect(),
             rotations: sum(|t| t.rotations),
             moved_per_step: sum(|t| t.moved) as f64 / steps.max(1) as f64,
             max_slave_step_m: most(|t| t.max_slave_step_m),
