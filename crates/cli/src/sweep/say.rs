@@ -131,7 +131,10 @@ fn text(
         let _ = write!(text, "\n{}\n{}", table.title, in_columns(&table));
     }
     let mut lines = Vec::new();
-    if let Some(words) = left_out(summary) {
+    // Who names metrics knows that the others are not shown.
+    if plan.metrics.is_empty()
+        && let Some(words) = left_out(summary)
+    {
         lines.push(("not shown".to_string(), words));
     }
     lines.extend(summary.notes.iter().map(|note| ("note".to_string(), note.clone())));
