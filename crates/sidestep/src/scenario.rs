@@ -105,19 +105,20 @@ impl Source {
     /// # Errors
     /// When either is missing or the format is another.
     pub fn preamble(&self) -> Result<Preamble, InputError> {
-        if let Ok(table) = self.text.parse::<toml::Table>()
-            && table.contains_key("scenario")
-            && !table.contains_key("world")
-        {
-            let remedy = "run it with `sidestep sweep`, or name the scenario that it names";
-            return Err(self.error(None, "this is a sweep, not a scenario", remedy));
-        }
-        let preamble: Preamble = self.parse()?;
+        let preamble: Preamble = self.parse().map_err(|e| self.sweep_instead().unwrap_or(e))?;
         if *preamble.format.get_ref() == FORMAT {
             return Ok(preamble);
         }
         let cause = format!("scenario format {} is not known", preamble.format.get_ref());
         Err(self.error(Some(preamble.format.span()), cause, format!("write `format = {FORMAT}`")))
+    }
+
+    /// The error of a file that is wrong as a scenario because it is a sweep.
+    fn sweep_instead(&self) -> Option<InputError> {
+        let table = self.text.parse::<toml::Table>().ok()?;
+        let is_sweep = table.contains_key("scenario") && !table.contains_key("world");
+        let remedy = "run it with `sidestep sweep`, or name the scenario that it names";
+        is_sweep.then(|| self.error(None, "this is a sweep, not a scenario", remedy))
     }
 
     /// An error at a span of the text.

@@ -24,7 +24,8 @@ pub(crate) struct ManyArgs {
     #[arg(long, value_name = "PRECISION", conflicts_with = "replicate")]
     pub(crate) until: Option<Until>,
 
-    /// Runs of each variant at most, with --until [default: 1000]
+    /// Runs of each variant at most, where a precision ends them: with --until, or where the file
+    /// has `[until]` [default: 1000]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub(crate) max: Option<u32>,
 

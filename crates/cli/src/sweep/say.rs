@@ -212,14 +212,13 @@ pub(super) fn say_share(
         "share": shard.to_string(),
         "runs": table.runs(),
         "failed": failed,
-        "took": effort.json(),
+        "took": (effort.runs > 0).then(|| effort.json()),
     });
     console.result(&json, || {
+        let time = (effort.runs > 0).then(|| ("time".to_string(), effort.words()));
+        let time: Vec<_> = time.into_iter().collect();
         let runs = grouped(table.runs() as u64);
-        format!(
-            "Share {shard} is finished: {runs} runs\n{}",
-            aligned(&[("time".into(), effort.words())])
-        )
+        format!("Share {shard} is finished: {runs} runs\n{}", aligned(&time))
     });
     Ok(if failed == 0 { ExitCode::Done } else { ExitCode::Failed })
 }

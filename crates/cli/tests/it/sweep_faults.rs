@@ -116,6 +116,20 @@ fn ctrl_c_keeps_finished_runs_and_resume_goes_on() {
 }
 
 #[test]
+fn ctrl_c_while_a_sweep_is_planned_leaves_nothing() {
+    let place = place();
+    let before = place.names();
+    let cycles: Vec<String> = (1..20_000).map(|n| n.to_string()).collect();
+    let vary = format!("cycles={}", cycles.join(","));
+    let child = place.start(&["sweep", "plan", "s.toml", "--vary", &vary, "--out", "d"]);
+    wait_for("the first variants", || place.names().len() > before.len());
+    signal(&child, "INT");
+    let ended = child.wait_with_output().expect("ended");
+    assert_eq!(ended.status.code(), Some(130), "{}", String::from_utf8_lossy(&ended.stderr));
+    assert_eq!(place.names(), before);
+}
+
+#[test]
 fn two_processes_do_not_run_one_share() {
     let place = place();
     let args = ["sweep", "sweep.toml", "--replicate", "400", "--out", "d"];
