@@ -65,16 +65,14 @@
 //! [`kernel::Simulation::record`] a [`kernel::ports::Recorder`]: the one in memory is here, the
 //! one that writes Parquet is in the crate `sidestep-record`.
 
-pub mod collectives;
 pub mod experiment;
-pub mod import;
-pub mod learn;
-pub mod map;
-pub mod office;
-pub mod planning;
-pub mod scenario;
-pub mod statistics;
 pub mod worlds;
 
-pub use map::{Cell, GridMap};
+pub use sidestep_collectives as collectives;
+pub use sidestep_import as import;
 pub use sidestep_kernel as kernel;
+pub use sidestep_map as map;
+pub use sidestep_map::{Cell, GridMap, office, planning};
+pub use sidestep_robots::learn;
+pub use sidestep_scenario as scenario;
+pub use sidestep_statistics as statistics;

@@ -3,7 +3,6 @@
 //! ```text
 //! farm.rs            runs over workers, results by index
 //! estimate.rs        a mean with its 95 % interval and the number of runs behind it
-//! least_squares.rs   linear models fitted to measurements
 //! claim.rs           a paper's claims, each with a verdict
 //! figure.rs          what to draw and what to print, as plain data
 //! document.rs        a report: text, tables, figures, pictures and claims in their order
@@ -22,7 +21,6 @@ pub mod document;
 pub mod estimate;
 pub mod farm;
 pub mod figure;
-pub mod least_squares;
 pub mod loria;
 pub mod methods;
 pub mod serpentine;

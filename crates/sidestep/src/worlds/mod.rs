@@ -1,6 +1,5 @@
 //! The worlds. They stand side by side on the kernel and never import each other.
 
-pub mod airspace;
 pub mod any;
-pub mod chain;
-pub mod robots;
+
+pub use {sidestep_airspace as airspace, sidestep_chain as chain, sidestep_robots as robots};

@@ -7,6 +7,7 @@ use sidestep::kernel::Simulation;
 use sidestep::scenario::Source;
 use sidestep::worlds::airspace::simulation::AirspaceSimulation;
 use sidestep::worlds::airspace::traffic::{from_bluesky, from_tracks, has_length};
+use sidestep_testing::shared_data as shared;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
@@ -316,17 +317,6 @@ fn wrong_tracks_and_orders_are_refused_with_a_remedy() {
         let error = AirspaceSimulation::new(&source, 1).expect_err(&airplanes).to_string();
         assert!(error.contains(remedy), "{airplanes}: {error}");
     }
-}
-
-/// A file or folder of the shared data, or `None` where that is not at hand.
-fn shared(name: &str) -> Option<PathBuf> {
-    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data");
-    let path = PathBuf::from(folder).join(name);
-    if !path.exists() {
-        println!("skipped: ../shared/data is not here");
-        return None;
-    }
-    Some(path)
 }
 
 #[test]

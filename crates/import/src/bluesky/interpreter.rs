@@ -1,0 +1,507 @@
+//! What the commands of a scenario do.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use super::lines::Command;
+use super::values::{
+    Arguments, altitude_ft, heading_deg, is_latitude, number, positive, speed, switch,
+};
+use super::{
+    Change, MAX_AIRCRAFT, MAX_WAY_POINTS, Place, Resolution, ScnAircraft, ScnFile, Speed,
+    UnplacedAircraft, UnresolvedPlace, WayPoint, Wind, synthetic,
+};
+use crate::local_plane::LatLon;
+use crate::table::Word;
+use sidestep_kernel::InputError;
+
+/// Commands to one aircraft, which may stand in front of them.
+const AIRCRAFT_COMMANDS: [&str; 27] = [
+    "ADDWPT", "AFTER", "ALT", "AT", "ATALT", "ATDIST", "ATSPD", "BEFORE", "DEL", "DELETE",
+    "DELRTE", "DELWPT", "DEST", "DIRECT", "HDG", "HEADING", "LISTRTE", "LNAV", "MOVE", "ORIG",
+    "POS", "SPD", "SPEED", "SWTOC", "TURN", "VNAV", "VS",
+];
+
+/// Commands that change or ask for a display.
+const DISPLAY_COMMANDS: [&str; 12] = [
+    "ECHO",
+    "FILTERALT",
+    "LABEL",
+    "LISTRTE",
+    "PAN",
+    "POS",
+    "SSD",
+    "SWRAD",
+    "SYMBOL",
+    "TRAIL",
+    "TRAILS",
+    "ZOOM",
+];
+
+/// Modes that `ADDWPT` takes in the place of a way-point. All are flown by, so both say nothing.
+const TURN_MODES: [&str; 2] = ["FLYBY", "FLYOVER"];
+
+/// How a command ended.
+enum Outcome {
+    Done,
+    /// It is not acted on; counted under this name.
+    NotUnderstood(String),
+}
+
+/// Why a command did nothing.
+enum Problem {
+    Unparsed(InputError),
+    Refused(InputError),
+}
+
+impl From<InputError> for Problem {
+    fn from(error: InputError) -> Self {
+        Self::Unparsed(error)
+    }
+}
+
+type Done = Result<Outcome, Problem>;
+
+/// An aircraft that is being built.
+struct Draft {
+    aircraft: ScnAircraft,
+    /// Where it starts when that is not known.
+    unresolved_start: Option<String>,
+}
+
+/// Carries out commands in their order.
+pub(super) struct Interpreter<'p> {
+    place: &'p dyn fmt::Display,
+    file: ScnFile,
+    drafts: Vec<Draft>,
+    /// The last draft of each identifier.
+    by_id: BTreeMap<String, usize>,
+    /// What `DEFWPT` has defined.
+    defined: BTreeMap<String, LatLon>,
+}
+
+impl<'p> Interpreter<'p> {
+    pub(super) fn new(place: &'p dyn fmt::Display, file: ScnFile) -> Self {
+        let (drafts, by_id, defined) = Default::default();
+        Self { place, file, drafts, by_id, defined }
+    }
+
+    /// Carries out `commands`, which are sorted by time.
+    pub(super) fn run(mut self, commands: Vec<Command>) -> ScnFile {
+        for command in commands {
+            self.execute(command);
+        }
+        for Draft { aircraft, unresolved_start } in self.drafts {
+            match unresolved_start {
+                None => self.file.traffic.aircraft.push(aircraft),
+                Some(place) => {
+                    self.file.traffic.unplaced.push(UnplacedAircraft { place, aircraft });
+                }
+            }
+        }
+        self.file
+    }
+
+    fn execute(&mut self, command: Command) {
+        let time_s = command.time_s;
+        let (name, mut arguments) = self.name_and_arguments(command.words);
+        count(&mut self.file.commands, name.clone());
+        if is_display(&name) {
+            return count(&mut self.file.ignored, name);
+        }
+        match self.act(&name, time_s, &mut arguments) {
+            Ok(Outcome::Done) => {}
+            Ok(Outcome::NotUnderstood(what)) => count(&mut self.file.not_understood, what),
+            Err(Problem::Unparsed(error)) => self.file.unparsed.push(error),
+            Err(Problem::Refused(error)) => self.file.refused.push(error),
+        }
+    }
+
+    /// Brings an aircraft that stands in front of its command behind it.
+    fn name_and_arguments<'a>(&self, mut words: Vec<Word<'a>>) -> (String, Arguments<'a>)
+    where
+        'p: 'a,
+    {
+        let first = upper(words[0]);
+        let second = words.get(1).map(|word| upper(*word));
+        // An aircraft of whose creation we do not know, as by MCRE, is told by the command.
+        let is_aircraft = self.by_id.contains_key(&first)
+            || (!is_command(&first)
+                && second.as_ref().is_some_and(|name| AIRCRAFT_COMMANDS.contains(&&**name)));
+        let (name, command) = match (is_aircraft, second) {
+            (false, _) => (first, words.remove(0)),
+            (true, Some(name)) => (name, words.remove(1)),
+            (true, None) => ("POS".to_string(), words[0]),
+        };
+        (name, Arguments::new(self.place, command, words))
+    }
+
+    fn act(&mut self, name: &str, time_s: f64, arguments: &mut Arguments) -> Done {
+        match name {
+            "CRE" | "CREATE" => self.create(time_s, arguments),
+            "DEL" | "DELETE" => self.delete(time_s, arguments),
+            "DEFWPT" => self.define(arguments),
+            "ADDWPT" => self.add_way_point(time_s, arguments),
+            "AFTER" => self.add_way_point_after(time_s, arguments),
+            "ORIG" | "DEST" => self.set_end(name, time_s, arguments),
+            "HDG" | "HEADING" | "TURN" | "SPD" | "SPEED" | "ALT" | "VS" | "LNAV" | "VNAV" => {
+                self.change(name, time_s, arguments)
+            }
+            "SYN" => self.synthesize(time_s, arguments),
+            "ASAS" | "CDMETHOD" | "RESO" | "ZONER" | "ZONEDH" | "DTLOOK" | "NOISE" => {
+                self.set(name, arguments)
+            }
+            "WIND" => self.add_wind(arguments),
+            "" => {
+                let cause = "the command has no name".to_string();
+                Err(arguments.command.error(self.place, cause, "remove the comma").into())
+            }
+            _ => Ok(Outcome::NotUnderstood(name.to_string())),
+        }
+    }
+
+    /// `CRE aircraft,type,place[,heading[,altitude[,speed]]]`
+    fn create(&mut self, time_s: f64, arguments: &mut Arguments) -> Done {
+        let id = arguments.required("an aircraft")?;
+        let kind = arguments.next().map_or(String::new(), |word| word.text.to_owned());
+        let place = self.place(arguments)?;
+        let aircraft = ScnAircraft {
+            id: upper(id),
+            kind,
+            created_s: time_s,
+            lat_deg: place.position().map_or(0.0, |position| position.lat_deg),
+            lon_deg: place.position().map_or(0.0, |position| position.lon_deg),
+            heading_deg: arguments.optional(heading_deg)?.unwrap_or(0.0),
+            altitude_ft: arguments.optional(altitude_ft)?.unwrap_or(0.0),
+            speed: arguments.optional(speed)?.unwrap_or(Speed::CasKt(0.0)),
+            way_points: Vec::new(),
+            origin: None,
+            destination: None,
+            destination_s: None,
+            changes: Vec::new(),
+            deleted_s: None,
+        };
+        let unresolved_start = match &place {
+            Place::Unresolved(name) => Some(name.clone()),
+            _ => None,
+        };
+        self.admit(id, Draft { aircraft, unresolved_start })?;
+        self.note_unresolved(arguments.command, Some(id.text), &place);
+        Ok(Outcome::Done)
+    }
+
+    /// Takes a new aircraft in, where `word` asks for it.
+    fn admit(&mut self, word: Word, draft: Draft) -> Result<(), Problem> {
+        if self.drafts.len() >= MAX_AIRCRAFT {
+            let cause = format!("this is more than {MAX_AIRCRAFT} aircraft");
+            return Err(self.refused(word, cause, "create fewer"));
+        }
+        let id = draft.aircraft.id.clone();
+        if let Some(&earlier) = self.by_id.get(&id)
+            && self.drafts[earlier].aircraft.deleted_s.is_none()
+        {
+            let cause = format!("aircraft {id} exists already");
+            return Err(self.refused(word, cause, "delete it first, or take another identifier"));
+        }
+        self.by_id.insert(id, self.drafts.len());
+        self.drafts.push(draft);
+        Ok(())
+    }
+
+    /// `DEL aircraft,...` or `DEL WIND`
+    fn delete(&mut self, time_s: f64, arguments: &mut Arguments) -> Done {
+        if arguments.peek().is_some_and(|word| word.eq_ignore_ascii_case("WIND")) {
+            self.file.traffic.wind.clear();
+            return Ok(Outcome::Done);
+        }
+        loop {
+            let index = self.existing(arguments)?;
+            self.drafts[index].aircraft.deleted_s = Some(time_s);
+            if arguments.remaining() == 0 {
+                return Ok(Outcome::Done);
+            }
+        }
+    }
+
+    /// The next argument, an aircraft that is there.
+    fn existing(&self, arguments: &mut Arguments) -> Result<usize, Problem> {
+        let word = arguments.required("an aircraft")?;
+        let found = self.by_id.get(&upper(word)).copied();
+        let why = match found {
+            Some(index) if self.drafts[index].aircraft.deleted_s.is_none() => return Ok(index),
+            Some(_) => "was deleted before",
+            None => "was not created before",
+        };
+        let cause = format!("aircraft {} {why}", word.text);
+        Err(self.refused(word, cause, "check the identifier and the times"))
+    }
+
+    /// `DEFWPT name,place`
+    fn define(&mut self, arguments: &mut Arguments) -> Done {
+        let name = arguments.required("a name")?;
+        let place = self.place(arguments)?;
+        if let Some(position) = place.position() {
+            self.defined.insert(upper(name), position);
+        }
+        self.note_unresolved(arguments.command, None, &place);
+        Ok(Outcome::Done)
+    }
+
+    /// `ADDWPT aircraft,place[,altitude[,speed[,after]]]`
+    fn add_way_point(&mut self, time_s: f64, arguments: &mut Arguments) -> Done {
+        let id = arguments.peek();
+        let index = self.existing(arguments)?;
+        let mode = arguments.peek().unwrap_or("").to_ascii_uppercase();
+        if TURN_MODES.contains(&&*mode) {
+            return Ok(Outcome::Done);
+        }
+        let way_point = self.way_point(time_s, arguments)?;
+        let after = arguments.next();
+        self.insert(index, way_point, after, (arguments.command, id))
+    }
+
+    /// `AFTER aircraft,after,ADDWPT,place[,altitude[,speed]]`
+    fn add_way_point_after(&mut self, time_s: f64, arguments: &mut Arguments) -> Done {
+        let id = arguments.peek();
+        let index = self.existing(arguments)?;
+        let after = arguments.required("a way-point of the route")?;
+        let what = upper(arguments.required("ADDWPT")?);
+        if what != "ADDWPT" {
+            return Ok(Outcome::NotUnderstood(format!("AFTER {what}")));
+        }
+        let way_point = self.way_point(time_s, arguments)?;
+        self.insert(index, way_point, Some(after), (arguments.command, id))
+    }
+
+    fn way_point(&self, added_s: f64, arguments: &mut Arguments) -> Result<WayPoint, InputError> {
+        Ok(WayPoint {
+            place: self.place(arguments)?,
+            altitude_ft: arguments.optional(altitude_ft)?,
+            speed: arguments.optional(speed)?,
+            added_s,
+        })
+    }
+
+    /// Inserts into a route behind the last way-point called `after`, or at its end.
+    fn insert(
+        &mut self,
+        index: usize,
+        way_point: WayPoint,
+        after: Option<Word>,
+        (command, id): (Word, Option<&str>),
+    ) -> Done {
+        let route = &self.drafts[index].aircraft.way_points;
+        if route.len() >= MAX_WAY_POINTS {
+            let cause = format!("the route has more than {MAX_WAY_POINTS} way-points");
+            return Err(self.refused(command, cause, "write fewer"));
+        }
+        let mut slot = route.len();
+        if let Some(after) = after {
+            let name = upper(after);
+            let found = route.iter().rposition(|earlier| earlier.place.name() == Some(&name));
+            let Some(found) = found else {
+                let cause = format!("no way-point {name} is on the route");
+                return Err(self.refused(after, cause, "add that one first"));
+            };
+            slot = found + 1;
+        }
+        self.note_unresolved(command, id, &way_point.place);
+        self.drafts[index].aircraft.way_points.insert(slot, way_point);
+        Ok(Outcome::Done)
+    }
+
+    /// `ORIG aircraft,place` and `DEST aircraft,place`
+    fn set_end(&mut self, name: &str, time_s: f64, arguments: &mut Arguments) -> Done {
+        let id = arguments.peek();
+        let index = self.existing(arguments)?;
+        if arguments.remaining() == 0 {
+            return Ok(Outcome::Done);
+        }
+        let place = self.place(arguments)?;
+        self.note_unresolved(arguments.command, id, &place);
+        let aircraft = &mut self.drafts[index].aircraft;
+        if name == "ORIG" {
+            aircraft.origin = Some(place);
+        } else {
+            (aircraft.destination, aircraft.destination_s) = (Some(place), Some(time_s));
+        }
+        Ok(Outcome::Done)
+    }
+
+    /// `HDG aircraft,heading` and the like. Without a value they ask and change nothing.
+    fn change(&mut self, name: &str, time_s: f64, arguments: &mut Arguments) -> Done {
+        let index = self.existing(arguments)?;
+        let change = match name {
+            "HDG" | "HEADING" | "TURN" => arguments.optional(heading_deg)?.map(Change::HeadingDeg),
+            "SPD" | "SPEED" => arguments.optional(speed)?.map(Change::Speed),
+            "ALT" => arguments.optional(altitude_ft)?.map(Change::AltitudeFt),
+            "LNAV" => arguments.optional(switch)?.map(Change::LateralNavigation),
+            "VNAV" => arguments.optional(switch)?.map(Change::VerticalNavigation),
+            _ => arguments.optional(number)?.map(Change::VerticalSpeedFpm),
+        };
+        // ALT may give the vertical speed as well.
+        let climb = if name == "ALT" { arguments.optional(number)? } else { None };
+        let changes = change.into_iter().chain(climb.map(Change::VerticalSpeedFpm));
+        self.drafts[index].aircraft.changes.extend(changes.map(|change| (time_s, change)));
+        Ok(Outcome::Done)
+    }
+
+    /// `SYN SUPER n`, `SYN WALL`, `SYN MATRIX n`
+    fn synthesize(&mut self, time_s: f64, arguments: &mut Arguments) -> Done {
+        let variant = arguments.required("SUPER, WALL or MATRIX")?;
+        let spacing_nm = self.file.traffic.zone_radius_nm;
+        let aircraft = match upper(variant).as_str() {
+            "SUPER" => synthetic::super_conflict(self.size(arguments, 1)?, time_s),
+            "WALL" => synthetic::wall(spacing_nm, time_s),
+            "MATRIX" => synthetic::matrix(self.size(arguments, 4)?, spacing_nm, time_s),
+            other => return Ok(Outcome::NotUnderstood(format!("SYN {other}"))),
+        };
+        if aircraft.iter().any(|one| one.lat_deg.abs() > 90.0 || one.lon_deg.abs() > 180.0) {
+            let cause = "the pattern is larger than the earth".to_string();
+            return Err(self.refused(variant, cause, "take a smaller number or a smaller ZONER"));
+        }
+        for aircraft in aircraft {
+            self.admit(variant, Draft { aircraft, unresolved_start: None })?;
+        }
+        Ok(Outcome::Done)
+    }
+
+    /// The size of a pattern that has `per_size` aircraft for each unit of it.
+    fn size(&self, arguments: &mut Arguments, per_size: usize) -> Result<u32, Problem> {
+        let word = arguments.required("a number of aircraft")?;
+        let size = word.integer(&self.place)?;
+        if size == 0 || (size as usize).saturating_mul(per_size) > MAX_AIRCRAFT {
+            let cause = format!("a pattern has 1 to {MAX_AIRCRAFT} aircraft");
+            return Err(self.refused(word, cause, "take another number"));
+        }
+        Ok(size)
+    }
+
+    /// A setting. Without a value it asks and changes nothing.
+    fn set(&mut self, name: &str, arguments: &mut Arguments) -> Done {
+        if arguments.peek().is_none() {
+            return Ok(Outcome::Done);
+        }
+        let value = arguments.required("a value")?;
+        let place = self.place;
+        if name == "RESO" {
+            self.file.traffic.resolution = Some(self.resolution(value)?);
+            return Ok(Outcome::Done);
+        }
+        let traffic = &mut self.file.traffic;
+        match name {
+            "ZONER" => traffic.zone_radius_nm = positive(place, value)?,
+            "ZONEDH" => traffic.zone_half_height_ft = positive(place, value)?,
+            "DTLOOK" => traffic.lookahead_s = positive(place, value)?,
+            "NOISE" => traffic.noise = switch(place, value)?,
+            _ if upper(value) == "STATEBASED" => traffic.detection = Some(true),
+            _ => traffic.detection = Some(switch(place, value)?),
+        }
+        Ok(Outcome::Done)
+    }
+
+    fn resolution(&self, word: Word) -> Result<Resolution, Problem> {
+        match upper(word).as_str() {
+            "OFF" => Ok(Resolution::Off),
+            "MVP" => Ok(Resolution::Mvp),
+            "SSD" => Ok(Resolution::Ssd),
+            "EBY" => Ok(Resolution::Eby),
+            other => {
+                let cause = format!("no resolution method `{other}` is known");
+                Err(self.refused(word, cause, "take OFF, MVP, SSD or EBY"))
+            }
+        }
+    }
+
+    /// `WIND place,direction,speed`, or `WIND place` and for each altitude
+    /// `altitude,direction,speed`, where the altitude may be left out.
+    fn add_wind(&mut self, arguments: &mut Arguments) -> Done {
+        let place = self.place(arguments)?;
+        let has_altitudes = arguments.remaining() != 2;
+        let mut winds = Vec::new();
+        let position = place.position().unwrap_or(LatLon { lat_deg: 0.0, lon_deg: 0.0 });
+        loop {
+            let altitude_ft = if has_altitudes { arguments.optional(altitude_ft)? } else { None };
+            let from = arguments.required("the direction the wind blows from")?;
+            let speed = arguments.required("the wind's speed in kt")?;
+            winds.push(Wind {
+                position,
+                altitude_ft,
+                from_deg: heading_deg(self.place, from)?,
+                speed_kt: number(self.place, speed)?,
+            });
+            if arguments.remaining() == 0 {
+                break;
+            }
+        }
+        self.note_unresolved(arguments.command, None, &place);
+        if place.position().is_some() {
+            self.file.traffic.wind.append(&mut winds);
+        }
+        Ok(Outcome::Done)
+    }
+
+    /// A latitude and a longitude, a defined way-point, or a name with or without a runway.
+    fn place(&self, arguments: &mut Arguments) -> Result<Place, InputError> {
+        let next = arguments.peek().unwrap_or("").to_ascii_uppercase();
+        if let Some(&position) = self.defined.get(&next) {
+            arguments.next();
+            return Ok(Place::Defined { name: next, position });
+        }
+        if is_latitude(&next) {
+            return Ok(Place::At(arguments.lat_lon()?));
+        }
+        let mut name = upper(arguments.required("a place")?);
+        let runway = arguments.peek().unwrap_or("").to_ascii_uppercase();
+        if is_runway(&runway) {
+            arguments.next();
+            name = format!("{name} {runway}");
+        }
+        Ok(Place::Unresolved(name))
+    }
+
+    /// Lists a place that has no position.
+    fn note_unresolved(&mut self, command: Word, aircraft: Option<&str>, place: &Place) {
+        if let Place::Unresolved(name) = place {
+            self.file.unresolved_places.push(UnresolvedPlace {
+                name: name.clone(),
+                command: upper(command),
+                aircraft: aircraft.map(str::to_ascii_uppercase),
+                line: command.line,
+            });
+        }
+    }
+
+    fn refused(&self, word: Word, cause: String, remedy: &str) -> Problem {
+        Problem::Refused(word.error(self.place, cause, remedy))
+    }
+}
+
+fn upper(word: Word) -> String {
+    word.text.to_ascii_uppercase()
+}
+
+fn count(counts: &mut BTreeMap<String, u64>, name: String) {
+    *counts.entry(name).or_default() += 1;
+}
+
+/// Whether a command is about the display only: a name of the list, or zooming with `+` and `-`.
+fn is_display(name: &str) -> bool {
+    let is_zoom = !name.is_empty() && name.chars().all(|c| "+-=".contains(c));
+    is_zoom || DISPLAY_COMMANDS.contains(&name)
+}
+
+/// Whether a word in front is a command and no aircraft.
+fn is_command(name: &str) -> bool {
+    const OTHERS: [&str; 12] = [
+        "ASAS", "CDMETHOD", "CRE", "CREATE", "DEFWPT", "DTLOOK", "NOISE", "RESO", "SYN", "WIND",
+        "ZONEDH", "ZONER",
+    ];
+    is_display(name) || AIRCRAFT_COMMANDS.contains(&name) || OTHERS.contains(&name)
+}
+
+/// `RW18L` or `RWY18L`.
+fn is_runway(name: &str) -> bool {
+    let number = name.strip_prefix("RWY").or_else(|| name.strip_prefix("RW"));
+    number.is_some_and(|number| number.starts_with(|c: char| c.is_ascii_digit()))
+}

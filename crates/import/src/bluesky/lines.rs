@@ -1,0 +1,242 @@
+//! From the text of a scenario to time-stamped commands with their words.
+
+use std::borrow::Cow;
+use std::fmt;
+
+use crate::table::Word;
+use sidestep_kernel::InputError;
+
+/// Lines with fewer characters are skipped, as the scenarios' own simulator does.
+const MIN_LINE_CHARS: usize = 10;
+
+/// The longest line in bytes, continued ones together. Bounds the time to find a word's column.
+const MAX_LINE_BYTES: usize = 10_000;
+
+/// What separates words besides the comma.
+const BLANKS: [char; 2] = [' ', '\t'];
+
+/// One command and its words, the first of which is its name or an aircraft.
+#[derive(Debug)]
+pub(super) struct Command<'a> {
+    /// Seconds since the start of the scenario.
+    pub(super) time_s: f64,
+    /// At least one. An argument that is left out is an empty word.
+    pub(super) words: Vec<Word<'a>>,
+}
+
+/// A line with all its continuations, without comment.
+#[derive(Debug, Default)]
+pub(super) struct Line<'a> {
+    text: Cow<'a, str>,
+    /// For each physical line its first byte in `text` and its number from 1.
+    pieces: Vec<(usize, usize)>,
+}
+
+/// The lines that hold commands, and how many were skipped for being short.
+pub(super) fn join_lines(text: &str) -> (Vec<Line<'_>>, u64) {
+    let mut lines: Vec<Line> = Vec::new();
+    let mut short_lines = 0;
+    let mut is_continued = false;
+    for (number, physical) in physical_lines(text) {
+        let content = before_comment(physical);
+        if content.trim().is_empty() {
+            continue;
+        }
+        // A short line is skipped only where it starts one: the end of a continued line counts.
+        if !is_continued && physical.trim().chars().count() < MIN_LINE_CHARS {
+            short_lines += 1;
+            continue;
+        }
+        let (content, continues) = match content.trim_end().strip_suffix('\\') {
+            Some(content) => (content, true),
+            None => (content, false),
+        };
+        match lines.last_mut().filter(|_| is_continued) {
+            Some(line) => line.append(number, content),
+            None => lines.push(Line { text: content.into(), pieces: vec![(0, number)] }),
+        }
+        is_continued = continues;
+    }
+    (lines, short_lines)
+}
+
+/// Lines and their numbers from 1. They end with LF, CR LF, CR CR LF or a lone CR: files from
+/// three systems are around, and some went through two of them.
+fn physical_lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    let ended_by_lf = text.split('\n').map(|line| line.trim_end_matches('\r'));
+    ended_by_lf.flat_map(|line| line.split('\r')).enumerate().map(|(i, line)| (i + 1, line))
+}
+
+fn before_comment(line: &str) -> &str {
+    line.split('#').next().unwrap_or("")
+}
+
+impl<'a> Line<'a> {
+    /// Adds a continuation exactly as it stands, its leading blanks included.
+    fn append(&mut self, number: usize, content: &str) {
+        if self.text.len() <= MAX_LINE_BYTES {
+            self.pieces.push((self.text.len(), number));
+            self.text.to_mut().push_str(content);
+        }
+    }
+
+    /// The commands on this line.
+    pub(super) fn commands(
+        &self,
+        place: &dyn fmt::Display,
+    ) -> Result<Vec<Command<'_>>, InputError> {
+        if self.text.len() > MAX_LINE_BYTES {
+            let cause = format!("the line has more than {MAX_LINE_BYTES} bytes");
+            let error = InputError::new(place, cause, "write one command per line");
+            return Err(error.at(self.pieces[0].1, 1));
+        }
+        let Some((stamp, content)) = self.text.split_once('>') else {
+            let word = self.word(self.text.trim());
+            return Err(word.error(place, "no `>` behind a time".to_string(), STAMP_REMEDY));
+        };
+        let time_s = parse_stamp(place, self.word(stamp.trim()))?;
+        let commands =
+            content.split(';').map(|command| Command { time_s, words: self.words(command) });
+        Ok(commands.filter(|command| !command.words.is_empty()).collect())
+    }
+
+    /// Splits at blanks, at commas with blanks around them, or both; two commas with nothing
+    /// between leave an argument out.
+    fn words(&self, command: &str) -> Vec<Word<'_>> {
+        let mut words = Vec::new();
+        let mut rest = command.trim_matches(BLANKS);
+        while !rest.is_empty() {
+            let end = rest.find([',', ' ', '\t']).unwrap_or(rest.len());
+            words.push(self.word(&rest[..end]));
+            rest = rest[end..].trim_start_matches(BLANKS);
+            rest = rest.strip_prefix(',').unwrap_or(rest).trim_start_matches(BLANKS);
+        }
+        words
+    }
+
+    /// `part` of this line's text with its place in the file.
+    fn word(&self, part: &str) -> Word<'_> {
+        let offset = part.as_ptr() as usize - self.text.as_ptr() as usize;
+        let piece = self.pieces.iter().rev().find(|(start, _)| *start <= offset);
+        let &(start, line) = piece.unwrap_or(&self.pieces[0]);
+        let column = self.text[start..offset].chars().count() + 1;
+        Word { text: &self.text[offset..offset + part.len()], line, column }
+    }
+}
+
+const STAMP_REMEDY: &str = "start the line with a time such as 00:01:30.00>";
+
+/// `HH:MM:SS.ss` in seconds; one digit per part is enough.
+fn parse_stamp(place: &dyn fmt::Display, stamp: Word) -> Result<f64, InputError> {
+    let parts: Vec<&str> = stamp.text.split(':').map(str::trim).collect();
+    let seconds = match parts[..] {
+        [hours, minutes, seconds] => hours
+            .parse::<u32>()
+            .ok()
+            .zip(minutes.parse::<u32>().ok())
+            .zip(seconds.parse::<f64>().ok().filter(|seconds| (0.0..1e9).contains(seconds))),
+        _ => None,
+    };
+    let Some(((hours, minutes), seconds)) = seconds else {
+        let cause = "no time of the form HH:MM:SS.ss in front of `>`".to_string();
+        return Err(stamp.error(place, cause, STAMP_REMEDY));
+    };
+    Ok(f64::from(hours) * 3600.0 + f64::from(minutes) * 60.0 + seconds)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Time and words of each command; words joined with `|`.
+    fn read(text: &str) -> Vec<(f64, String)> {
+        let (lines, _) = join_lines(text);
+        let commands = lines.iter().flat_map(|line| {
+            line.commands(&"f.scn").unwrap().into_iter().map(|command| {
+                let words: Vec<_> = command.words.iter().map(|word| word.text).collect();
+                (command.time_s, words.join("|"))
+            })
+        });
+        commands.collect()
+    }
+
+    fn words(command: &str) -> String {
+        read(&format!("00:00:00.00>{command}\n")).remove(0).1
+    }
+
+    #[test]
+    fn stamps_may_have_blanks_one_digit_and_fractions() {
+        for (stamp, time_s) in
+            [("00:00:26.9", 26.9), (" 0:15:00.00", 900.0), ("1:01:01", 3661.0), ("0:0:90.", 90.0)]
+        {
+            assert_eq!(read(&format!("{stamp}>HOLD IT")), [(time_s, "HOLD|IT".to_string())]);
+        }
+    }
+
+    #[test]
+    fn wrong_stamps_and_lines_without_one_are_pointed_at() {
+        let wrong = [
+            ("CRE A B744 52 4", 1),
+            ("  00:00>CRE A B744", 3),
+            ("00:00:-1>CRE A B744", 1),
+            ("00:xx:00>CRE A B744", 1),
+            ("00:00:inf>CRE A B744", 1),
+        ];
+        for (text, column) in wrong {
+            let error = join_lines(text).0[0].commands(&"f.scn").unwrap_err();
+            assert_eq!(error.position(), Some((1, column)), "{text}");
+        }
+    }
+
+    #[test]
+    fn words_are_split_at_blanks_and_commas_and_two_commas_leave_one_out() {
+        assert_eq!(words("CRE A, B744,52  4.0 , 90"), "CRE|A|B744|52|4.0|90");
+        assert_eq!(words("WIND 0,,180 ,, 25"), "WIND|0||180||25");
+        assert_eq!(words("WIND 0, ,180"), "WIND|0||180");
+        assert_eq!(words("DEST OU106   ,EKKA"), "DEST|OU106|EKKA");
+        assert_eq!(words("ADDWPT,KL204,PAM,"), "ADDWPT|KL204|PAM");
+        assert_eq!(words(" TEST\tLNAV ON "), "TEST|LNAV|ON");
+    }
+
+    #[test]
+    fn semicolons_separate_commands_and_comments_end_them() {
+        let both = "0:00:00.00>SYN SUPER 8;TRAILS ON # and; this > not\n#0:00:00.00>HOLD\n # x\n";
+        let expected = [(0.0, "SYN|SUPER|8".to_string()), (0.0, "TRAILS|ON".to_string())];
+        assert_eq!(read(both), expected);
+        assert_eq!(read("0:00:00.00>;; HOLD ;").len(), 1);
+    }
+
+    #[test]
+    fn short_lines_are_skipped_and_counted() {
+        let (lines, short_lines) = join_lines("0:00:0>OP\n\n# note\n0:00:00>OP\n0:0:0>X \n");
+        assert_eq!((lines.len(), short_lines), (1, 2));
+    }
+
+    #[test]
+    fn every_kind_of_line_end_ends_a_line_once() {
+        for end in ["\n", "\r\n", "\r\r\n", "\r"] {
+            let text = format!("00:00:00.00>HOLD{end}00:00:01.00>OP{end}");
+            assert_eq!(read(&text).len(), 2, "{end:?}");
+            let (lines, _) = join_lines(&text);
+            assert_eq!(lines[1].commands(&"f").unwrap()[0].words[0].line, 2, "{end:?}");
+        }
+    }
+
+    #[test]
+    fn a_backslash_continues_a_line_and_words_keep_their_places() {
+        let text = "0:00:00.00>CRE A,B744, \\\n# between\n 52 4\\\n0 90\n0:00:00.00>OP\n";
+        assert_eq!(read(text)[0].1, "CRE|A|B744|52|40|90");
+        let (lines, _) = join_lines(text);
+        let command = lines[0].commands(&"f").unwrap().remove(0);
+        let places: Vec<_> = command.words.iter().map(|word| (word.line, word.column)).collect();
+        assert_eq!(places, [(1, 12), (1, 16), (1, 18), (3, 2), (3, 5), (4, 3)]);
+    }
+
+    #[test]
+    fn a_line_without_end_is_an_error_and_takes_no_memory() {
+        let text = format!("0:00:00.00>A{}", "A,\\\n".repeat(100_000));
+        let (lines, _) = join_lines(&text);
+        assert!(lines[0].text.len() < 2 * MAX_LINE_BYTES);
+        assert!(lines[0].commands(&"f").unwrap_err().cause().contains("bytes"));
+    }
+}

@@ -1,0 +1,436 @@
+//! Scenarios as a whole: hand-written ones for each rule, and real ones against what others
+//! have read from them.
+
+use sidestep_testing::shared_data as shared;
+
+use serde_json::Value;
+
+use super::*;
+use crate::local_plane::LocalPlane;
+
+/// A scenario with these commands at time 0, one per line.
+fn scenario(commands: &str) -> ScnFile {
+    let lines: Vec<String> =
+        commands.lines().map(|command| format!("00:00:00.00>{}", command.trim())).collect();
+    parse(&"f.scn", &lines.join("\n"))
+}
+
+/// The same, without anything that is wrong or not known.
+fn good(commands: &str) -> ScnFile {
+    let file = scenario(commands);
+    assert_eq!((&file.unparsed, &file.refused), (&vec![], &vec![]));
+    assert_eq!((&file.unresolved_places, file.not_understood.len()), (&vec![], 0));
+    file
+}
+
+fn at(lat_deg: f64, lon_deg: f64) -> LatLon {
+    LatLon { lat_deg, lon_deg }
+}
+
+fn counts(entries: &[(&str, u64)]) -> BTreeMap<String, u64> {
+    entries.iter().map(|&(name, count)| (name.to_string(), count)).collect()
+}
+
+#[test]
+fn an_aircraft_is_created_from_all_forms_of_values() {
+    let file = good("cre kl204, b747,52'30'00,E4.5 326.8t Fl100 M.8\nCRE A,,0.,-3.06e-17,*,*,250");
+    let [first, second] = &file.traffic.aircraft[..] else { panic!("{file:?}") };
+    assert_eq!((first.id.as_str(), first.kind.as_str()), ("KL204", "b747"));
+    assert_eq!((first.position(), first.heading_deg), (at(52.5, 4.5), 326.8));
+    assert_eq!((first.altitude_ft, first.speed), (10_000.0, Speed::Mach(0.8)));
+    assert_eq!((second.kind.as_str(), second.position()), ("", at(0.0, -3.06e-17)));
+    assert_eq!((second.heading_deg, second.altitude_ft), (0.0, 0.0));
+    assert_eq!(second.speed, Speed::CasKt(250.0));
+}
+
+#[test]
+fn an_aircraft_may_stand_in_front_and_alone_asks_for_its_position() {
+    let file = good("CRE KL204 B744 52 4 90 FL200 250\nkl204 ALT FL300 -500\nKL204\nPOS KL204");
+    let expected = [(0.0, Change::AltitudeFt(30_000.0)), (0.0, Change::VerticalSpeedFpm(-500.0))];
+    assert_eq!(file.traffic.aircraft[0].changes, expected);
+    assert_eq!(file.commands, counts(&[("CRE", 1), ("ALT", 1), ("POS", 2)]));
+    assert_eq!(file.ignored, counts(&[("POS", 2)]));
+}
+
+#[test]
+fn commands_take_effect_in_the_order_of_their_times() {
+    let text = "\
+        00:10:00>KL204 HDG 180\n\
+        00:01:00>SPD KL204 M0.7\n\
+        00:00:00>CRE KL204 B744 52 4 90 FL200 250\n\
+        00:01:00>VS KL204 -1000;LNAV KL204 OFF; VNAV KL204 ON\n\
+        00:20:00>DEL KL204\n\
+        00:30:00>CRE KL204 A320 0 0 0 0 200\n";
+    let file = parse(&"f.scn", text);
+    assert_eq!((&file.unparsed, &file.refused), (&vec![], &vec![]));
+    let expected = [
+        (60.0, Change::Speed(Speed::Mach(0.7))),
+        (60.0, Change::VerticalSpeedFpm(-1000.0)),
+        (60.0, Change::LateralNavigation(false)),
+        (60.0, Change::VerticalNavigation(true)),
+        (600.0, Change::HeadingDeg(180.0)),
+    ];
+    let [first, second] = &file.traffic.aircraft[..] else { panic!("{file:?}") };
+    assert_eq!(first.changes, expected);
+    assert_eq!((first.deleted_s, second.created_s), (Some(1200.0), 1800.0));
+    assert_eq!(second.deleted_s, None);
+    assert_eq!((file.command_lines, file.commands["VNAV"]), (6, 1));
+}
+
+#[test]
+fn routes_use_defined_way_points_and_coordinates() {
+    let file = good(
+        "DEFWPT home,52,4,FIX
+        CRE A B744 50 4 0 FL200 250
+        ADDWPT A HOME,FL100,.7
+        A ADDWPT 51 4.5,,220
+        ADDWPT A 50.5 4.25 3000,,HOME
+        ADDWPT A FLYBY
+        ORIG A 0.0 , 1.0
+        DEST A,home",
+    );
+    let aircraft = &file.traffic.aircraft[0];
+    let home = Place::Defined { name: "HOME".to_string(), position: at(52.0, 4.0) };
+    let way_point =
+        |place, altitude_ft, speed| WayPoint { place, altitude_ft, speed, added_s: 0.0 };
+    let expected = [
+        way_point(home.clone(), Some(10_000.0), Some(Speed::Mach(0.7))),
+        way_point(Place::At(at(50.5, 4.25)), Some(3000.0), None),
+        way_point(Place::At(at(51.0, 4.5)), None, Some(Speed::CasKt(220.0))),
+    ];
+    assert_eq!(aircraft.way_points, expected);
+    assert_eq!(aircraft.origin, Some(Place::At(at(0.0, 1.0))));
+    assert_eq!(aircraft.destination, Some(home));
+    let goals: Vec<LatLon> = aircraft.known_goals().collect();
+    assert_eq!(goals, [at(52.0, 4.0), at(50.5, 4.25), at(51.0, 4.5), at(52.0, 4.0)]);
+}
+
+#[test]
+fn places_of_a_navigation_database_are_kept_and_listed() {
+    let file = scenario(
+        "CRE A,B744,EHAM,RWY18L,*,0,0
+        A DEST lemd RW18R
+        CRE B B744 52 4 0 FL200 250
+        ADDWPT B SPL
+        ADDWPT B SPY,FL040,,SPL
+        B AFTER SPL ADDWPT PAM",
+    );
+    assert_eq!((&file.unparsed, &file.refused), (&vec![], &vec![]));
+    let [unplaced] = &file.traffic.unplaced[..] else { panic!("{file:?}") };
+    assert_eq!((unplaced.place.as_str(), unplaced.aircraft.id.as_str()), ("EHAM RWY18L", "A"));
+    let route = &file.traffic.aircraft[0].way_points;
+    let names: Vec<_> = route.iter().map(|way_point| way_point.place.name().unwrap()).collect();
+    assert_eq!(names, ["SPL", "PAM", "SPY"]);
+    assert_eq!(route[2].altitude_ft, Some(4000.0));
+    let listed: Vec<_> = file
+        .unresolved_places
+        .iter()
+        .map(|p| (p.name.as_str(), p.command.as_str(), p.aircraft.as_deref().unwrap(), p.line))
+        .collect();
+    let expected = [
+        ("EHAM RWY18L", "CRE", "A", 1),
+        ("LEMD RW18R", "DEST", "A", 2),
+        ("SPL", "ADDWPT", "B", 4),
+        ("SPY", "ADDWPT", "B", 5),
+        ("PAM", "AFTER", "B", 6),
+    ];
+    assert_eq!(listed, expected);
+}
+
+#[test]
+fn settings_are_read_and_the_last_one_holds() {
+    let quiet = good("").traffic;
+    assert_eq!((quiet.zone_radius_nm, quiet.zone_half_height_ft), (5.0, 1000.0));
+    assert_eq!((quiet.lookahead_s, quiet.detection, quiet.resolution), (300.0, None, None));
+    let file = good(
+        "ZONER 3;ZONER 5.5;zonedh 900;DTLOOK 120;noise on;ASAS OFF;CDMETHOD STATEBASED
+        RESO OFF;RESO eby;ZONER
+        WIND 0,1,,180,25
+        WIND 0,1,70,60
+        WIND 52 4 FL100 270 20 20000 280T 30",
+    );
+    let traffic = file.traffic;
+    assert_eq!((traffic.zone_radius_nm, traffic.zone_half_height_ft), (5.5, 900.0));
+    assert_eq!((traffic.lookahead_s, traffic.noise, traffic.detection), (120.0, true, Some(true)));
+    assert_eq!(traffic.resolution, Some(Resolution::Eby));
+    let wind = |position, altitude_ft, from_deg, speed_kt| Wind {
+        position,
+        altitude_ft,
+        from_deg,
+        speed_kt,
+    };
+    let expected = [
+        wind(at(0.0, 1.0), None, 180.0, 25.0),
+        wind(at(0.0, 1.0), None, 70.0, 60.0),
+        wind(at(52.0, 4.0), Some(10_000.0), 270.0, 20.0),
+        wind(at(52.0, 4.0), Some(20_000.0), 280.0, 30.0),
+    ];
+    assert_eq!(traffic.wind, expected);
+    assert_eq!(scenario("WIND 0,1,,180,25\nDEL WIND").traffic.wind, []);
+}
+
+#[test]
+fn commands_that_are_not_acted_on_are_counted() {
+    let file = scenario(
+        "PAN EHAM;++;+++;Trail ON;echo a, b
+        HOLD;FF;hold;SYN FLOOR;MCRE 2
+        CRE A B744 0 0 0 0 100
+        A ATSPD 300 A ALT 2000
+        XX1 ATALT 2000 A ALT 3000
+        AFTER A X,DELWPT
+        RESO SWARM",
+    );
+    assert_eq!(
+        file.ignored,
+        counts(&[("PAN", 1), ("++", 1), ("+++", 1), ("TRAIL", 1), ("ECHO", 1)])
+    );
+    let expected = [
+        ("HOLD", 2),
+        ("FF", 1),
+        ("SYN FLOOR", 1),
+        ("MCRE", 1),
+        ("ATSPD", 1),
+        ("ATALT", 1),
+        ("AFTER DELWPT", 1),
+    ];
+    assert_eq!(file.not_understood, counts(&expected));
+    assert_eq!(file.traffic.aircraft[0].changes, []);
+    assert!(file.refused[0].cause().contains("SWARM"));
+}
+
+#[test]
+fn what_is_wrong_is_pointed_at_and_the_rest_is_read() {
+    let text = "\
+        00:00:00.00>CRE A B744 52 four 0 0 100\n\
+        nonsense without a time\n\
+        00:00:00.00>CRE A B744 52 4 0 0 100\n\
+        00:00:00.00>CRE A B744 52 4 0 0 100\n\
+        00:00:00.00>ALT B FL100; HDG A north; DEL A; DEL A\n\
+        00:00:00.00>CRE\n\
+        00:00:00.00>ADDWPT C 52\n";
+    let file = parse(&"f.scn", text);
+    let places = |errors: &[InputError]| -> Vec<_> {
+        errors.iter().map(|error| error.position().unwrap()).collect()
+    };
+    assert_eq!(places(&file.unparsed), [(1, 27), (2, 1), (5, 32), (6, 13)]);
+    assert_eq!(places(&file.refused), [(4, 17), (5, 17), (5, 50), (7, 20)]);
+    assert_eq!(file.traffic.aircraft.len(), 1);
+}
+
+#[test]
+fn patterns_are_those_of_the_saved_scenarios() {
+    for (command, name) in [
+        ("SYN SUPER 8", "synthetics__super__super8.scn"),
+        ("SYN WALL", "synthetics__wall.scn"),
+        ("SYN MATRIX 4", "synthetics__matrix__matrix4.scn"),
+    ] {
+        let Some(path) = shared(&format!("airspace/bluesky/{name}")) else { return };
+        let (made, saved) = (good(command).traffic.aircraft, read(&path).unwrap().traffic.aircraft);
+        assert_eq!(made.len(), saved.len(), "{name}");
+        for (made, saved) in made.iter().zip(&saved) {
+            assert_eq!((&made.id, &made.kind), (&saved.id, &saved.kind), "{name}");
+            let plane = LocalPlane::about(saved.position());
+            let [east_m, north_m] = plane.to_plane_m(made.position());
+            assert!(east_m.abs() < 1.0 && north_m.abs() < 1.0, "{name}: {made:?}");
+            assert!((made.heading_deg - saved.heading_deg).abs() < 1e-9, "{name}: {made:?}");
+        }
+    }
+}
+
+#[test]
+fn the_goals_of_a_pattern_are_straight_ahead() {
+    let file = good("SYN SUPER 5\nZONER 3\nSYN WALL\nSYN MATRIX 2");
+    let aircraft = file.traffic.aircraft;
+    assert_eq!(aircraft.len(), 5 + 21 + 8);
+    assert!((aircraft[7].lat_deg - aircraft[6].lat_deg - 3.3 * 1852.0 / 111_319.0).abs() < 1e-9);
+    for one in aircraft {
+        let goal = one.known_goals().next().unwrap();
+        let [east, north] = LocalPlane::about(at(0.0, 0.0))
+            .to_plane_m(at(goal.lat_deg - one.lat_deg, goal.lon_deg - one.lon_deg));
+        let bearing_deg = sidestep_kernel::math::atan2(east, north).to_degrees();
+        let off_deg = (bearing_deg - one.heading_deg + 180.0).rem_euclid(360.0) - 180.0;
+        assert!(off_deg.abs() < 1e-6, "{one:?} {bearing_deg}");
+    }
+}
+
+#[test]
+fn a_route_without_end_is_refused() {
+    let file = scenario(&format!("CRE A B744 0 0{}", "\nADDWPT A 1 1".repeat(MAX_WAY_POINTS + 1)));
+    assert_eq!(file.traffic.aircraft[0].way_points.len(), MAX_WAY_POINTS);
+    assert_eq!(file.refused.len(), 1);
+}
+
+#[test]
+fn absurd_patterns_are_refused() {
+    for command in ["SYN SUPER 0", "SYN SUPER 100001", "SYN MATRIX 90000", "SYN MATRIX 2000"] {
+        let file = scenario(command);
+        assert_eq!((file.refused.len(), file.traffic.aircraft.len()), (1, 0), "{command}");
+    }
+    for command in
+        [",HOLD", "SYN", "SYN SUPER", "SYN SUPER x", "ZONER -1", "NOISE maybe", "WIND 0,0,9"]
+    {
+        assert_eq!(scenario(command).unparsed.len(), 1, "{command}");
+    }
+}
+
+/// What others have read from the shared files.
+fn expected(name: &str) -> Option<Value> {
+    let text = std::fs::read_to_string(shared(name)?).expect("readable");
+    Some(serde_json::from_str(&text).expect("JSON"))
+}
+
+fn number_of(value: &Value, key: &str) -> u64 {
+    value[key].as_u64().unwrap_or_else(|| panic!("{key} in {value}"))
+}
+
+fn as_counts(value: &Value) -> BTreeMap<String, u64> {
+    let entries = value.as_object().expect("an object").iter();
+    entries.map(|(name, count)| (name.clone(), count.as_u64().expect("a count"))).collect()
+}
+
+#[test]
+fn every_shared_scenario_reads_into_the_expected_commands() {
+    let Some(expected) = expected("expected/bluesky_parse.json") else { return };
+    let files = expected["files"].as_object().expect("files");
+    assert_eq!(files.len(), 33);
+    let mut totals = BTreeMap::new();
+    for (name, expected) in files {
+        let file = read(&shared(name).expect("the scenario")).expect(name);
+        assert_eq!(file.unparsed, [], "{name}");
+        assert_eq!(file.command_lines, number_of(expected, "command_lines"), "{name}");
+        assert_eq!(file.short_lines, 0, "{name}");
+        assert_eq!(file.commands, with_aircraft_in_front(expected), "{name}");
+        let created = file.commands.get("CRE").copied().unwrap_or(0);
+        assert_eq!(created, number_of(expected, "cre"), "{name}");
+        check_first_aircraft(name, &file, expected);
+        for (command, count) in file.commands {
+            *totals.entry(command).or_insert(0) += count;
+        }
+    }
+    assert_eq!(totals, as_counts(&expected["totals_dev"]));
+    assert_eq!((totals["CRE"], totals["DEST"], totals["ADDWPT"]), (1068, 879, 111));
+    assert_eq!((totals["DEL"], totals["ASAS"] + totals["CDMETHOD"]), (60, 21));
+}
+
+/// The expected counts, which list commands behind an aircraft apart.
+fn with_aircraft_in_front(expected: &Value) -> BTreeMap<String, u64> {
+    let mut commands = as_counts(&expected["commands"]);
+    commands.remove("ACID-FIRST");
+    for (command, count) in as_counts(&expected["acid_first"]) {
+        *commands.entry(command).or_insert(0) += count;
+    }
+    commands
+}
+
+fn check_first_aircraft(name: &str, file: &ScnFile, expected: &Value) {
+    let placed = file.traffic.aircraft.iter();
+    let unplaced = file.traffic.unplaced.iter().map(|unplaced| &unplaced.aircraft);
+    let all: Vec<&ScnAircraft> = placed.chain(unplaced).collect();
+    for row in expected["cre_first3"].as_array().expect("rows") {
+        let id = row[1].as_str().expect("an identifier").to_uppercase();
+        let aircraft = all.iter().find(|aircraft| aircraft.id == id);
+        let aircraft = aircraft.unwrap_or_else(|| panic!("{id} in {name}"));
+        assert_eq!(Some(aircraft.created_s), row[0].as_f64(), "{name} {id}");
+        assert_eq!(Some(aircraft.kind.as_str()), row[2].as_str(), "{name} {id}");
+        if let Some(Ok(lat_deg)) = row[3].as_str().map(str::parse::<f64>) {
+            assert_eq!(aircraft.lat_deg, lat_deg, "{name} {id}");
+        }
+    }
+}
+
+#[test]
+fn the_shared_scenarios_true_airspeeds_are_the_expected_ones() {
+    let Some(expected) = expected("expected/cd_initial.json") else { return };
+    let mut compared = 0;
+    for (name, expected) in expected["files"].as_object().expect("files") {
+        let file = read(&shared(name).expect("the scenario")).expect(name);
+        let speeds = expected["tas_kt_first3"].as_array().expect("speeds");
+        for (aircraft, expected_kt) in file.traffic.aircraft.iter().zip(speeds) {
+            let speed_kt = aircraft.speed.true_airspeed_mps(aircraft.altitude_ft) / KNOT_MPS;
+            // Above 20 km the expected values take the air as isothermal, which the standard
+            // atmosphere is not. The scenario's own author meant 200 m/s there, as we read it.
+            let is_high = aircraft.altitude_ft * FOOT_M > 20_001.0;
+            let expected_kt = expected_kt.as_f64().expect("a speed");
+            let expected_kt = if is_high { 200.0 / KNOT_MPS } else { expected_kt };
+            let id = &aircraft.id;
+            assert!((speed_kt - expected_kt).abs() < 0.01, "{name} {id}: {speed_kt} {expected_kt}");
+            compared += 1;
+        }
+    }
+    assert!(compared > 30, "{compared}");
+}
+
+/// A shared scenario by its name in the folder.
+fn shared_scenario(name: &str) -> Option<ScnFile> {
+    shared(&format!("airspace/bluesky/{name}")).map(|path| read(&path).expect(name))
+}
+
+#[test]
+fn a_super_conflict_is_as_fast_as_where_it_was_first_flown() {
+    let Some(file) = shared_scenario("ASAS__ASAS-SUPER4.scn") else { return };
+    assert_eq!(file.traffic.aircraft.len(), 4);
+    for one in &file.traffic.aircraft {
+        let speed_kt = one.speed.true_airspeed_mps(one.altitude_ft) / KNOT_MPS;
+        assert!((speed_kt - 510.71).abs() < 0.05, "{speed_kt}");
+    }
+}
+
+/// Only the demonstration asks for what cannot be done: it was recorded from traffic in which
+/// two identifiers came back, and deletes aircraft twice.
+#[test]
+fn only_the_shared_demonstration_holds_commands_that_cannot_be_carried_out() {
+    let Some(expected) = expected("expected/bluesky_parse.json") else { return };
+    for name in expected["files"].as_object().expect("files").keys() {
+        let file = read(&shared(name).expect("the scenario")).expect(name);
+        let causes: Vec<_> = file.refused.iter().map(InputError::cause).collect();
+        if !name.contains("demo-scenario") {
+            assert_eq!(causes, [""; 0], "{name}");
+            continue;
+        }
+        let with = |what: &str| causes.iter().filter(|cause| cause.ends_with(what)).count();
+        let kinds = ["exists already", "was not created before", "was deleted before"].map(with);
+        assert_eq!((kinds, causes.len()), ([2, 1, 6], 9));
+        assert_eq!(file.traffic.aircraft.len(), 873);
+        let deleted = file.traffic.aircraft.iter().filter(|one| one.deleted_s.is_some());
+        assert_eq!(deleted.count(), 51);
+    }
+}
+
+#[test]
+fn the_shared_scenarios_of_each_kind_are_read_to_the_end() {
+    let Some(file) = shared_scenario("ASAS__ASAS-SUPER8-WIND.scn") else { return };
+    let wind = Wind { position: at(0.0, 0.0), altitude_ft: None, from_deg: 315.0, speed_kt: 100.0 };
+    assert_eq!((file.traffic.wind, file.traffic.aircraft.len()), (vec![wind], 8));
+    assert_eq!(file.traffic.resolution, Some(Resolution::Mvp));
+    assert_eq!(file.not_understood, counts(&[("AREA", 1), ("RMETHH", 1), ("RMETHV", 1)]));
+
+    let route = shared_scenario("ASAS__ASAS-06.scn").expect("shared").traffic.aircraft;
+    assert_eq!(route.iter().map(|one| one.way_points.len()).collect::<Vec<_>>(), [13, 12]);
+    assert_eq!(route[1].known_goals().last(), Some(at(1.0, 2.0)));
+
+    let flight = shared_scenario("KLM1705-EHAM-LEMD.scn").expect("shared");
+    assert_eq!((flight.traffic.unplaced.len(), flight.unresolved_places.len()), (1, 23));
+    let way_points = &flight.traffic.unplaced[0].aircraft.way_points;
+    assert_eq!(way_points.len(), 21);
+    let behind_orbis = way_points.iter().skip_while(|one| one.place.name() != Some("ORBIS"));
+    assert_eq!(behind_orbis.map(|one| one.place.name()).nth(1), Some(Some("SIE")));
+    let first = way_points[0].place.position().expect("degrees");
+    assert!((first.lat_deg - (52.0 + 12.0 / 60.0 + 51.0 / 3600.0)).abs() < 1e-9);
+
+    let dateline = shared_scenario("ASAS__testdateline.scn").expect("shared").traffic.aircraft;
+    let plane = LocalPlane::about_all(dateline.iter().map(ScnAircraft::position)).expect("two");
+    let [[west_m, _], [east_m, _]] = [0, 1].map(|i| plane.to_plane_m(dateline[i].position()));
+    assert!((east_m - west_m - 111_194.9).abs() < 0.1, "{west_m} {east_m}");
+}
+
+proptest::proptest! {
+    #[test]
+    fn any_text_is_a_scenario(
+        text in "(0:00:00.0>)?([A-Z]{2,4}[ ,])?[A-Z0-9é'.,;#\\\\> \r-]{0,40}(\n|\r\n?)?(\\PC{0,20}\n){0,3}",
+        command in "(CRE|ADDWPT|DEST|HDG|SPD|ALT|VS|SYN SUPER|SYN MATRIX|WIND|ZONER|DEL|AFTER)",
+        arguments in "([ ,]([A-B]|[0-9]{1,3}|-?[0-9.e]{1,4}|FL[0-9]{0,3}|M[.0-9]{0,3}|[NSEW'\"°T*é]{1,2})){0,8}",
+    ) {
+        parse(&"f.scn", &text);
+        parse(&"f.scn", &format!("0:00:00>CRE A B744 0 0\n0:00:00>{command}{arguments}\n{text}"));
+    }
+}

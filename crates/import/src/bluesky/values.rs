@@ -1,0 +1,303 @@
+//! The values that arguments of commands have.
+
+use std::fmt;
+use std::ops::RangeInclusive;
+
+use super::Speed;
+use crate::local_plane::{LatLon, wrap_deg};
+use crate::table::Word;
+use sidestep_kernel::InputError;
+
+/// The arguments of one command, taken from the left.
+pub(super) struct Arguments<'a> {
+    /// The file, as errors name it.
+    pub(super) place: &'a dyn fmt::Display,
+    /// Name of the command, which errors point at where an argument is missing.
+    pub(super) command: Word<'a>,
+    words: std::vec::IntoIter<Word<'a>>,
+}
+
+impl<'a> Arguments<'a> {
+    pub(super) fn new(
+        place: &'a dyn fmt::Display,
+        command: Word<'a>,
+        words: Vec<Word<'a>>,
+    ) -> Self {
+        Self { place, command, words: words.into_iter() }
+    }
+
+    /// The next argument; none where it is left out, is `*`, or the line ends.
+    pub(super) fn next(&mut self) -> Option<Word<'a>> {
+        self.words.next().filter(|word| !word.text.is_empty() && word.text != "*")
+    }
+
+    /// The next argument, which `what` names.
+    pub(super) fn required(&mut self, what: &str) -> Result<Word<'a>, InputError> {
+        self.next().ok_or_else(|| {
+            let cause = format!("{} lacks {what}", self.command.text);
+            self.command.error(self.place, cause, &format!("add {what}"))
+        })
+    }
+
+    /// How many are left.
+    pub(super) fn remaining(&self) -> usize {
+        self.words.len()
+    }
+
+    /// The next argument, which is not taken.
+    pub(super) fn peek(&self) -> Option<&'a str> {
+        self.words.as_slice().first().map(|word| word.text)
+    }
+
+    /// The next argument as `parse` reads it, where it is not left out.
+    pub(super) fn optional<T>(
+        &mut self,
+        parse: impl Fn(&dyn fmt::Display, Word) -> Result<T, InputError>,
+    ) -> Result<Option<T>, InputError> {
+        self.next().map(|word| parse(self.place, word)).transpose()
+    }
+
+    /// A latitude and a longitude.
+    pub(super) fn lat_lon(&mut self) -> Result<LatLon, InputError> {
+        let latitude = self.required("a latitude")?;
+        let lat_deg = degrees(self.place, latitude, LATITUDE)?;
+        let longitude = self.required("a longitude behind the latitude")?;
+        Ok(LatLon { lat_deg, lon_deg: degrees(self.place, longitude, LONGITUDE)? })
+    }
+}
+
+/// Which letters a coordinate may have, and how large it may be.
+#[derive(Clone, Copy)]
+struct Axis {
+    positive: char,
+    negative: char,
+    max_deg: f64,
+}
+
+const LATITUDE: Axis = Axis { positive: 'N', negative: 'S', max_deg: 90.0 };
+const LONGITUDE: Axis = Axis { positive: 'E', negative: 'W', max_deg: 360.0 };
+
+/// The altitudes that are flown; true airspeeds are finite at all of them.
+const ALTITUDES_FT: RangeInclusive<f64> = -10_000.0..=300_000.0;
+
+const MAX_SPEED_KT: f64 = 10_000.0;
+const MAX_MACH: f64 = 20.0;
+
+/// What separates degrees, minutes and seconds.
+const DEGREE_SIGNS: [char; 3] = ['\'', '"', '°'];
+
+/// Whether a word is meant as a latitude and not as a name: names have other letters.
+pub(super) fn is_latitude(word: &str) -> bool {
+    let is_sign = |c: char| c.is_ascii_digit() || DEGREE_SIGNS.contains(&c) || "+-.".contains(c);
+    // The exponent's letter stands between digits, those of the hemisphere at an end.
+    let trimmed = word.trim_matches(['N', 'S', 'n', 's']);
+    trimmed.contains(|c: char| c.is_ascii_digit())
+        && trimmed.chars().all(|c| is_sign(c) || "eE".contains(c))
+        && !trimmed.starts_with(['e', 'E'])
+}
+
+/// Degrees with a fraction, or `degrees'minutes'seconds`; a sign or a letter of the
+/// hemisphere in front or behind.
+fn degrees(place: &dyn fmt::Display, word: Word, axis: Axis) -> Result<f64, InputError> {
+    let value = signed_degrees(word.text, axis).filter(|deg| deg.abs() <= axis.max_deg);
+    let value = value.ok_or_else(|| {
+        let (positive, negative, max) = (axis.positive, axis.negative, axis.max_deg);
+        let cause = format!("`{}` are no degrees {positive} or {negative}", word.text);
+        let remedy = format!("write up to {max}, as 12.5, -12.5, {negative}12.5 or 12'30'00");
+        word.error(place, cause, &remedy)
+    })?;
+    // Longitudes are also counted from 0 to 360.
+    Ok(if value.abs() > 180.0 { wrap_deg(value) } else { value })
+}
+
+fn signed_degrees(text: &str, axis: Axis) -> Option<f64> {
+    let of_letter = |letter: char, sign: f64| {
+        let both = [letter, letter.to_ascii_lowercase()];
+        let rest = text.strip_prefix(both).or_else(|| text.strip_suffix(both));
+        rest.map(|rest| (rest, sign))
+    };
+    let (text, hemisphere) = of_letter(axis.positive, 1.0)
+        .or_else(|| of_letter(axis.negative, -1.0))
+        .unwrap_or((text, 1.0));
+    let (text, sign) = match text.strip_prefix('-') {
+        Some(text) => (text, -1.0),
+        None => (text.strip_prefix('+').unwrap_or(text), 1.0),
+    };
+    Some(hemisphere * sign * unsigned_degrees(text)?)
+}
+
+fn unsigned_degrees(text: &str) -> Option<f64> {
+    let text = text.strip_suffix(DEGREE_SIGNS).unwrap_or(text);
+    let mut value = 0.0;
+    for (i, part) in text.split(DEGREE_SIGNS).enumerate() {
+        let unit = *[1.0, 60.0, 3600.0].get(i)?;
+        let number = part.parse::<f64>().ok().filter(|number| *number >= 0.0)?;
+        // Not `<= 60`: 60 minutes are a degree. Infinity is no number of degrees.
+        if !number.is_finite() || (i > 0 && number >= 60.0) {
+            return None;
+        }
+        value += number / unit;
+    }
+    Some(value)
+}
+
+/// A heading or a wind direction in degrees from true north, in [0, 360).
+pub(super) fn heading_deg(place: &dyn fmt::Display, word: Word) -> Result<f64, InputError> {
+    let text = word.text.strip_suffix(['T', 't']).unwrap_or(word.text);
+    let value = Word { text, ..word }.number(place).map_err(|_| {
+        let cause = format!("`{}` is no true heading", word.text);
+        word.error(place, cause, "write degrees from true north such as 326.8 or 326.8T")
+    })?;
+    let turned = value.rem_euclid(360.0);
+    // rem_euclid may round up to the modulus itself.
+    Ok(if turned >= 360.0 { 0.0 } else { turned })
+}
+
+/// An altitude in ft: a number, or a flight level such as `FL200`.
+pub(super) fn altitude_ft(place: &dyn fmt::Display, word: Word) -> Result<f64, InputError> {
+    let level = word.text.get(..2).filter(|start| start.eq_ignore_ascii_case("FL"));
+    let (text, unit_ft) = level.map_or((word.text, 1.0), |_| (&word.text[2..], 100.0));
+    let value = Word { text, ..word }.number(place).map_err(|_| {
+        let cause = format!("`{}` is no altitude", word.text);
+        word.error(place, cause, "write feet such as 20000, or a flight level such as FL200")
+    })?;
+    if !ALTITUDES_FT.contains(&(value * unit_ft)) {
+        let cause = format!("`{}` is out of the air", word.text);
+        return Err(word.error(place, cause, "write an altitude from -10000 to 300000 ft"));
+    }
+    Ok(value * unit_ft)
+}
+
+/// A speed: knots, or a Mach number as `.8`, `M0.8`, `M.8` or `M80`.
+pub(super) fn speed(place: &dyn fmt::Display, word: Word) -> Result<Speed, InputError> {
+    let wrong = || {
+        let cause = format!("`{}` is no speed", word.text);
+        word.error(place, cause, "write knots such as 250, or a Mach number such as M0.8")
+    };
+    let up_to = |max: f64, text: &str| {
+        let value = Word { text, ..word }.number(place);
+        value.ok().filter(|value| (0.0..=max).contains(value)).ok_or_else(wrong)
+    };
+    let Some(mach) = word.text.strip_prefix(['M', 'm']) else {
+        let value = up_to(MAX_SPEED_KT, word.text)?;
+        // Nobody flies with less than a knot: a number below 1 is meant as a Mach number.
+        let is_mach = 0.1 < value && value < 1.0;
+        return Ok(if is_mach { Speed::Mach(value) } else { Speed::CasKt(value) });
+    };
+    // Without a point the digits stand behind it.
+    let digits = if mach.contains('.') { mach.to_owned() } else { format!(".{mach}") };
+    Ok(Speed::Mach(up_to(MAX_MACH, &digits)?))
+}
+
+/// A number that must be larger than 0.
+pub(super) fn positive(place: &dyn fmt::Display, word: Word) -> Result<f64, InputError> {
+    let value = word.number(place)?;
+    if value > 0.0 {
+        return Ok(value);
+    }
+    Err(word.error(place, format!("{value} is not larger than 0"), "write a number such as 5"))
+}
+
+/// Any number.
+pub(super) fn number(place: &dyn fmt::Display, word: Word) -> Result<f64, InputError> {
+    word.number(place)
+}
+
+/// `ON` or `OFF`.
+pub(super) fn switch(place: &dyn fmt::Display, word: Word) -> Result<bool, InputError> {
+    match word.text.to_ascii_uppercase().as_str() {
+        "ON" | "TRUE" | "YES" | "1" => Ok(true),
+        "OFF" | "FALSE" | "NO" | "0" => Ok(false),
+        _ => {
+            let cause = format!("`{}` is neither ON nor OFF", word.text);
+            Err(word.error(place, cause, "write ON or OFF"))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn word(text: &str) -> Word<'_> {
+        Word { text, line: 3, column: 7 }
+    }
+
+    #[test]
+    fn degrees_have_many_forms() {
+        for (text, expected) in [
+            ("0.", 0.0),
+            ("52", 52.0),
+            ("-3.06e-17", -3.06e-17),
+            (".5", 0.5),
+            ("52'12'36", 52.21),
+            ("52°12'36\"", 52.21),
+            ("-0'30", -0.5),
+            ("N52'30", 52.5),
+            ("52.5n", 52.5),
+            ("S33.5", -33.5),
+            ("33'30'00S", -33.5),
+        ] {
+            let value = degrees(&"f", word(text), LATITUDE).unwrap();
+            assert!((value - expected).abs() < 1e-12, "{text}: {value}");
+            assert!(is_latitude(text), "{text}");
+        }
+        for (text, expected) in
+            [("004'48'36", 4.81), ("W004", -4.0), ("4e", 4.0), ("1e1", 10.0), ("359.5", -0.5)]
+        {
+            let value = degrees(&"f", word(text), LONGITUDE).unwrap();
+            assert!((value - expected).abs() < 1e-12, "{text}: {value}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_degrees_is_an_error_with_its_place() {
+        for text in ["91", "12'60", "1'2'3'4", "--5", "N", "5W", "inf", "1e999", "'", "12'-3"] {
+            let error = degrees(&"f.scn", word(text), LATITUDE).unwrap_err();
+            assert_eq!(error.position(), Some((3, 7)), "{text}");
+        }
+    }
+
+    #[test]
+    fn names_of_places_are_no_latitudes() {
+        for name in ["EHAM", "SPL46", "R1814", "EHAM/RW18L", "NENEM", "SES", "E5", "4X062", "N"] {
+            assert!(!is_latitude(name), "{name}");
+        }
+    }
+
+    #[test]
+    fn headings_are_true_and_within_a_turn() {
+        for (text, expected) in
+            [("326.8T", 326.8), ("030", 30.0), ("360", 0.0), ("-90.0", 270.0), ("-1e-20", 0.0)]
+        {
+            assert_eq!(heading_deg(&"f", word(text)), Ok(expected), "{text}");
+        }
+        assert!(heading_deg(&"f", word("326M")).unwrap_err().remedy().contains("true north"));
+    }
+
+    #[test]
+    fn altitudes_are_feet_or_flight_levels() {
+        for (text, expected) in
+            [("FL200", 20_000.0), ("Fl100", 10_000.0), ("0.", 0.0), ("7169.0", 7169.0)]
+        {
+            assert_eq!(altitude_ft(&"f", word(text)), Ok(expected), "{text}");
+        }
+        for text in ["FL", "F200", "high", "é€", "FL9999", "-1e5", "1e300"] {
+            assert!(altitude_ft(&"f", word(text)).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn speeds_below_one_or_with_an_m_are_mach_numbers() {
+        for text in ["M0.8", "M.8", "m80", "M8", ".8", "0.80"] {
+            assert_eq!(speed(&"f", word(text)), Ok(Speed::Mach(0.8)), "{text}");
+        }
+        assert_eq!(speed(&"f", word("M1.2")), Ok(Speed::Mach(1.2)));
+        for (text, knots) in [("250", 250.0), ("0", 0.0), ("1", 1.0), ("0.05", 0.05)] {
+            assert_eq!(speed(&"f", word(text)), Ok(Speed::CasKt(knots)), "{text}");
+        }
+        for text in ["M", "fast", "-250", "inf", "M-1", "1e5", "M99.9", "M1e3"] {
+            assert!(speed(&"f", word(text)).is_err(), "{text}");
+        }
+    }
+}

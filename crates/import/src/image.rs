@@ -1,0 +1,224 @@
+//! Bitmaps: PNG and PNM (PGM among them), binary or ASCII, gray, color or one bit.
+
+use std::io::{Cursor, ErrorKind};
+use std::path::Path;
+
+use ::image::{
+    DynamicImage, ImageBuffer, ImageDecoder, ImageError, ImageReader, ImageResult, Limits, Pixel,
+    Primitive,
+};
+use sidestep_kernel::InputError;
+
+use sidestep_scenario::file::read_bytes;
+
+/// The most pixels an image may have; more are refused before memory is allocated for them.
+pub const MAX_PIXELS: u64 = 1 << 28;
+
+/// The largest image file: the ASCII form of an image of [`MAX_PIXELS`].
+const MAX_IMAGE_BYTES: u64 = 4 * MAX_PIXELS;
+
+/// The most memory that decoding may take: 8 bytes (four channels of 16 bits) per pixel.
+const MAX_DECODED_BYTES: u64 = 8 * MAX_PIXELS;
+
+/// A decoded image.
+#[derive(Debug, Clone)]
+pub struct Bitmap(DynamicImage);
+
+impl Bitmap {
+    /// Reads the image at `path` (also with gzip); its first bytes say which kind it is.
+    ///
+    /// # Errors
+    /// When the file cannot be read, is no PNG or PNM image, is damaged or cut short, or has
+    /// no pixel or more than [`MAX_PIXELS`].
+    pub fn load(path: &Path) -> Result<Self, InputError> {
+        Self::decode(&path.display().to_string(), read_bytes(path, MAX_IMAGE_BYTES)?)
+    }
+
+    /// Reads the image in `bytes`; errors name `place`.
+    ///
+    /// # Errors
+    /// As [`Bitmap::load`], but for those of reading the file.
+    pub fn decode(place: &str, bytes: Vec<u8>) -> Result<Self, InputError> {
+        let undecodable = |error| undecodable(place, &error);
+        let decoder = decoder(bytes).map_err(undecodable)?;
+        check_pixel_count(place, decoder.dimensions())?;
+        DynamicImage::from_decoder(decoder).map(Self).map_err(undecodable)
+    }
+
+    /// Pixels from left to right.
+    pub fn width(&self) -> u32 {
+        self.0.width()
+    }
+
+    /// Pixels from top to bottom.
+    pub fn height(&self) -> u32 {
+        self.0.height()
+    }
+
+    /// What `read` makes of each pixel's brightness, row by row from the top. The brightness is
+    /// the mean of the pixel's color channels, from 0 (black) to 255 (white); transparency is
+    /// not looked at.
+    pub fn map_brightness<T>(&self, read: impl Fn(f64) -> T) -> Vec<T> {
+        match &self.0 {
+            DynamicImage::ImageLuma8(pixels) => map_channels(pixels, 1, read),
+            DynamicImage::ImageLumaA8(pixels) => map_channels(pixels, 1, read),
+            DynamicImage::ImageRgb8(pixels) => map_channels(pixels, 3, read),
+            DynamicImage::ImageRgba8(pixels) => map_channels(pixels, 3, read),
+            DynamicImage::ImageLuma16(pixels) => map_channels(pixels, 1, read),
+            DynamicImage::ImageLumaA16(pixels) => map_channels(pixels, 1, read),
+            other => map_channels(&other.to_rgb16(), 3, read),
+        }
+    }
+}
+
+/// What `read` makes of the mean of each pixel's first `colors` channels, scaled to 0..255.
+fn map_channels<P, T>(
+    image: &ImageBuffer<P, Vec<P::Subpixel>>,
+    colors: usize,
+    read: impl Fn(f64) -> T,
+) -> Vec<T>
+where
+    P: Pixel,
+    P::Subpixel: Primitive + Into<f64>,
+{
+    // One division of whole numbers below 2^53: gray 205 is exactly 205.0 in every format.
+    let steps_per_unit = P::Subpixel::DEFAULT_MAX_VALUE.into() / 255.0;
+    let divisor = colors as f64 * steps_per_unit;
+    let brightness = |pixel: &P| {
+        let sum: f64 = pixel.channels()[..colors].iter().map(|&channel| channel.into()).sum();
+        sum / divisor
+    };
+    image.pixels().map(|pixel| read(brightness(pixel))).collect()
+}
+
+fn decoder(bytes: Vec<u8>) -> ImageResult<impl ImageDecoder> {
+    let mut limits = Limits::no_limits();
+    limits.max_alloc = Some(MAX_DECODED_BYTES);
+    let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format()?;
+    reader.limits(limits);
+    reader.into_decoder()
+}
+
+fn check_pixel_count(place: &str, (width, height): (u32, u32)) -> Result<(), InputError> {
+    match u64::from(width) * u64::from(height) {
+        1..=MAX_PIXELS => Ok(()),
+        _ => {
+            let cause = format!(
+                "an image of {width} x {height} pixels; from 1 to {MAX_PIXELS} pixels are allowed"
+            );
+            Err(InputError::new(place, cause, "scale the image, or cut out the part you need"))
+        }
+    }
+}
+
+fn undecodable(place: &str, error: &ImageError) -> InputError {
+    match error {
+        ImageError::IoError(io) if io.kind() == ErrorKind::UnexpectedEof => InputError::new(
+            place,
+            "the image is cut short: it has fewer pixels than it says",
+            "fetch or write the image again",
+        ),
+        ImageError::Unsupported(_) => InputError::new(
+            place,
+            format!("no image of a kind that is read ({error})"),
+            "give a PNG or a PGM (P2 or P5) image",
+        ),
+        _ => InputError::new(
+            place,
+            format!("the image cannot be read: {error}"),
+            "give a PNG or a PGM image, whole and undamaged",
+        ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ::image::{GrayImage, ImageFormat, Luma, LumaA, Rgb, Rgba};
+    use proptest::prelude::*;
+
+    fn brightness(bytes: &[u8]) -> Vec<f64> {
+        Bitmap::decode("test", bytes.to_vec()).expect("an image").map_brightness(|v| v)
+    }
+
+    fn png(image: impl Into<DynamicImage>) -> Vec<u8> {
+        let mut bytes = Cursor::new(Vec::new());
+        image.into().write_to(&mut bytes, ImageFormat::Png).expect("memory takes all");
+        bytes.into_inner()
+    }
+
+    #[test]
+    fn ascii_and_binary_pgm_read_the_same_with_comments_in_the_header() {
+        let ascii = b"P2\n# by hand\n3 1 # size\n# deepest\n255\n0 205\n255\n";
+        let binary = b"P5\n# CREATOR: GIMP PNM Filter Version 1.1\n3 1\n255\n\x00\xcd\xff";
+        assert_eq!(brightness(ascii), [0.0, 205.0, 255.0]);
+        assert_eq!(brightness(binary), [0.0, 205.0, 255.0]);
+    }
+
+    #[test]
+    fn other_depths_are_scaled_to_255() {
+        assert_eq!(brightness(b"P2 3 1 15 0 1 15"), [0.0, 17.0, 255.0]);
+        assert_eq!(brightness(b"P2 2 1 65535 0 65535"), [0.0, 255.0]);
+        assert_eq!(brightness(b"P1 2 1 1 0"), [0.0, 255.0], "in a P1 a 1 is black");
+    }
+
+    #[test]
+    fn a_gray_is_exactly_itself_in_every_png() {
+        let rgb = ImageBuffer::from_pixel(1, 1, Rgb([205u8; 3]));
+        let deep = ImageBuffer::from_pixel(1, 1, Luma([205u16 * 257]));
+        let deep_rgb = ImageBuffer::from_pixel(1, 1, Rgb([205u16 * 257; 3]));
+        assert_eq!(brightness(&png(ImageBuffer::from_pixel(1, 1, Luma([205u8])))), [205.0]);
+        assert_eq!(brightness(&png(rgb)), [205.0]);
+        assert_eq!(brightness(&png(deep)), [205.0]);
+        assert_eq!(brightness(&png(deep_rgb)), [205.0]);
+    }
+
+    #[test]
+    fn colors_are_averaged_and_transparency_is_ignored() {
+        let rgba = ImageBuffer::from_pixel(1, 1, Rgba([0u8, 30, 63, 7]));
+        let gray = ImageBuffer::from_pixel(1, 1, LumaA([9u8, 0]));
+        assert_eq!(brightness(&png(rgba)), [31.0]);
+        assert_eq!(brightness(&png(gray)), [9.0]);
+    }
+
+    #[test]
+    fn an_image_cut_short_is_an_error_in_every_format() {
+        let whole = png(GrayImage::from_fn(64, 64, |x, y| Luma([(x * y) as u8])));
+        let images: [&[u8]; 4] =
+            [b"P5 3 1 255\n\x00\xcd", b"P2 3 1 255 0 205", &whole[..whole.len() / 2], b"P5 3"];
+        for bytes in images {
+            assert!(Bitmap::decode("test", bytes.to_vec()).is_err(), "{bytes:?}");
+        }
+    }
+
+    #[test]
+    fn other_files_and_absurd_sizes_are_errors() {
+        for bytes in [&b""[..], b"GIF89a", b"text", b"P5 0 5 255\n", b"P2 1 1 255 x"] {
+            assert!(Bitmap::decode("test", bytes.to_vec()).is_err(), "{bytes:?}");
+        }
+        let error = Bitmap::decode("test", b"P5 60000 60000 255\n".to_vec()).expect_err("absurd");
+        assert!(error.cause().contains("60000 x 60000"), "{error}");
+    }
+
+    proptest! {
+        #[test]
+        fn no_damage_panics_the_decoder(
+            damage in proptest::collection::vec((0usize..200, any::<u8>()), 1..6),
+            which in 0usize..3,
+        ) {
+            let gray = GrayImage::from_fn(9, 9, |x, y| Luma([(x * y) as u8]));
+            let ascii = b"P2\n# comment\n3 2\n255\n0 1 2\n253 254 255\n".to_vec();
+            let mut bytes = [png(gray), ascii, b"P5 3 2 255\n\x00\x01\x02\x03\x04\x05".to_vec()][which].clone();
+            let length = bytes.len();
+            for (at, value) in damage {
+                bytes[at % length] = value;
+            }
+            // Damage may make a huge header, which is tested elsewhere and slow to allocate.
+            let is_small = decoder(bytes.clone()).is_ok_and(|d| d.dimensions().0.max(d.dimensions().1) < 5000);
+            if is_small && let Ok(image) = Bitmap::decode("test", bytes) {
+                let pixels = image.map_brightness(|v| v);
+                prop_assert!(pixels.iter().all(|v| (0.0..=255.0).contains(v)));
+            }
+        }
+    }
+}

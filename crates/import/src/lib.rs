@@ -1,0 +1,30 @@
+#![deny(clippy::disallowed_methods)]
+//! Foreign files, read into our own types.
+//!
+//! Every reader takes its file plain or packed with gzip, refuses absurd sizes before it
+//! allocates memory for them, and reports what is wrong as an
+//! [`InputError`](sidestep_kernel::InputError) with file, line and column.
+
+pub mod ascii;
+pub mod bluesky;
+pub mod carmen;
+pub mod image;
+pub mod local_plane;
+mod map_file;
+mod map_yaml;
+pub mod movingai;
+pub mod mrclam;
+mod pixel_map;
+pub mod rosmap;
+mod rows;
+pub mod stage;
+pub mod table;
+pub mod traffic;
+pub mod urdf;
+mod xml;
+
+#[cfg(test)]
+mod shared_data;
+
+pub use map_file::map_file;
+pub use pixel_map::{MAX_PIXELS, PixelMap};

@@ -1,0 +1,350 @@
+//! The YAML file of a ROS map: its keys, checked, each error with its place.
+
+use std::path::{Path, PathBuf};
+
+use saphyr::{LoadableYamlNode, MarkedYaml, Scalar, ScanError, YamlData};
+use sidestep_kernel::InputError;
+
+use super::rosmap::{Mode, Reading};
+
+/// The largest YAML file; the keys take 150 bytes.
+pub(super) const MAX_YAML_BYTES: u64 = 64 << 10;
+
+/// The longest line in bytes. A list within a list begins further right, so the limit bounds how
+/// deep they go, hence the stack that the parser's recursive tree takes.
+const MAX_LINE_BYTES: usize = 1000;
+
+/// The content of the YAML file.
+#[derive(Debug, PartialEq)]
+pub(super) struct Metadata {
+    /// An image file that exists.
+    pub(super) image: PathBuf,
+    /// Side of a pixel in metres, positive.
+    pub(super) resolution_m: f64,
+    /// World position of the lower-left corner in metres.
+    pub(super) origin_m: [f64; 2],
+    /// How pixels are read.
+    pub(super) reading: Reading,
+}
+
+impl Metadata {
+    /// Parses `text`; the image's path is relative to `folder`.
+    pub(super) fn parse(place: &str, text: &str, folder: &Path) -> Result<Self, InputError> {
+        let document = Document::parse(place, text)?;
+        Ok(Self {
+            resolution_m: document.resolution_m()?,
+            origin_m: document.origin_m()?,
+            reading: document.reading()?,
+            image: document.image(folder)?,
+        })
+    }
+}
+
+/// The YAML file, with the places of its values.
+struct Document<'a> {
+    place: &'a str,
+    text: &'a str,
+    root: MarkedYaml<'a>,
+}
+
+impl<'a> Document<'a> {
+    fn parse(place: &'a str, text: &'a str) -> Result<Self, InputError> {
+        check_lines(place, text)?;
+        let documents =
+            MarkedYaml::load_from_str(text).map_err(|error| malformed(place, text, &error))?;
+        match documents.into_iter().next() {
+            Some(root) if root.data.is_mapping() => Ok(Self { place, text, root }),
+            _ => Err(InputError::new(place, "is not a list of `key: value` lines", KEYS)),
+        }
+    }
+
+    fn resolution_m(&self) -> Result<f64, InputError> {
+        let value = self.value("resolution")?;
+        match self.number(value, "resolution")? {
+            resolution_m if resolution_m > 0.0 => Ok(resolution_m),
+            other => {
+                let cause = format!("a resolution of {other} m per pixel");
+                Err(self.error(value, cause, "give the side of a pixel in metres, such as 0.05"))
+            }
+        }
+    }
+
+    fn origin_m(&self) -> Result<[f64; 2], InputError> {
+        let value = self.value("origin")?;
+        let Some([x, y, yaw]) = value.data.as_sequence().map(Vec::as_slice) else {
+            let remedy = "write `origin: [x, y, 0]` in metres";
+            return Err(self.error(value, "`origin` is not a list of three numbers", remedy));
+        };
+        let origin_m = [self.number(x, "origin")?, self.number(y, "origin")?];
+        match self.number(yaw, "origin")? {
+            0.0 => Ok(origin_m),
+            yaw_rad => Err(self.error(
+                yaw,
+                format!("the map is rotated by an origin yaw of {yaw_rad} rad; only 0 is read"),
+                "rotate the image itself and write 0 as the third number of `origin`",
+            )),
+        }
+    }
+
+    fn reading(&self) -> Result<Reading, InputError> {
+        let (occupied_thresh, _) = self.threshold("occupied_thresh")?;
+        let (free_thresh, free_value) = self.threshold("free_thresh")?;
+        if free_thresh > occupied_thresh {
+            let cause = format!("free_thresh {free_thresh} is above {occupied_thresh}");
+            let remedy = "give a free_thresh that is not above occupied_thresh";
+            return Err(self.error(free_value, cause, remedy));
+        }
+        let (mode, negate) = (self.mode()?, self.negate()?);
+        Ok(Reading { mode, negate, occupied_thresh, free_thresh })
+    }
+
+    fn threshold(&self, key: &str) -> Result<(f64, &MarkedYaml<'a>), InputError> {
+        let value = self.value(key)?;
+        match self.number(value, key)? {
+            threshold if (0.0..=1.0).contains(&threshold) => Ok((threshold, value)),
+            other => {
+                let cause = format!("`{key}` is {other}");
+                Err(self.error(value, cause, "give a probability from 0 to 1, such as 0.65"))
+            }
+        }
+    }
+
+    fn mode(&self) -> Result<Mode, InputError> {
+        let Some(value) = self.root.data.as_mapping_get("mode") else {
+            return Ok(Mode::Trinary);
+        };
+        match value.data.as_str() {
+            Some("trinary") => Ok(Mode::Trinary),
+            Some("scale") => Ok(Mode::Scale),
+            Some("raw") => Ok(Mode::Raw),
+            _ => Err(self.error(value, "not a mode", "write trinary, scale or raw")),
+        }
+    }
+
+    fn negate(&self) -> Result<bool, InputError> {
+        let value = self.value("negate")?;
+        match (value.data.as_bool(), number_of(value)) {
+            (Some(negate), _) => Ok(negate),
+            (None, Some(0.0)) => Ok(false),
+            (None, Some(1.0)) => Ok(true),
+            _ => Err(self.error(value, "`negate` is neither 0 nor 1", "write 0 or 1")),
+        }
+    }
+
+    /// The image's file.
+    fn image(&self, folder: &Path) -> Result<PathBuf, InputError> {
+        let value = self.value("image")?;
+        let name = value.data.as_str().filter(|name| !name.is_empty()).ok_or_else(|| {
+            self.error(value, "`image` is not a file name", "write the image's name, in quotes")
+        })?;
+        let plain = folder.join(name);
+        let packed = folder.join(format!("{name}.gz"));
+        [plain, packed].into_iter().find(|path| path.is_file()).ok_or_else(|| {
+            let cause = format!("there is no image file `{name}`");
+            self.error(value, cause, "give the image's path, relative to this file's folder")
+        })
+    }
+
+    fn value(&self, key: &str) -> Result<&MarkedYaml<'a>, InputError> {
+        self.root
+            .data
+            .as_mapping_get(key)
+            .ok_or_else(|| InputError::new(self.place, format!("the key `{key}` is missing"), KEYS))
+    }
+
+    fn number(&self, value: &MarkedYaml<'a>, key: &str) -> Result<f64, InputError> {
+        number_of(value).ok_or_else(|| {
+            let cause = format!("`{key}` has a value that is not a finite number");
+            self.error(value, cause, "write a number")
+        })
+    }
+
+    fn error(&self, value: &MarkedYaml<'a>, cause: impl Into<String>, remedy: &str) -> InputError {
+        let offset = byte_offset(self.text, value.span.start.index());
+        InputError::new(self.place, cause, remedy).in_text(self.text, offset)
+    }
+}
+
+const KEYS: &str = "write the keys image, resolution, origin, negate, occupied_thresh and \
+                    free_thresh, and mode if you like";
+
+/// The finite number that a value is; in quotes too, as `map_server` has it.
+fn number_of(value: &MarkedYaml<'_>) -> Option<f64> {
+    let YamlData::Value(scalar) = &value.data else { return None };
+    let number = match scalar {
+        Scalar::Integer(number) => *number as f64,
+        Scalar::FloatingPoint(number) => number.into_inner(),
+        Scalar::String(text) => text.trim().parse().ok()?,
+        Scalar::Boolean(_) | Scalar::Null => return None,
+    };
+    number.is_finite().then_some(number)
+}
+
+fn check_lines(place: &str, text: &str) -> Result<(), InputError> {
+    match text.lines().position(|line| line.len() > MAX_LINE_BYTES) {
+        None => Ok(()),
+        Some(line) => {
+            let cause = format!("a line of more than {MAX_LINE_BYTES} bytes");
+            Err(InputError::new(place, cause, KEYS).at(line + 1, MAX_LINE_BYTES + 1))
+        }
+    }
+}
+
+fn malformed(place: &str, text: &str, error: &ScanError) -> InputError {
+    InputError::new(place, format!("is not YAML: {}", error.info()), KEYS)
+        .in_text(text, byte_offset(text, error.marker().index()))
+}
+
+/// Where the character number `index` begins.
+fn byte_offset(text: &str, index: usize) -> usize {
+    text.char_indices().nth(index).map_or(text.len(), |(offset, _)| offset)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const YAML: &str = "image: map.rs
+resolution: 0.05
+origin: [-1.5, 2, 0.]
+negate: 0
+occupied_thresh: 0.65
+free_thresh: 0.196
+";
+
+    /// The metadata of `text`, with this crate's sources for images.
+    fn parse(text: &str) -> Result<Metadata, InputError> {
+        let text = text.replace("map.rs", "map_yaml.rs");
+        Metadata::parse("m.yaml", &text, &Path::new(env!("CARGO_MANIFEST_DIR")).join("src"))
+    }
+
+    /// The metadata of the usual file with one piece of it replaced.
+    fn with(old: &str, new: &str) -> Result<Metadata, InputError> {
+        assert!(YAML.contains(old), "{old}");
+        parse(&YAML.replace(old, new))
+    }
+
+    fn error(old: &str, new: &str) -> InputError {
+        with(old, new).expect_err(new)
+    }
+
+    #[test]
+    fn the_six_keys_are_read_and_the_mode_is_trinary() {
+        let meta = parse(YAML).expect("read");
+        assert_eq!((meta.resolution_m, meta.origin_m), (0.05, [-1.5, 2.0]));
+        assert!(meta.image.ends_with("src/map_yaml.rs"));
+        let expected = Reading {
+            mode: Mode::Trinary,
+            negate: false,
+            occupied_thresh: 0.65,
+            free_thresh: 0.196,
+        };
+        assert_eq!(meta.reading, expected);
+    }
+
+    #[test]
+    fn numbers_may_lack_digits_on_either_side_of_the_point_and_stand_in_quotes() {
+        let origin = |text| with("[-1.5, 2, 0.]", text).map(|meta| meta.origin_m);
+        assert_eq!(origin("[-.5, 2., .0]"), Ok([-0.5, 2.0]));
+        assert_eq!(origin("[1e1, +3, -0.0]"), Ok([10.0, 3.0]));
+        assert_eq!(origin("\n- 1\n- '2'\n- 0"), Ok([1.0, 2.0]));
+    }
+
+    #[test]
+    fn comments_unknown_keys_and_boolean_negation_are_tolerated() {
+        let meta = with("negate: 0", "frame: map\nnegate: 1   # white is occupied");
+        assert!(meta.expect("read").reading.negate);
+        assert!(with("negate: 0", "negate: true").expect("read").reading.negate);
+        assert!(!with("negate: 0", "negate: false").expect("read").reading.negate);
+    }
+
+    #[test]
+    fn the_three_modes_are_read_and_no_other() {
+        let mode = |name: &str| {
+            with("negate: 0", &format!("mode: {name}\nnegate: 0")).map(|meta| meta.reading.mode)
+        };
+        assert_eq!(mode("trinary"), Ok(Mode::Trinary));
+        assert_eq!(mode("scale"), Ok(Mode::Scale));
+        assert_eq!(mode("'raw'"), Ok(Mode::Raw));
+        assert_eq!(mode("Binary").expect_err("no mode").position(), Some((4, 7)));
+    }
+
+    #[test]
+    fn a_rotated_map_is_refused_at_its_yaw() {
+        let rotated = error("0.]", "1.57]");
+        assert_eq!(rotated.position(), Some((3, 19)));
+        assert!(rotated.cause().contains("1.57 rad"), "{rotated}");
+        assert!(rotated.remedy().contains("rotate the image"), "{rotated}");
+    }
+
+    #[test]
+    fn a_wrong_value_is_pointed_at() {
+        for wrong in ["0", "-0.05", ".nan", ".inf", "fine", "[1]", ""] {
+            assert_eq!(error("0.05", wrong).position().map(|p| p.0), Some(2), "{wrong}");
+        }
+        assert_eq!(error("0.05", "-1").position(), Some((2, 13)));
+        for wrong in ["[1, 2]", "[1, 2, 3, 4]", "0", "[a, 2, 0]", "[1, .inf, 0]", "[1, 2, .nan]"] {
+            assert_eq!(error("[-1.5, 2, 0.]", wrong).position().map(|p| p.0), Some(3), "{wrong}");
+        }
+        assert_eq!(error("negate: 0", "negate: 2").position(), Some((4, 9)));
+        assert_eq!(error("0.65", "65").position(), Some((5, 18)));
+        assert_eq!(error("0.196", "0.7").position(), Some((6, 14)), "above occupied_thresh");
+        assert_eq!(error("map.rs", "none.pgm").position(), Some((1, 8)));
+        assert_eq!(error("map.rs", "''").position(), Some((1, 8)));
+        assert_eq!(error("map.rs", "7").position(), Some((1, 8)));
+    }
+
+    #[test]
+    fn a_missing_key_is_named() {
+        for line in YAML.lines() {
+            let error = error(line, "");
+            let key = line.split(':').next().expect("a key");
+            assert!(error.cause().contains(&format!("`{key}`")), "{error}");
+        }
+    }
+
+    #[test]
+    fn text_that_is_no_mapping_or_no_yaml_is_an_error() {
+        for text in ["", "# nothing\n", "- 1\n", "text", "a: [1", "a: 1\na: 2\n", "\ta: 1", "*x"] {
+            assert!(parse(text).is_err(), "{text:?}");
+        }
+        assert_eq!(parse("a: 1\nb: [1, 2\nc: }\n").expect_err("broken").place(), "m.yaml");
+    }
+
+    #[test]
+    fn deep_nesting_up_to_the_limits_is_no_stack_overflow() {
+        let on_one_line = |piece: &str| piece.repeat(MAX_LINE_BYTES / piece.len());
+        let indented: String = (0..350).map(|depth| format!("{:depth$}a:\n", "")).collect();
+        assert!(indented.len() as u64 <= MAX_YAML_BYTES);
+        for text in [on_one_line("["), on_one_line("- "), on_one_line("? "), indented] {
+            assert!(parse(&text).is_err());
+        }
+        let long = parse(&"- ".repeat(MAX_LINE_BYTES)).expect_err("a long line");
+        assert_eq!(long.position(), Some((1, MAX_LINE_BYTES + 1)));
+    }
+
+    proptest! {
+        #[test]
+        fn no_text_panics_the_reader(
+            head in prop_oneof![Just(YAML), Just("image: map.rs\norigin: "), Just("")],
+            pieces in proptest::collection::vec(
+                prop_oneof![
+                    Just("\n"), Just(" "), Just("image"), Just(": "), Just("["), Just("]"), Just(","),
+                    Just("{"), Just("}"), Just("0.05"), Just("- "), Just("? "), Just("'"), Just("\""),
+                    Just("# "), Just("&a "), Just("*a "), Just("!!float "), Just("|\n"), Just("\t"),
+                    Just("é"), Just("---\n"), Just("%YAML 1.2\n"), Just("\\x"), Just("<<: "),
+                ],
+                0..40,
+            ),
+        ) {
+            let _ = parse(&(head.to_owned() + &pieces.concat())).is_ok();
+        }
+    }
+
+    #[test]
+    fn columns_are_right_behind_characters_of_many_bytes() {
+        let text = YAML.replace("image", "# Größe é\nimage").replace("0.65", "'é'");
+        assert_eq!(parse(&text).expect_err("no number").position(), Some((6, 18)));
+    }
+}

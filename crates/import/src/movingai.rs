@@ -1,0 +1,371 @@
+//! MovingAI benchmarks: `.map` grids and `.scen` lists of starts and goals.
+//!
+//! The files count rows from the top; everything here is turned to rows from the bottom.
+
+use std::path::Path;
+use std::str::FromStr;
+
+use sidestep_kernel::InputError;
+
+use super::rows::{Legend, Line, MAX_TEXT_BYTES, Source, map_from_top};
+use sidestep_map::{Cell, GridMap, check_box_count};
+use sidestep_scenario::file::read_text;
+
+/// Ground, its other sign and swamp are passable; bounds (two signs), trees and water are not.
+const LEGEND: Legend = Legend {
+    cell: |character| match character {
+        '.' | 'G' | 'S' => Some(Cell::Free),
+        '@' | 'O' | 'T' | 'W' => Some(Cell::Wall),
+        _ => None,
+    },
+    remedy: "use `.`, `G`, `S` (passable) and `@`, `O`, `T`, `W` (blocked)",
+};
+
+/// The largest `.scen` file that is read; the benchmark's have less than 0.1 MB.
+const MAX_SCEN_BYTES: u64 = 1 << 28;
+
+/// A row of a `.scen` file: one start with one goal.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScenRow {
+    /// Line of the file, from 1.
+    pub line: usize,
+    /// Group of rows of similar length.
+    pub bucket: u32,
+    /// Name of the map file as written.
+    pub map: String,
+    /// Columns of the map.
+    pub width: u32,
+    /// Rows of the map.
+    pub height: u32,
+    /// Column from the west and row from the south.
+    pub start: (u32, u32),
+    /// Column from the west and row from the south.
+    pub goal: (u32, u32),
+    /// Length of a shortest path on 8 neighbors without cutting corners, in boxes.
+    pub optimal_length: f64,
+}
+
+impl ScenRow {
+    /// Checks that the row is about a map such as `map`; errors name `place` and the row's line.
+    ///
+    /// # Errors
+    /// When the map has another size, or the start or the goal is not free.
+    pub fn check_against(&self, place: &str, map: &GridMap) -> Result<(), InputError> {
+        let error = |cause, remedy| Err(InputError::new(place, cause, remedy).at(self.line, 1));
+        if (self.width, self.height) != (map.width(), map.height()) {
+            let (w, h) = (map.width(), map.height());
+            let cause = format!("a row for {} x {}, not {w} x {h}", self.width, self.height);
+            return error(cause, "give the map that the scenario was made for");
+        }
+        for (name, (col, row)) in [("start", self.start), ("goal", self.goal)] {
+            if map.cell(col, row) != Cell::Free {
+                let cause = format!("the {name}, column {col} and row {row}, is not free");
+                return error(cause, "give the map that the scenario was made for");
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Reads a `.map` file (also with gzip); a character becomes a box with a side of `box_size_m`
+/// metres (the benchmarks have no unit; 1 is customary).
+///
+/// # Errors
+/// Those of [`parse_map`], and a file that cannot be read.
+pub fn load_map(path: &Path, box_size_m: f64) -> Result<GridMap, InputError> {
+    parse_map(&path.display().to_string(), &read_text(path, MAX_TEXT_BYTES)?, box_size_m)
+}
+
+/// Reads `text` as a `.map` file; errors name `place`.
+///
+/// # Errors
+/// When the header or a character is wrong, or rows are missing, too many or of another width
+/// than the header says.
+pub fn parse_map(place: &str, text: &str, box_size_m: f64) -> Result<GridMap, InputError> {
+    let source = Source { place, text };
+    let mut lines = source.lines_of(text);
+    let (width, height) = header(source, &mut lines)?;
+    let (width, height) = (width as usize, height as usize);
+    let mut cells = Vec::new();
+    for line in lines.by_ref().take(height) {
+        LEGEND.read_row(source, line, width, &mut cells)?;
+    }
+    if cells.len() < width * height {
+        let cause = format!("the map ends after {} rows, not {height}", cells.len() / width);
+        return Err(source.error(text.len(), cause, ROWS));
+    }
+    if let Some(line) = lines.find(|line| !line.text.trim().is_empty()) {
+        let cause = format!("text behind the {height} rows of the map");
+        return Err(source.error(line.offset, cause, ROWS));
+    }
+    map_from_top(place, &cells, width, box_size_m)
+}
+
+const ROWS: &str = "give as many rows as `height` says";
+
+/// Reads the header up to and including `map`: the map's width and height.
+fn header<'a>(
+    source: Source<'_>,
+    lines: &mut impl Iterator<Item = Line<'a>>,
+) -> Result<(u32, u32), InputError> {
+    let (mut is_octile, mut width, mut height) = (false, None, None);
+    for line in lines {
+        let mut words = line.text.split_whitespace();
+        match (words.next(), words.next(), words.next()) {
+            (Some("type"), Some("octile"), None) if !is_octile => is_octile = true,
+            (Some("width"), Some(n), None) if width.is_none() => width = Some(size(source, n)?),
+            (Some("height"), Some(n), None) if height.is_none() => height = Some(size(source, n)?),
+            (Some("map"), None, None) => return finish_header(source, line, width.zip(height)),
+            _ => return Err(source.error(line.offset, "not a line of a map's header", HEADER)),
+        }
+    }
+    Err(source.error(source.text.len(), "the header has no line `map`", HEADER))
+}
+
+const HEADER: &str = "begin with the lines `type octile`, `height H`, `width W` and `map`";
+
+/// The number that the word `word` of the text writes.
+fn size(source: Source<'_>, word: &str) -> Result<u64, InputError> {
+    word.parse().map_err(|_| {
+        let cause = format!("`{word}` is not a whole number");
+        source.error(source.offset_of(word), cause, HEADER)
+    })
+}
+
+fn finish_header(
+    source: Source<'_>,
+    line: Line<'_>,
+    size: Option<(u64, u64)>,
+) -> Result<(u32, u32), InputError> {
+    let (width, height) =
+        size.ok_or_else(|| source.error(line.offset, "the header lacks the map's size", HEADER))?;
+    check_box_count(source.place, width, height)
+}
+
+/// Reads a `.scen` file (also with gzip).
+///
+/// # Errors
+/// Those of [`parse_scen`], and a file that cannot be read.
+pub fn load_scen(path: &Path) -> Result<Vec<ScenRow>, InputError> {
+    parse_scen(&path.display().to_string(), &read_text(path, MAX_SCEN_BYTES)?)
+}
+
+/// Reads `text` as a `.scen` file; errors name `place`.
+///
+/// # Errors
+/// When the first line is not `version 1`, or a row has not its nine fields between tabs, a
+/// field that is no number, or a start or goal outside the map.
+pub fn parse_scen(place: &str, text: &str) -> Result<Vec<ScenRow>, InputError> {
+    let source = Source { place, text };
+    let mut lines = source.lines_of(text);
+    let is_version_1 = |line: Line<'_>| {
+        let mut words = line.text.split_whitespace();
+        words.next() == Some("version") && matches!(words.next(), Some("1" | "1.0"))
+    };
+    if !lines.next().is_some_and(is_version_1) {
+        let remedy = "begin the file with the line `version 1`";
+        return Err(source.error(0, "not a MovingAI scenario of version 1", remedy));
+    }
+    lines
+        .enumerate()
+        .filter(|(_, line)| !line.text.trim().is_empty())
+        .map(|(i, line)| scen_row(source, i + 2, line))
+        .collect()
+}
+
+fn scen_row(source: Source<'_>, line: usize, text: Line<'_>) -> Result<ScenRow, InputError> {
+    let mut fields = Fields { source, line: text, offset: text.offset, next: Some(text.text) };
+    let bucket = fields.number("the bucket")?;
+    let map = fields.text("the map's name")?.0.to_owned();
+    let (width, height) = (fields.number("the map's width")?, fields.number("its height")?);
+    let start = fields.place("the start", width, height)?;
+    let goal = fields.place("the goal", width, height)?;
+    let optimal_length = fields.length("the optimal length")?;
+    fields.finish()?;
+    Ok(ScenRow { line, bucket, map, width, height, start, goal, optimal_length })
+}
+
+/// The fields of a row, one after the other.
+struct Fields<'a> {
+    source: Source<'a>,
+    line: Line<'a>,
+    /// Where the rest of the row begins in the text.
+    offset: usize,
+    /// The rest of the row; none behind the last field.
+    next: Option<&'a str>,
+}
+
+const FIELDS: &str = "write bucket, map, width, height, start x, start y, goal x, goal y and \
+                      optimal length, with a tab between each two";
+
+impl<'a> Fields<'a> {
+    /// The next field and where it begins.
+    fn text(&mut self, name: &str) -> Result<(&'a str, usize), InputError> {
+        let offset = self.offset;
+        let rest = self.next.ok_or_else(|| {
+            let end = self.line.offset + self.line.text.len();
+            self.source.error(end, format!("the row ends before {name}"), FIELDS)
+        })?;
+        let (field, next) = match rest.split_once('\t') {
+            Some((field, next)) => (field, Some(next)),
+            None => (rest, None),
+        };
+        self.offset += field.len() + 1;
+        self.next = next;
+        Ok((field, offset))
+    }
+
+    fn number<T: FromStr>(&mut self, name: &str) -> Result<T, InputError> {
+        let (field, offset) = self.text(name)?;
+        field.trim().parse().map_err(|_| {
+            let cause = format!("`{}`, {name}, is not such a number", field.escape_debug());
+            self.source.error(offset, cause, FIELDS)
+        })
+    }
+
+    /// The column and, counted from the bottom, the row of a box.
+    fn place(&mut self, name: &str, width: u32, height: u32) -> Result<(u32, u32), InputError> {
+        let offset = self.offset;
+        let (x, y): (u32, u32) = (self.number(name)?, self.number(name)?);
+        if x < width && y < height {
+            return Ok((x, height - 1 - y));
+        }
+        let cause = format!("{name}, ({x}, {y}), is outside the map of {width} x {height}");
+        Err(self.source.error(offset, cause, "count columns and rows from 0"))
+    }
+
+    fn length(&mut self, name: &str) -> Result<f64, InputError> {
+        let offset = self.offset;
+        let length: f64 = self.number(name)?;
+        if length.is_finite() && length >= 0.0 {
+            return Ok(length);
+        }
+        let cause = format!("{name} is {length}");
+        Err(self.source.error(offset, cause, "give a length of 0 or more"))
+    }
+
+    fn finish(&self) -> Result<(), InputError> {
+        match self.next {
+            Some(rest) if !rest.trim().is_empty() => {
+                Err(self.source.error(self.offset, "a tenth field", FIELDS))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use Cell::{Free, Wall};
+    use proptest::prelude::*;
+
+    const MAP: &str = "type octile\nheight 2\nwidth 7\nmap\n.GS@OTW\n.......\n";
+
+    #[test]
+    fn the_first_row_of_the_file_is_the_top() {
+        let map = parse_map("m", MAP, 1.0).expect("a map");
+        assert_eq!((map.width(), map.height()), (7, 2));
+        assert_eq!(map.cells()[..7], [Free; 7]);
+        assert_eq!(map.cells()[7..], [Free, Free, Free, Wall, Wall, Wall, Wall]);
+    }
+
+    #[test]
+    fn line_ends_the_order_of_the_sizes_and_empty_last_lines_do_not_matter() {
+        let other = "type octile\r\nwidth 7\r\nheight 2\r\nmap\r\n.GS@OTW\r\n.......\r\n\r\n";
+        assert_eq!(parse_map("m", other, 1.0), parse_map("m", MAP, 1.0));
+    }
+
+    fn map_error(text: &str) -> (usize, usize) {
+        parse_map("m", text, 1.0).expect_err(text).position().expect("a position")
+    }
+
+    #[test]
+    fn errors_of_a_map_are_pointed_at() {
+        let head = "type octile\nheight 1\nwidth 2\nmap\n";
+        for (rest, position) in [("..\n..\n", (6, 1)), (".#\n", (5, 2)), (".\n", (5, 2))] {
+            assert_eq!(map_error(&format!("{head}{rest}")), position, "{rest:?}");
+        }
+        assert_eq!(map_error(head), (5, 1), "no rows");
+        assert_eq!(map_error("type tile\n"), (1, 1));
+        assert_eq!(map_error("type octile\nheight -1\n"), (2, 8));
+        assert_eq!(map_error("type octile\nheight 1\nheight 1\n"), (3, 1), "twice");
+        assert_eq!(map_error("type octile\nheight 1\nmap\n.\n"), (3, 1), "no width");
+        assert_eq!(map_error(""), (1, 1));
+    }
+
+    #[test]
+    fn absurd_sizes_are_refused_at_the_header() {
+        let text = "type octile\nheight 4000000000\nwidth 4000000000\nmap\n";
+        let error = parse_map("m", text, 1.0).expect_err("absurd");
+        assert!(error.cause().contains("boxes"), "{error}");
+    }
+
+    #[test]
+    fn a_scenario_counts_rows_from_the_bottom_and_keeps_blanks_in_names() {
+        let text = "version 1\n3\ta map.map\t10\t20\t1\t0\t9\t19\t2.5\n\n";
+        let rows = parse_scen("s", text).expect("a scenario");
+        let expected = ScenRow {
+            line: 2,
+            bucket: 3,
+            map: "a map.map".into(),
+            width: 10,
+            height: 20,
+            start: (1, 19),
+            goal: (9, 0),
+            optimal_length: 2.5,
+        };
+        assert_eq!(rows, [expected]);
+    }
+
+    #[test]
+    fn a_row_of_another_map_is_found_out() {
+        let map = parse_map("m", MAP, 1.0).expect("a map");
+        let row = |size: &str, ends: &str| {
+            let text = format!("version 1\n0\tm\t{size}\t{ends}\t1\n");
+            parse_scen("s", &text).expect("a scenario").remove(0).check_against("s", &map)
+        };
+        assert_eq!(row("7\t2", "0\t0\t6\t1"), Ok(()));
+        for wrong in
+            [row("7\t3", "0\t1\t6\t1"), row("7\t2", "3\t0\t0\t0"), row("7\t2", "0\t0\t6\t0")]
+        {
+            assert_eq!(wrong.expect_err("another map").position(), Some((2, 1)));
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn no_text_panics_the_readers(
+            head in prop_oneof![Just("type octile\nheight 2\nwidth 2\nmap\n"), Just("version 1\n"), Just("")],
+            pieces in proptest::collection::vec(
+                prop_oneof![
+                    Just("\n"), Just("\r\n"), Just("\t"), Just(" "), Just("."), Just("@"), Just("é"),
+                    Just("map"), Just("width "), Just("7"), Just("-1"), Just("99999999999"),
+                ],
+                0..40,
+            ),
+        ) {
+            let text = head.to_owned() + &pieces.concat();
+            let _ = (parse_map("m", &text, 1.0).is_ok(), parse_scen("s", &text).is_ok());
+        }
+    }
+
+    fn scen_error(row: &str) -> (usize, usize) {
+        let text = format!("version 1.0\r\n{row}\r\n");
+        parse_scen("s", &text).expect_err(row).position().expect("a position")
+    }
+
+    #[test]
+    fn errors_of_a_scenario_are_pointed_at() {
+        assert_eq!(scen_error("0\tm\t10\t20\t1\t2\t3"), (2, 16), "too few fields");
+        assert_eq!(scen_error("0 m 10 20 1 2 3 4 5.0"), (2, 1), "blanks for tabs");
+        assert_eq!(scen_error("0\tm\t10\t20\t1\t-2\t3\t4\t5"), (2, 13), "negative");
+        assert_eq!(scen_error("0\tm\t10\t20\t10\t2\t3\t4\t5"), (2, 11), "start outside");
+        assert_eq!(scen_error("0\tm\t10\t20\t1\t2\t3\t20\t5"), (2, 15), "goal outside");
+        assert_eq!(scen_error("0\tm\t10\t20\t1\t2\t3\t4\tNaN"), (2, 19), "no length");
+        assert_eq!(scen_error("0\tm\t10\t20\t1\t2\t3\t4\t5\t6"), (2, 21), "ten fields");
+        let other = parse_scen("s", "version 2\n").expect_err("another version");
+        assert_eq!(other.position(), Some((1, 1)));
+        assert!(parse_scen("s", "").is_err());
+    }
+}

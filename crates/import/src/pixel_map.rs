@@ -1,0 +1,257 @@
+//! A map of pixels, and the rule that makes boxes of them.
+
+use std::ops::Range;
+
+use sidestep_kernel::InputError;
+
+use sidestep_map::{Cell, CellCounts, GridMap, UnknownPolicy, check_box_count, check_box_size};
+
+pub use super::image::MAX_PIXELS;
+
+/// An occupancy grid as a mapping robot makes it: square pixels, free, occupied or unknown.
+///
+/// Pixel (0, 0) is the lower-left one: rows count from the bottom, unlike those of the image.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PixelMap {
+    width: u32,
+    height: u32,
+    resolution_m: f64,
+    origin_m: [f64; 2],
+    /// Row by row from the bottom; length `width * height`.
+    pixels: Vec<Cell>,
+}
+
+impl PixelMap {
+    /// A map of `width` x `height` pixels with a side of `resolution_m` metres whose lower-left
+    /// corner is at `origin_m`; `pixels` holds them row by row from the bottom.
+    ///
+    /// # Panics
+    /// When `pixels` has another length than `width * height`, or `resolution_m` is not a
+    /// positive number.
+    pub fn new(
+        width: u32,
+        height: u32,
+        resolution_m: f64,
+        origin_m: [f64; 2],
+        pixels: Vec<Cell>,
+    ) -> Self {
+        assert_eq!(pixels.len(), width as usize * height as usize, "one cell per pixel");
+        assert!(resolution_m.is_finite() && resolution_m > 0.0, "a pixel has a positive side");
+        Self { width, height, resolution_m, origin_m, pixels }
+    }
+
+    /// Pixels from west to east.
+    pub fn width(&self) -> u32 {
+        self.width
+    }
+
+    /// Pixels from south to north.
+    pub fn height(&self) -> u32 {
+        self.height
+    }
+
+    /// Side of a pixel in metres.
+    pub fn resolution_m(&self) -> f64 {
+        self.resolution_m
+    }
+
+    /// World position of the lower-left corner, in metres.
+    pub fn origin_m(&self) -> [f64; 2] {
+        self.origin_m
+    }
+
+    /// All pixels, row by row from the bottom.
+    pub fn pixels(&self) -> &[Cell] {
+        &self.pixels
+    }
+
+    /// Number of pixels of each sort.
+    pub fn counts(&self) -> CellCounts {
+        CellCounts::of(&self.pixels)
+    }
+
+    /// The map in boxes with a side of `box_size_m` metres, counted from the lower-left corner.
+    ///
+    /// A pixel belongs to the box that holds its center. A box is a wall when any of its pixels
+    /// is occupied, else unknown when any is unknown, else free; `unknown` then says what the
+    /// unknown boxes become. Where boxes are smaller than pixels, a box that holds no center of
+    /// a pixel is what the pixel around its own center is. The last column and row may reach
+    /// over the edge of the map; there is one for every pixel's center and for every box whose
+    /// center lies on the map.
+    ///
+    /// # Errors
+    /// When `box_size_m` is not a positive number or makes more boxes than
+    /// [`MAX_BOXES`](sidestep_map::MAX_BOXES).
+    pub fn to_boxes(&self, box_size_m: f64, unknown: UnknownPolicy) -> Result<GridMap, InputError> {
+        let axis = |pixels| Axis { pixels, resolution_m: self.resolution_m, box_size_m };
+        let (x, y) = (axis(self.width), axis(self.height));
+        check_box_size(box_size_m)?;
+        let (width, height) = check_box_count("box_size_m", x.boxes(), y.boxes())?;
+        let columns: Vec<_> = (0..width).map(|col| x.pixels_of(col)).collect();
+        let mut cells = Vec::with_capacity(width as usize * height as usize);
+        for row in 0..height {
+            let rows = y.pixels_of(row);
+            cells.extend(columns.iter().map(|cols| unknown.apply(self.whole(cols, &rows))));
+        }
+        Ok(GridMap::new(width, height, box_size_m, cells).with_origin(self.origin_m))
+    }
+
+    /// What a box of these pixels is.
+    fn whole(&self, cols: &Range<usize>, rows: &Range<usize>) -> Cell {
+        let mut whole = Cell::Free;
+        for row in rows.clone() {
+            let start = row * self.width as usize;
+            for pixel in &self.pixels[start + cols.start..start + cols.end] {
+                match pixel {
+                    Cell::Wall => return Cell::Wall,
+                    Cell::Unknown => whole = Cell::Unknown,
+                    Cell::Free => {}
+                }
+            }
+        }
+        whole
+    }
+}
+
+/// How boxes lie over pixels, along one axis.
+#[derive(Clone, Copy)]
+struct Axis {
+    /// Number of pixels, at least 1 where a method is called.
+    pixels: u32,
+    resolution_m: f64,
+    box_size_m: f64,
+}
+
+impl Axis {
+    /// The box that holds the center of a pixel. Saturates far above any allowed size.
+    fn box_of(self, pixel: u32) -> u64 {
+        ((f64::from(pixel) + 0.5) * self.resolution_m / self.box_size_m).floor() as u64
+    }
+
+    /// The pixel around the center of a box.
+    fn pixel_around(self, index: u32) -> u32 {
+        let pixel = ((f64::from(index) + 0.5) * self.box_size_m / self.resolution_m).floor();
+        (pixel as u32).min(self.pixels - 1)
+    }
+
+    /// The number of boxes.
+    fn boxes(self) -> u64 {
+        let Some(last) = self.pixels.checked_sub(1) else { return 0 };
+        let length = f64::from(self.pixels) * self.resolution_m / self.box_size_m;
+        let with_center_on_map = (length - 0.5).ceil() as u64;
+        with_center_on_map.max(self.box_of(last).saturating_add(1))
+    }
+
+    /// The pixels that make up a box; at least one.
+    fn pixels_of(self, index: u32) -> Range<usize> {
+        let first = self.first_at_or_after(u64::from(index));
+        let end = self.first_at_or_after(u64::from(index) + 1);
+        if first < end {
+            return first as usize..end as usize;
+        }
+        let pixel = self.pixel_around(index) as usize;
+        pixel..pixel + 1
+    }
+
+    /// The first pixel whose center is in the box `index` or behind it.
+    fn first_at_or_after(self, index: u64) -> u32 {
+        // `box_of` never falls, so bisection finds the edge by the very formula that defines it.
+        let (mut low, mut high) = (0, self.pixels);
+        while low < high {
+            let middle = low + (high - low) / 2;
+            if self.box_of(middle) < index {
+                low = middle + 1;
+            } else {
+                high = middle;
+            }
+        }
+        low
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use Cell::{Free, Unknown, Wall};
+    use proptest::{num, prelude::*};
+
+    fn row(pixels: &[Cell], resolution_m: f64) -> PixelMap {
+        PixelMap::new(pixels.len() as u32, 1, resolution_m, [1.0, 2.0], pixels.to_vec())
+    }
+
+    /// The lowest row of boxes.
+    fn boxes(map: &PixelMap, box_size_m: f64) -> Vec<Cell> {
+        let boxes = map.to_boxes(box_size_m, UnknownPolicy::Keep).expect("boxes");
+        (0..boxes.width()).map(|col| boxes.cell(col, 0)).collect()
+    }
+
+    #[test]
+    fn any_occupied_pixel_makes_a_wall_and_else_any_unknown_one_an_unknown_box() {
+        let pixels = [Free, Wall, Unknown, Free, Free, Unknown, Free, Free, Free];
+        assert_eq!(boxes(&row(&pixels, 0.1), 0.3), [Wall, Unknown, Free]);
+    }
+
+    #[test]
+    fn a_pixel_belongs_to_the_box_that_holds_its_center() {
+        let pixels = [Free, Free, Wall, Free];
+        assert_eq!(boxes(&row(&pixels, 0.38), 1.0), [Wall, Free], "center at 0.95");
+        assert_eq!(boxes(&row(&pixels, 0.45), 1.0), [Free, Wall], "center at 1.125");
+    }
+
+    #[test]
+    fn a_box_smaller_than_a_pixel_is_what_the_pixel_around_its_center_is() {
+        let map = row(&[Free, Wall], 0.5);
+        assert_eq!(boxes(&map, 0.25), [Free, Free, Wall, Wall]);
+        assert_eq!(boxes(&map, 0.2), [Free, Free, Wall, Wall, Wall], "0.4..0.6: center 0.5");
+        assert_eq!(boxes(&row(&[Wall], 1.0), 0.3), [Wall; 3]);
+    }
+
+    #[test]
+    fn boxes_keep_the_origin_the_size_and_the_rows_from_the_bottom() {
+        let map = PixelMap::new(1, 2, 0.5, [-3.0, 4.0], vec![Wall, Free]);
+        let boxes = map.to_boxes(0.5, UnknownPolicy::Wall).expect("boxes");
+        assert_eq!((boxes.origin_m, boxes.box_size_m), ([-3.0, 4.0], 0.5));
+        assert_eq!(boxes.cells(), [Wall, Free]);
+    }
+
+    #[test]
+    fn the_policy_says_what_unknown_boxes_become() {
+        let map = row(&[Unknown], 0.5);
+        for (policy, cell) in [
+            (UnknownPolicy::Wall, Wall),
+            (UnknownPolicy::Free, Free),
+            (UnknownPolicy::Keep, Unknown),
+        ] {
+            assert_eq!(map.to_boxes(0.5, policy).expect("boxes").cells(), [cell]);
+        }
+    }
+
+    #[test]
+    fn wrong_and_absurdly_small_boxes_are_refused() {
+        let map = row(&[Free; 4], 0.5);
+        for wrong in [0.0, -0.5, f64::NAN, f64::INFINITY, 1e-9, f64::MIN_POSITIVE] {
+            assert!(map.to_boxes(wrong, UnknownPolicy::Wall).is_err(), "{wrong}");
+        }
+        let empty = PixelMap::new(0, 0, 0.5, [0.0; 2], Vec::new());
+        assert!(empty.to_boxes(0.5, UnknownPolicy::Wall).is_err());
+    }
+
+    proptest! {
+        #[test]
+        fn boxes_of_any_size_are_made_or_refused_and_lose_no_wall(
+            width in 1u32..20,
+            height in 1u32..20,
+            resolution_m in prop_oneof![0.001..10.0, num::f64::POSITIVE],
+            box_size_m in prop_oneof![0.001..10.0f64, any::<f64>()],
+            seed in any::<u64>(),
+        ) {
+            let cell = |i: u32| [Free, Wall, Unknown][(seed.rotate_right(i) % 3) as usize];
+            let pixels: Vec<_> = (0..width * height).map(cell).collect();
+            let map = PixelMap::new(width, height, resolution_m, [0.0; 2], pixels);
+            if let Ok(boxes) = map.to_boxes(box_size_m, UnknownPolicy::Keep) {
+                prop_assert_eq!(map.counts().wall > 0, boxes.count(Wall) > 0);
+                prop_assert!(map.counts().free > 0 || boxes.count(Free) == 0);
+            }
+        }
+    }
+}

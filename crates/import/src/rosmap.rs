@@ -1,0 +1,187 @@
+//! Maps of ROS `map_server`: a YAML file and the image that it names.
+//!
+//! With `v` the mean of a pixel's color channels (0 to 255), `p = (255 - v) / 255`, or
+//! `v / 255` where `negate` is set. The pixel is occupied where `p > occupied_thresh`, free
+//! where `p < free_thresh` and else unknown. The modes differ as follows.
+//!
+//! - `trinary`, the default: as said.
+//! - `scale`: what is neither occupied nor free gets a shade between the two; not being free
+//!   for sure, it is unknown here.
+//! - `raw`: `v` (`255 - v` where `negate` is set) is itself the occupancy in percent, compared
+//!   with both thresholds; above 100 it is unknown.
+//!
+//! Unlike `map_server`, whose trinary mode takes transparency for one more color, transparency
+//! is not looked at. Unknown keys are ignored, as `map_server` does.
+
+use std::path::Path;
+
+use sidestep_kernel::InputError;
+
+use super::PixelMap;
+use super::image::Bitmap;
+use super::map_yaml::{MAX_YAML_BYTES, Metadata};
+use sidestep_map::Cell;
+use sidestep_scenario::file::read_text;
+
+/// Reads the map whose YAML file is at `path`. YAML file and image may be packed with gzip; an
+/// image that is there only with `.gz` behind its name is found too.
+///
+/// # Errors
+/// When a file is missing, damaged or absurdly large, a key is missing or has a wrong value, or
+/// the map is rotated (an origin yaw that is not 0).
+pub fn load(path: &Path) -> Result<PixelMap, InputError> {
+    let place = path.display().to_string();
+    let text = read_text(path, MAX_YAML_BYTES)?;
+    let meta = Metadata::parse(&place, &text, path.parent().unwrap_or(Path::new("")))?;
+    let image = Bitmap::load(&meta.image)?;
+    Ok(pixel_map(&meta, &image))
+}
+
+fn pixel_map(meta: &Metadata, image: &Bitmap) -> PixelMap {
+    let from_top = image.map_brightness(|brightness| meta.reading.cell(brightness));
+    let from_bottom = from_top.rchunks(image.width() as usize).flatten().copied().collect();
+    PixelMap::new(image.width(), image.height(), meta.resolution_m, meta.origin_m, from_bottom)
+}
+
+/// What a pixel's brightness stands for; see the module.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Mode {
+    Trinary,
+    Scale,
+    Raw,
+}
+
+/// How a brightness is read as a cell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Reading {
+    pub(super) mode: Mode,
+    pub(super) negate: bool,
+    pub(super) occupied_thresh: f64,
+    pub(super) free_thresh: f64,
+}
+
+impl Reading {
+    fn cell(&self, brightness: f64) -> Cell {
+        let shade = if self.negate { brightness } else { 255.0 - brightness };
+        match self.mode {
+            Mode::Trinary | Mode::Scale => self.occupancy_cell(shade / 255.0),
+            Mode::Raw => self.raw_cell(255.0 - shade),
+        }
+    }
+
+    /// `map_server` stores a raw value as a whole number; 101 to 255 mean unknown.
+    fn raw_cell(&self, value: f64) -> Cell {
+        match value.floor() {
+            percent if percent > 100.0 => Cell::Unknown,
+            percent => self.occupancy_cell(percent / 100.0),
+        }
+    }
+
+    fn occupancy_cell(&self, occupancy: f64) -> Cell {
+        if occupancy > self.occupied_thresh {
+            Cell::Wall
+        } else if occupancy < self.free_thresh {
+            Cell::Free
+        } else {
+            Cell::Unknown
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::PathBuf;
+
+    use super::*;
+    use Cell::{Free, Unknown, Wall};
+
+    const READING: Reading =
+        Reading { mode: Mode::Trinary, negate: false, occupied_thresh: 0.65, free_thresh: 0.196 };
+
+    fn cells(reading: Reading, brightnesses: &[f64]) -> Vec<Cell> {
+        brightnesses.iter().map(|&brightness| reading.cell(brightness)).collect()
+    }
+
+    #[test]
+    fn dark_is_occupied_light_is_free_and_205_is_unknown_by_a_hair() {
+        assert_eq!(cells(READING, &[0.0, 205.0, 206.0, 255.0]), [Wall, Unknown, Free, Free]);
+        let lenient = Reading { free_thresh: 0.25, ..READING };
+        assert_eq!(cells(lenient, &[205.0]), [Free]);
+    }
+
+    #[test]
+    fn both_thresholds_are_strict() {
+        let reading = Reading { occupied_thresh: 0.6, free_thresh: 0.2, ..READING };
+        assert_eq!(cells(reading, &[102.0, 101.0, 204.0, 205.0]), [Unknown, Wall, Unknown, Free]);
+    }
+
+    #[test]
+    fn negate_turns_dark_and_light_around() {
+        let reading = Reading { negate: true, ..READING };
+        assert_eq!(cells(reading, &[0.0, 50.0, 255.0]), [Free, Unknown, Wall]);
+    }
+
+    #[test]
+    fn the_shades_of_scale_are_unknown() {
+        let reading = Reading { mode: Mode::Scale, ..READING };
+        assert_eq!(cells(reading, &[0.0, 128.0, 255.0]), [Wall, Unknown, Free]);
+    }
+
+    #[test]
+    fn raw_values_are_percent_and_unknown_above_100() {
+        let reading = Reading { mode: Mode::Raw, ..READING };
+        let values = [0.0, 19.0, 20.0, 65.0, 66.0, 100.0, 101.0, 255.0];
+        let expected = [Free, Free, Unknown, Unknown, Wall, Wall, Unknown, Unknown];
+        assert_eq!(cells(reading, &values), expected);
+        let negated = Reading { negate: true, ..reading };
+        assert_eq!(cells(negated, &[255.0, 155.0, 0.0]), [Free, Wall, Unknown]);
+    }
+
+    /// A folder with a map of 1 x 2 pixels, white over black, and its YAML file.
+    fn written(image: &str, bytes: &[u8]) -> (tempfile::TempDir, PathBuf) {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        std::fs::write(folder.path().join(image), bytes).expect("written");
+        let yaml = "image: a.pgm\nresolution: 0.5\norigin: [1, 2, 0]\nnegate: 0\n\
+                    occupied_thresh: 0.65\nfree_thresh: 0.196\n";
+        let path = folder.path().join("a.yaml");
+        std::fs::write(&path, yaml).expect("written");
+        (folder, path)
+    }
+
+    const IMAGE: &[u8] = b"P5 1 2 255\n\xff\x00";
+
+    #[test]
+    fn the_last_row_of_the_image_is_the_bottom_of_the_map() {
+        let (_folder, path) = written("a.pgm", IMAGE);
+        let map = load(&path).expect("a map");
+        assert_eq!((map.width(), map.height(), map.resolution_m()), (1, 2, 0.5));
+        assert_eq!((map.origin_m(), map.pixels()), ([1.0, 2.0], &[Wall, Free][..]));
+    }
+
+    #[test]
+    fn an_image_that_is_there_in_packed_form_only_is_found() {
+        use std::io::Write;
+        let mut gzip = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+        gzip.write_all(IMAGE).expect("memory takes all");
+        let (_folder, path) = written("a.pgm.gz", &gzip.finish().expect("memory takes all"));
+        assert_eq!(load(&path).map(|map| map.counts().free), Ok(1));
+    }
+
+    #[test]
+    fn a_missing_image_is_an_error_in_the_yaml_file_and_a_cut_one_in_the_image() {
+        let (_folder, path) = written("b.pgm", IMAGE);
+        let error = load(&path).expect_err("missing");
+        assert!(error.place().ends_with("a.yaml"), "{error}");
+        assert_eq!(error.position(), Some((1, 8)));
+        let (_folder, path) = written("a.pgm", &IMAGE[..12]);
+        let error = load(&path).expect_err("cut");
+        assert!(error.place().ends_with("a.pgm") && error.cause().contains("short"), "{error}");
+    }
+
+    #[test]
+    fn a_yaml_file_of_absurd_size_is_refused() {
+        let (_folder, path) = written("a.pgm", IMAGE);
+        std::fs::write(&path, "#".repeat(1 << 20)).expect("written");
+        assert!(load(&path).is_err());
+    }
+}

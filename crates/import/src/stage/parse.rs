@@ -1,0 +1,172 @@
+//! Text -> [`Item`]s.
+
+use winnow::ascii::{digit1, multispace1, till_line_ending};
+use winnow::combinator::{alt, cut_err, opt, preceded, repeat, terminated};
+use winnow::error::{ContextError, StrContext, StrContextValue};
+use winnow::prelude::*;
+use winnow::stream::{LocatingSlice, Location};
+use winnow::token::{take_till, take_while};
+
+use sidestep_kernel::InputError;
+
+type Input<'a> = LocatingSlice<&'a str>;
+
+/// The most models in each other.
+pub(super) const MAX_NESTING: usize = 64;
+
+/// A top-level part of a file.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Item {
+    Include(Value),
+    Define { name: String, model: Model },
+    Entry(Entry),
+}
+
+/// A part of a model, or of the whole world.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Entry {
+    Property { key: String, value: Value },
+    Model(Model),
+}
+
+/// `KIND ( ENTRIES )`
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Model {
+    pub(super) kind: String,
+    pub(super) entries: Vec<Entry>,
+    pub(super) at: Place,
+}
+
+/// One word or text, or a list of them.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Value {
+    pub(super) words: Vec<String>,
+    pub(super) at: Place,
+}
+
+/// Which file, and which byte of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Place {
+    pub(super) file: usize,
+    pub(super) offset: usize,
+}
+
+/// The items of a file.
+pub(super) fn items(place: &str, text: &str, file: usize) -> Result<Vec<Item>, InputError> {
+    check_nesting(place, text)?;
+    let mut parser = preceded(blank, repeat(0.., |input: &mut Input| item(input, file)));
+    parser.parse(LocatingSlice::new(text)).map_err(|error| {
+        let expected = error.inner().context().find_map(|context| match context {
+            StrContext::Expected(value) => Some(value.to_string()),
+            _ => None,
+        });
+        let expected = expected.unwrap_or_else(|| "a property or a model".into());
+        let found = match text[error.offset()..].chars().next() {
+            Some(c) => format!("`{}`", c.escape_debug()),
+            None => "the end of the file".into(),
+        };
+        let cause = format!("{found} where {expected} is expected");
+        InputError::new(place, cause, format!("write {expected} there"))
+            .in_text(text, error.offset())
+    })
+}
+
+/// The parser calls itself for each model in a model; the stack must not decide how deep.
+fn check_nesting(place: &str, text: &str) -> Result<(), InputError> {
+    let (mut depth, mut in_comment, mut in_text) = (0usize, false, false);
+    for (at, c) in text.char_indices() {
+        match c {
+            '\n' => in_comment = false,
+            _ if in_comment => {}
+            '"' => in_text = !in_text,
+            _ if in_text => {}
+            '#' => in_comment = true,
+            '(' => depth += 1,
+            ')' => depth = depth.saturating_sub(1),
+            _ => {}
+        }
+        if depth > MAX_NESTING {
+            let cause = format!("more than {MAX_NESTING} models in each other");
+            return Err(InputError::new(place, cause, "use fewer").in_text(text, at));
+        }
+    }
+    Ok(())
+}
+
+fn expected(what: &'static str) -> StrContext {
+    StrContext::Expected(StrContextValue::Description(what))
+}
+
+fn blank(input: &mut Input) -> ModalResult<()> {
+    let comment = ('#', till_line_ending).void();
+    repeat(0.., alt((multispace1.void(), comment))).parse_next(input)
+}
+
+fn sign<'a>(sign: char) -> impl ModalParser<Input<'a>, char, ContextError> {
+    terminated(sign, blank)
+}
+
+fn is_word(c: char) -> bool {
+    !c.is_whitespace() && !"()[]\"#".contains(c)
+}
+
+/// A word, perhaps with an index: `point[3]`.
+fn name(input: &mut Input) -> ModalResult<String> {
+    let index = opt(('[', digit1, ']'));
+    let name = (take_while(1.., is_word), index).take().map(str::to_owned);
+    terminated(name, blank).parse_next(input)
+}
+
+/// A word or a text in quotes.
+fn atom(input: &mut Input) -> ModalResult<String> {
+    let closed = cut_err('"').context(expected("a closing `\"`"));
+    let text = preceded('"', terminated(take_till(0.., ['"', '\n']), closed));
+    let word = take_while(1.., is_word);
+    terminated(alt((text, word)).map(str::to_owned), blank).parse_next(input)
+}
+
+fn value(input: &mut Input, file: usize) -> ModalResult<Value> {
+    let at = Place { file, offset: input.current_token_start() };
+    let closed = cut_err(sign(']')).context(expected("a value or `]`"));
+    let list = preceded(sign('['), terminated(repeat(0.., atom), closed));
+    let one = atom.map(|word| vec![word]);
+    let words = cut_err(alt((list, one))).context(expected("a value")).parse_next(input)?;
+    Ok(Value { words, at })
+}
+
+fn item(input: &mut Input, file: usize) -> ModalResult<Item> {
+    let at = Place { file, offset: input.current_token_start() };
+    let word = name.parse_next(input)?;
+    match word.as_str() {
+        "include" => value(input, file).map(Item::Include),
+        "define" => {
+            let name = cut_err(name).context(expected("a name")).parse_next(input)?;
+            let at = Place { file, offset: input.current_token_start() };
+            let kind = cut_err(self::name).context(expected("a model's name")).parse_next(input)?;
+            cut_err(sign('(')).context(expected("`(`")).parse_next(input)?;
+            Ok(Item::Define { name, model: model(input, kind, at)? })
+        }
+        _ => entry_of(input, word, at).map(Item::Entry),
+    }
+}
+
+fn entry(input: &mut Input, file: usize) -> ModalResult<Entry> {
+    let at = Place { file, offset: input.current_token_start() };
+    let word = name.parse_next(input)?;
+    entry_of(input, word, at)
+}
+
+/// What a word begins: a model, or a property.
+fn entry_of(input: &mut Input, word: String, at: Place) -> ModalResult<Entry> {
+    if opt(sign('(')).parse_next(input)?.is_some() {
+        return model(input, word, at).map(Entry::Model);
+    }
+    Ok(Entry::Property { key: word, value: value(input, at.file)? })
+}
+
+/// The rest of a model, behind its opening bracket.
+fn model(input: &mut Input, kind: String, at: Place) -> ModalResult<Model> {
+    let entries = repeat(0.., |input: &mut Input| entry(input, at.file)).parse_next(input)?;
+    cut_err(sign(')')).context(expected("a property, a model or `)`")).parse_next(input)?;
+    Ok(Model { kind, entries, at })
+}

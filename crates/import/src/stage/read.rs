@@ -1,0 +1,286 @@
+//! [`Item`]s -> [`World`].
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
+
+use super::parse::{self, Entry, Item, MAX_NESTING, Model, Place, Value};
+use super::{Body, FloorPlan, MAX_WORLD_BYTES, Pose, Robot, World};
+use crate::image::Bitmap;
+use sidestep_kernel::InputError;
+use sidestep_kernel::math::{cos, hypot, sin};
+use sidestep_scenario::file::read_text;
+
+const MAX_FILES: usize = 1000;
+const MAX_MODELS: usize = 100_000;
+/// What Stage gives models without a size.
+const DEFAULT_SIZE_M: f64 = 0.1;
+/// Pixels brighter than this are free, as in Stage.
+const DARKEST_FREE: f64 = 127.0;
+
+pub(super) fn world(path: &Path) -> Result<World, InputError> {
+    let mut reader = Reader::default();
+    reader.file(path)?;
+    reader.world.not_used = reader.not_used.into_iter().collect();
+    Ok(reader.world)
+}
+
+/// A file that has been read.
+struct Source {
+    path: PathBuf,
+    text: String,
+}
+
+/// A model with all that it has from those it descends from.
+#[derive(Debug, Clone, Default)]
+struct Definition {
+    /// The built-in kind at its root.
+    root: String,
+    /// The last value of each property counts.
+    properties: BTreeMap<String, Value>,
+    children: Vec<Model>,
+}
+
+#[derive(Default)]
+struct Reader {
+    sources: Vec<Source>,
+    /// Files that are being read: each was included by the one before.
+    open: Vec<PathBuf>,
+    definitions: BTreeMap<String, Rc<Definition>>,
+    models: usize,
+    not_used: BTreeMap<String, usize>,
+    world: World,
+}
+
+impl Reader {
+    fn file(&mut self, path: &Path) -> Result<(), InputError> {
+        let text = read_text(path, MAX_WORLD_BYTES)?;
+        let canonical = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+        self.open.push(canonical);
+        let file = self.sources.len();
+        let items = parse::items(&path.display().to_string(), &text, file)?;
+        self.sources.push(Source { path: path.to_owned(), text });
+        for item in items {
+            match item {
+                Item::Include(name) => self.include(&name)?,
+                Item::Define { name, model } => {
+                    let definition = self.resolved(&model);
+                    self.definitions.insert(name, Rc::new(definition));
+                }
+                Item::Entry(Entry::Property { key, .. }) => self.pass_over(key),
+                Item::Entry(Entry::Model(model)) => self.model(&model, Pose::default(), 0)?,
+            }
+        }
+        self.open.pop();
+        Ok(())
+    }
+
+    fn include(&mut self, name: &Value) -> Result<(), InputError> {
+        let path = self.path(name)?;
+        let is_open = path.canonicalize().is_ok_and(|path| self.open.contains(&path));
+        if is_open || self.sources.len() >= MAX_FILES {
+            let cause = match is_open {
+                true => format!("{} includes itself", path.display()),
+                false => format!("more than {MAX_FILES} files are included"),
+            };
+            return Err(self.error(name.at, cause, "leave this `include` out"));
+        }
+        match path.is_file() {
+            true => self.file(&path),
+            false => {
+                let cause = format!("there is no file {}", path.display());
+                Err(self.error(name.at, cause, "put it there, or leave the line out"))
+            }
+        }
+    }
+
+    /// A path that a file names, relative to that file.
+    fn path(&self, name: &Value) -> Result<PathBuf, InputError> {
+        let [file] = &name.words[..] else {
+            return Err(self.error(name.at, "a list where a file's name is expected", "give one"));
+        };
+        let beside = self.sources[name.at.file].path.parent();
+        Ok(beside.unwrap_or(Path::new("")).join(file))
+    }
+
+    fn error(&self, at: Place, cause: impl Into<String>, remedy: &str) -> InputError {
+        let Source { path, text } = &self.sources[at.file];
+        InputError::new(path.display(), cause, remedy).in_text(text, at.offset)
+    }
+
+    fn pass_over(&mut self, name: impl Into<String>) {
+        *self.not_used.entry(name.into()).or_default() += 1;
+    }
+
+    /// What a model has, its own properties before inherited ones.
+    fn resolved(&self, model: &Model) -> Definition {
+        let mut definition = match self.definitions.get(&model.kind) {
+            Some(base) => (**base).clone(),
+            None => Definition { root: model.kind.clone(), ..Definition::default() },
+        };
+        for entry in &model.entries {
+            match entry {
+                Entry::Property { key, value } => {
+                    definition.properties.insert(key.clone(), value.clone());
+                }
+                Entry::Model(child) => definition.children.push(child.clone()),
+            }
+        }
+        definition
+    }
+
+    fn model(&mut self, model: &Model, parent: Pose, depth: usize) -> Result<(), InputError> {
+        self.models += 1;
+        if self.models > MAX_MODELS || depth > MAX_NESTING {
+            let cause = format!("more than {MAX_MODELS} models, or {MAX_NESTING} in each other");
+            return Err(self.error(model.at, cause, "use fewer"));
+        }
+        let definition = self.resolved(model);
+        match definition.root.as_str() {
+            "position" => self.robot(model, &definition, parent),
+            "model" => self.thing(model, &definition, parent, depth),
+            _ if definition.properties.contains_key("bitmap") => {
+                // A floor plan whose definition is in a file that is not at hand.
+                self.thing(model, &definition, parent, depth)
+            }
+            root => {
+                self.pass_over(root);
+                Ok(())
+            }
+        }
+    }
+
+    fn robot(&mut self, model: &Model, def: &Definition, parent: Pose) -> Result<(), InputError> {
+        let (size_m, origin) = (self.size_m(def)?, self.pose(def, "origin")?);
+        let far = |offset_m: f64, size_m: f64| offset_m.abs() + 0.5 * size_m;
+        let robot = Robot {
+            name: self.text(def, "name"),
+            kind: model.kind.clone(),
+            pose: self.pose(def, "pose")?.on(parent),
+            size_m,
+            radius_m: match origin.yaw_rad == 0.0 {
+                true => hypot(far(origin.x_m, size_m[0]), far(origin.y_m, size_m[1])),
+                false => hypot(origin.x_m, origin.y_m) + 0.5 * hypot(size_m[0], size_m[1]),
+            },
+        };
+        self.world.robots.push(robot);
+        self.count_unused(def);
+        Ok(())
+    }
+
+    fn thing(
+        &mut self,
+        model: &Model,
+        def: &Definition,
+        parent: Pose,
+        depth: usize,
+    ) -> Result<(), InputError> {
+        let pose = self.pose(def, "pose")?.on(parent);
+        let middle = self.pose(def, "origin")?.on(pose);
+        let size_m = self.size_m(def)?;
+        let name = self.text(def, "name");
+        if let Some(bitmap) = def.properties.get("bitmap") {
+            let has_boundary = self.number(def, "boundary", 0.0)? != 0.0;
+            let plan = self.floor_plan(bitmap)?;
+            let plan = FloorPlan { name, size_m, pose: middle, has_boundary, ..plan };
+            self.world.floor_plans.push(plan);
+        } else if self.is_in_the_way(def)? {
+            self.world.boxes.push(Body { name, pose: middle, size_m });
+        } else {
+            self.pass_over(&model.kind);
+        }
+        self.count_unused(def);
+        def.children.iter().try_for_each(|child| self.model(child, pose, depth + 1))
+    }
+
+    fn is_in_the_way(&self, def: &Definition) -> Result<bool, InputError> {
+        let is_hit = self.number(def, "obstacle_return", 1.0)? != 0.0;
+        Ok(is_hit || self.number(def, "ranger_return", 1.0)? >= 0.0)
+    }
+
+    /// The pixels of a bitmap.
+    fn floor_plan(&self, bitmap: &Value) -> Result<FloorPlan, InputError> {
+        let image = Bitmap::load(&self.path(bitmap)?)?;
+        let from_top = image.map_brightness(|brightness| brightness <= DARKEST_FREE);
+        let rows = from_top.rchunks(image.width() as usize);
+        Ok(FloorPlan {
+            name: String::new(),
+            width: image.width(),
+            height: image.height(),
+            solid: rows.flatten().copied().collect(),
+            size_m: [0.0; 2],
+            pose: Pose::default(),
+            has_boundary: false,
+        })
+    }
+
+    fn count_unused(&mut self, def: &Definition) {
+        let is_used = |key: &&String| !USED.contains(&key.as_str());
+        for key in def.properties.keys().filter(is_used) {
+            self.pass_over(key);
+        }
+    }
+
+    fn text(&self, def: &Definition, key: &str) -> String {
+        def.properties.get(key).map(|value| value.words.join(" ")).unwrap_or_default()
+    }
+
+    fn number(&self, def: &Definition, key: &str, default: f64) -> Result<f64, InputError> {
+        let Some(value) = def.properties.get(key) else { return Ok(default) };
+        match self.numbers(value)?[..] {
+            [number] => Ok(number),
+            _ => Err(self.error(value.at, format!("a list for {key}"), "give one number")),
+        }
+    }
+
+    fn numbers(&self, value: &Value) -> Result<Vec<f64>, InputError> {
+        let number = |word: &String| {
+            let number = word.parse().ok().filter(|x: &f64| x.is_finite());
+            number.ok_or_else(|| {
+                self.error(value.at, format!("`{word}` is no number"), "give finite numbers")
+            })
+        };
+        value.words.iter().map(number).collect()
+    }
+
+    fn size_m(&self, def: &Definition) -> Result<[f64; 2], InputError> {
+        let Some(value) = def.properties.get("size") else { return Ok([DEFAULT_SIZE_M; 2]) };
+        match self.numbers(value)?[..] {
+            [x, y] | [x, y, _] if x > 0.0 && y > 0.0 => Ok([x, y]),
+            _ => Err(self.error(
+                value.at,
+                "no size",
+                "give three lengths in m, those along x and y above 0",
+            )),
+        }
+    }
+
+    fn pose(&self, def: &Definition, key: &str) -> Result<Pose, InputError> {
+        let Some(value) = def.properties.get(key) else { return Ok(Pose::default()) };
+        match self.numbers(value)?[..] {
+            [x_m, y_m, _, yaw_deg] => Ok(Pose { x_m, y_m, yaw_rad: yaw_deg.to_radians() }),
+            [x_m, y_m, _] if key == "origin" => Ok(Pose { x_m, y_m, yaw_rad: 0.0 }),
+            _ => Err(self.error(
+                value.at,
+                format!("no {key}"),
+                "give four numbers: x, y and z in m, and degrees",
+            )),
+        }
+    }
+}
+
+/// Properties that are read.
+const USED: [&str; 8] =
+    ["name", "pose", "origin", "size", "bitmap", "boundary", "obstacle_return", "ranger_return"];
+
+impl Pose {
+    /// A pose that is given in the frame of another.
+    fn on(self, parent: Self) -> Self {
+        let (s, c) = (sin(parent.yaw_rad), cos(parent.yaw_rad));
+        Self {
+            x_m: parent.x_m + c * self.x_m - s * self.y_m,
+            y_m: parent.y_m + s * self.x_m + c * self.y_m,
+            yaw_rad: parent.yaw_rad + self.yaw_rad,
+        }
+    }
+}

@@ -1,0 +1,133 @@
+use std::f64::consts::FRAC_PI_2;
+
+use super::*;
+use proptest::prelude::*;
+use sidestep_kernel::math::hypot;
+use sidestep_testing::shared_data as shared;
+
+/// Reads the first of some files in a folder of their own.
+fn read(files: &[(&str, &str)]) -> Result<World, InputError> {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for (name, text) in files {
+        let path = folder.path().join(name);
+        std::fs::create_dir_all(path.parent().expect("a folder")).expect("made");
+        std::fs::write(path, text).expect("written");
+    }
+    load(&folder.path().join(files[0].0))
+}
+
+fn error(text: &str) -> InputError {
+    read(&[("a.world", text)]).expect_err(text)
+}
+
+/// Two columns of three rows; the lower-left pixel is dark.
+const PGM: &str = "P2 2 3 255  255 200  255 255  0 128";
+
+#[test]
+fn a_floor_plan_is_stretched_to_its_size_and_place() {
+    let world = "include \"inc/map.inc\" # defines floorplan\n\
+        floorplan ( name \"cave\" size [4 9 0.8] pose [1 2 0 90] bitmap \"maps/cave.pgm\" )";
+    let map = "define floorplan model ( boundary 1 obstacle_return 0 color \"gray\" )";
+    let files = [("a.world", world), ("inc/map.inc", map), ("maps/cave.pgm", PGM)];
+    let world = read(&files).expect("a world");
+    let [plan] = &world.floor_plans[..] else { panic!("{world:?}") };
+    assert_eq!((plan.width, plan.height), (2, 3));
+    assert_eq!(plan.solid, [true, false, false, false, false, false]);
+    assert_eq!((plan.name.as_str(), plan.size_m, plan.has_boundary), ("cave", [4.0, 9.0], true));
+    assert_eq!(plan.pose, Pose { x_m: 1.0, y_m: 2.0, yaw_rad: FRAC_PI_2 });
+    assert_eq!(world.not_used, [("color".into(), 1)]);
+}
+
+#[test]
+fn robots_and_boxes_have_what_they_inherit() {
+    let text = "
+        speedup 3
+        define base position ( size [0.4 0.3 0.2] drive \"diff\" ranger ( fov 180 ) )
+        define bot base ( origin [-0.1 0 0 0] )
+        define brick model ( size [1 2 1] )
+        define ghost model ( obstacle_return 0 ranger_return -1 )
+        bot ( pose [5 6 0 180] name \"r0\" )
+        base( size [0.6 0.8] )
+        brick( pose [10 0 0 90] origin [1 0 0] brick( name \"inner\" pose [2 0 0 0] ) )
+        ghost()
+        window( size [ 600 400 ] )";
+    let world = read(&[("a.world", text)]).expect("a world");
+    let [first, second] = &world.robots[..] else { panic!("{world:?}") };
+    assert_eq!((first.name.as_str(), first.kind.as_str()), ("r0", "bot"));
+    assert_eq!((first.pose.x_m, first.pose.y_m), (5.0, 6.0));
+    assert!((first.radius_m - hypot(0.3, 0.15)).abs() < 1e-12);
+    assert!((second.radius_m - 0.5).abs() < 1e-12);
+    let places: Vec<_> = world.boxes.iter().map(|b| (b.pose.x_m, b.pose.y_m)).collect();
+    for ((x, y), (expected_x, expected_y)) in places.into_iter().zip([(10.0, 1.0), (10.0, 2.0)]) {
+        assert!((x - expected_x).abs() < 1e-12 && (y - expected_y).abs() < 1e-12, "{x} {y}");
+    }
+    assert_eq!((world.boxes.len(), world.boxes[1].name.as_str()), (2, "inner"));
+    let told = [("drive", 2), ("ghost", 1), ("speedup", 1), ("window", 1)];
+    assert_eq!(world.not_used, told.map(|(name, n)| (name.to_owned(), n)));
+}
+
+#[test]
+fn wrong_syntax_and_values_are_pointed_at() {
+    for (text, position) in [
+        ("a ( b", (1, 6)),
+        ("a ( size [1 2 )", (1, 15)),
+        ("x 1\n  )", (2, 3)),
+        ("define a (", (1, 10)),
+        ("name \"open", (1, 11)),
+        ("model (\n pose [1 2] )", (2, 7)),
+        ("model ( pose [1 2 0 x] )", (1, 14)),
+        ("model ( size [0 1 1] )", (1, 14)),
+        ("include \"none.inc\"", (1, 9)),
+    ] {
+        let error = error(text);
+        assert_eq!(error.position(), Some(position), "{error}");
+    }
+    assert!(read(&[("a.world", "model ( bitmap \"none.png\" )")]).is_err());
+}
+
+#[test]
+fn files_that_include_themselves_are_refused() {
+    let loop_of_two = [("a.world", "include \"b.inc\""), ("b.inc", "\ninclude \"a.world\"")];
+    let error = read(&loop_of_two).expect_err("a loop");
+    assert_eq!(error.position(), Some((2, 9)), "{error}");
+    assert!(error.place().ends_with("b.inc"), "{error}");
+}
+
+#[test]
+fn models_that_multiply_are_refused() {
+    let doubling = (1..60).map(|k| format!("define m{k} model ( m{0}() m{0}() )\n", k - 1));
+    let text: String = doubling.collect();
+    error(&format!("define m0 model ()\n{text}m59()"));
+    error("define a model ( a() )\na()\ndefine b a ()\nb( a() ) define a model ( a() ) a()");
+    error(&"m(".repeat(100_000));
+}
+
+proptest! {
+    #[test]
+    fn no_text_panics(text in "(define|model|include|[a-c(\\[\"#\\])0-9. \n]|size|pose){0,30}") {
+        let _ = read(&[("a.world", text.as_str())]);
+    }
+}
+
+#[test]
+fn real_worlds_hold_what_they_say() {
+    let read = |name: &str| Some(load(&shared(name)?).expect(name));
+    let Some(cave) = read("worlds/stage/simple.world") else { return };
+    let plan = &cave.floor_plans[0];
+    assert_eq!((plan.width, plan.height, plan.size_m), (500, 500, [16.0; 2]));
+    assert_eq!((cave.robots.len(), cave.boxes.len()), (2, 0));
+    assert!((cave.robots[0].pose.yaw_rad - 0.5 * FRAC_PI_2).abs() < 1e-12);
+    let sfu = read("worlds/stage/SFU.world").expect("there");
+    let plan = &sfu.floor_plans[0];
+    assert_eq!((plan.width, plan.height, plan.size_m), (1200, 615, [1200.0, 600.0]));
+    assert_eq!((plan.pose.y_m, sfu.robots.len()), (-40.0, 94));
+    let willow = read("worlds/willow/willow-erratic.world").expect("there");
+    let plan = &willow.floor_plans[0];
+    assert_eq!((plan.width, plan.height, plan.size_m), (540, 587, [54.0, 58.7]));
+    assert_eq!((willow.robots.len(), willow.boxes.len()), (1, 1));
+    assert_eq!(willow.boxes[0].size_m, [0.5; 2]);
+    for (name, world) in [("cave", &cave), ("SFU", &sfu), ("willow", &willow)] {
+        let solid = world.floor_plans[0].solid.iter().filter(|&&s| s).count();
+        println!("{name}: {solid} solid pixels; not used: {:?}", world.not_used);
+    }
+}

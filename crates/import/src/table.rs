@@ -1,0 +1,297 @@
+//! Tables of text: plain or gzip files, columns of numbers, and CSV with a header.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+use sidestep_kernel::InputError;
+use sidestep_scenario::file::read_text;
+
+/// The longest text that is read, in bytes after unpacking: some 20 times the largest known log.
+pub const MAX_TEXT_BYTES: u64 = 1 << 29;
+
+/// The file `name` in `folder`, or `name.gz` where only that exists.
+///
+/// # Errors
+/// When neither exists.
+pub fn find_file(folder: &Path, name: &str) -> Result<PathBuf, InputError> {
+    let candidates = [folder.join(name), folder.join(format!("{name}.gz"))];
+    candidates.iter().find(|path| path.is_file()).cloned().ok_or_else(|| {
+        InputError::new(
+            candidates[0].display(),
+            "the file is missing",
+            format!("put {name} or {name}.gz into the folder"),
+        )
+    })
+}
+
+/// The longest CSV table that is read, in bytes after unpacking.
+pub const MAX_CSV_BYTES: u64 = 1 << 28;
+
+/// One word of a text and where it stands.
+#[derive(Debug, Clone, Copy)]
+pub struct Word<'a> {
+    /// The word without the blanks around it.
+    pub text: &'a str,
+    /// Line, from 1.
+    pub line: usize,
+    /// Column of its first character, from 1.
+    pub column: usize,
+}
+
+impl Word<'_> {
+    /// An error that points at this word.
+    pub fn error(&self, place: &dyn fmt::Display, cause: String, remedy: &str) -> InputError {
+        InputError::new(place, cause, remedy).at(self.line, self.column)
+    }
+
+    /// The word as a finite number.
+    ///
+    /// # Errors
+    /// When it is no number, infinite or not a number.
+    pub fn number(&self, place: &dyn fmt::Display) -> Result<f64, InputError> {
+        match self.text.parse::<f64>() {
+            Ok(value) if value.is_finite() => Ok(value),
+            _ => Err(self.error(
+                place,
+                format!("`{}` is not a finite number", shorten(self.text)),
+                "write a decimal number such as 1.25",
+            )),
+        }
+    }
+
+    /// The word as a whole number from 0.
+    ///
+    /// # Errors
+    /// When it is something else.
+    pub fn integer(&self, place: &dyn fmt::Display) -> Result<u32, InputError> {
+        self.text.parse().map_err(|_| {
+            self.error(
+                place,
+                format!("`{}` is not a whole number from 0", shorten(self.text)),
+                "write a number such as 14",
+            )
+        })
+    }
+}
+
+/// A word as it is quoted in an error: its first 40 characters.
+fn shorten(text: &str) -> &str {
+    text.char_indices().nth(40).map_or(text, |(end, _)| &text[..end])
+}
+
+/// The words of line number `line`, separated by blanks or tabs.
+pub fn words(line: usize, text: &str) -> impl Iterator<Item = Word<'_>> {
+    text.split_ascii_whitespace().map(move |word| {
+        let offset = word.as_ptr() as usize - text.as_ptr() as usize;
+        Word { text: word, line, column: text[..offset].chars().count() + 1 }
+    })
+}
+
+/// The lines that hold data: neither blank nor a `#` comment. Numbered from 1.
+pub fn data_lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    let numbered = text.lines().enumerate().map(|(i, line)| (i + 1, line));
+    numbered.filter(|(_, line)| {
+        let start = line.trim_start();
+        !start.is_empty() && !start.starts_with('#')
+    })
+}
+
+/// All data lines as rows of exactly `N` words.
+///
+/// # Errors
+/// Each item where the line has more or fewer words.
+pub fn rows<'a, const N: usize>(
+    place: &dyn fmt::Display,
+    text: &'a str,
+) -> impl Iterator<Item = Result<[Word<'a>; N], InputError>> {
+    data_lines(text).map(move |(line, content)| {
+        // One word more than wanted is enough to see that there are too many.
+        let found: Vec<Word> = words(line, content).take(N + 1).collect();
+        let wrong = found.get(N).or(found.last()).map_or(1, |word| word.column);
+        let count = if found.len() > N { "more" } else { "fewer" };
+        found.try_into().map_err(|_| {
+            let cause = format!("the line has {count} columns than {N}");
+            InputError::new(place, cause, "restore the file; comments start with #").at(line, wrong)
+        })
+    })
+}
+
+/// A CSV file with a header row: fields are found by the name of their column.
+///
+/// Separator `,`, quotes `"`, blanks around fields ignored, lines that start with `#` skipped.
+#[derive(Debug)]
+pub struct CsvTable {
+    place: String,
+    header: Vec<String>,
+    /// Line of each row, from 1.
+    lines: Vec<u32>,
+    /// All fields of all rows, one after the other.
+    fields: String,
+    /// Where each field ends in `fields`; as many per row as the header has.
+    ends: Vec<u32>,
+}
+
+impl CsvTable {
+    /// Reads a file, plain or packed.
+    ///
+    /// # Errors
+    /// When it cannot be read or a row has another number of fields than the header.
+    pub fn read(path: &Path) -> Result<Self, InputError> {
+        Self::parse(&path.display(), &read_text(path, MAX_CSV_BYTES)?)
+    }
+
+    /// Parses text; `place` is named in errors.
+    ///
+    /// # Errors
+    /// When a row has another number of fields than the header, there is no header, or the text
+    /// is longer than [`MAX_CSV_BYTES`].
+    pub fn parse(place: &dyn fmt::Display, text: &str) -> Result<Self, InputError> {
+        if text.len() as u64 > MAX_CSV_BYTES {
+            let cause = format!("the table has more than {MAX_CSV_BYTES} bytes");
+            return Err(InputError::new(place, cause, "learn from a part of it"));
+        }
+        let mut reader = csv::ReaderBuilder::new()
+            .trim(csv::Trim::All)
+            .comment(Some(b'#'))
+            .from_reader(text.as_bytes());
+        let header = reader.headers().map_err(|e| csv_error(place, &e))?;
+        let header: Vec<String> = header.iter().map(str::to_owned).collect();
+        if header.is_empty() {
+            return Err(InputError::new(place, "the file is empty", "write a header row first"));
+        }
+        let mut table = Self {
+            place: place.to_string(),
+            header,
+            lines: Vec::new(),
+            fields: String::new(),
+            ends: Vec::new(),
+        };
+        let mut record = csv::StringRecord::new();
+        while reader.read_record(&mut record).map_err(|e| csv_error(place, &e))? {
+            table.push(&record);
+        }
+        Ok(table)
+    }
+
+    fn push(&mut self, record: &csv::StringRecord) {
+        self.lines.push(record.position().map_or(0, |p| p.line() as u32));
+        for field in record {
+            self.fields.push_str(field);
+            // MAX_CSV_BYTES fits.
+            self.ends.push(self.fields.len() as u32);
+        }
+    }
+
+    /// The file, as errors name it.
+    pub fn place(&self) -> &str {
+        &self.place
+    }
+
+    /// The position of the column called `name`, where there is one.
+    pub fn find(&self, name: &str) -> Option<usize> {
+        self.header.iter().position(|column| column == name)
+    }
+
+    /// The position of the column called `name`.
+    ///
+    /// # Errors
+    /// When there is none.
+    pub fn column(&self, name: &str) -> Result<usize, InputError> {
+        self.find(name).ok_or_else(|| {
+            let found = self.header.join(",");
+            let cause = format!("no column `{name}` in the header `{}`", shorten(&found));
+            InputError::new(&self.place, cause, format!("add a column named {name}")).at(1, 1)
+        })
+    }
+
+    /// The rows, in the order of the file.
+    pub fn rows(&self) -> impl Iterator<Item = CsvRow<'_>> {
+        (0..self.lines.len()).map(|index| CsvRow { table: self, index })
+    }
+}
+
+/// One row of a [`CsvTable`].
+#[derive(Debug, Clone, Copy)]
+pub struct CsvRow<'a> {
+    table: &'a CsvTable,
+    index: usize,
+}
+
+impl<'a> CsvRow<'a> {
+    /// The field in the column at `index`, which [`CsvTable::column`] gave.
+    ///
+    /// # Panics
+    /// When the header has no such column.
+    pub fn field(&self, index: usize) -> Word<'a> {
+        assert!(index < self.table.header.len(), "a column of the header");
+        // Quotes and trimmed blanks are not kept, so the column may be off by those.
+        let before: usize = (0..index).map(|i| self.text(i).chars().count() + 1).sum();
+        let line = self.table.lines[self.index] as usize;
+        Word { text: self.text(index), line, column: before + 1 }
+    }
+
+    fn text(&self, index: usize) -> &'a str {
+        let slot = self.index * self.table.header.len() + index;
+        let start = slot.checked_sub(1).map_or(0, |before| self.table.ends[before]);
+        &self.table.fields[start as usize..self.table.ends[slot] as usize]
+    }
+}
+
+fn csv_error(place: &dyn fmt::Display, error: &csv::Error) -> InputError {
+    let line = error.position().map_or(1, |p| p.line() as usize);
+    let cause = match error.kind() {
+        csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
+            format!("the row has {len} fields, the header {expected_len}")
+        }
+        _ => error.to_string(),
+    };
+    InputError::new(place, cause, "give every row one field per column of the header").at(line, 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wrong_column_count_names_line_and_column() {
+        let wrong = |text| rows::<2>(&"f.dat", text).find_map(Result::err).unwrap();
+        let error = wrong("# head\n1 2\n 1 2 3\n");
+        assert_eq!(error.position(), Some((3, 6)));
+        assert!(error.cause().contains("more columns than 2"));
+        assert_eq!(wrong("1 \t").position(), Some((1, 1)));
+    }
+
+    #[test]
+    fn a_bad_number_names_line_and_column() {
+        let parsed: Vec<_> = rows::<2>(&"f.dat", "1 2\n3 \tx4\n").collect();
+        let error = parsed[1].as_ref().unwrap()[1].number(&"f.dat").unwrap_err();
+        assert_eq!(error.position(), Some((2, 4)));
+        for word in ["nan", "inf", "1e999", "", "-"] {
+            assert!(Word { text: word, line: 1, column: 1 }.number(&"f").is_err(), "{word}");
+        }
+        assert!(Word { text: "-1", line: 1, column: 1 }.integer(&"f").is_err());
+    }
+
+    #[test]
+    fn a_file_is_found_packed_or_plain_by_its_plain_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let packed = folder.path().join("a.dat.gz");
+        std::fs::write(&packed, "").unwrap();
+        assert_eq!(find_file(folder.path(), "a.dat"), Ok(packed));
+        assert!(find_file(folder.path(), "b.dat").unwrap_err().cause().contains("missing"));
+    }
+
+    #[test]
+    fn csv_fields_are_found_by_name_and_errors_by_line() {
+        let table = CsvTable::parse(&"f.csv", "b, a\n# note\n1, 2\n").unwrap();
+        let a = table.column("a").unwrap();
+        assert_eq!(table.rows().next().unwrap().field(a).number(&"f").unwrap(), 2.0);
+        assert!(table.column("c").unwrap_err().cause().contains("no column `c`"));
+        let error = CsvTable::parse(&"f.csv", "a,b\n1,2\n1\n").unwrap_err();
+        assert_eq!(error.position(), Some((3, 1)));
+        assert!(CsvTable::parse(&"f.csv", "").is_err());
+        let row = CsvTable::parse(&"f.csv", "a,b\n1,x\n").unwrap();
+        let error = row.rows().next().unwrap().field(1).number(&"f.csv").unwrap_err();
+        assert_eq!(error.position(), Some((2, 3)));
+    }
+}

@@ -1,0 +1,257 @@
+//! Recorded air traffic: a CSV table with one row per aircraft and instant.
+//!
+//! Columns, found by name: `time_s` (UTC, s), `icao24` (the transponder's address), `callsign`,
+//! `lat_deg`, `lon_deg`, `alt_ft` (barometric), `gs_kt`, `track_deg` and `vs_fpm`. The table may
+//! lack `callsign` and `vs_fpm`, and fields of these two may be empty. Other columns are ignored.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::path::Path;
+
+use super::local_plane::LatLon;
+use super::table::{CsvRow, CsvTable, Word};
+use sidestep_kernel::InputError;
+
+/// All tracks of one file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RecordedTraffic {
+    /// One track per aircraft, sorted by `icao24`.
+    pub tracks: Vec<Track>,
+    /// Rows of the table, without the header.
+    pub rows: usize,
+    /// Rows that repeat the instant of an earlier row of the same aircraft; they are left out.
+    pub repeated_rows: usize,
+}
+
+/// What one aircraft flew.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Track {
+    /// Address of the transponder, as written.
+    pub icao24: String,
+    /// The first call sign that is given; empty where there is none.
+    pub callsign: String,
+    /// At least one sample, their times strictly ascending.
+    pub samples: Vec<Sample>,
+}
+
+/// An aircraft at one instant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample {
+    /// Time in s since the start of 1970, UTC.
+    pub time_s: f64,
+    /// Where it was.
+    pub position: LatLon,
+    /// Barometric altitude in ft.
+    pub altitude_ft: f64,
+    /// Speed over the ground in kt, not negative.
+    pub ground_speed_kt: f64,
+    /// Direction of motion over the ground in degrees, clockwise from true north, in [0, 360).
+    pub track_deg: f64,
+    /// Vertical speed in ft/min, + up.
+    pub vertical_speed_fpm: Option<f64>,
+}
+
+/// Reads a file, plain or packed with gzip.
+///
+/// # Errors
+/// When it cannot be read or is not as described in the [module](self).
+pub fn read(path: &Path) -> Result<RecordedTraffic, InputError> {
+    tracks(&CsvTable::read(path)?)
+}
+
+/// Parses text; `place` is named in errors.
+///
+/// # Errors
+/// When it is not as described in the [module](self).
+pub fn parse(place: &dyn fmt::Display, text: &str) -> Result<RecordedTraffic, InputError> {
+    tracks(&CsvTable::parse(place, text)?)
+}
+
+/// The columns' positions.
+struct Columns<'a> {
+    place: &'a str,
+    time: usize,
+    icao24: usize,
+    callsign: Option<usize>,
+    lat: usize,
+    lon: usize,
+    altitude: usize,
+    ground_speed: usize,
+    track: usize,
+    vertical_speed: Option<usize>,
+}
+
+impl<'a> Columns<'a> {
+    fn find(table: &'a CsvTable) -> Result<Self, InputError> {
+        Ok(Self {
+            place: table.place(),
+            time: table.column("time_s")?,
+            icao24: table.column("icao24")?,
+            callsign: table.find("callsign"),
+            lat: table.column("lat_deg")?,
+            lon: table.column("lon_deg")?,
+            altitude: table.column("alt_ft")?,
+            ground_speed: table.column("gs_kt")?,
+            track: table.column("track_deg")?,
+            vertical_speed: table.find("vs_fpm"),
+        })
+    }
+
+    fn sample(&self, row: CsvRow) -> Result<Sample, InputError> {
+        let vertical_speed = self.vertical_speed.map(|column| row.field(column));
+        let vertical_speed = vertical_speed.filter(|word| !word.text.is_empty());
+        Ok(Sample {
+            time_s: row.field(self.time).number(&self.place)?,
+            position: LatLon {
+                lat_deg: self.within(row.field(self.lat), -90.0, 90.0)?,
+                lon_deg: self.within(row.field(self.lon), -180.0, 180.0)?,
+            },
+            altitude_ft: row.field(self.altitude).number(&self.place)?,
+            ground_speed_kt: self.within(row.field(self.ground_speed), 0.0, 10_000.0)?,
+            // 360 is north, as is 0.
+            track_deg: self.within(row.field(self.track), 0.0, 360.0)? % 360.0,
+            vertical_speed_fpm: vertical_speed.map(|word| word.number(&self.place)).transpose()?,
+        })
+    }
+
+    fn within(&self, word: Word, min: f64, max: f64) -> Result<f64, InputError> {
+        let value = word.number(&self.place)?;
+        if (min..=max).contains(&value) {
+            return Ok(value);
+        }
+        let cause = format!("{value} is not between {min} and {max}");
+        Err(word.error(&self.place, cause, "restore the value or delete the row"))
+    }
+
+    fn icao24<'t>(&self, row: CsvRow<'t>) -> Result<&'t str, InputError> {
+        let word = row.field(self.icao24);
+        if word.text.is_empty() {
+            let cause = "the row names no aircraft".to_string();
+            return Err(word.error(&self.place, cause, "write its icao24 address"));
+        }
+        Ok(word.text)
+    }
+}
+
+fn tracks(table: &CsvTable) -> Result<RecordedTraffic, InputError> {
+    let columns = Columns::find(table)?;
+    let mut by_aircraft: BTreeMap<&str, Track> = BTreeMap::new();
+    let mut rows = 0;
+    for row in table.rows() {
+        rows += 1;
+        let icao24 = columns.icao24(row)?;
+        let track = by_aircraft.entry(icao24).or_insert_with(|| Track {
+            icao24: icao24.to_owned(),
+            callsign: String::new(),
+            samples: Vec::new(),
+        });
+        if let (Some(column), "") = (columns.callsign, track.callsign.as_str()) {
+            row.field(column).text.clone_into(&mut track.callsign);
+        }
+        track.samples.push(columns.sample(row)?);
+    }
+    let mut tracks: Vec<Track> = by_aircraft.into_values().collect();
+    let repeated_rows = tracks.iter_mut().map(sort_by_time).sum();
+    Ok(RecordedTraffic { tracks, rows, repeated_rows })
+}
+
+/// Sorts the samples; of several at one instant the first stays. Returns how many went.
+fn sort_by_time(track: &mut Track) -> usize {
+    let before = track.samples.len();
+    track.samples.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+    track.samples.dedup_by_key(|sample| sample.time_s);
+    before - track.samples.len()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sidestep_testing::shared_data as shared;
+
+    const HEADER: &str = "time_s,icao24,callsign,lat_deg,lon_deg,alt_ft,gs_kt,track_deg,vs_fpm\n";
+
+    fn parsed(rows: &str) -> Result<RecordedTraffic, InputError> {
+        parse(&"t.csv", &format!("{HEADER}{rows}"))
+    }
+
+    #[test]
+    fn rows_become_tracks_by_aircraft_sorted_by_time() {
+        let traffic = parsed(
+            "20,b,,46,6,38000,460,360,\n10,a,X1,46,6,38000,460,10,-64\n10,b,Y2,47,6,38000,460,0,0\n",
+        )
+        .unwrap();
+        assert_eq!(traffic.rows, 3);
+        let names: Vec<_> = traffic.tracks.iter().map(|track| track.callsign.as_str()).collect();
+        assert_eq!(names, ["X1", "Y2"]);
+        assert_eq!(traffic.tracks[0].samples[0].vertical_speed_fpm, Some(-64.0));
+        let b = &traffic.tracks[1].samples;
+        assert_eq!((b[0].time_s, b[1].time_s), (10.0, 20.0));
+        assert_eq!((b[1].track_deg, b[1].vertical_speed_fpm), (0.0, None));
+    }
+
+    #[test]
+    fn a_second_row_for_one_instant_is_left_out_and_counted() {
+        let traffic = parsed("10,a,,46,6,1,2,3,\n10,a,,47,6,1,2,3,\n").unwrap();
+        assert_eq!((traffic.rows, traffic.repeated_rows), (2, 1));
+        assert_eq!(traffic.tracks[0].samples[0].position.lat_deg, 46.0);
+    }
+
+    #[test]
+    fn wrong_fields_are_pointed_at() {
+        for (row, column) in [
+            ("x,a,,46,6,1,2,3,", 1),
+            ("1,,,46,6,1,2,3,", 3),
+            ("1,a,,,6,1,2,3,", 6),
+            ("1,a,,91,6,1,2,3,", 6),
+            ("1,a,,46,181,1,2,3,", 9),
+            ("1,a,,46,6,1,-2,3,", 13),
+            ("1,a,,46,6,1,2,3,up", 17),
+        ] {
+            let error = parsed(row).unwrap_err();
+            assert_eq!(error.position(), Some((2, column)), "{row}: {error}");
+        }
+        assert!(parse(&"t.csv", "time_s\n1\n").unwrap_err().cause().contains("icao24"));
+    }
+
+    #[test]
+    fn a_table_without_call_signs_and_vertical_speeds_is_traffic_too() {
+        let text = "time_s,icao24,lat_deg,lon_deg,alt_ft,gs_kt,track_deg\n1,a,46,6,1,2,3\n";
+        let traffic = parse(&"t.csv", text).unwrap();
+        assert_eq!(traffic.tracks[0].samples[0].vertical_speed_fpm, None);
+        assert_eq!(traffic.tracks[0].callsign, "");
+    }
+
+    #[test]
+    fn the_recording_over_switzerland_has_the_expected_aircraft_and_rows() {
+        let Some(path) = shared("airspace/opensky/switzerland_20180801_dev.csv") else { return };
+        let traffic = read(&path).unwrap();
+        assert_eq!((traffic.tracks.len(), traffic.rows, traffic.repeated_rows), (88, 6112, 0));
+        let samples = || traffic.tracks.iter().flat_map(|track| &track.samples);
+        assert_eq!(samples().count(), 6112);
+        let range = |of: fn(&Sample) -> f64| {
+            let ends = (f64::INFINITY, f64::NEG_INFINITY);
+            samples().map(of).fold(ends, |(low, high), value| (low.min(value), high.max(value)))
+        };
+        assert_eq!(range(|s| s.time_s), (1_533_114_900.0, 1_533_116_690.0));
+        assert_eq!(range(|s| s.altitude_ft), (31_000.0, 43_000.0));
+        assert_eq!(range(|s| s.ground_speed_kt), (393.2, 509.0));
+    }
+
+    #[test]
+    fn a_packed_file_reads_the_same() {
+        use std::io::Write;
+        let text = format!("{HEADER}10,a,,46,6,1,2,3,\n");
+        let mut file = tempfile::NamedTempFile::new().unwrap();
+        let mut gzip = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
+        gzip.write_all(text.as_bytes()).unwrap();
+        file.write_all(&gzip.finish().unwrap()).unwrap();
+        assert_eq!(read(file.path()), parse(&"t.csv", &text));
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn any_text_is_traffic_or_an_error(rows in "([0-9a-z.,-]{0,30}\n){0,4}") {
+            let _ = parsed(&rows);
+        }
+    }
+}

@@ -1,0 +1,170 @@
+//! Robot models: URDF (links and joints) and SRDF (groups, named postures).
+//!
+//! Only kinematics is read: joints with their origins, axes, limits and mimicry. Masses, shapes
+//! and meshes are passed over, so a mesh that is missing is no error. Lengths are meters, angles
+//! radians. Formats: <https://wiki.ros.org/urdf/XML>, <https://wiki.ros.org/srdf>.
+//!
+//! The XML is read with `roxmltree` and not with `urdf-rs`: the latter's errors name no line, it
+//! reads no SRDF, and it would add an XML reader of its own.
+
+mod read;
+pub mod srdf;
+#[cfg(test)]
+pub(crate) mod tests;
+mod tree;
+
+use std::path::Path;
+
+use sidestep_kernel::InputError;
+use sidestep_scenario::file::read_text;
+use sidestep_scenario::nearest;
+
+/// The longest model that is read, in bytes after unpacking: some 400 times the longest known.
+pub const MAX_URDF_BYTES: u64 = 1 << 24;
+
+/// A tree of links that joints connect.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Model {
+    /// The robot's name.
+    pub name: String,
+    /// Names of the links, in the order of the file.
+    pub links: Vec<String>,
+    /// The joints, in the order of the file. Parents and children index [`Model::links`].
+    pub joints: Vec<Joint>,
+    /// The link that is no joint's child.
+    pub root: usize,
+}
+
+/// What holds one link to another.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Joint {
+    /// Its name; no other joint has it.
+    pub name: String,
+    /// How the child can move.
+    pub kind: JointKind,
+    /// The link that it is mounted on.
+    pub parent: usize,
+    /// The link that it carries.
+    pub child: usize,
+    /// The joint's frame in the parent's frame.
+    pub origin: Origin,
+    /// Unit vector in the joint's frame, about or along which it moves. (1, 0, 0) where it cannot.
+    pub axis: [f64; 3],
+    /// Lowest and highest value, in rad or m; none of joints without such limits.
+    pub limits: Option<Limits>,
+    /// The joint that drives this one.
+    pub mimic: Option<Mimic>,
+}
+
+/// A frame in another: turned by `rpy_rad`, then moved by `xyz_m`.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Origin {
+    /// Displacement in m.
+    pub xyz_m: [f64; 3],
+    /// Roll, pitch and yaw about the fixed axes x, y, z in rad: R = Rz(yaw) Ry(pitch) Rx(roll).
+    pub rpy_rad: [f64; 3],
+}
+
+/// How a joint's child can move.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum JointKind {
+    /// Not at all.
+    Fixed,
+    /// About the axis, between limits in rad.
+    Revolute,
+    /// About the axis, without limits.
+    Continuous,
+    /// Along the axis, between limits in m.
+    Prismatic,
+    /// In all six ways.
+    Floating,
+    /// In the plane across the axis.
+    Planar,
+}
+
+/// A closed range, in rad or m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits {
+    /// Lowest value.
+    pub lower: f64,
+    /// Highest value, not below `lower`.
+    pub upper: f64,
+}
+
+impl Limits {
+    /// Whether `value` is in the range, give or take the rounding of a printed value.
+    pub fn contain(&self, value: f64) -> bool {
+        const SLACK: f64 = 1e-9;
+        (self.lower - SLACK..=self.upper + SLACK).contains(&value)
+    }
+}
+
+/// A joint's value as a function of another's: `multiplier * value + offset`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mimic {
+    /// Index of the joint that drives, in [`Model::joints`].
+    pub joint: usize,
+    /// Factor.
+    pub multiplier: f64,
+    /// In rad or m.
+    pub offset: f64,
+}
+
+impl JointKind {
+    /// Whether one value says where the child is.
+    pub fn has_one_value(self) -> bool {
+        matches!(self, Self::Revolute | Self::Continuous | Self::Prismatic)
+    }
+}
+
+impl Model {
+    /// Reads the URDF file at `path`, plain or packed with gzip.
+    ///
+    /// # Errors
+    /// When the file cannot be read, is xacro, is no URDF, or describes no tree of links; with
+    /// file, line and column.
+    pub fn load(path: &Path) -> Result<Self, InputError> {
+        let place = path.display().to_string();
+        if place.trim_end_matches(".gz").ends_with(".xacro") {
+            return Err(InputError::new(&place, read::XACRO, read::EXPAND));
+        }
+        Self::parse(&place, &read_text(path, MAX_URDF_BYTES)?)
+    }
+
+    /// Reads the text of a URDF file, which errors call `place`.
+    ///
+    /// # Errors
+    /// Those of [`Model::load`], but for reading.
+    pub fn parse(place: &str, text: &str) -> Result<Self, InputError> {
+        read::model(place, text)
+    }
+
+    /// The link called `name`, which stands in `place` (a file or an option).
+    ///
+    /// # Errors
+    /// When there is none; with the nearest name.
+    pub fn link(&self, place: &str, name: &str) -> Result<usize, InputError> {
+        self.links.iter().position(|link| link == name).ok_or_else(|| {
+            let known: Vec<&str> = self.links.iter().map(String::as_str).collect();
+            let cause = format!("`{}` has no link `{name}`", self.name);
+            InputError::new(place, cause, nearest(name, &known))
+        })
+    }
+
+    /// The joint called `name`, which stands in `place` (a file or an option).
+    ///
+    /// # Errors
+    /// When there is none; with the nearest name.
+    pub fn joint(&self, place: &str, name: &str) -> Result<usize, InputError> {
+        self.joints.iter().position(|joint| joint.name == name).ok_or_else(|| {
+            let known: Vec<&str> = self.joints.iter().map(|j| j.name.as_str()).collect();
+            let cause = format!("`{}` has no joint `{name}`", self.name);
+            InputError::new(place, cause, nearest(name, &known))
+        })
+    }
+
+    /// The joint that carries `link`; none of the root.
+    pub fn joint_above(&self, link: usize) -> Option<usize> {
+        self.joints.iter().position(|joint| joint.child == link)
+    }
+}

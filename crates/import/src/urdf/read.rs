@@ -1,0 +1,214 @@
+//! URDF text -> [`Model`].
+
+use super::tree;
+use super::{Joint, JointKind, Limits, Mimic, Model, Origin};
+use crate::xml::{Element, Value, XmlFile};
+use sidestep_kernel::InputError;
+use sidestep_scenario::nearest;
+
+pub(super) const XACRO: &str = "is xacro, macros that have to become URDF first";
+pub(super) const EXPAND: &str = "expand it with ROS: xacro FILE.urdf.xacro > FILE.urdf";
+
+/// Names that files give to the sorts of joints.
+const KINDS: [(&str, JointKind); 6] = [
+    ("fixed", JointKind::Fixed),
+    ("revolute", JointKind::Revolute),
+    ("continuous", JointKind::Continuous),
+    ("prismatic", JointKind::Prismatic),
+    ("floating", JointKind::Floating),
+    ("planar", JointKind::Planar),
+];
+
+/// Coordinates beyond this are no robot's, and their squares must stay finite.
+const MAX_COORDINATE: f64 = 1e6;
+
+/// More links than any known robot has by far.
+const MAX_LINKS: usize = 10_000;
+
+/// Shorter axes have no direction worth the name.
+const MIN_AXIS: f64 = 1e-6;
+
+pub(super) fn model(place: &str, text: &str) -> Result<Model, InputError> {
+    let file = XmlFile::parse(place, text).map_err(|error| {
+        let is_xacro = error.cause().contains("`xacro:`");
+        if is_xacro { at(&error, InputError::new(place, XACRO, EXPAND)) } else { error }
+    })?;
+    refuse_xacro(&file)?;
+    let robot = file.root("robot")?;
+    let name = robot.required("name")?.text().to_owned();
+    let links = links(robot)?;
+    let elements: Vec<_> = robot.children("joint").collect();
+    let mut joints = Vec::with_capacity(elements.len());
+    let mut names = tree::Names::default();
+    for &element in &elements {
+        let joint = joint(element, &links)?;
+        names.add(&joint.name, joints.len()).map_err(|name| {
+            element.error(format!("a second joint `{name}`"), "give each joint a name of its own")
+        })?;
+        joints.push(joint);
+    }
+    read_mimics(&elements, &mut joints, &names)?;
+    let root = tree::root(robot, &elements, &links.in_order, &joints)?;
+    Ok(Model { name, links: links.in_order, joints, root })
+}
+
+/// `error` at the place of another.
+fn at(other: &InputError, error: InputError) -> InputError {
+    match other.position() {
+        Some((line, column)) => error.at(line, column),
+        None => error,
+    }
+}
+
+/// A file may declare the prefix and not use it: files that were expanded often do.
+fn refuse_xacro(file: &XmlFile) -> Result<(), InputError> {
+    for element in file.elements() {
+        if element.namespace().is_some_and(|address| address.contains("xacro")) {
+            return Err(element.error(XACRO, EXPAND));
+        }
+        let is_macro = |value: &Value| value.text().contains("${") || value.text().contains("$(");
+        if let Some(value) = element.attributes().find(is_macro) {
+            return Err(value.error(XACRO, EXPAND));
+        }
+    }
+    Ok(())
+}
+
+/// The links and where their names stand.
+struct Links {
+    in_order: Vec<String>,
+    names: tree::Names,
+}
+
+impl Links {
+    /// The link that an element's attribute `link` names.
+    fn named_in(&self, element: Element) -> Result<usize, InputError> {
+        let value = element.required("link")?;
+        self.names.get(value.text()).ok_or_else(|| {
+            let known: Vec<&str> = self.in_order.iter().map(String::as_str).collect();
+            let cause = format!("there is no link `{}`", value.text());
+            value.error(cause, nearest(value.text(), &known))
+        })
+    }
+}
+
+fn links(robot: Element) -> Result<Links, InputError> {
+    let mut links = Links { in_order: Vec::new(), names: tree::Names::default() };
+    for element in robot.children("link") {
+        let name = element.required("name")?.text();
+        links.names.add(name, links.in_order.len()).map_err(|name| {
+            element.error(format!("a second link `{name}`"), "give each link a name of its own")
+        })?;
+        links.in_order.push(name.to_owned());
+    }
+    if links.in_order.len() > MAX_LINKS {
+        let cause = format!("has {} links, more than {MAX_LINKS}", links.in_order.len());
+        return Err(robot.error(cause, "check that this is the right file"));
+    }
+    if links.in_order.is_empty() {
+        return Err(robot.error("the robot has no links", "add <link name=\"...\"/>"));
+    }
+    Ok(links)
+}
+
+fn joint(element: Element, links: &Links) -> Result<Joint, InputError> {
+    let name = element.required("name")?.text().to_owned();
+    let kind = kind(element.required("type")?)?;
+    Ok(Joint {
+        name,
+        kind,
+        parent: links.named_in(element.required_child("parent")?)?,
+        child: links.named_in(element.required_child("child")?)?,
+        origin: origin(element)?,
+        axis: axis(element, kind)?,
+        limits: limits(element, kind)?,
+        mimic: None,
+    })
+}
+
+fn kind(value: Value) -> Result<JointKind, InputError> {
+    let found = KINDS.iter().find(|(name, _)| *name == value.text());
+    found.map(|(_, kind)| *kind).ok_or_else(|| {
+        let cause = format!("there are no `{}` joints", value.text());
+        value.error(cause, nearest(value.text(), &KINDS.map(|(name, _)| name)))
+    })
+}
+
+fn origin(joint: Element) -> Result<Origin, InputError> {
+    let Some(element) = joint.child("origin")? else { return Ok(Origin::default()) };
+    let triple = |name| element.attribute(name).map_or(Ok([0.0; 3]), bounded);
+    Ok(Origin { xyz_m: triple("xyz")?, rpy_rad: triple("rpy")? })
+}
+
+fn bounded(value: Value) -> Result<[f64; 3], InputError> {
+    let triple = value.triple()?;
+    match triple.into_iter().find(|x| x.abs() > MAX_COORDINATE) {
+        None => Ok(triple),
+        Some(x) => {
+            let cause = format!("{x} is beyond {MAX_COORDINATE:e}");
+            Err(value.error(cause, "give lengths in meters and angles in radians"))
+        }
+    }
+}
+
+/// Files give fixed joints a zero axis; it means nothing there and is not read.
+fn axis(joint: Element, kind: JointKind) -> Result<[f64; 3], InputError> {
+    const DEFAULT: [f64; 3] = [1.0, 0.0, 0.0];
+    if !kind.has_one_value() && kind != JointKind::Planar {
+        return Ok(DEFAULT);
+    }
+    let Some(element) = joint.child("axis")? else { return Ok(DEFAULT) };
+    let value = element.required("xyz")?;
+    let [x, y, z] = bounded(value)?;
+    let length = (x * x + y * y + z * z).sqrt();
+    if length < MIN_AXIS {
+        let cause = "the axis has no direction";
+        return Err(value.error(cause, "write a vector that is not zero, e.g. \"0 0 1\""));
+    }
+    Ok([x / length, y / length, z / length])
+}
+
+fn limits(joint: Element, kind: JointKind) -> Result<Option<Limits>, InputError> {
+    if !matches!(kind, JointKind::Revolute | JointKind::Prismatic) {
+        return Ok(None);
+    }
+    let element = joint.required_child("limit")?;
+    let bound = |name| element.attribute(name).map_or(Ok(0.0), |value| value.number());
+    let limits = Limits { lower: bound("lower")?, upper: bound("upper")? };
+    if limits.lower > limits.upper {
+        let cause = format!("lower {} is above upper {}", limits.lower, limits.upper);
+        return Err(element.error(cause, "write the smaller number into `lower`"));
+    }
+    Ok(Some(limits))
+}
+
+fn read_mimics(
+    elements: &[Element],
+    joints: &mut [Joint],
+    names: &tree::Names,
+) -> Result<(), InputError> {
+    for (i, &joint) in elements.iter().enumerate() {
+        let Some(element) = joint.child("mimic")? else { continue };
+        let value = element.required("joint")?;
+        let driver = names.get(value.text()).ok_or_else(|| {
+            let known: Vec<&str> = joints.iter().map(|j| j.name.as_str()).collect();
+            let cause = format!("there is no joint `{}`", value.text());
+            value.error(cause, nearest(value.text(), &known))
+        })?;
+        if !joints[i].kind.has_one_value() || !joints[driver].kind.has_one_value() {
+            let cause = "a joint that cannot move takes part in a mimicry";
+            return Err(value.error(cause, "name joints with one value each"));
+        }
+        let number = |name, default| element.attribute(name).map_or(Ok(default), |v| v.number());
+        joints[i].mimic = Some(Mimic {
+            joint: driver,
+            multiplier: number("multiplier", 1.0)?,
+            offset: number("offset", 0.0)?,
+        });
+    }
+    let endless = (0..joints.len()).find(|&i| tree::mimics_in_a_circle(joints, i));
+    endless.map_or(Ok(()), |i| {
+        let cause = format!("`{}` mimics itself in a circle", joints[i].name);
+        Err(elements[i].error(cause, "remove one <mimic> of the circle"))
+    })
+}

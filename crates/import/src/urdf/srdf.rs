@@ -1,0 +1,279 @@
+//! SRDF: what a URDF does not say about a robot. Groups of joints, named postures, end effectors
+//! and the pairs of links that need no collision check.
+
+use std::path::Path;
+
+use super::{MAX_URDF_BYTES, Model};
+use crate::xml::{Element, Value, XmlFile};
+use sidestep_kernel::InputError;
+use sidestep_scenario::file::read_text;
+use sidestep_scenario::nearest;
+
+/// What an SRDF file says of a model.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Semantics {
+    /// Groups, in the order of the file.
+    pub groups: Vec<Group>,
+    /// Named postures, in the order of the file.
+    pub postures: Vec<NamedPosture>,
+    /// End effectors, in the order of the file.
+    pub end_effectors: Vec<EndEffector>,
+    /// Pairs of links that may touch.
+    pub disabled_collisions: Vec<DisabledCollision>,
+}
+
+/// A part of a robot, given in one or several ways.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Group {
+    /// Its name; no other group has it.
+    pub name: String,
+    /// Joints that are listed, as indices of [`Model::joints`].
+    pub joints: Vec<usize>,
+    /// Links that are listed, as indices of [`Model::links`].
+    pub links: Vec<usize>,
+    /// Chains: base and tip, as indices of [`Model::links`]. The tip hangs on the base.
+    pub chains: Vec<(usize, usize)>,
+    /// Names of groups that belong to it.
+    pub groups: Vec<String>,
+}
+
+/// Values of joints under a name (`group_state`).
+#[derive(Debug, Clone, PartialEq)]
+pub struct NamedPosture {
+    /// Its name. Postures of several groups may share one.
+    pub name: String,
+    /// The group whose joints it sets.
+    pub group: String,
+    /// Index of a joint in [`Model::joints`], and its value in rad or m.
+    pub values: Vec<(usize, f64)>,
+}
+
+/// A tool at the end of an arm.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct EndEffector {
+    /// Its name.
+    pub name: String,
+    /// The link that it is mounted on, as index of [`Model::links`].
+    pub parent_link: usize,
+    /// The group that it consists of, as the file says.
+    pub group: String,
+}
+
+/// Two links that may touch.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DisabledCollision {
+    /// The two, as indices of [`Model::links`].
+    pub links: (usize, usize),
+    /// Why, such as `Adjacent`, `Never` or `Default`; empty where the file does not say.
+    pub reason: String,
+}
+
+impl Semantics {
+    /// Reads the SRDF file at `path` for `model`, plain or packed with gzip.
+    ///
+    /// # Errors
+    /// When the file cannot be read, is no SRDF, or names a link, joint or group that is not
+    /// there; with file, line, column and the nearest name.
+    pub fn load(path: &Path, model: &Model) -> Result<Self, InputError> {
+        Self::parse(&path.display().to_string(), &read_text(path, MAX_URDF_BYTES)?, model)
+    }
+
+    /// Reads the text of an SRDF file, which errors call `place`.
+    ///
+    /// # Errors
+    /// Those of [`Semantics::load`], but for reading.
+    pub fn parse(place: &str, text: &str, model: &Model) -> Result<Self, InputError> {
+        let file = XmlFile::parse(place, text)?;
+        let reader = Reader { robot: file.root("robot")?, model };
+        let groups = reader.groups()?;
+        Ok(Self {
+            postures: reader.each("group_state", |e| reader.posture(e, &groups))?,
+            end_effectors: reader.each("end_effector", |e| reader.end_effector(e))?,
+            disabled_collisions: reader.each("disable_collisions", |e| reader.disabled(e))?,
+            groups,
+        })
+    }
+
+    /// The values of all postures called `name`, later ones over earlier ones. `place` is the
+    /// option that names it.
+    ///
+    /// # Errors
+    /// When there is none; with the names that there are.
+    pub fn posture(&self, place: &str, name: &str) -> Result<Vec<(usize, f64)>, InputError> {
+        let named: Vec<_> = self.postures.iter().filter(|p| p.name == name).collect();
+        if named.is_empty() {
+            let known: Vec<&str> = self.postures.iter().map(|p| p.name.as_str()).collect();
+            let cause = format!("there is no posture `{name}`");
+            return Err(InputError::new(place, cause, nearest(name, &known)));
+        }
+        Ok(named.iter().flat_map(|posture| posture.values.iter().copied()).collect())
+    }
+
+    /// The group called `name`. `place` is the option that names it.
+    ///
+    /// # Errors
+    /// When there is none; with the nearest name.
+    pub fn group(&self, place: &str, name: &str) -> Result<&Group, InputError> {
+        self.groups.iter().find(|group| group.name == name).ok_or_else(|| {
+            let known: Vec<&str> = self.groups.iter().map(|g| g.name.as_str()).collect();
+            InputError::new(place, format!("there is no group `{name}`"), nearest(name, &known))
+        })
+    }
+
+    /// The links that the group `name` leads from and to: its chain, or the ends of the way that
+    /// its joints and those of its parts lie on. `place` is the option that names it.
+    ///
+    /// # Errors
+    /// When there is no such group, or it is no single way.
+    pub fn ends(
+        &self,
+        place: &str,
+        name: &str,
+        model: &Model,
+    ) -> Result<(usize, usize), InputError> {
+        if let [chain] = self.group(place, name)?.chains[..] {
+            return Ok(chain);
+        }
+        let mut names = vec![name];
+        let mut joints = Vec::new();
+        // Groups that name each other in a circle are each looked at once.
+        let mut next = 0;
+        while let Some(name) = names.get(next) {
+            let group = self.group(place, name)?;
+            joints.extend(group.joints.iter().copied());
+            joints.extend(group.links.iter().filter_map(|&link| model.joint_above(link)));
+            for part in &group.groups {
+                if !names.contains(&part.as_str()) {
+                    names.push(part);
+                }
+            }
+            next += 1;
+        }
+        way_of(&joints, model).ok_or_else(|| {
+            let cause = format!("the joints of group `{name}` do not lie on one way");
+            InputError::new(place, cause, "name base and tip with --base and --tip")
+        })
+    }
+}
+
+/// The ends of the way that holds all of these joints.
+fn way_of(joints: &[usize], model: &Model) -> Option<(usize, usize)> {
+    let depth = |&joint: &usize| model.way(model.root, model.joints[joint].child).map(|w| w.len());
+    let first = *joints.iter().min_by_key(|j| depth(j))?;
+    let last = *joints.iter().max_by_key(|j| depth(j))?;
+    let (base, tip) = (model.joints[first].parent, model.joints[last].child);
+    let way = model.way(base, tip)?;
+    joints.iter().all(|joint| way.contains(joint)).then_some((base, tip))
+}
+
+struct Reader<'a> {
+    robot: Element<'a>,
+    model: &'a Model,
+}
+
+impl<'a> Reader<'a> {
+    /// What `read` makes of each element called `name`.
+    fn each<T>(
+        &self,
+        name: &'a str,
+        read: impl Fn(Element<'a>) -> Result<T, InputError>,
+    ) -> Result<Vec<T>, InputError> {
+        self.robot.children(name).map(read).collect()
+    }
+
+    fn groups(&self) -> Result<Vec<Group>, InputError> {
+        let groups = self.each("group", |element| self.group(element))?;
+        for (i, element) in self.robot.children("group").enumerate() {
+            if groups[..i].iter().any(|earlier| earlier.name == groups[i].name) {
+                let cause = format!("a second group `{}`", groups[i].name);
+                return Err(element.error(cause, "give each group a name of its own"));
+            }
+            for part in element.children("group") {
+                known_group(part.required("name")?, &groups)?;
+            }
+        }
+        Ok(groups)
+    }
+
+    fn group(&self, element: Element<'a>) -> Result<Group, InputError> {
+        let of_model = |name, found: fn(&Self, Value) -> Result<usize, InputError>| {
+            let named = element.children(name).map(|e| found(self, e.required("name")?));
+            named.collect::<Result<Vec<usize>, InputError>>()
+        };
+        let names = element.children("group").map(|e| Ok(e.required("name")?.text().to_owned()));
+        Ok(Group {
+            name: element.required("name")?.text().to_owned(),
+            joints: of_model("joint", Self::joint)?,
+            links: of_model("link", Self::link)?,
+            chains: element.children("chain").map(|e| self.chain(e)).collect::<Result<_, _>>()?,
+            groups: names.collect::<Result<_, InputError>>()?,
+        })
+    }
+
+    fn chain(&self, element: Element<'a>) -> Result<(usize, usize), InputError> {
+        let base = self.link(element.required("base_link")?)?;
+        let tip_link = element.required("tip_link")?;
+        let tip = self.link(tip_link)?;
+        if self.model.way(base, tip).is_none() {
+            let links = &self.model.links;
+            let cause = format!("`{}` does not hang on `{}`", links[tip], links[base]);
+            return Err(tip_link.error(cause, "write the link nearer to the root as base_link"));
+        }
+        Ok((base, tip))
+    }
+
+    fn posture(&self, element: Element<'a>, groups: &[Group]) -> Result<NamedPosture, InputError> {
+        let group = element.required("group")?;
+        known_group(group, groups)?;
+        let values = element.children("joint").filter(|joint| !self.is_virtual(*joint));
+        let value = |joint: Element<'a>| {
+            Ok((self.joint(joint.required("name")?)?, joint.required("value")?.number()?))
+        };
+        Ok(NamedPosture {
+            name: element.required("name")?.text().to_owned(),
+            group: group.text().to_owned(),
+            values: values.map(value).collect::<Result<_, InputError>>()?,
+        })
+    }
+
+    /// Whether a joint is one that only the SRDF knows, which places the robot in the world.
+    fn is_virtual(&self, joint: Element<'a>) -> bool {
+        let name = |e: Element<'a>| e.attribute("name").map(|value| value.text());
+        self.robot.children("virtual_joint").any(|v| name(v).is_some() && name(v) == name(joint))
+    }
+
+    fn end_effector(&self, element: Element<'a>) -> Result<EndEffector, InputError> {
+        Ok(EndEffector {
+            name: element.required("name")?.text().to_owned(),
+            parent_link: self.link(element.required("parent_link")?)?,
+            group: element.attribute("group").map_or("", |v| v.text()).to_owned(),
+        })
+    }
+
+    fn disabled(&self, element: Element<'a>) -> Result<DisabledCollision, InputError> {
+        let link = |name| self.link(element.required(name)?);
+        Ok(DisabledCollision {
+            links: (link("link1")?, link("link2")?),
+            reason: element.attribute("reason").map_or("", |v| v.text()).to_owned(),
+        })
+    }
+
+    fn link(&self, value: Value) -> Result<usize, InputError> {
+        let found = self.model.link("", value.text());
+        found.map_err(|error| value.error(error.cause(), error.remedy()))
+    }
+
+    fn joint(&self, value: Value) -> Result<usize, InputError> {
+        let found = self.model.joint("", value.text());
+        found.map_err(|error| value.error(error.cause(), error.remedy()))
+    }
+}
+
+fn known_group(value: Value, groups: &[Group]) -> Result<(), InputError> {
+    if groups.iter().any(|group| group.name == value.text()) {
+        return Ok(());
+    }
+    let known: Vec<&str> = groups.iter().map(|group| group.name.as_str()).collect();
+    let cause = format!("there is no group `{}`", value.text());
+    Err(value.error(cause, nearest(value.text(), &known)))
+}

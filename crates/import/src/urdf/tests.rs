@@ -1,0 +1,167 @@
+use super::srdf::Semantics;
+use super::*;
+use sidestep_testing::{ROBOT_MODELS as SHARED, robot_model as shared};
+
+const ARM: &str = r#"<robot name="arm">
+  <link name="base"/>
+  <link name="upper"/>
+  <link name="hand"/>
+  <joint name="shoulder" type="revolute">
+    <parent link="base"/><child link="upper"/>
+    <axis xyz="0 0 2"/><limit lower="-1" upper="2"/>
+  </joint>
+  <joint name="wrist" type="fixed">
+    <parent link="upper"/><child link="hand"/>
+    <origin xyz="1 0 0"/><axis xyz="0 0 0"/>
+  </joint>
+</robot>
+"#;
+
+fn error_of(old: &str, new: &str) -> InputError {
+    assert!(ARM.contains(old), "{old}");
+    Model::parse("arm.urdf", &ARM.replacen(old, new, 1)).expect_err(new)
+}
+
+#[test]
+fn a_small_arm_is_read_with_all_defaults() {
+    let arm = Model::parse("arm.urdf", ARM).expect("a model");
+    assert_eq!(arm.links, ["base", "upper", "hand"]);
+    assert_eq!((arm.root, arm.default_tip()), (0, 2));
+    let [shoulder, wrist] = &arm.joints[..] else { panic!("two joints") };
+    assert_eq!(shoulder.axis, [0.0, 0.0, 1.0]);
+    assert_eq!(shoulder.origin, Origin::default());
+    assert_eq!(shoulder.limits, Some(Limits { lower: -1.0, upper: 2.0 }));
+    assert_eq!((wrist.kind, wrist.limits), (JointKind::Fixed, None));
+    assert_eq!(arm.way(0, 2), Some(vec![0, 1]));
+    assert_eq!(arm.way(2, 0), None);
+}
+
+#[test]
+fn every_wrong_thing_is_named_with_its_place_and_what_would_be_right() {
+    let cases = [
+        ("child link=\"hand\"", "child link=\"hnad\"", 10, "hnad", "`hand`?"),
+        ("\"0 0 2\"", "\"0 0 0\"", 7, "no direction", "0 0 1"),
+        ("\"0 0 2\"", "\"0 NaN 1\"", 7, "`NaN`", "number"),
+        ("\"0 0 2\"", "\"0 1\"", 7, "2 numbers", "three"),
+        ("lower=\"-1\"", "lower=\"3\"", 7, "above", "smaller"),
+        ("<limit lower=\"-1\" upper=\"2\"/>", "", 5, "lacks <limit>", "add <limit"),
+        ("revolute", "revolut", 5, "revolut", "`revolute`?"),
+        ("<parent link=\"base\"/>", "", 5, "lacks <parent>", "add <parent"),
+        ("link name=\"hand\"", "link name=\"base\"", 4, "second link", "own"),
+        ("joint name=\"wrist\"", "joint name=\"shoulder\"", 9, "second joint", "own"),
+        ("parent link=\"upper\"", "parent link=\"hand\"", 9, "loop", "base"),
+        ("child link=\"hand\"", "child link=\"upper\"", 9, "hangs on joint", "tree"),
+        ("<link name=\"hand\"/>", "<link name=\"hand\"/><link name=\"x\"/>", 1, "`x`", "joints"),
+        ("child link=\"hand\"", "child link=\"base\"", 9, "loop", "tree"),
+        ("<robot", "<sdf", 13, "closes", "</sdf>"),
+        ("xyz=\"1 0 0\"", "xyz=\"1e9 0 0\"", 11, "1e6", "meters"),
+        ("xyz=\"1 0 0\"", "xyz=\"${x} 0 0\"", 11, "xacro", "xacro FILE"),
+        ("<axis xyz=\"0 0 2\"/>", "<mimic joint=\"shoulder\"/>", 5, "circle", "<mimic>"),
+        ("<axis xyz=\"0 0 2\"/>", "<mimic joint=\"wrist\"/>", 7, "cannot move", "value"),
+        ("<axis xyz=\"0 0 2\"/>", "<mimic joint=\"wirst\"/>", 7, "wirst", "`wrist`?"),
+    ];
+    for (old, new, line, cause, remedy) in cases {
+        let error = error_of(old, new);
+        assert_eq!(error.position().map(|p| p.0), Some(line), "{error}");
+        assert!(error.cause().contains(cause) && error.remedy().contains(remedy), "{error}");
+    }
+    assert_eq!(error_of("\"0 0 2\"", "\"0 0 0\"").position(), Some((7, 16)));
+    let circle = ARM.replace("<link name=\"hand\"/>", "").replace("\"hand\"", "\"base\"");
+    let error = Model::parse("arm.urdf", &circle).expect_err("no root");
+    assert!(error.cause().contains("every link hangs on another"), "{error}");
+}
+
+#[test]
+fn xacro_is_refused_and_its_unused_prefix_is_not() {
+    let unused = ARM.replace("name=\"arm\"", "name=\"arm\" xmlns:xacro=\"http://ros.org/xacro\"");
+    assert!(Model::parse("f", &unused).is_ok());
+    let used = unused.replace("<link name=\"hand\"/>", "<xacro:hand/>");
+    let undeclared = ARM.replace("<link name=\"hand\"/>", "<xacro:hand/>");
+    for text in [used, undeclared] {
+        let error = Model::parse("f", &text).expect_err("xacro");
+        assert!(error.cause().contains("xacro") && error.position().is_some(), "{error}");
+        assert!(error.remedy().contains("xacro FILE"), "{error}");
+    }
+    assert!(
+        Model::load(std::path::Path::new("a.urdf.xacro")).is_err_and(|e| e.cause() == read::XACRO)
+    );
+}
+
+#[test]
+fn other_elements_prefixes_and_missing_meshes_do_not_matter() {
+    let link = r#"<link name="hand"><visual><geometry>
+        <mesh filename="package://no/such.stl"/></geometry></visual>
+        <d:proximity xmlns:d="http://drake.mit.edu"/></link><gazebo/><transmission name="t"/>"#;
+    let text = ARM.replace("<link name=\"hand\"/>", link);
+    assert_eq!(Model::parse("f", &text), Model::parse("f", ARM));
+}
+
+#[test]
+fn every_shared_model_is_read() {
+    for name in SHARED {
+        let Some(path) = shared(name) else { return };
+        let model = Model::load(&path).expect(name);
+        assert_eq!(model.links.len(), model.joints.len() + 1, "{name}");
+    }
+}
+
+#[test]
+fn the_panda_has_a_mimic_joint_a_posture_and_groups() {
+    let (Some(urdf), Some(srdf)) = (shared("chain/panda.urdf"), shared("chain/panda.srdf")) else {
+        return;
+    };
+    let model = Model::load(&urdf).expect("a model");
+    let mimic = model.joints.iter().find_map(|joint| joint.mimic).expect("a mimic joint");
+    assert_eq!(model.joints[mimic.joint].name, "panda_finger_joint1");
+    let semantics = Semantics::load(&srdf, &model).expect("an SRDF");
+    assert_eq!(semantics.groups.len(), 3);
+    assert_eq!(semantics.group("--group", "arm_and_hand").expect("there").groups, ["arm", "hand"]);
+    assert_eq!(semantics.posture("--posture", "default").expect("there").len(), 8);
+    assert_eq!(semantics.end_effectors[0].name, "end_effector");
+    assert!(semantics.disabled_collisions.iter().any(|d| d.reason == "Never"));
+    let error = semantics.posture("--posture", "defalt").expect_err("wrong");
+    assert_eq!(error.remedy(), "did you mean `default`?");
+    let ur5 = shared("chain/ur5.urdf").zip(shared("chain/ur5.srdf")).expect("both");
+    let model = Model::load(&ur5.0).expect("a model");
+    assert_eq!(Semantics::load(&ur5.1, &model).expect("SRDF").disabled_collisions.len(), 10);
+}
+
+const SRDF: &str = r#"<robot name="arm">
+  <virtual_joint name="floor" type="floating" parent_frame="w" child_link="base"/>
+  <group name="all"><chain base_link="base" tip_link="hand"/></group>
+  <group name="both"><group name="all"/><joint name="shoulder"/><link name="hand"/></group>
+  <group_state name="up" group="all">
+    <joint name="floor" value="0 0 0"/><joint name="shoulder" value="1.5"/>
+  </group_state>
+  <end_effector name="tool" parent_link="hand" group="all"/>
+  <disable_collisions link1="base" link2="upper" reason="Adjacent"/>
+</robot>
+"#;
+
+#[test]
+fn an_srdf_is_read_whole_and_its_errors_are_pointed_at() {
+    let arm = Model::parse("arm.urdf", ARM).expect("a model");
+    let semantics = Semantics::parse("arm.srdf", SRDF, &arm).expect("an SRDF");
+    assert_eq!(semantics.groups[0].chains, [(0, 2)]);
+    assert_eq!(semantics.posture("--posture", "up"), Ok(vec![(0, 1.5)]));
+    assert_eq!(semantics.disabled_collisions[0].links, (0, 1));
+    let cases = [
+        ("tip_link=\"hand\"", "tip_link=\"hnd\"", 3, "`hand`?"),
+        (
+            "base_link=\"base\" tip_link=\"hand\"",
+            "base_link=\"hand\" tip_link=\"base\"",
+            3,
+            "base_link",
+        ),
+        ("<group name=\"all\"/>", "<group name=\"al\"/>", 4, "`all`?"),
+        ("name=\"both\"", "name=\"all\"", 4, "own"),
+        ("group=\"all\">", "group=\"alls\">", 5, "`all`?"),
+        ("value=\"1.5\"", "value=\"up\"", 6, "number"),
+        ("link2=\"upper\"", "link2=\"uper\"", 9, "`upper`?"),
+    ];
+    for (old, new, line, remedy) in cases {
+        let error = Semantics::parse("f", &SRDF.replacen(old, new, 1), &arm).expect_err(new);
+        assert_eq!(error.position().map(|p| p.0), Some(line), "{error}");
+        assert!(error.remedy().contains(remedy), "{error}");
+    }
+}

@@ -1,0 +1,160 @@
+//! Links and joints as a tree: names, the root, ways from link to link.
+
+use std::collections::BTreeMap;
+
+use super::{Joint, Model};
+use crate::xml::Element;
+use sidestep_kernel::InputError;
+
+/// How many names an error lists.
+const LISTED: usize = 8;
+
+/// Names and the indices that they stand for.
+#[derive(Default)]
+pub(super) struct Names(BTreeMap<String, usize>);
+
+impl Names {
+    /// Adds a name, or gives it back where it is taken.
+    pub(super) fn add(&mut self, name: &str, index: usize) -> Result<(), String> {
+        match self.0.insert(name.to_owned(), index) {
+            None => Ok(()),
+            Some(_) => Err(name.to_owned()),
+        }
+    }
+
+    pub(super) fn get(&self, name: &str) -> Option<usize> {
+        self.0.get(name).copied()
+    }
+}
+
+/// Whether following the mimicry from `joint` never ends.
+pub(super) fn mimics_in_a_circle(joints: &[Joint], joint: usize) -> bool {
+    let mut next = joint;
+    for _ in 0..=joints.len() {
+        match &joints[next].mimic {
+            None => return false,
+            Some(mimic) => next = mimic.joint,
+        }
+    }
+    true
+}
+
+/// The one link without a joint above it, from which all others are reached.
+pub(super) fn root(
+    robot: Element,
+    elements: &[Element],
+    links: &[String],
+    joints: &[Joint],
+) -> Result<usize, InputError> {
+    let above = joints_above(elements, links, joints)?;
+    let roots: Vec<usize> = (0..links.len()).filter(|&link| above[link].is_none()).collect();
+    match roots[..] {
+        [root] => all_hang_on(root, &above, elements, links, joints).map(|()| root),
+        [] => {
+            let cause = "every link hangs on another: the joints form a loop";
+            Err(robot.error(cause, "a URDF is a tree: remove the joint that closes the loop"))
+        }
+        _ => {
+            let names = roots.iter().map(|&link| format!("`{}`", links[link]));
+            let cause = format!("{} links hang on nothing: {}", roots.len(), listed(names));
+            Err(robot.error(cause, "connect all but one to the others with joints"))
+        }
+    }
+}
+
+fn listed(names: impl ExactSizeIterator<Item = String>) -> String {
+    let more = if names.len() > LISTED { ", ..." } else { "" };
+    names.take(LISTED).collect::<Vec<_>>().join(", ") + more
+}
+
+/// For each link the joint that carries it.
+fn joints_above(
+    elements: &[Element],
+    links: &[String],
+    joints: &[Joint],
+) -> Result<Vec<Option<usize>>, InputError> {
+    let mut above = vec![None; links.len()];
+    for (i, joint) in joints.iter().enumerate() {
+        if let Some(first) = above[joint.child].replace(i) {
+            let first: &Joint = &joints[first];
+            let cause = format!(
+                "`{}` already hangs on joint `{}`: the joints form a loop",
+                links[joint.child], first.name
+            );
+            let remedy = "a URDF is a tree: each link is the child of one joint";
+            return Err(elements[i].error(cause, remedy));
+        }
+    }
+    Ok(above)
+}
+
+/// With one root, a link that is not reached from it is in a loop or hangs on one.
+fn all_hang_on(
+    root: usize,
+    above: &[Option<usize>],
+    elements: &[Element],
+    links: &[String],
+    joints: &[Joint],
+) -> Result<(), InputError> {
+    let mut children = vec![Vec::new(); links.len()];
+    for joint in joints {
+        children[joint.parent].push(joint.child);
+    }
+    let mut reached = vec![false; links.len()];
+    let mut open = vec![root];
+    while let Some(link) = open.pop() {
+        reached[link] = true;
+        open.extend(&children[link]);
+    }
+    let Some(lost) = reached.iter().position(|reached| !reached) else { return Ok(()) };
+    let joint = above[lost].expect("all but the root have a joint above them");
+    let cause = format!("`{}` is in a loop of joints or hangs on one", links[lost]);
+    let remedy = format!("connect it to `{}`, from which the tree grows", links[root]);
+    Err(elements[joint].error(cause, remedy))
+}
+
+impl Model {
+    /// The joints from `base` out to `tip`, in this order; empty where they are the same link.
+    /// None where `tip` does not hang on `base`.
+    pub fn way(&self, base: usize, tip: usize) -> Option<Vec<usize>> {
+        let mut above = vec![None; self.links.len()];
+        for (i, joint) in self.joints.iter().enumerate() {
+            above[joint.child] = Some(i);
+        }
+        let mut way = Vec::new();
+        let mut link = tip;
+        while link != base {
+            let joint = above[link]?;
+            way.push(joint);
+            link = self.joints[joint].parent;
+        }
+        way.reverse();
+        Some(way)
+    }
+
+    /// The links that carry no other, in the order of the file.
+    pub fn leaves(&self) -> Vec<usize> {
+        let mut is_parent = vec![false; self.links.len()];
+        for joint in &self.joints {
+            is_parent[joint.parent] = true;
+        }
+        (0..self.links.len()).filter(|&link| !is_parent[link]).collect()
+    }
+
+    /// The leaf with the most joints that move on its way from the root; of several the first
+    /// in the file.
+    pub fn default_tip(&self) -> usize {
+        let moving = |tip: usize| {
+            let way = self.way(self.root, tip).expect("every link hangs on the root");
+            way.iter().filter(|&&joint| self.joints[joint].kind.has_one_value()).count()
+        };
+        let mut best = (self.root, 0);
+        for leaf in self.leaves() {
+            let count = moving(leaf);
+            if count > best.1 || best.0 == self.root {
+                best = (leaf, count);
+            }
+        }
+        best.0
+    }
+}

@@ -1,0 +1,132 @@
+//! Steps to the nearest goal, by breadth-first search.
+
+use super::{FreeSpace, STEPS};
+
+/// How many 4-connected steps every box of a grid is away from the nearest goal.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Distances {
+    width: u32,
+    height: u32,
+    /// Steps, row by row from the bottom, or [`Distances::UNREACHED`].
+    steps: Vec<u32>,
+}
+
+impl Distances {
+    pub(super) const UNREACHED: u32 = u32::MAX;
+
+    /// Distances to the nearest of `goals` (column, row) for a body of `size` x `size` boxes that
+    /// has to fit into `free` on its way; boxes and goals mean its lower-left box. Goals where
+    /// the body does not fit do not count.
+    ///
+    /// # Panics
+    /// When `size` is 0.
+    pub fn to_nearest(free: &FreeSpace, size: u32, goals: &[(u32, u32)]) -> Self {
+        Self::between_anchors(&free.anchors(size), goals)
+    }
+
+    /// Distances in the space of a body's anchors.
+    pub(super) fn between_anchors(anchors: &FreeSpace, goals: &[(u32, u32)]) -> Self {
+        let mut distances = Self {
+            width: anchors.width(),
+            height: anchors.height(),
+            steps: vec![Self::UNREACHED; anchors.len()],
+        };
+        let mut queue = distances.start(anchors, goals);
+        let mut head = 0;
+        while let Some(&at) = queue.get(head) {
+            head += 1;
+            distances.spread(anchors, at, &mut queue);
+        }
+        distances
+    }
+
+    /// Steps from a box to the nearest goal, or `None` where no way leads to one.
+    pub fn steps(&self, col: u32, row: u32) -> Option<u32> {
+        if col >= self.width || row >= self.height {
+            return None;
+        }
+        let steps = self.steps[row as usize * self.width as usize + col as usize];
+        (steps != Self::UNREACHED).then_some(steps)
+    }
+
+    /// The most steps that any box with a way to a goal is away; `None` without a goal.
+    pub fn max(&self) -> Option<u32> {
+        self.steps.iter().copied().filter(|&steps| steps != Self::UNREACHED).max()
+    }
+
+    /// Columns of the grid.
+    pub fn width(&self) -> u32 {
+        self.width
+    }
+
+    /// Rows of the grid.
+    pub fn height(&self) -> u32 {
+        self.height
+    }
+
+    /// Steps of all boxes, row by row from the bottom.
+    pub(super) fn all(&self) -> &[u32] {
+        &self.steps
+    }
+
+    /// Sets the goals to 0; returns their boxes, each once.
+    fn start(&mut self, anchors: &FreeSpace, goals: &[(u32, u32)]) -> Vec<(u32, u32)> {
+        let mut queue = Vec::new();
+        for &(col, row) in goals.iter().filter(|&&(col, row)| anchors.is_free(col, row)) {
+            let steps = &mut self.steps[anchors.index(col, row)];
+            if *steps == Self::UNREACHED {
+                *steps = 0;
+                queue.push((col, row));
+            }
+        }
+        queue
+    }
+
+    /// Gives the unreached neighbors of a box their distance and puts them into the queue.
+    fn spread(&mut self, anchors: &FreeSpace, (col, row): (u32, u32), queue: &mut Vec<(u32, u32)>) {
+        let steps = self.steps[anchors.index(col, row)] + 1;
+        for (east, north) in STEPS {
+            let next = (col.wrapping_add_signed(east), row.wrapping_add_signed(north));
+            if next.0 < self.width && next.1 < self.height {
+                let index = anchors.index(next.0, next.1);
+                if self.steps[index] == Self::UNREACHED && anchors.has(index) {
+                    self.steps[index] = steps;
+                    queue.push(next);
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::planning::drawn as space;
+
+    #[test]
+    fn steps_go_around_walls_and_not_through_corners() {
+        let free = space("...\n.#.\n.#.");
+        let distances = Distances::to_nearest(&free, 1, &[(0, 0)]);
+        assert_eq!(distances.steps(2, 0), Some(6));
+        assert_eq!(distances.steps(1, 0), None, "a wall");
+        assert_eq!(distances.steps(3, 0), None, "outside");
+        assert_eq!(distances.max(), Some(6));
+    }
+
+    #[test]
+    fn the_nearest_of_several_goals_counts_and_blocked_ones_do_not() {
+        let free = space("....#");
+        let distances = Distances::to_nearest(&free, 1, &[(0, 0), (0, 0), (3, 0), (4, 0), (9, 9)]);
+        let steps: Vec<_> = (0..5).map(|col| distances.steps(col, 0)).collect();
+        assert_eq!(steps, [Some(0), Some(1), Some(1), Some(0), None]);
+        assert_eq!(Distances::to_nearest(&free, 1, &[(4, 0)]).max(), None);
+    }
+
+    #[test]
+    fn a_large_body_needs_a_wide_way() {
+        let free = space("....\n.#..\n....\n....");
+        let distances = Distances::to_nearest(&free, 2, &[(0, 0)]);
+        assert_eq!(distances.steps(2, 2), Some(4));
+        assert_eq!(distances.steps(0, 2), None, "the wall is in the way");
+    }
+}

@@ -1,0 +1,145 @@
+//! Which boxes are free, one bit per box.
+
+use crate::{Cell, GridMap};
+
+/// A set of boxes of a grid: those where a body may stand.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FreeSpace {
+    width: u32,
+    height: u32,
+    /// Bit `index % 64` of word `index / 64` with `index = row * width + col`.
+    bits: Vec<u64>,
+}
+
+impl FreeSpace {
+    /// The boxes of a `width` x `height` grid for which `is_free(col, row)` holds.
+    pub fn new(width: u32, height: u32, mut is_free: impl FnMut(u32, u32) -> bool) -> Self {
+        let mut space = Self::empty(width, height);
+        for row in 0..height {
+            for col in 0..width {
+                if is_free(col, row) {
+                    space.insert(col, row);
+                }
+            }
+        }
+        space
+    }
+
+    /// The free boxes of `map`; unknown boxes are not among them (see
+    /// [`GridMap::with_unknown`]).
+    pub fn of_map(map: &GridMap) -> Self {
+        Self::new(map.width(), map.height(), |col, row| map.cell(col, row) == Cell::Free)
+    }
+
+    /// Columns of the grid.
+    pub fn width(&self) -> u32 {
+        self.width
+    }
+
+    /// Rows of the grid.
+    pub fn height(&self) -> u32 {
+        self.height
+    }
+
+    /// Whether the box is free; boxes outside the grid are not.
+    pub fn is_free(&self, col: u32, row: u32) -> bool {
+        col < self.width && row < self.height && self.has(self.index(col, row))
+    }
+
+    /// The anchors of a body of `size` x `size` boxes: the boxes that can be the lower-left one
+    /// of a square that is free as a whole. A step from one anchor to the next sweeps free
+    /// boxes only.
+    ///
+    /// # Panics
+    /// When `size` is 0.
+    #[must_use]
+    pub fn anchors(&self, size: u32) -> Self {
+        assert!(size > 0, "a body covers at least one box");
+        if size == 1 {
+            return self.clone();
+        }
+        let mut anchors = Self::empty(self.width, self.height);
+        // Side of the largest free square with its lower-left box at a column, in the row above;
+        // one column more, for the east edge.
+        let mut above = vec![0; self.width as usize + 1];
+        for row in (0..self.height).rev() {
+            // The value above and east, which the pass to the west has overwritten already.
+            let mut above_east = 0;
+            for col in (0..self.width).rev() {
+                let at = col as usize;
+                let smallest = above[at].min(above[at + 1]).min(above_east);
+                above_east = above[at];
+                above[at] = if self.is_free(col, row) { smallest + 1 } else { 0 };
+                if above[at] >= size {
+                    anchors.insert(col, row);
+                }
+            }
+        }
+        anchors
+    }
+
+    fn empty(width: u32, height: u32) -> Self {
+        let boxes = width as usize * height as usize;
+        Self { width, height, bits: vec![0; boxes.div_ceil(64)] }
+    }
+
+    /// Position of a box in row-major order; the box has to be inside.
+    pub(super) fn index(&self, col: u32, row: u32) -> usize {
+        row as usize * self.width as usize + col as usize
+    }
+
+    /// Number of boxes of the grid.
+    pub(super) fn len(&self) -> usize {
+        self.width as usize * self.height as usize
+    }
+
+    /// Whether the box at `index` is free.
+    pub(super) fn has(&self, index: usize) -> bool {
+        self.bits[index / 64] >> (index % 64) & 1 == 1
+    }
+
+    fn insert(&mut self, col: u32, row: u32) {
+        let index = self.index(col, row);
+        self.bits[index / 64] |= 1 << (index % 64);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn boxes_outside_the_grid_are_not_free() {
+        let space = FreeSpace::new(3, 2, |_, _| true);
+        assert!(space.is_free(2, 1));
+        assert!(!space.is_free(3, 0) && !space.is_free(0, 2) && !space.is_free(u32::MAX, 0));
+    }
+
+    #[test]
+    fn only_free_boxes_of_a_map_are_free() {
+        let map = GridMap::new(3, 1, 1.0, vec![Cell::Free, Cell::Wall, Cell::Unknown]);
+        let space = FreeSpace::of_map(&map);
+        assert_eq!([0, 1, 2].map(|col| space.is_free(col, 0)), [true, false, false]);
+    }
+
+    proptest! {
+        #[test]
+        fn an_anchor_is_a_box_whose_whole_square_is_free(
+            width in 1u32..12, height in 1u32..12, size in 1u32..5, walls in any::<[u128; 2]>(),
+        ) {
+            let is_wall = |col: u32, row: u32| {
+                let index = row * width + col;
+                // Three of four boxes are free, so that squares of every size occur.
+                walls[0].rotate_right(index) & 1 == 1 && walls[1].rotate_right(index) & 1 == 1
+            };
+            let space = FreeSpace::new(width, height, |col, row| !is_wall(col, row));
+            let anchors = space.anchors(size);
+            for (col, row) in (0..width).flat_map(|col| (0..height).map(move |row| (col, row))) {
+                let square = (0..size).flat_map(|x| (0..size).map(move |y| (col + x, row + y)));
+                let is_anchor = square.clone().all(|(x, y)| space.is_free(x, y));
+                prop_assert_eq!(anchors.is_free(col, row), is_anchor);
+            }
+        }
+    }
+}

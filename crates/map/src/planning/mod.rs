@@ -1,0 +1,29 @@
+//! Distances and ways on a grid of boxes.
+//!
+//! [`FreeSpace`] says where a body may stand, [`Distances`] how many steps it is to the nearest
+//! goal, and [`FlowField`] which way; [`octile_distance`] is the measure of the MovingAI
+//! benchmarks. Everything here is a pure function of its arguments; ties are broken by
+//! documented rules.
+
+mod distance;
+mod flow_field;
+mod free_space;
+mod octile;
+
+pub use distance::Distances;
+pub use flow_field::FlowField;
+pub use free_space::FreeSpace;
+pub use octile::octile_distance;
+
+/// The four steps on a grid as (columns, rows), by direction: 0 east, 1 north, 2 west, 3 south.
+pub const STEPS: [(i32, i32); 4] = [(1, 0), (0, 1), (-1, 0), (0, -1)];
+
+/// Returns the free boxes of a drawing whose first line is the north edge; `#` is a wall.
+#[cfg(test)]
+fn drawn(art: &str) -> FreeSpace {
+    use crate::{Cell, GridMap};
+    let rows: Vec<&str> = art.lines().rev().collect();
+    let cell = |sign| if sign == '#' { Cell::Wall } else { Cell::Free };
+    let cells = rows.iter().flat_map(|row| row.chars().map(cell)).collect();
+    FreeSpace::of_map(&GridMap::new(rows[0].len() as u32, rows.len() as u32, 1.0, cells))
+}

@@ -1,0 +1,130 @@
+//! The distance of the MovingAI benchmarks: 8-connected, diagonals of length sqrt 2, and no
+//! diagonal past the corner of a blocked box.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+use std::f64::consts::SQRT_2;
+
+use super::{FreeSpace, STEPS};
+
+/// Length in boxes of a shortest octile way from `start` to `goal` (column, row), by A*; `None`
+/// where there is no way.
+///
+/// A diagonal step needs both boxes beside it free. The length is computed once from whole
+/// numbers of straight and diagonal steps, so it carries no error summed along the way.
+pub fn octile_distance(free: &FreeSpace, start: (u32, u32), goal: (u32, u32)) -> Option<f64> {
+    if !free.is_free(start.0, start.1) || !free.is_free(goal.0, goal.1) {
+        return None;
+    }
+    let mut best = vec![f64::INFINITY; free.len()];
+    best[free.index(start.0, start.1)] = 0.0;
+    let mut open = BinaryHeap::from([Reverse(Visit::new(start, Length::default(), goal))]);
+    while let Some(Reverse(visit)) = open.pop() {
+        if visit.at == goal {
+            return Some(visit.length.in_boxes());
+        }
+        if visit.length.in_boxes() > best[free.index(visit.at.0, visit.at.1)] {
+            continue;
+        }
+        for (next, length) in moves(free, visit.at, visit.length) {
+            let known = &mut best[free.index(next.0, next.1)];
+            if length.in_boxes() < *known {
+                *known = length.in_boxes();
+                open.push(Reverse(Visit::new(next, length, goal)));
+            }
+        }
+    }
+    None
+}
+
+/// A length as steps along the axes and across.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
+struct Length {
+    straight: u32,
+    diagonal: u32,
+}
+
+impl Length {
+    fn in_boxes(self) -> f64 {
+        f64::from(self.straight) + f64::from(self.diagonal) * SQRT_2
+    }
+
+    /// The octile distance on a grid without walls.
+    fn between(a: (u32, u32), b: (u32, u32)) -> Self {
+        let (x, y) = (a.0.abs_diff(b.0), a.1.abs_diff(b.1));
+        Self { straight: x.abs_diff(y), diagonal: x.min(y) }
+    }
+}
+
+/// A box on the search's frontier; the least is the one to look at next.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Visit {
+    /// Bits of the least length of a way through here: lengths are not negative, so their bits
+    /// are ordered as they are.
+    estimate_bits: u64,
+    at: (u32, u32),
+    length: Length,
+}
+
+impl Visit {
+    fn new(at: (u32, u32), length: Length, goal: (u32, u32)) -> Self {
+        let rest = Length::between(at, goal);
+        let whole = Length {
+            straight: length.straight + rest.straight,
+            diagonal: length.diagonal + rest.diagonal,
+        };
+        Self { estimate_bits: whole.in_boxes().to_bits(), at, length }
+    }
+}
+
+/// The boxes one step away and the length of the way to them.
+fn moves(
+    free: &FreeSpace,
+    (col, row): (u32, u32),
+    length: Length,
+) -> impl Iterator<Item = ((u32, u32), Length)> {
+    let shifted =
+        move |east, north| (col.wrapping_add_signed(east), row.wrapping_add_signed(north));
+    let is_free = move |(col, row): (u32, u32)| free.is_free(col, row);
+    let straight = Length { straight: length.straight + 1, ..length };
+    let diagonal = Length { diagonal: length.diagonal + 1, ..length };
+    let along = STEPS.into_iter().map(move |(east, north)| shifted(east, north));
+    let across = [(1, 1), (-1, 1), (-1, -1), (1, -1)].into_iter();
+    let across = across
+        .filter(move |&(east, north)| is_free(shifted(east, 0)) && is_free(shifted(0, north)))
+        .map(move |(east, north)| shifted(east, north));
+    along
+        .map(move |at| (at, straight))
+        .chain(across.map(move |at| (at, diagonal)))
+        .filter(move |&(at, _)| is_free(at))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::planning::drawn as space;
+
+    #[test]
+    fn an_open_grid_is_crossed_by_diagonals() {
+        let free = space(&"......\n".repeat(4));
+        assert_eq!(octile_distance(&free, (0, 0), (5, 3)), Some(2.0 + 3.0 * SQRT_2));
+        assert_eq!(octile_distance(&free, (5, 3), (0, 0)), Some(2.0 + 3.0 * SQRT_2));
+        assert_eq!(octile_distance(&free, (2, 2), (2, 2)), Some(0.0));
+    }
+
+    #[test]
+    fn corners_are_not_cut() {
+        assert_eq!(octile_distance(&space("..\n.#"), (0, 0), (1, 1)), Some(2.0));
+        assert_eq!(octile_distance(&space("#.\n.#"), (0, 0), (1, 1)), None);
+    }
+
+    #[test]
+    fn blocked_ends_and_ends_outside_have_no_way() {
+        let free = space(".#.");
+        for (start, goal) in
+            [((0, 0), (2, 0)), ((1, 0), (0, 0)), ((0, 0), (1, 0)), ((0, 0), (9, 0))]
+        {
+            assert_eq!(octile_distance(&free, start, goal), None, "{start:?} {goal:?}");
+        }
+    }
+}

@@ -1,0 +1,163 @@
+//! Linear models fitted by least squares, with intervals for their coefficients.
+
+use crate::Interval;
+use serde::Serialize;
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+/// A fitted model `y = sum of coefficient * x`; a constant is a column of ones.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Fit {
+    /// One coefficient per column, in the unit of `y` per unit of that column.
+    pub coefficients: Vec<f64>,
+    /// 95 % intervals of the coefficients by Student's t; absent without freedom.
+    pub intervals: Option<Vec<Interval>>,
+    /// Coefficient of determination: the share of the variance of `y` that is explained.
+    pub r_squared: f64,
+    /// Number of observations.
+    pub n: usize,
+}
+
+/// A pivot below this share of its column's square means that the column is a combination of
+/// others: its coefficient cannot be told.
+const SINGULAR: f64 = 1e-10;
+
+impl Fit {
+    /// Fits `y` (`n`) to the rows of `x` (`n` x `k`).
+    ///
+    /// `None` when there are fewer rows than columns, or the columns depend on each other.
+    ///
+    /// # Panics
+    /// When the rows differ in length or in number from `y`.
+    pub fn new(x: &[Vec<f64>], y: &[f64]) -> Option<Self> {
+        assert_eq!(x.len(), y.len(), "one row per observation");
+        let (n, k) = (y.len(), x.first()?.len());
+        // Columns of length 1: how well the system is posed must not depend on units.
+        let lengths: Vec<f64> = (0..k).map(|j| dot(x, j, j).sqrt()).collect();
+        if n < k || lengths.contains(&0.0) {
+            return None;
+        }
+        let scaled = |i: usize, j: usize| dot(x, i, j) / (lengths[i] * lengths[j]);
+        let gram: Vec<Vec<f64>> = (0..k).map(|i| (0..k).map(|j| scaled(i, j)).collect()).collect();
+        let inverse = inverse(gram)?;
+        let moment =
+            |j: usize| x.iter().zip(y).map(|(row, y)| row[j] * y).sum::<f64>() / lengths[j];
+        let moments: Vec<f64> = (0..k).map(moment).collect();
+        let coefficient = |i: usize| {
+            inverse[i].iter().zip(&moments).map(|(a, b)| a * b).sum::<f64>() / lengths[i]
+        };
+        let coefficients: Vec<f64> = (0..k).map(coefficient).collect();
+        let spread = |j: usize| inverse[j][j].sqrt() / lengths[j];
+        let residual = residual_square(x, y, &coefficients);
+        let intervals = intervals(&coefficients, residual, n, spread);
+        let r_squared = 1.0 - residual / variation(y).max(f64::MIN_POSITIVE);
+        Some(Self { coefficients, intervals, r_squared, n })
+    }
+
+    /// What the model says for a row.
+    pub fn predict(&self, row: &[f64]) -> f64 {
+        self.coefficients.iter().zip(row).map(|(c, x)| c * x).sum()
+    }
+}
+
+fn dot(x: &[Vec<f64>], i: usize, j: usize) -> f64 {
+    x.iter().map(|row| row[i] * row[j]).sum()
+}
+
+fn residual_square(x: &[Vec<f64>], y: &[f64], coefficients: &[f64]) -> f64 {
+    let predicted = |row: &[f64]| row.iter().zip(coefficients).map(|(x, c)| x * c).sum::<f64>();
+    x.iter().zip(y).map(|(row, y)| (y - predicted(row)) * (y - predicted(row))).sum()
+}
+
+fn variation(y: &[f64]) -> f64 {
+    let mean = y.iter().sum::<f64>() / y.len() as f64;
+    y.iter().map(|v| (v - mean) * (v - mean)).sum()
+}
+
+fn intervals(
+    coefficients: &[f64],
+    residual: f64,
+    n: usize,
+    spread: impl Fn(usize) -> f64,
+) -> Option<Vec<Interval>> {
+    let freedom = n.checked_sub(coefficients.len()).filter(|&f| f > 0)? as f64;
+    let t = StudentsT::new(0.0, 1.0, freedom).ok()?.inverse_cdf(0.975);
+    let around = |(j, &c): (usize, &f64)| {
+        let half_width = t * (residual / freedom).sqrt() * spread(j);
+        Interval { low: c - half_width, high: c + half_width }
+    };
+    Some(coefficients.iter().enumerate().map(around).collect())
+}
+
+/// The inverse of a symmetric positive matrix with ones on its diagonal, by Gauss and Jordan.
+fn inverse(mut a: Vec<Vec<f64>>) -> Option<Vec<Vec<f64>>> {
+    let k = a.len();
+    for pivot in 0..k {
+        let divisor = a[pivot][pivot];
+        if divisor < SINGULAR {
+            return None;
+        }
+        // In place: the column of the identity takes the place of the column it removes.
+        a[pivot][pivot] = 1.0;
+        a[pivot].iter_mut().for_each(|v| *v /= divisor);
+        let row = a[pivot].clone();
+        for (_, other) in a.iter_mut().enumerate().filter(|(i, _)| *i != pivot) {
+            let factor = std::mem::take(&mut other[pivot]);
+            other.iter_mut().zip(&row).for_each(|(v, r)| *v -= factor * r);
+        }
+    }
+    Some(a)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sidestep_kernel::Seed;
+    use sidestep_kernel::distr::normal;
+    use sidestep_kernel::stream::{Purpose, Streams};
+
+    fn close(a: f64, b: f64, tolerance: f64) {
+        assert!((a - b).abs() <= tolerance, "{a} is not {b}");
+    }
+
+    #[test]
+    fn a_line_through_known_points_has_the_textbook_figures() {
+        // Draper and Smith style example: x = 1..5, y = 2, 4, 5, 4, 5.
+        let x: Vec<Vec<f64>> = (1..=5).map(|i| vec![1.0, f64::from(i)]).collect();
+        let fit = Fit::new(&x, &[2.0, 4.0, 5.0, 4.0, 5.0]).unwrap();
+        close(fit.coefficients[0], 2.2, 1e-12);
+        close(fit.coefficients[1], 0.6, 1e-12);
+        close(fit.r_squared, 0.6, 1e-12);
+        // Standard error of the slope sqrt(0.8 / 10), t(3, 0.975) = 3.182446.
+        close(fit.intervals.unwrap()[1].high - 0.6, 3.182_446 * 0.08_f64.sqrt(), 1e-6);
+        close(Fit::new(&x, &[3.0; 5]).unwrap().predict(&[1.0, 9.0]), 3.0, 1e-12);
+    }
+
+    #[test]
+    fn known_parameters_are_recovered_from_noise_within_their_intervals() {
+        let truth = [2e-7, 5e-8, 3e2];
+        let mut draws = Streams::new(Seed(1)).draws(0, 0, Purpose(0));
+        let (mut x, mut y) = (Vec::new(), Vec::new());
+        for i in 0..200 {
+            let row = vec![100.0 + f64::from(i), f64::from(i * i % 37), 1e-9 * f64::from(i % 11)];
+            y.push(
+                truth.iter().zip(&row).map(|(t, r)| t * r).sum::<f64>() + 1e-6 * normal(&mut draws),
+            );
+            x.push(row);
+        }
+        let fit = Fit::new(&x, &y).unwrap();
+        for (interval, truth) in fit.intervals.unwrap().iter().zip(truth) {
+            assert!(interval.contains(truth), "{truth} is outside {interval:?}");
+            assert!(interval.high - interval.low < 0.5 * truth);
+        }
+        assert!(fit.r_squared > 0.9);
+    }
+
+    #[test]
+    fn what_cannot_be_told_apart_is_not_fitted() {
+        let doubled: Vec<Vec<f64>> = (1..9).map(|i| vec![f64::from(i), f64::from(2 * i)]).collect();
+        assert!(Fit::new(&doubled, &[1.0; 8]).is_none());
+        assert!(Fit::new(&[vec![1.0, 2.0]], &[1.0]).is_none());
+        assert!(Fit::new(&[vec![0.0], vec![0.0]], &[1.0, 1.0]).is_none());
+        assert!(Fit::new(&[], &[]).is_none());
+    }
+}

@@ -1,0 +1,39 @@
+//! Helpers that the tests of several crates share.
+
+use std::path::{Path, PathBuf};
+
+/// Returns the folder of the repository.
+pub fn root() -> &'static Path {
+    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
+}
+
+/// Returns a file or folder of the shared data, or `None` (said once) where that folder is not at
+/// hand: recorded data of others are no part of the repository.
+pub fn shared_data(name: &str) -> Option<PathBuf> {
+    let path = root().join("../shared/data").join(name);
+    if !path.exists() {
+        println!("skipped: ../shared/data is not here");
+        return None;
+    }
+    Some(path)
+}
+
+/// Returns a robot model of the shared data, or `None` where that folder is not at hand.
+pub fn robot_model(name: &str) -> Option<PathBuf> {
+    shared_data(&format!("urdf/{name}"))
+}
+
+/// The URDF files of the shared data.
+pub const ROBOT_MODELS: [&str; 11] = [
+    "REU_snake.urdf",
+    "RSNAKE_snake.urdf",
+    "iiwa14_primitive_collision.urdf",
+    "panda.urdf",
+    "pendulum5.urdf",
+    "ur5_robot.urdf",
+    "z1.urdf",
+    "chain/iiwa7.urdf",
+    "chain/panda.urdf",
+    "chain/snake16_own.urdf",
+    "chain/ur5.urdf",
+];

@@ -1,0 +1,476 @@
+//! Where the optimizer of a group runs: one and the same algorithm, deployed in several ways.
+//!
+//! - `direct`: one process decides for all. The reference: on a faultless network every other
+//!   deployment chooses the same controls, bit for bit.
+//! - `team`: an agent per airplane (the paper's Algorithm 1). With sampled expectations each
+//!   sends the predicted ways of its samples every round, then its part of their costs; with
+//!   exact ones it sends the ways of all its actions once, and then its distribution.
+//! - `compact-team`: the same, but an agent sends its state and model once, from which the others
+//!   predict its ways themselves; then only its samples' numbers, or its distribution.
+//! - `pim`: one coordinator whose state migrates from airplane to airplane (the paper's process
+//!   integrated mechanism) and reads an airplane's model only while it is there.
+//! - `hierarchical-pim`: a coordinator for each part of the group, and one above them.
+//!
+//! Agents are state machines without input or output of their own: messages in, messages out
+//! (`link.rs`). Here they are run on a network in memory (`network.rs`), which counts every message
+//! in its serialized form and can lose, delay, double and reorder them, and silence an airplane.
+//! Nobody waits for ever: who is not heard is presumed where it was last heard of ([`contact`]),
+//! and every talk has a deadline. What the shield needs to know goes over the same network
+//! (`exchange.rs`).
+
+pub mod contact;
+mod exchange;
+mod informed;
+mod link;
+mod network;
+mod pim;
+mod team;
+
+use super::airplane::{Action, Point};
+use super::decide::Known;
+use super::events::{Event, EventKind};
+use super::objective::Options;
+use super::world::AirspaceWorld;
+use contact::{Beacon, Contact, Contacts};
+pub(super) use exchange::Seen;
+use network::{Ended, Talk, Topic};
+pub use network::{Network, Silence, Traffic};
+use serde::{Deserialize, Serialize};
+use sidestep_collectives::{Estimator, Order, Player, Settings, Utility};
+use sidestep_kernel::{Cycle, EntityId};
+
+/// Where the optimizer runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Deployment {
+    /// One process decides for all.
+    #[default]
+    Direct,
+    /// An agent per airplane, which sends what it may fly.
+    Team,
+    /// A coordinator that migrates.
+    Pim,
+    /// Coordinators that migrate, one above the others.
+    HierarchicalPim,
+    /// An agent per airplane, which sends its model.
+    CompactTeam,
+}
+
+impl Deployment {
+    /// Its name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Direct => "direct",
+            Self::Team => "team",
+            Self::Pim => "pim",
+            Self::HierarchicalPim => "hierarchical-pim",
+            Self::CompactTeam => "compact-team",
+        }
+    }
+}
+
+/// What the optimizer of an airplane comes to.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Decided {
+    /// Number of the chosen action.
+    pub(super) chosen: usize,
+    /// The estimate of every action in the end.
+    pub(super) expected: Vec<f64>,
+    pub(super) rounds: u32,
+    pub(super) converged: bool,
+}
+
+/// What an agent comes to.
+#[derive(Debug, Clone, PartialEq)]
+struct Came {
+    /// Nothing, if time was up before it had learned anything.
+    decided: Option<Decided>,
+    /// What it has heard the others tell of themselves, by place.
+    beacons: Vec<Option<Beacon>>,
+}
+
+/// What one airplane knows of itself, and what all have agreed on.
+#[derive(Debug, Clone)]
+struct Own<'a> {
+    world: &'a AirspaceWorld,
+    /// Place in the group.
+    me: usize,
+    /// Ids of the group.
+    group: &'a [EntityId],
+    known: Known,
+    now: Cycle,
+    options: Options,
+    contacts: &'a Contacts,
+}
+
+impl Own<'_> {
+    fn settings(&self) -> &Settings {
+        &self.world.settings
+    }
+
+    fn uniform(&self, k: u64) -> f64 {
+        self.world.uniform(self.known.slot, self.now, k)
+    }
+
+    fn mission(&self) -> &[Point] {
+        self.world.stage(self.known.slot, self.known.orders).mission
+    }
+
+    /// The next `block` samples of a player after `drawn`.
+    fn samples(&self, player: &Player, drawn: u64, block: usize) -> Vec<usize> {
+        (drawn..drawn + block as u64).map(|k| player.draw(self.uniform(k))).collect()
+    }
+
+    /// What a player of samples or of distributions comes to after some rounds, of which the
+    /// last `calm` were calm; nothing, if it has not learned anything.
+    fn decided(&self, player: &Player, rounds: u32, calm: u32) -> Option<Decided> {
+        let Settings { estimator, choice, stop, .. } = *self.settings();
+        let drawn = match estimator {
+            Estimator::Exact => 0,
+            Estimator::Sampled { block, .. } => u64::from(rounds) * block as u64,
+        };
+        (!player.expected().is_empty()).then(|| Decided {
+            chosen: player.choose(choice, self.uniform(drawn)),
+            expected: player.expected().to_vec(),
+            rounds,
+            converged: calm >= stop.calm_rounds,
+        })
+    }
+
+    /// What it tells of itself.
+    fn beacon(&self) -> Beacon {
+        self.world.beacon(self.known)
+    }
+
+    /// Whether another one was heard of late, or never yet.
+    fn expects(&self, other: usize) -> bool {
+        let contact = self.contacts.get(&self.group[other]);
+        contact.is_none_or(|contact| contact.heard_in + 1 >= self.now)
+    }
+
+    /// Where another one is taken to fly that is not heard.
+    fn presumed(&self, other: usize) -> Options {
+        let id = self.group[other];
+        let contact = self.contacts.get(&id).cloned().unwrap_or_else(|| self.world.filed(id));
+        contact.options(self.world, self.now)
+    }
+
+    /// The same of one that was heard a moment ago.
+    fn presumed_from(&self, beacon: &Beacon) -> Options {
+        Contact::heard(beacon.clone(), self.now).options(self.world, self.now)
+    }
+}
+
+/// Why a deployment cannot run with some settings.
+pub(super) fn refuses(deployment: Deployment, settings: &Settings) -> Option<&'static str> {
+    let sampled = matches!(settings.estimator, Estimator::Sampled { .. });
+    let as_in_the_paper = settings.order == Order::Parallel && settings.utility == Utility::Joint;
+    (deployment != Deployment::Direct && sampled && !as_in_the_paper)
+        .then_some("agents that sample update in parallel and learn from the joint cost")
+}
+
+/// What the agents of a group come to: each what, if anything; and what went over the network.
+pub(super) type Deployed = (Vec<Option<Decided>>, Traffic);
+
+impl AirspaceWorld {
+    /// Lets the agents of a group decide, and notes in `contacts` what they hear of each other.
+    pub(super) fn deployed(
+        &self,
+        group: &[Known],
+        now: Cycle,
+        contacts: &mut [Contacts],
+        events: &mut Vec<Event>,
+    ) -> Deployed {
+        let ids: Vec<EntityId> = group.iter().map(|known| known.slot).collect();
+        let own = |(me, known): (usize, &Known)| Own {
+            world: self,
+            me,
+            group: &ids,
+            known: *known,
+            now,
+            options: self.options(*known),
+            contacts: &contacts[me],
+        };
+        let own: Vec<Own<'_>> = group.iter().enumerate().map(own).collect();
+        let (ended, traffic) = self.talk_of(own, &self.talk(Topic::Optimization, now));
+        if self.network.is_some() {
+            for (me, end) in ended.iter().enumerate() {
+                self.tell(end, (ids[me], &ids), now, &contacts[me], events);
+                let beacons = end.outcome.iter().flat_map(|came| came.beacons.iter().zip(&ids));
+                for (beacon, &id) in beacons {
+                    if let Some(beacon) = beacon {
+                        contact::note(&mut contacts[me], id, beacon.clone(), now);
+                    }
+                }
+            }
+        }
+        let decided = ended.into_iter().map(|end| end.outcome.and_then(|came| came.decided));
+        (decided.collect(), traffic)
+    }
+
+    fn talk_of(&self, own: Vec<Own<'_>>, talk: &Talk<'_>) -> pim::Run {
+        let ids = own[0].group;
+        match (self.deployment, self.settings.estimator) {
+            (Deployment::Pim, _) => {
+                let all = (0..own.len()).collect();
+                pim::run(talk, &own, vec![all])
+            }
+            (Deployment::HierarchicalPim, _) => pim::run(talk, &own, pim::parts(&own)),
+            (Deployment::Team, Estimator::Sampled { block, ageing }) => {
+                let agents = own.into_iter().map(|own| team::Agent::new(own, block, ageing));
+                network::run(talk, ids, agents.collect())
+            }
+            (deployment, _) => {
+                let by_model = deployment == Deployment::CompactTeam;
+                let agents = own.into_iter().map(|own| informed::Agent::new(own, by_model));
+                network::run(talk, ids, agents.collect())
+            }
+        }
+    }
+
+    fn talk(&self, topic: Topic, now: Cycle) -> Talk<'_> {
+        Talk {
+            network: self.network.as_ref(),
+            streams: self.streams,
+            topic,
+            now,
+            at_s: now as f64 * self.timing.dt_s,
+        }
+    }
+
+    /// Whether an airplane's radio is dead in a cycle.
+    pub(super) fn is_silent(&self, id: EntityId, now: Cycle) -> bool {
+        self.talk(Topic::Optimization, now).is_silent(id)
+    }
+
+    /// What an airplane tells of itself.
+    fn beacon(&self, known: Known) -> Beacon {
+        let stage = self.stage(known.slot, known.orders);
+        Beacon {
+            pose: known.pose,
+            goal: stage.mission.get(known.next).copied(),
+            v_m_s: stage.model.v_m_s,
+            omega_max_rad_s: stage.model.omega_max_rad_s,
+            separation_m: stage.model.separation_m,
+            levels: self.levels(known),
+        }
+    }
+
+    /// Actions of airplane `i`, for whoever knows its model.
+    pub(super) fn actions_of(&self, slot: u32) -> &[Action] {
+        &self.actions[slot as usize]
+    }
+
+    /// Books how a talk has ended for an airplane, and of whom nothing is heard any more.
+    fn tell<O>(
+        &self,
+        end: &Ended<O>,
+        (id, ids): (EntityId, &[EntityId]),
+        now: Cycle,
+        contacts: &Contacts,
+        events: &mut Vec<Event>,
+    ) {
+        let heard_in = |other: &EntityId| match contacts.get(other) {
+            Some(contact) => contact.heard_in,
+            None => self.appears_in(*other as usize),
+        };
+        let lost = end.unheard.iter().map(|&place| ids[place]).filter(|id| heard_in(id) + 1 >= now);
+        events.extend(lost.map(|other| Event::of_pair(now, EventKind::Unheard, id, other)));
+        if end.late {
+            events.push(Event::of(now, EventKind::Deadline, id));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::metrics::Metrics;
+    use super::super::simulation::AirspaceSimulation;
+    use proptest::prelude::*;
+    use sidestep_kernel::{Digest, Simulation};
+    use sidestep_scenario::Source;
+
+    fn flown(preset: &str, deployment: &str, more: &str) -> (Digest, Metrics) {
+        let text = format!(
+            "format = 1\nworld = \"airspace\"\nseed = 5\n[airspace]\npreset = \"{preset}\"\n\
+             deployment = \"{deployment}\"\nmax_rounds = 60\nshield = \"off\"\n{more}\n\
+             [airspace.generator]\nkind = \"superconflict\"\nn = 5\n"
+        );
+        let mut run = AirspaceSimulation::new(&Source::new("s", text, ""), 1).expect("a scenario");
+        run.advance(25);
+        (run.digest(), run.airspace_metrics())
+    }
+
+    /// On a faultless network, with exact expectations in sequence and in parallel, and with
+    /// sampled ones and drawn controls.
+    #[test]
+    fn every_deployment_chooses_the_same_controls_bit_for_bit() {
+        let parallel = "order = \"parallel\"";
+        for (preset, more) in [("default", ""), ("default", parallel), ("paper", "")] {
+            let (direct, alone) = flown(preset, "direct", more);
+            assert_eq!((alone.messages, alone.bytes), (0, 0));
+            for deployment in ["team", "compact-team", "pim", "hierarchical-pim"] {
+                let (digest, metrics) = flown(preset, deployment, more);
+                assert_eq!(digest, direct, "{deployment}, {preset} {more}");
+                assert_eq!(metrics.rounds_mean, alone.rounds_mean);
+                assert!(metrics.messages > 0 && metrics.bytes > 0);
+            }
+        }
+    }
+
+    /// Parts of the paper's figures 6 and 7, and what compact messages save.
+    #[test]
+    fn a_coordinator_sends_fewer_messages_than_a_team_and_more_bytes_than_one_that_multicasts() {
+        let [team, compact, pim] =
+            ["team", "compact-team", "pim"].map(|deployment| flown("paper", deployment, "").1);
+        assert!(pim.messages < team.messages);
+        assert!(pim.bytes > 2 * team.multicast_bytes);
+        assert!(compact.bytes * 20 < team.bytes, "{} {}", compact.bytes, team.bytes);
+    }
+
+    const FAULTS: &str = "network = { loss = 0.1, duplication = 0.05, max_delay_s = 0.003, \
+         silent = [{ airplane = 2, from_s = 60.0 }] }";
+
+    fn over_a_bad_network(
+        preset: &str,
+        deployment: &str,
+        more: &str,
+        seed: u64,
+    ) -> AirspaceSimulation {
+        let text = format!(
+            "format = 1\nworld = \"airspace\"\nseed = {seed}\n[airspace]\npreset = \"{preset}\"\n\
+             deployment = \"{deployment}\"\nmax_rounds = 40\n{more}\n\
+             [airspace.generator]\nkind = \"superconflict\"\nn = 5\n"
+        );
+        AirspaceSimulation::new(&Source::new("s", text, ""), 1).expect("a scenario")
+    }
+
+    /// Whatever is lost, everybody ends in time, nobody comes too near, and all arrive but the
+    /// one that nobody hears, which waits on its orbit.
+    #[test]
+    fn on_a_network_that_loses_messages_and_an_airplane_the_shield_keeps_all_apart() {
+        for deployment in ["team", "compact-team", "pim", "hierarchical-pim"] {
+            for (preset, seed) in [("default", 1), ("default", 2), ("paper", 1)] {
+                let mut run = over_a_bad_network(preset, deployment, FAULTS, seed);
+                run.advance(300);
+                let metrics = run.airspace_metrics();
+                let what = format!("{deployment}, {preset}, seed {seed}: {metrics:?}");
+                assert_eq!(metrics.losses_of_separation, 0, "{what}");
+                assert_eq!(metrics.arrived, 4, "{what}");
+                assert!(metrics.contacts_lost >= 4, "{what}");
+            }
+        }
+    }
+
+    /// Also where most messages are lost, and where time is up before anything is agreed.
+    #[test]
+    fn with_hardly_any_message_or_any_time_the_shield_keeps_all_apart() {
+        let worse = [
+            "network = { loss = 0.7, duplication = 0.2, max_delay_s = 0.02 }",
+            "network = { loss = 0.2, latency_s = 0.02, deadline_s = 0.5 }",
+        ];
+        for (deployment, more) in [("team", worse[0]), ("pim", worse[0]), ("team", worse[1])] {
+            let mut run = over_a_bad_network("default", deployment, more, 3);
+            run.advance(60);
+            let metrics = run.airspace_metrics();
+            assert_eq!(metrics.losses_of_separation, 0, "{deployment}, {more}: {metrics:?}");
+            assert!(metrics.deadlines_missed + metrics.contacts_lost > 0, "{more}: {metrics:?}");
+        }
+    }
+
+    /// Delays that leave time for few questions only: whoever is silent is given up soon enough.
+    #[test]
+    fn a_silent_airplane_stops_nobody_where_messages_are_slow() {
+        for deployment in ["team", "pim"] {
+            let network = "network = { loss = 0.1, max_delay_s = 0.05, \
+                           silent = [{ airplane = 1, from_s = 60.0 }] }";
+            let mut run = over_a_bad_network("default", deployment, network, 1);
+            run.advance(300);
+            let metrics = run.airspace_metrics();
+            assert_eq!((metrics.losses_of_separation, metrics.arrived), (0, 4), "{metrics:?}");
+        }
+    }
+
+    /// Distributions of others mean nothing where their options are only presumed.
+    #[test]
+    fn agents_that_never_hear_a_model_do_not_mind_what_it_samples() {
+        for seed in 1..4 {
+            let more = "network = { loss = 0.9 }";
+            let mut run = over_a_bad_network("paper", "compact-team", more, seed);
+            run.advance(40);
+            assert_eq!(run.airspace_metrics().losses_of_separation, 0);
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(12))]
+        /// Whoever falls silent wherever and whenever, met before or not, whoever comes in later:
+        /// all whose orbits were apart when they came in stay apart.
+        #[test]
+        fn nobody_comes_near_a_silent_airplane(
+            seed in any::<u32>(), n in 3usize..9, loss in 0.0f64..0.6, deployment in 0usize..2,
+            silent in prop::collection::vec((0usize..9, 0.0f64..200.0), 0..3),
+            appears_s in 0.0f64..100.0, x in -4000.0f64..4000.0,
+        ) {
+            let silent: Vec<String> = silent.iter()
+                .map(|(k, from_s)| format!("{{ airplane = {}, from_s = {from_s:?} }}", k % n))
+                .collect();
+            let text = format!(
+                "format = 1\nworld = \"airspace\"\nseed = {seed}\n[airspace]\nmethod = \"none\"\n\
+                 deployment = \"{}\"\n\
+                 network = {{ loss = {loss:?}, max_delay_s = 0.01, silent = [{}] }}\n\
+                 [airspace.generator]\nkind = \"random\"\nn = {n}\nradius_m = 7000.0\n\
+                 [[airplanes]]\nat_m = [{x}, 6000]\nheading_deg = -90\nappears_s = {appears_s:?}\n\
+                 way_points_m = [[{x}, -6000]]\n",
+                ["team", "pim"][deployment], silent.join(", "),
+            );
+            let mut run = AirspaceSimulation::new(&Source::new("s", text, ""), 1).expect("valid");
+            run.advance(90);
+            let metrics = run.airspace_metrics();
+            let told = &metrics.too_close;
+            prop_assert!(
+                metrics.losses_of_separation == 0 || !told.is_empty(), "{metrics:?}"
+            );
+        }
+    }
+
+    /// Without the shield too nobody waits for ever; whoever is not heard flies on.
+    #[test]
+    fn without_the_shield_a_silent_airplane_stops_nobody() {
+        for deployment in ["team", "compact-team", "pim", "hierarchical-pim"] {
+            let more = format!("shield = \"off\"\n{FAULTS}");
+            let mut run = over_a_bad_network("default", deployment, &more, 1);
+            run.advance(300);
+            assert_eq!(run.airspace_metrics().arrived, 5, "{deployment}");
+        }
+    }
+
+    #[test]
+    fn a_network_needs_agents_that_use_it_and_sane_numbers() {
+        let wrong = [
+            ("direct", "loss = 0.1", "one process decides for all"),
+            ("team", "loss = 1.5", "no probability"),
+            ("team", "deadline_s = 4.0", "at most half of dt_s"),
+            ("team", "silent = [{ airplane = 9 }]", "ids from 0 to 2"),
+        ];
+        for (deployment, network, cause) in wrong {
+            let text = format!(
+                "format = 1\nworld = \"airspace\"\n[airspace]\ndeployment = \"{deployment}\"\n\
+                 [airspace.network]\n{network}\n\
+                 [airspace.generator]\nkind = \"superconflict\"\nn = 3\n"
+            );
+            let error =
+                AirspaceSimulation::new(&Source::new("s", text, ""), 1).expect_err("refused");
+            assert!(error.to_string().contains(cause), "{error}");
+        }
+    }
+
+    #[test]
+    fn agents_that_sample_in_sequence_are_refused() {
+        let text = "format = 1\nworld = \"airspace\"\n[airspace]\npreset = \"paper\"\n\
+                    order = \"sequence\"\ndeployment = \"team\"\n\
+                    [airspace.generator]\nkind = \"superconflict\"\nn = 3\n";
+        let error = AirspaceSimulation::new(&Source::new("s", text, ""), 1).expect_err("refused");
+        assert!(error.to_string().contains("parallel"), "{error}");
+    }
+}

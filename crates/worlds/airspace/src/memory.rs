@@ -1,0 +1,115 @@
+//! How much memory optimizing a group takes: said before, not after.
+
+use super::Scratch;
+use super::airplane::{Point, distance_m};
+use super::decide::Known;
+use super::deploy::Deployment;
+use super::state::AirspaceState;
+use super::world::AirspaceWorld;
+use sidestep_collectives::{Estimator, PairwiseGame};
+use sidestep_kernel::conflict::Groups;
+use sidestep_kernel::{Slot, World};
+
+impl AirspaceWorld {
+    /// Bytes that optimizing a group takes at most: tables of its pairs, and predictions, in as
+    /// many copies as its deployment has of them.
+    pub(super) fn group_takes_bytes(&self, group: &[Known]) -> u64 {
+        let (tables, predictions) = (self.table_bytes(group), self.prediction_bytes(group));
+        let members = group.len() as u64;
+        match (self.deployment, self.settings.estimator) {
+            (Deployment::Direct | Deployment::Pim | Deployment::HierarchicalPim, _) => {
+                tables + predictions
+            }
+            // Each agent has the tables of its own pairs, and everybody's predictions.
+            (Deployment::Team | Deployment::CompactTeam, Estimator::Exact) => {
+                2 * tables + members * predictions
+            }
+            // Each computes what all samples cost all.
+            (Deployment::CompactTeam, Estimator::Sampled { .. }) => {
+                members * (tables + predictions)
+            }
+            // Each has the sampled ways of all others, of this round and the one before.
+            (Deployment::Team, Estimator::Sampled { block, .. }) => {
+                let way = self.timing.horizon as u64 * size_of::<Point>() as u64;
+                predictions + 2 * members * members.saturating_sub(1) * block as u64 * way
+            }
+        }
+    }
+
+    /// Bytes of the predicted ways of all actions of a group.
+    fn prediction_bytes(&self, group: &[Known]) -> u64 {
+        let ways: u64 = group.iter().map(|known| self.actions_of(known.slot).len() as u64).sum();
+        ways * self.timing.horizon as u64 * size_of::<Point>() as u64
+    }
+
+    /// Bytes that the tables of a group's pairs take at most.
+    fn table_bytes(&self, group: &[Known]) -> u64 {
+        let actions = |known: &Known| self.actions_of(known.slot).len() as u64;
+        let mut entries = 0;
+        for (k, a) in group.iter().enumerate() {
+            let meets = |b: &&Known| {
+                let apart_m = distance_m(a.pose.at, b.pose.at);
+                (a.altitude_m - b.altitude_m).abs() < self.vertical_m
+                    && apart_m <= self.look_m(a.slot as usize, b.slot as usize)
+            };
+            entries +=
+                group[k + 1..].iter().filter(meets).map(|b| actions(a) * actions(b)).sum::<u64>();
+        }
+        entries * PairwiseGame::BYTES_PER_ENTRY
+    }
+
+    /// The members of the group that takes most at the start of a run, and its bytes.
+    pub(super) fn largest_at_start(&self, state: &AirspaceState) -> (usize, u64) {
+        let n = self.airplanes.len();
+        let (groups, mut scratch) = (Groups::new(n), Scratch::default());
+        self.perceive_and_decide(state, 0, 0..n, &mut scratch);
+        self.find_conflicts(state, 0, 0..n, &groups, &mut scratch);
+        let mut members = Vec::new();
+        let leaders =
+            (0..n as Slot).filter(|&slot| groups.is_leader(slot) && !groups.is_alone(slot));
+        let taken = leaders.map(|leader| {
+            groups.members(leader, &mut members);
+            let flown = members.iter().filter(|&&slot| !self.is_replayed(slot, 0));
+            let known: Vec<Known> = flown.map(|&slot| self.known(state, 0, slot)).collect();
+            (known.len(), self.group_takes_bytes(&known))
+        });
+        taken.max_by_key(|(_, bytes)| *bytes).unwrap_or_default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::scenario::Compiled;
+    use super::*;
+    use sidestep_scenario::Source;
+
+    /// Bytes of four airplanes, all near each other, each with so many actions.
+    fn taken(deployment: &str, preset: &str) -> (u64, u64) {
+        let text = format!(
+            "format = 1\nworld = \"airspace\"\n[airspace]\npreset = \"{preset}\"\nhorizon = 200\n\
+             deployment = \"{deployment}\"\n[airspace.generator]\nkind = \"superconflict\"\nn = 4\n"
+        );
+        let compiled = Compiled::new(&Source::new("m", text, "")).expect("a scenario");
+        let state = AirspaceState::restore(&compiled.world, &compiled.start_snapshot());
+        let (airplanes, bytes) = compiled.world.largest_at_start(&state);
+        assert_eq!(airplanes, 4);
+        (bytes, compiled.world.actions_of(0).len() as u64)
+    }
+
+    #[test]
+    fn every_deployment_is_estimated_by_the_copies_that_it_has() {
+        let way = 200 * 16;
+        for preset in ["default", "paper"] {
+            let (once, actions) = taken("direct", preset);
+            let (tables, ways) = (6 * actions * actions * 24, 4 * actions * way);
+            assert_eq!(once, tables + ways, "{preset}");
+            assert_eq!((taken("pim", preset).0, taken("hierarchical-pim", preset).0), (once, once));
+            let (team, compact) = (taken("team", preset).0, taken("compact-team", preset).0);
+            if preset == "default" {
+                assert_eq!((team, compact), (2 * tables + 4 * ways, 2 * tables + 4 * ways));
+            } else {
+                assert_eq!((team, compact), (ways + 2 * 12 * 20 * way, 4 * once));
+            }
+        }
+    }
+}

@@ -1,0 +1,276 @@
+//! What came of a run.
+
+use super::books::LOOKS_PER_STEP;
+use super::decide::Effort;
+use super::events::{Event, EventKind};
+use super::state::{AirspaceState, Cell, PairRecord};
+use super::world::AirspaceWorld;
+use serde::{Deserialize, Serialize};
+use sidestep_kernel::{Cycle, EntityId};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Everything that a run books beside its state, and that a checkpoint keeps.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Ledger {
+    /// Pairs that came near each other, by ids.
+    pub pairs: BTreeMap<(EntityId, EntityId), PairRecord>,
+    /// Pairs without fallbacks that are apart when the later one of them came under the method,
+    /// after the cycle in which that was.
+    pub too_close: BTreeSet<(Cycle, EntityId, EntityId)>,
+    /// What optimizations took.
+    pub effort: Effort,
+    /// How often what happened.
+    pub events: BTreeMap<EventKind, u64>,
+}
+
+impl Ledger {
+    pub(super) fn add_pair(&mut self, pair: (EntityId, EntityId), record: PairRecord) {
+        self.pairs.entry(pair).and_modify(|r| r.add(record)).or_insert(record);
+    }
+
+    pub(super) fn add_event(&mut self, event: &Event) {
+        *self.events.entry(event.kind).or_default() += 1;
+    }
+
+    fn count(&self, kind: EventKind) -> u64 {
+        self.events.get(&kind).copied().unwrap_or(0)
+    }
+}
+
+/// Metrics of a run.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Metrics {
+    /// Closest approach of any two airplanes; none if no two came near each other.
+    pub min_separation_m: Option<f64>,
+    /// How often two airplanes have come nearer than their separation.
+    pub losses_of_separation: u64,
+    /// Seconds that pairs spent nearer than their separation.
+    pub lost_s: f64,
+    /// Airplanes that have reached their last way-point.
+    pub arrived: u64,
+    /// All airplanes.
+    pub airplanes: u64,
+    /// Mean over those that have arrived: time beyond what the flight takes alone, percent of
+    /// that. Those whose flight alone would never end are left out.
+    pub mean_delay_percent: Option<f64>,
+    /// Messages between agents, or migrations of a coordinator; none where one process decides
+    /// for all.
+    pub messages: u64,
+    /// Bytes of those messages.
+    pub bytes: u64,
+    /// Messages, if one could reach all of a group,
+    pub multicasts: u64,
+    /// and their bytes.
+    pub multicast_bytes: u64,
+    /// Optimizations run.
+    pub optimisations: u64,
+    /// Their rounds on average.
+    pub rounds_mean: Option<f64>,
+    /// Optimizations whose rounds ran out.
+    pub unconverged: u64,
+    /// Processor time spent deciding in this process's run, all workers together.
+    pub optimise_cpu_s: f64,
+    /// Times that the shield changed what an airplane wanted,
+    pub shield_overrides: u64,
+    /// of these, falls back to an orbit for one `dt`,
+    pub shield_orbits: u64,
+    /// and of these, since not everybody had agreed in time.
+    pub shield_held_back: u64,
+    /// Times that an airplane lost contact with another one.
+    pub contacts_lost: u64,
+    /// Times that an airplane's agent ran out of time.
+    pub deadlines_missed: u64,
+    /// Times that a group was too large to be optimized.
+    pub groups_too_large: u64,
+    /// Airplanes that were removed before they had arrived.
+    pub left: u64,
+    /// Airplanes that arrived at the end of their recorded way, which nobody changed.
+    pub replayed: u64,
+    /// Orders carried out.
+    pub orders: u64,
+    /// Times that an order waited for the next `dt`, because no orbit was apart from those of others.
+    pub orders_delayed: u64,
+    /// Pairs for which the shield promises nothing.
+    pub too_close: Vec<TooClose>,
+}
+
+/// Two airplanes that were too near each other for the shield when the later one came in.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct TooClose {
+    /// When that was, seconds after the start.
+    pub at_s: f64,
+    /// The two.
+    pub airplanes: [EntityId; 2],
+}
+
+/// What came of one airplane.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct AirplaneMetrics {
+    /// Its id.
+    pub airplane: EntityId,
+    /// Seconds from its appearance to its arrival, if it has arrived; of a recorded one, from
+    /// when it was handed over.
+    pub flown_s: Option<f64>,
+    /// Seconds that the flight takes alone; 0 where it flew its recorded way to the end, infinite
+    /// where it would never end.
+    pub alone_s: f64,
+    /// Time beyond that, percent of it.
+    pub delay_percent: Option<f64>,
+    /// Times that the shield changed what it wanted,
+    pub shield_overrides: u32,
+    /// of these, falls back to its orbit.
+    pub shield_orbits: u32,
+    /// Whether it was removed before it had arrived.
+    pub left: bool,
+    /// Orders carried out.
+    pub orders: u16,
+    /// Times that one had to wait for the next `dt`.
+    pub orders_delayed: u16,
+}
+
+/// What came of two airplanes that came near each other.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct PairMetrics {
+    /// Their ids.
+    pub airplanes: [EntityId; 2],
+    /// Closest approach.
+    pub nearest_m: f64,
+    /// How often they have come nearer than their separation,
+    pub losses: u32,
+    /// seconds spent so,
+    pub lost_s: f64,
+    /// and the part of the separation that was lost at most, from 0 to 1.
+    pub severity: f64,
+}
+
+impl AirplaneMetrics {
+    /// Seconds beyond what the flight takes alone; none where alone it would never end.
+    pub(super) fn delay_s(&self) -> Option<f64> {
+        self.flown_s.map(|flown_s| flown_s - self.alone_s).filter(|delay_s| delay_s.is_finite())
+    }
+}
+
+impl AirspaceWorld {
+    /// Metrics of one airplane.
+    pub fn airplane_metrics(&self, state: &AirspaceState, id: EntityId) -> AirplaneMetrics {
+        let (cell, alone_s) = (&state.airplanes[id as usize], self.alone_s[id as usize]);
+        let joined_s = self.starts_s(self.joins_in(id as usize));
+        let arrived_s = cell.arrived_step().map(|step| step as f64 * self.timing.dtau_s);
+        let flown_s = arrived_s.map(|s| s - joined_s).filter(|_| !self.is_replayed_to_the_end(id));
+        AirplaneMetrics {
+            airplane: id,
+            flown_s,
+            alone_s,
+            delay_percent: flown_s
+                .filter(|_| alone_s > 0.0 && alone_s.is_finite())
+                .map(|s| 100.0 * (s - alone_s) / alone_s),
+            shield_overrides: cell.overrides.get(),
+            shield_orbits: cell.orbits.get(),
+            left: cell.has_left(),
+            orders: cell.orders.get(),
+            orders_delayed: cell.waits.get(),
+        }
+    }
+
+    fn is_replayed_to_the_end(&self, id: EntityId) -> bool {
+        let joined_s = self.starts_s(self.joins_in(id as usize));
+        let track = &self.airplanes[id as usize].track;
+        track.as_ref().is_some_and(|track| track.ends_s() <= joined_s)
+    }
+
+    /// Metrics of all pairs that came near each other, by ids.
+    pub fn pair_metrics(&self, ledger: &Ledger) -> Vec<PairMetrics> {
+        let separation_m = |id: EntityId| self.airplanes[id as usize].model.separation_m;
+        let one = |(&(a, b), record): (&(EntityId, EntityId), &PairRecord)| PairMetrics {
+            airplanes: [a, b],
+            nearest_m: record.nearest_m,
+            losses: record.losses,
+            lost_s: self.lost_s(record.lost_looks),
+            severity: (1.0 - record.nearest_m / separation_m(a).max(separation_m(b))).max(0.0),
+        };
+        ledger.pairs.iter().map(one).collect()
+    }
+
+    fn lost_s(&self, looks: u64) -> f64 {
+        looks as f64 * self.timing.dtau_s / LOOKS_PER_STEP as f64
+    }
+
+    /// Metrics of a run so far; `decide_s` is the time spent deciding.
+    pub fn metrics(&self, state: &AirspaceState, ledger: &Ledger, decide_s: f64) -> Metrics {
+        let all = (0..self.airplanes.len() as EntityId).map(|id| self.airplane_metrics(state, id));
+        let all: Vec<AirplaneMetrics> = all.collect();
+        let delays: Vec<f64> = all.iter().filter_map(|a| a.delay_percent).collect();
+        let count =
+            |is: &dyn Fn(&Cell) -> bool| state.airplanes.iter().filter(|c| is(c)).count() as u64;
+        let ended =
+            |a: &&AirplaneMetrics| state.airplanes[a.airplane as usize].arrived_step().is_some();
+        let replayed = all.iter().filter(ended).filter(|a| self.is_replayed_to_the_end(a.airplane));
+        let mean = |sum: f64, n: usize| (n > 0).then(|| sum / n as f64);
+        let nearest = ledger.pairs.values().map(|r| r.nearest_m).min_by(f64::total_cmp);
+        let looks: u64 = ledger.pairs.values().map(|r| r.lost_looks).sum();
+        let Effort { optimizations: optimisations, rounds, unconverged, traffic } = ledger.effort;
+        Metrics {
+            min_separation_m: nearest,
+            losses_of_separation: ledger.pairs.values().map(|r| u64::from(r.losses)).sum(),
+            lost_s: self.lost_s(looks),
+            arrived: count(&|cell| cell.arrived_step().is_some()),
+            airplanes: all.len() as u64,
+            mean_delay_percent: mean(delays.iter().sum(), delays.len()),
+            messages: traffic.messages,
+            bytes: traffic.bytes,
+            multicasts: traffic.multicasts,
+            multicast_bytes: traffic.multicast_bytes,
+            optimisations,
+            rounds_mean: mean(rounds as f64, optimisations as usize),
+            unconverged,
+            optimise_cpu_s: decide_s,
+            shield_overrides: all.iter().map(|a| u64::from(a.shield_overrides)).sum(),
+            shield_orbits: all.iter().map(|a| u64::from(a.shield_orbits)).sum(),
+            shield_held_back: ledger.count(EventKind::HeldBack),
+            contacts_lost: ledger.count(EventKind::Unheard),
+            deadlines_missed: ledger.count(EventKind::Deadline),
+            groups_too_large: ledger.count(EventKind::GroupTooLarge),
+            left: count(&Cell::has_left),
+            replayed: replayed.count() as u64,
+            orders: all.iter().map(|a| u64::from(a.orders)).sum(),
+            orders_delayed: all.iter().map(|a| u64::from(a.orders_delayed)).sum(),
+            too_close: ledger.too_close.iter().map(|pair| self.too_close(pair)).collect(),
+        }
+    }
+
+    fn too_close(&self, &(cycle, a, b): &(Cycle, EntityId, EntityId)) -> TooClose {
+        TooClose { at_s: self.starts_s(cycle), airplanes: [a, b] }
+    }
+
+    /// Whether everybody has arrived or left by now.
+    pub fn is_over(&self, state: &AirspaceState) -> bool {
+        state.airplanes.iter().all(|cell| !cell.is_flying())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::simulation::AirspaceSimulation;
+    use sidestep_kernel::Simulation;
+    use sidestep_scenario::Source;
+
+    /// Alone, the first is told to keep a heading before it comes to its way-point. In traffic an
+    /// order may have to wait, and so it may arrive after all.
+    #[test]
+    fn a_flight_that_alone_would_never_end_has_no_delay() {
+        let text = "format = 1\nworld = \"airspace\"\n\
+                    [[airplanes]]\nat_m = [0, 0]\nheading_deg = 0\nway_points_m = [[700, 0]]\n\
+                    orders = [{ at_s = 5.0, heading_deg = 0.0 }]\n\
+                    [[airplanes]]\nat_m = [0, 9000]\nheading_deg = 0\nway_points_m = [[700, 9000]]\n";
+        let source = Source::new("n", text, "");
+        let mut run = AirspaceSimulation::new(&source, 1).expect("a scenario");
+        run.advance(30);
+        let world = run.world();
+        assert_eq!(world.alone_s[0], f64::INFINITY);
+        run.state().airplanes[0].arrived.set(20);
+        let first = world.airplane_metrics(run.state(), 0);
+        assert_eq!((first.flown_s, first.delay_s(), first.delay_percent), (Some(20.0), None, None));
+        let metrics = run.airspace_metrics();
+        assert!(metrics.mean_delay_percent.is_some_and(f64::is_finite), "{metrics:?}");
+    }
+}

@@ -1,0 +1,395 @@
+//! The objective of the paper (eq. 8 to 11): separation against deviation.
+//!
+//! ```text
+//! G(x)       = sum_{i != j} Gcol_i(x_i, x_j) + alpha sum_i Gdev_i(x_i)                (8, 9, 10)
+//! Gcol_i     = sum_k beta^(k-1) max(R_i - |f_i(x_i, k) - f_j(x_j, k)|, 0)^2           (9)
+//! Gdev_i     = |f_i(x_i, kmax) - f_i(x_i_opt, kmax)|^2                                (10)
+//! ```
+
+use super::airplane::{Point, Prediction};
+use super::levels::Levels;
+use serde::{Deserialize, Serialize};
+use sidestep_collectives::PairwiseGame;
+
+/// What is weighed against what.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Objective {
+    /// Weight of deviations from the optimal way.
+    pub alpha: f64,
+    /// Factor on penalties per step into the future, in (0, 1].
+    pub beta: f64,
+    /// Factor on separations in the objective: above 1, some margin is asked for.
+    pub inflation: f64,
+    /// Whether steps after either has arrived do not count.
+    pub mask: bool,
+    /// Airplanes at least this far above each other cost each other nothing.
+    pub vertical_m: f64,
+}
+
+impl Objective {
+    /// `Gcol_i` and `Gcol_j` of two predictions, for separations `r` of `i` and `j` (eq. 9):
+    /// slice by slice of time, so that whoever knows slices apart comes to the same bits.
+    pub fn collision(&self, a: &Prediction, b: &Prediction, r: [f64; 2]) -> [f64; 2] {
+        let counted = |way: &Prediction| if self.mask { way.counted } else { way.points.len() };
+        let most = counted(a).min(counted(b));
+        let (mut sums, mut weight) = ([0.0; 2], 1.0);
+        let slices = a.points[..most].chunks(SLICE).zip(b.points[..most].chunks(SLICE));
+        for (of_a, of_b) in slices {
+            let parts = self.slice_collision(of_a, of_b, weight, r);
+            (0..2).for_each(|k| sums[k] += parts[k]);
+            weight = self.aged(weight);
+        }
+        sums
+    }
+
+    /// The same over the points of one slice, of which the first weighs `weight`.
+    fn slice_collision(&self, a: &[Point], b: &[Point], mut weight: f64, r: [f64; 2]) -> [f64; 2] {
+        let [ra, rb] = r.map(|r| r * self.inflation);
+        let widest = ra.max(rb) * ra.max(rb);
+        let mut sums = [0.0; 2];
+        for (p, q) in a.iter().zip(b) {
+            let (dx, dy) = (p[0] - q[0], p[1] - q[1]);
+            let square = dx * dx + dy * dy;
+            if square < widest {
+                let d = square.sqrt();
+                let miss = |r: f64| (r - d).max(0.0);
+                sums[0] += weight * miss(ra) * miss(ra);
+                sums[1] += weight * miss(rb) * miss(rb);
+            }
+            weight *= self.beta;
+        }
+        sums
+    }
+
+    /// What the first point of a slice weighs if that of the slice before weighs `weight`.
+    fn aged(&self, weight: f64) -> f64 {
+        (0..SLICE).fold(weight, |weight, _| weight * self.beta)
+    }
+
+    /// `Gdev_i`, from the ends of a prediction and of the optimal one (eq. 10).
+    pub fn deviation(&self, of: &Prediction, optimal: &Prediction) -> f64 {
+        match (of.points.last(), optimal.points.last()) {
+            (Some(p), Some(q)) => {
+                let (dx, dy) = (p[0] - q[0], p[1] - q[1]);
+                dx * dx + dy * dy
+            }
+            _ => 0.0,
+        }
+    }
+}
+
+/// Points of a slice of time. Within a slice ways move little, so bounds around it are tight.
+const SLICE: usize = 16;
+
+/// An airplane's predictions, one per action, the optimal action last.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// One prediction per action.
+    pub predictions: Vec<Prediction>,
+    /// Separation asked for.
+    pub separation_m: f64,
+    /// The levels it takes.
+    pub levels: Levels,
+    slices: Vec<Slice>,
+}
+
+impl Options {
+    /// Options with their slices.
+    pub fn new(predictions: Vec<Prediction>, separation_m: f64, levels: Levels) -> Self {
+        let longest = predictions.iter().map(|p| p.points.len()).max().unwrap_or(0);
+        let slices = (0..longest).step_by(SLICE).map(|from| Slice::new(&predictions, from));
+        let slices = slices.collect();
+        Self { predictions, separation_m, levels, slices }
+    }
+
+    fn piece(&self, piece: &Piece, from: usize, mask: bool) -> &[Point] {
+        let way = &self.predictions[piece.actions[0]];
+        let end = if mask { piece.counted } else { way.points.len().min(from + SLICE) };
+        &way.points[from.min(end)..end]
+    }
+}
+
+/// What all actions of an airplane come to in one slice of time.
+#[derive(Debug, Clone)]
+struct Slice {
+    pieces: Vec<Piece>,
+    /// Around all of them.
+    all: Bounds,
+}
+
+/// Points of a slice that some actions share: those that turn alike differ only later.
+#[derive(Debug, Clone)]
+struct Piece {
+    /// The actions, at least one.
+    actions: Vec<usize>,
+    /// Point of the prediction at which the counted part of the slice ends.
+    counted: usize,
+    bounds: Bounds,
+}
+
+impl Slice {
+    fn new(predictions: &[Prediction], from: usize) -> Self {
+        let mut pieces: Vec<Piece> = Vec::new();
+        for (action, way) in predictions.iter().enumerate() {
+            let end = way.points.len().min(from + SLICE);
+            let points = &way.points[from.min(end)..end];
+            let counted = way.counted.clamp(from.min(end), end);
+            // Most ways that differ do so at the end.
+            let is_alike = |piece: &&mut Piece| {
+                let other = &predictions[piece.actions[0]].points;
+                let other = &other[from.min(other.len())..other.len().min(from + SLICE)];
+                piece.counted == counted && points.last() == other.last() && points == other
+            };
+            match pieces.iter_mut().find(is_alike) {
+                Some(piece) => piece.actions.push(action),
+                None => {
+                    let bounds = Bounds::of(points);
+                    pieces.push(Piece { actions: vec![action], counted, bounds });
+                }
+            }
+        }
+        let corners: Vec<Point> =
+            pieces.iter().flat_map(|p| [p.bounds.low, p.bounds.high]).collect();
+        Self { pieces, all: Bounds::of(&corners) }
+    }
+}
+
+/// The smallest upright rectangle around some points.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Bounds {
+    low: Point,
+    high: Point,
+}
+
+impl Bounds {
+    fn of(points: &[Point]) -> Self {
+        let start = Self { low: [f64::INFINITY; 2], high: [f64::NEG_INFINITY; 2] };
+        points.iter().fold(start, |b, p| Self {
+            low: [b.low[0].min(p[0]), b.low[1].min(p[1])],
+            high: [b.high[0].max(p[0]), b.high[1].max(p[1])],
+        })
+    }
+
+    fn is_within(&self, other: &Self, gap_m: f64) -> bool {
+        (0..2).all(|k| self.low[k] - gap_m <= other.high[k] && other.low[k] - gap_m <= self.high[k])
+    }
+}
+
+/// The objective of a group as a game: players are airplanes, strategies actions, and
+/// `G = sum own + sum pairs` with `own_i = alpha Gdev_i` and `pair_ij = Gcol_i + Gcol_j`.
+///
+/// All that does not change during an optimization is computed here, once.
+pub fn game(objective: &Objective, group: &[Options]) -> PairwiseGame {
+    let own = group.iter().map(|options| own_costs(objective, options)).collect();
+    let mut game = PairwiseGame::new(own);
+    for (i, a) in group.iter().enumerate() {
+        for (j, b) in group.iter().enumerate().skip(i + 1) {
+            couple(&mut game, objective, (i, a), (j, b));
+        }
+    }
+    game
+}
+
+/// `alpha Gdev` of every action.
+pub(super) fn own_costs(objective: &Objective, options: &Options) -> Vec<f64> {
+    let optimal = options.predictions.last().expect("every airplane has an optimal action");
+    let deviation = |p: &Prediction| objective.alpha * objective.deviation(p, optimal);
+    options.predictions.iter().map(deviation).collect()
+}
+
+/// Adds what two airplanes cost each other to a game, if anything.
+pub(super) fn couple(
+    game: &mut PairwiseGame,
+    objective: &Objective,
+    (i, a): (usize, &Options),
+    (j, b): (usize, &Options),
+) {
+    if a.levels.meets(&b.levels, objective.vertical_m)
+        && let Some(costs) = pair_costs(objective, a, b)
+    {
+        game.add_pair_in_parts(i, j, costs);
+    }
+}
+
+/// `Gcol` of both for every two actions, if any two cost anything. Most slices of ways never
+/// come near each other, and what several actions share is computed once.
+fn pair_costs(objective: &Objective, a: &Options, b: &Options) -> Option<Vec<[f64; 2]>> {
+    let r = [a.separation_m, b.separation_m];
+    // A hair more, so that no rounding of bounds leaves out what costs anything.
+    let gap_m = objective.inflation * r[0].max(r[1]) * (1.0 + 1e-9);
+    let columns = b.predictions.len();
+    let mut costs = None;
+    let mut weight = 1.0;
+    for (k, (of_a, of_b)) in a.slices.iter().zip(&b.slices).enumerate() {
+        let near = |p: &&Piece| p.bounds.is_within(&of_b.all, gap_m);
+        let rows = of_a.pieces.iter().filter(|_| of_a.all.is_within(&of_b.all, gap_m));
+        for p in rows.filter(near) {
+            let of_p = a.piece(p, k * SLICE, objective.mask);
+            for q in of_b.pieces.iter().filter(|q| p.bounds.is_within(&q.bounds, gap_m)) {
+                let of_q = b.piece(q, k * SLICE, objective.mask);
+                let parts = objective.slice_collision(of_p, of_q, weight, r);
+                if parts != [0.0; 2] {
+                    let costs =
+                        costs.get_or_insert_with(|| vec![[0.0; 2]; a.predictions.len() * columns]);
+                    add_to_all(costs, columns, (&p.actions, &q.actions), parts);
+                }
+            }
+        }
+        weight = objective.aged(weight);
+    }
+    costs
+}
+
+/// Adds `parts` for every two of some actions.
+fn add_to_all(
+    costs: &mut [[f64; 2]],
+    columns: usize,
+    (rows, others): (&[usize], &[usize]),
+    parts: [f64; 2],
+) {
+    for row in rows {
+        for other in others {
+            let sums = &mut costs[row * columns + other];
+            (0..2).for_each(|k| sums[k] += parts[k]);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::airplane::{Action, After, Model, Passing, Pilot, Pose, Timing};
+    use super::*;
+    use serde_json::Value;
+    use sidestep_collectives::Game;
+
+    /// Independent numbers of the shared data, to 1e-9 relative.
+    #[test]
+    fn the_objective_and_its_parts_are_those_of_the_oracle() {
+        let root = sidestep_testing::root().join("..");
+        let path = root.join("shared/data/oracle/collectives_cases.json");
+        let Ok(text) = std::fs::read_to_string(&path) else {
+            println!("skipped: {} is not there", path.display());
+            return;
+        };
+        let cases: Vec<Value> = serde_json::from_str(&text).expect("JSON");
+        assert_eq!(cases.len(), 5);
+        cases.iter().for_each(check);
+    }
+
+    fn near(found: f64, expected: &Value, what: &str) {
+        let expected = expected.as_f64().expect(what);
+        let error = (found - expected).abs();
+        assert!(error <= 1e-9 * expected.abs().max(1e-3), "{what}: {found} is not {expected}");
+    }
+
+    fn point(value: &Value) -> Point {
+        [value[0].as_f64().expect("x"), value[1].as_f64().expect("y")]
+    }
+
+    fn check(case: &Value) {
+        let name = case["name"].as_str().expect("a name");
+        let params = &case["params"];
+        let number = |key: &str| params[key].as_f64().expect("a number");
+        let timing =
+            Timing { dt_s: number("dt"), dtau_s: number("dtau"), horizon: number("kmax") as usize };
+        let objective = Objective {
+            alpha: number("alpha"),
+            beta: number("beta"),
+            inflation: 1.0,
+            mask: params["mask"] == true,
+            vertical_m: 1.0,
+        };
+        let after = if params["after"] == "pursue" { After::Pursue } else { After::Straight };
+        let passing = Passing { tolerance_m: number("tol"), passes: false };
+        let expected = &case["expected"];
+        let mut predictions = Vec::new();
+        let planes = case["planes"].as_array().expect("planes");
+        let actions = case["actions"].as_array().expect("actions");
+        for (i, (plane, action)) in planes.iter().zip(actions).enumerate() {
+            let number = |key: &str| plane[key].as_f64().expect("a number");
+            let model = Model {
+                v_m_s: number("v"),
+                omega_max_rad_s: number("omega_max"),
+                separation_m: number("R"),
+                turns: 5,
+            };
+            let mission: Vec<Point> =
+                plane["wps"].as_array().expect("way-points").iter().map(point).collect();
+            let pilot =
+                Pilot { model: &model, mission: &mission, passing, after, dtau_s: timing.dtau_s };
+            let pose = Pose { at: [number("x"), number("y")], psi_rad: number("psi") };
+            let chosen = match action["omega"].as_f64() {
+                None => Action::Proceed,
+                Some(omega_rad_s) if action["g"] == 0 => Action::Hold { omega_rad_s },
+                Some(omega_rad_s) => Action::Then { omega_rad_s, hold_s: timing.dt_s },
+            };
+            let optimal = pilot.predict(Action::Proceed, pose, 0, &timing);
+            let prediction = pilot.predict(chosen, pose, 0, &timing);
+            for (key, k) in [("f_k1", 0), ("f_k10", 9), ("f_kmax", timing.horizon - 1)] {
+                (0..2).for_each(|c| near(prediction.points[k][c], &expected[key][i][c], name));
+            }
+            assert_eq!(expected["ka"][i].as_u64(), Some(prediction.counted as u64), "{name}");
+            near(objective.deviation(&prediction, &optimal), &expected["G_dev_i"][i], name);
+            predictions.push((prediction, optimal, model.separation_m));
+        }
+        let mut total = [0.0; 2];
+        for (i, (a, optimal, ra)) in predictions.iter().enumerate() {
+            let mut own = objective.alpha * objective.deviation(a, optimal);
+            total[1] += objective.deviation(a, optimal);
+            for (j, (b, _, rb)) in predictions.iter().enumerate().filter(|(j, _)| *j != i) {
+                let [of_a, _] = objective.collision(a, b, [*ra, *rb]);
+                near(of_a, &expected["G_col_ij"][i][j], name);
+                own += of_a;
+                total[0] += of_a;
+            }
+            near(own, &expected["G_i"][i], name);
+        }
+        near(total[0], &expected["G_col"], name);
+        near(total[1], &expected["G_dev"], name);
+        near(total[0] + objective.alpha * total[1], &expected["G"], name);
+        let options: Vec<Options> = predictions
+            .iter()
+            .map(|(p, optimal, r)| {
+                Options::new(vec![p.clone(), optimal.clone()], *r, Levels::at(0.0))
+            })
+            .collect();
+        let game = game(&objective, &options);
+        near(game.cost(&vec![0; options.len()]), &expected["G"], name);
+    }
+
+    /// What slices, bounds and shared pieces leave out is what costs nothing, to the bit.
+    #[test]
+    fn tables_hold_what_two_predictions_cost_to_the_bit() {
+        use super::super::airplane::{Legs, actions};
+        let model = Model { v_m_s: 35.0, omega_max_rad_s: 0.07, separation_m: 500.0, turns: 5 };
+        let timing = Timing { dt_s: 5.0, dtau_s: 1.0, horizon: 90 };
+        let passing = Passing { tolerance_m: 100.0, passes: true };
+        let all = [Legs::default(), Legs::usual()].map(|legs| actions(&model, 5.0, &[], &legs));
+        let mut meetings = 0;
+        for (k, mask) in (0..12).flat_map(|k| [(k, true), (k, false)]) {
+            let options = [0.0, 1.0].map(|side| {
+                let angle = side * 0.5 * f64::from(k);
+                let pose = Pose { at: [900.0 * side, 700.0 * side], psi_rad: angle + 3.0 * side };
+                let mission = [[2000.0 - 2500.0 * side, 300.0]];
+                let after = After::Straight;
+                let pilot = Pilot { model: &model, mission: &mission, passing, after, dtau_s: 1.0 };
+                let predict = |action: &Action| pilot.predict(*action, pose, 0, &timing);
+                let ways = all[k as usize % 2].iter().map(predict).collect();
+                Options::new(ways, model.separation_m * (1.0 - 0.1 * side), Levels::at(0.0))
+            });
+            let [a, b] = &options;
+            let objective =
+                Objective { alpha: 1.0, beta: 0.995, inflation: 1.05, mask, vertical_m: 300.0 };
+            let free = vec![[0.0; 2]; a.predictions.len() * b.predictions.len()];
+            let table = pair_costs(&objective, a, b).unwrap_or(free);
+            let pairs =
+                a.predictions.iter().flat_map(|p| b.predictions.iter().map(move |q| (p, q)));
+            let r = [a.separation_m, b.separation_m];
+            for ((p, q), found) in pairs.zip(&table) {
+                assert_eq!(*found, objective.collision(p, q, r));
+                meetings += usize::from(*found != [0.0; 2]);
+            }
+        }
+        assert!(meetings > 500, "{meetings}");
+    }
+}

@@ -1,0 +1,257 @@
+//! Corridors: straight and bent legs between two walls (slides E2, N6).
+
+use super::Pose;
+use crate::geometry::Point;
+use crate::obstacle::Obstacle;
+use sidestep_kernel::InputError;
+use sidestep_kernel::math::{cos, sin};
+
+/// About how long a piece of wall is: bends are polygons of such pieces.
+pub const WALL_PIECE_M: f64 = 0.16;
+/// Longer corridors are taken for a mistake.
+const MAX_LENGTH_M: f64 = 1e6;
+
+/// A part of a corridor's center line.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Leg {
+    /// Straight on.
+    Straight {
+        /// How far.
+        length_m: f64,
+    },
+    /// Along an arc of a circle.
+    Bend {
+        /// The circle's radius.
+        radius_m: f64,
+        /// How far around, positive to the left.
+        turn_deg: f64,
+    },
+}
+
+impl Leg {
+    /// Length of the center line, and how far it turns to the left.
+    fn measures(self) -> (f64, f64) {
+        match self {
+            Self::Straight { length_m } => (length_m, 0.0),
+            Self::Bend { radius_m, turn_deg } => {
+                let turn_rad = turn_deg.to_radians();
+                (radius_m * turn_rad.abs(), turn_rad)
+            }
+        }
+    }
+
+    /// What is wrong with it.
+    fn fault(self) -> Option<String> {
+        let is_good = |x: f64| x > 0.0 && x <= MAX_LENGTH_M;
+        let is_good_turn = |deg: f64| deg != 0.0 && deg.abs() <= 3600.0;
+        match self {
+            Self::Straight { length_m } if !is_good(length_m) => {
+                Some(format!("has a length of {length_m} m"))
+            }
+            Self::Bend { radius_m, .. } if !is_good(radius_m) => {
+                Some(format!("has a radius of {radius_m} m"))
+            }
+            Self::Bend { turn_deg, .. } if !is_good_turn(turn_deg) => {
+                Some(format!("turns by {turn_deg} degrees"))
+            }
+            _ => None,
+        }
+    }
+}
+
+/// Legs one after the other, from the origin along the first axis, with a wall on each side.
+/// Both ends are open.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Corridor {
+    legs: Vec<Leg>,
+    width_m: f64,
+}
+
+impl Corridor {
+    /// A corridor of a width. Where a bend's radius is less than half the width, its inner wall
+    /// crosses itself.
+    ///
+    /// # Errors
+    /// No leg; a length, radius, turn or width that is not positive (a turn: not 0) or absurd.
+    pub fn new(legs: Vec<Leg>, width_m: f64) -> Result<Self, InputError> {
+        let fault = |place: String, cause: String| {
+            Err(InputError::new(place, cause, "give it in meters above 0, turns in degrees"))
+        };
+        if !(width_m > 0.0 && width_m <= MAX_LENGTH_M) {
+            return fault("corridor".into(), format!("has a width of {width_m} m"));
+        }
+        if legs.is_empty() {
+            return fault("corridor".into(), "has no leg".into());
+        }
+        for (k, leg) in legs.iter().enumerate() {
+            if let Some(cause) = leg.fault() {
+                return fault(format!("corridor, leg {k}"), cause);
+            }
+        }
+        let corridor = Self { legs, width_m };
+        match corridor.length_m() {
+            length_m if length_m <= MAX_LENGTH_M => Ok(corridor),
+            length_m => fault("corridor".into(), format!("is {length_m} m long")),
+        }
+    }
+
+    /// The corridor of the measurements: 14 m straight, 90 degrees left (radius 2 m), 90 right
+    /// (1.5), a U-turn (1.6), an S of 60, 120 and 60 degrees (1.3), a U-turn (2), 8 m straight.
+    ///
+    /// # Errors
+    /// A width that is not positive.
+    pub fn pinned(width_m: f64) -> Result<Self, InputError> {
+        let bend = |radius_m, turn_deg| Leg::Bend { radius_m, turn_deg };
+        let legs = vec![
+            Leg::Straight { length_m: 14.0 },
+            bend(2.0, 90.0),
+            bend(1.5, -90.0),
+            bend(1.6, 180.0),
+            bend(1.3, 60.0),
+            bend(1.3, -120.0),
+            bend(1.3, 60.0),
+            bend(2.0, -180.0),
+            Leg::Straight { length_m: 8.0 },
+        ];
+        Self::new(legs, width_m)
+    }
+
+    /// Its legs.
+    pub fn legs(&self) -> &[Leg] {
+        &self.legs
+    }
+
+    /// From wall to wall.
+    pub fn width_m(&self) -> f64 {
+        self.width_m
+    }
+
+    /// Length of the center line.
+    pub fn length_m(&self) -> f64 {
+        self.legs.iter().map(|leg| leg.measures().0).sum()
+    }
+
+    /// Poses along the center line, from its start to its end, at most `step_m` apart; the ends
+    /// of legs are among them.
+    ///
+    /// # Panics
+    /// Where `step_m` is not positive.
+    pub fn line(&self, step_m: f64) -> Vec<Pose> {
+        assert!(step_m > 0.0, "poses lie apart");
+        let mut line = vec![Pose { at: [0.0; 2], heading_rad: 0.0 }];
+        for leg in &self.legs {
+            let (length_m, turn_rad) = leg.measures();
+            let n = (length_m / step_m).ceil();
+            let (ds_m, turn_rad) = (length_m / n, turn_rad / n);
+            for _ in 0..n as usize {
+                let Pose { at: [x, y], heading_rad } = line[line.len() - 1];
+                let middle_rad = heading_rad + 0.5 * turn_rad;
+                line.push(Pose {
+                    at: [x + ds_m * cos(middle_rad), y + ds_m * sin(middle_rad)],
+                    heading_rad: heading_rad + turn_rad,
+                });
+            }
+        }
+        line
+    }
+
+    /// Its walls, without thickness, in pieces of about [`WALL_PIECE_M`]: first the right one,
+    /// then the left one, numbered on from `first_id` in the direction of the corridor.
+    pub fn walls(&self, first_id: u32) -> Vec<Obstacle<2>> {
+        let line = self.line(WALL_PIECE_M);
+        let sides = [-1.0, 1.0].map(|side| line.windows(2).map(move |piece| (side, piece)));
+        (first_id..)
+            .zip(sides.into_iter().flatten())
+            .map(|(id, (side, piece))| {
+                Obstacle::capsule(id, [0, 1].map(|k| self.beside(piece[k], side)), 0.0)
+            })
+            .collect()
+    }
+
+    /// The point of a wall beside a pose; `side` is 1 to the left, -1 to the right.
+    fn beside(&self, Pose { at: [x, y], heading_rad }: Pose, side: f64) -> Point<2> {
+        let half_m = 0.5 * self.width_m;
+        [x - side * half_m * sin(heading_rad), y + side * half_m * cos(heading_rad)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Core, distance};
+    use crate::obstacle::Obstacles;
+    use proptest::prelude::*;
+
+    fn leg() -> impl Strategy<Value = Leg> {
+        prop_oneof![
+            (0.1..5.0f64).prop_map(|length_m| Leg::Straight { length_m }),
+            (1.0..3.0f64, prop_oneof![-180.0..-10.0f64, 10.0..180.0f64])
+                .prop_map(|(radius_m, turn_deg)| Leg::Bend { radius_m, turn_deg }),
+        ]
+    }
+
+    proptest! {
+        #[test]
+        fn the_line_is_as_long_as_its_legs_and_turns_as_they_do(
+            legs in prop::collection::vec(leg(), 1..8), step_m in 0.02..0.3f64,
+        ) {
+            let corridor = Corridor::new(legs.clone(), 1.0).unwrap();
+            let line = corridor.line(step_m);
+            let way_m: f64 = line.windows(2).map(|w| distance(w[0].at, w[1].at)).sum();
+            prop_assert!((way_m - corridor.length_m()).abs() < 1e-9);
+            prop_assert!(line.windows(2).all(|w| distance(w[0].at, w[1].at) <= step_m + 1e-12));
+            let turns = legs.iter().map(|leg| match leg {
+                Leg::Straight { .. } => 0.0,
+                Leg::Bend { turn_deg, .. } => turn_deg.to_radians(),
+            });
+            prop_assert!((line[line.len() - 1].heading_rad - turns.sum::<f64>()).abs() < 1e-9);
+        }
+
+        #[test]
+        fn a_bend_ends_where_its_circle_says(radius_m in 0.5..5.0f64, turn_deg in 5.0..180.0f64) {
+            let corridor = Corridor::new(vec![Leg::Bend { radius_m, turn_deg }], 1.0).unwrap();
+            let line = corridor.line(0.01 * radius_m);
+            let turn_rad = turn_deg.to_radians();
+            let end = [radius_m * sin(turn_rad), radius_m * (1.0 - cos(turn_rad))];
+            prop_assert!(distance(line[line.len() - 1].at, end) < 1e-4 * radius_m);
+        }
+    }
+
+    #[test]
+    fn walls_are_half_a_width_beside_the_line_and_closed() {
+        let corridor = Corridor::pinned(2.0).unwrap();
+        let walls = corridor.walls(7);
+        assert_eq!(walls.len(), 2 * (corridor.line(WALL_PIECE_M).len() - 1));
+        assert!((7..).zip(&walls).all(|(id, wall)| wall.id == id));
+        let ends: Vec<_> = walls
+            .iter()
+            .map(|wall| match wall.core {
+                Core::Segment(ends) => ends,
+                other => panic!("{other:?} is no wall"),
+            })
+            .collect();
+        let breaks = ends.windows(2).filter(|w| w[0][1] != w[1][0]).count();
+        assert_eq!(breaks, 1, "between the right wall and the left one");
+        let all = Obstacles::new(walls, 1.0).unwrap();
+        for pose in corridor.line(0.05) {
+            let clearance_m = all.clearance_m([pose.at; 2], 0.0, 2.0);
+            assert!((clearance_m - 1.0).abs() < 0.01, "{clearance_m} at {:?}", pose.at);
+        }
+    }
+
+    #[test]
+    fn impossible_corridors_are_refused() {
+        let straight = |length_m| vec![Leg::Straight { length_m }];
+        let bend = |radius_m, turn_deg| vec![Leg::Bend { radius_m, turn_deg }];
+        assert!(Corridor::new(Vec::new(), 1.0).is_err());
+        for width_m in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert!(Corridor::new(straight(1.0), width_m).is_err());
+            assert!(Corridor::new(straight(width_m), 1.0).is_err());
+            assert!(Corridor::new(bend(width_m, 90.0), 1.0).is_err());
+        }
+        for turn_deg in [0.0, f64::NAN, f64::INFINITY, 1e9] {
+            assert!(Corridor::new(bend(1.0, turn_deg), 1.0).is_err());
+        }
+        assert!(Corridor::new(straight(9e5).repeat(2), 1.0).is_err());
+    }
+}

@@ -1,0 +1,372 @@
+//! Where what moves is at a time.
+//!
+//! Every course is a closed formula of time: nobody keeps a state, any worker computes any
+//! obstacle at any moment, and a checkpoint needs nothing but the time.
+
+use crate::geometry::{Bounds, Point, between, distance, is_finite, norm, scaled, sub, unit};
+use crate::obstacle::Obstacle;
+use sidestep_kernel::InputError;
+
+/// How something moves.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Course<const D: usize> {
+    /// On and on.
+    Straight {
+        /// How fast, and where to.
+        velocity_m_s: Point<D>,
+    },
+    /// In a room whose sides throw it back: on each axis a triangle wave.
+    Bouncing {
+        /// Its velocity at the beginning.
+        velocity_m_s: Point<D>,
+        /// What it never leaves, with its whole body.
+        room: Bounds<D>,
+    },
+    /// From way point to way point. The middle of the body is at the first one at time 0.
+    Patrol {
+        /// At least two; neighbors lie apart.
+        way_points: Vec<Point<D>>,
+        /// From the last straight to the first again, or back the way it came.
+        closed: bool,
+        /// How fast.
+        speed_m_s: f64,
+    },
+}
+
+/// An obstacle that moves.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mover<const D: usize> {
+    /// What it is, and where it is at time 0 (on a patrol: anywhere).
+    body: Obstacle<D>,
+    course: Course<D>,
+    bounds: Bounds<D>,
+}
+
+impl<const D: usize> Mover<D> {
+    /// A body on a course.
+    ///
+    /// # Errors
+    /// Numbers that are not finite, a course that does not move, a room that the body does not
+    /// fit into or is not in, a patrol of fewer than two way points or with two equal neighbors.
+    pub fn new(body: Obstacle<D>, course: Course<D>) -> Result<Self, InputError> {
+        let mover = Self { bounds: body.bounds(), body, course };
+        match mover.fault() {
+            None => Ok(mover),
+            Some((cause, remedy)) => {
+                Err(InputError::new(format!("moving obstacle {}", mover.body.id), cause, remedy))
+            }
+        }
+    }
+
+    fn fault(&self) -> Option<(&'static str, &'static str)> {
+        let still = ("does not move", "give it a speed, or make it an obstacle that stands still");
+        let moves = |v: &Point<D>| is_finite(v) && norm(*v) > 0.0;
+        match &self.course {
+            Course::Straight { velocity_m_s } => (!moves(velocity_m_s)).then_some(still),
+            Course::Bouncing { velocity_m_s, .. } if !moves(velocity_m_s) => Some(still),
+            Course::Bouncing { room, .. } if !holds(room, &self.bounds) => {
+                Some(("is not in its room", "put it inside, or make the room larger"))
+            }
+            Course::Bouncing { .. } => None,
+            Course::Patrol { speed_m_s, .. } if !(*speed_m_s > 0.0 && speed_m_s.is_finite()) => {
+                Some(still)
+            }
+            Course::Patrol { way_points, .. } => patrol_fault(way_points),
+        }
+    }
+
+    /// The obstacle at a time, with the velocity that it has from then on.
+    pub fn at(&self, t_s: f64) -> Obstacle<D> {
+        let (shift_m, velocity_m_s) = self.motion(t_s);
+        Obstacle { core: self.body.core.shifted(shift_m), velocity_m_s, ..self.body }
+    }
+
+    /// How far the body is from where it was given, and its velocity.
+    fn motion(&self, t_s: f64) -> (Point<D>, Point<D>) {
+        match &self.course {
+            Course::Straight { velocity_m_s } => (scaled(*velocity_m_s, t_s), *velocity_m_s),
+            Course::Bouncing { velocity_m_s, room } => {
+                let axis = |i: usize| {
+                    let (lo_m, hi_m) =
+                        (room.lo[i] - self.bounds.lo[i], room.hi[i] - self.bounds.hi[i]);
+                    bounce([lo_m.min(0.0), hi_m.max(0.0)], velocity_m_s[i], t_s)
+                };
+                let axes: [_; D] = std::array::from_fn(axis);
+                (axes.map(|(shift_m, _)| shift_m), axes.map(|(_, v)| v))
+            }
+            Course::Patrol { way_points, closed, speed_m_s } => {
+                let (at, velocity_m_s) = patrol(way_points, *closed, *speed_m_s, t_s);
+                (sub(at, between(self.bounds.lo, self.bounds.hi, 0.5)), velocity_m_s)
+            }
+        }
+    }
+}
+
+/// Whether a box holds another, but for rounding.
+fn holds<const D: usize>(room: &Bounds<D>, body: &Bounds<D>) -> bool {
+    let slack_m = 1e-9;
+    is_finite(&room.lo)
+        && is_finite(&room.hi)
+        && (0..D).all(|i| room.lo[i] - slack_m <= body.lo[i] && body.hi[i] <= room.hi[i] + slack_m)
+}
+
+fn patrol_fault<const D: usize>(way_points: &[Point<D>]) -> Option<(&'static str, &'static str)> {
+    if way_points.len() < 2 {
+        return Some(("has fewer than two way points", "give at least two"));
+    }
+    if !way_points.iter().all(is_finite) {
+        return Some(("has a way point that is no finite number", "give finite numbers"));
+    }
+    let stays = way_points.windows(2).any(|w| w[0] == w[1]);
+    stays.then_some(("has two equal way points behind each other", "leave one of them out"))
+}
+
+/// A point that starts at 0 and is thrown back at `lo_m` (at most 0) and `hi_m` (at least 0).
+fn bounce([lo_m, hi_m]: [f64; 2], v_m_s: f64, t_s: f64) -> (f64, f64) {
+    if v_m_s < 0.0 {
+        let (x_m, v_m_s) = bounce([-hi_m, -lo_m], -v_m_s, t_s);
+        return (-x_m, -v_m_s);
+    }
+    let span_m = hi_m - lo_m;
+    if span_m <= 0.0 {
+        return (0.0, 0.0);
+    }
+    let (x_m, forward) = there_and_back(v_m_s * t_s - lo_m, span_m);
+    (lo_m + x_m, if forward { v_m_s } else { -v_m_s })
+}
+
+/// How far along a way of `length_m` one is after `way_m` of going to and fro on it, and whether
+/// one goes forward from there.
+fn there_and_back(way_m: f64, length_m: f64) -> (f64, bool) {
+    let m = way_m.rem_euclid(2.0 * length_m);
+    // The remainder may round up to the modulus itself.
+    if m < length_m { (m, true) } else { ((2.0 * length_m - m).max(0.0), false) }
+}
+
+/// Where one is on a patrol, and the velocity.
+fn patrol<const D: usize>(
+    way_points: &[Point<D>],
+    closed: bool,
+    speed_m_s: f64,
+    t_s: f64,
+) -> (Point<D>, Point<D>) {
+    let first = closed.then_some(&way_points[0]);
+    let ends = || way_points.iter().zip(way_points[1..].iter().chain(first));
+    let length_m: f64 = ends().map(|(a, b)| distance(*a, *b)).sum();
+    let (mut left_m, forward) = if closed {
+        ((speed_m_s * t_s).rem_euclid(length_m), true)
+    } else {
+        there_and_back(speed_m_s * t_s, length_m)
+    };
+    let (mut at, mut u) = (way_points[0], [0.0; D]);
+    for (a, b) in ends() {
+        let leg_m = distance(*a, *b);
+        let Some(along) = unit(sub(*b, *a)) else { continue };
+        at = between(*a, *b, (left_m / leg_m).min(1.0));
+        u = along;
+        // At a way point the next leg counts going forward, the one before going back.
+        if left_m < leg_m || (!forward && left_m <= leg_m) {
+            break;
+        }
+        left_m -= leg_m;
+    }
+    (at, scaled(u, if forward { speed_m_s } else { -speed_m_s }))
+}
+
+/// All obstacles of a world that move.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Movers<const D: usize>(Vec<Mover<D>>);
+
+impl<const D: usize> Movers<D> {
+    /// Obstacles that move; sorted by their ids.
+    ///
+    /// # Errors
+    /// Two with one id.
+    pub fn new(mut movers: Vec<Mover<D>>) -> Result<Self, InputError> {
+        movers.sort_by_key(|m| m.body.id);
+        match movers.windows(2).find(|w| w[0].body.id == w[1].body.id) {
+            None => Ok(Self(movers)),
+            Some(w) => Err(InputError::new(
+                format!("moving obstacle {}", w[0].body.id),
+                "is there twice",
+                "give each an id of its own",
+            )),
+        }
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// All of them at a time, by id.
+    pub fn at(&self, t_s: f64) -> impl Iterator<Item = Obstacle<D>> {
+        self.0.iter().map(move |mover| mover.at(t_s))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Core, add};
+    use proptest::prelude::*;
+
+    const ROOM: Bounds<2> = Bounds { lo: [-5.0, -3.0], hi: [6.0, 4.0] };
+
+    fn center<const D: usize>(obstacle: &Obstacle<D>) -> Point<D> {
+        match obstacle.core {
+            Core::Point(c) => c,
+            other => panic!("{other:?} is no ball"),
+        }
+    }
+
+    fn ball(at: Point<2>) -> Obstacle<2> {
+        Obstacle::ball(3, at, 0.5)
+    }
+
+    fn course() -> impl Strategy<Value = Course<2>> {
+        let velocity = || prop::array::uniform2(prop_oneof![-2.0..-0.1f64, 0.1..2.0f64]);
+        let points = prop::collection::vec(prop::array::uniform2(-5.0..5.0f64), 2..6);
+        prop_oneof![
+            velocity().prop_map(|velocity_m_s| Course::Straight { velocity_m_s }),
+            velocity().prop_map(|velocity_m_s| Course::Bouncing { velocity_m_s, room: ROOM }),
+            (points, any::<bool>(), 0.1..2.0f64).prop_map(|(way_points, closed, speed_m_s)| {
+                Course::Patrol { way_points, closed, speed_m_s }
+            }),
+        ]
+    }
+
+    fn speed_m_s(course: &Course<2>) -> f64 {
+        match course {
+            Course::Straight { velocity_m_s } | Course::Bouncing { velocity_m_s, .. } => {
+                norm(*velocity_m_s)
+            }
+            Course::Patrol { speed_m_s, .. } => *speed_m_s,
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn nobody_leaps_or_exceeds_the_speed(
+            course in course(), t_s in 0.0..1e3f64, dt_s in 1e-6..5.0f64,
+        ) {
+            let limit_m_s = speed_m_s(&course);
+            let mover = Mover::new(ball([0.0; 2]), course).unwrap();
+            let (before, after) = (mover.at(t_s), mover.at(t_s + dt_s));
+            let way_m = distance(center(&before), center(&after));
+            prop_assert!(way_m <= limit_m_s * dt_s + 1e-9);
+            prop_assert!((norm(before.velocity_m_s) - limit_m_s).abs() < 1e-9);
+            prop_assert!(before.is_moving());
+        }
+
+        #[test]
+        fn the_velocity_is_the_way_that_follows(course in course(), t_s in 0.0..1e3f64) {
+            let mover = Mover::new(ball([0.0; 2]), course).unwrap();
+            let (now, dt_s) = (mover.at(t_s), 1e-6);
+            let soon = center(&mover.at(t_s + dt_s));
+            let off_m = distance(soon, add(center(&now), scaled(now.velocity_m_s, dt_s)));
+            // A turn within the time is possible, and rare.
+            prop_assert!(off_m < 1e-9 || off_m < 2.0 * dt_s * norm(now.velocity_m_s));
+        }
+
+        #[test]
+        fn bouncing_is_what_small_steps_with_reflections_make(
+            start in prop::array::uniform2(-2.4..3.4f64),
+            velocity_m_s in prop::array::uniform2(-2.0..2.0f64),
+        ) {
+            prop_assume!(norm(velocity_m_s) > 0.1);
+            let mover =
+                Mover::new(ball(start), Course::Bouncing { velocity_m_s, room: ROOM }).unwrap();
+            let (mut at, mut v, dt_s) = (start, velocity_m_s, 0.01);
+            for k in 1..=4000 {
+                for i in 0..2 {
+                    at[i] += v[i] * dt_s;
+                    let (lo, hi) = (ROOM.lo[i] + 0.5, ROOM.hi[i] - 0.5);
+                    if at[i] > hi {
+                        (at[i], v[i]) = (2.0 * hi - at[i], -v[i]);
+                    }
+                    if at[i] < lo {
+                        (at[i], v[i]) = (2.0 * lo - at[i], -v[i]);
+                    }
+                }
+                let obstacle = mover.at(f64::from(k) * dt_s);
+                prop_assert!(distance(center(&obstacle), at) < 1e-8);
+                prop_assert!(holds(&ROOM, &obstacle.bounds()));
+            }
+        }
+
+        #[test]
+        fn a_patrol_passes_its_way_points_in_time(
+            way_points in prop::collection::vec(prop::array::uniform2(-5.0..5.0f64), 2..6),
+            closed in any::<bool>(),
+        ) {
+            let course = Course::Patrol { way_points: way_points.clone(), closed, speed_m_s: 0.5 };
+            let mover = Mover::new(ball([9.0; 2]), course).unwrap();
+            let there = way_points.windows(2).map(|w| distance(w[0], w[1])).sum::<f64>();
+            let last = way_points[way_points.len() - 1];
+            let round_m = there + if closed { distance(last, way_points[0]) } else { there };
+            let mut way_m = 0.0;
+            for (k, point) in way_points.iter().enumerate() {
+                way_m += if k > 0 { distance(way_points[k - 1], *point) } else { 0.0 };
+                for rounds in [0.0, 3.0] {
+                    let at = center(&mover.at(2.0 * (way_m + rounds * round_m)));
+                    prop_assert!(distance(at, *point) < 1e-9, "way point {k}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_corner_has_the_velocity_of_what_comes() {
+        let way_points = vec![[0.0, 0.0], [2.0, 0.0], [2.0, 2.0]];
+        let velocity_at = |closed, t_s| {
+            let course = Course::Patrol { way_points: way_points.clone(), closed, speed_m_s: 1.0 };
+            Mover::new(ball([0.0; 2]), course).unwrap().at(t_s).velocity_m_s
+        };
+        assert_eq!(velocity_at(false, 2.0), [0.0, 1.0]);
+        assert_eq!(velocity_at(false, 4.0), [0.0, -1.0]);
+        assert_eq!(velocity_at(false, 6.0), [-1.0, 0.0]);
+        assert_eq!(velocity_at(false, 8.0), [1.0, 0.0]);
+        assert!(velocity_at(true, 4.0).iter().all(|v| (v + 0.5_f64.sqrt()).abs() < 1e-12));
+    }
+
+    #[test]
+    fn movers_are_told_by_id_at_any_time() {
+        let mover = |id, at| {
+            let course = Course::Straight { velocity_m_s: [1.0, 0.0] };
+            Mover::new(Obstacle::ball(id, at, 0.1), course).unwrap()
+        };
+        let movers = Movers::new(vec![mover(8, [1.0, 1.0]), mover(2, [0.0; 2])]).unwrap();
+        let places: Vec<_> = movers.at(2.5).map(|o| (o.id, center(&o))).collect();
+        assert_eq!(places, [(2, [2.5, 0.0]), (8, [3.5, 1.0])]);
+        assert!(Movers::new(vec![mover(1, [0.0; 2]), mover(1, [1.0; 2])]).is_err());
+    }
+
+    #[test]
+    fn impossible_courses_are_refused() {
+        let patrol = |way_points: &[Point<2>], speed_m_s| Course::Patrol {
+            way_points: way_points.to_vec(),
+            closed: true,
+            speed_m_s,
+        };
+        let inside_out = Bounds { lo: [1.0; 2], hi: [-1.0; 2] };
+        for course in [
+            Course::Straight { velocity_m_s: [0.0; 2] },
+            Course::Straight { velocity_m_s: [f64::NAN, 1.0] },
+            Course::Bouncing { velocity_m_s: [0.0; 2], room: ROOM },
+            Course::Bouncing { velocity_m_s: [1.0; 2], room: inside_out },
+            Course::Bouncing { velocity_m_s: [1.0; 2], room: ROOM.grown(-3.2) },
+            patrol(&[[0.0; 2]], 1.0),
+            patrol(&[[0.0; 2], [0.0; 2]], 1.0),
+            patrol(&[[0.0; 2], [f64::INFINITY; 2]], 1.0),
+            patrol(&[[0.0; 2], [1.0; 2]], 0.0),
+        ] {
+            assert!(Mover::new(ball([0.0; 2]), course.clone()).is_err(), "{course:?}");
+        }
+    }
+}

@@ -1,0 +1,270 @@
+//! Obstacles at random places, from the seed alone.
+
+use super::courses::{Course, Mover};
+use super::purposes;
+use crate::geometry::{Bounds, Core, Point, along, is_finite, unit};
+use crate::obstacle::Obstacle;
+use sidestep_kernel::stream::{Draws, Streams};
+use sidestep_kernel::{InputError, Seed};
+use std::f64::consts::PI;
+use std::ops::RangeInclusive;
+
+/// More obstacles are taken for a mistake.
+const MAX_OBSTACLES: f64 = 1e7;
+/// How often something looks for a place before there is said to be none.
+const ATTEMPTS: u64 = 1000;
+
+/// Balls, or capsules in all directions, spread evenly over a box.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Field<const D: usize> {
+    /// Where their middles are.
+    pub room: Bounds<D>,
+    /// Their sizes together, as a part of the room's. They may overlap, and those that would
+    /// come too near to `keep_clear` are left out, so they cover less.
+    pub part: f64,
+    /// Radius of each.
+    pub radius_m: f64,
+    /// From end to end of a capsule's core; 0 for balls.
+    pub length_m: f64,
+    /// What they keep away from: where chains start.
+    pub keep_clear: Vec<Core<D>>,
+    /// How far their surfaces stay away from it.
+    pub keep_m: f64,
+}
+
+impl<const D: usize> Field<D> {
+    /// The obstacles, numbered from `first_id`; gaps in the numbers are those left out.
+    ///
+    /// # Errors
+    /// A room, part or size that is not finite or not positive; more than ten million obstacles.
+    pub fn fill(&self, seed: Seed, first_id: u32) -> Result<Vec<Obstacle<D>>, InputError> {
+        let n = self.count()?;
+        let streams = Streams::new(seed);
+        let clear = (&self.keep_clear[..], self.keep_m);
+        let one = |k: u32| {
+            let ends = self.ends(&mut streams.draws(k, 0, purposes::STILL));
+            let core = if ends[0] == ends[1] { Core::Point(ends[0]) } else { Core::Segment(ends) };
+            is_away(ends, self.radius_m, clear)
+                .then(|| Obstacle::still(first_id + k, core, self.radius_m))
+        };
+        Ok((0..n).filter_map(one).collect())
+    }
+
+    /// The ends of a core somewhere in the room.
+    fn ends(&self, draws: &mut Draws) -> [Point<D>; 2] {
+        let middle = point_in(draws, &self.room);
+        let u = direction(draws);
+        [-0.5, 0.5].map(|k| along(middle, u, k * self.length_m))
+    }
+
+    fn count(&self) -> Result<u32, InputError> {
+        let extent = |i: usize| self.room.hi[i] - self.room.lo[i];
+        let n = self.part * (0..D).map(extent).product::<f64>() / self.size_of_one();
+        let is_room = (0..D).all(|i| extent(i) > 0.0) && is_finite(&self.room.lo);
+        let is_body = self.radius_m > 0.0 && self.length_m >= 0.0 && self.part >= 0.0;
+        if is_room && is_body && self.keep_m.is_finite() && n <= MAX_OBSTACLES {
+            return Ok(n as u32);
+        }
+        Err(InputError::new(
+            "field",
+            format!(
+                "{n} obstacles of radius {} m and length {} m for {} of its room",
+                self.radius_m, self.length_m, self.part
+            ),
+            "give a room, a part from 0 on and a positive radius that make at most 1e7 obstacles",
+        ))
+    }
+
+    /// Area or volume of one obstacle.
+    fn size_of_one(&self) -> f64 {
+        let r = self.radius_m;
+        match D {
+            2 => PI * r * r + 2.0 * r * self.length_m,
+            _ => 4.0 / 3.0 * PI * r * r * r + PI * r * r * self.length_m,
+        }
+    }
+}
+
+/// Balls that wander about in a room.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Crowd<const D: usize> {
+    /// What they never leave.
+    pub room: Bounds<D>,
+    /// How many.
+    pub n: u32,
+    /// Their radii, evenly spread.
+    pub radius_m: RangeInclusive<f64>,
+    /// Their speeds, evenly spread.
+    pub speed_m_s: RangeInclusive<f64>,
+    /// What they keep away from at time 0.
+    pub keep_clear: Vec<Core<D>>,
+    /// How far their surfaces stay away from it at time 0.
+    pub keep_m: f64,
+}
+
+impl<const D: usize> Crowd<D> {
+    /// The obstacles, numbered from `first_id`.
+    ///
+    /// # Errors
+    /// A room that is too small for them, or has no place away from `keep_clear`; sizes or
+    /// speeds that are not finite and positive.
+    pub fn gather(&self, seed: Seed, first_id: u32) -> Result<Vec<Mover<D>>, InputError> {
+        if f64::from(self.n) > MAX_OBSTACLES {
+            let cause = format!("{} moving obstacles", self.n);
+            return Err(InputError::new("crowd", cause, "give at most 1e7"));
+        }
+        let streams = Streams::new(seed);
+        (0..self.n).map(|k| self.one(&streams, k, first_id + k)).collect()
+    }
+
+    fn one(&self, streams: &Streams, k: u32, id: u32) -> Result<Mover<D>, InputError> {
+        for attempt in 0..ATTEMPTS {
+            let mut draws = streams.draws(k, attempt, purposes::MOVING);
+            let radius_m = within(&mut draws, &self.radius_m);
+            let speed_m_s = within(&mut draws, &self.speed_m_s);
+            let velocity_m_s = direction::<D>(&mut draws).map(|u| u * speed_m_s);
+            let places = self.room.grown(-radius_m);
+            if !(radius_m > 0.0 && (0..D).all(|i| places.lo[i] <= places.hi[i])) {
+                let cause = format!("a ball of radius {radius_m} m does not fit into the room");
+                return Err(InputError::new("crowd", cause, "make the room larger"));
+            }
+            let at = point_in(&mut draws, &places);
+            if is_away([at; 2], radius_m, (&self.keep_clear, self.keep_m)) {
+                let ball = Obstacle::ball(id, at, radius_m);
+                return Mover::new(ball, Course::Bouncing { velocity_m_s, room: self.room });
+            }
+        }
+        Err(InputError::new(
+            "crowd",
+            format!("found no place for moving obstacle {id} in {ATTEMPTS} attempts"),
+            "make the room larger, or keep less of it clear",
+        ))
+    }
+}
+
+/// Whether a capsule between `ends` stays away from all of `keep_clear`.
+fn is_away<const D: usize>(
+    ends: [Point<D>; 2],
+    radius_m: f64,
+    (keep_clear, keep_m): (&[Core<D>], f64),
+) -> bool {
+    let reach_m = radius_m + keep_m;
+    keep_clear.iter().all(|core| core.nearest_to_segment(ends).distance_m > reach_m)
+}
+
+fn within(draws: &mut Draws, range: &RangeInclusive<f64>) -> f64 {
+    range.start() + (range.end() - range.start()) * draws.uniform()
+}
+
+fn point_in<const D: usize>(draws: &mut Draws, room: &Bounds<D>) -> Point<D> {
+    std::array::from_fn(|i| within(draws, &(room.lo[i]..=room.hi[i])))
+}
+
+/// A unit vector, all directions alike: a point in the unit ball, scaled.
+fn direction<const D: usize>(draws: &mut Draws) -> Point<D> {
+    loop {
+        let p: Point<D> = std::array::from_fn(|_| 2.0 * draws.uniform() - 1.0);
+        let squared: f64 = p.iter().map(|x| x * x).sum();
+        if let Some(u) = unit(p).filter(|_| (0.01..=1.0).contains(&squared)) {
+            return u;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::norm;
+
+    fn field<const D: usize>(part: f64, length_m: f64) -> Field<D> {
+        let mut tail = [0.0; D];
+        tail[0] = -3.0;
+        Field {
+            room: Bounds { lo: [-4.0; D], hi: [4.0; D] },
+            part,
+            radius_m: 0.3,
+            length_m,
+            keep_clear: vec![Core::Segment([[0.0; D], tail])],
+            keep_m: 0.2,
+        }
+    }
+
+    fn check<const D: usize>(length_m: f64) {
+        let field = field::<D>(0.2, length_m);
+        let found = field.fill(Seed(3), 5).unwrap();
+        assert!(found.len() > 10 && found.len() < field.count().unwrap() as usize);
+        for o in &found {
+            let ends = match o.core {
+                Core::Point(c) => [c; 2],
+                Core::Segment(ends) => ends,
+                other => panic!("{other:?}"),
+            };
+            assert!(
+                (norm(std::array::from_fn::<_, D, _>(|i| ends[1][i] - ends[0][i])) - length_m)
+                    .abs()
+                    < 1e-12
+            );
+            assert!(field.keep_clear[0].nearest_to_segment(ends).distance_m > 0.5);
+        }
+        assert_eq!(found, field.fill(Seed(3), 5).unwrap());
+        assert_ne!(found, field.fill(Seed(4), 5).unwrap());
+    }
+
+    #[test]
+    fn fields_keep_away_from_what_is_kept_clear() {
+        check::<2>(0.0);
+        check::<2>(0.7);
+        check::<3>(0.0);
+        check::<3>(0.7);
+    }
+
+    #[test]
+    fn a_field_has_the_size_it_is_asked_for() {
+        let field = Field { keep_clear: Vec::new(), ..field::<3>(0.3, 0.5) };
+        let one = 4.0 / 3.0 * PI * 0.027 + PI * 0.09 * 0.5;
+        let size = field.fill(Seed(1), 0).unwrap().len() as f64 * one;
+        assert!((size / 512.0 - 0.3).abs() < 0.001, "{size}");
+    }
+
+    #[test]
+    fn a_crowd_stays_in_its_room_with_the_sizes_and_speeds_it_is_given() {
+        let crowd = Crowd {
+            room: Bounds { lo: [-3.0, -2.0], hi: [3.0, 2.0] },
+            n: 40,
+            radius_m: 0.2..=0.5,
+            speed_m_s: 0.25..=2.0,
+            keep_clear: vec![Core::Point([0.0; 2])],
+            keep_m: 0.5,
+        };
+        for mover in crowd.gather(Seed(9), 100).unwrap() {
+            let start = mover.at(0.0);
+            assert!(start.id >= 100 && (0.2..=0.5).contains(&start.radius_m));
+            assert!(start.core.nearest_to_point([0.0; 2]).distance_m > start.radius_m + 0.5);
+            for t_s in [0.0, 7.3, 1e4] {
+                let now = mover.at(t_s);
+                let (speed_m_s, at) = (norm(now.velocity_m_s), now.bounds());
+                assert!((0.25 - 1e-12..=2.0 + 1e-12).contains(&speed_m_s));
+                assert!((0..2).all(|i| at.lo[i] > crowd.room.lo[i] - 1e-9));
+                assert!((0..2).all(|i| at.hi[i] < crowd.room.hi[i] + 1e-9));
+            }
+        }
+        let cramped = Crowd { keep_m: 9.0, ..crowd.clone() };
+        assert!(cramped.gather(Seed(9), 0).is_err());
+        let too_large = Crowd { radius_m: 2.5..=3.0, ..crowd };
+        assert!(too_large.gather(Seed(9), 0).is_err());
+    }
+
+    #[test]
+    fn impossible_fields_are_refused() {
+        for wrong in [
+            Field { part: f64::NAN, ..field::<2>(0.1, 0.0) },
+            Field { part: -1.0, ..field(0.1, 0.0) },
+            Field { radius_m: 0.0, ..field(0.1, 0.0) },
+            Field { radius_m: 1e-9, ..field(0.1, 0.0) },
+            Field { length_m: -1.0, ..field(0.1, 0.0) },
+            Field { room: Bounds { lo: [1.0; 2], hi: [0.0; 2] }, ..field(0.1, 0.0) },
+        ] {
+            assert!(wrong.fill(Seed(1), 0).is_err(), "{wrong:?}");
+        }
+    }
+}

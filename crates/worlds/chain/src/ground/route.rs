@@ -1,0 +1,365 @@
+//! Where a chain has room on a floor: a start for its leader, and a free way behind it.
+
+use super::{Pose, Site, purposes};
+use crate::geometry::{Bounds, Point, along, between, distance, dot, sub, unit};
+use crate::obstacle::Obstacles;
+use sidestep_kernel::math::atan2;
+use sidestep_kernel::stream::Streams;
+use sidestep_kernel::{InputError, Seed};
+use sidestep_map::planning::{Distances, FreeSpace, STEPS};
+
+/// Random places that are tried as such.
+const PLACES: u64 = 20_000;
+/// Free places among them from which a way for the chain is looked for.
+const STARTS: u32 = 64;
+/// The way behind the leader is looked for on a grid with at most this many boxes on each side.
+const MAX_HALF_BOXES: f64 = 500.0;
+
+/// What a chain needs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wanted {
+    /// Leader and followers.
+    pub connectors: usize,
+    /// From each to the next.
+    pub spacing_m: f64,
+    /// Free around every connector's middle, and along the way.
+    pub clearance_m: f64,
+    /// Free around the straight line from each to the next.
+    pub rod_clearance_m: f64,
+    /// The way ahead of the leader that has to be free as well.
+    pub ahead_m: f64,
+    /// Where the leader starts: anywhere on the site where not given. Many sites have insides of
+    /// blocks that are free and lead nowhere.
+    pub within: Option<Bounds<2>>,
+}
+
+/// Where a chain starts.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Start {
+    /// The leader, which looks away from its chain.
+    pub leader: Pose,
+    /// All connectors, the leader first.
+    pub points: Vec<Point<2>>,
+}
+
+/// What was wanting where no start was found.
+#[derive(Debug, Default)]
+struct Wanting {
+    free_places: u32,
+    longest_m: f64,
+    laid: u32,
+}
+
+/// A start for a chain on a site, from the seed alone; `obstacles` are all that is there.
+///
+/// Random places are tried. From a free one, a breadth-first search finds the places that it takes
+/// the longest to get to within the chain's reach; the way to one of them, pulled straight, is
+/// where the chain lies.
+///
+/// # Errors
+/// Sizes that are not positive; no room, with what was wanting.
+pub fn find(
+    site: &Site,
+    obstacles: &Obstacles<2>,
+    wanted: &Wanted,
+    seed: Seed,
+) -> Result<Start, InputError> {
+    wanted.check()?;
+    let search = Search { site, obstacles, wanted };
+    let (streams, mut wanting) = (Streams::new(seed), Wanting::default());
+    let bounds = wanted.within.unwrap_or_else(|| site.bounds());
+    for place in 0..PLACES {
+        let mut draws = streams.draws(0, place, purposes::ROUTE);
+        let leader =
+            std::array::from_fn(|i| bounds.lo[i] + (bounds.hi[i] - bounds.lo[i]) * draws.uniform());
+        if !search.is_free(leader) {
+            continue;
+        }
+        wanting.free_places += 1;
+        let way = search.way_from(leader, draws.next_u32());
+        wanting.longest_m = wanting.longest_m.max(length_m(&way));
+        if let Some(points) = search.lay(&way) {
+            wanting.laid += 1;
+            if let Some(start) = search.start(points) {
+                return Ok(start);
+            }
+        }
+        if wanting.free_places >= STARTS {
+            break;
+        }
+    }
+    Err(wanting.error(wanted))
+}
+
+impl Wanted {
+    /// Length of the chain.
+    fn length_m(&self) -> f64 {
+        self.spacing_m * (self.connectors.max(1) - 1) as f64
+    }
+
+    fn check(&self) -> Result<(), InputError> {
+        let lengths = [self.clearance_m, self.rod_clearance_m, self.ahead_m];
+        let has_place =
+            self.within.is_none_or(|b| (0..2).all(|i| b.lo[i] <= b.hi[i] && b.hi[i].is_finite()));
+        let is_good = has_place
+            && self.connectors > 0
+            && self.spacing_m > 0.0
+            && self.clearance_m > 0.0
+            && self.length_m() <= 1e5
+            && lengths.iter().all(|m| (0.0..=1e3).contains(m));
+        if is_good {
+            return Ok(());
+        }
+        let cause = format!("a start for {self:?}");
+        Err(InputError::new("start", cause, "give positive lengths in m, and a connector"))
+    }
+}
+
+impl Wanting {
+    fn error(&self, wanted: &Wanted) -> InputError {
+        let (cause, remedy) = if self.free_places == 0 {
+            let cause = format!(
+                "no place with {} m free around it among {PLACES} random ones",
+                wanted.clearance_m
+            );
+            (cause, "make the robots smaller or the clearance less")
+        } else if self.laid == 0 {
+            let cause = format!(
+                "no free way for a chain of {:.1} m from {} places; the longest is {:.1} m",
+                wanted.length_m(),
+                self.free_places,
+                self.longest_m
+            );
+            (cause, "take fewer followers, a shorter spacing or less clearance")
+        } else {
+            let cause = format!("nowhere {} m free ahead of the leader", wanted.ahead_m);
+            (cause, "ask for less room ahead")
+        };
+        InputError::new("start", cause, remedy)
+    }
+}
+
+struct Search<'a> {
+    site: &'a Site,
+    obstacles: &'a Obstacles<2>,
+    wanted: &'a Wanted,
+}
+
+impl Search<'_> {
+    fn is_clear(&self, ends: [Point<2>; 2], radius_m: f64) -> bool {
+        self.obstacles.clearance_m(ends, 0.0, radius_m) >= radius_m
+    }
+
+    fn is_free(&self, at: Point<2>) -> bool {
+        self.site.is_free(at) && self.is_clear([at; 2], self.wanted.clearance_m)
+    }
+
+    /// A long way away from a place, pulled straight.
+    fn way_from(&self, leader: Point<2>, choice: u32) -> Vec<Point<2>> {
+        let Wanted { spacing_m, clearance_m, .. } = *self.wanted;
+        // On 4 neighbors a way counts up to sqrt 2 as long as it is.
+        let reach_m = 1.5 * self.wanted.length_m() + spacing_m;
+        let box_m = (0.5 * clearance_m.min(spacing_m)).max(reach_m / MAX_HALF_BOXES);
+        let half = (reach_m / box_m).ceil() as u32;
+        let place = |(col, row): (u32, u32)| {
+            let from_leader = |k: u32| (f64::from(k) - f64::from(half)) * box_m;
+            [leader[0] + from_leader(col), leader[1] + from_leader(row)]
+        };
+        let side = 2 * half + 1;
+        let free = FreeSpace::new(side, side, |col, row| self.is_free(place((col, row))));
+        let steps = Distances::to_nearest(&free, 1, &[(half, half)]);
+        let way = back_from(&steps, furthest(&steps, half, choice));
+        self.pulled(way.into_iter().rev().map(place).collect())
+    }
+
+    /// A way with fewer corners: from each, straight on as far as there is clearance.
+    fn pulled(&self, way: Vec<Point<2>>) -> Vec<Point<2>> {
+        let (mut pulled, mut from) = (vec![way[0]], 0);
+        while from + 1 < way.len() {
+            let is_clear =
+                |to: &usize| self.is_clear([way[from], way[*to]], self.wanted.clearance_m);
+            let to = (from + 2..way.len()).take_while(is_clear).last().unwrap_or(from + 1);
+            pulled.push(way[to]);
+            from = to;
+        }
+        pulled
+    }
+
+    /// Connectors along a way, each at the spacing from the one before; `None` where it is too
+    /// short, or a rod would come too near to something.
+    fn lay(&self, way: &[Point<2>]) -> Option<Vec<Point<2>>> {
+        let Wanted { connectors, spacing_m, rod_clearance_m, .. } = *self.wanted;
+        let (mut points, mut leg, mut part) = (vec![way[0]], 0, 0.0);
+        while points.len() < connectors {
+            let last = points[points.len() - 1];
+            loop {
+                let [a, b] = [*way.get(leg)?, *way.get(leg + 1)?];
+                match leaves_at(last, spacing_m, [a, b]).filter(|&p| p >= part) {
+                    Some(found) => {
+                        points.push(between(a, b, found));
+                        part = found;
+                        break;
+                    }
+                    None => (leg, part) = (leg + 1, 0.0),
+                }
+            }
+        }
+        let is_clear = |rod: &[Point<2>]| self.is_clear([rod[0], rod[1]], rod_clearance_m);
+        (points.windows(2).all(is_clear) && points.iter().all(|&p| self.is_free(p)))
+            .then_some(points)
+    }
+
+    /// The start of a chain that lies at `points`, if there is room ahead of it.
+    fn start(&self, points: Vec<Point<2>>) -> Option<Start> {
+        let at = points[0];
+        let u = points.get(1).and_then(|&next| unit(sub(at, next))).unwrap_or([1.0, 0.0]);
+        let ahead = [at, along(at, u, self.wanted.ahead_m)];
+        let leader = Pose { at, heading_rad: atan2(u[1], u[0]) };
+        self.is_clear(ahead, self.wanted.clearance_m).then_some(Start { leader, points })
+    }
+}
+
+/// One of the boxes that are nearly the most steps away.
+fn furthest(steps: &Distances, half: u32, choice: u32) -> (u32, u32) {
+    let most = steps.max().unwrap_or(0);
+    let all = (0..=2 * half).flat_map(|row| (0..=2 * half).map(move |col| (col, row)));
+    let far =
+        |&(col, row): &(u32, u32)| steps.steps(col, row).is_some_and(|n| n + most / 20 >= most);
+    let far: Vec<_> = all.filter(far).collect();
+    far.get(choice as usize % far.len().max(1)).copied().unwrap_or((half, half))
+}
+
+/// The boxes from one to that at 0 steps, each a step nearer.
+fn back_from(steps: &Distances, mut at: (u32, u32)) -> Vec<(u32, u32)> {
+    let mut way = vec![at];
+    while let Some(n) = steps.steps(at.0, at.1).filter(|&n| n > 0) {
+        let beside = STEPS
+            .map(|(east, north)| (at.0.wrapping_add_signed(east), at.1.wrapping_add_signed(north)));
+        let is_nearer = |b: &&(u32, u32)| steps.steps(b.0, b.1) == Some(n - 1);
+        let Some(&next) = beside.iter().find(is_nearer) else { break };
+        at = next;
+        way.push(at);
+    }
+    way
+}
+
+/// At which part of a segment a way along it leaves the circle around a point, if it does.
+fn leaves_at(center: Point<2>, radius_m: f64, [a, b]: [Point<2>; 2]) -> Option<f64> {
+    let (d, r) = (sub(b, a), sub(a, center));
+    let (dd, dr) = (dot(d, d), dot(d, r));
+    let root = dr * dr - dd * (dot(r, r) - radius_m * radius_m);
+    let part = (-dr + root.max(0.0).sqrt()) / dd;
+    (dd > 0.0 && root >= 0.0 && (0.0..=1.0).contains(&part)).then_some(part)
+}
+
+fn length_m(way: &[Point<2>]) -> f64 {
+    way.windows(2).map(|leg| distance(leg[0], leg[1])).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chain::{Chain, Connector, Rod};
+    use sidestep_import::{PixelMap, rosmap, stage};
+    use sidestep_map::{Cell, UnknownPolicy};
+    use sidestep_testing::shared_data as shared;
+
+    const WANTED: Wanted = Wanted {
+        connectors: 16,
+        spacing_m: 0.7,
+        clearance_m: 0.33,
+        rod_clearance_m: 0.05,
+        ahead_m: 1.0,
+        within: None,
+    };
+
+    /// A corridor with a bend: `#` is solid, a pixel has a side of 0.5 m.
+    fn bent() -> Site {
+        let rows = [
+            "####################",
+            "#..................#",
+            "#..................#",
+            "#..###########...#.#",
+            "#..###########...#.#",
+            "####################",
+        ];
+        let pixels = rows.iter().rev().flat_map(|row| row.chars());
+        let cell = |c| if c == '#' { Cell::Wall } else { Cell::Free };
+        let map = PixelMap::new(20, 6, 0.5, [-2.0, 1.0], pixels.map(cell).collect());
+        Site::of_map(&map, UnknownPolicy::Wall)
+    }
+
+    fn check(name: &str, site: &Site, wanted: &Wanted, seeds: u64) {
+        let obstacles = Obstacles::new(site.obstacles(0), 1.0).unwrap();
+        for seed in 0..seeds {
+            let start = find(site, &obstacles, wanted, Seed(seed)).expect(name);
+            assert_eq!(start, find(site, &obstacles, wanted, Seed(seed)).unwrap());
+            assert_eq!((start.points.len(), start.points[0]), (wanted.connectors, start.leader.at));
+            let within = wanted.within.unwrap_or_else(|| site.bounds());
+            assert!(within.meets(&Bounds::of(&[start.leader.at])));
+            for rod in start.points.windows(2) {
+                assert!((distance(rod[0], rod[1]) - wanted.spacing_m).abs() < 1e-9);
+                let apart_m = obstacles.clearance_m([rod[0], rod[1]], 0.0, 1.0);
+                assert!(apart_m >= wanted.rod_clearance_m, "{name}: rod at {apart_m}");
+            }
+            for &p in &start.points {
+                assert!(site.is_free(p));
+                assert!(obstacles.clearance_m([p; 2], 0.0, 1.0) >= wanted.clearance_m);
+            }
+            let rod = Rod::fixed(wanted.spacing_m, wanted.rod_clearance_m);
+            let n = wanted.connectors;
+            let connectors = vec![Connector::free(wanted.clearance_m); n];
+            assert!(Chain::new(start.points, connectors, vec![rod; n - 1]).is_ok());
+        }
+    }
+
+    #[test]
+    fn a_chain_has_room_in_a_bent_corridor() {
+        check("bent", &bent(), &Wanted { connectors: 10, ..WANTED }, 10);
+        check("alone", &bent(), &Wanted { connectors: 1, ..WANTED }, 3);
+    }
+
+    #[test]
+    fn starts_differ_by_seed() {
+        let site = bent();
+        let obstacles = Obstacles::new(site.obstacles(0), 1.0).unwrap();
+        let wanted = Wanted { connectors: 5, ..WANTED };
+        let start = |seed| find(&site, &obstacles, &wanted, Seed(seed)).unwrap();
+        assert_ne!(start(1), start(2));
+    }
+
+    #[test]
+    fn what_is_wanting_is_said() {
+        let site = bent();
+        let obstacles = Obstacles::new(site.obstacles(0), 1.0).unwrap();
+        let cause = |wanted: Wanted| {
+            find(&site, &obstacles, &wanted, Seed(1)).unwrap_err().cause().to_owned()
+        };
+        assert!(cause(Wanted { clearance_m: 2.0, ..WANTED }).contains("no place with 2 m"));
+        let too_long = cause(Wanted { connectors: 40, ..WANTED });
+        assert!(too_long.contains("no free way for a chain of 27.3"), "{too_long}");
+        let no_room = cause(Wanted { connectors: 3, ahead_m: 50.0, ..WANTED });
+        assert!(no_room.contains("nowhere 50 m free"), "{no_room}");
+        for wrong in [
+            Wanted { connectors: 0, ..WANTED },
+            Wanted { spacing_m: 0.0, ..WANTED },
+            Wanted { clearance_m: f64::NAN, ..WANTED },
+            Wanted { spacing_m: f64::INFINITY, ..WANTED },
+        ] {
+            assert!(find(&site, &obstacles, &wrong, Seed(1)).is_err());
+        }
+    }
+
+    #[test]
+    fn real_maps_have_room_for_fifteen_followers() {
+        for name in ["porto/porto", "berlin/berlin"] {
+            let Some(path) = shared(&format!("maps/{name}.yaml")) else { return };
+            let map = rosmap::load(&path).expect(name);
+            check(name, &Site::of_map(&map, UnknownPolicy::Wall), &WANTED, 4);
+        }
+        let path = shared("worlds/stage/SFU.world").expect("there");
+        let world = stage::load(&path).expect("SFU");
+        let within = Some(Bounds { lo: [-20.0, -10.0], hi: [5.0, 10.0] });
+        check("SFU", &Site::of_stage(&world), &Wanted { within, ..WANTED }, 3);
+    }
+}

@@ -1,0 +1,129 @@
+//! Ground as files tell it: floors of pixels and boxes.
+
+use super::Pose;
+use super::pixels::Floor;
+use crate::geometry::{Bounds, Core, Cuboid, Point};
+use crate::obstacle::{Obstacle, outline};
+use sidestep_import::{PixelMap, stage};
+use sidestep_kernel::math::{cos, sin};
+use sidestep_map::UnknownPolicy;
+
+/// Floors, and solid things that stand on them.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Site {
+    floors: Vec<Floor>,
+    /// Boxes, and walls around floors; their ids are given later.
+    solids: Vec<Obstacle<2>>,
+}
+
+impl Site {
+    /// The site of a map, solid all around.
+    pub fn of_map(map: &PixelMap, unknown: UnknownPolicy) -> Self {
+        Self { floors: vec![Floor::of_map(map, unknown)], solids: Vec::new() }
+    }
+
+    /// The site of a Stage world, without its robots (see [`stage::Robot`] for where they start).
+    /// A floor plan with a boundary has thin walls around it, none is solid beside it.
+    pub fn of_stage(world: &stage::World) -> Self {
+        let mut site = Self::default();
+        for plan in &world.floor_plans {
+            let pixel_m =
+                [plan.size_m[0] / f64::from(plan.width), plan.size_m[1] / f64::from(plan.height)];
+            let floor = Floor::new(plan.width, plan.height, pixel_m, plan.solid.clone());
+            let pose = Pose::from(plan.pose);
+            site.floors.push(floor.centered(pose.at, pose.heading_rad).open());
+            if plan.has_boundary {
+                let edges = cuboid(pose, plan.size_m).edges_2d();
+                site.solids.extend(outline(0, &edges.map(|edge| edge[0]), 0.0));
+            }
+        }
+        let boxes = world.boxes.iter();
+        let solid = |body: &stage::Body| Core::Cuboid(cuboid(body.pose.into(), body.size_m));
+        site.solids.extend(boxes.map(|body| Obstacle::still(0, solid(body), 0.0)));
+        site
+    }
+
+    /// The floors.
+    pub fn floors(&self) -> &[Floor] {
+        &self.floors
+    }
+
+    /// Everything in the way, numbered on from `first_id`.
+    pub fn obstacles(&self, first_id: u32) -> Vec<Obstacle<2>> {
+        let walls = self.floors.iter().flat_map(|floor| floor.walls(0));
+        let all = walls.chain(self.solids.iter().copied());
+        (first_id..).zip(all).map(|(id, obstacle)| Obstacle { id, ..obstacle }).collect()
+    }
+
+    /// Whether a place is on no solid pixel. Boxes are not looked at: see
+    /// [`Obstacles::clearance_m`](crate::Obstacles::clearance_m).
+    pub fn is_free(&self, at: Point<2>) -> bool {
+        self.floors.iter().all(|floor| floor.is_free(at))
+    }
+
+    /// The box around all floors.
+    pub fn bounds(&self) -> Bounds<2> {
+        self.floors.iter().fold(Bounds::nothing(), |all, floor| all.joined(&floor.bounds()))
+    }
+}
+
+impl From<stage::Pose> for Pose {
+    fn from(pose: stage::Pose) -> Self {
+        Self { at: [pose.x_m, pose.y_m], heading_rad: pose.yaw_rad }
+    }
+}
+
+/// A box around a pose.
+fn cuboid(pose: Pose, size_m: [f64; 2]) -> Cuboid<2> {
+    let (s, c) = (sin(pose.heading_rad), cos(pose.heading_rad));
+    Cuboid { center: pose.at, axes: [[c, s], [-s, c]], half_m: size_m.map(|m| 0.5 * m) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::obstacle::Obstacles;
+    use sidestep_testing::shared_data as shared;
+
+    #[test]
+    fn a_stage_world_is_its_floors_boundaries_and_boxes() {
+        let pose = stage::Pose { x_m: 10.0, y_m: 0.0, yaw_rad: std::f64::consts::FRAC_PI_2 };
+        let plan = stage::FloorPlan {
+            name: String::new(),
+            width: 2,
+            height: 1,
+            solid: vec![true, false],
+            size_m: [4.0, 1.0],
+            pose,
+            has_boundary: true,
+        };
+        let body = stage::Body { name: String::new(), pose, size_m: [0.2, 0.1] };
+        let world =
+            stage::World { floor_plans: vec![plan], boxes: vec![body], ..Default::default() };
+        let site = Site::of_stage(&world);
+        // Turned to the left: the solid pixel is the southern one.
+        assert!(!site.is_free([10.0, -1.0]) && site.is_free([10.0, 1.0]) && site.is_free([0.0; 2]));
+        let obstacles = site.obstacles(3);
+        assert!((3..).zip(&obstacles).all(|(id, o)| o.id == id));
+        assert_eq!(obstacles.len(), 4 + 4 + 1);
+        let all = Obstacles::new(obstacles, 1.0).unwrap();
+        assert!((all.clearance_m([[10.0, 1.8]; 2], 0.0, 1.0) - 0.2).abs() < 1e-12);
+        assert!((all.clearance_m([[10.0, 0.25]; 2], 0.0, 1.0) - 0.15).abs() < 1e-12);
+    }
+
+    #[test]
+    fn robots_of_real_worlds_stand_free() {
+        for name in ["stage/simple", "stage/SFU", "willow/willow-erratic"] {
+            let Some(path) = shared(&format!("worlds/{name}.world")) else { return };
+            let world = stage::load(&path).expect(name);
+            let site = Site::of_stage(&world);
+            let obstacles = site.obstacles(0);
+            println!("{name}: {} obstacles", obstacles.len());
+            let all = Obstacles::new(obstacles, 1.0).unwrap();
+            for robot in &world.robots {
+                let at = Pose::from(robot.pose).at;
+                assert!(site.is_free(at) && all.clearance_m([at; 2], robot.radius_m, 1.0) > 0.0);
+            }
+        }
+    }
+}

@@ -1,0 +1,72 @@
+//! Arms from URDF files.
+
+use super::super::arm::Arm;
+use super::super::kinematics::SerialChain;
+use super::Compiler;
+use serde::Deserialize;
+use sidestep_import::urdf::Model;
+use sidestep_import::urdf::srdf::Semantics;
+use sidestep_kernel::InputError;
+use std::ops::Range;
+use toml::Spanned;
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ArmSection {
+    urdf: String,
+    base: Option<String>,
+    tip: Option<String>,
+    srdf: Option<String>,
+    posture: Option<String>,
+    joints: Option<Vec<f64>>,
+}
+
+impl Compiler<'_> {
+    /// An arm whose base is at `at_m`.
+    pub(super) fn arm(
+        &self,
+        section: &Spanned<ArmSection>,
+        at_m: [f64; 3],
+    ) -> Result<Arm, InputError> {
+        let (s, at) = (section.get_ref(), section.span());
+        let model = Model::load(&self.source.path(s.urdf.as_ref()))?;
+        let link = |name: &Option<String>, key: &str, preset: usize| match name {
+            Some(name) => model.link(key, name).map_err(|error| self.at(at.clone(), &error)),
+            None => Ok(preset),
+        };
+        let base = link(&s.base, "base", model.root)?;
+        let tip = link(&s.tip, "tip", model.default_tip())?;
+        let serial = SerialChain::new(&model, base, tip, &s.urdf)
+            .map_err(|error| self.at(at.clone(), &error))?;
+        let values = self.values(s, &model, &serial, at.clone())?;
+        serial.check_limits("joints", &values).map_err(|error| self.at(at, &error))?;
+        Ok(Arm::new(serial, at_m, values))
+    }
+
+    /// Joint values at the start: given, of a named posture, or at rest.
+    fn values(
+        &self,
+        s: &ArmSection,
+        model: &Model,
+        serial: &SerialChain,
+        at: Range<usize>,
+    ) -> Result<Vec<f64>, InputError> {
+        let told = |error: InputError| self.at(at.clone(), &error);
+        match (&s.joints, &s.posture, &s.srdf) {
+            (Some(values), None, None) => {
+                serial.check_count("joints", values).map_err(told)?;
+                Ok(values.clone())
+            }
+            (None, Some(name), Some(srdf)) => {
+                let semantics = Semantics::load(&self.source.path(srdf.as_ref()), model)?;
+                let posture = semantics.posture("posture", name).map_err(told)?;
+                Ok(serial.with_posture(model, &posture))
+            }
+            (None, None, None) => Ok(serial.rest()),
+            _ => {
+                let remedy = "give joints = [...], or srdf and posture, or none of them";
+                Err(self.error(Some(at), "a posture given in two ways, or half", remedy))
+            }
+        }
+    }
+}

@@ -1,0 +1,131 @@
+//! Motion scripts: a small turtle language that drives an initiator.
+//!
+//! ```text
+//! # A square, twice as large each time.
+//! to square :side
+//!   repeat 4 [ forward :side turn 90 ]
+//! end
+//!
+//! square 0.5
+//! square 2 * 0.5
+//! wait 1.5
+//! goto 1, 2
+//! ```
+//!
+//! | statement | what it does |
+//! | --- | --- |
+//! | `forward D` | D meters ahead (back where D is negative) |
+//! | `turn A` | A degrees to the left |
+//! | `pitch A` | nose up by A degrees |
+//! | `wait S` | S seconds of rest |
+//! | `goto X, Y` or `goto X, Y, Z` | to that place in meters; the heading stays, and Z where left out |
+//! | `repeat N [ ... ]` | N times; N is a whole number |
+//! | `to NAME :a :b ... end` | a procedure, outside of all others; `NAME 1, 2` carries it out |
+//!
+//! Values are numbers, parameters, `+ - * /` and parentheses. `#` begins a comment. A procedure
+//! may call itself: `repeat 0` ends that. A script begins where its [`Turtle`] is.
+
+mod parse;
+mod run;
+#[cfg(test)]
+mod tests;
+
+use sidestep_kernel::InputError;
+
+pub use run::{Motion, Motions, Turtle};
+
+/// The longest script that is read, in bytes.
+pub const MAX_BYTES: usize = 1 << 20;
+
+/// How deep brackets may stand in each other.
+pub const MAX_NESTING: usize = 64;
+
+/// How deep procedures and repetitions may be in each other while a script runs.
+pub const MAX_DEPTH: usize = 1000;
+
+/// Statements that a script may carry out. Repetitions count as one each time.
+pub const MAX_STATEMENTS: u64 = 10_000_000;
+
+/// A script that can be run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Script {
+    place: String,
+    text: String,
+    main: Vec<Statement>,
+    procedures: Vec<Procedure>,
+}
+
+impl Script {
+    /// Reads the text of a script, which errors call `place`.
+    ///
+    /// # Errors
+    /// When it is too long, is no script, or uses procedures or parameters that it does not have;
+    /// with line, column and what was expected there.
+    pub fn parse(place: &str, text: &str) -> Result<Self, InputError> {
+        parse::script(place, text)
+    }
+
+    /// The motions of an initiator that is at `start`, one after the other. After an error there
+    /// are no more.
+    pub fn motions(&self, start: Turtle) -> Motions<'_> {
+        Motions::new(self, start)
+    }
+
+    fn error(&self, at: usize, cause: impl Into<String>, remedy: impl Into<String>) -> InputError {
+        InputError::new(&self.place, cause, remedy).in_text(&self.text, at)
+    }
+}
+
+#[derive(Debug, Clone, PartialEq)]
+struct Procedure {
+    name: String,
+    parameters: Vec<String>,
+    body: Vec<Statement>,
+    /// Bytes of the text before it.
+    at: usize,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+struct Statement {
+    /// Bytes of the text before it.
+    at: usize,
+    action: Action,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+enum Action {
+    Forward(Expression),
+    Turn(Expression),
+    Pitch(Expression),
+    Wait(Expression),
+    /// Two or three coordinates.
+    Goto(Vec<Expression>),
+    Repeat(Expression, Vec<Statement>),
+    Call {
+        name: String,
+        procedure: usize,
+        arguments: Vec<Expression>,
+    },
+}
+
+/// A value in postfix form: long sums nest no calls.
+#[derive(Debug, Clone, PartialEq)]
+struct Expression {
+    /// Bytes of the text before it.
+    at: usize,
+    terms: Vec<Term>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+enum Term {
+    Number(f64),
+    /// A parameter by its name, and the bytes of the text before it.
+    Named(String, usize),
+    /// A parameter of the procedure around.
+    Parameter(usize),
+    Negate,
+    Add,
+    Subtract,
+    Multiply,
+    Divide,
+}

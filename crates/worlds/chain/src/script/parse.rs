@@ -1,0 +1,313 @@
+//! Text -> [`Script`].
+
+use winnow::ascii::{digit0, digit1, multispace1, till_line_ending};
+use winnow::combinator::{alt, cut_err, opt, peek, preceded, repeat, separated, terminated};
+use winnow::error::{ContextError, ErrMode, ParserError, StrContext, StrContextValue};
+use winnow::prelude::*;
+use winnow::stream::{LocatingSlice, Location, Stream};
+use winnow::token::{one_of, take_while};
+
+use super::{Action, Expression, MAX_BYTES, MAX_NESTING, Procedure, Script, Statement, Term};
+use sidestep_kernel::InputError;
+use sidestep_scenario::nearest;
+
+type Input<'a> = LocatingSlice<&'a str>;
+
+/// Words that name no procedure.
+const RESERVED: [&str; 8] = ["forward", "turn", "pitch", "wait", "goto", "repeat", "to", "end"];
+
+/// What may stand where a statement may.
+const STATEMENTS: &str = "a statement (forward, turn, pitch, wait, goto, repeat, a procedure)";
+
+pub(super) fn script(place: &str, text: &str) -> Result<Script, InputError> {
+    if text.len() > MAX_BYTES {
+        let cause = format!("has more than {MAX_BYTES} bytes");
+        return Err(InputError::new(place, cause, "use procedures and repeat"));
+    }
+    check_nesting(place, text)?;
+    let items = program.parse(LocatingSlice::new(text)).map_err(|error| {
+        let (cause, remedy) = words(error.inner(), &text[error.offset()..]);
+        InputError::new(place, cause, remedy).in_text(text, error.offset())
+    })?;
+    let (mut main, mut procedures) = (Vec::new(), Vec::new());
+    for item in items {
+        match item {
+            Item::Statement(statement) => main.push(statement),
+            Item::Procedure(procedure) => procedures.push(procedure),
+        }
+    }
+    let script = Script { place: place.into(), text: text.into(), main, procedures };
+    resolved(script)
+}
+
+/// The parser calls itself for each bracket; the stack must not decide how deep.
+fn check_nesting(place: &str, text: &str) -> Result<(), InputError> {
+    let (mut depth, mut in_comment) = (0usize, false);
+    for (at, c) in text.char_indices() {
+        match c {
+            '#' => in_comment = true,
+            '\n' => in_comment = false,
+            '[' | '(' if !in_comment => depth += 1,
+            ']' | ')' if !in_comment => depth = depth.saturating_sub(1),
+            _ => {}
+        }
+        if depth > MAX_NESTING {
+            let cause = format!("more than {MAX_NESTING} brackets in each other");
+            return Err(InputError::new(place, cause, "use procedures").in_text(text, at));
+        }
+    }
+    Ok(())
+}
+
+/// What was expected, and what is there.
+fn words(error: &ContextError, rest: &str) -> (String, String) {
+    let expected = error.context().find_map(|context| match context {
+        StrContext::Expected(value) => Some(value.to_string()),
+        _ => None,
+    });
+    let expected = expected.unwrap_or_else(|| STATEMENTS.into());
+    let found = match rest.chars().next() {
+        Some(c) if is_name(c) => format!("`{}`", rest.split(|c| !is_name(c)).next().unwrap_or("")),
+        Some(c) => format!("`{}`", c.escape_debug()),
+        None => "the end of the script".into(),
+    };
+    (format!("{found} where {expected} is expected"), format!("write {expected} there"))
+}
+
+fn is_name(c: char) -> bool {
+    c.is_alphanumeric() || c == '_'
+}
+
+fn expected(what: &'static str) -> StrContext {
+    StrContext::Expected(StrContextValue::Description(what))
+}
+
+enum Item {
+    Statement(Statement),
+    Procedure(Procedure),
+}
+
+fn program(input: &mut Input) -> ModalResult<Vec<Item>> {
+    let item = alt((procedure.map(Item::Procedure), statement.map(Item::Statement)));
+    preceded(blank, repeat(0.., item)).parse_next(input)
+}
+
+fn blank(input: &mut Input) -> ModalResult<()> {
+    let comment = ('#', till_line_ending).void();
+    repeat(0.., alt((multispace1.void(), comment))).parse_next(input)
+}
+
+fn name<'a>(input: &mut Input<'a>) -> ModalResult<&'a str> {
+    let letters = (one_of(char::is_alphabetic), take_while(0.., is_name)).take();
+    terminated(letters, blank).parse_next(input)
+}
+
+fn sign<'a>(expected: char) -> impl ModalParser<Input<'a>, char, ContextError> {
+    terminated(expected, blank)
+}
+
+fn procedure(input: &mut Input) -> ModalResult<Procedure> {
+    let at = input.current_token_start();
+    name.verify(|word: &str| word == "to").parse_next(input)?;
+    let free = name.verify(|word: &str| !RESERVED.contains(&word));
+    let called = cut_err(free).context(expected("a name for the procedure")).parse_next(input)?;
+    let parameter = preceded(':', cut_err(name).context(expected("a parameter's name")));
+    let parameters: Vec<&str> = repeat(0.., parameter).parse_next(input)?;
+    let body = repeat(0.., statement).parse_next(input)?;
+    let end = name.verify(|word: &str| word == "end");
+    cut_err(end).context(expected("a statement or `end`")).parse_next(input)?;
+    let parameters = parameters.into_iter().map(str::to_owned).collect();
+    Ok(Procedure { name: called.into(), parameters, body, at })
+}
+
+fn statement(input: &mut Input) -> ModalResult<Statement> {
+    let (start, at) = (input.checkpoint(), input.current_token_start());
+    let action = match name.parse_next(input)? {
+        "forward" => Action::Forward(argument(input)?),
+        "turn" => Action::Turn(argument(input)?),
+        "pitch" => Action::Pitch(argument(input)?),
+        "wait" => Action::Wait(argument(input)?),
+        "goto" => Action::Goto(coordinates(input)?),
+        "repeat" => Action::Repeat(argument(input)?, block(input)?),
+        "to" | "end" => {
+            input.reset(&start);
+            return Err(ErrMode::Backtrack(ContextError::from_input(input)));
+        }
+        name => Action::Call { name: name.into(), procedure: 0, arguments: arguments(input)? },
+    };
+    Ok(Statement { at, action })
+}
+
+fn block(input: &mut Input) -> ModalResult<Vec<Statement>> {
+    cut_err(sign('[')).context(expected("`[`")).parse_next(input)?;
+    let statements = repeat(0.., statement).parse_next(input)?;
+    cut_err(sign(']')).context(expected("a statement or `]`")).parse_next(input)?;
+    Ok(statements)
+}
+
+fn argument(input: &mut Input) -> ModalResult<Expression> {
+    cut_err(expression).context(expected("a value")).parse_next(input)
+}
+
+fn coordinates(input: &mut Input) -> ModalResult<Vec<Expression>> {
+    let mut found = vec![argument(input)?];
+    cut_err(sign(',')).context(expected("`,`")).parse_next(input)?;
+    found.push(argument(input)?);
+    if opt(sign(',')).parse_next(input)?.is_some() {
+        found.push(argument(input)?);
+    }
+    Ok(found)
+}
+
+/// Values behind a procedure's name; none where no value begins there.
+fn arguments(input: &mut Input) -> ModalResult<Vec<Expression>> {
+    let begins = one_of(|c: char| c.is_ascii_digit() || ".:(-".contains(c));
+    if opt(peek(begins)).parse_next(input)?.is_none() {
+        return Ok(Vec::new());
+    }
+    separated(1.., argument, sign(',')).parse_next(input)
+}
+
+fn expression(input: &mut Input) -> ModalResult<Expression> {
+    let at = input.current_token_start();
+    let mut terms = Vec::new();
+    sum(input, &mut terms)?;
+    Ok(Expression { at, terms })
+}
+
+fn sum(input: &mut Input, terms: &mut Vec<Term>) -> ModalResult<()> {
+    product(input, terms)?;
+    while let Some(operator) = opt(alt((sign('+'), sign('-')))).parse_next(input)? {
+        operand(input, terms, product)?;
+        terms.push(if operator == '+' { Term::Add } else { Term::Subtract });
+    }
+    Ok(())
+}
+
+fn product(input: &mut Input, terms: &mut Vec<Term>) -> ModalResult<()> {
+    factor(input, terms)?;
+    while let Some(operator) = opt(alt((sign('*'), sign('/')))).parse_next(input)? {
+        operand(input, terms, factor)?;
+        terms.push(if operator == '*' { Term::Multiply } else { Term::Divide });
+    }
+    Ok(())
+}
+
+/// What has to follow an operator.
+fn operand(
+    input: &mut Input,
+    terms: &mut Vec<Term>,
+    parse: fn(&mut Input, &mut Vec<Term>) -> ModalResult<()>,
+) -> ModalResult<()> {
+    let mut parse = |input: &mut Input| parse(input, terms);
+    cut_err(parse.by_ref()).context(expected("a value")).parse_next(input)
+}
+
+fn factor(input: &mut Input, terms: &mut Vec<Term>) -> ModalResult<()> {
+    let is_negative = opt(sign('-')).parse_next(input)?.is_some();
+    if opt(sign('(')).parse_next(input)?.is_some() {
+        operand(input, terms, sum)?;
+        cut_err(sign(')')).context(expected("`)`")).parse_next(input)?;
+    } else {
+        terms.push(alt((number, parameter)).parse_next(input)?);
+    }
+    if is_negative {
+        terms.push(Term::Negate);
+    }
+    Ok(())
+}
+
+fn number(input: &mut Input) -> ModalResult<Term> {
+    let digits = alt(((digit1, opt(('.', digit0))).void(), ('.', digit1).void()));
+    let exponent = (one_of(['e', 'E']), opt(one_of(['+', '-'])), digit1);
+    let number = (digits, opt(exponent)).take().parse_to().map(Term::Number);
+    terminated(number, blank).parse_next(input)
+}
+
+fn parameter(input: &mut Input) -> ModalResult<Term> {
+    let at = input.current_token_start();
+    let named = cut_err(name).context(expected("a parameter's name"));
+    preceded(':', named).map(|name| Term::Named(name.into(), at)).parse_next(input)
+}
+
+/// Names of procedures and parameters become indices.
+fn resolved(mut script: Script) -> Result<Script, InputError> {
+    for (i, procedure) in script.procedures.iter().enumerate() {
+        if script.procedures[..i].iter().any(|earlier| earlier.name == procedure.name) {
+            let cause = format!("a second procedure `{}`", procedure.name);
+            return Err(script.error(procedure.at, cause, "give each a name of its own"));
+        }
+    }
+    let mut main = std::mem::take(&mut script.main);
+    resolve(&script, &mut main, &[])?;
+    let mut bodies = Vec::with_capacity(script.procedures.len());
+    for procedure in &script.procedures {
+        let mut body = procedure.body.clone();
+        resolve(&script, &mut body, &procedure.parameters)?;
+        bodies.push(body);
+    }
+    for (procedure, body) in script.procedures.iter_mut().zip(bodies) {
+        procedure.body = body;
+    }
+    Ok(Script { main, ..script })
+}
+
+fn resolve(
+    script: &Script,
+    statements: &mut [Statement],
+    parameters: &[String],
+) -> Result<(), InputError> {
+    for Statement { at, action } in statements {
+        match action {
+            Action::Forward(e) | Action::Turn(e) | Action::Pitch(e) | Action::Wait(e) => {
+                resolve_values(script, std::slice::from_mut(e), parameters)?;
+            }
+            Action::Goto(coordinates) => resolve_values(script, coordinates, parameters)?,
+            Action::Repeat(count, body) => {
+                resolve_values(script, std::slice::from_mut(count), parameters)?;
+                resolve(script, body, parameters)?;
+            }
+            Action::Call { name, procedure, arguments } => {
+                *procedure = called(script, *at, name, arguments.len())?;
+                resolve_values(script, arguments, parameters)?;
+            }
+        }
+    }
+    Ok(())
+}
+
+fn called(script: &Script, at: usize, name: &str, arguments: usize) -> Result<usize, InputError> {
+    let Some(index) = script.procedures.iter().position(|p| p.name == name) else {
+        let procedures = script.procedures.iter().map(|p| p.name.as_str());
+        let known: Vec<&str> = RESERVED.into_iter().chain(procedures).collect();
+        let cause = format!("there is no procedure `{name}`");
+        return Err(script.error(at, cause, nearest(name, &known)));
+    };
+    let parameters = &script.procedures[index].parameters;
+    if parameters.len() != arguments {
+        let cause = format!("`{name}` takes {} values, not {arguments}", parameters.len());
+        let remedy = match &parameters[..] {
+            [] => format!("write `{name}` alone"),
+            _ => format!("write {name} {}", parameters.join(", ")),
+        };
+        return Err(script.error(at, cause, remedy));
+    }
+    Ok(index)
+}
+
+fn resolve_values(
+    script: &Script,
+    values: &mut [Expression],
+    parameters: &[String],
+) -> Result<(), InputError> {
+    for term in values.iter_mut().flat_map(|value| &mut value.terms) {
+        let Term::Named(name, at) = term else { continue };
+        let Some(index) = parameters.iter().position(|parameter| parameter == name) else {
+            let known: Vec<&str> = parameters.iter().map(String::as_str).collect();
+            let cause = format!("there is no parameter `:{name}` here");
+            return Err(script.error(*at, cause, nearest(name, &known)));
+        };
+        *term = Term::Parameter(index);
+    }
+    Ok(())
+}

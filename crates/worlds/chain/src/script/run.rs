@@ -1,0 +1,287 @@
+//! A script, carried out statement by statement.
+
+use super::{Action, Expression, MAX_DEPTH, MAX_STATEMENTS, Script, Statement, Term};
+use sidestep_kernel::InputError;
+use sidestep_kernel::math::{cos, sin};
+
+/// Where an initiator is, and which way it looks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Turtle {
+    /// In m.
+    pub position_m: [f64; 3],
+    /// Unit vector ahead.
+    pub ahead: [f64; 3],
+    /// Unit vector to the left, across `ahead`.
+    pub left: [f64; 3],
+}
+
+impl Default for Turtle {
+    /// At the origin, looking along x, with z up.
+    fn default() -> Self {
+        Self { position_m: [0.0; 3], ahead: [1.0, 0.0, 0.0], left: [0.0, 1.0, 0.0] }
+    }
+}
+
+impl Turtle {
+    fn up(&self) -> [f64; 3] {
+        let ([ax, ay, az], [lx, ly, lz]) = (self.ahead, self.left);
+        [ay * lz - az * ly, az * lx - ax * lz, ax * ly - ay * lx]
+    }
+
+    fn advance(&mut self, distance_m: f64) {
+        self.position_m = mixed(self.position_m, 1.0, self.ahead, distance_m);
+    }
+
+    /// To the left about the upward axis.
+    fn turn(&mut self, angle_rad: f64) {
+        let (s, c) = (sin(angle_rad), cos(angle_rad));
+        (self.ahead, self.left) =
+            (mixed(self.ahead, c, self.left, s), mixed(self.left, c, self.ahead, -s));
+        self.straighten();
+    }
+
+    /// Nose up about the axis to the left.
+    fn pitch(&mut self, angle_rad: f64) {
+        self.ahead = mixed(self.ahead, cos(angle_rad), self.up(), sin(angle_rad));
+        self.straighten();
+    }
+
+    /// Rounding bends the axes a little, and each turn multiplies what earlier ones have bent.
+    fn straighten(&mut self) {
+        self.ahead = unit(self.ahead);
+        self.left = unit(mixed(self.left, 1.0, self.ahead, -dot(self.left, self.ahead)));
+    }
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn unit(a: [f64; 3]) -> [f64; 3] {
+    mixed(a, 1.0 / dot(a, a).sqrt(), [0.0; 3], 0.0)
+}
+
+/// `a * by + b * times`.
+fn mixed(a: [f64; 3], by: f64, b: [f64; 3], times: f64) -> [f64; 3] {
+    [0, 1, 2].map(|i| a[i] * by + b[i] * times)
+}
+
+/// What an initiator is to do next.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Motion {
+    /// Move straight to this position, in m.
+    MoveTo {
+        /// The position.
+        position_m: [f64; 3],
+    },
+    /// Look this way.
+    Face {
+        /// Unit vector.
+        ahead: [f64; 3],
+    },
+    /// Rest.
+    Wait {
+        /// How long, in s, not negative.
+        duration_s: f64,
+    },
+}
+
+/// The motions of a script.
+#[derive(Debug, Clone)]
+pub struct Motions<'a> {
+    script: &'a Script,
+    turtle: Turtle,
+    frames: Vec<Frame<'a>>,
+    /// Statements that may still be carried out.
+    left: u64,
+}
+
+/// A body that is being carried out.
+#[derive(Debug, Clone)]
+struct Frame<'a> {
+    body: &'a [Statement],
+    next: usize,
+    /// How often to begin again.
+    again: u64,
+    /// Values of the parameters of the procedure around.
+    parameters: Vec<f64>,
+}
+
+impl<'a> Motions<'a> {
+    pub(super) fn new(script: &'a Script, turtle: Turtle) -> Self {
+        let main = Frame { body: &script.main, next: 0, again: 0, parameters: Vec::new() };
+        Self { script, turtle, frames: vec![main], left: MAX_STATEMENTS }
+    }
+
+    /// Where the initiator is after the motions so far.
+    pub fn turtle(&self) -> &Turtle {
+        &self.turtle
+    }
+
+    /// The next statement; none at the end of the script.
+    fn statement(&mut self) -> Option<Result<&'a Statement, InputError>> {
+        loop {
+            let frame = self.frames.last_mut()?;
+            if let Some(statement) = frame.body.get(frame.next) {
+                frame.next += 1;
+                return Some(self.count(statement.at).map(|()| statement));
+            }
+            if frame.again == 0 {
+                self.frames.pop();
+                continue;
+            }
+            frame.again -= 1;
+            frame.next = 0;
+            // A body without statements would go round unseen.
+            let at = frame.body.first().map_or(0, |statement| statement.at);
+            if let Err(error) = self.count(at) {
+                return Some(Err(error));
+            }
+        }
+    }
+
+    fn count(&mut self, at: usize) -> Result<(), InputError> {
+        let Some(left) = self.left.checked_sub(1) else {
+            let cause = format!("more than {MAX_STATEMENTS} statements have been carried out");
+            return Err(self.script.error(at, cause, "repeat less often"));
+        };
+        self.left = left;
+        Ok(())
+    }
+
+    /// What a statement comes to; none where it only opens a body.
+    fn carry_out(&mut self, statement: &'a Statement) -> Result<Option<Motion>, InputError> {
+        match &statement.action {
+            Action::Forward(distance) => {
+                self.turtle.advance(self.value(distance)?);
+                self.moved(statement)
+            }
+            Action::Goto(coordinates) => {
+                for (i, coordinate) in coordinates.iter().enumerate() {
+                    self.turtle.position_m[i] = self.value(coordinate)?;
+                }
+                self.moved(statement)
+            }
+            Action::Turn(angle) => {
+                self.turtle.turn(self.value(angle)?.to_radians());
+                Ok(Some(Motion::Face { ahead: self.turtle.ahead }))
+            }
+            Action::Pitch(angle) => {
+                self.turtle.pitch(self.value(angle)?.to_radians());
+                Ok(Some(Motion::Face { ahead: self.turtle.ahead }))
+            }
+            Action::Wait(duration) => self.wait(duration).map(Some),
+            Action::Repeat(count, body) => self.repeat(count, body).map(|()| None),
+            Action::Call { procedure, arguments, .. } => {
+                let parameters = arguments.iter().map(|argument| self.value(argument));
+                let parameters = parameters.collect::<Result<_, _>>()?;
+                let body = &self.script.procedures[*procedure].body;
+                self.open(statement.at, Frame { body, next: 0, again: 0, parameters })?;
+                Ok(None)
+            }
+        }
+    }
+
+    fn moved(&self, statement: &Statement) -> Result<Option<Motion>, InputError> {
+        let position_m = self.turtle.position_m;
+        if position_m.iter().all(|x| x.is_finite()) {
+            return Ok(Some(Motion::MoveTo { position_m }));
+        }
+        Err(self.script.error(statement.at, "this goes beyond all numbers", "go less far"))
+    }
+
+    fn wait(&self, duration: &Expression) -> Result<Motion, InputError> {
+        let duration_s = self.value(duration)?;
+        if duration_s < 0.0 {
+            let cause = format!("nobody can wait {duration_s} s");
+            return Err(self.script.error(duration.at, cause, "write a time from 0 on"));
+        }
+        Ok(Motion::Wait { duration_s })
+    }
+
+    fn repeat(&mut self, count: &Expression, body: &'a [Statement]) -> Result<(), InputError> {
+        let times = self.value(count)?;
+        if times < 0.0 || times.fract() != 0.0 || times > MAX_STATEMENTS as f64 {
+            let cause = format!("nothing can be repeated {times} times");
+            let remedy = format!("write a whole number from 0 to {MAX_STATEMENTS}");
+            return Err(self.script.error(count.at, cause, remedy));
+        }
+        if times == 0.0 {
+            return Ok(());
+        }
+        let parameters = self.parameters().to_vec();
+        self.open(count.at, Frame { body, next: 0, again: times as u64 - 1, parameters })
+    }
+
+    fn open(&mut self, at: usize, frame: Frame<'a>) -> Result<(), InputError> {
+        // A body that has nothing left to do needs no place: the last call of a procedure is free.
+        while self.frames.last().is_some_and(|f| f.next == f.body.len() && f.again == 0) {
+            self.frames.pop();
+        }
+        if self.frames.len() >= MAX_DEPTH {
+            let cause = format!("more than {MAX_DEPTH} procedures in each other");
+            return Err(self.script.error(at, cause, "let the procedure that calls itself end"));
+        }
+        self.frames.push(frame);
+        Ok(())
+    }
+
+    fn parameters(&self) -> &[f64] {
+        self.frames.last().map_or(&[], |frame| &frame.parameters)
+    }
+
+    fn value(&self, expression: &Expression) -> Result<f64, InputError> {
+        let value = evaluate(&expression.terms, self.parameters());
+        if value.is_finite() {
+            return Ok(value);
+        }
+        let cause = format!("the value is {value}");
+        Err(self.script.error(expression.at, cause, "divide by something that is not zero"))
+    }
+}
+
+/// A postfix expression that the parser has made: it has two operands where it takes two.
+fn evaluate(terms: &[Term], parameters: &[f64]) -> f64 {
+    let mut stack = Vec::with_capacity(terms.len());
+    for term in terms {
+        let value = match term {
+            Term::Number(number) => *number,
+            Term::Parameter(index) => parameters[*index],
+            Term::Named(..) => unreachable!("names are resolved when a script is read"),
+            Term::Negate => -pop(&mut stack),
+            operator => {
+                let (b, a) = (pop(&mut stack), pop(&mut stack));
+                match operator {
+                    Term::Add => a + b,
+                    Term::Subtract => a - b,
+                    Term::Multiply => a * b,
+                    _ => a / b,
+                }
+            }
+        };
+        stack.push(value);
+    }
+    pop(&mut stack)
+}
+
+fn pop(stack: &mut Vec<f64>) -> f64 {
+    stack.pop().expect("the parser emits operands before operators")
+}
+
+impl Iterator for Motions<'_> {
+    type Item = Result<Motion, InputError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        loop {
+            let motion = self.statement()?.and_then(|statement| self.carry_out(statement));
+            match motion {
+                Ok(None) => {}
+                Ok(Some(motion)) => return Some(Ok(motion)),
+                Err(error) => {
+                    self.frames.clear();
+                    return Some(Err(error));
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,228 @@
+//! A robot on wheels that keeps to its connector (slide E2).
+//!
+//! The chain says where the robot shall be; wheels get there late, and look elsewhere on the way.
+//! Short-range sensors let it slide along what is near and hold it back from what it would touch.
+//! Robots that only stop hang on walls when they are asked to graze them: their connectors'
+//! radius has to exceed their own by a margin (pitfall 17).
+
+use super::drive::{Drive, Pose, Wheels};
+use super::laser::Body;
+use super::proximity::{Gaps, Ring, SECTOR_RAD, safe_speed_m_s};
+use crate::geometry::{Point, along, dot, norm, sub};
+use crate::obstacle::Obstacles;
+use sidestep_kernel::InputError;
+use sidestep_kernel::math::{atan2, cos, sin, wrap_angle};
+use std::f64::consts::PI;
+
+/// What a follower is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Follower {
+    /// Its wheels.
+    pub drive: Drive,
+    /// Its body and sensors.
+    pub ring: Ring,
+    /// Speed per distance from the connector, beyond the connector's own speed.
+    pub gain_per_s: f64,
+    /// Turn per angle away from where it wants to go.
+    pub turn_gain_per_s: f64,
+    /// It goes no faster than to where a collision is so far away in time.
+    pub horizon_s: f64,
+    /// It slides along what is nearer than this; 0 for a robot that only stops.
+    pub slide_m: f64,
+}
+
+/// Where the connector is that a follower keeps to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Goal {
+    /// Its place.
+    pub at: Point<2>,
+    /// How fast it moves.
+    pub velocity_m_s: Point<2>,
+}
+
+/// What a follower does.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Command {
+    /// Speeds of its wheels.
+    pub wheels: Wheels,
+    /// Whether its sensors made it slower.
+    pub is_held: bool,
+}
+
+/// A follower after a tick.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Followed {
+    /// Where it is.
+    pub pose: Pose,
+    /// Whether its sensors made it slower.
+    pub is_held: bool,
+    /// Whether its bumper is pressed.
+    pub is_bumped: bool,
+    /// The air between its body and whatever is nearest, up to 1 m.
+    pub gap_m: f64,
+}
+
+/// A bumper is pressed by what is nearer than this.
+const BUMPER_M: f64 = 1e-3;
+
+/// A robot that looks this far away from where it wants to go drives backward.
+const BACKWARD_RAD: f64 = 2.0;
+/// Who wants to go no faster than this stands.
+const STANDING_M_S: f64 = 1e-3;
+
+impl Follower {
+    /// A follower of the usual gains, with sensors that see 0.15 m.
+    ///
+    /// # Errors
+    /// A radius that is not above 0.
+    pub fn new(drive: Drive, radius_m: f64) -> Result<Self, InputError> {
+        if !(radius_m > 0.0 && radius_m.is_finite()) {
+            let cause = format!("has a radius of {radius_m} m");
+            return Err(InputError::new("follower", cause, "give more than 0"));
+        }
+        let ring = Ring { radius_m, range_m: 0.15 };
+        Ok(Self {
+            drive,
+            ring,
+            gain_per_s: 3.0,
+            turn_gain_per_s: 6.0,
+            horizon_s: 0.1,
+            slide_m: 0.08,
+        })
+    }
+
+    /// Speeds of the wheels that keep to a connector, held back by what the sensors read. Its
+    /// wheels will turn for `dt_s`.
+    pub fn decide(&self, pose: &Pose, goal: &Goal, gaps: &Gaps, dt_s: f64) -> Command {
+        let wished = along(goal.velocity_m_s, sub(goal.at, pose.at), self.gain_per_s);
+        let wanted = self.aside(wished, pose.heading_rad, gaps);
+        let speed_m_s = norm(wanted);
+        if speed_m_s <= STANDING_M_S {
+            return Command { wheels: Wheels::default(), is_held: norm(wished) > STANDING_M_S };
+        }
+        let off_rad = wrap_angle(atan2(wanted[1], wanted[0]) - pose.heading_rad);
+        let is_backward = off_rad.abs() > BACKWARD_RAD;
+        let off_rad = if is_backward { wrap_angle(off_rad - PI) } else { off_rad };
+        let ahead_m_s = speed_m_s * cos(off_rad).max(0.0);
+        let wheels = self.drive.wheels(ahead_m_s, self.turn_gain_per_s * off_rad);
+        self.held(wheels, is_backward, gaps, dt_s)
+    }
+
+    /// One tick: it reads its sensors and turns its wheels. `others` are the bodies of other
+    /// robots.
+    pub fn follow(
+        &self,
+        pose: &Pose,
+        goal: &Goal,
+        (obstacles, others): (&Obstacles<2>, impl Iterator<Item = Body> + Clone),
+        dt_s: f64,
+    ) -> Followed {
+        let gaps = self.ring.read(pose, obstacles, others.clone());
+        let command = self.decide(pose, goal, &gaps, dt_s);
+        let pose = self.drive.step(*pose, command.wheels, dt_s);
+        let radius_m = self.ring.radius_m;
+        let to_robot =
+            |b: Body| b.core.nearest_to_point(pose.at).distance_m - b.radius_m - radius_m;
+        let apart_m = others.map(to_robot).fold(1.0, f64::min);
+        let gap_m = obstacles.clearance_m([pose.at; 2], radius_m, 1.0).min(apart_m);
+        Followed { pose, is_held: command.is_held, is_bumped: gap_m < BUMPER_M, gap_m }
+    }
+
+    /// What is left of a wish when its part toward what is near is taken away, the nearer the
+    /// more: the robot slides along.
+    fn aside(&self, mut wished: Point<2>, heading_rad: f64, gaps: &Gaps) -> Point<2> {
+        for (k, gap_m) in gaps.iter().enumerate().filter(|&(_, &gap_m)| gap_m < self.slide_m) {
+            let toward = heading_rad + k as f64 * SECTOR_RAD;
+            let u = [cos(toward), sin(toward)];
+            let closing_m_s = dot(wished, u).max(0.0);
+            wished = along(wished, u, closing_m_s * (gap_m / self.slide_m - 1.0));
+        }
+        wished
+    }
+
+    /// Slows the middle, never the turn: a round body that turns on the spot touches nothing.
+    fn held(&self, wheels: Wheels, is_backward: bool, gaps: &Gaps, dt_s: f64) -> Command {
+        let turn_rad_s = self.drive.turn_rad_s(wheels);
+        let (toward_rad, sign) = if is_backward { (PI, -1.0) } else { (0.0, 1.0) };
+        let slack_rad = 0.5 * turn_rad_s.abs() * dt_s;
+        let horizon_s = self.horizon_s.max(2.0 * dt_s);
+        let safe_m_s = safe_speed_m_s(gaps, toward_rad, slack_rad, horizon_s);
+        let speed_m_s = wheels.speed_m_s();
+        Command {
+            wheels: self.drive.wheels(sign * speed_m_s.min(safe_m_s), turn_rad_s),
+            is_held: speed_m_s > safe_m_s,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::ray::tests::any_core;
+    use super::*;
+    use crate::geometry::distance;
+    use crate::obstacle::{Obstacle, Obstacles};
+    use proptest::prelude::*;
+
+    const DT_S: f64 = 0.02;
+
+    fn follower() -> Follower {
+        Follower::new(Drive::new(0.4, 0.6).unwrap(), 0.25).unwrap()
+    }
+
+    fn run(mut pose: Pose, goal: impl Fn(f64) -> Goal, ticks: usize) -> (Pose, f64) {
+        let follower = follower();
+        let open = [follower.ring.range_m; 8];
+        for k in 0..ticks {
+            let command = follower.decide(&pose, &goal(k as f64 * DT_S), &open, DT_S);
+            pose = follower.drive.step(pose, command.wheels, DT_S);
+        }
+        (pose, distance(pose.at, goal(ticks as f64 * DT_S).at))
+    }
+
+    #[test]
+    fn it_arrives_at_a_connector_at_rest_from_wherever_it_looks() {
+        for k in 0..24 {
+            let pose = Pose { at: [0.0, 0.0], heading_rad: f64::from(k) * 0.26 - PI };
+            let rest = Goal { at: [0.5, 0.3], velocity_m_s: [0.0; 2] };
+            let (_, off_m) = run(pose, |_| rest, 600);
+            assert!(off_m < 0.01, "from {}: {off_m}", pose.heading_rad);
+        }
+    }
+
+    #[test]
+    fn it_keeps_up_with_a_connector_that_moves() {
+        let goal = |t: f64| Goal { at: [0.5 * t, 0.0], velocity_m_s: [0.5, 0.0] };
+        let (_, lag_m) = run(Pose { at: [-0.3, 0.1], heading_rad: 0.0 }, goal, 500);
+        assert!(lag_m < 0.02, "{lag_m}");
+    }
+
+    #[test]
+    fn it_backs_off_where_its_connector_goes_back() {
+        let goal = |t: f64| Goal { at: [-0.4 * t, 0.0], velocity_m_s: [-0.4, 0.0] };
+        let (pose, lag_m) = run(Pose { at: [0.0, 0.0], heading_rad: 0.0 }, goal, 300);
+        assert!(lag_m < 0.02 && pose.heading_rad.abs() < 0.01, "{pose:?}");
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(100))]
+        #[test]
+        fn it_never_enters_what_stands_still(
+            cores in prop::collection::vec((any_core(), 0.01..0.4f64), 1..8),
+            at in prop::array::uniform2(-3.0..3.0f64), heading_rad in -3.1..3.1f64,
+            goal in prop::array::uniform2(-3.0..3.0f64),
+        ) {
+            let all: Vec<_> = cores.iter().map(|(core, r)| Obstacle::still(1, *core, *r)).collect();
+            let obstacles = Obstacles::new(all, 1.0).unwrap();
+            prop_assume!(obstacles.clearance_m([at, at], 0.25, 1.0) > 0.0);
+            let follower = follower();
+            let goal = Goal { at: goal, velocity_m_s: [0.0; 2] };
+            let mut pose = Pose { at, heading_rad };
+            for _ in 0..300 {
+                let gaps = follower.ring.read(&pose, &obstacles, []);
+                let command = follower.decide(&pose, &goal, &gaps, DT_S);
+                pose = follower.drive.step(pose, command.wheels, DT_S);
+                prop_assert!(obstacles.clearance_m([pose.at; 2], 0.25, 1.0) > -1e-9);
+            }
+        }
+    }
+}

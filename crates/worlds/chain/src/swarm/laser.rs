@@ -1,0 +1,321 @@
+//! A laser that turns: distances from the robot's middle to what is around (slide N2).
+
+use super::drive::Pose;
+use super::ray;
+use crate::geometry::{Bounds, Core, Point};
+use crate::obstacle::{Obstacles, around};
+use sidestep_kernel::InputError;
+use sidestep_kernel::distr::normal;
+use sidestep_kernel::math::{cos, sin, wrap_angle};
+use sidestep_kernel::stream::{Draws, Purpose};
+use std::f64::consts::{PI, TAU};
+use std::ops::RangeInclusive;
+
+/// Draws of the errors of a laser's ranges: one stream per chain and cycle.
+pub const LASER_NOISE: Purpose = Purpose(1);
+
+/// Something that is no obstacle of the world, but in the way all the same: another robot.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Body {
+    /// Its inner part.
+    pub core: Core<2>,
+    /// How far it reaches beyond.
+    pub radius_m: f64,
+}
+
+impl Body {
+    /// A round robot.
+    pub fn disc(at: Point<2>, radius_m: f64) -> Self {
+        Self { core: Core::Point(at), radius_m }
+    }
+
+    pub(super) fn bounds(&self) -> Bounds<2> {
+        self.core.bounds().grown(self.radius_m)
+    }
+}
+
+/// A laser with equally spaced beams all around, of which it reads those within its field.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Laser {
+    /// How far it sees.
+    range_m: f64,
+    /// Standard deviation of its errors; 0 for none.
+    noise_std_m: f64,
+    /// The beams it reads are those up to this many to each side of straight ahead.
+    beams_per_side: usize,
+    /// Direction of every beam relative to the heading; beam `k` is `k` steps to the left.
+    directions: Vec<Point<2>>,
+}
+
+/// What a laser saw.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Scan {
+    /// Range of every beam of the full circle, as in [`Laser`]; beams that are not read hold 0.
+    ranges_m: Vec<f64>,
+}
+
+impl Laser {
+    /// A laser with `beams` around the full circle, that reads those within `half_field_rad` of
+    /// straight ahead.
+    ///
+    /// # Errors
+    /// No beams, or more than 3600; a range that is not above 0; a field outside (0, pi]; errors
+    /// that are not finite or negative.
+    pub fn new(
+        beams: usize,
+        range_m: f64,
+        half_field_rad: f64,
+        noise_std_m: f64,
+    ) -> Result<Self, InputError> {
+        let wrong = |cause: String, remedy: &str| Err(InputError::new("laser", cause, remedy));
+        if !(4..=3600).contains(&beams) {
+            return wrong(format!("has {beams} beams"), "give 4 to 3600");
+        }
+        if !(range_m > 0.0 && range_m <= 1e4) {
+            return wrong(format!("has a range of {range_m} m"), "give more than 0, up to 1e4 m");
+        }
+        if !(half_field_rad > 0.0 && half_field_rad <= PI + 1e-9) {
+            return wrong(format!("sees {half_field_rad} rad to each side"), "give up to pi");
+        }
+        if !(0.0..=range_m).contains(&noise_std_m) {
+            return wrong(format!("errs by {noise_std_m} m"), "give 0 up to its range");
+        }
+        let step_rad = TAU / beams as f64;
+        let direction = |k: usize| [cos(k as f64 * step_rad), sin(k as f64 * step_rad)];
+        Ok(Self {
+            range_m,
+            noise_std_m,
+            beams_per_side: last_beam(half_field_rad, step_rad),
+            directions: (0..beams).map(direction).collect(),
+        })
+    }
+
+    /// How far it sees.
+    pub fn range_m(&self) -> f64 {
+        self.range_m
+    }
+
+    fn step_rad(&self) -> f64 {
+        TAU / self.directions.len() as f64
+    }
+
+    /// Reads every beam of the field: the distance from the robot's middle to the nearest
+    /// obstacle or body, with an error where it errs, up to the range.
+    ///
+    /// One query of the obstacles' grid for all beams; each obstacle is then looked at by those
+    /// beams only that may meet it.
+    pub fn scan(
+        &self,
+        pose: &Pose,
+        obstacles: &Obstacles<2>,
+        bodies: impl IntoIterator<Item = Body>,
+        noise: &mut Draws,
+        scan: &mut Scan,
+    ) {
+        scan.ranges_m.clear();
+        scan.ranges_m.resize(self.directions.len(), 0.0);
+        self.read_beams().for_each(|beam| scan.ranges_m[beam] = self.range_m);
+        let turn = [cos(pose.heading_rad), sin(pose.heading_rad)];
+        let near = around(pose.at, self.range_m);
+        obstacles.visit(&near, |o| self.look(pose, turn, (&o.core, o.radius_m), scan));
+        for body in bodies.into_iter().filter(|body| body.bounds().meets(&near)) {
+            self.look(pose, turn, (&body.core, body.radius_m), scan);
+        }
+        if self.noise_std_m > 0.0 {
+            for beam in self.read_beams() {
+                let error_m = self.noise_std_m * normal(noise);
+                let range_m = &mut scan.ranges_m[beam];
+                *range_m = (*range_m + error_m).clamp(0.0, self.range_m);
+            }
+        }
+    }
+
+    /// The beams it reads, from the rightmost to the leftmost.
+    fn read_beams(&self) -> impl Iterator<Item = usize> {
+        let n = self.directions.len();
+        let m = self.beams_per_side;
+        (0..(2 * m + 1).min(n)).map(move |k| (n + k - m) % n)
+    }
+
+    fn look(
+        &self,
+        pose: &Pose,
+        turn: Point<2>,
+        (core, radius_m): (&Core<2>, f64),
+        scan: &mut Scan,
+    ) {
+        match core {
+            Core::Point(c) => self.look_at(pose, turn, [*c; 2], (core, radius_m), scan),
+            Core::Segment(ends) => self.look_at(pose, turn, *ends, (core, radius_m), scan),
+            Core::Cuboid(cuboid) => {
+                // From inside, the edges are not in every direction.
+                if core.nearest_to_point(pose.at).distance_m <= radius_m {
+                    return scan.ranges_m.fill(0.0);
+                }
+                for edge in cuboid.edges_2d() {
+                    self.look_at(pose, turn, edge, (&Core::Segment(edge), radius_m), scan);
+                }
+            }
+        }
+    }
+
+    /// Shortens the beams that meet a core, which lies around the segment `ends`.
+    fn look_at(
+        &self,
+        pose: &Pose,
+        turn: Point<2>,
+        ends: [Point<2>; 2],
+        (core, radius_m): (&Core<2>, f64),
+        scan: &mut Scan,
+    ) {
+        let n = self.directions.len();
+        let (first, count) = match ray::extent_rad(pose.at, ends, radius_m) {
+            None => (0, n),
+            Some((middle, half)) => {
+                let right = wrap_angle(middle - pose.heading_rad) - half;
+                let beams = (2.0 * half / self.step_rad()) as usize + 3;
+                let first = (right / self.step_rad()).floor() as isize;
+                (first.rem_euclid(n as isize) as usize, beams.min(n))
+            }
+        };
+        for k in 0..count {
+            let beam = (first + k) % n;
+            // Beams out of the field hold 0 and are never shortened.
+            let so_far_m = scan.ranges_m[beam];
+            if so_far_m > 0.0 {
+                let [c, s] = self.directions[beam];
+                let u = [c * turn[0] - s * turn[1], s * turn[0] + c * turn[1]];
+                let hit_m = ray::distance_m(pose.at, u, core, radius_m);
+                scan.ranges_m[beam] = hit_m.map_or(so_far_m, |m| m.min(so_far_m));
+            }
+        }
+    }
+
+    /// Bearing, left positive, and range of every beam that it reads, from the rightmost on.
+    pub fn readings<'a>(&'a self, scan: &'a Scan) -> impl Iterator<Item = (f64, f64)> + 'a {
+        let rightmost = -(self.beams_per_side as f64);
+        let bearing_rad = move |k: usize| (rightmost + k as f64) * self.step_rad();
+        let ranges_m = self.read_beams().filter_map(|beam| scan.ranges_m.get(beam).copied());
+        ranges_m.enumerate().map(move |(k, range_m)| (bearing_rad(k), range_m))
+    }
+
+    /// The least range within a sector of beams, given by its ends relative to the heading, left
+    /// positive; `None` where [`Self::sees`] says no.
+    pub fn least_m(&self, scan: &Scan, sector_rad: [f64; 2]) -> Option<f64> {
+        let n = self.directions.len() as isize;
+        let range_m = |k: isize| scan.ranges_m[k.rem_euclid(n) as usize];
+        let beams = self.sector(sector_rad)?;
+        Some(beams.map(range_m).fold(self.range_m, f64::min))
+    }
+
+    /// Whether a sector is wholly in the field and has a beam.
+    pub fn sees(&self, sector_rad: [f64; 2]) -> bool {
+        self.sector(sector_rad).is_some()
+    }
+
+    /// The beams of a sector; negative ones are to the right.
+    fn sector(&self, [from_rad, to_rad]: [f64; 2]) -> Option<RangeInclusive<isize>> {
+        // Ends that are multiples of the step count as inside, whatever their rounding.
+        let first = (from_rad / self.step_rad() - 1e-9).ceil() as isize;
+        let last = (to_rad / self.step_rad() + 1e-9).floor() as isize;
+        let side = self.beams_per_side as isize;
+        let n = self.directions.len() as isize;
+        let sees_all = 2 * side + 1 >= n && last.saturating_sub(first) < n;
+        let is_seen = sees_all || (-side <= first && last <= side);
+        (first <= last && is_seen).then_some(first..=last)
+    }
+}
+
+fn last_beam(angle_rad: f64, step_rad: f64) -> usize {
+    (angle_rad / step_rad + 1e-9) as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::ray::tests::{any_core, marched_m};
+    use super::*;
+    use crate::geometry::along;
+    use crate::obstacle::Obstacle;
+    use proptest::prelude::*;
+    use sidestep_kernel::Seed;
+    use sidestep_kernel::stream::Streams;
+
+    fn draws() -> Draws {
+        Streams::new(Seed(5)).draws(0, 0, LASER_NOISE)
+    }
+
+    fn scanned(laser: &Laser, pose: &Pose, obstacles: &Obstacles<2>, bodies: &[Body]) -> Scan {
+        let mut scan = Scan::default();
+        laser.scan(pose, obstacles, bodies.iter().copied(), &mut draws(), &mut scan);
+        scan
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(60))]
+        #[test]
+        fn every_beam_goes_as_far_as_marching_does(
+            cores in prop::collection::vec((any_core(), 0.01..0.5f64), 1..8),
+            body in (any_core(), 0.01..0.5f64),
+            at in prop::array::uniform2(-3.0..3.0f64), heading_rad in -3.1..3.1f64,
+        ) {
+            let laser = Laser::new(180, 3.2, PI, 0.0).unwrap();
+            let pose = Pose { at, heading_rad };
+            let all = cores.iter().map(|(core, r)| Obstacle::still(1, *core, *r)).collect();
+            let obstacles = Obstacles::new(all, 1.0).unwrap();
+            let bodies = [Body { core: body.0, radius_m: body.1 }];
+            let scan = scanned(&laser, &pose, &obstacles, &bodies);
+            for beam in 0..180 {
+                let toward = heading_rad + beam as f64 * TAU / 180.0;
+                let u = [cos(toward), sin(toward)];
+                let marched = cores.iter().chain([&body])
+                    .filter_map(|(core, r)| marched_m(at, u, core, *r)).fold(3.2, f64::min);
+                let seen = scan.ranges_m[beam];
+                let grazes = cores.iter().chain([&body]).any(|(core, r)| {
+                    let least = core.nearest_to_segment([at, along(at, u, 3.2)]).distance_m;
+                    (least - r).abs() < 1e-6
+                });
+                prop_assert!((seen - marched).abs() < 1e-3 || grazes, "{beam}: {seen} {marched}");
+            }
+        }
+    }
+
+    #[test]
+    fn sectors_hold_their_ends() {
+        let laser = Laser::new(180, 3.2, f64::to_radians(90.0), 0.0).unwrap();
+        let wall = Obstacle::capsule(0, [[-9.0, 0.6], [9.0, 0.6]], 0.0);
+        let obstacles = Obstacles::new(vec![wall], 1.0).unwrap();
+        let pose = Pose { at: [0.0, 0.0], heading_rad: 0.0 };
+        let scan = scanned(&laser, &pose, &obstacles, &[]);
+        let side = f64::to_radians(90.0);
+        assert!((laser.least_m(&scan, [0.0, side]).unwrap() - 0.6).abs() < 1e-12);
+        assert_eq!(laser.least_m(&scan, [-side, 0.0]), Some(3.2));
+        assert_eq!(laser.least_m(&scan, [0.0, side + 0.1]), None, "beyond the field");
+    }
+
+    #[test]
+    fn errors_have_their_spread_and_belong_to_the_cycle() {
+        let laser = Laser::new(180, 3.2, PI, 0.02).unwrap();
+        let ring = Obstacle::ball(0, [0.0, 0.0], 0.1);
+        let obstacles = Obstacles::new(vec![ring], 1.0).unwrap();
+        let pose = Pose { at: [1.0, 0.0], heading_rad: PI };
+        let mut ahead_m = Vec::new();
+        for cycle in 0..500 {
+            let mut scan = Scan::default();
+            let mut noise = Streams::new(Seed(5)).draws(0, cycle, LASER_NOISE);
+            laser.scan(&pose, &obstacles, [], &mut noise, &mut scan);
+            ahead_m.push(scan.ranges_m[0]);
+        }
+        let mean = ahead_m.iter().sum::<f64>() / 500.0;
+        let square = |x: f64| (x - mean) * (x - mean);
+        let spread = (ahead_m.iter().map(|&x| square(x)).sum::<f64>() / 500.0).sqrt();
+        assert!((mean - 0.9).abs() < 0.005 && (spread - 0.02).abs() < 0.003, "{mean} {spread}");
+    }
+
+    #[test]
+    fn wrong_lasers_are_refused() {
+        assert!(Laser::new(0, 3.2, PI, 0.0).is_err());
+        assert!(Laser::new(180, 0.0, PI, 0.0).is_err());
+        assert!(Laser::new(180, 3.2, 4.0, 0.0).is_err());
+        assert!(Laser::new(180, 3.2, PI, f64::NAN).is_err());
+    }
+}

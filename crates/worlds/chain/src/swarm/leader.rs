@@ -1,0 +1,449 @@
+//! The robot that finds the way: wall following with a target, as six layers (slides N1 to N6).
+//!
+//! | layer | when | left, right wheel |
+//! | --- | --- | --- |
+//! | 6 keep moving | always | s, s |
+//! | 5 target check | a target is seen | toward it |
+//! | 4 far right | leaving the right wall | s, 0 |
+//! | 3 far left | leaving the left wall, but not the right one | 0, s |
+//! | 2 close right | wall close on the right | 0, s |
+//! | 1 close left | wall close on the left, but not on the right | s, 0 |
+//!
+//! A lower number replaces a higher one. The exclusions let the right side win every tie, which
+//! is what turns a robot round in a dead end. Distances are from the robot's middle.
+
+use super::drive::{Pose, Wheels, steer};
+use super::laser::{Body, Laser, Scan};
+use super::ray;
+use crate::geometry::{Point, distance};
+use crate::obstacle::Obstacles;
+use serde::{Deserialize, Serialize};
+use sidestep_kernel::InputError;
+use sidestep_kernel::stream::Draws;
+
+/// One of the six layers; the number is the slides'.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Layer {
+    /// 1: away from the left wall.
+    CloseLeft = 1,
+    /// 2: away from the right wall.
+    CloseRight = 2,
+    /// 3: back to the left wall.
+    FarLeft = 3,
+    /// 4: back to the right wall.
+    FarRight = 4,
+    /// 5: to the target.
+    TargetCheck = 5,
+    /// 6: straight on.
+    KeepMoving = 6,
+}
+
+/// When a wall counts as being left. The slides do not say.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Leaving {
+    /// It was near, is no longer, and is not lost yet: an event with a memory.
+    #[default]
+    Latched,
+    /// Its distance is between far and lost.
+    Range,
+    /// Its distance is above far: the slides' words taken literally. A leader in the open then
+    /// turns for ever, as it leaves walls that are not there.
+    Level,
+}
+
+/// When a target ends the following of a wall.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LeaveRule {
+    /// So far must the way to the target be free.
+    pub free_m: f64,
+    /// In this angle to each side of its bearing.
+    pub half_angle_rad: f64,
+}
+
+impl Default for LeaveRule {
+    fn default() -> Self {
+        Self { free_m: 1.4, half_angle_rad: 0.5 }
+    }
+}
+
+/// How targets are detected.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TargetSense {
+    /// From how far; infinite for a beacon.
+    pub range_m: f64,
+    /// Whether obstacles hide it.
+    pub needs_line_of_sight: bool,
+}
+
+impl Default for TargetSense {
+    fn default() -> Self {
+        Self { range_m: f64::INFINITY, needs_line_of_sight: false }
+    }
+}
+
+/// How a leader turns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Turning {
+    /// About the resting wheel, as in the slides; where that is blocked it stands.
+    #[default]
+    AboutAWheel,
+    /// About the resting wheel, and on the spot where that is blocked: for corridors too narrow
+    /// to swing round in.
+    OnTheSpotWhereBlocked,
+}
+
+/// What a leader is: its laser and the numbers of its behavior.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Leader {
+    /// Its eyes.
+    pub laser: Laser,
+    /// Between which angles to each side of straight ahead it looks for walls.
+    pub sector_rad: [f64; 2],
+    /// Speed of a wheel that drives.
+    pub speed_m_s: f64,
+    /// A wall nearer than this is close.
+    pub near_m: f64,
+    /// A wall further than this may be being left.
+    pub far_m: f64,
+    /// A wall further than this is lost.
+    pub lost_m: f64,
+    /// When a wall counts as being left.
+    pub leaving: Leaving,
+    /// When a target ends the following of a wall; `None` for never, as in the slides.
+    pub leave_rule: Option<LeaveRule>,
+    /// How targets are detected.
+    pub target_sense: TargetSense,
+    /// How it turns.
+    pub turning: Turning,
+}
+
+impl Leader {
+    /// The leader of the slides: 0.7 to 0.9 m from walls, a laser of 3.2 m all around whose front
+    /// quarters count on each side, the latched reading and the leave rule.
+    ///
+    /// # Errors
+    /// A speed that is not above 0.
+    pub fn new(speed_m_s: f64) -> Result<Self, InputError> {
+        let leader = Self {
+            laser: Laser::new(180, 3.2, std::f64::consts::PI, 0.0)?,
+            sector_rad: [0.0, std::f64::consts::FRAC_PI_2],
+            speed_m_s,
+            near_m: 0.7,
+            far_m: 0.9,
+            lost_m: 1.3,
+            leaving: Leaving::default(),
+            leave_rule: Some(LeaveRule::default()),
+            target_sense: TargetSense::default(),
+            turning: Turning::default(),
+        };
+        leader.check()?;
+        Ok(leader)
+    }
+
+    /// Whether its numbers make sense together.
+    ///
+    /// # Errors
+    /// A speed that is not above 0; distances that are not 0 < near <= far <= lost <= the
+    /// laser's range; a sector that the laser does not see.
+    pub fn check(&self) -> Result<(), InputError> {
+        let wrong = |cause: String, remedy: &str| Err(InputError::new("leader", cause, remedy));
+        let Self { speed_m_s, near_m, far_m, lost_m, sector_rad: [from, to], .. } = *self;
+        if !(speed_m_s > 0.0 && speed_m_s.is_finite()) {
+            return wrong(format!("has a speed of {speed_m_s} m/s"), "give more than 0");
+        }
+        let range_m = self.laser.range_m();
+        if !(0.0 < near_m && near_m <= far_m && far_m <= lost_m && lost_m <= range_m) {
+            return wrong(
+                format!("has walls near at {near_m}, far at {far_m}, lost at {lost_m} m"),
+                "give 0 < near <= far <= lost <= the laser's range",
+            );
+        }
+        if !self.laser.sees([from, to]) || !self.laser.sees([-to, -from]) {
+            let cause = format!("looks for walls from {from} to {to} rad, where it has no beams");
+            return wrong(cause, "widen the laser's field, or the sector");
+        }
+        Ok(())
+    }
+}
+
+/// What a leader remembers.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct LeaderState {
+    /// Where it is.
+    pub pose: Pose,
+    /// The walls that it follows.
+    pub followed: Sides<bool>,
+}
+
+impl LeaderState {
+    /// A leader that follows no wall yet.
+    pub fn at(pose: Pose) -> Self {
+        Self { pose, followed: Sides::default() }
+    }
+}
+
+/// Something on each side.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Sides<T> {
+    /// On the left.
+    pub left: T,
+    /// On the right.
+    pub right: T,
+}
+
+/// What is around a leader.
+#[derive(Debug, Clone, Copy)]
+pub struct Surroundings<'a> {
+    /// The world's obstacles.
+    pub obstacles: &'a Obstacles<2>,
+    /// Other robots.
+    pub bodies: &'a [Body],
+    /// Where it shall go.
+    pub target: Option<Point<2>>,
+}
+
+/// What a leader perceives.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Percept {
+    /// Nearest walls.
+    pub walls_m: Sides<f64>,
+    /// The target, where it is detected.
+    pub target: Option<Sighting>,
+}
+
+/// A detected target.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sighting {
+    /// In which direction, relative to the heading, left positive.
+    pub bearing_rad: f64,
+    /// Whether the leave rule finds the way to it free.
+    pub way_is_free: bool,
+}
+
+/// What a leader does.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Decision {
+    /// Speeds of its wheels.
+    pub wheels: Wheels,
+    /// The layer that acts.
+    pub layer: Layer,
+    /// The walls that it follows from now on.
+    pub followed: Sides<bool>,
+}
+
+impl Leader {
+    /// Reads the laser and the target's detector. `scan` is a buffer; what it held is forgotten.
+    pub fn perceive(
+        &self,
+        pose: &Pose,
+        around: &Surroundings<'_>,
+        noise: &mut Draws,
+        scan: &mut Scan,
+    ) -> Percept {
+        self.laser.scan(pose, around.obstacles, around.bodies.iter().copied(), noise, scan);
+        let [from, to] = self.sector_rad;
+        let least_m = |sector| self.laser.least_m(scan, sector).unwrap_or(self.laser.range_m());
+        let walls_m = Sides { left: least_m([from, to]), right: least_m([-to, -from]) };
+        let target = around.target.filter(|&target| self.detects(pose, around, target));
+        Percept { walls_m, target: target.map(|target| self.sighting(pose, target, scan)) }
+    }
+
+    fn detects(&self, pose: &Pose, around: &Surroundings<'_>, target: Point<2>) -> bool {
+        let is_hidden = || {
+            let line = [pose.at, target];
+            !ray::is_clear(around.obstacles, line)
+                || around.bodies.iter().any(|b| !b.core.is_clear_of_segment(line, b.radius_m))
+        };
+        distance(pose.at, target) <= self.target_sense.range_m
+            && !(self.target_sense.needs_line_of_sight && is_hidden())
+    }
+
+    fn sighting(&self, pose: &Pose, target: Point<2>, scan: &Scan) -> Sighting {
+        let bearing_rad = pose.bearing_rad(target);
+        let is_free = |rule: LeaveRule| {
+            let cone = [bearing_rad - rule.half_angle_rad, bearing_rad + rule.half_angle_rad];
+            let needed_m = rule.free_m.min(distance(pose.at, target));
+            // Where the laser does not look, the way is not known to be free.
+            self.laser.least_m(scan, cone).is_some_and(|free_m| free_m >= needed_m)
+        };
+        Sighting { bearing_rad, way_is_free: self.leave_rule.is_some_and(is_free) }
+    }
+
+    /// Which layer acts, and what it does.
+    pub fn decide(&self, followed: Sides<bool>, percept: &Percept) -> Decision {
+        let leaves_walls = percept.target.is_some_and(|target| target.way_is_free);
+        let left = self.wall(followed.left, percept.walls_m.left, leaves_walls);
+        let right = self.wall(followed.right, percept.walls_m.right, leaves_walls);
+        let s = self.speed_m_s;
+        let (to_left, to_right) = (Wheels::new(0.0, s), Wheels::new(s, 0.0));
+        let (layer, wheels) = if left.is_close && !right.is_close {
+            (Layer::CloseLeft, to_right)
+        } else if right.is_close {
+            (Layer::CloseRight, to_left)
+        } else if left.is_left_behind && !right.is_left_behind {
+            (Layer::FarLeft, to_left)
+        } else if right.is_left_behind {
+            (Layer::FarRight, to_right)
+        } else if let Some(target) = percept.target {
+            (Layer::TargetCheck, steer(target.bearing_rad, s))
+        } else {
+            (Layer::KeepMoving, Wheels::new(s, s))
+        };
+        let followed = Sides { left: left.is_followed, right: right.is_followed };
+        Decision { wheels, layer, followed }
+    }
+
+    fn wall(&self, was_followed: bool, wall_m: f64, leaves_walls: bool) -> Wall {
+        let is_far = wall_m > self.far_m;
+        let is_followed = !leaves_walls && (!is_far || was_followed && wall_m <= self.lost_m);
+        let is_left_behind = is_far
+            && !leaves_walls
+            && match self.leaving {
+                Leaving::Latched => is_followed,
+                Leaving::Range => wall_m < self.lost_m,
+                Leaving::Level => true,
+            };
+        Wall { is_close: wall_m < self.near_m, is_followed, is_left_behind }
+    }
+
+    /// What it does instead where the way of its wheels is blocked.
+    pub fn when_blocked(&self, wheels: Wheels) -> Wheels {
+        match self.turning {
+            Turning::AboutAWheel => Wheels::default(),
+            Turning::OnTheSpotWhereBlocked => wheels.on_the_spot(),
+        }
+    }
+}
+
+/// What the layers make of a wall.
+#[derive(Debug, Clone, Copy)]
+struct Wall {
+    is_close: bool,
+    is_followed: bool,
+    is_left_behind: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn leader(leaving: Leaving) -> Leader {
+        Leader { leaving, ..Leader::new(0.5).unwrap() }
+    }
+
+    fn percept(left: f64, right: f64) -> Percept {
+        Percept { walls_m: Sides { left, right }, target: None }
+    }
+
+    fn layer(leader: &Leader, followed: (bool, bool), percept: &Percept) -> Layer {
+        let (left, right) = followed;
+        leader.decide(Sides { left, right }, percept).layer
+    }
+
+    #[test]
+    fn the_table_of_the_slides_holds_line_by_line() {
+        let leader = leader(Leaving::Latched);
+        let (l, r) = (Wheels::new(0.0, 0.5), Wheels::new(0.5, 0.0));
+        for (walls, followed, layer, wheels) in [
+            ((0.6, 0.8), (false, false), Layer::CloseLeft, r),
+            ((0.8, 0.6), (false, false), Layer::CloseRight, l),
+            ((0.6, 0.6), (false, false), Layer::CloseRight, l),
+            ((1.0, 0.8), (true, true), Layer::FarLeft, l),
+            ((0.8, 1.0), (true, true), Layer::FarRight, r),
+            ((1.0, 1.0), (true, true), Layer::FarRight, r),
+            ((0.8, 0.8), (true, true), Layer::KeepMoving, Wheels::new(0.5, 0.5)),
+            // Close comes before far, whatever the sides.
+            ((0.6, 1.0), (true, true), Layer::CloseLeft, r),
+            ((1.0, 0.6), (true, true), Layer::CloseRight, l),
+        ] {
+            let (left, right) = followed;
+            let decision = leader.decide(Sides { left, right }, &percept(walls.0, walls.1));
+            assert_eq!((decision.layer, decision.wheels), (layer, wheels), "{walls:?}");
+        }
+    }
+
+    #[test]
+    fn a_wall_is_left_behind_as_the_reading_says() {
+        let reading = |leaving, followed, left| {
+            layer(&leader(leaving), (followed, false), &percept(left, 0.8))
+        };
+        let (far, keep) = (Layer::FarLeft, Layer::KeepMoving);
+        assert_eq!(reading(Leaving::Latched, true, 1.0), far);
+        assert_eq!(reading(Leaving::Latched, false, 1.0), keep, "never near");
+        assert_eq!(reading(Leaving::Latched, true, 1.4), keep, "lost");
+        assert_eq!(reading(Leaving::Range, false, 1.0), far);
+        assert_eq!(reading(Leaving::Range, true, 1.4), keep);
+        assert_eq!(reading(Leaving::Level, false, 3.2), far);
+    }
+
+    #[test]
+    fn a_leader_that_cannot_work_is_refused() {
+        let right = leader(Leaving::Latched);
+        assert!(right.check().is_ok());
+        assert!(Leader::new(f64::NAN).is_err());
+        assert!(Leader { near_m: 1.0, ..right.clone() }.check().is_err());
+        assert!(Leader { lost_m: 4.0, ..right.clone() }.check().is_err());
+        let narrow = Laser::new(180, 3.2, 0.5, 0.0).unwrap();
+        assert!(Leader { laser: narrow, ..right }.check().is_err());
+    }
+
+    #[test]
+    fn a_lost_wall_is_forgotten() {
+        let leader = leader(Leaving::Latched);
+        let near = leader.decide(Sides::default(), &percept(0.8, 3.2)).followed;
+        assert_eq!(near, Sides { left: true, right: false });
+        let leaving = leader.decide(near, &percept(1.2, 3.2)).followed;
+        assert_eq!(leaving, near);
+        let lost = leader.decide(leaving, &percept(1.4, 3.2)).followed;
+        assert_eq!(leader.decide(lost, &percept(1.2, 3.2)).layer, Layer::KeepMoving);
+    }
+
+    #[test]
+    fn a_free_way_to_the_target_ends_the_following() {
+        let target = |way_is_free| Some(Sighting { bearing_rad: 0.1, way_is_free });
+        for leaving in [Leaving::Latched, Leaving::Range, Leaving::Level] {
+            let leader = leader(leaving);
+            let seen = |free| Percept { target: target(free), ..percept(1.0, 3.2) };
+            assert_eq!(layer(&leader, (true, false), &seen(true)), Layer::TargetCheck);
+            assert_ne!(layer(&leader, (true, false), &seen(false)), Layer::TargetCheck);
+        }
+    }
+
+    #[test]
+    fn a_target_behind_a_wall_is_seen_by_who_may_see_through_it() {
+        use crate::obstacle::Obstacle;
+        use sidestep_kernel::{Seed, stream::Streams};
+        let wall = Obstacle::capsule(0, [[2.0, -1.0], [2.0, 1.0]], 0.0);
+        let obstacles = Obstacles::new(vec![wall], 1.0).unwrap();
+        let around = Surroundings { obstacles: &obstacles, bodies: &[], target: Some([4.0, 0.0]) };
+        let pose = Pose { at: [0.0, 0.0], heading_rad: 0.0 };
+        let mut noise = Streams::new(Seed(1)).draws(0, 0, super::super::laser::LASER_NOISE);
+        let mut sees = |needs_line_of_sight, range_m| {
+            let target_sense = TargetSense { range_m, needs_line_of_sight };
+            let leader = Leader { target_sense, ..leader(Leaving::Latched) };
+            leader.perceive(&pose, &around, &mut noise, &mut Scan::default()).target.is_some()
+        };
+        assert!(sees(false, f64::INFINITY));
+        assert!(!sees(true, f64::INFINITY));
+        assert!(!sees(false, 3.9));
+    }
+
+    proptest! {
+        /// Without walls to tell apart by rank, left and right are mirror images.
+        #[test]
+        fn what_is_mirrored_decides_mirrored_but_for_ties(
+            left in 0.3..2.0f64, right in 0.3..2.0f64, fl: bool, fr: bool,
+        ) {
+            let leader = leader(Leaving::Latched);
+            let this = leader.decide(Sides { left: fl, right: fr }, &percept(left, right));
+            let other = leader.decide(Sides { left: fr, right: fl }, &percept(right, left));
+            let both_close = left < 0.7 && right < 0.7;
+            let both_far = (fl && left > 0.9 && left <= 1.3) && (fr && right > 0.9 && right <= 1.3);
+            if !both_close && !both_far {
+                prop_assert_eq!(this.wheels.left_m_s, other.wheels.right_m_s);
+                prop_assert_eq!(this.wheels.right_m_s, other.wheels.left_m_s);
+            }
+        }
+    }
+}

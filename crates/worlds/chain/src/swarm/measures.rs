@@ -1,0 +1,96 @@
+//! What a convoy's run comes to, in numbers.
+
+use super::convoy::{Convoy, Tick};
+use crate::Obstacles;
+use crate::geometry::{Point, distance};
+
+/// What came of a run, so far.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Measures {
+    /// Ticks so far.
+    pub ticks: usize,
+    /// Ticks in which each layer acted, layer 1 first.
+    pub layers: [usize; 6],
+    /// Ticks in which the chain objected.
+    pub vetoes: usize,
+    /// Ticks in which followers slowed the leader down.
+    pub slowed: usize,
+    /// The way of the leader.
+    pub way_m: f64,
+    /// The least air between the leader's body and anything, up to 1 m.
+    pub leader_clearance_m: f64,
+    /// The least air between a connector and anything, up to 1 m.
+    pub connector_clearance_m: f64,
+    /// The same of the followers' bodies.
+    pub follower_clearance_m: f64,
+    /// Robot-ticks with a pressed bumper, and with sensors that held a robot back.
+    pub bumped: usize,
+    /// See [`Self::bumped`].
+    pub held: usize,
+    /// Distances of followers from their connectors, summed over followers and ticks.
+    pub lag_sum_m: f64,
+    /// The greatest such distance.
+    pub max_lag_m: f64,
+    /// The least and greatest distance of neighbors.
+    pub pairs_m: [f64; 2],
+    /// The fastest connector, as a multiple of the leader's speed.
+    pub fastest: f64,
+}
+
+impl Default for Measures {
+    fn default() -> Self {
+        Self {
+            ticks: 0,
+            layers: [0; 6],
+            vetoes: 0,
+            slowed: 0,
+            way_m: 0.0,
+            leader_clearance_m: 1.0,
+            connector_clearance_m: 1.0,
+            follower_clearance_m: 1.0,
+            bumped: 0,
+            held: 0,
+            lag_sum_m: 0.0,
+            max_lag_m: 0.0,
+            pairs_m: [f64::INFINITY, 0.0],
+            fastest: 0.0,
+        }
+    }
+}
+
+impl Measures {
+    /// Adds the state after a tick.
+    pub fn note(&mut self, convoy: &Convoy, obstacles: &Obstacles<2>, tick: &Tick) {
+        self.ticks += 1;
+        self.layers[tick.layer as usize - 1] += 1;
+        self.vetoes += usize::from(tick.veto.is_some());
+        self.slowed += usize::from(tick.pace < 1.0);
+        self.bumped += tick.bumped;
+        self.held += tick.held;
+        let (plan, points, before) = (convoy.plan(), convoy.chain().points(), convoy.before());
+        self.way_m += distance(before[0], points[0]);
+        let radius_m = plan.follower.ring.radius_m;
+        let air_m = |at: Point<2>, radius_m| obstacles.clearance_m([at; 2], radius_m, 1.0);
+        self.leader_clearance_m = self.leader_clearance_m.min(air_m(points[0], radius_m));
+        let mut ahead = convoy.leader().pose;
+        for (i, follower) in (1..).zip(convoy.followers()) {
+            let body_m = air_m(follower.at, radius_m);
+            self.follower_clearance_m = self.follower_clearance_m.min(body_m);
+            let connector_m = air_m(points[i], convoy.chain().connectors()[i].radius_m);
+            self.connector_clearance_m = self.connector_clearance_m.min(connector_m);
+            let lag_m = distance(follower.at, points[i]);
+            self.lag_sum_m += lag_m;
+            self.max_lag_m = self.max_lag_m.max(lag_m);
+            let pair_m = distance(follower.at, ahead.at);
+            self.pairs_m = [self.pairs_m[0].min(pair_m), self.pairs_m[1].max(pair_m)];
+            let speed_m_s = distance(before[i], points[i]) / plan.dt_s;
+            self.fastest = self.fastest.max(speed_m_s / plan.leader.speed_m_s);
+            ahead = *follower;
+        }
+    }
+
+    /// The mean distance of followers from their connectors.
+    pub fn mean_lag_m(&self, followers: usize) -> f64 {
+        self.lag_sum_m / (self.ticks * followers).max(1) as f64
+    }
+}

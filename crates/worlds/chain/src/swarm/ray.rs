@@ -1,0 +1,175 @@
+//! How far a ray goes before it meets something, in the plane, exactly.
+
+use crate::geometry::{
+    Bounds, Core, Point, add, cross_2d, distance, dot, perpendicular, scaled, sub, unit,
+};
+use crate::obstacle::Obstacles;
+
+/// The distance at which a ray from `from` along the unit vector `u` enters everything within
+/// `radius_m` of a core; 0 from inside, `None` where it never does.
+pub fn distance_m(from: Point<2>, u: Point<2>, core: &Core<2>, radius_m: f64) -> Option<f64> {
+    match core {
+        Core::Point(c) => to_disc(from, u, *c, radius_m),
+        Core::Segment(ends) => to_capsule(from, u, *ends, radius_m),
+        // The outline of a box with round corners is the outer one of its edges' capsules.
+        Core::Cuboid(cuboid) => {
+            if core.nearest_to_point(from).distance_m <= radius_m {
+                return Some(0.0);
+            }
+            let edges = cuboid.edges_2d().map(|edge| to_capsule(from, u, edge, radius_m));
+            edges.into_iter().flatten().reduce(f64::min)
+        }
+    }
+}
+
+fn to_disc(from: Point<2>, u: Point<2>, center: Point<2>, radius_m: f64) -> Option<f64> {
+    let to = sub(center, from);
+    let (ahead_m, aside_m) = (dot(u, to), cross_2d(u, to));
+    if dot(to, to) <= radius_m * radius_m {
+        return Some(0.0);
+    }
+    let half2 = radius_m * radius_m - aside_m * aside_m;
+    (half2 >= 0.0 && ahead_m > 0.0).then(|| (ahead_m - half2.sqrt()).max(0.0))
+}
+
+fn to_capsule(from: Point<2>, u: Point<2>, ends: [Point<2>; 2], radius_m: f64) -> Option<f64> {
+    if radius_m > 0.0 && Core::Segment(ends).nearest_to_point(from).distance_m <= radius_m {
+        return Some(0.0);
+    }
+    let caps = ends.map(|end| to_disc(from, u, end, radius_m)).into_iter().flatten();
+    caps.chain(to_sides(from, u, ends, radius_m)).reduce(f64::min)
+}
+
+/// The two long sides of a capsule; without a radius, they are the segment.
+fn to_sides(from: Point<2>, u: Point<2>, ends: [Point<2>; 2], radius_m: f64) -> Option<f64> {
+    let aside = scaled(perpendicular(unit(sub(ends[1], ends[0]))?), radius_m);
+    let left = to_segment(from, u, ends.map(|end| add(end, aside)));
+    if radius_m == 0.0 {
+        return left;
+    }
+    let right = to_segment(from, u, ends.map(|end| sub(end, aside)));
+    [left, right].into_iter().flatten().reduce(f64::min)
+}
+
+fn to_segment(from: Point<2>, u: Point<2>, [a, b]: [Point<2>; 2]) -> Option<f64> {
+    let (d, to_a) = (sub(b, a), sub(a, from));
+    // The ends lie on both sides of the ray's line, or on it.
+    let (side_a, side_b) = (cross_2d(u, to_a), cross_2d(u, sub(b, from)));
+    let crossing = cross_2d(u, d);
+    if side_a * side_b > 0.0 || crossing == 0.0 {
+        return None;
+    }
+    let ahead_m = cross_2d(to_a, d) / crossing;
+    (ahead_m >= 0.0).then_some(ahead_m)
+}
+
+/// Whether no obstacle lies on a line.
+pub fn is_clear(obstacles: &Obstacles<2>, line: [Point<2>; 2]) -> bool {
+    let mut is_clear = true;
+    obstacles.visit(&Bounds::of(&line), |o| {
+        is_clear &= o.core.nearest_to_segment(line).distance_m > o.radius_m;
+    });
+    is_clear
+}
+
+/// The directions in which a capsule is seen, as seen from `from`: the middle one and half the
+/// angle between the outermost; `None` where it may be in any direction.
+pub(super) fn extent_rad(from: Point<2>, ends: [Point<2>; 2], radius_m: f64) -> Option<(f64, f64)> {
+    use sidestep_kernel::math::{asin, atan2, wrap_angle};
+    if Core::Segment(ends).nearest_to_point(from).distance_m <= radius_m + 1e-9 {
+        return None;
+    }
+    let [a, b] = ends.map(|end| {
+        let to = sub(end, from);
+        (atan2(to[1], to[0]), asin((radius_m / distance(end, from)).min(1.0)))
+    });
+    let apart = wrap_angle(b.0 - a.0);
+    let low = (-a.1).min(apart - b.1);
+    let high = a.1.max(apart + b.1);
+    Some((a.0 + 0.5 * (low + high), 0.5 * (high - low)))
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use crate::geometry::{Cuboid, along};
+    use proptest::prelude::*;
+    use sidestep_kernel::math::{cos, sin};
+
+    /// Goes along the ray by the distance to the core, which never oversteps.
+    pub(crate) fn marched_m(
+        from: Point<2>,
+        u: Point<2>,
+        core: &Core<2>,
+        radius_m: f64,
+    ) -> Option<f64> {
+        let mut gone_m = 0.0;
+        for _ in 0..200_000 {
+            let gap_m = core.nearest_to_point(along(from, u, gone_m)).distance_m - radius_m;
+            if gap_m < 1e-9 {
+                return Some(gone_m);
+            }
+            gone_m += gap_m;
+            if gone_m > 20.0 {
+                return None;
+            }
+        }
+        None
+    }
+
+    pub(crate) fn any_core() -> impl Strategy<Value = Core<2>> {
+        let point = || prop::array::uniform2(-3.0..3.0f64);
+        let cuboid = (point(), -3.0..3.0f64, prop::array::uniform2(0.05..1.0f64)).prop_map(
+            |(center, turn, half_m)| {
+                let axis = [cos(turn), sin(turn)];
+                Core::Cuboid(Cuboid { center, axes: [axis, perpendicular(axis)], half_m })
+            },
+        );
+        prop_oneof![
+            point().prop_map(Core::Point),
+            (point(), point()).prop_map(|(a, b)| Core::Segment([a, b])),
+            cuboid,
+        ]
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(1000))]
+        #[test]
+        fn a_ray_goes_as_far_as_marching_does(
+            from in prop::array::uniform2(-3.0..3.0f64), toward in -3.2..3.2f64,
+            core in any_core(), radius_m in 0.01..0.8f64,
+        ) {
+            let u = [cos(toward), sin(toward)];
+            let (exact, marched) = (distance_m(from, u, &core, radius_m), marched_m(from, u, &core, radius_m));
+            match (exact, marched) {
+                (Some(e), Some(m)) => prop_assert!((e - m).abs() < 1e-3, "{e} {m}"),
+                (None, None) => {}
+                // A ray that just grazes.
+                (e, m) => {
+                    let least = core.nearest_to_segment([from, along(from, u, 20.0)]).distance_m;
+                    prop_assert!((least - radius_m).abs() < 1e-6, "{e:?} {m:?}");
+                }
+            }
+        }
+
+        #[test]
+        fn a_thin_wall_is_met_where_it_is_crossed(
+            from in prop::array::uniform2(-3.0..3.0f64),
+            a in prop::array::uniform2(-3.0..3.0f64), b in prop::array::uniform2(-3.0..3.0f64),
+            part in 0.01..0.99f64,
+        ) {
+            let at = crate::geometry::between(a, b, part);
+            let Some(u) = unit(sub(at, from)) else { return Ok(()) };
+            prop_assume!(cross_2d(u, sub(b, a)).abs() > 1e-3);
+            let hit_m = distance_m(from, u, &Core::Segment([a, b]), 0.0).unwrap();
+            prop_assert!((hit_m - distance(at, from)).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_wall_seen_end_on_is_seen() {
+        let wall = Core::Segment([[1.0, 0.0], [2.0, 0.0]]);
+        assert_eq!(distance_m([0.0, 0.0], [1.0, 0.0], &wall, 0.0), Some(1.0));
+        assert_eq!(distance_m([0.0, 0.0], [-1.0, 0.0], &wall, 0.0), None);
+    }
+}

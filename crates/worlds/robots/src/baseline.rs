@@ -1,0 +1,338 @@
+//! The two parallel strategies that the source paper rejects, for measuring against them.
+//!
+//! Both use the very functions of the double pool (perceive and decide, claim, act); they
+//! differ in who does what when. Neither promises what the double pool promises: results
+//! depend on the number of workers, and under the lock also on the scheduling of the moment.
+//! What they do keep are the world's laws: no two bodies in a box, nobody in a wall, every
+//! body acts once a cycle when it is due.
+//!
+//! - *Spatial partition*: each worker owns a vertical band of the map and the bodies anchored
+//!   in it. It perceives for them, then moves those whose claims stay inside the band. What
+//!   stands or may come across a border is done by one worker, after all others; then bodies
+//!   are handed over to the bands they have entered. Within a band the order is that of a
+//!   list, without draws for priority: cheaper than the double pool, and less fair.
+//! - *One lock*: each worker takes a body, locks the world, perceives and acts, and unlocks, as
+//!   krABMaga's parallel schedule does per agent (which also starts its threads anew every
+//!   step; here they live on). Bodies so perceive a world that others have half changed.
+//!
+//! Both write claims, as the double pool does; the lock has no use for them.
+
+use super::Scratch;
+use super::metrics::Metrics;
+use super::scenario::Compiled;
+use super::state::{IDLE, RobotsState, Snapshot};
+use super::world::RobotsWorld;
+use sidestep_kernel::space::Floor;
+use sidestep_kernel::workers::{self, Worker};
+use sidestep_kernel::{Cycle, EntityId, Slot};
+use sidestep_map::Cell;
+use std::ops::Range;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// A strategy that the paper rejects.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Strategy {
+    /// Each worker owns a band of the map.
+    SpatialPartition,
+    /// Each body locks the world.
+    OneLock,
+}
+
+impl Strategy {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::SpatialPartition, Self::OneLock];
+
+    /// Its name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::SpatialPartition => "spatial partition",
+            Self::OneLock => "one lock",
+        }
+    }
+}
+
+/// A run of a robots world under one of the rejected strategies.
+#[derive(Debug)]
+pub struct Baseline {
+    compiled: Compiled,
+    state: RobotsState,
+    strategy: Strategy,
+    crew: Vec<Hand>,
+    cycle: Cycle,
+    serial_acts: u64,
+}
+
+/// What a worker keeps.
+#[derive(Debug, Default)]
+struct Hand {
+    scratch: Scratch,
+    /// Bodies anchored in this worker's band.
+    own: Vec<Slot>,
+    /// Bodies that this worker did while all others waited.
+    serial_acts: u64,
+}
+
+/// What the workers of a partition pass to each other.
+#[derive(Debug)]
+struct Borders {
+    /// Columns of each band in the padded grid; the outer ones reach over the map's edge.
+    bands: Vec<Range<u32>>,
+    /// Bodies of this cycle that are not inside one band.
+    crossing: Mutex<Vec<Slot>>,
+    /// Bodies that have come into each band.
+    inboxes: Vec<Mutex<Vec<Slot>>>,
+}
+
+impl Baseline {
+    /// A run at its start, with `workers` workers (at least 1).
+    pub fn new(compiled: Compiled, strategy: Strategy, workers: usize) -> Self {
+        let state = RobotsState::restore(&compiled.world, &compiled.start_snapshot());
+        let mut crew = Vec::new();
+        crew.resize_with(workers.max(1), Hand::default);
+        let bands = compiled.world.bands(crew.len());
+        for slot in 0..compiled.world.bodies.len() as Slot {
+            crew[band_of(&bands, state.at(slot).col())].own.push(slot);
+        }
+        Self { compiled, state, strategy, crew, cycle: 0, serial_acts: 0 }
+    }
+
+    /// Runs `cycles` cycles.
+    pub fn advance(&mut self, cycles: u64) {
+        let span = self.cycle..self.cycle + cycles;
+        match self.strategy {
+            Strategy::SpatialPartition => self.advance_partition(span),
+            Strategy::OneLock => self.advance_one_lock(span),
+        }
+        self.cycle += cycles;
+        self.serial_acts = self.crew.iter().map(|hand| hand.serial_acts).sum();
+    }
+
+    /// The state by entity id.
+    pub fn snapshot(&self) -> Snapshot {
+        self.state.snapshot(&self.compiled.world, self.cycle)
+    }
+
+    /// Metrics so far; there are no conflict groups.
+    pub fn metrics(&self) -> Metrics {
+        self.compiled.world.metrics(&self.state, self.cycle, &[], 0)
+    }
+
+    /// Share of the bodies' cycles that one worker did while all others waited.
+    pub fn serial_share(&self) -> f64 {
+        let all = self.compiled.world.bodies.len() as u64 * self.cycle;
+        self.serial_acts as f64 / all.max(1) as f64
+    }
+
+    fn advance_one_lock(&mut self, span: Range<Cycle>) {
+        let (world, state) = (&*self.compiled.world, &self.state);
+        let the_world = Mutex::new(());
+        workers::run(&mut self.crew, |worker, hand| {
+            for (pool, now) in (0u64..).zip(span.clone()) {
+                worker.for_each_chunk(pool, world.bodies.len(), |bodies| {
+                    for slot in bodies {
+                        let _turn = lock(&the_world);
+                        world.perceive_one(state, now, slot as Slot, &mut hand.scratch);
+                        world.act_drawn(state, now, slot as Slot, &mut hand.scratch);
+                    }
+                });
+                worker.barrier();
+            }
+        });
+    }
+
+    fn advance_partition(&mut self, span: Range<Cycle>) {
+        let (world, state) = (&*self.compiled.world, &self.state);
+        let borders = Borders::new(world.bands(self.crew.len()));
+        workers::run(&mut self.crew, |worker, hand| {
+            for now in span.clone() {
+                partition_cycle(world, state, &borders, worker, hand, now);
+            }
+        });
+    }
+}
+
+/// Own bodies perceive; barrier; those inside the band act; barrier; one worker does the
+/// rest and hands over; barrier.
+fn partition_cycle(
+    world: &RobotsWorld,
+    state: &RobotsState,
+    borders: &Borders,
+    worker: &Worker<'_>,
+    hand: &mut Hand,
+    now: Cycle,
+) {
+    let Hand { scratch, own, serial_acts } = hand;
+    own.iter().for_each(|&slot| world.perceive_one(state, now, slot, scratch));
+    worker.barrier();
+    let band = &borders.bands[worker.index()];
+    own.retain(|&slot| {
+        let inside = world.stays_inside(state, slot, band);
+        if inside {
+            world.act_drawn(state, now, slot, scratch);
+        } else {
+            lock(&borders.crossing).push(slot);
+        }
+        inside
+    });
+    worker.barrier();
+    if worker.index() == 0 {
+        let mut crossing = std::mem::take(&mut *lock(&borders.crossing));
+        // The order in which workers came is that of the moment; the slots are not.
+        crossing.sort_unstable();
+        *serial_acts += crossing.len() as u64;
+        for slot in crossing {
+            world.act_drawn(state, now, slot, scratch);
+            borders.hand_over(slot, state.at(slot).col());
+        }
+    }
+    worker.barrier();
+    own.append(&mut lock(&borders.inboxes[worker.index()]));
+}
+
+impl Borders {
+    fn new(bands: Vec<Range<u32>>) -> Self {
+        let inboxes = bands.iter().map(|_| Mutex::default()).collect();
+        Self { bands, crossing: Mutex::default(), inboxes }
+    }
+
+    fn hand_over(&self, slot: Slot, col: u32) {
+        lock(&self.inboxes[band_of(&self.bands, col)]).push(slot);
+    }
+}
+
+/// A worker that panicked has ended the run anyway.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// The band of a column.
+fn band_of(bands: &[Range<u32>], col: u32) -> usize {
+    bands.partition_point(|band| band.end <= col).min(bands.len() - 1)
+}
+
+impl RobotsWorld {
+    /// `n` vertical bands of equal width.
+    fn bands(&self, n: usize) -> Vec<Range<u32>> {
+        let border = |k: usize| match k {
+            0 => 0,
+            _ if k == n => u32::MAX,
+            _ => (u64::from(self.stride) * k as u64 / n as u64) as u32,
+        };
+        (0..n).map(|k| border(k)..border(k + 1)).collect()
+    }
+
+    /// Whether all boxes that a body covers, and may come to cover, lie in these columns.
+    fn stays_inside(&self, state: &RobotsState, slot: Slot, band: &Range<u32>) -> bool {
+        let (col, width) = (state.at(slot).col(), state.type_in(self, slot).size.0);
+        let reach = self.reach;
+        if col >= band.start.saturating_add(reach) && col + width + reach <= band.end {
+            return true;
+        }
+        let covers = band.contains(&col) && band.contains(&(col + width - 1));
+        let intent = state.bodies[slot as usize].intent.get();
+        if !covers || intent == IDLE {
+            return covers;
+        }
+        let mut inside = true;
+        let mut look = |index: usize| inside &= band.contains(&(index as u32 % self.stride));
+        match &state.floor {
+            Floor::Narrow(floor) => self.for_each_claimed(floor, state, slot, |i, _| look(i)),
+            Floor::Wide(floor) => self.for_each_claimed(floor, state, slot, |i, _| look(i)),
+        }
+        inside
+    }
+}
+
+/// The first breach of the laws in a state: two bodies in a box, or one in a wall.
+pub fn breach(world: &RobotsWorld, snapshot: &Snapshot) -> Option<String> {
+    let width = world.map.width();
+    let mut owner: Vec<Option<EntityId>> = vec![None; world.map.cells().len()];
+    for (id, body) in (0..).zip(&snapshot.bodies) {
+        let ty = world.type_of(id);
+        if world.is_door(id) && body.facing == 1 {
+            continue;
+        }
+        let (cols, rows) = (body.at.0..body.at.0 + ty.size.0, body.at.1..body.at.1 + ty.size.1);
+        for (col, row) in rows.flat_map(|r| cols.clone().map(move |c| (c, r))) {
+            let outside = col >= width || row >= world.map.height();
+            if outside || world.map.cell(col, row) != Cell::Free {
+                return Some(format!("body {id} stands in a wall at [{col}, {row}]"));
+            }
+            let box_owner = &mut owner[(row * width + col) as usize];
+            if let Some(other) = box_owner.replace(id) {
+                return Some(format!("bodies {other} and {id} stand in one box [{col}, {row}]"));
+            }
+        }
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenario::{Behaviours, StorageOrder};
+    use sidestep_scenario::Source;
+
+    /// A crowded hall with people and a door that closes on whoever stands in it.
+    fn crowd() -> Compiled {
+        let row = format!("{}\n", ".".repeat(40));
+        let text = format!(
+            "format = 1\nworld = \"robots\"\nseed = 3\n[map]\nascii = \"\"\"\n{}\"\"\"\n\
+             [[robots]]\ncount = 60\nsize = 2\neffector = \"nomad\"\nsensors = [\"sonar-8\"]\n\
+             behaviour = {{ kind = \"replay\", actions = [{}] }}\n\
+             [[people]]\ncount = 60\n\
+             [doors]\nat = [[19, 12]]\nsize = [4, 1]\nrandom = {{ p_open = 0.3, p_close = 0.3 }}\n",
+            row.repeat(25),
+            "\"forward\", \"forward\", \"left\", ".repeat(200)
+        );
+        let source = Source::new("crowd", text, "");
+        Compiled::new(&source, &Behaviours::new(), StorageOrder::Spatial).unwrap()
+    }
+
+    #[test]
+    fn every_strategy_keeps_the_world_valid_and_counts_every_body_once_a_cycle() {
+        let compiled = crowd();
+        for strategy in Strategy::ALL {
+            for workers in [1, 2, 3, 8] {
+                let mut run = Baseline::new(compiled.clone(), strategy, workers);
+                for _ in 0..40 {
+                    run.advance(5);
+                    assert_eq!(breach(&compiled.world, &run.snapshot()), None);
+                }
+                // A replay remembers how many actions it has begun.
+                let snapshot = run.snapshot();
+                assert!(snapshot.bodies[..60].iter().all(|robot| robot.memory[0] == 200));
+            }
+        }
+    }
+
+    #[test]
+    fn bodies_of_a_partition_are_never_lost_and_change_bands() {
+        let mut run = Baseline::new(crowd(), Strategy::SpatialPartition, 3);
+        let before: Vec<Vec<Slot>> = run.crew.iter().map(|hand| hand.own.clone()).collect();
+        run.advance(300);
+        let mut all: Vec<Slot> = run.crew.iter().flat_map(|hand| hand.own.clone()).collect();
+        all.sort_unstable();
+        assert_eq!(all, (0..121).collect::<Vec<Slot>>());
+        assert!(run.crew.iter().zip(&before).any(|(hand, before)| hand.own != *before));
+        assert!(run.serial_share() > 0.0 && run.serial_share() < 0.9);
+    }
+
+    #[test]
+    fn one_worker_has_no_borders() {
+        let mut run = Baseline::new(crowd(), Strategy::SpatialPartition, 1);
+        run.advance(100);
+        assert_eq!(run.serial_share(), 0.0);
+    }
+
+    #[test]
+    fn bodies_on_each_other_and_in_walls_are_breaches() {
+        let compiled = crowd();
+        let mut snapshot = compiled.start_snapshot();
+        assert_eq!(breach(&compiled.world, &snapshot), None);
+        snapshot.bodies[1].at = snapshot.bodies[0].at;
+        assert!(breach(&compiled.world, &snapshot).is_some_and(|b| b.contains("one box")));
+        snapshot.bodies[1].at = (39, 0);
+        assert!(breach(&compiled.world, &snapshot).is_some_and(|b| b.contains("wall")));
+    }
+}

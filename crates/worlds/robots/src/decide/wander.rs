@@ -1,0 +1,84 @@
+//! Obstacle avoidance and corridor following, as the Nomad's basic behaviour in the paper.
+
+use super::{Behaviour, Decision, Memory, Percept, Sector};
+use crate::effector::{ActionId, FORWARD, LEFT, RIGHT};
+use sidestep_kernel::stream::Draws;
+
+/// Goes ahead; turns to the freer side before what is near or after a contact; now and then
+/// turns into an open side, so that it explores crossings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Wander {
+    /// Mean number of own actions between two voluntary turns.
+    pub turn_every: u32,
+}
+
+impl Default for Wander {
+    fn default() -> Self {
+        Self { turn_every: 40 }
+    }
+}
+
+/// Word 0 of the memory: actions left until the next voluntary turn, plus 1; 0 = not drawn.
+const STRIDE: usize = 0;
+/// Word 1: the turn of the last avoidance plus 1, kept while the way stays blocked.
+const AVOIDING: usize = 1;
+
+impl Behaviour for Wander {
+    #[inline]
+    fn decide(&self, percept: &Percept<'_>, memory: &mut Memory, draws: &mut Draws) -> Decision {
+        let [ahead, left, right] = [Sector::Ahead, Sector::Left, Sector::Right]
+            .map(|sector| percept.nearest_in[sector as usize]);
+        if ahead == 0 || percept.contact.is_some() {
+            return avoid(left, right, memory, draws).into();
+        }
+        memory.words[AVOIDING] = 0;
+        if self.stride_is_over(memory, draws) {
+            let open = [(left, LEFT), (right, RIGHT)];
+            let mut open = open.iter().filter(|(class, _)| *class > 0).map(|&(_, turn)| turn);
+            match (open.next(), open.next()) {
+                (Some(a), Some(b)) => return if draws.below(2) == 0 { a } else { b }.into(),
+                (Some(only), None) => return only.into(),
+                _ => {}
+            }
+        }
+        FORWARD.into()
+    }
+}
+
+impl Wander {
+    /// Counts an action down; at the end draws the next stride.
+    #[inline]
+    fn stride_is_over(self, memory: &mut Memory, draws: &mut Draws) -> bool {
+        let stride = &mut memory.words[STRIDE];
+        if *stride > 1 {
+            *stride -= 1;
+            return false;
+        }
+        let first = *stride == 0;
+        *stride = draws.below(self.turn_every.saturating_mul(2)).saturating_add(2);
+        !first
+    }
+}
+
+/// Turns to the freer side, and goes on turning that way until the way is free.
+fn avoid(left: u8, right: u8, memory: &mut Memory, draws: &mut Draws) -> ActionId {
+    let turn = match memory.words[AVOIDING] {
+        0 if left != right => {
+            if left > right {
+                LEFT
+            } else {
+                RIGHT
+            }
+        }
+        0 => {
+            if draws.below(2) == 0 {
+                LEFT
+            } else {
+                RIGHT
+            }
+        }
+        kept => (kept - 1) as ActionId,
+    };
+    memory.words[AVOIDING] = u32::from(turn) + 1;
+    turn
+}

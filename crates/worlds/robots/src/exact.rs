@@ -1,0 +1,194 @@
+//! The exact Markov chain of one robot in a building, without a single draw.
+//!
+//! A robot that is alone, with walls and closed doors around it, is a Markov chain over its
+//! poses. This module computes the chain from the same tables that the simulator draws from,
+//! by other code, so that each can be held against the other; and it writes the model as a
+//! POMDP for planners.
+//!
+//! ```text
+//! Compiled -> Model   outcomes of every action at every pose      obstacle.rs building.rs
+//!               |---> Chain under a policy: distributions         chain.rs
+//!               |        `---> Comparison with the simulator      compare.rs
+//!               `---> Pomdp: observations as well, as text        observe.rs pomdp.rs names.rs
+//! ```
+
+mod building;
+mod chain;
+mod compare;
+mod names;
+mod observe;
+mod obstacle;
+mod pomdp;
+mod sparse;
+mod summary;
+
+pub use chain::{Chain, ChainState, Stationary, total_variation};
+pub use compare::{Comparison, SIGNIFICANCE, compare, sampling_limit};
+pub use observe::Beam;
+pub use obstacle::{Outcome, Pose, here_and_now};
+pub use pomdp::{MAX_BEAMS, Pomdp, PomdpOptions, PomdpSize};
+pub use summary::{Summary, VisitedBox};
+
+use super::decide::Random;
+use super::effector::{ActionId, FORWARD, ObstacleRule, Side};
+use super::scenario::Compiled;
+use building::{Building, Robot};
+use sidestep_kernel::InputError;
+use sparse::Sparse;
+use std::collections::BTreeMap;
+
+/// Most poses of a model.
+pub const MAX_STATES: usize = 200_000;
+/// Most outcomes over all poses and actions.
+const MAX_OUTCOMES: usize = 20_000_000;
+
+/// The policies that have a name.
+pub const POLICIES: [&str; 3] = ["uniform", "forward", "bounce"];
+
+/// The policy of a name: `uniform` (each standard action alike), `forward` (always ahead),
+/// `bounce` (ahead, and a turn to either side after a contact).
+///
+/// # Errors
+/// When there is no such policy.
+pub fn policy(name: &str) -> Result<Random, InputError> {
+    match name {
+        "uniform" => Ok(Random::uniform()),
+        "forward" => Ok(Random::always(FORWARD)),
+        "bounce" => Ok(Random::bounce()),
+        _ => {
+            let remedy = sidestep_scenario::nearest(name, &POLICIES);
+            Err(InputError::new("--policy", format!("unknown policy `{name}`"), remedy))
+        }
+    }
+}
+
+/// Every pose that a robot can reach from its start, and what each action comes to there.
+#[derive(Debug, Clone)]
+pub struct Model {
+    place: String,
+    building: Building,
+    robot: Robot,
+    rule: ObstacleRule,
+    kinds: Vec<String>,
+    /// In the order in which a search finds them; the first is the start.
+    poses: Vec<Pose>,
+    /// Row `pose * actions + action`.
+    outcomes: Sparse<Arrival>,
+}
+
+/// One outcome of an action at a pose.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Arrival {
+    /// Index of the pose reached.
+    to: u32,
+    contact: Option<(u8, Side)>,
+    p: f64,
+}
+
+impl Model {
+    /// Computes the model of a scenario with one robot and nothing else that moves; doors
+    /// that never open are walls of their kind.
+    ///
+    /// # Errors
+    /// When there are more robots or other moving bodies, or more than [`MAX_STATES`] poses.
+    pub fn new(compiled: &Compiled) -> Result<Self, InputError> {
+        let (building, robot) = building::only_robot(compiled)?;
+        let mut model = Self {
+            place: building::place(compiled),
+            building,
+            poses: vec![robot.start],
+            robot,
+            rule: compiled.world.obstacle_rule,
+            kinds: compiled.world.kinds.clone(),
+            outcomes: Sparse::default(),
+        };
+        model.explore()?;
+        Ok(model)
+    }
+
+    /// Follows every action from every pose found, until no pose is new.
+    fn explore(&mut self) -> Result<(), InputError> {
+        let mut index_of = BTreeMap::from([(self.robot.start, 0)]);
+        let mut next = 0;
+        while let Some(&pose) = self.poses.get(next) {
+            next += 1;
+            for action in 0..self.actions().len() {
+                let outcomes = self.here_and_now(pose, action as ActionId);
+                let poses = &mut self.poses;
+                let arrivals = outcomes.into_iter().map(|(Outcome { pose, contact }, p)| {
+                    let to = *index_of.entry(pose).or_insert_with(|| {
+                        poses.push(pose);
+                        poses.len() as u32 - 1
+                    });
+                    Arrival { to, contact, p }
+                });
+                self.outcomes.push(arrivals);
+            }
+            self.check_size()?;
+        }
+        Ok(())
+    }
+
+    fn check_size(&self) -> Result<(), InputError> {
+        if self.poses.len() <= MAX_STATES && self.outcomes.len() <= MAX_OUTCOMES {
+            return Ok(());
+        }
+        let cause = format!(
+            "the robot reaches more than {MAX_STATES} poses, or its actions have more than {MAX_OUTCOMES} outcomes there"
+        );
+        let remedy = "use larger boxes (map.box_size_m), a smaller map, or fewer transitions";
+        Err(InputError::new(&self.place, cause, remedy))
+    }
+
+    /// The distribution of outcomes of an action at a pose, merged; sums to 1.
+    ///
+    /// # Panics
+    /// When the robot has no such action.
+    pub fn here_and_now(&self, pose: Pose, action: ActionId) -> Vec<(Outcome, f64)> {
+        let transitions = &self.robot.actions[usize::from(action)];
+        let kind_at = |col, row| self.building.kind_at(col, row);
+        here_and_now(transitions, self.robot.size, pose, self.rule, kind_at)
+    }
+
+    /// Every pose that can be reached; the first is the start.
+    pub fn poses(&self) -> &[Pose] {
+        &self.poses
+    }
+
+    /// Names of the actions, by id.
+    pub fn actions(&self) -> &[String] {
+        &self.robot.body.effector.actions
+    }
+
+    /// Outcomes over all poses and actions.
+    pub fn outcomes(&self) -> usize {
+        self.outcomes.len()
+    }
+
+    /// How often the robot acts in the first `cycles` cycles.
+    pub fn actions_in(&self, cycles: u64) -> u64 {
+        let (period, phase) = (u64::from(self.robot.timing.period), self.robot.timing.phase);
+        (cycles + u64::from(phase)).div_ceil(period) - u64::from(phase).div_ceil(period)
+    }
+
+    /// The chain that the robot is under a policy.
+    ///
+    /// # Errors
+    /// When the policy chooses an action that the robot does not have.
+    pub fn chain(&self, policy: &Random) -> Result<Chain, InputError> {
+        Chain::new(self, policy)
+    }
+
+    /// The model with its observations, as planners read it.
+    ///
+    /// # Errors
+    /// When `options` do not fit the scenario, or ask for too much.
+    pub fn pomdp(&self, options: &PomdpOptions) -> Result<Pomdp, InputError> {
+        Pomdp::new(self, options)
+    }
+
+    /// What an action comes to at the pose with this index.
+    fn arrivals(&self, pose: usize, action: usize) -> &[Arrival] {
+        self.outcomes.row(pose * self.actions().len() + action)
+    }
+}

@@ -1,0 +1,115 @@
+//! What a chain needs of a scenario: one robot, and everything else at rest.
+
+use super::obstacle::Pose;
+use crate::effector::{ActionId, Transition};
+use crate::scenario::Compiled;
+use crate::state::{FREE, WALL};
+use crate::world::{Body, Door, RobotBody, RobotModel, Role};
+use sidestep_kernel::distr::Chance;
+use sidestep_kernel::{EntityId, InputError};
+use sidestep_map::{Cell, GridMap};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// The map with its closed doors.
+#[derive(Debug, Clone)]
+pub(super) struct Building {
+    pub(super) map: Arc<GridMap>,
+    doors: BTreeMap<(i32, i32), u8>,
+}
+
+/// The one robot.
+#[derive(Debug, Clone)]
+pub(super) struct Robot {
+    pub(super) start: Pose,
+    pub(super) size: u32,
+    /// When it acts.
+    pub(super) timing: Body,
+    /// Sensors, and names of the actions.
+    pub(super) body: Arc<RobotBody>,
+    /// What each action does in a free place, in the scenario's regime.
+    pub(super) actions: Vec<Vec<Transition>>,
+}
+
+impl Building {
+    /// Kind of what stands in a box; walls all around the map.
+    pub(super) fn kind_at(&self, col: i32, row: i32) -> u8 {
+        let (Ok(c), Ok(r)) = (u32::try_from(col), u32::try_from(row)) else { return WALL };
+        if c >= self.map.width() || r >= self.map.height() || self.map.cell(c, r) != Cell::Free {
+            return WALL;
+        }
+        self.doors.get(&(col, row)).copied().unwrap_or(FREE)
+    }
+}
+
+/// How errors name the scenario.
+pub(super) fn place(compiled: &Compiled) -> String {
+    if compiled.name.is_empty() {
+        "the scenario".into()
+    } else {
+        format!("scenario `{}`", compiled.name)
+    }
+}
+
+/// Takes a scenario apart, and refuses what is no chain over one robot's poses.
+pub(super) fn only_robot(compiled: &Compiled) -> Result<(Building, Robot), InputError> {
+    let world = &compiled.world;
+    let refuse = |cause: String, remedy: &str| Err(InputError::new(place(compiled), cause, remedy));
+    let mut doors = BTreeMap::new();
+    let mut robots = Vec::new();
+    for &body in &world.bodies {
+        let ty = &world.types[usize::from(body.ty)];
+        match &ty.role {
+            Role::Robot(model) => robots.push((body, model, ty.size.0)),
+            Role::Mover(_) => {
+                let kind = &world.kinds[usize::from(ty.kind)];
+                let cause = format!("body {} (kind `{kind}`) moves by itself", body.id);
+                return refuse(cause, "leave out [people]: a chain has one moving body");
+            }
+            Role::Door(door) if stays_closed(door) => {
+                doors.extend(covered(compiled, body.id, ty.size).map(|at| (at, ty.kind)));
+            }
+            Role::Door(_) => {
+                return refuse(
+                    format!("door {} opens", body.id),
+                    "keep doors closed with periodic = { open = 0, closed = 1 }, or leave out [doors]",
+                );
+            }
+        }
+    }
+    let building = Building { map: Arc::clone(&world.map), doors };
+    match robots[..] {
+        [(body, model, size)] => Ok((building, robot(compiled, body, model, size))),
+        _ => refuse(
+            format!("{} robots", robots.len()),
+            "give one robot: [robots] with count = 1, or --set robots.count=1",
+        ),
+    }
+}
+
+fn stays_closed(door: &Door) -> bool {
+    match *door {
+        Door::Periodic { open, .. } => open == 0,
+        Door::Random { open, .. } => open == Chance::new(0.0),
+    }
+}
+
+/// The boxes that a body covers at the start.
+fn covered(
+    compiled: &Compiled,
+    id: EntityId,
+    (width, height): (u32, u32),
+) -> impl Iterator<Item = (i32, i32)> {
+    let ((col, row), _) = compiled.start[id as usize];
+    let boxes = (row..row + height).flat_map(move |r| (col..col + width).map(move |c| (c, r)));
+    boxes.map(|(c, r)| (c as i32, r as i32))
+}
+
+fn robot(compiled: &Compiled, timing: Body, model: &RobotModel, size: u32) -> Robot {
+    let ((col, row), heading) = compiled.start[timing.id as usize];
+    let start = Pose { col: col as i32, row: row as i32, heading };
+    let (body, reliable) = (&model.body, compiled.world.regime.reliable_effectors());
+    let ids = 0..body.effector.actions.len() as ActionId;
+    let actions = ids.map(|action| body.effector.transitions_of(action, reliable)).collect();
+    Robot { start, size, timing, actions, body: Arc::clone(body) }
+}

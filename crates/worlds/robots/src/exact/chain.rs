@@ -1,0 +1,216 @@
+//! A model under a fixed policy: a Markov chain, its distributions over time and at rest.
+
+use super::obstacle::Pose;
+use super::sparse::Sparse;
+use super::{Arrival, Model};
+use crate::decide::Random;
+use serde::Serialize;
+use sidestep_kernel::InputError;
+use std::collections::BTreeMap;
+
+/// A state of a chain: the pose, and what else the policy looks at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct ChainState {
+    /// Where the robot is.
+    pub pose: Pose,
+    /// Whether its last action met something; always false for a policy that does not mind.
+    pub after_contact: bool,
+}
+
+/// A Markov chain over the states that the policy reaches; the first state is the start.
+#[derive(Debug, Clone)]
+pub struct Chain {
+    states: Vec<ChainState>,
+    rows: Sparse<(u32, f64)>,
+}
+
+/// Where a chain is in the long run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stationary {
+    /// Probability of each state.
+    pub distribution: Vec<f64>,
+    /// Total variation between the distribution and itself one action later: 0 were it
+    /// exact.
+    pub residual: f64,
+    /// Iterations made.
+    pub iterations: u32,
+}
+
+/// How a chain's long run is described in a report.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub(super) struct Convergence {
+    pub(super) residual: f64,
+    pub(super) iterations: u32,
+}
+
+impl From<&Stationary> for Convergence {
+    fn from(s: &Stationary) -> Self {
+        Self { residual: s.residual, iterations: s.iterations }
+    }
+}
+
+/// Iterations stop when one changes the distribution by less than this (total variation).
+const CONVERGED: f64 = 1e-13;
+/// Multiplications after which iterating stops without having converged.
+const MAX_WORK: usize = 5_000_000_000;
+
+impl Chain {
+    pub(super) fn new(model: &Model, policy: &Random) -> Result<Self, InputError> {
+        check_actions(model, policy)?;
+        let mut index_of = BTreeMap::from([((0, false), 0)]);
+        let mut found = vec![(0, false)];
+        let mut rows = Sparse::default();
+        let mut next = 0;
+        while let Some(&(pose, after_contact)) = found.get(next) {
+            next += 1;
+            let mut row = BTreeMap::new();
+            for (key, p) in successors(model, policy, pose, after_contact) {
+                let to = *index_of.entry(key).or_insert_with(|| {
+                    found.push(key);
+                    found.len() as u32 - 1
+                });
+                *row.entry(to).or_insert(0.0) += p;
+            }
+            rows.push(row);
+        }
+        let state = |&(pose, after_contact): &(u32, bool)| ChainState {
+            pose: model.poses[pose as usize],
+            after_contact,
+        };
+        Ok(Self { states: found.iter().map(state).collect(), rows })
+    }
+
+    /// The states; the first is the start.
+    pub fn states(&self) -> &[ChainState] {
+        &self.states
+    }
+
+    /// Successors of a state by index, with their probabilities.
+    pub fn row(&self, state: usize) -> &[(u32, f64)] {
+        self.rows.row(state)
+    }
+
+    /// The distribution one action later. Shape: that of [`Chain::states`], as the result.
+    pub fn step(&self, distribution: &[f64]) -> Vec<f64> {
+        let mut next = vec![0.0; self.states.len()];
+        for (&mass, row) in distribution.iter().zip(self.rows.rows()) {
+            if mass > 0.0 {
+                row.iter().for_each(|&(to, p)| next[to as usize] += mass * p);
+            }
+        }
+        next
+    }
+
+    /// The distribution after `actions` actions from the start.
+    pub fn distribution_after(&self, actions: u64) -> Vec<f64> {
+        let mut distribution = self.start();
+        for _ in 0..actions {
+            let next = self.step(&distribution);
+            // A fixed point stays what it is, however many actions are left.
+            if next == distribution {
+                break;
+            }
+            distribution = next;
+        }
+        distribution
+    }
+
+    /// The share of actions spent in each state in the long run from the start.
+    ///
+    /// Power iteration on the chain that does nothing half of the time: it has the same long
+    /// run, and converges where the chain itself is periodic. Where it does not within the
+    /// work allowed, [`Stationary::residual`] says how far it got.
+    pub fn stationary(&self) -> Stationary {
+        let mut distribution = self.start();
+        let limit = (MAX_WORK / self.rows.len().max(1)).clamp(100, 1_000_000) as u32;
+        for iteration in 1..=limit {
+            let next = self.step(&distribution);
+            let residual = total_variation(&distribution, &next);
+            if residual < CONVERGED {
+                return Stationary { distribution, residual, iterations: iteration };
+            }
+            distribution.iter_mut().zip(&next).for_each(|(p, q)| *p = 0.5 * (*p + q));
+        }
+        let residual = total_variation(&distribution, &self.step(&distribution));
+        Stationary { distribution, residual, iterations: limit }
+    }
+
+    /// A distribution over states as one over poses.
+    pub fn over_poses(&self, distribution: &[f64]) -> BTreeMap<Pose, f64> {
+        let mut poses = BTreeMap::new();
+        for (state, p) in self.states.iter().zip(distribution) {
+            *poses.entry(state.pose).or_insert(0.0) += p;
+        }
+        poses
+    }
+
+    fn start(&self) -> Vec<f64> {
+        let mut distribution = vec![0.0; self.states.len()];
+        distribution[0] = 1.0;
+        distribution
+    }
+}
+
+/// Half the sum of absolute differences: the largest difference in the probability of any
+/// event.
+///
+/// # Panics
+/// When the distributions are over different numbers of states.
+pub fn total_variation(p: &[f64], q: &[f64]) -> f64 {
+    assert_eq!(p.len(), q.len(), "distributions over the same states");
+    0.5 * p.iter().zip(q).map(|(a, b)| (a - b).abs()).sum::<f64>()
+}
+
+fn check_actions(model: &Model, policy: &Random) -> Result<(), InputError> {
+    let known = model.actions().len();
+    let unknown = |row: &[f64]| row.iter().skip(known).any(|&p| p > 0.0);
+    if !unknown(policy.probabilities(false)) && !unknown(policy.probabilities(true)) {
+        return Ok(());
+    }
+    let cause = format!("the policy chooses an action beyond the robot's {known}");
+    Err(InputError::new(&model.place, cause, "give weights to the robot's own actions only"))
+}
+
+/// States after one action chosen by the policy, unmerged.
+fn successors<'a>(
+    model: &'a Model,
+    policy: &'a Random,
+    pose: u32,
+    after_contact: bool,
+) -> impl Iterator<Item = ((u32, bool), f64)> + 'a {
+    let minds = policy.minds_contacts();
+    let chosen = policy.probabilities(after_contact).iter().enumerate().filter(|c| *c.1 > 0.0);
+    chosen.flat_map(move |(action, &chance)| {
+        let state = move |a: &Arrival| ((a.to, minds && a.contact.is_some()), chance * a.p);
+        model.arrivals(pose as usize, action).iter().map(state)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two states that change places with certainty: periodic.
+    fn flip() -> Chain {
+        let state =
+            |col| ChainState { pose: Pose { col, row: 0, heading: 0 }, after_contact: false };
+        let mut rows = Sparse::default();
+        rows.push([(1, 1.0)]);
+        rows.push([(0, 1.0)]);
+        Chain { states: vec![state(0), state(1)], rows }
+    }
+
+    #[test]
+    fn a_periodic_chain_has_a_long_run_all_the_same() {
+        let stationary = flip().stationary();
+        assert_eq!(stationary.distribution, [0.5, 0.5]);
+        assert!(stationary.residual < CONVERGED);
+        assert_eq!(flip().distribution_after(7), [0.0, 1.0]);
+    }
+
+    #[test]
+    fn total_variation_is_the_largest_difference_of_any_event() {
+        assert_eq!(total_variation(&[0.5, 0.5, 0.0], &[0.25, 0.25, 0.5]), 0.5);
+        assert_eq!(total_variation(&[1.0, 0.0], &[1.0, 0.0]), 0.0);
+    }
+}

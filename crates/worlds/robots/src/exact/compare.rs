@@ -1,0 +1,131 @@
+//! The simulator against the exact chain: are the robots where they ought to be?
+
+use super::Model;
+use super::chain::total_variation;
+use super::obstacle::Pose;
+use crate::decide::Random;
+use crate::scenario::Compiled;
+use crate::simulation::RobotsSimulation;
+use crate::world::{RobotsWorld, Role};
+use serde::Serialize;
+use sidestep_kernel::stream::Streams;
+use sidestep_kernel::{InputError, Seed, Simulation, math};
+use sidestep_scenario::Source;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Chance that a simulator without fault is found to disagree.
+pub const SIGNIFICANCE: f64 = 1e-4;
+
+/// Where independent runs end, against the exact distribution.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Comparison {
+    /// Length of each run.
+    pub cycles: u64,
+    /// Number of runs, each with its own seed.
+    pub runs: u32,
+    /// Total variation between the runs' last poses and the exact distribution.
+    pub total_variation: f64,
+    /// What sampling alone stays below, but for one time in `1 / significance`.
+    pub limit: f64,
+    /// See [`SIGNIFICANCE`].
+    pub significance: f64,
+    /// Whether the total variation is within the limit.
+    pub agrees: bool,
+}
+
+/// Runs the scenario's robot `runs` times for `cycles` cycles from its start under `policy`
+/// (run k with the scenario's seed plus k) and compares where it ends with
+/// [`Chain::distribution_after`](super::Chain::distribution_after).
+///
+/// Runs are independent, so that the limit holds whether or not the chain mixes.
+///
+/// # Errors
+/// When the scenario is no chain, see [`Model::new`], or `runs` is 0.
+pub fn compare(
+    compiled: &Compiled,
+    source: &Source,
+    policy: &Random,
+    cycles: u64,
+    runs: u32,
+) -> Result<Comparison, InputError> {
+    if runs == 0 {
+        return Err(InputError::new("--runs", "no run at all", "give 1000 or more"));
+    }
+    let model = Model::new(compiled)?;
+    let chain = model.chain(policy)?;
+    let exact = chain.over_poses(&chain.distribution_after(model.actions_in(cycles)));
+    let counts = last_poses(compiled, source, policy, cycles, runs);
+    Ok(Comparison::new(&exact, &counts, cycles, runs))
+}
+
+impl Comparison {
+    fn new(
+        exact: &BTreeMap<Pose, f64>,
+        counts: &BTreeMap<Pose, u32>,
+        cycles: u64,
+        runs: u32,
+    ) -> Self {
+        // Poses that the model does not know count in full.
+        let unknown = counts.keys().filter(|pose| !exact.contains_key(pose));
+        let poses: Vec<Pose> = exact.keys().chain(unknown).copied().collect();
+        let expected: Vec<f64> =
+            poses.iter().map(|p| exact.get(p).copied().unwrap_or(0.0)).collect();
+        let share = |pose| f64::from(counts.get(pose).copied().unwrap_or(0)) / f64::from(runs);
+        let observed: Vec<f64> = poses.iter().map(share).collect();
+        let total_variation = total_variation(&expected, &observed);
+        let limit = sampling_limit(&expected, f64::from(runs), SIGNIFICANCE);
+        let agrees = total_variation <= limit;
+        Self { cycles, runs, total_variation, limit, significance: SIGNIFICANCE, agrees }
+    }
+}
+
+/// The total variation that the shares of `samples` independent samples of `distribution`
+/// exceed with a probability of at most `significance`.
+///
+/// The mean is at most half the sum of the shares' standard deviations; one sample more or
+/// less changes the total variation by at most 1 / `samples`, so that McDiarmid's inequality
+/// bounds how far above its mean it lies.
+pub fn sampling_limit(distribution: &[f64], samples: f64, significance: f64) -> f64 {
+    let deviation = |p: &f64| (p * (1.0 - p).max(0.0) / samples).sqrt();
+    let mean = 0.5 * distribution.iter().map(deviation).sum::<f64>();
+    mean + (math::ln(1.0 / significance) / (2.0 * samples)).sqrt()
+}
+
+/// How often each pose is the last.
+fn last_poses(
+    compiled: &Compiled,
+    source: &Source,
+    policy: &Random,
+    cycles: u64,
+    runs: u32,
+) -> BTreeMap<Pose, u32> {
+    let mut world = (*compiled.world).clone();
+    follow(&mut world, policy);
+    let mut counts = BTreeMap::new();
+    for run in 0..u64::from(runs) {
+        world.streams = Streams::new(Seed(compiled.seed.wrapping_add(run)));
+        let compiled = Compiled { world: Arc::new(world.clone()), ..compiled.clone() };
+        let mut simulation = RobotsSimulation::from_compiled(compiled, source, 1);
+        simulation.advance(cycles);
+        *counts.entry(pose(&simulation)).or_insert(0) += 1;
+    }
+    counts
+}
+
+/// Gives the robots another behaviour.
+fn follow(world: &mut RobotsWorld, policy: &Random) {
+    for ty in &mut world.types {
+        if let Role::Robot(model) = &mut ty.role {
+            model.behaviour = Arc::new(policy.clone());
+        }
+    }
+}
+
+fn pose(simulation: &RobotsSimulation) -> Pose {
+    let (world, state) = (simulation.world(), simulation.state());
+    let slot = world.robots()[0];
+    let (col, row) = world.map_position(state.at(slot));
+    let heading = state.bodies[slot as usize].facing.get();
+    Pose { col: col as i32, row: row as i32, heading }
+}

@@ -1,0 +1,146 @@
+//! The obstacle rule as arithmetic: what an action comes to at a place, with probabilities.
+//!
+//! Written from the model's description alone, not from the simulator: boxes are found by
+//! coordinates, where the simulator walks lists of prepared offsets. The tests hold the two
+//! against each other.
+
+use crate::effector::{ObstacleRule, Side, Transition};
+use crate::state::FREE;
+use std::collections::BTreeMap;
+
+/// Where a body stands and how it is turned.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Pose {
+    /// Column of its lower-left box, from the west.
+    pub col: i32,
+    /// Row of its lower-left box, from the south.
+    pub row: i32,
+    /// 0 east, 1 north, 2 west, 3 south.
+    pub heading: u8,
+}
+
+/// How an action ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Outcome {
+    /// Where the body is then.
+    pub pose: Pose,
+    /// Kind of the thing that stopped it, and the side of the body that touched it.
+    pub contact: Option<(u8, Side)>,
+}
+
+impl Pose {
+    /// The pose one box further to `side`.
+    fn shifted(self, side: Side) -> Self {
+        let (dx, dy) = unit(self.heading, side);
+        Self { col: self.col + dx, row: self.row + dy, ..self }
+    }
+
+    fn turned(self, quarters: u8) -> Self {
+        Self { heading: (self.heading + quarters) % 4, ..self }
+    }
+
+    /// The boxes next to a `size` x `size` body on `side`, from the left to the right as
+    /// seen looking that way.
+    fn beside(self, size: u32, side: Side) -> impl Iterator<Item = (i32, i32)> {
+        let last = size as i32 - 1;
+        let (dx, dy) = unit(self.heading, side);
+        // The body's own boxes on that side lie on the line through this corner ...
+        let corner = (self.col + last * i32::from(dx > 0), self.row + last * i32::from(dy > 0));
+        // ... along the direction a quarter to the right, which may begin at its far end.
+        let (rx, ry) = (dy, -dx);
+        let first =
+            (corner.0 + last * i32::from(rx < 0) + dx, corner.1 + last * i32::from(ry < 0) + dy);
+        (0..size as i32).map(move |k| (first.0 + k * rx, first.1 + k * ry))
+    }
+}
+
+/// The distribution of outcomes of an action of a `size` x `size` body, here and now.
+///
+/// `transitions` hold in a free place; `kind_at(col, row)` is the kind of what stands in a
+/// box, 0 for nothing, and knows nothing of the body itself. Equal outcomes are merged, and
+/// come in the order of their poses. Probabilities are those of `transitions`, so they sum
+/// to 1 when those do.
+pub fn here_and_now(
+    transitions: &[Transition],
+    size: u32,
+    from: Pose,
+    rule: ObstacleRule,
+    kind_at: impl Fn(i32, i32) -> u8,
+) -> Vec<(Outcome, f64)> {
+    let possible = transitions.iter().filter(|t| t.p > 0.0);
+    let walked: Vec<(Outcome, f64)> =
+        possible.map(|t| (walk(t, size, from, rule, &kind_at), t.p)).collect();
+    match rule {
+        ObstacleRule::Cut | ObstacleRule::Stay => merged(walked),
+        ObstacleRule::Renormalise => renormalised(walked),
+    }
+}
+
+/// Follows one path to its end, or to the first box that is not free.
+fn walk(
+    transition: &Transition,
+    size: u32,
+    from: Pose,
+    rule: ObstacleRule,
+    kind_at: impl Fn(i32, i32) -> u8,
+) -> Outcome {
+    let mut at = from;
+    for &side in &transition.path {
+        let met = at.beside(size, side).map(|(col, row)| kind_at(col, row)).find(|&k| k != FREE);
+        if let Some(kind) = met {
+            let pose = if rule == ObstacleRule::Cut { at } else { from };
+            return Outcome { pose, contact: Some((kind, side)) };
+        }
+        at = at.shifted(side);
+    }
+    Outcome { pose: at.turned(transition.turn), contact: None }
+}
+
+/// Strikes out what is blocked and rescales the rest; keeps the first contact when nothing
+/// is left.
+fn renormalised(walked: Vec<(Outcome, f64)>) -> Vec<(Outcome, f64)> {
+    let free = |w: &&(Outcome, f64)| w.0.contact.is_none();
+    let left: f64 = walked.iter().filter(free).map(|w| w.1).sum();
+    if left > 0.0 {
+        return merged(walked.iter().filter(free).map(|&(o, p)| (o, p / left)).collect());
+    }
+    walked.first().map(|&(outcome, _)| vec![(outcome, 1.0)]).unwrap_or_default()
+}
+
+fn merged(outcomes: Vec<(Outcome, f64)>) -> Vec<(Outcome, f64)> {
+    let mut sums = BTreeMap::new();
+    for (outcome, p) in outcomes {
+        *sums.entry(outcome).or_insert(0.0) += p;
+    }
+    sums.into_iter().collect()
+}
+
+/// The unit vector to a side of a body with this heading.
+fn unit(heading: u8, side: Side) -> (i32, i32) {
+    match (heading + side as u8) % 4 {
+        0 => (1, 0),
+        1 => (0, 1),
+        2 => (-1, 0),
+        _ => (0, -1),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn beside(heading: u8, side: Side) -> Vec<(i32, i32)> {
+        Pose { col: 5, row: 7, heading }.beside(2, side).collect()
+    }
+
+    #[test]
+    fn boxes_beside_a_body_run_from_its_left_to_its_right() {
+        assert_eq!(beside(0, Side::Front), [(7, 8), (7, 7)]);
+        assert_eq!(beside(1, Side::Front), [(5, 9), (6, 9)]);
+        assert_eq!(beside(2, Side::Front), [(4, 7), (4, 8)]);
+        assert_eq!(beside(3, Side::Front), [(6, 6), (5, 6)]);
+        assert_eq!(beside(0, Side::Left), [(5, 9), (6, 9)]);
+        assert_eq!(beside(0, Side::Back), [(4, 7), (4, 8)]);
+        assert_eq!(beside(1, Side::Right), [(7, 8), (7, 7)]);
+    }
+}

@@ -1,0 +1,253 @@
+//! Tables of counts: rows are what was true, columns what came out.
+
+use serde::Serialize;
+use serde::ser::{SerializeMap, Serializer};
+
+use sidestep_statistics::{Interval, wilson};
+
+/// Counts of outcomes by row. A count may be fractional where one event is spread over
+/// outcomes (phase averaging); a row's total is its number of events all the same.
+///
+/// Serialized as `{row: {column: count}}` without empty cells and rows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Counts {
+    name: String,
+    rows: Vec<String>,
+    columns: Vec<String>,
+    /// Row by row; shape `(rows, columns)`.
+    cells: Vec<Vec<f64>>,
+}
+
+/// One estimated probability and what it rests on.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Estimate {
+    /// Which table of counts.
+    pub table: String,
+    /// What was true, or commanded.
+    pub row: String,
+    /// What came out.
+    pub column: String,
+    /// How often.
+    pub count: f64,
+    /// Out of how many.
+    pub of: f64,
+    /// `count / of`, without smoothing.
+    pub probability: f64,
+    /// Wilson's 95 % interval of that probability.
+    pub interval: Interval,
+}
+
+/// A row that rests on few counts.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ThinRow {
+    /// Which table of counts.
+    pub table: String,
+    /// What was true, or commanded.
+    pub row: String,
+    /// Counts in the row.
+    pub count: f64,
+}
+
+impl Counts {
+    /// A table without counts.
+    pub fn new(name: &str, rows: &[String], columns: &[String]) -> Self {
+        Self {
+            name: name.to_owned(),
+            rows: rows.to_vec(),
+            columns: columns.to_vec(),
+            cells: vec![vec![0.0; columns.len()]; rows.len()],
+        }
+    }
+
+    /// Adds `weight` to a cell.
+    pub fn add(&mut self, row: usize, column: usize, weight: f64) {
+        self.cells[row][column] += weight;
+    }
+
+    /// What the table counts.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Names of the rows.
+    pub fn rows(&self) -> &[String] {
+        &self.rows
+    }
+
+    /// Names of the columns.
+    pub fn columns(&self) -> &[String] {
+        &self.columns
+    }
+
+    /// All counts, shape `(rows, columns)`.
+    pub fn cells(&self) -> &[Vec<f64>] {
+        &self.cells
+    }
+
+    /// The counts of one row.
+    pub fn row(&self, row: usize) -> &[f64] {
+        &self.cells[row]
+    }
+
+    /// Sum of one row.
+    pub fn total(&self, row: usize) -> f64 {
+        self.cells[row].iter().sum()
+    }
+
+    /// The row as probabilities after `alpha` is added to every cell; `None` when the row has
+    /// no counts, because then all it would tell is the shape of the table.
+    pub fn smoothed(&self, row: usize, alpha: f64) -> Option<Vec<f64>> {
+        (self.total(row) > 0.0).then(|| smooth(&self.cells[row], alpha))
+    }
+
+    /// Every cell of every row that has counts, as a probability.
+    pub fn estimates(&self) -> Vec<Estimate> {
+        (0..self.rows.len())
+            .filter(|&row| self.total(row) > 0.0)
+            .flat_map(|row| (0..self.columns.len()).map(move |column| self.estimate(row, column)))
+            .collect()
+    }
+
+    fn estimate(&self, row: usize, column: usize) -> Estimate {
+        let (count, of) = (self.cells[row][column], self.total(row));
+        Estimate {
+            table: self.name.clone(),
+            row: self.rows[row].clone(),
+            column: self.columns[column].clone(),
+            count,
+            of,
+            probability: count / of,
+            interval: wilson(count, of),
+        }
+    }
+
+    /// The rows with fewer than `below` counts, those with none included.
+    pub fn thin(&self, below: u32) -> Vec<ThinRow> {
+        let totals = self.rows.iter().enumerate().map(|(i, row)| (row, self.total(i)));
+        let thin = totals.filter(|(_, total)| *total < f64::from(below));
+        thin.map(|(row, count)| ThinRow { table: self.name.clone(), row: row.clone(), count })
+            .collect()
+    }
+}
+
+/// Probabilities from counts, `alpha` added to each; all equal when there is nothing to go by.
+pub(crate) fn smooth(counts: &[f64], alpha: f64) -> Vec<f64> {
+    let total: f64 = counts.iter().map(|count| count + alpha).sum();
+    if total <= 0.0 {
+        return vec![1.0 / counts.len() as f64; counts.len()];
+    }
+    counts.iter().map(|count| (count + alpha) / total).collect()
+}
+
+/// Probabilities with nine decimals that sum to 1: what rounding takes or gives goes to the
+/// greatest.
+pub(crate) fn rounded(probabilities: &[f64]) -> Vec<f64> {
+    let nine = |p: f64| (p * 1e9).round() / 1e9;
+    let mut row: Vec<f64> = probabilities.iter().map(|p| nine(*p)).collect();
+    let greatest = (0..row.len()).max_by(|a, b| row[*a].total_cmp(&row[*b]));
+    if let Some(greatest) = greatest {
+        let others: f64 = (0..row.len()).filter(|i| *i != greatest).map(|i| row[i]).sum();
+        row[greatest] = nine(1.0 - others);
+    }
+    row
+}
+
+/// A count is written as an integer where it is one.
+struct Count(f64);
+
+impl Serialize for Count {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        if self.0.fract() == 0.0 {
+            serializer.serialize_u64(self.0 as u64)
+        } else {
+            serializer.serialize_f64(self.0)
+        }
+    }
+}
+
+/// A table that is serialized as its bare numbers, shape `(rows, columns)`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CountMatrix(pub Counts);
+
+impl Serialize for CountMatrix {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let rows = self.0.cells.iter();
+        serializer.collect_seq(rows.map(|row| row.iter().map(|&c| Count(c)).collect::<Vec<_>>()))
+    }
+}
+
+/// The non-empty cells of one row.
+struct FilledCells<'a> {
+    columns: &'a [String],
+    cells: &'a [f64],
+}
+
+impl Serialize for FilledCells<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let filled = self.columns.iter().zip(self.cells).filter(|(_, count)| **count != 0.0);
+        serializer.collect_map(filled.map(|(column, &count)| (column, Count(count))))
+    }
+}
+
+impl Serialize for Counts {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(None)?;
+        for (row, cells) in self.rows.iter().zip(&self.cells) {
+            if cells.iter().any(|count| *count != 0.0) {
+                map.serialize_entry(row, &FilledCells { columns: &self.columns, cells })?;
+            }
+        }
+        map.end()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(names: &[&str]) -> Vec<String> {
+        names.iter().map(|name| name.to_string()).collect()
+    }
+
+    fn small() -> Counts {
+        let mut counts = Counts::new("t", &names(&["a", "b"]), &names(&["x", "y"]));
+        counts.add(0, 0, 3.0);
+        counts.add(0, 1, 1.0);
+        counts
+    }
+
+    #[test]
+    fn smoothing_adds_alpha_to_every_cell_and_leaves_an_empty_row_alone() {
+        assert_eq!(small().smoothed(0, 0.5), Some(vec![0.7, 0.3]));
+        assert_eq!(small().smoothed(0, 0.0), Some(vec![0.75, 0.25]));
+        assert_eq!(small().smoothed(1, 0.5), None);
+        assert_eq!(smooth(&[0.0, 0.0], 0.0), [0.5, 0.5]);
+    }
+
+    #[test]
+    fn every_estimate_has_its_count_and_interval_and_thin_rows_are_listed() {
+        let estimates = small().estimates();
+        assert_eq!(estimates.len(), 2);
+        assert_eq!(
+            (estimates[0].count, estimates[0].of, estimates[0].probability),
+            (3.0, 4.0, 0.75)
+        );
+        assert_eq!(estimates[0].interval, wilson(3.0, 4.0));
+        let thin = small().thin(4);
+        assert_eq!((thin.len(), thin[0].row.as_str(), thin[0].count), (1, "b", 0.0));
+        assert_eq!(small().thin(5).len(), 2);
+    }
+
+    #[test]
+    fn rounded_rows_still_sum_to_one() {
+        let row = rounded(&smooth(&[1.0, 1.0, 1.0, 4.0, 1e-7], 0.1));
+        assert!((row.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+        assert_eq!(rounded(&[1.0 / 3.0; 3])[0], 0.333_333_333);
+    }
+
+    #[test]
+    fn json_names_the_filled_cells_with_whole_counts() {
+        assert_eq!(serde_json::to_string(&small()).unwrap(), r#"{"a":{"x":3,"y":1}}"#);
+        assert_eq!(serde_json::to_string(&CountMatrix(small())).unwrap(), "[[3,1],[0,0]]");
+    }
+}

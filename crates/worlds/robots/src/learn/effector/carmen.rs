@@ -1,0 +1,189 @@
+//! Odometry against corrected poses (rule L6).
+
+use super::EffectorModel;
+use super::events::{Events, Move, Turn};
+use crate::learn::EstimateOptions;
+use crate::learn::track::{Motion, Pose};
+use sidestep_import::carmen::{CorrectedLog, Scan};
+use sidestep_kernel::InputError;
+use sidestep_kernel::math::{hypot, tan, wrap_angle};
+use sidestep_statistics::Moments;
+
+/// More turn than this is no move ahead.
+const FORWARD_TURN_MAX_DEG: f64 = 10.0;
+/// A shorter move is none.
+const FORWARD_MIN_M: f64 = 0.3;
+/// A smaller turn is none.
+const TURN_MIN_DEG: f64 = 20.0;
+/// A longer path is no turn in place.
+const TURN_PATH_MAX_M: f64 = 0.3;
+/// A shorter step of odometry is too short to tell its slip.
+const SLIP_STEP_MIN_M: f64 = 0.03;
+/// Wheels slip sideways by less than 1 % of their way; the particles of a SLAM program, logged
+/// in place of odometry, by 3 % to 13 %.
+const SLIP_SD_MAX: f64 = 0.02;
+
+/// How events become transitions.
+const RULE: &str = "odometry against corrected poses, displacement over commanded path, \
+    phase-averaged (L6), outcomes beyond the five spread in proportion; turns in place, true \
+    over commanded taken for the share of a quarter turn, phase-averaged; every count plus alpha";
+
+pub(super) fn learn(
+    source: &str,
+    log: &CorrectedLog,
+    options: &EstimateOptions,
+) -> Result<EffectorModel, InputError> {
+    let pairs: Vec<Pair> = log.scans.windows(2).filter_map(Pair::of).collect();
+    let events = Events {
+        moves: pairs.iter().filter_map(Pair::as_move).collect(),
+        turns: pairs.iter().filter_map(Pair::as_turn).collect(),
+    };
+    if events.moves.is_empty() {
+        let cause = "odometry claims no move of 0.3 m ahead between two scans";
+        return Err(InputError::new(source, cause, "name a corrected log with ODOM messages"));
+    }
+    let mut report = events.report(source, options);
+    report.lateral_slip = Moments::of(slip_ratios(log));
+    report.lateral_slip_sd = report.lateral_slip.map(|slip| slip.sd);
+    report.warnings.extend(report.lateral_slip_sd.and_then(slip_warning));
+    let ahead: Vec<&Pair> = pairs.iter().filter(|pair| pair.is_ahead()).collect();
+    let of = |value: fn(&&Pair) -> f64| Moments::of(ahead.iter().map(value));
+    let moments = [
+        ("odometry_forward_m", of(|pair| pair.claimed.ahead_m)),
+        ("error_ahead_m", of(|pair| pair.corrected.ahead_m - pair.claimed.ahead_m)),
+        ("error_left_m", of(|pair| pair.corrected.left_m)),
+    ];
+    let known = moments.into_iter().filter_map(|(name, m)| Some((name.to_string(), m?)));
+    report.moments.extend(known);
+    Ok(EffectorModel { report, profile: events.profile(RULE, options) })
+}
+
+/// What happened between two scans, in the frame of the first.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Pair {
+    /// According to odometry.
+    claimed: Motion,
+    /// According to the corrected poses.
+    corrected: Motion,
+    duration_s: f64,
+}
+
+impl Pair {
+    /// `None` where no odometry lies between the scans.
+    fn of(scans: &[Scan]) -> Option<Self> {
+        let start = Pose::from(scans[0].pose);
+        let claimed = Pose::from(*scans[0].odometry.last()?);
+        Some(Self {
+            claimed: start.motion_to(&claimed),
+            corrected: start.motion_to(&Pose::from(scans[1].pose)),
+            duration_s: scans[1].t_secs - scans[0].t_secs,
+        })
+    }
+
+    fn is_ahead(&self) -> bool {
+        self.claimed.turn_rad.abs() <= FORWARD_TURN_MAX_DEG.to_radians()
+            && self.claimed.ahead_m >= FORWARD_MIN_M
+    }
+
+    fn as_move(&self) -> Option<Move> {
+        self.is_ahead().then(|| Move {
+            ahead_boxes: self.corrected.ahead_m / self.claimed.ahead_m,
+            left_boxes: self.corrected.left_m / self.claimed.ahead_m,
+            turn_error_rad: wrap_angle(self.corrected.turn_rad - self.claimed.turn_rad),
+            duration_s: Some(self.duration_s),
+        })
+    }
+
+    fn as_turn(&self) -> Option<Turn> {
+        let path_m = hypot(self.claimed.ahead_m, self.claimed.left_m);
+        let is_turn = self.claimed.turn_rad.abs() >= TURN_MIN_DEG.to_radians();
+        (is_turn && path_m <= TURN_PATH_MAX_M).then_some(Turn {
+            commanded_rad: self.claimed.turn_rad,
+            true_rad: self.corrected.turn_rad,
+            duration_s: Some(self.duration_s),
+        })
+    }
+}
+
+/// Sideways motion of each step of odometry as a share of its length, beyond what an arc of
+/// the turned angle brings.
+fn slip_ratios(log: &CorrectedLog) -> Vec<f64> {
+    let runs = std::iter::once(&log.odometry_before).chain(log.scans.iter().map(|s| &s.odometry));
+    let steps = runs.flat_map(|run| run.windows(2));
+    steps
+        .filter_map(|step| slip_ratio(&Pose::from(step[0]).motion_to(&Pose::from(step[1]))))
+        .collect()
+}
+
+fn slip_ratio(step: &Motion) -> Option<f64> {
+    (step.ahead_m.abs() > SLIP_STEP_MIN_M)
+        .then(|| step.left_m / step.ahead_m - tan(step.turn_rad / 2.0))
+}
+
+fn slip_warning(sd: f64) -> Option<String> {
+    (sd > SLIP_SD_MAX).then(|| {
+        format!(
+            "odometry slips sideways by {:.1} % of each step (wheels: under 1 %): its poses look \
+             like the samples of a SLAM program, whose noise would be learned instead of the robot's",
+            100.0 * sd
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scan(t_secs: f64, pose: [f64; 3], odometry: &[[f64; 3]]) -> Scan {
+        Scan { t_secs, n_beams: 0, pose, odometry: odometry.to_vec() }
+    }
+
+    fn log(scans: Vec<Scan>) -> CorrectedLog {
+        CorrectedLog { odometry_before: Vec::new(), scans }
+    }
+
+    #[test]
+    fn a_move_is_told_in_units_of_what_odometry_claims() {
+        let log = log(vec![
+            scan(0.0, [0.0; 3], &[[0.0; 3], [2.0, 0.0, 0.1]]),
+            scan(1.5, [1.5, 0.5, 0.2], &[]),
+            scan(2.0, [9.0, 0.0, 0.0], &[]),
+        ]);
+        let model = learn("f", &log, &EstimateOptions::default()).unwrap();
+        assert_eq!(model.report.events, 1, "no odometry, no pair");
+        let moments = &model.report.moments;
+        assert_eq!((moments["ahead_boxes"].mean, moments["left_boxes"].mean), (0.75, 0.25));
+        assert_eq!((moments["duration_s"].mean, moments["error_ahead_m"].mean), (1.5, -0.5));
+        assert!((moments["dtheta_minus_cmd_rad"].mean - 0.1).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_turn_in_place_is_no_move_and_an_arc_is_neither() {
+        let turned =
+            Pair::of(&[scan(0.0, [0.0; 3], &[[0.1, 0.0, 0.6]]), scan(1.0, [0.1, 0.0, 0.5], &[])]);
+        let turned = turned.unwrap();
+        assert_eq!((turned.as_move(), turned.as_turn().unwrap().true_rad), (None, 0.5));
+        let arc =
+            Pair::of(&[scan(0.0, [0.0; 3], &[[1.0, 0.0, 0.6]]), scan(1.0, [1.0, 0.0, 0.5], &[])]);
+        assert_eq!((arc.unwrap().as_move(), arc.unwrap().as_turn()), (None, None));
+    }
+
+    #[test]
+    fn odometry_that_slips_sideways_is_warned_of() {
+        let zigzag = |slip: f64| {
+            let step = |i: u32| [f64::from(i), if i.is_multiple_of(2) { 0.0 } else { slip }, 0.0];
+            let odometry: Vec<[f64; 3]> = (0..20).map(step).collect();
+            log(vec![scan(0.0, [0.0; 3], &odometry), scan(1.0, [19.0, 0.0, 0.0], &[])])
+        };
+        let warnings =
+            |slip| learn("f", &zigzag(slip), &EstimateOptions::default()).unwrap().report.warnings;
+        assert!(warnings(0.03)[0].contains("slips sideways by 3."));
+        assert_eq!(warnings(0.01), Vec::<String>::new());
+    }
+
+    #[test]
+    fn a_log_without_moves_is_an_error() {
+        let log = log(vec![scan(0.0, [0.0; 3], &[]), scan(1.0, [0.0; 3], &[])]);
+        assert!(learn("f", &log, &EstimateOptions::default()).is_err());
+    }
+}

@@ -1,0 +1,264 @@
+//! Measured moves and turns, from whatever log, and their counts.
+
+use std::collections::BTreeMap;
+
+use super::phase::{FORWARD_CLASSES, average, forward_class, outcomes, rounded};
+use super::report::{EffectorReport, ForwardShares, TurnReport};
+use super::transitions::{self, EffectorProfile, TURN_CLASSES, Transition, intended, turn_class};
+use crate::learn::holdout::{Fit, fit, split};
+use crate::learn::{Counts, EstimateOptions};
+use sidestep_statistics::Moments;
+
+/// One commanded box ahead and what became of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Move {
+    pub(super) ahead_boxes: f64,
+    pub(super) left_boxes: f64,
+    /// True turn minus commanded turn.
+    pub(super) turn_error_rad: f64,
+    /// `None` where the log does not tell.
+    pub(super) duration_s: Option<f64>,
+}
+
+/// One commanded turn and what became of it; both in rad, + to the left.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Turn {
+    pub(super) commanded_rad: f64,
+    pub(super) true_rad: f64,
+    /// `None` where the log does not tell.
+    pub(super) duration_s: Option<f64>,
+}
+
+impl Turn {
+    fn ratio(&self) -> f64 {
+        self.true_rad / self.commanded_rad
+    }
+
+    /// Degrees turned along the command.
+    fn along_deg(&self) -> f64 {
+        (self.true_rad * self.commanded_rad.signum()).to_degrees()
+    }
+
+    fn error_deg(&self) -> f64 {
+        self.along_deg() - self.commanded_rad.abs().to_degrees()
+    }
+
+    fn is_left(&self) -> bool {
+        self.commanded_rad > 0.0
+    }
+}
+
+/// All that a log tells of a robot's moves and turns.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct Events {
+    pub(super) moves: Vec<Move>,
+    pub(super) turns: Vec<Turn>,
+}
+
+impl Events {
+    /// Everything that follows from moves and turns; the rest of the report is left empty.
+    pub(super) fn report(&self, source: &str, options: &EstimateOptions) -> EffectorReport {
+        let all: Vec<&Move> = self.moves.iter().collect();
+        let (forward, turns) = (forward_counts(&all), self.turn_counts());
+        let tables = [&forward, &turns];
+        EffectorReport {
+            source: source.to_owned(),
+            events: self.moves.len() as u64,
+            transitions: ForwardShares::of(forward.row(0)),
+            transitions_rounded: ForwardShares::of(rounded_counts(&all).row(0)),
+            outcomes: box_shares(&all),
+            rounded_counts: boxes_by_rounding(&all),
+            moments: self.moments(),
+            turns: self.turn_report(),
+            probabilities: tables.iter().flat_map(|table| table.estimates()).collect(),
+            thin: tables.iter().flat_map(|table| table.thin(options.thin_below)).collect(),
+            hold_out: self.hold_out(options),
+            estimate: *options,
+            ..EffectorReport::default()
+        }
+    }
+
+    /// Transitions of all three actions.
+    pub(super) fn profile(&self, rule: &str, options: &EstimateOptions) -> EffectorProfile {
+        let forward = forward_counts(&self.moves.iter().collect::<Vec<_>>());
+        let mut assumed = Vec::new();
+        let left = self.turn_transitions("left", options.alpha, &mut assumed);
+        let right = self.turn_transitions("right", options.alpha, &mut assumed);
+        let actions = [
+            ("forward", transitions::forward(&forward, options.alpha)),
+            ("left", left),
+            ("right", right),
+        ];
+        EffectorProfile {
+            box_m: None,
+            actions: actions.map(|(name, list)| (name.to_string(), list)).to_vec(),
+            assumed,
+            rule: rule.to_owned(),
+        }
+    }
+
+    fn moments(&self) -> BTreeMap<String, Moments> {
+        let of = |value: fn(&Move) -> f64| Moments::of(self.moves.iter().map(value));
+        let named = [
+            ("ahead_boxes", of(|m| m.ahead_boxes)),
+            ("left_boxes", of(|m| m.left_boxes)),
+            ("dtheta_minus_cmd_rad", of(|m| m.turn_error_rad)),
+            ("duration_s", Moments::of(self.moves.iter().filter_map(|m| m.duration_s))),
+        ];
+        named.into_iter().filter_map(|(name, moments)| Some((name.to_string(), moments?))).collect()
+    }
+
+    fn hold_out(&self, options: &EstimateOptions) -> Vec<Fit> {
+        let (train, held) = split(&self.moves, options.hold_out_every);
+        let moves = fit(&forward_counts(&train), &forward_counts(&held), options.alpha);
+        let (train, held) = split(&self.turns, options.hold_out_every);
+        let part = |turns: Vec<&Turn>| turn_counts(turns.into_iter());
+        vec![moves, fit(&part(train), &part(held), options.alpha)]
+    }
+
+    fn turn_counts(&self) -> Counts {
+        turn_counts(self.turns.iter())
+    }
+
+    /// Turns to one side; without any, those to the other side mirrored; without any at all,
+    /// turns that never fail.
+    fn turn_transitions(
+        &self,
+        action: &str,
+        alpha: f64,
+        assumed: &mut Vec<String>,
+    ) -> Vec<Transition> {
+        let counts = self.turn_counts();
+        let (own, other, side) = if action == "left" { (0, 1, 1) } else { (1, 0, -1) };
+        if counts.total(own) > 0.0 {
+            return transitions::turn(&counts, own, side, alpha);
+        }
+        if counts.total(other) > 0.0 {
+            assumed.push(format!("{action}: mirrored from turns to the other side"));
+            return transitions::turn(&counts, other, side, alpha);
+        }
+        assumed.push(format!("{action}: never fails"));
+        transitions::exact(intended(action))
+    }
+
+    fn turn_report(&self) -> Option<TurnReport> {
+        let turns = &self.turns;
+        let n_left = turns.iter().filter(|turn| turn.is_left()).count();
+        let of = |value: fn(&Turn) -> f64| Moments::of(turns.iter().map(value));
+        (!turns.is_empty()).then(|| TurnReport {
+            n: turns.len(),
+            n_left,
+            n_right: turns.len() - n_left,
+            true_over_commanded: of(Turn::ratio),
+            error_deg_along_turn: of(Turn::error_deg),
+            duration_s: Moments::of(turns.iter().filter_map(|turn| turn.duration_s)),
+            hist_15deg: histogram(turns.iter().map(Turn::along_deg), 15),
+            error_hist_5deg: histogram(turns.iter().map(Turn::error_deg), 5),
+        })
+    }
+}
+
+/// Phase-averaged classes of moves ahead.
+fn forward_counts(moves: &[&Move]) -> Counts {
+    let mut counts = empty_forward();
+    for (outcome, weight) in moves.iter().flat_map(|m| outcomes(m.ahead_boxes, m.left_boxes, 0.0)) {
+        counts.add(0, forward_class(outcome.ahead, outcome.left), weight);
+    }
+    counts
+}
+
+/// Classes of moves ahead by rounding.
+fn rounded_counts(moves: &[&Move]) -> Counts {
+    let mut counts = empty_forward();
+    for m in moves {
+        counts.add(0, forward_class(rounded(m.ahead_boxes), rounded(m.left_boxes)), 1.0);
+    }
+    counts
+}
+
+fn empty_forward() -> Counts {
+    Counts::new("moves", &["forward".to_string()], &FORWARD_CLASSES.map(String::from))
+}
+
+/// Turns by side, phase-averaged: the ratio of true to commanded turn is what a turn of 90
+/// degrees would be in quarters.
+fn turn_counts<'t>(turns: impl Iterator<Item = &'t Turn>) -> Counts {
+    let rows = ["left", "right"].map(String::from);
+    let mut counts = Counts::new("turns", &rows, &TURN_CLASSES.map(String::from));
+    for turn in turns {
+        for (quarters, weight) in average(turn.ratio()) {
+            counts.add(usize::from(!turn.is_left()), turn_class(quarters), weight);
+        }
+    }
+    counts
+}
+
+/// Phase-averaged share of each box, `"ahead,left"`.
+fn box_shares(moves: &[&Move]) -> BTreeMap<String, f64> {
+    let mut shares = BTreeMap::new();
+    for (outcome, weight) in moves.iter().flat_map(|m| outcomes(m.ahead_boxes, m.left_boxes, 0.0)) {
+        let name = format!("{},{}", outcome.ahead, outcome.left);
+        *shares.entry(name).or_insert(0.0) += weight / moves.len() as f64;
+    }
+    shares
+}
+
+fn boxes_by_rounding(moves: &[&Move]) -> BTreeMap<String, u64> {
+    let mut counts = BTreeMap::new();
+    for m in moves {
+        let name = format!("{},{}", rounded(m.ahead_boxes), rounded(m.left_boxes));
+        *counts.entry(name).or_insert(0) += 1;
+    }
+    counts
+}
+
+/// Values by their nearest multiple of `width`.
+fn histogram(values: impl Iterator<Item = f64>, width: i32) -> BTreeMap<i32, u64> {
+    let mut bins = BTreeMap::new();
+    for value in values {
+        *bins.entry(rounded(value / f64::from(width)) * width).or_insert(0) += 1;
+    }
+    bins
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::FRAC_PI_4;
+
+    fn turn(ratio: f64, side: f64) -> Turn {
+        let commanded_rad = side * FRAC_PI_4;
+        Turn { commanded_rad, true_rad: commanded_rad * ratio, duration_s: None }
+    }
+
+    #[test]
+    fn a_turn_too_short_fails_as_often_as_it_is_short() {
+        let events = Events { moves: vec![], turns: vec![turn(0.75, 1.0), turn(1.25, 1.0)] };
+        let counts = events.turn_counts();
+        assert_eq!(counts.row(0), [1.5, 0.25, 0.25, 0.0]);
+        let options = EstimateOptions { alpha: 0.0, ..Default::default() };
+        let profile = events.profile("", &options);
+        let p: Vec<_> = profile.action("left").unwrap().iter().map(|t| (t.turn_deg, t.p)).collect();
+        assert_eq!(p, [(90, 0.75), (0, 0.125), (180, 0.125)]);
+        assert_eq!(profile.action("right").unwrap()[0].turn_deg, -90);
+        assert_eq!(profile.assumed, ["right: mirrored from turns to the other side"]);
+    }
+
+    #[test]
+    fn without_turns_an_exact_turn_is_assumed_and_said() {
+        let profile = Events::default().profile("", &EstimateOptions::default());
+        let left = profile.action("left").unwrap();
+        assert_eq!((left.len(), left[0].p), (1, 1.0));
+        assert_eq!(profile.assumed, ["left: never fails", "right: never fails"]);
+        assert_eq!(Events::default().turn_report(), None);
+    }
+
+    #[test]
+    fn histograms_tell_degrees_along_the_turn() {
+        let events = Events { moves: vec![], turns: vec![turn(0.9, -1.0), turn(1.0, 1.0)] };
+        let report = events.turn_report().unwrap();
+        assert_eq!((report.n_left, report.n_right), (1, 1));
+        assert_eq!(report.hist_15deg, BTreeMap::from([(45, 2)]));
+        assert_eq!(report.error_hist_5deg, BTreeMap::from([(-5, 1), (0, 1)]));
+    }
+}

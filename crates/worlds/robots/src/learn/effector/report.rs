@@ -1,0 +1,134 @@
+//! What was learned about an effector, for people and for programs.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use serde::Serialize;
+
+use super::phase::FORWARD_CLASSES;
+use crate::learn::display::{self, Heading};
+use crate::learn::holdout::Fit;
+use crate::learn::{Estimate, EstimateOptions, ThinRow};
+use sidestep_statistics::Moments;
+
+/// What was learned about an effector. Displayed as readable tables, serialized for programs.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct EffectorReport {
+    /// The folder or file learned from.
+    pub source: String,
+    /// Side of a box in m; `None` where displacements are in units of the commanded move.
+    pub box_m: Option<f64>,
+    /// Moves of one box ahead.
+    pub events: u64,
+    /// Windows that were not used, by cause.
+    pub rejected: BTreeMap<String, u64>,
+    /// What became of a move ahead, phase-averaged; `None` without such moves.
+    pub transitions: Option<ForwardShares>,
+    /// The same with displacements rounded to whole boxes.
+    pub transitions_rounded: Option<ForwardShares>,
+    /// Phase-averaged probability of each box, `"ahead,left"`.
+    pub outcomes: BTreeMap<String, f64>,
+    /// Moves by the box they round to, `"ahead,left"`.
+    pub rounded_counts: BTreeMap<String, u64>,
+    /// Displacements: `ahead_boxes`, `left_boxes`, `dtheta_minus_cmd_rad`, `duration_s` and
+    /// what else the source tells, by name with unit.
+    pub moments: BTreeMap<String, Moments>,
+    /// Turns.
+    pub turns: Option<TurnReport>,
+    /// Counts of every action's outcomes, phase-averaged, where the source names actions.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub actions: BTreeMap<String, BTreeMap<String, f64>>,
+    /// Lateral slip of odometry per step as a share of its length: standard deviation.
+    pub lateral_slip_sd: Option<f64>,
+    /// The same in full.
+    pub lateral_slip: Option<Moments>,
+    /// Every estimated probability with its count and interval.
+    pub probabilities: Vec<Estimate>,
+    /// Rows that rest on few counts.
+    pub thin: Vec<ThinRow>,
+    /// How well a part predicts the rest.
+    pub hold_out: Vec<Fit>,
+    /// How counts become probabilities.
+    pub estimate: EstimateOptions,
+    /// What the reader should know before trusting the numbers.
+    pub warnings: Vec<String>,
+}
+
+/// What became of one box ahead; shares of all events.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct ForwardShares {
+    /// In the same box.
+    pub stay: f64,
+    /// One box ahead.
+    pub ahead: f64,
+    /// Two ahead.
+    pub ahead2: f64,
+    /// One ahead, one to the left.
+    pub ahead_left: f64,
+    /// One ahead, one to the right.
+    pub ahead_right: f64,
+    /// Anywhere else.
+    pub other: f64,
+}
+
+impl ForwardShares {
+    /// Shares from counts in the order of [`FORWARD_CLASSES`]; `None` without counts.
+    pub(super) fn of(counts: &[f64]) -> Option<Self> {
+        let total: f64 = counts.iter().sum();
+        let [stay, ahead, ahead2, ahead_left, ahead_right, other] =
+            std::array::from_fn(|class: usize| counts[class] / total);
+        debug_assert_eq!(counts.len(), FORWARD_CLASSES.len());
+        (total > 0.0).then_some(Self { stay, ahead, ahead2, ahead_left, ahead_right, other })
+    }
+}
+
+/// What became of commanded turns.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TurnReport {
+    /// Turns.
+    pub n: usize,
+    /// Those to the left.
+    pub n_left: usize,
+    /// Those to the right.
+    pub n_right: usize,
+    /// True turn over commanded turn.
+    pub true_over_commanded: Option<Moments>,
+    /// True turn minus commanded turn in degrees, + = too far.
+    pub error_deg_along_turn: Option<Moments>,
+    /// Duration in s, where known.
+    pub duration_s: Option<Moments>,
+    /// True turns, rounded to 15 degrees: turns by degrees along the command.
+    pub hist_15deg: BTreeMap<i32, u64>,
+    /// Errors, rounded to 5 degrees: turns by degrees too far.
+    pub error_hist_5deg: BTreeMap<i32, u64>,
+}
+
+impl fmt::Display for EffectorReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "Effector learned from {}", self.source)?;
+        let unit = self.box_m.map_or("one commanded move".to_string(), |m| format!("{m} m"));
+        writeln!(f, "{} moves of one box ({unit}) ahead", self.events)?;
+        for (cause, count) in &self.rejected {
+            writeln!(f, "  rejected {count}: {}", cause.replace('_', " "))?;
+        }
+        display::warnings(f, &self.warnings)?;
+        display::moments(f, &self.named_moments())?;
+        let heading = Heading { row: "action", column: "outcome" };
+        display::estimates(f, &self.probabilities, &heading)?;
+        display::thin(f, &self.thin, self.estimate.thin_below)?;
+        display::hold_out(f, &self.hold_out)
+    }
+}
+
+impl EffectorReport {
+    fn named_moments(&self) -> Vec<(String, Option<Moments>)> {
+        let mut named: Vec<(String, Option<Moments>)> =
+            self.moments.iter().map(|(name, moments)| (name.clone(), Some(*moments))).collect();
+        named.push(("lateral_slip_ratio".to_string(), self.lateral_slip));
+        if let Some(turns) = &self.turns {
+            named.push(("turn true/commanded".to_string(), turns.true_over_commanded));
+            named.push(("turn error [deg]".to_string(), turns.error_deg_along_turn));
+        }
+        named
+    }
+}

@@ -1,0 +1,81 @@
+//! Learns a real robot's sensor and effector errors from its logs.
+//!
+//! Reads logs through [`sidestep_import`], counts ([`Counts`]), and writes what it found as a
+//! profile that a scenario loads by name ([`profile`]). [`sensor`] learns confusion, distance
+//! and detection; [`effector`] learns what a commanded move or turn really does.
+//!
+//! Every probability is reported with its count and a 95 % interval
+//! ([`statistics::wilson`](sidestep_statistics::wilson)); a part of the events is held out to
+//! say how well the rest predicts it ([`holdout`]). Learning draws no random numbers.
+
+pub mod effector;
+pub mod sensor;
+
+mod counts;
+mod display;
+pub mod holdout;
+pub mod profile;
+mod track;
+
+#[cfg(test)]
+mod closed_loop;
+#[cfg(test)]
+mod oracle;
+
+pub use counts::{CountMatrix, Counts, Estimate, ThinRow};
+
+use serde::Serialize;
+
+use sidestep_kernel::InputError;
+
+/// How counts become probabilities.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct EstimateOptions {
+    /// Added to every count of a row before it is normalized. The default, 0.5, is Jeffreys'
+    /// prior: nothing is impossible because it was not seen, and a hundred counts outweigh it.
+    pub alpha: f64,
+    /// Rows with fewer counts than this are reported as thin.
+    pub thin_below: u32,
+    /// Every `hold_out_every`-th event is held out; 2 compares odd with even.
+    pub hold_out_every: usize,
+}
+
+impl Default for EstimateOptions {
+    fn default() -> Self {
+        Self { alpha: 0.5, thin_below: 30, hold_out_every: 2 }
+    }
+}
+
+impl EstimateOptions {
+    /// Refuses options that mean nothing.
+    ///
+    /// # Errors
+    /// When `alpha` is negative or not finite, or `hold_out_every` is below 2.
+    pub fn check(&self) -> Result<(), InputError> {
+        if !(self.alpha.is_finite() && self.alpha >= 0.0) {
+            let cause = format!("{} cannot be added to a count", self.alpha);
+            return Err(InputError::new("alpha", cause, "give a number from 0, such as 0.5"));
+        }
+        if self.hold_out_every < 2 {
+            let cause = format!("holding out every {}th event leaves none", self.hold_out_every);
+            return Err(InputError::new("hold-out", cause, "give 2 or more"));
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn options_that_mean_nothing_are_refused() {
+        let refused = [
+            EstimateOptions { alpha: -0.1, ..Default::default() },
+            EstimateOptions { alpha: f64::NAN, ..Default::default() },
+            EstimateOptions { hold_out_every: 1, ..Default::default() },
+        ];
+        assert!(refused.iter().all(|options| options.check().is_err()));
+        assert!(EstimateOptions::default().check().is_ok());
+    }
+}

@@ -1,0 +1,163 @@
+//! Profiles: files of sensors and effectors that a scenario loads by name.
+//!
+//! [`empty`] makes one, [`with_sensor`] and [`with_effector`] add to it what was learned and
+//! leave the rest of the text as it is, comments included. Each section ends with a table
+//! `evidence` that the simulation ignores: source, rule, every probability with its count and
+//! 95 % interval, rows that are thin or assumed, and the hold-out fit.
+
+mod evidence;
+
+use toml_edit::{Array, DocumentMut, InlineTable, Item, Table, Value, value};
+
+use super::effector::{EffectorModel, Transition};
+use super::sensor::{NamedRow, SensorModel};
+use sidestep_kernel::InputError;
+use sidestep_scenario::FORMAT;
+
+/// A profile without sensors and effectors, called `name`.
+pub fn empty(name: &str) -> String {
+    let mut document = DocumentMut::new();
+    document["format"] = value(i64::from(FORMAT));
+    document["profile"] = value(name);
+    document.to_string()
+}
+
+/// The profile `text` with the sensor `name` added, or replaced; `place` names the text in
+/// errors.
+///
+/// # Errors
+/// When `text` is no profile or `name` is empty.
+pub fn with_sensor(
+    place: &str,
+    text: &str,
+    name: &str,
+    model: &SensorModel,
+) -> Result<String, InputError> {
+    with_section(place, text, ["sensors", name], sensor(model))
+}
+
+/// The profile `text` with the effector `name` added, or replaced; `place` names the text in
+/// errors.
+///
+/// # Errors
+/// When `text` is no profile or `name` is empty.
+pub fn with_effector(
+    place: &str,
+    text: &str,
+    name: &str,
+    model: &EffectorModel,
+) -> Result<String, InputError> {
+    with_section(place, text, ["effectors", name], effector(model))
+}
+
+fn with_section(
+    place: &str,
+    text: &str,
+    [group, name]: [&str; 2],
+    section: Table,
+) -> Result<String, InputError> {
+    if name.trim().is_empty() {
+        let cause = format!("one of the {group} has no name");
+        return Err(InputError::new(place, cause, "give it a name, e.g. camera"));
+    }
+    let mut document = parse(place, text)?;
+    let sections = document.entry(group).or_insert_with(|| Item::Table(implicit()));
+    let sections = sections.as_table_mut().ok_or_else(|| {
+        let cause = format!("`{group}` is no table");
+        InputError::new(place, cause, format!("write [{group}.{name}] for a section"))
+    })?;
+    // Removed first, so that the new section stands at the end instead of among the rest.
+    sections.remove(name);
+    sections.insert(name, Item::Table(section));
+    Ok(document.to_string())
+}
+
+/// The document, if it is a profile of the format that is written here.
+fn parse(place: &str, text: &str) -> Result<DocumentMut, InputError> {
+    let document: DocumentMut = text.parse().map_err(|e: toml_edit::TomlError| {
+        let error = InputError::new(place, e.message(), "write valid TOML");
+        e.span().map_or(error.clone(), |span| error.in_text(text, span.start))
+    })?;
+    let format = document.get("format").and_then(Item::as_integer);
+    if format != Some(i64::from(FORMAT)) || !document.contains_key("profile") {
+        let remedy = format!("begin it with `format = {FORMAT}` and `profile = \"name\"`");
+        return Err(InputError::new(place, "the file is no profile", remedy));
+    }
+    Ok(document)
+}
+
+/// A table without a header of its own.
+fn implicit() -> Table {
+    let mut table = Table::new();
+    table.set_implicit(true);
+    table
+}
+
+fn sensor(model: &SensorModel) -> Table {
+    let profile = &model.profile;
+    let mut section = Table::new();
+    section["bearings_deg"] = numbers(&profile.bearings_deg);
+    section["range_m"] = value(profile.range_m);
+    section["observations"] = words(&profile.observations);
+    if !profile.designates.is_empty() {
+        let named = profile.designates.iter().map(|(kind, seen)| (kind, seen.as_str()));
+        section["designates"] = value(InlineTable::from_iter(named));
+    }
+    section["distance_edges_m"] = numbers(&profile.distance_edges_m);
+    section["distance_classes"] = words(&profile.distance_classes);
+    section["confusion"] = rows(&profile.confusion);
+    if !profile.confusion_by_class.is_empty() {
+        let mut by_class = implicit();
+        for (class, class_rows) in &profile.confusion_by_class {
+            by_class[class] = rows(class_rows);
+        }
+        section["confusion_by_class"] = Item::Table(by_class);
+    }
+    section["distance_confusion"] = rows(&profile.distance_confusion);
+    section["evidence"] = Item::Table(evidence::of_sensor(model));
+    section
+}
+
+fn effector(model: &EffectorModel) -> Table {
+    let mut section = Table::new();
+    if let Some(box_m) = model.profile.box_m {
+        section["box_m"] = value(box_m);
+    }
+    for (action, transitions) in &model.profile.actions {
+        section[action] = value(Array::from_iter(transitions.iter().map(transition)));
+    }
+    section["evidence"] = Item::Table(evidence::of_effector(model));
+    section
+}
+
+/// `{ p = 0.9, path = "F" }`; a turn of 0 is left out, and so is the path of a turn in place.
+fn transition(transition: &Transition) -> Value {
+    let mut fields = InlineTable::new();
+    fields.insert("p", transition.p.into());
+    if !transition.path.is_empty() || transition.turn_deg == 0 {
+        fields.insert("path", transition.path.as_str().into());
+    }
+    if transition.turn_deg != 0 {
+        fields.insert("turn", i64::from(transition.turn_deg).into());
+    }
+    fields.into()
+}
+
+fn rows(rows: &[NamedRow]) -> Item {
+    let mut table = Table::new();
+    for row in rows {
+        table[&row.name] = numbers(&row.probabilities);
+    }
+    Item::Table(table)
+}
+
+fn numbers(numbers: &[f64]) -> Item {
+    value(Array::from_iter(numbers.iter().copied()))
+}
+
+fn words(words: &[String]) -> Item {
+    value(Array::from_iter(words.iter().map(String::as_str)))
+}
+
+#[cfg(test)]
+mod tests;

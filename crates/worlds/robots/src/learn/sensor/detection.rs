@@ -1,0 +1,180 @@
+//! How often a subject in view is read (rule L4).
+
+use serde::Serialize;
+
+use super::options::DistanceClasses;
+use super::sighting::{others, position_of};
+use crate::learn::Counts;
+use crate::learn::track::pose_at;
+use sidestep_import::mrclam::{Dataset, RobotLog};
+
+/// Half of the field in which a subject is surely in view.
+const FIELD_HALF_RAD: f64 = 0.40;
+/// Length of a bin.
+const BIN_SECS: f64 = 1.0;
+/// A longer log is taken for damaged time stamps: eleven days.
+const BINS_MAX: f64 = 1e6;
+
+/// Detection by distance class: rows are classes, columns `seen` and `missed`.
+///
+/// Time is cut into bins of 1 s from the observer's first to its last common time stamp. A
+/// subject is in view of a bin when its true bearing at mid-bin is within 0.40 rad, and seen
+/// when its code was read in the bin. Nothing is known of occlusion: a subject hidden behind
+/// another counts as missed.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Detection {
+    /// Bins of all observers in which the observer's pose is known.
+    pub looks: u64,
+    /// All subjects.
+    pub all: Counts,
+    /// Robots only.
+    pub robots: Counts,
+    /// Landmarks only.
+    pub landmarks: Counts,
+}
+
+impl Detection {
+    /// The tables, most general first.
+    pub fn tables(&self) -> [&Counts; 3] {
+        [&self.all, &self.robots, &self.landmarks]
+    }
+
+    /// Counts of `views`.
+    pub(super) fn of<'a>(
+        views: impl IntoIterator<Item = &'a View>,
+        looks: u64,
+        classes: &DistanceClasses,
+    ) -> Self {
+        let columns = ["seen", "missed"].map(String::from);
+        let table = |name: &str| Counts::new(name, &classes.names, &columns);
+        let mut detection = Self {
+            looks,
+            all: table("detection"),
+            robots: table("detection_robot"),
+            landmarks: table("detection_landmark"),
+        };
+        for view in views {
+            let by_kind =
+                if view.is_robot { &mut detection.robots } else { &mut detection.landmarks };
+            by_kind.add(view.class, usize::from(!view.seen), 1.0);
+            detection.all.add(view.class, usize::from(!view.seen), 1.0);
+        }
+        detection
+    }
+}
+
+/// One subject in view of one bin.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct View {
+    is_robot: bool,
+    /// Distance class of the true range at mid-bin.
+    class: usize,
+    seen: bool,
+}
+
+/// All subjects in view of all bins of all observers, and the number of bins with a pose.
+pub(super) fn views(dataset: &Dataset, classes: &DistanceClasses) -> (Vec<View>, u64) {
+    let mut views = Vec::new();
+    let mut looks = 0;
+    for (&observer, robot) in &dataset.robots {
+        let Some((start_secs, n_bins)) = bins(robot) else { continue };
+        let read = codes_by_bin(dataset, robot, start_secs, n_bins);
+        for (bin, read) in read.iter().enumerate() {
+            let middle_secs = start_secs + (bin as f64 + 0.5) * BIN_SECS;
+            looks += u64::from(pose_at(&robot.truth, middle_secs).is_some());
+            views.extend(in_view(dataset, observer, middle_secs, read, classes));
+        }
+    }
+    (views, looks)
+}
+
+/// Start of the first bin and the number of whole bins common to all three streams.
+fn bins(robot: &RobotLog) -> Option<(f64, usize)> {
+    let truth = robot.truth.iter().map(|sample| sample.t_secs);
+    let commands = robot.commands.iter().map(|command| command.t_secs);
+    let readings = robot.measurements.iter().map(|reading| reading.t_secs);
+    let (a, b, c) = (ends(truth)?, ends(commands)?, ends(readings)?);
+    let start_secs = a.0.max(b.0).max(c.0);
+    let n_bins = ((a.1.min(b.1).min(c.1) - start_secs) / BIN_SECS).floor();
+    (1.0..=BINS_MAX).contains(&n_bins).then_some((start_secs, n_bins as usize))
+}
+
+/// First and last of the time stamps.
+fn ends(mut stamps: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+    let first = stamps.next()?;
+    Some((first, stamps.last().unwrap_or(first)))
+}
+
+/// The subjects read in each bin.
+fn codes_by_bin(
+    dataset: &Dataset,
+    robot: &RobotLog,
+    start_secs: f64,
+    n_bins: usize,
+) -> Vec<Vec<u32>> {
+    let mut read = vec![Vec::new(); n_bins];
+    for reading in &robot.measurements {
+        let bin = ((reading.t_secs - start_secs) / BIN_SECS).floor();
+        let subject = dataset.subject_of_barcode.get(&reading.barcode);
+        if let (Some(subject), true) = (subject, bin >= 0.0 && bin < n_bins as f64) {
+            read[bin as usize].push(*subject);
+        }
+    }
+    read
+}
+
+fn in_view(
+    dataset: &Dataset,
+    observer: u32,
+    t_secs: f64,
+    read: &[u32],
+    classes: &DistanceClasses,
+) -> Vec<View> {
+    let Some(pose) = pose_at(&dataset.robots[&observer].truth, t_secs) else { return Vec::new() };
+    others(dataset, observer)
+        .filter_map(|subject| {
+            let (range_m, bearing_rad) = pose.sees(position_of(dataset, subject, t_secs)?);
+            (bearing_rad.abs() <= FIELD_HALF_RAD).then(|| View {
+                is_robot: dataset.robots.contains_key(&subject),
+                class: classes.of(range_m),
+                seen: read.contains(&subject),
+            })
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::sighting::tests::{reading, scene};
+    use super::*;
+    use sidestep_import::mrclam::Command;
+
+    #[test]
+    fn a_subject_in_view_is_seen_in_the_bins_in_which_it_was_read() {
+        let mut dataset = scene(vec![
+            reading(0.0, 60, 2.06, 0.245),
+            reading(1.2, 60, 2.06, 0.245),
+            reading(1.3, 60, 2.06, 0.245),
+            reading(4.0, 99, 2.06, 0.245),
+        ]);
+        let command = |t_secs| Command { t_secs, forward_mps: 0.0, turn_radps: 0.0 };
+        dataset.robots.get_mut(&1).unwrap().commands = vec![command(0.0), command(9.0)];
+        let classes = DistanceClasses::new(&[2.5], &[]).unwrap();
+        let (views, looks) = views(&dataset, &classes);
+        let detection = Detection::of(&views, looks, &classes);
+        assert_eq!(detection.looks, 4, "four whole bins; robot 2 logged no commands");
+        assert_eq!(detection.landmarks.row(0), [2.0, 6.0]);
+        assert_eq!(detection.robots.row(1), [0.0, 4.0]);
+        assert_eq!(detection.all.row(0), [2.0, 6.0]);
+    }
+
+    #[test]
+    fn a_log_with_absurd_time_stamps_has_no_bins() {
+        let mut dataset = scene(vec![reading(0.0, 60, 2.0, 0.0), reading(1e12, 60, 2.0, 0.0)]);
+        let robot = dataset.robots.get_mut(&1).unwrap();
+        let command = |t_secs| Command { t_secs, forward_mps: 0.0, turn_radps: 0.0 };
+        robot.commands = vec![command(0.0), command(1e12)];
+        robot.truth.last_mut().unwrap().t_secs = 1e12;
+        assert_eq!(bins(robot), None);
+    }
+}

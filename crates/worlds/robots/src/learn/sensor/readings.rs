@@ -1,0 +1,185 @@
+//! Readings whose truth is known, from a CSV table.
+
+use std::collections::BTreeSet;
+
+use super::camera::NOTHING;
+use super::options::{BEYOND, DistanceClasses};
+use sidestep_import::table::{CsvRow, CsvTable, Word};
+use sidestep_kernel::InputError;
+
+/// So many observations are taken for a column of numbers.
+const OBSERVATIONS_MAX: usize = 250;
+
+/// One row of the file.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Reading {
+    /// Index of the true observation; 0 is `nothing`.
+    pub(super) truth: usize,
+    /// Index of the reported one.
+    pub(super) reported: usize,
+    /// Where there was something.
+    pub(super) true_at: Option<Distance>,
+    /// Where something was reported.
+    pub(super) reported_at: Option<Distance>,
+}
+
+impl Reading {
+    /// True and reported distance of a right report of something.
+    pub(super) fn right_distances(&self) -> Option<(Distance, Distance)> {
+        (self.truth == self.reported).then_some((self.true_at?, self.reported_at?))
+    }
+}
+
+/// A distance as the file tells it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Distance {
+    pub(super) class: usize,
+    /// In m; `None` where only the class is told.
+    pub(super) range_m: Option<f64>,
+}
+
+/// The observations of a table, `nothing` first and the others by name, and its readings of the
+/// sensor `wanted`.
+pub(super) fn read(
+    table: &CsvTable,
+    wanted: Option<&str>,
+    classes: &DistanceClasses,
+) -> Result<(Vec<String>, Vec<Reading>), InputError> {
+    let columns = Columns::find(table)?;
+    let rows = rows_of_sensor(table, wanted)?;
+    let observations = observations(table.place(), &rows, &columns)?;
+    let parser = RowParser { place: table.place(), columns, observations, classes };
+    let readings = rows.iter().map(|row| parser.reading(row)).collect::<Result<_, _>>()?;
+    Ok((parser.observations, readings))
+}
+
+/// Where the columns are.
+struct Columns {
+    truth: usize,
+    reported: usize,
+    true_at: usize,
+    reported_at: usize,
+    /// Whether distances are told in m, else by class.
+    in_meters: bool,
+}
+
+impl Columns {
+    fn find(table: &CsvTable) -> Result<Self, InputError> {
+        let in_meters = table.find("true_class").is_none();
+        let [true_at, reported_at] = if in_meters {
+            ["true_distance_m", "reported_distance_m"]
+        } else {
+            ["true_class", "reported_class"]
+        };
+        Ok(Self {
+            truth: table.column("true")?,
+            reported: table.column("reported")?,
+            true_at: table.column(true_at)?,
+            reported_at: table.column(reported_at)?,
+            in_meters,
+        })
+    }
+}
+
+/// The rows of the sensor that is to be learned.
+fn rows_of_sensor<'t>(
+    table: &'t CsvTable,
+    wanted: Option<&str>,
+) -> Result<Vec<CsvRow<'t>>, InputError> {
+    let column = table.find("sensor");
+    let name = |row: &CsvRow<'t>| column.map_or("", |column| row.field(column).text);
+    let names: BTreeSet<&str> = table.rows().map(|row| name(&row)).collect();
+    let listed = names.iter().copied().collect::<Vec<_>>().join(", ");
+    if wanted.is_none() && names.len() > 1 {
+        let cause = format!("the file has readings of several sensors: {listed}");
+        return Err(InputError::new(table.place(), cause, "choose one of them"));
+    }
+    let rows: Vec<CsvRow> =
+        table.rows().filter(|row| wanted.is_none_or(|wanted| name(row) == wanted)).collect();
+    if rows.is_empty() {
+        let cause = wanted.map_or("the file has no readings".to_string(), |wanted| {
+            format!("no readings of the sensor `{wanted}`")
+        });
+        let remedy = format!("sensors in the file: {listed}");
+        return Err(InputError::new(table.place(), cause, remedy));
+    }
+    Ok(rows)
+}
+
+/// `nothing`, then every other observation of the file by name.
+fn observations(
+    place: &str,
+    rows: &[CsvRow<'_>],
+    columns: &Columns,
+) -> Result<Vec<String>, InputError> {
+    let words = rows.iter().flat_map(|row| [row.field(columns.truth), row.field(columns.reported)]);
+    let mut names = BTreeSet::new();
+    for word in words {
+        if word.text.is_empty() {
+            let remedy = "name an observation; `nothing` where there is none";
+            return Err(word.error(&place, "the observation is empty".to_string(), remedy));
+        }
+        names.insert(word.text);
+        if names.len() >= OBSERVATIONS_MAX {
+            let cause = format!("{OBSERVATIONS_MAX} different observations or more");
+            return Err(word.error(&place, cause, "name kinds of things, not measurements"));
+        }
+    }
+    let others = names.into_iter().filter(|name| *name != NOTHING);
+    Ok(std::iter::once(NOTHING).chain(others).map(String::from).collect())
+}
+
+/// Turns rows into readings.
+struct RowParser<'a> {
+    place: &'a str,
+    columns: Columns,
+    observations: Vec<String>,
+    classes: &'a DistanceClasses,
+}
+
+impl RowParser<'_> {
+    fn reading(&self, row: &CsvRow<'_>) -> Result<Reading, InputError> {
+        let truth = self.observation(row.field(self.columns.truth));
+        let reported = self.observation(row.field(self.columns.reported));
+        // A distance beside `nothing` means nothing, but must not be garbage.
+        let true_at = self.distance(row.field(self.columns.true_at))?;
+        let reported_at = self.distance(row.field(self.columns.reported_at))?;
+        Ok(Reading {
+            truth,
+            reported,
+            true_at: true_at.filter(|_| truth != 0),
+            reported_at: reported_at.filter(|_| reported != 0),
+        })
+    }
+
+    fn observation(&self, word: Word<'_>) -> usize {
+        let found = self.observations.iter().position(|name| name == word.text);
+        found.expect("every observation of the file was collected")
+    }
+
+    fn distance(&self, word: Word<'_>) -> Result<Option<Distance>, InputError> {
+        match word.text {
+            "" | BEYOND => Ok(None),
+            _ if self.columns.in_meters => self.range(word).map(Some),
+            _ => self.class(word).map(Some),
+        }
+    }
+
+    fn range(&self, word: Word<'_>) -> Result<Distance, InputError> {
+        let range_m = word.number(&self.place)?;
+        if range_m < 0.0 {
+            let cause = format!("a distance of {range_m} m");
+            return Err(word.error(&self.place, cause, "give a distance of at least 0 m"));
+        }
+        Ok(Distance { class: self.classes.of(range_m), range_m: Some(range_m) })
+    }
+
+    fn class(&self, word: Word<'_>) -> Result<Distance, InputError> {
+        let names = &self.classes.names;
+        let class = names.iter().position(|name| name == word.text).ok_or_else(|| {
+            let cause = format!("`{}` is not a distance class", word.text);
+            word.error(&self.place, cause, &format!("use one of {}", names.join(", ")))
+        })?;
+        Ok(Distance { class, range_m: None })
+    }
+}

@@ -1,0 +1,226 @@
+//! Whom a barcode reading was really of (rule L2).
+
+use std::collections::BTreeMap;
+
+use crate::learn::track::{Pose, pose_at};
+use sidestep_import::mrclam::{Dataset, Measurement};
+use sidestep_kernel::math::wrap_angle;
+
+/// A subject is where a reading says when the bearing differs by no more than this ...
+const BEARING_TOLERANCE_RAD: f64 = 0.15;
+/// ... and the range by no more than the greater of this ...
+const RANGE_TOLERANCE_M: f64 = 0.5;
+/// ... and this share of the true range.
+const RANGE_TOLERANCE_SHARE: f64 = 0.25;
+/// Spread of the bearing by which candidates are weighed.
+const BEARING_SPREAD_RAD: f64 = 0.03;
+/// Spread of the range by which candidates are weighed, as a share of the true range.
+const RANGE_SPREAD_SHARE: f64 = 0.1;
+
+/// One judged reading.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Sighting {
+    /// Who read.
+    pub(super) observer: u32,
+    pub(super) barcode: u32,
+    /// The subject that wears the barcode; `None` when nobody does.
+    pub(super) decoded: Option<u32>,
+    /// Who stood there.
+    pub(super) truth: Option<Candidate>,
+    /// Whom geometry alone would choose.
+    pub(super) nearest: Option<u32>,
+    pub(super) range_m: f64,
+    pub(super) bearing_rad: f64,
+}
+
+impl Sighting {
+    /// The true subject.
+    pub(super) fn subject(&self) -> Option<u32> {
+        self.truth.map(|candidate| candidate.subject)
+    }
+
+    /// The true subject's geometry, where the reading named it.
+    pub(super) fn correct(&self) -> Option<Candidate> {
+        self.truth.filter(|candidate| self.decoded == Some(candidate.subject))
+    }
+}
+
+/// A subject that stands where a reading says.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Candidate {
+    pub(super) subject: u32,
+    /// True range, center to center.
+    pub(super) range_m: f64,
+    /// True bearing.
+    pub(super) bearing_rad: f64,
+    /// Squared distance from the reading, in spreads.
+    misfit: f64,
+}
+
+/// Why a reading cannot be judged.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Skip {
+    /// The observer's own pose is unknown at that time.
+    ObserverLost,
+    /// The pose of the decoded robot is.
+    SubjectLost,
+}
+
+impl Skip {
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::ObserverLost => "observer_without_ground_truth",
+            Self::SubjectLost => "subject_without_ground_truth",
+        }
+    }
+}
+
+/// Judges all readings of all robots; the others are counted by cause.
+pub(super) fn judge_all(dataset: &Dataset) -> (Vec<Sighting>, BTreeMap<Skip, u64>) {
+    let mut sightings = Vec::new();
+    let mut skipped = BTreeMap::new();
+    for (&observer, robot) in &dataset.robots {
+        for measurement in &robot.measurements {
+            match judge(dataset, observer, measurement) {
+                Ok(sighting) => sightings.push(sighting),
+                Err(cause) => *skipped.entry(cause).or_insert(0) += 1,
+            }
+        }
+    }
+    (sightings, skipped)
+}
+
+fn judge(dataset: &Dataset, observer: u32, reading: &Measurement) -> Result<Sighting, Skip> {
+    let own_track = &dataset.robots[&observer].truth;
+    let pose = pose_at(own_track, reading.t_secs).ok_or(Skip::ObserverLost)?;
+    let decoded = dataset.subject_of_barcode.get(&reading.barcode).copied();
+    let candidates = consistent(dataset, observer, &pose, reading);
+    let nearest = candidates.iter().min_by(|a, b| a.misfit.total_cmp(&b.misfit)).copied();
+    let as_decoded = candidates.iter().find(|c| Some(c.subject) == decoded).copied();
+    let lost = |subject| position_of(dataset, subject, reading.t_secs).is_none();
+    if as_decoded.is_none() && decoded.is_some_and(lost) {
+        return Err(Skip::SubjectLost);
+    }
+    Ok(Sighting {
+        observer,
+        barcode: reading.barcode,
+        decoded,
+        truth: as_decoded.or(nearest),
+        nearest: nearest.map(|candidate| candidate.subject),
+        range_m: reading.range_m,
+        bearing_rad: reading.bearing_rad,
+    })
+}
+
+/// All other subjects that stand where the reading says, by subject number.
+fn consistent(
+    dataset: &Dataset,
+    observer: u32,
+    pose: &Pose,
+    reading: &Measurement,
+) -> Vec<Candidate> {
+    others(dataset, observer)
+        .filter_map(|subject| {
+            let (range_m, bearing_rad) = pose.sees(position_of(dataset, subject, reading.t_secs)?);
+            weigh(subject, range_m, bearing_rad, reading)
+        })
+        .collect()
+}
+
+fn weigh(subject: u32, range_m: f64, bearing_rad: f64, reading: &Measurement) -> Option<Candidate> {
+    let off_rad = wrap_angle(reading.bearing_rad - bearing_rad).abs();
+    let off_m = (reading.range_m - range_m).abs();
+    let tolerance_m = RANGE_TOLERANCE_M.max(RANGE_TOLERANCE_SHARE * range_m);
+    let (u, v) = (off_rad / BEARING_SPREAD_RAD, off_m / (RANGE_SPREAD_SHARE * range_m));
+    (off_rad <= BEARING_TOLERANCE_RAD && off_m <= tolerance_m).then_some(Candidate {
+        subject,
+        range_m,
+        bearing_rad,
+        misfit: u * u + v * v,
+    })
+}
+
+/// All subjects but `observer`: robots, then landmarks.
+pub(super) fn others(dataset: &Dataset, observer: u32) -> impl Iterator<Item = u32> {
+    let subjects = dataset.robots.keys().chain(dataset.landmarks.keys());
+    subjects.copied().filter(move |subject| *subject != observer)
+}
+
+/// Where a subject stands at a time; `None` for a robot without ground truth then.
+pub(super) fn position_of(dataset: &Dataset, subject: u32, t_secs: f64) -> Option<[f64; 2]> {
+    if let Some(position_m) = dataset.landmarks.get(&subject) {
+        return Some(*position_m);
+    }
+    let pose = pose_at(&dataset.robots.get(&subject)?.truth, t_secs)?;
+    Some([pose.x_m, pose.y_m])
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use sidestep_import::mrclam::{RobotLog, TruePose};
+
+    /// Robot 1 stands at the origin and looks along x from t = 0 to 10 s; robot 2 stands at
+    /// (3, 0) until t = 5 s; landmarks 6 and 7 at (2, 0.5) and (2, -0.5). Barcodes are ten
+    /// times the subject.
+    pub(in crate::learn::sensor) fn scene(measurements: Vec<Measurement>) -> Dataset {
+        let still = |x: f64, until: u32| {
+            let at = |i| TruePose {
+                t_secs: f64::from(i) * 0.25,
+                position_m: [x, 0.0],
+                heading_rad: 0.0,
+            };
+            (0..=until * 4).map(at).collect()
+        };
+        let first = RobotLog { truth: still(0.0, 10), measurements, ..Default::default() };
+        let second = RobotLog { truth: still(3.0, 5), ..Default::default() };
+        Dataset {
+            subject_of_barcode: [1, 2, 6, 7].map(|s| (s * 10, s)).into(),
+            landmarks: [(6, [2.0, 0.5]), (7, [2.0, -0.5])].into(),
+            robots: [(1, first), (2, second)].into(),
+        }
+    }
+
+    pub(in crate::learn::sensor) fn reading(
+        t_secs: f64,
+        barcode: u32,
+        range_m: f64,
+        bearing_rad: f64,
+    ) -> Measurement {
+        Measurement { t_secs, barcode, range_m, bearing_rad }
+    }
+
+    fn judged(reading: Measurement) -> Result<Option<u32>, Skip> {
+        judge(&scene(Vec::new()), 1, &reading).map(|sighting| sighting.subject())
+    }
+
+    #[test]
+    fn a_consistent_decoded_subject_is_the_true_one_though_another_is_nearer() {
+        // Between robot 2 and landmark 6, both within the tolerance, the robot closer.
+        let sighting = judge(&scene(Vec::new()), 1, &reading(1.0, 60, 2.5, 0.11)).unwrap();
+        assert_eq!((sighting.nearest, sighting.subject()), (Some(2), Some(6)));
+        let misread = judge(&scene(Vec::new()), 1, &reading(1.0, 70, 2.06, 0.245)).unwrap();
+        assert_eq!((misread.subject(), misread.decoded), (Some(6), Some(7)));
+        assert_eq!(misread.correct(), None);
+    }
+
+    #[test]
+    fn a_reading_of_nothing_or_of_an_unknown_code_is_counted_as_such() {
+        assert_eq!(judged(reading(1.0, 60, 2.0, -1.5)), Ok(None));
+        assert_eq!(judged(reading(1.0, 99, 3.0, 0.0)), Ok(Some(2)));
+    }
+
+    #[test]
+    fn a_lost_observer_or_decoded_robot_skips_the_reading() {
+        assert_eq!(judged(reading(11.0, 60, 2.0, 0.0)), Err(Skip::ObserverLost));
+        assert_eq!(judged(reading(6.0, 20, 3.0, 0.0)), Err(Skip::SubjectLost));
+        assert_eq!(judged(reading(6.0, 10, 2.06, 0.245)), Ok(Some(6)), "one's own code");
+    }
+
+    #[test]
+    fn tolerances_are_met_on_the_edge() {
+        assert_eq!(judged(reading(1.0, 20, 3.75, 0.0)), Ok(Some(2)), "25 % of 3 m");
+        assert_eq!(judged(reading(1.0, 20, 3.76, 0.0)), Ok(None));
+        assert_eq!(judged(reading(1.0, 20, 3.0, 0.151)), Ok(None));
+    }
+}

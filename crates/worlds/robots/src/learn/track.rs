@@ -1,0 +1,112 @@
+//! Poses over time and relative to each other (rule L1).
+
+use sidestep_import::mrclam::TruePose;
+use sidestep_kernel::math::{atan2, cos, hypot, sin, wrap_angle};
+
+/// Motion capture with a gap wider than this says nothing about the time between.
+const BRACKET_SECS_MAX: f64 = 0.5;
+
+/// A pose in the plane.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Pose {
+    pub(crate) x_m: f64,
+    pub(crate) y_m: f64,
+    pub(crate) heading_rad: f64,
+}
+
+/// A displacement in the frame of the pose it starts from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Motion {
+    pub(crate) ahead_m: f64,
+    pub(crate) left_m: f64,
+    /// To the left, in [-pi, pi).
+    pub(crate) turn_rad: f64,
+}
+
+impl From<[f64; 3]> for Pose {
+    fn from([x_m, y_m, heading_rad]: [f64; 3]) -> Self {
+        Self { x_m, y_m, heading_rad }
+    }
+}
+
+impl Pose {
+    /// How one gets from here to `to`.
+    pub(crate) fn motion_to(&self, to: &Pose) -> Motion {
+        let (dx, dy) = (to.x_m - self.x_m, to.y_m - self.y_m);
+        let (s, c) = (sin(self.heading_rad), cos(self.heading_rad));
+        Motion {
+            ahead_m: c * dx + s * dy,
+            left_m: c * dy - s * dx,
+            turn_rad: wrap_angle(to.heading_rad - self.heading_rad),
+        }
+    }
+
+    /// Range in m and bearing in rad (+ = left) of a point.
+    pub(crate) fn sees(&self, [x_m, y_m]: [f64; 2]) -> (f64, f64) {
+        let (dx, dy) = (x_m - self.x_m, y_m - self.y_m);
+        (hypot(dx, dy), wrap_angle(atan2(dy, dx) - self.heading_rad))
+    }
+}
+
+/// The pose at `t_secs`: linear between the two samples around it, the heading along the
+/// shorter arc. `None` outside the track and inside a gap wider than 0.5 s.
+pub(crate) fn pose_at(track: &[TruePose], t_secs: f64) -> Option<Pose> {
+    let after = track.partition_point(|sample| sample.t_secs < t_secs);
+    let end = track.get(after)?;
+    if after == 0 {
+        return (end.t_secs == t_secs).then(|| between(end, end, 0.0));
+    }
+    let start = &track[after - 1];
+    let gap_secs = end.t_secs - start.t_secs;
+    (gap_secs <= BRACKET_SECS_MAX).then(|| between(start, end, (t_secs - start.t_secs) / gap_secs))
+}
+
+fn between(start: &TruePose, end: &TruePose, fraction: f64) -> Pose {
+    let mix = |a: f64, b: f64| a + fraction * (b - a);
+    let arc_rad = wrap_angle(end.heading_rad - start.heading_rad);
+    Pose {
+        x_m: mix(start.position_m[0], end.position_m[0]),
+        y_m: mix(start.position_m[1], end.position_m[1]),
+        heading_rad: wrap_angle(start.heading_rad + fraction * arc_rad),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::{FRAC_PI_2, PI};
+
+    fn sample(t_secs: f64, x_m: f64, heading_rad: f64) -> TruePose {
+        TruePose { t_secs, position_m: [x_m, 0.0], heading_rad }
+    }
+
+    #[test]
+    fn a_pose_is_linear_between_samples_and_turns_the_shorter_way() {
+        let track = [sample(0.0, 0.0, PI - 0.1), sample(0.4, 1.0, -PI + 0.1)];
+        let pose = pose_at(&track, 0.1).unwrap();
+        assert!((pose.x_m - 0.25).abs() < 1e-12);
+        assert!((wrap_angle(pose.heading_rad - (PI - 0.05))).abs() < 1e-12);
+    }
+
+    #[test]
+    fn there_is_no_pose_outside_the_track_or_in_a_gap() {
+        let track = [sample(0.0, 0.0, 0.0), sample(0.75, 1.0, 0.0), sample(1.25, 1.0, 0.0)];
+        assert_eq!(pose_at(&track, -0.1), None);
+        assert_eq!(pose_at(&track, 1.3), None);
+        assert_eq!(pose_at(&track, 0.3), None);
+        assert!(pose_at(&track, 0.8).is_some(), "a gap of exactly 0.5 s is bridged");
+        assert!(pose_at(&track, 0.0).is_some() && pose_at(&track, 1.25).is_some());
+        assert_eq!(pose_at(&[], 0.0), None);
+    }
+
+    #[test]
+    fn motion_is_told_in_the_start_frame() {
+        let start = Pose::from([1.0, 1.0, FRAC_PI_2]);
+        let motion = start.motion_to(&Pose::from([0.0, 3.0, PI]));
+        assert!((motion.ahead_m - 2.0).abs() < 1e-12);
+        assert!((motion.left_m - 1.0).abs() < 1e-12);
+        assert!((motion.turn_rad - FRAC_PI_2).abs() < 1e-12);
+        let (range_m, bearing_rad) = start.sees([0.0, 1.0]);
+        assert!((range_m - 1.0).abs() < 1e-12 && (bearing_rad - FRAC_PI_2).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,126 @@
+//! What a run reports: per robot and in all.
+
+use super::state::RobotsState;
+use super::world::RobotsWorld;
+use serde::Serialize;
+use sidestep_kernel::{Cycle, EntityId};
+use sidestep_map::Cell;
+use std::collections::BTreeMap;
+
+/// Counters of one robot, or their sums over all robots.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Counts {
+    /// Actions begun.
+    pub actions: u64,
+    /// Contacts in all.
+    pub contacts: u64,
+    /// Contacts by the kind touched; 0 for kinds that nobody touched.
+    pub contacts_by_kind: BTreeMap<String, u64>,
+    /// Way made, in metres.
+    pub distance_m: f64,
+    /// Trips completed.
+    pub trips: u64,
+    /// Mean cycles per completed trip; absent without trips.
+    pub trip_cycles_mean: Option<f64>,
+    /// Boxes that no robot had covered before.
+    pub first_visits: u64,
+}
+
+/// Metrics of a run so far.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Metrics {
+    /// Sums over all robots.
+    #[serde(flatten)]
+    pub total: Counts,
+    /// Share of the free boxes that some robot has covered.
+    pub coverage: f64,
+    /// Share of actions that ended in a contact.
+    pub contacts_per_action: f64,
+    /// How many conflict groups had 1, 2-3, 4-7, ... bodies, over all cycles of this process.
+    pub group_sizes: Vec<u64>,
+    /// The largest conflict group of this process's run.
+    pub largest_group: u64,
+}
+
+impl RobotsWorld {
+    /// Counters of a robot after `cycle` cycles.
+    pub fn counts(&self, state: &RobotsState, cycle: Cycle, id: EntityId) -> Counts {
+        let (i, kinds) = (id as usize, self.kinds.len());
+        let cell = state.body(id);
+        let by_kind = (0..kinds).map(|k| u64::from(state.contacts.get(i * kinds + k)));
+        let named = self.kinds.iter().cloned().zip(by_kind.clone());
+        let trips = u64::from(cell.trips.get());
+        Counts {
+            actions: self.bodies[i].actions_before(cycle),
+            contacts: by_kind.sum(),
+            contacts_by_kind: named.collect(),
+            distance_m: f64::from(cell.moves.get()) * self.map.box_size_m,
+            trips,
+            trip_cycles_mean: (trips > 0).then(|| cell.trip_cycles.get() as f64 / trips as f64),
+            first_visits: u64::from(cell.first_visits.get()),
+        }
+    }
+
+    /// Counters of all robots together after `cycle` cycles.
+    pub fn totals(&self, state: &RobotsState, cycle: Cycle) -> Counts {
+        let mut total = Counts::default();
+        let mut trip_cycles = 0;
+        for &id in &self.robots {
+            let one = self.counts(state, cycle, id);
+            trip_cycles += state.body(id).trip_cycles.get();
+            total.actions += one.actions;
+            total.contacts += one.contacts;
+            total.distance_m += one.distance_m;
+            total.trips += one.trips;
+            total.first_visits += one.first_visits;
+            for (kind, n) in one.contacts_by_kind {
+                *total.contacts_by_kind.entry(kind).or_default() += n;
+            }
+        }
+        total.trip_cycles_mean = (total.trips > 0).then(|| trip_cycles as f64 / total.trips as f64);
+        total
+    }
+
+    /// Metrics of a run, with the group sizes its workers have seen.
+    pub fn metrics(
+        &self,
+        state: &RobotsState,
+        cycle: Cycle,
+        group_sizes: &[u64],
+        largest_group: u64,
+    ) -> Metrics {
+        let total = self.totals(state, cycle);
+        let free = self.map.count(Cell::Free).max(1);
+        let used = group_sizes.iter().rposition(|&n| n > 0).map_or(0, |k| k + 1);
+        Metrics {
+            coverage: (self.covered_at_start() + total.first_visits) as f64 / free as f64,
+            contacts_per_action: total.contacts as f64 / total.actions.max(1) as f64,
+            group_sizes: group_sizes[..used].to_vec(),
+            largest_group,
+            total,
+        }
+    }
+
+    /// Boxes under robots at the start; nobody visits them for the first time.
+    fn covered_at_start(&self) -> u64 {
+        let boxes = |&id: &EntityId| self.type_of(id).own.len() as u64;
+        self.robots.iter().map(boxes).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::simulation::RobotsSimulation;
+    use sidestep_kernel::Simulation;
+    use sidestep_scenario::Source;
+
+    #[test]
+    fn a_robot_covers_the_boxes_it_stands_in_and_those_it_comes_to() {
+        let text = "format = 1\nworld = \"robots\"\n[map]\nascii = \"...#.\"\n[robots]\nat = [[0, 0, 0]]\n\
+                    behaviour = { kind = \"replay\", actions = [\"forward\"], repeat = true }\n";
+        let mut run = RobotsSimulation::new(&Source::new("s", text, ""), 1).expect("fits");
+        assert_eq!(run.robot_metrics().coverage, 0.25);
+        run.advance(5);
+        assert_eq!(run.robot_metrics().coverage, 0.75);
+    }
+}

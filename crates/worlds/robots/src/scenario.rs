@@ -1,0 +1,304 @@
+//! The sections of a robots scenario, as they stand in the file. Unknown keys are errors.
+
+mod compile;
+mod placing;
+mod random;
+mod tables;
+
+pub use compile::{Behaviours, Compiled, StorageOrder, presets};
+
+use super::effector::ObstacleRule;
+use super::resolve::ConflictPolicy;
+use super::world::Regime;
+use serde::Deserialize;
+use sidestep_map::UnknownPolicy;
+use sidestep_map::office::OfficeSpec;
+use sidestep_scenario::OneOrMany;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use toml::Spanned;
+
+/// A whole robots scenario. Every key is described in `scenarios/robots/default.toml`.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RobotsFile {
+    #[serde(rename = "format")]
+    _format: u32,
+    #[serde(rename = "world")]
+    _world: String,
+    #[serde(default)]
+    pub(super) name: String,
+    #[serde(default, rename = "description")]
+    _description: String,
+    #[serde(default = "one")]
+    pub(super) seed: u64,
+    #[serde(default = "default_cycles")]
+    pub(super) cycles: u64,
+    #[serde(default)]
+    pub(super) regime: Regime,
+    #[serde(default)]
+    pub(super) obstacle_rule: ObstacleRule,
+    #[serde(default)]
+    pub(super) conflict_policy: ConflictPolicy,
+    #[serde(default)]
+    pub(super) kind_order: Vec<Spanned<String>>,
+    #[serde(default)]
+    pub(super) profiles: Vec<Spanned<PathBuf>>,
+    pub(super) map: Spanned<MapSection>,
+    #[serde(default)]
+    pub(super) kinds: BTreeMap<Spanned<String>, KindSection>,
+    #[serde(default)]
+    pub(super) sensors: BTreeMap<String, Spanned<SensorSection>>,
+    #[serde(default)]
+    pub(super) effectors: BTreeMap<String, Spanned<EffectorSection>>,
+    #[serde(default = "none")]
+    pub(super) robots: Spanned<OneOrMany<RobotSection>>,
+    #[serde(default = "none")]
+    pub(super) people: Spanned<OneOrMany<MoverSection>>,
+    #[serde(default = "none")]
+    pub(super) doors: Spanned<OneOrMany<DoorSection>>,
+    pub(super) radio: Option<Spanned<RadioSection>>,
+    #[serde(default)]
+    pub(super) record: RecordSection,
+}
+
+/// A file with sensors and effectors only: a learned profile, or the presets.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ProfileFile {
+    pub(super) format: Spanned<u32>,
+    #[serde(rename = "profile")]
+    _profile: String,
+    #[serde(default)]
+    pub(super) sensors: BTreeMap<String, Spanned<SensorSection>>,
+    #[serde(default)]
+    pub(super) effectors: BTreeMap<String, Spanned<EffectorSection>>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct MapSection {
+    pub(super) file: Option<Spanned<PathBuf>>,
+    pub(super) ascii: Option<Spanned<String>>,
+    pub(super) office: Option<Spanned<OfficeSpec>>,
+    pub(super) box_size_m: Option<Spanned<f64>>,
+    #[serde(default)]
+    pub(super) unknown: UnknownPolicy,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct KindSection {
+    pub(super) observation: Option<String>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SensorSection {
+    pub(super) bearings_deg: Spanned<Vec<f64>>,
+    pub(super) range_m: Spanned<f64>,
+    pub(super) observations: Spanned<Vec<String>>,
+    #[serde(default)]
+    pub(super) designates: BTreeMap<Spanned<String>, Spanned<String>>,
+    pub(super) confusion: Spanned<Rows>,
+    #[serde(default)]
+    pub(super) confusion_by_class: BTreeMap<Spanned<String>, Spanned<Rows>>,
+    #[serde(default)]
+    pub(super) distance_edges_m: Option<Spanned<Vec<f64>>>,
+    #[serde(default)]
+    pub(super) distance_classes: Option<Spanned<Vec<String>>>,
+    #[serde(default)]
+    pub(super) distance_confusion: Option<Spanned<Rows>>,
+    #[serde(default, rename = "evidence")]
+    _evidence: toml::Table,
+}
+
+/// Rows of a matrix by name.
+pub(super) type Rows = BTreeMap<Spanned<String>, Spanned<Vec<f64>>>;
+
+/// Actions by name; `box_m` and `evidence` say what they rest on.
+#[derive(Debug, Clone, Default)]
+pub(super) struct EffectorSection {
+    pub(super) actions: BTreeMap<String, Spanned<Vec<TransitionSection>>>,
+}
+
+/// By hand, since flattened maps lose the places of their entries.
+impl<'de> Deserialize<'de> for EffectorSection {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Visitor;
+
+        impl<'de> serde::de::Visitor<'de> for Visitor {
+            type Value = EffectorSection;
+
+            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str("a table of actions")
+            }
+
+            fn visit_map<A: serde::de::MapAccess<'de>>(
+                self,
+                mut map: A,
+            ) -> Result<EffectorSection, A::Error> {
+                let mut section = EffectorSection::default();
+                while let Some(key) = map.next_key::<String>()? {
+                    match key.as_str() {
+                        "box_m" => drop(map.next_value::<f64>()?),
+                        "evidence" => drop(map.next_value::<toml::Table>()?),
+                        _ => drop(section.actions.insert(key, map.next_value()?)),
+                    }
+                }
+                Ok(section)
+            }
+        }
+        deserializer.deserialize_map(Visitor)
+    }
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct TransitionSection {
+    pub(super) p: f64,
+    #[serde(default)]
+    pub(super) path: String,
+    #[serde(default)]
+    pub(super) turn: i32,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RobotSection {
+    #[serde(default, rename = "name")]
+    _name: String,
+    #[serde(default = "robot_kind")]
+    pub(super) kind: Spanned<String>,
+    pub(super) count: Option<Spanned<u32>>,
+    #[serde(default)]
+    pub(super) at: Vec<Spanned<Vec<u32>>>,
+    pub(super) region: Option<Spanned<[u32; 4]>>,
+    pub(super) scen: Option<Spanned<PathBuf>>,
+    pub(super) size: Option<Spanned<u32>>,
+    pub(super) period: Option<Spanned<u32>>,
+    pub(super) phase: Option<u32>,
+    #[serde(default)]
+    pub(super) sensors: Vec<Spanned<String>>,
+    pub(super) effector: Option<Spanned<String>>,
+    pub(super) behaviour: Option<Spanned<BehaviourSection>>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct BehaviourSection {
+    pub(super) kind: String,
+    pub(super) turn_every: Option<u32>,
+    pub(super) a: Option<[u32; 4]>,
+    pub(super) b: Option<[u32; 4]>,
+    pub(super) goals: Option<Vec<(u32, u32)>>,
+    pub(super) actions: Option<Vec<String>>,
+    pub(super) repeat: Option<bool>,
+    pub(super) weights: Option<BTreeMap<String, f64>>,
+    pub(super) weights_after_contact: Option<BTreeMap<String, f64>>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct MoverSection {
+    #[serde(default, rename = "name")]
+    _name: String,
+    #[serde(default = "person_kind")]
+    pub(super) kind: Spanned<String>,
+    pub(super) count: Option<Spanned<u32>>,
+    #[serde(default)]
+    pub(super) at: Vec<Spanned<Vec<u32>>>,
+    pub(super) region: Option<Spanned<[u32; 4]>>,
+    #[serde(default = "one_by_one")]
+    pub(super) size: Spanned<[u32; 2]>,
+    pub(super) period: Option<Spanned<u32>>,
+    pub(super) phase: Option<u32>,
+    #[serde(default = "default_straight")]
+    pub(super) p_straight: Spanned<f64>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct DoorSection {
+    #[serde(default = "door_kind")]
+    pub(super) kind: Spanned<String>,
+    #[serde(default)]
+    pub(super) at: Vec<Spanned<Vec<u32>>>,
+    #[serde(default = "one_by_one")]
+    pub(super) size: Spanned<[u32; 2]>,
+    #[serde(default)]
+    pub(super) office: bool,
+    pub(super) periodic: Option<Spanned<PeriodicSection>>,
+    pub(super) random: Option<Spanned<RandomSection>>,
+}
+
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct PeriodicSection {
+    pub(super) open: u64,
+    pub(super) closed: u64,
+    pub(super) phase: Option<u64>,
+}
+
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RandomSection {
+    pub(super) p_open: f64,
+    pub(super) p_close: f64,
+}
+
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RadioSection {
+    pub(super) range_m: f64,
+    #[serde(default)]
+    pub(super) loss: f64,
+}
+
+/// What a run keeps beside its summary.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct RecordSection {
+    /// Pose of every body at every cycle.
+    pub trajectories: bool,
+    /// Contacts and doors.
+    pub events: bool,
+    /// Truth and report of every beam, and what every action came to: logs to learn from.
+    pub calibration: bool,
+    /// Cycles between two checkpoints.
+    pub checkpoint_every: u64,
+}
+
+impl Default for RecordSection {
+    fn default() -> Self {
+        Self { trajectories: true, events: true, calibration: false, checkpoint_every: 10_000 }
+    }
+}
+
+fn one() -> u64 {
+    1
+}
+fn default_cycles() -> u64 {
+    10_000
+}
+fn spanned<T>(value: T) -> Spanned<T> {
+    Spanned::new(0..0, value)
+}
+fn none<T>() -> Spanned<OneOrMany<T>> {
+    spanned(OneOrMany::default())
+}
+fn robot_kind() -> Spanned<String> {
+    spanned("robot".into())
+}
+fn person_kind() -> Spanned<String> {
+    spanned("person".into())
+}
+fn door_kind() -> Spanned<String> {
+    spanned("door".into())
+}
+fn one_by_one() -> Spanned<[u32; 2]> {
+    spanned([1, 1])
+}
+fn default_straight() -> Spanned<f64> {
+    spanned(0.8)
+}

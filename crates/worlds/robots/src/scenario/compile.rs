@@ -1,0 +1,365 @@
+//! A scenario's text -> an immutable world and where everybody starts.
+
+mod bodies;
+mod map;
+mod people_and_doors;
+mod robots;
+
+use self::map::{load_map, padded};
+use super::placing::{Floor, Obstacle};
+use super::random;
+use super::tables::{self, Kinds, Located};
+use super::{
+    BehaviourSection, DoorSection, EffectorSection, MapSection, MoverSection, ProfileFile,
+    RecordSection, RobotSection, RobotsFile, SensorSection,
+};
+use crate::decide::{Behaviour, External, Goto, Replay, Sector, Shuttle, Wander};
+use crate::effector::{Action, EffectorModel, MAX_PATH, Side, Transition, own_boxes};
+use crate::resolve::ConflictPolicy;
+use crate::sensor::SensorModel;
+use crate::world::{
+    BEAM_STEP, Body, BodyType, Door, MountedSensor, Mover, Radio, RobotBody, RobotModel,
+    RobotsWorld, Role, purpose,
+};
+use sidestep_kernel::distr::Chance;
+use sidestep_kernel::stream::{Purpose, Streams};
+use sidestep_kernel::{EntityId, InputError, Seed};
+use sidestep_map::planning::{FlowField, FreeSpace};
+use sidestep_map::{Cell, GridMap, Rect};
+use sidestep_scenario::{OneOrMany, Source, nearest};
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::sync::Arc;
+use toml::Spanned;
+
+/// Most bodies of a scenario.
+const MAX_BODIES: u64 = 10_000_000;
+/// Largest body, in boxes.
+const MAX_SIZE: u32 = 64;
+const MAX_RANGE_BOXES: f64 = 4096.0;
+
+/// Behaviours of the library's user, by the name a scenario gives them.
+pub type Behaviours = BTreeMap<String, Arc<dyn Behaviour>>;
+
+/// The order in which bodies are stored; no result depends on it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum StorageOrder {
+    /// Neighbors on the map are neighbors in memory; arranged anew now and then.
+    #[default]
+    Spatial,
+    /// By entity id.
+    ById,
+    /// Shuffled by this number; for tests.
+    Shuffled(u64),
+}
+
+/// What a scenario compiles to.
+#[derive(Debug, Clone)]
+pub struct Compiled {
+    /// The immutable world.
+    pub world: Arc<RobotsWorld>,
+    /// Place and facing of each entity at the start, by id.
+    pub start: Arc<[((u32, u32), u8)]>,
+    /// Name of the scenario, may be empty.
+    pub name: String,
+    /// The seed.
+    pub seed: u64,
+    /// Cycles that the scenario asks for.
+    pub cycles: u64,
+    /// What to keep.
+    pub record: RecordSection,
+}
+
+impl Compiled {
+    /// Compiles a scenario.
+    ///
+    /// # Errors
+    /// With place, line, column, cause and remedy for anything that is wrong in it.
+    pub fn new(source: &Source, own: &Behaviours, order: StorageOrder) -> Result<Self, InputError> {
+        Compiler::new(source, own)?.compile(order)
+    }
+}
+
+struct Compiler<'a> {
+    source: Arc<Source>,
+    own: &'a Behaviours,
+    file: RobotsFile,
+    map: Arc<GridMap>,
+    office_doors: Vec<Rect>,
+    kinds: Vec<String>,
+    sensors: BTreeMap<String, Located<SensorSection>>,
+    effectors: BTreeMap<String, Located<EffectorSection>>,
+    streams: Streams,
+    types: Vec<BodyType>,
+    bodies: Vec<Body>,
+    start: Vec<((u32, u32), u8)>,
+    floor: Floor,
+    /// Spans by id, to name the other body when two stand on each other.
+    spans: Vec<Range<usize>>,
+    /// Rings of wall to put around the map.
+    border: u32,
+    /// Most boxes that a claim reaches beside a body.
+    reach: u32,
+}
+
+impl<'a> Compiler<'a> {
+    fn new(source: &Source, own: &'a Behaviours) -> Result<Self, InputError> {
+        let source = Arc::new(source.clone());
+        let file: RobotsFile = source.parse()?;
+        let (map, office_doors) = load_map(&source, &file.map)?;
+        let (mut sensors, mut effectors) = (BTreeMap::new(), BTreeMap::new());
+        let presets = Source::new("presets", include_str!("../presets.toml"), "");
+        add_profile(Arc::new(presets), &mut sensors, &mut effectors)?;
+        for profile in &file.profiles {
+            let path = source.path(profile.get_ref());
+            let profile = Source::read(&path, &[])?;
+            add_profile(Arc::new(profile), &mut sensors, &mut effectors)?;
+        }
+        add_all(&source, &file.sensors, &mut sensors);
+        add_all(&source, &file.effectors, &mut effectors);
+        let kinds = kinds(&source, &file)?;
+        let streams = Streams::new(Seed(file.seed));
+        let floor = Floor::new(&map);
+        let border = border(&file, &effectors);
+        Ok(Self {
+            source,
+            own,
+            kinds,
+            sensors,
+            effectors,
+            streams,
+            types: Vec::new(),
+            bodies: Vec::new(),
+            start: Vec::new(),
+            floor,
+            spans: Vec::new(),
+            border,
+            reach: 0,
+            map,
+            office_doors,
+            file,
+        })
+    }
+
+    fn compile(mut self, order: StorageOrder) -> Result<Compiled, InputError> {
+        let groups = self.groups()?;
+        // Doors and bodies with a given place first, so that draws find what is left; ids
+        // go robots, people, doors whatever is placed first.
+        let mut first_id = 0;
+        let firsts: Vec<EntityId> = groups
+            .iter()
+            .map(|g| {
+                let id = first_id;
+                first_id += g.count as EntityId;
+                id
+            })
+            .collect();
+        let n = first_id as usize;
+        self.bodies = vec![Body { id: 0, ty: 0, period: 1, phase: 0 }; n];
+        self.start = vec![((0, 0), 0); n];
+        self.spans = vec![0..0; n];
+        for given in [true, false] {
+            for (group, &first) in groups.iter().zip(&firsts) {
+                if group.places.is_empty() != given {
+                    self.add_group(group, first)?;
+                }
+            }
+        }
+        self.finish(order)
+    }
+
+    fn finish(self, order: StorageOrder) -> Result<Compiled, InputError> {
+        let is_robot = |b: &&Body| matches!(self.types[usize::from(b.ty)].role, Role::Robot(_));
+        let robots = self.bodies.iter().filter(is_robot).map(|b| b.id).collect();
+        let stride = self.stride();
+        let rows = self.map.height() + 2 * self.border;
+        let radio = self.radio()?;
+        let kind_rank = self.kind_rank()?;
+        let world = RobotsWorld {
+            walls: padded(&self.map, self.border, stride, rows),
+            regime: self.file.regime,
+            obstacle_rule: self.file.obstacle_rule,
+            policy: self.file.conflict_policy,
+            kinds: self.kinds,
+            map: self.map,
+            types: self.types,
+            bodies: self.bodies,
+            kind_rank,
+            radio,
+            robots,
+            storage: order,
+            streams: self.streams,
+            border: self.border,
+            stride,
+            reach: self.reach,
+        };
+        Ok(Compiled {
+            world: Arc::new(world),
+            start: self.start.into(),
+            name: self.file.name,
+            seed: self.file.seed,
+            cycles: self.file.cycles,
+            record: self.file.record,
+        })
+    }
+
+    fn stride(&self) -> u32 {
+        self.map.width() + 2 * self.border
+    }
+
+    fn error(
+        &self,
+        span: Range<usize>,
+        cause: impl Into<String>,
+        remedy: impl Into<String>,
+    ) -> InputError {
+        self.source.error((span != (0..0)).then_some(span), cause, remedy)
+    }
+
+    fn radio(&self) -> Result<Option<Radio>, InputError> {
+        let Some(radio) = &self.file.radio else { return Ok(None) };
+        let r = radio.get_ref();
+        if !(r.range_m > 0.0 && r.range_m < 1e6 && (0.0..=1.0).contains(&r.loss)) {
+            let cause = format!("range {} m with loss {}", r.range_m, r.loss);
+            return Err(self.error(
+                radio.span(),
+                cause,
+                "give a range above 0 m and a loss between 0 and 1",
+            ));
+        }
+        Ok(Some(Radio::new(r.range_m, self.map.box_size_m, r.loss)))
+    }
+
+    /// Rank of each kind in `kind_order`; kinds that are not named come last.
+    fn kind_rank(&self) -> Result<Vec<u8>, InputError> {
+        let mut rank = vec![self.file.kind_order.len() as u8; self.kinds.len()];
+        for (k, kind) in self.file.kind_order.iter().enumerate() {
+            rank[usize::from(self.kind(kind)?)] = k as u8;
+        }
+        if self.file.conflict_policy == ConflictPolicy::ByKind && self.file.kind_order.is_empty() {
+            let remedy = "add kind_order = [\"person\", \"robot\"], first the kind that goes first";
+            return Err(self.error(0..0, "conflict_policy \"by_kind\" needs kind_order", remedy));
+        }
+        Ok(rank)
+    }
+
+    fn kind(&self, name: &Spanned<String>) -> Result<u8, InputError> {
+        let known = || self.kinds.iter().skip(1).map(String::as_str).collect::<Vec<_>>();
+        self.kinds.iter().skip(1).position(|k| k == name.get_ref()).map(|k| k as u8 + 1).ok_or_else(
+            || {
+                let cause = format!("unknown kind `{}`", name.get_ref());
+                self.error(
+                    name.span(),
+                    cause,
+                    format!(
+                        "{}; new kinds are made by [kinds.NAME]",
+                        nearest(name.get_ref(), &known())
+                    ),
+                )
+            },
+        )
+    }
+}
+
+/// As many rings of wall as the longest path has steps, and as a beam may be read past a wall.
+fn border(file: &RobotsFile, effectors: &BTreeMap<String, Located<EffectorSection>>) -> u32 {
+    let named = file.robots.get_ref().0.iter().filter_map(|robots| robots.effector.as_ref());
+    let known = named.filter_map(|name| effectors.get(name.get_ref()));
+    let transitions = known.flat_map(|e| e.section.get_ref().actions.values());
+    let steps = transitions.flat_map(|list| list.get_ref()).map(|t| t.path.chars().count());
+    steps.max().unwrap_or(1).clamp(BEAM_STEP, MAX_PATH) as u32
+}
+
+/// Every action at every heading, see `BodyType::actions`.
+fn actions_at_headings(
+    actions: &[Vec<Transition>],
+    size: (u32, u32),
+    stride: u32,
+) -> Arc<[Action]> {
+    let at = |heading: u8| {
+        let build = move |a| Action::new(a, heading, size, stride).expect("the rows were checked");
+        actions.iter().map(Vec::as_slice).map(build)
+    };
+    (0..4).flat_map(at).collect()
+}
+
+/// Names of the kinds: `free` and `wall` first, then the built-in ones, then the user's own.
+fn kinds(source: &Source, file: &RobotsFile) -> Result<Vec<String>, InputError> {
+    let mut kinds: Vec<String> =
+        ["free", "wall", "door", "person", "robot"].map(String::from).to_vec();
+    for name in file.kinds.keys() {
+        if name.get_ref() == "free" {
+            return Err(source.error(
+                Some(name.span()),
+                "`free` is no kind",
+                "name the kind otherwise",
+            ));
+        }
+        if !kinds.contains(name.get_ref()) {
+            kinds.push(name.get_ref().clone());
+        }
+    }
+    if kinds.len() > 127 {
+        return Err(source.error(
+            None,
+            "more than 122 kinds of your own",
+            "let kinds share a name",
+        ));
+    }
+    Ok(kinds)
+}
+
+fn add_profile(
+    source: Arc<Source>,
+    sensors: &mut BTreeMap<String, Located<SensorSection>>,
+    effectors: &mut BTreeMap<String, Located<EffectorSection>>,
+) -> Result<(), InputError> {
+    let file: ProfileFile = source.parse()?;
+    if *file.format.get_ref() != sidestep_scenario::FORMAT {
+        let cause = format!("profile format {} is not known", file.format.get_ref());
+        return Err(source.error(
+            Some(file.format.span()),
+            cause,
+            "learn the profile anew, or write `format = 1`",
+        ));
+    }
+    add_all(&source, &file.sensors, sensors);
+    add_all(&source, &file.effectors, effectors);
+    Ok(())
+}
+
+fn add_all<T: Clone>(
+    source: &Arc<Source>,
+    from: &BTreeMap<String, Spanned<T>>,
+    into: &mut BTreeMap<String, Located<T>>,
+) {
+    for (name, section) in from {
+        into.insert(name.clone(), Located { section: section.clone(), source: Arc::clone(source) });
+    }
+}
+
+/// Moves the sections of one key out of the file, with the key's place.
+fn take<T>(sections: &mut Spanned<OneOrMany<T>>) -> (Range<usize>, Vec<T>) {
+    (sections.span(), std::mem::take(&mut sections.get_mut().0))
+}
+
+impl StorageOrder {
+    /// Entity ids in the order of storage.
+    pub(in super::super) fn ids(self, world: &RobotsWorld) -> Vec<EntityId> {
+        let mut ids: Vec<EntityId> = (0..world.bodies.len() as EntityId).collect();
+        match self {
+            // Arranged as it goes.
+            Self::ById | Self::Spatial => {}
+            Self::Shuffled(by) => {
+                let streams = Streams::new(Seed(by));
+                ids.sort_by_key(|&id| streams.block(id, 0, Purpose(0), 0));
+            }
+        }
+        ids
+    }
+}
+
+/// The presets as text, for `sidestep new` and the documentation.
+pub fn presets() -> &'static str {
+    include_str!("../presets.toml")
+}

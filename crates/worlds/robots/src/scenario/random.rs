@@ -1,0 +1,73 @@
+//! The behaviour `random` of a scenario: weights by the actions' names.
+
+use super::BehaviourSection;
+use crate::decide::Random;
+use sidestep_scenario::nearest;
+use std::collections::BTreeMap;
+
+/// Cause and remedy of what is wrong with a behaviour; the caller knows the place.
+pub(super) type Wrong = (String, String);
+
+/// The standard actions alike where no weights are given; after a contact the same weights
+/// unless others are given.
+pub(super) fn behaviour(s: &BehaviourSection, actions: &[String]) -> Result<Random, Wrong> {
+    let Some(usual) = &s.weights else {
+        return match &s.weights_after_contact {
+            None => Ok(Random::uniform()),
+            Some(_) => Err((
+                "`weights_after_contact` without `weights`".into(),
+                "add weights = { forward = 1 }".into(),
+            )),
+        };
+    };
+    let after_contact = s.weights_after_contact.as_ref().unwrap_or(usual);
+    let random = Random::new(row(usual, actions)?, row(after_contact, actions)?);
+    Ok(random.expect("the rows were brought to sum to 1"))
+}
+
+/// Weights by the actions' names as probabilities by their ids.
+fn row(weights: &BTreeMap<String, f64>, actions: &[String]) -> Result<Vec<f64>, Wrong> {
+    let sum: f64 = weights.values().sum();
+    if !(sum > 0.0 && sum.is_finite() && weights.values().all(|w| *w >= 0.0)) {
+        let cause = "a negative weight, or weights that are all 0 or beyond all numbers";
+        return Err((cause.into(), "give weights of at least 0, one of them above 0".into()));
+    }
+    let mut row = vec![0.0; actions.len()];
+    for (name, weight) in weights {
+        let id = actions.iter().position(|a| a == name).ok_or_else(|| {
+            let known: Vec<&str> = actions.iter().map(String::as_str).collect();
+            (format!("unknown action `{name}`"), nearest(name, &known))
+        })?;
+        row[id] = weight / sum;
+    }
+    Ok(row)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<Random, Wrong> {
+        let section: BehaviourSection = toml::from_str(text).expect("a section");
+        behaviour(&section, &["forward", "left", "right", "stay", "spin"].map(String::from))
+    }
+
+    #[test]
+    fn weights_become_probabilities_by_action() {
+        let random = read("kind = 'random'\nweights = { forward = 3, spin = 1 }").expect("fits");
+        assert_eq!(random.probabilities(false), [0.75, 0.0, 0.0, 0.0, 0.25]);
+        assert_eq!(random.probabilities(true), [0.75, 0.0, 0.0, 0.0, 0.25]);
+        assert_eq!(read("kind = 'random'").expect("fits"), Random::uniform());
+    }
+
+    #[test]
+    fn weights_that_mean_nothing_are_refused() {
+        let wrong = |text: &str| read(&format!("kind = 'random'\n{text}")).expect_err(text);
+        assert_eq!(wrong("weights = { foward = 1 }").1, "did you mean `forward`?");
+        wrong("weights = {}");
+        wrong("weights = { left = -1, right = 3 }");
+        wrong("weights = { left = inf }");
+        wrong("weights = { left = nan }");
+        wrong("weights_after_contact = { left = 1 }");
+    }
+}

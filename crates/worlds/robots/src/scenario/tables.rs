@@ -1,0 +1,335 @@
+//! Sensor and effector sections -> checked models.
+
+use super::{EffectorSection, Rows, SensorSection, TransitionSection};
+use crate::effector::{EffectorModel, MAX_PATH, STANDARD_ACTIONS, Side, Transition};
+use crate::sensor::SensorModel;
+use sidestep_kernel::InputError;
+use sidestep_kernel::distr::check_row;
+use sidestep_scenario::{Source, nearest};
+use std::collections::BTreeMap;
+use std::ops::Range;
+use toml::Spanned;
+
+/// Most beams, observations, classes and actions; readings name them with a byte.
+const MAX_NAMES: usize = 250;
+/// Most actions; an intent holds an action and a flag in one byte.
+const MAX_ACTIONS: usize = 120;
+const MAX_BEAMS: usize = 1024;
+
+/// A section and the text it stands in (scenario, profile or presets).
+#[derive(Debug, Clone)]
+pub(super) struct Located<T> {
+    pub(super) section: Spanned<T>,
+    pub(super) source: std::sync::Arc<Source>,
+}
+
+impl<T> Located<T> {
+    pub(super) fn error(
+        &self,
+        span: Range<usize>,
+        cause: impl Into<String>,
+        remedy: &str,
+    ) -> InputError {
+        self.source.error(Some(span), cause, remedy)
+    }
+}
+
+/// Kinds of the scenario and the observation each designates.
+pub(super) struct Kinds {
+    pub(super) names: Vec<String>,
+    pub(super) observations: Vec<String>,
+    /// Kinds that really occur: only these must be known to every sensor.
+    pub(super) used: Vec<bool>,
+}
+
+/// Checks a sensor and brings its rows into order.
+pub(super) fn sensor(
+    name: &str,
+    at: &Located<SensorSection>,
+    kinds: &Kinds,
+) -> Result<SensorModel, InputError> {
+    let s = at.section.get_ref();
+    let observations = observations(at)?;
+    let (edges, classes) = classes(at)?;
+    let bearings = s.bearings_deg.get_ref();
+    if bearings.is_empty() || bearings.len() > MAX_BEAMS || bearings.iter().any(|b| !b.is_finite())
+    {
+        let cause = format!("{} bearings, or one that is not finite", bearings.len());
+        return Err(at.error(
+            s.bearings_deg.span(),
+            cause,
+            "give 1 to 1024 finite bearings in degrees",
+        ));
+    }
+    let range_m = *s.range_m.get_ref();
+    if !(range_m > 0.0 && range_m <= 1e4) {
+        let cause = format!("a range of {range_m} m");
+        return Err(at.error(s.range_m.span(), cause, "give a range above 0 and up to 10000 m"));
+    }
+    let everywhere = matrix(at, &s.confusion, &observations, &observations)?;
+    let mut confusion = vec![everywhere; classes.len() + 1];
+    for (class, rows) in &s.confusion_by_class {
+        let index =
+            classes.iter().chain([&"beyond".to_string()]).position(|c| c == class.get_ref());
+        let index = index.ok_or_else(|| {
+            let known: Vec<&str> = classes.iter().map(String::as_str).collect();
+            at.error(
+                class.span(),
+                format!("unknown distance class `{}`", class.get_ref()),
+                &nearest(class.get_ref(), &known),
+            )
+        })?;
+        for (row_name, row) in rows.get_ref() {
+            let observation = position(at, row_name, &observations)?;
+            confusion[index][observation] = checked_row(at, row_name, row, observations.len())?;
+        }
+    }
+    Ok(SensorModel {
+        name: name.into(),
+        bearings_deg: bearings.clone(),
+        range_m,
+        designates: designates(name, at, kinds, &observations)?,
+        distance_confusion: distance_confusion(at, &classes)?,
+        observations,
+        confusion,
+        distance_edges_m: edges,
+        distance_classes: classes,
+    })
+}
+
+fn observations(at: &Located<SensorSection>) -> Result<Vec<String>, InputError> {
+    let list = &at.section.get_ref().observations;
+    let names = list.get_ref();
+    if names.first().map(String::as_str) != Some("nothing") {
+        return Err(at.error(
+            list.span(),
+            "the first observation is not `nothing`",
+            "write observations = [\"nothing\", ...]",
+        ));
+    }
+    let doubled = (1..names.len()).any(|i| names[..i].contains(&names[i]));
+    if doubled || names.len() > MAX_NAMES {
+        return Err(at.error(
+            list.span(),
+            "an observation stands twice, or there are more than 250",
+            "name each observation once",
+        ));
+    }
+    Ok(names.clone())
+}
+
+/// Edges and names of the distance classes; without edges there is one class, `near`.
+fn classes(at: &Located<SensorSection>) -> Result<(Vec<f64>, Vec<String>), InputError> {
+    let s = at.section.get_ref();
+    let edges = s.distance_edges_m.as_ref().map_or(vec![], |e| e.get_ref().clone());
+    if let Some(list) = &s.distance_edges_m {
+        let rising = edges.windows(2).all(|w| w[0] < w[1])
+            && edges.iter().all(|e| *e > 0.0 && e.is_finite());
+        if !rising || edges.len() >= MAX_NAMES {
+            return Err(at.error(
+                list.span(),
+                "the edges do not rise from above 0",
+                "write rising edges in metres, e.g. [0.5, 1.5]",
+            ));
+        }
+    }
+    let default = || (0..=edges.len()).map(|k| format!("class{k}")).collect();
+    let names = s.distance_classes.as_ref().map_or_else(default, |c| c.get_ref().clone());
+    if names.len() != edges.len() + 1 {
+        let span = s.distance_classes.as_ref().map_or(at.section.span(), Spanned::span);
+        let cause = format!("{} class names for {} edges", names.len(), edges.len());
+        return Err(at.error(span, cause, "give one name more than there are edges"));
+    }
+    Ok((edges, names))
+}
+
+/// Rows over the classes; the row `beyond`, for spurious reports, may be left out and then
+/// puts all on the farthest class. Without any row every class is reported as it is.
+fn distance_confusion(
+    at: &Located<SensorSection>,
+    classes: &[String],
+) -> Result<Vec<Vec<f64>>, InputError> {
+    let n = classes.len();
+    let certain = |k: usize| (0..n).map(|c| if c == k { 1.0 } else { 0.0 }).collect::<Vec<f64>>();
+    let mut rows: Vec<Vec<f64>> = (0..n).map(certain).collect();
+    rows.push(certain(n - 1));
+    let Some(given) = &at.section.get_ref().distance_confusion else { return Ok(rows) };
+    let mut names = classes.to_vec();
+    names.push("beyond".into());
+    for (row_name, row) in given.get_ref() {
+        let index = position(at, row_name, &names)?;
+        rows[index] = checked_row(at, row_name, row, n)?;
+    }
+    if let Some(missing) =
+        classes.iter().find(|c| !given.get_ref().keys().any(|k| k.get_ref() == *c))
+    {
+        return Err(at.error(
+            given.span(),
+            format!("the row `{missing}` is missing"),
+            "give one row per distance class",
+        ));
+    }
+    Ok(rows)
+}
+
+fn matrix(
+    at: &Located<SensorSection>,
+    rows: &Spanned<Rows>,
+    row_names: &[String],
+    columns: &[String],
+) -> Result<Vec<Vec<f64>>, InputError> {
+    let mut by_index: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
+    for (row_name, row) in rows.get_ref() {
+        let index = position(at, row_name, row_names)?;
+        by_index.insert(index, checked_row(at, row_name, row, columns.len())?);
+    }
+    let missing = (0..row_names.len()).find(|i| !by_index.contains_key(i));
+    if let Some(i) = missing {
+        let cause = format!("the row `{}` is missing", row_names[i]);
+        return Err(at.error(
+            rows.span(),
+            cause,
+            "give one row per observation, `nothing` included",
+        ));
+    }
+    Ok(by_index.into_values().collect())
+}
+
+fn position<T>(
+    at: &Located<T>,
+    name: &Spanned<String>,
+    names: &[String],
+) -> Result<usize, InputError> {
+    names.iter().position(|n| n == name.get_ref()).ok_or_else(|| {
+        let known: Vec<&str> = names.iter().map(String::as_str).collect();
+        at.error(
+            name.span(),
+            format!("unknown row `{}`", name.get_ref()),
+            &nearest(name.get_ref(), &known),
+        )
+    })
+}
+
+fn checked_row<T>(
+    at: &Located<T>,
+    name: &Spanned<String>,
+    row: &Spanned<Vec<f64>>,
+    columns: usize,
+) -> Result<Vec<f64>, InputError> {
+    let values = row.get_ref();
+    if values.len() != columns {
+        let cause = format!("row `{}` has {} entries, not {columns}", name.get_ref(), values.len());
+        return Err(at.error(
+            row.span(),
+            cause,
+            "give one entry per column, in the order of the list of names",
+        ));
+    }
+    check_row(values).map_err(|e| {
+        let cause = format!("row `{}`: {e}", name.get_ref());
+        at.error(row.span(), cause, "make the entries probabilities that sum to 1")
+    })?;
+    let sum: f64 = values.iter().sum();
+    Ok(values.iter().map(|v| v / sum).collect())
+}
+
+/// The observation that each kind truly is for this sensor.
+fn designates(
+    sensor: &str,
+    at: &Located<SensorSection>,
+    kinds: &Kinds,
+    observations: &[String],
+) -> Result<Vec<u8>, InputError> {
+    let own = &at.section.get_ref().designates;
+    for (kind, observation) in own {
+        position(at, observation, observations)?;
+        if !kinds.names.contains(kind.get_ref())
+            && !["wall", "door", "person", "robot"].contains(&kind.get_ref().as_str())
+        {
+            let known: Vec<&str> = kinds.names.iter().skip(1).map(String::as_str).collect();
+            return Err(at.error(
+                kind.span(),
+                format!("unknown kind `{}`", kind.get_ref()),
+                &nearest(kind.get_ref(), &known),
+            ));
+        }
+    }
+    let mut table = vec![0u8];
+    for (k, kind) in kinds.names.iter().enumerate().skip(1) {
+        let chosen = own.iter().find(|(name, _)| name.get_ref() == kind);
+        let observation = chosen.map_or(&kinds.observations[k], |(_, o)| o.get_ref());
+        match observations.iter().position(|o| o == observation) {
+            Some(index) => table.push(index as u8),
+            None if !kinds.used[k] => table.push(0),
+            None => {
+                let cause = format!(
+                    "sensor `{sensor}` has no observation `{observation}` for the kind `{kind}`"
+                );
+                return Err(at.error(
+                    at.section.get_ref().observations.span(),
+                    cause,
+                    &format!("add it to `observations`, or say what it takes the kind for: designates = {{ {kind} = \"nothing\" }}"),
+                ));
+            }
+        }
+    }
+    Ok(table)
+}
+
+/// Checks an effector; `left`, `right` and `stay` are perfect where they are left out.
+pub(super) fn effector(
+    name: &str,
+    at: &Located<EffectorSection>,
+) -> Result<EffectorModel, InputError> {
+    let section = at.section.get_ref();
+    let mut model = EffectorModel { name: name.into(), ..EffectorModel::perfect() };
+    let span = at.section.span();
+    if !section.actions.contains_key("forward") {
+        return Err(at.error(
+            span,
+            format!("effector `{name}` has no action `forward`"),
+            "give at least forward = [{ p = 1.0, path = \"F\" }]",
+        ));
+    }
+    for (action, transitions) in &section.actions {
+        let span = transitions.span();
+        let list = transitions
+            .get_ref()
+            .iter()
+            .map(|t| transition(at, span.clone(), t))
+            .collect::<Result<Vec<_>, _>>()?;
+        let row: Vec<f64> = list.iter().map(|t| t.p).collect();
+        check_row(&row).map_err(|e| {
+            let cause = format!("action `{action}` of effector `{name}`: {e}");
+            at.error(span, cause, "make the probabilities `p` of its transitions sum to 1")
+        })?;
+        match STANDARD_ACTIONS.iter().position(|s| s == action) {
+            Some(id) => model.transitions[id] = list,
+            None => {
+                model.actions.push(action.clone());
+                model.transitions.push(list);
+            }
+        }
+    }
+    if model.actions.len() > MAX_ACTIONS {
+        return Err(at.error(span, "more than 120 actions", "give fewer"));
+    }
+    Ok(model)
+}
+
+fn transition(
+    at: &Located<EffectorSection>,
+    span: Range<usize>,
+    t: &TransitionSection,
+) -> Result<Transition, InputError> {
+    let path: Option<Vec<Side>> = t.path.chars().map(Side::from_letter).collect();
+    let path = path.filter(|p| p.len() <= MAX_PATH).ok_or_else(|| {
+        let cause = format!("`{}` is no path", t.path);
+        at.error(span.clone(), cause, "write up to 16 letters F, L, B, R, e.g. \"FL\"")
+    })?;
+    if t.turn % 90 != 0 {
+        let cause = format!("a turn of {} degrees", t.turn);
+        return Err(at.error(span, cause, "give a multiple of 90 degrees, positive to the left"));
+    }
+    Ok(Transition { p: t.p, path, turn: (t.turn / 90).rem_euclid(4) as u8 })
+}

@@ -1,0 +1,184 @@
+//! What can be seen of a building: floor, bodies, sensors' readings, events in words.
+
+use super::effector::Side;
+use super::sensor::{NOTHING, Reading, SensorModel};
+use super::state::{BodyCell, RobotsState};
+use super::world::{MountedSensor, RobotModel, Role};
+use super::{Event, EventKind, RobotsWorld, Scratch};
+use sidestep_kernel::math::{cos, sin};
+use sidestep_kernel::space::{BoxWord, Floor};
+use sidestep_kernel::view::{self, Body, Condition, Entry, Kind, Level, Pose, Scan, Shape};
+use sidestep_kernel::{Column, Cycle, EntityId, World};
+use sidestep_map::Cell;
+use std::f64::consts::FRAC_PI_2;
+
+/// What a cycle counts as where seconds are asked for: the model itself knows no other time.
+pub(super) const CYCLE_S: f64 = 1.0;
+
+impl RobotsWorld {
+    /// The building without bodies.
+    pub(super) fn scenery(&self, name: &str) -> view::Scenery {
+        let map = &self.map;
+        let occupancy = |cell: &Cell| match cell {
+            Cell::Free => view::Occupancy::Free,
+            Cell::Wall => view::Occupancy::Wall,
+            Cell::Unknown => view::Occupancy::Unknown,
+        };
+        view::Scenery {
+            name: name.into(),
+            dimensions: 2,
+            cycle_s: CYCLE_S,
+            floor: Some(view::Floor {
+                width: map.width(),
+                height: map.height(),
+                box_m: map.box_size_m,
+                origin_m: map.origin_m,
+                boxes: map.cells().iter().map(occupancy).collect(),
+            }),
+            bodies: Vec::new(),
+        }
+    }
+
+    /// All bodies by id.
+    pub(super) fn visible_bodies(&self, state: &RobotsState) -> Vec<Body> {
+        let ids = 0..self.bodies.len() as EntityId;
+        ids.map(|id| self.visible_body(id, state.body(id))).collect()
+    }
+
+    fn visible_body(&self, id: EntityId, cell: &BodyCell) -> Body {
+        let kind = self.visible_kind(id);
+        let is_open = kind == Kind::Door && cell.facing.get() == 1;
+        // How high things are is made up: the model is a plane.
+        let side_m = self.side_m(id);
+        let height_m = match kind {
+            Kind::Door if is_open => 0.05 * side_m,
+            Kind::Robot => 0.5 * side_m,
+            _ => side_m,
+        };
+        let (size, box_m) = (self.type_of(id).size, self.map.box_size_m);
+        let size_m = [f64::from(size.0) * box_m, f64::from(size.1) * box_m, height_m];
+        let pose = self.pose(id, cell, 0.5 * height_m);
+        Body::new(kind, id, pose, Shape::Cuboid { size_m })
+            .when(cell.contact.get() != 0, Condition::Touching)
+            .when(is_open, Condition::Open)
+    }
+
+    fn visible_kind(&self, id: EntityId) -> Kind {
+        match self.type_of(id).role {
+            Role::Robot(_) => Kind::Robot,
+            Role::Mover(_) => Kind::Person,
+            Role::Door(_) => Kind::Door,
+        }
+    }
+
+    /// The shorter side of a body.
+    fn side_m(&self, id: EntityId) -> f64 {
+        let (width, height) = self.type_of(id).size;
+        f64::from(width.min(height)) * self.map.box_size_m
+    }
+
+    /// The middle of a body at a height, and where it looks.
+    fn pose(&self, id: EntityId, cell: &BodyCell, z_m: f64) -> Pose {
+        let ((width, height), (col, row)) = (self.type_of(id).size, self.map_position(cell.at()));
+        let [x_m, y_m] = self.map.origin_m;
+        let middle =
+            |at: u32, size: u32| (f64::from(at) + 0.5 * f64::from(size)) * self.map.box_size_m;
+        let at_m = [x_m + middle(col, width), y_m + middle(row, height), z_m];
+        match self.type_of(id).role {
+            Role::Door(_) => Pose::at(at_m),
+            _ => Pose::heading(at_m, f64::from(cell.facing.get()) * FRAC_PI_2),
+        }
+    }
+
+    /// What the first robots are about to perceive.
+    pub(super) fn scans(&self, state: &RobotsState, now: Cycle, robots: usize) -> Vec<Scan> {
+        let mut scratch = self.scratch();
+        let shown = self.robots.iter().take(robots);
+        shown.flat_map(|&id| self.scans_of(state, now, id, &mut scratch)).collect()
+    }
+
+    fn scans_of(
+        &self,
+        state: &RobotsState,
+        now: Cycle,
+        id: EntityId,
+        scratch: &mut Scratch,
+    ) -> Vec<Scan> {
+        let (cell, ty) = (state.body(id), self.type_of(id));
+        let Role::Robot(model) = &ty.role else { return Vec::new() };
+        match &state.floor {
+            Floor::Narrow(floor) => self.read(model, (floor, state), now, cell, scratch),
+            Floor::Wide(floor) => self.read(model, (floor, state), now, cell, scratch),
+        }
+        let pose = self.pose(id, cell, 0.5 * self.side_m(id));
+        let mut readings = &scratch.readings[..];
+        let scan = |sensor: &MountedSensor| {
+            let (own, others) = readings.split_at(sensor.model.bearings_deg.len());
+            readings = others;
+            scan(&sensor.model, own, self.side_m(id), (id, pose))
+        };
+        model.body.sensors.iter().map(scan).collect()
+    }
+
+    fn read<T: BoxWord>(
+        &self,
+        model: &RobotModel,
+        (floor, state): (&Column<T>, &RobotsState),
+        now: Cycle,
+        cell: &BodyCell,
+        scratch: &mut Scratch,
+    ) {
+        self.sense(model, (floor, state), now, cell, scratch);
+    }
+
+    /// An event in words.
+    pub(super) fn entry(&self, event: &Event) -> Entry {
+        let (level, words) = match event.event {
+            EventKind::Contact { kind, side } => {
+                let what = &self.kinds[usize::from(kind)];
+                (Level::Warning, format!("touches a {what} with its {}", side_in_words(side)))
+            }
+            EventKind::Opened => (Level::Info, "opens".into()),
+            EventKind::Closed => (Level::Info, "closes".into()),
+        };
+        let who = format!("{}/{}", self.visible_kind(event.body), event.body);
+        Entry { cycle: event.cycle, level, who, words }
+    }
+}
+
+fn side_in_words(side: Side) -> String {
+    format!("{} side", side.name())
+}
+
+/// A sensor's readings as ranges from the middle of its robot.
+fn scan(
+    sensor: &SensorModel,
+    readings: &[Reading],
+    side_m: f64,
+    (id, pose): (EntityId, Pose),
+) -> Scan {
+    let bearings_rad: Vec<f64> = sensor.bearings_deg.iter().map(|deg| deg.to_radians()).collect();
+    let range_m = |(&reading, &bearing_rad): (&Reading, &f64)| {
+        let to_boundary_m = 0.5 * side_m / cos(bearing_rad).abs().max(sin(bearing_rad).abs());
+        to_boundary_m + beyond_boundary_m(sensor, reading)
+    };
+    Scan {
+        of: (Kind::Robot, id, None),
+        sensor: sensor.name.clone(),
+        pose,
+        ranges_m: readings.iter().zip(&bearings_rad).map(range_m).collect(),
+        range_m: sensor.range_m + 0.5 * side_m * std::f64::consts::SQRT_2,
+        bearings_rad,
+    }
+}
+
+/// The middle of the distance class that is reported; infinite for nothing.
+fn beyond_boundary_m(sensor: &SensorModel, reading: Reading) -> f64 {
+    if reading.observation == NOTHING || reading.class >= sensor.beyond() {
+        return f64::INFINITY;
+    }
+    let (class, edges_m) = (usize::from(reading.class), &sensor.distance_edges_m);
+    let near_m = if class == 0 { 0.0 } else { edges_m[class - 1] };
+    let far_m = edges_m.get(class).copied().unwrap_or(sensor.range_m).min(sensor.range_m);
+    0.5 * (near_m + far_m)
+}
