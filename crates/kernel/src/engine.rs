@@ -1,30 +1,29 @@
 //! Runs a world for many cycles: the crew, the groups, and how many workers are worth it.
 //!
 //! A cycle that is too small to share out runs on one worker by itself. The engine measures
-//! instead of guessing: it times stretches of cycles with one worker and with all, keeps to
-//! the faster, and looks again now and then. Results do not depend on it.
+//! instead of guessing, see [`Pace`]. Results do not depend on it.
 
 use crate::conflict::Groups;
-use crate::cycle::{Mate, PhaseTimes, advance};
+use crate::cycle::{Mate, Observer, PhaseTimes, Ran, Stretch, advance, lock};
 use crate::ports::Clock;
 use crate::units::Cycle;
+use crate::workers::Team;
 use crate::world::World;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// A stretch between two decisions lasts about this long.
-const STRETCH_NS: f64 = 5e6;
-/// The slower way is tried again after this many stretches.
-const LOOK_AGAIN: u32 = 40;
 /// Bodies are arranged anew after at least this many cycles: they have not gone far by then,
 /// and sorting is below 1 % of the work.
 const ARRANGE_EVERY: u64 = 64;
 
-/// What runs a world: as many workers as asked for, and what they share.
+/// Runs a world with as many workers as asked for, and keeps what they share.
 #[derive(Debug)]
 pub struct Engine<W: World> {
     groups: Groups,
     /// Cycles since the bodies were arranged.
     since_arranged: u64,
-    crew: Vec<Mate<W::Scratch>>,
+    crew: Vec<Mutex<Mate<W::Scratch>>>,
+    /// What all workers need to work together: made when they first do.
+    team: Option<Team>,
     pace: Pace,
     times: PhaseTimes,
 }
@@ -32,11 +31,12 @@ pub struct Engine<W: World> {
 impl<W: World> Engine<W> {
     /// An engine of `workers` workers (at least 1) for `bodies` bodies.
     pub fn new(world: &W, bodies: usize, workers: usize) -> Self {
-        let crew = (0..workers.max(1)).map(|_| Mate::new(world.scratch())).collect();
+        let mate = || Mutex::new(Mate::new(world.scratch()));
         Self {
             groups: Groups::new(bodies),
             since_arranged: ARRANGE_EVERY,
-            crew,
+            crew: (0..workers.max(1)).map(|_| mate()).collect(),
+            team: None,
             pace: Pace::default(),
             times: PhaseTimes::default(),
         }
@@ -48,13 +48,13 @@ impl<W: World> Engine<W> {
     }
 
     /// The workers, for what they have gathered.
-    pub fn crew(&self) -> &[Mate<W::Scratch>] {
-        &self.crew
+    pub fn crew(&self) -> impl Iterator<Item = MutexGuard<'_, Mate<W::Scratch>>> {
+        self.crew.iter().map(lock)
     }
 
     /// The workers, to take what they have gathered.
-    pub fn crew_mut(&mut self) -> &mut [Mate<W::Scratch>] {
-        &mut self.crew
+    pub fn crew_mut(&mut self) -> impl Iterator<Item = &mut Mate<W::Scratch>> {
+        self.crew.iter_mut().map(|mate| mate.get_mut().unwrap_or_else(PoisonError::into_inner))
     }
 
     /// Time per phase so far.
@@ -67,105 +67,470 @@ impl<W: World> Engine<W> {
         self.groups.heap_bytes()
     }
 
-    /// Runs `cycles` cycles from `from` on.
+    /// Runs `cycles` cycles from `from` on. For worlds that nobody needs to look at in between:
+    /// events carry their cycle, and wait in the scratches.
     pub fn advance(
+        &mut self,
+        world: &W,
+        state: &mut W::State,
+        span: (Cycle, u64),
+        clock: &impl Clock,
+    ) {
+        self.run(world, state, span, clock, None);
+    }
+
+    /// Runs up to `cycles` cycles from `from` on, and returns how many: fewer where `observer`,
+    /// which is called between all cycles, has ended the run. One call with many cycles is
+    /// cheaper than many calls, which start the threads anew each time.
+    pub fn advance_observed(
+        &mut self,
+        world: &W,
+        state: &mut W::State,
+        span: (Cycle, u64),
+        clock: &impl Clock,
+        observer: &mut dyn Observer<W>,
+    ) -> u64 {
+        self.run(world, state, span, clock, Some(observer))
+    }
+
+    fn run(
         &mut self,
         world: &W,
         state: &mut W::State,
         (from, cycles): (Cycle, u64),
         clock: &impl Clock,
-    ) {
+        mut observer: Option<&mut dyn Observer<W>>,
+    ) -> u64 {
         let mut done = 0;
         while done < cycles {
             if self.since_arranged >= ARRANGE_EVERY {
                 world.arrange(state);
                 self.since_arranged = 0;
             }
-            let (team, stretch) = self.pace.next(self.crew.len(), cycles - done);
-            let started_ns = clock.now_ns();
-            let crew = &mut self.crew[..team];
-            let span = (from + done, stretch);
-            self.times.add(advance(world, state, &self.groups, crew, span, clock));
-            self.pace.note(team, stretch, clock.now_ns() - started_ns);
-            self.since_arranged += stretch;
-            done += stretch;
+            let plan = self.pace.plan(self.crew.len());
+            let stretch =
+                Stretch { from: from + done, cycles: cycles - done, limit_ns: plan.limit_ns };
+            let observer = observer.as_mut().map(|observer| &mut **observer as _);
+            let ran = self.stretch(world, state, plan.workers, stretch, clock, observer);
+            self.pace.note(plan, &ran);
+            self.times.add(ran.times);
+            self.since_arranged += ran.cycles;
+            done += ran.cycles;
+            if ran.is_ended {
+                break;
+            }
+        }
+        done
+    }
+
+    fn stretch(
+        &mut self,
+        world: &W,
+        state: &W::State,
+        workers: usize,
+        stretch: Stretch,
+        clock: &impl Clock,
+        observer: Option<&mut dyn Observer<W>>,
+    ) -> Ran {
+        let crew = &self.crew[..workers];
+        let team = (workers > 1).then(|| self.team.get_or_insert_with(|| Team::new(workers)));
+        advance(world, state, &self.groups, (crew, team), stretch, clock, observer)
+    }
+}
+
+/// A stretch with one worker lasts about this long,
+const ALONE_NS: u64 = 5_000_000;
+/// one with all so long that starting their threads is below 1 % of it,
+const TEAM_NS: u64 = 20_000_000;
+/// and a look at the other way this long, if a cycle is not longer.
+const LOOK_NS: u64 = 2_000_000;
+
+/// A cycle of less work is never shared out: waiting for each other three times costs about
+/// 1 us where every worker has a processor of its own, and 100 times that where not.
+const SMALLEST_NS: f64 = 10_000.0;
+/// A cycle of so much work is tried with all workers at once: it takes as long as a look does.
+const LARGE_NS: f64 = 1_000_000.0;
+
+/// All workers must be so much faster than one to be taken.
+const WORTHWHILE: f64 = 0.9;
+
+/// Time before the first look, and between looks that may be worth it,
+const SHORTEST_WAIT_NS: f64 = 200e6;
+/// and the longest between looks that were not, each time twice as long; but
+const LONGEST_WAIT_NS: f64 = 5e9;
+/// a look is followed by at least this many times its own time without one.
+const WAIT_PER_COST: f64 = 64.0;
+
+/// Weight of the newest stretch in what a cycle is taken to cost.
+const NEWEST: f64 = 0.25;
+
+/// Decides by measurement whether one worker or all run the next stretch.
+///
+/// It keeps to the faster of the two, its favorite, and looks at the other now and then.
+/// Whatever the other costs (with a barrier on processors that are busy with other work,
+/// a thousand times as much), looking takes at most 1 part in [`WAIT_PER_COST`] of the time:
+/// a look ends after [`LOOK_NS`] or one cycle, and its own cost says when the next is due. One
+/// that finds nothing doubles the wait for the next, up to [`LONGEST_WAIT_NS`], so that a
+/// change is still noticed. Only a look can make all workers the favorite, so an old measurement
+/// never does; one worker takes over as soon as all are slower.
+#[derive(Debug)]
+struct Pace {
+    /// Nanoseconds per cycle with one worker and with all; nothing where not measured yet.
+    alone_ns: Option<f64>,
+    team_ns: Option<f64>,
+    favors_team: bool,
+    /// Time since the last look, and until the next.
+    since_ns: f64,
+    wait_ns: f64,
+    share_always: bool,
+}
+
+/// What the next stretch is to be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Plan {
+    workers: usize,
+    limit_ns: u64,
+    /// Whether this is not the favorite, but a look at the other way.
+    is_look: bool,
+}
+
+impl Default for Pace {
+    fn default() -> Self {
+        Self {
+            alone_ns: None,
+            team_ns: None,
+            favors_team: false,
+            since_ns: 0.0,
+            wait_ns: SHORTEST_WAIT_NS,
+            share_always: false,
         }
     }
 }
 
-/// Which team is faster, by measurement.
-#[derive(Debug, Default)]
-struct Pace {
-    /// Nanoseconds per cycle with one worker and with all; 0 = not measured yet.
-    alone_ns: f64,
-    team_ns: f64,
-    stretches: u32,
-    share_always: bool,
+impl Pace {
+    fn plan(&self, crew: usize) -> Plan {
+        if self.share_always {
+            return Plan { workers: crew, limit_ns: TEAM_NS, is_look: false };
+        }
+        let is_look = crew > 1 && self.is_look_due();
+        let with_all = self.favors_team != is_look;
+        let limit_ns = match (is_look, with_all) {
+            (true, _) => LOOK_NS,
+            (false, true) => TEAM_NS,
+            (false, false) => ALONE_NS,
+        };
+        Plan { workers: if with_all { crew } else { 1 }, limit_ns, is_look }
+    }
+
+    fn is_look_due(&self) -> bool {
+        let Some(alone_ns) = self.alone_ns else { return false };
+        if !self.favors_team && alone_ns < SMALLEST_NS {
+            return false;
+        }
+        let is_first = self.team_ns.is_none();
+        self.since_ns >= self.wait_ns || (is_first && alone_ns >= LARGE_NS)
+    }
+
+    fn note(&mut self, plan: Plan, ran: &Ran) {
+        let took_ns = ran.took_ns as f64;
+        let with_all = self.favors_team != plan.is_look;
+        let measured = if with_all { &mut self.team_ns } else { &mut self.alone_ns };
+        if plan.is_look {
+            // What was measured long ago says nothing about now.
+            *measured = Some(per_cycle_ns(ran, ran.cycles > 1));
+            self.since_ns = 0.0;
+            self.choose_after_look(took_ns);
+        } else {
+            let newest = per_cycle_ns(ran, false);
+            *measured = Some(measured.map_or(newest, |old| old + NEWEST * (newest - old)));
+            self.since_ns += took_ns;
+            self.give_up_team(ran);
+        }
+    }
+
+    fn choose_after_look(&mut self, took_ns: f64) {
+        let (Some(alone_ns), Some(team_ns)) = (self.alone_ns, self.team_ns) else { return };
+        // What is the favorite stays it in doubt.
+        let bar_ns = if self.favors_team { alone_ns } else { WORTHWHILE * alone_ns };
+        let favored_team = std::mem::replace(&mut self.favors_team, team_ns < bar_ns);
+        self.wait_ns = if favored_team == self.favors_team {
+            (2.0 * self.wait_ns).min(LONGEST_WAIT_NS)
+        } else {
+            SHORTEST_WAIT_NS
+        };
+        self.wait_ns = self.wait_ns.max(WAIT_PER_COST * took_ns);
+    }
+
+    /// Goes back to one worker where all have become slower; the loss counts like that of a look.
+    fn give_up_team(&mut self, ran: &Ran) {
+        let (Some(alone_ns), Some(team_ns)) = (self.alone_ns, self.team_ns) else { return };
+        if self.favors_team && team_ns > alone_ns {
+            let lost_ns = ran.took_ns as f64 - ran.cycles as f64 * alone_ns;
+            self.favors_team = false;
+            self.since_ns = 0.0;
+            self.wait_ns = SHORTEST_WAIT_NS.max(WAIT_PER_COST * lost_ns);
+        }
+    }
 }
 
-impl Pace {
-    /// Workers and cycles of the next stretch.
-    fn next(&self, crew: usize, left: u64) -> (usize, u64) {
-        let (expected_ns, team) = if crew == 1 || (self.alone_ns == 0.0 && !self.share_always) {
-            (self.alone_ns, 1)
-        } else if self.share_always {
-            (self.team_ns, crew)
-        } else if self.team_ns == 0.0 {
-            (self.alone_ns, crew)
-        } else {
-            let team_is_faster = self.team_ns < self.alone_ns;
-            let look_again = self.stretches % LOOK_AGAIN == LOOK_AGAIN - 1;
-            let chosen = if team_is_faster != look_again { crew } else { 1 };
-            (self.alone_ns.max(self.team_ns), chosen)
-        };
-        let stretch = if expected_ns == 0.0 { 1.0 } else { (STRETCH_NS / expected_ns).max(1.0) };
-        (team, (stretch as u64).min(left))
-    }
-
-    fn note(&mut self, team: usize, cycles: u64, took_ns: u64) {
-        let per_cycle = (took_ns as f64 / cycles as f64).max(1.0);
-        let measured = if team == 1 { &mut self.alone_ns } else { &mut self.team_ns };
-        *measured = if *measured == 0.0 { per_cycle } else { 0.5 * *measured + 0.5 * per_cycle };
-        self.stretches = self.stretches.wrapping_add(1);
-    }
+/// Nanoseconds per cycle, without the first one if that is to be left out: threads were started
+/// in it, and caches were cold.
+fn per_cycle_ns(ran: &Ran, without_first: bool) -> f64 {
+    let (took_ns, cycles) = if without_first {
+        (ran.took_ns - ran.first_ns, ran.cycles - 1)
+    } else {
+        (ran.took_ns, ran.cycles)
+    };
+    (took_ns as f64 / cycles as f64).max(1.0)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cycle::Scratches;
+    use crate::ports::ManualClock;
+    use crate::units::Slot;
+    use std::ops::{ControlFlow, Range};
+    use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
-    fn settled(alone_ns: f64, team_ns: f64) -> Pace {
-        Pace { alone_ns, team_ns, ..Pace::default() }
+    const SECOND_NS: u64 = 1_000_000_000;
+
+    /// A pace on a machine whose cycles take a known time.
+    #[derive(Default)]
+    struct Trial {
+        pace: Pace,
+        now_ns: u64,
+        looking_ns: u64,
+        with_all_ns: u64,
+        looks_at_ns: Vec<u64>,
+    }
+
+    impl Trial {
+        /// Runs for a time, with cycles of `[one worker, all workers]`.
+        fn run(&mut self, time_ns: u64, cycle_ns: [u64; 2]) -> &mut Self {
+            let until_ns = self.now_ns + time_ns;
+            while self.now_ns < until_ns {
+                let plan = self.pace.plan(2);
+                let cycle_ns = cycle_ns[usize::from(plan.workers > 1)];
+                let cycles = plan.limit_ns.div_ceil(cycle_ns);
+                let took_ns = cycles * cycle_ns;
+                let ran = Ran { cycles, took_ns, first_ns: cycle_ns, ..Ran::default() };
+                if plan.is_look {
+                    self.looks_at_ns.push(self.now_ns);
+                    self.looking_ns += took_ns;
+                }
+                self.with_all_ns += if plan.workers > 1 { took_ns } else { 0 };
+                self.pace.note(plan, &ran);
+                self.now_ns += took_ns;
+            }
+            self
+        }
+
+        fn share_of_looking(&self) -> f64 {
+            self.looking_ns as f64 / self.now_ns as f64
+        }
     }
 
     #[test]
-    fn the_faster_team_is_kept() {
-        assert_eq!(settled(1e6, 6e5).next(2, 100).0, 2);
-        assert_eq!(settled(1e4, 3e4).next(2, 100).0, 1);
-        assert_eq!(settled(1e6, 0.0).next(1, 100).0, 1);
+    fn the_faster_way_is_kept_for_nearly_all_of_the_time() {
+        for (cycle_ns, least, most) in [
+            ([2_000_000, 1_100_000], 0.97, 1.0),
+            ([100_000, 60_000], 0.93, 1.0),
+            ([100_000, 300_000], 0.0, 0.02),
+            // Not worth the other processors.
+            ([100_000, 95_000], 0.0, 0.02),
+        ] {
+            let mut trial = Trial::default();
+            trial.run(4 * SECOND_NS, cycle_ns);
+            let with_all = trial.with_all_ns as f64 / trial.now_ns as f64;
+            assert!((least..=most).contains(&with_all), "{cycle_ns:?}: {with_all}");
+        }
     }
 
     #[test]
-    fn both_are_measured_first_and_the_slower_is_looked_at_again() {
-        let mut pace = Pace::default();
-        let (first, stretch) = pace.next(4, 100);
-        assert_eq!((first, stretch), (1, 1));
-        pace.note(1, 1, 1_000_000);
-        assert_eq!(pace.next(4, 100).0, 4);
-        pace.note(4, 5, 1_500_000);
-        let teams: Vec<usize> = (0..LOOK_AGAIN)
-            .map(|_| {
-                let (team, n) = pace.next(4, 100);
-                pace.note(team, n, if team == 1 { 1_000_000 } else { 300_000 } * n);
-                team
-            })
-            .collect();
-        assert_eq!(teams.iter().filter(|&&t| t == 1).count(), 1);
+    fn looking_takes_two_percent_at_most_however_slow_the_other_way_is() {
+        for alone_ns in [12_000, 50_000, 900_000, 3_000_000] {
+            for times_slower in [1, 3, 30, 1000] {
+                let mut trial = Trial::default();
+                let cycle_ns = [alone_ns, alone_ns * times_slower];
+                trial.run(100 * SECOND_NS + 1000 * cycle_ns[1], cycle_ns);
+                let share = trial.share_of_looking();
+                assert!(share <= 0.02, "{cycle_ns:?}: {share}");
+                assert!(!trial.looks_at_ns.is_empty());
+            }
+        }
     }
 
     #[test]
-    fn a_stretch_never_exceeds_what_is_left() {
-        assert_eq!(settled(10.0, 10.0).next(2, 7).1, 7);
-        assert_eq!(settled(1e12, 1e12).next(2, 7).1, 1);
+    fn a_hopeless_team_is_looked_at_ever_less_often_but_never_given_up() {
+        let mut trial = Trial::default();
+        trial.run(100 * SECOND_NS, [100_000, 500_000]);
+        let waits: Vec<u64> = trial.looks_at_ns.windows(2).map(|w| w[1] - w[0]).collect();
+        assert!(waits.len() > 10, "{waits:?}");
+        let longest = LONGEST_WAIT_NS as u64;
+        let grows = |w: &[u64]| 2 * w[1] > 3 * w[0] || w[1].abs_diff(longest) < longest / 50;
+        assert!(waits.windows(2).all(grows), "{waits:?}");
+    }
+
+    #[test]
+    fn a_tiny_world_never_gets_a_team() {
+        let mut trial = Trial::default();
+        trial.run(60 * SECOND_NS, [9_000, 1]);
+        assert_eq!(trial.with_all_ns, 0);
+    }
+
+    #[test]
+    fn a_change_is_noticed_in_either_direction() {
+        let mut trial = Trial::default();
+        trial.run(60 * SECOND_NS, [100_000, 2_000_000]);
+        assert!(!trial.pace.favors_team);
+        trial.run(2 * LONGEST_WAIT_NS as u64, [100_000, 55_000]);
+        assert!(trial.pace.favors_team, "the other work has ended");
+        trial.run(20 * SECOND_NS, [100_000, 55_000]);
+        trial.run(SECOND_NS / 10, [100_000, 100_000_000]);
+        assert!(!trial.pace.favors_team, "other work has begun");
+        trial.run(60 * SECOND_NS, [100_000, 55_000]);
+        assert!(trial.pace.favors_team, "and has ended");
+        trial.run(20 * SECOND_NS, [30_000, 55_000]);
+        assert!(!trial.pace.favors_team, "one worker has become faster");
+    }
+
+    #[test]
+    fn what_a_false_hope_costs_is_paid_off_before_the_next() {
+        let mut trial = Trial::default();
+        // Looks are promising, and everything after them is slow.
+        for _ in 0..300 {
+            while !trial.pace.plan(2).is_look {
+                trial.run(1, [100_000, 400_000]);
+            }
+            trial.run(1, [100_000, 50_000]);
+        }
+        let lost = trial.with_all_ns as f64 * 0.75 / trial.now_ns as f64;
+        assert!(lost <= 0.02, "{lost}");
+    }
+
+    /// Counts its cycles; a cycle takes time on the clock, more of it for a second worker.
+    struct Ticking<'a> {
+        clock: &'a ManualClock,
+        alone_ns: u64,
+        helper_ns: u64,
+    }
+
+    struct Ticks(Vec<AtomicU64>);
+
+    impl World for Ticking<'_> {
+        type State = Ticks;
+        type Scratch = Vec<(Cycle, usize)>;
+
+        fn scratch(&self) -> Self::Scratch {
+            Vec::new()
+        }
+
+        fn bodies(&self, state: &Ticks) -> usize {
+            // Every worker asks once a cycle.
+            let is_helper = std::thread::current().name().is_some_and(|n| n.starts_with("worker"));
+            self.clock.advance_ns(if is_helper { self.helper_ns } else { self.alone_ns });
+            state.0.len()
+        }
+
+        fn perceive_and_decide(
+            &self,
+            state: &Ticks,
+            now: Cycle,
+            bodies: Range<usize>,
+            scratch: &mut Self::Scratch,
+        ) {
+            for body in bodies {
+                state.0[body].fetch_add(1, Relaxed);
+                scratch.push((now, body));
+            }
+        }
+
+        fn find_conflicts(
+            &self,
+            _: &Ticks,
+            _: Cycle,
+            _: Range<usize>,
+            _: &Groups,
+            _: &mut Self::Scratch,
+        ) {
+        }
+
+        fn react(&self, _: &Ticks, _: Cycle, _: &mut [Slot], _: &mut Self::Scratch) {}
+    }
+
+    fn ticks(n: usize) -> Ticks {
+        Ticks((0..n).map(|_| AtomicU64::new(0)).collect())
+    }
+
+    #[test]
+    fn an_engine_spends_two_percent_at_most_on_a_team_that_is_a_thousand_times_slower() {
+        let clock = ManualClock::default();
+        let world = Ticking { clock: &clock, alone_ns: 20_000, helper_ns: 20_000_000 };
+        let (mut state, cycles) = (ticks(3), 200_000);
+        let mut engine = Engine::new(&world, 3, 2);
+        engine.advance(&world, &mut state, (0, cycles), &clock);
+        assert!(engine.team.is_some(), "it was looked at");
+        let took_ns = clock.now_ns() as f64;
+        let alone_ns = (cycles * world.alone_ns) as f64;
+        assert!(took_ns <= 1.02 * alone_ns, "{took_ns} against {alone_ns}");
+        engine.crew_mut().for_each(|mate| mate.scratch.clear());
+        assert!(state.0.iter().all(|n| n.load(Relaxed) == cycles));
+    }
+
+    #[test]
+    fn an_engine_never_makes_a_team_for_a_tiny_world() {
+        let clock = ManualClock::default();
+        let world = Ticking { clock: &clock, alone_ns: 5_000, helper_ns: 1 };
+        let mut engine = Engine::new(&world, 3, 2);
+        engine.advance(&world, &mut ticks(3), (0, 200_000), &clock);
+        assert!(engine.team.is_none());
+    }
+
+    /// Notes what it is shown, and ends the run after `last`.
+    #[derive(Default)]
+    struct Notes {
+        last: Cycle,
+        began: Vec<(Cycle, u64)>,
+        done: Vec<(Cycle, usize)>,
+    }
+
+    impl Observer<Ticking<'_>> for Notes {
+        fn before_cycle(&mut self, now: Cycle, state: &Ticks) {
+            self.began.push((now, state.0[0].load(Relaxed)));
+        }
+
+        fn after_cycle(
+            &mut self,
+            now: Cycle,
+            state: &Ticks,
+            mut scratches: Scratches<'_, Vec<(Cycle, usize)>>,
+        ) -> ControlFlow<()> {
+            assert!(state.0.iter().all(|n| n.load(Relaxed) == now + 1));
+            let mut seen = Vec::new();
+            scratches.for_each(|scratch| seen.append(scratch));
+            seen.sort_unstable();
+            self.done.extend(seen);
+            if now == self.last { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        }
+    }
+
+    #[test]
+    fn an_observer_sees_every_cycle_whole_and_ends_the_run_where_it_likes() {
+        let clock = ManualClock::default();
+        // Several stretches.
+        let world = Ticking { clock: &clock, alone_ns: 400_000, helper_ns: 400_000 };
+        for workers in [1, 2, 3] {
+            let mut engine = Engine::new(&world, 5, workers);
+            engine.share_always();
+            let (mut state, mut notes) = (ticks(5), Notes { last: 149, ..Notes::default() });
+            for span in [(0, 1), (1, 99), (100, 1000)] {
+                let done = engine.advance_observed(&world, &mut state, span, &clock, &mut notes);
+                assert_eq!(done, span.1.min(150 - span.0));
+            }
+            assert_eq!(notes.began, (0..150).map(|now| (now, now)).collect::<Vec<_>>());
+            let all = (0..150).flat_map(|now| (0..5).map(move |body| (now, body)));
+            assert_eq!(notes.done, all.collect::<Vec<_>>());
+        }
     }
 }

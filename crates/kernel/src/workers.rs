@@ -2,8 +2,9 @@
 //!
 //! A pool holds the numbers `0..n`. Each worker has a share of it, takes chunks of its own
 //! share first (its caches still hold those bodies) and then helps with the others' shares,
-//! so the load balances itself and nobody waits for a lock. Worker count 1 runs the very
-//! same code on the calling thread; there is no second code path.
+//! so the load balances itself and nobody waits for a lock. One worker runs the very same
+//! code on the calling thread; it takes the pool from front to back, has nobody to wait for,
+//! and asks nothing of the system.
 
 use std::num::NonZeroUsize;
 use std::ops::Range;
@@ -14,11 +15,15 @@ use std::sync::{Condvar, Mutex, PoisonError};
 /// put back by the next pool but one, when nobody reads them any more.
 const POOLS: usize = 4;
 
+/// Numbers in the largest chunk of a pool.
+const CHUNK: usize = 64;
+
 /// Spins before a waiting worker offers its processor to others, and before it sleeps.
 const SPINS_BEFORE_YIELD: u32 = 4_000;
 const YIELDS_BEFORE_SLEEP: u32 = 200;
 
-/// How many processors this process may use, at least 1.
+/// How many processors this process may use, at least 1. The answer takes system calls that
+/// read files: ask once.
 pub fn available() -> usize {
     std::thread::available_parallelism().map_or(1, NonZeroUsize::get)
 }
@@ -29,33 +34,25 @@ pub fn available() -> usize {
 /// # Panics
 /// When a worker panicked (a bug); the others are released first.
 pub fn run<S: Send>(crew: &mut [S], work: impl Fn(&Worker<'_>, &mut S) + Sync) {
-    let team = Team::new(crew.len());
-    let run_one = |index: usize, own: &mut S| {
-        let worker = Worker { team: &team, index };
-        let _release = ReleaseOnPanic(&team);
-        work(&worker, own);
-    };
-    let Some((first, others)) = crew.split_first_mut() else { return };
-    std::thread::scope(|scope| {
-        for (i, own) in others.iter_mut().enumerate() {
-            let run_one = &run_one;
-            std::thread::Builder::new()
-                .name(format!("worker {}", i + 1))
-                .spawn_scoped(scope, move || run_one(i + 1, own))
-                .expect("the system can start a thread");
-        }
-        run_one(0, first);
-    });
+    match crew {
+        [] => {}
+        [only] => work(&Worker::ALONE, only),
+        _ => Team::new(crew.len()).run(crew, &work, &work),
+    }
 }
 
 /// One of the workers of a [`run`].
 #[derive(Debug)]
 pub struct Worker<'a> {
-    team: &'a Team,
+    /// Nothing for a worker that is alone.
+    team: Option<&'a Team>,
     index: usize,
 }
 
 impl Worker<'_> {
+    /// The only worker of a run.
+    pub(crate) const ALONE: Worker<'static> = Worker { team: None, index: 0 };
+
     /// This worker's number, from 0.
     pub fn index(&self) -> usize {
         self.index
@@ -63,20 +60,23 @@ impl Worker<'_> {
 
     /// How many work together.
     pub fn team_size(&self) -> usize {
-        self.team.size
+        self.team.map_or(1, Team::size)
     }
 
     /// Takes chunks of `0..n` until none is left. All workers call it with the same `pool`
     /// and `n`; every number is handed out exactly once. `pool` counts the calls: 0, 1, 2...
     #[inline]
     pub fn for_each_chunk(&self, pool: u64, n: usize, mut task: impl FnMut(Range<usize>)) {
-        let team = self.team.size;
-        self.team.cursor((pool + 2) % POOLS as u64, self.index).store(0, Ordering::Relaxed);
-        let chunk = (n / (team * 8)).clamp(1, 64);
-        for k in 0..team {
-            let owner = (self.index + k) % team;
-            let (start, end) = (n * owner / team, n * (owner + 1) / team);
-            let cursor = self.team.cursor(pool % POOLS as u64, owner);
+        let Some(team) = self.team else {
+            return (0..n).step_by(CHUNK).for_each(|from| task(from..n.min(from + CHUNK)));
+        };
+        let size = team.size();
+        team.cursor((pool + 2) % POOLS as u64, self.index).store(0, Ordering::Relaxed);
+        let chunk = (n / (size * 8)).clamp(1, CHUNK);
+        for k in 0..size {
+            let owner = (self.index + k) % size;
+            let (start, end) = (n * owner / size, n * (owner + 1) / size);
+            let cursor = team.cursor(pool % POOLS as u64, owner);
             loop {
                 let from = start + cursor.fetch_add(chunk, Ordering::Relaxed);
                 if from >= end {
@@ -93,16 +93,14 @@ impl Worker<'_> {
     /// When another worker panicked.
     #[inline]
     pub fn barrier(&self) {
-        if self.team.size > 1 {
-            self.team.barrier.wait(self.team.size as u32, self.team.spins);
+        if let Some(team) = self.team {
+            team.barrier.wait(team.size as u32, team.spins);
         }
     }
-}
 
-impl Worker<'_> {
     /// Whether `own` is true for any worker. All must call it; it waits for all.
     pub fn any(&self, own: bool) -> bool {
-        let votes = &self.team.votes;
+        let Some(Team { votes, .. }) = self.team else { return own };
         if own {
             votes.fetch_add(1, Ordering::Relaxed);
         }
@@ -121,8 +119,9 @@ impl Worker<'_> {
 #[repr(align(128))]
 struct Padded(AtomicUsize);
 
+/// What workers that run together share. It outlives a run and serves the next one.
 #[derive(Debug)]
-struct Team {
+pub(crate) struct Team {
     size: usize,
     /// `POOLS` cursors per worker.
     cursors: Vec<Padded>,
@@ -134,7 +133,8 @@ struct Team {
 }
 
 impl Team {
-    fn new(size: usize) -> Self {
+    /// A team of `size` workers. Asks the system for its processors.
+    pub(crate) fn new(size: usize) -> Self {
         Self {
             size,
             cursors: (0..size * POOLS).map(|_| Padded::default()).collect(),
@@ -142,6 +142,48 @@ impl Team {
             votes: AtomicUsize::new(0),
             spins: if size <= available() { SPINS_BEFORE_YIELD } else { 0 },
         }
+    }
+
+    fn size(&self) -> usize {
+        self.size
+    }
+
+    /// Runs `lead` on the calling thread as worker 0 and `work` on a thread for each other
+    /// worker, each with its own element of `crew`, and returns when all are done.
+    ///
+    /// # Panics
+    /// When a worker panicked (a bug), or when `crew` has not one element per worker.
+    pub(crate) fn run<S: Send>(
+        &mut self,
+        crew: &mut [S],
+        lead: impl FnOnce(&Worker<'_>, &mut S),
+        work: impl Fn(&Worker<'_>, &mut S) + Sync,
+    ) {
+        assert_eq!(crew.len(), self.size, "one element per worker");
+        self.put_back();
+        let (team, work) = (&*self, &work);
+        let Some((first, others)) = crew.split_first_mut() else { return };
+        std::thread::scope(|scope| {
+            // Also where a thread cannot be started: those that wait are let go.
+            let _release = ReleaseOnPanic(team);
+            for (i, own) in others.iter_mut().enumerate() {
+                std::thread::Builder::new()
+                    .name(format!("worker {}", i + 1))
+                    .spawn_scoped(scope, move || {
+                        let _release = ReleaseOnPanic(team);
+                        work(&Worker { team: Some(team), index: i + 1 }, own);
+                    })
+                    .expect("the system can start a thread");
+            }
+            lead(&Worker { team: Some(team), index: 0 }, first);
+        });
+    }
+
+    /// Pools are counted from 0 in each run, and a run that panicked left things as they were.
+    fn put_back(&mut self) {
+        self.cursors.iter_mut().for_each(|cursor| *cursor.0.get_mut() = 0);
+        *self.votes.get_mut() = 0;
+        self.barrier = Barrier::default();
     }
 
     #[inline]
@@ -186,7 +228,11 @@ impl Barrier {
     }
 
     fn wait_past(&self, generation: u32, spins: u32) {
-        let passed = || self.generation.load(Ordering::SeqCst) != generation;
+        // Whoever comes after a panic must not wait either: its generation never ends.
+        let passed = || {
+            self.generation.load(Ordering::SeqCst) != generation
+                || self.broken.load(Ordering::SeqCst)
+        };
         for _ in 0..spins {
             if passed() {
                 return;
@@ -248,6 +294,28 @@ mod tests {
     }
 
     #[test]
+    fn a_team_serves_run_after_run_and_survives_a_panic() {
+        let mut team = Team::new(2);
+        for runs in 0..4 {
+            let done = AtomicU64::new(0);
+            let work = |worker: &Worker<'_>, (): &mut ()| {
+                for pool in 0..=runs {
+                    worker.for_each_chunk(pool, 10, |range| {
+                        done.fetch_add(range.len() as u64, Ordering::Relaxed);
+                    });
+                    worker.barrier();
+                }
+            };
+            team.run(&mut [(); 2], work, work);
+            assert_eq!(done.into_inner(), 10 * (runs + 1));
+            let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+                team.run(&mut [(); 2], |_, ()| panic!("a bug"), |worker, ()| worker.barrier());
+            }));
+            assert!(outcome.is_err());
+        }
+    }
+
+    #[test]
     fn any_is_the_same_answer_for_all() {
         for team in [1, 2, 5] {
             run(&mut vec![(); team], |worker, ()| {
@@ -264,6 +332,18 @@ mod tests {
         let outcome = std::panic::catch_unwind(|| {
             run(&mut [(); 3], |worker, ()| {
                 assert!(worker.index() != 1, "a bug");
+                worker.barrier();
+            });
+        });
+        assert!(outcome.is_err());
+    }
+
+    #[test]
+    fn a_worker_that_comes_after_a_panic_does_not_wait() {
+        let outcome = std::panic::catch_unwind(|| {
+            run(&mut [(); 2], |worker, ()| {
+                assert!(worker.index() != 1, "a bug");
+                std::thread::sleep(std::time::Duration::from_millis(20));
                 worker.barrier();
             });
         });

@@ -136,7 +136,7 @@ impl RobotsSimulation {
     /// Lets the workers keep events where anybody wants them.
     fn keep_events(&mut self) {
         let wanted = self.log.is_kept || self.tables.contains(&Table::Events);
-        self.engine.crew_mut().iter_mut().for_each(|mate| mate.scratch.keep_events = wanted);
+        self.engine.crew_mut().for_each(|mate| mate.scratch.keep_events = wanted);
     }
 
     /// Takes the workers' events over, in an order that does not depend on who has seen what.
@@ -213,7 +213,7 @@ impl RobotsSimulation {
 
     fn gather<T: Copy>(&mut self, from: impl Fn(&mut Scratch) -> &mut Vec<T>) -> Vec<T> {
         let crew = self.engine.crew_mut();
-        crew.iter_mut().flat_map(|mate| std::mem::take(from(&mut mate.scratch))).collect()
+        crew.flat_map(|mate| std::mem::take(from(&mut mate.scratch))).collect()
     }
 
     fn trajectories(&mut self) -> Vec<Values> {
