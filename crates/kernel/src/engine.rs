@@ -8,7 +8,7 @@ use crate::cycle::{Mate, Observer, PhaseTimes, Ran, Stretch, advance, lock};
 use crate::ports::Clock;
 use crate::units::Cycle;
 use crate::workers::Team;
-use crate::world::World;
+use crate::world::Phases;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Bodies are arranged anew after at least this many cycles: they have not gone far by then,
@@ -17,7 +17,7 @@ const ARRANGE_EVERY: u64 = 64;
 
 /// Runs a world with as many workers as asked for, and keeps what they share.
 #[derive(Debug)]
-pub struct Engine<W: World> {
+pub struct Engine<W: Phases> {
     groups: Groups,
     /// Cycles since the bodies were arranged.
     since_arranged: u64,
@@ -28,7 +28,7 @@ pub struct Engine<W: World> {
     times: PhaseTimes,
 }
 
-impl<W: World> Engine<W> {
+impl<W: Phases> Engine<W> {
     /// An engine of `workers` workers (at least 1) for `bodies` bodies.
     pub fn new(world: &W, bodies: usize, workers: usize) -> Self {
         let mate = || Mutex::new(Mate::new(world.scratch()));

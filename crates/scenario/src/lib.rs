@@ -5,7 +5,9 @@
 //! world's own business.
 
 pub mod file;
+pub mod kind;
 
+pub use kind::{Compiled, Foreign, Kind, Worlds};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use sidestep_kernel::InputError;

@@ -11,9 +11,9 @@ use sidestep::scenario::Source;
 use sidestep::worlds::airspace::airplane::{
     Action, After, Legs, Model, Passing, Pilot, Point, Pose, Timing, actions,
 };
+use sidestep::worlds::airspace::airspace_run;
 use sidestep::worlds::airspace::levels::Levels;
 use sidestep::worlds::airspace::objective::{Objective, Options, game};
-use sidestep::worlds::airspace::simulation::AirspaceSimulation;
 use sidestep_kernel::stream::{Purpose, Streams};
 use sidestep_kernel::{Seed, Simulation};
 use std::time::Instant;
@@ -194,8 +194,7 @@ fn many() {
              radius_m = {radius_m}\n"
         );
         let workers = sidestep_kernel::workers::available();
-        let mut run =
-            AirspaceSimulation::new(&Source::new("many", text, ""), workers).expect("valid");
+        let mut run = airspace_run(&Source::new("many", text, ""), workers).expect("valid");
         run.advance(4);
         let (cpu, wall, cycles) = (ProcessTime::now(), Instant::now(), 10);
         run.advance(cycles);

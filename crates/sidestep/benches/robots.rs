@@ -6,7 +6,7 @@
 
 use cpu_time::ProcessTime;
 use sidestep::scenario::Source;
-use sidestep::worlds::robots::simulation::RobotsSimulation;
+use sidestep::worlds::robots::{RobotsRun, robots_run};
 use sidestep_kernel::conflict::Groups;
 use sidestep_kernel::ports::Recorder;
 use sidestep_kernel::{Simulation, World};
@@ -75,8 +75,8 @@ beyond = [0.1, 0.3, 0.6]
         Source::new(self.name, text, "")
     }
 
-    fn simulation(&self, workers: usize) -> RobotsSimulation {
-        RobotsSimulation::new(&self.scenario(), workers).expect("the case is a valid scenario")
+    fn simulation(&self, workers: usize) -> RobotsRun {
+        robots_run(&self.scenario(), workers).expect("the case is a valid scenario")
     }
 
     /// Cycles that take about a second.
@@ -86,14 +86,14 @@ beyond = [0.1, 0.3, 0.6]
 }
 
 /// CPU and wall seconds of `cycles` cycles.
-fn time(simulation: &mut RobotsSimulation, cycles: u64) -> (f64, f64) {
+fn time(simulation: &mut RobotsRun, cycles: u64) -> (f64, f64) {
     let (cpu, wall) = (ProcessTime::now(), Instant::now());
     advance(simulation, cycles);
     (cpu.elapsed().as_secs_f64(), wall.elapsed().as_secs_f64())
 }
 
 /// Advances over recording buffers too.
-fn advance(simulation: &mut RobotsSimulation, cycles: u64) {
+fn advance(simulation: &mut RobotsRun, cycles: u64) {
     let mut done = 0;
     while done < cycles {
         done += simulation.advance(cycles - done);
@@ -117,8 +117,8 @@ fn median_of(n: usize, ratio: impl FnMut() -> f64) -> f64 {
 
 /// Median of wall(1 worker) / wall(`workers`), taken in turn.
 fn speed_up(source: &Source, workers: usize, cycles: u64) -> f64 {
-    let mut alone = RobotsSimulation::new(source, 1).expect("a valid scenario");
-    let mut team = RobotsSimulation::new(source, workers).expect("a valid scenario");
+    let mut alone = robots_run(source, 1).expect("a valid scenario");
+    let mut team = robots_run(source, workers).expect("a valid scenario");
     for simulation in [&mut alone, &mut team] {
         time(simulation, cycles / 4);
     }
@@ -169,9 +169,9 @@ fn corridor() {
         );
         let source = Source::new("corridor", text, "");
         let ratio = speed_up(&source, 2, 2_000);
-        let mut run = RobotsSimulation::new(&source, 1).expect("a valid scenario");
+        let mut run = robots_run(&source, 1).expect("a valid scenario");
         advance(&mut run, 200);
-        let largest = run.robot_metrics().largest_group;
+        let largest = run.metrics().largest_group;
         println!(
             "corridor, 1000 robots on 1440 boxes, {policy}: 2 workers {ratio:.2}x, largest group {largest}"
         );

@@ -13,7 +13,7 @@ use crate::scenario::Source;
 use crate::worlds::airspace::airplane::Point as AirPoint;
 use crate::worlds::airspace::deploy::Deployment;
 use crate::worlds::airspace::metrics::Metrics;
-use crate::worlds::airspace::simulation::AirspaceSimulation;
+use crate::worlds::airspace::{AirspaceRun, airspace_run};
 use serde::Serialize;
 use sidestep_kernel::{InputError, Simulation};
 
@@ -156,7 +156,7 @@ fn flown(plan: &Plan, n: usize, deployment: Deployment, seed: u64) -> Result<Met
     while run.cycle() < plan.cycles && !run.is_over() {
         run.advance(plan.cycles - run.cycle());
     }
-    Ok(run.airspace_metrics())
+    Ok(run.metrics())
 }
 
 /// The paper's numbers: its preset, and no shield.
@@ -165,7 +165,7 @@ fn begun(
     n: usize,
     deployment: Deployment,
     seed: u64,
-) -> Result<AirspaceSimulation, InputError> {
+) -> Result<AirspaceRun, InputError> {
     let text = format!(
         "format = 1\nworld = \"airspace\"\nname = \"Super-conflict\"\nseed = {seed}\n\
          cycles = {}\n[airspace]\npreset = \"paper\"\nshield = \"off\"\ndeployment = \"{}\"\n\
@@ -174,7 +174,7 @@ fn begun(
         plan.cycles,
         deployment.name(),
     );
-    AirspaceSimulation::new(&Source::new("agentfly", text, ""), 1)
+    airspace_run(&Source::new("agentfly", text, ""), 1)
 }
 
 fn cell(airplanes: usize, deployment: Deployment, all: &[&Metrics]) -> Cell {

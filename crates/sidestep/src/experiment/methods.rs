@@ -4,8 +4,8 @@ use super::figure::Table;
 use super::{Estimate, farm};
 use crate::scenario::Source;
 use crate::statistics::{Interval, wilson};
+use crate::worlds::airspace::airspace_run;
 use crate::worlds::airspace::metrics::Metrics;
-use crate::worlds::airspace::simulation::AirspaceSimulation;
 use crate::worlds::airspace::world::Method;
 use serde::Serialize;
 use sidestep_kernel::{InputError, Simulation};
@@ -73,12 +73,12 @@ pub fn compare(
 
 /// One run to its end.
 fn flown(source: &Source) -> Result<Metrics, InputError> {
-    let mut run = AirspaceSimulation::new(source, 1)?;
-    let cycles = run.compiled().cycles;
+    let mut run = airspace_run(source, 1)?;
+    let cycles = run.plan().cycles;
     while run.cycle() < cycles && !run.is_over() {
         run.advance(cycles - run.cycle());
     }
-    Ok(run.airspace_metrics())
+    Ok(run.metrics())
 }
 
 fn result(method: &'static str, all: &[Metrics]) -> MethodResult {

@@ -7,8 +7,8 @@ use sidestep::learn::sensor::SensorOptions;
 use sidestep::learn::{Estimate, EstimateOptions, effector, profile, sensor};
 use sidestep::scenario::Source;
 use sidestep::worlds::robots::exact::Model;
+use sidestep::worlds::robots::robots_run;
 use sidestep::worlds::robots::scenario::{Behaviours, Compiled, StorageOrder};
-use sidestep::worlds::robots::simulation::RobotsSimulation;
 use std::path::Path;
 
 const SENSOR: &str = r#"
@@ -58,7 +58,7 @@ fn halls() -> Source {
 
 /// Runs and writes the table `name` as CSV into `folder`.
 fn record(source: &Source, cycles: u64, name: &str, folder: &Path) -> std::path::PathBuf {
-    let mut run = RobotsSimulation::new(source, 2).unwrap_or_else(|e| panic!("{e}"));
+    let mut run = robots_run(source, 2).unwrap_or_else(|e| panic!("{e}"));
     run.begin_recording();
     let schemas = run.schemas();
     let mut recorder = MemoryRecorder::new(&schemas);

@@ -3,6 +3,7 @@
 use super::airplane::Pose;
 use super::decide::Optimization;
 use super::events::{Event, EventKind};
+use super::scenario::RecordSection;
 use sidestep_kernel::ports::{ColumnSpec, ColumnType, RecordError, Recorder, TableSchema, Values};
 use sidestep_kernel::{Cycle, EntityId};
 
@@ -83,6 +84,7 @@ impl Table {
 /// Rows that wait for being recorded.
 #[derive(Debug, Default)]
 pub(super) struct Rows {
+    record: RecordSection,
     /// The tables that are recorded at all, in the order of their numbers.
     tables: Vec<Table>,
     poses: Poses,
@@ -100,9 +102,17 @@ struct Poses {
 }
 
 impl Rows {
-    /// From now on rows of these tables are kept.
-    pub(super) fn begin(&mut self, tables: impl Iterator<Item = Table>) {
-        self.tables = tables.collect();
+    /// Nothing yet; later what `record` asks for.
+    pub(super) fn new(record: RecordSection) -> Self {
+        Self { record, ..Self::default() }
+    }
+
+    /// Begins to keep rows.
+    pub(super) fn begin(&mut self) {
+        let record = &self.record;
+        let asked = [record.trajectories, record.events, record.optimizations];
+        let tables = Table::ALL.into_iter().zip(asked).filter(|(_, asked)| *asked);
+        self.tables = tables.map(|(table, _)| table).collect();
     }
 
     /// Whether rows must be recorded before more can be kept.

@@ -44,7 +44,7 @@ const MOVER_NEAR_M: f64 = 1.0;
 
 /// A chain in a cycle.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Turn<'a, const D: usize> {
+pub(super) struct Step<'a, const D: usize> {
     pub(super) spec: &'a ChainSpec<D>,
     pub(super) slot: Slot,
     pub(super) now: Cycle,
@@ -52,7 +52,7 @@ pub(super) struct Turn<'a, const D: usize> {
     pub(super) decision: Option<Decision>,
 }
 
-impl<const D: usize> Turn<'_, D> {
+impl<const D: usize> Step<'_, D> {
     /// An event of this chain.
     pub(super) fn event(&self, kind: EventKind, connector: usize, value: f64) -> Event {
         let (cycle, chain, connector) = (self.now, self.slot, connector as u32);
@@ -65,7 +65,7 @@ impl<const D: usize> ChainWorld<D> {
     pub(super) fn act(
         &self,
         body: &mut Body<D>,
-        turn: Turn<'_, D>,
+        turn: Step<'_, D>,
         claim: &Bounds<D>,
         scratch: &mut Scratch<D>,
     ) {
@@ -86,7 +86,7 @@ impl<const D: usize> ChainWorld<D> {
     }
 
     /// Parts that something comes too near to move away, whoever leads.
-    fn get_out_of_the_way(&self, body: &mut Body<D>, turn: Turn<'_, D>, scratch: &mut Scratch<D>) {
+    fn get_out_of_the_way(&self, body: &mut Body<D>, turn: Step<'_, D>, scratch: &mut Scratch<D>) {
         let Some(escaper) = &mut scratch.escaper else { return };
         let escaped = escaper.escape(
             &mut body.chain,
@@ -111,7 +111,7 @@ impl<const D: usize> ChainWorld<D> {
     fn keep_to_bounds(
         &self,
         body: &mut Body<D>,
-        turn: Turn<'_, D>,
+        turn: Step<'_, D>,
         claim: &Bounds<D>,
         scratch: &mut Scratch<D>,
     ) {
@@ -134,7 +134,7 @@ impl<const D: usize> ChainWorld<D> {
     }
 
     /// A leader on wheels is where its connector is, wherever that was moved to.
-    fn take_leader_along(&self, body: &mut Body<D>, turn: Turn<'_, D>) {
+    fn take_leader_along(&self, body: &mut Body<D>, turn: Step<'_, D>) {
         let agent = turn.spec.tasks.get(body.driving.task as usize).map(|task| task.agent);
         if let (Some(leader), Some(agent)) = (&mut body.driving.leader, agent) {
             leader.pose.at = plane_point(body.chain.points()[agent]);
@@ -142,7 +142,7 @@ impl<const D: usize> ChainWorld<D> {
     }
 
     /// The present task, for one cycle.
-    fn drive(&self, body: &mut Body<D>, turn: Turn<'_, D>, scratch: &mut Scratch<D>) {
+    fn drive(&self, body: &mut Body<D>, turn: Step<'_, D>, scratch: &mut Scratch<D>) {
         let Some(task) = turn.spec.tasks.get(body.driving.task as usize) else { return };
         let is_late = self.starts_s(body.driving.cycles + 1) >= task.lasts_s;
         body.driving.cycles += 1;
@@ -164,7 +164,7 @@ impl<const D: usize> ChainWorld<D> {
         &self,
         body: &mut Body<D>,
         task: &Task<D>,
-        turn: Turn<'_, D>,
+        turn: Step<'_, D>,
         scratch: &mut Scratch<D>,
     ) -> Wish<D> {
         let at = body.chain.points()[task.agent];
@@ -247,7 +247,7 @@ impl<const D: usize> ChainWorld<D> {
         &self,
         body: &mut Body<D>,
         (task, pose): (&Task<D>, Pose),
-        turn: Turn<'_, D>,
+        turn: Step<'_, D>,
         scratch: &mut Scratch<D>,
     ) {
         let Driver::Navigate(navigator) = &task.driver else { return };
@@ -262,7 +262,7 @@ impl<const D: usize> ChainWorld<D> {
         &self,
         body: &mut Body<D>,
         (task, to): (&Task<D>, Point<D>),
-        turn: Turn<'_, D>,
+        turn: Step<'_, D>,
         scratch: &mut Scratch<D>,
     ) -> Went {
         let at = body.chain.points()[task.agent];
@@ -323,7 +323,7 @@ impl<const D: usize> ChainWorld<D> {
         &self,
         body: &mut Body<D>,
         (task, climbed, way): (&Task<D>, &Climbed<D>, Point<D>),
-        turn: Turn<'_, D>,
+        turn: Step<'_, D>,
         scratch: &mut Scratch<D>,
     ) -> Went {
         body.tally.rungs.count(climbed);
@@ -374,7 +374,7 @@ impl<const D: usize> ChainWorld<D> {
     }
 
     /// Who wanders and is stuck goes on in any direction.
-    fn look_elsewhere(&self, body: &mut Body<D>, task: &Task<D>, turn: Turn<'_, D>) {
+    fn look_elsewhere(&self, body: &mut Body<D>, task: &Task<D>, turn: Step<'_, D>) {
         if matches!(task.driver, Driver::Wander(_)) {
             let draws = &mut self.streams.draws(turn.slot, turn.now, purpose::TURN_AWAY);
             let any: Point<D> = std::array::from_fn(|_| normal(draws));
@@ -393,7 +393,7 @@ impl<const D: usize> ChainWorld<D> {
     fn vetoed(
         &self,
         body: &mut Body<D>,
-        turn: Turn<'_, D>,
+        turn: Step<'_, D>,
         veto: &Veto<D>,
         scratch: &mut Scratch<D>,
     ) {
@@ -415,7 +415,7 @@ impl<const D: usize> ChainWorld<D> {
         &self,
         body: &mut Body<D>,
         task: &Task<D>,
-        turn: Turn<'_, D>,
+        turn: Step<'_, D>,
         scratch: &mut Scratch<D>,
     ) {
         let tried = body.driving.idle.max(body.driving.late);
@@ -450,7 +450,7 @@ impl<const D: usize> ChainWorld<D> {
     fn next_task(
         &self,
         body: &mut Body<D>,
-        turn: Turn<'_, D>,
+        turn: Step<'_, D>,
         how: EventKind,
         scratch: &mut Scratch<D>,
     ) {

@@ -1,7 +1,7 @@
 //! What happens to chains: parts that fail, and chains that break and are joined again (slides R8,
 //! R10, F3).
 
-use super::act::Turn;
+use super::act::Step;
 use super::driver::towards;
 use super::events::EventKind;
 use super::geometry::{Point, add, distance};
@@ -16,7 +16,7 @@ const THROWS: usize = 100;
 
 impl<const D: usize> ChainWorld<D> {
     /// What happens to a chain at the begin of a cycle.
-    pub(super) fn change(&self, body: &mut Body<D>, turn: Turn<'_, D>, scratch: &mut Scratch<D>) {
+    pub(super) fn change(&self, body: &mut Body<D>, turn: Step<'_, D>, scratch: &mut Scratch<D>) {
         for change in turn.spec.changes.iter().filter(|change| change.cycle == turn.now) {
             change.constrain(&mut body.chain);
             match &change.what {
@@ -45,7 +45,7 @@ impl<const D: usize> ChainWorld<D> {
     fn scatter(
         &self,
         body: &mut Body<D>,
-        turn: Turn<'_, D>,
+        turn: Step<'_, D>,
         (connectors, by_m): (&RangeInclusive<usize>, f64),
         scratch: &Scratch<D>,
     ) {
@@ -74,7 +74,7 @@ impl<const D: usize> ChainWorld<D> {
     fn begin_reform(
         &self,
         body: &mut Body<D>,
-        turn: Turn<'_, D>,
+        turn: Step<'_, D>,
         (may_come, speed_m_s): (MayCome, f64),
         scratch: &mut Scratch<D>,
     ) {
@@ -116,7 +116,7 @@ impl<const D: usize> ChainWorld<D> {
     pub(super) fn come_together(
         &self,
         body: &mut Body<D>,
-        turn: Turn<'_, D>,
+        turn: Step<'_, D>,
         scratch: &mut Scratch<D>,
     ) {
         let Some(scattered) = body.scattered.as_ref().filter(|s| !s.goals_m.is_empty()) else {

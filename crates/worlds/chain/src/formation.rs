@@ -1,7 +1,7 @@
 //! Robots on wheels that keep to the connectors of their chain: where the swarm's followers meet
 //! this world (slides E2, K5 to K7).
 
-use super::act::Turn;
+use super::act::Step;
 use super::events::EventKind;
 use super::geometry::{Point, distance, scaled, sub};
 use super::navigate::{Solid, in_plane, plane_point};
@@ -49,7 +49,7 @@ impl<const D: usize> Body<D> {
 impl<const D: usize> ChainWorld<D> {
     /// Moves the robots of a swarm after their connectors. All perceive each other as they were
     /// before.
-    pub(super) fn follow(&self, body: &mut Body<D>, turn: Turn<'_, D>, scratch: &mut Scratch<D>) {
+    pub(super) fn follow(&self, body: &mut Body<D>, turn: Step<'_, D>, scratch: &mut Scratch<D>) {
         let Some(Robots { follower, .. }) = &turn.spec.robots else { return };
         let agent = turn.spec.tasks.get(body.driving.task as usize).map(|task| task.agent);
         let mut others = std::mem::take(&mut scratch.seen);
@@ -66,7 +66,7 @@ impl<const D: usize> ChainWorld<D> {
     }
 
     /// What part of its speed a leader may go for the sake of the latest robot.
-    pub(super) fn pace(&self, body: &Body<D>, turn: Turn<'_, D>) -> f64 {
+    pub(super) fn pace(&self, body: &Body<D>, turn: Step<'_, D>) -> f64 {
         let Some(robots) = &turn.spec.robots else { return 1.0 };
         let lag_m = |(robot, at): (&Robot, &Point<D>)| distance(robot.pose.at, plane_point(*at));
         let lags_m = body.robots.iter().zip(body.chain.points()).map(lag_m);
@@ -84,7 +84,7 @@ impl<const D: usize> ChainWorld<D> {
         &self,
         body: &mut Body<D>,
         (follower, k): (&Follower, usize),
-        (turn, others): (Turn<'_, D>, &[Seen]),
+        (turn, others): (Step<'_, D>, &[Seen]),
         scratch: &mut Scratch<D>,
     ) {
         let Some(solid) = in_plane(scratch.solid()) else { return };

@@ -1,6 +1,6 @@
 //! What is measured of a chain at the end of each of its cycles.
 
-use super::act::Turn;
+use super::act::Step;
 use super::chain::Chain;
 use super::events::EventKind;
 use super::geometry::{Bounds, distance};
@@ -27,7 +27,7 @@ impl Tally {
 
 impl<const D: usize> ChainWorld<D> {
     /// Looks at a chain as it is after its cycle.
-    pub(super) fn measure(&self, body: &mut Body<D>, turn: Turn<'_, D>, scratch: &mut Scratch<D>) {
+    pub(super) fn measure(&self, body: &mut Body<D>, turn: Step<'_, D>, scratch: &mut Scratch<D>) {
         let (chain, tally) = (&body.chain, &mut body.tally);
         tally.steps += 1;
         let ways_m = scratch.before.iter().zip(chain.points()).map(|(a, b)| distance(*a, *b));

@@ -1,7 +1,7 @@
 //! An initiator on wheels that finds its way with a laser: where the swarm's leader meets this
 //! world (slides N1 to N6).
 
-use super::act::Turn;
+use super::act::Step;
 use super::driver::{Driver, Task};
 use super::geometry::{Point, distance, unit};
 use super::obstacle::Obstacles;
@@ -162,7 +162,7 @@ impl<const D: usize> ChainWorld<D> {
         body: &mut Body<D>,
         task: &Task<D>,
         navigator: &Navigator,
-        turn: Turn<'_, D>,
+        turn: Step<'_, D>,
     ) -> Option<Pose> {
         let decision = turn.decision?;
         let mut leader = body.driving.leader.unwrap_or_else(|| leader_state(body, task));
@@ -199,7 +199,7 @@ impl<const D: usize> ChainWorld<D> {
         body: &mut Body<D>,
         task: &Task<D>,
         navigator: &Navigator,
-        turn: Turn<'_, D>,
+        turn: Step<'_, D>,
     ) {
         let (Some(leader), Some(decision)) = (body.driving.leader, turn.decision) else { return };
         let wheels = navigator.leader.when_blocked(decision.wheels);

@@ -1,8 +1,11 @@
 //! What a run records: tables, and their rows until they are recorded.
 
 use super::events::{Event, EventKind};
-use super::geometry::Point;
+use super::geometry::{Core, Point};
+use super::state::ChainState;
+use super::swarm::drive::Pose;
 use super::veto::Reason;
+use super::world::ChainWorld;
 use sidestep_kernel::ports::{ColumnSpec, ColumnType, RecordError, Recorder, TableSchema, Values};
 use sidestep_kernel::{Cycle, EntityId};
 
@@ -96,6 +99,8 @@ fn reasons() -> Vec<String> {
 /// Rows that wait for being recorded.
 #[derive(Debug, Default)]
 pub(super) struct Rows {
+    /// Every how many cycles places are kept, and the tables that will be recorded.
+    asked: (Cycle, Vec<Table>),
     dimensions: usize,
     /// The tables that are recorded at all, in the order of their numbers.
     tables: Vec<Table>,
@@ -134,10 +139,45 @@ impl Places {
 }
 
 impl Rows {
-    /// From now on rows of these tables are kept.
-    pub(super) fn begin(&mut self, dimensions: usize, tables: impl Iterator<Item = Table>) {
+    /// Nothing yet; later rows of these tables, of places every so many cycles.
+    pub(super) fn new(asked: (Cycle, Vec<Table>)) -> Self {
+        Self { asked, ..Self::default() }
+    }
+
+    /// Begins to keep rows.
+    pub(super) fn begin(&mut self, dimensions: usize) {
         self.dimensions = dimensions;
-        self.tables = tables.collect();
+        self.tables = self.asked.1.clone();
+    }
+
+    /// Keeps where everything is at the start of cycle `now`.
+    pub(super) fn places<const D: usize>(
+        &mut self,
+        world: &ChainWorld<D>,
+        state: &ChainState<D>,
+        now: Cycle,
+    ) {
+        if self.tables.is_empty() || !now.is_multiple_of(self.asked.0) {
+            return;
+        }
+        if self.keeps(Table::Trajectories) {
+            for slot in 0..state.len() {
+                self.connectors(now, slot as EntityId, state.body(slot).chain.points());
+            }
+        }
+        if self.keeps(Table::Robots) {
+            for slot in 0..state.len() {
+                for (k, robot) in (0..).zip(&state.body(slot).robots) {
+                    let Pose { at: [x, y], heading_rad } = robot.pose;
+                    self.robot(now, slot as EntityId, k, [x, y, heading_rad]);
+                }
+            }
+        }
+        if self.keeps(Table::Movers) {
+            for obstacle in world.movers.at(world.starts_s(now)) {
+                self.mover(now, obstacle.id, middle(&obstacle.core));
+            }
+        }
     }
 
     /// Whether rows must be recorded before more can be kept.
@@ -146,26 +186,21 @@ impl Rows {
         places.iter().any(|p| p.cycle.len() >= MAX_ROWS) || self.events.len() >= MAX_ROWS
     }
 
-    pub(super) fn keeps(&self, table: Table) -> bool {
+    fn keeps(&self, table: Table) -> bool {
         self.tables.contains(&table)
     }
 
-    pub(super) fn connectors<const D: usize>(
-        &mut self,
-        cycle: Cycle,
-        chain: EntityId,
-        points: &[Point<D>],
-    ) {
+    fn connectors<const D: usize>(&mut self, cycle: Cycle, chain: EntityId, points: &[Point<D>]) {
         for (k, at) in (0..).zip(points) {
             self.trajectories.push(cycle, [chain, k], at);
         }
     }
 
-    pub(super) fn robot(&mut self, cycle: Cycle, chain: EntityId, robot: u32, pose: [f64; 3]) {
+    fn robot(&mut self, cycle: Cycle, chain: EntityId, robot: u32, pose: [f64; 3]) {
         self.robots.push(cycle, [chain, robot], &pose);
     }
 
-    pub(super) fn mover<const D: usize>(&mut self, cycle: Cycle, id: u32, at: Point<D>) {
+    fn mover<const D: usize>(&mut self, cycle: Cycle, id: u32, at: Point<D>) {
         self.movers.push(cycle, [0, id], &at);
     }
 
@@ -194,6 +229,15 @@ impl Rows {
             Table::Movers => self.movers.take(1..2, self.dimensions),
             Table::Events => events(std::mem::take(&mut self.events)),
         }
+    }
+}
+
+/// A point of a core that moves with it.
+fn middle<const D: usize>(core: &Core<D>) -> [f64; D] {
+    match core {
+        Core::Point(c) => *c,
+        Core::Segment([a, b]) => std::array::from_fn(|i| 0.5 * (a[i] + b[i])),
+        Core::Cuboid(cuboid) => cuboid.center,
     }
 }
 

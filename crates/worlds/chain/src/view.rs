@@ -11,7 +11,7 @@ use super::world::{ChainSpec, ChainWorld, OTHER_CHAIN, Scratch};
 use sidestep_kernel::view::{
     Body, Condition, Entry, Kind, Level, Place, Pose, Scan, Scenery, Shape,
 };
-use sidestep_kernel::{Cycle, EntityId, Slot, World};
+use sidestep_kernel::{Cycle, EntityId, Phases, Slot};
 use std::ops::RangeInclusive;
 
 /// Connectors without a body are drawn so large, compared with the longest rod.

@@ -1,6 +1,6 @@
 //! A compiled world of chains: everything that never changes during a run.
 
-use super::act::Turn;
+use super::act::Step;
 use super::arm::Arm;
 use super::chain::{Chain, Mobility};
 use super::driver::{Driver, Driving, Task};
@@ -19,11 +19,11 @@ use super::script::Motion;
 use super::state::{Body, ChainState};
 use super::swarm::drive::Pose;
 use super::swarm::laser::{Body as Seen, Scan};
-use cpu_time::ThreadTime;
 use sidestep_kernel::conflict::Groups;
 use sidestep_kernel::math::atan2;
 use sidestep_kernel::stream::Streams;
-use sidestep_kernel::{Cycle, InputError, Slot, World};
+use sidestep_kernel::world::Decides;
+use sidestep_kernel::{Cycle, InputError, Phases, Slot, Turn};
 use std::ops::RangeInclusive;
 use std::sync::Arc;
 
@@ -252,7 +252,7 @@ impl<const D: usize> ChainWorld<D> {
     }
 
     /// Whether all tasks of all chains are done and everything is whole.
-    pub(super) fn is_over(&self, state: &ChainState<D>) -> bool {
+    pub(super) fn all_is_done(&self, state: &ChainState<D>) -> bool {
         self.chains.iter().enumerate().all(|(slot, spec)| {
             let body = state.body(slot);
             let is_done = body.driving.task as usize >= spec.tasks.len();
@@ -286,8 +286,6 @@ pub struct Scratch<const D: usize> {
     pub(super) escaped: Vec<Point<D>>,
     /// What happened.
     pub(super) events: Vec<Event>,
-    /// Processor time spent: told beside the results, never part of them.
-    pub(super) cpu_ns: u64,
 }
 
 impl<const D: usize> Scratch<D> {
@@ -352,7 +350,9 @@ pub(super) fn push_parts<const D: usize>(
     parts.extend(rods.map(|(ends, rod)| Obstacle::capsule(id, [ends[0], ends[1]], rod.radius_m)));
 }
 
-impl<const D: usize> World for ChainWorld<D> {
+impl<const D: usize> Phases for ChainWorld<D> {
+    const DECIDES: Decides = Decides::Together;
+
     type State = ChainState<D>;
     type Scratch = Scratch<D>;
 
@@ -371,7 +371,6 @@ impl<const D: usize> World for ChainWorld<D> {
             robots_gap_m: f64::INFINITY,
             escaped: Vec::new(),
             events: Vec::new(),
-            cpu_ns: 0,
         }
     }
 
@@ -379,31 +378,18 @@ impl<const D: usize> World for ChainWorld<D> {
         state.len()
     }
 
-    fn perceive_and_decide(
-        &self,
-        state: &ChainState<D>,
-        now: Cycle,
-        bodies: std::ops::Range<usize>,
-        scratch: &mut Scratch<D>,
-    ) {
-        let began = ThreadTime::now();
+    fn claim(turn: &mut Turn<'_, Self>, bodies: std::ops::Range<usize>) {
+        let &mut Turn { world, state, now, ref mut scratch, .. } = turn;
         for slot in bodies {
-            let claim = self.reach(&self.chains[slot], &state.body(slot), now);
+            let claim = world.reach(&world.chains[slot], &state.body(slot), now);
             state.set_claim(slot, claim);
-            let decision = self.look_around(state, (slot as Slot, now), scratch);
+            let decision = world.look_around(state, (slot as Slot, now), scratch);
             state.set_decision(slot, decision);
         }
-        scratch.cpu_ns += began.elapsed().as_nanos() as u64;
     }
 
-    fn find_conflicts(
-        &self,
-        state: &ChainState<D>,
-        _: Cycle,
-        bodies: std::ops::Range<usize>,
-        groups: &Groups,
-        _: &mut Scratch<D>,
-    ) {
+    fn join(turn: &mut Turn<'_, Self>, bodies: std::ops::Range<usize>, groups: &Groups) {
+        let state = turn.state;
         for slot in bodies {
             let claim = state.claim(slot);
             for other in (0..slot).filter(|&other| state.claim(other).meets(&claim)) {
@@ -412,24 +398,17 @@ impl<const D: usize> World for ChainWorld<D> {
         }
     }
 
-    fn react(
-        &self,
-        state: &ChainState<D>,
-        now: Cycle,
-        group: &mut [Slot],
-        scratch: &mut Scratch<D>,
-    ) {
-        let began = ThreadTime::now();
+    fn act(turn: &mut Turn<'_, Self>, group: &mut [Slot]) {
+        let &mut Turn { world, state, now, ref mut scratch, .. } = turn;
         group.sort_unstable();
         for &slot in &*group {
             let claim = state.claim(slot as usize);
             let meets = |s: &Slot| *s != slot && state.claim(*s as usize).meets(&claim);
-            scratch.gather(self, state, now + 1, group.iter().copied().filter(meets));
+            scratch.gather(world, state, now + 1, group.iter().copied().filter(meets));
             let decision = state.decision(slot as usize);
-            let turn = Turn { spec: &self.chains[slot as usize], slot, now, decision };
+            let step = Step { spec: &world.chains[slot as usize], slot, now, decision };
             let mut body = state.body_mut(slot as usize);
-            self.act(&mut body, turn, &claim, scratch);
+            world.act(&mut body, step, &claim, scratch);
         }
-        scratch.cpu_ns += began.elapsed().as_nanos() as u64;
     }
 }

@@ -16,6 +16,7 @@ pub mod bundle;
 pub mod decide;
 pub mod effector;
 pub mod exact;
+mod kind;
 pub mod learn;
 pub mod metrics;
 mod perceive;
@@ -23,19 +24,24 @@ pub mod ray;
 mod react;
 pub mod resolve;
 mod rounds;
+pub mod rows;
+pub mod run;
 pub mod scenario;
 pub mod sensor;
-pub mod simulation;
 pub mod state;
 mod view;
+mod words;
 pub mod world;
 
 use effector::Side;
+pub use kind::Robots;
 use resolve::ConflictPolicy;
+pub use run::{RobotsRun, robots_run};
 use scenario::StorageOrder;
 use sensor::Reading;
 use sidestep_kernel::conflict::Groups;
-use sidestep_kernel::{Cycle, EntityId, Slot, World};
+use sidestep_kernel::world::Auction;
+use sidestep_kernel::{Cycle, EntityId, Phases, Slot, Turn};
 use state::RobotsState;
 use std::ops::Range;
 pub use world::RobotsWorld;
@@ -117,7 +123,7 @@ pub struct Scratch {
     motion_samples: Vec<MotionSample>,
 }
 
-impl World for RobotsWorld {
+impl Phases for RobotsWorld {
     type State = RobotsState;
     type Scratch = Scratch;
 
@@ -136,74 +142,58 @@ impl World for RobotsWorld {
     }
 
     #[inline]
-    fn perceive_and_decide(
-        &self,
-        state: &RobotsState,
-        now: Cycle,
-        bodies: Range<usize>,
-        scratch: &mut Scratch,
-    ) {
+    fn claim(turn: &mut Turn<'_, Self>, bodies: Range<usize>) {
         for slot in bodies {
-            self.perceive_one(state, now, slot as Slot, scratch);
+            turn.world.perceive_one(turn.state, turn.now, slot as Slot, turn.scratch);
         }
     }
 
     #[inline]
-    fn find_conflicts(
-        &self,
-        state: &RobotsState,
-        _: Cycle,
-        bodies: Range<usize>,
-        groups: &Groups,
-        _: &mut Scratch,
-    ) {
+    fn join(turn: &mut Turn<'_, Self>, bodies: Range<usize>, groups: &Groups) {
         for slot in bodies {
-            self.join_one(state, slot as Slot, groups);
+            turn.world.join_one(turn.state, slot as Slot, groups);
         }
     }
 
     #[inline]
-    fn react(&self, state: &RobotsState, now: Cycle, group: &mut [Slot], scratch: &mut Scratch) {
+    fn act(turn: &mut Turn<'_, Self>, group: &mut [Slot]) {
+        let &mut Turn { world, state, now, ref mut scratch, .. } = turn;
         if let [alone] = *group {
-            return self.act_drawn(state, now, alone, scratch);
+            return world.act_drawn(state, now, alone, scratch);
         }
-        self.order(state, now, group, scratch);
+        world.order(state, now, group, scratch);
         let order = std::mem::take(&mut scratch.order);
         for place in &order {
-            self.act(state, now, place.slot, place.word, scratch);
+            world.act(state, now, place.slot, place.word, scratch);
         }
         scratch.order = order;
     }
 
-    fn reacts_in_rounds(&self) -> bool {
-        self.policy == ConflictPolicy::Rounds
+    fn auction(&self) -> Option<&dyn Auction<Self>> {
+        (self.policy == ConflictPolicy::Rounds).then_some(self)
+    }
+}
+
+impl Auction<Self> for RobotsWorld {
+    fn bid(&self, turn: &mut Turn<'_, Self>, body: Slot) {
+        self.bid_one(turn.state, turn.now, body, turn.scratch);
     }
 
-    fn bid(&self, state: &RobotsState, now: Cycle, body: Slot, scratch: &mut Scratch) {
-        self.bid_one(state, now, body, scratch);
-    }
-
-    fn act_on_bids(
-        &self,
-        state: &RobotsState,
-        now: Cycle,
-        pending: &mut Vec<Slot>,
-        scratch: &mut Scratch,
-    ) {
+    fn act_on_bids(&self, turn: &mut Turn<'_, Self>, pending: &mut Vec<Slot>) {
         pending.clear();
-        for k in 0..scratch.bids.len() {
-            let bid = scratch.bids[k];
-            if self.is_highest(state, bid) {
-                self.act(state, now, bid.slot, bid.word, scratch);
+        for k in 0..turn.scratch.bids.len() {
+            let bid = turn.scratch.bids[k];
+            if self.is_highest(turn.state, bid) {
+                self.act(turn.state, turn.now, bid.slot, bid.word, turn.scratch);
             } else {
                 pending.push(bid.slot);
             }
         }
     }
 
-    fn retract_bids(&self, state: &RobotsState, scratch: &mut Scratch) {
-        for bid in scratch.bids.drain(..) {
-            self.retract(state, bid);
+    fn retract_bids(&self, turn: &mut Turn<'_, Self>) {
+        for bid in turn.scratch.bids.drain(..) {
+            self.retract(turn.state, bid);
         }
     }
 }

@@ -1,6 +1,5 @@
 //! The airspace world as the command sees it.
 
-mod foreign;
 mod picture;
 
 pub(super) use foreign::{told_of, translated};

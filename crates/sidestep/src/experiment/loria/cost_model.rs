@@ -30,7 +30,7 @@ use crate::experiment::figure::Point as FigurePoint;
 use crate::experiment::{Figure, FigureKind, Series, Table};
 use crate::statistics::Interval;
 use crate::statistics::least_squares::Fit;
-use crate::worlds::robots::simulation::RobotsSimulation;
+use crate::worlds::robots::RobotsRun;
 use serde::Serialize;
 use sidestep_kernel::Simulation;
 use std::sync::Arc;
@@ -294,14 +294,14 @@ fn measure(load: &Load, robot_cycles: u64) -> Point {
     }
 }
 
-fn advance(run: &mut RobotsSimulation, cycles: u64) {
+fn advance(run: &mut RobotsRun, cycles: u64) {
     let mut done = 0;
     while done < cycles {
         done += run.advance(cycles - done);
     }
 }
 
-fn totals(run: &RobotsSimulation) -> Totals {
+fn totals(run: &RobotsRun) -> Totals {
     let times = run.phase_times();
     // A step enters a row of boxes and leaves one; bodies that move are square.
     let boxes = run.state().bodies.iter().map(|body| {
@@ -309,9 +309,9 @@ fn totals(run: &RobotsSimulation) -> Totals {
         f64::from(2 * body.moves.get()) * f64::from(side)
     });
     Totals {
-        first_ns: times.perceive_decide_ns as f64,
-        second_ns: (times.conflicts_ns + times.react_ns) as f64,
-        alone: run.robot_metrics().group_sizes.first().copied().unwrap_or(0) as f64,
+        first_ns: times.claim_ns as f64,
+        second_ns: (times.join_ns + times.act_ns) as f64,
+        alone: run.metrics().group_sizes.first().copied().unwrap_or(0) as f64,
         boxes: boxes.sum(),
     }
 }

@@ -3,7 +3,7 @@
 use super::Plan;
 use super::floor::Floor;
 use super::measure::{Variant, recorded};
-use crate::worlds::robots::simulation::RobotsSimulation;
+use crate::worlds::robots::RobotsRun;
 use crate::worlds::robots::world::Regime;
 use sidestep_kernel::Cycle;
 use std::sync::Arc;
@@ -13,7 +13,7 @@ pub struct Scene {
     /// What it shows.
     pub title: &'static str,
     /// The run at its end.
-    pub simulation: RobotsSimulation,
+    pub simulation: RobotsRun,
     /// The cycle at which the ways begin.
     pub from: Cycle,
     /// Of each robot, by entity id, its places by cycle.
@@ -46,7 +46,7 @@ fn scene(title: &'static str, variant: &Variant, cycles: Cycle) -> Scene {
     let from = cycles.saturating_sub(SEEN);
     let way = |id: u32| {
         let seen = &tracks[id as usize][from as usize..];
-        let now = simulation.snapshot().bodies[id as usize].at;
+        let now = simulation.saved().bodies[id as usize].at;
         let left = seen.iter().map(|&(col, row, heading)| ((col, row), u32::from(heading)));
         (id, left.chain([(now, 0)]).collect())
     };

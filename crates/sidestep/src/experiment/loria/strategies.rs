@@ -5,8 +5,8 @@ use super::performance::{loads, worker_counts};
 use super::timing::{Load, STRETCHES, arithmetic, race, seconds};
 use crate::experiment::farm::Progress;
 use crate::experiment::{Estimate, Figure, FigureKind, Series, Table};
+use crate::worlds::robots::RobotsRun;
 use crate::worlds::robots::baseline::{Baseline, Strategy, breach};
-use crate::worlds::robots::simulation::RobotsSimulation;
 use serde::Serialize;
 use sidestep_kernel::Simulation;
 use std::convert::Infallible;
@@ -54,7 +54,7 @@ const ARITHMETIC: &str = "arithmetic";
 
 /// What takes its turn: a run under one of the three strategies, or arithmetic.
 enum Run {
-    DoublePool(Box<RobotsSimulation>),
+    DoublePool(Box<RobotsRun>),
     Baseline(Box<Baseline>),
     Arithmetic,
 }
@@ -235,7 +235,7 @@ fn contestants(plan: &Plan, load: &Load) -> Vec<Contestant> {
 /// `None` for arithmetic.
 fn judge(load: &Load, run: &Run) -> Option<(f64, f64, bool, bool)> {
     let (metrics, snapshot, share) = match run {
-        Run::DoublePool(run) => (run.robot_metrics(), run.snapshot(), 0.0),
+        Run::DoublePool(run) => (run.metrics(), run.saved(), 0.0),
         Run::Baseline(run) => (run.metrics(), run.snapshot(), run.serial_share()),
         Run::Arithmetic => return None,
     };

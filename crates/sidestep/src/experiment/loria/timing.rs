@@ -4,9 +4,9 @@ use super::NewRecorder;
 use super::floor::Floor;
 use super::patrol::{Costly, burn};
 use crate::scenario::Source;
+use crate::worlds::robots::RobotsRun;
 use crate::worlds::robots::decide::Wander;
 use crate::worlds::robots::scenario::{Behaviours, Compiled, StorageOrder};
-use crate::worlds::robots::simulation::RobotsSimulation;
 use serde::Serialize;
 use sidestep_kernel::Simulation;
 use sidestep_kernel::ports::{Clock, RecordError, Recorder, SystemClock};
@@ -77,8 +77,8 @@ impl Load {
     }
 
     /// A run at its start.
-    pub fn simulation(&self, workers: usize) -> RobotsSimulation {
-        RobotsSimulation::from_compiled(self.compiled(), &self.source(), workers)
+    pub fn simulation(&self, workers: usize) -> RobotsRun {
+        self.compiled().start(&self.source(), workers)
     }
 }
 
@@ -130,7 +130,7 @@ pub fn arithmetic(workers: usize, robot_cycles: u64) -> f64 {
 
 /// A run, and where its rows go if it is recorded.
 pub struct Timed {
-    simulation: RobotsSimulation,
+    simulation: RobotsRun,
     recorder: Option<Box<dyn Recorder>>,
 }
 
@@ -174,7 +174,7 @@ impl Timed {
     }
 
     /// The run.
-    pub fn simulation(&self) -> &RobotsSimulation {
+    pub fn simulation(&self) -> &RobotsRun {
         &self.simulation
     }
 

@@ -5,8 +5,8 @@ use super::Plan;
 use super::runs::{DT_S, SPEED_M_S, Share, begun, finish, grid, head, least, mm, most};
 use crate::experiment::farm::Progress;
 use crate::experiment::{Estimate, Figure, FigureKind, Series, Table};
+use crate::worlds::chain::ChainRun;
 use crate::worlds::chain::metrics::Metrics;
-use crate::worlds::chain::simulation::ChainSimulation;
 use serde::Serialize;
 use sidestep_kernel::InputError;
 
@@ -87,10 +87,10 @@ fn ride(case: &Case, seed: u64, cycles: u64) -> Result<Ride, InputError> {
     let mut in_band = 0;
     finish(&mut run, |run| in_band += u64::from(is_in_band(run)));
     let way_m = run.state().body(0).tally.way_m;
-    Ok(Ride { metrics: run.chain_metrics(), way_m, in_band })
+    Ok(Ride { metrics: run.metrics(), way_m, in_band })
 }
 
-fn is_in_band(run: &ChainSimulation<2>) -> bool {
+fn is_in_band(run: &ChainRun<2>) -> bool {
     let leader = run.state().body(0).chain.points()[0];
     let apart_m = run.world().obstacles.clearance_m([leader; 2], 0.0, 1.0);
     (BAND_M[0]..=BAND_M[1]).contains(&apart_m)

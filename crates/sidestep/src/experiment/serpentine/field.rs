@@ -116,7 +116,7 @@ impl Fields {
         let run = |case: &Case, seed: u64| -> Result<Metrics, InputError> {
             let mut run = begun::<2>(case.text(seed, plan.field_cycles))?;
             finish(&mut run, |_| ());
-            Ok(run.chain_metrics())
+            Ok(run.metrics())
         };
         let all = grid((plan, plan.field_seeds), "open field", &cases, progress, run)?;
         Ok(Self { cells: cases.iter().zip(&all).map(|(case, runs)| cell(*case, runs)).collect() })

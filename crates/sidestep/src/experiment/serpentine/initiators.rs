@@ -159,7 +159,7 @@ fn told(_: &(), seed: u64) -> Result<bool, InputError> {
     );
     let mut run = begun::<2>(text)?;
     finish(&mut run, |_| ());
-    let metrics = run.chain_metrics();
+    let metrics = run.metrics();
     let by_it = metrics.given_up.iter().map(|given_up| {
         let what = &given_up.what;
         what.by == Some(failing as u32) && what.reason.as_deref() == Some(Reason::Failed.name())

@@ -95,7 +95,7 @@ impl Movers {
         let run = |case: &Case, seed: u64| -> Result<Metrics, InputError> {
             let mut run = begun::<2>(case.text(seed, plan.mover_cycles))?;
             finish(&mut run, |_| ());
-            Ok(run.chain_metrics())
+            Ok(run.metrics())
         };
         let all = grid((plan, plan.seeds), "discs that move", &cases, progress, run)?;
         Ok(Self { cells: cases.iter().zip(&all).map(|(case, runs)| cell(*case, runs)).collect() })

@@ -88,7 +88,7 @@ fn ride(case: &Case, seed: u64, cycles: u64) -> Result<Ride, InputError> {
             furthest = furthest.max(run.world().progress(0, &body));
         }
     });
-    let metrics = run.chain_metrics();
+    let metrics = run.metrics();
     Ok(Ride { progress: if metrics.done == 1 { 1.0 } else { furthest }, metrics })
 }
 

@@ -5,8 +5,8 @@ use crate::experiment::farm::{self, Progress};
 use crate::experiment::figure::Point as FigurePoint;
 use crate::scenario::Source;
 use crate::statistics::{Interval, clopper_pearson, percentile};
+use crate::worlds::chain::ChainRun;
 use crate::worlds::chain::scenario::Compiled;
-use crate::worlds::chain::simulation::ChainSimulation;
 use serde::Serialize;
 use sidestep_kernel::stream::{Draws, Purpose, Streams};
 use sidestep_kernel::{InputError, Seed, Simulation};
@@ -26,17 +26,14 @@ pub(super) fn head<const D: usize>(seed: u64, cycles: u64) -> String {
 }
 
 /// A run of a scenario at its start.
-pub(super) fn begun<const D: usize>(text: String) -> Result<ChainSimulation<D>, InputError> {
+pub(super) fn begun<const D: usize>(text: String) -> Result<ChainRun<D>, InputError> {
     let source = Source::new("a scenario of this experiment", text, "");
-    Ok(ChainSimulation::new(Compiled::new(&source)?, &source, 1))
+    Ok(Compiled::new(&source)?.start(&source, 1))
 }
 
 /// Runs to the end, and tells `look` of every cycle.
-pub(super) fn finish<const D: usize>(
-    run: &mut ChainSimulation<D>,
-    mut look: impl FnMut(&ChainSimulation<D>),
-) {
-    while run.cycle() < run.compiled().cycles && !run.is_over() {
+pub(super) fn finish<const D: usize>(run: &mut ChainRun<D>, mut look: impl FnMut(&ChainRun<D>)) {
+    while run.cycle() < run.plan().cycles && !run.is_over() {
         run.advance(1);
         look(run);
     }

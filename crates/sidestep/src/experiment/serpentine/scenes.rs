@@ -4,9 +4,9 @@
 use super::Plan;
 use super::runs::begun;
 use super::{broken, corridor, snake};
+use crate::worlds::chain::ChainRun;
 use crate::worlds::chain::Obstacle;
 use crate::worlds::chain::geometry::{Point, distance};
-use crate::worlds::chain::simulation::ChainSimulation;
 use sidestep_kernel::{InputError, Simulation};
 
 /// A picture in the plane or in space.
@@ -62,7 +62,7 @@ pub(super) fn all(plan: &Plan) -> Result<Vec<Scene>, InputError> {
 fn traced<const D: usize>(
     text: String,
     cycles: u64,
-) -> Result<(ChainSimulation<D>, Vec<Vec<Point<D>>>), InputError> {
+) -> Result<(ChainRun<D>, Vec<Vec<Point<D>>>), InputError> {
     let mut run = begun::<D>(text)?;
     let mut trails = vec![Vec::new(); 2];
     while run.cycle() < cycles && !run.is_over() {
@@ -77,7 +77,7 @@ fn traced<const D: usize>(
     Ok((run, trails))
 }
 
-fn strand<const D: usize>(run: &ChainSimulation<D>) -> Strand<D> {
+fn strand<const D: usize>(run: &ChainRun<D>) -> Strand<D> {
     let body = run.state().body(0);
     let chain = &body.chain;
     Strand {

@@ -89,7 +89,7 @@ impl Snakes {
         let run = |case: &Case, seed: u64| -> Result<Metrics, InputError> {
             let mut run = begun::<3>(case.text(seed, plan.snake_cycles))?;
             finish(&mut run, |_| ());
-            Ok(run.chain_metrics())
+            Ok(run.metrics())
         };
         let all = grid((plan, plan.snake_seeds), "snake in space", &cases, progress, run)?;
         Ok(Self { cells: cases.iter().zip(&all).map(|(case, runs)| cell(*case, runs)).collect() })

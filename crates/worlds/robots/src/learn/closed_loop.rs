@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use crate::learn::sensor::{self, SensorOptions};
 use crate::learn::{Estimate, EstimateOptions, effector};
-use crate::simulation::RobotsSimulation;
+use crate::robots_run;
 use sidestep_import::table::CsvTable;
 use sidestep_kernel::Simulation;
 use sidestep_kernel::ports::recorder::{ColumnSpec, MemoryRecorder, TableSchema, Values};
@@ -61,7 +61,7 @@ effector = "wheels"
 
 /// Runs the scenario and writes the table `name` that it recorded as CSV.
 fn recorded(name: &str) -> CsvTable {
-    let mut run = RobotsSimulation::new(&scenario(), 2).unwrap();
+    let mut run = robots_run(&scenario(), 2).unwrap();
     run.begin_recording();
     let schemas = run.schemas();
     let mut recorder = MemoryRecorder::new(&schemas);

@@ -1,12 +1,12 @@
 //! Traffic in other programs' files, taken as scenarios.
 
-use super::Told;
-use crate::console::grouped;
-use serde_json::json;
-use sidestep::import::bluesky::{self, ScnFile};
-use sidestep::import::traffic::{self, RecordedTraffic};
-use sidestep::kernel::InputError;
-use sidestep::worlds::airspace::traffic::{from_bluesky, from_tracks, has_length, not_flown};
+use super::traffic::{from_bluesky, from_tracks, has_length, not_flown};
+use serde_json::{Value, json};
+use sidestep_import::bluesky::{self, ScnFile};
+use sidestep_import::traffic::{self, RecordedTraffic};
+use sidestep_kernel::InputError;
+use sidestep_kernel::words::{Lines, grouped};
+use sidestep_scenario::Foreign;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
@@ -27,31 +27,31 @@ fn form(file: &Path) -> Form {
     }
 }
 
-/// See [`crate::worlds::translated`].
-pub(crate) fn translated(file: &Path) -> Result<Option<String>, InputError> {
+/// Returns the scenario that a file of another form stands for, and what else is in it.
+///
+/// # Errors
+/// When it cannot be read, or has no airplane.
+pub(super) fn translate(file: &Path) -> Result<Option<Foreign>, InputError> {
     let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let text = match form(file) {
+    let (scenario, (json, lines)) = match form(file) {
         Form::Other => return Ok(None),
-        Form::Bluesky => from_bluesky(&name, &bluesky::read(file)?),
-        Form::Tracks => from_tracks(&name, &traffic::read(file)?),
+        Form::Bluesky => {
+            let scn = bluesky::read(file)?;
+            (from_bluesky(&name, &scn), told_of_bluesky(&scn))
+        }
+        Form::Tracks => {
+            let tracks = traffic::read(file)?;
+            (from_tracks(&name, &tracks), told_of_tracks(&tracks))
+        }
     };
-    let nobody = || {
+    let scenario = scenario.ok_or_else(|| {
         let remedy = "give a file that creates aircraft at known places";
         InputError::new(file.display(), "no aircraft in it has a place", remedy)
-    };
-    text.map(Some).ok_or_else(nobody)
+    })?;
+    Ok(Some(Foreign { scenario, json, lines }))
 }
 
-/// See [`crate::worlds::told_of`].
-pub(crate) fn told_of(file: &Path) -> Result<Option<Told>, InputError> {
-    match form(file) {
-        Form::Bluesky => Ok(Some(told_of_bluesky(&bluesky::read(file)?))),
-        Form::Tracks => Ok(Some(told_of_tracks(&traffic::read(file)?))),
-        Form::Other => Ok(None),
-    }
-}
-
-fn told_of_bluesky(scn: &ScnFile) -> Told {
+fn told_of_bluesky(scn: &ScnFile) -> (Value, Lines) {
     let words = |errors: &[InputError]| errors.iter().map(ToString::to_string).collect::<Vec<_>>();
     let json = json!({
         "command_lines": scn.command_lines,
@@ -74,7 +74,7 @@ fn told_of_bluesky(scn: &ScnFile) -> Told {
     lines.extend(first_named("unknown way-points", &unresolved_names(scn)));
     lines.extend(listed("unparsed", &scn.unparsed));
     lines.extend(listed("not carried out", &scn.refused));
-    Told { json, lines }
+    (json, lines)
 }
 
 /// Aircraft that begin where only a navigation database knows, with the names of these places.
@@ -91,7 +91,7 @@ fn unresolved_names(scn: &ScnFile) -> Vec<String> {
     names.into_iter().cloned().collect()
 }
 
-fn told_of_tracks(recorded: &RecordedTraffic) -> Told {
+fn told_of_tracks(recorded: &RecordedTraffic) -> (Value, Lines) {
     let (rows, repeated) = (recorded.rows as u64, recorded.repeated_rows as u64);
     let single = recorded.tracks.iter().filter(|track| !has_length(track)).count() as u64;
     let json = json!({
@@ -109,7 +109,7 @@ fn told_of_tracks(recorded: &RecordedTraffic) -> Told {
     };
     left_out("repeated rows", repeated);
     left_out("aircraft of one row", single);
-    Told { json, lines }
+    (json, lines)
 }
 
 /// Names with their counts on one line; no line for none.
