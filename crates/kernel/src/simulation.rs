@@ -4,7 +4,7 @@ use crate::cycle::PhaseTimes;
 use crate::digest::Digest;
 use crate::ports::{RecordError, Recorder, TableSchema};
 use crate::units::Cycle;
-use crate::view::{Frame, Look, Scenery};
+use crate::view::{Frame, Look, PlaceRows, Scenery};
 
 /// A world and a state that advances.
 pub trait Simulation: Send {
@@ -51,6 +51,11 @@ pub trait Simulation: Send {
     /// How things are now, and what happened since the last call (nothing without
     /// [`Simulation::watch`]). It changes no result.
     fn frame(&mut self, look: Look) -> Frame;
+
+    /// Which recorded rows say where bodies were.
+    fn place_rows(&self) -> Vec<PlaceRows> {
+        Vec::new()
+    }
 
     /// What the run measured so far, as JSON (`metrics` of the summary).
     fn metrics(&self) -> serde_json::Value;

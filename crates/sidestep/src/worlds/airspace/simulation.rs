@@ -13,7 +13,7 @@ use sidestep_kernel::checkpoint::{self, CheckpointError, Header};
 use sidestep_kernel::cycle::PhaseTimes;
 use sidestep_kernel::engine::Engine;
 use sidestep_kernel::ports::{RecordError, Recorder, SystemClock, TableSchema};
-use sidestep_kernel::view::{Frame, Log, Look, Scenery};
+use sidestep_kernel::view::{Frame, Log, Look, PlaceRows, Scenery};
 use sidestep_kernel::{Cycle, Digest, InputError, Simulation};
 use std::sync::Arc;
 
@@ -236,6 +236,10 @@ impl Simulation for AirspaceSimulation {
             log: events.iter().map(entry).collect(),
             log_left_out,
         }
+    }
+
+    fn place_rows(&self) -> Vec<PlaceRows> {
+        AirspaceWorld::place_rows()
     }
 
     fn metrics(&self) -> serde_json::Value {

@@ -18,7 +18,7 @@ use sidestep_kernel::checkpoint::{self, CheckpointError, Header};
 use sidestep_kernel::cycle::PhaseTimes;
 use sidestep_kernel::engine::Engine;
 use sidestep_kernel::ports::{RecordError, Recorder, SystemClock, TableSchema};
-use sidestep_kernel::view::{Frame, Log, Look, Scenery};
+use sidestep_kernel::view::{Frame, Log, Look, PlaceRows, Scenery};
 use sidestep_kernel::{Cycle, Digest, EntityId, Simulation};
 use std::sync::Arc;
 
@@ -281,6 +281,10 @@ impl<const D: usize> Simulation for ChainSimulation<D> {
             log: events.iter().map(entry).collect(),
             log_left_out,
         }
+    }
+
+    fn place_rows(&self) -> Vec<PlaceRows> {
+        ChainWorld::<D>::place_rows(self.compiled.record.every)
     }
 
     fn metrics(&self) -> serde_json::Value {

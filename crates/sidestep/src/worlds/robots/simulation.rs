@@ -15,7 +15,7 @@ use sidestep_kernel::engine::Engine;
 use sidestep_kernel::ports::{
     ColumnSpec, ColumnType, RecordError, Recorder, SystemClock, TableSchema, Values,
 };
-use sidestep_kernel::view::{Frame, Log, Look, Scenery};
+use sidestep_kernel::view::{Frame, Log, Look, PlaceRows, Scenery};
 use sidestep_kernel::{Cycle, Digest, EntityId, InputError, Simulation};
 use std::sync::Arc;
 
@@ -551,6 +551,10 @@ impl Simulation for RobotsSimulation {
             log: events.iter().map(|event| world.entry(event)).collect(),
             log_left_out,
         }
+    }
+
+    fn place_rows(&self) -> Vec<PlaceRows> {
+        self.compiled.world.place_rows()
     }
 
     fn metrics(&self) -> serde_json::Value {

@@ -14,6 +14,8 @@ use std::f64::consts::FRAC_PI_2;
 
 /// What a cycle counts as where seconds are asked for: the model itself knows no other time.
 pub(super) const CYCLE_S: f64 = 1.0;
+/// Longer ways cover a floor.
+const WORTH_CYCLES: Cycle = 400;
 
 impl RobotsWorld {
     /// The building without bodies.
@@ -36,7 +38,25 @@ impl RobotsWorld {
                 boxes: map.cells().iter().map(occupancy).collect(),
             }),
             bodies: Vec::new(),
+            names: Vec::new(),
         }
+    }
+
+    /// Recorded poses as places of robots and people.
+    pub(super) fn place_rows(&self) -> Vec<view::PlaceRows> {
+        let (scale_m, origin_m) = (self.map.box_size_m, self.map.origin_m);
+        let axis = |column, offset_m| view::Axis { column, scale_m, offset_m };
+        vec![view::PlaceRows {
+            table: "trajectories",
+            kind: Kind::Robot,
+            number: "body",
+            part: None,
+            axes: vec![axis("col_boxes", origin_m[0]), axis("row_boxes", origin_m[1])],
+            is_corner: true,
+            ahead: Some("heading"),
+            every: 1,
+            worth: WORTH_CYCLES,
+        }]
     }
 
     /// All bodies by id.
