@@ -40,6 +40,9 @@ macro_rules! delegates_simulation {
             fn frame(&mut self, look: Look) -> Frame {
                 self.simulation.frame(look)
             }
+            fn place_rows(&self) -> Vec<PlaceRows> {
+                self.simulation.place_rows()
+            }
             fn metrics(&self) -> Value {
                 self.simulation.metrics()
             }
@@ -54,12 +57,9 @@ macro_rules! delegates_simulation {
 }
 
 mod airspace;
-pub(crate) mod chain;
-pub(crate) mod robots;
+mod chain;
+mod robots;
 
-pub(crate) use robots::shade;
-
-use crate::exit::Failure;
 use crate::report::Lines;
 use airspace::AirspaceRun;
 use robots::RobotsRun;
@@ -101,26 +101,6 @@ pub(crate) struct Told {
     pub(crate) lines: Lines,
 }
 
-/// How a recomputed state compares with what was recorded of it.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum Comparison {
-    /// Nothing of this cycle is on the disk.
-    NotRecorded,
-    /// So many recorded poses, all equal.
-    Equal(usize),
-    /// The bodies whose poses differ.
-    Different(Vec<u32>),
-}
-
-/// What a picture of a run is made from.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Pictured<'a> {
-    /// The run folder with the recorded tracks.
-    pub(crate) folder: Option<&'a Path>,
-    /// Small print that says which run this is.
-    pub(crate) origin: &'a str,
-}
-
 /// A run of some world: the kernel's face, and what only the command asks for.
 pub(crate) trait Run: Simulation {
     /// What one of its agents is called.
@@ -151,12 +131,6 @@ pub(crate) trait Run: Simulation {
 
     /// Where every body is.
     fn poses(&self) -> Said;
-
-    /// Compares the present state with what `folder` holds of this cycle.
-    fn compare(&self, folder: &Path) -> Result<Comparison, InputError>;
-
-    /// The present state, and the recorded tracks where there are some, as SVG.
-    fn picture(&self, of: Pictured<'_>) -> Result<String, Failure>;
 }
 
 /// The scenario that a file of another form stands for: BlueSky traffic (`.scn`) or recorded

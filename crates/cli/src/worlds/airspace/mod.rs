@@ -1,26 +1,23 @@
 //! The airspace world as the command sees it.
 
 mod foreign;
-mod picture;
 
 pub(super) use foreign::{told_of, translated};
 
-use super::{Comparison, Pictured, Plan, Run, Said, Told};
+use super::{Plan, Run, Said, Told};
 use crate::console::grouped;
-use crate::exit::Failure;
 use crate::report::Lines;
 use serde_json::{Value, json};
 use sidestep::kernel::checkpoint::CheckpointError;
 use sidestep::kernel::cycle::PhaseTimes;
 use sidestep::kernel::ports::{RecordError, Recorder, TableSchema};
-use sidestep::kernel::view::{Frame, Look, Scenery};
-use sidestep::kernel::{Cycle, Digest, InputError, Simulation};
+use sidestep::kernel::view::{Frame, Look, PlaceRows, Scenery};
+use sidestep::kernel::{Cycle, Digest, Simulation};
 use sidestep::scenario::Source;
 use sidestep::worlds::airspace::metrics::{Metrics, TooClose};
 use sidestep::worlds::airspace::scenario::Compiled;
 use sidestep::worlds::airspace::simulation::AirspaceSimulation;
 use sidestep::worlds::airspace::state::AirplaneRecord;
-use std::path::Path;
 
 /// A run of an airspace.
 pub(super) struct AirspaceRun {
@@ -126,14 +123,6 @@ impl Run for AirspaceRun {
         };
         let text = snapshot.airplanes.iter().enumerate().map(row).fold(heading, |t, r| t + &r);
         Said { json, text }
-    }
-
-    fn compare(&self, folder: &Path) -> Result<Comparison, InputError> {
-        picture::compare(&self.simulation, folder)
-    }
-
-    fn picture(&self, of: Pictured<'_>) -> Result<String, Failure> {
-        picture::svg(&self.simulation, of)
     }
 }
 

@@ -1,24 +1,18 @@
 //! The world of chains as the command sees it.
 
-pub(crate) mod picture;
-
-use super::{Comparison, Pictured, Plan, Run, Said};
+use super::{Plan, Run, Said};
 use crate::console::grouped;
-use crate::exit::Failure;
 use crate::report::Lines;
-use picture::Drawn;
 use serde_json::{Value, json};
 use sidestep::kernel::checkpoint::CheckpointError;
 use sidestep::kernel::cycle::PhaseTimes;
 use sidestep::kernel::ports::{RecordError, Recorder, TableSchema};
-use sidestep::kernel::view::{Frame, Look, Scenery};
-use sidestep::kernel::{Cycle, Digest, InputError, Simulation};
+use sidestep::kernel::view::{Frame, Look, PlaceRows, Scenery};
+use sidestep::kernel::{Cycle, Digest, Simulation};
 use sidestep::scenario::Source;
 use sidestep::worlds::chain::metrics::{ChainGivenUp, Metrics};
 use sidestep::worlds::chain::scenario::{AnyCompiled, Compiled};
 use sidestep::worlds::chain::simulation::ChainSimulation;
-use sidestep_draw::BodyScene;
-use std::path::Path;
 
 /// A run of chains at its start.
 pub(super) fn start(compiled: AnyCompiled, source: &Source, workers: usize) -> Box<dyn Run> {
@@ -41,10 +35,7 @@ impl<const D: usize> ChainRun<D> {
 
 delegates_simulation!([const D: usize] ChainRun<D>);
 
-impl<const D: usize> Run for ChainRun<D>
-where
-    BodyScene<D>: Drawn,
-{
+impl<const D: usize> Run for ChainRun<D> {
     fn agent(&self) -> &'static str {
         "connector"
     }
@@ -120,14 +111,6 @@ where
             }
         }
         Said { json: Value::Array(rows), text }
-    }
-
-    fn compare(&self, folder: &Path) -> Result<Comparison, InputError> {
-        picture::compare(&self.simulation, folder)
-    }
-
-    fn picture(&self, of: Pictured<'_>) -> Result<String, Failure> {
-        picture::svg(&self.simulation, of)
     }
 }
 

@@ -1,26 +1,21 @@
 //! The robots world as the command sees it.
 
 mod contents;
-pub(crate) mod picture;
 mod poses;
 
-pub(crate) use picture::shade;
-
-use super::{Comparison, Pictured, Plan, Run, Said};
+use super::{Plan, Run, Said};
 use crate::console::grouped;
-use crate::exit::Failure;
 use crate::report::Lines;
 use serde_json::{Value, json};
 use sidestep::kernel::checkpoint::CheckpointError;
 use sidestep::kernel::cycle::PhaseTimes;
 use sidestep::kernel::ports::{RecordError, Recorder, TableSchema};
-use sidestep::kernel::view::{Frame, Look, Scenery};
-use sidestep::kernel::{Cycle, Digest, InputError, Simulation};
+use sidestep::kernel::view::{Frame, Look, PlaceRows, Scenery};
+use sidestep::kernel::{Cycle, Digest, Simulation};
 use sidestep::scenario::Source;
 use sidestep::worlds::robots::metrics::Metrics;
 use sidestep::worlds::robots::scenario::Compiled;
 use sidestep::worlds::robots::simulation::RobotsSimulation;
-use std::path::Path;
 
 /// A run of a robots world.
 pub(super) struct RobotsRun {
@@ -84,14 +79,6 @@ impl Run for RobotsRun {
 
     fn poses(&self) -> Said {
         poses::said(&self.simulation)
-    }
-
-    fn compare(&self, folder: &Path) -> Result<Comparison, InputError> {
-        poses::compare(&self.simulation, folder)
-    }
-
-    fn picture(&self, of: Pictured<'_>) -> Result<String, Failure> {
-        picture::svg(&self.simulation, of)
     }
 }
 

@@ -5,7 +5,6 @@ use super::sensor::{NOTHING, Reading, SensorModel};
 use super::state::{BodyCell, RobotsState};
 use super::world::{MountedSensor, RobotModel, Role};
 use super::{Event, EventKind, RobotsWorld, Scratch};
-use crate::map::Cell;
 use sidestep_kernel::math::{cos, sin};
 use sidestep_kernel::space::{BoxWord, Floor};
 use sidestep_kernel::view::{self, Body, Condition, Entry, Kind, Level, Pose, Scan, Shape};
@@ -20,23 +19,11 @@ const WORTH_CYCLES: Cycle = 400;
 impl RobotsWorld {
     /// The building without bodies.
     pub(super) fn scenery(&self, name: &str) -> view::Scenery {
-        let map = &self.map;
-        let occupancy = |cell: &Cell| match cell {
-            Cell::Free => view::Occupancy::Free,
-            Cell::Wall => view::Occupancy::Wall,
-            Cell::Unknown => view::Occupancy::Unknown,
-        };
         view::Scenery {
             name: name.into(),
             dimensions: 2,
             cycle_s: CYCLE_S,
-            floor: Some(view::Floor {
-                width: map.width(),
-                height: map.height(),
-                box_m: map.box_size_m,
-                origin_m: map.origin_m,
-                boxes: map.cells().iter().map(occupancy).collect(),
-            }),
+            floor: Some(self.map.floor()),
             bodies: Vec::new(),
             names: Vec::new(),
         }
