@@ -16,6 +16,8 @@ mod key;
 mod labels;
 mod sheet;
 mod space;
+#[cfg(test)]
+mod tests;
 mod trails;
 mod ways;
 

@@ -316,6 +316,23 @@ mod tests {
     }
 
     #[test]
+    fn every_kind_has_the_colors_that_pictures_have() {
+        let ball = Shape::Sphere { radius_m: 1.0 };
+        for kind in [Kind::Robot, Kind::Person, Kind::Door, Kind::Zone, Kind::Obstacle, Kind::Goal]
+        {
+            for dimensions in [2, 3] {
+                let body = Body::new(kind, 4, ViewPose::at([0.0; 3]), ball.clone());
+                let look = body.appearance(dimensions);
+                let frame = Frame { bodies: vec![body], ..Frame::default() };
+                let update = scene(&frame, dimensions, &mut BTreeSet::new());
+                let shown = update.entities[0].spheres[0].color.clone().expect("a color");
+                let bytes = [shown.r, shown.g, shown.b].map(|part| (255.0 * part).round() as u8);
+                assert_eq!((bytes, shown.a), (look.color, look.opacity), "{kind}");
+            }
+        }
+    }
+
+    #[test]
     fn times_are_told_in_nanoseconds_without_loss() {
         assert_eq!(to_ns(1.5), 1_500_000_000);
         assert_eq!(to_ns(0.1 * 3.0), 300_000_000);
