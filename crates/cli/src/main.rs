@@ -11,6 +11,7 @@
 
 mod args;
 mod commands;
+mod compare;
 mod console;
 mod driver;
 mod exit;

@@ -2,8 +2,10 @@
 
 use crate::exit::Failure;
 use crate::files::replace;
-use crate::worlds::{Pictured, Run};
-use sidestep_draw::to_png;
+use crate::recorded::trails;
+use crate::worlds::Run;
+use sidestep::kernel::view::Look;
+use sidestep_draw::{Options, describe, draw, to_png};
 use sidestep_record::RunFolder;
 use std::io::Write;
 use std::path::Path;
@@ -15,7 +17,7 @@ const PNG_PX: u32 = 1600;
 ///
 /// # Errors
 /// When it cannot be drawn or written.
-pub(crate) fn draw_run(run: &dyn Run, folder: &RunFolder) -> Result<(), Failure> {
+pub(crate) fn draw_run(run: &mut dyn Run, folder: &RunFolder) -> Result<(), Failure> {
     let plan = run.plan();
     let origin = match run.cycle() < plan.cycles && !run.is_over() {
         true => {
@@ -23,9 +25,28 @@ pub(crate) fn draw_run(run: &dyn Run, folder: &RunFolder) -> Result<(), Failure>
         }
         false => origin(run),
     };
-    let svg = run.picture(Pictured { folder: Some(folder.path()), origin: &origin })?;
+    let svg = svg(run, Some(folder.path()), &origin)?;
     write(&folder.path().join("trajectories.svg"), svg.as_bytes())?;
     write_png(&folder.path().join("trajectories.png"), &svg)
+}
+
+/// The run as it is now, with the ways that its folder tells, as SVG. `origin` is small print that
+/// says which run this is.
+///
+/// # Errors
+/// When the folder is damaged, or the picture cannot be drawn.
+pub(crate) fn svg(
+    run: &mut dyn Run,
+    folder: Option<&Path>,
+    origin: &str,
+) -> Result<String, Failure> {
+    let (scenery, frame) = (run.scenery(), run.frame(Look::BODIES));
+    let trails = match folder {
+        Some(folder) => trails(&run.place_rows(), folder, &scenery, &frame)?,
+        None => Vec::new(),
+    };
+    let caption = format!("{} {origin}", describe(&scenery, &frame, &trails));
+    Ok(draw(&scenery, &frame, &trails, &Options::page(&scenery, caption))?)
 }
 
 /// Small print under a picture.

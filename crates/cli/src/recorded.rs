@@ -3,9 +3,38 @@
 use sidestep::import::table::CsvTable;
 use sidestep::kernel::InputError;
 use sidestep::kernel::ports::{ColumnSpec, Values};
+use sidestep::kernel::view::{Frame, PlaceRows, Scenery, Trail};
+use sidestep_draw::worth_a_trail;
 use sidestep_record::{Table, read_table};
 use std::fmt::Write;
 use std::path::Path;
+
+/// So many recorded places are read for trails; of longer runs the last ones.
+const MOST_ROWS: u64 = 4_000_000;
+
+/// The ways that led to a moment, as far as they are recorded and worth showing.
+///
+/// # Errors
+/// When a table is damaged.
+pub(crate) fn trails(
+    tables: &[PlaceRows],
+    folder: &Path,
+    scenery: &Scenery,
+    frame: &Frame,
+) -> Result<Vec<Trail>, InputError> {
+    let whose = worth_a_trail(scenery, frame);
+    let mut trails = Vec::new();
+    for rows in tables.iter().filter(|rows| has_rows(folder, rows.table)) {
+        let here = frame.bodies.iter().filter(|body| body.kind == rows.kind).count();
+        let moments = (MOST_ROWS / here.max(whose.len()).max(1) as u64).max(1);
+        let cycles = moments.saturating_mul(rows.every).min(rows.worth);
+        let from = frame.cycle.saturating_sub(cycles);
+        let table = read_table(folder, rows.table, from..frame.cycle)?;
+        let ways = rows.trails(scenery, frame, &whose, |name| table.column(name));
+        trails.extend(ways.unwrap_or_default());
+    }
+    Ok(trails)
+}
 
 /// The table `name` of the run in `folder`, which has it with `record.calibration = true`.
 ///

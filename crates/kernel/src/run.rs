@@ -7,7 +7,7 @@ use crate::engine::Engine;
 use crate::ports::{RecordError, Recorder, SystemClock, TableSchema};
 use crate::simulation::Simulation;
 use crate::units::Cycle;
-use crate::view::{Frame, Look, Scenery};
+use crate::view::{Frame, Look, PlaceRows, Scenery};
 use crate::words::{Lines, Said};
 use crate::world::{Decides, World};
 use serde_json::Value;
@@ -260,6 +260,10 @@ impl<W: World> Simulation for Run<W> {
     fn frame(&mut self, look: Look) -> Frame {
         self.gather();
         self.world.frame(&self.state, &mut self.books, self.cycle, look)
+    }
+
+    fn place_rows(&self) -> Vec<PlaceRows> {
+        self.world.place_rows(&self.books)
     }
 
     fn metrics(&self) -> Value {

@@ -6,7 +6,7 @@ use crate::digest::Digest;
 use crate::ports::{RecordError, Recorder, TableSchema};
 use crate::run::Plan;
 use crate::units::Cycle;
-use crate::view::{Frame, Look, Scenery};
+use crate::view::{Frame, Look, PlaceRows, Scenery};
 use crate::words::{Lines, Said};
 use crate::world::Decides;
 
@@ -71,6 +71,9 @@ pub trait Simulation: Send {
     /// How things are now, and what happened since the last call (nothing without
     /// [`Simulation::watch`]). It changes no result.
     fn frame(&mut self, look: Look) -> Frame;
+
+    /// Which recorded rows say where bodies were.
+    fn place_rows(&self) -> Vec<PlaceRows>;
 
     /// What the run measured so far, as JSON (`metrics` of the summary).
     fn metrics(&self) -> serde_json::Value;

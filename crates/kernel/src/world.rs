@@ -12,7 +12,7 @@ use crate::digest::Digest;
 use crate::ports::{Clock, RecordError, Recorder, TableSchema};
 use crate::run::Effort;
 use crate::units::{Cycle, Slot};
-use crate::view::{Frame, Look, Scenery};
+use crate::view::{Frame, Look, PlaceRows, Scenery};
 use crate::words::{Lines, Said};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -192,6 +192,11 @@ pub trait World: Phases<State: Send> + Send + 'static {
 
     /// How things are now, and what happened since the last frame.
     fn frame(&self, state: &Self::State, books: &mut Self::Books, now: Cycle, look: Look) -> Frame;
+
+    /// Which recorded rows say where bodies were.
+    fn place_rows(&self, _: &Self::Books) -> Vec<PlaceRows> {
+        Vec::new()
+    }
 
     /// What the run measured so far.
     fn metrics(

@@ -1,17 +1,18 @@
 //! `sidestep replay`: a recorded run computed again, to its end or up to any cycle.
 
+use crate::compare::compare;
 use crate::console::{Console, grouped};
 use crate::driver::{Sinks, drive};
 use crate::exit::{ExitCode, Failure};
 use crate::interrupt;
-use crate::picture::{origin, write_png};
+use crate::picture::{origin, svg, write_png};
 use crate::plan::WorkersArg;
 use crate::rerun::Recorded;
-use crate::worlds::{Comparison, Pictured, Run};
+use crate::worlds::Run;
 use clap::Args;
 use serde_json::json;
 use sidestep::kernel::{Cycle, InputError};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -85,7 +86,7 @@ fn replay_all(
         return Err(Failure::stopped(cause, remedy));
     }
     recorded.confirm(run.as_ref())?;
-    draw(run.as_ref(), recorded, args)?;
+    draw(run.as_mut(), recorded, args)?;
     let digest = run.digest().to_string();
     let json = json!({
         "cycle": run.cycle(),
@@ -117,10 +118,13 @@ fn replay_to(
         return Ok(ExitCode::Interrupted);
     }
     let compared = match &recorded.folder {
-        Some(folder) => compare(run.as_ref(), folder)?,
+        Some(folder) => {
+            let again = recorded.start(args.workers.count())?;
+            compare(run.as_ref(), again, folder)?
+        }
         None => 0,
     };
-    draw(run.as_ref(), recorded, args)?;
+    draw(run.as_mut(), recorded, args)?;
     show(run.as_ref(), compared, console);
     Ok(ExitCode::Done)
 }
@@ -133,10 +137,10 @@ fn check_cycle(cycle: Cycle, planned: Cycle) -> Result<(), InputError> {
     Err(InputError::new(format!("--cycle {cycle}"), cause, format!("give 0 to {planned}")))
 }
 
-fn draw(run: &dyn Run, recorded: &Recorded, args: &ReplayArgs) -> Result<(), Failure> {
+fn draw(run: &mut dyn Run, recorded: &Recorded, args: &ReplayArgs) -> Result<(), Failure> {
     let Some(png) = &args.png else { return Ok(()) };
     let origin = origin(run);
-    let svg = run.picture(Pictured { folder: recorded.folder.as_deref(), origin: &origin })?;
+    let svg = svg(run, recorded.folder.as_deref(), &origin)?;
     write_png(png, &svg)
 }
 
@@ -157,23 +161,4 @@ fn show(run: &dyn Run, compared: usize, console: Console) {
         };
         format!("Cycle {}: {compared}\n{}  digest {digest}\n", grouped(run.cycle()), poses.text)
     });
-}
-
-/// Number of recorded poses that were compared.
-fn compare(run: &dyn Run, folder: &Path) -> Result<usize, Failure> {
-    match run.compare(folder)? {
-        Comparison::NotRecorded => Ok(0),
-        Comparison::Equal(poses) => Ok(poses),
-        Comparison::Different(bodies) => {
-            let cause = format!(
-                "at cycle {} the poses of {} bodies differ from what was recorded, first of body {}",
-                run.cycle(),
-                bodies.len(),
-                bodies[0],
-            );
-            let remedy =
-                "the folder was changed, or this is a bug: please report it with the folder";
-            Err(Failure::stopped(cause, remedy))
-        }
-    }
 }

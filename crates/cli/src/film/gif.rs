@@ -1,7 +1,7 @@
 //! Films as GIF: one palette for all pictures, and of each picture only what has changed.
 
-use super::stage::{ALERT, COLORS, DOOR, INK, OBSTACLE, PERSON, UNKNOWN, WALL};
 use gif::{DisposalMethod, Encoder, Frame, Repeat};
+use sidestep::kernel::view::{ALERT, COLORS, DOOR, MOBILE, UNKNOWN, WALL};
 use std::borrow::Cow;
 use std::io::{Error, Result, Write};
 
@@ -90,7 +90,7 @@ impl Palette {
         let white = [255; 3];
         let gray = |k: u32| [(255 * k / (GRAYS - 1)) as u8; 3];
         let mut colors: Vec<[u8; 3]> = (0..GRAYS).map(gray).collect();
-        let drawn = COLORS.iter().chain([&ALERT, &DOOR, &OBSTACLE, &WALL, &UNKNOWN, &PERSON, &INK]);
+        let drawn = COLORS.iter().chain([&ALERT, &DOOR, &WALL, &UNKNOWN, &MOBILE]);
         for &color in drawn {
             colors.extend((0..=STEPS).map(|k| mixed(color, white, k)));
             colors.extend([2, 4].map(|k| mixed(color, WALL, k)));

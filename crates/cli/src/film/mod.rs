@@ -3,7 +3,6 @@
 mod gif;
 mod mcap;
 mod pictures;
-mod stage;
 
 pub(crate) use gif::write_gif;
 pub(crate) use mcap::{Ending, McapFilm};

@@ -1,12 +1,12 @@
 //! Frames of a run, kept until all are there, then drawn: the view depends on all of them.
 
-use super::{Film, stage};
+use super::Film;
 use crate::console::grouped;
 use crate::exit::Failure;
 use crate::worlds::Run;
-use sidestep::kernel::view::{Frame, Look, Scenery};
+use sidestep::kernel::view::{Frame, Look, Scenery, Trail, Who};
 use sidestep::kernel::{Cycle, InputError};
-use sidestep_draw::{Picture, Stage};
+use sidestep_draw::{Film as View, Still, worth_a_trail};
 
 /// More bodies in all frames would take too much memory.
 const MOST_BODIES: usize = 4_000_000;
@@ -32,23 +32,24 @@ impl Pictures {
         self.frames.len()
     }
 
-    /// The stage on which all pictures are drawn.
+    /// The view that all pictures have.
     ///
     /// # Errors
     /// When it cannot be drawn.
-    pub(crate) fn stage(&self, width_px: u32) -> Result<Stage, Failure> {
-        Ok(stage::stage(&self.scenery, &self.frames, width_px)?)
+    pub(crate) fn view(&self, width_px: u32) -> Result<View, Failure> {
+        Ok(View::new(self.scenery.clone(), &self.frames, width_px)?)
     }
 
     /// One picture.
     ///
     /// # Errors
     /// When it cannot be drawn.
-    pub(crate) fn draw(&self, stage: &Stage, index: usize) -> Result<Picture, Failure> {
+    pub(crate) fn draw(&self, view: &View, index: usize) -> Result<Still, Failure> {
         let frame = &self.frames[index];
-        let mut figures = stage::trails(&self.frames[index.saturating_sub(TRAIL)..=index]);
-        figures.extend(frame.bodies.iter().flat_map(stage::figures));
-        Ok(stage.picture(&figures, &self.caption(frame))?)
+        let frames = &self.frames[index.saturating_sub(TRAIL)..=index];
+        let whose = worth_a_trail(&self.scenery, frame);
+        let trails: Vec<Trail> = whose.into_iter().map(|of| trail(of, frames)).collect();
+        Ok(view.still(frame, &trails, &self.caption(frame))?)
     }
 
     fn caption(&self, frame: &Frame) -> String {
@@ -80,4 +81,14 @@ impl Film for Pictures {
         self.frames.push(frame);
         Ok(())
     }
+}
+
+/// Where a body was in these frames; nothing of one that is not in the last of them.
+fn trail(of: Who, frames: &[Frame]) -> Trail {
+    let find = |frame: &Frame| {
+        frame.bodies.iter().find(|body| body.who() == of).map(|body| body.pose.at_m)
+    };
+    let is_here = frames.last().is_some_and(|frame| find(frame).is_some());
+    let frames = frames.iter().filter(|_| is_here);
+    Trail { of, way: frames.filter_map(|frame| Some((frame.cycle, find(frame)?))).collect() }
 }

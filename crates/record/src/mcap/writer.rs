@@ -56,6 +56,7 @@ pub struct McapRecorder {
     writer: Option<Writer<BufWriter<File>>>,
     origin: McapOrigin,
     cycle_s: f64,
+    dimensions: u8,
     /// Channels by topic.
     channels: BTreeMap<String, u16>,
     /// Bodies of the frame before, by name.
@@ -104,6 +105,7 @@ impl McapRecorder {
             writer: Some(writer),
             origin,
             cycle_s: scenery.cycle_s,
+            dimensions: scenery.dimensions,
             channels: BTreeMap::new(),
             shown: BTreeSet::new(),
             frames: 0,
@@ -151,7 +153,7 @@ impl McapRecorder {
             self.write::<Log>("/log", messages::nanoseconds(&entry), &entry)?;
         }
         let now_ns = messages::to_ns(frame.time_s);
-        let scene = messages::scene(frame, &mut self.shown);
+        let scene = messages::scene(frame, self.dimensions, &mut self.shown);
         self.write::<SceneUpdate>("/scene", now_ns, &scene)?;
         self.write::<FrameTransforms>("/tf", now_ns, &messages::transforms(frame))?;
         for kind in [Kind::Robot, Kind::Connector, Kind::Airplane] {

@@ -13,7 +13,7 @@ use serde_json::Value;
 use sidestep_kernel::checkpoint::CheckpointError;
 use sidestep_kernel::ports::{RecordError, Recorder, TableSchema};
 use sidestep_kernel::run::{Effort, Plan, Run};
-use sidestep_kernel::view::{Frame, Log, Look, Scenery};
+use sidestep_kernel::view::{Frame, Log, Look, PlaceRows, Scenery};
 use sidestep_kernel::words::{Lines, Said};
 use sidestep_kernel::{Cycle, Digest, EntityId, InputError, World};
 use sidestep_scenario::Source;
@@ -178,6 +178,10 @@ impl World for AirspaceWorld {
             log: events.iter().map(entry).collect(),
             log_left_out,
         }
+    }
+
+    fn place_rows(&self, _: &Books) -> Vec<PlaceRows> {
+        AirspaceWorld::place_rows()
     }
 
     fn metrics(&self, state: &AirspaceState, books: &Books, _: Cycle, _: &Effort) -> Metrics {

@@ -144,6 +144,11 @@ impl Rows {
         Self { asked, ..Self::default() }
     }
 
+    /// Every how many cycles places are kept.
+    pub(super) fn every(&self) -> Cycle {
+        self.asked.0
+    }
+
     /// Begins to keep rows.
     pub(super) fn begin(&mut self, dimensions: usize) {
         self.dimensions = dimensions;

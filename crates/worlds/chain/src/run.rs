@@ -15,7 +15,7 @@ use serde_json::Value;
 use sidestep_kernel::checkpoint::CheckpointError;
 use sidestep_kernel::ports::{RecordError, Recorder, TableSchema};
 use sidestep_kernel::run::{Effort, Plan, Run};
-use sidestep_kernel::view::{Frame, Log, Look, Scenery};
+use sidestep_kernel::view::{Frame, Log, Look, PlaceRows, Scenery};
 use sidestep_kernel::words::{Lines, Said};
 use sidestep_kernel::{Cycle, Digest, EntityId, World};
 use sidestep_scenario::Source;
@@ -188,6 +188,10 @@ impl<const D: usize> World for ChainWorld<D> {
             log: events.iter().map(entry).collect(),
             log_left_out,
         }
+    }
+
+    fn place_rows(&self, books: &Books) -> Vec<PlaceRows> {
+        ChainWorld::<D>::place_rows(books.rows.every())
     }
 
     fn metrics(&self, state: &ChainState<D>, books: &Books, _: Cycle, effort: &Effort) -> Metrics {

@@ -9,7 +9,7 @@ use super::obstacle::Obstacle;
 use super::state::{Body as ChainBody, ChainState};
 use super::world::{ChainSpec, ChainWorld, OTHER_CHAIN, Scratch};
 use sidestep_kernel::view::{
-    Body, Condition, Entry, Kind, Level, Place, Pose, Scan, Scenery, Shape,
+    Axis, Body, Condition, Entry, Kind, Level, Place, PlaceRows, Pose, Scan, Scenery, Shape,
 };
 use sidestep_kernel::{Cycle, EntityId, Phases, Slot};
 use std::ops::RangeInclusive;
@@ -34,7 +34,26 @@ impl<const D: usize> ChainWorld<D> {
             cycle_s: self.dt_s,
             floor: None,
             bodies: still.chain(goals).collect(),
+            names: (0..)
+                .zip(&self.chains)
+                .map(|(id, spec)| (Kind::Connector, id, spec.name.clone()))
+                .collect(),
         }
+    }
+
+    /// Recorded positions as places of connectors; a row every so many cycles.
+    pub(super) fn place_rows(every: Cycle) -> Vec<PlaceRows> {
+        vec![PlaceRows {
+            table: "trajectories",
+            kind: Kind::Connector,
+            number: "chain",
+            part: Some("connector"),
+            axes: ["x_m", "y_m", "z_m"][..D].iter().map(|axis| Axis::meters(axis)).collect(),
+            is_corner: false,
+            ahead: None,
+            every,
+            worth: Cycle::MAX,
+        }]
     }
 
     /// All chains by id, then what moves among them.
@@ -165,7 +184,7 @@ fn seen<const D: usize>(obstacle: &Obstacle<D>) -> Body {
         }
         Core::Cuboid(cuboid) => (cuboid_pose(cuboid), cuboid_shape(cuboid, radius_m)),
     };
-    Body::new(Kind::Obstacle, obstacle.id, pose, shape)
+    Body::new(Kind::Obstacle, obstacle.id, pose, shape).moving(in_space(obstacle.velocity_m_s))
 }
 
 fn cuboid_shape<const D: usize>(cuboid: &Cuboid<D>, radius_m: f64) -> Shape {

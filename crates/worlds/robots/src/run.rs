@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use sidestep_kernel::checkpoint::CheckpointError;
 use sidestep_kernel::ports::{RecordError, Recorder, TableSchema};
 use sidestep_kernel::run::{Effort, Plan, Run};
-use sidestep_kernel::view::{Frame, Look, Scenery};
+use sidestep_kernel::view::{Frame, Look, PlaceRows, Scenery};
 use sidestep_kernel::words::{Lines, Said};
 use sidestep_kernel::{Cycle, Digest, EntityId, InputError, World};
 use sidestep_scenario::Source;
@@ -163,6 +163,10 @@ impl World for RobotsWorld {
             log: events.iter().map(|event| self.entry(event)).collect(),
             log_left_out,
         }
+    }
+
+    fn place_rows(&self, _: &Books) -> Vec<PlaceRows> {
+        RobotsWorld::place_rows(self)
     }
 
     fn metrics(&self, state: &RobotsState, _: &Books, now: Cycle, effort: &Effort) -> Metrics {

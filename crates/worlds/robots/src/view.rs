@@ -14,29 +14,37 @@ use std::f64::consts::FRAC_PI_2;
 
 /// What a cycle counts as where seconds are asked for: the model itself knows no other time.
 pub(super) const CYCLE_S: f64 = 1.0;
+/// Longer ways cover a floor.
+const WORTH_CYCLES: Cycle = 400;
 
 impl RobotsWorld {
     /// The building without bodies.
     pub(super) fn scenery(&self, name: &str) -> view::Scenery {
-        let map = &self.map;
-        let occupancy = |cell: &Cell| match cell {
-            Cell::Free => view::Occupancy::Free,
-            Cell::Wall => view::Occupancy::Wall,
-            Cell::Unknown => view::Occupancy::Unknown,
-        };
         view::Scenery {
             name: name.into(),
             dimensions: 2,
             cycle_s: CYCLE_S,
-            floor: Some(view::Floor {
-                width: map.width(),
-                height: map.height(),
-                box_m: map.box_size_m,
-                origin_m: map.origin_m,
-                boxes: map.cells().iter().map(occupancy).collect(),
-            }),
+            floor: Some(self.map.floor()),
             bodies: Vec::new(),
+            names: Vec::new(),
         }
+    }
+
+    /// Recorded poses as places of robots and people.
+    pub(super) fn place_rows(&self) -> Vec<view::PlaceRows> {
+        let (scale_m, origin_m) = (self.map.box_size_m, self.map.origin_m);
+        let axis = |column, offset_m| view::Axis { column, scale_m, offset_m };
+        vec![view::PlaceRows {
+            table: "trajectories",
+            kind: Kind::Robot,
+            number: "body",
+            part: None,
+            axes: vec![axis("col_boxes", origin_m[0]), axis("row_boxes", origin_m[1])],
+            is_corner: true,
+            ahead: Some("heading"),
+            every: 1,
+            worth: WORTH_CYCLES,
+        }]
     }
 
     /// All bodies by id.

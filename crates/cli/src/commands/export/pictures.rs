@@ -8,12 +8,11 @@ use crate::exit::{ExitCode, Failure};
 use crate::files::replace;
 use crate::film::{Pictures, write_gif};
 use crate::interrupt;
-use crate::picture::origin;
+use crate::picture::{origin, svg};
 use crate::progress::Stages;
 use crate::rerun::Recorded;
-use crate::worlds::Pictured;
 use sidestep::kernel::Cycle;
-use sidestep_draw::{Stage, to_png};
+use sidestep_draw::{Film, Still, to_png};
 use std::io::{Error, Write};
 use std::path::Path;
 
@@ -34,12 +33,12 @@ pub(super) fn export_picture(
 ) -> Result<ExitCode, Failure> {
     let target = Target::file(args, &format!(".{}", args.to.name()))?;
     let at = args.from.unwrap_or(span.until);
-    let Some(run) = run_up_to(recorded, at, args.workers, console)? else {
+    let Some(mut run) = run_up_to(recorded, at, args.workers, console)? else {
         return Ok(ExitCode::Interrupted);
     };
     let confirmed = recorded.confirm(run.as_ref())?;
     let origin = format!("Cycle {}. {}", run.cycle(), origin(run.as_ref()));
-    let svg = run.picture(Pictured { folder: recorded.folder.as_deref(), origin: &origin })?;
+    let svg = svg(run.as_mut(), recorded.folder.as_deref(), &origin)?;
     let bytes = match args.to {
         Form::Svg => svg.into_bytes(),
         _ => to_png(&svg, args.width.unwrap_or(PNG_PX).into())?,
@@ -97,14 +96,14 @@ struct Drawn {
 
 impl Drawn {
     fn write_gif(&self, args: &ExportArgs, to: &Path) -> Result<String, Failure> {
-        let stage = self.pictures.stage(args.width.unwrap_or(GIF_PX).into())?;
+        let view = self.pictures.view(args.width.unwrap_or(GIF_PX).into())?;
         let progress = Stages::new(self.console);
         let pixels = (0..self.pictures.len()).map(|index| {
-            let picture = self.draw(&stage, index, &progress).map_err(Error::other)?;
+            let picture = self.draw(&view, index, &progress).map_err(Error::other)?;
             Ok(picture.rgba().to_vec())
         });
         let written =
-            replace(to, |file| write_gif(file, stage.size_px(), f64::from(self.fps), pixels));
+            replace(to, |file| write_gif(file, view.size_px(), f64::from(self.fps), pixels));
         progress.clear();
         written?;
         let seconds = self.pictures.len() as f64 / f64::from(self.fps);
@@ -118,10 +117,10 @@ impl Drawn {
         folder: &Path,
         named: &Path,
     ) -> Result<String, Failure> {
-        let stage = self.pictures.stage(args.width.unwrap_or(FRAME_PX).into())?;
+        let view = self.pictures.view(args.width.unwrap_or(FRAME_PX).into())?;
         let progress = Stages::new(self.console);
         for index in 0..self.pictures.len() {
-            let picture = self.draw(&stage, index, &progress)?;
+            let picture = self.draw(&view, index, &progress)?;
             let png = picture.to_png()?;
             // From 1 on, as ffmpeg counts.
             let path = folder.join(format!("frame-{:05}.png", index + 1));
@@ -137,16 +136,11 @@ impl Drawn {
         ))
     }
 
-    fn draw(
-        &self,
-        stage: &Stage,
-        index: usize,
-        progress: &Stages,
-    ) -> Result<sidestep_draw::Picture, Failure> {
+    fn draw(&self, view: &Film, index: usize, progress: &Stages) -> Result<Still, Failure> {
         if interrupt::requested() {
             return Err(Failure::stopped("interrupted", "start it again; nothing was written"));
         }
         progress.at("drawing", index as f64 / self.pictures.len().max(1) as f64);
-        self.pictures.draw(stage, index)
+        self.pictures.draw(view, index)
     }
 }

@@ -10,9 +10,11 @@ use crate::files::replace;
 use crate::pages::{Pages, Raster};
 use clap::{Args, Subcommand};
 use serde::Serialize;
-use sidestep::experiment::Document;
 use sidestep::experiment::claim::{Claim, tally};
+use sidestep::experiment::document::Picture;
+use sidestep::experiment::{Document, Scene};
 use sidestep::kernel::InputError;
+use sidestep_draw::{DrawError, Options, Style, draw};
 use sidestep_report::markdown::without_pictures;
 use std::io::Write;
 use std::path::Path;
@@ -52,6 +54,14 @@ pub(crate) fn reproduce(args: &ReproduceArgs, console: Console) -> Result<ExitCo
         Paper::Agentfly(args) => agentfly::reproduce(args, console),
         Paper::Serpentine(args) => serpentine::reproduce(args, console),
     }
+}
+
+/// A picture whose words stand beside it.
+fn drawn(scene: &Scene) -> Result<Picture, DrawError> {
+    let (title, caption) = (String::new(), String::new());
+    let options = Options { style: Style::MAP, title, caption };
+    let svg = draw(&scene.scenery, &scene.frame, &scene.trails, &options)?;
+    Ok(Picture { title: scene.title.clone(), caption: scene.caption.clone(), svg })
 }
 
 fn check_vacant(folder: &Path) -> Result<(), InputError> {

@@ -25,7 +25,7 @@ pub mod pushing;
 pub mod rotation;
 mod runs;
 pub mod scaling;
-pub mod scenes;
+mod scenes;
 pub mod snake;
 
 pub use runs::Share;
@@ -186,7 +186,7 @@ pub struct Report {
     pub claims: Vec<Claim>,
     /// Pictures of bodies: no numbers of them are kept.
     #[serde(skip)]
-    pub scenes: Vec<scenes::Scene>,
+    pub scenes: Vec<crate::experiment::Scene>,
 }
 
 /// Runs all experiments.

@@ -1,9 +1,11 @@
-//! All boxes of one shade as one path of few rectangles.
+//! Floors: all boxes of one sort as one path of few rectangles.
 
 use std::fmt::Write as _;
 
-use super::{CellShade, GridScene};
-use crate::svg::Svg;
+use super::canvas::Canvas;
+use crate::style::hex;
+use crate::svg::{Num, Svg};
+use sidestep_kernel::view::{Floor, Occupancy, UNKNOWN, WALL};
 
 /// More rectangles than this (some megabytes of SVG) are drawn at a coarser grain.
 const MOST_RECTANGLES: usize = 100_000;
@@ -17,15 +19,22 @@ struct Block {
     height: u32,
 }
 
-/// Draws all boxes of `shade`, if there are any, in units of boxes.
-pub(super) fn draw(svg: &mut Svg, scene: &GridScene, shade: CellShade, fill: &str) {
-    let is = |col: u32, row: u32| {
-        scene.cells[row as usize * scene.width as usize + col as usize] == shade
-    };
-    let data = path_data(scene.width, scene.height, &is);
-    if !data.is_empty() {
-        svg.path(&data, format_args!(r#"fill="{fill}""#));
+/// Draws a floor, in a group whose unit is one box, y upward.
+pub(super) fn draw(svg: &mut Svg, floor: &Floor, canvas: &Canvas) {
+    let [x_m, y_m] = floor.origin_m;
+    let (x, y) = canvas.at([x_m, y_m, 0.0]);
+    let (x, y, px) = (Num(x), Num(y), canvas.px_per_m * floor.box_m);
+    svg.raw(format_args!(r#"<g transform="translate({x} {y}) scale({px} -{px})">"#));
+    for (occupancy, color) in [(Occupancy::Unknown, UNKNOWN), (Occupancy::Wall, WALL)] {
+        let is = |col: u32, row: u32| {
+            floor.boxes[row as usize * floor.width as usize + col as usize] == occupancy
+        };
+        let data = path_data(floor.width, floor.height, &is);
+        if !data.is_empty() {
+            svg.path(&data, format_args!(r#"fill="{}""#, hex(color)));
+        }
     }
+    svg.close_group();
 }
 
 /// Path data of the boxes where `is` holds.
