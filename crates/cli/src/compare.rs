@@ -2,8 +2,8 @@
 
 use crate::exit::Failure;
 use crate::recorded::has_rows;
-use crate::worlds::Run;
 use sidestep::kernel::InputError;
+use sidestep::kernel::Simulation;
 use sidestep::kernel::ports::{MemoryRecorder, Values};
 use sidestep::kernel::view::{PlaceRows, Who};
 use sidestep_record::{Table, read_table};
@@ -17,8 +17,8 @@ use std::path::Path;
 /// # Errors
 /// When a pose differs, or the folder is damaged.
 pub(crate) fn compare(
-    run: &dyn Run,
-    mut again: Box<dyn Run>,
+    run: &dyn Simulation,
+    mut again: Box<dyn Simulation>,
     folder: &Path,
 ) -> Result<usize, Failure> {
     let cycle = run.cycle();

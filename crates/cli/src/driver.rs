@@ -6,9 +6,9 @@ use crate::film::Film;
 use crate::interrupt;
 use crate::progress::Progress;
 use crate::recording::Recording;
-use crate::worlds::Run;
 use cpu_time::ProcessTime;
 use sidestep::kernel::Cycle;
+use sidestep::kernel::Simulation;
 use std::time::{Duration, Instant};
 
 /// How long a slice lasts: nobody waits longer for Ctrl-C to work.
@@ -40,7 +40,7 @@ pub(crate) struct Sinks<'a> {
 /// # Errors
 /// When rows, checkpoints or frames cannot be stored.
 pub(crate) fn drive(
-    run: &mut dyn Run,
+    run: &mut dyn Simulation,
     until: Cycle,
     mut sinks: Sinks<'_>,
     console: Console,
@@ -61,7 +61,7 @@ pub(crate) fn drive(
 
 /// Advances a little, and hands over what is due.
 fn slice(
-    run: &mut dyn Run,
+    run: &mut dyn Simulation,
     until: Cycle,
     sinks: &mut Sinks<'_>,
     pace: &mut Pace,
@@ -73,7 +73,7 @@ fn slice(
     let done = run.advance(asked);
     pace.note(done, started.elapsed());
     // A run may be over just where a slice ends: then there is no further one.
-    let is_due = |due: Cycle, run: &dyn Run| run.cycle() == due || run.is_over();
+    let is_due = |due: Cycle, run: &dyn Simulation| run.cycle() == due || run.is_over();
     if let Some(recording) = &mut sinks.recording
         && (done < asked || is_due(rows_due, run))
     {

@@ -27,7 +27,6 @@ mod recording;
 mod report;
 mod rerun;
 mod sweep;
-mod worlds;
 
 use clap::Parser;
 

@@ -3,7 +3,7 @@
 use crate::exit::Failure;
 use crate::files::replace;
 use crate::recorded::trails;
-use crate::worlds::Run;
+use sidestep::kernel::Simulation;
 use sidestep::kernel::view::Look;
 use sidestep_draw::{Options, describe, draw, to_png};
 use sidestep_record::RunFolder;
@@ -17,7 +17,7 @@ const PNG_PX: u32 = 1600;
 ///
 /// # Errors
 /// When it cannot be drawn or written.
-pub(crate) fn draw_run(run: &mut dyn Run, folder: &RunFolder) -> Result<(), Failure> {
+pub(crate) fn draw_run(run: &mut dyn Simulation, folder: &RunFolder) -> Result<(), Failure> {
     let plan = run.plan();
     let origin = match run.cycle() < plan.cycles && !run.is_over() {
         true => {
@@ -36,7 +36,7 @@ pub(crate) fn draw_run(run: &mut dyn Run, folder: &RunFolder) -> Result<(), Fail
 /// # Errors
 /// When the folder is damaged, or the picture cannot be drawn.
 pub(crate) fn svg(
-    run: &mut dyn Run,
+    run: &mut dyn Simulation,
     folder: Option<&Path>,
     origin: &str,
 ) -> Result<String, Failure> {
@@ -50,7 +50,7 @@ pub(crate) fn svg(
 }
 
 /// Small print under a picture.
-pub(crate) fn origin(run: &dyn Run) -> String {
+pub(crate) fn origin(run: &dyn Simulation) -> String {
     format!("Seed {}, sidestep {}.", run.plan().seed, env!("CARGO_PKG_VERSION"))
 }
 

@@ -1,9 +1,10 @@
 //! A scenario file and the options of the command line -> a scenario that is known to be right.
 
-use crate::worlds::{self, Compiled};
 use clap::Args;
 use sidestep::kernel::{InputError, workers};
+use sidestep::scenario::Compiled;
 use sidestep::scenario::Source;
+use sidestep::worlds::WORLDS;
 use std::path::{Path, PathBuf};
 
 /// The scenario, and what the command line changes in it.
@@ -62,10 +63,10 @@ impl ScenarioArgs {
     ///
     /// # Errors
     /// When anything in it is wrong.
-    pub(crate) fn compile(&self) -> Result<(Source, Compiled), InputError> {
+    pub(crate) fn compile(&self) -> Result<(Source, Box<dyn Compiled>), InputError> {
         let overrides = self.all_overrides();
         let source = source_of(&self.file, &overrides)?;
-        match Compiled::new(&source) {
+        match WORLDS.compile(&source) {
             Ok(compiled) => Ok((source, compiled)),
             Err(error) if overrides.is_empty() => Err(error),
             Err(error) => Err(in_the_file_itself(&self.file, error)),
@@ -94,8 +95,10 @@ impl ChangeArgs {
 /// # Errors
 /// When it cannot be read, or an override does not fit.
 pub(crate) fn source_of(file: &Path, overrides: &[String]) -> Result<Source, InputError> {
-    match worlds::translated(file)? {
-        Some(text) => Source::new(file.display().to_string(), text, "").with(overrides),
+    match WORLDS.translate(file)? {
+        Some(foreign) => {
+            Source::new(file.display().to_string(), foreign.scenario?, "").with(overrides)
+        }
         None => Source::read(file, overrides),
     }
 }
@@ -103,12 +106,28 @@ pub(crate) fn source_of(file: &Path, overrides: &[String]) -> Result<Source, Inp
 /// The same error where it stands in the file, if no override has brought it in: overrides
 /// may move lines.
 fn in_the_file_itself(file: &Path, error: InputError) -> InputError {
-    if !matches!(worlds::translated(file), Ok(None)) {
+    if !matches!(WORLDS.translate(file), Ok(None)) {
         return error;
     }
-    let plain = Source::read(file, &[]).and_then(|source| Compiled::new(&source).map(drop));
+    let plain = Source::read(file, &[]).and_then(|source| WORLDS.compile(&source).map(drop));
     match plain {
         Err(plain) if plain.cause() == error.cause() => plain,
         _ => error,
     }
+}
+
+/// The scenario itself, for commands that are about one world alone.
+///
+/// # Errors
+/// When it is of another world.
+pub(crate) fn of_world<'a, C: 'static>(
+    compiled: &'a dyn Compiled,
+    source: &Source,
+    world: &str,
+) -> Result<&'a C, InputError> {
+    compiled.as_any().downcast_ref().ok_or_else(|| {
+        let cause = format!("this command is about the world `{world}` alone");
+        let remedy = format!("give a scenario with world = \"{world}\"");
+        InputError::new(&source.place, cause, remedy)
+    })
 }

@@ -2,7 +2,7 @@
 
 use crate::driver::next;
 use crate::exit::Failure;
-use crate::worlds::Run;
+use sidestep::kernel::Simulation;
 use sidestep::kernel::ports::{RecordError, Recorder};
 use sidestep::kernel::{Cycle, InputError};
 use sidestep::scenario::Resolved;
@@ -31,7 +31,7 @@ impl Recording {
     pub(crate) fn create(
         path: &Path,
         resolved: &Resolved,
-        run: &mut dyn Run,
+        run: &mut dyn Simulation,
         existing: Existing,
     ) -> Result<Self, Failure> {
         let plan = run.plan();
@@ -53,10 +53,10 @@ impl Recording {
     ///
     /// # Errors
     /// What the system says.
-    pub(crate) fn begin(folder: RunFolder, run: &mut dyn Run) -> Result<Self, RecordError> {
+    pub(crate) fn begin(folder: RunFolder, run: &mut dyn Simulation) -> Result<Self, RecordError> {
         run.begin_recording();
         let recorder = folder.recorder(&run.schemas(), run.cycle())?;
-        let checkpoint_every = run.plan().checkpoint_every;
+        let checkpoint_every = run.plan().checkpoint_interval();
         Ok(Self { folder, recorder, checkpoint_every, took: Duration::ZERO })
     }
 
@@ -69,7 +69,7 @@ impl Recording {
     ///
     /// # Errors
     /// What the system says.
-    pub(crate) fn take(&mut self, run: &mut dyn Run) -> Result<(), RecordError> {
+    pub(crate) fn take(&mut self, run: &mut dyn Simulation) -> Result<(), RecordError> {
         let started = Instant::now();
         run.record(&mut self.recorder)?;
         if run.cycle().is_multiple_of(self.checkpoint_every) {
@@ -80,7 +80,7 @@ impl Recording {
     }
 
     /// Makes everything so far durable.
-    fn save(&mut self, run: &dyn Run) -> Result<(), RecordError> {
+    fn save(&mut self, run: &dyn Simulation) -> Result<(), RecordError> {
         self.recorder.seal(run.cycle())?;
         self.folder.save_checkpoint(run.cycle(), &run.checkpoint())
     }
@@ -97,7 +97,7 @@ impl Recording {
     ///
     /// # Errors
     /// What the system says.
-    pub(crate) fn save_unfinished(&mut self, run: &mut dyn Run) -> Result<(), RecordError> {
+    pub(crate) fn save_unfinished(&mut self, run: &mut dyn Simulation) -> Result<(), RecordError> {
         run.record(&mut self.recorder)?;
         self.save(run)
     }
@@ -138,7 +138,7 @@ pub(crate) fn write_inputs(folder: &Path, files: &[(String, Vec<u8>)]) -> Result
 /// # Errors
 /// When the checkpoint is damaged or belongs to another version or scenario.
 pub(crate) fn restore(
-    run: &mut dyn Run,
+    run: &mut dyn Simulation,
     point: &ResumePoint,
     folder: &Path,
 ) -> Result<(), InputError> {

@@ -2,11 +2,12 @@
 
 use crate::console::{aligned, duration, grouped};
 use crate::driver::Effort;
-use crate::worlds::{Run, Told};
 use serde::Serialize;
 use serde_json::Value;
 use sidestep::kernel::Cycle;
-use sidestep::kernel::cycle::PhaseTimes;
+use sidestep::kernel::Simulation;
+use sidestep::kernel::world::Decides;
+use sidestep::scenario::Foreign;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -41,13 +42,16 @@ pub(crate) struct Summary {
     /// Cycles done since the run's start.
     cycles: Cycle,
     cycles_planned: Cycle,
-    /// Agents; named after the first world.
+    agents: usize,
+    /// Alias of `agents`, for readers of earlier summaries.
     robots: usize,
     workers: usize,
     /// Cycles done by this process; the times below are theirs.
     cycles_timed: u64,
     wall_s: f64,
     cpu_s: f64,
+    agent_cycles_per_cpu_s: f64,
+    /// Alias of `agent_cycles_per_cpu_s`.
     robot_cycles_per_cpu_s: f64,
     phases_s: Phases,
     metrics: Value,
@@ -66,31 +70,43 @@ pub(crate) struct Summary {
 /// Seconds per phase, by the clock of worker 0.
 #[derive(Debug, Clone, Copy, Serialize)]
 struct Phases {
+    claim: f64,
+    join: f64,
+    act: f64,
+    record: f64,
+    /// Aliases of the first three, for readers of earlier summaries.
     perceive_decide: f64,
     conflicts: f64,
     react: f64,
-    record: f64,
+    #[serde(skip)]
+    decides: Decides,
 }
 
 impl Phases {
-    fn new(times: PhaseTimes, record: Duration) -> Self {
-        let seconds = |ns: u64| ns as f64 / 1e9;
+    fn new(run: &dyn Simulation, record: Duration) -> Self {
+        let times = run.phase_times();
+        let [claim, join, act] =
+            [times.claim_ns, times.join_ns, times.act_ns].map(|ns| ns as f64 / 1e9);
         Self {
-            perceive_decide: seconds(times.perceive_decide_ns),
-            conflicts: seconds(times.conflicts_ns),
-            react: seconds(times.react_ns),
+            claim,
+            join,
+            act,
             record: record.as_secs_f64(),
+            perceive_decide: claim,
+            conflicts: join,
+            react: act,
+            decides: run.decides(),
         }
     }
 
     /// Shares of the whole, in words.
     fn words(self) -> String {
-        let phases = [
-            ("perceive and decide", self.perceive_decide),
-            ("conflicts", self.conflicts),
-            ("react", self.react),
-            ("record", self.record),
-        ];
+        let [first, last] = match self.decides {
+            Decides::Alone => ["perceive, decide and claim", "act"],
+            Decides::Together => ["perceive and claim", "decide and act"],
+        };
+        let phases =
+            [(first, self.claim), ("join", self.join), (last, self.act), ("record", self.record)];
         let all: f64 = phases.iter().map(|(_, s)| s).sum();
         let share = |(name, s): &(&str, f64)| format!("{name} {:.0} %", 100.0 * s / all.max(1e-12));
         phases.iter().map(share).collect::<Vec<_>>().join(", ")
@@ -108,10 +124,11 @@ pub(crate) struct Cost {
 
 impl Summary {
     /// The report of a run as it stands.
-    pub(crate) fn new(run: &dyn Run, cost: Cost, folder: Option<&Path>) -> Self {
+    pub(crate) fn new(run: &dyn Simulation, cost: Cost, folder: Option<&Path>) -> Self {
         let plan = run.plan();
-        let (cycles, robots, effort) = (run.cycle(), run.agents(), cost.effort);
+        let (cycles, agents, effort) = (run.cycle(), run.agents(), cost.effort);
         let cpu_s = effort.cpu.as_secs_f64();
+        let agent_cycles_per_cpu_s = agents as f64 * effort.cycles as f64 / cpu_s.max(1e-9);
         let status = match cycles < plan.cycles && !run.is_over() {
             true => Status::Incomplete,
             false => Status::Complete,
@@ -120,19 +137,21 @@ impl Summary {
             version: env!("CARGO_PKG_VERSION"),
             world: run.world(),
             agent: run.agent(),
-            name: plan.name,
+            name: plan.name.clone(),
             status,
             seed: plan.seed,
             digest: run.digest().to_string(),
             cycles,
             cycles_planned: plan.cycles,
-            robots,
+            agents,
+            robots: agents,
             workers: cost.workers,
             cycles_timed: effort.cycles,
             wall_s: effort.wall.as_secs_f64(),
             cpu_s,
-            robot_cycles_per_cpu_s: robots as f64 * effort.cycles as f64 / cpu_s.max(1e-9),
-            phases_s: Phases::new(run.phase_times(), cost.recording),
+            agent_cycles_per_cpu_s,
+            robot_cycles_per_cpu_s: agent_cycles_per_cpu_s,
+            phases_s: Phases::new(run, cost.recording),
             metrics: run.metrics(),
             folder: folder.map(Path::to_path_buf),
             mcap: None,
@@ -142,9 +161,9 @@ impl Summary {
     }
 
     /// Adds what was found in the file that the scenario was made from.
-    pub(crate) fn tell_of_file(&mut self, told: Told) {
-        self.file = Some(told.json);
-        self.file_lines = told.lines;
+    pub(crate) fn tell_of_file(&mut self, foreign: Foreign) {
+        self.file = Some(foreign.json);
+        self.file_lines = foreign.lines;
     }
 
     /// Adds where the recording for viewers is.
@@ -165,7 +184,7 @@ impl Summary {
     /// The report for people; `outcome` is the world's part.
     pub(crate) fn text(&self, outcome: Lines) -> String {
         let mut lines = vec![
-            line(&format!("{}s", self.agent), grouped(self.robots as u64)),
+            line(&format!("{}s", self.agent), grouped(self.agents as u64)),
             line("cycles", self.cycles_words()),
         ];
         lines.extend(outcome);
@@ -202,7 +221,7 @@ impl Summary {
             duration(self.wall_s),
             grouped(self.cycles_timed),
             grouped(per_second as u64),
-            rate(self.robot_cycles_per_cpu_s),
+            rate(self.agent_cycles_per_cpu_s),
             self.agent,
             self.workers,
             if self.workers == 1 { "" } else { "s" },

@@ -2,11 +2,12 @@
 
 use crate::exit::Failure;
 use crate::recording::{restore, write_inputs};
-use crate::worlds::{Compiled, Run};
+use sidestep::kernel::Simulation;
 use sidestep::kernel::checkpoint::decode_header;
 use sidestep::kernel::{Cycle, InputError};
 use sidestep::scenario::Resolved;
 use sidestep::scenario::Source;
+use sidestep::worlds::WORLDS;
 use sidestep_record::{McapRun, ResumePoint, RunView, Status, is_mcap};
 use std::path::{Path, PathBuf};
 
@@ -104,8 +105,8 @@ impl Recorded {
     /// # Errors
     /// Results may change between versions, so only the writer's own can be computed again. A
     /// scenario that is wrong by now.
-    pub(crate) fn start(&self, workers: usize) -> Result<Box<dyn Run>, InputError> {
-        let (compiled, source) = (Compiled::new(&self.source)?, &self.source);
+    pub(crate) fn start(&self, workers: usize) -> Result<Box<dyn Simulation>, InputError> {
+        let (compiled, source) = (WORLDS.compile(&self.source)?, &self.source);
         let (wrote, reads) = (&self.version, env!("CARGO_PKG_VERSION"));
         if wrote == reads {
             return Ok(compiled.start(source, workers));
@@ -123,7 +124,7 @@ impl Recorded {
         &self,
         cycle: Cycle,
         workers: usize,
-    ) -> Result<Box<dyn Run>, InputError> {
+    ) -> Result<Box<dyn Simulation>, InputError> {
         let mut run = self.start(workers)?;
         if let Some(folder) = &self.folder
             && let Ok(bytes) = std::fs::read(folder.join("checkpoint.bin"))
@@ -139,7 +140,7 @@ impl Recorded {
     ///
     /// # Errors
     /// When they differ.
-    pub(crate) fn confirm(&self, run: &dyn Run) -> Result<bool, Failure> {
+    pub(crate) fn confirm(&self, run: &dyn Simulation) -> Result<bool, Failure> {
         let Some(recorded) = self.digest.as_ref().filter(|_| run.cycle() == self.cycles_done)
         else {
             return Ok(false);

@@ -28,6 +28,13 @@ pub struct Plan {
     pub checkpoint_every: Cycle,
 }
 
+impl Plan {
+    /// Cycles from one checkpoint to the next; the largest number where there is none.
+    pub fn checkpoint_interval(&self) -> Cycle {
+        if self.checkpoint_every == 0 { Cycle::MAX } else { self.checkpoint_every }
+    }
+}
+
 /// What a run has seen and spent in this process, beside its results.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Effort {

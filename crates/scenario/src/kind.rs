@@ -14,6 +14,9 @@ pub trait Kind: Sync {
     /// Noun for one of its agents, e.g. `robot`.
     fn agent(&self) -> &'static str;
 
+    /// One line that says what it simulates.
+    fn about(&self) -> &'static str;
+
     /// A commented scenario with every key.
     fn default_scenario(&self) -> &'static str;
 
@@ -21,7 +24,7 @@ pub trait Kind: Sync {
     /// world does not read.
     ///
     /// # Errors
-    /// When such a file cannot be read, or holds nothing to simulate.
+    /// When such a file cannot be read.
     fn translate(&self, _: &Path) -> Result<Option<Foreign>, InputError> {
         Ok(None)
     }
@@ -35,6 +38,9 @@ pub trait Kind: Sync {
 
 /// A scenario that has been found right; many runs of it share one world.
 pub trait Compiled: Send + Sync {
+    /// Name of its world.
+    fn world(&self) -> &'static str;
+
     /// What the scenario asks for.
     fn plan(&self) -> Plan;
 
@@ -60,8 +66,8 @@ pub trait Compiled: Send + Sync {
 /// What a file of another program's form stands for.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Foreign {
-    /// The scenario's text.
-    pub scenario: String,
+    /// The scenario's text, or why nobody in the file can be simulated.
+    pub scenario: Result<String, InputError>,
     /// What was found in the file beside it, for machines,
     pub json: serde_json::Value,
     /// and for people.
@@ -99,7 +105,7 @@ impl Worlds {
     /// What a file of another program's form stands for; `None` for files of our own.
     ///
     /// # Errors
-    /// When it cannot be read, or holds nothing to simulate.
+    /// When it cannot be read.
     pub fn translate(self, file: &Path) -> Result<Option<Foreign>, InputError> {
         for kind in self.0 {
             if let Some(foreign) = kind.translate(file)? {

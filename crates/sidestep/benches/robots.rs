@@ -6,10 +6,11 @@
 
 use cpu_time::ProcessTime;
 use sidestep::scenario::Source;
-use sidestep::worlds::robots::{RobotsRun, robots_run};
+use sidestep::worlds::robots::run::heap_bytes;
+use sidestep::worlds::robots::{RobotsRun, RobotsWorld, robots_run};
 use sidestep_kernel::conflict::Groups;
-use sidestep_kernel::ports::Recorder;
-use sidestep_kernel::{Simulation, World};
+use sidestep_kernel::ports::{Recorder, SystemClock};
+use sidestep_kernel::{Phases, Simulation, Turn};
 use sidestep_record::{Origin, ParquetRecorder};
 use std::time::Instant;
 
@@ -129,7 +130,7 @@ fn rates() {
     println!("robot-cycles per CPU second, one worker, both unreliable (promised in brackets)");
     for case in CASES {
         let simulation = case.simulation(1);
-        let (boxes, bodies) = simulation.heap_bytes();
+        let (boxes, bodies) = heap_bytes(&simulation);
         let map_boxes = simulation.world().map.cells().len() as f64;
         let robots = f64::from(case.robots);
         let allowed = 200.0 * robots + 2.0 * map_boxes;
@@ -187,15 +188,17 @@ fn plain_loop() {
         let (world, state) = (plain.world().clone(), plain.state());
         let (mut scratch, groups) = (world.scratch(), Groups::new(world.bodies.len()));
         let n = world.bodies.len();
+        let clock = &SystemClock::default();
         let mut now = 0;
         let mut members = Vec::new();
         let mut plain_cycle = || {
             (0..n as u32).for_each(|slot| groups.reset(slot));
-            world.perceive_and_decide(state, now, 0..n, &mut scratch);
-            world.find_conflicts(state, now, 0..n, &groups, &mut scratch);
+            let turn = &mut Turn { world: &*world, state, now, clock, scratch: &mut scratch };
+            RobotsWorld::claim(turn, 0..n);
+            RobotsWorld::join(turn, 0..n, &groups);
             for slot in (0..n as u32).filter(|&s| groups.is_leader(s)) {
                 groups.members(slot, &mut members);
-                world.react(state, now, &mut members, &mut scratch);
+                RobotsWorld::act(turn, &mut members);
             }
             now += 1;
         };

@@ -33,6 +33,6 @@ fn main() -> Result<(), InputError> {
     let compiled = Compiled::new(&source, &own, StorageOrder::Spatial)?;
     let mut run = compiled.start(&source, 2);
     run.advance(10_000);
-    println!("{:#}", run.metrics());
+    println!("{:#}", Simulation::metrics(&run));
     Ok(())
 }

@@ -8,22 +8,23 @@ use crate::interrupt;
 use crate::picture;
 use crate::recording::Recording;
 use crate::report::{Cost, Status, Summary, SummaryFile};
-use crate::worlds::{Run, Told};
 use sidestep::kernel::Cycle;
+use sidestep::kernel::Simulation;
 use sidestep::kernel::ports::RecordError;
+use sidestep::scenario::Foreign;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Duration;
 
 /// A run that is ready to go.
 pub(super) struct Journey {
-    pub(super) run: Box<dyn Run>,
+    pub(super) run: Box<dyn Simulation>,
     pub(super) recording: Option<Recording>,
     pub(super) film: Option<McapFilm>,
     pub(super) workers: usize,
     /// Where to stop, if before the planned end.
     pub(super) until: Option<Cycle>,
     /// What to report of the file that the scenario was made from.
-    pub(super) told: Option<Told>,
+    pub(super) told: Option<Foreign>,
 }
 
 /// Goes to the end of a recorded run and stores all that belongs to it; whether it got there.
@@ -31,7 +32,7 @@ pub(super) struct Journey {
 /// # Errors
 /// When something cannot be stored.
 pub(crate) fn recorded_run(
-    run: &mut dyn Run,
+    run: &mut dyn Simulation,
     mut recording: Recording,
     workers: usize,
     console: Console,
@@ -96,7 +97,7 @@ fn ending(summary: &Summary, recorded: bool, console: Console) -> ExitCode {
 
 /// Ends the folder: whole tables and pictures, or a checkpoint to resume at.
 fn store(
-    run: &mut dyn Run,
+    run: &mut dyn Simulation,
     mut recording: Recording,
     summary: &Summary,
     console: Console,
@@ -121,7 +122,7 @@ fn store(
 
 /// Drives the run; a bug says what replays it.
 fn drive_guarded(
-    run: &mut dyn Run,
+    run: &mut dyn Simulation,
     until: Cycle,
     sinks: Sinks<'_>,
     console: Console,
@@ -131,7 +132,7 @@ fn drive_guarded(
 }
 
 /// Adds what saves the run where something could not be stored.
-fn broken_by(failure: Failure, run: &dyn Run, recording: Option<&Recording>) -> Failure {
+fn broken_by(failure: Failure, run: &dyn Simulation, recording: Option<&Recording>) -> Failure {
     match failure {
         Failure::Record(error) => broken(run, recording, &error),
         other => other,
@@ -139,15 +140,15 @@ fn broken_by(failure: Failure, run: &dyn Run, recording: Option<&Recording>) -> 
 }
 
 /// What replays a run up to where it failed.
-fn whereabouts(run: &dyn Run) -> String {
+fn whereabouts(run: &dyn Simulation) -> String {
     let plan = run.plan();
     let (cycle, version) = (run.cycle(), env!("CARGO_PKG_VERSION"));
-    let (name, seed, cycles) = (plan.name, plan.seed, plan.cycles);
+    let (name, seed, cycles) = (&plan.name, plan.seed, plan.cycles);
     format!("at cycle {cycle} of {cycles} of `{name}`, seed {seed}, sidestep {version}")
 }
 
 /// Recording failed: says what saves the run.
-fn broken(run: &dyn Run, recording: Option<&Recording>, error: &RecordError) -> Failure {
+fn broken(run: &dyn Simulation, recording: Option<&Recording>, error: &RecordError) -> Failure {
     let remedy = match recording.map(|r| r.folder().path().display()) {
         Some(folder) => format!("make room, then continue with: sidestep resume {folder}"),
         None => "make room, then run it again; without --out nothing can be continued".into(),
@@ -156,7 +157,7 @@ fn broken(run: &dyn Run, recording: Option<&Recording>, error: &RecordError) -> 
 }
 
 /// The simulation broke a rule of its own.
-fn bug(run: &dyn Run) -> Failure {
+fn bug(run: &dyn Simulation) -> Failure {
     let cause = format!("this is a bug in sidestep, met shortly after\n  {}", whereabouts(run));
     Failure::stopped(cause, "please report it with the scenario and the lines above")
 }

@@ -8,9 +8,9 @@ use crate::interrupt;
 use crate::picture::{origin, svg, write_png};
 use crate::plan::WorkersArg;
 use crate::rerun::Recorded;
-use crate::worlds::Run;
 use clap::Args;
 use serde_json::json;
+use sidestep::kernel::Simulation;
 use sidestep::kernel::{Cycle, InputError};
 use std::path::PathBuf;
 
@@ -137,14 +137,14 @@ fn check_cycle(cycle: Cycle, planned: Cycle) -> Result<(), InputError> {
     Err(InputError::new(format!("--cycle {cycle}"), cause, format!("give 0 to {planned}")))
 }
 
-fn draw(run: &mut dyn Run, recorded: &Recorded, args: &ReplayArgs) -> Result<(), Failure> {
+fn draw(run: &mut dyn Simulation, recorded: &Recorded, args: &ReplayArgs) -> Result<(), Failure> {
     let Some(png) = &args.png else { return Ok(()) };
     let origin = origin(run);
     let svg = svg(run, recorded.folder.as_deref(), &origin)?;
     write_png(png, &svg)
 }
 
-fn show(run: &dyn Run, compared: usize, console: Console) {
+fn show(run: &dyn Simulation, compared: usize, console: Console) {
     let poses = run.poses();
     let digest = run.digest().to_string();
     let json = json!({

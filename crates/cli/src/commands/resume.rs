@@ -7,10 +7,10 @@ use crate::interrupt;
 use crate::plan::WorkersArg;
 use crate::recording::{Recording, restore};
 use crate::sweep::{Folder, go_on};
-use crate::worlds::Compiled;
 use clap::Args;
 use sidestep::kernel::{Cycle, InputError};
 use sidestep::scenario::Source;
+use sidestep::worlds::WORLDS;
 use sidestep_record::RunFolder;
 use std::path::{Path, PathBuf};
 
@@ -50,7 +50,7 @@ pub(crate) fn resume(args: &ResumeArgs, console: Console) -> Result<ExitCode, Fa
     let (folder, point) = RunFolder::resume(&args.folder)?;
     let workers = args.workers.count();
     let source = Source::new(scenario_place(&args.folder), folder.scenario(), &args.folder);
-    let mut run = Compiled::new(&source)?.start(&source, workers);
+    let mut run = WORLDS.compile(&source)?.start(&source, workers);
     restore(run.as_mut(), &point, &args.folder)?;
     check_end(args.cycles, run.cycle(), run.plan().cycles)?;
     interrupt::listen()?;

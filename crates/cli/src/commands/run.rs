@@ -9,10 +9,10 @@ use crate::interrupt;
 use crate::plan::{ScenarioArgs, WorkersArg};
 use crate::recording::Recording;
 use crate::sweep::ManyArgs;
-use crate::worlds;
 use clap::{ArgGroup, Args};
 use sidestep::kernel::{Cycle, InputError};
 use sidestep::scenario::Source;
+use sidestep::worlds::WORLDS;
 use sidestep_record::{Existing, McapRecorder};
 use std::path::PathBuf;
 
@@ -79,7 +79,7 @@ pub(crate) fn run(args: &RunArgs, console: Console) -> Result<ExitCode, Failure>
     }
     args.many.check_one_run()?;
     let (source, compiled) = args.scenario.compile()?;
-    let told = worlds::told_of(&args.scenario.file)?;
+    let told = WORLDS.translate(&args.scenario.file)?;
     let workers = args.workers.count();
     let existing = if args.replace { Existing::Replace } else { Existing::Refuse };
     if let Some(file) = &args.mcap {

@@ -2,8 +2,8 @@
 
 use super::Film;
 use crate::exit::Failure;
-use crate::worlds::Run;
 use sidestep::kernel::Cycle;
+use sidestep::kernel::Simulation;
 use sidestep::kernel::view::Look;
 use sidestep::scenario::Resolved;
 use sidestep_record::{McapEnd, McapOrigin, McapRecorder, Origin, Status};
@@ -41,7 +41,7 @@ impl McapFilm {
         path: &Path,
         every: Cycle,
         resolved: Resolved,
-        run: &mut dyn Run,
+        run: &mut dyn Simulation,
     ) -> Result<Self, Failure> {
         let plan = run.plan();
         let mut files = resolved.files;
@@ -66,7 +66,7 @@ impl McapFilm {
     ///
     /// # Errors
     /// What the system says.
-    pub(crate) fn finish(self, run: &dyn Run, ending: Ending) -> Result<PathBuf, Failure> {
+    pub(crate) fn finish(self, run: &dyn Simulation, ending: Ending) -> Result<PathBuf, Failure> {
         let status = match ending {
             Ending::Complete => Status::Complete,
             Ending::Extract | Ending::Stopped => Status::Incomplete,
@@ -90,7 +90,7 @@ impl Film for McapFilm {
         self.every
     }
 
-    fn shoot(&mut self, run: &mut dyn Run) -> Result<(), Failure> {
+    fn shoot(&mut self, run: &mut dyn Simulation) -> Result<(), Failure> {
         let started = Instant::now();
         self.recorder.frame(&run.frame(LOOK))?;
         self.took += started.elapsed();

@@ -9,8 +9,8 @@ pub(crate) use mcap::{Ending, McapFilm};
 pub(crate) use pictures::Pictures;
 
 use crate::exit::Failure;
-use crate::worlds::Run;
 use sidestep::kernel::Cycle;
+use sidestep::kernel::Simulation;
 
 /// Takes a picture of a run now and then.
 pub(crate) trait Film {
@@ -21,5 +21,5 @@ pub(crate) trait Film {
     ///
     /// # Errors
     /// When it cannot be stored.
-    fn shoot(&mut self, run: &mut dyn Run) -> Result<(), Failure>;
+    fn shoot(&mut self, run: &mut dyn Simulation) -> Result<(), Failure>;
 }

@@ -3,7 +3,7 @@
 use super::Film;
 use crate::console::grouped;
 use crate::exit::Failure;
-use crate::worlds::Run;
+use sidestep::kernel::Simulation;
 use sidestep::kernel::view::{Frame, Look, Scenery, Trail, Who};
 use sidestep::kernel::{Cycle, InputError};
 use sidestep_draw::{Film as View, Still, worth_a_trail};
@@ -23,7 +23,7 @@ pub(crate) struct Pictures {
 
 impl Pictures {
     /// A film of a run with a picture every so many cycles.
-    pub(crate) fn new(run: &dyn Run, every: Cycle) -> Self {
+    pub(crate) fn new(run: &dyn Simulation, every: Cycle) -> Self {
         Self { scenery: run.scenery(), every, frames: Vec::new(), bodies: 0 }
     }
 
@@ -70,7 +70,7 @@ impl Film for Pictures {
         self.every
     }
 
-    fn shoot(&mut self, run: &mut dyn Run) -> Result<(), Failure> {
+    fn shoot(&mut self, run: &mut dyn Simulation) -> Result<(), Failure> {
         let frame = run.frame(Look::BODIES);
         self.bodies += frame.bodies.len();
         if self.bodies > MOST_BODIES {

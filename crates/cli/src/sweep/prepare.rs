@@ -6,8 +6,8 @@ use crate::progress::Stages;
 use sidestep::experiment::sweep::cell::metric_names;
 use sidestep::experiment::sweep::{Plan, Setting, Sweep, Variant};
 use sidestep::kernel::InputError;
-use sidestep::scenario::{Source, nearest};
-use sidestep::worlds::any::AnyCompiled;
+use sidestep::scenario::{Compiled, Source, nearest};
+use sidestep::worlds::WORLDS;
 
 /// Compiles every variant, hands it to `each` with its number, and makes the plan.
 ///
@@ -16,7 +16,7 @@ use sidestep::worlds::any::AnyCompiled;
 pub(super) fn prepare(
     sweep: &Sweep,
     stages: &Stages,
-    mut each: impl FnMut(u32, &Source, &AnyCompiled) -> Result<(), Failure>,
+    mut each: impl FnMut(u32, &Source, &dyn Compiled) -> Result<(), Failure>,
 ) -> Result<Plan, Failure> {
     let fixed: Vec<String> = sweep.fixed.iter().map(Setting::to_override).collect();
     let base = source_of(&sweep.scenario, &fixed)?;
@@ -27,25 +27,29 @@ pub(super) fn prepare(
     for (k, settings) in (0u32..).zip(&variants) {
         stages.at("checking variants", f64::from(k) / count as f64);
         let (source, compiled) = variant(&base, settings)?;
-        agents = agents.max(compiled.agents());
+        agents = agents.max(compiled.bodies() as u64);
         if first.is_none() {
             first = Some((compiled.world(), compiled.plan().seed));
-            check_metrics(sweep, &source, &compiled)?;
+            check_metrics(sweep, &source, compiled.as_ref())?;
         }
-        each(k, &source, &compiled)?;
+        each(k, &source, compiled.as_ref())?;
     }
     let first = first.expect("a design has at least one variant");
     Ok(Plan { agents, ..Plan::new(sweep, variants, first)? })
 }
 
 /// The metrics that are named must be there: better told now than after all runs.
-fn check_metrics(sweep: &Sweep, source: &Source, compiled: &AnyCompiled) -> Result<(), InputError> {
+fn check_metrics(
+    sweep: &Sweep,
+    source: &Source,
+    compiled: &dyn Compiled,
+) -> Result<(), InputError> {
     let of_until = sweep.until.iter().flat_map(|until| &until.metrics);
     let mut wanted = sweep.metrics.iter().chain(of_until).peekable();
     if wanted.peek().is_none() {
         return Ok(());
     }
-    let mut simulation = compiled.clone().start(source, 1);
+    let mut simulation = compiled.start(source, 1);
     // Some metrics are there only once something has happened.
     simulation.advance(1);
     let known = metric_names(simulation.as_ref());
@@ -56,10 +60,10 @@ fn check_metrics(sweep: &Sweep, source: &Source, compiled: &AnyCompiled) -> Resu
 }
 
 /// A variant's scenario; an error says which variant it is.
-fn variant(base: &Source, settings: &[Setting]) -> Result<(Source, AnyCompiled), InputError> {
+fn variant(base: &Source, settings: &[Setting]) -> Result<(Source, Box<dyn Compiled>), InputError> {
     let overrides: Vec<String> = settings.iter().map(Setting::to_override).collect();
     let compiled = base.clone().with(&overrides).and_then(|source| {
-        let compiled = AnyCompiled::new(&source)?;
+        let compiled = WORLDS.compile(&source)?;
         Ok((source, compiled))
     });
     compiled.map_err(|e| {

@@ -6,11 +6,11 @@ use crate::exit::Failure;
 use crate::interrupt;
 use crate::progress::Progress;
 use crate::recording::Recording;
-use crate::worlds::Compiled;
 use serde_json::json;
 use sidestep::experiment::sweep::{Cell, Outcome, Plan, start};
 use sidestep::kernel::{InputError, workers};
 use sidestep::scenario::Source;
+use sidestep::worlds::WORLDS;
 use sidestep_record::Existing;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
@@ -114,7 +114,7 @@ impl Work<'_> {
 
 fn plain(cell: Cell, variant: &Source, workers: usize) -> Result<Option<Outcome>, Failure> {
     let begun = Instant::now();
-    let started = start(cell, variant, workers)?;
+    let started = start(WORLDS, cell, variant, workers)?;
     let compiled = Instant::now();
     let outcome = started.run(&|| !interrupt::requested());
     Ok(outcome.map(|outcome| timed(outcome, [compiled - begun, compiled.elapsed()])))
@@ -133,7 +133,7 @@ pub(super) fn recorded(
 ) -> Result<Option<Outcome>, Failure> {
     let begun = Instant::now();
     let source = variant.with(&[format!("seed={}", cell.seed)])?;
-    let compiled = Compiled::new(&source)?;
+    let compiled = WORLDS.compile(&source)?;
     let resolved = compiled.resolve(&source)?;
     let itself = Source::new("scenario.toml", &*resolved.text, folder);
     let mut run = compiled.start(&itself, workers);

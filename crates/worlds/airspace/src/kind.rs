@@ -21,6 +21,10 @@ impl Kind for Airspace {
         AirspaceWorld::AGENT
     }
 
+    fn about(&self) -> &'static str {
+        "Airplanes that avoid each other"
+    }
+
     fn default_scenario(&self) -> &'static str {
         include_str!("../../../../scenarios/airspace/default.toml")
     }
@@ -35,6 +39,10 @@ impl Kind for Airspace {
 }
 
 impl AnyCompiled for Compiled {
+    fn world(&self) -> &'static str {
+        AirspaceWorld::NAME
+    }
+
     fn plan(&self) -> Plan {
         Compiled::plan(self)
     }

@@ -20,6 +20,10 @@ impl Kind for Chains {
         ChainWorld::<2>::AGENT
     }
 
+    fn about(&self) -> &'static str {
+        "Chains that creep among obstacles"
+    }
+
     fn default_scenario(&self) -> &'static str {
         include_str!("../../../../scenarios/chain/default.toml")
     }
@@ -33,6 +37,10 @@ impl Kind for Chains {
 }
 
 impl<const D: usize> AnyCompiled for Compiled<D> {
+    fn world(&self) -> &'static str {
+        ChainWorld::<D>::NAME
+    }
+
     fn plan(&self) -> Plan {
         Compiled::plan(self)
     }

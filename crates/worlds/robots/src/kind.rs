@@ -20,6 +20,10 @@ impl Kind for Robots {
         RobotsWorld::AGENT
     }
 
+    fn about(&self) -> &'static str {
+        "Stochastic robots on a grid"
+    }
+
     fn default_scenario(&self) -> &'static str {
         include_str!("../../../../scenarios/robots/default.toml")
     }
@@ -31,6 +35,10 @@ impl Kind for Robots {
 }
 
 impl AnyCompiled for Compiled {
+    fn world(&self) -> &'static str {
+        RobotsWorld::NAME
+    }
+
     fn plan(&self) -> Plan {
         Compiled::plan(self)
     }

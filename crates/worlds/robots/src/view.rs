@@ -9,7 +9,6 @@ use sidestep_kernel::math::{cos, sin};
 use sidestep_kernel::space::{BoxWord, Floor};
 use sidestep_kernel::view::{self, Body, Condition, Entry, Kind, Level, Pose, Scan, Shape};
 use sidestep_kernel::{Column, Cycle, EntityId, Phases};
-use sidestep_map::Cell;
 use std::f64::consts::FRAC_PI_2;
 
 /// What a cycle counts as where seconds are asked for: the model itself knows no other time.

@@ -11,9 +11,9 @@ use crate::film::{Ending, McapFilm};
 use crate::interrupt;
 use crate::plan::WorkersArg;
 use crate::rerun::Recorded;
-use crate::worlds::Run;
 use clap::{Args, ValueEnum};
 use serde_json::json;
+use sidestep::kernel::Simulation;
 use sidestep::kernel::{Cycle, InputError};
 use std::path::PathBuf;
 use target::Target;
@@ -194,7 +194,7 @@ fn run_up_to(
     cycle: Cycle,
     workers: WorkersArg,
     console: Console,
-) -> Result<Option<Box<dyn Run>>, Failure> {
+) -> Result<Option<Box<dyn Simulation>>, Failure> {
     let mut run = recorded.start_near(cycle, workers.count())?;
     drive(run.as_mut(), cycle, Sinks::default(), console)?;
     Ok((run.cycle() == cycle || run.is_over()).then_some(run))

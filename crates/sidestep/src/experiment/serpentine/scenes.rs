@@ -5,8 +5,8 @@ use super::Plan;
 use super::runs::begun;
 use super::{broken, corridor, snake};
 use crate::experiment::Scene;
-use crate::worlds::chain::geometry::Point;
 use crate::worlds::chain::ChainRun;
+use crate::worlds::chain::geometry::Point;
 use sidestep_kernel::view::{Body, Frame, Kind, Look, Place, Pose, Scenery, Shape, Trail};
 use sidestep_kernel::{InputError, Simulation};
 
