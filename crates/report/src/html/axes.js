@@ -80,15 +80,18 @@ const axes = (() => {
     const exponent = floorLog(Math.abs(value));
     const mantissa = String(Number((value / power(exponent)).toFixed(digits)));
     if (exponent === 0) return minus(mantissa);
+    if (exponent === 1) return minus(String(Number((Number(mantissa) * 10).toFixed(digits))));
     if (mantissa === "1" || mantissa === "-1") return minus(mantissa.replace("1", `10${superscript(exponent)}`));
     return minus(`${mantissa}\u00d710${superscript(exponent)}`);
   }
 
-  // What the tick of a value says where the next one is a step away.
-  function label(value, step) {
+  // What the tick of a value says where the next one is a step away, and no value is beyond `most`.
+  // Powers of ten stand where all digits would be many, and few of them are needed.
+  function label(value, step, most) {
     const digits = Math.max(0, -floorLog(step));
-    if (Math.abs(value) < 1e-6 * step) return digits > 5 ? "0" : (0).toFixed(digits);
-    if (Math.abs(value) < 999999.5 && digits <= 5) return minus(value.toFixed(digits));
+    const isLong = (digits > 5 || most >= 999999.5) && floorLog(most) - floorLog(step) <= 2;
+    if (Math.abs(value) < 1e-6 * step) return isLong ? "0" : (0).toFixed(digits);
+    if (!isLong) return minus(value.toFixed(digits));
     const needed = floorLog(Math.abs(value)) - floorLog(step);
     return scientific(value, Math.min(Math.max(needed, 0), 10));
   }
@@ -105,7 +108,8 @@ const axes = (() => {
     const first = Math.ceil(low / step - 1e-9);
     const count = Math.min(Math.floor(high / step + 1e-9) - first, 100) + 1;
     const values = Array.from({ length: Math.max(count, 0) }, (_, k) => (first + k) * step);
-    return { major: values.map((value) => ({ at: value, label: label(value, step) })), minor: [] };
+    const largest = Math.max(Math.abs(low), Math.abs(high));
+    return { major: values.map((value) => ({ at: value, label: label(value, step, largest) })), minor: [] };
   }
 
   // At the powers of ten; where there is room for more, at 1, 2 and 5 or 1 and 3 times them.
@@ -131,7 +135,7 @@ const axes = (() => {
 
   function told(marks) {
     const plain = marks.every(({ value }) => value >= 0.000999 && value <= 10001);
-    const say = (value) => (plain ? label(value, power(floorLog(value))) : scientific(value, 0));
+    const say = (value) => (plain ? label(value, power(floorLog(value)), value) : scientific(value, 0));
     return marks.map(({ at, value }) => ({ at, label: say(value) }));
   }
 
@@ -140,12 +144,15 @@ const axes = (() => {
     const places = [...new Set(values)].map((value) => ({ value, at: measured(scale, value) }))
       .filter(({ at }) => !Number.isNaN(at)).sort((a, b) => a.at - b.at);
     const gap = Math.min(...places.slice(1).map(({ at }, k) => at - places[k].at));
-    if (places.length < 2 || places.length > 10 || gap < 0.07 * (high - low)) return null;
+    if (places.length < 1 || places.length > 10 || gap < 0.07 * (high - low)) return null;
     return { major: places.map(({ value, at }) => ({ at, label: digits(value) })), minor: [] };
   }
 
   // A value for a reader: five digits tell any two measurements apart.
-  const digits = (value) => minus(Number(value.toPrecision(5)).toString());
+  function digits(value) {
+    const words = String(Number(value.toPrecision(5)));
+    return words.includes("e") ? scientific(value, 4) : minus(words);
+  }
 
   return { measured, extent, padded, rounded, ticks, ticksAt, digits };
 })();

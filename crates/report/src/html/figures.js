@@ -165,7 +165,7 @@
   function ticksAcross(figure, shown, range, area, isWhole) {
     const most = Math.min(Math.max(Math.floor(area.width / 70), 2), 12);
     if (isWhole && ["lines", "bands"].includes(figure.kind)) {
-      const values = shown.flatMap((series) => series.points.map((point) => point.told.x));
+      const values = shown.flatMap((series) => series.points.filter(isThere).map((point) => point.told.x));
       const given = axes.ticksAt(figure.x_scale, values, range);
       const room = (tick) => widthOf(tick.label) + 8;
       const needed = given?.major.reduce((sum, tick) => sum + room(tick), 0) ?? Infinity;
@@ -279,7 +279,10 @@
     if (categoriesOf(figure)) {
       const base = layout.toY(Math.max(layout.y[0], figure.y_scale === "log" ? layout.y[0] : 0));
       group.append(...there.map((point) => bar(point, base, color)));
-      group.append(...there.filter((p) => p.ends).map((p) => errorBar(p, Math.min(0.2 * p.width, 5), { class: "interval ink" })));
+      const half = Math.min(0.2 * (there[0]?.width ?? 0), 5);
+      group.append(...there.filter((p) => p.ends).map((p) => errorBar(p, half, { class: "interval ink" })));
+      const right = layout.area.left + layout.area.width;
+      group.append(drawn("line", { class: "axis", x1: layout.area.left, y1: base, x2: right, y2: base }));
       return group;
     }
     if (isBanded(figure)) {
@@ -317,7 +320,12 @@
     const marks = placed(chart, layout);
     const { area } = layout;
     const clip = `${chart.id}-area`;
-    const box = { x: area.left, y: area.top - 1, width: area.width + 1, height: area.height + 2 };
+    // A mark at the end of an axis is seen as a whole; of a part only what lies in it.
+    const slack = chart.zoom ? 1 : 6;
+    const box = {
+      x: area.left - slack, y: area.top - slack,
+      width: area.width + 2 * slack, height: area.height + 2 * slack,
+    };
     const data = drawn("g", { "clip-path": `url(#${clip})` }, ...marks.map((each) => seriesMarks(chart, each, layout)));
     const rect = drawn("rect", { class: "selection", visibility: "hidden" });
     const spot = drawn("g", { class: "spot" });
