@@ -4,13 +4,21 @@
   addEventListener("error", (event) => found.errors.push(event.message));
   addEventListener("unhandledrejection", (event) => found.errors.push(String(event.reason)));
   addEventListener("securitypolicyviolation", (event) =>
-    found.violations.push(`${event.violatedDirective} ${event.blockedURI}`));
+    found.violations.push(`${event.violatedDirective} ${event.blockedURI}`),
+  );
   const all = (selector) => [...document.querySelectorAll(selector)];
   const later = (ms) => new Promise((done) => setTimeout(done, ms));
 
   // What a mouse sends to the element at a place of the window.
   function send(element, [clientX, clientY], ...kinds) {
-    const at = { bubbles: true, cancelable: true, clientX, clientY, button: 0, pointerType: "mouse" };
+    const at = {
+      bubbles: true,
+      cancelable: true,
+      clientX,
+      clientY,
+      button: 0,
+      pointerType: "mouse",
+    };
     for (const kind of kinds) {
       const Kind = kind.startsWith("pointer") ? PointerEvent : MouseEvent;
       element.dispatchEvent(new Kind(kind, at));
@@ -42,16 +50,23 @@
     return plot.querySelector(".tip:not([hidden])")?.textContent ?? "";
   }
 
-  const ticks = (plot) => [...plot.querySelectorAll(".tick")].map((tick) => tick.textContent).join(" ");
+  const ticks = (plot) =>
+    [...plot.querySelectorAll(".tick")].map((tick) => tick.textContent).join(" ");
 
   // Words at the axes of a figure that touch others or are cut off by its edge.
   function spoiled(plot) {
     const edge = plot.querySelector(".chart").getBoundingClientRect();
-    const words = [...plot.querySelectorAll(".tick")].map((tick) => [tick.textContent, tick.getBoundingClientRect()]);
-    const isCut = ([, box]) => box.left < edge.left - 1 || box.right > edge.right + 1 || box.bottom > edge.bottom + 1;
-    const touch = ([, a], [, b]) => Math.min(a.right, b.right) - Math.max(a.left, b.left) > 1
-      && Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 2;
-    return words.filter((word, k) => isCut(word) || words.slice(k + 1).some((other) => touch(word, other)))
+    const words = [...plot.querySelectorAll(".tick")].map((tick) => [
+      tick.textContent,
+      tick.getBoundingClientRect(),
+    ]);
+    const isCut = ([, box]) =>
+      box.left < edge.left - 1 || box.right > edge.right + 1 || box.bottom > edge.bottom + 1;
+    const touch = ([, a], [, b]) =>
+      Math.min(a.right, b.right) - Math.max(a.left, b.left) > 1 &&
+      Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 2;
+    return words
+      .filter((word, k) => isCut(word) || words.slice(k + 1).some((other) => touch(word, other)))
       .map(([word]) => word);
   }
 
@@ -72,7 +87,11 @@
 
   async function look() {
     const plots = all(".plot .drawn");
-    for (let k = 0; k < 300 && all(".plot").length !== Number(document.documentElement.dataset.drawn ?? 0); k += 1) {
+    for (
+      let k = 0;
+      k < 300 && all(".plot").length !== Number(document.documentElement.dataset.drawn ?? 0);
+      k += 1
+    ) {
       await later(100);
     }
     found.figures = all("figure.plot").length;
@@ -99,7 +118,9 @@
         found.sorted.push(column());
       }
     }
-    const plot = plots.find((each) => each.querySelectorAll(".series").length > 1 && each.querySelector(".entry"));
+    const plot = plots.find(
+      (each) => each.querySelectorAll(".series").length > 1 && each.querySelector(".entry"),
+    );
     if (plot) {
       found.hover = hover(plot);
       [found.zoomed, found.whole_again] = zoom(plot);
@@ -111,7 +132,9 @@
       found.shown_again = count() === before;
     }
     // A page of its own makes none.
-    found.requests = performance.getEntriesByType("resource").map((entry) => entry.name)
+    found.requests = performance
+      .getEntriesByType("resource")
+      .map((entry) => entry.name)
       .filter((name) => !name.startsWith("data:"));
     const script = document.createElement("script");
     script.type = "application/json";
@@ -120,8 +143,10 @@
     document.body.append(script);
   }
 
-  addEventListener("load", () => look().catch((error) => {
-    document.title = `probe failed: ${error}`;
-    console.error(error);
-  }));
+  addEventListener("load", () =>
+    look().catch((error) => {
+      document.title = `probe failed: ${error}`;
+      console.error(error);
+    }),
+  );
 })();

@@ -72,8 +72,11 @@ const axes = (() => {
 
   const SUPERSCRIPTS = "\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079";
   const superscript = (exponent) =>
-    String(exponent).replace("-", "\u207b").replace(/\d/g, (digit) => SUPERSCRIPTS[digit]);
-  const minus = (digits) => (/^-[0.]*$/.test(digits) ? digits.slice(1) : digits.replace("-", "\u2212"));
+    String(exponent)
+      .replace("-", "\u207b")
+      .replace(/\d/g, (digit) => SUPERSCRIPTS[digit]);
+  const minus = (digits) =>
+    /^-[0.]*$/.test(digits) ? digits.slice(1) : digits.replace("-", "\u2212");
 
   // A value as mantissa times a power of ten.
   function scientific(value, digits) {
@@ -81,7 +84,8 @@ const axes = (() => {
     const mantissa = String(Number((value / power(exponent)).toFixed(digits)));
     if (exponent === 0) return minus(mantissa);
     if (exponent === 1) return minus(String(Number((Number(mantissa) * 10).toFixed(digits))));
-    if (mantissa === "1" || mantissa === "-1") return minus(mantissa.replace("1", `10${superscript(exponent)}`));
+    if (mantissa === "1" || mantissa === "-1")
+      return minus(mantissa.replace("1", `10${superscript(exponent)}`));
     return minus(`${mantissa}\u00d710${superscript(exponent)}`);
   }
 
@@ -109,15 +113,27 @@ const axes = (() => {
     const count = Math.min(Math.floor(high / step + 1e-9) - first, 100) + 1;
     const values = Array.from({ length: Math.max(count, 0) }, (_, k) => (first + k) * step);
     const largest = Math.max(Math.abs(low), Math.abs(high));
-    return { major: values.map((value) => ({ at: value, label: label(value, step, largest) })), minor: [] };
+    return {
+      major: values.map((value) => ({ at: value, label: label(value, step, largest) })),
+      minor: [],
+    };
   }
 
   // At the powers of ten; where there is room for more, at 1, 2 and 5 or 1 and 3 times them.
   function log(low, high, most) {
-    const decades = Array.from({ length: Math.floor(high) - Math.floor(low) + 1 }, (_, k) => Math.floor(low) + k);
-    const multiples = (digits) => decades.flatMap((exponent) =>
-      digits.map((digit) => ({ at: exponent + Math.log10(digit), value: digit * power(exponent) })))
-      .filter(({ at }) => at >= low - 1e-9 && at <= high + 1e-9);
+    const decades = Array.from(
+      { length: Math.floor(high) - Math.floor(low) + 1 },
+      (_, k) => Math.floor(low) + k,
+    );
+    const multiples = (digits) =>
+      decades
+        .flatMap((exponent) =>
+          digits.map((digit) => ({
+            at: exponent + Math.log10(digit),
+            value: digit * power(exponent),
+          })),
+        )
+        .filter(({ at }) => at >= low - 1e-9 && at <= high + 1e-9);
     for (const digits of [[1, 2, 5], [1, 3], [1]]) {
       const marks = multiples(digits);
       if (marks.length >= 2 && marks.length <= Math.max(most, 2)) {
@@ -135,14 +151,17 @@ const axes = (() => {
 
   function told(marks) {
     const plain = marks.every(({ value }) => value >= 0.000999 && value <= 10001);
-    const say = (value) => (plain ? label(value, power(floorLog(value)), value) : scientific(value, 0));
+    const say = (value) =>
+      plain ? label(value, power(floorLog(value)), value) : scientific(value, 0);
     return marks.map(({ at, value }) => ({ at, label: say(value) }));
   }
 
   // Ticks where there are values, if they are few and far enough apart to be read.
   function ticksAt(scale, values, [low, high]) {
-    const places = [...new Set(values)].map((value) => ({ value, at: measured(scale, value) }))
-      .filter(({ at }) => !Number.isNaN(at)).sort((a, b) => a.at - b.at);
+    const places = [...new Set(values)]
+      .map((value) => ({ value, at: measured(scale, value) }))
+      .filter(({ at }) => !Number.isNaN(at))
+      .sort((a, b) => a.at - b.at);
     const gap = Math.min(...places.slice(1).map(({ at }, k) => at - places[k].at));
     if (places.length < 1 || places.length > 10 || gap < 0.07 * (high - low)) return null;
     return { major: places.map(({ value, at }) => ({ at, label: digits(value) })), minor: [] };

@@ -1,6 +1,5 @@
-// Draws figures from the data beside them, and lets them answer the mouse. Without it the page
-// shows the still form of every figure.
-(() => {
+// Draws a figure into its place: what is shown of it, where that stands, and the marks themselves.
+const figures = (() => {
   "use strict";
 
   const DASHES = ["", "7 4", "2 4", "7 3 2 3"];
@@ -10,10 +9,6 @@
   const [FONT_PX, TICK_PX, TOP_PX, RIGHT_PX] = [12, 5, 10, 14];
   // A line of more points than this has no marker at each of them.
   const MOST_MARKERS = 60;
-  // Of the pointer: points farther away are not told about.
-  const REACH_PX = 40;
-  // Shorter drags are clicks, or go along the other axis alone.
-  const DRAG_PX = 8;
   // The part of a category's slot that its bars fill, and the widest bar.
   const [FILLED, WIDEST_PX] = [0.78, 60];
 
@@ -21,11 +16,37 @@
   // seven colors are coprime, so that 35 series differ.
   const SHAPES = [
     null,
-    [[-0.9, -0.9], [0.9, -0.9], [0.9, 0.9], [-0.9, 0.9]],
-    [[0, -1.2], [1.1, 0.8], [-1.1, 0.8]],
-    [[0, -1.3], [1.2, 0], [0, 1.3], [-1.2, 0]],
-    [[-0.4, -1.2], [0.4, -1.2], [0.4, -0.4], [1.2, -0.4], [1.2, 0.4], [0.4, 0.4],
-      [0.4, 1.2], [-0.4, 1.2], [-0.4, 0.4], [-1.2, 0.4], [-1.2, -0.4], [-0.4, -0.4]],
+    [
+      [-0.9, -0.9],
+      [0.9, -0.9],
+      [0.9, 0.9],
+      [-0.9, 0.9],
+    ],
+    [
+      [0, -1.2],
+      [1.1, 0.8],
+      [-1.1, 0.8],
+    ],
+    [
+      [0, -1.3],
+      [1.2, 0],
+      [0, 1.3],
+      [-1.2, 0],
+    ],
+    [
+      [-0.4, -1.2],
+      [0.4, -1.2],
+      [0.4, -0.4],
+      [1.2, -0.4],
+      [1.2, 0.4],
+      [0.4, 0.4],
+      [0.4, 1.2],
+      [-0.4, 1.2],
+      [-0.4, 0.4],
+      [-1.2, 0.4],
+      [-1.2, -0.4],
+      [-0.4, -0.4],
+    ],
   ];
 
   const fixed = (px) => String(Math.round(px * 100) / 100);
@@ -48,10 +69,15 @@
     return element;
   }
 
+  // Words at the axes.
+  function words(x, y, anchor, said, more = {}) {
+    return drawn("text", { class: "tick", x, y, "text-anchor": anchor, ...more }, said);
+  }
+
   const pencil = document.createElement("canvas").getContext("2d");
-  function widthOf(words) {
+  function widthOf(said) {
     pencil.font = `${FONT_PX}px ${getComputedStyle(document.body).fontFamily}`;
-    return pencil.measureText(words).width;
+    return pencil.measureText(said).width;
   }
 
   // ---- What is drawn ----
@@ -68,7 +94,12 @@
     const points = series.points.map((told) => {
       const ends = (told.interval ?? []).map((end) => axes.measured(y, end));
       const hasEnds = ends.length === 2 && !ends.some(Number.isNaN);
-      return { told, x: axes.measured(x, told.x), y: axes.measured(y, told.y), ends: hasEnds ? ends : null };
+      return {
+        told,
+        x: axes.measured(x, told.x),
+        y: axes.measured(y, told.y),
+        ends: hasEnds ? ends : null,
+      };
     });
     return { index, name: series.name, points };
   }
@@ -85,7 +116,8 @@
     const nothing = [0, 1];
     const across = axes.extent(points.map((point) => point.x)) ?? nothing;
     const up = axes.extent(heights) ?? nothing;
-    if (names) return { x: [-0.5, names.length - 0.5], y: axes.rounded(figure.y_scale, up, mostUp) };
+    if (names)
+      return { x: [-0.5, names.length - 0.5], y: axes.rounded(figure.y_scale, up, mostUp) };
     if (figure.kind === "ways") return { x: axes.padded(across, 0.04), y: axes.padded(up, 0.04) };
     const margin = shown.some((series) => hasMarkers(figure, series)) ? 0.04 : 0;
     return { x: axes.padded(across, margin), y: axes.rounded(figure.y_scale, up, mostUp) };
@@ -109,7 +141,11 @@
     const isTooWide = (name) => name.split(" ").some((word) => widthOf(word) > room);
     if (!names.some(isTooWide)) {
       const lines = names.map((name) => brokenAt(name, room));
-      return { upright: false, lines, height: Math.max(...lines.map((all) => all.length)) * 1.3 * FONT_PX };
+      return {
+        upright: false,
+        lines,
+        height: Math.max(...lines.map((all) => all.length)) * 1.3 * FONT_PX,
+      };
     }
     const lines = names.map((name) => [shortened(name, 140)]);
     return { upright: true, lines, height: Math.max(...lines.map(([name]) => widthOf(name))) + 4 };
@@ -153,7 +189,12 @@
     const { x, y } = isSquare ? equalScales(ranges, area) : ranges;
     const slots = names ? slotNames(names, area.width / names.length - 6) : null;
     return {
-      area, x, y, slots, shown, width,
+      area,
+      x,
+      y,
+      slots,
+      shown,
+      width,
       height: TOP_PX + height + TICK_PX + (slots?.height ?? 1.3 * FONT_PX) + 6,
       xTicks: names ? null : ticksAcross(figure, shown, x, area, !chart.zoom),
       yTicks: axes.ticks(figure.y_scale, y, mostUp),
@@ -165,7 +206,9 @@
   function ticksAcross(figure, shown, range, area, isWhole) {
     const most = Math.min(Math.max(Math.floor(area.width / 70), 2), 12);
     if (isWhole && ["lines", "bands"].includes(figure.kind)) {
-      const values = shown.flatMap((series) => series.points.filter(isThere).map((point) => point.told.x));
+      const values = shown.flatMap((series) =>
+        series.points.filter(isThere).map((point) => point.told.x),
+      );
       const given = axes.ticksAt(figure.x_scale, values, range);
       const room = (tick) => widthOf(tick.label) + 8;
       const needed = given?.major.reduce((sum, tick) => sum + room(tick), 0) ?? Infinity;
@@ -177,16 +220,24 @@
   // Every point that has a place, in pixels; what is drawn and what answers the pointer.
   function placed(chart, layout) {
     const count = Math.max(layout.shown.length, 1);
-    const slot = categoriesOf(chart.figure) ? layout.area.width / categoriesOf(chart.figure).length : 0;
+    const slot = categoriesOf(chart.figure)
+      ? layout.area.width / categoriesOf(chart.figure).length
+      : 0;
     const width = Math.min((slot * FILLED) / count, WIDEST_PX);
     return layout.shown.map((series, order) => {
       // From the middle of the slot to the middle of this series' bar.
       const aside = (order - (count - 1) / 2) * width;
-      const points = series.points.map((point) => isThere(point) && {
-        series, told: point.told, width,
-        x: layout.toX(point.x) + (slot ? aside : 0), y: layout.toY(point.y),
-        ends: point.ends?.map(layout.toY),
-      });
+      const points = series.points.map(
+        (point) =>
+          isThere(point) && {
+            series,
+            told: point.told,
+            width,
+            x: layout.toX(point.x) + (slot ? aside : 0),
+            y: layout.toY(point.y),
+            ends: point.ends?.map(layout.toY),
+          },
+      );
       return { series, points };
     });
   }
@@ -196,12 +247,12 @@
   function frame(chart, { area, slots, xTicks, yTicks, toX, toY }) {
     const [right, bottom] = [area.left + area.width, area.top + area.height];
     const group = drawn("g", { class: "frame" });
-    const line = (kind, x1, y1, x2, y2) => group.append(drawn("line", { class: kind, x1, y1, x2, y2 }));
+    const line = (kind, x1, y1, x2, y2) =>
+      group.append(drawn("line", { class: kind, x1, y1, x2, y2 }));
     for (const { at, label } of yTicks.major) {
       line("grid", area.left, toY(at), right, toY(at));
       line("axis", area.left - TICK_PX, toY(at), area.left, toY(at));
-      const middle = toY(at) + 0.36 * FONT_PX;
-      group.append(drawn("text", { class: "tick", x: area.left - TICK_PX - 3, y: middle, "text-anchor": "end" }, label));
+      group.append(words(area.left - TICK_PX - 3, toY(at) + 0.36 * FONT_PX, "end", label));
     }
     for (const { at } of yTicks.minor) line("axis", area.left - 3, toY(at), area.left, toY(at));
     let free = 0;
@@ -213,7 +264,7 @@
       const x = Math.min(toX(at), right + RIGHT_PX - half);
       if (x - half < free) continue;
       free = x + half + 6;
-      group.append(drawn("text", { class: "tick", x, y: bottom + TICK_PX + FONT_PX, "text-anchor": "middle" }, label));
+      group.append(words(x, bottom + TICK_PX + FONT_PX, "middle", label));
     }
     for (const { at } of xTicks?.minor ?? []) line("axis", toX(at), bottom, toX(at), bottom + 3);
     if (slots) group.append(...slotLabels(slots, toX, bottom + TICK_PX));
@@ -223,11 +274,13 @@
   }
 
   function slotLabels({ upright, lines }, toX, top) {
-    return lines.flatMap((all, k) => all.map((words, row) => {
-      if (!upright) return drawn("text", { class: "tick", x: toX(k), y: top + FONT_PX * (1 + 1.3 * row), "text-anchor": "middle" }, words);
-      const x = toX(k) + 0.36 * FONT_PX;
-      return drawn("text", { class: "tick", x, y: top, "text-anchor": "end", transform: `rotate(-90 ${fixed(x)} ${fixed(top)})` }, words);
-    }));
+    return lines.flatMap((all, k) =>
+      all.map((said, row) => {
+        if (!upright) return words(toX(k), top + FONT_PX * (1 + 1.3 * row), "middle", said);
+        const x = toX(k) + 0.36 * FONT_PX;
+        return words(x, top, "end", said, { transform: `rotate(-90 ${fixed(x)} ${fixed(top)})` });
+      }),
+    );
   }
 
   // The stretches of points between the gaps.
@@ -260,8 +313,9 @@
   }
 
   function errorBar({ x, ends: [low, high] }, half, look) {
-    const d = `M${fixed(x)} ${fixed(low)}V${fixed(high)}`
-      + [low, high].map((end) => `M${fixed(x - half)} ${fixed(end)}H${fixed(x + half)}`).join("");
+    const d =
+      `M${fixed(x)} ${fixed(low)}V${fixed(high)}` +
+      [low, high].map((end) => `M${fixed(x - half)} ${fixed(end)}H${fixed(x + half)}`).join("");
     return drawn("path", { class: "interval", d, ...look });
   }
 
@@ -274,41 +328,58 @@
   function seriesMarks(chart, { series, points }, layout) {
     const { figure } = chart;
     const color = colorOf(chart, series.index);
-    const group = drawn("g", { class: "series" });
     const there = points.filter(Boolean);
+    const sure = there.filter((point) => point.ends);
+    const group = drawn("g", { class: "series" });
     if (categoriesOf(figure)) {
-      const base = layout.toY(Math.max(layout.y[0], figure.y_scale === "log" ? layout.y[0] : 0));
-      group.append(...there.map((point) => bar(point, base, color)));
-      const half = Math.min(0.2 * (there[0]?.width ?? 0), 5);
-      group.append(...there.filter((p) => p.ends).map((p) => errorBar(p, half, { class: "interval ink" })));
-      const right = layout.area.left + layout.area.width;
-      group.append(drawn("line", { class: "axis", x1: layout.area.left, y1: base, x2: right, y2: base }));
+      group.append(...bars(there, sure, layout, figure.y_scale === "log", color));
       return group;
     }
-    if (isBanded(figure)) {
-      for (const run of runs(points, (point) => point.ends)) {
-        const [lower, upper] = [0, 1].map((k) => run.map((point) => [point.x, point.ends[k]]));
-        group.append(drawn("path", { class: "band", d: `${pathThrough([...upper, ...lower.reverse()])}Z`, fill: color }));
-      }
-    }
-    if (isJoined(figure)) {
-      for (const run of runs(points, () => true)) {
-        const d = pathThrough(run.map((point) => [point.x, point.y]));
-        group.append(drawn("path", { class: "line", d, stroke: color, "stroke-dasharray": dashOf(chart, series.index) }));
-      }
-    }
-    if (!isBanded(figure)) {
-      group.append(...there.filter((p) => p.ends).map((p) => errorBar(p, 4, { stroke: color })));
-    }
+    if (isBanded(figure)) group.append(...bands(points, color));
+    if (isJoined(figure)) group.append(...lines(points, color, dashOf(chart, series.index)));
+    if (!isBanded(figure)) group.append(...sure.map((p) => errorBar(p, 4, { stroke: color })));
     if (hasMarkers(figure, series)) {
-      group.append(...there.map((p) => marker(series.index, p.x, p.y, 4, { class: "marker", fill: color })));
+      const look = { class: "marker", fill: color };
+      group.append(...there.map((p) => marker(series.index, p.x, p.y, 4, look)));
     }
     return group;
   }
 
+  function bands(points, fill) {
+    return runs(points, (point) => point.ends).map((run) => {
+      const [lower, upper] = [0, 1].map((k) => run.map((point) => [point.x, point.ends[k]]));
+      const d = `${pathThrough([...upper, ...lower.reverse()])}Z`;
+      return drawn("path", { class: "band", d, fill });
+    });
+  }
+
+  function lines(points, stroke, dash) {
+    return runs(points, () => true).map((run) => {
+      const d = pathThrough(run.map((point) => [point.x, point.y]));
+      return drawn("path", { class: "line", d, stroke, "stroke-dasharray": dash });
+    });
+  }
+
+  // Bars from zero, or from the low end of a logarithmic axis, and the line that they stand on.
+  function bars(there, sure, { area, y, toY }, isLog, color) {
+    const foot = toY(isLog ? y[0] : Math.max(y[0], 0));
+    const half = Math.min(0.2 * (there[0]?.width ?? 0), 5);
+    const ends = { x1: area.left, y1: foot, x2: area.left + area.width, y2: foot };
+    return [
+      ...there.map((point) => bar(point, foot, color)),
+      ...sure.map((point) => errorBar(point, half, { class: "interval ink" })),
+      drawn("line", { class: "axis", ...ends }),
+    ];
+  }
+
   function bar({ x, y, width }, base, fill) {
     const filled = width - Math.min(0.06 * width, 1.5);
-    const box = { x: x - filled / 2, y: Math.min(y, base), width: filled, height: Math.abs(base - y) };
+    const box = {
+      x: x - filled / 2,
+      y: Math.min(y, base),
+      width: filled,
+      height: Math.abs(base - y),
+    };
     return drawn("rect", { class: "bar", fill, ...box });
   }
 
@@ -323,229 +394,72 @@
     // A mark at the end of an axis is seen as a whole; of a part only what lies in it.
     const slack = chart.zoom ? 1 : 6;
     const box = {
-      x: area.left - slack, y: area.top - slack,
-      width: area.width + 2 * slack, height: area.height + 2 * slack,
+      x: area.left - slack,
+      y: area.top - slack,
+      width: area.width + 2 * slack,
+      height: area.height + 2 * slack,
     };
-    const data = drawn("g", { "clip-path": `url(#${clip})` }, ...marks.map((each) => seriesMarks(chart, each, layout)));
+    const data = drawn(
+      "g",
+      { "clip-path": `url(#${clip})` },
+      ...marks.map((each) => seriesMarks(chart, each, layout)),
+    );
     const rect = drawn("rect", { class: "selection", visibility: "hidden" });
     const spot = drawn("g", { class: "spot" });
     const whole = `0 0 ${fixed(width)} ${fixed(layout.height)}`;
     for (const [key, value] of Object.entries({ viewBox: whole, width, height: layout.height })) {
       chart.svg.setAttribute(key, typeof value === "number" ? fixed(value) : value);
     }
-    chart.svg.replaceChildren(drawn("clipPath", { id: clip }, drawn("rect", box)), frame(chart, layout), data, spot, rect);
+    chart.svg.replaceChildren(
+      drawn("clipPath", { id: clip }, drawn("rect", box)),
+      frame(chart, layout),
+      data,
+      spot,
+      rect,
+    );
     chart.below.style.paddingLeft = `${fixed(area.left)}px`;
     chart.reset.style.visibility = chart.zoom ? "visible" : "hidden";
     Object.assign(chart, { layout, marks, spot, rect, drawnWidth: width });
-    tellNothing(chart);
-  }
-
-  // ---- Answering the mouse ----
-
-  const isInside = ({ left, top, width, height }, [x, y], slack = 0) =>
-    x >= left - slack && x <= left + width + slack && y >= top - slack && y <= top + height + slack;
-
-  // How far a mark is from the pointer; a bar is near from its foot to its end.
-  function distance(chart, point, [x, y]) {
-    if (!categoriesOf(chart.figure)) return Math.hypot(point.x - x, point.y - y);
-    const foot = chart.layout.area.top + chart.layout.area.height;
-    const aside = Math.max(Math.abs(point.x - x) - point.width / 2, 0);
-    const above = Math.max(Math.min(point.y, foot) - y, y - Math.max(point.y, foot), 0);
-    return Math.hypot(aside, above);
-  }
-
-  function nearest(chart, at) {
-    const { area } = chart.layout;
-    const seen = chart.marks.flatMap(({ points }) => points)
-      .filter((point) => point && isInside(area, [point.x, Math.min(Math.max(point.y, area.top), area.top + area.height)], 1));
-    let [best, least] = [null, REACH_PX];
-    for (const point of seen) {
-      const far = distance(chart, point, at);
-      if (far < least) [best, least] = [point, far];
-    }
-    return best;
-  }
-
-  function tellNothing(chart) {
     chart.tip.hidden = true;
-    chart.spot.replaceChildren();
   }
-
-  // Shows a point's values beside it.
-  function tell(chart, point) {
-    const { told, series } = point;
-    const { digits } = axes;
-    const names = categoriesOf(chart.figure);
-    const across = names ? names[told.x] ?? "" : digits(told.x);
-    const between = point.ends ? ` [${told.interval.map(digits).join(", ")}]` : "";
-    const lines = [made("div", "", `${across}: `, made("strong", "", digits(told.y)), between)];
-    if (series.name !== "") lines.unshift(made("div", "name", swatch(chart, series), series.name));
-    if (told.n !== undefined) lines.push(made("div", "", `n = ${told.n}`));
-    chart.tip.replaceChildren(...lines);
-    chart.tip.hidden = false;
-    const color = colorOf(chart, series.index);
-    const { area } = chart.layout;
-    const y = Math.max(point.y, area.top);
-    if (names) chart.spot.replaceChildren(drawn("circle", { cx: point.x, cy: y, r: 4, fill: color }));
-    else chart.spot.replaceChildren(marker(series.index, point.x, y, 6, { fill: color }));
-    // Above the point, or below it where there is no room; never beyond the figure's sides.
-    const [wide, high] = [chart.tip.offsetWidth, chart.tip.offsetHeight];
-    const left = Math.min(Math.max(point.x - wide / 2, 0), Math.max(chart.layout.width - wide, 0));
-    const above = y - high - 12;
-    chart.tip.style.left = `${fixed(left)}px`;
-    chart.tip.style.top = `${fixed(above < -20 ? y + 14 : above)}px`;
-  }
-
-  // The range between two places in pixels, or null where they are too near for one.
-  function between(from, to, start, length, [low, high]) {
-    if (Math.abs(to - from) < DRAG_PX) return null;
-    const measure = (px) => low + (Math.min(Math.max(px - start, 0), length) / length) * (high - low);
-    const range = [measure(Math.min(from, to)), measure(Math.max(from, to))];
-    // Beyond this numbers cannot tell places apart.
-    const size = Math.max(Math.abs(range[0]), Math.abs(range[1]));
-    return range[1] - range[0] > 1e-9 * size ? range : null;
-  }
-
-  function zoomed(chart, [x1, y1], [x2, y2]) {
-    const { area, x, y } = chart.layout;
-    const bottom = area.top + area.height;
-    const across = categoriesOf(chart.figure) ? null : between(x1, x2, area.left, area.width, x);
-    const up = between(bottom - y1, bottom - y2, 0, area.height, y);
-    if (!across && !up) return;
-    chart.zoom = { x: across ?? x, y: up ?? y };
-    draw(chart);
-  }
-
-  function showSelection(chart, [x1, y1], [x2, y2]) {
-    const { area } = chart.layout;
-    const clamped = (px, start, length) => Math.min(Math.max(px, start), start + length);
-    const side = (a, b, start, length, isWhole) => (isWhole ? [start, start + length]
-      : [Math.min(a, b), Math.max(a, b)].map((px) => clamped(px, start, length)));
-    const isBars = Boolean(categoriesOf(chart.figure));
-    const [left, right] = side(x1, x2, area.left, area.width, isBars || Math.abs(x2 - x1) < DRAG_PX);
-    const [top, bottom] = side(y1, y2, area.top, area.height, Math.abs(y2 - y1) < DRAG_PX);
-    const box = { x: left, y: top, width: right - left, height: bottom - top, visibility: "visible" };
-    for (const [key, value] of Object.entries(box)) chart.rect.setAttribute(key, value);
-  }
-
-  function answerMouse(chart) {
-    const { svg } = chart;
-    const at = (event) => {
-      const box = svg.getBoundingClientRect();
-      return [event.clientX - box.left, event.clientY - box.top];
-    };
-    const hover = (event) => {
-      const point = nearest(chart, at(event));
-      if (point) tell(chart, point);
-      else tellNothing(chart);
-    };
-    let from = null;
-    const moved = (event) => {
-      tellNothing(chart);
-      const to = at(event);
-      if (Math.hypot(to[0] - from[0], to[1] - from[1]) >= DRAG_PX) showSelection(chart, from, to);
-    };
-    const ended = (event) => {
-      window.removeEventListener("pointermove", moved);
-      window.removeEventListener("pointerup", ended);
-      window.removeEventListener("pointercancel", ended);
-      chart.rect.setAttribute("visibility", "hidden");
-      const start = from;
-      from = null;
-      if (event.type === "pointerup") zoomed(chart, start, at(event));
-    };
-    svg.addEventListener("pointermove", (event) => { if (!from) hover(event); });
-    svg.addEventListener("pointerleave", () => tellNothing(chart));
-    svg.addEventListener("pointerdown", (event) => {
-      // A finger scrolls the page, and tells about what it touches.
-      if (event.pointerType === "touch") return hover(event);
-      if (event.button !== 0 || from || !isInside(chart.layout.area, at(event))) return undefined;
-      event.preventDefault();
-      from = at(event);
-      window.addEventListener("pointermove", moved);
-      window.addEventListener("pointerup", ended);
-      window.addEventListener("pointercancel", ended);
-      return undefined;
-    });
-    const whole = () => { chart.zoom = null; draw(chart); };
-    svg.addEventListener("dblclick", whole);
-    chart.reset.addEventListener("click", whole);
-  }
-
-  // ---- Legend ----
 
   // What a series looks like, two letters wide.
   function swatch(chart, series) {
     const { figure } = chart;
     const color = colorOf(chart, series.index);
-    const picture = drawn("svg", { class: "swatch", width: 24, height: 12, viewBox: "0 0 24 12", "aria-hidden": "true" });
-    if (categoriesOf(figure)) picture.append(drawn("rect", { x: 2, y: 1, width: 20, height: 10, fill: color }));
-    if (isBanded(figure)) picture.append(drawn("rect", { class: "band", x: 0, y: 0, width: 24, height: 12, fill: color }));
-    if (isJoined(figure)) picture.append(drawn("path", { class: "line", d: "M0 6H24", stroke: color, "stroke-dasharray": dashOf(chart, series.index) }));
-    if (hasMarkers(figure, series)) picture.append(marker(series.index, 12, 6, 4, { class: "marker", fill: color }));
+    const picture = drawn("svg", {
+      class: "swatch",
+      width: 24,
+      height: 12,
+      viewBox: "0 0 24 12",
+      "aria-hidden": "true",
+    });
+    if (categoriesOf(figure))
+      picture.append(drawn("rect", { x: 2, y: 1, width: 20, height: 10, fill: color }));
+    if (isBanded(figure))
+      picture.append(
+        drawn("rect", { class: "band", x: 0, y: 0, width: 24, height: 12, fill: color }),
+      );
+    if (isJoined(figure))
+      picture.append(
+        drawn("path", {
+          class: "line",
+          d: "M0 6H24",
+          stroke: color,
+          "stroke-dasharray": dashOf(chart, series.index),
+        }),
+      );
+    if (hasMarkers(figure, series))
+      picture.append(marker(series.index, 12, 6, 4, { class: "marker", fill: color }));
     return picture;
   }
 
-  function fillLegend(chart) {
-    const named = chart.series.filter((series) => series.name !== "");
-    chart.legend.hidden = named.length === 0;
-    chart.legend.replaceChildren(...named.map((series) => {
-      const button = made("button", "entry", swatch(chart, series), made("span", "", series.name));
-      button.type = "button";
-      button.setAttribute("aria-pressed", String(!chart.hidden.has(series.index)));
-      button.addEventListener("click", () => {
-        const isHidden = chart.hidden.delete(series.index);
-        if (!isHidden) chart.hidden.add(series.index);
-        button.setAttribute("aria-pressed", String(isHidden));
-        draw(chart);
-      });
-      return button;
-    }));
-  }
-
-  // ---- Beginning ----
-
-  function begun(place) {
+  // A figure as the page tells it, with all of its series in the measures of its axes.
+  function read(place) {
     const { figure, colors } = JSON.parse(place.querySelector("script").textContent);
     const series = figure.series.map((each, index) => measuredSeries(figure, each, index));
-    const stage = place.querySelector(".drawn");
-    const reset = made("button", "reset", "Reset zoom");
-    reset.type = "button";
-    const still = place.querySelector(".still");
-    const svg = drawn("svg", { class: "chart", role: "img", "aria-label": still?.alt ?? figure.title });
-    const chart = {
-      id: place.id, figure, colors, series, stage, reset, svg, zoom: null, hidden: new Set(),
-      legend: made("div", "legend"), tip: made("div", "tip"), below: made("div", "x-label", figure.x_label),
-    };
-    const above = made("div", "above", made("span", "", figure.y_label), reset);
-    stage.classList.toggle("square", figure.kind === "ways");
-    stage.replaceChildren(chart.legend, above, made("div", "canvas", svg, chart.tip), chart.below);
-    stage.hidden = false;
-    fillLegend(chart);
-    draw(chart);
-    answerMouse(chart);
-    if (still) still.hidden = true;
-    return chart;
+    return { id: place.id, figure, colors, series, zoom: null, hidden: new Set() };
   }
 
-  const charts = [];
-  for (const place of document.querySelectorAll("figure.plot")) {
-    try {
-      charts.push(begun(place));
-    } catch (error) {
-      // The still form stays.
-      place.querySelector(".drawn").hidden = true;
-      reportError(error);
-    }
-  }
-  document.documentElement.dataset.drawn = String(charts.length);
-
-  const resized = new ResizeObserver(() => charts.forEach((chart) => {
-    if (chart.stage.clientWidth !== chart.drawnWidth) draw(chart);
-  }));
-  charts.forEach((chart) => resized.observe(chart.stage));
-  dark.addEventListener("change", () => charts.forEach((chart) => {
-    fillLegend(chart);
-    draw(chart);
-  }));
+  return { read, draw, drawn, made, fixed, marker, swatch, colorOf, categoriesOf };
 })();

@@ -3,8 +3,8 @@
 //! ```text
 //! blocks.rs    the parts of a document       figures.rs   figures and pictures
 //! tables.rs    tables and claims             page.css     looks
-//! page.js      sorting of tables             figures.js   figures that answer the mouse
-//!                                            axes.js      their ranges and ticks
+//! page.js      sorting of tables             axes.js      ranges and ticks of figures
+//! figures.js   figures from their data       mouse.js     what they answer to the mouse
 //! ```
 
 mod blocks;
@@ -19,7 +19,8 @@ use sidestep::experiment::document::{Block, Span, Text};
 const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("page.js");
 /// Draws figures; a page without any does not carry it.
-const FIGURES_SCRIPT: &str = concat!(include_str!("axes.js"), include_str!("figures.js"));
+const FIGURES_SCRIPT: &str =
+    concat!(include_str!("axes.js"), include_str!("figures.js"), include_str!("mouse.js"));
 
 /// Nothing may be loaded; what is inside may be shown and run.
 const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; \
