@@ -47,7 +47,8 @@
     const names = categoriesOf(chart.figure);
     const across = names ? (names[told.x] ?? "") : digits(told.x);
     const between = point.ends ? ` [${told.interval.map(digits).join(", ")}]` : "";
-    const lines = [made("div", "", `${across}: `, made("strong", "", digits(told.y)), between)];
+    const then = chart.figure.kind === "ways" ? ", " : ": ";
+    const lines = [made("div", "", across + then, made("strong", "", digits(told.y)), between)];
     if (series.name !== "") lines.unshift(made("div", "name", swatch(chart, series), series.name));
     if (told.n !== undefined) lines.push(made("div", "", `n = ${told.n}`));
     chart.tip.replaceChildren(...lines);
