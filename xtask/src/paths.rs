@@ -1,5 +1,6 @@
 //! Paths that a file names, with the module that each stands in.
 
+use proc_macro2::{TokenStream, TokenTree};
 use syn::visit::{self, Visit};
 use syn::{Item, ItemMod, ItemUse, UseTree};
 
@@ -47,6 +48,44 @@ impl<'ast> Visit<'ast> for Finder {
         }
         visit::visit_path(self, path);
     }
+
+    fn visit_macro(&mut self, call: &'ast syn::Macro) {
+        let mut chains = Vec::new();
+        chained(call.tokens.clone(), &mut chains);
+        for path in chains {
+            self.found.push(Named { path, within: self.within.clone(), import: None });
+        }
+    }
+}
+
+/// Collects names with two colons between them: what macros are given is tokens and no paths yet.
+fn chained(tokens: TokenStream, chains: &mut Vec<Vec<String>>) {
+    let mut chain: Vec<String> = Vec::new();
+    let mut colons = 0;
+    let mut end = |chain: &mut Vec<String>| {
+        let whole = std::mem::take(chain);
+        chains.extend((whole.len() > 1).then_some(whole));
+    };
+    let mut groups = Vec::new();
+    for token in tokens {
+        match token {
+            TokenTree::Punct(mark) if mark.as_char() == ':' => colons += 1,
+            TokenTree::Ident(name) => {
+                if colons != 2 {
+                    end(&mut chain);
+                }
+                colons = 0;
+                chain.push(name.to_string());
+            }
+            other => {
+                end(&mut chain);
+                colons = 0;
+                groups.extend(if let TokenTree::Group(group) = other { Some(group) } else { None });
+            }
+        }
+    }
+    end(&mut chain);
+    groups.into_iter().for_each(|group| chained(group.stream(), chains));
 }
 
 /// Returns every path that an import names, with the name that it gets.
@@ -110,6 +149,16 @@ mod tests {
         assert_eq!(
             written("mod a { fn f(x: super::T) -> u8 { crate::g::h::<std::thread::Thread>(x) } }"),
             ["a|super::T", "a|crate::g::h", "a|std::thread::Thread"]
+        );
+    }
+
+    #[test]
+    fn paths_in_macros_are_told() {
+        assert_eq!(
+            written(
+                "fn f() { assert!(crate::g::h(a, [b; 2]), \"{}\", x::<super::K>()); let y: u8 = 1; }"
+            ),
+            ["|crate::g::h", "|super::K"]
         );
     }
 }
