@@ -437,7 +437,7 @@ mod tests {
 
     struct Ticks(Vec<AtomicU64>);
 
-    impl World for Ticking<'_> {
+    impl Phases for Ticking<'_> {
         type State = Ticks;
         type Scratch = Vec<(Cycle, usize)>;
 
@@ -452,30 +452,16 @@ mod tests {
             state.0.len()
         }
 
-        fn perceive_and_decide(
-            &self,
-            state: &Ticks,
-            now: Cycle,
-            bodies: Range<usize>,
-            scratch: &mut Self::Scratch,
-        ) {
+        fn claim(turn: &mut Turn<'_, Self>, bodies: Range<usize>) {
             for body in bodies {
-                state.0[body].fetch_add(1, Relaxed);
-                scratch.push((now, body));
+                turn.state.0[body].fetch_add(1, Relaxed);
+                turn.scratch.push((turn.now, body));
             }
         }
 
-        fn find_conflicts(
-            &self,
-            _: &Ticks,
-            _: Cycle,
-            _: Range<usize>,
-            _: &Groups,
-            _: &mut Self::Scratch,
-        ) {
-        }
+        fn join(_: &mut Turn<'_, Self>, _: Range<usize>, _: &Groups) {}
 
-        fn react(&self, _: &Ticks, _: Cycle, _: &mut [Slot], _: &mut Self::Scratch) {}
+        fn act(_: &mut Turn<'_, Self>, _: &mut [Slot]) {}
     }
 
     fn ticks(n: usize) -> Ticks {
