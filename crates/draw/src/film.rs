@@ -1,7 +1,7 @@
 //! Films: the same view again and again, with things in it that move, without axes and legend.
 //!
-//! Seen from above, what stays is drawn once, and each picture is a copy of it with the moving
-//! things on top: a film has hundreds of pictures.
+//! What stays is drawn once, and each picture is a copy of it with the moving things on top: a film
+//! has hundreds of pictures.
 
 use resvg::tiny_skia::{Color, Pixmap, Transform};
 use sidestep_kernel::view::{Frame, Place, Scenery, Trail};
@@ -43,15 +43,13 @@ impl Film {
         let mut still = Pixmap::new(width, height).ok_or_else(no_area)?;
         still.fill(Color::WHITE);
         let mut film = Self { scenery, canvas, window, still };
-        if film.canvas.is_above() {
-            let mut svg = Svg::default();
-            let nothing = Frame::default();
-            let scene = Scene::new(&film.scenery, &nothing, &[]);
-            svg.open_clip(window);
-            scene.draw_still(&mut svg, &film.canvas);
-            svg.close_group();
-            film.still = film.with(svg)?;
-        }
+        let mut svg = Svg::default();
+        let nothing = Frame::default();
+        let scene = Scene::new(&film.scenery, &nothing, &[]);
+        svg.open_clip(window);
+        scene.draw_still(&mut svg, &film.canvas);
+        svg.close_group();
+        film.still = film.with(svg)?;
         Ok(film)
     }
 
@@ -74,10 +72,7 @@ impl Film {
         let scene = Scene::new(&self.scenery, frame, trails).with_thin_trails();
         let mut svg = Svg::default();
         svg.open_clip(self.window);
-        match self.canvas.is_above() {
-            true => scene.draw_moving(&mut svg, &self.canvas),
-            false => scene.draw_space(&mut svg, &self.canvas),
-        }
+        scene.draw_moving(&mut svg, &self.canvas);
         svg.close_group();
         svg.text(8.0, self.window.bottom() + 17.0, caption, &TextLook::new(13.0, Anchor::Start));
         Ok(Still(self.with(svg)?))

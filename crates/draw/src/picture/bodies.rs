@@ -15,8 +15,10 @@ const LEAST_LINE_PX: f64 = 1.4;
 const LEAST_RADIUS_PX: f64 = 1.2;
 /// Arrowheads are drawn at least this long.
 const LEAST_DART_PX: f64 = 9.0;
-/// The mark of those who lead has at least this radius.
-const LEADER_PX: f64 = 3.0;
+/// The mark of those who lead has at least this radius, from above and in space.
+const LEADER_PX: [f64; 2] = [3.0, 5.0];
+/// A goal has at least this radius.
+const LEAST_GOAL_PX: f64 = 3.5;
 /// The time whose way a moving body's arrow shows, in seconds.
 const ARROW_S: f64 = 1.0;
 /// Corners of a circle that is seen from the side.
@@ -61,10 +63,15 @@ pub(super) fn draw_layers(
     shown.into_iter().for_each(|body| draw_body(svg, scene, canvas, body));
 }
 
-/// All bodies in space, far ones first; a line with many points by its parts.
-pub(super) fn draw_by_depth(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas) {
+/// Bodies in space, far ones first; a line with many points by its parts.
+pub(super) fn draw_by_depth<'a>(
+    svg: &mut Svg,
+    scene: &Scene<'_>,
+    canvas: &Canvas,
+    bodies: impl Iterator<Item = &'a Body>,
+) {
     let mut parts: Vec<(f64, &Body, Option<usize>)> = Vec::new();
-    for body in scene.scenery.bodies.iter().chain(&scene.frame.bodies) {
+    for body in bodies {
         match &body.shape {
             Shape::Line { points_m, .. } => {
                 let depth_m =
@@ -155,7 +162,8 @@ fn draw_body(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, body: &Body) {
             svg.path(&outline(circle(&body.pose, *radius_m).map(|p| canvas.at(p))), look);
         }
         Shape::Cylinder { radius_m, .. } | Shape::Sphere { radius_m } => {
-            let radius_px = (radius_m * canvas.px_per_m).max(LEAST_RADIUS_PX);
+            let least_px = if body.kind == Kind::Goal { LEAST_GOAL_PX } else { LEAST_RADIUS_PX };
+            let radius_px = (radius_m * canvas.px_per_m).max(least_px);
             svg.circle(canvas.at(body.pose.at_m), radius_px, look);
         }
         Shape::Dart { length_m, width_m } => {
@@ -190,7 +198,7 @@ fn draw_heading(svg: &mut Svg, canvas: &Canvas, body: &Body) {
     if body.kind == Kind::Robot {
         let size_m = 0.34 * side_m;
         let corners =
-            [[size_m, 0.0], [-0.7 * size_m, 0.8 * size_m], [-0.7 * size_m, -0.8 * size_m]];
+            [[size_m, 0.0], [-0.7 * size_m, 0.6 * size_m], [-0.7 * size_m, -0.6 * size_m]];
         let corners = corners.map(|[x, y]| canvas.at(body.pose.place([x, y, top_m])));
         svg.path(&outline(corners), r##"fill="#FFFFFF""##);
     }
@@ -206,7 +214,8 @@ pub(super) fn draw_marks(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas) {
     }
     for body in bodies().filter(|body| leads(body)) {
         if let Shape::Sphere { radius_m } = body.shape {
-            let radius_px = (0.7 * radius_m * canvas.px_per_m).max(LEADER_PX);
+            let least_px = LEADER_PX[usize::from(!canvas.is_above())];
+            let radius_px = (0.7 * radius_m * canvas.px_per_m).max(least_px);
             let (color, _) = fill(scene, canvas, body);
             start_mark(svg, canvas.at(body.pose.at_m), radius_px, &hex(color));
         }

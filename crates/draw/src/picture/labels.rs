@@ -6,7 +6,7 @@ use crate::legend::{end_mark, start_mark};
 use crate::style::{Style, hex};
 use crate::svg::{Anchor, Rect, Svg, TextLook};
 use crate::text::{self, Weight};
-use sidestep_kernel::view::{Body, Shape};
+use sidestep_kernel::view::{Body, Kind, Shape};
 
 /// With more trails than this there is no room for names.
 const MOST_LABELS: usize = 12;
@@ -44,6 +44,13 @@ pub(super) fn draw(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, room: Rect
     if wanted.len() > MOST_LABELS {
         return;
     }
+    let matters = |body: &&Body| {
+        body.kind.is_agent() || matches!(body.kind, Kind::Person | Kind::Start | Kind::Goal)
+    };
+    let others = scene.scenery.bodies.iter().chain(&scene.frame.bodies).filter(matters);
+    taken.extend(
+        others.map(|body| around(canvas.at(body.pose.at_m), radius_m(body) * canvas.px_per_m)),
+    );
     for (at, clear_px, words) in wanted {
         write(svg, (at, clear_px), &words, room, &mut taken, style);
     }

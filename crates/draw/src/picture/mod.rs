@@ -103,8 +103,11 @@ impl<'a> Scene<'a> {
         self.scenery.dimensions == 2
     }
 
-    /// Walls and what stands still, seen from above.
+    /// Walls and what stands still.
     pub(crate) fn draw_still(&self, svg: &mut Svg, canvas: &Canvas) {
+        if !canvas.is_above() {
+            return bodies::draw_by_depth(svg, self, canvas, self.scenery.bodies.iter());
+        }
         if let Some(floor) = &self.scenery.floor {
             floor::draw(svg, floor, canvas);
         }
@@ -112,8 +115,12 @@ impl<'a> Scene<'a> {
         bodies::draw_layers(svg, self, canvas, &self.scenery.bodies, 0..=u8::MAX);
     }
 
-    /// What moves, seen from above: trails lie over doors and under those who walk.
+    /// What moves. Seen from above, trails lie over doors and under those who walk.
     pub(crate) fn draw_moving(&self, svg: &mut Svg, canvas: &Canvas) {
+        if !canvas.is_above() {
+            bodies::draw_by_depth(svg, self, canvas, self.frame.bodies.iter());
+            return self.draw_over(svg, canvas);
+        }
         bodies::draw_layers(svg, self, canvas, &self.frame.bodies, 0..=3);
         self.trails.iter().for_each(|trail| ways::draw(svg, trail, canvas));
         bodies::draw_layers(svg, self, canvas, &self.frame.bodies, 4..=u8::MAX);
@@ -121,8 +128,13 @@ impl<'a> Scene<'a> {
     }
 
     /// Everything in space, far things first; trails over it.
-    pub(crate) fn draw_space(&self, svg: &mut Svg, canvas: &Canvas) {
-        bodies::draw_by_depth(svg, self, canvas);
+    fn draw_space(&self, svg: &mut Svg, canvas: &Canvas) {
+        let bodies = self.scenery.bodies.iter().chain(&self.frame.bodies);
+        bodies::draw_by_depth(svg, self, canvas, bodies);
+        self.draw_over(svg, canvas);
+    }
+
+    fn draw_over(&self, svg: &mut Svg, canvas: &Canvas) {
         self.trails.iter().for_each(|trail| ways::draw(svg, trail, canvas));
         bodies::draw_marks(svg, self, canvas);
     }

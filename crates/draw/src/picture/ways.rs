@@ -13,8 +13,8 @@ use sidestep_kernel::view::Color;
 const SHADES: usize = 8;
 /// How much of its color the oldest part of a trail keeps.
 const OLDEST: f64 = 0.3;
-/// How much of what is under it a trail hides.
-const OPACITY: f64 = 0.5;
+/// How much of what is under it a ribbon hides, and a line.
+const OPACITY: [f64; 2] = [0.5, 0.8];
 /// Width of a trail that is a line.
 const LINE_PX: f64 = 1.8;
 /// Of a line, points nearer to each other than this cannot be told apart.
@@ -41,9 +41,9 @@ pub(super) fn draw(svg: &mut Svg, trail: &Shown<'_>, canvas: &Canvas) {
         Some(_) => shades.zip(points).collect(),
         None => thinned(shades.zip(points)),
     };
-    let width = Num(width_px);
+    let (width, opacity) = (Num(width_px), OPACITY[usize::from(trail.width_m.is_none())]);
     svg.raw(format_args!(
-        r#"<g class="trail" opacity="{OPACITY}" fill="none" stroke-width="{width}" {ends}>"#
+        r#"<g class="trail" opacity="{opacity}" fill="none" stroke-width="{width}" {ends}>"#
     ));
     for (shade, data) in path_data(&points).into_iter().enumerate() {
         if !data.is_empty() {
