@@ -293,6 +293,7 @@ mod tests {
     use crate::cycle::Scratches;
     use crate::ports::ManualClock;
     use crate::units::Slot;
+    use crate::world::Turn;
     use std::ops::{ControlFlow, Range};
     use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 

@@ -24,6 +24,7 @@ fn scenery() -> Scenery {
         cycle_s: 0.1,
         floor: Some(floor),
         bodies: vec![Body::new(Kind::Obstacle, 0, Pose::at([0.0; 3]), wall)],
+        names: Vec::new(),
     }
 }
 

@@ -2,7 +2,6 @@
 
 use sidestep::kernel::Simulation;
 use sidestep::scenario::Source;
-use sidestep::worlds::chain::ChainRun;
 use sidestep::worlds::chain::scenario::{AnyCompiled, Compiled};
 use toml::Value;
 

@@ -7,7 +7,6 @@ use sidestep::kernel::ports::MemoryRecorder;
 use sidestep::kernel::view::{Kind, Look, Shape};
 use sidestep::scenario::Source;
 use sidestep::worlds::airspace::airspace_run;
-use sidestep::worlds::chain::ChainRun;
 use sidestep::worlds::chain::scenario::Compiled;
 use sidestep::worlds::robots::robots_run;
 
