@@ -14,10 +14,9 @@ use super::world::{ChainWorld, Scratch};
 use serde_json::Value;
 use sidestep_kernel::checkpoint::CheckpointError;
 use sidestep_kernel::ports::{RecordError, Recorder, TableSchema};
-use sidestep_kernel::run::{Effort, Plan, Run};
 use sidestep_kernel::view::{Frame, Log, Look, PlaceRows, Scenery};
 use sidestep_kernel::words::{Lines, Said};
-use sidestep_kernel::{Cycle, Digest, EntityId, World};
+use sidestep_kernel::{Cycle, Digest, Effort, EntityId, Plan, Run, World};
 use sidestep_scenario::Source;
 
 /// A run of chains in `D` dimensions.

@@ -8,7 +8,7 @@ mod tables;
 pub use compile::{Behaviours, Compiled, StorageOrder, presets};
 
 use super::effector::ObstacleRule;
-use super::resolve::ConflictPolicy;
+use super::policy::ConflictPolicy;
 use super::world::Regime;
 use serde::Deserialize;
 use sidestep_map::UnknownPolicy;

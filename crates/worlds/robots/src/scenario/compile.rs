@@ -15,7 +15,7 @@ use super::{
 };
 use crate::decide::{Behaviour, External, Goto, Replay, Sector, Shuttle, Wander};
 use crate::effector::{Action, EffectorModel, MAX_PATH, Side, Transition, own_boxes};
-use crate::resolve::ConflictPolicy;
+use crate::policy::ConflictPolicy;
 use crate::sensor::SensorModel;
 use crate::world::{
     BEAM_STEP, Body, BodyType, Door, MountedSensor, Mover, Radio, RobotBody, RobotModel,
