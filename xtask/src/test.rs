@@ -23,10 +23,11 @@ fn has_nextest() -> bool {
     asked.is_ok_and(|status| status.success())
 }
 
-/// Returns whether the command succeeded in the whole workspace.
+/// Returns whether the command succeeded, in the whole workspace unless `more` names a package.
 fn cargo(words: &[&str], more: &[String]) -> bool {
     let mut cargo = command(words);
-    cargo.args(["--release", "--workspace"]).args(more);
+    let is_chosen = more.iter().any(|word| word.starts_with("-p") || word.starts_with("--package"));
+    cargo.arg("--release").args((!is_chosen).then_some("--workspace")).args(more);
     cargo.status().is_ok_and(|status| status.success())
 }
 
