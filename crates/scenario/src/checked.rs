@@ -253,11 +253,15 @@ impl<const D: usize, R: Rule> Point<D, R> {
 
 impl<'de, const D: usize, R: Rule> Deserialize<'de> for Point<D, R> {
     fn deserialize<S: Deserializer<'de>>(deserializer: S) -> Result<Self, S::Error> {
-        let numbers = deserializer.deserialize_seq(Reader("a point: [x, y]"))?;
+        let numbers = match deserializer.deserialize_seq(Reader("a point: [x, y]"))? {
+            Numbers::Many(numbers) => numbers,
+            Numbers::One(number) => vec![number],
+        };
         match numbers[..].try_into() {
             Ok(point) if numbers.iter().all(|x| R::allows(*x)) => Ok(Self(point, PhantomData)),
             _ => {
-                Err(refused(format_args!("{numbers:?}"), &format!("give {}", R::words_of_point(D))))
+                let remedy = format!("give {}", R::words_of_point(D));
+                Err(refused(format_args!("{numbers:?}"), &remedy))
             }
         }
     }
@@ -274,37 +278,45 @@ pub struct Limits {
 
 impl<'de> Deserialize<'de> for Limits {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        match deserializer.deserialize_any(Reader("a number, or [least, greatest]"))?[..] {
-            [both] => Ok(Self { least: both, greatest: both }),
-            [least, greatest] => Ok(Self { least, greatest }),
-            ref numbers => {
-                let remedy = "give one number, or the least and the greatest";
-                Err(refused(format_args!("{numbers:?}"), remedy))
-            }
+        match deserializer.deserialize_any(Reader("a number, or [least, greatest]"))? {
+            Numbers::One(both) => Ok(Self { least: both, greatest: both }),
+            Numbers::Many(numbers) => match numbers[..] {
+                [least, greatest] => Ok(Self { least, greatest }),
+                _ => {
+                    let remedy = "give one number, or the least and the greatest";
+                    Err(refused(format_args!("{numbers:?}"), remedy))
+                }
+            },
         }
     }
+}
+
+/// A number, or an array of them.
+enum Numbers {
+    One(f64),
+    Many(Vec<f64>),
 }
 
 /// Reads numbers, one or an array of them; holds what is expected.
 struct Reader(&'static str);
 
 impl<'de> Visitor<'de> for Reader {
-    type Value = Vec<f64>;
+    type Value = Numbers;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.0)
     }
 
     fn visit_f64<E: Error>(self, number: f64) -> Result<Self::Value, E> {
-        Ok(vec![number])
+        Ok(Numbers::One(number))
     }
 
     fn visit_i64<E: Error>(self, number: i64) -> Result<Self::Value, E> {
-        Ok(vec![number as f64])
+        Ok(Numbers::One(number as f64))
     }
 
     fn visit_u64<E: Error>(self, number: u64) -> Result<Self::Value, E> {
-        Ok(vec![number as f64])
+        Ok(Numbers::One(number as f64))
     }
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Self::Value, A::Error> {
@@ -312,7 +324,7 @@ impl<'de> Visitor<'de> for Reader {
         while let Some(number) = seq.next_element()? {
             numbers.push(number);
         }
-        Ok(numbers)
+        Ok(Numbers::Many(numbers))
     }
 }
 
@@ -375,6 +387,8 @@ mod tests {
             ("b = 0", 5, "b = 0", "give 1 to 9"),
             ("b = -3", 5, "b = -3", "give 1 to 9"),
             ("c = [[1, 2], [nan, 1]]", 5, "c = [NaN, 1.0]", "give 2 numbers"),
+            ("c = [1, 2]", 5, "c = [1.0]", "give 2 numbers"),
+            ("d = [1]", 5, "d = [1.0]", "the least and the greatest"),
             ("d = [1, 2, 3]", 5, "d = [1.0, 2.0, 3.0]", "the least and the greatest"),
             ("e = [0.1, 1.5]", 11, "e = 1.5", "0 to 1"),
             ("f = -1e-9", 5, "f = -0.000000001", "at least 0"),
