@@ -6,7 +6,7 @@ use sidestep_kernel::InputError;
 use std::fmt::Display;
 use std::path::Path;
 
-/// Where the files are, seen from the scenario.
+/// The folder of the files, seen from the scenario.
 const FOLDER: &str = "inputs";
 /// Largest file that goes along as it is, unpacked.
 const MAX_BYTES: u64 = 64 << 20;

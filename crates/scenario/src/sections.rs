@@ -25,7 +25,7 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for Sections<T> {
     }
 }
 
-/// What stands in a table's place: one table, or an array of them.
+/// The content of a key: one table, or an array of them.
 enum OneOrEach<One, Each> {
     One(One),
     Each(Vec<Each>),

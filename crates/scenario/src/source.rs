@@ -14,13 +14,13 @@ use toml_edit::DocumentMut;
 /// Version of the scenario format that this program reads.
 pub const FORMAT: u32 = 1;
 
-/// What the place of a changed scenario ends in.
+/// The end of a changed scenario's place.
 const WITH_OVERRIDES: &str = " (with --set)";
 
 /// The text of a scenario, where it came from, and the folder its paths are relative to.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Source {
-    /// How errors name it.
+    /// Its name in errors.
     pub place: String,
     /// The TOML text, overrides applied: the resolved scenario.
     pub text: String,

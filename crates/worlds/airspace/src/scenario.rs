@@ -98,7 +98,7 @@ struct AirspaceSection {
 /// A weight or a factor that only takes away.
 type UpToOne = Number<AboveTo<0, 1>>;
 
-/// How long tracks are replayed: infinity is a time as well.
+/// The times until which tracks may be replayed: infinity is one as well.
 #[derive(Debug, Clone, Copy)]
 struct UntilWhen;
 
@@ -112,7 +112,7 @@ impl Rule for UntilWhen {
     }
 }
 
-/// What a run keeps.
+/// The tables that a run keeps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RecordSection {
@@ -132,7 +132,7 @@ impl Default for RecordSection {
     }
 }
 
-/// What a scenario compiles to.
+/// A compiled scenario.
 #[derive(Debug, Clone)]
 pub struct Compiled {
     /// The immutable world.
@@ -143,7 +143,7 @@ pub struct Compiled {
     pub seed: u64,
     /// Cycles at most; a run ends when all have arrived.
     pub cycles: u64,
-    /// What to keep.
+    /// The tables to keep.
     pub record: RecordSection,
     /// Sides of the first fallbacks.
     pub fallbacks: Vec<Side>,

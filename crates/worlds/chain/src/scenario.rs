@@ -133,7 +133,7 @@ struct ChainFile<const D: usize> {
     record: RecordSection,
 }
 
-/// What a rod does that hits an obstacle, in words.
+/// The behavior of a rod that hits an obstacle, in words.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 enum RotationWord {
@@ -161,7 +161,7 @@ struct RulesSection {
     may_start_inside: bool,
 }
 
-/// How chains get out of the way of what moves.
+/// The time at which chains get out of the way of moving obstacles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 enum EscapeWord {
@@ -174,7 +174,7 @@ enum EscapeWord {
     Off,
 }
 
-/// What a run keeps.
+/// The tables that a run keeps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RecordSection {
@@ -207,13 +207,13 @@ impl Default for RecordSection {
 }
 
 impl RecordSection {
-    /// Whether the tables are asked for, in the order of their numbers.
+    /// Returns whether the tables are asked for, in the order of their numbers.
     pub(super) fn tables(&self) -> [bool; 4] {
         [self.trajectories, self.robots, self.movers, self.events]
     }
 }
 
-/// What a scenario compiles to.
+/// A compiled scenario.
 #[derive(Debug, Clone)]
 pub struct Compiled<const D: usize> {
     /// The immutable world.
@@ -224,7 +224,7 @@ pub struct Compiled<const D: usize> {
     pub seed: u64,
     /// Cycles at most; a run ends when all tasks are done.
     pub cycles: u64,
-    /// What to keep.
+    /// The tables to keep.
     pub record: RecordSection,
 }
 
@@ -320,12 +320,12 @@ impl<const D: usize> Compiler<'_, D> {
         })
     }
 
-    /// Whether the scripts come to motions, so that they cannot fail while a run goes on.
+    /// Carries the scripts out once, so that they cannot fail during a run.
     fn try_out(&self, compiled: &Compiled<D>) -> Result<(), InputError> {
         super::state::ChainState::new(&compiled.world).map(drop)
     }
 
-    /// How chains escape; not at all where nothing moves. Unless it is said, they may do so twice
+    /// The rule by which chains escape; none where nothing moves. Unless it is said, they may do so twice
     /// as fast as they are led, or as the fastest that moves.
     fn escape(&self, chains: &[ChainSpec<D>], movers: &Movers<D>, dt_s: f64) -> Option<Escape> {
         let section = &self.file.chain;

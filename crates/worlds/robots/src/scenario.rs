@@ -243,7 +243,7 @@ pub(super) struct RadioSection {
     pub(super) loss: Option<Share>,
 }
 
-/// What a run keeps beside its summary.
+/// The tables that a run keeps beside its summary.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RecordSection {

@@ -65,7 +65,7 @@ pub(super) struct ModelSection {
 }
 
 impl ModelSection {
-    /// What an airplane says itself, before what is said for all.
+    /// Values of one airplane, filled up with those for all.
     fn with_own(&self, s: &AirplaneSection) -> Self {
         Self {
             v_m_s: s.v_m_s.or(self.v_m_s),
@@ -85,7 +85,7 @@ impl ModelSection {
     }
 }
 
-/// How long recorded airplanes follow their tracks.
+/// The time for which recorded airplanes follow their tracks.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Replay {
     pub(super) cycles: u64,
@@ -193,7 +193,7 @@ impl Compiler<'_> {
         Ok(following(track, model, replay))
     }
 
-    /// How long recorded airplanes follow their tracks.
+    /// The time for which recorded airplanes follow their tracks.
     pub(super) fn replay(&self, timing: &Timing) -> Replay {
         let until_s = self.file.airspace.replay_until_s.map_or(f64::INFINITY, f64::from);
         // Beyond the largest number of cycles this is that number.

@@ -106,7 +106,7 @@ impl Compiler<'_> {
         Err(self.source.error(given.map(Spanned::span), cause, remedy))
     }
 
-    /// Whether the deployment can compute what is asked for.
+    /// Refuses settings that the deployment cannot compute.
     fn fits_deployment(&self, world: &AirspaceWorld) -> Result<(), InputError> {
         if let Some(reason) = refuses(world.deployment, &world.settings) {
             let cause = format!("deployment {}: {reason}", world.deployment.name());
@@ -123,7 +123,7 @@ impl Compiler<'_> {
         Ok(())
     }
 
-    /// Whether the groups at the start can be optimized in the memory allowed.
+    /// Refuses groups at the start that need more memory than allowed.
     fn fits_memory(&self, compiled: &Compiled) -> Result<(), InputError> {
         let world = &compiled.world;
         if world.method != Method::Pc {

@@ -65,7 +65,7 @@ fn one_chain() -> usize {
     1
 }
 
-/// What is special about one connector.
+/// Limits of one connector.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct LimitSection<const D: usize> {
@@ -76,7 +76,7 @@ pub(super) struct LimitSection<const D: usize> {
     failed: Option<bool>,
 }
 
-/// Where a connector may be.
+/// The places where a connector may be.
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub(super) enum MobilitySection<const D: usize> {
@@ -312,7 +312,7 @@ impl<const D: usize> Compiler<'_, D> {
         Ok((chain, None))
     }
 
-    /// Radius of the connectors: of robots, with the margin that those need who follow.
+    /// Radius of the connectors: of robots, with the margin that followers need.
     fn radius_m(&self, s: &ChainSection<D>, at: Range<usize>) -> Result<f64, InputError> {
         match (&s.robots, s.radius_m) {
             (None, given) => Ok(given.unwrap_or(0.05)),
@@ -327,7 +327,7 @@ impl<const D: usize> Compiler<'_, D> {
         }
     }
 
-    /// Who navigates is where its connector is, so that needs no margin.
+    /// Takes the margin from leaders: they are exactly where their connectors are.
     fn trim_leaders(&self, s: &ChainSection<D>, connectors: &mut [Connector<D>]) {
         let Some(robots) = &s.robots else { return };
         for task in s.tasks.0.iter().map(Spanned::get_ref).filter(|task| task.navigates()) {
@@ -419,7 +419,7 @@ impl<const D: usize> Compiler<'_, D> {
         Ok(start.points.iter().map(|p| std::array::from_fn(|i| p[i])).collect())
     }
 
-    /// Where the connectors are: one by one, or on a line from the first one.
+    /// Places of the connectors: one by one, or on a line from the first one.
     fn points(
         &self,
         s: &ChainSection<D>,

@@ -116,7 +116,7 @@ impl<const D: usize> Compiler<'_, D> {
         Ok(line.map(Goal::EndOf))
     }
 
-    /// How the robots of a swarm behave whose leader drives with `speed_m_s`.
+    /// Robots of a swarm whose leader drives with `speed_m_s`.
     pub(super) fn robots(
         &self,
         section: &Spanned<RobotsSection>,

@@ -15,7 +15,7 @@ use sidestep_scenario::Limits;
 use std::ops::{Range, RangeInclusive};
 use toml::Spanned;
 
-/// How far generated obstacles stay away from chains at the start, unless it is said.
+/// Distance of generated obstacles from chains at the start, unless it is given.
 const KEEP_M: f64 = 0.1;
 
 #[derive(Debug, Deserialize)]
@@ -30,7 +30,7 @@ pub(super) struct GroundSection {
     stage: Option<String>,
 }
 
-/// What unknown pixels of a map are.
+/// The meaning of a map's unknown pixels.
 #[derive(Debug, Clone, Copy, Default, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 enum UnknownWord {
@@ -87,13 +87,13 @@ pub(super) struct FieldSection<const D: usize> {
     keep_m: Option<f64>,
 }
 
-/// What is in the way of a world's chains.
+/// Everything in the way of a world's chains.
 pub(super) struct Ground<const D: usize> {
     pub(super) obstacles: Obstacles<D>,
     pub(super) movers: Movers<D>,
 }
 
-/// What is gathered of it.
+/// The part of it that is gathered so far.
 struct Gathered<const D: usize> {
     still: Vec<Obstacle<D>>,
     movers: Vec<Mover<D>>,
@@ -282,7 +282,7 @@ impl<const D: usize> Compiler<'_, D> {
         }
     }
 
-    /// How an obstacle moves; `None` where it stands still.
+    /// Course of an obstacle; `None` where it stands still.
     fn course(
         &self,
         s: &ObstacleSection<D>,

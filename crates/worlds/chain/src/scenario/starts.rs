@@ -65,7 +65,7 @@ impl<const D: usize> Compiler<'_, D> {
         self.source.error(self.section_of(slot), cause, remedy)
     }
 
-    /// Where the section stands that a chain comes from.
+    /// Place of the section that a chain comes from.
     fn section_of(&self, slot: usize) -> Option<Range<usize>> {
         let sections = self.file.chains.0.iter();
         let mut spans = sections.flat_map(|s| std::iter::repeat_n(s.span(), s.get_ref().count));
@@ -73,7 +73,7 @@ impl<const D: usize> Compiler<'_, D> {
     }
 }
 
-/// Where a chain is deepest in anything that is not called `own`.
+/// The deepest part of a chain in anything that is not called `own`.
 fn deepest<const D: usize>(
     chain: &Chain<D>,
     obstacles: &Obstacles<D>,

@@ -10,9 +10,9 @@ use std::ops::Range;
 use std::sync::Arc;
 use toml::Spanned;
 
-/// How fast initiators go, unless it is said.
+/// Speed of initiators, unless it is given.
 const SPEED_M_S: f64 = 0.5;
-/// How near counts as at a target, meters.
+/// Distance that counts as at a target, meters.
 const TOLERANCE_M: f64 = 1e-3;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
@@ -53,7 +53,7 @@ impl<const D: usize> TaskSection<D> {
         self.speed_m_s.map_or(SPEED_M_S, f64::from)
     }
 
-    /// Whether it drives on wheels.
+    /// Returns whether it drives on wheels.
     pub(super) fn navigates(&self) -> bool {
         self.kind == Kind::Navigate
     }

@@ -53,7 +53,7 @@ pub enum StorageOrder {
     Shuffled(u64),
 }
 
-/// What a scenario compiles to.
+/// A compiled scenario.
 #[derive(Debug, Clone)]
 pub struct Compiled {
     /// The immutable world.
@@ -66,7 +66,7 @@ pub struct Compiled {
     pub seed: u64,
     /// Cycles that the scenario asks for.
     pub cycles: u64,
-    /// What to keep.
+    /// The tables to keep.
     pub record: RecordSection,
 }
 

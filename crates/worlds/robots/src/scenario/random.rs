@@ -39,7 +39,7 @@ fn row(weights: &BTreeMap<String, f64>, actions: &[String]) -> Result<Vec<f64>, 
     Ok(row)
 }
 
-/// Where an action stands among those of an effector.
+/// Index of an action among those of an effector.
 pub(super) fn action_id(name: &str, actions: &[String]) -> Result<usize, Wrong> {
     actions.iter().position(|action| action == name).ok_or_else(|| {
         let known: Vec<&str> = actions.iter().map(String::as_str).collect();
