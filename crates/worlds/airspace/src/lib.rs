@@ -15,6 +15,7 @@
 pub mod airplane;
 mod baseline;
 mod books;
+pub mod bundle;
 mod decide;
 pub mod deploy;
 mod entry;
