@@ -33,6 +33,9 @@ pub struct SweepManifest<P> {
     pub format: FormatVersion,
     /// Version of the program that made the plan; the same makes the runs.
     pub program_version: String,
+    /// Its build; early folders do not name it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub build: Option<String>,
     /// Of the scenario of each variant and the files it names, see [`fingerprint`].
     pub fingerprints: Vec<String>,
     /// The plan.
@@ -65,6 +68,7 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
     pub fn create<E: From<InputError> + From<RecordError>>(
         path: &Path,
         program_version: &str,
+        build: &str,
         fill: impl FnOnce(&Path) -> Result<(P, Vec<String>, Vec<NullableColumn>), E>,
     ) -> Result<Self, E> {
         if Self::is_at(path) {
@@ -78,6 +82,7 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         let manifest = SweepManifest {
             format: format::CURRENT,
             program_version: program_version.into(),
+            build: Some(build.into()),
             fingerprints,
             plan,
         };
@@ -407,7 +412,7 @@ mod tests {
     }
 
     fn create(path: &Path) -> Result<Folder, Failed> {
-        Folder::create(path, "0.1.0", |staging| {
+        Folder::create(path, "0.1.0", "0.1.0+a", |staging| {
             let files = [("inputs/a.txt".to_string(), b"a".to_vec())];
             Folder::write_variant(staging, 0, "seed = 1\n", &files)?;
             Ok((vec![4, 5], vec!["f".into()], cells()))
@@ -447,7 +452,7 @@ mod tests {
     fn a_plan_that_fails_leaves_nothing() {
         let place = tempfile::tempdir().unwrap();
         let path = place.path().join("a/sweep");
-        let made = Folder::create(&path, "0.1.0", |_| Err(Failed("no".into())));
+        let made = Folder::create(&path, "0.1.0", "0.1.0+a", |_| Err(Failed("no".into())));
         assert!(made.is_err());
         assert_eq!(fs::read_dir(place.path()).unwrap().count(), 0);
     }

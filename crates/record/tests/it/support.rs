@@ -53,7 +53,12 @@ pub(crate) fn origin() -> Origin {
 
 /// A run to make a folder for.
 pub(crate) fn new_run() -> NewRun {
-    NewRun { world: "robots".into(), origin: origin(), cycles_planned: 100 }
+    NewRun {
+        world: "robots".into(),
+        build: "0.1.0+a".into(),
+        origin: origin(),
+        cycles_planned: 100,
+    }
 }
 
 /// A recorder of [`trajectories`] in `folder`.
