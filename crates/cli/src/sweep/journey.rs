@@ -1,6 +1,5 @@
 //! From a sweep to the table of its runs: in memory, in a folder, or share by share.
 
-use super::columns::{cells, from_file, share as share_of, to_file};
 use super::prepare::prepare;
 use super::say::{Effort, say, say_share};
 use super::work::{Take, Work};
@@ -10,10 +9,13 @@ use crate::interrupt;
 use crate::progress::Stages;
 use serde_json::json;
 use sidestep::experiment::sweep::rounds::Rounds;
-use sidestep::experiment::sweep::{Cell, Outcome, Plan, Rows, RunTable, Shard, Sweep};
+use sidestep::experiment::sweep::{
+    Cell, Outcome, Plan, Role, Rows, RunTable, Shard, Sweep, rows::cells,
+};
 use sidestep::kernel::InputError;
 use sidestep::scenario::Source;
-use sidestep_record::sweep::{SweepFolder, fingerprint};
+use sidestep_record::WholeTable;
+use sidestep_record::sweep::{Share, SweepFolder, fingerprint};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -75,7 +77,7 @@ pub(crate) fn planned(sweep: &Sweep, out: &Path, console: Console) -> Result<Fol
             fingerprints.push(fingerprint(resolved.text.as_bytes(), &resolved.files));
             Ok(Folder::write_variant(staging, k, &resolved.text, &resolved.files)?)
         })?;
-        let cells = cells(&plan);
+        let cells = cells(&plan).columns;
         Ok::<_, Failure>((plan, fingerprints, cells))
     });
     stages.clear();
@@ -160,7 +162,7 @@ pub(crate) fn go_on(
         return Ok(interrupted(folder, log.rows.len(), console));
     }
     let table = log.rows.table(folder.plan())?;
-    folder.complete(&to_file(table.results()), &to_file(table.timings()))?;
+    folder.complete(&table.results().columns, &table.timings().columns)?;
     say(folder.plan(), &table, effort, Some(folder), console)
 }
 
@@ -207,7 +209,7 @@ pub(crate) fn share(
         return Ok(interrupted(folder, log.rows.len(), console));
     }
     let table = log.rows.table(plan)?;
-    folder.end_share(share_of(shard), journal, &to_file(table.clone()))?;
+    folder.end_share(share_of(shard), journal, &table.columns)?;
     say_share(&table, shard, effort, folder, console)
 }
 
@@ -221,7 +223,7 @@ fn finished_of(folder: &Folder, shard: Shard) -> Result<RunTable, Failure> {
         }
     };
     match folder.is_complete() {
-        true => from_file(folder.results()?).outcomes(&mut take),
+        true => table_of(folder.results()?).outcomes(&mut take),
         false => gather(folder, None, &mut take)?,
     }
     Ok(rows.table(folder.plan())?)
@@ -247,14 +249,24 @@ pub(crate) fn collect(folder: &Folder, console: Console) -> Result<ExitCode, Fai
         return Err(Failure::stopped(cause, remedy));
     }
     let table = log.rows.table(plan)?;
-    folder.complete(&to_file(table.results()), &to_file(table.timings()))?;
+    folder.complete(&table.results().columns, &table.timings().columns)?;
     say(plan, &table, Effort::default(), Some(folder), console)
 }
 
 /// What came of a sweep that is done.
 fn show(folder: &Folder, console: Console) -> Result<ExitCode, Failure> {
-    let table = from_file(folder.results()?);
+    let table = table_of(folder.results()?);
     say(folder.plan(), &table, Effort::default(), Some(folder), console)
+}
+
+/// The table of runs in a file.
+pub(super) fn table_of(file: WholeTable<Role>) -> RunTable {
+    RunTable { columns: file.columns }
+}
+
+/// The same share, as folders name it.
+fn share_of(shard: Shard) -> Share {
+    Share { index: shard.index, count: shard.count }
 }
 
 /// Hands over all finished runs, but for those of the share `but`.
@@ -263,7 +275,7 @@ pub(super) fn gather(
     but: Option<Shard>,
     mut each: impl FnMut(Outcome),
 ) -> Result<(), InputError> {
-    folder.parts(|part| from_file(part).outcomes(&mut each))?;
+    folder.parts(|part| table_of(part).outcomes(&mut each))?;
     folder.journals(but.map(share_of), &mut each)
 }
 

@@ -3,12 +3,10 @@
 //! ```text
 //! ask.rs      options and files -> what to run         prepare.rs   every variant compiled, a plan
 //! work.rs     cells -> outcomes, many at once          journey.rs   from the plan to the table
-//! columns.rs  tables of runs <-> files                 say.rs       what it came to, in words
-//! look.rs     what a report needs
+//! say.rs      what it came to, in words                look.rs      what a report needs
 //! ```
 
 mod ask;
-mod columns;
 mod journey;
 mod look;
 mod prepare;

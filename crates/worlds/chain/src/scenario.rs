@@ -129,13 +129,6 @@ impl Default for RecordSection {
     }
 }
 
-impl RecordSection {
-    /// Whether the tables are asked for, in the order of their numbers.
-    pub(super) fn tables(&self) -> [bool; 4] {
-        [self.trajectories, self.robots, self.movers, self.events]
-    }
-}
-
 /// What a scenario compiles to.
 #[derive(Debug, Clone)]
 pub struct Compiled<const D: usize> {
