@@ -11,7 +11,7 @@ use super::world::AirspaceWorld;
 use super::{Scratch, words};
 use serde_json::Value;
 use sidestep_kernel::checkpoint::CheckpointError;
-use sidestep_kernel::ports::{RecordError, Recorder, TableSchema};
+use sidestep_kernel::ports::{Buffers, RecordError, Recorder, TableSchema};
 use sidestep_kernel::view::{Frame, Log, Look, PlaceRows, Scenery};
 use sidestep_kernel::words::{Lines, Said};
 use sidestep_kernel::{Cycle, Digest, Effort, EntityId, InputError, Plan, Run, World};

@@ -5,7 +5,7 @@ use super::driver::in_space;
 use super::events::Event;
 use super::kinematics::Recovered;
 use super::metrics::{ChainMetrics, Metrics, Tally};
-use super::rows::{Rows, Table};
+use super::rows::Rows;
 use super::scenario::Compiled;
 use super::state::{ChainState, Snapshot};
 use super::view::entry;
@@ -13,7 +13,7 @@ use super::words;
 use super::world::{ChainWorld, Scratch};
 use serde_json::Value;
 use sidestep_kernel::checkpoint::CheckpointError;
-use sidestep_kernel::ports::{RecordError, Recorder, TableSchema};
+use sidestep_kernel::ports::{Buffers, RecordError, Recorder, TableSchema};
 use sidestep_kernel::view::{Frame, Log, Look, PlaceRows, Scenery};
 use sidestep_kernel::words::{Lines, Said};
 use sidestep_kernel::{Cycle, Digest, Effort, EntityId, Plan, Run, World};
@@ -29,7 +29,7 @@ impl<const D: usize> Compiled<D> {
     /// Never: scripts are tried when they are compiled.
     pub fn start(self, source: &Source, workers: usize) -> ChainRun<D> {
         let state = ChainState::new(&self.world).expect("scripts are tried when they are compiled");
-        let books = Books { rows: Rows::new(self.tables()), ..Books::default() };
+        let books = Books { rows: Rows::new(self.record), ..Books::default() };
         let plan = self.plan();
         Run::new(self.world, plan, (state, books), &source.text, workers)
     }
@@ -42,17 +42,6 @@ impl<const D: usize> Compiled<D> {
             cycles: self.cycles,
             checkpoint_every: self.record.checkpoint_every,
         }
-    }
-
-    /// How often rows are kept, and the tables that are asked for and will have rows.
-    fn tables(&self) -> (Cycle, Vec<Table>) {
-        let asked = Table::ALL.into_iter().zip(self.record.tables()).filter(|(_, asked)| *asked);
-        let has_rows = |table: &Table| match table {
-            Table::Movers => !self.world.movers.is_empty(),
-            Table::Robots => self.world.chains.iter().any(|spec| spec.robots.is_some()),
-            Table::Trajectories | Table::Events => true,
-        };
-        (self.record.every, asked.map(|(table, _)| table).filter(has_rows).collect())
     }
 }
 
@@ -135,7 +124,7 @@ impl<const D: usize> World for ChainWorld<D> {
     }
 
     fn begin_recording(&self, _: &mut ChainState<D>, books: &mut Books, _: Cycle) {
-        books.rows.begin(D);
+        books.rows.begin(self);
     }
 
     fn watch(&self, books: &mut Books) {

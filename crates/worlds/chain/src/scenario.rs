@@ -206,13 +206,6 @@ impl Default for RecordSection {
     }
 }
 
-impl RecordSection {
-    /// Returns whether the tables are asked for, in the order of their numbers.
-    pub(super) fn tables(&self) -> [bool; 4] {
-        [self.trajectories, self.robots, self.movers, self.events]
-    }
-}
-
 /// A compiled scenario.
 #[derive(Debug, Clone)]
 pub struct Compiled<const D: usize> {

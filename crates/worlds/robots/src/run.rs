@@ -116,7 +116,7 @@ impl World for RobotsWorld {
     }
 
     fn schemas(&self, books: &Books) -> Vec<TableSchema> {
-        books.schemas(self)
+        books.schemas()
     }
 
     fn record(
