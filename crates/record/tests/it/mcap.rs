@@ -32,7 +32,6 @@ fn scenery() -> Scenery {
         floor: Some(floor),
         names: Vec::new(),
         bodies: vec![Body::new(Kind::Obstacle, 0, Pose::at([0.0; 3]), wall)],
-        names: Vec::new(),
     }
 }
 
