@@ -2,16 +2,16 @@
 
 use super::driver::{Driver, Task, in_space, out_of_space, towards, wander};
 use super::events::{Event, EventKind};
-use super::geometry::{Bounds, distance, first_axis, norm, sub, unit};
 use super::metrics::GivenUp;
+use super::motion::replan::{Climbed, Ladder, Situation};
 use super::navigate::plane_point;
-use super::obstacle::Obstacle;
-use super::replan::{Climbed, Ladder, Situation};
+use super::rods::geometry::{Bounds, distance, first_axis, norm, sub, unit};
+use super::rods::obstacle::Obstacle;
+use super::rods::veto::{Mode, Motion, Moved, Reason, Request, Veto};
 use super::script::Motion as ScriptMotion;
 use super::state::Body;
 use super::swarm::drive::Pose;
 use super::swarm::leader::Decision;
-use super::veto::{Mode, Motion, Moved, Reason, Request, Veto};
 use super::world::{ChainWorld, Scratch, purpose};
 use super::{geometry::Point, world::ChainSpec};
 use sidestep_kernel::distr::normal;
@@ -181,7 +181,7 @@ impl<const D: usize> ChainWorld<D> {
                 let draws = &mut self.streams.draws(turn.slot, turn.now, purpose::WANDER);
                 let ahead = wander(rule, at, out_of_space(body.driving.ahead), step_m, draws);
                 body.driving.ahead = in_space(ahead);
-                Wish::Go(super::geometry::along(at, ahead, step_m))
+                Wish::Go(super::rods::geometry::along(at, ahead, step_m))
             }
             Driver::Script(_) => self.by_script(body, at, step_m),
             Driver::Targets(targets) => {

@@ -4,8 +4,8 @@
 use super::act::Step;
 use super::driver::towards;
 use super::events::EventKind;
-use super::geometry::{Point, add, distance};
-use super::rebuild::{MayCome, Reformed, reform};
+use super::rods::geometry::{Point, add, distance};
+use super::rods::rebuild::{MayCome, Reformed, reform};
 use super::state::{Body, Scattered, flat};
 use super::world::{ChainWorld, FARTHEST_THROW, Scratch, What, purpose};
 use sidestep_kernel::distr::normal;

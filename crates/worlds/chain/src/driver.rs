@@ -2,12 +2,12 @@
 //! (slides R4, R9).
 
 use super::events::EventKind;
-use super::geometry::{Bounds, Point, along, distance, unit};
+use super::motion::replan::Memory;
 use super::navigate::Navigator;
-use super::replan::Memory;
+use super::rods::geometry::{Bounds, Point, along, distance, unit};
+use super::rods::veto::{Reason, Source};
 use super::script::{Motion, Script, Turtle};
 use super::swarm::leader::LeaderState;
-use super::veto::{Reason, Source};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::distr::normal;
 use sidestep_kernel::stream::Draws;

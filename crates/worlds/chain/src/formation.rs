@@ -3,8 +3,8 @@
 
 use super::act::Step;
 use super::events::EventKind;
-use super::geometry::{Point, distance, scaled, sub};
 use super::navigate::{Solid, in_plane, plane_point};
+use super::rods::geometry::{Point, distance, scaled, sub};
 use super::state::Body;
 use super::swarm::convoy;
 use super::swarm::drive::Pose;

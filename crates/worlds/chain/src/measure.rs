@@ -1,13 +1,13 @@
 //! What is measured of a chain at the end of each of its cycles.
 
 use super::act::Step;
-use super::chain::Chain;
 use super::events::EventKind;
-use super::geometry::{Bounds, distance};
 use super::metrics::{PENETRATION_M, Tally};
-use super::obstacle::Obstacles;
+use super::rods::chain::Chain;
+use super::rods::geometry::{Bounds, distance};
+use super::rods::obstacle::Obstacles;
+use super::rods::veto::{Moved, Reason};
 use super::state::Body;
-use super::veto::{Moved, Reason};
 use super::world::{ChainWorld, Scratch};
 
 impl Tally {

@@ -1,8 +1,8 @@
 //! What came of a run.
 
-use super::escape::Escaped;
-use super::replan::Climbed;
-use super::veto::Reason;
+use super::motion::escape::Escaped;
+use super::motion::replan::Climbed;
+use super::rods::veto::Reason;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::EntityId;
 use std::collections::BTreeMap;

@@ -3,8 +3,8 @@
 
 use super::act::Step;
 use super::driver::{Driver, Task};
-use super::geometry::{Point, distance, unit};
-use super::obstacle::Obstacles;
+use super::rods::geometry::{Point, distance, unit};
+use super::rods::obstacle::Obstacles;
 use super::state::{Body, ChainState};
 use super::swarm::drive::{Drive, Pose};
 use super::swarm::laser::Body as Seen;

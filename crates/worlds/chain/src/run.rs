@@ -1,9 +1,9 @@
 //! What a run asks of the world beside its phases.
 
-use super::arm::Arm;
+use super::arms::arm::Arm;
+use super::arms::kinematics::Recovered;
 use super::driver::in_space;
 use super::events::Event;
-use super::kinematics::Recovered;
 use super::metrics::{ChainMetrics, Metrics, Tally};
 use super::rows::{Rows, Table};
 use super::scenario::Compiled;

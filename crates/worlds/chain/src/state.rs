@@ -1,10 +1,10 @@
 //! All that changes in a run, and its snapshot.
 
-use super::chain::Chain;
 use super::driver::Driving;
 use super::formation::Robot;
-use super::geometry::{Bounds, Point};
 use super::metrics::Tally;
+use super::rods::chain::Chain;
+use super::rods::geometry::{Bounds, Point};
 use super::script::Motion;
 use super::swarm::leader::Decision;
 use super::world::{ChainSpec, ChainWorld};

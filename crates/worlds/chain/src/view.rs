@@ -1,11 +1,11 @@
 //! What can be seen of chains: connectors and rods, robots on wheels, what is in the way.
 
-use super::chain::Chain;
 use super::driver::{Driver, Task, in_space};
 use super::events::{Event, EventKind};
-use super::geometry::{Core, Cuboid};
 use super::navigate::Goal;
-use super::obstacle::Obstacle;
+use super::rods::chain::Chain;
+use super::rods::geometry::{Core, Cuboid};
+use super::rods::obstacle::Obstacle;
 use super::state::{Body as ChainBody, ChainState};
 use super::world::{ChainSpec, ChainWorld, OTHER_CHAIN, Scratch};
 use sidestep_kernel::view::{

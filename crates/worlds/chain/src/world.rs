@@ -1,20 +1,20 @@
 //! A compiled world of chains: everything that never changes during a run.
 
 use super::act::Step;
-use super::arm::Arm;
-use super::chain::{Chain, Mobility};
+use super::arms::arm::Arm;
 use super::driver::{Driver, Driving, Task};
-use super::escape::{Escape, Escaper};
 use super::events::Event;
 use super::formation::{Robot, Robots};
-use super::geometry::{Bounds, Point, norm};
 use super::ground::Movers;
+use super::motion::escape::{Escape, Escaper};
+use super::motion::replan::Rungs;
 use super::navigate::{Solid, lifted, plane_point};
-use super::obstacle::{Obstacle, Obstacles};
-use super::propagate::Propagator;
-use super::rebuild::MayCome;
-use super::replan::Rungs;
-use super::rules::Rules;
+use super::rods::chain::{Chain, Mobility};
+use super::rods::geometry::{Bounds, Point, norm};
+use super::rods::obstacle::{Obstacle, Obstacles};
+use super::rods::propagate::Propagator;
+use super::rods::rebuild::MayCome;
+use super::rods::rules::Rules;
 use super::script::Motion;
 use super::state::{Body, ChainState};
 use super::swarm::drive::Pose;
