@@ -10,30 +10,33 @@
 //! ground/: where obstacles come from                     swarm/:  robots on wheels that follow a leader
 //!
 //! scenario.rs -> world.rs (immutable), state.rs (bodies), driver.rs (tasks)
-//! act.rs: a chain's cycle: broken.rs, navigate.rs, formation.rs, measure.rs -> metrics.rs, rows.rs
+//! one cycle: claim.rs (perceive.rs) -> join.rs -> act/ -> metrics.rs, events.rs, rows.rs
 //! ```
 //!
 //! `rods` and `arms` know nothing of the world and of runs: a library that needs no cycle.
 
 mod act;
 pub mod arms;
-mod broken;
 pub mod bundle;
+mod claim;
 pub mod driver;
 pub mod events;
 pub mod formation;
 pub mod ground;
+mod join;
 mod kind;
-mod measure;
 pub mod metrics;
 pub mod motion;
 pub mod navigate;
+mod perceive;
+mod progress;
 pub mod rods;
 mod rows;
 pub mod run;
 pub mod scenario;
 #[cfg(test)]
 mod scenes;
+mod scratch;
 pub mod script;
 pub mod state;
 pub mod swarm;
@@ -55,3 +58,37 @@ pub use run::ChainRun;
 use arms::arm;
 use motion::{escape, replan};
 use rods::{chain, obstacle, rules, veto};
+use scratch::Scratch;
+use sidestep_kernel::conflict::Groups;
+use sidestep_kernel::world::Decides;
+use sidestep_kernel::{Phases, Slot, Turn};
+use state::ChainState;
+use std::ops::Range;
+use world::ChainWorld;
+
+impl<const D: usize> Phases for ChainWorld<D> {
+    const DECIDES: Decides = Decides::Together;
+
+    type State = ChainState<D>;
+    type Scratch = Scratch<D>;
+
+    fn scratch(&self) -> Scratch<D> {
+        Scratch::new(self)
+    }
+
+    fn bodies(&self, state: &ChainState<D>) -> usize {
+        state.len()
+    }
+
+    fn claim(turn: &mut Turn<'_, Self>, bodies: Range<usize>) {
+        bodies.for_each(|slot| claim::claim(turn, slot));
+    }
+
+    fn join(turn: &mut Turn<'_, Self>, bodies: Range<usize>, groups: &Groups) {
+        bodies.for_each(|slot| join::join(turn, slot, groups));
+    }
+
+    fn act(turn: &mut Turn<'_, Self>, group: &mut [Slot]) {
+        act::act(turn, group);
+    }
+}

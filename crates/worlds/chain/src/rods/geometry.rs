@@ -1,128 +1,15 @@
-//! Points, segments, boxes and their distances, in two and three dimensions with one code.
+//! Segments, boxes and their distances, in two and three dimensions with one code.
 //!
 //! Distances between segments are the least of the four distances from an end to the other
 //! segment and, where both feet are inside, of the distance of the lines. The usual clamped
 //! formula is off by up to 4e-8 for nearly parallel segments, which a promise of 1e-9 m cannot
 //! afford.
 
-use sidestep_kernel::math;
-
-/// A position or a vector in `D` dimensions, meters.
-pub type Point<const D: usize> = [f64; D];
-
-/// `a + b`.
-#[inline]
-pub fn add<const D: usize>(a: Point<D>, b: Point<D>) -> Point<D> {
-    std::array::from_fn(|i| a[i] + b[i])
-}
-
-/// `a - b`.
-#[inline]
-pub fn sub<const D: usize>(a: Point<D>, b: Point<D>) -> Point<D> {
-    std::array::from_fn(|i| a[i] - b[i])
-}
-
-/// `a` made `k` times as long.
-#[inline]
-pub fn scaled<const D: usize>(a: Point<D>, k: f64) -> Point<D> {
-    std::array::from_fn(|i| a[i] * k)
-}
-
-/// The point `a + k u`.
-#[inline]
-pub fn along<const D: usize>(a: Point<D>, u: Point<D>, k: f64) -> Point<D> {
-    std::array::from_fn(|i| a[i] + u[i] * k)
-}
-
-/// The point at part `part` of the way from `a` to `b`.
-#[inline]
-pub fn between<const D: usize>(a: Point<D>, b: Point<D>, part: f64) -> Point<D> {
-    std::array::from_fn(|i| a[i] + (b[i] - a[i]) * part)
-}
-
-/// Inner product.
-#[inline]
-pub fn dot<const D: usize>(a: Point<D>, b: Point<D>) -> f64 {
-    let mut sum = a[0] * b[0];
-    for i in 1..D {
-        sum += a[i] * b[i];
-    }
-    sum
-}
-
-/// Length of a vector.
-#[inline]
-pub fn norm<const D: usize>(a: Point<D>) -> f64 {
-    dot(a, a).sqrt()
-}
-
-/// Distance of two points.
-#[inline]
-pub fn distance<const D: usize>(a: Point<D>, b: Point<D>) -> f64 {
-    norm(sub(a, b))
-}
-
-/// Whether every coordinate is a finite number.
-pub fn is_finite<const D: usize>(a: &Point<D>) -> bool {
-    a.iter().all(|x| x.is_finite())
-}
-
-/// The vector of length 1 in the direction of `a`; `None` where `a` is zero.
-#[inline]
-pub fn unit<const D: usize>(a: Point<D>) -> Option<Point<D>> {
-    let length = norm(a);
-    (length > 0.0).then(|| scaled(a, 1.0 / length))
-}
-
-/// The first axis.
-pub fn first_axis<const D: usize>() -> Point<D> {
-    std::array::from_fn(|i| if i == 0 { 1.0 } else { 0.0 })
-}
-
-/// A unit vector perpendicular to the unit vector `u`, always the same for the same `u`: in two
-/// dimensions `u` turned to the left.
-pub fn perpendicular<const D: usize>(u: Point<D>) -> Point<D> {
-    if D == 2 {
-        return std::array::from_fn(|i| if i == 0 { -u[1] } else { u[0] });
-    }
-    let axis = (0..D).min_by(|&i, &j| u[i].abs().total_cmp(&u[j].abs())).unwrap_or(0);
-    let e: Point<D> = std::array::from_fn(|i| if i == axis { 1.0 } else { 0.0 });
-    unit(along(e, u, -u[axis])).unwrap_or(e)
-}
-
-/// Signed area of the parallelogram of two plane vectors: positive where `b` is left of `a`.
-#[inline]
-pub fn cross_2d<const D: usize>(a: Point<D>, b: Point<D>) -> f64 {
-    a[0] * b[1] - a[1] * b[0]
-}
-
-/// Angle between two vectors, in [0, pi]; exact near 0 and pi too.
-pub fn angle_rad<const D: usize>(a: Point<D>, b: Point<D>) -> f64 {
-    let along_a = dot(a, b);
-    let across = if D == 2 { cross_2d(a, b).abs() } else { norm(cross_3d(a, b)) };
-    math::atan2(across, along_a)
-}
-
-/// Cross product of space vectors.
-#[inline]
-fn cross_3d<const D: usize>(a: Point<D>, b: Point<D>) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-/// The point of the segment `a b` nearest to `p`.
-#[inline]
-pub fn nearest_on_segment<const D: usize>(p: Point<D>, a: Point<D>, b: Point<D>) -> Point<D> {
-    let d = sub(b, a);
-    let length2 = dot(d, d);
-    let part = dot(sub(p, a), d);
-    if part <= 0.0 || length2 <= 0.0 {
-        a
-    } else if part >= length2 {
-        b
-    } else {
-        along(a, d, part / length2)
-    }
-}
+pub use sidestep_kernel::geometry::{
+    Point, across, add, along, angle_rad, between, cross, cross_2d, distance, dot, first_axis,
+    in_dimensions, is_finite, nearest_on_segment, norm, norm2, perpendicular, scaled, sub, towards,
+    unit,
+};
 
 /// How near something comes, and where.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -177,7 +64,7 @@ fn between_insides<const D: usize>(
             Nearest { distance_m: 0.0, on_body: at, on_core: at }
         });
     }
-    let n = cross_3d(d1, d2);
+    let n = cross(d1, d2);
     let t = (bb * s + f) / ee;
     let is_inside = s > 0.0 && s < 1.0 && t > 0.0 && t < 1.0;
     (is_inside && norm2(n) > PARALLEL2 * aa * ee).then(|| {
@@ -394,13 +281,8 @@ fn is_far_from_segment<const D: usize>(c: Point<D>, [p, q]: [Point<D>; 2], reach
         let r = sub(c, q);
         return dot(r, r) >= reach2;
     }
-    let across2 = if D == 2 { cross_2d(d, r) * cross_2d(d, r) } else { norm2(cross_3d(d, r)) };
+    let across2 = if D == 2 { cross_2d(d, r) * cross_2d(d, r) } else { norm2(cross(d, r)) };
     across2 >= reach2 * whole
-}
-
-#[inline]
-fn norm2(a: [f64; 3]) -> f64 {
-    dot(a, a)
 }
 
 /// Whether a plane segment `a b` lies on one side of the line `p q`, further than `reach_m`.
@@ -488,6 +370,7 @@ impl<const D: usize> Bounds<D> {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+    use sidestep_kernel::math;
 
     fn sampled_distance<const D: usize>(body: [Point<D>; 2], core: &Core<D>) -> f64 {
         let at = |k: i32| between(body[0], body[1], f64::from(k) / 2000.0);
@@ -533,7 +416,7 @@ mod tests {
             let Some(u) = unit(u) else { return Ok(()) };
             let n = perpendicular(u);
             let angle_rad = math::exp(magnitude * std::f64::consts::LN_10);
-            let across = cross_3d(n, u);
+            let across = cross(n, u);
             let v = add(scaled(u, math::cos(angle_rad)), scaled(across, math::sin(angle_rad)));
             let through = |at: Point<3>, u: Point<3>, part: f64| {
                 [along(at, u, -2.0 * part), along(at, u, 2.0 * (1.0 - part))]
@@ -590,7 +473,7 @@ mod tests {
         ) {
             let Some(u) = unit(u) else { return Ok(()) };
             let v = perpendicular(u);
-            let cuboid = Cuboid { center, axes: [u, v, cross_3d(u, v)], half_m };
+            let cuboid = Cuboid { center, axes: [u, v, cross(u, v)], half_m };
             let nearest = cuboid.nearest_to_segment([p, q]);
             let sampled = sampled_distance([p, q], &Core::Cuboid(cuboid));
             prop_assert!(nearest.distance_m <= sampled + 1e-9);
@@ -608,11 +491,5 @@ mod tests {
     fn segments_that_cross_have_no_distance() {
         let nearest = between_segments([[-1.0, 0.0], [1.0, 0.0]], [[0.0, -1.0], [0.0, 1.0]]);
         assert_eq!((nearest.distance_m, nearest.on_core), (0.0, [0.0, 0.0]));
-    }
-
-    #[test]
-    fn angles_are_exact_near_zero_and_a_half_turn() {
-        assert!((angle_rad([1.0, 0.0, 0.0], [1.0, 1e-9, 0.0]) - 1e-9).abs() < 1e-20);
-        assert_eq!(angle_rad([1.0, 0.0], [-2.0, 0.0]), std::f64::consts::PI);
     }
 }

@@ -7,6 +7,7 @@
 use super::geometry::{self, Bounds, Core, Point, add, scaled};
 use super::grid::Grid;
 use sidestep_kernel::InputError;
+use std::any::Any;
 use std::sync::Arc;
 
 /// Something in the way: all points within a radius of a convex core.
@@ -108,6 +109,11 @@ struct Still<const D: usize> {
 const FEW: usize = 12;
 
 impl<const D: usize> Obstacles<D> {
+    /// The same obstacles in a world of the plane; none where `D` is not 2.
+    pub(crate) fn in_plane(&self) -> Option<&Obstacles<2>> {
+        (self as &dyn Any).downcast_ref()
+    }
+
     /// Obstacles for chains whose longest rod, with its ends, measures about `reach_m`; that
     /// sets the cells of the grid, never the result.
     ///

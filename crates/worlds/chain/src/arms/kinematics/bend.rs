@@ -6,9 +6,10 @@
 
 use std::f64::consts::PI;
 
-use super::pose::{Vector, across, cross, dot, length, scale, sub};
+use super::pose::Vector;
 use super::serial::{Motion, SerialChain};
 use super::skeleton::Skeleton;
+use sidestep_kernel::geometry::{across, cross, dot, norm, scaled, sub};
 use sidestep_kernel::math::{acos, atan2, cos, wrap_angle};
 
 /// Angles that differ by less are equal: models are written with some ten digits.
@@ -73,10 +74,10 @@ struct Bend {
 impl Bend {
     /// None where the joint turns one of the rods about itself.
     fn new(before: Vector, after: Vector, axis: Vector) -> Option<Self> {
-        let before = scale(before, 1.0 / length(before));
-        let after = scale(after, 1.0 / length(after));
+        let before = scaled(before, 1.0 / norm(before));
+        let after = scaled(after, 1.0 / norm(after));
         let (u, v) = (across(before, axis), across(after, axis));
-        let product = length(u) * length(v);
+        let product = norm(u) * norm(v);
         if product < SAME_ANGLE_RAD {
             return None;
         }

@@ -1,39 +1,11 @@
-//! Vectors, rotations and frames of three dimensions, in m and rad.
+//! Rotations and frames of three dimensions, in m and rad.
 
 use sidestep_import::urdf::Origin;
+use sidestep_kernel::geometry::{Point, add, cross, dot, norm, scaled, sub};
 use sidestep_kernel::math::{cos, sin};
 
 /// A point or a direction.
-pub type Vector = [f64; 3];
-
-pub(super) fn add(a: Vector, b: Vector) -> Vector {
-    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
-}
-
-pub(super) fn sub(a: Vector, b: Vector) -> Vector {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-pub(super) fn scale(a: Vector, by: f64) -> Vector {
-    a.map(|x| x * by)
-}
-
-pub(super) fn dot(a: Vector, b: Vector) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-pub(super) fn cross(a: Vector, b: Vector) -> Vector {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-pub(super) fn length(a: Vector) -> f64 {
-    dot(a, a).sqrt()
-}
-
-/// The part of `a` across the unit vector `axis`.
-pub(super) fn across(a: Vector, axis: Vector) -> Vector {
-    sub(a, scale(axis, dot(a, axis)))
-}
+pub type Vector = Point<3>;
 
 /// A frame in another: a point `p` of it is at `rotation * p + origin_m` in the other.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -99,12 +71,12 @@ impl Pose {
     pub fn point_inside(&self, p_m: Vector) -> Vector {
         let d = sub(p_m, self.origin_m);
         let [x, y, z] = self.rotation;
-        add(add(scale(x, d[0]), scale(y, d[1])), scale(z, d[2]))
+        add(add(scaled(x, d[0]), scaled(y, d[1])), scaled(z, d[2]))
     }
 }
 
 fn multiply(a: &[Vector; 3], b: &[Vector; 3]) -> [Vector; 3] {
-    a.map(|row| add(add(scale(b[0], row[0]), scale(b[1], row[1])), scale(b[2], row[2])))
+    a.map(|row| add(add(scaled(b[0], row[0]), scaled(b[1], row[1])), scaled(b[2], row[2])))
 }
 
 /// A straight line: a joint's axis in space.
@@ -120,12 +92,12 @@ impl Line {
     /// The point on the line that is nearest to `p_m`.
     pub(super) fn nearest(&self, p_m: Vector) -> Vector {
         let t = dot(sub(p_m, self.through_m), self.along);
-        add(self.through_m, scale(self.along, t))
+        add(self.through_m, scaled(self.along, t))
     }
 
     /// Distance of `p_m` from the line.
     pub(super) fn distance_m(&self, p_m: Vector) -> f64 {
-        length(sub(p_m, self.nearest(p_m)))
+        norm(sub(p_m, self.nearest(p_m)))
     }
 
     /// The ends of the common perpendicular, on this line and on `other`; none of parallel lines.
@@ -139,7 +111,7 @@ impl Line {
         }
         let between = sub(other.through_m, self.through_m);
         let t = dot(cross(between, other.along), normal) / sine_squared;
-        let foot = add(self.through_m, scale(self.along, t));
+        let foot = add(self.through_m, scaled(self.along, t));
         Some((foot, other.nearest(foot)))
     }
 }

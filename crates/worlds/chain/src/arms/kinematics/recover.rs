@@ -9,10 +9,11 @@
 
 use std::f64::consts::TAU;
 
-use super::pose::{Line, Pose, Vector, across, add, cross, dot, length, scale, sub};
+use super::pose::{Line, Pose, Vector};
 use super::serial::{Motion, MovingJoint, SerialChain};
 use super::skeleton::Skeleton;
 use sidestep_import::urdf::Limits;
+use sidestep_kernel::geometry::{across, add, cross, dot, norm, scaled, sub};
 use sidestep_kernel::math::{atan2, wrap_angle};
 
 /// Connectors further from where joints can bring them, as a share of the reach, do not fit.
@@ -217,7 +218,7 @@ impl Search<'_> {
     }
 
     fn fits(&mut self, connector: usize, error_m: Vector) -> bool {
-        let distance_m = length(error_m);
+        let distance_m = norm(error_m);
         let fits = distance_m <= FITS * self.skeleton.reach_m;
         if !fits {
             let failure = RecoverError::DoesNotFit { connector, distance_m };
@@ -284,7 +285,7 @@ impl Search<'_> {
             across(sub(p_m, line.through_m), line.along),
             across(sub(target_m, line.through_m), line.along),
         );
-        if length(from) <= on_axis_m || length(to) <= on_axis_m {
+        if norm(from) <= on_axis_m || norm(to) <= on_axis_m {
             return Value { value: reference, is_open: true };
         }
         let angle_rad = atan2(dot(cross(from, to), line.along), dot(from, to));
@@ -323,7 +324,7 @@ impl Search<'_> {
     fn finish(self) -> Recovered {
         let frames = self.chain.forward(&self.values);
         let found = self.chain.connectors(self.skeleton, &frames);
-        let errors = found.iter().zip(self.positions_m).map(|(&a, &b)| length(sub(a, b)));
+        let errors = found.iter().zip(self.positions_m).map(|(&a, &b)| norm(sub(a, b)));
         let variables = self.chain.variables.iter().zip(&self.open);
         Recovered {
             residual_m: errors.fold(0.0, f64::max),
@@ -376,14 +377,14 @@ fn nearest_turn(angle_rad: f64, reference_rad: f64, limits: Option<Limits>) -> f
 fn meeting_points(first: &Line, a: Vector, second: &Line, b: Vector) -> Vec<Vector> {
     // Everything relative to the second circle's center.
     let center = second.nearest(b);
-    let radius = length(sub(b, center));
+    let radius = norm(sub(b, center));
     let n2 = second.along;
     let (n1, d1) = match first.feet(second) {
         Some(_) => (first.along, dot(first.along, sub(a, center))),
         None => {
             let other = first.nearest(a);
             let between = across(sub(other, center), n2);
-            let radius_1 = length(sub(a, other));
+            let radius_1 = norm(sub(a, other));
             let d = dot(between, between);
             (between, 0.5 * (d + radius * radius - radius_1 * radius_1))
         }
@@ -395,8 +396,8 @@ fn meeting_points(first: &Line, a: Vector, second: &Line, b: Vector) -> Vec<Vect
         return vec![b];
     }
     // The point of the line {n1 x = d1, n2 x = 0} that is nearest to the center.
-    let nearest = scale(cross(n2, along), d1 / square);
+    let nearest = scaled(cross(n2, along), d1 / square);
     let half_chord = ((radius * radius - dot(nearest, nearest)).max(0.0) / square).sqrt();
-    let at = |t: f64| add(center, add(nearest, scale(along, t)));
+    let at = |t: f64| add(center, add(nearest, scaled(along, t)));
     if half_chord == 0.0 { vec![at(0.0)] } else { vec![at(half_chord), at(-half_chord)] }
 }

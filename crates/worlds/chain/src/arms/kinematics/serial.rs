@@ -1,8 +1,9 @@
 //! A model's joints from base to tip, and forward kinematics.
 
-use super::pose::{Line, Pose, Vector, scale};
+use super::pose::{Line, Pose, Vector};
 use sidestep_import::urdf::{JointKind, Limits, Model};
 use sidestep_kernel::InputError;
+use sidestep_kernel::geometry::scaled;
 
 /// The joints between two links of a model. Fixed joints are merged into the links.
 ///
@@ -87,7 +88,7 @@ impl MovingJoint {
     pub(super) fn moved(&self, value: f64) -> Pose {
         match self.motion {
             Motion::Turn => Pose::turn(self.axis, value),
-            Motion::Slide => Pose::shift(scale(self.axis, value)),
+            Motion::Slide => Pose::shift(scaled(self.axis, value)),
         }
     }
 

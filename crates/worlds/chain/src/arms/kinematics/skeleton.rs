@@ -5,8 +5,9 @@
 //! is the one furthest out that shares a link with the last one, so that points between which
 //! nothing bends (such as the elbow offsets of a Panda) drop out.
 
-use super::pose::{Line, Vector, across, add, dot, length, scale, sub};
+use super::pose::{Line, Vector};
 use super::serial::{Frames, Motion, SerialChain};
+use sidestep_kernel::geometry::{across, add, dot, norm, scaled, sub};
 
 /// Points nearer to each other than this share of the arm's reach are one point.
 const SAME: f64 = 1e-9;
@@ -75,8 +76,8 @@ impl SerialChain {
             (Motion::Slide, Some(limits)) => limits.lower.abs().max(limits.upper.abs()),
             _ => 0.0,
         };
-        let links = self.joints.iter().map(|joint| length(joint.origin.origin_m) + slide(joint));
-        links.sum::<f64>() + length(self.to_tip.origin_m)
+        let links = self.joints.iter().map(|joint| norm(joint.origin.origin_m) + slide(joint));
+        links.sum::<f64>() + norm(self.to_tip.origin_m)
     }
 }
 
@@ -166,20 +167,20 @@ impl Builder<'_> {
 
     fn coincide(&self, inner: &Anchor, outer: &Anchor) -> bool {
         self.slide_between(inner, outer).is_none()
-            && length(self.between_m(inner, outer)) <= SAME * self.reach_m
+            && norm(self.between_m(inner, outer)) <= SAME * self.reach_m
     }
 
     fn rod(&self, inner: &Anchor, outer: &Anchor) -> Rod {
         let v = self.between_m(inner, outer);
         let Some(joint) = self.slide_between(inner, outer) else {
-            return Rod { min_m: length(v), max_m: length(v) };
+            return Rod { min_m: norm(v), max_m: norm(v) };
         };
         let axis = self.lines[joint].along;
-        let offset_m = length(across(v, axis));
+        let offset_m = norm(across(v, axis));
         let joint = &self.chain.joints[joint];
         // The frames of the builder have every variable at zero, a mimic joint at its offset.
         let zero = joint.drive.offset;
-        let length_m = |q: f64| length([offset_m, dot(v, axis) + q - zero, 0.0]);
+        let length_m = |q: f64| norm([offset_m, dot(v, axis) + q - zero, 0.0]);
         let Some(limits) = joint.limits else {
             return Rod { min_m: offset_m, max_m: f64::INFINITY };
         };
@@ -195,7 +196,7 @@ impl Builder<'_> {
         let first = connectors.first().filter(|c| c.first == 0 && c.last > 0)?;
         let axis = self.lines[0].along;
         let outward = connectors.get(1).map_or(0.0, |next| dot(self.between_m(first, next), axis));
-        Some(if outward < 0.0 { scale(axis, -1.0) } else { add(axis, [0.0; 3]) })
+        Some(if outward < 0.0 { scaled(axis, -1.0) } else { add(axis, [0.0; 3]) })
     }
 }
 

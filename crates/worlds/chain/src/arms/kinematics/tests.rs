@@ -2,9 +2,9 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use proptest::prelude::*;
 
-use super::pose::{dot, length, sub};
 use super::*;
 use sidestep_import::urdf::Model;
+use sidestep_kernel::geometry::{dot, norm, sub};
 use sidestep_testing::{ROBOT_MODELS as SHARED, robot_model as shared};
 
 fn chain_of(model: &Model, tip: Option<&str>) -> SerialChain {
@@ -46,7 +46,7 @@ const O: [f64; 3] = [0.0; 3];
 const TURN: [f64; 2] = [-3.0, 3.0];
 
 fn assert_near(found: Vector, expected: Vector, tolerance: f64) {
-    assert!(length(sub(found, expected)) <= tolerance, "{found:?} is not {expected:?}");
+    assert!(norm(sub(found, expected)) <= tolerance, "{found:?} is not {expected:?}");
 }
 
 #[test]
@@ -99,7 +99,7 @@ fn every_shared_arm_has_rods_of_its_lengths_in_every_posture() {
             let connectors = chain.connectors(&skeleton, &frames);
             assert_near(connectors[connectors.len() - 1], frames.tip.origin_m, 1e-9);
             for (pair, rod) in connectors.windows(2).zip(&skeleton.rods) {
-                let length_m = length(sub(pair[1], pair[0]));
+                let length_m = norm(sub(pair[1], pair[0]));
                 let range = rod.min_m - 1e-9..=rod.max_m + 1e-9;
                 assert!(range.contains(&length_m), "{name}: {length_m} {rod:?}");
                 assert!(rod.max_m > 1e-6, "{name}: {rod:?}");
@@ -278,7 +278,7 @@ fn mimic_joints_follow_their_driver() {
     let mut values = hand.rest();
     let closed = hand.forward(&values).tip.origin_m;
     values[7] = 0.03;
-    assert!((length(sub(hand.forward(&values).tip.origin_m, closed)) - 0.03).abs() < 1e-12);
+    assert!((norm(sub(hand.forward(&values).tip.origin_m, closed)) - 0.03).abs() < 1e-12);
     let skeleton = hand.skeleton();
     let connectors = hand.connectors(&skeleton, &hand.forward(&values));
     assert!(hand.recover(&skeleton, &connectors, &values).is_err());
@@ -311,7 +311,7 @@ proptest! {
         joints in prop::collection::vec((vector(), vector(), vector(), any::<bool>()), 1..9),
         values in prop::collection::vec(-2.0..2.0f64, 9),
     ) {
-        let unit = |a: [f64; 3]| if length(a) < 0.1 { Z } else { a };
+        let unit = |a: [f64; 3]| if norm(a) < 0.1 { Z } else { a };
         let kind = |slides: bool| if slides { "prismatic" } else { "revolute" };
         let rows: Vec<_> =
             joints.iter().map(|&(xyz, rpy, axis, s)| (kind(s), xyz, rpy, unit(axis), [-2.0, 2.0])).collect();
@@ -321,7 +321,7 @@ proptest! {
         let connectors = chain.connectors(&skeleton, &frames);
         prop_assert_eq!(connectors.len(), skeleton.rods.len() + 1);
         for (pair, rod) in connectors.windows(2).zip(&skeleton.rods) {
-            let length_m = length(sub(pair[1], pair[0]));
+            let length_m = norm(sub(pair[1], pair[0]));
             prop_assert!(rod.min_m - 1e-7 <= length_m && length_m <= rod.max_m + 1e-7, "{} {:?}", length_m, rod);
         }
     }
@@ -343,7 +343,7 @@ proptest! {
         prop_assert!(found.residual_m < 1e-9);
         let again = chain.connectors(&skeleton, &chain.forward(&found.values));
         for (a, b) in again.iter().zip(&connectors) {
-            prop_assert!(length(sub(*a, *b)) < 1e-9);
+            prop_assert!(norm(sub(*a, *b)) < 1e-9);
         }
     }
 }

@@ -1,12 +1,13 @@
 //! The connectors' solution as a posture of the joints.
 
-use super::super::pose::{Vector, add, scale};
+use super::super::pose::Vector;
 use super::super::serial::SerialChain;
 use super::super::skeleton::Skeleton;
 use super::goal::ArmGoal;
 use crate::arms::ik::{Goal, Solver};
 use crate::rods::{Chain, Connector, Mobility, Obstacle, Obstacles, Rod, Rules};
 use sidestep_kernel::InputError;
+use sidestep_kernel::geometry::{add, scaled};
 
 /// Rods that a prismatic joint can close altogether have at least this length in m.
 const LEAST_ROD_M: f64 = 1e-6;
@@ -74,7 +75,7 @@ fn chain_of(
     joints[0].mobility = Mobility::Fixed;
     let before = usize::from(skeleton.base_direction.is_some());
     if let Some(direction) = skeleton.base_direction {
-        points.insert(0, add(points[0], scale(direction, -1.0)));
+        points.insert(0, add(points[0], scaled(direction, -1.0)));
         rods.insert(0, Rod::fixed(1.0, 0.0));
         joints.insert(0, Connector { mobility: Mobility::Fixed, ..Connector::free(0.0) });
     }

@@ -23,11 +23,12 @@ mod tests;
 
 pub use goal::{ArmAnswer, ArmGoal, ArmReason, Hit, Sphere};
 
-use super::pose::{Vector, length, sub};
+use super::pose::Vector;
 use super::serial::{Motion, SerialChain};
 use super::skeleton::Skeleton;
 use crate::arms::ik::Engine;
 use rows::{Errors, Scene};
+use sidestep_kernel::geometry::{norm, sub};
 use sidestep_kernel::math::wrap_angle;
 use sidestep_kernel::stream::{Draws, Purpose, Streams};
 use sidestep_kernel::{InputError, Seed};
@@ -193,7 +194,7 @@ impl Search<'_> {
     /// What the rods alone rule out.
     fn out_of_reach(&self, skeleton: &Skeleton, start: &[f64]) -> Option<ArmReason> {
         let connectors = self.chain.connectors(skeleton, &self.chain.forward(start));
-        let far_m = length(sub(self.goal.target_m, connectors[0]));
+        let far_m = norm(sub(self.goal.target_m, connectors[0]));
         let reach_m: f64 = skeleton.rods.iter().map(|rod| rod.max_m).sum();
         let longest_m = skeleton.rods.iter().map(|rod| rod.min_m + rod.max_m).fold(0.0, f64::max);
         let hole_m = longest_m - reach_m;
@@ -252,5 +253,5 @@ impl Search<'_> {
 
 /// The distance of two points.
 fn apart_m(a: Vector, b: Vector) -> f64 {
-    length(sub(a, b))
+    norm(sub(a, b))
 }

@@ -1,11 +1,12 @@
 //! Errors of a posture, and how the joints change them.
 
-use super::super::pose::{Line, Vector, cross, dot, scale, sub};
+use super::super::pose::{Line, Vector};
 use super::super::serial::{Frames, Motion, SerialChain};
 use super::super::skeleton::{Anchor, Skeleton};
 use super::apart_m;
 use super::goal::{ArmGoal, Hit, Sphere};
 use crate::rods::geometry::nearest_on_segment;
+use sidestep_kernel::geometry::{cross, dot, scaled, sub};
 
 /// How far from spheres steps aim to stay, in parts of the reach.
 const MARGIN: f64 = 1e-4;
@@ -82,7 +83,7 @@ impl<'a> Scene<'a> {
                 Motion::Turn => cross(line.along, sub(p_m, line.through_m)),
                 Motion::Slide => line.along,
             };
-            tell(joint.drive.variable, scale(moves, joint.drive.multiplier));
+            tell(joint.drive.variable, scaled(moves, joint.drive.multiplier));
         }
     }
 
@@ -98,7 +99,7 @@ impl<'a> Scene<'a> {
                     continue;
                 }
                 let away = if apart > 0.0 {
-                    scale(sub(nearest, center_m), 1.0 / apart)
+                    scaled(sub(nearest, center_m), 1.0 / apart)
                 } else {
                     [0.0, 0.0, 1.0]
                 };

@@ -1,53 +1,37 @@
 //! What is measured of a chain at the end of each of its cycles.
 
-use super::act::Step;
-use super::events::EventKind;
-use super::metrics::{PENETRATION_M, Tally};
-use super::rods::chain::Chain;
-use super::rods::geometry::{Bounds, distance};
-use super::rods::obstacle::Obstacles;
-use super::rods::veto::{Moved, Reason};
-use super::state::Body;
-use super::world::{ChainWorld, Scratch};
+use super::Acting;
+use crate::events::EventKind;
+use crate::metrics::PENETRATION_M;
+use crate::rods::chain::Chain;
+use crate::rods::geometry::{Bounds, distance};
+use crate::rods::obstacle::Obstacles;
 
-impl Tally {
-    /// Adds a motion.
-    pub(super) fn add_moved<const D: usize>(&mut self, moved: &Moved<D>) {
-        self.rotations += moved.rotated as u64;
-        self.moved += moved.changed as u64;
-        self.max_slave_step_m = self.max_slave_step_m.max(moved.max_slave_step_m);
-    }
-
-    /// Adds a veto.
-    pub(super) fn add_veto(&mut self, reason: Reason) {
-        let k = Reason::ALL.iter().position(|&all| all == reason);
-        self.vetoes[k.unwrap_or_default()] += 1;
-    }
-}
-
-impl<const D: usize> ChainWorld<D> {
-    /// Looks at a chain as it is after its cycle.
-    pub(super) fn measure(&self, body: &mut Body<D>, turn: Step<'_, D>, scratch: &mut Scratch<D>) {
-        let (chain, tally) = (&body.chain, &mut body.tally);
+impl<const D: usize> Acting<'_, D> {
+    /// Looks at the chain as it is after its cycle.
+    pub(super) fn measure(&mut self) {
+        let (look_m, dt_s) = (self.world.look_m, self.world.dt_s);
+        let (chain, tally) = (&self.body.chain, &mut self.body.tally);
         tally.steps += 1;
-        let ways_m = scratch.before.iter().zip(chain.points()).map(|(a, b)| distance(*a, *b));
-        tally.max_speed_m_s = tally.max_speed_m_s.max(ways_m.fold(0.0, f64::max) / self.dt_s);
+        let ways = self.scratch.before.iter().zip(chain.points());
+        let longest_m = ways.map(|(a, b)| distance(*a, *b)).fold(0.0, f64::max);
+        tally.max_speed_m_s = tally.max_speed_m_s.max(longest_m / dt_s);
         // Of a broken chain the parts count, and no rods.
-        let is_whole = body.scattered.is_none();
+        let is_whole = self.body.scattered.is_none();
         if is_whole {
             tally.max_rod_violation_m = tally.max_rod_violation_m.max(chain.max_rod_violation_m());
         }
-        let (least_m, part) = least_clearance(chain, &scratch.obstacles, self.look_m, is_whole);
-        if least_m < self.look_m {
+        let (least_m, part) = least_clearance(chain, &self.scratch.obstacles, look_m, is_whole);
+        if least_m < look_m {
             tally.min_clearance_m = tally.min_clearance_m.min(least_m);
         }
-        let is_inside = least_m.min(scratch.robots_gap_m) < -PENETRATION_M;
+        let is_inside = least_m.min(self.scratch.robots_gap_m) < -PENETRATION_M;
         tally.penetrations += u64::from(is_inside);
-        if is_inside != tally.is_inside {
+        let was_inside = std::mem::replace(&mut tally.is_inside, is_inside);
+        if is_inside != was_inside {
             let kind = if is_inside { EventKind::Penetration } else { EventKind::Clear };
-            scratch.events.push(turn.event(kind, part, (-least_m).max(0.0)));
+            self.tell(kind, part, (-least_m).max(0.0));
         }
-        tally.is_inside = is_inside;
     }
 }
 
