@@ -15,6 +15,7 @@
 //! - [`workers`], [`cycle`]: the same bits for every number of workers.
 //! - [`digest`], [`checkpoint`]: a state has one digest, and continues bit for bit.
 //! - [`view`]: what can be seen of any world; looking changes nothing.
+//! - [`math`], [`distr`], [`geometry`]: numbers that are the same on every platform.
 //! - [`ports`]: recorder, transport and clock, each with an in-memory version.
 
 pub mod checkpoint;
@@ -25,6 +26,7 @@ pub mod digest;
 pub mod distr;
 pub mod engine;
 pub mod error;
+pub mod geometry;
 pub mod math;
 pub mod plan;
 pub mod ports;

@@ -1,16 +1,17 @@
 //! What a run asks of the world beside its phases.
 
-use super::arm::Arm;
-use super::driver::in_space;
+use super::arms::arm::Arm;
+use super::arms::kinematics::Recovered;
 use super::events::Event;
-use super::kinematics::Recovered;
 use super::metrics::{ChainMetrics, Metrics, Tally};
+use super::rods::geometry::in_dimensions;
 use super::rows::Rows;
 use super::scenario::Compiled;
+use super::scratch::Scratch;
 use super::state::{ChainState, Snapshot};
 use super::view::entry;
 use super::words;
-use super::world::{ChainWorld, Scratch};
+use super::world::ChainWorld;
 use serde_json::Value;
 use sidestep_kernel::checkpoint::CheckpointError;
 use sidestep_kernel::ports::{Buffers, RecordError, Recorder, TableSchema};
@@ -63,7 +64,7 @@ impl<const D: usize> ChainWorld<D> {
     pub fn metrics_of(&self, state: &ChainState<D>, slot: usize) -> ChainMetrics {
         let body = state.body(slot);
         let spec = &self.chains[slot];
-        let points: Vec<_> = body.chain.points().iter().map(|p| in_space(*p)).collect();
+        let points: Vec<_> = body.chain.points().iter().map(|p| in_dimensions(*p)).collect();
         let joints = spec.arm.as_ref().map(|arm| (arm, arm.joints(&points)));
         let named = |(arm, recovered): (&Arm, Recovered)| {
             let names = arm.serial.variables.iter().map(|variable| variable.name.clone());
