@@ -8,11 +8,10 @@ use sidestep::collectives::{
     Choice, Estimator, Game, Order, Settings, Stop, Update, Utility, optimize,
 };
 use sidestep::scenario::Source;
-use sidestep::worlds::airspace::airplane::{
-    Action, After, Legs, Model, Passing, Pilot, Point, Pose, Timing, actions,
-};
 use sidestep::worlds::airspace::airspace_run;
-use sidestep::worlds::airspace::levels::Levels;
+use sidestep::worlds::airspace::flight::{
+    Action, After, Legs, Levels, Model, Passing, Pilot, Point, Pose, Timing, actions,
+};
 use sidestep::worlds::airspace::objective::{Objective, Options, game};
 use sidestep_kernel::stream::{Purpose, Streams};
 use sidestep_kernel::{Seed, Simulation};

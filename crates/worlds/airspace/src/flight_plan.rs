@@ -1,9 +1,7 @@
 //! The text of one airplane of a scenario: where it begins, its way-points, its recorded track,
 //! and its orders.
 
-use super::airplane::Point;
-use super::orders::{FlightOrder, MAX_ORDERS, Task};
-use super::track::{Track, TrackPoint};
+use super::flight::{FlightOrder, MAX_ORDERS, Point, Task, Track, TrackPoint};
 use serde::Deserialize;
 use sidestep_kernel::{InputError, math};
 use sidestep_scenario::Source;

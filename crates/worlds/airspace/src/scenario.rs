@@ -3,16 +3,14 @@
 mod network;
 mod settings;
 
-use super::airplane::{Legs, Model, Passing, Point, Pose, Timing};
 use super::deploy::{Deployment, refuses};
+use super::flight::{Airplane, Legs, Levels, Model, Passing, Point, Pose, Task, Timing, Track};
 use super::flight_plan::AirplaneSection;
-use super::generate::{Order as Wanted, generate};
-use super::levels::Levels;
-use super::orders::Task;
+use super::generate::{GeneratorKind, Order as Wanted, generate};
+use super::memory::largest_at_start;
 use super::shield::{Flyer, Side, first_fallbacks};
 use super::state::{AirplaneRecord, AirspaceState, FLYING, Snapshot};
-use super::track::Track;
-use super::world::{Airplane, AirspaceWorld, Disturbance, Method};
+use super::world::{AirspaceWorld, Disturbance, Method};
 use network::NetworkSection;
 use serde::{Deserialize, Serialize};
 use sidestep_collectives::{Choice, Estimator, Order, Update, Utility};
@@ -37,18 +35,6 @@ const MOST_NOISE_M: f64 = 1e6;
 const TURNS_DEG_S: RangeInclusive<f64> = 1e-3..=360.0;
 /// Most airplanes of a scenario.
 const MAX_AIRPLANES: usize = 1_000_000;
-
-/// Kinds of made-up traffic.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum GeneratorKind {
-    /// On a circle, each to the opposite point.
-    Superconflict,
-    /// From anywhere to anywhere in a disc.
-    Random,
-    /// Three streams that meet.
-    Streams,
-}
 
 /// Sets of parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize)]
@@ -306,7 +292,7 @@ impl Compiler<'_> {
             return Ok(());
         }
         let state = AirspaceState::restore(world, &compiled.start_snapshot());
-        let (airplanes, bytes) = world.largest_at_start(&state);
+        let (airplanes, bytes) = largest_at_start(world, &state);
         if bytes <= world.group_bytes {
             return Ok(());
         }

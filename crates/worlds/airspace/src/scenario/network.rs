@@ -1,9 +1,8 @@
 //! The section of a network that is not to be relied on.
 
-use super::super::airplane::Timing;
-use super::super::deploy::{Deployment, Network, Silence};
-use super::super::orders::{FlightOrder, Task};
-use super::super::world::Airplane;
+use super::super::agents::network::{Network, Silence};
+use super::super::deploy::Deployment;
+use super::super::flight::{Airplane, FlightOrder, Task, Timing};
 use super::Compiler;
 use serde::Deserialize;
 use sidestep_kernel::InputError;

@@ -1,6 +1,6 @@
 //! What is optimized, how, and whether the shield filters it.
 
-use super::super::airplane::Legs;
+use super::super::flight::Legs;
 use super::super::objective::Objective;
 use super::Compiler;
 use sidestep_collectives::{Choice, Estimator, Order, Settings, Stop, Update};
