@@ -4,11 +4,10 @@
 //! `many`; CPU time, and ratios taken in one run, since the machine may be noisy.
 
 use cpu_time::ProcessTime;
-use sidestep_airspace::airplane::{
-    Action, After, Legs, Model, Passing, Pilot, Point, Pose, Timing, actions,
-};
 use sidestep_airspace::airspace_run;
-use sidestep_airspace::levels::Levels;
+use sidestep_airspace::flight::{
+    Action, After, Legs, Levels, Model, Passing, Pilot, Point, Pose, Timing, actions,
+};
 use sidestep_airspace::objective::{Objective, Options, game};
 use sidestep_collectives::{
     Choice, Estimator, Game, Order, Settings, Stop, Update, Utility, optimize,

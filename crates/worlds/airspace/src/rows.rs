@@ -1,8 +1,8 @@
 //! What a run records: its tables, and their rows until they are recorded.
 
-use super::airplane::Pose;
 use super::decide::Optimization;
 use super::events::{Event, EventKind};
+use super::flight::Pose;
 use super::scenario::RecordSection;
 use sidestep_kernel::ports::table::label_of;
 use sidestep_kernel::ports::{Buffer, Buffers, RowBuffer, Table};

@@ -6,10 +6,11 @@ mod network;
 mod settings;
 
 use super::deploy::Deployment;
+use super::flight::Airplane;
 use super::flight_plan::AirplaneSection;
 use super::shield::Side;
 use super::state::{AirplaneRecord, FLYING, Snapshot};
-use super::world::{Airplane, AirspaceWorld, Method};
+use super::world::{AirspaceWorld, Method};
 use airplanes::{GeneratorSection, ModelSection};
 pub(super) use airplanes::{Measure, TurnRate, Turns};
 use compile::Compiler;
@@ -24,18 +25,6 @@ use sidestep_scenario::{
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use toml::Spanned;
-
-/// Kinds of made-up traffic.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum GeneratorKind {
-    /// On a circle, each to the opposite point.
-    Superconflict,
-    /// From anywhere to anywhere in a disc.
-    Random,
-    /// Three streams that meet.
-    Streams,
-}
 
 /// Sets of parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize)]

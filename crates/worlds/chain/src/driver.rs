@@ -4,7 +4,6 @@
 use super::events::EventKind;
 use super::motion::replan::Memory;
 use super::navigate::Navigator;
-pub(crate) use super::rods::geometry::in_dimensions as out_of_space;
 use super::rods::geometry::{Bounds, Point, in_dimensions, unit};
 use super::rods::veto::{Reason, Source};
 use super::script::{Motion, Script, Turtle};

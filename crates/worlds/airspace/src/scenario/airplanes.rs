@@ -1,13 +1,13 @@
 //! Airplanes: their model, made-up traffic, flight plans and recorded tracks.
 
-use super::GeneratorKind;
 use super::compile::Compiler;
-use crate::airplane::{Model, Pose, Timing};
+use crate::flight::Airplane;
+use crate::flight::Task;
+use crate::flight::Track;
+use crate::flight::{Model, Pose, Timing};
 use crate::flight_plan::AirplaneSection;
+use crate::generate::GeneratorKind;
 use crate::generate::{Order, generate};
-use crate::orders::Task;
-use crate::track::Track;
-use crate::world::Airplane;
 use serde::Deserialize;
 use sidestep_kernel::InputError;
 use sidestep_kernel::stream::Streams;

@@ -2,12 +2,14 @@
 
 use super::airplanes::speeds_m_s;
 use super::{AirspaceFile, Compiled, Preset};
-use crate::airplane::{Passing, Timing};
 use crate::deploy::refuses;
-use crate::levels::Levels;
+use crate::flight::Airplane;
+use crate::flight::Levels;
+use crate::flight::{Passing, Timing};
+use crate::memory::largest_at_start;
 use crate::shield::{Flyer, Side, first_fallbacks};
 use crate::state::AirspaceState;
-use crate::world::{Airplane, AirspaceWorld, Disturbance, Method};
+use crate::world::{AirspaceWorld, Disturbance, Method};
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{InputError, Seed};
 use sidestep_scenario::{Head, Source};
@@ -130,7 +132,7 @@ impl Compiler<'_> {
             return Ok(());
         }
         let state = AirspaceState::restore(world, &compiled.start_snapshot());
-        let (airplanes, bytes) = world.largest_at_start(&state);
+        let (airplanes, bytes) = largest_at_start(world, &state);
         if bytes <= world.group_bytes {
             return Ok(());
         }

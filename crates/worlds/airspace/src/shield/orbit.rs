@@ -5,7 +5,7 @@
 //! opposite ones a common period that is searched the same way, and of any others are kept apart
 //! as whole circles.
 
-use super::airplane::{Point, Pose, distance_m};
+use crate::flight::{Point, Pose, distance_m};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::math;
 
@@ -38,9 +38,9 @@ impl Side {
 
 /// A circle that is flown for ever.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Orbit {
+pub(crate) struct Orbit {
     center: Point,
-    pub(super) radius_m: f64,
+    pub(crate) radius_m: f64,
     /// Positive to the left.
     omega_rad_s: f64,
     /// Direction from the centre at time 0.
@@ -49,7 +49,7 @@ pub(super) struct Orbit {
 
 impl Orbit {
     /// The orbit that an airplane enters at `pose`.
-    pub(super) fn from(pose: Pose, v_m_s: f64, omega_rad_s: f64) -> Self {
+    pub(crate) fn from(pose: Pose, v_m_s: f64, omega_rad_s: f64) -> Self {
         let radius_m = v_m_s / omega_rad_s.abs();
         // The centre is at a right angle to the heading, on the side of the turn.
         let to_center = pose.psi_rad + omega_rad_s.signum() * std::f64::consts::FRAC_PI_2;
@@ -61,7 +61,7 @@ impl Orbit {
     }
 
     /// Where the airplane is on it.
-    pub(super) fn at(&self, t_s: f64) -> Point {
+    pub(crate) fn at(&self, t_s: f64) -> Point {
         let angle = self.phase_rad + self.omega_rad_s * t_s;
         [
             self.center[0] + self.radius_m * math::cos(angle),
@@ -74,7 +74,7 @@ impl Orbit {
     }
 
     /// Whether two orbits stay `gap_m` apart for all time.
-    pub(super) fn stays_apart(&self, other: &Self, gap_m: f64) -> bool {
+    pub(crate) fn stays_apart(&self, other: &Self, gap_m: f64) -> bool {
         let between = distance_m(self.center, other.center);
         let (ra, rb) = (self.radius_m, other.radius_m);
         // As whole circles, side by side or one inside the other.
@@ -102,7 +102,7 @@ impl Orbit {
 
 /// Whether a distance that changes by at most `closing_m_s` per second stays at least `gap_m`
 /// during the interval: decided by halving, never wrongly yes.
-pub(super) fn stays_apart(
+pub(crate) fn stays_apart(
     distance_m: &impl Fn(f64) -> f64,
     (from_s, to_s): (f64, f64),
     closing_m_s: f64,

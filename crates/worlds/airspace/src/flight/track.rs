@@ -1,6 +1,6 @@
 //! Recorded ways: where an airplane was at any time, and what of its way is left.
 
-use super::airplane::{Point, Pose, distance_m};
+use super::motion::{Point, Pose, distance_m};
 use sidestep_kernel::math;
 
 /// Way-points along the rest of a track are this far apart in time.

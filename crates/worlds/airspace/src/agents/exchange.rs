@@ -33,20 +33,19 @@
 //! it to accept anything. After some exchanges in a row without hearing from it they take its radio
 //! to be dead, and fly without its consent what keeps apart from every orbit it may be on. That it
 //! is alive all the same, and everything was lost, is the one chance which is taken here: below
-//! 1e-12 each time ([`super::Network::silent_after`]).
+//! 1e-12 each time ([`super::network::Network::silent_after`]).
 
-use super::super::events::{Event, EventKind};
-use super::super::shield::{Certainty, Decision, Flyer, Plan, Side, Way, filter};
-use super::super::world::AirspaceWorld;
 use super::contact::{Beacon, Contact, Contacts, Orbiting, note};
-use super::network::{Ended, Topic, Traffic, run};
-use super::{Deployment, link};
+use super::link;
+use crate::flight::Air;
+use crate::shield::{Certainty, Decision, Flyer, Plan, Side, Way, filter};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::{Cycle, EntityId};
+use std::sync::Arc;
 
 /// What airplanes tell each other.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-enum Message {
+pub enum Message {
     /// Where the sender is, and what it would do.
     Proposal(Proposal),
     /// The way it will fly if all agree, and the side it turns to then; `None`: its fallback.
@@ -55,13 +54,27 @@ enum Message {
     Accepts(Vec<u16>),
 }
 
+/// Where an airplane is, and what it would do.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-struct Proposal {
+pub struct Proposal {
     beacon: Beacon,
     fallback: Side,
     came_too_close: bool,
     rank: u64,
     ways: Vec<Way>,
+}
+
+impl Proposal {
+    /// Returns what an airplane proposes: the ways that it may fly, the wanted one first.
+    pub fn new(flyer: &Flyer, ways: &[Way]) -> Self {
+        Self {
+            beacon: Beacon::of(flyer),
+            fallback: flyer.fallback,
+            came_too_close: flyer.came_too_close,
+            rank: flyer.rank,
+            ways: ways.to_vec(),
+        }
+    }
 }
 
 /// Another member of the group.
@@ -78,25 +91,45 @@ struct Member {
 
 /// What an airplane does after the exchange.
 #[derive(Debug, Clone, PartialEq)]
-struct Agreed {
-    decision: Decision,
+pub struct Agreed {
+    /// What it flies.
+    pub decision: Decision,
     /// It would have flown another way, had all agreed.
-    held_back: bool,
+    pub held_back: bool,
     /// What it knows of others now.
-    contacts: Contacts,
+    pub contacts: Contacts,
+}
+
+/// An airplane as others see it.
+#[derive(Debug, Clone, Copy)]
+pub struct Seen {
+    /// Its place, its model, and its stored fallback.
+    pub flyer: Flyer,
+    /// Whether it is seen to be on that fallback.
+    pub orbits: bool,
+}
+
+/// What all of a group see and have agreed on before they exchange their plans.
+#[derive(Debug, Clone)]
+pub struct Scene {
+    /// The air that all fly through.
+    pub air: Air,
+    /// Airplanes at least this far above each other do not mind each other.
+    pub vertical_m: f64,
+    /// The cycle.
+    pub now: Cycle,
+    /// See [`super::network::Network::silent_after`].
+    pub silent_after: u32,
+    /// All of the group as they can be seen, by rising id.
+    pub seen: Vec<Seen>,
 }
 
 /// The shield's agent of one airplane.
-struct Agent<'a> {
-    world: &'a AirspaceWorld,
-    now: Cycle,
+#[derive(Debug)]
+pub struct Agent {
+    scene: Arc<Scene>,
     me: usize,
-    ids: &'a [EntityId],
     flyer: Flyer,
-    /// All of the group as they can be seen.
-    seen: &'a [Seen],
-    /// See [`super::Network::silent_after`].
-    silent_after: u32,
     own: Proposal,
     contacts: Contacts,
     members: Vec<Member>,
@@ -104,13 +137,37 @@ struct Agent<'a> {
     agreed: Option<Agreed>,
 }
 
-impl Agent<'_> {
+impl Agent {
+    /// An agent that has not said anything yet, of the airplane at place `me`, which may fly
+    /// `ways`.
+    pub fn new(scene: Arc<Scene>, me: usize, ways: &[Way], contacts: Contacts) -> Self {
+        let flyer = scene.seen[me].flyer;
+        Self {
+            me,
+            flyer,
+            own: Proposal::new(&flyer, ways),
+            contacts,
+            members: scene.seen.iter().map(|_| Member::default()).collect(),
+            scene,
+            decision: None,
+            agreed: None,
+        }
+    }
+
     fn dtau_s(&self) -> f64 {
-        self.world.timing.dtau_s
+        self.scene.air.timing.dtau_s
     }
 
     fn steps(&self) -> usize {
-        self.world.timing.points_per_dt()
+        self.scene.air.timing.points_per_dt()
+    }
+
+    fn size(&self) -> usize {
+        self.scene.seen.len()
+    }
+
+    fn id(&self, place: usize) -> EntityId {
+        self.scene.seen[place].flyer.id
     }
 
     fn fallback(&self, flyer: Flyer) -> Plan {
@@ -120,13 +177,13 @@ impl Agent<'_> {
     fn flyer_of(&self, place: usize, proposal: &Proposal) -> Flyer {
         let Proposal { beacon, fallback, came_too_close, rank, .. } = proposal;
         Flyer {
-            id: self.ids[place],
+            id: self.id(place),
             pose: beacon.pose,
             v_m_s: beacon.v_m_s,
             omega_max_rad_s: beacon.omega_max_rad_s,
             separation_m: beacon.separation_m,
             levels: beacon.levels,
-            vertical_m: self.world.vertical_m,
+            vertical_m: self.scene.vertical_m,
             fallback: *fallback,
             came_too_close: *came_too_close,
             rank: *rank,
@@ -135,9 +192,9 @@ impl Agent<'_> {
 
     /// All orbits that an unheard airplane may be on.
     fn possible(&self, place: usize) -> Vec<Flyer> {
-        let Seen { flyer, orbits } = self.seen[place];
+        let Seen { flyer, orbits } = self.scene.seen[place];
         let told = self.contacts.get(&flyer.id).map_or(&[][..], |contact| &contact.possible);
-        let fresh = told.iter().filter(|orbiting| orbiting.as_of == self.now);
+        let fresh = told.iter().filter(|orbiting| orbiting.as_of == self.scene.now);
         let at =
             |orbiting: &Orbiting| Flyer { pose: orbiting.pose, fallback: orbiting.side, ..flyer };
         let heard: Vec<Flyer> = fresh.map(at).collect();
@@ -168,7 +225,7 @@ impl Agent<'_> {
         let mut flyers = Vec::new();
         let mut candidates = Vec::new();
         let mut mine = 0;
-        for place in 0..self.ids.len() {
+        for place in 0..self.size() {
             if place == self.me {
                 mine = flyers.len();
                 flyers.push(self.flyer);
@@ -203,7 +260,7 @@ impl Agent<'_> {
         let own = self.members[self.me].plan.clone().flatten();
         let mine = [self.plan_of(self.flyer, &own), self.fallback(self.flyer)];
         let mut accepted = Vec::new();
-        for place in (0..self.ids.len()).filter(|&place| place != self.me) {
+        for place in (0..self.size()).filter(|&place| place != self.me) {
             let Member { proposal: Some(proposal), plan: Some(plan), .. } = &self.members[place]
             else {
                 continue;
@@ -226,21 +283,21 @@ impl Agent<'_> {
         if member.accepts.as_ref().is_some_and(|accepted| accepted.contains(&me)) {
             return true;
         }
-        !self.flyer.minds(&self.seen[place].flyer)
-            || (member.proposal.is_none() && self.unheard_before(place) >= self.silent_after)
+        !self.flyer.minds(&self.scene.seen[place].flyer)
+            || (member.proposal.is_none() && self.unheard_before(place) >= self.scene.silent_after)
     }
 
     /// Exchanges in a row up to the one before in which a member was there and not heard.
     fn unheard_before(&self, place: usize) -> u32 {
-        let contact = self.contacts.get(&self.ids[place]);
-        contact.filter(|c| c.met_in + 1 == self.now).map_or(0, |contact| contact.unheard)
+        let contact = self.contacts.get(&self.id(place));
+        contact.filter(|c| c.met_in + 1 == self.scene.now).map_or(0, |contact| contact.unheard)
     }
 
     /// The end: flies its plan, or its fallback.
     fn agree(&mut self) {
         let fallback = Decision { candidate: None, fallback: self.flyer.fallback };
         let wanted = self.decision.unwrap_or(fallback);
-        let mut others = (0..self.ids.len()).filter(|&place| place != self.me);
+        let mut others = (0..self.size()).filter(|&place| place != self.me);
         let all_agree = wanted.candidate.is_none() || others.all(|place| self.agrees(place));
         self.agreed = Some(Agreed {
             decision: if all_agree { wanted } else { fallback },
@@ -253,13 +310,14 @@ impl Agent<'_> {
     fn known_now(&self) -> Contacts {
         let mut contacts = self.contacts.clone();
         for (place, member) in self.members.iter().enumerate().filter(|(k, _)| *k != self.me) {
-            let id = self.ids[place];
+            let id = self.id(place);
             let Some(proposal) = &member.proposal else {
                 let unheard = self.unheard_before(place) + 1;
                 // Seen, if never heard.
-                let sighted = || Contact::heard(Beacon::of(&self.seen[place].flyer), self.now);
+                let sighted =
+                    || Contact::heard(Beacon::of(&self.scene.seen[place].flyer), self.scene.now);
                 let contact = contacts.entry(id).or_insert_with(sighted);
-                (contact.unheard, contact.met_in) = (unheard, self.now);
+                (contact.unheard, contact.met_in) = (unheard, self.scene.now);
                 continue;
             };
             let flyer = self.flyer_of(place, proposal);
@@ -267,9 +325,9 @@ impl Agent<'_> {
             if let Some(plan) = member.plan.as_ref().filter(|_| member.accepted) {
                 plans.push(self.plan_of(flyer, plan));
             }
-            note(&mut contacts, id, proposal.beacon.clone(), self.now);
+            note(&mut contacts, id, proposal.beacon.clone(), self.scene.now);
             if let Some(contact) = contacts.get_mut(&id) {
-                (contact.unheard, contact.met_in) = (0, self.now);
+                (contact.unheard, contact.met_in) = (0, self.scene.now);
                 contact.possible = plans.iter().map(|plan| self.orbiting(plan)).collect();
             }
         }
@@ -278,14 +336,14 @@ impl Agent<'_> {
 
     /// The orbit at the end of a plan.
     fn orbiting(&self, plan: &Plan) -> Orbiting {
-        let [wx, wy] = self.world.wind_m_s.map(|w| w * self.world.timing.dt_s);
+        let [wx, wy] = self.scene.air.wind_m_s.map(|w| w * self.scene.air.timing.dt_s);
         let mut pose = plan.end();
         pose.at = [pose.at[0] + wx, pose.at[1] + wy];
-        Orbiting { pose, as_of: self.now + 1, side: plan.side() }
+        Orbiting { pose, as_of: self.scene.now + 1, side: plan.side() }
     }
 }
 
-impl link::Agent for Agent<'_> {
+impl link::Agent for Agent {
     type Message = Message;
     type Outcome = Agreed;
 
@@ -323,7 +381,7 @@ impl link::Agent for Agent<'_> {
             Some(_) if has_accepted => member.accepts.is_none(),
             Some(_) => member.plan.is_none(),
         };
-        let others = (0..self.ids.len()).filter(|&place| place != self.me);
+        let others = (0..self.size()).filter(|&place| place != self.me);
         others.filter(|&j| !self.members[j].gone && missing(&self.members[j])).collect()
     }
 
@@ -341,98 +399,5 @@ impl link::Agent for Agent<'_> {
 
     fn outcome(&self) -> Option<Agreed> {
         self.agreed.clone()
-    }
-}
-
-/// An airplane as others see it.
-#[derive(Debug, Clone, Copy)]
-pub(in super::super) struct Seen {
-    /// Its place, its model, and its stored fallback.
-    pub(in super::super) flyer: Flyer,
-    /// Whether it is seen to be on that fallback.
-    pub(in super::super) orbits: bool,
-}
-
-/// What the shield decides for each of a group, and what went over the network.
-pub(in super::super) type Shielded = (Vec<Decision>, Traffic);
-
-impl AirspaceWorld {
-    /// Filters wishes over the network of the deployment.
-    pub(in super::super) fn exchanged(
-        &self,
-        seen: &[Seen],
-        candidates: &[Vec<Way>],
-        now: Cycle,
-        contacts: &mut [Contacts],
-        events: &mut Vec<Event>,
-    ) -> Shielded {
-        let flyers: Vec<Flyer> = seen.iter().map(|seen| seen.flyer).collect();
-        let frame = (self.timing.points_per_dt(), self.timing.dtau_s);
-        let Some(network) = &self.network else {
-            let decisions = filter(&flyers, candidates, frame, Certainty::Sure);
-            return (decisions, self.proposals(&flyers, candidates));
-        };
-        let ids: Vec<EntityId> = flyers.iter().map(|flyer| flyer.id).collect();
-        let agent = |(me, (flyer, ways)): (usize, (&Flyer, &Vec<Way>))| Agent {
-            world: self,
-            now,
-            me,
-            ids: &ids,
-            flyer: *flyer,
-            seen,
-            silent_after: network.silent_after(),
-            own: proposal(flyer, ways),
-            contacts: contacts[me].clone(),
-            members: ids.iter().map(|_| Member::default()).collect(),
-            decision: None,
-            agreed: None,
-        };
-        let agents = flyers.iter().zip(candidates).enumerate().map(agent).collect();
-        let (ended, traffic) = run(&self.talk(Topic::Shield, now), &ids, agents);
-        let mut decisions = Vec::with_capacity(ids.len());
-        for (me, end) in ended.into_iter().enumerate() {
-            self.tell(&end, (ids[me], &ids), now, &contacts[me], events);
-            let fallback = Decision { candidate: None, fallback: flyers[me].fallback };
-            // An airplane whose radio is dead stays on its fallback, whatever it would like.
-            let is_silent = self.is_silent(ids[me], now);
-            decisions.push(match end {
-                Ended { outcome: Some(agreed), .. } if !is_silent => {
-                    if agreed.held_back {
-                        events.push(Event::of(now, EventKind::HeldBack, ids[me]));
-                    }
-                    contacts[me] = agreed.contacts;
-                    agreed.decision
-                }
-                _ => {
-                    // It knows of nobody any more where they are.
-                    contacts[me].clear();
-                    fallback
-                }
-            });
-        }
-        (decisions, traffic)
-    }
-
-    /// What the proposals alone take on a network that loses nothing.
-    fn proposals(&self, flyers: &[Flyer], candidates: &[Vec<Way>]) -> Traffic {
-        let mut traffic = Traffic::default();
-        if self.deployment == Deployment::Direct || flyers.len() < 2 {
-            return traffic;
-        }
-        for (flyer, ways) in flyers.iter().zip(candidates) {
-            let message = Message::Proposal(proposal(flyer, ways));
-            traffic.count(flyers.len() - 1, link::bytes_of(&message).len());
-        }
-        traffic
-    }
-}
-
-fn proposal(flyer: &Flyer, ways: &[Way]) -> Proposal {
-    Proposal {
-        beacon: Beacon::of(flyer),
-        fallback: flyer.fallback,
-        came_too_close: flyer.came_too_close,
-        rank: flyer.rank,
-        ways: ways.to_vec(),
     }
 }

@@ -14,25 +14,25 @@
 //! coordinator carries the ways of all through every airplane. The algorithm is the same, and so
 //! are the controls.
 //!
-//! On a network that loses messages a hop is made again until it is acknowledged. An airplane
-//! that cannot be reached is left out: it is presumed where it was last heard of, and decides for
-//! itself. When time is up, whoever has not been told yet decides for itself too.
+//! A hop is a message like any other, over the [`Transport`] that is handed in. On a network that
+//! loses messages it is made again until it is acknowledged. An airplane that cannot be reached is
+//! left out: it is presumed where it was last heard of, and decides for itself. When time is up,
+//! whoever has not been told yet decides for itself too.
 
-use super::super::airplane::{Prediction, distance_m};
-use super::super::levels::Levels;
-use super::super::objective::{Options, couple, own_costs};
-use super::super::world::purpose;
 use super::contact::Beacon;
-use super::link::{Patience, bytes_of};
-use super::network::{Ended, Network, Talk, Traffic};
-use super::{Came, Decided, Own};
+use super::link::{Ended, bytes_of};
+use super::network::{Patience, Traffic};
+use super::own_ship::OwnShip;
+use super::{Conclusion, Decided};
+use crate::flight::{Levels, Prediction, distance_m};
+use crate::objective::{Objective, Options, couple, own_costs};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use sidestep_collectives::{Estimator, PairwiseGame, Player, optimize};
-use sidestep_kernel::distr::Chance;
+use sidestep_collectives::{Estimator, PairwiseGame, Player, Settings, optimize};
+use sidestep_kernel::ports::{Envelope, Transport};
 
-/// Bytes of an acknowledgement.
-const ACKNOWLEDGED: usize = 1;
+/// What says that a coordinator has arrived.
+const ACKNOWLEDGED: [u8; 1] = [1];
 
 /// What a coordinator has of one airplane.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -64,108 +64,170 @@ struct Coordinator {
     airplanes: Vec<Visited>,
 }
 
-/// The network as coordinators use it: one hop after the other.
-struct Carrier<'a> {
-    talk: &'a Talk<'a>,
-    hosts: &'a [Own<'a>],
-    traffic: Traffic,
-    /// Ticks gone by, and how many there are.
-    gone: u64,
-    most: u64,
-    /// Messages so far: what tells them apart.
-    sent: u32,
+/// How long coordinators may travel, and how often a hop is made again.
+#[derive(Debug, Clone, Copy)]
+pub struct Journey {
+    /// The tick in which the first one sets out,
+    pub begin: u64,
+    /// and the one in which time is up.
+    pub end: u64,
+    /// How hops are repeated that are not acknowledged; `None` on a network that loses nothing.
+    pub patience: Option<Patience>,
 }
 
-impl<'a> Carrier<'a> {
-    fn new(talk: &'a Talk<'a>, hosts: &'a [Own<'a>]) -> Self {
-        let (begin, end) = talk.ticks();
-        Self { talk, hosts, traffic: Traffic::default(), gone: 0, most: end - begin, sent: 0 }
+/// Coordinators of a group, on the airplanes that they visit.
+pub struct Migration<'a> {
+    transport: &'a mut dyn Transport,
+    /// What is aboard each airplane,
+    hosts: &'a [OwnShip],
+    /// and whether its radio is dead.
+    silent: &'a [bool],
+    journey: Journey,
+    /// Ticks gone by.
+    gone: u64,
+    /// Messages so far: what tells them apart.
+    sent: u32,
+    traffic: Traffic,
+}
+
+impl<'a> Migration<'a> {
+    /// Coordinators that have not set out yet. `silent` says whose radio is dead.
+    pub fn new(
+        transport: &'a mut dyn Transport,
+        hosts: &'a [OwnShip],
+        silent: &'a [bool],
+        journey: Journey,
+    ) -> Self {
+        Self { transport, hosts, silent, journey, gone: 0, sent: 0, traffic: Traffic::default() }
+    }
+
+    /// Runs the coordinators, one for each part of the group, and returns what each airplane
+    /// comes to, and what went over the network.
+    pub fn run(mut self, parts: Vec<Vec<usize>>) -> (Vec<Ended<Conclusion>>, Traffic) {
+        let parts = parts.iter().filter_map(|part| Coordinator::new(&self, part));
+        let mut team: Vec<Coordinator> = parts.collect();
+        match self.settings().estimator {
+            _ if team.is_empty() => {}
+            Estimator::Exact => exact(&mut team, &mut self),
+            Estimator::Sampled { block, ageing } => sampled(&mut team, (block, ageing), &mut self),
+        }
+        let nothing = Ended { outcome: None, unheard: Vec::new(), late: false };
+        let mut told = vec![nothing; self.hosts.len()];
+        deliver(team, &mut self, &mut told);
+        let late = self.is_late();
+        told.iter_mut().filter(|ended| ended.outcome.is_none()).for_each(|ended| ended.late = late);
+        (told, self.traffic)
+    }
+
+    fn settings(&self) -> Settings {
+        *self.hosts[0].settings()
+    }
+
+    fn objective(&self) -> &'a Objective {
+        &self.hosts[0].briefing.objective
     }
 
     fn is_late(&self) -> bool {
-        self.gone >= self.most
+        self.gone >= self.journey.end - self.journey.begin
     }
 
-    /// Whether a message arrives, after how many ticks.
-    fn sends(&mut self, from: usize, to: usize, bytes: usize) -> Option<u64> {
-        self.traffic.count(1, bytes);
+    fn id(&self, place: usize) -> u32 {
+        self.hosts[place].known.slot
+    }
+
+    /// Sends a message `after` ticks of the journey.
+    fn send(&mut self, [from, to]: [usize; 2], payload: Vec<u8>, after: u64) {
+        self.traffic.count(1, payload.len());
+        self.transport.send(Envelope {
+            cycle: self.journey.begin + after,
+            sender: self.id(from),
+            sequence: self.sent,
+            receiver: self.id(to),
+            payload,
+        });
         self.sent += 1;
-        let Some(network) = self.talk.network else { return Some(1) };
-        let id = |place: usize| self.hosts[place].known.slot;
-        let faults = network.faults();
-        let (begin, _) = self.talk.ticks();
-        let words = self.talk.streams.pair(id(from), id(to), begin, purpose::NETWORK, self.sent);
-        let lost = Chance::new(faults.loss).happens(words[0]) || self.talk.is_silent(id(to));
-        let choices = u64::from(faults.max_delay_cycles) + 1;
-        (!lost).then_some(1 + ((u64::from(words[1]) * choices) >> 32))
+    }
+
+    /// Waits for a message numbered `first` or later, sent before `after` ticks had gone by.
+    /// Returns what arrives by tick `until` of the journey, and when.
+    fn await_from(
+        &mut self,
+        [from, to]: [usize; 2],
+        first: u32,
+        (after, until): (u64, u64),
+    ) -> Option<(Vec<u8>, u64)> {
+        let (sender, receiver) = (self.id(from), self.id(to));
+        for tick in after + 1..=until {
+            let arrived = self.transport.receive(receiver, self.journey.begin + tick);
+            // Copies of earlier hops concern nobody any more, and a dead radio hears nothing.
+            let awaited = |e: &Envelope| e.sender == sender && e.sequence >= first;
+            if let Some(envelope) = arrived.into_iter().find(awaited).filter(|_| !self.silent[to]) {
+                return Some((envelope.payload, tick));
+            }
+        }
+        None
     }
 
     /// Takes a coordinator's state from one airplane to another. Whether it has arrived.
     fn hop<S: Serialize + DeserializeOwned>(&mut self, state: &mut S, way: [usize; 2]) -> bool {
         let bytes = bytes_of(state);
-        let one = Patience { ticks: 0, tries: 1 };
-        let patience = self.talk.network.map_or(one, Network::patience);
+        let first = self.sent;
         let expected = self.hosts[way[0]].expects(way[1]);
-        let mut arrived = false;
-        for _ in 0..if expected { patience.tries } else { 1 } {
+        let tries = self.journey.patience.filter(|_| expected).map_or(1, |patience| patience.tries);
+        let wait = self.journey.patience.map_or(1, |patience| patience.ticks);
+        let mut arrived = None;
+        for _ in 0..tries {
             if self.is_late() {
                 break;
             }
-            if let Some(ticks) = self.sends(way[0], way[1], bytes.len()) {
-                arrived = true;
-                self.gone += ticks;
+            let set_out = self.gone;
+            self.send(way, bytes.clone(), set_out);
+            if let Some((payload, tick)) = self.await_from(way, first, (set_out, set_out + wait)) {
+                arrived = Some(payload);
+                if self.is_acknowledged(way, (tick, set_out + wait)) {
+                    self.gone = tick;
+                    break;
+                }
             }
-            let is_ideal = self.talk.network.is_none();
-            if arrived && (is_ideal || self.sends(way[1], way[0], ACKNOWLEDGED).is_some()) {
-                break;
-            }
-            self.gone += patience.ticks;
+            self.gone = set_out + wait;
         }
-        if arrived {
-            // On the other side it is read back.
-            *state = postcard::from_bytes(&bytes).expect("the state can be read");
+        // On the other side it is read back.
+        match arrived.as_deref().map(postcard::from_bytes) {
+            Some(Ok(read)) => *state = read,
+            _ => return false,
         }
-        arrived
+        true
     }
-}
 
-/// What a run comes to, for each airplane, and what went over the network.
-pub(super) type Run = (Vec<Ended<Came>>, Traffic);
-
-/// Runs coordinators over a group, one for each part of it.
-pub(super) fn run(talk: &Talk<'_>, hosts: &[Own<'_>], parts: Vec<Vec<usize>>) -> Run {
-    let mut carrier = Carrier::new(talk, hosts);
-    let mut team: Vec<Coordinator> =
-        parts.iter().filter_map(|part| Coordinator::new(talk, hosts, part)).collect();
-    match hosts[0].settings().estimator {
-        _ if team.is_empty() => {}
-        Estimator::Exact => exact(&mut team, &mut carrier),
-        Estimator::Sampled { block, ageing } => sampled(&mut team, (block, ageing), &mut carrier),
+    /// Tells whoever has sent a coordinator that it has arrived at tick `tick` of the journey.
+    /// Whether that is known by tick `until`.
+    fn is_acknowledged(&mut self, [from, to]: [usize; 2], (tick, until): (u64, u64)) -> bool {
+        if self.journey.patience.is_none() {
+            return true;
+        }
+        let first = self.sent;
+        self.send([to, from], ACKNOWLEDGED.to_vec(), tick);
+        self.await_from([to, from], first, (tick, until)).is_some()
     }
-    let mut told = vec![Ended { outcome: None, unheard: Vec::new(), late: false }; hosts.len()];
-    deliver(team, &mut carrier, &mut told);
-    let late = carrier.is_late();
-    told.iter_mut().filter(|ended| ended.outcome.is_none()).for_each(|ended| ended.late = late);
-    (told, carrier.traffic)
 }
 
 impl Coordinator {
     /// The coordinator of a part; none where all radios are dead.
-    fn new(talk: &Talk<'_>, hosts: &[Own<'_>], part: &[usize]) -> Option<Self> {
-        let can_hear = |place: &usize| !talk.is_silent(hosts[*place].known.slot);
+    fn new(migration: &Migration<'_>, part: &[usize]) -> Option<Self> {
+        let can_hear = |place: &usize| !migration.silent[*place];
         let head = part.iter().copied().find(can_hear)?;
         let airplane = |&place: &usize| Visited { place, ..Visited::default() };
         Some(Self { head, airplanes: part.iter().map(airplane).collect(), ..Self::default() })
     }
 
     /// Visits all airplanes of the part, and returns.
-    fn tour(&mut self, carrier: &mut Carrier<'_>, block: Option<usize>) {
-        let (head, hosts) = (self.head, carrier.hosts);
+    fn tour(&mut self, migration: &mut Migration<'_>, block: Option<usize>) {
+        let (head, hosts) = (self.head, migration.hosts);
         let mut at = head;
         for k in 0..self.airplanes.len() {
             let place = self.airplanes[k].place;
             let given_up = self.airplanes[k].is_presumed;
-            let is_there = place == at || (!given_up && carrier.hop(self, [at, place]));
+            let is_there = place == at || (!given_up && migration.hop(self, [at, place]));
             let airplane = &mut self.airplanes[k];
             if is_there {
                 at = place;
@@ -176,7 +238,7 @@ impl Coordinator {
         }
         if at != head {
             // It goes on from there if it cannot return.
-            self.head = if carrier.hop(self, [at, head]) { head } else { at };
+            self.head = if migration.hop(self, [at, head]) { head } else { at };
         }
     }
 
@@ -192,12 +254,12 @@ impl Coordinator {
 
 impl Visited {
     /// On the airplane: reads its model.
-    fn see(&mut self, host: &Own<'_>, round: u32, block: Option<usize>) {
+    fn see(&mut self, host: &OwnShip, round: u32, block: Option<usize>) {
         let options = &host.options;
         self.is_presumed = false;
-        self.beacon = Some(host.beacon());
+        self.beacon = Some(host.beacon.clone());
         (self.separation_m, self.levels) = (options.separation_m, options.levels);
-        let costs = own_costs(&host.world.objective, options);
+        let costs = own_costs(&host.briefing.objective, options);
         let Some(block) = block else {
             self.ways.clone_from(&options.predictions);
             self.own_costs = costs;
@@ -210,7 +272,7 @@ impl Visited {
     }
 
     /// Out of reach, as seen from another airplane.
-    fn presume(&mut self, from: &Own<'_>, block: Option<usize>) {
+    fn presume(&mut self, from: &OwnShip, block: Option<usize>) {
         let options = from.presumed(self.place);
         self.is_presumed = true;
         (self.separation_m, self.levels) = (options.separation_m, options.levels);
@@ -224,26 +286,26 @@ impl Visited {
 /// goes from head to head and ends on the last.
 fn gather(
     team: &mut [Coordinator],
-    carrier: &mut Carrier<'_>,
+    migration: &mut Migration<'_>,
     block: Option<usize>,
 ) -> Coordinator {
-    let began = carrier.gone;
+    let began = migration.gone;
     let mut longest = began;
     for part in team.iter_mut() {
-        carrier.gone = began;
-        part.tour(carrier, block);
-        longest = longest.max(carrier.gone);
+        migration.gone = began;
+        part.tour(migration, block);
+        longest = longest.max(migration.gone);
     }
-    carrier.gone = longest;
+    migration.gone = longest;
     let mut above = team[0].clone();
     for part in &team[1..] {
         let way = [above.head, part.head];
-        if carrier.hop(&mut above, way) {
+        if migration.hop(&mut above, way) {
             above.head = part.head;
             above.airplanes.extend(part.airplanes.iter().cloned());
         } else {
             let unreached = part.airplanes.iter().cloned().map(|mut airplane| {
-                airplane.presume(&carrier.hosts[above.head], block);
+                airplane.presume(&migration.hosts[above.head], block);
                 airplane
             });
             above.airplanes.extend(unreached);
@@ -254,12 +316,12 @@ fn gather(
 }
 
 /// Takes what has become of it back to all parts.
-fn hand_back(mut above: Coordinator, team: &mut [Coordinator], carrier: &mut Carrier<'_>) {
+fn hand_back(mut above: Coordinator, team: &mut [Coordinator], migration: &mut Migration<'_>) {
     above.drop_ways();
     for part in team.iter_mut().rev() {
         if part.head != above.head {
             let way = [above.head, part.head];
-            if !carrier.hop(&mut above, way) {
+            if !migration.hop(&mut above, way) {
                 continue;
             }
             above.head = part.head;
@@ -272,46 +334,47 @@ fn hand_back(mut above: Coordinator, team: &mut [Coordinator], carrier: &mut Car
     }
 }
 
-fn exact(team: &mut [Coordinator], carrier: &mut Carrier<'_>) {
-    let mut above = gather(team, carrier, None);
-    let hosts = carrier.hosts;
+fn exact(team: &mut [Coordinator], migration: &mut Migration<'_>) {
+    let mut above = gather(team, migration, None);
+    let hosts = migration.hosts;
     let options = |a: &Visited| Options::new(a.ways.clone(), a.separation_m, a.levels);
     let all: Vec<Options> = above.airplanes.iter().map(options).collect();
     let mut game = PairwiseGame::new(above.airplanes.iter().map(|a| a.own_costs.clone()).collect());
-    let world = hosts[0].world;
+    let objective = migration.objective();
     for i in 0..all.len() {
         for j in i + 1..all.len() {
-            couple(&mut game, &world.objective, (i, &all[i]), (j, &all[j]));
+            couple(&mut game, objective, (i, &all[i]), (j, &all[j]));
         }
     }
     let places: Vec<usize> = above.airplanes.iter().map(|a| a.place).collect();
-    let outcome = optimize(&game, &world.settings, |player, k| hosts[places[player]].uniform(k));
+    let outcome =
+        optimize(&game, &migration.settings(), |player, k| hosts[places[player]].uniform(k));
     let each = outcome.joint.into_iter().zip(outcome.expected);
     for (airplane, (chosen, expected)) in above.airplanes.iter_mut().zip(each) {
         let (rounds, converged) = (outcome.rounds, outcome.converged);
         airplane.decided =
             (!airplane.is_presumed).then_some(Decided { chosen, expected, rounds, converged });
     }
-    hand_back(above, team, carrier);
+    hand_back(above, team, migration);
 }
 
-fn sampled(team: &mut [Coordinator], (block, ageing): (usize, f64), carrier: &mut Carrier<'_>) {
-    let hosts = carrier.hosts;
-    let settings = *hosts[0].settings();
+fn sampled(team: &mut [Coordinator], (block, ageing): (usize, f64), migration: &mut Migration<'_>) {
+    let hosts = migration.hosts;
+    let settings = migration.settings();
     loop {
-        let mut above = gather(team, carrier, Some(block));
+        let mut above = gather(team, migration, Some(block));
         let change = learn(&mut above, &hosts[0], (block, ageing));
         above.calm = settings.stop.calm(above.calm, change);
         above.round += 1;
         let converged = above.calm >= settings.stop.calm_rounds;
-        let ends = converged || above.round >= settings.stop.max_rounds || carrier.is_late();
+        let ends = converged || above.round >= settings.stop.max_rounds || migration.is_late();
         if ends {
             for airplane in above.airplanes.iter_mut().filter(|a| !a.is_presumed) {
                 let Some(player) = &airplane.player else { continue };
                 airplane.decided = hosts[airplane.place].decided(player, above.round, above.calm);
             }
         }
-        hand_back(above, team, carrier);
+        hand_back(above, team, migration);
         if ends {
             return;
         }
@@ -319,8 +382,8 @@ fn sampled(team: &mut [Coordinator], (block, ageing): (usize, f64), carrier: &mu
 }
 
 /// All ways of a round are known: costs, summed as everywhere else, and everybody's update.
-fn learn(above: &mut Coordinator, host: &Own<'_>, (block, ageing): (usize, f64)) -> f64 {
-    let objective = &host.world.objective;
+fn learn(above: &mut Coordinator, host: &OwnShip, (block, ageing): (usize, f64)) -> f64 {
+    let objective = &host.briefing.objective;
     let all = &above.airplanes;
     let part = |i: usize, k: usize| {
         let own = &all[i];
@@ -349,15 +412,15 @@ fn learn(above: &mut Coordinator, host: &Own<'_>, (block, ageing): (usize, f64))
 }
 
 /// Every part's coordinator brings its airplanes their controls.
-fn deliver(team: Vec<Coordinator>, carrier: &mut Carrier<'_>, told: &mut [Ended<Came>]) {
-    let began = carrier.gone;
+fn deliver(team: Vec<Coordinator>, migration: &mut Migration<'_>, told: &mut [Ended<Conclusion>]) {
+    let began = migration.gone;
     for mut part in team {
-        carrier.gone = began;
+        migration.gone = began;
         let mut at = part.head;
         let places: Vec<usize> = part.airplanes.iter().map(|a| a.place).collect();
         for (k, place) in places.into_iter().enumerate() {
             let given_up = part.airplanes[k].is_presumed;
-            if place != at && (given_up || !carrier.hop(&mut part, [at, place])) {
+            if place != at && (given_up || !migration.hop(&mut part, [at, place])) {
                 continue;
             }
             at = place;
@@ -368,7 +431,7 @@ fn deliver(team: Vec<Coordinator>, carrier: &mut Carrier<'_>, told: &mut [Ended<
             let presumed = part.airplanes.iter().filter(|a| a.is_presumed);
             told[place] = Ended {
                 unheard: presumed.map(|a| a.place).collect(),
-                outcome: Some(Came { decided: part.airplanes[k].decided.clone(), beacons }),
+                outcome: Some(Conclusion { decided: part.airplanes[k].decided.clone(), beacons }),
                 late: false,
             };
         }
@@ -377,7 +440,7 @@ fn deliver(team: Vec<Coordinator>, carrier: &mut Carrier<'_>, told: &mut [Ended<
 
 /// Splits a group by proximity into parts of about as many members as there are parts: the first
 /// that is left and those nearest to it.
-pub(super) fn parts(hosts: &[Own<'_>]) -> Vec<Vec<usize>> {
+pub fn parts(hosts: &[OwnShip]) -> Vec<Vec<usize>> {
     let size = (hosts.len() as f64).sqrt().ceil() as usize;
     let mut left: Vec<usize> = (0..hosts.len()).collect();
     let mut parts = Vec::new();

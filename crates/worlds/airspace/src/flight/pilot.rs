@@ -1,95 +1,9 @@
-//! Airplanes: how they move, what they are to reach, what they may do, where that leads.
-//!
-//! Plane metres, x east and y north; headings in radians, counter-clockwise from east; a
-//! positive turn rate turns left. Source: section 3 of the paper; the step is exact.
+//! Predictions: a pilot flies actions and missions step by step, and says where that leads.
 
+use super::action::Action;
+use super::motion::{Model, Point, Pose, Timing, sinc};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::math;
-
-/// A point of the plane, metres.
-pub type Point = [f64; 2];
-
-/// Distance of two points in metres.
-#[inline]
-pub fn distance_m(a: Point, b: Point) -> f64 {
-    math::hypot(a[0] - b[0], a[1] - b[1])
-}
-
-/// What an airplane can do and must keep.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Model {
-    /// Airspeed, constant.
-    pub v_m_s: f64,
-    /// Largest rate of turn.
-    pub omega_max_rad_s: f64,
-    /// Nobody else should come nearer than this.
-    pub separation_m: f64,
-    /// Number of evenly spaced turn rates, odd and at least 3.
-    pub turns: usize,
-}
-
-impl Model {
-    /// Radius of the tightest turn.
-    pub fn turn_radius_m(&self) -> f64 {
-        self.v_m_s / self.omega_max_rad_s
-    }
-}
-
-/// Where an airplane is and where it heads.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Pose {
-    /// Position.
-    pub at: Point,
-    /// Heading.
-    pub psi_rad: f64,
-}
-
-impl Pose {
-    /// The pose after `dtau_s` seconds at the turn rate `omega_rad_s`: exactly, in chord form,
-    /// which stays exact as the turn rate goes to 0.
-    #[inline]
-    pub fn step(self, v_m_s: f64, omega_rad_s: f64, dtau_s: f64) -> Self {
-        let half = 0.5 * omega_rad_s * dtau_s;
-        let chord = v_m_s * dtau_s * sinc(half);
-        let along = self.psi_rad + half;
-        Self {
-            at: [self.at[0] + chord * math::cos(along), self.at[1] + chord * math::sin(along)],
-            psi_rad: self.psi_rad + omega_rad_s * dtau_s,
-        }
-    }
-
-    /// The turn rate that would head for `goal` after `dtau_s`, within the limits.
-    #[inline]
-    pub fn steer(self, goal: Point, omega_max_rad_s: f64, dtau_s: f64) -> f64 {
-        let bearing = math::atan2(goal[1] - self.at[1], goal[0] - self.at[0]);
-        let wanted = math::wrap_angle(bearing - self.psi_rad) / dtau_s;
-        wanted.clamp(-omega_max_rad_s, omega_max_rad_s)
-    }
-}
-
-/// sin(a) / a.
-#[inline]
-fn sinc(a: f64) -> f64 {
-    if a.abs() < 1e-4 { 1.0 - a * a / 6.0 } else { math::sin(a) / a }
-}
-
-/// How time is cut and when a way-point counts as reached.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Timing {
-    /// Time between two optimizations.
-    pub dt_s: f64,
-    /// Time between two points of a prediction; divides `dt_s`.
-    pub dtau_s: f64,
-    /// Points of a prediction.
-    pub horizon: usize,
-}
-
-impl Timing {
-    /// Points of a prediction within one `dt_s`.
-    pub fn points_per_dt(&self) -> usize {
-        (self.dt_s / self.dtau_s).round() as usize
-    }
-}
 
 /// What an airplane does after its last way-point, in predictions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -139,113 +53,6 @@ impl Passing {
         // Abeam since the last look: on a circle, ahead changes by less than a step per step.
         is_inside && left.abs() < radius_m && (-step_m..=0.0).contains(&ahead)
     }
-}
-
-/// An action: a turn rate, held for some time, and then proceeding to the way-point.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub enum Action {
-    /// The turn rate, for the whole horizon (the paper's g = 0).
-    Hold {
-        /// Turn rate.
-        omega_rad_s: f64,
-    },
-    /// The turn rate for `hold_s` (the paper's g = 1 has dt) and then proceed.
-    Then {
-        /// Turn rate.
-        omega_rad_s: f64,
-        /// How long it is held.
-        hold_s: f64,
-    },
-    /// The turn rate, then straight on, and then proceed: a leg to one side.
-    Leg {
-        /// Turn rate.
-        omega_rad_s: f64,
-        /// How long it is turned.
-        turn_s: f64,
-        /// When the leg ends, from the start of the turn.
-        until_s: f64,
-    },
-    /// Proceed from the start: the optimal action.
-    Proceed,
-}
-
-impl Action {
-    /// The turn rate that the action asks for after `flown_s` seconds of it, if it does not
-    /// proceed to the way-point by then.
-    #[inline]
-    pub fn held_rad_s(self, flown_s: f64) -> Option<f64> {
-        // Rounding of step times must not decide.
-        let before = |end_s: f64| flown_s < end_s - 1e-9;
-        match self {
-            Self::Hold { omega_rad_s } => Some(omega_rad_s),
-            Self::Then { omega_rad_s, hold_s } => before(hold_s).then_some(omega_rad_s),
-            Self::Leg { omega_rad_s, turn_s, .. } if before(turn_s) => Some(omega_rad_s),
-            Self::Leg { until_s, .. } => before(until_s).then_some(0.0),
-            Self::Proceed => None,
-        }
-    }
-}
-
-/// Ways around others: a turn, a straight leg, and then proceeding.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Legs {
-    /// How long the turns may last.
-    pub turns_s: Vec<f64>,
-    /// When the legs may end, from the start of the turn.
-    pub until_s: Vec<f64>,
-}
-
-impl Legs {
-    /// Those of the default preset: heading changes of 10 to 60 degrees at the paper's turn
-    /// rates, held for as long as most conflicts take to pass.
-    pub fn usual() -> Self {
-        Self { turns_s: vec![5.0, 10.0, 15.0], until_s: vec![60.0] }
-    }
-
-    /// Whether there are none.
-    pub fn is_empty(&self) -> bool {
-        self.turns_s.is_empty() || self.until_s.is_empty()
-    }
-
-    /// Those that begin at a turn rate; straight on, how long one turns makes no difference.
-    fn of(&self, omega_rad_s: f64) -> Vec<Action> {
-        let straight = |&hold_s: &f64| Action::Then { omega_rad_s: 0.0, hold_s };
-        if omega_rad_s == 0.0 {
-            return self.until_s.iter().map(straight).collect();
-        }
-        let leg = |(&turn_s, &until_s): (&f64, &f64)| Action::Leg { omega_rad_s, turn_s, until_s };
-        self.turns_s
-            .iter()
-            .flat_map(|turn_s| self.until_s.iter().map(move |until_s| leg((turn_s, until_s))))
-            .collect()
-    }
-}
-
-/// The action set of a model, ordered by turn rate, the optimal one last. Without legs it is the
-/// paper's: `2 m + 1` actions, every rate held for ever and for `dt_s`. With legs, which never
-/// begin a turn only to undo it, these take the place of the held turns; straight on for ever
-/// remains. `holds_s` are further times for which turns are held.
-pub fn actions(model: &Model, dt_s: f64, holds_s: &[f64], legs: &Legs) -> Vec<Action> {
-    let m = model.turns;
-    let rate = |k: usize| match 2.0 * k as f64 / (m - 1) as f64 - 1.0 {
-        // The middle one is exactly straight.
-        _ if 2 * k + 1 == m => 0.0,
-        part => part * model.omega_max_rad_s,
-    };
-    let mut all = Vec::new();
-    for omega_rad_s in (0..m).map(rate) {
-        if legs.is_empty() || omega_rad_s == 0.0 {
-            all.push(Action::Hold { omega_rad_s });
-        }
-        if legs.is_empty() {
-            all.push(Action::Then { omega_rad_s, hold_s: dt_s });
-        }
-        all.extend(holds_s.iter().map(|&hold_s| Action::Then { omega_rad_s, hold_s }));
-        all.extend(legs.of(omega_rad_s));
-    }
-    all.push(Action::Proceed);
-    all
 }
 
 /// Where an action leads.
@@ -383,6 +190,8 @@ impl Pilot<'_> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::action::{Legs, actions};
+    use super::super::motion::distance_m;
     use super::*;
     use proptest::prelude::*;
 
@@ -456,28 +265,5 @@ mod tests {
             let nearest_m = (0..=last).map(apart_m).fold(f64::INFINITY, f64::min);
             prop_assert!(apart_m(last) < tolerance_m || apart_m(last) < nearest_m + 35.0);
         }
-    }
-
-    #[test]
-    fn the_action_set_is_ordered_and_contains_straight_flight() {
-        let all = actions(&model(), 5.0, &[30.0], &Legs::default());
-        assert_eq!(all.len(), 5 * 3 + 1);
-        assert_eq!(all[6], Action::Hold { omega_rad_s: 0.0 });
-        assert_eq!(all[8], Action::Then { omega_rad_s: 0.0, hold_s: 30.0 });
-        assert_eq!(all[15], Action::Proceed);
-    }
-
-    #[test]
-    fn legs_take_the_place_of_turns_that_are_undone() {
-        let legs = Legs { turns_s: vec![5.0, 15.0], until_s: vec![60.0] };
-        let all = actions(&model(), 5.0, &[], &legs);
-        let omega_rad_s = -4f64.to_radians();
-        assert_eq!(all.len(), 4 * 2 + 2 + 1);
-        assert_eq!(all[1], Action::Leg { omega_rad_s, turn_s: 15.0, until_s: 60.0 });
-        assert_eq!(all[4], Action::Hold { omega_rad_s: 0.0 });
-        assert_eq!(all[5], Action::Then { omega_rad_s: 0.0, hold_s: 60.0 });
-        assert_eq!(all[10], Action::Proceed);
-        let rates: Vec<_> = [0.0, 14.0, 15.0, 59.0, 60.0].map(|t| all[1].held_rad_s(t)).into();
-        assert_eq!(rates, [Some(omega_rad_s), Some(omega_rad_s), Some(0.0), Some(0.0), None]);
     }
 }

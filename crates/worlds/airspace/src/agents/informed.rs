@@ -1,34 +1,58 @@
 //! Agents that first tell each other all they may do, and then only what they make of it:
 //! samples' numbers, or distributions.
 
-use super::super::airplane::{Point, Prediction};
-use super::super::decide::Known;
-use super::super::objective::{Options, couple, own_costs};
 use super::contact::Beacon;
-use super::link;
-use super::{Came, Own};
+use super::own_ship::OwnShip;
+use super::{Conclusion, link};
+use crate::flight::{Known, Point, Prediction};
+use crate::objective::{Options, couple, own_costs};
 use serde::{Deserialize, Serialize};
 use sidestep_collectives::{Estimator, Game, Order, PairwiseGame, Player};
 use std::collections::BTreeMap;
 
 /// What agents tell each other.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub(super) enum Message {
+pub enum Message {
     /// The ways of all the sender's actions.
-    Ways { beacon: Beacon, ways: Vec<Prediction> },
+    Ways {
+        /// What the sender tells of itself.
+        beacon: Beacon,
+        /// The ways, by action.
+        ways: Vec<Prediction>,
+    },
     /// From which the others predict its ways themselves.
     Model {
+        /// What the sender tells of itself.
         beacon: Beacon,
+        /// Way-points done with.
         next: u32,
+        /// What it is to reach.
         mission: Vec<Point>,
+        /// Which airplane it is,
         airplane: u32,
+        /// how many of its orders are carried out,
         orders: u32,
+        /// and its altitude.
         altitude_m: f64,
     },
     /// The numbers of the round's samples, and how far the sender has moved in the round before.
-    Samples { round: u32, change: f64, samples: Vec<u16> },
+    Samples {
+        /// The round, from 0.
+        round: u32,
+        /// How far the probabilities have moved.
+        change: f64,
+        /// Numbers of actions.
+        samples: Vec<u16>,
+    },
     /// The sender's distribution after a round, and how far it has moved in it.
-    Distribution { round: u32, change: f64, q: Vec<f64> },
+    Distribution {
+        /// The round, from 1.
+        round: u32,
+        /// How far the probabilities have moved.
+        change: f64,
+        /// Probabilities of the actions.
+        q: Vec<f64>,
+    },
 }
 
 /// A member of the group, as an agent knows it.
@@ -77,8 +101,8 @@ impl Member {
 
 /// One agent.
 #[derive(Debug)]
-pub(super) struct Agent<'a> {
-    own: Own<'a>,
+pub struct Agent {
+    own: OwnShip,
     by_model: bool,
     members: Vec<Member>,
     game: Option<PairwiseGame>,
@@ -86,24 +110,26 @@ pub(super) struct Agent<'a> {
     /// Rounds made.
     round: u32,
     calm: u32,
-    decided: Option<Came>,
+    decided: Option<Conclusion>,
 }
 
-impl<'a> Agent<'a> {
-    pub(super) fn new(own: Own<'a>, by_model: bool) -> Self {
-        let mut members: Vec<Member> = (0..own.group.len()).map(|_| Member::default()).collect();
+impl Agent {
+    /// An agent that has not said anything yet.
+    pub fn new(own: OwnShip, by_model: bool) -> Self {
+        let mut members: Vec<Member> =
+            (0..own.briefing.ids.len()).map(|_| Member::default()).collect();
         members[own.me].options = Some(own.options.clone());
         let player = Player::new(own.options.predictions.len());
         Self { own, by_model, members, game: None, player, round: 0, calm: 0, decided: None }
     }
 
     fn announcement(&self) -> Message {
-        let beacon = self.own.beacon();
+        let beacon = self.own.beacon.clone();
         if !self.by_model {
             return Message::Ways { beacon, ways: self.own.options.predictions.clone() };
         }
         let Known { slot, next, orders, altitude_m, .. } = self.own.known;
-        let mission = self.own.mission().to_vec();
+        let mission = self.own.mission.clone();
         Message::Model { beacon, next: next as u32, mission, airplane: slot, orders, altitude_m }
     }
 
@@ -128,7 +154,7 @@ impl<'a> Agent<'a> {
 
     /// Everybody's options are known: the game, and the distributions at the beginning.
     fn meet(&mut self) {
-        let objective = &self.own.world.objective;
+        let objective = &self.own.briefing.objective;
         let all: Vec<&Options> = self.members.iter().filter_map(|m| m.options.as_ref()).collect();
         let mut game = PairwiseGame::new(all.iter().map(|o| own_costs(objective, o)).collect());
         for i in 0..all.len() {
@@ -255,13 +281,13 @@ impl<'a> Agent<'a> {
     fn decide(&mut self) {
         let decided = self.own.decided(&self.player, self.round, self.calm);
         let beacons = self.members.iter_mut().map(|m| m.beacon.take()).collect();
-        self.decided = Some(Came { decided, beacons });
+        self.decided = Some(Conclusion { decided, beacons });
     }
 }
 
-impl link::Agent for Agent<'_> {
+impl link::Agent for Agent {
     type Message = Message;
-    type Outcome = Came;
+    type Outcome = Conclusion;
 
     fn start(&mut self) -> Vec<Message> {
         let mut said = vec![self.announcement()];
@@ -277,10 +303,8 @@ impl link::Agent for Agent<'_> {
                 member.options.get_or_insert(options);
                 member.beacon = Some(beacon);
             }
-            Message::Model { beacon, next, mission, airplane: slot, orders, altitude_m } => {
-                let (pose, next) = (beacon.pose, next as usize);
-                let known = Known { slot, pose, next, orders, altitude_m };
-                let options = self.own.world.options_towards(known, &mission);
+            Message::Model { beacon, next, mission, .. } => {
+                let options = self.own.briefing.options(from, &beacon, &mission, next as usize);
                 member.options.get_or_insert(options);
                 member.beacon = Some(beacon);
             }
@@ -333,7 +357,7 @@ impl link::Agent for Agent<'_> {
         self.decide();
     }
 
-    fn outcome(&self) -> Option<Came> {
+    fn outcome(&self) -> Option<Conclusion> {
         self.decided.clone()
     }
 }

@@ -1,23 +1,36 @@
 //! The paper's Algorithm 1: an agent per airplane that samples, predicts, and shares both.
 
-use super::super::airplane::Prediction;
-use super::super::levels::Levels;
-use super::super::objective::{Options, own_costs};
 use super::contact::Beacon;
-use super::link;
-use super::{Came, Own};
+use super::own_ship::OwnShip;
+use super::{Conclusion, link};
+use crate::flight::{Levels, Prediction};
+use crate::objective::{Options, own_costs};
 use serde::{Deserialize, Serialize};
 use sidestep_collectives::Player;
 use std::collections::BTreeMap;
 
 /// What agents tell each other.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub(super) enum Message {
+pub enum Message {
     /// Lines 6 to 9: the predicted ways of the round's samples, and how far the sender's
     /// probabilities have moved in the round before.
-    Predictions { round: u32, change: f64, beacon: Beacon, ways: Vec<Prediction> },
+    Predictions {
+        /// The round, from 0.
+        round: u32,
+        /// How far the probabilities have moved.
+        change: f64,
+        /// What the sender tells of itself.
+        beacon: Beacon,
+        /// The ways, by sample.
+        ways: Vec<Prediction>,
+    },
     /// Line 17: the sender's part of the cost of each joint sample (eq. 11).
-    Costs { round: u32, costs: Vec<f64> },
+    Costs {
+        /// The round, from 0.
+        round: u32,
+        /// The costs, by sample.
+        costs: Vec<f64>,
+    },
 }
 
 /// A member of the group, as an agent knows it.
@@ -59,8 +72,8 @@ impl Member {
 
 /// One agent.
 #[derive(Debug)]
-pub(super) struct Agent<'a> {
-    own: Own<'a>,
+pub struct Agent {
+    own: OwnShip,
     own_costs: Vec<f64>,
     player: Player,
     block: usize,
@@ -70,15 +83,16 @@ pub(super) struct Agent<'a> {
     change: f64,
     samples: Vec<usize>,
     members: Vec<Member>,
-    decided: Option<Came>,
+    decided: Option<Conclusion>,
 }
 
-impl<'a> Agent<'a> {
-    pub(super) fn new(own: Own<'a>, block: usize, ageing: f64) -> Self {
+impl Agent {
+    /// An agent that has not said anything yet.
+    pub fn new(own: OwnShip, block: usize, ageing: f64) -> Self {
         Self {
-            own_costs: own_costs(&own.world.objective, &own.options),
+            own_costs: own_costs(&own.briefing.objective, &own.options),
             player: Player::new(own.options.predictions.len()),
-            members: own.group.iter().map(|_| Member::default()).collect(),
+            members: own.briefing.ids.iter().map(|_| Member::default()).collect(),
             own,
             block,
             ageing,
@@ -100,7 +114,7 @@ impl<'a> Agent<'a> {
         Message::Predictions {
             round: self.round,
             change: self.change,
-            beacon: self.own.beacon(),
+            beacon: self.own.beacon.clone(),
             ways: ways.collect(),
         }
     }
@@ -152,8 +166,8 @@ impl<'a> Agent<'a> {
 
     /// The own part of the cost of joint sample `k`.
     fn cost_of(&self, k: usize) -> f64 {
-        let objective = &self.own.world.objective;
-        let Own { options, .. } = &self.own;
+        let objective = &self.own.briefing.objective;
+        let OwnShip { options, .. } = &self.own;
         let x = self.samples[k];
         let way = &options.predictions[x];
         let on_level = |(_, member): &(usize, &Member)| {
@@ -185,13 +199,13 @@ impl<'a> Agent<'a> {
     fn decide(&mut self) {
         let decided = self.own.decided(&self.player, self.round, self.calm);
         let beacons = self.members.iter_mut().map(|m| m.beacon.take()).collect();
-        self.decided = Some(Came { decided, beacons });
+        self.decided = Some(Conclusion { decided, beacons });
     }
 }
 
-impl link::Agent for Agent<'_> {
+impl link::Agent for Agent {
     type Message = Message;
-    type Outcome = Came;
+    type Outcome = Conclusion;
 
     fn start(&mut self) -> Vec<Message> {
         let mut said = vec![self.predictions()];
@@ -248,7 +262,7 @@ impl link::Agent for Agent<'_> {
         self.decide();
     }
 
-    fn outcome(&self) -> Option<Came> {
+    fn outcome(&self) -> Option<Conclusion> {
         self.decided.clone()
     }
 }

@@ -1,11 +1,8 @@
 //! What airplanes know of each other when messages get lost.
 
-use super::super::airplane::{Point, Pose, Prediction, distance_m};
-use super::super::decide::Known;
-use super::super::levels::Levels;
-use super::super::objective::Options;
-use super::super::shield::{Flyer, Side};
-use super::super::world::AirspaceWorld;
+use crate::flight::{Air, Levels, Point, Pose, Prediction, distance_m};
+use crate::objective::Options;
+use crate::shield::{Flyer, Side};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::{Cycle, EntityId, math};
 use std::collections::BTreeMap;
@@ -61,18 +58,18 @@ pub type Contacts = BTreeMap<EntityId, Contact>;
 
 impl Orbiting {
     /// Where it is at the beginning of cycle `now`.
-    fn pose(&self, world: &AirspaceWorld, beacon: &Beacon, now: Cycle) -> Pose {
-        let gone_s = now.saturating_sub(self.as_of) as f64 * world.timing.dt_s;
+    fn pose(&self, air: &Air, beacon: &Beacon, now: Cycle) -> Pose {
+        let gone_s = now.saturating_sub(self.as_of) as f64 * air.timing.dt_s;
         let omega_rad_s = self.side.sign() * beacon.omega_max_rad_s;
         let Pose { at: [x, y], psi_rad } = self.pose.step(beacon.v_m_s, omega_rad_s, gone_s);
-        let [wx, wy] = world.wind_m_s;
+        let [wx, wy] = air.wind_m_s;
         Pose { at: [x + wx * gone_s, y + wy * gone_s], psi_rad: math::wrap_angle(psi_rad) }
     }
 }
 
 impl Beacon {
     /// What can be told of one without knowing where it wants to go.
-    pub(super) fn of(flyer: &Flyer) -> Self {
+    pub(crate) fn of(flyer: &Flyer) -> Self {
         Self {
             pose: flyer.pose,
             goal: None,
@@ -86,64 +83,50 @@ impl Beacon {
 
 impl Contact {
     /// One that has just been heard.
-    pub(super) fn heard(beacon: Beacon, now: Cycle) -> Self {
+    pub(crate) fn heard(beacon: Beacon, now: Cycle) -> Self {
         Self { heard_in: now, beacon, possible: Vec::new(), unheard: 0, met_in: now }
     }
 
     /// Where one that is not heard is taken to fly: on the orbit on which the shield keeps it,
     /// or else straight to the way-point it had. Others keep farther away from it.
-    pub(super) fn options(&self, world: &AirspaceWorld, now: Cycle) -> Options {
+    pub(crate) fn options(&self, air: &Air, is_shielded: bool, now: Cycle) -> Options {
         let points = match self.possible.first() {
-            Some(orbiting) if world.shield => self.on_orbit(world, orbiting, now),
-            _ => self.straight(world, now),
+            Some(orbiting) if is_shielded => self.on_orbit(air, orbiting, now),
+            _ => self.straight(air, now),
         };
         let prediction = Prediction { counted: points.len(), points };
         let separation_m = WIDER * self.beacon.separation_m;
         Options::new(vec![prediction], separation_m, self.beacon.levels)
     }
 
-    fn on_orbit(&self, world: &AirspaceWorld, orbiting: &Orbiting, now: Cycle) -> Vec<Point> {
+    fn on_orbit(&self, air: &Air, orbiting: &Orbiting, now: Cycle) -> Vec<Point> {
         let Beacon { v_m_s, omega_max_rad_s, .. } = self.beacon;
-        let pose = orbiting.pose(world, &self.beacon, now);
+        let pose = orbiting.pose(air, &self.beacon, now);
         let omega_rad_s = orbiting.side.sign() * omega_max_rad_s;
-        let point = |k: usize| pose.step(v_m_s, omega_rad_s, k as f64 * world.timing.dtau_s).at;
-        (1..=world.timing.horizon).map(point).collect()
+        let point = |k: usize| pose.step(v_m_s, omega_rad_s, k as f64 * air.timing.dtau_s).at;
+        (1..=air.timing.horizon).map(point).collect()
     }
 
-    fn straight(&self, world: &AirspaceWorld, now: Cycle) -> Vec<Point> {
+    fn straight(&self, air: &Air, now: Cycle) -> Vec<Point> {
         let Beacon { pose: Pose { at, psi_rad }, goal, v_m_s, .. } = self.beacon;
-        let toward = match goal.map(|goal| world.aim(at, goal, v_m_s)) {
+        let toward = match goal.map(|goal| air.aim(at, goal, v_m_s)) {
             Some(aim) if distance_m(at, aim) > 0.0 => math::atan2(aim[1] - at[1], aim[0] - at[0]),
             _ => psi_rad,
         };
         let [vx, vy] = [v_m_s * math::cos(toward), v_m_s * math::sin(toward)];
-        let [wx, wy] = world.wind_m_s;
-        let gone_s = now.saturating_sub(self.heard_in) as f64 * world.timing.dt_s;
+        let [wx, wy] = air.wind_m_s;
+        let gone_s = now.saturating_sub(self.heard_in) as f64 * air.timing.dt_s;
         let from = [at[0] + (vx + wx) * gone_s, at[1] + (vy + wy) * gone_s];
         let point = |k: usize| {
-            let t_s = k as f64 * world.timing.dtau_s;
+            let t_s = k as f64 * air.timing.dtau_s;
             [from[0] + vx * t_s, from[1] + vy * t_s]
         };
-        (1..=world.timing.horizon).map(point).collect()
-    }
-}
-
-impl AirspaceWorld {
-    /// What all know of a flight before they have heard of it: how it was filed.
-    pub(super) fn filed(&self, id: EntityId) -> Contact {
-        let i = id as usize;
-        let heard_in = self.appears_in(i);
-        let pose = self.airplanes[i].start;
-        let orbiting = Orbiting { pose, as_of: heard_in, side: self.first_fallbacks[i] };
-        let altitude_m = self.airplanes[i].altitude_m;
-        let known = Known { slot: id, pose, next: 0, orders: 0, altitude_m };
-        let beacon = self.beacon(known);
-        Contact { heard_in, beacon, possible: vec![orbiting], unheard: 0, met_in: heard_in }
+        (1..=air.timing.horizon).map(point).collect()
     }
 }
 
 /// Notes what another has told of itself in cycle `now`.
-pub(super) fn note(contacts: &mut Contacts, id: EntityId, beacon: Beacon, now: Cycle) {
+pub(crate) fn note(contacts: &mut Contacts, id: EntityId, beacon: Beacon, now: Cycle) {
     match contacts.get_mut(&id) {
         Some(contact) => (contact.beacon, contact.heard_in) = (beacon, now),
         None => drop(contacts.insert(id, Contact::heard(beacon, now))),
