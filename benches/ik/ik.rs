@@ -1,6 +1,6 @@
 //! Speed and success of inverse kinematics.
 //!
-//! `cargo bench -p sidestep --bench ik [-- PART ...]` with the parts `free` (the default),
+//! `cargo bench --manifest-path benches/ik/Cargo.toml [-- PART ...]` with the parts `free` (the default),
 //! `guarded` and `arms` (slow; arms need `../shared/data`); CPU time. The yardstick of the first is
 //! the FABRIK of the crate `rebirth-ik`, in single precision, on the same chains and targets in the
 //! same run, and where it is bearable the Jacobian solver of the crate `k` on a joint per rod (two

@@ -1,11 +1,11 @@
 //! Speed of the chain world's core.
 //!
-//! `cargo bench -p sidestep --bench chain [-- PART ...]` with the parts `open`, `middle`, `wavefront`,
+//! `cargo bench -p sidestep-chain [-- PART ...]` with the parts `open`, `middle`, `wavefront`,
 //! `field`, `corridor`, and `corridors` for the table of all pinned corridors; CPU time. In brackets what the prototype took.
 
 use cpu_time::ProcessTime;
-use sidestep::worlds::chain::geometry::{Point, add, along, first_axis, norm, scaled, sub, unit};
-use sidestep::worlds::chain::{
+use sidestep_chain::geometry::{Point, add, along, first_axis, norm, scaled, sub, unit};
+use sidestep_chain::{
     Chain, Connector, Obstacle, Obstacles, Outcome, Propagator, Request, Rod, wavefront,
 };
 use sidestep_kernel::Seed;

@@ -1,21 +1,21 @@
 //! Speed of the airspace world and of its optimizer.
 //!
-//! `cargo bench -p sidestep --bench airspace [-- PART ...]` with the parts `exact`, `sampled` and
+//! `cargo bench -p sidestep-airspace [-- PART ...]` with the parts `exact`, `sampled` and
 //! `many`; CPU time, and ratios taken in one run, since the machine may be noisy.
 
 use cpu_time::ProcessTime;
-use sidestep::collectives::{
-    Choice, Estimator, Game, Order, Settings, Stop, Update, Utility, optimize,
-};
-use sidestep::scenario::Source;
-use sidestep::worlds::airspace::airplane::{
+use sidestep_airspace::airplane::{
     Action, After, Legs, Model, Passing, Pilot, Point, Pose, Timing, actions,
 };
-use sidestep::worlds::airspace::airspace_run;
-use sidestep::worlds::airspace::levels::Levels;
-use sidestep::worlds::airspace::objective::{Objective, Options, game};
+use sidestep_airspace::airspace_run;
+use sidestep_airspace::levels::Levels;
+use sidestep_airspace::objective::{Objective, Options, game};
+use sidestep_collectives::{
+    Choice, Estimator, Game, Order, Settings, Stop, Update, Utility, optimize,
+};
 use sidestep_kernel::stream::{Purpose, Streams};
 use sidestep_kernel::{Seed, Simulation};
+use sidestep_scenario::Source;
 use std::time::Instant;
 
 const TIMING: Timing = Timing { dt_s: 5.0, dtau_s: 1.0, horizon: 125 };
