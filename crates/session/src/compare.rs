@@ -88,18 +88,22 @@ fn by_body<'a>(
     let body = |row: usize| {
         let number = word(rows.number, row).unwrap_or(u32::MAX);
         let of = (rows.kind, number, rows.part.and_then(|part| word(part, row)));
-        // A column that is missing has other bits than any that is there.
+        // What is missing has other bits than anything that is there.
         let cells = columns.iter().flat_map(|values| match values {
-            Some(values) => [1, bits(values, row)],
-            None => [0, 0],
+            Some(values) if !values.is_missing(row) => [1, bits(values, row)],
+            _ => [0, 0],
         });
         (of, cells.collect())
     };
     (0..count).map(body).collect()
 }
 
+/// The bits of a value; tables of places have no text.
 fn bits(values: &Values, row: usize) -> u64 {
     match values {
+        Values::Text(_) => 0,
+        Values::I64(v) => v[row] as u64,
+        Values::Bool(v) => v[row].into(),
         Values::U32(v) | Values::Label(v) => v[row].into(),
         Values::U64(v) => v[row],
         Values::I32(v) => v[row] as u64,
@@ -126,9 +130,9 @@ mod tests {
             worth: 1,
         };
         let column = |name: &str, x: f64| match name {
-            "x_m" => Values::F64(vec![1.5, x]),
-            "chain" => Values::U32(vec![0, 0]),
-            _ => Values::U32(vec![3, 4]),
+            "x_m" => Values::F64(vec![1.5, x].into()),
+            "chain" => Values::U32(vec![0, 0].into()),
+            _ => Values::U32(vec![3, 4].into()),
         };
         let names = ["chain", "connector", "x_m"];
         let table = |x| names.map(|name| (name, column(name, x)));

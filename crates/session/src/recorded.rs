@@ -2,11 +2,9 @@
 
 use sidestep::import::table::CsvTable;
 use sidestep::kernel::InputError;
-use sidestep::kernel::ports::{ColumnSpec, Values};
 use sidestep::kernel::view::{Frame, PlaceRows, Scenery, Trail};
 use sidestep_draw::worth_a_trail;
 use sidestep_record::{Table, read_table};
-use std::fmt::Write;
 use std::path::Path;
 
 /// So many recorded places are read for trails; of longer runs the last ones.
@@ -56,23 +54,13 @@ fn as_csv(table: &Table) -> String {
     for row in 0..table.rows() {
         for (k, (column, values)) in columns.iter().zip(&table.columns).enumerate() {
             let separator = if k == 0 { "" } else { "," };
+            text.push_str(separator);
             // Writing to a string cannot fail.
-            let _ = write!(text, "{separator}");
-            write_field(&mut text, column, values, row);
+            let _ = values.write(row, &column.labels, &mut text);
         }
         text.push('\n');
     }
     text
-}
-
-fn write_field(text: &mut String, column: &ColumnSpec, values: &Values, row: usize) {
-    let _ = match values {
-        Values::U32(v) => write!(text, "{}", v[row]),
-        Values::U64(v) => write!(text, "{}", v[row]),
-        Values::I32(v) => write!(text, "{}", v[row]),
-        Values::F64(v) => write!(text, "{}", v[row]),
-        Values::Label(v) => write!(text, "{}", column.labels[v[row] as usize]),
-    };
 }
 
 /// Whether some part of the table is whole: a run that was killed early has none.

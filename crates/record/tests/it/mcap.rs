@@ -30,8 +30,8 @@ fn scenery() -> Scenery {
         dimensions: 2,
         cycle_s: 0.1,
         floor: Some(floor),
-        bodies: vec![Body::new(Kind::Obstacle, 0, Pose::at([0.0; 3]), wall)],
         names: Vec::new(),
+        bodies: vec![Body::new(Kind::Obstacle, 0, Pose::at([0.0; 3]), wall)],
     }
 }
 

@@ -8,7 +8,7 @@ use sidestep_record::{NewRun, Origin, ParquetRecorder};
 /// A column without a meaning.
 pub(crate) fn column(name: &str, ty: ColumnType, labels: &[&str]) -> ColumnSpec {
     let labels = labels.iter().map(ToString::to_string).collect();
-    ColumnSpec { name: name.into(), ty, meaning: format!("the {name}"), labels }
+    ColumnSpec { labels, ..ColumnSpec::new(name, ty, &format!("the {name}")) }
 }
 
 /// Where two robots are in every cycle.

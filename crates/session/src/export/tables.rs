@@ -4,11 +4,11 @@ use super::target::Target;
 use super::{Job, Written};
 use crate::Error;
 use csv::ByteRecord;
-use sidestep::kernel::ports::{ColumnSpec, TableSchema, Values};
+use sidestep::kernel::ports::{TableSchema, Values};
 use sidestep::kernel::{Cycle, InputError};
 use sidestep_record::{Table, TableFile, for_each_block, tables};
 use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 /// The table of which no row is left out for coming between.
@@ -154,31 +154,15 @@ fn heading(schema: &TableSchema) -> impl Iterator<Item = &str> {
 }
 
 fn write_rows(csv: &mut csv::Writer<impl Write>, block: &Table) -> Result<(), csv::Error> {
-    let (mut record, mut field) = (ByteRecord::new(), Vec::new());
+    let (mut record, mut field) = (ByteRecord::new(), String::new());
     for row in 0..block.rows() {
         record.clear();
         for (column, values) in block.schema.columns.iter().zip(&block.columns) {
             field.clear();
-            write_field(&mut field, column, values, row)?;
-            record.push_field(&field);
+            values.write(row, &column.labels, &mut field).map_err(io::Error::other)?;
+            record.push_field(field.as_bytes());
         }
         csv.write_byte_record(&record)?;
     }
     Ok(())
-}
-
-/// A value; of labels their text. Floats have as many digits as bring them back exactly.
-fn write_field(
-    field: &mut Vec<u8>,
-    column: &ColumnSpec,
-    values: &Values,
-    row: usize,
-) -> std::io::Result<()> {
-    match values {
-        Values::U32(v) => write!(field, "{}", v[row]),
-        Values::U64(v) => write!(field, "{}", v[row]),
-        Values::I32(v) => write!(field, "{}", v[row]),
-        Values::F64(v) => write!(field, "{}", v[row]),
-        Values::Label(v) => write!(field, "{}", column.labels[v[row] as usize]),
-    }
 }

@@ -153,7 +153,7 @@ fn first_rows(recorded: &Recorded) -> Table {
     let mut table = Table::new("Events one by one", left_out(recorded.rows(), shown), &names);
     for row in 0..shown {
         let cells = columns.iter().zip(&recorded.columns);
-        table.row(cells.map(|(column, values)| cell(values, &column.labels, row)));
+        table.row(cells.map(|(column, values)| cell(column, values, row)));
     }
     table
 }

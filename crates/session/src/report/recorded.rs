@@ -4,7 +4,7 @@ use super::metrics::unit;
 use crate::recorded::has_rows;
 use sidestep::experiment::{Document, Table};
 use sidestep::kernel::InputError;
-use sidestep::kernel::ports::{ColumnType, Values};
+use sidestep::kernel::ports::{ColumnSpec, Values};
 use sidestep_record::read_table;
 use std::path::Path;
 
@@ -42,7 +42,7 @@ pub(super) fn tell(document: &mut Document, folder: &Path) -> Result<(), InputEr
         let first = read_table(folder, &name, ..1).or_else(|_| read_table(folder, &name, ..))?;
         for column in &first.schema.columns {
             let unit = unit(&column.name);
-            let ty = type_name(column.ty).to_string();
+            let ty = column.ty.name().to_string();
             table.row([name.clone(), column.name.clone(), ty, unit, column.meaning.clone()]);
         }
     }
@@ -52,26 +52,14 @@ pub(super) fn tell(document: &mut Document, folder: &Path) -> Result<(), InputEr
     Ok(())
 }
 
-fn type_name(ty: ColumnType) -> &'static str {
-    match ty {
-        ColumnType::U32 => "u32",
-        ColumnType::U64 => "u64",
-        ColumnType::I32 => "i32",
-        ColumnType::F64 => "f64",
-        ColumnType::Label => "label",
-    }
-}
-
 /// A value of a column as people read it.
-pub(super) fn cell(values: &Values, labels: &[String], row: usize) -> String {
+pub(super) fn cell(column: &ColumnSpec, values: &Values, row: usize) -> String {
     match values {
         // What stands for none.
         Values::U32(v) if v[row] == u32::MAX => "-".into(),
-        Values::U32(v) => v[row].to_string(),
-        Values::U64(v) => v[row].to_string(),
-        Values::I32(v) => v[row].to_string(),
         Values::F64(v) => super::metrics::digits(v[row]),
-        Values::Label(v) => labels[v[row] as usize].clone(),
+        _ if values.is_missing(row) => "-".into(),
+        _ => column.text(values, row),
     }
 }
 

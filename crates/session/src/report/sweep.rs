@@ -7,7 +7,8 @@ use crate::{Error, Watcher};
 use sidestep::experiment::Table;
 use sidestep::experiment::document::{Block, Code, Document, Picture, Text};
 use sidestep::experiment::sweep::rounds::{Stopped, stopped};
-use sidestep::experiment::sweep::{Plan, RunTable, RunValues, Summary};
+use sidestep::experiment::sweep::{Plan, RunTable, Summary};
+use sidestep::kernel::ports::Values;
 use sidestep::scenario::Worlds;
 
 /// Variants of which a run is drawn.
@@ -118,8 +119,8 @@ fn variants(plan: &Plan, table: &RunTable) -> Option<Table> {
         return None;
     }
     let mut runs = vec![0u64; plan.variants.len()];
-    if let Some(RunValues::Int(of)) = table.column("variant").map(|c| &c.values) {
-        of.iter().flatten().filter_map(|v| usize::try_from(*v).ok()).for_each(|v| runs[v] += 1);
+    if let Some(Values::I64(of)) = table.column("variant").map(|c| &c.values) {
+        of.options().flatten().filter_map(|v| usize::try_from(*v).ok()).for_each(|v| runs[v] += 1);
     }
     let mut columns = vec!["variant", "runs"];
     columns.extend(plan.parameters.iter().map(String::as_str));

@@ -1,17 +1,19 @@
 //! From a sweep to the table of its runs: in memory, in a folder, or share by share.
 
-use super::columns::{cells, from_file, share as share_of, to_file};
 use super::effort::Effort;
 use super::prepare::prepare;
 use super::work::{Take, Work};
 use crate::identity::Maker;
 use crate::{Error, Watcher};
 use sidestep::experiment::sweep::rounds::Rounds;
-use sidestep::experiment::sweep::{Cell, Outcome, Plan, Rows, RunTable, Shard, Sweep};
+use sidestep::experiment::sweep::{
+    Cell, Outcome, Plan, Role, Rows, RunTable, Shard, Sweep, rows::cells,
+};
 use sidestep::kernel::InputError;
 use sidestep::scenario::{Source, Worlds};
 use sidestep::{BUILD, VERSION};
-use sidestep_record::sweep::{SweepFolder, fingerprint};
+use sidestep_record::WholeTable;
+use sidestep_record::sweep::{Share, SweepFolder, fingerprint};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -94,7 +96,7 @@ pub fn planned(
             fingerprints.push(fingerprint(resolved.text.as_bytes(), &resolved.files));
             Ok(Folder::write_variant(staging, k, &resolved.text, &resolved.files)?)
         })?;
-        let cells = cells(&plan);
+        let cells = cells(&plan).columns;
         Ok::<_, Error>((plan, fingerprints, cells))
     })
 }
@@ -158,7 +160,7 @@ pub fn go_on(
     watcher: &dyn Watcher,
 ) -> Result<Ended, Error> {
     if folder.is_complete() {
-        return Ok(Done::before(from_file(folder.results()?)));
+        return Ok(Done::before(table_of(folder.results()?)));
     }
     check_build(folder)?;
     let mut log = Log::new(folder.plan());
@@ -176,7 +178,7 @@ pub fn go_on(
         return Ok(Ended::Interrupted(log.rows.len()));
     }
     let table = log.rows.table(folder.plan())?;
-    folder.complete(&to_file(table.results()), &to_file(table.timings()))?;
+    folder.complete(&table.results().columns, &table.timings().columns)?;
     Ok(Done::now(table, effort))
 }
 
@@ -222,7 +224,7 @@ pub fn share(
         return Ok(Ended::Interrupted(log.rows.len()));
     }
     let table = log.rows.table(plan)?;
-    folder.end_share(share_of(shard), journal, &to_file(table.clone()))?;
+    folder.end_share(share_of(shard), journal, &table.columns)?;
     Ok(Done::now(table, effort))
 }
 
@@ -236,7 +238,7 @@ fn finished_of(folder: &Folder, shard: Shard) -> Result<RunTable, Error> {
         }
     };
     match folder.is_complete() {
-        true => from_file(folder.results()?).outcomes(&mut take),
+        true => table_of(folder.results()?).outcomes(&mut take),
         false => gather(folder, None, &mut take)?,
     }
     Ok(rows.table(folder.plan())?)
@@ -248,7 +250,7 @@ fn finished_of(folder: &Folder, shard: Shard) -> Result<RunTable, Error> {
 /// When runs are missing, cannot be read or stored, or are of another build.
 pub fn collect(folder: &Folder) -> Result<Ended, Error> {
     if folder.is_complete() {
-        return Ok(Done::before(from_file(folder.results()?)));
+        return Ok(Done::before(table_of(folder.results()?)));
     }
     check_build(folder)?;
     let plan = folder.plan();
@@ -262,8 +264,18 @@ pub fn collect(folder: &Folder) -> Result<Ended, Error> {
         return Err(Error::stopped(cause, remedy));
     }
     let table = log.rows.table(plan)?;
-    folder.complete(&to_file(table.results()), &to_file(table.timings()))?;
+    folder.complete(&table.results().columns, &table.timings().columns)?;
     Ok(Done::now(table, Effort::default()))
+}
+
+/// The table of runs in a file.
+pub(super) fn table_of(file: WholeTable<Role>) -> RunTable {
+    RunTable { columns: file.columns }
+}
+
+/// The same share, as folders name it.
+fn share_of(shard: Shard) -> Share {
+    Share { index: shard.index, count: shard.count }
 }
 
 /// Hands over all finished runs, but for those of the share `but`.
@@ -272,7 +284,7 @@ pub(super) fn gather(
     but: Option<Shard>,
     mut each: impl FnMut(Outcome),
 ) -> Result<(), InputError> {
-    folder.parts(|part| from_file(part).outcomes(&mut each))?;
+    folder.parts(|part| table_of(part).outcomes(&mut each))?;
     folder.journals(but.map(share_of), &mut each)
 }
 

@@ -1,7 +1,6 @@
 //! What a report needs of a sweep: its finished runs, and pictures of some.
 
-use super::columns::from_file;
-use super::journey::{Folder, gather};
+use super::journey::{Folder, gather, table_of};
 use super::work::recorded;
 use crate::watcher::Within;
 use crate::{Error, Watcher};
@@ -24,8 +23,8 @@ pub struct Finished {
 /// When there are none, or they cannot be read.
 pub fn finished(folder: &Folder) -> Result<Finished, InputError> {
     if folder.is_complete() {
-        let mut table = from_file(folder.results()?);
-        let costs = from_file(folder.timings()?).columns;
+        let mut table = table_of(folder.results()?);
+        let costs = table_of(folder.timings()?).columns;
         let has = |name: &str| table.columns.iter().any(|c| c.name == name);
         let costs: Vec<_> = costs.into_iter().filter(|c| !has(&c.name)).collect();
         table.columns.extend(costs);

@@ -6,7 +6,6 @@
 //! look.rs      finished runs, for reports         effort.rs    time that all took
 //! ```
 
-mod columns;
 mod effort;
 mod journey;
 mod look;

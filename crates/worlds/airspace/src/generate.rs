@@ -1,14 +1,26 @@
 //! Traffic that is made up: the super-conflict, random crossings, converging streams.
 
-use super::airplane::{Model, Point, Pose, distance_m};
-use super::scenario::GeneratorKind;
-use super::world::{Airplane, purpose};
+use super::flight::{Airplane, Model, Point, Pose, distance_m};
+use super::purpose;
+use serde::{Deserialize, Serialize};
 use sidestep_kernel::math;
 use sidestep_kernel::stream::{Draws, Streams};
 use std::f64::consts::TAU;
 
 /// Draws until a place is far enough from all others, at most this often per airplane.
 const TRIES: usize = 2_000;
+
+/// Kinds of made-up traffic.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum GeneratorKind {
+    /// On a circle, each to the opposite point.
+    Superconflict,
+    /// From anywhere to anywhere in a disc.
+    Random,
+    /// Three streams that meet.
+    Streams,
+}
 
 /// What is to be generated.
 #[derive(Debug, Clone, PartialEq)]

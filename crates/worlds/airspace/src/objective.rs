@@ -6,8 +6,7 @@
 //! Gdev_i     = |f_i(x_i, kmax) - f_i(x_i_opt, kmax)|^2                                (10)
 //! ```
 
-use super::airplane::{Point, Prediction};
-use super::levels::Levels;
+use super::flight::{Levels, Point, Prediction};
 use serde::{Deserialize, Serialize};
 use sidestep_collectives::PairwiseGame;
 
@@ -257,7 +256,7 @@ fn add_to_all(
 
 #[cfg(test)]
 mod tests {
-    use super::super::airplane::{Action, After, Model, Passing, Pilot, Pose, Timing};
+    use super::super::flight::{Action, After, Model, Passing, Pilot, Pose, Timing};
     use super::*;
     use serde_json::Value;
     use sidestep_collectives::Game;
@@ -360,7 +359,7 @@ mod tests {
     /// What slices, bounds and shared pieces leave out is what costs nothing, to the bit.
     #[test]
     fn tables_hold_what_two_predictions_cost_to_the_bit() {
-        use super::super::airplane::{Legs, actions};
+        use super::super::flight::{Legs, actions};
         let model = Model { v_m_s: 35.0, omega_max_rad_s: 0.07, separation_m: 500.0, turns: 5 };
         let timing = Timing { dt_s: 5.0, dtau_s: 1.0, horizon: 90 };
         let passing = Passing { tolerance_m: 100.0, passes: true };

@@ -1,8 +1,7 @@
 //! All that changes in a run, and its snapshot.
 
-use super::airplane::{Point, Pose, distance_m};
-use super::deploy::contact::Contacts;
-use super::levels::Levels;
+use super::agents::contact::Contacts;
+use super::flight::{Point, Pose, Stage};
 use super::shield::Side;
 use super::world::AirspaceWorld;
 use serde::{Deserialize, Serialize};
@@ -187,13 +186,16 @@ pub struct AirplaneRecord {
     pub orders: [u16; 2],
 }
 
+/// Looks at the distance of a pair in one step of `dtau`.
+pub const LOOKS_PER_STEP: usize = 10;
+
 /// What a pair of airplanes has come to.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PairRecord {
     /// Closest approach.
     pub nearest_m: f64,
     /// Looks at which they were nearer than their separation, see
-    /// [`super::LOOKS_PER_STEP`].
+    /// [`LOOKS_PER_STEP`].
     pub lost_looks: u64,
     /// Separate losses of separation.
     pub losses: u32,
@@ -288,15 +290,9 @@ impl AirspaceState {
         self.airplanes[slot as usize].is_flying() && world.appears_in(slot as usize) <= now
     }
 
-    /// Whether two airplanes have to mind each other.
-    pub(super) fn is_near(&self, world: &AirspaceWorld, (a, b): (Slot, Slot), now: Cycle) -> bool {
-        let at = |slot: Slot| self.airplanes[slot as usize].pose().at;
-        let levels = |slot: Slot| match world.is_replayed(slot, now) {
-            true => Levels::ALL,
-            false => world.claimed_levels(&self.airplanes[slot as usize], slot, now),
-        };
-        distance_m(at(a), at(b)) <= world.look_m(a as usize, b as usize)
-            && levels(a).meets(&levels(b), world.vertical_m)
+    /// What an airplane flies now.
+    pub(super) fn stage<'a>(&self, world: &'a AirspaceWorld, slot: Slot) -> Stage<'a> {
+        world.stage(slot, self.airplanes[slot as usize].orders.get().into())
     }
 }
 

@@ -11,7 +11,7 @@
 //! Recorded tracks are replayed as they are; from `airspace.replay_until_s` on, which stands at
 //! infinity, they are flown anew.
 
-use super::airplane::Point;
+use super::flight::Point;
 use super::flight_plan::CLIMB_M_S;
 use sidestep_import::bluesky::{Change, ScnAircraft, ScnFile};
 use sidestep_import::local_plane::LocalPlane;

@@ -4,8 +4,7 @@
 pub(super) mod mvp;
 pub(super) mod orca;
 
-use super::airplane::Point;
-use super::levels::Levels;
+use super::flight::{Levels, Point};
 
 /// What a method is told of an airplane.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,0 +1,80 @@
+//! Airplanes in the air during one `dt`.
+
+use crate::Turn;
+use crate::flight::{Levels, Point, Pose, Stage, Track};
+use crate::shield::Way;
+use sidestep_kernel::Slot;
+
+/// One airplane in this `dt`.
+pub(super) struct Flight<'a> {
+    pub(super) slot: Slot,
+    pub(super) course: Course<'a>,
+    pub(super) pose: Pose,
+    pub(super) altitude_m: f64,
+    /// When it came into the air, seconds after the start.
+    pub(super) since_s: f64,
+    pub(super) next: usize,
+    /// How it ended, as [`crate::state::Cell::arrived`] says it.
+    pub(super) ended: Option<u64>,
+}
+
+/// What it follows.
+pub(super) enum Course<'a> {
+    /// What has been decided.
+    Way(Way, Stage<'a>),
+    /// Its recorded way.
+    Track(&'a Track),
+}
+
+impl<'a> Flight<'a> {
+    /// An airplane as it is at the start of the cycle.
+    pub(super) fn new(turn: &Turn<'_>, slot: Slot, course: Course<'a>) -> Self {
+        let Turn { world, state, .. } = turn;
+        let cell = &state.airplanes[slot as usize];
+        let track = &world.airplanes[slot as usize].track;
+        let recorded_s = track.as_ref().map_or(0.0, Track::begins_s);
+        let since_s = world.starts_s(world.appears_in(slot as usize)).max(recorded_s);
+        let (pose, altitude_m) = (cell.pose(), cell.altitude_m.get());
+        let next = cell.next.get() as usize;
+        Self { slot, course, pose, altitude_m, since_s, next, ended: None }
+    }
+
+    /// Its altitude some seconds after `altitude_m`, on a decided way.
+    pub(super) fn altitude_after_m(&self, stage: &Stage<'_>, seconds: f64) -> f64 {
+        let most_m = stage.climb_m_s * seconds;
+        self.altitude_m + (stage.altitude_m - self.altitude_m).clamp(-most_m, most_m)
+    }
+
+    /// Where and how high it is `t_s` after the begin of step `k` at `step_s`; `None` where it
+    /// is not in the air.
+    pub(super) fn at(
+        &self,
+        wind_m_s: Point,
+        (step_s, k): (f64, usize),
+        t_s: f64,
+    ) -> Option<(Point, f64)> {
+        match &self.course {
+            Course::Way(way, stage) => {
+                let omega = way.omegas_rad_s[k];
+                let [x, y] = self.pose.step(stage.model.v_m_s, omega, t_s).at;
+                let [wx, wy] = wind_m_s;
+                Some(([x + wx * t_s, y + wy * t_s], self.altitude_after_m(stage, t_s)))
+            }
+            Course::Track(track) => {
+                let now_s = step_s + t_s;
+                let at = || (track.pose_at(now_s).at, track.altitude_at_m(now_s));
+                track.covers(now_s).then(at)
+            }
+        }
+    }
+
+    /// All levels that it is on during one step.
+    pub(super) fn levels(&self, dtau_s: f64) -> Levels {
+        match &self.course {
+            Course::Way(_, stage) => {
+                Levels::between(self.altitude_m, self.altitude_after_m(stage, dtau_s))
+            }
+            Course::Track(_) => Levels::ALL,
+        }
+    }
+}
