@@ -7,16 +7,16 @@
 //! ```
 
 pub mod corridor;
-pub mod courses;
-pub mod fields;
-pub mod pixels;
-pub mod route;
-pub mod site;
+pub(crate) mod courses;
+pub(crate) mod fields;
+pub(crate) mod pixels;
+pub(crate) mod route;
+pub(crate) mod site;
 
 pub use corridor::{Corridor, Leg};
 pub use courses::{Course, Mover, Movers};
-pub use pixels::Floor;
-pub use site::Site;
+pub(crate) use pixels::Floor;
+pub(crate) use site::Site;
 
 use super::rods::geometry::Point;
 use sidestep_kernel::stream::Purpose;
