@@ -15,8 +15,8 @@ pub(crate) mod site;
 
 pub use corridor::{Corridor, Leg};
 pub use courses::{Course, Mover, Movers};
-pub(crate) use pixels::Floor;
-pub(crate) use site::Site;
+pub use pixels::Floor;
+pub use site::Site;
 
 use super::rods::geometry::Point;
 use sidestep_kernel::stream::Purpose;
