@@ -126,7 +126,7 @@ impl Rows {
             self.poses.airplane.push(id);
             self.poses.x_m.push(pose.at[0]);
             self.poses.y_m.push(pose.at[1]);
-            self.poses.heading_rad.push(pose.psi_rad);
+            self.poses.heading_rad.push(pose.heading_rad);
         }
     }
 

@@ -429,8 +429,8 @@ impl Compiler<'_> {
             let remedy = "add way_points_m = [[x, y], ...]";
             return Err(self.error(at, "an airplane without way-points", remedy));
         }
-        let psi_rad = sidestep_kernel::math::wrap_angle(heading_deg.to_radians());
-        let start = Pose { at: at_m, psi_rad };
+        let heading_rad = sidestep_kernel::math::wrap_angle(heading_deg.to_radians());
+        let start = Pose { at: at_m, heading_rad };
         let (orders, leaves_s) = s.orders(self.source)?;
         Ok(Airplane { model, start, mission, altitude_m, appears_s, leaves_s, orders, track: None })
     }

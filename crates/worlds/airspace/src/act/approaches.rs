@@ -1,7 +1,6 @@
 //! Closest approaches: how near pairs of airplanes come to each other, whoever flies them.
 
-use super::flight::Flight;
-use super::step::Moment;
+use super::flight::{Flight, Moment};
 use crate::Scratch;
 use crate::events::{Event, EventKind};
 use crate::flight::distance_m;

@@ -3,7 +3,20 @@
 use crate::Turn;
 use crate::flight::{Levels, Point, Pose, Stage, Track};
 use crate::shield::Way;
-use sidestep_kernel::Slot;
+use crate::state::End;
+use sidestep_kernel::{Cycle, Slot};
+
+/// One step of `dtau`.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Moment {
+    pub(super) now: Cycle,
+    /// Number of the step in this `dt`,
+    pub(super) k: usize,
+    /// and in the run.
+    pub(super) step: u64,
+    /// When it begins, seconds after the start.
+    pub(super) step_s: f64,
+}
 
 /// One airplane in this `dt`.
 pub(super) struct Flight<'a> {
@@ -14,8 +27,8 @@ pub(super) struct Flight<'a> {
     /// When it came into the air, seconds after the start.
     pub(super) since_s: f64,
     pub(super) next: usize,
-    /// How it ended, as [`crate::state::Cell::arrived`] says it.
-    pub(super) ended: Option<u64>,
+    /// How it ended.
+    pub(super) ended: Option<End>,
 }
 
 /// What it follows.

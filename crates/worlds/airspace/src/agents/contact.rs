@@ -61,9 +61,9 @@ impl Orbiting {
     fn pose(&self, air: &Air, beacon: &Beacon, now: Cycle) -> Pose {
         let gone_s = now.saturating_sub(self.as_of) as f64 * air.timing.dt_s;
         let omega_rad_s = self.side.sign() * beacon.omega_max_rad_s;
-        let Pose { at: [x, y], psi_rad } = self.pose.step(beacon.v_m_s, omega_rad_s, gone_s);
+        let Pose { at: [x, y], heading_rad } = self.pose.step(beacon.v_m_s, omega_rad_s, gone_s);
         let [wx, wy] = air.wind_m_s;
-        Pose { at: [x + wx * gone_s, y + wy * gone_s], psi_rad: math::wrap_angle(psi_rad) }
+        Pose { at: [x + wx * gone_s, y + wy * gone_s], heading_rad: math::wrap_angle(heading_rad) }
     }
 }
 
@@ -108,10 +108,10 @@ impl Contact {
     }
 
     fn straight(&self, air: &Air, now: Cycle) -> Vec<Point> {
-        let Beacon { pose: Pose { at, psi_rad }, goal, v_m_s, .. } = self.beacon;
+        let Beacon { pose: Pose { at, heading_rad }, goal, v_m_s, .. } = self.beacon;
         let toward = match goal.map(|goal| air.aim(at, goal, v_m_s)) {
             Some(aim) if distance_m(at, aim) > 0.0 => math::atan2(aim[1] - at[1], aim[0] - at[0]),
-            _ => psi_rad,
+            _ => heading_rad,
         };
         let [vx, vy] = [v_m_s * math::cos(toward), v_m_s * math::sin(toward)];
         let [wx, wy] = air.wind_m_s;

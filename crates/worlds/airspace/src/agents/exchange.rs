@@ -35,12 +35,14 @@
 //! is alive all the same, and everything was lost, is the one chance which is taken here: below
 //! 1e-12 each time ([`super::network::Network::silent_after`]).
 
+mod scene;
+
 use super::contact::{Beacon, Contact, Contacts, Orbiting, note};
 use super::link;
-use crate::flight::Air;
 use crate::shield::{Certainty, Decision, Flyer, Plan, Side, Way, filter};
+pub use scene::{Scene, Seen};
 use serde::{Deserialize, Serialize};
-use sidestep_kernel::{Cycle, EntityId};
+use sidestep_kernel::EntityId;
 use std::sync::Arc;
 
 /// What airplanes tell each other.
@@ -98,30 +100,6 @@ pub struct Agreed {
     pub held_back: bool,
     /// What it knows of others now.
     pub contacts: Contacts,
-}
-
-/// An airplane as others see it.
-#[derive(Debug, Clone, Copy)]
-pub struct Seen {
-    /// Its place, its model, and its stored fallback.
-    pub flyer: Flyer,
-    /// Whether it is seen to be on that fallback.
-    pub orbits: bool,
-}
-
-/// What all of a group see and have agreed on before they exchange their plans.
-#[derive(Debug, Clone)]
-pub struct Scene {
-    /// The air that all fly through.
-    pub air: Air,
-    /// Airplanes at least this far above each other do not mind each other.
-    pub vertical_m: f64,
-    /// The cycle.
-    pub now: Cycle,
-    /// See [`super::network::Network::silent_after`].
-    pub silent_after: u32,
-    /// All of the group as they can be seen, by rising id.
-    pub seen: Vec<Seen>,
 }
 
 /// The shield's agent of one airplane.

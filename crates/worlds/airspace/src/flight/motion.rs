@@ -6,10 +6,10 @@
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::math;
 
-/// A point of the plane, metres.
+/// A point of the plane, meters.
 pub type Point = [f64; 2];
 
-/// Distance of two points in metres.
+/// Distance of two points in meters.
 #[inline]
 pub fn distance_m(a: Point, b: Point) -> f64 {
     math::hypot(a[0] - b[0], a[1] - b[1])
@@ -41,7 +41,8 @@ pub struct Pose {
     /// Position.
     pub at: Point,
     /// Heading.
-    pub psi_rad: f64,
+    #[serde(rename = "psi_rad")]
+    pub heading_rad: f64,
 }
 
 impl Pose {
@@ -51,10 +52,10 @@ impl Pose {
     pub fn step(self, v_m_s: f64, omega_rad_s: f64, dtau_s: f64) -> Self {
         let half = 0.5 * omega_rad_s * dtau_s;
         let chord = v_m_s * dtau_s * sinc(half);
-        let along = self.psi_rad + half;
+        let along = self.heading_rad + half;
         Self {
             at: [self.at[0] + chord * math::cos(along), self.at[1] + chord * math::sin(along)],
-            psi_rad: self.psi_rad + omega_rad_s * dtau_s,
+            heading_rad: self.heading_rad + omega_rad_s * dtau_s,
         }
     }
 
@@ -62,7 +63,7 @@ impl Pose {
     #[inline]
     pub fn steer(self, goal: Point, omega_max_rad_s: f64, dtau_s: f64) -> f64 {
         let bearing = math::atan2(goal[1] - self.at[1], goal[0] - self.at[0]);
-        let wanted = math::wrap_angle(bearing - self.psi_rad) / dtau_s;
+        let wanted = math::wrap_angle(bearing - self.heading_rad) / dtau_s;
         wanted.clamp(-omega_max_rad_s, omega_max_rad_s)
     }
 }

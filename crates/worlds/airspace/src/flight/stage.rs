@@ -52,8 +52,9 @@ pub(crate) fn later(airplane: &Airplane) -> Vec<Later> {
     for order in &airplane.orders {
         now.next = None;
         match &order.task {
-            Task::Heading(psi_rad) => {
-                let ahead = [FAR_AHEAD_M * math::cos(*psi_rad), FAR_AHEAD_M * math::sin(*psi_rad)];
+            Task::Heading(heading_rad) => {
+                let ahead =
+                    [FAR_AHEAD_M * math::cos(*heading_rad), FAR_AHEAD_M * math::sin(*heading_rad)];
                 // As many as on the route, so that the number of those done with still holds.
                 now.mission = vec![ahead; route.len()];
             }

@@ -5,7 +5,7 @@ use crate::flight::{Levels, Pose};
 use sidestep_kernel::EntityId;
 
 /// Meters that new plans keep beyond the separation.
-pub const SLACK_M: f64 = 0.01;
+pub(super) const SLACK_M: f64 = 0.01;
 
 /// What the shield knows of an airplane.
 #[derive(Debug, Clone, Copy, PartialEq)]
