@@ -16,7 +16,7 @@ pub struct Ledger {
     /// Pairs without fallbacks that are apart when the later one of them came under the method,
     /// after the cycle in which that was.
     pub too_close: BTreeSet<(Cycle, EntityId, EntityId)>,
-    /// What optimizations took.
+    /// Sums over optimizations.
     pub effort: Effort,
     /// How often what happened.
     pub events: BTreeMap<EventKind, u64>,

@@ -70,7 +70,7 @@ pub struct Cell {
 }
 
 impl Cell {
-    /// Where it is.
+    /// Its pose.
     pub fn pose(&self) -> Pose {
         Pose { at: [self.x_m.get(), self.y_m.get()], heading_rad: self.heading_rad.get() }
     }
@@ -199,7 +199,7 @@ fn held(contacts: &Mutex<Contacts>) -> std::sync::MutexGuard<'_, Contacts> {
 /// One airplane in a snapshot.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct AirplaneRecord {
-    /// Where it is.
+    /// Its pose.
     pub pose: Pose,
     /// See [`Cell::arrived`].
     pub arrived: u64,
@@ -319,7 +319,7 @@ impl AirspaceState {
         self.airplanes[slot as usize].is_flying() && world.appears_in(slot as usize) <= now
     }
 
-    /// What an airplane flies now.
+    /// Returns the part of a flight that an airplane is on now.
     pub(super) fn stage<'a>(&self, world: &'a AirspaceWorld, slot: Slot) -> Stage<'a> {
         world.stage(slot, self.airplanes[slot as usize].orders.get().into())
     }

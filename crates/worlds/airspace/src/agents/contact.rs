@@ -1,4 +1,4 @@
-//! What airplanes know of each other when messages get lost.
+//! Knowledge of airplanes about each other when messages get lost.
 
 use crate::flight::{Air, Levels, Point, Pose, Prediction, distance_m};
 use crate::objective::Options;
@@ -10,10 +10,10 @@ use std::collections::BTreeMap;
 /// Factor on the separation from an airplane of which nothing is heard.
 const WIDER: f64 = 1.5;
 
-/// What an airplane tells of itself.
+/// Message in which an airplane tells of itself.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Beacon {
-    /// Where it is.
+    /// Its pose.
     pub pose: Pose,
     /// Its next way-point.
     pub goal: Option<Point>,
@@ -38,12 +38,12 @@ pub struct Orbiting {
     pub side: Side,
 }
 
-/// What one airplane knows of another one.
+/// Knowledge of one airplane about another one.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Contact {
-    /// When it was last heard of.
+    /// Cycle in which it was last heard of.
     pub heard_in: Cycle,
-    /// What it told then.
+    /// Its message then.
     pub beacon: Beacon,
     /// The orbits it may be on since then, under the shield.
     pub possible: Vec<Orbiting>,
@@ -53,11 +53,11 @@ pub struct Contact {
     pub met_in: Cycle,
 }
 
-/// What an airplane knows of others, by id.
+/// Knowledge of an airplane about others, by id.
 pub type Contacts = BTreeMap<EntityId, Contact>;
 
 impl Orbiting {
-    /// Where it is at the beginning of cycle `now`.
+    /// Returns its place at the beginning of cycle `now`.
     fn pose(&self, air: &Air, beacon: &Beacon, now: Cycle) -> Pose {
         let gone_s = now.saturating_sub(self.as_of) as f64 * air.timing.dt_s;
         let omega_rad_s = self.side.sign() * beacon.omega_max_rad_s;
@@ -68,7 +68,7 @@ impl Orbiting {
 }
 
 impl Beacon {
-    /// What can be told of one without knowing where it wants to go.
+    /// Returns all that can be told of one without knowing where it wants to go.
     pub(crate) fn of(flyer: &Flyer) -> Self {
         Self {
             pose: flyer.pose,

@@ -32,7 +32,7 @@ pub use migration::{Journey, Migration};
 use serde::{Deserialize, Serialize};
 use sidestep_collectives::{Estimator, PairwiseGame, Player, optimize};
 
-/// What a coordinator has of one airplane.
+/// The part of a coordinator that is about one airplane.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 struct Visited {
     /// Place in the group.
@@ -43,7 +43,7 @@ struct Visited {
     /// those of this round, and the ways gathered in this tour.
     samples: Vec<usize>,
     ways: Vec<Prediction>,
-    /// What the ways cost the airplane itself.
+    /// Cost of the ways to the airplane itself.
     own_costs: Vec<f64>,
     separation_m: f64,
     levels: Levels,

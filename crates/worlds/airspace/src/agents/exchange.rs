@@ -45,10 +45,10 @@ use serde::{Deserialize, Serialize};
 use sidestep_kernel::EntityId;
 use std::sync::Arc;
 
-/// What airplanes tell each other.
+/// Messages between airplanes.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub enum Message {
-    /// Where the sender is, and what it would do.
+    /// Place of the sender, and the ways it would fly.
     Proposal(Proposal),
     /// The way it will fly if all agree, and the side it turns to then; `None`: its fallback.
     Plan(Option<(Way, Side)>),
@@ -56,7 +56,7 @@ pub enum Message {
     Accepts(Vec<u16>),
 }
 
-/// Where an airplane is, and what it would do.
+/// Place of an airplane, and the ways it would fly.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Proposal {
     beacon: Beacon,
@@ -91,14 +91,14 @@ struct Member {
     accepted: bool,
 }
 
-/// What an airplane does after the exchange.
+/// Outcome of the exchange for one airplane.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Agreed {
-    /// What it flies.
+    /// Its decision.
     pub decision: Decision,
     /// It would have flown another way, had all agreed.
     pub held_back: bool,
-    /// What it knows of others now.
+    /// Its knowledge of others after the exchange.
     pub contacts: Contacts,
 }
 
@@ -284,7 +284,7 @@ impl Agent {
         });
     }
 
-    /// What it knows of others after this `dt`.
+    /// Its knowledge of others after this `dt`.
     fn known_now(&self) -> Contacts {
         let mut contacts = self.contacts.clone();
         for (place, member) in self.members.iter().enumerate().filter(|(k, _)| *k != self.me) {

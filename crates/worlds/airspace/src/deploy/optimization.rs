@@ -13,7 +13,7 @@ use sidestep_collectives::Estimator;
 use sidestep_kernel::{Cycle, EntityId};
 use std::sync::Arc;
 
-/// What each agent of a group comes to, if anything, and what went over the network.
+/// Outcomes of the agents of a group, if any, and the count of messages.
 pub(crate) type Deployed = (Vec<Option<Decided>>, Traffic);
 
 /// Lets the agents of a group decide, and notes in `contacts` what they hear of each other.
@@ -120,7 +120,7 @@ pub fn own_ship(
     }
 }
 
-/// What an airplane tells of itself.
+/// Message in which an airplane tells of itself.
 fn beacon(world: &AirspaceWorld, known: Known) -> Beacon {
     let stage = world.stage(known.slot, known.orders);
     Beacon {
@@ -133,7 +133,7 @@ fn beacon(world: &AirspaceWorld, known: Known) -> Beacon {
     }
 }
 
-/// What all know of a flight before they have heard of it: how it was filed.
+/// Knowledge that all have of a flight before they have heard of it: as it was filed.
 fn filed(world: &AirspaceWorld, id: EntityId) -> Contact {
     let i = id as usize;
     let heard_in = world.appears_in(i);

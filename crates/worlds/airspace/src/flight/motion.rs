@@ -15,7 +15,7 @@ pub fn distance_m(a: Point, b: Point) -> f64 {
     math::hypot(a[0] - b[0], a[1] - b[1])
 }
 
-/// What an airplane can do and must keep.
+/// Abilities and separation of an airplane.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Model {
     /// Airspeed, constant.
@@ -35,7 +35,7 @@ impl Model {
     }
 }
 
-/// Where an airplane is and where it heads.
+/// Place and heading of an airplane.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Pose {
     /// Position.
@@ -74,7 +74,7 @@ pub(super) fn sinc(a: f64) -> f64 {
     if a.abs() < 1e-4 { 1.0 - a * a / 6.0 } else { math::sin(a) / a }
 }
 
-/// How time is cut and when a way-point counts as reached.
+/// Steps of time.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Timing {
     /// Time between two optimizations.

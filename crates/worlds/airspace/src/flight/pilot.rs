@@ -5,7 +5,7 @@ use super::motion::{Model, Point, Pose, Timing, sinc};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::math;
 
-/// What an airplane does after its last way-point, in predictions.
+/// Flight after the last way-point, in predictions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum After {
@@ -16,7 +16,7 @@ pub enum After {
     Pursue,
 }
 
-/// When an airplane has done with a way-point.
+/// Rule by which an airplane has done with a way-point.
 ///
 /// It is reached within a tolerance. But an airplane whose way-point lies inside one of its two
 /// tightest turning circles would orbit it for ever: steering for it keeps the airplane on that
@@ -55,7 +55,7 @@ impl Passing {
     }
 }
 
-/// Where an action leads.
+/// The way that an action leads.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Prediction {
     /// Positions after 1, 2, ... steps of `dtau`.
@@ -120,9 +120,9 @@ pub struct Pilot<'a> {
     pub model: &'a Model,
     /// Its way-points.
     pub mission: &'a [Point],
-    /// When way-points count as reached.
+    /// Rule by which way-points count as reached.
     pub passing: Passing,
-    /// What comes after the last.
+    /// Flight after the last.
     pub after: After,
     /// Seconds per step.
     pub dtau_s: f64,

@@ -6,7 +6,7 @@ use sidestep_kernel::math;
 /// Way-points along the rest of a track are this far apart in time.
 const WAY_POINT_EVERY_S: f64 = 120.0;
 
-/// Where an airplane was at one time.
+/// Place of an airplane at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrackPoint {
     /// Seconds after the start of the scenario.
@@ -35,12 +35,12 @@ impl Track {
         is_track.then(|| Self { headings_rad: headings_rad(&points), points })
     }
 
-    /// When it begins, seconds after the start.
+    /// Its beginning, seconds after the start.
     pub fn begins_s(&self) -> f64 {
         self.points[0].t_s
     }
 
-    /// When it ends, seconds after the start.
+    /// Its end, seconds after the start.
     pub fn ends_s(&self) -> f64 {
         self.points[self.points.len() - 1].t_s
     }
@@ -50,7 +50,7 @@ impl Track {
         (self.begins_s()..=self.ends_s()).contains(&t_s)
     }
 
-    /// Where it was and where it headed; before the beginning and after the end as there.
+    /// Returns its pose; before the beginning and after the end as there.
     pub fn pose_at(&self, t_s: f64) -> Pose {
         let (k, part) = self.between(t_s);
         let ([x0, y0], [x1, y1]) = (self.points[k].at, self.points[k + 1].at);
@@ -58,7 +58,7 @@ impl Track {
         Pose { at, heading_rad: self.headings_rad[k] }
     }
 
-    /// How high it was.
+    /// Returns its altitude.
     pub fn altitude_at_m(&self, t_s: f64) -> f64 {
         let (k, part) = self.between(t_s);
         let (from_m, to_m) = (self.points[k].altitude_m, self.points[k + 1].altitude_m);

@@ -60,7 +60,7 @@ impl Orbit {
         Self { center, radius_m, omega_rad_s, phase_rad: to_center + std::f64::consts::PI }
     }
 
-    /// Where the airplane is on it.
+    /// Returns the airplane's place on it.
     pub(crate) fn at(&self, t_s: f64) -> Point {
         let angle = self.phase_rad + self.omega_rad_s * t_s;
         [

@@ -9,24 +9,24 @@ use serde::de::DeserializeOwned;
 use sidestep_collectives::Settings;
 use sidestep_kernel::ports::{Envelope, Transport};
 
-/// What says that a coordinator has arrived.
+/// Message that a coordinator has arrived.
 const ACKNOWLEDGED: [u8; 1] = [1];
 
-/// How long coordinators may travel, and how often a hop is made again.
+/// Time in which coordinators may travel, and how often a hop is made again.
 #[derive(Debug, Clone, Copy)]
 pub struct Journey {
     /// The tick in which the first one sets out,
     pub begin: u64,
     /// and the one in which time is up.
     pub end: u64,
-    /// How hops are repeated that are not acknowledged; `None` on a network that loses nothing.
+    /// Repetition of hops that are not acknowledged; `None` on a network that loses nothing.
     pub patience: Option<Patience>,
 }
 
 /// Coordinators of a group, on the airplanes that they visit.
 pub struct Migration<'a> {
     transport: &'a mut dyn Transport,
-    /// What is aboard each airplane,
+    /// Data aboard each airplane,
     pub(super) hosts: &'a [OwnShip],
     /// and whether its radio is dead.
     pub(super) silent: &'a [bool],

@@ -1,4 +1,4 @@
-//! What all of a group see before they exchange their plans.
+//! The scene that all of a group see before they exchange their plans.
 
 use crate::flight::Air;
 use crate::shield::Flyer;
@@ -13,7 +13,8 @@ pub struct Seen {
     pub orbits: bool,
 }
 
-/// What all of a group see and have agreed on before they exchange their plans.
+/// The scene that all of a group see, and numbers they have agreed on, before they exchange their
+/// plans.
 #[derive(Debug, Clone)]
 pub struct Scene {
     /// The air that all fly through.
