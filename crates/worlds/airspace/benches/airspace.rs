@@ -43,7 +43,7 @@ impl Conflict {
             [radius_m * cos(angle), radius_m * sin(angle)]
         };
         let turn = std::f64::consts::PI;
-        let pose = |k| Pose { at: on(3000.0, angle(k)), psi_rad: angle(k) + turn };
+        let pose = |k| Pose { at: on(3000.0, angle(k)), heading_rad: angle(k) + turn };
         Self {
             poses: (0..n).map(pose).collect(),
             goals: (0..n).map(|k| [on(6500.0, angle(k) + turn)]).collect(),

@@ -1,4 +1,4 @@
-//! What the airplanes of a group want to do: by the method of the world.
+//! Decisions of the airplanes of a group, by the method of the world.
 
 mod velocity;
 mod wishes;
@@ -33,11 +33,11 @@ pub struct Optimization {
     pub rounds: u32,
     /// Whether the distributions had settled.
     pub converged: bool,
-    /// What went over the network.
+    /// Messages and bytes that went over the network.
     pub traffic: Traffic,
 }
 
-/// What optimizations took.
+/// Sums over optimizations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Effort {
     /// Optimizations.
@@ -46,7 +46,7 @@ pub struct Effort {
     pub rounds: u64,
     /// Those that ended before they had converged.
     pub unconverged: u64,
-    /// What went over the network, the shield's exchanges included.
+    /// Messages over the network, the shield's exchanges included.
     pub traffic: Traffic,
 }
 

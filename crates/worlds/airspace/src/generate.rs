@@ -43,10 +43,10 @@ pub(super) fn generate(order: &Order<'_>, streams: &Streams) -> Result<Vec<Airpl
 
 fn airplane(order: &Order<'_>, from: Point, to: Vec<Point>) -> Airplane {
     let first = to.first().copied().unwrap_or(from);
-    let psi_rad = math::atan2(first[1] - from[1], first[0] - from[0]);
+    let heading_rad = math::atan2(first[1] - from[1], first[0] - from[0]);
     Airplane {
         model: order.model.clone(),
-        start: Pose { at: from, psi_rad },
+        start: Pose { at: from, heading_rad },
         mission: to,
         altitude_m: 0.0,
         appears_s: 0.0,
@@ -104,8 +104,8 @@ fn in_disc(radius_m: f64, draws: &mut Draws) -> Point {
     on_circle(r, TAU * draws.uniform())
 }
 
-/// Three streams that meet at the centre and go on together; airplanes of a stream follow each
-/// other at four separations, and the first of each stream come to the centre at once, so do the
+/// Three streams that meet at the center and go on together; airplanes of a stream follow each
+/// other at four separations, and the first of each stream come to the center at once, so do the
 /// second, and so on.
 fn converging(order: &Order<'_>, streams: &Streams) -> Vec<Airplane> {
     let spacing_m = 4.0 * order.model.separation_m;

@@ -16,7 +16,7 @@ pub struct Ledger {
     /// Pairs without fallbacks that are apart when the later one of them came under the method,
     /// after the cycle in which that was.
     pub too_close: BTreeSet<(Cycle, EntityId, EntityId)>,
-    /// What optimizations took.
+    /// Sums over optimizations.
     pub effort: Effort,
     /// How often what happened.
     pub events: BTreeMap<EventKind, u64>,
@@ -197,6 +197,21 @@ fn lost_s(world: &AirspaceWorld, looks: u64) -> f64 {
     looks as f64 * world.timing.dtau_s / LOOKS_PER_STEP as f64
 }
 
+fn count(state: &AirspaceState, is: impl Fn(&Cell) -> bool) -> u64 {
+    state.airplanes.iter().filter(|cell| is(cell)).count() as u64
+}
+
+/// How many have flown their recorded way to its end.
+fn replayed(world: &AirspaceWorld, state: &AirspaceState) -> u64 {
+    let all = (0..).zip(&state.airplanes);
+    let ended = all.filter(|(_, cell)| cell.arrived_step().is_some());
+    ended.filter(|(id, _)| is_replayed_to_the_end(world, *id)).count() as u64
+}
+
+fn mean(sum: f64, n: usize) -> Option<f64> {
+    (n > 0).then(|| sum / n as f64)
+}
+
 /// Metrics of a run so far; `decide_s` is the time spent deciding.
 pub fn metrics(
     world: &AirspaceWorld,
@@ -207,12 +222,6 @@ pub fn metrics(
     let all = (0..world.airplanes.len() as EntityId).map(|id| airplane_metrics(world, state, id));
     let all: Vec<AirplaneMetrics> = all.collect();
     let delays: Vec<f64> = all.iter().filter_map(|a| a.delay_percent).collect();
-    let count =
-        |is: &dyn Fn(&Cell) -> bool| state.airplanes.iter().filter(|c| is(c)).count() as u64;
-    let ended =
-        |a: &&AirplaneMetrics| state.airplanes[a.airplane as usize].arrived_step().is_some();
-    let replayed = all.iter().filter(ended).filter(|a| is_replayed_to_the_end(world, a.airplane));
-    let mean = |sum: f64, n: usize| (n > 0).then(|| sum / n as f64);
     let nearest = ledger.pairs.values().map(|r| r.nearest_m).min_by(f64::total_cmp);
     let looks: u64 = ledger.pairs.values().map(|r| r.lost_looks).sum();
     let Effort { optimizations: optimisations, rounds, unconverged, traffic } = ledger.effort;
@@ -220,7 +229,7 @@ pub fn metrics(
         min_separation_m: nearest,
         losses_of_separation: ledger.pairs.values().map(|r| u64::from(r.losses)).sum(),
         lost_s: lost_s(world, looks),
-        arrived: count(&|cell| cell.arrived_step().is_some()),
+        arrived: count(state, |cell| cell.arrived_step().is_some()),
         airplanes: all.len() as u64,
         mean_delay_percent: mean(delays.iter().sum(), delays.len()),
         messages: traffic.messages,
@@ -237,8 +246,8 @@ pub fn metrics(
         contacts_lost: ledger.count(EventKind::Unheard),
         deadlines_missed: ledger.count(EventKind::Deadline),
         groups_too_large: ledger.count(EventKind::GroupTooLarge),
-        left: count(&Cell::has_left),
-        replayed: replayed.count() as u64,
+        left: count(state, Cell::has_left),
+        replayed: replayed(world, state),
         orders: all.iter().map(|a| u64::from(a.orders)).sum(),
         orders_delayed: all.iter().map(|a| u64::from(a.orders_delayed)).sum(),
         too_close: ledger.too_close.iter().map(|pair| too_close(world, pair)).collect(),

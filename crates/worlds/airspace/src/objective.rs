@@ -316,7 +316,7 @@ mod tests {
                 plane["wps"].as_array().expect("way-points").iter().map(point).collect();
             let pilot =
                 Pilot { model: &model, mission: &mission, passing, after, dtau_s: timing.dtau_s };
-            let pose = Pose { at: [number("x"), number("y")], psi_rad: number("psi") };
+            let pose = Pose { at: [number("x"), number("y")], heading_rad: number("psi") };
             let chosen = match action["omega"].as_f64() {
                 None => Action::Proceed,
                 Some(omega_rad_s) if action["g"] == 0 => Action::Hold { omega_rad_s },
@@ -368,7 +368,8 @@ mod tests {
         for (k, mask) in (0..12).flat_map(|k| [(k, true), (k, false)]) {
             let options = [0.0, 1.0].map(|side| {
                 let angle = side * 0.5 * f64::from(k);
-                let pose = Pose { at: [900.0 * side, 700.0 * side], psi_rad: angle + 3.0 * side };
+                let pose =
+                    Pose { at: [900.0 * side, 700.0 * side], heading_rad: angle + 3.0 * side };
                 let mission = [[2000.0 - 2500.0 * side, 300.0]];
                 let after = After::Straight;
                 let pilot = Pilot { model: &model, mission: &mission, passing, after, dtau_s: 1.0 };

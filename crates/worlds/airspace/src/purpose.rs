@@ -1,9 +1,9 @@
-//! What random draws of this world are for.
+//! Purposes of random draws of this world.
 
 use sidestep_kernel::stream::{Purpose, Streams};
 use sidestep_kernel::{Cycle, Slot};
 
-/// Where generated airplanes begin and go.
+/// Starts and goals of generated airplanes.
 pub(crate) const PLACE: Purpose = Purpose(1);
 /// Samples of the optimizer, one stream per airplane and cycle.
 pub(crate) const SAMPLE: Purpose = Purpose(2);
@@ -11,7 +11,7 @@ pub(crate) const SAMPLE: Purpose = Purpose(2);
 pub(crate) const POSITION: Purpose = Purpose(3);
 /// Disturbed headings.
 pub(crate) const HEADING: Purpose = Purpose(4);
-/// What happens to messages.
+/// Faults of messages.
 pub(crate) const NETWORK: Purpose = Purpose(5);
 
 /// Returns the `k`-th uniform number in [0, 1) of an airplane's samples in a cycle.

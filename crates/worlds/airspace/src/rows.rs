@@ -22,7 +22,7 @@ fn trajectories() -> Table<Place> {
         .u32("airplane", "entity id", |p| p.airplane)
         .f64("x_m", "position east", |p| p.pose.at[0])
         .f64("y_m", "position north", |p| p.pose.at[1])
-        .f64("heading_rad", "heading, counter-clockwise from east", |p| p.pose.psi_rad)
+        .f64("heading_rad", "heading, counter-clockwise from east", |p| p.pose.heading_rad)
 }
 
 fn events() -> Table<Event> {

@@ -93,7 +93,7 @@ fn airplane_and_zone(
 ) -> [Body; 2] {
     let cell = &state.airplanes[id as usize];
     let ([x_m, y_m], radius_m) = (cell.pose().at, zone_radius_m(world, id));
-    let pose = Pose::heading([x_m, y_m, cell.altitude_m.get()], cell.pose().psi_rad);
+    let pose = Pose::heading([x_m, y_m, cell.altitude_m.get()], cell.pose().heading_rad);
     let length_m = LENGTH_OF_RADIUS * radius_m;
     let dart = Shape::Dart { length_m, width_m: WIDTH_OF_LENGTH * length_m };
     let zone = Shape::Cylinder { radius_m, height_m: ZONE_HEIGHT * radius_m };

@@ -57,9 +57,9 @@ pub struct Disturbance {
 pub struct AirspaceWorld {
     /// The airplanes by id.
     pub airplanes: Vec<Airplane>,
-    /// How time is cut.
+    /// Steps of time.
     pub timing: Timing,
-    /// When way-points count as reached.
+    /// Rule by which way-points count as reached.
     pub passing: Passing,
     /// What is optimized,
     pub objective: Objective,
@@ -71,7 +71,7 @@ pub struct AirspaceWorld {
     pub legs: Legs,
     /// Who decides.
     pub method: Method,
-    /// Where the optimizer runs.
+    /// A deployment of the optimizer.
     pub deployment: Deployment,
     /// What its messages go over, if that is not to be relied on.
     pub network: Option<Network>,

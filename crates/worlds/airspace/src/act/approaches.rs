@@ -1,7 +1,6 @@
 //! Closest approaches: how near pairs of airplanes come to each other, whoever flies them.
 
-use super::flight::Flight;
-use super::step::Moment;
+use super::flight::{Flight, Moment};
 use crate::Scratch;
 use crate::events::{Event, EventKind};
 use crate::flight::distance_m;
@@ -53,23 +52,23 @@ fn gap_m(world: &AirspaceWorld, a: &Flight<'_>, b: &Flight<'_>) -> f64 {
     own_m(a).max(own_m(b))
 }
 
-/// What comes of a pair in one step.
+/// Returns the record of a pair in one step.
 fn closest(
     world: &AirspaceWorld,
     (a, b): (&Flight<'_>, &Flight<'_>),
-    Moment { step_s, k, .. }: Moment,
+    moment: Moment,
 ) -> PairRecord {
     let (dtau_s, gap_m) = (world.timing.dtau_s, gap_m(world, a, b));
     // Only where both are in the air, and on one level.
     let apart_m = |t_s: f64| {
-        let at = |f: &Flight<'_>| f.at(world.wind_m_s, (step_s, k), t_s);
+        let at = |f: &Flight<'_>| f.at(world.wind_m_s, moment, t_s);
         let ((place_a, height_a), (place_b, height_b)) = at(a).zip(at(b))?;
         let on_one_level = (height_a - height_b).abs() < world.vertical_m;
         on_one_level.then(|| distance_m(place_a, place_b))
     };
     // A loss goes on where the step before has ended; only when one of the two has just
     // come into the air there is none before.
-    let begins = step_s <= a.since_s.max(b.since_s) + ROUNDING * dtau_s;
+    let begins = moment.step_s <= a.since_s.max(b.since_s) + ROUNDING * dtau_s;
     let mut was_lost = !begins && apart_m(0.0).is_some_and(|d| d < gap_m);
     let mut record = PairRecord { nearest_m: f64::INFINITY, lost_looks: 0, losses: 0 };
     for look in 1..=LOOKS_PER_STEP {

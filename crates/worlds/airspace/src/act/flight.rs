@@ -3,7 +3,20 @@
 use crate::Turn;
 use crate::flight::{Levels, Point, Pose, Stage, Track};
 use crate::shield::Way;
-use sidestep_kernel::Slot;
+use crate::state::End;
+use sidestep_kernel::{Cycle, Slot};
+
+/// One step of `dtau`.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Moment {
+    pub(super) now: Cycle,
+    /// Number of the step in this `dt`,
+    pub(super) k: usize,
+    /// and in the run.
+    pub(super) step: u64,
+    /// Its beginning, seconds after the start.
+    pub(super) step_s: f64,
+}
 
 /// One airplane in this `dt`.
 pub(super) struct Flight<'a> {
@@ -11,16 +24,16 @@ pub(super) struct Flight<'a> {
     pub(super) course: Course<'a>,
     pub(super) pose: Pose,
     pub(super) altitude_m: f64,
-    /// When it came into the air, seconds after the start.
+    /// Time at which it came into the air, seconds after the start.
     pub(super) since_s: f64,
     pub(super) next: usize,
-    /// How it ended, as [`crate::state::Cell::arrived`] says it.
-    pub(super) ended: Option<u64>,
+    /// Its end, if it has come.
+    pub(super) ended: Option<End>,
 }
 
-/// What it follows.
+/// The course of an airplane.
 pub(super) enum Course<'a> {
-    /// What has been decided.
+    /// A decided way.
     Way(Way, Stage<'a>),
     /// Its recorded way.
     Track(&'a Track),
@@ -45,23 +58,18 @@ impl<'a> Flight<'a> {
         self.altitude_m + (stage.altitude_m - self.altitude_m).clamp(-most_m, most_m)
     }
 
-    /// Where and how high it is `t_s` after the begin of step `k` at `step_s`; `None` where it
-    /// is not in the air.
-    pub(super) fn at(
-        &self,
-        wind_m_s: Point,
-        (step_s, k): (f64, usize),
-        t_s: f64,
-    ) -> Option<(Point, f64)> {
+    /// Returns its place and altitude `t_s` after the start of a step; `None` while it is not in
+    /// the air.
+    pub(super) fn at(&self, wind_m_s: Point, moment: Moment, t_s: f64) -> Option<(Point, f64)> {
         match &self.course {
             Course::Way(way, stage) => {
-                let omega = way.omegas_rad_s[k];
+                let omega = way.omegas_rad_s[moment.k];
                 let [x, y] = self.pose.step(stage.model.v_m_s, omega, t_s).at;
                 let [wx, wy] = wind_m_s;
                 Some(([x + wx * t_s, y + wy * t_s], self.altitude_after_m(stage, t_s)))
             }
             Course::Track(track) => {
-                let now_s = step_s + t_s;
+                let now_s = moment.step_s + t_s;
                 let at = || (track.pose_at(now_s).at, track.altitude_at_m(now_s));
                 track.covers(now_s).then(at)
             }

@@ -1,4 +1,4 @@
-//! What the shield knows of airplanes, and what it makes of their wishes.
+//! Airplanes as the shield knows them, and the ways it leaves them.
 
 use crate::Turn;
 use crate::agents::contact::Contacts;

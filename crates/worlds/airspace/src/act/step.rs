@@ -1,27 +1,14 @@
 //! The steps of one `dt`: all fly, and what becomes of them is stored.
 
 use super::approaches;
-use super::flight::{Course, Flight};
+use super::flight::{Course, Flight, Moment};
 use crate::Turn;
 use crate::events::{Event, EventKind};
 use crate::metrics::airplane_metrics;
 use crate::purpose;
-use crate::state::LEFT;
+use crate::state::End;
 use crate::world::AirspaceWorld;
-use sidestep_kernel::Cycle;
 use sidestep_kernel::distr::normal;
-
-/// One step of `dtau`.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Moment {
-    pub(super) now: Cycle,
-    /// Number of the step in this `dt`,
-    pub(super) k: usize,
-    /// and in the run.
-    pub(super) step: u64,
-    /// When it begins, seconds after the start.
-    pub(super) step_s: f64,
-}
 
 /// Flies all steps of this `dt`.
 pub(super) fn step_all(turn: &mut Turn<'_>, mut flights: Vec<Flight<'_>>) {
@@ -32,7 +19,7 @@ pub(super) fn step_all(turn: &mut Turn<'_>, mut flights: Vec<Flight<'_>>) {
         let moment = Moment { now, k, step, step_s: step as f64 * world.timing.dtau_s };
         for flight in flights.iter_mut().filter(|f| f.ended.is_none()) {
             let leaves_s = world.airplanes[flight.slot as usize].leaves_s;
-            flight.ended = (leaves_s <= moment.step_s).then_some(LEFT | step);
+            flight.ended = (leaves_s <= moment.step_s).then_some(End::Left(step));
         }
         approaches::book(world, &flights, moment, turn.scratch);
         for flight in flights.iter_mut().filter(|f| f.ended.is_none()) {
@@ -61,7 +48,7 @@ fn fly(world: &AirspaceWorld, flight: &mut Flight<'_>, Moment { k, step, .. }: M
             track.ends_s() <= after_s
         }
     };
-    flight.ended = is_at_end.then_some(step + 1);
+    flight.ended = is_at_end.then_some(End::Arrived(step + 1));
 }
 
 fn store(turn: &mut Turn<'_>, flight: Flight<'_>) {
@@ -71,14 +58,14 @@ fn store(turn: &mut Turn<'_>, flight: Flight<'_>) {
     let is_disturbed = matches!(flight.course, Course::Way(..));
     if is_disturbed && world.disturbance.heading_rad > 0.0 {
         let mut draws = world.streams.draws(flight.slot, now, purpose::HEADING);
-        pose.psi_rad += world.disturbance.heading_rad * normal(&mut draws);
+        pose.heading_rad += world.disturbance.heading_rad * normal(&mut draws);
     }
-    pose.psi_rad = sidestep_kernel::math::wrap_angle(pose.psi_rad);
+    pose.heading_rad = sidestep_kernel::math::wrap_angle(pose.heading_rad);
     cell.set_pose(pose);
     cell.altitude_m.set(flight.altitude_m);
     cell.next.set(flight.next as u32);
-    if let Some(ended) = flight.ended {
-        cell.arrived.set(ended);
+    if let Some(end) = flight.ended {
+        cell.set_end(end);
         if let Some(delay_s) = airplane_metrics(world, state, flight.slot).delay_s() {
             let event = Event::of(now, EventKind::Arrival, flight.slot);
             scratch.events.push(event.with(delay_s));

@@ -1,4 +1,4 @@
-//! What airplanes know of each other when messages get lost.
+//! Knowledge of airplanes about each other when messages get lost.
 
 use crate::flight::{Air, Levels, Point, Pose, Prediction, distance_m};
 use crate::objective::Options;
@@ -10,10 +10,10 @@ use std::collections::BTreeMap;
 /// Factor on the separation from an airplane of which nothing is heard.
 const WIDER: f64 = 1.5;
 
-/// What an airplane tells of itself.
+/// Message in which an airplane tells of itself.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Beacon {
-    /// Where it is.
+    /// Its pose.
     pub pose: Pose,
     /// Its next way-point.
     pub goal: Option<Point>,
@@ -38,12 +38,12 @@ pub struct Orbiting {
     pub side: Side,
 }
 
-/// What one airplane knows of another one.
+/// Knowledge of one airplane about another one.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Contact {
-    /// When it was last heard of.
+    /// Cycle in which it was last heard of.
     pub heard_in: Cycle,
-    /// What it told then.
+    /// Its message then.
     pub beacon: Beacon,
     /// The orbits it may be on since then, under the shield.
     pub possible: Vec<Orbiting>,
@@ -53,22 +53,22 @@ pub struct Contact {
     pub met_in: Cycle,
 }
 
-/// What an airplane knows of others, by id.
+/// Knowledge of an airplane about others, by id.
 pub type Contacts = BTreeMap<EntityId, Contact>;
 
 impl Orbiting {
-    /// Where it is at the beginning of cycle `now`.
+    /// Returns its place at the beginning of cycle `now`.
     fn pose(&self, air: &Air, beacon: &Beacon, now: Cycle) -> Pose {
         let gone_s = now.saturating_sub(self.as_of) as f64 * air.timing.dt_s;
         let omega_rad_s = self.side.sign() * beacon.omega_max_rad_s;
-        let Pose { at: [x, y], psi_rad } = self.pose.step(beacon.v_m_s, omega_rad_s, gone_s);
+        let Pose { at: [x, y], heading_rad } = self.pose.step(beacon.v_m_s, omega_rad_s, gone_s);
         let [wx, wy] = air.wind_m_s;
-        Pose { at: [x + wx * gone_s, y + wy * gone_s], psi_rad: math::wrap_angle(psi_rad) }
+        Pose { at: [x + wx * gone_s, y + wy * gone_s], heading_rad: math::wrap_angle(heading_rad) }
     }
 }
 
 impl Beacon {
-    /// What can be told of one without knowing where it wants to go.
+    /// Returns all that can be told of one without knowing where it wants to go.
     pub(crate) fn of(flyer: &Flyer) -> Self {
         Self {
             pose: flyer.pose,
@@ -108,10 +108,10 @@ impl Contact {
     }
 
     fn straight(&self, air: &Air, now: Cycle) -> Vec<Point> {
-        let Beacon { pose: Pose { at, psi_rad }, goal, v_m_s, .. } = self.beacon;
+        let Beacon { pose: Pose { at, heading_rad }, goal, v_m_s, .. } = self.beacon;
         let toward = match goal.map(|goal| air.aim(at, goal, v_m_s)) {
             Some(aim) if distance_m(at, aim) > 0.0 => math::atan2(aim[1] - at[1], aim[0] - at[0]),
-            _ => psi_rad,
+            _ => heading_rad,
         };
         let [vx, vy] = [v_m_s * math::cos(toward), v_m_s * math::sin(toward)];
         let [wx, wy] = air.wind_m_s;

@@ -19,22 +19,20 @@
 //! left out: it is presumed where it was last heard of, and decides for itself. When time is up,
 //! whoever has not been told yet decides for itself too.
 
+mod migration;
+
 use super::contact::Beacon;
-use super::link::{Ended, bytes_of};
-use super::network::{Patience, Traffic};
+use super::link::Ended;
+use super::network::Traffic;
 use super::own_ship::OwnShip;
 use super::{Conclusion, Decided};
 use crate::flight::{Levels, Prediction, distance_m};
-use crate::objective::{Objective, Options, couple, own_costs};
-use serde::de::DeserializeOwned;
+use crate::objective::{Options, couple, own_costs};
+pub use migration::{Journey, Migration};
 use serde::{Deserialize, Serialize};
-use sidestep_collectives::{Estimator, PairwiseGame, Player, Settings, optimize};
-use sidestep_kernel::ports::{Envelope, Transport};
+use sidestep_collectives::{Estimator, PairwiseGame, Player, optimize};
 
-/// What says that a coordinator has arrived.
-const ACKNOWLEDGED: [u8; 1] = [1];
-
-/// What a coordinator has of one airplane.
+/// The part of a coordinator that is about one airplane.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 struct Visited {
     /// Place in the group.
@@ -45,7 +43,7 @@ struct Visited {
     /// those of this round, and the ways gathered in this tour.
     samples: Vec<usize>,
     ways: Vec<Prediction>,
-    /// What the ways cost the airplane itself.
+    /// Cost of the ways to the airplane itself.
     own_costs: Vec<f64>,
     separation_m: f64,
     levels: Levels,
@@ -64,151 +62,27 @@ struct Coordinator {
     airplanes: Vec<Visited>,
 }
 
-/// How long coordinators may travel, and how often a hop is made again.
-#[derive(Debug, Clone, Copy)]
-pub struct Journey {
-    /// The tick in which the first one sets out,
-    pub begin: u64,
-    /// and the one in which time is up.
-    pub end: u64,
-    /// How hops are repeated that are not acknowledged; `None` on a network that loses nothing.
-    pub patience: Option<Patience>,
-}
-
-/// Coordinators of a group, on the airplanes that they visit.
-pub struct Migration<'a> {
-    transport: &'a mut dyn Transport,
-    /// What is aboard each airplane,
-    hosts: &'a [OwnShip],
-    /// and whether its radio is dead.
-    silent: &'a [bool],
-    journey: Journey,
-    /// Ticks gone by.
-    gone: u64,
-    /// Messages so far: what tells them apart.
-    sent: u32,
-    traffic: Traffic,
-}
-
-impl<'a> Migration<'a> {
-    /// Coordinators that have not set out yet. `silent` says whose radio is dead.
-    pub fn new(
-        transport: &'a mut dyn Transport,
-        hosts: &'a [OwnShip],
-        silent: &'a [bool],
-        journey: Journey,
-    ) -> Self {
-        Self { transport, hosts, silent, journey, gone: 0, sent: 0, traffic: Traffic::default() }
-    }
-
-    /// Runs the coordinators, one for each part of the group, and returns what each airplane
-    /// comes to, and what went over the network.
-    pub fn run(mut self, parts: Vec<Vec<usize>>) -> (Vec<Ended<Conclusion>>, Traffic) {
-        let parts = parts.iter().filter_map(|part| Coordinator::new(&self, part));
-        let mut team: Vec<Coordinator> = parts.collect();
-        match self.settings().estimator {
-            _ if team.is_empty() => {}
-            Estimator::Exact => exact(&mut team, &mut self),
-            Estimator::Sampled { block, ageing } => sampled(&mut team, (block, ageing), &mut self),
+/// Runs the coordinators of a group, one for each part of it. Returns what each airplane comes to,
+/// and what went over the network.
+pub fn run(
+    mut migration: Migration<'_>,
+    parts: &[Vec<usize>],
+) -> (Vec<Ended<Conclusion>>, Traffic) {
+    let parts = parts.iter().filter_map(|part| Coordinator::new(&migration, part));
+    let mut team: Vec<Coordinator> = parts.collect();
+    match migration.settings().estimator {
+        _ if team.is_empty() => {}
+        Estimator::Exact => exact(&mut team, &mut migration),
+        Estimator::Sampled { block, ageing } => {
+            sampled(&mut team, (block, ageing), &mut migration);
         }
-        let nothing = Ended { outcome: None, unheard: Vec::new(), late: false };
-        let mut told = vec![nothing; self.hosts.len()];
-        deliver(team, &mut self, &mut told);
-        let late = self.is_late();
-        told.iter_mut().filter(|ended| ended.outcome.is_none()).for_each(|ended| ended.late = late);
-        (told, self.traffic)
     }
-
-    fn settings(&self) -> Settings {
-        *self.hosts[0].settings()
-    }
-
-    fn objective(&self) -> &'a Objective {
-        &self.hosts[0].briefing.objective
-    }
-
-    fn is_late(&self) -> bool {
-        self.gone >= self.journey.end - self.journey.begin
-    }
-
-    fn id(&self, place: usize) -> u32 {
-        self.hosts[place].known.slot
-    }
-
-    /// Sends a message `after` ticks of the journey.
-    fn send(&mut self, [from, to]: [usize; 2], payload: Vec<u8>, after: u64) {
-        self.traffic.count(1, payload.len());
-        self.transport.send(Envelope {
-            cycle: self.journey.begin + after,
-            sender: self.id(from),
-            sequence: self.sent,
-            receiver: self.id(to),
-            payload,
-        });
-        self.sent += 1;
-    }
-
-    /// Waits for a message numbered `first` or later, sent before `after` ticks had gone by.
-    /// Returns what arrives by tick `until` of the journey, and when.
-    fn await_from(
-        &mut self,
-        [from, to]: [usize; 2],
-        first: u32,
-        (after, until): (u64, u64),
-    ) -> Option<(Vec<u8>, u64)> {
-        let (sender, receiver) = (self.id(from), self.id(to));
-        for tick in after + 1..=until {
-            let arrived = self.transport.receive(receiver, self.journey.begin + tick);
-            // Copies of earlier hops concern nobody any more, and a dead radio hears nothing.
-            let awaited = |e: &Envelope| e.sender == sender && e.sequence >= first;
-            if let Some(envelope) = arrived.into_iter().find(awaited).filter(|_| !self.silent[to]) {
-                return Some((envelope.payload, tick));
-            }
-        }
-        None
-    }
-
-    /// Takes a coordinator's state from one airplane to another. Whether it has arrived.
-    fn hop<S: Serialize + DeserializeOwned>(&mut self, state: &mut S, way: [usize; 2]) -> bool {
-        let bytes = bytes_of(state);
-        let first = self.sent;
-        let expected = self.hosts[way[0]].expects(way[1]);
-        let tries = self.journey.patience.filter(|_| expected).map_or(1, |patience| patience.tries);
-        let wait = self.journey.patience.map_or(1, |patience| patience.ticks);
-        let mut arrived = None;
-        for _ in 0..tries {
-            if self.is_late() {
-                break;
-            }
-            let set_out = self.gone;
-            self.send(way, bytes.clone(), set_out);
-            if let Some((payload, tick)) = self.await_from(way, first, (set_out, set_out + wait)) {
-                arrived = Some(payload);
-                if self.is_acknowledged(way, (tick, set_out + wait)) {
-                    self.gone = tick;
-                    break;
-                }
-            }
-            self.gone = set_out + wait;
-        }
-        // On the other side it is read back.
-        match arrived.as_deref().map(postcard::from_bytes) {
-            Some(Ok(read)) => *state = read,
-            _ => return false,
-        }
-        true
-    }
-
-    /// Tells whoever has sent a coordinator that it has arrived at tick `tick` of the journey.
-    /// Whether that is known by tick `until`.
-    fn is_acknowledged(&mut self, [from, to]: [usize; 2], (tick, until): (u64, u64)) -> bool {
-        if self.journey.patience.is_none() {
-            return true;
-        }
-        let first = self.sent;
-        self.send([to, from], ACKNOWLEDGED.to_vec(), tick);
-        self.await_from([to, from], first, (tick, until)).is_some()
-    }
+    let nothing = Ended { outcome: None, unheard: Vec::new(), late: false };
+    let mut told = vec![nothing; migration.hosts.len()];
+    deliver(team, &mut migration, &mut told);
+    let late = migration.is_late();
+    told.iter_mut().filter(|ended| ended.outcome.is_none()).for_each(|ended| ended.late = late);
+    (told, migration.traffic)
 }
 
 impl Coordinator {

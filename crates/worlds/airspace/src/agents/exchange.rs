@@ -35,18 +35,20 @@
 //! is alive all the same, and everything was lost, is the one chance which is taken here: below
 //! 1e-12 each time ([`super::network::Network::silent_after`]).
 
+mod scene;
+
 use super::contact::{Beacon, Contact, Contacts, Orbiting, note};
 use super::link;
-use crate::flight::Air;
 use crate::shield::{Certainty, Decision, Flyer, Plan, Side, Way, filter};
+pub use scene::{Scene, Seen};
 use serde::{Deserialize, Serialize};
-use sidestep_kernel::{Cycle, EntityId};
+use sidestep_kernel::EntityId;
 use std::sync::Arc;
 
-/// What airplanes tell each other.
+/// Messages between airplanes.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub enum Message {
-    /// Where the sender is, and what it would do.
+    /// Place of the sender, and the ways it would fly.
     Proposal(Proposal),
     /// The way it will fly if all agree, and the side it turns to then; `None`: its fallback.
     Plan(Option<(Way, Side)>),
@@ -54,7 +56,7 @@ pub enum Message {
     Accepts(Vec<u16>),
 }
 
-/// Where an airplane is, and what it would do.
+/// Place of an airplane, and the ways it would fly.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Proposal {
     beacon: Beacon,
@@ -89,39 +91,15 @@ struct Member {
     accepted: bool,
 }
 
-/// What an airplane does after the exchange.
+/// Outcome of the exchange for one airplane.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Agreed {
-    /// What it flies.
+    /// Its decision.
     pub decision: Decision,
     /// It would have flown another way, had all agreed.
     pub held_back: bool,
-    /// What it knows of others now.
+    /// Its knowledge of others after the exchange.
     pub contacts: Contacts,
-}
-
-/// An airplane as others see it.
-#[derive(Debug, Clone, Copy)]
-pub struct Seen {
-    /// Its place, its model, and its stored fallback.
-    pub flyer: Flyer,
-    /// Whether it is seen to be on that fallback.
-    pub orbits: bool,
-}
-
-/// What all of a group see and have agreed on before they exchange their plans.
-#[derive(Debug, Clone)]
-pub struct Scene {
-    /// The air that all fly through.
-    pub air: Air,
-    /// Airplanes at least this far above each other do not mind each other.
-    pub vertical_m: f64,
-    /// The cycle.
-    pub now: Cycle,
-    /// See [`super::network::Network::silent_after`].
-    pub silent_after: u32,
-    /// All of the group as they can be seen, by rising id.
-    pub seen: Vec<Seen>,
 }
 
 /// The shield's agent of one airplane.
@@ -306,7 +284,7 @@ impl Agent {
         });
     }
 
-    /// What it knows of others after this `dt`.
+    /// Its knowledge of others after this `dt`.
     fn known_now(&self) -> Contacts {
         let mut contacts = self.contacts.clone();
         for (place, member) in self.members.iter().enumerate().filter(|(k, _)| *k != self.me) {

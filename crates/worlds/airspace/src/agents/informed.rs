@@ -10,23 +10,23 @@ use serde::{Deserialize, Serialize};
 use sidestep_collectives::{Estimator, Game, Order, PairwiseGame, Player};
 use std::collections::BTreeMap;
 
-/// What agents tell each other.
+/// Messages between agents.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub enum Message {
     /// The ways of all the sender's actions.
     Ways {
-        /// What the sender tells of itself.
+        /// Beacon of the sender.
         beacon: Beacon,
         /// The ways, by action.
         ways: Vec<Prediction>,
     },
     /// From which the others predict its ways themselves.
     Model {
-        /// What the sender tells of itself.
+        /// Beacon of the sender.
         beacon: Beacon,
         /// Way-points done with.
         next: u32,
-        /// What it is to reach.
+        /// Way-points that it is to reach.
         mission: Vec<Point>,
         /// Which airplane it is,
         airplane: u32,
@@ -39,7 +39,7 @@ pub enum Message {
     Samples {
         /// The round, from 0.
         round: u32,
-        /// How far the probabilities have moved.
+        /// Largest move of the probabilities.
         change: f64,
         /// Numbers of actions.
         samples: Vec<u16>,
@@ -48,7 +48,7 @@ pub enum Message {
     Distribution {
         /// The round, from 1.
         round: u32,
-        /// How far the probabilities have moved.
+        /// Largest move of the probabilities.
         change: f64,
         /// Probabilities of the actions.
         q: Vec<f64>,
@@ -69,7 +69,7 @@ struct Member {
 }
 
 impl Member {
-    /// What holds in a round, if that is known.
+    /// Returns its word that holds in a round, if that is known.
     fn at<'a, T>(&self, of_rounds: &'a BTreeMap<u32, T>, round: u32) -> Option<&'a T> {
         match of_rounds.get(&round) {
             None if self.gone => of_rounds.range(..round).next_back().map(|(_, value)| value),
@@ -85,7 +85,7 @@ impl Member {
         self.at(&self.samples, round)
     }
 
-    /// How far it has moved in a round.
+    /// Returns how far it has moved in a round.
     fn change(&self, round: u32) -> f64 {
         self.changes.get(&round).copied().unwrap_or(0.0)
     }

@@ -1,4 +1,4 @@
-//! What an agent needs to talk over a network that loses, delays, doubles and reorders messages.
+//! Talking over a network that loses, delays, doubles and reorders messages.
 //!
 //! Every agent says all it says to all the others of its group. An [`Endpoint`] numbers what its
 //! agent says and keeps it; whoever misses something asks for it again. One that does not answer
@@ -20,19 +20,19 @@ use std::sync::Arc;
 /// An agent as a state machine: messages in, messages to all others out. Others are known by
 /// their place in the group.
 pub trait Agent {
-    /// What it sends and receives.
+    /// Messages that it sends and receives.
     type Message: Serialize + DeserializeOwned;
-    /// What it comes to.
+    /// Its outcome.
     type Outcome;
 
-    /// What it says before it has heard anything.
+    /// Returns its messages before it has heard anything.
     fn start(&mut self) -> Vec<Self::Message>;
 
     /// Takes a message of agent `from`, and says what it has to say then. Messages come in any
     /// order, each once.
     fn on_message(&mut self, from: usize, message: Self::Message) -> Vec<Self::Message>;
 
-    /// Whose messages it needs in order to go on.
+    /// Returns the places of those whose messages it needs in order to go on.
     fn awaits(&self) -> Vec<usize>;
 
     /// Whether an answer of agent `other` can be expected.
@@ -47,11 +47,11 @@ pub trait Agent {
     /// Time is up: makes the best of what it knows.
     fn at_deadline(&mut self);
 
-    /// What it has come to, when it has.
+    /// Returns its outcome, if it has come to one.
     fn outcome(&self) -> Option<Self::Outcome>;
 }
 
-/// What goes over the wire.
+/// A packet on the wire.
 #[derive(Debug, Serialize, Deserialize)]
 enum Packet<M> {
     /// The message of this number of the sender's.
@@ -71,14 +71,14 @@ struct Outgoing {
     payload: Vec<u8>,
 }
 
-/// What an endpoint needs to know before it talks.
+/// Settings of an endpoint.
 #[derive(Debug, Clone)]
 pub struct Radio {
     /// Ids of the group, rising.
     pub group: Arc<[EntityId]>,
     /// Place of its airplane in the group.
     pub me: usize,
-    /// How long it waits for others.
+    /// Time that it waits for others.
     pub patience: Patience,
     /// Whether the radio is dead: it sends nothing, hears nothing, and knows.
     pub is_silent: bool,
@@ -89,7 +89,7 @@ pub struct Radio {
 pub struct Endpoint<A> {
     agent: A,
     radio: Radio,
-    /// What it has said, serialized, by number.
+    /// Its messages so far, serialized, by number.
     said: Vec<Vec<u8>>,
     others: Vec<Other>,
     quiet_since: u64,
@@ -99,7 +99,7 @@ pub struct Endpoint<A> {
     traffic: Traffic,
 }
 
-/// What an endpoint knows of another one.
+/// Knowledge of an endpoint about another one.
 #[derive(Debug, Clone, Default)]
 struct Other {
     /// All messages below this number have come,
@@ -127,10 +127,10 @@ pub(crate) fn bytes_of<M: Serialize>(message: &M) -> Vec<u8> {
     postcard::to_stdvec(message).expect("messages are plain data")
 }
 
-/// How a talk has ended for one agent.
+/// End of a talk for one agent.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ended<O> {
-    /// What it has come to, if anything.
+    /// Its outcome, if it has come to one.
     pub outcome: Option<O>,
     /// The others, by place, of whom it has heard nothing in spite of asking.
     pub unheard: Vec<usize>,
@@ -289,7 +289,7 @@ impl<A: Agent> Endpoint<A> {
         self.agent.outcome().is_some()
     }
 
-    /// What it has sent so far.
+    /// Returns the count of its messages so far.
     pub fn traffic(&self) -> Traffic {
         self.traffic
     }

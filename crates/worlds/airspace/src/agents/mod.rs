@@ -30,7 +30,7 @@ pub use link::{Agent, Ended, Endpoint, Radio};
 pub use own_ship::{Briefing, Filed, OwnShip};
 use serde::{Deserialize, Serialize};
 
-/// What the optimizer of an airplane comes to.
+/// Outcome of the optimization for an airplane.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Decided {
     /// Number of the chosen action.
@@ -43,11 +43,11 @@ pub struct Decided {
     pub converged: bool,
 }
 
-/// What an agent comes to.
+/// Outcome of an agent.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Conclusion {
     /// Nothing, if time was up before it had learned anything.
     pub decided: Option<Decided>,
-    /// What it has heard the others tell of themselves, by place.
+    /// Beacons of the others that it has heard, by place.
     pub beacons: Vec<Option<Beacon>>,
 }

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use sidestep_kernel::ports::Faults;
 use sidestep_kernel::{EntityId, math};
 
-/// What went over the network.
+/// Messages and bytes that went over the network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Traffic {
     /// Messages, one per receiver; of a coordinator, its migrations.
@@ -50,7 +50,7 @@ pub struct Network {
     pub patience_s: f64,
     /// An optimization ends after this, and so does what the shield exchanges after it.
     pub deadline_s: f64,
-    /// Whose radio is dead, and when.
+    /// Airplanes whose radio is dead, and times.
     pub silences: Vec<Silence>,
 }
 
@@ -118,11 +118,11 @@ impl Network {
     }
 }
 
-/// How long and how often an endpoint asks.
+/// Time after which an endpoint asks, and how often.
 #[derive(Debug, Clone, Copy)]
 pub struct Patience {
     /// Ticks without anything new after which it asks.
     pub ticks: u64,
-    /// How often somebody is asked before it is given up.
+    /// Questions to somebody before it is given up.
     pub tries: u32,
 }

@@ -1,4 +1,4 @@
-//! What an agent knows of its own airplane, and what all agents of a group have agreed on.
+//! Knowledge of an agent about its own airplane, and of all agents of a group alike.
 
 use super::Decided;
 use super::contact::{Beacon, Contact, Contacts};
@@ -10,14 +10,14 @@ use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{Cycle, EntityId};
 use std::sync::Arc;
 
-/// What all agents of a group know alike before they talk.
+/// Knowledge that all agents of a group share before they talk.
 #[derive(Debug, Clone)]
 pub struct Briefing {
     /// The cycle.
     pub now: Cycle,
     /// Ids of the group, rising.
     pub ids: Arc<[EntityId]>,
-    /// How each of them was filed, in this order.
+    /// Their flights as they were filed, in this order.
     pub filed: Vec<Filed>,
     /// The air that all fly through.
     pub air: Air,
@@ -31,14 +31,14 @@ pub struct Briefing {
     pub is_shielded: bool,
 }
 
-/// How a flight was filed.
+/// A flight as it was filed.
 #[derive(Debug, Clone)]
 pub struct Filed {
-    /// What the airplane can do.
+    /// Abilities of the airplane.
     pub model: Model,
-    /// What it may choose from.
+    /// Actions that it may choose from.
     pub actions: Vec<Action>,
-    /// What all know of it before they have heard of it.
+    /// Knowledge that all have of it before they have heard of it.
     pub contact: Contact,
 }
 
@@ -63,22 +63,22 @@ impl Briefing {
     }
 }
 
-/// What an agent knows of its own airplane, and has heard of others.
+/// Knowledge of an agent about its own airplane, and hearsay about others.
 #[derive(Debug, Clone)]
 pub struct OwnShip {
     /// Place in the group.
     pub me: usize,
-    /// Where it is and what it has done with.
+    /// Its place, and the number of way-points behind it.
     pub known: Known,
-    /// What it tells of itself.
+    /// Message in which it tells of itself.
     pub beacon: Beacon,
-    /// What it is to reach.
+    /// Way-points that it is to reach.
     pub mission: Vec<Point>,
-    /// Where its actions lead.
+    /// Predictions of its actions.
     pub options: Options,
-    /// What it has heard of others before.
+    /// Hearsay about others from earlier cycles.
     pub contacts: Contacts,
-    /// What all have agreed on.
+    /// Knowledge that all share.
     pub briefing: Arc<Briefing>,
 }
 
@@ -118,7 +118,7 @@ impl OwnShip {
         contact.is_none_or(|contact| contact.heard_in + 1 >= self.briefing.now)
     }
 
-    /// Where another one is taken to fly that is not heard.
+    /// Predictions for another one that is not heard.
     pub(super) fn presumed(&self, other: usize) -> Options {
         let id = self.briefing.ids[other];
         let filed = || &self.briefing.filed[other].contact;

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use sidestep_collectives::Player;
 use std::collections::BTreeMap;
 
-/// What agents tell each other.
+/// Messages between agents.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub enum Message {
     /// Lines 6 to 9: the predicted ways of the round's samples, and how far the sender's
@@ -17,9 +17,9 @@ pub enum Message {
     Predictions {
         /// The round, from 0.
         round: u32,
-        /// How far the probabilities have moved.
+        /// Largest move of the probabilities.
         change: f64,
-        /// What the sender tells of itself.
+        /// Beacon of the sender.
         beacon: Beacon,
         /// The ways, by sample.
         ways: Vec<Prediction>,
@@ -43,7 +43,7 @@ struct Member {
     changes: BTreeMap<u32, f64>,
     /// and its part of the costs.
     costs: BTreeMap<u32, Vec<f64>>,
-    /// Where it is taken to fly since nothing more comes of it.
+    /// Predictions for it, since nothing more comes of it.
     presumed: Option<Options>,
 }
 

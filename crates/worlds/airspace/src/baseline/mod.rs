@@ -10,9 +10,9 @@ use super::flight::{Levels, Point};
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Moving {
     pub(super) at: Point,
-    /// Metres per second.
+    /// Meters per second.
     pub(super) velocity: Point,
-    /// Where it would fly if it were alone, metres per second.
+    /// Where it would fly if it were alone, meters per second.
     pub(super) preferred: Point,
     pub(super) separation_m: f64,
     pub(super) levels: Levels,

@@ -38,15 +38,15 @@ fn turning(world: &AirspaceWorld, known: Known, [vx, vy]: [f64; 2]) -> Vec<Actio
 
 fn moving(world: &AirspaceWorld, known: Known) -> Moving {
     let Stage { model, mission, .. } = world.stage(known.slot, known.orders);
-    let Pose { at, psi_rad } = known.pose;
+    let Pose { at, heading_rad } = known.pose;
     let v = model.v_m_s;
-    let toward = mission.get(known.next).map_or(psi_rad, |&goal| {
+    let toward = mission.get(known.next).map_or(heading_rad, |&goal| {
         let aim = world.air().aim(at, goal, v);
         math::atan2(aim[1] - at[1], aim[0] - at[0])
     });
     Moving {
         at,
-        velocity: [v * math::cos(psi_rad), v * math::sin(psi_rad)],
+        velocity: [v * math::cos(heading_rad), v * math::sin(heading_rad)],
         preferred: [v * math::cos(toward), v * math::sin(toward)],
         separation_m: model.separation_m,
         levels: world.levels(known),

@@ -16,10 +16,10 @@ use std::sync::Arc;
 /// Agents wait for each other as long as it takes.
 const FOR_EVER: Patience = Patience { ticks: u64::MAX, tries: 1 };
 
-/// What agents talk about in a `dt`, one after the other: each has ticks of its own.
+/// Topics of a `dt`, one after the other: each has ticks of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Topic {
-    /// What to do.
+    /// The optimization.
     Optimization,
     /// Whether that is safe.
     Shield,
@@ -37,7 +37,7 @@ pub(super) struct Talk<'a> {
 }
 
 impl<'a> Talk<'a> {
-    /// What a group of a world talks about in a cycle.
+    /// Returns the talk of a group in a cycle.
     pub(super) fn new(world: &'a AirspaceWorld, topic: Topic, now: Cycle) -> Self {
         let (network, streams) = (world.network.as_ref(), world.streams);
         Self { network, streams, topic, now, at_s: world.starts_s(now) }
@@ -56,7 +56,7 @@ impl<'a> Talk<'a> {
         self.network.is_some_and(|network| network.is_silent(id, self.at_s))
     }
 
-    /// How agents are asked that do not answer; `None` where nothing is lost.
+    /// Returns how agents are asked that do not answer; `None` where nothing is lost.
     pub(super) fn patience(&self) -> Option<Patience> {
         self.network.map(Network::patience)
     }

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use sidestep_collectives::{Estimator, Order, Settings, Utility};
 
-/// Where the optimizer runs.
+/// A deployment of the optimizer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Deployment {

@@ -1,4 +1,4 @@
-//! Where the optimizer of a group runs: one and the same algorithm, deployed in several ways.
+//! Deployments of a group's optimizer: one and the same algorithm in several places.
 //!
 //! - `direct`: one process decides for all. The reference: on a faultless network every other
 //!   deployment chooses the same controls, bit for bit.

@@ -3,7 +3,7 @@
 use super::drive::{Talk, Topic, run};
 use super::{Deployment, note_end};
 use crate::agents::contact::{self, Beacon, Contact, Contacts, Orbiting};
-use crate::agents::coordinator::{Journey, Migration, parts};
+use crate::agents::coordinator::{self, Journey, Migration, parts};
 use crate::agents::network::Traffic;
 use crate::agents::{Briefing, Conclusion, Decided, Ended, Filed, OwnShip, informed, sampling};
 use crate::events::Event;
@@ -13,7 +13,7 @@ use sidestep_collectives::Estimator;
 use sidestep_kernel::{Cycle, EntityId};
 use std::sync::Arc;
 
-/// What each agent of a group comes to, if anything, and what went over the network.
+/// Outcomes of the agents of a group, if any, and the count of messages.
 pub(crate) type Deployed = (Vec<Option<Decided>>, Traffic);
 
 /// Lets the agents of a group decide, and notes in `contacts` what they hear of each other.
@@ -53,8 +53,8 @@ fn talked(
 ) -> (Vec<Ended<Conclusion>>, Traffic) {
     let ids = own[0].briefing.ids.clone();
     match (world.deployment, world.settings.estimator) {
-        (Deployment::Pim, _) => migrated(talk, &own, vec![(0..own.len()).collect()]),
-        (Deployment::HierarchicalPim, _) => migrated(talk, &own, parts(&own)),
+        (Deployment::Pim, _) => migrated(talk, &own, &[(0..own.len()).collect()]),
+        (Deployment::HierarchicalPim, _) => migrated(talk, &own, &parts(&own)),
         (Deployment::Team, Estimator::Sampled { block, ageing }) => {
             let agents = own.into_iter().map(|own| sampling::Agent::new(own, block, ageing));
             run(talk, &ids, agents.collect())
@@ -71,12 +71,13 @@ fn talked(
 fn migrated(
     talk: &Talk<'_>,
     own: &[OwnShip],
-    parts: Vec<Vec<usize>>,
+    parts: &[Vec<usize>],
 ) -> (Vec<Ended<Conclusion>>, Traffic) {
     let (begin, end) = talk.ticks();
     let silent: Vec<bool> = own.iter().map(|own| talk.is_silent(own.known.slot)).collect();
     let journey = Journey { begin, end, patience: talk.patience() };
-    Migration::new(&mut talk.transport(), own, &silent, journey).run(parts)
+    let mut transport = talk.transport();
+    coordinator::run(Migration::new(&mut transport, own, &silent, journey), parts)
 }
 
 /// Returns what all agents of a group know alike before they talk.
@@ -119,7 +120,7 @@ pub fn own_ship(
     }
 }
 
-/// What an airplane tells of itself.
+/// Message in which an airplane tells of itself.
 fn beacon(world: &AirspaceWorld, known: Known) -> Beacon {
     let stage = world.stage(known.slot, known.orders);
     Beacon {
@@ -132,7 +133,7 @@ fn beacon(world: &AirspaceWorld, known: Known) -> Beacon {
     }
 }
 
-/// What all know of a flight before they have heard of it: how it was filed.
+/// Knowledge that all have of a flight before they have heard of it: as it was filed.
 fn filed(world: &AirspaceWorld, id: EntityId) -> Contact {
     let i = id as usize;
     let heard_in = world.appears_in(i);

@@ -57,7 +57,7 @@ fn scene(world: &AirspaceWorld, now: Cycle, network: &Network, seen: Vec<Seen>) 
     Scene { air: world.air(), vertical_m: world.vertical_m, now, silent_after, seen }
 }
 
-/// What the proposals alone take on a network that loses nothing.
+/// Returns the messages that the proposals alone take on a network that loses nothing.
 fn proposals(deployment: Deployment, flyers: &[Flyer], candidates: &[Vec<Way>]) -> Traffic {
     let mut traffic = Traffic::default();
     if deployment == Deployment::Direct || flyers.len() < 2 {

@@ -15,16 +15,16 @@ pub enum Action {
     Then {
         /// Turn rate.
         omega_rad_s: f64,
-        /// How long it is held.
+        /// Time for which it is held.
         hold_s: f64,
     },
     /// The turn rate, then straight on, and then proceed: a leg to one side.
     Leg {
         /// Turn rate.
         omega_rad_s: f64,
-        /// How long it is turned.
+        /// Time for which it is turned.
         turn_s: f64,
-        /// When the leg ends, from the start of the turn.
+        /// End of the leg, from the start of the turn.
         until_s: f64,
     },
     /// Proceed from the start: the optimal action.
@@ -52,9 +52,9 @@ impl Action {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Legs {
-    /// How long the turns may last.
+    /// Times that the turns may last.
     pub turns_s: Vec<f64>,
-    /// When the legs may end, from the start of the turn.
+    /// Ends of the legs, from the start of the turn.
     pub until_s: Vec<f64>,
 }
 

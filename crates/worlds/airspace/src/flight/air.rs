@@ -8,12 +8,12 @@ use super::motion::{Model, Point, Pose, Timing, distance_m};
 use super::pilot::{After, Passing, Pilot, Prediction};
 use sidestep_kernel::math;
 
-/// What is the same for all airplanes that fly.
+/// The air: all that is the same for every airplane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Air {
-    /// How time is cut.
+    /// Steps of time.
     pub timing: Timing,
-    /// When way-points count as reached.
+    /// Rule by which way-points count as reached.
     pub passing: Passing,
     /// A wind that all know.
     pub wind_m_s: Point,

@@ -8,19 +8,19 @@ use sidestep_kernel::Slot;
 /// One airplane as it begins.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Airplane {
-    /// What it can do.
+    /// Its abilities.
     pub model: Model,
-    /// Where it begins.
+    /// Its first pose.
     pub start: Pose,
-    /// What it is to reach.
+    /// Way-points that it is to reach.
     pub mission: Vec<Point>,
     /// The level with which the method takes it over.
     pub altitude_m: f64,
-    /// When it appears, seconds after the start.
+    /// Time of its appearance, seconds after the start.
     pub appears_s: f64,
-    /// When it vanishes, seconds after the start; infinite for never.
+    /// Time at which it vanishes, seconds after the start; infinite for never.
     pub leaves_s: f64,
-    /// What it is told on its way, by rising time.
+    /// Orders on its way, by rising time.
     pub orders: Vec<FlightOrder>,
     /// The way that it is recorded to have flown, and follows until it is handed over.
     pub track: Option<Track>,
@@ -47,7 +47,7 @@ impl Airplane {
 pub struct Known {
     /// Which airplane.
     pub slot: Slot,
-    /// Where it is taken to be.
+    /// Its assumed pose.
     pub pose: Pose,
     /// Way-points done with.
     pub next: usize,

@@ -5,9 +5,9 @@ use serde::{Deserialize, Serialize};
 /// The levels that an airplane is on or passes while it changes its level.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Levels {
-    /// The lowest, metres.
+    /// The lowest, meters.
     pub low_m: f64,
-    /// The highest, metres.
+    /// The highest, meters.
     pub high_m: f64,
 }
 

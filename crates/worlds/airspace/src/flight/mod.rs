@@ -1,4 +1,4 @@
-//! How airplanes fly: where they are, what they may do, where that leads, what they are told.
+//! Flight of airplanes: motion, actions and predictions, orders, recorded tracks.
 //!
 //! ```text
 //! motion.rs                          a pose, and one step of it

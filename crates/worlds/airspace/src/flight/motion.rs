@@ -6,16 +6,16 @@
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::math;
 
-/// A point of the plane, metres.
+/// A point of the plane, meters.
 pub type Point = [f64; 2];
 
-/// Distance of two points in metres.
+/// Distance of two points in meters.
 #[inline]
 pub fn distance_m(a: Point, b: Point) -> f64 {
     math::hypot(a[0] - b[0], a[1] - b[1])
 }
 
-/// What an airplane can do and must keep.
+/// Abilities and separation of an airplane.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Model {
     /// Airspeed, constant.
@@ -35,13 +35,14 @@ impl Model {
     }
 }
 
-/// Where an airplane is and where it heads.
+/// Place and heading of an airplane.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Pose {
     /// Position.
     pub at: Point,
     /// Heading.
-    pub psi_rad: f64,
+    #[serde(rename = "psi_rad")]
+    pub heading_rad: f64,
 }
 
 impl Pose {
@@ -51,10 +52,10 @@ impl Pose {
     pub fn step(self, v_m_s: f64, omega_rad_s: f64, dtau_s: f64) -> Self {
         let half = 0.5 * omega_rad_s * dtau_s;
         let chord = v_m_s * dtau_s * sinc(half);
-        let along = self.psi_rad + half;
+        let along = self.heading_rad + half;
         Self {
             at: [self.at[0] + chord * math::cos(along), self.at[1] + chord * math::sin(along)],
-            psi_rad: self.psi_rad + omega_rad_s * dtau_s,
+            heading_rad: self.heading_rad + omega_rad_s * dtau_s,
         }
     }
 
@@ -62,7 +63,7 @@ impl Pose {
     #[inline]
     pub fn steer(self, goal: Point, omega_max_rad_s: f64, dtau_s: f64) -> f64 {
         let bearing = math::atan2(goal[1] - self.at[1], goal[0] - self.at[0]);
-        let wanted = math::wrap_angle(bearing - self.psi_rad) / dtau_s;
+        let wanted = math::wrap_angle(bearing - self.heading_rad) / dtau_s;
         wanted.clamp(-omega_max_rad_s, omega_max_rad_s)
     }
 }
@@ -73,7 +74,7 @@ pub(super) fn sinc(a: f64) -> f64 {
     if a.abs() < 1e-4 { 1.0 - a * a / 6.0 } else { math::sin(a) / a }
 }
 
-/// How time is cut and when a way-point counts as reached.
+/// Steps of time.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Timing {
     /// Time between two optimizations.

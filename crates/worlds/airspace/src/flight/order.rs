@@ -12,13 +12,13 @@ pub const MAX_ORDERS: usize = 10_000;
 /// An order and its time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FlightOrder {
-    /// When it is given, seconds after the start.
+    /// Time at which it is given, seconds after the start.
     pub at_s: f64,
-    /// What is to be done.
+    /// The task.
     pub task: Task,
 }
 
-/// What an airplane is told to do.
+/// A task for an airplane.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Task {
     /// Keep a heading, radians counter-clockwise from east, until sent to a way-point again.
@@ -29,7 +29,7 @@ pub enum Task {
     Altitude {
         /// The new level.
         altitude_m: f64,
-        /// How fast to climb or descend.
+        /// Rate of climb or descent.
         climb_m_s: f64,
     },
     /// Go on to the next way-point.

@@ -5,7 +5,7 @@ use super::motion::{Model, Point, Pose, Timing, sinc};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::math;
 
-/// What an airplane does after its last way-point, in predictions.
+/// Flight after the last way-point, in predictions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum After {
@@ -16,7 +16,7 @@ pub enum After {
     Pursue,
 }
 
-/// When an airplane has done with a way-point.
+/// Rule by which an airplane has done with a way-point.
 ///
 /// It is reached within a tolerance. But an airplane whose way-point lies inside one of its two
 /// tightest turning circles would orbit it for ever: steering for it keeps the airplane on that
@@ -45,9 +45,9 @@ impl Passing {
         if !self.passes || square >= 4.0 * radius_m * radius_m {
             return false;
         }
-        // The circles' centres are a radius to the left and right: the goal is inside when its
-        // distance to the nearer centre is below the radius.
-        let (sin, cos) = (math::sin(pose.psi_rad), math::cos(pose.psi_rad));
+        // The circles' centers are a radius to the left and right: the goal is inside when its
+        // distance to the nearer center is below the radius.
+        let (sin, cos) = (math::sin(pose.heading_rad), math::cos(pose.heading_rad));
         let (ahead, left) = (cos * dx + sin * dy, cos * dy - sin * dx);
         let is_inside = square < 2.0 * radius_m * left.abs();
         // Abeam since the last look: on a circle, ahead changes by less than a step per step.
@@ -55,7 +55,7 @@ impl Passing {
     }
 }
 
-/// Where an action leads.
+/// The way that an action leads.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Prediction {
     /// Positions after 1, 2, ... steps of `dtau`.
@@ -78,7 +78,7 @@ struct Flight {
 
 impl Flight {
     fn new(pose: Pose) -> Self {
-        let along = [math::cos(pose.psi_rad), math::sin(pose.psi_rad)];
+        let along = [math::cos(pose.heading_rad), math::sin(pose.heading_rad)];
         Self { pose, along, omega_rad_s: 0.0, half_turn: [1.0, 0.0, 1.0] }
     }
 
@@ -108,7 +108,7 @@ impl Flight {
         self.along = turned(middle);
         self.pose = Pose {
             at: [self.pose.at[0] + chord_m * middle[0], self.pose.at[1] + chord_m * middle[1]],
-            psi_rad: self.pose.psi_rad + omega_rad_s * dtau_s,
+            heading_rad: self.pose.heading_rad + omega_rad_s * dtau_s,
         };
     }
 }
@@ -120,9 +120,9 @@ pub struct Pilot<'a> {
     pub model: &'a Model,
     /// Its way-points.
     pub mission: &'a [Point],
-    /// When way-points count as reached.
+    /// Rule by which way-points count as reached.
     pub passing: Passing,
-    /// What comes after the last.
+    /// Flight after the last.
     pub after: After,
     /// Seconds per step.
     pub dtau_s: f64,
@@ -202,19 +202,19 @@ mod tests {
     proptest! {
         #[test]
         fn two_half_steps_are_one_step(
-            x in -1e4f64..1e4, psi_rad in -3.0f64..3.0, omega in -0.1f64..0.1, dtau_s in 0.1f64..5.0,
+            x in -1e4f64..1e4, heading_rad in -3.0f64..3.0, omega in -0.1f64..0.1, dtau_s in 0.1f64..5.0,
         ) {
-            let pose = Pose { at: [x, -x], psi_rad };
+            let pose = Pose { at: [x, -x], heading_rad };
             let once = pose.step(35.0, omega, dtau_s);
             let twice = pose.step(35.0, omega, dtau_s / 2.0).step(35.0, omega, dtau_s / 2.0);
             prop_assert!(distance_m(once.at, twice.at) < 1e-8);
-            prop_assert!((once.psi_rad - twice.psi_rad).abs() < 1e-12);
+            prop_assert!((once.heading_rad - twice.heading_rad).abs() < 1e-12);
         }
 
         /// The prediction is the motion, step by step.
         #[test]
         fn a_predicted_way_is_the_one_that_is_flown(
-            psi_rad in -3.2f64..3.2, x in -6000.0f64..6000.0, y in -6000.0f64..6000.0, which in 0usize..36,
+            heading_rad in -3.2f64..3.2, x in -6000.0f64..6000.0, y in -6000.0f64..6000.0, which in 0usize..36,
         ) {
             let model = model();
             let mission = [[x, y], [-y, x]];
@@ -230,7 +230,7 @@ mod tests {
             let held = actions(&model, 5.0, &[30.0], &Legs::default());
             let all = [held, actions(&model, 5.0, &[], &some)].concat();
             let action = all[which % all.len()];
-            let (mut pose, mut next) = (Pose { at: [0.0, 0.0], psi_rad }, 0);
+            let (mut pose, mut next) = (Pose { at: [0.0, 0.0], heading_rad }, 0);
             let predicted = pilot.predict(action, pose, next, &timing);
             for (k, point) in predicted.points.iter().enumerate() {
                 let omega = pilot.omega_rad_s(action, pose, next, k as f64);
@@ -243,7 +243,7 @@ mod tests {
         /// Wherever a way-point lies, an airplane that proceeds has done with it before long.
         #[test]
         fn nobody_orbits_a_way_point_for_ever(
-            psi_rad in -3.2f64..3.2, x in -3000.0f64..3000.0, y in -3000.0f64..3000.0,
+            heading_rad in -3.2f64..3.2, x in -3000.0f64..3000.0, y in -3000.0f64..3000.0,
             tolerance_m in 1.0f64..100.0,
         ) {
             let model = model();
@@ -255,7 +255,7 @@ mod tests {
                 after: After::Straight,
                 dtau_s: 1.0,
             };
-            let pose = Pose { at: [0.0, 0.0], psi_rad };
+            let pose = Pose { at: [0.0, 0.0], heading_rad };
             let timing = Timing { dt_s: 5.0, dtau_s: 1.0, horizon: 400 };
             let flown = pilot.predict(Action::Proceed, pose, 0, &timing);
             prop_assert!(flown.counted < 400, "still flying to {mission:?}");

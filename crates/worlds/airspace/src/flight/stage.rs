@@ -9,7 +9,7 @@ use sidestep_kernel::math;
 /// heading wherever it is.
 const FAR_AHEAD_M: f64 = 1e12;
 
-/// What an airplane flies between two orders.
+/// The part of a flight between two orders.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Stage<'a> {
     pub(crate) model: &'a Model,
@@ -20,7 +20,7 @@ pub(crate) struct Stage<'a> {
     pub(crate) climb_m_s: f64,
 }
 
-/// What an airplane flies from an order on.
+/// The part of a flight from an order on.
 #[derive(Debug, Clone)]
 pub(crate) struct Later {
     model: Model,
@@ -38,7 +38,7 @@ impl Later {
     }
 }
 
-/// What an airplane flies after each of its orders.
+/// Returns the parts of a flight after each of its orders.
 pub(crate) fn later(airplane: &Airplane) -> Vec<Later> {
     let mut route = airplane.mission.clone();
     let mut now = Later {
@@ -52,8 +52,9 @@ pub(crate) fn later(airplane: &Airplane) -> Vec<Later> {
     for order in &airplane.orders {
         now.next = None;
         match &order.task {
-            Task::Heading(psi_rad) => {
-                let ahead = [FAR_AHEAD_M * math::cos(*psi_rad), FAR_AHEAD_M * math::sin(*psi_rad)];
+            Task::Heading(heading_rad) => {
+                let ahead =
+                    [FAR_AHEAD_M * math::cos(*heading_rad), FAR_AHEAD_M * math::sin(*heading_rad)];
                 // As many as on the route, so that the number of those done with still holds.
                 now.mission = vec![ahead; route.len()];
             }

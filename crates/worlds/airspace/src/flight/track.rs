@@ -6,7 +6,7 @@ use sidestep_kernel::math;
 /// Way-points along the rest of a track are this far apart in time.
 const WAY_POINT_EVERY_S: f64 = 120.0;
 
-/// Where an airplane was at one time.
+/// Place of an airplane at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrackPoint {
     /// Seconds after the start of the scenario.
@@ -35,12 +35,12 @@ impl Track {
         is_track.then(|| Self { headings_rad: headings_rad(&points), points })
     }
 
-    /// When it begins, seconds after the start.
+    /// Its beginning, seconds after the start.
     pub fn begins_s(&self) -> f64 {
         self.points[0].t_s
     }
 
-    /// When it ends, seconds after the start.
+    /// Its end, seconds after the start.
     pub fn ends_s(&self) -> f64 {
         self.points[self.points.len() - 1].t_s
     }
@@ -50,15 +50,15 @@ impl Track {
         (self.begins_s()..=self.ends_s()).contains(&t_s)
     }
 
-    /// Where it was and where it headed; before the beginning and after the end as there.
+    /// Returns its pose; before the beginning and after the end as there.
     pub fn pose_at(&self, t_s: f64) -> Pose {
         let (k, part) = self.between(t_s);
         let ([x0, y0], [x1, y1]) = (self.points[k].at, self.points[k + 1].at);
         let at = [x0 + part * (x1 - x0), y0 + part * (y1 - y0)];
-        Pose { at, psi_rad: self.headings_rad[k] }
+        Pose { at, heading_rad: self.headings_rad[k] }
     }
 
-    /// How high it was.
+    /// Returns its altitude.
     pub fn altitude_at_m(&self, t_s: f64) -> f64 {
         let (k, part) = self.between(t_s);
         let (from_m, to_m) = (self.points[k].altitude_m, self.points[k + 1].altitude_m);
@@ -119,8 +119,8 @@ fn headings_rad(points: &[TrackPoint]) -> Vec<f64> {
         known[k - 1] = known[k - 1].or(known[k]);
     }
     let mut before = 0.0;
-    let heading = |psi_rad: Option<f64>| {
-        before = psi_rad.unwrap_or(before);
+    let heading = |heading_rad: Option<f64>| {
+        before = heading_rad.unwrap_or(before);
         before
     };
     known.into_iter().map(heading).collect()
@@ -141,7 +141,7 @@ mod tests {
         let track = track(&[[10.0, 0.0, 0.0, 900.0], [20.0, 0.0, 1000.0, 1100.0]]).expect("valid");
         assert_eq!(track.pose_at(13.0).at, [0.0, 300.0]);
         assert_eq!(track.altitude_at_m(15.0), 1000.0);
-        assert_eq!(track.pose_at(13.0).psi_rad, std::f64::consts::FRAC_PI_2);
+        assert_eq!(track.pose_at(13.0).heading_rad, std::f64::consts::FRAC_PI_2);
         assert_eq!((track.pose_at(0.0).at, track.pose_at(99.0).at), ([0.0, 0.0], [0.0, 1000.0]));
         assert!(track.covers(10.0) && track.covers(20.0) && !track.covers(20.1));
         assert_eq!((track.top_speed_m_s(), track.mean_speed_m_s(15.0)), (100.0, 100.0));
@@ -166,7 +166,7 @@ mod tests {
         ];
         let track = track(&still).expect("valid");
         let west = std::f64::consts::PI;
-        assert_eq!([0.5, 1.5, 2.5].map(|t_s| track.pose_at(t_s).psi_rad), [west; 3]);
+        assert_eq!([0.5, 1.5, 2.5].map(|t_s| track.pose_at(t_s).heading_rad), [west; 3]);
     }
 
     #[test]

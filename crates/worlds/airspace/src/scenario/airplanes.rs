@@ -159,11 +159,11 @@ impl Compiler<'_> {
             let remedy = "add way_points_m = [[x, y], ...]";
             return error("an airplane without way-points", remedy);
         }
-        let psi_rad = sidestep_kernel::math::wrap_angle(heading_deg.get().to_radians());
+        let heading_rad = sidestep_kernel::math::wrap_angle(heading_deg.get().to_radians());
         let (orders, leaves_s) = s.orders(self.source)?;
         Ok(Airplane {
             model,
-            start: Pose { at: at_m.get(), psi_rad },
+            start: Pose { at: at_m.get(), heading_rad },
             mission,
             altitude_m: s.altitude_m.map_or(0.0, f64::from),
             appears_s: s.appears_s.map_or(0.0, f64::from),

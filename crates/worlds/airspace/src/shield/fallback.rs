@@ -6,13 +6,13 @@ use crate::flight::distance_m;
 
 /// Sides for first fallbacks that are pairwise apart, as far as there are any, and the pairs that
 /// are not: they start too close.
-pub fn first_fallbacks(flyers: &[Flyer]) -> (Vec<Side>, Vec<(usize, usize)>) {
+pub(crate) fn first_fallbacks(flyers: &[Flyer]) -> (Vec<Side>, Vec<(usize, usize)>) {
     entry_fallbacks(flyers, |_| true)
 }
 
 /// The same among airplanes some of which have their fallbacks already and keep them: only those
 /// that `enters` choose, and only pairs with one of them are named.
-pub fn entry_fallbacks(
+pub(crate) fn entry_fallbacks(
     flyers: &[Flyer],
     enters: impl Fn(usize) -> bool,
 ) -> (Vec<Side>, Vec<(usize, usize)>) {
@@ -47,7 +47,7 @@ pub fn entry_fallbacks(
 
 /// The side on which an airplane that flies as `now` and is about to fly as `changed` has an orbit
 /// apart from the stored fallbacks of others, if there is one; rather the one it has stored.
-pub fn side_apart(
+pub(crate) fn side_apart(
     now: &Flyer,
     changed: &Flyer,
     others: impl Iterator<Item = Flyer>,

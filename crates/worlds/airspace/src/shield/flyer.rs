@@ -1,19 +1,19 @@
-//! What the shield knows of an airplane.
+//! An airplane as the shield knows it.
 
 use super::orbit::{Orbit, Side};
 use crate::flight::{Levels, Pose};
 use sidestep_kernel::EntityId;
 
 /// Meters that new plans keep beyond the separation.
-pub const SLACK_M: f64 = 0.01;
+pub(super) const SLACK_M: f64 = 0.01;
 
-/// What the shield knows of an airplane.
+/// An airplane as the shield knows it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Flyer {
     /// Whose orbit this is. Where it is not sure on which of several an airplane is, it takes
     /// part with each of them.
     pub id: EntityId,
-    /// Where it is.
+    /// Its pose.
     pub pose: Pose,
     /// Airspeed.
     pub v_m_s: f64,
@@ -50,7 +50,7 @@ impl Flyer {
         Orbit::from(self.pose, self.v_m_s, side.sign() * self.omega_max_rad_s)
     }
 
-    /// How far apart two airplanes are to be on new plans.
+    /// Returns how far apart two airplanes are to be on new plans.
     pub(super) fn gap_m(&self, other: &Self) -> f64 {
         self.separation_m.max(other.separation_m) + SLACK_M
     }

@@ -26,13 +26,13 @@
 //!    invariant.
 //!
 //! By induction over `dt` there is never a loss of separation once the first fallbacks are apart
-//! ([`first_fallbacks`] chooses them). Where they are not, the pair is left to the method until
+//! (`first_fallbacks` chooses them). Where they are not, the pair is left to the method until
 //! they are, and the induction is about all other pairs. An airplane that leaves the world keeps
 //! every other pair as it was. A wind that all know moves everybody alike and changes no distance.
 //! Each step is a property test in `tests.rs`.
 //!
 //! Numbers: `orbit.rs` never says wrongly that motions stay apart. New plans must keep
-//! [`SLACK_M`] more than `R`, so that rounding never adds up to a loss.
+//! a hair (`SLACK_M`) more than `R`, so that rounding never adds up to a loss.
 
 mod fallback;
 mod flyer;
@@ -42,8 +42,8 @@ mod search;
 #[cfg(test)]
 mod tests;
 
-pub use fallback::{entry_fallbacks, first_fallbacks, side_apart};
-pub use flyer::{Flyer, SLACK_M};
+pub(crate) use fallback::{entry_fallbacks, first_fallbacks, side_apart};
+pub use flyer::Flyer;
 pub use orbit::Side;
 pub(crate) use plan::Plan;
 pub use plan::Way;

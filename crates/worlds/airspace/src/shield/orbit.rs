@@ -43,7 +43,7 @@ pub(crate) struct Orbit {
     pub(crate) radius_m: f64,
     /// Positive to the left.
     omega_rad_s: f64,
-    /// Direction from the centre at time 0.
+    /// Direction from the center at time 0.
     phase_rad: f64,
 }
 
@@ -51,8 +51,8 @@ impl Orbit {
     /// The orbit that an airplane enters at `pose`.
     pub(crate) fn from(pose: Pose, v_m_s: f64, omega_rad_s: f64) -> Self {
         let radius_m = v_m_s / omega_rad_s.abs();
-        // The centre is at a right angle to the heading, on the side of the turn.
-        let to_center = pose.psi_rad + omega_rad_s.signum() * std::f64::consts::FRAC_PI_2;
+        // The center is at a right angle to the heading, on the side of the turn.
+        let to_center = pose.heading_rad + omega_rad_s.signum() * std::f64::consts::FRAC_PI_2;
         let center = [
             pose.at[0] + radius_m * math::cos(to_center),
             pose.at[1] + radius_m * math::sin(to_center),
@@ -60,7 +60,7 @@ impl Orbit {
         Self { center, radius_m, omega_rad_s, phase_rad: to_center + std::f64::consts::PI }
     }
 
-    /// Where the airplane is on it.
+    /// Returns the airplane's place on it.
     pub(crate) fn at(&self, t_s: f64) -> Point {
         let angle = self.phase_rad + self.omega_rad_s * t_s;
         [
@@ -148,7 +148,7 @@ mod tests {
         fn an_orbit_is_the_motion_it_stands_for(
             x in -1e3f64..1e3, psi in -3.1f64..3.1, left in any::<bool>(), t_s in 0.0f64..300.0,
         ) {
-            let pose = Pose { at: [x, 0.0], psi_rad: psi };
+            let pose = Pose { at: [x, 0.0], heading_rad: psi };
             let omega = Side::BOTH[usize::from(left)].sign() * 4f64.to_radians();
             let flown = pose.step(35.0, omega, t_s).at;
             prop_assert!(distance_m(flown, Orbit::from(pose, 35.0, omega).at(t_s)) < 1e-6);

@@ -12,7 +12,7 @@ pub struct Way {
     pub omegas_rad_s: Vec<f64>,
 }
 
-/// What an airplane flies, and where it can wait after that.
+/// A way, and an orbit on which to wait after that.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Plan {
     flyer: Flyer,
@@ -55,7 +55,7 @@ impl Plan {
         Self::of(flyer, vec![omega; steps], dtau_s, (None, flyer.fallback))
     }
 
-    /// Where `dt` ends.
+    /// Returns the pose at the end of `dt`.
     pub(crate) fn end(&self) -> Pose {
         self.poses[self.poses.len() - 1]
     }

@@ -4,7 +4,7 @@ use super::flyer::Flyer;
 use super::orbit::Side;
 use super::plan::{Plan, Way};
 
-/// What the shield has decided for one airplane.
+/// Decision of the shield for one airplane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Decision {
     /// Number of the candidate to fly, `None` for the stored fallback.
@@ -13,7 +13,7 @@ pub struct Decision {
     pub fallback: Side,
 }
 
-/// How sure it is that everybody will fly the plan it is given.
+/// Certainty that everybody will fly the plan it is given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Certainty {
     /// Everybody will.

@@ -8,10 +8,10 @@ use proptest::prelude::*;
 const DTAU_S: f64 = 1.0;
 const STEPS: usize = 5;
 
-fn flyer(x: f64, y: f64, psi_rad: f64, rank: u64) -> Flyer {
+fn flyer(x: f64, y: f64, heading_rad: f64, rank: u64) -> Flyer {
     Flyer {
         id: rank as u32,
-        pose: Pose { at: [x, y], psi_rad },
+        pose: Pose { at: [x, y], heading_rad },
         v_m_s: 35.0,
         omega_max_rad_s: 4f64.to_radians(),
         separation_m: 500.0,
@@ -159,7 +159,7 @@ fn two_that_came_in_too_close_are_left_to_the_method_and_nobody_else_is() {
     assert!(wanted.iter().all(|d| d.candidate == Some(0)), "{wanted:?}");
     // In each other's way, but with fallbacks that are apart.
     let mut apart = [close(0.0, 0), close(0.0, 1)];
-    apart[1].pose = Pose { at: [0.0, 620.0], psi_rad: -std::f64::consts::FRAC_PI_2 };
+    apart[1].pose = Pose { at: [0.0, 620.0], heading_rad: -std::f64::consts::FRAC_PI_2 };
     apart.iter_mut().for_each(|f| f.fallback = Side::Right);
     assert!(nearest_on_orbits(&apart, 400) > 500.0);
     let kept = filter(&apart, &[straight(), straight()], (STEPS, DTAU_S), Certainty::Sure);
