@@ -3,7 +3,7 @@
 use crate::exit::Failure;
 use crate::files::replace;
 use crate::picture::write_png;
-use sidestep::experiment::Document;
+use sidestep_document::Document;
 use sidestep_report::{Rendered, SvgFile, render};
 use std::io::Write;
 use std::path::{Path, PathBuf};

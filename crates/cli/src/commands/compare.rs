@@ -6,8 +6,8 @@ use crate::plan::{ScenarioArgs, WorkersArg};
 use crate::progress::Stages;
 use clap::{Args, ValueEnum};
 use serde_json::json;
-use sidestep::experiment::methods::{compare as run_all, table};
 use sidestep::worlds::airspace::world::Method;
+use sidestep_papers::methods::{compare as run_all, table};
 use sidestep_report::markdown;
 
 const EXAMPLES: &str = "\

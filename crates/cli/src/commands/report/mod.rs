@@ -18,8 +18,8 @@ use crate::pages::{Pages, Raster};
 use crate::sweep::Folder;
 use clap::Args;
 use serde_json::json;
-use sidestep::experiment::Document;
 use sidestep::kernel::InputError;
+use sidestep_document::Document;
 use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\

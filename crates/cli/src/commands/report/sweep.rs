@@ -5,10 +5,10 @@ use super::run::quoted;
 use crate::console::duration;
 use crate::exit::Failure;
 use crate::sweep::{Finished, Folder, finished, picture_of};
-use sidestep::experiment::Table;
-use sidestep::experiment::document::{Block, Code, Document, Picture, Text};
 use sidestep::experiment::sweep::rounds::{Stopped, stopped};
 use sidestep::experiment::sweep::{Plan, RunTable, RunValues, Summary};
+use sidestep_document::Table;
+use sidestep_document::document::{Block, Code, Document, Picture, Text};
 
 /// Variants of which a run is drawn.
 const DRAWN: usize = 4;

@@ -7,11 +7,11 @@ use crate::interrupt;
 use crate::progress::Stages;
 use crate::worlds::robots::picture::{Ways, with_ways};
 use clap::Args;
-use sidestep::experiment::document::Picture;
-use sidestep::experiment::loria::scenes::{self, Scene};
-use sidestep::experiment::loria::{LoriaError, NewRecorder, Plan, Report, in_memory, run_recorded};
 use sidestep::kernel::ports::{RecordError, Recorder, TableSchema};
+use sidestep_document::document::Picture;
 use sidestep_draw::{DrawError, Style, to_svg};
+use sidestep_papers::loria::scenes::{self, Scene};
+use sidestep_papers::loria::{LoriaError, NewRecorder, Plan, Report, in_memory, run_recorded};
 use sidestep_record::{Origin, ParquetRecorder};
 use std::path::{Path, PathBuf};
 

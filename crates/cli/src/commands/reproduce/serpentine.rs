@@ -6,10 +6,10 @@ use crate::exit::{ExitCode, Failure};
 use crate::progress::Stages;
 use crate::worlds::chain::picture::drawn_obstacle;
 use clap::Args;
-use sidestep::experiment::document::Picture;
-use sidestep::experiment::serpentine::scenes::{Scene, View};
-use sidestep::experiment::serpentine::{self, Plan};
+use sidestep_document::document::Picture;
 use sidestep_draw::{BodyScene, DrawError, Strand, Style, Trail};
+use sidestep_papers::serpentine::scenes::{Scene, View};
+use sidestep_papers::serpentine::{self, Plan};
 use std::path::PathBuf;
 
 /// How much to run.

@@ -10,9 +10,9 @@ use super::groups::Groups;
 use super::table::RunColumn;
 use super::text::sentence;
 use super::{Label, RunValues};
-use crate::experiment::figure::Point;
-use crate::experiment::{Figure, FigureKind, Series};
 use crate::statistics::{Sample, wilson};
+use sidestep_document::figure::Point;
+use sidestep_document::{Figure, FigureKind, Series};
 use std::collections::BTreeMap;
 
 /// Series in a figure at most: more cannot be told apart.

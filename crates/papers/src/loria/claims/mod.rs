@@ -1,0 +1,19 @@
+//! The paper's claims, each with our figures and a verdict that follows from them by rule.
+//!
+//! Numbers E-1 to E-15 (experiments) and P-3 (parallelization) are those of the study of the
+//! paper; a letter tells apart what one sentence claims at once.
+
+mod behaviour;
+mod setting;
+mod time;
+
+use super::Report;
+pub use sidestep_document::claim::{Claim, Verdict};
+
+/// All claims, judged.
+pub fn judge(report: &Report) -> Vec<Claim> {
+    let mut claims = setting::claims(report);
+    claims.extend(behaviour::claims(report));
+    claims.extend(time::claims(report));
+    claims
+}

@@ -1,0 +1,235 @@
+//! E-12 to E-15 and P-3: time, and what takes it.
+
+use super::super::Report;
+use super::super::performance::{Performance, REFERENCE_CYCLES, Timing};
+use super::{Claim, Verdict};
+use sidestep::worlds::robots::baseline::Strategy;
+use sidestep_document::Estimate;
+
+/// Initialization is called small below this share.
+const SMALL_SHARE: f64 = 0.05;
+
+/// Efficiency is said to fall quickly where it is below this with the most workers.
+const LOW_EFFICIENCY: f64 = 0.75;
+
+pub(super) fn claims(report: &Report) -> Vec<Claim> {
+    let p = &report.performance;
+    vec![
+        initialization(p),
+        time_falls(report),
+        efficiency_falls(p),
+        lost_speed_up(p),
+        second_machine(),
+        costly_decisions(p),
+        conflicts(report),
+        rejected(report),
+    ]
+}
+
+fn initialization(p: &Performance) -> Claim {
+    let worst = p.initialization.iter().map(|i| i.share_alone).fold(0.0, f64::max);
+    Claim {
+        id: "E-12",
+        paper: "Time is that of the cycles with recording to disk; initialization is not parallel \
+                and a small share of the whole.",
+        papers_figure: None,
+        ours: format!(
+            "Initialization takes up to {:.2} % of a run of {REFERENCE_CYCLES} cycles with one \
+             worker (largest of {} loads).",
+            100.0 * worst,
+            p.loads.len()
+        ),
+        verdict: Verdict::of(worst < SMALL_SHARE),
+        reason: format!(
+            "Held when below {:.0} % for every load; the paper's share and cycles are lost.",
+            100.0 * SMALL_SHARE
+        ),
+    }
+}
+
+/// Why time over workers cannot be judged: there is one processor, or others were using them.
+fn is_excused(p: &Performance) -> bool {
+    p.most_workers() == 1 || p.was_busy()
+}
+
+fn time_falls(report: &Report) -> Claim {
+    let p = &report.performance;
+    let most = p.most_workers();
+    let timings = || p.at_most_workers(false).chain(p.at_most_workers(true));
+    let falls = timings().all(|timing| timing.speed_up.is_above(1.0));
+    let machine = Estimate::of(timings().map(|timing| timing.machine.mean));
+    Claim {
+        id: "E-13a",
+        paper: "Execution time falls as processors are added.",
+        papers_figure: None,
+        ours: format!(
+            "Speed-up with {most} workers: {} unrecorded, {} recorded ({} loads, {} repeats of \
+             each; mere arithmetic in turn with them: {machine}).",
+            range(p.at_most_workers(false)),
+            range(p.at_most_workers(true)),
+            p.loads.len(),
+            report.plan.repeats,
+        ),
+        verdict: if !falls && is_excused(p) { Verdict::Lost } else { Verdict::of(falls) },
+        reason: "Held when, for every load, recorded or not, the interval of the speed-up with \
+                 the most workers lies above 1. Otherwise not judged where others were using the \
+                 machine."
+            .into(),
+    }
+}
+
+/// The mean speed-ups of some loads.
+fn range<'a>(timings: impl Iterator<Item = &'a Timing>) -> String {
+    let means: Vec<f64> = timings.filter_map(|timing| timing.speed_up.mean).collect();
+    let least = means.iter().copied().fold(f64::INFINITY, f64::min);
+    let greatest = means.iter().copied().fold(0.0, f64::max);
+    format!("{least:.2} to {greatest:.2}")
+}
+
+fn efficiency_falls(p: &Performance) -> Claim {
+    let most = p.most_workers();
+    let efficiency = |t: &Timing| t.speed_up.or_zero() / most as f64;
+    let all = || p.at_most_workers(false).map(efficiency);
+    let (low, n) = (all().filter(|&e| e < LOW_EFFICIENCY).count(), all().count());
+    let listed: Vec<String> = all().map(|e| format!("{e:.2}")).collect();
+    Claim {
+        id: "E-13b",
+        paper: "Speed-up rises slowly and efficiency falls quickly.",
+        papers_figure: None,
+        ours: format!(
+            "Efficiency with {most} workers, unrecorded, by load: {}; below {LOW_EFFICIENCY} for \
+             {low} of {n}.",
+            listed.join(", ")
+        ),
+        verdict: if is_excused(p) { Verdict::Lost } else { Verdict::of(2 * low > n) },
+        reason: format!(
+            "Held when efficiency is below {LOW_EFFICIENCY} for most loads; not judged where \
+             others were using the machine. The paper went to sixteen processors; {} can show \
+             the beginning of a fall only.",
+            p.processors
+        ),
+    }
+}
+
+fn lost_speed_up(p: &Performance) -> Claim {
+    Claim {
+        id: "E-13c",
+        paper: "The first parallel version reached a certain speed-up on a certain number of \
+                processors.",
+        papers_figure: None,
+        ours: format!("With {} workers: {}.", p.most_workers(), range(p.at_most_workers(false))),
+        verdict: Verdict::Lost,
+        reason: "Both numbers are lost.".into(),
+    }
+}
+
+fn second_machine() -> Claim {
+    Claim {
+        id: "E-14",
+        paper: "A small machine under another system gives equivalent results with the same \
+                number of processors.",
+        papers_figure: None,
+        ours: "One machine was used.".into(),
+        verdict: Verdict::Lost,
+        reason: "The paper's table is lost, and it takes a second machine; the digests of this \
+                 report tell whether another gives the same bits."
+            .into(),
+    }
+}
+
+fn costly_decisions(p: &Performance) -> Claim {
+    let gain = p.gain_by_cost();
+    let operations = || p.loads.iter().map(|load| load.operations);
+    let (least, most) = (operations().min().unwrap_or(0), operations().max().unwrap_or(0));
+    let speed_up = |cost: u32| {
+        let timings = p.at_most_workers(false).filter(|t| p.loads[t.load].operations == cost);
+        Estimate::of(timings.flat_map(|timing| timing.ratios.iter().copied()))
+    };
+    Claim {
+        id: "E-15a",
+        paper: "Costlier behaviours are expected to give better parallel performance.",
+        papers_figure: None,
+        ours: format!(
+            "Speed-up with {} workers: {} at {least} operations per decision, {} at {most}; \
+             difference {gain}.",
+            p.most_workers(),
+            speed_up(least),
+            speed_up(most),
+        ),
+        verdict: Verdict::by_sign(gain.interval.filter(|_| !is_excused(p))),
+        reason: "Held when the paired difference of speed-ups, dearest less cheapest decisions, \
+                 lies above 0; not judged when its interval holds 0, or where others were using the \
+                 machine. Unrecorded, over all numbers of robots."
+            .into(),
+    }
+}
+
+fn conflicts(report: &Report) -> Claim {
+    let model = &report.cost_model;
+    let shown = |name: &str| match model.parameter(name) {
+        None => "not to be told".into(),
+        Some(p) => match p.interval_ns {
+            None => format!("{:.0} ns", p.value_ns),
+            Some(i) => format!("{:.0} ns [{:.0}, {:.0}]", p.value_ns, i.low, i.high),
+        },
+    };
+    Claim {
+        id: "E-15b",
+        paper: "Conflicts, the more so with many agents, cost time in the second step.",
+        papers_figure: None,
+        ours: format!(
+            "Per body in conflict c_s = {}, besides c_d = {} for every body; p = {:.3} to {:.3}; \
+             {} runs, R2 of the second step {:.3}.",
+            shown("c_s"),
+            shown("c_d"),
+            model.conflict_share.0,
+            model.conflict_share.1,
+            model.points.len(),
+            model.r_squared[1],
+        ),
+        verdict: Verdict::by_sign(model.parameter("c_s").and_then(|p| p.interval_ns)),
+        reason: "Held when the interval of c_s, fitted over runs of different crowding, lies \
+                 above 0; not judged when it holds 0."
+            .into(),
+    }
+}
+
+/// The strategies that the paper rejects before any experiment.
+fn rejected(report: &Report) -> Claim {
+    let s = &report.strategies;
+    let leads = Strategy::ALL.map(|strategy| (strategy.name(), s.lead_over(strategy)));
+    let all = || leads.iter().flat_map(|(_, leads)| leads);
+    let shown = leads.iter().map(|(name, leads)| {
+        let ahead = leads.iter().filter(|lead| lead.is_above(0.0)).count();
+        let behind = leads.iter().filter(|lead| lead.is_below(0.0)).count();
+        let listed: Vec<String> = leads.iter().map(ToString::to_string).collect();
+        format!(
+            "over {name}: ahead at {ahead}, behind at {behind} of {} loads ({})",
+            leads.len(),
+            listed.join("; ")
+        )
+    });
+    let verdict = if all().all(|lead| lead.is_above(0.0)) {
+        Verdict::Held
+    } else if all().any(|lead| lead.is_below(0.0)) && !is_excused(&report.performance) {
+        Verdict::NotHeld
+    } else {
+        Verdict::Lost
+    };
+    Claim {
+        id: "P-3",
+        paper: "Spatial partition (unequal load, conflicts at borders) and a process per agent \
+                (conflicts made serial) are worse than merged conflicts in a double pool.",
+        papers_figure: None,
+        ours: format!(
+            "Speed-up of the double pool with the most workers less that of the other, {}.",
+            shown.collect::<Vec<_>>().join("; ")
+        ),
+        verdict,
+        reason: "Held when the double pool is ahead of both at every load by its paired interval, \
+                 not held when behind at one; not judged otherwise, or where others were using \
+                 the machine. Only the double pool gives the same bits for every number of \
+                 workers."
+            .into(),
+    }
+}
