@@ -5,18 +5,17 @@
 //! numbers are those of a Java platform of 2009; its claims are about which is more, and those
 //! are judged here. Both deployments choose the same controls, so flights are the same.
 
-use crate::farm;
+use crate::cells::{Cell, Columns, Run, Runs, Value, column, figure, series};
+use crate::claims::{all, claim, listed};
+use crate::study::{Progress, Study, finish, number, setting, source};
 use serde::Serialize;
-use sidestep::kernel::{InputError, Simulation};
-use sidestep::scenario::Source;
+use sidestep::kernel::InputError;
 use sidestep::worlds::airspace::airplane::Point as AirPoint;
-use sidestep::worlds::airspace::deploy::Deployment;
-use sidestep::worlds::airspace::metrics::Metrics;
 use sidestep::worlds::airspace::simulation::AirspaceSimulation;
-use sidestep_document::Estimate;
 use sidestep_document::claim::{self, Claim, Verdict};
 use sidestep_document::document::{Document, Experiment};
-use sidestep_document::figure::{Figure, FigureKind, Point, Series, Table};
+use sidestep_document::figure::Point;
+use sidestep_document::{Estimate, Figure, FigureKind, Series, Table};
 
 /// How much to run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -47,87 +46,71 @@ impl Plan {
     }
 }
 
-/// One deployment at one number of airplanes.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Cell {
-    /// Airplanes.
-    pub airplanes: usize,
-    /// Name of the deployment.
-    pub deployment: &'static str,
-    /// Seconds spent deciding per run, if every agent has a processor of its own: of a team the
-    /// time of all agents divided by their number, of a coordinator all of it.
-    pub elapsed_s: Estimate,
-    /// The same per optimization.
-    pub optimization_s: Estimate,
-    /// Messages, or migrations, per run.
-    pub messages: Estimate,
-    /// Bytes per run, one message per receiver,
-    pub bytes: Estimate,
-    /// and if a message could reach all at once.
-    pub multicast_bytes: Estimate,
-    /// Rounds per optimization.
-    pub rounds: Estimate,
-    /// Losses of separation per run.
-    pub losses: Estimate,
-    /// Mean delay, percent.
-    pub delay_percent: Estimate,
-    /// What ratios are made of.
-    pub by_seed: Vec<Flown>,
-}
-
-/// One run.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Flown {
-    /// As in a [`Cell`].
-    pub elapsed_s: f64,
-    /// Messages, or migrations.
-    pub messages: f64,
-    /// Bytes, one message per receiver,
-    pub bytes: f64,
-    /// and if a message could reach all at once.
-    pub multicast_bytes: f64,
-}
-
 /// What came of all.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Report {
     /// What was run.
     pub plan: Plan,
     /// Results by number of airplanes, the team before the coordinator.
-    pub cells: Vec<Cell>,
+    cells: Vec<Cell>,
     /// The paper's claims and our verdicts.
     pub claims: Vec<Claim>,
     /// Where the airplanes of the largest team flew with the first seed, metres.
-    pub tracks_m: Vec<Vec<AirPoint>>,
+    tracks_m: Vec<Vec<AirPoint>>,
 }
 
 /// Time between two optimizations.
 const DT_S: f64 = 5.0;
 /// From so many airplanes on the paper finds its coordinator slow.
-const MANY: usize = 5;
-const BOTH: [Deployment; 2] = [Deployment::Team, Deployment::Pim];
+const MANY: u64 = 5;
+const BOTH: [&str; 2] = ["team", "pim"];
+
+const SCENARIO: &str = include_str!("../../../scenarios/papers/agentfly/superconflict.toml");
+const SWEEP: &str = include_str!("../../../scenarios/papers/agentfly/superconflict.sweep.toml");
+const AIRPLANES: &str = "airspace.generator.n";
+
+const COLUMNS: Columns = Columns {
+    case: &[],
+    came: &[
+        column("airplanes", "airplanes", |r| r.set(AIRPLANES)),
+        column("deployment", "deployment", |r| r.set("airspace.deployment")),
+        column("elapsed_s", "time, s", |r| r.mean_of(|run| elapsed_s(r, run))),
+        column("optimization_s", "per optimization, s", |r| {
+            r.mean_of(|run| elapsed_s(r, run) / run.or_zero("optimisations"))
+        }),
+        column("messages", "messages", |r| r.mean("messages")),
+        column("bytes", "bytes", |r| r.mean("bytes")),
+        column("multicast_bytes", "multicast bytes", |r| r.mean("multicast_bytes")),
+        column("rounds", "rounds", |r| r.mean("rounds_mean")),
+        column("losses", "losses", |r| r.mean("losses_of_separation")),
+        column("delay_percent", "delay, %", |r| r.mean("mean_delay_percent")),
+        column("by_seed", "", |r| {
+            let flown = |run: Run<'_>| {
+                let metric = |name| (name, run.or_zero(name));
+                let elapsed = ("elapsed_s", elapsed_s(r, &run));
+                vec![elapsed, metric("messages"), metric("bytes"), metric("multicast_bytes")]
+            };
+            Value::BySeed(r.each().map(flown).collect())
+        }),
+    ],
+};
+
+/// Seconds spent deciding, if every agent has a processor of its own: of a team the time of all
+/// agents divided by their number, of a coordinator all of it.
+fn elapsed_s(case: &Runs<'_>, run: &Run<'_>) -> f64 {
+    let is_team = case.set("airspace.deployment") == Value::Word(BOTH[0].into());
+    let processors = if is_team { case.set_number(AIRPLANES) } else { 1.0 };
+    run.or_zero("optimise_cpu_s") / processors
+}
 
 /// Runs the experiments.
 ///
 /// # Errors
 /// When the plan asks for what no scenario can be.
-pub fn run(plan: &Plan, progress: &mut farm::Progress<'_>) -> Result<Report, InputError> {
-    let cases = plan.airplanes.iter().flat_map(|&n| BOTH.map(|deployment| (n, deployment)));
-    let cases: Vec<(usize, Deployment)> = cases.collect();
-    // Seed by seed, so that what else the machine does meets all cases alike.
-    let run = |i: usize| {
-        let (n, deployment) = cases[i % cases.len()];
-        flown(plan, n, deployment, (i / cases.len()) as u64 + 1)
-    };
-    let total = cases.len() * plan.seeds;
-    let report = |share| progress("super-conflicts", share);
-    let runs = farm::in_batches(plan.workers, total, report, run);
-    let runs: Vec<Metrics> = runs.into_iter().collect::<Result<_, InputError>>()?;
-    let of_case = |(k, &(n, deployment)): (usize, &(usize, Deployment))| {
-        let all: Vec<&Metrics> = runs.iter().skip(k).step_by(cases.len()).collect();
-        cell(n, deployment, &all)
-    };
-    let cells: Vec<Cell> = cases.iter().enumerate().map(of_case).collect();
+pub fn run(plan: &Plan, progress: &mut Progress<'_>) -> Result<Report, InputError> {
+    let study = Study::of_file(SWEEP, SCENARIO)?.sized(plan.seeds, Some(plan.cycles));
+    let study = study.keep(|v| plan.airplanes.contains(&(number(v, AIRPLANES) as usize)));
+    let cells = COLUMNS.cells(&study.run((plan.workers, "super-conflicts"), progress)?);
     let claims = judge(&cells);
     let largest = plan.airplanes.iter().copied().max().unwrap_or(0);
     let tracks_m = tracks_m(plan, largest)?;
@@ -136,103 +119,43 @@ pub fn run(plan: &Plan, progress: &mut farm::Progress<'_>) -> Result<Report, Inp
 
 /// Where `n` airplanes fly with the first seed.
 fn tracks_m(plan: &Plan, n: usize) -> Result<Vec<Vec<AirPoint>>, InputError> {
-    let mut run = begun(plan, n, Deployment::Direct, 1)?;
+    let settings = [
+        setting(AIRPLANES, n as i64),
+        setting("airspace.deployment", "direct"),
+        setting("cycles", plan.cycles as i64),
+    ];
+    let mut run = AirspaceSimulation::new(&source(SCENARIO, &settings)?, 1)?;
     let mut tracks = vec![Vec::new(); n];
-    loop {
+    let mut note = |run: &AirspaceSimulation| {
         for (track, cell) in tracks.iter_mut().zip(&run.state().airplanes) {
             let at = cell.pose().at;
             if track.last() != Some(&at) {
                 track.push(at);
             }
         }
-        if run.cycle() >= plan.cycles || run.is_over() {
-            return Ok(tracks);
-        }
-        run.advance(1);
-    }
-}
-
-fn flown(plan: &Plan, n: usize, deployment: Deployment, seed: u64) -> Result<Metrics, InputError> {
-    let mut run = begun(plan, n, deployment, seed)?;
-    while run.cycle() < plan.cycles && !run.is_over() {
-        run.advance(plan.cycles - run.cycle());
-    }
-    Ok(run.airspace_metrics())
-}
-
-/// The paper's numbers: its preset, and no shield.
-fn begun(
-    plan: &Plan,
-    n: usize,
-    deployment: Deployment,
-    seed: u64,
-) -> Result<AirspaceSimulation, InputError> {
-    let text = format!(
-        "format = 1\nworld = \"airspace\"\nname = \"Super-conflict\"\nseed = {seed}\n\
-         cycles = {}\n[airspace]\npreset = \"paper\"\nshield = \"off\"\ndeployment = \"{}\"\n\
-         dt_s = {DT_S:?}\n\
-         [airspace.generator]\nkind = \"superconflict\"\nn = {n}\njitter_m = 0.0\n",
-        plan.cycles,
-        deployment.name(),
-    );
-    AirspaceSimulation::new(&Source::new("agentfly", text, ""), 1)
-}
-
-fn cell(airplanes: usize, deployment: Deployment, all: &[&Metrics]) -> Cell {
-    let of = |value: &dyn Fn(&Metrics) -> Option<f64>| Estimate::of(all.iter().map(|m| value(m)));
-    let processors = if deployment == Deployment::Team { airplanes as f64 } else { 1.0 };
-    let elapsed_s = |m: &Metrics| Some(m.optimise_cpu_s / processors);
-    let flown = |m: &&Metrics| Flown {
-        elapsed_s: m.optimise_cpu_s / processors,
-        messages: m.messages as f64,
-        bytes: m.bytes as f64,
-        multicast_bytes: m.multicast_bytes as f64,
     };
-    Cell {
-        airplanes,
-        deployment: deployment.name(),
-        elapsed_s: of(&elapsed_s),
-        optimization_s: of(&|m| Some(elapsed_s(m)? / m.optimisations as f64)),
-        messages: of(&|m| Some(m.messages as f64)),
-        bytes: of(&|m| Some(m.bytes as f64)),
-        multicast_bytes: of(&|m| Some(m.multicast_bytes as f64)),
-        rounds: of(&|m| m.rounds_mean),
-        losses: of(&|m| Some(m.losses_of_separation as f64)),
-        delay_percent: of(&|m| m.mean_delay_percent),
-        by_seed: all.iter().map(flown).collect(),
-    }
+    note(&run);
+    finish(&mut run, plan.cycles, note);
+    Ok(tracks)
 }
 
 /// Team and coordinator at each number of airplanes at which either had anything to say.
 fn pairs(cells: &[Cell]) -> impl Iterator<Item = (&Cell, &Cell)> {
-    let talks = |cell: &Cell| cell.messages.or_zero() > 0.0;
+    let talks = |cell: &Cell| cell.number("messages") > 0.0;
     let both = cells.chunks_exact(2).map(|pair| (&pair[0], &pair[1]));
     both.filter(move |(team, pim)| talks(team) && talks(pim))
 }
 
-type Value = fn(&Flown) -> f64;
-
 /// A value of the coordinator over one of the team, seed by seed, wherever there are both and any.
-fn ratios(cells: &[Cell], of_pim: Value, of_team: Value) -> Vec<Estimate> {
-    pairs(cells)
-        .map(|(team, pim)| ratio((&pim.by_seed, of_pim), (&team.by_seed, of_team)))
-        .collect()
+fn ratios(cells: &[Cell], of_pim: &str, of_team: &str) -> Vec<Estimate> {
+    pairs(cells).map(|(team, pim)| ratio((pim, of_pim), (team, of_team))).collect()
 }
 
-fn ratio((a, of_a): (&[Flown], Value), (b, of_b): (&[Flown], Value)) -> Estimate {
-    let values = |all: &[Flown], of: Value| -> Vec<Option<f64>> {
-        all.iter().map(|flown| Some(of(flown)).filter(|v| *v > 0.0)).collect()
+fn ratio((a, of_a): (&Cell, &str), (b, of_b): (&Cell, &str)) -> Estimate {
+    let values = |cell: &Cell, of: &str| -> Vec<Option<f64>> {
+        cell.by_seed("by_seed", of).into_iter().map(|v| v.filter(|v| *v > 0.0)).collect()
     };
     Estimate::ratio(&values(a, of_a), &values(b, of_b))
-}
-
-/// Held if it is so at every number of airplanes; lost if nothing was measured at any.
-fn everywhere(ratios: &[Estimate], holds: impl Fn(&Estimate) -> bool) -> Verdict {
-    match ratios.iter().all(holds) {
-        _ if ratios.is_empty() => Verdict::Lost,
-        true => Verdict::Held,
-        false => Verdict::NotHeld,
-    }
 }
 
 /// Held if each mean is more than the one before; lost if there are no two.
@@ -245,11 +168,8 @@ fn rising(values: &[Estimate]) -> Verdict {
 }
 
 /// Numbers one after the other, or that there are none.
-fn listed(values: &[Estimate]) -> String {
-    match values {
-        [] => "nothing measured".into(),
-        _ => values.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "),
-    }
+fn each(values: &[Estimate]) -> String {
+    listed(values, ToString::to_string)
 }
 
 fn judge(cells: &[Cell]) -> Vec<Claim> {
@@ -264,44 +184,38 @@ fn judge(cells: &[Cell]) -> Vec<Claim> {
 }
 
 fn takes_more_time(cells: &[Cell]) -> Claim {
-    let ratios = ratios(cells, |f| f.elapsed_s, |f| f.elapsed_s);
-    Claim {
-        id: "A-1",
-        paper: "pim takes more time than the team (figure 5)",
-        papers_figure: None,
-        ours: format!("pim / team: {}", listed(&ratios)),
-        verdict: everywhere(&ratios, |ratio| ratio.is_above(1.0)),
-        reason: "above 1 at every number of airplanes, by its interval".into(),
-    }
+    let ratios = ratios(cells, "elapsed_s", "elapsed_s");
+    claim(
+        ("A-1", "pim takes more time than the team (figure 5)"),
+        all(&ratios, |ratio| ratio.is_above(1.0)),
+        format!("pim / team: {}", each(&ratios)),
+        "above 1 at every number of airplanes, by its interval",
+    )
 }
 
 fn needs_fewer_messages(cells: &[Cell]) -> Claim {
-    let ratios = ratios(cells, |f| f.messages, |f| f.messages);
-    Claim {
-        id: "A-2",
-        paper: "pim needs fewer messages than the team (figure 6)",
-        papers_figure: None,
-        ours: format!("pim / team: {}", listed(&ratios)),
-        verdict: everywhere(&ratios, |ratio| ratio.is_below(1.0)),
-        reason: "below 1 at every number of airplanes, by its interval".into(),
-    }
+    let ratios = ratios(cells, "messages", "messages");
+    claim(
+        ("A-2", "pim needs fewer messages than the team (figure 6)"),
+        all(&ratios, |ratio| ratio.is_below(1.0)),
+        format!("pim / team: {}", each(&ratios)),
+        "below 1 at every number of airplanes, by its interval",
+    )
 }
 
 fn moves_far_more_bytes(cells: &[Cell]) -> Claim {
-    let unicast = ratios(cells, |f| f.bytes, |f| f.bytes);
-    let multicast = ratios(cells, |f| f.bytes, |f| f.multicast_bytes);
-    Claim {
-        id: "A-3",
-        paper: "pim moves far more bytes than the team (figure 7)",
-        papers_figure: None,
-        ours: format!(
+    let unicast = ratios(cells, "bytes", "bytes");
+    let multicast = ratios(cells, "bytes", "multicast_bytes");
+    claim(
+        ("A-3", "pim moves far more bytes than the team (figure 7)"),
+        all(&unicast, |ratio| ratio.is_above(2.0)),
+        format!(
             "pim / team: {}; against a team that multicasts: {}",
-            listed(&unicast),
-            listed(&multicast)
+            each(&unicast),
+            each(&multicast)
         ),
-        verdict: everywhere(&unicast, |ratio| ratio.is_above(2.0)),
-        reason: "far more: more than twice, by its interval at every number of airplanes".into(),
-    }
+        "far more: more than twice, by its interval at every number of airplanes",
+    )
 }
 
 fn bytes_grow_faster(cells: &[Cell]) -> Claim {
@@ -309,129 +223,83 @@ fn bytes_grow_faster(cells: &[Cell]) -> Claim {
         [first, .., last] => vec![*first, *last],
         _ => Vec::new(),
     };
-    let unicast = ends(&ratios(cells, |f| f.bytes, |f| f.bytes));
-    let multicast = ends(&ratios(cells, |f| f.bytes, |f| f.multicast_bytes));
-    Claim {
-        id: "A-4",
-        paper: "pim's bytes grow faster with the number of airplanes (figure 7)",
-        papers_figure: None,
-        ours: format!(
+    let unicast = ends(&ratios(cells, "bytes", "bytes"));
+    let multicast = ends(&ratios(cells, "bytes", "multicast_bytes"));
+    claim(
+        ("A-4", "pim's bytes grow faster with the number of airplanes (figure 7)"),
+        rising(&unicast),
+        format!(
             "pim / team with the fewest and the most airplanes: {}; against a team that \
              multicasts: {}",
-            listed(&unicast),
-            listed(&multicast)
+            each(&unicast),
+            each(&multicast)
         ),
-        verdict: rising(&unicast),
-        reason: "the first mean ratio rises; the paper does not say which team it counts".into(),
-    }
+        "the first mean ratio rises; the paper does not say which team it counts",
+    )
 }
 
 fn multicast_saves(cells: &[Cell]) -> Claim {
-    let saved = |(team, _): (&Cell, &Cell)| {
-        ratio((&team.by_seed, |f| f.bytes), (&team.by_seed, |f| f.multicast_bytes))
-    };
+    let saved = |(team, _): (&Cell, &Cell)| ratio((team, "bytes"), (team, "multicast_bytes"));
     let saved: Vec<Estimate> = pairs(cells).map(saved).collect();
-    Claim {
-        id: "A-5",
-        paper: "multicast saves the team further bandwidth, most with many airplanes",
-        papers_figure: None,
-        ours: format!("unicast / multicast: {}", listed(&saved)),
-        verdict: rising(&saved),
-        reason: "the mean ratio rises with every airplane".into(),
-    }
+    claim(
+        ("A-5", "multicast saves the team further bandwidth, most with many airplanes"),
+        rising(&saved),
+        format!("unicast / multicast: {}", each(&saved)),
+        "the mean ratio rises with every airplane",
+    )
 }
 
 fn hardly_in_time(cells: &[Cell]) -> Claim {
-    let coordinators = pairs(cells).map(|(_, pim)| pim).filter(|pim| pim.airplanes >= MANY);
-    let times_s = coordinators.map(|pim| pim.optimization_s).filter(|s| s.mean.is_some());
+    let coordinators =
+        pairs(cells).map(|(_, pim)| pim).filter(|pim| pim.count("airplanes") >= MANY);
+    let times_s =
+        coordinators.map(|pim| *pim.estimate("optimization_s")).filter(|s| s.mean.is_some());
     let longest_s = times_s.max_by(|a, b| a.or_zero().total_cmp(&b.or_zero()));
     let (verdict, ours) = match longest_s {
-        None => (Verdict::Lost, listed(&[])),
+        None => (Verdict::Lost, each(&[])),
         Some(s) => {
             let verdict = Verdict::of(s.or_zero() > DT_S);
             (verdict, format!("the longest on average, in seconds of {DT_S}: {s}"))
         }
     };
-    Claim {
-        id: "A-6",
-        paper: "with five and more airplanes pim can hardly compute the optimum in reasonable time",
-        papers_figure: Some("from 5 airplanes on; one optimization every 5 s"),
-        ours,
+    claim(
+        (
+            "A-6",
+            "with five and more airplanes pim can hardly compute the optimum in reasonable time",
+        ),
         verdict,
-        reason: "an optimization takes longer than the time between two, with any such number"
-            .into(),
-    }
+        ours,
+        "an optimization takes longer than the time between two, with any such number",
+    )
+    .with_papers_figure("from 5 airplanes on; one optimization every 5 s")
 }
 
 impl Report {
     /// Figures 4 to 7.
-    pub fn figures(&self) -> Vec<Figure> {
-        let figure = |title: &str, y_label: &str, value: fn(&Cell) -> &Estimate| Figure {
-            title: title.into(),
-            x_label: "airplanes".into(),
-            y_label: y_label.into(),
-            kind: FigureKind::Lines,
-            series: BOTH
-                .map(|deployment| Series {
-                    name: deployment.name().into(),
-                    points: self
-                        .cells
-                        .iter()
-                        .filter(|cell| cell.deployment == deployment.name())
-                        .filter_map(|cell| value(cell).point(cell.airplanes as f64))
-                        .collect(),
-                })
-                .into(),
-            ..Figure::default()
+    fn figures(&self) -> Vec<Figure> {
+        let over = |title: &str, y_label: &str, y: &str| {
+            let of = |deployment: &str| {
+                let cells = self.cells.iter().filter(|c| c.says("deployment", deployment));
+                series(deployment, cells, ["airplanes", y])
+            };
+            figure(title, ["airplanes", y_label], BOTH.map(of))
         };
-        let flights = Figure {
-            title: format!("Flights of {} airplanes", self.tracks_m.len()),
-            x_label: "east, km".into(),
-            y_label: "north, km".into(),
-            kind: FigureKind::Ways,
-            series: self.tracks_m.iter().map(|track| flight(track)).collect(),
-            ..Figure::default()
-        };
+        let title = format!("Flights of {} airplanes", self.tracks_m.len());
+        let flown: Vec<Series> = self.tracks_m.iter().map(|track| flight(track)).collect();
+        let flights = figure(&title, ["east, km", "north, km"], flown);
         vec![
-            flights,
-            figure("Time spent in all optimizations", "seconds", |c| &c.elapsed_s),
-            figure("Messages of a whole flight", "messages", |c| &c.messages),
-            figure("Bytes of a whole flight", "bytes", |c| &c.bytes),
+            Figure { kind: FigureKind::Ways, ..flights },
+            over("Time spent in all optimizations", "seconds", "elapsed_s"),
+            over("Messages of a whole flight", "messages", "messages"),
+            over("Bytes of a whole flight", "bytes", "bytes"),
         ]
     }
 
     /// All numbers.
-    pub fn table(&self) -> Table {
+    fn table(&self) -> Table {
         let note = "Per run, with 95 % intervals. Time is what deciding takes if every agent has \
                     a processor of its own, without transmission.";
-        let columns = [
-            "airplanes",
-            "deployment",
-            "time, s",
-            "per optimization, s",
-            "messages",
-            "bytes",
-            "multicast bytes",
-            "rounds",
-            "losses",
-            "delay, %",
-        ];
-        let mut table = Table::new("Team and migrating coordinator", note, &columns);
-        for c in &self.cells {
-            let numbers = [
-                &c.elapsed_s,
-                &c.optimization_s,
-                &c.messages,
-                &c.bytes,
-                &c.multicast_bytes,
-                &c.rounds,
-                &c.losses,
-                &c.delay_percent,
-            ];
-            let head = [c.airplanes.to_string(), c.deployment.to_string()];
-            table.row(head.into_iter().chain(numbers.iter().map(ToString::to_string)));
-        }
-        table
+        COLUMNS.table("Team and migrating coordinator", note, &self.cells)
     }
 
     /// The report, the claims first.
@@ -481,7 +349,7 @@ mod tests {
         let short = Plan { seeds: 1, cycles: 16, ..Plan::quick() };
         let report = run(&short, &mut |_, _| ()).expect("a valid plan");
         assert_eq!((report.cells.len(), report.claims.len()), (6, 6));
-        assert!(report.cells.iter().all(|cell| cell.messages.or_zero() > 0.0), "all have talked");
+        assert!(report.cells.iter().all(|cell| cell.number("messages") > 0.0), "all have talked");
         assert!(report.claims.iter().all(|claim| claim.verdict != Verdict::Lost));
         let document = report.document();
         assert!(document.blocks.contains(&Block::Claims(report.claims.clone())));
@@ -491,30 +359,19 @@ mod tests {
     }
 
     /// Team and coordinator with the same value everywhere.
-    fn alike(airplanes: usize, value: f64) -> [Cell; 2] {
+    fn alike(airplanes: u64, value: f64) -> [Cell; 2] {
         BOTH.map(|deployment| {
-            let same = || Estimate::of([Some(value), Some(value)]);
-            Cell {
-                airplanes,
-                deployment: deployment.name(),
-                elapsed_s: same(),
-                optimization_s: same(),
-                messages: same(),
-                bytes: same(),
-                multicast_bytes: same(),
-                rounds: same(),
-                losses: same(),
-                delay_percent: same(),
-                by_seed: vec![
-                    Flown {
-                        elapsed_s: value,
-                        messages: value,
-                        bytes: value,
-                        multicast_bytes: value
-                    };
-                    2
-                ],
-            }
+            let same = Value::Estimate(Estimate::of([Some(value), Some(value)]));
+            let of_run: Vec<_> =
+                ["elapsed_s", "messages", "bytes", "multicast_bytes"].map(|of| (of, value)).into();
+            let came = [
+                ("airplanes", Value::Count(airplanes)),
+                ("deployment", Value::Word(deployment.into())),
+                ("optimization_s", same.clone()),
+                ("messages", same),
+                ("by_seed", Value::BySeed(vec![of_run; 2])),
+            ];
+            Cell::new([], came)
         })
     }
 

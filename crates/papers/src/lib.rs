@@ -5,13 +5,20 @@
 //! loria/        the source paper of the robots world
 //! serpentine/   the source of the chain world
 //! methods.rs    methods of the airspace world on the same traffic
-//! farm.rs       runs over workers, results by index
+//! study.rs      a sweep file and its scenario -> the table of its runs
+//! cells.rs      the table of runs -> a cell for every case: as JSON, a table, points of figures
+//! claims.rs     verdicts over cells
 //! ```
 //!
 //! Nothing here draws a figure or writes a file: results are data, reports are documents.
 
 pub mod agentfly;
-pub mod farm;
+mod cells;
+mod claims;
+
 pub mod loria;
 pub mod methods;
 pub mod serpentine;
+mod study;
+
+pub use study::Progress;

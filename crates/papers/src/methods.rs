@@ -1,15 +1,15 @@
 //! Methods of avoiding each other, compared on the same traffic.
 
-use crate::farm;
+use crate::study::{Progress, all_of, setting};
 use serde::Serialize;
+use sidestep::experiment::sweep::Setting;
 use sidestep::kernel::{InputError, Simulation};
 use sidestep::scenario::Source;
 use sidestep::statistics::{Interval, wilson};
 use sidestep::worlds::airspace::metrics::Metrics;
 use sidestep::worlds::airspace::simulation::AirspaceSimulation;
 use sidestep::worlds::airspace::world::Method;
-use sidestep_document::Estimate;
-use sidestep_document::figure::Table;
+use sidestep_document::{Estimate, Table};
 
 /// What a method came to over all runs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -50,24 +50,18 @@ pub fn compare(
     methods: &[Method],
     (seed, runs): (u64, usize),
     workers: usize,
-    progress: &mut farm::Progress<'_>,
+    progress: &mut Progress<'_>,
 ) -> Result<Vec<MethodResult>, InputError> {
     let mut results = Vec::new();
     for method in methods {
-        let overrides = |k: usize| {
-            vec![
-                format!("airspace.method=\"{}\"", method.name()),
-                format!("seed={}", seed + k as u64),
-            ]
+        let seeds: Vec<u64> = (seed..seed + runs as u64).collect();
+        let run = |seed: &u64| {
+            let settings =
+                [setting("airspace.method", method.name()), setting("seed", *seed as i64)];
+            flown(&source.clone().with(&settings.map(|s| Setting::to_override(&s)))?)
         };
-        let all = farm::in_batches(
-            workers,
-            runs,
-            |share| progress(method.name(), share),
-            |k| flown(&source.clone().with(&overrides(k))?),
-        );
-        let all: Vec<Metrics> = all.into_iter().collect::<Result<_, InputError>>()?;
-        results.push(result(method.name(), &all));
+        let report = |share| progress(method.name(), share);
+        results.push(result(method.name(), &all_of(&seeds, workers, report, run)?));
     }
     Ok(results)
 }

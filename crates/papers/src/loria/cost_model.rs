@@ -25,7 +25,7 @@
 use super::Plan;
 use super::floor::Floor;
 use super::timing::Load;
-use crate::farm::Progress;
+use crate::study::Progress;
 use serde::Serialize;
 use sidestep::kernel::Simulation;
 use sidestep::statistics::Interval;
@@ -37,49 +37,49 @@ use std::sync::Arc;
 
 /// A run with one worker, per cycle.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Point {
+pub(super) struct Point {
     /// Robots, `n`.
-    pub agents: f64,
+    pub(super) agents: f64,
     /// People and doors, `m`.
-    pub objects: f64,
+    pub(super) objects: f64,
     /// Side of a robot in boxes.
-    pub size: u32,
+    pub(super) size: u32,
     /// Bodies in groups of two or more, `p (n + m)`.
-    pub in_conflict: f64,
+    pub(super) in_conflict: f64,
     /// Boxes entered or left, `f`.
-    pub boxes: f64,
+    pub(super) boxes: f64,
     /// Time of pool one, ns.
-    pub first_ns: f64,
+    pub(super) first_ns: f64,
     /// Time of joining and of pool two, ns.
-    pub second_ns: f64,
+    pub(super) second_ns: f64,
 }
 
 /// A parameter of the model and its value, ns.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Parameter {
+pub(super) struct Parameter {
     /// Its name in the paper, as read.
-    pub name: String,
+    pub(super) name: String,
     /// What it is.
-    pub meaning: String,
+    pub(super) meaning: String,
     /// Value in ns.
-    pub value_ns: f64,
+    pub(super) value_ns: f64,
     /// 95 % interval in ns.
-    pub interval_ns: Option<Interval>,
+    pub(super) interval_ns: Option<Interval>,
 }
 
 /// The fitted model.
 #[derive(Debug, Clone, Serialize)]
-pub struct CostModel {
+pub(super) struct CostModel {
     /// The runs.
-    pub points: Vec<Point>,
+    pub(super) points: Vec<Point>,
     /// `t_p`, `t_o`, `c_d`, `c_s`, `e_u`; empty when they cannot be told apart.
-    pub parameters: Vec<Parameter>,
+    pub(super) parameters: Vec<Parameter>,
     /// Share of the variance of the cost per body explained, of step one and of step two.
-    pub r_squared: [f64; 2],
+    pub(super) r_squared: [f64; 2],
     /// Share of the variance of whole cycles' times explained, of both steps together.
-    pub r_squared_cycle: f64,
+    pub(super) r_squared_cycle: f64,
     /// Least and greatest share of bodies in conflict, `p`.
-    pub conflict_share: (f64, f64),
+    pub(super) conflict_share: (f64, f64),
 }
 
 const PARAMETERS: [(&str, &str); 5] = [
@@ -92,7 +92,7 @@ const PARAMETERS: [(&str, &str); 5] = [
 
 impl CostModel {
     /// Measures and fits.
-    pub fn run(plan: &Plan, report: &mut Progress<'_>) -> Self {
+    pub(super) fn run(plan: &Plan, report: &mut Progress<'_>) -> Self {
         let loads = grid(plan);
         let mut points = Vec::new();
         for (index, load) in loads.iter().enumerate() {
@@ -103,7 +103,7 @@ impl CostModel {
     }
 
     /// Fits the model to runs.
-    pub fn fit(points: Vec<Point>) -> Self {
+    pub(super) fn fit(points: Vec<Point>) -> Self {
         let bodies = |p: &Point| p.agents + p.objects;
         let per_body = |p: &Point, values: &[f64]| values.iter().map(|v| v / bodies(p)).collect();
         let fit = |row: fn(&Point) -> Vec<f64>, y: fn(&Point) -> f64| {
@@ -127,12 +127,12 @@ impl CostModel {
     }
 
     /// The parameter of a name.
-    pub fn parameter(&self, name: &str) -> Option<&Parameter> {
+    pub(super) fn parameter(&self, name: &str) -> Option<&Parameter> {
         self.parameters.iter().find(|p| p.name == name)
     }
 
     /// The fitted parameters as a table.
-    pub fn table(&self) -> Table {
+    pub(super) fn table(&self) -> Table {
         let note = format!(
             "{} runs with one worker, n = {:.0} to {:.0} robots of 1 to 3 boxes a side, m = {:.0} \
              to {:.0} people and doors, share in conflict p = {:.3} to {:.3} (counted). Least \
@@ -161,7 +161,7 @@ impl CostModel {
     }
 
     /// Predicted against measured time of a cycle.
-    pub fn figure(&self) -> Figure {
+    pub(super) fn figure(&self) -> Figure {
         let value = |name| self.parameter(name).map_or(0.0, |p| p.value_ns);
         let predict = |p: &Point| {
             let first = dot(&first_row(p), &[value("t_p"), value("t_o")]);

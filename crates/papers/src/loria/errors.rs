@@ -13,8 +13,10 @@
 //! Where a sensor's error mass goes decides how much it hurts, so there are two recipes; and
 //! beams that look the same way make up for each other's errors, so there are two rings.
 
+use crate::study::setting;
 use serde::Serialize;
-use std::fmt::Write;
+use sidestep::experiment::sweep::Setting;
+use toml::Value;
 
 /// Observations of the sensor, `nothing` first.
 const OBSERVATIONS: [&str; 5] = ["nothing", "wall", "door", "person", "robot"];
@@ -22,7 +24,7 @@ const OBSERVATIONS: [&str; 5] = ["nothing", "wall", "door", "person", "robot"];
 /// Where the error mass of a sensor's row goes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Spread {
+pub(super) enum Spread {
     /// Evenly over all other observations: a thing is missed with probability `e / 4`, and
     /// otherwise taken for another thing.
     Even,
@@ -32,10 +34,10 @@ pub enum Spread {
 
 impl Spread {
     /// Both recipes.
-    pub const ALL: [Self; 2] = [Self::Even, Self::Blind];
+    pub(super) const ALL: [Self; 2] = [Self::Even, Self::Blind];
 
     /// Its name in tables.
-    pub fn name(self) -> &'static str {
+    pub(super) fn name(self) -> &'static str {
         match self {
             Self::Even => "even",
             Self::Blind => "blind",
@@ -43,7 +45,7 @@ impl Spread {
     }
 
     /// The confusion matrix at error level `e` (true x reported).
-    pub fn confusion(self, e: f64) -> [[f64; OBSERVATIONS.len()]; OBSERVATIONS.len()] {
+    pub(super) fn confusion(self, e: f64) -> [[f64; OBSERVATIONS.len()]; OBSERVATIONS.len()] {
         let others = (OBSERVATIONS.len() - 1) as f64;
         std::array::from_fn(|truth| {
             std::array::from_fn(|reported| match (self, truth, reported) {
@@ -59,7 +61,7 @@ impl Spread {
 /// How many beams a robot has for the same thing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Beams {
+pub(super) enum Beams {
     /// The Nomad's ring: three beams look ahead, five to each side.
     Sixteen,
     /// One beam in each direction, for a robot of one box: nothing makes up for an error. The
@@ -69,7 +71,7 @@ pub enum Beams {
 
 impl Beams {
     /// Bearings of the beams in degrees.
-    pub fn bearings_deg(self) -> Vec<f64> {
+    pub(super) fn bearings_deg(self) -> Vec<f64> {
         let (n, step) = match self {
             Self::Sixteen => (16, 22.5),
             Self::Four => (4, 90.0),
@@ -78,7 +80,7 @@ impl Beams {
     }
 
     /// Side of the robot that carries them, in boxes.
-    pub fn size(self) -> u32 {
+    pub(super) fn size(self) -> u32 {
         match self {
             Self::Sixteen => 2,
             Self::Four => 1,
@@ -86,47 +88,43 @@ impl Beams {
     }
 }
 
-/// The transitions of an action: path, turn in degrees; the intended one first.
-type Outcomes = &'static [(&'static str, i32)];
-
-/// The standard actions of the effector.
-const ACTIONS: [(&str, Outcomes); 3] = [
+/// The standard actions of the effector, and their transitions (path, turn in degrees), the
+/// intended one first.
+const ACTIONS: [(&str, &[(&str, i64)]); 3] = [
     ("forward", &[("F", 0), ("", 0), ("FF", 0), ("FL", 0), ("FR", 0)]),
     ("left", &[("", 90), ("", 0), ("", 180)]),
     ("right", &[("", -90), ("", 0), ("", 180)]),
 ];
 
 /// Probabilities of `n` outcomes at error level `e`, the intended one first.
-pub fn outcomes(n: usize, e: f64) -> Vec<f64> {
+fn outcomes(n: usize, e: f64) -> Vec<f64> {
     let other = e / (n - 1) as f64;
     (0..n).map(|k| if k == 0 { 1.0 - e } else { other }).collect()
 }
 
-/// Sections of a scenario: a sonar ring `equal-ring` and an effector `equal-wheels` that err at
-/// level `e`.
-pub fn sections(e: f64, spread: Spread, beams: Beams) -> String {
-    let mut text = format!(
-        "[sensors.equal-ring]\nbearings_deg = {:?}\nrange_m = 3.75\n\
-         distance_edges_m = [0.3, 1.5]\ndistance_classes = [\"near\", \"medium\", \"far\"]\n",
-        beams.bearings_deg(),
-    );
-    // Writing to a string cannot fail.
-    let _ = writeln!(text, "observations = {OBSERVATIONS:?}\n[sensors.equal-ring.confusion]");
+/// What the sonar ring `equal-ring` and the effector `equal-wheels` of the scenario are set to, so
+/// that they err at level `e`.
+pub(super) fn settings(e: f64, spread: Spread, beams: Beams) -> Vec<Setting> {
+    let list = |row: &[f64]| Value::from(row.to_vec());
+    let under = |section: &str, key: &str, value: Value| setting(&[section, key].join("."), value);
+    let mut all = vec![under("sensors.equal-ring", "bearings_deg", list(&beams.bearings_deg()))];
     for (name, row) in OBSERVATIONS.iter().zip(spread.confusion(e)) {
-        let _ = writeln!(text, "{name} = {row:?}");
+        all.push(under("sensors.equal-ring.confusion", name, list(&row)));
     }
-    text += "[sensors.equal-ring.distance_confusion]\nnear = [1.0, 0.0, 0.0]\n\
-             medium = [0.0, 1.0, 0.0]\nfar = [0.0, 0.0, 1.0]\n";
-    let _ = writeln!(text, "beyond = {:?}\n[effectors.equal-wheels]", [1.0 / 3.0; 3]);
     for (action, transitions) in ACTIONS {
-        let probabilities = outcomes(transitions.len(), e);
-        let entries = transitions
-            .iter()
-            .zip(probabilities)
-            .map(|((path, turn), p)| format!("{{ p = {p:?}, path = \"{path}\", turn = {turn} }}"));
-        let _ = writeln!(text, "{action} = [{}]", entries.collect::<Vec<_>>().join(", "));
+        let entry = |((path, turn), p): (&(&str, i64), f64)| -> Value {
+            let entries = [("p", p.into()), ("path", (*path).into()), ("turn", (*turn).into())];
+            entries
+                .map(|(key, value): (&str, Value)| (key.to_string(), value))
+                .into_iter()
+                .collect::<toml::Table>()
+                .into()
+        };
+        let row: Vec<Value> =
+            transitions.iter().zip(outcomes(transitions.len(), e)).map(entry).collect();
+        all.push(under("effectors.equal-wheels", action, row.into()));
     }
-    text
+    all
 }
 
 #[cfg(test)]

@@ -7,38 +7,38 @@ use super::Plan;
 use super::floor::Floor;
 use super::measure::{Outcome, Variant, measure_all, values};
 use super::reliability::{CONTACTS, TRIP};
-use crate::farm::Progress;
+use crate::study::Progress;
 use serde::Serialize;
 use sidestep::worlds::robots::world::Regime;
 use sidestep_document::{Estimate, Figure, FigureKind, Series, Table};
 use std::sync::Arc;
 
 /// Sides of the bodies, in boxes.
-pub const SIZES: [u32; 5] = [1, 2, 3, 4, 5];
+pub(super) const SIZES: [u32; 5] = [1, 2, 3, 4, 5];
 
 /// Outcomes of one body size and set of sensors.
 #[derive(Debug, Clone, Serialize)]
-pub struct Build {
+pub(super) struct Build {
     /// Side of the body in boxes.
-    pub size: u32,
+    pub(super) size: u32,
     /// Whether a camera was added to the sonar ring.
-    pub camera: bool,
+    pub(super) camera: bool,
     /// Outcomes by seed.
-    pub outcomes: Vec<Outcome>,
+    pub(super) outcomes: Vec<Outcome>,
 }
 
 /// The genericity experiment.
 #[derive(Debug, Clone, Serialize)]
-pub struct Genericity {
+pub(super) struct Genericity {
     /// All builds.
-    pub builds: Vec<Build>,
+    pub(super) builds: Vec<Build>,
     /// Cycles of each run.
-    pub cycles: u64,
+    pub(super) cycles: u64,
 }
 
 impl Genericity {
     /// Runs the experiment: both sensors and effectors unreliable, medium floor.
-    pub fn run(plan: &Plan, report: &mut Progress<'_>) -> Self {
+    pub(super) fn run(plan: &Plan, report: &mut Progress<'_>) -> Self {
         let floor = Arc::new(Floor::medium());
         let build = |(camera, size)| Variant { size, camera, ..Variant::new(&floor, Regime::Both) };
         let builds = [false, true].into_iter().flat_map(|camera| SIZES.map(|size| (camera, size)));
@@ -52,7 +52,7 @@ impl Genericity {
 
     /// Of the runs with or without a camera: how many kept the laws, in how many trips were
     /// completed, and how many there are.
-    pub fn runs(&self, camera: bool) -> [usize; 3] {
+    pub(super) fn runs(&self, camera: bool) -> [usize; 3] {
         let runs = || self.builds.iter().filter(|b| b.camera == camera).flat_map(|b| &b.outcomes);
         let lawful = runs().filter(|outcome| outcome.lawful).count();
         let with_trips = runs().filter(|outcome| outcome.trip_cycles.is_some()).count();
@@ -60,7 +60,7 @@ impl Genericity {
     }
 
     /// Contacts with a camera less those without, over all sizes and seeds.
-    pub fn camera_effect(&self) -> Estimate {
+    pub(super) fn camera_effect(&self) -> Estimate {
         let contacts = |camera| {
             let builds = self.builds.iter().filter(move |b| b.camera == camera);
             builds.flat_map(|b| values(&b.outcomes, CONTACTS)).collect::<Vec<_>>()
@@ -69,7 +69,7 @@ impl Genericity {
     }
 
     /// Contacts and trips by size and sensors.
-    pub fn table(&self) -> Table {
+    pub(super) fn table(&self) -> Table {
         let columns = [
             "body, boxes",
             "sensors",
@@ -101,7 +101,7 @@ impl Genericity {
     }
 
     /// Contacts over body size.
-    pub fn figure(&self) -> Figure {
+    pub(super) fn figure(&self) -> Figure {
         let series = [false, true].map(|camera| {
             let builds = self.builds.iter().filter(|b| b.camera == camera);
             let point =

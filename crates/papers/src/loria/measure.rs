@@ -2,7 +2,7 @@
 
 use super::errors::{self, Beams, Spread};
 use super::floor::{Floor, Mind};
-use crate::farm::{self, Progress};
+use crate::study::{Progress, all_of, setting, source};
 use serde::Serialize;
 use sidestep::kernel::Simulation;
 use sidestep::kernel::ports::{MemoryRecorder, Values};
@@ -12,13 +12,16 @@ use sidestep::worlds::robots::effector::ObstacleRule;
 use sidestep::worlds::robots::scenario::{Behaviours, Compiled, StorageOrder};
 use sidestep::worlds::robots::simulation::RobotsSimulation;
 use sidestep::worlds::robots::world::Regime;
-use std::fmt::Write;
+use std::convert::Infallible;
 use std::sync::Arc;
+
+/// The medium floor, with sensors and effectors of an equal error level.
+const EQUAL: &str = include_str!("../../../../scenarios/papers/loria/equal.toml");
 
 /// Which tables sensors and effectors err by.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Tables {
+pub(super) enum Tables {
     /// The presets `sonar-ring` and `nomad`.
     Presets,
     /// Those of an equal error level, see [`errors`].
@@ -27,28 +30,28 @@ pub enum Tables {
 
 /// What is varied between runs; the seed is not part of it.
 #[derive(Debug, Clone, Serialize)]
-pub struct Variant {
+pub(super) struct Variant {
     /// The building and who is in it.
     #[serde(skip)]
-    pub floor: Arc<Floor>,
+    pub(super) floor: Arc<Floor>,
     /// Which errors are on.
-    pub regime: Regime,
+    pub(super) regime: Regime,
     /// The law for blocked paths.
-    pub obstacle_rule: ObstacleRule,
+    pub(super) obstacle_rule: ObstacleRule,
     /// How robots decide.
-    pub mind: Mind,
+    pub(super) mind: Mind,
     /// How sensors and effectors err.
-    pub tables: Tables,
+    pub(super) tables: Tables,
     /// Robots cover `size` x `size` boxes.
-    pub size: u32,
+    pub(super) size: u32,
     /// Whether robots have a camera beside the sonar ring.
-    pub camera: bool,
+    pub(super) camera: bool,
 }
 
 impl Variant {
     /// Robots of 2 x 2 boxes with a sonar ring that avoid what it reports, under the presets
     /// and the rule `cut`.
-    pub fn new(floor: &Arc<Floor>, regime: Regime) -> Self {
+    pub(super) fn new(floor: &Arc<Floor>, regime: Regime) -> Self {
         Self {
             floor: Arc::clone(floor),
             regime,
@@ -60,45 +63,36 @@ impl Variant {
         }
     }
 
-    /// The scenario of a run, as a user would write it; `patrol-0`... are the behaviours of
-    /// the corridors.
-    pub fn scenario(&self, seed: u64) -> String {
-        let (ring, wheels) = match self.tables {
-            Tables::Presets => ("sonar-ring", "nomad"),
-            Tables::Equal(..) => ("equal-ring", "equal-wheels"),
-        };
-        let camera = if self.camera { ", \"camera\"" } else { "" };
-        let mut text = format!(
-            "format = 1\nworld = \"robots\"\nseed = {seed}\nregime = \"{}\"\n\
-             obstacle_rule = \"{}\"\n{}",
-            self.regime.name(),
-            self.obstacle_rule.name(),
-            self.floor.map_section(),
-        );
-        for (k, c) in self.floor.corridors().enumerate() {
-            // Writing to a string cannot fail.
-            let _ = write!(
-                text,
-                "[[robots]]\ncount = {}\nsize = {}\nregion = [{}, {}, {}, {}]\n\
-                 sensors = [\"{ring}\"{camera}]\neffector = \"{wheels}\"\n\
-                 behaviour = {{ kind = \"patrol-{k}\" }}\n",
-                self.floor.robots_per_corridor, self.size, c.col, c.row, c.width, c.height,
-            );
-        }
-        let _ = write!(
-            text,
-            "[[people]]\ncount = {}\nsize = [2, 2]\nperiod = 2\np_straight = 0.9\n\
-             [doors]\noffice = true\nrandom = {{ p_open = 0.005, p_close = 0.01 }}\n",
-            self.floor.people,
-        );
+    /// The scenario of a run: the floor's, with what this variant differs in; `patrol-0`... are
+    /// the behaviours of the corridors.
+    pub(super) fn source(&self, seed: u64) -> Source {
+        let mut settings = vec![
+            setting("seed", seed as i64),
+            setting("regime", self.regime.name()),
+            setting("obstacle_rule", self.obstacle_rule.name()),
+        ];
+        let mut text = self.floor.scenario;
+        let mut sensors = vec!["sonar-ring"];
         if let Tables::Equal(e, spread, beams) = self.tables {
-            text += &errors::sections(e, spread, beams);
+            (text, sensors) = (EQUAL, vec!["equal-ring"]);
+            settings.extend(errors::settings(e, spread, beams));
         }
-        text
+        sensors.extend(self.camera.then_some("camera"));
+        for k in 0..self.floor.corridors().count() {
+            let key = |name: &str| ["robots", &k.to_string(), name].join(".");
+            let patrol = format!("patrol-{k}");
+            settings.push(setting(&key("size"), self.size));
+            settings.push(setting(&key("sensors"), sensors.clone()));
+            settings.push(setting(
+                &key("behaviour"),
+                toml::Table::from_iter([("kind".to_string(), patrol.into())]),
+            ));
+        }
+        source(text, &settings).expect("the experiments' scenarios are valid")
     }
 
     /// The behaviours by name, shared by all runs of this variant.
-    pub fn behaviours(&self) -> Behaviours {
+    pub(super) fn behaviours(&self) -> Behaviours {
         let all = self.floor.behaviours(self.mind, self.size);
         all.into_iter().enumerate().map(|(k, b)| (format!("patrol-{k}"), b)).collect()
     }
@@ -106,36 +100,36 @@ impl Variant {
 
 /// What a run of a variant came to.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
-pub struct Outcome {
+pub(super) struct Outcome {
     /// Contacts per 1000 actions, with anything.
-    pub contacts: Option<f64>,
+    pub(super) contacts: Option<f64>,
     /// Contacts per 1000 actions, with walls.
-    pub wall_contacts: Option<f64>,
+    pub(super) wall_contacts: Option<f64>,
     /// Contacts per 1000 actions, with robots.
-    pub robot_contacts: Option<f64>,
+    pub(super) robot_contacts: Option<f64>,
     /// Mean cycles of a completed to-and-fro trip; absent when none was completed.
-    pub trip_cycles: Option<f64>,
+    pub(super) trip_cycles: Option<f64>,
     /// Completed trips per robot.
-    pub trips: Option<f64>,
+    pub(super) trips: Option<f64>,
     /// Net displacement by path length over windows of [`WINDOW_CYCLES`], on average.
-    pub straightness: Option<f64>,
+    pub(super) straightness: Option<f64>,
     /// Moves with a sideways part per 1000 actions.
-    pub lateral_moves: Option<f64>,
+    pub(super) lateral_moves: Option<f64>,
     /// Whether every robot has acted once a cycle, and at the end no two bodies shared a box
     /// and none stood in a wall.
-    pub lawful: bool,
+    pub(super) lawful: bool,
 }
 
 /// A measure of an outcome.
-pub type Measure = fn(&Outcome) -> Option<f64>;
+pub(super) type Measure = fn(&Outcome) -> Option<f64>;
 
 /// The values of a measure by run.
-pub fn values(outcomes: &[Outcome], measure: Measure) -> Vec<Option<f64>> {
+pub(super) fn values(outcomes: &[Outcome], measure: Measure) -> Vec<Option<f64>> {
     outcomes.iter().map(measure).collect()
 }
 
 /// Length of the windows in which straightness is measured, in cycles.
-pub const WINDOW_CYCLES: usize = 20;
+pub(super) const WINDOW_CYCLES: usize = 20;
 
 /// Windows with a shorter path say nothing about its shape, in boxes.
 const SHORTEST_PATH_BOXES: f64 = 10.0;
@@ -144,7 +138,7 @@ const SHORTEST_PATH_BOXES: f64 = 10.0;
 ///
 /// All variants see the same seeds: where they start, and every draw that a variant does not
 /// itself change, are the same, so that differences between variants are paired by seed.
-pub fn measure_all(
+pub(super) fn measure_all(
     variants: &[Variant],
     (seeds, cycles): (usize, u64),
     workers: usize,
@@ -152,17 +146,22 @@ pub fn measure_all(
     report: &mut Progress<'_>,
 ) -> Vec<Vec<Outcome>> {
     let behaviours: Vec<Behaviours> = variants.iter().map(Variant::behaviours).collect();
-    let run = |i: usize| {
+    let run = |i: &usize| {
         let (v, seed) = (i / seeds, (i % seeds) as u64 + 1);
-        measure(&variants[v], &behaviours[v], seed, cycles)
+        Ok::<_, Infallible>(measure(&variants[v], &behaviours[v], seed, cycles))
     };
-    let outcomes =
-        farm::in_batches(workers, variants.len() * seeds, |share| report(what, share), run);
+    let numbers: Vec<usize> = (0..variants.len() * seeds).collect();
+    let Ok(outcomes) = all_of(&numbers, workers, |share| report(what, share), run);
     outcomes.chunks(seeds).map(<[Outcome]>::to_vec).collect()
 }
 
 /// Runs one variant once, on one worker.
-pub fn measure(variant: &Variant, behaviours: &Behaviours, seed: u64, cycles: u64) -> Outcome {
+pub(super) fn measure(
+    variant: &Variant,
+    behaviours: &Behaviours,
+    seed: u64,
+    cycles: u64,
+) -> Outcome {
     let (simulation, tracks) = recorded(variant, behaviours, seed, cycles);
     outcome(&simulation, &tracks)
 }
@@ -174,7 +173,7 @@ pub(super) fn recorded(
     seed: u64,
     cycles: u64,
 ) -> (RobotsSimulation, Vec<Track>) {
-    let source = Source::new("reproduce loria", variant.scenario(seed), "");
+    let source = variant.source(seed);
     let compiled = Compiled::new(&source, behaviours, StorageOrder::Spatial)
         .expect("the experiments' scenarios are valid");
     let mut simulation = RobotsSimulation::from_compiled(compiled, &source, 1);

@@ -13,20 +13,20 @@
 //! claims.rs                                                   what follows from all that
 //! ```
 
-pub mod claims;
-pub mod cost_model;
-pub mod errors;
-pub mod floor;
-pub mod genericity;
-pub mod measure;
-pub mod patrol;
-pub mod performance;
-pub mod reliability;
+mod claims;
+mod cost_model;
+mod errors;
+mod floor;
+mod genericity;
+mod measure;
+mod patrol;
+mod performance;
+mod reliability;
 pub mod scenes;
-pub mod strategies;
-pub mod timing;
+mod strategies;
+mod timing;
 
-use crate::farm::{Progress, stage};
+use crate::study::{Progress, stage};
 use claims::Claim;
 use cost_model::CostModel;
 use genericity::Genericity;
@@ -162,16 +162,11 @@ pub struct Report {
     pub plan: Plan,
     /// Version of the program.
     pub program_version: String,
-    /// Four regimes and the sweep of the error level.
-    pub reliability: Reliability,
-    /// Body sizes and the camera.
-    pub genericity: Genericity,
-    /// Speed-up.
-    pub performance: Performance,
-    /// The rejected strategies.
-    pub strategies: Strategies,
-    /// The cost model.
-    pub cost_model: CostModel,
+    reliability: Reliability,
+    genericity: Genericity,
+    performance: Performance,
+    strategies: Strategies,
+    cost_model: CostModel,
     /// The paper's claims and our verdicts.
     pub claims: Vec<Claim>,
 }

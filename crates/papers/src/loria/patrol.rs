@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 /// When a robot believes that something is near.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Trust {
+pub(super) enum Trust {
     /// As soon as one beam of a sector says so.
     OneBeam,
     /// Ahead, where a miss costs a contact, on one beam's word; at the sides only when two
@@ -25,11 +25,11 @@ pub enum Trust {
 
 /// To and fro between two ends; a trip is there and back again.
 #[derive(Debug, Clone)]
-pub struct Patrol {
+pub(super) struct Patrol {
     /// Ways to the two ends.
-    pub ends: [Arc<FlowField>; 2],
+    pub(super) ends: [Arc<FlowField>; 2],
     /// When a near report is believed.
-    pub trust: Trust,
+    pub(super) trust: Trust,
 }
 
 /// Word 0: ends reached.
@@ -164,15 +164,15 @@ fn either(draws: &mut Draws) -> ActionId {
 
 /// A behaviour that thinks longer: decides as another does, after so many operations.
 #[derive(Debug, Clone)]
-pub struct Costly {
+pub(super) struct Costly {
     /// Who really decides.
-    pub inner: Arc<dyn Behaviour>,
+    pub(super) inner: Arc<dyn Behaviour>,
     /// Dependent multiply-and-adds per decision.
-    pub operations: u32,
+    pub(super) operations: u32,
 }
 
 /// Does so many dependent multiply-and-adds, for nothing.
-pub fn burn(mut x: u64, operations: u32) {
+pub(super) fn burn(mut x: u64, operations: u32) {
     for _ in 0..operations {
         x = x.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
     }

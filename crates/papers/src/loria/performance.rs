@@ -8,7 +8,7 @@
 use super::floor::Floor;
 use super::timing::{Load, STRETCHES, Timed, arithmetic, race, seconds};
 use super::{NewRecorder, Plan};
-use crate::farm::Progress;
+use crate::study::Progress;
 use serde::Serialize;
 use sidestep::kernel::Simulation;
 use sidestep::kernel::ports::RecordError;
@@ -17,61 +17,61 @@ use std::sync::Arc;
 
 /// A load under a number of workers.
 #[derive(Debug, Clone, Serialize)]
-pub struct Timing {
+pub(super) struct Timing {
     /// Number of the load.
-    pub load: usize,
+    pub(super) load: usize,
     /// Workers.
-    pub workers: usize,
+    pub(super) workers: usize,
     /// Whether the run was recorded.
-    pub recorded: bool,
+    pub(super) recorded: bool,
     /// Milliseconds per cycle.
-    pub cycle_ms: Estimate,
+    pub(super) cycle_ms: Estimate,
     /// Time with one worker by time with these, both recorded or both not.
-    pub speed_up: Estimate,
+    pub(super) speed_up: Estimate,
     /// Speed-up by repeat, for pairs with other loads.
-    pub ratios: Vec<Option<f64>>,
+    pub(super) ratios: Vec<Option<f64>>,
     /// Speed-up of mere arithmetic with as many workers, timed in turn with this.
-    pub machine: Estimate,
+    pub(super) machine: Estimate,
 }
 
 /// What a run costs before its first cycle.
 #[derive(Debug, Clone, Copy, Serialize)]
-pub struct Initialization {
+pub(super) struct Initialization {
     /// Number of the load.
-    pub load: usize,
+    pub(super) load: usize,
     /// Seconds to read the scenario, compile the world and place all bodies.
-    pub seconds: f64,
+    pub(super) seconds: f64,
     /// Share of the whole time of a run of [`REFERENCE_CYCLES`] with one worker.
-    pub share_alone: f64,
+    pub(super) share_alone: f64,
     /// The same with the most workers.
-    pub share_together: f64,
+    pub(super) share_together: f64,
 }
 
 /// Cycles of the run whose initialization is counted; the paper's number is lost.
-pub const REFERENCE_CYCLES: u64 = 1000;
+pub(super) const REFERENCE_CYCLES: u64 = 1000;
 
 /// Worker counts whose digests are compared; more than the machine has processors is allowed.
 const DIGEST_WORKERS: [usize; 6] = [1, 2, 3, 4, 8, 16];
 
 /// The parallel performance experiment.
 #[derive(Debug, Clone, Serialize)]
-pub struct Performance {
+pub(super) struct Performance {
     /// Processors that the run may use.
-    pub processors: usize,
+    pub(super) processors: usize,
     /// What was timed.
-    pub loads: Vec<Load>,
+    pub(super) loads: Vec<Load>,
     /// The times.
-    pub timings: Vec<Timing>,
+    pub(super) timings: Vec<Timing>,
     /// Initialization of each load.
-    pub initialization: Vec<Initialization>,
+    pub(super) initialization: Vec<Initialization>,
     /// Digest after the same cycles of the same run, by number of workers.
-    pub digests: Vec<(usize, String)>,
+    pub(super) digests: Vec<(usize, String)>,
     /// Digest of the same run recorded.
-    pub recorded_digest: String,
+    pub(super) recorded_digest: String,
 }
 
 /// Loads of the experiment: sparse and dense, each at every cost of a decision.
-pub fn loads(plan: &Plan) -> Vec<Load> {
+pub(super) fn loads(plan: &Plan) -> Vec<Load> {
     let floor = Arc::new(Floor::large());
     let load = |&(robots, operations): &(u32, u32)| Load {
         robots,
@@ -85,7 +85,7 @@ pub fn loads(plan: &Plan) -> Vec<Load> {
 }
 
 /// Worker counts from 1 to `most`: all up to 4, then ever larger steps.
-pub fn worker_counts(most: usize) -> Vec<usize> {
+pub(super) fn worker_counts(most: usize) -> Vec<usize> {
     let mut counts: Vec<usize> = [1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64]
         .into_iter()
         .filter(|&count| count < most)
@@ -99,7 +99,7 @@ impl Performance {
     ///
     /// # Errors
     /// When a recording fails.
-    pub fn run(
+    pub(super) fn run(
         plan: &Plan,
         recorders: &mut NewRecorder<'_>,
         report: &mut Progress<'_>,
@@ -125,24 +125,24 @@ impl Performance {
     }
 
     /// Whether every number of workers, recorded or not, gives one digest.
-    pub fn is_deterministic(&self) -> bool {
+    pub(super) fn is_deterministic(&self) -> bool {
         self.digests.iter().all(|(_, digest)| *digest == self.recorded_digest)
     }
 
     /// The greatest number of workers that was timed.
-    pub fn most_workers(&self) -> usize {
+    pub(super) fn most_workers(&self) -> usize {
         self.timings.iter().map(|timing| timing.workers).max().unwrap_or(1)
     }
 
     /// Timings with the most workers.
-    pub fn at_most_workers(&self, recorded: bool) -> impl Iterator<Item = &Timing> {
+    pub(super) fn at_most_workers(&self, recorded: bool) -> impl Iterator<Item = &Timing> {
         let most = self.most_workers();
         self.timings.iter().filter(move |t| t.workers == most && t.recorded == recorded)
     }
 
     /// Whether the machine itself gave less than this share of the workers' worth: others
     /// were using it, and times say little.
-    pub fn was_busy(&self) -> bool {
+    pub(super) fn was_busy(&self) -> bool {
         const SHARE: f64 = 0.85;
         let least = SHARE * self.most_workers() as f64;
         self.at_most_workers(false).any(|timing| timing.machine.or_zero() < least)
@@ -150,7 +150,7 @@ impl Performance {
 
     /// Speed-up of the costliest decisions less that of the cheapest, same robots, unrecorded,
     /// with the most workers; one value per repeat and number of robots.
-    pub fn gain_by_cost(&self) -> Estimate {
+    pub(super) fn gain_by_cost(&self) -> Estimate {
         let (mut cheap, mut costly) = (Vec::new(), Vec::new());
         let cost = |timing: &Timing| self.loads[timing.load].operations;
         let extremes = [
@@ -168,7 +168,7 @@ impl Performance {
     }
 
     /// The tables of this experiment.
-    pub fn tables(&self) -> Vec<Table> {
+    pub(super) fn tables(&self) -> Vec<Table> {
         vec![self.times_table(), self.initialization_table(), self.digest_table()]
     }
 
@@ -242,7 +242,7 @@ impl Performance {
     }
 
     /// The figures of this experiment: speed-up and time over workers.
-    pub fn figures(&self) -> Vec<Figure> {
+    pub(super) fn figures(&self) -> Vec<Figure> {
         let speed_up: fn(&Timing) -> &Estimate = |t| &t.speed_up;
         let cycle_ms: fn(&Timing) -> &Estimate = |t| &t.cycle_ms;
         vec![

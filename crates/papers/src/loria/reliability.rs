@@ -5,7 +5,7 @@ use super::Plan;
 use super::errors::{Beams, Spread};
 use super::floor::{Floor, Mind};
 use super::measure::{Measure, Outcome, Tables, Variant, measure_all, values};
-use crate::farm::Progress;
+use crate::study::Progress;
 use serde::Serialize;
 use sidestep::worlds::robots::effector::ObstacleRule;
 use sidestep::worlds::robots::world::Regime;
@@ -14,42 +14,42 @@ use std::sync::Arc;
 
 /// A variant and its outcomes by seed.
 #[derive(Debug, Clone, Serialize)]
-pub struct Cell {
+pub(super) struct Cell {
     /// Name of the floor.
-    pub floor: String,
+    pub(super) floor: String,
     /// What was run.
-    pub variant: Variant,
+    pub(super) variant: Variant,
     /// What came of it.
-    pub outcomes: Vec<Outcome>,
+    pub(super) outcomes: Vec<Outcome>,
 }
 
 /// All runs of the reliability experiment.
 #[derive(Debug, Clone, Serialize)]
-pub struct Reliability {
+pub(super) struct Reliability {
     /// The floors, in words.
-    pub floors: Vec<String>,
+    pub(super) floors: Vec<String>,
     /// Every variant with its outcomes.
-    pub cells: Vec<Cell>,
+    pub(super) cells: Vec<Cell>,
     /// Error levels of the sweep.
-    pub levels: Vec<f64>,
+    pub(super) levels: Vec<f64>,
 }
 
 /// What selects a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Key<'a> {
+pub(super) struct Key<'a> {
     /// Name of the floor.
-    pub floor: &'a str,
+    pub(super) floor: &'a str,
     /// Law for blocked paths.
-    pub rule: ObstacleRule,
+    pub(super) rule: ObstacleRule,
     /// How robots decide.
-    pub mind: Mind,
+    pub(super) mind: Mind,
     /// How they err.
-    pub tables: Tables,
+    pub(super) tables: Tables,
 }
 
 impl Key<'_> {
     /// The medium floor, rule `cut`, avoiding robots, presets.
-    pub const BASE: Key<'static> = Key {
+    pub(super) const BASE: Key<'static> = Key {
         floor: "medium",
         rule: ObstacleRule::Cut,
         mind: Mind::Avoid,
@@ -58,7 +58,7 @@ impl Key<'_> {
 }
 
 /// Measures that are reported, with their names.
-pub const MEASURES: [(&str, Measure); 6] = [
+pub(super) const MEASURES: [(&str, Measure); 6] = [
     ("contacts / 1000 actions", |o| o.contacts),
     ("with walls", |o| o.wall_contacts),
     ("with robots", |o| o.robot_contacts),
@@ -68,23 +68,23 @@ pub const MEASURES: [(&str, Measure); 6] = [
 ];
 
 /// Contacts per 1000 actions.
-pub const CONTACTS: Measure = MEASURES[0].1;
+pub(super) const CONTACTS: Measure = MEASURES[0].1;
 /// Cycles of a to-and-fro trip.
-pub const TRIP: Measure = MEASURES[3].1;
+pub(super) const TRIP: Measure = MEASURES[3].1;
 /// Straightness of trajectories.
-pub const STRAIGHTNESS: Measure = MEASURES[4].1;
+pub(super) const STRAIGHTNESS: Measure = MEASURES[4].1;
 /// Sideways moves per 1000 actions.
-pub const LATERAL: Measure = MEASURES[5].1;
+pub(super) const LATERAL: Measure = MEASURES[5].1;
 
 impl Reliability {
     /// Runs the experiment.
-    pub fn run(plan: &Plan, report: &mut Progress<'_>) -> Self {
+    pub(super) fn run(plan: &Plan, report: &mut Progress<'_>) -> Self {
         let floors = [Floor::medium(), Floor::small(), Floor::large()].map(Arc::new);
         let variants = variants(&floors, plan);
         let size = (plan.seeds, plan.cycles);
         let outcomes = measure_all(&variants, size, plan.workers, "reliability", report);
         let cell = |(variant, outcomes): (Variant, _)| Cell {
-            floor: variant.floor.name.clone(),
+            floor: variant.floor.name.into(),
             variant,
             outcomes,
         };
@@ -96,7 +96,12 @@ impl Reliability {
     }
 
     /// Values by seed of one measure in one cell; empty for a cell that was not run.
-    pub fn values(&self, key: Key<'_>, regime: Regime, measure: Measure) -> Vec<Option<f64>> {
+    pub(super) fn values(
+        &self,
+        key: Key<'_>,
+        regime: Regime,
+        measure: Measure,
+    ) -> Vec<Option<f64>> {
         // A regime that switches an error off does not depend on that error's table, so those
         // cells are run for one table only.
         let is_cell = |cell: &&Cell| {
@@ -109,28 +114,38 @@ impl Reliability {
     }
 
     /// The mean of a measure in one cell.
-    pub fn estimate(&self, key: Key<'_>, regime: Regime, measure: Measure) -> Estimate {
+    pub(super) fn estimate(&self, key: Key<'_>, regime: Regime, measure: Measure) -> Estimate {
         Estimate::of(self.values(key, regime, measure))
     }
 
     /// Paired difference of a measure between two regimes, `a - b`.
-    pub fn difference(&self, key: Key<'_>, [a, b]: [Regime; 2], measure: Measure) -> Estimate {
+    pub(super) fn difference(
+        &self,
+        key: Key<'_>,
+        [a, b]: [Regime; 2],
+        measure: Measure,
+    ) -> Estimate {
         Estimate::paired(&self.values(key, a, measure), &self.values(key, b, measure))
     }
 
     /// Ratio of a measure between two regimes seed by seed, `a / b`.
-    pub fn ratio(&self, key: Key<'_>, [a, b]: [Regime; 2], measure: Measure) -> Estimate {
+    pub(super) fn ratio(&self, key: Key<'_>, [a, b]: [Regime; 2], measure: Measure) -> Estimate {
         Estimate::ratio(&self.values(key, a, measure), &self.values(key, b, measure))
     }
 
     /// Paired difference of a measure between two minds under one regime, `a - b`.
-    pub fn between_minds(&self, [a, b]: [Mind; 2], regime: Regime, measure: Measure) -> Estimate {
+    pub(super) fn between_minds(
+        &self,
+        [a, b]: [Mind; 2],
+        regime: Regime,
+        measure: Measure,
+    ) -> Estimate {
         let of = |mind| self.values(Key { mind, ..Key::BASE }, regime, measure);
         Estimate::paired(&of(a), &of(b))
     }
 
     /// Keys of the places where the four regimes were run under the presets.
-    pub fn places(&self) -> Vec<Key<'static>> {
+    pub(super) fn places(&self) -> Vec<Key<'static>> {
         let rules = ObstacleRule::ALL.map(|rule| Key { rule, ..Key::BASE });
         let floors = ["small", "large"].map(|floor| Key { floor, ..Key::BASE });
         let minds = [Mind::Touch, Mind::Filter].map(|mind| Key { mind, ..Key::BASE });
@@ -138,12 +153,12 @@ impl Reliability {
     }
 
     /// Contacts by sensor errors alone less those by effector errors alone, at one level.
-    pub fn sensors_less_effectors(&self, case: SweepCase, e: f64) -> Estimate {
+    pub(super) fn sensors_less_effectors(&self, case: SweepCase, e: f64) -> Estimate {
         self.difference(case.key(e), [Regime::Sensors, Regime::Effectors], CONTACTS)
     }
 
     /// The tables of this experiment.
-    pub fn tables(&self) -> Vec<Table> {
+    pub(super) fn tables(&self) -> Vec<Table> {
         vec![self.regimes_table(), self.differences_table(), self.sweep_table(), self.minds_table()]
     }
 
@@ -245,7 +260,7 @@ impl Reliability {
     }
 
     /// The figures of this experiment.
-    pub fn figures(&self) -> Vec<Figure> {
+    pub(super) fn figures(&self) -> Vec<Figure> {
         let bars = [
             self.bars("Contacts under the four regimes", "contacts per 1000 actions", CONTACTS),
             self.bars("A to-and-fro trip under the four regimes", "cycles per trip", TRIP),
@@ -303,13 +318,13 @@ impl Reliability {
 
 /// A behaviour, its beams and their recipe of errors, swept over the error level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct SweepCase {
+pub(super) struct SweepCase {
     /// How robots decide.
-    pub mind: Mind,
+    pub(super) mind: Mind,
     /// How many beams they have.
-    pub beams: Beams,
+    pub(super) beams: Beams,
     /// Where the sensor's error mass goes.
-    pub spread: Spread,
+    pub(super) spread: Spread,
 }
 
 impl SweepCase {
@@ -317,7 +332,7 @@ impl SweepCase {
         [(Mind::Avoid, Beams::Sixteen), (Mind::Filter, Beams::Sixteen), (Mind::Avoid, Beams::Four)];
 
     /// All cases of the sweep.
-    pub fn all() -> impl Iterator<Item = Self> {
+    pub(super) fn all() -> impl Iterator<Item = Self> {
         let case = |(mind, beams)| Spread::ALL.map(|spread| Self { mind, beams, spread });
         Self::MINDS.into_iter().flat_map(case)
     }
@@ -328,14 +343,14 @@ impl SweepCase {
     }
 
     /// Behaviour, number of beams and recipe, for tables.
-    pub fn names(self) -> [String; 3] {
+    pub(super) fn names(self) -> [String; 3] {
         let beams = self.beams.bearings_deg().len().to_string();
         [self.mind.name().into(), beams, self.spread.name().into()]
     }
 }
 
 /// Which of the two causes more contacts, where the interval tells.
-pub fn larger(sensors_less_effectors: &Estimate) -> &'static str {
+pub(super) fn larger(sensors_less_effectors: &Estimate) -> &'static str {
     if sensors_less_effectors.is_above(0.0) {
         "sensors"
     } else if sensors_less_effectors.is_below(0.0) {

@@ -3,7 +3,7 @@
 use super::Plan;
 use super::performance::{loads, worker_counts};
 use super::timing::{Load, STRETCHES, arithmetic, race, seconds};
-use crate::farm::Progress;
+use crate::study::Progress;
 use serde::Serialize;
 use sidestep::kernel::Simulation;
 use sidestep::worlds::robots::baseline::{Baseline, Strategy, breach};
@@ -13,38 +13,38 @@ use std::convert::Infallible;
 
 /// A strategy's time for a load.
 #[derive(Debug, Clone, Serialize)]
-pub struct Trial {
+pub(super) struct Trial {
     /// Number of the load.
-    pub load: usize,
+    pub(super) load: usize,
     /// Name of the strategy.
-    pub strategy: String,
+    pub(super) strategy: String,
     /// Workers.
-    pub workers: usize,
+    pub(super) workers: usize,
     /// Milliseconds per cycle.
-    pub cycle_ms: Estimate,
+    pub(super) cycle_ms: Estimate,
     /// Time of the double pool with one worker by this time.
-    pub speed_up: Estimate,
+    pub(super) speed_up: Estimate,
     /// The same by repeat, for pairs with other strategies.
-    pub ratios: Vec<Option<f64>>,
+    pub(super) ratios: Vec<Option<f64>>,
     /// Speed-up of mere arithmetic with as many workers, timed in turn with this.
-    pub machine: Estimate,
+    pub(super) machine: Estimate,
     /// Contacts per 1000 actions: what a robot meets depends on the strategy.
-    pub contacts: f64,
+    pub(super) contacts: f64,
     /// Share of the bodies' cycles that one worker does while all others wait.
-    pub serial_share: f64,
+    pub(super) serial_share: f64,
     /// Whether at the end no two bodies shared a box, and none stood in a wall.
-    pub valid: bool,
+    pub(super) valid: bool,
     /// Whether every robot has acted once in every cycle.
-    pub complete: bool,
+    pub(super) complete: bool,
 }
 
 /// All trials.
 #[derive(Debug, Clone, Serialize)]
-pub struct Strategies {
+pub(super) struct Strategies {
     /// What was timed.
-    pub loads: Vec<Load>,
+    pub(super) loads: Vec<Load>,
     /// The trials.
-    pub trials: Vec<Trial>,
+    pub(super) trials: Vec<Trial>,
 }
 
 /// Name of the kernel's strategy.
@@ -92,7 +92,7 @@ impl Contestant {
 
 impl Strategies {
     /// Runs the comparison.
-    pub fn run(plan: &Plan, report: &mut Progress<'_>) -> Self {
+    pub(super) fn run(plan: &Plan, report: &mut Progress<'_>) -> Self {
         let mut loads = loads(plan);
         let extremes = [plan.operations.iter().min(), plan.operations.iter().max()];
         loads.retain(|load| extremes.contains(&Some(&load.operations)));
@@ -105,13 +105,14 @@ impl Strategies {
     }
 
     /// Whether every trial has kept the laws and left nobody out.
-    pub fn all_valid(&self) -> bool {
+    #[cfg(test)]
+    pub(super) fn all_valid(&self) -> bool {
         self.trials.iter().all(|trial| trial.valid && trial.complete)
     }
 
     /// Speed-up of the double pool less that of another strategy, with the most workers, one
     /// estimate per load.
-    pub fn lead_over(&self, strategy: Strategy) -> Vec<Estimate> {
+    pub(super) fn lead_over(&self, strategy: Strategy) -> Vec<Estimate> {
         let most = self.trials.iter().map(|t| t.workers).max().unwrap_or(1);
         let ratios = |load: usize, name: &str| {
             let is = |t: &&Trial| (t.load, t.workers, t.strategy.as_str()) == (load, most, name);
@@ -123,7 +124,7 @@ impl Strategies {
     }
 
     /// The comparison as a table.
-    pub fn table(&self) -> Table {
+    pub(super) fn table(&self) -> Table {
         let columns = [
             "load",
             "strategy",
@@ -161,7 +162,7 @@ impl Strategies {
     }
 
     /// Speed-up over workers, one figure per load.
-    pub fn figures(&self) -> Vec<Figure> {
+    pub(super) fn figures(&self) -> Vec<Figure> {
         let figure = |(index, load): (usize, &Load)| Figure {
             title: format!("Strategies: {}", load.name()),
             x_label: "workers".into(),

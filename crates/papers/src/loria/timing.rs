@@ -3,6 +3,7 @@
 use super::NewRecorder;
 use super::floor::Floor;
 use super::patrol::{Costly, burn};
+use crate::study::{setting, source};
 use serde::Serialize;
 use sidestep::kernel::Simulation;
 use sidestep::kernel::ports::{Clock, RecordError, Recorder, SystemClock};
@@ -13,63 +14,63 @@ use sidestep::worlds::robots::scenario::{Behaviours, Compiled, StorageOrder};
 use sidestep::worlds::robots::simulation::RobotsSimulation;
 use std::sync::Arc;
 
+const SMALL: &str = include_str!("../../../../scenarios/papers/loria/wander-small.toml");
+const LARGE: &str = include_str!("../../../../scenarios/papers/loria/wander-large.toml");
+
 /// Robots that wander on a floor among people and doors, at a given density and cost.
 #[derive(Debug, Clone, Serialize)]
-pub struct Load {
+pub(super) struct Load {
     /// Robots.
-    pub robots: u32,
+    pub(super) robots: u32,
     /// People, of 2 x 2 boxes.
-    pub people: u32,
+    pub(super) people: u32,
     /// Robots cover `size` x `size` boxes.
-    pub size: u32,
+    pub(super) size: u32,
     /// Multiply-and-adds that every decision costs beside its own work.
-    pub operations: u32,
+    pub(super) operations: u32,
     /// The building.
     #[serde(skip)]
-    pub floor: Arc<Floor>,
+    pub(super) floor: Arc<Floor>,
 }
 
 impl Load {
     /// Free boxes that robots and people cover, as a share.
-    pub fn density(&self) -> f64 {
+    pub(super) fn density(&self) -> f64 {
         let free = self.floor.office.map.count(sidestep::map::Cell::Free).max(1);
         f64::from(self.robots * self.size * self.size + self.people * 4) / free as f64
     }
 
     /// Its name in tables.
-    pub fn name(&self) -> String {
+    pub(super) fn name(&self) -> String {
         let (robots, operations) = (self.robots, self.operations);
         format!("{robots} robots, {:.0} % covered, {operations} operations", 100.0 * self.density())
     }
 
     /// Cycles that take about as long as `robot_cycles` decisions that cost nothing extra.
-    pub fn cycles(&self, robot_cycles: u64) -> u64 {
+    pub(super) fn cycles(&self, robot_cycles: u64) -> u64 {
         let bodies = u64::from(self.robots + self.people).max(1);
         // A decision with its sensing takes about as long as 500 operations.
         (robot_cycles / (bodies * (1 + u64::from(self.operations) / 500))).max(10)
     }
 
     /// The scenario.
-    pub fn source(&self) -> Source {
-        let doors = "[doors]\noffice = true\nrandom = { p_open = 0.005, p_close = 0.01 }\n";
-        let text = format!(
-            "format = 1\nworld = \"robots\"\nseed = 1\n{}\
-             [[robots]]\ncount = {}\nsize = {}\nsensors = [\"sonar-ring\"]\n\
-             effector = \"nomad\"\nbehaviour = {{ kind = \"costly\" }}\n\
-             [[people]]\ncount = {}\nsize = [2, 2]\np_straight = 0.9\n{doors}",
-            self.floor.map_section(),
-            self.robots,
-            self.size,
-            self.people,
-        );
-        Source::new("reproduce loria", text, "")
+    fn source(&self) -> Source {
+        let costly = toml::Table::from_iter([("kind".to_string(), "costly".into())]);
+        let settings = [
+            setting("robots.count", self.robots),
+            setting("robots.size", self.size),
+            setting("robots.behaviour", costly),
+            setting("people.count", self.people),
+        ];
+        let text = if self.floor.name == "small" { SMALL } else { LARGE };
+        source(text, &settings).expect("the experiments' scenarios are valid")
     }
 
     /// The compiled world.
     ///
     /// # Panics
     /// When the load does not fit its floor; the experiments' own do.
-    pub fn compiled(&self) -> Compiled {
+    pub(super) fn compiled(&self) -> Compiled {
         let costly = Costly { inner: Arc::new(Wander::default()), operations: self.operations };
         let behaviours = Behaviours::from([("costly".into(), Arc::new(costly) as _)]);
         Compiled::new(&self.source(), &behaviours, StorageOrder::Spatial)
@@ -77,20 +78,20 @@ impl Load {
     }
 
     /// A run at its start.
-    pub fn simulation(&self, workers: usize) -> RobotsSimulation {
+    pub(super) fn simulation(&self, workers: usize) -> RobotsSimulation {
         RobotsSimulation::from_compiled(self.compiled(), &self.source(), workers)
     }
 }
 
 /// Seconds that `work` takes.
-pub fn seconds<T>(work: impl FnOnce() -> T) -> (f64, T) {
+pub(super) fn seconds<T>(work: impl FnOnce() -> T) -> (f64, T) {
     let clock = SystemClock::default();
     let result = work();
     (clock.now_ns() as f64 * 1e-9, result)
 }
 
 /// Of so many stretches in turn the best one counts as one repeat.
-pub const STRETCHES: usize = 8;
+pub(super) const STRETCHES: usize = 8;
 
 /// Times contestants in turn. Each gets `repeats` values, and every value is the shortest of
 /// [`STRETCHES`] short stretches: what the machine gives when nothing else disturbs it.
@@ -98,7 +99,7 @@ pub const STRETCHES: usize = 8;
 ///
 /// # Errors
 /// The first that `run` gives.
-pub fn race<C, E>(
+pub(super) fn race<C, E>(
     contestants: &mut [C],
     repeats: usize,
     mut run: impl FnMut(&mut C) -> Result<f64, E>,
@@ -118,7 +119,7 @@ pub fn race<C, E>(
 
 /// Seconds that arithmetic without any world takes, shared out among workers: what the machine
 /// itself can give at the moment.
-pub fn arithmetic(workers: usize, robot_cycles: u64) -> f64 {
+pub(super) fn arithmetic(workers: usize, robot_cycles: u64) -> f64 {
     const OPERATIONS: u32 = 500;
     let work = |worker: &workers::Worker<'_>, (): &mut ()| {
         worker.for_each_chunk(0, robot_cycles as usize, |tasks| {
@@ -129,14 +130,14 @@ pub fn arithmetic(workers: usize, robot_cycles: u64) -> f64 {
 }
 
 /// A run, and where its rows go if it is recorded.
-pub struct Timed {
+pub(super) struct Timed {
     simulation: RobotsSimulation,
     recorder: Option<Box<dyn Recorder>>,
 }
 
 impl Timed {
     /// A run that is not recorded.
-    pub fn new(load: &Load, workers: usize) -> Self {
+    pub(super) fn new(load: &Load, workers: usize) -> Self {
         Self { simulation: load.simulation(workers), recorder: None }
     }
 
@@ -144,7 +145,7 @@ impl Timed {
     ///
     /// # Errors
     /// When the recorder cannot be made.
-    pub fn recorded(
+    pub(super) fn recorded(
         load: &Load,
         workers: usize,
         recorders: &mut NewRecorder<'_>,
@@ -159,7 +160,7 @@ impl Timed {
     ///
     /// # Errors
     /// When rows cannot be stored.
-    pub fn run(&mut self, cycles: u64) -> Result<f64, RecordError> {
+    pub(super) fn run(&mut self, cycles: u64) -> Result<f64, RecordError> {
         let (took_s, result) = seconds(|| {
             let mut done = 0;
             while done < cycles {
@@ -174,7 +175,7 @@ impl Timed {
     }
 
     /// The run.
-    pub fn simulation(&self) -> &RobotsSimulation {
+    pub(super) fn simulation(&self) -> &RobotsSimulation {
         &self.simulation
     }
 
@@ -182,7 +183,7 @@ impl Timed {
     ///
     /// # Errors
     /// When the last rows cannot be stored.
-    pub fn finish(mut self) -> Result<(), RecordError> {
+    pub(super) fn finish(mut self) -> Result<(), RecordError> {
         self.recorder.as_mut().map_or(Ok(()), |recorder| recorder.finish())
     }
 }

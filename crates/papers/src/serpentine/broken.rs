@@ -1,10 +1,12 @@
 //! A chain whose middle parts are thrown about, or partly gone, is joined again between its two
 //! whole ends (slide F3).
 
-use super::Plan;
-use super::runs::{Share, draws, grid, median};
-use crate::farm::Progress;
+use super::{Plan, draws};
+use crate::cells::{Cell, Columns, Value, column};
+use crate::study::{Progress, Study, number, outcome, setting};
 use serde::Serialize;
+use serde_json::{Value as Json, json};
+use sidestep::experiment::sweep::{Setting, Variant};
 use sidestep::kernel::InputError;
 use sidestep::kernel::distr::normal;
 use sidestep::kernel::math::{cos, sin};
@@ -20,52 +22,62 @@ const ROD: Rod = Rod { min_m: 0.9, max_m: 1.1, radius_m: 0.02 };
 /// Standard deviation of the bends of the whole chain, radians.
 const BEND_RAD: f64 = 0.3;
 
+const COLUMNS: Columns = Columns {
+    case: &[
+        column("scattered", "scattered", |r| r.set("scattered")),
+        column("by_m", "by, m", |r| r.set("by_m")),
+        column("gone", "gone", |r| r.set("gone")),
+        column("may_come", "an end may come", |r| r.set("may_come")),
+    ],
+    came: &[
+        column("can", "parts reach", |r| r.share(|run| run.is("can"))),
+        column("whole", "whole again", |r| r.share(|run| run.is("whole"))),
+        column("too_long", "refused", |r| r.count(|run| run.is("too_long"))),
+        column("median_passes", "passes there and back, median (most)", |r| {
+            Value::Number(r.median("passes"))
+        })
+        .shown(|c| format!("{} ({})", short(c.number("median_passes")), c.count("most_passes"))),
+        column("most_passes", "", |r| Value::Count(r.most("passes") as u64)),
+        column("ends_kept", "ends kept", |r| r.share(|run| run.is("ends_kept"))),
+        column("rod_violation_m", "", |r| Value::Number(r.most("rod_violation_m"))),
+    ],
+};
+
 /// What is run.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Case {
+#[derive(Debug, Clone, Copy)]
+struct Case {
     /// Middle connectors that are thrown about,
-    pub scattered: usize,
+    scattered: usize,
     /// by this standard deviation.
-    pub by_m: f64,
+    by_m: f64,
     /// Middle connectors that are gone.
-    pub gone: usize,
+    gone: usize,
     /// Whether the end with the last connector may come.
-    pub may_come: bool,
+    may_come: bool,
 }
 
-/// What came of one case.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Cell {
-    /// The case.
-    pub case: Case,
-    /// Runs whose parts reach across the gap.
-    pub can: Share,
-    /// Runs that are whole again.
-    pub whole: Share,
-    /// Runs that were refused because the parts do not reach.
-    pub too_long: u64,
-    /// Of the whole ones the median of passes there and back,
-    pub median_passes: f64,
-    /// and the most.
-    pub most_passes: usize,
-    /// Runs whose ends that may not move kept every bit.
-    pub ends_kept: Share,
-    /// The greatest amount by which a rod is outside its limits when all is whole.
-    pub rod_violation_m: f64,
-}
+impl Case {
+    fn settings(self) -> Vec<Setting> {
+        vec![
+            setting("scattered", self.scattered as i64),
+            setting("by_m", self.by_m),
+            setting("gone", self.gone as i64),
+            setting("may_come", self.may_come),
+        ]
+    }
 
-struct Run {
-    can: bool,
-    came: Reformed,
-    ends_kept: bool,
-    rod_violation_m: f64,
+    fn of(variant: &Variant) -> Self {
+        let [scattered, gone] = ["scattered", "gone"].map(|key| number(variant, key) as usize);
+        let may_come = variant.value("may_come").and_then(toml::Value::as_bool) == Some(true);
+        Self { scattered, by_m: number(variant, "by_m"), gone, may_come }
+    }
 }
 
 /// All cases.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Broken {
+pub(super) struct Broken {
     /// Results by case.
-    pub cells: Vec<Cell>,
+    pub(super) cells: Vec<Cell>,
 }
 
 /// A chain that bends a little at every connector.
@@ -107,7 +119,7 @@ pub(super) fn before_and_after(seed: u64) -> Result<[Vec<Point<2>>; 2], InputErr
     Ok([before, chain.points().to_vec()])
 }
 
-fn joined(case: &Case, seed: u64) -> Result<Run, InputError> {
+fn joined(case: &Case, seed: u64) -> Result<Json, InputError> {
     let (mut chain, scattered) = broken(case, seed)?;
     let before = chain.points().to_vec();
     let (low, high) = (*scattered.start() - 1, *scattered.end() + 1);
@@ -115,77 +127,41 @@ fn joined(case: &Case, seed: u64) -> Result<Run, InputError> {
     let may_come = if case.may_come { MayCome::Last } else { MayCome::Nobody };
     let came = reform(&mut chain, scattered, may_come)?;
     let kept = |range: std::ops::Range<usize>| chain.points()[range.clone()] == before[range];
-    // An end that may come keeps its place only where it need not.
-    let ends_kept = kept(0..low + 1) && ((case.may_come && !can) || kept(high..before.len()));
-    Ok(Run { can, came, ends_kept, rod_violation_m: chain.max_rod_violation_m() })
+    let passes = match came {
+        Reformed::Whole { double_passes } => Some(double_passes),
+        _ => None,
+    };
+    Ok(json!({
+        "can": can,
+        "whole": passes.is_some(),
+        "too_long": matches!(came, Reformed::GapTooLong { .. }),
+        "passes": passes,
+        // An end that may come keeps its place only where it need not.
+        "ends_kept": kept(0..low + 1) && ((case.may_come && !can) || kept(high..before.len())),
+        "rod_violation_m": passes.map(|_| chain.max_rod_violation_m()),
+    }))
 }
 
 impl Broken {
     pub(super) fn run(plan: &Plan, progress: &mut Progress<'_>) -> Result<Self, InputError> {
         let mut cases = Vec::new();
         for scattered in [4, 10, 20] {
-            for by_m in [1.0, 10.0, 100.0] {
-                cases.push(Case { scattered, by_m, gone: 0, may_come: false });
-            }
-            for may_come in [false, true] {
-                cases.push(Case { scattered, by_m: 10.0, gone: 2, may_come });
-            }
+            let case = |by_m, gone, may_come| Case { scattered, by_m, gone, may_come }.settings();
+            cases.extend([1.0, 10.0, 100.0].map(|by_m| case(by_m, 0, false)));
+            cases.extend([false, true].map(|may_come| case(10.0, 2, may_come)));
         }
-        let all = grid((plan, plan.breaks), "broken chains", &cases, progress, joined)?;
-        Ok(Self { cells: cases.iter().zip(&all).map(|(case, runs)| cell(*case, runs)).collect() })
+        let study = Study::of_variants("", cases).sized(plan.breaks, None);
+        let what = (plan.workers, "broken chains");
+        let results = study.run_by(what, progress, |_, case, cell| {
+            Ok(outcome(cell, joined(&Case::of(case), cell.seed)?))
+        })?;
+        Ok(Self { cells: COLUMNS.cells(&results) })
     }
 
     pub(super) fn table(&self) -> Table {
         let note = "40 connectors 1 m apart (rods of 0.9 to 1.1 m), bent at random; of the middle \
                     ones so many are thrown about, two of them are gone where it says so. A gap \
                     that the parts left cannot reach across is refused, or one end comes.";
-        let columns = [
-            "scattered",
-            "by, m",
-            "gone",
-            "an end may come",
-            "parts reach",
-            "whole again",
-            "refused",
-            "passes there and back, median (most)",
-            "ends kept",
-        ];
-        let mut table = Table::new("Broken chains", note, &columns);
-        for c in &self.cells {
-            table.row([
-                c.case.scattered.to_string(),
-                c.case.by_m.to_string(),
-                c.case.gone.to_string(),
-                if c.case.may_come { "yes" } else { "no" }.into(),
-                c.can.to_string(),
-                c.whole.to_string(),
-                c.too_long.to_string(),
-                format!("{} ({})", short(c.median_passes), c.most_passes),
-                c.ends_kept.to_string(),
-            ]);
-        }
-        table
-    }
-}
-
-fn cell(case: Case, runs: &[Run]) -> Cell {
-    let passes = || {
-        runs.iter().filter_map(|r| match r.came {
-            Reformed::Whole { double_passes } => Some(double_passes),
-            _ => None,
-        })
-    };
-    let is_whole = |r: &Run| matches!(r.came, Reformed::Whole { .. });
-    let is_too_long = |r: &&Run| matches!(r.came, Reformed::GapTooLong { .. });
-    let violations = runs.iter().filter(|r| is_whole(r)).map(|r| r.rod_violation_m);
-    Cell {
-        case,
-        can: Share::of(runs.iter().map(|r| r.can)),
-        whole: Share::of(runs.iter().map(is_whole)),
-        too_long: runs.iter().filter(is_too_long).count() as u64,
-        median_passes: median(passes().map(|n| n as f64)),
-        most_passes: passes().max().unwrap_or(0),
-        ends_kept: Share::of(runs.iter().map(|r| r.ends_kept)),
-        rod_violation_m: violations.fold(0.0, f64::max),
+        COLUMNS.table("Broken chains", note, &self.cells)
     }
 }

@@ -1,19 +1,23 @@
 //! Who may begin a motion, and who may object (slides R4, R5, R7, R8), and whether bends keep
 //! their limits (slide F1).
 
-use super::Plan;
-use super::runs::{Share, begun, draws, finish, grid, head};
-use crate::farm::Progress;
+use super::{Plan, draws};
+use crate::cells::Share;
+use crate::study::{Progress, all_of, finish, setting, source};
 use serde::Serialize;
 use sidestep::kernel::InputError;
 use sidestep::kernel::distr::normal;
 use sidestep::kernel::stream::Draws;
 use sidestep::worlds::chain::geometry::{Point, along, distance, unit};
+use sidestep::worlds::chain::scenario::Compiled;
+use sidestep::worlds::chain::simulation::ChainSimulation;
 use sidestep::worlds::chain::{
     BEND_TOLERANCE_RAD, Chain, Connector, Mobility, Obstacles, Outcome, Propagator, Reason,
     Request, Rod,
 };
 use sidestep_document::Table;
+
+const FAILING: &str = include_str!("../../../../scenarios/papers/serpentine/failing.toml");
 
 /// Connectors of the chain: an arm as redundant as the slides' snake of 25 degrees of freedom.
 const CONNECTORS: usize = 26;
@@ -24,40 +28,40 @@ const MOTIONS: usize = 400;
 
 /// Every connector as initiator.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Initiators {
+pub(super) struct Initiators {
     /// Motions that every connector of a free chain began, and that were made.
-    pub moved: Share,
+    pub(super) moved: Share,
     /// Of these, motions of a connector in the middle after which each half is where it would be
     /// as a chain of its own, to the bit.
-    pub halves_alike: Share,
+    pub(super) halves_alike: Share,
     /// Motions of a chain with a fixed base to which the base objected, as fixed.
-    pub base_objected: Share,
+    pub(super) base_objected: Share,
     /// Motions of a chain with a failed connector to which that one objected, as failed.
-    pub failed_objected: Share,
+    pub(super) failed_objected: Share,
     /// Vetoes that left every bit of the chain as it was.
-    pub kept: Share,
+    pub(super) kept: Share,
     /// Runs of a world in which a connector fails on the way, and the operator is told that it was
     /// that one.
-    pub told: Share,
+    pub(super) told: Share,
     /// Bend limits.
-    pub bends: Vec<Bend>,
+    pub(super) bends: Vec<Bend>,
 }
 
 /// What bend limits come to.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Bend {
+pub(super) struct Bend {
     /// The limit.
-    pub limit_deg: f64,
+    pub(super) limit_deg: f64,
     /// Whether in space, or in the plane.
-    pub in_space: bool,
+    pub(super) in_space: bool,
     /// Motions that were made.
-    pub moved: Share,
+    pub(super) moved: Share,
     /// Vetoes for another reason than the limit.
-    pub other_vetoes: u64,
+    pub(super) other_vetoes: u64,
     /// Motions after which a bend was beyond the limit.
-    pub exceeded: u64,
+    pub(super) exceeded: u64,
     /// The sharpest bend.
-    pub sharpest_deg: f64,
+    pub(super) sharpest_deg: f64,
 }
 
 #[derive(Default)]
@@ -101,7 +105,7 @@ fn propagated(chain: &mut Chain<3>, k: usize, to: Point<3>) -> Result<Outcome<3>
     Propagator::default().propagate(chain, &Obstacles::default(), &Request::exact(k, to))
 }
 
-fn seen(_: &(), seed: u64) -> Result<Seen, InputError> {
+fn seen(seed: u64) -> Result<Seen, InputError> {
     let draws = &mut draws(seed);
     let free = chain::<3>(draws, std::f64::consts::PI)?;
     let mut seen = Seen::default();
@@ -148,17 +152,15 @@ fn objects(
 }
 
 /// An operator leads a chain, a connector of it fails, and the operator is told who objects.
-fn told(_: &(), seed: u64) -> Result<bool, InputError> {
+fn told(seed: u64) -> Result<bool, InputError> {
     let failing = 1 + (draws(seed).below(14)) as usize;
-    let text = format!(
-        "{}dt_s = 0.02\n[[chains]]\nconnectors = 16\nat_m = [0.0, 0.0]\nrod_m = 0.5\nradius_m = 0.1\n\
-         [[chains.tasks]]\nkind = \"script\"\nscript = \"forward 2 turn 40 forward 4\"\n\
-         speed_m_s = 0.5\npatience_s = 1.0\n\
-         [[chains.changes]]\nat_s = 2.0\nconnector = {failing}\nfailed = true\n",
-        head::<2>(seed, 2000),
-    );
-    let mut run = begun::<2>(text)?;
-    finish(&mut run, |_| ());
+    let source = source(
+        FAILING,
+        &[setting("chains.changes.connector", failing as i64), setting("seed", seed as i64)],
+    )?;
+    let mut run = ChainSimulation::<2>::new(Compiled::new(&source)?, &source, 1);
+    let cycles = run.compiled().cycles;
+    finish(&mut run, cycles, |_| ());
     let metrics = run.chain_metrics();
     let by_it = metrics.given_up.iter().map(|given_up| {
         let what = &given_up.what;
@@ -199,26 +201,29 @@ fn bent<const D: usize>(limit_rad: f64, seed: u64) -> Result<Bent, InputError> {
 
 impl Initiators {
     pub(super) fn run(plan: &Plan, progress: &mut Progress<'_>) -> Result<Self, InputError> {
-        let what = "who begins, who objects";
-        let all = grid((plan, plan.seeds), what, &[()], progress, seen)?;
-        let all = Seen::all(all.into_iter().flatten().collect());
-        let told = grid((plan, plan.seeds), what, &[()], progress, told)?;
+        let seeds: Vec<u64> = (1..=plan.seeds as u64).collect();
+        let mut report = |share| progress("who begins, who objects", share);
+        let all = all_of(&seeds, plan.workers, &mut report, |seed| seen(*seed))?;
+        let all = Seen::all(all);
+        let told = all_of(&seeds, plan.workers, &mut report, |seed| told(*seed))?;
         let limits = [(90.0, false), (60.0, false), (30.0, false), (60.0, true), (30.0, true)];
-        let bends = grid((plan, plan.seeds), "bend limits", &limits, progress, |case, seed| {
-            let (limit_deg, in_space): (f64, bool) = *case;
-            match in_space {
-                true => bent::<3>(limit_deg.to_radians(), seed),
-                false => bent::<2>(limit_deg.to_radians(), seed),
-            }
-        })?;
+        let bends = limits.iter().map(|&(limit_deg, in_space): &(f64, bool)| {
+            let limit_rad = limit_deg.to_radians();
+            let runs = all_of(&seeds, plan.workers, &mut report, |&seed| match in_space {
+                true => bent::<3>(limit_rad, seed),
+                false => bent::<2>(limit_rad, seed),
+            })?;
+            Ok(bend((limit_deg, in_space), &runs))
+        });
+        let bends: Vec<Bend> = bends.collect::<Result<_, InputError>>()?;
         Ok(Self {
             moved: Share::of(all.moved),
             halves_alike: Share::of(all.halves_alike),
             base_objected: Share::of(all.base_objected),
             failed_objected: Share::of(all.failed_objected),
             kept: Share::of(all.kept),
-            told: Share::of(told.concat()),
-            bends: limits.iter().zip(&bends).map(|(limit, runs)| bend(*limit, runs)).collect(),
+            told: Share::of(told),
+            bends,
         })
     }
 

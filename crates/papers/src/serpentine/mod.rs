@@ -6,7 +6,6 @@
 //! claim whether it held, did not hold, or cannot be judged.
 //!
 //! ```text
-//! runs.rs          scenarios as text, cells of cases and seeds, shares
 //! corridor.rs, rotation.rs, field.rs    the swarm and its leader
 //! pushing.rs, movers.rs, snake.rs       chains among what stands and what moves
 //! scaling.rs, broken.rs, postures.rs, initiators.rs    what needs no world around it
@@ -14,28 +13,36 @@
 //! claims/          what follows from all that
 //! ```
 
-pub mod broken;
-pub mod claims;
-pub mod corridor;
-pub mod field;
-pub mod initiators;
-pub mod movers;
-pub mod postures;
-pub mod pushing;
-pub mod rotation;
-mod runs;
-pub mod scaling;
+mod broken;
+mod claims;
+mod corridor;
+mod field;
+mod initiators;
+mod movers;
+mod postures;
+mod pushing;
+mod rotation;
+mod scaling;
 pub mod scenes;
-pub mod snake;
+mod snake;
 
-pub use runs::Share;
-
-use crate::farm::{Progress, stage};
+use crate::study::{Progress, stage};
 use serde::Serialize;
-use sidestep::kernel::InputError;
+use sidestep::kernel::stream::{Draws, Purpose, Streams};
 use sidestep::kernel::workers::available;
+use sidestep::kernel::{InputError, Seed};
 use sidestep_document::claim::{self, Claim, tally};
 use sidestep_document::document::{Document, Experiment, Picture};
+
+/// How fast initiators go, m/s, as the prototypes' did.
+const SPEED_M_S: f64 = 0.5;
+/// What a cycle takes unless an experiment is about it.
+const DT_S: f64 = 0.02;
+
+/// Random numbers of an experiment that drives no world.
+fn draws(seed: u64) -> Draws {
+    Streams::new(Seed(seed)).draws(0, 0, Purpose(1))
+}
 
 /// How much to run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -162,26 +169,16 @@ pub struct Report {
     pub plan: Plan,
     /// Version of the program.
     pub program_version: String,
-    /// The swarm in the corridor.
-    pub corridor: corridor::Corridor,
-    /// Rules of rotation.
-    pub rotations: rotation::Rotations,
-    /// A robot in the open.
-    pub fields: field::Fields,
-    /// A chain that goes back.
-    pub pushing: pushing::Pushing,
-    /// Discs that run into a chain.
-    pub movers: movers::Movers,
-    /// A snake in space.
-    pub snakes: snake::Snakes,
-    /// What motions cost.
-    pub scaling: scaling::Scaling,
-    /// Broken chains.
-    pub broken: broken::Broken,
-    /// Targets of tips.
-    pub postures: postures::Postures,
-    /// Who begins, and who objects.
-    pub initiators: initiators::Initiators,
+    corridor: corridor::Corridor,
+    rotations: rotation::Rotations,
+    fields: field::Fields,
+    pushing: pushing::Pushing,
+    movers: movers::Movers,
+    snakes: snake::Snakes,
+    scaling: scaling::Scaling,
+    broken: broken::Broken,
+    postures: postures::Postures,
+    initiators: initiators::Initiators,
     /// The slides' claims and our verdicts.
     pub claims: Vec<Claim>,
     /// Pictures of bodies: no numbers of them are kept.

@@ -1,11 +1,13 @@
 //! Inverse kinematics by the chain's own rules (slides F2, E3): a tip is pulled to a target while
 //! the base objects, while it is free, and there and back; and damped least squares beside it.
 
-use super::Plan;
-use super::runs::{Share, draws, grid, median};
-use crate::farm::Progress;
+use super::{Plan, draws};
+use crate::cells::{Cell, Columns, Value, bars, column, figure};
+use crate::study::{Progress, Study, number, outcome, setting};
 use cpu_time::ThreadTime;
 use serde::Serialize;
+use serde_json::{Value as Json, json};
+use sidestep::experiment::sweep::{Setting, Variant};
 use sidestep::kernel::InputError;
 use sidestep::kernel::distr::normal;
 use sidestep::kernel::math::powf;
@@ -15,8 +17,8 @@ use sidestep::worlds::chain::ik::{Engine, Goal, Solver};
 use sidestep::worlds::chain::{
     Chain, Connector, Mobility, Obstacles, Propagator, Request, Rod, Rules,
 };
-use sidestep_document::figure::{Point as FigurePoint, Scale};
-use sidestep_document::{Figure, FigureKind, Series, Table};
+use sidestep_document::figure::Scale;
+use sidestep_document::{Figure, FigureKind, Table};
 
 /// Targets are within this part of the reach.
 const WITHIN: f64 = 0.9;
@@ -24,9 +26,8 @@ const WITHIN: f64 = 0.9;
 const TOLERANCE: f64 = 1e-4;
 
 /// Ways to bring a tip to a target.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Way {
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Way {
     /// One motion of the tip; the base always objects to being moved, as the slides have it.
     Veto,
     /// One motion of the tip, nobody is fixed.
@@ -40,6 +41,15 @@ pub enum Way {
 impl Way {
     const ALL: [Self; 4] = [Self::Veto, Self::FreeBase, Self::ThereAndBack, Self::LeastSquares];
 
+    /// Its name in settings and JSON.
+    pub(super) fn key(self) -> &'static str {
+        ["veto", "free-base", "there-and-back", "least-squares"][self as usize]
+    }
+
+    fn of(key: &str) -> Self {
+        Self::ALL.into_iter().find(|way| way.key() == key).expect("a way of this key")
+    }
+
     fn name(self) -> &'static str {
         match self {
             Self::Veto => "one pull, base objects",
@@ -50,44 +60,51 @@ impl Way {
     }
 }
 
+const COLUMNS: Columns = Columns {
+    case: &[
+        column("links", "links", |r| r.set("links")),
+        column("slack", "slack", |r| r.set("slack"))
+            .shown(|c| format!("{} %", 100.0 * c.number("slack"))),
+        column("way", "way", |r| r.set("way"))
+            .shown(|c| Way::of(&c.value("way").to_string()).name().into()),
+    ],
+    came: &[
+        column("reached", "reached", |r| r.share(|run| run.is("reached"))),
+        column("finished", "finished", |r| r.count(|run| run.is("finished"))),
+        column("median_us", "median, us", |r| Value::Number(r.median("us")))
+            .shown(|c| format!("{:.1}", c.number("median_us"))),
+        column("median_iterations", "passes or steps", |r| Value::Number(r.median("iterations"))),
+    ],
+};
+
 /// What is run.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Case {
+#[derive(Debug, Clone, Copy)]
+struct Case {
     /// How.
-    pub way: Way,
+    way: Way,
     /// Rods.
-    pub links: usize,
+    links: usize,
     /// How much longer and shorter than their mean rods may be.
-    pub slack: f64,
+    slack: f64,
 }
 
-/// What came of one case.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Cell {
-    /// The case.
-    pub case: Case,
-    /// Targets that were reached with base and rods in order.
-    pub reached: Share,
-    /// Those that the way itself did not reach, and that were finished in closed form.
-    pub finished: u64,
-    /// Processor time, microseconds, median.
-    pub median_us: f64,
-    /// Passes or steps, median.
-    pub median_iterations: f64,
-}
+impl Case {
+    fn settings(self) -> Vec<Setting> {
+        let Self { way, links, slack } = self;
+        vec![setting("links", links as i64), setting("slack", slack), setting("way", way.key())]
+    }
 
-struct Solved {
-    reached: bool,
-    finished: bool,
-    us: f64,
-    iterations: usize,
+    fn of(variant: &Variant) -> Self {
+        let way = Way::of(variant.value("way").and_then(toml::Value::as_str).unwrap_or_default());
+        Self { way, links: number(variant, "links") as usize, slack: number(variant, "slack") }
+    }
 }
 
 /// All cases.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Postures {
+pub(super) struct Postures {
     /// Results by case.
-    pub cells: Vec<Cell>,
+    pub(super) cells: Vec<Cell>,
 }
 
 fn direction(draws: &mut Draws) -> Point<3> {
@@ -118,7 +135,7 @@ fn chain(case: &Case, draws: &mut Draws) -> Result<Chain<3>, InputError> {
     Chain::new(points, connectors, rods)
 }
 
-fn solved(case: &Case, seed: u64) -> Result<Solved, InputError> {
+fn solved(case: &Case, seed: u64) -> Result<Json, InputError> {
     let draws = &mut draws(seed);
     let mut chain = chain(case, draws)?;
     let (tip, reach_m) = (case.links, case.links as f64);
@@ -135,15 +152,17 @@ fn solved(case: &Case, seed: u64) -> Result<Solved, InputError> {
     let answer = solver.solve(&chain, &Obstacles::default(), &goal)?;
     let us = 1e6 * began.elapsed().as_secs_f64();
     let finished = answer.engine == Engine::Direct;
-    Ok(Solved { reached: answer.reached, finished, us, iterations: answer.iterations })
+    let (reached, iterations) = (answer.reached, answer.iterations);
+    Ok(json!({ "reached": reached, "finished": finished, "us": us, "iterations": iterations }))
 }
 
-fn pulled(chain: &mut Chain<3>, tip: usize, target: Point<3>) -> Result<Solved, InputError> {
+fn pulled(chain: &mut Chain<3>, tip: usize, target: Point<3>) -> Result<Json, InputError> {
     let request = Request::exact(tip, target);
     let began = ThreadTime::now();
     let outcome = Propagator::default().propagate(chain, &Obstacles::default(), &request)?;
     let us = 1e6 * began.elapsed().as_secs_f64();
-    Ok(Solved { reached: outcome.moved().is_some(), finished: false, us, iterations: 1 })
+    let reached = outcome.moved().is_some();
+    Ok(json!({ "reached": reached, "finished": false, "us": us, "iterations": 1 }))
 }
 
 impl Postures {
@@ -151,75 +170,45 @@ impl Postures {
         let mut cases = Vec::new();
         for &links in &plan.ik_links {
             for slack in [0.0, 0.1] {
-                cases.extend(Way::ALL.map(|way| Case { way, links, slack }));
+                cases.extend(Way::ALL.map(|way| Case { way, links, slack }.settings()));
             }
         }
-        let all = grid((plan, plan.ik_targets), "targets of tips", &cases, progress, solved)?;
-        Ok(Self { cells: cases.iter().zip(&all).map(|(case, runs)| cell(*case, runs)).collect() })
+        let study = Study::of_variants("", cases).sized(plan.ik_targets, None);
+        let what = (plan.workers, "targets of tips");
+        let results = study.run_by(what, progress, |_, case, cell| {
+            Ok(outcome(cell, solved(&Case::of(case), cell.seed)?))
+        })?;
+        Ok(Self { cells: COLUMNS.cells(&results) })
     }
 
     /// Cells of a way.
     pub(super) fn of(&self, way: Way) -> impl Iterator<Item = &Cell> {
-        self.cells.iter().filter(move |c| c.case.way == way)
+        self.cells.iter().filter(move |c| c.says("way", way.key()))
     }
 
     pub(super) fn table(&self) -> Table {
         let note = "Targets uniform within 0.9 of the reach in space, to 1e-4 of it, from a posture at \
                     random; nothing in the way. `finished`: not reached by the way itself, but in \
                     closed form. With a free base one motion always is enough.";
-        let columns =
-            ["links", "slack", "way", "reached", "finished", "median, us", "passes or steps"];
-        let mut table = Table::new("Inverse kinematics", note, &columns);
-        for c in &self.cells {
-            table.row([
-                c.case.links.to_string(),
-                format!("{} %", 100.0 * c.case.slack),
-                c.case.way.name().into(),
-                c.reached.to_string(),
-                c.finished.to_string(),
-                format!("{:.1}", c.median_us),
-                c.median_iterations.to_string(),
-            ]);
-        }
-        table
+        COLUMNS.table("Inverse kinematics", note, &self.cells)
     }
 
     pub(super) fn figure(&self) -> Figure {
-        let mut links: Vec<usize> = self.cells.iter().map(|c| c.case.links).collect();
+        let mut links: Vec<String> =
+            self.cells.iter().map(|c| c.value("links").to_string()).collect();
         links.dedup();
-        let series = |way: Way, slack: f64| {
-            let cells = self.of(way).filter(move |c| c.case.slack == slack);
-            let points = (0..).zip(cells).map(|(k, c)| FigurePoint::new(f64::from(k), c.median_us));
-            let rods = if slack == 0.0 {
-                "fixed rods".into()
-            } else {
-                format!("\u{b1}{} %", 100.0 * slack)
+        let series = |(way, slack): (Way, f64)| {
+            let cells = self.of(way).filter(|c| c.number("slack") == slack);
+            let rods = match slack {
+                0.0 => "fixed rods".into(),
+                _ => format!("\u{b1}{} %", 100.0 * slack),
             };
-            Series { name: format!("{}, {rods}", way.name()), points: points.collect() }
+            bars(format!("{}, {rods}", way.name()), cells, "median_us")
         };
-        Figure {
-            title: "Time to bring a tip to its target".into(),
-            x_label: "links".into(),
-            y_label: "median, microseconds".into(),
-            y_scale: Scale::Log,
-            kind: FigureKind::Bars { categories: links.iter().map(ToString::to_string).collect() },
-            series: vec![
-                series(Way::ThereAndBack, 0.0),
-                series(Way::ThereAndBack, 0.1),
-                series(Way::LeastSquares, 0.0),
-                series(Way::LeastSquares, 0.1),
-            ],
-            ..Figure::default()
-        }
-    }
-}
-
-fn cell(case: Case, runs: &[Solved]) -> Cell {
-    Cell {
-        case,
-        reached: Share::of(runs.iter().map(|r| r.reached)),
-        finished: runs.iter().filter(|r| r.finished).count() as u64,
-        median_us: median(runs.iter().map(|r| r.us)),
-        median_iterations: median(runs.iter().map(|r| r.iterations as f64)),
+        let (back, squares) = (Way::ThereAndBack, Way::LeastSquares);
+        let all = [(back, 0.0), (back, 0.1), (squares, 0.0), (squares, 0.1)].map(series);
+        let labels = ["links", "median, microseconds"];
+        let figure = figure("Time to bring a tip to its target", labels, all);
+        Figure { y_scale: Scale::Log, kind: FigureKind::Bars { categories: links }, ..figure }
     }
 }

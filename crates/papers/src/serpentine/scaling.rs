@@ -1,9 +1,9 @@
 //! What a motion costs (slides P5, P6, E4): by the number of connectors, by how many of them it
 //! reaches, and by how many obstacles there are that nobody is near to.
 
-use super::Plan;
-use super::runs::{draws, median};
-use crate::farm::Progress;
+use super::{Plan, draws};
+use crate::cells::{figure, median};
+use crate::study::Progress;
 use cpu_time::ThreadTime;
 use serde::Serialize;
 use sidestep::kernel::math::{cos, sin};
@@ -11,7 +11,7 @@ use sidestep::kernel::{Digest, InputError};
 use sidestep::worlds::chain::geometry::{Point, along, unit};
 use sidestep::worlds::chain::{Chain, Connector, Obstacle, Obstacles, Propagator, Request, Rod};
 use sidestep_document::figure::{Point as FigurePoint, Scale};
-use sidestep_document::{Figure, FigureKind, Series, Table};
+use sidestep_document::{Figure, Series, Table};
 
 /// Repeats of each timing; the median counts.
 const REPEATS: usize = 5;
@@ -24,37 +24,37 @@ const AMONG: usize = 450;
 
 /// One chain that is led through the open.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Size {
+pub(super) struct Size {
     /// Connectors.
-    pub connectors: usize,
+    pub(super) connectors: usize,
     /// Time of a motion, microseconds: rods of fixed length,
-    pub fixed_us: f64,
+    pub(super) fixed_us: f64,
     /// and how many connectors move in one.
-    pub fixed_moved: f64,
+    pub(super) fixed_moved: f64,
     /// The same of rods that may be half as long again,
-    pub slack_us: f64,
+    pub(super) slack_us: f64,
     /// of which fewer move.
-    pub slack_moved: f64,
+    pub(super) slack_moved: f64,
 }
 
 /// One chain among balls, with others far away.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Far {
+pub(super) struct Far {
     /// Balls that nobody comes near to.
-    pub balls: usize,
+    pub(super) balls: usize,
     /// Time of a motion, microseconds.
-    pub us: f64,
+    pub(super) us: f64,
     /// Whether the chain ends where it does without them, to the bit.
-    pub same: bool,
+    pub(super) same: bool,
 }
 
 /// All timings.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Scaling {
+pub(super) struct Scaling {
     /// By number of connectors.
-    pub sizes: Vec<Size>,
+    pub(super) sizes: Vec<Size>,
     /// By number of far balls.
-    pub far: Vec<Far>,
+    pub(super) far: Vec<Far>,
 }
 
 /// A slightly bent chain, so that every connector moves at every motion: a bend lets through only
@@ -189,18 +189,12 @@ impl Scaling {
                 .map(|s| FigurePoint::new(s.connectors as f64, ns(s)))
                 .collect(),
         };
-        Figure {
-            title: "Time of a motion by the length of the chain".into(),
-            x_label: "connectors".into(),
-            y_label: "microseconds".into(),
-            x_scale: Scale::Log,
-            y_scale: Scale::Log,
-            kind: FigureKind::Lines,
-            series: vec![
-                series("fixed rods: all move", |s| s.fixed_us),
-                series("slack rods: it soon ends", |s| s.slack_us),
-            ],
-            ..Figure::default()
-        }
+        let all = [
+            series("fixed rods: all move", |s| s.fixed_us),
+            series("slack rods: it soon ends", |s| s.slack_us),
+        ];
+        let title = "Time of a motion by the length of the chain";
+        let figure = figure(title, ["connectors", "microseconds"], all);
+        Figure { x_scale: Scale::Log, y_scale: Scale::Log, ..figure }
     }
 }

@@ -2,11 +2,13 @@
 //! chain before and after.
 
 use super::Plan;
-use super::runs::begun;
 use super::{broken, corridor, snake};
+use crate::study::{setting, source};
+use sidestep::experiment::sweep::Setting;
 use sidestep::kernel::{InputError, Simulation};
 use sidestep::worlds::chain::Obstacle;
 use sidestep::worlds::chain::geometry::{Point, distance};
+use sidestep::worlds::chain::scenario::Compiled;
 use sidestep::worlds::chain::simulation::ChainSimulation;
 
 /// A picture in the plane or in space.
@@ -60,10 +62,12 @@ pub(super) fn all(plan: &Plan) -> Result<Vec<Scene>, InputError> {
 
 /// Runs `cycles`, and keeps the ways of both ends.
 fn traced<const D: usize>(
-    text: String,
+    text: &str,
+    settings: &[Setting],
     cycles: u64,
 ) -> Result<(ChainSimulation<D>, Vec<Vec<Point<D>>>), InputError> {
-    let mut run = begun::<D>(text)?;
+    let source = source(text, settings)?;
+    let mut run = ChainSimulation::<D>::new(Compiled::new(&source)?, &source, 1);
     let mut trails = vec![Vec::new(); 2];
     while run.cycle() < cycles && !run.is_over() {
         if run.cycle() % EVERY == 0 {
@@ -89,9 +93,9 @@ fn strand<const D: usize>(run: &ChainSimulation<D>) -> Strand<D> {
 }
 
 fn swarm(plan: &Plan) -> Result<Scene, InputError> {
-    let case = corridor::Case { width_m: 2.0, followers: 15, leaving: corridor::READINGS[0] };
     let cycles = plan.corridor_cycles.min(plan.pictured_cycles);
-    let (run, trails) = traced::<2>(case.text(1, cycles), cycles)?;
+    let (run, trails) =
+        traced::<2>(corridor::SCENARIO, &[setting("cycles", cycles as i64)], cycles)?;
     Ok(Scene::Plane(View {
         title: "A leader and 15 followers in the corridor of 2 m".into(),
         caption: format!("Seed 1, after {} cycles; ways of leader and last follower.", run.cycle()),
@@ -102,8 +106,8 @@ fn swarm(plan: &Plan) -> Result<Scene, InputError> {
 }
 
 fn creeping(plan: &Plan) -> Result<Scene, InputError> {
-    let case = snake::Case { filled: 0.1, movers: 0, connectors: 450 };
-    let (run, trails) = traced::<3>(case.text(1, plan.snake_cycles), plan.snake_cycles)?;
+    let cycles = setting("cycles", plan.snake_cycles as i64);
+    let (run, trails) = traced::<3>(snake::SCENARIO, &[cycles], plan.snake_cycles)?;
     let strand = strand(&run);
     let is_near = |o: &Obstacle<3>| {
         let apart_m = |p: &Point<3>| distance(o.core.nearest_to_point(*p).on_core, *p) - o.radius_m;

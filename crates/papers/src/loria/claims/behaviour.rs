@@ -6,6 +6,7 @@ use super::super::reliability::{
     CONTACTS, Key, LATERAL, Reliability, STRAIGHTNESS, SweepCase, TRIP, larger,
 };
 use super::{Claim, Verdict};
+use crate::claims::claim;
 use sidestep::worlds::robots::world::Regime::{self, Both, Effectors, Reliable, Sensors};
 use sidestep_document::Estimate;
 
@@ -18,20 +19,20 @@ fn zigzag(r: &Reliability) -> Claim {
     let bent = r.difference(Key::BASE, [Both, Reliable], STRAIGHTNESS);
     let lateral = r.estimate(Key::BASE, Both, LATERAL);
     let means = by_regime(|regime| r.estimate(Key::BASE, regime, STRAIGHTNESS));
-    Claim {
-        id: "E-8",
-        paper: "With unreliable sensors and effectors trajectories are not straight but slightly \
+    claim(
+        (
+            "E-8",
+            "With unreliable sensors and effectors trajectories are not straight but slightly \
                 zigzag.",
-        papers_figure: None,
-        ours: format!(
+        ),
+        Verdict::of(bent.is_below(0.0) && lateral.is_above(0.0)),
+        format!(
             "Straightness: {means}; both - reliable {bent}. Sideways moves per 1000 actions: \
              both {lateral}, reliable 0."
         ),
-        verdict: Verdict::of(bent.is_below(0.0) && lateral.is_above(0.0)),
-        reason: "Held when straightness with both is below that of reliable robots and sideways \
-                 moves are above 0, both by their intervals."
-            .into(),
-    }
+        "Held when straightness with both is below that of reliable robots and sideways \
+                 moves are above 0, both by their intervals.",
+    )
 }
 
 /// A measure under each regime, in words.
@@ -49,12 +50,14 @@ fn collisions(r: &Reliability) -> Claim {
     let by: Vec<&str> = swept.map(|(case, e)| larger(&r.sensors_less_effectors(case, e))).collect();
     let count = |name| by.iter().filter(|&&b| b == name).count();
     let (sensors, effectors) = (count("sensors"), count("effectors"));
-    Claim {
-        id: "E-9",
-        paper: "Errors of sensors cause more collisions than errors of effectors; both more than \
+    claim(
+        (
+            "E-9",
+            "Errors of sensors cause more collisions than errors of effectors; both more than \
                 none.",
-        papers_figure: None,
-        ours: format!(
+        ),
+        Verdict::of(whole == places.len() && effectors == 0),
+        format!(
             "Presets, rule cut, per 1000 actions: {}; sensors - effectors {}. Sensors are above \
              effectors at {above} of {} places (floors, rules, behaviours), and effectors above \
              reliable too at {whole}. At equal error level, of {} points: sensors more at \
@@ -66,12 +69,10 @@ fn collisions(r: &Reliability) -> Claim {
             by.len() - sensors - effectors,
             flips(r),
         ),
-        verdict: Verdict::of(whole == places.len() && effectors == 0),
-        reason: "Held only when the order is the same at all places and at no equal error level \
+        "Held only when the order is the same at all places and at no equal error level \
                  turns around. It turns with how often a thing is missed, how many beams see the \
-                 same thing, the behaviour, and the law for blocked paths."
-            .into(),
-    }
+                 same thing, the behaviour, and the law for blocked paths.",
+    )
 }
 
 /// From which error level on sensors cause more contacts, by case of the sweep.
@@ -93,20 +94,20 @@ fn slowest_trips(r: &Reliability) -> Claim {
     let slowest = |key| [Reliable, Effectors, Sensors].into_iter().all(|other| slower(key, other));
     let places = r.places();
     let held = places.iter().filter(|&&key| slowest(key)).count();
-    Claim {
-        id: "E-10a",
-        paper: "A trip to and fro takes longest when sensors and effectors are both unreliable.",
-        papers_figure: None,
-        ours: format!(
+    claim(
+        (
+            "E-10a",
+            "A trip to and fro takes longest when sensors and effectors are both unreliable.",
+        ),
+        Verdict::of(held == places.len()),
+        format!(
             "Cycles per trip: {}. Both are slowest at {held} of {} places.",
             by_regime(|regime| r.estimate(Key::BASE, regime, TRIP)),
             places.len()
         ),
-        verdict: Verdict::of(held == places.len()),
-        reason: "Held when, at every place, a trip with both takes longer than with none, with \
-                 effectors and with sensors alone, each by its paired interval."
-            .into(),
-    }
+        "Held when, at every place, a trip with both takes longer than with none, with \
+                 effectors and with sensors alone, each by its paired interval.",
+    )
 }
 
 fn trip_ratios(r: &Reliability) -> Claim {
@@ -120,26 +121,26 @@ fn trip_ratios(r: &Reliability) -> Claim {
     let ratio = |[a, b]: [Regime; 2]| {
         format!("{} / {} {}", a.name(), b.name(), r.ratio(Key::BASE, [a, b], TRIP))
     };
-    Claim {
-        id: "E-10b",
-        paper: "It takes some times, and a half, as long as in another case.",
-        papers_figure: None,
-        ours: format!("Seed by seed: {}.", pairs.map(ratio).join("; ")),
-        verdict: Verdict::Lost,
-        reason: "Factor and the pair of cases are lost; these are the ratios.".into(),
-    }
+    claim(
+        ("E-10b", "It takes some times, and a half, as long as in another case."),
+        Verdict::Lost,
+        format!("Seed by seed: {}.", pairs.map(ratio).join("; ")),
+        "Factor and the pair of cases are lost; these are the ratios.",
+    )
 }
 
 fn behaviours(r: &Reliability) -> Claim {
     let saved = |regime| r.between_minds([Mind::Avoid, Mind::Filter], regime, TRIP);
     let contacts = |regime| r.between_minds([Mind::Filter, Mind::Avoid], regime, CONTACTS);
     let more = difference_of_savings(r);
-    Claim {
-        id: "E-11",
-        paper: "Behaviours are harder to design for unreliable sensors and effectors; simple ones \
+    claim(
+        (
+            "E-11",
+            "Behaviours are harder to design for unreliable sensors and effectors; simple ones \
                 do where all is reliable.",
-        papers_figure: None,
-        ours: format!(
+        ),
+        Verdict::of(saved(Both).is_above(0.0) && more.is_above(0.0)),
+        format!(
             "A filter (two reports before a robot believes its side beams) saves cycles per \
              trip: reliable {}, both {}, the second less the first {more}. It costs contacts per \
              1000 actions: reliable {}, both {}.",
@@ -148,11 +149,9 @@ fn behaviours(r: &Reliability) -> Claim {
             contacts(Reliable),
             contacts(Both),
         ),
-        verdict: Verdict::of(saved(Both).is_above(0.0) && more.is_above(0.0)),
-        reason: "Held when the more elaborate behaviour saves time under errors, and more than it \
-                 saves without. One pair of behaviours is an example, not a proof."
-            .into(),
-    }
+        "Held when the more elaborate behaviour saves time under errors, and more than it \
+                 saves without. One pair of behaviours is an example, not a proof.",
+    )
 }
 
 /// Cycles that the filter saves under both errors, less those that it saves without any.

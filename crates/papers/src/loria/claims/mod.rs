@@ -8,10 +8,10 @@ mod setting;
 mod time;
 
 use super::Report;
-pub use sidestep_document::claim::{Claim, Verdict};
+use sidestep_document::claim::{Claim, Verdict};
 
 /// All claims, judged.
-pub fn judge(report: &Report) -> Vec<Claim> {
+pub(super) fn judge(report: &Report) -> Vec<Claim> {
     let mut claims = setting::claims(report);
     claims.extend(behaviour::claims(report));
     claims.extend(time::claims(report));

@@ -2,6 +2,7 @@
 
 use super::super::Report;
 use super::{Claim, Verdict};
+use crate::claims::claim;
 
 pub(super) fn claims(report: &Report) -> Vec<Claim> {
     vec![
@@ -20,68 +21,68 @@ fn suites(report: &Report) -> Claim {
     let builds: usize = report.genericity.builds.iter().map(|b| b.outcomes.len()).sum();
     let timed = report.performance.timings.len() + report.strategies.trials.len();
     let fitted = report.cost_model.points.len();
-    Claim {
-        id: "E-1",
-        paper: "The experiments are to show that the simulator is easy and general, that its \
+    claim(
+        (
+            "E-1",
+            "The experiments are to show that the simulator is easy and general, that its \
                 parallel model is efficient, and that its stochastic model is valid.",
-        papers_figure: None,
-        ours: format!(
+        ),
+        Verdict::Held,
+        format!(
             "{runs} reliability runs, {builds} genericity runs, {timed} timed series, {fitted} \
              runs for the cost model."
         ),
-        verdict: Verdict::Held,
-        reason: "All four suites ran to the end; what each shows stands below.".into(),
-    }
+        "All four suites ran to the end; what each shows stands below.",
+    )
 }
 
 fn floors(report: &Report) -> Claim {
-    Claim {
-        id: "E-2",
-        paper: "It ran on a real floor and on virtual ones of various sizes, with various numbers \
+    claim(
+        (
+            "E-2",
+            "It ran on a real floor and on virtual ones of various sizes, with various numbers \
                 of robots, doors and mobile objects.",
-        papers_figure: None,
-        ours: report.reliability.floors.join("; "),
-        verdict: Verdict::Held,
-        reason: "Three generated floors ran all four regimes. The paper's sizes and its real \
-                 floor are lost."
-            .into(),
-    }
+        ),
+        Verdict::Held,
+        report.reliability.floors.join("; "),
+        "Three generated floors ran all four regimes. The paper's sizes and its real \
+                 floor are lost.",
+    )
 }
 
 fn processors(report: &Report) -> Claim {
     let p = &report.performance;
     let workers: Vec<String> = p.digests.iter().map(|d| d.0.to_string()).collect();
-    Claim {
-        id: "E-3",
-        paper: "It ran on up to sixteen processors.",
-        papers_figure: Some("16 processors"),
-        ours: format!("Workers {}: {}.", workers.join(", "), digests(report)),
-        verdict: Verdict::of(p.is_deterministic()),
-        reason: format!(
+    claim(
+        ("E-3", "It ran on up to sixteen processors."),
+        Verdict::of(p.is_deterministic()),
+        format!("Workers {}: {}.", workers.join(", "), digests(report)),
+        format!(
             "The same run gives the same bits with every number of workers; of time, this \
              machine can show {} processors only.",
             p.processors
         ),
-    }
+    )
+    .with_papers_figure("16 processors")
 }
 
 fn sequential(report: &Report) -> Claim {
     let p = &report.performance;
-    Claim {
-        id: "E-4",
-        paper: "The same program runs sequentially and on parallel machines, and its user need \
+    claim(
+        (
+            "E-4",
+            "The same program runs sequentially and on parallel machines, and its user need \
                 not know parallel programming.",
-        papers_figure: None,
-        ours: format!(
+        ),
+        Verdict::of(p.is_deterministic()),
+        format!(
             "With 1 worker, with more, and recorded: {}, {}.",
             digests(report),
             p.recorded_digest
         ),
-        verdict: Verdict::of(p.is_deterministic()),
-        reason: "One worker is the sequential mode, without a second code path; a user gives a \
-                 number of workers. Other systems are to compare the digest."
-            .into(),
-    }
+        "One worker is the sequential mode, without a second code path; a user gives a \
+                 number of workers. Other systems are to compare the digest.",
+    )
 }
 
 fn digests(report: &Report) -> &'static str {
@@ -105,46 +106,45 @@ fn builds(report: &Report, camera: bool) -> (String, Verdict) {
 
 fn sizes(report: &Report) -> Claim {
     let (ours, verdict) = builds(report, false);
-    Claim {
-        id: "E-5",
-        paper: "Robots of other sizes needed no change but the number of boxes, and it was in \
+    claim(
+        (
+            "E-5",
+            "Robots of other sizes needed no change but the number of boxes, and it was in \
                 the source.",
-        papers_figure: None,
-        ours: format!("{ours}."),
+        ),
         verdict,
-        reason: format!("{GENERIC}; only `size` of the scenario changes, no source."),
-    }
+        format!("{ours}."),
+        format!("{GENERIC}; only `size` of the scenario changes, no source."),
+    )
 }
 
 fn camera(report: &Report) -> Claim {
     let (ours, verdict) = builds(report, true);
     let effect = report.genericity.camera_effect();
-    Claim {
-        id: "E-6",
-        paper: "A camera with its confusion matrix was easily added, with changes to source and \
+    claim(
+        (
+            "E-6",
+            "A camera with its confusion matrix was easily added, with changes to source and \
                 behaviour.",
-        papers_figure: None,
-        ours: format!("{ours}; contacts per 1000 actions with the camera less without: {effect}."),
+        ),
         verdict,
-        reason: format!("{GENERIC}; only `sensors` of the scenario changes, no source."),
-    }
+        format!("{ours}; contacts per 1000 actions with the camera less without: {effect}."),
+        format!("{GENERIC}; only `sensors` of the scenario changes, no source."),
+    )
 }
 
 fn regimes(report: &Report) -> Claim {
     let r = &report.reliability;
-    Claim {
-        id: "E-7",
-        paper: "Four cases: all reliable; effectors, sensors, or both unreliable.",
-        papers_figure: None,
-        ours: format!(
+    claim(
+        ("E-7", "Four cases: all reliable; effectors, sensors, or both unreliable."),
+        Verdict::Held,
+        format!(
             "{} variants x {} seeds, four regimes at each of {} places.",
             r.cells.len(),
             report.plan.seeds,
             r.places().len()
         ),
-        verdict: Verdict::Held,
-        reason: "`regime` of the scenario switches the error tables on and off; nothing else \
-                 differs between the four."
-            .into(),
-    }
+        "`regime` of the scenario switches the error tables on and off; nothing else \
+                 differs between the four.",
+    )
 }

@@ -3,6 +3,7 @@
 use super::super::Report;
 use super::super::performance::{Performance, REFERENCE_CYCLES, Timing};
 use super::{Claim, Verdict};
+use crate::claims::claim;
 use sidestep::worlds::robots::baseline::Strategy;
 use sidestep_document::Estimate;
 
@@ -28,23 +29,24 @@ pub(super) fn claims(report: &Report) -> Vec<Claim> {
 
 fn initialization(p: &Performance) -> Claim {
     let worst = p.initialization.iter().map(|i| i.share_alone).fold(0.0, f64::max);
-    Claim {
-        id: "E-12",
-        paper: "Time is that of the cycles with recording to disk; initialization is not parallel \
+    claim(
+        (
+            "E-12",
+            "Time is that of the cycles with recording to disk; initialization is not parallel \
                 and a small share of the whole.",
-        papers_figure: None,
-        ours: format!(
+        ),
+        Verdict::of(worst < SMALL_SHARE),
+        format!(
             "Initialization takes up to {:.2} % of a run of {REFERENCE_CYCLES} cycles with one \
              worker (largest of {} loads).",
             100.0 * worst,
             p.loads.len()
         ),
-        verdict: Verdict::of(worst < SMALL_SHARE),
-        reason: format!(
+        format!(
             "Held when below {:.0} % for every load; the paper's share and cycles are lost.",
             100.0 * SMALL_SHARE
         ),
-    }
+    )
 }
 
 /// Why time over workers cannot be judged: there is one processor, or others were using them.
@@ -58,11 +60,10 @@ fn time_falls(report: &Report) -> Claim {
     let timings = || p.at_most_workers(false).chain(p.at_most_workers(true));
     let falls = timings().all(|timing| timing.speed_up.is_above(1.0));
     let machine = Estimate::of(timings().map(|timing| timing.machine.mean));
-    Claim {
-        id: "E-13a",
-        paper: "Execution time falls as processors are added.",
-        papers_figure: None,
-        ours: format!(
+    claim(
+        ("E-13a", "Execution time falls as processors are added."),
+        if !falls && is_excused(p) { Verdict::Lost } else { Verdict::of(falls) },
+        format!(
             "Speed-up with {most} workers: {} unrecorded, {} recorded ({} loads, {} repeats of \
              each; mere arithmetic in turn with them: {machine}).",
             range(p.at_most_workers(false)),
@@ -70,12 +71,10 @@ fn time_falls(report: &Report) -> Claim {
             p.loads.len(),
             report.plan.repeats,
         ),
-        verdict: if !falls && is_excused(p) { Verdict::Lost } else { Verdict::of(falls) },
-        reason: "Held when, for every load, recorded or not, the interval of the speed-up with \
+        "Held when, for every load, recorded or not, the interval of the speed-up with \
                  the most workers lies above 1. Otherwise not judged where others were using the \
-                 machine."
-            .into(),
-    }
+                 machine.",
+    )
 }
 
 /// The mean speed-ups of some loads.
@@ -92,49 +91,48 @@ fn efficiency_falls(p: &Performance) -> Claim {
     let all = || p.at_most_workers(false).map(efficiency);
     let (low, n) = (all().filter(|&e| e < LOW_EFFICIENCY).count(), all().count());
     let listed: Vec<String> = all().map(|e| format!("{e:.2}")).collect();
-    Claim {
-        id: "E-13b",
-        paper: "Speed-up rises slowly and efficiency falls quickly.",
-        papers_figure: None,
-        ours: format!(
+    claim(
+        ("E-13b", "Speed-up rises slowly and efficiency falls quickly."),
+        if is_excused(p) { Verdict::Lost } else { Verdict::of(2 * low > n) },
+        format!(
             "Efficiency with {most} workers, unrecorded, by load: {}; below {LOW_EFFICIENCY} for \
              {low} of {n}.",
             listed.join(", ")
         ),
-        verdict: if is_excused(p) { Verdict::Lost } else { Verdict::of(2 * low > n) },
-        reason: format!(
+        format!(
             "Held when efficiency is below {LOW_EFFICIENCY} for most loads; not judged where \
              others were using the machine. The paper went to sixteen processors; {} can show \
              the beginning of a fall only.",
             p.processors
         ),
-    }
+    )
 }
 
 fn lost_speed_up(p: &Performance) -> Claim {
-    Claim {
-        id: "E-13c",
-        paper: "The first parallel version reached a certain speed-up on a certain number of \
+    claim(
+        (
+            "E-13c",
+            "The first parallel version reached a certain speed-up on a certain number of \
                 processors.",
-        papers_figure: None,
-        ours: format!("With {} workers: {}.", p.most_workers(), range(p.at_most_workers(false))),
-        verdict: Verdict::Lost,
-        reason: "Both numbers are lost.".into(),
-    }
+        ),
+        Verdict::Lost,
+        format!("With {} workers: {}.", p.most_workers(), range(p.at_most_workers(false))),
+        "Both numbers are lost.",
+    )
 }
 
 fn second_machine() -> Claim {
-    Claim {
-        id: "E-14",
-        paper: "A small machine under another system gives equivalent results with the same \
+    claim(
+        (
+            "E-14",
+            "A small machine under another system gives equivalent results with the same \
                 number of processors.",
-        papers_figure: None,
-        ours: "One machine was used.".into(),
-        verdict: Verdict::Lost,
-        reason: "The paper's table is lost, and it takes a second machine; the digests of this \
-                 report tell whether another gives the same bits."
-            .into(),
-    }
+        ),
+        Verdict::Lost,
+        "One machine was used.",
+        "The paper's table is lost, and it takes a second machine; the digests of this \
+                 report tell whether another gives the same bits.",
+    )
 }
 
 fn costly_decisions(p: &Performance) -> Claim {
@@ -145,23 +143,20 @@ fn costly_decisions(p: &Performance) -> Claim {
         let timings = p.at_most_workers(false).filter(|t| p.loads[t.load].operations == cost);
         Estimate::of(timings.flat_map(|timing| timing.ratios.iter().copied()))
     };
-    Claim {
-        id: "E-15a",
-        paper: "Costlier behaviours are expected to give better parallel performance.",
-        papers_figure: None,
-        ours: format!(
+    claim(
+        ("E-15a", "Costlier behaviours are expected to give better parallel performance."),
+        Verdict::by_sign(gain.interval.filter(|_| !is_excused(p))),
+        format!(
             "Speed-up with {} workers: {} at {least} operations per decision, {} at {most}; \
              difference {gain}.",
             p.most_workers(),
             speed_up(least),
             speed_up(most),
         ),
-        verdict: Verdict::by_sign(gain.interval.filter(|_| !is_excused(p))),
-        reason: "Held when the paired difference of speed-ups, dearest less cheapest decisions, \
+        "Held when the paired difference of speed-ups, dearest less cheapest decisions, \
                  lies above 0; not judged when its interval holds 0, or where others were using the \
-                 machine. Unrecorded, over all numbers of robots."
-            .into(),
-    }
+                 machine. Unrecorded, over all numbers of robots.",
+    )
 }
 
 fn conflicts(report: &Report) -> Claim {
@@ -173,11 +168,10 @@ fn conflicts(report: &Report) -> Claim {
             Some(i) => format!("{:.0} ns [{:.0}, {:.0}]", p.value_ns, i.low, i.high),
         },
     };
-    Claim {
-        id: "E-15b",
-        paper: "Conflicts, the more so with many agents, cost time in the second step.",
-        papers_figure: None,
-        ours: format!(
+    claim(
+        ("E-15b", "Conflicts, the more so with many agents, cost time in the second step."),
+        Verdict::by_sign(model.parameter("c_s").and_then(|p| p.interval_ns)),
+        format!(
             "Per body in conflict c_s = {}, besides c_d = {} for every body; p = {:.3} to {:.3}; \
              {} runs, R2 of the second step {:.3}.",
             shown("c_s"),
@@ -187,11 +181,9 @@ fn conflicts(report: &Report) -> Claim {
             model.points.len(),
             model.r_squared[1],
         ),
-        verdict: Verdict::by_sign(model.parameter("c_s").and_then(|p| p.interval_ns)),
-        reason: "Held when the interval of c_s, fitted over runs of different crowding, lies \
-                 above 0; not judged when it holds 0."
-            .into(),
-    }
+        "Held when the interval of c_s, fitted over runs of different crowding, lies \
+                 above 0; not judged when it holds 0.",
+    )
 }
 
 /// The strategies that the paper rejects before any experiment.
@@ -216,20 +208,20 @@ fn rejected(report: &Report) -> Claim {
     } else {
         Verdict::Lost
     };
-    Claim {
-        id: "P-3",
-        paper: "Spatial partition (unequal load, conflicts at borders) and a process per agent \
+    claim(
+        (
+            "P-3",
+            "Spatial partition (unequal load, conflicts at borders) and a process per agent \
                 (conflicts made serial) are worse than merged conflicts in a double pool.",
-        papers_figure: None,
-        ours: format!(
+        ),
+        verdict,
+        format!(
             "Speed-up of the double pool with the most workers less that of the other, {}.",
             shown.collect::<Vec<_>>().join("; ")
         ),
-        verdict,
-        reason: "Held when the double pool is ahead of both at every load by its paired interval, \
+        "Held when the double pool is ahead of both at every load by its paired interval, \
                  not held when behind at one; not judged otherwise, or where others were using \
                  the machine. Only the double pool gives the same bits for every number of \
-                 workers."
-            .into(),
-    }
+                 workers.",
+    )
 }

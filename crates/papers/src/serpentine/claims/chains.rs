@@ -1,15 +1,15 @@
 //! Claims about chains of any kind: what they keep, who may move them, what they cost.
 
 use super::super::Report;
-use super::super::broken::{self, Broken};
+use super::super::broken::Broken;
 use super::super::initiators::Initiators;
 use super::super::movers::{ESCAPES, Movers};
 use super::super::postures::{Postures, Way};
 use super::super::rotation::{RULES, Rotations};
-use super::super::runs::{least, mm, most};
 use super::super::scaling::{Scaling, Size};
 use super::super::snake::Snakes;
 use super::{Claim, all, both, claim, listed};
+use crate::cells::{Cell, least, mm, most};
 
 /// Rods keep their limits to this.
 const ROD_TOLERANCE_M: f64 = 1e-9;
@@ -41,12 +41,12 @@ pub(super) fn claims(report: &Report) -> Vec<Claim> {
 fn moving_obstacles(movers: &Movers) -> Claim {
     let told = |escape: &'static str| {
         let cells: Vec<_> = movers.of(escape).collect();
-        let worst = cells.iter().map(|c| c.inside_percent.or_zero()).fold(0.0, f64::max);
+        let worst = cells.iter().map(|c| c.number("inside_percent")).fold(0.0, f64::max);
         format!("{escape}: up to {worst:.2} % of steps inside")
     };
     claim(
         ("P2", "a chain copes with obstacles that move, at speeds like its own"),
-        all(movers.of(ESCAPES[2]), |c| c.inside_percent.or_zero() == 0.0),
+        all(movers.of(ESCAPES[2]), |c| c.number("inside_percent") == 0.0),
         listed(ESCAPES, told),
         "no step with a part inside at any speed and number of discs, for a chain that looks ahead \
          (ours; the slides' parts react when touched) and keeps to a speed limit and out of itself; \
@@ -84,15 +84,15 @@ fn local_cost(scaling: &Scaling) -> Claim {
 
 fn few_and_many(report: &Report) -> Claim {
     let links: Vec<_> = report.postures.of(Way::ThereAndBack).collect();
-    let few = links.iter().map(|c| c.case.links).min();
+    let few = links.iter().map(|c| c.count("links")).min();
     let many = report.scaling.sizes.iter().map(|s| s.connectors).max();
     let ours = format!(
         "from {} links, {}, to {} connectors",
         few.map_or("-".into(), |n| n.to_string()),
-        listed(links.first(), |c| c.reached.to_string()),
+        listed(links.first(), |c| c.share("reached").to_string()),
         many.map_or("-".into(), |n| n.to_string()),
     );
-    let verdict = both(&[all(&links, |c| c.reached.is_all()), all(many, |n| n >= 1000)]);
+    let verdict = both(&[all(&links, |c| c.in_all("reached")), all(many, |n| n >= 1000)]);
     claim(
         ("P6", "it scales up to highly redundant systems and serves few degrees of freedom too"),
         verdict,
@@ -102,13 +102,15 @@ fn few_and_many(report: &Report) -> Claim {
 }
 
 fn structure_kept(report: &Report) -> Claim {
-    let corridor = report.corridor.cells.iter().map(|c| c.rod_violation_m);
-    let rotations = report.rotations.cells.iter().map(|c| c.rod_violation_m);
-    let movers = report.movers.cells.iter().map(|c| c.rod_violation_m);
-    let snakes = report.snakes.cells.iter().map(|c| c.rod_violation_m);
-    let pushing = report.pushing.cells.iter().map(|c| c.rod_violation_m);
+    let all_cells = [
+        &report.corridor.cells,
+        &report.rotations.cells,
+        &report.movers.cells,
+        &report.snakes.cells,
+        &report.pushing.cells,
+    ];
     let worst: Vec<f64> =
-        corridor.chain(rotations).chain(movers).chain(snakes).chain(pushing).collect();
+        all_cells.into_iter().flatten().map(|c| c.number("rod_violation_m")).collect();
     let ours = format!("rods outside their limits by {:.1e} m at most", most(worst.clone()));
     claim(
         ("V5", "the constraints that define the chain are preserved"),
@@ -122,16 +124,16 @@ fn creeps(snakes: &Snakes) -> Claim {
     let ours = listed(snakes.at_rest(), |c| {
         format!(
             "{} connectors, {} % filled: {} % of the wanted way, {} of {} steps inside",
-            c.case.connectors,
-            100.0 * c.case.filled,
-            c.way_percent,
-            c.penetrations,
-            c.steps
+            c.count("connectors"),
+            100.0 * c.number("filled"),
+            c.estimate("way_percent"),
+            c.count("penetrations"),
+            c.count("steps")
         )
     });
     claim(
         ("V6", "with many rods it behaves like a snake that creeps among obstacles"),
-        all(snakes.at_rest(), |c| c.penetrations == 0 && c.way_percent.or_zero() > 90.0),
+        all(snakes.at_rest(), |c| c.count("penetrations") == 0 && c.number("way_percent") > 90.0),
         ours,
         "more than 90 % of the wanted way, and never inside, among balls that stand",
     )
@@ -176,9 +178,9 @@ fn failed_parts(initiators: &Initiators) -> Claim {
 fn one_turn(rotations: &Rotations) -> Claim {
     let ours = listed(RULES, |rule| {
         let cells: Vec<_> = rotations.of(rule).collect();
-        let inside: u64 = cells.iter().map(|c| c.penetrations).sum();
-        let steps: u64 = cells.iter().map(|c| c.steps).sum();
-        let clearance_m = least(cells.iter().map(|c| c.min_clearance_m));
+        let inside: u64 = cells.iter().map(|c| c.count("penetrations")).sum();
+        let steps: u64 = cells.iter().map(|c| c.count("steps")).sum();
+        let clearance_m = least(cells.iter().map(|c| c.maybe("min_clearance_m")));
         format!("{rule}: {inside} of {steps} steps inside, clearance {} mm", mm(clearance_m))
     });
     claim(
@@ -186,7 +188,7 @@ fn one_turn(rotations: &Rotations) -> Claim {
             "A7, A8",
             "a rod turned past the obstacle that it hits nearest to its master keeps clear of all",
         ),
-        all(rotations.of(RULES[1]), |c| c.penetrations == 0),
+        all(rotations.of(RULES[1]), |c| c.count("penetrations") == 0),
         ours,
         "no step inside with the slides' rule (`literal`): one turn leads into the next obstacle. \
          `union`, which turns clear of all at once, is ours",
@@ -212,8 +214,8 @@ fn bend_limits(initiators: &Initiators) -> Claim {
 fn posture_by_veto(postures: &Postures) -> Claim {
     let veto = || postures.of(Way::Veto);
     let best = |has_slack: bool| {
-        let cells = veto().filter(|c| (c.case.slack > 0.0) == has_slack);
-        most(cells.map(|c| c.reached.percent()))
+        let cells = veto().filter(|c| (c.number("slack") > 0.0) == has_slack);
+        most(cells.map(|c| c.number("reached")))
     };
     let (fixed, slack) = (best(false), best(true));
     claim(
@@ -221,7 +223,7 @@ fn posture_by_veto(postures: &Postures) -> Claim {
             "F2a",
             "the rules give inverse kinematics by themselves: an arm's tip is moved, its base objects",
         ),
-        all(veto(), |c| c.reached.percent() > 99.0),
+        all(veto(), |c| c.number("reached") > 99.0),
         format!(
             "rods of fixed length: at most {fixed:.1} %; with 10 % of slack: at most {slack:.1} %"
         ),
@@ -231,10 +233,15 @@ fn posture_by_veto(postures: &Postures) -> Claim {
 }
 
 fn posture_there_and_back(postures: &Postures) -> Claim {
-    let free = all(postures.of(Way::FreeBase), |c| c.reached.is_all());
-    let back = all(postures.of(Way::ThereAndBack), |c| c.reached.is_all());
-    let ours = listed(postures.of(Way::ThereAndBack).filter(|c| c.case.slack == 0.0), |c| {
-        format!("{} links: {}, {:.0} us", c.case.links, c.reached, c.median_us)
+    let free = all(postures.of(Way::FreeBase), |c| c.in_all("reached"));
+    let back = all(postures.of(Way::ThereAndBack), |c| c.in_all("reached"));
+    let ours = listed(postures.of(Way::ThereAndBack).filter(|c| c.number("slack") == 0.0), |c| {
+        format!(
+            "{} links: {}, {:.0} us",
+            c.count("links"),
+            c.share("reached"),
+            c.number("median_us")
+        )
     });
     claim(
         ("F2b", "the same rules give inverse kinematics where a base is free, or is brought back"),
@@ -246,30 +253,33 @@ fn posture_there_and_back(postures: &Postures) -> Claim {
 }
 
 fn rejoined(broken: &Broken) -> Claim {
-    let none_gone = || broken.cells.iter().filter(|c| c.case.gone == 0);
+    let none_gone = || broken.cells.iter().filter(|c| c.count("gone") == 0);
     let ours = listed(none_gone(), |c| {
-        format!("{} thrown by {} m: {}", c.case.scattered, c.case.by_m, c.whole)
+        format!("{} thrown by {} m: {}", c.count("scattered"), c.number("by_m"), c.share("whole"))
     });
     claim(
         ("F3a", "a chain broken by hand is joined again, and keeps the shape of its whole ends"),
-        all(none_gone(), |c| c.whole.is_all() && c.ends_kept.is_all()),
+        all(none_gone(), |c| c.in_all("whole") && c.in_all("ends_kept")),
         ours,
         "every one whole again, ends to the bit where they were",
     )
 }
 
 fn rejoined_with_fewer(broken: &Broken) -> Claim {
-    let gone = || broken.cells.iter().filter(|c| c.case.gone > 0);
+    let gone = || broken.cells.iter().filter(|c| c.count("gone") > 0);
     let ours = listed(gone(), |c| {
-        let who = if c.case.may_come { "an end may come" } else { "nobody may come" };
+        let who = if c.is("may_come") { "an end may come" } else { "nobody may come" };
         format!(
             "{} less {}, {who}: {} whole, {} refused",
-            c.case.scattered, c.case.gone, c.whole, c.too_long
+            c.count("scattered"),
+            c.count("gone"),
+            c.share("whole"),
+            c.count("too_long")
         )
     });
-    let as_can = |c: &broken::Cell| {
-        let whole = if c.case.may_come { c.whole.n } else { c.can.hits };
-        c.whole.hits == whole && c.ends_kept.is_all()
+    let as_can = |c: &Cell| {
+        let whole = if c.is("may_come") { c.share("whole").n } else { c.share("can").hits };
+        c.share("whole").hits == whole && c.in_all("ends_kept")
     };
     claim(
         ("F3b", "it is joined even with fewer parts"),
@@ -284,9 +294,9 @@ fn in_space(snakes: &Snakes) -> Claim {
     let ours = listed(snakes.at_rest(), |c| {
         format!(
             "{} % filled: clearance {} mm, vetoes {} %",
-            100.0 * c.case.filled,
-            mm(c.min_clearance_m),
-            c.veto_percent
+            100.0 * c.number("filled"),
+            c.mm("min_clearance_m"),
+            c.estimate("veto_percent")
         )
     });
     claim(
@@ -294,7 +304,7 @@ fn in_space(snakes: &Snakes) -> Claim {
             "F4",
             "collisions in space need hardly another rule, and no other propagation (future work)",
         ),
-        all(snakes.at_rest(), |c| c.penetrations == 0),
+        all(snakes.at_rest(), |c| c.count("penetrations") == 0),
         ours,
         "never inside with the propagation of the plane, which is the same code; only the search for \
          free directions is another",

@@ -1,16 +1,16 @@
 //! Claims about the swarm and its leader, and about the slides' experiments.
 
 use super::super::Report;
-use super::super::corridor::{Cell, Corridor, READINGS};
+use super::super::corridor::{Corridor, READINGS};
 use super::super::field::Fields;
-use super::super::runs::{mm, most};
-use super::super::snake::{self, Snakes};
+use super::super::snake::Snakes;
 use super::{Claim, Verdict, all, both, claim, listed};
+use crate::cells::{Cell, mm, most};
 
 /// The slides' swarm.
-const FOLLOWERS: usize = 15;
+const FOLLOWERS: u64 = 15;
 /// The slides' snake.
-const AGENTS: usize = 450;
+const AGENTS: u64 = 450;
 
 pub(super) fn claims(report: &Report) -> Vec<Claim> {
     let corridor = &report.corridor;
@@ -29,18 +29,18 @@ pub(super) fn claims(report: &Report) -> Vec<Claim> {
 
 /// Cells of our reading with the fewest followers.
 fn plain(corridor: &Corridor) -> impl Iterator<Item = &Cell> {
-    let fewest = corridor.cells.iter().map(|c| c.case.followers).min();
-    corridor.of(READINGS[0]).filter(move |c| Some(c.case.followers) == fewest)
+    corridor.of_few(READINGS[0])
 }
 
 fn band(corridor: &Corridor) -> Claim {
     // In a corridor of up to 1.4 m no place is further than 0.7 m from both walls.
-    let wide = || plain(corridor).filter(|c| c.case.width_m > 1.4);
-    let ours =
-        listed(plain(corridor), |c| format!("{} m: {} %", c.case.width_m, c.in_band_percent));
+    let wide = || plain(corridor).filter(|c| c.number("width_m") > 1.4);
+    let ours = listed(plain(corridor), |c| {
+        format!("{} m: {} %", c.number("width_m"), c.estimate("in_band_percent"))
+    });
     claim(
         ("N3", "the leader keeps 0.7 to 0.9 m from walls"),
-        all(wide(), |c| c.in_band_percent.or_zero() > 90.0),
+        all(wide(), |c| c.number("in_band_percent") > 90.0),
         format!("time with the nearest wall in the band, {ours}"),
         "more than 90 % of the time in corridors wider than 1.4 m, where there is such a place",
     )
@@ -49,11 +49,11 @@ fn band(corridor: &Corridor) -> Claim {
 
 fn layers_literally(fields: &Fields) -> Claim {
     let ours = listed(fields.at_rest("level", false), |c| {
-        format!("{} discs: {}", c.case.discs, c.arrived)
+        format!("{} discs: {}", c.count("discs"), c.share("arrived"))
     });
     claim(
         ("N5a", "six layers, as they are worded, lead a robot to its target in the open"),
-        all(fields.at_rest("level", false), |c| c.arrived.is_all()),
+        all(fields.at_rest("level", false), |c| c.in_all("arrived")),
         ours,
         "every run arrives, also without obstacles; worded literally, a robot in the open always \
          leaves a wall, and turns for ever",
@@ -63,12 +63,12 @@ fn layers_literally(fields: &Fields) -> Claim {
 fn layers_latched(fields: &Fields) -> Claim {
     let told = |rule: bool| {
         listed(fields.at_rest("latched", rule), |c| {
-            format!("{} discs: {}", c.case.discs, c.arrived)
+            format!("{} discs: {}", c.count("discs"), c.share("arrived"))
         })
     };
     claim(
         ("N5b", "six layers lead a robot to its target, where leaving is an event with a memory"),
-        all(fields.at_rest("latched", true), |c| c.arrived.is_all() && c.untouched.is_all()),
+        all(fields.at_rest("latched", true), |c| c.in_all("arrived") && c.in_all("untouched")),
         format!("with the leave rule, {}; without it, {}", told(true), told(false)),
         "every run arrives and touches nothing, with the rule (ours) that a free way to the target \
          ends following a wall",
@@ -77,48 +77,53 @@ fn layers_latched(fields: &Fields) -> Claim {
 
 fn narrow_corridors(corridor: &Corridor) -> Claim {
     let ours = listed(plain(corridor), |c| {
-        format!("{} m: {}, {} m/s", c.case.width_m, c.arrived, c.speed_m_s)
+        format!(
+            "{} m: {}, {} m/s",
+            c.number("width_m"),
+            c.share("arrived"),
+            c.estimate("speed_m_s")
+        )
     });
     claim(
         ("N6a", "it passes narrow corridors, even of high curvature"),
-        all(plain(corridor), |c| c.arrived.is_all() && c.penetrations == 0),
+        all(plain(corridor), |c| c.in_all("arrived") && c.count("penetrations") == 0),
         ours,
         "every run arrives at every width, with bends of 1.3 m, and nobody is ever inside a wall",
     )
 }
 
 fn moving_discs(fields: &Fields) -> Claim {
-    let near = || fields.moving().filter(|c| c.case.speed_ratio <= 1.0);
+    let near = || fields.moving().filter(|c| c.number("speed_ratio") <= 1.0);
     let ours = listed(fields.moving(), |c| {
         format!(
             "{} times as fast: {} arrived, {} untouched, {} mm",
-            c.case.speed_ratio,
-            c.arrived,
-            c.untouched,
-            mm(c.min_clearance_m)
+            c.number("speed_ratio"),
+            c.share("arrived"),
+            c.share("untouched"),
+            c.mm("min_clearance_m")
         )
     });
     claim(
         ("N6b", "it works among obstacles that move about as fast as the robot"),
-        all(near(), |c| c.arrived.is_all() && c.untouched.is_all()),
+        all(near(), |c| c.in_all("arrived") && c.in_all("untouched")),
         ours,
         "every run arrives and touches nothing up to the robot's own speed",
     )
 }
 
 fn snake_in_real_time(snakes: &Snakes) -> Claim {
-    let cells = || snakes.cells.iter().filter(|c| c.case.connectors >= AGENTS);
+    let cells = || snakes.cells.iter().filter(|c| c.count("connectors") >= AGENTS);
     let ours = listed(cells(), |c| {
         format!(
             "{} connectors, {} % filled, {} flying: {} times",
-            c.case.connectors,
-            100.0 * c.case.filled,
-            c.case.movers,
-            c.real_time
+            c.count("connectors"),
+            100.0 * c.number("filled"),
+            c.count("movers"),
+            c.estimate("real_time")
         )
     });
-    let lowest = |c: &snake::Cell| {
-        c.real_time.interval.map_or(c.real_time.or_zero(), |interval| interval.low)
+    let lowest = |c: &Cell| {
+        c.estimate("real_time").interval.map_or(c.number("real_time"), |interval| interval.low)
     };
     claim(
         ("E1", "a snake of 450 and more agents moves in space in real time"),
@@ -131,18 +136,20 @@ fn snake_in_real_time(snakes: &Snakes) -> Claim {
 }
 
 fn swarm(corridor: &Corridor) -> Claim {
-    let cells = || corridor.of(READINGS[0]).filter(|c| c.case.followers >= FOLLOWERS);
-    let is_clean = |c: &Cell| c.arrived.is_all() && c.bumper_events == 0 && c.penetrations == 0;
+    let cells = || corridor.of(READINGS[0]).filter(|c| c.count("followers") >= FOLLOWERS);
+    let is_clean = |c: &Cell| {
+        c.in_all("arrived") && c.count("bumper_events") == 0 && c.count("penetrations") == 0
+    };
     let sum = |count: fn(&Cell) -> u64| cells().map(count).sum::<u64>();
     let ours = format!(
         "{} of {} runs arrive; {} bumper events, {} of {} steps inside, gap {} mm, lag up to {:.3} m",
-        sum(|c| c.arrived.hits),
-        sum(|c| c.arrived.n),
-        sum(|c| c.bumper_events),
-        sum(|c| c.penetrations),
-        sum(|c| c.steps),
-        mm(cells().map(|c| c.min_gap_m).reduce(f64::min)),
-        most(cells().map(|c| c.max_lag_m)),
+        sum(|c| c.share("arrived").hits),
+        sum(|c| c.share("arrived").n),
+        sum(|c| c.count("bumper_events")),
+        sum(|c| c.count("penetrations")),
+        sum(|c| c.count("steps")),
+        mm(cells().map(|c| c.number("min_gap_m")).reduce(f64::min)),
+        most(cells().map(|c| c.number("max_lag_m"))),
     );
     claim(
         (
@@ -158,11 +165,11 @@ fn swarm(corridor: &Corridor) -> Claim {
 
 fn one_master(corridor: &Corridor) -> Claim {
     let cells = || corridor.of(READINGS[0]);
-    let vetoes: u64 = cells().map(|c| c.vetoes).sum();
-    let steps: u64 = cells().map(|c| c.steps).sum();
+    let vetoes: u64 = cells().map(|c| c.count("vetoes")).sum();
+    let steps: u64 = cells().map(|c| c.count("steps")).sum();
     claim(
         ("E3", "planning the motion of a chain is reduced to that of one part"),
-        both(&[all(cells(), |c| c.arrived.is_all()), all(cells(), |c| c.vetoes == 0)]),
+        both(&[all(cells(), |c| c.in_all("arrived")), all(cells(), |c| c.count("vetoes") == 0)]),
         format!("{vetoes} vetoes of {steps} motions of leaders that know nothing of who follows"),
         "in the corridor all who follow adapt to every motion of the leader; a leader that goes back \
          is another matter, see the table of pushing",
@@ -176,7 +183,7 @@ fn best_for() -> Claim {
             "it is best for highly redundant and reconfigurable arms, and for large swarms in narrow corridors",
         ),
         Verdict::Lost,
-        "no figure".into(),
+        "no figure",
         "the slides compare it with nothing, and name no measure",
     )
 }
