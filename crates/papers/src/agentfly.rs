@@ -6,7 +6,7 @@
 //! are judged here. Both deployments choose the same controls, so flights are the same.
 
 use crate::cells::{Cell, Columns, Run, Runs, Value, column, figure, series};
-use crate::claims::{all, claim, listed};
+use crate::claims::{File, Words, all, listed};
 use crate::study::{Progress, Study, finish, number, setting, source};
 use serde::Serialize;
 use sidestep::kernel::InputError;
@@ -172,6 +172,13 @@ fn each(values: &[Estimate]) -> String {
     listed(values, ToString::to_string)
 }
 
+static WORDS: Words = Words::new(|| File::read(include_str!("agentfly.toml")));
+
+/// A claim by its number, its verdict, and our figures.
+fn claim(id: &str, verdict: Verdict, ours: impl Into<String>) -> Claim {
+    WORDS.claim(id, verdict, ours.into())
+}
+
 fn judge(cells: &[Cell]) -> Vec<Claim> {
     vec![
         takes_more_time(cells),
@@ -186,20 +193,18 @@ fn judge(cells: &[Cell]) -> Vec<Claim> {
 fn takes_more_time(cells: &[Cell]) -> Claim {
     let ratios = ratios(cells, "elapsed_s", "elapsed_s");
     claim(
-        ("A-1", "pim takes more time than the team (figure 5)"),
+        "A-1",
         all(&ratios, |ratio| ratio.is_above(1.0)),
         format!("pim / team: {}", each(&ratios)),
-        "above 1 at every number of airplanes, by its interval",
     )
 }
 
 fn needs_fewer_messages(cells: &[Cell]) -> Claim {
     let ratios = ratios(cells, "messages", "messages");
     claim(
-        ("A-2", "pim needs fewer messages than the team (figure 6)"),
+        "A-2",
         all(&ratios, |ratio| ratio.is_below(1.0)),
         format!("pim / team: {}", each(&ratios)),
-        "below 1 at every number of airplanes, by its interval",
     )
 }
 
@@ -207,14 +212,13 @@ fn moves_far_more_bytes(cells: &[Cell]) -> Claim {
     let unicast = ratios(cells, "bytes", "bytes");
     let multicast = ratios(cells, "bytes", "multicast_bytes");
     claim(
-        ("A-3", "pim moves far more bytes than the team (figure 7)"),
+        "A-3",
         all(&unicast, |ratio| ratio.is_above(2.0)),
         format!(
             "pim / team: {}; against a team that multicasts: {}",
             each(&unicast),
             each(&multicast)
         ),
-        "far more: more than twice, by its interval at every number of airplanes",
     )
 }
 
@@ -226,7 +230,7 @@ fn bytes_grow_faster(cells: &[Cell]) -> Claim {
     let unicast = ends(&ratios(cells, "bytes", "bytes"));
     let multicast = ends(&ratios(cells, "bytes", "multicast_bytes"));
     claim(
-        ("A-4", "pim's bytes grow faster with the number of airplanes (figure 7)"),
+        "A-4",
         rising(&unicast),
         format!(
             "pim / team with the fewest and the most airplanes: {}; against a team that \
@@ -234,19 +238,13 @@ fn bytes_grow_faster(cells: &[Cell]) -> Claim {
             each(&unicast),
             each(&multicast)
         ),
-        "the first mean ratio rises; the paper does not say which team it counts",
     )
 }
 
 fn multicast_saves(cells: &[Cell]) -> Claim {
     let saved = |(team, _): (&Cell, &Cell)| ratio((team, "bytes"), (team, "multicast_bytes"));
     let saved: Vec<Estimate> = pairs(cells).map(saved).collect();
-    claim(
-        ("A-5", "multicast saves the team further bandwidth, most with many airplanes"),
-        rising(&saved),
-        format!("unicast / multicast: {}", each(&saved)),
-        "the mean ratio rises with every airplane",
-    )
+    claim("A-5", rising(&saved), format!("unicast / multicast: {}", each(&saved)))
 }
 
 fn hardly_in_time(cells: &[Cell]) -> Claim {
@@ -262,16 +260,7 @@ fn hardly_in_time(cells: &[Cell]) -> Claim {
             (verdict, format!("the longest on average, in seconds of {DT_S}: {s}"))
         }
     };
-    claim(
-        (
-            "A-6",
-            "with five and more airplanes pim can hardly compute the optimum in reasonable time",
-        ),
-        verdict,
-        ours,
-        "an optimization takes longer than the time between two, with any such number",
-    )
-    .with_papers_figure("from 5 airplanes on; one optimization every 5 s")
+    claim("A-6", verdict, ours)
 }
 
 impl Report {

@@ -1,15 +1,43 @@
-//! What all papers share of claims: a claim, and verdicts over all of something.
+//! What all papers share of claims: their words, and verdicts over all of something.
 
+use serde::Deserialize;
 use sidestep_document::claim::{Claim, Verdict};
+use std::sync::LazyLock;
 
-/// A claim by its number and words, its verdict, our figures, and the rule.
-pub(crate) fn claim(
-    (id, paper): (&'static str, &'static str),
-    verdict: Verdict,
-    ours: impl Into<String>,
-    reason: impl Into<String>,
-) -> Claim {
-    Claim { id, paper, papers_figure: None, ours: ours.into(), verdict, reason: reason.into() }
+/// The claims of a paper, as a file beside its experiments tells them.
+pub(crate) type Words = LazyLock<File>;
+
+/// A file of claims.
+#[derive(Debug, Deserialize)]
+pub(crate) struct File {
+    claim: Vec<Told>,
+}
+
+/// A claim in words.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Told {
+    id: String,
+    paper: String,
+    papers_figure: Option<String>,
+    /// The rule by which it is judged; without one the judgment itself says it.
+    #[serde(default)]
+    rule: String,
+}
+
+impl File {
+    /// Reads the claims of a paper.
+    pub(crate) fn read(text: &str) -> Self {
+        toml::from_str(text).expect("the claims of a paper are right")
+    }
+
+    /// A claim by its number, its verdict, and our figures.
+    pub(crate) fn claim(&'static self, id: &str, verdict: Verdict, ours: String) -> Claim {
+        let told = self.claim.iter().find(|told| told.id == id);
+        let told = told.unwrap_or_else(|| panic!("there is no claim `{id}`"));
+        let (reason, papers_figure) = (told.rule.clone(), told.papers_figure.as_deref());
+        Claim { id: &told.id, paper: &told.paper, papers_figure, ours, verdict, reason }
+    }
 }
 
 /// Held if it is so in all of them; lost where there is none.

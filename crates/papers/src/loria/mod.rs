@@ -27,7 +27,6 @@ mod strategies;
 mod timing;
 
 use crate::study::{Progress, stage};
-use claims::Claim;
 use cost_model::CostModel;
 use genericity::Genericity;
 use performance::Performance;
@@ -36,7 +35,7 @@ use serde::Serialize;
 use sidestep::kernel::InputError;
 use sidestep::kernel::ports::{MemoryRecorder, RecordError, Recorder, TableSchema};
 use sidestep::kernel::workers::available;
-use sidestep_document::claim::{self, tally};
+use sidestep_document::claim::{self, Claim, tally};
 use sidestep_document::document::{Document, Experiment, Picture};
 use strategies::Strategies;
 

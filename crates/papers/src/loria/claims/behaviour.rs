@@ -5,8 +5,7 @@ use super::super::floor::Mind;
 use super::super::reliability::{
     CONTACTS, Key, LATERAL, Reliability, STRAIGHTNESS, SweepCase, TRIP, larger,
 };
-use super::{Claim, Verdict};
-use crate::claims::claim;
+use super::{Claim, Verdict, claim};
 use sidestep::worlds::robots::world::Regime::{self, Both, Effectors, Reliable, Sensors};
 use sidestep_document::Estimate;
 
@@ -20,18 +19,12 @@ fn zigzag(r: &Reliability) -> Claim {
     let lateral = r.estimate(Key::BASE, Both, LATERAL);
     let means = by_regime(|regime| r.estimate(Key::BASE, regime, STRAIGHTNESS));
     claim(
-        (
-            "E-8",
-            "With unreliable sensors and effectors trajectories are not straight but slightly \
-                zigzag.",
-        ),
+        "E-8",
         Verdict::of(bent.is_below(0.0) && lateral.is_above(0.0)),
         format!(
             "Straightness: {means}; both - reliable {bent}. Sideways moves per 1000 actions: \
              both {lateral}, reliable 0."
         ),
-        "Held when straightness with both is below that of reliable robots and sideways \
-                 moves are above 0, both by their intervals.",
     )
 }
 
@@ -51,11 +44,7 @@ fn collisions(r: &Reliability) -> Claim {
     let count = |name| by.iter().filter(|&&b| b == name).count();
     let (sensors, effectors) = (count("sensors"), count("effectors"));
     claim(
-        (
-            "E-9",
-            "Errors of sensors cause more collisions than errors of effectors; both more than \
-                none.",
-        ),
+        "E-9",
         Verdict::of(whole == places.len() && effectors == 0),
         format!(
             "Presets, rule cut, per 1000 actions: {}; sensors - effectors {}. Sensors are above \
@@ -69,9 +58,6 @@ fn collisions(r: &Reliability) -> Claim {
             by.len() - sensors - effectors,
             flips(r),
         ),
-        "Held only when the order is the same at all places and at no equal error level \
-                 turns around. It turns with how often a thing is missed, how many beams see the \
-                 same thing, the behaviour, and the law for blocked paths.",
     )
 }
 
@@ -95,18 +81,13 @@ fn slowest_trips(r: &Reliability) -> Claim {
     let places = r.places();
     let held = places.iter().filter(|&&key| slowest(key)).count();
     claim(
-        (
-            "E-10a",
-            "A trip to and fro takes longest when sensors and effectors are both unreliable.",
-        ),
+        "E-10a",
         Verdict::of(held == places.len()),
         format!(
             "Cycles per trip: {}. Both are slowest at {held} of {} places.",
             by_regime(|regime| r.estimate(Key::BASE, regime, TRIP)),
             places.len()
         ),
-        "Held when, at every place, a trip with both takes longer than with none, with \
-                 effectors and with sensors alone, each by its paired interval.",
     )
 }
 
@@ -121,12 +102,7 @@ fn trip_ratios(r: &Reliability) -> Claim {
     let ratio = |[a, b]: [Regime; 2]| {
         format!("{} / {} {}", a.name(), b.name(), r.ratio(Key::BASE, [a, b], TRIP))
     };
-    claim(
-        ("E-10b", "It takes some times, and a half, as long as in another case."),
-        Verdict::Lost,
-        format!("Seed by seed: {}.", pairs.map(ratio).join("; ")),
-        "Factor and the pair of cases are lost; these are the ratios.",
-    )
+    claim("E-10b", Verdict::Lost, format!("Seed by seed: {}.", pairs.map(ratio).join("; ")))
 }
 
 fn behaviours(r: &Reliability) -> Claim {
@@ -134,11 +110,7 @@ fn behaviours(r: &Reliability) -> Claim {
     let contacts = |regime| r.between_minds([Mind::Filter, Mind::Avoid], regime, CONTACTS);
     let more = difference_of_savings(r);
     claim(
-        (
-            "E-11",
-            "Behaviours are harder to design for unreliable sensors and effectors; simple ones \
-                do where all is reliable.",
-        ),
+        "E-11",
         Verdict::of(saved(Both).is_above(0.0) && more.is_above(0.0)),
         format!(
             "A filter (two reports before a robot believes its side beams) saves cycles per \
@@ -149,8 +121,6 @@ fn behaviours(r: &Reliability) -> Claim {
             contacts(Reliable),
             contacts(Both),
         ),
-        "Held when the more elaborate behaviour saves time under errors, and more than it \
-                 saves without. One pair of behaviours is an example, not a proof.",
     )
 }
 

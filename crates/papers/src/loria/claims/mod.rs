@@ -8,6 +8,7 @@ mod setting;
 mod time;
 
 use super::Report;
+use crate::claims::{File, Words};
 use sidestep_document::claim::{Claim, Verdict};
 
 /// All claims, judged.
@@ -16,4 +17,11 @@ pub(super) fn judge(report: &Report) -> Vec<Claim> {
     claims.extend(behaviour::claims(report));
     claims.extend(time::claims(report));
     claims
+}
+
+static WORDS: Words = Words::new(|| File::read(include_str!("claims.toml")));
+
+/// A claim by its number, its verdict, and our figures.
+fn claim(id: &str, verdict: Verdict, ours: impl Into<String>) -> Claim {
+    WORDS.claim(id, verdict, ours.into())
 }

@@ -1,8 +1,7 @@
 //! E-1 to E-7: what the experiments are made of.
 
 use super::super::Report;
-use super::{Claim, Verdict};
-use crate::claims::claim;
+use super::{Claim, Verdict, claim};
 
 pub(super) fn claims(report: &Report) -> Vec<Claim> {
     vec![
@@ -22,66 +21,46 @@ fn suites(report: &Report) -> Claim {
     let timed = report.performance.timings.len() + report.strategies.trials.len();
     let fitted = report.cost_model.points.len();
     claim(
-        (
-            "E-1",
-            "The experiments are to show that the simulator is easy and general, that its \
-                parallel model is efficient, and that its stochastic model is valid.",
-        ),
+        "E-1",
         Verdict::Held,
         format!(
             "{runs} reliability runs, {builds} genericity runs, {timed} timed series, {fitted} \
              runs for the cost model."
         ),
-        "All four suites ran to the end; what each shows stands below.",
     )
 }
 
 fn floors(report: &Report) -> Claim {
-    claim(
-        (
-            "E-2",
-            "It ran on a real floor and on virtual ones of various sizes, with various numbers \
-                of robots, doors and mobile objects.",
-        ),
-        Verdict::Held,
-        report.reliability.floors.join("; "),
-        "Three generated floors ran all four regimes. The paper's sizes and its real \
-                 floor are lost.",
-    )
+    claim("E-2", Verdict::Held, report.reliability.floors.join("; "))
 }
 
 fn processors(report: &Report) -> Claim {
     let p = &report.performance;
     let workers: Vec<String> = p.digests.iter().map(|d| d.0.to_string()).collect();
-    claim(
-        ("E-3", "It ran on up to sixteen processors."),
-        Verdict::of(p.is_deterministic()),
-        format!("Workers {}: {}.", workers.join(", "), digests(report)),
-        format!(
+    Claim {
+        reason: format!(
             "The same run gives the same bits with every number of workers; of time, this \
              machine can show {} processors only.",
             p.processors
         ),
-    )
-    .with_papers_figure("16 processors")
+        ..claim(
+            "E-3",
+            Verdict::of(p.is_deterministic()),
+            format!("Workers {}: {}.", workers.join(", "), digests(report)),
+        )
+    }
 }
 
 fn sequential(report: &Report) -> Claim {
     let p = &report.performance;
     claim(
-        (
-            "E-4",
-            "The same program runs sequentially and on parallel machines, and its user need \
-                not know parallel programming.",
-        ),
+        "E-4",
         Verdict::of(p.is_deterministic()),
         format!(
             "With 1 worker, with more, and recorded: {}, {}.",
             digests(report),
             p.recorded_digest
         ),
-        "One worker is the sequential mode, without a second code path; a user gives a \
-                 number of workers. Other systems are to compare the digest.",
     )
 }
 
@@ -106,37 +85,29 @@ fn builds(report: &Report, camera: bool) -> (String, Verdict) {
 
 fn sizes(report: &Report) -> Claim {
     let (ours, verdict) = builds(report, false);
-    claim(
-        (
-            "E-5",
-            "Robots of other sizes needed no change but the number of boxes, and it was in \
-                the source.",
-        ),
-        verdict,
-        format!("{ours}."),
-        format!("{GENERIC}; only `size` of the scenario changes, no source."),
-    )
+    Claim {
+        reason: format!("{GENERIC}; only `size` of the scenario changes, no source."),
+        ..claim("E-5", verdict, format!("{ours}."))
+    }
 }
 
 fn camera(report: &Report) -> Claim {
     let (ours, verdict) = builds(report, true);
     let effect = report.genericity.camera_effect();
-    claim(
-        (
+    Claim {
+        reason: format!("{GENERIC}; only `sensors` of the scenario changes, no source."),
+        ..claim(
             "E-6",
-            "A camera with its confusion matrix was easily added, with changes to source and \
-                behaviour.",
-        ),
-        verdict,
-        format!("{ours}; contacts per 1000 actions with the camera less without: {effect}."),
-        format!("{GENERIC}; only `sensors` of the scenario changes, no source."),
-    )
+            verdict,
+            format!("{ours}; contacts per 1000 actions with the camera less without: {effect}."),
+        )
+    }
 }
 
 fn regimes(report: &Report) -> Claim {
     let r = &report.reliability;
     claim(
-        ("E-7", "Four cases: all reliable; effectors, sensors, or both unreliable."),
+        "E-7",
         Verdict::Held,
         format!(
             "{} variants x {} seeds, four regimes at each of {} places.",
@@ -144,7 +115,5 @@ fn regimes(report: &Report) -> Claim {
             report.plan.seeds,
             r.places().len()
         ),
-        "`regime` of the scenario switches the error tables on and off; nothing else \
-                 differs between the four.",
     )
 }

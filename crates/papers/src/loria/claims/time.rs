@@ -2,8 +2,7 @@
 
 use super::super::Report;
 use super::super::performance::{Performance, REFERENCE_CYCLES, Timing};
-use super::{Claim, Verdict};
-use crate::claims::claim;
+use super::{Claim, Verdict, claim};
 use sidestep::worlds::robots::baseline::Strategy;
 use sidestep_document::Estimate;
 
@@ -29,24 +28,22 @@ pub(super) fn claims(report: &Report) -> Vec<Claim> {
 
 fn initialization(p: &Performance) -> Claim {
     let worst = p.initialization.iter().map(|i| i.share_alone).fold(0.0, f64::max);
-    claim(
-        (
-            "E-12",
-            "Time is that of the cycles with recording to disk; initialization is not parallel \
-                and a small share of the whole.",
-        ),
-        Verdict::of(worst < SMALL_SHARE),
-        format!(
-            "Initialization takes up to {:.2} % of a run of {REFERENCE_CYCLES} cycles with one \
-             worker (largest of {} loads).",
-            100.0 * worst,
-            p.loads.len()
-        ),
-        format!(
+    Claim {
+        reason: format!(
             "Held when below {:.0} % for every load; the paper's share and cycles are lost.",
             100.0 * SMALL_SHARE
         ),
-    )
+        ..claim(
+            "E-12",
+            Verdict::of(worst < SMALL_SHARE),
+            format!(
+                "Initialization takes up to {:.2} % of a run of {REFERENCE_CYCLES} cycles with one \
+             worker (largest of {} loads).",
+                100.0 * worst,
+                p.loads.len()
+            ),
+        )
+    }
 }
 
 /// Why time over workers cannot be judged: there is one processor, or others were using them.
@@ -61,7 +58,7 @@ fn time_falls(report: &Report) -> Claim {
     let falls = timings().all(|timing| timing.speed_up.is_above(1.0));
     let machine = Estimate::of(timings().map(|timing| timing.machine.mean));
     claim(
-        ("E-13a", "Execution time falls as processors are added."),
+        "E-13a",
         if !falls && is_excused(p) { Verdict::Lost } else { Verdict::of(falls) },
         format!(
             "Speed-up with {most} workers: {} unrecorded, {} recorded ({} loads, {} repeats of \
@@ -71,9 +68,6 @@ fn time_falls(report: &Report) -> Claim {
             p.loads.len(),
             report.plan.repeats,
         ),
-        "Held when, for every load, recorded or not, the interval of the speed-up with \
-                 the most workers lies above 1. Otherwise not judged where others were using the \
-                 machine.",
     )
 }
 
@@ -91,48 +85,35 @@ fn efficiency_falls(p: &Performance) -> Claim {
     let all = || p.at_most_workers(false).map(efficiency);
     let (low, n) = (all().filter(|&e| e < LOW_EFFICIENCY).count(), all().count());
     let listed: Vec<String> = all().map(|e| format!("{e:.2}")).collect();
-    claim(
-        ("E-13b", "Speed-up rises slowly and efficiency falls quickly."),
-        if is_excused(p) { Verdict::Lost } else { Verdict::of(2 * low > n) },
-        format!(
-            "Efficiency with {most} workers, unrecorded, by load: {}; below {LOW_EFFICIENCY} for \
-             {low} of {n}.",
-            listed.join(", ")
-        ),
-        format!(
+    Claim {
+        reason: format!(
             "Held when efficiency is below {LOW_EFFICIENCY} for most loads; not judged where \
              others were using the machine. The paper went to sixteen processors; {} can show \
              the beginning of a fall only.",
             p.processors
         ),
-    )
+        ..claim(
+            "E-13b",
+            if is_excused(p) { Verdict::Lost } else { Verdict::of(2 * low > n) },
+            format!(
+                "Efficiency with {most} workers, unrecorded, by load: {}; below {LOW_EFFICIENCY} for \
+             {low} of {n}.",
+                listed.join(", ")
+            ),
+        )
+    }
 }
 
 fn lost_speed_up(p: &Performance) -> Claim {
     claim(
-        (
-            "E-13c",
-            "The first parallel version reached a certain speed-up on a certain number of \
-                processors.",
-        ),
+        "E-13c",
         Verdict::Lost,
         format!("With {} workers: {}.", p.most_workers(), range(p.at_most_workers(false))),
-        "Both numbers are lost.",
     )
 }
 
 fn second_machine() -> Claim {
-    claim(
-        (
-            "E-14",
-            "A small machine under another system gives equivalent results with the same \
-                number of processors.",
-        ),
-        Verdict::Lost,
-        "One machine was used.",
-        "The paper's table is lost, and it takes a second machine; the digests of this \
-                 report tell whether another gives the same bits.",
-    )
+    claim("E-14", Verdict::Lost, "One machine was used.")
 }
 
 fn costly_decisions(p: &Performance) -> Claim {
@@ -144,7 +125,7 @@ fn costly_decisions(p: &Performance) -> Claim {
         Estimate::of(timings.flat_map(|timing| timing.ratios.iter().copied()))
     };
     claim(
-        ("E-15a", "Costlier behaviours are expected to give better parallel performance."),
+        "E-15a",
         Verdict::by_sign(gain.interval.filter(|_| !is_excused(p))),
         format!(
             "Speed-up with {} workers: {} at {least} operations per decision, {} at {most}; \
@@ -153,9 +134,6 @@ fn costly_decisions(p: &Performance) -> Claim {
             speed_up(least),
             speed_up(most),
         ),
-        "Held when the paired difference of speed-ups, dearest less cheapest decisions, \
-                 lies above 0; not judged when its interval holds 0, or where others were using the \
-                 machine. Unrecorded, over all numbers of robots.",
     )
 }
 
@@ -169,7 +147,7 @@ fn conflicts(report: &Report) -> Claim {
         },
     };
     claim(
-        ("E-15b", "Conflicts, the more so with many agents, cost time in the second step."),
+        "E-15b",
         Verdict::by_sign(model.parameter("c_s").and_then(|p| p.interval_ns)),
         format!(
             "Per body in conflict c_s = {}, besides c_d = {} for every body; p = {:.3} to {:.3}; \
@@ -181,8 +159,6 @@ fn conflicts(report: &Report) -> Claim {
             model.points.len(),
             model.r_squared[1],
         ),
-        "Held when the interval of c_s, fitted over runs of different crowding, lies \
-                 above 0; not judged when it holds 0.",
     )
 }
 
@@ -209,19 +185,11 @@ fn rejected(report: &Report) -> Claim {
         Verdict::Lost
     };
     claim(
-        (
-            "P-3",
-            "Spatial partition (unequal load, conflicts at borders) and a process per agent \
-                (conflicts made serial) are worse than merged conflicts in a double pool.",
-        ),
+        "P-3",
         verdict,
         format!(
             "Speed-up of the double pool with the most workers less that of the other, {}.",
             shown.collect::<Vec<_>>().join("; ")
         ),
-        "Held when the double pool is ahead of both at every load by its paired interval, \
-                 not held when behind at one; not judged otherwise, or where others were using \
-                 the machine. Only the double pool gives the same bits for every number of \
-                 workers.",
     )
 }

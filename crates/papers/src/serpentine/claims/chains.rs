@@ -45,12 +45,9 @@ fn moving_obstacles(movers: &Movers) -> Claim {
         format!("{escape}: up to {worst:.2} % of steps inside")
     };
     claim(
-        ("P2", "a chain copes with obstacles that move, at speeds like its own"),
+        "P2",
         all(movers.of(ESCAPES[2]), |c| c.number("inside_percent") == 0.0),
         listed(ESCAPES, told),
-        "no step with a part inside at any speed and number of discs, for a chain that looks ahead \
-         (ours; the slides' parts react when touched) and keeps to a speed limit and out of itself; \
-         without these limits parts jump",
     )
 }
 
@@ -73,13 +70,7 @@ fn local_cost(scaling: &Scaling) -> Claim {
         far.map_or("-".into(), |x| format!("{x:.2}")),
         listed(&scaling.far, |f| if f.same { "yes".into() } else { "no".into() }),
     );
-    claim(
-        ("P5, E4", "an agent needs what is near and its two neighbours only, so that it scales"),
-        verdict,
-        ours,
-        "time per moved connector at most doubles from the shortest chain to the longest, far \
-         obstacles at most double it, and change no bit; timed on this machine",
-    )
+    claim("P5, E4", verdict, ours)
 }
 
 fn few_and_many(report: &Report) -> Claim {
@@ -93,12 +84,7 @@ fn few_and_many(report: &Report) -> Claim {
         many.map_or("-".into(), |n| n.to_string()),
     );
     let verdict = both(&[all(&links, |c| c.in_all("reached")), all(many, |n| n >= 1000)]);
-    claim(
-        ("P6", "it scales up to highly redundant systems and serves few degrees of freedom too"),
-        verdict,
-        ours,
-        "all targets reached at every number of links, and chains of 1000 connectors and more moved",
-    )
+    claim("P6", verdict, ours)
 }
 
 fn structure_kept(report: &Report) -> Claim {
@@ -112,12 +98,7 @@ fn structure_kept(report: &Report) -> Claim {
     let worst: Vec<f64> =
         all_cells.into_iter().flatten().map(|c| c.number("rod_violation_m")).collect();
     let ours = format!("rods outside their limits by {:.1e} m at most", most(worst.clone()));
-    claim(
-        ("V5", "the constraints that define the chain are preserved"),
-        all(worst, |m| m <= ROD_TOLERANCE_M),
-        ours,
-        "within 1e-9 m in every step of every run of corridor, rotation, discs, snake and pushing",
-    )
+    claim("V5", all(worst, |m| m <= ROD_TOLERANCE_M), ours)
 }
 
 fn creeps(snakes: &Snakes) -> Claim {
@@ -132,46 +113,39 @@ fn creeps(snakes: &Snakes) -> Claim {
         )
     });
     claim(
-        ("V6", "with many rods it behaves like a snake that creeps among obstacles"),
+        "V6",
         all(snakes.at_rest(), |c| c.count("penetrations") == 0 && c.number("way_percent") > 90.0),
         ours,
-        "more than 90 % of the wanted way, and never inside, among balls that stand",
     )
 }
 
 fn any_initiator(initiators: &Initiators) -> Claim {
     claim(
-        ("R4, R5", "any part may begin a motion; the chain is two sub-chains from there"),
+        "R4, R5",
         all([initiators.moved, initiators.halves_alike], |share| share.is_all()),
         format!("moved: {}; halves alike: {}", initiators.moved, initiators.halves_alike),
-        "every motion of every connector of a free chain is made, and both halves come to be, to \
-         the bit, where they would be alone",
     )
 }
 
 fn fixed_bases(initiators: &Initiators) -> Claim {
     claim(
-        ("R7", "vetoes allow arms with a fixed base, which always objects to being moved"),
+        "R7",
         all([initiators.base_objected, initiators.kept], |share| share.is_all()),
         format!(
             "the base objected: {}; nothing moved: {}",
             initiators.base_objected, initiators.kept
         ),
-        "every motion of rods of fixed length is vetoed by the base, as fixed, and leaves all as it \
-         was. What the arm does then is F2b",
     )
 }
 
 fn failed_parts(initiators: &Initiators) -> Claim {
     claim(
-        ("R8", "vetoes tell of a part that is trapped or does not work, so that one can re-plan"),
+        "R8",
         all([initiators.failed_objected, initiators.told], |share| share.is_all()),
         format!(
             "the failed one objected: {}; told: {}",
             initiators.failed_objected, initiators.told
         ),
-        "whoever begins, the veto names the failed connector and that it has failed; also where it \
-         fails while a run goes on",
     )
 }
 
@@ -183,16 +157,7 @@ fn one_turn(rotations: &Rotations) -> Claim {
         let clearance_m = least(cells.iter().map(|c| c.maybe("min_clearance_m")));
         format!("{rule}: {inside} of {steps} steps inside, clearance {} mm", mm(clearance_m))
     });
-    claim(
-        (
-            "A7, A8",
-            "a rod turned past the obstacle that it hits nearest to its master keeps clear of all",
-        ),
-        all(rotations.of(RULES[1]), |c| c.count("penetrations") == 0),
-        ours,
-        "no step inside with the slides' rule (`literal`): one turn leads into the next obstacle. \
-         `union`, which turns clear of all at once, is ours",
-    )
+    claim("A7, A8", all(rotations.of(RULES[1]), |c| c.count("penetrations") == 0), ours)
 }
 
 fn bend_limits(initiators: &Initiators) -> Claim {
@@ -203,12 +168,7 @@ fn bend_limits(initiators: &Initiators) -> Claim {
             b.limit_deg, b.exceeded, b.sharpest_deg
         )
     });
-    claim(
-        ("F1", "limits of angles fit into the same scheme of reactions (future work)"),
-        all(&initiators.bends, |b| b.exceeded == 0 && b.moved.hits > 0),
-        ours,
-        "no bend beyond its limit after any motion, and the chain still moves",
-    )
+    claim("F1", all(&initiators.bends, |b| b.exceeded == 0 && b.moved.hits > 0), ours)
 }
 
 fn posture_by_veto(postures: &Postures) -> Claim {
@@ -219,16 +179,11 @@ fn posture_by_veto(postures: &Postures) -> Claim {
     };
     let (fixed, slack) = (best(false), best(true));
     claim(
-        (
-            "F2a",
-            "the rules give inverse kinematics by themselves: an arm's tip is moved, its base objects",
-        ),
+        "F2a",
         all(veto(), |c| c.number("reached") > 99.0),
         format!(
             "rods of fixed length: at most {fixed:.1} %; with 10 % of slack: at most {slack:.1} %"
         ),
-        "more than 99 % of targets in one motion at every number of links; with fixed rods every \
-         motion displaces the base",
     )
 }
 
@@ -243,13 +198,7 @@ fn posture_there_and_back(postures: &Postures) -> Claim {
             c.number("median_us")
         )
     });
-    claim(
-        ("F2b", "the same rules give inverse kinematics where a base is free, or is brought back"),
-        both(&[free, back]),
-        ours,
-        "all targets: one motion with a free base, and motions of tip and base in turn with a fixed \
-         one (which is FABRIK, of 2011)",
-    )
+    claim("F2b", both(&[free, back]), ours)
 }
 
 fn rejoined(broken: &Broken) -> Claim {
@@ -257,12 +206,7 @@ fn rejoined(broken: &Broken) -> Claim {
     let ours = listed(none_gone(), |c| {
         format!("{} thrown by {} m: {}", c.count("scattered"), c.number("by_m"), c.share("whole"))
     });
-    claim(
-        ("F3a", "a chain broken by hand is joined again, and keeps the shape of its whole ends"),
-        all(none_gone(), |c| c.in_all("whole") && c.in_all("ends_kept")),
-        ours,
-        "every one whole again, ends to the bit where they were",
-    )
+    claim("F3a", all(none_gone(), |c| c.in_all("whole") && c.in_all("ends_kept")), ours)
 }
 
 fn rejoined_with_fewer(broken: &Broken) -> Claim {
@@ -281,13 +225,7 @@ fn rejoined_with_fewer(broken: &Broken) -> Claim {
         let whole = if c.is("may_come") { c.share("whole").n } else { c.share("can").hits };
         c.share("whole").hits == whole && c.in_all("ends_kept")
     };
-    claim(
-        ("F3b", "it is joined even with fewer parts"),
-        all(gone(), as_can),
-        ours,
-        "every one that the parts left can reach across, and all where an end may come; the others \
-         are refused with what is missing",
-    )
+    claim("F3b", all(gone(), as_can), ours)
 }
 
 fn in_space(snakes: &Snakes) -> Claim {
@@ -299,14 +237,5 @@ fn in_space(snakes: &Snakes) -> Claim {
             c.estimate("veto_percent")
         )
     });
-    claim(
-        (
-            "F4",
-            "collisions in space need hardly another rule, and no other propagation (future work)",
-        ),
-        all(snakes.at_rest(), |c| c.count("penetrations") == 0),
-        ours,
-        "never inside with the propagation of the plane, which is the same code; only the search for \
-         free directions is another",
-    )
+    claim("F4", all(snakes.at_rest(), |c| c.count("penetrations") == 0), ours)
 }

@@ -10,7 +10,7 @@ mod swarms;
 mod tests;
 
 use super::Report;
-use crate::claims::{all, both, claim, listed};
+use crate::claims::{File, Words, all, both, listed};
 use sidestep_document::claim::{Claim, Verdict};
 
 /// All claims, judged.
@@ -18,4 +18,11 @@ pub(super) fn judge(report: &Report) -> Vec<Claim> {
     let mut claims = chains::claims(report);
     claims.extend(swarms::claims(report));
     claims
+}
+
+static WORDS: Words = Words::new(|| File::read(include_str!("claims.toml")));
+
+/// A claim by its number, its verdict, and our figures.
+fn claim(id: &str, verdict: Verdict, ours: impl Into<String>) -> Claim {
+    WORDS.claim(id, verdict, ours.into())
 }

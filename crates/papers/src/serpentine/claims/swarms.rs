@@ -39,25 +39,17 @@ fn band(corridor: &Corridor) -> Claim {
         format!("{} m: {} %", c.number("width_m"), c.estimate("in_band_percent"))
     });
     claim(
-        ("N3", "the leader keeps 0.7 to 0.9 m from walls"),
+        "N3",
         all(wide(), |c| c.number("in_band_percent") > 90.0),
         format!("time with the nearest wall in the band, {ours}"),
-        "more than 90 % of the time in corridors wider than 1.4 m, where there is such a place",
     )
-    .with_papers_figure("0.7 to 0.9 m")
 }
 
 fn layers_literally(fields: &Fields) -> Claim {
     let ours = listed(fields.at_rest("level", false), |c| {
         format!("{} discs: {}", c.count("discs"), c.share("arrived"))
     });
-    claim(
-        ("N5a", "six layers, as they are worded, lead a robot to its target in the open"),
-        all(fields.at_rest("level", false), |c| c.in_all("arrived")),
-        ours,
-        "every run arrives, also without obstacles; worded literally, a robot in the open always \
-         leaves a wall, and turns for ever",
-    )
+    claim("N5a", all(fields.at_rest("level", false), |c| c.in_all("arrived")), ours)
 }
 
 fn layers_latched(fields: &Fields) -> Claim {
@@ -67,11 +59,9 @@ fn layers_latched(fields: &Fields) -> Claim {
         })
     };
     claim(
-        ("N5b", "six layers lead a robot to its target, where leaving is an event with a memory"),
+        "N5b",
         all(fields.at_rest("latched", true), |c| c.in_all("arrived") && c.in_all("untouched")),
         format!("with the leave rule, {}; without it, {}", told(true), told(false)),
-        "every run arrives and touches nothing, with the rule (ours) that a free way to the target \
-         ends following a wall",
     )
 }
 
@@ -85,10 +75,9 @@ fn narrow_corridors(corridor: &Corridor) -> Claim {
         )
     });
     claim(
-        ("N6a", "it passes narrow corridors, even of high curvature"),
+        "N6a",
         all(plain(corridor), |c| c.in_all("arrived") && c.count("penetrations") == 0),
         ours,
-        "every run arrives at every width, with bends of 1.3 m, and nobody is ever inside a wall",
     )
 }
 
@@ -103,12 +92,7 @@ fn moving_discs(fields: &Fields) -> Claim {
             c.mm("min_clearance_m")
         )
     });
-    claim(
-        ("N6b", "it works among obstacles that move about as fast as the robot"),
-        all(near(), |c| c.in_all("arrived") && c.in_all("untouched")),
-        ours,
-        "every run arrives and touches nothing up to the robot's own speed",
-    )
+    claim("N6b", all(near(), |c| c.in_all("arrived") && c.in_all("untouched")), ours)
 }
 
 fn snake_in_real_time(snakes: &Snakes) -> Claim {
@@ -125,14 +109,7 @@ fn snake_in_real_time(snakes: &Snakes) -> Claim {
     let lowest = |c: &Cell| {
         c.estimate("real_time").interval.map_or(c.number("real_time"), |interval| interval.low)
     };
-    claim(
-        ("E1", "a snake of 450 and more agents moves in space in real time"),
-        all(cells(), |c| lowest(c) > 1.0),
-        ours,
-        "faster than 50 steps of 1 cm a second on one core, collisions included (the slides' had \
-         none); the slides' machine of 2005 is lost",
-    )
-    .with_papers_figure("450 and more agents, in real time")
+    claim("E1", all(cells(), |c| lowest(c) > 1.0), ours)
 }
 
 fn swarm(corridor: &Corridor) -> Claim {
@@ -151,16 +128,7 @@ fn swarm(corridor: &Corridor) -> Claim {
         mm(cells().map(|c| c.number("min_gap_m")).reduce(f64::min)),
         most(cells().map(|c| c.number("max_lag_m"))),
     );
-    claim(
-        (
-            "E2",
-            "15 robots with simple sensors follow a wandering leader through curved narrow corridors",
-        ),
-        all(cells(), is_clean),
-        ours,
-        "every run at every width arrives, with no bumper pressed and nobody inside a wall",
-    )
-    .with_papers_figure("15 followers")
+    claim("E2", all(cells(), is_clean), ours)
 }
 
 fn one_master(corridor: &Corridor) -> Claim {
@@ -168,22 +136,12 @@ fn one_master(corridor: &Corridor) -> Claim {
     let vetoes: u64 = cells().map(|c| c.count("vetoes")).sum();
     let steps: u64 = cells().map(|c| c.count("steps")).sum();
     claim(
-        ("E3", "planning the motion of a chain is reduced to that of one part"),
+        "E3",
         both(&[all(cells(), |c| c.in_all("arrived")), all(cells(), |c| c.count("vetoes") == 0)]),
         format!("{vetoes} vetoes of {steps} motions of leaders that know nothing of who follows"),
-        "in the corridor all who follow adapt to every motion of the leader; a leader that goes back \
-         is another matter, see the table of pushing",
     )
 }
 
 fn best_for() -> Claim {
-    claim(
-        (
-            "E5",
-            "it is best for highly redundant and reconfigurable arms, and for large swarms in narrow corridors",
-        ),
-        Verdict::Lost,
-        "no figure",
-        "the slides compare it with nothing, and name no measure",
-    )
+    claim("E5", Verdict::Lost, "no figure")
 }
