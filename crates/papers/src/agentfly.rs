@@ -12,10 +12,9 @@ use serde::Serialize;
 use sidestep::kernel::InputError;
 use sidestep::worlds::airspace::airplane::Point as AirPoint;
 use sidestep::worlds::airspace::simulation::AirspaceSimulation;
-use sidestep_document::claim::{self, Claim, Verdict};
-use sidestep_document::document::{Document, Experiment};
+use sidestep_document::claim::{Claim, Verdict, tally};
 use sidestep_document::figure::Point;
-use sidestep_document::{Estimate, Figure, FigureKind, Series, Table};
+use sidestep_document::{Document, Estimate, Figure, FigureKind, Series, Table};
 
 /// How much to run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -301,24 +300,12 @@ impl Report {
             plan.cycles,
             env!("CARGO_PKG_VERSION"),
         );
-        let lead = format!("{} {setting}", claim::tally(&self.claims));
-        let title = "Probability collectives in AGENTFLY, run anew";
-        let mut document = claim::document(title, lead, plan.quick, &self.claims);
-        document.experiment(Experiment {
-            title: "Results",
-            about: "Airplanes on a circle fly towards its other side and would all meet in the \
-                    middle. They choose how to turn by probability collectives, every time anew: \
-                    as a team of agents that send messages (`team`), or by one coordinator that \
-                    migrates from airplane to airplane (`pim`). Both choose the same, so flights are \
-                    the same, and time, messages and bytes tell them apart.",
-            figures: self.figures(),
-            tables: vec![self.table()],
-        });
+        let lead = format!("{} {setting}", tally(&self.claims));
         let quick = if plan.quick { " --quick" } else { "" };
         let command =
             format!("sidestep reproduce agentfly{quick} --seeds {} --out DIR", plan.seeds);
-        document.section("How to run it again").commands("In a shell", command);
-        document
+        let experiments = WORDS.experiments([(self.figures(), vec![self.table()])]);
+        WORDS.document(lead, plan.quick, (&self.claims, Vec::new(), experiments), command)
     }
 }
 

@@ -366,6 +366,21 @@ impl Serialize for Cell {
     }
 }
 
+/// A table of whatever, by its columns: their heads, and what stands below them.
+pub(crate) fn table<T>(
+    title: impl Into<String>,
+    note: impl Into<String>,
+    items: impl IntoIterator<Item = T>,
+    columns: &[(&str, &dyn Fn(&T) -> String)],
+) -> Table {
+    let heads: Vec<&str> = columns.iter().map(|(head, _)| *head).collect();
+    let mut table = Table::new(title, note, &heads);
+    for item in items {
+        table.row(columns.iter().map(|(_, cell)| cell(&item)));
+    }
+    table
+}
+
 /// A series of cells: column `y` over column `x`.
 pub(crate) fn series<'a>(
     name: impl Into<String>,

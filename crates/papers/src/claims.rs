@@ -1,7 +1,9 @@
-//! What all papers share of claims: their words, and verdicts over all of something.
+//! What all papers share of reports: their words, and verdicts over all of something.
 
 use serde::Deserialize;
-use sidestep_document::claim::{Claim, Verdict};
+use sidestep_document::claim::{self, Claim, Verdict};
+use sidestep_document::document::{Experiment, Picture};
+use sidestep_document::{Document, Figure, Table};
 use std::sync::LazyLock;
 
 /// The claims of a paper, as a file beside its experiments tells them.
@@ -9,9 +11,23 @@ pub(crate) type Words = LazyLock<File>;
 
 /// A file of claims.
 #[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub(crate) struct File {
+    title: String,
+    experiment: Vec<About>,
     claim: Vec<Told>,
 }
+
+/// An experiment in words: what was run, and what to look for.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct About {
+    title: String,
+    about: String,
+}
+
+/// Claims, pictures and experiments of a report.
+pub(crate) type Parts<'a> = (&'a [Claim], Vec<Picture>, Vec<Experiment>);
 
 /// A claim in words.
 #[derive(Debug, Deserialize)]
@@ -29,6 +45,37 @@ impl File {
     /// Reads the claims of a paper.
     pub(crate) fn read(text: &str) -> Self {
         toml::from_str(text).expect("the claims of a paper are right")
+    }
+
+    /// The experiments, with their figures and tables in the order of the file.
+    pub(crate) fn experiments(
+        &'static self,
+        came: impl IntoIterator<Item = (Vec<Figure>, Vec<Table>)>,
+    ) -> Vec<Experiment> {
+        let told = |(told, (figures, tables)): (&'static About, _)| {
+            let About { title, about } = told;
+            Experiment { title, about, figures, tables }
+        };
+        self.experiment.iter().zip(came).map(told).collect()
+    }
+
+    /// The report of a paper: its claims, pictures, experiments, and the command that makes it.
+    pub(crate) fn document(
+        &self,
+        lead: String,
+        quick: bool,
+        (claims, pictures, experiments): Parts<'_>,
+        command: String,
+    ) -> Document {
+        let mut document = claim::document(&self.title, lead, quick, claims);
+        if !pictures.is_empty() {
+            document.section("Pictures").pictures(pictures);
+        }
+        for experiment in experiments {
+            document.experiment(experiment);
+        }
+        document.section("How to run it again").commands("In a shell", command);
+        document
     }
 
     /// A claim by its number, its verdict, and our figures.

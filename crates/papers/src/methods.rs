@@ -1,5 +1,6 @@
 //! Methods of avoiding each other, compared on the same traffic.
 
+use crate::cells;
 use crate::study::{Progress, all_of, setting};
 use serde::Serialize;
 use sidestep::experiment::sweep::Setting;
@@ -98,35 +99,29 @@ fn result(method: &'static str, all: &[Metrics]) -> MethodResult {
 /// The results side by side.
 pub fn table(title: &str, results: &[MethodResult]) -> Table {
     let note = "Means over runs with their 95 % intervals; every method flies the same traffic.";
-    let columns = [
-        "method",
-        "runs without loss",
-        "losses",
-        "nearest of all runs, m",
-        "arrived",
-        "delay, %",
-        "deciding, s",
-        "messages",
-        "bytes",
-        "changed by the shield",
-    ];
-    let mut table = Table::new(title, note, &columns);
-    for r in results {
+    let loss_free = |r: &MethodResult| {
         let Interval { low, high } = r.loss_free_interval;
-        table.row([
-            r.method.to_string(),
-            format!("{}/{} [{low:.2}, {high:.2}]", r.loss_free, r.runs),
-            r.losses.to_string(),
-            r.min_separation_m.map_or("-".into(), |d| format!("{d:.1}")),
-            r.arrived.to_string(),
-            r.delay_percent.to_string(),
-            r.optimise_cpu_s.to_string(),
-            r.messages.to_string(),
-            r.bytes.to_string(),
-            r.shield_overrides.to_string(),
-        ]);
-    }
-    table
+        format!("{}/{} [{low:.2}, {high:.2}]", r.loss_free, r.runs)
+    };
+    cells::table(
+        title,
+        note,
+        results,
+        &[
+            ("method", &|r| r.method.to_string()),
+            ("runs without loss", &|r| loss_free(r)),
+            ("losses", &|r| r.losses.to_string()),
+            ("nearest of all runs, m", &|r| {
+                r.min_separation_m.map_or("-".into(), |d| format!("{d:.1}"))
+            }),
+            ("arrived", &|r| r.arrived.to_string()),
+            ("delay, %", &|r| r.delay_percent.to_string()),
+            ("deciding, s", &|r| r.optimise_cpu_s.to_string()),
+            ("messages", &|r| r.messages.to_string()),
+            ("bytes", &|r| r.bytes.to_string()),
+            ("changed by the shield", &|r| r.shield_overrides.to_string()),
+        ],
+    )
 }
 
 #[cfg(test)]

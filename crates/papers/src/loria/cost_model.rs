@@ -25,6 +25,7 @@
 use super::Plan;
 use super::floor::Floor;
 use super::timing::Load;
+use crate::cells::{figure, table};
 use crate::study::Progress;
 use serde::Serialize;
 use sidestep::kernel::Simulation;
@@ -150,14 +151,20 @@ impl CostModel {
             self.r_squared[1],
             self.r_squared_cycle,
         );
-        let columns = ["parameter", "what", "ns", "95 % interval"];
-        let mut table = Table::new("The cost model, fitted", note, &columns);
-        for p in &self.parameters {
-            let interval =
-                p.interval_ns.map_or("-".into(), |i| format!("[{:.1}, {:.1}]", i.low, i.high));
-            table.row([p.name.clone(), p.meaning.clone(), format!("{:.1}", p.value_ns), interval]);
-        }
-        table
+        let interval = |p: &Parameter| {
+            p.interval_ns.map_or("-".into(), |i| format!("[{:.1}, {:.1}]", i.low, i.high))
+        };
+        table(
+            "The cost model, fitted",
+            note,
+            &self.parameters,
+            &[
+                ("parameter", &|p| p.name.clone()),
+                ("what", &|p| p.meaning.clone()),
+                ("ns", &|p| format!("{:.1}", p.value_ns)),
+                ("95 % interval", &|p| interval(p)),
+            ],
+        )
     }
 
     /// Predicted against measured time of a cycle.
@@ -177,12 +184,12 @@ impl CostModel {
                 .collect(),
         };
         Figure {
-            title: "The cost model against measurement".into(),
-            x_label: "measured ms per cycle".into(),
-            y_label: "predicted ms per cycle".into(),
             kind: FigureKind::Points,
-            series: SIZES.map(of_size).into(),
-            ..Figure::default()
+            ..figure(
+                "The cost model against measurement",
+                ["measured ms per cycle", "predicted ms per cycle"],
+                SIZES.map(of_size),
+            )
         }
     }
 }

@@ -7,10 +7,11 @@ use super::Plan;
 use super::floor::Floor;
 use super::measure::{Outcome, Variant, measure_all, values};
 use super::reliability::{CONTACTS, TRIP};
+use crate::cells::{figure, table};
 use crate::study::Progress;
 use serde::Serialize;
 use sidestep::worlds::robots::world::Regime;
-use sidestep_document::{Estimate, Figure, FigureKind, Series, Table};
+use sidestep_document::{Estimate, Figure, Series, Table};
 use std::sync::Arc;
 
 /// Sides of the bodies, in boxes.
@@ -70,14 +71,6 @@ impl Genericity {
 
     /// Contacts and trips by size and sensors.
     pub(super) fn table(&self) -> Table {
-        let columns = [
-            "body, boxes",
-            "sensors",
-            "contacts / 1000 actions",
-            "trip, cycles",
-            "trips per robot",
-            "straightness",
-        ];
         let note = format!(
             "Mean [95 % interval] over seeds, runs of {} cycles; sensors and effectors \
              unreliable, medium floor, behaviour `avoid`. Only `size` and `sensors` of the \
@@ -85,19 +78,20 @@ impl Genericity {
              boxes jam in corridors of 12 boxes.",
             self.cycles
         );
-        let mut table = Table::new("Body sizes and an added camera", note, &columns);
-        for b in &self.builds {
-            let estimate = |measure| Estimate::of(values(&b.outcomes, measure)).to_string();
-            table.row([
-                format!("{0} x {0}", b.size),
-                sensors(b.camera).into(),
-                estimate(CONTACTS),
-                estimate(TRIP),
-                estimate(|o| o.trips),
-                estimate(|o| o.straightness),
-            ]);
-        }
-        table
+        let estimate = |b: &Build, measure| Estimate::of(values(&b.outcomes, measure)).to_string();
+        table(
+            "Body sizes and an added camera",
+            note,
+            &self.builds,
+            &[
+                ("body, boxes", &|b| format!("{0} x {0}", b.size)),
+                ("sensors", &|b| sensors(b.camera).into()),
+                ("contacts / 1000 actions", &|b| estimate(b, CONTACTS)),
+                ("trip, cycles", &|b| estimate(b, TRIP)),
+                ("trips per robot", &|b| estimate(b, |o| o.trips)),
+                ("straightness", &|b| estimate(b, |o| o.straightness)),
+            ],
+        )
     }
 
     /// Contacts over body size.
@@ -108,14 +102,11 @@ impl Genericity {
                 |b: &Build| Estimate::of(values(&b.outcomes, CONTACTS)).point(f64::from(b.size));
             Series { name: sensors(camera).into(), points: builds.filter_map(point).collect() }
         });
-        Figure {
-            title: "Contacts by body size and sensors".into(),
-            x_label: "side of the body, boxes".into(),
-            y_label: "contacts per 1000 actions".into(),
-            kind: FigureKind::Lines,
-            series: series.into(),
-            ..Figure::default()
-        }
+        figure(
+            "Contacts by body size and sensors",
+            ["side of the body, boxes", "contacts per 1000 actions"],
+            series,
+        )
     }
 }
 

@@ -35,7 +35,7 @@ use serde::Serialize;
 use sidestep::kernel::InputError;
 use sidestep::kernel::ports::{MemoryRecorder, RecordError, Recorder, TableSchema};
 use sidestep::kernel::workers::available;
-use sidestep_document::claim::{self, Claim, tally};
+use sidestep_document::claim::{Claim, tally};
 use sidestep_document::document::{Document, Experiment, Picture};
 use strategies::Strategies;
 
@@ -213,55 +213,14 @@ pub fn run_recorded(
 
 impl Report {
     /// The experiments in the order of the report.
-    fn experiments(&self) -> [Experiment; 5] {
-        let (performance, cost_model) = (&self.performance, &self.cost_model);
-        [
-            Experiment {
-                title: "Reliability",
-                about: "Robots go to and fro along the corridors of an office floor, among people \
-                        and doors, under each of the four regimes: all reliable; errors of \
-                        effectors, of sensors, or of both. Runs of one seed begin alike and share \
-                        every draw that the regime does not change. `rule` is what an effector does \
-                        that would end in a wall: `cut` stops before it, `stay` does not move, \
-                        `renormalise` chooses among what is free. Sensors and effectors are then \
-                        compared at equal error level, because a preset makes either look worse.",
-                figures: self.reliability.figures(),
-                tables: self.reliability.tables(),
-            },
-            Experiment {
-                title: "Genericity",
-                about: "The same floor with robots of 1 to 5 boxes a side, with and without a \
-                        camera beside the sonar ring. Only the scenario differs, no source.",
-                figures: vec![self.genericity.figure()],
-                tables: vec![self.genericity.table()],
-            },
-            Experiment {
-                title: "Performance",
-                about: "The time of all cycles, recorded to disk as in the paper or not, with 1 to \
-                        as many workers as the machine has processors, for few and many robots and \
-                        cheap and dear decisions. Runs of all worker counts take turns, and mere \
-                        arithmetic takes its turn too: its speed-up is what the machine could give \
-                        at that moment.",
-                figures: performance.figures(),
-                tables: performance.tables(),
-            },
-            Experiment {
-                title: "Rejected strategies",
-                about: "The double pool beside the two strategies that the paper rejects: a part of \
-                        the floor for each worker, and a process for each agent, whose actions one \
-                        lock makes serial.",
-                figures: self.strategies.figures(),
-                tables: vec![self.strategies.table()],
-            },
-            Experiment {
-                title: "Cost model",
-                about: "The paper's model of a cycle's time, fitted to measured phases of runs that \
-                        differ in robots, people, crowding and size of bodies. Where points \
-                        lie on the diagonal the model foretells the time.",
-                figures: vec![cost_model.figure()],
-                tables: vec![cost_model.table()],
-            },
-        ]
+    fn experiments(&self) -> Vec<Experiment> {
+        claims::WORDS.experiments([
+            (self.reliability.figures(), self.reliability.tables()),
+            (vec![self.genericity.figure()], vec![self.genericity.table()]),
+            (self.performance.figures(), self.performance.tables()),
+            (self.strategies.figures(), vec![self.strategies.table()]),
+            (vec![self.cost_model.figure()], vec![self.cost_model.table()]),
+        ])
     }
 
     /// The report, the claims first; `pictures` are those of the [scenes](scenes::all), drawn.
@@ -277,16 +236,8 @@ impl Report {
             plan.repeats,
             self.performance.processors,
         );
-        let title = "The LORIA experiments of 2001, run anew";
-        let mut document = claim::document(title, lead, plan.quick, &self.claims);
-        if !pictures.is_empty() {
-            document.section("Pictures").pictures(pictures);
-        }
-        for experiment in self.experiments() {
-            document.experiment(experiment);
-        }
-        document.section("How to run it again").commands("In a shell", self.command());
-        document
+        let parts = (&self.claims[..], pictures, self.experiments());
+        claims::WORDS.document(lead, plan.quick, parts, self.command())
     }
 
     fn command(&self) -> String {

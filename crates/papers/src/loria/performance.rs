@@ -8,11 +8,12 @@
 use super::floor::Floor;
 use super::timing::{Load, STRETCHES, Timed, arithmetic, race, seconds};
 use super::{NewRecorder, Plan};
+use crate::cells::{figure, table};
 use crate::study::Progress;
 use serde::Serialize;
 use sidestep::kernel::Simulation;
 use sidestep::kernel::ports::RecordError;
-use sidestep_document::{Estimate, Figure, FigureKind, Series, Table};
+use sidestep_document::{Estimate, Figure, Series, Table};
 use std::sync::Arc;
 
 /// A load under a number of workers.
@@ -173,16 +174,6 @@ impl Performance {
     }
 
     fn times_table(&self) -> Table {
-        let columns = [
-            "load",
-            "workers",
-            "recorded",
-            "ms per cycle",
-            "speed-up",
-            "efficiency",
-            "the machine's speed-up",
-            "share of it",
-        ];
         let note = format!(
             "Mean [95 % interval] over repeats, each the best of {STRETCHES} stretches that take \
              turns; {} processors. Time includes recording where it says so, and excludes \
@@ -192,42 +183,45 @@ impl Performance {
              to the faster.",
             self.processors
         );
-        let mut table = Table::new("Execution time, speed-up and efficiency", note, &columns);
-        for timing in &self.timings {
-            let speed_up = timing.speed_up.or_zero();
-            table.row([
-                self.loads[timing.load].name(),
-                timing.workers.to_string(),
-                if timing.recorded { "yes" } else { "no" }.into(),
-                timing.cycle_ms.to_string(),
-                timing.speed_up.to_string(),
-                format!("{:.2}", speed_up / timing.workers as f64),
-                timing.machine.to_string(),
-                format!("{:.2}", speed_up / timing.machine.or_zero().max(f64::MIN_POSITIVE)),
-            ]);
-        }
-        table
+        let per = |timing: &Timing, of: f64| format!("{:.2}", timing.speed_up.or_zero() / of);
+        table(
+            "Execution time, speed-up and efficiency",
+            note,
+            &self.timings,
+            &[
+                ("load", &|timing| self.loads[timing.load].name()),
+                ("workers", &|timing| timing.workers.to_string()),
+                ("recorded", &|timing| if timing.recorded { "yes" } else { "no" }.into()),
+                ("ms per cycle", &|timing| timing.cycle_ms.to_string()),
+                ("speed-up", &|timing| timing.speed_up.to_string()),
+                ("efficiency", &|timing| per(timing, timing.workers as f64)),
+                ("the machine's speed-up", &|timing| timing.machine.to_string()),
+                ("share of it", &|timing| {
+                    per(timing, timing.machine.or_zero().max(f64::MIN_POSITIVE))
+                }),
+            ],
+        )
     }
 
     fn initialization_table(&self) -> Table {
         let most = self.most_workers();
         let title = format!("Initialization, of a run of {REFERENCE_CYCLES} cycles");
         let together = format!("share, {most} workers");
-        let columns = ["load", "seconds", "share, 1 worker", &together];
         let note = "Median of 3. Initialization is not parallel: the scenario is read, the world \
                     compiled, all bodies placed. Shares from the measured time per cycle, \
                     unrecorded.";
-        let mut table = Table::new(title, note, &columns);
-        for i in &self.initialization {
-            let percent = |share: f64| format!("{:.2} %", 100.0 * share);
-            table.row([
-                self.loads[i.load].name(),
-                format!("{:.4}", i.seconds),
-                percent(i.share_alone),
-                percent(i.share_together),
-            ]);
-        }
-        table
+        let percent = |share: f64| format!("{:.2} %", 100.0 * share);
+        table(
+            title,
+            note,
+            &self.initialization,
+            &[
+                ("load", &|i| self.loads[i.load].name()),
+                ("seconds", &|i| format!("{:.4}", i.seconds)),
+                ("share, 1 worker", &|i| percent(i.share_alone)),
+                (&together, &|i| percent(i.share_together)),
+            ],
+        )
     }
 
     fn digest_table(&self) -> Table {
@@ -264,14 +258,11 @@ impl Performance {
             let points = timings.filter_map(|t| quantity(t).point(t.workers as f64)).collect();
             Series { name: load.name(), points }
         };
-        Figure {
-            title: title.into(),
-            x_label: "workers".into(),
-            y_label: y_label.into(),
-            kind: FigureKind::Lines,
-            series: self.loads.iter().enumerate().map(line).collect(),
-            ..Figure::default()
-        }
+        figure(
+            title,
+            ["workers", y_label],
+            self.loads.iter().enumerate().map(line).collect::<Vec<_>>(),
+        )
     }
 }
 

@@ -5,6 +5,7 @@ use super::Plan;
 use super::errors::{Beams, Spread};
 use super::floor::{Floor, Mind};
 use super::measure::{Measure, Outcome, Tables, Variant, measure_all, values};
+use crate::cells::figure;
 use crate::study::Progress;
 use serde::Serialize;
 use sidestep::worlds::robots::effector::ObstacleRule;
@@ -285,12 +286,8 @@ impl Reliability {
         });
         let categories = Regime::ALL.map(|regime| regime.name().to_string()).to_vec();
         Figure {
-            title: title.into(),
-            x_label: "unreliable".into(),
-            y_label: y_label.into(),
             kind: FigureKind::Bars { categories },
-            series: series.into(),
-            ..Figure::default()
+            ..figure(title, ["unreliable", y_label], series)
         }
     }
 
@@ -301,18 +298,15 @@ impl Reliability {
             Series { name: name.into(), points: self.levels.iter().filter_map(at).collect() }
         };
         let n = beams.bearings_deg().len();
-        Figure {
-            title: format!("Contacts at equal error level: {}, {n} beams", mind.name()),
-            x_label: "error level e".into(),
-            y_label: "contacts per 1000 actions".into(),
-            kind: FigureKind::Lines,
-            series: vec![
+        figure(
+            &format!("Contacts at equal error level: {}, {n} beams", mind.name()),
+            ["error level e", "contacts per 1000 actions"],
+            vec![
                 line("effectors only", Regime::Effectors, Spread::Even),
                 line("sensors only, even", Regime::Sensors, Spread::Even),
                 line("sensors only, blind", Regime::Sensors, Spread::Blind),
             ],
-            ..Figure::default()
-        }
+        )
     }
 }
 

@@ -3,12 +3,13 @@
 use super::Plan;
 use super::performance::{loads, worker_counts};
 use super::timing::{Load, STRETCHES, arithmetic, race, seconds};
+use crate::cells::{figure, table};
 use crate::study::Progress;
 use serde::Serialize;
 use sidestep::kernel::Simulation;
 use sidestep::worlds::robots::baseline::{Baseline, Strategy, breach};
 use sidestep::worlds::robots::simulation::RobotsSimulation;
-use sidestep_document::{Estimate, Figure, FigureKind, Series, Table};
+use sidestep_document::{Estimate, Figure, Series, Table};
 use std::convert::Infallible;
 
 /// A strategy's time for a load.
@@ -125,17 +126,6 @@ impl Strategies {
 
     /// The comparison as a table.
     pub(super) fn table(&self) -> Table {
-        let columns = [
-            "load",
-            "strategy",
-            "workers",
-            "ms per cycle",
-            "speed-up over double pool, 1 worker",
-            "the machine's speed-up",
-            "done serially",
-            "contacts / 1000 actions",
-            "laws kept",
-        ];
         let note = format!(
             "Mean [95 % interval] over repeats, each the best of {STRETCHES} stretches that take \
              turns. The rejected strategies give valid worlds, but other ones: with the \
@@ -144,32 +134,35 @@ impl Strategies {
              before it in the same cycle. The partition makes no draws for priority, and the \
              lock keeps its threads between cycles; both favor them."
         );
-        let mut table = Table::new("The double pool and the rejected strategies", note, &columns);
-        for trial in &self.trials {
-            table.row([
-                self.loads[trial.load].name(),
-                trial.strategy.clone(),
-                trial.workers.to_string(),
-                trial.cycle_ms.to_string(),
-                trial.speed_up.to_string(),
-                trial.machine.to_string(),
-                format!("{:.1} %", 100.0 * trial.serial_share),
-                format!("{:.1}", trial.contacts),
-                if trial.valid && trial.complete { "yes" } else { "NO" }.into(),
-            ]);
-        }
-        table
+
+        table(
+            "The double pool and the rejected strategies",
+            note,
+            &self.trials,
+            &[
+                ("load", &|trial| self.loads[trial.load].name()),
+                ("strategy", &|trial| trial.strategy.clone()),
+                ("workers", &|trial| trial.workers.to_string()),
+                ("ms per cycle", &|trial| trial.cycle_ms.to_string()),
+                ("speed-up over double pool, 1 worker", &|trial| trial.speed_up.to_string()),
+                ("the machine's speed-up", &|trial| trial.machine.to_string()),
+                ("done serially", &|trial| format!("{:.1} %", 100.0 * trial.serial_share)),
+                ("contacts / 1000 actions", &|trial| format!("{:.1}", trial.contacts)),
+                ("laws kept", &|trial| {
+                    if trial.valid && trial.complete { "yes" } else { "NO" }.into()
+                }),
+            ],
+        )
     }
 
     /// Speed-up over workers, one figure per load.
     pub(super) fn figures(&self) -> Vec<Figure> {
-        let figure = |(index, load): (usize, &Load)| Figure {
-            title: format!("Strategies: {}", load.name()),
-            x_label: "workers".into(),
-            y_label: "speed-up over the double pool with 1 worker".into(),
-            kind: FigureKind::Lines,
-            series: names().iter().map(|name| self.series(index, name)).collect(),
-            ..Figure::default()
+        let figure = |(index, load): (usize, &Load)| {
+            figure(
+                &format!("Strategies: {}", load.name()),
+                ["workers", "speed-up over the double pool with 1 worker"],
+                names().iter().map(|name| self.series(index, name)).collect::<Vec<_>>(),
+            )
         };
         self.loads.iter().enumerate().map(figure).collect()
     }

@@ -2,7 +2,7 @@
 //! their limits (slide F1).
 
 use super::{Plan, draws};
-use crate::cells::Share;
+use crate::cells::{Share, table};
 use crate::study::{Progress, all_of, finish, setting, source};
 use serde::Serialize;
 use sidestep::kernel::InputError;
@@ -248,18 +248,20 @@ impl Initiators {
         }
         let note = "The same chain is moved 400 times by 5 cm, by connectors at random; where the limit \
                     would be exceeded, rods turn back into it, or somebody objects.";
-        let columns = ["limit, deg", "in", "moved", "other vetoes", "exceeded", "sharpest, deg"];
-        let mut bends = Table::new("Bend limits", note, &columns);
-        for b in &self.bends {
-            bends.row([
-                b.limit_deg.to_string(),
-                if b.in_space { "space" } else { "plane" }.into(),
-                b.moved.to_string(),
-                b.other_vetoes.to_string(),
-                b.exceeded.to_string(),
-                format!("{:.3}", b.sharpest_deg),
-            ]);
-        }
+
+        let bends = table(
+            "Bend limits",
+            note,
+            &self.bends,
+            &[
+                ("limit, deg", &|b| b.limit_deg.to_string()),
+                ("in", &|b| if b.in_space { "space" } else { "plane" }.into()),
+                ("moved", &|b| b.moved.to_string()),
+                ("other vetoes", &|b| b.other_vetoes.to_string()),
+                ("exceeded", &|b| b.exceeded.to_string()),
+                ("sharpest, deg", &|b| format!("{:.3}", b.sharpest_deg)),
+            ],
+        );
         [who, bends]
     }
 }

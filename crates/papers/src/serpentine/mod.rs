@@ -31,7 +31,7 @@ use serde::Serialize;
 use sidestep::kernel::stream::{Draws, Purpose, Streams};
 use sidestep::kernel::workers::available;
 use sidestep::kernel::{InputError, Seed};
-use sidestep_document::claim::{self, Claim, tally};
+use sidestep_document::claim::{Claim, tally};
 use sidestep_document::document::{Document, Experiment, Picture};
 
 /// How fast initiators go, m/s, as the prototypes' did.
@@ -230,85 +230,20 @@ pub fn run(plan: &Plan, progress: &mut Progress<'_>) -> Result<Report, InputErro
 
 impl Report {
     /// The experiments in the order of the report.
-    fn experiments(&self) -> [Experiment; 10] {
+    fn experiments(&self) -> Vec<Experiment> {
         let (scaling, corridor) = (&self.scaling, &self.corridor);
-        [
-            Experiment {
-                title: "The swarm in the corridor",
-                about: "A leader finds its way through a winding corridor by a laser, and a line of \
-                        robots on wheels follows as a snake: corridors of several widths, several \
-                        numbers of followers, and three readings of when a wall is being left.",
-                figures: corridor.figures(),
-                tables: vec![corridor.table()],
-            },
-            Experiment {
-                title: "Rules of rotation",
-                about: "What a rod does that would hit a wall: turn until it is free of everything, \
-                        turn once to the tangent as the slides say, or do not turn. How deep parts \
-                        get into walls tells the rules apart, the more so the longer the steps.",
-                figures: vec![self.rotations.figure()],
-                tables: vec![self.rotations.table()],
-            },
-            Experiment {
-                title: "A robot in the open",
-                about: "The leader alone among discs that stand or move, its target in the opposite \
-                        corner: readings of leaving a wall, with and without the rule that a free \
-                        way to the target ends the following of a wall.",
-                figures: vec![self.fields.figure()],
-                tables: vec![self.fields.table()],
-            },
-            Experiment {
-                title: "A chain that goes back",
-                about: "In a straight corridor a chain is pushed back by its head or pulled back by \
-                        its tail, until some part objects or all of the way is gone.",
-                figures: vec![self.pushing.figure()],
-                tables: vec![self.pushing.table()],
-            },
-            Experiment {
-                title: "Obstacles that move",
-                about: "Discs run into a chain that rests or wanders, slower and faster than it: \
-                        without a reaction, with one when touched, and with one before that.",
-                figures: vec![self.movers.figure()],
-                tables: vec![self.movers.table()],
-            },
-            Experiment {
-                title: "A snake in space",
-                about: "A chain of hundreds of connectors creeps at random among balls that stand \
-                        and balls that fly, every part of it looked at in every step.",
-                figures: Vec::new(),
-                tables: vec![self.snakes.table()],
-            },
-            Experiment {
-                title: "What motions cost",
-                about: "Processor time of one motion by the length of the chain, by how much of it \
-                        the motion reaches, and by obstacles that nobody is near to.",
-                figures: vec![scaling.figure()],
-                tables: scaling.tables().into(),
-            },
-            Experiment {
-                title: "Broken chains",
-                about: "Chains whose middle parts are thrown about, or partly gone, are joined again \
-                        between their two whole ends.",
-                figures: Vec::new(),
-                tables: vec![self.broken.table()],
-            },
-            Experiment {
-                title: "Targets of tips",
-                about: "Inverse kinematics by the chain's own rules: the tip is pulled to a target \
-                        while the base objects, while it is free, and there and back; damped least \
-                        squares stand beside it.",
-                figures: vec![self.postures.figure()],
-                tables: vec![self.postures.table()],
-            },
-            Experiment {
-                title: "Who begins, and who objects",
-                about: "Every connector of a chain in space begins a motion in turn: with nothing \
-                        fixed, with one end fixed, with parts that have failed, and with limits to \
-                        how sharply the chain may bend.",
-                figures: Vec::new(),
-                tables: self.initiators.tables().into(),
-            },
-        ]
+        claims::WORDS.experiments([
+            (corridor.figures(), vec![corridor.table()]),
+            (vec![self.rotations.figure()], vec![self.rotations.table()]),
+            (vec![self.fields.figure()], vec![self.fields.table()]),
+            (vec![self.pushing.figure()], vec![self.pushing.table()]),
+            (vec![self.movers.figure()], vec![self.movers.table()]),
+            (Vec::new(), vec![self.snakes.table()]),
+            (vec![scaling.figure()], scaling.tables().into()),
+            (Vec::new(), vec![self.broken.table()]),
+            (vec![self.postures.figure()], vec![self.postures.table()]),
+            (Vec::new(), self.initiators.tables().into()),
+        ])
     }
 
     /// The report, the claims first; `pictures` are those of the [scenes](Self::scenes), drawn.
@@ -324,18 +259,10 @@ impl Report {
             plan.snake_seeds,
             plan.workers,
         );
-        let title = "Multi-agent serpentine motion of 2005, run anew";
-        let mut document = claim::document(title, lead, plan.quick, &self.claims);
-        if !pictures.is_empty() {
-            document.section("Pictures").pictures(pictures);
-        }
-        for experiment in self.experiments() {
-            document.experiment(experiment);
-        }
         let quick = if plan.quick { " --quick" } else { "" };
         let seeds = plan.seeds;
         let command = format!("sidestep reproduce serpentine{quick} --seeds {seeds} --out DIR");
-        document.section("How to run it again").commands("In a shell", command);
-        document
+        let parts = (&self.claims[..], pictures, self.experiments());
+        claims::WORDS.document(lead, plan.quick, parts, command)
     }
 }

@@ -2,7 +2,7 @@
 //! reaches, and by how many obstacles there are that nobody is near to.
 
 use super::{Plan, draws};
-use crate::cells::{figure, median};
+use crate::cells::{figure, median, table};
 use crate::study::Progress;
 use cpu_time::ThreadTime;
 use serde::Serialize;
@@ -157,19 +157,20 @@ impl Scaling {
     pub(super) fn tables(&self) -> [Table; 2] {
         let note = "Processor time of one motion of 1 cm in space, medians of 5 repeats; slack rods \
                     may be half as long again, so that a motion soon ends.";
-        let columns =
-            ["connectors", "fixed rods, us", "moved", "ns each", "slack rods, us", "moved"];
-        let mut sizes = Table::new("Cost of a motion in the open", note, &columns);
-        for s in &self.sizes {
-            sizes.row([
-                s.connectors.to_string(),
-                format!("{:.2}", s.fixed_us),
-                format!("{:.0}", s.fixed_moved),
-                format!("{:.1}", 1e3 * s.fixed_us / s.fixed_moved.max(1.0)),
-                format!("{:.3}", s.slack_us),
-                format!("{:.1}", s.slack_moved),
-            ]);
-        }
+
+        let sizes = table(
+            "Cost of a motion in the open",
+            note,
+            &self.sizes,
+            &[
+                ("connectors", &|s| s.connectors.to_string()),
+                ("fixed rods, us", &|s| format!("{:.2}", s.fixed_us)),
+                ("moved", &|s| format!("{:.0}", s.fixed_moved)),
+                ("ns each", &|s| format!("{:.1}", 1e3 * s.fixed_us / s.fixed_moved.max(1.0))),
+                ("slack rods, us", &|s| format!("{:.3}", s.slack_us)),
+                ("moved", &|s| format!("{:.1}", s.slack_moved)),
+            ],
+        );
         let note = "450 connectors beside 60 balls, and so many more 400 m away.";
         let columns = ["far balls", "a motion, us", "same bits as without"];
         let mut far = Table::new("Cost of a motion with far obstacles", note, &columns);

@@ -20,7 +20,8 @@ pub(super) fn judge(report: &Report) -> Vec<Claim> {
     claims
 }
 
-static WORDS: Words = Words::new(|| File::read(include_str!("claims.toml")));
+/// The words of the report.
+pub(super) static WORDS: Words = Words::new(|| File::read(include_str!("../report.toml")));
 
 /// A claim by its number, its verdict, and our figures.
 fn claim(id: &str, verdict: Verdict, ours: impl Into<String>) -> Claim {
