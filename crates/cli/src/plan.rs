@@ -1,10 +1,12 @@
 //! A scenario file and the options of the command line -> a scenario that is known to be right.
 
-use crate::worlds::{self, Compiled};
 use clap::Args;
 use sidestep::kernel::{InputError, workers};
+use sidestep::scenario::Compiled;
 use sidestep::scenario::Source;
-use std::path::{Path, PathBuf};
+use sidestep::worlds::WORLDS;
+use sidestep_session::read;
+use std::path::PathBuf;
 
 /// The scenario, and what the command line changes in it.
 #[derive(Debug, Clone, Args)]
@@ -62,14 +64,8 @@ impl ScenarioArgs {
     ///
     /// # Errors
     /// When anything in it is wrong.
-    pub(crate) fn compile(&self) -> Result<(Source, Compiled), InputError> {
-        let overrides = self.all_overrides();
-        let source = source_of(&self.file, &overrides)?;
-        match Compiled::new(&source) {
-            Ok(compiled) => Ok((source, compiled)),
-            Err(error) if overrides.is_empty() => Err(error),
-            Err(error) => Err(in_the_file_itself(&self.file, error)),
-        }
+    pub(crate) fn compile(&self) -> Result<(Source, Box<dyn Compiled>), InputError> {
+        read(WORLDS, &self.file, &self.all_overrides())
     }
 
     fn all_overrides(&self) -> Vec<String> {
@@ -89,26 +85,18 @@ impl ChangeArgs {
     }
 }
 
-/// The scenario in a file, or that a file of another form stands for, with overrides.
+/// The scenario itself, for commands that are about one world alone.
 ///
 /// # Errors
-/// When it cannot be read, or an override does not fit.
-pub(crate) fn source_of(file: &Path, overrides: &[String]) -> Result<Source, InputError> {
-    match worlds::translated(file)? {
-        Some(text) => Source::new(file.display().to_string(), text, "").with(overrides),
-        None => Source::read(file, overrides),
-    }
-}
-
-/// The same error where it stands in the file, if no override has brought it in: overrides
-/// may move lines.
-fn in_the_file_itself(file: &Path, error: InputError) -> InputError {
-    if !matches!(worlds::translated(file), Ok(None)) {
-        return error;
-    }
-    let plain = Source::read(file, &[]).and_then(|source| Compiled::new(&source).map(drop));
-    match plain {
-        Err(plain) if plain.cause() == error.cause() => plain,
-        _ => error,
-    }
+/// When it is of another world.
+pub(crate) fn of_world<'a, C: 'static>(
+    compiled: &'a dyn Compiled,
+    source: &Source,
+    world: &str,
+) -> Result<&'a C, InputError> {
+    compiled.as_any().downcast_ref().ok_or_else(|| {
+        let cause = format!("this command is about the world `{world}` alone");
+        let remedy = format!("give a scenario with world = \"{world}\"");
+        InputError::new(&source.place, cause, remedy)
+    })
 }

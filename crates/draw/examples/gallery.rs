@@ -6,19 +6,18 @@ use std::path::{Path, PathBuf};
 use std::{env, error::Error, fs};
 
 use sidestep_draw::{
-    Axis, Bar, BarChart, BarSeries, BodyRect, BodyScene, BodyShade, CellShade, DoorRect, GridScene,
-    Histogram, Matrix, Obstacle, Plot, Point, Series, Shape, Strand, Style, Track, Trail, to_png,
-    to_svg,
+    Axis, Bar, BarChart, BarSeries, DrawError, Histogram, Matrix, Options, Plot, Point, Series,
+    Style, draw, to_png,
+};
+use sidestep_kernel::view::{
+    Body, Condition, Floor, Frame, Kind, Occupancy, Pose, Scenery, Shape, Trail,
 };
 
 fn main() -> Result<(), Box<dyn Error>> {
     let folder = PathBuf::from(env::args_os().nth(1).ok_or("usage: gallery OUTDIR")?);
     fs::create_dir_all(&folder)?;
-    let (chart, map) = (Style::CHART, Style::MAP);
-    save(&folder, "tracks", &to_svg(&corridor(), &map)?)?;
-    save(&folder, "city", &to_svg(&city(), &map)?)?;
-    save(&folder, "convoy", &convoy().to_svg(&map)?)?;
-    save(&folder, "snake", &snake().to_svg(&map)?)?;
+    let chart = Style::CHART;
+    save(&folder, "tracks", &corridor()?)?;
     save(&folder, "speed-up", &speed_up().to_svg(&chart)?)?;
     save(&folder, "density", &density().to_svg(&chart)?)?;
     save(&folder, "contacts", &contacts().to_svg(&chart)?)?;
@@ -35,7 +34,7 @@ fn save(folder: &Path, name: &str, svg: &str) -> Result<(), Box<dyn Error>> {
 }
 
 /// A corridor with rooms on both sides, three robots and two people.
-fn corridor() -> GridScene {
+fn corridor() -> Result<String, DrawError> {
     const PLAN: [&str; 14] = [
         "##################################",
         "#          #          #          #",
@@ -52,142 +51,55 @@ fn corridor() -> GridScene {
         "#          #          #     #????#",
         "##################################",
     ];
-    let shade = |c| match c {
-        '#' => CellShade::Wall,
-        '?' => CellShade::Unknown,
-        _ => CellShade::Free,
+    let occupancy = |c| match c {
+        '#' => Occupancy::Wall,
+        '?' => Occupancy::Unknown,
+        _ => Occupancy::Free,
     };
-    let door = |col, row, width, open| DoorRect { col, row, width, height: 1, open };
-    let person = |col, row| BodyRect {
-        col,
-        row,
-        width: 1,
-        height: 1,
-        heading: None,
-        shade: BodyShade::Active,
-    };
-    let robot = |col, row, quarters, index| BodyRect {
-        col,
-        row,
-        width: 2,
-        height: 2,
-        heading: Some(quarters),
-        shade: BodyShade::Robot(index),
-    };
-    GridScene {
+    let floor = Floor {
         width: 34,
         height: 14,
-        box_size_m: 0.25,
-        origin_m: [-2.0, 1.5],
-        cells: PLAN.iter().rev().flat_map(|line| line.chars().map(shade)).collect(),
-        doors: vec![
-            door(4, 8, 2, true),
-            door(16, 8, 2, false),
-            door(26, 8, 2, true),
-            door(6, 4, 2, true),
-            door(15, 4, 3, false),
-            door(24, 4, 2, true),
-        ],
-        tracks: vec![
-            track(
-                "robot 1",
-                true,
-                &[
-                    (2., 11.),
-                    (2., 10.),
-                    (5., 10.),
-                    (5., 6.),
-                    (20., 6.),
-                    (20., 7.),
-                    (25., 7.),
-                    (25., 3.),
-                    (26., 3.),
-                ],
-            ),
-            track(
-                "robot 2",
-                false,
-                &[
-                    (31., 6.),
-                    (22., 6.),
-                    (22., 7.),
-                    (14., 7.),
-                    (14., 6.),
-                    (7., 6.),
-                    (7., 2.),
-                    (3., 2.),
-                ],
-            ),
-            track("robot 3", false, &[(13., 11.), (20., 11.), (20., 10.), (14., 10.)]),
-        ],
-        bodies: vec![person(9, 2), person(29, 10), robot(25, 2, 3, 0), robot(13, 9, 2, 2)],
-        title: "To and fro on the corridor, one run of 2000 cycles".into(),
-        caption: "Robots are 0.5 m wide; ribbons are as wide as the robot. Robot 1 waited at the \
-                  closed door for 40 cycles."
-            .into(),
-    }
-}
-
-/// A track of a body two boxes wide through these corners, box by box.
-fn track(label: &str, highlighted: bool, corners: &[(f64, f64)]) -> Track {
-    let mut points = vec![corners[0]];
-    for pair in corners.windows(2) {
-        let steps = (pair[1].0 - pair[0].0).abs().max((pair[1].1 - pair[0].1).abs()) as u32;
-        let part = |step| f64::from(step) / f64::from(steps);
-        let on_the_way = |from: f64, to: f64, step| from + (to - from) * part(step);
-        points.extend((1..=steps).map(|step| {
-            (on_the_way(pair[0].0, pair[1].0, step), on_the_way(pair[0].1, pair[1].1, step))
-        }));
-    }
-    Track { width_boxes: 2.0, points, label: label.into(), highlighted }
-}
-
-/// Blocks of houses on 2000 x 2000 boxes, with wanderers of 100 000 steps.
-fn city() -> GridScene {
-    const SIDE: u32 = 2000;
-    let house = |col: u32, row: u32| {
-        let (x, y) = (col % 160, row % 125);
-        let wall = |v: u32, side: u32| v == 20 || v == side - 20;
-        let inside = (20..=140).contains(&x) && (20..=105).contains(&y);
-        inside && (wall(x, 160) || wall(y, 125) || (x == 80 && y > 40)) && !(70..78).contains(&x)
+        box_m: 1.0,
+        origin_m: [0.0; 2],
+        boxes: PLAN.iter().rev().flat_map(|line| line.chars().map(occupancy)).collect(),
     };
-    let shade = |at: u32| match house(at % SIDE, at / SIDE) {
-        true => CellShade::Wall,
-        false => CellShade::Free,
+    let body = |kind, number, (x, y): (f64, f64), (width, height): (f64, f64)| {
+        let pose = Pose::at([x, y, 0.0]);
+        Body::new(kind, number, pose, Shape::Cuboid { size_m: [width, height, 0.1] })
     };
-    GridScene {
-        width: SIDE,
-        height: SIDE,
-        box_size_m: 0.1,
-        cells: (0..SIDE * SIDE).map(shade).collect(),
-        tracks: (0..14).map(wanderer).collect(),
-        title: "Fourteen wanderers in a city block".into(),
-        ..GridScene::default()
-    }
-}
-
-/// A walk along the streets of the city, turning by a small fixed rule.
-fn wanderer(number: u32) -> Track {
-    let (mut x, mut y) =
-        (f64::from(160 * (number % 12)) + 3.5, f64::from(125 * (number % 15)) + 3.5);
-    let mut state = number * 7919 + 1;
-    let mut points = vec![(x, y)];
-    while points.len() < 100_000 {
-        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        let (dx, dy, steps) = match state >> 30 {
-            0 => (1.0, 0.0, 160),
-            1 => (0.0, 1.0, 125),
-            2 => (-1.0, 0.0, 160),
-            _ => (0.0, -1.0, 125),
-        };
-        let (end_x, end_y) = (x + dx * f64::from(steps), y + dy * f64::from(steps));
-        if !(0.0..2000.0).contains(&end_x) || !(0.0..2000.0).contains(&end_y) {
-            continue;
-        }
-        points.extend((1..=steps).map(|k| (x + dx * f64::from(k), y + dy * f64::from(k))));
-        (x, y) = (end_x, end_y);
-    }
-    Track { width_boxes: 7.0, points, label: format!("w{number}"), highlighted: number == 0 }
+    let door = |number, at: (f64, f64), width, open| {
+        body(Kind::Door, number, at, (width, 1.0)).when(open, Condition::Open)
+    };
+    let ways = [
+        &[(3.0, 12.0), (3.0, 11.0), (6.0, 7.0), (21.0, 7.0), (26.0, 8.0), (26.0, 3.0)][..],
+        &[(32.0, 7.0), (23.0, 7.0), (15.0, 8.0), (8.0, 7.0), (8.0, 3.0), (4.0, 3.0)],
+        &[(14.0, 12.0), (21.0, 12.0), (21.0, 11.0), (15.0, 11.0)],
+    ];
+    let way = |way: &[(f64, f64)]| (0..).zip(way.iter().map(|&(x, y)| [x, y, 0.0])).collect();
+    let trail =
+        |(k, places): (u32, &&[(f64, f64)])| Trail { of: (Kind::Robot, k, None), way: way(places) };
+    let robot = |(k, places): (u32, &&[(f64, f64)])| {
+        body(Kind::Robot, k, places[places.len() - 1], (2.0, 2.0))
+    };
+    let others = [
+        door(3, (5.0, 8.5), 2.0, true),
+        door(4, (17.0, 8.5), 2.0, false),
+        door(5, (16.5, 4.5), 3.0, false),
+        body(Kind::Person, 6, (9.5, 2.5), (1.0, 1.0)),
+        body(Kind::Person, 7, (29.5, 10.5), (1.0, 1.0)),
+    ];
+    let bodies = (0..).zip(&ways).map(robot).chain(others).collect();
+    let scenery = Scenery {
+        name: "To and fro on the corridor".into(),
+        dimensions: 2,
+        cycle_s: 1.0,
+        floor: Some(floor),
+        bodies: Vec::new(),
+        names: Vec::new(),
+    };
+    let frame = Frame { bodies, ..Frame::default() };
+    let trails: Vec<Trail> = (0..).zip(&ways).map(trail).collect();
+    draw(&scenery, &frame, &trails, &Options::page(&scenery, "Made-up places."))
 }
 
 const WORKERS: [f64; 5] = [1.0, 2.0, 4.0, 8.0, 16.0];
@@ -270,93 +182,4 @@ fn confusion() -> Result<Matrix, Box<dyn Error>> {
         .titles("true", "reported")
         .subscripts(counts)?
         .note("Small: counts. No robot was seen in the log."))
-}
-
-/// Numbers from 0 to 1 that look random (the mixing step of splitmix64).
-fn scatter(k: u32, stream: u32) -> f64 {
-    let mut z = (u64::from(k) << 8 | u64::from(stream)).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    (z >> 40) as f64 / f64::from(1 << 24)
-}
-
-/// Sixteen robots in a bent corridor, and two discs that cross their way.
-fn convoy() -> BodyScene<2> {
-    // A quarter of a circle of 4 m around the origin, then straight on.
-    let line = |s_m: f64, aside_m: f64| {
-        let angle = s_m / 4.0 - std::f64::consts::FRAC_PI_2;
-        let (r, turned) = (4.0 - aside_m, angle.min(0.0));
-        let on = 4.0 * angle.max(0.0);
-        [r * turned.cos(), r * turned.sin() + on]
-    };
-    let wall = |aside_m: f64| {
-        let piece = move |k: u32| {
-            let ends = [k, k + 1].map(|k| line(0.2 * f64::from(k), aside_m));
-            Obstacle { shape: Shape::Capsule { ends, radius_m: 0.0 }, velocity_m_s: [0.0; 2] }
-        };
-        (0..70).map(piece)
-    };
-    let disc = |center, velocity_m_s| Obstacle {
-        shape: Shape::Ball { center, radius_m: 0.3 },
-        velocity_m_s,
-    };
-    let box_ =
-        Shape::Cuboid { center: [1.0, 2.5], axes: [[0.8, 0.6], [-0.6, 0.8]], half_m: [0.8, 0.4] };
-    let column = Shape::Capsule { ends: [[0.0, 6.0], [1.5, 6.5]], radius_m: 0.2 };
-    let still = [box_, column].map(|shape| Obstacle { shape, velocity_m_s: [0.0; 2] });
-    let moving = [disc([1.2, 0.4], [0.5, 0.4]), disc([4.4, 6.6], [-0.3, -0.9])];
-    BodyScene {
-        obstacles: wall(-1.0).chain(wall(1.0)).chain(still).chain(moving).collect(),
-        strands: vec![Strand {
-            points: (0..16).map(|k| line(12.0 - 0.7 * f64::from(k), 0.0)).collect(),
-            connector_radius_m: 0.25,
-            rod_radius_m: 0.05,
-            label: "leader and 15 followers".into(),
-        }],
-        trails: vec![Trail {
-            points: (0..120)
-                .map(|k| line(0.1 * f64::from(k), 0.2 * (0.4 * f64::from(k)).sin()))
-                .collect(),
-            color: 1,
-            label: "way of the leader".into(),
-        }],
-        title: "A convoy in a bent corridor".into(),
-        caption: "Made-up places. Seed 1.".into(),
-        ..BodyScene::default()
-    }
-}
-
-/// 450 connectors among 1000 spheres.
-fn snake() -> BodyScene<3> {
-    let at = |k: u32| {
-        let t = f64::from(k) * 0.03;
-        [5.5 * (0.5 * t).cos(), 5.0 * (0.37 * t).sin(), 4.5 * (0.23 * t).sin()]
-    };
-    let sphere = |k: u32| Obstacle {
-        shape: Shape::Ball {
-            center: [0, 1, 2].map(|axis| 12.0 * scatter(k, axis) - 6.0),
-            radius_m: 0.35,
-        },
-        velocity_m_s: if k.is_multiple_of(100) { [0.8, 0.5, 0.6] } else { [0.0; 3] },
-    };
-    let boxes = [[-5.0, 5.0, 5.5], [5.0, -5.0, -3.0]].map(|center| Obstacle {
-        shape: Shape::Cuboid {
-            center,
-            axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
-            half_m: [0.8, 0.6, 1.0],
-        },
-        velocity_m_s: [0.0; 3],
-    });
-    BodyScene {
-        obstacles: (0..1000).map(sphere).chain(boxes).collect(),
-        strands: vec![Strand {
-            points: (0..450).map(at).collect(),
-            connector_radius_m: 0.06,
-            rod_radius_m: 0.04,
-            label: "450 connectors".into(),
-        }],
-        title: "A snake in space".into(),
-        caption: "Made-up places.".into(),
-        ..BodyScene::default()
-    }
 }

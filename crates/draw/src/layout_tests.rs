@@ -4,7 +4,10 @@
 use proptest::prelude::*;
 use resvg::usvg::{Group, Node, Rect};
 
+use sidestep_kernel::view::{Body, Floor, Frame, Kind, Pose, Scenery, Shape, Trail};
+
 use crate::raster::parse;
+use crate::testing::{ball, moment, open, plane};
 use crate::*;
 
 /// The boxes of all texts in the picture, and the picture's size.
@@ -75,36 +78,52 @@ fn matrix(side: usize) -> Matrix {
     Matrix::new("Confusion", names(), names(), values).unwrap().titles("true", "reported")
 }
 
-fn scene(width: u32, height: u32) -> GridScene {
-    let cells = vec![CellShade::Free; (width * height) as usize];
-    let title = "A title that wraps where the map is small, as it is here".into();
-    GridScene { width, height, box_size_m: 0.1, cells, title, ..GridScene::default() }
+fn options(style: Style, scenery: &Scenery) -> Options {
+    Options { style, ..Options::page(scenery, "Small print.") }
 }
 
-fn bodies<const D: usize>(n: u32) -> BodyScene<D> {
-    let at = |k: u32| std::array::from_fn(|i| f64::from(k) * (1.0 - 0.3 * i as f64));
-    let ball = |k| Obstacle {
-        shape: Shape::Ball { center: at(k), radius_m: 0.3 },
-        velocity_m_s: [f64::from(k % 2); D],
+fn map(width: u32, height: u32) -> String {
+    let scenery = plane(width, height);
+    draw(&scenery, &Frame::default(), &[], &options(Style::MAP, &scenery)).unwrap()
+}
+
+/// Chains, and robots that have met in one corner.
+fn bodies(dimensions: u8, n: u32, style: Style) -> String {
+    let at = |k: u32| [0, 1, 2].map(|i| f64::from(k) * (1.0 - 0.3 * f64::from(i)));
+    let still = |k| ball(Kind::Obstacle, k, at(k), 0.3).moving([f64::from(k % 2); 3]);
+    let name = |k| (Kind::Connector, k, format!("a chain with a long name {k}"));
+    let scenery = Scenery {
+        bodies: (0..n).map(still).collect(),
+        names: (0..n).map(name).collect(),
+        ..open(dimensions)
     };
-    let strand = |k: u32| Strand {
-        points: (0..k + 1).map(at).collect(),
-        connector_radius_m: 0.2,
-        rod_radius_m: 0.1,
-        label: format!("a chain with a long name {k}"),
+    let chain =
+        |k: u32| (0..=k).map(move |part| ball(Kind::Connector, k, at(part), 0.2).part(part));
+    let frame = moment((0..n).flat_map(chain).collect());
+    let trail = |k: u32| Trail {
+        of: (Kind::Connector, k, Some(0)),
+        way: (0..20).map(|cycle| (cycle, at(k + cycle as u32))).collect(),
     };
-    BodyScene {
-        obstacles: (0..n).map(ball).collect(),
-        strands: (0..n).map(strand).collect(),
-        trails: vec![],
-        view_m: None,
-        title: "A title that wraps where the picture is small, as it is here".into(),
-        caption: "Small print.".into(),
-    }
+    let trails: Vec<Trail> = (0..n).map(trail).collect();
+    draw(&scenery, &frame, &trails, &options(style, &scenery)).unwrap()
+}
+
+/// Airplanes that have come together in one place, each with its name.
+fn meeting(dimensions: u8, n: u32, apart_m: f64) -> String {
+    let dart = Shape::Dart { length_m: 500.0, width_m: 300.0 };
+    let at = |k: u32| [apart_m * f64::from(k % 4), apart_m * f64::from(k / 4), 3000.0];
+    let airplane = |k| Body::new(Kind::Airplane, k, Pose::at(at(k)), dart.clone());
+    let zone = |k| ball(Kind::Zone, k, at(k), 2000.0);
+    let frame = moment((0..n).flat_map(|k| [airplane(k), zone(k)]).collect());
+    let from = |k: u32| [30_000.0 - 900.0 * f64::from(k), 20_000.0 * f64::from(k % 2), 3000.0];
+    let trail = |k| Trail { of: (Kind::Airplane, k, None), way: vec![(0, from(k)), (90, at(k))] };
+    let trails: Vec<Trail> = (0..n).map(trail).collect();
+    let scenery = open(dimensions);
+    draw(&scenery, &frame, &trails, &options(Style::MAP, &scenery)).unwrap()
 }
 
 fn gallery() -> Vec<(&'static str, String)> {
-    let (chart, map) = (Style::CHART, Style::MAP);
+    let chart = Style::CHART;
     let small = Style { width_px: 240.0, height_px: 180.0, font_px: 9.0 };
     let tight_ticks = Axis::linear("x").ticks([1.0, 1.01, 1.02, 50.0]);
     let histogram = |y| {
@@ -126,16 +145,20 @@ fn gallery() -> Vec<(&'static str, String)> {
         ("one cell", matrix(1).to_svg(&chart).unwrap()),
         ("matrix", matrix(5).to_svg(&chart).unwrap()),
         ("large matrix", matrix(24).to_svg(&chart).unwrap()),
-        ("small map", to_svg(&scene(5, 4), &map).unwrap()),
-        ("low map", to_svg(&scene(300, 1), &map).unwrap()),
-        ("narrow map", to_svg(&scene(1, 400), &map).unwrap()),
-        ("large map", to_svg(&scene(1500, 900), &map).unwrap()),
-        ("bodies", bodies::<2>(7).to_svg(&map).unwrap()),
-        ("small bodies", bodies::<2>(7).to_svg(&small).unwrap()),
-        ("no bodies", bodies::<2>(0).to_svg(&map).unwrap()),
-        ("bodies in space", bodies::<3>(7).to_svg(&map).unwrap()),
-        ("small bodies in space", bodies::<3>(7).to_svg(&small).unwrap()),
-        ("no bodies in space", bodies::<3>(0).to_svg(&map).unwrap()),
+        ("small map", map(5, 4)),
+        ("low map", map(300, 1)),
+        ("narrow map", map(1, 400)),
+        ("large map", map(1500, 900)),
+        ("bodies", bodies(2, 7, Style::MAP)),
+        ("small bodies", bodies(2, 7, small)),
+        ("no bodies", bodies(2, 0, Style::MAP)),
+        ("bodies in space", bodies(3, 7, Style::MAP)),
+        ("small bodies in space", bodies(3, 7, small)),
+        ("no bodies in space", bodies(3, 0, Style::MAP)),
+        ("airplanes", meeting(2, 12, 9000.0)),
+        ("airplanes on one spot", meeting(2, 12, 10.0)),
+        ("airplanes in space", meeting(3, 12, 100.0)),
+        ("many airplanes", meeting(2, 70, 1000.0)),
     ]
 }
 
@@ -162,7 +185,9 @@ fn impossible_styles_are_refused() {
     {
         let style = Style { width_px, height_px, font_px };
         assert!(Plot::new("").to_svg(&style).is_err());
-        assert!(to_svg(&scene(3, 3), &style).is_err());
+        let scenery = plane(3, 3);
+        let options = options(style, &scenery);
+        assert!(draw(&scenery, &Frame::default(), &[], &options).is_err());
     }
 }
 
@@ -178,12 +203,15 @@ fn lists_that_do_not_match_are_refused() {
     assert!(Histogram::from_values("", &[1.0], usize::MAX).is_err());
     assert!(Matrix::new("", vec!["a".into()], vec!["b".into()], vec![]).is_err());
     assert!(Matrix::new("", vec![], vec![], vec![]).is_err());
-    let torn = GridScene { cells: vec![], ..scene(2, 2) };
-    assert!(length(to_svg(&torn, &Style::MAP)));
-    let empty = GridScene { box_size_m: 1.0, ..GridScene::default() };
-    assert!(to_svg(&empty, &Style::MAP).is_err());
-    let huge = GridScene { width: u32::MAX, height: u32::MAX, ..scene(1, 1) };
-    assert!(matches!(to_svg(&huge, &Style::MAP), Err(DrawError::TooLarge { .. })));
+    let picture = |floor: Floor| {
+        let scenery = Scenery { floor: Some(floor), ..open(2) };
+        draw(&scenery, &Frame::default(), &[], &options(Style::MAP, &scenery))
+    };
+    let floor = |width, height| Floor { width, height, ..plane(2, 2).floor.unwrap() };
+    assert!(picture(floor(2, 2)).is_ok());
+    assert!(length(picture(floor(2, 3))));
+    assert!(picture(Floor { boxes: vec![], ..floor(0, 0) }).is_err());
+    assert!(matches!(picture(floor(u32::MAX, u32::MAX)), Err(DrawError::TooLarge { .. })));
 }
 
 /// Any double: also NaN, infinities, subnormals and the very large.
@@ -250,74 +278,40 @@ proptest! {
     }
 
     #[test]
-    fn a_scene_of_any_numbers_is_a_picture_or_an_error(
-        width in 1u32..20,
-        height in 1u32..20,
-        (box_size_m, x, y, width_boxes) in (number(), number(), number(), number()),
-        points in prop::collection::vec((number(), number()), 0..30),
-        place in (any::<u32>(), any::<u32>(), any::<u32>(), any::<u32>(), any::<u8>()),
+    fn what_is_seen_of_any_numbers_is_a_picture_or_an_error(
+        points in prop::collection::vec(prop::array::uniform3(number()), 3..12),
+        (radius_m, side_m, speed) in (number(), number(), number()),
+        turn in prop::array::uniform4(number()),
+        (dimensions, has_floor) in (2u8..4, any::<bool>()),
+        (box_m, width) in (number(), 1u32..20),
     ) {
-        let (col, row, wide, high, quarters) = place;
-        let heading = Some(quarters);
-        let shade = BodyShade::Robot(usize::from(quarters));
-        let scene = GridScene {
-            box_size_m,
-            origin_m: [x, y],
-            doors: vec![DoorRect { col, row, width: wide, height: high, open: wide > high }],
-            bodies: vec![BodyRect { col, row, width: wide, height: high, heading, shade }],
-            tracks: vec![Track { width_boxes, points, label: "t".into(), highlighted: false }],
-            ..scene(width, height)
+        let kinds = [
+            (Kind::Robot, Shape::Cuboid { size_m: [side_m, radius_m, 1.0] }),
+            (Kind::Zone, Shape::Cylinder { radius_m, height_m: side_m }),
+            (Kind::Connector, Shape::Sphere { radius_m }),
+            (Kind::Rods, Shape::Line { points_m: points.clone(), thickness_m: side_m }),
+            (Kind::Airplane, Shape::Dart { length_m: radius_m, width_m: side_m }),
+            (Kind::Obstacle, Shape::Cuboid { size_m: [side_m; 3] }),
+        ];
+        let body = |(k, (kind, shape)): (usize, (Kind, Shape))| {
+            let pose = Pose { at_m: points[k % 3], turn };
+            Body::new(kind, k as u32, pose, shape).moving([speed; 3])
         };
-        if let Ok(svg) = to_svg(&scene, &Style::MAP) {
+        let bodies: Vec<Body> = kinds.into_iter().enumerate().map(body).collect();
+        let floor = Floor { box_m, origin_m: [speed, 0.0], ..plane(width, 3).floor.unwrap() };
+        let scenery = Scenery {
+            floor: has_floor.then_some(floor),
+            bodies: bodies.clone(),
+            ..open(dimensions)
+        };
+        let way = |k: usize| (0..).zip(points.iter().skip(k).copied()).collect();
+        let trails = [
+            Trail { of: (Kind::Robot, 0, None), way: way(0) },
+            Trail { of: (Kind::Connector, 2, None), way: way(1) },
+        ];
+        let drawn = draw(&scenery, &moment(bodies), &trails, &options(Style::MAP, &scenery));
+        if let Ok(svg) = drawn {
             prop_assert!(parse(&svg).is_ok());
         }
-    }
-
-    #[test]
-    fn bodies_of_any_numbers_are_a_picture_or_an_error(
-        points in prop::collection::vec(prop::array::uniform3(number()), 3..12),
-        (radius_m, half_m, speed) in (number(), number(), number()),
-        has_view in any::<bool>(),
-    ) {
-        let [a, b, c] = [points[0], points[1], points[2]];
-        let plane = |p: [f64; 3]| [p[0], p[1]];
-        let shapes_2 = [
-            Shape::Ball { center: plane(a), radius_m },
-            Shape::Capsule { ends: [plane(a), plane(b)], radius_m },
-            Shape::Cuboid { center: plane(a), axes: [plane(b), plane(c)], half_m: [half_m; 2] },
-        ];
-        let shapes_3 = [
-            Shape::Ball { center: a, radius_m },
-            Shape::Capsule { ends: [a, b], radius_m },
-            Shape::Cuboid { center: a, axes: [a, b, c], half_m: [half_m; 3] },
-        ];
-        let view_2 = has_view.then_some([plane(b), plane(c)]);
-        let view_3 = has_view.then_some([b, c]);
-        let in_plane = any_bodies(&shapes_2, speed, points.iter().map(|p| plane(*p)), view_2);
-        let in_space = any_bodies(&shapes_3, speed, points.iter().copied(), view_3);
-        for svg in [in_plane.to_svg(&Style::MAP), in_space.to_svg(&Style::MAP)].iter().flatten() {
-            prop_assert!(parse(svg).is_ok());
-        }
-    }
-}
-
-fn any_bodies<const D: usize>(
-    shapes: &[Shape<D>],
-    speed: f64,
-    points: impl Iterator<Item = [f64; D]> + Clone,
-    view_m: Option<[[f64; D]; 2]>,
-) -> BodyScene<D> {
-    let obstacle = |&shape| Obstacle { shape, velocity_m_s: [speed; D] };
-    BodyScene {
-        obstacles: shapes.iter().map(obstacle).collect(),
-        strands: vec![Strand {
-            points: points.clone().collect(),
-            connector_radius_m: 0.1,
-            rod_radius_m: 0.0,
-            label: "s".into(),
-        }],
-        trails: vec![Trail { points: points.collect(), color: 9, label: "t".into() }],
-        view_m,
-        ..BodyScene::default()
     }
 }

@@ -1,5 +1,7 @@
 //! Markers, and the legend: symbols with labels, in rows as wide as the picture.
 
+use std::borrow::Cow;
+
 use crate::style::{FAINT_INK, INK};
 use crate::svg::{Anchor, Num, Rect, Svg, TextLook};
 use crate::text::{self, Weight};
@@ -61,21 +63,22 @@ const CROSS: [(f64, f64); 12] = [
     (-0.4, -0.4),
 ];
 
+/// A color as SVG has it.
+pub(crate) type Paint = Cow<'static, str>;
+
 /// What stands before a legend's label.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Symbol {
     /// A stretch of line, perhaps with its marker.
-    Line { color: &'static str, marker: Option<Marker> },
+    Line { color: Paint, marker: Option<Marker> },
     /// A marker alone.
     Marker { color: &'static str, marker: Marker },
     /// The dashes of a reference line.
     Dashes { color: &'static str },
     /// A filled box.
-    Swatch { fill: &'static str, rim: &'static str, opacity: f64 },
+    Swatch { fill: Paint, rim: Paint, opacity: f64 },
     /// The mark at a track's start.
     Ring,
-    /// The mark at a track's end.
-    Disc,
 }
 
 /// A line of a legend.
@@ -132,14 +135,14 @@ impl Legend {
         let look = TextLook::new(self.font_px, Anchor::Start);
         for (x, row, entry) in &self.placed {
             let middle = top + (*row as f64 + 0.5) * self.row_px();
-            self.draw_symbol(svg, entry.symbol, left + x, middle);
+            self.draw_symbol(svg, &entry.symbol, left + x, middle);
             let text_x = left + x + 2.4 * self.font_px;
             svg.text(text_x, middle + look.middle_px(), &entry.label, &look);
         }
     }
 
     /// Draws `symbol` two letters wide, its left end at `x`.
-    fn draw_symbol(&self, svg: &mut Svg, symbol: Symbol, x: f64, y: f64) {
+    fn draw_symbol(&self, svg: &mut Svg, symbol: &Symbol, x: f64, y: f64) {
         let size = self.font_px;
         let (end, center) = ((x + 2.0 * size, y), (x + size, y));
         match symbol {
@@ -165,7 +168,6 @@ impl Legend {
                 );
             }
             Symbol::Ring => start_mark(svg, center, 0.36 * size, FAINT_INK),
-            Symbol::Disc => end_mark(svg, center, 0.36 * size, FAINT_INK),
         }
     }
 }
@@ -206,4 +208,9 @@ pub(crate) fn paragraph(
 /// The look of a picture's title.
 pub(crate) fn title_look(size_px: f64) -> TextLook<'static> {
     TextLook { weight: Weight::Bold, fill: INK, ..TextLook::new(size_px, Anchor::Start) }
+}
+
+/// Small print's look.
+pub(crate) fn faint(size_px: f64) -> TextLook<'static> {
+    TextLook { fill: FAINT_INK, ..TextLook::new(size_px, Anchor::Start) }
 }

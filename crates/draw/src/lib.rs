@@ -1,9 +1,10 @@
-//! Pictures of maps, trajectories and measurements: plain numbers in, SVG text and PNG bytes out.
+//! Pictures of runs and of measurements: what can be seen of a run, or plain numbers, in; SVG text
+//! and PNG bytes out.
 //!
-//! There is one drawing path, but for films ([`Stage`]), which skip the SVG. Every picture is first an SVG ([`GridScene`], [`BodyScene`],
-//! [`Plot`], [`BarChart`], [`Histogram`], [`Matrix`]); [`to_png`] rasterizes that very SVG. The
-//! crate reads no files, asks for no system font and knows nothing of worlds, runs or robots'
-//! types.
+//! There is one drawing path: every picture is first an SVG ([`draw`], [`Plot`], [`BarChart`],
+//! [`Histogram`], [`Matrix`]); [`to_png`] rasterizes that very SVG, and a [`Film`] does so again and
+//! again. The crate reads no files, asks for no system font and knows no world: of a run it sees
+//! scenery, frames and trails (`sidestep_kernel::view`).
 //!
 //! The same input gives the same bytes, whatever fonts and locale the machine has: numbers are
 //! rounded to a hundredth of a unit, logarithms come from `libm`, and the only font is the
@@ -29,7 +30,6 @@
 //! ```
 
 mod axis;
-mod bodies;
 mod chart;
 mod error;
 mod film;
@@ -37,21 +37,22 @@ mod heat;
 #[cfg(test)]
 mod layout_tests;
 mod legend;
+mod picture;
 mod raster;
-mod scene;
 mod style;
 mod svg;
+#[cfg(test)]
+mod testing;
 mod text;
 mod ticks;
 
 pub use axis::Axis;
-pub use bodies::{BodyScene, Obstacle, Shape, Strand, Trail};
 pub use chart::bars::{Bar, BarChart, BarSeries};
 pub use chart::histogram::Histogram;
 pub use chart::plot::{Mark, Plot, Point, Series};
 pub use error::DrawError;
-pub use film::{Camera, Figure, Form, Picture, Stage};
+pub use film::{Film, Still};
 pub use heat::Matrix;
+pub use picture::{Options, describe, draw, worth_a_trail};
 pub use raster::to_png;
-pub use scene::{BodyRect, BodyShade, CellShade, DoorRect, GridScene, Track, to_svg};
 pub use style::{SERIES_COLORS, Style};

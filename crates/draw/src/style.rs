@@ -1,6 +1,7 @@
 //! Sizes and colors that all pictures share.
 
 use crate::error::DrawError;
+use sidestep_kernel::view::Color;
 
 /// Okabe and Ito's palette without its yellow, which is unreadable on white: distinct for every
 /// common color blindness.
@@ -17,6 +18,11 @@ pub(crate) const GRID: &str = "#E4E4E4";
 /// The color of the series (or track) of this number; colors repeat after seven.
 pub(crate) fn series_color(index: usize) -> &'static str {
     SERIES_COLORS[index % SERIES_COLORS.len()]
+}
+
+/// A color as SVG has it.
+pub(crate) fn hex([r, g, b]: Color) -> String {
+    format!("#{r:02X}{g:02X}{b:02X}")
 }
 
 /// The room a picture may take and the size of its text.
@@ -69,5 +75,16 @@ impl Style {
 impl Default for Style {
     fn default() -> Self {
         Self::CHART
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn series_have_the_colors_of_bodies() {
+        let of_bodies = sidestep_kernel::view::COLORS.map(hex);
+        assert_eq!(of_bodies.as_slice(), &SERIES_COLORS[..of_bodies.len()]);
     }
 }

@@ -159,12 +159,21 @@ impl Svg {
 
     /// The whole document on a white ground; `title` is what screen readers say.
     pub(crate) fn finish(self, width_px: f64, height_px: f64, title: &str) -> String {
+        let ground = r##"<rect width="100%" height="100%" fill="#FFFFFF"/>"##;
+        self.document((width_px, height_px), title, ground)
+    }
+
+    /// The whole document without a ground, to be drawn over another picture.
+    pub(crate) fn finish_clear(self, width_px: f64, height_px: f64) -> String {
+        self.document((width_px, height_px), "", "")
+    }
+
+    fn document(self, (width_px, height_px): (f64, f64), title: &str, ground: &str) -> String {
         let (width, height) = (Num(width_px.ceil()), Num(height_px.ceil()));
         format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" \
              viewBox=\"0 0 {width} {height}\" font-family=\"{FAMILIES}\" role=\"img\">\n\
-             <title>{}</title>\n\
-             <rect width=\"{width}\" height=\"{height}\" fill=\"#FFFFFF\"/>\n{}</svg>\n",
+             <title>{}</title>\n{ground}\n{}</svg>\n",
             Escaped(title),
             self.body
         )

@@ -1,15 +1,41 @@
 //! What a map's picture shows, pixel by pixel, and how large it may become.
 
 use image::{Rgba, RgbaImage};
-use sidestep_draw::{
-    BodyRect, BodyShade, CellShade, DoorRect, GridScene, Style, Track, to_png, to_svg,
+use sidestep_draw::{Options, draw, to_png};
+use sidestep_kernel::Cycle;
+use sidestep_kernel::view::{
+    Body, Condition, DOOR, Floor, Frame, Kind, MOBILE, Occupancy, Place, Pose, Scenery, Shape,
+    Trail, WALL,
 };
 
 const WHITE: [u8; 3] = [255, 255, 255];
-const WALL: [u8; 3] = [0x3C, 0x3C, 0x3C];
-const ACTIVE: [u8; 3] = [0xA6, 0xA6, 0xA6];
-/// The first track's blue at 40 % on white.
-const RIBBON: [u8; 3] = [153, 199, 224];
+/// The first robot's blue at 50 % on white.
+const RIBBON: [u8; 3] = [127, 184, 216];
+/// Side of a box.
+const BOX_M: f64 = 0.25;
+
+/// What is on a floor.
+#[derive(Clone)]
+struct Scene {
+    floor: Floor,
+    bodies: Vec<Body>,
+    trails: Vec<Trail>,
+}
+
+impl Scene {
+    fn svg(&self) -> String {
+        let scenery = Scenery {
+            name: String::new(),
+            dimensions: 2,
+            cycle_s: 1.0,
+            floor: Some(self.floor.clone()),
+            bodies: Vec::new(),
+            names: Vec::new(),
+        };
+        let frame = Frame { bodies: self.bodies.clone(), ..Frame::default() };
+        draw(&scenery, &frame, &self.trails, &Options::page(&scenery, "")).unwrap()
+    }
+}
 
 /// A picture at one pixel per SVG pixel, with its map's place read from the SVG.
 struct Picture {
@@ -20,8 +46,8 @@ struct Picture {
 }
 
 impl Picture {
-    fn of(scene: &GridScene) -> Self {
-        let svg = to_svg(scene, &Style::MAP).unwrap();
+    fn of(scene: &Scene) -> Self {
+        let svg = scene.svg();
         let size = |name: &str| number_after(&svg, &format!("{name}=\""));
         let longer = size("width").max(size("height"));
         let png = to_png(&svg, longer as u32).unwrap();
@@ -48,46 +74,80 @@ fn number_after(text: &str, mark: &str) -> f64 {
 }
 
 /// A room of 20 x 20 boxes with walls around it.
-fn room() -> GridScene {
-    let shade = |at: u32| match (at % 20, at / 20) {
-        (0 | 19, _) | (_, 0 | 19) => CellShade::Wall,
-        _ => CellShade::Free,
+fn room() -> Scene {
+    let occupancy = |at: u32| match (at % 20, at / 20) {
+        (0 | 19, _) | (_, 0 | 19) => Occupancy::Wall,
+        _ => Occupancy::Free,
     };
-    let cells = (0..400).map(shade).collect();
-    GridScene { width: 20, height: 20, box_size_m: 0.25, cells, ..GridScene::default() }
+    floor(20, (0..400).map(occupancy).collect())
 }
 
-fn track(width_boxes: f64, points: Vec<(f64, f64)>) -> Track {
-    Track { width_boxes, points, ..Track::default() }
+fn floor(side: u32, boxes: Vec<Occupancy>) -> Scene {
+    let floor = Floor { width: side, height: side, box_m: BOX_M, origin_m: [-3.0, 2.0], boxes };
+    Scene { floor, bodies: Vec::new(), trails: Vec::new() }
+}
+
+/// A point in boxes.
+fn place((col, row): (f64, f64)) -> Place {
+    [-3.0 + BOX_M * col, 2.0 + BOX_M * row, 0.0]
+}
+
+/// A body of this many boxes around a point in boxes, with a heading in quarter turns.
+fn body(kind: Kind, number: u32, at: (f64, f64), size: (f64, f64), quarters: u8) -> Body {
+    let size_m = [BOX_M * size.0, BOX_M * size.1, 0.1];
+    let heading_rad = f64::from(quarters) * std::f64::consts::FRAC_PI_2;
+    let pose = Pose::heading(place(at), heading_rad);
+    Body::new(kind, number, pose, Shape::Cuboid { size_m })
+}
+
+/// A robot as wide as that many boxes at the end of its way.
+fn went(number: u32, width: f64, way: &[(f64, f64)]) -> (Body, Trail) {
+    // All in one cycle, so that all has one shade.
+    let places = way.iter().map(|&at| (0 as Cycle, place(at))).collect();
+    let robot = body(Kind::Robot, number, way[way.len() - 1], (width, width), 0);
+    (robot, Trail { of: (Kind::Robot, number, None), way: places })
+}
+
+/// The room with robots that have gone ways.
+fn ways(ways: &[(f64, &[(f64, f64)])]) -> Scene {
+    let ways = ways.iter().zip(0..).map(|((width, way), number)| went(number, *width, way));
+    let (bodies, trails) = ways.unzip();
+    Scene { bodies, trails, ..room() }
+}
+
+/// With a newest cycle elsewhere, a trail would be old: all of a trail is the newest shade here.
+fn newest(mut scene: Scene) -> Scene {
+    for trail in &mut scene.trails {
+        trail.way.insert(0, (0, trail.way[0].1));
+        trail.way[1..].iter_mut().for_each(|(cycle, _)| *cycle = 40);
+    }
+    scene
 }
 
 #[test]
 fn walls_doors_people_and_tracks_have_their_colors_at_their_places() {
-    let person =
-        BodyRect { col: 15, row: 15, width: 2, height: 2, heading: None, shade: BodyShade::Active };
-    let scene = GridScene {
-        doors: vec![
-            DoorRect { col: 0, row: 5, width: 1, height: 3, open: false },
-            DoorRect { col: 19, row: 5, width: 1, height: 3, open: true },
-        ],
-        bodies: vec![person],
-        tracks: vec![track(3.0, vec![(3.5, 3.5), (3.5, 12.5), (10.5, 12.5)])],
-        ..room()
-    };
+    let mut scene = newest(ways(&[(3.0, &[(3.5, 3.5), (3.5, 12.5), (10.5, 12.5)])]));
+    let door = |col: f64| body(Kind::Door, col as u32, (col, 6.5), (1.0, 3.0), 0);
+    scene.bodies.extend([
+        door(0.5),
+        door(19.5).when(true, Condition::Open),
+        body(Kind::Person, 9, (16.0, 16.0), (2.0, 2.0), 0),
+    ]);
     let picture = Picture::of(&scene);
     assert_eq!(picture.at(0.5, 0.5), WALL);
     assert_eq!(picture.at(10.5, 19.5), WALL);
-    assert_eq!(picture.at(0.5, 6.5), ACTIVE);
-    assert_eq!(picture.at(16.0, 16.0), ACTIVE);
+    assert_eq!(picture.at(0.5, 6.5), DOOR);
+    assert_ne!(picture.at(19.5, 6.5), DOOR);
+    assert_eq!(picture.at(16.0, 16.0), MOBILE);
     assert_eq!(picture.at(12.5, 5.5), WHITE);
     assert_eq!(picture.at(3.5, 8.5), RIBBON);
-    assert_eq!(picture.at(8.5, 12.5), RIBBON);
+    assert_eq!(picture.at(7.5, 12.5), RIBBON);
 }
 
 #[test]
 fn row_zero_is_at_the_bottom() {
     let mut scene = room();
-    scene.cells[20 + 5] = CellShade::Wall;
+    scene.floor.boxes[20 + 5] = Occupancy::Wall;
     let picture = Picture::of(&scene);
     assert_eq!(picture.at(5.5, 1.5), WALL);
     assert_eq!(picture.at(5.5, 18.5), WHITE);
@@ -95,30 +155,29 @@ fn row_zero_is_at_the_bottom() {
 
 #[test]
 fn a_ribbon_covers_the_boxes_the_body_covered_and_no_others() {
-    let scene = GridScene { tracks: vec![track(3.0, vec![(3.5, 9.5), (12.5, 9.5)])], ..room() };
-    let picture = Picture::of(&scene);
-    // A little inside and a little outside of the three rows and of the first and last column.
+    let picture = Picture::of(&newest(ways(&[(3.0, &[(12.5, 9.5), (3.5, 9.5), (12.5, 9.5)])])));
+    // A little inside and a little outside of the three rows and of the first column.
     for (row, color) in [(7.97, WHITE), (8.03, RIBBON), (10.97, RIBBON), (11.03, WHITE)] {
         assert_eq!(picture.at(8.5, row), color, "row {row}");
     }
-    for (col, color) in [(1.96, WHITE), (2.04, RIBBON), (13.96, RIBBON), (14.04, WHITE)] {
+    for (col, color) in [(1.96, WHITE), (2.04, RIBBON), (14.04, WHITE)] {
         assert_eq!(picture.at(col, 8.5), color, "column {col}");
     }
 }
 
 #[test]
 fn a_place_crossed_often_is_no_darker() {
-    let to_and_fro = (0..50).map(|i| (if i % 2 == 0 { 3.5 } else { 12.5 }, 9.5)).collect();
-    let square = vec![(3.5, 3.5), (9.5, 3.5), (9.5, 6.5), (6.5, 6.5), (6.5, 2.5)];
-    let scene = GridScene { tracks: vec![track(1.0, to_and_fro)], ..room() };
-    assert_eq!(Picture::of(&scene).at(8.5, 9.5), RIBBON);
-    let scene = GridScene { tracks: vec![track(1.0, square)], ..room() };
-    assert_eq!(Picture::of(&scene).at(6.5, 3.5), RIBBON);
+    let to_and_fro: Vec<_> = (0..50).map(|i| (if i % 2 == 0 { 3.5 } else { 12.5 }, 9.5)).collect();
+    let square = [(3.5, 3.5), (9.5, 3.5), (9.5, 6.5), (6.5, 6.5), (6.5, 2.5)];
+    assert_eq!(Picture::of(&newest(ways(&[(1.0, &to_and_fro)]))).at(8.5, 9.5), RIBBON);
+    assert_eq!(Picture::of(&newest(ways(&[(1.0, &square)]))).at(6.5, 3.5), RIBBON);
 }
 
 #[test]
 fn a_robot_that_never_moved_covers_its_boxes() {
-    let scene = GridScene { tracks: vec![track(3.0, vec![(9.5, 9.5)])], ..room() };
+    let mut scene = newest(ways(&[(3.0, &[(9.5, 9.5)])]));
+    // Gone a little aside, so that the place where it was can be seen.
+    scene.bodies[0] = body(Kind::Robot, 0, (15.5, 15.5), (3.0, 3.0), 0);
     let picture = Picture::of(&scene);
     assert_eq!(picture.at(8.1, 8.1), RIBBON);
     assert_eq!(picture.at(10.9, 10.9), RIBBON);
@@ -128,14 +187,23 @@ fn a_robot_that_never_moved_covers_its_boxes() {
 #[test]
 fn an_arrowhead_points_where_the_robot_heads() {
     for heading in 0..=5 {
-        let shade = BodyShade::Robot(0);
-        let body = BodyRect { col: 8, row: 8, width: 4, height: 4, heading: Some(heading), shade };
-        let picture = Picture::of(&GridScene { bodies: vec![body], ..room() });
+        let robot = body(Kind::Robot, 0, (10.0, 10.0), (4.0, 4.0), heading);
+        let picture = Picture::of(&Scene { bodies: vec![robot], ..room() });
         // The tip is white, the same distance behind the middle is not.
         let (x, y) = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)][usize::from(heading) % 4];
         assert_eq!(picture.at(10.0 + 1.1 * x, 10.0 + 1.1 * y), WHITE, "{heading}");
         assert_ne!(picture.at(10.0 - 1.1 * x, 10.0 - 1.1 * y), WHITE, "{heading}");
     }
+}
+
+#[test]
+fn what_is_longer_ago_is_paler() {
+    let mut scene = ways(&[(1.0, &[(2.5, 9.5), (16.5, 9.5)])]);
+    let way = (0..=40).map(|k| (k, place((2.5 + 0.35 * k as f64, 9.5))));
+    scene.trails[0].way = way.collect();
+    let picture = Picture::of(&scene);
+    let reds: Vec<u8> = [3.0, 7.0, 11.0, 14.0].map(|col| picture.at(col, 9.3)[0]).to_vec();
+    assert!(reds.windows(2).all(|pair| pair[0] > pair[1]), "{reds:?}");
 }
 
 #[test]
@@ -145,10 +213,9 @@ fn a_map_of_four_million_boxes_with_long_tracks_is_a_small_file() {
         state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
         state >> 16
     };
-    let cells = (0..4_000_000)
-        .map(|_| if random() % 3 == 0 { CellShade::Wall } else { CellShade::Free })
-        .collect();
-    let walk = |start: f64, random: &mut dyn FnMut() -> u32| {
+    let occupancy = |_| if random() % 3 == 0 { Occupancy::Wall } else { Occupancy::Free };
+    let boxes = (0..4_000_000).map(occupancy).collect();
+    let mut walk = |start: f64| -> Vec<(f64, f64)> {
         let mut at = (start, start);
         let step = |_| {
             let (dx, dy) =
@@ -156,18 +223,12 @@ fn a_map_of_four_million_boxes_with_long_tracks_is_a_small_file() {
             at = (at.0 + dx, at.1 + dy);
             at
         };
-        track(3.0, (0..100_000).map(step).collect())
+        (0..100_000).map(step).collect()
     };
-    let tracks = [500.5, 1000.5, 1500.5].map(|start| walk(start, &mut random)).to_vec();
-    let scene = GridScene {
-        width: 2000,
-        height: 2000,
-        box_size_m: 0.05,
-        cells,
-        tracks,
-        ..GridScene::default()
-    };
-    let svg = to_svg(&scene, &Style::MAP).unwrap();
+    let walks = [500.5, 1000.5, 1500.5].map(&mut walk);
+    let walked = walks.iter().zip(0..).map(|(way, number)| went(number, 3.0, way));
+    let (bodies, trails) = walked.unzip();
+    let svg = Scene { bodies, trails, ..floor(2000, boxes) }.svg();
     assert!(svg.matches('<').count() < 150, "{} elements", svg.matches('<').count());
     assert!(svg.len() < 6_000_000, "{} bytes", svg.len());
     assert!(to_png(&svg, 1000).unwrap().starts_with(b"\x89PNG"));
@@ -175,11 +236,8 @@ fn a_map_of_four_million_boxes_with_long_tracks_is_a_small_file() {
 
 #[test]
 fn boxes_smaller_than_a_pixel_still_show() {
-    let wall = |at: u32| if at % 2000 == 1000 { CellShade::Wall } else { CellShade::Free };
-    let cells = (0..4_000_000).map(wall).collect();
-    let scene =
-        GridScene { width: 2000, height: 2000, box_size_m: 0.05, cells, ..GridScene::default() };
-    let picture = Picture::of(&scene);
+    let wall = |at: u32| if at % 2000 == 1000 { Occupancy::Wall } else { Occupancy::Free };
+    let picture = Picture::of(&floor(2000, (0..4_000_000).map(wall).collect()));
     let [r, ..] = picture.at(1000.5, 800.0);
     assert!(r < 200, "{r}");
 }

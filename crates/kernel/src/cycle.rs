@@ -1,10 +1,12 @@
 //! The only place that knows the order of the phases.
 //!
 //! ```text
-//! pool one                      joining                pool two
-//! perceive, decide, claim  ──|  claims -> groups  ──|  groups react  ──|  next cycle
-//!                         barrier                barrier            barrier
+//! claim                         join                   act
+//! perceive, decide, claim  ──|  claims -> groups  ──|  groups act  ──|  next cycle
+//!                         barrier                barrier          barrier
 //! ```
+//!
+//! Where agents decide together ([`crate::world::Decides`]), they do it in the last phase.
 //!
 //! The source paper merges tasks while they are inserted into pool two and so needs two
 //! barriers, but a lock or an atomic exchange per claimed box. Here claims are plain stores
@@ -14,7 +16,7 @@ use crate::conflict::Groups;
 use crate::ports::Clock;
 use crate::units::{Cycle, Slot};
 use crate::workers::{Team, Worker};
-use crate::world::World;
+use crate::world::{Auction, Phases, Turn};
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -22,25 +24,25 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 /// Time spent in each phase by worker 0, waiting at the barrier included, in nanoseconds.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct PhaseTimes {
-    /// Pool one: perceive, decide, claim.
-    pub perceive_decide_ns: u64,
-    /// Joining claims into groups.
-    pub conflicts_ns: u64,
-    /// Pool two: react.
-    pub react_ns: u64,
+    /// Every body perceives, decides where agents decide alone, and claims.
+    pub claim_ns: u64,
+    /// Claims become groups.
+    pub join_ns: u64,
+    /// Groups decide where agents decide together, and act.
+    pub act_ns: u64,
 }
 
 impl PhaseTimes {
     /// Adds the times of another stretch of cycles.
     pub fn add(&mut self, other: Self) {
-        self.perceive_decide_ns += other.perceive_decide_ns;
-        self.conflicts_ns += other.conflicts_ns;
-        self.react_ns += other.react_ns;
+        self.claim_ns += other.claim_ns;
+        self.join_ns += other.join_ns;
+        self.act_ns += other.act_ns;
     }
 
     /// All phases together.
     pub fn total_ns(&self) -> u64 {
-        self.perceive_decide_ns + self.conflicts_ns + self.react_ns
+        self.claim_ns + self.join_ns + self.act_ns
     }
 }
 
@@ -49,27 +51,32 @@ impl PhaseTimes {
 pub struct Mate<S> {
     /// The world's scratch.
     pub scratch: S,
+    /// The kernel's own.
+    pub tally: Tally,
+}
+
+/// What a worker has seen and spent, and its buffers.
+#[derive(Debug, Default)]
+pub struct Tally {
     /// Conflict groups seen by size: index k counts groups of `2^k .. 2^(k+1)` bodies.
     pub group_sizes: [u64; 32],
     /// The largest group seen.
     pub largest_group: u64,
+    /// Processor time of the worker's thread.
+    pub cpu_ns: u64,
     members: Vec<Slot>,
-    /// Bodies in conflict that have not acted yet, where a world reacts in rounds.
+    /// Bodies in conflict that have not acted yet, in worlds with an auction.
     pending: Vec<Slot>,
 }
 
 impl<S> Mate<S> {
     /// A worker that has done nothing yet.
     pub fn new(scratch: S) -> Self {
-        Self {
-            scratch,
-            group_sizes: [0; 32],
-            largest_group: 0,
-            members: Vec::new(),
-            pending: Vec::new(),
-        }
+        Self { scratch, tally: Tally::default() }
     }
+}
 
+impl Tally {
     fn count_group(&mut self, size: usize) {
         self.group_sizes[size.ilog2() as usize] += 1;
         self.largest_group = self.largest_group.max(size as u64);
@@ -84,7 +91,7 @@ pub(crate) type Crew<S> = [Mutex<Mate<S>>];
 /// It sees the state and takes what the workers have gathered, so that a caller who must look
 /// after every cycle (keep poses, gather events, ask whether the run is over) costs no thread
 /// and no call of the system per cycle. It cannot change the state.
-pub trait Observer<W: World> {
+pub trait Observer<W: Phases> {
     /// Sees the state as cycle `now` begins.
     fn before_cycle(&mut self, _now: Cycle, _state: &W::State) {}
 
@@ -145,7 +152,7 @@ pub(crate) struct Ran {
 /// there are several.
 ///
 /// The result is the same bits for every length of `crew`.
-pub(crate) fn advance<W: World, C: Clock>(
+pub(crate) fn advance<W: Phases, C: Clock>(
     world: &W,
     state: &W::State,
     groups: &Groups,
@@ -160,7 +167,7 @@ pub(crate) fn advance<W: World, C: Clock>(
     }
     let is_observed = observer.is_some();
     let stop = AtomicBool::new(false);
-    let shared = Shared { world, state, groups, crew, stretch, is_observed, stop };
+    let shared = Shared { world, state, groups, crew, clock, stretch, is_observed, stop };
     let mark_ns = clock.now_ns();
     let mut lead = Lead { clock, observer, started_ns, mark_ns, ran: Ran::default() };
     match team {
@@ -175,11 +182,12 @@ pub(crate) fn advance<W: World, C: Clock>(
 }
 
 /// What all workers see of a stretch.
-struct Shared<'a, W: World> {
+struct Shared<'a, W: Phases> {
     world: &'a W,
     state: &'a W::State,
     groups: &'a Groups,
     crew: &'a Crew<W::Scratch>,
+    clock: &'a dyn Clock,
     stretch: Stretch,
     is_observed: bool,
     /// Whether the present cycle is the last one. Worker 0 writes it before a barrier, and all
@@ -188,7 +196,7 @@ struct Shared<'a, W: World> {
 }
 
 /// The part of worker 0 alone: it reads the clock, calls the observer, and says when to stop.
-struct Lead<'a, 'b, W: World, C> {
+struct Lead<'a, 'b, W: Phases, C> {
     clock: &'a C,
     observer: Option<&'a mut (dyn Observer<W> + 'b)>,
     started_ns: u64,
@@ -197,7 +205,7 @@ struct Lead<'a, 'b, W: World, C> {
     ran: Ran,
 }
 
-impl<W: World, C: Clock> Lead<'_, '_, W, C> {
+impl<W: Phases, C: Clock> Lead<'_, '_, W, C> {
     /// Adds the time since the last call to one phase.
     fn end_phase(&mut self, phase: impl FnOnce(&mut PhaseTimes) -> &mut u64) {
         let now_ns = self.clock.now_ns();
@@ -216,9 +224,16 @@ impl<W: World, C: Clock> Lead<'_, '_, W, C> {
     }
 }
 
-impl<W: World> Shared<'_, W> {
+impl<W: Phases> Shared<'_, W> {
     /// One worker's part of the stretch.
-    fn work<C: Clock>(&self, worker: &Worker<'_>, mut lead: Option<&mut Lead<'_, '_, W, C>>) {
+    fn work<C: Clock>(&self, worker: &Worker<'_>, lead: Option<&mut Lead<'_, '_, W, C>>) {
+        let began_ns = self.clock.thread_cpu_ns();
+        self.all_cycles(worker, lead);
+        let took_ns = self.clock.thread_cpu_ns() - began_ns;
+        lock(&self.crew[worker.index()]).tally.cpu_ns += took_ns;
+    }
+
+    fn all_cycles<C: Clock>(&self, worker: &Worker<'_>, mut lead: Option<&mut Lead<'_, '_, W, C>>) {
         let mut held = None;
         for (round, now) in (0..).zip(self.stretch.from..) {
             let mate = held.get_or_insert_with(|| lock(&self.crew[worker.index()]));
@@ -241,7 +256,7 @@ impl<W: World> Shared<'_, W> {
                 && worker.team_size() > 1
             {
                 // The wait for the others.
-                lead.end_phase(|times| &mut times.react_ns);
+                lead.end_phase(|times| &mut times.act_ns);
             }
             if self.stop.load(Ordering::Relaxed) {
                 return;
@@ -251,7 +266,7 @@ impl<W: World> Shared<'_, W> {
 
     /// Lets the observer look at the cycle that is done and, if there is one, at the next.
     fn observe<C: Clock>(&self, now: Cycle, lead: &mut Lead<'_, '_, W, C>) {
-        lead.end_phase(|times| &mut times.react_ns);
+        lead.end_phase(|times| &mut times.act_ns);
         let is_last = lead.count(self.stretch);
         let Some(observer) = &mut lead.observer else { return };
         lead.ran.is_ended = observer.after_cycle(now, self.state, Scratches(self.crew)).is_break();
@@ -272,79 +287,80 @@ impl<W: World> Shared<'_, W> {
         (now, round): (Cycle, u64),
         mut lead: Option<&mut Lead<'_, '_, W, C>>,
     ) {
-        let (world, state, groups) = (self.world, self.state, self.groups);
+        let &Self { world, state, groups, clock, .. } = self;
+        let Mate { scratch, tally } = mate;
+        let turn = &mut Turn { world, state, now, clock, scratch };
         let n = world.bodies(state);
         worker.for_each_chunk(3 * round, n, |bodies| {
             bodies.clone().for_each(|body| groups.reset(body as Slot));
-            world.perceive_and_decide(state, now, bodies, &mut mate.scratch);
+            W::claim(turn, bodies);
         });
         worker.barrier();
         if let Some(lead) = &mut lead {
-            lead.end_phase(|times| &mut times.perceive_decide_ns);
+            lead.end_phase(|times| &mut times.claim_ns);
         }
-        worker.for_each_chunk(3 * round + 1, n, |bodies| {
-            world.find_conflicts(state, now, bodies, groups, &mut mate.scratch);
-        });
+        worker.for_each_chunk(3 * round + 1, n, |bodies| W::join(turn, bodies, groups));
         worker.barrier();
         if let Some(lead) = &mut lead {
-            lead.end_phase(|times| &mut times.conflicts_ns);
+            lead.end_phase(|times| &mut times.join_ns);
         }
+        let auction = world.auction();
         worker.for_each_chunk(3 * round + 2, n, |bodies| {
-            bodies
-                .for_each(|body| react_as_leader(world, state, groups, mate, (now, body as Slot)));
+            bodies.for_each(|body| {
+                act_as_leader(turn, groups, tally, auction.is_some(), body as Slot);
+            });
         });
-        if world.reacts_in_rounds() {
-            react_in_rounds(world, state, worker, mate, now);
+        if let Some(auction) = auction {
+            hold_auction(auction, turn, &mut tally.pending, worker);
         }
         if let Some(lead) = &mut lead {
-            lead.end_phase(|times| &mut times.react_ns);
+            lead.end_phase(|times| &mut times.act_ns);
         }
     }
 }
 
-/// Lets the group of `body` react if `body` leads one.
+/// Lets the group of `body` act if `body` leads one.
 #[inline]
-fn react_as_leader<W: World>(
-    world: &W,
-    state: &W::State,
+fn act_as_leader<W: Phases>(
+    turn: &mut Turn<'_, W>,
     groups: &Groups,
-    mate: &mut Mate<W::Scratch>,
-    (now, body): (Cycle, Slot),
+    own: &mut Tally,
+    by_auction: bool,
+    body: Slot,
 ) {
     if !groups.is_leader(body) {
         return;
     }
     if groups.is_alone(body) {
-        mate.group_sizes[0] += 1;
-        return world.react(state, now, &mut [body], &mut mate.scratch);
+        own.group_sizes[0] += 1;
+        return W::act(turn, &mut [body]);
     }
-    let mut members = std::mem::take(&mut mate.members);
+    let mut members = std::mem::take(&mut own.members);
     groups.members(body, &mut members);
-    mate.count_group(members.len());
-    if world.reacts_in_rounds() {
-        mate.pending.extend_from_slice(&members);
+    own.count_group(members.len());
+    if by_auction {
+        own.pending.extend_from_slice(&members);
     } else {
-        world.react(state, now, &mut members, &mut mate.scratch);
+        W::act(turn, &mut members);
     }
-    mate.members = members;
+    own.members = members;
 }
 
-/// Rounds of bidding until every body in conflict has acted. A group's bodies are all in one
-/// worker's list, so the groups spread over the workers.
-fn react_in_rounds<W: World>(
-    world: &W,
-    state: &W::State,
+/// Holds rounds of bidding until every body in conflict has acted. A group's bodies are all in
+/// one worker's list, so the groups spread over the workers.
+fn hold_auction<W: Phases>(
+    auction: &dyn Auction<W>,
+    turn: &mut Turn<'_, W>,
+    pending: &mut Vec<Slot>,
     worker: &Worker<'_>,
-    mate: &mut Mate<W::Scratch>,
-    now: Cycle,
 ) {
-    while worker.any(!mate.pending.is_empty()) {
-        for &body in &mate.pending {
-            world.bid(state, now, body, &mut mate.scratch);
+    while worker.any(!pending.is_empty()) {
+        for &body in &*pending {
+            auction.bid(turn, body);
         }
         worker.barrier();
-        world.act_on_bids(state, now, &mut mate.pending, &mut mate.scratch);
+        auction.act_on_bids(turn, pending);
         worker.barrier();
-        world.retract_bids(state, &mut mate.scratch);
+        auction.retract_bids(turn);
     }
 }

@@ -8,7 +8,7 @@ use crate::cycle::{Mate, Observer, PhaseTimes, Ran, Stretch, advance, lock};
 use crate::ports::Clock;
 use crate::units::Cycle;
 use crate::workers::Team;
-use crate::world::World;
+use crate::world::Phases;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Bodies are arranged anew after at least this many cycles: they have not gone far by then,
@@ -17,7 +17,7 @@ const ARRANGE_EVERY: u64 = 64;
 
 /// Runs a world with as many workers as asked for, and keeps what they share.
 #[derive(Debug)]
-pub struct Engine<W: World> {
+pub struct Engine<W: Phases> {
     groups: Groups,
     /// Cycles since the bodies were arranged.
     since_arranged: u64,
@@ -28,7 +28,7 @@ pub struct Engine<W: World> {
     times: PhaseTimes,
 }
 
-impl<W: World> Engine<W> {
+impl<W: Phases> Engine<W> {
     /// An engine of `workers` workers (at least 1) for `bodies` bodies.
     pub fn new(world: &W, bodies: usize, workers: usize) -> Self {
         let mate = || Mutex::new(Mate::new(world.scratch()));
@@ -142,20 +142,23 @@ impl<W: World> Engine<W> {
 const ALONE_NS: u64 = 5_000_000;
 /// one with all so long that starting their threads is below 1 % of it,
 const TEAM_NS: u64 = 20_000_000;
-/// and a look at the other way this long, if a cycle is not longer.
-const LOOK_NS: u64 = 2_000_000;
+/// and a look at the other way this long, or as long as so many cycles take with one worker: the
+/// first of them says little, since a thread is started in it and caches are cold.
+const LOOK_NS: u64 = 1_000_000;
+const LOOK_CYCLES: f64 = 2.0;
 
 /// A cycle of less work is never shared out: waiting for each other three times costs about
 /// 1 us where every worker has a processor of its own, and 100 times that where not.
 const SMALLEST_NS: f64 = 10_000.0;
-/// A cycle of so much work is tried with all workers at once: it takes as long as a look does.
+/// A cycle of so much work is tried with all workers from the beginning: runs are of hundreds
+/// of cycles, and a look takes two or three.
 const LARGE_NS: f64 = 1_000_000.0;
 
 /// All workers must be so much faster than one to be taken.
 const WORTHWHILE: f64 = 0.9;
 
 /// Time before the first look, and between looks that may be worth it,
-const SHORTEST_WAIT_NS: f64 = 200e6;
+const SHORTEST_WAIT_NS: f64 = 64e6;
 /// and the longest between looks that were not, each time twice as long; but
 const LONGEST_WAIT_NS: f64 = 5e9;
 /// a look is followed by at least this many times its own time without one.
@@ -169,7 +172,7 @@ const NEWEST: f64 = 0.25;
 /// It keeps to the faster of the two, its favorite, and looks at the other now and then.
 /// Whatever the other costs (with a barrier on processors that are busy with other work,
 /// a thousand times as much), looking takes at most 1 part in [`WAIT_PER_COST`] of the time:
-/// a look ends after [`LOOK_NS`] or one cycle, and its own cost says when the next is due. One
+/// a look ends after [`LOOK_NS`] or [`LOOK_CYCLES`], and its own cost says when the next is due. One
 /// that finds nothing doubles the wait for the next, up to [`LONGEST_WAIT_NS`], so that a
 /// change is still noticed. Only a look can make all workers the favorite, so an old measurement
 /// never does; one worker takes over as soon as all are slower.
@@ -215,7 +218,7 @@ impl Pace {
         let is_look = crew > 1 && self.is_look_due();
         let with_all = self.favors_team != is_look;
         let limit_ns = match (is_look, with_all) {
-            (true, _) => LOOK_NS,
+            (true, _) => LOOK_NS.max((LOOK_CYCLES * self.alone_ns.unwrap_or(0.0)) as u64),
             (false, true) => TEAM_NS,
             (false, false) => ALONE_NS,
         };
@@ -290,6 +293,7 @@ mod tests {
     use crate::cycle::Scratches;
     use crate::ports::ManualClock;
     use crate::units::Slot;
+    use crate::world::Turn;
     use std::ops::{ControlFlow, Range};
     use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
@@ -299,6 +303,8 @@ mod tests {
     #[derive(Default)]
     struct Trial {
         pace: Pace,
+        /// More for the first cycle of all workers: threads are started.
+        start_ns: u64,
         now_ns: u64,
         looking_ns: u64,
         with_all_ns: u64,
@@ -312,9 +318,11 @@ mod tests {
             while self.now_ns < until_ns {
                 let plan = self.pace.plan(2);
                 let cycle_ns = cycle_ns[usize::from(plan.workers > 1)];
-                let cycles = plan.limit_ns.div_ceil(cycle_ns);
-                let took_ns = cycles * cycle_ns;
-                let ran = Ran { cycles, took_ns, first_ns: cycle_ns, ..Ran::default() };
+                let start_ns = if plan.workers > 1 { self.start_ns } else { 0 };
+                let cycles = plan.limit_ns.saturating_sub(start_ns).div_ceil(cycle_ns).max(1);
+                let took_ns = start_ns + cycles * cycle_ns;
+                let first_ns = start_ns + cycle_ns;
+                let ran = Ran { cycles, took_ns, first_ns, ..Ran::default() };
                 if plan.is_look {
                     self.looks_at_ns.push(self.now_ns);
                     self.looking_ns += took_ns;
@@ -344,6 +352,18 @@ mod tests {
             trial.run(4 * SECOND_NS, cycle_ns);
             let with_all = trial.with_all_ns as f64 / trial.now_ns as f64;
             assert!((least..=most).contains(&with_all), "{cycle_ns:?}: {with_all}");
+        }
+    }
+
+    #[test]
+    fn a_slow_start_of_threads_hides_no_faster_team() {
+        for (cycle_ns, start_ns) in
+            [([2_000_000, 1_100_000], 900_000), ([100_000, 60_000], 300_000)]
+        {
+            let mut trial = Trial { start_ns, ..Trial::default() };
+            trial.run(SECOND_NS / 10, cycle_ns);
+            assert!(trial.pace.favors_team, "{cycle_ns:?}");
+            assert_eq!(trial.looks_at_ns.len(), 1);
         }
     }
 
@@ -418,7 +438,7 @@ mod tests {
 
     struct Ticks(Vec<AtomicU64>);
 
-    impl World for Ticking<'_> {
+    impl Phases for Ticking<'_> {
         type State = Ticks;
         type Scratch = Vec<(Cycle, usize)>;
 
@@ -433,30 +453,16 @@ mod tests {
             state.0.len()
         }
 
-        fn perceive_and_decide(
-            &self,
-            state: &Ticks,
-            now: Cycle,
-            bodies: Range<usize>,
-            scratch: &mut Self::Scratch,
-        ) {
+        fn claim(turn: &mut Turn<'_, Self>, bodies: Range<usize>) {
             for body in bodies {
-                state.0[body].fetch_add(1, Relaxed);
-                scratch.push((now, body));
+                turn.state.0[body].fetch_add(1, Relaxed);
+                turn.scratch.push((turn.now, body));
             }
         }
 
-        fn find_conflicts(
-            &self,
-            _: &Ticks,
-            _: Cycle,
-            _: Range<usize>,
-            _: &Groups,
-            _: &mut Self::Scratch,
-        ) {
-        }
+        fn join(_: &mut Turn<'_, Self>, _: Range<usize>, _: &Groups) {}
 
-        fn react(&self, _: &Ticks, _: Cycle, _: &mut [Slot], _: &mut Self::Scratch) {}
+        fn act(_: &mut Turn<'_, Self>, _: &mut [Slot]) {}
     }
 
     fn ticks(n: usize) -> Ticks {

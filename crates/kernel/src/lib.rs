@@ -3,9 +3,11 @@
 //!
 //! ```text
 //! World (immutable) + State (columns)         one cycle, run by W workers
-//!   pool one : perceive, decide, claim   │ barrier │   cycle.rs knows the order
-//!   joining  : claims -> conflict groups │ barrier │   conflict.rs
-//!   pool two : groups react              │ barrier │   workers.rs knows the threads
+//!   claim : perceive, decide, claim   │ barrier │   cycle.rs knows the order
+//!   join  : claims -> conflict groups │ barrier │   conflict.rs
+//!   act   : groups act                │ barrier │   workers.rs knows the threads
+//!
+//! Run<World>: the one simulation; Simulation: what everybody else sees of it
 //! ```
 //!
 //! What the modules promise:
@@ -13,6 +15,7 @@
 //! - [`workers`], [`cycle`]: the same bits for every number of workers.
 //! - [`digest`], [`checkpoint`]: a state has one digest, and continues bit for bit.
 //! - [`view`]: what can be seen of any world; looking changes nothing.
+//! - [`math`], [`distr`], [`geometry`]: numbers that are the same on every platform.
 //! - [`ports`]: recorder, transport and clock, each with an in-memory version.
 
 pub mod checkpoint;
@@ -23,19 +26,25 @@ pub mod digest;
 pub mod distr;
 pub mod engine;
 pub mod error;
+pub mod geometry;
 pub mod math;
+pub mod plan;
 pub mod ports;
+pub mod run;
 pub mod simulation;
 pub mod space;
 pub mod stream;
 pub mod units;
 pub mod view;
+pub mod words;
 pub mod workers;
 pub mod world;
 
 pub use column::Column;
 pub use digest::Digest;
 pub use error::InputError;
+pub use plan::{Effort, Plan};
+pub use run::Run;
 pub use simulation::Simulation;
 pub use units::{Cycle, EntityId, Seed, Slot};
-pub use world::World;
+pub use world::{Phases, Turn, World};

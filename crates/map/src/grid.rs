@@ -4,6 +4,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::InputError;
+use sidestep_kernel::view::{Floor, Occupancy};
 
 /// The most boxes a map may have. More is taken for a mistake (a resolution in millimetres, a
 /// size in the wrong unit) and refused before memory is allocated.
@@ -114,6 +115,22 @@ impl GridMap {
     pub fn new(width: u32, height: u32, box_size_m: f64, cells: Vec<Cell>) -> Self {
         assert_eq!(cells.len(), width as usize * height as usize, "one cell per box");
         Self { width, height, box_size_m, origin_m: [0.0, 0.0], cells }
+    }
+
+    /// The map as it is seen.
+    pub fn floor(&self) -> Floor {
+        let occupancy = |cell: &Cell| match cell {
+            Cell::Free => Occupancy::Free,
+            Cell::Wall => Occupancy::Wall,
+            Cell::Unknown => Occupancy::Unknown,
+        };
+        Floor {
+            width: self.width,
+            height: self.height,
+            box_m: self.box_size_m,
+            origin_m: self.origin_m,
+            boxes: self.cells.iter().map(occupancy).collect(),
+        }
     }
 
     /// The same map with its lower-left corner at `origin_m` (metres, world frame).

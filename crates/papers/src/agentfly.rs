@@ -11,7 +11,7 @@ use crate::study::{Progress, Study, finish, number, setting, source};
 use serde::Serialize;
 use sidestep::kernel::InputError;
 use sidestep::worlds::airspace::airplane::Point as AirPoint;
-use sidestep::worlds::airspace::simulation::AirspaceSimulation;
+use sidestep::worlds::airspace::{AirspaceRun, airspace_run};
 use sidestep_document::claim::{Claim, Verdict, tally};
 use sidestep_document::figure::Point;
 use sidestep_document::{Document, Estimate, Figure, FigureKind, Series, Table};
@@ -123,9 +123,9 @@ fn tracks_m(plan: &Plan, n: usize) -> Result<Vec<Vec<AirPoint>>, InputError> {
         setting("airspace.deployment", "direct"),
         setting("cycles", plan.cycles as i64),
     ];
-    let mut run = AirspaceSimulation::new(&source(SCENARIO, &settings)?, 1)?;
+    let mut run = airspace_run(&source(SCENARIO, &settings)?, 1)?;
     let mut tracks = vec![Vec::new(); n];
-    let mut note = |run: &AirspaceSimulation| {
+    let mut note = |run: &AirspaceRun| {
         for (track, cell) in tracks.iter_mut().zip(&run.state().airplanes) {
             let at = cell.pose().at;
             if track.last() != Some(&at) {
@@ -134,7 +134,7 @@ fn tracks_m(plan: &Plan, n: usize) -> Result<Vec<Vec<AirPoint>>, InputError> {
         }
     };
     note(&run);
-    finish(&mut run, plan.cycles, note);
+    finish(&mut run, note);
     Ok(tracks)
 }
 

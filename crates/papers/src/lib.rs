@@ -6,6 +6,7 @@
 //! serpentine/   the source of the chain world
 //! methods.rs    methods of the airspace world on the same traffic
 //! study.rs      a sweep file and its scenario -> the table of its runs
+//! scene.rs      what a picture shows
 //! cells.rs      the table of runs -> a cell for every case: as JSON, a table, points of figures
 //! claims.rs     verdicts over cells
 //! ```
@@ -18,7 +19,9 @@ mod claims;
 
 pub mod loria;
 pub mod methods;
+mod scene;
 pub mod serpentine;
 mod study;
 
+pub use scene::Scene;
 pub use study::Progress;

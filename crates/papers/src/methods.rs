@@ -7,8 +7,8 @@ use sidestep::experiment::sweep::Setting;
 use sidestep::kernel::{InputError, Simulation};
 use sidestep::scenario::Source;
 use sidestep::statistics::{Interval, wilson};
+use sidestep::worlds::airspace::airspace_run;
 use sidestep::worlds::airspace::metrics::Metrics;
-use sidestep::worlds::airspace::simulation::AirspaceSimulation;
 use sidestep::worlds::airspace::world::Method;
 use sidestep_document::{Estimate, Table};
 
@@ -69,12 +69,12 @@ pub fn compare(
 
 /// One run to its end.
 fn flown(source: &Source) -> Result<Metrics, InputError> {
-    let mut run = AirspaceSimulation::new(source, 1)?;
-    let cycles = run.compiled().cycles;
+    let mut run = airspace_run(source, 1)?;
+    let cycles = run.plan().cycles;
     while run.cycle() < cycles && !run.is_over() {
         run.advance(cycles - run.cycle());
     }
-    Ok(run.airspace_metrics())
+    Ok(run.metrics())
 }
 
 fn result(method: &'static str, all: &[Metrics]) -> MethodResult {

@@ -10,6 +10,7 @@ use sidestep::experiment::sweep::{
 };
 use sidestep::kernel::{Cycle, InputError, Simulation};
 use sidestep::scenario::Source;
+use sidestep::worlds::WORLDS;
 
 /// Told how far an experiment is: what is being done, and the share done, from 0 to 1.
 pub type Progress<'a> = dyn FnMut(&str, f64) + 'a;
@@ -124,7 +125,7 @@ impl Study {
         progress: &mut Progress<'_>,
     ) -> Result<Results, InputError> {
         self.run_by((workers, what), progress, |scenario, _, cell| {
-            let run = start(*cell, &scenario()?, 1)?;
+            let run = start(WORLDS, *cell, &scenario()?, 1)?;
             Ok(run.run(&|| true).expect("nobody stops it"))
         })
     }
@@ -194,8 +195,9 @@ pub(crate) fn outcome(cell: &Cell, values: Value) -> Outcome {
 }
 
 /// Runs a simulation to its end, and tells `look` of every cycle.
-pub(crate) fn finish<S: Simulation>(run: &mut S, cycles: Cycle, mut look: impl FnMut(&S)) {
-    while run.cycle() < cycles && !run.is_over() {
+pub(crate) fn finish<S: Simulation>(run: &mut S, mut look: impl FnMut(&S)) {
+    let until = run.plan().cycles;
+    while run.cycle() < until && !run.is_over() {
         run.advance(1);
         look(run);
     }

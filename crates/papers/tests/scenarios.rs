@@ -2,7 +2,7 @@
 
 use sidestep::experiment::sweep::{Setting, Sweep};
 use sidestep::scenario::Source;
-use sidestep::worlds::any::AnyCompiled;
+use sidestep::worlds::WORLDS;
 use std::path::{Path, PathBuf};
 
 fn files(folder: &Path) -> Vec<PathBuf> {
@@ -22,14 +22,14 @@ fn every_scenario_compiles_and_so_do_the_variants_of_every_sweep() {
     for path in all {
         if !is_sweep(&path) {
             let source = Source::read(&path, &[]).expect("readable");
-            AnyCompiled::new(&source).expect("a right scenario");
+            WORLDS.compile(&source).expect("a right scenario");
             continue;
         }
         let sweep = Sweep::read(&path).expect("a right sweep");
         for settings in sweep.design.variants(&sweep.place).expect("right variants") {
             let overrides: Vec<String> = settings.iter().map(Setting::to_override).collect();
             let source = Source::read(&sweep.scenario, &overrides).expect("settings that fit");
-            AnyCompiled::new(&source).expect("a right variant");
+            WORLDS.compile(&source).expect("a right variant");
         }
     }
 }

@@ -65,7 +65,7 @@ fn every_kind() -> Vec<Figure> {
 }
 
 /// The page without the scripts at its end.
-fn before_library(html: &str) -> &str {
+fn before_scripts(html: &str) -> &str {
     html.split("<script>").next().unwrap()
 }
 
@@ -83,7 +83,7 @@ fn every_figure_and_picture_is_a_file_and_is_shown_by_both() {
         assert!(picture.svg.contains("<svg"), "{}", picture.stem);
         assert!(markdown.contains(&format!("(figures/{}.svg)", picture.stem)), "{markdown}");
     }
-    let own = before_library(&html);
+    let own = before_scripts(&html);
     assert_eq!(own.matches("data:image/svg+xml").count(), 6);
     assert_eq!(own.matches("<figure class=\"plot\"").count(), 5);
     assert_eq!(own.matches("application/json").count(), 5);
@@ -92,9 +92,9 @@ fn every_figure_and_picture_is_a_file_and_is_shown_by_both() {
 #[test]
 fn words_stay_words_in_html() {
     let html = render(&whole(), "figures").unwrap().html;
-    let own = before_library(&html);
+    let own = before_scripts(&html);
     assert!(!own.contains("<img src=x") && !own.contains("</script><img"));
-    // Of scripts: one for each figure, the library's and the page's own.
+    // Of scripts: one for each figure, the figures' and the page's own.
     assert_eq!(html.matches("</script>").count(), 5 + 2);
     assert!(own.contains("&lt;/script&gt;&lt;img src=x onerror=alert(1)&gt;"));
     assert!(own.contains("<strong>Mind</strong> the <code>gap</code>"));
@@ -129,7 +129,7 @@ fn claims_stand_with_the_papers_figure_beside_ours_and_a_verdict_in_words() {
 #[test]
 fn a_page_is_accessible_and_forbids_the_network() {
     let html = render(&whole(), "figures").unwrap().html;
-    let own = before_library(&html);
+    let own = before_scripts(&html);
     for part in [
         "<html lang=\"en\">",
         "default-src 'none'",
@@ -147,9 +147,10 @@ fn a_page_is_accessible_and_forbids_the_network() {
 }
 
 #[test]
-fn a_report_without_figures_carries_no_library() {
+fn a_report_without_figures_carries_no_script_for_them() {
     let rendered = render(&Document::new("T", "Nothing more."), "figures").unwrap();
-    assert!(rendered.html.len() < 40_000, "{}", rendered.html.len());
+    assert!(rendered.html.len() < 20_000, "{}", rendered.html.len());
+    assert!(!rendered.html.contains("figure.plot\""));
     assert_eq!(rendered.markdown, "# T\n\nNothing more.\n");
     assert!(rendered.pictures.is_empty());
 }

@@ -1,15 +1,16 @@
 //! Speed of the robots world: robot-cycles per CPU second, speed-up, and their like.
 //!
-//! `cargo bench -p sidestep --bench robots [-- PART ...]` with the parts `rates`, `teams`,
+//! `cargo bench -p sidestep [-- PART ...]` with the parts `rates`, `teams`,
 //! `corridor`, `loop` and `recording`; every figure is a ratio or a rate taken
 //! in one run, since the machine may be noisy. Sensors and effectors are both unreliable.
 
 use cpu_time::ProcessTime;
 use sidestep::scenario::Source;
-use sidestep::worlds::robots::simulation::RobotsSimulation;
+use sidestep::worlds::robots::run::heap_bytes;
+use sidestep::worlds::robots::{RobotsRun, RobotsWorld, robots_run};
 use sidestep_kernel::conflict::Groups;
-use sidestep_kernel::ports::Recorder;
-use sidestep_kernel::{Simulation, World};
+use sidestep_kernel::ports::{Recorder, SystemClock};
+use sidestep_kernel::{Phases, Simulation, Turn};
 use sidestep_record::{Origin, ParquetRecorder};
 use std::time::Instant;
 
@@ -75,8 +76,8 @@ beyond = [0.1, 0.3, 0.6]
         Source::new(self.name, text, "")
     }
 
-    fn simulation(&self, workers: usize) -> RobotsSimulation {
-        RobotsSimulation::new(&self.scenario(), workers).expect("the case is a valid scenario")
+    fn simulation(&self, workers: usize) -> RobotsRun {
+        robots_run(&self.scenario(), workers).expect("the case is a valid scenario")
     }
 
     /// Cycles that take about a second.
@@ -86,14 +87,14 @@ beyond = [0.1, 0.3, 0.6]
 }
 
 /// CPU and wall seconds of `cycles` cycles.
-fn time(simulation: &mut RobotsSimulation, cycles: u64) -> (f64, f64) {
+fn time(simulation: &mut RobotsRun, cycles: u64) -> (f64, f64) {
     let (cpu, wall) = (ProcessTime::now(), Instant::now());
     advance(simulation, cycles);
     (cpu.elapsed().as_secs_f64(), wall.elapsed().as_secs_f64())
 }
 
 /// Advances over recording buffers too.
-fn advance(simulation: &mut RobotsSimulation, cycles: u64) {
+fn advance(simulation: &mut RobotsRun, cycles: u64) {
     let mut done = 0;
     while done < cycles {
         done += simulation.advance(cycles - done);
@@ -117,8 +118,8 @@ fn median_of(n: usize, ratio: impl FnMut() -> f64) -> f64 {
 
 /// Median of wall(1 worker) / wall(`workers`), taken in turn.
 fn speed_up(source: &Source, workers: usize, cycles: u64) -> f64 {
-    let mut alone = RobotsSimulation::new(source, 1).expect("a valid scenario");
-    let mut team = RobotsSimulation::new(source, workers).expect("a valid scenario");
+    let mut alone = robots_run(source, 1).expect("a valid scenario");
+    let mut team = robots_run(source, workers).expect("a valid scenario");
     for simulation in [&mut alone, &mut team] {
         time(simulation, cycles / 4);
     }
@@ -129,7 +130,7 @@ fn rates() {
     println!("robot-cycles per CPU second, one worker, both unreliable (promised in brackets)");
     for case in CASES {
         let simulation = case.simulation(1);
-        let (boxes, bodies) = simulation.heap_bytes();
+        let (boxes, bodies) = heap_bytes(&simulation);
         let map_boxes = simulation.world().map.cells().len() as f64;
         let robots = f64::from(case.robots);
         let allowed = 200.0 * robots + 2.0 * map_boxes;
@@ -169,9 +170,9 @@ fn corridor() {
         );
         let source = Source::new("corridor", text, "");
         let ratio = speed_up(&source, 2, 2_000);
-        let mut run = RobotsSimulation::new(&source, 1).expect("a valid scenario");
+        let mut run = robots_run(&source, 1).expect("a valid scenario");
         advance(&mut run, 200);
-        let largest = run.robot_metrics().largest_group;
+        let largest = run.metrics().largest_group;
         println!(
             "corridor, 1000 robots on 1440 boxes, {policy}: 2 workers {ratio:.2}x, largest group {largest}"
         );
@@ -187,15 +188,17 @@ fn plain_loop() {
         let (world, state) = (plain.world().clone(), plain.state());
         let (mut scratch, groups) = (world.scratch(), Groups::new(world.bodies.len()));
         let n = world.bodies.len();
+        let clock = &SystemClock::default();
         let mut now = 0;
         let mut members = Vec::new();
         let mut plain_cycle = || {
             (0..n as u32).for_each(|slot| groups.reset(slot));
-            world.perceive_and_decide(state, now, 0..n, &mut scratch);
-            world.find_conflicts(state, now, 0..n, &groups, &mut scratch);
+            let turn = &mut Turn { world: &*world, state, now, clock, scratch: &mut scratch };
+            RobotsWorld::claim(turn, 0..n);
+            RobotsWorld::join(turn, 0..n, &groups);
             for slot in (0..n as u32).filter(|&s| groups.is_leader(s)) {
                 groups.members(slot, &mut members);
-                world.react(state, now, &mut members, &mut scratch);
+                RobotsWorld::act(turn, &mut members);
             }
             now += 1;
         };

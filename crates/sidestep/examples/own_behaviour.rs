@@ -5,7 +5,7 @@ use sidestep::scenario::Source;
 use sidestep::worlds::robots::decide::{Behaviour, Decision, Memory, Percept, Sector};
 use sidestep::worlds::robots::effector::{FORWARD, LEFT, RIGHT};
 use sidestep::worlds::robots::scenario::{Behaviours, Compiled, StorageOrder};
-use sidestep::worlds::robots::simulation::RobotsSimulation;
+
 use std::sync::Arc;
 
 const SCENARIO: &str = r#"format = 1
@@ -31,8 +31,8 @@ fn main() -> Result<(), InputError> {
     let source = Source::new("own_behaviour.rs", SCENARIO, "");
     let own = Behaviours::from([("wall".into(), Arc::new(FollowWall) as Arc<dyn Behaviour>)]);
     let compiled = Compiled::new(&source, &own, StorageOrder::Spatial)?;
-    let mut run = RobotsSimulation::from_compiled(compiled, &source, 2);
+    let mut run = compiled.start(&source, 2);
     run.advance(10_000);
-    println!("{:#}", run.metrics());
+    println!("{:#}", Simulation::metrics(&run));
     Ok(())
 }

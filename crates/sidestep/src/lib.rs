@@ -7,7 +7,7 @@
 //! ```
 //! use sidestep::kernel::Simulation;
 //! use sidestep::scenario::Source;
-//! use sidestep::worlds::robots::simulation::RobotsSimulation;
+//! use sidestep::worlds::robots::robots_run;
 //!
 //! let text = r#"
 //!     format = 1
@@ -17,15 +17,15 @@
 //!     robots = { count = 4, size = 2, sensors = ["sonar-8"], effector = "nomad" }
 //! "#;
 //! let source = Source::new("four robots", text, "");
-//! let mut run = RobotsSimulation::new(&source, 1)?;
+//! let mut run = robots_run(&source, 1)?;
 //! run.advance(500);
 //!
-//! let metrics = run.robot_metrics();
+//! let metrics = run.metrics();
 //! assert_eq!(metrics.total.actions, 4 * 500);
 //! assert!(metrics.coverage > 0.0);
 //!
 //! // The number of workers is no part of the result.
-//! let mut shared = RobotsSimulation::new(&source, 3)?;
+//! let mut shared = robots_run(&source, 3)?;
 //! shared.advance(500);
 //! assert_eq!(shared.digest(), run.digest());
 //! # Ok::<(), sidestep::kernel::InputError>(())
@@ -35,10 +35,10 @@
 //!
 //! ```
 //! use sidestep::scenario::Source;
-//! use sidestep::worlds::robots::simulation::RobotsSimulation;
+//! use sidestep::worlds::robots::robots_run;
 //!
 //! let text = "format = 1\nworld = \"robots\"\nsede = 7\n[map]\nascii = \"....\"\n[robots]\ncount = 1\n";
-//! let error = RobotsSimulation::new(&Source::new("s.toml", text, ""), 1).unwrap_err();
+//! let error = robots_run(&Source::new("s.toml", text, ""), 1).unwrap_err();
 //! assert_eq!(error.position(), Some((3, 1)));
 //! assert_eq!(error.remedy(), "did you mean `seed`?");
 //! ```
@@ -77,3 +77,22 @@ pub use sidestep_map::{Cell, GridMap, office, planning};
 pub use sidestep_robots::learn;
 pub use sidestep_scenario as scenario;
 pub use sidestep_statistics as statistics;
+
+/// The version.
+pub const VERSION: &str = env!("CARGO_PKG_VERSION");
+
+/// The build: the version and a digest over the sources that results follow from, as
+/// `0.1.0+0123456789ab`. Only the build that began a run or a sweep goes on with it.
+pub const BUILD: &str = env!("SIDESTEP_BUILD");
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_build_out_of_the_repository_has_an_identity() {
+        let digest = BUILD.strip_prefix(VERSION).and_then(|rest| rest.strip_prefix('+'));
+        let digest = digest.expect("version, plus, digest");
+        assert!(digest.len() == 12 && digest.bytes().all(|b| b.is_ascii_hexdigit()), "{BUILD}");
+    }
+}

@@ -3,9 +3,10 @@
 use crate::console::{Console, aligned};
 use crate::exit::{ExitCode, Failure};
 use crate::plan::ScenarioArgs;
-use crate::worlds;
 use clap::Args;
 use serde_json::Value;
+use sidestep::scenario::Foreign;
+use sidestep::worlds::WORLDS;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -26,26 +27,23 @@ pub(crate) struct CheckArgs {
 /// # Errors
 /// When the scenario is wrong.
 pub(crate) fn check(args: &CheckArgs, console: Console) -> Result<ExitCode, Failure> {
-    let told = worlds::told_of(&args.scenario.file)?;
-    let compiled = args.scenario.compile();
-    if compiled.is_err()
-        && let (Err(error), Some(told)) = (worlds::translated(&args.scenario.file), &told)
-    {
+    let foreign = WORLDS.translate(&args.scenario.file)?;
+    if let Some(Foreign { scenario: Err(error), json, lines }) = foreign {
         // A file of another program that can be read may be right and still hold nobody whom we
         // can place. Whatever else is wrong is wrong as in any scenario.
-        let mut json = told.json.clone();
+        let mut json = json;
         json["airplanes"] = 0.into();
         json["no_scenario"] = error.to_string().into();
-        console.result(&json, || format!("{error}\n{}", aligned(&told.lines)));
+        console.result(&json, || format!("{error}\n{}", aligned(&lines)));
         return Ok(ExitCode::Done);
     }
-    let (source, compiled) = compiled?;
-    let mut found = compiled.start(&source, 1).contents();
-    if let Some(told) = told {
-        if let (Some(all), Value::Object(more)) = (found.json.as_object_mut(), told.json) {
+    let (source, compiled) = args.scenario.compile()?;
+    let mut found = compiled.contents(&source);
+    if let Some(foreign) = foreign {
+        if let (Some(all), Value::Object(more)) = (found.json.as_object_mut(), foreign.json) {
             all.extend(more);
         }
-        found.text.push_str(&aligned(&told.lines));
+        found.text.push_str(&aligned(&foreign.lines));
     }
     let heading = format!("{} is a valid scenario\n", args.scenario.file.display());
     console.result(&found.json, || heading + &found.text);

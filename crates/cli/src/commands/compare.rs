@@ -2,10 +2,11 @@
 
 use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
-use crate::plan::{ScenarioArgs, WorkersArg};
+use crate::plan::{ScenarioArgs, WorkersArg, of_world};
 use crate::progress::Stages;
 use clap::{Args, ValueEnum};
 use serde_json::json;
+use sidestep::worlds::airspace::scenario::Compiled;
 use sidestep::worlds::airspace::world::Method;
 use sidestep_papers::methods::{compare as run_all, table};
 use sidestep_report::markdown;
@@ -64,7 +65,7 @@ impl Name {
 /// When the scenario is wrong, or of another world.
 pub(crate) fn compare(args: &CompareArgs, console: Console) -> Result<ExitCode, Failure> {
     let (source, compiled) = args.scenario.compile()?;
-    let compiled = compiled.into_airspace(&source)?;
+    let compiled: &Compiled = of_world(compiled.as_ref(), &source, "airspace")?;
     let methods: Vec<Method> = args.methods.iter().map(|name| name.method()).collect();
     let stages = Stages::new(console);
     let span = (compiled.seed, args.runs as usize);

@@ -2,13 +2,14 @@
 
 use crate::console::{Console, aligned, grouped};
 use crate::exit::{ExitCode, Failure};
-use crate::files::replace;
-use crate::plan::ScenarioArgs;
+use crate::plan::{ScenarioArgs, of_world};
 use clap::Args;
 use sidestep::kernel::InputError;
 use sidestep::worlds::robots::exact::{
     Beam, Comparison, Model, POLICIES, PomdpOptions, PomdpSize, Summary, compare, policy,
 };
+use sidestep::worlds::robots::scenario::Compiled;
+use sidestep_session::replace;
 use std::io::Write;
 use std::path::PathBuf;
 
@@ -102,13 +103,13 @@ impl ExportArgs {
 /// When the scenario is wrong or no chain, or the export cannot be written.
 pub(crate) fn exact(args: &ExactArgs, console: Console) -> Result<ExitCode, Failure> {
     let (source, compiled) = args.scenario.compile()?;
-    let compiled = compiled.into_robots(&source)?;
-    let model = Model::new(&compiled)?;
+    let compiled: &Compiled = of_world(compiled.as_ref(), &source, "robots")?;
+    let model = Model::new(compiled)?;
     let chosen = policy(&args.policy)?;
     let mut summary = model.summary(&args.policy, &chosen, args.top)?;
     if let Some(runs) = args.runs {
         let cycles = compiled.cycles;
-        summary.comparison = Some(compare(&compiled, &source, &chosen, cycles, runs)?);
+        summary.comparison = Some(compare(compiled, &source, &chosen, cycles, runs)?);
     }
     summary.pomdp = export(&model, &args.export)?;
     console.result(&summary, || text(&summary, &compiled.name));

@@ -2,14 +2,14 @@
 
 use crate::console::{Console, columns};
 use crate::exit::{ExitCode, Failure};
-use crate::picture::write_png;
-use crate::worlds::shade;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use sidestep::import::{map_file, rosmap};
 use sidestep::kernel::InputError;
+use sidestep::kernel::view::{Frame, Scenery};
 use sidestep::map::{CellCounts, GridMap, UnknownPolicy};
-use sidestep_draw::{GridScene, Style, to_svg};
+use sidestep_draw::{Options, draw};
+use sidestep_session::write_png;
 use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
@@ -87,7 +87,7 @@ struct Counts {
 pub(crate) fn map(args: &MapArgs, console: Console) -> Result<ExitCode, Failure> {
     let (counts, map) = read(args)?;
     if let Some(png) = &args.png {
-        draw(&map, &args.file, png)?;
+        draw_boxes(&map, &args.file, png)?;
     }
     let width = args.width.unwrap_or_else(columns);
     console.result(&counts, || map.to_text(width.into()) + &words(&counts));
@@ -155,16 +155,16 @@ fn words(c: &Counts) -> String {
     )
 }
 
-fn draw(map: &GridMap, file: &Path, png: &Path) -> Result<(), Failure> {
-    let scene = GridScene {
-        width: map.width(),
-        height: map.height(),
-        box_size_m: map.box_size_m,
-        origin_m: map.origin_m,
-        cells: map.cells().iter().map(|&cell| shade(cell)).collect(),
-        title: file.file_name().unwrap_or_default().display().to_string(),
-        caption: format!("{} x {} boxes of {} m", map.width(), map.height(), map.box_size_m),
-        ..GridScene::default()
+fn draw_boxes(map: &GridMap, file: &Path, png: &Path) -> Result<(), Failure> {
+    let scenery = Scenery {
+        name: file.file_name().unwrap_or_default().display().to_string(),
+        dimensions: 2,
+        cycle_s: 1.0,
+        floor: Some(map.floor()),
+        bodies: Vec::new(),
+        names: Vec::new(),
     };
-    write_png(png, &to_svg(&scene, &Style::MAP)?)
+    let caption = format!("{} x {} boxes of {} m", map.width(), map.height(), map.box_size_m);
+    let svg = draw(&scenery, &Frame::default(), &[], &Options::page(&scenery, caption))?;
+    write_png(png, &svg)
 }

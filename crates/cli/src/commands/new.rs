@@ -2,9 +2,12 @@
 
 use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser};
 use serde_json::json;
 use sidestep::kernel::InputError;
+use sidestep::scenario::Kind;
+use sidestep::worlds::WORLDS;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -19,41 +22,18 @@ Examples:
 #[command(after_help = EXAMPLES)]
 pub(crate) struct NewArgs {
     /// The world
-    #[arg(value_name = "WORLD")]
-    world: World,
+    #[arg(value_name = "WORLD", value_parser = worlds())]
+    world: String,
 
     /// The file to write; an existing one is left alone [default: WORLD.toml]
     #[arg(value_name = "NAME.toml")]
     file: Option<PathBuf>,
 }
 
-/// Worlds with a scenario to begin with.
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum World {
-    /// Stochastic robots on a grid
-    Robots,
-    /// Airplanes that avoid each other
-    Airspace,
-    /// Chains that creep among obstacles
-    Chain,
-}
-
-impl World {
-    fn name(self) -> &'static str {
-        match self {
-            Self::Robots => "robots",
-            Self::Airspace => "airspace",
-            Self::Chain => "chain",
-        }
-    }
-
-    fn scenario(self) -> &'static str {
-        match self {
-            Self::Robots => include_str!("../../../../scenarios/robots/default.toml"),
-            Self::Airspace => include_str!("../../../../scenarios/airspace/default.toml"),
-            Self::Chain => include_str!("../../../../scenarios/chain/default.toml"),
-        }
-    }
+/// The names of the worlds, each with what it simulates.
+fn worlds() -> PossibleValuesParser {
+    let named = |kind: &&dyn Kind| PossibleValue::new(kind.name()).help(kind.about());
+    PossibleValuesParser::new(WORLDS.0.iter().map(named))
 }
 
 /// Runs the command.
@@ -61,11 +41,12 @@ impl World {
 /// # Errors
 /// When the file is there already or cannot be written.
 pub(crate) fn new(args: &NewArgs, console: Console) -> Result<ExitCode, Failure> {
-    let default = || PathBuf::from(format!("{}.toml", args.world.name()));
+    let kind = WORLDS.named(&args.world).expect("the parser takes these names alone");
+    let default = || PathBuf::from(format!("{}.toml", kind.name()));
     let path = args.file.clone().unwrap_or_else(default);
-    write_new(&path, args.world.scenario())?;
+    write_new(&path, kind.default_scenario())?;
     let next = format!("Try: sidestep check {0}; sidestep run {0}\n", path.display());
-    let json = json!({ "file": path, "world": args.world.name() });
+    let json = json!({ "file": path, "world": args.world });
     console.result(&json, || format!("Wrote {}. {next}", path.display()));
     Ok(ExitCode::Done)
 }

@@ -4,29 +4,102 @@
   addEventListener("error", (event) => found.errors.push(event.message));
   addEventListener("unhandledrejection", (event) => found.errors.push(String(event.reason)));
   addEventListener("securitypolicyviolation", (event) =>
-    found.violations.push(`${event.violatedDirective} ${event.blockedURI}`));
+    found.violations.push(`${event.violatedDirective} ${event.blockedURI}`),
+  );
   const all = (selector) => [...document.querySelectorAll(selector)];
   const later = (ms) => new Promise((done) => setTimeout(done, ms));
 
+  // What a mouse sends to the element at a place of the window.
+  function send(element, [clientX, clientY], ...kinds) {
+    const at = {
+      bubbles: true,
+      cancelable: true,
+      clientX,
+      clientY,
+      button: 0,
+      pointerType: "mouse",
+    };
+    for (const kind of kinds) {
+      const Kind = kind.startsWith("pointer") ? PointerEvent : MouseEvent;
+      element.dispatchEvent(new Kind(kind, at));
+    }
+  }
+
   async function press(element) {
     const box = element.getBoundingClientRect();
-    const at = { bubbles: true, cancelable: true, clientX: box.x + 2, clientY: box.y + 2 };
-    for (const kind of ["mousemove", "mousedown", "mouseup", "click"]) {
-      element.dispatchEvent(new MouseEvent(kind, at));
-    }
-    // A legend waits whether a second click follows.
-    await later(1000);
+    send(element, [box.x + 2, box.y + 2], "pointermove", "pointerdown", "pointerup", "click");
+    await later(100);
+  }
+
+  // The place in the window of the first mark of a figure.
+  function firstMark(plot) {
+    const mark = plot.querySelector(".series .marker, .series .bar, .series .line");
+    if (!mark) return null;
+    const box = mark.getBoundingClientRect();
+    if (mark.matches(".bar")) return [box.x + box.width / 2, box.y + 1];
+    if (mark.matches(".marker")) return [box.x + box.width / 2, box.y + box.height / 2];
+    const chart = plot.querySelector(".chart").getBoundingClientRect();
+    const start = mark.getPointAtLength(0);
+    return [chart.x + start.x, chart.y + start.y];
+  }
+
+  // What a figure says when the mouse is at its first mark.
+  function hover(plot) {
+    const at = firstMark(plot);
+    if (at) send(plot.querySelector(".chart"), at, "pointermove");
+    return plot.querySelector(".tip:not([hidden])")?.textContent ?? "";
+  }
+
+  const ticks = (plot) =>
+    [...plot.querySelectorAll(".tick")].map((tick) => tick.textContent).join(" ");
+
+  // Words at the axes of a figure that touch others or are cut off by its edge.
+  function spoiled(plot) {
+    const edge = plot.querySelector(".chart").getBoundingClientRect();
+    const words = [...plot.querySelectorAll(".tick")].map((tick) => [
+      tick.textContent,
+      tick.getBoundingClientRect(),
+    ]);
+    const isCut = ([, box]) =>
+      box.left < edge.left - 1 || box.right > edge.right + 1 || box.bottom > edge.bottom + 1;
+    const touch = ([, a], [, b]) =>
+      Math.min(a.right, b.right) - Math.max(a.left, b.left) > 1 &&
+      Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 2;
+    return words
+      .filter((word, k) => isCut(word) || words.slice(k + 1).some((other) => touch(word, other)))
+      .map(([word]) => word);
+  }
+
+  // Drags across the middle of a figure, and says what came of it and of a double click.
+  function zoom(plot) {
+    const chart = plot.querySelector(".chart");
+    const box = chart.getBoundingClientRect();
+    const at = (part) => [box.x + part * box.width, box.y + part * box.height];
+    const whole = ticks(plot);
+    send(chart, at(0.4), "pointermove", "pointerdown");
+    send(chart, at(0.5), "pointermove");
+    const isMarked = plot.querySelector(".selection").getAttribute("visibility") === "visible";
+    send(chart, at(0.6), "pointermove", "pointerup", "click");
+    const isZoomed = isMarked && ticks(plot) !== whole;
+    send(chart, at(0.5), "dblclick");
+    return [isZoomed, ticks(plot) === whole];
   }
 
   async function look() {
     const plots = all(".plot .drawn");
-    for (let k = 0; k < 300 && all(".plot").length !== Number(document.documentElement.dataset.drawn ?? 0); k += 1) {
+    for (
+      let k = 0;
+      k < 300 && all(".plot").length !== Number(document.documentElement.dataset.drawn ?? 0);
+      k += 1
+    ) {
       await later(100);
     }
     found.figures = all("figure.plot").length;
-    found.drawn = plots.filter((plot) => plot.querySelector(".main-svg")).length;
+    found.drawn = plots.filter((plot) => plot.querySelector(".chart .frame")).length;
     found.stills_shown = all(".plot .still").filter((still) => !still.hidden).length;
-    found.traces = plots.map((plot) => plot.data?.length ?? 0);
+    found.series = plots.map((plot) => plot.querySelectorAll(".series").length);
+    found.spoiled = plots.flatMap(spoiled);
+    found.silent = plots.filter((plot) => firstMark(plot) && hover(plot) === "").length;
     found.pictures = all(".picture img").map((picture) => picture.naturalWidth);
     found.tables = all("table").length;
     found.captions = all("caption").map((caption) => caption.textContent);
@@ -45,19 +118,23 @@
         found.sorted.push(column());
       }
     }
-    const plot = plots.find((each) => each.data?.length > 1 && each.querySelector(".legendtoggle"));
+    const plot = plots.find(
+      (each) => each.querySelectorAll(".series").length > 1 && each.querySelector(".entry"),
+    );
     if (plot) {
-      const point = plot.data.findIndex((trace) => trace.x.length > 0);
-      window.Plotly.Fx.hover(plot, [{ curveNumber: point, pointNumber: 0 }]);
-      await later(300);
-      found.hover = plot.querySelector(".hoverlayer")?.textContent ?? "";
-      await press(plot.querySelector(".legendtoggle"));
-      found.hidden_by_legend = plot.data.filter((trace) => trace.visible === "legendonly").length;
-      await window.Plotly.relayout(plot, { "xaxis.range": [0, 1] });
-      found.zoomed = plot.layout.xaxis.autorange === false || plot.layout.xaxis.range[1] === 1;
+      found.hover = hover(plot);
+      [found.zoomed, found.whole_again] = zoom(plot);
+      const count = () => plot.querySelectorAll(".series").length;
+      const before = count();
+      await press(plot.querySelector(".entry"));
+      found.hidden_by_legend = before - count();
+      await press(plot.querySelector(".entry"));
+      found.shown_again = count() === before;
     }
     // A page of its own makes none.
-    found.requests = performance.getEntriesByType("resource").map((entry) => entry.name)
+    found.requests = performance
+      .getEntriesByType("resource")
+      .map((entry) => entry.name)
       .filter((name) => !name.startsWith("data:"));
     const script = document.createElement("script");
     script.type = "application/json";
@@ -66,8 +143,10 @@
     document.body.append(script);
   }
 
-  addEventListener("load", () => look().catch((error) => {
-    document.title = `probe failed: ${error}`;
-    console.error(error);
-  }));
+  addEventListener("load", () =>
+    look().catch((error) => {
+      document.title = `probe failed: ${error}`;
+      console.error(error);
+    }),
+  );
 })();

@@ -15,6 +15,7 @@ mod help;
 mod ik;
 mod input;
 mod learn;
+mod pictures;
 mod readers;
 mod report;
 mod reproduce;

@@ -15,6 +15,9 @@ const CHAIN: &str = "format = 1\nworld = \"chain\"\nname = \"Wanderer\"\nseed = 
                      radius_m = 0.05\n\
                      [[chains.tasks]]\nkind = \"wander\"\nspeed_m_s = 0.6\n";
 
+/// A page heavier than this is not one to send around.
+const MOST_BYTES: usize = 400_000;
+
 /// A place with a recorded run of each world and its report.
 fn reported(scenario: &str) -> Place {
     let place = Place::new();
@@ -36,6 +39,7 @@ fn a_run_of_every_world_becomes_a_page_and_its_twin() {
             assert!(text.contains(words), "{words}: {text}");
         }
         assert!(!text.contains("not complete") && !text.contains("NaN"), "{text}");
+        assert!(place.read("r/report.html").len() < MOST_BYTES, "{name}");
         let pictures = names(&place.path("r/report-figures"));
         for picture in &pictures {
             assert!(text.contains(&format!("(report-figures/{picture})")), "{picture}");
@@ -91,6 +95,7 @@ fn a_sweep_becomes_a_page_with_intervals_figures_and_pictures() {
         assert!(text.to_lowercase().contains(&words.to_lowercase()), "{words}: {text}");
     }
     assert!(text.contains("sidestep run d/variants/0000/scenario.toml --seed 5"), "{text}");
+    assert!(place.read("d/report.html").len() < MOST_BYTES);
     let Some(browser) = chromium() else { return };
     let found = assert_sound(&browser, &place.path("d/report.html"));
     assert_eq!(

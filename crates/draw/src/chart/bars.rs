@@ -148,8 +148,8 @@ impl BarChart {
 
     fn legend(&self) -> Vec<Entry> {
         let entry = |(index, series): (usize, &BarSeries)| {
-            let fill = series_color(index);
-            Entry::new(Symbol::Swatch { fill, rim: "none", opacity: 1.0 }, &series.label)
+            let (fill, rim) = (series_color(index).into(), "none".into());
+            Entry::new(Symbol::Swatch { fill, rim, opacity: 1.0 }, &series.label)
         };
         self.series.iter().enumerate().map(entry).collect()
     }

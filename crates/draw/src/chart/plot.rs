@@ -200,13 +200,14 @@ impl Plot {
             let symbol = match series.mark {
                 Mark::Points => Symbol::Marker { color, marker },
                 Mark::Line | Mark::Band => {
-                    Symbol::Line { color, marker: series.shows_markers().then_some(marker) }
+                    let marker = series.shows_markers().then_some(marker);
+                    Symbol::Line { color: color.into(), marker }
                 }
             };
             Entry::new(symbol, &series.label)
         });
-        let dashes = Symbol::Dashes { color: FAINT_INK };
-        series.chain(self.ideals.iter().map(|ideal| Entry::new(dashes, &ideal.label))).collect()
+        let ideal = |label| Entry::new(Symbol::Dashes { color: FAINT_INK }, label);
+        series.chain(self.ideals.iter().map(|line| ideal(&line.label))).collect()
     }
 
     fn draw_series(

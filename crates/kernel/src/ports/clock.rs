@@ -1,11 +1,15 @@
 //! Elapsed time for progress and phase times; never an input of a simulation.
 
+use cpu_time::ThreadTime;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// A monotonic clock.
 pub trait Clock: Sync {
     /// Nanoseconds since some fixed moment; never decreases.
     fn now_ns(&self) -> u64;
+
+    /// Processor time of the calling thread in nanoseconds; never decreases.
+    fn thread_cpu_ns(&self) -> u64;
 }
 
 /// The machine's monotonic clock.
@@ -23,6 +27,10 @@ impl Clock for SystemClock {
     fn now_ns(&self) -> u64 {
         u64::try_from(self.0.elapsed().as_nanos()).unwrap_or(u64::MAX)
     }
+
+    fn thread_cpu_ns(&self) -> u64 {
+        u64::try_from(ThreadTime::now().as_duration().as_nanos()).unwrap_or(u64::MAX)
+    }
 }
 
 /// A clock that a test moves by hand.
@@ -39,6 +47,10 @@ impl ManualClock {
 impl Clock for ManualClock {
     fn now_ns(&self) -> u64 {
         self.0.load(Ordering::Relaxed)
+    }
+
+    fn thread_cpu_ns(&self) -> u64 {
+        self.now_ns()
     }
 }
 

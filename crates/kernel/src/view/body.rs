@@ -1,6 +1,7 @@
 //! Bodies: what they are, where, and what they look like.
 
 use super::pose::{Place, Pose};
+use super::trails::Who;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -19,12 +20,22 @@ pub struct Body {
     pub shape: Shape,
     /// How it is.
     pub state: Condition,
+    /// Where it is carried, of things that do not act; zero for those that stand still.
+    pub velocity_m_s: Place,
 }
 
 impl Body {
     /// A body without parts, in order.
     pub fn new(kind: Kind, number: u32, pose: Pose, shape: Shape) -> Self {
-        Self { kind, number, part: None, pose, shape, state: Condition::Plain }
+        Self {
+            kind,
+            number,
+            part: None,
+            pose,
+            shape,
+            state: Condition::Plain,
+            velocity_m_s: [0.0; 3],
+        }
     }
 
     /// The same as a part of a larger thing.
@@ -37,6 +48,22 @@ impl Body {
     #[must_use]
     pub fn when(self, is_so: bool, state: Condition) -> Self {
         if is_so { Self { state, ..self } } else { self }
+    }
+
+    /// The same, carried along.
+    #[must_use]
+    pub fn moving(self, velocity_m_s: Place) -> Self {
+        Self { velocity_m_s, ..self }
+    }
+
+    /// Whether it is carried along.
+    pub fn moves(&self) -> bool {
+        self.velocity_m_s != [0.0; 3]
+    }
+
+    /// Which body it is.
+    pub fn who(&self) -> Who {
+        (self.kind, self.number, self.part)
     }
 
     /// A name that it keeps during the run, such as `robot/3` or `connector/0/7`.
@@ -70,6 +97,8 @@ pub enum Kind {
     Obstacle,
     /// A place to go to.
     Goal,
+    /// A place to come from.
+    Start,
 }
 
 impl Kind {
@@ -85,6 +114,7 @@ impl Kind {
             Self::Zone => "zone",
             Self::Obstacle => "obstacle",
             Self::Goal => "goal",
+            Self::Start => "start",
         }
     }
 

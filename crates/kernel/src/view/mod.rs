@@ -4,13 +4,17 @@
 //! computed from the state when somebody asks; looking never changes a run. Lengths are meters,
 //! x runs east, y north and z up; angles are radians, counter-clockwise.
 
+mod appearance;
 mod body;
 mod log;
 mod pose;
+mod trails;
 
+pub use appearance::{ALERT, Appearance, COLORS, Color, DOOR, MOBILE, UNKNOWN, WALL, color_of};
 pub use body::{Body, Condition, Kind, Shape};
 pub use log::{Entry, Level, Log};
 pub use pose::{Place, Pose};
+pub use trails::{Axis, PlaceRows, Trail, Who, corner};
 
 use crate::units::Cycle;
 use serde::{Deserialize, Serialize};
@@ -28,6 +32,8 @@ pub struct Scenery {
     pub floor: Option<Floor>,
     /// Walls, obstacles that stand still, places to go to.
     pub bodies: Vec<Body>,
+    /// Names of things that have one of their own, by kind and number.
+    pub names: Vec<(Kind, u32, String)>,
 }
 
 /// A floor of square boxes along the axes.
@@ -58,7 +64,7 @@ pub enum Occupancy {
 }
 
 /// The present moment.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Frame {
     /// Cycles done: this is how things are at the beginning of this cycle.
     pub cycle: Cycle,
@@ -90,7 +96,7 @@ impl Look {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Scan {
     /// Whose: kind, number and part of a body of the frame.
-    pub of: (Kind, u32, Option<u32>),
+    pub of: Who,
     /// The sensor's name.
     pub sensor: String,
     /// Where the sensor is and where its bearing 0 looks.

@@ -31,7 +31,7 @@ use serde::Serialize;
 use sidestep::kernel::Simulation;
 use sidestep::statistics::Interval;
 use sidestep::statistics::least_squares::Fit;
-use sidestep::worlds::robots::simulation::RobotsSimulation;
+use sidestep::worlds::robots::RobotsRun;
 use sidestep_document::figure::Point as FigurePoint;
 use sidestep_document::{Figure, FigureKind, Series, Table};
 use std::sync::Arc;
@@ -301,14 +301,14 @@ fn measure(load: &Load, robot_cycles: u64) -> Point {
     }
 }
 
-fn advance(run: &mut RobotsSimulation, cycles: u64) {
+fn advance(run: &mut RobotsRun, cycles: u64) {
     let mut done = 0;
     while done < cycles {
         done += run.advance(cycles - done);
     }
 }
 
-fn totals(run: &RobotsSimulation) -> Totals {
+fn totals(run: &RobotsRun) -> Totals {
     let times = run.phase_times();
     // A step enters a row of boxes and leaves one; bodies that move are square.
     let boxes = run.state().bodies.iter().map(|body| {
@@ -316,9 +316,9 @@ fn totals(run: &RobotsSimulation) -> Totals {
         f64::from(2 * body.moves.get()) * f64::from(side)
     });
     Totals {
-        first_ns: times.perceive_decide_ns as f64,
-        second_ns: (times.conflicts_ns + times.react_ns) as f64,
-        alone: run.robot_metrics().group_sizes.first().copied().unwrap_or(0) as f64,
+        first_ns: times.claim_ns as f64,
+        second_ns: (times.join_ns + times.act_ns) as f64,
+        alone: run.metrics().group_sizes.first().copied().unwrap_or(0) as f64,
         boxes: boxes.sum(),
     }
 }

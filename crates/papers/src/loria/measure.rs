@@ -7,10 +7,10 @@ use serde::Serialize;
 use sidestep::kernel::Simulation;
 use sidestep::kernel::ports::{MemoryRecorder, Values};
 use sidestep::scenario::Source;
+use sidestep::worlds::robots::RobotsRun;
 use sidestep::worlds::robots::baseline::breach;
 use sidestep::worlds::robots::effector::ObstacleRule;
 use sidestep::worlds::robots::scenario::{Behaviours, Compiled, StorageOrder};
-use sidestep::worlds::robots::simulation::RobotsSimulation;
 use sidestep::worlds::robots::world::Regime;
 use std::convert::Infallible;
 use std::sync::Arc;
@@ -172,11 +172,11 @@ pub(super) fn recorded(
     behaviours: &Behaviours,
     seed: u64,
     cycles: u64,
-) -> (RobotsSimulation, Vec<Track>) {
+) -> (RobotsRun, Vec<Track>) {
     let source = variant.source(seed);
     let compiled = Compiled::new(&source, behaviours, StorageOrder::Spatial)
         .expect("the experiments' scenarios are valid");
-    let mut simulation = RobotsSimulation::from_compiled(compiled, &source, 1);
+    let mut simulation = compiled.start(&source, 1);
     let tracks = record(&mut simulation, cycles);
     (simulation, tracks)
 }
@@ -185,7 +185,7 @@ pub(super) fn recorded(
 pub(super) type Track = Vec<(u32, u32, u8)>;
 
 /// Runs and keeps the poses of the robots, by entity id.
-fn record(simulation: &mut RobotsSimulation, cycles: u64) -> Vec<Track> {
+fn record(simulation: &mut RobotsRun, cycles: u64) -> Vec<Track> {
     simulation.begin_recording();
     let schemas = simulation.schemas();
     let mut tracks = vec![Track::with_capacity(cycles as usize); simulation.agents()];
@@ -213,8 +213,8 @@ fn append(tracks: &mut [Track], recorder: &MemoryRecorder) {
     }
 }
 
-fn outcome(simulation: &RobotsSimulation, tracks: &[Track]) -> Outcome {
-    let total = simulation.robot_metrics().total;
+fn outcome(simulation: &RobotsRun, tracks: &[Track]) -> Outcome {
+    let total = simulation.metrics().total;
     let per_1000 = |n: u64| (total.actions > 0).then(|| 1e3 * n as f64 / total.actions as f64);
     let of_kind = |kind: &str| per_1000(total.contacts_by_kind.get(kind).copied().unwrap_or(0));
     Outcome {
@@ -226,7 +226,7 @@ fn outcome(simulation: &RobotsSimulation, tracks: &[Track]) -> Outcome {
         straightness: straightness(tracks),
         lateral_moves: per_1000(tracks.iter().map(|track| lateral_moves(track)).sum()),
         lawful: total.actions == simulation.cycle() * simulation.agents() as u64
-            && breach(simulation.world(), &simulation.snapshot()).is_none(),
+            && breach(simulation.world(), &simulation.saved()).is_none(),
     }
 }
 

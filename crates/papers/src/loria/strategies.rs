@@ -7,8 +7,8 @@ use crate::cells::{figure, table};
 use crate::study::Progress;
 use serde::Serialize;
 use sidestep::kernel::Simulation;
+use sidestep::worlds::robots::RobotsRun;
 use sidestep::worlds::robots::baseline::{Baseline, Strategy, breach};
-use sidestep::worlds::robots::simulation::RobotsSimulation;
 use sidestep_document::{Estimate, Figure, Series, Table};
 use std::convert::Infallible;
 
@@ -55,7 +55,7 @@ const ARITHMETIC: &str = "arithmetic";
 
 /// What takes its turn: a run under one of the three strategies, or arithmetic.
 enum Run {
-    DoublePool(Box<RobotsSimulation>),
+    DoublePool(Box<RobotsRun>),
     Baseline(Box<Baseline>),
     Arithmetic,
 }
@@ -229,7 +229,7 @@ fn contestants(plan: &Plan, load: &Load) -> Vec<Contestant> {
 /// `None` for arithmetic.
 fn judge(load: &Load, run: &Run) -> Option<(f64, f64, bool, bool)> {
     let (metrics, snapshot, share) = match run {
-        Run::DoublePool(run) => (run.robot_metrics(), run.snapshot(), 0.0),
+        Run::DoublePool(run) => (run.metrics(), run.saved(), 0.0),
         Run::Baseline(run) => (run.metrics(), run.snapshot(), run.serial_share()),
         Run::Arithmetic => return None,
     };

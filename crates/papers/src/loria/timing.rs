@@ -9,9 +9,9 @@ use sidestep::kernel::Simulation;
 use sidestep::kernel::ports::{Clock, RecordError, Recorder, SystemClock};
 use sidestep::kernel::workers;
 use sidestep::scenario::Source;
+use sidestep::worlds::robots::RobotsRun;
 use sidestep::worlds::robots::decide::Wander;
 use sidestep::worlds::robots::scenario::{Behaviours, Compiled, StorageOrder};
-use sidestep::worlds::robots::simulation::RobotsSimulation;
 use std::sync::Arc;
 
 const SMALL: &str = include_str!("../../../../scenarios/papers/loria/wander-small.toml");
@@ -78,8 +78,8 @@ impl Load {
     }
 
     /// A run at its start.
-    pub(super) fn simulation(&self, workers: usize) -> RobotsSimulation {
-        RobotsSimulation::from_compiled(self.compiled(), &self.source(), workers)
+    pub(super) fn simulation(&self, workers: usize) -> RobotsRun {
+        self.compiled().start(&self.source(), workers)
     }
 }
 
@@ -131,7 +131,7 @@ pub(super) fn arithmetic(workers: usize, robot_cycles: u64) -> f64 {
 
 /// A run, and where its rows go if it is recorded.
 pub(super) struct Timed {
-    simulation: RobotsSimulation,
+    simulation: RobotsRun,
     recorder: Option<Box<dyn Recorder>>,
 }
 
@@ -175,7 +175,7 @@ impl Timed {
     }
 
     /// The run.
-    pub(super) fn simulation(&self) -> &RobotsSimulation {
+    pub(super) fn simulation(&self) -> &RobotsRun {
         &self.simulation
     }
 

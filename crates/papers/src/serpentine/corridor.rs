@@ -7,8 +7,8 @@ use crate::study::{Progress, Study, finish, number};
 use serde::Serialize;
 use sidestep::experiment::sweep::{Outcome, Variant};
 use sidestep::kernel::InputError;
+use sidestep::worlds::chain::ChainRun;
 use sidestep::worlds::chain::scenario::Compiled;
-use sidestep::worlds::chain::simulation::ChainSimulation;
 use sidestep_document::{Figure, Table};
 
 /// The scenario.
@@ -64,7 +64,7 @@ pub(super) const ROD_VIOLATION: Column =
     column("rod_violation_m", "", |r| Value::Number(r.most("max_rod_violation_m")));
 
 /// Whether the leader's nearest wall is in the slides' band.
-fn is_in_band(run: &ChainSimulation<2>) -> bool {
+fn is_in_band(run: &ChainRun<2>) -> bool {
     let leader = run.state().body(0).chain.points()[0];
     let apart_m = run.world().obstacles.clearance_m([leader; 2], 0.0, 1.0);
     (BAND_M[0]..=BAND_M[1]).contains(&apart_m)
@@ -89,9 +89,9 @@ impl Corridor {
         let what = (plan.workers, "swarm in the corridor");
         let results = study(plan)?.run_by(what, progress, |scenario, _, cell| {
             let source = scenario()?;
-            let mut run = ChainSimulation::<2>::new(Compiled::new(&source)?, &source, 1);
-            let (mut in_band, cycles) = (0_u64, run.compiled().cycles);
-            finish(&mut run, cycles, |run| in_band += u64::from(is_in_band(run)));
+            let mut run = Compiled::<2>::new(&source)?.start(&source, 1);
+            let mut in_band = 0_u64;
+            finish(&mut run, |run| in_band += u64::from(is_in_band(run)));
             let mut outcome = Outcome::of(*cell, &run);
             outcome.metrics.insert("in_band".into(), in_band.into());
             outcome.metrics.insert("way_m".into(), run.state().body(0).tally.way_m.into());

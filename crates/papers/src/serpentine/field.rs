@@ -11,6 +11,7 @@ use sidestep::experiment::sweep::{Setting, Variant, start};
 use sidestep::kernel::InputError;
 use sidestep::kernel::math::{cos, sin};
 use sidestep::kernel::stream::Draws;
+use sidestep::worlds::WORLDS;
 use sidestep::worlds::chain::geometry::{Point, distance};
 use sidestep_document::{Figure, Table};
 use std::f64::consts::TAU;
@@ -116,7 +117,7 @@ impl Fields {
             .sized(plan.field_seeds, Some(plan.field_cycles));
         let results =
             study.run_with((plan.workers, "open field"), progress, settings, |source, cell| {
-                Ok(start(*cell, source, 1)?.run(&|| true).expect("nobody stops it"))
+                Ok(start(WORLDS, *cell, source, 1)?.run(&|| true).expect("nobody stops it"))
             })?;
         Ok(Self { cells: COLUMNS.cells(&results) })
     }

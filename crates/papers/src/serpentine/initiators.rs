@@ -10,7 +10,6 @@ use sidestep::kernel::distr::normal;
 use sidestep::kernel::stream::Draws;
 use sidestep::worlds::chain::geometry::{Point, along, distance, unit};
 use sidestep::worlds::chain::scenario::Compiled;
-use sidestep::worlds::chain::simulation::ChainSimulation;
 use sidestep::worlds::chain::{
     BEND_TOLERANCE_RAD, Chain, Connector, Mobility, Obstacles, Outcome, Propagator, Reason,
     Request, Rod,
@@ -158,10 +157,9 @@ fn told(seed: u64) -> Result<bool, InputError> {
         FAILING,
         &[setting("chains.changes.connector", failing as i64), setting("seed", seed as i64)],
     )?;
-    let mut run = ChainSimulation::<2>::new(Compiled::new(&source)?, &source, 1);
-    let cycles = run.compiled().cycles;
-    finish(&mut run, cycles, |_| ());
-    let metrics = run.chain_metrics();
+    let mut run = Compiled::<2>::new(&source)?.start(&source, 1);
+    finish(&mut run, |_| ());
+    let metrics = run.metrics();
     let by_it = metrics.given_up.iter().map(|given_up| {
         let what = &given_up.what;
         what.by == Some(failing as u32) && what.reason.as_deref() == Some(Reason::Failed.name())

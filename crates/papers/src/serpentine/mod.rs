@@ -23,7 +23,7 @@ mod postures;
 mod pushing;
 mod rotation;
 mod scaling;
-pub mod scenes;
+mod scenes;
 mod snake;
 
 use crate::study::{Progress, stage};
@@ -183,7 +183,7 @@ pub struct Report {
     pub claims: Vec<Claim>,
     /// Pictures of bodies: no numbers of them are kept.
     #[serde(skip)]
-    pub scenes: Vec<scenes::Scene>,
+    pub scenes: Vec<crate::Scene>,
 }
 
 /// Runs all experiments.

@@ -9,7 +9,6 @@ use serde::Serialize;
 use sidestep::experiment::sweep::Outcome;
 use sidestep::kernel::InputError;
 use sidestep::worlds::chain::scenario::Compiled;
-use sidestep::worlds::chain::simulation::ChainSimulation;
 use sidestep_document::figure::Point;
 use sidestep_document::{Figure, Series, Table};
 
@@ -61,15 +60,15 @@ impl Rotations {
         let what = (plan.workers, "rules of rotation");
         let results = study(plan)?.run_by(what, progress, |scenario, _, cell| {
             let source = scenario()?;
-            let mut run = ChainSimulation::<2>::new(Compiled::new(&source)?, &source, 1);
-            let (mut furthest, cycles) = (0.0_f64, run.compiled().cycles);
-            finish(&mut run, cycles, |run| {
+            let mut run = Compiled::<2>::new(&source)?.start(&source, 1);
+            let mut furthest = 0.0_f64;
+            finish(&mut run, |run| {
                 let body = run.state().body(0);
                 if body.driving.task == 0 {
                     furthest = furthest.max(run.world().progress(0, &body));
                 }
             });
-            let furthest = if run.chain_metrics().done == 1 { 1.0 } else { furthest };
+            let furthest = if run.metrics().done == 1 { 1.0 } else { furthest };
             let mut outcome = Outcome::of(*cell, &run);
             outcome.metrics.insert("furthest".into(), furthest.into());
             Ok(outcome)

@@ -1,52 +1,16 @@
-//! Pictures of bodies as plain data: the swarm in its corridor, the snake in space, the broken
+//! What the pictures show: the swarm in its corridor, the snake in space, the broken
 //! chain before and after.
 
 use super::Plan;
 use super::{broken, corridor, snake};
+use crate::Scene;
 use crate::study::{setting, source};
 use sidestep::experiment::sweep::Setting;
+use sidestep::kernel::view::{Body, Frame, Kind, Look, Place, Pose, Scenery, Shape, Trail};
 use sidestep::kernel::{InputError, Simulation};
-use sidestep::worlds::chain::Obstacle;
-use sidestep::worlds::chain::geometry::{Point, distance};
+use sidestep::worlds::chain::ChainRun;
+use sidestep::worlds::chain::geometry::Point;
 use sidestep::worlds::chain::scenario::Compiled;
-use sidestep::worlds::chain::simulation::ChainSimulation;
-
-/// A picture in the plane or in space.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Scene {
-    /// Seen from above.
-    Plane(View<2>),
-    /// In space.
-    Space(View<3>),
-}
-
-/// What is to be seen.
-#[derive(Debug, Clone, PartialEq)]
-pub struct View<const D: usize> {
-    /// What it shows.
-    pub title: String,
-    /// Small print.
-    pub caption: String,
-    /// What stands and moves in it.
-    pub obstacles: Vec<Obstacle<D>>,
-    /// Chains.
-    pub strands: Vec<Strand<D>>,
-    /// Ways of the first and the last connector of the first chain.
-    pub trails: Vec<Vec<Point<D>>>,
-}
-
-/// A chain.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Strand<const D: usize> {
-    /// Its connectors, the first one leads.
-    pub points: Vec<Point<D>>,
-    /// Their radius,
-    pub connector_radius_m: f64,
-    /// and that of the rods.
-    pub rod_radius_m: f64,
-    /// Its name.
-    pub name: String,
-}
 
 /// Of how many cycles one is a point of a trail.
 const EVERY: u64 = 10;
@@ -60,84 +24,103 @@ pub(super) fn all(plan: &Plan) -> Result<Vec<Scene>, InputError> {
     Ok(scenes)
 }
 
-/// Runs `cycles`, and keeps the ways of both ends.
+/// Runs `cycles`, and keeps the ways of both ends of the chain.
 fn traced<const D: usize>(
     text: &str,
     settings: &[Setting],
     cycles: u64,
-) -> Result<(ChainSimulation<D>, Vec<Vec<Point<D>>>), InputError> {
+) -> Result<(ChainRun<D>, Vec<Trail>), InputError> {
     let source = source(text, settings)?;
-    let mut run = ChainSimulation::<D>::new(Compiled::new(&source)?, &source, 1);
-    let mut trails = vec![Vec::new(); 2];
+    let mut run = Compiled::<D>::new(&source)?.start(&source, 1);
+    let last = run.agents() as u32 - 1;
+    let trail = |part| Trail { of: (Kind::Connector, 0, Some(part)), way: Vec::new() };
+    let mut trails: Vec<Trail> = [0, last].map(trail).to_vec();
     while run.cycle() < cycles && !run.is_over() {
-        if run.cycle() % EVERY == 0 {
+        if run.cycle().is_multiple_of(EVERY) {
             let body = run.state().body(0);
             let points = body.chain.points();
-            trails[0].push(points[0]);
-            trails[1].push(points[points.len() - 1]);
+            for (trail, point) in trails.iter_mut().zip([points[0], points[points.len() - 1]]) {
+                trail.way.push((run.cycle(), in_space(point)));
+            }
         }
         run.advance(1);
     }
     Ok((run, trails))
 }
 
-fn strand<const D: usize>(run: &ChainSimulation<D>) -> Strand<D> {
-    let body = run.state().body(0);
-    let chain = &body.chain;
-    Strand {
-        points: chain.points().to_vec(),
-        connector_radius_m: chain.connectors().iter().map(|c| c.radius_m).fold(0.0, f64::max),
-        rod_radius_m: chain.rods().iter().map(|r| r.radius_m).fold(0.0, f64::max),
-        name: run.world().chains[0].name.clone(),
-    }
-}
-
 fn swarm(plan: &Plan) -> Result<Scene, InputError> {
     let cycles = plan.corridor_cycles.min(plan.pictured_cycles);
-    let (run, trails) =
+    let (mut run, trails) =
         traced::<2>(corridor::SCENARIO, &[setting("cycles", cycles as i64)], cycles)?;
-    Ok(Scene::Plane(View {
+    Ok(Scene {
         title: "A leader and 15 followers in the corridor of 2 m".into(),
         caption: format!("Seed 1, after {} cycles; ways of leader and last follower.", run.cycle()),
-        obstacles: run.world().obstacles.still().to_vec(),
-        strands: vec![strand(&run)],
+        scenery: run.scenery(),
+        frame: run.frame(Look::BODIES),
         trails,
-    }))
+    })
 }
 
 fn creeping(plan: &Plan) -> Result<Scene, InputError> {
     let cycles = setting("cycles", plan.snake_cycles as i64);
-    let (run, trails) = traced::<3>(snake::SCENARIO, &[cycles], plan.snake_cycles)?;
-    let strand = strand(&run);
-    let is_near = |o: &Obstacle<3>| {
-        let apart_m = |p: &Point<3>| distance(o.core.nearest_to_point(*p).on_core, *p) - o.radius_m;
-        strand.points.iter().any(|p| apart_m(p) < NEAR_M)
-    };
-    let obstacles = run.world().obstacles.still().iter().filter(|o| is_near(o)).copied().collect();
-    Ok(Scene::Space(View {
+    let (mut run, trails) = traced::<3>(snake::SCENARIO, &[cycles], plan.snake_cycles)?;
+    let (mut scenery, frame) = (run.scenery(), run.frame(Look::BODIES));
+    let connectors = frame.bodies.iter().filter(|body| body.kind == Kind::Connector);
+    let snake: Vec<Place> = connectors.map(|body| body.pose.at_m).collect();
+    scenery.bodies.retain(|body| is_near(body, &snake));
+    Ok(Scene {
         title: "A snake of 450 connectors among balls that fill a tenth of the room".into(),
         caption: format!("Seed 1, after {} cycles; balls within {NEAR_M} m of it.", run.cycle()),
-        obstacles,
-        strands: vec![strand],
+        scenery,
+        frame,
         trails: trails.into_iter().take(1).collect(),
-    }))
+    })
+}
+
+/// Whether a ball is near to one of these places; other things are.
+fn is_near(body: &Body, places: &[Place]) -> bool {
+    let (Kind::Obstacle, Shape::Sphere { radius_m }) = (body.kind, &body.shape) else {
+        return true;
+    };
+    let apart_m = |p: &Place| -> f64 {
+        (0..3).map(|k| (p[k] - body.pose.at_m[k]) * (p[k] - body.pose.at_m[k])).sum::<f64>().sqrt()
+    };
+    places.iter().any(|p| apart_m(p) - radius_m < NEAR_M)
 }
 
 fn broken_chain() -> Result<[Scene; 2], InputError> {
     let [before, after] = broken::before_and_after(1)?;
-    let view = |title: &str, points: Vec<Point<2>>| {
-        let name = "chain".into();
-        let strand = Strand { points, connector_radius_m: 0.2, rod_radius_m: 0.05, name };
-        Scene::Plane(View {
-            title: title.into(),
-            caption: "Seed 1; of 40 connectors two are gone and 18 thrown about by 5 m.".into(),
-            obstacles: Vec::new(),
-            strands: vec![strand],
-            trails: Vec::new(),
-        })
+    let scene = |title: &str, points: Vec<Point<2>>| Scene {
+        title: title.into(),
+        caption: "Seed 1; of 40 connectors two are gone and 18 thrown about by 5 m.".into(),
+        scenery: Scenery {
+            name: String::new(),
+            dimensions: 2,
+            cycle_s: 1.0,
+            floor: None,
+            bodies: Vec::new(),
+            names: vec![(Kind::Connector, 0, "chain".into())],
+        },
+        frame: Frame { bodies: chain(points), ..Frame::default() },
+        trails: Vec::new(),
     };
     Ok([
-        view("A broken chain", before),
-        view("The same joined again with fewer parts: its end has come", after),
+        scene("A broken chain", before),
+        scene("The same joined again with fewer parts: its end has come", after),
     ])
+}
+
+/// A chain as it is drawn.
+fn chain(points: Vec<Point<2>>) -> Vec<Body> {
+    let points_m: Vec<Place> = points.into_iter().map(in_space).collect();
+    let ball = |(part, at_m): (u32, &Place)| {
+        Body::new(Kind::Connector, 0, Pose::at(*at_m), Shape::Sphere { radius_m: 0.2 }).part(part)
+    };
+    let balls: Vec<Body> = (0..).zip(&points_m).map(ball).collect();
+    let rods = Shape::Line { points_m, thickness_m: 0.1 };
+    [Body::new(Kind::Rods, 0, Pose::at([0.0; 3]), rods)].into_iter().chain(balls).collect()
+}
+
+fn in_space<const D: usize>(at: Point<D>) -> Place {
+    std::array::from_fn(|k| at.get(k).copied().unwrap_or(0.0))
 }

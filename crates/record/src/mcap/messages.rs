@@ -9,23 +9,12 @@ use foxglove::messages::{
     line_primitive, log, packed_element_field, scene_entity_deletion,
 };
 use sidestep_kernel::view::{
-    Body, Condition, Floor, Frame, Kind, Level, Occupancy, Place, Pose as ViewPose, Scan, Scenery,
-    Shape,
+    Body, Floor, Frame, Kind, Level, Occupancy, Place, Pose as ViewPose, Scan, Scenery, Shape,
 };
 
 use super::WORLD;
 
 const NS_PER_S: u64 = 1_000_000_000;
-/// Colors by which numbered bodies are told apart: Okabe and Ito's, without yellow and black.
-const COLORS: [[u8; 3]; 6] = [
-    [0x00, 0x72, 0xB2],
-    [0xD5, 0x5E, 0x00],
-    [0x00, 0x9E, 0x73],
-    [0xCC, 0x79, 0xA7],
-    [0xE6, 0x9F, 0x00],
-    [0x56, 0xB4, 0xE9],
-];
-const ALERT: [u8; 3] = [0xD0, 0x10, 0x10];
 /// Beams whose steps differ by less count as evenly spaced.
 const EVEN_RAD: f64 = 1e-6;
 /// Beams that are not evenly spaced go into a raster of this step.
@@ -64,23 +53,9 @@ fn color([r, g, b]: [u8; 3], a: f64) -> Option<Color> {
     Some(Color { r: part(r), g: part(g), b: part(b), a })
 }
 
-fn color_of(body: &Body) -> Option<Color> {
-    let own = COLORS[body.number as usize % COLORS.len()];
-    match (body.kind, body.state) {
-        (Kind::Zone, Condition::Touching) => color(ALERT, 0.4),
-        (Kind::Zone, _) => color(own, 0.2),
-        (_, Condition::Touching | Condition::Failed) => color(ALERT, 1.0),
-        (_, Condition::Open) => color([0x80, 0x80, 0x80], 0.3),
-        (Kind::Door, _) => color([0x8B, 0x5A, 0x2B], 1.0),
-        (Kind::Person, _) => color([0xE6, 0x9F, 0x00], 1.0),
-        // Balls are of worlds in space, where they would hide what is behind them.
-        (Kind::Obstacle, _) if matches!(body.shape, Shape::Sphere { .. }) => {
-            color([0x60, 0x60, 0x60], 0.25)
-        }
-        (Kind::Obstacle, _) => color([0x60, 0x60, 0x60], 1.0),
-        (Kind::Goal, _) => color(own, 0.35),
-        (Kind::Robot | Kind::Connector | Kind::Rods | Kind::Airplane, _) => color(own, 1.0),
-    }
+fn color_of(body: &Body, dimensions: u8) -> Option<Color> {
+    let look = body.appearance(dimensions);
+    color(look.color, look.opacity)
 }
 
 /// The floor as bytes: 0 free, 100 wall, 255 unknown.
@@ -112,22 +87,22 @@ pub(super) fn grid(floor: &Floor) -> Grid {
 /// All that never moves, as one thing to show or hide.
 pub(super) fn scenery(scenery: &Scenery) -> SceneUpdate {
     let mut whole = entity("scenery", 0);
-    scenery.bodies.iter().for_each(|body| add(&mut whole, body));
+    scenery.bodies.iter().for_each(|body| add(&mut whole, body, scenery.dimensions));
     SceneUpdate { deletions: Vec::new(), entities: vec![whole] }
 }
 
 /// Bodies that are there; those of the frame before that are not are deleted.
-pub(super) fn scene(frame: &Frame, shown: &mut BTreeSet<String>) -> SceneUpdate {
+pub(super) fn scene(frame: &Frame, dimensions: u8, shown: &mut BTreeSet<String>) -> SceneUpdate {
     let now_ns = to_ns(frame.time_s);
     let mut entities: Vec<SceneEntity> = Vec::new();
     for body in &frame.bodies {
         let name = entity_name(body);
         // Parts of a thing are next to each other.
         match entities.last_mut().filter(|last| last.id == name) {
-            Some(last) => add(last, body),
+            Some(last) => add(last, body, dimensions),
             None => {
                 let mut new = entity(&name, now_ns);
-                add(&mut new, body);
+                add(&mut new, body, dimensions);
                 entities.push(new);
             }
         }
@@ -157,8 +132,8 @@ fn entity(id: &str, now_ns: u64) -> SceneEntity {
     }
 }
 
-fn add(entity: &mut SceneEntity, body: &Body) {
-    let (color, at) = (color_of(body), pose(&body.pose));
+fn add(entity: &mut SceneEntity, body: &Body, dimensions: u8) {
+    let (color, at) = (color_of(body, dimensions), pose(&body.pose));
     match &body.shape {
         Shape::Cuboid { size_m } => {
             entity.cubes.push(CubePrimitive { pose: at, size: vector(*size_m), color });
@@ -185,7 +160,9 @@ fn add(entity: &mut SceneEntity, body: &Body) {
             color,
             ..LinePrimitive::default()
         }),
-        Shape::Dart { length_m, width_m } => entity.arrows.push(dart(body, *length_m, *width_m)),
+        Shape::Dart { length_m, width_m } => {
+            entity.arrows.push(ArrowPrimitive { color, ..dart(body, *length_m, *width_m) });
+        }
     }
     if body.kind == Kind::Robot {
         entity.arrows.extend(heading(body));
@@ -201,7 +178,7 @@ fn dart(body: &Body, length_m: f64, width_m: f64) -> ArrowPrimitive {
         shaft_diameter: 0.3 * width_m,
         head_length: 0.6 * length_m,
         head_diameter: width_m,
-        color: color_of(body),
+        ..ArrowPrimitive::default()
     }
 }
 
@@ -336,6 +313,23 @@ mod tests {
         assert!((last - 90f64.to_radians()).abs() < 1e-12);
         assert_eq!((ranges.len(), ranges[0], ranges[10], ranges[100]), (101, 1.0, 2.0, 3.0));
         assert_eq!(ranges.iter().filter(|r| r.is_finite()).count(), 3);
+    }
+
+    #[test]
+    fn every_kind_has_the_colors_that_pictures_have() {
+        let ball = Shape::Sphere { radius_m: 1.0 };
+        for kind in [Kind::Robot, Kind::Person, Kind::Door, Kind::Zone, Kind::Obstacle, Kind::Goal]
+        {
+            for dimensions in [2, 3] {
+                let body = Body::new(kind, 4, ViewPose::at([0.0; 3]), ball.clone());
+                let look = body.appearance(dimensions);
+                let frame = Frame { bodies: vec![body], ..Frame::default() };
+                let update = scene(&frame, dimensions, &mut BTreeSet::new());
+                let shown = update.entities[0].spheres[0].color.clone().expect("a color");
+                let bytes = [shown.r, shown.g, shown.b].map(|part| (255.0 * part).round() as u8);
+                assert_eq!((bytes, shown.a), (look.color, look.opacity), "{kind}");
+            }
+        }
     }
 
     #[test]

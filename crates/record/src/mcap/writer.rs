@@ -28,6 +28,8 @@ const CHUNK_BYTES: u64 = 1 << 20;
 pub struct McapOrigin {
     /// The world, e.g. `robots`.
     pub world: String,
+    /// The build that makes it.
+    pub build: String,
     /// Where its frames come from.
     pub origin: Origin,
     /// Files that the scenario names, by their path relative to it.
@@ -56,6 +58,7 @@ pub struct McapRecorder {
     writer: Option<Writer<BufWriter<File>>>,
     origin: McapOrigin,
     cycle_s: f64,
+    dimensions: u8,
     /// Channels by topic.
     channels: BTreeMap<String, u16>,
     /// Bodies of the frame before, by name.
@@ -104,6 +107,7 @@ impl McapRecorder {
             writer: Some(writer),
             origin,
             cycle_s: scenery.cycle_s,
+            dimensions: scenery.dimensions,
             channels: BTreeMap::new(),
             shown: BTreeSet::new(),
             frames: 0,
@@ -151,7 +155,7 @@ impl McapRecorder {
             self.write::<Log>("/log", messages::nanoseconds(&entry), &entry)?;
         }
         let now_ns = messages::to_ns(frame.time_s);
-        let scene = messages::scene(frame, &mut self.shown);
+        let scene = messages::scene(frame, self.dimensions, &mut self.shown);
         self.write::<SceneUpdate>("/scene", now_ns, &scene)?;
         self.write::<FrameTransforms>("/tf", now_ns, &messages::transforms(frame))?;
         for kind in [Kind::Robot, Kind::Connector, Kind::Airplane] {
@@ -197,7 +201,7 @@ impl McapRecorder {
     }
 
     fn metadata(&self, end: &McapEnd) -> BTreeMap<String, String> {
-        let McapOrigin { world, origin, cycles_planned, every, .. } = &self.origin;
+        let McapOrigin { world, build, origin, cycles_planned, every, .. } = &self.origin;
         let status = match end.status {
             Status::Complete => "complete",
             Status::Running | Status::Incomplete => "incomplete",
@@ -205,6 +209,7 @@ impl McapRecorder {
         let pairs = [
             ("format", format::CURRENT.to_string()),
             ("program_version", origin.program_version.clone()),
+            ("build", build.clone()),
             ("world", world.clone()),
             ("seed", origin.seed.to_string()),
             ("cycles_planned", cycles_planned.to_string()),

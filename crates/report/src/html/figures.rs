@@ -19,7 +19,7 @@ pub(super) fn figure(figure: &Figure, id: &str, still: Option<&SvgFile>) -> Mark
             @if let Some(still) = still {
                 img .still src=(data_address(&still.svg)) alt=(words(figure));
             }
-            div .drawn hidden role="img" aria-label=(words(figure)) {}
+            div .drawn hidden {}
             script type="application/json" { (PreEscaped(safe_json(&data))) }
             @if !figure.note.is_empty() { p .note { (figure.note) } }
             @if let Some(numbers) = numbers(figure) {

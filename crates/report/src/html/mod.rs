@@ -2,13 +2,13 @@
 //!
 //! ```text
 //! blocks.rs    the parts of a document       figures.rs   figures and pictures
-//! tables.rs    tables and claims             plotly.rs    the script that draws figures
-//! page.css     looks                         page.js      figures, and sorting of tables
+//! tables.rs    tables and claims             page.css     looks
+//! page.js      sorting of tables             axes.js      ranges and ticks of figures
+//! figures.js   figures from their data       mouse.js     what they answer to the mouse
 //! ```
 
 mod blocks;
 mod figures;
-mod plotly;
 mod tables;
 
 use crate::{SvgFile, slug};
@@ -18,10 +18,17 @@ use sidestep_document::document::{Block, Span, Text};
 
 const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("page.js");
+/// Draws figures; a page without any does not carry it.
+const FIGURES_SCRIPT: &str =
+    concat!(include_str!("axes.js"), include_str!("figures.js"), include_str!("mouse.js"));
 
 /// Nothing may be loaded; what is inside may be shown and run.
 const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; \
                       img-src data: blob:; font-src data:; base-uri 'none'; form-action 'none'";
+
+/// How to use figures, for those who have a mouse.
+const HINT: &str = "Figures: point at a mark for its values, drag to zoom, double-click to see \
+                    all again, click a name in a legend to hide or show its series.";
 
 /// From so many sections on there is a table of contents.
 const LONG: usize = 3;
@@ -54,8 +61,9 @@ pub(crate) fn page(document: &Document, pictures: &[SvgFile]) -> String {
                 footer {
                     p { "Made by sidestep " (env!("CARGO_PKG_VERSION"))
                         ". This file is complete in itself and loads nothing." }
+                    @if has_figures { p .screen { (HINT) } }
                 }
-                @if has_figures { script { (PreEscaped(plotly::SCRIPT.as_str())) } }
+                @if has_figures { script { (PreEscaped(FIGURES_SCRIPT)) } }
                 script { (PreEscaped(SCRIPT)) }
             }
         }

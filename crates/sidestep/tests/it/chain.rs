@@ -4,8 +4,8 @@
 use sidestep::kernel::Simulation;
 use sidestep::kernel::ports::{MemoryRecorder, Recorder, Values};
 use sidestep::scenario::Source;
+use sidestep::worlds::chain::ChainRun;
 use sidestep::worlds::chain::scenario::Compiled;
-use sidestep::worlds::chain::simulation::ChainSimulation;
 use sidestep_kernel::math::hypot;
 
 /// Four chains that wander among pillars in a room of 5 m, and often come near each other.
@@ -176,15 +176,15 @@ pub(crate) fn source(seed: u64, text: &str) -> Source {
     Source::new("s.toml", text, "")
 }
 
-fn run<const D: usize>(source: &Source, workers: usize) -> ChainSimulation<D> {
+fn run<const D: usize>(source: &Source, workers: usize) -> ChainRun<D> {
     let compiled = Compiled::new(source).unwrap_or_else(|e| panic!("{e}"));
-    let mut run = ChainSimulation::new(compiled, source, workers);
+    let mut run = compiled.start(source, workers);
     run.share_always();
     run
 }
 
 /// To a cycle, or to the end of all tasks.
-fn advance_to<const D: usize>(run: &mut ChainSimulation<D>, cycle: u64) {
+fn advance_to<const D: usize>(run: &mut ChainRun<D>, cycle: u64) {
     while run.cycle() < cycle && !run.is_over() {
         run.advance(cycle - run.cycle());
     }
@@ -194,7 +194,7 @@ fn recorded<const D: usize>(
     source: &Source,
     workers: usize,
     cycles: u64,
-) -> (ChainSimulation<D>, MemoryRecorder) {
+) -> (ChainRun<D>, MemoryRecorder) {
     let mut run = run::<D>(source, workers);
     run.begin_recording();
     let mut recorder = MemoryRecorder::new(&run.schemas());
@@ -207,8 +207,8 @@ fn recorded<const D: usize>(
 }
 
 /// What came of each chain; nothing in it is about time that was spent.
-fn outcome<const D: usize>(run: &ChainSimulation<D>) -> String {
-    let one = |slot| format!("{:?}", run.metrics_of(slot));
+fn outcome<const D: usize>(run: &ChainRun<D>) -> String {
+    let one = |slot| format!("{:?}", run.world().metrics_of(run.state(), slot));
     (0..run.state().len()).map(one).collect()
 }
 
@@ -338,7 +338,7 @@ fn are_far<const D: usize>(one: [[f64; D]; 2], two: [[f64; D]; 2]) -> bool {
 }
 
 /// Connectors and rods of a chain as capsules.
-fn parts<const D: usize>(run: &ChainSimulation<D>, slot: usize) -> Vec<([[f64; D]; 2], f64)> {
+fn parts<const D: usize>(run: &ChainRun<D>, slot: usize) -> Vec<([[f64; D]; 2], f64)> {
     let body = run.state().body(slot);
     let (points, chain) = (body.chain.points(), &body.chain);
     let balls = points.iter().zip(chain.connectors()).map(|(p, c)| ([*p; 2], c.radius_m));
@@ -347,11 +347,7 @@ fn parts<const D: usize>(run: &ChainSimulation<D>, slot: usize) -> Vec<([[f64; D
 }
 
 /// The least distance of a chain from balls.
-fn clearance<const D: usize>(
-    run: &ChainSimulation<D>,
-    slot: usize,
-    balls: &[([f64; D], f64)],
-) -> f64 {
+fn clearance<const D: usize>(run: &ChainRun<D>, slot: usize, balls: &[([f64; D], f64)]) -> f64 {
     let least = |(ends, radius_m): ([[f64; D]; 2], f64)| {
         let to = |(at, r): &([f64; D], f64)| to_segment(*at, ends) - r - radius_m;
         balls.iter().map(to).fold(f64::INFINITY, f64::min)
@@ -360,7 +356,7 @@ fn clearance<const D: usize>(
 }
 
 /// All balls of a world at a cycle.
-fn balls<const D: usize>(run: &ChainSimulation<D>, cycle: u64) -> Vec<([f64; D], f64)> {
+fn balls<const D: usize>(run: &ChainRun<D>, cycle: u64) -> Vec<([f64; D], f64)> {
     use sidestep::worlds::chain::geometry::Core;
     let world = run.world();
     let moving: Vec<_> = world.movers.at(world.starts_s(cycle)).collect();
@@ -391,7 +387,7 @@ fn assert_recount<const D: usize>(seed: u64, text: &str, cycles: u64) -> u64 {
             }
         }
     }
-    let metrics = run.chain_metrics();
+    let metrics = run.metrics();
     assert_eq!(metrics.steps, cycles * n as u64);
     assert!((metrics.max_rod_violation_m - violation).abs() < 1e-12, "seed {seed}");
     assert!(violation <= 1e-9, "seed {seed}: a rod is {violation} m outside its limits");
@@ -472,7 +468,7 @@ fn chains_that_meet_never_overlap() {
                 }
             }
         }
-        assert_eq!(run.chain_metrics().penetrations, 0, "seed {seed}");
+        assert_eq!(run.metrics().penetrations, 0, "seed {seed}");
     }
     assert!(nearest_m < 0.02, "they never came near each other: {nearest_m} m");
 }
@@ -491,7 +487,7 @@ fn track(rows: &MemoryRecorder, connector: u32) -> Vec<[f64; 2]> {
 
 /// Events as (cycle, name, connector, reason, value).
 fn events<const D: usize>(
-    run: &ChainSimulation<D>,
+    run: &ChainRun<D>,
     rows: &MemoryRecorder,
 ) -> Vec<(u64, String, u32, String, f64)> {
     let schemas = run.schemas();
@@ -540,7 +536,7 @@ fn a_connector_that_is_fixed_or_has_failed_never_moves() {
         assert_eq!(still.len(), 300);
         assert!(still.iter().all(|at| *at == [-3.0, 0.0]), "{limit}");
         assert!(track(&rows, 0).windows(2).any(|w| w[0] != w[1]), "{limit}: nothing moved");
-        assert!(run.chain_metrics().max_rod_violation_m <= 1e-9);
+        assert!(run.metrics().max_rod_violation_m <= 1e-9);
     }
 }
 
@@ -562,7 +558,7 @@ fn a_vetoed_order_is_told_and_leaves_every_bit_until_patience_ends() {
     assert_eq!((told[1].0, told[1].1.as_str()), (20, "given-up"));
     assert!((0..6).all(|k| track(&rows, k).iter().all(|at| *at == [-f64::from(k), 0.0])));
     assert!(run.is_over() && run.cycle() == 21, "{}", run.cycle());
-    let metrics = run.chain_metrics();
+    let metrics = run.metrics();
     assert_eq!((metrics.vetoes, metrics.vetoes_by_reason["out-of-reach"]), (21, 21));
     let given_up = &metrics.given_up[0].what;
     assert_eq!(
@@ -581,7 +577,7 @@ fn a_target_that_is_given_up_is_told_with_how_near_it_was_and_why() {
          targets_m = [[1.0, 0.0], [3.0, 0.0], [1.0, 1.0]]\npatience_s = 1.0\n"
     );
     let (run, rows) = recorded::<2>(&source(1, &text), 1, 3000);
-    let metrics = run.chain_metrics();
+    let metrics = run.metrics();
     assert!(run.is_over() && run.cycle() < 3000);
     let [given_up] = &metrics.given_up[..] else { panic!("{:?}", metrics.given_up) };
     assert_eq!((given_up.chain, given_up.what.task, given_up.what.part), (0, 0, 1));
@@ -644,11 +640,11 @@ fn a_run_is_over_when_all_tasks_of_all_chains_are_done() {
     while !run.is_over() {
         assert!(run.cycle() < 1000, "it never ends");
         run.advance(1);
-        let progress = run.chain_metrics().progress;
+        let progress = run.metrics().progress;
         assert!((0.0..=1.0).contains(&progress) && progress >= least - 1e-12, "{progress}");
         least = progress;
     }
-    let metrics = run.chain_metrics();
+    let metrics = run.metrics();
     assert_eq!((metrics.progress, metrics.reformed, metrics.done), (1.0, 1, 2));
     assert!(metrics.max_rod_violation_m <= 1e-9 && metrics.given_up.is_empty(), "{metrics:?}");
 }
@@ -659,7 +655,7 @@ fn progress_means_what_the_task_asks_for() {
     let progress = |task: &str, cycles: u64| {
         let mut run = run::<2>(&source(1, &format!("{PULLED}[[chains.tasks]]\n{task}\n")), 1);
         advance_to(&mut run, cycles);
-        run.chain_metrics().progress
+        run.metrics().progress
     };
     let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-9, "{a}, not {b}");
     near(progress("kind = \"rest\"\nlasts_s = 4.0", 10), 0.25);

@@ -3,7 +3,6 @@
 use sidestep::kernel::Simulation;
 use sidestep::scenario::Source;
 use sidestep::worlds::chain::scenario::{AnyCompiled, Compiled};
-use sidestep::worlds::chain::simulation::ChainSimulation;
 use toml::Value;
 
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenarios/chain");
@@ -49,10 +48,10 @@ fn text_of(mutant: &Value) -> String {
 }
 
 fn run<const D: usize>(compiled: Compiled<D>, source: &Source) {
-    let mut run = ChainSimulation::new(compiled, source, 1);
+    let mut run = compiled.start(source, 1);
     run.begin_recording();
     run.advance(3);
-    run.chain_metrics();
+    run.metrics();
     run.digest();
 }
 

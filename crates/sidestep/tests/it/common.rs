@@ -1,8 +1,8 @@
 //! Worlds that several tests use.
 
 use sidestep::scenario::Source;
+use sidestep::worlds::robots::RobotsRun;
 use sidestep::worlds::robots::scenario::{Behaviours, Compiled, StorageOrder};
-use sidestep::worlds::robots::simulation::RobotsSimulation;
 
 /// A crowded floor: rooms, corridors, doors of both sorts, people of two sizes and speeds,
 /// robots of four sizes, several behaviours, sensors and periods, radio.
@@ -65,15 +65,15 @@ pub(crate) fn source(text: &str, overrides: &[&str]) -> Source {
 }
 
 /// A run that always uses all its workers.
-pub(crate) fn simulation(source: &Source, workers: usize) -> RobotsSimulation {
+pub(crate) fn simulation(source: &Source, workers: usize) -> RobotsRun {
     stored(source, workers, StorageOrder::Spatial)
 }
 
 /// The same with bodies stored in another order.
-pub(crate) fn stored(source: &Source, workers: usize, order: StorageOrder) -> RobotsSimulation {
+pub(crate) fn stored(source: &Source, workers: usize, order: StorageOrder) -> RobotsRun {
     let compiled = Compiled::new(source, &Behaviours::new(), order);
     let compiled = compiled.unwrap_or_else(|e| panic!("{e}"));
-    let mut simulation = RobotsSimulation::from_compiled(compiled, source, workers);
+    let mut simulation = compiled.start(source, workers);
     simulation.share_always();
     simulation
 }

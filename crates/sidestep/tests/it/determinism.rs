@@ -2,8 +2,8 @@
 //! entities, recorded or not, resumed or not.
 
 use crate::common::{CROWD, simulation, source, stored};
+use sidestep::worlds::robots::RobotsRun;
 use sidestep::worlds::robots::scenario::StorageOrder;
-use sidestep::worlds::robots::simulation::RobotsSimulation;
 use sidestep_kernel::Simulation;
 use sidestep_kernel::ports::{MemoryRecorder, Recorder};
 
@@ -18,7 +18,7 @@ const POLICIES: [&str; 5] = [
 ];
 const ORDER: &str = "kind_order=['door', 'person', 'robot']";
 
-fn digest_after(mut run: RobotsSimulation, cycles: u64) -> String {
+fn digest_after(mut run: RobotsRun, cycles: u64) -> String {
     let mut done = 0;
     while done < cycles {
         done += run.advance(cycles - done);
@@ -27,7 +27,7 @@ fn digest_after(mut run: RobotsSimulation, cycles: u64) -> String {
 }
 
 /// All rows of a recorded run; block borders are part of nothing.
-fn recorded(mut run: RobotsSimulation, cycles: u64, slice: u64) -> (String, MemoryRecorder) {
+fn recorded(mut run: RobotsRun, cycles: u64, slice: u64) -> (String, MemoryRecorder) {
     run.begin_recording();
     let mut recorder = MemoryRecorder::new(&run.schemas());
     while run.cycle() < cycles {

@@ -3,11 +3,11 @@
 
 use super::tiles::{Tiles, assert_fits, law, repeating};
 use sidestep::kernel::Simulation;
-use sidestep::kernel::ports::recorder::{MemoryRecorder, Values};
+use sidestep::kernel::ports::{MemoryRecorder, Values};
 use sidestep::scenario::Source;
 use sidestep::worlds::robots::effector::ObstacleRule;
 use sidestep::worlds::robots::exact::{Outcome, Pose};
-use sidestep::worlds::robots::simulation::RobotsSimulation;
+use sidestep::worlds::robots::{RobotsRun, robots_run};
 use std::collections::BTreeMap;
 
 /// A robot that stands still. Its beams meet a wall near by (ahead), a person at medium
@@ -97,10 +97,10 @@ fn reports(source: &Source, cycles: u64) -> BTreeMap<Report, BTreeMap<Report, u6
 }
 
 /// A recording and the run that it belongs to.
-type Recorded = (MemoryRecorder, RobotsSimulation);
+type Recorded = (MemoryRecorder, RobotsRun);
 
 fn recorded(source: &Source, cycles: u64) -> Recorded {
-    let mut simulation = RobotsSimulation::new(source, 2).unwrap_or_else(|e| panic!("{e}"));
+    let mut simulation = robots_run(source, 2).unwrap_or_else(|e| panic!("{e}"));
     simulation.begin_recording();
     let mut recorder = MemoryRecorder::new(&simulation.schemas());
     simulation.advance(cycles);
@@ -264,9 +264,9 @@ fn pairs(robots: [[i32; 3]; 2], effector: &str, seed: u64) -> Source {
 /// Where both robots of each tile stand after one cycle.
 fn meet(robots: [[i32; 3]; 2], effector: &str, seed: u64) -> Vec<[(i32, i32); 2]> {
     let source = pairs(robots, effector, seed);
-    let mut simulation = RobotsSimulation::new(&source, 2).unwrap_or_else(|e| panic!("{e}"));
+    let mut simulation = robots_run(&source, 2).unwrap_or_else(|e| panic!("{e}"));
     simulation.advance(1);
-    let bodies = simulation.snapshot().bodies;
+    let bodies = simulation.saved().bodies;
     let in_tile = |at: (u32, u32)| ((at.0 % 8) as i32, (at.1 % 8) as i32 - 1);
     bodies.chunks(2).map(|pair| [in_tile(pair[0].at), in_tile(pair[1].at)]).collect()
 }

@@ -4,13 +4,13 @@
 use super::tiles::{Tiles, assert_fits, law};
 use sidestep::kernel::{InputError, Simulation};
 use sidestep::scenario::Source;
+use sidestep::worlds::robots::RobotsRun;
 use sidestep::worlds::robots::decide::Random;
 use sidestep::worlds::robots::effector::{FORWARD, ObstacleRule, Side};
 use sidestep::worlds::robots::exact::{
     self, Chain, Comparison, Model, Pose, sampling_limit, total_variation,
 };
 use sidestep::worlds::robots::scenario::{Behaviours, Compiled, StorageOrder};
-use sidestep::worlds::robots::simulation::RobotsSimulation;
 use std::collections::BTreeMap;
 
 /// A room with two pillars and a niche.
@@ -53,7 +53,7 @@ fn model(tiles: &Tiles) -> Model {
 }
 
 /// Last poses of all rooms, contacts left out.
-fn poses(tiles: &Tiles, simulation: &RobotsSimulation) -> BTreeMap<Pose, u64> {
+fn poses(tiles: &Tiles, simulation: &RobotsRun) -> BTreeMap<Pose, u64> {
     let mut poses = BTreeMap::new();
     for (outcome, n) in tiles.outcomes(simulation) {
         *poses.entry(outcome.pose).or_insert(0) += n;

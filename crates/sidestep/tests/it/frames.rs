@@ -6,10 +6,9 @@ use sidestep::kernel::Simulation;
 use sidestep::kernel::ports::MemoryRecorder;
 use sidestep::kernel::view::{Kind, Look, Shape};
 use sidestep::scenario::Source;
-use sidestep::worlds::airspace::simulation::AirspaceSimulation;
+use sidestep::worlds::airspace::airspace_run;
 use sidestep::worlds::chain::scenario::Compiled;
-use sidestep::worlds::chain::simulation::ChainSimulation;
-use sidestep::worlds::robots::simulation::RobotsSimulation;
+use sidestep::worlds::robots::robots_run;
 
 const LOOK: Look = Look { scanning_bodies: usize::MAX };
 
@@ -20,18 +19,18 @@ fn traffic() -> Source {
 }
 
 fn robots(workers: usize) -> Box<dyn Simulation> {
-    Box::new(RobotsSimulation::new(&source(CROWD, &[]), workers).expect("a valid scenario"))
+    Box::new(robots_run(&source(CROWD, &[]), workers).expect("a valid scenario"))
 }
 
 fn chains(text: &str, workers: usize) -> Box<dyn Simulation> {
     let text = format!("format = 1\nworld = \"chain\"\nseed = 9\n{text}");
     let source = Source::new("chains", text, "");
     let compiled = Compiled::<2>::new(&source).unwrap_or_else(|e| panic!("{e}"));
-    Box::new(ChainSimulation::new(compiled, &source, workers))
+    Box::new(compiled.start(&source, workers))
 }
 
 fn airplanes(workers: usize) -> Box<dyn Simulation> {
-    Box::new(AirspaceSimulation::new(&traffic(), workers).expect("a valid scenario"))
+    Box::new(airspace_run(&traffic(), workers).expect("a valid scenario"))
 }
 
 fn worlds(workers: usize) -> Vec<Box<dyn Simulation>> {
@@ -64,8 +63,8 @@ fn looking_changes_no_result_whoever_computes_it() {
 
 #[test]
 fn events_reach_the_log_and_the_table_alike() {
-    let mut run = RobotsSimulation::new(&source(CROWD, &[]), 2).expect("a valid scenario");
-    let mut plain = RobotsSimulation::new(&source(CROWD, &[]), 1).expect("a valid scenario");
+    let mut run = robots_run(&source(CROWD, &[]), 2).expect("a valid scenario");
+    let mut plain = robots_run(&source(CROWD, &[]), 1).expect("a valid scenario");
     let (mut told, mut tables) = (0, Vec::new());
     for (run, watches) in [(&mut run, true), (&mut plain, false)] {
         run.begin_recording();
@@ -113,7 +112,7 @@ fn sensors_see_the_floor_around_them() {
                 ascii = \"\"\"\n########\n#......#\n########\n\"\"\"\n[[robots]]\ncount = 1\n\
                 size = 1\nsensors = [\"bumper-4\"]\neffector = \"nomad\"\nat = [[3, 1]]\n";
     let source = Source::new("narrow", text, "");
-    let mut run = RobotsSimulation::new(&source, 1).unwrap_or_else(|e| panic!("{e}"));
+    let mut run = robots_run(&source, 1).unwrap_or_else(|e| panic!("{e}"));
     let frame = run.frame(LOOK);
     let [scan] = &frame.scans[..] else { panic!("one robot has one sensor") };
     assert_eq!(scan.name(), "robot/0/bumper-4");

@@ -2,10 +2,10 @@
 
 use crate::common::{CROWD, simulation, source};
 use proptest::prelude::*;
-use sidestep::worlds::robots::simulation::RobotsSimulation;
+use sidestep::worlds::robots::RobotsRun;
 use sidestep_kernel::Simulation;
 
-fn run_audited(mut run: RobotsSimulation, cycles: u64) -> RobotsSimulation {
+fn run_audited(mut run: RobotsRun, cycles: u64) -> RobotsRun {
     for _ in 0..cycles {
         run.advance(1);
         run.world().audit(run.state()).unwrap_or_else(|e| panic!("cycle {}: {e}", run.cycle()));
@@ -21,7 +21,7 @@ fn a_million_crowded_body_cycles_share_no_box() {
         let source = source(CROWD, &[&format!("obstacle_rule='{law}'")]);
         let run = run_audited(simulation(&source, 2), 4_000);
         body_cycles += run.world().bodies.len() as u64 * run.cycle();
-        assert!(run.robot_metrics().largest_group > 8, "the crowd is a crowd");
+        assert!(run.metrics().largest_group > 8, "the crowd is a crowd");
     }
     assert!(body_cycles > 1_000_000);
 }
@@ -49,9 +49,9 @@ forward = [{ p = 0.5, path = "F" }, { p = 0.5, path = "FF" }]
     for seed in 0..50 {
         let source = source(text, &[&format!("seed={seed}")]);
         let run = run_audited(simulation(&source, 2), 40);
-        let bodies = run.snapshot().bodies;
+        let bodies = run.saved().bodies;
         assert_eq!(bodies[0].at.0 + 1, bodies[1].at.0, "they meet and stay");
-        assert!(run.robot_metrics().total.contacts > 0);
+        assert!(run.metrics().total.contacts > 0);
     }
 }
 
@@ -107,7 +107,7 @@ at = [[2, 0]]
 periodic = { open = 5, closed = 5, phase = 0 }
 "#;
     let run = run_audited(simulation(&source(text, &[]), 1), 40);
-    let bodies = run.snapshot().bodies;
+    let bodies = run.saved().bodies;
     assert_eq!(bodies[0].at, (2, 0), "the robot stopped in the doorway");
     assert_eq!(bodies[1].facing, 1, "the door has been waiting since");
 }

@@ -302,7 +302,7 @@ fn a_path_that_ends_where_it_began_counts_as_way_and_visit() {
         .keys("regime = \"reliable\"");
     let mut simulation = tiles.simulation();
     simulation.advance(1);
-    let total = simulation.robot_metrics().total;
+    let total = simulation.metrics().total;
     assert_eq!((total.distance_m, total.first_visits), (0.5, 1));
 }
 
@@ -379,7 +379,7 @@ proptest! {
         let tiles = tiles(&lines.join("\n"), 2, "nomad", action, rule).single();
         let tiles = tiles.keys(&format!("seed = {seed}"));
         let mut simulation = tiles.simulation();
-        let model = Model::new(simulation.compiled()).expect("one robot");
+        let model = Model::new(&compile(&tiles)).expect("one robot");
         simulation.advance(1);
         let ended = tiles.outcomes(&simulation);
         let id = ["forward", "left", "right", "stay"].iter().position(|a| *a == action);

@@ -5,7 +5,7 @@ use sidestep::scenario::Source;
 use sidestep::statistics::chi_square_p;
 use sidestep::worlds::robots::effector::{ObstacleRule, Side};
 use sidestep::worlds::robots::exact::{Outcome, Pose};
-use sidestep::worlds::robots::simulation::RobotsSimulation;
+use sidestep::worlds::robots::{RobotsRun, robots_run};
 use std::collections::BTreeMap;
 
 /// Chance that a simulator without fault fails one test of fit. Seeds are fixed, so that a
@@ -150,16 +150,16 @@ impl Tiles {
     }
 
     /// A run at its start.
-    pub(crate) fn simulation(&self) -> RobotsSimulation {
-        RobotsSimulation::new(&self.source(), 2).unwrap_or_else(|e| panic!("{e}"))
+    pub(crate) fn simulation(&self) -> RobotsRun {
+        robots_run(&self.source(), 2).unwrap_or_else(|e| panic!("{e}"))
     }
 
     /// How often the robots are where, seen from their tile, and what they touched.
-    pub(crate) fn outcomes(&self, simulation: &RobotsSimulation) -> BTreeMap<Outcome, u64> {
+    pub(crate) fn outcomes(&self, simulation: &RobotsRun) -> BTreeMap<Outcome, u64> {
         let (width, height) = self.pitch();
         let robots = simulation.agents();
         let mut counts = BTreeMap::new();
-        for body in &simulation.snapshot().bodies[..robots] {
+        for body in &simulation.saved().bodies[..robots] {
             let at = ((body.at.0 % width) as i32, (body.at.1 % height) as i32);
             let pose = Pose { col: at.0, row: at.1, heading: body.facing };
             let side = Side::ALL[usize::from(body.contact >> 8 & 3)];

@@ -15,12 +15,15 @@
 pub mod airplane;
 mod baseline;
 mod books;
+pub mod bundle;
 mod decide;
 pub mod deploy;
 mod entry;
 pub mod events;
 mod flight_plan;
+mod foreign;
 mod generate;
+mod kind;
 pub mod levels;
 mod memory;
 pub mod metrics;
@@ -29,23 +32,28 @@ mod orbit;
 pub mod orders;
 mod react;
 mod rows;
+pub mod run;
 pub mod scenario;
 pub mod shield;
-pub mod simulation;
 pub mod state;
 pub mod track;
 pub mod traffic;
 mod view;
+mod words;
 pub mod world;
 
 pub use books::LOOKS_PER_STEP;
 pub use decide::{Effort, Optimization};
 use deploy::Traffic;
 use events::Event;
+pub use kind::Airspace;
+pub use run::{AirspaceRun, airspace_run};
 use sidestep_kernel::conflict::Groups;
-use sidestep_kernel::{Cycle, Slot, World};
+use sidestep_kernel::world::Decides;
+use sidestep_kernel::{Cycle, Phases, Slot, Turn};
 use state::{AirspaceState, PairRecord};
 use std::collections::BTreeMap;
+use std::ops::Range;
 pub use world::AirspaceWorld;
 
 /// What a worker keeps between tasks.
@@ -64,7 +72,9 @@ pub struct Scratch {
     flying: Vec<Slot>,
 }
 
-impl World for AirspaceWorld {
+impl Phases for AirspaceWorld {
+    const DECIDES: Decides = Decides::Together;
+
     type State = AirspaceState;
     type Scratch = Scratch;
 
@@ -76,50 +86,40 @@ impl World for AirspaceWorld {
         self.airplanes.len()
     }
 
-    fn perceive_and_decide(
-        &self,
-        state: &AirspaceState,
-        now: Cycle,
-        bodies: std::ops::Range<usize>,
-        _: &mut Scratch,
-    ) {
+    fn claim(turn: &mut Turn<'_, Self>, bodies: Range<usize>) {
+        let Turn { world, state, now, .. } = *turn;
         for slot in bodies {
-            if state.is_there(self, slot as Slot, now) {
+            if state.is_there(world, slot as Slot, now) {
                 let at = state.airplanes[slot].pose().at;
                 state.neighborhood.enter(slot as Slot, at, now);
             }
         }
     }
 
-    fn find_conflicts(
-        &self,
-        state: &AirspaceState,
-        now: Cycle,
-        bodies: std::ops::Range<usize>,
-        groups: &Groups,
-        _: &mut Scratch,
-    ) {
+    fn join(turn: &mut Turn<'_, Self>, bodies: Range<usize>, groups: &Groups) {
+        let Turn { world, state, now, .. } = *turn;
         for slot in bodies.map(|slot| slot as Slot) {
             let cell = &state.airplanes[slot as usize];
-            if !state.is_there(self, slot, now) {
+            if !state.is_there(world, slot, now) {
                 continue;
             }
             state.neighborhood.around(cell.pose().at, now, |other| {
-                if other < slot && state.is_near(self, (slot, other), now) {
+                if other < slot && state.is_near(world, (slot, other), now) {
                     groups.join(slot, other);
                 }
             });
         }
     }
 
-    fn react(&self, state: &AirspaceState, now: Cycle, group: &mut [Slot], scratch: &mut Scratch) {
-        let mut flying = std::mem::take(&mut scratch.flying);
+    fn act(turn: &mut Turn<'_, Self>, group: &mut [Slot]) {
+        let Turn { world, state, now, .. } = *turn;
+        let mut flying = std::mem::take(&mut turn.scratch.flying);
         flying.clear();
-        flying.extend(group.iter().filter(|&&slot| state.is_there(self, slot, now)));
+        flying.extend(group.iter().filter(|&&slot| state.is_there(world, slot, now)));
         flying.sort_unstable();
         if !flying.is_empty() {
-            self.fly(state, now, &flying, scratch);
+            world.fly(turn, &flying);
         }
-        scratch.flying = flying;
+        turn.scratch.flying = flying;
     }
 }

@@ -8,7 +8,8 @@ use super::state::AirspaceState;
 use super::world::AirspaceWorld;
 use sidestep_collectives::{Estimator, PairwiseGame};
 use sidestep_kernel::conflict::Groups;
-use sidestep_kernel::{Slot, World};
+use sidestep_kernel::ports::ManualClock;
+use sidestep_kernel::{Phases, Slot, Turn};
 
 impl AirspaceWorld {
     /// Bytes that optimizing a group takes at most: tables of its pairs, and predictions, in as
@@ -62,8 +63,10 @@ impl AirspaceWorld {
     pub(super) fn largest_at_start(&self, state: &AirspaceState) -> (usize, u64) {
         let n = self.airplanes.len();
         let (groups, mut scratch) = (Groups::new(n), Scratch::default());
-        self.perceive_and_decide(state, 0, 0..n, &mut scratch);
-        self.find_conflicts(state, 0, 0..n, &groups, &mut scratch);
+        let clock = &ManualClock::default();
+        let turn = &mut Turn { world: self, state, now: 0, clock, scratch: &mut scratch };
+        Self::claim(turn, 0..n);
+        Self::join(turn, 0..n, &groups);
         let mut members = Vec::new();
         let leaders =
             (0..n as Slot).filter(|&slot| groups.is_leader(slot) && !groups.is_alone(slot));

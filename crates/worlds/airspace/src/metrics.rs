@@ -243,14 +243,14 @@ impl AirspaceWorld {
     }
 
     /// Whether everybody has arrived or left by now.
-    pub fn is_over(&self, state: &AirspaceState) -> bool {
+    pub fn everybody_has_arrived(&self, state: &AirspaceState) -> bool {
         state.airplanes.iter().all(|cell| !cell.is_flying())
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use crate::simulation::AirspaceSimulation;
+    use crate::airspace_run;
     use sidestep_kernel::Simulation;
     use sidestep_scenario::Source;
 
@@ -263,14 +263,14 @@ mod tests {
                     orders = [{ at_s = 5.0, heading_deg = 0.0 }]\n\
                     [[airplanes]]\nat_m = [0, 9000]\nheading_deg = 0\nway_points_m = [[700, 9000]]\n";
         let source = Source::new("n", text, "");
-        let mut run = AirspaceSimulation::new(&source, 1).expect("a scenario");
+        let mut run = airspace_run(&source, 1).expect("a scenario");
         run.advance(30);
         let world = run.world();
         assert_eq!(world.alone_s[0], f64::INFINITY);
         run.state().airplanes[0].arrived.set(20);
         let first = world.airplane_metrics(run.state(), 0);
         assert_eq!((first.flown_s, first.delay_s(), first.delay_percent), (Some(20.0), None, None));
-        let metrics = run.airspace_metrics();
+        let metrics = run.metrics();
         assert!(metrics.mean_delay_percent.is_some_and(f64::is_finite), "{metrics:?}");
     }
 }

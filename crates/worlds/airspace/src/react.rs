@@ -12,9 +12,8 @@ use super::shield::{Flyer, Side, Way};
 use super::state::{AirspaceState, Cell, LEFT};
 use super::track::Track;
 use super::world::{AirspaceWorld, purpose};
-use cpu_time::ThreadTime;
 use sidestep_kernel::distr::normal;
-use sidestep_kernel::{Cycle, Slot};
+use sidestep_kernel::{Cycle, Slot, Turn};
 
 /// Goals farther away than this rank alike.
 const FARTHEST_M: f64 = 2e9;
@@ -87,13 +86,8 @@ impl Flight<'_> {
 impl AirspaceWorld {
     /// A group decides, the shield filters, all fly, those on recorded ways beside them; `group`
     /// are the airplanes in the air, by id.
-    pub(super) fn fly(
-        &self,
-        state: &AirspaceState,
-        now: Cycle,
-        group: &[Slot],
-        scratch: &mut Scratch,
-    ) {
+    pub(super) fn fly(&self, turn: &mut Turn<'_, Self>, group: &[Slot]) {
+        let &mut Turn { state, now, clock, ref mut scratch, .. } = turn;
         let flown: Vec<Slot> =
             group.iter().copied().filter(|&slot| !self.is_replayed(slot, now)).collect();
         if self.shield {
@@ -101,10 +95,10 @@ impl AirspaceWorld {
         }
         self.carry_out(state, now, &flown);
         let known: Vec<Known> = flown.iter().map(|&slot| self.known(state, now, slot)).collect();
-        let began = ThreadTime::now();
+        let began_ns = clock.thread_cpu_ns();
         let mut contacts = state.take_contacts(&flown);
         let candidates = self.wanted(&known, now, &mut contacts, scratch);
-        scratch.decide_ns += began.elapsed().as_nanos() as u64;
+        scratch.decide_ns += clock.thread_cpu_ns() - began_ns;
         let ways = if self.shield {
             self.shielded(state, (now, &flown), &candidates, &mut contacts, scratch)
         } else {

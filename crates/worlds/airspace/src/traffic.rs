@@ -257,7 +257,7 @@ fn heading(name: &str, (separation_m, vertical_m): (f64, f64), more: &str) -> St
 
 #[cfg(test)]
 mod tests {
-    use super::super::simulation::AirspaceSimulation;
+    use super::super::airspace_run;
     use super::*;
     use sidestep_import::bluesky::parse;
     use sidestep_kernel::Simulation;
@@ -273,10 +273,10 @@ mod tests {
              00:00:00.00>DEST A1 0,0.4\n00:00:00.00>DEST B2 0,-0.4\n",
         );
         let text = from_bluesky("two", &file).expect("it has aircraft");
-        let mut run = AirspaceSimulation::new(&Source::new("two", text, ""), 1).expect("valid");
+        let mut run = airspace_run(&Source::new("two", text, ""), 1).expect("valid");
         assert_eq!(run.agents(), 3);
         run.advance(200);
-        let metrics = run.airspace_metrics();
+        let metrics = run.metrics();
         assert_eq!(metrics.losses_of_separation, 0);
         assert!(metrics.min_separation_m.is_some_and(|d| d < 20_000.0), "they have met");
     }

@@ -1,10 +1,12 @@
-//! What can be seen of an airspace: airplanes, the zones around them, where they are to go.
+//! What can be seen of an airspace: airplanes, the zones around them, whence and where they go.
 
 use super::airplane::{Point, distance_m};
 use super::events::{Event, EventKind};
 use super::state::AirspaceState;
 use super::world::AirspaceWorld;
-use sidestep_kernel::view::{Body, Condition, Entry, Kind, Level, Pose, Scenery, Shape};
+use sidestep_kernel::view::{
+    Axis, Body, Condition, Entry, Kind, Level, PlaceRows, Pose, Scenery, Shape,
+};
 use sidestep_kernel::{Cycle, Slot};
 
 /// An airplane as it is drawn is so much as long as the radius of its zone: large enough to be
@@ -18,21 +20,44 @@ const ZONE_HEIGHT: f64 = 0.02;
 const GOAL_OF_RADIUS: f64 = 0.15;
 
 impl AirspaceWorld {
-    /// The places that airplanes are to reach at last.
+    /// The places that airplanes start from, as wide as their zones, and those that they are to
+    /// reach at last.
     pub(super) fn scenery(&self, name: &str) -> Scenery {
+        let start = |(id, airplane): (u32, &super::world::Airplane)| {
+            let ([x_m, y_m], radius_m) = (airplane.start.at, self.zone_radius_m(id));
+            let disc = Shape::Cylinder { radius_m, height_m: ZONE_HEIGHT * radius_m };
+            Body::new(Kind::Start, id, Pose::at([x_m, y_m, airplane.altitude_m]), disc)
+        };
         let goal = |(id, airplane): (u32, &super::world::Airplane)| {
             let at = airplane.mission.last()?;
             let radius_m = GOAL_OF_RADIUS * self.zone_radius_m(id);
             let pose = Pose::at([at[0], at[1], airplane.altitude_m]);
             Some(Body::new(Kind::Goal, id, pose, Shape::Sphere { radius_m }))
         };
+        let starts = (0..).zip(&self.airplanes).map(start);
         Scenery {
             name: name.into(),
             dimensions: if self.is_level() { 2 } else { 3 },
             cycle_s: self.timing.dt_s,
             floor: None,
-            bodies: (0..).zip(&self.airplanes).filter_map(goal).collect(),
+            bodies: starts.chain((0..).zip(&self.airplanes).filter_map(goal)).collect(),
+            names: Vec::new(),
         }
+    }
+
+    /// Recorded poses as places of airplanes.
+    pub(super) fn place_rows() -> Vec<PlaceRows> {
+        vec![PlaceRows {
+            table: "trajectories",
+            kind: Kind::Airplane,
+            number: "airplane",
+            part: None,
+            axes: ["x_m", "y_m"].map(Axis::meters).to_vec(),
+            is_corner: false,
+            ahead: None,
+            every: 1,
+            worth: Cycle::MAX,
+        }]
     }
 
     /// Whether all fly on one level from the beginning to the end.

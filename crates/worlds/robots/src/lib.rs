@@ -6,36 +6,45 @@
 //!
 //! ```text
 //! scenario.rs -> world.rs (immutable), state.rs (columns)
-//! perceive.rs + decide.rs  ->  resolve.rs  ->  react.rs        one cycle
+//! perceive.rs + decide.rs  ->  join.rs  ->  act.rs, auction.rs   one cycle
 //! sensor.rs, ray.rs, effector.rs: the tables behind it         metrics.rs: what came of it
 //! ```
 
+mod act;
+mod auction;
 mod audit;
 pub mod baseline;
 pub mod bundle;
 pub mod decide;
 pub mod effector;
 pub mod exact;
+mod join;
+mod kind;
 pub mod learn;
 pub mod metrics;
 mod perceive;
+pub mod policy;
 pub mod ray;
-mod react;
-pub mod resolve;
-mod rounds;
+pub mod rows;
+pub mod run;
 pub mod scenario;
+mod scene;
 pub mod sensor;
-pub mod simulation;
 pub mod state;
 mod view;
+mod words;
 pub mod world;
 
 use effector::Side;
-use resolve::ConflictPolicy;
+pub use kind::Robots;
+use policy::ConflictPolicy;
+pub use run::{RobotsRun, robots_run};
 use scenario::StorageOrder;
+use scene::with_scene;
 use sensor::Reading;
 use sidestep_kernel::conflict::Groups;
-use sidestep_kernel::{Cycle, EntityId, Slot, World};
+use sidestep_kernel::world::Auction;
+use sidestep_kernel::{Cycle, EntityId, Phases, Slot, Turn};
 use state::RobotsState;
 use std::ops::Range;
 pub use world::RobotsWorld;
@@ -108,8 +117,8 @@ pub struct Scratch {
     /// What a sensor's beams truly meet.
     truths: Vec<sensor::Row>,
     heard: Vec<decide::Heard>,
-    order: Vec<resolve::Place>,
-    bids: Vec<rounds::Bid>,
+    order: Vec<join::Place>,
+    bids: Vec<auction::Bid>,
     keep_events: bool,
     keep_samples: bool,
     events: Vec<Event>,
@@ -117,7 +126,7 @@ pub struct Scratch {
     motion_samples: Vec<MotionSample>,
 }
 
-impl World for RobotsWorld {
+impl Phases for RobotsWorld {
     type State = RobotsState;
     type Scratch = Scratch;
 
@@ -136,74 +145,35 @@ impl World for RobotsWorld {
     }
 
     #[inline]
-    fn perceive_and_decide(
-        &self,
-        state: &RobotsState,
-        now: Cycle,
-        bodies: Range<usize>,
-        scratch: &mut Scratch,
-    ) {
-        for slot in bodies {
-            self.perceive_one(state, now, slot as Slot, scratch);
-        }
+    fn claim(turn: &mut Turn<'_, Self>, bodies: Range<usize>) {
+        with_scene!(turn.world, turn.state, turn.now, |scene| {
+            bodies.for_each(|slot| scene.perceive(slot as Slot, turn.scratch));
+        });
     }
 
     #[inline]
-    fn find_conflicts(
-        &self,
-        state: &RobotsState,
-        _: Cycle,
-        bodies: Range<usize>,
-        groups: &Groups,
-        _: &mut Scratch,
-    ) {
-        for slot in bodies {
-            self.join_one(state, slot as Slot, groups);
-        }
+    fn join(turn: &mut Turn<'_, Self>, bodies: Range<usize>, groups: &Groups) {
+        with_scene!(turn.world, turn.state, turn.now, |scene| {
+            bodies.for_each(|slot| scene.join(slot as Slot, groups));
+        });
     }
 
     #[inline]
-    fn react(&self, state: &RobotsState, now: Cycle, group: &mut [Slot], scratch: &mut Scratch) {
-        if let [alone] = *group {
-            return self.act_drawn(state, now, alone, scratch);
-        }
-        self.order(state, now, group, scratch);
-        let order = std::mem::take(&mut scratch.order);
-        for place in &order {
-            self.act(state, now, place.slot, place.word, scratch);
-        }
-        scratch.order = order;
-    }
-
-    fn reacts_in_rounds(&self) -> bool {
-        self.policy == ConflictPolicy::Rounds
-    }
-
-    fn bid(&self, state: &RobotsState, now: Cycle, body: Slot, scratch: &mut Scratch) {
-        self.bid_one(state, now, body, scratch);
-    }
-
-    fn act_on_bids(
-        &self,
-        state: &RobotsState,
-        now: Cycle,
-        pending: &mut Vec<Slot>,
-        scratch: &mut Scratch,
-    ) {
-        pending.clear();
-        for k in 0..scratch.bids.len() {
-            let bid = scratch.bids[k];
-            if self.is_highest(state, bid) {
-                self.act(state, now, bid.slot, bid.word, scratch);
-            } else {
-                pending.push(bid.slot);
+    fn act(turn: &mut Turn<'_, Self>, group: &mut [Slot]) {
+        with_scene!(turn.world, turn.state, turn.now, |scene| {
+            if let [alone] = *group {
+                return scene.act_drawn(alone, turn.scratch);
             }
-        }
+            scene.order(group, turn.scratch);
+            let order = std::mem::take(&mut turn.scratch.order);
+            for place in &order {
+                scene.act(place.slot, place.word, turn.scratch);
+            }
+            turn.scratch.order = order;
+        });
     }
 
-    fn retract_bids(&self, state: &RobotsState, scratch: &mut Scratch) {
-        for bid in scratch.bids.drain(..) {
-            self.retract(state, bid);
-        }
+    fn auction(&self) -> Option<&dyn Auction<Self>> {
+        (self.policy == ConflictPolicy::Rounds).then_some(self)
     }
 }

@@ -110,7 +110,7 @@ impl RobotsWorld {
 
 #[cfg(test)]
 mod tests {
-    use crate::simulation::RobotsSimulation;
+    use crate::robots_run;
     use sidestep_kernel::Simulation;
     use sidestep_scenario::Source;
 
@@ -118,9 +118,9 @@ mod tests {
     fn a_robot_covers_the_boxes_it_stands_in_and_those_it_comes_to() {
         let text = "format = 1\nworld = \"robots\"\n[map]\nascii = \"...#.\"\n[robots]\nat = [[0, 0, 0]]\n\
                     behaviour = { kind = \"replay\", actions = [\"forward\"], repeat = true }\n";
-        let mut run = RobotsSimulation::new(&Source::new("s", text, ""), 1).expect("fits");
-        assert_eq!(run.robot_metrics().coverage, 0.25);
+        let mut run = robots_run(&Source::new("s", text, ""), 1).expect("fits");
+        assert_eq!(run.metrics().coverage, 0.25);
         run.advance(5);
-        assert_eq!(run.robot_metrics().coverage, 0.75);
+        assert_eq!(run.metrics().coverage, 0.75);
     }
 }

@@ -1,42 +1,49 @@
 //! What can be seen of a building: floor, bodies, sensors' readings, events in words.
 
 use super::effector::Side;
+use super::scene::with_scene;
 use super::sensor::{NOTHING, Reading, SensorModel};
 use super::state::{BodyCell, RobotsState};
-use super::world::{MountedSensor, RobotModel, Role};
+use super::world::{MountedSensor, Role};
 use super::{Event, EventKind, RobotsWorld, Scratch};
 use sidestep_kernel::math::{cos, sin};
-use sidestep_kernel::space::{BoxWord, Floor};
 use sidestep_kernel::view::{self, Body, Condition, Entry, Kind, Level, Pose, Scan, Shape};
-use sidestep_kernel::{Column, Cycle, EntityId, World};
-use sidestep_map::Cell;
+use sidestep_kernel::{Cycle, EntityId, Phases};
 use std::f64::consts::FRAC_PI_2;
 
 /// What a cycle counts as where seconds are asked for: the model itself knows no other time.
 pub(super) const CYCLE_S: f64 = 1.0;
+/// Longer ways cover a floor.
+const WORTH_CYCLES: Cycle = 400;
 
 impl RobotsWorld {
     /// The building without bodies.
     pub(super) fn scenery(&self, name: &str) -> view::Scenery {
-        let map = &self.map;
-        let occupancy = |cell: &Cell| match cell {
-            Cell::Free => view::Occupancy::Free,
-            Cell::Wall => view::Occupancy::Wall,
-            Cell::Unknown => view::Occupancy::Unknown,
-        };
         view::Scenery {
             name: name.into(),
             dimensions: 2,
             cycle_s: CYCLE_S,
-            floor: Some(view::Floor {
-                width: map.width(),
-                height: map.height(),
-                box_m: map.box_size_m,
-                origin_m: map.origin_m,
-                boxes: map.cells().iter().map(occupancy).collect(),
-            }),
+            floor: Some(self.map.floor()),
             bodies: Vec::new(),
+            names: Vec::new(),
         }
+    }
+
+    /// Recorded poses as places of robots and people.
+    pub(super) fn place_rows(&self) -> Vec<view::PlaceRows> {
+        let (scale_m, origin_m) = (self.map.box_size_m, self.map.origin_m);
+        let axis = |column, offset_m| view::Axis { column, scale_m, offset_m };
+        vec![view::PlaceRows {
+            table: "trajectories",
+            kind: Kind::Robot,
+            number: "body",
+            part: None,
+            axes: vec![axis("col_boxes", origin_m[0]), axis("row_boxes", origin_m[1])],
+            is_corner: true,
+            ahead: Some("heading"),
+            every: 1,
+            worth: WORTH_CYCLES,
+        }]
     }
 
     /// All bodies by id.
@@ -106,10 +113,7 @@ impl RobotsWorld {
     ) -> Vec<Scan> {
         let (cell, ty) = (state.body(id), self.type_of(id));
         let Role::Robot(model) = &ty.role else { return Vec::new() };
-        match &state.floor {
-            Floor::Narrow(floor) => self.read(model, (floor, state), now, cell, scratch),
-            Floor::Wide(floor) => self.read(model, (floor, state), now, cell, scratch),
-        }
+        with_scene!(self, state, now, |scene| scene.sense(model, cell, scratch));
         let pose = self.pose(id, cell, 0.5 * self.side_m(id));
         let mut readings = &scratch.readings[..];
         let scan = |sensor: &MountedSensor| {
@@ -118,17 +122,6 @@ impl RobotsWorld {
             scan(&sensor.model, own, self.side_m(id), (id, pose))
         };
         model.body.sensors.iter().map(scan).collect()
-    }
-
-    fn read<T: BoxWord>(
-        &self,
-        model: &RobotModel,
-        (floor, state): (&Column<T>, &RobotsState),
-        now: Cycle,
-        cell: &BodyCell,
-        scratch: &mut Scratch,
-    ) {
-        self.sense(model, (floor, state), now, cell, scratch);
     }
 
     /// An event in words.

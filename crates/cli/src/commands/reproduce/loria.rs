@@ -1,16 +1,16 @@
 //! `sidestep reproduce loria`.
 
-use super::{EXAMPLES, Outcome, check_vacant, deliver};
+use super::{EXAMPLES, Outcome, check_vacant, deliver, drawn};
 use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
 use crate::interrupt;
 use crate::progress::Stages;
-use crate::worlds::robots::picture::{Ways, with_ways};
 use clap::Args;
 use sidestep::kernel::ports::{RecordError, Recorder, TableSchema};
 use sidestep_document::document::Picture;
-use sidestep_draw::{DrawError, Style, to_svg};
-use sidestep_papers::loria::scenes::{self, Scene};
+use sidestep_draw::{DrawError, describe};
+use sidestep_papers::Scene;
+use sidestep_papers::loria::scenes;
 use sidestep_papers::loria::{LoriaError, NewRecorder, Plan, Report, in_memory, run_recorded};
 use sidestep_record::{Origin, ParquetRecorder};
 use std::path::{Path, PathBuf};
@@ -62,19 +62,17 @@ pub(super) fn reproduce(args: &LoriaArgs, console: Console) -> Result<ExitCode, 
         }
     };
     let scenes = scenes::all(&report.plan);
-    let pictures: Vec<Picture> = scenes.into_iter().map(drawn).collect::<Result<_, _>>()?;
+    let pictures: Vec<Picture> = scenes.iter().map(described).collect::<Result<_, _>>()?;
     let document = report.document(pictures);
     let (claims, quick) = (&report.claims, report.plan.quick);
     deliver(&report, &Outcome { document, claims, quick }, args.out.as_deref(), console)
 }
 
-fn drawn(scene: Scene) -> Result<Picture, DrawError> {
-    let ways = Ways { from: scene.from, of: scene.ways };
-    let origin = format!("Medium floor, seed {}", scenes::SEED);
-    let mut drawn = with_ways(&scene.simulation, ways, &origin);
-    // It stands beside the picture.
-    let caption = std::mem::take(&mut drawn.caption);
-    Ok(Picture { title: scene.title.into(), caption, svg: to_svg(&drawn, &Style::MAP)? })
+/// A picture whose caption begins with what is seen.
+fn described(scene: &Scene) -> Result<Picture, DrawError> {
+    let what = describe(&scene.scenery, &scene.frame, &scene.trails);
+    let picture = drawn(scene)?;
+    Ok(Picture { caption: format!("{what} {}", picture.caption), ..picture })
 }
 
 fn run(plan: &Plan, recorders: &mut NewRecorder<'_>, console: Console) -> Result<Report, Failure> {

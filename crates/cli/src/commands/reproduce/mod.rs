@@ -6,14 +6,17 @@ mod serpentine;
 
 use crate::console::{Console, aligned};
 use crate::exit::{ExitCode, Failure};
-use crate::files::replace;
 use crate::pages::{Pages, Raster};
 use clap::{Args, Subcommand};
 use serde::Serialize;
 use sidestep::kernel::InputError;
 use sidestep_document::Document;
 use sidestep_document::claim::{Claim, tally};
+use sidestep_document::document::Picture;
+use sidestep_draw::{DrawError, Options, Style, draw};
+use sidestep_papers::Scene;
 use sidestep_report::markdown::without_pictures;
+use sidestep_session::replace;
 use std::io::Write;
 use std::path::Path;
 
@@ -52,6 +55,14 @@ pub(crate) fn reproduce(args: &ReproduceArgs, console: Console) -> Result<ExitCo
         Paper::Agentfly(args) => agentfly::reproduce(args, console),
         Paper::Serpentine(args) => serpentine::reproduce(args, console),
     }
+}
+
+/// A picture whose words stand beside it.
+fn drawn(scene: &Scene) -> Result<Picture, DrawError> {
+    let (title, caption) = (String::new(), String::new());
+    let options = Options { style: Style::MAP, title, caption };
+    let svg = draw(&scene.scenery, &scene.frame, &scene.trails, &options)?;
+    Ok(Picture { title: scene.title.clone(), caption: scene.caption.clone(), svg })
 }
 
 fn check_vacant(folder: &Path) -> Result<(), InputError> {

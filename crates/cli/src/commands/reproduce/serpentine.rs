@@ -1,14 +1,11 @@
 //! `sidestep reproduce serpentine`.
 
-use super::{EXAMPLES, Outcome, check_vacant, deliver};
+use super::{EXAMPLES, Outcome, check_vacant, deliver, drawn};
 use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
 use crate::progress::Stages;
-use crate::worlds::chain::picture::drawn_obstacle;
 use clap::Args;
 use sidestep_document::document::Picture;
-use sidestep_draw::{BodyScene, DrawError, Strand, Style, Trail};
-use sidestep_papers::serpentine::scenes::{Scene, View};
 use sidestep_papers::serpentine::{self, Plan};
 use std::path::PathBuf;
 
@@ -51,38 +48,4 @@ pub(super) fn reproduce(args: &SerpentineArgs, console: Console) -> Result<ExitC
     let (document, claims) = (report.document(pictures), &report.claims);
     let quick = report.plan.quick;
     deliver(&report, &Outcome { document, claims, quick }, args.out.as_deref(), console)
-}
-
-fn drawn(scene: &Scene) -> Result<Picture, DrawError> {
-    match scene {
-        Scene::Plane(view) => picture(view, body_scene(view).to_svg(&Style::MAP)),
-        Scene::Space(view) => picture(view, body_scene(view).to_svg(&Style::MAP)),
-    }
-}
-
-fn picture<const D: usize>(
-    view: &View<D>,
-    svg: Result<String, DrawError>,
-) -> Result<Picture, DrawError> {
-    Ok(Picture { title: view.title.clone(), caption: view.caption.clone(), svg: svg? })
-}
-
-fn body_scene<const D: usize>(view: &View<D>) -> BodyScene<D> {
-    let strand = |s: &serpentine::scenes::Strand<D>| Strand {
-        points: s.points.clone(),
-        connector_radius_m: s.connector_radius_m,
-        rod_radius_m: s.rod_radius_m,
-        label: s.name.clone(),
-    };
-    let trail =
-        |points: &Vec<[f64; D]>| Trail { points: points.clone(), color: 0, label: String::new() };
-    BodyScene {
-        obstacles: view.obstacles.iter().map(drawn_obstacle).collect(),
-        strands: view.strands.iter().map(strand).collect(),
-        trails: view.trails.iter().map(trail).collect(),
-        view_m: None,
-        // Both stand beside the picture.
-        title: String::new(),
-        caption: String::new(),
-    }
 }

@@ -1,8 +1,7 @@
 //! One cell -> one row.
 
 use super::plan::Cell;
-use crate::scenario::Source;
-use crate::worlds::any::AnyCompiled;
+use crate::scenario::{Source, Worlds};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use sidestep_kernel::{Cycle, InputError, Simulation};
@@ -39,13 +38,18 @@ pub struct Started {
     until: Cycle,
 }
 
-/// The simulation of a cell of the variant `source`, at its start.
+/// The simulation of a cell of the variant `source`, of one of `worlds`, at its start.
 ///
 /// # Errors
 /// When the scenario is wrong with this seed.
-pub fn start(cell: Cell, source: &Source, workers: usize) -> Result<Started, InputError> {
+pub fn start(
+    worlds: Worlds,
+    cell: Cell,
+    source: &Source,
+    workers: usize,
+) -> Result<Started, InputError> {
     let source = source.clone().with(&[format!("seed={}", cell.seed)])?;
-    let compiled = AnyCompiled::new(&source)?;
+    let compiled = worlds.compile(&source)?;
     let until = compiled.plan().cycles;
     Ok(Started { cell, simulation: compiled.start(&source, workers), until })
 }
@@ -132,6 +136,7 @@ fn add(found: &mut Map<String, Value>, name: &str, value: &Value) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::worlds::WORLDS;
     use serde_json::json;
 
     const ROBOTS: &str = "format = 1\nworld = \"robots\"\ncycles = 300\n[map]\n\
@@ -146,7 +151,7 @@ mod tests {
 
     fn outcome(text: &str, seed: u64, workers: usize) -> Outcome {
         let source = Source::new("s.toml", text, "");
-        let started = start(cell(seed), &source, workers).expect("valid");
+        let started = start(WORLDS, cell(seed), &source, workers).expect("valid");
         started.run(&|| true).expect("not stopped")
     }
 
@@ -171,7 +176,7 @@ mod tests {
     #[test]
     fn a_run_that_is_to_stop_is_no_row() {
         let source = Source::new("s.toml", ROBOTS, "");
-        assert_eq!(start(cell(1), &source, 1).expect("valid").run(&|| false), None);
+        assert_eq!(start(WORLDS, cell(1), &source, 1).expect("valid").run(&|| false), None);
     }
 
     #[test]

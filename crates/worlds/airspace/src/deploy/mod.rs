@@ -285,7 +285,7 @@ impl AirspaceWorld {
 #[cfg(test)]
 mod tests {
     use super::super::metrics::Metrics;
-    use super::super::simulation::AirspaceSimulation;
+    use super::super::{AirspaceRun, airspace_run};
     use proptest::prelude::*;
     use sidestep_kernel::{Digest, Simulation};
     use sidestep_scenario::Source;
@@ -296,9 +296,9 @@ mod tests {
              deployment = \"{deployment}\"\nmax_rounds = 60\nshield = \"off\"\n{more}\n\
              [airspace.generator]\nkind = \"superconflict\"\nn = 5\n"
         );
-        let mut run = AirspaceSimulation::new(&Source::new("s", text, ""), 1).expect("a scenario");
+        let mut run = airspace_run(&Source::new("s", text, ""), 1).expect("a scenario");
         run.advance(25);
-        (run.digest(), run.airspace_metrics())
+        (run.digest(), run.metrics())
     }
 
     /// On a faultless network, with exact expectations in sequence and in parallel, and with
@@ -331,18 +331,13 @@ mod tests {
     const FAULTS: &str = "network = { loss = 0.1, duplication = 0.05, max_delay_s = 0.003, \
          silent = [{ airplane = 2, from_s = 60.0 }] }";
 
-    fn over_a_bad_network(
-        preset: &str,
-        deployment: &str,
-        more: &str,
-        seed: u64,
-    ) -> AirspaceSimulation {
+    fn over_a_bad_network(preset: &str, deployment: &str, more: &str, seed: u64) -> AirspaceRun {
         let text = format!(
             "format = 1\nworld = \"airspace\"\nseed = {seed}\n[airspace]\npreset = \"{preset}\"\n\
              deployment = \"{deployment}\"\nmax_rounds = 40\n{more}\n\
              [airspace.generator]\nkind = \"superconflict\"\nn = 5\n"
         );
-        AirspaceSimulation::new(&Source::new("s", text, ""), 1).expect("a scenario")
+        airspace_run(&Source::new("s", text, ""), 1).expect("a scenario")
     }
 
     /// Whatever is lost, everybody ends in time, nobody comes too near, and all arrive but the
@@ -353,7 +348,7 @@ mod tests {
             for (preset, seed) in [("default", 1), ("default", 2), ("paper", 1)] {
                 let mut run = over_a_bad_network(preset, deployment, FAULTS, seed);
                 run.advance(300);
-                let metrics = run.airspace_metrics();
+                let metrics = run.metrics();
                 let what = format!("{deployment}, {preset}, seed {seed}: {metrics:?}");
                 assert_eq!(metrics.losses_of_separation, 0, "{what}");
                 assert_eq!(metrics.arrived, 4, "{what}");
@@ -372,7 +367,7 @@ mod tests {
         for (deployment, more) in [("team", worse[0]), ("pim", worse[0]), ("team", worse[1])] {
             let mut run = over_a_bad_network("default", deployment, more, 3);
             run.advance(60);
-            let metrics = run.airspace_metrics();
+            let metrics = run.metrics();
             assert_eq!(metrics.losses_of_separation, 0, "{deployment}, {more}: {metrics:?}");
             assert!(metrics.deadlines_missed + metrics.contacts_lost > 0, "{more}: {metrics:?}");
         }
@@ -386,7 +381,7 @@ mod tests {
                            silent = [{ airplane = 1, from_s = 60.0 }] }";
             let mut run = over_a_bad_network("default", deployment, network, 1);
             run.advance(300);
-            let metrics = run.airspace_metrics();
+            let metrics = run.metrics();
             assert_eq!((metrics.losses_of_separation, metrics.arrived), (0, 4), "{metrics:?}");
         }
     }
@@ -398,7 +393,7 @@ mod tests {
             let more = "network = { loss = 0.9 }";
             let mut run = over_a_bad_network("paper", "compact-team", more, seed);
             run.advance(40);
-            assert_eq!(run.airspace_metrics().losses_of_separation, 0);
+            assert_eq!(run.metrics().losses_of_separation, 0);
         }
     }
 
@@ -424,9 +419,9 @@ mod tests {
                  way_points_m = [[{x}, -6000]]\n",
                 ["team", "pim"][deployment], silent.join(", "),
             );
-            let mut run = AirspaceSimulation::new(&Source::new("s", text, ""), 1).expect("valid");
+            let mut run = airspace_run(&Source::new("s", text, ""), 1).expect("valid");
             run.advance(90);
-            let metrics = run.airspace_metrics();
+            let metrics = run.metrics();
             let told = &metrics.too_close;
             prop_assert!(
                 metrics.losses_of_separation == 0 || !told.is_empty(), "{metrics:?}"
@@ -441,7 +436,7 @@ mod tests {
             let more = format!("shield = \"off\"\n{FAULTS}");
             let mut run = over_a_bad_network("default", deployment, &more, 1);
             run.advance(300);
-            assert_eq!(run.airspace_metrics().arrived, 5, "{deployment}");
+            assert_eq!(run.metrics().arrived, 5, "{deployment}");
         }
     }
 
@@ -459,8 +454,7 @@ mod tests {
                  [airspace.network]\n{network}\n\
                  [airspace.generator]\nkind = \"superconflict\"\nn = 3\n"
             );
-            let error =
-                AirspaceSimulation::new(&Source::new("s", text, ""), 1).expect_err("refused");
+            let error = airspace_run(&Source::new("s", text, ""), 1).expect_err("refused");
             assert!(error.to_string().contains(cause), "{error}");
         }
     }
@@ -470,7 +464,7 @@ mod tests {
         let text = "format = 1\nworld = \"airspace\"\n[airspace]\npreset = \"paper\"\n\
                     order = \"sequence\"\ndeployment = \"team\"\n\
                     [airspace.generator]\nkind = \"superconflict\"\nn = 3\n";
-        let error = AirspaceSimulation::new(&Source::new("s", text, ""), 1).expect_err("refused");
+        let error = airspace_run(&Source::new("s", text, ""), 1).expect_err("refused");
         assert!(error.to_string().contains("parallel"), "{error}");
     }
 }

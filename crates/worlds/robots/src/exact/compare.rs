@@ -3,9 +3,9 @@
 use super::Model;
 use super::chain::total_variation;
 use super::obstacle::Pose;
+use crate::RobotsRun;
 use crate::decide::Random;
 use crate::scenario::Compiled;
-use crate::simulation::RobotsSimulation;
 use crate::world::{RobotsWorld, Role};
 use serde::Serialize;
 use sidestep_kernel::stream::Streams;
@@ -106,7 +106,7 @@ fn last_poses(
     for run in 0..u64::from(runs) {
         world.streams = Streams::new(Seed(compiled.seed.wrapping_add(run)));
         let compiled = Compiled { world: Arc::new(world.clone()), ..compiled.clone() };
-        let mut simulation = RobotsSimulation::from_compiled(compiled, source, 1);
+        let mut simulation = compiled.start(source, 1);
         simulation.advance(cycles);
         *counts.entry(pose(&simulation)).or_insert(0) += 1;
     }
@@ -122,7 +122,7 @@ fn follow(world: &mut RobotsWorld, policy: &Random) {
     }
 }
 
-fn pose(simulation: &RobotsSimulation) -> Pose {
+fn pose(simulation: &RobotsRun) -> Pose {
     let (world, state) = (simulation.world(), simulation.state());
     let slot = world.robots()[0];
     let (col, row) = world.map_position(state.at(slot));

@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 
 use crate::learn::sensor::{self, SensorOptions};
 use crate::learn::{Estimate, EstimateOptions, effector};
-use crate::simulation::RobotsSimulation;
+use crate::robots_run;
 use sidestep_import::table::CsvTable;
 use sidestep_kernel::Simulation;
-use sidestep_kernel::ports::recorder::{ColumnSpec, MemoryRecorder, TableSchema, Values};
+use sidestep_kernel::ports::{ColumnSpec, MemoryRecorder, TableSchema};
 use sidestep_scenario::Source;
 use sidestep_statistics::chi_square_p;
 
@@ -61,7 +61,7 @@ effector = "wheels"
 
 /// Runs the scenario and writes the table `name` that it recorded as CSV.
 fn recorded(name: &str) -> CsvTable {
-    let mut run = RobotsSimulation::new(&scenario(), 2).unwrap();
+    let mut run = robots_run(&scenario(), 2).unwrap();
     run.begin_recording();
     let schemas = run.schemas();
     let mut recorder = MemoryRecorder::new(&schemas);
@@ -78,14 +78,8 @@ fn as_csv(recorder: &MemoryRecorder, schema: &TableSchema) -> String {
     let names: Vec<&str> = schema.columns.iter().map(|column| column.name.as_str()).collect();
     let mut csv = names.join(",") + "\n";
     for row in 0..recorder.rows(&schema.name) {
-        let field = |column: &ColumnSpec| match recorder.column(&schema.name, &column.name) {
-            Some(Values::U32(values)) => values[row].to_string(),
-            Some(Values::U64(values)) => values[row].to_string(),
-            Some(Values::I32(values)) => values[row].to_string(),
-            Some(Values::F64(values)) => values[row].to_string(),
-            Some(Values::Label(values)) => column.labels[values[row] as usize].clone(),
-            None => String::new(),
-        };
+        let values = |column: &ColumnSpec| recorder.column(&schema.name, &column.name).unwrap();
+        let field = |column: &ColumnSpec| column.text(values(column), row);
         let fields: Vec<String> = schema.columns.iter().map(field).collect();
         csv += &(fields.join(",") + "\n");
     }

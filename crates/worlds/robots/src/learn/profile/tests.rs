@@ -51,7 +51,7 @@ fn loads(profile: &str, sensor: &str, effector: &str) -> Result<Compiled, InputE
 #[test]
 fn a_scenario_loads_what_was_learned() {
     let compiled = loads(&both(), "eye", "wheels").unwrap();
-    let sensor = compiled.sensors().next().unwrap().clone();
+    let sensor = compiled.world.sensors().next().unwrap().clone();
     let profile = sensor_model().profile;
     assert_eq!(sensor.observations, ["nothing", "robot", "wall"]);
     for (index, row) in profile.confusion.iter().enumerate() {

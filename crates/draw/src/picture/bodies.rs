@@ -1,0 +1,326 @@
+//! Everything that has a shape.
+
+use std::fmt::Write as _;
+
+use super::Scene;
+use super::canvas::{Canvas, Px, corners, dot};
+use crate::legend::start_mark;
+use crate::style::{INK, hex};
+use crate::svg::{Num, Svg};
+use sidestep_kernel::view::{Body, Color, Condition, Kind, Place, Pose, Scenery, Shape, WALL};
+
+/// Thinner lines than this would vanish.
+const LEAST_LINE_PX: f64 = 1.4;
+/// Smaller things are drawn with this radius.
+const LEAST_RADIUS_PX: f64 = 1.2;
+/// Arrowheads are drawn at least this long.
+const LEAST_DART_PX: f64 = 9.0;
+/// The mark of those who lead has at least this radius, from above and in space.
+const LEADER_PX: [f64; 2] = [3.0, 5.0];
+/// A goal has at least this radius.
+const LEAST_GOAL_PX: f64 = 3.5;
+/// The time whose way a moving body's arrow shows, in seconds.
+const ARROW_S: f64 = 1.0;
+/// Corners of a circle that is seen from the side.
+const CORNERS: usize = 32;
+/// Agents without a trail, where others have one.
+const DARK: Color = [0x22, 0x22, 0x22];
+/// What is far away in space is as pale as this.
+const FAR: f64 = 215.0;
+
+/// Walls without thickness that stand still, seen from above, as one path.
+pub(super) fn draw_walls(svg: &mut Svg, scenery: &Scenery, canvas: &Canvas) {
+    let mut data = String::new();
+    for body in scenery.bodies.iter().filter(|body| is_wall(body)) {
+        if let Shape::Line { points_m, .. } = &body.shape {
+            data += &path_data(points_m.iter().map(|&p| canvas.at(p)));
+        }
+    }
+    if !data.is_empty() {
+        let (wall, look) = (hex(WALL), r#"fill="none" stroke-width="1.5" stroke-linecap="round""#);
+        svg.path(&data, format_args!(r#"class="walls" stroke="{wall}" {look}"#));
+    }
+}
+
+fn is_wall(body: &Body) -> bool {
+    let is_thin = matches!(body.shape, Shape::Line { thickness_m: 0.0, .. });
+    body.kind == Kind::Obstacle && is_thin && !body.moves()
+}
+
+/// Bodies seen from above, those of lower layers first.
+pub(super) fn draw_layers(
+    svg: &mut Svg,
+    scene: &Scene<'_>,
+    canvas: &Canvas,
+    bodies: &[Body],
+    layers: std::ops::RangeInclusive<u8>,
+) {
+    let layer = |body: &Body| body.appearance(scene.scenery.dimensions).layer;
+    let mut shown: Vec<&Body> =
+        bodies.iter().filter(|body| layers.contains(&layer(body)) && !is_wall(body)).collect();
+    // Stable: of bodies of a layer the one named first is drawn first.
+    shown.sort_by_key(|body| layer(body));
+    shown.into_iter().for_each(|body| draw_body(svg, scene, canvas, body));
+}
+
+/// Bodies in space, far ones first; a line with many points by its parts.
+pub(super) fn draw_by_depth<'a>(
+    svg: &mut Svg,
+    scene: &Scene<'_>,
+    canvas: &Canvas,
+    bodies: impl Iterator<Item = &'a Body>,
+) {
+    let mut parts: Vec<(f64, &Body, Option<usize>)> = Vec::new();
+    for body in bodies {
+        match &body.shape {
+            Shape::Line { points_m, .. } => {
+                let depth_m =
+                    |pair: &[Place]| 0.5 * (depth(canvas, pair[0]) + depth(canvas, pair[1]));
+                let pairs = points_m.windows(2).enumerate();
+                parts.extend(pairs.map(|(k, pair)| (depth_m(pair), body, Some(k))));
+            }
+            _ => parts.push((depth(canvas, body.pose.at_m), body, None)),
+        }
+    }
+    // Stable: of things equally far the one named first is drawn first.
+    parts.sort_by(|a, b| a.0.total_cmp(&b.0));
+    for (_, body, segment) in parts {
+        match (&body.shape, segment) {
+            (Shape::Line { points_m, .. }, Some(k)) => {
+                draw_line(svg, scene, canvas, body, &points_m[k..k + 2]);
+            }
+            _ => draw_body(svg, scene, canvas, body),
+        }
+    }
+}
+
+fn depth(canvas: &Canvas, at: Place) -> f64 {
+    canvas.camera.depth_m(at)
+}
+
+/// The color of a body, and how much of what is behind it it hides.
+fn fill(scene: &Scene<'_>, canvas: &Canvas, body: &Body) -> (Color, f64) {
+    let look = body.appearance(scene.scenery.dimensions);
+    let acts = body.kind.is_agent() || body.kind == Kind::Rods;
+    if acts && body.state == Condition::Plain && scene.is_beside_trails(body) {
+        return (DARK, look.opacity);
+    }
+    if body.kind == Kind::Obstacle && !canvas.is_above() {
+        return (paler(look.color, canvas.nearness(body.pose.at_m)), look.opacity);
+    }
+    (look.color, look.opacity)
+}
+
+impl Scene<'_> {
+    /// Whether others have a trail and this one has none.
+    fn is_beside_trails(&self, body: &Body) -> bool {
+        !self.trails.is_empty() && self.trails.iter().all(|trail| trail.of.1 != body.number)
+    }
+}
+
+fn paler(color: Color, nearness: f64) -> Color {
+    color.map(|byte| (f64::from(byte) + (FAR - f64::from(byte)) * (1.0 - nearness)).round() as u8)
+}
+
+fn darker(color: Color) -> Color {
+    color.map(|byte| (0.66 * f64::from(byte)) as u8)
+}
+
+/// The line around a body.
+fn rim(canvas: &Canvas, body: &Body, color: Color) -> String {
+    let line =
+        |color: Color, width: f64| format!(r#"stroke="{}" stroke-width="{width}""#, hex(color));
+    let white = [0xFF; 3];
+    match body.kind {
+        Kind::Door if body.state == Condition::Open => {
+            format!(r#"{} stroke-dasharray="3 2""#, line(color, 1.0))
+        }
+        Kind::Obstacle if canvas.is_above() => line(darker(color), 0.8),
+        Kind::Obstacle => format!(r#"{} stroke-opacity="0.5""#, line(darker(color), 0.6)),
+        Kind::Zone => format!(r#"{} stroke-opacity="0.6""#, line(color, 0.8)),
+        Kind::Start => format!(r#"{} stroke-dasharray="5 3""#, line(color, 1.0)),
+        Kind::Goal | Kind::Person | Kind::Door => line(darker(color), 1.0),
+        Kind::Connector if canvas.is_above() => line(white, 0.6),
+        Kind::Airplane => line(white, 0.6),
+        Kind::Robot => line(DARK, 0.8),
+        Kind::Connector | Kind::Rods => String::new(),
+    }
+}
+
+fn draw_body(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, body: &Body) {
+    let (color, opacity) = fill(scene, canvas, body);
+    let hides = if opacity < 1.0 { format!(r#" fill-opacity="{opacity}""#) } else { String::new() };
+    let look = format!(r#"fill="{}"{hides} {}"#, hex(color), rim(canvas, body, color));
+    match &body.shape {
+        Shape::Line { points_m, .. } => draw_line(svg, scene, canvas, body, points_m),
+        Shape::Cuboid { size_m } => {
+            for face in faces(&body.pose, *size_m, canvas) {
+                svg.path(&outline(face.map(|p| canvas.at(p))), &look);
+            }
+        }
+        Shape::Cylinder { radius_m, .. } if !canvas.is_above() => {
+            svg.path(&outline(circle(&body.pose, *radius_m).map(|p| canvas.at(p))), look);
+        }
+        Shape::Cylinder { radius_m, .. } | Shape::Sphere { radius_m } => {
+            let least_px = if body.kind == Kind::Goal { LEAST_GOAL_PX } else { LEAST_RADIUS_PX };
+            let radius_px = (radius_m * canvas.px_per_m).max(least_px);
+            svg.circle(canvas.at(body.pose.at_m), radius_px, look);
+        }
+        Shape::Dart { length_m, width_m } => {
+            let grown = (LEAST_DART_PX / (length_m * canvas.px_per_m)).max(1.0);
+            let corners = dart(&body.pose, length_m * grown, width_m * grown);
+            svg.path(&outline(corners.map(|p| canvas.at(p))), look);
+        }
+    }
+    draw_heading(svg, canvas, body);
+}
+
+/// A line as thick as it is, round at its ends.
+fn draw_line(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, body: &Body, points_m: &[Place]) {
+    let Shape::Line { thickness_m, .. } = body.shape else { return };
+    let (color, opacity) = fill(scene, canvas, body);
+    let width = Num((thickness_m * canvas.px_per_m).max(LEAST_LINE_PX));
+    let hides = if opacity < 1.0 { r#" stroke-opacity="0.45""# } else { "" };
+    let data = path_data(points_m.iter().map(|&p| canvas.at(p)));
+    let ends = r#"stroke-linecap="round" stroke-linejoin="round""#;
+    let color = hex(color);
+    let look = format!(r#"fill="none" stroke="{color}" stroke-width="{width}"{hides} {ends}"#);
+    svg.path(&data, look);
+}
+
+/// An arrowhead on a robot that shows where it looks.
+fn draw_heading(svg: &mut Svg, canvas: &Canvas, body: &Body) {
+    let (side_m, top_m) = match body.shape {
+        Shape::Cuboid { size_m: [x, y, z] } => (x.min(y), 0.5 * z),
+        Shape::Cylinder { radius_m, height_m } => (1.6 * radius_m, 0.5 * height_m),
+        _ => return,
+    };
+    if body.kind == Kind::Robot {
+        let size_m = 0.34 * side_m;
+        let corners =
+            [[size_m, 0.0], [-0.7 * size_m, 0.6 * size_m], [-0.7 * size_m, -0.6 * size_m]];
+        let corners = corners.map(|[x, y]| canvas.at(body.pose.place([x, y, top_m])));
+        svg.path(&outline(corners), r##"fill="#FFFFFF""##);
+    }
+}
+
+/// What is drawn over everything: where moving things go, and who leads.
+pub(super) fn draw_marks(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas) {
+    let bodies = || scene.scenery.bodies.iter().chain(&scene.frame.bodies);
+    for body in bodies().filter(|body| body.kind == Kind::Obstacle && body.moves()) {
+        let from = middle(body);
+        let to = std::array::from_fn(|k| from[k] + ARROW_S * body.velocity_m_s[k]);
+        arrow(svg, canvas.at(from), canvas.at(to));
+    }
+    for body in bodies().filter(|body| leads(body)) {
+        if let Shape::Sphere { radius_m } = body.shape {
+            let least_px = LEADER_PX[usize::from(!canvas.is_above())];
+            let radius_px = (0.7 * radius_m * canvas.px_per_m).max(least_px);
+            let (color, _) = fill(scene, canvas, body);
+            start_mark(svg, canvas.at(body.pose.at_m), radius_px, &hex(color));
+        }
+    }
+}
+
+/// The first connector of a chain leads.
+pub(super) fn leads(body: &Body) -> bool {
+    body.kind == Kind::Connector && body.part == Some(0)
+}
+
+/// The middle of a body, wherever its pose is.
+fn middle(body: &Body) -> Place {
+    match &body.shape {
+        Shape::Line { points_m, .. } => {
+            let n = points_m.len().max(1) as f64;
+            std::array::from_fn(|k| points_m.iter().map(|p| p[k]).sum::<f64>() / n)
+        }
+        _ => body.pose.at_m,
+    }
+}
+
+/// The faces of a box that look toward the eye.
+fn faces(pose: &Pose, size_m: Place, canvas: &Canvas) -> Vec<[Place; 4]> {
+    let half = size_m.map(|side_m| 0.5 * side_m);
+    let corners = corners([half.map(|m| -m), half]).map(|corner| pose.place(corner));
+    let turn = |k: usize| {
+        let mut axis = [0.0; 3];
+        axis[k] = 1.0;
+        dot(pose.turned(axis), canvas.camera.to_eye)
+    };
+    // A face that is seen from its edge alone has no extent.
+    let facing = (0..3).map(|k| (k, turn(k))).filter(|(_, turn)| turn.abs() > 1e-9);
+    let face = |(k, turn): (usize, f64)| {
+        let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+        let side = usize::from(turn > 0.0) << k;
+        [0, 1 << i, 1 << i | 1 << j, 1 << j].map(|bits: usize| corners[side | bits])
+    };
+    facing.map(face).collect()
+}
+
+/// A circle that lies flat.
+fn circle(pose: &Pose, radius_m: f64) -> [Place; CORNERS] {
+    std::array::from_fn(|k| {
+        let angle = k as f64 * std::f64::consts::TAU / CORNERS as f64;
+        pose.place([radius_m * libm::cos(angle), radius_m * libm::sin(angle), 0.0])
+    })
+}
+
+/// An arrowhead whose middle is at the pose.
+fn dart(pose: &Pose, length_m: f64, width_m: f64) -> [Place; 4] {
+    let (half_m, wing_m) = (0.5 * length_m, 0.5 * width_m);
+    let corners = [[half_m, 0.0], [-half_m, wing_m], [-0.5 * half_m, 0.0], [-half_m, -wing_m]];
+    corners.map(|[x, y]| pose.place([x, y, 0.0]))
+}
+
+/// An arrow; shorter than its head it is not drawn.
+fn arrow(svg: &mut Svg, from: Px, to: Px) {
+    const HEAD_PX: f64 = 6.0;
+    let (dx, dy) = (to.0 - from.0, to.1 - from.1);
+    let length = (dx * dx + dy * dy).sqrt();
+    if length <= HEAD_PX {
+        return;
+    }
+    let (ux, uy) = (HEAD_PX * dx / length, HEAD_PX * dy / length);
+    let neck = (to.0 - ux, to.1 - uy);
+    svg.line(from, neck, format_args!(r#"class="arrow" stroke="{INK}" stroke-width="1.3""#));
+    let wings =
+        [(neck.0 - 0.5 * uy, neck.1 + 0.5 * ux), to, (neck.0 + 0.5 * uy, neck.1 - 0.5 * ux)];
+    svg.path(&outline(wings), format_args!(r#"fill="{INK}""#));
+}
+
+fn outline(points: impl IntoIterator<Item = Px>) -> String {
+    path_data(points) + "Z"
+}
+
+/// A line through points.
+fn path_data(points: impl IntoIterator<Item = Px>) -> String {
+    let mut data = String::new();
+    for (index, (x, y)) in points.into_iter().enumerate() {
+        let command = if index == 0 { 'M' } else { 'L' };
+        // Writing into a String cannot fail.
+        let _ = write!(data, "{command}{} {}", Num(x), Num(y));
+    }
+    data
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::picture::canvas::Camera;
+    use crate::svg::Rect;
+
+    #[test]
+    fn a_box_shows_the_faces_before_its_middle() {
+        let map = Rect { x: 0.0, y: 0.0, width: 1.0, height: 1.0 };
+        let above = Canvas::above([0.0; 2], 1.0, map);
+        let corner = Canvas { camera: Camera::CORNER, ..above };
+        let pose = Pose::at([0.0; 3]);
+        assert_eq!(faces(&pose, [2.0, 4.0, 6.0], &above).len(), 1);
+        let faces = faces(&pose, [2.0, 4.0, 6.0], &corner);
+        assert_eq!(faces.len(), 3);
+        for face in faces {
+            let middle = std::array::from_fn(|k| face.iter().map(|p| 0.25 * p[k]).sum());
+            assert!(dot(middle, corner.camera.to_eye) > 0.0, "{middle:?}");
+        }
+    }
+}

@@ -1,0 +1,121 @@
+//! From places in meters to pixels, equally long in all directions.
+
+use crate::svg::Rect;
+use sidestep_kernel::view::Place;
+
+/// A point in pixels, y downward.
+pub(crate) type Px = (f64, f64);
+
+/// Nothing is drawn further than this outside a picture.
+const FURTHEST_PX: f64 = 1e5;
+
+/// From where one looks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Camera {
+    pub(crate) right: Place,
+    pub(crate) up: Place,
+    pub(crate) to_eye: Place,
+}
+
+impl Camera {
+    /// From above: x to the right, y up.
+    pub(crate) const ABOVE: Self =
+        Self { right: [1.0, 0.0, 0.0], up: [0.0, 1.0, 0.0], to_eye: [0.0, 0.0, 1.0] };
+    /// From a corner: 37 degrees about the vertical and 37 degrees above the horizon, in numbers
+    /// that doubles nearly hold.
+    pub(crate) const CORNER: Self =
+        Self { right: [0.8, 0.6, 0.0], up: [-0.36, 0.48, 0.8], to_eye: [0.48, -0.64, 0.6] };
+
+    /// Where a place is seen: meters to the right and up.
+    pub(crate) fn seen(&self, at: Place) -> [f64; 2] {
+        [dot(self.right, at), dot(self.up, at)]
+    }
+
+    pub(crate) fn depth_m(&self, at: Place) -> f64 {
+        dot(self.to_eye, at)
+    }
+
+    /// The least and the greatest of a box's corners in some direction.
+    pub(crate) fn range(direction: Place, box_m: [Place; 2]) -> [f64; 2] {
+        let along = corners(box_m).map(|corner| dot(corner, direction));
+        let least = along.into_iter().fold(f64::INFINITY, f64::min);
+        [least, along.into_iter().fold(f64::NEG_INFINITY, f64::max)]
+    }
+}
+
+pub(crate) fn dot(a: Place, b: Place) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// The corners of a box; bit k of a corner's number says at which end of axis k it is.
+pub(crate) fn corners([lo, hi]: [Place; 2]) -> [Place; 8] {
+    std::array::from_fn(|bits| {
+        std::array::from_fn(|k| if bits >> k & 1 == 1 { hi[k] } else { lo[k] })
+    })
+}
+
+/// Where a picture's places are.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Canvas {
+    pub(crate) camera: Camera,
+    pub(crate) px_per_m: f64,
+    /// The pixel of what is seen at `seen_m`.
+    pub(crate) zero: Px,
+    pub(crate) seen_m: [f64; 2],
+    /// The nearest and the furthest depth.
+    pub(crate) depths_m: [f64; 2],
+}
+
+impl Canvas {
+    /// Seen from above; `lo_m` is in the lower left corner of `map`.
+    pub(crate) fn above(lo_m: [f64; 2], px_per_m: f64, map: Rect) -> Self {
+        let zero = (map.x, map.bottom());
+        Self { camera: Camera::ABOVE, px_per_m, zero, seen_m: lo_m, depths_m: [0.0, 1.0] }
+    }
+
+    pub(crate) fn at(&self, place: Place) -> Px {
+        let [right_m, up_m] = self.camera.seen(place);
+        let px = |m: f64| (m * self.px_per_m).clamp(-FURTHEST_PX, FURTHEST_PX);
+        (self.zero.0 + px(right_m - self.seen_m[0]), self.zero.1 - px(up_m - self.seen_m[1]))
+    }
+
+    pub(crate) fn is_above(&self) -> bool {
+        self.camera == Camera::ABOVE
+    }
+
+    /// 0 for the furthest, 1 for the nearest.
+    pub(crate) fn nearness(&self, place: Place) -> f64 {
+        let [far_m, near_m] = self.depths_m;
+        ((self.camera.depth_m(place) - far_m) / (near_m - far_m)).clamp(0.0, 1.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_directions_are_perpendicular_and_one_long() {
+        for Camera { right, up, to_eye } in [Camera::ABOVE, Camera::CORNER] {
+            for (a, b, expected) in [
+                (right, right, 1.0),
+                (up, up, 1.0),
+                (to_eye, to_eye, 1.0),
+                (right, up, 0.0),
+                (up, to_eye, 0.0),
+                (to_eye, right, 0.0),
+            ] {
+                assert!((dot(a, b) - expected).abs() < 1e-15);
+            }
+        }
+    }
+
+    #[test]
+    fn a_meter_is_as_long_in_both_directions() {
+        let map = Rect { x: 40.0, y: 10.0, width: 300.0, height: 100.0 };
+        let canvas = Canvas::above([1.0, 2.0], 7.0, map);
+        assert_eq!(canvas.at([1.0, 2.0, 9.0]), (40.0, 110.0));
+        assert_eq!(canvas.at([11.0, 2.0, 0.0]), (110.0, 110.0));
+        assert_eq!(canvas.at([1.0, 12.0, 0.0]), (40.0, 40.0));
+    }
+}

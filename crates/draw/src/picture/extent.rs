@@ -1,0 +1,184 @@
+//! Where everything is, and whether it can be drawn at all.
+
+use super::Scene;
+use super::canvas::Camera;
+use crate::error::DrawError;
+use sidestep_kernel::view::{Body, Floor, Frame, Kind, Place, Scenery, Shape, Trail};
+
+/// The most boxes a map may have: 16384 x 16384.
+const MOST_BOXES: u64 = 1 << 28;
+/// The most bodies, their points, and points of trails together.
+const MOST_PARTS: u64 = 1 << 22;
+/// Beyond this, in meters, pictures say nothing.
+const FURTHEST_M: f64 = 1e9;
+/// Air around what is shown, compared with its longest side.
+const MARGIN: f64 = 0.03;
+/// No side is shorter than this, compared with the longest.
+const LEAST_SIDE: f64 = 0.2;
+
+/// Refuses what no picture can be drawn of.
+pub(crate) fn check(scenery: &Scenery, frame: &Frame, trails: &[Trail]) -> Result<(), DrawError> {
+    if let Some(floor) = &scenery.floor {
+        check_floor(floor)?;
+    }
+    let bodies = || scenery.bodies.iter().chain(&frame.bodies);
+    let points = |body: &Body| match &body.shape {
+        Shape::Line { points_m, .. } => points_m.len(),
+        _ => 1,
+    };
+    let found = bodies().map(points).sum::<usize>();
+    let found = (found + trails.iter().map(|trail| trail.way.len()).sum::<usize>()) as u64;
+    if found > MOST_PARTS {
+        return Err(DrawError::TooLarge { what: "bodies", found, limit: MOST_PARTS });
+    }
+    bodies().try_for_each(check_body)?;
+    trails.iter().flat_map(|trail| &trail.way).try_for_each(|(_, at)| check_place(at))
+}
+
+fn check_floor(floor: &Floor) -> Result<(), DrawError> {
+    let boxes = u64::from(floor.width) * u64::from(floor.height);
+    if boxes > MOST_BOXES {
+        let (what, limit) = ("boxes of the map", MOST_BOXES);
+        return Err(DrawError::TooLarge { what, found: boxes, limit });
+    }
+    DrawError::some("number of the map's boxes", boxes as usize)?;
+    DrawError::length("boxes of the map", boxes as usize, floor.boxes.len())?;
+    DrawError::positive("box size in m", floor.box_m)?;
+    let [lo, hi] = around_floor(floor);
+    check_place(&lo)?;
+    check_place(&hi)?;
+    let size_m = [hi[0] - lo[0], hi[1] - lo[1]];
+    size_m.into_iter().try_for_each(|m| DrawError::positive("size of the map in m", m).map(drop))
+}
+
+fn check_body(body: &Body) -> Result<(), DrawError> {
+    check_place(&body.pose.at_m)?;
+    check_place(&body.velocity_m_s)?;
+    check_place(&[body.pose.turn[0], body.pose.turn[1], body.pose.turn[2]])?;
+    check_place(&[body.pose.turn[3], 0.0, 0.0])?;
+    match &body.shape {
+        Shape::Cuboid { size_m } => size_m.iter().try_for_each(|&m| check_size(m)),
+        Shape::Cylinder { radius_m: a, height_m: b } | Shape::Dart { length_m: a, width_m: b } => {
+            check_size(*a).and_then(|()| check_size(*b))
+        }
+        Shape::Sphere { radius_m } => check_size(*radius_m),
+        Shape::Line { points_m, thickness_m } => {
+            check_size(*thickness_m)?;
+            points_m.iter().try_for_each(check_place)
+        }
+    }
+}
+
+fn check_place(at: &Place) -> Result<(), DrawError> {
+    match at.iter().find(|x| !(-FURTHEST_M..=FURTHEST_M).contains(*x)) {
+        None => Ok(()),
+        Some(&value) => {
+            Err(DrawError::Value { what: "a coordinate in m", value, must: "from -1e9 to 1e9" })
+        }
+    }
+}
+
+fn check_size(value: f64) -> Result<(), DrawError> {
+    match (0.0..=FURTHEST_M).contains(&value) {
+        true => Ok(()),
+        false => Err(DrawError::Value { what: "a size in m", value, must: "from 0 to 1e9" }),
+    }
+}
+
+fn around_floor(floor: &Floor) -> [Place; 2] {
+    let [x, y] = floor.origin_m;
+    let end = |origin: f64, boxes: u32| origin + f64::from(boxes) * floor.box_m;
+    [[x, y, 0.0], [end(x, floor.width), end(y, floor.height), 0.0]]
+}
+
+/// Lower and upper corner of all that is shown; never empty.
+pub(super) fn whole(scene: &Scene<'_>) -> Result<[Place; 2], DrawError> {
+    if let (Some(floor), true) = (&scene.scenery.floor, scene.is_plane()) {
+        return Ok(around_floor(floor));
+    }
+    let mut bounds = Bounds::default();
+    let bodies = scene.scenery.bodies.iter().chain(&scene.frame.bodies);
+    bodies.for_each(|body| bounds.hold_body(body));
+    let places = scene.trails.iter().flat_map(|trail| trail.way);
+    places.for_each(|(_, at)| bounds.hold(*at, 0.0));
+    bounds.grown()
+}
+
+/// Lower and upper corner of what a film shows: a floor, else wherever things come to be that are
+/// not in the way.
+pub(crate) fn around(scenery: &Scenery, frames: &[Frame]) -> Result<[Place; 2], DrawError> {
+    if let (Some(floor), 2) = (&scenery.floor, scenery.dimensions) {
+        check_floor(floor)?;
+        return Ok(around_floor(floor));
+    }
+    let mut bounds = Bounds::default();
+    for body in frames.iter().flat_map(|frame| &frame.bodies) {
+        if body.kind != Kind::Obstacle {
+            check_body(body)?;
+            bounds.hold_body(body);
+        }
+    }
+    bounds.grown()
+}
+
+/// The rectangle in which a box is seen.
+pub(crate) fn seen(camera: Camera, box_m: [Place; 2]) -> [[f64; 2]; 2] {
+    let (across, upward) = (Camera::range(camera.right, box_m), Camera::range(camera.up, box_m));
+    [[across[0], upward[0]], [across[1], upward[1]]]
+}
+
+struct Bounds {
+    lo: Place,
+    hi: Place,
+}
+
+impl Default for Bounds {
+    fn default() -> Self {
+        Self { lo: [f64::INFINITY; 3], hi: [f64::NEG_INFINITY; 3] }
+    }
+}
+
+impl Bounds {
+    fn hold(&mut self, at: Place, by_m: f64) {
+        for (k, x) in at.into_iter().enumerate() {
+            self.lo[k] = self.lo[k].min(x - by_m);
+            self.hi[k] = self.hi[k].max(x + by_m);
+        }
+    }
+
+    fn hold_body(&mut self, body: &Body) {
+        let at = body.pose.at_m;
+        match &body.shape {
+            Shape::Line { points_m, thickness_m } => {
+                points_m.iter().for_each(|&point| self.hold(point, 0.5 * thickness_m));
+            }
+            Shape::Cuboid { size_m } => {
+                let half = size_m.map(|m| 0.5 * m);
+                for corner in super::canvas::corners([half.map(|m| -m), half]) {
+                    self.hold(body.pose.place(corner), 0.0);
+                }
+            }
+            Shape::Cylinder { radius_m, .. } | Shape::Sphere { radius_m } => {
+                self.hold(at, *radius_m);
+            }
+            Shape::Dart { length_m, .. } => self.hold(at, 0.5 * length_m),
+        }
+    }
+
+    /// With air on all sides, and no side that is hardly there beside the others.
+    fn grown(self) -> Result<[Place; 2], DrawError> {
+        if self.lo[0] > self.hi[0] {
+            return Ok([[0.0; 3], [1.0; 3]]);
+        }
+        let side_m = |k: usize| self.hi[k] - self.lo[k];
+        let longest_m = (0..3).map(side_m).fold(0.0, f64::max);
+        let least_m = if longest_m > 0.0 { LEAST_SIDE * longest_m } else { 1.0 };
+        let by_m = |k: usize| MARGIN * longest_m + 0.5 * (least_m - side_m(k)).max(0.0);
+        let lo: Place = std::array::from_fn(|k| self.lo[k] - by_m(k));
+        let hi: Place = std::array::from_fn(|k| self.hi[k] + by_m(k));
+        for side_m in std::array::from_fn::<f64, 3, _>(|k| hi[k] - lo[k]) {
+            DrawError::positive("extent of what is shown in m", side_m)?;
+        }
+        Ok([lo, hi])
+    }
+}

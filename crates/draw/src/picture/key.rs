@@ -1,0 +1,136 @@
+//! The legend, and what a picture shows in words.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::trails::agents;
+use super::{Scene, bodies};
+use crate::legend::{Entry, Symbol};
+use crate::style::hex;
+use sidestep_kernel::Cycle;
+use sidestep_kernel::view::{Frame, Kind, Occupancy, Scenery, Trail, UNKNOWN, WALL, color_of};
+
+/// Things with a color of their own beyond this share one line of the legend.
+const MOST_NAMED: usize = 10;
+/// The color of a symbol that stands for things of all colors.
+const ANY: [u8; 3] = [0x70, 0x70, 0x70];
+/// How a trail on a floor looks in the legend.
+const RIBBON: f64 = 0.5;
+
+/// What a picture of these shows, in a sentence; nothing where nobody acts.
+pub fn describe(scenery: &Scenery, frame: &Frame, trails: &[Trail]) -> String {
+    let agents = agents(scenery, frame);
+    let Some((kind, _)) = agents.first() else { return String::new() };
+    let (scene, all, to) = (Scene::new(scenery, frame, trails), agents.len(), frame.cycle);
+    let of: BTreeSet<u32> = scene.trails.iter().map(|trail| trail.of.1).collect();
+    let from = scene.trails.first().map_or(0, |trail| trail.span[0]);
+    let (plural, to, from) = (plural(*kind, all), grouped(to), grouped(from));
+    match of.len() {
+        0 => format!("{} {plural} before cycle {to}.", grouped(all as Cycle)),
+        1 if all == 1 => format!("Track of one {plural}, cycles {from} to {to}."),
+        n if n == all => format!("Tracks of all {n} {plural}, cycles {from} to {to}."),
+        n => format!("Tracks of {n} of {all} {plural} (the others black), cycles {from} to {to}."),
+    }
+}
+
+fn plural(kind: Kind, n: usize) -> String {
+    let one = if kind == Kind::Connector { "chain" } else { kind.name() };
+    if n == 1 { one.into() } else { format!("{one}s") }
+}
+
+/// A number with its thousands set apart by spaces: `1 234 567`.
+fn grouped(number: u64) -> String {
+    let digits = number.to_string();
+    let mut grouped = String::new();
+    for (k, digit) in digits.chars().enumerate() {
+        if k > 0 && (digits.len() - k).is_multiple_of(3) {
+            grouped.push(' ');
+        }
+        grouped.push(digit);
+    }
+    grouped
+}
+
+/// The legend: only what the picture has.
+pub(super) fn entries(scene: &Scene<'_>) -> Vec<Entry> {
+    let swatch = |color, opacity| Symbol::Swatch {
+        fill: hex(color).into(),
+        rim: if opacity < 0.5 { hex(color).into() } else { "none".into() },
+        opacity,
+    };
+    let floor = scene.scenery.floor.as_ref();
+    let has = |occupancy| floor.is_some_and(|floor| floor.boxes.contains(&occupancy));
+    let mut entries = Vec::new();
+    if has(Occupancy::Wall) {
+        entries.push(Entry::new(swatch(WALL, 1.0), "wall"));
+    }
+    if has(Occupancy::Unknown) {
+        let (fill, rim) = (hex(UNKNOWN).into(), "#CCCCCC".into());
+        entries.push(Entry::new(Symbol::Swatch { fill, rim, opacity: 1.0 }, "unknown"));
+    }
+    // By layer, then in the order of the alphabet.
+    let mut kinds = BTreeMap::new();
+    for body in scene.scenery.bodies.iter().chain(&scene.frame.bodies) {
+        let look = body.appearance(scene.scenery.dimensions);
+        if !look.words.is_empty() {
+            let is_own = look.color == color_of(body.number);
+            let color = if is_own { ANY } else { look.color };
+            kinds.entry((look.layer, look.words)).or_insert((color, look.opacity));
+        }
+    }
+    let words = kinds.into_iter().map(|((_, words), (color, opacity))| (words, color, opacity));
+    entries.extend(words.map(|(words, color, opacity)| Entry::new(swatch(color, opacity), words)));
+    if scene.frame.bodies.iter().any(bodies::leads) {
+        entries.push(Entry::new(Symbol::Ring, "leader"));
+    }
+    if scene.trails.iter().any(|trail| trail.width_m.is_some()) {
+        entries.push(Entry::new(Symbol::Ring, "beginning of a track"));
+    }
+    entries.extend(named(scene));
+    entries
+}
+
+/// A line for everybody with a color: those with a trail, and chains.
+fn named(scene: &Scene<'_>) -> Vec<Entry> {
+    let trails = scene.trails.iter().map(|trail| (trail.of.1, (trail.of.0, trail.width_m)));
+    let chains = scene.frame.bodies.iter().filter(|body| bodies::leads(body));
+    let chains = chains
+        .filter(|body| {
+            scene.trails.is_empty() || scene.trails.iter().any(|t| t.of.1 == body.number)
+        })
+        .map(|body| (body.number, (body.kind, None)));
+    let all: BTreeMap<u32, (Kind, Option<f64>)> = chains.chain(trails).collect();
+    let entry = |(&number, &(kind, width_m)): (&u32, &(Kind, Option<f64>))| {
+        let color = hex(color_of(number)).into();
+        let symbol = match width_m {
+            Some(_) => Symbol::Swatch { fill: color, rim: "none".into(), opacity: RIBBON },
+            None => Symbol::Line { color, marker: None },
+        };
+        Entry::new(symbol, name(scene, kind, number))
+    };
+    let mut entries: Vec<Entry> = all.iter().take(MOST_NAMED).map(entry).collect();
+    if all.len() > MOST_NAMED {
+        let symbol = Symbol::Line { color: hex(ANY).into(), marker: None };
+        entries.push(Entry::new(symbol, format!("and {} more", all.len() - MOST_NAMED)));
+    }
+    entries
+}
+
+/// What something is called.
+pub(super) fn name(scene: &Scene<'_>, kind: Kind, number: u32) -> String {
+    let own = scene.scenery.names.iter().find(|(k, n, _)| (*k, *n) == (kind, number));
+    match own {
+        Some((_, _, name)) => name.clone(),
+        None => format!("{} {number}", plural(kind, 1)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn thousands_are_set_apart() {
+        let cases = [0, 12, 123, 1234, 123_456, 1_234_567].map(grouped);
+        assert_eq!(cases, ["0", "12", "123", "1 234", "123 456", "1 234 567"]);
+    }
+}

@@ -1,0 +1,118 @@
+//! Names beside those who have gone a way, where they cover neither each other nor anybody.
+
+use super::canvas::{Canvas, Px};
+use super::{Scene, key};
+use crate::legend::{end_mark, start_mark};
+use crate::style::{Style, hex};
+use crate::svg::{Anchor, Rect, Svg, TextLook};
+use crate::text::{self, Weight};
+use sidestep_kernel::view::{Body, Kind, Shape};
+
+/// With more trails than this there is no room for names.
+const MOST_LABELS: usize = 12;
+/// Between a name and what it names.
+const GAP_PX: f64 = 4.0;
+/// Distances at which room is looked for, in gaps.
+const FURTHER: [f64; 4] = [1.0, 3.0, 6.0, 10.0];
+
+/// Where a trail begins and ends, and the name of the one whose it is, if there is room.
+pub(super) fn draw(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, room: Rect, style: &Style) {
+    let mut taken: Vec<Rect> = Vec::new();
+    let mut wanted = Vec::new();
+    for trail in &scene.trails {
+        let Some((&(_, start), &(_, end))) = trail.way.first().zip(trail.way.last()) else {
+            continue;
+        };
+        let (start, end, color) = (canvas.at(start), canvas.at(end), hex(trail.color));
+        let body = scene.frame.bodies.iter().find(|body| body.who() == trail.of);
+        let radius_px = body.map_or(0.0, |body| radius_m(body) * canvas.px_per_m);
+        let mark_px = (0.56 * radius_px).clamp(3.0, 6.0);
+        // Where the body itself is drawn it needs no mark.
+        if trail.width_m.is_some() && contains(room, start) {
+            start_mark(svg, start, mark_px, &color);
+        }
+        if body.is_none() && contains(room, end) {
+            end_mark(svg, end, 3.0, &color);
+        }
+        let clear_px = if body.is_some() { radius_px.max(mark_px) } else { mark_px };
+        taken.push(around(end, clear_px));
+        // Parts of a thing have no name of their own.
+        if trail.of.2.is_none() && contains(room, end) {
+            wanted.push((end, clear_px, key::name(scene, trail.of.0, trail.of.1)));
+        }
+    }
+    if wanted.len() > MOST_LABELS {
+        return;
+    }
+    let matters = |body: &&Body| {
+        body.kind.is_agent() || matches!(body.kind, Kind::Person | Kind::Start | Kind::Goal)
+    };
+    let others = scene.scenery.bodies.iter().chain(&scene.frame.bodies).filter(matters);
+    taken.extend(
+        others.map(|body| around(canvas.at(body.pose.at_m), radius_m(body) * canvas.px_per_m)),
+    );
+    for (at, clear_px, words) in wanted {
+        write(svg, (at, clear_px), &words, room, &mut taken, style);
+    }
+}
+
+fn radius_m(body: &Body) -> f64 {
+    match body.shape {
+        Shape::Cuboid { size_m: [x, y, _] } => 0.5 * x.max(y),
+        Shape::Cylinder { radius_m, .. } | Shape::Sphere { radius_m } => radius_m,
+        Shape::Dart { length_m, .. } => 0.5 * length_m,
+        Shape::Line { .. } => 0.0,
+    }
+}
+
+fn around((x, y): Px, radius: f64) -> Rect {
+    Rect { x: x - radius, y: y - radius, width: 2.0 * radius, height: 2.0 * radius }
+}
+
+fn contains(room: Rect, (x, y): Px) -> bool {
+    (room.x..=room.right()).contains(&x) && (room.y..=room.bottom()).contains(&y)
+}
+
+/// Writes words beside a point where there is room; nothing where there is none.
+fn write(
+    svg: &mut Svg,
+    ((x, y), clear_px): (Px, f64),
+    words: &str,
+    room: Rect,
+    taken: &mut Vec<Rect>,
+    style: &Style,
+) {
+    let size = style.small_px();
+    let look = TextLook { halo: true, weight: Weight::Bold, ..TextLook::new(size, Anchor::Start) };
+    let width = text::width(words, size, Weight::Bold);
+    // Letters reach a little beyond their size.
+    let height = 1.3 * size;
+    let places = FURTHER.iter().flat_map(|&gaps| {
+        let out = clear_px + gaps * GAP_PX;
+        let (left, middle, up) = (x - out - width, x - 0.5 * width, y - out - height);
+        [
+            (x + out, y - 0.5 * height),
+            (left, y - 0.5 * height),
+            (middle, up),
+            (middle, y + out),
+            (x + out, up),
+            (x + out, y + out),
+            (left, up),
+            (left, y + out),
+        ]
+    });
+    let mut rects = places.map(|(x, y)| Rect { x, y, width, height });
+    let is_free = |rect: &Rect| is_within(*rect, room) && taken.iter().all(|t| apart(*t, *rect));
+    if let Some(rect) = rects.find(is_free) {
+        svg.text(rect.x, rect.y + 0.5 * height + look.middle_px(), words, &look);
+        taken.push(rect);
+    }
+}
+
+fn is_within(rect: Rect, room: Rect) -> bool {
+    contains(room, (rect.x, rect.y)) && contains(room, (rect.right(), rect.bottom()))
+}
+
+fn apart(a: Rect, b: Rect) -> bool {
+    a.right() <= b.x || b.right() <= a.x || a.bottom() <= b.y || b.bottom() <= a.y
+}

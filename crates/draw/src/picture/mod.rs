@@ -1,0 +1,168 @@
+//! Pictures of what can be seen of a run: scenery, a frame, and the ways that led to it.
+//!
+//! ```text
+//! trails.rs   which ways are shown, and how much of them    canvas.rs   from meters to pixels
+//! ways.rs     a way as a line that fades with age           sheet.rs    axes, scale bar, caption
+//! floor.rs    walls as few rectangles                       space.rs    the edges of what is shown
+//! bodies.rs   everything that has a shape                   labels.rs   names that do not overlap
+//! key.rs      the legend, and what is shown in words        extent.rs   where everything is
+//! ```
+
+mod bodies;
+pub(crate) mod canvas;
+mod extent;
+mod floor;
+mod key;
+mod labels;
+mod sheet;
+mod space;
+#[cfg(test)]
+mod tests;
+mod trails;
+mod ways;
+
+pub use key::describe;
+pub use trails::worth_a_trail;
+
+pub(crate) use extent::{around, check, seen};
+
+use crate::error::DrawError;
+use crate::style::{INK, Style};
+use crate::svg::Svg;
+use canvas::Canvas;
+use sheet::{Area, Sheet};
+use sidestep_kernel::view::{Frame, Scenery, Trail};
+use trails::Shown;
+
+/// A box is never drawn larger than this.
+const LARGEST_BOX_PX: f64 = 28.0;
+
+/// How a picture is drawn, and the words around it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Options {
+    /// The room that it may take.
+    pub style: Style,
+    /// Its heading; may be empty.
+    pub title: String,
+    /// Small print under it; may be empty.
+    pub caption: String,
+}
+
+impl Options {
+    /// A picture as large as a page, under the scenario's name.
+    pub fn page(scenery: &Scenery, caption: impl Into<String>) -> Self {
+        Self { style: Style::MAP, title: scenery.name.clone(), caption: caption.into() }
+    }
+}
+
+/// Draws a moment of a run, with the ways that led to it: from above where all lies in a plane,
+/// else in parallel projection from a corner. A meter is as long in every direction.
+///
+/// Of the trails those are drawn that can be told apart ([`worth_a_trail`]): as wide as the body on
+/// a floor, else as lines; the older, the paler. Agents without a trail are dark where others have
+/// one.
+///
+/// # Errors
+/// [`DrawError::Length`] if a floor has not one entry per box; [`DrawError::TooLarge`] above 2^28
+/// boxes or four million bodies and points; [`DrawError::Value`] for places and sizes that are not
+/// finite, sizes below zero, a floor without boxes, an impossible style.
+pub fn draw(
+    scenery: &Scenery,
+    frame: &Frame,
+    trails: &[Trail],
+    options: &Options,
+) -> Result<String, DrawError> {
+    options.style.check()?;
+    check(scenery, frame, trails)?;
+    let scene = Scene::new(scenery, frame, trails);
+    match scene.is_plane() {
+        true => from_above(&scene, options),
+        false => space::draw(&scene, options),
+    }
+}
+
+/// What is drawn: a moment, and those of the ways that are shown.
+pub(crate) struct Scene<'a> {
+    pub(crate) scenery: &'a Scenery,
+    pub(crate) frame: &'a Frame,
+    trails: Vec<Shown<'a>>,
+}
+
+impl<'a> Scene<'a> {
+    pub(crate) fn new(scenery: &'a Scenery, frame: &'a Frame, trails: &'a [Trail]) -> Self {
+        Self { scenery, frame, trails: trails::shown(scenery, frame, trails) }
+    }
+
+    /// The same with trails as thin lines, for those whose steps are far apart.
+    pub(crate) fn with_thin_trails(mut self) -> Self {
+        self.trails.iter_mut().for_each(|trail| trail.width_m = None);
+        self
+    }
+
+    pub(crate) fn is_plane(&self) -> bool {
+        self.scenery.dimensions == 2
+    }
+
+    /// Walls and what stands still.
+    pub(crate) fn draw_still(&self, svg: &mut Svg, canvas: &Canvas) {
+        if !canvas.is_above() {
+            return bodies::draw_by_depth(svg, self, canvas, self.scenery.bodies.iter());
+        }
+        if let Some(floor) = &self.scenery.floor {
+            floor::draw(svg, floor, canvas);
+        }
+        bodies::draw_walls(svg, self.scenery, canvas);
+        bodies::draw_layers(svg, self, canvas, &self.scenery.bodies, 0..=u8::MAX);
+    }
+
+    /// What moves. Seen from above, trails lie over doors and under those who walk.
+    pub(crate) fn draw_moving(&self, svg: &mut Svg, canvas: &Canvas) {
+        if !canvas.is_above() {
+            bodies::draw_by_depth(svg, self, canvas, self.frame.bodies.iter());
+            return self.draw_over(svg, canvas);
+        }
+        bodies::draw_layers(svg, self, canvas, &self.frame.bodies, 0..=3);
+        self.trails.iter().for_each(|trail| ways::draw(svg, trail, canvas));
+        bodies::draw_layers(svg, self, canvas, &self.frame.bodies, 4..=u8::MAX);
+        bodies::draw_marks(svg, self, canvas);
+    }
+
+    /// Everything in space, far things first; trails over it.
+    fn draw_space(&self, svg: &mut Svg, canvas: &Canvas) {
+        let bodies = self.scenery.bodies.iter().chain(&self.frame.bodies);
+        bodies::draw_by_depth(svg, self, canvas, bodies);
+        self.draw_over(svg, canvas);
+    }
+
+    fn draw_over(&self, svg: &mut Svg, canvas: &Canvas) {
+        self.trails.iter().for_each(|trail| ways::draw(svg, trail, canvas));
+        bodies::draw_marks(svg, self, canvas);
+    }
+}
+
+fn from_above(scene: &Scene<'_>, options: &Options) -> Result<String, DrawError> {
+    let [lo, hi] = extent::whole(scene)?;
+    let size_m = [hi[0] - lo[0], hi[1] - lo[1]];
+    let px = px_per_m(scene, size_m, &options.style);
+    let area =
+        Area { origin_m: [lo[0], lo[1]], size_m, title: &options.title, caption: &options.caption };
+    let mut svg = Svg::default();
+    let sheet = Sheet::open(&mut svg, &area, &options.style, px);
+    let canvas = Canvas::above([lo[0], lo[1]], px, sheet.map);
+    svg.open_clip(sheet.map);
+    scene.draw_still(&mut svg, &canvas);
+    scene.draw_moving(&mut svg, &canvas);
+    svg.close_group();
+    svg.rect(sheet.map, format_args!(r#"fill="none" stroke="{INK}""#));
+    labels::draw(&mut svg, scene, &canvas, sheet.map, &options.style);
+    Ok(sheet.close(svg, &area, key::entries(scene), &options.style))
+}
+
+/// The scale at which all fits the style's room; whole pixels a box where boxes are large, so that
+/// walls have sharp edges.
+fn px_per_m(scene: &Scene<'_>, size_m: [f64; 2], style: &Style) -> f64 {
+    let px = (style.width_px / size_m[0]).min(style.height_px / size_m[1]);
+    let Some(floor) = &scene.scenery.floor else { return px };
+    let box_px = (px * floor.box_m).min(LARGEST_BOX_PX);
+    (if box_px >= 2.0 { box_px.floor() } else { box_px }) / floor.box_m
+}

@@ -1,0 +1,176 @@
+//! What surrounds the map: title, axes in meters, scale bar, legend, caption.
+
+use crate::legend::{Entry, Legend, faint, paragraph, title_look};
+use crate::style::{INK, Style};
+use crate::svg::{Anchor, Rect, Svg, TextLook};
+use crate::text::{self, Weight};
+use crate::ticks::{Spacing, Ticks, decimals, label, nice_step};
+
+pub(super) const EDGE_PX: f64 = 10.0;
+const TICK_PX: f64 = 4.0;
+/// The length of "y (m)" in letter sizes.
+const Y_LABEL_LETTERS: f64 = 3.0;
+/// Pictures are at least this wide, in letters, for the sake of title and legend.
+const LEAST_LETTERS: f64 = 32.0;
+/// From this extent on axes are in kilometers.
+const FAR_M: f64 = 5000.0;
+
+/// The unit of length for something of this extent, and how many meters it is.
+pub(super) fn unit(extent_m: f64) -> (&'static str, f64) {
+    if extent_m < FAR_M { ("m", 1.0) } else { ("km", 1000.0) }
+}
+
+/// What a sheet shows: a rectangle in meters, and the words around it.
+pub(super) struct Area<'a> {
+    /// World coordinates of its lower left corner.
+    pub(super) origin_m: [f64; 2],
+    /// Width and height.
+    pub(super) size_m: [f64; 2],
+    pub(super) title: &'a str,
+    pub(super) caption: &'a str,
+}
+
+/// Where the map stands in the picture.
+pub(super) struct Sheet {
+    /// The map in pixels.
+    pub(super) map: Rect,
+    /// Pixels per meter.
+    px: f64,
+    unit: (&'static str, f64),
+    width: f64,
+    /// How far the label of a low map's vertical axis stands out above and below it.
+    spill: f64,
+}
+
+/// One edge of the map in its unit.
+struct Edge {
+    origin: f64,
+    length: f64,
+    ticks: Ticks,
+}
+
+impl Edge {
+    fn new(origin: f64, length: f64, length_px: f64, tick_room_px: f64) -> Self {
+        let most = ((length_px / tick_room_px) as usize).clamp(1, 12);
+        // Sizes that a double cannot tell apart at this origin have no ticks.
+        let exact = length > 1e-9 * origin.abs() && length.is_finite();
+        let ticks =
+            if exact { Ticks::linear(origin, origin + length, most) } else { Ticks::default() };
+        Self { origin, length, ticks }
+    }
+
+    /// Each tick's distance from the edge's beginning, as part of the edge, and its label.
+    fn marks(&self) -> impl Iterator<Item = (f64, &str)> {
+        self.ticks.major.iter().map(|(v, label)| ((v - self.origin) / self.length, label.as_str()))
+    }
+}
+
+impl Sheet {
+    /// Draws title and axes, and says where the map goes.
+    pub(super) fn open(svg: &mut Svg, area: &Area<'_>, style: &Style, px: f64) -> Self {
+        let size = style.small_px();
+        let ([x0, y0], [width, height]) = (area.origin_m, area.size_m);
+        let unit = unit(width.max(height));
+        let edge = |from: f64, length: f64, room_px| {
+            Edge::new(from / unit.1, length / unit.1, length * px, room_px)
+        };
+        let (across, upward) = (edge(x0, width, 6.0 * size), edge(y0, height, 4.0 * size));
+        let labels = upward.ticks.widest_px(|label| text::width(label, size, Weight::Regular));
+        let left = EDGE_PX + 1.5 * style.font_px + labels + TICK_PX + 4.0;
+        let (map_width, map_height) = (width * px, height * px);
+        let width = (left + map_width + 2.0 * EDGE_PX + size).max(LEAST_LETTERS * style.font_px);
+        let lines = text::wrap(area.title, style.title_px(), Weight::Bold, width - 2.0 * EDGE_PX);
+        let top = paragraph(svg, &lines, (EDGE_PX, EDGE_PX), &title_look(style.title_px()));
+        // Whole pixels, for sharp edges.
+        let spill = ((Y_LABEL_LETTERS * style.font_px - map_height) / 2.0).max(0.0);
+        let (x, y) = (left.ceil(), (top + spill + 8.0).ceil());
+        let map = Rect { x, y, width: map_width, height: map_height };
+        let sheet = Self { map, px, unit, width, spill };
+        sheet.draw_across(svg, style, &across);
+        sheet.draw_upward(svg, style, &upward);
+        sheet
+    }
+
+    /// Draws what stands under the map and ends the picture.
+    pub(super) fn close(
+        &self,
+        mut svg: Svg,
+        area: &Area<'_>,
+        entries: Vec<Entry>,
+        style: &Style,
+    ) -> String {
+        let axis_px = TICK_PX + style.small_px() + 1.6 * style.font_px + 14.0;
+        let top = self.map.bottom() + axis_px.max(self.spill + 8.0);
+        let bar_px = self.draw_scale_bar(&mut svg, style, top);
+        let left = self.map.x + bar_px + 2.0 * style.font_px;
+        let legend = Legend::lay_out(entries, style.small_px(), self.width - left - EDGE_PX);
+        legend.draw(&mut svg, left, top - 4.0);
+        let top = top + legend.height_px().max(2.4 * style.small_px()) + 6.0;
+        let size = style.small_px();
+        let lines = text::wrap(area.caption, size, Weight::Regular, self.width - 2.0 * EDGE_PX);
+        let end = paragraph(&mut svg, &lines, (EDGE_PX, top), &faint(size));
+        svg.finish(self.width, end + EDGE_PX, area.title)
+    }
+
+    fn draw_across(&self, svg: &mut Svg, style: &Style, edge: &Edge) {
+        let bottom = self.map.bottom();
+        let look = TextLook::new(style.small_px(), Anchor::Middle);
+        let baseline = bottom + TICK_PX + 3.0 + look.size_px;
+        let mut spacing = Spacing::new();
+        for (part, label) in edge.marks() {
+            let x = self.map.x + part * self.map.width;
+            let label_px = text::width(label, look.size_px, Weight::Regular) + 0.5 * look.size_px;
+            if spacing.admits(x, label_px) {
+                svg.line((x, bottom), (x, bottom + TICK_PX), format_args!(r#"stroke="{INK}""#));
+                svg.text(x, baseline, label, &look);
+            }
+        }
+        let look = TextLook::new(style.font_px, Anchor::Middle);
+        svg.text(
+            self.map.x + self.map.width / 2.0,
+            baseline + 1.45 * style.font_px,
+            &format!("x ({})", self.unit.0),
+            &look,
+        );
+    }
+
+    fn draw_upward(&self, svg: &mut Svg, style: &Style, edge: &Edge) {
+        let left = self.map.x;
+        let look = TextLook::new(style.small_px(), Anchor::End);
+        let mut spacing = Spacing::new();
+        for (part, label) in edge.marks() {
+            let y = self.map.bottom() - part * self.map.height;
+            if spacing.admits(-y, look.size_px) {
+                svg.line((left - TICK_PX, y), (left, y), format_args!(r#"stroke="{INK}""#));
+                svg.text(left - TICK_PX - 3.0, y + look.middle_px(), label, &look);
+            }
+        }
+        let look = TextLook { upward: true, ..TextLook::new(style.font_px, Anchor::Middle) };
+        let words = format!("y ({})", self.unit.0);
+        svg.text(EDGE_PX + style.font_px, self.map.y + self.map.height / 2.0, &words, &look);
+    }
+
+    /// Draws a bar of round length, about a fifth of the map's longer side but less than half the
+    /// picture's width. Returns the room it takes, in pixels.
+    fn draw_scale_bar(&self, svg: &mut Svg, style: &Style, top: f64) -> f64 {
+        let per_px = 1.0 / (self.px * self.unit.1);
+        let wanted_px = (0.2 * self.map.width.max(self.map.height)).min(0.18 * self.width);
+        let length = nice_step(wanted_px * per_px, 1);
+        let length_px = length / per_px;
+        if !length_px.is_finite() {
+            return 0.0;
+        }
+        let words = format!("{} {}", label(length, decimals(length)), self.unit.0);
+        let look = TextLook::new(style.small_px(), Anchor::Middle);
+        let text_px = text::width(&words, look.size_px, Weight::Regular);
+        let bar = Rect {
+            x: self.map.x + ((text_px - length_px) / 2.0).max(0.0),
+            y: top,
+            width: length_px,
+            height: 4.0,
+        };
+        svg.rect(bar, format_args!(r#"class="scale-bar" fill="{INK}""#));
+        svg.text(bar.x + length_px / 2.0, top + 8.0 + look.size_px, &words, &look);
+        text_px.max(length_px)
+    }
+}

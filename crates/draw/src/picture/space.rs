@@ -1,0 +1,104 @@
+//! Pictures in space: the edges of what is shown, and the words around it.
+
+use super::canvas::{Camera, Canvas, corners};
+use super::sheet::{EDGE_PX, unit};
+use super::{Options, Scene, extent, key, labels};
+use crate::error::DrawError;
+use crate::legend::{Legend, faint, paragraph, title_look};
+use crate::style::{FAINT_INK, GRID, Style};
+use crate::svg::{Anchor, Rect, Svg, TextLook};
+use crate::text::{self, Weight};
+use crate::ticks::{decimals, label, nice_step};
+use sidestep_kernel::view::Place;
+
+pub(super) fn draw(scene: &Scene<'_>, options: &Options) -> Result<String, DrawError> {
+    let style = &options.style;
+    let box_m = extent::whole(scene)?;
+    let mut svg = Svg::default();
+    let room_px = style.width_px - 2.0 * EDGE_PX;
+    let title = text::wrap(&options.title, style.title_px(), Weight::Bold, room_px);
+    let top = paragraph(&mut svg, &title, (EDGE_PX, EDGE_PX), &title_look(style.title_px()));
+    let (canvas, height_px) = canvas(box_m, style, top);
+    let room = Rect { x: 0.0, y: top, width: style.width_px, height: height_px };
+    draw_box(&mut svg, &canvas, box_m, style);
+    svg.open_clip(room);
+    scene.draw_space(&mut svg, &canvas);
+    svg.close_group();
+    labels::draw(&mut svg, scene, &canvas, room, style);
+    let legend = Legend::lay_out(key::entries(scene), style.small_px(), room_px);
+    legend.draw(&mut svg, EDGE_PX, room.bottom());
+    let top = room.bottom() + legend.height_px() + 4.0;
+    let words = format!("{} {}", box_words(box_m), options.caption);
+    let lines = text::wrap(&words, style.small_px(), Weight::Regular, room_px);
+    let end = paragraph(&mut svg, &lines, (EDGE_PX, top), &faint(style.small_px()));
+    Ok(svg.finish(style.width_px, end + EDGE_PX, &options.title))
+}
+
+/// The canvas that shows a box as large as there is room, below `top`, and how high it is.
+fn canvas(box_m: [Place; 2], style: &Style, top: f64) -> (Canvas, f64) {
+    let camera = Camera::CORNER;
+    let [lo, hi] = extent::seen(camera, box_m);
+    // Room for the letters at the axes.
+    let margin = EDGE_PX + 1.5 * style.font_px;
+    let (width, height) =
+        ((style.width_px - 2.0 * margin).max(10.0), (style.height_px - 2.0 * margin).max(10.0));
+    let px_per_m = (width / (hi[0] - lo[0])).min(height / (hi[1] - lo[1]));
+    let spare = 0.5 * (width - px_per_m * (hi[0] - lo[0]));
+    let canvas = Canvas {
+        camera,
+        px_per_m,
+        zero: (margin + spare, top + margin + px_per_m * (hi[1] - lo[1])),
+        seen_m: lo,
+        depths_m: Camera::range(camera.to_eye, box_m),
+    };
+    (canvas, 2.0 * margin + px_per_m * (hi[1] - lo[1]))
+}
+
+/// The edges of what is shown, and the names of the axes.
+fn draw_box(svg: &mut Svg, canvas: &Canvas, box_m: [Place; 2], style: &Style) {
+    let all = corners(box_m);
+    for from in 0..8 {
+        for k in (0..3).filter(|k| from >> k & 1 == 0) {
+            let ends = [from, from | 1 << k].map(|c| canvas.at(all[c]));
+            svg.line(ends[0], ends[1], format_args!(r#"stroke="{GRID}""#));
+        }
+    }
+    let look = TextLook { fill: FAINT_INK, ..TextLook::new(style.small_px(), Anchor::Middle) };
+    // Edges with nothing in front of them, as corners of the box.
+    for (name, [from, to]) in [("x", [0, 1]), ("y", [1, 3]), ("z", [0, 4])] {
+        let (from, to) = (canvas.at(all[from]), canvas.at(all[to]));
+        svg.line(from, to, format_args!(r#"stroke="{FAINT_INK}" stroke-width="1.2""#));
+        let length = ((to.0 - from.0).powi(2) + (to.1 - from.1).powi(2)).sqrt().max(1.0);
+        let out = style.font_px / length;
+        let at = (to.0 + out * (to.0 - from.0), to.1 + out * (to.1 - from.1));
+        svg.text(at.0, at.1 + look.middle_px(), name, &look);
+    }
+}
+
+/// The extent of what is shown, in words.
+fn box_words([lo, hi]: [Place; 2]) -> String {
+    let longest_m = (0..3).map(|k| hi[k] - lo[k]).fold(0.0, f64::max);
+    let (unit, unit_m) = unit(longest_m);
+    let axis = |k: usize| {
+        let (from, to) = (lo[k] / unit_m, hi[k] / unit_m);
+        let digits = decimals(nice_step(to - from, 100));
+        format!("{} {} to {} {unit}", ["x", "y", "z"][k], label(from, digits), label(to, digits))
+    };
+    format!("Shown: {}, {}, {}.", axis(0), axis(1), axis(2))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_shown_fills_the_room_and_stays_inside() {
+        let style = Style::MAP;
+        let box_m = [[-3.0, 1.0, 0.0], [5.0, 2.0, 4.0]];
+        let (canvas, height_px) = canvas(box_m, &style, 40.0);
+        for (x, y) in corners(box_m).map(|p| canvas.at(p)) {
+            assert!((EDGE_PX..=style.width_px - EDGE_PX).contains(&x), "{x}");
+            assert!((40.0..=40.0 + height_px).contains(&y), "{y}");
+        }
+    }
+}

@@ -1,0 +1,269 @@
+//! The one simulation: a world, its state, the engine, and what is recorded.
+
+use crate::checkpoint::{self, CheckpointError, Header};
+use crate::cycle::{Observer, PhaseTimes, Scratches};
+use crate::digest::Digest;
+use crate::engine::Engine;
+use crate::plan::{Effort, Plan};
+use crate::ports::{RecordError, Recorder, SystemClock, TableSchema};
+use crate::simulation::Simulation;
+use crate::units::Cycle;
+use crate::view::{Frame, Look, PlaceRows, Scenery};
+use crate::words::{Lines, Said};
+use crate::world::{Decides, World};
+use serde_json::Value;
+use std::fmt;
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+/// A run of a world.
+pub struct Run<W: World> {
+    world: Arc<W>,
+    plan: Plan,
+    /// Digest of the scenario's text: what checkpoints belong to.
+    scenario: [u8; 16],
+    state: W::State,
+    books: W::Books,
+    engine: Engine<W>,
+    cycle: Cycle,
+    clock: SystemClock,
+}
+
+impl<W: World> Run<W> {
+    /// A run at its start, with `workers` workers; the world is shared, not copied. `scenario` is
+    /// the resolved scenario's text.
+    pub fn new(
+        world: Arc<W>,
+        plan: Plan,
+        (state, books): (W::State, W::Books),
+        scenario: &str,
+        workers: usize,
+    ) -> Self {
+        let engine = Engine::new(&*world, world.bodies(&state), workers);
+        let scenario = *Digest::of(scenario.as_bytes()).as_bytes();
+        let clock = SystemClock::default();
+        Self { world, plan, scenario, state, books, engine, cycle: 0, clock }
+    }
+
+    /// Uses all workers even where one would be faster; for tests and benchmarks.
+    pub fn share_always(&mut self) {
+        self.engine.share_always();
+    }
+
+    /// The world.
+    pub fn world(&self) -> &Arc<W> {
+        &self.world
+    }
+
+    /// The state.
+    pub fn state(&self) -> &W::State {
+        &self.state
+    }
+
+    /// What is kept beside the state.
+    pub fn books(&self) -> &W::Books {
+        &self.books
+    }
+
+    /// What a checkpoint would keep of the present state.
+    pub fn saved(&self) -> W::Saved {
+        self.world.save(&self.state, &self.books, self.cycle)
+    }
+
+    /// What the run measured so far.
+    pub fn metrics(&self) -> W::Metrics {
+        self.world.metrics(&self.state, &self.books, self.cycle, &self.effort())
+    }
+
+    /// Bytes on the heap of the engine, which grow with the bodies.
+    pub fn engine_heap_bytes(&self) -> usize {
+        self.engine.heap_bytes()
+    }
+
+    /// What the workers have seen and spent.
+    pub fn effort(&self) -> Effort {
+        let mut effort = Effort::default();
+        for mate in self.engine.crew() {
+            let tally = &mate.tally;
+            effort.group_sizes.iter_mut().zip(tally.group_sizes).for_each(|(sum, n)| *sum += n);
+            effort.largest_group = effort.largest_group.max(tally.largest_group);
+            effort.cpu_ns += tally.cpu_ns;
+        }
+        effort
+    }
+
+    fn header(&self) -> Header {
+        Header {
+            format: checkpoint::FORMAT,
+            program_version: env!("CARGO_PKG_VERSION").into(),
+            world: W::NAME.into(),
+            scenario: self.scenario,
+            cycle: self.cycle,
+        }
+    }
+
+    /// Takes over what the workers have gathered.
+    fn gather(&mut self) {
+        let Self { world, books, engine, .. } = self;
+        engine.crew_mut().for_each(|mate| world.gather(books, &mut mate.scratch));
+        world.book(books);
+    }
+
+    /// Lets the workers gather what is wanted by now.
+    fn prepare(&mut self) {
+        let Self { world, books, engine, .. } = self;
+        engine.crew_mut().for_each(|mate| world.prepare(books, &mut mate.scratch));
+    }
+}
+
+impl<W: World> fmt::Debug for Run<W> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Run").field("world", &W::NAME).field("cycle", &self.cycle).finish()
+    }
+}
+
+/// Looks on between cycles, for worlds that ask for it.
+struct Onlooker<'a, W: World> {
+    world: &'a W,
+    books: &'a mut W::Books,
+}
+
+impl<W: World> Observer<W> for Onlooker<'_, W> {
+    fn before_cycle(&mut self, now: Cycle, state: &W::State) {
+        self.world.before_cycle(state, self.books, now);
+    }
+
+    fn after_cycle(
+        &mut self,
+        now: Cycle,
+        state: &W::State,
+        mut scratches: Scratches<'_, W::Scratch>,
+    ) -> ControlFlow<()> {
+        scratches.for_each(|scratch| self.world.gather(self.books, scratch));
+        self.world.book(self.books);
+        let is_full = self.world.room(state, self.books, now + 1) == 0;
+        match is_full || self.world.is_over(state) {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
+        }
+    }
+}
+
+impl<W: World> Simulation for Run<W> {
+    fn world(&self) -> &'static str {
+        W::NAME
+    }
+
+    fn agent(&self) -> &'static str {
+        W::AGENT
+    }
+
+    fn decides(&self) -> Decides {
+        W::DECIDES
+    }
+
+    fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    fn cycle(&self) -> Cycle {
+        self.cycle
+    }
+
+    fn agents(&self) -> usize {
+        self.world.agents()
+    }
+
+    fn is_over(&self) -> bool {
+        self.world.is_over(&self.state)
+    }
+
+    fn advance(&mut self, cycles: u64) -> u64 {
+        let cycles = cycles.min(self.world.room(&self.state, &self.books, self.cycle));
+        let Self { world, state, books, engine, clock, .. } = self;
+        let span = (self.cycle, cycles);
+        let done = match W::LOOKS_EACH_CYCLE {
+            false => {
+                engine.advance(world, state, span, clock);
+                cycles
+            }
+            true => {
+                let mut onlooker = Onlooker { world: &**world, books };
+                engine.advance_observed(world, state, span, clock, &mut onlooker)
+            }
+        };
+        self.cycle += done;
+        done
+    }
+
+    fn digest(&self) -> Digest {
+        self.world.digest(&self.state, self.cycle)
+    }
+
+    fn checkpoint(&self) -> Vec<u8> {
+        checkpoint::encode(&self.header(), &self.saved())
+    }
+
+    fn restore(&mut self, checkpoint: &[u8]) -> Result<(), CheckpointError> {
+        let (cycle, saved) = checkpoint::decode(checkpoint, &self.header())?;
+        self.state = self.world.restore(saved, &mut self.books)?;
+        self.cycle = cycle;
+        Ok(())
+    }
+
+    fn begin_recording(&mut self) {
+        self.world.begin_recording(&mut self.state, &mut self.books, self.cycle);
+        self.prepare();
+    }
+
+    fn schemas(&self) -> Vec<TableSchema> {
+        self.world.schemas(&self.books)
+    }
+
+    fn record(&mut self, recorder: &mut dyn Recorder) -> Result<(), RecordError> {
+        self.gather();
+        self.world.record(&mut self.state, &mut self.books, self.cycle, recorder)
+    }
+
+    fn scenery(&self) -> Scenery {
+        self.world.scenery(&self.plan.name)
+    }
+
+    fn watch(&mut self) {
+        self.world.watch(&mut self.books);
+        self.prepare();
+    }
+
+    fn frame(&mut self, look: Look) -> Frame {
+        self.gather();
+        self.world.frame(&self.state, &mut self.books, self.cycle, look)
+    }
+
+    fn place_rows(&self) -> Vec<PlaceRows> {
+        self.world.place_rows(&self.books)
+    }
+
+    fn metrics(&self) -> Value {
+        serde_json::to_value(Run::metrics(self)).unwrap_or_default()
+    }
+
+    fn agent_metrics(&self) -> Value {
+        self.world.agent_metrics(&self.state, &self.books, self.cycle)
+    }
+
+    fn pair_metrics(&self) -> Value {
+        self.world.pair_metrics(&self.books)
+    }
+
+    fn outcome(&self) -> Lines {
+        self.world.outcome(&Run::metrics(self))
+    }
+
+    fn poses(&self) -> Said {
+        self.world.poses(&self.state, self.cycle)
+    }
+
+    fn phase_times(&self) -> PhaseTimes {
+        self.engine.times()
+    }
+}

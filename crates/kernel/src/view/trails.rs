@@ -1,0 +1,241 @@
+//! The ways that bodies have gone, and how rows of recorded tables tell them.
+
+use super::body::{Body, Kind, Shape};
+use super::pose::Place;
+use super::{Frame, Scenery};
+use crate::ports::Values;
+use crate::units::Cycle;
+use std::collections::BTreeMap;
+
+/// Which body: its kind, its number, and its part of things that have parts.
+pub type Who = (Kind, u32, Option<u32>);
+
+/// The way that a body has gone.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trail {
+    /// Whose way it is.
+    pub of: Who,
+    /// Where its middle was at the beginning of a cycle, the earliest first.
+    pub way: Vec<(Cycle, Place)>,
+}
+
+/// Rows of a recorded table as places of bodies.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlaceRows {
+    /// Name of the table; its column `cycle` says when.
+    pub table: &'static str,
+    /// What the bodies are.
+    pub kind: Kind,
+    /// The column with their numbers.
+    pub number: &'static str,
+    /// The column with the numbers of their parts.
+    pub part: Option<&'static str>,
+    /// Columns with the coordinates x, y and perhaps z.
+    pub axes: Vec<Axis>,
+    /// Whether the places are those of a body's corner with the lowest coordinates, not those of
+    /// its middle.
+    pub is_corner: bool,
+    /// The column with headings in quarter turns from east, of bodies that go straight ahead
+    /// before they slip to a side.
+    pub ahead: Option<&'static str>,
+    /// Cycles between two rows of a body.
+    pub every: Cycle,
+    /// So many cycles before the present are worth showing.
+    pub worth: Cycle,
+}
+
+/// A column with coordinates: meters are `offset_m` and the value times `scale_m`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Axis {
+    /// Its name.
+    pub column: &'static str,
+    /// Meters of a step of 1.
+    pub scale_m: f64,
+    /// Where the value 0 is.
+    pub offset_m: f64,
+}
+
+/// A row: when, where, and the heading in quarter turns.
+type Row = (Cycle, Place, Option<u32>);
+
+impl PlaceRows {
+    /// The ways of some bodies up to the moment of a frame, from the columns of the table;
+    /// `None` where it has other columns. Those whose rows end before that moment, though they are
+    /// still there, have no way: it would leap.
+    pub fn trails<'a>(
+        &self,
+        scenery: &Scenery,
+        frame: &Frame,
+        whose: &[Who],
+        column: impl Fn(&str) -> Option<&'a Values>,
+    ) -> Option<Vec<Trail>> {
+        let rows = self.rows(frame.cycle, whose, column)?;
+        let trail = |(of, rows): (Who, Vec<Row>)| {
+            let here = frame.bodies.iter().find(|body| body.who() == of);
+            let way = self.way(rows, scenery, here.map(|body| (frame.cycle, body)), of);
+            way.map(|way| Trail { of, way })
+        };
+        Some(rows.into_iter().filter_map(trail).collect())
+    }
+
+    /// The rows of some bodies before a cycle.
+    fn rows<'a>(
+        &self,
+        before: Cycle,
+        whose: &[Who],
+        column: impl Fn(&str) -> Option<&'a Values>,
+    ) -> Option<BTreeMap<Who, Vec<Row>>> {
+        let Values::U64(cycles) = column("cycle")? else { return None };
+        let words = |name| match column(name)? {
+            Values::U32(values) | Values::Label(values) => Some(values),
+            _ => None,
+        };
+        let numbers = words(self.number)?;
+        // A column that is asked for and not there makes it another table.
+        let parts = self.part.map(|name| words(name).ok_or(())).transpose().ok()?;
+        let ahead = self.ahead.map(|name| words(name).ok_or(())).transpose().ok()?;
+        let axes = self.axes.iter().map(|axis| Some((axis, column(axis.column)?)));
+        let axes: Vec<(&Axis, &Values)> = axes.collect::<Option<_>>()?;
+        let mut rows: BTreeMap<Who, Vec<Row>> = whose.iter().map(|&of| (of, Vec::new())).collect();
+        for (k, &cycle) in cycles.iter().enumerate().filter(|(_, cycle)| **cycle < before) {
+            let of = (self.kind, numbers[k], parts.map(|parts| parts[k]));
+            let Some(own) = rows.get_mut(&of) else { continue };
+            let mut at_m = [0.0; 3];
+            for (x, (axis, values)) in at_m.iter_mut().zip(&axes) {
+                *x = axis.offset_m + axis.scale_m * number(values, k)?;
+            }
+            own.push((cycle, at_m, ahead.map(|ahead| ahead[k])));
+        }
+        rows.values_mut().for_each(|rows| rows.sort_by_key(|(cycle, ..)| *cycle));
+        Some(rows)
+    }
+
+    fn way(
+        &self,
+        rows: Vec<Row>,
+        scenery: &Scenery,
+        here: Option<(Cycle, &Body)>,
+        (_, number, _): Who,
+    ) -> Option<Vec<(Cycle, Place)>> {
+        let &(last, ..) = rows.last()?;
+        if here.is_some_and(|(now, _)| last + self.every < now) {
+            return None;
+        }
+        let is_start = |body: &&Body| (body.kind, body.number) == (Kind::Start, number);
+        let like = here.map(|(_, body)| body).or_else(|| scenery.bodies.iter().find(is_start));
+        let half_m = match like.map(|body| &body.shape) {
+            Some(Shape::Cuboid { size_m }) if self.is_corner => size_m.map(|m| 0.5 * m),
+            _ => [0.0; 3],
+        };
+        let middle = |at: Place| -> Place {
+            std::array::from_fn(|k| match k < self.axes.len() {
+                true => at[k] + half_m[k],
+                // A height that is not recorded.
+                false => like.map_or(0.0, |body| body.pose.at_m[k]),
+            })
+        };
+        let now = here.map(|(now, body)| (now, body.pose.at_m, None));
+        let rows = rows.into_iter().map(|(cycle, at, ahead)| (cycle, middle(at), ahead)).chain(now);
+        let mut way: Vec<(Cycle, Place)> = Vec::new();
+        let mut left: Option<(Place, u32)> = None;
+        for (cycle, at, ahead) in rows {
+            if let Some((from, quarters)) = left {
+                let between = corner(from, quarters, at);
+                way.extend((between != from && between != at).then_some((cycle, between)));
+            }
+            way.push((cycle, at));
+            left = ahead.map(|ahead| (at, ahead));
+        }
+        Some(way)
+    }
+}
+
+fn number(values: &Values, row: usize) -> Option<f64> {
+    values.number(row).filter(|_| values.is_numeric())
+}
+
+impl Axis {
+    /// A column that is in meters already.
+    pub fn meters(column: &'static str) -> Self {
+        Self { column, scale_m: 1.0, offset_m: 0.0 }
+    }
+}
+
+/// Where a body is between two places, if it has gone ahead before it slipped to a side: in the
+/// heading, in quarter turns from east, in which it left the first one.
+pub fn corner(from: Place, quarters: u32, to: Place) -> Place {
+    if quarters.is_multiple_of(2) { [to[0], from[1], from[2]] } else { [from[0], to[1], from[2]] }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Pose;
+    use super::*;
+
+    #[test]
+    fn a_slip_goes_ahead_before_it_goes_aside() {
+        let (east, north) = (0, 1);
+        assert_eq!(corner([5.0, 5.0, 0.0], east, [6.0, 6.0, 0.0]), [6.0, 5.0, 0.0]);
+        assert_eq!(corner([5.0, 5.0, 0.0], north, [4.0, 6.0, 0.0]), [5.0, 6.0, 0.0]);
+        assert_eq!(corner([5.0, 5.0, 0.0], east, [5.0, 5.0, 0.0]), [5.0, 5.0, 0.0]);
+    }
+
+    fn rows() -> PlaceRows {
+        let axis = |column| Axis { column, scale_m: 0.5, offset_m: 10.0 };
+        PlaceRows {
+            table: "trajectories",
+            kind: Kind::Robot,
+            number: "body",
+            part: None,
+            axes: vec![axis("col"), axis("row")],
+            is_corner: true,
+            ahead: Some("heading"),
+            every: 1,
+            worth: 400,
+        }
+    }
+
+    /// A robot of two boxes that slips north while it goes east, until a cycle.
+    fn trails(until: Cycle) -> Option<Vec<Trail>> {
+        let size_m = [1.0, 1.0, 0.5];
+        let robot =
+            Body::new(Kind::Robot, 7, Pose::at([11.5, 11.0, 0.25]), Shape::Cuboid { size_m });
+        let frame = Frame { cycle: until, bodies: vec![robot], ..Frame::default() };
+        let columns = [
+            ("cycle", Values::U64(vec![1, 0, 0].into())),
+            ("body", Values::U32(vec![7, 7, 8].into())),
+            ("col", Values::U32(vec![1, 0, 9].into())),
+            ("row", Values::U32(vec![0, 0, 9].into())),
+            ("heading", Values::Label(vec![0, 0, 0].into())),
+        ];
+        let column = |name: &str| columns.iter().find(|(n, _)| *n == name).map(|(_, v)| v);
+        let scenery = Scenery {
+            name: String::new(),
+            dimensions: 2,
+            cycle_s: 1.0,
+            floor: None,
+            bodies: Vec::new(),
+            names: Vec::new(),
+        };
+        rows().trails(&scenery, &frame, &[(Kind::Robot, 7, None)], column)
+    }
+
+    #[test]
+    fn rows_become_the_way_to_where_a_body_is() {
+        let [trail] = &trails(2).unwrap()[..] else { panic!("one robot is asked for") };
+        let way = [
+            (0, [10.5, 10.5, 0.25]),
+            (1, [11.0, 10.5, 0.25]),
+            (2, [11.5, 10.5, 0.25]),
+            (2, [11.5, 11.0, 0.25]),
+        ];
+        assert_eq!((trail.of, &trail.way[..]), ((Kind::Robot, 7, None), &way[..]));
+    }
+
+    #[test]
+    fn rows_that_end_too_early_are_no_way() {
+        assert!(trails(3).unwrap().is_empty());
+        let none = rows().rows(9, &[], |_| None);
+        assert_eq!(none, None, "a table with other columns");
+    }
+}

@@ -1,0 +1,136 @@
+//! Traffic in other programs' files, taken as scenarios.
+
+use super::traffic::{from_bluesky, from_tracks, has_length, not_flown};
+use serde_json::{Value, json};
+use sidestep_import::bluesky::{self, ScnFile};
+use sidestep_import::traffic::{self, RecordedTraffic};
+use sidestep_kernel::InputError;
+use sidestep_kernel::words::{Lines, grouped};
+use sidestep_scenario::Foreign;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+/// Forms of files, by their names' ends.
+enum Form {
+    Bluesky,
+    Tracks,
+    Other,
+}
+
+fn form(file: &Path) -> Form {
+    let name = file.to_string_lossy().to_ascii_lowercase();
+    let name = name.strip_suffix(".gz").unwrap_or(&name);
+    match name {
+        _ if name.ends_with(".scn") => Form::Bluesky,
+        _ if name.ends_with(".csv") => Form::Tracks,
+        _ => Form::Other,
+    }
+}
+
+/// Returns the scenario that a file of another form stands for, and what else is in it.
+///
+/// # Errors
+/// When it cannot be read.
+pub(super) fn translate(file: &Path) -> Result<Option<Foreign>, InputError> {
+    let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let (scenario, (json, lines)) = match form(file) {
+        Form::Other => return Ok(None),
+        Form::Bluesky => {
+            let scn = bluesky::read(file)?;
+            (from_bluesky(&name, &scn), told_of_bluesky(&scn))
+        }
+        Form::Tracks => {
+            let tracks = traffic::read(file)?;
+            (from_tracks(&name, &tracks), told_of_tracks(&tracks))
+        }
+    };
+    let scenario = scenario.ok_or_else(|| {
+        let remedy = "give a file that creates aircraft at known places";
+        InputError::new(file.display(), "no aircraft in it has a place", remedy)
+    });
+    Ok(Some(Foreign { scenario, json, lines }))
+}
+
+fn told_of_bluesky(scn: &ScnFile) -> (Value, Lines) {
+    let words = |errors: &[InputError]| errors.iter().map(ToString::to_string).collect::<Vec<_>>();
+    let json = json!({
+        "command_lines": scn.command_lines,
+        "unparsed_lines": scn.unparsed.len(),
+        "unparsed": words(&scn.unparsed),
+        "refused": words(&scn.refused),
+        "commands": scn.commands,
+        "not_understood": scn.not_understood,
+        "not_flown": not_flown(scn),
+        "ignored": scn.ignored,
+        "unresolved_places": scn.unresolved_places.len(),
+        "unresolved_names": unresolved_names(scn),
+        "aircraft_without_place": without_place(scn),
+    });
+    let mut lines = vec![("command lines".to_string(), grouped(scn.command_lines))];
+    lines.extend(counted("not acted on", &scn.not_understood));
+    lines.extend(counted("not flown", &not_flown(scn)));
+    lines.extend(counted("display only", &scn.ignored));
+    lines.extend(first_named("left out, place unknown", &without_place(scn)));
+    lines.extend(first_named("unknown way-points", &unresolved_names(scn)));
+    lines.extend(listed("unparsed", &scn.unparsed));
+    lines.extend(listed("not carried out", &scn.refused));
+    (json, lines)
+}
+
+/// Aircraft that begin where only a navigation database knows, with the names of these places.
+fn without_place(scn: &ScnFile) -> Vec<String> {
+    let unplaced = scn.traffic.unplaced.iter();
+    unplaced.map(|one| format!("{} at {}", one.aircraft.id, one.place)).collect()
+}
+
+/// Names that the file does not define of places to fly to, each once.
+fn unresolved_names(scn: &ScnFile) -> Vec<String> {
+    let creates = |command: &str| matches!(command, "CRE" | "CREATE");
+    let uses = scn.unresolved_places.iter().filter(|used| !creates(&used.command));
+    let names: BTreeSet<&String> = uses.map(|used| &used.name).collect();
+    names.into_iter().cloned().collect()
+}
+
+fn told_of_tracks(recorded: &RecordedTraffic) -> (Value, Lines) {
+    let (rows, repeated) = (recorded.rows as u64, recorded.repeated_rows as u64);
+    let single = recorded.tracks.iter().filter(|track| !has_length(track)).count() as u64;
+    let json = json!({
+        "rows": rows,
+        "aircraft": recorded.tracks.len(),
+        "repeated_rows": repeated,
+        "aircraft_of_one_row": single,
+    });
+    let aircraft = grouped(recorded.tracks.len() as u64);
+    let mut lines = vec![("rows".to_string(), format!("{} of {aircraft} aircraft", grouped(rows)))];
+    let mut left_out = |name: &str, n: u64| {
+        if n > 0 {
+            lines.push((name.to_string(), format!("{}, left out", grouped(n))));
+        }
+    };
+    left_out("repeated rows", repeated);
+    left_out("aircraft of one row", single);
+    (json, lines)
+}
+
+/// Names with their counts on one line; no line for none.
+fn counted(name: &str, counts: &BTreeMap<String, u64>) -> Option<(String, String)> {
+    let words: Vec<String> = counts.iter().map(|(name, n)| format!("{name} {n}")).collect();
+    (!words.is_empty()).then(|| (name.to_string(), words.join(", ")))
+}
+
+/// The first few names, and how many more there are; no line for none.
+fn first_named(name: &str, all: &[String]) -> Option<(String, String)> {
+    const NAMED: usize = 5;
+    let mut words = all[..all.len().min(NAMED)].join(", ");
+    if all.len() > NAMED {
+        words.push_str(&format!(" and {} more", grouped((all.len() - NAMED) as u64)));
+    }
+    (!all.is_empty()).then(|| (name.to_string(), words))
+}
+
+/// A line per error, which says where in the file it is.
+fn listed(name: &str, errors: &[InputError]) -> impl Iterator<Item = (String, String)> {
+    // The remedy stands on a line of its own, which would look like a line of the report.
+    let in_one_line = |error: &InputError| error.to_string().replace("\n  help: ", "; ");
+    errors.iter().map(move |error| (name.to_string(), in_one_line(error)))
+}

@@ -1,0 +1,206 @@
+//! What a run asks of the world beside its phases.
+
+use super::decide::Optimization;
+use super::events::Event;
+use super::metrics::{Ledger, Metrics};
+use super::rows::Rows;
+use super::scenario::Compiled;
+use super::state::{AirspaceState, Snapshot};
+use super::view::entry;
+use super::world::AirspaceWorld;
+use super::{Scratch, words};
+use serde_json::Value;
+use sidestep_kernel::checkpoint::CheckpointError;
+use sidestep_kernel::ports::{Buffers, RecordError, Recorder, TableSchema};
+use sidestep_kernel::view::{Frame, Log, Look, PlaceRows, Scenery};
+use sidestep_kernel::words::{Lines, Said};
+use sidestep_kernel::{Cycle, Digest, Effort, EntityId, InputError, Plan, Run, World};
+use sidestep_scenario::Source;
+
+/// A run of an airspace.
+pub type AirspaceRun = Run<AirspaceWorld>;
+
+/// Returns a run of a scenario at its start.
+///
+/// # Errors
+/// When the scenario is wrong.
+pub fn airspace_run(source: &Source, workers: usize) -> Result<AirspaceRun, InputError> {
+    Ok(Compiled::new(source)?.start(source, workers))
+}
+
+impl Compiled {
+    /// A run at its start; the world is shared, not copied. `source` names it in checkpoints.
+    pub fn start(self, source: &Source, workers: usize) -> AirspaceRun {
+        let state = AirspaceState::restore(&self.world, &self.start_snapshot());
+        let too_close = self.too_close.iter().map(|&(a, b)| (0, a, b)).collect();
+        let ledger = Ledger { too_close, ..Ledger::default() };
+        let books = Books { ledger, rows: Rows::new(self.record), ..Books::default() };
+        let plan = self.plan();
+        Run::new(self.world, plan, (state, books), &source.text, workers)
+    }
+
+    /// What the scenario asks for.
+    pub fn plan(&self) -> Plan {
+        Plan {
+            name: self.name.clone(),
+            seed: self.seed,
+            cycles: self.cycles,
+            checkpoint_every: self.record.checkpoint_every,
+        }
+    }
+}
+
+/// What a run keeps beside its state.
+#[derive(Debug, Default)]
+pub struct Books {
+    /// Sums that metrics are made of.
+    pub ledger: Ledger,
+    /// Processor time spent deciding in this process.
+    decide_ns: u64,
+    /// What is to be recorded; nothing without recording.
+    rows: Rows,
+    /// Events that wait for the next frame.
+    log: Log<Event>,
+    /// Events and optimizations as the workers have gathered them.
+    gathered: (Vec<Event>, Vec<Optimization>),
+}
+
+impl World for AirspaceWorld {
+    const NAME: &'static str = "airspace";
+    const AGENT: &'static str = "airplane";
+    const LOOKS_EACH_CYCLE: bool = true;
+
+    type Books = Books;
+    type Saved = (Snapshot, Ledger);
+    type Metrics = Metrics;
+
+    fn agents(&self) -> usize {
+        self.airplanes.len()
+    }
+
+    fn room(&self, _: &AirspaceState, books: &Books, _: Cycle) -> u64 {
+        if books.rows.is_full() { 0 } else { u64::MAX }
+    }
+
+    fn before_cycle(&self, state: &AirspaceState, books: &mut Books, now: Cycle) {
+        for (id, cell) in (0..).zip(&state.airplanes) {
+            if state.is_there(self, id, now) {
+                books.rows.pose(now, id, cell.pose());
+            }
+        }
+    }
+
+    fn is_over(&self, state: &AirspaceState) -> bool {
+        self.everybody_has_arrived(state)
+    }
+
+    fn gather(&self, books: &mut Books, scratch: &mut Scratch) {
+        let ledger = &mut books.ledger;
+        for (pair, record) in std::mem::take(&mut scratch.pairs) {
+            ledger.add_pair(pair, record);
+        }
+        ledger.effort.traffic.add(std::mem::take(&mut scratch.exchanged));
+        ledger.too_close.extend(std::mem::take(&mut scratch.too_close));
+        books.decide_ns += std::mem::take(&mut scratch.decide_ns);
+        books.gathered.0.append(&mut scratch.events);
+        books.gathered.1.append(&mut scratch.optimizations);
+    }
+
+    fn book(&self, books: &mut Books) {
+        let (mut events, mut optimizations) = std::mem::take(&mut books.gathered);
+        events.sort_unstable_by_key(Event::key);
+        optimizations.sort_unstable_by_key(|one| (one.cycle, one.airplane));
+        for event in events {
+            books.ledger.add_event(&event);
+            books.log.push(event);
+            books.rows.event(event);
+        }
+        for optimization in optimizations {
+            books.ledger.effort.add(&optimization);
+            books.rows.optimization(optimization);
+        }
+    }
+
+    fn begin_recording(&self, _: &mut AirspaceState, books: &mut Books, _: Cycle) {
+        books.rows.begin();
+    }
+
+    fn watch(&self, books: &mut Books) {
+        books.log.is_kept = true;
+    }
+
+    fn schemas(&self, books: &Books) -> Vec<TableSchema> {
+        books.rows.schemas()
+    }
+
+    fn record(
+        &self,
+        _: &mut AirspaceState,
+        books: &mut Books,
+        _: Cycle,
+        recorder: &mut dyn Recorder,
+    ) -> Result<(), RecordError> {
+        books.rows.record(recorder)
+    }
+
+    fn digest(&self, state: &AirspaceState, now: Cycle) -> Digest {
+        state.snapshot(now).digest()
+    }
+
+    fn save(&self, state: &AirspaceState, books: &Books, now: Cycle) -> (Snapshot, Ledger) {
+        (state.snapshot(now), books.ledger.clone())
+    }
+
+    fn restore(
+        &self,
+        (snapshot, ledger): (Snapshot, Ledger),
+        books: &mut Books,
+    ) -> Result<AirspaceState, CheckpointError> {
+        if snapshot.airplanes.len() != self.airplanes.len() {
+            return Err(CheckpointError::Damaged);
+        }
+        books.ledger = ledger;
+        Ok(AirspaceState::restore(self, &snapshot))
+    }
+
+    fn scenery(&self, name: &str) -> Scenery {
+        AirspaceWorld::scenery(self, name)
+    }
+
+    fn frame(&self, state: &AirspaceState, books: &mut Books, now: Cycle, _: Look) -> Frame {
+        let (events, log_left_out) = books.log.take();
+        Frame {
+            cycle: now,
+            time_s: self.starts_s(now),
+            bodies: self.visible_bodies(state, now),
+            scans: Vec::new(),
+            log: events.iter().map(entry).collect(),
+            log_left_out,
+        }
+    }
+
+    fn place_rows(&self, _: &Books) -> Vec<PlaceRows> {
+        AirspaceWorld::place_rows()
+    }
+
+    fn metrics(&self, state: &AirspaceState, books: &Books, _: Cycle, _: &Effort) -> Metrics {
+        AirspaceWorld::metrics(self, state, &books.ledger, books.decide_ns as f64 / 1e9)
+    }
+
+    fn agent_metrics(&self, state: &AirspaceState, _: &Books, _: Cycle) -> Value {
+        let one = |id| serde_json::to_value(self.airplane_metrics(state, id)).unwrap_or_default();
+        (0..self.airplanes.len() as EntityId).map(one).collect()
+    }
+
+    fn pair_metrics(&self, books: &Books) -> Value {
+        serde_json::to_value(AirspaceWorld::pair_metrics(self, &books.ledger)).unwrap_or_default()
+    }
+
+    fn outcome(&self, metrics: &Metrics) -> Lines {
+        words::outcome(metrics)
+    }
+
+    fn poses(&self, state: &AirspaceState, now: Cycle) -> Said {
+        words::poses(&state.snapshot(now))
+    }
+}

@@ -1,0 +1,147 @@
+//! What the world says to people: a scenario's contents, a run's outcome, where everybody is.
+
+use super::metrics::{Metrics, TooClose};
+use super::scenario::Compiled;
+use super::state::{AirplaneRecord, Snapshot};
+use serde_json::json;
+use sidestep_kernel::Cycle;
+use sidestep_kernel::words::{Lines, Said, grouped, line};
+
+/// Returns what a compiled scenario holds.
+pub(super) fn contents(compiled: &Compiled) -> Said {
+    let world = &*compiled.world;
+    let shield = if world.shield { "on" } else { "off" };
+    let recorded = world.airplanes.iter().filter(|a| a.track.is_some()).count() as u64;
+    // The JSON of a time that never comes is null.
+    let until_s = match world.replay_cycles {
+        Cycle::MAX => f64::INFINITY,
+        cycles => world.starts_s(cycles),
+    };
+    let json = json!({
+        "airplanes": world.airplanes.len(),
+        "method": world.method.name(),
+        "deployment": world.deployment.name(),
+        "shield": shield,
+        "dt_s": world.timing.dt_s,
+        "too_close": compiled.too_close,
+        "recorded": recorded,
+        "replay_until_s": (recorded > 0).then_some(until_s),
+    });
+    let mut text = format!(
+        "  airplanes        {}\n  method           {}, {}, shield {shield}\n",
+        grouped(world.airplanes.len() as u64),
+        world.method.name(),
+        world.deployment.name(),
+    );
+    if recorded > 0 {
+        let until = if until_s.is_finite() { format!("until {until_s} s") } else { "all".into() };
+        text.push_str(&format!("  recorded         {}, replayed {until}\n", grouped(recorded)));
+    }
+    text.push_str(&too_close(&compiled.too_close));
+    Said { json, text }
+}
+
+/// Returns what came of a run.
+pub(super) fn outcome(metrics: &Metrics) -> Lines {
+    let mut lines = flights(metrics);
+    lines.extend(network(metrics));
+    lines.extend(on_the_way(metrics));
+    lines.extend(warning(&metrics.too_close));
+    lines
+}
+
+/// Returns where every airplane is, by entity id.
+pub(super) fn poses(snapshot: &Snapshot) -> Said {
+    let json = serde_json::to_value(&snapshot.airplanes).unwrap_or_default();
+    let heading = "  airplane       x_m         y_m    heading_deg\n".to_string();
+    let row = |(id, a): (usize, &AirplaneRecord)| {
+        let ([x, y], psi_deg) = (a.pose.at, a.pose.psi_rad.to_degrees());
+        format!("  {id:<8} {x:>10.1}  {y:>10.1}  {psi_deg:>13.1}\n")
+    };
+    let text = snapshot.airplanes.iter().enumerate().map(row).fold(heading, |t, r| t + &r);
+    Said { json, text }
+}
+
+/// Pairs whose first fallbacks are not apart, in words.
+fn too_close(pairs: &[(u32, u32)]) -> String {
+    let warn = |(a, b): &(u32, u32)| {
+        format!("  warning          airplanes {a} and {b} start too close for the shield\n")
+    };
+    pairs.iter().map(warn).collect()
+}
+
+/// What went over the network, and what went wrong on it.
+fn network(m: &Metrics) -> Lines {
+    let mut lines = Lines::new();
+    if m.messages > 0 {
+        let sent = format!("{}, {} bytes", grouped(m.messages), grouped(m.bytes));
+        lines.push(line("messages", sent));
+    }
+    let counts = [
+        (m.contacts_lost, "contacts lost"),
+        (m.deadlines_missed, "agents out of time"),
+        (m.shield_held_back, "plans held back"),
+        (m.groups_too_large, "groups too large to optimize"),
+    ];
+    let said = counts.iter().filter(|(n, _)| *n > 0);
+    let said: Vec<String> = said.map(|(n, what)| format!("{} {what}", grouped(*n))).collect();
+    if !said.is_empty() {
+        lines.push(line("trouble", said.join(", ")));
+    }
+    lines
+}
+
+/// What was recorded, told or removed; no lines where there was nothing of that.
+fn on_the_way(m: &Metrics) -> Lines {
+    let mut lines = Vec::new();
+    if m.replayed > 0 {
+        lines.push(line("replayed", format!("{} to the end of their tracks", grouped(m.replayed))));
+    }
+    if m.left > 0 {
+        lines.push(line("left", format!("{} before they had arrived", grouped(m.left))));
+    }
+    if m.orders + m.orders_delayed > 0 {
+        let (done, waits) = (grouped(m.orders), grouped(m.orders_delayed));
+        lines.push(line("orders", format!("{done} carried out, delayed {waits} times by one dt")));
+    }
+    lines
+}
+
+/// Names the first pairs that came in too close, and counts the others.
+fn warning(too_close: &[TooClose]) -> Option<(String, String)> {
+    const NAMED: usize = 5;
+    let named = too_close.iter().take(NAMED).map(|TooClose { at_s, airplanes: [a, b] }| {
+        if *at_s > 0.0 { format!("{a} and {b} at {at_s} s") } else { format!("{a} and {b}") }
+    });
+    let mut pairs: Vec<String> = named.collect();
+    if too_close.len() > NAMED {
+        pairs.push(format!("and {} more", grouped((too_close.len() - NAMED) as u64)));
+    }
+    let told = || line("WARNING", format!("start too close for the shield: {}", pairs.join(", ")));
+    (!too_close.is_empty()).then(told)
+}
+
+fn flights(m: &Metrics) -> Lines {
+    let nearest = m.min_separation_m.map_or("nobody came near".into(), |d| format!("{d:.1} m"));
+    let lost = match m.losses_of_separation {
+        0 => "none".into(),
+        n => format!("{}, {:.1} s in all", grouped(n), m.lost_s),
+    };
+    let delay = m.mean_delay_percent.map_or("-".into(), |d| format!("{d:.1} % on average"));
+    let rounds = m.rounds_mean.map_or(String::new(), |r| format!(", {r:.1} rounds each"));
+    vec![
+        line("arrived", format!("{} of {}", grouped(m.arrived), grouped(m.airplanes))),
+        line("nearest approach", nearest),
+        line("losses of separation", lost),
+        line("delay", delay),
+        line("optimizations", format!("{}{rounds}", grouped(m.optimisations))),
+        line(
+            "shield",
+            format!(
+                "{} decisions changed, {} of them to orbits",
+                grouped(m.shield_overrides),
+                grouped(m.shield_orbits)
+            ),
+        ),
+    ]
+}

@@ -1,0 +1,67 @@
+//! The world as those see it who run scenarios and know no world.
+
+use super::scenario::{AnyCompiled as EitherCompiled, Compiled};
+use super::{bundle, words, world::ChainWorld};
+use sidestep_kernel::words::Said;
+use sidestep_kernel::{InputError, Plan, Simulation, World};
+use sidestep_scenario::{Compiled as AnyCompiled, Kind, Resolved, Source};
+use std::any::Any;
+
+/// Chains of connectors and rods, in the plane or in space.
+#[derive(Debug, Clone, Copy)]
+pub struct Chains;
+
+impl Kind for Chains {
+    fn name(&self) -> &'static str {
+        ChainWorld::<2>::NAME
+    }
+
+    fn agent(&self) -> &'static str {
+        ChainWorld::<2>::AGENT
+    }
+
+    fn about(&self) -> &'static str {
+        "Chains that creep among obstacles"
+    }
+
+    fn default_scenario(&self) -> &'static str {
+        include_str!("../../../../scenarios/chain/default.toml")
+    }
+
+    fn compile(&self, source: &Source) -> Result<Box<dyn AnyCompiled>, InputError> {
+        Ok(match EitherCompiled::new(source)? {
+            EitherCompiled::Plane(compiled) => Box::new(compiled),
+            EitherCompiled::Space(compiled) => Box::new(compiled),
+        })
+    }
+}
+
+impl<const D: usize> AnyCompiled for Compiled<D> {
+    fn world(&self) -> &'static str {
+        ChainWorld::<D>::NAME
+    }
+
+    fn plan(&self) -> Plan {
+        Compiled::plan(self)
+    }
+
+    fn bodies(&self) -> usize {
+        self.world.agents()
+    }
+
+    fn contents(&self, _: &Source) -> Said {
+        words::contents(self)
+    }
+
+    fn resolve(&self, source: &Source) -> Result<Resolved, InputError> {
+        bundle::resolve(source, self)
+    }
+
+    fn start(&self, source: &Source, workers: usize) -> Box<dyn Simulation> {
+        Box::new(self.clone().start(source, workers))
+    }
+
+    fn as_any(&self) -> &dyn Any {
+        self
+    }
+}

@@ -1,0 +1,211 @@
+//! What a run asks of the world beside its phases.
+
+use super::arms::arm::Arm;
+use super::arms::kinematics::Recovered;
+use super::events::Event;
+use super::metrics::{ChainMetrics, Metrics, Tally};
+use super::rods::geometry::in_dimensions;
+use super::rows::Rows;
+use super::scenario::Compiled;
+use super::scratch::Scratch;
+use super::state::{ChainState, Snapshot};
+use super::view::entry;
+use super::words;
+use super::world::ChainWorld;
+use serde_json::Value;
+use sidestep_kernel::checkpoint::CheckpointError;
+use sidestep_kernel::ports::{Buffers, RecordError, Recorder, TableSchema};
+use sidestep_kernel::view::{Frame, Log, Look, PlaceRows, Scenery};
+use sidestep_kernel::words::{Lines, Said};
+use sidestep_kernel::{Cycle, Digest, Effort, EntityId, Plan, Run, World};
+use sidestep_scenario::Source;
+
+/// A run of chains in `D` dimensions.
+pub type ChainRun<const D: usize> = Run<ChainWorld<D>>;
+
+impl<const D: usize> Compiled<D> {
+    /// A run at its start; the world is shared, not copied. `source` names it in checkpoints.
+    ///
+    /// # Panics
+    /// Never: scripts are tried when they are compiled.
+    pub fn start(self, source: &Source, workers: usize) -> ChainRun<D> {
+        let state = ChainState::new(&self.world).expect("scripts are tried when they are compiled");
+        let books = Books { rows: Rows::new(self.record), ..Books::default() };
+        let plan = self.plan();
+        Run::new(self.world, plan, (state, books), &source.text, workers)
+    }
+
+    /// What the scenario asks for.
+    pub fn plan(&self) -> Plan {
+        Plan {
+            name: self.name.clone(),
+            seed: self.seed,
+            cycles: self.cycles,
+            checkpoint_every: self.record.checkpoint_every,
+        }
+    }
+}
+
+/// What a run keeps beside its state.
+#[derive(Debug, Default)]
+pub struct Books {
+    /// Steps that were made before this process took the run up.
+    steps_before: u64,
+    /// What is to be recorded; nothing without recording.
+    rows: Rows,
+    /// Events that wait for the next frame.
+    log: Log<Event>,
+    /// Events as the workers have gathered them.
+    gathered: Vec<Event>,
+}
+
+impl<const D: usize> ChainWorld<D> {
+    /// Metrics of one chain.
+    pub fn metrics_of(&self, state: &ChainState<D>, slot: usize) -> ChainMetrics {
+        let body = state.body(slot);
+        let spec = &self.chains[slot];
+        let points: Vec<_> = body.chain.points().iter().map(|p| in_dimensions(*p)).collect();
+        let joints = spec.arm.as_ref().map(|arm| (arm, arm.joints(&points)));
+        let named = |(arm, recovered): (&Arm, Recovered)| {
+            let names = arm.serial.variables.iter().map(|variable| variable.name.clone());
+            names.zip(recovered.values).collect()
+        };
+        let (joints, joints_error) = match joints {
+            None => (None, None),
+            Some((arm, Ok(recovered))) => (Some(named((arm, recovered))), None),
+            Some((_, Err(error))) => (None, Some(error.to_string())),
+        };
+        ChainMetrics {
+            chain: slot as EntityId,
+            name: spec.name.clone(),
+            joints,
+            joints_error,
+            progress: self.progress(slot, &body),
+            tally: body.tally.clone(),
+        }
+    }
+}
+
+impl<const D: usize> World for ChainWorld<D> {
+    const NAME: &'static str = "chain";
+    const AGENT: &'static str = "connector";
+    const LOOKS_EACH_CYCLE: bool = true;
+
+    type Books = Books;
+    type Saved = (Snapshot, Vec<Tally>);
+    type Metrics = Metrics;
+
+    fn agents(&self) -> usize {
+        self.chains.iter().map(|spec| spec.start.points().len()).sum()
+    }
+
+    fn room(&self, _: &ChainState<D>, books: &Books, _: Cycle) -> u64 {
+        if books.rows.is_full() { 0 } else { u64::MAX }
+    }
+
+    fn before_cycle(&self, state: &ChainState<D>, books: &mut Books, now: Cycle) {
+        books.rows.places(self, state, now);
+    }
+
+    fn is_over(&self, state: &ChainState<D>) -> bool {
+        self.all_is_done(state)
+    }
+
+    fn gather(&self, books: &mut Books, scratch: &mut Scratch<D>) {
+        books.gathered.append(&mut scratch.events);
+    }
+
+    fn book(&self, books: &mut Books) {
+        // One chain's events are in their order already.
+        books.gathered.sort_by_key(|event| (event.cycle, event.chain));
+        for event in books.gathered.drain(..) {
+            books.log.push(event);
+            books.rows.event(event);
+        }
+    }
+
+    fn begin_recording(&self, _: &mut ChainState<D>, books: &mut Books, _: Cycle) {
+        books.rows.begin(self);
+    }
+
+    fn watch(&self, books: &mut Books) {
+        books.log.is_kept = true;
+    }
+
+    fn schemas(&self, books: &Books) -> Vec<TableSchema> {
+        books.rows.schemas()
+    }
+
+    fn record(
+        &self,
+        _: &mut ChainState<D>,
+        books: &mut Books,
+        _: Cycle,
+        recorder: &mut dyn Recorder,
+    ) -> Result<(), RecordError> {
+        books.rows.record(recorder)
+    }
+
+    fn digest(&self, state: &ChainState<D>, now: Cycle) -> Digest {
+        state.snapshot(now).digest()
+    }
+
+    fn save(&self, state: &ChainState<D>, _: &Books, now: Cycle) -> (Snapshot, Vec<Tally>) {
+        (state.snapshot(now), state.tallies())
+    }
+
+    fn restore(
+        &self,
+        (snapshot, tallies): (Snapshot, Vec<Tally>),
+        books: &mut Books,
+    ) -> Result<ChainState<D>, CheckpointError> {
+        books.steps_before = tallies.iter().map(|t| t.steps).sum();
+        ChainState::restore(self, &snapshot, tallies)
+    }
+
+    fn scenery(&self, name: &str) -> Scenery {
+        ChainWorld::scenery(self, name)
+    }
+
+    fn frame(&self, state: &ChainState<D>, books: &mut Books, now: Cycle, look: Look) -> Frame {
+        let (events, log_left_out) = books.log.take();
+        Frame {
+            cycle: now,
+            time_s: self.starts_s(now),
+            bodies: self.visible_bodies(state, now),
+            scans: self.scans(state, now, look.scanning_bodies),
+            log: events.iter().map(entry).collect(),
+            log_left_out,
+        }
+    }
+
+    fn place_rows(&self, books: &Books) -> Vec<PlaceRows> {
+        ChainWorld::<D>::place_rows(books.rows.every())
+    }
+
+    fn metrics(&self, state: &ChainState<D>, books: &Books, _: Cycle, effort: &Effort) -> Metrics {
+        let tallies = state.tallies();
+        let progress: Vec<f64> =
+            (0..state.len()).map(|slot| self.progress(slot, &state.body(slot))).collect();
+        let steps = tallies.iter().map(|t| t.steps).sum::<u64>() - books.steps_before;
+        let told = |slot| Some((slot as EntityId, self.metrics_of(state, slot).joints_error?));
+        let arms = (0..tallies.len()).filter(|&slot| self.chains[slot].arm.is_some());
+        Metrics {
+            joints_errors: arms.filter_map(told).collect(),
+            ..Metrics::of(&tallies, &progress, effort.cpu_ns as f64 / 1e9, steps)
+        }
+    }
+
+    fn agent_metrics(&self, state: &ChainState<D>, _: &Books, _: Cycle) -> Value {
+        let one = |slot| serde_json::to_value(self.metrics_of(state, slot)).unwrap_or_default();
+        (0..state.len()).map(one).collect()
+    }
+
+    fn outcome(&self, metrics: &Metrics) -> Lines {
+        words::outcome(metrics)
+    }
+
+    fn poses(&self, state: &ChainState<D>, now: Cycle) -> Said {
+        words::poses::<D>(&state.snapshot(now))
+    }
+}

@@ -1,0 +1,165 @@
+//! What the world says to people: a scenario's contents, a run's outcome, where everything is.
+
+use super::metrics::{ChainGivenUp, Metrics};
+use super::scenario::Compiled;
+use super::state::Snapshot;
+use serde_json::{Value, json};
+use sidestep_kernel::World;
+use sidestep_kernel::words::{Lines, Said, grouped, line};
+
+/// Returns what a compiled scenario holds.
+pub(super) fn contents<const D: usize>(compiled: &Compiled<D>) -> Said {
+    let world = &compiled.world;
+    let rods: usize = world.chains.iter().map(|spec| spec.start.rods().len()).sum();
+    let plan = compiled.plan();
+    let connectors = world.agents();
+    let json = json!({
+        "name": plan.name,
+        "seed": plan.seed,
+        "cycles": plan.cycles,
+        "chains": world.chains.len(),
+        "connectors": connectors,
+        "rods": rods,
+        "obstacles": world.obstacles.still().len(),
+        "movers": world.movers.len(),
+        "dimensions": D,
+        "dt_s": world.dt_s,
+    });
+    let text = format!(
+        "  chains           {}, of {} connectors in {D} dimensions\n  \
+         obstacles        {}, and {} that move\n",
+        grouped(world.chains.len() as u64),
+        grouped(connectors as u64),
+        grouped(world.obstacles.still().len() as u64),
+        grouped(world.movers.len() as u64),
+    );
+    Said { json, text }
+}
+
+/// Returns where every connector is.
+pub(super) fn poses<const D: usize>(snapshot: &Snapshot) -> Said {
+    let mut rows = Vec::new();
+    let axes: String =
+        ["x_m", "y_m", "z_m"][..D].iter().map(|axis| format!("{axis:>12}")).collect();
+    let mut text = format!("  chain  connector{axes}\n");
+    for (chain, record) in snapshot.chains.iter().enumerate() {
+        for (connector, at) in record.points_m.chunks_exact(D).enumerate() {
+            rows.push(json!({ "chain": chain, "connector": connector, "at_m": at }));
+            let at = at.iter().map(|x| format!("{x:>12.4}")).collect::<String>();
+            text.push_str(&format!("  {chain:<5}  {connector:<9}{at}\n"));
+        }
+    }
+    Said { json: Value::Array(rows), text }
+}
+
+/// Returns what came of a run.
+pub(super) fn outcome(m: &Metrics) -> Lines {
+    let clearance = match m.min_clearance_m {
+        None => "nothing came near".into(),
+        Some(c) if c.abs() < TOUCH_M => "touched".into(),
+        Some(c) => format!("{c:.4} m"),
+    };
+    let penetrations = match m.penetrations {
+        0 => "none".into(),
+        n => format!("{} steps with a part in an obstacle", grouped(n)),
+    };
+    let mut lines = vec![
+        line("progress", format!("{:.1} %", 100.0 * m.progress)),
+        line("vetoes", vetoes(m)),
+        line("penetrations", penetrations),
+        line("least clearance", clearance),
+        line("rods", format!("within their limits to {:.1e} m", m.max_rod_violation_m)),
+        line(
+            "effort",
+            format!(
+                "{:.1} connectors moved per step, {} rods turned",
+                m.moved_per_step,
+                grouped(m.rotations)
+            ),
+        ),
+        line("greatest speed", format!("{:.3} m/s", m.max_speed_m_s)),
+    ];
+    if let Some(robots) = &m.robots {
+        let bumpers = match robots.bumper_events {
+            0 => "no bumper pressed".into(),
+            n => format!("bumpers pressed {} times", grouped(n)),
+        };
+        lines.push(line(
+            "robots",
+            format!(
+                "{bumpers}; behind their connectors by {:.2} m on average, {:.2} m at most",
+                robots.mean_lag_m, robots.max_lag_m
+            ),
+        ));
+    }
+    lines.extend(after_vetoes(m));
+    if m.reformed > 0 {
+        lines.push(line("re-formed", format!("{} times", grouped(m.reformed))));
+    }
+    if m.not_reformed > 0 {
+        lines.push(line("NOT re-formed", format!("{} times", grouped(m.not_reformed))));
+    }
+    lines.extend(m.joints_errors.iter().map(|(chain, error)| {
+        line("joints", format!("of chain {chain} cannot follow its connectors: {error}"))
+    }));
+    lines.extend(m.given_up.iter().take(MOST_TOLD).map(given_up));
+    if m.given_up.len() > MOST_TOLD {
+        let more = grouped((m.given_up.len() - MOST_TOLD) as u64);
+        lines.push(line("given up", format!("and {more} more")));
+    }
+    lines
+}
+
+/// How initiators went on after vetoes, and what getting out of the way came to; no lines where
+/// there was nothing of that.
+fn after_vetoes(m: &Metrics) -> Lines {
+    let some = |counts: &[(u64, &str)]| {
+        let said = counts.iter().filter(|(n, _)| *n > 0);
+        let said: Vec<String> = said.map(|(n, what)| format!("{} {what}", grouped(*n))).collect();
+        (!said.is_empty()).then(|| said.join(", "))
+    };
+    let (rungs, escapes) = (&m.rungs, &m.escapes);
+    let went_on = some(&[
+        (rungs.shorter, "shorter steps"),
+        (rungs.sideways, "to the side"),
+        (rungs.turned, "turns on the spot"),
+        (rungs.waited, "waited"),
+        (rungs.pulled_back, "pulled by the other end"),
+        (rungs.stuck, "stuck"),
+    ]);
+    let escaped = some(&[
+        (escapes.moves, "parts moved away"),
+        (escapes.vetoes, "could not"),
+        (escapes.capped, "of these too slow"),
+    ]);
+    let went_on = went_on.map(|said| line("after vetoes", said));
+    went_on.into_iter().chain(escaped.map(|said| line("escapes", said))).collect()
+}
+
+/// What is nearer than this touches, meters.
+const TOUCH_M: f64 = 1e-6;
+/// More that was given up is only counted.
+const MOST_TOLD: usize = 5;
+
+fn vetoes(m: &Metrics) -> String {
+    if m.vetoes == 0 {
+        return "none".into();
+    }
+    let reasons = m.vetoes_by_reason.iter().filter(|(_, n)| **n > 0);
+    let reasons = reasons.map(|(reason, n)| format!("{reason} {}", grouped(*n)));
+    format!("{}: {}", grouped(m.vetoes), reasons.collect::<Vec<_>>().join(", "))
+}
+
+fn given_up(told: &ChainGivenUp) -> (String, String) {
+    let what = &told.what;
+    let why = match (&what.by, &what.reason) {
+        (Some(by), Some(reason)) => format!("connector {by} objected: {reason}"),
+        _ => "nobody objected".into(),
+    };
+    let nearest = match what.nearest_m.is_finite() {
+        true => format!(", came within {:.4} m", what.nearest_m),
+        false => String::new(),
+    };
+    let who = format!("chain {}, task {}, part {}", told.chain, what.task, what.part);
+    line("given up", format!("{who}{nearest}; {why}"))
+}

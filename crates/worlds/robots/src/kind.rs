@@ -1,0 +1,65 @@
+//! The world as those see it who run scenarios and know no world.
+
+use super::scenario::{Behaviours, Compiled, StorageOrder};
+use super::{RobotsWorld, bundle, words};
+use sidestep_kernel::words::Said;
+use sidestep_kernel::{InputError, Plan, Simulation, World};
+use sidestep_scenario::{Compiled as AnyCompiled, Kind, Resolved, Source};
+use std::any::Any;
+
+/// Situated agents on a grid.
+#[derive(Debug, Clone, Copy)]
+pub struct Robots;
+
+impl Kind for Robots {
+    fn name(&self) -> &'static str {
+        RobotsWorld::NAME
+    }
+
+    fn agent(&self) -> &'static str {
+        RobotsWorld::AGENT
+    }
+
+    fn about(&self) -> &'static str {
+        "Stochastic robots on a grid"
+    }
+
+    fn default_scenario(&self) -> &'static str {
+        include_str!("../../../../scenarios/robots/default.toml")
+    }
+
+    fn compile(&self, source: &Source) -> Result<Box<dyn AnyCompiled>, InputError> {
+        let compiled = Compiled::new(source, &Behaviours::new(), StorageOrder::Spatial)?;
+        Ok(Box::new(compiled))
+    }
+}
+
+impl AnyCompiled for Compiled {
+    fn world(&self) -> &'static str {
+        RobotsWorld::NAME
+    }
+
+    fn plan(&self) -> Plan {
+        Compiled::plan(self)
+    }
+
+    fn bodies(&self) -> usize {
+        self.world.bodies.len()
+    }
+
+    fn contents(&self, source: &Source) -> Said {
+        words::contents(self, source)
+    }
+
+    fn resolve(&self, source: &Source) -> Result<Resolved, InputError> {
+        bundle::resolve(source, self)
+    }
+
+    fn start(&self, source: &Source, workers: usize) -> Box<dyn Simulation> {
+        Box::new(self.clone().start(source, workers))
+    }
+
+    fn as_any(&self) -> &dyn Any {
+        self
+    }
+}

@@ -1,0 +1,311 @@
+//! What a run records: tables, and what waits for being recorded.
+
+use super::effector::Side;
+use super::perceive::name_of;
+use super::scenario::RecordSection;
+use super::sensor::SensorModel;
+use super::state::{Frames, RobotsState, pose_of_word};
+use super::world::{RobotsWorld, Role};
+use super::{Event, EventKind, MotionSample, Scratch, SensorSample};
+use sidestep_kernel::ports::{
+    BlockBuffer, Buffer, Buffers, ColumnSpec, ColumnType, RecordError, Recorder, RowBuffer, Table,
+    TableSchema, Values,
+};
+use sidestep_kernel::view::Log;
+use sidestep_kernel::{Cycle, EntityId};
+use std::ops::Range;
+
+/// Poses kept before they must be recorded: what a processor's cache holds,
+const FEW_POSES: usize = 1 << 18;
+/// or more for very many bodies, so that cycles run at least sixteen in a row,
+const CYCLES_IN_A_ROW: usize = 16;
+/// but never more than this.
+const MAX_POSES: usize = 1 << 24;
+/// Bodies whose poses are brought together at a time: a cache line of each cycle.
+const TRANSPOSED: usize = 16;
+
+/// Names of the headings by number.
+pub const HEADING_NAMES: [&str; 4] = ["east", "north", "west", "south"];
+
+const CYCLE: &str = "cycle, counted from 0";
+const BODY: &str = "entity id: robots first, then people, then doors";
+
+/// The table of poses, which are recorded as whole columns: they are many.
+fn trajectories() -> TableSchema {
+    let column = ColumnSpec::new;
+    let columns = vec![
+        column("cycle", ColumnType::U64, "the pose at the beginning of this cycle"),
+        column("body", ColumnType::U32, BODY),
+        column("col_boxes", ColumnType::U32, "column of the body's lower-left box, from the west"),
+        column("row_boxes", ColumnType::U32, "row of the body's lower-left box, from the south"),
+        ColumnSpec::label("heading", "where the body looks", HEADING_NAMES),
+    ];
+    TableSchema { name: "trajectories".into(), columns }
+}
+
+fn events(world: &RobotsWorld) -> Table<Event> {
+    let names = ["contact", "door_opened", "door_closed"];
+    let kinds = world.kinds.iter().cloned().chain([String::new()]);
+    let no_kind = world.kinds.len() as u32;
+    let sides = Side::ALL.iter().map(|side| side.name()).chain([""]);
+    let no_side = Side::ALL.len() as u32;
+    Table::new("events")
+        .u64("cycle", CYCLE, |e: &Event| e.cycle)
+        .u32("body", BODY, |e| e.body)
+        .label("event", "what happened", names, |e| match e.event {
+            EventKind::Contact { .. } => 0,
+            EventKind::Opened => 1,
+            EventKind::Closed => 2,
+        })
+        .label("kind", "kind of the thing touched, empty otherwise", kinds, move |e| {
+            match e.event {
+                EventKind::Contact { kind, .. } => u32::from(kind),
+                _ => no_kind,
+            }
+        })
+        .label(
+            "side",
+            "side of the robot that touched it, empty otherwise",
+            sides,
+            move |e| match e.event {
+                EventKind::Contact { side, .. } => side as u32,
+                _ => no_side,
+            },
+        )
+}
+
+/// A beam: what it met and what was reported, each an observation and a class of distance.
+struct Reading {
+    cycle: Cycle,
+    robot: EntityId,
+    sensor: u16,
+    truth: [u32; 2],
+    reported: [u32; 2],
+}
+
+fn readings(Vocabulary { observations, classes }: Vocabulary) -> Table<Reading> {
+    Table::new("readings")
+        .u64("cycle", CYCLE, |r: &Reading| r.cycle)
+        .u32("robot", "entity id", |r| r.robot)
+        .u32("sensor", "number of the sensor on its robot", |r| u32::from(r.sensor))
+        .label("true", "what the beam met", observations.clone(), |r| r.truth[0])
+        .label("true_class", "its true distance class", classes.clone(), |r| r.truth[1])
+        .label("reported", "what the sensor reported", observations, |r| r.reported[0])
+        .label("reported_class", "the reported distance class", classes, |r| r.reported[1])
+}
+
+fn motions() -> Table<MotionSample> {
+    let action = "action tried: 0 forward, 1 left, 2 right, 3 stay, then the effector's own";
+    Table::new("motions")
+        .u64("cycle", CYCLE, |s: &MotionSample| s.cycle)
+        .u32("robot", "entity id", |s| s.robot)
+        .u32("action", action, |s| u32::from(s.action))
+        .i32("ahead_boxes", "displacement ahead in the heading before", |s| s.ahead)
+        .i32("left_boxes", "displacement to the left", |s| s.left)
+        .i32("turn_deg", "turn made, positive to the left", |s| {
+            let quarters = i32::from(s.quarter_turns);
+            90 * if quarters == 3 { -1 } else { quarters }
+        })
+        .label("contact", "whether an obstacle cut it", ["no", "yes"], |s| u32::from(s.contact))
+}
+
+/// The tables, and their rows until they are recorded.
+#[derive(Debug, Default)]
+struct Rows {
+    trajectories: BlockBuffer,
+    events: RowBuffer<Event>,
+    readings: RowBuffer<Reading>,
+    motions: RowBuffer<MotionSample>,
+}
+
+impl Buffers for Rows {
+    fn buffers(&self) -> Vec<&dyn Buffer> {
+        vec![&self.trajectories, &self.events, &self.readings, &self.motions]
+    }
+
+    fn buffers_mut(&mut self) -> Vec<&mut dyn Buffer> {
+        vec![&mut self.trajectories, &mut self.events, &mut self.readings, &mut self.motions]
+    }
+}
+
+/// What a run keeps beside its state: events and samples that wait.
+#[derive(Debug, Default)]
+pub struct Books {
+    record: RecordSection,
+    /// First cycle whose poses are not recorded yet.
+    recorded: Cycle,
+    is_recording: bool,
+    rows: Rows,
+    /// Events as the workers have gathered them,
+    gathered: Vec<Event>,
+    /// and those that wait for the next frame.
+    pub(super) log: Log<Event>,
+    sensor_samples: Vec<SensorSample>,
+    motion_samples: Vec<MotionSample>,
+}
+
+impl Books {
+    /// Empty books of a run that may come to record what `record` says.
+    pub fn new(record: RecordSection) -> Self {
+        Self { record, ..Self::default() }
+    }
+
+    /// Begins to keep rows from cycle `now` on.
+    pub(super) fn begin(&mut self, world: &RobotsWorld, state: &mut RobotsState, now: Cycle) {
+        let record = &self.record;
+        self.rows.trajectories.begin(record.trajectories.then(trajectories));
+        self.rows.events.begin(record.events.then(|| events(world)));
+        self.rows.readings.begin(record.calibration.then(|| readings(Vocabulary::of(world))));
+        self.rows.motions.begin(record.calibration.then(motions));
+        if record.trajectories {
+            let bodies = world.bodies.len();
+            let wanted = (FEW_POSES / bodies).max(CYCLES_IN_A_ROW);
+            let capacity = wanted.min(MAX_POSES / bodies).clamp(1, 4096);
+            state.frames = Some(Frames::new(now, capacity, bodies));
+        }
+        (self.is_recording, self.recorded) = (true, now);
+    }
+
+    /// Goes on from cycle `now`, whose state was restored.
+    pub(super) fn go_on(&mut self, world: &RobotsWorld, state: &mut RobotsState, now: Cycle) {
+        self.recorded = now;
+        if self.is_recording {
+            self.begin(world, state, now);
+        }
+    }
+
+    /// Lets a worker keep what is wanted.
+    pub(super) fn prepare(&self, scratch: &mut Scratch) {
+        scratch.keep_events = self.log.is_kept || self.rows.events.is_kept();
+        scratch.keep_samples = self.rows.readings.is_kept();
+    }
+
+    /// Takes a worker's events and samples over.
+    pub(super) fn gather(&mut self, scratch: &mut Scratch) {
+        self.gathered.append(&mut scratch.events);
+        self.sensor_samples.append(&mut scratch.sensor_samples);
+        self.motion_samples.append(&mut scratch.motion_samples);
+    }
+
+    /// Files what was gathered, in an order that does not depend on who has seen what.
+    pub(super) fn book(&mut self) {
+        self.gathered.sort_unstable_by_key(|e| (e.cycle, e.body));
+        self.gathered.iter().for_each(|&event| self.log.push(event));
+        self.rows.events.extend(self.gathered.drain(..));
+    }
+
+    /// The tables that are recorded.
+    pub(super) fn schemas(&self) -> Vec<TableSchema> {
+        self.rows.schemas()
+    }
+
+    /// Hands over the rows of all cycles before `now`.
+    pub(super) fn record(
+        &mut self,
+        world: &RobotsWorld,
+        state: &mut RobotsState,
+        now: Cycle,
+        recorder: &mut dyn Recorder,
+    ) -> Result<(), RecordError> {
+        if let Some(frames) = &mut state.frames {
+            self.rows.trajectories.set(poses(world, frames, self.recorded..now));
+            frames.first = now;
+        }
+        self.sensor_samples.sort_by_key(|s| (s.cycle, s.robot));
+        if !self.sensor_samples.is_empty() {
+            let vocabulary = Vocabulary::of(world);
+            let samples = self.sensor_samples.drain(..);
+            self.rows.readings.extend(samples.filter_map(|s| vocabulary.reading(world, &s)));
+        }
+        self.motion_samples.sort_unstable_by_key(|s| (s.cycle, s.robot));
+        self.rows.motions.extend(self.motion_samples.drain(..));
+        self.recorded = now;
+        self.rows.record(recorder)
+    }
+}
+
+/// The columns of the table of poses in these cycles.
+fn poses(world: &RobotsWorld, frames: &Frames, span: Range<Cycle>) -> Vec<Values> {
+    let cycles = (span.end - span.start) as usize;
+    let moving: Vec<EntityId> =
+        (0..world.bodies.len() as EntityId).filter(|&id| !world.is_door(id)).collect();
+    let [mut bodies, mut cols, mut rows, mut headings] =
+        std::array::from_fn(|_| Vec::with_capacity(cycles * moving.len()));
+    let mut at_cycle = Vec::with_capacity(cycles * moving.len());
+    let from = (span.start - frames.first) as usize;
+    // Poses come by cycle and leave by body: a few bodies at a time, so that what is read
+    // of a cycle lies together.
+    let mut ways = vec![Vec::new(); TRANSPOSED];
+    for some in moving.chunks(TRANSPOSED) {
+        ways.iter_mut().for_each(Vec::clear);
+        for cycle in from..from + cycles {
+            for (way, &id) in ways.iter_mut().zip(some) {
+                way.push(frames.poses.get(cycle * frames.bodies + id as usize));
+            }
+        }
+        for (way, &id) in ways.iter().zip(some) {
+            bodies.extend(std::iter::repeat_n(id, cycles));
+            at_cycle.extend(span.clone());
+            cols.extend(way.iter().map(|&pose| pose_of_word(pose).0 - world.border));
+            rows.extend(way.iter().map(|&pose| pose_of_word(pose).1 - world.border));
+            headings.extend(way.iter().map(|&pose| u32::from(pose_of_word(pose).2)));
+        }
+    }
+    vec![
+        Values::U64(at_cycle.into()),
+        Values::U32(bodies.into()),
+        Values::U32(cols.into()),
+        Values::U32(rows.into()),
+        Values::Label(headings.into()),
+    ]
+}
+
+/// The labels of readings, sorted: observations and classes of distance of all sensors.
+struct Vocabulary {
+    observations: Vec<String>,
+    classes: Vec<String>,
+}
+
+impl Vocabulary {
+    fn of(world: &RobotsWorld) -> Self {
+        let (mut observations, mut classes) = (Vec::new(), vec!["beyond".to_string()]);
+        for sensor in world.sensors() {
+            observations.extend(sensor.observations.iter().cloned());
+            classes.extend(sensor.distance_classes.iter().cloned());
+        }
+        for names in [&mut observations, &mut classes] {
+            names.sort_unstable();
+            names.dedup();
+        }
+        Self { observations, classes }
+    }
+
+    /// The row of a sample; `None` for a body without sensors.
+    fn reading(&self, world: &RobotsWorld, sample: &SensorSample) -> Option<Reading> {
+        let Role::Robot(model) = &world.type_of(sample.robot).role else { return None };
+        let sensor = &model.body.sensors[usize::from(sample.sensor)].model;
+        let index = |names: &[String], name: &str| {
+            names.binary_search_by(|n| n.as_str().cmp(name)).unwrap_or(0) as u32
+        };
+        let labels = |(observation, class): (&str, &str)| {
+            [index(&self.observations, observation), index(&self.classes, class)]
+        };
+        Some(Reading {
+            cycle: sample.cycle,
+            robot: sample.robot,
+            sensor: sample.sensor,
+            truth: labels(name_of(sample.truth, sensor)),
+            reported: labels(name_of(sample.reported, sensor)),
+        })
+    }
+}
+
+impl RobotsWorld {
+    /// The sensors of all robot types.
+    pub fn sensors(&self) -> impl Iterator<Item = &SensorModel> {
+        self.types.iter().flat_map(|ty| match &ty.role {
+            Role::Robot(model) => model.body.sensors.iter().map(|s| &s.model).collect(),
+            _ => Vec::new(),
+        })
+    }
+}

@@ -1,0 +1,300 @@
+//! What the world says to people: a scenario's contents, a run's outcome, where every body is.
+
+use super::metrics::Metrics;
+use super::rows::HEADING_NAMES;
+use super::run::heap_bytes;
+use super::scenario::Compiled;
+use super::sensor::SensorModel;
+use super::state::{BodyRecord, Snapshot};
+use super::world::RobotsWorld;
+use serde_json::{Value, json};
+use sidestep_kernel::words::{Lines, Said, aligned, grouped, line};
+use sidestep_scenario::Source;
+use std::collections::BTreeMap;
+
+/// Returns what came of a run.
+pub(super) fn outcome(metrics: &Metrics) -> Lines {
+    let total = &metrics.total;
+    let mut lines = vec![
+        line("contacts", contacts(metrics)),
+        line("trips", trips(total.trips, total.trip_cycles_mean)),
+        line("distance", distance(total.distance_m)),
+        line("coverage", format!("{:.1} % of the free boxes", 100.0 * metrics.coverage)),
+    ];
+    // A continued run at its end has seen no group in this process.
+    if metrics.largest_group > 0 {
+        lines.push(line("conflict groups", groups(metrics)));
+    }
+    lines
+}
+
+fn distance(meters: f64) -> String {
+    match meters < 1000.0 {
+        true => format!("{meters:.1} m"),
+        false => format!("{:.1} km", meters / 1000.0),
+    }
+}
+
+fn contacts(metrics: &Metrics) -> String {
+    let total = &metrics.total;
+    let touched = total.contacts_by_kind.iter().filter(|(_, n)| **n > 0);
+    let by_kind: Vec<String> = touched.map(|(kind, n)| format!("{kind} {}", grouped(*n))).collect();
+    let share = 1000.0 * metrics.contacts_per_action;
+    match by_kind.is_empty() {
+        true => "none".into(),
+        false => format!(
+            "{} ({share:.1} in 1000 actions): {}",
+            grouped(total.contacts),
+            by_kind.join(", ")
+        ),
+    }
+}
+
+fn trips(trips: u64, mean_cycles: Option<f64>) -> String {
+    match mean_cycles {
+        Some(mean) => format!("{}, {mean:.1} cycles on average", grouped(trips)),
+        None => "none".into(),
+    }
+}
+
+/// How many conflict groups had how many bodies: index k counts those of `2^k .. 2^(k+1)`.
+fn groups(metrics: &Metrics) -> String {
+    let sizes = metrics.group_sizes.iter().enumerate().filter(|(_, n)| **n > 0);
+    let bins = sizes.map(|(k, n)| match k {
+        0 => format!("alone {}", grouped(*n)),
+        _ => format!("{}-{}: {}", 1u64 << k, (2u64 << k) - 1, grouped(*n)),
+    });
+    format!("{}; largest {}", bins.collect::<Vec<_>>().join(", "), metrics.largest_group)
+}
+
+/// Returns every body by entity id.
+pub(super) fn poses(world: &RobotsWorld, snapshot: &Snapshot) -> Said {
+    let bodies: Vec<Body<'_>> = snapshot
+        .bodies
+        .iter()
+        .enumerate()
+        .map(|(id, record)| Body { world, id: id as u32, record })
+        .collect();
+    let heading = "  body  kind        col_boxes  row_boxes  heading\n".to_string();
+    let text = bodies.iter().fold(heading, |text, body| text + &body.row());
+    Said { json: bodies.iter().map(Body::json).collect(), text }
+}
+
+struct Body<'a> {
+    world: &'a RobotsWorld,
+    id: u32,
+    record: &'a BodyRecord,
+}
+
+impl Body<'_> {
+    fn kind(&self) -> &str {
+        let world = self.world;
+        &world.kinds[usize::from(world.type_of(self.id).kind)]
+    }
+
+    fn is_door(&self) -> bool {
+        let world = self.world;
+        world.is_door(self.id)
+    }
+
+    fn heading(&self) -> &'static str {
+        HEADING_NAMES[usize::from(self.record.facing % 4)]
+    }
+
+    fn json(&self) -> Value {
+        let (col, row) = self.record.at;
+        let place = json!({
+            "body": self.id, "kind": self.kind(), "col_boxes": col, "row_boxes": row,
+        });
+        let Value::Object(mut place) = place else { return place };
+        match self.is_door() {
+            true => place.insert("open".into(), (self.record.facing == 1).into()),
+            false => place.insert("heading".into(), self.heading().into()),
+        };
+        Value::Object(place)
+    }
+
+    fn row(&self) -> String {
+        let (col, row) = self.record.at;
+        let look = match (self.is_door(), self.record.facing) {
+            (true, 1) => "open",
+            (true, _) => "closed",
+            (false, _) => self.heading(),
+        };
+        format!("  {:<4}  {:<10}  {col:>9}  {row:>9}  {look}\n", self.id, self.kind())
+    }
+}
+
+/// Returns map, bodies, sensors, effectors and memory of a scenario.
+pub(super) fn contents(compiled: &Compiled, source: &Source) -> Said {
+    let file: Value = source.parse().unwrap_or_default();
+    let world = &*compiled.world;
+    let (boxes_bytes, bodies_bytes) = heap_bytes(&compiled.clone().start(source, 1));
+    let json = json!({
+        "world": "robots",
+        "name": compiled.name,
+        "seed": compiled.seed,
+        "cycles": compiled.cycles,
+        "regime": world.regime,
+        "obstacle_rule": world.obstacle_rule,
+        "conflict_policy": world.policy,
+        "map": map(world),
+        "bodies": bodies(world),
+        "robots": robots(&file),
+        "sensors": sensors(world),
+        "memory_bytes": boxes_bytes + bodies_bytes,
+    });
+    let text = text(&json);
+    Said { json, text }
+}
+
+fn map(world: &RobotsWorld) -> Value {
+    let map = &world.map;
+    let counts = map.counts();
+    json!({
+        "width_boxes": map.width(),
+        "height_boxes": map.height(),
+        "box_size_m": map.box_size_m,
+        "free": counts.free,
+        "wall": counts.wall,
+        "unknown": counts.unknown,
+    })
+}
+
+/// Number of bodies of each kind.
+fn bodies(world: &RobotsWorld) -> BTreeMap<&str, u64> {
+    let mut count = BTreeMap::new();
+    for id in 0..world.bodies.len() as u32 {
+        let kind = &world.kinds[usize::from(world.type_of(id).kind)];
+        *count.entry(kind.as_str()).or_default() += 1;
+    }
+    count
+}
+
+/// One entry per `[[robots]]` section.
+fn robots(file: &Value) -> Vec<Value> {
+    let sections = match &file["robots"] {
+        Value::Array(many) => many.as_slice(),
+        Value::Null => &[],
+        one => std::slice::from_ref(one),
+    };
+    sections.iter().map(robot_section).collect()
+}
+
+fn robot_section(section: &Value) -> Value {
+    let places = section["at"].as_array().map(|at| at.len().into());
+    let or = |value: &Value, default: Value| if value.is_null() { default } else { value.clone() };
+    json!({
+        "name": or(&section["name"], "robots".into()),
+        "count": or(&section["count"], places.unwrap_or(Value::Null)),
+        "size_boxes": or(&section["size"], 1.into()),
+        "period": or(&section["period"], 1.into()),
+        "sensors": or(&section["sensors"], json!([])),
+        "effector": or(&section["effector"], "perfect".into()),
+        "behaviour": or(&section["behaviour"]["kind"], "wander".into()),
+    })
+}
+
+/// The sensors in use, each once.
+fn sensors(world: &RobotsWorld) -> Vec<Value> {
+    let by_name: BTreeMap<&str, &SensorModel> =
+        world.sensors().map(|s| (s.name.as_str(), s)).collect();
+    let one = |s: &SensorModel| {
+        json!({
+            "name": s.name,
+            "beams": s.bearings_deg.len(),
+            "range_m": s.range_m,
+            "observations": s.observations,
+            "distance_edges_m": s.distance_edges_m,
+        })
+    };
+    by_name.into_values().map(one).collect()
+}
+
+fn text(found: &Value) -> String {
+    let mut lines =
+        vec![line("map", map_words(&found["map"])), line("bodies", bodies_words(&found["bodies"]))];
+    lines.extend(items(found, "robots").map(|r| line(&plain(&r["name"]), robots_words(r))));
+    lines.extend(items(found, "sensors").map(|s| line("sensor", sensor_words(s))));
+    let plain = |key: &str| plain(&found[key]);
+    lines.extend([
+        line("regime", plain("regime")),
+        line(
+            "laws",
+            format!("obstacles {}, conflicts {}", plain("obstacle_rule"), plain("conflict_policy")),
+        ),
+        line("run", format!("{} cycles, seed {}", number(&found["cycles"]), plain("seed"))),
+        line("memory", memory(found["memory_bytes"].as_u64().unwrap_or(0))),
+    ]);
+    aligned(&lines)
+}
+
+fn items<'a>(found: &'a Value, key: &str) -> impl Iterator<Item = &'a Value> {
+    found[key].as_array().into_iter().flatten()
+}
+
+fn map_words(map: &Value) -> String {
+    let meters =
+        |key: &str| map[key].as_f64().unwrap_or(0.0) * map["box_size_m"].as_f64().unwrap_or(0.0);
+    format!(
+        "{} x {} boxes of {} m ({:.1} x {:.1} m), {} of them free",
+        map["width_boxes"],
+        map["height_boxes"],
+        map["box_size_m"],
+        meters("width_boxes"),
+        meters("height_boxes"),
+        number(&map["free"]),
+    )
+}
+
+fn bodies_words(bodies: &Value) -> String {
+    let kinds = bodies.as_object().into_iter().flatten();
+    let words: Vec<String> = kinds.map(|(kind, n)| format!("{} {kind}", number(n))).collect();
+    words.join(", ")
+}
+
+fn robots_words(robots: &Value) -> String {
+    let names: Vec<String> = items(robots, "sensors").map(plain).collect();
+    let sensors = if names.is_empty() { "no sensor".into() } else { names.join(" + ") };
+    let count =
+        if robots["count"].is_null() { "as listed".into() } else { number(&robots["count"]) };
+    format!(
+        "{count} of {size} x {size} boxes: {sensors}, effector {}, {}, every {}",
+        plain(&robots["effector"]),
+        plain(&robots["behaviour"]),
+        match &robots["period"] {
+            Value::Number(n) if n.as_u64() == Some(1) => "cycle".into(),
+            n => format!("{n} cycles"),
+        },
+        size = robots["size_boxes"],
+    )
+}
+
+fn sensor_words(sensor: &Value) -> String {
+    let observations: Vec<String> = items(sensor, "observations").map(plain).collect();
+    let edges: Vec<String> = items(sensor, "distance_edges_m").map(plain).collect();
+    let classes = if edges.is_empty() { "none".into() } else { edges.join(", ") };
+    format!(
+        "{}: {} beams of {} m, sees {}; distance edges in m: {classes}",
+        plain(&sensor["name"]),
+        sensor["beams"],
+        sensor["range_m"],
+        observations.join("/"),
+    )
+}
+
+/// A JSON value without quotes.
+fn plain(value: &Value) -> String {
+    value.as_str().map_or_else(|| value.to_string(), str::to_string)
+}
+
+fn number(value: &Value) -> String {
+    value.as_u64().map_or_else(|| value.to_string(), grouped)
+}
+
+fn memory(bytes: u64) -> String {
+    match bytes {
+        0..1_000_000 => format!("about {} kB", bytes.div_ceil(1000)),
+        _ => format!("about {:.1} MB", bytes as f64 / 1e6),
+    }
+}

@@ -1,0 +1,231 @@
+//! Rules of the house that cargo cannot hold: who may name what, and no circles of imports.
+//!
+//! Crates are known by their folders; a rule about one that is not there holds by itself.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use toml::{Table, Value};
+
+use crate::arguments;
+use crate::measures::{circles, functions};
+use crate::members::{self, Member};
+use crate::paths;
+
+/// Circles that are known, in the format of `cargo xtask shape --circles`.
+const KNOWN: &str = include_str!("../circles.txt");
+
+/// Folders whose code may name threads; tests may too.
+const THREADS: [&str; 3] = ["crates/kernel", "crates/session", "crates/cli"];
+
+/// Packages that only one crate may depend on, with the folder of that crate.
+const RESERVED: [(&str, &str); 4] = [
+    ("parquet", "crates/record"),
+    ("mcap", "crates/record"),
+    ("foxglove", "crates/record"),
+    ("clap", "crates/cli"),
+];
+
+/// Folder of the crates of worlds.
+const WORLDS: &str = "crates/worlds";
+
+/// Crates that know no world, not even through another crate.
+const WITHOUT_WORLDS: [&str; 11] = [
+    "crates/kernel",
+    "crates/record",
+    "crates/draw",
+    "crates/report",
+    "crates/scenario",
+    "crates/import",
+    "crates/statistics",
+    "crates/collectives",
+    "crates/map",
+    "crates/link",
+    "crates/server",
+];
+
+/// Kinds of dependencies that get into what is built.
+const BUILT: [&str; 2] = ["dependencies", "build-dependencies"];
+const ALL: [&str; 3] = ["dependencies", "build-dependencies", "dev-dependencies"];
+
+fn is(member: &Member, folder: &str) -> bool {
+    member.folder == Path::new(folder)
+}
+
+fn is_world(member: &Member) -> bool {
+    member.folder.starts_with(WORLDS)
+}
+
+/// Names of the packages that a crate depends on itself, for one target or for all.
+fn dependencies(member: &Member, kinds: &[&str]) -> BTreeSet<String> {
+    let targets = member.manifest.get("target").and_then(Value::as_table);
+    let tables = targets.into_iter().flat_map(Table::values).filter_map(Value::as_table);
+    let mut names = BTreeSet::new();
+    for table in tables.chain([&member.manifest]) {
+        for entries in kinds.iter().filter_map(|kind| table.get(*kind)?.as_table()) {
+            for (name, details) in entries {
+                let package = details.get("package").and_then(Value::as_str);
+                names.insert(package.unwrap_or(name).to_string());
+            }
+        }
+    }
+    names
+}
+
+/// Returns the members that `start` depends on, through others too.
+fn needed<'a>(members: &'a [Member], start: &Member) -> Vec<&'a Member> {
+    let mut found: Vec<&Member> = Vec::new();
+    let mut open = dependencies(start, &BUILT);
+    while let Some(name) = open.pop_first() {
+        let new =
+            |member: &&Member| member.name == name && !found.iter().any(|known| known.name == name);
+        if let Some(member) = members.iter().find(new) {
+            found.push(member);
+            open.extend(dependencies(member, &BUILT));
+        }
+    }
+    found
+}
+
+/// Returns who depends on a package that is reserved for another crate.
+fn trespassers(members: &[Member]) -> Vec<String> {
+    let mut wrong = Vec::new();
+    for (package, folder) in RESERVED {
+        let others = members.iter().filter(|member| !is(member, folder));
+        for member in others.filter(|member| dependencies(member, &ALL).contains(package)) {
+            wrong.push(format!("{} depends on {package}: only {folder} may", member.name));
+        }
+    }
+    wrong
+}
+
+/// Returns worlds that depend on another, and crates that depend on a world and may not.
+fn knows_worlds(members: &[Member]) -> Vec<String> {
+    let mut wrong = Vec::new();
+    for member in members {
+        let may_not = is_world(member) || WITHOUT_WORLDS.iter().any(|folder| is(member, folder));
+        let direct = dependencies(member, &ALL);
+        let indirect = needed(members, member);
+        let worlds = members.iter().filter(|other| is_world(other) && other.name != member.name);
+        for world in worlds.filter(|_| may_not) {
+            if direct.contains(&world.name) || indirect.iter().any(|n| n.name == world.name) {
+                wrong.push(format!("{} depends on the world {}", member.name, world.name));
+            }
+        }
+    }
+    wrong
+}
+
+/// Returns where code names threads and may not.
+fn threads(members: &[Member]) -> Vec<String> {
+    let may_not = |member: &&Member| !THREADS.iter().any(|folder| is(member, folder));
+    let mut wrong = Vec::new();
+    for member in members.iter().filter(may_not) {
+        for source in functions::code(member) {
+            if paths::of(&source.items).iter().any(|named| named.path.starts_with(&std_thread())) {
+                let path = member.folder.join(&source.path);
+                wrong.push(format!("{} names std::thread", path.display()));
+            }
+        }
+    }
+    wrong
+}
+
+fn std_thread() -> [String; 2] {
+    ["std", "thread"].map(String::from)
+}
+
+/// Parts of a list of circles: the name of the crate, then a line for each file.
+fn circles_of(text: &str) -> BTreeSet<&str> {
+    let text = text.split("\n\n").map(str::trim);
+    text.filter(|circle| circle.starts_with('[')).collect()
+}
+
+/// Returns what differs between the circles that are there and those that are known.
+fn differing(found: &str, known: &str) -> Vec<String> {
+    let (found, known) = (circles_of(found), circles_of(known));
+    let new = found.difference(&known).map(|circle| {
+        format!("a new circle of imports: move what both need to a file of its own\n{circle}\n")
+    });
+    let gone = known.difference(&found).map(|circle| {
+        format!("a circle is gone: well done, take it from xtask/circles.txt\n{circle}\n")
+    });
+    new.chain(gone).collect()
+}
+
+/// All rules in one test, as reading the sources takes longer than the rules.
+#[test]
+fn the_rules_of_the_house_hold() {
+    let members = members::read(&arguments::house()).unwrap();
+    let wrong = [
+        trespassers(&members),
+        knows_worlds(&members),
+        threads(&members),
+        differing(&circles::listed(&members), KNOWN),
+    ]
+    .concat();
+    assert!(wrong.is_empty(), "\n{}\n", wrong.join("\n"));
+}
+
+mod small {
+    use super::*;
+    use crate::measures::functions::testing;
+
+    fn member(folder: &str, manifest: &str, text: &str) -> Member {
+        let name = folder.rsplit('/').next().unwrap().to_string();
+        let manifest = manifest.parse().unwrap();
+        Member { name, folder: folder.into(), manifest, ..testing::member(&[("src/lib.rs", text)]) }
+    }
+
+    #[test]
+    fn reserved_packages_are_found_by_any_name() {
+        let renamed = "[target.'cfg(unix)'.dev-dependencies]\nrows = { package = 'parquet' }";
+        let members = [
+            member("crates/record", "[dependencies]\nparquet.workspace = true", ""),
+            member("crates/cli", "[dependencies]\nclap = '4'", ""),
+            member("crates/draw", renamed, ""),
+        ];
+        assert_eq!(trespassers(&members), ["draw depends on parquet: only crates/record may"]);
+    }
+
+    #[test]
+    fn worlds_are_found_through_other_crates() {
+        let members = [
+            member("crates/worlds/robots", "[dependencies]\nkernel = {}", ""),
+            member("crates/worlds/chain", "[dev-dependencies]\nrobots = {}", ""),
+            member("crates/facade", "[dependencies]\nrobots = {}", ""),
+            member("crates/report", "[dependencies]\nfacade = {}", ""),
+            member("crates/kernel", "", ""),
+        ];
+        assert_eq!(
+            knows_worlds(&members),
+            ["chain depends on the world robots", "report depends on the world robots"]
+        );
+    }
+
+    #[test]
+    fn threads_are_found_in_imports_and_in_code_but_not_in_tests() {
+        let tests = "#[cfg(test)] mod tests { use std::thread; }";
+        let members = [
+            member("crates/a", "", "use std::{fmt, thread::{self, scope}};"),
+            member("crates/b", "", "fn f() { std::thread::yield_now() }"),
+            member("crates/c", "", tests),
+            member("crates/kernel", "", "use std::thread;"),
+        ];
+        assert_eq!(
+            threads(&members),
+            ["crates/a/src/lib.rs names std::thread", "crates/b/src/lib.rs names std::thread"]
+        );
+    }
+
+    #[test]
+    fn circles_must_be_listed_and_listed_ones_must_be_there() {
+        let known = "# Comment.\n\n[a]\nsrc/b.rs\nsrc/c.rs\n\n[a]\nsrc/d.rs\nsrc/e.rs\n";
+        assert_eq!(differing(known, known), Vec::<String>::new());
+        let wrong =
+            differing("[a]\nsrc/b.rs\nsrc/c.rs\nsrc/f.rs\n\n[a]\nsrc/d.rs\nsrc/e.rs\n\n", known);
+        assert_eq!(wrong.len(), 2);
+        assert!(wrong[0].starts_with("a new circle") && wrong[0].contains("src/f.rs"));
+        assert!(wrong[1].starts_with("a circle is gone"));
+    }
+}
