@@ -1,7 +1,7 @@
 //! What the command prints: results on standard output, everything else on standard error.
 
 use serde::Serialize;
-use sidestep::experiment::Table;
+use sidestep_document::Table;
 use std::fmt::Display;
 use std::io::{IsTerminal, Write};
 

@@ -1,7 +1,7 @@
 //! Reports as files: the page, its Markdown twin, and the pictures of that.
 
 use crate::exit::Failure;
-use sidestep::experiment::Document;
+use sidestep_document::Document;
 use sidestep_report::{Rendered, SvgFile, render};
 use sidestep_session::{replace, write_png};
 use std::io::Write;

@@ -1,7 +1,7 @@
 //! Figures as SVG.
 
-use sidestep::experiment::figure::{Point, Scale, Series};
-use sidestep::experiment::{Figure, FigureKind};
+use sidestep_document::figure::{Point, Scale, Series};
+use sidestep_document::{Figure, FigureKind};
 use sidestep_draw::{Axis, Bar, BarChart, BarSeries, DrawError, Mark, Plot, Style};
 
 /// Room for ways in the plane: about square, so that a circle looks like one.

@@ -6,8 +6,8 @@ pub mod markdown;
 
 pub use chart::chart_svg;
 
-use sidestep::experiment::Document;
-use sidestep::experiment::document::Block;
+use sidestep_document::Document;
+use sidestep_document::document::Block;
 use sidestep_draw::DrawError;
 
 /// A report, ready to be stored.

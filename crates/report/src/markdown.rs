@@ -1,10 +1,10 @@
 //! Documents as Markdown.
 
 use crate::SvgFile;
-use sidestep::experiment::Document;
-use sidestep::experiment::Table;
-use sidestep::experiment::claim::{self, Claim};
-use sidestep::experiment::document::{Block, Code, Span, Text};
+use sidestep_document::Document;
+use sidestep_document::Table;
+use sidestep_document::claim::{self, Claim};
+use sidestep_document::document::{Block, Code, Span, Text};
 use std::fmt::Write;
 
 /// A document as text; `folder` holds the `pictures`, one for each figure and picture.

@@ -1,10 +1,10 @@
 //! What both renderers promise of every document.
 
 use super::*;
-use sidestep::experiment::claim::{Claim, Verdict};
-use sidestep::experiment::document::{Picture, Text};
-use sidestep::experiment::figure::{Point, Scale};
-use sidestep::experiment::{Figure, FigureKind, Series, Table};
+use sidestep_document::claim::{Claim, Verdict};
+use sidestep_document::document::{Picture, Text};
+use sidestep_document::figure::{Point, Scale};
+use sidestep_document::{Figure, FigureKind, Series, Table};
 
 /// What each language would read as its own.
 const HOSTILE: &str = "</script><img src=x onerror=alert(1)> | `a` **b** [c](d) & \"e\"";

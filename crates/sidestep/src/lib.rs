@@ -56,7 +56,7 @@
 //! kernel          the cycle, workers, random streams, digests, checkpoints, recorder port
 //!
 //! learn           logs of a real robot -> error tables that a scenario loads
-//! experiment      many runs and sweeps, what they come to with intervals, the papers' experiments
+//! experiment      many runs and sweeps, and what they come to with intervals
 //! statistics      intervals, tests, and when there are runs enough
 //! ```
 //!
@@ -69,6 +69,7 @@ pub mod experiment;
 pub mod worlds;
 
 pub use sidestep_collectives as collectives;
+pub use sidestep_document as document;
 pub use sidestep_import as import;
 pub use sidestep_kernel as kernel;
 pub use sidestep_map as map;

@@ -6,9 +6,9 @@ use crate::plan::{ScenarioArgs, WorkersArg, of_world};
 use crate::progress::Stages;
 use clap::{Args, ValueEnum};
 use serde_json::json;
-use sidestep::experiment::methods::{compare as run_all, table};
 use sidestep::worlds::airspace::scenario::Compiled;
 use sidestep::worlds::airspace::world::Method;
+use sidestep_papers::methods::{compare as run_all, table};
 use sidestep_report::markdown;
 
 const EXAMPLES: &str = "\

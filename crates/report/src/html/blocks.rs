@@ -2,7 +2,7 @@
 
 use super::{Part, figures, tables, text};
 use maud::{Markup, html};
-use sidestep::experiment::document::{Block, Code, Text};
+use sidestep_document::document::{Block, Code, Text};
 
 /// Text of more lines than this is shown when it is asked for.
 const LONG_LINES: usize = 24;

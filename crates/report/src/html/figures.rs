@@ -4,8 +4,8 @@ use super::tables;
 use crate::SvgFile;
 use maud::{Markup, PreEscaped, html};
 use serde_json::json;
-use sidestep::experiment::document::Picture;
-use sidestep::experiment::{Figure, FigureKind, Table};
+use sidestep_document::document::Picture;
+use sidestep_document::{Figure, FigureKind, Table};
 use sidestep_draw::SERIES_COLORS;
 
 /// A figure of more points than this has no table of its numbers.

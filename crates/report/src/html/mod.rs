@@ -13,8 +13,8 @@ mod tables;
 
 use crate::{SvgFile, slug};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
-use sidestep::experiment::Document;
-use sidestep::experiment::document::{Block, Span, Text};
+use sidestep_document::Document;
+use sidestep_document::document::{Block, Span, Text};
 
 const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("page.js");

@@ -2,9 +2,9 @@
 
 use super::text;
 use maud::{Markup, html};
-use sidestep::experiment::Table;
-use sidestep::experiment::claim::{self, Claim, Verdict};
-use sidestep::experiment::document::Text;
+use sidestep_document::Table;
+use sidestep_document::claim::{self, Claim, Verdict};
+use sidestep_document::document::Text;
 
 /// A table that is sorted by a click on a head and scrolls inside itself.
 pub(super) fn table(table: &Table, id: &str) -> Markup {

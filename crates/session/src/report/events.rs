@@ -2,10 +2,10 @@
 
 use super::metrics::{digits, left_out};
 use super::recorded::{cell, rows};
-use sidestep::experiment::figure::{Figure, FigureKind, Point, Series, Table};
-use sidestep::experiment::{Document, document::Text};
 use sidestep::kernel::InputError;
 use sidestep::kernel::ports::Values;
+use sidestep_document::figure::{Figure, FigureKind, Point, Series, Table};
+use sidestep_document::{Document, document::Text};
 use sidestep_record::{Table as Recorded, read_table};
 use std::path::Path;
 

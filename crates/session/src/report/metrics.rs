@@ -2,7 +2,7 @@
 
 use super::words::count;
 use serde_json::{Map, Value};
-use sidestep::experiment::Table;
+use sidestep_document::Table;
 
 /// More rows than this are left out, and told.
 const MOST_ROWS: usize = 200;

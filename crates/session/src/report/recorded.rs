@@ -2,9 +2,9 @@
 
 use super::metrics::unit;
 use crate::recorded::has_rows;
-use sidestep::experiment::{Document, Table};
 use sidestep::kernel::InputError;
 use sidestep::kernel::ports::{ColumnSpec, Values};
+use sidestep_document::{Document, Table};
 use sidestep_record::read_table;
 use std::path::Path;
 

@@ -4,9 +4,9 @@
 use super::words::{count, duration};
 use super::{events, metrics, recorded};
 use serde_json::Value;
-use sidestep::experiment::Document;
-use sidestep::experiment::document::{Block, Code, Picture, Text};
 use sidestep::kernel::InputError;
+use sidestep_document::Document;
+use sidestep_document::document::{Block, Code, Picture, Text};
 use sidestep_record::{Manifest, RunView, Status};
 use std::path::Path;
 

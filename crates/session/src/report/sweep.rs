@@ -4,12 +4,12 @@ use super::run::quoted;
 use super::words::{count, duration};
 use crate::sweep::{Finished, Folder, finished, picture_of};
 use crate::{Error, Watcher};
-use sidestep::experiment::Table;
-use sidestep::experiment::document::{Block, Code, Document, Picture, Text};
 use sidestep::experiment::sweep::rounds::{Stopped, stopped};
 use sidestep::experiment::sweep::{Plan, RunTable, Summary};
 use sidestep::kernel::ports::Values;
 use sidestep::scenario::Worlds;
+use sidestep_document::Table;
+use sidestep_document::document::{Block, Code, Document, Picture, Text};
 
 /// Variants of which a run is drawn.
 const DRAWN: usize = 4;

@@ -5,14 +5,13 @@ use crate::recording::Recording;
 use crate::watcher::{Progress, Watched, Within};
 use crate::{Error, Watcher};
 use serde_json::json;
+use sidestep::experiment::sweep::work::{self, run_cells};
 use sidestep::experiment::sweep::{Cell, Outcome, Plan, start};
-use sidestep::kernel::{InputError, workers};
+use sidestep::kernel::InputError;
 use sidestep::scenario::{Source, Worlds};
 use sidestep_record::Existing;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 /// Worlds of so many agents fill the caches by themselves: they are run one after the other, each
@@ -32,14 +31,7 @@ pub(super) struct Work<'a> {
 }
 
 /// Takes an outcome: when it returns, the run is finished.
-pub(super) type Take<'a> = dyn FnMut(Outcome) -> Result<(), Error> + Send + 'a;
-
-/// What all workers share.
-struct Shared<'a, 'b> {
-    take: &'a mut Take<'b>,
-    done: u64,
-    failure: Option<Error>,
-}
+pub(super) type Take<'a> = work::Take<'a, Outcome, Error>;
 
 impl Work<'_> {
     /// Runs the cells, in their order as far as there are workers, until all are done, something
@@ -56,29 +48,15 @@ impl Work<'_> {
     ) -> Result<(), Error> {
         let at_once = self.at_once(cells.len());
         let each = (self.workers / at_once).max(1);
-        let next = AtomicUsize::new(0);
-        let shared = Mutex::new(Shared { take, done: before, failure: None });
         let watched = Watched(self.watcher);
         watched.at(Progress::Runs { before, done: before, of: total });
-        let mut crew = vec![(); at_once];
-        workers::run(&mut crew, |_, ()| {
-            while let Some(cell) = cells.get(next.fetch_add(1, Ordering::Relaxed)) {
-                // Nobody holds the lock while a run is under way.
-                let broken = lock(&shared).failure.is_some();
-                let outcome = if broken { None } else { self.cell(*cell, each) };
-                let Some(outcome) = outcome else { return };
-                let shared = &mut *lock(&shared);
-                if let Err(failure) = outcome.and_then(|outcome| (shared.take)(outcome)) {
-                    shared.failure.get_or_insert(failure);
-                    return;
-                }
-                shared.done += 1;
-                watched.at(Progress::Runs { before, done: shared.done, of: total });
-            }
-        });
-        drop(watched);
-        let failure = lock(&shared).failure.take();
-        failure.map_or(Ok(()), Err)
+        let mut done = before;
+        run_cells(cells, at_once, |cell| self.cell(*cell, each), &mut |outcome| {
+            take(outcome)?;
+            done += 1;
+            watched.at(Progress::Runs { before, done, of: total });
+            Ok(())
+        })
     }
 
     /// How many of so many runs are under way at once; each has its part of the workers.
@@ -167,9 +145,4 @@ fn timed(mut outcome: Outcome, [compiling, running]: [std::time::Duration; 2]) -
     outcome.costs.insert("compile_wall_s".into(), json!(compiling.as_secs_f64()));
     outcome.costs.insert("run_wall_s".into(), json!(running.as_secs_f64()));
     outcome
-}
-
-/// A worker that panicked outside of a run has left whole values behind.
-fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -57,6 +57,10 @@ fn runs_of_a_sweep_are_recorded_and_reported() {
     let document = document(WORLDS, &path, &Unwatched).expect("a document");
     let pages = sidestep_report::render(&document, "pictures").expect("pages");
     for words in ["6 runs of 2 variants", "hops per frog"] {
-        assert!(pages.markdown.replace('\u{a0}', " ").contains(words), "no {words} in {}", pages.markdown);
+        assert!(
+            pages.markdown.replace('\u{a0}', " ").contains(words),
+            "no {words} in {}",
+            pages.markdown
+        );
     }
 }

@@ -5,7 +5,7 @@ use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
 use crate::progress::Stages;
 use clap::Args;
-use sidestep::experiment::agentfly;
+use sidestep_papers::agentfly;
 use std::path::PathBuf;
 
 /// How much to run.

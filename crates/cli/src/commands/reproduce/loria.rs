@@ -6,12 +6,12 @@ use crate::exit::{ExitCode, Failure};
 use crate::interrupt;
 use crate::progress::Stages;
 use clap::Args;
-use sidestep::experiment::Scene;
-use sidestep::experiment::document::Picture;
-use sidestep::experiment::loria::scenes;
-use sidestep::experiment::loria::{LoriaError, NewRecorder, Plan, Report, in_memory, run_recorded};
 use sidestep::kernel::ports::{RecordError, Recorder, TableSchema};
+use sidestep_document::document::Picture;
 use sidestep_draw::{DrawError, describe};
+use sidestep_papers::Scene;
+use sidestep_papers::loria::scenes;
+use sidestep_papers::loria::{LoriaError, NewRecorder, Plan, Report, in_memory, run_recorded};
 use sidestep_record::{Origin, ParquetRecorder};
 use std::path::{Path, PathBuf};
 

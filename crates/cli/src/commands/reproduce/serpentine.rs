@@ -5,8 +5,8 @@ use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
 use crate::progress::Stages;
 use clap::Args;
-use sidestep::experiment::document::Picture;
-use sidestep::experiment::serpentine::{self, Plan};
+use sidestep_document::document::Picture;
+use sidestep_papers::serpentine::{self, Plan};
 use std::path::PathBuf;
 
 /// How much to run.

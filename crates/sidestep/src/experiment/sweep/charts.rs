@@ -10,9 +10,9 @@ use super::Label;
 use super::groups::Groups;
 use super::table::RunColumn;
 use super::text::sentence;
-use crate::experiment::figure::Point;
-use crate::experiment::{Figure, FigureKind, Series};
 use crate::statistics::{Sample, wilson};
+use sidestep_document::figure::Point;
+use sidestep_document::{Figure, FigureKind, Series};
 use sidestep_kernel::ports::Values;
 use std::collections::BTreeMap;
 

@@ -1,9 +1,9 @@
 //! Runs by variant and replicate.
 
 use super::table::{Role, RunColumn, RunTable};
-use crate::experiment::Estimate;
 use crate::statistics::{Sample, wilson};
 use serde::Serialize;
+use sidestep_document::Estimate;
 use sidestep_kernel::InputError;
 use sidestep_kernel::ports::Values;
 use std::collections::{BTreeMap, BTreeSet};

@@ -5,6 +5,7 @@
 //! design.rs    which variants: a full grid, a list, a Latin hypercube, or products of them
 //! plan.rs      variants x replicates -> cells, and who runs which
 //! cell.rs      one cell -> one outcome: a deterministic run, so a lost one is simply run again
+//! work.rs      cells -> results, many at once
 //! rounds.rs    which cells are next, where a wanted precision says when to stop
 //! rows.rs      outcomes -> a table of runs, the same in whatever order they came
 //!
@@ -35,6 +36,7 @@ pub mod rows;
 pub mod summary;
 pub mod table;
 mod text;
+pub mod work;
 
 pub use cell::{Outcome, Started, start};
 pub use compare::Comparison;

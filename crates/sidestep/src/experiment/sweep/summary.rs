@@ -15,13 +15,13 @@ use super::compare::{Comparison, comparisons};
 use super::groups::{Groups, Level, Parameter};
 use super::table::{Role, RunColumn, RunTable};
 use super::{charts, text};
-use crate::experiment::{Estimate, Figure, Table};
 use crate::scenario::nearest;
 use crate::statistics::{
     Bootstrap, Interval, QuantileInterval, Sample, mean, mean_interval, percentile,
     quantile_interval, runs_for_half_width, sample_sd, wilson,
 };
 use serde::Serialize;
+use sidestep_document::{Estimate, Figure, Table};
 use sidestep_kernel::InputError;
 use sidestep_kernel::ports::Values;
 

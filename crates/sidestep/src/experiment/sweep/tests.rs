@@ -2,9 +2,9 @@
 
 use super::summary::Described;
 use super::*;
-use crate::experiment::FigureKind;
 use crate::statistics::Bootstrap;
 use proptest::prelude::*;
+use sidestep_document::FigureKind;
 use sidestep_kernel::Seed;
 use sidestep_kernel::distr::normal;
 use sidestep_kernel::ports::Values;

@@ -6,8 +6,8 @@ use super::summary::{
     Described, LeftOut, MetricSummary, NOT_ASKED_FOR, Numbers, Quantile, Share, Summary,
     VariantMetric,
 };
-use crate::experiment::{Estimate, Table};
 use crate::statistics::Interval;
+use sidestep_document::{Estimate, Table};
 use sidestep_kernel::math;
 
 pub(super) fn tables(summary: &Summary) -> Vec<Table> {

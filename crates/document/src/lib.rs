@@ -1,0 +1,20 @@
+//! A report as plain data; others draw figures and write pages.
+//!
+//! ```text
+//! estimate.rs   a mean with its 95 % interval and the number of runs behind it
+//! figure.rs     what to draw and what to print
+//! claim.rs      a paper's claims, each with a verdict
+//! document.rs   a report: text, tables, figures, pictures and claims in their order
+//! ```
+//!
+//! It knows no world, no file and no markup, and carries neither font nor rasterizer: both the
+//! library that sums up runs and the crate that writes pages depend on it.
+
+pub mod claim;
+pub mod document;
+pub mod estimate;
+pub mod figure;
+
+pub use document::Document;
+pub use estimate::Estimate;
+pub use figure::{Figure, FigureKind, Series, Table};

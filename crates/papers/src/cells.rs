@@ -1,0 +1,499 @@
+//! What all papers share of results: columns, each declared once, that say how the runs of a case
+//! are summed up -> cells, which are printed as a table, kept as JSON and asked by claims.
+
+use crate::study::{Results, number};
+use serde::ser::SerializeMap;
+use serde::{Serialize, Serializer};
+use sidestep::experiment::sweep::Variant;
+use sidestep::statistics::{Interval, clopper_pearson, percentile};
+use sidestep_document::figure::Point;
+use sidestep_document::{Estimate, Figure, Series, Table};
+use std::fmt;
+
+/// The runs of one case.
+pub(crate) struct Runs<'a> {
+    results: &'a Results,
+    variant: &'a Variant,
+    rows: Vec<usize>,
+}
+
+/// One run of a case.
+#[derive(Clone, Copy)]
+pub(crate) struct Run<'a> {
+    results: &'a Results,
+    row: usize,
+}
+
+impl Run<'_> {
+    /// A metric as a number; true is 1.
+    pub(crate) fn number(&self, metric: &str) -> Option<f64> {
+        self.results.table.column(metric)?.values.number(self.row)
+    }
+
+    /// A metric in words.
+    pub(crate) fn text(&self, metric: &str) -> String {
+        self.results.table.column(metric).map_or_else(String::new, |c| c.values.text(self.row))
+    }
+
+    /// A metric as a number; 0 where it is not there.
+    pub(crate) fn or_zero(&self, metric: &str) -> f64 {
+        self.number(metric).unwrap_or(0.0)
+    }
+
+    /// A count of steps, in percent of all steps.
+    pub(crate) fn percent(&self, metric: &str) -> f64 {
+        100.0 * self.or_zero(metric) / self.or_zero("steps")
+    }
+
+    /// Whether a metric is true, or above 0.
+    pub(crate) fn is(&self, metric: &str) -> bool {
+        self.or_zero(metric) > 0.0
+    }
+}
+
+impl Runs<'_> {
+    /// What the case sets a key to.
+    pub(crate) fn set(&self, key: &str) -> Value {
+        match self.variant.value(key) {
+            Some(toml::Value::Integer(n)) => Value::Count(*n as u64),
+            Some(toml::Value::Float(x)) => Value::Number(*x),
+            Some(toml::Value::Boolean(is)) => Value::Yes(*is),
+            Some(toml::Value::String(word)) => Value::Word(word.clone()),
+            value => panic!("`{key}` of a case is {value:?}"),
+        }
+    }
+
+    /// What the case sets.
+    pub(crate) fn variant(&self) -> &Variant {
+        self.variant
+    }
+
+    /// What the case sets a key to, as a number.
+    pub(crate) fn set_number(&self, key: &str) -> f64 {
+        number(self.variant, key)
+    }
+
+    /// The runs, by seed.
+    pub(crate) fn each(&self) -> impl Iterator<Item = Run<'_>> {
+        self.rows.iter().map(|&row| Run { results: self.results, row })
+    }
+
+    /// Mean of a metric over the runs.
+    pub(crate) fn mean(&self, metric: &str) -> Value {
+        Value::Estimate(Estimate::of(self.each().map(|run| run.number(metric))))
+    }
+
+    /// Mean of what `of` gives for each run.
+    pub(crate) fn mean_of(&self, of: impl Fn(&Run<'_>) -> f64) -> Value {
+        Value::Estimate(Estimate::of(self.each().map(|run| Some(of(&run)))))
+    }
+
+    /// The share of the runs of which this holds.
+    pub(crate) fn share(&self, holds: impl Fn(&Run<'_>) -> bool) -> Value {
+        Value::Share(Share::of(self.each().map(|run| holds(&run))))
+    }
+
+    /// A count of all runs.
+    pub(crate) fn sum(&self, metric: &str) -> Value {
+        Value::Count(self.each().map(|run| run.or_zero(metric) as u64).sum())
+    }
+
+    /// Of how many runs this holds.
+    pub(crate) fn count(&self, holds: impl Fn(&Run<'_>) -> bool) -> Value {
+        Value::Count(self.each().filter(|run| holds(run)).count() as u64)
+    }
+
+    /// The least of those runs that have it.
+    pub(crate) fn least(&self, metric: &str) -> Option<f64> {
+        least(self.each().map(|run| run.number(metric)))
+    }
+
+    /// The greatest; 0 of none.
+    pub(crate) fn most(&self, metric: &str) -> f64 {
+        most(self.each().filter_map(|run| run.number(metric)))
+    }
+
+    /// The one in the middle; 0 of none.
+    pub(crate) fn median(&self, metric: &str) -> f64 {
+        median(self.each().filter_map(|run| run.number(metric)))
+    }
+}
+
+/// How the runs of a case are summed up, and shown.
+pub(crate) struct Column {
+    /// Its name in JSON, and for claims.
+    name: &'static str,
+    /// Its head in the table; without one it has no place there.
+    head: &'static str,
+    of: fn(&Runs<'_>) -> Value,
+    show: Option<fn(&Cell) -> String>,
+}
+
+/// A column that is shown as its value prints.
+pub(crate) const fn column(
+    name: &'static str,
+    head: &'static str,
+    of: fn(&Runs<'_>) -> Value,
+) -> Column {
+    Column { name, head, of, show: None }
+}
+
+impl Column {
+    /// The same column, shown otherwise.
+    pub(crate) const fn shown(self, show: fn(&Cell) -> String) -> Self {
+        Self { show: Some(show), ..self }
+    }
+}
+
+/// The columns of an experiment: what its cases are, and what comes of them.
+pub(crate) struct Columns {
+    pub(crate) case: &'static [Column],
+    pub(crate) came: &'static [Column],
+}
+
+impl Columns {
+    /// A cell for every case.
+    pub(crate) fn cells(&self, results: &Results) -> Vec<Cell> {
+        let named = |columns: &[Column], runs: &Runs<'_>| {
+            columns.iter().map(|c| (c.name, (c.of)(runs))).collect()
+        };
+        runs(results)
+            .map(|r| Cell { case: named(self.case, &r), came: named(self.came, &r) })
+            .collect()
+    }
+
+    /// The cells as a table.
+    pub(crate) fn table(&self, title: &str, note: &str, cells: &[Cell]) -> Table {
+        let shown: Vec<&Column> =
+            self.case.iter().chain(self.came).filter(|c| !c.head.is_empty()).collect();
+        let heads: Vec<&str> = shown.iter().map(|c| c.head).collect();
+        let mut table = Table::new(title, note, &heads);
+        for cell in cells {
+            let words = |c: &&Column| match c.show {
+                Some(show) => show(cell),
+                None => cell.value(c.name).to_string(),
+            };
+            table.row(shown.iter().map(words));
+        }
+        table
+    }
+}
+
+/// The runs of every case.
+pub(crate) fn runs(results: &Results) -> impl Iterator<Item = Runs<'_>> {
+    let variants = results.table.column("variant");
+    (0u32..).zip(&results.variants).map(move |(k, variant)| {
+        let is_its =
+            |row: &usize| variants.and_then(|c| c.values.number(*row)) == Some(f64::from(k));
+        let rows = (0..results.table.runs()).filter(is_its).collect();
+        Runs { results, variant, rows }
+    })
+}
+
+/// A value of a cell.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(untagged)]
+pub(crate) enum Value {
+    Count(u64),
+    Number(f64),
+    Maybe(Option<f64>),
+    Yes(bool),
+    Word(String),
+    Words(Vec<String>),
+    Share(Share),
+    Estimate(Estimate),
+    /// Some numbers of every run, by name.
+    #[serde(serialize_with = "of_runs")]
+    BySeed(Vec<Named>),
+}
+
+/// Numbers by name.
+type Named = Vec<(&'static str, f64)>;
+
+fn of_runs<S: Serializer>(runs: &[Named], serializer: S) -> Result<S::Ok, S::Error> {
+    let map = |run: &Named| -> serde_json::Map<String, serde_json::Value> {
+        run.iter().map(|(name, x)| ((*name).into(), (*x).into())).collect()
+    };
+    serializer.collect_seq(runs.iter().map(map))
+}
+
+impl fmt::Display for Value {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Count(n) => n.fmt(f),
+            Self::Number(x) | Self::Maybe(Some(x)) => x.fmt(f),
+            Self::Maybe(None) => f.write_str("-"),
+            Self::Yes(is) => f.write_str(if *is { "yes" } else { "no" }),
+            Self::Word(word) => f.write_str(word),
+            Self::Words(words) => f.write_str(&words.join(", ")),
+            Self::Share(share) => share.fmt(f),
+            Self::Estimate(estimate) => estimate.fmt(f),
+            Self::BySeed(runs) => write!(f, "{} runs", runs.len()),
+        }
+    }
+}
+
+/// What came of one case.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Cell {
+    case: Vec<(&'static str, Value)>,
+    came: Vec<(&'static str, Value)>,
+}
+
+impl Cell {
+    /// A made-up cell.
+    #[cfg(test)]
+    pub(crate) fn new(
+        case: impl IntoIterator<Item = (&'static str, Value)>,
+        came: impl IntoIterator<Item = (&'static str, Value)>,
+    ) -> Self {
+        Self { case: case.into_iter().collect(), came: came.into_iter().collect() }
+    }
+
+    /// Replaces a value.
+    #[cfg(test)]
+    pub(crate) fn put(&mut self, name: &str, value: Value) {
+        let mut all = self.case.iter_mut().chain(&mut self.came);
+        all.find(|(own, _)| *own == name).expect("a column of this name").1 = value;
+    }
+
+    /// The value of a column.
+    ///
+    /// # Panics
+    /// When the experiment has no such column.
+    pub(crate) fn value(&self, name: &str) -> &Value {
+        let mut all = self.case.iter().chain(&self.came);
+        let found = all.find(|(own, _)| *own == name).map(|(_, value)| value);
+        found.unwrap_or_else(|| panic!("there is no column `{name}`"))
+    }
+
+    /// A number of whatever kind; a mean is 0 where nothing was measured.
+    pub(crate) fn number(&self, name: &str) -> f64 {
+        match self.value(name) {
+            Value::Count(n) => *n as f64,
+            Value::Number(x) => *x,
+            Value::Maybe(x) => x.unwrap_or(0.0),
+            Value::Yes(is) => f64::from(*is),
+            Value::Share(share) => share.percent(),
+            Value::Estimate(estimate) => estimate.or_zero(),
+            other => panic!("`{name}` is no number: {other:?}"),
+        }
+    }
+
+    /// A count.
+    pub(crate) fn count(&self, name: &str) -> u64 {
+        match self.value(name) {
+            Value::Count(n) => *n,
+            other => panic!("`{name}` is no count: {other:?}"),
+        }
+    }
+
+    /// A number that may not be there.
+    pub(crate) fn maybe(&self, name: &str) -> Option<f64> {
+        match self.value(name) {
+            Value::Maybe(x) => *x,
+            _ => Some(self.number(name)),
+        }
+    }
+
+    /// Whether it is so.
+    pub(crate) fn is(&self, name: &str) -> bool {
+        *self.value(name) == Value::Yes(true)
+    }
+
+    /// Whether it is this word.
+    pub(crate) fn says(&self, name: &str, word: &str) -> bool {
+        matches!(self.value(name), Value::Word(own) if own == word)
+    }
+
+    /// A share of runs.
+    pub(crate) fn share(&self, name: &str) -> &Share {
+        match self.value(name) {
+            Value::Share(share) => share,
+            other => panic!("`{name}` is no share: {other:?}"),
+        }
+    }
+
+    /// Whether it is so in all runs, of which there are some.
+    pub(crate) fn in_all(&self, name: &str) -> bool {
+        self.share(name).is_all()
+    }
+
+    /// A mean.
+    pub(crate) fn estimate(&self, name: &str) -> &Estimate {
+        match self.value(name) {
+            Value::Estimate(estimate) => estimate,
+            other => panic!("`{name}` is no mean: {other:?}"),
+        }
+    }
+
+    /// What runs came to, one by one.
+    pub(crate) fn by_seed(&self, column: &str, name: &str) -> Vec<Option<f64>> {
+        let Value::BySeed(runs) = self.value(column) else { return Vec::new() };
+        let of = |run: &Named| run.iter().find(|(own, _)| *own == name).map(|(_, x)| *x);
+        runs.iter().map(of).collect()
+    }
+
+    /// A length, in millimeters.
+    pub(crate) fn mm(&self, name: &str) -> String {
+        mm(self.maybe(name))
+    }
+
+    /// A point of a figure.
+    pub(crate) fn point(&self, x: f64, y: &str) -> Option<Point> {
+        match self.value(y) {
+            Value::Share(share) => Some(share.point(x)),
+            Value::Estimate(estimate) => estimate.point(x),
+            _ => Some(Point::new(x, self.number(y))),
+        }
+    }
+}
+
+impl Serialize for Cell {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        struct Case<'a>(&'a [(&'static str, Value)]);
+        impl Serialize for Case<'_> {
+            fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+                serializer.collect_map(self.0.iter().map(|(name, value)| (name, value)))
+            }
+        }
+        let mut map = serializer.serialize_map(None)?;
+        if !self.case.is_empty() {
+            map.serialize_entry("case", &Case(&self.case))?;
+        }
+        self.came.iter().try_for_each(|(name, value)| map.serialize_entry(name, value))?;
+        map.end()
+    }
+}
+
+/// A table of whatever, by its columns: their heads, and what stands below them.
+pub(crate) fn table<T>(
+    title: impl Into<String>,
+    note: impl Into<String>,
+    items: impl IntoIterator<Item = T>,
+    columns: &[(&str, &dyn Fn(&T) -> String)],
+) -> Table {
+    let heads: Vec<&str> = columns.iter().map(|(head, _)| *head).collect();
+    let mut table = Table::new(title, note, &heads);
+    for item in items {
+        table.row(columns.iter().map(|(_, cell)| cell(&item)));
+    }
+    table
+}
+
+/// A series of cells: column `y` over column `x`.
+pub(crate) fn series<'a>(
+    name: impl Into<String>,
+    cells: impl IntoIterator<Item = &'a Cell>,
+    [x, y]: [&str; 2],
+) -> Series {
+    let points = cells.into_iter().filter_map(|c| c.point(c.number(x), y)).collect();
+    Series { name: name.into(), points }
+}
+
+/// A series over the numbers of categories.
+pub(crate) fn bars<'a>(
+    name: impl Into<String>,
+    cells: impl IntoIterator<Item = &'a Cell>,
+    y: &str,
+) -> Series {
+    let points = (0..).zip(cells).filter_map(|(k, c)| c.point(f64::from(k), y)).collect();
+    Series { name: name.into(), points }
+}
+
+/// A figure of lines.
+pub(crate) fn figure(title: &str, [x, y]: [&str; 2], series: impl Into<Vec<Series>>) -> Figure {
+    let (title, x_label, y_label) = (title.into(), x.into(), y.into());
+    Figure { title, x_label, y_label, series: series.into(), ..Figure::default() }
+}
+
+/// How many of some runs, and between which shares of all runs that may lie: 95 %, by Clopper
+/// and Pearson.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub(crate) struct Share {
+    /// Runs in which it was so,
+    pub(crate) hits: u64,
+    /// of so many.
+    pub(crate) n: u64,
+    /// Interval of the share, 0 to 1.
+    interval: Interval,
+}
+
+impl Share {
+    /// The share of those that are true.
+    pub(crate) fn of(all: impl IntoIterator<Item = bool>) -> Self {
+        let (mut hits, mut n) = (0, 0);
+        for hit in all {
+            hits += u64::from(hit);
+            n += 1;
+        }
+        Self::new(hits, n)
+    }
+
+    /// So many of `n`.
+    pub(crate) fn new(hits: u64, n: u64) -> Self {
+        Self { hits, n, interval: clopper_pearson(hits, n) }
+    }
+
+    /// All of one or more.
+    pub(crate) fn is_all(&self) -> bool {
+        self.n > 0 && self.hits == self.n
+    }
+
+    /// Percent, 0 without runs.
+    pub(crate) fn percent(&self) -> f64 {
+        100.0 * self.hits as f64 / self.n.max(1) as f64
+    }
+
+    fn point(&self, x: f64) -> Point {
+        let Interval { low, high } = self.interval;
+        let interval = Some((100.0 * low, 100.0 * high));
+        Point::new(x, self.percent()).with_interval(interval).of_runs(self.n as usize)
+    }
+}
+
+impl fmt::Display for Share {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Interval { low, high } = self.interval;
+        let percent = |x: f64| (100.0 * x).round();
+        write!(f, "{}/{} [{}, {}] %", self.hits, self.n, percent(low), percent(high))
+    }
+}
+
+/// The one in the middle; 0 of none.
+pub(crate) fn median(values: impl IntoIterator<Item = f64>) -> f64 {
+    let mut values: Vec<f64> = values.into_iter().collect();
+    values.sort_by(f64::total_cmp);
+    percentile(&values, 0.5).unwrap_or(0.0)
+}
+
+/// The least of some that are there.
+pub(crate) fn least(values: impl IntoIterator<Item = Option<f64>>) -> Option<f64> {
+    values.into_iter().flatten().reduce(f64::min)
+}
+
+/// The greatest; 0 of none.
+pub(crate) fn most(values: impl IntoIterator<Item = f64>) -> f64 {
+    values.into_iter().fold(0.0, f64::max)
+}
+
+/// A length in millimeters, with its sign; what is nowhere near is told as such.
+pub(crate) fn mm(value_m: Option<f64>) -> String {
+    match value_m {
+        None => "far".into(),
+        Some(m) if m.abs() < 1e-6 => "0.000".into(),
+        Some(m) => format!("{:.3}", 1e3 * m),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_share_says_how_sure_it_is() {
+        let share = Share::of([true, true, true, false]);
+        assert_eq!(share.to_string(), "3/4 [19, 99] %");
+        assert!(!share.is_all() && Share::of([true; 2]).is_all() && !Share::of([]).is_all());
+    }
+}

@@ -1,0 +1,27 @@
+//! The experiments of three papers, run anew, and what came of their claims.
+//!
+//! ```text
+//! agentfly.rs   the source paper of the airspace world
+//! loria/        the source paper of the robots world
+//! serpentine/   the source of the chain world
+//! methods.rs    methods of the airspace world on the same traffic
+//! study.rs      a sweep file and its scenario -> the table of its runs
+//! scene.rs      what a picture shows
+//! cells.rs      the table of runs -> a cell for every case: as JSON, a table, points of figures
+//! claims.rs     verdicts over cells
+//! ```
+//!
+//! Nothing here draws a figure or writes a file: results are data, reports are documents.
+
+pub mod agentfly;
+mod cells;
+mod claims;
+
+pub mod loria;
+pub mod methods;
+mod scene;
+pub mod serpentine;
+mod study;
+
+pub use scene::Scene;
+pub use study::Progress;

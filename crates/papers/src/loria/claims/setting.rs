@@ -1,0 +1,119 @@
+//! E-1 to E-7: what the experiments are made of.
+
+use super::super::Report;
+use super::{Claim, Verdict, claim};
+
+pub(super) fn claims(report: &Report) -> Vec<Claim> {
+    vec![
+        suites(report),
+        floors(report),
+        processors(report),
+        sequential(report),
+        sizes(report),
+        camera(report),
+        regimes(report),
+    ]
+}
+
+fn suites(report: &Report) -> Claim {
+    let runs: usize = report.reliability.cells.iter().map(|cell| cell.outcomes.len()).sum();
+    let builds: usize = report.genericity.builds.iter().map(|b| b.outcomes.len()).sum();
+    let timed = report.performance.timings.len() + report.strategies.trials.len();
+    let fitted = report.cost_model.points.len();
+    claim(
+        "E-1",
+        Verdict::Held,
+        format!(
+            "{runs} reliability runs, {builds} genericity runs, {timed} timed series, {fitted} \
+             runs for the cost model."
+        ),
+    )
+}
+
+fn floors(report: &Report) -> Claim {
+    claim("E-2", Verdict::Held, report.reliability.floors.join("; "))
+}
+
+fn processors(report: &Report) -> Claim {
+    let p = &report.performance;
+    let workers: Vec<String> = p.digests.iter().map(|d| d.0.to_string()).collect();
+    Claim {
+        reason: format!(
+            "The same run gives the same bits with every number of workers; of time, this \
+             machine can show {} processors only.",
+            p.processors
+        ),
+        ..claim(
+            "E-3",
+            Verdict::of(p.is_deterministic()),
+            format!("Workers {}: {}.", workers.join(", "), digests(report)),
+        )
+    }
+}
+
+fn sequential(report: &Report) -> Claim {
+    let p = &report.performance;
+    claim(
+        "E-4",
+        Verdict::of(p.is_deterministic()),
+        format!(
+            "With 1 worker, with more, and recorded: {}, {}.",
+            digests(report),
+            p.recorded_digest
+        ),
+    )
+}
+
+fn digests(report: &Report) -> &'static str {
+    if report.performance.is_deterministic() { "one digest" } else { "different digests" }
+}
+
+/// Why a build is judged generic.
+const GENERIC: &str = "Held when in every run every robot acts in every cycle and no two bodies \
+                       come to share a box";
+
+/// Runs with or without a camera in words, and whether all kept the laws.
+fn builds(report: &Report, camera: bool) -> (String, Verdict) {
+    let [lawful, with_trips, all] = report.genericity.runs(camera);
+    let text = format!(
+        "Sizes 1 to 5: {lawful} of {all} runs kept the laws, {with_trips} completed trips within \
+         {} cycles",
+        report.genericity.cycles
+    );
+    (text, Verdict::of(lawful == all))
+}
+
+fn sizes(report: &Report) -> Claim {
+    let (ours, verdict) = builds(report, false);
+    Claim {
+        reason: format!("{GENERIC}; only `size` of the scenario changes, no source."),
+        ..claim("E-5", verdict, format!("{ours}."))
+    }
+}
+
+fn camera(report: &Report) -> Claim {
+    let (ours, verdict) = builds(report, true);
+    let effect = report.genericity.camera_effect();
+    Claim {
+        reason: format!("{GENERIC}; only `sensors` of the scenario changes, no source."),
+        ..claim(
+            "E-6",
+            verdict,
+            format!("{ours}; contacts per 1000 actions with the camera less without: {effect}."),
+        )
+    }
+}
+
+fn regimes(report: &Report) -> Claim {
+    let r = &report.reliability;
+    claim(
+        "E-7",
+        Verdict::Held,
+        format!(
+            "{} variants x {} seeds, four regimes at each of {} places.",
+            r.cells.len(),
+            report.plan.seeds,
+            r.places().len()
+        ),
+    )
+}

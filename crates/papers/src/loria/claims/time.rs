@@ -1,0 +1,195 @@
+//! E-12 to E-15 and P-3: time, and what takes it.
+
+use super::super::Report;
+use super::super::performance::{Performance, REFERENCE_CYCLES, Timing};
+use super::{Claim, Verdict, claim};
+use sidestep::worlds::robots::baseline::Strategy;
+use sidestep_document::Estimate;
+
+/// Initialization is called small below this share.
+const SMALL_SHARE: f64 = 0.05;
+
+/// Efficiency is said to fall quickly where it is below this with the most workers.
+const LOW_EFFICIENCY: f64 = 0.75;
+
+pub(super) fn claims(report: &Report) -> Vec<Claim> {
+    let p = &report.performance;
+    vec![
+        initialization(p),
+        time_falls(report),
+        efficiency_falls(p),
+        lost_speed_up(p),
+        second_machine(),
+        costly_decisions(p),
+        conflicts(report),
+        rejected(report),
+    ]
+}
+
+fn initialization(p: &Performance) -> Claim {
+    let worst = p.initialization.iter().map(|i| i.share_alone).fold(0.0, f64::max);
+    Claim {
+        reason: format!(
+            "Held when below {:.0} % for every load; the paper's share and cycles are lost.",
+            100.0 * SMALL_SHARE
+        ),
+        ..claim(
+            "E-12",
+            Verdict::of(worst < SMALL_SHARE),
+            format!(
+                "Initialization takes up to {:.2} % of a run of {REFERENCE_CYCLES} cycles with one \
+             worker (largest of {} loads).",
+                100.0 * worst,
+                p.loads.len()
+            ),
+        )
+    }
+}
+
+/// Why time over workers cannot be judged: there is one processor, or others were using them.
+fn is_excused(p: &Performance) -> bool {
+    p.most_workers() == 1 || p.was_busy()
+}
+
+fn time_falls(report: &Report) -> Claim {
+    let p = &report.performance;
+    let most = p.most_workers();
+    let timings = || p.at_most_workers(false).chain(p.at_most_workers(true));
+    let falls = timings().all(|timing| timing.speed_up.is_above(1.0));
+    let machine = Estimate::of(timings().map(|timing| timing.machine.mean));
+    claim(
+        "E-13a",
+        if !falls && is_excused(p) { Verdict::Lost } else { Verdict::of(falls) },
+        format!(
+            "Speed-up with {most} workers: {} unrecorded, {} recorded ({} loads, {} repeats of \
+             each; mere arithmetic in turn with them: {machine}).",
+            range(p.at_most_workers(false)),
+            range(p.at_most_workers(true)),
+            p.loads.len(),
+            report.plan.repeats,
+        ),
+    )
+}
+
+/// The mean speed-ups of some loads.
+fn range<'a>(timings: impl Iterator<Item = &'a Timing>) -> String {
+    let means: Vec<f64> = timings.filter_map(|timing| timing.speed_up.mean).collect();
+    let least = means.iter().copied().fold(f64::INFINITY, f64::min);
+    let greatest = means.iter().copied().fold(0.0, f64::max);
+    format!("{least:.2} to {greatest:.2}")
+}
+
+fn efficiency_falls(p: &Performance) -> Claim {
+    let most = p.most_workers();
+    let efficiency = |t: &Timing| t.speed_up.or_zero() / most as f64;
+    let all = || p.at_most_workers(false).map(efficiency);
+    let (low, n) = (all().filter(|&e| e < LOW_EFFICIENCY).count(), all().count());
+    let listed: Vec<String> = all().map(|e| format!("{e:.2}")).collect();
+    Claim {
+        reason: format!(
+            "Held when efficiency is below {LOW_EFFICIENCY} for most loads; not judged where \
+             others were using the machine. The paper went to sixteen processors; {} can show \
+             the beginning of a fall only.",
+            p.processors
+        ),
+        ..claim(
+            "E-13b",
+            if is_excused(p) { Verdict::Lost } else { Verdict::of(2 * low > n) },
+            format!(
+                "Efficiency with {most} workers, unrecorded, by load: {}; below {LOW_EFFICIENCY} for \
+             {low} of {n}.",
+                listed.join(", ")
+            ),
+        )
+    }
+}
+
+fn lost_speed_up(p: &Performance) -> Claim {
+    claim(
+        "E-13c",
+        Verdict::Lost,
+        format!("With {} workers: {}.", p.most_workers(), range(p.at_most_workers(false))),
+    )
+}
+
+fn second_machine() -> Claim {
+    claim("E-14", Verdict::Lost, "One machine was used.")
+}
+
+fn costly_decisions(p: &Performance) -> Claim {
+    let gain = p.gain_by_cost();
+    let operations = || p.loads.iter().map(|load| load.operations);
+    let (least, most) = (operations().min().unwrap_or(0), operations().max().unwrap_or(0));
+    let speed_up = |cost: u32| {
+        let timings = p.at_most_workers(false).filter(|t| p.loads[t.load].operations == cost);
+        Estimate::of(timings.flat_map(|timing| timing.ratios.iter().copied()))
+    };
+    claim(
+        "E-15a",
+        Verdict::by_sign(gain.interval.filter(|_| !is_excused(p))),
+        format!(
+            "Speed-up with {} workers: {} at {least} operations per decision, {} at {most}; \
+             difference {gain}.",
+            p.most_workers(),
+            speed_up(least),
+            speed_up(most),
+        ),
+    )
+}
+
+fn conflicts(report: &Report) -> Claim {
+    let model = &report.cost_model;
+    let shown = |name: &str| match model.parameter(name) {
+        None => "not to be told".into(),
+        Some(p) => match p.interval_ns {
+            None => format!("{:.0} ns", p.value_ns),
+            Some(i) => format!("{:.0} ns [{:.0}, {:.0}]", p.value_ns, i.low, i.high),
+        },
+    };
+    claim(
+        "E-15b",
+        Verdict::by_sign(model.parameter("c_s").and_then(|p| p.interval_ns)),
+        format!(
+            "Per body in conflict c_s = {}, besides c_d = {} for every body; p = {:.3} to {:.3}; \
+             {} runs, R2 of the second step {:.3}.",
+            shown("c_s"),
+            shown("c_d"),
+            model.conflict_share.0,
+            model.conflict_share.1,
+            model.points.len(),
+            model.r_squared[1],
+        ),
+    )
+}
+
+/// The strategies that the paper rejects before any experiment.
+fn rejected(report: &Report) -> Claim {
+    let s = &report.strategies;
+    let leads = Strategy::ALL.map(|strategy| (strategy.name(), s.lead_over(strategy)));
+    let all = || leads.iter().flat_map(|(_, leads)| leads);
+    let shown = leads.iter().map(|(name, leads)| {
+        let ahead = leads.iter().filter(|lead| lead.is_above(0.0)).count();
+        let behind = leads.iter().filter(|lead| lead.is_below(0.0)).count();
+        let listed: Vec<String> = leads.iter().map(ToString::to_string).collect();
+        format!(
+            "over {name}: ahead at {ahead}, behind at {behind} of {} loads ({})",
+            leads.len(),
+            listed.join("; ")
+        )
+    });
+    let verdict = if all().all(|lead| lead.is_above(0.0)) {
+        Verdict::Held
+    } else if all().any(|lead| lead.is_below(0.0)) && !is_excused(&report.performance) {
+        Verdict::NotHeld
+    } else {
+        Verdict::Lost
+    };
+    claim(
+        "P-3",
+        verdict,
+        format!(
+            "Speed-up of the double pool with the most workers less that of the other, {}.",
+            shown.collect::<Vec<_>>().join("; ")
+        ),
+    )
+}

@@ -1,0 +1,386 @@
+//! The paper's cost model, fitted to measured phases.
+//!
+//! The paper's formulas are lost in part; read as
+//!
+//! ```text
+//! T1 = n t_p + m t_o                                  perceive, decide, generate
+//! T2 = (n + m) c_d + p (n + m) c_s + f e_u            detect, solve, update
+//! ```
+//!
+//! with `n` agents, `m` active objects, `p` the share of bodies in conflict, and `f` the
+//! boxes whose occupation changes. (In the paper an update also refreshes the distributions
+//! around a body; here those are computed when needed, so a change costs its boxes alone.)
+//!
+//! How each parameter can be told from the others:
+//! - `t_p`, `t_o`: by runs of different `n : m`.
+//! - `c_s`: by runs of like `n + m` but different crowding, hence different `p`. `p` itself is
+//!   counted, not fitted: bodies in groups of two or more, by bodies.
+//! - `e_u`: by bodies of different size (a step rewrites two rows of boxes per body).
+//! - `c_d`: what detection and reaction cost per body when `p` and `f` are taken away. It holds
+//!   everything that is paid per body: joining claims, judging paths, bookkeeping.
+//!
+//! Both sides are divided by `n + m` before fitting, so that all runs weigh alike; the share of
+//! variance explained is that of the cost *per body*, a harder test than that of whole cycles.
+
+use super::Plan;
+use super::floor::Floor;
+use super::timing::Load;
+use crate::cells::{figure, table};
+use crate::study::Progress;
+use serde::Serialize;
+use sidestep::kernel::Simulation;
+use sidestep::statistics::Interval;
+use sidestep::statistics::least_squares::Fit;
+use sidestep::worlds::robots::RobotsRun;
+use sidestep_document::figure::Point as FigurePoint;
+use sidestep_document::{Figure, FigureKind, Series, Table};
+use std::sync::Arc;
+
+/// A run with one worker, per cycle.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub(super) struct Point {
+    /// Robots, `n`.
+    pub(super) agents: f64,
+    /// People and doors, `m`.
+    pub(super) objects: f64,
+    /// Side of a robot in boxes.
+    pub(super) size: u32,
+    /// Bodies in groups of two or more, `p (n + m)`.
+    pub(super) in_conflict: f64,
+    /// Boxes entered or left, `f`.
+    pub(super) boxes: f64,
+    /// Time of pool one, ns.
+    pub(super) first_ns: f64,
+    /// Time of joining and of pool two, ns.
+    pub(super) second_ns: f64,
+}
+
+/// A parameter of the model and its value, ns.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct Parameter {
+    /// Its name in the paper, as read.
+    pub(super) name: String,
+    /// What it is.
+    pub(super) meaning: String,
+    /// Value in ns.
+    pub(super) value_ns: f64,
+    /// 95 % interval in ns.
+    pub(super) interval_ns: Option<Interval>,
+}
+
+/// The fitted model.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct CostModel {
+    /// The runs.
+    pub(super) points: Vec<Point>,
+    /// `t_p`, `t_o`, `c_d`, `c_s`, `e_u`; empty when they cannot be told apart.
+    pub(super) parameters: Vec<Parameter>,
+    /// Share of the variance of the cost per body explained, of step one and of step two.
+    pub(super) r_squared: [f64; 2],
+    /// Share of the variance of whole cycles' times explained, of both steps together.
+    pub(super) r_squared_cycle: f64,
+    /// Least and greatest share of bodies in conflict, `p`.
+    pub(super) conflict_share: (f64, f64),
+}
+
+const PARAMETERS: [(&str, &str); 5] = [
+    ("t_p", "an agent perceives and decides"),
+    ("t_o", "an active object generates its action"),
+    ("c_d", "per body: detect conflicts, judge and make its move"),
+    ("c_s", "per body in conflict, besides: gather and order its group"),
+    ("e_u", "per box entered or left: update its occupation"),
+];
+
+impl CostModel {
+    /// Measures and fits.
+    pub(super) fn run(plan: &Plan, report: &mut Progress<'_>) -> Self {
+        let loads = grid(plan);
+        let mut points = Vec::new();
+        for (index, load) in loads.iter().enumerate() {
+            report("cost model", index as f64 / loads.len() as f64);
+            points.push(measure(load, plan.timed_robot_cycles / 2));
+        }
+        Self::fit(points)
+    }
+
+    /// Fits the model to runs.
+    pub(super) fn fit(points: Vec<Point>) -> Self {
+        let bodies = |p: &Point| p.agents + p.objects;
+        let per_body = |p: &Point, values: &[f64]| values.iter().map(|v| v / bodies(p)).collect();
+        let fit = |row: fn(&Point) -> Vec<f64>, y: fn(&Point) -> f64| {
+            let x: Vec<Vec<f64>> = points.iter().map(|p| per_body(p, &row(p))).collect();
+            let y: Vec<f64> = points.iter().map(|p| y(p) / bodies(p)).collect();
+            Fit::new(&x, &y)
+        };
+        let first = fit(first_row, |p| p.first_ns);
+        let second = fit(second_row, |p| p.second_ns);
+        let share = |p: &Point| p.in_conflict / bodies(p);
+        let least = points.iter().map(share).fold(f64::INFINITY, f64::min);
+        let greatest = points.iter().map(share).fold(0.0, f64::max);
+        let explained = |fit: &Option<Fit>| fit.as_ref().map_or(0.0, |f| f.r_squared);
+        Self {
+            parameters: parameters(&first, &second),
+            r_squared: [explained(&first), explained(&second)],
+            r_squared_cycle: whole_cycles(&points, &first, &second),
+            conflict_share: (least, greatest),
+            points,
+        }
+    }
+
+    /// The parameter of a name.
+    pub(super) fn parameter(&self, name: &str) -> Option<&Parameter> {
+        self.parameters.iter().find(|p| p.name == name)
+    }
+
+    /// The fitted parameters as a table.
+    pub(super) fn table(&self) -> Table {
+        let note = format!(
+            "{} runs with one worker, n = {:.0} to {:.0} robots of 1 to 3 boxes a side, m = {:.0} \
+             to {:.0} people and doors, share in conflict p = {:.3} to {:.3} (counted). Least \
+             squares on the cost per body, each time the best of {BLOCKS} blocks; R2 of step one {:.3}, of step two {:.3}, of whole \
+             cycles {:.3}. t_p and t_o are told apart by n : m, c_s by crowding, e_u by body \
+             size, c_d is the rest per body.",
+            self.points.len(),
+            least(&self.points, |p| p.agents),
+            greatest(&self.points, |p| p.agents),
+            least(&self.points, |p| p.objects),
+            greatest(&self.points, |p| p.objects),
+            self.conflict_share.0,
+            self.conflict_share.1,
+            self.r_squared[0],
+            self.r_squared[1],
+            self.r_squared_cycle,
+        );
+        let interval = |p: &Parameter| {
+            p.interval_ns.map_or("-".into(), |i| format!("[{:.1}, {:.1}]", i.low, i.high))
+        };
+        table(
+            "The cost model, fitted",
+            note,
+            &self.parameters,
+            &[
+                ("parameter", &|p| p.name.clone()),
+                ("what", &|p| p.meaning.clone()),
+                ("ns", &|p| format!("{:.1}", p.value_ns)),
+                ("95 % interval", &|p| interval(p)),
+            ],
+        )
+    }
+
+    /// Predicted against measured time of a cycle.
+    pub(super) fn figure(&self) -> Figure {
+        let value = |name| self.parameter(name).map_or(0.0, |p| p.value_ns);
+        let predict = |p: &Point| {
+            let first = dot(&first_row(p), &[value("t_p"), value("t_o")]);
+            first + dot(&second_row(p), &[value("c_d"), value("c_s"), value("e_u")])
+        };
+        let of_size = |size: u32| Series {
+            name: format!("robots of {size} x {size}"),
+            points: self
+                .points
+                .iter()
+                .filter(|p| p.size == size)
+                .map(|p| FigurePoint::new(1e-6 * (p.first_ns + p.second_ns), 1e-6 * predict(p)))
+                .collect(),
+        };
+        Figure {
+            kind: FigureKind::Points,
+            ..figure(
+                "The cost model against measurement",
+                ["measured ms per cycle", "predicted ms per cycle"],
+                SIZES.map(of_size),
+            )
+        }
+    }
+}
+
+fn first_row(p: &Point) -> Vec<f64> {
+    vec![p.agents, p.objects]
+}
+
+fn second_row(p: &Point) -> Vec<f64> {
+    vec![p.agents + p.objects, p.in_conflict, p.boxes]
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+fn least(points: &[Point], of: fn(&Point) -> f64) -> f64 {
+    points.iter().map(of).fold(f64::INFINITY, f64::min)
+}
+
+fn greatest(points: &[Point], of: fn(&Point) -> f64) -> f64 {
+    points.iter().map(of).fold(0.0, f64::max)
+}
+
+fn parameters(first: &Option<Fit>, second: &Option<Fit>) -> Vec<Parameter> {
+    let fits = [first, second].into_iter().flatten();
+    let values = fits.flat_map(|fit| {
+        let interval = |k: usize| fit.intervals.as_ref().map(|all| all[k]);
+        fit.coefficients.iter().enumerate().map(move |(k, &c)| (c, interval(k)))
+    });
+    let named = |((name, meaning), (value_ns, interval_ns)): ((&str, &str), _)| Parameter {
+        name: name.into(),
+        meaning: meaning.into(),
+        value_ns,
+        interval_ns,
+    };
+    match (first, second) {
+        (Some(_), Some(_)) => PARAMETERS.into_iter().zip(values).map(named).collect(),
+        _ => Vec::new(),
+    }
+}
+
+/// Share of the variance of whole cycles' times that both fits together explain.
+fn whole_cycles(points: &[Point], first: &Option<Fit>, second: &Option<Fit>) -> f64 {
+    let (Some(first), Some(second)) = (first, second) else { return 0.0 };
+    let measured: Vec<f64> = points.iter().map(|p| p.first_ns + p.second_ns).collect();
+    let mean = measured.iter().sum::<f64>() / measured.len() as f64;
+    let square = |x: f64| x * x;
+    let predict = |p: &Point| first.predict(&first_row(p)) + second.predict(&second_row(p));
+    let left: f64 = points.iter().zip(&measured).map(|(p, y)| square(y - predict(p))).sum();
+    let all: f64 = measured.iter().map(|y| square(y - mean)).sum();
+    1.0 - left / all.max(f64::MIN_POSITIVE)
+}
+
+/// Sides of robots in boxes.
+const SIZES: [u32; 3] = [1, 2, 3];
+
+/// Loads of different numbers, crowding and size.
+fn grid(plan: &Plan) -> Vec<Load> {
+    let small = (Arc::new(Floor::small()), [20, 50, 80], [0, 30, 80]);
+    let large = (Arc::new(Floor::large()), [100, 300, 800], [0, 200, 600]);
+    let mut loads = Vec::new();
+    for (floor, agents, objects) in [small, large] {
+        for (robots, people) in agents.into_iter().flat_map(|n| objects.map(|m| (n, m))) {
+            let load = |size| Load { robots, people, size, operations: 0, floor: floor.clone() };
+            loads.extend(SIZES.map(load));
+        }
+    }
+    let keep = if plan.quick { 5 } else { 1 };
+    loads.into_iter().step_by(keep).collect()
+}
+
+/// Blocks in which a load is timed; the shortest time per cycle of each phase counts.
+const BLOCKS: usize = 16;
+
+/// What has happened in a run so far.
+#[derive(Debug, Clone, Copy)]
+struct Totals {
+    first_ns: f64,
+    second_ns: f64,
+    alone: f64,
+    boxes: f64,
+}
+
+fn measure(load: &Load, robot_cycles: u64) -> Point {
+    let cycles = load.cycles(robot_cycles);
+    let mut run = load.simulation(1);
+    advance(&mut run, cycles);
+    let mut totals = vec![totals(&run)];
+    for _ in 0..BLOCKS {
+        advance(&mut run, cycles);
+        totals.push(self::totals(&run));
+    }
+    let per_cycle = |of: fn(&Totals) -> f64| {
+        let block = |pair: &[Totals]| (of(&pair[1]) - of(&pair[0])) / cycles as f64;
+        totals.windows(2).map(block).collect::<Vec<f64>>()
+    };
+    let best = |of| per_cycle(of).into_iter().fold(f64::INFINITY, f64::min);
+    let mean = |of| per_cycle(of).iter().sum::<f64>() / BLOCKS as f64;
+    let (agents, bodies) = (f64::from(load.robots), run.world().bodies.len() as f64);
+    Point {
+        agents,
+        objects: bodies - agents,
+        size: load.size,
+        in_conflict: bodies - mean(|t| t.alone),
+        boxes: mean(|t| t.boxes),
+        first_ns: best(|t| t.first_ns),
+        second_ns: best(|t| t.second_ns),
+    }
+}
+
+fn advance(run: &mut RobotsRun, cycles: u64) {
+    let mut done = 0;
+    while done < cycles {
+        done += run.advance(cycles - done);
+    }
+}
+
+fn totals(run: &RobotsRun) -> Totals {
+    let times = run.phase_times();
+    // A step enters a row of boxes and leaves one; bodies that move are square.
+    let boxes = run.state().bodies.iter().map(|body| {
+        let side = run.world().types[usize::from(body.ty)].size.0;
+        f64::from(2 * body.moves.get()) * f64::from(side)
+    });
+    Totals {
+        first_ns: times.claim_ns as f64,
+        second_ns: (times.join_ns + times.act_ns) as f64,
+        alone: run.metrics().group_sizes.first().copied().unwrap_or(0) as f64,
+        boxes: boxes.sum(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_model_recovers_the_parameters_it_is_made_from() {
+        let truth = [900.0, 60.0, 80.0, 45.0, 3.0];
+        let mut points = Vec::new();
+        for (k, n) in [20.0, 100.0, 400.0, 800.0].into_iter().enumerate() {
+            for (m, size) in [(0.0, 1), (n / 2.0, 2), (3.0 * n, 3)] {
+                let (in_conflict, boxes) = (0.1 * k as f64 * n, f64::from(size) * n);
+                let mut p = Point {
+                    agents: n,
+                    objects: m,
+                    size,
+                    in_conflict,
+                    boxes,
+                    first_ns: 0.0,
+                    second_ns: 0.0,
+                };
+                p.first_ns = dot(&first_row(&p), &truth[..2]);
+                p.second_ns = dot(&second_row(&p), &truth[2..]);
+                points.push(p);
+            }
+        }
+        let model = CostModel::fit(points);
+        for (p, truth) in model.parameters.iter().zip(truth) {
+            assert!((p.value_ns - truth).abs() < 1e-6 * truth, "{} = {}", p.name, p.value_ns);
+        }
+        assert_eq!(model.parameters.len(), 5);
+        assert!(
+            model.r_squared.iter().all(|&r| r > 0.999_999) && model.r_squared_cycle > 0.999_999
+        );
+    }
+
+    #[test]
+    fn parameters_that_cannot_be_told_apart_are_not_given() {
+        let p = Point {
+            agents: 9.0,
+            objects: 9.0,
+            size: 1,
+            in_conflict: 1.0,
+            boxes: 1.0,
+            first_ns: 5.0,
+            second_ns: 5.0,
+        };
+        assert!(CostModel::fit(vec![p; 8]).parameters.is_empty());
+        assert!(CostModel::fit(Vec::new()).parameters.is_empty());
+    }
+
+    #[test]
+    fn measured_bodies_and_conflicts_are_plausible() {
+        let floor = Arc::new(Floor::small());
+        let load = Load { robots: 50, people: 30, size: 2, operations: 0, floor };
+        let p = measure(&load, 20_000);
+        assert_eq!((p.agents, p.objects), (50.0, 38.0), "30 people and 8 doors");
+        assert!(p.in_conflict > 1.0 && p.in_conflict < 88.0);
+        assert!(p.boxes > 50.0 && p.boxes < 88.0 * 6.0);
+        assert!(p.first_ns > 0.0 && p.second_ns > 0.0);
+    }
+}

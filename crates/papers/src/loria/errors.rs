@@ -1,0 +1,158 @@
+//! Error tables from one number: the equal error level of sensors and effectors.
+//!
+//! The paper's tables are lost, and which errors hurt more depends on the tables. So, beside
+//! the presets, sensors and effectors are compared at *equal error level* `e`:
+//!
+//! - Sensor: every row of the confusion matrix has `1 - e` on its diagonal. Distance classes
+//!   are exact, so a reading is right with probability `1 - e` exactly. A spurious report
+//!   draws its distance class evenly.
+//! - Effector: every action does what is intended with probability `1 - e`. The rest is
+//!   spread evenly over the paper's other transitions (forward: stays, slips two boxes, drifts
+//!   left, drifts right; turns: stays, turns half around).
+//!
+//! Where a sensor's error mass goes decides how much it hurts, so there are two recipes; and
+//! beams that look the same way make up for each other's errors, so there are two rings.
+
+use crate::study::setting;
+use serde::Serialize;
+use sidestep::experiment::sweep::Setting;
+use toml::Value;
+
+/// Observations of the sensor, `nothing` first.
+const OBSERVATIONS: [&str; 5] = ["nothing", "wall", "door", "person", "robot"];
+
+/// Where the error mass of a sensor's row goes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Spread {
+    /// Evenly over all other observations: a thing is missed with probability `e / 4`, and
+    /// otherwise taken for another thing.
+    Even,
+    /// What is something is taken for nothing: a thing is missed with probability `e`.
+    Blind,
+}
+
+impl Spread {
+    /// Both recipes.
+    pub(super) const ALL: [Self; 2] = [Self::Even, Self::Blind];
+
+    /// Its name in tables.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Even => "even",
+            Self::Blind => "blind",
+        }
+    }
+
+    /// The confusion matrix at error level `e` (true x reported).
+    pub(super) fn confusion(self, e: f64) -> [[f64; OBSERVATIONS.len()]; OBSERVATIONS.len()] {
+        let others = (OBSERVATIONS.len() - 1) as f64;
+        std::array::from_fn(|truth| {
+            std::array::from_fn(|reported| match (self, truth, reported) {
+                _ if truth == reported => 1.0 - e,
+                (Self::Blind, 1.., 0) => e,
+                (Self::Blind, 1.., _) => 0.0,
+                _ => e / others,
+            })
+        })
+    }
+}
+
+/// How many beams a robot has for the same thing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Beams {
+    /// The Nomad's ring: three beams look ahead, five to each side.
+    Sixteen,
+    /// One beam in each direction, for a robot of one box: nothing makes up for an error. The
+    /// paper has one observation per sensor and object, which this is nearest to.
+    Four,
+}
+
+impl Beams {
+    /// Bearings of the beams in degrees.
+    pub(super) fn bearings_deg(self) -> Vec<f64> {
+        let (n, step) = match self {
+            Self::Sixteen => (16, 22.5),
+            Self::Four => (4, 90.0),
+        };
+        (0..n).map(|k| f64::from(k) * step).collect()
+    }
+
+    /// Side of the robot that carries them, in boxes.
+    pub(super) fn size(self) -> u32 {
+        match self {
+            Self::Sixteen => 2,
+            Self::Four => 1,
+        }
+    }
+}
+
+/// The standard actions of the effector, and their transitions (path, turn in degrees), the
+/// intended one first.
+const ACTIONS: [(&str, &[(&str, i64)]); 3] = [
+    ("forward", &[("F", 0), ("", 0), ("FF", 0), ("FL", 0), ("FR", 0)]),
+    ("left", &[("", 90), ("", 0), ("", 180)]),
+    ("right", &[("", -90), ("", 0), ("", 180)]),
+];
+
+/// Probabilities of `n` outcomes at error level `e`, the intended one first.
+fn outcomes(n: usize, e: f64) -> Vec<f64> {
+    let other = e / (n - 1) as f64;
+    (0..n).map(|k| if k == 0 { 1.0 - e } else { other }).collect()
+}
+
+/// What the sonar ring `equal-ring` and the effector `equal-wheels` of the scenario are set to, so
+/// that they err at level `e`.
+pub(super) fn settings(e: f64, spread: Spread, beams: Beams) -> Vec<Setting> {
+    let list = |row: &[f64]| Value::from(row.to_vec());
+    let under = |section: &str, key: &str, value: Value| setting(&[section, key].join("."), value);
+    let mut all = vec![under("sensors.equal-ring", "bearings_deg", list(&beams.bearings_deg()))];
+    for (name, row) in OBSERVATIONS.iter().zip(spread.confusion(e)) {
+        all.push(under("sensors.equal-ring.confusion", name, list(&row)));
+    }
+    for (action, transitions) in ACTIONS {
+        let entry = |((path, turn), p): (&(&str, i64), f64)| -> Value {
+            let entries = [("p", p.into()), ("path", (*path).into()), ("turn", (*turn).into())];
+            entries
+                .map(|(key, value): (&str, Value)| (key.to_string(), value))
+                .into_iter()
+                .collect::<toml::Table>()
+                .into()
+        };
+        let row: Vec<Value> =
+            transitions.iter().zip(outcomes(transitions.len(), e)).map(entry).collect();
+        all.push(under("effectors.equal-wheels", action, row.into()));
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_of_the_equal_level_recipe_sum_to_one_and_err_as_often_as_said() {
+        for e in [0.0, 0.02, 0.05, 0.1, 0.2, 0.3, 0.75] {
+            for spread in Spread::ALL {
+                for (truth, row) in spread.confusion(e).iter().enumerate() {
+                    assert!((row.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+                    assert!((1.0 - row[truth] - e).abs() < 1e-12);
+                    assert!(row.iter().all(|&p| p >= 0.0));
+                }
+            }
+            for (_, transitions) in ACTIONS {
+                let row = outcomes(transitions.len(), e);
+                assert!((row.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+                assert!((1.0 - row[0] - e).abs() < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn recipes_differ_in_how_often_a_thing_is_missed() {
+        assert_eq!(Spread::Even.confusion(0.2)[1][0], 0.05);
+        assert_eq!(Spread::Blind.confusion(0.2)[1][0], 0.2);
+        assert_eq!(Spread::Blind.confusion(0.2)[0], Spread::Even.confusion(0.2)[0]);
+    }
+}

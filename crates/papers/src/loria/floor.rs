@@ -1,0 +1,177 @@
+//! The buildings of the experiments, our own: the paper's floor is not published.
+
+use super::patrol::{Patrol, Trust};
+use serde::{Deserialize, Serialize};
+use sidestep::map::Rect;
+use sidestep::office::{Office, OfficeSpec};
+use sidestep::planning::{FlowField, FreeSpace};
+use sidestep::worlds::robots::decide::{Behaviour, Shuttle};
+use std::sync::Arc;
+
+/// The floors: boxes of 0.25 m, of which the paper's robot, 0.53 m across, covers 2 x 2.
+const SMALL: &str = include_str!("../../../../scenarios/papers/loria/small.toml");
+const MEDIUM: &str = include_str!("../../../../scenarios/papers/loria/medium.toml");
+const LARGE: &str = include_str!("../../../../scenarios/papers/loria/large.toml");
+
+/// Boxes at each end of a corridor that count as its end.
+const END_BOXES: u32 = 4;
+
+/// How a robot goes to and fro.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Mind {
+    /// The built-in `shuttle`: keeps to its way until it touches something.
+    Touch,
+    /// Steps around what its sonar reports, on one beam's word.
+    Avoid,
+    /// The same, but believes only what two reports agree on.
+    Filter,
+}
+
+impl Mind {
+    /// All three.
+    #[cfg(test)]
+    pub(super) const ALL: [Self; 3] = [Self::Touch, Self::Avoid, Self::Filter];
+
+    /// Its name in tables.
+    pub(super) fn name(self) -> &'static str {
+        ["touch", "avoid", "filter"][self as usize]
+    }
+
+    fn between(self, ends: [Arc<FlowField>; 2]) -> Arc<dyn Behaviour> {
+        match self {
+            Self::Touch => Arc::new(Shuttle { ends }),
+            Self::Avoid => Arc::new(Patrol { ends, trust: Trust::OneBeam }),
+            Self::Filter => Arc::new(Patrol { ends, trust: Trust::TwoReports }),
+        }
+    }
+}
+
+/// A floor of corridors and rooms, and who is in it.
+#[derive(Debug, Clone)]
+pub(super) struct Floor {
+    /// Its name in tables.
+    pub(super) name: &'static str,
+    /// The scenario of its robots.
+    pub(super) scenario: &'static str,
+    /// The building.
+    pub(super) office: Arc<Office>,
+    robots_per_corridor: u32,
+    people: u32,
+}
+
+/// What of a scenario the experiments must know.
+#[derive(Deserialize)]
+struct Told {
+    map: Map,
+    robots: Vec<Group>,
+    people: Vec<Group>,
+}
+
+#[derive(Deserialize)]
+struct Map {
+    box_size_m: f64,
+    office: OfficeSpec,
+}
+
+#[derive(Deserialize)]
+struct Group {
+    count: u32,
+}
+
+impl Floor {
+    fn new(name: &'static str, scenario: &'static str) -> Self {
+        let told: Told = toml::from_str(scenario).expect("the experiments' scenarios are valid");
+        let office = told.map.office.build(told.map.box_size_m);
+        Self {
+            name,
+            scenario,
+            office: Arc::new(office.expect("the experiments' offices stand")),
+            robots_per_corridor: told.robots[0].count,
+            people: told.people[0].count,
+        }
+    }
+
+    /// One corridor with 8 rooms.
+    pub(super) fn small() -> Self {
+        Self::new("small", SMALL)
+    }
+
+    /// Two corridors with 24 rooms; the floor of the experiments that name none.
+    pub(super) fn medium() -> Self {
+        Self::new("medium", MEDIUM)
+    }
+
+    /// Two floors of three corridors with 96 rooms.
+    pub(super) fn large() -> Self {
+        Self::new("large", LARGE)
+    }
+
+    /// The corridors along which robots go: not those across, nor passages.
+    pub(super) fn corridors(&self) -> impl Iterator<Item = &Rect> {
+        self.office.corridors.iter().filter(|c| c.width > 4 * c.height)
+    }
+
+    /// Robots on the floor.
+    pub(super) fn robots(&self) -> u32 {
+        self.robots_per_corridor * self.corridors().count() as u32
+    }
+
+    /// The behaviour of the robots of each corridor, for bodies of `size` x `size` boxes.
+    pub(super) fn behaviours(&self, mind: Mind, size: u32) -> Vec<Arc<dyn Behaviour>> {
+        let free = FreeSpace::of_map(&self.office.map);
+        self.corridors().map(|corridor| mind.between(ends(&free, corridor, size))).collect()
+    }
+
+    /// What the floor is, in words.
+    pub(super) fn describe(&self) -> String {
+        let map = &self.office.map;
+        format!(
+            "{}: {} x {} boxes of {} m, corridors {}, rooms with doors {}, robots {}, \
+             people {}",
+            self.name,
+            map.width(),
+            map.height(),
+            map.box_size_m,
+            self.corridors().count(),
+            self.office.rooms.len(),
+            self.robots(),
+            self.people,
+        )
+    }
+}
+
+/// Ways to the west and to the east end of a corridor.
+fn ends(free: &FreeSpace, corridor: &Rect, size: u32) -> [Arc<FlowField>; 2] {
+    let last = corridor.col + corridor.width - size;
+    let way = |from: u32| {
+        let goals: Vec<_> = (from..from + END_BOXES)
+            .flat_map(|col| (corridor.row..corridor.row + corridor.height).map(move |r| (col, r)))
+            .collect();
+        Arc::new(FlowField::towards(free, size, &goals))
+    };
+    [way(corridor.col), way(last + 1 - END_BOXES)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn robots_of_every_size_find_a_way_along_every_corridor_of_every_floor() {
+        for floor in [Floor::small(), Floor::medium(), Floor::large()] {
+            let free = FreeSpace::of_map(&floor.office.map);
+            // One group of robots for each.
+            let told: Told = toml::from_str(floor.scenario).expect("a right scenario");
+            assert_eq!(floor.corridors().count(), told.robots.len());
+            for (corridor, size) in floor.corridors().flat_map(|c| (1..=5).map(move |s| (c, s))) {
+                let [west, east] = ends(&free, corridor, size);
+                let middle = (corridor.col + corridor.width / 2, corridor.row);
+                assert_eq!(west.direction(middle.0, middle.1), Some(2));
+                assert_eq!(east.direction(middle.0, middle.1), Some(0));
+                assert!(west.is_goal(corridor.col, corridor.row));
+                assert!(east.is_goal(corridor.col + corridor.width - size, corridor.row));
+            }
+        }
+    }
+}

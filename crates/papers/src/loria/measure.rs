@@ -1,0 +1,304 @@
+//! One run of one variant, and what it came to.
+
+use super::errors::{self, Beams, Spread};
+use super::floor::{Floor, Mind};
+use crate::study::{Progress, all_of, setting, source};
+use serde::Serialize;
+use sidestep::kernel::Simulation;
+use sidestep::kernel::ports::{MemoryRecorder, Values};
+use sidestep::scenario::Source;
+use sidestep::worlds::robots::RobotsRun;
+use sidestep::worlds::robots::baseline::breach;
+use sidestep::worlds::robots::effector::ObstacleRule;
+use sidestep::worlds::robots::scenario::{Behaviours, Compiled, StorageOrder};
+use sidestep::worlds::robots::world::Regime;
+use std::convert::Infallible;
+use std::sync::Arc;
+
+/// The medium floor, with sensors and effectors of an equal error level.
+const EQUAL: &str = include_str!("../../../../scenarios/papers/loria/equal.toml");
+
+/// Which tables sensors and effectors err by.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Tables {
+    /// The presets `sonar-ring` and `nomad`.
+    Presets,
+    /// Those of an equal error level, see [`errors`].
+    Equal(f64, Spread, Beams),
+}
+
+/// What is varied between runs; the seed is not part of it.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct Variant {
+    /// The building and who is in it.
+    #[serde(skip)]
+    pub(super) floor: Arc<Floor>,
+    /// Which errors are on.
+    pub(super) regime: Regime,
+    /// The law for blocked paths.
+    pub(super) obstacle_rule: ObstacleRule,
+    /// How robots decide.
+    pub(super) mind: Mind,
+    /// How sensors and effectors err.
+    pub(super) tables: Tables,
+    /// Robots cover `size` x `size` boxes.
+    pub(super) size: u32,
+    /// Whether robots have a camera beside the sonar ring.
+    pub(super) camera: bool,
+}
+
+impl Variant {
+    /// Robots of 2 x 2 boxes with a sonar ring that avoid what it reports, under the presets
+    /// and the rule `cut`.
+    pub(super) fn new(floor: &Arc<Floor>, regime: Regime) -> Self {
+        Self {
+            floor: Arc::clone(floor),
+            regime,
+            obstacle_rule: ObstacleRule::Cut,
+            mind: Mind::Avoid,
+            tables: Tables::Presets,
+            size: 2,
+            camera: false,
+        }
+    }
+
+    /// The scenario of a run: the floor's, with what this variant differs in; `patrol-0`... are
+    /// the behaviours of the corridors.
+    pub(super) fn source(&self, seed: u64) -> Source {
+        let mut settings = vec![
+            setting("seed", seed as i64),
+            setting("regime", self.regime.name()),
+            setting("obstacle_rule", self.obstacle_rule.name()),
+        ];
+        let mut text = self.floor.scenario;
+        let mut sensors = vec!["sonar-ring"];
+        if let Tables::Equal(e, spread, beams) = self.tables {
+            (text, sensors) = (EQUAL, vec!["equal-ring"]);
+            settings.extend(errors::settings(e, spread, beams));
+        }
+        sensors.extend(self.camera.then_some("camera"));
+        for k in 0..self.floor.corridors().count() {
+            let key = |name: &str| ["robots", &k.to_string(), name].join(".");
+            let patrol = format!("patrol-{k}");
+            settings.push(setting(&key("size"), self.size));
+            settings.push(setting(&key("sensors"), sensors.clone()));
+            settings.push(setting(
+                &key("behaviour"),
+                toml::Table::from_iter([("kind".to_string(), patrol.into())]),
+            ));
+        }
+        source(text, &settings).expect("the experiments' scenarios are valid")
+    }
+
+    /// The behaviours by name, shared by all runs of this variant.
+    pub(super) fn behaviours(&self) -> Behaviours {
+        let all = self.floor.behaviours(self.mind, self.size);
+        all.into_iter().enumerate().map(|(k, b)| (format!("patrol-{k}"), b)).collect()
+    }
+}
+
+/// What a run of a variant came to.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub(super) struct Outcome {
+    /// Contacts per 1000 actions, with anything.
+    pub(super) contacts: Option<f64>,
+    /// Contacts per 1000 actions, with walls.
+    pub(super) wall_contacts: Option<f64>,
+    /// Contacts per 1000 actions, with robots.
+    pub(super) robot_contacts: Option<f64>,
+    /// Mean cycles of a completed to-and-fro trip; absent when none was completed.
+    pub(super) trip_cycles: Option<f64>,
+    /// Completed trips per robot.
+    pub(super) trips: Option<f64>,
+    /// Net displacement by path length over windows of [`WINDOW_CYCLES`], on average.
+    pub(super) straightness: Option<f64>,
+    /// Moves with a sideways part per 1000 actions.
+    pub(super) lateral_moves: Option<f64>,
+    /// Whether every robot has acted once a cycle, and at the end no two bodies shared a box
+    /// and none stood in a wall.
+    pub(super) lawful: bool,
+}
+
+/// A measure of an outcome.
+pub(super) type Measure = fn(&Outcome) -> Option<f64>;
+
+/// The values of a measure by run.
+pub(super) fn values(outcomes: &[Outcome], measure: Measure) -> Vec<Option<f64>> {
+    outcomes.iter().map(measure).collect()
+}
+
+/// Length of the windows in which straightness is measured, in cycles.
+pub(super) const WINDOW_CYCLES: usize = 20;
+
+/// Windows with a shorter path say nothing about its shape, in boxes.
+const SHORTEST_PATH_BOXES: f64 = 10.0;
+
+/// Runs every variant with seeds `1..=seeds`; the outcomes are by variant, then by seed.
+///
+/// All variants see the same seeds: where they start, and every draw that a variant does not
+/// itself change, are the same, so that differences between variants are paired by seed.
+pub(super) fn measure_all(
+    variants: &[Variant],
+    (seeds, cycles): (usize, u64),
+    workers: usize,
+    what: &str,
+    report: &mut Progress<'_>,
+) -> Vec<Vec<Outcome>> {
+    let behaviours: Vec<Behaviours> = variants.iter().map(Variant::behaviours).collect();
+    let run = |i: &usize| {
+        let (v, seed) = (i / seeds, (i % seeds) as u64 + 1);
+        Ok::<_, Infallible>(measure(&variants[v], &behaviours[v], seed, cycles))
+    };
+    let numbers: Vec<usize> = (0..variants.len() * seeds).collect();
+    let Ok(outcomes) = all_of(&numbers, workers, |share| report(what, share), run);
+    outcomes.chunks(seeds).map(<[Outcome]>::to_vec).collect()
+}
+
+/// Runs one variant once, on one worker.
+pub(super) fn measure(
+    variant: &Variant,
+    behaviours: &Behaviours,
+    seed: u64,
+    cycles: u64,
+) -> Outcome {
+    let (simulation, tracks) = recorded(variant, behaviours, seed, cycles);
+    outcome(&simulation, &tracks)
+}
+
+/// A variant's run at its end, and the poses of its robots by entity id.
+pub(super) fn recorded(
+    variant: &Variant,
+    behaviours: &Behaviours,
+    seed: u64,
+    cycles: u64,
+) -> (RobotsRun, Vec<Track>) {
+    let source = variant.source(seed);
+    let compiled = Compiled::new(&source, behaviours, StorageOrder::Spatial)
+        .expect("the experiments' scenarios are valid");
+    let mut simulation = compiled.start(&source, 1);
+    let tracks = record(&mut simulation, cycles);
+    (simulation, tracks)
+}
+
+/// Column, row and heading by cycle.
+pub(super) type Track = Vec<(u32, u32, u8)>;
+
+/// Runs and keeps the poses of the robots, by entity id.
+fn record(simulation: &mut RobotsRun, cycles: u64) -> Vec<Track> {
+    simulation.begin_recording();
+    let schemas = simulation.schemas();
+    let mut tracks = vec![Track::with_capacity(cycles as usize); simulation.agents()];
+    let mut done = 0;
+    while done < cycles {
+        done += simulation.advance(cycles - done);
+        // One recorder per stretch, so that memory does not grow with the run.
+        let mut recorder = MemoryRecorder::new(&schemas);
+        simulation.record(&mut recorder).expect("memory takes every row of its schema");
+        append(&mut tracks, &recorder);
+    }
+    tracks
+}
+
+fn append(tracks: &mut [Track], recorder: &MemoryRecorder) {
+    let column = |name| match recorder.column("trajectories", name) {
+        Some(Values::U32(values) | Values::Label(values)) => &values[..],
+        _ => &[],
+    };
+    let places = column("col_boxes").iter().zip(column("row_boxes")).zip(column("heading"));
+    for (&body, ((&col, &row), &heading)) in column("body").iter().zip(places) {
+        if let Some(track) = tracks.get_mut(body as usize) {
+            track.push((col, row, heading as u8));
+        }
+    }
+}
+
+fn outcome(simulation: &RobotsRun, tracks: &[Track]) -> Outcome {
+    let total = simulation.metrics().total;
+    let per_1000 = |n: u64| (total.actions > 0).then(|| 1e3 * n as f64 / total.actions as f64);
+    let of_kind = |kind: &str| per_1000(total.contacts_by_kind.get(kind).copied().unwrap_or(0));
+    Outcome {
+        contacts: per_1000(total.contacts),
+        wall_contacts: of_kind("wall"),
+        robot_contacts: of_kind("robot"),
+        trip_cycles: total.trip_cycles_mean,
+        trips: Some(total.trips as f64 / tracks.len() as f64),
+        straightness: straightness(tracks),
+        lateral_moves: per_1000(tracks.iter().map(|track| lateral_moves(track)).sum()),
+        lawful: total.actions == simulation.cycle() * simulation.agents() as u64
+            && breach(simulation.world(), &simulation.saved()).is_none(),
+    }
+}
+
+/// Mean over all windows of all tracks of net displacement by path length: 1 for a straight
+/// line, less for a zigzag.
+fn straightness(tracks: &[Track]) -> Option<f64> {
+    let windows = tracks.iter().flat_map(|track| track.chunks_exact(WINDOW_CYCLES + 1));
+    let shares: Vec<f64> = windows.filter_map(straightness_of).collect();
+    sidestep::statistics::mean(&shares)
+}
+
+fn straightness_of(window: &[(u32, u32, u8)]) -> Option<f64> {
+    let distance = |a: (u32, u32, u8), b: (u32, u32, u8)| {
+        let (dx, dy) = (f64::from(b.0.abs_diff(a.0)), f64::from(b.1.abs_diff(a.1)));
+        (dx * dx + dy * dy).sqrt()
+    };
+    let path: f64 = window.windows(2).map(|pair| distance(pair[0], pair[1])).sum();
+    let net = distance(*window.first()?, *window.last()?);
+    (path >= SHORTEST_PATH_BOXES).then(|| net / path)
+}
+
+/// Moves between two cycles that lead aside from the heading before.
+fn lateral_moves(track: &[(u32, u32, u8)]) -> u64 {
+    let aside = |pair: &&[(u32, u32, u8)]| {
+        let ((x, y, heading), (u, v, _)) = (pair[0], pair[1]);
+        if heading % 2 == 0 { v != y } else { u != x }
+    };
+    track.windows(2).filter(aside).count() as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_straight_line_is_straight_and_a_staircase_is_not() {
+        let line: Track = (0..42).map(|x| (x, 0, 0)).collect();
+        assert_eq!(straightness(std::slice::from_ref(&line)), Some(1.0));
+        assert_eq!(lateral_moves(&line), 0);
+        let stairs: Track = (0..42u32).map(|k| (k.div_ceil(2), k / 2, 0)).collect();
+        let share = straightness(std::slice::from_ref(&stairs)).unwrap();
+        assert!((share - 0.5_f64.sqrt()).abs() < 1e-3, "{share}");
+        assert_eq!(lateral_moves(&stairs), 20);
+        assert_eq!(straightness(&[vec![(3, 3, 1); 100]]), None, "who stands has no path");
+    }
+
+    #[test]
+    fn where_all_is_perfect_nobody_moves_sideways() {
+        let floor = Arc::new(Floor::small());
+        for mind in Mind::ALL {
+            let variant = Variant { mind, ..Variant::new(&floor, Regime::Reliable) };
+            let outcome = measure(&variant, &variant.behaviours(), 1, 600);
+            assert_eq!(outcome.lateral_moves, Some(0.0));
+            assert!(outcome.trips > Some(0.5), "{outcome:?}");
+        }
+        let level_0 = Variant {
+            tables: Tables::Equal(0.0, Spread::Blind, Beams::Sixteen),
+            ..Variant::new(&floor, Regime::Both)
+        };
+        let reliable = Variant { regime: Regime::Reliable, ..level_0.clone() };
+        let [a, b] = [level_0, reliable].map(|v| measure(&v, &v.behaviours(), 1, 300));
+        assert_eq!(a, b, "errors of level 0 are none");
+    }
+
+    #[test]
+    fn outcomes_do_not_depend_on_how_many_runs_are_done_at_once() {
+        let floor = Arc::new(Floor::small());
+        let variants = [Regime::Reliable, Regime::Both].map(|r| Variant::new(&floor, r));
+        let all = |workers| measure_all(&variants, (3, 200), workers, "", &mut |_, _| {});
+        let (one, three) = (all(1), all(3));
+        assert_eq!(one, three);
+        assert!(one[0] != one[1] && one[1].len() == 3);
+        assert!(one.iter().flatten().all(|outcome| outcome.lawful));
+    }
+}

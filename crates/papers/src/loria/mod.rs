@@ -1,0 +1,307 @@
+//! The experiments of the robots world's source paper, "A parallel simulation of stochastic
+//! agent/environment interaction" (LORIA, 2001), run anew.
+//!
+//! The paper's tables are lost, so its *claims* are examined: what larger, smaller, faster. Every
+//! figure is our own, with the number of runs and a 95 % interval. [`claims`] says of each claim
+//! whether it held, did not hold, or cannot be judged.
+//!
+//! ```text
+//! floor.rs, patrol.rs, errors.rs   the buildings, the behaviours, the error tables
+//! measure.rs   -> reliability.rs, genericity.rs               what runs come to
+//! timing.rs    -> performance.rs, strategies.rs, cost_model.rs   how long they take
+//! scenes.rs                        where robots go, as a picture shows it
+//! claims.rs                                                   what follows from all that
+//! ```
+
+mod claims;
+mod cost_model;
+mod errors;
+mod floor;
+mod genericity;
+mod measure;
+mod patrol;
+mod performance;
+mod reliability;
+pub mod scenes;
+mod strategies;
+mod timing;
+
+use crate::study::{Progress, stage};
+use cost_model::CostModel;
+use genericity::Genericity;
+use performance::Performance;
+use reliability::Reliability;
+use serde::Serialize;
+use sidestep::kernel::InputError;
+use sidestep::kernel::ports::{MemoryRecorder, RecordError, Recorder, TableSchema};
+use sidestep::kernel::workers::available;
+use sidestep_document::claim::{Claim, tally};
+use sidestep_document::document::{Document, Experiment, Picture};
+use strategies::Strategies;
+
+/// How much to run.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Plan {
+    /// Seeds per variant, at least 2 (an interval needs two).
+    pub seeds: usize,
+    /// Cycles of each run whose behaviour is measured.
+    pub cycles: u64,
+    /// Error levels at which sensors and effectors are compared, above 0 and below 1.
+    pub error_levels: Vec<f64>,
+    /// Runs at once, where behaviour is measured; no result depends on it.
+    pub workers: usize,
+    /// Most workers of one run, where time is measured.
+    pub most_workers: usize,
+    /// Repeats of each timing, at least 2.
+    pub repeats: usize,
+    /// Robots of the timed loads, sparse to dense.
+    pub robots: Vec<u32>,
+    /// Operations that a decision costs in the timed loads, cheap to dear.
+    pub operations: Vec<u32>,
+    /// About how many decisions of the cheapest kind a timed stretch is as long as.
+    pub timed_robot_cycles: u64,
+    /// Whether this is a rehearsal: fewer points, and figures without weight.
+    pub quick: bool,
+}
+
+impl Default for Plan {
+    /// 24 seeds; a few minutes on two processors.
+    fn default() -> Self {
+        Self {
+            seeds: 24,
+            cycles: 4000,
+            error_levels: vec![0.02, 0.05, 0.1, 0.2, 0.3, 0.4],
+            workers: available(),
+            most_workers: available().min(16),
+            repeats: 9,
+            robots: vec![250, 1500],
+            operations: vec![0, 1000, 10_000],
+            timed_robot_cycles: 25_000,
+            quick: false,
+        }
+    }
+}
+
+/// Bounds of a plan: what a machine can do in a day.
+const MOST: u64 = 1_000_000;
+
+impl Plan {
+    /// A rehearsal of seconds: everything is run once, nothing is measured well.
+    pub fn quick() -> Self {
+        Self {
+            seeds: 2,
+            cycles: 700,
+            error_levels: vec![0.1],
+            workers: 2,
+            most_workers: 2,
+            repeats: 2,
+            robots: vec![100],
+            operations: vec![0, 1000],
+            timed_robot_cycles: 500,
+            quick: true,
+        }
+    }
+
+    fn check(&self) -> Result<(), InputError> {
+        let refuse = |key: &str, is_wrong: bool, remedy: &str| {
+            let cause = "out of range for the experiment";
+            if is_wrong {
+                Err(InputError::new(format!("plan.{key}"), cause, remedy))
+            } else {
+                Ok(())
+            }
+        };
+        let outside = |value: u64, least: u64, most: u64| !(least..=most).contains(&value);
+        let levels = &self.error_levels;
+        let bad_level = levels.is_empty() || levels.iter().any(|&e| !(e > 0.0 && e < 1.0));
+        let count = |n: usize| n as u64;
+        refuse("seeds", outside(count(self.seeds), 2, 100_000), "give 2 to 100000 seeds")?;
+        refuse("cycles", outside(self.cycles, 100, 10 * MOST), "give 100 to 10000000 cycles")?;
+        refuse("error_levels", bad_level, "give levels above 0 and below 1")?;
+        refuse("workers", outside(count(self.workers), 1, 1024), "give 1 to 1024 workers")?;
+        refuse(
+            "most_workers",
+            outside(count(self.most_workers), 1, 1024),
+            "give 1 to 1024 workers",
+        )?;
+        refuse("repeats", outside(count(self.repeats), 2, 10_000), "give 2 to 10000 repeats")?;
+        let bad_robots = |&n: &u32| outside(u64::from(n), 1, 3000);
+        let none_or = |bad: bool, empty: bool| bad || empty;
+        let robots = none_or(self.robots.iter().any(bad_robots), self.robots.is_empty());
+        refuse("robots", robots, "give numbers from 1 to 3000: more do not fit the floor")?;
+        refuse("operations", self.operations.is_empty(), "give at least one cost, e.g. 0")?;
+        let decisions = outside(self.timed_robot_cycles, 100, 1000 * MOST);
+        refuse("timed_robot_cycles", decisions, "give 100 to 1000000000")
+    }
+}
+
+/// Makes a recorder for a run with these tables.
+pub type NewRecorder<'a> = dyn FnMut(&[TableSchema]) -> Result<Box<dyn Recorder>, RecordError> + 'a;
+
+/// Keeps recordings in memory until their run ends.
+pub fn in_memory(schemas: &[TableSchema]) -> Result<Box<dyn Recorder>, RecordError> {
+    Ok(Box::new(MemoryRecorder::new(schemas)))
+}
+
+/// Why the experiments could not be run.
+#[derive(Debug, thiserror::Error)]
+pub enum LoriaError {
+    /// The plan is out of range.
+    #[error(transparent)]
+    Plan(#[from] InputError),
+    /// A recording failed.
+    #[error(transparent)]
+    Record(#[from] RecordError),
+}
+
+/// Everything that came of the experiments.
+#[derive(Debug, Clone, Serialize)]
+pub struct Report {
+    /// What was run.
+    pub plan: Plan,
+    /// Version of the program.
+    pub program_version: String,
+    reliability: Reliability,
+    genericity: Genericity,
+    performance: Performance,
+    strategies: Strategies,
+    cost_model: CostModel,
+    /// The paper's claims and our verdicts.
+    pub claims: Vec<Claim>,
+}
+
+/// Runs all experiments; recordings are kept in memory.
+///
+/// `progress` is told what is being done and the share of the whole that is done.
+///
+/// # Errors
+/// When the plan is out of range.
+pub fn run(plan: &Plan, progress: &mut Progress<'_>) -> Result<Report, LoriaError> {
+    run_recorded(plan, &mut in_memory, progress)
+}
+
+/// Runs all experiments; `recorders` says where timed runs are recorded to.
+///
+/// # Errors
+/// When the plan is out of range, or a recording fails.
+pub fn run_recorded(
+    plan: &Plan,
+    recorders: &mut NewRecorder<'_>,
+    progress: &mut Progress<'_>,
+) -> Result<Report, LoriaError> {
+    plan.check()?;
+    // Shares of the whole as they take their time on two processors.
+    let reliability = Reliability::run(plan, &mut stage(progress, 0.0, 0.45));
+    let genericity = Genericity::run(plan, &mut stage(progress, 0.45, 0.55));
+    let performance = Performance::run(plan, recorders, &mut stage(progress, 0.55, 0.8))?;
+    let strategies = Strategies::run(plan, &mut stage(progress, 0.8, 0.93));
+    let cost_model = CostModel::run(plan, &mut stage(progress, 0.93, 1.0));
+    let mut report = Report {
+        plan: plan.clone(),
+        program_version: env!("CARGO_PKG_VERSION").into(),
+        reliability,
+        genericity,
+        performance,
+        strategies,
+        cost_model,
+        claims: Vec::new(),
+    };
+    report.claims = claims::judge(&report);
+    progress("done", 1.0);
+    Ok(report)
+}
+
+impl Report {
+    /// The experiments in the order of the report.
+    fn experiments(&self) -> Vec<Experiment> {
+        claims::WORDS.experiments([
+            (self.reliability.figures(), self.reliability.tables()),
+            (vec![self.genericity.figure()], vec![self.genericity.table()]),
+            (self.performance.figures(), self.performance.tables()),
+            (self.strategies.figures(), vec![self.strategies.table()]),
+            (vec![self.cost_model.figure()], vec![self.cost_model.table()]),
+        ])
+    }
+
+    /// The report, the claims first; `pictures` are those of the [scenes](scenes::all), drawn.
+    pub fn document(&self, pictures: Vec<Picture>) -> Document {
+        let plan = &self.plan;
+        let lead = format!(
+            "{} The paper's tables are lost; every number here is ours. Version {}; seeds 1 to {} \
+             for every variant, {} cycles a run, {} repeats of every timing, {} processors.",
+            tally(&self.claims),
+            self.program_version,
+            plan.seeds,
+            plan.cycles,
+            plan.repeats,
+            self.performance.processors,
+        );
+        let parts = (&self.claims[..], pictures, self.experiments());
+        claims::WORDS.document(lead, plan.quick, parts, self.command())
+    }
+
+    fn command(&self) -> String {
+        let plan = &self.plan;
+        format!(
+            "sidestep reproduce loria{} --seeds {} --cycles {} --workers {} --out DIR",
+            if plan.quick { " --quick" } else { "" },
+            plan.seeds,
+            plan.cycles,
+            plan.workers,
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sidestep_document::document::Block;
+
+    #[test]
+    fn a_quick_plan_judges_every_claim_and_gives_text_figures_and_json() {
+        let mut shares = Vec::new();
+        let report = run(&Plan::quick(), &mut |_, share| shares.push(share)).unwrap();
+        assert!(shares.is_sorted() && shares.last() == Some(&1.0));
+        for number in 1..=15 {
+            let id = format!("E-{number}");
+            let of_id = |c: &&Claim| c.id.trim_end_matches(char::is_alphabetic) == id;
+            let claim = report.claims.iter().find(of_id).expect("every claim is judged");
+            assert!(!claim.ours.is_empty() && !claim.reason.is_empty(), "{id}");
+        }
+        assert!(report.strategies.all_valid() && report.performance.is_deterministic());
+        let document = report.document(Vec::new());
+        assert!(document.blocks.iter().any(|block| matches!(block, Block::Warning(_))));
+        let text = format!("{document:?}");
+        assert!(text.contains("E-9") && !text.contains("NaN"));
+        for figure in report.experiments().into_iter().flat_map(|e| e.figures) {
+            assert!(!figure.series.is_empty(), "{}", figure.title);
+            assert!(figure.series.iter().any(|s| !s.points.is_empty()), "{}", figure.title);
+        }
+        assert!(serde_json::to_string(&report).is_ok_and(|json| json.contains("\"claims\"")));
+    }
+
+    #[test]
+    fn plans_out_of_range_are_refused_before_anything_runs() {
+        let quick = Plan::quick();
+        let wrong = [
+            Plan { seeds: 1, ..quick.clone() },
+            Plan { cycles: u64::MAX, ..quick.clone() },
+            Plan { error_levels: vec![f64::NAN], ..quick.clone() },
+            Plan { workers: 0, ..quick.clone() },
+            Plan { robots: vec![4_000_000_000], ..quick.clone() },
+            Plan { operations: Vec::new(), ..quick.clone() },
+        ];
+        for plan in wrong {
+            let outcome = run(&plan, &mut |_, _| panic!("nothing runs"));
+            assert!(matches!(outcome, Err(LoriaError::Plan(_))), "{plan:?}");
+        }
+        assert!(Plan::default().check().is_ok() && quick.check().is_ok());
+    }
+
+    #[test]
+    fn a_failing_recorder_ends_the_experiment_with_its_error() {
+        let mut full = |_: &[TableSchema]| Err(RecordError::new("disk", "full"));
+        let outcome = run_recorded(&Plan::quick(), &mut full, &mut |_, _| {});
+        assert!(matches!(outcome, Err(LoriaError::Record(e)) if e.cause == "full"));
+    }
+}

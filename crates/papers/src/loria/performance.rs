@@ -1,0 +1,388 @@
+//! Parallel performance: 1 to W workers, recorded or not, over density and cost of decisions.
+//!
+//! Time is taken as the paper does: all cycles and the recording, without initialization, whose
+//! share is given apart. Runs of all worker counts take turns, so that what else the machine
+//! does hits all alike, and arithmetic without any world takes its turn too: its speed-up is
+//! what the machine could give at that moment.
+
+use super::floor::Floor;
+use super::timing::{Load, STRETCHES, Timed, arithmetic, race, seconds};
+use super::{NewRecorder, Plan};
+use crate::cells::{figure, table};
+use crate::study::Progress;
+use serde::Serialize;
+use sidestep::kernel::Simulation;
+use sidestep::kernel::ports::RecordError;
+use sidestep_document::{Estimate, Figure, Series, Table};
+use std::sync::Arc;
+
+/// A load under a number of workers.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct Timing {
+    /// Number of the load.
+    pub(super) load: usize,
+    /// Workers.
+    pub(super) workers: usize,
+    /// Whether the run was recorded.
+    pub(super) recorded: bool,
+    /// Milliseconds per cycle.
+    pub(super) cycle_ms: Estimate,
+    /// Time with one worker by time with these, both recorded or both not.
+    pub(super) speed_up: Estimate,
+    /// Speed-up by repeat, for pairs with other loads.
+    pub(super) ratios: Vec<Option<f64>>,
+    /// Speed-up of mere arithmetic with as many workers, timed in turn with this.
+    pub(super) machine: Estimate,
+}
+
+/// What a run costs before its first cycle.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub(super) struct Initialization {
+    /// Number of the load.
+    pub(super) load: usize,
+    /// Seconds to read the scenario, compile the world and place all bodies.
+    pub(super) seconds: f64,
+    /// Share of the whole time of a run of [`REFERENCE_CYCLES`] with one worker.
+    pub(super) share_alone: f64,
+    /// The same with the most workers.
+    pub(super) share_together: f64,
+}
+
+/// Cycles of the run whose initialization is counted; the paper's number is lost.
+pub(super) const REFERENCE_CYCLES: u64 = 1000;
+
+/// Worker counts whose digests are compared; more than the machine has processors is allowed.
+const DIGEST_WORKERS: [usize; 6] = [1, 2, 3, 4, 8, 16];
+
+/// The parallel performance experiment.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct Performance {
+    /// Processors that the run may use.
+    pub(super) processors: usize,
+    /// What was timed.
+    pub(super) loads: Vec<Load>,
+    /// The times.
+    pub(super) timings: Vec<Timing>,
+    /// Initialization of each load.
+    pub(super) initialization: Vec<Initialization>,
+    /// Digest after the same cycles of the same run, by number of workers.
+    pub(super) digests: Vec<(usize, String)>,
+    /// Digest of the same run recorded.
+    pub(super) recorded_digest: String,
+}
+
+/// Loads of the experiment: sparse and dense, each at every cost of a decision.
+pub(super) fn loads(plan: &Plan) -> Vec<Load> {
+    let floor = Arc::new(Floor::large());
+    let load = |&(robots, operations): &(u32, u32)| Load {
+        robots,
+        people: robots / 5,
+        size: 2,
+        operations,
+        floor: Arc::clone(&floor),
+    };
+    let costs = |robots| plan.operations.iter().map(move |&operations| (robots, operations));
+    plan.robots.iter().copied().flat_map(costs).collect::<Vec<_>>().iter().map(load).collect()
+}
+
+/// Worker counts from 1 to `most`: all up to 4, then ever larger steps.
+pub(super) fn worker_counts(most: usize) -> Vec<usize> {
+    let mut counts: Vec<usize> = [1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64]
+        .into_iter()
+        .filter(|&count| count < most)
+        .collect();
+    counts.push(most.max(1));
+    counts
+}
+
+impl Performance {
+    /// Runs the experiment.
+    ///
+    /// # Errors
+    /// When a recording fails.
+    pub(super) fn run(
+        plan: &Plan,
+        recorders: &mut NewRecorder<'_>,
+        report: &mut Progress<'_>,
+    ) -> Result<Self, RecordError> {
+        let loads = loads(plan);
+        let (mut timings, mut initialization) = (Vec::new(), Vec::new());
+        for (index, load) in loads.iter().enumerate() {
+            report("parallel performance", index as f64 / loads.len() as f64);
+            let times = time_load(plan, load, recorders)?;
+            let of_load = timings.len()..;
+            timings.extend(times.into_iter().map(|timing| Timing { load: index, ..timing }));
+            initialization.push(initialize(index, load, &timings[of_load]));
+        }
+        let (digests, recorded_digest) = digests(&loads[0], recorders)?;
+        Ok(Self {
+            processors: sidestep::kernel::workers::available(),
+            loads,
+            timings,
+            initialization,
+            digests,
+            recorded_digest,
+        })
+    }
+
+    /// Whether every number of workers, recorded or not, gives one digest.
+    pub(super) fn is_deterministic(&self) -> bool {
+        self.digests.iter().all(|(_, digest)| *digest == self.recorded_digest)
+    }
+
+    /// The greatest number of workers that was timed.
+    pub(super) fn most_workers(&self) -> usize {
+        self.timings.iter().map(|timing| timing.workers).max().unwrap_or(1)
+    }
+
+    /// Timings with the most workers.
+    pub(super) fn at_most_workers(&self, recorded: bool) -> impl Iterator<Item = &Timing> {
+        let most = self.most_workers();
+        self.timings.iter().filter(move |t| t.workers == most && t.recorded == recorded)
+    }
+
+    /// Whether the machine itself gave less than this share of the workers' worth: others
+    /// were using it, and times say little.
+    pub(super) fn was_busy(&self) -> bool {
+        const SHARE: f64 = 0.85;
+        let least = SHARE * self.most_workers() as f64;
+        self.at_most_workers(false).any(|timing| timing.machine.or_zero() < least)
+    }
+
+    /// Speed-up of the costliest decisions less that of the cheapest, same robots, unrecorded,
+    /// with the most workers; one value per repeat and number of robots.
+    pub(super) fn gain_by_cost(&self) -> Estimate {
+        let (mut cheap, mut costly) = (Vec::new(), Vec::new());
+        let cost = |timing: &Timing| self.loads[timing.load].operations;
+        let extremes = [
+            self.loads.iter().map(|l| l.operations).min(),
+            self.loads.iter().map(|l| l.operations).max(),
+        ];
+        for timing in self.at_most_workers(false) {
+            if Some(cost(timing)) == extremes[0] {
+                cheap.extend(timing.ratios.iter().copied());
+            } else if Some(cost(timing)) == extremes[1] {
+                costly.extend(timing.ratios.iter().copied());
+            }
+        }
+        Estimate::paired(&costly, &cheap)
+    }
+
+    /// The tables of this experiment.
+    pub(super) fn tables(&self) -> Vec<Table> {
+        vec![self.times_table(), self.initialization_table(), self.digest_table()]
+    }
+
+    fn times_table(&self) -> Table {
+        let note = format!(
+            "Mean [95 % interval] over repeats, each the best of {STRETCHES} stretches that take \
+             turns; {} processors. Time includes recording where it says so, and excludes \
+             initialization. The machine's speed-up is that of mere arithmetic, timed in turn: \
+             where it is well below the number of workers, others were using the machine. The \
+             engine measures now and then whether all workers are faster than one, and keeps \
+             to the faster.",
+            self.processors
+        );
+        let per = |timing: &Timing, of: f64| format!("{:.2}", timing.speed_up.or_zero() / of);
+        table(
+            "Execution time, speed-up and efficiency",
+            note,
+            &self.timings,
+            &[
+                ("load", &|timing| self.loads[timing.load].name()),
+                ("workers", &|timing| timing.workers.to_string()),
+                ("recorded", &|timing| if timing.recorded { "yes" } else { "no" }.into()),
+                ("ms per cycle", &|timing| timing.cycle_ms.to_string()),
+                ("speed-up", &|timing| timing.speed_up.to_string()),
+                ("efficiency", &|timing| per(timing, timing.workers as f64)),
+                ("the machine's speed-up", &|timing| timing.machine.to_string()),
+                ("share of it", &|timing| {
+                    per(timing, timing.machine.or_zero().max(f64::MIN_POSITIVE))
+                }),
+            ],
+        )
+    }
+
+    fn initialization_table(&self) -> Table {
+        let most = self.most_workers();
+        let title = format!("Initialization, of a run of {REFERENCE_CYCLES} cycles");
+        let together = format!("share, {most} workers");
+        let note = "Median of 3. Initialization is not parallel: the scenario is read, the world \
+                    compiled, all bodies placed. Shares from the measured time per cycle, \
+                    unrecorded.";
+        let percent = |share: f64| format!("{:.2} %", 100.0 * share);
+        table(
+            title,
+            note,
+            &self.initialization,
+            &[
+                ("load", &|i| self.loads[i.load].name()),
+                ("seconds", &|i| format!("{:.4}", i.seconds)),
+                ("share, 1 worker", &|i| percent(i.share_alone)),
+                (&together, &|i| percent(i.share_together)),
+            ],
+        )
+    }
+
+    fn digest_table(&self) -> Table {
+        let note = "The same run, so many cycles, with more workers than processors too. Compare \
+                    the digest with that of another machine.";
+        let mut table = Table::new("The same bits", note, &["workers", "recorded", "digest"]);
+        for (workers, digest) in &self.digests {
+            table.row([workers.to_string(), "no".into(), digest.clone()]);
+        }
+        table.row(["2".into(), "yes".into(), self.recorded_digest.clone()]);
+        table
+    }
+
+    /// The figures of this experiment: speed-up and time over workers.
+    pub(super) fn figures(&self) -> Vec<Figure> {
+        let speed_up: fn(&Timing) -> &Estimate = |t| &t.speed_up;
+        let cycle_ms: fn(&Timing) -> &Estimate = |t| &t.cycle_ms;
+        vec![
+            self.figure("Speed-up", "time of 1 worker / time", false, speed_up),
+            self.figure("Speed-up, recorded", "time of 1 worker / time", true, speed_up),
+            self.figure("Execution time", "ms per cycle", false, cycle_ms),
+        ]
+    }
+
+    fn figure(
+        &self,
+        title: &str,
+        y_label: &str,
+        recorded: bool,
+        quantity: fn(&Timing) -> &Estimate,
+    ) -> Figure {
+        let line = |(index, load): (usize, &Load)| {
+            let timings = self.timings.iter().filter(|t| t.load == index && t.recorded == recorded);
+            let points = timings.filter_map(|t| quantity(t).point(t.workers as f64)).collect();
+            Series { name: load.name(), points }
+        };
+        figure(
+            title,
+            ["workers", y_label],
+            self.loads.iter().enumerate().map(line).collect::<Vec<_>>(),
+        )
+    }
+}
+
+/// What takes its turn.
+enum Contestant {
+    Run(Box<Timed>, usize, bool),
+    Arithmetic(usize),
+}
+
+/// All contestants of a load: unrecorded, recorded, and arithmetic, each with every number of
+/// workers; each has been run once.
+fn contestants(
+    plan: &Plan,
+    load: &Load,
+    recorders: &mut NewRecorder<'_>,
+) -> Result<Vec<Contestant>, RecordError> {
+    let counts = worker_counts(plan.most_workers);
+    let mut all = Vec::new();
+    for &workers in &counts {
+        let mut plain = Timed::new(load, workers);
+        let mut recorded = Timed::recorded(load, workers, recorders)?;
+        for run in [&mut plain, &mut recorded] {
+            run.run(load.cycles(plan.timed_robot_cycles))?;
+        }
+        all.push(Contestant::Run(Box::new(plain), workers, false));
+        all.push(Contestant::Run(Box::new(recorded), workers, true));
+    }
+    all.extend(counts.into_iter().map(Contestant::Arithmetic));
+    Ok(all)
+}
+
+/// Times one load, unrecorded and recorded, with every number of workers.
+fn time_load(
+    plan: &Plan,
+    load: &Load,
+    recorders: &mut NewRecorder<'_>,
+) -> Result<Vec<Timing>, RecordError> {
+    let cycles = load.cycles(plan.timed_robot_cycles);
+    let mut all = contestants(plan, load, recorders)?;
+    let times_s = race(&mut all, plan.repeats, |contestant| match contestant {
+        Contestant::Run(run, ..) => run.run(cycles),
+        Contestant::Arithmetic(workers) => Ok(arithmetic(*workers, plan.timed_robot_cycles)),
+    })?;
+    let machine = |wanted: usize| {
+        let is = |c: &Contestant| matches!(c, Contestant::Arithmetic(w) if *w == wanted);
+        all.iter().position(is).map_or(&[][..], |k| &times_s[k][..])
+    };
+    let alone = |wanted: bool| {
+        let is = |c: &Contestant| matches!(c, Contestant::Run(_, 1, r) if *r == wanted);
+        all.iter().position(is).map_or(&[][..], |k| &times_s[k][..])
+    };
+    let timing = |(contestant, times_s): (&Contestant, &Vec<Option<f64>>)| {
+        let &Contestant::Run(_, workers, recorded) = contestant else { return None };
+        let ratio = |(a, b): (&Option<f64>, &Option<f64>)| Some((*a)? / (*b)?);
+        let ratios: Vec<Option<f64>> = alone(recorded).iter().zip(times_s).map(ratio).collect();
+        Some(Timing {
+            load: 0,
+            workers,
+            recorded,
+            cycle_ms: Estimate::of(times_s.iter().map(|t| t.map(|t| 1e3 * t / cycles as f64))),
+            speed_up: Estimate::of(ratios.iter().copied()),
+            ratios,
+            machine: Estimate::ratio(machine(1), machine(workers)),
+        })
+    };
+    let mut timings: Vec<Timing> = all.iter().zip(&times_s).filter_map(timing).collect();
+    timings.sort_by_key(|timing| (timing.recorded, timing.workers));
+    for contestant in all {
+        if let Contestant::Run(run, ..) = contestant {
+            run.finish()?;
+        }
+    }
+    Ok(timings)
+}
+
+fn initialize(index: usize, load: &Load, timings: &[Timing]) -> Initialization {
+    let mut times_s = [0; 3].map(|_| seconds(|| load.simulation(1)).0);
+    times_s.sort_by(f64::total_cmp);
+    let seconds = times_s[1];
+    let unrecorded = || timings.iter().filter(|t| !t.recorded);
+    let share = |timing: Option<&Timing>| {
+        let cycle_s = timing.map_or(0.0, |t| t.cycle_ms.or_zero()) * 1e-3;
+        seconds / (seconds + cycle_s * REFERENCE_CYCLES as f64)
+    };
+    Initialization {
+        load: index,
+        seconds,
+        share_alone: share(unrecorded().next()),
+        share_together: share(unrecorded().next_back()),
+    }
+}
+
+/// Digests of one run by number of workers, and of the recorded run.
+fn digests(
+    load: &Load,
+    recorders: &mut NewRecorder<'_>,
+) -> Result<(Vec<(usize, String)>, String), RecordError> {
+    const CYCLES: u64 = 100;
+    let mut digests = Vec::new();
+    for workers in DIGEST_WORKERS {
+        let mut run = load.simulation(workers);
+        run.advance(CYCLES);
+        digests.push((workers, run.digest().to_string()));
+    }
+    let mut run = Timed::recorded(load, 2, recorders)?;
+    run.run(CYCLES)?;
+    let recorded = run.simulation().digest().to_string();
+    run.finish()?;
+    Ok((digests, recorded))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn worker_counts_begin_with_one_and_end_with_the_most() {
+        assert_eq!(worker_counts(1), [1]);
+        assert_eq!(worker_counts(2), [1, 2]);
+        assert_eq!(worker_counts(5), [1, 2, 3, 4, 5]);
+        assert_eq!(worker_counts(16), [1, 2, 3, 4, 6, 8, 12, 16]);
+    }
+}

@@ -1,0 +1,395 @@
+//! Reliability: the same floors under the four regimes, and sensors against effectors at
+//! equal error level.
+
+use super::Plan;
+use super::errors::{Beams, Spread};
+use super::floor::{Floor, Mind};
+use super::measure::{Measure, Outcome, Tables, Variant, measure_all, values};
+use crate::cells::figure;
+use crate::study::Progress;
+use serde::Serialize;
+use sidestep::worlds::robots::effector::ObstacleRule;
+use sidestep::worlds::robots::world::Regime;
+use sidestep_document::{Estimate, Figure, FigureKind, Series, Table};
+use std::sync::Arc;
+
+/// A variant and its outcomes by seed.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct Cell {
+    /// Name of the floor.
+    pub(super) floor: String,
+    /// What was run.
+    pub(super) variant: Variant,
+    /// What came of it.
+    pub(super) outcomes: Vec<Outcome>,
+}
+
+/// All runs of the reliability experiment.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct Reliability {
+    /// The floors, in words.
+    pub(super) floors: Vec<String>,
+    /// Every variant with its outcomes.
+    pub(super) cells: Vec<Cell>,
+    /// Error levels of the sweep.
+    pub(super) levels: Vec<f64>,
+}
+
+/// What selects a cell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Key<'a> {
+    /// Name of the floor.
+    pub(super) floor: &'a str,
+    /// Law for blocked paths.
+    pub(super) rule: ObstacleRule,
+    /// How robots decide.
+    pub(super) mind: Mind,
+    /// How they err.
+    pub(super) tables: Tables,
+}
+
+impl Key<'_> {
+    /// The medium floor, rule `cut`, avoiding robots, presets.
+    pub(super) const BASE: Key<'static> = Key {
+        floor: "medium",
+        rule: ObstacleRule::Cut,
+        mind: Mind::Avoid,
+        tables: Tables::Presets,
+    };
+}
+
+/// Measures that are reported, with their names.
+pub(super) const MEASURES: [(&str, Measure); 6] = [
+    ("contacts / 1000 actions", |o| o.contacts),
+    ("with walls", |o| o.wall_contacts),
+    ("with robots", |o| o.robot_contacts),
+    ("trip, cycles", |o| o.trip_cycles),
+    ("straightness", |o| o.straightness),
+    ("sideways moves / 1000 actions", |o| o.lateral_moves),
+];
+
+/// Contacts per 1000 actions.
+pub(super) const CONTACTS: Measure = MEASURES[0].1;
+/// Cycles of a to-and-fro trip.
+pub(super) const TRIP: Measure = MEASURES[3].1;
+/// Straightness of trajectories.
+pub(super) const STRAIGHTNESS: Measure = MEASURES[4].1;
+/// Sideways moves per 1000 actions.
+pub(super) const LATERAL: Measure = MEASURES[5].1;
+
+impl Reliability {
+    /// Runs the experiment.
+    pub(super) fn run(plan: &Plan, report: &mut Progress<'_>) -> Self {
+        let floors = [Floor::medium(), Floor::small(), Floor::large()].map(Arc::new);
+        let variants = variants(&floors, plan);
+        let size = (plan.seeds, plan.cycles);
+        let outcomes = measure_all(&variants, size, plan.workers, "reliability", report);
+        let cell = |(variant, outcomes): (Variant, _)| Cell {
+            floor: variant.floor.name.into(),
+            variant,
+            outcomes,
+        };
+        Self {
+            floors: floors.iter().map(|floor| floor.describe()).collect(),
+            cells: variants.into_iter().zip(outcomes).map(cell).collect(),
+            levels: plan.error_levels.clone(),
+        }
+    }
+
+    /// Values by seed of one measure in one cell; empty for a cell that was not run.
+    pub(super) fn values(
+        &self,
+        key: Key<'_>,
+        regime: Regime,
+        measure: Measure,
+    ) -> Vec<Option<f64>> {
+        // A regime that switches an error off does not depend on that error's table, so those
+        // cells are run for one table only.
+        let is_cell = |cell: &&Cell| {
+            let v = &cell.variant;
+            (cell.floor.as_str(), v.obstacle_rule, v.mind, v.regime)
+                == (key.floor, key.rule, key.mind, regime)
+                && same_errors(v.tables, key.tables, regime)
+        };
+        self.cells.iter().find(is_cell).map_or_else(Vec::new, |c| values(&c.outcomes, measure))
+    }
+
+    /// The mean of a measure in one cell.
+    pub(super) fn estimate(&self, key: Key<'_>, regime: Regime, measure: Measure) -> Estimate {
+        Estimate::of(self.values(key, regime, measure))
+    }
+
+    /// Paired difference of a measure between two regimes, `a - b`.
+    pub(super) fn difference(
+        &self,
+        key: Key<'_>,
+        [a, b]: [Regime; 2],
+        measure: Measure,
+    ) -> Estimate {
+        Estimate::paired(&self.values(key, a, measure), &self.values(key, b, measure))
+    }
+
+    /// Ratio of a measure between two regimes seed by seed, `a / b`.
+    pub(super) fn ratio(&self, key: Key<'_>, [a, b]: [Regime; 2], measure: Measure) -> Estimate {
+        Estimate::ratio(&self.values(key, a, measure), &self.values(key, b, measure))
+    }
+
+    /// Paired difference of a measure between two minds under one regime, `a - b`.
+    pub(super) fn between_minds(
+        &self,
+        [a, b]: [Mind; 2],
+        regime: Regime,
+        measure: Measure,
+    ) -> Estimate {
+        let of = |mind| self.values(Key { mind, ..Key::BASE }, regime, measure);
+        Estimate::paired(&of(a), &of(b))
+    }
+
+    /// Keys of the places where the four regimes were run under the presets.
+    pub(super) fn places(&self) -> Vec<Key<'static>> {
+        let rules = ObstacleRule::ALL.map(|rule| Key { rule, ..Key::BASE });
+        let floors = ["small", "large"].map(|floor| Key { floor, ..Key::BASE });
+        let minds = [Mind::Touch, Mind::Filter].map(|mind| Key { mind, ..Key::BASE });
+        rules.into_iter().chain(floors).chain(minds).collect()
+    }
+
+    /// Contacts by sensor errors alone less those by effector errors alone, at one level.
+    pub(super) fn sensors_less_effectors(&self, case: SweepCase, e: f64) -> Estimate {
+        self.difference(case.key(e), [Regime::Sensors, Regime::Effectors], CONTACTS)
+    }
+
+    /// The tables of this experiment.
+    pub(super) fn tables(&self) -> Vec<Table> {
+        vec![self.regimes_table(), self.differences_table(), self.sweep_table(), self.minds_table()]
+    }
+
+    fn regimes_table(&self) -> Table {
+        let columns: Vec<&str> = ["floor", "rule", "behaviour", "errors"]
+            .into_iter()
+            .chain(MEASURES.map(|m| m.0))
+            .collect();
+        let note = format!(
+            "Mean [95 % interval by Student's t] over seeds. Floors: {}.",
+            self.floors.join("; ")
+        );
+        let mut table = Table::new("Four regimes", note, &columns);
+        for key in self.places() {
+            for regime in Regime::ALL {
+                let estimates = MEASURES.map(|(_, m)| self.estimate(key, regime, m).to_string());
+                table.row(names(key).into_iter().chain([regime.name().into()]).chain(estimates));
+            }
+        }
+        table
+    }
+
+    fn differences_table(&self) -> Table {
+        use Regime::{Both, Effectors, Reliable, Sensors};
+        let columns = [
+            "floor",
+            "rule",
+            "behaviour",
+            "contacts: effectors - reliable",
+            "contacts: sensors - reliable",
+            "contacts: sensors - effectors",
+            "trip: effectors / reliable",
+            "trip: sensors / reliable",
+            "trip: both / reliable",
+            "trip: both / sensors",
+        ];
+        let note = "Paired by seed: both runs of a pair start alike and share every draw that the \
+                    regime does not change. Contacts per 1000 actions; mean [95 % interval].";
+        let mut table = Table::new("What each error adds", note, &columns);
+        for key in self.places() {
+            let contacts = [[Effectors, Reliable], [Sensors, Reliable], [Sensors, Effectors]]
+                .map(|pair| self.difference(key, pair, CONTACTS).to_string());
+            let pairs =
+                [[Effectors, Reliable], [Sensors, Reliable], [Both, Reliable], [Both, Sensors]];
+            let trips = pairs.map(|pair| self.ratio(key, pair, TRIP).to_string());
+            table.row(names(key).into_iter().chain(contacts).chain(trips));
+        }
+        table
+    }
+
+    fn sweep_table(&self) -> Table {
+        let columns = [
+            "behaviour",
+            "beams",
+            "sensor recipe",
+            "e",
+            "effectors only",
+            "sensors only",
+            "sensors - effectors",
+            "more contacts by",
+        ];
+        let note = "Contacts per 1000 actions on the medium floor, rule `cut`; paired difference. \
+                    `even`: an error of a sensor is any other observation, so a thing is missed \
+                    with probability e/4; `blind`: a thing is missed with probability e. 16 \
+                    beams on robots of 2 x 2 boxes; 4 beams on robots of 1 box.";
+        let title = "Sensors against effectors at equal error level e";
+        let mut table = Table::new(title, note, &columns);
+        for case in SweepCase::all() {
+            for &e in &self.levels {
+                let difference = self.sensors_less_effectors(case, e);
+                let of = |regime| self.estimate(case.key(e), regime, CONTACTS).to_string();
+                let contacts = [of(Regime::Effectors), of(Regime::Sensors), difference.to_string()];
+                let names = case.names().into_iter().chain([format!("{e}")]);
+                table.row(names.chain(contacts).chain([larger(&difference).into()]));
+            }
+        }
+        table
+    }
+
+    fn minds_table(&self) -> Table {
+        let columns = [
+            "errors",
+            "contacts: touch - avoid",
+            "contacts: filter - avoid",
+            "trip: touch - avoid",
+            "trip: filter - avoid",
+        ];
+        let note = "Paired by seed, medium floor, rule `cut`, presets. `touch` keeps to its way \
+                    until it touches something, `avoid` steps around what one beam reports near, \
+                    `filter` believes two reports only.";
+        let mut table = Table::new("Behaviours under each regime", note, &columns);
+        for regime in Regime::ALL {
+            let pairs = [[Mind::Touch, Mind::Avoid], [Mind::Filter, Mind::Avoid]];
+            let contacts = pairs.map(|p| self.between_minds(p, regime, CONTACTS).to_string());
+            let trips = pairs.map(|p| self.between_minds(p, regime, TRIP).to_string());
+            table.row([regime.name().into()].into_iter().chain(contacts).chain(trips));
+        }
+        table
+    }
+
+    /// The figures of this experiment.
+    pub(super) fn figures(&self) -> Vec<Figure> {
+        let bars = [
+            self.bars("Contacts under the four regimes", "contacts per 1000 actions", CONTACTS),
+            self.bars("A to-and-fro trip under the four regimes", "cycles per trip", TRIP),
+            self.bars(
+                "Straightness of trajectories",
+                "net displacement / path length",
+                STRAIGHTNESS,
+            ),
+        ];
+        let sweeps = SweepCase::MINDS.map(|mind| self.sweep_figure(mind));
+        bars.into_iter().chain(sweeps).collect()
+    }
+
+    /// One bar per regime, one series per obstacle rule.
+    fn bars(&self, title: &str, y_label: &str, measure: Measure) -> Figure {
+        let series = ObstacleRule::ALL.map(|rule| {
+            let at = |(x, &regime): (usize, &Regime)| {
+                self.estimate(Key { rule, ..Key::BASE }, regime, measure).point(x as f64)
+            };
+            let points = Regime::ALL.iter().enumerate().filter_map(at).collect();
+            Series { name: format!("rule {}", rule.name()), points }
+        });
+        let categories = Regime::ALL.map(|regime| regime.name().to_string()).to_vec();
+        Figure {
+            kind: FigureKind::Bars { categories },
+            ..figure(title, ["unreliable", y_label], series)
+        }
+    }
+
+    fn sweep_figure(&self, (mind, beams): (Mind, Beams)) -> Figure {
+        let line = |name: &str, regime, spread| {
+            let case = SweepCase { mind, beams, spread };
+            let at = |&e: &f64| self.estimate(case.key(e), regime, CONTACTS).point(e);
+            Series { name: name.into(), points: self.levels.iter().filter_map(at).collect() }
+        };
+        let n = beams.bearings_deg().len();
+        figure(
+            &format!("Contacts at equal error level: {}, {n} beams", mind.name()),
+            ["error level e", "contacts per 1000 actions"],
+            vec![
+                line("effectors only", Regime::Effectors, Spread::Even),
+                line("sensors only, even", Regime::Sensors, Spread::Even),
+                line("sensors only, blind", Regime::Sensors, Spread::Blind),
+            ],
+        )
+    }
+}
+
+/// A behaviour, its beams and their recipe of errors, swept over the error level.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct SweepCase {
+    /// How robots decide.
+    pub(super) mind: Mind,
+    /// How many beams they have.
+    pub(super) beams: Beams,
+    /// Where the sensor's error mass goes.
+    pub(super) spread: Spread,
+}
+
+impl SweepCase {
+    const MINDS: [(Mind, Beams); 3] =
+        [(Mind::Avoid, Beams::Sixteen), (Mind::Filter, Beams::Sixteen), (Mind::Avoid, Beams::Four)];
+
+    /// All cases of the sweep.
+    pub(super) fn all() -> impl Iterator<Item = Self> {
+        let case = |(mind, beams)| Spread::ALL.map(|spread| Self { mind, beams, spread });
+        Self::MINDS.into_iter().flat_map(case)
+    }
+
+    fn key(self, e: f64) -> Key<'static> {
+        let tables = Tables::Equal(e, self.spread, self.beams);
+        Key { mind: self.mind, tables, ..Key::BASE }
+    }
+
+    /// Behaviour, number of beams and recipe, for tables.
+    pub(super) fn names(self) -> [String; 3] {
+        let beams = self.beams.bearings_deg().len().to_string();
+        [self.mind.name().into(), beams, self.spread.name().into()]
+    }
+}
+
+/// Which of the two causes more contacts, where the interval tells.
+pub(super) fn larger(sensors_less_effectors: &Estimate) -> &'static str {
+    if sensors_less_effectors.is_above(0.0) {
+        "sensors"
+    } else if sensors_less_effectors.is_below(0.0) {
+        "effectors"
+    } else {
+        "cannot be told"
+    }
+}
+
+fn names(key: Key<'_>) -> [String; 3] {
+    [key.floor.into(), key.rule.name().into(), key.mind.name().into()]
+}
+
+/// Whether two tables err alike under a regime.
+fn same_errors(a: Tables, b: Tables, regime: Regime) -> bool {
+    match (a, b, regime) {
+        (Tables::Equal(e, _, m), Tables::Equal(f, _, n), Regime::Effectors) => (e, m) == (f, n),
+        _ => a == b,
+    }
+}
+
+fn variants(floors: &[Arc<Floor>; 3], plan: &Plan) -> Vec<Variant> {
+    let [medium, small, large] = floors;
+    let base = |floor, regime| Variant::new(floor, regime);
+    let mut variants = Vec::new();
+    for regime in Regime::ALL {
+        let rules = ObstacleRule::ALL;
+        variants
+            .extend(rules.map(|obstacle_rule| Variant { obstacle_rule, ..base(medium, regime) }));
+        variants.extend([small, large].map(|floor| base(floor, regime)));
+        variants.extend(
+            [Mind::Touch, Mind::Filter].map(|mind| Variant { mind, ..base(medium, regime) }),
+        );
+    }
+    for (mind, beams) in SweepCase::MINDS {
+        for &e in &plan.error_levels {
+            let at = |regime, spread| Variant {
+                mind,
+                tables: Tables::Equal(e, spread, beams),
+                size: beams.size(),
+                ..base(medium, regime)
+            };
+            variants.push(at(Regime::Effectors, Spread::Even));
+            variants.extend(Spread::ALL.map(|spread| at(Regime::Sensors, spread)));
+        }
+    }
+    variants
+}

@@ -1,0 +1,98 @@
+//! Where robots go, as a picture shows it: on the medium floor, all reliable and nothing.
+
+use super::Plan;
+use super::floor::Floor;
+use super::measure::{Track, Variant, recorded};
+use crate::Scene;
+use sidestep::kernel::ports::Values;
+use sidestep::kernel::view::{Kind, Look, Trail, Who};
+use sidestep::kernel::{Cycle, Simulation};
+use sidestep::worlds::robots::world::Regime;
+use std::sync::Arc;
+
+/// Cycles of a run: all robots are on their way then.
+const CYCLES: Cycle = 600;
+/// Of which so many are seen.
+const SEEN: Cycle = 400;
+/// The seed of all scenes.
+const SEED: u64 = 1;
+
+/// All pictures: the same floor and seed, without errors and with both.
+pub fn all(plan: &Plan) -> [Scene; 2] {
+    let floor = Arc::new(Floor::medium());
+    let scene =
+        |title, regime| scene(title, &Variant::new(&floor, regime), CYCLES.min(plan.cycles));
+    [
+        scene("Ways of robots, all reliable", Regime::Reliable),
+        scene("Ways of the same robots, sensors and effectors unreliable", Regime::Both),
+    ]
+}
+
+fn scene(title: &str, variant: &Variant, cycles: Cycle) -> Scene {
+    let (mut run, tracks) = recorded(variant, &variant.behaviours(), SEED, cycles);
+    let (scenery, frame) = (run.scenery(), run.frame(Look::BODIES));
+    let columns = columns(&tracks, cycles.saturating_sub(SEEN));
+    let column = |name: &str| columns.iter().find(|(n, _)| *n == name).map(|(_, values)| values);
+    let robots = frame.bodies.iter().filter(|body| body.kind == Kind::Robot);
+    let whose: Vec<Who> = robots.map(|body| body.who()).collect();
+    let trails = |rows: &sidestep::kernel::view::PlaceRows| {
+        rows.trails(&scenery, &frame, &whose, column).unwrap_or_default()
+    };
+    let trails: Vec<Trail> = run.place_rows().iter().flat_map(trails).collect();
+    Scene {
+        title: title.into(),
+        caption: format!("Medium floor, seed {SEED}."),
+        scenery,
+        frame,
+        trails,
+    }
+}
+
+/// The tracks from a cycle on as the table of trajectories has them.
+fn columns(tracks: &[Track], from: Cycle) -> [(&'static str, Values); 5] {
+    let rows = || {
+        let of = |(body, track): (u32, &Track)| {
+            let poses = (0..).zip(track.clone()).skip(from as usize);
+            poses.map(move |(cycle, pose)| (cycle, body, pose)).collect::<Vec<_>>()
+        };
+        (0..).zip(tracks).flat_map(of)
+    };
+    [
+        ("cycle", Values::U64(rows().map(|(cycle, ..)| cycle).collect())),
+        ("body", Values::U32(rows().map(|(_, body, _)| body).collect())),
+        ("col_boxes", Values::U32(rows().map(|(_, _, (col, ..))| col).collect())),
+        ("row_boxes", Values::U32(rows().map(|(_, _, (_, row, _))| row).collect())),
+        (
+            "heading",
+            Values::Label(rows().map(|(_, _, (.., heading))| u32::from(heading)).collect()),
+        ),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sidestep::kernel::view::Place;
+
+    #[test]
+    fn ways_are_whole_and_end_where_the_robots_are() {
+        let scenes = all(&Plan { cycles: 450, ..Plan::quick() });
+        for scene in &scenes {
+            let robots = scene.frame.bodies.iter().filter(|body| body.kind == Kind::Robot).count();
+            assert_eq!(scene.trails.len(), robots);
+            let box_m = scene.scenery.floor.as_ref().expect("a floor").box_m;
+            let far = |pair: &[(Cycle, Place)]| {
+                let (a, b) = (pair[0].1, pair[1].1);
+                (a[0] - b[0]).abs().max((a[1] - b[1]).abs())
+            };
+            for trail in &scene.trails {
+                assert_eq!((trail.way[0].0, trail.way[trail.way.len() - 1].0), (50, 450));
+                let cycles = trail.way.chunk_by(|a, b| a.0 == b.0).count();
+                assert_eq!(cycles as Cycle, SEEN + 1);
+                let leaps = trail.way.windows(2).filter(|pair| far(pair) > 2.01 * box_m).count();
+                assert_eq!(leaps, 0, "no way leaps");
+            }
+        }
+        assert_ne!(scenes[0].trails, scenes[1].trails);
+    }
+}

@@ -1,0 +1,239 @@
+//! The double pool against the two strategies that the paper rejects.
+
+use super::Plan;
+use super::performance::{loads, worker_counts};
+use super::timing::{Load, STRETCHES, arithmetic, race, seconds};
+use crate::cells::{figure, table};
+use crate::study::Progress;
+use serde::Serialize;
+use sidestep::kernel::Simulation;
+use sidestep::worlds::robots::RobotsRun;
+use sidestep::worlds::robots::baseline::{Baseline, Strategy, breach};
+use sidestep_document::{Estimate, Figure, Series, Table};
+use std::convert::Infallible;
+
+/// A strategy's time for a load.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct Trial {
+    /// Number of the load.
+    pub(super) load: usize,
+    /// Name of the strategy.
+    pub(super) strategy: String,
+    /// Workers.
+    pub(super) workers: usize,
+    /// Milliseconds per cycle.
+    pub(super) cycle_ms: Estimate,
+    /// Time of the double pool with one worker by this time.
+    pub(super) speed_up: Estimate,
+    /// The same by repeat, for pairs with other strategies.
+    pub(super) ratios: Vec<Option<f64>>,
+    /// Speed-up of mere arithmetic with as many workers, timed in turn with this.
+    pub(super) machine: Estimate,
+    /// Contacts per 1000 actions: what a robot meets depends on the strategy.
+    pub(super) contacts: f64,
+    /// Share of the bodies' cycles that one worker does while all others wait.
+    pub(super) serial_share: f64,
+    /// Whether at the end no two bodies shared a box, and none stood in a wall.
+    pub(super) valid: bool,
+    /// Whether every robot has acted once in every cycle.
+    pub(super) complete: bool,
+}
+
+/// All trials.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct Strategies {
+    /// What was timed.
+    pub(super) loads: Vec<Load>,
+    /// The trials.
+    pub(super) trials: Vec<Trial>,
+}
+
+/// Name of the kernel's strategy.
+const DOUBLE_POOL: &str = "double pool";
+/// Name of what shows what the machine can give.
+const ARITHMETIC: &str = "arithmetic";
+
+/// What takes its turn: a run under one of the three strategies, or arithmetic.
+enum Run {
+    DoublePool(Box<RobotsRun>),
+    Baseline(Box<Baseline>),
+    Arithmetic,
+}
+
+/// A run, the name of its strategy and its number of workers.
+struct Contestant {
+    strategy: &'static str,
+    workers: usize,
+    run: Run,
+}
+
+impl Run {
+    fn advance(&mut self, cycles: u64) {
+        match self {
+            Self::DoublePool(run) => {
+                let mut done = 0;
+                while done < cycles {
+                    done += run.advance(cycles - done);
+                }
+            }
+            Self::Baseline(run) => run.advance(cycles),
+            Self::Arithmetic => {}
+        }
+    }
+}
+
+impl Contestant {
+    fn seconds(&mut self, cycles: u64, robot_cycles: u64) -> f64 {
+        match self.run {
+            Run::Arithmetic => arithmetic(self.workers, robot_cycles),
+            _ => seconds(|| self.run.advance(cycles)).0,
+        }
+    }
+}
+
+impl Strategies {
+    /// Runs the comparison.
+    pub(super) fn run(plan: &Plan, report: &mut Progress<'_>) -> Self {
+        let mut loads = loads(plan);
+        let extremes = [plan.operations.iter().min(), plan.operations.iter().max()];
+        loads.retain(|load| extremes.contains(&Some(&load.operations)));
+        let mut trials = Vec::new();
+        for (index, load) in loads.iter().enumerate() {
+            report("rejected strategies", index as f64 / loads.len() as f64);
+            trials.extend(try_load(plan, index, load));
+        }
+        Self { loads, trials }
+    }
+
+    /// Whether every trial has kept the laws and left nobody out.
+    #[cfg(test)]
+    pub(super) fn all_valid(&self) -> bool {
+        self.trials.iter().all(|trial| trial.valid && trial.complete)
+    }
+
+    /// Speed-up of the double pool less that of another strategy, with the most workers, one
+    /// estimate per load.
+    pub(super) fn lead_over(&self, strategy: Strategy) -> Vec<Estimate> {
+        let most = self.trials.iter().map(|t| t.workers).max().unwrap_or(1);
+        let ratios = |load: usize, name: &str| {
+            let is = |t: &&Trial| (t.load, t.workers, t.strategy.as_str()) == (load, most, name);
+            self.trials.iter().find(is).map_or(&[][..], |t| &t.ratios[..])
+        };
+        let lead =
+            |load| Estimate::paired(ratios(load, DOUBLE_POOL), ratios(load, strategy.name()));
+        (0..self.loads.len()).map(lead).collect()
+    }
+
+    /// The comparison as a table.
+    pub(super) fn table(&self) -> Table {
+        let note = format!(
+            "Mean [95 % interval] over repeats, each the best of {STRETCHES} stretches that take \
+             turns. The rejected strategies give valid worlds, but other ones: with the \
+             partition results depend on the number of workers, with the lock on the moment \
+             too. Under the lock fewer contacts count, since a robot sees the moves of those \
+             before it in the same cycle. The partition makes no draws for priority, and the \
+             lock keeps its threads between cycles; both favor them."
+        );
+
+        table(
+            "The double pool and the rejected strategies",
+            note,
+            &self.trials,
+            &[
+                ("load", &|trial| self.loads[trial.load].name()),
+                ("strategy", &|trial| trial.strategy.clone()),
+                ("workers", &|trial| trial.workers.to_string()),
+                ("ms per cycle", &|trial| trial.cycle_ms.to_string()),
+                ("speed-up over double pool, 1 worker", &|trial| trial.speed_up.to_string()),
+                ("the machine's speed-up", &|trial| trial.machine.to_string()),
+                ("done serially", &|trial| format!("{:.1} %", 100.0 * trial.serial_share)),
+                ("contacts / 1000 actions", &|trial| format!("{:.1}", trial.contacts)),
+                ("laws kept", &|trial| {
+                    if trial.valid && trial.complete { "yes" } else { "NO" }.into()
+                }),
+            ],
+        )
+    }
+
+    /// Speed-up over workers, one figure per load.
+    pub(super) fn figures(&self) -> Vec<Figure> {
+        let figure = |(index, load): (usize, &Load)| {
+            figure(
+                &format!("Strategies: {}", load.name()),
+                ["workers", "speed-up over the double pool with 1 worker"],
+                names().iter().map(|name| self.series(index, name)).collect::<Vec<_>>(),
+            )
+        };
+        self.loads.iter().enumerate().map(figure).collect()
+    }
+
+    fn series(&self, load: usize, name: &str) -> Series {
+        let trials = self.trials.iter().filter(|t| t.load == load && t.strategy == name);
+        let points = trials.filter_map(|t| t.speed_up.point(t.workers as f64)).collect();
+        Series { name: name.into(), points }
+    }
+}
+
+fn names() -> [&'static str; 3] {
+    [DOUBLE_POOL, Strategy::SpatialPartition.name(), Strategy::OneLock.name()]
+}
+
+fn try_load(plan: &Plan, index: usize, load: &Load) -> Vec<Trial> {
+    let cycles = load.cycles(plan.timed_robot_cycles);
+    let mut all = contestants(plan, load);
+    all.iter_mut().for_each(|contestant| contestant.run.advance(cycles));
+    let Ok(times_s) = race(&mut all, plan.repeats, |contestant| {
+        Ok::<_, Infallible>(contestant.seconds(cycles, plan.timed_robot_cycles))
+    });
+    let times_of = |strategy: &str, workers: usize| {
+        let is = |c: &Contestant| (c.strategy, c.workers) == (strategy, workers);
+        all.iter().position(is).map_or(&[][..], |k| &times_s[k][..])
+    };
+    let trial = |(c, own_s): (&Contestant, &Vec<Option<f64>>)| {
+        let (contacts, serial_share, valid, complete) = judge(load, &c.run)?;
+        let reference = times_of(DOUBLE_POOL, 1).iter().zip(own_s);
+        let ratios: Vec<Option<f64>> = reference.map(|(a, b)| Some((*a)? / (*b)?)).collect();
+        Some(Trial {
+            load: index,
+            strategy: c.strategy.into(),
+            workers: c.workers,
+            cycle_ms: Estimate::of(own_s.iter().map(|t| t.map(|t| 1e3 * t / cycles as f64))),
+            speed_up: Estimate::of(ratios.iter().copied()),
+            ratios,
+            machine: Estimate::ratio(times_of(ARITHMETIC, 1), times_of(ARITHMETIC, c.workers)),
+            contacts,
+            serial_share,
+            valid,
+            complete,
+        })
+    };
+    all.iter().zip(&times_s).filter_map(trial).collect()
+}
+
+/// Every strategy with every number of workers, and arithmetic.
+fn contestants(plan: &Plan, load: &Load) -> Vec<Contestant> {
+    let mut all = Vec::new();
+    for workers in worker_counts(plan.most_workers) {
+        let mut add = |strategy, run| all.push(Contestant { strategy, workers, run });
+        add(DOUBLE_POOL, Run::DoublePool(Box::new(load.simulation(workers))));
+        for strategy in Strategy::ALL {
+            let run = Baseline::new(load.compiled(), strategy, workers);
+            add(strategy.name(), Run::Baseline(Box::new(run)));
+        }
+        add(ARITHMETIC, Run::Arithmetic);
+    }
+    all
+}
+
+/// Contacts per 1000 actions, the serial share, and whether laws and counts were kept.
+/// `None` for arithmetic.
+fn judge(load: &Load, run: &Run) -> Option<(f64, f64, bool, bool)> {
+    let (metrics, snapshot, share) = match run {
+        Run::DoublePool(run) => (run.metrics(), run.saved(), 0.0),
+        Run::Baseline(run) => (run.metrics(), run.snapshot(), run.serial_share()),
+        Run::Arithmetic => return None,
+    };
+    let valid = breach(&load.compiled().world, &snapshot).is_none();
+    let complete = metrics.total.actions == u64::from(load.robots) * snapshot.cycle;
+    Some((1e3 * metrics.contacts_per_action, share, valid, complete))
+}

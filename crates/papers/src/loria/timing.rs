@@ -1,0 +1,216 @@
+//! Loads to time, and how they are timed.
+
+use super::NewRecorder;
+use super::floor::Floor;
+use super::patrol::{Costly, burn};
+use crate::study::{setting, source};
+use serde::Serialize;
+use sidestep::kernel::Simulation;
+use sidestep::kernel::ports::{Clock, RecordError, Recorder, SystemClock};
+use sidestep::kernel::workers;
+use sidestep::scenario::Source;
+use sidestep::worlds::robots::RobotsRun;
+use sidestep::worlds::robots::decide::Wander;
+use sidestep::worlds::robots::scenario::{Behaviours, Compiled, StorageOrder};
+use std::sync::Arc;
+
+const SMALL: &str = include_str!("../../../../scenarios/papers/loria/wander-small.toml");
+const LARGE: &str = include_str!("../../../../scenarios/papers/loria/wander-large.toml");
+
+/// Robots that wander on a floor among people and doors, at a given density and cost.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct Load {
+    /// Robots.
+    pub(super) robots: u32,
+    /// People, of 2 x 2 boxes.
+    pub(super) people: u32,
+    /// Robots cover `size` x `size` boxes.
+    pub(super) size: u32,
+    /// Multiply-and-adds that every decision costs beside its own work.
+    pub(super) operations: u32,
+    /// The building.
+    #[serde(skip)]
+    pub(super) floor: Arc<Floor>,
+}
+
+impl Load {
+    /// Free boxes that robots and people cover, as a share.
+    pub(super) fn density(&self) -> f64 {
+        let free = self.floor.office.map.count(sidestep::map::Cell::Free).max(1);
+        f64::from(self.robots * self.size * self.size + self.people * 4) / free as f64
+    }
+
+    /// Its name in tables.
+    pub(super) fn name(&self) -> String {
+        let (robots, operations) = (self.robots, self.operations);
+        format!("{robots} robots, {:.0} % covered, {operations} operations", 100.0 * self.density())
+    }
+
+    /// Cycles that take about as long as `robot_cycles` decisions that cost nothing extra.
+    pub(super) fn cycles(&self, robot_cycles: u64) -> u64 {
+        let bodies = u64::from(self.robots + self.people).max(1);
+        // A decision with its sensing takes about as long as 500 operations.
+        (robot_cycles / (bodies * (1 + u64::from(self.operations) / 500))).max(10)
+    }
+
+    /// The scenario.
+    fn source(&self) -> Source {
+        let costly = toml::Table::from_iter([("kind".to_string(), "costly".into())]);
+        let settings = [
+            setting("robots.count", self.robots),
+            setting("robots.size", self.size),
+            setting("robots.behaviour", costly),
+            setting("people.count", self.people),
+        ];
+        let text = if self.floor.name == "small" { SMALL } else { LARGE };
+        source(text, &settings).expect("the experiments' scenarios are valid")
+    }
+
+    /// The compiled world.
+    ///
+    /// # Panics
+    /// When the load does not fit its floor; the experiments' own do.
+    pub(super) fn compiled(&self) -> Compiled {
+        let costly = Costly { inner: Arc::new(Wander::default()), operations: self.operations };
+        let behaviours = Behaviours::from([("costly".into(), Arc::new(costly) as _)]);
+        Compiled::new(&self.source(), &behaviours, StorageOrder::Spatial)
+            .expect("the experiments' scenarios are valid")
+    }
+
+    /// A run at its start.
+    pub(super) fn simulation(&self, workers: usize) -> RobotsRun {
+        self.compiled().start(&self.source(), workers)
+    }
+}
+
+/// Seconds that `work` takes.
+pub(super) fn seconds<T>(work: impl FnOnce() -> T) -> (f64, T) {
+    let clock = SystemClock::default();
+    let result = work();
+    (clock.now_ns() as f64 * 1e-9, result)
+}
+
+/// Of so many stretches in turn the best one counts as one repeat.
+pub(super) const STRETCHES: usize = 8;
+
+/// Times contestants in turn. Each gets `repeats` values, and every value is the shortest of
+/// [`STRETCHES`] short stretches: what the machine gives when nothing else disturbs it.
+/// Contestants take turns stretch by stretch, so that what does disturb hits all alike.
+///
+/// # Errors
+/// The first that `run` gives.
+pub(super) fn race<C, E>(
+    contestants: &mut [C],
+    repeats: usize,
+    mut run: impl FnMut(&mut C) -> Result<f64, E>,
+) -> Result<Vec<Vec<Option<f64>>>, E> {
+    let mut times_s = vec![Vec::with_capacity(repeats); contestants.len()];
+    for _ in 0..repeats {
+        let mut best_s = vec![f64::INFINITY; contestants.len()];
+        for _ in 0..STRETCHES {
+            for (best_s, contestant) in best_s.iter_mut().zip(&mut *contestants) {
+                *best_s = best_s.min(run(contestant)?);
+            }
+        }
+        times_s.iter_mut().zip(best_s).for_each(|(all, best)| all.push(Some(best)));
+    }
+    Ok(times_s)
+}
+
+/// Seconds that arithmetic without any world takes, shared out among workers: what the machine
+/// itself can give at the moment.
+pub(super) fn arithmetic(workers: usize, robot_cycles: u64) -> f64 {
+    const OPERATIONS: u32 = 500;
+    let work = |worker: &workers::Worker<'_>, (): &mut ()| {
+        worker.for_each_chunk(0, robot_cycles as usize, |tasks| {
+            tasks.for_each(|task| burn(task as u64, OPERATIONS));
+        });
+    };
+    seconds(|| workers::run(&mut vec![(); workers], work)).0
+}
+
+/// A run, and where its rows go if it is recorded.
+pub(super) struct Timed {
+    simulation: RobotsRun,
+    recorder: Option<Box<dyn Recorder>>,
+}
+
+impl Timed {
+    /// A run that is not recorded.
+    pub(super) fn new(load: &Load, workers: usize) -> Self {
+        Self { simulation: load.simulation(workers), recorder: None }
+    }
+
+    /// A recorded run.
+    ///
+    /// # Errors
+    /// When the recorder cannot be made.
+    pub(super) fn recorded(
+        load: &Load,
+        workers: usize,
+        recorders: &mut NewRecorder<'_>,
+    ) -> Result<Self, RecordError> {
+        let mut simulation = load.simulation(workers);
+        simulation.begin_recording();
+        let recorder = Some(recorders(&simulation.schemas())?);
+        Ok(Self { simulation, recorder })
+    }
+
+    /// Runs `cycles` cycles, and says how many seconds they took, recording included.
+    ///
+    /// # Errors
+    /// When rows cannot be stored.
+    pub(super) fn run(&mut self, cycles: u64) -> Result<f64, RecordError> {
+        let (took_s, result) = seconds(|| {
+            let mut done = 0;
+            while done < cycles {
+                done += self.simulation.advance(cycles - done);
+                if let Some(recorder) = &mut self.recorder {
+                    self.simulation.record(&mut **recorder)?;
+                }
+            }
+            Ok(())
+        });
+        result.map(|()| took_s)
+    }
+
+    /// The run.
+    pub(super) fn simulation(&self) -> &RobotsRun {
+        &self.simulation
+    }
+
+    /// Ends the recording.
+    ///
+    /// # Errors
+    /// When the last rows cannot be stored.
+    pub(super) fn finish(mut self) -> Result<(), RecordError> {
+        self.recorder.as_mut().map_or(Ok(()), |recorder| recorder.finish())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_repeat_is_the_best_of_its_stretches() {
+        let mut n = [0.0, 0.0];
+        let outcome: Result<_, ()> = race(&mut [0, 1], 2, |&mut k| {
+            n[k] += 1.0;
+            Ok(100.0 - n[k])
+        });
+        let expected = vec![Some(92.0), Some(84.0)];
+        assert_eq!(outcome, Ok(vec![expected.clone(), expected]));
+        assert_eq!(race(&mut [0], 2, |_| Err("full")), Err("full"));
+        assert!(arithmetic(2, 100) > 0.0);
+    }
+
+    #[test]
+    fn costlier_loads_are_run_for_fewer_cycles() {
+        let floor = Arc::new(Floor::small());
+        let load =
+            |operations| Load { robots: 20, people: 5, size: 2, operations, floor: floor.clone() };
+        assert!(load(10_000).cycles(100_000) * 10 < load(0).cycles(100_000));
+        assert!(load(0).density() > 0.01 && load(0).density() < 0.1);
+    }
+}

@@ -1,0 +1,131 @@
+//! One robot with a laser finds its way through the winding corridor, others follow as a snake
+//! (slides E2, N1 to N6): widths, numbers of followers, and readings of "leaving a wall".
+
+use super::{DT_S, Plan};
+use crate::cells::{Cell, Column, Columns, Value, column, figure, series};
+use crate::study::{Progress, Study, finish, number};
+use serde::Serialize;
+use sidestep::experiment::sweep::{Outcome, Variant};
+use sidestep::kernel::InputError;
+use sidestep::worlds::chain::ChainRun;
+use sidestep::worlds::chain::scenario::Compiled;
+use sidestep_document::{Figure, Table};
+
+/// The scenario.
+pub(super) const SCENARIO: &str =
+    include_str!("../../../../scenarios/papers/serpentine/corridor.toml");
+const SWEEP: &str = include_str!("../../../../scenarios/papers/serpentine/corridor.sweep.toml");
+
+/// Keys that are varied.
+pub(super) const WIDTH: &str = "ground.corridor.width_m";
+const CONNECTORS: &str = "chains.connectors";
+const LEAVING: &str = "chains.tasks.navigator.leaving";
+
+/// The slides' band of distances from walls, meters from the robot's middle.
+const BAND_M: [f64; 2] = [0.7, 0.9];
+/// The readings of "leaving a wall"; the first is ours, the last the slides' words.
+pub(super) const READINGS: [&str; 3] = ["latched", "range", "level"];
+
+const COLUMNS: Columns = Columns {
+    case: &[
+        column("leaving", "leaving", |r| r.set(LEAVING)),
+        column("width_m", "width, m", |r| r.set(WIDTH)),
+        column("followers", "followers", |r| Value::Count(r.set_number(CONNECTORS) as u64 - 1)),
+    ],
+    came: &[
+        column("arrived", "arrived", |r| r.share(|run| run.or_zero("done") == 1.0)),
+        column("vetoes", "vetoes", |r| r.sum("vetoes")),
+        column("penetrations", "steps inside", |r| r.sum("penetrations")),
+        column("steps", "", |r| r.sum("steps")),
+        CLEARANCE,
+        ROD_VIOLATION,
+        column("bumper_events", "bumper events", |r| r.sum("robots.bumper_events")),
+        column("min_gap_m", "gap, mm", |r| {
+            Value::Number(r.least("robots.min_gap_m").unwrap_or(1.0).min(1.0))
+        })
+        .shown(|c| c.mm("min_gap_m")),
+        column("mean_lag_m", "mean lag, m", |r| r.mean("robots.mean_lag_m")),
+        column("max_lag_m", "max lag, m", |r| Value::Number(r.most("robots.max_lag_m")))
+            .shown(|c| format!("{:.3}", c.number("max_lag_m"))),
+        column("speed_m_s", "speed, m/s", |r| {
+            r.mean_of(|run| run.or_zero("way_m") / (run.or_zero("steps") * DT_S))
+        }),
+        column("in_band_percent", "0.7-0.9 m, %", |r| r.mean_of(|run| run.percent("in_band"))),
+    ],
+};
+
+/// The least distance of any part from what it must not touch.
+pub(super) const CLEARANCE: Column =
+    column("min_clearance_m", "clearance, mm", |r| Value::Maybe(r.least("min_clearance_m")))
+        .shown(|c| c.mm("min_clearance_m"));
+
+/// The greatest amount by which a rod was outside its limits.
+pub(super) const ROD_VIOLATION: Column =
+    column("rod_violation_m", "", |r| Value::Number(r.most("max_rod_violation_m")));
+
+/// Whether the leader's nearest wall is in the slides' band.
+fn is_in_band(run: &ChainRun<2>) -> bool {
+    let leader = run.state().body(0).chain.points()[0];
+    let apart_m = run.world().obstacles.clearance_m([leader; 2], 0.0, 1.0);
+    (BAND_M[0]..=BAND_M[1]).contains(&apart_m)
+}
+
+/// All cases.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct Corridor {
+    /// Results by case, the fewest followers first.
+    pub(super) cells: Vec<Cell>,
+}
+
+/// The sweep of a plan.
+pub(super) fn study(plan: &Plan) -> Result<Study, InputError> {
+    let followers = |v: &Variant| plan.followers.contains(&(number(v, CONNECTORS) as usize - 1));
+    let study = Study::of_file(SWEEP, SCENARIO)?.keep_numbers(WIDTH, &plan.widths_m);
+    Ok(study.keep(followers).sized(plan.seeds, Some(plan.corridor_cycles)))
+}
+
+impl Corridor {
+    pub(super) fn run(plan: &Plan, progress: &mut Progress<'_>) -> Result<Self, InputError> {
+        let what = (plan.workers, "swarm in the corridor");
+        let results = study(plan)?.run_by(what, progress, |scenario, _, cell| {
+            let source = scenario()?;
+            let mut run = Compiled::<2>::new(&source)?.start(&source, 1);
+            let mut in_band = 0_u64;
+            finish(&mut run, |run| in_band += u64::from(is_in_band(run)));
+            let mut outcome = Outcome::of(*cell, &run);
+            outcome.metrics.insert("in_band".into(), in_band.into());
+            outcome.metrics.insert("way_m".into(), run.state().body(0).tally.way_m.into());
+            Ok(outcome)
+        })?;
+        Ok(Self { cells: COLUMNS.cells(&results) })
+    }
+
+    /// Cells of a reading, the fewest followers first.
+    pub(super) fn of<'a>(&'a self, leaving: &'a str) -> impl Iterator<Item = &'a Cell> {
+        self.cells.iter().filter(move |c| c.says("leaving", leaving))
+    }
+
+    /// Cells of a reading with the fewest followers.
+    pub(super) fn of_few<'a>(&'a self, leaving: &'a str) -> impl Iterator<Item = &'a Cell> {
+        let fewest = self.cells.iter().map(|c| c.count("followers")).min();
+        self.of(leaving).filter(move |c| Some(c.count("followers")) == fewest)
+    }
+
+    pub(super) fn table(&self) -> Table {
+        let note = "Runs differ by the laser's error of 1 cm. Clearance is of connectors and rods, \
+                    which keep 8 cm of room for the robots that follow them on wheels; gap, bumpers \
+                    and lag are those robots'. `level` is the slides' wording taken literally.";
+        COLUMNS.table("A swarm in the winding corridor", note, &self.cells)
+    }
+
+    pub(super) fn figures(&self) -> Vec<Figure> {
+        let over_width = |title, y_label, y| {
+            let lines = READINGS.map(|of| series(of, self.of_few(of), ["width_m", y]));
+            figure(title, ["width of the corridor, m", y_label], lines)
+        };
+        vec![
+            over_width("Speed of a leader that wants 0.5 m/s", "m/s", "speed_m_s"),
+            over_width("Time within the band of 0.7 to 0.9 m", "%", "in_band_percent"),
+        ]
+    }
+}

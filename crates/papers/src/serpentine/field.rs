@@ -1,0 +1,152 @@
+//! A robot in an open field of discs, with a target that it sees (slides N4 to N6): readings of
+//! "leaving a wall", with and without the rule that a free way to the target ends following a
+//! wall, and discs that move as fast as it.
+
+use super::corridor::CLEARANCE;
+use super::{Plan, SPEED_M_S, draws};
+use crate::cells::{Cell, Columns, column, figure, series};
+use crate::study::{Progress, Study, number, setting};
+use serde::Serialize;
+use sidestep::experiment::sweep::{Setting, Variant, start};
+use sidestep::kernel::InputError;
+use sidestep::kernel::math::{cos, sin};
+use sidestep::kernel::stream::Draws;
+use sidestep::worlds::WORLDS;
+use sidestep::worlds::chain::geometry::{Point, distance};
+use sidestep_document::{Figure, Table};
+use std::f64::consts::TAU;
+use toml::Value;
+
+const SCENARIO: &str = include_str!("../../../../scenarios/papers/serpentine/field.toml");
+
+/// Half the side of the field.
+const HALF_M: f64 = 10.0;
+/// Start and target, in opposite corners.
+const ENDS_M: [Point<2>; 2] = [[-8.5, -8.5], [8.5, 8.5]];
+/// Air around them.
+const AIR_M: f64 = 1.5;
+
+/// Readings of "leaving a wall", and whether the leave rule is added.
+const READINGS: [(&str, bool); 5] =
+    [("latched", true), ("latched", false), ("range", true), ("range", false), ("level", false)];
+
+const COLUMNS: Columns = Columns {
+    case: &[
+        column("discs", "discs", |r| r.set("discs")),
+        column("speed_ratio", "disc / robot speed", |r| r.set("speed_ratio")),
+        column("leaving", "leaving", |r| r.set("leaving")),
+        column("leave_rule", "leave rule", |r| r.set("leave_rule")),
+    ],
+    came: &[
+        column("arrived", "arrived", |r| r.share(|run| run.or_zero("done") == 1.0)),
+        column("untouched", "untouched", |r| r.share(|run| !run.is("penetrations"))),
+        column("penetrations", "steps inside", |r| r.sum("penetrations")),
+        column("steps", "steps", |r| r.sum("steps")),
+        column("vetoes", "vetoes", |r| r.sum("vetoes")),
+        CLEARANCE,
+    ],
+};
+
+/// What is run: discs of 0.2 to 0.5 m, their speed over the robot's (0 where they stand), when a
+/// wall counts as being left, and whether a free way to the target ends following a wall.
+fn case(discs: usize, speed_ratio: f64, (leaving, leave_rule): (&str, bool)) -> Vec<Setting> {
+    vec![
+        setting("discs", discs as i64),
+        setting("speed_ratio", speed_ratio),
+        setting("leaving", leaving),
+        setting("leave_rule", leave_rule),
+    ]
+}
+
+fn cases(plan: &Plan) -> Vec<Vec<Setting>> {
+    let discs = || std::iter::once(0).chain(plan.discs.iter().copied());
+    let standing = READINGS.into_iter().flat_map(|of| discs().map(move |n| case(n, 0.0, of)));
+    let most = plan.discs.iter().max().copied().unwrap_or(0);
+    let moving = plan.speed_ratios.iter().map(|&ratio| case(most, ratio, READINGS[0]));
+    standing.chain(moving).collect()
+}
+
+/// What a case with this seed sets in the scenario: the robot's heading and the discs.
+fn settings(case: &Variant, seed: u64) -> Vec<Setting> {
+    let draws = &mut draws(seed);
+    let heading_deg = 360.0 * draws.uniform();
+    let mut discs: Vec<Value> = Vec::new();
+    while discs.len() < number(case, "discs") as usize {
+        discs.extend(disc(draws, number(case, "speed_ratio")));
+    }
+    let navigator = "chains.tasks.navigator";
+    let mut settings =
+        vec![setting("chains.heading_deg", heading_deg), setting("obstacles", discs)];
+    for key in ["leaving", "leave_rule"] {
+        let value = case.value(key).cloned().unwrap_or(Value::Boolean(false));
+        settings.push(Setting { key: [navigator, key].join("."), value });
+    }
+    settings
+}
+
+/// A disc at random, if it leaves air around start and target.
+fn disc(draws: &mut Draws, speed_ratio: f64) -> Option<Value> {
+    let [u, v, w, turn] = [0; 4].map(|_: u8| draws.uniform());
+    let (at, radius_m) = ([u, v].map(|x| HALF_M * (2.0 * x - 1.0)), 0.2 + 0.3 * w);
+    if ENDS_M.iter().any(|end| distance(*end, at) < radius_m + AIR_M) {
+        return None;
+    }
+    let point = |p: Point<2>| Value::from(p.to_vec());
+    let mut disc = toml::Table::new();
+    disc.insert("at_m".into(), point(at));
+    disc.insert("radius_m".into(), radius_m.into());
+    if speed_ratio > 0.0 {
+        let velocity = [cos(TAU * turn), sin(TAU * turn)].map(|x| x * speed_ratio * SPEED_M_S);
+        let bounds = [[-HALF_M - 1.0; 2], [HALF_M + 1.0; 2]].map(point);
+        disc.insert("velocity_m_s".into(), point(velocity));
+        disc.insert("bounces_m".into(), bounds.to_vec().into());
+    }
+    Some(disc.into())
+}
+
+/// All cases.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct Fields {
+    /// Results by case.
+    pub(super) cells: Vec<Cell>,
+}
+
+impl Fields {
+    pub(super) fn run(plan: &Plan, progress: &mut Progress<'_>) -> Result<Self, InputError> {
+        let study = Study::of_variants(SCENARIO, cases(plan))
+            .sized(plan.field_seeds, Some(plan.field_cycles));
+        let results =
+            study.run_with((plan.workers, "open field"), progress, settings, |source, cell| {
+                Ok(start(WORLDS, *cell, source, 1)?.run(&|| true).expect("nobody stops it"))
+            })?;
+        Ok(Self { cells: COLUMNS.cells(&results) })
+    }
+
+    /// Cells with discs at rest, of a reading with or without the rule.
+    pub(super) fn at_rest(&self, leaving: &str, leave_rule: bool) -> impl Iterator<Item = &Cell> {
+        let is_its =
+            move |c: &&Cell| c.says("leaving", leaving) && c.is("leave_rule") == leave_rule;
+        self.cells.iter().filter(|c| c.number("speed_ratio") == 0.0).filter(is_its)
+    }
+
+    /// Cells with discs that move.
+    pub(super) fn moving(&self) -> impl Iterator<Item = &Cell> {
+        self.cells.iter().filter(|c| c.number("speed_ratio") > 0.0)
+    }
+
+    pub(super) fn table(&self) -> Table {
+        let note = "One robot in 20 m x 20 m, its target in the opposite corner; discs of 0.2 to \
+                    0.5 m. Discs that move run into a robot too: it steps aside, but not faster \
+                    than it may.";
+        COLUMNS.table("A robot in the open", note, &self.cells)
+    }
+
+    pub(super) fn figure(&self) -> Figure {
+        let readings = [("latched", true), ("latched", false), ("range", true), ("level", false)];
+        let lines = readings.map(|(leaving, rule)| {
+            let name = format!("{leaving}{}", if rule { ", leave rule" } else { "" });
+            series(name, self.at_rest(leaving, rule), ["discs", "arrived"])
+        });
+        figure("Runs that come to their target among discs", ["discs", "arrived, %"], lines)
+    }
+}

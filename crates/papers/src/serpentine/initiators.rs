@@ -1,0 +1,290 @@
+//! Who may begin a motion, and who may object (slides R4, R5, R7, R8), and whether bends keep
+//! their limits (slide F1).
+
+use super::{Plan, draws};
+use crate::cells::{Share, table};
+use crate::study::{Progress, all_of, finish, setting, source};
+use serde::Serialize;
+use sidestep::kernel::InputError;
+use sidestep::kernel::distr::normal;
+use sidestep::kernel::stream::Draws;
+use sidestep::worlds::chain::geometry::{Point, along, distance, unit};
+use sidestep::worlds::chain::scenario::Compiled;
+use sidestep::worlds::chain::{
+    BEND_TOLERANCE_RAD, Chain, Connector, Mobility, Obstacles, Outcome, Propagator, Reason,
+    Request, Rod,
+};
+use sidestep_document::Table;
+
+const FAILING: &str = include_str!("../../../../scenarios/papers/serpentine/failing.toml");
+
+/// Connectors of the chain: an arm as redundant as the slides' snake of 25 degrees of freedom.
+const CONNECTORS: usize = 26;
+/// Way of an initiator.
+const STEP_M: f64 = 0.05;
+/// Motions of each chain with bend limits.
+const MOTIONS: usize = 400;
+
+/// Every connector as initiator.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct Initiators {
+    /// Motions that every connector of a free chain began, and that were made.
+    pub(super) moved: Share,
+    /// Of these, motions of a connector in the middle after which each half is where it would be
+    /// as a chain of its own, to the bit.
+    pub(super) halves_alike: Share,
+    /// Motions of a chain with a fixed base to which the base objected, as fixed.
+    pub(super) base_objected: Share,
+    /// Motions of a chain with a failed connector to which that one objected, as failed.
+    pub(super) failed_objected: Share,
+    /// Vetoes that left every bit of the chain as it was.
+    pub(super) kept: Share,
+    /// Runs of a world in which a connector fails on the way, and the operator is told that it was
+    /// that one.
+    pub(super) told: Share,
+    /// Bend limits.
+    pub(super) bends: Vec<Bend>,
+}
+
+/// What bend limits come to.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct Bend {
+    /// The limit.
+    pub(super) limit_deg: f64,
+    /// Whether in space, or in the plane.
+    pub(super) in_space: bool,
+    /// Motions that were made.
+    pub(super) moved: Share,
+    /// Vetoes for another reason than the limit.
+    pub(super) other_vetoes: u64,
+    /// Motions after which a bend was beyond the limit.
+    pub(super) exceeded: u64,
+    /// The sharpest bend.
+    pub(super) sharpest_deg: f64,
+}
+
+#[derive(Default)]
+struct Seen {
+    moved: Vec<bool>,
+    halves_alike: Vec<bool>,
+    base_objected: Vec<bool>,
+    failed_objected: Vec<bool>,
+    kept: Vec<bool>,
+}
+
+fn direction<const D: usize>(draws: &mut Draws) -> Point<D> {
+    let random = std::array::from_fn(|_| normal(draws));
+    unit(random).unwrap_or_else(|| std::array::from_fn(|i| if i == 0 { 1.0 } else { 0.0 }))
+}
+
+/// A chain of fixed rods that turns a little at every connector.
+fn chain<const D: usize>(draws: &mut Draws, max_bend_rad: f64) -> Result<Chain<D>, InputError> {
+    let mut u: Point<D> = direction(draws);
+    let mut points = vec![[0.0; D]];
+    for i in 1..CONNECTORS {
+        u = unit(along(u, direction(draws), 0.2)).unwrap_or(u);
+        points.push(along(points[i - 1], u, 0.5));
+    }
+    let connector = Connector { max_bend_rad, ..Connector::free(0.05) };
+    let rods = points.windows(2).map(|ends| Rod::fixed(distance(ends[0], ends[1]), 0.02)).collect();
+    Chain::new(points, vec![connector; CONNECTORS], rods)
+}
+
+/// The connectors `range` as a chain of their own.
+fn part(chain: &Chain<3>, range: std::ops::RangeInclusive<usize>) -> Result<Chain<3>, InputError> {
+    let (first, last) = (*range.start(), *range.end());
+    Chain::new(
+        chain.points()[range.clone()].to_vec(),
+        chain.connectors()[range].to_vec(),
+        chain.rods()[first..last].to_vec(),
+    )
+}
+
+fn propagated(chain: &mut Chain<3>, k: usize, to: Point<3>) -> Result<Outcome<3>, InputError> {
+    Propagator::default().propagate(chain, &Obstacles::default(), &Request::exact(k, to))
+}
+
+fn seen(seed: u64) -> Result<Seen, InputError> {
+    let draws = &mut draws(seed);
+    let free = chain::<3>(draws, std::f64::consts::PI)?;
+    let mut seen = Seen::default();
+    for k in 0..CONNECTORS {
+        let to = along(free.points()[k], direction(draws), STEP_M);
+        let mut moved = free.clone();
+        seen.moved.push(propagated(&mut moved, k, to)?.moved().is_some());
+        if (1..CONNECTORS - 1).contains(&k) {
+            let (mut low, mut high) = (part(&free, 0..=k)?, part(&free, k..=CONNECTORS - 1)?);
+            propagated(&mut low, k, to)?;
+            propagated(&mut high, 0, to)?;
+            let alike =
+                low.points() == &moved.points()[..=k] && high.points() == &moved.points()[k..];
+            seen.halves_alike.push(alike);
+        }
+        for other in (0..CONNECTORS).filter(|&other| other != k) {
+            let mut failing = free.clone();
+            failing.set_failed(other, true);
+            let objected = objects(&mut failing, (k, to), (other, Reason::Failed), &mut seen)?;
+            seen.failed_objected.push(objected);
+        }
+        if k > 0 {
+            let mut arm = free.clone();
+            arm.set_mobility(0, Mobility::Fixed)?;
+            let objected = objects(&mut arm, (k, to), (0, Reason::Fixed), &mut seen)?;
+            seen.base_objected.push(objected);
+        }
+    }
+    Ok(seen)
+}
+
+/// Whether a motion is vetoed by the one who is expected to, for the reason expected.
+fn objects(
+    chain: &mut Chain<3>,
+    (k, to): (usize, Point<3>),
+    (by, reason): (usize, Reason),
+    seen: &mut Seen,
+) -> Result<bool, InputError> {
+    let before = chain.points().to_vec();
+    let outcome = propagated(chain, k, to)?;
+    let Some(veto) = outcome.veto() else { return Ok(false) };
+    seen.kept.push(chain.points() == before);
+    Ok(veto.by == by && veto.reason == reason)
+}
+
+/// An operator leads a chain, a connector of it fails, and the operator is told who objects.
+fn told(seed: u64) -> Result<bool, InputError> {
+    let failing = 1 + (draws(seed).below(14)) as usize;
+    let source = source(
+        FAILING,
+        &[setting("chains.changes.connector", failing as i64), setting("seed", seed as i64)],
+    )?;
+    let mut run = Compiled::<2>::new(&source)?.start(&source, 1);
+    finish(&mut run, |_| ());
+    let metrics = run.metrics();
+    let by_it = metrics.given_up.iter().map(|given_up| {
+        let what = &given_up.what;
+        what.by == Some(failing as u32) && what.reason.as_deref() == Some(Reason::Failed.name())
+    });
+    let told: Vec<bool> = by_it.collect();
+    Ok(!told.is_empty() && told.iter().all(|&it| it))
+}
+
+/// What a wandering head with a bend limit came to.
+struct Bent {
+    moved: Vec<bool>,
+    other_vetoes: u64,
+    exceeded: u64,
+    sharpest_rad: f64,
+}
+
+fn bent<const D: usize>(limit_rad: f64, seed: u64) -> Result<Bent, InputError> {
+    let draws = &mut draws(seed);
+    let mut chain = chain::<D>(draws, limit_rad)?;
+    let (mut propagator, nothing) = (Propagator::default(), Obstacles::default());
+    let mut u: Point<D> = direction(draws);
+    let mut came = Bent { moved: Vec::new(), other_vetoes: 0, exceeded: 0, sharpest_rad: 0.0 };
+    for _ in 0..MOTIONS {
+        u = unit(along(u, direction(draws), 0.3)).unwrap_or(u);
+        let k = draws.below(CONNECTORS as u32) as usize;
+        let to = along(chain.points()[k], u, STEP_M);
+        let outcome = propagator.propagate(&mut chain, &nothing, &Request::exact(k, to))?;
+        came.moved.push(outcome.moved().is_some());
+        let is_other = outcome.veto().is_some_and(|veto| veto.reason != Reason::BendLimit);
+        came.other_vetoes += u64::from(is_other);
+        let sharpest_rad = (0..CONNECTORS).filter_map(|i| chain.bend_rad(i)).fold(0.0, f64::max);
+        came.exceeded += u64::from(sharpest_rad > limit_rad + BEND_TOLERANCE_RAD);
+        came.sharpest_rad = came.sharpest_rad.max(sharpest_rad);
+    }
+    Ok(came)
+}
+
+impl Initiators {
+    pub(super) fn run(plan: &Plan, progress: &mut Progress<'_>) -> Result<Self, InputError> {
+        let seeds: Vec<u64> = (1..=plan.seeds as u64).collect();
+        let mut report = |share| progress("who begins, who objects", share);
+        let all = all_of(&seeds, plan.workers, &mut report, |seed| seen(*seed))?;
+        let all = Seen::all(all);
+        let told = all_of(&seeds, plan.workers, &mut report, |seed| told(*seed))?;
+        let limits = [(90.0, false), (60.0, false), (30.0, false), (60.0, true), (30.0, true)];
+        let bends = limits.iter().map(|&(limit_deg, in_space): &(f64, bool)| {
+            let limit_rad = limit_deg.to_radians();
+            let runs = all_of(&seeds, plan.workers, &mut report, |&seed| match in_space {
+                true => bent::<3>(limit_rad, seed),
+                false => bent::<2>(limit_rad, seed),
+            })?;
+            Ok(bend((limit_deg, in_space), &runs))
+        });
+        let bends: Vec<Bend> = bends.collect::<Result<_, InputError>>()?;
+        Ok(Self {
+            moved: Share::of(all.moved),
+            halves_alike: Share::of(all.halves_alike),
+            base_objected: Share::of(all.base_objected),
+            failed_objected: Share::of(all.failed_objected),
+            kept: Share::of(all.kept),
+            told: Share::of(told),
+            bends,
+        })
+    }
+
+    pub(super) fn tables(&self) -> [Table; 2] {
+        let note = "26 connectors in space, bent at random; every connector begins a motion of \
+                    5 cm, with nothing fixed, with the first one fixed, and with every other one \
+                    failed in turn.";
+        let mut who = Table::new("Who begins, who objects", note, &["what", "share"]);
+        let rows = [
+            ("motions of a free chain that are made, whoever begins", &self.moved),
+            (
+                "halves that are where they would be as chains of their own, to the bit",
+                &self.halves_alike,
+            ),
+            ("motions that the fixed base objects to, as fixed", &self.base_objected),
+            ("motions that the failed connector objects to, as failed", &self.failed_objected),
+            ("vetoes that leave every bit as it was", &self.kept),
+            ("operators who are told that the connector that fails on the way objects", &self.told),
+        ];
+        for (what, share) in rows {
+            who.row([what.to_string(), share.to_string()]);
+        }
+        let note = "The same chain is moved 400 times by 5 cm, by connectors at random; where the limit \
+                    would be exceeded, rods turn back into it, or somebody objects.";
+
+        let bends = table(
+            "Bend limits",
+            note,
+            &self.bends,
+            &[
+                ("limit, deg", &|b| b.limit_deg.to_string()),
+                ("in", &|b| if b.in_space { "space" } else { "plane" }.into()),
+                ("moved", &|b| b.moved.to_string()),
+                ("other vetoes", &|b| b.other_vetoes.to_string()),
+                ("exceeded", &|b| b.exceeded.to_string()),
+                ("sharpest, deg", &|b| format!("{:.3}", b.sharpest_deg)),
+            ],
+        );
+        [who, bends]
+    }
+}
+
+fn bend((limit_deg, in_space): (f64, bool), runs: &[Bent]) -> Bend {
+    Bend {
+        limit_deg,
+        in_space,
+        moved: Share::of(runs.iter().flat_map(|r| r.moved.iter().copied())),
+        other_vetoes: runs.iter().map(|r| r.other_vetoes).sum(),
+        exceeded: runs.iter().map(|r| r.exceeded).sum(),
+        sharpest_deg: runs.iter().map(|r| r.sharpest_rad).fold(0.0, f64::max).to_degrees(),
+    }
+}
+
+impl Seen {
+    /// Everything that some runs saw.
+    fn all(runs: Vec<Self>) -> Self {
+        runs.into_iter().fold(Self::default(), |mut all, run| {
+            all.moved.extend(run.moved);
+            all.halves_alike.extend(run.halves_alike);
+            all.base_objected.extend(run.base_objected);
+            all.failed_objected.extend(run.failed_objected);
+            all.kept.extend(run.kept);
+            all
+        })
+    }
+}

@@ -1,0 +1,268 @@
+//! The experiments of the chain world's source, "Multi-agent serpentine motion with reactive
+//! obstacle avoidance" (Birbilis and Aspragathos, slides of 2005), run anew.
+//!
+//! The slides show pictures and no numbers, so their *claims* are examined. Every figure is our
+//! own, with the number of runs, and an interval where runs are random. [`claims`] says of each
+//! claim whether it held, did not hold, or cannot be judged.
+//!
+//! ```text
+//! corridor.rs, rotation.rs, field.rs    the swarm and its leader
+//! pushing.rs, movers.rs, snake.rs       chains among what stands and what moves
+//! scaling.rs, broken.rs, postures.rs, initiators.rs    what needs no world around it
+//! scenes.rs        pictures of bodies
+//! claims/          what follows from all that
+//! ```
+
+mod broken;
+mod claims;
+mod corridor;
+mod field;
+mod initiators;
+mod movers;
+mod postures;
+mod pushing;
+mod rotation;
+mod scaling;
+mod scenes;
+mod snake;
+
+use crate::study::{Progress, stage};
+use serde::Serialize;
+use sidestep::kernel::stream::{Draws, Purpose, Streams};
+use sidestep::kernel::workers::available;
+use sidestep::kernel::{InputError, Seed};
+use sidestep_document::claim::{Claim, tally};
+use sidestep_document::document::{Document, Experiment, Picture};
+
+/// How fast initiators go, m/s, as the prototypes' did.
+const SPEED_M_S: f64 = 0.5;
+/// What a cycle takes unless an experiment is about it.
+const DT_S: f64 = 0.02;
+
+/// Random numbers of an experiment that drives no world.
+fn draws(seed: u64) -> Draws {
+    Streams::new(Seed(seed)).draws(0, 0, Purpose(1))
+}
+
+/// How much to run.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Plan {
+    /// Seeds of every case that is random,
+    pub seeds: usize,
+    /// of cases of the open field,
+    pub field_seeds: usize,
+    /// and of the snake in space.
+    pub snake_seeds: usize,
+    /// Widths of the corridor.
+    pub widths_m: Vec<f64>,
+    /// Numbers of followers in it.
+    pub followers: Vec<usize>,
+    /// Cycles of a run in it, at most.
+    pub corridor_cycles: u64,
+    /// Steps of its leader, where rules of rotation are compared.
+    pub steps_m: Vec<f64>,
+    /// Numbers of discs in the open field, beside none.
+    pub discs: Vec<usize>,
+    /// Cycles of a run in it, at most.
+    pub field_cycles: u64,
+    /// Speeds of what moves over those of what it meets.
+    pub speed_ratios: Vec<f64>,
+    /// Numbers of discs that run into a chain.
+    pub mover_discs: Vec<usize>,
+    /// Cycles of such a run.
+    pub mover_cycles: u64,
+    /// Connectors of the snake in space.
+    pub snake_connectors: Vec<usize>,
+    /// Cycles of its runs.
+    pub snake_cycles: u64,
+    /// Connectors of chains whose motions are timed.
+    pub sizes: Vec<usize>,
+    /// Numbers of far obstacles.
+    pub far_balls: Vec<usize>,
+    /// About how many motions of a single connector a timing is as long as.
+    pub timed_motions: usize,
+    /// Broken chains of each kind.
+    pub breaks: usize,
+    /// Links of chains that reach for targets,
+    pub ik_links: Vec<usize>,
+    /// and targets.
+    pub ik_targets: usize,
+    /// The cycle of the swarm's picture.
+    pub pictured_cycles: u64,
+    /// Workers; nothing but times depends on them.
+    pub workers: usize,
+    /// Whether this is a rehearsal.
+    pub quick: bool,
+}
+
+impl Default for Plan {
+    /// Half an hour on two processors, most of it for snakes among balls that fly.
+    fn default() -> Self {
+        Self {
+            seeds: 10,
+            field_seeds: 30,
+            snake_seeds: 4,
+            widths_m: vec![1.2, 1.4, 1.6, 1.8, 2.0, 2.5, 3.0],
+            followers: vec![15, 40],
+            corridor_cycles: 12_000,
+            steps_m: vec![0.01, 0.05, 0.1],
+            discs: vec![10, 25, 40],
+            field_cycles: 15_000,
+            speed_ratios: vec![0.25, 0.5, 1.0, 2.0, 4.0],
+            mover_discs: vec![8, 16],
+            mover_cycles: 4000,
+            snake_connectors: vec![450, 1000],
+            snake_cycles: 8000,
+            sizes: vec![50, 100, 450, 1000, 3000, 10_000],
+            far_balls: vec![0, 1000, 10_000, 100_000],
+            timed_motions: 1_000_000,
+            breaks: 200,
+            ik_links: vec![2, 7, 25, 100, 450],
+            ik_targets: 500,
+            pictured_cycles: 2500,
+            workers: available(),
+            quick: false,
+        }
+    }
+}
+
+impl Plan {
+    /// A rehearsal of seconds: everything is run, nothing is measured well.
+    pub fn quick() -> Self {
+        Self {
+            seeds: 2,
+            field_seeds: 2,
+            snake_seeds: 2,
+            widths_m: vec![1.2, 2.0],
+            followers: vec![15],
+            steps_m: vec![0.05],
+            discs: vec![10],
+            field_cycles: 4000,
+            speed_ratios: vec![1.0, 4.0],
+            mover_discs: vec![16],
+            mover_cycles: 400,
+            snake_connectors: vec![450],
+            snake_cycles: 600,
+            sizes: vec![50, 450, 1000],
+            far_balls: vec![0, 1000],
+            timed_motions: 20_000,
+            breaks: 10,
+            ik_links: vec![2, 7, 25],
+            ik_targets: 20,
+            quick: true,
+            ..Self::default()
+        }
+    }
+
+    fn check(&self) -> Result<(), InputError> {
+        match self.seeds {
+            1..=10_000 => Ok(()),
+            n => Err(InputError::new("plan.seeds", format!("is {n}"), "give 1 to 10000 seeds")),
+        }
+    }
+}
+
+/// Everything that came of the experiments.
+#[derive(Debug, Clone, Serialize)]
+pub struct Report {
+    /// What was run.
+    pub plan: Plan,
+    /// Version of the program.
+    pub program_version: String,
+    corridor: corridor::Corridor,
+    rotations: rotation::Rotations,
+    fields: field::Fields,
+    pushing: pushing::Pushing,
+    movers: movers::Movers,
+    snakes: snake::Snakes,
+    scaling: scaling::Scaling,
+    broken: broken::Broken,
+    postures: postures::Postures,
+    initiators: initiators::Initiators,
+    /// The slides' claims and our verdicts.
+    pub claims: Vec<Claim>,
+    /// Pictures of bodies: no numbers of them are kept.
+    #[serde(skip)]
+    pub scenes: Vec<crate::Scene>,
+}
+
+/// Runs all experiments.
+///
+/// `progress` is told what is being done and the share of the whole that is done.
+///
+/// # Errors
+/// When the plan asks for what no scenario can be.
+pub fn run(plan: &Plan, progress: &mut Progress<'_>) -> Result<Report, InputError> {
+    plan.check()?;
+    // Shares of the whole as they take their time on two processors. What is timed comes first,
+    // when the machine is quiet.
+    let scaling = scaling::Scaling::run(plan, &mut stage(progress, 0.0, 0.05))?;
+    let corridor = corridor::Corridor::run(plan, &mut stage(progress, 0.05, 0.25))?;
+    let rotations = rotation::Rotations::run(plan, &mut stage(progress, 0.25, 0.35))?;
+    let fields = field::Fields::run(plan, &mut stage(progress, 0.35, 0.55))?;
+    let pushing = pushing::Pushing::run(plan, &mut stage(progress, 0.55, 0.6))?;
+    let movers = movers::Movers::run(plan, &mut stage(progress, 0.6, 0.8))?;
+    let snakes = snake::Snakes::run(plan, &mut stage(progress, 0.8, 0.93))?;
+    let broken = broken::Broken::run(plan, &mut stage(progress, 0.93, 0.94))?;
+    let postures = postures::Postures::run(plan, &mut stage(progress, 0.94, 0.97))?;
+    let initiators = initiators::Initiators::run(plan, &mut stage(progress, 0.97, 0.99))?;
+    let scenes = scenes::all(plan)?;
+    let mut report = Report {
+        plan: plan.clone(),
+        program_version: env!("CARGO_PKG_VERSION").into(),
+        corridor,
+        rotations,
+        fields,
+        pushing,
+        movers,
+        snakes,
+        scaling,
+        broken,
+        postures,
+        initiators,
+        claims: Vec::new(),
+        scenes,
+    };
+    report.claims = claims::judge(&report);
+    progress("done", 1.0);
+    Ok(report)
+}
+
+impl Report {
+    /// The experiments in the order of the report.
+    fn experiments(&self) -> Vec<Experiment> {
+        let (scaling, corridor) = (&self.scaling, &self.corridor);
+        claims::WORDS.experiments([
+            (corridor.figures(), vec![corridor.table()]),
+            (vec![self.rotations.figure()], vec![self.rotations.table()]),
+            (vec![self.fields.figure()], vec![self.fields.table()]),
+            (vec![self.pushing.figure()], vec![self.pushing.table()]),
+            (vec![self.movers.figure()], vec![self.movers.table()]),
+            (Vec::new(), vec![self.snakes.table()]),
+            (vec![scaling.figure()], scaling.tables().into()),
+            (Vec::new(), vec![self.broken.table()]),
+            (vec![self.postures.figure()], vec![self.postures.table()]),
+            (Vec::new(), self.initiators.tables().into()),
+        ])
+    }
+
+    /// The report, the claims first; `pictures` are those of the [scenes](Self::scenes), drawn.
+    pub fn document(&self, pictures: Vec<Picture>) -> Document {
+        let plan = &self.plan;
+        let lead = format!(
+            "{} The slides show pictures and hardly a number; every figure here is ours. Version \
+             {}; seeds 1 to {} ({} in the open field, {} of the snake), {} workers.",
+            tally(&self.claims),
+            self.program_version,
+            plan.seeds,
+            plan.field_seeds,
+            plan.snake_seeds,
+            plan.workers,
+        );
+        let quick = if plan.quick { " --quick" } else { "" };
+        let seeds = plan.seeds;
+        let command = format!("sidestep reproduce serpentine{quick} --seeds {seeds} --out DIR");
+        let parts = (&self.claims[..], pictures, self.experiments());
+        claims::WORDS.document(lead, plan.quick, parts, command)
+    }
+}

@@ -1,0 +1,214 @@
+//! Inverse kinematics by the chain's own rules (slides F2, E3): a tip is pulled to a target while
+//! the base objects, while it is free, and there and back; and damped least squares beside it.
+
+use super::{Plan, draws};
+use crate::cells::{Cell, Columns, Value, bars, column, figure};
+use crate::study::{Progress, Study, number, outcome, setting};
+use cpu_time::ThreadTime;
+use serde::Serialize;
+use serde_json::{Value as Json, json};
+use sidestep::experiment::sweep::{Setting, Variant};
+use sidestep::kernel::InputError;
+use sidestep::kernel::distr::normal;
+use sidestep::kernel::math::powf;
+use sidestep::kernel::stream::Draws;
+use sidestep::worlds::chain::geometry::{Point, along, distance, scaled, unit};
+use sidestep::worlds::chain::ik::{Engine, Goal, Solver};
+use sidestep::worlds::chain::{
+    Chain, Connector, Mobility, Obstacles, Propagator, Request, Rod, Rules,
+};
+use sidestep_document::figure::Scale;
+use sidestep_document::{Figure, FigureKind, Table};
+
+/// Targets are within this part of the reach.
+const WITHIN: f64 = 0.9;
+/// Near enough, in parts of the reach.
+const TOLERANCE: f64 = 1e-4;
+
+/// Ways to bring a tip to a target.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Way {
+    /// One motion of the tip; the base always objects to being moved, as the slides have it.
+    Veto,
+    /// One motion of the tip, nobody is fixed.
+    FreeBase,
+    /// The chain's rule there and back until tip and base are where they belong.
+    ThereAndBack,
+    /// Damped least squares.
+    LeastSquares,
+}
+
+impl Way {
+    const ALL: [Self; 4] = [Self::Veto, Self::FreeBase, Self::ThereAndBack, Self::LeastSquares];
+
+    /// Its name in settings and JSON.
+    pub(super) fn key(self) -> &'static str {
+        ["veto", "free-base", "there-and-back", "least-squares"][self as usize]
+    }
+
+    fn of(key: &str) -> Self {
+        Self::ALL.into_iter().find(|way| way.key() == key).expect("a way of this key")
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Veto => "one pull, base objects",
+            Self::FreeBase => "one pull, base free",
+            Self::ThereAndBack => "there and back",
+            Self::LeastSquares => "damped least squares",
+        }
+    }
+}
+
+const COLUMNS: Columns = Columns {
+    case: &[
+        column("links", "links", |r| r.set("links")),
+        column("slack", "slack", |r| r.set("slack"))
+            .shown(|c| format!("{} %", 100.0 * c.number("slack"))),
+        column("way", "way", |r| r.set("way"))
+            .shown(|c| Way::of(&c.value("way").to_string()).name().into()),
+    ],
+    came: &[
+        column("reached", "reached", |r| r.share(|run| run.is("reached"))),
+        column("finished", "finished", |r| r.count(|run| run.is("finished"))),
+        column("median_us", "median, us", |r| Value::Number(r.median("us")))
+            .shown(|c| format!("{:.1}", c.number("median_us"))),
+        column("median_iterations", "passes or steps", |r| Value::Number(r.median("iterations"))),
+    ],
+};
+
+/// What is run.
+#[derive(Debug, Clone, Copy)]
+struct Case {
+    /// How.
+    way: Way,
+    /// Rods.
+    links: usize,
+    /// How much longer and shorter than their mean rods may be.
+    slack: f64,
+}
+
+impl Case {
+    fn settings(self) -> Vec<Setting> {
+        let Self { way, links, slack } = self;
+        vec![setting("links", links as i64), setting("slack", slack), setting("way", way.key())]
+    }
+
+    fn of(variant: &Variant) -> Self {
+        let way = Way::of(variant.value("way").and_then(toml::Value::as_str).unwrap_or_default());
+        Self { way, links: number(variant, "links") as usize, slack: number(variant, "slack") }
+    }
+}
+
+/// All cases.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct Postures {
+    /// Results by case.
+    pub(super) cells: Vec<Cell>,
+}
+
+fn direction(draws: &mut Draws) -> Point<3> {
+    unit([0; 3].map(|_: u8| normal(draws))).unwrap_or([1.0, 0.0, 0.0])
+}
+
+/// A chain at random whose rods are as long as on average.
+fn chain(case: &Case, draws: &mut Draws) -> Result<Chain<3>, InputError> {
+    let (slack, n) = (case.slack, case.links);
+    let rod = Rod { min_m: 1.0 - slack, max_m: 1.0 + slack, radius_m: 0.01 };
+    let mut points = vec![[0.0; 3]];
+    let mut u = direction(draws);
+    for i in 0..n {
+        let turned = along(u, direction(draws), 0.5);
+        u = unit(turned).unwrap_or(u);
+        points.push(along(points[i], u, 1.0));
+    }
+    let mut connectors = vec![Connector::free(0.02); n + 1];
+    if case.way == Way::Veto {
+        connectors[0].mobility = Mobility::Fixed;
+    }
+    // Of fixed length to the bit: as long as they came out.
+    let rods = points.windows(2).map(|ends| match slack {
+        0.0 => Rod::fixed(distance(ends[0], ends[1]), 0.01),
+        _ => rod,
+    });
+    let rods = rods.collect();
+    Chain::new(points, connectors, rods)
+}
+
+fn solved(case: &Case, seed: u64) -> Result<Json, InputError> {
+    let draws = &mut draws(seed);
+    let mut chain = chain(case, draws)?;
+    let (tip, reach_m) = (case.links, case.links as f64);
+    let part = powf(draws.uniform(), 1.0 / 3.0);
+    let target = scaled(direction(draws), WITHIN * reach_m * part);
+    let engine = match case.way {
+        Way::Veto | Way::FreeBase => return pulled(&mut chain, tip, target),
+        Way::ThereAndBack => Engine::Chain,
+        Way::LeastSquares => Engine::Dls,
+    };
+    let goal = Goal { engine, tolerance_m: TOLERANCE * reach_m, ..Goal::new(tip, 0, target) };
+    let mut solver = Solver::new(Rules::default());
+    let began = ThreadTime::now();
+    let answer = solver.solve(&chain, &Obstacles::default(), &goal)?;
+    let us = 1e6 * began.elapsed().as_secs_f64();
+    let finished = answer.engine == Engine::Direct;
+    let (reached, iterations) = (answer.reached, answer.iterations);
+    Ok(json!({ "reached": reached, "finished": finished, "us": us, "iterations": iterations }))
+}
+
+fn pulled(chain: &mut Chain<3>, tip: usize, target: Point<3>) -> Result<Json, InputError> {
+    let request = Request::exact(tip, target);
+    let began = ThreadTime::now();
+    let outcome = Propagator::default().propagate(chain, &Obstacles::default(), &request)?;
+    let us = 1e6 * began.elapsed().as_secs_f64();
+    let reached = outcome.moved().is_some();
+    Ok(json!({ "reached": reached, "finished": false, "us": us, "iterations": 1 }))
+}
+
+impl Postures {
+    pub(super) fn run(plan: &Plan, progress: &mut Progress<'_>) -> Result<Self, InputError> {
+        let mut cases = Vec::new();
+        for &links in &plan.ik_links {
+            for slack in [0.0, 0.1] {
+                cases.extend(Way::ALL.map(|way| Case { way, links, slack }.settings()));
+            }
+        }
+        let study = Study::of_variants("", cases).sized(plan.ik_targets, None);
+        let what = (plan.workers, "targets of tips");
+        let results = study.run_by(what, progress, |_, case, cell| {
+            Ok(outcome(cell, solved(&Case::of(case), cell.seed)?))
+        })?;
+        Ok(Self { cells: COLUMNS.cells(&results) })
+    }
+
+    /// Cells of a way.
+    pub(super) fn of(&self, way: Way) -> impl Iterator<Item = &Cell> {
+        self.cells.iter().filter(move |c| c.says("way", way.key()))
+    }
+
+    pub(super) fn table(&self) -> Table {
+        let note = "Targets uniform within 0.9 of the reach in space, to 1e-4 of it, from a posture at \
+                    random; nothing in the way. `finished`: not reached by the way itself, but in \
+                    closed form. With a free base one motion always is enough.";
+        COLUMNS.table("Inverse kinematics", note, &self.cells)
+    }
+
+    pub(super) fn figure(&self) -> Figure {
+        let mut links: Vec<String> =
+            self.cells.iter().map(|c| c.value("links").to_string()).collect();
+        links.dedup();
+        let series = |(way, slack): (Way, f64)| {
+            let cells = self.of(way).filter(|c| c.number("slack") == slack);
+            let rods = match slack {
+                0.0 => "fixed rods".into(),
+                _ => format!("\u{b1}{} %", 100.0 * slack),
+            };
+            bars(format!("{}, {rods}", way.name()), cells, "median_us")
+        };
+        let (back, squares) = (Way::ThereAndBack, Way::LeastSquares);
+        let all = [(back, 0.0), (back, 0.1), (squares, 0.0), (squares, 0.1)].map(series);
+        let labels = ["links", "median, microseconds"];
+        let figure = figure("Time to bring a tip to its target", labels, all);
+        Figure { y_scale: Scale::Log, kind: FigureKind::Bars { categories: links }, ..figure }
+    }
+}

@@ -1,0 +1,147 @@
+//! A chain in a straight corridor is pushed back by its head until somebody objects, and pulled
+//! back by its tail (slides A3, A4, R4).
+
+use super::{Plan, draws};
+use crate::cells::{Cell, Columns, Value, bars, column, figure};
+use crate::study::{Progress, Study, number, outcome, setting};
+use serde::Serialize;
+use serde_json::{Value as Json, json};
+use sidestep::experiment::sweep::{Setting, Variant};
+use sidestep::kernel::InputError;
+use sidestep::kernel::distr::normal;
+use sidestep::worlds::chain::geometry::along;
+use sidestep::worlds::chain::ground::{Corridor, Leg};
+use sidestep::worlds::chain::{
+    Chain, Connector, Obstacles, Outcome, Propagator, Request, Rod, Rules,
+};
+use sidestep_document::{Figure, FigureKind, Table};
+use std::collections::BTreeSet;
+
+/// Standard deviation across the corridor of where the head is told to go: pushing a straight
+/// chain exactly along itself would never fold it.
+const NOISE_M: f64 = 0.001;
+const STEP_M: f64 = 0.01;
+/// How far it is to go.
+const WAY_M: f64 = 12.0;
+const WIDTH_M: f64 = 2.0;
+
+const COLUMNS: Columns = Columns {
+    case: &[
+        column("by_head", "back by", |r| r.set("by_head"))
+            .shown(|c| if c.is("by_head") { "head (push)" } else { "tail (pull)" }.into()),
+        column("self_collision", "self-collision", |r| r.set("self_collision")),
+        column("max_bend_deg", "bend limit, deg", |r| r.set("max_bend_deg")),
+    ],
+    came: &[
+        column("way_m", "way, m", |r| r.mean("way_m")),
+        column("vetoed", "vetoed", |r| r.count(|run| !run.text("veto").is_empty()))
+            .shown(|c| format!("{}/{}", c.count("vetoed"), c.count("runs"))),
+        column("runs", "", |r| r.count(|_| true)),
+        column("reasons", "reasons", |r| {
+            let reasons: BTreeSet<String> = r.each().map(|run| run.text("veto")).collect();
+            Value::Words(reasons.into_iter().filter(|reason| !reason.is_empty()).collect())
+        }),
+        column("sharpest_deg", "sharpest bend, deg", |r| {
+            Value::Number(r.most("sharpest_rad").to_degrees())
+        })
+        .shown(|c| format!("{:.0}", c.number("sharpest_deg"))),
+        column("rod_violation_m", "", |r| Value::Number(r.most("rod_violation_m"))),
+    ],
+};
+
+/// What is run: whether the chain's own parts are obstacles to it, and the greatest angle between
+/// two rods (180 for none); and whether the head leads, and pushes, or the tail, and pulls.
+fn cases() -> Vec<Vec<Setting>> {
+    let limits = [(false, 180.0), (true, 180.0), (true, 60.0), (true, 30.0)];
+    let case = |by_head: bool, (self_collision, max_bend_deg): (bool, f64)| {
+        vec![
+            setting("by_head", by_head),
+            setting("self_collision", self_collision),
+            setting("max_bend_deg", max_bend_deg),
+        ]
+    };
+    [true, false].into_iter().flat_map(|by_head| limits.map(|limit| case(by_head, limit))).collect()
+}
+
+/// All cases.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct Pushing {
+    /// Results by case.
+    pub(super) cells: Vec<Cell>,
+}
+
+fn chain(max_bend_deg: f64) -> Result<Chain<2>, InputError> {
+    let rod = Rod { min_m: 0.6, max_m: 0.8, radius_m: 0.05 };
+    let connector = Connector { max_bend_rad: max_bend_deg.to_radians(), ..Connector::free(0.25) };
+    // The head is at the far end.
+    Chain::straight([30.0, 0.0], [-1.0, 0.0], 15, rod, connector)
+}
+
+/// How far a case goes until somebody objects, and what it comes to on the way.
+fn pushed(case: &Variant, seed: u64) -> Result<Json, InputError> {
+    let is = |key: &str| case.value(key).and_then(toml::Value::as_bool) == Some(true);
+    let walls = Corridor::new(vec![Leg::Straight { length_m: 40.0 }], WIDTH_M)?.walls(0);
+    let obstacles = Obstacles::new(walls, 1.3)?;
+    let mut chain = chain(number(case, "max_bend_deg"))?;
+    let rules = Rules { self_collision: is("self_collision"), ..Rules::default() };
+    let mut propagator = Propagator::new(rules);
+    let (draws, k) = (&mut draws(seed), if is("by_head") { 0 } else { 15 });
+    let start = chain.points()[k];
+    let (mut gone_m, mut reason, mut sharpest_rad, mut rod_violation_m) = (0.0, None, 0.0, 0.0_f64);
+    for step in 1..=(WAY_M / STEP_M) as usize {
+        let way_m = STEP_M * step as f64;
+        let to = along(along(start, [-1.0, 0.0], way_m), [0.0, 1.0], NOISE_M * normal(draws));
+        if let Outcome::Vetoed(veto) =
+            propagator.propagate(&mut chain, &obstacles, &Request::exact(k, to))?
+        {
+            reason = Some(veto.reason.name());
+            break;
+        }
+        gone_m = way_m;
+        let bends = (0..chain.points().len()).filter_map(|i| chain.bend_rad(i));
+        sharpest_rad = bends.fold(sharpest_rad, f64::max);
+        rod_violation_m = rod_violation_m.max(chain.max_rod_violation_m());
+    }
+    Ok(json!({
+        "way_m": gone_m,
+        "veto": reason,
+        "sharpest_rad": sharpest_rad,
+        "rod_violation_m": rod_violation_m,
+    }))
+}
+
+impl Pushing {
+    pub(super) fn run(plan: &Plan, progress: &mut Progress<'_>) -> Result<Self, InputError> {
+        let study = Study::of_variants("", cases()).sized(plan.seeds, None);
+        let results =
+            study.run_by((plan.workers, "pushed and pulled"), progress, |_, case, cell| {
+                Ok(outcome(cell, pushed(case, cell.seed)?))
+            })?;
+        Ok(Self { cells: COLUMNS.cells(&results) })
+    }
+
+    /// Cells of pushing, or of pulling.
+    pub(super) fn of(&self, by_head: bool) -> impl Iterator<Item = &Cell> {
+        self.cells.iter().filter(move |c| c.is("by_head") == by_head)
+    }
+
+    pub(super) fn table(&self) -> Table {
+        let note = "16 connectors in a straight corridor of 2 m; where the head is told to go errs \
+                    by 1 mm across, 12 m in all. Without self-collision a pushed chain folds onto \
+                    itself, which no robots can.";
+        COLUMNS.table("Pushed by the head, pulled by the tail", note, &self.cells)
+    }
+
+    pub(super) fn figure(&self) -> Figure {
+        let category = |c: &Cell| match c.number("max_bend_deg") {
+            _ if !c.is("self_collision") => "no self-collision".to_string(),
+            180.0 => "self-collision".to_string(),
+            deg => format!("bends up to {deg}\u{b0}"),
+        };
+        let pushed = bars("pushed by the head", self.of(true), "way_m");
+        let pulled = bars("pulled by the tail", self.of(false), "way_m");
+        let kind = FigureKind::Bars { categories: self.of(true).map(category).collect() };
+        let title = "How far a chain goes back until somebody objects";
+        Figure { kind, ..figure(title, ["", "way of 12 m, m"], [pushed, pulled]) }
+    }
+}

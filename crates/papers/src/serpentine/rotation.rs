@@ -1,0 +1,106 @@
+//! What a rod does that hits an obstacle (slide A7): turn to the nearest direction that is free of
+//! everything, turn once as the slides say, or do not turn.
+
+use super::Plan;
+use super::corridor::{CLEARANCE, ROD_VIOLATION, WIDTH};
+use crate::cells::{Cell, Columns, Value, column, figure, least};
+use crate::study::{Progress, Study, finish};
+use serde::Serialize;
+use sidestep::experiment::sweep::Outcome;
+use sidestep::kernel::InputError;
+use sidestep::worlds::chain::scenario::Compiled;
+use sidestep_document::figure::Point;
+use sidestep_document::{Figure, Series, Table};
+
+const SCENARIO: &str = include_str!("../../../../scenarios/papers/serpentine/rotation.toml");
+const SWEEP: &str = include_str!("../../../../scenarios/papers/serpentine/rotation.sweep.toml");
+const STEP: &str = "chain.step_m";
+
+/// The rules; the second is the slides'.
+pub(super) const RULES: [&str; 3] = ["union", "literal", "never"];
+
+const COLUMNS: Columns = Columns {
+    case: &[
+        column("rotation", "rotation", |r| r.set("chain.rotation")),
+        column("step_m", "step, m", |r| r.set(STEP)),
+        column("width_m", "width, m", |r| r.set(WIDTH)),
+    ],
+    came: &[
+        column("arrived", "arrived", |r| r.share(|run| run.or_zero("done") == 1.0)),
+        column("progress_percent", "progress, %", |r| {
+            r.mean_of(|run| 100.0 * run.or_zero("furthest"))
+        }),
+        column("vetoes", "vetoes", |r| r.sum("vetoes")),
+        column("penetrations", "steps inside", |r| r.sum("penetrations")),
+        column("steps", "steps", |r| r.sum("steps")),
+        CLEARANCE,
+        column("slave_over_master", "follower / leader", |r| {
+            Value::Number(r.most("max_slave_step_m") / r.set_number(STEP))
+        })
+        .shown(|c| format!("{:.2}", c.number("slave_over_master"))),
+        ROD_VIOLATION,
+    ],
+};
+
+/// All cases.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct Rotations {
+    /// Results by case.
+    pub(super) cells: Vec<Cell>,
+}
+
+/// The sweep of a plan: corridors of medium width.
+pub(super) fn study(plan: &Plan) -> Result<Study, InputError> {
+    let study = Study::of_file(SWEEP, SCENARIO)?.keep_numbers(WIDTH, &plan.widths_m);
+    Ok(study.keep_numbers(STEP, &plan.steps_m).sized(plan.seeds, None))
+}
+
+impl Rotations {
+    pub(super) fn run(plan: &Plan, progress: &mut Progress<'_>) -> Result<Self, InputError> {
+        let what = (plan.workers, "rules of rotation");
+        let results = study(plan)?.run_by(what, progress, |scenario, _, cell| {
+            let source = scenario()?;
+            let mut run = Compiled::<2>::new(&source)?.start(&source, 1);
+            let mut furthest = 0.0_f64;
+            finish(&mut run, |run| {
+                let body = run.state().body(0);
+                if body.driving.task == 0 {
+                    furthest = furthest.max(run.world().progress(0, &body));
+                }
+            });
+            let furthest = if run.metrics().done == 1 { 1.0 } else { furthest };
+            let mut outcome = Outcome::of(*cell, &run);
+            outcome.metrics.insert("furthest".into(), furthest.into());
+            Ok(outcome)
+        })?;
+        Ok(Self { cells: COLUMNS.cells(&results) })
+    }
+
+    /// Cells of a rule.
+    pub(super) fn of<'a>(&'a self, rotation: &'a str) -> impl Iterator<Item = &'a Cell> {
+        self.cells.iter().filter(move |c| c.says("rotation", rotation))
+    }
+
+    pub(super) fn table(&self) -> Table {
+        let note = "15 followers without wheels (connectors of 0.25 m, rods of 0.05 m); progress by \
+                    points of the corridor's middle, 0.1 m apart. `literal` is the slides' rule: one \
+                    turn to the tangent of the obstacle that is hit nearest to the master.";
+        COLUMNS.table("Rules of rotation", note, &self.cells)
+    }
+
+    pub(super) fn figure(&self) -> Figure {
+        let mut steps_m: Vec<f64> = self.of(RULES[0]).map(|c| c.number("step_m")).collect();
+        steps_m.dedup();
+        let deepest = |rule: &str, step_m: f64| {
+            let cells = self.of(rule).filter(|c| c.number("step_m") == step_m);
+            let least_m = least(cells.map(|c| c.maybe("min_clearance_m"))).unwrap_or(0.0);
+            1e3 * (-least_m).max(0.0)
+        };
+        let series = RULES.map(|rule| Series {
+            name: rule.into(),
+            points: steps_m.iter().map(|&s| Point::new(1e3 * s, deepest(rule, s))).collect(),
+        });
+        let labels = ["step of the leader, mm", "deepest, mm"];
+        figure("How deep parts get into walls, by rule of rotation", labels, series)
+    }
+}

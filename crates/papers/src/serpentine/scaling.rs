@@ -1,0 +1,201 @@
+//! What a motion costs (slides P5, P6, E4): by the number of connectors, by how many of them it
+//! reaches, and by how many obstacles there are that nobody is near to.
+
+use super::{Plan, draws};
+use crate::cells::{figure, median, table};
+use crate::study::Progress;
+use cpu_time::ThreadTime;
+use serde::Serialize;
+use sidestep::kernel::math::{cos, sin};
+use sidestep::kernel::{Digest, InputError};
+use sidestep::worlds::chain::geometry::{Point, along, unit};
+use sidestep::worlds::chain::{Chain, Connector, Obstacle, Obstacles, Propagator, Request, Rod};
+use sidestep_document::figure::{Point as FigurePoint, Scale};
+use sidestep_document::{Figure, Series, Table};
+
+/// Repeats of each timing; the median counts.
+const REPEATS: usize = 5;
+/// Length of a rod.
+const ROD_M: f64 = 0.1;
+/// Way of the head in a motion.
+const STEP_M: f64 = 0.01;
+/// Connectors of the chain among obstacles.
+const AMONG: usize = 450;
+
+/// One chain that is led through the open.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct Size {
+    /// Connectors.
+    pub(super) connectors: usize,
+    /// Time of a motion, microseconds: rods of fixed length,
+    pub(super) fixed_us: f64,
+    /// and how many connectors move in one.
+    pub(super) fixed_moved: f64,
+    /// The same of rods that may be half as long again,
+    pub(super) slack_us: f64,
+    /// of which fewer move.
+    pub(super) slack_moved: f64,
+}
+
+/// One chain among balls, with others far away.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct Far {
+    /// Balls that nobody comes near to.
+    pub(super) balls: usize,
+    /// Time of a motion, microseconds.
+    pub(super) us: f64,
+    /// Whether the chain ends where it does without them, to the bit.
+    pub(super) same: bool,
+}
+
+/// All timings.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct Scaling {
+    /// By number of connectors.
+    pub(super) sizes: Vec<Size>,
+    /// By number of far balls.
+    pub(super) far: Vec<Far>,
+}
+
+/// A slightly bent chain, so that every connector moves at every motion: a bend lets through only
+/// its cosine, so the longer the chain the less it is bent.
+fn snake(n: usize, max_m: f64) -> Result<Chain<3>, InputError> {
+    let mut points = vec![[0.0; 3]];
+    let bent = 0.2_f64.min(90.0 / n as f64);
+    for i in 1..n {
+        let u = [-1.0, bent * sin(i as f64 * 0.1), bent * cos(i as f64 * 0.07)];
+        let u = unit(u).unwrap_or([-1.0, 0.0, 0.0]);
+        points.push(along(points[i - 1], u, ROD_M));
+    }
+    let rod = Rod { min_m: ROD_M, max_m, radius_m: 0.01 };
+    Chain::new(points, vec![Connector::free(0.02); n], vec![rod; n - 1])
+}
+
+/// Where the head is after `k` motions.
+fn head(k: usize) -> Point<3> {
+    let t = k as f64 * STEP_M;
+    [t, 0.3 * sin(t), 0.3 * cos(t) - 0.3]
+}
+
+/// Leads a chain; microseconds and connectors per motion.
+fn led(
+    chain: &mut Chain<3>,
+    obstacles: &Obstacles<3>,
+    motions: std::ops::Range<usize>,
+) -> Result<(f64, f64), InputError> {
+    let mut propagator = Propagator::default();
+    let (count, mut moved) = (motions.len() as f64, 0);
+    let began = ThreadTime::now();
+    for k in motions {
+        let outcome = propagator.propagate(chain, obstacles, &Request::exact(0, head(k)))?;
+        moved += outcome.moved().map_or(0, |m| m.touched.len());
+    }
+    Ok((1e6 * began.elapsed().as_secs_f64() / count, moved as f64 / count))
+}
+
+/// Time and connectors of a motion of a chain in the open: the median of some repeats.
+fn in_the_open(n: usize, max_m: f64, motions: usize) -> Result<(f64, f64), InputError> {
+    let mut chain = snake(n, max_m)?;
+    let (nothing, mut times_us, mut moved) = (Obstacles::default(), Vec::new(), 0.0);
+    for repeat in 0..REPEATS {
+        let from = 1 + repeat * motions;
+        let (us, touched) = led(&mut chain, &nothing, from..from + motions)?;
+        times_us.push(us);
+        moved += touched / REPEATS as f64;
+    }
+    Ok((median(times_us), moved))
+}
+
+/// Balls beside the way of the head, which rods turn from, and `far` ones that nobody meets.
+fn balls(far: usize) -> Result<Obstacles<3>, InputError> {
+    let beside = (0..60).map(|k| [0.5 * f64::from(k), 0.12, 0.0]);
+    let mut all: Vec<_> = (0..).zip(beside).map(|(id, at)| Obstacle::ball(id, at, 0.05)).collect();
+    let draws = &mut draws(1);
+    for id in 0..far {
+        let at: [f64; 3] = [0; 3].map(|_: u8| 2.0 * draws.uniform() - 1.0);
+        let at = along([0.0, 0.0, 500.0], at, 100.0);
+        all.push(Obstacle::ball(1000 + id as u32, at, 0.2));
+    }
+    Obstacles::new(all, ROD_M + 0.1)
+}
+
+fn bits(chain: &Chain<3>) -> Digest {
+    let bytes: Vec<u8> = chain.points().iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
+    Digest::of(&bytes)
+}
+
+impl Scaling {
+    /// Timings run alone, on one worker.
+    pub(super) fn run(plan: &Plan, progress: &mut Progress<'_>) -> Result<Self, InputError> {
+        let mut sizes = Vec::new();
+        for (k, &connectors) in plan.sizes.iter().enumerate() {
+            progress("cost of a motion", k as f64 / plan.sizes.len() as f64);
+            let motions = (plan.timed_motions / connectors).max(4);
+            let (fixed_us, fixed_moved) = in_the_open(connectors, ROD_M, motions)?;
+            let (slack_us, slack_moved) = in_the_open(connectors, 1.5 * ROD_M, motions)?;
+            sizes.push(Size { connectors, fixed_us, fixed_moved, slack_us, slack_moved });
+        }
+        let mut alone = None;
+        let motions = (plan.timed_motions / AMONG).max(50);
+        let mut far = Vec::new();
+        for &count in &plan.far_balls {
+            let obstacles = balls(count)?;
+            let mut times_us = Vec::new();
+            let mut end = None;
+            for _ in 0..REPEATS {
+                let mut chain = snake(AMONG, ROD_M)?;
+                times_us.push(led(&mut chain, &obstacles, 1..motions)?.0);
+                end = Some(bits(&chain));
+            }
+            let alone = *alone.get_or_insert(end);
+            far.push(Far { balls: count, us: median(times_us), same: end == alone });
+        }
+        progress("cost of a motion", 1.0);
+        Ok(Self { sizes, far })
+    }
+
+    pub(super) fn tables(&self) -> [Table; 2] {
+        let note = "Processor time of one motion of 1 cm in space, medians of 5 repeats; slack rods \
+                    may be half as long again, so that a motion soon ends.";
+
+        let sizes = table(
+            "Cost of a motion in the open",
+            note,
+            &self.sizes,
+            &[
+                ("connectors", &|s| s.connectors.to_string()),
+                ("fixed rods, us", &|s| format!("{:.2}", s.fixed_us)),
+                ("moved", &|s| format!("{:.0}", s.fixed_moved)),
+                ("ns each", &|s| format!("{:.1}", 1e3 * s.fixed_us / s.fixed_moved.max(1.0))),
+                ("slack rods, us", &|s| format!("{:.3}", s.slack_us)),
+                ("moved", &|s| format!("{:.1}", s.slack_moved)),
+            ],
+        );
+        let note = "450 connectors beside 60 balls, and so many more 400 m away.";
+        let columns = ["far balls", "a motion, us", "same bits as without"];
+        let mut far = Table::new("Cost of a motion with far obstacles", note, &columns);
+        for f in &self.far {
+            let same = if f.same { "yes" } else { "no" };
+            far.row([f.balls.to_string(), format!("{:.1}", f.us), same.into()]);
+        }
+        [sizes, far]
+    }
+
+    pub(super) fn figure(&self) -> Figure {
+        let series = |name: &str, ns: fn(&Size) -> f64| Series {
+            name: name.into(),
+            points: self
+                .sizes
+                .iter()
+                .map(|s| FigurePoint::new(s.connectors as f64, ns(s)))
+                .collect(),
+        };
+        let all = [
+            series("fixed rods: all move", |s| s.fixed_us),
+            series("slack rods: it soon ends", |s| s.slack_us),
+        ];
+        let title = "Time of a motion by the length of the chain";
+        let figure = figure(title, ["connectors", "microseconds"], all);
+        Figure { x_scale: Scale::Log, y_scale: Scale::Log, ..figure }
+    }
+}

@@ -1,0 +1,251 @@
+//! What all papers share of running: a sweep file and its scenario -> the table of its runs.
+//!
+//! The sweep files and scenarios are those of `scenarios/papers/`, which `sidestep sweep` and
+//! `sidestep run` take as they are. A plan keeps to some of a sweep's variants, or runs it longer.
+
+use serde_json::{Map, Value};
+use sidestep::experiment::sweep::work::run_cells;
+use sidestep::experiment::sweep::{
+    Cell, Outcome, Plan, Rows, RunTable, Setting, Shard, Sweep, Variant, start,
+};
+use sidestep::kernel::{Cycle, InputError, Simulation};
+use sidestep::scenario::Source;
+use sidestep::worlds::WORLDS;
+
+/// Told how far an experiment is: what is being done, and the share done, from 0 to 1.
+pub type Progress<'a> = dyn FnMut(&str, f64) + 'a;
+
+/// Progress of a part of the whole that goes from share `from` to share `to`.
+pub(crate) fn stage(progress: &mut Progress<'_>, from: f64, to: f64) -> impl FnMut(&str, f64) {
+    move |what, share| progress(what, from + (to - from) * share)
+}
+
+/// Runs between two reports of progress, per worker.
+const BATCH: usize = 8;
+
+/// Runs every item on one of up to `workers` workers; results in the order of the items.
+///
+/// # Errors
+/// The first that `run` gives.
+pub(crate) fn all_of<C: Sync, T: Send, E: Send>(
+    items: &[C],
+    workers: usize,
+    mut report: impl FnMut(f64),
+    run: impl Fn(&C) -> Result<T, E> + Sync,
+) -> Result<Vec<T>, E> {
+    let numbers: Vec<usize> = (0..items.len()).collect();
+    let mut results: Vec<(usize, T)> = Vec::with_capacity(items.len());
+    for batch in numbers.chunks(workers.max(1) * BATCH) {
+        let run = |k: &usize| Some(run(&items[*k]).map(|result| (*k, result)));
+        run_cells(batch, workers, run, &mut |result| {
+            results.push(result);
+            Ok(())
+        })?;
+        report(results.len() as f64 / items.len() as f64);
+    }
+    results.sort_by_key(|(k, _)| *k);
+    Ok(results.into_iter().map(|(_, result)| result).collect())
+}
+
+/// A setting of a variant.
+pub(crate) fn setting(key: &str, value: impl Into<toml::Value>) -> Setting {
+    Setting { key: key.into(), value: value.into() }
+}
+
+/// The scenario of this text, with some settings.
+///
+/// # Errors
+/// When a setting does not fit.
+pub(crate) fn source(text: &str, settings: &[Setting]) -> Result<Source, InputError> {
+    let overrides: Vec<String> = settings.iter().map(Setting::to_override).collect();
+    Source::new("a scenario of this experiment", text, "").with(&overrides)
+}
+
+/// Variants, how often each is run, and of which scenario.
+#[derive(Debug)]
+pub(crate) struct Study {
+    scenario: &'static str,
+    sweep: Sweep,
+    variants: Vec<Vec<Setting>>,
+}
+
+impl Study {
+    /// A sweep file, and the scenario that it names.
+    ///
+    /// # Errors
+    /// When the file is wrong.
+    pub(crate) fn of_file(file: &str, scenario: &'static str) -> Result<Self, InputError> {
+        let sweep = Sweep::parse(&Source::new("a sweep of this experiment", file, ""))?;
+        let variants = sweep.design.variants(&sweep.place)?;
+        Ok(Self { scenario, sweep, variants })
+    }
+
+    /// Variants that no sweep file can tell, for what they set is no key of a scenario.
+    pub(crate) fn of_variants(scenario: &'static str, variants: Vec<Vec<Setting>>) -> Self {
+        let sweep = Sweep::of_scenario("a case of this experiment");
+        Self { scenario, sweep, variants }
+    }
+
+    /// Runs of each variant, and cycles of each run.
+    pub(crate) fn sized(mut self, seeds: usize, cycles: Option<Cycle>) -> Self {
+        self.sweep.replicates = seeds as u32;
+        self.sweep.first_seed = Some(1);
+        // A variant that says itself how long it is run keeps to it.
+        let is_open = |v: &Vec<Setting>| v.iter().all(|s| s.key != "cycles");
+        if let Some(cycles) = cycles.filter(|_| self.variants.iter().all(is_open)) {
+            self.sweep.fixed.push(setting("cycles", cycles as i64));
+        }
+        self
+    }
+
+    /// The variants of which this holds.
+    pub(crate) fn keep(mut self, holds: impl Fn(&Variant) -> bool) -> Self {
+        self.variants.retain(|settings| holds(&Variant { settings: settings.clone() }));
+        self
+    }
+
+    /// The variants that set `key` to one of these numbers.
+    pub(crate) fn keep_numbers(self, key: &str, among: &[f64]) -> Self {
+        self.keep(|v| among.contains(&number(v, key)))
+    }
+
+    /// Number of the variants.
+    #[cfg(test)]
+    pub(crate) fn len(&self) -> usize {
+        self.variants.len()
+    }
+
+    /// Runs every variant to its end; the metrics are those of its world.
+    ///
+    /// # Errors
+    /// When a scenario is wrong.
+    pub(crate) fn run(
+        &self,
+        (workers, what): (usize, &str),
+        progress: &mut Progress<'_>,
+    ) -> Result<Results, InputError> {
+        self.run_by((workers, what), progress, |scenario, _, cell| {
+            let run = start(WORLDS, *cell, &scenario()?, 1)?;
+            Ok(run.run(&|| true).expect("nobody stops it"))
+        })
+    }
+
+    /// Runs every variant by `run`, where a case and its seed say what the scenario sets.
+    ///
+    /// # Errors
+    /// The first that `run` gives.
+    pub(crate) fn run_with(
+        &self,
+        what: (usize, &str),
+        progress: &mut Progress<'_>,
+        settings: impl Fn(&Variant, u64) -> Vec<Setting> + Sync,
+        run: impl Fn(&Source, &Cell) -> Result<Outcome, InputError> + Sync,
+    ) -> Result<Results, InputError> {
+        self.run_by(what, progress, |_, variant, cell| {
+            let all = [&self.sweep.fixed[..], &settings(variant, cell.seed)].concat();
+            run(&source(self.scenario, &all)?, cell)
+        })
+    }
+
+    /// Runs every variant by `run`, seed by seed, so that what else the machine does meets all
+    /// variants alike. `run` is given what makes the variant's scenario.
+    ///
+    /// # Errors
+    /// The first that `run` gives.
+    pub(crate) fn run_by(
+        &self,
+        (workers, what): (usize, &str),
+        progress: &mut Progress<'_>,
+        run: impl Fn(&Scenario<'_>, &Variant, &Cell) -> Result<Outcome, InputError> + Sync,
+    ) -> Result<Results, InputError> {
+        let base = source(self.scenario, &self.sweep.fixed)?;
+        let plan = Plan::new(&self.sweep, self.variants.clone(), ("", 1))?;
+        let cells: Vec<Cell> = plan.share(Shard::ALL).collect();
+        let outcomes = all_of(
+            &cells,
+            workers,
+            |share| progress(what, share),
+            |cell| {
+                let variant = &plan.variants[cell.variant as usize];
+                let overrides: Vec<String> =
+                    variant.settings.iter().map(Setting::to_override).collect();
+                let seed = format!("seed={}", cell.seed);
+                let scenario = || base.clone().with(&overrides)?.with(std::slice::from_ref(&seed));
+                run(&scenario, variant, cell)
+            },
+        )?;
+        let mut rows = Rows::default();
+        outcomes.into_iter().for_each(|outcome| rows.push(outcome));
+        let table = rows.table(&plan)?;
+        Ok(Results { table, variants: plan.variants })
+    }
+}
+
+/// Makes the scenario of a cell.
+pub(crate) type Scenario<'a> = dyn Fn() -> Result<Source, InputError> + 'a;
+
+/// What a run came to that is no run of a scenario: its values by name.
+pub(crate) fn outcome(cell: &Cell, values: Value) -> Outcome {
+    let metrics = match values {
+        Value::Object(metrics) => metrics,
+        _ => Map::new(),
+    };
+    let (digest, costs) = (String::new(), Map::new());
+    Outcome { cell: cell.id, cycles: 0, digest, failure: None, metrics, costs }
+}
+
+/// Runs a simulation to its end, and tells `look` of every cycle.
+pub(crate) fn finish<S: Simulation>(run: &mut S, mut look: impl FnMut(&S)) {
+    let until = run.plan().cycles;
+    while run.cycle() < until && !run.is_over() {
+        run.advance(1);
+        look(run);
+    }
+}
+
+/// The table of runs, and the variants that its rows are of.
+#[derive(Debug)]
+pub(crate) struct Results {
+    pub(crate) table: RunTable,
+    pub(crate) variants: Vec<Variant>,
+}
+
+/// What a variant sets a key to, as a number; of a list its first; NaN where it is none.
+pub(crate) fn number(variant: &Variant, key: &str) -> f64 {
+    fn of(value: &toml::Value) -> Option<f64> {
+        let first = || value.as_array().and_then(|all| all.first()).and_then(of);
+        value.as_float().or(value.as_integer().map(|n| n as f64)).or_else(first)
+    }
+    variant.value(key).and_then(of).unwrap_or(f64::NAN)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn results_come_back_in_the_order_of_the_items_for_any_number_of_workers() {
+        for workers in [0, 1, 2, 5] {
+            let items: Vec<usize> = (0..100).collect();
+            let mut shares = vec![0.0];
+            let square = |i: &usize| Ok::<_, ()>(i * i);
+            let results = all_of(&items, workers, |share| shares.push(share), square);
+            assert_eq!(results, Ok(items.iter().map(|i| i * i).collect()));
+            assert!(shares.is_sorted() && shares.last() == Some(&1.0));
+        }
+    }
+
+    #[test]
+    fn rows_are_by_variant_and_seed() {
+        let variants = vec![vec![setting("n", 1)], vec![setting("n", 2)], vec![setting("n", 3)]];
+        let study = Study::of_variants("", variants).sized(2, None).keep(|v| number(v, "n") > 1.0);
+        let run = |_: &Scenario<'_>, v: &Variant, cell: &Cell| {
+            Ok(outcome(cell, json!({ "x": 10.0 * number(v, "n") + cell.seed as f64 })))
+        };
+        let results = study.run_by((2, ""), &mut |_, _| (), run).expect("valid");
+        let x = results.table.column("x").expect("there");
+        let values: Vec<_> = (0..4).filter_map(|row| x.values.number(row)).collect();
+        assert_eq!(values, [21.0, 22.0, 31.0, 32.0]);
+    }
+}
