@@ -1,8 +1,16 @@
 //! What is recorded of a pond.
 
 use super::{PondState, PondWorld};
-use sidestep_kernel::ports::{ColumnSpec, ColumnType, RecordError, Recorder, TableSchema, Values};
+use sidestep_kernel::ports::{Buffer, Buffers, RowBuffer, Table};
 use sidestep_kernel::{Cycle, Slot};
+
+/// Where a frog is at the start of a cycle.
+#[derive(Debug)]
+struct Place {
+    cycle: Cycle,
+    frog: Slot,
+    at_m: [f64; 2],
+}
 
 /// Something that a frog did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -18,67 +26,50 @@ pub(super) enum What {
     Bump,
 }
 
+fn trajectories() -> Table<Place> {
+    Table::new("trajectories")
+        .u64("cycle", "cycle at whose start this holds", |p: &Place| p.cycle)
+        .u32("frog", "number of the frog", |p| p.frog)
+        .f64("x_m", "position east", |p| p.at_m[0])
+        .f64("y_m", "position north", |p| p.at_m[1])
+}
+
+fn events() -> Table<Event> {
+    Table::new("events")
+        .u64("cycle", "cycle in which it happened", |e: &Event| e.cycle)
+        .u32("frog", "number of the frog", |e| e.frog)
+        .label("event", "what happened", ["hop", "bump"], |e| e.what as u32)
+}
+
 /// Rows that wait to be handed over.
 #[derive(Debug, Default)]
 pub(super) struct Rows {
-    is_kept: bool,
-    cycles: Vec<u64>,
-    frogs: Vec<u32>,
-    places_m: [Vec<f64>; 2],
-    events: Vec<Event>,
+    places: RowBuffer<Place>,
+    events: RowBuffer<Event>,
 }
 
 impl Rows {
     pub(super) fn begin(&mut self) {
-        self.is_kept = true;
+        self.places.begin(Some(trajectories()));
+        self.events.begin(Some(events()));
     }
 
     pub(super) fn poses(&mut self, world: &PondWorld, state: &PondState, now: Cycle) {
-        for (frog, pad) in (0..).zip(state.pad.iter()).filter(|_| self.is_kept) {
-            self.cycles.push(now);
-            self.frogs.push(frog);
-            let [x_m, y_m] = world.place_m(pad);
-            self.places_m[0].push(x_m);
-            self.places_m[1].push(y_m);
-        }
+        let place = |(frog, pad)| Place { cycle: now, frog, at_m: world.place_m(pad) };
+        self.places.extend((0..).zip(state.pad.iter()).map(place));
     }
 
     pub(super) fn event(&mut self, event: Event) {
-        if self.is_kept {
-            self.events.push(event);
-        }
-    }
-
-    pub(super) fn record(&mut self, recorder: &mut dyn Recorder) -> Result<(), RecordError> {
-        let Self { cycles, frogs, places_m: [x_m, y_m], events, .. } =
-            std::mem::replace(self, Self { is_kept: self.is_kept, ..Self::default() });
-        let poses = [Values::U64(cycles), Values::U32(frogs), Values::F64(x_m), Values::F64(y_m)];
-        recorder.append(0, &poses)?;
-        let events = [
-            Values::U64(events.iter().map(|event| event.cycle).collect()),
-            Values::U32(events.iter().map(|event| event.frog).collect()),
-            Values::Label(events.iter().map(|event| event.what as u32).collect()),
-        ];
-        recorder.append(1, &events)
+        self.events.push(event);
     }
 }
 
-/// The tables, poses first.
-pub(super) fn schemas() -> Vec<TableSchema> {
-    let column = |name: &str, ty, labels: &[&str]| ColumnSpec {
-        name: name.into(),
-        ty,
-        meaning: format!("the {name} of a frog"),
-        labels: labels.iter().map(ToString::to_string).collect(),
-    };
-    let head = || [column("cycle", ColumnType::U64, &[]), column("frog", ColumnType::U32, &[])];
-    let place = [column("x_m", ColumnType::F64, &[]), column("y_m", ColumnType::F64, &[])];
-    let event = [column("event", ColumnType::Label, &["hop", "bump"])];
-    vec![
-        TableSchema {
-            name: "trajectories".into(),
-            columns: head().into_iter().chain(place).collect(),
-        },
-        TableSchema { name: "events".into(), columns: head().into_iter().chain(event).collect() },
-    ]
+impl Buffers for Rows {
+    fn buffers(&self) -> Vec<&dyn Buffer> {
+        vec![&self.places, &self.events]
+    }
+
+    fn buffers_mut(&mut self) -> Vec<&mut dyn Buffer> {
+        vec![&mut self.places, &mut self.events]
+    }
 }

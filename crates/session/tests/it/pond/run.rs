@@ -1,11 +1,11 @@
 //! What a run asks of a pond beside its phases.
 
-use super::rows::{Event, Rows, What, schemas};
+use super::rows::{Event, Rows, What};
 use super::{PondState, PondWorld, Saved, Sums};
 use serde_json::{Value, json};
 use sidestep_kernel::checkpoint::CheckpointError;
 use sidestep_kernel::digest::Hasher;
-use sidestep_kernel::ports::{RecordError, Recorder, TableSchema};
+use sidestep_kernel::ports::{Buffers, RecordError, Recorder, TableSchema};
 use sidestep_kernel::run::Effort;
 use sidestep_kernel::view::{Axis, Body, Frame, Kind, Look, PlaceRows, Pose, Scenery, Shape};
 use sidestep_kernel::words::{Lines, Said, line};
@@ -58,8 +58,8 @@ impl World for PondWorld {
 
     fn watch(&self, _: &mut Books) {}
 
-    fn schemas(&self, _: &Books) -> Vec<TableSchema> {
-        schemas()
+    fn schemas(&self, books: &Books) -> Vec<TableSchema> {
+        books.rows.schemas()
     }
 
     fn record(
