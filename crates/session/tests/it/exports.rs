@@ -44,7 +44,7 @@ fn a_run_goes_out_in_every_form() {
     let frames = place.path("frames");
     let last = Export { from: Some(5000), ..wanted(Form::Frames(film), &frames) };
     let written = export(&recorded, &last, &Unwatched).expect("written");
-    assert_eq!(written.film, Some((144, 10)));
+    assert_eq!(written.film, Some((145, 10)));
     let tables = export(&recorded, &wanted(Form::Csv(None), &place.path("csv")), &Unwatched);
     let names = |path: &PathBuf| path.file_name().map(|name| name.display().to_string());
     let names: Vec<_> = tables.expect("written").paths.iter().filter_map(names).collect();

@@ -14,14 +14,14 @@ struct Place {
 
 /// Something that a frog did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Event {
-    pub(super) cycle: Cycle,
-    pub(super) frog: Slot,
-    pub(super) what: What,
+pub(crate) struct Event {
+    pub(crate) cycle: Cycle,
+    pub(crate) frog: Slot,
+    pub(crate) what: What,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum What {
+pub(crate) enum What {
     Hop,
     Bump,
 }
