@@ -1,4 +1,4 @@
-//! Tools of the house, started by `cargo xtask`. Today there is one: `shape` counts the sources.
+//! Tools of the house, started by `cargo xtask`: `test` runs all tests, `shape` counts the sources.
 
 mod arguments;
 mod counts;
@@ -11,6 +11,7 @@ mod paths;
 mod rules;
 mod source;
 mod table;
+mod test;
 
 use std::process::ExitCode;
 
@@ -18,7 +19,13 @@ use arguments::{Arguments, Print};
 use members::Member;
 
 fn main() -> ExitCode {
-    match run(std::env::args().skip(1)) {
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    if let [task, chosen @ ..] = words.as_slice()
+        && task == "test"
+    {
+        return test::run(chosen);
+    }
+    match run(words.into_iter()) {
         Ok(text) => {
             print!("{text}");
             ExitCode::SUCCESS

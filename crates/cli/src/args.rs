@@ -8,7 +8,7 @@ const LAST: usize = 900;
 
 /// Simulate and compare decentralized multi-agent motion, with sensors that lie and wheels that slip.
 #[derive(Debug, Parser)]
-#[command(name = "sidestep", version, after_help = EXAMPLES, arg_required_else_help = true)]
+#[command(name = "sidestep", version = sidestep::BUILD, after_help = EXAMPLES, arg_required_else_help = true)]
 pub(crate) struct Cli {
     /// Print one JSON object on standard output and nothing else
     #[arg(long, global = true, display_order = LAST)]

@@ -5,6 +5,9 @@ use sidestep::experiment::Table;
 use std::fmt::Display;
 use std::io::{IsTerminal, Write};
 
+pub(crate) use sidestep::kernel::words::{aligned, grouped};
+pub(crate) use sidestep_session::report::duration;
+
 /// Columns of text where the terminal does not say how many it has.
 const DEFAULT_COLS: u16 = 100;
 
@@ -19,11 +22,6 @@ impl Console {
     /// A console for people, or for machines with `json`; `quiet` keeps to the result.
     pub(crate) fn new(json: bool, quiet: bool) -> Self {
         Self { json, quiet }
-    }
-
-    /// A console for nobody: what is part of something larger.
-    pub(crate) fn silent() -> Self {
-        Self { json: false, quiet: true }
     }
 
     /// Whether progress may be shown: to a person who has not asked for silence.
@@ -80,22 +78,6 @@ fn write_out(text: &str) {
     let _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());
 }
 
-/// A number with its thousands set apart by spaces: `1 234 567`.
-pub(crate) fn grouped(number: u64) -> String {
-    let digits = number.to_string();
-    let first = digits.len() % 3;
-    let (head, tail) = digits.split_at(first);
-    let groups = tail.as_bytes().chunks(3).map(|c| std::str::from_utf8(c).unwrap_or_default());
-    let head = (!head.is_empty()).then_some(head);
-    head.into_iter().chain(groups).collect::<Vec<_>>().join(" ")
-}
-
-/// Lines of names and values, the values below each other.
-pub(crate) fn aligned(rows: &[(String, String)]) -> String {
-    let width = rows.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0);
-    rows.iter().map(|(name, value)| format!("  {name:<width$}  {value}\n")).collect()
-}
-
 /// A table in columns, numbers to the right; what its cells say is left as it is.
 pub(crate) fn in_columns(table: &Table) -> String {
     let rows: Vec<Vec<&str>> = table.rows.iter().map(|row| table.cells(row).collect()).collect();
@@ -114,38 +96,4 @@ pub(crate) fn in_columns(table: &Table) -> String {
         format!("  {}\n", cells.join("   ").trim_end())
     };
     std::iter::once(&head).chain(&rows).map(line).collect()
-}
-
-/// Seconds as people say them: `0.83 s`, `4 min 12 s`, `2 h 05 min`.
-pub(crate) fn duration(seconds: f64) -> String {
-    let whole = seconds.round() as u64;
-    match whole {
-        0..60 => format!("{seconds:.2} s"),
-        60..3600 => format!("{} min {:02} s", whole / 60, whole % 60),
-        _ => format!("{} h {:02} min", whole / 3600, whole % 3600 / 60),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn thousands_are_set_apart() {
-        assert_eq!([0, 999, 1000].map(grouped), ["0", "999", "1 000"]);
-        assert_eq!(grouped(1_234_567), "1 234 567");
-    }
-
-    #[test]
-    fn durations_are_said_in_fitting_units() {
-        assert_eq!(duration(0.834), "0.83 s");
-        assert_eq!(duration(252.4), "4 min 12 s");
-        assert_eq!(duration(7500.0), "2 h 05 min");
-    }
-
-    #[test]
-    fn values_stand_below_each_other() {
-        let rows = [("a".into(), "1".into()), ("long".into(), "2".into())];
-        assert_eq!(aligned(&rows), "  a     1\n  long  2\n");
-    }
 }

@@ -1,8 +1,6 @@
-//! How the command ends: exit codes, and the failures behind them.
+//! Exit codes of the command.
 
-use sidestep::kernel::InputError;
-use sidestep::kernel::ports::RecordError;
-use sidestep_draw::DrawError;
+pub(crate) use sidestep_session::Error as Failure;
 
 /// The exit codes of `sidestep`; part of its interface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -25,49 +23,12 @@ impl From<ExitCode> for std::process::ExitCode {
     }
 }
 
-/// Why a command ends before its goal.
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum Failure {
-    /// Wrong input; says where and what would be right.
-    #[error(transparent)]
-    Input(#[from] InputError),
-    /// Something could not be stored.
-    #[error(transparent)]
-    Record(#[from] RecordError),
-    /// A picture could not be drawn.
-    #[error("the picture cannot be drawn: {0}")]
-    Draw(#[from] DrawError),
-    /// Stopped by Ctrl-C before there was anything to keep.
-    #[error("interrupted; nothing was written")]
-    Interrupted,
-    /// Anything else that stopped the work, with what helps.
-    #[error("{cause}\n  help: {remedy}")]
-    Stopped {
-        /// What happened.
-        cause: String,
-        /// What helps.
-        remedy: String,
-    },
-}
-
-impl Failure {
-    /// A stop with its remedy.
-    pub(crate) fn stopped(cause: impl Into<String>, remedy: impl Into<String>) -> Self {
-        Self::Stopped { cause: cause.into(), remedy: remedy.into() }
-    }
-
-    /// A file that could not be written.
-    pub(crate) fn write(path: &std::path::Path, error: &std::io::Error) -> Self {
-        let remedy = "check the folder, its permissions and the space on the disk";
-        Self::stopped(format!("cannot write {}: {error}", path.display()), remedy)
-    }
-
-    /// The code the process ends with.
-    pub(crate) fn exit_code(&self) -> ExitCode {
-        match self {
-            Self::Input(_) => ExitCode::WrongInput,
-            Self::Interrupted => ExitCode::Interrupted,
-            Self::Record(_) | Self::Draw(_) | Self::Stopped { .. } => ExitCode::Failed,
+impl From<&Failure> for ExitCode {
+    fn from(failure: &Failure) -> Self {
+        match failure {
+            Failure::Input(_) => Self::WrongInput,
+            Failure::Interrupted => Self::Interrupted,
+            Failure::Record(_) | Failure::Draw(_) | Failure::Stopped { .. } => Self::Failed,
         }
     }
 }

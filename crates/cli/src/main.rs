@@ -1,34 +1,29 @@
-//! The `sidestep` command: arguments -> plan -> run.
+//! The `sidestep` command: arguments -> plan -> session -> words.
 //!
 //! ```text
-//! args.rs      what can be typed                commands/*.rs   one file per command
-//! plan.rs      scenario + options -> a run      worlds/         the only place that knows worlds
-//! driver.rs    advances, records, checkpoints   report.rs       what a run says at its end
-//! sweep/       many runs of one scenario                  recording.rs    a run folder that grows
-//! film/        frames into files                rerun.rs        recorded runs, computed again
-//! exit.rs      how the command ends             console.rs      what it prints, and where
+//! args.rs      what can be typed                 commands/*.rs   one file per command
+//! plan.rs      options -> a scenario             sweep/          options -> a sweep; its words
+//! watch.rs     progress and Ctrl-C for sessions  progress.rs     bars on a terminal
+//! report.rs    a run's summary in words          pages.rs        documents as files
+//! exit.rs      how the command ends              console.rs      what it prints, and where
 //! ```
+//!
+//! What is done with runs is done by the crate `sidestep-session`.
 
 mod args;
 mod commands;
-mod compare;
 mod console;
-mod driver;
 mod exit;
-mod files;
-mod film;
 mod interrupt;
 mod pages;
-mod picture;
 mod plan;
 mod progress;
-mod recorded;
-mod recording;
 mod report;
-mod rerun;
 mod sweep;
+mod watch;
 
 use clap::Parser;
+use exit::ExitCode;
 
 fn main() -> std::process::ExitCode {
     let cli = args::Cli::parse();
@@ -37,7 +32,7 @@ fn main() -> std::process::ExitCode {
         Ok(code) => code.into(),
         Err(failure) => {
             console.error(&failure);
-            failure.exit_code().into()
+            ExitCode::from(&failure).into()
         }
     }
 }

@@ -1,10 +1,9 @@
 //! Reports as files: the page, its Markdown twin, and the pictures of that.
 
 use crate::exit::Failure;
-use crate::files::replace;
-use crate::picture::write_png;
 use sidestep::experiment::Document;
 use sidestep_report::{Rendered, SvgFile, render};
+use sidestep_session::{replace, write_png};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 

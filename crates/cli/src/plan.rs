@@ -5,7 +5,8 @@ use sidestep::kernel::{InputError, workers};
 use sidestep::scenario::Compiled;
 use sidestep::scenario::Source;
 use sidestep::worlds::WORLDS;
-use std::path::{Path, PathBuf};
+use sidestep_session::read;
+use std::path::PathBuf;
 
 /// The scenario, and what the command line changes in it.
 #[derive(Debug, Clone, Args)]
@@ -64,13 +65,7 @@ impl ScenarioArgs {
     /// # Errors
     /// When anything in it is wrong.
     pub(crate) fn compile(&self) -> Result<(Source, Box<dyn Compiled>), InputError> {
-        let overrides = self.all_overrides();
-        let source = source_of(&self.file, &overrides)?;
-        match WORLDS.compile(&source) {
-            Ok(compiled) => Ok((source, compiled)),
-            Err(error) if overrides.is_empty() => Err(error),
-            Err(error) => Err(in_the_file_itself(&self.file, error)),
-        }
+        read(WORLDS, &self.file, &self.all_overrides())
     }
 
     fn all_overrides(&self) -> Vec<String> {
@@ -87,32 +82,6 @@ impl ChangeArgs {
         all.extend(self.cycles.map(|cycles| format!("cycles={cycles}")));
         all.extend(self.regime.as_ref().map(|r| format!("regime=\"{r}\"")));
         all
-    }
-}
-
-/// The scenario in a file, or that a file of another form stands for, with overrides.
-///
-/// # Errors
-/// When it cannot be read, or an override does not fit.
-pub(crate) fn source_of(file: &Path, overrides: &[String]) -> Result<Source, InputError> {
-    match WORLDS.translate(file)? {
-        Some(foreign) => {
-            Source::new(file.display().to_string(), foreign.scenario?, "").with(overrides)
-        }
-        None => Source::read(file, overrides),
-    }
-}
-
-/// The same error where it stands in the file, if no override has brought it in: overrides
-/// may move lines.
-fn in_the_file_itself(file: &Path, error: InputError) -> InputError {
-    if !matches!(WORLDS.translate(file), Ok(None)) {
-        return error;
-    }
-    let plain = Source::read(file, &[]).and_then(|source| WORLDS.compile(&source).map(drop));
-    match plain {
-        Err(plain) if plain.cause() == error.cause() => plain,
-        _ => error,
     }
 }
 

@@ -8,11 +8,11 @@ use crate::console::{Console, grouped};
 
 /// How far a run is, or many of them.
 #[derive(Debug)]
-pub(crate) struct Progress(ProgressBar);
+pub(crate) struct Bar(ProgressBar);
 
-impl Progress {
+impl Bar {
     /// A bar from `from` to `until`; silent where nobody looks.
-    pub(crate) fn new(console: Console, from: Cycle, until: Cycle) -> Self {
+    pub(crate) fn of_cycles(console: Console, from: Cycle, until: Cycle) -> Self {
         let bar = bar(console, until);
         bar.set_style(style());
         bar.set_position(from);

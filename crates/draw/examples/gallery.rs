@@ -6,21 +6,18 @@ use std::path::{Path, PathBuf};
 use std::{env, error::Error, fs};
 
 use sidestep_draw::{
-    Axis, Bar, BarChart, BarSeries, Histogram, Matrix, Options, Plot, Point, Series, Style, draw,
-    to_png,
+    Axis, Bar, BarChart, BarSeries, DrawError, Histogram, Matrix, Options, Plot, Point, Series,
+    Style, draw, to_png,
 };
 use sidestep_kernel::view::{
-    Body, Condition, Floor, Frame, Kind, Occupancy, Place, Pose, Scenery, Shape, Trail,
+    Body, Condition, Floor, Frame, Kind, Occupancy, Pose, Scenery, Shape, Trail,
 };
 
 fn main() -> Result<(), Box<dyn Error>> {
     let folder = PathBuf::from(env::args_os().nth(1).ok_or("usage: gallery OUTDIR")?);
     fs::create_dir_all(&folder)?;
     let chart = Style::CHART;
-    save(&folder, "tracks", &picture(&corridor())?)?;
-    save(&folder, "city", &picture(&city())?)?;
-    save(&folder, "convoy", &picture(&convoy())?)?;
-    save(&folder, "snake", &picture(&snake())?)?;
+    save(&folder, "tracks", &corridor()?)?;
     save(&folder, "speed-up", &speed_up().to_svg(&chart)?)?;
     save(&folder, "density", &density().to_svg(&chart)?)?;
     save(&folder, "contacts", &contacts().to_svg(&chart)?)?;
@@ -36,30 +33,8 @@ fn save(folder: &Path, name: &str, svg: &str) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// What a picture is made of.
-type Scene = (Scenery, Frame, Vec<Trail>);
-
-fn picture((scenery, frame, trails): &Scene) -> Result<String, Box<dyn Error>> {
-    Ok(draw(scenery, frame, trails, &Options::page(scenery, "Made-up places."))?)
-}
-
-fn scenery(name: &str, dimensions: u8) -> Scenery {
-    Scenery {
-        name: name.into(),
-        dimensions,
-        cycle_s: 1.0,
-        floor: None,
-        bodies: Vec::new(),
-        names: Vec::new(),
-    }
-}
-
-fn moment(bodies: Vec<Body>) -> Frame {
-    Frame { bodies, ..Frame::default() }
-}
-
 /// A corridor with rooms on both sides, three robots and two people.
-fn corridor() -> Scene {
+fn corridor() -> Result<String, DrawError> {
     const PLAN: [&str; 14] = [
         "##################################",
         "#          #          #          #",
@@ -114,65 +89,17 @@ fn corridor() -> Scene {
         body(Kind::Person, 7, (29.5, 10.5), (1.0, 1.0)),
     ];
     let bodies = (0..).zip(&ways).map(robot).chain(others).collect();
-    let scenery = Scenery { floor: Some(floor), ..scenery("To and fro on the corridor", 2) };
-    (scenery, moment(bodies), (0..).zip(&ways).map(trail).collect())
-}
-
-/// Blocks of houses on 2000 x 2000 boxes, with wanderers of 100 000 steps.
-fn city() -> Scene {
-    const SIDE: u32 = 2000;
-    let house = |col: u32, row: u32| {
-        let (x, y) = (col % 160, row % 125);
-        let wall = |v: u32, side: u32| v == 20 || v == side - 20;
-        let inside = (20..=140).contains(&x) && (20..=105).contains(&y);
-        inside && (wall(x, 160) || wall(y, 125) || (x == 80 && y > 40)) && !(70..78).contains(&x)
+    let scenery = Scenery {
+        name: "To and fro on the corridor".into(),
+        dimensions: 2,
+        cycle_s: 1.0,
+        floor: Some(floor),
+        bodies: Vec::new(),
+        names: Vec::new(),
     };
-    let occupancy = |at: u32| match house(at % SIDE, at / SIDE) {
-        true => Occupancy::Wall,
-        false => Occupancy::Free,
-    };
-    let floor = Floor {
-        width: SIDE,
-        height: SIDE,
-        box_m: 1.0,
-        origin_m: [0.0; 2],
-        boxes: (0..SIDE * SIDE).map(occupancy).collect(),
-    };
-    let trails: Vec<Trail> = (0..6).map(wanderer).collect();
-    let size_m = [7.0, 7.0, 1.0];
-    let robot = |trail: &Trail| {
-        let (kind, number, _) = trail.of;
-        let (_, at) = trail.way[trail.way.len() - 1];
-        Body::new(kind, number, Pose::at(at), Shape::Cuboid { size_m })
-    };
-    let frame = moment(trails.iter().map(robot).collect());
-    (Scenery { floor: Some(floor), ..scenery("Wanderers in a city block", 2) }, frame, trails)
-}
-
-/// A walk along the streets of the city, turning by a small fixed rule.
-fn wanderer(number: u32) -> Trail {
-    let (mut x, mut y) =
-        (f64::from(160 * (number % 12)) + 3.5, f64::from(125 * (number % 15)) + 3.5);
-    let mut state = number * 7919 + 1;
-    let mut way = vec![(0, [x, y, 0.0])];
-    while way.len() < 100_000 {
-        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        let (dx, dy, steps) = match state >> 30 {
-            0 => (1.0, 0.0, 160),
-            1 => (0.0, 1.0, 125),
-            2 => (-1.0, 0.0, 160),
-            _ => (0.0, -1.0, 125),
-        };
-        let (end_x, end_y) = (x + dx * f64::from(steps), y + dy * f64::from(steps));
-        if !(0.0..2000.0).contains(&end_x) || !(0.0..2000.0).contains(&end_y) {
-            continue;
-        }
-        for k in 1..=steps {
-            way.push((way.len() as u64, [x + dx * f64::from(k), y + dy * f64::from(k), 0.0]));
-        }
-        (x, y) = (end_x, end_y);
-    }
-    Trail { of: (Kind::Robot, number, None), way }
+    let frame = Frame { bodies, ..Frame::default() };
+    let trails: Vec<Trail> = (0..).zip(&ways).map(trail).collect();
+    draw(&scenery, &frame, &trails, &Options::page(&scenery, "Made-up places."))
 }
 
 const WORKERS: [f64; 5] = [1.0, 2.0, 4.0, 8.0, 16.0];
@@ -255,81 +182,4 @@ fn confusion() -> Result<Matrix, Box<dyn Error>> {
         .titles("true", "reported")
         .subscripts(counts)?
         .note("Small: counts. No robot was seen in the log."))
-}
-
-/// Numbers from 0 to 1 that look random (the mixing step of splitmix64).
-fn scatter(k: u32, stream: u32) -> f64 {
-    let mut z = (u64::from(k) << 8 | u64::from(stream)).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    (z >> 40) as f64 / f64::from(1 << 24)
-}
-
-/// Connectors and the rods between them.
-fn chain(places: impl Iterator<Item = Place>, radius_m: f64, thickness_m: f64) -> Vec<Body> {
-    let points_m: Vec<Place> = places.collect();
-    let ball = |(part, at): (u32, &Place)| {
-        Body::new(Kind::Connector, 0, Pose::at(*at), Shape::Sphere { radius_m }).part(part)
-    };
-    let connectors: Vec<Body> = (0..).zip(&points_m).map(ball).collect();
-    let rods = Shape::Line { points_m, thickness_m };
-    [Body::new(Kind::Rods, 0, Pose::at([0.0; 3]), rods)].into_iter().chain(connectors).collect()
-}
-
-fn obstacle(number: u32, at: Place, shape: Shape) -> Body {
-    Body::new(Kind::Obstacle, number, Pose::at(at), shape)
-}
-
-/// A leader and its followers in a bent corridor.
-fn convoy() -> Scene {
-    // A place so far along the middle of the corridor and to its left: a quarter circle, then
-    // straight on.
-    let line = |s_m: f64, aside_m: f64| -> Place {
-        let angle = s_m / 4.0 - std::f64::consts::FRAC_PI_2;
-        let (r, turned) = (4.0 - aside_m, angle.min(0.0));
-        [r * turned.cos(), r * turned.sin() + 4.0 * angle.max(0.0), 0.0]
-    };
-    let wall = |aside_m: f64| {
-        let points_m = (0..=70).map(|k| line(0.2 * f64::from(k), aside_m)).collect();
-        obstacle(0, [0.0; 3], Shape::Line { points_m, thickness_m: 0.0 })
-    };
-    let disc = |at, velocity| {
-        obstacle(2, at, Shape::Cylinder { radius_m: 0.3, height_m: 0.1 }).moving(velocity)
-    };
-    let mut frame = moment(chain((0..16).map(|k| line(12.0 - 0.7 * f64::from(k), 0.0)), 0.25, 0.1));
-    let movers = [([1.2, 0.4, 0.0], [0.5, 0.4, 0.0]), ([4.4, 6.6, 0.0], [-0.3, -0.9, 0.0])];
-    frame.bodies.extend(movers.map(|(at, velocity)| disc(at, velocity)));
-    let scenery = Scenery {
-        bodies: vec![
-            wall(-1.0),
-            wall(1.0),
-            obstacle(1, [1.0, 2.5, 0.0], Shape::Cuboid { size_m: [1.6, 0.8, 0.1] }),
-        ],
-        names: vec![(Kind::Connector, 0, "leader and 15 followers".into())],
-        ..scenery("A convoy in a bent corridor", 2)
-    };
-    let way =
-        (0..120u32).map(|k| (k.into(), line(0.1 * f64::from(k), 0.2 * (0.4 * f64::from(k)).sin())));
-    (scenery, frame, vec![Trail { of: (Kind::Connector, 0, Some(0)), way: way.collect() }])
-}
-
-/// 450 connectors among 1000 spheres.
-fn snake() -> Scene {
-    let at = |k: u32| {
-        let t = f64::from(k) * 0.03;
-        [5.5 * (0.5 * t).cos(), 5.0 * (0.37 * t).sin(), 4.5 * (0.23 * t).sin()]
-    };
-    let sphere = |k: u32| {
-        let at = [0, 1, 2].map(|axis| 12.0 * scatter(k, axis) - 6.0);
-        let velocity = if k.is_multiple_of(100) { [0.8, 0.5, 0.6] } else { [0.0; 3] };
-        obstacle(k, at, Shape::Sphere { radius_m: 0.35 }).moving(velocity)
-    };
-    let boxes = [[-5.0, 5.0, 5.5], [5.0, -5.0, -3.0]]
-        .map(|at| obstacle(0, at, Shape::Cuboid { size_m: [1.6, 1.2, 2.0] }));
-    let scenery = Scenery {
-        bodies: (0..1000).map(sphere).chain(boxes).collect(),
-        names: vec![(Kind::Connector, 0, "450 connectors".into())],
-        ..scenery("A snake in space", 3)
-    };
-    (scenery, moment(chain((0..450).map(at), 0.06, 0.08)), Vec::new())
 }

@@ -10,7 +10,7 @@ use sidestep_kernel::view::{
 
 const WHITE: [u8; 3] = [255, 255, 255];
 /// The first robot's blue at 50 % on white.
-const RIBBON: [u8; 3] = [128, 185, 217];
+const RIBBON: [u8; 3] = [127, 184, 216];
 /// Side of a box.
 const BOX_M: f64 = 0.25;
 

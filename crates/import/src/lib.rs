@@ -21,6 +21,7 @@ pub mod stage;
 pub mod table;
 pub mod traffic;
 pub mod urdf;
+pub mod write;
 mod xml;
 
 #[cfg(test)]

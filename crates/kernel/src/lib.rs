@@ -15,6 +15,7 @@
 //! - [`workers`], [`cycle`]: the same bits for every number of workers.
 //! - [`digest`], [`checkpoint`]: a state has one digest, and continues bit for bit.
 //! - [`view`]: what can be seen of any world; looking changes nothing.
+//! - [`math`], [`distr`], [`geometry`]: numbers that are the same on every platform.
 //! - [`ports`]: recorder, transport and clock, each with an in-memory version.
 
 pub mod checkpoint;
@@ -25,7 +26,9 @@ pub mod digest;
 pub mod distr;
 pub mod engine;
 pub mod error;
+pub mod geometry;
 pub mod math;
+pub mod plan;
 pub mod ports;
 pub mod run;
 pub mod simulation;
@@ -40,7 +43,8 @@ pub mod world;
 pub use column::Column;
 pub use digest::Digest;
 pub use error::InputError;
-pub use run::{Plan, Run};
+pub use plan::{Effort, Plan};
+pub use run::Run;
 pub use simulation::Simulation;
 pub use units::{Cycle, EntityId, Seed, Slot};
 pub use world::{Phases, Turn, World};

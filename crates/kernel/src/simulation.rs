@@ -3,8 +3,8 @@
 use crate::checkpoint::CheckpointError;
 use crate::cycle::PhaseTimes;
 use crate::digest::Digest;
+use crate::plan::Plan;
 use crate::ports::{RecordError, Recorder, TableSchema};
-use crate::run::Plan;
 use crate::units::Cycle;
 use crate::view::{Frame, Look, PlaceRows, Scenery};
 use crate::words::{Lines, Said};

@@ -9,8 +9,8 @@
 use crate::checkpoint::CheckpointError;
 use crate::conflict::Groups;
 use crate::digest::Digest;
+use crate::plan::Effort;
 use crate::ports::{Clock, RecordError, Recorder, TableSchema};
-use crate::run::Effort;
 use crate::units::{Cycle, Slot};
 use crate::view::{Frame, Look, PlaceRows, Scenery};
 use crate::words::{Lines, Said};

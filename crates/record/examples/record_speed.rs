@@ -38,20 +38,15 @@ fn main() {
 }
 
 fn schema() -> TableSchema {
-    let column = |name: &str, ty, labels: &[&str]| ColumnSpec {
-        name: name.into(),
-        ty,
-        meaning: String::new(),
-        labels: labels.iter().map(ToString::to_string).collect(),
-    };
+    let column = |name: &str, ty| ColumnSpec::new(name, ty, "");
     TableSchema {
         name: "trajectories".into(),
         columns: vec![
-            column("cycle", ColumnType::U64, &[]),
-            column("robot", ColumnType::U32, &[]),
-            column("col", ColumnType::U32, &[]),
-            column("row", ColumnType::U32, &[]),
-            column("heading", ColumnType::Label, &["east", "north", "west", "south"]),
+            column("cycle", ColumnType::U64),
+            column("robot", ColumnType::U32),
+            column("col", ColumnType::U32),
+            column("row", ColumnType::U32),
+            ColumnSpec::label("heading", "", ["east", "north", "west", "south"]),
         ],
     }
 }
@@ -95,11 +90,11 @@ fn block(
         }
     }
     vec![
-        Values::U64(cycle),
-        Values::U32(robot),
-        Values::U32(col),
-        Values::U32(row),
-        Values::Label(heading),
+        Values::U64(cycle.into()),
+        Values::U32(robot.into()),
+        Values::U32(col.into()),
+        Values::U32(row.into()),
+        Values::Label(heading.into()),
     ]
 }
 

@@ -25,6 +25,8 @@ const LOCK: &str = "run.lock";
 pub struct NewRun {
     /// The world to simulate, e.g. `robots`.
     pub world: String,
+    /// The build that makes it.
+    pub build: String,
     /// Where its rows will come from.
     pub origin: Origin,
     /// Cycles that the scenario asks for.
@@ -71,7 +73,8 @@ impl RunFolder {
         check_vacant(path, existing)?;
         let staging = Staging::new(path)?;
         let Origin { program_version, scenario, seed } = &run.origin;
-        let manifest = manifest::begin(&run.world, *seed, program_version, run.cycles_planned);
+        let begun = manifest::begin(&run.world, *seed, program_version, run.cycles_planned);
+        let manifest = Manifest { build: Some(run.build.clone()), ..begun };
         fill(staging.path(), &manifest, scenario)
             .map_err(|e| cannot_make(path, format!("{}: {}", e.place, e.cause)))?;
         // Nobody may be writing the run that is about to be deleted.

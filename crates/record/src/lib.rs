@@ -12,10 +12,10 @@ pub mod folder;
 pub mod format;
 pub mod manifest;
 pub mod mcap;
-pub mod nullable;
 pub mod parquet;
 pub mod read;
 pub mod sweep;
+pub mod whole;
 
 pub use folder::{Existing, NewRun, ResumePoint, RunFolder, RunView};
 pub use format::FormatVersion;
@@ -25,3 +25,4 @@ pub use parquet::ParquetRecorder;
 pub use read::{Table, for_each_block, read_table, tables};
 pub use schema::Origin;
 pub use table_file::TableFile;
+pub use whole::WholeTable;

@@ -29,6 +29,9 @@ pub struct Manifest {
     pub format: FormatVersion,
     /// Version of the program that made the run.
     pub program_version: String,
+    /// Its build; early folders do not name it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub build: Option<String>,
     /// The world that was simulated, e.g. `robots`.
     pub world: String,
     /// The seed.
@@ -106,6 +109,7 @@ pub(crate) fn begin(
     Manifest {
         format: format::CURRENT,
         program_version: program_version.to_string(),
+        build: None,
         world: world.to_string(),
         seed,
         status: Status::Running,

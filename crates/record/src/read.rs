@@ -5,16 +5,16 @@ use std::fs::File;
 use std::ops::{Bound, RangeBounds};
 use std::path::{Path, PathBuf};
 
-use parquet::basic::Type as PhysicalType;
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
-use parquet::data_type::{ByteArray, DataType};
+use parquet::data_type::{ByteArray, ByteArrayType, DataType};
 use parquet::errors::{ParquetError, Result as ParquetResult};
 use parquet::file::metadata::{ColumnChunkMetaData, ParquetMetaData, RowGroupMetaData};
 use parquet::file::reader::{ChunkReader, FileReader, Length};
 use parquet::file::serialized_reader::SerializedFileReader;
 use parquet::file::statistics::Statistics;
 use sidestep_kernel::InputError;
-use sidestep_kernel::ports::{ColumnSpec, ColumnType, TableSchema, Values};
+use sidestep_kernel::ports::table::Texts;
+use sidestep_kernel::ports::{Cells, ColumnSpec, ColumnType, TableSchema, Values};
 
 use crate::disk;
 use crate::format::FormatVersion;
@@ -236,8 +236,8 @@ impl<'a> Part<'a> {
         let fits = |(i, c): (usize, &ColumnSpec)| {
             let column = stored.column(i);
             column.name() == c.name
-                && column.physical_type() == physical_type(c.ty)
-                && column.max_def_level() == 0
+                && column.physical_type() == schema::physical_type(c.ty)
+                && column.max_def_level() == i16::from(c.is_nullable)
                 && column.max_rep_level() == 0
         };
         let columns = &self.schema.columns;
@@ -349,15 +349,6 @@ fn extent(group: &RowGroupMetaData) -> Option<(u64, u64)> {
     Some((start, end - start))
 }
 
-fn physical_type(ty: ColumnType) -> PhysicalType {
-    match ty {
-        ColumnType::U32 | ColumnType::I32 => PhysicalType::INT32,
-        ColumnType::U64 => PhysicalType::INT64,
-        ColumnType::F64 => PhysicalType::DOUBLE,
-        ColumnType::Label => PhysicalType::BYTE_ARRAY,
-    }
-}
-
 /// Smallest and largest cycle of a row group, where stored.
 fn bounds(group: &RowGroupMetaData, column: usize) -> Option<(u64, u64)> {
     match group.column(column).statistics()? {
@@ -383,34 +374,89 @@ fn append(columns: &mut [Values], rows: Vec<Values>, cycle: Option<usize>, cycle
 }
 
 fn read_column(reader: ColumnReader, spec: &ColumnSpec) -> ParquetResult<Values> {
+    use ColumnReader::{
+        BoolColumnReader, ByteArrayColumnReader, DoubleColumnReader, Int32ColumnReader,
+        Int64ColumnReader,
+    };
+    let nullable = spec.is_nullable;
     Ok(match (reader, spec.ty) {
-        (ColumnReader::Int32ColumnReader(r), ColumnType::U32) => {
-            Values::U32(read_values(r, |v| Ok(v as u32))?)
+        (Int32ColumnReader(r), ColumnType::U32) => {
+            Values::U32(read_cells(r, nullable, |v| Ok(v as u32))?)
         }
-        (ColumnReader::Int32ColumnReader(r), _) => Values::I32(read_values(r, Ok)?),
-        (ColumnReader::Int64ColumnReader(r), _) => Values::U64(read_values(r, |v| Ok(v as u64))?),
-        (ColumnReader::DoubleColumnReader(r), _) => Values::F64(read_values(r, Ok)?),
-        (ColumnReader::ByteArrayColumnReader(r), _) => {
+        (Int32ColumnReader(r), ColumnType::I32) => Values::I32(read_cells(r, nullable, Ok)?),
+        (Int64ColumnReader(r), ColumnType::U64) => {
+            Values::U64(read_cells(r, nullable, |v| Ok(v as u64))?)
+        }
+        (Int64ColumnReader(r), ColumnType::I64) => Values::I64(read_cells(r, nullable, Ok)?),
+        (DoubleColumnReader(r), ColumnType::F64) => Values::F64(read_cells(r, nullable, Ok)?),
+        (BoolColumnReader(r), ColumnType::Bool) => Values::Bool(read_cells(r, nullable, Ok)?),
+        (ByteArrayColumnReader(r), ColumnType::Label) => {
             let mut index = LabelIndex::new(spec);
-            Values::Label(read_values(r, |label| index.of(&label))?)
+            Values::Label(read_cells(r, nullable, |label| index.of(&label))?)
         }
+        (ByteArrayColumnReader(r), ColumnType::Text) => Values::Text(read_texts(r, nullable)?),
         _ => return Err(ParquetError::General(format!("column `{}` has another type", spec.name))),
     })
 }
 
-/// Reads a column to its end.
-fn read_values<T: DataType, V>(
-    mut reader: ColumnReaderImpl<T>,
+/// Reads a column of numbers, truth values or labels to its end.
+pub(crate) fn read_cells<T: DataType, V: Clone + Default>(
+    reader: ColumnReaderImpl<T>,
+    is_nullable: bool,
     mut convert: impl FnMut(T::T) -> ParquetResult<V>,
-) -> ParquetResult<Vec<V>> {
-    let (mut values, mut batch) = (Vec::new(), Vec::new());
-    loop {
-        let (_, read, _) = reader.read_records(BATCH, None, None, &mut batch)?;
-        if read == 0 {
-            return Ok(values);
+) -> ParquetResult<Cells<V>> {
+    if is_nullable {
+        let mut cells = Cells::default();
+        read_values(reader, true, |v| {
+            cells.push(v.map(&mut convert).transpose()?);
+            Ok(())
+        })?;
+        return Ok(cells);
+    }
+    let mut values = Vec::new();
+    read_values(reader, false, |v| {
+        if let Some(v) = v {
+            values.push(convert(v)?);
         }
-        for value in batch.drain(..) {
-            values.push(convert(value)?);
+        Ok(())
+    })?;
+    Ok(values.into())
+}
+
+/// Reads a column of text to its end.
+pub(crate) fn read_texts(
+    reader: ColumnReaderImpl<ByteArrayType>,
+    is_nullable: bool,
+) -> ParquetResult<Texts> {
+    let mut texts = Texts::default();
+    read_values(reader, is_nullable, |bytes| {
+        texts.push(bytes.as_ref().map(ByteArray::as_utf8).transpose()?);
+        Ok(())
+    })?;
+    Ok(texts)
+}
+
+/// Hands over the values of a column, `None` for a missing one.
+fn read_values<T: DataType>(
+    mut reader: ColumnReaderImpl<T>,
+    is_nullable: bool,
+    mut each: impl FnMut(Option<T::T>) -> ParquetResult<()>,
+) -> ParquetResult<()> {
+    let (mut levels, mut batch) = (Vec::new(), Vec::new());
+    loop {
+        levels.clear();
+        let wanted = is_nullable.then_some(&mut levels);
+        let (rows, ..) = reader.read_records(BATCH, wanted, None, &mut batch)?;
+        if rows == 0 {
+            return Ok(());
+        }
+        let mut present = batch.drain(..);
+        if is_nullable {
+            for level in &levels {
+                each(if *level == 0 { None } else { present.next() })?;
+            }
+        } else {
+            present.try_for_each(|value| each(Some(value)))?;
         }
     }
 }

@@ -1,5 +1,6 @@
 //! A table's schema as Parquet knows it, and the key-value pairs in every file.
 
+use std::ops::Not;
 use std::sync::Arc;
 
 use parquet::basic::{LogicalType, Repetition, Type as PhysicalType};
@@ -41,45 +42,29 @@ pub struct Origin {
 #[derive(Debug, Serialize, Deserialize)]
 struct ColumnEntry {
     name: String,
-    #[serde(rename = "type")]
-    ty: TypeName,
+    #[serde(rename = "type", with = "type_name")]
+    ty: ColumnType,
     meaning: String,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     labels: Vec<String>,
+    #[serde(default, skip_serializing_if = "Not::not")]
+    nullable: bool,
 }
 
-/// The names of the column types in [`COLUMNS`].
-#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-enum TypeName {
-    U32,
-    U64,
-    I32,
-    F64,
-    Label,
-}
+/// Column types by their names in [`COLUMNS`].
+mod type_name {
+    use serde::de::{Deserialize, Deserializer, Error};
+    use serde::ser::Serializer;
+    use sidestep_kernel::ports::ColumnType;
 
-impl From<ColumnType> for TypeName {
-    fn from(ty: ColumnType) -> Self {
-        match ty {
-            ColumnType::U32 => Self::U32,
-            ColumnType::U64 => Self::U64,
-            ColumnType::I32 => Self::I32,
-            ColumnType::F64 => Self::F64,
-            ColumnType::Label => Self::Label,
-        }
+    pub(super) fn serialize<S: Serializer>(ty: &ColumnType, to: S) -> Result<S::Ok, S::Error> {
+        to.serialize_str(ty.name())
     }
-}
 
-impl From<TypeName> for ColumnType {
-    fn from(name: TypeName) -> Self {
-        match name {
-            TypeName::U32 => Self::U32,
-            TypeName::U64 => Self::U64,
-            TypeName::I32 => Self::I32,
-            TypeName::F64 => Self::F64,
-            TypeName::Label => Self::Label,
-        }
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<ColumnType, D::Error> {
+        let name = String::deserialize(from)?;
+        ColumnType::from_name(&name)
+            .ok_or_else(|| D::Error::custom(format!("there is no column type `{name}`")))
     }
 }
 
@@ -112,25 +97,39 @@ fn repeated<'a>(texts: impl Iterator<Item = &'a String>) -> Option<&'a String> {
     sorted.windows(2).find(|pair| pair[0] == pair[1]).map(|pair| pair[0])
 }
 
-/// The Parquet schema: required columns, unsigned integers marked as such, labels as text.
+/// The Parquet schema: unsigned integers marked as such, labels as text, columns required unless
+/// values may be missing.
 pub(crate) fn parquet_schema(schema: &TableSchema) -> Result<TypePtr> {
     let fields = schema.columns.iter().map(field).collect::<Result<_>>()?;
     Ok(Arc::new(Type::group_type_builder("schema").with_fields(fields).build()?))
 }
 
 fn field(column: &ColumnSpec) -> Result<TypePtr> {
-    let (physical, logical) = match column.ty {
-        ColumnType::U32 => (PhysicalType::INT32, Some(LogicalType::integer(32, false))),
-        ColumnType::I32 => (PhysicalType::INT32, Some(LogicalType::integer(32, true))),
-        ColumnType::U64 => (PhysicalType::INT64, Some(LogicalType::integer(64, false))),
-        ColumnType::F64 => (PhysicalType::DOUBLE, None),
-        ColumnType::Label => (PhysicalType::BYTE_ARRAY, Some(LogicalType::String)),
+    let logical = match column.ty {
+        ColumnType::U32 => Some(LogicalType::integer(32, false)),
+        ColumnType::I32 => Some(LogicalType::integer(32, true)),
+        ColumnType::U64 => Some(LogicalType::integer(64, false)),
+        ColumnType::I64 => Some(LogicalType::integer(64, true)),
+        ColumnType::F64 | ColumnType::Bool => None,
+        ColumnType::Label | ColumnType::Text => Some(LogicalType::String),
     };
-    let field = Type::primitive_type_builder(&column.name, physical)
-        .with_repetition(Repetition::REQUIRED)
+    let repetition = if column.is_nullable { Repetition::OPTIONAL } else { Repetition::REQUIRED };
+    let field = Type::primitive_type_builder(&column.name, physical_type(column.ty))
+        .with_repetition(repetition)
         .with_logical_type(logical)
         .build()?;
     Ok(Arc::new(field))
+}
+
+/// How Parquet stores the values of a column.
+pub(crate) fn physical_type(ty: ColumnType) -> PhysicalType {
+    match ty {
+        ColumnType::U32 | ColumnType::I32 => PhysicalType::INT32,
+        ColumnType::U64 | ColumnType::I64 => PhysicalType::INT64,
+        ColumnType::F64 => PhysicalType::DOUBLE,
+        ColumnType::Bool => PhysicalType::BOOLEAN,
+        ColumnType::Label | ColumnType::Text => PhysicalType::BYTE_ARRAY,
+    }
 }
 
 /// The key-value pairs of a file of `schema`.
@@ -154,9 +153,10 @@ pub(crate) fn key_value<'a>(metadata: &'a ParquetMetaData, key: &str) -> Option<
 fn columns_to_json(columns: &[ColumnSpec]) -> String {
     let entry = |c: &ColumnSpec| ColumnEntry {
         name: c.name.clone(),
-        ty: c.ty.into(),
+        ty: c.ty,
         meaning: c.meaning.clone(),
         labels: c.labels.clone(),
+        nullable: c.is_nullable,
     };
     let entries: Vec<_> = columns.iter().map(entry).collect();
     serde_json::to_string(&entries).expect("texts and lists always become JSON")
@@ -170,9 +170,10 @@ pub(crate) fn columns_from_json(text: &str) -> serde_json::Result<Vec<ColumnSpec
     let entries: Vec<ColumnEntry> = serde_json::from_str(text)?;
     let spec = |e: ColumnEntry| ColumnSpec {
         name: e.name,
-        ty: e.ty.into(),
+        ty: e.ty,
         meaning: e.meaning,
         labels: e.labels,
+        is_nullable: e.nullable,
     };
     Ok(entries.into_iter().map(spec).collect())
 }

@@ -1,6 +1,6 @@
 //! Speed of the robots world: robot-cycles per CPU second, speed-up, and their like.
 //!
-//! `cargo bench -p sidestep --bench robots [-- PART ...]` with the parts `rates`, `teams`,
+//! `cargo bench -p sidestep [-- PART ...]` with the parts `rates`, `teams`,
 //! `corridor`, `loop` and `recording`; every figure is a ratio or a rate taken
 //! in one run, since the machine may be noisy. Sensors and effectors are both unreliable.
 

@@ -76,3 +76,22 @@ pub use sidestep_map::{Cell, GridMap, office, planning};
 pub use sidestep_robots::learn;
 pub use sidestep_scenario as scenario;
 pub use sidestep_statistics as statistics;
+
+/// The version.
+pub const VERSION: &str = env!("CARGO_PKG_VERSION");
+
+/// The build: the version and a digest over the sources that results follow from, as
+/// `0.1.0+0123456789ab`. Only the build that began a run or a sweep goes on with it.
+pub const BUILD: &str = env!("SIDESTEP_BUILD");
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_build_out_of_the_repository_has_an_identity() {
+        let digest = BUILD.strip_prefix(VERSION).and_then(|rest| rest.strip_prefix('+'));
+        let digest = digest.expect("version, plus, digest");
+        assert!(digest.len() == 12 && digest.bytes().all(|b| b.is_ascii_hexdigit()), "{BUILD}");
+    }
+}

@@ -2,7 +2,6 @@
 
 use crate::console::{Console, aligned, grouped};
 use crate::exit::{ExitCode, Failure};
-use crate::files::replace;
 use crate::plan::{ScenarioArgs, of_world};
 use clap::Args;
 use sidestep::kernel::InputError;
@@ -10,6 +9,7 @@ use sidestep::worlds::robots::exact::{
     Beam, Comparison, Model, POLICIES, PomdpOptions, PomdpSize, Summary, compare, policy,
 };
 use sidestep::worlds::robots::scenario::Compiled;
+use sidestep_session::replace;
 use std::io::Write;
 use std::path::PathBuf;
 

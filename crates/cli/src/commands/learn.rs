@@ -2,8 +2,6 @@
 
 use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
-use crate::files::replace;
-use crate::recorded::csv_table;
 use clap::{Args, Subcommand};
 use serde::Serialize;
 use sidestep::kernel::InputError;
@@ -12,6 +10,7 @@ use sidestep::learn::effector::{self, EffectorModel};
 use sidestep::learn::profile;
 use sidestep::learn::sensor::{self, SensorModel, SensorOptions};
 use sidestep::scenario::file::read_text;
+use sidestep_session::{csv_table, replace};
 use std::fmt::Display;
 use std::io::Write;
 use std::path::PathBuf;

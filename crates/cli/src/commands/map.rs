@@ -2,7 +2,6 @@
 
 use crate::console::{Console, columns};
 use crate::exit::{ExitCode, Failure};
-use crate::picture::write_png;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use sidestep::import::{map_file, rosmap};
@@ -10,6 +9,7 @@ use sidestep::kernel::InputError;
 use sidestep::kernel::view::{Frame, Scenery};
 use sidestep::map::{CellCounts, GridMap, UnknownPolicy};
 use sidestep_draw::{Options, draw};
+use sidestep_session::write_png;
 use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\

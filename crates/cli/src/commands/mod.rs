@@ -5,7 +5,7 @@ mod check;
 mod compare;
 mod exact;
 mod export;
-pub(crate) mod finish;
+mod finish;
 mod fk;
 mod ik;
 mod learn;

@@ -1,18 +1,17 @@
 //! `sidestep resume`: goes on with a run that was stopped or killed.
 
-use super::finish::{Journey, travel};
+use super::finish::travel;
 use crate::console::{Console, grouped};
 use crate::exit::{ExitCode, Failure};
 use crate::interrupt;
 use crate::plan::WorkersArg;
-use crate::recording::{Recording, restore};
-use crate::sweep::{Folder, go_on};
+use crate::sweep::go_on;
 use clap::Args;
 use sidestep::kernel::{Cycle, InputError};
-use sidestep::scenario::Source;
 use sidestep::worlds::WORLDS;
-use sidestep_record::RunFolder;
-use std::path::{Path, PathBuf};
+use sidestep_session::Journey;
+use sidestep_session::sweep::Folder;
+use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -47,16 +46,11 @@ pub(crate) fn resume(args: &ResumeArgs, console: Console) -> Result<ExitCode, Fa
     if Folder::is_at(&args.folder) {
         return resume_sweep(args, console);
     }
-    let (folder, point) = RunFolder::resume(&args.folder)?;
     let workers = args.workers.count();
-    let source = Source::new(scenario_place(&args.folder), folder.scenario(), &args.folder);
-    let mut run = WORLDS.compile(&source)?.start(&source, workers);
-    restore(run.as_mut(), &point, &args.folder)?;
-    check_end(args.cycles, run.cycle(), run.plan().cycles)?;
     interrupt::listen()?;
-    console.note(format!("Continuing {} at cycle {}", args.folder.display(), grouped(run.cycle())));
-    let recording = Some(Recording::begin(folder, run.as_mut())?);
-    let journey = Journey { run, recording, film: None, workers, until: args.cycles, told: None };
+    let journey = Journey::resume(WORLDS, &args.folder, workers, args.cycles)?;
+    let cycle = grouped(journey.cycle());
+    console.note(format!("Continuing {} at cycle {cycle}", args.folder.display()));
     travel(journey, console)
 }
 
@@ -71,19 +65,4 @@ fn resume_sweep(args: &ResumeArgs, console: Console) -> Result<ExitCode, Failure
         return Err(InputError::new(args.folder.display(), "the sweep is done", remedy).into());
     }
     go_on(&folder, args.workers.count(), console)
-}
-
-/// How errors name a run folder's scenario.
-pub(super) fn scenario_place(folder: &Path) -> String {
-    folder.join("scenario.toml").display().to_string()
-}
-
-fn check_end(asked: Option<Cycle>, now: Cycle, planned: Cycle) -> Result<(), InputError> {
-    let Some(end) = asked.filter(|end| !(now..=planned).contains(end)) else { return Ok(()) };
-    let cause = format!("the run stands at cycle {now} and was planned for {planned} cycles");
-    let remedy = format!(
-        "give {now} to {planned}; for a longer run: \
-         sidestep run DIR/scenario.toml --cycles N --out NEW_DIR"
-    );
-    Err(InputError::new(format!("--cycles {end}"), cause, remedy))
 }

@@ -1,19 +1,16 @@
 //! `sidestep run`: scenario -> cycles -> report.
 
-use super::finish::{Journey, travel};
+use super::finish::travel;
 use super::sweep::many_runs;
 use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
-use crate::film::McapFilm;
 use crate::interrupt;
 use crate::plan::{ScenarioArgs, WorkersArg};
-use crate::recording::Recording;
 use crate::sweep::ManyArgs;
 use clap::{ArgGroup, Args};
 use sidestep::kernel::{Cycle, InputError};
-use sidestep::scenario::Source;
 use sidestep::worlds::WORLDS;
-use sidestep_record::{Existing, McapRecorder};
+use sidestep_session::{Journey, Keep};
 use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
@@ -81,29 +78,11 @@ pub(crate) fn run(args: &RunArgs, console: Console) -> Result<ExitCode, Failure>
     let (source, compiled) = args.scenario.compile()?;
     let told = WORLDS.translate(&args.scenario.file)?;
     let workers = args.workers.count();
-    let existing = if args.replace { Existing::Replace } else { Existing::Refuse };
-    if let Some(file) = &args.mcap {
-        McapRecorder::check_vacant(file, existing)?;
-    }
+    let keep = Keep {
+        folder: args.out.as_deref(),
+        mcap: args.mcap.as_deref().map(|file| (file, args.mcap_every)),
+        replace: args.replace,
+    };
     interrupt::listen()?;
-    if args.out.is_none() && args.mcap.is_none() {
-        let run = compiled.start(&source, workers);
-        let journey = Journey { run, recording: None, film: None, workers, until: None, told };
-        return travel(journey, console);
-    }
-    let resolved = compiled.resolve(&source)?;
-    let (mut run, recording) = match &args.out {
-        None => (compiled.start(&source, workers), None),
-        Some(folder) => {
-            let itself = Source::new("scenario.toml", &*resolved.text, folder);
-            let mut run = compiled.start(&itself, workers);
-            let recording = Recording::create(folder, &resolved, run.as_mut(), existing)?;
-            (run, Some(recording))
-        }
-    };
-    let film = match &args.mcap {
-        None => None,
-        Some(file) => Some(McapFilm::begin(file, args.mcap_every, resolved, run.as_mut())?),
-    };
-    travel(Journey { run, recording, film, workers, until: None, told }, console)
+    travel(Journey::start(compiled.as_ref(), &source, workers, keep, told)?, console)
 }

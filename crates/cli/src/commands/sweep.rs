@@ -2,12 +2,16 @@
 
 use crate::console::{Console, aligned, grouped};
 use crate::exit::{ExitCode, Failure};
+use crate::interrupt;
 use crate::plan::{ChangeArgs, WorkersArg};
-use crate::sweep::{self, Folder, ManyArgs};
+use crate::sweep::{ManyArgs, Told, go_on, tell, tell_share};
+use crate::watch::Watch;
 use clap::{Args, Subcommand};
 use serde_json::json;
 use sidestep::experiment::sweep::Shard;
 use sidestep::kernel::InputError;
+use sidestep::worlds::WORLDS;
+use sidestep_session::sweep::{self, Folder};
 use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
@@ -108,10 +112,8 @@ pub(crate) fn sweep(args: &SweepArgs, console: Console) -> Result<ExitCode, Fail
     let SweepArgs { step, file, changes, many, workers, out } = args;
     match (step, file) {
         (Some(Step::Plan(args)), _) => plan(args, console),
-        (Some(Step::Run(args)), _) => {
-            sweep::share(&Folder::open(&args.folder)?, args.shard, args.workers.count(), console)
-        }
-        (Some(Step::Collect(args)), _) => sweep::collect(&Folder::open(&args.folder)?, console),
+        (Some(Step::Run(args)), _) => share(args, console),
+        (Some(Step::Collect(args)), _) => collect(args, console),
         (None, Some(file)) => {
             many_runs((file, changes), many, out.as_deref(), workers.count(), console)
         }
@@ -134,14 +136,34 @@ pub(super) fn many_runs(
     console: Console,
 ) -> Result<ExitCode, Failure> {
     let wanted = many.sweep(file, changes)?;
-    match out {
-        None => sweep::in_memory(&wanted, workers, console),
-        Some(out) => sweep::in_folder(&wanted, out, workers, console),
-    }
+    interrupt::listen()?;
+    let watch = Watch::new(console);
+    let Some(out) = out else {
+        let (plan, ended) = sweep::in_memory(WORLDS, &wanted, workers, &watch)?;
+        return tell(Told { plan: &plan, folder: None, console }, ended, "");
+    };
+    go_on(&sweep::planned_or_there(WORLDS, &wanted, out, &watch)?, workers, console)
+}
+
+fn share(args: &ShareArgs, console: Console) -> Result<ExitCode, Failure> {
+    let (folder, workers) = (Folder::open(&args.folder)?, args.workers.count());
+    interrupt::listen()?;
+    let ended = sweep::share(WORLDS, &folder, args.shard, workers, &Watch::new(console))?;
+    let told = Told { plan: folder.plan(), folder: Some(&folder), console };
+    Ok(tell_share(told, args.shard, ended))
+}
+
+fn collect(args: &CollectArgs, console: Console) -> Result<ExitCode, Failure> {
+    let folder = Folder::open(&args.folder)?;
+    let ended = sweep::collect(&folder)?;
+    let told = Told { plan: folder.plan(), folder: Some(&folder), console };
+    tell(told, ended, "The runs are collected already.")
 }
 
 fn plan(args: &PlanArgs, console: Console) -> Result<ExitCode, Failure> {
-    let folder = sweep::planned(&args.many.sweep(&args.file, &args.changes)?, &args.out, console)?;
+    let wanted = args.many.sweep(&args.file, &args.changes)?;
+    interrupt::listen()?;
+    let folder = sweep::planned(WORLDS, &wanted, &args.out, &Watch::new(console))?;
     let plan = folder.plan();
     let json = json!({
         "folder": args.out,

@@ -1,20 +1,32 @@
-//! Many runs: what was typed -> a sweep -> cells -> one table.
+//! Many runs: what was typed -> a sweep, and what came of it in words.
 //!
 //! ```text
-//! ask.rs      options and files -> what to run         prepare.rs   every variant compiled, a plan
-//! work.rs     cells -> outcomes, many at once          journey.rs   from the plan to the table
-//! columns.rs  tables of runs <-> files                 say.rs       what it came to, in words
-//! look.rs     what a report needs
+//! ask.rs      options and files -> what to run         say.rs       what it came to, in words
 //! ```
 
 mod ask;
-mod columns;
-mod journey;
-mod look;
-mod prepare;
 mod say;
-mod work;
 
+use crate::console::Console;
+use crate::exit::{ExitCode, Failure};
+use crate::interrupt;
+use crate::watch::Watch;
 pub(crate) use ask::ManyArgs;
-pub(crate) use journey::{Folder, collect, go_on, in_folder, in_memory, planned, share};
-pub(crate) use look::{Finished, finished, picture_of};
+pub(crate) use say::{Told, tell, tell_share};
+use sidestep::worlds::WORLDS;
+use sidestep_session::sweep::{self, Folder};
+
+/// Runs whatever is not finished yet in the folder of a sweep.
+///
+/// # Errors
+/// When runs cannot be read or stored.
+pub(crate) fn go_on(
+    folder: &Folder,
+    workers: usize,
+    console: Console,
+) -> Result<ExitCode, Failure> {
+    interrupt::listen()?;
+    let ended = sweep::go_on(WORLDS, folder, workers, &Watch::new(console))?;
+    let told = Told { plan: folder.plan(), folder: Some(folder), console };
+    tell(told, ended, "All runs are finished already.")
+}

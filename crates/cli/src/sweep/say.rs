@@ -1,99 +1,64 @@
 //! What a sweep came to, in words and as JSON.
 
-use super::journey::Folder;
 use crate::console::{Console, aligned, duration, grouped, in_columns};
 use crate::exit::{ExitCode, Failure};
 use serde_json::json;
 use sidestep::experiment::sweep::rounds::{Stopped, stopped};
-use sidestep::experiment::sweep::{LeftOut, Outcome, Plan, RunTable, Shard, Summary};
+use sidestep::experiment::sweep::{LeftOut, Plan, RunTable, Shard, Summary};
+use sidestep_session::sweep::{Done, Effort, Ended, Folder};
 use std::fmt::Write;
-use std::time::Instant;
+use std::path::Path;
 
 /// Failed runs that are named.
 const NAMED: usize = 5;
 
-/// What runs took in this process.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Effort {
-    begun: Option<Instant>,
-    wall_s: f64,
-    /// Wall time of workers, and what of it was simulation.
-    worked_s: f64,
-    simulated_s: f64,
-    runs: u64,
-    at_once: usize,
+fn time_words(effort: &Effort) -> String {
+    format!(
+        "{} for {} runs, {} at once; {:.1} ms of simulation and {:.1} ms beside it each",
+        duration(effort.wall_s),
+        grouped(effort.runs),
+        effort.at_once,
+        1000.0 * effort.simulation_s_per_run(),
+        effort.overhead_ms_per_run(),
+    )
 }
 
-impl Effort {
-    /// From now on.
-    pub(super) fn begin() -> Self {
-        Self { begun: Some(Instant::now()), ..Self::default() }
-    }
-
-    /// A run is finished.
-    pub(super) fn note(&mut self, outcome: &Outcome) {
-        self.runs += 1;
-        self.simulated_s += outcome.costs.get("run_wall_s").and_then(|v| v.as_f64()).unwrap_or(0.0);
-    }
-
-    /// All are, on so many workers at once.
-    pub(super) fn end(&mut self, at_once: usize) {
-        self.wall_s = self.begun.map_or(0.0, |begun| begun.elapsed().as_secs_f64());
-        self.worked_s = self.wall_s * at_once as f64;
-        self.at_once = at_once;
-    }
-
-    /// With another stretch after it.
-    pub(super) fn add(&mut self, later: Self) {
-        self.wall_s += later.wall_s;
-        self.worked_s += later.worked_s;
-        self.simulated_s += later.simulated_s;
-        self.runs += later.runs;
-        self.at_once = self.at_once.max(later.at_once);
-    }
-
-    /// What a run took beyond its simulation: reading and compiling its scenario, storing its row,
-    /// waiting for work at the end.
-    fn overhead_ms(&self) -> f64 {
-        1000.0 * (self.worked_s - self.simulated_s) / self.runs.max(1) as f64
-    }
-
-    fn words(&self) -> String {
-        format!(
-            "{} for {} runs, {} at once; {:.1} ms of simulation and {:.1} ms beside it each",
-            duration(self.wall_s),
-            grouped(self.runs),
-            self.at_once,
-            1000.0 * self.simulated_s / self.runs.max(1) as f64,
-            self.overhead_ms(),
-        )
-    }
-
-    fn json(&self) -> serde_json::Value {
-        json!({
-            "runs": self.runs,
-            "at_once": self.at_once,
-            "wall_s": self.wall_s,
-            "simulation_s_per_run": self.simulated_s / self.runs.max(1) as f64,
-            "overhead_ms_per_run": self.overhead_ms(),
-        })
-    }
+fn time_json(effort: &Effort) -> serde_json::Value {
+    json!({
+        "runs": effort.runs,
+        "at_once": effort.at_once,
+        "wall_s": effort.wall_s,
+        "simulation_s_per_run": effort.simulation_s_per_run(),
+        "overhead_ms_per_run": effort.overhead_ms_per_run(),
+    })
 }
 
-/// Sums the runs up and prints it. Runs that failed are told, and end with exit code 1.
+/// The sweep that is spoken of, and to whom.
+#[derive(Clone, Copy)]
+pub(crate) struct Told<'a> {
+    pub(crate) plan: &'a Plan,
+    /// Its folder, if it has one.
+    pub(crate) folder: Option<&'a Folder>,
+    pub(crate) console: Console,
+}
+
+/// Sums the runs up and prints it; `already` is for runs that were finished before. Runs that
+/// failed are told, and end with exit code 1.
 ///
 /// # Errors
 /// When a metric that is to be reported does not exist.
-pub(super) fn say(
-    plan: &Plan,
-    table: &RunTable,
-    effort: Effort,
-    folder: Option<&Folder>,
-    console: Console,
-) -> Result<ExitCode, Failure> {
-    let summary = plan.summary(table)?;
-    let stopped = stopped(plan, table);
-    let failed = failures(plan, table, folder, console);
+pub(crate) fn tell(told: Told<'_>, ended: Ended, already: &str) -> Result<ExitCode, Failure> {
+    let Told { plan, folder, console } = told;
+    let Done { table, effort, was_done } = match ended {
+        Ended::Done(done) => done,
+        Ended::Interrupted(runs) => return Ok(interrupted(told, runs)),
+    };
+    if was_done {
+        console.note(already);
+    }
+    let summary = plan.summary(&table)?;
+    let stopped = stopped(plan, &table);
+    let failed = failures(told, &table);
     let json = json!({
         "status": "complete",
         "name": plan.name,
@@ -103,12 +68,31 @@ pub(super) fn say(
         "runs": table.runs(),
         "failed": failed,
         "stopped": stopped,
-        "took": (effort.runs > 0).then(|| effort.json()),
+        "took": (effort.runs > 0).then(|| time_json(&effort)),
         "results": folder.map(Folder::results_file),
         "summary": summary,
     });
-    console.result(&json, || text(plan, table, &summary, &stopped, effort, folder));
+    console.result(&json, || text(plan, &table, &summary, &stopped, effort, folder));
     Ok(if failed == 0 { ExitCode::Done } else { ExitCode::Failed })
+}
+
+/// Says how far an interrupted sweep is.
+fn interrupted(told: Told<'_>, finished: usize) -> ExitCode {
+    let Told { plan, folder, console } = told;
+    let path = folder.map(Folder::path);
+    match path.map(Path::display) {
+        None => console.note("Interrupted; nothing is kept without --out DIR."),
+        Some(path) => {
+            let all = plan.len();
+            let of = if plan.until.is_some() { String::new() } else { format!(" of {all}") };
+            console.note(format!(
+                "{finished}{of} runs are finished; `sidestep resume {path}` goes on."
+            ));
+        }
+    }
+    let json = json!({ "status": "interrupted", "runs": finished, "folder": path });
+    console.result(&json, String::new);
+    ExitCode::Interrupted
 }
 
 fn text(
@@ -144,7 +128,7 @@ fn text(
         lines.push(("stopped".to_string(), words));
     }
     if effort.runs > 0 {
-        lines.push(("time".to_string(), effort.words()));
+        lines.push(("time".to_string(), time_words(&effort)));
     }
     if let Some(folder) = folder {
         lines.push(("results".to_string(), folder.results_file().display().to_string()));
@@ -174,7 +158,8 @@ fn left_out(summary: &Summary) -> Option<String> {
 }
 
 /// Tells the first runs that failed, and how to run them again; their number.
-fn failures(plan: &Plan, table: &RunTable, folder: Option<&Folder>, console: Console) -> usize {
+fn failures(told: Told<'_>, table: &RunTable) -> usize {
+    let Told { plan, folder, console } = told;
     let Some(column) = table.column("failure") else { return 0 };
     let cell = table.column("cell");
     let cell_of = |row: usize| {
@@ -199,26 +184,28 @@ fn failures(plan: &Plan, table: &RunTable, folder: Option<&Folder>, console: Con
     failed.len()
 }
 
-/// Says that a share is done.
-pub(super) fn say_share(
-    table: &RunTable,
-    shard: Shard,
-    effort: Effort,
-    folder: &Folder,
-    console: Console,
-) -> Result<ExitCode, Failure> {
-    let failed = failures(folder.plan(), table, Some(folder), console);
+/// Says that a share is done, or how far it is.
+pub(crate) fn tell_share(told: Told<'_>, shard: Shard, ended: Ended) -> ExitCode {
+    let console = told.console;
+    let Done { table, effort, was_done } = match ended {
+        Ended::Done(done) => done,
+        Ended::Interrupted(runs) => return interrupted(told, runs),
+    };
+    if was_done {
+        console.note(format!("Share {shard} is finished already."));
+    }
+    let failed = failures(told, &table);
     let json = json!({
         "share": shard.to_string(),
         "runs": table.runs(),
         "failed": failed,
-        "took": (effort.runs > 0).then(|| effort.json()),
+        "took": (effort.runs > 0).then(|| time_json(&effort)),
     });
     console.result(&json, || {
-        let time = (effort.runs > 0).then(|| ("time".to_string(), effort.words()));
+        let time = (effort.runs > 0).then(|| ("time".to_string(), time_words(&effort)));
         let time: Vec<_> = time.into_iter().collect();
         let runs = grouped(table.runs() as u64);
         format!("Share {shard} is finished: {runs} runs\n{}", aligned(&time))
     });
-    Ok(if failed == 0 { ExitCode::Done } else { ExitCode::Failed })
+    if failed == 0 { ExitCode::Done } else { ExitCode::Failed }
 }

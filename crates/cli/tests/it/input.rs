@@ -45,7 +45,7 @@ const TABLE: [(&str, &str, &str, &[&str]); 17] = [
     ("outside the map", "count = 1\nsensors", "at = [[500, 5]]\nsensors", &["leaves the map"]),
     ("too many bodies", "count = 1\nsensors", "count = 4000\nsensors", &["no free place"]),
     ("absurdly many bodies", "count = 1\nsensors", "count = 4000000000\nsensors", &["at most"]),
-    ("absurd body", "size = 2", "size = 60000", &["60000 x 60000"]),
+    ("absurd body", "size = 2", "size = 60000", &["size = 60000", "give 1 to 64"]),
     ("absurd region", "a = [1, 3, 2, 2]", "a = [1, 3, 4000000000, 2]", &["leaves the map"]),
     (
         "map without free boxes",

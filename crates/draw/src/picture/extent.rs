@@ -174,13 +174,11 @@ impl Bounds {
         let longest_m = (0..3).map(side_m).fold(0.0, f64::max);
         let least_m = if longest_m > 0.0 { LEAST_SIDE * longest_m } else { 1.0 };
         let by_m = |k: usize| MARGIN * longest_m + 0.5 * (least_m - side_m(k)).max(0.0);
-        let grown = [
-            std::array::from_fn(|k| self.lo[k] - by_m(k)),
-            std::array::from_fn(|k| self.hi[k] + by_m(k)),
-        ];
-        for k in 0..3 {
-            DrawError::positive("extent of what is shown in m", grown[1][k] - grown[0][k])?;
+        let lo: Place = std::array::from_fn(|k| self.lo[k] - by_m(k));
+        let hi: Place = std::array::from_fn(|k| self.hi[k] + by_m(k));
+        for side_m in std::array::from_fn::<f64, 3, _>(|k| hi[k] - lo[k]) {
+            DrawError::positive("extent of what is shown in m", side_m)?;
         }
-        Ok(grown)
+        Ok([lo, hi])
     }
 }

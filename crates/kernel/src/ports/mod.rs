@@ -3,10 +3,13 @@
 
 pub mod clock;
 pub mod recorder;
+pub mod table;
 pub mod transport;
 
 pub use clock::{Clock, ManualClock, SystemClock};
-pub use recorder::{
-    ColumnSpec, ColumnType, MemoryRecorder, RecordError, Recorder, TableSchema, Values,
+pub use recorder::{MemoryRecorder, RecordError, Recorder};
+pub use table::{
+    BlockBuffer, Buffer, Buffers, Cells, ColumnSpec, ColumnType, RoleColumn, RowBuffer, Table,
+    TableSchema, Values,
 };
 pub use transport::{Envelope, Faults, MemoryTransport, Transport};

@@ -5,128 +5,8 @@
 //! A recorder may be slow (the run waits) but never changes the run, and what it has not
 //! finished is never taken for whole.
 
+use super::table::{ColumnSpec, ColumnType, TableSchema, Values};
 use std::fmt;
-
-/// The type of a column.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ColumnType {
-    /// Unsigned 32-bit integers.
-    U32,
-    /// Unsigned 64-bit integers.
-    U64,
-    /// Signed 32-bit integers.
-    I32,
-    /// Double precision floats.
-    F64,
-    /// Short text from a small vocabulary, stored as an index into `labels`.
-    Label,
-}
-
-/// One column: name with its unit (`distance_m`), type and meaning.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct ColumnSpec {
-    /// Name; ends in the unit where the quantity has one.
-    pub name: String,
-    /// Type of its values.
-    pub ty: ColumnType,
-    /// One sentence for the reader of the file.
-    pub meaning: String,
-    /// The vocabulary of a [`ColumnType::Label`] column, empty for others.
-    pub labels: Vec<String>,
-}
-
-/// One table: name and columns.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct TableSchema {
-    /// File stem, e.g. `trajectories`.
-    pub name: String,
-    /// The columns in order.
-    pub columns: Vec<ColumnSpec>,
-}
-
-/// The values of one column in one block.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Values {
-    /// See [`ColumnType::U32`].
-    U32(Vec<u32>),
-    /// See [`ColumnType::U64`].
-    U64(Vec<u64>),
-    /// See [`ColumnType::I32`].
-    I32(Vec<i32>),
-    /// See [`ColumnType::F64`].
-    F64(Vec<f64>),
-    /// See [`ColumnType::Label`]; indices into the column's labels.
-    Label(Vec<u32>),
-}
-
-impl Values {
-    /// No values of this type.
-    pub fn empty(ty: ColumnType) -> Self {
-        match ty {
-            ColumnType::U32 => Self::U32(Vec::new()),
-            ColumnType::U64 => Self::U64(Vec::new()),
-            ColumnType::I32 => Self::I32(Vec::new()),
-            ColumnType::F64 => Self::F64(Vec::new()),
-            ColumnType::Label => Self::Label(Vec::new()),
-        }
-    }
-
-    /// Appends the values of `more`.
-    ///
-    /// # Panics
-    /// When the types differ; [`check_block`] compares them for a whole block.
-    pub fn append(&mut self, more: &Self) {
-        match (self, more) {
-            (Self::U32(a), Self::U32(b)) | (Self::Label(a), Self::Label(b)) => {
-                a.extend_from_slice(b);
-            }
-            (Self::U64(a), Self::U64(b)) => a.extend_from_slice(b),
-            (Self::I32(a), Self::I32(b)) => a.extend_from_slice(b),
-            (Self::F64(a), Self::F64(b)) => a.extend_from_slice(b),
-            (a, b) => panic!("{:?} values appended to {:?} ones", b.ty(), a.ty()),
-        }
-    }
-
-    /// Keeps the values at which `keep` (of the same length) is true.
-    pub fn retain_rows(&mut self, keep: &[bool]) {
-        fn retain<T>(values: &mut Vec<T>, keep: &[bool]) {
-            let mut keep = keep.iter();
-            values.retain(|_| keep.next().copied().unwrap_or(false));
-        }
-        match self {
-            Self::U32(v) | Self::Label(v) => retain(v, keep),
-            Self::U64(v) => retain(v, keep),
-            Self::I32(v) => retain(v, keep),
-            Self::F64(v) => retain(v, keep),
-        }
-    }
-
-    /// Number of values.
-    pub fn len(&self) -> usize {
-        match self {
-            Self::U32(v) | Self::Label(v) => v.len(),
-            Self::U64(v) => v.len(),
-            Self::I32(v) => v.len(),
-            Self::F64(v) => v.len(),
-        }
-    }
-
-    /// True without values.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
-    /// The column type these values belong to.
-    pub fn ty(&self) -> ColumnType {
-        match self {
-            Self::U32(_) => ColumnType::U32,
-            Self::U64(_) => ColumnType::U64,
-            Self::I32(_) => ColumnType::I32,
-            Self::F64(_) => ColumnType::F64,
-            Self::Label(_) => ColumnType::Label,
-        }
-    }
-}
 
 /// Recording failed: a full disk, a file that cannot be created.
 #[derive(Debug, thiserror::Error)]
@@ -232,6 +112,9 @@ pub fn check_block(schema: &TableSchema, block: &[Values]) -> Result<(), RecordE
         if values.len() != block[0].len() {
             return wrong(format!("column `{}` differs in length from the first", spec.name));
         }
+        if !spec.is_nullable && values.valid().is_some() {
+            return wrong(format!("column `{}` has missing values", spec.name));
+        }
         // The maximum, not the first wrong one: this runs for every row of a recorded run.
         if let Values::Label(indices) = values
             && let Some(bad) = indices.iter().max().filter(|&&i| i as usize >= spec.labels.len())
@@ -261,27 +144,21 @@ impl Recorder for MemoryRecorder {
 
 /// The schema that [`conformance`] writes to: create the recorder under test with it.
 pub fn conformance_schemas() -> Vec<TableSchema> {
-    let column = |name: &str, ty, labels: &[&str]| ColumnSpec {
-        name: name.into(),
-        ty,
-        meaning: format!("test column {name}"),
-        labels: labels.iter().map(ToString::to_string).collect(),
-    };
+    let column = |name: &str, ty| ColumnSpec::new(name, ty, &format!("test column {name}"));
+    let event = ColumnSpec::label("event", "test column event", ["contact", "trip"]);
+    let note = ColumnSpec { is_nullable: true, ..column("note", ColumnType::Text) };
     vec![
         TableSchema {
             name: "first".into(),
             columns: vec![
-                column("cycle", ColumnType::U64, &[]),
-                column("entity", ColumnType::U32, &[]),
-                column("x_m", ColumnType::F64, &[]),
+                column("cycle", ColumnType::U64),
+                column("entity", ColumnType::U32),
+                column("x_m", ColumnType::F64),
             ],
         },
         TableSchema {
             name: "second".into(),
-            columns: vec![
-                column("delta", ColumnType::I32, &[]),
-                column("event", ColumnType::Label, &["contact", "trip"]),
-            ],
+            columns: vec![column("delta", ColumnType::I32), event, note],
         },
     ]
 }
@@ -297,7 +174,7 @@ pub type ReadBack = Box<dyn Fn(usize, usize) -> Values>;
 pub fn conformance<R: Recorder>(mut recorder: R, read_back: impl FnOnce(R) -> ReadBack) {
     recorder.append(0, &first_block(10)).expect("a block that fits is stored");
     recorder.append(1, &second_block()).expect("tables are independent");
-    recorder.append(1, &[Values::I32(vec![]), Values::Label(vec![])]).expect("no rows are fine");
+    recorder.append(1, &second(vec![], vec![])).expect("no rows are fine");
     refuses_what_does_not_fit(&mut recorder);
     recorder.seal(13).expect("sealing succeeds after a refused block");
     recorder.append(0, &first_block(u64::MAX - 3)).expect("blocks append after sealing");
@@ -305,29 +182,37 @@ pub fn conformance<R: Recorder>(mut recorder: R, read_back: impl FnOnce(R) -> Re
 
     let column = read_back(recorder);
     let big = u64::MAX - 3;
-    let cycles = Values::U64(vec![10, 11, 12, big, big + 1, big + 2]);
+    let cycles = Values::U64(vec![10, 11, 12, big, big + 1, big + 2].into());
     assert_eq!(column(0, 0), cycles, "rows keep their order, u64 its range");
-    let entities = Values::U32(vec![0, 7, u32::MAX, 0, 7, u32::MAX]);
+    let entities = Values::U32(vec![0, 7, u32::MAX, 0, 7, u32::MAX].into());
     assert_eq!(column(0, 1), entities, "u32 keeps its range");
     let Values::F64(places_m) = column(0, 2) else { panic!("f64 stays f64") };
     let bits: Vec<_> = places_m.iter().map(|x| x.to_bits()).collect();
     let expected = [-0.5, -0.0, 1e300].map(f64::to_bits).repeat(2);
     assert_eq!(bits, expected, "f64 keeps its bits");
-    assert_eq!(vec![column(1, 0), column(1, 1)], second_block(), "i32 and labels come back");
+    let second = (0..3).map(|k| column(1, k)).collect::<Vec<_>>();
+    assert_eq!(second, second_block(), "i32, labels and text with a gap come back");
 }
 
 /// Three rows of the first conformance table.
 fn first_block(cycle: u64) -> Vec<Values> {
     vec![
         Values::U64((cycle..cycle + 3).collect()),
-        Values::U32(vec![0, 7, u32::MAX]),
-        Values::F64(vec![-0.5, -0.0, 1e300]),
+        Values::U32(vec![0, 7, u32::MAX].into()),
+        Values::F64(vec![-0.5, -0.0, 1e300].into()),
     ]
 }
 
 /// Three rows of the second conformance table.
 fn second_block() -> Vec<Values> {
-    vec![Values::I32(vec![i32::MIN, 0, i32::MAX]), Values::Label(vec![1, 0, 1])]
+    second(vec![i32::MIN, 0, i32::MAX], vec![1, 0, 1])
+}
+
+/// Rows of the second conformance table; the second of every two has no note.
+fn second(delta: Vec<i32>, event: Vec<u32>) -> Vec<Values> {
+    let note = |row| (row % 2 == 0).then(|| format!("row {row}"));
+    let notes = Values::Text((0..delta.len()).map(note).collect());
+    vec![Values::I32(delta.into()), Values::Label(event.into()), notes]
 }
 
 fn refuses_what_does_not_fit(recorder: &mut impl Recorder) {
@@ -337,8 +222,11 @@ fn refuses_what_does_not_fit(recorder: &mut impl Recorder) {
     refuses(0, &second_block(), "a block of another table");
     refuses(0, &first_block(10)[..2], "a missing column");
     refuses(9, &second_block(), "a table that does not exist");
-    refuses(1, &[Values::I32(vec![1]), Values::Label(vec![])], "a column of another length");
-    refuses(1, &[Values::I32(vec![1]), Values::Label(vec![2])], "a label without a name");
+    refuses(1, &second(vec![1], vec![]), "a column of another length");
+    refuses(1, &second(vec![1], vec![2]), "a label without a name");
+    let mut missing = second(vec![1], vec![0]);
+    missing[0] = Values::I32([None].into_iter().collect());
+    refuses(1, &missing, "a missing value of a column that is declared without");
 }
 
 #[cfg(test)]

@@ -73,18 +73,12 @@ impl Pose {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::cross;
     use crate::math::{cos, sin};
     use proptest::prelude::*;
 
     fn near(a: Place, b: Place) -> bool {
         a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9)
-    }
-
-    fn cross(a: Place, b: Place) -> Place {
-        std::array::from_fn(|i| {
-            let (j, k) = ((i + 1) % 3, (i + 2) % 3);
-            a[j] * b[k] - a[k] * b[j]
-        })
     }
 
     proptest! {

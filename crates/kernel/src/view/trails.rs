@@ -151,12 +151,7 @@ impl PlaceRows {
 }
 
 fn number(values: &Values, row: usize) -> Option<f64> {
-    match values {
-        Values::F64(values) => Some(values[row]),
-        Values::U32(values) => Some(f64::from(values[row])),
-        Values::I32(values) => Some(f64::from(values[row])),
-        Values::U64(_) | Values::Label(_) => None,
-    }
+    values.number(row).filter(|_| values.is_numeric())
 }
 
 impl Axis {
@@ -207,11 +202,11 @@ mod tests {
             Body::new(Kind::Robot, 7, Pose::at([11.5, 11.0, 0.25]), Shape::Cuboid { size_m });
         let frame = Frame { cycle: until, bodies: vec![robot], ..Frame::default() };
         let columns = [
-            ("cycle", Values::U64(vec![1, 0, 0])),
-            ("body", Values::U32(vec![7, 7, 8])),
-            ("col", Values::U32(vec![1, 0, 9])),
-            ("row", Values::U32(vec![0, 0, 9])),
-            ("heading", Values::Label(vec![0, 0, 0])),
+            ("cycle", Values::U64(vec![1, 0, 0].into())),
+            ("body", Values::U32(vec![7, 7, 8].into())),
+            ("col", Values::U32(vec![1, 0, 9].into())),
+            ("row", Values::U32(vec![0, 0, 9].into())),
+            ("heading", Values::Label(vec![0, 0, 0].into())),
         ];
         let column = |name: &str| columns.iter().find(|(n, _)| *n == name).map(|(_, v)| v);
         let scenery = Scenery {

@@ -10,6 +10,12 @@ use parquet::file::statistics::Statistics;
 use parquet::file::writer::{SerializedPageWriter, TrackedWrite};
 use parquet::schema::types::ColumnDescPtr;
 
+/// Appends a text as plain pages have it: its length, then its bytes.
+pub(super) fn put_text(text: &str, page: &mut Vec<u8>) {
+    page.extend_from_slice(&(text.len() as u32).to_le_bytes());
+    page.extend_from_slice(text.as_bytes());
+}
+
 /// The encoded pages of one column in one row group.
 pub(crate) struct ColumnChunk {
     descriptor: ColumnDescPtr,
@@ -33,10 +39,7 @@ impl ColumnChunk {
     /// Puts the vocabulary first; once, before any data page.
     pub(crate) fn add_dictionary(&mut self, labels: &[String]) -> Result<()> {
         let mut page = Vec::new();
-        for label in labels {
-            page.extend_from_slice(&(label.len() as u32).to_le_bytes());
-            page.extend_from_slice(label.as_bytes());
-        }
+        labels.iter().for_each(|label| put_text(label, &mut page));
         self.write(Page::DictionaryPage {
             buf: page.into(),
             num_values: labels.len() as u32,
@@ -54,7 +57,8 @@ impl ColumnChunk {
             buf: page.into(),
             num_values: rows,
             encoding,
-            // Every column is required, so no levels are written; readers want a name.
+            // Of a nullable column; of a required one no levels are written, yet readers want a
+            // name.
             def_level_encoding: Encoding::RLE,
             rep_level_encoding: Encoding::RLE,
             statistics: None,

@@ -10,6 +10,7 @@ use parquet::file::statistics::Statistics;
 use parquet::schema::types::ColumnDescPtr;
 use sidestep_kernel::ports::{ColumnSpec, ColumnType, Values};
 
+use super::chunk::put_text;
 use super::delta::DeltaEncoder;
 use super::labels::LabelEncoder;
 use super::{ColumnChunk, PAGE_ROWS};
@@ -19,6 +20,8 @@ pub(crate) struct ColumnEncoder {
     descriptor: ColumnDescPtr,
     labels: Vec<String>,
     encoder: Encoder,
+    /// Whether each value of the page is there (1) or missing (0); of a nullable column.
+    levels: Option<LabelEncoder>,
     rows_in_page: usize,
     chunk: ColumnChunk,
 }
@@ -28,9 +31,14 @@ enum Encoder {
     U32(DeltaEncoder<u32>),
     I32(DeltaEncoder<i32>),
     U64(DeltaEncoder<u64>, Bounds),
+    I64(DeltaEncoder<i64>),
     /// Little-endian doubles.
     F64(Vec<u8>),
+    /// A bit a value.
+    Bool(Vec<bool>),
     Label(LabelEncoder),
+    /// Length and bytes of each text.
+    Text(Vec<u8>),
 }
 
 /// The smallest and the largest counter of the row group. Only counters have bounds: rows
@@ -64,18 +72,22 @@ impl ColumnEncoder {
             ColumnType::U32 => Encoder::U32(DeltaEncoder::new()),
             ColumnType::I32 => Encoder::I32(DeltaEncoder::new()),
             ColumnType::U64 => Encoder::U64(DeltaEncoder::new(), Bounds::default()),
+            ColumnType::I64 => Encoder::I64(DeltaEncoder::new()),
             ColumnType::F64 => Encoder::F64(Vec::new()),
+            ColumnType::Bool => Encoder::Bool(Vec::new()),
             ColumnType::Label => Encoder::Label(LabelEncoder::new(spec.labels.len())),
+            ColumnType::Text => Encoder::Text(Vec::new()),
         };
         let chunk = ColumnChunk::new(descriptor.clone());
-        Self { descriptor, labels: spec.labels.clone(), encoder, rows_in_page: 0, chunk }
+        let levels = spec.is_nullable.then(|| LabelEncoder::new(2));
+        Self { descriptor, labels: spec.labels.clone(), encoder, levels, rows_in_page: 0, chunk }
     }
 
     /// Appends the values at `range`.
     pub(crate) fn append(&mut self, values: &Values, mut range: Range<usize>) -> Result<()> {
         while !range.is_empty() {
             let n = (PAGE_ROWS - self.rows_in_page).min(range.len());
-            self.encoder.extend(values, range.start..range.start + n);
+            self.extend(values, range.start..range.start + n);
             self.rows_in_page += n;
             range.start += n;
             if self.rows_in_page == PAGE_ROWS {
@@ -85,11 +97,26 @@ impl ColumnEncoder {
         Ok(())
     }
 
+    /// Appends values that the page has room for.
+    fn extend(&mut self, values: &Values, range: Range<usize>) {
+        let Some(levels) = &mut self.levels else { return self.encoder.extend(values, range) };
+        let is_there = |row: &usize| !values.is_missing(*row);
+        let flags: Vec<u32> = range.clone().map(|row| u32::from(is_there(&row))).collect();
+        levels.extend(&flags);
+        let present: Vec<usize> = range.filter(is_there).collect();
+        self.encoder.extend(&values.pick(&present), 0..present.len());
+    }
+
     fn end_page(&mut self) -> Result<()> {
         if matches!(self.encoder, Encoder::Label(_)) && self.chunk.rows() == 0 {
             self.chunk.add_dictionary(&self.labels)?;
         }
-        let (page, encoding) = self.encoder.take_page();
+        let (mut page, encoding) = self.encoder.take_page();
+        if let Some(levels) = &mut self.levels {
+            // A page of labels begins with their width, one of levels with its length.
+            let levels = &levels.take_page()[1..];
+            page = [&(levels.len() as u32).to_le_bytes(), levels, &page].concat();
+        }
         self.chunk.add_page(page, self.rows_in_page as u32, encoding)?;
         self.rows_in_page = 0;
         Ok(())
@@ -101,7 +128,9 @@ impl ColumnEncoder {
             self.end_page()?;
         }
         let empty = ColumnChunk::new(self.descriptor.clone());
-        std::mem::replace(&mut self.chunk, empty).close(self.encoder.take_statistics())
+        // The bounds say that no value is missing.
+        let statistics = self.encoder.take_statistics().filter(|_| self.levels.is_none());
+        std::mem::replace(&mut self.chunk, empty).close(statistics)
     }
 }
 
@@ -114,8 +143,13 @@ impl Encoder {
                 bounds.extend(&v[range.clone()]);
                 encoder.extend(&v[range]);
             }
+            (Self::I64(encoder), Values::I64(v)) => encoder.extend(&v[range]),
             (Self::F64(page), Values::F64(v)) => put_doubles(&v[range], page),
+            (Self::Bool(page), Values::Bool(v)) => page.extend_from_slice(&v[range]),
             (Self::Label(encoder), Values::Label(v)) => encoder.extend(&v[range]),
+            (Self::Text(page), Values::Text(v)) => {
+                range.filter_map(|row| v.get(row)).for_each(|text| put_text(text, page));
+            }
             _ => unreachable!("`check_block` compared the types"),
         }
     }
@@ -125,7 +159,9 @@ impl Encoder {
             Self::U32(encoder) => (encoder.take_page(), Encoding::DELTA_BINARY_PACKED),
             Self::I32(encoder) => (encoder.take_page(), Encoding::DELTA_BINARY_PACKED),
             Self::U64(encoder, _) => (encoder.take_page(), Encoding::DELTA_BINARY_PACKED),
-            Self::F64(page) => (std::mem::take(page), Encoding::PLAIN),
+            Self::I64(encoder) => (encoder.take_page(), Encoding::DELTA_BINARY_PACKED),
+            Self::F64(page) | Self::Text(page) => (std::mem::take(page), Encoding::PLAIN),
+            Self::Bool(page) => (packed(&std::mem::take(page)), Encoding::PLAIN),
             Self::Label(encoder) => (encoder.take_page(), Encoding::RLE_DICTIONARY),
         }
     }
@@ -145,4 +181,12 @@ fn put_doubles(values: &[f64], page: &mut Vec<u8>) {
     for (cell, v) in cells.iter_mut().zip(values) {
         *cell = v.to_le_bytes();
     }
+}
+
+/// Eight values a byte, the first in its lowest bit.
+fn packed(values: &[bool]) -> Vec<u8> {
+    let byte = |eight: &[bool]| {
+        (0..).zip(eight).fold(0, |byte, (bit, &value)| byte | u8::from(value) << bit)
+    };
+    values.chunks(8).map(byte).collect()
 }

@@ -69,15 +69,36 @@ impl Integer for u64 {
         self as i64
     }
 
-    /// Nearly every block of a counter has small differences; those go the narrow way.
     fn put_block(deltas: &[i64; BLOCK], packer: &Packer, out: &mut Vec<u8>) {
-        let narrow = deltas.map(|d| d as i32);
-        let changed = deltas.iter().zip(&narrow).fold(0, |all, (d, n)| all | (d ^ i64::from(*n)));
-        if changed == 0 {
-            put_narrow_block(&narrow, packer, out);
-        } else {
-            put_wide_block(deltas, packer, out);
-        }
+        put_any_block(deltas, packer, out);
+    }
+}
+
+impl Integer for i64 {
+    type Delta = i64;
+
+    fn minus(self, previous: Self) -> i64 {
+        self.wrapping_sub(previous)
+    }
+
+    fn signed(self) -> i64 {
+        self
+    }
+
+    fn put_block(deltas: &[i64; BLOCK], packer: &Packer, out: &mut Vec<u8>) {
+        put_any_block(deltas, packer, out);
+    }
+}
+
+/// Appends a block of 64 bits. Nearly every block of a counter has small differences; those go the
+/// narrow way.
+fn put_any_block(deltas: &[i64; BLOCK], packer: &Packer, out: &mut Vec<u8>) {
+    let narrow = deltas.map(|d| d as i32);
+    let changed = deltas.iter().zip(&narrow).fold(0, |all, (d, n)| all | (d ^ i64::from(*n)));
+    if changed == 0 {
+        put_narrow_block(&narrow, packer, out);
+    } else {
+        put_wide_block(deltas, packer, out);
     }
 }
 

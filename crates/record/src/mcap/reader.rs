@@ -33,6 +33,8 @@ pub struct McapRun {
     pub format: FormatVersion,
     /// Version of the program that made it.
     pub program_version: String,
+    /// Its build; early recordings do not name it.
+    pub build: Option<String>,
     /// The world.
     pub world: String,
     /// The seed.
@@ -84,6 +86,7 @@ impl McapRun {
             path: path.to_path_buf(),
             format,
             program_version: text("program_version")?.clone(),
+            build: said.get("build").cloned(),
             world: text("world")?.clone(),
             seed: number("seed")?,
             status: if is_complete { Status::Complete } else { Status::Incomplete },

@@ -28,6 +28,8 @@ const CHUNK_BYTES: u64 = 1 << 20;
 pub struct McapOrigin {
     /// The world, e.g. `robots`.
     pub world: String,
+    /// The build that makes it.
+    pub build: String,
     /// Where its frames come from.
     pub origin: Origin,
     /// Files that the scenario names, by their path relative to it.
@@ -199,7 +201,7 @@ impl McapRecorder {
     }
 
     fn metadata(&self, end: &McapEnd) -> BTreeMap<String, String> {
-        let McapOrigin { world, origin, cycles_planned, every, .. } = &self.origin;
+        let McapOrigin { world, build, origin, cycles_planned, every, .. } = &self.origin;
         let status = match end.status {
             Status::Complete => "complete",
             Status::Running | Status::Incomplete => "incomplete",
@@ -207,6 +209,7 @@ impl McapRecorder {
         let pairs = [
             ("format", format::CURRENT.to_string()),
             ("program_version", origin.program_version.clone()),
+            ("build", build.clone()),
             ("world", world.clone()),
             ("seed", origin.seed.to_string()),
             ("cycles_planned", cycles_planned.to_string()),

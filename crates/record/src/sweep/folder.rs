@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use sidestep_kernel::ports::RecordError;
+use sidestep_kernel::ports::{RecordError, RoleColumn};
 use sidestep_kernel::{Digest, InputError};
 
 use super::journal::{Journal, read_journal};
@@ -13,8 +13,8 @@ use crate::disk;
 use crate::folder::check_vacant;
 use crate::format::{self, FormatVersion};
 use crate::manifest::{self, json};
-use crate::nullable::{self, NullableColumn, NullableTable};
 use crate::staging::Staging;
+use crate::whole::{self, WholeTable};
 
 /// The manifest's name.
 pub(crate) const MANIFEST: &str = "sweep.json";
@@ -33,6 +33,9 @@ pub struct SweepManifest<P> {
     pub format: FormatVersion,
     /// Version of the program that made the plan; the same makes the runs.
     pub program_version: String,
+    /// Its build; early folders do not name it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub build: Option<String>,
     /// Of the scenario of each variant and the files it names, see [`fingerprint`].
     pub fingerprints: Vec<String>,
     /// The plan.
@@ -62,10 +65,11 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
     ///
     /// # Errors
     /// When something else is there, no folder can be made there, or `fill` fails.
-    pub fn create<E: From<InputError> + From<RecordError>>(
+    pub fn create<R: Serialize, E: From<InputError> + From<RecordError>>(
         path: &Path,
         program_version: &str,
-        fill: impl FnOnce(&Path) -> Result<(P, Vec<String>, Vec<NullableColumn>), E>,
+        build: &str,
+        fill: impl FnOnce(&Path) -> Result<(P, Vec<String>, Vec<RoleColumn<R>>), E>,
     ) -> Result<Self, E> {
         if Self::is_at(path) {
             let remedy = "name another folder, or go on with what is there: sidestep resume DIR";
@@ -78,11 +82,12 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         let manifest = SweepManifest {
             format: format::CURRENT,
             program_version: program_version.into(),
+            build: Some(build.into()),
             fingerprints,
             plan,
         };
         make_folder(&staging.path().join(SHARES))?;
-        nullable::write(&staging.path().join(CELLS), &cells, program_version, &[])?;
+        whole::write(&staging.path().join(CELLS), &cells, program_version, &[])?;
         let file = staging.path().join(MANIFEST);
         disk::replace(&file, &json(&manifest, &file)?)?;
         staging.take_place_of(path)?;
@@ -202,14 +207,14 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
     ///
     /// # Errors
     /// What the system says; the journal stays then.
-    pub fn end_share(
+    pub fn end_share<R: Serialize>(
         &self,
         share: Share,
         journal: Journal,
-        runs: &[NullableColumn],
+        runs: &[RoleColumn<R>],
     ) -> Result<(), RecordError> {
         let version = &self.manifest.program_version;
-        nullable::write(&self.share_file(share, "parquet"), runs, version, &[])?;
+        whole::write(&self.share_file(share, "parquet"), runs, version, &[])?;
         drop(journal);
         let path = self.share_file(share, "journal");
         fs::remove_file(&path).map_err(|e| RecordError::new(path.display(), e))
@@ -219,10 +224,13 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
     ///
     /// # Errors
     /// When one of them cannot be read.
-    pub fn parts(&self, mut each: impl FnMut(NullableTable)) -> Result<(), InputError> {
+    pub fn parts<R: DeserializeOwned>(
+        &self,
+        mut each: impl FnMut(WholeTable<R>),
+    ) -> Result<(), InputError> {
         for share in self.shares_with("parquet")? {
             let path = self.share_file(share, "parquet");
-            let table = nullable::read(&path)?;
+            let table = whole::read(&path)?;
             self.check_version(&path, &table)?;
             each(table);
         }
@@ -254,17 +262,17 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
     ///
     /// # Errors
     /// What the system says.
-    pub fn complete(
+    pub fn complete<R: Serialize>(
         &self,
-        results: &[NullableColumn],
-        timings: &[NullableColumn],
+        results: &[RoleColumn<R>],
+        timings: &[RoleColumn<R>],
     ) -> Result<(), RecordError> {
         let plan = serde_json::to_string(self.plan())
             .map_err(|e| RecordError::new(self.path.display(), e))?;
         let extra = [("sidestep.plan", plan), ("sidestep.fingerprint", self.fingerprint())];
         let version = &self.manifest.program_version;
-        nullable::write(&self.path.join(TIMINGS), timings, version, &extra)?;
-        nullable::write(&self.path.join(RESULTS), results, version, &extra)
+        whole::write(&self.path.join(TIMINGS), timings, version, &extra)?;
+        whole::write(&self.path.join(RESULTS), results, version, &extra)
     }
 
     /// Whether the table of all runs is there.
@@ -281,13 +289,13 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
     ///
     /// # Errors
     /// When the sweep is not done, or the table is damaged.
-    pub fn results(&self) -> Result<NullableTable, InputError> {
+    pub fn results<R: DeserializeOwned>(&self) -> Result<WholeTable<R>, InputError> {
         if !self.is_complete() {
             let remedy = "go on with `sidestep resume DIR`, or run its shares and \
                           `sidestep sweep collect DIR`";
             return Err(InputError::new(self.path.display(), "the sweep is not done yet", remedy));
         }
-        nullable::read(&self.results_file()).map_err(|e| {
+        whole::read(&self.results_file()).map_err(|e| {
             let remedy =
                 "delete it; `sidestep resume DIR` makes it again from the runs in `shares`";
             InputError::new(e.place(), e.cause(), remedy)
@@ -298,11 +306,11 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
     ///
     /// # Errors
     /// When the sweep is not done, or the table is damaged.
-    pub fn timings(&self) -> Result<NullableTable, InputError> {
-        nullable::read(&self.path.join(TIMINGS))
+    pub fn timings<R: DeserializeOwned>(&self) -> Result<WholeTable<R>, InputError> {
+        whole::read(&self.path.join(TIMINGS))
     }
 
-    fn check_version(&self, path: &Path, table: &NullableTable) -> Result<(), InputError> {
+    fn check_version<R>(&self, path: &Path, table: &WholeTable<R>) -> Result<(), InputError> {
         let (wrote, ours) = (&table.program_version, &self.manifest.program_version);
         if wrote == ours {
             return Ok(());
@@ -381,7 +389,7 @@ fn make_folder(path: &Path) -> Result<(), RecordError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::nullable::NullableValues;
+    use sidestep_kernel::ports::Values;
 
     type Folder = SweepFolder<Vec<u32>>;
 
@@ -401,13 +409,13 @@ mod tests {
         }
     }
 
-    fn cells() -> Vec<NullableColumn> {
-        let values = NullableValues::Int(vec![Some(0), Some(1)]);
-        vec![NullableColumn { name: "cell".into(), role: "cell".into(), values }]
+    fn cells() -> Vec<RoleColumn<String>> {
+        let values = Values::I64(vec![0, 1].into());
+        vec![RoleColumn { name: "cell".into(), role: "cell".into(), values }]
     }
 
     fn create(path: &Path) -> Result<Folder, Failed> {
-        Folder::create(path, "0.1.0", |staging| {
+        Folder::create(path, "0.1.0", "0.1.0+a", |staging| {
             let files = [("inputs/a.txt".to_string(), b"a".to_vec())];
             Folder::write_variant(staging, 0, "seed = 1\n", &files)?;
             Ok((vec![4, 5], vec!["f".into()], cells()))
@@ -436,7 +444,7 @@ mod tests {
         let mut parts = Vec::new();
         folder.parts(|part| parts.push(part.columns)).unwrap();
         assert_eq!(parts, [cells()]);
-        assert!(folder.results().unwrap_err().cause().contains("not done"));
+        assert!(folder.results::<String>().unwrap_err().cause().contains("not done"));
         folder.complete(&cells(), &cells()).unwrap();
         let again = Folder::open(&path).unwrap();
         assert_eq!((again.plan(), again.is_complete()), (&vec![4, 5], true));
@@ -447,7 +455,8 @@ mod tests {
     fn a_plan_that_fails_leaves_nothing() {
         let place = tempfile::tempdir().unwrap();
         let path = place.path().join("a/sweep");
-        let made = Folder::create(&path, "0.1.0", |_| Err(Failed("no".into())));
+        let made =
+            Folder::create::<String, _>(&path, "0.1.0", "0.1.0+a", |_| Err(Failed("no".into())));
         assert!(made.is_err());
         assert_eq!(fs::read_dir(place.path()).unwrap().count(), 0);
     }

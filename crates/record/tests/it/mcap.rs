@@ -11,7 +11,14 @@ use crate::support::{names, origin};
 
 fn about() -> McapOrigin {
     let files = vec![("maps/floor.pgm".to_string(), vec![7; 1000])];
-    McapOrigin { world: "robots".into(), origin: origin(), files, cycles_planned: 100, every: 2 }
+    McapOrigin {
+        world: "robots".into(),
+        build: "0.1.0+a".into(),
+        origin: origin(),
+        files,
+        cycles_planned: 100,
+        every: 2,
+    }
 }
 
 fn scenery() -> Scenery {
@@ -23,8 +30,8 @@ fn scenery() -> Scenery {
         dimensions: 2,
         cycle_s: 0.1,
         floor: Some(floor),
-        bodies: vec![Body::new(Kind::Obstacle, 0, Pose::at([0.0; 3]), wall)],
         names: Vec::new(),
+        bodies: vec![Body::new(Kind::Obstacle, 0, Pose::at([0.0; 3]), wall)],
     }
 }
 

@@ -8,7 +8,7 @@ use sidestep_record::{NewRun, Origin, ParquetRecorder};
 /// A column without a meaning.
 pub(crate) fn column(name: &str, ty: ColumnType, labels: &[&str]) -> ColumnSpec {
     let labels = labels.iter().map(ToString::to_string).collect();
-    ColumnSpec { name: name.into(), ty, meaning: format!("the {name}"), labels }
+    ColumnSpec { labels, ..ColumnSpec::new(name, ty, &format!("the {name}")) }
 }
 
 /// Where two robots are in every cycle.
@@ -53,7 +53,12 @@ pub(crate) fn origin() -> Origin {
 
 /// A run to make a folder for.
 pub(crate) fn new_run() -> NewRun {
-    NewRun { world: "robots".into(), origin: origin(), cycles_planned: 100 }
+    NewRun {
+        world: "robots".into(),
+        build: "0.1.0+a".into(),
+        origin: origin(),
+        cycles_planned: 100,
+    }
 }
 
 /// A recorder of [`trajectories`] in `folder`.

@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use sidestep_kernel::ports::recorder::{conformance, conformance_schemas};
-use sidestep_kernel::ports::{ColumnType, Recorder, TableSchema, Values};
+use sidestep_kernel::ports::{ColumnSpec, ColumnType, Recorder, TableSchema, Values};
 use sidestep_record::{ParquetRecorder, read_table};
 
 use crate::support::{column, joined, names, origin, recorder, rows, trajectories};
@@ -54,7 +54,7 @@ fn rows_are_chosen_by_cycle_across_parts_and_row_groups() {
     let read = |from, to| read_table(folder.path(), "trajectories", from..to).unwrap().columns;
     assert_eq!(read(7, 8), rows(7, 8));
     assert_eq!(read(600_099, 600_101), joined(&[rows(600_099, 600_100), rows(600_100, 600_101)]));
-    assert_eq!(read(600_200, u64::MAX)[0], Values::U64(vec![]));
+    assert_eq!(read(600_200, u64::MAX)[0], Values::U64(vec![].into()));
     let whole = read_table(folder.path(), "trajectories", ..).unwrap().columns;
     let blocks = [rows(0, 600_000), rows(600_000, 600_100), rows(600_100, 600_200)];
     assert!(whole == joined(&blocks), "every row comes back over page and row group borders");
@@ -68,7 +68,7 @@ fn a_range_of_cycles_of_a_table_without_cycles_is_refused() {
         columns: vec![column("size_m", ColumnType::F64, &[])],
     };
     let mut recorder = ParquetRecorder::create(folder.path(), &[schema], &origin()).unwrap();
-    recorder.append(0, &[Values::F64(vec![f64::NAN, 0.5])]).unwrap();
+    recorder.append(0, &[Values::F64(vec![f64::NAN, 0.5].into())]).unwrap();
     recorder.finish().unwrap();
     assert_eq!(read_table(folder.path(), "robots", ..).unwrap().rows(), 2);
     let error = read_table(folder.path(), "robots", 3..4).unwrap_err();
@@ -204,7 +204,7 @@ fn blocks() -> impl Strategy<Value = Vec<Vec<Values>>> {
 
 fn block(values: &[u64]) -> Vec<Values> {
     vec![
-        Values::U64(values.to_vec()),
+        Values::U64(values.to_vec().into()),
         Values::U32(values.iter().map(|&v| v as u32).collect()),
         Values::I32(values.iter().map(|&v| v as i32).collect()),
         Values::Label(values.iter().map(|&v| (v % 5) as u32).collect()),
@@ -231,5 +231,44 @@ proptest! {
         }
         recorder.finish().unwrap();
         prop_assert_eq!(read_table(folder.path(), "t", ..).unwrap().columns, joined(&blocks));
+    }
+}
+
+/// Columns of every type with `rows` rows; of those that may be missing, every so many are.
+fn every_type(rows: u64, missing: u64) -> (TableSchema, Vec<Values>) {
+    let value = |k: u64| (k % missing != 1).then_some(k);
+    let all = || (0..rows).map(value);
+    let blocks = vec![
+        Values::U32(all().map(|v| v.map(|k| k as u32)).collect()),
+        Values::U64(all().collect()),
+        Values::I32(all().map(|v| v.map(|k| -(k as i32))).collect()),
+        Values::I64(all().map(|v| v.map(|k| i64::MIN + k as i64)).collect()),
+        Values::F64(all().map(|v| v.map(|k| k as f64 / 3.0)).collect()),
+        Values::Bool(all().map(|v| v.map(|k| k % 3 == 0)).collect()),
+        Values::Label(all().map(|v| v.map(|k| (k / 9 % 2) as u32)).collect()),
+        Values::Text(all().map(|v| v.map(|k| format!("a{}", k % 7))).collect()),
+    ];
+    let spec = |values: &Values| {
+        let labels = if values.ty() == ColumnType::Label { &["no", "yes"][..] } else { &[] };
+        let spec = column(values.ty().name(), values.ty(), labels);
+        ColumnSpec { is_nullable: missing <= rows, ..spec }
+    };
+    (TableSchema { name: "t".into(), columns: blocks.iter().map(spec).collect() }, blocks)
+}
+
+#[test]
+fn columns_of_every_type_come_back_also_where_values_are_missing() {
+    // One page, several ones, none missing, all but the first missing.
+    for (rows, missing) in [(100, 7), (70_000, 5), (70_000, 70_001), (2, 2)] {
+        let (schema, block) = every_type(rows, missing);
+        let folder = tempfile::tempdir().unwrap();
+        let mut recorder =
+            ParquetRecorder::create(folder.path(), &[schema.clone()], &origin()).unwrap();
+        recorder.append(0, &block).unwrap();
+        recorder.append(0, &block).unwrap();
+        recorder.finish().unwrap();
+        let table = read_table(folder.path(), "t", ..).unwrap();
+        assert_eq!(table.schema, schema);
+        assert_eq!(table.columns, joined(&[block.clone(), block]), "{rows} rows");
     }
 }

@@ -165,7 +165,7 @@ fn wrong_scenarios_are_refused_with_a_remedy() {
         ),
         ("[airspace]\nupdate = { kind = \"brouwer\", step = nan }\n", "above 0 and at most 1"),
         ("[airspace]\nupdate = { kind = \"nearest-newton\", step = 0.0 }\n", "above 0 and at most"),
-        ("[airspace]\nposition_noise_m = 1e300\n", "give 0 to 1000000"),
+        ("[airspace]\nposition_noise_m = 1e300\n", "give 0 to 1e6"),
         ("[airspace]\nshield = false\n", "give \"on\" or \"off\""),
         ("[airspace]\npreset = \"paper\"\nmax_rounds = 4000000000\n", "fewer rounds"),
         (

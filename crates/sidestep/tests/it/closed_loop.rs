@@ -2,7 +2,7 @@
 //! known tables, record, write CSV, learn, write a profile, load it, and compare.
 
 use sidestep::kernel::Simulation;
-use sidestep::kernel::ports::recorder::{ColumnSpec, MemoryRecorder, TableSchema, Values};
+use sidestep::kernel::ports::{ColumnSpec, MemoryRecorder, TableSchema, Values};
 use sidestep::learn::sensor::SensorOptions;
 use sidestep::learn::{Estimate, EstimateOptions, effector, profile, sensor};
 use sidestep::scenario::Source;
@@ -77,14 +77,7 @@ fn as_csv(recorder: &MemoryRecorder, schema: &TableSchema) -> String {
         .iter()
         .map(|c| (c, recorder.column(&schema.name, &c.name).expect("a column of the schema")))
         .collect();
-    let field = |(spec, values): &(&ColumnSpec, &Values), row: usize| match values {
-        Values::U32(v) => v[row].to_string(),
-        Values::U64(v) => v[row].to_string(),
-        Values::I32(v) => v[row].to_string(),
-        Values::F64(v) => v[row].to_string(),
-        Values::Label(v) => spec.labels[v[row] as usize].clone(),
-    };
-    let line = |row| columns.iter().map(|c| field(c, row)).collect::<Vec<_>>().join(",");
+    let line = |row| columns.iter().map(|(c, v)| c.text(v, row)).collect::<Vec<_>>().join(",");
     let rows: Vec<String> = (0..recorder.rows(&schema.name)).map(line).collect();
     format!("{}\n{}\n", names.join(","), rows.join("\n"))
 }

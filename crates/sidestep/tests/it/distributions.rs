@@ -3,7 +3,7 @@
 
 use super::tiles::{Tiles, assert_fits, law, repeating};
 use sidestep::kernel::Simulation;
-use sidestep::kernel::ports::recorder::{MemoryRecorder, Values};
+use sidestep::kernel::ports::{MemoryRecorder, Values};
 use sidestep::scenario::Source;
 use sidestep::worlds::robots::effector::ObstacleRule;
 use sidestep::worlds::robots::exact::{Outcome, Pose};

@@ -3,7 +3,7 @@
 
 use super::tiles::{Tiles, assert_fits};
 use sidestep::kernel::Simulation;
-use sidestep::kernel::ports::recorder::{MemoryRecorder, Values};
+use sidestep::kernel::ports::{MemoryRecorder, Values};
 use sidestep::worlds::robots::exact::{Beam, Model, PomdpOptions};
 use sidestep::worlds::robots::scenario::{Behaviours, Compiled, StorageOrder};
 use std::collections::BTreeMap;
@@ -214,7 +214,7 @@ fn the_simulator_reports_what_the_file_says() {
 /// Names of the poses in the order of the readings: by cycle, then by robot.
 fn poses_by_cycle(recorder: &MemoryRecorder) -> Vec<String> {
     let numbers = |column: &str| match recorder.column("trajectories", column) {
-        Some(Values::U32(values) | Values::Label(values)) => values.clone(),
+        Some(Values::U32(values) | Values::Label(values)) => values.to_vec(),
         Some(Values::U64(values)) => values.iter().map(|&v| v as u32).collect(),
         _ => panic!("{column}"),
     };
@@ -233,7 +233,7 @@ fn poses_by_cycle(recorder: &MemoryRecorder) -> Vec<String> {
 
 fn labels(
     recorder: &MemoryRecorder,
-    schemas: &[sidestep::kernel::ports::recorder::TableSchema],
+    schemas: &[sidestep::kernel::ports::TableSchema],
     column: &str,
 ) -> Vec<String> {
     let readings = schemas.iter().find(|s| s.name == "readings").expect("calibration is on");

@@ -1,43 +1,47 @@
 //! The text of one airplane of a scenario: where it begins, its way-points, its recorded track,
 //! and its orders.
 
-use super::flight::{FlightOrder, MAX_ORDERS, Point, Task, Track, TrackPoint};
+use super::flight::{FlightOrder, MAX_ORDERS, Task, Track, TrackPoint};
+use super::scenario::{Measure, TurnRate, Turns};
 use serde::Deserialize;
 use sidestep_kernel::{InputError, math};
-use sidestep_scenario::Source;
+use sidestep_scenario::{AboveTo, FromTo, Number, Point, Source};
 use toml::Spanned;
 
 /// How fast levels are changed when an order does not say it: 1500 ft/min.
 pub(super) const CLIMB_M_S: f64 = 7.62;
-/// No position, height or time is beyond this.
-const MOST: f64 = 1e9;
+/// No position, height or angle is beyond this.
+type Value = Number<FromTo<-1_000_000_000, 1_000_000_000>>;
+/// No time either, nor before the start.
+type Time = Number<FromTo<0, 1_000_000_000>>;
+type Place = Point<2, FromTo<-1_000_000_000, 1_000_000_000>>;
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct AirplaneSection {
-    pub(super) at_m: Option<Point>,
-    pub(super) heading_deg: Option<f64>,
-    pub(super) way_points_m: Option<Vec<Point>>,
-    pub(super) altitude_m: Option<f64>,
-    pub(super) appears_s: Option<f64>,
-    pub(super) track: Option<Spanned<Vec<[f64; 4]>>>,
+    pub(super) at_m: Option<Place>,
+    pub(super) heading_deg: Option<Value>,
+    way_points_m: Option<Vec<Place>>,
+    pub(super) altitude_m: Option<Value>,
+    pub(super) appears_s: Option<Time>,
+    track: Option<Spanned<Vec<[f64; 4]>>>,
     #[serde(default)]
-    pub(super) orders: Vec<Spanned<OrderSection>>,
-    pub(super) v_m_s: Option<f64>,
-    pub(super) omega_max_deg_s: Option<f64>,
-    pub(super) separation_m: Option<f64>,
-    pub(super) turns: Option<usize>,
+    orders: Vec<Spanned<OrderSection>>,
+    pub(super) v_m_s: Option<Measure>,
+    pub(super) omega_max_deg_s: Option<Number<TurnRate>>,
+    pub(super) separation_m: Option<Measure>,
+    pub(super) turns: Option<Turns>,
 }
 
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub(super) struct OrderSection {
-    at_s: f64,
-    heading_deg: Option<f64>,
-    speed_m_s: Option<f64>,
-    altitude_m: Option<f64>,
-    climb_m_s: Option<f64>,
-    way_points_m: Option<Vec<Point>>,
+struct OrderSection {
+    at_s: Option<Time>,
+    heading_deg: Option<Value>,
+    speed_m_s: Option<Measure>,
+    altitude_m: Option<Value>,
+    climb_m_s: Option<Number<AboveTo<0, 1_000_000_000>>>,
+    way_points_m: Option<Vec<Place>>,
     proceeds: Option<bool>,
     leaves: Option<bool>,
 }
@@ -45,11 +49,16 @@ pub(super) struct OrderSection {
 /// Orders in their order, and when the airplane is removed: never at infinity.
 type Orders = (Vec<FlightOrder>, f64);
 
-fn is_absurd(value: f64) -> bool {
-    !value.is_finite() || value.abs() > MOST
+fn places(given: Option<&Vec<Place>>) -> Vec<[f64; 2]> {
+    given.into_iter().flatten().map(|place| place.get()).collect()
 }
 
 impl AirplaneSection {
+    /// The way-points in their order; none if none are given.
+    pub(super) fn way_points_m(&self) -> Vec<[f64; 2]> {
+        places(self.way_points_m.as_ref())
+    }
+
     /// The recorded track, if there is one.
     pub(super) fn track(&self, source: &Source) -> Result<Option<Track>, InputError> {
         let Some(rows) = &self.track else { return Ok(None) };
@@ -57,11 +66,7 @@ impl AirplaneSection {
         if own || self.altitude_m.is_some() || self.appears_s.is_some() || !self.orders.is_empty() {
             let remedy =
                 "leave out at_m, heading_deg, way_points_m, altitude_m, appears_s and orders";
-            return Err(source.error(
-                Some(rows.span()),
-                "a track beside what it tells itself",
-                remedy,
-            ));
+            return Err(source.error(rows.span(), "a track beside what it tells itself", remedy));
         }
         let point =
             |&[t_s, x, y, altitude_m]: &[f64; 4]| TrackPoint { t_s, at: [x, y], altitude_m };
@@ -71,7 +76,7 @@ impl AirplaneSection {
             Some(track) => Ok(Some(track)),
             None => {
                 let remedy = "give two or more [t_s, x_m, y_m, altitude_m], times rising from 0";
-                Err(source.error(Some(rows.span()), "this is no track", remedy))
+                Err(source.error(rows.span(), "this is no track", remedy))
             }
         }
     }
@@ -82,19 +87,16 @@ impl AirplaneSection {
         let mut last_s = 0.0;
         for section in &self.orders {
             let order = section.get_ref();
-            let error =
-                |cause: &str, remedy: &str| Err(source.error(Some(section.span()), cause, remedy));
-            if is_absurd(order.at_s) || order.at_s < last_s {
-                return error(
-                    "the order's time is before the one before",
-                    "sort orders by at_s, from 0",
-                );
+            let error = |cause: &str, remedy: &str| source.error(section.span(), cause, remedy);
+            let at_s = order.at_s.map_or(0.0, f64::from);
+            if at_s < last_s {
+                let cause = "the order's time is before the one before";
+                return Err(error(cause, "sort orders by at_s, from 0"));
             }
-            last_s = order.at_s;
-            match order.task() {
-                Ok(Some(task)) => orders.push(FlightOrder { at_s: order.at_s, task }),
-                Ok(None) => leaves_s = order.at_s.min(leaves_s),
-                Err((cause, remedy)) => return error(cause, remedy),
+            last_s = at_s;
+            match order.task().map_err(|(cause, remedy)| error(cause, remedy))? {
+                Some(task) => orders.push(FlightOrder { at_s, task }),
+                None => leaves_s = at_s.min(leaves_s),
             }
         }
         if orders.len() > MAX_ORDERS {
@@ -108,29 +110,18 @@ impl AirplaneSection {
 impl OrderSection {
     /// The one task that the order is; `None` for leaving.
     fn task(&self) -> Result<Option<Task>, (&'static str, &'static str)> {
-        let climb_m_s = self.climb_m_s.unwrap_or(CLIMB_M_S);
-        let numbers = [self.heading_deg, self.speed_m_s, self.altitude_m, Some(climb_m_s)];
-        let points = self.way_points_m.iter().flatten().flatten();
-        if numbers.iter().flatten().chain(points).any(|v| is_absurd(*v)) {
-            return Err((
-                "an order with a value that is no number, or absurd",
-                "give less than 1e9",
-            ));
-        }
-        if climb_m_s <= 0.0 || self.speed_m_s.is_some_and(|v| v <= 0.0 || v >= 1e6) {
-            return Err(("a speed that is not positive, or absurd", "give more than 0"));
-        }
         if self.climb_m_s.is_some() && self.altitude_m.is_none() {
             return Err(("climb_m_s without altitude_m", "say to which altitude_m"));
         }
-        let route = self.way_points_m.clone();
-        let altitude = self.altitude_m.map(|altitude_m| Task::Altitude { altitude_m, climb_m_s });
-        let heading = self.heading_deg.map(|deg| Task::Heading(math::wrap_angle(deg.to_radians())));
+        let climb_m_s = self.climb_m_s.map_or(CLIMB_M_S, f64::from);
+        let climbs = |to: Value| Task::Altitude { altitude_m: to.get(), climb_m_s };
+        let turns = |to: Value| Task::Heading(math::wrap_angle(to.get().to_radians()));
+        let route = places(self.way_points_m.as_ref());
         let tasks = [
-            heading,
-            self.speed_m_s.map(Task::Speed),
-            altitude,
-            route.filter(|way_points| !way_points.is_empty()).map(Task::WayPoints),
+            self.heading_deg.map(turns),
+            self.speed_m_s.map(|speed| Task::Speed(speed.get())),
+            self.altitude_m.map(climbs),
+            (!route.is_empty()).then_some(Task::WayPoints(route)),
             self.proceeds.filter(|yes| *yes).map(|_| Task::Proceed),
         ];
         let mut tasks: Vec<Task> = tasks.into_iter().flatten().collect();

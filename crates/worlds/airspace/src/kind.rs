@@ -1,7 +1,7 @@
 //! The world as those see it who run scenarios and know no world.
 
 use super::scenario::Compiled;
-use super::{AirspaceWorld, foreign, words};
+use super::{AirspaceWorld, bundle, foreign, words};
 use sidestep_kernel::words::Said;
 use sidestep_kernel::{InputError, Plan, Simulation, World};
 use sidestep_scenario::{Compiled as AnyCompiled, Foreign, Kind, Resolved, Source};
@@ -56,8 +56,7 @@ impl AnyCompiled for Compiled {
     }
 
     fn resolve(&self, source: &Source) -> Result<Resolved, InputError> {
-        // Such a scenario names no other file.
-        Ok(Resolved { text: source.text.clone(), files: Vec::new() })
+        bundle::resolve(source, self)
     }
 
     fn start(&self, source: &Source, workers: usize) -> Box<dyn Simulation> {

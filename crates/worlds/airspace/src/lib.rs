@@ -15,6 +15,7 @@
 mod act;
 pub mod agents;
 mod baseline;
+pub mod bundle;
 mod decide;
 pub mod deploy;
 pub mod events;

@@ -10,11 +10,10 @@ use super::world::AirspaceWorld;
 use super::{Scratch, view, words};
 use serde_json::Value;
 use sidestep_kernel::checkpoint::CheckpointError;
-use sidestep_kernel::ports::{RecordError, Recorder, TableSchema};
-use sidestep_kernel::run::{Effort, Plan, Run};
+use sidestep_kernel::ports::{Buffers, RecordError, Recorder, TableSchema};
 use sidestep_kernel::view::{Frame, Log, Look, PlaceRows, Scenery};
 use sidestep_kernel::words::{Lines, Said};
-use sidestep_kernel::{Cycle, Digest, EntityId, InputError, World};
+use sidestep_kernel::{Cycle, Digest, Effort, EntityId, InputError, Plan, Run, World};
 use sidestep_scenario::Source;
 
 /// A run of an airspace.

@@ -2,12 +2,12 @@
 //! (slides R4, R9).
 
 use super::events::EventKind;
-use super::geometry::{Bounds, Point, along, distance, unit};
+use super::motion::replan::Memory;
 use super::navigate::Navigator;
-use super::replan::Memory;
+use super::rods::geometry::{Bounds, Point, in_dimensions, unit};
+use super::rods::veto::{Reason, Source};
 use super::script::{Motion, Script, Turtle};
 use super::swarm::leader::LeaderState;
-use super::veto::{Reason, Source};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::distr::normal;
 use sidestep_kernel::stream::Draws;
@@ -90,8 +90,8 @@ pub struct Driving {
     pub next: u32,
     /// Cycles that it has rested on order of the script.
     pub rested: u32,
-    /// Where the task began: position, ahead, left.
-    pub start: [[f64; 3]; 3],
+    /// Where the task began.
+    pub start: Turtle,
     /// The direction ahead, a unit vector.
     pub ahead: [f64; 3],
     /// The nearest that it came to its present target.
@@ -99,17 +99,35 @@ pub struct Driving {
     /// The kind of event that was told last since a motion as wanted.
     pub told: Option<EventKind>,
     /// Who objected last in this part of the task, and why.
-    pub objection: Option<(u32, Reason)>,
+    pub objection: Option<Objection>,
     /// Where it is on the ladder after vetoes.
     pub ladder: Memory,
     /// What it remembers as a navigator on wheels.
     pub leader: Option<LeaderState>,
-    /// Way that it wanted to go, and way that it went, in this task.
-    pub way_m: [f64; 2],
+    /// Its ways in this task, meters.
+    pub way_m: Way,
+}
+
+/// An objection to what an initiator wanted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Objection {
+    /// The connector that objected.
+    pub by: u32,
+    /// Why.
+    pub reason: Reason,
+}
+
+/// How far an initiator came, of how far it wanted.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Way {
+    /// The way that it wanted to go.
+    pub wanted: f64,
+    /// The way that it went.
+    pub gone: f64,
 }
 
 impl Driving {
-    /// At the begin of the first task.
+    /// At the start of the first task.
     pub fn new<const D: usize>(agent: usize, points: &[Point<D>]) -> Self {
         let mut driving = Self {
             task: 0,
@@ -118,14 +136,14 @@ impl Driving {
             late: 0,
             next: 0,
             rested: 0,
-            start: [[0.0; 3]; 3],
+            start: Turtle { position_m: [0.0; 3], ahead: [0.0; 3], left: [0.0; 3] },
             ahead: [0.0; 3],
             nearest_m: f64::INFINITY,
             told: None,
             objection: None,
             ladder: Memory::default(),
             leader: None,
-            way_m: [0.0; 2],
+            way_m: Way::default(),
         };
         driving.begin(agent, points);
         driving
@@ -133,13 +151,20 @@ impl Driving {
 
     /// Begins a task where its initiator is.
     fn begin<const D: usize>(&mut self, agent: usize, points: &[Point<D>]) {
-        let turtle = turtle(agent, points);
-        self.start = [turtle.position_m, turtle.ahead, turtle.left];
-        self.ahead = turtle.ahead;
+        self.start = turtle(agent, points);
+        self.ahead = self.start.ahead;
         (self.cycles, self.idle, self.next, self.rested) = (0, 0, 0, 0);
         (self.nearest_m, self.late, self.leader) = (f64::INFINITY, 0, None);
         (self.told, self.objection) = (None, None);
-        (self.ladder, self.way_m) = (Memory::default(), [0.0; 2]);
+        (self.ladder, self.way_m) = (Memory::default(), Way::default());
+    }
+
+    /// Goes on to the next motion or target.
+    pub fn next_part(&mut self) {
+        self.next += 1;
+        (self.rested, self.idle) = (0, 0);
+        (self.told, self.objection) = (None, None);
+        (self.nearest_m, self.late) = (f64::INFINITY, 0);
     }
 
     /// Goes on to the next task, which `agent` carries out.
@@ -153,8 +178,7 @@ impl Driving {
     /// # Errors
     /// What the script comes to that is no motion, or too many of them.
     pub fn motions(&self, script: &Script) -> Result<Vec<Motion>, InputError> {
-        let [position_m, ahead, left] = self.start;
-        let motions = script.motions(Turtle { position_m, ahead, left });
+        let motions = script.motions(self.start);
         let motions: Vec<Motion> = motions.take(MAX_MOTIONS + 1).collect::<Result<_, _>>()?;
         if motions.len() > MAX_MOTIONS {
             let cause = format!("comes to more than {MAX_MOTIONS} motions");
@@ -172,38 +196,18 @@ fn turtle<const D: usize>(agent: usize, points: &[Point<D>]) -> Turtle {
         _ => points.get(agent - 1),
     };
     let ahead = behind.and_then(|b| unit(std::array::from_fn::<f64, D, _>(|i| at[i] - b[i])));
-    let ahead = ahead.map_or([1.0, 0.0, 0.0], in_space);
+    let ahead = ahead.map_or([1.0, 0.0, 0.0], in_dimensions);
     // Left is level: across the upward axis, or along y where that is ahead.
     let across = math::hypot(ahead[0], ahead[1]);
     let left = match across > 1e-9 {
         true => [-ahead[1] / across, ahead[0] / across, 0.0],
         false => [0.0, 1.0, 0.0],
     };
-    Turtle { position_m: in_space(at), ahead, left }
-}
-
-/// A point with as many coordinates as three.
-pub fn in_space<const D: usize>(p: Point<D>) -> [f64; 3] {
-    std::array::from_fn(|i| p.get(i).copied().unwrap_or(0.0))
-}
-
-/// The first coordinates of a point.
-pub fn out_of_space<const D: usize>(p: [f64; 3]) -> Point<D> {
-    std::array::from_fn(|i| p[i])
-}
-
-/// At most `step_m` towards a place.
-pub fn towards<const D: usize>(from: Point<D>, to: Point<D>, step_m: f64) -> Point<D> {
-    let far_m = distance(from, to);
-    if far_m <= step_m {
-        to
-    } else {
-        along(from, std::array::from_fn(|i| to[i] - from[i]), step_m / far_m)
-    }
+    Turtle { position_m: in_dimensions(at), ahead, left }
 }
 
 /// The direction of a wandering initiator for the next step.
-pub(super) fn wander<const D: usize>(
+pub(crate) fn wander<const D: usize>(
     rule: &Wander<D>,
     at: Point<D>,
     ahead: Point<D>,
@@ -240,12 +244,5 @@ mod tests {
         assert_eq!(turtle(0, &points[..1]).ahead, [1.0, 0.0, 0.0]);
         let upward = turtle(1, &[[0.0, 0.0, 0.0], [0.0, 0.0, 2.0]]);
         assert_eq!((upward.ahead, upward.left), ([0.0, 0.0, 1.0], [0.0, 1.0, 0.0]));
-    }
-
-    #[test]
-    fn a_step_never_goes_beyond_its_goal() {
-        assert_eq!(towards([0.0, 0.0], [3.0, 4.0], 10.0), [3.0, 4.0]);
-        assert_eq!(towards([0.0, 0.0], [3.0, 4.0], 2.5), [1.5, 2.0]);
-        assert_eq!(towards([1.0], [1.0], 0.0), [1.0]);
     }
 }

@@ -1,6 +1,6 @@
 //! What happened, and when.
 
-use super::veto::Reason;
+use super::rods::veto::Reason;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::{Cycle, EntityId};
 

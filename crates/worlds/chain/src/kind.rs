@@ -54,7 +54,7 @@ impl<const D: usize> AnyCompiled for Compiled<D> {
     }
 
     fn resolve(&self, source: &Source) -> Result<Resolved, InputError> {
-        bundle::resolve(source, (self.seed, self.cycles))
+        bundle::resolve(source, self)
     }
 
     fn start(&self, source: &Source, workers: usize) -> Box<dyn Simulation> {

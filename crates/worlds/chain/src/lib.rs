@@ -5,77 +5,90 @@
 //! why. One code for two and three dimensions.
 //!
 //! ```text
-//! chain.rs, obstacle.rs: what there is          geometry.rs, grid.rs: distances, and what is near
-//! veto.rs: requests and outcomes                rules.rs: named options
-//! propagate.rs -> candidates.rs -> scene.rs     one motion: sweeps, a slave's choices, their judge
-//!                 interval.rs, search.rs        free directions: exact in the plane, searched in space
-//!                 sweep.rs, own_body.rs         nothing is passed through; the chain's own parts
-//!                 open.rs                       the same where nothing is in the way
-//! wavefront.rs: many motions at once            passage.rs: who passed through what, between states
-//! reach.rs: an arm with a fixed base            rebuild.rs: broken chains
-//! ground/: where obstacles come from            script/: a turtle language that drives an initiator
-//! swarm/: robots on wheels, one that navigates and those that follow
-//! kinematics/: arms of joints, as chains        ik/: postures that reach a target
+//! rods/:   chains, constraints, propagation, search      arms/:   joints as rods, inverse kinematics
+//! motion/: after a veto, out of the way                  script/: a turtle language for initiators
+//! ground/: where obstacles come from                     swarm/:  robots on wheels that follow a leader
 //!
-//! scenario.rs -> world.rs (immutable), state.rs (bodies), driver.rs (tasks), simulation.rs
-//! act.rs: a chain's cycle: escape.rs, replan.rs, broken.rs, navigate.rs, formation.rs,
-//!                         measure.rs -> metrics.rs, rows.rs
+//! scenario.rs -> world.rs (immutable), state.rs (bodies), driver.rs (tasks)
+//! one cycle: claim.rs (perceive.rs) -> join.rs -> act/ -> metrics.rs, events.rs, rows.rs
 //! ```
+//!
+//! `rods` and `arms` know nothing of the world and of runs: a library that needs no cycle.
 
 mod act;
-pub mod arm;
-mod broken;
+pub mod arms;
 pub mod bundle;
-mod candidates;
-#[expect(clippy::module_inception, reason = "the chain itself, of the world of chains")]
-pub mod chain;
+mod claim;
 pub mod driver;
-pub mod escape;
 pub mod events;
 pub mod formation;
-pub mod geometry;
-mod grid;
 pub mod ground;
-pub mod ik;
-pub mod interval;
+mod join;
 mod kind;
-pub mod kinematics;
-mod measure;
 pub mod metrics;
+pub mod motion;
 pub mod navigate;
-pub mod obstacle;
-mod open;
-mod own_body;
-pub mod passage;
-pub mod propagate;
-pub mod reach;
-pub mod rebuild;
-pub mod replan;
+mod perceive;
+mod progress;
+pub mod rods;
 mod rows;
-pub mod rules;
 pub mod run;
 pub mod scenario;
-mod scene;
 #[cfg(test)]
 mod scenes;
+mod scratch;
 pub mod script;
-mod search;
 pub mod state;
 pub mod swarm;
-pub mod sweep;
-pub mod veto;
 mod view;
-pub mod wavefront;
 mod words;
 pub mod world;
 
-pub use chain::{Chain, Connector, Mobility, Rod};
-pub use escape::{Escape, Escaped, Escaper};
+pub use arms::{ik, kinematics};
 pub use kind::Chains;
-pub use obstacle::{Obstacle, Obstacles};
-pub use propagate::Propagator;
-pub use replan::{Climbed, Ladder, Rungs, Situation};
-pub use rules::{Rotation, Rules};
+pub use motion::escape::{Escape, Escaped, Escaper};
+pub use motion::replan::{Climbed, Ladder, Rungs, Situation};
+pub use rods::{
+    BEND_TOLERANCE_RAD, Chain, Connector, Mobility, Mode, Motion, Moved, Obstacle, Obstacles,
+    Outcome, Propagator, Reason, Request, Rod, Rotation, Rules, SKIN_M, Source, TOLERANCE_M, Veto,
+    geometry, rebuild, wavefront,
+};
 pub use run::ChainRun;
-pub use scene::{BEND_TOLERANCE_RAD, SKIN_M, TOLERANCE_M};
-pub use veto::{Mode, Motion, Moved, Outcome, Reason, Request, Source, Veto};
+
+use arms::arm;
+use motion::{escape, replan};
+use rods::{chain, obstacle, rules, veto};
+use scratch::Scratch;
+use sidestep_kernel::conflict::Groups;
+use sidestep_kernel::world::Decides;
+use sidestep_kernel::{Phases, Slot, Turn};
+use state::ChainState;
+use std::ops::Range;
+use world::ChainWorld;
+
+impl<const D: usize> Phases for ChainWorld<D> {
+    const DECIDES: Decides = Decides::Together;
+
+    type State = ChainState<D>;
+    type Scratch = Scratch<D>;
+
+    fn scratch(&self) -> Scratch<D> {
+        Scratch::new(self)
+    }
+
+    fn bodies(&self, state: &ChainState<D>) -> usize {
+        state.len()
+    }
+
+    fn claim(turn: &mut Turn<'_, Self>, bodies: Range<usize>) {
+        bodies.for_each(|slot| claim::claim(turn, slot));
+    }
+
+    fn join(turn: &mut Turn<'_, Self>, bodies: Range<usize>, groups: &Groups) {
+        bodies.for_each(|slot| join::join(turn, slot, groups));
+    }
+
+    fn act(turn: &mut Turn<'_, Self>, group: &mut [Slot]) {
+        act::act(turn, group);
+    }
+}

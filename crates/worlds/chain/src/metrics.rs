@@ -1,8 +1,9 @@
 //! What came of a run.
 
-use super::escape::Escaped;
-use super::replan::Climbed;
-use super::veto::Reason;
+use super::motion::escape::Escaped;
+use super::motion::replan::Climbed;
+use super::rods::veto::{Moved, Reason};
+use super::swarm::follower::Followed;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::EntityId;
 use std::collections::BTreeMap;
@@ -161,6 +162,16 @@ impl Default for RobotTally {
 }
 
 impl RobotTally {
+    /// Counts the step of a robot that ended `lag_m` from its connector.
+    pub(crate) fn count(&mut self, followed: &Followed, lag_m: f64) {
+        self.steps += 1;
+        self.lag_sum_m += lag_m;
+        self.max_lag_m = self.max_lag_m.max(lag_m);
+        self.held_steps += u64::from(followed.is_held);
+        self.bumper_steps += u64::from(followed.is_bumped);
+        self.min_gap_m = self.min_gap_m.min(followed.gap_m);
+    }
+
     fn add(self, other: &Self) -> Self {
         Self {
             steps: self.steps + other.steps,
@@ -171,6 +182,21 @@ impl RobotTally {
             max_lag_m: self.max_lag_m.max(other.max_lag_m),
             min_gap_m: self.min_gap_m.min(other.min_gap_m),
         }
+    }
+}
+
+impl Tally {
+    /// Adds a motion.
+    pub(crate) fn add_moved<const D: usize>(&mut self, moved: &Moved<D>) {
+        self.rotations += moved.rotated as u64;
+        self.moved += moved.changed as u64;
+        self.max_slave_step_m = self.max_slave_step_m.max(moved.max_slave_step_m);
+    }
+
+    /// Adds a veto.
+    pub(crate) fn add_veto(&mut self, reason: Reason) {
+        let k = Reason::ALL.iter().position(|&all| all == reason);
+        self.vetoes[k.unwrap_or_default()] += 1;
     }
 }
 

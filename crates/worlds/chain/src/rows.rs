@@ -1,158 +1,108 @@
-//! What a run records: tables, and their rows until they are recorded.
+//! What a run records: its tables, and their rows until they are recorded.
 
 use super::events::{Event, EventKind};
 use super::geometry::{Core, Point};
+use super::scenario::RecordSection;
 use super::state::ChainState;
 use super::swarm::drive::Pose;
 use super::veto::Reason;
 use super::world::ChainWorld;
-use sidestep_kernel::ports::{ColumnSpec, ColumnType, RecordError, Recorder, TableSchema, Values};
+use sidestep_kernel::ports::table::label_of;
+use sidestep_kernel::ports::{Buffer, Buffers, RowBuffer, Table};
 use sidestep_kernel::{Cycle, EntityId};
 
-/// Rows kept at most before they must be recorded.
-const MAX_ROWS: usize = 1 << 20;
 /// The number of an obstacle in an event that is about none.
 const NO_OBSTACLE: u32 = u32::MAX;
 
-/// Tables of a run of chains.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Table {
-    /// A row per connector and recorded cycle.
-    Trajectories,
-    /// A row per robot of a swarm and recorded cycle.
-    Robots,
-    /// A row per obstacle that moves and recorded cycle.
-    Movers,
-    /// A row per event.
-    Events,
+/// Where a connector, a robot or an obstacle is at the start of a cycle.
+#[derive(Debug)]
+struct Place {
+    cycle: Cycle,
+    /// The chain it belongs to, of connectors and robots.
+    chain: EntityId,
+    /// Its index there, or its number.
+    id: u32,
+    at: [f64; 3],
 }
 
-fn column(name: &str, ty: ColumnType, meaning: &str) -> ColumnSpec {
-    ColumnSpec { name: name.into(), ty, meaning: meaning.into(), labels: Vec::new() }
+/// The columns of a position in as many dimensions.
+fn axes(table: Table<Place>, dimensions: usize) -> Table<Place> {
+    let axes = ["x_m", "y_m", "z_m"].into_iter().take(dimensions).enumerate();
+    axes.fold(table, |table, (i, axis)| table.f64(axis, "position", move |p| p.at[i]))
 }
 
-fn labels(name: &str, meaning: &str, labels: Vec<String>) -> ColumnSpec {
-    ColumnSpec { labels, ..column(name, ColumnType::Label, meaning) }
+fn table_of_places(name: &str) -> Table<Place> {
+    let meaning = "cycle of dt at whose start this holds";
+    Table::new(name).u64("cycle", meaning, |p: &Place| p.cycle)
 }
 
-const AXES: [&str; 3] = ["x_m", "y_m", "z_m"];
-
-fn axes(n: usize) -> impl Iterator<Item = ColumnSpec> {
-    let names = AXES.into_iter().take(n);
-    names.map(|name| column(name, ColumnType::F64, "position"))
+fn trajectories(dimensions: usize) -> Table<Place> {
+    let table = table_of_places("trajectories").u32("chain", "entity id", |p| p.chain).u32(
+        "connector",
+        "its index",
+        |p| p.id,
+    );
+    axes(table, dimensions)
 }
 
-impl Table {
-    pub(super) const ALL: [Self; 4] =
-        [Self::Trajectories, Self::Robots, Self::Movers, Self::Events];
-
-    fn schema(self, dimensions: usize) -> TableSchema {
-        let at = || column("cycle", ColumnType::U64, "cycle of dt at whose start this holds");
-        let chain = || column("chain", ColumnType::U32, "entity id");
-        let (name, columns) = match self {
-            Self::Trajectories => {
-                let who = [at(), chain(), column("connector", ColumnType::U32, "its index")];
-                ("trajectories", who.into_iter().chain(axes(dimensions)).collect())
-            }
-            Self::Robots => (
-                "robots",
-                vec![
-                    at(),
-                    chain(),
-                    column("robot", ColumnType::U32, "the connector that it follows"),
-                    column("x_m", ColumnType::F64, "position of the body"),
-                    column("y_m", ColumnType::F64, "position of the body"),
-                    column("heading_rad", ColumnType::F64, "counter-clockwise from x"),
-                ],
-            ),
-            Self::Movers => {
-                let who = [at(), column("obstacle", ColumnType::U32, "its number")];
-                ("movers", who.into_iter().chain(axes(dimensions)).collect())
-            }
-            Self::Events => (
-                "events",
-                vec![
-                    column("cycle", ColumnType::U64, "cycle of dt in which it happened"),
-                    chain(),
-                    labels(
-                        "event",
-                        "what happened",
-                        EventKind::ALL.iter().map(|kind| kind.name().into()).collect(),
-                    ),
-                    column("connector", ColumnType::U32, "the connector that it is about"),
-                    labels("reason", "why, of vetoes", reasons()),
-                    column("obstacle", ColumnType::U32, "the obstacle; 4294967295 for none"),
-                    column("value", ColumnType::F64, "meters, radians or a number, by event"),
-                ],
-            ),
-        };
-        TableSchema { name: name.into(), columns }
-    }
+fn robots() -> Table<Place> {
+    table_of_places("robots")
+        .u32("chain", "entity id", |p| p.chain)
+        .u32("robot", "the connector that it follows", |p| p.id)
+        .f64("x_m", "position of the body", |p| p.at[0])
+        .f64("y_m", "position of the body", |p| p.at[1])
+        .f64("heading_rad", "counter-clockwise from x", |p| p.at[2])
 }
 
-/// Labels of the column `reason`: first that of events without one.
-fn reasons() -> Vec<String> {
-    let names = Reason::ALL.iter().map(|reason| reason.name().into());
-    std::iter::once("none".to_string()).chain(names).collect()
+fn movers(dimensions: usize) -> Table<Place> {
+    axes(table_of_places("movers").u32("obstacle", "its number", |p| p.id), dimensions)
+}
+
+fn events() -> Table<Event> {
+    let kinds = EventKind::ALL.map(EventKind::name);
+    // The first label is that of events without a reason.
+    let reasons = std::iter::once("none").chain(Reason::ALL.map(Reason::name));
+    let reason = |reason: &Reason| label_of(&Reason::ALL, reason) + 1;
+    Table::new("events")
+        .u64("cycle", "cycle of dt in which it happened", |e: &Event| e.cycle)
+        .u32("chain", "entity id", |e| e.chain)
+        .label("event", "what happened", kinds, |e| label_of(&EventKind::ALL, &e.kind))
+        .u32("connector", "the connector that it is about", |e| e.connector)
+        .label("reason", "why, of vetoes", reasons, move |e| e.reason.as_ref().map_or(0, reason))
+        .u32("obstacle", "the obstacle; 4294967295 for none", |e| e.obstacle.unwrap_or(NO_OBSTACLE))
+        .f64("value", "meters, radians or a number, by event", |e| e.value)
 }
 
 /// Rows that wait for being recorded.
 #[derive(Debug, Default)]
 pub(super) struct Rows {
-    /// Every how many cycles places are kept, and the tables that will be recorded.
-    asked: (Cycle, Vec<Table>),
-    dimensions: usize,
-    /// The tables that are recorded at all, in the order of their numbers.
-    tables: Vec<Table>,
-    trajectories: Places,
-    robots: Places,
-    movers: Places,
-    events: Vec<Event>,
-}
-
-/// Rows of who is where.
-#[derive(Debug, Default)]
-struct Places {
-    cycle: Vec<u64>,
-    who: [Vec<u32>; 2],
-    at: [Vec<f64>; 3],
-}
-
-impl Places {
-    fn push(&mut self, cycle: Cycle, who: [u32; 2], at: &[f64]) {
-        self.cycle.push(cycle);
-        for (column, id) in self.who.iter_mut().zip(who) {
-            column.push(id);
-        }
-        for (column, &x) in self.at.iter_mut().zip(at) {
-            column.push(x);
-        }
-    }
-
-    /// Its columns; `who` of the two ids stand in the table.
-    fn take(&mut self, who: std::ops::Range<usize>, dimensions: usize) -> Vec<Values> {
-        let Self { cycle, who: ids, at } = std::mem::take(self);
-        let ids = ids.into_iter().skip(who.start).take(who.len()).map(Values::U32);
-        let at = at.into_iter().take(dimensions).map(Values::F64);
-        std::iter::once(Values::U64(cycle)).chain(ids).chain(at).collect()
-    }
+    record: RecordSection,
+    trajectories: RowBuffer<Place>,
+    robots: RowBuffer<Place>,
+    movers: RowBuffer<Place>,
+    events: RowBuffer<Event>,
 }
 
 impl Rows {
-    /// Nothing yet; later rows of these tables, of places every so many cycles.
-    pub(super) fn new(asked: (Cycle, Vec<Table>)) -> Self {
-        Self { asked, ..Self::default() }
+    /// Nothing yet; later what `record` asks for.
+    pub(super) fn new(record: RecordSection) -> Self {
+        Self { record, ..Self::default() }
     }
 
     /// Every how many cycles places are kept.
     pub(super) fn every(&self) -> Cycle {
-        self.asked.0
+        self.record.every
     }
 
-    /// Begins to keep rows.
-    pub(super) fn begin(&mut self, dimensions: usize) {
-        self.dimensions = dimensions;
-        self.tables = self.asked.1.clone();
+    /// Begins to keep rows, of those tables that will have some.
+    pub(super) fn begin<const D: usize>(&mut self, world: &ChainWorld<D>) {
+        let record = self.record;
+        let has_robots = world.chains.iter().any(|spec| spec.robots.is_some());
+        let has_movers = !world.movers.is_empty();
+        self.trajectories.begin(record.trajectories.then(|| trajectories(D)));
+        self.robots.begin((record.robots && has_robots).then(robots));
+        self.movers.begin((record.movers && has_movers).then(|| movers(D)));
+        self.events.begin(record.events.then(events));
     }
 
     /// Keeps where everything is at the start of cycle `now`.
@@ -162,79 +112,44 @@ impl Rows {
         state: &ChainState<D>,
         now: Cycle,
     ) {
-        if self.tables.is_empty() || !now.is_multiple_of(self.asked.0) {
+        if !now.is_multiple_of(self.record.every) {
             return;
         }
-        if self.keeps(Table::Trajectories) {
+        if self.trajectories.is_kept() {
             for slot in 0..state.len() {
-                self.connectors(now, slot as EntityId, state.body(slot).chain.points());
+                self.trajectories.extend(connectors(now, slot, state.body(slot).chain.points()));
             }
         }
-        if self.keeps(Table::Robots) {
+        if self.robots.is_kept() {
             for slot in 0..state.len() {
-                for (k, robot) in (0..).zip(&state.body(slot).robots) {
+                for (id, robot) in (0..).zip(&state.body(slot).robots) {
                     let Pose { at: [x, y], heading_rad } = robot.pose;
-                    self.robot(now, slot as EntityId, k, [x, y, heading_rad]);
+                    let at = [x, y, heading_rad];
+                    self.robots.push(Place { cycle: now, chain: slot as EntityId, id, at });
                 }
             }
         }
-        if self.keeps(Table::Movers) {
-            for obstacle in world.movers.at(world.starts_s(now)) {
-                self.mover(now, obstacle.id, middle(&obstacle.core));
+        if self.movers.is_kept() {
+            for mover in world.movers.at(world.starts_s(now)) {
+                let at = in_space(&middle(&mover.core));
+                self.movers.push(Place { cycle: now, chain: 0, id: mover.id, at });
             }
         }
     }
 
-    /// Whether rows must be recorded before more can be kept.
-    pub(super) fn is_full(&self) -> bool {
-        let places = [&self.trajectories, &self.robots, &self.movers];
-        places.iter().any(|p| p.cycle.len() >= MAX_ROWS) || self.events.len() >= MAX_ROWS
-    }
-
-    fn keeps(&self, table: Table) -> bool {
-        self.tables.contains(&table)
-    }
-
-    fn connectors<const D: usize>(&mut self, cycle: Cycle, chain: EntityId, points: &[Point<D>]) {
-        for (k, at) in (0..).zip(points) {
-            self.trajectories.push(cycle, [chain, k], at);
-        }
-    }
-
-    fn robot(&mut self, cycle: Cycle, chain: EntityId, robot: u32, pose: [f64; 3]) {
-        self.robots.push(cycle, [chain, robot], &pose);
-    }
-
-    fn mover<const D: usize>(&mut self, cycle: Cycle, id: u32, at: Point<D>) {
-        self.movers.push(cycle, [0, id], &at);
-    }
-
     pub(super) fn event(&mut self, event: Event) {
-        if self.keeps(Table::Events) {
-            self.events.push(event);
-        }
+        self.events.push(event);
     }
+}
 
-    pub(super) fn schemas(&self) -> Vec<TableSchema> {
-        self.tables.iter().map(|table| table.schema(self.dimensions)).collect()
-    }
-
-    pub(super) fn record(&mut self, recorder: &mut dyn Recorder) -> Result<(), RecordError> {
-        for (number, table) in self.tables.clone().into_iter().enumerate() {
-            let columns = self.take(table);
-            recorder.append(number, &columns)?;
-        }
-        Ok(())
-    }
-
-    fn take(&mut self, table: Table) -> Vec<Values> {
-        match table {
-            Table::Trajectories => self.trajectories.take(0..2, self.dimensions),
-            Table::Robots => self.robots.take(0..2, 3),
-            Table::Movers => self.movers.take(1..2, self.dimensions),
-            Table::Events => events(std::mem::take(&mut self.events)),
-        }
-    }
+/// The places of a chain's connectors.
+fn connectors<const D: usize>(
+    cycle: Cycle,
+    slot: usize,
+    points: &[Point<D>],
+) -> impl Iterator<Item = Place> {
+    let chain = slot as EntityId;
+    (0..).zip(points).map(move |(id, at)| Place { cycle, chain, id, at: in_space(at) })
 }
 
 /// A point of a core that moves with it.
@@ -246,22 +161,17 @@ fn middle<const D: usize>(core: &Core<D>) -> [f64; D] {
     }
 }
 
-fn events(rows: Vec<Event>) -> Vec<Values> {
-    let label = |reason: Option<Reason>| {
-        reason
-            .and_then(|r| Reason::ALL.iter().position(|&all| all == r))
-            .map_or(0, |k| k as u32 + 1)
-    };
-    let kind = |kind: EventKind| {
-        EventKind::ALL.iter().position(|&all| all == kind).unwrap_or_default() as u32
-    };
-    vec![
-        Values::U64(rows.iter().map(|e| e.cycle).collect()),
-        Values::U32(rows.iter().map(|e| e.chain).collect()),
-        Values::Label(rows.iter().map(|e| kind(e.kind)).collect()),
-        Values::U32(rows.iter().map(|e| e.connector).collect()),
-        Values::Label(rows.iter().map(|e| label(e.reason)).collect()),
-        Values::U32(rows.iter().map(|e| e.obstacle.unwrap_or(NO_OBSTACLE)).collect()),
-        Values::F64(rows.iter().map(|e| e.value).collect()),
-    ]
+/// A point with zeros for the axes that it has not.
+fn in_space<const D: usize>(point: &Point<D>) -> [f64; 3] {
+    std::array::from_fn(|i| point.get(i).copied().unwrap_or(0.0))
+}
+
+impl Buffers for Rows {
+    fn buffers(&self) -> Vec<&dyn Buffer> {
+        vec![&self.trajectories, &self.robots, &self.movers, &self.events]
+    }
+
+    fn buffers_mut(&mut self) -> Vec<&mut dyn Buffer> {
+        vec![&mut self.trajectories, &mut self.robots, &mut self.movers, &mut self.events]
+    }
 }

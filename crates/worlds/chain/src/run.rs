@@ -1,23 +1,23 @@
 //! What a run asks of the world beside its phases.
 
-use super::arm::Arm;
-use super::driver::in_space;
+use super::arms::arm::Arm;
+use super::arms::kinematics::Recovered;
 use super::events::Event;
-use super::kinematics::Recovered;
 use super::metrics::{ChainMetrics, Metrics, Tally};
-use super::rows::{Rows, Table};
+use super::rods::geometry::in_dimensions;
+use super::rows::Rows;
 use super::scenario::Compiled;
+use super::scratch::Scratch;
 use super::state::{ChainState, Snapshot};
 use super::view::entry;
 use super::words;
-use super::world::{ChainWorld, Scratch};
+use super::world::ChainWorld;
 use serde_json::Value;
 use sidestep_kernel::checkpoint::CheckpointError;
-use sidestep_kernel::ports::{RecordError, Recorder, TableSchema};
-use sidestep_kernel::run::{Effort, Plan, Run};
+use sidestep_kernel::ports::{Buffers, RecordError, Recorder, TableSchema};
 use sidestep_kernel::view::{Frame, Log, Look, PlaceRows, Scenery};
 use sidestep_kernel::words::{Lines, Said};
-use sidestep_kernel::{Cycle, Digest, EntityId, World};
+use sidestep_kernel::{Cycle, Digest, Effort, EntityId, Plan, Run, World};
 use sidestep_scenario::Source;
 
 /// A run of chains in `D` dimensions.
@@ -30,7 +30,7 @@ impl<const D: usize> Compiled<D> {
     /// Never: scripts are tried when they are compiled.
     pub fn start(self, source: &Source, workers: usize) -> ChainRun<D> {
         let state = ChainState::new(&self.world).expect("scripts are tried when they are compiled");
-        let books = Books { rows: Rows::new(self.tables()), ..Books::default() };
+        let books = Books { rows: Rows::new(self.record), ..Books::default() };
         let plan = self.plan();
         Run::new(self.world, plan, (state, books), &source.text, workers)
     }
@@ -43,17 +43,6 @@ impl<const D: usize> Compiled<D> {
             cycles: self.cycles,
             checkpoint_every: self.record.checkpoint_every,
         }
-    }
-
-    /// How often rows are kept, and the tables that are asked for and will have rows.
-    fn tables(&self) -> (Cycle, Vec<Table>) {
-        let asked = Table::ALL.into_iter().zip(self.record.tables()).filter(|(_, asked)| *asked);
-        let has_rows = |table: &Table| match table {
-            Table::Movers => !self.world.movers.is_empty(),
-            Table::Robots => self.world.chains.iter().any(|spec| spec.robots.is_some()),
-            Table::Trajectories | Table::Events => true,
-        };
-        (self.record.every, asked.map(|(table, _)| table).filter(has_rows).collect())
     }
 }
 
@@ -75,7 +64,7 @@ impl<const D: usize> ChainWorld<D> {
     pub fn metrics_of(&self, state: &ChainState<D>, slot: usize) -> ChainMetrics {
         let body = state.body(slot);
         let spec = &self.chains[slot];
-        let points: Vec<_> = body.chain.points().iter().map(|p| in_space(*p)).collect();
+        let points: Vec<_> = body.chain.points().iter().map(|p| in_dimensions(*p)).collect();
         let joints = spec.arm.as_ref().map(|arm| (arm, arm.joints(&points)));
         let named = |(arm, recovered): (&Arm, Recovered)| {
             let names = arm.serial.variables.iter().map(|variable| variable.name.clone());
@@ -136,7 +125,7 @@ impl<const D: usize> World for ChainWorld<D> {
     }
 
     fn begin_recording(&self, _: &mut ChainState<D>, books: &mut Books, _: Cycle) {
-        books.rows.begin(D);
+        books.rows.begin(self);
     }
 
     fn watch(&self, books: &mut Books) {

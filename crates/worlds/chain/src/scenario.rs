@@ -9,17 +9,17 @@ mod starts;
 mod tasks;
 
 use super::escape::Escape;
-use super::geometry::{Point, norm};
+use super::geometry::{Bounds, norm};
 use super::ground::Movers;
 use super::replan::Rungs;
 use super::rules::{Rotation, Rules};
 use super::world::{ChainSpec, ChainWorld};
 use chains::ChainSection;
-use obstacles::{FieldSection, GroundSection, ObstacleSection};
+use obstacles::{FieldSection, GroundSection, ObstacleSection, fitted};
 use serde::Deserialize;
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{InputError, Seed};
-use sidestep_scenario::{Sections, Source};
+use sidestep_scenario::{AboveTo, Head, Number, Rule, Sections, Source, Whole, refused};
 use std::ops::Range;
 use std::sync::Arc;
 use toml::Spanned;
@@ -29,36 +29,111 @@ const MOST: f64 = 1e6;
 /// Cycles of a run whose scenario does not say it.
 const CYCLES: u64 = 2000;
 
+/// A length, time or speed.
+type Measure = Number<AboveTo<0, 1_000_000>>;
+/// A place or a direction.
+type Place<const D: usize> = sidestep_scenario::Point<D, Coordinate>;
+
+/// Coordinates that a world may have.
+#[derive(Debug, Clone, Copy)]
+struct Coordinate;
+
+impl Rule for Coordinate {
+    fn allows(number: f64) -> bool {
+        number.abs() <= MOST
+    }
+
+    fn words() -> String {
+        "-1e6 to 1e6".into()
+    }
+
+    fn words_of_point(dimensions: usize) -> String {
+        format!("{dimensions} finite numbers, up to 1e6; chain.dimensions is {dimensions}")
+    }
+}
+
+/// Numbers above 0; infinity sets no bound.
+#[derive(Debug, Clone, Copy)]
+struct Unbounded;
+
+impl Rule for Unbounded {
+    fn allows(number: f64) -> bool {
+        number > 0.0
+    }
+
+    fn words() -> String {
+        "a number above 0, or inf".into()
+    }
+}
+
+/// The same up to 1e6.
+#[derive(Debug, Clone, Copy)]
+struct StepMost;
+
+impl Rule for StepMost {
+    fn allows(number: f64) -> bool {
+        number > 0.0 && (number <= MOST || number == f64::INFINITY)
+    }
+
+    fn words() -> String {
+        "a number above 0 and at most 1e6, or inf".into()
+    }
+}
+
+/// A box by its lower and its upper corner.
+#[derive(Debug, Clone, Copy)]
+struct Room<const D: usize>(Bounds<D>);
+
+impl<'de, const D: usize> Deserialize<'de> for Room<D> {
+    fn deserialize<S: serde::Deserializer<'de>>(deserializer: S) -> Result<Self, S::Error> {
+        let [lo, hi] = <[Place<D>; 2]>::deserialize(deserializer)?.map(Place::get);
+        match (0..D).all(|i| lo[i] < hi[i]) {
+            true => Ok(Self(Bounds { lo, hi })),
+            false => {
+                let remedy = "give the lower corner first, then the upper";
+                Err(refused(format_args!("[{lo:?}, {hi:?}]"), remedy))
+            }
+        }
+    }
+}
+
+impl<const D: usize> Room<D> {
+    /// Its floor.
+    fn in_the_plane(&self) -> Bounds<2> {
+        Bounds { lo: fitted(self.0.lo), hi: fitted(self.0.hi) }
+    }
+}
+
+/// As much of a scenario as tells how its points are to be read.
+#[derive(Debug, Deserialize)]
+struct Shape {
+    #[serde(default)]
+    chain: ShapeSection,
+}
+
+#[derive(Debug, Default, Deserialize)]
+struct ShapeSection {
+    dimensions: Option<Spanned<usize>>,
+}
+
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct ChainFile {
-    #[serde(rename = "format")]
-    _format: u32,
-    #[serde(rename = "world")]
-    _world: String,
-    #[serde(default)]
-    name: String,
-    #[serde(default = "one")]
-    seed: u64,
-    cycles: Option<u64>,
+struct ChainFile<const D: usize> {
     #[serde(default)]
     chain: RulesSection,
     #[serde(default)]
     ground: Option<Spanned<GroundSection>>,
     #[serde(default)]
-    obstacles: Sections<ObstacleSection>,
+    obstacles: Sections<ObstacleSection<D>>,
     #[serde(default)]
-    fields: Sections<FieldSection>,
+    fields: Sections<FieldSection<D>>,
     #[serde(default)]
-    chains: Sections<ChainSection>,
-    record: Option<Spanned<RecordSection>>,
+    chains: Sections<ChainSection<D>>,
+    #[serde(default)]
+    record: RecordSection,
 }
 
-fn one() -> u64 {
-    1
-}
-
-/// What a rod does that hits an obstacle, in words.
+/// The behavior of a rod that hits an obstacle, in words.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 enum RotationWord {
@@ -71,21 +146,22 @@ enum RotationWord {
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct RulesSection {
-    dimensions: Option<Spanned<usize>>,
-    dt_s: Option<Spanned<f64>>,
+    #[serde(rename = "dimensions")]
+    _dimensions: Option<usize>,
+    dt_s: Option<Measure>,
     rotation: RotationWord,
     self_collision: Option<bool>,
-    slave_step_max_m: Option<Spanned<f64>>,
-    step_m: Option<Spanned<f64>>,
+    slave_step_max_m: Option<Number<StepMost>>,
+    step_m: Option<Measure>,
     backtracks: Option<usize>,
-    look_m: Option<Spanned<f64>>,
+    look_m: Option<Measure>,
     escape: EscapeWord,
-    escape_speed_m_s: Option<Spanned<f64>>,
-    escape_ahead_s: Option<Spanned<f64>>,
+    escape_speed_m_s: Option<Measure>,
+    escape_ahead_s: Option<Measure>,
     may_start_inside: bool,
 }
 
-/// How chains get out of the way of what moves.
+/// The time at which chains get out of the way of moving obstacles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 enum EscapeWord {
@@ -98,7 +174,7 @@ enum EscapeWord {
     Off,
 }
 
-/// What a run keeps.
+/// The tables that a run keeps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RecordSection {
@@ -111,6 +187,7 @@ pub struct RecordSection {
     /// A row per event, see [`super::events`].
     pub events: bool,
     /// Of how many cycles one is recorded; events are recorded of all.
+    #[serde(deserialize_with = "Whole::<1>::read")]
     pub every: u64,
     /// Cycles between two checkpoints; 0 for none.
     pub checkpoint_every: u64,
@@ -129,14 +206,7 @@ impl Default for RecordSection {
     }
 }
 
-impl RecordSection {
-    /// Whether the tables are asked for, in the order of their numbers.
-    pub(super) fn tables(&self) -> [bool; 4] {
-        [self.trajectories, self.robots, self.movers, self.events]
-    }
-}
-
-/// What a scenario compiles to.
+/// A compiled scenario.
 #[derive(Debug, Clone)]
 pub struct Compiled<const D: usize> {
     /// The immutable world.
@@ -147,7 +217,7 @@ pub struct Compiled<const D: usize> {
     pub seed: u64,
     /// Cycles at most; a run ends when all tasks are done.
     pub cycles: u64,
-    /// What to keep.
+    /// The tables to keep.
     pub record: RecordSection,
 }
 
@@ -166,18 +236,21 @@ impl AnyCompiled {
     /// # Errors
     /// With place, line, column, cause and remedy for anything that is wrong in it.
     pub fn new(source: &Source) -> Result<Self, InputError> {
-        let file: ChainFile = source.parse()?;
-        let compiler = Compiler { source, file: &file };
-        match &file.chain.dimensions {
-            None => compiler.compile().map(Self::Plane),
-            Some(n) if *n.get_ref() == 2 => compiler.compile().map(Self::Plane),
-            Some(n) if *n.get_ref() == 3 => compiler.compile().map(Self::Space),
-            Some(n) => {
-                let cause = format!("dimensions = {}", n.get_ref());
-                Err(source.error(Some(n.span()), cause, "give 2 or 3"))
+        let dimensions = source.parse::<Shape>()?.chain.dimensions;
+        match dimensions.as_ref().map_or(2, |n| *n.get_ref()) {
+            2 => compiled(source).map(Self::Plane),
+            3 => compiled(source).map(Self::Space),
+            n => {
+                let span = dimensions.map(|n| n.span());
+                Err(source.error(span, format!("dimensions = {n}"), "give 2 or 3"))
             }
         }
     }
+}
+
+fn compiled<const D: usize>(source: &Source) -> Result<Compiled<D>, InputError> {
+    let (head, file) = source.parse_world()?;
+    Compiler { source, head: &head, file: &file }.compile()
 }
 
 impl<const D: usize> Compiled<D> {
@@ -186,160 +259,115 @@ impl<const D: usize> Compiled<D> {
     /// # Errors
     /// As [`AnyCompiled::new`]; when it has another number of dimensions.
     pub fn new(source: &Source) -> Result<Self, InputError> {
-        let file: ChainFile = source.parse()?;
-        let dimensions = file.chain.dimensions.as_ref().map_or(2, |n| *n.get_ref());
+        let shape = source.parse::<Shape>()?.chain;
+        let dimensions = shape.dimensions.map_or(2, Spanned::into_inner);
         if dimensions != D {
             let cause = format!("the scenario has {dimensions} dimensions");
             return Err(source.error(None, cause, format!("set chain.dimensions to {D}")));
         }
-        Compiler { source, file: &file }.compile()
+        compiled(source)
     }
 }
 
-struct Compiler<'a> {
+struct Compiler<'a, const D: usize> {
     source: &'a Source,
-    file: &'a ChainFile,
+    head: &'a Head,
+    file: &'a ChainFile<D>,
 }
 
-impl Compiler<'_> {
-    fn compile<const D: usize>(&self) -> Result<Compiled<D>, InputError> {
-        let section = &self.file.chain;
-        let dt_s = self.positive(section.dt_s.as_ref(), "dt_s", 0.02)?;
-        let streams = Streams::new(Seed(self.file.seed));
-        let site = self.site()?;
-        let chains = self.chains::<D>(dt_s, site.as_ref())?;
-        let ground = self.ground(site.as_ref(), &chains)?;
-        self.starts(&chains, &ground)?;
-        let radius_m = chains.iter().flat_map(|spec| spec.start.connectors()).map(|c| c.radius_m);
-        let look_m = 4.0 * radius_m.fold(0.05, f64::max);
-        let escape = self.escape(&chains, &ground.movers, dt_s)?;
-        let world = ChainWorld {
-            chains,
-            cycles: self.file.cycles.unwrap_or(CYCLES),
-            escape,
-            rungs: Rungs::default(),
-            obstacles: ground.obstacles,
-            movers: ground.movers,
-            dt_s,
-            rules: self.rules(escape.as_ref())?,
-            look_m: self.positive(section.look_m.as_ref(), "look_m", look_m)?,
-            streams,
-        };
-        let record = self.file.record.as_ref();
-        if let Some(record) = record.filter(|record| record.get_ref().every == 0) {
-            return Err(self.error(Some(record.span()), "record.every = 0", "give 1 or more"));
-        }
+impl<const D: usize> Compiler<'_, D> {
+    fn compile(&self) -> Result<Compiled<D>, InputError> {
+        let cycles = self.head.cycles.unwrap_or(CYCLES);
         let compiled = Compiled {
-            world: Arc::new(world),
-            name: self.file.name.clone(),
-            seed: self.file.seed,
-            cycles: self.file.cycles.unwrap_or(CYCLES),
-            record: record.map_or(RecordSection::default(), |record| *record.get_ref()),
+            world: Arc::new(self.world(cycles)?),
+            name: self.head.name.clone(),
+            seed: self.head.seed,
+            cycles,
+            record: self.file.record,
         };
         self.try_out(&compiled)?;
         Ok(compiled)
     }
 
-    /// Whether the scripts come to motions, so that they cannot fail while a run goes on.
-    fn try_out<const D: usize>(&self, compiled: &Compiled<D>) -> Result<(), InputError> {
+    fn world(&self, cycles: u64) -> Result<ChainWorld<D>, InputError> {
+        let section = &self.file.chain;
+        let dt_s = section.dt_s.map_or(0.02, f64::from);
+        let site = self.site()?;
+        let chains = self.chains(dt_s, site.as_ref())?;
+        let ground = self.ground(site.as_ref(), &chains)?;
+        self.starts(&chains, &ground)?;
+        let radius_m = chains.iter().flat_map(|spec| spec.start.connectors()).map(|c| c.radius_m);
+        let look_m = 4.0 * radius_m.fold(0.05, f64::max);
+        let escape = self.escape(&chains, &ground.movers, dt_s);
+        Ok(ChainWorld {
+            chains,
+            cycles,
+            escape,
+            rungs: Rungs::default(),
+            obstacles: ground.obstacles,
+            movers: ground.movers,
+            dt_s,
+            rules: self.rules(escape.as_ref()),
+            look_m: section.look_m.map_or(look_m, f64::from),
+            streams: Streams::new(Seed(self.head.seed)),
+        })
+    }
+
+    /// Carries the scripts out once, so that they cannot fail during a run.
+    fn try_out(&self, compiled: &Compiled<D>) -> Result<(), InputError> {
         super::state::ChainState::new(&compiled.world).map(drop)
     }
 
-    /// How chains escape; not at all where nothing moves. Unless it is said, they may do so twice
+    /// The rule by which chains escape; none where nothing moves. Unless it is said, they may do so twice
     /// as fast as they are led, or as the fastest that moves.
-    fn escape<const D: usize>(
-        &self,
-        chains: &[ChainSpec<D>],
-        movers: &Movers<D>,
-        dt_s: f64,
-    ) -> Result<Option<Escape>, InputError> {
+    fn escape(&self, chains: &[ChainSpec<D>], movers: &Movers<D>, dt_s: f64) -> Option<Escape> {
         let section = &self.file.chain;
         if section.escape == EscapeWord::Off || movers.is_empty() {
-            return Ok(None);
+            return None;
         }
         let led = chains.iter().flat_map(|spec| &spec.tasks).map(|task| task.speed_m_s);
         let fastest = movers.at(0.0).map(|mover| norm(mover.velocity_m_s)).fold(0.0, f64::max);
         let usual_m_s = 2.0 * led.fold(fastest, f64::max);
-        let given = section.escape_speed_m_s.as_ref();
-        let speed_max_m_s = self.positive(given, "escape_speed_m_s", usual_m_s)?;
-        let look_ahead = section.escape == EscapeWord::LookAhead;
-        let usual = Escape::new(dt_s, speed_max_m_s);
-        let usual_s = usual.ticks_ahead * dt_s;
-        let ahead_s = self.positive(section.escape_ahead_s.as_ref(), "escape_ahead_s", usual_s)?;
-        let ticks_ahead = if look_ahead { ahead_s / dt_s } else { 0.0 };
-        Ok(Some(Escape { ticks_ahead, ..usual }))
+        let usual = Escape::new(dt_s, section.escape_speed_m_s.map_or(usual_m_s, f64::from));
+        let ahead_s = section.escape_ahead_s.map_or(usual.ticks_ahead * dt_s, f64::from);
+        let looks_ahead = section.escape == EscapeWord::LookAhead;
+        let ticks_ahead = if looks_ahead { ahead_s / dt_s } else { 0.0 };
+        Some(Escape { ticks_ahead, ..usual })
     }
 
-    fn rules(&self, escape: Option<&Escape>) -> Result<Rules, InputError> {
+    fn rules(&self, escape: Option<&Escape>) -> Rules {
         let section = &self.file.chain;
-        let step_m = match &section.step_m {
-            None => None,
-            given => Some(self.positive(given.as_ref(), "step_m", 1.0)?),
-        };
-        let slave_step_max_m = match &section.slave_step_max_m {
-            Some(given) if *given.get_ref() == f64::INFINITY => f64::INFINITY,
-            given => self.positive(given.as_ref(), "slave_step_max_m", f64::INFINITY)?,
-        };
-        Ok(Rules {
+        let slave_step_max_m = section.slave_step_max_m.map_or(f64::INFINITY, f64::from);
+        Rules {
             rotation: match section.rotation {
                 RotationWord::Union => Rotation::Union,
                 RotationWord::Literal => Rotation::Literal,
                 RotationWord::Never => Rotation::Never,
             },
             self_collision: section.self_collision.unwrap_or(true),
-            // Who escapes is no faster than it may be, and neither is who is led.
+            // Nobody escapes faster than allowed, and nobody is led faster either.
             slave_step_max_m: escape.map_or(slave_step_max_m, |escape| {
                 slave_step_max_m.min(escape.speed_max_m_s * escape.dt_s)
             }),
             backtracks: section.backtracks.unwrap_or(Rules::default().backtracks),
-            step_m,
-        })
+            step_m: section.step_m.map(f64::from),
+        }
     }
 
-    /// A number above 0; `preset` where none is given.
-    fn positive(
+    /// Refuses a key that is given and does nothing; told are key, whether it is given, and
+    /// whether it does something.
+    fn has_no_idle_key(
         &self,
-        value: Option<&Spanned<f64>>,
-        key: &str,
-        preset: f64,
-    ) -> Result<f64, InputError> {
-        match value {
-            None => Ok(preset),
-            Some(v) if *v.get_ref() > 0.0 && *v.get_ref() <= MOST => Ok(*v.get_ref()),
-            Some(v) => {
-                let cause = format!("{key} = {}", v.get_ref());
-                Err(self.error(Some(v.span()), cause, "give a number above 0, at most 1e6"))
+        keys: &[(&str, bool, bool)],
+        of: &str,
+        at: Range<usize>,
+    ) -> Result<(), InputError> {
+        match keys.iter().find(|(_, is_given, does_something)| *is_given && !does_something) {
+            None => Ok(()),
+            Some((key, ..)) => {
+                let remedy = "leave it out, or give what it belongs to";
+                Err(self.source.error(at, format!("`{key}` does nothing {of}"), remedy))
             }
         }
-    }
-
-    /// A point with as many coordinates as there are dimensions.
-    fn point<const D: usize>(
-        &self,
-        value: &[f64],
-        key: &str,
-        at: Range<usize>,
-    ) -> Result<Point<D>, InputError> {
-        let is_right = value.len() == D && value.iter().all(|x| x.is_finite() && x.abs() <= MOST);
-        if is_right {
-            return Ok(std::array::from_fn(|i| value[i]));
-        }
-        let remedy = format!("give {D} finite numbers, up to 1e6; chain.dimensions is {D}");
-        Err(self.error(Some(at), format!("{key} = {value:?}"), remedy))
-    }
-
-    fn error(
-        &self,
-        span: Option<Range<usize>>,
-        cause: impl Into<String>,
-        remedy: impl Into<String>,
-    ) -> InputError {
-        self.source.error(span, cause, remedy)
-    }
-
-    /// An error of a part, told where its section stands.
-    fn at(&self, span: Range<usize>, error: &InputError) -> InputError {
-        let cause = format!("{}: {}", error.place(), error.cause());
-        self.error(Some(span), cause, error.remedy())
     }
 }

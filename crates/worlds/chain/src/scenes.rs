@@ -1,10 +1,10 @@
 //! Scenes that several tests share.
 
-use super::chain::{Chain, Connector, Rod};
-use super::geometry::{Bounds, Core, Point, between_segments, distance, nearest_on_segment};
 use super::ground::Corridor;
 use super::ground::fields::Field;
-use super::obstacle::{Obstacle, Obstacles};
+use super::rods::chain::{Chain, Connector, Rod};
+use super::rods::geometry::{Bounds, Core, Point, between_segments, distance, nearest_on_segment};
+use super::rods::obstacle::{Obstacle, Obstacles};
 use sidestep_kernel::Seed;
 use sidestep_kernel::stream::{Purpose, Streams};
 
@@ -59,19 +59,20 @@ pub(super) struct Wanderer<const D: usize> {
 
 impl<const D: usize> Wanderer<D> {
     pub(super) fn new(seed: u64) -> Self {
-        Self { numbers: Numbers::new(seed), u: super::geometry::first_axis() }
+        Self { numbers: Numbers::new(seed), u: super::rods::geometry::first_axis() }
     }
 
     pub(super) fn next(&mut self, from: Point<D>, step_m: f64) -> Point<D> {
         let by = self.numbers.point(0.3);
-        self.u = super::geometry::unit(super::geometry::add(self.u, by)).expect("not zero");
-        super::geometry::along(from, self.u, step_m)
+        self.u =
+            super::rods::geometry::unit(super::rods::geometry::add(self.u, by)).expect("not zero");
+        super::rods::geometry::along(from, self.u, step_m)
     }
 
     /// Anywhere else, after a veto.
     pub(super) fn turn(&mut self) {
         let by = self.numbers.point(1.0);
-        self.u = super::geometry::unit(by).unwrap_or(self.u);
+        self.u = super::rods::geometry::unit(by).unwrap_or(self.u);
     }
 }
 

@@ -1,16 +1,18 @@
 //! All that changes in a run, and its snapshot.
 
-use super::chain::Chain;
-use super::driver::Driving;
-use super::formation::Robot;
-use super::geometry::{Bounds, Point};
+use super::driver::{Driving, Task};
+use super::formation::{Robot, Solid};
 use super::metrics::Tally;
+use super::rods::chain::Chain;
+use super::rods::geometry::{Bounds, Point, in_dimensions, unit};
 use super::script::Motion;
-use super::swarm::leader::Decision;
+use super::swarm::drive::Pose;
+use super::swarm::leader::{Decision, LeaderState};
 use super::world::{ChainSpec, ChainWorld};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::checkpoint::CheckpointError;
 use sidestep_kernel::digest::Hasher;
+use sidestep_kernel::math::atan2;
 use sidestep_kernel::{Cycle, Digest, InputError};
 use std::sync::{Mutex, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
 
@@ -44,11 +46,11 @@ pub struct Body<const D: usize> {
     /// The robots that keep to its connectors; none where nothing is on wheels.
     pub robots: Vec<Robot>,
     /// Radius of their bodies.
-    pub(super) robot_radius_m: f64,
+    pub(crate) robot_radius_m: f64,
     /// What came of it so far.
     pub tally: Tally,
     /// The motions of the present script: they follow from where it began.
-    pub(super) motions: Vec<Motion>,
+    pub(crate) motions: Vec<Motion>,
 }
 
 /// Parts of a broken chain.
@@ -89,7 +91,7 @@ pub struct Snapshot {
 
 impl<const D: usize> Body<D> {
     /// A chain at its start.
-    pub(super) fn new(spec: &ChainSpec<D>) -> Result<Self, InputError> {
+    pub(crate) fn new(spec: &ChainSpec<D>) -> Result<Self, InputError> {
         let chain = spec.start.clone();
         let driving = Driving::new(spec.tasks[0].agent, chain.points());
         let mut body = Self {
@@ -103,6 +105,29 @@ impl<const D: usize> Body<D> {
         };
         body.motions = spec.motions(&body.driving)?;
         Ok(body)
+    }
+
+    /// What others see of the chain: its robots, or its connectors where it has none.
+    pub(crate) fn solids(&self) -> impl Iterator<Item = (usize, Solid)> + '_ {
+        let solid = |k: usize| match self.robots.get(k) {
+            Some(robot) => Solid { at: robot.pose.at, radius_m: self.robot_radius_m },
+            None => {
+                let radius_m = self.chain.connectors()[k].radius_m;
+                Solid { at: in_dimensions(self.chain.points()[k]), radius_m }
+            }
+        };
+        (0..self.chain.points().len()).map(move |k| (k, solid(k)))
+    }
+
+    /// A navigator as it remembers itself; at the start of its task it stands at its connector and
+    /// looks ahead.
+    pub(crate) fn leader(&self, task: &Task<D>) -> LeaderState {
+        self.driving.leader.unwrap_or_else(|| {
+            let [x, y, _] = self.driving.ahead;
+            let [x, y] = unit([x, y]).unwrap_or([1.0, 0.0]);
+            let at = in_dimensions(self.chain.points()[task.agent]);
+            LeaderState::at(Pose { at, heading_rad: atan2(y, x) })
+        })
     }
 
     fn record(&self) -> ChainRecord {
@@ -144,7 +169,7 @@ impl<const D: usize> Body<D> {
 }
 
 /// Coordinate after coordinate.
-pub(super) fn flat<const D: usize>(points: &[Point<D>]) -> Vec<f64> {
+pub(crate) fn flat<const D: usize>(points: &[Point<D>]) -> Vec<f64> {
     points.iter().flatten().copied().collect()
 }
 
@@ -171,7 +196,7 @@ impl<const D: usize> ChainState<D> {
     ///
     /// # Errors
     /// When it is of other chains.
-    pub(super) fn restore(
+    pub(crate) fn restore(
         world: &ChainWorld<D>,
         snapshot: &Snapshot,
         tallies: Vec<Tally>,
@@ -202,25 +227,25 @@ impl<const D: usize> ChainState<D> {
     }
 
     /// One chain, to change.
-    pub(super) fn body_mut(&self, slot: usize) -> RwLockWriteGuard<'_, Body<D>> {
+    pub(crate) fn body_mut(&self, slot: usize) -> RwLockWriteGuard<'_, Body<D>> {
         self.cells[slot].body.write().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// The box that a chain has claimed for this cycle.
-    pub(super) fn claim(&self, slot: usize) -> Bounds<D> {
+    pub(crate) fn claim(&self, slot: usize) -> Bounds<D> {
         *self.cells[slot].claim.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    pub(super) fn set_claim(&self, slot: usize, claim: Bounds<D>) {
+    pub(crate) fn set_claim(&self, slot: usize, claim: Bounds<D>) {
         *self.cells[slot].claim.lock().unwrap_or_else(PoisonError::into_inner) = claim;
     }
 
     /// What a chain's navigator has decided.
-    pub(super) fn decision(&self, slot: usize) -> Option<Decision> {
+    pub(crate) fn decision(&self, slot: usize) -> Option<Decision> {
         *self.cells[slot].decision.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    pub(super) fn set_decision(&self, slot: usize, decision: Option<Decision>) {
+    pub(crate) fn set_decision(&self, slot: usize, decision: Option<Decision>) {
         *self.cells[slot].decision.lock().unwrap_or_else(PoisonError::into_inner) = decision;
     }
 
@@ -230,7 +255,7 @@ impl<const D: usize> ChainState<D> {
     }
 
     /// What came of each chain so far.
-    pub(super) fn tallies(&self) -> Vec<Tally> {
+    pub(crate) fn tallies(&self) -> Vec<Tally> {
         (0..self.len()).map(|slot| self.body(slot).tally.clone()).collect()
     }
 }

@@ -1,17 +1,19 @@
 //! What can be seen of chains: connectors and rods, robots on wheels, what is in the way.
 
-use super::chain::Chain;
-use super::driver::{Driver, Task, in_space};
+use super::driver::{Driver, Task};
 use super::events::{Event, EventKind};
-use super::geometry::{Core, Cuboid};
 use super::navigate::Goal;
-use super::obstacle::Obstacle;
+use super::perceive::Looking;
+use super::rods::chain::Chain;
+use super::rods::geometry::{Core, Cuboid, cross, in_dimensions};
+use super::rods::obstacle::Obstacle;
+use super::scratch::Scratch;
 use super::state::{Body as ChainBody, ChainState};
-use super::world::{ChainSpec, ChainWorld, OTHER_CHAIN, Scratch};
+use super::world::{ChainSpec, ChainWorld, OTHER_CHAIN};
 use sidestep_kernel::view::{
     Axis, Body, Condition, Entry, Kind, Level, Place, PlaceRows, Pose, Scan, Scenery, Shape,
 };
-use sidestep_kernel::{Cycle, EntityId, Phases, Slot};
+use sidestep_kernel::{Cycle, EntityId, Slot};
 use std::ops::RangeInclusive;
 
 /// Connectors without a body are drawn so large, compared with the longest rod.
@@ -23,7 +25,7 @@ const LASER: &str = "laser";
 
 impl<const D: usize> ChainWorld<D> {
     /// What stands still, and the places to go to.
-    pub(super) fn scenery(&self, name: &str) -> Scenery {
+    pub(crate) fn scenery(&self, name: &str) -> Scenery {
         // Walls of one room share their number.
         let still = (0..).zip(self.obstacles.still());
         let still = still.map(|(part, obstacle)| seen(obstacle).part(part));
@@ -42,7 +44,7 @@ impl<const D: usize> ChainWorld<D> {
     }
 
     /// Recorded positions as places of connectors; a row every so many cycles.
-    pub(super) fn place_rows(every: Cycle) -> Vec<PlaceRows> {
+    pub(crate) fn place_rows(every: Cycle) -> Vec<PlaceRows> {
         vec![PlaceRows {
             table: "trajectories",
             kind: Kind::Connector,
@@ -57,7 +59,7 @@ impl<const D: usize> ChainWorld<D> {
     }
 
     /// All chains by id, then what moves among them.
-    pub(super) fn visible_bodies(&self, state: &ChainState<D>, now: Cycle) -> Vec<Body> {
+    pub(crate) fn visible_bodies(&self, state: &ChainState<D>, now: Cycle) -> Vec<Body> {
         let mut bodies = Vec::new();
         for (id, spec) in (0..).zip(&self.chains) {
             push_chain(&mut bodies, id, spec, &state.body(id as usize));
@@ -67,35 +69,29 @@ impl<const D: usize> ChainWorld<D> {
     }
 
     /// What the leaders on wheels of the first chains are about to see.
-    pub(super) fn scans(&self, state: &ChainState<D>, now: Cycle, leaders: usize) -> Vec<Scan> {
-        let mut scratch = self.scratch();
+    pub(crate) fn scans(&self, state: &ChainState<D>, now: Cycle, leaders: usize) -> Vec<Scan> {
+        let scratch = &mut Scratch::new(self);
+        let mut looking = Looking { world: self, state, now, scratch };
         let slots = 0..state.len() as Slot;
-        slots
-            .filter_map(|slot| self.scan_of(state, (slot, now), &mut scratch))
-            .take(leaders)
-            .collect()
+        slots.filter_map(|slot| scan_of(&mut looking, slot)).take(leaders).collect()
     }
+}
 
-    fn scan_of(
-        &self,
-        state: &ChainState<D>,
-        (slot, now): (Slot, Cycle),
-        scratch: &mut Scratch<D>,
-    ) -> Option<Scan> {
-        let sight = self.sight(state, (slot, now), scratch)?;
-        let (laser, [x_m, y_m]) = (&sight.navigator.leader.laser, sight.leader.pose.at);
-        let beams = laser.readings(&scratch.scan);
-        let beyond = |range_m: f64| if range_m < laser.range_m() { range_m } else { f64::INFINITY };
-        let (bearings_rad, ranges_m) = beams.map(|(b, range_m)| (b, beyond(range_m))).unzip();
-        Some(Scan {
-            of: (Kind::Connector, slot, Some(sight.agent as u32)),
-            sensor: LASER.into(),
-            pose: Pose::heading([x_m, y_m, 0.0], sight.leader.pose.heading_rad),
-            bearings_rad,
-            ranges_m,
-            range_m: laser.range_m(),
-        })
-    }
+/// What a leader on wheels is about to see; none of other chains.
+fn scan_of<const D: usize>(looking: &mut Looking<'_, D>, slot: Slot) -> Option<Scan> {
+    let sight = looking.sight(slot)?;
+    let (laser, [x_m, y_m]) = (&sight.navigator.leader.laser, sight.leader.pose.at);
+    let beams = laser.readings(&looking.scratch.scan);
+    let beyond = |range_m: f64| if range_m < laser.range_m() { range_m } else { f64::INFINITY };
+    let (bearings_rad, ranges_m) = beams.map(|(b, range_m)| (b, beyond(range_m))).unzip();
+    Some(Scan {
+        of: (Kind::Connector, slot, Some(sight.agent as u32)),
+        sensor: LASER.into(),
+        pose: Pose::heading([x_m, y_m, 0.0], sight.leader.pose.heading_rad),
+        bearings_rad,
+        ranges_m,
+        range_m: laser.range_m(),
+    })
 }
 
 /// The places that a chain is to reach.
@@ -103,7 +99,7 @@ fn goals<const D: usize>(id: EntityId, spec: &ChainSpec<D>) -> Vec<Body> {
     let of_task = |task: &Task<D>| -> Vec<(Place, f64)> {
         match &task.driver {
             Driver::Targets(targets) => {
-                targets.places.iter().map(|at| (in_space(*at), targets.tolerance_m)).collect()
+                targets.places.iter().map(|at| (in_dimensions(*at), targets.tolerance_m)).collect()
             }
             Driver::Navigate(navigator) => match &navigator.goal {
                 Some(Goal::Target { at, tolerance_m }) => vec![([at[0], at[1], 0.0], *tolerance_m)],
@@ -133,7 +129,7 @@ fn push_chain<const D: usize>(
     body: &ChainBody<D>,
 ) {
     let (chain, least_m) = (&body.chain, point_radius_m(&spec.start));
-    let points_m: Vec<Place> = chain.points().iter().map(|p| in_space(*p)).collect();
+    let points_m: Vec<Place> = chain.points().iter().map(|p| in_dimensions(*p)).collect();
     let radius_m = chain.rods().iter().map(|rod| rod.radius_m).fold(0.0, f64::max);
     for (part, whole) in (0..).zip(whole_parts(chain)) {
         let points_m = points_m[whole].to_vec();
@@ -174,17 +170,17 @@ fn seen<const D: usize>(obstacle: &Obstacle<D>) -> Body {
     let radius_m = obstacle.radius_m;
     let (pose, shape) = match &obstacle.core {
         Core::Point(at) if D == 2 => {
-            (Pose::at(in_space(*at)), Shape::Cylinder { radius_m, height_m: HEIGHT_M })
+            (Pose::at(in_dimensions(*at)), Shape::Cylinder { radius_m, height_m: HEIGHT_M })
         }
-        Core::Point(at) => (Pose::at(in_space(*at)), Shape::Sphere { radius_m }),
+        Core::Point(at) => (Pose::at(in_dimensions(*at)), Shape::Sphere { radius_m }),
         Core::Segment(ends) => {
-            let points_m = ends.iter().map(|p| in_space(*p)).collect();
+            let points_m = ends.iter().map(|p| in_dimensions(*p)).collect();
             let line = Shape::Line { points_m, thickness_m: 2.0 * radius_m };
             (Pose::at([0.0; 3]), line)
         }
         Core::Cuboid(cuboid) => (cuboid_pose(cuboid), cuboid_shape(cuboid, radius_m)),
     };
-    Body::new(Kind::Obstacle, obstacle.id, pose, shape).moving(in_space(obstacle.velocity_m_s))
+    Body::new(Kind::Obstacle, obstacle.id, pose, shape).moving(in_dimensions(obstacle.velocity_m_s))
 }
 
 fn cuboid_shape<const D: usize>(cuboid: &Cuboid<D>, radius_m: f64) -> Shape {
@@ -196,18 +192,14 @@ fn cuboid_shape<const D: usize>(cuboid: &Cuboid<D>, radius_m: f64) -> Shape {
 }
 
 fn cuboid_pose<const D: usize>(cuboid: &Cuboid<D>) -> Pose {
-    let axis = |i: usize| cuboid.axes.get(i).map_or([0.0; 3], |axis| in_space(*axis));
+    let axis = |i: usize| cuboid.axes.get(i).map_or([0.0; 3], |axis| in_dimensions(*axis));
     let (x, y) = (axis(0), axis(1));
     // Two axes say what the third is, or is opposite to: a box looks the same both ways.
-    let cross = |i: usize| {
-        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
-        x[j] * y[k] - x[k] * y[j]
-    };
-    Pose::axes(in_space(cuboid.center), [x, y, std::array::from_fn(cross)])
+    Pose::axes(in_dimensions(cuboid.center), [x, y, cross(x, y)])
 }
 
 /// An event in words.
-pub(super) fn entry(event: &Event) -> Entry {
+pub(crate) fn entry(event: &Event) -> Entry {
     let value = event.value;
     let what = event.obstacle.map(obstacle_in_words);
     let because = what.as_ref().map_or(String::new(), |what| format!(", because of {what}"));

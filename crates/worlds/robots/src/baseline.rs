@@ -20,9 +20,10 @@
 use super::Scratch;
 use super::metrics::Metrics;
 use super::scenario::Compiled;
-use super::state::{IDLE, RobotsState, Snapshot};
+use super::scene::{Scene, with_scene};
+use super::state::{RobotsState, Snapshot};
 use super::world::RobotsWorld;
-use sidestep_kernel::space::Floor;
+use sidestep_kernel::space::BoxWord;
 use sidestep_kernel::workers::{self, Worker};
 use sidestep_kernel::{Cycle, EntityId, Slot};
 use sidestep_map::Cell;
@@ -129,11 +130,11 @@ impl Baseline {
         workers::run(&mut self.crew, |worker, hand| {
             for (pool, now) in (0u64..).zip(span.clone()) {
                 worker.for_each_chunk(pool, world.bodies.len(), |bodies| {
-                    for slot in bodies {
+                    with_scene!(world, state, now, |scene| for slot in bodies {
                         let _turn = lock(&the_world);
-                        world.perceive_one(state, now, slot as Slot, &mut hand.scratch);
-                        world.act_drawn(state, now, slot as Slot, &mut hand.scratch);
-                    }
+                        scene.perceive(slot as Slot, &mut hand.scratch);
+                        scene.act_drawn(slot as Slot, &mut hand.scratch);
+                    });
                 });
                 worker.barrier();
             }
@@ -145,7 +146,9 @@ impl Baseline {
         let borders = Borders::new(world.bands(self.crew.len()));
         workers::run(&mut self.crew, |worker, hand| {
             for now in span.clone() {
-                partition_cycle(world, state, &borders, worker, hand, now);
+                with_scene!(world, state, now, |scene| {
+                    partition_cycle(scene, &borders, worker, hand);
+                });
             }
         });
     }
@@ -153,22 +156,20 @@ impl Baseline {
 
 /// Own bodies perceive; barrier; those inside the band act; barrier; one worker does the
 /// rest and hands over; barrier.
-fn partition_cycle(
-    world: &RobotsWorld,
-    state: &RobotsState,
+fn partition_cycle<T: BoxWord>(
+    scene: &Scene<'_, T>,
     borders: &Borders,
     worker: &Worker<'_>,
     hand: &mut Hand,
-    now: Cycle,
 ) {
     let Hand { scratch, own, serial_acts } = hand;
-    own.iter().for_each(|&slot| world.perceive_one(state, now, slot, scratch));
+    own.iter().for_each(|&slot| scene.perceive(slot, scratch));
     worker.barrier();
     let band = &borders.bands[worker.index()];
     own.retain(|&slot| {
-        let inside = world.stays_inside(state, slot, band);
+        let inside = scene.stays_inside(slot, band);
         if inside {
-            world.act_drawn(state, now, slot, scratch);
+            scene.act_drawn(slot, scratch);
         } else {
             lock(&borders.crossing).push(slot);
         }
@@ -181,8 +182,8 @@ fn partition_cycle(
         crossing.sort_unstable();
         *serial_acts += crossing.len() as u64;
         for slot in crossing {
-            world.act_drawn(state, now, slot, scratch);
-            borders.hand_over(slot, state.at(slot).col());
+            scene.act_drawn(slot, scratch);
+            borders.hand_over(slot, scene.cell(slot).at().col());
         }
     }
     worker.barrier();
@@ -220,25 +221,25 @@ impl RobotsWorld {
         };
         (0..n).map(|k| border(k)..border(k + 1)).collect()
     }
+}
 
+impl<T: BoxWord> Scene<'_, T> {
     /// Whether all boxes that a body covers, and may come to cover, lie in these columns.
-    fn stays_inside(&self, state: &RobotsState, slot: Slot, band: &Range<u32>) -> bool {
-        let (col, width) = (state.at(slot).col(), state.type_in(self, slot).size.0);
-        let reach = self.reach;
+    fn stays_inside(&self, slot: Slot, band: &Range<u32>) -> bool {
+        let (world, cell) = (self.world, self.cell(slot));
+        let (col, width) = (cell.at().col(), self.type_of(cell).size.0);
+        let reach = world.reach;
         if col >= band.start.saturating_add(reach) && col + width + reach <= band.end {
             return true;
         }
         let covers = band.contains(&col) && band.contains(&(col + width - 1));
-        let intent = state.bodies[slot as usize].intent.get();
-        if !covers || intent == IDLE {
+        if !covers || cell.intent.get().is_idle() {
             return covers;
         }
         let mut inside = true;
-        let mut look = |index: usize| inside &= band.contains(&(index as u32 % self.stride));
-        match &state.floor {
-            Floor::Narrow(floor) => self.for_each_claimed(floor, state, slot, |i, _| look(i)),
-            Floor::Wide(floor) => self.for_each_claimed(floor, state, slot, |i, _| look(i)),
-        }
+        self.for_each_claimed(slot, |index, _| {
+            inside &= band.contains(&(index as u32 % world.stride));
+        });
         inside
     }
 }

@@ -6,27 +6,29 @@
 //!
 //! ```text
 //! scenario.rs -> world.rs (immutable), state.rs (columns)
-//! perceive.rs + decide.rs  ->  resolve.rs  ->  react.rs        one cycle
+//! perceive.rs + decide.rs  ->  join.rs  ->  act.rs, auction.rs   one cycle
 //! sensor.rs, ray.rs, effector.rs: the tables behind it         metrics.rs: what came of it
 //! ```
 
+mod act;
+mod auction;
 mod audit;
 pub mod baseline;
 pub mod bundle;
 pub mod decide;
 pub mod effector;
 pub mod exact;
+mod join;
 mod kind;
 pub mod learn;
 pub mod metrics;
 mod perceive;
+pub mod policy;
 pub mod ray;
-mod react;
-pub mod resolve;
-mod rounds;
 pub mod rows;
 pub mod run;
 pub mod scenario;
+mod scene;
 pub mod sensor;
 pub mod state;
 mod view;
@@ -35,9 +37,10 @@ pub mod world;
 
 use effector::Side;
 pub use kind::Robots;
-use resolve::ConflictPolicy;
+use policy::ConflictPolicy;
 pub use run::{RobotsRun, robots_run};
 use scenario::StorageOrder;
+use scene::with_scene;
 use sensor::Reading;
 use sidestep_kernel::conflict::Groups;
 use sidestep_kernel::world::Auction;
@@ -114,8 +117,8 @@ pub struct Scratch {
     /// What a sensor's beams truly meet.
     truths: Vec<sensor::Row>,
     heard: Vec<decide::Heard>,
-    order: Vec<resolve::Place>,
-    bids: Vec<rounds::Bid>,
+    order: Vec<join::Place>,
+    bids: Vec<auction::Bid>,
     keep_events: bool,
     keep_samples: bool,
     events: Vec<Event>,
@@ -143,57 +146,34 @@ impl Phases for RobotsWorld {
 
     #[inline]
     fn claim(turn: &mut Turn<'_, Self>, bodies: Range<usize>) {
-        for slot in bodies {
-            turn.world.perceive_one(turn.state, turn.now, slot as Slot, turn.scratch);
-        }
+        with_scene!(turn.world, turn.state, turn.now, |scene| {
+            bodies.for_each(|slot| scene.perceive(slot as Slot, turn.scratch));
+        });
     }
 
     #[inline]
     fn join(turn: &mut Turn<'_, Self>, bodies: Range<usize>, groups: &Groups) {
-        for slot in bodies {
-            turn.world.join_one(turn.state, slot as Slot, groups);
-        }
+        with_scene!(turn.world, turn.state, turn.now, |scene| {
+            bodies.for_each(|slot| scene.join(slot as Slot, groups));
+        });
     }
 
     #[inline]
     fn act(turn: &mut Turn<'_, Self>, group: &mut [Slot]) {
-        let &mut Turn { world, state, now, ref mut scratch, .. } = turn;
-        if let [alone] = *group {
-            return world.act_drawn(state, now, alone, scratch);
-        }
-        world.order(state, now, group, scratch);
-        let order = std::mem::take(&mut scratch.order);
-        for place in &order {
-            world.act(state, now, place.slot, place.word, scratch);
-        }
-        scratch.order = order;
+        with_scene!(turn.world, turn.state, turn.now, |scene| {
+            if let [alone] = *group {
+                return scene.act_drawn(alone, turn.scratch);
+            }
+            scene.order(group, turn.scratch);
+            let order = std::mem::take(&mut turn.scratch.order);
+            for place in &order {
+                scene.act(place.slot, place.word, turn.scratch);
+            }
+            turn.scratch.order = order;
+        });
     }
 
     fn auction(&self) -> Option<&dyn Auction<Self>> {
         (self.policy == ConflictPolicy::Rounds).then_some(self)
-    }
-}
-
-impl Auction<Self> for RobotsWorld {
-    fn bid(&self, turn: &mut Turn<'_, Self>, body: Slot) {
-        self.bid_one(turn.state, turn.now, body, turn.scratch);
-    }
-
-    fn act_on_bids(&self, turn: &mut Turn<'_, Self>, pending: &mut Vec<Slot>) {
-        pending.clear();
-        for k in 0..turn.scratch.bids.len() {
-            let bid = turn.scratch.bids[k];
-            if self.is_highest(turn.state, bid) {
-                self.act(turn.state, turn.now, bid.slot, bid.word, turn.scratch);
-            } else {
-                pending.push(bid.slot);
-            }
-        }
-    }
-
-    fn retract_bids(&self, turn: &mut Turn<'_, Self>) {
-        for bid in turn.scratch.bids.drain(..) {
-            self.retract(turn.state, bid);
-        }
     }
 }

@@ -1,98 +1,67 @@
-//! Pool one: bodies that are due perceive the frozen state, decide, and claim.
+//! *Claim*: bodies that are due perceive the frozen state, decide, and claim.
 
 use super::decide::{Contact, Decision, Heard, Memory, Percept, Sector, Trip, UNSEEN};
 use super::effector::{Side, Sweep};
+use super::scene::{Scene, all_free, at};
 use super::sensor::{Reading, Row};
-use super::state::{BodyCell, CLEAR, IDLE, RobotsState, pose_word};
-use super::world::{Crossed, Door, MountedSensor, Mover, RobotModel, RobotsWorld, Role, purpose};
+use super::state::{BodyCell, Intent, pose_word};
+use super::world::{Crossed, Door, MountedSensor, Mover, Radio, RobotModel, Role, purpose};
 use super::{Scratch, SensorSample};
-use sidestep_kernel::Column;
-use sidestep_kernel::space::{BoxWord, Floor};
-use sidestep_kernel::{Cycle, Slot};
+use sidestep_kernel::space::BoxWord;
+use sidestep_kernel::{Column, Cycle, Slot};
 
-impl RobotsWorld {
-    /// One body's share of pool one.
+impl<T: BoxWord> Scene<'_, T> {
+    /// Lets a body perceive and decide, and claims what it may come to cover.
     #[inline]
-    pub(super) fn perceive_one(
-        &self,
-        state: &RobotsState,
-        now: Cycle,
-        slot: Slot,
-        scratch: &mut Scratch,
-    ) {
-        match &state.floor {
-            Floor::Narrow(floor) => self.perceive_on(floor, state, now, slot, scratch),
-            Floor::Wide(floor) => self.perceive_on(floor, state, now, slot, scratch),
-        }
-    }
-
-    #[inline]
-    fn perceive_on<T: BoxWord>(
-        &self,
-        floor: &Column<T>,
-        state: &RobotsState,
-        now: Cycle,
-        slot: Slot,
-        scratch: &mut Scratch,
-    ) {
-        let cell = &state.bodies[slot as usize];
-        if let Some(frames) = &state.frames {
-            let index = (now - frames.first) as usize * frames.bodies + cell.id as usize;
+    pub(super) fn perceive(&self, slot: Slot, scratch: &mut Scratch) {
+        let (world, cell) = (self.world, self.cell(slot));
+        if let Some(frames) = &self.state.frames {
+            let index = (self.now - frames.first) as usize * frames.bodies + cell.id as usize;
             frames.poses.set(index, pose_word(cell.at(), cell.facing.get()));
         }
-        let role = &self.types[usize::from(cell.ty)].role;
-        let intent = if cell.period == 1 || self.bodies[cell.id as usize].is_due(now) {
-            match role {
-                Role::Robot(model) => self.robot_decides(model, (floor, state), now, slot, scratch),
-                Role::Mover(mover) => self.mover_draws(mover, state, now, slot),
-                Role::Door(door) => self.door_wants(door, state, now, slot),
-            }
-        } else {
-            IDLE
+        let is_due = cell.period == 1 || world.bodies[cell.id as usize].is_due(self.now);
+        let intent = match &self.type_of(cell).role {
+            _ if !is_due => Intent::IDLE,
+            Role::Robot(model) => self.robot_decides(model, slot, scratch),
+            Role::Mover(mover) => self.mover_draws(mover, cell),
+            Role::Door(door) => self.door_wants(door, cell),
         };
-        let clear = intent != IDLE && self.claim(floor, state, slot, intent);
-        cell.intent.set(if clear { intent | CLEAR } else { intent });
+        let is_clear = !intent.is_idle() && self.claim(slot, intent);
+        cell.intent.set(if is_clear { intent.clear() } else { intent });
     }
 
     #[inline]
-    fn robot_decides<T: BoxWord>(
-        &self,
-        model: &RobotModel,
-        (floor, state): (&Column<T>, &RobotsState),
-        now: Cycle,
-        slot: Slot,
-        scratch: &mut Scratch,
-    ) -> u8 {
-        let cell = &state.bodies[slot as usize];
-        let id = cell.id;
-        let nearest = self.sense(model, (floor, state), now, cell, scratch);
+    fn robot_decides(&self, model: &RobotModel, slot: Slot, scratch: &mut Scratch) -> Intent {
+        let cell = self.cell(slot);
+        let nearest = self.sense(model, cell, scratch);
         scratch.heard.clear();
-        if let Some(radio) = &self.radio {
-            self.listen(radio, state, now, slot, &mut scratch.heard);
+        if let Some(radio) = &self.world.radio {
+            self.listen(radio, slot, &mut scratch.heard);
         }
         let percept = Percept {
-            now,
+            now: self.now,
             readings: &scratch.readings,
             sectors: &model.body.sectors,
             nearest_in: nearest,
             contact: contact_of_word(cell.contact.get()),
-            at: self.map_position(cell.at()),
+            at: self.world.map_position(cell.at()),
             heading: cell.facing.get(),
             heard: &scratch.heard,
         };
         let mut memory = memory_of(cell);
-        let mut draws = self.streams.draws(id, now, purpose::DECIDE);
+        let mut draws = self.world.streams.draws(cell.id, self.now, purpose::DECIDE);
         let decision = model.behaviour.decide(&percept, &mut memory, &mut draws);
         store_memory(cell, memory);
-        self.note(state, now, cell, decision);
+        self.note(cell, decision);
         let known = usize::from(decision.action) < model.body.effector.actions.len();
-        debug_assert!(known, "behaviours choose among the effector's actions");
-        if known { decision.action + 1 } else { IDLE }
+        debug_assert!(known, "behaviors choose among the effector's actions");
+        if known { Intent::action(decision.action) } else { Intent::IDLE }
     }
 
     /// Counts what the decision says beside the action.
     #[inline]
-    fn note(&self, state: &RobotsState, now: Cycle, cell: &BodyCell, decision: Decision) {
+    fn note(&self, cell: &BodyCell, decision: Decision) {
+        let now = self.now;
         if let Some(trip) = decision.trip {
             if trip == Trip::Done {
                 cell.trips.set(cell.trips.get() + 1);
@@ -100,27 +69,23 @@ impl RobotsWorld {
             }
             cell.trip_begun.set(now);
         }
-        if self.radio.is_some() {
-            let (heard_now, heard_next) =
-                (&state.voice[(now % 2) as usize], &state.voice[((now + 1) % 2) as usize]);
+        if self.world.radio.is_some() {
+            let voice = |cycle: Cycle| &self.state.voice[(cycle % 2) as usize];
             let i = cell.id as usize;
-            heard_next.set(i, decision.broadcast.unwrap_or_else(|| heard_now.get(i)));
+            voice(now + 1).set(i, decision.broadcast.unwrap_or_else(|| voice(now).get(i)));
         }
     }
 
     /// Fills `scratch.readings` with what each beam reports of what it truly meets, and
     /// returns the nearest class reported per sector.
     #[inline]
-    pub(super) fn sense<T: BoxWord>(
+    pub(super) fn sense(
         &self,
         model: &RobotModel,
-        (floor, state): (&Column<T>, &RobotsState),
-        now: Cycle,
         cell: &BodyCell,
         scratch: &mut Scratch,
     ) -> [u8; 4] {
-        let (id, heading) = (cell.id, usize::from(cell.facing.get()));
-        let base = cell.at().index(self.stride);
+        let id = cell.id;
         let Scratch { readings, truths, .. } = scratch;
         readings.resize(model.body.sectors.len(), Reading::default());
         let mut nearest = [UNSEEN; 4];
@@ -129,13 +94,13 @@ impl RobotsWorld {
             let beams = first..first + sensor.ends.len();
             first = beams.end;
             let (readings, sectors) = (&mut readings[beams.clone()], &model.body.sectors[beams]);
-            cast(sensor, floor, state, (base, heading), truths);
-            let words = |block| self.streams.block(id, now, purpose::sense(s), block);
+            cast(self, sensor, cell, truths);
+            let words = |block| self.world.streams.block(id, self.now, purpose::sense(s), block);
             report(sensor, truths, words, readings.iter_mut().zip(sectors), &mut nearest);
             if scratch.keep_samples {
                 let samples = truths.iter().zip(&*readings).map(|(&row, &reported)| {
                     let (truth, sensor) = (sensor.table.truth(row), s as u16);
-                    SensorSample { cycle: now, robot: id, sensor, truth, reported }
+                    SensorSample { cycle: self.now, robot: id, sensor, truth, reported }
                 });
                 scratch.sensor_samples.extend(samples);
             }
@@ -144,48 +109,38 @@ impl RobotsWorld {
     }
 
     /// People and other movers go on as before or draw a new direction.
-    fn mover_draws(&self, mover: &Mover, state: &RobotsState, now: Cycle, slot: Slot) -> u8 {
-        let i = slot as usize;
-        let words = self.streams.block(state.bodies[i].id, now, purpose::MOVE, 0);
+    fn mover_draws(&self, mover: &Mover, cell: &BodyCell) -> Intent {
+        let words = self.world.streams.block(cell.id, self.now, purpose::MOVE, 0);
         if !mover.straight.happens(words[0]) {
-            state.bodies[i].facing.set((words[1] >> 30) as u8);
+            cell.facing.set((words[1] >> 30) as u8);
         }
-        1
+        Intent::ONLY
     }
 
     /// A door tries to toggle when its schedule says so; a closing that is in the way waits.
-    fn door_wants(&self, door: &Door, state: &RobotsState, now: Cycle, slot: Slot) -> u8 {
-        let is_open = state.bodies[slot as usize].facing.get() == 1;
-        let wants_open = door.wants_open(is_open, now, || {
-            self.streams.block(state.bodies[slot as usize].id, now, purpose::DOOR, 0)[0]
-        });
-        u8::from(wants_open != is_open)
+    fn door_wants(&self, door: &Door, cell: &BodyCell) -> Intent {
+        let is_open = cell.facing.get() == 1;
+        let draw = || self.world.streams.block(cell.id, self.now, purpose::DOOR, 0)[0];
+        let wants_open = door.wants_open(is_open, self.now, draw);
+        if wants_open == is_open { Intent::IDLE } else { Intent::ONLY }
     }
 
     /// Claims every free box that the body may come to cover, and says whether all of them
     /// are free.
     #[inline]
-    fn claim<T: BoxWord>(
-        &self,
-        floor: &Column<T>,
-        state: &RobotsState,
-        slot: Slot,
-        intent: u8,
-    ) -> bool {
-        let cell = &state.bodies[slot as usize];
-        let (base, claim) = (cell.at().index(self.stride), T::claimed(slot));
-        let body = &self.types[usize::from(cell.ty)];
+    fn claim(&self, slot: Slot, intent: Intent) -> bool {
+        let (floor, cell, claim) = (self.floor, self.cell(slot), T::claimed(slot));
+        let (base, body) = (self.base(cell), self.type_of(cell));
         if !body.actions.is_empty() {
-            let action = body.action_index(cell.facing.get(), intent - 1);
+            let action = body.action_index(cell.facing.get(), intent.number());
             cell.action.set(action);
             let boxes = &*body.actions[usize::from(action)].claims;
             if all_free(floor, base, boxes) {
-                let at = |offset: i32| base.wrapping_add_signed(offset) as usize;
-                boxes.iter().for_each(|&offset| floor.set(at(offset), claim));
+                boxes.iter().for_each(|&offset| floor.set(at(base, offset), claim));
                 return true;
             }
         }
-        self.for_each_claimed(floor, state, slot, |index, word| {
+        self.for_each_claimed(slot, |index, word| {
             if word.is_free() {
                 floor.set(index, claim);
             }
@@ -195,31 +150,48 @@ impl RobotsWorld {
 
     /// Calls `each` for every box that the body may come to cover, walls excepted, with what
     /// it holds now: boxes outside the body, of a door its own. The body is not idle.
-    pub(super) fn for_each_claimed<T: BoxWord>(
-        &self,
-        floor: &Column<T>,
-        state: &RobotsState,
-        slot: Slot,
-        mut each: impl FnMut(usize, T),
-    ) {
-        let cell = &state.bodies[slot as usize];
-        let base = cell.at().index(self.stride);
-        let body = &self.types[usize::from(cell.ty)];
+    pub(super) fn for_each_claimed(&self, slot: Slot, mut each: impl FnMut(usize, T)) {
+        let (floor, cell) = (self.floor, self.cell(slot));
+        let (base, body) = (self.base(cell), self.type_of(cell));
         match body.actions.get(usize::from(cell.action.get())) {
             Some(action) => sweep(floor, &action.sweep, base, each),
             None => body.own.iter().for_each(|&offset| {
-                let index = base.wrapping_add_signed(offset) as usize;
+                let index = at(base, offset);
                 each(index, floor.get(index));
             }),
         }
     }
-}
 
-/// Whether nothing stands in any of some boxes.
-#[inline]
-pub(super) fn all_free<T: BoxWord>(floor: &Column<T>, base: u32, offsets: &[i32]) -> bool {
-    let at = |offset: i32| base.wrapping_add_signed(offset) as usize;
-    offsets.iter().fold(T::FREE, |all, &offset| all & floor.get(at(offset))).is_free()
+    /// What the robots in range last broadcast, by sender; each reception may be lost.
+    fn listen(&self, radio: &Radio, slot: Slot, heard: &mut Vec<Heard>) {
+        let (world, state, id) = (self.world, self.state, self.cell(slot).id);
+        let voice = &state.voice[(self.now % 2) as usize];
+        for &sender in &world.robots {
+            let other = state.slot_of_id[sender as usize];
+            if other == slot || !self.in_radio_range(radio, slot, other) {
+                continue;
+            }
+            let words = world.streams.pair(id, sender, self.now, purpose::RADIO, 0);
+            if !radio.loss.happens(words[0]) {
+                heard.push(Heard { sender, word: voice.get(sender as usize) });
+            }
+        }
+    }
+
+    fn in_radio_range(&self, radio: &Radio, a: Slot, b: Slot) -> bool {
+        // Twice the distance between centers, so that all is integer.
+        let center = |slot: Slot| {
+            let cell = self.cell(slot);
+            let (at, size) = (cell.at(), self.type_of(cell).size);
+            (
+                2 * i64::from(at.col()) + i64::from(size.0),
+                2 * i64::from(at.row()) + i64::from(size.1),
+            )
+        };
+        let (a, b) = (center(a), center(b));
+        let (dx, dy) = (a.0 - b.0, a.1 - b.1);
+        ((dx * dx + dy * dy) as u64) <= radio.reach2_half_boxes
+    }
 }
 
 /// Walks the tree of an action's steps; what lies behind a wall is left out.
@@ -229,7 +201,7 @@ fn sweep<T: BoxWord>(floor: &Column<T>, sweep: &Sweep, base: u32, mut each: impl
     while let Some(step) = sweep.nodes.get(node) {
         let mut walled = false;
         for &offset in &sweep.boxes[step.first as usize..step.end as usize] {
-            let index = base.wrapping_add_signed(offset) as usize;
+            let index = at(base, offset);
             let word = floor.get(index);
             if word == T::WALL {
                 walled = true;
@@ -247,13 +219,13 @@ fn sweep<T: BoxWord>(floor: &Column<T>, sweep: &Sweep, base: u32, mut each: impl
 /// they would run out of registers.
 #[inline(never)]
 fn cast<T: BoxWord>(
+    scene: &Scene<'_, T>,
     sensor: &MountedSensor,
-    floor: &Column<T>,
-    state: &RobotsState,
-    (base, heading): (u32, usize),
+    cell: &BodyCell,
     truths: &mut Vec<Row>,
 ) {
-    let boxes = &*sensor.boxes[heading];
+    let (floor, state, base) = (scene.floor, scene.state, scene.base(cell));
+    let boxes = &*sensor.boxes[usize::from(cell.facing.get())];
     truths.clear();
     let mut from = 0;
     truths.extend(sensor.ends.iter().map(|&end| {
@@ -269,7 +241,7 @@ fn cast<T: BoxWord>(
 /// The first box along a beam that holds something: what it holds, and its distance class.
 #[inline]
 fn first_hit<T: BoxWord>(floor: &Column<T>, base: u32, beam: &[Crossed]) -> Option<(T, u8)> {
-    let look = |offset: i32| floor.get(base.wrapping_add_signed(offset) as usize);
+    let look = |offset: i32| floor.get(at(base, offset));
     for Crossed { offsets: [a, b, c, d], classes } in beam {
         let four = [look(*a), look(*b), look(*c), look(*d)];
         let [a, b, c, d] = four;
@@ -323,49 +295,4 @@ pub(super) fn name_of(reading: Reading, sensor: &super::sensor::SensorModel) -> 
     let observation = &sensor.observations[usize::from(reading.observation)];
     let class = sensor.distance_classes.get(usize::from(reading.class));
     (observation, class.map_or("beyond", String::as_str))
-}
-
-impl RobotsWorld {
-    /// What the robots in range last broadcast, by sender; each reception may be lost.
-    fn listen(
-        &self,
-        radio: &super::world::Radio,
-        state: &RobotsState,
-        now: Cycle,
-        slot: Slot,
-        heard: &mut Vec<Heard>,
-    ) {
-        let id = state.bodies[slot as usize].id;
-        let voice = &state.voice[(now % 2) as usize];
-        for &sender in &self.robots {
-            let other = state.slot_of_id[sender as usize];
-            if other == slot || !self.in_radio_range(radio, state, slot, other) {
-                continue;
-            }
-            let words = self.streams.pair(id, sender, now, purpose::RADIO, 0);
-            if !radio.loss.happens(words[0]) {
-                heard.push(Heard { sender, word: voice.get(sender as usize) });
-            }
-        }
-    }
-
-    fn in_radio_range(
-        &self,
-        radio: &super::world::Radio,
-        state: &RobotsState,
-        a: Slot,
-        b: Slot,
-    ) -> bool {
-        // Twice the distance between centers, so that all is integer.
-        let center = |slot: Slot| {
-            let (at, size) = (state.at(slot), state.type_in(self, slot).size);
-            (
-                2 * i64::from(at.col()) + i64::from(size.0),
-                2 * i64::from(at.row()) + i64::from(size.1),
-            )
-        };
-        let (a, b) = (center(a), center(b));
-        let (dx, dy) = (a.0 - b.0, a.1 - b.1);
-        ((dx * dx + dy * dy) as u64) <= radio.reach2_half_boxes
-    }
 }

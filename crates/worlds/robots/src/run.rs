@@ -10,10 +10,9 @@ use super::{Scratch, words};
 use serde_json::{Value, json};
 use sidestep_kernel::checkpoint::CheckpointError;
 use sidestep_kernel::ports::{RecordError, Recorder, TableSchema};
-use sidestep_kernel::run::{Effort, Plan, Run};
 use sidestep_kernel::view::{Frame, Look, PlaceRows, Scenery};
 use sidestep_kernel::words::{Lines, Said};
-use sidestep_kernel::{Cycle, Digest, EntityId, InputError, World};
+use sidestep_kernel::{Cycle, Digest, Effort, EntityId, InputError, Plan, Run, World};
 use sidestep_scenario::Source;
 
 /// A run of a robots world.
@@ -117,7 +116,7 @@ impl World for RobotsWorld {
     }
 
     fn schemas(&self, books: &Books) -> Vec<TableSchema> {
-        books.schemas(self)
+        books.schemas()
     }
 
     fn record(

@@ -1,6 +1,7 @@
 //! The sections of a robots scenario, as they stand in the file. Unknown keys are errors.
 
 mod compile;
+mod parts;
 mod placing;
 mod random;
 mod tables;
@@ -8,12 +9,13 @@ mod tables;
 pub use compile::{Behaviours, Compiled, StorageOrder, presets};
 
 use super::effector::ObstacleRule;
-use super::resolve::ConflictPolicy;
+use super::policy::ConflictPolicy;
 use super::world::Regime;
+use parts::{BoxSide, Period, Placing, QuarterTurns, Side, Steps};
 use serde::Deserialize;
 use sidestep_map::UnknownPolicy;
 use sidestep_map::office::OfficeSpec;
-use sidestep_scenario::OneOrMany;
+use sidestep_scenario::{AboveBelow, AboveTo, Number, Sections, Share};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use toml::Spanned;
@@ -22,18 +24,8 @@ use toml::Spanned;
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RobotsFile {
-    #[serde(rename = "format")]
-    _format: u32,
-    #[serde(rename = "world")]
-    _world: String,
-    #[serde(default)]
-    pub(super) name: String,
     #[serde(default, rename = "description")]
     _description: String,
-    #[serde(default = "one")]
-    pub(super) seed: u64,
-    #[serde(default = "default_cycles")]
-    pub(super) cycles: u64,
     #[serde(default)]
     pub(super) regime: Regime,
     #[serde(default)]
@@ -51,13 +43,13 @@ pub(super) struct RobotsFile {
     pub(super) sensors: BTreeMap<String, Spanned<SensorSection>>,
     #[serde(default)]
     pub(super) effectors: BTreeMap<String, Spanned<EffectorSection>>,
-    #[serde(default = "none")]
-    pub(super) robots: Spanned<OneOrMany<RobotSection>>,
-    #[serde(default = "none")]
-    pub(super) people: Spanned<OneOrMany<MoverSection>>,
-    #[serde(default = "none")]
-    pub(super) doors: Spanned<OneOrMany<DoorSection>>,
-    pub(super) radio: Option<Spanned<RadioSection>>,
+    #[serde(default)]
+    pub(super) robots: Sections<RobotSection>,
+    #[serde(default)]
+    pub(super) people: Sections<MoverSection>,
+    #[serde(default)]
+    pub(super) doors: Sections<DoorSection>,
+    pub(super) radio: Option<RadioSection>,
     #[serde(default)]
     pub(super) record: RecordSection,
 }
@@ -78,10 +70,10 @@ pub(super) struct ProfileFile {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct MapSection {
-    pub(super) file: Option<Spanned<PathBuf>>,
-    pub(super) ascii: Option<Spanned<String>>,
+    pub(super) file: Option<PathBuf>,
+    pub(super) ascii: Option<String>,
     pub(super) office: Option<Spanned<OfficeSpec>>,
-    pub(super) box_size_m: Option<Spanned<f64>>,
+    pub(super) box_size_m: Option<Number<BoxSide>>,
     #[serde(default)]
     pub(super) unknown: UnknownPolicy,
 }
@@ -96,7 +88,7 @@ pub(super) struct KindSection {
 #[serde(deny_unknown_fields)]
 pub(super) struct SensorSection {
     pub(super) bearings_deg: Spanned<Vec<f64>>,
-    pub(super) range_m: Spanned<f64>,
+    pub(super) range_m: Number<AboveTo<0, 10_000>>,
     pub(super) observations: Spanned<Vec<String>>,
     #[serde(default)]
     pub(super) designates: BTreeMap<Spanned<String>, Spanned<String>>,
@@ -158,9 +150,9 @@ impl<'de> Deserialize<'de> for EffectorSection {
 pub(super) struct TransitionSection {
     pub(super) p: f64,
     #[serde(default)]
-    pub(super) path: String,
+    pub(super) path: Steps,
     #[serde(default)]
-    pub(super) turn: i32,
+    pub(super) turn: QuarterTurns,
 }
 
 #[derive(Debug, Deserialize)]
@@ -172,11 +164,11 @@ pub(super) struct RobotSection {
     pub(super) kind: Spanned<String>,
     pub(super) count: Option<Spanned<u32>>,
     #[serde(default)]
-    pub(super) at: Vec<Spanned<Vec<u32>>>,
+    pub(super) at: Vec<Spanned<Placing>>,
     pub(super) region: Option<Spanned<[u32; 4]>>,
     pub(super) scen: Option<Spanned<PathBuf>>,
-    pub(super) size: Option<Spanned<u32>>,
-    pub(super) period: Option<Spanned<u32>>,
+    pub(super) size: Option<Side>,
+    pub(super) period: Option<Period>,
     pub(super) phase: Option<u32>,
     #[serde(default)]
     pub(super) sensors: Vec<Spanned<String>>,
@@ -207,14 +199,12 @@ pub(super) struct MoverSection {
     pub(super) kind: Spanned<String>,
     pub(super) count: Option<Spanned<u32>>,
     #[serde(default)]
-    pub(super) at: Vec<Spanned<Vec<u32>>>,
+    pub(super) at: Vec<Spanned<Placing>>,
     pub(super) region: Option<Spanned<[u32; 4]>>,
-    #[serde(default = "one_by_one")]
-    pub(super) size: Spanned<[u32; 2]>,
-    pub(super) period: Option<Spanned<u32>>,
+    pub(super) size: Option<[Side; 2]>,
+    pub(super) period: Option<Period>,
     pub(super) phase: Option<u32>,
-    #[serde(default = "default_straight")]
-    pub(super) p_straight: Spanned<f64>,
+    pub(super) p_straight: Option<Share>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -223,13 +213,12 @@ pub(super) struct DoorSection {
     #[serde(default = "door_kind")]
     pub(super) kind: Spanned<String>,
     #[serde(default)]
-    pub(super) at: Vec<Spanned<Vec<u32>>>,
-    #[serde(default = "one_by_one")]
-    pub(super) size: Spanned<[u32; 2]>,
+    pub(super) at: Vec<Spanned<Placing>>,
+    pub(super) size: Option<[Side; 2]>,
     #[serde(default)]
     pub(super) office: bool,
     pub(super) periodic: Option<Spanned<PeriodicSection>>,
-    pub(super) random: Option<Spanned<RandomSection>>,
+    pub(super) random: Option<RandomSection>,
 }
 
 #[derive(Debug, Clone, Copy, Deserialize)]
@@ -243,19 +232,18 @@ pub(super) struct PeriodicSection {
 #[derive(Debug, Clone, Copy, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RandomSection {
-    pub(super) p_open: f64,
-    pub(super) p_close: f64,
+    pub(super) p_open: Share,
+    pub(super) p_close: Share,
 }
 
 #[derive(Debug, Clone, Copy, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RadioSection {
-    pub(super) range_m: f64,
-    #[serde(default)]
-    pub(super) loss: f64,
+    pub(super) range_m: Number<AboveBelow<0, 1_000_000>>,
+    pub(super) loss: Option<Share>,
 }
 
-/// What a run keeps beside its summary.
+/// The tables that a run keeps beside its summary.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RecordSection {
@@ -275,17 +263,8 @@ impl Default for RecordSection {
     }
 }
 
-fn one() -> u64 {
-    1
-}
-fn default_cycles() -> u64 {
-    10_000
-}
 fn spanned<T>(value: T) -> Spanned<T> {
     Spanned::new(0..0, value)
-}
-fn none<T>() -> Spanned<OneOrMany<T>> {
-    spanned(OneOrMany::default())
 }
 fn robot_kind() -> Spanned<String> {
     spanned("robot".into())
@@ -295,10 +274,4 @@ fn person_kind() -> Spanned<String> {
 }
 fn door_kind() -> Spanned<String> {
     spanned("door".into())
-}
-fn one_by_one() -> Spanned<[u32; 2]> {
-    spanned([1, 1])
-}
-fn default_straight() -> Spanned<f64> {
-    spanned(0.8)
 }

@@ -1,23 +1,80 @@
 //! All that changes in a run, in columns by slot, and its snapshot by entity id.
 
-use super::resolve::ConflictPolicy;
+use super::policy::ConflictPolicy;
 use super::world::{Body, BodyType, RobotsWorld};
 use serde::{Deserialize, Serialize};
-use sidestep_kernel::column::Shared;
+use sidestep_kernel::column::{Shared, Word};
 use sidestep_kernel::digest::Hasher;
 use sidestep_kernel::space::{BoxWord, Floor, Marks, Position};
 use sidestep_kernel::{Column, Cycle, Digest, EntityId, Slot};
-use std::sync::atomic::AtomicU64;
+use std::sync::atomic::{AtomicU8, AtomicU64};
 
 /// The kind of a box in which nothing stands.
 pub const FREE: u8 = 0;
 /// The kind of the static map's walls.
 pub const WALL: u8 = 1;
 
-/// Nothing intended; otherwise an action's id plus 1, with or without [`CLEAR`].
-pub const IDLE: u8 = 0;
-/// Added to an intent when every box that the action may sweep is free.
-pub const CLEAR: u8 = 0x80;
+/// What a body is about to do in this cycle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Intent(u8);
+
+impl Intent {
+    /// Nothing.
+    pub(super) const IDLE: Self = Self(0);
+    /// The only thing that bodies without a choice do: people go on, doors toggle.
+    pub(super) const ONLY: Self = Self(1);
+    /// Added when every box that the action may sweep is free.
+    const CLEAR: u8 = 0x80;
+
+    /// The action of this number; there are fewer than 127.
+    #[inline(always)]
+    pub(super) fn action(number: u8) -> Self {
+        Self(number + 1)
+    }
+
+    /// The same, with every box that it may sweep free.
+    #[inline(always)]
+    pub(super) fn clear(self) -> Self {
+        Self(self.0 | Self::CLEAR)
+    }
+
+    /// Whether nothing is intended.
+    #[inline(always)]
+    pub(super) fn is_idle(self) -> bool {
+        self == Self::IDLE
+    }
+
+    /// Whether every box that the action may sweep is free.
+    #[inline(always)]
+    pub(super) fn is_clear(self) -> bool {
+        self.0 & Self::CLEAR != 0
+    }
+
+    /// Number of the action; the body is not idle.
+    #[inline(always)]
+    pub(super) fn number(self) -> u8 {
+        (self.0 & !Self::CLEAR) - 1
+    }
+}
+
+impl Word for Intent {
+    type Cell = AtomicU8;
+
+    #[inline(always)]
+    fn cell(self) -> AtomicU8 {
+        AtomicU8::new(self.0)
+    }
+
+    #[inline(always)]
+    fn load(cell: &AtomicU8) -> Self {
+        Self(u8::load(cell))
+    }
+
+    #[inline(always)]
+    fn store(cell: &AtomicU8, intent: Self) {
+        u8::store(cell, intent.0);
+    }
+}
 
 /// The state of a robots world.
 #[derive(Debug)]
@@ -52,7 +109,7 @@ pub struct BodyCell {
     /// Heading (0 east, 1 north, 2 west, 3 south); of a door: 1 open, 0 closed.
     pub facing: Shared<u8>,
     /// What the body is about to do this cycle.
-    pub intent: Shared<u8>,
+    pub intent: Shared<Intent>,
     /// Outcome of the last action, see [`contact_word`].
     pub contact: Shared<u16>,
     /// A robot's memory.

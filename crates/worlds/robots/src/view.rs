@@ -1,14 +1,14 @@
 //! What can be seen of a building: floor, bodies, sensors' readings, events in words.
 
 use super::effector::Side;
+use super::scene::with_scene;
 use super::sensor::{NOTHING, Reading, SensorModel};
 use super::state::{BodyCell, RobotsState};
-use super::world::{MountedSensor, RobotModel, Role};
+use super::world::{MountedSensor, Role};
 use super::{Event, EventKind, RobotsWorld, Scratch};
 use sidestep_kernel::math::{cos, sin};
-use sidestep_kernel::space::{BoxWord, Floor};
 use sidestep_kernel::view::{self, Body, Condition, Entry, Kind, Level, Pose, Scan, Shape};
-use sidestep_kernel::{Column, Cycle, EntityId, Phases};
+use sidestep_kernel::{Cycle, EntityId, Phases};
 use std::f64::consts::FRAC_PI_2;
 
 /// What a cycle counts as where seconds are asked for: the model itself knows no other time.
@@ -113,10 +113,7 @@ impl RobotsWorld {
     ) -> Vec<Scan> {
         let (cell, ty) = (state.body(id), self.type_of(id));
         let Role::Robot(model) = &ty.role else { return Vec::new() };
-        match &state.floor {
-            Floor::Narrow(floor) => self.read(model, (floor, state), now, cell, scratch),
-            Floor::Wide(floor) => self.read(model, (floor, state), now, cell, scratch),
-        }
+        with_scene!(self, state, now, |scene| scene.sense(model, cell, scratch));
         let pose = self.pose(id, cell, 0.5 * self.side_m(id));
         let mut readings = &scratch.readings[..];
         let scan = |sensor: &MountedSensor| {
@@ -125,17 +122,6 @@ impl RobotsWorld {
             scan(&sensor.model, own, self.side_m(id), (id, pose))
         };
         model.body.sensors.iter().map(scan).collect()
-    }
-
-    fn read<T: BoxWord>(
-        &self,
-        model: &RobotModel,
-        (floor, state): (&Column<T>, &RobotsState),
-        now: Cycle,
-        cell: &BodyCell,
-        scratch: &mut Scratch,
-    ) {
-        self.sense(model, (floor, state), now, cell, scratch);
     }
 
     /// An event in words.

@@ -2,8 +2,8 @@
 
 use super::decide::{Behaviour, Sector};
 use super::effector::{Action, EffectorModel, ObstacleRule};
+use super::policy::ConflictPolicy;
 use super::ray::{Crossing, crossings, turn_crossing};
-use super::resolve::ConflictPolicy;
 use super::scenario::StorageOrder;
 use super::sensor::{Reading, ReadingTable, Row, SensorModel};
 use serde::{Deserialize, Serialize};

@@ -6,7 +6,6 @@ mod serpentine;
 
 use crate::console::{Console, aligned};
 use crate::exit::{ExitCode, Failure};
-use crate::files::replace;
 use crate::pages::{Pages, Raster};
 use clap::{Args, Subcommand};
 use serde::Serialize;
@@ -16,6 +15,7 @@ use sidestep::experiment::{Document, Scene};
 use sidestep::kernel::InputError;
 use sidestep_draw::{DrawError, Options, Style, draw};
 use sidestep_report::markdown::without_pictures;
+use sidestep_session::replace;
 use std::io::Write;
 use std::path::Path;
 

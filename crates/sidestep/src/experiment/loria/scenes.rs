@@ -62,7 +62,10 @@ fn columns(tracks: &[Track], from: Cycle) -> [(&'static str, Values); 5] {
         ("body", Values::U32(rows().map(|(_, body, _)| body).collect())),
         ("col_boxes", Values::U32(rows().map(|(_, _, (col, ..))| col).collect())),
         ("row_boxes", Values::U32(rows().map(|(_, _, (_, row, _))| row).collect())),
-        ("heading", Values::Label(rows().map(|(_, _, (.., heading))| heading.into()).collect())),
+        (
+            "heading",
+            Values::Label(rows().map(|(_, _, (.., heading))| u32::from(heading)).collect()),
+        ),
     ]
 }
 

@@ -61,7 +61,8 @@ fn creeping(plan: &Plan) -> Result<Scene, InputError> {
     let case = snake::Case { filled: 0.1, movers: 0, connectors: 450 };
     let (mut run, trails) = traced::<3>(case.text(1, plan.snake_cycles), plan.snake_cycles)?;
     let (mut scenery, frame) = (run.scenery(), run.frame(Look::BODIES));
-    let snake: Vec<Place> = frame.bodies.iter().map(|body| body.pose.at_m).collect();
+    let connectors = frame.bodies.iter().filter(|body| body.kind == Kind::Connector);
+    let snake: Vec<Place> = connectors.map(|body| body.pose.at_m).collect();
     scenery.bodies.retain(|body| is_near(body, &snake));
     Ok(Scene {
         title: "A snake of 450 connectors among balls that fill a tenth of the room".into(),

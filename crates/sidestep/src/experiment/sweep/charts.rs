@@ -6,13 +6,14 @@
 //! have two points, as in a Latin hypercube, the variants are points. Without parameters the
 //! variants are bars, and one variant is its distribution over runs.
 
+use super::Label;
 use super::groups::Groups;
 use super::table::RunColumn;
 use super::text::sentence;
-use super::{Label, RunValues};
 use crate::experiment::figure::Point;
 use crate::experiment::{Figure, FigureKind, Series};
 use crate::statistics::{Sample, wilson};
+use sidestep_kernel::ports::Values;
 use std::collections::BTreeMap;
 
 /// Series in a figure at most: more cannot be told apart.
@@ -147,7 +148,7 @@ fn of_variants(groups: &Groups<'_>, metric: &RunColumn) -> Figure {
 
 /// The share of runs up to each value, with Wilson's intervals. A share of runs has none.
 fn distribution(groups: &Groups<'_>, metric: &RunColumn) -> Option<Figure> {
-    if matches!(metric.values, RunValues::Bool(_)) {
+    if matches!(metric.values, Values::Bool(_)) {
         return None;
     }
     let sorted = Sample::of(groups.values(metric, 0)).sorted();
@@ -181,7 +182,7 @@ fn figure(
     kind: FigureKind,
     series: Vec<Series>,
 ) -> Figure {
-    let share = matches!(metric.values, RunValues::Bool(_));
+    let share = matches!(metric.values, Values::Bool(_));
     let label = Label::of(&metric.name);
     let y_label = if share { format!("{label}: share of runs") } else { label.to_string() };
     Figure { title, x_label, y_label, kind, series, ..Figure::default() }

@@ -1,9 +1,10 @@
 //! A variant against the baseline, on the same replicates.
 
 use super::groups::Groups;
-use super::table::{RunColumn, RunValues};
+use super::table::RunColumn;
 use crate::statistics::{Bootstrap, Interval, Pairs, holm};
 use serde::Serialize;
+use sidestep_kernel::ports::Values;
 
 /// How a variant differs from the baseline in one metric, pair by pair of equal replicates.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -50,7 +51,7 @@ pub(super) fn comparisons(
     bootstrap: Option<&Bootstrap>,
 ) -> Vec<Comparison> {
     let base = groups.by_replicate(metric, baseline);
-    let is_share = matches!(metric.values, RunValues::Bool(_));
+    let is_share = matches!(metric.values, Values::Bool(_));
     let others = (0..groups.variants.len()).filter(|v| *v != baseline);
     let mut all: Vec<Comparison> = others
         .map(|variant| {

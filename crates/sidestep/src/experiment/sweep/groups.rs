@@ -1,10 +1,11 @@
 //! Runs by variant and replicate.
 
-use super::table::{Role, RunColumn, RunTable, RunValues};
+use super::table::{Role, RunColumn, RunTable};
 use crate::experiment::Estimate;
 use crate::statistics::{Sample, wilson};
 use serde::Serialize;
 use sidestep_kernel::InputError;
+use sidestep_kernel::ports::Values;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A value of a parameter.
@@ -119,7 +120,7 @@ impl<'a> Groups<'a> {
     pub(super) fn mean_over(&self, metric: &RunColumn, group: &[usize]) -> Estimate {
         if let [variant] = group {
             let values = self.values(metric, *variant);
-            if matches!(metric.values, RunValues::Bool(_)) {
+            if matches!(metric.values, Values::Bool(_)) {
                 return share(&values);
             }
             return Estimate::of(values);
@@ -167,7 +168,7 @@ fn ordered(table: &RunTable) -> Vec<usize> {
     let mut rows: Vec<usize> = (0..table.runs()).collect();
     if let Some(cell) = table.of_role(Role::Cell).next() {
         match &cell.values {
-            RunValues::Int(numbers) => rows.sort_by_key(|&run| numbers[run]),
+            Values::I64(numbers) => rows.sort_by_key(|&run| numbers.get(run)),
             values => rows.sort_by_key(|&run| values.text(run)),
         }
     }

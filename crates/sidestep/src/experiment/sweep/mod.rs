@@ -45,7 +45,7 @@ pub use label::Label;
 pub use plan::{Cell, Plan, Shard, Variant};
 pub use rows::Rows;
 pub use summary::{LeftOut, Summary, SummaryOptions};
-pub use table::{Role, RunColumn, RunTable, RunValues};
+pub use table::{Role, RunColumn, RunTable};
 
 #[cfg(test)]
 mod tests;

@@ -3,10 +3,11 @@
 use super::design::Setting;
 use super::file::{Sweep, Until};
 use super::summary::{Summary, SummaryOptions};
-use super::table::{Role, RunTable, RunValues};
+use super::table::{Role, RunTable};
 use crate::scenario::nearest;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::InputError;
+use sidestep_kernel::ports::Values;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::str::FromStr;
@@ -165,7 +166,7 @@ impl Plan {
                 let variant = column.values.number(k)? as usize;
                 names.get(variant).cloned()
             };
-            column.values = RunValues::Text((0..runs.runs()).map(name).collect());
+            column.values = Values::Text((0..runs.runs()).map(name).collect());
         }
         let options = SummaryOptions {
             metrics: (!self.metrics.is_empty()).then(|| self.metrics.clone()),

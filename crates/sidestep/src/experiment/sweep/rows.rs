@@ -2,16 +2,17 @@
 
 use super::cell::Outcome;
 use super::plan::Plan;
-use super::table::{Role, RunColumn, RunTable, RunValues};
+use super::table::{Role, RunColumn, RunTable};
 use serde_json::Value;
 use sidestep_kernel::InputError;
+use sidestep_kernel::ports::{ColumnType, Values};
 use std::collections::BTreeMap;
 
 /// The column of why a run failed; only there when one did.
 const FAILURE: &str = "failure";
 
-/// A table that grows by outcomes. A number takes its 16 bytes, so a million runs of 40 metrics
-/// fit into less than a gigabyte.
+/// A table that grows by outcomes. A number takes its 8 or 9 bytes, so a million runs of 40
+/// metrics fit into less than half a gigabyte.
 #[derive(Debug, Default)]
 pub struct Rows {
     cells: Vec<u64>,
@@ -68,7 +69,7 @@ impl Rows {
         let cell = self.cells[row];
         let key = (role, name.to_string());
         let k = *self.index.entry(key).or_insert_with(|| {
-            let values = RunValues::Float(Vec::new());
+            let values = Values::empty(ColumnType::F64);
             let column = RunColumn { name: name.into(), role, values };
             self.columns.push(Growing { column, first: (u64::MAX, usize::MAX) });
             self.columns.len() - 1
@@ -76,7 +77,7 @@ impl Rows {
         let growing = &mut self.columns[k];
         let cell = if value.is_null() { u64::MAX } else { cell };
         growing.first = growing.first.min((cell, place));
-        fill(&mut growing.column.values, row);
+        growing.column.values.resize(row);
         add(&mut growing.column.values, value);
     }
 
@@ -87,7 +88,7 @@ impl Rows {
     /// When a cell has two outcomes that differ: they come from different programs or machines.
     pub fn table(mut self, plan: &Plan) -> Result<RunTable, InputError> {
         let rows = self.cells.len();
-        self.columns.iter_mut().for_each(|c| fill(&mut c.column.values, rows));
+        self.columns.iter_mut().for_each(|c| c.column.values.resize(rows));
         let mut order: Vec<usize> = (0..rows).collect();
         order.retain(|&row| plan.cell_of(self.cells[row]).is_some());
         order.sort_by_key(|&row| (self.cells[row], row));
@@ -96,7 +97,7 @@ impl Rows {
         self.columns.sort_by_key(|c| (c.column.role, c.first));
         let mut columns = identity(plan, order.iter().map(|&row| self.cells[row]));
         for Growing { column, .. } in self.columns {
-            columns.push(RunColumn { values: pick(column.values, &order), ..column });
+            columns.push(RunColumn { values: column.values.pick(&order), ..column });
         }
         Ok(RunTable { columns })
     }
@@ -134,7 +135,7 @@ impl RunTable {
     /// Hands over the outcomes that the rows of a share's table stand for.
     pub fn outcomes(&self, mut each: impl FnMut(Outcome)) {
         let number = |row: usize, column: Option<&RunColumn>| match column.map(|c| &c.values) {
-            Some(RunValues::Int(values)) => values[row].and_then(|n| u64::try_from(n).ok()),
+            Some(Values::I64(values)) => values.get(row).and_then(|n| u64::try_from(*n).ok()),
             _ => None,
         };
         let cell = self.of_role(Role::Cell).next();
@@ -170,7 +171,7 @@ fn identity(plan: &Plan, cells: impl Iterator<Item = u64>) -> Vec<RunColumn> {
     let ints = |name: &str, role, value: fn(&super::Cell) -> u64| RunColumn {
         name: name.into(),
         role,
-        values: RunValues::Int(cells.iter().map(|c| Some(value(c) as i64)).collect()),
+        values: Values::I64(cells.iter().map(|c| value(c) as i64).collect()),
     };
     let mut columns = vec![
         ints("cell", Role::Cell, |c| c.id),
@@ -180,7 +181,7 @@ fn identity(plan: &Plan, cells: impl Iterator<Item = u64>) -> Vec<RunColumn> {
     ];
     for name in &plan.parameters {
         let levels = levels(plan, name);
-        let mut values = RunValues::Float(Vec::new());
+        let mut values = Values::empty(ColumnType::F64);
         cells.iter().for_each(|cell| add(&mut values, &levels[cell.variant as usize]));
         columns.push(RunColumn { name: name.clone(), role: Role::Parameter, values });
     }
@@ -207,27 +208,18 @@ fn json(value: &toml::Value) -> Value {
     }
 }
 
-/// Makes a column `rows` long.
-fn fill(values: &mut RunValues, rows: usize) {
-    match values {
-        RunValues::Int(v) => v.resize(rows, None),
-        RunValues::Float(v) => v.resize(rows, None),
-        RunValues::Bool(v) => v.resize(rows, None),
-        RunValues::Text(v) => v.resize(rows, None),
-    }
-}
-
 /// Appends a value; the column takes a wider type where it must.
-fn add(values: &mut RunValues, value: &Value) {
+fn add(values: &mut Values, value: &Value) {
     if value.is_null() {
-        return fill(values, values.len() + 1);
+        return values.resize(values.len() + 1);
     }
     widen(values, value);
     match values {
-        RunValues::Int(v) => v.push(value.as_i64()),
-        RunValues::Float(v) => v.push(value.as_f64()),
-        RunValues::Bool(v) => v.push(value.as_bool()),
-        RunValues::Text(v) => v.push(Some(words(value))),
+        Values::I64(v) => v.push(value.as_i64()),
+        Values::F64(v) => v.push(value.as_f64()),
+        Values::Bool(v) => v.push(value.as_bool()),
+        Values::Text(v) => v.push(Some(&words(value))),
+        _ => unreachable!("`widen` makes columns of these four types"),
     }
 }
 
@@ -236,42 +228,34 @@ fn words(value: &Value) -> String {
 }
 
 /// Makes the column's type one that holds the value.
-fn widen(values: &mut RunValues, value: &Value) {
+fn widen(values: &mut Values, value: &Value) {
     let fits = match values {
-        RunValues::Int(_) => value.as_i64().is_some(),
-        RunValues::Float(_) => value.is_f64(),
-        RunValues::Bool(_) => value.is_boolean(),
-        RunValues::Text(_) => true,
+        Values::I64(_) => value.as_i64().is_some(),
+        Values::F64(_) => value.is_f64(),
+        Values::Bool(_) => value.is_boolean(),
+        _ => true,
     };
     if fits {
         return;
     }
     let n = values.len();
-    let is_new = (0..n).all(|row| values.json(row).is_null());
-    *values = match value {
-        Value::Number(number) if is_new && number.as_i64().is_some() => {
-            RunValues::Int(vec![None; n])
-        }
-        Value::Bool(_) if is_new => RunValues::Bool(vec![None; n]),
-        Value::Number(_) if is_new || values.is_numeric() => {
-            RunValues::Float((0..n).map(|row| values.number(row)).collect())
-        }
-        _ => RunValues::Text(
-            (0..n).map(|row| values.json(row)).map(|v| (!v.is_null()).then(|| words(&v))).collect(),
-        ),
+    let is_new = (0..n).all(|row| values.is_missing(row));
+    let empty = |ty| {
+        let mut values = Values::empty(ty);
+        values.resize(n);
+        values
     };
-}
-
-fn pick(values: RunValues, order: &[usize]) -> RunValues {
-    fn of<T: Clone>(values: &[T], order: &[usize]) -> Vec<T> {
-        order.iter().map(|&row| values[row].clone()).collect()
-    }
-    match values {
-        RunValues::Int(v) => RunValues::Int(of(&v, order)),
-        RunValues::Float(v) => RunValues::Float(of(&v, order)),
-        RunValues::Bool(v) => RunValues::Bool(of(&v, order)),
-        RunValues::Text(v) => RunValues::Text(of(&v, order)),
-    }
+    *values = match value {
+        Value::Number(number) if is_new && number.as_i64().is_some() => empty(ColumnType::I64),
+        Value::Bool(_) if is_new => empty(ColumnType::Bool),
+        Value::Number(_) if is_new || values.is_numeric() => {
+            Values::F64((0..n).map(|row| values.number(row)).collect())
+        }
+        _ => {
+            let text = |row| (!values.is_missing(row)).then(|| words(&values.json(row)));
+            Values::Text((0..n).map(text).collect())
+        }
+    };
 }
 
 #[cfg(test)]
@@ -331,8 +315,8 @@ mod tests {
         let text = |name: &str, row| table.column(name).expect(name).values.text(row);
         assert_eq!([text("n", 0), text("n", 4), text("n", 8)], ["1", "2.5", "word"]);
         assert_eq!((text("seed", 3), text("seed", 5)), ("10".into(), "8".into()));
-        assert!(matches!(table.column("wider").expect("there").values, RunValues::Float(_)));
-        assert!(matches!(table.column("sometimes").expect("there").values, RunValues::Bool(_)));
+        assert!(matches!(table.column("wider").expect("there").values, Values::F64(_)));
+        assert!(matches!(table.column("sometimes").expect("there").values, Values::Bool(_)));
         assert!(table.results().column("run_wall_s").is_none());
         assert_eq!(table.timings().columns.len(), 2);
         assert_eq!(table.check(), Ok(()));

@@ -13,7 +13,7 @@
 use super::Label;
 use super::compare::{Comparison, comparisons};
 use super::groups::{Groups, Level, Parameter};
-use super::table::{Role, RunColumn, RunTable, RunValues};
+use super::table::{Role, RunColumn, RunTable};
 use super::{charts, text};
 use crate::experiment::{Estimate, Figure, Table};
 use crate::scenario::nearest;
@@ -23,6 +23,7 @@ use crate::statistics::{
 };
 use serde::Serialize;
 use sidestep_kernel::InputError;
+use sidestep_kernel::ports::Values;
 
 /// Quantiles that are told.
 pub const QUANTILES: [f64; 5] = [0.05, 0.25, 0.5, 0.75, 0.95];
@@ -346,7 +347,7 @@ fn named<'a>(all: &[&'a RunColumn], names: &[String]) -> Result<Chosen<'a>, Inpu
             let cause = format!("there is no metric `{name}`");
             return Err(InputError::new(place(), cause, nearest(name, &known)));
         };
-        if matches!(column.values, RunValues::Text(_)) {
+        if matches!(column.values, Values::Text(_)) {
             let cause = format!("the metric `{name}` is words, not numbers");
             return Err(InputError::new(place(), cause, "leave it out"));
         }
@@ -362,7 +363,7 @@ fn named<'a>(all: &[&'a RunColumn], names: &[String]) -> Result<Chosen<'a>, Inpu
 
 /// Why a metric has nothing to tell, if so.
 fn uninformative(column: &RunColumn) -> Option<String> {
-    if matches!(column.values, RunValues::Text(_)) {
+    if matches!(column.values, Values::Text(_)) {
         return Some("words, not numbers".into());
     }
     let runs = column.values.len();
@@ -406,7 +407,7 @@ fn summed(
     MetricSummary {
         name: column.name.clone(),
         label: Label::of(&column.name),
-        is_share: matches!(column.values, RunValues::Bool(_)),
+        is_share: matches!(column.values, Values::Bool(_)),
         explained: explained(groups, column),
         variants: variants.map(describe).collect(),
         comparisons: baseline.map_or(Vec::new(), |b| comparisons(groups, column, b, bootstrap)),
@@ -421,7 +422,7 @@ fn described(
     bootstrap: Option<&Bootstrap>,
 ) -> VariantMetric {
     let sample = Sample::of(groups.values(column, variant));
-    let values = if matches!(column.values, RunValues::Bool(_)) {
+    let values = if matches!(column.values, Values::Bool(_)) {
         Described::Share(share(&sample.values))
     } else {
         Described::Numbers(numbers(&sample, bootstrap))

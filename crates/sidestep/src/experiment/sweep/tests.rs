@@ -7,14 +7,15 @@ use crate::statistics::Bootstrap;
 use proptest::prelude::*;
 use sidestep_kernel::Seed;
 use sidestep_kernel::distr::normal;
+use sidestep_kernel::ports::Values;
 use sidestep_kernel::stream::{Purpose, Streams};
 
-fn column(name: &str, role: Role, values: RunValues) -> RunColumn {
+fn column(name: &str, role: Role, values: Values) -> RunColumn {
     RunColumn { name: name.into(), role, values }
 }
 
-fn numbers(values: impl IntoIterator<Item = f64>) -> RunValues {
-    RunValues::Float(values.into_iter().map(Some).collect())
+fn numbers(values: impl IntoIterator<Item = f64>) -> Values {
+    Values::F64(values.into_iter().map(Some).collect())
 }
 
 /// A full grid: 2 regimes, counts 10, 20 and 40, 20 replicates. The delay is
@@ -35,17 +36,16 @@ fn grid() -> RunTable {
         *count as f64 / 10.0 + 3.0 * rush(regime) + 2.0 * common(*replicate) + 0.2 * noise(i, 2)
     };
     let arrived = |(i, row): (usize, &(&str, i64, i64))| Some(noise(i, 3) > rush(row.0));
-    let int = |of: fn(&(&str, i64, i64)) -> i64| {
-        RunValues::Int(rows.iter().map(|r| Some(of(r))).collect())
-    };
+    let int =
+        |of: fn(&(&str, i64, i64)) -> i64| Values::I64(rows.iter().map(|r| Some(of(r))).collect());
     let text = |of: &dyn Fn(&(&str, i64, i64)) -> String| {
-        RunValues::Text(rows.iter().map(|r| Some(of(r))).collect())
+        Values::Text(rows.iter().map(|r| Some(of(r))).collect())
     };
     let delays = numbers(rows.iter().enumerate().map(delay));
     let floats = |purpose| numbers((0..rows.len()).map(|i| noise(i, purpose)));
     let metric = |name, values| column(name, Role::Metric, values);
     let columns = vec![
-        column("cell", Role::Cell, RunValues::Int((0..rows.len() as i64).map(Some).collect())),
+        column("cell", Role::Cell, Values::I64((0..rows.len() as i64).map(Some).collect())),
         column("variant", Role::Variant, text(&|r| format!("{} {}", r.0, r.1))),
         column("replicate", Role::Replicate, int(|r| r.2)),
         column("seed", Role::Seed, int(|r| r.2 + 100)),
@@ -54,7 +54,7 @@ fn grid() -> RunTable {
         column("format", Role::Parameter, int(|_| 1)),
         metric("noise_m", floats(4)),
         metric("mean_delay_percent", delays),
-        metric("arrived", RunValues::Bool(rows.iter().enumerate().map(arrived).collect())),
+        metric("arrived", Values::Bool(rows.iter().enumerate().map(arrived).collect())),
         metric("lost", int(|_| 0)),
         metric("reason", text(&|_| "over".into())),
         column("digest", Role::Digest, text(&|_| "ab".into())),
@@ -168,8 +168,7 @@ fn figures_are_lines_over_numbers_bars_over_words_and_points_where_nothing_is_on
 fn hypercube(variants: i64, replicates: i64) -> RunTable {
     let rows: Vec<(i64, i64)> =
         (0..variants).flat_map(|v| (0..replicates).map(move |r| (v, r))).collect();
-    let int =
-        |of: fn(&(i64, i64)) -> i64| RunValues::Int(rows.iter().map(|r| Some(of(r))).collect());
+    let int = |of: fn(&(i64, i64)) -> i64| Values::I64(rows.iter().map(|r| Some(of(r))).collect());
     let columns = vec![
         column("variant", Role::Variant, int(|r| r.0)),
         column("replicate", Role::Replicate, int(|r| r.1)),
@@ -211,8 +210,10 @@ fn no_number_in_a_table_is_without_interval_and_n() {
 fn missing_and_infinite_values_are_counted_and_told() {
     let mut table = grid();
     let delay = table.columns.iter_mut().find(|c| c.name == "mean_delay_percent").unwrap();
-    let RunValues::Float(values) = &mut delay.values else { panic!("numbers") };
-    (values[0], values[1], values[25]) = (None, Some(f64::NAN), Some(f64::INFINITY));
+    let Values::F64(values) = &mut delay.values else { panic!("numbers") };
+    let mut cells: Vec<Option<f64>> = values.iter().copied().map(Some).collect();
+    (cells[0], cells[1], cells[25]) = (None, Some(f64::NAN), Some(f64::INFINITY));
+    *values = cells.into_iter().collect();
     let summary = summed(&table);
     let delay = of(&summary, "mean_delay_percent");
     let first = &delay.variants[0];
@@ -226,13 +227,9 @@ fn missing_and_infinite_values_are_counted_and_told() {
 fn the_order_of_rows_is_no_part_of_a_summary() {
     let table = grid();
     let mut turned = table.clone();
+    let backwards: Vec<usize> = (0..table.runs()).rev().collect();
     for column in &mut turned.columns {
-        match &mut column.values {
-            RunValues::Int(v) => v.reverse(),
-            RunValues::Float(v) => v.reverse(),
-            RunValues::Bool(v) => v.reverse(),
-            RunValues::Text(v) => v.reverse(),
-        }
+        column.values = column.values.pick(&backwards);
     }
     assert_eq!(summed(&turned), summed(&table));
 }
@@ -248,7 +245,7 @@ fn wrong_names_and_tables_are_refused_with_a_remedy() {
     assert_eq!(error.cause(), "there is no metric `noise`");
     let mut twice = grid();
     let replicate = twice.columns.iter_mut().find(|c| c.role == Role::Replicate).unwrap();
-    replicate.values = RunValues::Int(vec![Some(4); 120]);
+    replicate.values = Values::I64(vec![4; 120].into());
     let error = Summary::of(&twice, &SummaryOptions::default()).unwrap_err();
     assert_eq!(error.cause(), "variant `calm 10` has two runs of replicate 4");
     let empty = Summary::of(&RunTable::default(), &SummaryOptions::default()).unwrap();
@@ -277,12 +274,12 @@ proptest! {
         cell: bool, variant: bool, replicate: bool,
     ) {
         let mut columns = vec![
-            column("p", Role::Parameter, RunValues::Int(rows.iter().map(|r| Some(r.0)).collect())),
-            column("q", Role::Parameter, RunValues::Float(rows.iter().map(|r| r.2).collect())),
-            column("x_s", Role::Metric, RunValues::Float(rows.iter().map(|r| r.2).collect())),
-            column("ok", Role::Metric, RunValues::Bool(rows.iter().map(|r| r.3).collect())),
+            column("p", Role::Parameter, Values::I64(rows.iter().map(|r| Some(r.0)).collect())),
+            column("q", Role::Parameter, Values::F64(rows.iter().map(|r| r.2).collect())),
+            column("x_s", Role::Metric, Values::F64(rows.iter().map(|r| r.2).collect())),
+            column("ok", Role::Metric, Values::Bool(rows.iter().map(|r| r.3).collect())),
         ];
-        let int = |numbers: Vec<i64>| RunValues::Int(numbers.into_iter().map(Some).collect());
+        let int = |numbers: Vec<i64>| Values::I64(numbers.into_iter().map(Some).collect());
         let (first, second) = (rows.iter().map(|r| r.0), rows.iter().map(|r| r.1));
         if cell { columns.push(column("cell", Role::Cell, int(second.clone().collect()))); }
         if variant { columns.push(column("variant", Role::Variant, int(first.collect()))); }

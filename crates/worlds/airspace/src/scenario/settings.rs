@@ -1,31 +1,72 @@
-//! What is optimized, how, and whether the shield filters it.
+//! What is optimized, and how.
 
-use super::super::flight::Legs;
-use super::super::objective::Objective;
-use super::Compiler;
+use super::compile::Compiler;
+use crate::flight::Legs;
+use crate::objective::Objective;
+use serde::Deserialize;
 use sidestep_collectives::{Choice, Estimator, Order, Settings, Stop, Update};
 use sidestep_kernel::InputError;
-use toml::Spanned;
+use sidestep_scenario::{AboveZero, Rule as _, refused};
 
 /// Most samples of a block.
 const MOST_SAMPLES: usize = 10_000;
+/// Most times of a list.
+const MOST_TIMES: usize = 20;
+
+/// A list of times above 0.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Times(pub(super) Vec<f64>);
+
+impl<'de> Deserialize<'de> for Times {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let times_s = Vec::<f64>::deserialize(deserializer)?;
+        if times_s.iter().all(|t| AboveZero::allows(*t)) && times_s.len() <= MOST_TIMES {
+            return Ok(Self(times_s));
+        }
+        let remedy = format!("give up to {MOST_TIMES} positive times in seconds");
+        Err(refused(format_args!("{times_s:?}"), &remedy))
+    }
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct LegsSection {
+    turns_s: Times,
+    until_s: Times,
+}
+
+/// A word for yes or no; yes unless it is said.
+#[derive(Debug)]
+pub(super) struct Switch(pub(super) bool);
+
+impl Default for Switch {
+    fn default() -> Self {
+        Self(true)
+    }
+}
+
+impl<'de> Deserialize<'de> for Switch {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let given = toml::Value::deserialize(deserializer)?;
+        match given.as_str() {
+            Some("on") => Ok(Self(true)),
+            Some("off") => Ok(Self(false)),
+            _ => Err(refused(given, "give \"on\" or \"off\"")),
+        }
+    }
+}
 
 impl Compiler<'_> {
-    pub(super) fn objective(&self, vertical_m: f64) -> Result<Objective, InputError> {
+    pub(super) fn objective(&self, vertical_m: f64) -> Objective {
         let section = &self.file.airspace;
         let paper = self.is_paper();
-        let beta = self.positive(section.beta.as_ref(), 0.995)?;
-        if beta > 1.0 {
-            let span = section.beta.as_ref().map(Spanned::span);
-            return Err(self.error(span, format!("beta = {beta}"), "give at most 1"));
-        }
-        Ok(Objective {
-            alpha: self.positive(section.alpha.as_ref(), if paper { 1.0 } else { 0.001 })?,
-            beta,
-            inflation: self.positive(section.inflation.as_ref(), if paper { 1.0 } else { 1.12 })?,
+        Objective {
+            alpha: section.alpha.map_or(if paper { 1.0 } else { 0.001 }, f64::from),
+            beta: section.beta.map_or(0.995, f64::from),
+            inflation: section.inflation.map_or(if paper { 1.0 } else { 1.12 }, f64::from),
             mask: true,
             vertical_m,
-        })
+        }
     }
 
     pub(super) fn settings(&self) -> Result<Settings, InputError> {
@@ -33,12 +74,6 @@ impl Compiler<'_> {
         let paper = self.is_paper();
         let estimator =
             if paper { Estimator::Sampled { block: 20, ageing: 0.7 } } else { Estimator::Exact };
-        let preset = if paper { 0.8 } else { 0.7 };
-        let cooling = self.positive(section.cooling.as_ref(), preset)?;
-        if cooling > 1.0 {
-            let span = section.cooling.as_ref().map(Spanned::span);
-            return Err(self.error(span, format!("cooling = {cooling}"), "give at most 1"));
-        }
         let choice = if paper { Choice::Draw } else { Choice::Argmax };
         let order = if paper { Order::Parallel } else { Order::Sequence };
         Ok(Settings {
@@ -46,26 +81,14 @@ impl Compiler<'_> {
             update: self.update()?.unwrap_or(Update::NearestNewton { step: 0.5 }),
             order: section.order.unwrap_or(order),
             utility: section.utility.unwrap_or_default(),
-            cooling,
+            cooling: section.cooling.map_or(if paper { 0.8 } else { 0.7 }, f64::from),
             stop: Stop {
                 threshold: 1e-3,
                 calm_rounds: 3,
-                max_rounds: self.max_rounds()?.unwrap_or(200),
+                max_rounds: section.max_rounds.map_or(200, |rounds| rounds.get() as u32),
             },
             choice: section.choice.unwrap_or(choice),
         })
-    }
-
-    pub(super) fn has_shield(&self) -> Result<bool, InputError> {
-        let Some(given) = &self.file.airspace.shield else { return Ok(true) };
-        match given.get_ref().as_str() {
-            Some("on") => Ok(true),
-            Some("off") => Ok(false),
-            _ => {
-                let cause = format!("shield = {}", given.get_ref());
-                Err(self.error(Some(given.span()), cause, "give \"on\" or \"off\""))
-            }
-        }
     }
 
     fn estimator(&self) -> Result<Option<Estimator>, InputError> {
@@ -75,7 +98,7 @@ impl Compiler<'_> {
         {
             let cause = format!("an estimator with block = {block}, ageing = {ageing}");
             let remedy = format!("give a block of 1 to {MOST_SAMPLES} samples, ageing from 0 to 1");
-            return Err(self.error(Some(given.span()), cause, remedy));
+            return Err(self.source.error(given.span(), cause, remedy));
         }
         Ok(Some(*given.get_ref()))
     }
@@ -87,34 +110,16 @@ impl Compiler<'_> {
             return Ok(Some(*given.get_ref()));
         }
         let cause = format!("an update with step = {step}");
-        Err(self.error(Some(given.span()), cause, "give a step above 0 and at most 1"))
+        Err(self.source.error(given.span(), cause, "give a step above 0 and at most 1"))
     }
 
-    fn max_rounds(&self) -> Result<Option<u32>, InputError> {
-        match &self.file.airspace.max_rounds {
-            Some(given) if *given.get_ref() == 0 => {
-                Err(self.error(Some(given.span()), "max_rounds = 0", "give 1 or more"))
+    pub(super) fn legs(&self) -> Legs {
+        match &self.file.airspace.legs {
+            Some(LegsSection { turns_s, until_s }) => {
+                Legs { turns_s: turns_s.0.clone(), until_s: until_s.0.clone() }
             }
-            given => Ok(given.as_ref().map(|rounds| *rounds.get_ref())),
-        }
-    }
-
-    pub(super) fn legs(&self) -> Result<Legs, InputError> {
-        let legs = match &self.file.airspace.legs {
-            Some(legs) => legs.clone(),
             None if self.is_paper() => Legs::default(),
             None => Legs::usual(),
-        };
-        self.times(&legs.turns_s, "legs.turns_s")?;
-        self.times(&legs.until_s, "legs.until_s")?;
-        Ok(legs)
-    }
-
-    pub(super) fn times(&self, times_s: &[f64], key: &str) -> Result<Vec<f64>, InputError> {
-        if times_s.iter().any(|t| !(*t > 0.0 && t.is_finite())) || times_s.len() > 20 {
-            let cause = format!("{key} = {times_s:?}");
-            return Err(self.error(None, cause, "give up to 20 positive times in seconds"));
         }
-        Ok(times_s.to_vec())
     }
 }

@@ -1,8 +1,8 @@
 //! Corridors: straight and bent legs between two walls (slides E2, N6).
 
 use super::Pose;
-use crate::geometry::Point;
-use crate::obstacle::Obstacle;
+use crate::rods::geometry::Point;
+use crate::rods::obstacle::Obstacle;
 use sidestep_kernel::InputError;
 use sidestep_kernel::math::{cos, sin};
 
@@ -178,8 +178,8 @@ impl Corridor {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{Core, distance};
-    use crate::obstacle::Obstacles;
+    use crate::rods::geometry::{Core, distance};
+    use crate::rods::obstacle::Obstacles;
     use proptest::prelude::*;
 
     fn leg() -> impl Strategy<Value = Leg> {

@@ -3,8 +3,8 @@
 //! Every course is a closed formula of time: nobody keeps a state, any worker computes any
 //! obstacle at any moment, and a checkpoint needs nothing but the time.
 
-use crate::geometry::{Bounds, Point, between, distance, is_finite, norm, scaled, sub, unit};
-use crate::obstacle::Obstacle;
+use crate::rods::geometry::{Bounds, Point, between, distance, is_finite, norm, scaled, sub, unit};
+use crate::rods::obstacle::Obstacle;
 use sidestep_kernel::InputError;
 
 /// How something moves.
@@ -213,7 +213,7 @@ impl<const D: usize> Movers<D> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{Core, add};
+    use crate::rods::geometry::{Core, add};
     use proptest::prelude::*;
 
     const ROOM: Bounds<2> = Bounds { lo: [-5.0, -3.0], hi: [6.0, 4.0] };

@@ -2,8 +2,8 @@
 
 use super::courses::{Course, Mover};
 use super::purposes;
-use crate::geometry::{Bounds, Core, Point, along, is_finite, unit};
-use crate::obstacle::Obstacle;
+use crate::rods::geometry::{Bounds, Core, Point, along, is_finite, unit};
+use crate::rods::obstacle::Obstacle;
 use sidestep_kernel::stream::{Draws, Streams};
 use sidestep_kernel::{InputError, Seed};
 use std::f64::consts::PI;
@@ -174,7 +174,7 @@ fn direction<const D: usize>(draws: &mut Draws) -> Point<D> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::norm;
+    use crate::rods::geometry::norm;
 
     fn field<const D: usize>(part: f64, length_m: f64) -> Field<D> {
         let mut tail = [0.0; D];

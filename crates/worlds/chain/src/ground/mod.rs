@@ -18,7 +18,7 @@ pub use courses::{Course, Mover, Movers};
 pub use pixels::Floor;
 pub use site::Site;
 
-use super::geometry::Point;
+use super::rods::geometry::Point;
 use sidestep_kernel::stream::Purpose;
 
 /// A place in the plane and a direction.

@@ -5,11 +5,11 @@
 //! solid lies on such an edge. It is also little: a straight wall is one segment where a box would
 //! have four sides, and the inside of what is solid is nothing at all. Nobody gets there: walls
 //! that meet share their corners bit for bit, and no motion passes through a wall, however thin
-//! (see [`sweep`](crate::sweep)). Who starts inside what is solid is not noticed by
+//! (see [`sweep`](crate::rods::sweep)). Who starts inside what is solid is not noticed by
 //! the walls; [`Floor::is_free`] tells.
 
-use crate::geometry::{Bounds, Point, add, along, dot, scaled, sub};
-use crate::obstacle::Obstacle;
+use crate::rods::geometry::{Bounds, Point, add, along, dot, scaled, sub};
+use crate::rods::obstacle::Obstacle;
 use sidestep_import::PixelMap;
 use sidestep_kernel::math::{cos, sin};
 use sidestep_map::{Cell, UnknownPolicy};
@@ -168,7 +168,7 @@ fn runs(n: i64, is: impl Fn(i64) -> bool, mut tell: impl FnMut(i64, i64)) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{Core, Cuboid, distance};
+    use crate::rods::geometry::{Core, Cuboid, distance};
     use proptest::prelude::*;
     use sidestep_import::rosmap;
     use sidestep_testing::shared_data as shared;
@@ -236,7 +236,7 @@ mod tests {
             );
             let way = [point(0), point(2)];
             let crosses = |wall: &Obstacle<2>| match wall.core {
-                Core::Segment(ends) => crate::geometry::cross_each_other(way, ends),
+                Core::Segment(ends) => crate::rods::geometry::cross_each_other(way, ends),
                 _ => false,
             };
             let crossed = floor.walls(0).iter().filter(|wall| crosses(wall)).count();

@@ -1,8 +1,8 @@
 //! Where a chain has room on a floor: a start for its leader, and a free way behind it.
 
 use super::{Pose, Site, purposes};
-use crate::geometry::{Bounds, Point, along, between, distance, dot, sub, unit};
-use crate::obstacle::Obstacles;
+use crate::rods::geometry::{Bounds, Point, along, between, distance, dot, sub, unit};
+use crate::rods::obstacle::Obstacles;
 use sidestep_kernel::math::atan2;
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{InputError, Seed};
@@ -259,7 +259,7 @@ fn length_m(way: &[Point<2>]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chain::{Chain, Connector, Rod};
+    use crate::rods::chain::{Chain, Connector, Rod};
     use sidestep_import::{PixelMap, rosmap, stage};
     use sidestep_map::{Cell, UnknownPolicy};
     use sidestep_testing::shared_data as shared;

@@ -2,8 +2,8 @@
 
 use super::Pose;
 use super::pixels::Floor;
-use crate::geometry::{Bounds, Core, Cuboid, Point};
-use crate::obstacle::{Obstacle, outline};
+use crate::rods::geometry::{Bounds, Core, Cuboid, Point};
+use crate::rods::obstacle::{Obstacle, outline};
 use sidestep_import::{PixelMap, stage};
 use sidestep_kernel::math::{cos, sin};
 use sidestep_map::UnknownPolicy;
@@ -56,7 +56,7 @@ impl Site {
     }
 
     /// Whether a place is on no solid pixel. Boxes are not looked at: see
-    /// [`Obstacles::clearance_m`](crate::Obstacles::clearance_m).
+    /// [`Obstacles::clearance_m`](crate::rods::Obstacles::clearance_m).
     pub fn is_free(&self, at: Point<2>) -> bool {
         self.floors.iter().all(|floor| floor.is_free(at))
     }
@@ -82,7 +82,7 @@ fn cuboid(pose: Pose, size_m: [f64; 2]) -> Cuboid<2> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::obstacle::Obstacles;
+    use crate::rods::obstacle::Obstacles;
     use sidestep_testing::shared_data as shared;
 
     #[test]

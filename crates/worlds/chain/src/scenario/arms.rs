@@ -21,7 +21,7 @@ pub(super) struct ArmSection {
     joints: Option<Vec<f64>>,
 }
 
-impl Compiler<'_> {
+impl<const D: usize> Compiler<'_, D> {
     /// An arm whose base is at `at_m`.
     pub(super) fn arm(
         &self,
@@ -31,15 +31,17 @@ impl Compiler<'_> {
         let (s, at) = (section.get_ref(), section.span());
         let model = Model::load(&self.source.path(s.urdf.as_ref()))?;
         let link = |name: &Option<String>, key: &str, preset: usize| match name {
-            Some(name) => model.link(key, name).map_err(|error| self.at(at.clone(), &error)),
+            Some(name) => {
+                model.link(key, name).map_err(|error| self.source.error_of(at.clone(), &error))
+            }
             None => Ok(preset),
         };
         let base = link(&s.base, "base", model.root)?;
         let tip = link(&s.tip, "tip", model.default_tip())?;
         let serial = SerialChain::new(&model, base, tip, &s.urdf)
-            .map_err(|error| self.at(at.clone(), &error))?;
+            .map_err(|error| self.source.error_of(at.clone(), &error))?;
         let values = self.values(s, &model, &serial, at.clone())?;
-        serial.check_limits("joints", &values).map_err(|error| self.at(at, &error))?;
+        serial.check_limits("joints", &values).map_err(|error| self.source.error_of(at, &error))?;
         Ok(Arm::new(serial, at_m, values))
     }
 
@@ -51,7 +53,7 @@ impl Compiler<'_> {
         serial: &SerialChain,
         at: Range<usize>,
     ) -> Result<Vec<f64>, InputError> {
-        let told = |error: InputError| self.at(at.clone(), &error);
+        let told = |error: InputError| self.source.error_of(at.clone(), &error);
         match (&s.joints, &s.posture, &s.srdf) {
             (Some(values), None, None) => {
                 serial.check_count("joints", values).map_err(told)?;
@@ -65,7 +67,7 @@ impl Compiler<'_> {
             (None, None, None) => Ok(serial.rest()),
             _ => {
                 let remedy = "give joints = [...], or srdf and posture, or none of them";
-                Err(self.error(Some(at), "a posture given in two ways, or half", remedy))
+                Err(self.source.error(at, "a posture given in two ways, or half", remedy))
             }
         }
     }

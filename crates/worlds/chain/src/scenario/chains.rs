@@ -2,21 +2,22 @@
 
 use super::super::arm::Arm;
 use super::super::chain::{Chain, Connector, Mobility, Rod};
-use super::super::driver::{Driver, Task, out_of_space};
+use super::super::driver::{Driver, Task};
 use super::super::formation::Robots;
 use super::super::geometry::{Point, along, first_axis, unit};
 use super::super::ground::Site;
 use super::super::ground::route::{Wanted, find};
 use super::super::obstacle::Obstacles;
-use super::super::world::{ChainSpec, What};
-use super::Compiler;
+use super::super::world::{ChainSpec, Change, What};
 use super::arms::ArmSection;
 use super::changes::ChangeSection;
 use super::navigators::RobotsSection;
+use super::obstacles::fitted;
 use super::tasks::TaskSection;
+use super::{Compiler, Place, Room};
 use serde::Deserialize;
 use sidestep_kernel::{InputError, Seed, math};
-use sidestep_scenario::Sections;
+use sidestep_scenario::{Limits, Sections};
 use std::ops::Range;
 use std::sync::Arc;
 use toml::Spanned;
@@ -30,73 +31,79 @@ const MAX_STEPS: f64 = 1e5;
 /// Most connectors of all chains together: some 3 GB.
 const MAX_CONNECTORS: usize = 10_000_000;
 
-/// A length, or the least and the greatest.
-#[derive(Debug, Clone, Copy, Deserialize)]
-#[serde(untagged)]
-enum Length {
-    Fixed(f64),
-    Between([f64; 2]),
-}
-
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct ChainSection {
+pub(super) struct ChainSection<const D: usize> {
     #[serde(default)]
     name: String,
     #[serde(default = "one_chain")]
     pub(super) count: usize,
-    apart_m: Option<Spanned<Vec<f64>>>,
+    apart_m: Option<Place<D>>,
     connectors: Option<usize>,
-    at_m: Option<Spanned<Vec<f64>>>,
-    along: Option<Spanned<Vec<f64>>>,
+    at_m: Option<Place<D>>,
+    along: Option<Spanned<Place<D>>>,
     heading_deg: Option<f64>,
-    points_m: Option<Spanned<Vec<Vec<f64>>>>,
+    points_m: Option<Vec<Place<D>>>,
     #[serde(default)]
     anywhere: bool,
-    within_m: Option<Spanned<[Vec<f64>; 2]>>,
+    within_m: Option<Spanned<Room<D>>>,
     arm: Option<Spanned<ArmSection>>,
     robots: Option<Spanned<RobotsSection>>,
-    rod_m: Option<Spanned<Length>>,
+    rod_m: Option<Limits>,
     radius_m: Option<f64>,
     rod_radius_m: Option<f64>,
     max_bend_deg: Option<f64>,
     #[serde(default)]
-    limits: Sections<LimitSection>,
+    limits: Sections<LimitSection<D>>,
     #[serde(default)]
-    tasks: Sections<TaskSection>,
+    tasks: Sections<TaskSection<D>>,
     #[serde(default)]
-    changes: Sections<ChangeSection>,
+    changes: Sections<ChangeSection<D>>,
 }
 
 fn one_chain() -> usize {
     1
 }
 
-/// What is special about one connector.
+/// Limits of one connector.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct LimitSection {
+pub(super) struct LimitSection<const D: usize> {
     connector: usize,
-    mobility: Option<Spanned<MobilitySection>>,
+    mobility: Option<MobilitySection<D>>,
     max_bend_deg: Option<f64>,
     radius_m: Option<f64>,
     failed: Option<bool>,
 }
 
-/// Where a connector may be.
+/// The places where a connector may be.
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub(super) enum MobilitySection {
+pub(super) enum MobilitySection<const D: usize> {
     Free,
     Fixed,
-    OnSegment([Vec<f64>; 2]),
-    OnPlane { normal: Vec<f64>, offset_m: f64 },
-    InBox([Vec<f64>; 2]),
+    OnSegment([Place<D>; 2]),
+    OnPlane { normal: Place<D>, offset_m: f64 },
+    InBox([Place<D>; 2]),
 }
 
-impl Compiler<'_> {
+impl<const D: usize> MobilitySection<D> {
+    pub(super) fn mobility(&self) -> Mobility<D> {
+        match *self {
+            Self::Free => Mobility::Free,
+            Self::Fixed => Mobility::Fixed,
+            Self::OnSegment(ends) => Mobility::OnSegment(ends.map(Place::get)),
+            Self::OnPlane { normal, offset_m } => {
+                Mobility::OnPlane { normal: normal.get(), offset_m }
+            }
+            Self::InBox([lo, hi]) => Mobility::InBox { lo: lo.get(), hi: hi.get() },
+        }
+    }
+}
+
+impl<const D: usize> Compiler<'_, D> {
     /// All chains.
-    pub(super) fn chains<const D: usize>(
+    pub(super) fn chains(
         &self,
         dt_s: f64,
         site: Option<&Site>,
@@ -104,14 +111,14 @@ impl Compiler<'_> {
         self.check_total()?;
         let mut all = Vec::new();
         for section in &self.file.chains.0 {
-            let spec = self.chain::<D>(section, dt_s, site)?;
+            let spec = self.chain(section, dt_s, site)?;
             for copy in 0..section.get_ref().count {
                 all.push(self.copied(&spec, section, copy)?);
             }
         }
         if all.is_empty() {
             let remedy = "add [[chains]] with connectors, rod_m and [[chains.tasks]]";
-            return Err(self.error(None, "the scenario has no chains", remedy));
+            return Err(self.source.error(None, "the scenario has no chains", remedy));
         }
         Ok(all)
     }
@@ -121,32 +128,32 @@ impl Compiler<'_> {
         let mut total: usize = 0;
         for section in &self.file.chains.0 {
             let s = section.get_ref();
-            let given = s.points_m.as_ref().map(|points| points.get_ref().len());
+            let given = s.points_m.as_ref().map(Vec::len);
             let n = s.connectors.or(given).unwrap_or(1).max(1);
             total = total.saturating_add(n.saturating_mul(s.count));
             if total > MAX_CONNECTORS {
                 let cause = format!("{total} connectors in all");
                 let remedy = format!("give at most {MAX_CONNECTORS}: connectors times count");
-                return Err(self.error(Some(section.span()), cause, remedy));
+                return Err(self.source.error(section.span(), cause, remedy));
             }
         }
         Ok(())
     }
 
     /// One more chain like `spec`, so many times `apart_m` further.
-    fn copied<const D: usize>(
+    fn copied(
         &self,
         spec: &ChainSpec<D>,
-        section: &Spanned<ChainSection>,
+        section: &Spanned<ChainSection<D>>,
         copy: usize,
     ) -> Result<ChainSpec<D>, InputError> {
         let s = section.get_ref();
         let apart_m: Point<D> = match &s.apart_m {
-            Some(given) => self.point(given.get_ref(), "apart_m", given.span())?,
+            Some(given) => given.get(),
             None if s.count > 1 => {
                 let remedy = "add apart_m = [...], the way from one to the next";
-                return Err(self.error(
-                    Some(section.span()),
+                return Err(self.source.error(
+                    section.span(),
                     format!("{} chains at one place", s.count),
                     remedy,
                 ));
@@ -157,19 +164,40 @@ impl Compiler<'_> {
         let chain = &spec.start;
         let points = chain.points().iter().map(|p| along(*p, by, 1.0)).collect();
         let start = Chain::new(points, chain.connectors().to_vec(), chain.rods().to_vec())
-            .map_err(|error| self.at(section.span(), &error))?;
+            .map_err(|error| self.source.error_of(section.span(), &error))?;
         Ok(ChainSpec { start, ..spec.clone() })
     }
 
-    fn chain<const D: usize>(
+    fn chain(
         &self,
-        section: &Spanned<ChainSection>,
+        section: &Spanned<ChainSection<D>>,
         dt_s: f64,
         site: Option<&Site>,
     ) -> Result<ChainSpec<D>, InputError> {
         let (s, at) = (section.get_ref(), section.span());
-        let (start, arm) = self.shape::<D>(s, site, at.clone())?;
-        let n = start.points().len();
+        let (start, arm) = self.shape(s, site, at.clone())?;
+        let tasks = self.tasks(s, start.points().len(), at.clone())?;
+        let changes = self.changes(s, &start, dt_s, at.clone())?;
+        let speed_m_s = tasks.iter().map(|task| task.speed_m_s).fold(0.0, f64::max);
+        self.check_steps(&start, speed_m_s * dt_s, at.clone())?;
+        let robots = s.robots.as_ref().map(|robots| self.robots(robots, speed_m_s)).transpose()?;
+        if let Some(robots) = &robots {
+            self.check_room(robots, &start, at.clone())?;
+        }
+        if D != 2 && robots.is_some() {
+            let remedy = "set chain.dimensions = 2, or leave robots out";
+            return Err(self.source.error(at, "robots on wheels in space", remedy));
+        }
+        Ok(ChainSpec { name: s.name.clone(), start, tasks, changes, arm, robots })
+    }
+
+    /// Tasks of a chain of `n` connectors: at least one, and an endless one only at the end.
+    fn tasks(
+        &self,
+        s: &ChainSection<D>,
+        n: usize,
+        at: Range<usize>,
+    ) -> Result<Vec<Task<D>>, InputError> {
         let tasks =
             s.tasks.0.iter().map(|task| self.task(task, n)).collect::<Result<Vec<_>, _>>()?;
         let is_endless = |task: &Task<D>| {
@@ -181,55 +209,54 @@ impl Compiler<'_> {
             !has_an_end && task.lasts_s.is_infinite()
         };
         if let Some(k) = tasks.iter().position(is_endless).filter(|k| k + 1 < tasks.len()) {
-            let remedy = "add lasts_s";
-            let span = s.tasks.0[k].span();
-            return Err(self.error(Some(span), "this task never ends, and others follow", remedy));
+            let cause = "this task never ends, and others follow";
+            return Err(self.source.error(s.tasks.0[k].span(), cause, "add lasts_s"));
         }
         if tasks.is_empty() {
             let remedy = "add [[chains.tasks]] with a kind: rest, wander, script or targets";
-            return Err(self.error(Some(at), "a chain without a task", remedy));
+            return Err(self.source.error(at, "a chain without a task", remedy));
         }
-        let changes = s.changes.0.iter().map(|change| self.change(change, &start, dt_s));
+        Ok(tasks)
+    }
+
+    /// Changes of a chain by their time.
+    fn changes(
+        &self,
+        s: &ChainSection<D>,
+        start: &Chain<D>,
+        dt_s: f64,
+        at: Range<usize>,
+    ) -> Result<Vec<Change<D>>, InputError> {
+        let changes = s.changes.0.iter().map(|change| self.change(change, start, dt_s));
         let mut changes = changes.collect::<Result<Vec<_>, _>>()?;
         changes.sort_by_key(|change| change.cycle);
-        let is_broken =
-            |change: &super::super::world::Change<D>| matches!(change.what, What::Scatter { .. });
-        if changes.iter().filter(|change| is_broken(change)).count() > 1 {
+        let breaks = changes.iter().filter(|change| matches!(change.what, What::Scatter { .. }));
+        if breaks.count() > 1 {
             let remedy = "let it break once";
-            return Err(self.error(Some(at), "a chain that breaks more than once", remedy));
+            return Err(self.source.error(at, "a chain that breaks more than once", remedy));
         }
-        let speed_m_s = tasks.iter().map(|task| task.speed_m_s).fold(0.0, f64::max);
-        self.check_steps(&start, speed_m_s * dt_s, at.clone())?;
-        let robots = s.robots.as_ref().map(|robots| self.robots(robots, speed_m_s)).transpose()?;
-        if let Some(robots) = &robots {
-            self.check_room(robots, &start, at.clone())?;
-        }
-        if D != 2 && robots.is_some() {
-            let remedy = "set chain.dimensions = 2, or leave robots out";
-            return Err(self.error(Some(at), "robots on wheels in space", remedy));
-        }
-        Ok(ChainSpec { name: s.name.clone(), start, tasks, changes, arm, robots })
+        Ok(changes)
     }
 
     /// Refuses a way per cycle that would take more sub-steps than anybody waits for.
-    fn check_steps<const D: usize>(
+    fn check_steps(
         &self,
         chain: &Chain<D>,
         way_m: f64,
         at: Range<usize>,
     ) -> Result<(), InputError> {
-        let step_m = self.rules(None)?.step_m.unwrap_or(chain.step_m());
+        let step_m = self.rules(None).step_m.unwrap_or(chain.step_m());
         if way_m <= MAX_STEPS * step_m {
             return Ok(());
         }
         let cause = format!("its initiator goes {way_m:e} m in a cycle, in steps of {step_m:e} m");
         let remedy = "give a shorter chain.dt_s, a lower speed_m_s, larger connectors and rods, \
                       or a longer chain.step_m";
-        Err(self.error(Some(at), cause, remedy))
+        Err(self.source.error(at, cause, remedy))
     }
 
     /// Refuses robots that overlap where their rods are shortest, and a margin below 0.
-    fn check_room<const D: usize>(
+    fn check_room(
         &self,
         robots: &Robots,
         chain: &Chain<D>,
@@ -239,18 +266,18 @@ impl Compiler<'_> {
         let least_m = chain.rods().iter().map(|rod| rod.min_m).fold(f64::INFINITY, f64::min);
         if least_m < 2.0 * radius_m {
             let cause = format!("robots of radius {radius_m} m as near as {least_m} m");
-            return Err(self.error(Some(at), cause, "give longer rods, or smaller robots"));
+            return Err(self.source.error(at, cause, "give longer rods, or smaller robots"));
         }
         if chain.connectors().iter().any(|connector| connector.radius_m < radius_m) {
             let remedy = "give robots.margin_m of 0 or more";
-            return Err(self.error(Some(at), "connectors smaller than their robots", remedy));
+            return Err(self.source.error(at, "connectors smaller than their robots", remedy));
         }
         Ok(())
     }
 
-    fn shape<const D: usize>(
+    fn shape(
         &self,
-        s: &ChainSection,
+        s: &ChainSection<D>,
         site: Option<&Site>,
         at: Range<usize>,
     ) -> Result<(Chain<D>, Option<Arc<Arm>>), InputError> {
@@ -261,15 +288,15 @@ impl Compiler<'_> {
         let rod = self.rod(s, radius_m, at.clone())?;
         if let Some(within) = s.within_m.as_ref().filter(|_| !s.anywhere) {
             let remedy = "leave it out, or set anywhere = true";
-            return Err(self.error(
-                Some(within.span()),
+            return Err(self.source.error(
+                within.span(),
                 "within_m of a chain that has its place",
                 remedy,
             ));
         }
         let points = match s.anywhere {
             true => self.anywhere(s, &rod, radius_m, site, at.clone())?,
-            false => self.points::<D>(s, rod.max_m, at.clone())?,
+            false => self.points(s, rod.max_m, at.clone())?,
         };
         let mut connectors = vec![Connector::free(radius_m); points.len()];
         self.trim_leaders(s, &mut connectors);
@@ -280,39 +307,40 @@ impl Compiler<'_> {
             self.limit(&mut connectors, limit)?;
         }
         let rods = vec![rod; points.len() - 1];
-        let chain = Chain::new(points, connectors, rods).map_err(|error| self.at(at, &error))?;
+        let chain = Chain::new(points, connectors, rods)
+            .map_err(|error| self.source.error_of(at, &error))?;
         Ok((chain, None))
     }
 
-    /// Radius of the connectors: of robots, with the margin that those need who follow.
-    fn radius_m(&self, s: &ChainSection, at: Range<usize>) -> Result<f64, InputError> {
+    /// Radius of the connectors: of robots, with the margin that followers need.
+    fn radius_m(&self, s: &ChainSection<D>, at: Range<usize>) -> Result<f64, InputError> {
         match (&s.robots, s.radius_m) {
             (None, given) => Ok(given.unwrap_or(0.05)),
             (Some(robots), None) => {
                 let robots = robots.get_ref();
-                Ok(self.robot_radius_m(robots) + robots.margin_m.unwrap_or(MARGIN_M))
+                Ok(robots.radius_m() + robots.margin_m.unwrap_or(MARGIN_M))
             }
             (Some(_), Some(_)) => {
                 let remedy = "give robots.radius_m and robots.margin_m instead";
-                Err(self.error(Some(at), "radius_m beside robots", remedy))
+                Err(self.source.error(at, "radius_m beside robots", remedy))
             }
         }
     }
 
-    /// Who navigates is where its connector is, so that needs no margin.
-    fn trim_leaders<const D: usize>(&self, s: &ChainSection, connectors: &mut [Connector<D>]) {
+    /// Takes the margin from leaders: they are exactly where their connectors are.
+    fn trim_leaders(&self, s: &ChainSection<D>, connectors: &mut [Connector<D>]) {
         let Some(robots) = &s.robots else { return };
         for task in s.tasks.0.iter().map(Spanned::get_ref).filter(|task| task.navigates()) {
             if let Some(connector) = connectors.get_mut(task.connector()) {
-                connector.radius_m = self.robot_radius_m(robots.get_ref());
+                connector.radius_m = robots.get_ref().radius_m();
             }
         }
     }
 
     /// The chain that an arm stands for.
-    fn arm_shape<const D: usize>(
+    fn arm_shape(
         &self,
-        s: &ChainSection,
+        s: &ChainSection<D>,
         section: &Spanned<ArmSection>,
         radius_m: f64,
         at: Range<usize>,
@@ -323,17 +351,14 @@ impl Compiler<'_> {
         if D != 3 || is_shaped || is_turned || s.count != 1 {
             let remedy = "set chain.dimensions = 3, and leave out connectors, points_m, rod_m, \
                           along, heading_deg, max_bend_deg, anywhere, robots and count";
-            return Err(self.error(Some(at), "an arm has its shape from its URDF file", remedy));
+            return Err(self.source.error(at, "an arm has its shape from its URDF file", remedy));
         }
-        let base_m = match &s.at_m {
-            Some(given) => self.point::<3>(given.get_ref(), "at_m", given.span())?,
-            None => [0.0; 3],
-        };
-        let arm = self.arm(section, base_m)?;
+        let base_m = s.at_m.map_or([0.0; D], Place::get);
+        let arm = self.arm(section, fitted(base_m))?;
         let solid = arm.chain(radius_m, s.rod_radius_m.unwrap_or(0.8 * radius_m));
-        let solid = solid.map_err(|error| self.at(section.span(), &error))?;
+        let solid = solid.map_err(|error| self.source.error_of(section.span(), &error))?;
         // The same in as many dimensions as asked for, which are three.
-        let points = solid.points().iter().map(|p| out_of_space(*p)).collect();
+        let points = solid.points().iter().map(|p| fitted(*p)).collect();
         let connector = |c: &Connector<3>| Connector {
             mobility: if c.is_still() { Mobility::Fixed } else { Mobility::Free },
             max_bend_rad: c.max_bend_rad,
@@ -344,31 +369,27 @@ impl Compiler<'_> {
             self.limit(&mut connectors, limit)?;
         }
         let chain = Chain::new(points, connectors, solid.rods().to_vec());
-        Ok((chain.map_err(|error| self.at(at, &error))?, Some(Arc::new(arm))))
+        Ok((chain.map_err(|error| self.source.error_of(at, &error))?, Some(Arc::new(arm))))
     }
 
-    fn rod(&self, s: &ChainSection, radius_m: f64, at: Range<usize>) -> Result<Rod, InputError> {
+    fn rod(&self, s: &ChainSection<D>, radius_m: f64, at: Range<usize>) -> Result<Rod, InputError> {
         // Thick rods make slaves jump: those of a swarm are virtual anyway.
         let rod_radius_m = s.rod_radius_m.unwrap_or(0.2 * radius_m);
-        match &s.rod_m {
-            Some(length) => {
-                let [min_m, max_m] = match *length.get_ref() {
-                    Length::Fixed(length_m) => [length_m; 2],
-                    Length::Between(limits) => limits,
-                };
-                Ok(Rod { min_m, max_m, radius_m: rod_radius_m })
+        match s.rod_m {
+            Some(Limits { least, greatest }) => {
+                Ok(Rod { min_m: least, max_m: greatest, radius_m: rod_radius_m })
             }
             None => {
                 let remedy = "add rod_m = 0.5, or rod_m = [least, greatest]";
-                Err(self.error(Some(at), "a chain without the length of its rods", remedy))
+                Err(self.source.error(at, "a chain without the length of its rods", remedy))
             }
         }
     }
 
     /// Some place on the ground where the chain has room; another seed, another place.
-    fn anywhere<const D: usize>(
+    fn anywhere(
         &self,
-        s: &ChainSection,
+        s: &ChainSection<D>,
         rod: &Rod,
         radius_m: f64,
         site: Option<&Site>,
@@ -376,46 +397,44 @@ impl Compiler<'_> {
     ) -> Result<Vec<Point<D>>, InputError> {
         let (Some(site), Some(connectors)) = (site, s.connectors) else {
             let remedy = "name a ground.map or a ground.stage, and give connectors";
-            return Err(self.error(Some(at), "a chain anywhere on no map", remedy));
+            return Err(self.source.error(at, "a chain anywhere on no map", remedy));
         };
         if s.at_m.is_some() || s.points_m.is_some() || s.along.is_some() || s.heading_deg.is_some()
         {
             let remedy = "leave out at_m, points_m, along and heading_deg";
-            return Err(self.error(Some(at), "a chain placed in two ways", remedy));
+            return Err(self.source.error(at, "a chain placed in two ways", remedy));
         }
         let obstacles = Obstacles::new(site.obstacles(0), rod.max_m.max(1e-3))
-            .map_err(|error| self.at(at.clone(), &error))?;
+            .map_err(|error| self.source.error_of(at.clone(), &error))?;
         let wanted = Wanted {
             connectors,
             spacing_m: rod.max_m,
             clearance_m: ROOM * radius_m,
             rod_clearance_m: ROOM * rod.radius_m,
             ahead_m: rod.max_m,
-            within: s.within_m.as_ref().map(|within| self.within(within)).transpose()?,
+            within: s.within_m.as_ref().map(|within| within.get_ref().in_the_plane()),
         };
-        let start = find(site, &obstacles, &wanted, Seed(self.file.seed))
-            .map_err(|error| self.at(at, &error))?;
+        let start = find(site, &obstacles, &wanted, Seed(self.head.seed))
+            .map_err(|error| self.source.error_of(at, &error))?;
         Ok(start.points.iter().map(|p| std::array::from_fn(|i| p[i])).collect())
     }
 
-    /// Where the connectors are: one by one, or on a line from the first one.
-    fn points<const D: usize>(
+    /// Places of the connectors: one by one, or on a line from the first one.
+    fn points(
         &self,
-        s: &ChainSection,
+        s: &ChainSection<D>,
         length_m: f64,
         at: Range<usize>,
     ) -> Result<Vec<Point<D>>, InputError> {
         if let Some(given) = &s.points_m {
             if s.connectors.is_some() || s.at_m.is_some() {
                 let remedy = "give points_m alone, or connectors and at_m";
-                return Err(self.error(Some(at), "a chain placed in two ways", remedy));
+                return Err(self.source.error(at, "a chain placed in two ways", remedy));
             }
-            let point = |p: &Vec<f64>| self.point(p, "points_m", given.span());
-            let points = given.get_ref().iter().map(point).collect::<Result<Vec<_>, _>>()?;
-            if points.is_empty() {
-                return Err(self.error(Some(at), "points_m = []", "give one point or more"));
+            if given.is_empty() {
+                return Err(self.source.error(at, "points_m = []", "give one point or more"));
             }
-            return Ok(points);
+            return Ok(given.iter().map(|place| place.get()).collect());
         }
         let n = match s.connectors {
             Some(n) if (1..=MAX_CONNECTORS).contains(&n) => n,
@@ -423,19 +442,16 @@ impl Compiler<'_> {
                 let cause =
                     format!("connectors = {}", given.map_or("nothing".into(), |n| n.to_string()));
                 let remedy = "give a number from 1 to 10000000, or points_m";
-                return Err(self.error(Some(at), cause, remedy));
+                return Err(self.source.error(at, cause, remedy));
             }
         };
-        let start: Point<D> = match &s.at_m {
-            Some(given) => self.point(given.get_ref(), "at_m", given.span())?,
-            None => [0.0; D],
-        };
-        let u = self.direction::<D>(s)?;
+        let start = s.at_m.map_or([0.0; D], Place::get);
+        let u = self.direction(s)?;
         Ok((0..n).map(|k| along(start, u, length_m * k as f64)).collect())
     }
 
     /// The direction from the first connector to the last.
-    fn direction<const D: usize>(&self, s: &ChainSection) -> Result<Point<D>, InputError> {
+    fn direction(&self, s: &ChainSection<D>) -> Result<Point<D>, InputError> {
         match (&s.along, s.heading_deg) {
             (None, None) => Ok(first_axis().map(|x: f64| -x)),
             (None, Some(deg)) => {
@@ -444,35 +460,32 @@ impl Compiler<'_> {
                 let ahead = [math::cos(rad), math::sin(rad), 0.0];
                 Ok(std::array::from_fn(|i| -ahead[i]))
             }
-            (Some(given), None) => {
-                let direction = self.point::<D>(given.get_ref(), "along", given.span())?;
-                unit(direction).ok_or_else(|| {
-                    let remedy = "give a direction that is not zero";
-                    self.error(Some(given.span()), "along has no length", remedy)
-                })
-            }
+            (Some(given), None) => unit(given.get_ref().get()).ok_or_else(|| {
+                let remedy = "give a direction that is not zero";
+                self.source.error(given.span(), "along has no length", remedy)
+            }),
             (Some(given), Some(_)) => {
                 let remedy =
                     "give along, the way from the first connector to the last, or heading_deg";
-                Err(self.error(Some(given.span()), "two directions", remedy))
+                Err(self.source.error(given.span(), "two directions", remedy))
             }
         }
     }
 
-    fn limit<const D: usize>(
+    fn limit(
         &self,
         connectors: &mut [Connector<D>],
-        limit: &Spanned<LimitSection>,
+        limit: &Spanned<LimitSection<D>>,
     ) -> Result<(), InputError> {
         let s = limit.get_ref();
         let n = connectors.len();
         let Some(connector) = connectors.get_mut(s.connector) else {
             let cause = format!("connector = {} of a chain of {n}", s.connector);
-            return Err(self.error(Some(limit.span()), cause, "count from 0"));
+            return Err(self.source.error(limit.span(), cause, "count from 0"));
         };
         connector.failed = s.failed.unwrap_or(connector.failed);
         if let Some(given) = &s.mobility {
-            connector.mobility = self.mobility(given)?;
+            connector.mobility = given.mobility();
         }
         if let Some(deg) = s.max_bend_deg {
             connector.max_bend_rad = deg.to_radians();
@@ -481,22 +494,5 @@ impl Compiler<'_> {
             connector.radius_m = radius_m;
         }
         Ok(())
-    }
-
-    /// Where a connector may be.
-    pub(super) fn mobility<const D: usize>(
-        &self,
-        given: &Spanned<MobilitySection>,
-    ) -> Result<Mobility<D>, InputError> {
-        let point = |p: &[f64]| self.point::<D>(p, "mobility", given.span());
-        Ok(match given.get_ref() {
-            MobilitySection::Free => Mobility::Free,
-            MobilitySection::Fixed => Mobility::Fixed,
-            MobilitySection::OnSegment([a, b]) => Mobility::OnSegment([point(a)?, point(b)?]),
-            MobilitySection::OnPlane { normal, offset_m } => {
-                Mobility::OnPlane { normal: point(normal)?, offset_m: *offset_m }
-            }
-            MobilitySection::InBox([lo, hi]) => Mobility::InBox { lo: point(lo)?, hi: point(hi)? },
-        })
     }
 }

@@ -6,15 +6,16 @@ use super::super::ground::fields::{Crowd, Field};
 use super::super::ground::{Corridor, Course, Leg, Mover, Movers, Site};
 use super::super::obstacle::{Obstacle, Obstacles, outline};
 use super::super::world::ChainSpec;
-use super::{Compiler, MOST};
+use super::{Compiler, MOST, Measure, Place};
 use serde::Deserialize;
 use sidestep_import::{rosmap, stage};
 use sidestep_kernel::{InputError, Seed, math};
 use sidestep_map::UnknownPolicy;
-use std::ops::Range;
+use sidestep_scenario::Limits;
+use std::ops::{Range, RangeInclusive};
 use toml::Spanned;
 
-/// How far generated obstacles stay away from chains at the start, unless it is said.
+/// Distance of generated obstacles from chains at the start, unless it is given.
 const KEEP_M: f64 = 0.1;
 
 #[derive(Debug, Deserialize)]
@@ -22,14 +23,14 @@ const KEEP_M: f64 = 0.1;
 pub(super) struct GroundSection {
     corridor: Option<Spanned<CorridorSection>>,
     /// A map of ROS (`.yaml`).
-    map: Option<Spanned<String>>,
+    map: Option<String>,
     #[serde(default)]
     unknown: UnknownWord,
     /// A world of Stage (`.world`).
-    stage: Option<Spanned<String>>,
+    stage: Option<String>,
 }
 
-/// What unknown pixels of a map are.
+/// The meaning of a map's unknown pixels.
 #[derive(Debug, Clone, Copy, Default, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 enum UnknownWord {
@@ -57,59 +58,42 @@ enum LegSection {
 /// (`at_m`, `size_m`) or the outline of a polygon (`corners_m`).
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct ObstacleSection {
-    at_m: Option<Vec<f64>>,
-    ends_m: Option<[Vec<f64>; 2]>,
-    size_m: Option<Vec<f64>>,
-    corners_m: Option<Vec<Vec<f64>>>,
+pub(super) struct ObstacleSection<const D: usize> {
+    at_m: Option<Place<D>>,
+    ends_m: Option<[Place<D>; 2]>,
+    size_m: Option<Place<D>>,
+    corners_m: Option<Vec<Place<D>>>,
     #[serde(default)]
     radius_m: f64,
     turn_deg: Option<f64>,
-    velocity_m_s: Option<Vec<f64>>,
-    bounces_m: Option<[Vec<f64>; 2]>,
-    patrol_m: Option<Vec<Vec<f64>>>,
+    velocity_m_s: Option<Place<D>>,
+    bounces_m: Option<[Place<D>; 2]>,
+    patrol_m: Option<Vec<Place<D>>>,
     closed: Option<bool>,
-    speed_m_s: Option<f64>,
+    speed_m_s: Option<Measure>,
 }
 
 /// Obstacles at random.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct FieldSection {
-    lo_m: Vec<f64>,
-    hi_m: Vec<f64>,
+pub(super) struct FieldSection<const D: usize> {
+    lo_m: Place<D>,
+    hi_m: Place<D>,
     part: Option<f64>,
     n: Option<u32>,
-    radius_m: Spanned<Range1>,
+    radius_m: Limits,
     length_m: Option<f64>,
-    speed_m_s: Option<Range1>,
+    speed_m_s: Option<Limits>,
     keep_m: Option<f64>,
 }
 
-/// A number, or the least and the greatest.
-#[derive(Debug, Clone, Copy, Deserialize)]
-#[serde(untagged)]
-enum Range1 {
-    One(f64),
-    Two([f64; 2]),
-}
-
-impl Range1 {
-    fn range(self) -> std::ops::RangeInclusive<f64> {
-        match self {
-            Self::One(x) => x..=x,
-            Self::Two([lo, hi]) => lo..=hi,
-        }
-    }
-}
-
-/// What is in the way of a world's chains.
+/// Everything in the way of a world's chains.
 pub(super) struct Ground<const D: usize> {
     pub(super) obstacles: Obstacles<D>,
     pub(super) movers: Movers<D>,
 }
 
-/// What is gathered of it.
+/// The part of it that is gathered so far.
 struct Gathered<const D: usize> {
     still: Vec<Obstacle<D>>,
     movers: Vec<Mover<D>>,
@@ -125,9 +109,9 @@ impl<const D: usize> Gathered<D> {
     }
 }
 
-impl Compiler<'_> {
+impl<const D: usize> Compiler<'_, D> {
     /// All obstacles.
-    pub(super) fn ground<const D: usize>(
+    pub(super) fn ground(
         &self,
         site: Option<&Site>,
         chains: &[ChainSpec<D>],
@@ -169,11 +153,11 @@ impl Compiler<'_> {
             .count();
         if given != 1 {
             let remedy = "give one of corridor, map and stage";
-            return Err(self.error(Some(at), format!("{given} grounds"), remedy));
+            return Err(self.source.error(at, format!("{given} grounds"), remedy));
         }
-        if self.file.chain.dimensions.as_ref().is_some_and(|n| *n.get_ref() != 2) {
+        if D != 2 {
             let remedy = "set chain.dimensions = 2, or leave [ground] out";
-            return Err(self.error(Some(at), "a ground lies in the plane", remedy));
+            return Err(self.source.error(at, "a ground lies in the plane", remedy));
         }
         let unknown = match s.unknown {
             UnknownWord::Solid => UnknownPolicy::Wall,
@@ -181,18 +165,18 @@ impl Compiler<'_> {
         };
         Ok(match (&s.map, &s.stage) {
             (Some(map), _) => {
-                let map = rosmap::load(&self.source.path(map.get_ref().as_ref()))?;
+                let map = rosmap::load(&self.source.path(map.as_ref()))?;
                 Some(Site::of_map(&map, unknown))
             }
             (_, Some(world)) => {
-                let world = stage::load(&self.source.path(world.get_ref().as_ref()))?;
+                let world = stage::load(&self.source.path(world.as_ref()))?;
                 Some(Site::of_stage(&world))
             }
             _ => None,
         })
     }
 
-    fn add_corridor<const D: usize>(&self, all: &mut Gathered<D>) -> Result<(), InputError> {
+    fn add_corridor(&self, all: &mut Gathered<D>) -> Result<(), InputError> {
         let section =
             self.file.ground.as_ref().and_then(|ground| ground.get_ref().corridor.as_ref());
         let Some(given) = section else { return Ok(()) };
@@ -222,12 +206,12 @@ impl Compiler<'_> {
                 Corridor::new(legs.iter().map(leg).collect(), s.width_m)
             }
         };
-        corridor.map_err(|error| self.at(given.span(), &error))
+        corridor.map_err(|error| self.source.error_of(given.span(), &error))
     }
 
-    fn add_obstacle<const D: usize>(
+    fn add_obstacle(
         &self,
-        section: &Spanned<ObstacleSection>,
+        section: &Spanned<ObstacleSection<D>>,
         all: &mut Gathered<D>,
     ) -> Result<(), InputError> {
         let (s, at) = (section.get_ref(), section.span());
@@ -237,12 +221,13 @@ impl Compiler<'_> {
             return self.add_outline(s, corners, at, all);
         }
         let body = Obstacle::still(id, self.core(s, at.clone())?, s.radius_m);
-        body.check().map_err(|error| self.at(at.clone(), &error))?;
+        body.check().map_err(|error| self.source.error_of(at.clone(), &error))?;
         all.next_id += 1;
         match self.course(s, at.clone())? {
             None => all.still.push(body),
             Some(course) => {
-                let mover = Mover::new(body, course).map_err(|error| self.at(at, &error))?;
+                let mover =
+                    Mover::new(body, course).map_err(|error| self.source.error_of(at, &error))?;
                 all.movers.push(mover);
             }
         }
@@ -250,7 +235,7 @@ impl Compiler<'_> {
     }
 
     /// Refuses keys that do nothing for a shape or a way to move.
-    fn shapes_one_thing(&self, s: &ObstacleSection, at: Range<usize>) -> Result<(), InputError> {
+    fn shapes_one_thing(&self, s: &ObstacleSection<D>, at: Range<usize>) -> Result<(), InputError> {
         let is_box = s.size_m.is_some() && s.corners_m.is_none();
         let keys = [
             ("size_m", s.size_m.is_some(), is_box),
@@ -259,143 +244,123 @@ impl Compiler<'_> {
             ("closed", s.closed.is_some(), s.patrol_m.is_some()),
             ("speed_m_s", s.speed_m_s.is_some(), s.patrol_m.is_some()),
         ];
-        match keys.iter().find(|(_, is_given, does_something)| *is_given && !does_something) {
-            None => Ok(()),
-            Some((key, ..)) => {
-                let cause = format!("`{key}` does nothing for this obstacle");
-                Err(self.error(Some(at), cause, "leave it out, or give what it belongs to"))
-            }
-        }
+        self.has_no_idle_key(&keys, "for this obstacle", at)
     }
 
-    fn add_outline<const D: usize>(
+    fn add_outline(
         &self,
-        s: &ObstacleSection,
-        corners: &[Vec<f64>],
+        s: &ObstacleSection<D>,
+        corners: &[Place<D>],
         at: Range<usize>,
         all: &mut Gathered<D>,
     ) -> Result<(), InputError> {
         let moves = s.velocity_m_s.is_some() || s.patrol_m.is_some();
         if D != 2 || corners.len() < 3 || moves || s.at_m.is_some() || s.ends_m.is_some() {
             let remedy = "give three corners or more, in two dimensions, and nothing that moves";
-            return Err(self.error(Some(at), "this is no polygon", remedy));
+            return Err(self.source.error(at, "this is no polygon", remedy));
         }
-        let corners = corners
-            .iter()
-            .map(|corner| self.point::<2>(corner, "corners_m", at.clone()))
-            .collect::<Result<Vec<_>, _>>()?;
+        let corners: Vec<Point<2>> = corners.iter().map(|corner| fitted(corner.get())).collect();
         let walls = outline(all.next_id, &corners, s.radius_m);
         all.add_still(walls.iter().map(lifted));
         Ok(())
     }
 
-    fn core<const D: usize>(
-        &self,
-        s: &ObstacleSection,
-        at: Range<usize>,
-    ) -> Result<Core<D>, InputError> {
-        let point = |p: &[f64], key: &str| self.point::<D>(p, key, at.clone());
-        match (&s.at_m, &s.ends_m, &s.size_m) {
-            (Some(center), None, None) => Ok(Core::Point(point(center, "at_m")?)),
-            (None, Some([a, b]), None) => {
-                Ok(Core::Segment([point(a, "ends_m")?, point(b, "ends_m")?]))
-            }
+    fn core(&self, s: &ObstacleSection<D>, at: Range<usize>) -> Result<Core<D>, InputError> {
+        match (s.at_m, s.ends_m, s.size_m) {
+            (Some(center), None, None) => Ok(Core::Point(center.get())),
+            (None, Some(ends), None) => Ok(Core::Segment(ends.map(Place::get))),
             (Some(center), None, Some(size)) => {
-                let size: Point<D> = point(size, "size_m")?;
-                let half_m = size.map(|x| 0.5 * x.abs());
-                let (center, axes) = (point(center, "at_m")?, turned(s.turn_deg.unwrap_or(0.0)));
-                Ok(Core::Cuboid(Cuboid { center, axes, half_m }))
+                let half_m = size.get().map(|x| 0.5 * x.abs());
+                let axes = turned(s.turn_deg.unwrap_or(0.0));
+                Ok(Core::Cuboid(Cuboid { center: center.get(), axes, half_m }))
             }
             _ => {
                 let remedy = "give at_m and radius_m (a ball), ends_m (a capsule or a wall), \
                               at_m and size_m (a box), or corners_m (a polygon)";
-                Err(self.error(Some(at), "an obstacle without a shape, or with two", remedy))
+                Err(self.source.error(at, "an obstacle without a shape, or with two", remedy))
             }
         }
     }
 
-    /// How an obstacle moves; `None` where it stands still.
-    fn course<const D: usize>(
+    /// Course of an obstacle; `None` where it stands still.
+    fn course(
         &self,
-        s: &ObstacleSection,
+        s: &ObstacleSection<D>,
         at: Range<usize>,
     ) -> Result<Option<Course<D>>, InputError> {
-        let point = |p: &[f64], key: &str| self.point::<D>(p, key, at.clone());
-        match (&s.velocity_m_s, &s.bounces_m, &s.patrol_m) {
-            (None, None, None) => Ok(None),
-            (Some(v), None, None) => {
-                Ok(Some(Course::Straight { velocity_m_s: point(v, "velocity_m_s")? }))
+        let course = match (s.velocity_m_s.map(Place::get), s.bounces_m, &s.patrol_m) {
+            (None, None, None) => return Ok(None),
+            (Some(velocity_m_s), None, None) => Course::Straight { velocity_m_s },
+            (Some(velocity_m_s), Some(corners), None) => {
+                let [lo, hi] = corners.map(Place::get);
+                Course::Bouncing { velocity_m_s, room: Bounds { lo, hi } }
             }
-            (Some(v), Some([lo, hi]), None) => {
-                let room = Bounds { lo: point(lo, "bounces_m")?, hi: point(hi, "bounces_m")? };
-                Ok(Some(Course::Bouncing { velocity_m_s: point(v, "velocity_m_s")?, room }))
-            }
-            (None, None, Some(_)) if s.speed_m_s.is_some_and(|speed_m_s| speed_m_s > MOST) => {
-                let cause = format!("speed_m_s = {:?}", s.speed_m_s.unwrap_or_default());
-                Err(self.error(Some(at), cause, "give at most 1e6 m/s"))
-            }
-            (None, None, Some(way_points)) => Ok(Some(Course::Patrol {
-                way_points: way_points
-                    .iter()
-                    .map(|p| point(p, "patrol_m"))
-                    .collect::<Result<_, _>>()?,
+            (None, None, Some(way_points)) => Course::Patrol {
+                way_points: way_points.iter().map(|place| place.get()).collect(),
                 closed: s.closed.unwrap_or(false),
-                speed_m_s: s.speed_m_s.unwrap_or(0.5),
-            })),
+                speed_m_s: s.speed_m_s.map_or(0.5, f64::from),
+            },
             _ => {
                 let remedy = "give velocity_m_s, or it and bounces_m, or patrol_m and speed_m_s";
-                Err(self.error(Some(at), "an obstacle that moves in two ways", remedy))
+                return Err(self.source.error(at, "an obstacle that moves in two ways", remedy));
             }
-        }
+        };
+        Ok(Some(course))
     }
 
-    fn add_field<const D: usize>(
+    fn add_field(
         &self,
-        section: &Spanned<FieldSection>,
+        section: &Spanned<FieldSection<D>>,
         number: u64,
         chains: &[ChainSpec<D>],
         all: &mut Gathered<D>,
     ) -> Result<(), InputError> {
-        let (s, at) = (section.get_ref(), section.span());
-        let corner = |p: &[f64], key| self.point::<D>(p, key, at.clone());
-        let room = Bounds { lo: corner(&s.lo_m, "lo_m")?, hi: corner(&s.hi_m, "hi_m")? };
+        let s = section.get_ref();
+        let told = |error: InputError| self.source.error_of(section.span(), &error);
+        let room = Bounds { lo: s.lo_m.get(), hi: s.hi_m.get() };
         let keep_clear = chains.iter().flat_map(|spec| parts(&spec.start)).collect();
         let widest = chains.iter().flat_map(|spec| spec.start.connectors());
         let widest_m = widest.map(|c| c.radius_m).fold(0.0, f64::max);
         let keep_m = widest_m + s.keep_m.unwrap_or(KEEP_M);
         // Every field has places of its own.
-        let seed = Seed(self.file.seed.wrapping_add(number << 32));
-        let radius_m = s.radius_m.get_ref().range();
-        match (s.part, s.n) {
-            (Some(part), None) if s.speed_m_s.is_none() && radius_m.start() == radius_m.end() => {
-                let (radius_m, length_m) = (*radius_m.start(), s.length_m.unwrap_or(0.0));
-                let field = Field { room, part, radius_m, length_m, keep_clear, keep_m };
-                let filled = field.fill(seed, all.next_id);
-                all.add_still(filled.map_err(|error| self.at(at, &error))?);
+        let seed = Seed(self.head.seed.wrapping_add(number << 32));
+        let Limits { least, greatest } = s.radius_m;
+        match (s.part, s.n, s.speed_m_s) {
+            (Some(part), None, None) if least == greatest => {
+                let length_m = s.length_m.unwrap_or(0.0);
+                let field = Field { room, part, radius_m: least, length_m, keep_clear, keep_m };
+                all.add_still(field.fill(seed, all.next_id).map_err(told)?);
             }
-            (None, Some(n)) if s.length_m.is_none() && s.speed_m_s.is_some() => {
-                let speed_m_s = s.speed_m_s.map_or(0.0..=0.0, Range1::range);
-                let ends = [&radius_m, &speed_m_s].map(|range| [*range.start(), *range.end()]);
-                if let Some(x) = ends.iter().flatten().find(|x| !(0.0..=MOST).contains(*x)) {
-                    let cause = format!("a radius_m or a speed_m_s of {x}");
-                    return Err(self.error(Some(at), cause, "give numbers from 0 to 1e6"));
-                }
+            (None, Some(n), Some(speed_m_s)) if s.length_m.is_none() => {
+                let [radius_m, speed_m_s] = self.sizes([s.radius_m, speed_m_s], section.span())?;
                 let crowd = Crowd { room, n, radius_m, speed_m_s, keep_clear, keep_m };
-                let gathered = crowd.gather(seed, all.next_id);
-                all.movers.extend(gathered.map_err(|error| self.at(at, &error))?);
+                all.movers.extend(crowd.gather(seed, all.next_id).map_err(told)?);
                 all.next_id += n;
             }
             _ => {
                 let remedy = "give part, one radius_m and maybe length_m for obstacles that stand \
                               still, or n and speed_m_s for balls that move";
-                return Err(self.error(
-                    Some(at),
-                    "a field that is neither still nor moving",
-                    remedy,
-                ));
+                let cause = "a field that is neither still nor moving";
+                return Err(self.source.error(section.span(), cause, remedy));
             }
         }
         Ok(())
+    }
+
+    /// Radii and speeds of a crowd.
+    fn sizes(
+        &self,
+        limits: [Limits; 2],
+        at: Range<usize>,
+    ) -> Result<[RangeInclusive<f64>; 2], InputError> {
+        let mut ends = limits.iter().flat_map(|limits| [limits.least, limits.greatest]);
+        match ends.find(|x| !(0.0..=MOST).contains(x)) {
+            None => Ok(limits.map(|limits| limits.least..=limits.greatest)),
+            Some(x) => {
+                let cause = format!("a radius_m or a speed_m_s of {x}");
+                Err(self.source.error(at, cause, "give numbers from 0 to 1e6"))
+            }
+        }
     }
 }
 
@@ -406,15 +371,19 @@ fn parts<const D: usize>(chain: &Chain<D>) -> impl Iterator<Item = Core<D>> + '_
     points.windows(2).map(|ends| Core::Segment([ends[0], ends[1]])).chain(one)
 }
 
+/// A point in as many dimensions as asked for.
+pub(super) fn fitted<const FROM: usize, const TO: usize>(p: Point<FROM>) -> Point<TO> {
+    std::array::from_fn(|i| p.get(i).copied().unwrap_or(0.0))
+}
+
 /// A plane wall in as many dimensions as asked for.
 fn lifted<const D: usize>(wall: &Obstacle<2>) -> Obstacle<D> {
-    let point = |p: Point<2>| std::array::from_fn(|i| p.get(i).copied().unwrap_or(0.0));
     let core = match wall.core {
-        Core::Point(c) => Core::Point(point(c)),
-        Core::Segment([a, b]) => Core::Segment([point(a), point(b)]),
+        Core::Point(c) => Core::Point(fitted(c)),
+        Core::Segment(ends) => Core::Segment(ends.map(fitted)),
         Core::Cuboid(Cuboid { center, axes, half_m }) => {
-            let axes = std::array::from_fn(|i| axes.get(i).map_or([0.0; D], |axis| point(*axis)));
-            Core::Cuboid(Cuboid { center: point(center), axes, half_m: point(half_m) })
+            let axes = std::array::from_fn(|i| axes.get(i).map_or([0.0; D], |axis| fitted(*axis)));
+            Core::Cuboid(Cuboid { center: fitted(center), axes, half_m: fitted(half_m) })
         }
     };
     Obstacle::still(wall.id, core, wall.radius_m)

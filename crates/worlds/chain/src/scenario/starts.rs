@@ -19,10 +19,10 @@ struct Inside {
     depth_m: f64,
 }
 
-impl Compiler<'_> {
+impl<const D: usize> Compiler<'_, D> {
     /// Refuses chains that begin in obstacles, or in each other: no motion leads out of there
     /// without passing through something.
-    pub(super) fn starts<const D: usize>(
+    pub(super) fn starts(
         &self,
         chains: &[ChainSpec<D>],
         ground: &Ground<D>,
@@ -62,10 +62,10 @@ impl Compiler<'_> {
              the rod behind it"
         );
         let remedy = "move one of them, or set chain.may_start_inside = true";
-        self.error(self.section_of(slot), cause, remedy)
+        self.source.error(self.section_of(slot), cause, remedy)
     }
 
-    /// Where the section stands that a chain comes from.
+    /// Place of the section that a chain comes from.
     fn section_of(&self, slot: usize) -> Option<Range<usize>> {
         let sections = self.file.chains.0.iter();
         let mut spans = sections.flat_map(|s| std::iter::repeat_n(s.span(), s.get_ref().count));
@@ -73,7 +73,7 @@ impl Compiler<'_> {
     }
 }
 
-/// Where a chain is deepest in anything that is not called `own`.
+/// The deepest part of a chain in anything that is not called `own`.
 fn deepest<const D: usize>(
     chain: &Chain<D>,
     obstacles: &Obstacles<D>,

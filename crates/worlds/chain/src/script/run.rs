@@ -1,11 +1,12 @@
 //! A script, carried out statement by statement.
 
 use super::{Action, Expression, MAX_DEPTH, MAX_STATEMENTS, Script, Statement, Term};
+use serde::{Deserialize, Serialize};
 use sidestep_kernel::InputError;
 use sidestep_kernel::math::{cos, sin};
 
 /// Where an initiator is, and which way it looks.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Turtle {
     /// In m.
     pub position_m: [f64; 3],

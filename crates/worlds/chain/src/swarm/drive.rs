@@ -1,6 +1,6 @@
 //! Two driven wheels on one axle.
 
-use crate::geometry::Point;
+use crate::rods::geometry::Point;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::InputError;
 use sidestep_kernel::math::{cos, sin, wrap_angle};
@@ -136,7 +136,7 @@ fn sine_ratio(x: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::distance;
+    use crate::rods::geometry::distance;
     use proptest::prelude::*;
 
     fn drive() -> Drive {

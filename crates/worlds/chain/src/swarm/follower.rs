@@ -8,8 +8,8 @@
 use super::drive::{Drive, Pose, Wheels};
 use super::laser::Body;
 use super::proximity::{Gaps, Ring, SECTOR_RAD, safe_speed_m_s};
-use crate::geometry::{Point, along, dot, norm, sub};
-use crate::obstacle::Obstacles;
+use crate::rods::geometry::{Point, along, dot, norm, sub};
+use crate::rods::obstacle::Obstacles;
 use sidestep_kernel::InputError;
 use sidestep_kernel::math::{atan2, cos, sin, wrap_angle};
 use std::f64::consts::PI;
@@ -159,8 +159,8 @@ impl Follower {
 mod tests {
     use super::super::ray::tests::any_core;
     use super::*;
-    use crate::geometry::distance;
-    use crate::obstacle::{Obstacle, Obstacles};
+    use crate::rods::geometry::distance;
+    use crate::rods::obstacle::{Obstacle, Obstacles};
     use proptest::prelude::*;
 
     const DT_S: f64 = 0.02;

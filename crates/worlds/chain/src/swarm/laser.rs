@@ -2,8 +2,8 @@
 
 use super::drive::Pose;
 use super::ray;
-use crate::geometry::{Bounds, Core, Point};
-use crate::obstacle::{Obstacles, around};
+use crate::rods::geometry::{Bounds, Core, Point};
+use crate::rods::obstacle::{Obstacles, around};
 use sidestep_kernel::InputError;
 use sidestep_kernel::distr::normal;
 use sidestep_kernel::math::{cos, sin, wrap_angle};
@@ -234,8 +234,8 @@ fn last_beam(angle_rad: f64, step_rad: f64) -> usize {
 mod tests {
     use super::super::ray::tests::{any_core, marched_m};
     use super::*;
-    use crate::geometry::along;
-    use crate::obstacle::Obstacle;
+    use crate::rods::geometry::along;
+    use crate::rods::obstacle::Obstacle;
     use proptest::prelude::*;
     use sidestep_kernel::Seed;
     use sidestep_kernel::stream::Streams;

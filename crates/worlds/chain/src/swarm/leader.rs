@@ -15,8 +15,8 @@
 use super::drive::{Pose, Wheels, steer};
 use super::laser::{Body, Laser, Scan};
 use super::ray;
-use crate::geometry::{Point, distance};
-use crate::obstacle::Obstacles;
+use crate::rods::geometry::{Point, distance};
+use crate::rods::obstacle::Obstacles;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::InputError;
 use sidestep_kernel::stream::Draws;
@@ -412,7 +412,7 @@ mod tests {
 
     #[test]
     fn a_target_behind_a_wall_is_seen_by_who_may_see_through_it() {
-        use crate::obstacle::Obstacle;
+        use crate::rods::obstacle::Obstacle;
         use sidestep_kernel::{Seed, stream::Streams};
         let wall = Obstacle::capsule(0, [[2.0, -1.0], [2.0, 1.0]], 0.0);
         let obstacles = Obstacles::new(vec![wall], 1.0).unwrap();

@@ -1,8 +1,8 @@
 //! What a convoy's run comes to, in numbers.
 
 use super::convoy::{Convoy, Tick};
-use crate::Obstacles;
-use crate::geometry::{Point, distance};
+use crate::rods::Obstacles;
+use crate::rods::geometry::{Point, distance};
 
 /// What came of a run, so far.
 #[derive(Debug, Clone, Copy, PartialEq)]

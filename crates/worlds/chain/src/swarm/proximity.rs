@@ -4,8 +4,8 @@
 use super::drive::Pose;
 use super::laser::Body;
 use super::ray;
-use crate::geometry::{Core, sub};
-use crate::obstacle::{Obstacles, around};
+use crate::rods::geometry::{Core, sub};
+use crate::rods::obstacle::{Obstacles, around};
 use sidestep_kernel::math::{atan2, cos, sin, wrap_angle};
 use std::f64::consts::TAU;
 
@@ -98,7 +98,7 @@ pub fn safe_speed_m_s(gaps: &Gaps, bearing_rad: f64, slack_rad: f64, horizon_s: 
 mod tests {
     use super::super::ray::tests::any_core;
     use super::*;
-    use crate::obstacle::Obstacle;
+    use crate::rods::obstacle::Obstacle;
     use proptest::prelude::*;
 
     const RING: Ring = Ring { radius_m: 0.25, range_m: 0.15 };

@@ -1,9 +1,9 @@
 //! How far a ray goes before it meets something, in the plane, exactly.
 
-use crate::geometry::{
+use crate::rods::geometry::{
     Bounds, Core, Point, add, cross_2d, distance, dot, perpendicular, scaled, sub, unit,
 };
-use crate::obstacle::Obstacles;
+use crate::rods::obstacle::Obstacles;
 
 /// The distance at which a ray from `from` along the unit vector `u` enters everything within
 /// `radius_m` of a core; 0 from inside, `None` where it never does.
@@ -92,7 +92,7 @@ pub(super) fn extent_rad(from: Point<2>, ends: [Point<2>; 2], radius_m: f64) -> 
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::geometry::{Cuboid, along};
+    use crate::rods::geometry::{Cuboid, along};
     use proptest::prelude::*;
     use sidestep_kernel::math::{cos, sin};
 
@@ -158,7 +158,7 @@ pub(super) mod tests {
             a in prop::array::uniform2(-3.0..3.0f64), b in prop::array::uniform2(-3.0..3.0f64),
             part in 0.01..0.99f64,
         ) {
-            let at = crate::geometry::between(a, b, part);
+            let at = crate::rods::geometry::between(a, b, part);
             let Some(u) = unit(sub(at, from)) else { return Ok(()) };
             prop_assume!(cross_2d(u, sub(b, a)).abs() > 1e-3);
             let hit_m = distance_m(from, u, &Core::Segment([a, b]), 0.0).unwrap();

@@ -5,9 +5,9 @@ use super::drive::{Drive, Pose};
 use super::laser::{LASER_NOISE, Laser};
 use super::leader::{Leaving, Turning};
 use super::measures::Measures;
-use crate::geometry::{Point, distance};
+use crate::rods::geometry::{Point, distance};
+use crate::rods::{Obstacle, Obstacles};
 use crate::scenes::{Numbers, corridor_line, corridor_walls};
-use crate::{Obstacle, Obstacles};
 use sidestep_kernel::Seed;
 use sidestep_kernel::stream::Streams;
 use std::f64::consts::PI;
@@ -239,7 +239,7 @@ fn the_same_seed_gives_the_same_bits_and_another_seed_others() {
 fn a_leader_that_is_blocked_stands_or_turns_on_the_spot() {
     // A box that leaves no room to swing round.
     let corners = [[-0.3, -0.3], [0.3, -0.3], [0.3, 0.3], [-0.3, 0.3]];
-    let walls = crate::obstacle::outline(0, &corners, 0.0);
+    let walls = crate::rods::obstacle::outline(0, &corners, 0.0);
     let course = Course {
         obstacles: Obstacles::new(walls, 1.0).unwrap(),
         target: None,

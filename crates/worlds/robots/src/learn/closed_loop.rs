@@ -8,7 +8,7 @@ use crate::learn::{Estimate, EstimateOptions, effector};
 use crate::robots_run;
 use sidestep_import::table::CsvTable;
 use sidestep_kernel::Simulation;
-use sidestep_kernel::ports::recorder::{ColumnSpec, MemoryRecorder, TableSchema, Values};
+use sidestep_kernel::ports::{ColumnSpec, MemoryRecorder, TableSchema};
 use sidestep_scenario::Source;
 use sidestep_statistics::chi_square_p;
 
@@ -78,14 +78,8 @@ fn as_csv(recorder: &MemoryRecorder, schema: &TableSchema) -> String {
     let names: Vec<&str> = schema.columns.iter().map(|column| column.name.as_str()).collect();
     let mut csv = names.join(",") + "\n";
     for row in 0..recorder.rows(&schema.name) {
-        let field = |column: &ColumnSpec| match recorder.column(&schema.name, &column.name) {
-            Some(Values::U32(values)) => values[row].to_string(),
-            Some(Values::U64(values)) => values[row].to_string(),
-            Some(Values::I32(values)) => values[row].to_string(),
-            Some(Values::F64(values)) => values[row].to_string(),
-            Some(Values::Label(values)) => column.labels[values[row] as usize].clone(),
-            None => String::new(),
-        };
+        let values = |column: &ColumnSpec| recorder.column(&schema.name, &column.name).unwrap();
+        let field = |column: &ColumnSpec| column.text(values(column), row);
         let fields: Vec<String> = schema.columns.iter().map(field).collect();
         csv += &(fields.join(",") + "\n");
     }

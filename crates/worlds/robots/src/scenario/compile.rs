@@ -14,8 +14,8 @@ use super::{
     RecordSection, RobotSection, RobotsFile, SensorSection,
 };
 use crate::decide::{Behaviour, External, Goto, Replay, Sector, Shuttle, Wander};
-use crate::effector::{Action, EffectorModel, MAX_PATH, Side, Transition, own_boxes};
-use crate::resolve::ConflictPolicy;
+use crate::effector::{Action, EffectorModel, MAX_PATH, Transition, own_boxes};
+use crate::policy::ConflictPolicy;
 use crate::sensor::SensorModel;
 use crate::world::{
     BEAM_STEP, Body, BodyType, Door, MountedSensor, Mover, Radio, RobotBody, RobotModel,
@@ -26,7 +26,7 @@ use sidestep_kernel::stream::{Purpose, Streams};
 use sidestep_kernel::{EntityId, InputError, Seed};
 use sidestep_map::planning::{FlowField, FreeSpace};
 use sidestep_map::{Cell, GridMap, Rect};
-use sidestep_scenario::{OneOrMany, Source, nearest};
+use sidestep_scenario::{Head, Source, nearest};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
@@ -34,8 +34,8 @@ use toml::Spanned;
 
 /// Most bodies of a scenario.
 const MAX_BODIES: u64 = 10_000_000;
-/// Largest body, in boxes.
-const MAX_SIZE: u32 = 64;
+/// Cycles of a run whose scenario does not say it.
+const CYCLES: u64 = 10_000;
 const MAX_RANGE_BOXES: f64 = 4096.0;
 
 /// Behaviours of the library's user, by the name a scenario gives them.
@@ -53,7 +53,7 @@ pub enum StorageOrder {
     Shuffled(u64),
 }
 
-/// What a scenario compiles to.
+/// A compiled scenario.
 #[derive(Debug, Clone)]
 pub struct Compiled {
     /// The immutable world.
@@ -66,7 +66,7 @@ pub struct Compiled {
     pub seed: u64,
     /// Cycles that the scenario asks for.
     pub cycles: u64,
-    /// What to keep.
+    /// The tables to keep.
     pub record: RecordSection,
 }
 
@@ -83,6 +83,7 @@ impl Compiled {
 struct Compiler<'a> {
     source: Arc<Source>,
     own: &'a Behaviours,
+    head: Head,
     file: RobotsFile,
     map: Arc<GridMap>,
     office_doors: Vec<Rect>,
@@ -105,7 +106,7 @@ struct Compiler<'a> {
 impl<'a> Compiler<'a> {
     fn new(source: &Source, own: &'a Behaviours) -> Result<Self, InputError> {
         let source = Arc::new(source.clone());
-        let file: RobotsFile = source.parse()?;
+        let (head, file) = source.parse_world::<RobotsFile>()?;
         let (map, office_doors) = load_map(&source, &file.map)?;
         let (mut sensors, mut effectors) = (BTreeMap::new(), BTreeMap::new());
         let presets = Source::new("presets", include_str!("../presets.toml"), "");
@@ -118,7 +119,7 @@ impl<'a> Compiler<'a> {
         add_all(&source, &file.sensors, &mut sensors);
         add_all(&source, &file.effectors, &mut effectors);
         let kinds = kinds(&source, &file)?;
-        let streams = Streams::new(Seed(file.seed));
+        let streams = Streams::new(Seed(head.seed));
         let floor = Floor::new(&map);
         let border = border(&file, &effectors);
         Ok(Self {
@@ -137,6 +138,7 @@ impl<'a> Compiler<'a> {
             reach: 0,
             map,
             office_doors,
+            head,
             file,
         })
     }
@@ -146,14 +148,11 @@ impl<'a> Compiler<'a> {
         // Doors and bodies with a given place first, so that draws find what is left; ids
         // go robots, people, doors whatever is placed first.
         let mut first_id = 0;
-        let firsts: Vec<EntityId> = groups
-            .iter()
-            .map(|g| {
-                let id = first_id;
-                first_id += g.count as EntityId;
-                id
-            })
-            .collect();
+        let mut firsts: Vec<EntityId> = Vec::new();
+        for group in &groups {
+            firsts.push(first_id);
+            first_id += group.count as EntityId;
+        }
         let n = first_id as usize;
         self.bodies = vec![Body { id: 0, ty: 0, period: 1, phase: 0 }; n];
         self.start = vec![((0, 0), 0); n];
@@ -173,7 +172,7 @@ impl<'a> Compiler<'a> {
         let robots = self.bodies.iter().filter(is_robot).map(|b| b.id).collect();
         let stride = self.stride();
         let rows = self.map.height() + 2 * self.border;
-        let radio = self.radio()?;
+        let radio = self.radio();
         let kind_rank = self.kind_rank()?;
         let world = RobotsWorld {
             walls: padded(&self.map, self.border, stride, rows),
@@ -196,9 +195,9 @@ impl<'a> Compiler<'a> {
         Ok(Compiled {
             world: Arc::new(world),
             start: self.start.into(),
-            name: self.file.name,
-            seed: self.file.seed,
-            cycles: self.file.cycles,
+            name: self.head.name,
+            seed: self.head.seed,
+            cycles: self.head.cycles.unwrap_or(CYCLES),
             record: self.file.record,
         })
     }
@@ -207,27 +206,10 @@ impl<'a> Compiler<'a> {
         self.map.width() + 2 * self.border
     }
 
-    fn error(
-        &self,
-        span: Range<usize>,
-        cause: impl Into<String>,
-        remedy: impl Into<String>,
-    ) -> InputError {
-        self.source.error((span != (0..0)).then_some(span), cause, remedy)
-    }
-
-    fn radio(&self) -> Result<Option<Radio>, InputError> {
-        let Some(radio) = &self.file.radio else { return Ok(None) };
-        let r = radio.get_ref();
-        if !(r.range_m > 0.0 && r.range_m < 1e6 && (0.0..=1.0).contains(&r.loss)) {
-            let cause = format!("range {} m with loss {}", r.range_m, r.loss);
-            return Err(self.error(
-                radio.span(),
-                cause,
-                "give a range above 0 m and a loss between 0 and 1",
-            ));
-        }
-        Ok(Some(Radio::new(r.range_m, self.map.box_size_m, r.loss)))
+    fn radio(&self) -> Option<Radio> {
+        let radio = self.file.radio?;
+        let loss = radio.loss.map_or(0.0, f64::from);
+        Some(Radio::new(radio.range_m.get(), self.map.box_size_m, loss))
     }
 
     /// Rank of each kind in `kind_order`; kinds that are not named come last.
@@ -238,35 +220,33 @@ impl<'a> Compiler<'a> {
         }
         if self.file.conflict_policy == ConflictPolicy::ByKind && self.file.kind_order.is_empty() {
             let remedy = "add kind_order = [\"person\", \"robot\"], first the kind that goes first";
-            return Err(self.error(0..0, "conflict_policy \"by_kind\" needs kind_order", remedy));
+            return Err(self.source.error(
+                0..0,
+                "conflict_policy \"by_kind\" needs kind_order",
+                remedy,
+            ));
         }
         Ok(rank)
     }
 
     fn kind(&self, name: &Spanned<String>) -> Result<u8, InputError> {
-        let known = || self.kinds.iter().skip(1).map(String::as_str).collect::<Vec<_>>();
-        self.kinds.iter().skip(1).position(|k| k == name.get_ref()).map(|k| k as u8 + 1).ok_or_else(
-            || {
-                let cause = format!("unknown kind `{}`", name.get_ref());
-                self.error(
-                    name.span(),
-                    cause,
-                    format!(
-                        "{}; new kinds are made by [kinds.NAME]",
-                        nearest(name.get_ref(), &known())
-                    ),
-                )
-            },
-        )
+        let own = self.kinds.iter().skip(1);
+        if let Some(k) = own.clone().position(|kind| kind == name.get_ref()) {
+            return Ok(k as u8 + 1);
+        }
+        let known: Vec<&str> = own.map(String::as_str).collect();
+        let cause = format!("unknown kind `{}`", name.get_ref());
+        let remedy = nearest(name.get_ref(), &known) + "; new kinds are made by [kinds.NAME]";
+        Err(self.source.error(name.span(), cause, remedy))
     }
 }
 
 /// As many rings of wall as the longest path has steps, and as a beam may be read past a wall.
 fn border(file: &RobotsFile, effectors: &BTreeMap<String, Located<EffectorSection>>) -> u32 {
-    let named = file.robots.get_ref().0.iter().filter_map(|robots| robots.effector.as_ref());
+    let named = file.robots.0.iter().filter_map(|robots| robots.get_ref().effector.as_ref());
     let known = named.filter_map(|name| effectors.get(name.get_ref()));
     let transitions = known.flat_map(|e| e.section.get_ref().actions.values());
-    let steps = transitions.flat_map(|list| list.get_ref()).map(|t| t.path.chars().count());
+    let steps = transitions.flat_map(|list| list.get_ref()).map(|t| t.path.0.len());
     steps.max().unwrap_or(1).clamp(BEAM_STEP, MAX_PATH) as u32
 }
 
@@ -289,22 +269,16 @@ fn kinds(source: &Source, file: &RobotsFile) -> Result<Vec<String>, InputError> 
         ["free", "wall", "door", "person", "robot"].map(String::from).to_vec();
     for name in file.kinds.keys() {
         if name.get_ref() == "free" {
-            return Err(source.error(
-                Some(name.span()),
-                "`free` is no kind",
-                "name the kind otherwise",
-            ));
+            let remedy = "name the kind otherwise";
+            return Err(source.error(name.span(), "`free` is no kind", remedy));
         }
         if !kinds.contains(name.get_ref()) {
             kinds.push(name.get_ref().clone());
         }
     }
     if kinds.len() > 127 {
-        return Err(source.error(
-            None,
-            "more than 122 kinds of your own",
-            "let kinds share a name",
-        ));
+        let remedy = "let kinds share a name";
+        return Err(source.error(None, "more than 122 kinds of your own", remedy));
     }
     Ok(kinds)
 }
@@ -317,11 +291,8 @@ fn add_profile(
     let file: ProfileFile = source.parse()?;
     if *file.format.get_ref() != sidestep_scenario::FORMAT {
         let cause = format!("profile format {} is not known", file.format.get_ref());
-        return Err(source.error(
-            Some(file.format.span()),
-            cause,
-            "learn the profile anew, or write `format = 1`",
-        ));
+        let remedy = "learn the profile anew, or write `format = 1`";
+        return Err(source.error(file.format.span(), cause, remedy));
     }
     add_all(&source, &file.sensors, sensors);
     add_all(&source, &file.effectors, effectors);
@@ -336,11 +307,6 @@ fn add_all<T: Clone>(
     for (name, section) in from {
         into.insert(name.clone(), Located { section: section.clone(), source: Arc::clone(source) });
     }
-}
-
-/// Moves the sections of one key out of the file, with the key's place.
-fn take<T>(sections: &mut Spanned<OneOrMany<T>>) -> (Range<usize>, Vec<T>) {
-    (sections.span(), std::mem::take(&mut sections.get_mut().0))
 }
 
 impl StorageOrder {

@@ -12,7 +12,7 @@ const WALL: u32 = u32::MAX - 1;
 /// Draws before a free place is looked for in order.
 const TRIES: u32 = 200;
 
-/// Who stands in which box of the map.
+/// The occupant of each box of the map.
 pub(super) struct Floor {
     width: u32,
     height: u32,

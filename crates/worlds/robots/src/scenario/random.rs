@@ -34,13 +34,17 @@ fn row(weights: &BTreeMap<String, f64>, actions: &[String]) -> Result<Vec<f64>, 
     }
     let mut row = vec![0.0; actions.len()];
     for (name, weight) in weights {
-        let id = actions.iter().position(|a| a == name).ok_or_else(|| {
-            let known: Vec<&str> = actions.iter().map(String::as_str).collect();
-            (format!("unknown action `{name}`"), nearest(name, &known))
-        })?;
-        row[id] = weight / sum;
+        row[action_id(name, actions)?] = weight / sum;
     }
     Ok(row)
+}
+
+/// Index of an action among those of an effector.
+pub(super) fn action_id(name: &str, actions: &[String]) -> Result<usize, Wrong> {
+    actions.iter().position(|action| action == name).ok_or_else(|| {
+        let known: Vec<&str> = actions.iter().map(String::as_str).collect();
+        (format!("unknown action `{name}`"), nearest(name, &known))
+    })
 }
 
 #[cfg(test)]

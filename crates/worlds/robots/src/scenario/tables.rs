@@ -1,7 +1,7 @@
 //! Sensor and effector sections -> checked models.
 
 use super::{EffectorSection, Rows, SensorSection, TransitionSection};
-use crate::effector::{EffectorModel, MAX_PATH, STANDARD_ACTIONS, Side, Transition};
+use crate::effector::{EffectorModel, STANDARD_ACTIONS, Transition};
 use crate::sensor::SensorModel;
 use sidestep_kernel::InputError;
 use sidestep_kernel::distr::check_row;
@@ -52,49 +52,46 @@ pub(super) fn sensor(
     let observations = observations(at)?;
     let (edges, classes) = classes(at)?;
     let bearings = s.bearings_deg.get_ref();
-    if bearings.is_empty() || bearings.len() > MAX_BEAMS || bearings.iter().any(|b| !b.is_finite())
-    {
+    if !(1..=MAX_BEAMS).contains(&bearings.len()) || bearings.iter().any(|b| !b.is_finite()) {
         let cause = format!("{} bearings, or one that is not finite", bearings.len());
-        return Err(at.error(
-            s.bearings_deg.span(),
-            cause,
-            "give 1 to 1024 finite bearings in degrees",
-        ));
-    }
-    let range_m = *s.range_m.get_ref();
-    if !(range_m > 0.0 && range_m <= 1e4) {
-        let cause = format!("a range of {range_m} m");
-        return Err(at.error(s.range_m.span(), cause, "give a range above 0 and up to 10000 m"));
-    }
-    let everywhere = matrix(at, &s.confusion, &observations, &observations)?;
-    let mut confusion = vec![everywhere; classes.len() + 1];
-    for (class, rows) in &s.confusion_by_class {
-        let index =
-            classes.iter().chain([&"beyond".to_string()]).position(|c| c == class.get_ref());
-        let index = index.ok_or_else(|| {
-            let known: Vec<&str> = classes.iter().map(String::as_str).collect();
-            at.error(
-                class.span(),
-                format!("unknown distance class `{}`", class.get_ref()),
-                &nearest(class.get_ref(), &known),
-            )
-        })?;
-        for (row_name, row) in rows.get_ref() {
-            let observation = position(at, row_name, &observations)?;
-            confusion[index][observation] = checked_row(at, row_name, row, observations.len())?;
-        }
+        let remedy = "give 1 to 1024 finite bearings in degrees";
+        return Err(at.error(s.bearings_deg.span(), cause, remedy));
     }
     Ok(SensorModel {
         name: name.into(),
         bearings_deg: bearings.clone(),
-        range_m,
+        range_m: s.range_m.get(),
+        confusion: confusion(at, &observations, &classes)?,
         designates: designates(name, at, kinds, &observations)?,
         distance_confusion: distance_confusion(at, &classes)?,
         observations,
-        confusion,
         distance_edges_m: edges,
         distance_classes: classes,
     })
+}
+
+/// One matrix for each distance class and one beyond: what is not said of a class is as anywhere.
+fn confusion(
+    at: &Located<SensorSection>,
+    observations: &[String],
+    classes: &[String],
+) -> Result<Vec<Vec<Vec<f64>>>, InputError> {
+    let s = at.section.get_ref();
+    let everywhere = matrix(at, &s.confusion, observations, observations)?;
+    let mut confusion = vec![everywhere; classes.len() + 1];
+    for (class, rows) in &s.confusion_by_class {
+        let mut names = classes.iter().map(String::as_str).chain(["beyond"]);
+        let index = names.position(|name| name == class.get_ref()).ok_or_else(|| {
+            let known: Vec<&str> = classes.iter().map(String::as_str).collect();
+            let cause = format!("unknown distance class `{}`", class.get_ref());
+            at.error(class.span(), cause, &nearest(class.get_ref(), &known))
+        })?;
+        for (row_name, row) in rows.get_ref() {
+            let observation = position(at, row_name, observations)?;
+            confusion[index][observation] = checked_row(at, row_name, row, observations.len())?;
+        }
+    }
+    Ok(confusion)
 }
 
 fn observations(at: &Located<SensorSection>) -> Result<Vec<String>, InputError> {
@@ -129,7 +126,7 @@ fn classes(at: &Located<SensorSection>) -> Result<(Vec<f64>, Vec<String>), Input
             return Err(at.error(
                 list.span(),
                 "the edges do not rise from above 0",
-                "write rising edges in metres, e.g. [0.5, 1.5]",
+                "write rising edges in meters, e.g. [0.5, 1.5]",
             ));
         }
     }
@@ -247,11 +244,8 @@ fn designates(
             && !["wall", "door", "person", "robot"].contains(&kind.get_ref().as_str())
         {
             let known: Vec<&str> = kinds.names.iter().skip(1).map(String::as_str).collect();
-            return Err(at.error(
-                kind.span(),
-                format!("unknown kind `{}`", kind.get_ref()),
-                &nearest(kind.get_ref(), &known),
-            ));
+            let cause = format!("unknown kind `{}`", kind.get_ref());
+            return Err(at.error(kind.span(), cause, &nearest(kind.get_ref(), &known)));
         }
     }
     let mut table = vec![0u8];
@@ -265,11 +259,12 @@ fn designates(
                 let cause = format!(
                     "sensor `{sensor}` has no observation `{observation}` for the kind `{kind}`"
                 );
-                return Err(at.error(
-                    at.section.get_ref().observations.span(),
-                    cause,
-                    &format!("add it to `observations`, or say what it takes the kind for: designates = {{ {kind} = \"nothing\" }}"),
-                ));
+                let remedy = format!(
+                    "add it to `observations`, or say what it takes the kind for: \
+                     designates = {{ {kind} = \"nothing\" }}"
+                );
+                let span = at.section.get_ref().observations.span();
+                return Err(at.error(span, cause, &remedy));
             }
         }
     }
@@ -293,11 +288,7 @@ pub(super) fn effector(
     }
     for (action, transitions) in &section.actions {
         let span = transitions.span();
-        let list = transitions
-            .get_ref()
-            .iter()
-            .map(|t| transition(at, span.clone(), t))
-            .collect::<Result<Vec<_>, _>>()?;
+        let list: Vec<Transition> = transitions.get_ref().iter().map(transition).collect();
         let row: Vec<f64> = list.iter().map(|t| t.p).collect();
         check_row(&row).map_err(|e| {
             let cause = format!("action `{action}` of effector `{name}`: {e}");
@@ -317,19 +308,6 @@ pub(super) fn effector(
     Ok(model)
 }
 
-fn transition(
-    at: &Located<EffectorSection>,
-    span: Range<usize>,
-    t: &TransitionSection,
-) -> Result<Transition, InputError> {
-    let path: Option<Vec<Side>> = t.path.chars().map(Side::from_letter).collect();
-    let path = path.filter(|p| p.len() <= MAX_PATH).ok_or_else(|| {
-        let cause = format!("`{}` is no path", t.path);
-        at.error(span.clone(), cause, "write up to 16 letters F, L, B, R, e.g. \"FL\"")
-    })?;
-    if t.turn % 90 != 0 {
-        let cause = format!("a turn of {} degrees", t.turn);
-        return Err(at.error(span, cause, "give a multiple of 90 degrees, positive to the left"));
-    }
-    Ok(Transition { p: t.p, path, turn: (t.turn / 90).rem_euclid(4) as u8 })
+fn transition(t: &TransitionSection) -> Transition {
+    Transition { p: t.p, path: t.path.0.clone(), turn: t.turn.0 }
 }

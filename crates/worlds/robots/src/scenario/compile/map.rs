@@ -13,60 +13,46 @@ pub(super) fn load_map(
     source: &Source,
     section: &Spanned<MapSection>,
 ) -> Result<(Arc<GridMap>, Vec<Rect>), InputError> {
-    let s = section.get_ref();
-    let size_span = s.box_size_m.as_ref().map_or(section.span(), Spanned::span);
-    let box_size_m = s.box_size_m.as_ref().map_or(0.25, |b| *b.get_ref());
-    if !(box_size_m > 0.0 && box_size_m <= 1000.0) {
-        let cause = format!("boxes of {box_size_m} m");
-        return Err(source.error(
-            Some(size_span),
-            cause,
-            "give a side above 0 m, typically 0.1 to 0.5",
-        ));
-    }
-    let (map, doors) = match (&s.file, &s.ascii, &s.office) {
-        (Some(file), None, None) => {
-            let path = source.path(file.get_ref());
-            (sidestep_import::map_file(&path, box_size_m, s.unknown)?, Vec::new())
-        }
-        (None, Some(art), None) => {
-            let map = sidestep_import::ascii::parse(
-                &format!("{} (map.ascii)", source.place),
-                art.get_ref(),
-                box_size_m,
-            )?;
-            (map.with_unknown(s.unknown), Vec::new())
-        }
-        (None, None, Some(spec)) => {
-            let office = spec.get_ref().build(box_size_m).map_err(|e| {
-                source.error(Some(spec.span()), format!("{}: {}", e.place(), e.cause()), e.remedy())
-            })?;
-            (office.map, office.doors)
-        }
-        _ => {
-            return Err(source.error(
-                Some(section.span()),
-                "the map needs exactly one of `file`, `ascii` and `office`",
-                "write e.g. [map] with file = \"building.yaml\"",
-            ));
-        }
-    };
+    let (map, doors) = read_map(source, section)?;
+    let error = |cause: String, remedy: String| Err(source.error(section.span(), cause, remedy));
     if map.width() > MAX_SIDE || map.height() > MAX_SIDE {
         let cause = format!("a map of {} x {} boxes", map.width(), map.height());
-        return Err(source.error(
-            Some(section.span()),
-            cause,
-            format!("use larger boxes: at most {MAX_SIDE} a side"),
-        ));
+        return error(cause, format!("use larger boxes: at most {MAX_SIDE} a side"));
     }
     if map.count(Cell::Free) == 0 {
-        return Err(source.error(
-            Some(section.span()),
-            "the map has no free box",
-            "use smaller boxes, another map, or unknown = \"free\"",
-        ));
+        let remedy = "use smaller boxes, another map, or unknown = \"free\"";
+        return error("the map has no free box".into(), remedy.into());
     }
     Ok((Arc::new(map), doors))
+}
+
+fn read_map(
+    source: &Source,
+    section: &Spanned<MapSection>,
+) -> Result<(GridMap, Vec<Rect>), InputError> {
+    let s = section.get_ref();
+    let box_size_m = s.box_size_m.map_or(0.25, f64::from);
+    match (&s.file, &s.ascii, &s.office) {
+        (Some(file), None, None) => {
+            let map = sidestep_import::map_file(&source.path(file), box_size_m, s.unknown)?;
+            Ok((map, Vec::new()))
+        }
+        (None, Some(art), None) => {
+            let place = format!("{} (map.ascii)", source.place);
+            let map = sidestep_import::ascii::parse(&place, art, box_size_m)?;
+            Ok((map.with_unknown(s.unknown), Vec::new()))
+        }
+        (None, None, Some(spec)) => {
+            let office = spec.get_ref().build(box_size_m);
+            let office = office.map_err(|error| source.error_of(spec.span(), &error))?;
+            Ok((office.map, office.doors))
+        }
+        _ => {
+            let cause = "the map needs exactly one of `file`, `ascii` and `office`";
+            let remedy = "write e.g. [map] with file = \"building.yaml\"";
+            Err(source.error(section.span(), cause, remedy))
+        }
+    }
 }
 
 /// The map with its border, one byte per box, as states begin.

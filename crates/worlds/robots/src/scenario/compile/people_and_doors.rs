@@ -1,7 +1,12 @@
 //! Sections of people (any mobile objects) and doors.
 
-use super::bodies::{Group, TypeOf};
+use super::super::Placing;
+use super::bodies::{Group, TypeOf, boxes, cycles_of};
 use super::*;
+use crate::effector::Side;
+
+/// Longest side of a door that a map brings, in boxes.
+const MAX_SIDE: u32 = 64;
 
 impl Compiler<'_> {
     pub(super) fn people(
@@ -9,31 +14,21 @@ impl Compiler<'_> {
         s: &MoverSection,
         span: Range<usize>,
     ) -> Result<Group, InputError> {
-        let (count, places, period) =
-            self.common(s.count.as_ref(), &s.at, s.period.as_ref(), &span)?;
-        let size = self.size(*s.size.get_ref(), s.size.span())?;
-        let straight = *s.p_straight.get_ref();
-        if !(0.0..=1.0).contains(&straight) {
-            let cause = format!("p_straight = {straight}");
-            return Err(self.error(
-                s.p_straight.span(),
-                cause,
-                "give a probability between 0 and 1",
-            ));
-        }
+        let count = self.count(s.count.as_ref(), &s.at, &span)?;
+        let size = boxes(s.size);
         self.reach = self.reach.max(1);
         let step = [Transition { p: 1.0, path: vec![Side::Front], turn: 0 }];
         let actions = actions_at_headings(&[step.to_vec()], size, self.stride());
-        let role = Role::Mover(Mover { straight: Chance::new(straight) });
-        let ty = self.body_type(&s.kind, size, actions, role)?;
+        let straight = Chance::new(s.p_straight.map_or(0.8, f64::from));
+        let ty = self.body_type(&s.kind, size, actions, Role::Mover(Mover { straight }))?;
         let ty = TypeOf::All(self.add_type(ty, &span)?);
         Ok(Group {
             count,
-            places,
+            places: s.at.clone(),
             region: self.region(s.region.as_ref())?,
             span,
             ty,
-            period,
+            period: cycles_of(s.period),
             phase: s.phase,
         })
     }
@@ -43,19 +38,17 @@ impl Compiler<'_> {
         s: &DoorSection,
         span: Range<usize>,
     ) -> Result<Group, InputError> {
-        let rects = self.door_rects(s, &span)?;
+        let doors = self.door_places(s, &span)?;
         let (mut places, mut types) = (Vec::new(), Vec::new());
-        for (k, (rect, at)) in rects.iter().enumerate() {
-            let size = self.size([rect.width, rect.height], at.clone())?;
+        for (k, (place, size)) in doors.iter().enumerate() {
             // Without a given phase the doors of a section do not all toggle at once.
-            let door = self.door(s, &span, k as u64, rects.len() as u64)?;
-            let role = Role::Door(door);
-            let ty = self.body_type(&s.kind, size, Arc::new([]), role)?;
+            let door = self.door(s, &span, k as u64, doors.len() as u64)?;
+            let ty = self.body_type(&s.kind, *size, Arc::new([]), Role::Door(door))?;
             types.push(self.add_type(ty, &span)?);
-            places.push((((rect.col, rect.row), Some(0)), at.clone()));
+            places.push(place.clone());
         }
         Ok(Group {
-            count: rects.len() as u64,
+            count: doors.len() as u64,
             places,
             region: None,
             span,
@@ -65,28 +58,32 @@ impl Compiler<'_> {
         })
     }
 
-    fn door_rects(
+    /// Where doors are, and how large; they all face the same way.
+    fn door_places(
         &self,
         s: &DoorSection,
         span: &Range<usize>,
-    ) -> Result<Vec<(Rect, Range<usize>)>, InputError> {
-        let [width, height] = *s.size.get_ref();
-        let mut rects = Vec::new();
-        for place in &s.at {
-            let ((col, row), _) = self.placing(place)?;
-            rects.push((Rect { col, row, width, height }, place.span()));
+    ) -> Result<Vec<(Spanned<Placing>, (u32, u32))>, InputError> {
+        let facing = Some(0);
+        let given = s.at.iter().map(|place| {
+            let place = Spanned::new(place.span(), Placing { facing, ..*place.get_ref() });
+            (place, boxes(s.size))
+        });
+        let mut doors: Vec<_> = given.collect();
+        for rect in self.office_doors.iter().filter(|_| s.office) {
+            if [rect.width, rect.height].iter().any(|side| !(1..=MAX_SIDE).contains(side)) {
+                let cause = format!("a door of {} x {} boxes", rect.width, rect.height);
+                let remedy = format!("give 1 to {MAX_SIDE} boxes a side");
+                return Err(self.source.error(span.clone(), cause, remedy));
+            }
+            let place = Placing { at: (rect.col, rect.row), facing };
+            doors.push((Spanned::new(span.clone(), place), (rect.width, rect.height)));
         }
-        if s.office {
-            rects.extend(self.office_doors.iter().map(|r| (*r, span.clone())));
+        if doors.is_empty() {
+            let remedy = "add at = [[col, row]], or office = true on a generated office";
+            return Err(self.source.error(span.clone(), "these doors stand nowhere", remedy));
         }
-        if rects.is_empty() {
-            return Err(self.error(
-                span.clone(),
-                "these doors stand nowhere",
-                "add at = [[col, row]], or office = true on a generated office",
-            ));
-        }
-        Ok(rects)
+        Ok(doors)
     }
 
     fn door(
@@ -97,20 +94,25 @@ impl Compiler<'_> {
         of: u64,
     ) -> Result<Door, InputError> {
         match (&s.periodic, &s.random) {
-            (Some(p), None) => {
-                let (at, p) = (p.span(), p.get_ref());
+            (Some(periodic), None) => {
+                let p = periodic.get_ref();
                 let total = p.open.checked_add(p.closed).filter(|t| *t > 0 && *t < 1 << 40);
-                let total = total.ok_or_else(|| self.error(at, "a period of 0 or far too many cycles", "give open = 200, closed = 100"))?;
-                Ok(Door::Periodic { open: p.open, closed: p.closed, phase: p.phase.unwrap_or(index * total / of) % total })
+                let total = total.ok_or_else(|| {
+                    let cause = "a period of 0 or far too many cycles";
+                    self.source.error(periodic.span(), cause, "give open = 200, closed = 100")
+                })?;
+                let phase = p.phase.unwrap_or(index * total / of) % total;
+                Ok(Door::Periodic { open: p.open, closed: p.closed, phase })
             }
-            (None, Some(r)) => {
-                let (at, r) = (r.span(), r.get_ref());
-                if !(0.0..=1.0).contains(&r.p_open) || !(0.0..=1.0).contains(&r.p_close) {
-                    return Err(self.error(at, "p_open or p_close is no probability", "give numbers between 0 and 1"));
-                }
-                Ok(Door::Random { open: Chance::new(r.p_open), close: Chance::new(r.p_close) })
+            (None, Some(r)) => Ok(Door::Random {
+                open: Chance::new(r.p_open.get()),
+                close: Chance::new(r.p_close.get()),
+            }),
+            _ => {
+                let remedy = "add periodic = { open = 200, closed = 100 } or \
+                              random = { p_open = 0.01, p_close = 0.01 }";
+                Err(self.source.error(span.clone(), "a door needs one schedule", remedy))
             }
-            _ => Err(self.error(span.clone(), "a door needs one schedule", "add periodic = { open = 200, closed = 100 } or random = { p_open = 0.01, p_close = 0.01 }")),
         }
     }
 }

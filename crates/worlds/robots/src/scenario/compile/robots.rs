@@ -1,6 +1,8 @@
 //! Robot sections: bodies with sensors and effectors, and behaviours.
 
-use super::bodies::{Group, TypeOf};
+use super::super::Placing;
+use super::bodies::{Group, TypeOf, cycles_of};
+use super::random::Wrong;
 use super::*;
 
 impl Compiler<'_> {
@@ -12,9 +14,8 @@ impl Compiler<'_> {
         if let Some(scen) = &s.scen {
             return self.robots_of_scen(s, scen, &span);
         }
-        let (count, places, period) =
-            self.common(s.count.as_ref(), &s.at, s.period.as_ref(), &span)?;
-        let size = self.robot_size(s)?;
+        let count = self.count(s.count.as_ref(), &s.at, &span)?;
+        let size = side(s);
         let body = Arc::new(self.robot_body(s, size)?);
         let behaviour = self.behaviour(s.behaviour.as_ref(), size, &body)?;
         let actions = Arc::clone(&body.actions);
@@ -23,11 +24,11 @@ impl Compiler<'_> {
         let ty = TypeOf::All(self.add_type(ty, &span)?);
         Ok(Group {
             count,
-            places,
+            places: s.at.clone(),
             region: self.region(s.region.as_ref())?,
             span,
             ty,
-            period,
+            period: cycles_of(s.period),
             phase: s.phase,
         })
     }
@@ -43,9 +44,9 @@ impl Compiler<'_> {
         let count = s.count.as_ref().map_or(rows.len(), |c| *c.get_ref() as usize);
         if count > rows.len() {
             let cause = format!("count = {count}, but the list has {} rows", rows.len());
-            return Err(self.error(scen.span(), cause, "give a smaller count"));
+            return Err(self.source.error(scen.span(), cause, "give a smaller count"));
         }
-        let size = self.robot_size(s)?;
+        let size = side(s);
         let body = Arc::new(self.robot_body(s, size)?);
         let free = FreeSpace::of_map(&self.map);
         let (mut places, mut types) = (Vec::new(), Vec::new());
@@ -56,24 +57,17 @@ impl Compiler<'_> {
             let actions = Arc::clone(&body.actions);
             let ty = self.body_type(&s.kind, (size, size), actions, Role::Robot(model))?;
             types.push(self.add_type(ty, span)?);
-            places.push(((row.start, None), scen.span()));
+            places.push(Spanned::new(scen.span(), Placing { at: row.start, facing: None }));
         }
-        let period = self.period(s.period.as_ref())?;
         Ok(Group {
             count: count as u64,
             places,
             region: None,
             span: span.clone(),
             ty: TypeOf::Each(types),
-            period,
+            period: cycles_of(s.period),
             phase: s.phase,
         })
-    }
-
-    fn robot_size(&self, s: &RobotSection) -> Result<u32, InputError> {
-        let span = s.size.as_ref().map_or(0..0, Spanned::span);
-        let side = s.size.as_ref().map_or(1, |v| *v.get_ref());
-        self.size([side, side], span).map(|size| size.0)
     }
 
     fn robot_body(&mut self, s: &RobotSection, size: u32) -> Result<RobotBody, InputError> {
@@ -97,18 +91,13 @@ impl Compiler<'_> {
         let model = self.sensor_model(name)?;
         let box_size_m = self.map.box_size_m;
         let range_boxes = model.range_m / box_size_m;
-        if range_boxes * model.bearings_deg.len() as f64 > 60_000.0 || range_boxes > MAX_RANGE_BOXES
-        {
-            let cause = format!(
-                "sensor `{}` reaches over {range_boxes:.0} boxes with {} beams",
-                name.get_ref(),
-                model.bearings_deg.len()
-            );
-            return Err(self.error(
-                name.span(),
-                cause,
-                "give a shorter range, fewer beams or larger boxes",
-            ));
+        let beams = model.bearings_deg.len();
+        if range_boxes * beams as f64 > 60_000.0 || range_boxes > MAX_RANGE_BOXES {
+            let sensor = name.get_ref();
+            let cause =
+                format!("sensor `{sensor}` reaches over {range_boxes:.0} boxes with {beams} beams");
+            let remedy = "give a shorter range, fewer beams or larger boxes";
+            return Err(self.source.error(name.span(), cause, remedy));
         }
         let reliable = self.file.regime.reliable_sensors();
         Ok(MountedSensor::new(model, size, box_size_m, self.stride(), reliable)
@@ -119,8 +108,8 @@ impl Compiler<'_> {
         let section = self.lookup(&self.sensors, name, "sensor")?;
         let mut used = vec![false; self.kinds.len()];
         used[1] = true;
-        let people = self.file.people.get_ref().0.iter().map(|p| &p.kind);
-        let doors = self.file.doors.get_ref().0.iter().map(|d| &d.kind);
+        let people = self.file.people.0.iter().map(|p| &p.get_ref().kind);
+        let doors = self.file.doors.0.iter().map(|d| &d.get_ref().kind);
         for kind in people.chain(doors) {
             used[usize::from(self.kind(kind)?)] = true;
         }
@@ -153,7 +142,7 @@ impl Compiler<'_> {
         all.get(name.get_ref()).ok_or_else(|| {
             let known: Vec<&str> = all.keys().map(String::as_str).collect();
             let cause = format!("unknown {what} `{}`", name.get_ref());
-            self.error(name.span(), cause, nearest(name.get_ref(), &known))
+            self.source.error(name.span(), cause, nearest(name.get_ref(), &known))
         })
     }
 
@@ -163,88 +152,87 @@ impl Compiler<'_> {
         size: u32,
         body: &RobotBody,
     ) -> Result<Arc<dyn Behaviour>, InputError> {
-        let Some(spanned) = section else { return Ok(Arc::new(Wander::default())) };
-        let (s, span) = (spanned.get_ref(), spanned.span());
-        let missing = |key: &str, example: &str| {
-            self.error(
-                span.clone(),
-                format!("behaviour `{}` needs `{key}`", s.kind),
-                format!("add {example}"),
-            )
-        };
-        let way = |rect: [u32; 4]| -> Result<Arc<FlowField>, InputError> {
-            self.check_rect(rect, span.clone())?;
-            let goals: Vec<_> = (rect[1]..rect[1] + rect[3])
-                .flat_map(|r| (rect[0]..rect[0] + rect[2]).map(move |c| (c, r)))
-                .collect();
-            let field = FlowField::towards(&FreeSpace::of_map(&self.map), size, &goals);
-            if goals.iter().any(|&(c, r)| field.is_goal(c, r)) {
-                return Ok(Arc::new(field));
-            }
-            let cause = format!(
-                "a robot of {size} x {size} boxes fits nowhere in [{}, {}, {}, {}]",
-                rect[0], rect[1], rect[2], rect[3]
-            );
-            Err(self.error(
-                span.clone(),
-                cause,
-                "name a region with free boxes; its boxes stand for the robot's lower-left box",
-            ))
-        };
+        let Some(section) = section else { return Ok(Arc::new(Wander::default())) };
+        let s = section.get_ref();
+        let error = |wrong: Wrong| self.source.error(section.span(), wrong.0, wrong.1);
+        let ways = Ways { compiler: self, size, span: section.span() };
+        let actions = &body.effector.actions;
         Ok(match s.kind.as_str() {
             "wander" => Arc::new(Wander {
                 turn_every: s.turn_every.unwrap_or(Wander::default().turn_every).max(1),
             }),
             "shuttle" => {
-                let a = s.a.ok_or_else(|| missing("a", "a = [col, row, width, height]"))?;
-                let b = s.b.ok_or_else(|| missing("b", "b = [col, row, width, height]"))?;
-                Arc::new(Shuttle { ends: [way(a)?, way(b)?] })
+                let end = |given: Option<[u32; 4]>, key: &str| {
+                    ways.to(needed(s, key, given, "[col, row, width, height]").map_err(error)?)
+                };
+                Arc::new(Shuttle { ends: [end(s.a, "a")?, end(s.b, "b")?] })
             }
             "goto" => {
-                let goals = s
-                    .goals
-                    .as_ref()
-                    .ok_or_else(|| missing("goals", "goals = [[col, row], ...]"))?;
-                let goals =
-                    goals.iter().map(|&(c, r)| way([c, r, 1, 1])).collect::<Result<_, _>>()?;
+                let goals = needed(s, "goals", s.goals.as_ref(), "[[col, row], ...]");
+                let goals = goals.map_err(error)?.iter().map(|&(c, r)| ways.to([c, r, 1, 1]));
+                let goals = goals.collect::<Result<_, _>>()?;
                 Arc::new(Goto { goals, repeat: s.repeat.unwrap_or(false) })
             }
-            "replay" => {
-                let names = s
-                    .actions
-                    .as_ref()
-                    .ok_or_else(|| missing("actions", "actions = [\"forward\", \"left\"]"))?;
-                let known: Vec<&str> = body.effector.actions.iter().map(String::as_str).collect();
-                let id = |name: &String| {
-                    known.iter().position(|k| k == name).map(|k| k as u8).ok_or_else(|| {
-                        self.error(
-                            span.clone(),
-                            format!("unknown action `{name}`"),
-                            nearest(name, &known),
-                        )
-                    })
-                };
-                let actions = names.iter().map(id).collect::<Result<_, _>>()?;
-                Arc::new(Replay { actions, repeat: s.repeat.unwrap_or(false) })
-            }
-            "random" => {
-                let random = random::behaviour(s, &body.effector.actions);
-                Arc::new(random.map_err(|(cause, remedy)| self.error(span, cause, remedy))?)
-            }
+            "replay" => Arc::new(replay(s, actions).map_err(error)?),
+            "random" => Arc::new(random::behaviour(s, actions).map_err(error)?),
             "external" => Arc::new(External),
             other => match self.own.get(other) {
                 Some(own) => Arc::clone(own),
-                None => {
-                    let mut known =
-                        vec!["wander", "shuttle", "goto", "replay", "random", "external"];
-                    known.extend(self.own.keys().map(String::as_str));
-                    return Err(self.error(
-                        span,
-                        format!("unknown behaviour `{other}`"),
-                        nearest(other, &known),
-                    ));
-                }
+                None => return Err(error(self.unknown_behaviour(other))),
             },
         })
     }
+
+    fn unknown_behaviour(&self, name: &str) -> Wrong {
+        let own = self.own.keys().map(String::as_str);
+        let known: Vec<&str> = BEHAVIOURS.into_iter().chain(own).collect();
+        (format!("unknown behaviour `{name}`"), nearest(name, &known))
+    }
+}
+
+/// Behaviours that need nobody to bring them.
+const BEHAVIOURS: [&str; 6] = ["wander", "shuttle", "goto", "replay", "random", "external"];
+
+/// Ways of robots of one size, asked for at one place of the scenario.
+struct Ways<'c, 'a> {
+    compiler: &'c Compiler<'a>,
+    size: u32,
+    span: Range<usize>,
+}
+
+impl Ways<'_, '_> {
+    /// The way to a region in which a robot finds room.
+    fn to(&self, rect: [u32; 4]) -> Result<Arc<FlowField>, InputError> {
+        let (compiler, size) = (self.compiler, self.size);
+        compiler.check_rect(rect, self.span.clone())?;
+        let [col, row, width, height] = rect;
+        let goals: Vec<_> =
+            (row..row + height).flat_map(|r| (col..col + width).map(move |c| (c, r))).collect();
+        let field = FlowField::towards(&FreeSpace::of_map(&compiler.map), size, &goals);
+        if goals.iter().any(|&(c, r)| field.is_goal(c, r)) {
+            return Ok(Arc::new(field));
+        }
+        let cause = format!("a robot of {size} x {size} boxes fits nowhere in {rect:?}");
+        let remedy =
+            "name a region with free boxes; its boxes stand for the robot's lower-left box";
+        Err(compiler.source.error(self.span.clone(), cause, remedy))
+    }
+}
+
+/// A key without which a behaviour does not know what to do.
+fn needed<T>(s: &BehaviourSection, key: &str, given: Option<T>, example: &str) -> Result<T, Wrong> {
+    given.ok_or_else(|| {
+        (format!("behaviour `{}` needs `{key}`", s.kind), format!("add {key} = {example}"))
+    })
+}
+
+fn replay(s: &BehaviourSection, actions: &[String]) -> Result<Replay, Wrong> {
+    let names = needed(s, "actions", s.actions.as_ref(), "[\"forward\", \"left\"]")?;
+    let ids = names.iter().map(|name| random::action_id(name, actions).map(|id| id as u8));
+    Ok(Replay { actions: ids.collect::<Result<_, _>>()?, repeat: s.repeat.unwrap_or(false) })
+}
+
+/// Boxes of a robot's side.
+fn side(s: &RobotSection) -> u32 {
+    s.size.map_or(1, |side| side.get() as u32)
 }

@@ -1,0 +1,212 @@
+//! `sidestep export`: a recorded run in the forms of other programs.
+
+use crate::console::{Console, grouped};
+use crate::exit::{ExitCode, Failure};
+use crate::interrupt;
+use crate::plan::WorkersArg;
+use crate::watch::Watch;
+use clap::{Args, ValueEnum};
+use serde_json::json;
+use sidestep::kernel::{Cycle, InputError};
+use sidestep::worlds::WORLDS;
+use sidestep_session::Recorded;
+use sidestep_session::export::{self, Export, Film, Written};
+use std::path::{Path, PathBuf};
+
+const EXAMPLES: &str = "\
+Examples:
+  sidestep export runs/office --to csv                     runs/office-csv/, a file per table
+  sidestep export runs/office --to parquet --table trajectories
+  sidestep export runs/office --to mcap --every 10         runs/office.mcap, for Foxglove
+  sidestep export runs/office --to gif --from 1000 --until 2000
+  sidestep export runs/office --to png --from 1234         the state at the begin of this cycle
+  sidestep export office.mcap --to mp4-frames              pictures, and how ffmpeg joins them
+
+Tables are copied from the run folder. Everything else is computed again from the recorded
+scenario; whoever comes to the recorded end confirms the recorded digest there.";
+
+/// The forms.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Form {
+    /// Tables as text
+    Csv,
+    /// Tables, each as one file
+    Parquet,
+    /// What can be seen, for Foxglove and other viewers
+    Mcap,
+    /// The picture of the run, or of a moment
+    Svg,
+    /// The same as pixels
+    Png,
+    /// A film
+    Gif,
+    /// A film as numbered PNG files
+    #[value(name = "mp4-frames")]
+    Mp4Frames,
+}
+
+impl Form {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Csv => "csv",
+            Self::Parquet => "parquet",
+            Self::Mcap => "mcap",
+            Self::Svg => "svg",
+            Self::Png => "png",
+            Self::Gif => "gif",
+            Self::Mp4Frames => "mp4-frames",
+        }
+    }
+
+    fn is_table(self) -> bool {
+        matches!(self, Self::Csv | Self::Parquet)
+    }
+
+    fn is_film(self) -> bool {
+        matches!(self, Self::Gif | Self::Mp4Frames)
+    }
+
+    fn is_picture(self) -> bool {
+        matches!(self, Self::Svg | Self::Png)
+    }
+}
+
+/// Write a recorded run as tables, pictures, films or recordings for viewers.
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct ExportArgs {
+    /// The run folder, or an MCAP file
+    #[arg(value_name = "DIR|FILE")]
+    recorded: PathBuf,
+
+    /// What to write
+    #[arg(long, value_name = "FORM", value_enum)]
+    to: Form,
+
+    /// Where to [default: beside DIR, by its name]
+    #[arg(long, value_name = "PATH")]
+    out: Option<PathBuf>,
+
+    /// Begin at this cycle; of svg and png, show the state at its begin
+    #[arg(long, value_name = "C")]
+    from: Option<Cycle>,
+
+    /// End with this cycle [default: the last]
+    #[arg(long, value_name = "C")]
+    until: Option<Cycle>,
+
+    /// Only cycles that are multiples of this; of films: so that they have 150 pictures at most,
+    /// else each; events are never left out of tables
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    every: Option<Cycle>,
+
+    /// Only this table, of csv and parquet
+    #[arg(long, value_name = "NAME")]
+    table: Option<String>,
+
+    /// Pictures of a film per second [default: 15]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=50))]
+    fps: Option<u16>,
+
+    /// Longer side of pictures in pixels [default: 640 of gif, 1280 of mp4-frames, 1600 of png]
+    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u16).range(64..=4096))]
+    width: Option<u16>,
+
+    #[command(flatten)]
+    workers: WorkersArg,
+
+    /// Replace what was exported before
+    #[arg(long)]
+    replace: bool,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// When the recorded run or an option is wrong, or the result cannot be stored or differs from
+/// what was recorded.
+pub(crate) fn export(args: &ExportArgs, console: Console) -> Result<ExitCode, Failure> {
+    check_options(args)?;
+    let recorded = Recorded::open(WORLDS, &args.recorded)?;
+    interrupt::listen()?;
+    if args.to.is_table() && recorded.folder.is_some() && !recorded.is_complete {
+        console.warn("the run is not complete: its rows end at the last checkpoint");
+    }
+    match export::export(&recorded, &wanted(args), &Watch::new(console)) {
+        Err(Failure::Interrupted) => Ok(ExitCode::Interrupted),
+        written => {
+            report(args.to, &written?, console);
+            Ok(ExitCode::Done)
+        }
+    }
+}
+
+fn wanted(args: &ExportArgs) -> Export<'_> {
+    let film = Film { fps: args.fps, width_px: args.width };
+    let form = match args.to {
+        Form::Csv => export::Form::Csv(args.table.clone()),
+        Form::Parquet => export::Form::Parquet(args.table.clone()),
+        Form::Mcap => export::Form::Mcap,
+        Form::Svg => export::Form::Svg,
+        Form::Png => export::Form::Png { width_px: args.width },
+        Form::Gif => export::Form::Gif(film),
+        Form::Mp4Frames => export::Form::Frames(film),
+    };
+    Export {
+        form,
+        out: args.out.as_deref(),
+        replace: args.replace,
+        from: args.from,
+        until: args.until,
+        every: args.every,
+        workers: args.workers.count(),
+    }
+}
+
+/// Refuses options that would do nothing.
+fn check_options(args: &ExportArgs) -> Result<(), InputError> {
+    let form = args.to;
+    let given = [
+        ("--until", args.until.is_some(), !form.is_picture()),
+        ("--every", args.every.is_some(), !form.is_picture()),
+        ("--table", args.table.is_some(), form.is_table()),
+        ("--fps", args.fps.is_some(), form.is_film()),
+        ("--width", args.width.is_some(), form.is_film() || form == Form::Png),
+    ];
+    match given.iter().find(|(_, is_given, has_meaning)| *is_given && !has_meaning) {
+        None => Ok(()),
+        Some((option, ..)) => {
+            let cause = format!("means nothing for --to {}", form.name());
+            Err(InputError::new(*option, cause, "leave it out"))
+        }
+    }
+}
+
+/// Says what was written.
+fn report(form: Form, written: &Written, console: Console) {
+    let Written { paths, is_confirmed, film } = written;
+    let json = json!({ "written": paths, "digest_confirmed": is_confirmed });
+    let names = paths.iter().map(|path| format!("{}\n", path.display())).collect::<String>();
+    let short = || names.clone();
+    console.result_or_short(&json, short, || {
+        let confirmed = if *is_confirmed { "  its end has the recorded digest\n" } else { "" };
+        let bytes: u64 =
+            paths.iter().filter_map(|path| Some(std::fs::metadata(path).ok()?.len())).sum();
+        let size = format!("  {} bytes\n", grouped(bytes));
+        let size = if paths.iter().all(|path| path.is_file()) { size } else { String::new() };
+        let film = film.map_or(String::new(), |film| film_words(form, film, &paths[0]));
+        format!("{names}{size}{confirmed}{film}")
+    });
+}
+
+/// Says how long a film is, or how to join its pictures.
+fn film_words(form: Form, (pictures, fps): (usize, u16), path: &Path) -> String {
+    if form == Form::Gif {
+        return format!("  {pictures} pictures, {:.1} s\n", pictures as f64 / f64::from(fps));
+    }
+    let folder = path.display();
+    format!(
+        "  {pictures} pictures; join them with:\n  ffmpeg -framerate {fps} \
+         -i '{folder}/frame-%05d.png' -c:v libx264 -pix_fmt yuv420p '{folder}.mp4'\n"
+    )
+}

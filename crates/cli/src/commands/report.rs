@@ -1,0 +1,62 @@
+//! `sidestep report`: a folder of results as a page, and as Markdown.
+
+use crate::console::Console;
+use crate::exit::{ExitCode, Failure};
+use crate::pages::{Pages, Raster};
+use crate::watch::Watch;
+use clap::Args;
+use serde_json::json;
+use sidestep::kernel::InputError;
+use sidestep::worlds::WORLDS;
+use sidestep_session::report::document;
+use std::path::PathBuf;
+
+const EXAMPLES: &str = "\
+Examples:
+  sidestep report runs/office                  runs/office/report.html and report.md
+  sidestep report runs/office --out office.html
+  sidestep report sweeps/methods               of all runs: intervals, comparisons, figures
+
+The page is one file that needs no network. A run that has not ended can be reported too; the
+report says so.";
+
+/// Write a report of a run or a sweep: one HTML file, and Markdown.
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct ReportArgs {
+    /// The folder of a run or a sweep
+    #[arg(value_name = "DIR")]
+    folder: PathBuf,
+
+    /// Write the page to this file, and its Markdown twin beside it [default: DIR/report.html]
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// When the folder holds nothing to report, something in it is damaged, or the report cannot be
+/// written.
+pub(crate) fn report(args: &ReportArgs, console: Console) -> Result<ExitCode, Failure> {
+    let pages = pages(args)?;
+    let document = document(WORLDS, &args.folder, &Watch::new(console))?;
+    pages.store(&document, Raster::None)?;
+    let (html, markdown) = (pages.html.display(), pages.markdown());
+    let json = json!({ "html": html.to_string(), "markdown": markdown.display().to_string() });
+    console.result(&json, || format!("{html}\n{}\n", markdown.display()));
+    Ok(ExitCode::Done)
+}
+
+/// Where the report goes; its Markdown twin must not be the page itself.
+fn pages(args: &ReportArgs) -> Result<Pages, InputError> {
+    let html = args.out.clone().unwrap_or_else(|| args.folder.join("report.html"));
+    let ending = html.extension().and_then(|e| e.to_str());
+    let stem = html.file_stem().and_then(|stem| stem.to_str());
+    let (Some("html" | "htm"), Some(stem)) = (ending, stem) else {
+        let cause = "the page is HTML, and Markdown is written beside it";
+        return Err(InputError::new(html.display(), cause, "give a name that ends in .html"));
+    };
+    let pictures = format!("{stem}-figures");
+    Ok(Pages { html, pictures })
+}

@@ -1,0 +1,56 @@
+//! Maps written as `map_server` reads them, so that a run can keep the ones that it saw.
+
+use sidestep_map::Cell;
+
+/// Name of the image that [`map_files`] speaks of.
+const IMAGE: &str = "map.pgm";
+
+/// YAML file and image of a map, with their names; rows of cells begin at the bottom.
+pub fn map_files(
+    [width, height]: [u32; 2],
+    resolution_m: f64,
+    [x_m, y_m]: [f64; 2],
+    cells: &[Cell],
+) -> [(&'static str, Vec<u8>); 2] {
+    let yaml = format!(
+        "# The map as the simulation saw it.\nimage: {IMAGE}\nresolution: {resolution_m:?}\n\
+         origin: [{x_m:?}, {y_m:?}, 0.0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
+    );
+    let gray = |cell: &Cell| match cell {
+        Cell::Free => 254,
+        Cell::Unknown => 205,
+        Cell::Wall => 0,
+    };
+    let image = pgm(width, height, cells.iter().map(gray));
+    [("map.yaml", yaml.into_bytes()), (IMAGE, image)]
+}
+
+/// Binary PGM of gray values whose rows begin at the bottom: the first row of the file is the
+/// north edge.
+pub fn pgm(width: u32, height: u32, grays: impl Iterator<Item = u8>) -> Vec<u8> {
+    let grays: Vec<u8> = grays.collect();
+    let mut bytes = format!("P5\n{width} {height}\n255\n").into_bytes();
+    for row in grays.chunks_exact(width.max(1) as usize).rev() {
+        bytes.extend_from_slice(row);
+    }
+    bytes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::map_file;
+    use sidestep_map::{GridMap, UnknownPolicy};
+
+    #[test]
+    fn the_map_comes_back_as_it_was() {
+        let cells = vec![Cell::Free, Cell::Wall, Cell::Unknown, Cell::Free, Cell::Free, Cell::Wall];
+        let map = GridMap::new(3, 2, 0.1 + 0.2, cells).with_origin([-1.5, 1e-7]);
+        let folder = tempfile::tempdir().expect("a folder");
+        for (name, bytes) in map_files([3, 2], map.box_size_m, map.origin_m, map.cells()) {
+            std::fs::write(folder.path().join(name), bytes).expect("written");
+        }
+        let back = map_file(&folder.path().join("map.yaml"), map.box_size_m, UnknownPolicy::Keep);
+        assert_eq!(back, Ok(map));
+    }
+}

@@ -1,0 +1,180 @@
+//! Points and vectors in any number of dimensions.
+//!
+//! Every sum is taken in the order of the coordinates, so that a result has the same bits wherever
+//! it is computed.
+
+use crate::math;
+
+/// A position or a vector in `D` dimensions, meters.
+pub type Point<const D: usize> = [f64; D];
+
+/// `a + b`.
+#[inline]
+pub fn add<const D: usize>(a: Point<D>, b: Point<D>) -> Point<D> {
+    std::array::from_fn(|i| a[i] + b[i])
+}
+
+/// `a - b`.
+#[inline]
+pub fn sub<const D: usize>(a: Point<D>, b: Point<D>) -> Point<D> {
+    std::array::from_fn(|i| a[i] - b[i])
+}
+
+/// `a` made `k` times as long.
+#[inline]
+pub fn scaled<const D: usize>(a: Point<D>, k: f64) -> Point<D> {
+    std::array::from_fn(|i| a[i] * k)
+}
+
+/// The point `a + k u`.
+#[inline]
+pub fn along<const D: usize>(a: Point<D>, u: Point<D>, k: f64) -> Point<D> {
+    std::array::from_fn(|i| a[i] + u[i] * k)
+}
+
+/// The point at part `part` of the way from `a` to `b`.
+#[inline]
+pub fn between<const D: usize>(a: Point<D>, b: Point<D>, part: f64) -> Point<D> {
+    std::array::from_fn(|i| a[i] + (b[i] - a[i]) * part)
+}
+
+/// Inner product.
+#[inline]
+pub fn dot<const D: usize>(a: Point<D>, b: Point<D>) -> f64 {
+    let mut sum = a[0] * b[0];
+    for i in 1..D {
+        sum += a[i] * b[i];
+    }
+    sum
+}
+
+/// Length of a vector.
+#[inline]
+pub fn norm<const D: usize>(a: Point<D>) -> f64 {
+    dot(a, a).sqrt()
+}
+
+/// Square of the length of a vector.
+#[inline]
+pub fn norm2<const D: usize>(a: Point<D>) -> f64 {
+    dot(a, a)
+}
+
+/// Distance of two points.
+#[inline]
+pub fn distance<const D: usize>(a: Point<D>, b: Point<D>) -> f64 {
+    norm(sub(a, b))
+}
+
+/// Whether every coordinate is a finite number.
+pub fn is_finite<const D: usize>(a: &Point<D>) -> bool {
+    a.iter().all(|x| x.is_finite())
+}
+
+/// The vector of length 1 in the direction of `a`; `None` where `a` is zero.
+#[inline]
+pub fn unit<const D: usize>(a: Point<D>) -> Option<Point<D>> {
+    let length = norm(a);
+    (length > 0.0).then(|| scaled(a, 1.0 / length))
+}
+
+/// The part of `a` across the unit vector `axis`.
+#[inline]
+pub fn across<const D: usize>(a: Point<D>, axis: Point<D>) -> Point<D> {
+    sub(a, scaled(axis, dot(a, axis)))
+}
+
+/// At most `step_m` of the way from a place to another.
+pub fn towards<const D: usize>(from: Point<D>, to: Point<D>, step_m: f64) -> Point<D> {
+    let far_m = distance(from, to);
+    if far_m <= step_m { to } else { along(from, sub(to, from), step_m / far_m) }
+}
+
+/// A point with as many coordinates as asked for: further ones are left out, missing ones are 0.
+#[inline]
+pub fn in_dimensions<const D: usize, const N: usize>(p: Point<D>) -> Point<N> {
+    std::array::from_fn(|i| if i < D { p[i] } else { 0.0 })
+}
+
+/// The first axis.
+pub fn first_axis<const D: usize>() -> Point<D> {
+    std::array::from_fn(|i| if i == 0 { 1.0 } else { 0.0 })
+}
+
+/// A unit vector perpendicular to the unit vector `u`, always the same for the same `u`: in two
+/// dimensions `u` turned to the left.
+pub fn perpendicular<const D: usize>(u: Point<D>) -> Point<D> {
+    if D == 2 {
+        return std::array::from_fn(|i| if i == 0 { -u[1] } else { u[0] });
+    }
+    let axis = (0..D).min_by(|&i, &j| u[i].abs().total_cmp(&u[j].abs())).unwrap_or(0);
+    let e: Point<D> = std::array::from_fn(|i| if i == axis { 1.0 } else { 0.0 });
+    unit(along(e, u, -u[axis])).unwrap_or(e)
+}
+
+/// Signed area of the parallelogram of two plane vectors: positive where `b` is left of `a`.
+#[inline]
+pub fn cross_2d<const D: usize>(a: Point<D>, b: Point<D>) -> f64 {
+    a[0] * b[1] - a[1] * b[0]
+}
+
+/// Angle between two vectors, in [0, pi]; exact near 0 and pi too.
+pub fn angle_rad<const D: usize>(a: Point<D>, b: Point<D>) -> f64 {
+    let along_a = dot(a, b);
+    let across = if D == 2 { cross_2d(a, b).abs() } else { norm(cross(a, b)) };
+    math::atan2(across, along_a)
+}
+
+/// Cross product of vectors in space; `D` is 3, and generic for code that knows that only at run time.
+///
+/// # Panics
+/// In fewer than three dimensions.
+#[inline]
+pub fn cross<const D: usize>(a: Point<D>, b: Point<D>) -> Point<3> {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+/// The point of the segment `a b` nearest to `p`.
+#[inline]
+pub fn nearest_on_segment<const D: usize>(p: Point<D>, a: Point<D>, b: Point<D>) -> Point<D> {
+    let d = sub(b, a);
+    let length2 = dot(d, d);
+    let part = dot(sub(p, a), d);
+    if part <= 0.0 || length2 <= 0.0 {
+        a
+    } else if part >= length2 {
+        b
+    } else {
+        along(a, d, part / length2)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn angles_are_exact_near_zero_and_a_half_turn() {
+        assert!((angle_rad([1.0, 0.0, 0.0], [1.0, 1e-9, 0.0]) - 1e-9).abs() < 1e-20);
+        assert_eq!(angle_rad([1.0, 0.0], [-2.0, 0.0]), std::f64::consts::PI);
+    }
+
+    #[test]
+    fn a_step_never_goes_beyond_its_goal() {
+        assert_eq!(towards([0.0, 0.0], [3.0, 4.0], 10.0), [3.0, 4.0]);
+        assert_eq!(towards([0.0, 0.0], [3.0, 4.0], 2.5), [1.5, 2.0]);
+        assert_eq!(towards([1.0], [1.0], 0.0), [1.0]);
+    }
+
+    #[test]
+    fn points_get_as_many_coordinates_as_asked_for() {
+        assert_eq!(in_dimensions::<2, 3>([1.0, 2.0]), [1.0, 2.0, 0.0]);
+        assert_eq!(in_dimensions::<3, 2>([1.0, 2.0, 3.0]), [1.0, 2.0]);
+    }
+
+    #[test]
+    fn axes_make_a_right_handed_frame() {
+        assert_eq!(cross([1.0, 0.0, 0.0], [0.0, 1.0, 0.0]), [0.0, 0.0, 1.0]);
+        assert_eq!(across([1.0, 2.0, 3.0], [0.0, 0.0, 1.0]), [1.0, 2.0, 0.0]);
+    }
+}

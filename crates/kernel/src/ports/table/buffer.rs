@@ -1,0 +1,209 @@
+//! Rows that wait for being recorded.
+
+use super::declare::Table;
+use super::schema::TableSchema;
+use super::values::Values;
+use crate::ports::recorder::{RecordError, Recorder};
+use std::fmt;
+
+/// Rows of a table that are kept at most before they must be recorded.
+const MAX_ROWS: usize = 1 << 20;
+
+/// What waits for being recorded in one table.
+pub trait Buffer {
+    /// The table; `None` of one that is not recorded.
+    fn schema(&self) -> Option<TableSchema>;
+
+    /// Number of rows that wait.
+    fn rows(&self) -> usize;
+
+    /// All rows that wait, as one block; none wait afterwards. `None` of a table that is not
+    /// recorded.
+    fn take(&mut self) -> Option<Vec<Values>>;
+}
+
+/// The tables of a run; those that are recorded are numbered in their order.
+pub trait Buffers {
+    /// All tables.
+    fn buffers(&self) -> Vec<&dyn Buffer>;
+
+    /// All tables, in the same order.
+    fn buffers_mut(&mut self) -> Vec<&mut dyn Buffer>;
+
+    /// Whether rows must be recorded before more can be kept.
+    fn is_full(&self) -> bool {
+        self.buffers().iter().any(|buffer| buffer.rows() >= MAX_ROWS)
+    }
+
+    /// The tables that are recorded.
+    fn schemas(&self) -> Vec<TableSchema> {
+        self.buffers().iter().filter_map(|buffer| buffer.schema()).collect()
+    }
+
+    /// Hands all rows over to a recorder of these [`schemas`](Self::schemas).
+    ///
+    /// # Errors
+    /// When rows cannot be stored.
+    fn record(&mut self, recorder: &mut dyn Recorder) -> Result<(), RecordError> {
+        let blocks = self.buffers_mut().into_iter().filter_map(Buffer::take);
+        blocks.enumerate().try_for_each(|(table, block)| recorder.append(table, &block))
+    }
+}
+
+/// Rows that are kept one by one.
+pub struct RowBuffer<R> {
+    table: Option<Table<R>>,
+    rows: Vec<R>,
+}
+
+impl<R> RowBuffer<R> {
+    /// Keeps rows of `table` from now on; none without a table.
+    pub fn begin(&mut self, table: Option<Table<R>>) {
+        self.table = table;
+    }
+
+    /// Whether rows are kept at all.
+    pub fn is_kept(&self) -> bool {
+        self.table.is_some()
+    }
+
+    /// Keeps a row, if rows are kept at all.
+    pub fn push(&mut self, row: R) {
+        if self.is_kept() {
+            self.rows.push(row);
+        }
+    }
+}
+
+impl<R> Extend<R> for RowBuffer<R> {
+    fn extend<I: IntoIterator<Item = R>>(&mut self, rows: I) {
+        if self.is_kept() {
+            self.rows.extend(rows);
+        }
+    }
+}
+
+impl<R> Default for RowBuffer<R> {
+    fn default() -> Self {
+        Self { table: None, rows: Vec::new() }
+    }
+}
+
+impl<R> fmt::Debug for RowBuffer<R> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let rows = self.rows.len();
+        f.debug_struct("RowBuffer").field("table", &self.table).field("rows", &rows).finish()
+    }
+}
+
+impl<R> Buffer for RowBuffer<R> {
+    fn schema(&self) -> Option<TableSchema> {
+        self.table.as_ref().map(Table::schema)
+    }
+
+    fn rows(&self) -> usize {
+        self.rows.len()
+    }
+
+    fn take(&mut self) -> Option<Vec<Values>> {
+        let rows = std::mem::take(&mut self.rows);
+        self.table.as_ref().map(|table| table.block(&rows))
+    }
+}
+
+/// Whole columns, for tables whose rows are too many to be kept one by one.
+#[derive(Debug, Default)]
+pub struct BlockBuffer {
+    schema: Option<TableSchema>,
+    block: Option<Vec<Values>>,
+}
+
+impl BlockBuffer {
+    /// Keeps a block of `schema` from now on; none without a schema.
+    pub fn begin(&mut self, schema: Option<TableSchema>) {
+        self.schema = schema;
+    }
+
+    /// Whether a block is kept at all.
+    pub fn is_kept(&self) -> bool {
+        self.schema.is_some()
+    }
+
+    /// Keeps the block that is recorded next, in place of one that waits.
+    pub fn set(&mut self, block: Vec<Values>) {
+        self.block = Some(block);
+    }
+}
+
+impl Buffer for BlockBuffer {
+    fn schema(&self) -> Option<TableSchema> {
+        self.schema.clone()
+    }
+
+    fn rows(&self) -> usize {
+        self.block.as_ref().and_then(|block| block.first()).map_or(0, Values::len)
+    }
+
+    fn take(&mut self) -> Option<Vec<Values>> {
+        let schema = self.schema.as_ref()?;
+        let empty = || schema.columns.iter().map(|column| Values::empty(column.ty)).collect();
+        Some(self.block.take().unwrap_or_else(empty))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ports::MemoryRecorder;
+
+    #[derive(Default)]
+    struct Two {
+        kept: RowBuffer<u32>,
+        unwanted: RowBuffer<u32>,
+        blocks: BlockBuffer,
+    }
+
+    impl Buffers for Two {
+        fn buffers(&self) -> Vec<&dyn Buffer> {
+            vec![&self.unwanted, &self.kept, &self.blocks]
+        }
+
+        fn buffers_mut(&mut self) -> Vec<&mut dyn Buffer> {
+            vec![&mut self.unwanted, &mut self.kept, &mut self.blocks]
+        }
+    }
+
+    fn table(name: &str) -> Table<u32> {
+        Table::new(name).u32("k", "its number", |k| *k)
+    }
+
+    #[test]
+    fn rows_wait_until_they_are_recorded() {
+        let mut tables = Two::default();
+        tables.kept.begin(Some(table("kept")));
+        tables.blocks.begin(Some(table("blocks").schema()));
+        assert_eq!((tables.kept.is_kept(), tables.unwanted.is_kept()), (true, false));
+        tables.kept.extend([1, 2]);
+        tables.unwanted.push(3);
+        let mut recorder = MemoryRecorder::new(&tables.schemas());
+        tables.record(&mut recorder).unwrap();
+        tables.kept.push(4);
+        tables.blocks.set(vec![Values::U32(vec![5].into())]);
+        tables.record(&mut recorder).unwrap();
+        assert_eq!(recorder.column("kept", "k"), Some(&Values::U32(vec![1, 2, 4].into())));
+        assert_eq!(recorder.column("blocks", "k"), Some(&Values::U32(vec![5].into())));
+        assert_eq!(recorder.column("unwanted", "k"), None);
+    }
+
+    #[test]
+    fn a_table_with_many_rows_is_full() {
+        let mut tables = Two::default();
+        tables.kept.begin(Some(table("kept")));
+        tables.kept.extend(0..MAX_ROWS as u32 - 1);
+        assert!(!tables.is_full());
+        tables.kept.push(0);
+        assert!(tables.is_full());
+        tables.record(&mut MemoryRecorder::new(&tables.schemas())).unwrap();
+        assert!(!tables.is_full());
+    }
+}

@@ -1,0 +1,27 @@
+//! Tables: columns that are declared once, and their values as they lie in memory.
+//!
+//! ```text
+//! schema.rs   ColumnSpec, TableSchema: name, type, unit and meaning of a column
+//! unit.rs     the unit that a name ends in
+//! cells.rs    Cells, Texts: values side by side, and which of them are missing
+//! values.rs   Values: the cells of one column, of any type; RoleColumn: with a name and a role
+//! declare.rs  Table: columns with their getters; rows -> a block of values
+//! buffer.rs   rows that wait for being recorded
+//! ```
+//!
+//! The values of a column lie as Arrow wants them: one behind the other, with a mask beside them
+//! only where some are missing; text as offsets into one string.
+
+mod buffer;
+mod cells;
+mod declare;
+mod schema;
+mod unit;
+mod values;
+
+pub use buffer::{BlockBuffer, Buffer, Buffers, RowBuffer};
+pub use cells::{Cells, Texts};
+pub use declare::{Table, label_of};
+pub use schema::{ColumnSpec, ColumnType, TableSchema};
+pub use unit::split_unit;
+pub use values::{RoleColumn, Values};

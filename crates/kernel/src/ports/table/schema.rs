@@ -1,0 +1,129 @@
+//! The columns of a table: name, type, unit and meaning.
+
+use super::unit::split_unit;
+use super::values::Values;
+
+/// The type of a column.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ColumnType {
+    /// Unsigned 32-bit integers.
+    U32,
+    /// Unsigned 64-bit integers.
+    U64,
+    /// Signed 32-bit integers.
+    I32,
+    /// Signed 64-bit integers.
+    I64,
+    /// Double precision floats.
+    F64,
+    /// Truth values.
+    Bool,
+    /// Short text from a small vocabulary, stored as an index into `labels`.
+    Label,
+    /// Any text.
+    Text,
+}
+
+impl ColumnType {
+    /// All types.
+    pub const ALL: [Self; 8] = [
+        Self::U32,
+        Self::U64,
+        Self::I32,
+        Self::I64,
+        Self::F64,
+        Self::Bool,
+        Self::Label,
+        Self::Text,
+    ];
+
+    /// Its name in files and reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::U32 => "u32",
+            Self::U64 => "u64",
+            Self::I32 => "i32",
+            Self::I64 => "i64",
+            Self::F64 => "f64",
+            Self::Bool => "bool",
+            Self::Label => "label",
+            Self::Text => "text",
+        }
+    }
+
+    /// The type of this [name](Self::name).
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|ty| ty.name() == name)
+    }
+}
+
+/// One column: name with its unit (`distance_m`), type and meaning.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ColumnSpec {
+    /// Name; ends in the unit where the quantity has one.
+    pub name: String,
+    /// Type of its values.
+    pub ty: ColumnType,
+    /// One sentence for the reader of the file.
+    pub meaning: String,
+    /// The vocabulary of a [`ColumnType::Label`] column, empty for others.
+    pub labels: Vec<String>,
+    /// Whether values may be missing.
+    pub is_nullable: bool,
+}
+
+impl ColumnSpec {
+    /// A column without labels, of which no value is missing.
+    pub fn new(name: &str, ty: ColumnType, meaning: &str) -> Self {
+        let (name, meaning) = (name.into(), meaning.into());
+        Self { name, ty, meaning, labels: Vec::new(), is_nullable: false }
+    }
+
+    /// A column of labels, of which none is missing.
+    pub fn label<L: Into<String>>(
+        name: &str,
+        meaning: &str,
+        labels: impl IntoIterator<Item = L>,
+    ) -> Self {
+        let labels = labels.into_iter().map(Into::into).collect();
+        Self { labels, ..Self::new(name, ColumnType::Label, meaning) }
+    }
+
+    /// The value in `row` of its values, as [`Values::write`] writes it.
+    pub fn text(&self, values: &Values, row: usize) -> String {
+        let mut text = String::new();
+        // Writing to a string cannot fail.
+        let _ = values.write(row, &self.labels, &mut text);
+        text
+    }
+
+    /// The unit of its values, where its name ends in one.
+    pub fn unit(&self) -> Option<&'static str> {
+        split_unit(&self.name).1
+    }
+}
+
+/// One table: name and columns.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TableSchema {
+    /// File stem, e.g. `trajectories`.
+    pub name: String,
+    /// The columns in order.
+    pub columns: Vec<ColumnSpec>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn types_survive_their_names_and_units_are_those_of_names() {
+        for ty in ColumnType::ALL {
+            assert_eq!(ColumnType::from_name(ty.name()), Some(ty));
+        }
+        assert_eq!(ColumnType::from_name("complex"), None);
+        let unit = |name| ColumnSpec::new(name, ColumnType::F64, "").unit();
+        assert_eq!((unit("x_m"), unit("max_speed_m_s")), (Some("m"), Some("m/s")));
+        assert_eq!((unit("entity"), unit("bytes")), (None, None));
+    }
+}

@@ -1,0 +1,239 @@
+//! The cells of one column, of any type.
+
+use super::cells::{Cells, Texts};
+use super::schema::ColumnType;
+use serde_json::Value;
+use std::fmt::{self, Write};
+
+/// The values of one column in one block; any of them may be missing.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Values {
+    /// See [`ColumnType::U32`].
+    U32(Cells<u32>),
+    /// See [`ColumnType::U64`].
+    U64(Cells<u64>),
+    /// See [`ColumnType::I32`].
+    I32(Cells<i32>),
+    /// See [`ColumnType::I64`].
+    I64(Cells<i64>),
+    /// See [`ColumnType::F64`].
+    F64(Cells<f64>),
+    /// See [`ColumnType::Bool`].
+    Bool(Cells<bool>),
+    /// See [`ColumnType::Label`]; indices into the column's labels.
+    Label(Cells<u32>),
+    /// See [`ColumnType::Text`].
+    Text(Texts),
+}
+
+/// Does the same for the cells of any type.
+macro_rules! each {
+    ($values:expr, $cells:ident => $work:expr) => {
+        match $values {
+            Values::U32($cells) | Values::Label($cells) => $work,
+            Values::U64($cells) => $work,
+            Values::I32($cells) => $work,
+            Values::I64($cells) => $work,
+            Values::F64($cells) => $work,
+            Values::Bool($cells) => $work,
+            Values::Text($cells) => $work,
+        }
+    };
+}
+
+impl Values {
+    /// No values of this type.
+    pub fn empty(ty: ColumnType) -> Self {
+        match ty {
+            ColumnType::U32 => Self::U32(Cells::default()),
+            ColumnType::U64 => Self::U64(Cells::default()),
+            ColumnType::I32 => Self::I32(Cells::default()),
+            ColumnType::I64 => Self::I64(Cells::default()),
+            ColumnType::F64 => Self::F64(Cells::default()),
+            ColumnType::Bool => Self::Bool(Cells::default()),
+            ColumnType::Label => Self::Label(Cells::default()),
+            ColumnType::Text => Self::Text(Texts::default()),
+        }
+    }
+
+    /// The column type these values belong to.
+    pub fn ty(&self) -> ColumnType {
+        match self {
+            Self::U32(_) => ColumnType::U32,
+            Self::U64(_) => ColumnType::U64,
+            Self::I32(_) => ColumnType::I32,
+            Self::I64(_) => ColumnType::I64,
+            Self::F64(_) => ColumnType::F64,
+            Self::Bool(_) => ColumnType::Bool,
+            Self::Label(_) => ColumnType::Label,
+            Self::Text(_) => ColumnType::Text,
+        }
+    }
+
+    /// Number of values, missing ones included.
+    pub fn len(&self) -> usize {
+        each!(self, cells => cells.len())
+    }
+
+    /// True without values.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Which rows have a value; `None` where all have.
+    pub fn valid(&self) -> Option<&[bool]> {
+        each!(self, cells => cells.valid())
+    }
+
+    /// Whether the value in `row` is missing, or there is no such row.
+    pub fn is_missing(&self, row: usize) -> bool {
+        each!(self, cells => cells.get(row).is_none())
+    }
+
+    /// Appends the values of `more`.
+    ///
+    /// # Panics
+    /// When the types differ; [`check_block`](crate::ports::recorder::check_block) compares them
+    /// for a whole block.
+    pub fn append(&mut self, more: &Self) {
+        match (self, more) {
+            (Self::U32(a), Self::U32(b)) | (Self::Label(a), Self::Label(b)) => a.append(b),
+            (Self::U64(a), Self::U64(b)) => a.append(b),
+            (Self::I32(a), Self::I32(b)) => a.append(b),
+            (Self::I64(a), Self::I64(b)) => a.append(b),
+            (Self::F64(a), Self::F64(b)) => a.append(b),
+            (Self::Bool(a), Self::Bool(b)) => a.append(b),
+            (Self::Text(a), Self::Text(b)) => a.append(b),
+            (a, b) => panic!("{:?} values appended to {:?} ones", b.ty(), a.ty()),
+        }
+    }
+
+    /// Makes it `rows` long; new values are missing.
+    pub fn resize(&mut self, rows: usize) {
+        each!(self, cells => cells.resize(rows));
+    }
+
+    /// Keeps the values at which `keep` (of the same length) is true.
+    pub fn retain_rows(&mut self, keep: &[bool]) {
+        each!(self, cells => cells.retain_rows(keep));
+    }
+
+    /// The values of these rows, in this order.
+    #[must_use]
+    pub fn pick(&self, order: &[usize]) -> Self {
+        match self {
+            Self::U32(cells) => Self::U32(cells.pick(order)),
+            Self::U64(cells) => Self::U64(cells.pick(order)),
+            Self::I32(cells) => Self::I32(cells.pick(order)),
+            Self::I64(cells) => Self::I64(cells.pick(order)),
+            Self::F64(cells) => Self::F64(cells.pick(order)),
+            Self::Bool(cells) => Self::Bool(cells.pick(order)),
+            Self::Label(cells) => Self::Label(cells.pick(order)),
+            Self::Text(cells) => Self::Text(cells.pick(order)),
+        }
+    }
+
+    /// Whether the values are numbers.
+    pub fn is_numeric(&self) -> bool {
+        !matches!(self, Self::Bool(_) | Self::Label(_) | Self::Text(_))
+    }
+
+    /// The value in `row` as a number; true is 1, false 0, a label its index, text is none.
+    pub fn number(&self, row: usize) -> Option<f64> {
+        match self {
+            Self::U32(cells) | Self::Label(cells) => cells.get(row).map(|&v| f64::from(v)),
+            Self::U64(cells) => cells.get(row).map(|&v| v as f64),
+            Self::I32(cells) => cells.get(row).map(|&v| f64::from(v)),
+            Self::I64(cells) => cells.get(row).map(|&v| v as f64),
+            Self::F64(cells) => cells.get(row).copied(),
+            Self::Bool(cells) => cells.get(row).map(|&v| f64::from(v)),
+            Self::Text(_) => None,
+        }
+    }
+
+    /// The value in `row` as JSON; a missing one is null, a label its index.
+    pub fn json(&self, row: usize) -> Value {
+        fn of<T: Clone + Into<Value>>(value: Option<&T>) -> Value {
+            value.cloned().map_or(Value::Null, Into::into)
+        }
+        match self {
+            Self::U32(cells) | Self::Label(cells) => of(cells.get(row)),
+            Self::U64(cells) => of(cells.get(row)),
+            Self::I32(cells) => of(cells.get(row)),
+            Self::I64(cells) => of(cells.get(row)),
+            Self::F64(cells) => of(cells.get(row)),
+            Self::Bool(cells) => of(cells.get(row)),
+            Self::Text(cells) => cells.get(row).into(),
+        }
+    }
+
+    /// Writes the value in `row` as text, nothing where it is missing. Floats have as many digits
+    /// as bring them back exactly; a label is its text in `labels`, or its index.
+    ///
+    /// # Errors
+    /// When nothing can be written to `to`.
+    pub fn write(&self, row: usize, labels: &[String], to: &mut impl Write) -> fmt::Result {
+        if let Self::Label(cells) = self
+            && let Some(label) = cells.get(row).and_then(|&label| labels.get(label as usize))
+        {
+            return to.write_str(label);
+        }
+        each!(self, cells => cells.get(row).map_or(Ok(()), |value| write!(to, "{value}")))
+    }
+
+    /// The value in `row` as [`write`](Self::write) writes it, a label as its index; see
+    /// [`ColumnSpec::text`](super::ColumnSpec::text) for its text.
+    pub fn text(&self, row: usize) -> String {
+        let mut text = String::new();
+        // Writing to a string cannot fail.
+        let _ = self.write(row, &[], &mut text);
+        text
+    }
+}
+
+/// A column of a table that is whole in memory, with what it is to the table, e.g. a parameter or a
+/// metric of runs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RoleColumn<R> {
+    /// Its name, with its unit where the quantity has one.
+    pub name: String,
+    /// What it is.
+    pub role: R,
+    /// Its values, one a row.
+    pub values: Values,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn values_are_numbers_words_and_json() {
+        let values = Values::Bool([Some(true), None].into_iter().collect());
+        assert_eq!((values.number(0), values.number(1), values.number(9)), (Some(1.0), None, None));
+        assert_eq!((values.text(0).as_str(), values.text(1).as_str()), ("true", ""));
+        assert_eq!((values.json(0), values.json(1)), (json!(true), Value::Null));
+        assert_eq!(Values::F64(vec![0.5].into()).text(0), "0.5");
+        assert_eq!(Values::I64(vec![-3].into()).json(0), json!(-3));
+        assert_eq!(Values::Text([Some("a")].into_iter().collect()).json(0), json!("a"));
+        let labels = ["low".to_string(), "high".to_string()];
+        let mut text = String::new();
+        Values::Label(vec![1].into()).write(0, &labels, &mut text).unwrap();
+        assert_eq!(text, "high");
+    }
+
+    #[test]
+    fn every_type_grows_and_is_picked_from() {
+        for ty in ColumnType::ALL {
+            let mut values = Values::empty(ty);
+            assert_eq!((values.ty(), values.is_empty(), values.valid()), (ty, true, None));
+            values.resize(2);
+            values.append(&values.clone());
+            assert_eq!((values.len(), values.is_missing(3)), (4, true));
+            assert_eq!(values.pick(&[0, 3]).len(), 2);
+            values.retain_rows(&[true, false, false, false]);
+            assert_eq!(values.len(), 1);
+        }
+    }
+}

@@ -1,0 +1,370 @@
+//! Tables that are whole in memory, whose cells may be missing: one row a run.
+//!
+//! [`write()`] makes one Parquet file that is there in full or not at all; [`read()`] reads it back
+//! after comparing its checksums. Columns of runs are few and rows are some millions at most, so
+//! nothing here is streamed. Every column is optional in the file; it has an integer of 64 bits,
+//! a float, a truth value or text.
+
+use std::fs::File;
+use std::io::{self, Write};
+use std::ops::Range;
+use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use parquet::basic::{LogicalType, Repetition, Type as PhysicalType};
+use parquet::column::writer::ColumnWriterImpl;
+use parquet::data_type::{BoolType, ByteArray, ByteArrayType, DataType, DoubleType, Int64Type};
+use parquet::errors::{ParquetError, Result as ParquetResult};
+use parquet::file::metadata::KeyValue;
+use parquet::file::properties::{EnabledStatistics, WriterProperties};
+use parquet::file::reader::{FileReader, RowGroupReader};
+use parquet::file::serialized_reader::SerializedFileReader;
+use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
+use parquet::schema::types::{Type, TypePtr};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use sidestep_kernel::InputError;
+use sidestep_kernel::ports::{Cells, ColumnType, RecordError, RoleColumn, Values};
+
+use crate::disk;
+use crate::format::{self, FormatVersion};
+use crate::part::cause;
+use crate::read::{check_bytes, damaged, read_cells, read_texts, text};
+use crate::schema::{self, CHECKSUMS, COLUMNS, FORMAT, VERSION};
+
+/// Rows of a row group.
+const GROUP_ROWS: usize = 1 << 16;
+
+/// A column in the file's key-value pair [`COLUMNS`].
+#[derive(Debug, Serialize, Deserialize)]
+struct ColumnEntry {
+    name: String,
+    role: Value,
+}
+
+/// A table that was read back.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WholeTable<R> {
+    /// Its columns, all of one length; those of a role that this version does not know are left
+    /// out.
+    pub columns: Vec<RoleColumn<R>>,
+    /// Version of the program that wrote it.
+    pub program_version: String,
+}
+
+/// Writes the columns (all of one length) to the file at `path`, and what `extra` adds to its
+/// key-value pairs.
+///
+/// # Errors
+/// A column of a type that such files do not hold; what the system says. A file that was there
+/// stays then.
+pub fn write<R: Serialize>(
+    path: &Path,
+    columns: &[RoleColumn<R>],
+    program_version: &str,
+    extra: &[(&str, String)],
+) -> Result<(), RecordError> {
+    let growing = disk::partial(path);
+    let written = File::create(&growing)
+        .map_err(ParquetError::from)
+        .and_then(|file| write_file(file, columns, program_version, extra));
+    written.map_err(|e| {
+        // On a full disk the half-written file must not keep its space.
+        let _ = std::fs::remove_file(&growing);
+        RecordError::new(path.display(), cause(e))
+    })?;
+    disk::rename(&growing, path)
+}
+
+fn write_file<R: Serialize>(
+    file: File,
+    columns: &[RoleColumn<R>],
+    program_version: &str,
+    extra: &[(&str, String)],
+) -> ParquetResult<()> {
+    let hash = Hash::default();
+    let sink = Hashed { file, hash: hash.clone() };
+    let properties = WriterProperties::builder()
+        .set_created_by(concat!("sidestep-record ", env!("CARGO_PKG_VERSION")).into())
+        .set_statistics_enabled(EnabledStatistics::Chunk)
+        .set_offset_index_disabled(true)
+        .set_key_value_metadata(Some(key_values(columns, program_version, extra)?))
+        .build();
+    let mut writer =
+        SerializedFileWriter::new(sink, parquet_schema(columns)?, Arc::new(properties))?;
+    writer.flush()?;
+    hash.take();
+    let rows = columns.first().map_or(0, |c| c.values.len());
+    let mut checksums = Vec::new();
+    for start in (0..rows).step_by(GROUP_ROWS) {
+        let mut group = writer.next_row_group()?;
+        for column in columns {
+            write_column(&mut group, column, start..rows.min(start + GROUP_ROWS))?;
+        }
+        group.close()?;
+        writer.flush()?;
+        checksums.push(hash.take());
+    }
+    let checksums = schema::checksums_to_text(&checksums);
+    writer.append_key_value_metadata(KeyValue::new(CHECKSUMS.to_string(), checksums));
+    writer.into_inner()?.file.sync_all()?;
+    Ok(())
+}
+
+fn key_values<R: Serialize>(
+    columns: &[RoleColumn<R>],
+    program_version: &str,
+    extra: &[(&str, String)],
+) -> ParquetResult<Vec<KeyValue>> {
+    let json = |e: serde_json::Error| ParquetError::External(Box::new(e));
+    let entry = |c: &RoleColumn<R>| {
+        Ok(ColumnEntry { name: c.name.clone(), role: serde_json::to_value(&c.role)? })
+    };
+    let entries = columns.iter().map(entry).collect::<Result<Vec<_>, _>>().map_err(json)?;
+    let entries = serde_json::to_string(&entries).map_err(json)?;
+    let pair = |key: &str, value: String| KeyValue::new(key.to_string(), value);
+    let mut pairs = vec![
+        pair(FORMAT, format::CURRENT.to_string()),
+        pair(VERSION, program_version.to_string()),
+        pair(COLUMNS, entries),
+    ];
+    pairs.extend(extra.iter().map(|(key, value)| pair(key, value.clone())));
+    Ok(pairs)
+}
+
+fn parquet_schema<R>(columns: &[RoleColumn<R>]) -> ParquetResult<TypePtr> {
+    let field = |column: &RoleColumn<R>| {
+        let (physical, logical) = match column.values.ty() {
+            ColumnType::I64 => (PhysicalType::INT64, None),
+            ColumnType::F64 => (PhysicalType::DOUBLE, None),
+            ColumnType::Bool => (PhysicalType::BOOLEAN, None),
+            ColumnType::Text => (PhysicalType::BYTE_ARRAY, Some(LogicalType::String)),
+            other => return Err(wrong_type(&column.name, other)),
+        };
+        let field = Type::primitive_type_builder(&column.name, physical)
+            .with_repetition(Repetition::OPTIONAL)
+            .with_logical_type(logical)
+            .build()?;
+        Ok(Arc::new(field))
+    };
+    let fields = columns.iter().map(field).collect::<ParquetResult<_>>()?;
+    Ok(Arc::new(Type::group_type_builder("schema").with_fields(fields).build()?))
+}
+
+fn wrong_type(column: &str, ty: ColumnType) -> ParquetError {
+    let ty = ty.name();
+    ParquetError::General(format!("column `{column}` is {ty}, not i64, f64, bool or text"))
+}
+
+fn write_column<R>(
+    group: &mut SerializedRowGroupWriter<'_, Hashed>,
+    RoleColumn { name, values, .. }: &RoleColumn<R>,
+    rows: Range<usize>,
+) -> ParquetResult<()> {
+    let too_few = || ParquetError::General("a column more than the schema has".into());
+    let mut column = group.next_column()?.ok_or_else(too_few)?;
+    let levels: Vec<i16> = match values.valid() {
+        None => vec![1; rows.len()],
+        Some(valid) => valid[rows.clone()].iter().map(|valid| i16::from(*valid)).collect(),
+    };
+    match values {
+        Values::I64(v) => write_values::<Int64Type>(column.typed(), &levels, present(v, rows)),
+        Values::F64(v) => write_values::<DoubleType>(column.typed(), &levels, present(v, rows)),
+        Values::Bool(v) => write_values::<BoolType>(column.typed(), &levels, present(v, rows)),
+        Values::Text(v) => {
+            let texts = rows.filter_map(|row| v.get(row)).map(ByteArray::from).collect();
+            write_values::<ByteArrayType>(column.typed(), &levels, texts)
+        }
+        other => Err(wrong_type(name, other.ty())),
+    }?;
+    column.close()
+}
+
+/// The values in `rows` that are not missing.
+fn present<T: Copy>(cells: &Cells<T>, rows: Range<usize>) -> Vec<T> {
+    rows.filter_map(|row| cells.get(row).copied()).collect()
+}
+
+fn write_values<T: DataType>(
+    column: &mut ColumnWriterImpl<'_, T>,
+    levels: &[i16],
+    present: Vec<T::T>,
+) -> ParquetResult<()> {
+    column.write_batch(&present, Some(levels), None).map(drop)
+}
+
+/// A checksum that is shared with what writes through it.
+#[derive(Debug, Clone, Default)]
+struct Hash(Arc<Mutex<crc32fast::Hasher>>);
+
+impl Hash {
+    fn update(&self, bytes: &[u8]) {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).update(bytes);
+    }
+
+    /// The checksum of all bytes since the last call.
+    fn take(&self) -> u32 {
+        std::mem::take(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner)).finalize()
+    }
+}
+
+/// A file whose bytes are hashed as they are written.
+#[derive(Debug)]
+struct Hashed {
+    file: File,
+    hash: Hash,
+}
+
+impl Write for Hashed {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let n = self.file.write(bytes)?;
+        self.hash.update(&bytes[..n]);
+        Ok(n)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+/// Reads the table in the file at `path`.
+///
+/// # Errors
+/// When it is missing, damaged, no table of this kind, or of another major format.
+pub fn read<R: DeserializeOwned>(path: &Path) -> Result<WholeTable<R>, InputError> {
+    let bytes = File::open(path).map_err(|e| {
+        InputError::new(path.display(), e.to_string(), "name a table that a sweep wrote")
+    })?;
+    let failed = |e| damaged(path, cause(e));
+    let copy = bytes.try_clone().map_err(|e| failed(e.into()))?;
+    let file = SerializedFileReader::new(copy).map_err(failed)?;
+    let text = |key| text(path, file.metadata(), key);
+    let wrong = |e: &dyn std::fmt::Display| damaged(path, e.to_string());
+    let format: FormatVersion = text(FORMAT)?.parse().map_err(|e| wrong(&e))?;
+    format.check_readable(path.display())?;
+    let program_version = text(VERSION)?;
+    let entries: Vec<ColumnEntry> = serde_json::from_str(&text(COLUMNS)?).map_err(|e| wrong(&e))?;
+    let checksums = schema::checksums_from_text(&text(CHECKSUMS)?).map_err(|e| wrong(&e))?;
+    let mut values = empty_values(&file, &entries).map_err(failed)?;
+    for group in 0..file.num_row_groups() {
+        check_bytes(&bytes, file.metadata(), group, &checksums).map_err(failed)?;
+        read_group(file.get_row_group(group).map_err(failed)?.as_ref(), &mut values)
+            .map_err(failed)?;
+    }
+    let column = |(ColumnEntry { name, role }, values)| {
+        Some(RoleColumn { name, role: serde_json::from_value(role).ok()?, values })
+    };
+    let columns = entries.into_iter().zip(values).filter_map(column).collect();
+    Ok(WholeTable { columns, program_version })
+}
+
+/// Columns without rows, of the file's types.
+fn empty_values(
+    file: &SerializedFileReader<File>,
+    entries: &[ColumnEntry],
+) -> ParquetResult<Vec<Values>> {
+    let stored = file.metadata().file_metadata().schema_descr();
+    let wrong = || ParquetError::General(format!("its columns are not those of `{COLUMNS}`"));
+    if stored.num_columns() != entries.len() {
+        return Err(wrong());
+    }
+    let values = |(i, entry): (usize, &ColumnEntry)| {
+        let column = stored.column(i);
+        if column.name() != entry.name || column.max_def_level() != 1 || column.max_rep_level() != 0
+        {
+            return Err(wrong());
+        }
+        match column.physical_type() {
+            PhysicalType::INT64 => Ok(Values::empty(ColumnType::I64)),
+            PhysicalType::DOUBLE => Ok(Values::empty(ColumnType::F64)),
+            PhysicalType::BOOLEAN => Ok(Values::empty(ColumnType::Bool)),
+            PhysicalType::BYTE_ARRAY => Ok(Values::empty(ColumnType::Text)),
+            _ => Err(wrong()),
+        }
+    };
+    entries.iter().enumerate().map(values).collect()
+}
+
+fn read_group(group: &dyn RowGroupReader, columns: &mut [Values]) -> ParquetResult<()> {
+    use parquet::column::reader::ColumnReader as Reader;
+    let rows = usize::try_from(group.metadata().num_rows()).unwrap_or(0);
+    for (i, values) in columns.iter_mut().enumerate() {
+        let read = match group.get_column_reader(i)? {
+            Reader::Int64ColumnReader(r) => Values::I64(read_cells(r, true, Ok)?),
+            Reader::DoubleColumnReader(r) => Values::F64(read_cells(r, true, Ok)?),
+            Reader::BoolColumnReader(r) => Values::Bool(read_cells(r, true, Ok)?),
+            Reader::ByteArrayColumnReader(r) => Values::Text(read_texts(r, true)?),
+            _ => return Err(ParquetError::General(format!("column {i} has another type"))),
+        };
+        if read.len() != rows {
+            return Err(ParquetError::General(format!("column {i} has not {rows} rows")));
+        }
+        values.append(&read);
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn column(name: &str, values: Values) -> RoleColumn<String> {
+        RoleColumn { name: name.into(), role: "metric".into(), values }
+    }
+
+    fn back(columns: &[RoleColumn<String>]) -> Vec<RoleColumn<String>> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("t.parquet");
+        write(&path, columns, "0.1.0", &[("sidestep.plan", "{}".into())]).unwrap();
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+        read(&path).unwrap().columns
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+        #[test]
+        fn a_table_survives_its_file(
+            rows in proptest::collection::vec(
+                (any::<Option<i64>>(), any::<Option<f64>>(), any::<Option<bool>>(), ".{0,5}"), 0..50,
+            ),
+        ) {
+            let text = |s: &String| (!s.is_empty()).then(|| s.clone());
+            let columns = [
+                column("a.b", Values::I64(rows.iter().map(|r| r.0).collect())),
+                column("b", Values::F64(
+                    rows.iter().map(|r| r.1.filter(|x| !x.is_nan())).collect(),
+                )),
+                column("c", Values::Bool(rows.iter().map(|r| r.2).collect())),
+                column("d", Values::Text(rows.iter().map(|r| text(&r.3)).collect())),
+            ];
+            prop_assert_eq!(back(&columns), columns);
+        }
+    }
+
+    #[test]
+    fn a_table_of_several_row_groups_survives_its_file() {
+        let n = GROUP_ROWS + 5;
+        let odd = |k: usize| (k % 2 == 1).then_some(k as i64);
+        let columns = [column("k", Values::I64((0..n).map(odd).collect()))];
+        assert_eq!(back(&columns), columns);
+    }
+
+    #[test]
+    fn a_changed_byte_is_noticed() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("t.parquet");
+        let columns = [column("k", Values::I64((0..1000).map(Some).collect()))];
+        write(&path, &columns, "0.1.0", &[]).unwrap();
+        let whole = std::fs::read(&path).unwrap();
+        for place in [10, whole.len() / 3] {
+            let mut changed = whole.clone();
+            changed[place] ^= 4;
+            std::fs::write(&path, &changed).unwrap();
+            assert!(read::<String>(&path).is_err(), "byte {place}");
+        }
+        std::fs::write(&path, &whole[..whole.len() - 9]).unwrap();
+        assert!(read::<String>(&path).is_err());
+    }
+}

@@ -1,0 +1,403 @@
+//! Numbers that check themselves on reading.
+//!
+//! A field of such a type holds a right value, or the file was refused:
+//! [`Source::parse`](crate::Source::parse) points at the wrong number and tells the remedy. A
+//! later check that needs the place as well wraps it: `Spanned<Positive>`.
+//!
+//! ```
+//! use sidestep_scenario::{Positive, Share, Source, Whole};
+//!
+//! #[derive(Debug, serde::Deserialize)]
+//! struct Radio {
+//!     range_m: Positive,
+//!     loss: Option<Share>,
+//!     channels: Whole<1, 16>,
+//! }
+//! let read = |text: &str| Source::new("s.toml", text, "").parse::<Radio>();
+//! let radio = read("range_m = 4\nchannels = 2").expect("right");
+//! assert_eq!((radio.range_m.get(), radio.loss, radio.channels.get()), (4.0, None, 2));
+//! let error = read("range_m = 4\nloss = nan\nchannels = 2").expect_err("no share");
+//! assert_eq!(error.position(), Some((2, 8)));
+//! assert_eq!((error.cause(), error.remedy()), ("loss = NaN", "give 0 to 1"));
+//! ```
+
+use serde::de::{Error, SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer};
+use std::fmt;
+use std::marker::PhantomData;
+
+/// A rule that numbers obey.
+pub trait Rule {
+    /// Returns whether a number obeys.
+    fn allows(number: f64) -> bool;
+
+    /// Right numbers in words, as they follow "give": "a number above 0".
+    fn words() -> String;
+
+    /// Right points in the same words.
+    fn words_of_point(dimensions: usize) -> String {
+        format!("{dimensions} numbers, each {}", Self::words())
+    }
+}
+
+/// Every finite number.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Any;
+
+impl Rule for Any {
+    fn allows(number: f64) -> bool {
+        number.is_finite()
+    }
+
+    fn words() -> String {
+        "a finite number".into()
+    }
+}
+
+/// Finite numbers above 0.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AboveZero;
+
+impl Rule for AboveZero {
+    fn allows(number: f64) -> bool {
+        number > 0.0 && number.is_finite()
+    }
+
+    fn words() -> String {
+        "a number above 0".into()
+    }
+}
+
+/// Finite numbers from 0 on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FromZero;
+
+impl Rule for FromZero {
+    fn allows(number: f64) -> bool {
+        number >= 0.0 && number.is_finite()
+    }
+
+    fn words() -> String {
+        "a number of at least 0".into()
+    }
+}
+
+/// Numbers from `LEAST` to `MOST`; whether the bounds themselves are right is told by the last two.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Between<const LEAST: i64, const MOST: i64, const HAS_LEAST: bool, const HAS_MOST: bool>;
+
+/// Numbers from `LEAST` to `MOST`, both included.
+pub type FromTo<const LEAST: i64, const MOST: i64> = Between<LEAST, MOST, true, true>;
+/// Numbers above `LEAST`, up to `MOST`.
+pub type AboveTo<const LEAST: i64, const MOST: i64> = Between<LEAST, MOST, false, true>;
+/// Numbers from `LEAST` on, below `MOST`.
+pub type FromBelow<const LEAST: i64, const MOST: i64> = Between<LEAST, MOST, true, false>;
+/// Numbers above `LEAST` and below `MOST`.
+pub type AboveBelow<const LEAST: i64, const MOST: i64> = Between<LEAST, MOST, false, false>;
+
+impl<const LEAST: i64, const MOST: i64, const HAS_LEAST: bool, const HAS_MOST: bool> Rule
+    for Between<LEAST, MOST, HAS_LEAST, HAS_MOST>
+{
+    fn allows(number: f64) -> bool {
+        let (least, most) = (LEAST as f64, MOST as f64);
+        let is_in = number >= least && number <= most;
+        is_in && (HAS_LEAST || number > least) && (HAS_MOST || number < most)
+    }
+
+    fn words() -> String {
+        let [least, most] = [LEAST, MOST].map(short);
+        match (HAS_LEAST, HAS_MOST) {
+            (true, true) => format!("{least} to {most}"),
+            (false, true) => format!("a number above {least} and at most {most}"),
+            (true, false) => format!("{least} or more and less than {most}"),
+            (false, false) => format!("more than {least} and less than {most}"),
+        }
+    }
+}
+
+/// A bound as people write it: 1e6 rather than 1000000.
+fn short(bound: i64) -> String {
+    match bound.abs() < 1_000_000 {
+        true => bound.to_string(),
+        false => format!("{bound:e}"),
+    }
+}
+
+/// A number that obeys a rule.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Number<R>(f64, PhantomData<R>);
+
+/// A finite number.
+pub type Finite = Number<Any>;
+/// A number above 0.
+pub type Positive = Number<AboveZero>;
+/// A number of at least 0.
+pub type NonNegative = Number<FromZero>;
+/// A number from 0 to 1: a share, a probability.
+pub type Share = Number<FromTo<0, 1>>;
+
+impl<R: Rule> Number<R> {
+    /// The number.
+    pub fn get(self) -> f64 {
+        self.0
+    }
+
+    fn checked<E: Error>(number: f64) -> Result<Self, E> {
+        match R::allows(number) {
+            true => Ok(Self(number, PhantomData)),
+            false => Err(refused(number, &format!("give {}", R::words()))),
+        }
+    }
+}
+
+impl<R> From<Number<R>> for f64 {
+    fn from(number: Number<R>) -> Self {
+        number.0
+    }
+}
+
+/// Checked inside the visitor, so that the reader knows the place even in an array.
+impl<'de, R: Rule> Deserialize<'de> for Number<R> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Reader<R>(PhantomData<R>);
+
+        impl<R: Rule> Visitor<'_> for Reader<R> {
+            type Value = Number<R>;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a number")
+            }
+
+            fn visit_f64<E: Error>(self, number: f64) -> Result<Self::Value, E> {
+                Number::checked(number)
+            }
+
+            fn visit_i64<E: Error>(self, number: i64) -> Result<Self::Value, E> {
+                Number::checked(number as f64)
+            }
+
+            fn visit_u64<E: Error>(self, number: u64) -> Result<Self::Value, E> {
+                Number::checked(number as f64)
+            }
+        }
+        deserializer.deserialize_f64(Reader(PhantomData))
+    }
+}
+
+/// A whole number from `LEAST` to `MOST`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Whole<const LEAST: u64, const MOST: u64 = { u64::MAX }>(u64);
+
+impl<const LEAST: u64, const MOST: u64> Whole<LEAST, MOST> {
+    /// The number.
+    pub fn get(self) -> u64 {
+        self.0
+    }
+
+    /// Reads such a number into a field that holds a plain one: `deserialize_with`.
+    ///
+    /// # Errors
+    /// As reading `Self`.
+    pub fn read<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u64, D::Error> {
+        Self::deserialize(deserializer).map(Self::get)
+    }
+
+    /// A bound that nobody reaches is not worth a word.
+    fn remedy(is_below: bool) -> String {
+        match is_below && MOST >= u64::from(u32::MAX) {
+            true => format!("give {LEAST} or more"),
+            false => format!("give {LEAST} to {MOST}"),
+        }
+    }
+}
+
+impl<'de, const LEAST: u64, const MOST: u64> Deserialize<'de> for Whole<LEAST, MOST> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Reader<const LEAST: u64, const MOST: u64>;
+
+        impl<const LEAST: u64, const MOST: u64> Visitor<'_> for Reader<LEAST, MOST> {
+            type Value = Whole<LEAST, MOST>;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a whole number")
+            }
+
+            fn visit_i64<E: Error>(self, number: i64) -> Result<Self::Value, E> {
+                match u64::try_from(number) {
+                    Ok(number) => self.visit_u64(number),
+                    Err(_) => Err(refused(number, &Self::Value::remedy(true))),
+                }
+            }
+
+            fn visit_u64<E: Error>(self, number: u64) -> Result<Self::Value, E> {
+                match (LEAST..=MOST).contains(&number) {
+                    true => Ok(Whole(number)),
+                    false => Err(refused(number, &Self::Value::remedy(number < LEAST))),
+                }
+            }
+        }
+        deserializer.deserialize_u64(Reader)
+    }
+}
+
+/// A point: as many numbers as there are dimensions, each of which obeys a rule.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Point<const D: usize, R = Any>([f64; D], PhantomData<R>);
+
+impl<const D: usize, R: Rule> Point<D, R> {
+    /// Its coordinates.
+    pub fn get(self) -> [f64; D] {
+        self.0
+    }
+}
+
+impl<'de, const D: usize, R: Rule> Deserialize<'de> for Point<D, R> {
+    fn deserialize<S: Deserializer<'de>>(deserializer: S) -> Result<Self, S::Error> {
+        let numbers = match deserializer.deserialize_seq(Reader("a point: [x, y]"))? {
+            Numbers::Many(numbers) => numbers,
+            Numbers::One(number) => vec![number],
+        };
+        match numbers[..].try_into() {
+            Ok(point) if numbers.iter().all(|x| R::allows(*x)) => Ok(Self(point, PhantomData)),
+            _ => {
+                let remedy = format!("give {}", R::words_of_point(D));
+                Err(refused(format_args!("{numbers:?}"), &remedy))
+            }
+        }
+    }
+}
+
+/// One number, or the least and the greatest: `0.5` or `[0.4, 0.6]`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits {
+    /// The least.
+    pub least: f64,
+    /// The greatest; may be the same.
+    pub greatest: f64,
+}
+
+impl<'de> Deserialize<'de> for Limits {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        match deserializer.deserialize_any(Reader("a number, or [least, greatest]"))? {
+            Numbers::One(both) => Ok(Self { least: both, greatest: both }),
+            Numbers::Many(numbers) => match numbers[..] {
+                [least, greatest] => Ok(Self { least, greatest }),
+                _ => {
+                    let remedy = "give one number, or the least and the greatest";
+                    Err(refused(format_args!("{numbers:?}"), remedy))
+                }
+            },
+        }
+    }
+}
+
+/// A number, or an array of them.
+enum Numbers {
+    One(f64),
+    Many(Vec<f64>),
+}
+
+/// Reads numbers, one or an array of them; holds what is expected.
+struct Reader(&'static str);
+
+impl<'de> Visitor<'de> for Reader {
+    type Value = Numbers;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.0)
+    }
+
+    fn visit_f64<E: Error>(self, number: f64) -> Result<Self::Value, E> {
+        Ok(Numbers::One(number))
+    }
+
+    fn visit_i64<E: Error>(self, number: i64) -> Result<Self::Value, E> {
+        Ok(Numbers::One(number as f64))
+    }
+
+    fn visit_u64<E: Error>(self, number: u64) -> Result<Self::Value, E> {
+        Ok(Numbers::One(number as f64))
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Self::Value, A::Error> {
+        let mut numbers = Vec::new();
+        while let Some(number) = seq.next_element()? {
+            numbers.push(number);
+        }
+        Ok(Numbers::Many(numbers))
+    }
+}
+
+/// Words between a wrong value and its remedy, in the reader's one message.
+const BEFORE: &str = "wrong value `";
+const BETWEEN: &str = "`, ";
+
+/// The error of a value that a type refuses by itself: `Source::parse` adds key and place.
+pub fn refused<E: Error>(value: impl fmt::Display, remedy: &str) -> E {
+    E::custom(format_args!("{BEFORE}{value}{BETWEEN}{remedy}"))
+}
+
+/// Value and remedy of such an error's message.
+pub(crate) fn told_by_a_value(message: &str) -> Option<(&str, &str)> {
+    message.strip_prefix(BEFORE)?.split_once(BETWEEN)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Source;
+    use sidestep_kernel::InputError;
+
+    #[derive(Debug, Deserialize)]
+    #[expect(dead_code, reason = "only the errors are of interest")]
+    struct Section {
+        a: Option<Positive>,
+        b: Option<Whole<1, 9>>,
+        c: Option<Vec<Point<2>>>,
+        d: Option<Limits>,
+        e: Option<Vec<Share>>,
+        f: Option<toml::Spanned<NonNegative>>,
+    }
+
+    fn read(text: &str) -> Result<Section, InputError> {
+        #[derive(Debug, Deserialize)]
+        struct File {
+            s: Section,
+        }
+        Source::new("s.toml", format!("[s]\n{text}"), "").parse::<File>().map(|file| file.s)
+    }
+
+    #[test]
+    fn right_values_are_taken_whole_or_not() {
+        let s = read("a = 2\nb = 9\nc = [[1, 2.5]]\nd = 3\ne = [0, 1, 0.5]\nf = 0").expect("right");
+        assert_eq!(s.a.map(f64::from), Some(2.0));
+        assert_eq!(s.c.expect("given")[0].get(), [1.0, 2.5]);
+        assert_eq!(s.d, Some(Limits { least: 3.0, greatest: 3.0 }));
+        assert_eq!(s.f.expect("given").get_ref().get(), 0.0);
+        let d = read("d = [1, 2]").expect("right").d;
+        assert_eq!(d, Some(Limits { least: 1.0, greatest: 2.0 }));
+    }
+
+    #[test]
+    fn wrong_values_are_told_with_key_and_place() {
+        for (text, column, cause, remedy) in [
+            ("a = 0.0", 5, "a = 0", "above 0"),
+            ("a = nan", 5, "a = NaN", "above 0"),
+            ("a = inf", 5, "a = inf", "above 0"),
+            ("b = 0", 5, "b = 0", "give 1 to 9"),
+            ("b = -3", 5, "b = -3", "give 1 to 9"),
+            ("c = [[1, 2], [nan, 1]]", 5, "c = [NaN, 1.0]", "give 2 numbers"),
+            ("c = [1, 2]", 5, "c = [1.0]", "give 2 numbers"),
+            ("d = [1]", 5, "d = [1.0]", "the least and the greatest"),
+            ("d = [1, 2, 3]", 5, "d = [1.0, 2.0, 3.0]", "the least and the greatest"),
+            ("e = [0.1, 1.5]", 11, "e = 1.5", "0 to 1"),
+            ("f = -1e-9", 5, "f = -0.000000001", "at least 0"),
+        ] {
+            let error = read(text).expect_err(text);
+            assert_eq!((error.position(), error.cause()), (Some((2, column)), cause));
+            assert!(error.remedy().contains(remedy), "{error}");
+        }
+        let error = read("a = \"far\"").expect_err("text");
+        assert!(error.cause().contains("expected a number"), "{error}");
+    }
+}

@@ -1,0 +1,87 @@
+//! Messages of the TOML reader in words that help.
+
+use super::checked::told_by_a_value;
+
+/// Cause and remedy of an error of the TOML reader; `also` are known keys that it did not see.
+pub(crate) fn explain(error: &toml::de::Error, also: &[&str]) -> (String, String) {
+    let message = error.message().trim();
+    let path = path_of(error);
+    if let Some((value, remedy)) = told_by_a_value(message) {
+        let key = path.as_deref().map_or("a value", last_key);
+        return (format!("{key} = {value}"), remedy.into());
+    }
+    if let Some((found, known)) = named(message, "unknown field `") {
+        let mut known = quoted(known);
+        if path.is_none() {
+            known.extend(also);
+        }
+        return (format!("unknown key `{found}`"), nearest(found, &known));
+    }
+    if let Some((found, known)) = named(message, "unknown variant `") {
+        return (format!("unknown value `{found}`"), nearest(found, &quoted(known)));
+    }
+    if let Some((missing, _)) = named(message, "missing field `") {
+        return (format!("the key `{missing}` is missing"), format!("add `{missing} = ...`"));
+    }
+    let remedy = "see what `sidestep new robots` (or airspace, chain) writes";
+    (message.replace('\n', " "), remedy.into())
+}
+
+/// The name that stands in backticks behind a beginning, and the rest of the message.
+fn named<'a>(message: &'a str, beginning: &str) -> Option<(&'a str, &'a str)> {
+    message.strip_prefix(beginning)?.split_once('`')
+}
+
+/// Keys on the way to the error, joined by dots; the reader tells them in its words only, and
+/// only where it has no text to quote.
+fn path_of(error: &toml::de::Error) -> Option<String> {
+    let mut error = error.clone();
+    error.set_input(None);
+    let words = error.to_string();
+    let last = words.trim_end().lines().last()?;
+    last.strip_prefix("in `")?.strip_suffix('`').map(String::from)
+}
+
+fn last_key(path: &str) -> &str {
+    path.rsplit('.').next().unwrap_or(path)
+}
+
+fn quoted(text: &str) -> Vec<&str> {
+    text.split('`').skip(1).step_by(2).collect()
+}
+
+/// "did you mean" with the nearest of `known`, or the whole list.
+pub fn nearest(found: &str, known: &[&str]) -> String {
+    let distance = |k: &&&str| strsim::osa_distance(found, k);
+    match known.iter().min_by_key(distance) {
+        Some(best) if strsim::osa_distance(found, best) <= 1 + found.len() / 3 => {
+            format!("did you mean `{best}`?")
+        }
+        Some(_) => format!("known are: {}", known.join(", ")),
+        None => "nothing is known here".into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::Source;
+    use serde::Deserialize;
+
+    #[test]
+    fn an_unknown_key_is_answered_with_the_nearest() {
+        #[derive(Debug, Deserialize)]
+        #[serde(deny_unknown_fields)]
+        #[expect(dead_code, reason = "only the error is of interest")]
+        struct Small {
+            cycles: u32,
+            seed: u32,
+        }
+        let error = Source::new("s.toml", "seed = 1\ncylces = 3\n", "").parse::<Small>();
+        let error = error.expect_err("misspelled");
+        assert_eq!(error.position(), Some((2, 1)));
+        assert_eq!(
+            (error.cause(), error.remedy()),
+            ("unknown key `cylces`", "did you mean `cycles`?")
+        );
+    }
+}

@@ -1,0 +1,103 @@
+//! Sections that stand once or many times.
+
+use serde::Deserialize;
+use toml::Spanned;
+
+/// One table or an array of tables under one key, `[robots]` or `[[robots]]`; each knows where it
+/// stands.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sections<T>(pub Vec<Spanned<T>>);
+
+impl<T> Default for Sections<T> {
+    fn default() -> Self {
+        Self(Vec::new())
+    }
+}
+
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for Sections<T> {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let spanned = Spanned::<OneOrEach<T, Spanned<T>>>::deserialize(deserializer)?;
+        let span = spanned.span();
+        Ok(Self(match spanned.into_inner() {
+            OneOrEach::One(one) => vec![Spanned::new(span, one)],
+            OneOrEach::Each(many) => many,
+        }))
+    }
+}
+
+/// The content of a key: one table, or an array of them.
+enum OneOrEach<One, Each> {
+    One(One),
+    Each(Vec<Each>),
+}
+
+impl<'de, One: Deserialize<'de>, Each: Deserialize<'de>> Deserialize<'de> for OneOrEach<One, Each> {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Visitor<One, Each>(std::marker::PhantomData<(One, Each)>);
+
+        impl<'de, One: Deserialize<'de>, Each: Deserialize<'de>> serde::de::Visitor<'de>
+            for Visitor<One, Each>
+        {
+            type Value = OneOrEach<One, Each>;
+
+            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str("a table or an array of tables")
+            }
+
+            fn visit_map<A: serde::de::MapAccess<'de>>(
+                self,
+                map: A,
+            ) -> Result<Self::Value, A::Error> {
+                One::deserialize(serde::de::value::MapAccessDeserializer::new(map))
+                    .map(OneOrEach::One)
+            }
+
+            fn visit_seq<A: serde::de::SeqAccess<'de>>(
+                self,
+                mut seq: A,
+            ) -> Result<Self::Value, A::Error> {
+                let mut many = Vec::new();
+                while let Some(one) = seq.next_element()? {
+                    many.push(one);
+                }
+                Ok(OneOrEach::Each(many))
+            }
+        }
+        deserializer.deserialize_any(Visitor(std::marker::PhantomData))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Source;
+
+    #[test]
+    fn sections_stand_alone_or_in_an_array_and_know_where() {
+        #[derive(Debug, Deserialize)]
+        struct File {
+            #[serde(default)]
+            a: Sections<Section>,
+        }
+        #[derive(Debug, Deserialize)]
+        #[serde(deny_unknown_fields)]
+        struct Section {
+            n: u32,
+        }
+        let read = |text: &str| Source::new("s.toml", text, "").parse::<File>();
+        for (text, starts) in [
+            ("[a]\nn = 1\n", vec![(1, 0)]),
+            ("[[a]]\nn = 1\n[[a]]\nn = 2\n", vec![(1, 0), (2, 12)]),
+            ("a = [{ n = 1 }, { n = 2 }]", vec![(1, 5), (2, 16)]),
+            ("", vec![]),
+        ] {
+            let file = read(text).expect(text);
+            let told: Vec<_> = file.a.0.iter().map(|s| (s.get_ref().n, s.span().start)).collect();
+            assert_eq!(told, starts, "{text}");
+        }
+        for text in ["[a]\nm = 1\n", "[[a]]\nn = 1\n[[a]]\nm = 1\n"] {
+            let error = read(text).expect_err(text).to_string();
+            assert!(error.contains("unknown key `m`"), "{error}");
+        }
+    }
+}

@@ -1,0 +1,241 @@
+//! The text of a scenario, and how it is read.
+
+use super::explain::explain;
+use super::overrides::set;
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+use sidestep_kernel::InputError;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use toml::Spanned;
+use toml::de::{DeTable, Deserializer};
+use toml_edit::DocumentMut;
+
+/// Version of the scenario format that this program reads.
+pub const FORMAT: u32 = 1;
+
+/// The end of a changed scenario's place.
+const WITH_OVERRIDES: &str = " (with --set)";
+
+/// The text of a scenario, where it came from, and the folder its paths are relative to.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Source {
+    /// Its name in errors.
+    pub place: String,
+    /// The TOML text, overrides applied: the resolved scenario.
+    pub text: String,
+    /// Files named in the scenario are relative to this folder.
+    pub folder: PathBuf,
+}
+
+/// The beginning of every scenario: what is needed to tell whose it is.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+pub struct Preamble {
+    /// See [`FORMAT`].
+    pub format: Spanned<u32>,
+    /// Name of the world.
+    pub world: Spanned<String>,
+}
+
+/// Keys of [`Head`].
+const HEAD: [&str; 5] = ["format", "world", "name", "seed", "cycles"];
+
+/// The part of a scenario that is the same in all worlds.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Head {
+    #[serde(rename = "format")]
+    _format: u32,
+    #[serde(rename = "world")]
+    _world: String,
+    /// Name of the scenario, may be empty.
+    #[serde(default)]
+    pub name: String,
+    /// The seed; 1 unless it is given.
+    #[serde(default = "first_seed")]
+    pub seed: u64,
+    /// Cycles to run, if it is said.
+    pub cycles: Option<u64>,
+}
+
+fn first_seed() -> u64 {
+    1
+}
+
+impl Source {
+    /// Reads a scenario file and applies `key=value` overrides.
+    ///
+    /// # Errors
+    /// When the file cannot be read or an override does not fit.
+    pub fn read(path: &Path, overrides: &[String]) -> Result<Self, InputError> {
+        let text = crate::file::read_text(path, 16 << 20)?;
+        let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
+        Self::new(path.display().to_string(), text, folder).with(overrides)
+    }
+
+    /// A scenario from text; `place` names it in errors.
+    pub fn new(
+        place: impl Into<String>,
+        text: impl Into<String>,
+        folder: impl Into<PathBuf>,
+    ) -> Self {
+        Self { place: place.into(), text: text.into(), folder: folder.into() }
+    }
+
+    /// Applies `key=value` overrides: `seed=3`, `robots.count=20`, `map.file="x.yaml"`. A
+    /// value that is not TOML is taken as text. A table that stands alone in an array needs
+    /// no index; others are counted from 0 (`robots.1.count`).
+    ///
+    /// # Errors
+    /// When the text is not TOML, or a key leads through something that is not a table.
+    pub fn with(mut self, overrides: &[String]) -> Result<Self, InputError> {
+        if overrides.is_empty() {
+            return Ok(self);
+        }
+        let mut document: DocumentMut = self.text.parse().map_err(|e: toml_edit::TomlError| {
+            self.error(e.span(), e.message().to_string(), "write valid TOML")
+        })?;
+        for override_text in overrides {
+            set(&mut document, override_text)?;
+        }
+        self.text = document.to_string();
+        if !self.place.ends_with(WITH_OVERRIDES) {
+            self.place.push_str(WITH_OVERRIDES);
+        }
+        Ok(self)
+    }
+
+    /// Parses the text into a type whose fields refuse unknown keys.
+    ///
+    /// # Errors
+    /// With line and column; an unknown key is answered with the nearest known one.
+    pub fn parse<T: DeserializeOwned>(&self) -> Result<T, InputError> {
+        toml::from_str(&self.text).map_err(|error| self.explained(&error, &[]))
+    }
+
+    /// Parses a scenario: the head that all worlds share, and the sections of one world.
+    ///
+    /// # Errors
+    /// As [`Self::parse`].
+    pub fn parse_world<T: DeserializeOwned>(&self) -> Result<(Head, T), InputError> {
+        let told = |error| self.explained(&error, &HEAD);
+        let table = DeTable::parse(&self.text).map_err(told)?;
+        let span = table.span();
+        // Two tables instead of a flattened field, which would lose the places of its entries.
+        let (head, own): (DeTable<'_>, DeTable<'_>) =
+            table.into_inner().into_iter().partition(|(key, _)| HEAD.contains(&&**key.get_ref()));
+        let part = |table| Deserializer::from(Spanned::new(span.clone(), table));
+        Ok((Head::deserialize(part(head)).map_err(told)?, T::deserialize(part(own)).map_err(told)?))
+    }
+
+    fn explained(&self, error: &toml::de::Error, also: &[&str]) -> InputError {
+        let (cause, remedy) = explain(error, also);
+        let told = InputError::new(&self.place, cause, remedy);
+        match error.span() {
+            Some(span) => told.in_text(&self.text, span.start),
+            None => told,
+        }
+    }
+
+    /// Reads format and world, and refuses a format that this program does not know.
+    ///
+    /// # Errors
+    /// When either is missing or the format is another.
+    pub fn preamble(&self) -> Result<Preamble, InputError> {
+        let preamble: Preamble = self.parse().map_err(|e| self.sweep_instead().unwrap_or(e))?;
+        if *preamble.format.get_ref() == FORMAT {
+            return Ok(preamble);
+        }
+        let cause = format!("scenario format {} is not known", preamble.format.get_ref());
+        Err(self.error(Some(preamble.format.span()), cause, format!("write `format = {FORMAT}`")))
+    }
+
+    /// The error of a file that is wrong as a scenario because it is a sweep.
+    fn sweep_instead(&self) -> Option<InputError> {
+        let table = self.text.parse::<toml::Table>().ok()?;
+        let is_sweep = table.contains_key("scenario") && !table.contains_key("world");
+        let remedy = "run it with `sidestep sweep`, or name the scenario that it names";
+        is_sweep.then(|| self.error(None, "this is a sweep, not a scenario", remedy))
+    }
+
+    /// An error in the text, at a span if one is given. The empty span of a default is none.
+    pub fn error(
+        &self,
+        span: impl Into<Option<Range<usize>>>,
+        cause: impl Into<String>,
+        remedy: impl Into<String>,
+    ) -> InputError {
+        let error = InputError::new(&self.place, cause, remedy);
+        match span.into().filter(|span| *span != (0..0)) {
+            Some(span) => error.in_text(&self.text, span.start),
+            None => error,
+        }
+    }
+
+    /// The error of a part that does not know the text, told where its section stands.
+    pub fn error_of(
+        &self,
+        span: impl Into<Option<Range<usize>>>,
+        error: &InputError,
+    ) -> InputError {
+        self.error(span, format!("{}: {}", error.place(), error.cause()), error.remedy())
+    }
+
+    /// The first line of a resolved scenario: what it was made from, and by whom.
+    pub fn heading(&self) -> String {
+        let place = self.place.trim_end_matches(WITH_OVERRIDES);
+        let name = Path::new(place).file_name().unwrap_or_default().display();
+        format!("# {name}, resolved by sidestep {}\n", env!("CARGO_PKG_VERSION"))
+    }
+
+    /// A path of the scenario, relative to its folder.
+    pub fn path(&self, path: &Path) -> PathBuf {
+        self.folder.join(path)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Debug, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct Own {
+        n: Spanned<u32>,
+    }
+
+    fn read(text: &str) -> Result<(Head, Own), InputError> {
+        Source::new("s.toml", text, "").parse_world()
+    }
+
+    #[test]
+    fn a_head_is_read_beside_what_is_a_worlds_own() {
+        let (head, own) = read("format = 1\nn = 3\nworld = \"w\"\ncycles = 7\n").expect("right");
+        assert_eq!((head.seed, head.cycles, head.name.as_str()), (1, Some(7), ""));
+        assert_eq!((*own.n.get_ref(), own.n.span()), (3, 15..16));
+    }
+
+    #[test]
+    fn what_is_wrong_in_either_part_is_told_where_it_stands() {
+        for (line, at, remedy) in [
+            ("cylces = 3", (3, 1), "did you mean `cycles`?"),
+            ("m = 3", (3, 1), "did you mean `n`?"),
+            ("n = -1", (3, 5), "see what"),
+            ("seed = \"five\"", (3, 8), "see what"),
+        ] {
+            let error = read(&format!("format = 1\nworld = \"w\"\n{line}\n")).expect_err(line);
+            assert_eq!(error.position(), Some(at), "{error}");
+            assert!(error.remedy().contains(remedy), "{error}");
+        }
+        assert!(read("n = 1\nworld = \"w\"").expect_err("no format").cause().contains("format"));
+    }
+
+    #[test]
+    fn the_place_of_a_default_is_nowhere() {
+        let source = Source::new("s.toml", "a = 1", "");
+        assert_eq!(source.error(0..0, "c", "r").position(), None);
+        assert_eq!(source.error(4..5, "c", "r").position(), Some((1, 5)));
+        let part = InputError::new("part", "is wrong", "mend it");
+        assert_eq!(source.error_of(4..5, &part).cause(), "part: is wrong");
+    }
+}

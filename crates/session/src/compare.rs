@@ -1,0 +1,148 @@
+//! Whether a state that was computed again is the one that was recorded.
+
+use crate::Error;
+use crate::recorded::has_rows;
+use sidestep::kernel::InputError;
+use sidestep::kernel::Simulation;
+use sidestep::kernel::ports::{MemoryRecorder, Values};
+use sidestep::kernel::view::{PlaceRows, Who};
+use sidestep_record::{Table, read_table};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Number of recorded poses of the present cycle that were compared; `again` is the same run at its
+/// start. What is recorded of a cycle is what a run records at its beginning, so a copy of the run
+/// records it once more, to the bit.
+///
+/// # Errors
+/// When a pose differs, or the folder is damaged.
+pub(crate) fn compare(
+    run: &dyn Simulation,
+    mut again: Box<dyn Simulation>,
+    folder: &Path,
+) -> Result<usize, Error> {
+    let cycle = run.cycle();
+    let mut recorded: Vec<(PlaceRows, Table)> = Vec::new();
+    for rows in run.place_rows().into_iter().filter(|rows| has_rows(folder, rows.table)) {
+        let table = read_table(folder, rows.table, cycle..=cycle)?;
+        if table.rows() > 0 {
+            recorded.push((rows, table));
+        }
+    }
+    if recorded.is_empty() {
+        return Ok(0);
+    }
+    let rejected = |e: sidestep::kernel::checkpoint::CheckpointError| {
+        InputError::new(folder.display(), e.to_string(), "this is a bug: please report it")
+    };
+    again.restore(&run.checkpoint()).map_err(rejected)?;
+    again.begin_recording();
+    let mut memory = MemoryRecorder::new(&again.schemas());
+    again.advance(1);
+    again.record(&mut memory)?;
+    let mut different = Vec::new();
+    for (rows, table) in &recorded {
+        let now = |name: &str| memory.column(rows.table, name);
+        different.extend(differences(rows, table, now));
+    }
+    different.sort_unstable();
+    different.dedup();
+    match different.first() {
+        None => Ok(recorded.iter().map(|(_, table)| table.rows()).sum()),
+        Some(first) => Err(differs(cycle, different.len(), first)),
+    }
+}
+
+fn differs(cycle: u64, bodies: usize, (kind, number, part): &Who) -> Error {
+    let part = part.map_or(String::new(), |part| format!("/{part}"));
+    let cause = format!(
+        "at cycle {cycle} the poses of {bodies} bodies differ from what was recorded, first of \
+         {kind}/{number}{part}"
+    );
+    let remedy = "the folder was changed, or this is a bug: please report it with the folder";
+    Error::stopped(cause, remedy)
+}
+
+/// The bodies whose recorded rows are not those of now.
+fn differences<'a>(
+    rows: &PlaceRows,
+    table: &Table,
+    now: impl Fn(&str) -> Option<&'a Values>,
+) -> Vec<Who> {
+    let names: Vec<&str> = table.schema.columns.iter().map(|c| c.name.as_str()).collect();
+    let recorded = by_body(rows, &names, |name| table.column(name));
+    let present = by_body(rows, &names, now);
+    let differs = |(of, cells): (&Who, &Vec<u64>)| (present.get(of) != Some(cells)).then_some(*of);
+    recorded.iter().filter_map(differs).collect()
+}
+
+/// The bits of all columns by body.
+fn by_body<'a>(
+    rows: &PlaceRows,
+    names: &[&str],
+    column: impl Fn(&str) -> Option<&'a Values>,
+) -> BTreeMap<Who, Vec<u64>> {
+    let word = |name: &str, row| column(name).map(|values| bits(values, row) as u32);
+    let columns: Vec<Option<&Values>> = names.iter().map(|name| column(name)).collect();
+    let count = columns.iter().flatten().map(|values| values.len()).max().unwrap_or(0);
+    let body = |row: usize| {
+        let number = word(rows.number, row).unwrap_or(u32::MAX);
+        let of = (rows.kind, number, rows.part.and_then(|part| word(part, row)));
+        // What is missing has other bits than anything that is there.
+        let cells = columns.iter().flat_map(|values| match values {
+            Some(values) if !values.is_missing(row) => [1, bits(values, row)],
+            _ => [0, 0],
+        });
+        (of, cells.collect())
+    };
+    (0..count).map(body).collect()
+}
+
+/// The bits of a value; tables of places have no text.
+fn bits(values: &Values, row: usize) -> u64 {
+    match values {
+        Values::Text(_) => 0,
+        Values::I64(v) => v[row] as u64,
+        Values::Bool(v) => v[row].into(),
+        Values::U32(v) | Values::Label(v) => v[row].into(),
+        Values::U64(v) => v[row],
+        Values::I32(v) => v[row] as u64,
+        Values::F64(v) => v[row].to_bits(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sidestep::kernel::view::{Axis, Kind};
+
+    #[test]
+    fn one_changed_cell_is_found() {
+        let rows = PlaceRows {
+            table: "trajectories",
+            kind: Kind::Connector,
+            number: "chain",
+            part: Some("connector"),
+            axes: vec![Axis::meters("x_m")],
+            is_corner: false,
+            ahead: None,
+            every: 1,
+            worth: 1,
+        };
+        let column = |name: &str, x: f64| match name {
+            "x_m" => Values::F64(vec![1.5, x].into()),
+            "chain" => Values::U32(vec![0, 0].into()),
+            _ => Values::U32(vec![3, 4].into()),
+        };
+        let names = ["chain", "connector", "x_m"];
+        let table = |x| names.map(|name| (name, column(name, x)));
+        let bodies = |x| {
+            let table: &'static _ = Box::leak(Box::new(table(x)));
+            by_body(&rows, &names, |name| table.iter().find(|(n, _)| *n == name).map(|(_, v)| v))
+        };
+        let (was, is) = (bodies(2.0), bodies(2.0 + f64::EPSILON * 2.0));
+        assert_eq!(was, bodies(2.0));
+        let same = |of: &Who| was[of] == is[of];
+        assert!(same(&(Kind::Connector, 0, Some(3))) && !same(&(Kind::Connector, 0, Some(4))));
+    }
+}

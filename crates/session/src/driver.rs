@@ -1,0 +1,132 @@
+//! Advances a run to its end, in slices short enough for whoever watches.
+
+use crate::Error;
+use crate::film::Film;
+use crate::recording::Recording;
+use crate::watcher::{Progress, Watched, Watcher};
+use cpu_time::ProcessTime;
+use sidestep::kernel::Cycle;
+use sidestep::kernel::Simulation;
+use std::time::{Duration, Instant};
+
+/// How long a slice lasts: nobody waits longer for a stop.
+const SLICE: Duration = Duration::from_millis(30);
+
+/// What a stretch of a run took in this process.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Effort {
+    /// Cycles done.
+    pub cycles: u64,
+    /// Elapsed time.
+    pub wall: Duration,
+    /// CPU time of all threads.
+    pub cpu: Duration,
+}
+
+/// Where rows and frames of a run go.
+#[derive(Default)]
+pub struct Sinks<'a> {
+    /// Rows and checkpoints.
+    pub recording: Option<&'a mut Recording>,
+    /// What can be seen.
+    pub film: Option<&'a mut dyn Film>,
+}
+
+/// Runs up to cycle `until`, or until the watcher says no. Whether the end was reached, the run's
+/// cycle says. A film begins with the run as it is.
+///
+/// # Errors
+/// When rows, checkpoints or frames cannot be stored.
+pub fn drive(
+    run: &mut dyn Simulation,
+    until: Cycle,
+    mut sinks: Sinks<'_>,
+    watcher: &dyn Watcher,
+) -> Result<Effort, Error> {
+    let (from, wall, cpu) = (run.cycle(), Instant::now(), ProcessTime::now());
+    let watched = Watched(watcher);
+    let mut pace = Pace::default();
+    if let Some(film) = &mut sinks.film {
+        film.shoot(run)?;
+    }
+    watched.at(Progress::Cycles { from, done: from, until });
+    while run.cycle() < until && !run.is_over() && watcher.go_on() {
+        slice(run, until, &mut sinks, &mut pace)?;
+        watched.at(Progress::Cycles { from, done: run.cycle(), until });
+    }
+    Ok(Effort { cycles: run.cycle() - from, wall: wall.elapsed(), cpu: cpu.elapsed() })
+}
+
+/// Advances a little, and hands over what is due.
+fn slice(
+    run: &mut dyn Simulation,
+    until: Cycle,
+    sinks: &mut Sinks<'_>,
+    pace: &mut Pace,
+) -> Result<(), Error> {
+    let rows_due = sinks.recording.as_ref().map_or(until, |r| r.next_stop(run.cycle()).min(until));
+    let frame_due = sinks.film.as_ref().map_or(until, |f| next(f.every(), run.cycle()).min(until));
+    let asked = pace.cycles().min(rows_due.min(frame_due) - run.cycle());
+    let started = Instant::now();
+    let done = run.advance(asked);
+    pace.note(done, started.elapsed());
+    // A run may be over just where a slice ends: then there is no further one.
+    let is_due = |due: Cycle, run: &dyn Simulation| run.cycle() == due || run.is_over();
+    if let Some(recording) = &mut sinks.recording
+        && (done < asked || is_due(rows_due, run))
+    {
+        recording.take(run)?;
+    }
+    if let Some(film) = &mut sinks.film
+        && is_due(frame_due, run)
+    {
+        film.shoot(run)?;
+    }
+    Ok(())
+}
+
+/// The first multiple of `every` after `cycle`.
+pub(crate) fn next(every: Cycle, cycle: Cycle) -> Cycle {
+    (cycle / every + 1).saturating_mul(every)
+}
+
+/// How many cycles make a slice.
+#[derive(Debug)]
+struct Pace(u64);
+
+impl Default for Pace {
+    fn default() -> Self {
+        Self(1)
+    }
+}
+
+impl Pace {
+    fn cycles(&self) -> u64 {
+        self.0
+    }
+
+    /// Aims at [`SLICE`], and grows at most fourfold at a time.
+    fn note(&mut self, cycles: u64, took: Duration) {
+        let per_cycle_s = took.as_secs_f64() / cycles.max(1) as f64;
+        let fitting = (SLICE.as_secs_f64() / per_cycle_s.max(1e-12)) as u64;
+        self.0 = fitting.clamp(1, self.0.saturating_mul(4));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slices_grow_towards_their_time_and_shrink_at_once() {
+        let mut pace = Pace::default();
+        pace.note(1, Duration::from_micros(1));
+        assert_eq!(pace.cycles(), 4);
+        (0..20).for_each(|_| pace.note(100, Duration::from_micros(100)));
+        assert_eq!(pace.cycles(), 30_000);
+        pace.note(30_000, Duration::from_secs(30));
+        assert_eq!(pace.cycles(), 30);
+        pace.note(1, Duration::from_secs(30));
+        assert_eq!(pace.cycles(), 1);
+    }
+}

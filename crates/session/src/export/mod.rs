@@ -1,0 +1,169 @@
+//! Recorded runs in the forms of other programs. Tables are copied from the run folder; everything
+//! else is computed again from the recorded scenario.
+
+mod pictures;
+mod tables;
+mod target;
+
+use crate::driver::{Sinks, drive};
+use crate::film::{Ending, McapFilm};
+use crate::{Error, Recorded, Watcher};
+use sidestep::kernel::{Cycle, InputError, Simulation};
+use std::path::{Path, PathBuf};
+use target::Target;
+
+/// The forms, each with its own options.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Form {
+    /// Tables as text: one of this name, or all.
+    Csv(Option<String>),
+    /// Tables, each as one file: one of this name, or all.
+    Parquet(Option<String>),
+    /// Bodies, scans and events, for Foxglove and other viewers.
+    Mcap,
+    /// The picture of the run, or of a moment.
+    Svg,
+    /// The same as pixels.
+    Png {
+        /// The longer side, where it is not the usual one.
+        width_px: Option<u16>,
+    },
+    /// A film.
+    Gif(Film),
+    /// A film as numbered PNG files.
+    Frames(Film),
+}
+
+/// Options of a film.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Film {
+    /// Pictures per second, where it is not the usual number.
+    pub fps: Option<u16>,
+    /// The longer side, where it is not the usual one.
+    pub width_px: Option<u16>,
+}
+
+/// What is exported, and where to.
+#[derive(Debug, Clone)]
+pub struct Export<'a> {
+    /// The form.
+    pub form: Form,
+    /// The place; `None` for one beside the recorded run, by its name.
+    pub out: Option<&'a Path>,
+    /// Whether what was exported before is replaced.
+    pub replace: bool,
+    /// The first cycle; of pictures, the moment that is shown.
+    pub from: Option<Cycle>,
+    /// The last cycle.
+    pub until: Option<Cycle>,
+    /// Only cycles that are multiples of this; events are never left out of tables. Films have 150
+    /// pictures at most where it is not given.
+    pub every: Option<Cycle>,
+    /// Number of workers, where something is computed again.
+    pub workers: usize,
+}
+
+/// What was written.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Written {
+    /// The files, or the folder of a film's pictures.
+    pub paths: Vec<PathBuf>,
+    /// Whether a run that was computed again came to the recorded digest.
+    pub is_confirmed: bool,
+    /// Pictures of a film, and how many are shown per second.
+    pub film: Option<(usize, u16)>,
+}
+
+impl Written {
+    fn one(path: impl Into<PathBuf>, is_confirmed: bool) -> Self {
+        Self { paths: vec![path.into()], is_confirmed, film: None }
+    }
+}
+
+/// Exports a recorded run.
+///
+/// # Errors
+/// When the part or the place is wrong, the result cannot be stored, or the run differs from what
+/// was recorded; [`Error::Interrupted`] when the watcher said no.
+pub fn export(
+    recorded: &Recorded,
+    wanted: &Export<'_>,
+    watcher: &dyn Watcher,
+) -> Result<Written, Error> {
+    let job = Job { recorded, wanted, span: Span::of(wanted, recorded)?, watcher };
+    match &wanted.form {
+        Form::Csv(table) => tables::export(&job, tables::Form::Csv, table.as_deref()),
+        Form::Parquet(table) => tables::export(&job, tables::Form::Parquet, table.as_deref()),
+        Form::Mcap => export_mcap(&job),
+        Form::Svg => pictures::export_svg(&job),
+        Form::Png { width_px } => pictures::export_png(&job, *width_px),
+        Form::Gif(film) => pictures::export_gif(&job, *film),
+        Form::Frames(film) => pictures::export_frames(&job, *film),
+    }
+}
+
+/// An export that has been found possible.
+struct Job<'a> {
+    recorded: &'a Recorded,
+    wanted: &'a Export<'a>,
+    span: Span,
+    watcher: &'a dyn Watcher,
+}
+
+/// The cycles that are asked for, both ends included.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Span {
+    from: Cycle,
+    until: Cycle,
+}
+
+impl Span {
+    fn of(wanted: &Export<'_>, recorded: &Recorded) -> Result<Self, InputError> {
+        let done = recorded.cycles_done;
+        let (from, until) = (wanted.from.unwrap_or(0), wanted.until.unwrap_or(done));
+        let wrong = |option: &str, cycle: Cycle, cause: String, remedy: String| {
+            Err(InputError::new(format!("{option} {cycle}"), cause, remedy))
+        };
+        if from > done {
+            let cause = format!("{done} cycles are recorded");
+            return wrong("--from", from, cause, format!("give 0 to {done}"));
+        }
+        if until < from || until > done {
+            let cause = format!("the part begins at cycle {from}, {done} cycles are recorded");
+            return wrong("--until", until, cause, format!("give {from} to {done}"));
+        }
+        Ok(Self { from, until })
+    }
+}
+
+impl Job<'_> {
+    /// The run at the beginning of a cycle.
+    fn run_up_to(&self, cycle: Cycle) -> Result<Box<dyn Simulation>, Error> {
+        let mut run = self.recorded.start_near(cycle, self.wanted.workers)?;
+        self.drive(run.as_mut(), cycle, Sinks::default())?;
+        Ok(run)
+    }
+
+    /// Goes on to a cycle, or to the end of the run if that comes first.
+    fn drive(&self, run: &mut dyn Simulation, until: Cycle, sinks: Sinks<'_>) -> Result<(), Error> {
+        drive(run, until, sinks, self.watcher)?;
+        match run.cycle() < until && !run.is_over() {
+            true => Err(Error::Interrupted),
+            false => Ok(()),
+        }
+    }
+}
+
+fn export_mcap(job: &Job<'_>) -> Result<Written, Error> {
+    let Job { recorded, wanted, span, .. } = job;
+    let target = Target::file(job, ".mcap")?;
+    let resolved = recorded.resolved()?;
+    let mut run = job.run_up_to(span.from)?;
+    let every = wanted.every.unwrap_or(1);
+    let mut film = McapFilm::begin(target.path(), every, resolved, run.as_mut())?;
+    job.drive(run.as_mut(), span.until, Sinks { film: Some(&mut film), ..Sinks::default() })?;
+    let is_confirmed = recorded.confirm(run.as_ref())?;
+    let is_whole = span.from == 0 && is_confirmed && recorded.is_complete;
+    let ending = if is_whole { Ending::Complete } else { Ending::Extract };
+    Ok(Written::one(film.finish(run.as_ref(), ending)?, is_confirmed))
+}

@@ -1,0 +1,168 @@
+//! Recorded tables as CSV, or each as one Parquet file.
+
+use super::target::Target;
+use super::{Job, Written};
+use crate::Error;
+use csv::ByteRecord;
+use sidestep::kernel::ports::{TableSchema, Values};
+use sidestep::kernel::{Cycle, InputError};
+use sidestep_record::{Table, TableFile, for_each_block, tables};
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+/// The table of which no row is left out for coming between.
+const EVENTS: &str = "events";
+
+/// The forms of tables.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Form {
+    Csv,
+    Parquet,
+}
+
+/// Exports the table `only`, or all.
+pub(super) fn export(job: &Job<'_>, form: Form, only: Option<&str>) -> Result<Written, Error> {
+    let Some(folder) = &job.recorded.folder else {
+        let remedy = "name the run folder; one is made by `sidestep run SCENARIO --out DIR`";
+        let cause = "a recording for viewers has no tables";
+        return Err(InputError::new(job.recorded.path.display(), cause, remedy).into());
+    };
+    let source = Source { folder, job, form };
+    let ending = match form {
+        Form::Csv => "csv",
+        Form::Parquet => "parquet",
+    };
+    let paths = match only {
+        Some(name) => {
+            source.check_table(name)?;
+            let target = Target::file(job, &format!("-{name}.{ending}"))?;
+            source.write(name, target.path())?;
+            vec![target.path().to_path_buf()]
+        }
+        None => {
+            let names = tables(folder)?;
+            let target = Target::folder(job, &format!("-{ending}"), ending)?;
+            target.make_folder(|growing| {
+                names.iter().try_for_each(|name| {
+                    source.write(name, &growing.join(format!("{name}.{ending}")))
+                })
+            })?;
+            names.iter().map(|name| target.path().join(format!("{name}.{ending}"))).collect()
+        }
+    };
+    Ok(Written { paths, is_confirmed: false, film: None })
+}
+
+/// What is exported.
+struct Source<'a> {
+    folder: &'a Path,
+    job: &'a Job<'a>,
+    form: Form,
+}
+
+impl Source<'_> {
+    fn check_table(&self, name: &str) -> Result<(), InputError> {
+        let names = tables(self.folder)?;
+        if names.iter().any(|known| known == name) {
+            return Ok(());
+        }
+        let cause = "the run has no such table";
+        let remedy = format!("give one of {}", names.join(", "));
+        Err(InputError::new(format!("--table {name}"), cause, remedy))
+    }
+
+    fn write(&self, name: &str, to: &Path) -> Result<(), Error> {
+        match self.form {
+            Form::Csv => self.write_csv(name, to),
+            Form::Parquet => self.write_parquet(name, to),
+        }
+    }
+
+    /// Goes through the rows that are asked for.
+    fn each_block(
+        &self,
+        name: &str,
+        mut each: impl FnMut(Table) -> Result<(), Error>,
+    ) -> Result<(), Error> {
+        let Job { wanted, span, .. } = self.job;
+        let every = if name == EVENTS { 1 } else { wanted.every.unwrap_or(1) };
+        let thinned = |mut block: Table| {
+            thin(&mut block, every);
+            each(block)
+        };
+        // The whole table may be one without cycles.
+        match wanted.from.is_some() || wanted.until.is_some() {
+            true => for_each_block(self.folder, name, span.from..=span.until, thinned),
+            false => for_each_block(self.folder, name, .., thinned),
+        }
+    }
+
+    fn write_parquet(&self, name: &str, to: &Path) -> Result<(), Error> {
+        let mut file: Option<TableFile> = None;
+        self.each_block(name, |block| {
+            let file = match &mut file {
+                Some(file) => file,
+                None => file.insert(TableFile::create(to, &block.schema, &block.origin)?),
+            };
+            Ok(file.append(&block.columns)?)
+        })?;
+        Ok(file.map_or(Ok(()), TableFile::finish)?)
+    }
+
+    fn write_csv(&self, name: &str, to: &Path) -> Result<(), Error> {
+        let growing = partial(to);
+        let written = self
+            .fill_csv(name, &growing)
+            .and_then(|()| std::fs::rename(&growing, to).map_err(|e| Error::write(to, &e)));
+        written.inspect_err(|_| drop(std::fs::remove_file(&growing)))
+    }
+
+    fn fill_csv(&self, name: &str, growing: &Path) -> Result<(), Error> {
+        let failed = |e: std::io::Error| Error::write(growing, &e);
+        let mut csv =
+            csv::Writer::from_writer(BufWriter::new(File::create(growing).map_err(failed)?));
+        let mut is_begun = false;
+        self.each_block(name, |block| {
+            if !is_begun {
+                csv.write_record(heading(&block.schema)).map_err(|e| failed(e.into()))?;
+                is_begun = true;
+            }
+            write_rows(&mut csv, &block).map_err(|e| failed(e.into()))
+        })?;
+        let file = csv.into_inner().map_err(|e| failed(e.into_error()))?;
+        let file = file.into_inner().map_err(|e| failed(e.into_error()))?;
+        file.sync_all().map_err(failed)
+    }
+}
+
+fn partial(path: &Path) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".partial");
+    name.into()
+}
+
+/// Keeps rows of cycles that are multiples of `every`.
+fn thin(block: &mut Table, every: Cycle) {
+    let Some(Values::U64(cycles)) = block.column("cycle").filter(|_| every > 1) else { return };
+    let keep: Vec<bool> = cycles.iter().map(|cycle| cycle.is_multiple_of(every)).collect();
+    block.columns.iter_mut().for_each(|column| column.retain_rows(&keep));
+}
+
+fn heading(schema: &TableSchema) -> impl Iterator<Item = &str> {
+    schema.columns.iter().map(|column| column.name.as_str())
+}
+
+fn write_rows(csv: &mut csv::Writer<impl Write>, block: &Table) -> Result<(), csv::Error> {
+    let (mut record, mut field) = (ByteRecord::new(), String::new());
+    for row in 0..block.rows() {
+        record.clear();
+        for (column, values) in block.schema.columns.iter().zip(&block.columns) {
+            field.clear();
+            values.write(row, &column.labels, &mut field).map_err(io::Error::other)?;
+            record.push_field(field.as_bytes());
+        }
+        csv.write_byte_record(&record)?;
+    }
+    Ok(())
+}

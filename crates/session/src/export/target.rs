@@ -1,0 +1,116 @@
+//! Where an export goes.
+
+use super::Job;
+use crate::Error;
+use sidestep::kernel::InputError;
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+
+/// A file or folder that is not there yet, or may be replaced.
+#[derive(Debug)]
+pub(super) struct Target {
+    path: PathBuf,
+}
+
+impl Target {
+    /// The place that was asked for, else one beside the recorded run, with its name and `ending`.
+    fn named(job: &Job<'_>, ending: &str) -> Self {
+        let beside = || beside(&job.recorded.path, ending);
+        Self { path: job.wanted.out.map_or_else(beside, Path::to_path_buf) }
+    }
+
+    /// A file: what was asked for, else the run's name with `ending`.
+    ///
+    /// # Errors
+    /// When it is there and not to be replaced.
+    pub(super) fn file(job: &Job<'_>, ending: &str) -> Result<Self, InputError> {
+        let target = Self::named(job, ending);
+        match std::fs::metadata(&target.path) {
+            Ok(found) if found.is_dir() => Err(target.refuse("this is a folder", "name a file")),
+            Ok(_) if !job.wanted.replace => Err(target.refuse(EXISTS, REPLACE)),
+            _ => Ok(target),
+        }
+    }
+
+    /// A folder, of files with the extension `holds` only where it is to be replaced.
+    ///
+    /// # Errors
+    /// When it is there and not to be replaced, or holds something else.
+    pub(super) fn folder(job: &Job<'_>, ending: &str, holds: &str) -> Result<Self, InputError> {
+        let target = Self::named(job, ending);
+        let Ok(mut entries) = std::fs::read_dir(&target.path) else {
+            return match target.path.exists() {
+                true => Err(target.refuse("this is no folder", "name a new folder")),
+                false => Ok(target),
+            };
+        };
+        let is_ours = |entry: std::io::Result<std::fs::DirEntry>| {
+            entry.is_ok_and(|e| {
+                e.path().is_file() && e.path().extension() == Some(OsStr::new(holds))
+            })
+        };
+        if !job.wanted.replace {
+            return Err(target.refuse(EXISTS, REPLACE));
+        }
+        if !entries.all(is_ours) {
+            let cause = format!("the folder holds something else than .{holds} files");
+            return Err(target.refuse(&cause, "name a new folder"));
+        }
+        Ok(target)
+    }
+
+    fn refuse(&self, cause: &str, remedy: &str) -> InputError {
+        InputError::new(self.path.display(), cause, remedy)
+    }
+
+    /// Its name.
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Makes the folder: `fill` is given one with another name, which takes its place when all
+    /// is in it.
+    ///
+    /// # Errors
+    /// What `fill` returns, and what the system says; then nothing is left.
+    pub(super) fn make_folder<T>(
+        &self,
+        fill: impl FnOnce(&Path) -> Result<T, Error>,
+    ) -> Result<T, Error> {
+        let mut growing = self.path.as_os_str().to_owned();
+        growing.push(".partial");
+        let growing = PathBuf::from(growing);
+        let failed = |e: std::io::Error| Error::write(&self.path, &e);
+        // What a process that was killed left.
+        remove(&growing).map_err(failed)?;
+        std::fs::create_dir_all(&growing).map_err(failed)?;
+        let filled = fill(&growing).and_then(|done| {
+            remove(&self.path)
+                .and_then(|()| std::fs::rename(&growing, &self.path))
+                .map_err(failed)?;
+            Ok(done)
+        });
+        filled.inspect_err(|_| drop(remove(&growing)))
+    }
+}
+
+const EXISTS: &str = "is there already";
+const REPLACE: &str = "name another place with --out, or give --replace";
+
+fn remove(folder: &Path) -> std::io::Result<()> {
+    match std::fs::remove_dir_all(folder) {
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(()),
+        other => other,
+    }
+}
+
+/// The place beside a recording, by its name.
+fn beside(recorded: &Path, ending: &str) -> PathBuf {
+    // `.` and `..` have no name of their own.
+    let whole = std::fs::canonicalize(recorded).unwrap_or_else(|_| recorded.to_path_buf());
+    let named = if recorded.file_name().is_some() { recorded } else { &whole };
+    let stem = if named.is_file() { named.file_stem() } else { named.file_name() };
+    let mut name = stem.unwrap_or(OsStr::new("run")).to_owned();
+    name.push(ending);
+    named.with_file_name(name)
+}

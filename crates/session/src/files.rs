@@ -1,0 +1,50 @@
+//! Files that are written whole or not at all.
+
+use crate::Error;
+use std::fs::File;
+use std::io::{BufWriter, Result, Write};
+use std::path::Path;
+
+/// Replaces the file at `path` by what `write` writes: a file that was there stays until the
+/// new one is complete.
+///
+/// # Errors
+/// What the system says.
+pub fn replace(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<File>) -> Result<()>,
+) -> std::result::Result<(), Error> {
+    let mut growing = path.as_os_str().to_owned();
+    growing.push(format!(".{}.partial", std::process::id()));
+    let growing = Path::new(&growing);
+    fill(growing, write)
+        .and_then(|()| std::fs::rename(growing, path))
+        .inspect_err(|_| drop(std::fs::remove_file(growing)))
+        .map_err(|e| Error::write(path, &e))
+}
+
+fn fill(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> Result<()>) -> Result<()> {
+    let mut file = BufWriter::new(File::create(path)?);
+    write(&mut file)?;
+    file.flush()?;
+    file.get_ref().sync_all()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_cannot_be_written_leaves_the_old_file_and_no_other() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.txt");
+        replace(&path, |f| f.write_all(b"old")).expect("written");
+        let fails = replace(&path, |f| {
+            f.write_all(b"half")?;
+            Err(std::io::Error::other("no"))
+        });
+        assert!(fails.is_err());
+        assert_eq!(std::fs::read(&path).expect("read"), b"old");
+        assert_eq!(std::fs::read_dir(folder.path()).expect("read").count(), 1);
+    }
+}

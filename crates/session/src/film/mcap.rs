@@ -1,0 +1,101 @@
+//! A run as a recording for viewers.
+
+use super::Film;
+use crate::Error;
+use sidestep::kernel::Cycle;
+use sidestep::kernel::Simulation;
+use sidestep::kernel::view::Look;
+use sidestep::scenario::Resolved;
+use sidestep::{BUILD, VERSION};
+use sidestep_record::{McapEnd, McapOrigin, McapRecorder, Origin, Status};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// Scans of more bodies than this are left out: each is a topic of its own, and reading sensors
+/// for it costs what the simulation does.
+const LOOK: Look = Look { scanning_bodies: 64 };
+
+/// Why a recording ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ending {
+    /// The run is complete.
+    Complete,
+    /// No more of the run is wanted.
+    Extract,
+    /// The run was stopped: the file keeps `.partial` at its end.
+    Stopped,
+}
+
+/// An MCAP file that grows with a run.
+pub struct McapFilm {
+    recorder: McapRecorder,
+    every: Cycle,
+    took: Duration,
+}
+
+impl McapFilm {
+    /// A new file at `path`; the run is watched from now on.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn begin(
+        path: &Path,
+        every: Cycle,
+        resolved: Resolved,
+        run: &mut dyn Simulation,
+    ) -> Result<Self, Error> {
+        let plan = run.plan();
+        let mut files = resolved.files;
+        files.sort();
+        let about = McapOrigin {
+            world: run.world().into(),
+            build: BUILD.into(),
+            origin: Origin {
+                program_version: VERSION.into(),
+                scenario: resolved.text,
+                seed: plan.seed,
+            },
+            files,
+            cycles_planned: plan.cycles,
+            every,
+        };
+        let recorder = McapRecorder::create(path, about, &run.scenery())?;
+        run.watch();
+        Ok(Self { recorder, every, took: Duration::ZERO })
+    }
+
+    /// Ends the file, and says what it is called.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn finish(self, run: &dyn Simulation, ending: Ending) -> Result<PathBuf, Error> {
+        let status = match ending {
+            Ending::Complete => Status::Complete,
+            Ending::Extract | Ending::Stopped => Status::Incomplete,
+        };
+        let (cycles_done, digest) = (run.cycle(), run.digest().to_string());
+        let end = McapEnd { status, cycles_done, digest };
+        Ok(match ending {
+            Ending::Stopped => self.recorder.stop(&end)?,
+            Ending::Complete | Ending::Extract => self.recorder.finish(&end)?,
+        })
+    }
+
+    /// Time spent so far.
+    pub fn took(&self) -> Duration {
+        self.took
+    }
+}
+
+impl Film for McapFilm {
+    fn every(&self) -> Cycle {
+        self.every
+    }
+
+    fn shoot(&mut self, run: &mut dyn Simulation) -> Result<(), Error> {
+        let started = Instant::now();
+        self.recorder.frame(&run.frame(LOOK))?;
+        self.took += started.elapsed();
+        Ok(())
+    }
+}

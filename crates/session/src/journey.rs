@@ -1,0 +1,255 @@
+//! One run, from where it is to its end, with all that it leaves behind.
+
+use crate::driver::{Effort, Sinks, drive};
+use crate::film::{Ending, Film, McapFilm};
+use crate::identity::Maker;
+use crate::recording::{Recording, restore};
+use crate::summary::{Cost, Status, Summary, SummaryFile};
+use crate::{Error, Watcher, picture};
+use sidestep::VERSION;
+use sidestep::kernel::ports::RecordError;
+use sidestep::kernel::{Cycle, InputError, Simulation};
+use sidestep::scenario::{Compiled, Foreign, Source, Worlds};
+use sidestep_record::{Existing, McapRecorder, RunFolder};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+use std::time::Duration;
+
+/// A run that is ready to go.
+pub struct Journey {
+    run: Box<dyn Simulation>,
+    recording: Option<Recording>,
+    film: Option<McapFilm>,
+    workers: usize,
+    /// The cycle to stop at, if before the planned end.
+    until: Option<Cycle>,
+    /// What to report of the file that the scenario was made from.
+    told: Option<Foreign>,
+}
+
+/// Places where a run is recorded.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Keep<'a> {
+    /// A folder for its rows, checkpoints, summary and picture.
+    pub folder: Option<&'a Path>,
+    /// An MCAP file for viewers, and the cycles from frame to frame.
+    pub mcap: Option<(&'a Path, Cycle)>,
+    /// Whether what is there already is deleted.
+    pub replace: bool,
+}
+
+impl Keep<'_> {
+    fn existing(&self) -> Existing {
+        if self.replace { Existing::Replace } else { Existing::Refuse }
+    }
+
+    /// Refuses places that may not be taken, before anything is made.
+    ///
+    /// # Errors
+    /// When the MCAP file is there already, and is not to be replaced.
+    fn check(&self) -> Result<(), InputError> {
+        self.mcap.map_or(Ok(()), |(file, _)| McapRecorder::check_vacant(file, self.existing()))
+    }
+}
+
+impl Journey {
+    /// Returns a run of a scenario at its start; `told` is what to report of the file that the
+    /// scenario was made from.
+    ///
+    /// # Errors
+    /// When a place to keep it is taken, or cannot be made.
+    pub fn start(
+        compiled: &dyn Compiled,
+        source: &Source,
+        workers: usize,
+        keep: Keep<'_>,
+        told: Option<Foreign>,
+    ) -> Result<Self, Error> {
+        keep.check()?;
+        if keep.folder.is_none() && keep.mcap.is_none() {
+            let run = compiled.start(source, workers);
+            return Ok(Self { run, recording: None, film: None, workers, until: None, told });
+        }
+        let resolved = compiled.resolve(source)?;
+        let (mut run, recording) = match keep.folder {
+            None => (compiled.start(source, workers), None),
+            Some(folder) => {
+                let itself = Source::new("scenario.toml", &*resolved.text, folder);
+                let mut run = compiled.start(&itself, workers);
+                let recording =
+                    Recording::create(folder, &resolved, run.as_mut(), keep.existing())?;
+                (run, Some(recording))
+            }
+        };
+        let film = match keep.mcap {
+            None => None,
+            Some((file, every)) => Some(McapFilm::begin(file, every, resolved, run.as_mut())?),
+        };
+        Ok(Self { run, recording, film, workers, until: None, told })
+    }
+
+    /// Returns the run in a folder where it was stopped, to go on to its end, or to cycle `until`.
+    ///
+    /// # Errors
+    /// When the folder holds no run of one of `worlds` that this build can continue, or the run
+    /// is past that cycle.
+    pub fn resume(
+        worlds: Worlds,
+        path: &Path,
+        workers: usize,
+        until: Option<Cycle>,
+    ) -> Result<Self, Error> {
+        let (folder, point) = RunFolder::resume(path)?;
+        let manifest = folder.manifest();
+        let maker =
+            Maker { version: manifest.program_version.clone(), build: manifest.build.clone() };
+        maker.check(path, "run", |wrote| {
+            format!("continue it with sidestep {wrote}, or run its scenario again in a new folder")
+        })?;
+        let place = path.join("scenario.toml").display().to_string();
+        let source = Source::new(place, folder.scenario(), path);
+        let mut run = worlds.compile(&source)?.start(&source, workers);
+        restore(run.as_mut(), &point, path)?;
+        check_end(until, run.cycle(), run.plan().cycles)?;
+        let recording = Some(Recording::begin(folder, run.as_mut())?);
+        Ok(Self { run, recording, film: None, workers, until, told: None })
+    }
+
+    /// Cycles done since the run's start.
+    pub fn cycle(&self) -> Cycle {
+        self.run.cycle()
+    }
+
+    /// Goes to the end, or until the watcher says no, and stores all that is to be kept.
+    ///
+    /// # Errors
+    /// When something cannot be stored; a bug of the simulation.
+    pub fn travel(self, watcher: &dyn Watcher) -> Result<Summary, Error> {
+        let Self { mut run, mut recording, mut film, workers, until, told } = self;
+        let until = until.unwrap_or(run.plan().cycles);
+        let sinks = Sinks {
+            recording: recording.as_mut(),
+            film: film.as_mut().map(|film| film as &mut dyn Film),
+        };
+        let driven = drive_guarded(run.as_mut(), until, sinks, watcher);
+        let effort = driven.map_err(|e| broken_by(e, run.as_ref(), recording.as_ref()))?;
+        let folder = recording.as_ref().map(|r| r.folder().path().to_path_buf());
+        let took = recording.as_ref().map_or(Duration::ZERO, Recording::took)
+            + film.as_ref().map_or(Duration::ZERO, McapFilm::took);
+        let cost = Cost { workers, effort, recording: took };
+        let mut summary = Summary::new(run.as_ref(), cost, folder.as_deref());
+        if let Some(told) = told {
+            summary.tell_of_file(told);
+        }
+        if let Some(film) = film {
+            let ending = match summary.status {
+                Status::Complete => Ending::Complete,
+                Status::Incomplete => Ending::Stopped,
+            };
+            let path = film.finish(run.as_ref(), ending);
+            let path = path.map_err(|e| broken_by(e, run.as_ref(), recording.as_ref()))?;
+            summary.tell_of_mcap(path);
+        }
+        if let Some(recording) = recording {
+            store(run.as_mut(), recording, &summary, watcher)?;
+        }
+        Ok(summary)
+    }
+}
+
+fn check_end(asked: Option<Cycle>, now: Cycle, planned: Cycle) -> Result<(), InputError> {
+    let Some(end) = asked.filter(|end| !(now..=planned).contains(end)) else { return Ok(()) };
+    let cause = format!("the run stands at cycle {now} and was planned for {planned} cycles");
+    let remedy = format!(
+        "give {now} to {planned}; for a longer run: \
+         sidestep run DIR/scenario.toml --cycles N --out NEW_DIR"
+    );
+    Err(InputError::new(format!("--cycles {end}"), cause, remedy))
+}
+
+/// Goes to the end of a recorded run and stores all that belongs to it; whether it got there.
+///
+/// # Errors
+/// When something cannot be stored.
+pub(crate) fn recorded_run(
+    run: &mut dyn Simulation,
+    mut recording: Recording,
+    workers: usize,
+    watcher: &dyn Watcher,
+) -> Result<bool, Error> {
+    let until = run.plan().cycles;
+    let sinks = Sinks { recording: Some(&mut recording), film: None };
+    let effort = drive_guarded(run, until, sinks, watcher)?;
+    let folder = recording.folder().path().to_path_buf();
+    let cost = Cost { workers, effort, recording: recording.took() };
+    let summary = Summary::new(run, cost, Some(&folder));
+    store(run, recording, &summary, watcher)?;
+    Ok(summary.status == Status::Complete)
+}
+
+/// Ends the folder: whole tables and pictures, or a checkpoint to resume at.
+fn store(
+    run: &mut dyn Simulation,
+    mut recording: Recording,
+    summary: &Summary,
+    watcher: &dyn Watcher,
+) -> Result<(), Error> {
+    let closed = match summary.status {
+        Status::Complete => recording.finish_tables(),
+        Status::Incomplete => recording.save_unfinished(run),
+    };
+    closed.map_err(|e| broken(run, Some(&recording), &e))?;
+    let folder = recording.into_folder();
+    if let Err(error) = picture::draw_run(run, &folder) {
+        watcher.warn(&error);
+    }
+    let (per_agent, per_pair) = (run.agent_metrics(), run.pair_metrics());
+    folder.write_summary(&SummaryFile { summary, per_agent, per_pair })?;
+    match summary.status {
+        Status::Complete => folder.complete(run.cycle(), &summary.digest)?,
+        Status::Incomplete => folder.stop(run.cycle())?,
+    }
+    Ok(())
+}
+
+/// Drives the run; a bug says what replays it.
+fn drive_guarded(
+    run: &mut dyn Simulation,
+    until: Cycle,
+    sinks: Sinks<'_>,
+    watcher: &dyn Watcher,
+) -> Result<Effort, Error> {
+    let driven = catch_unwind(AssertUnwindSafe(|| drive(run, until, sinks, watcher)));
+    driven.unwrap_or_else(|_| Err(bug(run)))
+}
+
+/// Adds what saves the run where something could not be stored.
+fn broken_by(error: Error, run: &dyn Simulation, recording: Option<&Recording>) -> Error {
+    match error {
+        Error::Record(error) => broken(run, recording, &error),
+        other => other,
+    }
+}
+
+/// What replays a run up to where it failed.
+fn whereabouts(run: &dyn Simulation) -> String {
+    let plan = run.plan();
+    let (cycle, version) = (run.cycle(), VERSION);
+    let (name, seed, cycles) = (&plan.name, plan.seed, plan.cycles);
+    format!("at cycle {cycle} of {cycles} of `{name}`, seed {seed}, sidestep {version}")
+}
+
+/// Recording failed: says what saves the run.
+fn broken(run: &dyn Simulation, recording: Option<&Recording>, error: &RecordError) -> Error {
+    let remedy = match recording.map(|r| r.folder().path().display()) {
+        Some(folder) => format!("make room, then continue with: sidestep resume {folder}"),
+        None => "make room, then run it again; without --out nothing can be continued".into(),
+    };
+    Error::stopped(format!("{error}\n  {}", whereabouts(run)), remedy)
+}
+
+/// The simulation broke a rule of its own.
+fn bug(run: &dyn Simulation) -> Error {
+    let cause = format!("this is a bug in sidestep, met shortly after\n  {}", whereabouts(run));
+    Error::stopped(cause, "please report it with the scenario and the lines above")
+}

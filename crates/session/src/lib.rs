@@ -1,0 +1,50 @@
+//! Whatever drives runs of any world: starts, records, resumes and replays them, films and exports
+//! them, runs sweeps of them, and makes the documents of reports.
+//!
+//! ```text
+//! scenario.rs   a file and overrides -> a scenario     journey.rs    one run, to its end
+//! driver.rs     advances in slices                     recording.rs  a run folder that grows
+//! film/         frames into files                      picture.rs    pictures into files
+//! rerun.rs      recorded runs, computed again          replay.rs     ... and compared
+//! export/       recorded runs in other forms           report/       folders -> documents
+//! sweep/        many runs of one scenario              summary.rs    what a run came to
+//! watcher.rs    progress, and whether to go on         identity.rs   which build made it
+//! ```
+//!
+//! Nothing here knows a terminal, options of a command, or a world: functions that need to know
+//! which worlds there are take [`Worlds`](sidestep::scenario::Worlds), and tell a [`Watcher`] how
+//! far they are.
+
+mod compare;
+mod driver;
+mod error;
+mod files;
+mod film;
+mod identity;
+mod journey;
+mod picture;
+mod recorded;
+mod recording;
+mod replay;
+mod rerun;
+mod scenario;
+mod summary;
+mod watcher;
+
+pub mod export;
+pub mod report;
+pub mod sweep;
+
+pub use driver::{Effort, Sinks, drive};
+pub use error::Error;
+pub use files::replace;
+pub use film::{Ending, Film, McapFilm};
+pub use journey::{Journey, Keep};
+pub use picture::write_png;
+pub use recorded::csv_table;
+pub use recording::Recording;
+pub use replay::{Replayed, replay_all, replay_to};
+pub use rerun::Recorded;
+pub use scenario::read;
+pub use summary::{Phases, Status, Summary};
+pub use watcher::{Progress, Unwatched, Watcher};

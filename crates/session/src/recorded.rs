@@ -1,0 +1,73 @@
+//! Tables of a recorded run, also as CSV, the form in which logs are learned from.
+
+use sidestep::import::table::CsvTable;
+use sidestep::kernel::InputError;
+use sidestep::kernel::view::{Frame, PlaceRows, Scenery, Trail};
+use sidestep_draw::worth_a_trail;
+use sidestep_record::{Table, read_table};
+use std::path::Path;
+
+/// So many recorded places are read for trails; of longer runs the last ones.
+const MOST_ROWS: u64 = 4_000_000;
+
+/// The ways that led to a moment, as far as they are recorded and worth showing.
+///
+/// # Errors
+/// When a table is damaged.
+pub(crate) fn trails(
+    tables: &[PlaceRows],
+    folder: &Path,
+    scenery: &Scenery,
+    frame: &Frame,
+) -> Result<Vec<Trail>, InputError> {
+    let whose = worth_a_trail(scenery, frame);
+    let mut trails = Vec::new();
+    for rows in tables.iter().filter(|rows| has_rows(folder, rows.table)) {
+        let here = frame.bodies.iter().filter(|body| body.kind == rows.kind).count();
+        let moments = (MOST_ROWS / here.max(whose.len()).max(1) as u64).max(1);
+        let cycles = moments.saturating_mul(rows.every).min(rows.worth);
+        let from = frame.cycle.saturating_sub(cycles);
+        let table = read_table(folder, rows.table, from..frame.cycle)?;
+        let ways = rows.trails(scenery, frame, &whose, |name| table.column(name));
+        trails.extend(ways.unwrap_or_default());
+    }
+    Ok(trails)
+}
+
+/// The table `name` of the run in `folder`, which has it with `record.calibration = true`.
+///
+/// # Errors
+/// When the run has no such table, or it is damaged.
+pub fn csv_table(folder: &Path, name: &str) -> Result<CsvTable, InputError> {
+    let table = read_table(folder, name, ..).map_err(|e| {
+        let remedy = "record the run with --set record.calibration=true";
+        if folder.join(name).exists() { e } else { InputError::new(e.place(), e.cause(), remedy) }
+    })?;
+    CsvTable::parse(&folder.join(name).display(), &as_csv(&table))
+}
+
+/// A heading, then one line per row; a beam or an action per line.
+fn as_csv(table: &Table) -> String {
+    let columns = &table.schema.columns;
+    let names: Vec<&str> = columns.iter().map(|c| c.name.as_str()).collect();
+    let mut text = names.join(",") + "\n";
+    for row in 0..table.rows() {
+        for (k, (column, values)) in columns.iter().zip(&table.columns).enumerate() {
+            let separator = if k == 0 { "" } else { "," };
+            text.push_str(separator);
+            // Writing to a string cannot fail.
+            let _ = values.write(row, &column.labels, &mut text);
+        }
+        text.push('\n');
+    }
+    text
+}
+
+/// Whether some part of the table is whole: a run that was killed early has none.
+pub(crate) fn has_rows(folder: &Path, table: &str) -> bool {
+    let is_part = |name: &std::ffi::OsStr| Path::new(name).extension() == Some("parquet".as_ref());
+    [table.to_string(), format!("{table}.partial")].iter().any(|table| {
+        let entries = std::fs::read_dir(folder.join(table));
+        entries.is_ok_and(|mut all| all.any(|e| e.is_ok_and(|e| is_part(&e.file_name()))))
+    })
+}

@@ -1,0 +1,96 @@
+//! A recorded run computed again: to its end, or up to any cycle.
+
+use crate::compare::compare;
+use crate::driver::{Effort, Sinks, drive};
+use crate::picture::{origin, svg, write_png};
+use crate::{Error, Recorded, Watcher};
+use sidestep::kernel::{Cycle, InputError, Simulation};
+use std::path::Path;
+
+/// A run that was computed again.
+pub struct Replayed {
+    /// The run, at the cycle that was asked for.
+    pub run: Box<dyn Simulation>,
+    /// What computing it took.
+    pub effort: Effort,
+    /// Number of recorded poses of the cycle that it was compared with.
+    pub compared_poses: usize,
+}
+
+/// Computes the whole run again, and compares its last state with the recorded digest.
+///
+/// # Errors
+/// When no digest is recorded, or it is another; [`Error::Interrupted`] when the watcher said no.
+pub fn replay_all(
+    recorded: &Recorded,
+    workers: usize,
+    watcher: &dyn Watcher,
+) -> Result<Replayed, Error> {
+    if recorded.digest.is_none() {
+        let remedy = "end it with `sidestep resume DIR`, or give a --cycle";
+        let cause = "the run is not complete: no digest of it is recorded";
+        return Err(InputError::new(recorded.path.display(), cause, remedy).into());
+    }
+    let mut run = recorded.start(workers)?;
+    let until = recorded.cycles_done;
+    let effort = drive(run.as_mut(), until, Sinks::default(), watcher)?;
+    if run.cycle() < until && !run.is_over() {
+        return Err(Error::Interrupted);
+    }
+    if run.cycle() != until {
+        let cause = format!("the run is over after {} cycles, recorded are {until}", run.cycle());
+        let remedy = "the recording was changed, or this is a bug: please report it";
+        return Err(Error::stopped(cause, remedy));
+    }
+    recorded.confirm(run.as_ref())?;
+    Ok(Replayed { run, effort, compared_poses: 0 })
+}
+
+/// Computes the state at the beginning of a cycle, and compares it with the poses that are
+/// recorded of that cycle.
+///
+/// # Errors
+/// When the run has no such cycle, or a pose differs; [`Error::Interrupted`] when the watcher said
+/// no.
+pub fn replay_to(
+    recorded: &Recorded,
+    cycle: Cycle,
+    workers: usize,
+    watcher: &dyn Watcher,
+) -> Result<Replayed, Error> {
+    let mut run = recorded.start_near(cycle, workers)?;
+    check_cycle(cycle, run.plan().cycles)?;
+    let effort = drive(run.as_mut(), cycle, Sinks::default(), watcher)?;
+    if run.cycle() < cycle {
+        return Err(match run.is_over() {
+            true => no_such_cycle(cycle, run.cycle()).into(),
+            false => Error::Interrupted,
+        });
+    }
+    let compared_poses = match &recorded.folder {
+        Some(folder) => compare(run.as_ref(), recorded.start(workers)?, folder)?,
+        None => 0,
+    };
+    Ok(Replayed { run, effort, compared_poses })
+}
+
+fn check_cycle(cycle: Cycle, planned: Cycle) -> Result<(), InputError> {
+    if cycle <= planned { Ok(()) } else { Err(no_such_cycle(cycle, planned)) }
+}
+
+fn no_such_cycle(cycle: Cycle, last: Cycle) -> InputError {
+    let cause = format!("the run has {last} cycles");
+    InputError::new(format!("--cycle {cycle}"), cause, format!("give 0 to {last}"))
+}
+
+impl Replayed {
+    /// Draws the state to a PNG file, with the ways that are recorded.
+    ///
+    /// # Errors
+    /// When it cannot be drawn or written.
+    pub fn draw(&mut self, recorded: &Recorded, png: &Path) -> Result<(), Error> {
+        let origin = origin(self.run.as_ref());
+        let svg = svg(self.run.as_mut(), recorded.folder.as_deref(), &origin)?;
+        write_png(png, &svg)
+    }
+}

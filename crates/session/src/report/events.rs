@@ -1,0 +1,159 @@
+//! What happened in a run and when, for every table that has the columns `cycle` and `event`.
+
+use super::metrics::{digits, left_out};
+use super::recorded::{cell, rows};
+use sidestep::experiment::figure::{Figure, FigureKind, Point, Series, Table};
+use sidestep::experiment::{Document, document::Text};
+use sidestep::kernel::InputError;
+use sidestep::kernel::ports::Values;
+use sidestep_record::{Table as Recorded, read_table};
+use std::path::Path;
+
+/// Events that are listed one by one.
+const MOST_ROWS: usize = 100;
+/// Stretches of cycles over which events are counted.
+const STRETCHES: u64 = 50;
+/// Kinds of events with a line of their own; palettes have no more colors.
+const MOST_KINDS: usize = 7;
+
+/// Appends what the table `name` tells, if it is one of events.
+///
+/// # Errors
+/// When the table is damaged.
+pub(super) fn tell(document: &mut Document, folder: &Path, name: &str) -> Result<(), InputError> {
+    let first = read_table(folder, name, ..1);
+    let is_of_events = |t: &Recorded| t.column("event").is_some() && t.column("cycle").is_some();
+    if !first.is_ok_and(|table| is_of_events(&table)) {
+        return Ok(());
+    }
+    let table = read_table(folder, name, ..)?;
+    let Some(events) = Events::of(&table) else { return Ok(()) };
+    let title =
+        if name == "events" { "What happened".into() } else { format!("What happened: {name}") };
+    document.section(title);
+    if table.rows() == 0 {
+        document.paragraph("Nothing that is recorded as an event.");
+        return Ok(());
+    }
+    let partial = if table.complete { "" } else { ", of those cycles that are on the disk" };
+    let words = Text::from(format!("{} of ", rows(table.rows())));
+    document.paragraph(words.and(Text::code(name)).and(format!("{partial}.")));
+    document.tables([events.counts()]).figures(events.over_time());
+    document.tables([first_rows(&table)]);
+    Ok(())
+}
+
+/// The columns that every table of events has.
+struct Events<'a> {
+    table: &'a Recorded,
+    cycles: &'a [u64],
+    kinds: &'a [u32],
+    names: &'a [String],
+}
+
+impl<'a> Events<'a> {
+    fn of(table: &'a Recorded) -> Option<Self> {
+        let Some(Values::U64(cycles)) = table.column("cycle") else { return None };
+        let Some(Values::Label(kinds)) = table.column("event") else { return None };
+        let names = &table.schema.columns.iter().find(|c| c.name == "event")?.labels;
+        Some(Self { table, cycles, kinds, names })
+    }
+
+    /// Cycles of the events of a kind.
+    fn cycles_of(&self, kind: usize) -> impl Iterator<Item = u64> {
+        let is_its = move |(_, k): &(&u64, &u32)| **k as usize == kind;
+        self.cycles.iter().zip(self.kinds).filter(is_its).map(|(cycle, _)| *cycle)
+    }
+
+    /// Kinds that occur with their numbers, most frequent first.
+    fn frequent(&self) -> Vec<(usize, usize)> {
+        let mut counts: Vec<(usize, usize)> = (0..self.names.len()).map(|k| (k, 0)).collect();
+        for &kind in self.kinds {
+            counts[kind as usize].1 += 1;
+        }
+        counts.retain(|(_, count)| *count > 0);
+        counts.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
+        counts
+    }
+
+    fn counts(&self) -> Table {
+        let values = self.table.columns.iter().zip(&self.table.schema.columns);
+        let floats: Vec<(&str, &[f64])> = values
+            .filter_map(|(values, column)| match values {
+                Values::F64(v) => Some((column.name.as_str(), &v[..])),
+                _ => None,
+            })
+            .collect();
+        let mut table =
+            Table::new("Events by kind", "", &["event", "count", "first cycle", "last cycle"]);
+        for (name, _) in &floats {
+            table.columns.extend([format!("least {name}"), format!("greatest {name}")]);
+        }
+        for (kind, count) in self.frequent() {
+            let end = |cycle: Option<u64>| cycle.map_or("-".into(), |c| c.to_string());
+            let (first, last) = (self.cycles_of(kind).min(), self.cycles_of(kind).max());
+            let head = [self.names[kind].clone(), count.to_string(), end(first), end(last)];
+            let ends = floats.iter().flat_map(|(_, values)| self.ends(kind, values));
+            table.row(head.into_iter().chain(ends));
+        }
+        table
+    }
+
+    /// The least and the greatest value of a kind.
+    fn ends(&self, kind: usize, values: &[f64]) -> [String; 2] {
+        let its = || {
+            let all = values.iter().zip(self.kinds);
+            all.filter(|(v, k)| **k as usize == kind && v.is_finite()).map(|(v, _)| *v)
+        };
+        [its().reduce(f64::min), its().reduce(f64::max)].map(|end| end.map_or("-".into(), digits))
+    }
+
+    /// How many of each kind there were in each stretch of cycles; nothing of one stretch.
+    fn over_time(&self) -> Option<Figure> {
+        let last = self.cycles.iter().max()? + 1;
+        let length = last.div_ceil(STRETCHES);
+        let stretches = last.div_ceil(length);
+        if stretches < 2 {
+            return None;
+        }
+        let frequent = self.frequent();
+        let mut series: Vec<Series> = frequent[..frequent.len().min(MOST_KINDS)]
+            .iter()
+            .map(|(kind, _)| Series { name: self.names[*kind].clone(), points: Vec::new() })
+            .collect();
+        for (line, (kind, _)) in series.iter_mut().zip(&frequent) {
+            let mut counts = vec![0_u64; stretches as usize];
+            self.cycles_of(*kind).for_each(|cycle| counts[(cycle / length) as usize] += 1);
+            let middle = |k: usize| (k as f64 + 0.5) * length as f64;
+            let point = |(k, count): (usize, &u64)| Point::new(middle(k), *count as f64);
+            line.points = counts.iter().enumerate().map(point).collect();
+        }
+        let left_out = match frequent.len().saturating_sub(MOST_KINDS) {
+            0 => String::new(),
+            n => format!(" {n} less frequent kinds are left out."),
+        };
+        Some(Figure {
+            title: "Events over time".into(),
+            note: format!(
+                "Counts per stretch of {length} cycles, at its middle. One run: no interval.{left_out}"
+            ),
+            x_label: "cycle".into(),
+            y_label: format!("events in {length} cycles"),
+            kind: FigureKind::Lines,
+            series,
+            ..Figure::default()
+        })
+    }
+}
+
+fn first_rows(recorded: &Recorded) -> Table {
+    let columns = &recorded.schema.columns;
+    let names: Vec<&str> = columns.iter().map(|c| c.name.as_str()).collect();
+    let shown = recorded.rows().min(MOST_ROWS);
+    let mut table = Table::new("Events one by one", left_out(recorded.rows(), shown), &names);
+    for row in 0..shown {
+        let cells = columns.iter().zip(&recorded.columns);
+        table.row(cells.map(|(column, values)| cell(column, values, row)));
+    }
+    table
+}

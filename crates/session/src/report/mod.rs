@@ -1,0 +1,34 @@
+//! Folders of results as documents.
+//!
+//! ```text
+//! run.rs        a run folder -> a document       metrics.rs   numbers of a summary -> tables
+//! sweep.rs      the folder of a sweep -> a document
+//! recorded.rs   its tables: what is in them      events.rs    what happened, and when
+//! ```
+
+mod events;
+mod metrics;
+mod recorded;
+mod run;
+mod sweep;
+mod words;
+
+use crate::sweep::Folder;
+use crate::{Error, Watcher};
+use sidestep::experiment::Document;
+use sidestep::scenario::Worlds;
+use std::path::Path;
+
+pub use words::duration;
+
+/// Returns the report of a run folder or of the folder of a sweep. The one place that tells the
+/// two apart.
+///
+/// # Errors
+/// When the folder holds nothing to report, or something in it is damaged.
+pub fn document(worlds: Worlds, folder: &Path, watcher: &dyn Watcher) -> Result<Document, Error> {
+    match Folder::is_at(folder) {
+        true => sweep::document(worlds, &Folder::open(folder)?, watcher),
+        false => Ok(run::document(folder)?),
+    }
+}

@@ -1,0 +1,69 @@
+//! What the tables of a run folder hold, by their schemas.
+
+use super::metrics::unit;
+use crate::recorded::has_rows;
+use sidestep::experiment::{Document, Table};
+use sidestep::kernel::InputError;
+use sidestep::kernel::ports::{ColumnSpec, Values};
+use sidestep_record::read_table;
+use std::path::Path;
+
+/// Names of the tables in a run folder of which something is whole, sorted.
+///
+/// # Errors
+/// When the folder cannot be read.
+pub(super) fn names(folder: &Path) -> Result<Vec<String>, InputError> {
+    let cannot = |e: std::io::Error| {
+        InputError::new(folder.display(), e.to_string(), "make the folder readable")
+    };
+    let mut names = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(cannot)? {
+        let name = entry.map_err(cannot)?.file_name().to_string_lossy().into_owned();
+        let name = name.strip_suffix(".partial").unwrap_or(&name).to_string();
+        if has_rows(folder, &name) {
+            names.push(name);
+        }
+    }
+    names.sort();
+    names.dedup();
+    Ok(names)
+}
+
+/// Appends what columns there are and what they mean.
+///
+/// # Errors
+/// When a table is damaged.
+pub(super) fn tell(document: &mut Document, folder: &Path) -> Result<(), InputError> {
+    let note = "Parquet files below the run folder, one folder a table.";
+    let columns = ["table", "column", "type", "unit", "meaning"];
+    let mut table = Table::new("Columns", note, &columns);
+    for name in names(folder)? {
+        // Its first rows tell the schema; the whole may be large.
+        let first = read_table(folder, &name, ..1).or_else(|_| read_table(folder, &name, ..))?;
+        for column in &first.schema.columns {
+            let unit = unit(&column.name);
+            let ty = column.ty.name().to_string();
+            table.row([name.clone(), column.name.clone(), ty, unit, column.meaning.clone()]);
+        }
+    }
+    if !table.rows.is_empty() {
+        document.section("What was recorded").tables([table]);
+    }
+    Ok(())
+}
+
+/// A value of a column as people read it.
+pub(super) fn cell(column: &ColumnSpec, values: &Values, row: usize) -> String {
+    match values {
+        // What stands for none.
+        Values::U32(v) if v[row] == u32::MAX => "-".into(),
+        Values::F64(v) => super::metrics::digits(v[row]),
+        _ if values.is_missing(row) => "-".into(),
+        _ => column.text(values, row),
+    }
+}
+
+/// A number of rows in words.
+pub(super) fn rows(rows: usize) -> String {
+    format!("{} row{}", super::words::count(rows as u64), if rows == 1 { "" } else { "s" })
+}

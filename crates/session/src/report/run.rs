@@ -1,0 +1,177 @@
+//! A run folder as a document. Nothing here knows worlds: metrics are what `summary.json` holds,
+//! everything else follows from the schemas of the recorded tables.
+
+use super::words::{count, duration};
+use super::{events, metrics, recorded};
+use serde_json::Value;
+use sidestep::experiment::Document;
+use sidestep::experiment::document::{Block, Code, Picture, Text};
+use sidestep::kernel::InputError;
+use sidestep_record::{Manifest, RunView, Status};
+use std::path::Path;
+
+/// What is said wherever numbers of one run stand.
+const ONE_RUN: &str = "**One run, n = 1**: these numbers have no interval, and say nothing of other \
+                       seeds.";
+
+/// What there is to say about the run in `folder`.
+///
+/// # Errors
+/// When it is no run folder, or something in it is damaged.
+pub(super) fn document(folder: &Path) -> Result<Document, InputError> {
+    let view = RunView::open(folder)?;
+    let summary = summary(folder)?;
+    let name = name(&view, summary.as_ref());
+    let mut document = Document::new(format!("{name}, seed {}", view.manifest.seed), lead(&view));
+    if let Some(warning) = unfinished(&view) {
+        document.warning(warning);
+    }
+    document.section("What was run").push(Block::Facts(facts(&view, summary.as_ref())));
+    document.push(Block::Code(Code {
+        title: "The scenario, complete in itself (scenario.toml)".into(),
+        language: "toml",
+        text: view.scenario.clone(),
+    }));
+    document.commands("How to run it again", again(&view));
+    if let Some(summary) = &summary {
+        tell_metrics(&mut document, &view.manifest, summary);
+    }
+    if let Some(picture) = picture(folder)? {
+        document.section("Where everybody went").pictures([picture]);
+    }
+    for table in recorded::names(folder)? {
+        events::tell(&mut document, folder, &table)?;
+    }
+    recorded::tell(&mut document, folder)?;
+    Ok(document)
+}
+
+/// The scenario's name, else the world's.
+fn name(view: &RunView, summary: Option<&Value>) -> String {
+    let named = summary.and_then(|s| s.get("name")).and_then(Value::as_str);
+    named.filter(|name| !name.is_empty()).unwrap_or(&view.manifest.world).into()
+}
+
+fn lead(view: &RunView) -> Text {
+    let Manifest { world, status, cycles_done, cycles_planned, program_version, .. } =
+        &view.manifest;
+    let (done, planned) = (count(*cycles_done), count(*cycles_planned));
+    let cycles = match (cycles_done == cycles_planned, status) {
+        (true, _) => format!("{done} cycles"),
+        (false, Status::Complete) => format!("over after {done} of at most {planned} cycles"),
+        (false, _) => format!("{done} of {planned} cycles"),
+    };
+    let text = format!("A run of the world `{world}` by sidestep {program_version}, {cycles}.");
+    Text::marked(&text)
+}
+
+/// What to say of a run that is not complete.
+fn unfinished(view: &RunView) -> Option<Text> {
+    let Manifest { status, cycles_done, .. } = &view.manifest;
+    let how = match status {
+        Status::Complete => return None,
+        Status::Incomplete => "It was stopped",
+        Status::Running => "It is under way, or was killed",
+    };
+    let text = format!(
+        "**This run is not complete.** {how}; what is below is of its first {} cycles at most. ",
+        count(*cycles_done)
+    );
+    let resume =
+        Text::code(format!("sidestep resume {}", quoted(&view.path.display().to_string())));
+    Some(Text::marked(&text).and(resume).and(" goes on with it."))
+}
+
+fn facts(view: &RunView, summary: Option<&Value>) -> Vec<(String, Text)> {
+    let manifest = &view.manifest;
+    let status = match manifest.status {
+        Status::Complete => "complete",
+        Status::Incomplete => "incomplete",
+        Status::Running => "not ended",
+    };
+    let mut facts: Vec<(String, Text)> = vec![
+        ("World".into(), Text::code(&*manifest.world)),
+        ("Status".into(), status.into()),
+        ("Seed".into(), manifest.seed.to_string().into()),
+        ("Cycles".into(), count(manifest.cycles_done).into()),
+        ("Cycles planned".into(), count(manifest.cycles_planned).into()),
+        ("Version".into(), format!("sidestep {}", manifest.program_version).into()),
+    ];
+    let number = |key: &str| summary.and_then(|s| s.get(key)).and_then(Value::as_f64);
+    let mut fact = |name: &str, value: Option<String>| {
+        facts.extend(value.map(|value| (name.to_string(), Text::from(value))));
+    };
+    fact("Agents", number("robots").map(|n| count(n as u64)));
+    fact("Took", number("wall_s").map(duration));
+    fact("Workers", number("workers").map(|n| n.to_string()));
+    let digest = manifest.digest.clone();
+    facts.extend(digest.map(|digest| ("Digest of the last state".into(), Text::code(digest))));
+    facts
+}
+
+/// Commands that give the same again.
+fn again(view: &RunView) -> String {
+    let folder = quoted(&view.path.display().to_string());
+    let scenario = quoted(&view.path.join("scenario.toml").display().to_string());
+    format!(
+        "# the same run, with the same rows and the same digest\n\
+         sidestep run {scenario} --out NEW_DIR\n\
+         # its state at a cycle, computed anew and compared with what was recorded\n\
+         sidestep replay {folder}\n"
+    )
+}
+
+/// A path as a shell takes it.
+pub(super) fn quoted(path: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "/._-+=:,@%".contains(c);
+    if !path.is_empty() && path.chars().all(is_plain) {
+        return path.into();
+    }
+    format!("'{}'", path.replace('\'', "'\\''"))
+}
+
+/// `summary.json`, which a run writes at its end.
+fn summary(folder: &Path) -> Result<Option<Value>, InputError> {
+    let path = folder.join("summary.json");
+    let Ok(text) = std::fs::read_to_string(&path) else { return Ok(None) };
+    let damaged = |e: serde_json::Error| {
+        let remedy = "restore the file, or run the scenario again in a new folder";
+        InputError::new(path.display(), format!("this is no summary: {e}"), remedy)
+    };
+    serde_json::from_str(&text).map(Some).map_err(damaged)
+}
+
+fn tell_metrics(document: &mut Document, manifest: &Manifest, summary: &Value) {
+    let cycles = summary.get("cycles").and_then(Value::as_u64).unwrap_or(manifest.cycles_done);
+    let of = format!(" After {} cycles.", count(cycles));
+    document.section("Results").paragraph(Text::marked(&format!("{ONE_RUN}{of}")));
+    let get = |key| summary.get(key).unwrap_or(&Value::Null);
+    document.tables(metrics::flat("Metrics", get("metrics")));
+    document.tables(metrics::listed("Metrics of every agent", get("per_agent")));
+    document.tables(metrics::listed("Metrics of pairs of agents", get("per_pair")));
+}
+
+/// The picture that the run left.
+fn picture(folder: &Path) -> Result<Option<Picture>, InputError> {
+    let path = folder.join("trajectories.svg");
+    match std::fs::read_to_string(&path) {
+        Ok(svg) => {
+            let title = "Trajectories, and where everybody is at the end".into();
+            Ok(Some(Picture { title, caption: String::new(), svg }))
+        }
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
+        Err(e) => Err(InputError::new(path.display(), e.to_string(), "make the file readable")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_path_reaches_the_shell_as_it_is() {
+        assert_eq!(quoted("runs/a-1"), "runs/a-1");
+        assert_eq!(quoted("my runs/it's"), "'my runs/it'\\''s'");
+        assert_eq!(quoted("$(rm)"), "'$(rm)'");
+    }
+}

@@ -1,0 +1,227 @@
+//! The folder of a sweep as a document: what was run, what it came to, how sure that is.
+
+use super::run::quoted;
+use super::words::{count, duration};
+use crate::sweep::{Finished, Folder, finished, picture_of};
+use crate::{Error, Watcher};
+use sidestep::experiment::Table;
+use sidestep::experiment::document::{Block, Code, Document, Picture, Text};
+use sidestep::experiment::sweep::rounds::{Stopped, stopped};
+use sidestep::experiment::sweep::{Plan, RunTable, Summary};
+use sidestep::kernel::ports::Values;
+use sidestep::scenario::Worlds;
+
+/// Variants of which a run is drawn.
+const DRAWN: usize = 4;
+/// A run that took longer is not made again for its picture.
+const LONGEST_S: f64 = 20.0;
+/// Failed runs that are named.
+const NAMED: usize = 20;
+
+/// What there is to say about the sweep in `folder`.
+///
+/// # Errors
+/// When something in it is damaged, or no run is finished yet.
+pub(super) fn document(
+    worlds: Worlds,
+    folder: &Folder,
+    watcher: &dyn Watcher,
+) -> Result<Document, Error> {
+    let Finished { table, is_complete } = finished(folder)?;
+    let plan = folder.plan();
+    let summary = plan.summary(&table)?;
+    let mut document = Document::new(name(plan), lead(plan, &table));
+    if !is_complete {
+        document.warning(unfinished(folder, &table));
+    }
+    document.section("What was run").push(Block::Facts(facts(folder, &table)));
+    document.tables(variants(plan, &table));
+    document.tables(why_enough(plan, &table));
+    document.commands("How to run it again", again(folder));
+    let scenario = std::fs::read_to_string(folder.scenario(0));
+    if let Ok(text) = scenario {
+        let title = format!("The scenario of the first variant: {}", plan.names()[0]);
+        document.push(Block::Code(Code { title, language: "toml", text }));
+    }
+    tell_results(&mut document, &summary);
+    tell_failures(&mut document, plan, &table);
+    let pictures = pictures((worlds, watcher), folder, &table)?;
+    if !pictures.is_empty() {
+        document.section("Where everybody went");
+        let text = "The run of the first seed, of the first variants.";
+        document.paragraph(text).pictures(pictures);
+    }
+    Ok(document)
+}
+
+fn name(plan: &Plan) -> String {
+    match plan.name.is_empty() {
+        true => format!("A sweep of the world {}", plan.world),
+        false => plan.name.clone(),
+    }
+}
+
+fn lead(plan: &Plan, table: &RunTable) -> Text {
+    let (runs, variants) = (table.runs() as u64, plan.variants.len() as u64);
+    Text::marked(&format!(
+        "{} runs of {} variants in the world `{}`. Replicate k of every variant has seed {} + k, so \
+         variants are compared seed by seed. Intervals are 95 %.",
+        count(runs),
+        count(variants),
+        plan.world,
+        plan.first_seed,
+    ))
+}
+
+fn unfinished(folder: &Folder, table: &RunTable) -> Text {
+    let (done, all) = (count(table.runs() as u64), count(folder.plan().len()));
+    let text = format!("**This sweep is not done.** {done} of at most {all} runs are finished. ");
+    let resume = format!("sidestep resume {}", quoted(&folder.path().display().to_string()));
+    Text::marked(&text).and(Text::code(resume)).and(" goes on with it.")
+}
+
+fn facts(folder: &Folder, table: &RunTable) -> Vec<(String, Text)> {
+    let (plan, manifest) = (folder.plan(), folder.manifest());
+    let mut facts: Vec<(String, Text)> = vec![
+        ("World".into(), Text::code(&*plan.world)),
+        ("Runs".into(), count(table.runs() as u64).into()),
+        ("Variants".into(), count(plan.variants.len() as u64).into()),
+        ("First seed".into(), plan.first_seed.to_string().into()),
+        ("Version".into(), format!("sidestep {}", manifest.program_version).into()),
+        ("Fingerprint of all scenarios".into(), Text::code(folder.fingerprint())),
+    ];
+    if let Some(until) = &plan.until {
+        let unit = if until.is_relative { "of the mean" } else { "in the metric's unit" };
+        let of = match until.metrics.is_empty() {
+            true => "every metric that varies".to_string(),
+            false => until.metrics.join(", "),
+        };
+        let words = format!(
+            "until half the interval is at most {} {unit}: {of}; at most {} runs a variant",
+            until.half_width, plan.replicates
+        );
+        facts.push(("Runs of a variant".into(), words.into()));
+    }
+    if let Some(simulated_s) = total(table, "run_wall_s") {
+        facts.push(("Simulation in all".into(), duration(simulated_s).into()));
+    }
+    facts
+}
+
+fn total(table: &RunTable, column: &str) -> Option<f64> {
+    let values = &table.column(column)?.values;
+    Some((0..table.runs()).filter_map(|row| values.number(row)).sum())
+}
+
+/// The variants, their parameters and numbers of runs.
+fn variants(plan: &Plan, table: &RunTable) -> Option<Table> {
+    if plan.parameters.is_empty() {
+        return None;
+    }
+    let mut runs = vec![0u64; plan.variants.len()];
+    if let Some(Values::I64(of)) = table.column("variant").map(|c| &c.values) {
+        of.options().flatten().filter_map(|v| usize::try_from(*v).ok()).for_each(|v| runs[v] += 1);
+    }
+    let mut columns = vec!["variant", "runs"];
+    columns.extend(plan.parameters.iter().map(String::as_str));
+    let note = "`variants/NNNN/scenario.toml` is the whole scenario of variant NNNN.";
+    let mut rows = Table::new("Variants", note, &columns);
+    for (k, variant) in plan.variants.iter().enumerate() {
+        let value = |key: &String| match variant.value(key) {
+            None => "as in the scenario".to_string(),
+            Some(value) => value.as_str().map_or_else(|| value.to_string(), str::to_string),
+        };
+        let first = [format!("{k:04}"), runs[k].to_string()];
+        rows.row(first.into_iter().chain(plan.parameters.iter().map(value)));
+    }
+    Some(rows)
+}
+
+/// Why variants were run no more, where a precision ends them.
+fn why_enough(plan: &Plan, table: &RunTable) -> Option<Table> {
+    let stopped = stopped(plan, table);
+    let names = plan.names();
+    let mut rows = Table::new("Why so many runs", "", &["variant", "runs", "why"]);
+    for Stopped { variant, runs, reason } in &stopped {
+        let name = names[*variant as usize].clone();
+        rows.row([name, runs.to_string(), reason.words().to_string()]);
+    }
+    (!stopped.is_empty()).then_some(rows)
+}
+
+/// Commands that give the same again.
+fn again(folder: &Folder) -> String {
+    let at = |rest: &str| quoted(&folder.path().join(rest).display().to_string());
+    format!(
+        "# one run of the table: the scenario of its variant, and its seed\n\
+         sidestep run {} --seed {}\n\
+         # all runs as one table: a row a run, parameters and metrics in typed columns\n\
+         python3 -c 'import polars, sys; print(polars.read_parquet(sys.argv[1]))' {}\n",
+        at("variants/0000/scenario.toml"),
+        folder.plan().first_seed,
+        quoted(&folder.results_file().display().to_string()),
+    )
+}
+
+/// Every metric in a section of its own: its figures, then its tables.
+fn tell_results(document: &mut Document, summary: &Summary) {
+    for section in summary.sections() {
+        document.section(section.title).figures(section.figures).tables(section.tables);
+    }
+    let notes: Vec<&str> = summary.notes.iter().map(String::as_str).collect();
+    if !notes.is_empty() {
+        document.section("Notes");
+        notes.into_iter().for_each(|note| {
+            document.paragraph(note);
+        });
+    }
+    document.tables(summary.left_out());
+}
+
+fn tell_failures(document: &mut Document, plan: &Plan, table: &RunTable) {
+    let Some(column) = table.column("failure") else { return };
+    let failed = (0..table.runs()).filter(|&row| !column.values.text(row).is_empty());
+    let failed: Vec<usize> = failed.collect();
+    if failed.is_empty() {
+        return;
+    }
+    let text = format!("**{} runs failed** and are in no figure of this report.", failed.len());
+    document.section("Runs that failed").warning(Text::marked(&text));
+    let note = format!("The first {NAMED} at most.");
+    let mut rows = Table::new("Failures", note, &["variant", "seed", "why"]);
+    let names = plan.names();
+    for &row in failed.iter().take(NAMED) {
+        let number = |name: &str| table.column(name).and_then(|c| c.values.number(row));
+        let variant = number("variant").and_then(|v| names.get(v as usize).cloned());
+        let seed = number("seed").map_or_else(String::new, |s| s.to_string());
+        rows.row([variant.unwrap_or_default(), seed, column.values.text(row)]);
+    }
+    document.tables([rows]);
+}
+
+/// A run of each of the first variants, drawn; nothing of those that took long.
+fn pictures(
+    (worlds, watcher): (Worlds, &dyn Watcher),
+    folder: &Folder,
+    table: &RunTable,
+) -> Result<Vec<Picture>, Error> {
+    let plan = folder.plan();
+    let cells = table.column("cell");
+    let took_s = |id: u64| {
+        let row = (0..table.runs())
+            .find(|&row| cells.and_then(|c| c.values.number(row)) == Some(id as f64))?;
+        table.column("run_wall_s")?.values.number(row)
+    };
+    let mut pictures = Vec::new();
+    for (variant, name) in (0u32..).zip(plan.names()).take(DRAWN) {
+        let cell = plan.cell(variant, 0);
+        if took_s(cell.id).is_some_and(|took_s| took_s <= LONGEST_S)
+            && let Some(svg) = picture_of((worlds, watcher), folder, cell)?
+        {
+            let caption =
+                format!("Seed {}, digest and metrics in row {} of the table.", cell.seed, cell.id);
+            pictures.push(Picture { title: name, caption, svg });
+        }
+    }
+    Ok(pictures)
+}

@@ -1,0 +1,158 @@
+//! A recorded run that is computed again: from its folder, or from a recording for viewers.
+
+use crate::Error;
+use crate::identity::Maker;
+use crate::recording::{restore, write_inputs};
+use sidestep::kernel::Simulation;
+use sidestep::kernel::checkpoint::decode_header;
+use sidestep::kernel::{Cycle, InputError};
+use sidestep::scenario::Resolved;
+use sidestep::scenario::{Source, Worlds};
+use sidestep_record::{McapRun, ResumePoint, RunView, Status, is_mcap};
+use std::path::{Path, PathBuf};
+
+/// What is recorded of a run, whatever it was recorded to.
+pub struct Recorded {
+    /// The folder or file.
+    pub path: PathBuf,
+    worlds: Worlds,
+    maker: Maker,
+    /// Whether it came to its end.
+    pub is_complete: bool,
+    /// Cycles that are done for certain.
+    pub cycles_done: Cycle,
+    /// The digest of the state after these, where it is known.
+    pub digest: Option<String>,
+    /// The run folder, where it is one.
+    pub folder: Option<PathBuf>,
+    source: Source,
+    /// The folder that the scenario's files lie in.
+    base: PathBuf,
+    /// The same, where it lasts only as long as this.
+    _unpacked: Option<tempfile::TempDir>,
+}
+
+/// Where resolved scenarios have their files.
+const INPUTS: &str = "inputs";
+
+impl Recorded {
+    /// Opens a run folder or an MCAP file of ours, of a run of one of `worlds`.
+    ///
+    /// # Errors
+    /// When it is neither, or damaged.
+    pub fn open(worlds: Worlds, path: &Path) -> Result<Self, Error> {
+        if is_mcap(path) { Self::of_mcap(worlds, path) } else { Ok(Self::of_folder(worlds, path)?) }
+    }
+
+    fn of_folder(worlds: Worlds, path: &Path) -> Result<Self, InputError> {
+        let view = RunView::open(path)?;
+        let place = path.join("scenario.toml").display().to_string();
+        Ok(Self {
+            path: path.to_path_buf(),
+            worlds,
+            maker: Maker { version: view.manifest.program_version, build: view.manifest.build },
+            is_complete: view.manifest.status == Status::Complete,
+            cycles_done: view.manifest.cycles_done,
+            digest: view.manifest.digest,
+            folder: Some(path.to_path_buf()),
+            source: Source::new(place, view.scenario, path),
+            base: path.to_path_buf(),
+            _unpacked: None,
+        })
+    }
+
+    fn of_mcap(worlds: Worlds, path: &Path) -> Result<Self, Error> {
+        let run = McapRun::open(path)?;
+        let files = tempfile::tempdir().map_err(|e| Error::write(&std::env::temp_dir(), &e))?;
+        write_inputs(files.path(), &run.files)?;
+        let place = format!("{}: scenario.toml", path.display());
+        Ok(Self {
+            path: path.to_path_buf(),
+            worlds,
+            maker: Maker { version: run.program_version, build: run.build },
+            is_complete: run.status == Status::Complete,
+            cycles_done: run.cycles_done,
+            digest: Some(run.digest),
+            folder: None,
+            source: Source::new(place, run.scenario, files.path()),
+            base: files.path().to_path_buf(),
+            _unpacked: Some(files),
+        })
+    }
+
+    /// The scenario as it was recorded, and its files.
+    ///
+    /// # Errors
+    /// When a file cannot be read any more.
+    pub fn resolved(&self) -> Result<Resolved, InputError> {
+        let folder = self.base.join(INPUTS);
+        let mut files = Vec::new();
+        if folder.is_dir() {
+            let unreadable = |e: std::io::Error| {
+                let remedy = "make the folder readable, or run the scenario again";
+                InputError::new(folder.display(), e.to_string(), remedy)
+            };
+            for entry in std::fs::read_dir(&folder).map_err(unreadable)? {
+                let entry = entry.map_err(unreadable)?;
+                let name = format!("{INPUTS}/{}", entry.file_name().display());
+                files.push((name, std::fs::read(entry.path()).map_err(unreadable)?));
+            }
+        }
+        Ok(Resolved { text: self.source.text.clone(), files })
+    }
+
+    /// The run at its start.
+    ///
+    /// # Errors
+    /// Results may change between builds, so only the writer's own can compute it again. A scenario
+    /// that is wrong by now.
+    pub fn start(&self, workers: usize) -> Result<Box<dyn Simulation>, InputError> {
+        let compiled = self.worlds.compile(&self.source)?;
+        self.maker.check(&self.path, "run", |wrote| {
+            format!("use sidestep {wrote}, or run its scenario again")
+        })?;
+        Ok(compiled.start(&self.source, workers))
+    }
+
+    /// The run at its last checkpoint, if that lies before `cycle`; else at its start.
+    ///
+    /// # Errors
+    /// As [`Self::start`]; a damaged checkpoint.
+    pub fn start_near(
+        &self,
+        cycle: Cycle,
+        workers: usize,
+    ) -> Result<Box<dyn Simulation>, InputError> {
+        let mut run = self.start(workers)?;
+        if let Some(folder) = &self.folder
+            && let Ok(bytes) = std::fs::read(folder.join("checkpoint.bin"))
+            && decode_header(&bytes).is_ok_and(|header| header.cycle <= cycle)
+        {
+            restore(run.as_mut(), &ResumePoint::Checkpoint(bytes), folder)?;
+        }
+        Ok(run)
+    }
+
+    /// Compares the state of a run that was computed again with what is recorded of its last one.
+    /// Whether there was anything to compare.
+    ///
+    /// # Errors
+    /// When they differ.
+    pub fn confirm(&self, run: &dyn Simulation) -> Result<bool, Error> {
+        let Some(recorded) = self.digest.as_ref().filter(|_| run.cycle() == self.cycles_done)
+        else {
+            return Ok(false);
+        };
+        let digest = run.digest().to_string();
+        if *recorded == digest {
+            return Ok(true);
+        }
+        let cause = format!(
+            "after {} cycles the digest is {digest}, recorded is {recorded}",
+            self.cycles_done
+        );
+        let remedy =
+            "the recording was changed, or this is a bug: please report it with the recording";
+        Err(Error::stopped(format!("{}: {cause}", self.path.display()), remedy))
+    }
+}

@@ -1,0 +1,191 @@
+//! The summary of a run: the content of `summary.json`, and lines for people.
+
+use crate::driver::Effort;
+use serde::Serialize;
+use serde_json::Value;
+use sidestep::VERSION;
+use sidestep::kernel::Cycle;
+use sidestep::kernel::Simulation;
+use sidestep::kernel::words::Lines;
+use sidestep::kernel::world::Decides;
+use sidestep::scenario::Foreign;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// Whether a run reached its end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Status {
+    /// All cycles are done.
+    Complete,
+    /// It was stopped before.
+    Incomplete,
+}
+
+/// The summary of a run as it stands.
+#[derive(Debug, Clone, Serialize)]
+pub struct Summary {
+    /// Version of the program.
+    pub version: &'static str,
+    /// Name of the world.
+    pub world: &'static str,
+    /// Noun for one of its agents.
+    #[serde(skip)]
+    pub agent: &'static str,
+    /// Name of the scenario.
+    pub name: String,
+    /// Whether it reached its end.
+    pub status: Status,
+    /// The seed.
+    pub seed: u64,
+    /// Digest of the state after `cycles` cycles, in hexadecimal.
+    pub digest: String,
+    /// Cycles done since the run's start.
+    pub cycles: Cycle,
+    /// Cycles that the scenario asks for.
+    pub cycles_planned: Cycle,
+    /// Number of agents.
+    pub agents: usize,
+    /// Alias of `agents`, for readers of earlier summaries.
+    robots: usize,
+    /// Number of workers.
+    pub workers: usize,
+    /// Cycles done by this process; the times below are theirs.
+    pub cycles_timed: u64,
+    /// Elapsed time.
+    pub wall_s: f64,
+    /// CPU time of all threads.
+    pub cpu_s: f64,
+    /// Speed: agents times cycles by CPU time.
+    pub agent_cycles_per_cpu_s: f64,
+    /// Alias of `agent_cycles_per_cpu_s`.
+    robot_cycles_per_cpu_s: f64,
+    /// Seconds per phase.
+    pub phases_s: Phases,
+    /// Metrics of its world.
+    pub metrics: Value,
+    /// The run folder, if there is one.
+    pub folder: Option<PathBuf>,
+    /// The recording for viewers, if there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mcap: Option<PathBuf>,
+    /// What was found in the file of another program's form that the scenario was made from.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub file: Option<Value>,
+    /// The same for people.
+    #[serde(skip)]
+    pub file_lines: Lines,
+    /// The world's own results, for people.
+    #[serde(skip)]
+    pub outcome: Lines,
+}
+
+/// Seconds per phase, by the clock of worker 0.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct Phases {
+    /// Of the phase *claim*,
+    pub claim: f64,
+    /// of *join*,
+    pub join: f64,
+    /// of *act*,
+    pub act: f64,
+    /// and of recording.
+    pub record: f64,
+    /// Aliases of the first three, for readers of earlier summaries.
+    perceive_decide: f64,
+    conflicts: f64,
+    react: f64,
+    /// Where agents decide: what the phases are called.
+    #[serde(skip)]
+    pub decides: Decides,
+}
+
+impl Phases {
+    fn new(run: &dyn Simulation, record: Duration) -> Self {
+        let times = run.phase_times();
+        let [claim, join, act] =
+            [times.claim_ns, times.join_ns, times.act_ns].map(|ns| ns as f64 / 1e9);
+        Self {
+            claim,
+            join,
+            act,
+            record: record.as_secs_f64(),
+            perceive_decide: claim,
+            conflicts: join,
+            react: act,
+            decides: run.decides(),
+        }
+    }
+}
+
+/// Time that a process spent on a run.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Cost {
+    pub(crate) workers: usize,
+    pub(crate) effort: Effort,
+    /// Time spent on recording.
+    pub(crate) recording: Duration,
+}
+
+impl Summary {
+    /// Returns the summary of a run as it stands.
+    pub(crate) fn new(run: &dyn Simulation, cost: Cost, folder: Option<&Path>) -> Self {
+        let plan = run.plan();
+        let (cycles, agents, effort) = (run.cycle(), run.agents(), cost.effort);
+        let cpu_s = effort.cpu.as_secs_f64();
+        let agent_cycles_per_cpu_s = agents as f64 * effort.cycles as f64 / cpu_s.max(1e-9);
+        let status = match cycles < plan.cycles && !run.is_over() {
+            true => Status::Incomplete,
+            false => Status::Complete,
+        };
+        Self {
+            version: VERSION,
+            world: run.world(),
+            agent: run.agent(),
+            name: plan.name.clone(),
+            status,
+            seed: plan.seed,
+            digest: run.digest().to_string(),
+            cycles,
+            cycles_planned: plan.cycles,
+            agents,
+            robots: agents,
+            workers: cost.workers,
+            cycles_timed: effort.cycles,
+            wall_s: effort.wall.as_secs_f64(),
+            cpu_s,
+            agent_cycles_per_cpu_s,
+            robot_cycles_per_cpu_s: agent_cycles_per_cpu_s,
+            phases_s: Phases::new(run, cost.recording),
+            metrics: run.metrics(),
+            folder: folder.map(Path::to_path_buf),
+            mcap: None,
+            file: None,
+            file_lines: Vec::new(),
+            outcome: run.outcome(),
+        }
+    }
+
+    /// Adds what was found in the file that the scenario was made from.
+    pub(crate) fn tell_of_file(&mut self, foreign: Foreign) {
+        self.file = Some(foreign.json);
+        self.file_lines = foreign.lines;
+    }
+
+    /// Adds where the recording for viewers is.
+    pub(crate) fn tell_of_mcap(&mut self, path: PathBuf) {
+        self.mcap = Some(path);
+    }
+}
+
+/// The content of `summary.json`.
+#[derive(Debug, Serialize)]
+pub(crate) struct SummaryFile<'a> {
+    #[serde(flatten)]
+    pub(crate) summary: &'a Summary,
+    /// Metrics of every agent by itself,
+    pub(crate) per_agent: Value,
+    /// and of pairs of agents, in worlds that have any.
+    #[serde(skip_serializing_if = "Value::is_null")]
+    pub(crate) per_pair: Value,
+}

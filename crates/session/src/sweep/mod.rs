@@ -1,0 +1,20 @@
+//! Many runs: a sweep -> cells -> one table.
+//!
+//! ```text
+//! prepare.rs   every variant compiled, a plan     work.rs      cells -> outcomes, many at once
+//! journey.rs   from the plan to the table         columns.rs   tables of runs <-> files
+//! look.rs      finished runs, for reports         effort.rs    time that all took
+//! ```
+
+mod effort;
+mod journey;
+mod look;
+mod prepare;
+mod work;
+
+pub use effort::Effort;
+pub use journey::{
+    Done, Ended, Folder, collect, go_on, in_memory, planned, planned_or_there, share,
+};
+pub(crate) use look::picture_of;
+pub use look::{Finished, finished};

@@ -1,0 +1,86 @@
+//! Every variant of a sweep, compiled once: what is wrong in any of them is told before any runs.
+
+use crate::scenario::source_of;
+use crate::watcher::{Progress, Watched};
+use crate::{Error, Watcher};
+use sidestep::experiment::sweep::cell::metric_names;
+use sidestep::experiment::sweep::{Plan, Setting, Sweep, Variant};
+use sidestep::kernel::InputError;
+use sidestep::scenario::{Compiled, Source, Worlds, nearest};
+
+/// Compiles every variant, hands it to `each` with its number, and makes the plan.
+///
+/// # Errors
+/// When the design or a variant is wrong, `each` fails, or the watcher says no.
+pub(super) fn prepare(
+    worlds: Worlds,
+    sweep: &Sweep,
+    watcher: &dyn Watcher,
+    mut each: impl FnMut(u32, &Source, &dyn Compiled) -> Result<(), Error>,
+) -> Result<Plan, Error> {
+    let fixed: Vec<String> = sweep.fixed.iter().map(Setting::to_override).collect();
+    let base = source_of(worlds, &sweep.scenario, &fixed)?;
+    let variants = sweep.design.variants(&sweep.place)?;
+    Plan::check_size(variants.len(), sweep.replicates, &sweep.place)?;
+    let (mut agents, mut first) = (0, None);
+    let (count, watched) = (variants.len(), Watched(watcher));
+    for (k, settings) in (0u32..).zip(&variants) {
+        if !watcher.go_on() {
+            return Err(Error::Interrupted);
+        }
+        let share = f64::from(k) / count as f64;
+        watched.at(Progress::Stage { what: "checking variants", share });
+        let (source, compiled) = variant(worlds, &base, settings)?;
+        agents = agents.max(compiled.bodies() as u64);
+        if first.is_none() {
+            first = Some((compiled.world(), compiled.plan().seed));
+            check_metrics(sweep, &source, compiled.as_ref())?;
+        }
+        each(k, &source, compiled.as_ref())?;
+    }
+    let first = first.expect("a design has at least one variant");
+    Ok(Plan { agents, ..Plan::new(sweep, variants, first)? })
+}
+
+/// The metrics that are named must be there: better told now than after all runs.
+fn check_metrics(
+    sweep: &Sweep,
+    source: &Source,
+    compiled: &dyn Compiled,
+) -> Result<(), InputError> {
+    let of_until = sweep.until.iter().flat_map(|until| &until.metrics);
+    let mut wanted = sweep.metrics.iter().chain(of_until).peekable();
+    if wanted.peek().is_none() {
+        return Ok(());
+    }
+    let mut simulation = compiled.start(source, 1);
+    // Some metrics are there only once something has happened.
+    simulation.advance(1);
+    let known = metric_names(simulation.as_ref());
+    let Some(unknown) = wanted.find(|name| !known.contains(name)) else { return Ok(()) };
+    let known: Vec<&str> = known.iter().map(String::as_str).collect();
+    let cause = format!("`{unknown}` is no metric of the world `{}`", compiled.world());
+    Err(InputError::new(&sweep.place, cause, nearest(unknown, &known)))
+}
+
+/// A variant's scenario; an error says which variant it is.
+fn variant(
+    worlds: Worlds,
+    base: &Source,
+    settings: &[Setting],
+) -> Result<(Source, Box<dyn Compiled>), InputError> {
+    let overrides: Vec<String> = settings.iter().map(Setting::to_override).collect();
+    let compiled = base.clone().with(&overrides).and_then(|source| {
+        let compiled = worlds.compile(&source)?;
+        Ok((source, compiled))
+    });
+    compiled.map_err(|e| {
+        if settings.is_empty() {
+            return e;
+        }
+        let variant = Variant { settings: settings.to_vec() };
+        let place = format!("{}, where {variant}", e.place());
+        let error = InputError::new(place, e.cause(), e.remedy());
+        e.position().map_or(error.clone(), |(line, column)| error.at(line, column))
+    })
+}

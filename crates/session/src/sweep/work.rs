@@ -1,0 +1,174 @@
+//! Cells -> outcomes: many at once, or one after the other on all workers.
+
+use crate::journey::recorded_run;
+use crate::recording::Recording;
+use crate::watcher::{Progress, Watched, Within};
+use crate::{Error, Watcher};
+use serde_json::json;
+use sidestep::experiment::sweep::{Cell, Outcome, Plan, start};
+use sidestep::kernel::{InputError, workers};
+use sidestep::scenario::{Source, Worlds};
+use sidestep_record::Existing;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
+
+/// Worlds of so many agents fill the caches by themselves: they are run one after the other, each
+/// on all workers, which also bounds the memory.
+const LARGE: u64 = 20_000;
+
+/// What cells are run with.
+pub(super) struct Work<'a> {
+    pub(super) worlds: Worlds,
+    pub(super) plan: &'a Plan,
+    /// The scenario of a variant.
+    pub(super) source: &'a (dyn Fn(u32) -> Result<Source, InputError> + Sync),
+    /// Where the run of a cell is recorded, if it is.
+    pub(super) record: Option<&'a (dyn Fn(u64) -> PathBuf + Sync)>,
+    pub(super) workers: usize,
+    pub(super) watcher: &'a dyn Watcher,
+}
+
+/// Takes an outcome: when it returns, the run is finished.
+pub(super) type Take<'a> = dyn FnMut(Outcome) -> Result<(), Error> + Send + 'a;
+
+/// What all workers share.
+struct Shared<'a, 'b> {
+    take: &'a mut Take<'b>,
+    done: u64,
+    failure: Option<Error>,
+}
+
+impl Work<'_> {
+    /// Runs the cells, in their order as far as there are workers, until all are done, something
+    /// fails, or somebody asks to stop. `before` and `total` are for the progress bar: runs that
+    /// were done before, and all.
+    ///
+    /// # Errors
+    /// What `take` returns; no cell is begun after that.
+    pub(super) fn run(
+        &self,
+        cells: &[Cell],
+        (before, total): (u64, u64),
+        take: &mut Take<'_>,
+    ) -> Result<(), Error> {
+        let at_once = self.at_once(cells.len());
+        let each = (self.workers / at_once).max(1);
+        let next = AtomicUsize::new(0);
+        let shared = Mutex::new(Shared { take, done: before, failure: None });
+        let watched = Watched(self.watcher);
+        watched.at(Progress::Runs { before, done: before, of: total });
+        let mut crew = vec![(); at_once];
+        workers::run(&mut crew, |_, ()| {
+            while let Some(cell) = cells.get(next.fetch_add(1, Ordering::Relaxed)) {
+                // Nobody holds the lock while a run is under way.
+                let broken = lock(&shared).failure.is_some();
+                let outcome = if broken { None } else { self.cell(*cell, each) };
+                let Some(outcome) = outcome else { return };
+                let shared = &mut *lock(&shared);
+                if let Err(failure) = outcome.and_then(|outcome| (shared.take)(outcome)) {
+                    shared.failure.get_or_insert(failure);
+                    return;
+                }
+                shared.done += 1;
+                watched.at(Progress::Runs { before, done: shared.done, of: total });
+            }
+        });
+        drop(watched);
+        let failure = lock(&shared).failure.take();
+        failure.map_or(Ok(()), Err)
+    }
+
+    /// How many of so many runs are under way at once; each has its part of the workers.
+    pub(super) fn at_once(&self, runs: usize) -> usize {
+        let most = if self.plan.agents >= LARGE { 1 } else { self.workers };
+        most.min(runs).max(1)
+    }
+
+    /// Runs a cell; `None` when it was broken off.
+    fn cell(&self, cell: Cell, workers: usize) -> Option<Result<Outcome, Error>> {
+        if !self.watcher.go_on() {
+            return None;
+        }
+        // What is wrong with the folder is no outcome of a run: it may be mended.
+        let source = match (self.source)(cell.variant) {
+            Ok(source) => source,
+            Err(e) => return Some(Err(e.into())),
+        };
+        let run = || match self.record {
+            None => self.plain(cell, &source, workers),
+            Some(folder) => {
+                let place = (self.worlds, self.watcher);
+                recorded(place, cell, source, workers, &folder(cell.id))
+            }
+        };
+        match catch_unwind(AssertUnwindSafe(run)) {
+            Ok(Ok(outcome)) => outcome.map(Ok),
+            // A seed for which a scenario has no start, say: the others go on.
+            Ok(Err(Error::Input(e))) => Some(Ok(Outcome::failed(cell, e.to_string()))),
+            Ok(Err(failure)) => Some(Err(failure)),
+            Err(_) => Some(Ok(Outcome::failed(cell, "a bug in sidestep: see standard error"))),
+        }
+    }
+
+    /// Runs a cell and keeps nothing but its row.
+    fn plain(
+        &self,
+        cell: Cell,
+        variant: &Source,
+        workers: usize,
+    ) -> Result<Option<Outcome>, Error> {
+        let begun = Instant::now();
+        let started = start(self.worlds, cell, variant, workers)?;
+        let compiled = Instant::now();
+        let outcome = started.run(&|| self.watcher.go_on());
+        Ok(outcome.map(|outcome| timed(outcome, [compiled - begun, compiled.elapsed()])))
+    }
+}
+
+/// Runs a cell into a run folder of its own; `None` when it was broken off. A folder that a kill
+/// has left is begun anew.
+///
+/// # Errors
+/// When the scenario is wrong with this seed, or something cannot be stored.
+pub(super) fn recorded(
+    (worlds, watcher): (Worlds, &dyn Watcher),
+    cell: Cell,
+    variant: Source,
+    workers: usize,
+    folder: &Path,
+) -> Result<Option<Outcome>, Error> {
+    let begun = Instant::now();
+    let source = variant.with(&[format!("seed={}", cell.seed)])?;
+    let compiled = worlds.compile(&source)?;
+    let resolved = compiled.resolve(&source)?;
+    let itself = Source::new("scenario.toml", &*resolved.text, folder);
+    let mut run = compiled.start(&itself, workers);
+    let recording = Recording::create(folder, &resolved, run.as_mut(), Existing::Replace)
+        .map_err(no_outcome)?;
+    let compiled = Instant::now();
+    let is_complete = recorded_run(run.as_mut(), recording, workers, &Within(watcher))?;
+    let outcome = is_complete.then(|| Outcome::of(cell, run.as_ref()));
+    Ok(outcome.map(|outcome| timed(outcome, [compiled - begun, compiled.elapsed()])))
+}
+
+/// A folder that cannot be taken is nothing that a run comes to.
+fn no_outcome(failure: Error) -> Error {
+    match failure {
+        Error::Input(e) => Error::stopped(format!("{}: {}", e.place(), e.cause()), e.remedy()),
+        other => other,
+    }
+}
+
+fn timed(mut outcome: Outcome, [compiling, running]: [std::time::Duration; 2]) -> Outcome {
+    outcome.costs.insert("compile_wall_s".into(), json!(compiling.as_secs_f64()));
+    outcome.costs.insert("run_wall_s".into(), json!(running.as_secs_f64()));
+    outcome
+}
+
+/// A worker that panicked outside of a run has left whole values behind.
+fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}

@@ -1,0 +1,233 @@
+//! Airplanes: their model, made-up traffic, flight plans and recorded tracks.
+
+use super::compile::Compiler;
+use crate::flight::Airplane;
+use crate::flight::Task;
+use crate::flight::Track;
+use crate::flight::{Model, Pose, Timing};
+use crate::flight_plan::AirplaneSection;
+use crate::generate::GeneratorKind;
+use crate::generate::{Order, generate};
+use serde::Deserialize;
+use sidestep_kernel::InputError;
+use sidestep_kernel::stream::Streams;
+use sidestep_scenario::{AboveBelow, FromBelow, Number, Rule, Whole, refused};
+use toml::Spanned;
+
+/// A speed or a separation.
+pub(crate) type Measure = Number<AboveBelow<0, 1_000_000>>;
+
+/// Turn rates of airplanes: slower ones would make orbits without end.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct TurnRate;
+
+impl Rule for TurnRate {
+    fn allows(deg_s: f64) -> bool {
+        (1e-3..=360.0).contains(&deg_s)
+    }
+
+    fn words() -> String {
+        "0.001 to 360 degrees per second".into()
+    }
+}
+
+/// A number of turns to choose from.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Turns(usize);
+
+impl<'de> Deserialize<'de> for Turns {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let turns = i64::deserialize(deserializer)?;
+        if !(3..=99).contains(&turns) || turns % 2 == 0 {
+            let remedy = "give an odd number from 3 to 99, so that straight flight is among them";
+            return Err(refused(turns, remedy));
+        }
+        Ok(Self(turns as usize))
+    }
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct GeneratorSection {
+    kind: GeneratorKind,
+    n: Whole<1, 1_000_000>,
+    radius_m: Option<Number<AboveBelow<0, 1_000_000_000>>>,
+    jitter_m: Option<Number<FromBelow<0, 1_000_000>>>,
+}
+
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct ModelSection {
+    v_m_s: Option<Measure>,
+    omega_max_deg_s: Option<Number<TurnRate>>,
+    separation_m: Option<Measure>,
+    turns: Option<Turns>,
+}
+
+impl ModelSection {
+    /// Values of one airplane, filled up with those for all.
+    fn with_own(&self, s: &AirplaneSection) -> Self {
+        Self {
+            v_m_s: s.v_m_s.or(self.v_m_s),
+            omega_max_deg_s: s.omega_max_deg_s.or(self.omega_max_deg_s),
+            separation_m: s.separation_m.or(self.separation_m),
+            turns: s.turns.or(self.turns),
+        }
+    }
+
+    fn model(&self) -> Model {
+        Model {
+            v_m_s: self.v_m_s.map_or(35.0, f64::from),
+            omega_max_rad_s: self.omega_max_deg_s.map_or(4.0, f64::from).to_radians(),
+            separation_m: self.separation_m.map_or(500.0, f64::from),
+            turns: self.turns.map_or(5, |turns| turns.0),
+        }
+    }
+}
+
+/// The time for which recorded airplanes follow their tracks.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Replay {
+    pub(super) cycles: u64,
+    /// The end of these cycles.
+    until_s: f64,
+    dt_s: f64,
+}
+
+impl Compiler<'_> {
+    pub(super) fn airplanes(
+        &self,
+        streams: &Streams,
+        replay: Replay,
+    ) -> Result<Vec<Airplane>, InputError> {
+        let common = self.file.airplane.clone().unwrap_or_default();
+        let mut all = match &self.file.airspace.generator {
+            Some(generator) => self.generated(generator, &common.model(), streams)?,
+            None => Vec::new(),
+        };
+        for section in &self.file.airplanes.0 {
+            let own = common.with_own(section.get_ref());
+            all.push(match section.get_ref().track(self.source)? {
+                Some(track) => self.recorded(section, own.model(), track, replay)?,
+                None => self.planned(section, own.model())?,
+            });
+        }
+        if all.is_empty() {
+            let remedy = "add [airspace.generator] with kind and n, or [[airplanes]]";
+            return Err(self.source.error(None, "the scenario has no airplanes", remedy));
+        }
+        Ok(all)
+    }
+
+    fn generated(
+        &self,
+        section: &Spanned<GeneratorSection>,
+        model: &Model,
+        streams: &Streams,
+    ) -> Result<Vec<Airplane>, InputError> {
+        let s = section.get_ref();
+        let n = s.n.get() as usize;
+        // Random traffic is as dense as ten airplanes in the paper's circle, whatever their number.
+        let usual_m = match s.kind {
+            GeneratorKind::Random => 6_500.0 * (n as f64 / 5.0).max(1.0).sqrt(),
+            _ => 6_500.0,
+        };
+        let radius_m = s.radius_m.map_or(usual_m, f64::from);
+        let jitter_m = s.jitter_m.map_or(20.0, f64::from);
+        let order = Order { kind: s.kind, n, radius_m, jitter_m, model };
+        generate(&order, streams).map_err(|placed| {
+            let cause = format!("no place is left after {placed} of {n} airplanes");
+            self.source.error(section.span(), cause, "give a larger radius_m or a smaller n")
+        })
+    }
+
+    /// An airplane with a flight plan of its own.
+    fn planned(
+        &self,
+        section: &Spanned<AirplaneSection>,
+        model: Model,
+    ) -> Result<Airplane, InputError> {
+        let s = section.get_ref();
+        let error =
+            |cause: &str, remedy: &str| Err(self.source.error(section.span(), cause, remedy));
+        let (Some(at_m), Some(heading_deg)) = (s.at_m, s.heading_deg) else {
+            let remedy = "add at_m = [x, y] and heading_deg, or a track";
+            return error("an airplane that begins nowhere", remedy);
+        };
+        let mission = s.way_points_m();
+        if mission.is_empty() {
+            let remedy = "add way_points_m = [[x, y], ...]";
+            return error("an airplane without way-points", remedy);
+        }
+        let heading_rad = sidestep_kernel::math::wrap_angle(heading_deg.get().to_radians());
+        let (orders, leaves_s) = s.orders(self.source)?;
+        Ok(Airplane {
+            model,
+            start: Pose { at: at_m.get(), heading_rad },
+            mission,
+            altitude_m: s.altitude_m.map_or(0.0, f64::from),
+            appears_s: s.appears_s.map_or(0.0, f64::from),
+            leaves_s,
+            orders,
+            track: None,
+        })
+    }
+
+    /// An airplane that follows its track, and then flies on along the rest of it, as fast as
+    /// recorded unless it is said.
+    fn recorded(
+        &self,
+        section: &Spanned<AirplaneSection>,
+        mut model: Model,
+        track: Track,
+        replay: Replay,
+    ) -> Result<Airplane, InputError> {
+        if section.get_ref().v_m_s.is_none() {
+            model.v_m_s = track.mean_speed_m_s(replay.until_s).max(1.0);
+        }
+        if model.v_m_s >= 1e6 {
+            let cause = format!("v_m_s = {}", model.v_m_s);
+            let remedy = "give more than 0 and less than 1e6";
+            return Err(self.source.error(section.span(), cause, remedy));
+        }
+        Ok(following(track, model, replay))
+    }
+
+    /// The time for which recorded airplanes follow their tracks.
+    pub(super) fn replay(&self, timing: &Timing) -> Replay {
+        let until_s = self.file.airspace.replay_until_s.map_or(f64::INFINITY, f64::from);
+        // Beyond the largest number of cycles this is that number.
+        let cycles = (until_s / timing.dt_s).ceil() as u64;
+        Replay { cycles, until_s: cycles as f64 * timing.dt_s, dt_s: timing.dt_s }
+    }
+}
+
+fn following(track: Track, model: Model, replay: Replay) -> Airplane {
+    let begins_s = track.begins_s();
+    // One that appears later comes in at the start of a cycle.
+    let appears_s = if (begins_s / replay.dt_s).floor() < replay.cycles as f64 {
+        begins_s
+    } else {
+        (begins_s / replay.dt_s).ceil() * replay.dt_s
+    };
+    let joins_s = replay.until_s.max(appears_s);
+    Airplane {
+        model,
+        start: track.pose_at(appears_s),
+        mission: track.rest(joins_s),
+        altitude_m: track.altitude_at_m(joins_s),
+        appears_s,
+        leaves_s: f64::INFINITY,
+        orders: Vec::new(),
+        track: Some(track),
+    }
+}
+
+/// All speeds that an airplane is to fly with.
+pub(super) fn speeds_m_s(airplane: &Airplane) -> impl Iterator<Item = f64> {
+    let told = airplane.orders.iter().filter_map(|order| match order.task {
+        Task::Speed(v_m_s) => Some(v_m_s),
+        _ => None,
+    });
+    told.chain([airplane.model.v_m_s])
+}

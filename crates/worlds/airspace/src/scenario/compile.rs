@@ -1,0 +1,208 @@
+//! A scenario's sections -> an immutable world.
+
+use super::airplanes::speeds_m_s;
+use super::{AirspaceFile, Compiled, Preset};
+use crate::deploy::refuses;
+use crate::flight::Airplane;
+use crate::flight::Levels;
+use crate::flight::{Passing, Timing};
+use crate::memory::largest_at_start;
+use crate::shield::{Flyer, Side, first_fallbacks};
+use crate::state::AirspaceState;
+use crate::world::{AirspaceWorld, Disturbance, Method};
+use sidestep_kernel::stream::Streams;
+use sidestep_kernel::{InputError, Seed};
+use sidestep_scenario::{Head, Source};
+use std::sync::Arc;
+use toml::Spanned;
+
+/// Levels that are apart by what is asked for may seem nearer by this when they were rounded.
+const ROUNDED_M: f64 = 1e-6;
+/// A run whose length is not given may take so many cycles,
+const FEWEST_CYCLES: u64 = 400;
+/// or so many times what the last airplane to come in would need alone, if that is more: room for
+/// detours and orbits.
+const TIMES_ALONE: f64 = 3.0;
+/// Most steps of a horizon.
+const MOST_STEPS: usize = 10_000;
+const GIB: f64 = (1_u64 << 30) as f64;
+
+pub(super) struct Compiler<'a> {
+    pub(super) source: &'a Source,
+    pub(super) head: Head,
+    pub(super) file: &'a AirspaceFile,
+}
+
+impl Compiler<'_> {
+    pub(super) fn compile(&self) -> Result<Compiled, InputError> {
+        let mut world = self.world()?;
+        self.fits_deployment(&world)?;
+        let (fallbacks, too_close) = first(&world);
+        world.first_fallbacks.clone_from(&fallbacks);
+        let cycles = self.head.cycles.unwrap_or_else(|| enough_cycles(&world));
+        let compiled = Compiled {
+            world: Arc::new(world),
+            name: self.head.name.clone(),
+            seed: self.head.seed,
+            cycles,
+            record: self.file.record,
+            fallbacks,
+            too_close,
+        };
+        self.fits_memory(&compiled)?;
+        Ok(compiled)
+    }
+
+    fn world(&self) -> Result<AirspaceWorld, InputError> {
+        let section = &self.file.airspace;
+        let streams = Streams::new(Seed(self.head.seed));
+        let timing = self.timing()?;
+        let replay = self.replay(&timing);
+        let airplanes = self.airplanes(&streams, replay)?;
+        let radius_m = airplanes.iter().map(|a| a.model.separation_m).fold(0.0, f64::max);
+        let tolerance_m = section.tolerance_m.map_or((radius_m / 5.0).max(1.0), f64::from);
+        let vertical_m = section.vertical_m.map_or(300.0, f64::from) - ROUNDED_M;
+        let network = self.network(&timing, &airplanes)?;
+        let group_memory_gib = section.group_memory_gib.map_or(2.0, f64::from);
+        let world = AirspaceWorld {
+            wind_m_s: self.wind_m_s(&airplanes)?,
+            airplanes,
+            timing,
+            network,
+            passing: Passing { tolerance_m, passes: true },
+            objective: self.objective(vertical_m),
+            settings: self.settings()?,
+            holds_s: section.holds_s.0.clone(),
+            legs: self.legs(),
+            method: section.method,
+            deployment: section.deployment,
+            group_bytes: (group_memory_gib * GIB) as u64,
+            shield: section.shield.0,
+            vertical_m,
+            replay_cycles: replay.cycles,
+            disturbance: Disturbance {
+                position_m: section.position_noise_m.map_or(0.0, f64::from),
+                heading_rad: section.heading_noise_deg.map_or(0.0, f64::from).to_radians(),
+            },
+            streams,
+            actions: Vec::new(),
+            later: Vec::new(),
+            top_m_s: Vec::new(),
+            alone_s: Vec::new(),
+            first_fallbacks: Vec::new(),
+        };
+        Ok(world.prepared())
+    }
+
+    /// The wind, if everybody can fly against it.
+    fn wind_m_s(&self, airplanes: &[Airplane]) -> Result<[f64; 2], InputError> {
+        let given = self.file.airspace.wind_m_s.as_ref();
+        let wind_m_s = given.map_or([0.0; 2], |given| given.get_ref().get());
+        let slowest = airplanes.iter().flat_map(speeds_m_s).fold(f64::INFINITY, f64::min);
+        let wind = sidestep_kernel::math::hypot(wind_m_s[0], wind_m_s[1]);
+        if wind < slowest {
+            return Ok(wind_m_s);
+        }
+        let cause = format!("a wind of {wind} m/s, and airplanes of {slowest} m/s");
+        let remedy = "give a wind that all airplanes can fly against";
+        Err(self.source.error(given.map(Spanned::span), cause, remedy))
+    }
+
+    /// Refuses settings that the deployment cannot compute.
+    fn fits_deployment(&self, world: &AirspaceWorld) -> Result<(), InputError> {
+        if let Some(reason) = refuses(world.deployment, &world.settings) {
+            let cause = format!("deployment {}: {reason}", world.deployment.name());
+            let remedy = "set order = \"parallel\" and utility = \"joint\", or \
+                          estimator = { kind = \"exact\" }";
+            return Err(self.source.error(None, cause, remedy));
+        }
+        if world.most_samples().is_none_or(|most| most > u64::from(u16::MAX) * 4) {
+            let cause = "more samples than a random stream holds";
+            let remedy = "give smaller blocks or fewer rounds, or order = \"parallel\": in \
+                          sequence each airplane draws a block anew after every other";
+            return Err(self.source.error(None, cause, remedy));
+        }
+        Ok(())
+    }
+
+    /// Refuses groups at the start that need more memory than allowed.
+    fn fits_memory(&self, compiled: &Compiled) -> Result<(), InputError> {
+        let world = &compiled.world;
+        if world.method != Method::Pc {
+            return Ok(());
+        }
+        let state = AirspaceState::restore(world, &compiled.start_snapshot());
+        let (airplanes, bytes) = largest_at_start(world, &state);
+        if bytes <= world.group_bytes {
+            return Ok(());
+        }
+        let gib = bytes as f64 / GIB;
+        let cause = format!(
+            "{airplanes} airplanes near each other need up to {gib:.1} GiB to be optimized together"
+        );
+        let allowed = world.group_bytes as f64 / GIB;
+        let remedy = format!(
+            "give fewer airplanes, a shorter horizon, fewer turns or holds_s, or a group_memory_gib \
+             above {allowed}"
+        );
+        Err(self.source.error(None, cause, remedy))
+    }
+
+    pub(super) fn is_paper(&self) -> bool {
+        self.file.airspace.preset == Preset::Paper
+    }
+
+    fn timing(&self) -> Result<Timing, InputError> {
+        let section = &self.file.airspace;
+        let dt_s = section.dt_s.as_ref().map_or(5.0, |v| v.get_ref().get());
+        let dtau_s = section.dtau_s.as_ref().map_or(1.0, |v| v.get_ref().get());
+        let parts = dt_s / dtau_s;
+        if (parts - parts.round()).abs() > 1e-9 || parts < 1.0 {
+            let cause = format!("dt_s = {dt_s} is no multiple of dtau_s = {dtau_s}");
+            let span = section.dtau_s.as_ref().or(section.dt_s.as_ref()).map(Spanned::span);
+            return Err(self.source.error(span, cause, "give a dtau_s that divides dt_s"));
+        }
+        let preset = if self.is_paper() { 125 } else { 90 };
+        let horizon = section.horizon.as_ref().map_or(preset, |h| *h.get_ref());
+        if !((parts.round() as usize)..=MOST_STEPS).contains(&horizon) {
+            let cause = format!("a horizon of {horizon} steps");
+            let span = section.horizon.as_ref().map(Spanned::span);
+            let remedy = format!("give at least dt_s / dtau_s and at most {MOST_STEPS}");
+            return Err(self.source.error(span, cause, remedy));
+        }
+        Ok(Timing { dt_s, dtau_s, horizon })
+    }
+}
+
+/// Cycles in which everybody should arrive. Flights that never end do not count.
+fn enough_cycles(world: &AirspaceWorld) -> u64 {
+    let ends = (0..world.airplanes.len()).map(|i| world.ends_alone_s(i));
+    let longest_s = ends.filter(|s| s.is_finite()).fold(0.0, f64::max);
+    FEWEST_CYCLES.max((TIMES_ALONE * longest_s / world.timing.dt_s).ceil() as u64)
+}
+
+/// First fallbacks that are apart as far as there are any, and the pairs that are not.
+fn first(world: &AirspaceWorld) -> (Vec<Side>, Vec<(u32, u32)>) {
+    let mut sides = vec![Side::default(); world.airplanes.len()];
+    // Airplanes that come in at other times do not meet at the start.
+    let starts: Vec<usize> = (0..sides.len()).filter(|&i| world.joins_in(i) == 0).collect();
+    let flyer = |(rank, &i): (usize, &usize)| {
+        let airplane = &world.airplanes[i];
+        Flyer {
+            pose: airplane.start,
+            v_m_s: airplane.model.v_m_s,
+            omega_max_rad_s: airplane.model.omega_max_rad_s,
+            separation_m: airplane.model.separation_m,
+            levels: Levels::at(airplane.altitude_m),
+            vertical_m: world.vertical_m,
+            fallback: Side::Left,
+            came_too_close: false,
+            rank: rank as u64,
+            id: i as u32,
+        }
+    };
+    let flyers: Vec<Flyer> = starts.iter().enumerate().map(flyer).collect();
+    let (chosen, pairs) = first_fallbacks(&flyers);
+    starts.iter().zip(chosen).for_each(|(&i, side)| sides[i] = side);
+    (sides, pairs.into_iter().map(|(i, j)| (starts[i] as u32, starts[j] as u32)).collect())
+}

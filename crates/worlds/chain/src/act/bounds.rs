@@ -1,0 +1,62 @@
+//! Out of the way of what comes too near, and back from where a chain must not be.
+
+use super::Acting;
+use crate::events::{Event, EventKind};
+use crate::rods::geometry::{Bounds, Point, distance, in_dimensions};
+use crate::rods::veto::{Reason, Veto};
+
+/// Ways of exactly the greatest speed may seem longer by this part.
+const ROUNDING: f64 = 1e-9;
+
+impl<const D: usize> Acting<'_, D> {
+    /// Parts that something comes too near to move away, whoever leads.
+    pub(super) fn get_out_of_the_way(&mut self) {
+        let Some(escaper) = &mut self.scratch.escaper else { return };
+        let escaped = escaper.escape(
+            &mut self.body.chain,
+            &self.scratch.obstacles,
+            &mut self.scratch.propagator,
+            &self.scratch.before,
+        );
+        // Out of the world nobody escapes.
+        let Ok(escaped) = escaped else { return };
+        self.body.tally.escapes.add(&escaped);
+        self.scratch.escaped.copy_from_slice(self.body.chain.points());
+        self.take_leader_along();
+        // Only the first of cycles in a row in which it escapes is an event.
+        let first = escaped.first.filter(|_| !self.body.tally.is_escaping);
+        if let Some((connector, obstacle)) = first {
+            let event = self.event(EventKind::Escape, connector, escaped.moves as f64);
+            self.scratch.events.push(Event { obstacle: Some(obstacle), ..event });
+        }
+        self.body.tally.is_escaping = escaped.moves > 0;
+    }
+
+    /// What would leave the claim is taken back, for nobody else counts on the chain there; and so
+    /// is what would be faster than escapes may be, together with them.
+    pub(super) fn keep_to_bounds(&mut self) {
+        let most_m = match &self.world.escape {
+            Some(escape) => escape.speed_max_m_s * self.world.dt_s * (1.0 + ROUNDING),
+            None if self.world.chains.len() == 1 => return,
+            None => f64::INFINITY,
+        };
+        let is_beyond = |(p, was): (&Point<D>, &Point<D>)| {
+            distance(*p, *was) > most_m || !self.claim.meets(&Bounds::of(&[*p]))
+        };
+        let mut ways = self.body.chain.points().iter().zip(&self.scratch.before);
+        let Some(by) = ways.position(is_beyond) else { return };
+        self.body.chain.points_mut().copy_from_slice(&self.scratch.escaped);
+        let from = self.task().map_or(0, |task| task.agent);
+        let reached = self.body.chain.points()[from];
+        self.take_leader_along();
+        self.vetoed(&Veto { by, from, reason: Reason::StepLimit, obstacle: None, reached });
+    }
+
+    /// A leader on wheels is where its connector is, wherever that was moved to.
+    fn take_leader_along(&mut self) {
+        let agent = self.task().map(|task| task.agent);
+        if let (Some(leader), Some(agent)) = (&mut self.body.driving.leader, agent) {
+            leader.pose.at = in_dimensions(self.body.chain.points()[agent]);
+        }
+    }
+}

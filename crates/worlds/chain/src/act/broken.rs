@@ -1,0 +1,133 @@
+//! What happens to chains: parts that fail, and chains that break and are joined again (slides R8,
+//! R10, F3).
+
+use super::Acting;
+use crate::events::EventKind;
+use crate::rods::geometry::{Point, add, distance, towards};
+use crate::rods::rebuild::{MayCome, Reformed, reform};
+use crate::state::{Scattered, flat};
+use crate::world::{Change, FARTHEST_THROW, What, purpose};
+use sidestep_kernel::distr::normal;
+use std::ops::RangeInclusive;
+
+/// How often a free place is looked for where a part may fall.
+const THROWS: usize = 100;
+
+impl<const D: usize> Acting<'_, D> {
+    /// What happens to the chain at the start of a cycle.
+    pub(super) fn change(&mut self) {
+        let (spec, now) = (self.spec, self.now);
+        for change in spec.changes.iter().filter(|change| change.cycle == now) {
+            self.apply(change);
+        }
+    }
+
+    fn apply(&mut self, change: &Change<D>) {
+        change.constrain(&mut self.body.chain);
+        match &change.what {
+            What::Failed { connector, .. }
+            | What::Mobility { connector, .. }
+            | What::MaxBend { connector, .. } => self.tell(EventKind::Changed, *connector, 0.0),
+            What::Scatter { connectors, by_m, apart_m } => {
+                self.scatter(connectors, *by_m);
+                for point in &mut self.body.chain.points_mut()[connectors.end() + 1..] {
+                    *point = add(*point, *apart_m);
+                }
+                let n = connectors.clone().count() as f64;
+                self.tell(EventKind::Broken, *connectors.start(), n);
+            }
+            What::Reform { may_come, speed_m_s } => self.begin_reform(*may_come, *speed_m_s),
+        }
+    }
+
+    /// Throws parts about: each to some place near where it is that is free, if there is one. Who
+    /// is fixed or has failed stays.
+    fn scatter(&mut self, connectors: &RangeInclusive<usize>, by_m: f64) {
+        let draws = &mut self.world.streams.draws(self.slot, self.now, purpose::SCATTER);
+        let chain = &mut self.body.chain;
+        for k in connectors.clone() {
+            if chain.connectors()[k].is_still() {
+                continue;
+            }
+            let (at, radius_m) = (chain.points()[k], chain.connectors()[k].radius_m);
+            let mut throw = || normal(draws).clamp(-FARTHEST_THROW, FARTHEST_THROW);
+            let mut place = || at.map(|x| x + by_m * throw());
+            let is_free =
+                |p: &Point<D>| self.scratch.obstacles.clearance_m([*p; 2], radius_m, 1.0) > 0.0;
+            let free = (0..THROWS).map(|_| place()).find(is_free);
+            chain.points_mut()[k] = free.unwrap_or(at);
+        }
+        self.body.scattered = Some(Scattered {
+            first: *connectors.start() as u32,
+            last: *connectors.end() as u32,
+            speed_m_s: 0.0,
+            goals_m: Vec::new(),
+        });
+    }
+
+    /// Finds where the scattered parts have to be.
+    fn begin_reform(&mut self, may_come: MayCome, speed_m_s: f64) {
+        let Some(scattered) = &self.body.scattered else { return };
+        let (first, last) = (scattered.first as usize, scattered.last as usize);
+        let (whole, came) = self.reformed(first..=last, may_come);
+        let (kind, value) = match came {
+            Reformed::Whole { double_passes } => {
+                if let Some(scattered) = &mut self.body.scattered {
+                    (scattered.goals_m, scattered.speed_m_s) = (flat(&whole), speed_m_s);
+                }
+                (EventKind::Reforming, double_passes as f64)
+            }
+            Reformed::GapTooLong { have_m, need_m } => (EventKind::GapTooLong, need_m - have_m),
+            Reformed::NotReached { off_m } => (EventKind::NotReformed, off_m),
+        };
+        self.body.tally.not_reformed += u64::from(kind != EventKind::Reforming);
+        self.tell(kind, first, value);
+    }
+
+    /// Where the connectors of the chain would be, were it whole, and whether it can be. What never
+    /// moves may not move for that either.
+    fn reformed(
+        &self,
+        scattered: RangeInclusive<usize>,
+        may_come: MayCome,
+    ) -> (Vec<Point<D>>, Reformed) {
+        let chain = &self.body.chain;
+        let mut whole = chain.clone();
+        // An end cannot come out of the world.
+        let came = reform(&mut whole, scattered, may_come)
+            .unwrap_or(Reformed::NotReached { off_m: chain.max_rod_violation_m() });
+        let stays = |k: &usize| chain.connectors()[*k].is_still();
+        let would_move = |k: usize| whole.points()[k] != chain.points()[k];
+        let came = match (0..whole.points().len()).filter(stays).find(|&k| would_move(k)) {
+            None => came,
+            Some(k) => {
+                let off_m = distance(whole.points()[k], chain.points()[k]);
+                Reformed::NotReached { off_m }
+            }
+        };
+        (whole.points().to_vec(), came)
+    }
+
+    /// Scattered parts go to where they are joined again, each straight, and the chain is whole
+    /// when all are there.
+    pub(super) fn come_together(&mut self) {
+        let body = &mut *self.body;
+        let Some(scattered) = body.scattered.as_ref().filter(|s| !s.goals_m.is_empty()) else {
+            return;
+        };
+        let first = scattered.first as usize;
+        let step_m = scattered.speed_m_s * self.world.dt_s;
+        let goals = scattered.goals_m.chunks_exact(D);
+        let mut all_there = true;
+        for (point, goal) in body.chain.points_mut().iter_mut().zip(goals) {
+            let goal = std::array::from_fn(|i| goal[i]);
+            *point = towards(*point, goal, step_m);
+            all_there &= *point == goal;
+        }
+        if all_there {
+            body.scattered = None;
+            body.tally.reformed += 1;
+            self.tell(EventKind::Reformed, first, 0.0);
+        }
+    }
+}

@@ -1,0 +1,136 @@
+//! The present task of a chain, for one cycle: what its driver wants.
+
+use super::Acting;
+use crate::driver::{Driver, Targets, Task, Wander, wander};
+use crate::events::EventKind;
+use crate::rods::geometry::{Point, along, distance, in_dimensions, towards};
+use crate::script::Motion;
+use crate::swarm::drive::Pose;
+use crate::world::purpose;
+
+/// What a driver wants in a cycle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Wish<const D: usize> {
+    /// Nothing.
+    Rest,
+    /// The initiator elsewhere.
+    Go(Point<D>),
+    /// The same of a robot on wheels.
+    Steer(Pose),
+    /// Its task is done.
+    Done,
+}
+
+impl<const D: usize> Acting<'_, D> {
+    /// Carries out the present task.
+    pub(super) fn drive(&mut self) {
+        let Some(task) = self.task() else { return };
+        let is_late = self.world.starts_s(self.body.driving.cycles + 1) >= task.lasts_s;
+        self.body.driving.cycles += 1;
+        match self.wish(task) {
+            Wish::Rest => {}
+            Wish::Go(to) => {
+                self.go(task, to);
+            }
+            Wish::Steer(pose) => self.go_on_wheels(task, pose),
+            Wish::Done => return self.next_task(EventKind::Done),
+        }
+        if is_late {
+            self.next_task(EventKind::Done);
+        }
+    }
+
+    /// Where the initiator wants to be at the end of the cycle.
+    fn wish(&mut self, task: &Task<D>) -> Wish<D> {
+        let at = self.body.chain.points()[task.agent];
+        let step_m = task.speed_m_s * self.world.dt_s;
+        match &task.driver {
+            Driver::Rest => Wish::Rest,
+            Driver::Navigate(navigator) => {
+                if self.has_arrived(task, navigator) {
+                    return Wish::Done;
+                }
+                self.steered(task, navigator).map_or(Wish::Rest, Wish::Steer)
+            }
+            Driver::Wander(rule) => self.wandering(rule, at, step_m),
+            Driver::Script(_) => self.by_script(at, step_m),
+            Driver::Targets(targets) => self.next_target(task, targets, at, step_m),
+        }
+    }
+
+    fn wandering(&mut self, rule: &Wander<D>, at: Point<D>, step_m: f64) -> Wish<D> {
+        let draws = &mut self.world.streams.draws(self.slot, self.now, purpose::WANDER);
+        let was = in_dimensions(self.body.driving.ahead);
+        let ahead = wander(rule, at, was, step_m, draws);
+        self.body.driving.ahead = in_dimensions(ahead);
+        Wish::Go(along(at, ahead, step_m))
+    }
+
+    /// To the next target. A cycle in which one is reached is one of rest.
+    fn next_target(
+        &mut self,
+        task: &Task<D>,
+        targets: &Targets<D>,
+        at: Point<D>,
+        step_m: f64,
+    ) -> Wish<D> {
+        let driving = &mut self.body.driving;
+        let Some(&target) = targets.places.get(driving.next as usize) else {
+            return Wish::Done;
+        };
+        let left_m = distance(at, target);
+        driving.late = match left_m < driving.nearest_m {
+            true => 0,
+            false => driving.late.saturating_add(1),
+        };
+        driving.nearest_m = driving.nearest_m.min(left_m);
+        if left_m > targets.tolerance_m {
+            return Wish::Go(towards(at, target, step_m));
+        }
+        self.tell(EventKind::Target, task.agent, f64::from(self.body.driving.next));
+        self.body.tally.done += 1;
+        self.body.driving.next_part();
+        Wish::Rest
+    }
+
+    /// What the script says. Turning takes no time.
+    fn by_script(&mut self, at: Point<D>, step_m: f64) -> Wish<D> {
+        let driving = &mut self.body.driving;
+        loop {
+            match self.body.motions.get(driving.next as usize) {
+                None => return Wish::Done,
+                Some(Motion::Face { ahead }) => driving.ahead = *ahead,
+                Some(Motion::Wait { duration_s }) => {
+                    if self.world.starts_s(u64::from(driving.rested)) < *duration_s {
+                        driving.rested += 1;
+                        return Wish::Rest;
+                    }
+                }
+                Some(Motion::MoveTo { position_m }) => {
+                    let to = in_dimensions(*position_m);
+                    let left_m = distance(at, to);
+                    driving.nearest_m = driving.nearest_m.min(left_m);
+                    if left_m > self.body.chain.least_move_m() {
+                        return Wish::Go(towards(at, to, step_m));
+                    }
+                }
+            }
+            driving.next_part();
+        }
+    }
+
+    /// Ends the present task, done or given up, and begins the next.
+    pub(super) fn next_task(&mut self, how: EventKind) {
+        let Some(task) = self.task() else { return };
+        let driving = &mut self.body.driving;
+        let next = self.spec.tasks.get(driving.task as usize + 1).unwrap_or(task);
+        let ended = f64::from(driving.task);
+        driving.next_task(next.agent, self.body.chain.points());
+        self.body.tally.done += u64::from(how == EventKind::Done);
+        self.body.motions = self
+            .spec
+            .motions(&self.body.driving)
+            .expect("scripts are tried when they are compiled");
+        self.tell(how, task.agent, ended);
+    }
+}

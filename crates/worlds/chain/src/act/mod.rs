@@ -1,0 +1,96 @@
+//! Phase *act*: what one chain does in a cycle.
+//!
+//! ```text
+//! broken.rs -> bounds.rs (out of the way) -> drive.rs -> go.rs, wheels.rs -> bounds.rs (back into the claim)
+//!           -> follow.rs -> measure.rs
+//! ```
+
+mod bounds;
+mod broken;
+mod drive;
+mod follow;
+mod go;
+mod measure;
+mod wheels;
+
+use super::driver::Task;
+use super::events::{Event, EventKind};
+use super::rods::geometry::Bounds;
+use super::scratch::Scratch;
+use super::state::Body;
+use super::swarm::leader::Decision;
+use super::world::{ChainSpec, ChainWorld};
+use sidestep_kernel::{Cycle, Slot, Turn};
+
+/// One chain that acts.
+pub(crate) struct Acting<'a, const D: usize> {
+    world: &'a ChainWorld<D>,
+    spec: &'a ChainSpec<D>,
+    slot: Slot,
+    now: Cycle,
+    /// What its navigator has decided.
+    decision: Option<Decision>,
+    /// The box that it stays in.
+    claim: Bounds<D>,
+    body: &'a mut Body<D>,
+    scratch: &'a mut Scratch<D>,
+}
+
+/// The chains of one conflict group act, one after the other.
+pub(crate) fn act<const D: usize>(turn: &mut Turn<'_, ChainWorld<D>>, group: &mut [Slot]) {
+    let &mut Turn { world, state, now, .. } = turn;
+    group.sort_unstable();
+    for &slot in &*group {
+        let claim = state.claim(slot as usize);
+        let meets = |s: &Slot| *s != slot && state.claim(*s as usize).meets(&claim);
+        turn.scratch.gather(world, state, now + 1, group.iter().copied().filter(meets));
+        let mut body = state.body_mut(slot as usize);
+        let mut acting = Acting {
+            world,
+            spec: &world.chains[slot as usize],
+            slot,
+            now,
+            decision: state.decision(slot as usize),
+            claim,
+            body: &mut body,
+            scratch: turn.scratch,
+        };
+        acting.act();
+    }
+}
+
+impl<'a, const D: usize> Acting<'a, D> {
+    /// One cycle of the chain, which stays in its claim.
+    fn act(&mut self) {
+        self.change();
+        self.scratch.before.clear();
+        self.scratch.before.extend_from_slice(self.body.chain.points());
+        self.scratch.escaped.clone_from(&self.scratch.before);
+        if self.body.scattered.is_some() {
+            self.come_together();
+        } else {
+            self.get_out_of_the_way();
+            self.drive();
+            self.keep_to_bounds();
+        }
+        self.scratch.robots_gap_m = f64::INFINITY;
+        self.follow();
+        self.measure();
+    }
+
+    /// The present task; none after the last.
+    fn task(&self) -> Option<&'a Task<D>> {
+        self.spec.tasks.get(self.body.driving.task as usize)
+    }
+
+    /// An event of this chain.
+    fn event(&self, kind: EventKind, connector: usize, value: f64) -> Event {
+        let (cycle, chain, connector) = (self.now, self.slot, connector as u32);
+        Event { cycle, chain, kind, connector, reason: None, obstacle: None, value }
+    }
+
+    /// Notes that something has happened.
+    fn tell(&mut self, kind: EventKind, connector: usize, value: f64) {
+        self.scratch.events.push(self.event(kind, connector, value));
+    }
+}

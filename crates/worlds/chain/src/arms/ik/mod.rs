@@ -1,0 +1,209 @@
+//! Inverse kinematics: a posture of a chain whose connector `k` is at a target while its base
+//! keeps its place.
+//!
+//! ```text
+//! goal       what is wanted, and what came of it
+//! limb       the rods from base to tip; what they can reach
+//! dls        the nearest posture, by damped least squares in O(n)
+//! alternate  the chain's own rule there and back (FABRIK)
+//! direct     closed form: straight but for two bends
+//! guarded    obstacles, bend limits, the chain's own body, connectors that are not free:
+//!            motion, then relax from several postures, judged by legal
+//! ```
+//!
+//! Where nothing constrains the connectors every target within reach is reached: what an engine
+//! leaves is finished in closed form. Guarded chains are first *moved* there by the rules of
+//! propagation, every state on the way checked; where that fails, postures are searched that are
+//! good in themselves, and [`Kind`] says which of the two an answer is.
+
+mod alternate;
+mod direct;
+mod dls;
+mod goal;
+mod guarded;
+mod legal;
+mod limb;
+mod motion;
+mod relax;
+mod starts;
+#[cfg(test)]
+mod tests;
+
+pub use goal::{Answer, Engine, Goal, Kind, Unreached};
+pub use limb::Shell;
+
+use crate::rods::chain::Chain;
+use crate::rods::geometry::{Point, add, along, distance, first_axis, is_finite, norm, sub};
+use crate::rods::obstacle::Obstacles;
+use crate::rods::propagate::Propagator;
+use crate::rods::rules::Rules;
+use limb::{Limb, Span};
+use sidestep_kernel::InputError;
+
+/// Up to this many rods the chain's own rule is the faster (bench `ik`, part `free`).
+const FEW_RODS: usize = 10;
+
+/// Solves goals. It owns the buffers, and remembers nothing from one goal to the next.
+#[derive(Debug, Clone, Default)]
+pub struct Solver<const D: usize> {
+    propagator: Propagator<D>,
+    limb: Limb<D>,
+    points: Vec<Point<D>>,
+}
+
+/// What an engine came to.
+struct Solved {
+    iterations: usize,
+    engine: Engine,
+}
+
+impl<const D: usize> Solver<D> {
+    /// A solver for chains that react by `rules`; of these only self-collision concerns postures,
+    /// the others motions.
+    pub fn new(rules: Rules) -> Self {
+        Self { propagator: Propagator::new(rules), ..Self::default() }
+    }
+
+    /// A posture of `chain` that meets the goal, or the nearest one found. The chain itself is
+    /// not changed. The connector nearest to the goal's that never moves is the base that
+    /// counts; connectors behind the base stay where they are, those beyond the goal's follow.
+    ///
+    /// # Errors
+    /// A target that is not finite, a tolerance that is not above zero, connectors that the chain
+    /// does not have, or one that may not move. A target that cannot be reached is no error.
+    pub fn solve(
+        &mut self,
+        chain: &Chain<D>,
+        obstacles: &Obstacles<D>,
+        goal: &Goal<D>,
+    ) -> Result<Answer<D>, InputError> {
+        check(chain, goal)?;
+        let base = limb::nearest_still(chain, goal.base, goal.k);
+        let goal = &Goal { base, ..*goal };
+        self.limb.read(chain, chain.points(), base, goal.k);
+        let shell = Shell::of(&self.limb.spans);
+        let home = chain.points()[base];
+        let wanted = add(home, shell.nearest(sub(goal.target, home)));
+        let is_guarded = !obstacles.is_empty()
+            || self.propagator.rules.self_collision
+            || !limb::is_free(chain, base);
+        let answer = if is_guarded {
+            guarded::solve(self, chain, obstacles, &Goal { target: wanted, ..*goal })?
+        } else {
+            self.solve_free(chain, &Goal { target: wanted, ..*goal })
+        };
+        Ok(answer.against(goal, &shell, home))
+    }
+
+    /// Without anything in the way.
+    fn solve_free(&mut self, chain: &Chain<D>, goal: &Goal<D>) -> Answer<D> {
+        self.points.clear();
+        self.points.extend_from_slice(chain.points());
+        let Solved { iterations, engine } = self.free_posture(goal);
+        self.write(goal);
+        follow_beyond(&mut self.points, chain, goal);
+        Answer {
+            reached: true,
+            error_m: 0.0,
+            points: self.points.clone(),
+            iterations,
+            engine,
+            kind: Kind::Posture,
+            reason: None,
+        }
+    }
+
+    /// Brings `self.limb` to the target, which is within its reach.
+    fn free_posture(&mut self, goal: &Goal<D>) -> Solved {
+        let Self { limb: Limb { spans, vectors }, points, .. } = self;
+        let target = sub(goal.target, points[goal.base]);
+        let engines: &[Engine] = match goal.engine {
+            Engine::Auto if spans.len() <= FEW_RODS => &[Engine::Chain, Engine::Dls],
+            Engine::Auto | Engine::Dls => &[Engine::Dls],
+            Engine::Chain => &[Engine::Chain],
+            Engine::Direct => &[],
+        };
+        let mut iterations = 0;
+        for &engine in engines {
+            let by = if engine == Engine::Chain { alternate::by_vectors } else { dls::solve };
+            let (more, left_m) = by(vectors, spans, target, goal.tolerance_m);
+            iterations += more;
+            if left_m <= goal.tolerance_m {
+                return Solved { iterations, engine };
+            }
+        }
+        direct::solve(vectors, spans, target);
+        Solved { iterations, engine: Engine::Direct }
+    }
+
+    /// Lays the limb out from the base.
+    fn write(&mut self, goal: &Goal<D>) {
+        let mut at = self.points[goal.base];
+        for (i, v) in limb::path(goal.base, goal.k).skip(1).zip(&self.limb.vectors) {
+            at = add(at, *v);
+            self.points[i] = at;
+        }
+    }
+}
+
+/// The connectors beyond the goal's, pushed and pulled by it.
+fn follow_beyond<const D: usize>(points: &mut [Point<D>], chain: &Chain<D>, goal: &Goal<D>) {
+    let end = if goal.k > goal.base { points.len() - 1 } else { 0 };
+    let mut master = goal.k;
+    for slave in limb::path(goal.k, end).skip(1) {
+        let span = Span::of(&chain.rod_between(master, slave));
+        let g = sub(points[slave], points[master]);
+        let d = norm(g);
+        points[slave] = if d > 0.0 {
+            along(points[master], g, span.nearest_m(d) / d)
+        } else {
+            along(points[master], first_axis(), span.min_m)
+        };
+        master = slave;
+    }
+}
+
+fn check<const D: usize>(chain: &Chain<D>, goal: &Goal<D>) -> Result<(), InputError> {
+    let n = chain.points().len();
+    if goal.k >= n {
+        let cause = format!("is connector {}, of {n}", goal.k);
+        return Err(InputError::new("tip", cause, "count from 0"));
+    }
+    if goal.base >= n || goal.base == goal.k {
+        let cause = format!("is connector {}, of {n}", goal.base);
+        let remedy = "name another connector than the tip, counted from 0";
+        return Err(InputError::new("base", cause, remedy));
+    }
+    if chain.connectors()[goal.k].is_still() {
+        let cause = format!("is connector {}, which never moves", goal.k);
+        return Err(InputError::new("tip", cause, "name a connector that is free"));
+    }
+    if !is_finite(&goal.target) || goal.target.iter().any(|x| x.abs() > 1e7) {
+        let cause = format!("is {:?}", goal.target);
+        return Err(InputError::new("target", cause, "give finite coordinates up to 1e7 m"));
+    }
+    if !(goal.tolerance_m > 0.0 && goal.tolerance_m.is_finite()) {
+        let cause = format!("is {} m", goal.tolerance_m);
+        return Err(InputError::new("tolerance", cause, "give a length above 0"));
+    }
+    Ok(())
+}
+
+impl<const D: usize> Answer<D> {
+    /// The answer seen from the goal as it was given, which may be out of reach.
+    fn against(mut self, goal: &Goal<D>, shell: &Shell, home: Point<D>) -> Self {
+        self.error_m = distance(self.points[goal.k], goal.target);
+        self.reached = self.error_m <= goal.tolerance_m && self.reason.is_none();
+        if !self.reached {
+            let far_m = distance(goal.target, home);
+            let Shell { hole_m, reach_m } = *shell;
+            if far_m > reach_m + goal.tolerance_m {
+                self.reason = Some(Unreached::TooFar { far_m, reach_m });
+            } else if far_m < hole_m - goal.tolerance_m {
+                self.reason = Some(Unreached::TooNear { far_m, hole_m });
+            }
+            self.reason = self.reason.or(Some(Unreached::NotFound { tries: 1 }));
+        }
+        self
+    }
+}

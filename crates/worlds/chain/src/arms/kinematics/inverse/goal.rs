@@ -1,0 +1,151 @@
+//! What is wanted of an arm, and what came of it.
+
+use super::super::pose::Vector;
+use crate::arms::ik::Engine;
+use sidestep_kernel::InputError;
+
+/// Something that no rod of the arm may be in. Rods are thin lines: the radius must hold the arm's
+/// thickness too.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sphere {
+    /// In m, in the base's frame.
+    pub center_m: Vector,
+    /// In m.
+    pub radius_m: f64,
+}
+
+/// Where the tip of an arm shall be.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ArmGoal {
+    /// In m, in the base's frame.
+    pub target_m: Vector,
+    /// How near counts as there, in m.
+    pub tolerance_m: f64,
+    /// [`Engine::Chain`] starts from what the connectors say; all others work on the joints from
+    /// the first step.
+    pub engine: Engine,
+    /// Random postures to start from after the given one.
+    pub restarts: usize,
+    /// What they grow from.
+    pub seed: u64,
+    /// Whether joints may be outside their limits.
+    pub ignore_limits: bool,
+    /// What no rod may be in.
+    pub spheres: Vec<Sphere>,
+}
+
+impl ArmGoal {
+    /// The tip at `target_m` to 1e-6 m, with 100 restarts, inside the limits.
+    pub fn new(target_m: Vector) -> Self {
+        Self {
+            target_m,
+            tolerance_m: 1e-6,
+            engine: Engine::Auto,
+            restarts: 100,
+            seed: 0,
+            ignore_limits: false,
+            spheres: Vec::new(),
+        }
+    }
+
+    pub(super) fn check(&self) -> Result<(), InputError> {
+        if !self.target_m.iter().all(|x| x.abs() <= 1e7) {
+            let cause = format!("is {:?}", self.target_m);
+            return Err(InputError::new("target", cause, "give finite coordinates up to 1e7 m"));
+        }
+        if !(self.tolerance_m > 0.0 && self.tolerance_m.is_finite()) {
+            let cause = format!("is {} m", self.tolerance_m);
+            return Err(InputError::new("tolerance", cause, "give a length above 0"));
+        }
+        let is_right = |s: &Sphere| {
+            s.center_m.iter().chain([&s.radius_m]).all(|x| x.abs() <= 1e7) && s.radius_m >= 0.0
+        };
+        match self.spheres.iter().position(|s| !is_right(s)) {
+            None => Ok(()),
+            Some(i) => {
+                let cause = format!("is {:?}", self.spheres[i]);
+                let remedy = "give finite coordinates and a radius that is not negative";
+                Err(InputError::new(format!("obstacle {}", i + 1), cause, remedy))
+            }
+        }
+    }
+}
+
+/// What came of a goal.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ArmAnswer {
+    /// Whether the goal is met, with all joints inside their limits and no rod in a sphere.
+    pub reached: bool,
+    /// Distance of the tip from the target, by forward kinematics at the values.
+    pub error_m: f64,
+    /// A value for each variable, inside the limits unless they are ignored; where the goal is not
+    /// met, of those that came nearest.
+    pub values: Vec<f64>,
+    /// [`Engine::Chain`] where the connectors led to the answer.
+    pub engine: Engine,
+    /// Steps over all starts.
+    pub iterations: usize,
+    /// Postures that it started from.
+    pub starts: usize,
+    /// Why the goal is not met; `None` if it is.
+    pub reason: Option<ArmReason>,
+}
+
+/// A rod that is in a sphere.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Hit {
+    /// The rod leads from this connector (from 0) to the next.
+    pub rod: usize,
+    /// Index of the sphere.
+    pub sphere: usize,
+    /// How deep, in m.
+    pub depth_m: f64,
+}
+
+/// Why a goal is not met.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ArmReason {
+    /// The rods are too short.
+    #[error(
+        "the target is {far_m:.6} m from the arm's first connector, and its rods reach {reach_m:.6} m"
+    )]
+    TooFar {
+        /// Distance of the target from the first connector in m.
+        far_m: f64,
+        /// The sum of the rods' greatest lengths in m.
+        reach_m: f64,
+    },
+    /// One rod is longer than all the others together.
+    #[error(
+        "the target is {far_m:.6} m from the arm's first connector, and the tip comes no nearer than {hole_m:.6} m"
+    )]
+    TooNear {
+        /// Distance of the target from the first connector in m.
+        far_m: f64,
+        /// The least that the rods allow in m.
+        hole_m: f64,
+    },
+    /// The target can be reached, but only with a joint outside its limits.
+    #[error("joint `{joint}` would have to be at {value:.6}, outside {lower:.6} to {upper:.6}")]
+    OutsideLimits {
+        /// Its name.
+        joint: String,
+        /// Its value in rad or m.
+        value: f64,
+        /// Lowest value allowed.
+        lower: f64,
+        /// Highest value allowed.
+        upper: f64,
+    },
+    /// The target can be reached, but only with a rod in a sphere.
+    #[error("the rod from connector {} would be {:.6} m deep in obstacle {}", .0.rod + 1, .0.depth_m, .0.sphere + 1)]
+    Blocked(Hit),
+    /// No start led to the target.
+    #[error("no posture was found from {starts} starts; the nearest is {error_m:.6} m off")]
+    NotFound {
+        /// Postures that it started from.
+        starts: usize,
+        /// Distance of the nearest from the target in m.
+        error_m: f64,
+    },
+}

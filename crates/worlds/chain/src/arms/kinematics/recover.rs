@@ -1,0 +1,403 @@
+//! Joint values from the positions of connectors.
+//!
+//! From the base out, each connector determines the joints that move it and none before it: none,
+//! one (an angle about an axis, or a displacement along it), or two (the circles that two axes
+//! draw meet in at most two points; Paden and Kahan's second subproblem, here for axes that need
+//! not meet). Where a step has two solutions, both are tried, the one nearer to the reference
+//! first. Iiwa arms and UR5 are solved this way, exactly; a Panda's elbow offsets couple three
+//! joints to one connector, which is refused with [`RecoverError::Coupled`].
+
+use std::f64::consts::TAU;
+
+use super::pose::{Line, Pose, Vector};
+use super::serial::{Motion, MovingJoint, SerialChain};
+use super::skeleton::Skeleton;
+use sidestep_import::urdf::Limits;
+use sidestep_kernel::geometry::{across, add, cross, dot, norm, scaled, sub};
+use sidestep_kernel::math::{atan2, wrap_angle};
+
+/// Connectors further from where joints can bring them, as a share of the reach, do not fit.
+const FITS: f64 = 1e-6;
+
+/// Points nearer to an axis than this share of the reach are on it: no turn moves them.
+const ON_AXIS: f64 = 1e-10;
+
+/// Joint values tried before the search gives up; an arm of 7 joints needs at most some 20.
+const MAX_TRIES: usize = 20_000;
+
+/// Joint values that bring the connectors where they are.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recovered {
+    /// One for each variable, inside its limits, in rad or m.
+    pub values: Vec<f64>,
+    /// The largest distance between a connector and where forward kinematics puts it, in m.
+    pub residual_m: f64,
+    /// Variables that no connector depends on (the twist of the last rod, or of any rod that is
+    /// straight on with its joint's axis); they have their reference value.
+    pub open: Vec<String>,
+}
+
+/// Why there are no joint values for connectors.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum RecoverError {
+    /// More or fewer positions than the skeleton has connectors, or one that is not finite.
+    #[error("{found} finite positions where the arm has {expected} connectors")]
+    WrongCount {
+        /// Positions that were given and are finite.
+        found: usize,
+        /// Connectors of the arm.
+        expected: usize,
+    },
+    /// Points leave these joints open, or couple them to connectors further out.
+    #[error("connector {connector} depends on {} at once; its position does not tell them apart", .joints.join(", "))]
+    Coupled {
+        /// Index of the connector.
+        connector: usize,
+        /// Names of the joints.
+        joints: Vec<String>,
+    },
+    /// A joint between base and tip mimics another, so that values are not independent.
+    #[error("joint `{joint}` mimics another; values are recovered for independent joints only")]
+    Mimics {
+        /// Its name.
+        joint: String,
+    },
+    /// No joint values bring the connector there: a rod has a wrong length, or axes forbid it.
+    #[error(
+        "connector {connector} is {distance_m:e} m from the nearest place its joints can bring it to"
+    )]
+    DoesNotFit {
+        /// Index of the connector.
+        connector: usize,
+        /// That distance in m.
+        distance_m: f64,
+    },
+    /// The connectors can be reached, but only with a joint outside its limits.
+    #[error("joint `{joint}` would have to be at {value}, outside {lower} to {upper}")]
+    OutsideLimits {
+        /// Its name.
+        joint: String,
+        /// Its value in rad or m.
+        value: f64,
+        /// Lowest value allowed.
+        lower: f64,
+        /// Highest value allowed.
+        upper: f64,
+    },
+}
+
+impl SerialChain {
+    /// The joint values that bring the connectors of `skeleton` (this chain's) to `positions_m`
+    /// in the base's frame. Of several the first found inside the limits, trying at each step
+    /// what is nearest to `reference`, which has a value for each variable. A posture that was
+    /// moved a little is found again from itself as reference.
+    ///
+    /// # Errors
+    /// When the points do not determine the joints, do not fit the arm, or need a joint outside
+    /// its limits.
+    ///
+    /// # Panics
+    /// When `reference` has not one value for each variable.
+    pub fn recover(
+        &self,
+        skeleton: &Skeleton,
+        positions_m: &[Vector],
+        reference: &[f64],
+    ) -> Result<Recovered, RecoverError> {
+        assert_eq!(reference.len(), self.variables.len(), "one value for each variable");
+        let finite = positions_m.iter().filter(|p| p.iter().all(|x| x.is_finite())).count();
+        let expected = skeleton.connectors.len();
+        if finite != expected || positions_m.len() != expected {
+            return Err(RecoverError::WrongCount { found: finite, expected });
+        }
+        let mimics = |(i, j): &(usize, &MovingJoint)| !j.drive.is_own() || j.drive.variable != *i;
+        if let Some((_, joint)) = self.joints.iter().enumerate().find(mimics) {
+            return Err(RecoverError::Mimics { joint: joint.name.clone() });
+        }
+        self.check_solvable(skeleton)?;
+        let mut search = Search {
+            chain: self,
+            skeleton,
+            positions_m,
+            reference,
+            values: reference.to_vec(),
+            open: vec![true; reference.len()],
+            tries: 0,
+            best_failure: None,
+        };
+        if !search.place(0, 0, Pose::IDENTITY) {
+            return Err(search.best_failure.expect("a search that fails says why").1);
+        }
+        Ok(search.finish())
+    }
+
+    /// Whether each connector is moved by at most two joints that no earlier one is moved by.
+    fn check_solvable(&self, skeleton: &Skeleton) -> Result<(), RecoverError> {
+        let mut known = 0;
+        for (connector, anchor) in skeleton.connectors.iter().enumerate() {
+            let joints = &self.joints[known.min(anchor.first)..anchor.first];
+            let solvable = match joints {
+                [] | [_] => true,
+                [a, b] => a.motion == Motion::Turn && b.motion == Motion::Turn,
+                _ => false,
+            };
+            if !solvable {
+                let joints = joints.iter().map(|joint| joint.name.clone()).collect();
+                return Err(RecoverError::Coupled { connector, joints });
+            }
+            known = known.max(anchor.first);
+        }
+        Ok(())
+    }
+}
+
+/// A depth-first search over the solutions of each step.
+struct Search<'a> {
+    chain: &'a SerialChain,
+    skeleton: &'a Skeleton,
+    positions_m: &'a [Vector],
+    reference: &'a [f64],
+    values: Vec<f64>,
+    /// Whether a variable has its reference value because nothing says otherwise.
+    open: Vec<bool>,
+    tries: usize,
+    /// The failure of the branch that came furthest; a limit tells more than a misfit.
+    best_failure: Option<((usize, bool), RecoverError)>,
+}
+
+impl Search<'_> {
+    /// Places the connectors from `connector` on, with the first `known` joints decided and the
+    /// link behind them at `link`. Whether that worked.
+    fn place(&mut self, connector: usize, known: usize, link: Pose) -> bool {
+        let Some(anchor) = self.skeleton.connectors.get(connector) else { return true };
+        let target_m = self.positions_m[connector];
+        let until = anchor.first.max(known);
+        if until == known {
+            // Fixed in a link that is already placed.
+            let frames = self.chain.forward(&self.values);
+            return self.fits(connector, sub(anchor.position_m(&frames), target_m))
+                && self.place(connector + 1, known, link);
+        }
+        let joints = &self.chain.joints[known..until];
+        for turn in self.solutions(joints, known, &link, anchor.point_m, target_m) {
+            self.tries += 1;
+            if self.tries > MAX_TRIES {
+                return false;
+            }
+            if self.try_values(connector, known, link, &turn) {
+                return true;
+            }
+        }
+        false
+    }
+
+    /// Decides the joints from `known` on, and goes on from there.
+    fn try_values(&mut self, connector: usize, known: usize, link: Pose, found: &[Value]) -> bool {
+        let mut outer = link;
+        for (i, value) in found.iter().enumerate() {
+            let joint = &self.chain.joints[known + i];
+            self.values[known + i] = value.value;
+            self.open[known + i] = value.is_open;
+            outer = outer.then(&joint.origin).then(&joint.moved(value.value));
+        }
+        let anchor = &self.skeleton.connectors[connector];
+        self.fits(connector, sub(outer.point(anchor.point_m), self.positions_m[connector]))
+            && self.are_legal(connector, known, found)
+            && self.place(connector + 1, known + found.len(), outer)
+    }
+
+    /// Whether the joints from `known` on may have these values.
+    fn are_legal(&mut self, connector: usize, known: usize, found: &[Value]) -> bool {
+        for (joint, found) in self.chain.joints[known..].iter().zip(found) {
+            if let Some(limits) = joint.limits.filter(|l| !l.contain(found.value)) {
+                self.fail((connector, true), outside(joint, found.value, limits));
+                return false;
+            }
+        }
+        true
+    }
+
+    fn fits(&mut self, connector: usize, error_m: Vector) -> bool {
+        let distance_m = norm(error_m);
+        let fits = distance_m <= FITS * self.skeleton.reach_m;
+        if !fits {
+            let failure = RecoverError::DoesNotFit { connector, distance_m };
+            self.fail((connector, false), failure);
+        }
+        fits
+    }
+
+    fn fail(&mut self, progress: (usize, bool), failure: RecoverError) {
+        if self.best_failure.as_ref().is_none_or(|(best, _)| progress > *best) {
+            self.best_failure = Some((progress, failure));
+        }
+    }
+
+    /// Values of one or two joints that bring the point `p_m` of the link behind them to
+    /// `target_m`, those nearer to the reference first.
+    fn solutions(
+        &self,
+        joints: &[MovingJoint],
+        known: usize,
+        link: &Pose,
+        p_m: Vector,
+        target_m: Vector,
+    ) -> Vec<Vec<Value>> {
+        let reference = &self.reference[known..known + joints.len()];
+        match joints {
+            [joint] => vec![vec![self.one(joint, link, p_m, target_m, reference[0])]],
+            [inner, outer] => {
+                let mut found = self.two(inner, outer, link, p_m, target_m, reference);
+                found.sort_by(|a, b| away(a, reference).total_cmp(&away(b, reference)));
+                found
+            }
+            _ => unreachable!("check_solvable refuses more"),
+        }
+    }
+
+    fn one(
+        &self,
+        joint: &MovingJoint,
+        link: &Pose,
+        p_m: Vector,
+        target_m: Vector,
+        reference: f64,
+    ) -> Value {
+        let line = joint.line(link);
+        let p_m = link.then(&joint.origin).point(p_m);
+        match joint.motion {
+            Motion::Slide => Value::found(dot(sub(target_m, p_m), line.along)),
+            Motion::Turn => self.turn(joint, &line, p_m, target_m, reference),
+        }
+    }
+
+    /// The turn about `line` that brings `p_m` to the direction of `target_m`.
+    fn turn(
+        &self,
+        joint: &MovingJoint,
+        line: &Line,
+        p_m: Vector,
+        target_m: Vector,
+        reference: f64,
+    ) -> Value {
+        let on_axis_m = ON_AXIS * self.skeleton.reach_m;
+        let (from, to) = (
+            across(sub(p_m, line.through_m), line.along),
+            across(sub(target_m, line.through_m), line.along),
+        );
+        if norm(from) <= on_axis_m || norm(to) <= on_axis_m {
+            return Value { value: reference, is_open: true };
+        }
+        let angle_rad = atan2(dot(cross(from, to), line.along), dot(from, to));
+        Value::found(nearest_turn(angle_rad, reference, joint.limits))
+    }
+
+    /// Two turns: the inner one brings to `target_m` what the outer one leaves at `z`, which is
+    /// on the circle that the outer axis draws through `p_m` and on the one that the inner axis
+    /// draws through `target_m`.
+    fn two(
+        &self,
+        inner: &MovingJoint,
+        outer: &MovingJoint,
+        link: &Pose,
+        p_m: Vector,
+        target_m: Vector,
+        reference: &[f64],
+    ) -> Vec<Vec<Value>> {
+        let (first, at_zero) = (inner.line(link), link.then(&inner.origin));
+        let second = outer.line(&at_zero);
+        let p_m = at_zero.then(&outer.origin).point(p_m);
+        let pair = |z: Vector| {
+            let q1 = self.turn(inner, &first, z, target_m, reference[0]);
+            // An open first turn is at its reference, and the second has to fit it.
+            let back = inner.moved(-q1.value);
+            let z = if q1.is_open {
+                at_zero.point(back.point(at_zero.point_inside(target_m)))
+            } else {
+                z
+            };
+            vec![q1, self.turn(outer, &second, p_m, z, reference[1])]
+        };
+        meeting_points(&first, target_m, &second, p_m).into_iter().map(pair).collect()
+    }
+
+    fn finish(self) -> Recovered {
+        let frames = self.chain.forward(&self.values);
+        let found = self.chain.connectors(self.skeleton, &frames);
+        let errors = found.iter().zip(self.positions_m).map(|(&a, &b)| norm(sub(a, b)));
+        let variables = self.chain.variables.iter().zip(&self.open);
+        Recovered {
+            residual_m: errors.fold(0.0, f64::max),
+            open: variables.filter(|(_, open)| **open).map(|(v, _)| v.name.clone()).collect(),
+            values: self.values,
+        }
+    }
+}
+
+/// A joint's value.
+#[derive(Debug, Clone, Copy)]
+struct Value {
+    value: f64,
+    is_open: bool,
+}
+
+impl Value {
+    fn found(value: f64) -> Self {
+        Self { value, is_open: false }
+    }
+}
+
+fn away(values: &[Value], reference: &[f64]) -> f64 {
+    values.iter().zip(reference).map(|(v, r)| (v.value - r).abs()).sum()
+}
+
+fn outside(joint: &MovingJoint, value: f64, limits: Limits) -> RecoverError {
+    let Limits { lower, upper } = limits;
+    RecoverError::OutsideLimits { joint: joint.name.clone(), value, lower, upper }
+}
+
+/// Of all angles that differ from `angle_rad` by full turns, the one nearest to `reference_rad`
+/// that is inside the limits; the nearest of all where none is.
+fn nearest_turn(angle_rad: f64, reference_rad: f64, limits: Option<Limits>) -> f64 {
+    let nearest = reference_rad + wrap_angle(angle_rad - reference_rad);
+    let turns = [nearest, nearest - TAU, nearest + TAU];
+    let legal = |value: &f64| limits.is_none_or(|limits| limits.contain(*value));
+    turns.into_iter().find(legal).unwrap_or_else(|| {
+        // Far references end up here: bring the angle near to the middle of the limits.
+        let middle = limits.map_or(0.0, |limits| 0.5 * (limits.lower + limits.upper));
+        middle + wrap_angle(angle_rad - middle)
+    })
+}
+
+/// Where the circle about `first` through `a` meets the circle about `second` through `b`.
+///
+/// The planes of the circles meet in a line, and that meets the sphere about a point of `second`
+/// through `b`. Circles about parallel axes lie in one plane; the line is that of the points with
+/// equal power then. One point where circles just touch, or miss each other by rounding.
+fn meeting_points(first: &Line, a: Vector, second: &Line, b: Vector) -> Vec<Vector> {
+    // Everything relative to the second circle's center.
+    let center = second.nearest(b);
+    let radius = norm(sub(b, center));
+    let n2 = second.along;
+    let (n1, d1) = match first.feet(second) {
+        Some(_) => (first.along, dot(first.along, sub(a, center))),
+        None => {
+            let other = first.nearest(a);
+            let between = across(sub(other, center), n2);
+            let radius_1 = norm(sub(a, other));
+            let d = dot(between, between);
+            (between, 0.5 * (d + radius * radius - radius_1 * radius_1))
+        }
+    };
+    let along = cross(n1, n2);
+    let square = dot(along, along);
+    if square == 0.0 {
+        // One axis twice: the inner turn does it all.
+        return vec![b];
+    }
+    // The point of the line {n1 x = d1, n2 x = 0} that is nearest to the center.
+    let nearest = scaled(cross(n2, along), d1 / square);
+    let half_chord = ((radius * radius - dot(nearest, nearest)).max(0.0) / square).sqrt();
+    let at = |t: f64| add(center, add(nearest, scaled(along, t)));
+    if half_chord == 0.0 { vec![at(0.0)] } else { vec![at(half_chord), at(-half_chord)] }
+}

@@ -1,0 +1,302 @@
+//! A model's joints from base to tip, and forward kinematics.
+
+use super::pose::{Line, Pose, Vector};
+use sidestep_import::urdf::{JointKind, Limits, Model};
+use sidestep_kernel::InputError;
+use sidestep_kernel::geometry::scaled;
+
+/// The joints between two links of a model. Fixed joints are merged into the links.
+///
+/// Link 0 is the base; joint `j` (from 0) carries link `j + 1`. A joint that mimics another has
+/// no value of its own: the values of a posture are those of [`SerialChain::variables`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct SerialChain {
+    /// Name of the base link.
+    pub base: String,
+    /// Name of the tip link.
+    pub tip: String,
+    /// What has a value, in the order from base to tip.
+    pub variables: Vec<Variable>,
+    pub(super) joints: Vec<MovingJoint>,
+    /// The tip in the last link.
+    pub(super) to_tip: Pose,
+}
+
+/// A value that a posture consists of.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Variable {
+    /// The joint whose value it is. It need not be between base and tip where one that is
+    /// mimics it.
+    pub name: String,
+    /// Whether the value is an angle in rad or a displacement in m.
+    pub motion: Motion,
+    /// Lowest and highest value; none of continuous joints.
+    pub limits: Option<Limits>,
+}
+
+/// How a joint moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Motion {
+    /// About its axis, in rad.
+    Turn,
+    /// Along its axis, in m.
+    Slide,
+}
+
+impl Motion {
+    /// The unit of its values.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Turn => "rad",
+            Self::Slide => "m",
+        }
+    }
+}
+
+/// A joint that can move, fixed joints before it merged.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct MovingJoint {
+    pub(super) name: String,
+    pub(super) motion: Motion,
+    /// The joint's frame in the link before it.
+    pub(super) origin: Pose,
+    pub(super) axis: Vector,
+    pub(super) limits: Option<Limits>,
+    pub(super) drive: Drive,
+}
+
+/// A joint's value: `multiplier * values[variable] + offset`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Drive {
+    pub(super) variable: usize,
+    pub(super) multiplier: f64,
+    pub(super) offset: f64,
+}
+
+impl Drive {
+    pub(super) fn value(&self, values: &[f64]) -> f64 {
+        self.multiplier * values[self.variable] + self.offset
+    }
+
+    pub(super) fn is_own(&self) -> bool {
+        self.multiplier == 1.0 && self.offset == 0.0
+    }
+}
+
+impl MovingJoint {
+    /// What `value` does.
+    pub(super) fn moved(&self, value: f64) -> Pose {
+        match self.motion {
+            Motion::Turn => Pose::turn(self.axis, value),
+            Motion::Slide => Pose::shift(scaled(self.axis, value)),
+        }
+    }
+
+    /// Its axis, where the link before it stands at `before`.
+    pub(super) fn line(&self, before: &Pose) -> Line {
+        let frame = before.then(&self.origin);
+        Line { through_m: frame.origin_m, along: frame.direction(self.axis) }
+    }
+}
+
+/// Where everything is, in the base's frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Frames {
+    /// Link 0 (the base), then the link that each joint carries.
+    pub links: Vec<Pose>,
+    /// The tip.
+    pub tip: Pose,
+}
+
+impl SerialChain {
+    /// The joints from the link `base` to the link `tip` of `model` (indices of its links).
+    /// `place` is what named the tip.
+    ///
+    /// # Errors
+    /// When the tip does not hang on the base, or over a joint that no single value moves.
+    pub fn new(model: &Model, base: usize, tip: usize, place: &str) -> Result<Self, InputError> {
+        let way = model.way(base, tip).ok_or_else(|| {
+            let cause = format!("`{}` does not hang on `{}`", model.links[tip], model.links[base]);
+            InputError::new(place, cause, "name a link that is further from the root")
+        })?;
+        let mut chain = Self {
+            base: model.links[base].clone(),
+            tip: model.links[tip].clone(),
+            variables: Vec::new(),
+            joints: Vec::new(),
+            to_tip: Pose::IDENTITY,
+        };
+        let mut drivers = Vec::new();
+        for joint in way {
+            chain.push(model, joint, &mut drivers, place)?;
+        }
+        Ok(chain)
+    }
+
+    /// Appends a joint of the model. `drivers` are the joints that the variables belong to.
+    fn push(
+        &mut self,
+        model: &Model,
+        index: usize,
+        drivers: &mut Vec<usize>,
+        place: &str,
+    ) -> Result<(), InputError> {
+        let joint = &model.joints[index];
+        let origin = self.to_tip.then(&Pose::from_origin(&joint.origin));
+        let motion = match joint.kind {
+            JointKind::Fixed => {
+                self.to_tip = origin;
+                return Ok(());
+            }
+            JointKind::Revolute | JointKind::Continuous => Motion::Turn,
+            JointKind::Prismatic => Motion::Slide,
+            JointKind::Floating | JointKind::Planar => {
+                let cause = format!("joint `{}` moves in more than one way", joint.name);
+                return Err(InputError::new(place, cause, "choose base and tip on one side of it"));
+            }
+        };
+        let (driver, multiplier, offset) = driver(model, index);
+        let known = drivers.iter().position(|&known| known == driver);
+        let variable = known.unwrap_or_else(|| {
+            drivers.push(driver);
+            self.variables.push(variable(model, driver));
+            drivers.len() - 1
+        });
+        self.joints.push(MovingJoint {
+            name: joint.name.clone(),
+            motion,
+            origin,
+            axis: joint.axis,
+            limits: joint.limits,
+            drive: Drive { variable, multiplier, offset },
+        });
+        self.to_tip = Pose::IDENTITY;
+        Ok(())
+    }
+
+    /// Forward kinematics: where links and tip are when the variables have these values, inside
+    /// their limits or not.
+    ///
+    /// # Panics
+    /// When there are not as many values as variables.
+    pub fn forward(&self, values: &[f64]) -> Frames {
+        assert_eq!(values.len(), self.variables.len(), "one value for each variable");
+        let mut links = Vec::with_capacity(self.joints.len() + 1);
+        let mut link = Pose::IDENTITY;
+        links.push(link);
+        for joint in &self.joints {
+            link = link.then(&joint.origin).then(&joint.moved(joint.drive.value(values)));
+            links.push(link);
+        }
+        Frames { tip: link.then(&self.to_tip), links }
+    }
+
+    /// The values of a named posture of `model`, by joint; joints that it leaves out are at rest.
+    /// Of several values for one joint the last one holds.
+    pub fn with_posture(&self, model: &Model, posture: &[(usize, f64)]) -> Vec<f64> {
+        let said = |variable: &Variable| {
+            posture.iter().rfind(|(joint, _)| model.joints[*joint].name == variable.name)
+        };
+        let at_rest = self.variables.iter().zip(self.rest());
+        at_rest.map(|(variable, rest)| said(variable).map_or(rest, |(_, value)| *value)).collect()
+    }
+
+    /// The values nearest to zero that are inside the limits.
+    pub fn rest(&self) -> Vec<f64> {
+        let nearest = |v: &Variable| v.limits.map_or(0.0, |l| 0f64.clamp(l.lower, l.upper));
+        self.variables.iter().map(nearest).collect()
+    }
+
+    /// Whether there is a finite value for each variable. `place` is what gave the values.
+    ///
+    /// # Errors
+    /// When there are more or fewer, with the names; or when one is not finite.
+    pub fn check_count(&self, place: &str, values: &[f64]) -> Result<(), InputError> {
+        let names: Vec<&str> = self.variables.iter().map(|v| v.name.as_str()).collect();
+        if values.len() != names.len() {
+            let cause = format!(
+                "{} values for the {} joints up to `{}`",
+                values.len(),
+                names.len(),
+                self.tip
+            );
+            let remedy = format!("give a value for each of: {}", names.join(", "));
+            return Err(InputError::new(place, cause, remedy));
+        }
+        match values.iter().position(|value| !value.is_finite()) {
+            None => Ok(()),
+            Some(i) => {
+                let cause = format!("`{}` is {}", names[i], values[i]);
+                Err(InputError::new(place, cause, "give finite numbers"))
+            }
+        }
+    }
+
+    /// Whether all joints are inside their limits, those that mimic others too. `place` is what
+    /// gave the values.
+    ///
+    /// # Errors
+    /// When one is outside: its name and its limits.
+    pub fn check_limits(&self, place: &str, values: &[f64]) -> Result<(), InputError> {
+        match self.outside(values).next() {
+            None => Ok(()),
+            Some((name, motion, limits, value)) => {
+                let unit = motion.unit();
+                let cause = format!("joint `{name}` cannot be at {value} {unit}");
+                let remedy = format!("stay between {} and {} {unit}", limits.lower, limits.upper);
+                Err(InputError::new(place, cause, remedy))
+            }
+        }
+    }
+
+    /// Names of the joints outside their limits, those that mimic others too, each once.
+    pub fn outside_limits<'a>(&'a self, values: &'a [f64]) -> Vec<&'a str> {
+        let mut names = Vec::new();
+        for (name, ..) in self.outside(values) {
+            if !names.contains(&name) {
+                names.push(name);
+            }
+        }
+        names
+    }
+
+    fn outside<'a>(
+        &'a self,
+        values: &'a [f64],
+    ) -> impl Iterator<Item = (&'a str, Motion, Limits, f64)> {
+        let of_variables = self
+            .variables
+            .iter()
+            .zip(values)
+            .map(|(v, &x)| (v.name.as_str(), v.motion, v.limits, x));
+        let of_joints = self
+            .joints
+            .iter()
+            .map(|j| (j.name.as_str(), j.motion, j.limits, j.drive.value(values)));
+        of_variables.chain(of_joints).filter_map(|(name, motion, limits, value)| {
+            let limits = limits.filter(|limits| !limits.contain(value))?;
+            Some((name, motion, limits, value))
+        })
+    }
+}
+
+/// The joint at the end of the mimicry from `joint`, and `joint`'s value as a function of its.
+fn driver(model: &Model, joint: usize) -> (usize, f64, f64) {
+    let (mut driver, mut multiplier, mut offset) = (joint, 1.0, 0.0);
+    // Models hold no circles of mimicry.
+    while let Some(mimic) = &model.joints[driver].mimic {
+        offset += multiplier * mimic.offset;
+        multiplier *= mimic.multiplier;
+        driver = mimic.joint;
+    }
+    (driver, multiplier, offset)
+}
+
+fn variable(model: &Model, joint: usize) -> Variable {
+    let joint = &model.joints[joint];
+    let motion = match joint.kind {
+        JointKind::Prismatic => Motion::Slide,
+        _ => Motion::Turn,
+    };
+    Variable { name: joint.name.clone(), motion, limits: joint.limits }
+}

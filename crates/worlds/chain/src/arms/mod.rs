@@ -1,0 +1,11 @@
+//! Arms of joints as chains of rods: from URDF to connectors and back, and postures that reach a
+//! target. No run, no clock, no cycle.
+//!
+//! ```text
+//! kinematics/: joints -> connectors -> joints     ik/: postures of chains that reach a target
+//! arm.rs: an arm with a place in the world, as a chain
+//! ```
+
+pub mod arm;
+pub mod ik;
+pub mod kinematics;

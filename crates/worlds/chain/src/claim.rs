@@ -1,0 +1,38 @@
+//! Phase *claim*: a navigator looks around and decides, and every chain claims the box that it may
+//! come to be in.
+
+use super::perceive::Looking;
+use super::rods::geometry::Bounds;
+use super::state::Body;
+use super::world::{ChainSpec, ChainWorld};
+use sidestep_kernel::{Cycle, Slot, Turn};
+
+/// Claims for one chain.
+pub(crate) fn claim<const D: usize>(turn: &mut Turn<'_, ChainWorld<D>>, slot: usize) {
+    let &mut Turn { world, state, now, .. } = turn;
+    let claim = reach(world, &world.chains[slot], &state.body(slot), now);
+    state.set_claim(slot, claim);
+    let decision = Looking { world, state, now, scratch: turn.scratch }.decide(slot as Slot);
+    state.set_decision(slot, decision);
+}
+
+/// The box in which a chain may come to be during one cycle: nobody of it leaves that box.
+fn reach<const D: usize>(
+    world: &ChainWorld<D>,
+    spec: &ChainSpec<D>,
+    body: &Body<D>,
+    now: Cycle,
+) -> Bounds<D> {
+    let chain = &body.chain;
+    let radius_m = chain.connectors().iter().map(|c| c.radius_m).fold(0.0, f64::max);
+    let longest_m = chain.rods().iter().map(|r| r.max_m).fold(0.0, f64::max);
+    let fastest_m_s = spec.tasks.iter().map(|t| t.speed_m_s).fold(0.0, f64::max);
+    let way_m = match &world.escape {
+        Some(escape) => escape.speed_max_m_s * world.dt_s,
+        // Who turns round what is in its way goes as far as its rod reaches to both sides.
+        None => 2.0 * longest_m.min(world.rules.slave_step_max_m) + fastest_m_s * world.dt_s,
+    };
+    let thrown_m = spec.changes.iter().map(|change| change.throws_m(now)).fold(0.0, f64::max);
+    let back_m = body.scattered.as_ref().map_or(0.0, |s| s.speed_m_s * world.dt_s);
+    Bounds::of(chain.points()).grown(radius_m + way_m + thrown_m + back_m)
+}

@@ -1,0 +1,111 @@
+//! Which parts of a chain are near a moving obstacle, and how near.
+
+use crate::rods::chain::Chain;
+use crate::rods::geometry::{Bounds, Point, distance, first_axis, perpendicular, sub, unit};
+use crate::rods::obstacle::{Obstacle, Obstacles};
+use crate::rods::own_body::OwnBody;
+
+/// A part of a chain; the order breaks ties between equally deep violations.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Part {
+    /// A connector.
+    Connector(usize),
+    /// The rod between a connector and the next.
+    Rod(usize),
+}
+
+impl Part {
+    /// The connector, or the one at the begin of the rod.
+    pub fn connector(self) -> usize {
+        let (Self::Connector(k) | Self::Rod(k)) = self;
+        k
+    }
+}
+
+/// A part and a moving obstacle that may get too near to each other in this tick.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Threat {
+    pub(super) part: Part,
+    /// Index among [`Obstacles::moving`].
+    pub(super) mover: usize,
+    /// How deep the part was in what must stay free, when last looked at.
+    pub(super) depth_m: f64,
+    /// Whether nothing could be done about it.
+    pub(super) given_up: bool,
+}
+
+/// How a part lies to an obstacle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Nearness<const D: usize> {
+    /// Distance of the surfaces; negative where they overlap.
+    pub(super) gap_m: f64,
+    /// Unit vector from the obstacle to the part. Where the cores overlap it is across the
+    /// obstacle's way, to its left.
+    pub(super) away: Point<D>,
+    /// Where on the rod: 0 at its first end, 1 at its second.
+    pub(super) along_rod: f64,
+}
+
+/// How a part lies to an obstacle.
+pub(super) fn nearness<const D: usize>(
+    chain: &Chain<D>,
+    part: Part,
+    mover: &Obstacle<D>,
+) -> Nearness<D> {
+    let (body, radius_m) = match part {
+        Part::Connector(i) => ([chain.points()[i]; 2], chain.connectors()[i].radius_m),
+        Part::Rod(i) => ([chain.points()[i], chain.points()[i + 1]], chain.rods()[i].radius_m),
+    };
+    let nearest = mover.core.nearest_to_segment(body);
+    let length_m = distance(body[0], body[1]);
+    let along_rod =
+        if length_m > 0.0 { distance(body[0], nearest.on_body) / length_m } else { 0.0 };
+    Nearness {
+        gap_m: nearest.distance_m - mover.radius_m - radius_m,
+        away: unit(sub(nearest.on_body, nearest.on_core)).unwrap_or_else(|| left_of(mover)),
+        along_rod,
+    }
+}
+
+/// Across the way of an obstacle.
+fn left_of<const D: usize>(mover: &Obstacle<D>) -> Point<D> {
+    perpendicular(unit(mover.velocity_m_s).unwrap_or(first_axis()))
+}
+
+/// Collects all parts that are nearer to a moving obstacle than `within_m` of it.
+pub(super) fn collect<const D: usize>(
+    chain: &Chain<D>,
+    obstacles: &Obstacles<D>,
+    body: &mut OwnBody<D>,
+    within_m: impl Fn(&Obstacle<D>) -> f64,
+    threats: &mut Vec<Threat>,
+) {
+    threats.clear();
+    if obstacles.moving().is_empty() {
+        return;
+    }
+    let n_rods = chain.rods().len();
+    body.rebuild((0..n_rods).map(|i| rod_box(chain, i)));
+    // Parts of other chains stand among those that move, and are not fled from.
+    let movers = obstacles.moving().iter().enumerate();
+    for (k, mover) in movers.filter(|(_, mover)| mover.is_moving()) {
+        let within_m = within_m(mover);
+        let mut look = |part: Part| {
+            if nearness(chain, part, mover).gap_m < within_m {
+                threats.push(Threat { part, mover: k, depth_m: 0.0, given_up: false });
+            }
+        };
+        body.visit(&mover.bounds().grown(within_m), |rod| {
+            look(Part::Connector(rod));
+            look(Part::Rod(rod));
+        });
+        // The last connector begins no rod.
+        look(Part::Connector(n_rods));
+    }
+}
+
+fn rod_box<const D: usize>(chain: &Chain<D>, i: usize) -> Bounds<D> {
+    // Rods are no thicker than their connectors.
+    let radius_m = chain.connectors()[i].radius_m.max(chain.connectors()[i + 1].radius_m);
+    Bounds::of(&[chain.points()[i], chain.points()[i + 1]]).grown(radius_m)
+}

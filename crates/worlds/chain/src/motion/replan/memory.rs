@@ -1,0 +1,138 @@
+//! What a ladder remembers from tick to tick.
+
+use crate::rods::geometry::Point;
+use serde::{Deserialize, Serialize};
+use sidestep_kernel::math::atan2;
+use std::collections::VecDeque;
+use std::f64::consts::TAU;
+
+/// A place for the guard against going to and fro: cells of 0.1 m, 16 headings.
+const CELL_M: f64 = 0.1;
+const HEADINGS: f64 = 16.0;
+/// Places that are remembered.
+const PLACES: usize = 64;
+/// Coming nearer to the goal by this part of a cell is progress.
+const PROGRESS: f64 = 0.1;
+
+/// Where on the ladder an initiator stands.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Memory {
+    /// The side of the last good turn: 1 left, -1 right, 0 unknown; and its plane.
+    pub(super) side: i8,
+    pub(super) plane: usize,
+    /// Straight ticks in a row.
+    pub(super) straight: u32,
+    /// Whether the last motion was a turn to the side.
+    pub(super) on_detour: bool,
+    pub(super) turns: u32,
+    pub(super) waits: u32,
+    /// Ticks that the other end still leads.
+    pub(super) pulling_back: u32,
+    pub(super) hand_overs: u32,
+    /// The least distance from the goal.
+    pub(super) best_m: Option<f64>,
+    pub(super) places: VecDeque<Visit>,
+}
+
+/// A cell and a heading.
+pub(super) type Place = ([i64; 3], i64);
+
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(super) struct Visit {
+    place: Place,
+    times: u32,
+    /// Distance from the goal at the first of these times.
+    goal_m: f64,
+}
+
+/// The place of a point and a direction.
+pub(super) fn place<const D: usize>(at: Point<D>, u: Point<D>) -> Place {
+    let mut cell = [0; 3];
+    for (i, x) in at.into_iter().enumerate() {
+        cell[i] = (x / CELL_M).floor() as i64;
+    }
+    let heading = (atan2(u[1], u[0]) / TAU * HEADINGS).round() as i64;
+    (cell, heading.rem_euclid(HEADINGS as i64))
+}
+
+impl Memory {
+    pub(super) fn side_or_left(&self) -> i8 {
+        if self.side == 0 { 1 } else { self.side }
+    }
+
+    /// Coming a cell nearer to the goal than ever is progress: what failed before may be tried.
+    pub(super) fn note_goal(&mut self, goal_m: Option<f64>) {
+        let Some(goal_m) = goal_m else { return };
+        if self.best_m.is_none_or(|best_m| goal_m < best_m - CELL_M) {
+            self.best_m = Some(goal_m);
+            self.hand_overs = 0;
+        }
+    }
+
+    pub(super) fn went_straight(&mut self, forget_after: u32) {
+        self.moved_on();
+        self.on_detour = false;
+        self.straight = self.straight.saturating_add(1);
+        if self.straight >= forget_after {
+            self.side = 0;
+            if self.best_m.is_none() {
+                self.hand_overs = 0;
+            }
+        }
+    }
+
+    pub(super) fn went_sideways(&mut self, plane: usize, turn_rad: f64) {
+        self.moved_on();
+        self.straight = 0;
+        self.side = if turn_rad > 0.0 { 1 } else { -1 };
+        self.plane = plane;
+    }
+
+    pub(super) fn moved_on(&mut self) {
+        (self.turns, self.waits) = (0, 0);
+    }
+
+    /// Counts a detour's way through a place; how often that was without progress.
+    pub(super) fn visit(&mut self, place: Place, goal_m: Option<f64>) -> u32 {
+        let begins = !std::mem::replace(&mut self.on_detour, true);
+        let Some(goal_m) = goal_m else { return 0 };
+        let last = self.places.back().map(|visit| visit.place);
+        if !begins && last == Some(place) {
+            return 0;
+        }
+        let known = self.places.iter().position(|visit| visit.place == place);
+        let mut visit = known
+            .and_then(|k| self.places.remove(k))
+            .filter(|visit| goal_m > visit.goal_m - PROGRESS * CELL_M)
+            .unwrap_or(Visit { place, times: 0, goal_m });
+        visit.times += 1;
+        self.places.push_back(visit);
+        if self.places.len() > PLACES {
+            self.places.pop_front();
+        }
+        visit.times
+    }
+
+    /// One tick in which the other end led. After the last, the other side is tried first.
+    pub(super) fn pulled_back(&mut self) {
+        self.pulling_back -= 1;
+        if self.pulling_back == 0 {
+            self.side = -self.side_or_left();
+            self.leave_place();
+        }
+    }
+
+    /// After it was told that nothing works, everything may be tried again.
+    pub(super) fn starts_afresh(&mut self) {
+        self.pulling_back = 0;
+        self.hand_overs = 0;
+        self.leave_place();
+    }
+
+    fn leave_place(&mut self) {
+        self.moved_on();
+        self.straight = 0;
+        self.on_detour = false;
+        self.places.clear();
+    }
+}

@@ -1,0 +1,75 @@
+//! What navigators see and decide, at the start of a cycle: everybody else is where they are then.
+
+use super::driver::Driver;
+use super::navigate::{Goal, Navigator};
+use super::rods::geometry::distance;
+use super::scratch::Scratch;
+use super::state::ChainState;
+use super::swarm::leader::{Decision, LeaderState, Percept, Surroundings};
+use super::world::{ChainWorld, purpose};
+use sidestep_kernel::{Cycle, Slot};
+
+/// A worker that looks at a state which nobody changes meanwhile.
+pub(crate) struct Looking<'a, const D: usize> {
+    pub(crate) world: &'a ChainWorld<D>,
+    pub(crate) state: &'a ChainState<D>,
+    pub(crate) now: Cycle,
+    pub(crate) scratch: &'a mut Scratch<D>,
+}
+
+/// What a navigator perceives.
+pub(crate) struct Sight<'a> {
+    pub(crate) navigator: &'a Navigator,
+    /// The connector that it is.
+    pub(crate) agent: usize,
+    pub(crate) leader: LeaderState,
+    pub(crate) percept: Percept,
+}
+
+impl<'a, const D: usize> Looking<'a, D> {
+    /// What a navigator decides; none of other drivers.
+    pub(crate) fn decide(&mut self, slot: Slot) -> Option<Decision> {
+        let sight = self.sight(slot)?;
+        Some(sight.navigator.leader.decide(sight.leader.followed, &sight.percept))
+    }
+
+    /// What a navigator perceives; its laser's ranges are in the scratch.
+    pub(crate) fn sight(&mut self, slot: Slot) -> Option<Sight<'a>> {
+        let Self { world, state, now, .. } = *self;
+        let body = state.body(slot as usize);
+        let task = world.chains[slot as usize].tasks.get(body.driving.task as usize)?;
+        let Driver::Navigate(navigator) = &task.driver else { return None };
+        let leader = body.leader(task);
+        drop(body);
+        self.see_others(slot, task.agent, navigator, &leader);
+        self.scratch.gather(world, state, now, std::iter::empty());
+        let noise = &mut world.streams.draws(slot, now, purpose::LASER);
+        let Scratch { obstacles, scan, seen, .. } = &mut *self.scratch;
+        let target = navigator.goal.as_ref().and_then(Goal::target);
+        let around = Surroundings { obstacles: obstacles.in_plane()?, bodies: seen, target };
+        let percept = navigator.leader.perceive(&leader.pose, &around, noise, scan);
+        Some(Sight { navigator, agent: task.agent, leader, percept })
+    }
+
+    /// Gathers what a navigator may see of chains, its own included, but itself.
+    fn see_others(
+        &mut self,
+        slot: Slot,
+        agent: usize,
+        navigator: &Navigator,
+        leader: &LeaderState,
+    ) {
+        let range_m = navigator.leader.laser.range_m();
+        let seen = &mut self.scratch.seen;
+        seen.clear();
+        for other in 0..self.state.len() {
+            let body = self.state.body(other);
+            let is_own = other == slot as usize;
+            body.solids().filter(|(k, _)| !(is_own && *k == agent)).for_each(|(_, solid)| {
+                if distance(leader.pose.at, solid.at) - solid.radius_m <= range_m {
+                    seen.push(solid.as_seen());
+                }
+            });
+        }
+    }
+}

@@ -1,0 +1,54 @@
+//! How much of its tasks a chain has done.
+
+use super::driver::{Driver, Task};
+use super::rods::geometry::in_dimensions;
+use super::state::{Body, ChainState};
+use super::world::ChainWorld;
+
+impl<const D: usize> ChainWorld<D> {
+    /// The part of its tasks that a chain has done, from 0 to 1. Several tasks count alike; what
+    /// was given up is not done.
+    pub fn progress(&self, slot: usize, body: &Body<D>) -> f64 {
+        let tasks = &self.chains[slot].tasks;
+        let part = tasks.get(body.driving.task as usize).map(|task| self.part_done(body, task));
+        let undone: f64 = body.tally.given_up.iter().map(|what| what.undone).sum();
+        let done = f64::from(body.driving.task) + part.unwrap_or(0.0) - undone;
+        (done / tasks.len() as f64).clamp(0.0, 1.0)
+    }
+
+    /// The part of its present task that an initiator is through with: of scripts by motions, of
+    /// targets by targets, of tasks that take a time by time; of going anywhere the part that was
+    /// gone of the way that its speed allows in the whole run; of resting the part of the run.
+    pub(crate) fn part_done(&self, body: &Body<D>, task: &Task<D>) -> f64 {
+        let part = match &task.driver {
+            _ if task.lasts_s.is_finite() => self.starts_s(body.driving.cycles) / task.lasts_s,
+            Driver::Rest => body.driving.cycles as f64 / self.cycles.max(1) as f64,
+            Driver::Wander(_) => self.way_part(body, task),
+            Driver::Script(_) => f64::from(body.driving.next) / body.motions.len().max(1) as f64,
+            Driver::Targets(targets) => {
+                f64::from(body.driving.next) / targets.places.len().max(1) as f64
+            }
+            Driver::Navigate(navigator) => match &navigator.goal {
+                Some(goal) => {
+                    let start = in_dimensions(body.driving.start.position_m);
+                    goal.progress(body.driving.next as usize, start, body.driving.nearest_m)
+                }
+                None => self.way_part(body, task),
+            },
+        };
+        part.clamp(0.0, 1.0)
+    }
+
+    fn way_part(&self, body: &Body<D>, task: &Task<D>) -> f64 {
+        body.driving.way_m.gone / (task.speed_m_s * self.starts_s(self.cycles.max(1)))
+    }
+
+    /// Whether all tasks of all chains are done and everything is whole.
+    pub(crate) fn all_is_done(&self, state: &ChainState<D>) -> bool {
+        self.chains.iter().enumerate().all(|(slot, spec)| {
+            let body = state.body(slot);
+            let is_done = body.driving.task as usize >= spec.tasks.len();
+            is_done && body.scattered.is_none()
+        })
+    }
+}

@@ -1,0 +1,39 @@
+//! Chains of connectors and rods, and how one motion goes through them: no run, no clock, no cycle.
+//!
+//! ```text
+//! chain.rs, obstacle.rs: what there is          geometry.rs, grid.rs: distances, and what is near
+//! veto.rs: requests and outcomes                rules.rs: named options
+//! propagate.rs -> candidates.rs -> scene.rs     one motion: sweeps, a slave's choices, their judge
+//!                 interval.rs, search.rs        free directions: exact in the plane, searched in space
+//!                 sweep.rs, own_body.rs         nothing is passed through; the chain's own parts
+//!                 open.rs, pass.rs              the same where nothing is in the way
+//! wavefront.rs: many motions at once            passage.rs: what passed through what, between states
+//! reach.rs: a base that keeps its place         rebuild.rs: broken chains
+//! ```
+
+mod candidates;
+pub mod chain;
+pub mod geometry;
+mod grid;
+pub mod interval;
+pub mod obstacle;
+mod open;
+pub(crate) mod own_body;
+mod pass;
+pub mod passage;
+pub mod propagate;
+pub mod reach;
+pub mod rebuild;
+pub mod rules;
+pub(crate) mod scene;
+mod search;
+pub mod sweep;
+pub mod veto;
+pub mod wavefront;
+
+pub use chain::{Chain, Connector, Mobility, Rod};
+pub use obstacle::{Obstacle, Obstacles};
+pub use propagate::Propagator;
+pub use rules::{Rotation, Rules};
+pub use scene::{BEND_TOLERANCE_RAD, SKIN_M, TOLERANCE_M};
+pub use veto::{Mode, Motion, Moved, Outcome, Reason, Request, Source, Veto};

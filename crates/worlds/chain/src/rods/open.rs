@@ -1,0 +1,77 @@
+//! Motions where nothing can object: no obstacle, every connector free. Straight into the chain.
+//!
+//! A sweep is a chain of dependent roots and divisions, and a processor that waits. The two
+//! sweeps of an initiator in the middle depend on nothing but the initiator, so they take turns
+//! in one loop and a processor computes both at once; no bit differs from one after the other.
+
+use super::candidates::guided;
+use super::chain::{Chain, Rod};
+use super::geometry::{Point, distance, dot, sub};
+use super::pass::{Direction, Tally};
+use super::scene::fits;
+
+/// Moves connector `k`, and all that must follow.
+pub(super) fn pull<const D: usize>(
+    chain: &mut Chain<D>,
+    k: usize,
+    to: Point<D>,
+    tally: &mut Tally,
+) {
+    let least_move_m = chain.least_move_m();
+    let (points, rods) = chain.parts_mut();
+    let from = std::mem::replace(&mut points[k], to);
+    let mut sweeps = [Direction::Up, Direction::Down].map(|direction| Sweep {
+        direction,
+        master: k,
+        was: from,
+        is: to,
+        changed: 0,
+        longest2: 0.0,
+    });
+    let [up, down] = &mut sweeps;
+    while up.advance(points, rods, least_move_m) && down.advance(points, rods, least_move_m) {}
+    while up.advance(points, rods, least_move_m) {}
+    while down.advance(points, rods, least_move_m) {}
+    tally.touch(down.master..up.master + 1);
+    tally.changed += 1 + up.changed + down.changed;
+    tally.slave_went(up.longest2.max(down.longest2).sqrt());
+}
+
+/// One sweep on its way outward.
+struct Sweep<const D: usize> {
+    direction: Direction,
+    /// Who moved last, and where it was and is.
+    master: usize,
+    was: Point<D>,
+    is: Point<D>,
+    changed: usize,
+    /// Square of the longest way of a slave.
+    longest2: f64,
+}
+
+impl<const D: usize> Sweep<D> {
+    /// Moves the next slave; false, now and ever after, where the motion ends.
+    #[inline(always)]
+    fn advance(&mut self, points: &mut [Point<D>], rods: &[Rod], least_move_m: f64) -> bool {
+        let Some(slave) = self.direction.next(self.master, points.len()) else { return false };
+        let so = points[slave];
+        let rod = rods[slave.min(self.master)];
+        let new = guided([self.was, self.is, so], rod, least_move_m);
+        if new == so && self.may_end_at(slave, points, rods) {
+            return false;
+        }
+        let way = sub(new, so);
+        self.longest2 = self.longest2.max(dot(way, way));
+        self.changed += usize::from(new != so);
+        points[slave] = new;
+        (self.master, self.was, self.is) = (slave, so, new);
+        true
+    }
+
+    /// Whether the rod beyond a slave that stays is good as it is; it need not be in a chain that
+    /// is broken.
+    fn may_end_at(&self, slave: usize, points: &[Point<D>], rods: &[Rod]) -> bool {
+        let Some(next) = self.direction.next(slave, points.len()) else { return true };
+        fits(rods[slave.min(next)], distance(points[slave], points[next]))
+    }
+}

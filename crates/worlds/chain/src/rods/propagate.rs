@@ -1,0 +1,530 @@
+//! One motion through the whole chain, or not at all (slides R1 to R7).
+//!
+//! The initiator moves; from it two sweeps go outward, each slave reacting to its master and
+//! becoming the next one's master. New positions are kept apart until both sweeps have agreed: a
+//! veto leaves every bit of the chain as it was.
+
+use super::candidates::{Candidate, Work};
+use super::chain::{Chain, is_in_range, out_of_range};
+use super::geometry::{Bounds, Point, between, distance};
+use super::obstacle::{Obstacles, swept};
+use super::open;
+use super::own_body::OwnBody;
+use super::pass::{Direction, Tally};
+use super::rules::{Rotation, Rules};
+use super::scene::{Overlay, Refusal, Scene, Step, TOLERANCE_M, fits, needed_m};
+use super::veto::{Mode, Motion, Moved, Outcome, Reason, Request, Veto};
+use sidestep_kernel::InputError;
+use std::ops::Range;
+
+/// A request that would take more sub-steps is refused.
+const MAX_SUB_STEPS: f64 = 1e6;
+
+/// Moves chains by the rules. It owns the buffers of a motion, so that none allocates, and
+/// remembers nothing from one motion to the next.
+#[derive(Debug, Clone, Default)]
+pub struct Propagator<const D: usize> {
+    /// How chains react.
+    pub rules: Rules,
+    overlay: Overlay<D>,
+    own: OwnBody<D>,
+    work: Work<D>,
+    untried: Vec<Untried<D>>,
+    /// Positions before the request, of the run of connectors that have moved.
+    before: Overlay<D>,
+    tally: Tally,
+}
+
+/// What an earlier slave might do instead.
+#[derive(Debug, Clone, Copy)]
+enum Untried<const D: usize> {
+    /// Go to another place.
+    Place { slave: usize, candidate: Candidate<D> },
+    /// Turn its rod to the other side, where nobody has looked yet.
+    OtherSide { slave: usize, tried: Point<D> },
+}
+
+/// The connectors that are moved from outside: one, or the two of a rod.
+#[derive(Debug, Clone, Copy)]
+struct Heads<const D: usize> {
+    first: usize,
+    n: usize,
+    to: [Point<D>; 2],
+}
+
+impl<const D: usize> Heads<D> {
+    fn of(motion: &Motion<D>) -> Self {
+        match *motion {
+            Motion::Connector { k, to } => Self { first: k, n: 1, to: [to, to] },
+            Motion::Rod { i, to } => Self { first: i, n: 2, to },
+        }
+    }
+
+    fn indices(&self) -> Range<usize> {
+        self.first..self.first + self.n
+    }
+
+    /// Where they are.
+    fn places(&self, chain: &Chain<D>) -> [Point<D>; 2] {
+        [chain.points()[self.first], chain.points()[self.first + self.n - 1]]
+    }
+}
+
+/// An objection and who raised it.
+type Objection = (usize, Refusal);
+
+impl<const D: usize> Propagator<D> {
+    /// A propagator for rules.
+    pub fn new(rules: Rules) -> Self {
+        Self { rules, ..Self::default() }
+    }
+
+    /// Moves a chain as requested, in sub-steps where something may be in the way.
+    ///
+    /// # Errors
+    /// A target that is not finite or more than 1e6 m from the origin, an index that the chain does not have. A
+    /// motion that cannot be is no error but a veto.
+    pub fn propagate(
+        &mut self,
+        chain: &mut Chain<D>,
+        obstacles: &Obstacles<D>,
+        request: &Request<D>,
+    ) -> Result<Outcome<D>, InputError> {
+        let mut heads = Heads::of(&request.motion);
+        check(chain, &heads)?;
+        let from = heads.places(chain);
+        self.tally = Tally::start(heads.first);
+        self.before.start(chain.points().len(), heads.first);
+        if let Err((by, refusal)) = project(chain, &mut heads, request.mode) {
+            return Ok(Outcome::Vetoed(veto(chain, heads.first, by, refusal)));
+        }
+        let n = self.sub_steps(chain, obstacles, &heads, from)?;
+        for k in 1..=n {
+            let part = k as f64 / n as f64;
+            let to = [0, 1]
+                .map(|h| if k == n { heads.to[h] } else { between(from[h], heads.to[h], part) });
+            if let Err((by, refusal)) = self.sub_step(chain, obstacles, Heads { to, ..heads }) {
+                let veto = veto(chain, heads.first, by, refusal);
+                return Ok(self.stopped(chain, request.mode, veto));
+            }
+        }
+        Ok(Outcome::Moved(self.moved(None)))
+    }
+
+    fn sub_steps(
+        &self,
+        chain: &Chain<D>,
+        obstacles: &Obstacles<D>,
+        heads: &Heads<D>,
+        from: [Point<D>; 2],
+    ) -> Result<usize, InputError> {
+        let way_m = distance(from[0], heads.to[0]).max(distance(from[1], heads.to[heads.n - 1]));
+        let is_open = obstacles.is_empty() && !self.rules.self_collision;
+        let step_m = match self.rules.step_m {
+            Some(step_m) if step_m > 0.0 => step_m,
+            _ if is_open => f64::INFINITY,
+            _ => chain.step_m(),
+        };
+        let n = (way_m / step_m).ceil().max(1.0);
+        if n > MAX_SUB_STEPS {
+            return Err(InputError::new(
+                "target",
+                format!("is {way_m} m away, which takes {n} steps of {step_m} m"),
+                "go there in several requests",
+            ));
+        }
+        Ok(n as usize)
+    }
+
+    fn stopped(&mut self, chain: &mut Chain<D>, mode: Mode, veto: Veto<D>) -> Outcome<D> {
+        if mode == Mode::AsFarAsPossible && self.tally.changed > 0 {
+            return Outcome::Moved(self.moved(Some(veto)));
+        }
+        let run = self.before.from..self.before.to;
+        chain.points_mut()[run].copy_from_slice(self.before.placed());
+        Outcome::Vetoed(veto)
+    }
+
+    fn moved(&self, cut_short: Option<Veto<D>>) -> Moved<D> {
+        let Tally { from, to, changed, rotated, max_slave_step_m } = self.tally;
+        Moved { touched: from..to, changed, rotated, max_slave_step_m, cut_short }
+    }
+
+    /// One short motion: all of it, or none.
+    fn sub_step(
+        &mut self,
+        chain: &mut Chain<D>,
+        obstacles: &Obstacles<D>,
+        heads: Heads<D>,
+    ) -> Result<(), Objection> {
+        let is_there = |(h, k): (usize, usize)| {
+            distance(heads.to[h], chain.points()[k]) <= chain.least_move_m()
+        };
+        if heads.indices().enumerate().all(is_there) {
+            return Ok(());
+        }
+        if obstacles.is_empty() && !self.rules.self_collision && chain.is_plain() && heads.n == 1 {
+            open::pull(chain, heads.first, heads.to[0], &mut self.tally);
+            return Ok(());
+        }
+        self.overlay.start(chain.points().len(), heads.first);
+        if self.rules.self_collision {
+            self.own
+                .rebuild((0..chain.rods().len()).map(|i| rod_box(chain, i, |k| chain.points()[k])));
+        }
+        self.place_heads(chain, obstacles, &heads)?;
+        let rotated = self.tally.rotated;
+        let followed = self
+            .sweep(chain, obstacles, heads.first + heads.n - 1, Direction::Up)
+            .and_then(|()| self.sweep(chain, obstacles, heads.first, Direction::Down));
+        match followed {
+            Ok(()) => self.commit(chain, &heads),
+            Err(_) => self.tally.rotated = rotated,
+        }
+        followed
+    }
+
+    fn place_heads(
+        &mut self,
+        chain: &Chain<D>,
+        obstacles: &Obstacles<D>,
+        heads: &Heads<D>,
+    ) -> Result<(), Objection> {
+        for (h, k) in heads.indices().enumerate() {
+            let scene = self.scene(chain, obstacles);
+            scene.judge_initiator(k, heads.to[h]).map_err(|refusal| (k, refusal))?;
+        }
+        for (h, k) in heads.indices().enumerate() {
+            self.place(chain, k, heads.to[h]);
+        }
+        if heads.n == 2 {
+            let [m, s] = [heads.first, heads.first + 1];
+            let step = Step {
+                mn: heads.to[0],
+                ..self.scene(chain, obstacles).step(m, s, Direction::Up, chain.points()[s])
+            };
+            if !fits(step.rod, distance(heads.to[0], heads.to[1])) {
+                return Err((s, Refusal::of(Reason::Mobility)));
+            }
+            let alone = Step { prev: None, ..step };
+            self.scene(chain, obstacles).judge(&alone, heads.to[1]).map_err(|r| (s, r))?;
+        }
+        Ok(())
+    }
+
+    fn scene<'a>(&'a self, chain: &'a Chain<D>, obstacles: &'a Obstacles<D>) -> Scene<'a, D> {
+        let Self { rules, overlay, own, .. } = self;
+        Scene { chain, obstacles, rules, overlay, own }
+    }
+
+    /// From a head outward. Rods keep their lengths when they turn, which is cheap and nearly
+    /// always enough; where that ends in a veto, all over again with every length they may have.
+    fn sweep(
+        &mut self,
+        chain: &Chain<D>,
+        obstacles: &Obstacles<D>,
+        head: usize,
+        direction: Direction,
+    ) -> Result<(), Objection> {
+        let rotated = self.tally.rotated;
+        self.work.all_lengths = false;
+        let followed = self.follow(chain, obstacles, head, direction);
+        let Some(first) = direction.next(head, chain.points().len()) else { return followed };
+        if followed.is_ok()
+            || self.rules.rotation != Rotation::Union
+            || !may_go_elsewhere(chain, head, direction)
+        {
+            return followed;
+        }
+        self.take_back(chain, first, direction);
+        self.tally.rotated = rotated;
+        self.work.all_lengths = true;
+        self.follow(chain, obstacles, head, direction)
+    }
+
+    /// From a head outward, until a slave need not move or the chain ends.
+    fn follow(
+        &mut self,
+        chain: &Chain<D>,
+        obstacles: &Obstacles<D>,
+        head: usize,
+        direction: Direction,
+    ) -> Result<(), Objection> {
+        self.untried.clear();
+        let mut first_objection: Option<Objection> = None;
+        let mut left = self.rules.backtracks;
+        let mut master = head;
+        while let Some(slave) = direction.next(master, chain.points().len()) {
+            let (at_slave, chosen) = match self.react(chain, obstacles, slave, direction) {
+                Ok(chosen) => (slave, chosen),
+                Err(refusal) => {
+                    let objection = *first_objection.get_or_insert((slave, refusal));
+                    self.step_back(chain, obstacles, direction, &mut left, objection)?
+                }
+            };
+            let so = chain.points()[at_slave];
+            let stays = distance(chosen.at, so) <= chain.least_move_m();
+            if stays && self.may_stop(chain, obstacles, at_slave, direction) {
+                return Ok(());
+            }
+            self.place(chain, at_slave, if stays { so } else { chosen.at });
+            self.tally.rotated += usize::from(chosen.rotated);
+            master = at_slave;
+        }
+        Ok(())
+    }
+
+    /// The best place for a slave; what else it might do is remembered.
+    fn react(
+        &mut self,
+        chain: &Chain<D>,
+        obstacles: &Obstacles<D>,
+        slave: usize,
+        direction: Direction,
+    ) -> Result<Candidate<D>, Refusal> {
+        self.look(chain, obstacles, slave, direction)?;
+        let Self { work, untried, .. } = self;
+        let chosen = work.found[0];
+        let rest = work.found[1..].iter().rev();
+        untried.extend(rest.map(|&candidate| Untried::Place { slave, candidate }));
+        if work.has_other_side {
+            untried.push(Untried::OtherSide { slave, tried: chosen.at });
+        }
+        Ok(chosen)
+    }
+
+    /// Fills `work.found` with places for a slave.
+    fn look(
+        &mut self,
+        chain: &Chain<D>,
+        obstacles: &Obstacles<D>,
+        slave: usize,
+        direction: Direction,
+    ) -> Result<(), Refusal> {
+        let Self { rules, overlay, own, work, .. } = self;
+        let scene = Scene { chain, obstacles, rules, overlay, own };
+        let master = direction.before(slave);
+        scene.candidates(&scene.step(master, slave, direction, chain.points()[slave]), work)
+    }
+
+    /// After an objection: the latest of the earlier slaves that might do something else does it.
+    fn step_back(
+        &mut self,
+        chain: &Chain<D>,
+        obstacles: &Obstacles<D>,
+        direction: Direction,
+        left: &mut usize,
+        objection: Objection,
+    ) -> Result<(usize, Candidate<D>), Objection> {
+        while let Some(untried) = self.untried.pop() {
+            if *left == 0 {
+                return Err((objection.0, Refusal { reason: Reason::Limit, ..objection.1 }));
+            }
+            *left -= 1;
+            match untried {
+                Untried::Place { slave, candidate } => {
+                    self.take_back(chain, slave, direction);
+                    return Ok((slave, candidate));
+                }
+                Untried::OtherSide { slave, tried } => {
+                    self.take_back(chain, slave, direction);
+                    self.work.both_sides = true;
+                    let found = self.look(chain, obstacles, slave, direction);
+                    self.work.both_sides = false;
+                    let other = self.work.found.iter().find(|c| c.at != tried);
+                    if let (Ok(()), Some(&candidate)) = (found, other) {
+                        return Ok((slave, candidate));
+                    }
+                }
+            }
+        }
+        Err(objection)
+    }
+
+    /// Whether the rest of the chain has nothing to react to: this slave stays, and the bend at
+    /// it and the rod beyond it are good as they are (pitfall 7).
+    fn may_stop(
+        &self,
+        chain: &Chain<D>,
+        obstacles: &Obstacles<D>,
+        slave: usize,
+        direction: Direction,
+    ) -> bool {
+        let Some(next) = direction.next(slave, chain.points().len()) else { return true };
+        let scene = self.scene(chain, obstacles);
+        let step = scene.step(slave, next, direction, chain.points()[next]);
+        fits(step.rod, distance(step.so, step.mn)) && step.bends_at(step.so)
+    }
+
+    fn place(&mut self, chain: &Chain<D>, i: usize, at: Point<D>) {
+        self.overlay.set(i, at);
+        self.refresh_own(chain, i);
+    }
+
+    fn refresh_own(&mut self, chain: &Chain<D>, i: usize) {
+        if !self.rules.self_collision {
+            return;
+        }
+        for rod in i.saturating_sub(1)..(i + 1).min(chain.rods().len()) {
+            let at = |k: usize| self.overlay.get(k).unwrap_or(chain.points()[k]);
+            let bounds = rod_box(chain, rod, at);
+            self.own.set(rod, bounds);
+        }
+    }
+
+    /// Forgets the new places from a slave outward.
+    fn take_back(&mut self, chain: &Chain<D>, slave: usize, direction: Direction) {
+        let (from, to) = (self.overlay.from, self.overlay.to);
+        let forgotten = match direction {
+            Direction::Up => slave..to,
+            Direction::Down => from..slave + 1,
+        };
+        match direction {
+            Direction::Up => self.overlay.to = slave.min(to),
+            Direction::Down => self.overlay.from = (slave + 1).max(from),
+        }
+        for i in forgotten {
+            self.refresh_own(chain, i);
+        }
+    }
+
+    fn commit(&mut self, chain: &mut Chain<D>, heads: &Heads<D>) {
+        // Outward from the head, so that the run of old positions has no gap.
+        let (from, to) = (self.overlay.from, self.overlay.to);
+        for i in (heads.first..to).chain((from..heads.first).rev()) {
+            let old = chain.points()[i];
+            let new = self.overlay.get(i).unwrap_or(old);
+            if self.before.get(i).is_none() {
+                self.before.set(i, old);
+            }
+            self.tally.changed += usize::from(old != new);
+            if !heads.indices().contains(&i) {
+                self.tally.slave_went(distance(old, new));
+            }
+            chain.points_mut()[i] = new;
+        }
+        self.tally.touch(from..to);
+    }
+}
+
+/// Whether a second look finds slaves more places: rods of other lengths, and in the plane also
+/// the other side.
+fn may_go_elsewhere<const D: usize>(chain: &Chain<D>, head: usize, direction: Direction) -> bool {
+    let rods = match direction {
+        Direction::Up => &chain.rods()[head..],
+        Direction::Down => &chain.rods()[..head],
+    };
+    D == 2 || rods.iter().any(|rod| rod.min_m < rod.max_m)
+}
+
+impl<const D: usize> Scene<'_, D> {
+    /// The step of a slave whose master's new place is settled.
+    fn step(&self, master: usize, slave: usize, direction: Direction, so: Point<D>) -> Step<D> {
+        let points = self.chain.points();
+        let before = match direction {
+            Direction::Up => master.checked_sub(1),
+            Direction::Down => (master + 1 < points.len()).then_some(master + 1),
+        };
+        // In the first sweep the connector on the initiator's other side is yet to move, and the
+        // second sweep will mind the bend.
+        let prev =
+            before.filter(|&b| direction == Direction::Down || self.overlay.get(b).is_some());
+        Step {
+            master,
+            slave,
+            mo: points[master],
+            mn: self.at(master),
+            so,
+            prev: prev.map(|b| self.at(b)),
+            rod: self.chain.rod_between(master, slave),
+            tip_radius_m: self.chain.connectors()[slave].radius_m,
+            max_bend_rad: self.chain.connectors()[master].max_bend_rad,
+        }
+    }
+
+    /// Whether the way of an initiator is free of obstacles and of the chain's own parts
+    /// (pitfall 8).
+    fn judge_initiator(&self, k: usize, to: Point<D>) -> Result<(), Refusal> {
+        if self.rules.rotation == Rotation::Literal && self.obstacles.is_empty() {
+            return Ok(());
+        }
+        let from = self.chain.points()[k];
+        let radius_m = self.chain.connectors()[k].radius_m;
+        let near = swept([from, from, to, to], radius_m);
+        let mut worst: Option<(f64, Refusal)> = None;
+        self.visit_blocks(&near, (None, k), |block| {
+            let keep_m = block.radius_m + radius_m;
+            if !block.stops_tip || block.core.is_clear_of_segment([from, to], needed_m(keep_m)) {
+                return;
+            }
+            let before_m = keep_m - block.core.nearest_to_point(from).distance_m;
+            let after_m = keep_m - block.core.nearest_to_point(to).distance_m;
+            let was_inside = before_m > TOLERANCE_M;
+            if was_inside && after_m <= before_m {
+                return;
+            }
+            let reason = if was_inside { Reason::Inside } else { Reason::TargetBlocked };
+            if worst.as_ref().is_none_or(|(depth_m, _)| after_m > *depth_m) {
+                worst = Some((after_m, Refusal::by(reason, block.name)));
+            }
+        });
+        worst.map_or(Ok(()), |(_, refusal)| Err(refusal))
+    }
+}
+
+/// Brings the targets to where the heads may be, or says who may not be there.
+fn project<const D: usize>(
+    chain: &Chain<D>,
+    heads: &mut Heads<D>,
+    mode: Mode,
+) -> Result<(), Objection> {
+    for (h, k) in heads.indices().enumerate() {
+        let (connector, at) = (&chain.connectors()[k], chain.points()[k]);
+        if heads.to[h] == at {
+            continue;
+        }
+        if connector.is_still() && distance(heads.to[h], at) > chain.least_move_m() {
+            return Err((k, Refusal::of(connector.why_still())));
+        }
+        if !connector.mobility.allows(heads.to[h], at) {
+            if mode == Mode::Exact || heads.n > 1 {
+                return Err((k, Refusal::of(Reason::Mobility)));
+            }
+            heads.to[h] = connector.mobility.project(heads.to[h], at);
+        }
+    }
+    Ok(())
+}
+
+fn rod_box<const D: usize>(
+    chain: &Chain<D>,
+    i: usize,
+    at: impl Fn(usize) -> Point<D>,
+) -> Bounds<D> {
+    // Rods are no thicker than their connectors.
+    let radius_m = chain.connectors()[i].radius_m.max(chain.connectors()[i + 1].radius_m);
+    Bounds::of(&[at(i), at(i + 1)]).grown(radius_m)
+}
+
+fn veto<const D: usize>(chain: &Chain<D>, from: usize, by: usize, refusal: Refusal) -> Veto<D> {
+    let Refusal { reason, obstacle } = refusal;
+    Veto { by, from, reason, obstacle, reached: chain.points()[from] }
+}
+
+fn check<const D: usize>(chain: &Chain<D>, heads: &Heads<D>) -> Result<(), InputError> {
+    if heads.first + heads.n > chain.points().len() {
+        return Err(InputError::new(
+            "initiator",
+            format!(
+                "is number {}, and the chain has {} connectors",
+                heads.first,
+                chain.points().len()
+            ),
+            "count from 0",
+        ));
+    }
+    heads.to.iter().find(|to| !is_in_range(to)).map_or(Ok(()), |to| Err(out_of_range(to)))
+}
+
+#[cfg(test)]
+mod tests;

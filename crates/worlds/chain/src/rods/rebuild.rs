@@ -1,0 +1,233 @@
+//! Re-forming a broken chain (slide F3): the parts between two whole ends are scattered, or some
+//! of them are gone.
+//!
+//! Passes from the one stub to the other and back, each slave by push, pull and resize, bring
+//! every rod into its limits; the whole ends keep every bit. Where the gap is longer than the
+//! parts that are left, one end must come, and only an end that may.
+
+use super::candidates::guided;
+use super::chain::{Chain, LENGTH_TOLERANCE_M, Rod};
+use super::geometry::{Point, between, distance};
+use super::obstacle::Obstacles;
+use super::pass::Direction;
+use super::propagate::Propagator;
+use super::scene::fits;
+use super::veto::Request;
+use sidestep_kernel::InputError;
+use std::ops::RangeInclusive;
+
+/// Double passes before it is given up. The worst case measured took 120.
+const MAX_DOUBLE_PASSES: usize = 1_000;
+/// A gap of this part of what the scattered parts reach stretches them out.
+const STRETCHED: f64 = 0.999;
+/// An end that comes leaves a gap of this part of what the scattered parts reach.
+const SLACK_LEFT: f64 = 0.95;
+
+/// Which whole end may come where the gap is too long.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MayCome {
+    /// None.
+    Nobody,
+    /// The one with connector 0.
+    First,
+    /// The one with the last connector.
+    Last,
+}
+
+/// What came of re-forming.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Reformed {
+    /// All rods are within their limits again.
+    Whole {
+        /// Passes there and back.
+        double_passes: usize,
+    },
+    /// The parts between the ends are too short; nothing has changed.
+    GapTooLong {
+        /// How far the parts reach.
+        have_m: f64,
+        /// How far they would have to.
+        need_m: f64,
+    },
+    /// Passes did not bring it together; nothing has changed.
+    NotReached {
+        /// What the worst rod was off by.
+        off_m: f64,
+    },
+}
+
+/// Brings the scattered connectors of a chain back between the two whole ends beside them.
+/// An end that may come is pulled as a chain of its own; the other keeps every bit. No obstacle
+/// is looked at: move the whole chain afterwards to avoid them.
+///
+/// # Errors
+/// Scattered connectors that the chain does not have, or with no connector beside them on both
+/// sides.
+pub fn reform<const D: usize>(
+    chain: &mut Chain<D>,
+    scattered: RangeInclusive<usize>,
+    may_come: MayCome,
+) -> Result<Reformed, InputError> {
+    let (first, last) = (*scattered.start(), *scattered.end());
+    if first == 0 || last + 1 >= chain.points().len() || first > last {
+        return Err(InputError::new(
+            "scattered connectors",
+            format!("are {first} to {last}, of a chain of {}", chain.points().len()),
+            "leave a whole end on both sides",
+        ));
+    }
+    let before = chain.points().to_vec();
+    let (low, high) = (first - 1, last + 1);
+    let have_m: f64 = chain.rods()[low..high].iter().map(|r| r.max_m).sum();
+    let need_m = distance(chain.points()[low], chain.points()[high]);
+    if need_m > have_m + LENGTH_TOLERANCE_M {
+        match may_come {
+            MayCome::Nobody => return Ok(Reformed::GapTooLong { have_m, need_m }),
+            MayCome::First => pull_end(chain, 0..=low, high, have_m)?,
+            MayCome::Last => pull_end(chain, high..=chain.points().len() - 1, low, have_m)?,
+        }
+    }
+    lay_out(chain, low, high, have_m);
+    for double_passes in 0..=MAX_DOUBLE_PASSES {
+        if (low..high).all(|i| fits(chain.rods()[i], chain.length_m(i))) {
+            return Ok(Reformed::Whole { double_passes });
+        }
+        pass(chain, low, high, Direction::Up);
+        pass(chain, high, low, Direction::Down);
+    }
+    let off_m = chain.max_rod_violation_m();
+    chain.points_mut().copy_from_slice(&before);
+    Ok(Reformed::NotReached { off_m })
+}
+
+/// Where the parts reach across the gap only just, they lie on the straight line between the
+/// stubs: passes would come near that for ever.
+fn lay_out<const D: usize>(chain: &mut Chain<D>, low: usize, high: usize, have_m: f64) {
+    let [a, b] = [chain.points()[low], chain.points()[high]];
+    let part = distance(a, b) / have_m;
+    let fit = |rod: &Rod| fits(*rod, part * rod.max_m);
+    if part < STRETCHED || !chain.rods()[low..high].iter().all(fit) {
+        return;
+    }
+    let mut way_m = 0.0;
+    for i in low..high - 1 {
+        way_m += chain.rods()[i].max_m;
+        chain.points_mut()[i + 1] = between(a, b, way_m / have_m);
+    }
+}
+
+/// From one stub to the connector before the other.
+fn pass<const D: usize>(chain: &mut Chain<D>, from: usize, to: usize, direction: Direction) {
+    let least_move_m = chain.least_move_m();
+    let mut master = from;
+    let mut mo = chain.points()[from];
+    while let Some(slave) = direction.next(master, chain.points().len()).filter(|&s| s != to) {
+        let (mn, so) = (chain.points()[master], chain.points()[slave]);
+        let rod = chain.rod_between(master, slave);
+        chain.points_mut()[slave] = guided([mo, mn, so], rod, least_move_m);
+        (master, mo) = (slave, so);
+    }
+}
+
+/// Pulls a whole end, as a chain of its own, until the parts reach across the gap.
+fn pull_end<const D: usize>(
+    chain: &mut Chain<D>,
+    end: RangeInclusive<usize>,
+    other_stub: usize,
+    have_m: f64,
+) -> Result<(), InputError> {
+    let (low, high) = (*end.start(), *end.end());
+    let stub = if low == 0 { high } else { low };
+    let (at, to) = (chain.points()[stub], chain.points()[other_stub]);
+    // Passes converge slowly where the parts are stretched out, so they get some slack.
+    let part = 1.0 - SLACK_LEFT * have_m / distance(at, to);
+    let target: Point<D> = between(at, to, part);
+    let mut alone = Chain::broken(
+        chain.points()[low..=high].to_vec(),
+        chain.connectors()[low..=high].to_vec(),
+        chain.rods()[low..high].to_vec(),
+    )?;
+    let request = Request::exact(stub - low, target);
+    let _ = Propagator::default().propagate(&mut alone, &Obstacles::default(), &request)?;
+    chain.points_mut()[low..=high].copy_from_slice(alone.points());
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::chain::Connector;
+    use super::super::geometry::add;
+    use super::*;
+    use crate::scenes::Numbers;
+
+    fn broken<const D: usize>(seed: u64, scattered: RangeInclusive<usize>, by_m: f64) -> Chain<D> {
+        let mut numbers = Numbers::new(seed);
+        let mut points: Vec<Point<D>> = (0..40)
+            .map(|i| {
+                let mut p = [0.0; D];
+                p[0] = i as f64;
+                p
+            })
+            .collect();
+        for i in scattered {
+            points[i] = add(points[i], numbers.point(by_m));
+        }
+        let rod = Rod { min_m: 0.9, max_m: 1.1, radius_m: 0.0 };
+        Chain::broken(points, vec![Connector::free(0.0); 40], vec![rod; 39]).unwrap()
+    }
+
+    #[test]
+    fn scattered_parts_come_back_and_the_ends_keep_every_bit() {
+        for seed in 0..60 {
+            let n = [4, 10, 20][seed as usize % 3];
+            let scattered = 20 - n / 2..=20 + n / 2 - 1;
+            let mut chain =
+                broken::<2>(seed, scattered.clone(), [1.0, 10.0, 100.0][seed as usize / 20]);
+            let before = chain.clone();
+            let came = reform(&mut chain, scattered.clone(), MayCome::Nobody).unwrap();
+            assert!(matches!(came, Reformed::Whole { .. }), "{seed}: {came:?}");
+            assert!(chain.max_rod_violation_m() <= 1e-9);
+            assert_eq!(chain.points()[..*scattered.start()], before.points()[..*scattered.start()]);
+            assert_eq!(
+                chain.points()[scattered.end() + 1..],
+                before.points()[scattered.end() + 1..]
+            );
+        }
+    }
+
+    /// As a chain is laid out by a scenario: every rod at its greatest length.
+    #[test]
+    fn parts_that_only_just_reach_across_lie_on_a_line() {
+        for (rod_m, n) in [(1.1, 40), (0.3, 30), (0.7, 12)] {
+            let rod = Rod { min_m: 0.9 * rod_m, max_m: rod_m, radius_m: 0.0 };
+            let mut chain =
+                Chain::straight([0.0; 2], [1.0, 0.0], n - 1, rod, Connector::free(0.0)).unwrap();
+            let mut numbers = Numbers::new(n as u64);
+            for p in &mut chain.points_mut()[3..n - 2] {
+                *p = add(*p, numbers.point(5.0));
+            }
+            let came = reform(&mut chain, 3..=n - 3, MayCome::Nobody).unwrap();
+            assert_eq!(came, Reformed::Whole { double_passes: 0 });
+            assert!(chain.max_rod_violation_m() <= 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_gap_too_long_is_named_unless_an_end_may_come() {
+        let mut chain = broken::<3>(1, 18..=21, 3.0);
+        // Two parts are missing: the far end is two rods further away.
+        for p in &mut chain.points_mut()[22..] {
+            p[0] += 2.0;
+        }
+        let before = chain.clone();
+        let told = reform(&mut chain, 18..=21, MayCome::Nobody).unwrap();
+        let Reformed::GapTooLong { have_m, need_m } = told else { panic!("{told:?}") };
+        assert!((have_m - 5.5).abs() < 1e-12 && (need_m - 7.0).abs() < 1e-12);
+        assert_eq!(chain, before);
+        let came = reform(&mut chain, 18..=21, MayCome::Last).unwrap();
+        assert!(matches!(came, Reformed::Whole { .. }), "{came:?}");
+        assert!(chain.max_rod_violation_m() <= 1e-9);
+        assert_eq!(chain.points()[..18], before.points()[..18]);
+        assert!(reform(&mut chain, 0..=3, MayCome::Nobody).is_err());
+    }
+}

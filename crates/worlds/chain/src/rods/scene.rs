@@ -1,0 +1,289 @@
+//! What one slave perceives and may do: the judge of every position of a chain's part.
+//!
+//! A slave's reaction depends on its master's move, its own place, the rod before, and what is
+//! near (slide E4), never on anything further along the chain.
+
+use super::chain::{Chain, LENGTH_TOLERANCE_M, Rod};
+use super::geometry::{Bounds, Core, Point, angle_rad, distance, sub};
+use super::obstacle::{Obstacles, swept};
+use super::own_body::OwnBody;
+use super::rules::Rules;
+use super::sweep::Sweep;
+use super::veto::Reason;
+use std::f64::consts::PI;
+
+/// Clearance that a turn aims at, meters. Ten times the tolerance at least: otherwise the next
+/// step starts "inside" (pitfall 4).
+pub const SKIN_M: f64 = 1e-7;
+/// Penetration that counts as contact, meters.
+pub const TOLERANCE_M: f64 = 1e-9;
+/// Bends are within their limits to this.
+pub const BEND_TOLERANCE_RAD: f64 = 1e-9;
+/// What touches a body without any thickness.
+const TOUCH_M: f64 = 1e-12;
+
+/// New positions before they are accepted: a run of connectors around the initiator.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Overlay<const D: usize> {
+    points: Vec<Point<D>>,
+    /// First and one past the last connector that has a new position.
+    pub(super) from: usize,
+    pub(super) to: usize,
+}
+
+impl<const D: usize> Overlay<D> {
+    pub(super) fn start(&mut self, n: usize, first: usize) {
+        self.points.resize(n, [0.0; D]);
+        (self.from, self.to) = (first, first);
+    }
+
+    /// Gives a connector of the run, or one beside it, a position.
+    pub(super) fn set(&mut self, i: usize, p: Point<D>) {
+        debug_assert!(self.from <= i + 1 && i <= self.to, "the run would have a gap");
+        self.points[i] = p;
+        (self.from, self.to) = (self.from.min(i), self.to.max(i + 1));
+    }
+
+    pub(super) fn get(&self, i: usize) -> Option<Point<D>> {
+        (self.from <= i && i < self.to).then(|| self.points[i])
+    }
+
+    pub(super) fn placed(&self) -> &[Point<D>] {
+        &self.points[self.from..self.to]
+    }
+}
+
+/// What stands in the way.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Block<const D: usize> {
+    pub(super) core: Core<D>,
+    pub(super) radius_m: f64,
+    pub(super) name: Name,
+    /// Whether it is in the way of the rod, and of the connector at its end.
+    pub(super) stops_rod: bool,
+    pub(super) stops_tip: bool,
+}
+
+/// Whose part it is; the order breaks ties.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Name {
+    Obstacle(u32),
+    OwnRod(usize),
+    OwnConnector(usize),
+}
+
+impl Name {
+    pub(super) fn obstacle(self) -> Option<u32> {
+        match self {
+            Self::Obstacle(id) => Some(id),
+            Self::OwnRod(_) | Self::OwnConnector(_) => None,
+        }
+    }
+}
+
+/// An objection, before anybody knows how far the motion got.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Refusal {
+    pub(super) reason: Reason,
+    pub(super) obstacle: Option<u32>,
+}
+
+impl Refusal {
+    pub(super) fn of(reason: Reason) -> Self {
+        Self { reason, obstacle: None }
+    }
+
+    pub(super) fn by(reason: Reason, name: Name) -> Self {
+        let reason = if name.obstacle().is_none() { Reason::SelfCollision } else { reason };
+        Self { reason, obstacle: name.obstacle() }
+    }
+}
+
+/// A master that moved, and its slave.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Step<const D: usize> {
+    pub(super) master: usize,
+    pub(super) slave: usize,
+    /// The master before and after, and the slave before.
+    pub(super) mo: Point<D>,
+    pub(super) mn: Point<D>,
+    pub(super) so: Point<D>,
+    /// The connector on the master's other side, where its place is settled.
+    pub(super) prev: Option<Point<D>>,
+    pub(super) rod: Rod,
+    /// Radius of the slave's body and bend limit of the master.
+    pub(super) tip_radius_m: f64,
+    pub(super) max_bend_rad: f64,
+}
+
+impl<const D: usize> Step<D> {
+    fn sweep(&self, s: Point<D>) -> Sweep<D> {
+        Sweep { from: [self.mo, self.so], to: [self.mn, s] }
+    }
+
+    pub(super) fn bends_at(&self, s: Point<D>) -> bool {
+        let Some(prev) = self.prev else { return true };
+        self.max_bend_rad >= PI
+            || angle_rad(sub(self.mn, prev), sub(s, self.mn))
+                <= self.max_bend_rad + BEND_TOLERANCE_RAD
+    }
+}
+
+/// What must be kept between a body and an obstacle so that they only touch.
+pub(crate) fn needed_m(radius_m: f64) -> f64 {
+    (radius_m - TOLERANCE_M).max(TOUCH_M)
+}
+
+/// Everything a motion reads.
+pub(super) struct Scene<'a, const D: usize> {
+    pub(super) chain: &'a Chain<D>,
+    pub(super) obstacles: &'a Obstacles<D>,
+    pub(super) rules: &'a Rules,
+    pub(super) overlay: &'a Overlay<D>,
+    pub(super) own: &'a OwnBody<D>,
+}
+
+impl<'a, const D: usize> Scene<'a, D> {
+    /// Where a connector is now: its new place if it has one.
+    pub(super) fn at(&self, i: usize) -> Point<D> {
+        self.overlay.get(i).unwrap_or(self.chain.points()[i])
+    }
+
+    /// Visits what may be in the way of a rod and the connector at its end. A rod that does not
+    /// exist (`rod` of `None`) stands for the connector alone.
+    pub(super) fn visit_blocks(
+        &self,
+        near: &Bounds<D>,
+        (rod, tip): (Option<usize>, usize),
+        mut look: impl FnMut(&Block<D>),
+    ) {
+        self.obstacles.visit(near, |o| {
+            look(&Block {
+                core: o.core,
+                radius_m: o.radius_m,
+                name: Name::Obstacle(o.id),
+                stops_rod: true,
+                stops_tip: true,
+            });
+        });
+        if self.rules.self_collision {
+            self.own.visit(near, |other| {
+                for block in self.own_blocks(other, rod, tip).into_iter().flatten() {
+                    look(&block);
+                }
+            });
+        }
+    }
+
+    /// A rod of the chain and its connectors (the last rod's both) as obstacles to another.
+    /// Neighbors are exempt: they touch by construction.
+    fn own_blocks(&self, other: usize, rod: Option<usize>, tip: usize) -> [Option<Block<D>>; 3] {
+        let connectors = self.chain.connectors();
+        let connector = |c: usize| {
+            let far_from_rod = rod.is_some_and(|r| c + 1 < r || c > r + 2);
+            Block {
+                core: Core::Point(self.at(c)),
+                radius_m: connectors[c].radius_m,
+                name: Name::OwnConnector(c),
+                stops_rod: far_from_rod,
+                stops_tip: c.abs_diff(tip) > 1,
+            }
+        };
+        let own_rod = Block {
+            core: Core::Segment([self.at(other), self.at(other + 1)]),
+            radius_m: self.chain.rods()[other].radius_m,
+            name: Name::OwnRod(other),
+            stops_rod: rod.is_some_and(|r| other.abs_diff(r) > 2),
+            stops_tip: tip + 1 < other || tip > other + 2,
+        };
+        let is_last = other + 2 == connectors.len();
+        [Some(own_rod), Some(connector(other)), is_last.then(|| connector(other + 1))]
+            .map(|b| b.filter(|b| b.stops_rod || b.stops_tip))
+    }
+
+    /// Whether the slave may be at `s`; the first objection otherwise.
+    pub(super) fn judge(&self, step: &Step<D>, s: Point<D>) -> Result<(), Refusal> {
+        if !step.bends_at(s) {
+            return Err(Refusal::of(Reason::BendLimit));
+        }
+        let longest_m = self.rules.slave_step_max_m;
+        if longest_m < f64::INFINITY && distance(step.so, s) > longest_m {
+            return Err(Refusal::of(Reason::StepLimit));
+        }
+        let reach_m = step.rod.radius_m.max(step.tip_radius_m);
+        let near = swept([step.mo, step.so, step.mn, s], reach_m);
+        let mut worst: Option<(f64, Name, Reason)> = None;
+        let rod = step.master.min(step.slave);
+        let way_m = step.sweep(s).longest_way_m();
+        self.visit_blocks(&near, (Some(rod), step.slave), |block| {
+            if let Some((depth_m, reason)) = objection(step, s, way_m, block) {
+                let deeper = worst
+                    .is_none_or(|(w, name, _)| depth_m > w || (depth_m == w && block.name < name));
+                if deeper {
+                    worst = Some((depth_m, block.name, reason));
+                }
+            }
+        });
+        worst.map_or(Ok(()), |(_, name, reason)| Err(Refusal::by(reason, name)))
+    }
+
+    /// Whether the slave stays where it is allowed to be.
+    pub(super) fn may_be_at(&self, i: usize, p: Point<D>) -> bool {
+        let connector = &self.chain.connectors()[i];
+        if connector.is_still() {
+            return p == self.chain.points()[i];
+        }
+        connector.mobility.allows(p, p)
+    }
+}
+
+/// How deep a rod or its end is in a block, and what that is called; `None` where all is well.
+/// No point of the rod goes further than `way_m`.
+fn objection<const D: usize>(
+    step: &Step<D>,
+    s: Point<D>,
+    way_m: f64,
+    block: &Block<D>,
+) -> Option<(f64, Reason)> {
+    let (rod, core) = ([step.mn, s], &block.core);
+    let rod_m = block.radius_m + step.rod.radius_m;
+    let tip_m = block.radius_m + step.tip_radius_m;
+    let tip_is_clear = !block.stops_tip || core.is_clear_of_point(s, needed_m(tip_m));
+    let sure_m = needed_m(rod_m).max(Sweep::<D>::sure_m(way_m, rod_m));
+    if tip_is_clear && (!block.stops_rod || core.is_clear_of_segment(rod, sure_m)) {
+        return None;
+    }
+    let rod_is_clear = !block.stops_rod || core.is_clear_of_segment(rod, needed_m(rod_m));
+    if rod_is_clear && tip_is_clear {
+        let passes =
+            step.sweep(s).is_clear_on_the_way(core, rod_m, way_m) || was_inside(step, block);
+        return (!passes).then_some((0.0, Reason::WouldTunnel));
+    }
+    let (now_m, before_m) =
+        (depth_m(step.mn, s, step, block), depth_m(step.mo, step.so, step, block));
+    // Who starts inside may not go deeper.
+    if before_m > TOLERANCE_M && now_m <= before_m {
+        return None;
+    }
+    let reason = if before_m > TOLERANCE_M { Reason::Inside } else { Reason::BothSidesBlocked };
+    Some((now_m, reason))
+}
+
+fn was_inside<const D: usize>(step: &Step<D>, block: &Block<D>) -> bool {
+    depth_m(step.mo, step.so, step, block) > TOLERANCE_M
+}
+
+/// How deep a rod, or the connector at its end, is in a block; negative outside.
+fn depth_m<const D: usize>(m: Point<D>, s: Point<D>, step: &Step<D>, block: &Block<D>) -> f64 {
+    let rod_m =
+        block.radius_m + step.rod.radius_m - block.core.nearest_to_segment([m, s]).distance_m;
+    let tip_m = block.radius_m + step.tip_radius_m - block.core.nearest_to_point(s).distance_m;
+    let rod_m = if block.stops_rod { rod_m } else { f64::NEG_INFINITY };
+    let tip_m = if block.stops_tip { tip_m } else { f64::NEG_INFINITY };
+    rod_m.max(tip_m)
+}
+
+/// Whether a rod's length is within its limits, to the tolerance.
+pub(crate) fn fits(rod: Rod, length_m: f64) -> bool {
+    (rod.min_m - LENGTH_TOLERANCE_M..=rod.max_m + LENGTH_TOLERANCE_M).contains(&length_m)
+}

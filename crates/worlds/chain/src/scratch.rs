@@ -1,0 +1,108 @@
+//! What a worker keeps between tasks: buffers, and obstacles as they are at a moment.
+
+use super::events::Event;
+use super::formation::Solid;
+use super::motion::escape::Escaper;
+use super::rods::geometry::{Point, in_dimensions};
+use super::rods::obstacle::{Obstacle, Obstacles};
+use super::rods::propagate::Propagator;
+use super::state::ChainState;
+use super::swarm::laser::{Body as Seen, Scan};
+use super::world::{ChainWorld, OTHER_CHAIN, push_parts};
+use sidestep_kernel::{Cycle, Slot};
+
+/// What a worker keeps between tasks.
+#[derive(Debug, Clone)]
+pub struct Scratch<const D: usize> {
+    pub(crate) propagator: Propagator<D>,
+    pub(crate) escaper: Option<Escaper<D>>,
+    /// The world's obstacles, with those that move where they are at the begin of `moment`, and
+    /// the parts of other chains.
+    pub(crate) obstacles: Obstacles<D>,
+    /// The same without other chains, where there are any.
+    solid: Obstacles<D>,
+    moment: Option<Cycle>,
+    /// Obstacles that move, and parts of other chains.
+    guests: Vec<Obstacle<D>>,
+    has_others: bool,
+    /// Robots around a robot.
+    pub(crate) seen: Vec<Seen>,
+    pub(crate) scan: Scan,
+    /// Positions before a cycle.
+    pub(crate) before: Vec<Point<D>>,
+    /// The least air around a robot in this cycle.
+    pub(crate) robots_gap_m: f64,
+    /// Positions after parts got out of the way.
+    pub(crate) escaped: Vec<Point<D>>,
+    /// What happened.
+    pub(crate) events: Vec<Event>,
+}
+
+impl<const D: usize> Scratch<D> {
+    /// A scratch that has gathered nothing yet.
+    pub(crate) fn new(world: &ChainWorld<D>) -> Self {
+        Self {
+            propagator: Propagator::new(world.rules),
+            escaper: world.escape.map(Escaper::new),
+            obstacles: world.obstacles.clone(),
+            solid: world.obstacles.clone(),
+            moment: None,
+            guests: Vec::new(),
+            has_others: false,
+            seen: Vec::new(),
+            scan: Scan::default(),
+            before: Vec::new(),
+            robots_gap_m: f64::INFINITY,
+            escaped: Vec::new(),
+            events: Vec::new(),
+        }
+    }
+
+    /// Puts the movers where they are at the begin of cycle `moment`, and other chains where they
+    /// are now.
+    pub(crate) fn gather(
+        &mut self,
+        world: &ChainWorld<D>,
+        state: &ChainState<D>,
+        moment: Cycle,
+        others: impl Iterator<Item = Slot>,
+    ) {
+        const CHECKED: &str = "movers and chains were checked when the scenario was compiled";
+        let mut others = others.peekable();
+        let has_others = others.peek().is_some();
+        if self.moment == Some(moment) && !self.has_others && !has_others {
+            return;
+        }
+        self.guests.clear();
+        let movers = world.movers.at(world.starts_s(moment));
+        self.guests.extend(movers.filter(Obstacle::is_in_range));
+        let movers = self.guests.len();
+        let others: Vec<Slot> = others.collect();
+        if has_others {
+            others.iter().for_each(|&slot| push_robots(&mut self.guests, slot, state));
+            self.solid.set_moving(&self.guests).expect(CHECKED);
+            self.guests.truncate(movers);
+        }
+        for slot in others {
+            push_parts(&mut self.guests, slot, &state.body(slot as usize).chain);
+        }
+        self.obstacles.set_moving(&self.guests).expect(CHECKED);
+        (self.moment, self.has_others) = (Some(moment), has_others);
+    }
+
+    /// What is solid to robots: other chains are their robots, not their rods.
+    pub(crate) fn solid(&self) -> &Obstacles<D> {
+        if self.has_others { &self.solid } else { &self.obstacles }
+    }
+}
+
+/// What of a chain robots can touch: its robots, or its parts where it has none.
+fn push_robots<const D: usize>(parts: &mut Vec<Obstacle<D>>, slot: Slot, state: &ChainState<D>) {
+    let body = state.body(slot as usize);
+    if body.robots.is_empty() {
+        return push_parts(parts, slot, &body.chain);
+    }
+    let solid =
+        |solid: Solid| Obstacle::ball(OTHER_CHAIN + slot, in_dimensions(solid.at), solid.radius_m);
+    parts.extend(body.solids().map(|(_, robot)| solid(robot)));
+}

@@ -1,0 +1,220 @@
+//! *Act*: the bodies of a group act one after the other; the environment decides.
+
+use super::effector::{Action, ObstacleRule, Side, Walk};
+use super::scene::{Scene, all_free, at};
+use super::state::{BodyCell, contact_word};
+use super::world::Role;
+use super::{Event, EventKind, MotionSample, Scratch};
+use sidestep_kernel::Slot;
+use sidestep_kernel::distr::Categorical;
+use sidestep_kernel::space::BoxWord;
+
+/// What a walk comes to in the present state.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Verdict {
+    /// Steps that are made.
+    pub(super) steps: usize,
+    /// Kind and side of what stopped it.
+    pub(super) contact: Option<(u8, Side)>,
+}
+
+impl<T: BoxWord> Scene<'_, T> {
+    /// One body acts with the draw of its own stream.
+    #[inline]
+    pub(super) fn act_drawn(&self, slot: Slot, scratch: &mut Scratch) {
+        let [word, _] = self.act_words(self.cell(slot).id);
+        self.act(slot, word, scratch);
+    }
+
+    /// One body acts on the state as left by those before it; `word` is its draw.
+    #[inline]
+    pub(super) fn act(&self, slot: Slot, word: u32, scratch: &mut Scratch) {
+        let cell = self.cell(slot);
+        if cell.intent.get().is_idle() {
+            return;
+        }
+        let body = self.type_of(cell);
+        let Some(action) = body.actions.get(usize::from(cell.action.get())) else {
+            return self.toggle(slot, scratch);
+        };
+        let drawn = match self.world.obstacle_rule {
+            ObstacleRule::Cut | ObstacleRule::Stay => action.distribution.sample(word),
+            ObstacleRule::Renormalise => match self.rescaled(action, slot) {
+                Ok(distribution) => distribution.sample(word),
+                Err(blocked) => blocked,
+            },
+        };
+        let walk = &action.walks[drawn];
+        if all_free(self.floor, self.base(cell), &walk.whole.enter) {
+            self.make_whole(walk, slot);
+            if scratch.keep_samples {
+                let verdict = Verdict { steps: walk.steps.len(), contact: None };
+                self.sample_motion(walk, verdict, cell, scratch);
+            }
+        } else {
+            self.blocked(walk, slot, scratch);
+        }
+    }
+
+    /// Makes all of a walk that meets nothing.
+    #[inline]
+    fn make_whole(&self, walk: &Walk, slot: Slot) {
+        let (floor, cell) = (self.floor, self.cell(slot));
+        let base = self.base(cell);
+        cell.contact.set(0);
+        if walk.turn != 0 {
+            cell.facing.set((cell.facing.get() + walk.turn) % 4);
+        }
+        if walk.steps.is_empty() {
+            return;
+        }
+        let whole = &walk.whole;
+        whole.leave.iter().for_each(|&offset| floor.set(at(base, offset), T::FREE));
+        whole.fill.iter().for_each(|&offset| floor.set(at(base, offset), T::standing(slot)));
+        cell.anchor.set(cell.at().offset(whole.delta.0, whole.delta.1).word());
+        cell.moves.set(cell.moves.get() + walk.steps.len() as u32);
+        if self.type_of(cell).marks {
+            let new = |&offset: &i32| self.state.visited.insert(at(base, offset));
+            let first_visits = whole.enter.iter().filter(|offset| new(offset)).count();
+            cell.first_visits.set(cell.first_visits.get() + first_visits as u32);
+        }
+    }
+
+    /// A walk that may be cut short by something in the way.
+    fn blocked(&self, walk: &Walk, slot: Slot, scratch: &mut Scratch) {
+        let cell = self.cell(slot);
+        let verdict = self.judge(walk, slot);
+        let is_mover = matches!(self.type_of(cell).role, Role::Mover(_));
+        let made = match self.world.obstacle_rule {
+            _ if verdict.contact.is_none() => verdict.steps,
+            ObstacleRule::Cut if !is_mover => verdict.steps,
+            _ => 0,
+        };
+        self.make(walk, made, slot);
+        if is_mover {
+            return;
+        }
+        if scratch.keep_samples {
+            let made = Verdict { steps: made, ..verdict };
+            self.sample_motion(walk, made, cell, scratch);
+        }
+        match verdict.contact {
+            None => {
+                cell.contact.set(0);
+                if walk.turn != 0 {
+                    cell.facing.set((cell.facing.get() + walk.turn) % 4);
+                }
+            }
+            Some((kind, side)) => self.touch(cell, kind, side, scratch),
+        }
+    }
+
+    /// Notes a contact in the body's cell, in its counters and, where anybody wants it, as event.
+    fn touch(&self, cell: &BodyCell, kind: u8, side: Side, scratch: &mut Scratch) {
+        cell.contact.set(contact_word(kind, side as u8));
+        let (body, kinds) = (cell.id, self.world.kinds.len());
+        self.state.contacts.add(body as usize * kinds + usize::from(kind), 1);
+        if scratch.keep_events {
+            let event = EventKind::Contact { kind, side };
+            scratch.events.push(Event { cycle: self.now, body, event });
+        }
+    }
+
+    /// How far a walk gets: to the first step that enters a box that is not free.
+    #[inline]
+    fn judge(&self, walk: &Walk, slot: Slot) -> Verdict {
+        let base = self.base(self.cell(slot));
+        for (steps, step) in walk.steps.iter().enumerate() {
+            for &offset in &step.enter {
+                let word = self.floor.get(at(base, offset));
+                // A path that turns back enters boxes that the body itself still covers.
+                if !word.is_free() && word.slot() != slot {
+                    let contact = Some((self.state.kind_of(word), step.side));
+                    return Verdict { steps, contact };
+                }
+            }
+        }
+        Verdict { steps: walk.steps.len(), contact: None }
+    }
+
+    /// Makes the first `steps` steps of a walk.
+    #[inline]
+    fn make(&self, walk: &Walk, steps: usize, slot: Slot) {
+        if steps == 0 {
+            return;
+        }
+        let (floor, cell) = (self.floor, self.cell(slot));
+        let (base, marks) = (self.base(cell), self.type_of(cell).marks);
+        let (mut moved, mut first_visits) = (cell.at(), 0);
+        for step in &walk.steps[..steps] {
+            step.leave.iter().for_each(|&offset| floor.set(at(base, offset), T::FREE));
+            for &offset in &step.enter {
+                let index = at(base, offset);
+                floor.set(index, T::standing(slot));
+                first_visits += u32::from(marks && self.state.visited.insert(index));
+            }
+            moved = moved.offset(step.delta.0, step.delta.1);
+        }
+        cell.anchor.set(moved.word());
+        cell.moves.set(cell.moves.get() + steps as u32);
+        cell.first_visits.set(cell.first_visits.get() + first_visits);
+    }
+
+    /// The distribution over the walks that are not blocked here, or the first blocked one
+    /// when none is left.
+    fn rescaled(&self, action: &Action, slot: Slot) -> Result<Categorical, usize> {
+        let free = |walk: &Walk| self.judge(walk, slot).contact.is_none();
+        let mut row: Vec<f64> = action
+            .probabilities
+            .iter()
+            .zip(&action.walks)
+            .map(|(&p, walk)| if p > 0.0 && free(walk) { p } else { 0.0 })
+            .collect();
+        let sum: f64 = row.iter().sum();
+        if sum <= 0.0 {
+            return Err(action.probabilities.iter().position(|&p| p > 0.0).unwrap_or(0));
+        }
+        row.iter_mut().for_each(|p| *p /= sum);
+        Ok(Categorical::new(&row).expect("a rescaled row is a distribution"))
+    }
+
+    /// Opens, or closes when nobody stands in the way; otherwise the closing waits.
+    fn toggle(&self, slot: Slot, scratch: &mut Scratch) {
+        let (floor, cell) = (self.floor, self.cell(slot));
+        let (base, own) = (self.base(cell), &self.type_of(cell).own);
+        let opens = cell.facing.get() == 0;
+        if !opens && !all_free(floor, base, own) {
+            return;
+        }
+        let word = if opens { T::FREE } else { T::standing(slot) };
+        own.iter().for_each(|&offset| floor.set(at(base, offset), word));
+        cell.facing.set(u8::from(opens));
+        if scratch.keep_events {
+            let event = if opens { EventKind::Opened } else { EventKind::Closed };
+            scratch.events.push(Event { cycle: self.now, body: cell.id, event });
+        }
+    }
+
+    /// Notes what an action came to, for a log to learn from: the steps and the turn that were
+    /// made, not those that the drawn transition would have made in a free place.
+    fn sample_motion(&self, walk: &Walk, verdict: Verdict, cell: &BodyCell, scratch: &mut Scratch) {
+        let (mut ahead, mut left) = (0, 0);
+        for step in &walk.steps[..verdict.steps] {
+            match step.side {
+                Side::Front => ahead += 1,
+                Side::Back => ahead -= 1,
+                Side::Left => left += 1,
+                Side::Right => left -= 1,
+            }
+        }
+        scratch.motion_samples.push(MotionSample {
+            cycle: self.now,
+            robot: cell.id,
+            action: cell.intent.get().number(),
+            ahead,
+            left,
+            quarter_turns: if verdict.contact.is_none() { walk.turn } else { 0 },
+            contact: verdict.contact.is_some(),
+        });
+    }
+}

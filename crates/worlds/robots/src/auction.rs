@@ -1,0 +1,94 @@
+//! The policy `rounds`: bids on boxes instead of an order within a group.
+//!
+//! A body bids its priority for every box it covers or may come to cover. It acts when its
+//! bid is the highest in all of them: then all that conflict with it and come before it have
+//! acted. So the outcome is that of the policy `random`, whose draws the bids are.
+
+use super::scene::{Scene, at, with_scene};
+use super::world::RobotsWorld;
+use sidestep_kernel::space::{BoxWord, Position};
+use sidestep_kernel::world::Auction;
+use sidestep_kernel::{Slot, Turn};
+use std::sync::atomic::Ordering::Relaxed;
+
+/// A body's bid of one round.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Bid {
+    pub(super) slot: Slot,
+    /// The body's draw of what its action comes to.
+    pub(super) word: u32,
+    /// Where it stood when it bid.
+    at: Position,
+    /// Higher acts first; never 0, unique per body.
+    value: u64,
+}
+
+impl<T: BoxWord> Scene<'_, T> {
+    /// Bids for all that a body covers or may come to cover.
+    fn bid(&self, slot: Slot) -> Bid {
+        let cell = self.cell(slot);
+        let [word, draw] = self.act_words(cell.id);
+        // The smallest (draw, id) acts first.
+        let value = !(u64::from(draw) << 32 | u64::from(cell.id));
+        let bid = Bid { slot, word, at: cell.at(), value };
+        self.for_each_box_of(bid, |index| {
+            self.state.bids[index].fetch_max(value, Relaxed);
+        });
+        bid
+    }
+
+    fn is_highest(&self, bid: Bid) -> bool {
+        let mut highest = true;
+        self.for_each_box_of(bid, |index| {
+            highest &= self.state.bids[index].load(Relaxed) == bid.value;
+        });
+        highest
+    }
+
+    fn retract(&self, bid: Bid) {
+        self.for_each_box_of(bid, |index| self.state.bids[index].store(0, Relaxed));
+    }
+
+    /// All boxes that a bidder covers, or may come to cover if it acts; walls included, which
+    /// nobody contends for.
+    fn for_each_box_of(&self, bid: Bid, mut each: impl FnMut(usize)) {
+        let cell = self.cell(bid.slot);
+        let body = self.type_of(cell);
+        let base = bid.at.index(self.world.stride);
+        let mut all = |boxes: &[i32]| boxes.iter().for_each(|&offset| each(at(base, offset)));
+        all(&body.own);
+        if !cell.intent.get().is_idle()
+            && let Some(action) = body.actions.get(usize::from(cell.action.get()))
+        {
+            all(&action.claims);
+        }
+    }
+}
+
+impl Auction<Self> for RobotsWorld {
+    fn bid(&self, turn: &mut Turn<'_, Self>, body: Slot) {
+        let bid = with_scene!(self, turn.state, turn.now, |scene| scene.bid(body));
+        turn.scratch.bids.push(bid);
+    }
+
+    fn act_on_bids(&self, turn: &mut Turn<'_, Self>, pending: &mut Vec<Slot>) {
+        pending.clear();
+        let bids = std::mem::take(&mut turn.scratch.bids);
+        with_scene!(self, turn.state, turn.now, |scene| {
+            for &bid in &bids {
+                if scene.is_highest(bid) {
+                    scene.act(bid.slot, bid.word, turn.scratch);
+                } else {
+                    pending.push(bid.slot);
+                }
+            }
+        });
+        turn.scratch.bids = bids;
+    }
+
+    fn retract_bids(&self, turn: &mut Turn<'_, Self>) {
+        with_scene!(self, turn.state, turn.now, |scene| {
+            turn.scratch.bids.drain(..).for_each(|bid| scene.retract(bid));
+        });
+    }
+}

@@ -1,0 +1,104 @@
+//! *Join*: who meets whom, and in which order the bodies of a conflict group act.
+
+use super::Scratch;
+use super::policy::ConflictPolicy;
+use super::scene::{Scene, at};
+use super::state::BodyCell;
+use super::world::Role;
+use sidestep_kernel::Slot;
+use sidestep_kernel::conflict::Groups;
+use sidestep_kernel::space::BoxWord;
+
+/// A body's place in the order of its group.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Place {
+    key: (u8, u32, u32),
+    pub(super) slot: Slot,
+    pub(super) word: u32,
+}
+
+impl<T: BoxWord> Scene<'_, T> {
+    /// Joins a body with all whose claims meet its own: a box that it may come to cover names
+    /// another, be it one that stands there or one that may come too.
+    #[inline]
+    pub(super) fn join(&self, slot: Slot, groups: &Groups) {
+        let cell = self.cell(slot);
+        let intent = cell.intent.get();
+        if intent.is_idle() {
+            return;
+        }
+        // A neighbor is often met in several boxes.
+        let mut last_met = slot;
+        let mut meet = |word: T| {
+            let other = word.slot();
+            if other != slot && other != last_met {
+                last_met = other;
+                groups.join(slot, other);
+            }
+        };
+        if !intent.is_clear() {
+            return self.for_each_claimed(slot, |_, word| meet(word));
+        }
+        let base = self.base(cell);
+        let boxes = &*self.type_of(cell).actions[usize::from(cell.action.get())].claims;
+        boxes.iter().for_each(|&offset| meet(self.floor.get(at(base, offset))));
+    }
+
+    /// Fills `scratch.order` with a group in its order of acting, and each body's draw of
+    /// what its action comes to (the priority is drawn beside it).
+    pub(super) fn order(&self, group: &[Slot], scratch: &mut Scratch) {
+        let first = match self.world.policy {
+            ConflictPolicy::RightOfWay => self.first_heading(group),
+            _ => 0,
+        };
+        let order = &mut scratch.order;
+        order.clear();
+        order.extend(group.iter().map(|&slot| {
+            let cell = self.cell(slot);
+            let [word, draw] = self.act_words(cell.id);
+            Place { key: self.priority(cell, draw, first), slot, word }
+        }));
+        order.sort_unstable_by_key(|place| place.key);
+    }
+
+    /// Smaller acts earlier: rank by the policy, fair draw, id. Unique per body.
+    #[inline]
+    fn priority(&self, cell: &BodyCell, draw: u32, first_heading: u8) -> (u8, u32, u32) {
+        let id = cell.id;
+        match self.world.policy {
+            ConflictPolicy::Fixed => (0, 0, id),
+            ConflictPolicy::Random | ConflictPolicy::Rounds => (0, draw, id),
+            ConflictPolicy::ByKind => {
+                (self.world.kind_rank[usize::from(self.type_of(cell).kind)], draw, id)
+            }
+            ConflictPolicy::RightOfWay => {
+                let rank = match self.heading_of(cell) {
+                    // Each heading yields to the one a quarter to its left.
+                    Some(heading) => 1 + (4 + first_heading - heading) % 4,
+                    None => 0,
+                };
+                (rank, draw, id)
+            }
+        }
+    }
+
+    /// Doors have no heading and go first.
+    fn heading_of(&self, cell: &BodyCell) -> Option<u8> {
+        let is_door = matches!(self.type_of(cell).role, Role::Door(_));
+        (!is_door).then(|| cell.facing.get())
+    }
+
+    /// Whoever heads `h` sees on its right those that head `h + 1` (a quarter to the left),
+    /// so a heading begins when the next one is absent; among several, and when all four are
+    /// there, a fair draw per cycle decides.
+    fn first_heading(&self, group: &[Slot]) -> u8 {
+        let mut present = [false; 4];
+        for heading in group.iter().filter_map(|&slot| self.heading_of(self.cell(slot))) {
+            present[usize::from(heading)] = true;
+        }
+        let draw = (self.act_words(u32::MAX)[1] >> 30) as usize;
+        let candidates = (0..4).map(|k| (draw + k) % 4);
+        let begins = |h: &usize| present[*h] && !present[(h + 1) % 4];
+        candidates.clone().find(begins).unwrap_or(draw) as u8
+    }
+}

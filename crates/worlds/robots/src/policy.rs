@@ -1,0 +1,39 @@
+//! In which order the bodies of a conflict group act.
+
+use serde::{Deserialize, Serialize};
+
+/// The order within a conflict group.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ConflictPolicy {
+    /// A fair draw per body and cycle.
+    #[default]
+    Random,
+    /// By entity id.
+    Fixed,
+    /// By the rank of the kind (`kind_order`), then a fair draw.
+    ByKind,
+    /// Who comes from the right goes first; where all four headings meet, a fair draw says
+    /// which heading begins.
+    RightOfWay,
+    /// The fair draw of `random`, but in rounds: whoever has the highest key among its
+    /// neighbors acts, until all have. The same outcome, in parallel inside large groups.
+    Rounds,
+}
+
+impl ConflictPolicy {
+    /// All policies.
+    pub const ALL: [Self; 5] =
+        [Self::Random, Self::Fixed, Self::ByKind, Self::RightOfWay, Self::Rounds];
+
+    /// Its name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Random => "random",
+            Self::Fixed => "fixed",
+            Self::ByKind => "by_kind",
+            Self::RightOfWay => "right_of_way",
+            Self::Rounds => "rounds",
+        }
+    }
+}

@@ -1,0 +1,79 @@
+//! Values of a scenario that check themselves on reading.
+
+use crate::effector::{self, MAX_PATH};
+use serde::{Deserialize, Deserializer};
+use sidestep_scenario::{Rule, Whole, refused};
+
+/// A side of a body in boxes.
+pub(crate) type Side = Whole<1, 64>;
+/// Cycles from one action to the next.
+pub(crate) type Period = Whole<1, { u32::MAX as u64 }>;
+
+/// A side of a box in meters.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct BoxSide;
+
+impl Rule for BoxSide {
+    fn allows(number: f64) -> bool {
+        number > 0.0 && number <= 1000.0
+    }
+
+    fn words() -> String {
+        "a side above 0 m, typically 0.1 to 0.5".into()
+    }
+}
+
+/// Column and row, and the facing if it is not to be drawn.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Placing {
+    pub(crate) at: (u32, u32),
+    pub(crate) facing: Option<u8>,
+}
+
+impl<'de> Deserialize<'de> for Placing {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let numbers = Vec::<u32>::deserialize(deserializer)?;
+        match numbers[..] {
+            [col, row] => Ok(Self { at: (col, row), facing: None }),
+            [col, row, facing] if facing < 4 => {
+                Ok(Self { at: (col, row), facing: Some(facing as u8) })
+            }
+            _ => {
+                let remedy = "write [col, row] or [col, row, heading] with heading 0 east, \
+                              1 north, 2 west, 3 south";
+                Err(refused(format_args!("{numbers:?}"), remedy))
+            }
+        }
+    }
+}
+
+/// Steps of an action: letters F, L, B, R.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Steps(pub(crate) Vec<effector::Side>);
+
+impl<'de> Deserialize<'de> for Steps {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let text = String::deserialize(deserializer)?;
+        let steps: Option<Vec<_>> = text.chars().map(effector::Side::from_letter).collect();
+        let remedy = "write up to 16 letters F, L, B, R, e.g. \"FL\"";
+        let steps = steps.filter(|steps| steps.len() <= MAX_PATH);
+        steps.map(Self).ok_or_else(|| refused(format_args!("{text:?}"), remedy))
+    }
+}
+
+/// Quarters of a full turn to the left, given in degrees.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct QuarterTurns(pub(crate) u8);
+
+impl<'de> Deserialize<'de> for QuarterTurns {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let turn_deg = i32::deserialize(deserializer)?;
+        match turn_deg % 90 {
+            0 => Ok(Self((turn_deg / 90).rem_euclid(4) as u8)),
+            _ => {
+                let remedy = "give a multiple of 90 degrees, positive to the left";
+                Err(refused(turn_deg, remedy))
+            }
+        }
+    }
+}
