@@ -4,26 +4,12 @@ use super::{PondState, PondWorld};
 use sidestep_kernel::ports::{Buffer, Buffers, RowBuffer, Table};
 use sidestep_kernel::{Cycle, Slot};
 
-/// Where a frog is at the start of a cycle.
-#[derive(Debug)]
-struct Place {
-    cycle: Cycle,
-    frog: Slot,
-    at_m: [f64; 2],
-}
-
 /// Something that a frog did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Event {
-<<<<<<< HEAD
     pub(super) cycle: Cycle,
     pub(super) frog: Slot,
     pub(super) what: What,
-=======
-    pub(crate) cycle: Cycle,
-    pub(crate) frog: Slot,
-    pub(crate) what: What,
->>>>>>> f15d14fa7470996f889bc63b6ebb292d0b83c502
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -32,7 +18,6 @@ pub(crate) enum What {
     Bump,
 }
 
-<<<<<<< HEAD
 /// Where a frog sits at the start of a cycle.
 #[derive(Debug)]
 struct Place {
@@ -41,8 +26,6 @@ struct Place {
     at_m: [f64; 2],
 }
 
-=======
->>>>>>> f15d14fa7470996f889bc63b6ebb292d0b83c502
 fn trajectories() -> Table<Place> {
     Table::new("trajectories")
         .u64("cycle", "cycle at whose start this holds", |p: &Place| p.cycle)
@@ -72,14 +55,9 @@ impl Rows {
     }
 
     pub(super) fn poses(&mut self, world: &PondWorld, state: &PondState, now: Cycle) {
-<<<<<<< HEAD
         for (frog, pad) in (0..).zip(state.pad.iter()) {
             self.places.push(Place { cycle: now, frog, at_m: world.place_m(pad) });
         }
-=======
-        let place = |(frog, pad)| Place { cycle: now, frog, at_m: world.place_m(pad) };
-        self.places.extend((0..).zip(state.pad.iter()).map(place));
->>>>>>> f15d14fa7470996f889bc63b6ebb292d0b83c502
     }
 
     pub(super) fn event(&mut self, event: Event) {

@@ -6,10 +6,6 @@ use serde_json::{Value, json};
 use sidestep_kernel::checkpoint::CheckpointError;
 use sidestep_kernel::digest::Hasher;
 use sidestep_kernel::ports::{Buffers, RecordError, Recorder, TableSchema};
-<<<<<<< HEAD
-=======
-use sidestep_kernel::run::Effort;
->>>>>>> f15d14fa7470996f889bc63b6ebb292d0b83c502
 use sidestep_kernel::view::{Axis, Body, Frame, Kind, Look, PlaceRows, Pose, Scenery, Shape};
 use sidestep_kernel::words::{Lines, Said, line};
 use sidestep_kernel::{Cycle, Digest, Effort, World};
