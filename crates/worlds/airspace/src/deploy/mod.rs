@@ -213,7 +213,7 @@ mod tests {
     fn a_network_needs_agents_that_use_it_and_sane_numbers() {
         let wrong = [
             ("direct", "loss = 0.1", "one process decides for all"),
-            ("team", "loss = 1.5", "no probability"),
+            ("team", "loss = 1.5", "give 0 or more and less than 1"),
             ("team", "deadline_s = 4.0", "at most half of dt_s"),
             ("team", "silent = [{ airplane = 9 }]", "ids from 0 to 2"),
         ];
