@@ -4,6 +4,7 @@ mod airplanes;
 mod compile;
 mod network;
 mod settings;
+mod values;
 
 use super::deploy::Deployment;
 use super::flight::Airplane;
@@ -12,7 +13,6 @@ use super::shield::Side;
 use super::state::{AirplaneRecord, FLYING, Snapshot};
 use super::world::{AirspaceWorld, Method};
 use airplanes::{GeneratorSection, ModelSection};
-pub(super) use airplanes::{Measure, TurnRate, Turns};
 use compile::Compiler;
 use network::NetworkSection;
 use serde::{Deserialize, Serialize};
@@ -25,6 +25,7 @@ use sidestep_scenario::{
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use toml::Spanned;
+pub(super) use values::{Measure, TurnRate, Turns};
 
 /// Sets of parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize)]

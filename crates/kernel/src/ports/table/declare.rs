@@ -1,7 +1,8 @@
 //! Columns with their getters: rows -> a block of values.
 
 use super::cells::{Cells, Texts};
-use super::schema::{ColumnSpec, ColumnType, TableSchema};
+use super::column_type::ColumnType;
+use super::schema::{ColumnSpec, TableSchema};
 use super::values::Values;
 use std::fmt;
 

@@ -1,10 +1,9 @@
 //! A scenario's sections -> an immutable world.
 
-use super::airplanes::speeds_m_s;
 use super::{AirspaceFile, Compiled, Preset};
 use crate::deploy::refuses;
-use crate::flight::Airplane;
 use crate::flight::Levels;
+use crate::flight::{Airplane, Task};
 use crate::flight::{Passing, Timing};
 use crate::memory::largest_at_start;
 use crate::shield::{Flyer, Side, first_fallbacks};
@@ -205,4 +204,13 @@ fn first(world: &AirspaceWorld) -> (Vec<Side>, Vec<(u32, u32)>) {
     let (chosen, pairs) = first_fallbacks(&flyers);
     starts.iter().zip(chosen).for_each(|(&i, side)| sides[i] = side);
     (sides, pairs.into_iter().map(|(i, j)| (starts[i] as u32, starts[j] as u32)).collect())
+}
+
+/// All speeds that an airplane is to fly with.
+fn speeds_m_s(airplane: &Airplane) -> impl Iterator<Item = f64> {
+    let told = airplane.orders.iter().filter_map(|order| match order.task {
+        Task::Speed(v_m_s) => Some(v_m_s),
+        _ => None,
+    });
+    told.chain([airplane.model.v_m_s])
 }
