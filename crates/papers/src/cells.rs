@@ -366,12 +366,15 @@ impl Serialize for Cell {
     }
 }
 
-/// A table of whatever, by its columns: their heads, and what stands below them.
+/// A column of a table: its head, and the text of an item below it.
+pub(crate) type TextColumn<'a, T> = (&'a str, &'a dyn Fn(&T) -> String);
+
+/// Returns a table of items by its columns.
 pub(crate) fn table<T>(
     title: impl Into<String>,
     note: impl Into<String>,
     items: impl IntoIterator<Item = T>,
-    columns: &[(&str, &dyn Fn(&T) -> String)],
+    columns: &[TextColumn<'_, T>],
 ) -> Table {
     let heads: Vec<&str> = columns.iter().map(|(head, _)| *head).collect();
     let mut table = Table::new(title, note, &heads);
