@@ -14,9 +14,9 @@ pub enum ColumnType {
     I32,
     /// Signed 64-bit integers.
     I64,
-    /// Double precision floats.
+    /// Double-precision floats.
     F64,
-    /// Truth values.
+    /// Booleans.
     Bool,
     /// Short text from a small vocabulary, stored as an index into `labels`.
     Label,
@@ -25,7 +25,7 @@ pub enum ColumnType {
 }
 
 impl ColumnType {
-    /// All types.
+    /// All column types.
     pub const ALL: [Self; 8] = [
         Self::U32,
         Self::U64,
@@ -37,7 +37,7 @@ impl ColumnType {
         Self::Text,
     ];
 
-    /// Its name in files and reports.
+    /// Returns its name in files and reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::U32 => "u32",
@@ -51,7 +51,7 @@ impl ColumnType {
         }
     }
 
-    /// The type of this [name](Self::name).
+    /// Returns the type with this [name](Self::name).
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|ty| ty.name() == name)
     }
@@ -73,13 +73,13 @@ pub struct ColumnSpec {
 }
 
 impl ColumnSpec {
-    /// A column without labels, of which no value is missing.
+    /// Creates a column without labels and without missing values.
     pub fn new(name: &str, ty: ColumnType, meaning: &str) -> Self {
         let (name, meaning) = (name.into(), meaning.into());
         Self { name, ty, meaning, labels: Vec::new(), is_nullable: false }
     }
 
-    /// A column of labels, of which none is missing.
+    /// Creates a column of labels, without missing values.
     pub fn label<L: Into<String>>(
         name: &str,
         meaning: &str,
@@ -89,7 +89,7 @@ impl ColumnSpec {
         Self { labels, ..Self::new(name, ColumnType::Label, meaning) }
     }
 
-    /// The value in `row` of its values, as [`Values::write`] writes it.
+    /// Returns the value in `row` as text, as [`Values::write`] writes it.
     pub fn text(&self, values: &Values, row: usize) -> String {
         let mut text = String::new();
         // Writing to a string cannot fail.
@@ -97,7 +97,7 @@ impl ColumnSpec {
         text
     }
 
-    /// The unit of its values, where its name ends in one.
+    /// Returns the unit of its values, where its name ends in one.
     pub fn unit(&self) -> Option<&'static str> {
         split_unit(&self.name).1
     }
