@@ -110,9 +110,9 @@ pub trait World: Phases<State: Send> + Send + 'static {
     const NAME: &'static str;
     /// The noun for one of its agents, e.g. `robot`.
     const AGENT: &'static str;
-    /// Whether [`World::before_cycle`] and [`World::is_over`] are called before every cycle; a
-    /// world whose cycles take microseconds leaves it at `false`, because the calls would be a
-    /// measurable cost.
+    /// Whether [`World::before_cycle`] and [`World::is_over`] are called before every cycle. A
+    /// world whose cycles take microseconds leaves it at `false`, because each look takes one more
+    /// barrier.
     const LOOKS_EACH_CYCLE: bool = false;
 
     /// The sums, rows and events that a run keeps beside the state.
