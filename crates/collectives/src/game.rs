@@ -190,7 +190,7 @@ pub(super) mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// A game of any shape with costs from `costs`, repeated.
+    /// Creates a game of any shape with costs from `costs`, repeated.
     pub(crate) fn game(sizes: &[usize], costs: &[f64]) -> PairwiseGame {
         let mut costs = costs.iter().copied().cycle();
         let mut some = |n: usize| costs.by_ref().take(n).collect::<Vec<f64>>();
@@ -203,7 +203,7 @@ pub(super) mod tests {
         game
     }
 
-    /// All joint moves.
+    /// Returns all joint moves.
     pub(crate) fn joints(sizes: &[usize]) -> Vec<Vec<usize>> {
         sizes.iter().fold(vec![vec![]], |all, &n| {
             let longer = |joint: &Vec<usize>| {
@@ -243,7 +243,7 @@ pub(super) mod tests {
             }
         }
 
-        /// What the private cost leaves out does not depend on the player.
+        /// The part that the private cost leaves out does not depend on the player.
         #[test]
         fn private_and_joint_costs_differ_by_what_others_pay(
             sizes in prop::collection::vec(1usize..4, 2..4),

@@ -4,14 +4,14 @@
 //! `v / 255` where `negate` is set. The pixel is occupied where `p > occupied_thresh`, free
 //! where `p < free_thresh` and else unknown. The modes differ as follows.
 //!
-//! - `trinary`, the default: as said.
-//! - `scale`: what is neither occupied nor free gets a shade between the two; not being free
-//!   for sure, it is unknown here.
+//! - `trinary`, the default: as described above.
+//! - `scale`: a pixel that is neither occupied nor free gets a shade between the two; because it is
+//!   not certainly free, it is unknown here.
 //! - `raw`: `v` (`255 - v` where `negate` is set) is itself the occupancy in percent, compared
 //!   with both thresholds; above 100 it is unknown.
 //!
-//! Unlike `map_server`, whose trinary mode takes transparency for one more color, transparency
-//! is not looked at. Unknown keys are ignored, as `map_server` does.
+//! Transparency is ignored, unlike in `map_server`, whose trinary mode takes it for one more color.
+//! Unknown keys are ignored, as in `map_server`.
 
 use std::path::Path;
 
@@ -24,7 +24,7 @@ use sidestep_map::Cell;
 use sidestep_scenario::file::read_text;
 
 /// Reads the map whose YAML file is at `path`. YAML file and image may be packed with gzip; an
-/// image that is there only with `.gz` behind its name is found too.
+/// image that exists only with `.gz` after its name is found too.
 ///
 /// # Errors
 /// When a file is missing, damaged or absurdly large, a key is missing or has a wrong value, or
@@ -43,7 +43,7 @@ fn pixel_map(meta: &Metadata, image: &Bitmap) -> PixelMap {
     PixelMap::new(image.width(), image.height(), meta.resolution_m, meta.origin_m, from_bottom)
 }
 
-/// What a pixel's brightness stands for; see the module.
+/// The meaning of a pixel's brightness; see the module.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Mode {
     Trinary,
@@ -51,7 +51,7 @@ pub(super) enum Mode {
     Raw,
 }
 
-/// How a brightness is read as a cell.
+/// The conversion of a brightness into a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Reading {
     pub(super) mode: Mode,

@@ -494,7 +494,7 @@ mod tests {
         assert!(engine.team.is_none());
     }
 
-    /// Notes what it is shown, and ends the run after `last`.
+    /// Notes the cycles it sees, and ends the run after `last`.
     #[derive(Default)]
     struct Notes {
         last: Cycle,

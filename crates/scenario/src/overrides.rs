@@ -13,7 +13,7 @@ pub(crate) fn set(document: &mut DocumentMut, override_text: &str) -> Result<(),
             "write --set key=value, e.g. --set robots.count=20",
         )
     })?;
-    // Text needs no quotes on a command line: what is not TOML is text.
+    // Text needs no quotes on a command line, so a value that is not TOML is text.
     let value: Value = value.trim().parse().unwrap_or_else(|_| Value::from(value.trim()));
     let keys: Vec<&str> = key.trim().split('.').collect();
     let (last, path) = keys.split_last().expect("split gives at least one part");

@@ -246,7 +246,7 @@ mod tests {
         close(distinct.len() as f64 / items.len() as f64, 1.0 - math::exp(-1.0), 0.01);
     }
 
-    /// Share of 1,000 samples whose interval holds the mean of what they were drawn from.
+    /// Share of 1,000 samples whose interval contains the mean of their distribution.
     fn coverage(
         n: usize,
         truth: f64,

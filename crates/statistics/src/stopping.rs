@@ -255,7 +255,7 @@ mod tests {
         assert_eq!(both, ABSOLUTE.next(&wide));
     }
 
-    /// How often the interval at the stop holds the mean, over 4,000 sweeps, and their mean
+    /// Share of intervals at the stop that contain the mean, over 4,000 sweeps, and their mean
     /// number of runs.
     fn coverage(rule: StoppingRule, truth: f64, draw: impl Fn(&mut Draws) -> f64) -> (f64, f64) {
         let (mut held, mut total) = (0, 0);
