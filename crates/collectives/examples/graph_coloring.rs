@@ -3,7 +3,7 @@
 //! `cargo run -p sidestep-collectives --example graph_coloring`
 //!
 //! Every country is a player, its strategies are the colors, and two neighbors of one color
-//! cost 1. Countries only ever learn from what their own color costs them.
+//! cost 1. Countries only ever learn from the cost of their own color.
 
 use sidestep_collectives::{
     Choice, Estimator, Game, Order, PairwiseGame, Settings, Stop, Update, Utility, optimize,

@@ -1,21 +1,22 @@
-//! What is optimized.
+//! The games that are optimized.
 
 /// A finite game of common cost.
 pub trait Game {
-    /// Number of strategies of each player (shape: players), at least 1 each.
+    /// Returns the number of strategies of each player (shape: players), at least 1 each.
     fn strategies(&self) -> &[usize];
 
-    /// The cost `G(x)` of a joint move, a strategy per player (eq. 1).
+    /// Returns the cost `G(x)` of a joint move, which is one strategy per player (eq. 1).
     fn cost(&self, joint: &[usize]) -> f64;
 
-    /// The part of the cost that player `i` has a hand in; what it leaves out must not depend
-    /// on `joint[i]`. The same minimum for `i` with less noise from what others do among
-    /// themselves.
+    /// Returns the part of the cost that player `i` can influence; the part left out must not
+    /// depend on `joint[i]`. It has the same minimum for `i`, with less noise from the costs of
+    /// others among themselves.
     fn private_cost(&self, joint: &[usize], _player: usize) -> f64 {
         self.cost(joint)
     }
 
-    /// The game as a sum over pairs, if it is one: then expectations need no samples.
+    /// Returns the game as a sum over pairs, if it is one, because expectations then need no
+    /// samples.
     fn as_pairwise(&self) -> Option<&PairwiseGame> {
         None
     }
@@ -28,29 +29,29 @@ pub struct PairwiseGame {
     strategies: Vec<usize>,
     own: Vec<Vec<f64>>,
     pairs: Vec<Pair>,
-    /// Per player: its pairs, by index.
+    /// Indices of each player's pairs.
     of_player: Vec<Vec<usize>>,
 }
 
-/// The costs of two players' strategies together.
+/// The costs of the joint strategies of two players.
 #[derive(Debug, Clone)]
 struct Pair {
     a: usize,
     b: usize,
-    /// What the strategies cost both together: a row per strategy of `a`,
+    /// The joint cost of two strategies: a row per strategy of `a`.
     given_a: Table,
-    /// and a row per strategy of `b`.
+    /// The same with a row per strategy of `b`.
     given_b: Table,
-    /// The same, as the parts of `a` and of `b`: `parts[x_a * strategies_b + x_b]`.
+    /// The same divided into the parts of `a` and of `b`: `parts[x_a * strategies_b + x_b]`.
     parts: Vec<[f64; 2]>,
 }
 
-/// What strategies of one player cost, a row per strategy of another.
+/// The costs of one player's strategies, a row per strategy of another.
 #[derive(Debug, Clone)]
 struct Table {
     width: usize,
     costs: Vec<f64>,
-    /// Rows in which anything costs anything, rising.
+    /// Rows with any cost that is not 0, in increasing order.
     rows: Vec<usize>,
 }
 
@@ -65,7 +66,7 @@ impl Table {
         &self.costs[row * self.width..][..self.width]
     }
 
-    /// Adds what is expected if rows have the probabilities `q`.
+    /// Adds the expected costs if rows have the probabilities `q`.
     fn expect(&self, q: &[f64], expected: &mut [f64]) {
         for &row in &self.rows {
             let p = q[row];
@@ -75,11 +76,11 @@ impl Table {
 }
 
 impl PairwiseGame {
-    /// Bytes that a pair takes for every two strategies.
+    /// Size of a pair in bytes per combination of two strategies.
     pub const BYTES_PER_ENTRY: u64 = 3 * size_of::<f64>() as u64;
 
-    /// A game of players who pay for their own strategies alone; `own[i][x]` is what strategy
-    /// `x` costs player `i`.
+    /// Creates a game of players who pay for their own strategies alone; `own[i][x]` is the cost of
+    /// strategy `x` for player `i`.
     ///
     /// # Panics
     /// When a player has no strategy.
@@ -89,8 +90,8 @@ impl PairwiseGame {
         Self { of_player: vec![Vec::new(); own.len()], strategies, own, pairs: Vec::new() }
     }
 
-    /// Adds what the strategies of players `a` and `b` cost together: `costs[x_a][x_b]`, row by
-    /// row in one list. A pair that never costs anything is left out.
+    /// Adds the joint cost of the strategies of players `a` and `b`: `costs[x_a][x_b]`, row by row
+    /// in one list. A pair without any cost is left out.
     ///
     /// # Panics
     /// When `a` is `b`, one of them does not exist, or the list has another length.
@@ -98,12 +99,13 @@ impl PairwiseGame {
         self.add_pair_in_parts(a, b, costs.into_iter().map(|cost| [cost, 0.0]).collect());
     }
 
-    /// Adds a pair of which each bears a part: `parts[x_a][x_b]` are those of `a` and `b`. The
-    /// cost of a joint move is summed player by player, each player's own costs and parts by
-    /// rising number of the others, so that players who sum apart come to the same bits.
+    /// Adds a pair of which each player bears a part: `parts[x_a][x_b]` are those of `a` and `b`.
+    /// The cost of a joint move is summed player by player, each player's own costs first and then
+    /// its parts by increasing number of the other player, so that players who sum separately get
+    /// the same bits.
     ///
     /// # Panics
-    /// See [`PairwiseGame::add_pair`].
+    /// The same as for [`PairwiseGame::add_pair`].
     pub fn add_pair_in_parts(&mut self, a: usize, b: usize, parts: Vec<[f64; 2]>) {
         assert!(a != b, "a pair is two players");
         assert_eq!(
@@ -124,7 +126,7 @@ impl PairwiseGame {
         }
     }
 
-    /// Keeps a player's pairs by rising number of the other.
+    /// Adds a pair to a player's list, which is sorted by the number of the other player.
     fn enlist(&mut self, player: usize, other: usize, index: usize) {
         let pairs = &self.pairs;
         let of_player = &mut self.of_player[player];
@@ -132,7 +134,7 @@ impl PairwiseGame {
         of_player.insert(place, index);
     }
 
-    /// The part of a joint move's cost that a player bears.
+    /// Returns the part of a joint move's cost that a player bears.
     pub fn part(&self, joint: &[usize], player: usize) -> f64 {
         let own = self.own[player][joint[player]];
         self.of_player[player].iter().fold(own, |sum, &index| {
@@ -142,8 +144,9 @@ impl PairwiseGame {
         })
     }
 
-    /// Writes `E[G | x_i = x]`, less a part that is the same for all `x`, into `expected` (shape:
-    /// strategies of player `i`), where the others play `q`: the closed form of eq. 3.
+    /// Writes `E[G
+    /// x_i = x]`, less a part that is the same for all `x`, into `expected` (shape: strategies of
+    /// player `i`), where the others play `q`: the closed form of eq. 3.
     pub fn expect(&self, player: usize, q: &[Vec<f64>], expected: &mut Vec<f64>) {
         expected.clear();
         expected.extend_from_slice(&self.own[player]);
@@ -187,7 +190,7 @@ pub(super) mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// A game of any shape with costs from `costs`, repeated.
+    /// Creates a game of any shape with costs from `costs`, repeated.
     pub(crate) fn game(sizes: &[usize], costs: &[f64]) -> PairwiseGame {
         let mut costs = costs.iter().copied().cycle();
         let mut some = |n: usize| costs.by_ref().take(n).collect::<Vec<f64>>();
@@ -200,7 +203,7 @@ pub(super) mod tests {
         game
     }
 
-    /// All joint moves.
+    /// Returns all joint moves.
     pub(crate) fn joints(sizes: &[usize]) -> Vec<Vec<usize>> {
         sizes.iter().fold(vec![vec![]], |all, &n| {
             let longer = |joint: &Vec<usize>| {
@@ -240,7 +243,7 @@ pub(super) mod tests {
             }
         }
 
-        /// What the private cost leaves out does not depend on the player.
+        /// The part that the private cost leaves out does not depend on the player.
         #[test]
         fn private_and_joint_costs_differ_by_what_others_pay(
             sizes in prop::collection::vec(1usize..4, 2..4),

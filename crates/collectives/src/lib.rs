@@ -15,7 +15,7 @@
 //! minimum of its `L_i`, and lowers `T`; as `T` falls the distributions settle on strategies.
 //!
 //! ```text
-//! game.rs      what is optimized: joint costs, and costs that are sums over pairs
+//! game.rs      the games: joint costs, and costs that are sums over pairs
 //! player.rs    one player: its distribution, its estimates, its update
 //! optimize.rs  the rounds: estimate, update, cool, until no distribution moves
 //! ```

@@ -1,94 +1,95 @@
-//! The rounds: estimate, update, cool, until no distribution moves any more.
+//! The rounds: estimate, update, cool, until no distribution moves anymore.
 
 use super::game::Game;
 use super::player::{Choice, Player, Update, Utility};
 use serde::{Deserialize, Serialize};
 
-/// How `E[G | x_i]` is found.
+/// The estimator of `E[G
+/// x_i]`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", tag = "kind")]
 pub enum Estimator {
-    /// From blocks of joint samples (the paper's).
+    /// From blocks of joint samples, as in the paper.
     Sampled {
         /// Samples per block, `N_SB`.
         block: usize,
-        /// What a block weighs after each further one, in [0, 1].
+        /// The factor on a block's weight after each further block, in [0, 1].
         ageing: f64,
     },
     /// In closed form, for games that are sums over pairs.
     Exact,
 }
 
-/// When the players update.
+/// The order in which the players update.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Order {
     /// All at once, on the distributions of the round before.
     #[default]
     Parallel,
-    /// One after the other, each on what those before it have come to.
+    /// One after the other, each on the new distributions of those before it.
     Sequence,
 }
 
-/// How to optimize.
+/// The settings of an optimization.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
-    /// How expectations are found.
+    /// The estimator of expectations.
     pub estimator: Estimator,
-    /// How distributions move.
+    /// The update of the distributions.
     pub update: Update,
-    /// When they move.
+    /// The order of the updates.
     pub order: Order,
-    /// Whose cost the samples show.
+    /// The cost that players learn from.
     pub utility: Utility,
     /// Factor on the temperature after each round, in (0, 1].
     pub cooling: f64,
-    /// When to stop.
+    /// The stopping rule.
     pub stop: Stop,
-    /// How final strategies follow from distributions.
+    /// The choice of final strategies from the distributions.
     pub choice: Choice,
 }
 
-/// When to stop.
+/// The rule by which an optimization stops.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Stop {
-    /// Converged when no probability moves by more than this,
+    /// The largest change of a probability in a calm round.
     pub threshold: f64,
-    /// so many rounds in a row.
+    /// The number of calm rounds in a row that counts as converged.
     pub calm_rounds: u32,
-    /// Ends here even if not converged; the outcome says so.
+    /// The maximum number of rounds; the outcome says whether the distributions had converged.
     pub max_rounds: u32,
 }
 
 impl Stop {
-    /// Counts calm rounds: the number in a row after one in which probabilities moved by at
-    /// most `change`.
+    /// Counts calm rounds: returns the number in a row after a round in which probabilities moved
+    /// by at most `change`.
     pub fn calm(&self, so_far: u32, change: f64) -> u32 {
         if change <= self.threshold { so_far + 1 } else { 0 }
     }
 }
 
-/// What an optimization came to.
+/// The outcome of an optimization.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcome {
     /// The chosen strategy of each player.
     pub joint: Vec<usize>,
-    /// The distributions in the end.
+    /// The final distributions.
     pub q: Vec<Vec<f64>>,
-    /// Each player's estimate of `E[G | x]` in the end, up to a constant: how bad other
-    /// strategies would be.
+    /// Each player's final estimate of `E[G
+    /// x]`, up to a constant: it ranks the strategies that were not chosen.
     pub expected: Vec<Vec<f64>>,
-    /// Rounds made.
+    /// Number of rounds.
     pub rounds: u32,
-    /// Whether the distributions had settled, rather than the rounds run out.
+    /// Whether the distributions converged, rather than the rounds run out.
     pub converged: bool,
 }
 
-/// Optimizes a game. `uniform(player, k)` is the `k`-th uniform number in [0, 1) of a player's
-/// own stream: samples take them in order, and the one after the last makes the final draw.
+/// Optimizes a game. `uniform(player, k)` is the `k`-th uniform number in [0, 1) of a player's own
+/// stream: samples take them in order, and the one after the last makes the final draw.
 ///
 /// # Panics
-/// When the estimator is exact and the game is no sum over pairs.
+/// When the estimator is exact and the game is not a sum over pairs.
 pub fn optimize(
     game: &impl Game,
     settings: &Settings,
@@ -111,15 +112,15 @@ pub fn optimize(
     Outcome { joint, q, expected, rounds, converged }
 }
 
-/// The players at one table.
+/// All players and their samples during an optimization.
 struct RoundTable<'g, G, U> {
     game: &'g G,
     settings: &'g Settings,
     uniform: U,
     players: Vec<Player>,
-    /// Distributions that the players see.
+    /// The distributions that the players see.
     q: Vec<Vec<f64>>,
-    /// Samples drawn by each player.
+    /// Number of samples drawn by each player.
     drawn: u64,
 }
 
@@ -130,7 +131,7 @@ impl<'g, G: Game, U: Fn(usize, u64) -> f64> RoundTable<'g, G, U> {
         Self { game, settings, uniform, players, q, drawn: 0 }
     }
 
-    /// Returns the largest change of a probability.
+    /// Runs a round with exact expectations; returns the largest change of a probability.
     fn exact_round(&mut self) -> f64 {
         let game = self.game.as_pairwise().expect("exact expectations need a sum over pairs");
         let mut change: f64 = 0.0;
@@ -146,8 +147,9 @@ impl<'g, G: Game, U: Fn(usize, u64) -> f64> RoundTable<'g, G, U> {
         change
     }
 
-    /// A block of joint samples, sample `k` of all players being joint move `k`. In sequence,
-    /// each player draws a block anew with those before it.
+    /// Runs a round with a block of joint samples, sample `k` of all players being joint move `k`.
+    /// In sequence, each player draws a block anew with those before it. Returns the largest change
+    /// of a probability.
     fn sampled_round(&mut self, block: usize, ageing: f64) -> f64 {
         let mut samples = self.draw_block(block);
         let mut change: f64 = 0.0;
@@ -163,7 +165,7 @@ impl<'g, G: Game, U: Fn(usize, u64) -> f64> RoundTable<'g, G, U> {
         change
     }
 
-    /// Per player, its next `block` samples.
+    /// Draws the next `block` samples of each player.
     fn draw_block(&mut self, block: usize) -> Vec<Vec<usize>> {
         let from = self.drawn;
         self.drawn += block as u64;

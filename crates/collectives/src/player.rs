@@ -1,49 +1,49 @@
-//! One player: its distribution over strategies, what it has learned, and how it updates.
+//! One player: its distribution over strategies, its estimates, and its updates.
 
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::math;
 
-/// Probabilities never fall below this, so that every strategy may come back.
+/// The least probability, above 0 so that every strategy may return.
 const LEAST: f64 = 1e-9;
-/// Temperatures never fall below this part of the costs' scale.
+/// The lowest temperature, as a share of the costs' scale.
 const COLDEST: f64 = 1e-12;
 
-/// How a distribution moves towards the minimum of eq. 7.
+/// The step of a distribution towards the minimum of eq. 7.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", tag = "kind")]
 pub enum Update {
     /// `q <- q - s q [ (E[G|x] - E_q G) / T + S(q) + ln q ]`, clipped and scaled to sum 1: a
     /// step `s` of Newton's method on the quadratic nearest to the Lagrangian.
     NearestNewton {
-        /// Step `s`, in (0, 1].
+        /// Step size `s`, in (0, 1].
         step: f64,
     },
     /// `q <- (1 - s) q + s softmax(-E[G|x] / T)`.
     Brouwer {
-        /// Step `s`, in (0, 1].
+        /// Step size `s`, in (0, 1].
         step: f64,
     },
 }
 
-/// Whose cost a player learns from.
+/// The cost that a player learns from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Utility {
-    /// The cost of all (the paper's).
+    /// The cost of all players, as in the paper.
     #[default]
     Joint,
-    /// The part of it that the player has a hand in: less noise.
+    /// The part of it that the player can influence, which has less noise.
     Private,
 }
 
-/// How the final strategy follows from the distribution.
+/// The choice of the final strategy from the distribution.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Choice {
-    /// The likeliest; among equals the first.
+    /// The most probable strategy; among equals the first.
     #[default]
     Argmax,
-    /// A draw from the distribution (the paper's line 27).
+    /// A draw from the distribution, as in line 27 of the paper.
     Draw,
 }
 
@@ -52,16 +52,16 @@ pub enum Choice {
 pub struct Player {
     /// Probability of each strategy.
     pub q: Vec<f64>,
-    /// Temperature; 0 until the first estimate says on which scale costs are.
+    /// Temperature; 0 until the first estimate gives the scale of the costs.
     pub temperature: f64,
-    /// Per strategy the aged sum of costs seen with it, and the aged number of samples.
+    /// Per strategy the aged sum of its sampled costs, and the aged number of samples.
     sums: Vec<f64>,
     counts: Vec<f64>,
     expected: Vec<f64>,
 }
 
 impl Player {
-    /// A player that knows nothing: every strategy is as likely.
+    /// Creates a player with a uniform distribution and no estimates.
     pub fn new(strategies: usize) -> Self {
         Self {
             q: vec![1.0 / strategies as f64; strategies],
@@ -72,7 +72,7 @@ impl Player {
         }
     }
 
-    /// The strategy that the uniform number `u` in [0, 1) stands for under `q`.
+    /// Returns the strategy that the uniform number `u` in [0, 1) selects under `q`.
     pub fn draw(&self, u: f64) -> usize {
         let mut cumulated = 0.0;
         let below = |p: &f64| {
@@ -82,7 +82,7 @@ impl Player {
         self.q.iter().position(below).unwrap_or(self.q.len() - 1)
     }
 
-    /// The final strategy; `u` as in [`Player::draw`].
+    /// Returns the final strategy; `u` as in [`Player::draw`].
     pub fn choose(&self, choice: Choice, u: f64) -> usize {
         match choice {
             Choice::Draw => self.draw(u),
@@ -94,9 +94,9 @@ impl Player {
         }
     }
 
-    /// Estimates from a block of samples: strategies tried and what each cost. Estimates of
-    /// earlier blocks weigh `ageing` times as much as before; a strategy without any sample
-    /// yet is given the mean of all.
+    /// Updates the estimates from a block of samples: strategies and the cost of each. Estimates of
+    /// earlier blocks weigh `ageing` times as much as before; a strategy without any sample yet is
+    /// given the mean of all.
     pub fn learn(&mut self, samples: &[usize], costs: &[f64], ageing: f64) {
         self.sums.iter_mut().chain(&mut self.counts).for_each(|v| *v *= ageing);
         for (&x, &cost) in samples.iter().zip(costs) {
@@ -109,12 +109,14 @@ impl Player {
         self.expected.extend(each.map(|(sum, n)| if *n > 0.0 { sum / n } else { mean }));
     }
 
-    /// Takes `E[G | x]` as known; `write` fills it in.
+    /// Sets `E[G
+    /// x]` to known values, which `write` fills in.
     pub fn know(&mut self, write: impl FnOnce(&mut Vec<f64>)) {
         write(&mut self.expected);
     }
 
-    /// The present estimate of `E[G | x]`, up to a constant.
+    /// Returns the present estimate of `E[G
+    /// x]`, up to a constant.
     pub fn expected(&self) -> &[f64] {
         &self.expected
     }
@@ -131,7 +133,7 @@ impl Player {
             self.temperature = spread;
         }
         if spread <= 0.0 {
-            // Nothing is better than anything else.
+            // All costs are equal, so no strategy is better than another.
             return 0.0;
         }
         let t = self.temperature.max(COLDEST * (low.abs().max(high.abs()) + 1.0));

@@ -1,5 +1,5 @@
-//! Maps drawn with characters, in a scenario or in a `.txt` file: `#` wall, `.` or a blank
-//! free, `?` unknown. The first line is the north edge; one character is one box.
+//! Maps drawn with characters, in a scenario or in a `.txt` file: `#` wall, `.` or a blank free,
+//! `?` unknown. The first line is the north edge; each character is one box.
 
 use std::ops::Range;
 use std::path::Path;
@@ -20,7 +20,7 @@ const LEGEND: Legend = Legend {
     remedy: "draw with `#` (wall), `.` or a blank (free) and `?` (unknown)",
 };
 
-/// Reads the file at `path` (also with gzip) as a map of boxes with a side of `box_size_m`.
+/// Reads the file at `path` (also with gzip) as a map of boxes with a side of `box_size_m` meters.
 ///
 /// # Errors
 /// Those of [`parse`], and a file that cannot be read.
@@ -28,18 +28,18 @@ pub fn load(path: &Path, box_size_m: f64) -> Result<GridMap, InputError> {
     parse(&path.display().to_string(), &read_text(path, MAX_TEXT_BYTES)?, box_size_m)
 }
 
-/// Reads `art` as a map of boxes with a side of `box_size_m` metres. An empty first line (as
-/// behind an opening quote) and empty last lines do not count.
+/// Reads `art` as a map of boxes with a side of `box_size_m` meters. An empty first line (as after
+/// an opening quote) and empty last lines do not count.
 ///
 /// # Errors
-/// When a character means nothing, the rows differ in length, there is no row or there are too
-/// many boxes. Errors name `place` and count lines and columns in `art`.
+/// When a character is unknown, the rows differ in length, there is no row or there are too many
+/// boxes. Errors name `place` and count lines and columns in `art`.
 pub fn parse(place: &str, art: &str, box_size_m: f64) -> Result<GridMap, InputError> {
     parse_within(place, art, 0..art.len(), box_size_m)
 }
 
-/// As [`parse`], for a drawing that is the part `art` (in bytes) of a larger `document`: errors
-/// count lines and columns in the document.
+/// Reads a drawing that is the part `art` (in bytes) of a larger `document`, as [`parse`] does;
+/// errors count lines and columns in the document.
 ///
 /// # Errors
 /// Those of [`parse`].

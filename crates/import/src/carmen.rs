@@ -1,13 +1,12 @@
-//! CARMEN logs that a SLAM program has corrected (`.log`, `.log.gz`).
+//! CARMEN logs corrected by a SLAM program (`.log`, `.log.gz`).
 //!
 //! Messages read: `ODOM x y theta tv rv accel time host logger_time` and
 //! `FLASER n r1 .. rn x y theta odom_x odom_y odom_theta time host logger_time`. Every other
 //! message (`NEFF`, `PARAM`, ...) and `#` comments are skipped.
 //!
-//! The pose of a `FLASER` is the corrected one. The `ODOM` lines after it continue from that
-//! pose with raw odometry, so the last one before the next `FLASER` says where odometry
-//! believed the robot to be. The first `ODOM` after a `FLASER` repeats its pose, with a time
-//! that means nothing.
+//! The pose of a `FLASER` is the corrected one. The `ODOM` lines after it continue from that pose
+//! with raw odometry, so the last one before the next `FLASER` is the robot's pose according to
+//! odometry. The first `ODOM` after a `FLASER` repeats its pose, with a time that is meaningless.
 
 use std::path::Path;
 
@@ -15,9 +14,9 @@ use super::table::{MAX_TEXT_BYTES, Word, data_lines, words};
 use sidestep_kernel::InputError;
 use sidestep_scenario::file::read_text;
 
-/// Beams per scan beyond which a count is taken for damage.
+/// Number of beams per scan above which a count is taken for damage.
 const BEAMS_MAX: u32 = 100_000;
-/// Words of a message that are looked at: those of the longest scan, and more.
+/// Maximum number of words of a message that are read: those of the longest scan, and more.
 const WORDS_MAX: usize = BEAMS_MAX as usize + 32;
 
 /// A pose in the world: x and y in m, heading in rad.
@@ -41,7 +40,7 @@ pub struct Scan {
     pub n_beams: u32,
     /// Corrected pose.
     pub pose: Pose,
-    /// Poses that odometry claims after this scan, starting at [`Scan::pose`].
+    /// Poses according to odometry after this scan, starting at [`Scan::pose`].
     pub odometry: Vec<Pose>,
 }
 

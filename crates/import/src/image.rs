@@ -11,13 +11,13 @@ use sidestep_kernel::InputError;
 
 use sidestep_scenario::file::read_bytes;
 
-/// The most pixels an image may have; more are refused before memory is allocated for them.
+/// The maximum number of pixels; larger images are refused before memory is allocated for them.
 pub const MAX_PIXELS: u64 = 1 << 28;
 
-/// The largest image file: the ASCII form of an image of [`MAX_PIXELS`].
+/// The size of the largest image file in bytes: the ASCII form of an image of [`MAX_PIXELS`].
 const MAX_IMAGE_BYTES: u64 = 4 * MAX_PIXELS;
 
-/// The most memory that decoding may take: 8 bytes (four channels of 16 bits) per pixel.
+/// The maximum memory for decoding in bytes: 8 (four channels of 16 bits) per pixel.
 const MAX_DECODED_BYTES: u64 = 8 * MAX_PIXELS;
 
 /// A decoded image.
@@ -25,11 +25,11 @@ const MAX_DECODED_BYTES: u64 = 8 * MAX_PIXELS;
 pub struct Bitmap(DynamicImage);
 
 impl Bitmap {
-    /// Reads the image at `path` (also with gzip); its first bytes say which kind it is.
+    /// Reads the image at `path` (also with gzip); its first bytes determine the format.
     ///
     /// # Errors
-    /// When the file cannot be read, is no PNG or PNM image, is damaged or cut short, or has
-    /// no pixel or more than [`MAX_PIXELS`].
+    /// When the file cannot be read, is not a PNG or PNM image, is damaged or cut short, or has no
+    /// pixel or more than [`MAX_PIXELS`].
     pub fn load(path: &Path) -> Result<Self, InputError> {
         Self::decode(&path.display().to_string(), read_bytes(path, MAX_IMAGE_BYTES)?)
     }
@@ -37,7 +37,7 @@ impl Bitmap {
     /// Reads the image in `bytes`; errors name `place`.
     ///
     /// # Errors
-    /// As [`Bitmap::load`], but for those of reading the file.
+    /// As [`Bitmap::load`], except those of reading the file.
     pub fn decode(place: &str, bytes: Vec<u8>) -> Result<Self, InputError> {
         let undecodable = |error| undecodable(place, &error);
         let decoder = decoder(bytes).map_err(undecodable)?;
@@ -45,19 +45,19 @@ impl Bitmap {
         DynamicImage::from_decoder(decoder).map(Self).map_err(undecodable)
     }
 
-    /// Pixels from left to right.
+    /// Number of pixels from left to right.
     pub fn width(&self) -> u32 {
         self.0.width()
     }
 
-    /// Pixels from top to bottom.
+    /// Number of pixels from top to bottom.
     pub fn height(&self) -> u32 {
         self.0.height()
     }
 
-    /// What `read` makes of each pixel's brightness, row by row from the top. The brightness is
-    /// the mean of the pixel's color channels, from 0 (black) to 255 (white); transparency is
-    /// not looked at.
+    /// Returns the result of `read` for each pixel's brightness, row by row from the top. The
+    /// brightness is the mean of the pixel's color channels, from 0 (black) to 255 (white);
+    /// transparency is ignored.
     pub fn map_brightness<T>(&self, read: impl Fn(f64) -> T) -> Vec<T> {
         match &self.0 {
             DynamicImage::ImageLuma8(pixels) => map_channels(pixels, 1, read),
@@ -71,7 +71,8 @@ impl Bitmap {
     }
 }
 
-/// What `read` makes of the mean of each pixel's first `colors` channels, scaled to 0..255.
+/// Returns the result of `read` for the mean of each pixel's first `colors` channels, scaled to
+/// 0..255.
 fn map_channels<P, T>(
     image: &ImageBuffer<P, Vec<P::Subpixel>>,
     colors: usize,
@@ -81,7 +82,7 @@ where
     P: Pixel,
     P::Subpixel: Primitive + Into<f64>,
 {
-    // One division of whole numbers below 2^53: gray 205 is exactly 205.0 in every format.
+    // One division of whole numbers below 2^53, so that gray 205 is exactly 205.0 in every format.
     let steps_per_unit = P::Subpixel::DEFAULT_MAX_VALUE.into() / 255.0;
     let divisor = colors as f64 * steps_per_unit;
     let brightness = |pixel: &P| {

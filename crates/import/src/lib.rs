@@ -1,9 +1,9 @@
 #![deny(clippy::disallowed_methods)]
-//! Foreign files, read into our own types.
+//! Readers of file formats of other programs, such as maps, robot models, traffic and data sets.
 //!
-//! Every reader takes its file plain or packed with gzip, refuses absurd sizes before it
-//! allocates memory for them, and reports what is wrong as an
-//! [`InputError`](sidestep_kernel::InputError) with file, line and column.
+//! Every reader accepts its file plain or packed with gzip, refuses absurd sizes before it
+//! allocates memory for them, and reports errors as an [`InputError`](sidestep_kernel::InputError)
+//! with file, line and column.
 
 pub mod ascii;
 pub mod bluesky;

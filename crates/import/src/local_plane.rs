@@ -2,10 +2,10 @@
 
 use sidestep_kernel::math;
 
-/// The mean radius of the earth, in m.
+/// The mean radius of the earth, in meters.
 pub const EARTH_RADIUS_M: f64 = 6_371_000.0;
 
-/// The smallest cosine of a center's latitude: a plane about a pole stays invertible.
+/// The smallest cosine of a center's latitude, so that a plane at a pole stays invertible.
 const MIN_COSINE: f64 = 1e-9;
 
 /// A place on the earth.
@@ -19,11 +19,11 @@ pub struct LatLon {
 
 /// The plane that touches a sphere of radius [`EARTH_RADIUS_M`] in its center: x east, y north.
 ///
-/// The projection is equirectangular. North-south distances are those of the sphere;
-/// east-west ones are those at the center's latitude, so at a place `d` meters further north
-/// they come out too long by the fraction `d * tan(latitude) / radius`: per 100 km 0.9 % at
-/// 30 degrees, 2.1 % at 52 degrees, and none at the equator, where the error is of second order
-/// (0.01 % at 100 km). The earth's flattening adds up to 0.7 %. Not for use near the poles.
+/// The projection is equirectangular. North-south distances are those of the sphere; east-west ones
+/// are those at the center's latitude, so at a place `d` meters further north they are too long by
+/// the fraction `d * tan(latitude) / radius`: per 100 km 0.9 % at 30 degrees, 2.1 % at 52 degrees,
+/// and none at the equator, where the error is of second order (0.01 % at 100 km). The earth's
+/// flattening adds up to 0.7 %. Not for use near the poles.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LocalPlane {
     center: LatLon,
@@ -32,23 +32,23 @@ pub struct LocalPlane {
 }
 
 impl LocalPlane {
-    /// The plane about `center`.
+    /// Creates the plane around `center`.
     pub fn about(center: LatLon) -> Self {
         let east_scale = math::cos(center.lat_deg.to_radians()).max(MIN_COSINE);
         Self { center, east_scale }
     }
 
-    /// The plane about the [`center`] of `positions`, where there are any.
+    /// Creates the plane around the [`center`] of `positions`, where there are any.
     pub fn about_all(positions: impl IntoIterator<Item = LatLon>) -> Option<Self> {
         center(positions).map(Self::about)
     }
 
-    /// The place at the origin.
+    /// Returns the place at the origin.
     pub fn center(&self) -> LatLon {
         self.center
     }
 
-    /// Meters east and north of the center, the short way round the earth.
+    /// Returns the meters east and north of the center, the short way around the earth.
     pub fn to_plane_m(&self, at: LatLon) -> [f64; 2] {
         let east_deg = wrap_deg(at.lon_deg - self.center.lon_deg);
         let north_deg = at.lat_deg - self.center.lat_deg;
@@ -58,7 +58,8 @@ impl LocalPlane {
         ]
     }
 
-    /// The place at `[east, north]` meters from the center; its longitude is in [-180, 180).
+    /// Returns the place at `[east, north]` meters from the center; its longitude is in [-180,
+    /// 180).
     pub fn to_lat_lon(&self, [east_m, north_m]: [f64; 2]) -> LatLon {
         let east_deg = (east_m / (EARTH_RADIUS_M * self.east_scale)).to_degrees();
         LatLon {
@@ -68,8 +69,8 @@ impl LocalPlane {
     }
 }
 
-/// The middle of `positions`, where there are any: the direction of the sum of their unit
-/// vectors from the earth's center, hence right across the date line.
+/// Returns the center of `positions`, where there are any: the direction of the sum of their unit
+/// vectors from the earth's center, which is correct across the date line.
 pub fn center(positions: impl IntoIterator<Item = LatLon>) -> Option<LatLon> {
     let mut sum = [0.0; 3];
     let mut is_empty = true;
@@ -87,10 +88,10 @@ pub fn center(positions: impl IntoIterator<Item = LatLon>) -> Option<LatLon> {
     })
 }
 
-/// A longitude or a difference of two, brought into [-180, 180).
+/// Returns a longitude or a difference of two, in [-180, 180).
 pub(super) fn wrap_deg(deg: f64) -> f64 {
     let turned = (deg + 180.0).rem_euclid(360.0);
-    // rem_euclid may round up to the modulus itself.
+    // rem_euclid may round up to the modulus itself, which is outside the range.
     if turned >= 360.0 { -180.0 } else { turned - 180.0 }
 }
 

@@ -1,4 +1,4 @@
-//! One door for all map files.
+//! One reader for all map files.
 
 use std::path::Path;
 
@@ -7,14 +7,14 @@ use sidestep_kernel::InputError;
 use super::{ascii, movingai, rosmap};
 use sidestep_map::{GridMap, UnknownPolicy};
 
-/// Reads the map at `path` into boxes with a side of `box_size_m` metres; the extension says
-/// how: `.yaml` and `.yml` as ROS `map_server`, `.map` as MovingAI, `.txt` as characters, each
-/// of them also with `.gz` behind. `unknown` says what unknown boxes become.
+/// Reads the map at `path` into boxes with a side of `box_size_m` meters. The extension determines
+/// the format: `.yaml` and `.yml` for ROS `map_server`, `.map` for MovingAI, `.txt` for characters,
+/// each of them also followed by `.gz`. `unknown` decides on unknown boxes.
 ///
-/// A `map_server` map is resampled to `box_size_m`; in the two others a character is a box.
+/// A `map_server` map is resampled to `box_size_m`; in the other two formats a character is a box.
 ///
 /// # Errors
-/// Another extension, and those of [`rosmap::load`] with
+/// When the extension is another one, and those of [`rosmap::load`] with
 /// [`PixelMap::to_boxes`](super::PixelMap::to_boxes), [`movingai::load_map`], [`ascii::load`].
 pub fn map_file(
     path: &Path,
@@ -30,7 +30,7 @@ pub fn map_file(
     Ok(map.with_unknown(unknown))
 }
 
-/// The extension in lower case, the one before `.gz` where that is the last.
+/// Returns the extension in lower case, the one before `.gz` where that is the last.
 fn extension(path: &Path) -> String {
     let name = path.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
     let name = name.strip_suffix(".gz").unwrap_or(&name);

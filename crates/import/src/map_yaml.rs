@@ -1,4 +1,4 @@
-//! The YAML file of a ROS map: its keys, checked, each error with its place.
+//! The YAML file of a ROS map: its keys, checked, each error with its position.
 
 use std::path::{Path, PathBuf};
 
@@ -6,23 +6,23 @@ use saphyr::{LoadableYamlNode, MarkedYaml, Scalar, ScanError, YamlData};
 use sidestep_kernel::InputError;
 use sidestep_map::Cell;
 
-/// The largest YAML file; the keys take 150 bytes.
+/// The maximum size of the YAML file in bytes; the keys take 150 bytes.
 pub(super) const MAX_YAML_BYTES: u64 = 64 << 10;
 
-/// The longest line in bytes. A list within a list begins further right, so the limit bounds how
-/// deep they go, hence the stack that the parser's recursive tree takes.
+/// The maximum length of a line in bytes. A list within a list starts further right, so the limit
+/// bounds their depth, and with it the stack that the parser's recursive tree takes.
 const MAX_LINE_BYTES: usize = 1000;
 
 /// The content of the YAML file.
 #[derive(Debug, PartialEq)]
 pub(super) struct Metadata {
-    /// An image file that exists.
+    /// The path of an image file that exists.
     pub(super) image: PathBuf,
-    /// Side of a pixel in metres, positive.
+    /// Side of a pixel in meters, positive.
     pub(super) resolution_m: f64,
-    /// World position of the lower-left corner in metres.
+    /// World position of the lower-left corner in meters.
     pub(super) origin_m: [f64; 2],
-    /// How pixels are read.
+    /// The conversion of pixels into cells.
     pub(super) reading: Reading,
 }
 
@@ -39,7 +39,7 @@ impl Metadata {
     }
 }
 
-/// The YAML file, with the places of its values.
+/// The YAML file, with the positions of its values.
 struct Document<'a> {
     place: &'a str,
     text: &'a str,
@@ -130,7 +130,7 @@ impl<'a> Document<'a> {
         }
     }
 
-    /// The image's file.
+    /// Returns the path of the image.
     fn image(&self, folder: &Path) -> Result<PathBuf, InputError> {
         let value = self.value("image")?;
         let name = value.data.as_str().filter(|name| !name.is_empty()).ok_or_else(|| {
@@ -167,7 +167,7 @@ impl<'a> Document<'a> {
 const KEYS: &str = "write the keys image, resolution, origin, negate, occupied_thresh and \
                     free_thresh, and mode if you like";
 
-/// The finite number that a value is; in quotes too, as `map_server` has it.
+/// Returns a value as a finite number; also in quotes, as `map_server` accepts it.
 fn number_of(value: &MarkedYaml<'_>) -> Option<f64> {
     let YamlData::Value(scalar) = &value.data else { return None };
     let number = match scalar {
@@ -194,7 +194,7 @@ fn malformed(place: &str, text: &str, error: &ScanError) -> InputError {
         .in_text(text, byte_offset(text, error.marker().index()))
 }
 
-/// Where the character number `index` begins.
+/// Returns the byte offset of the character number `index`.
 fn byte_offset(text: &str, index: usize) -> usize {
     text.char_indices().nth(index).map_or(text.len(), |(offset, _)| offset)
 }

@@ -1,6 +1,6 @@
 //! MovingAI benchmarks: `.map` grids and `.scen` lists of starts and goals.
 //!
-//! The files count rows from the top; everything here is turned to rows from the bottom.
+//! The files count rows from the top; all rows here count from the bottom.
 
 use std::path::Path;
 use std::str::FromStr;
@@ -11,7 +11,8 @@ use super::rows::{Legend, Line, MAX_TEXT_BYTES, Source, map_from_top};
 use sidestep_map::{Cell, GridMap, check_box_count};
 use sidestep_scenario::file::read_text;
 
-/// Ground, its other sign and swamp are passable; bounds (two signs), trees and water are not.
+/// Ground (two characters) and swamp are passable; out of bounds (two characters), trees and water
+/// are not.
 const LEGEND: Legend = Legend {
     cell: |character| match character {
         '.' | 'G' | 'S' => Some(Cell::Free),
@@ -21,35 +22,35 @@ const LEGEND: Legend = Legend {
     remedy: "use `.`, `G`, `S` (passable) and `@`, `O`, `T`, `W` (blocked)",
 };
 
-/// The largest `.scen` file that is read; the benchmark's have less than 0.1 MB.
+/// The maximum size of a `.scen` file in bytes; those of the benchmark have less than 0.1 MB.
 const MAX_SCEN_BYTES: u64 = 1 << 28;
 
 /// A row of a `.scen` file: one start with one goal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScenRow {
-    /// Line of the file, from 1.
+    /// Line in the file, from 1.
     pub line: usize,
     /// Group of rows of similar length.
     pub bucket: u32,
-    /// Name of the map file as written.
+    /// Name of the map file as written in the row.
     pub map: String,
-    /// Columns of the map.
+    /// Number of columns of the map.
     pub width: u32,
-    /// Rows of the map.
+    /// Number of rows of the map.
     pub height: u32,
-    /// Column from the west and row from the south.
+    /// Start: column from the west and row from the south.
     pub start: (u32, u32),
-    /// Column from the west and row from the south.
+    /// Goal: column from the west and row from the south.
     pub goal: (u32, u32),
     /// Length of a shortest path on 8 neighbors without cutting corners, in boxes.
     pub optimal_length: f64,
 }
 
 impl ScenRow {
-    /// Checks that the row is about a map such as `map`; errors name `place` and the row's line.
+    /// Checks that the row fits `map`; errors name `place` and the row's line.
     ///
     /// # Errors
-    /// When the map has another size, or the start or the goal is not free.
+    /// When the map has a different size, or the start or the goal is not free.
     pub fn check_against(&self, place: &str, map: &GridMap) -> Result<(), InputError> {
         let error = |cause, remedy| Err(InputError::new(place, cause, remedy).at(self.line, 1));
         if (self.width, self.height) != (map.width(), map.height()) {
@@ -68,7 +69,7 @@ impl ScenRow {
 }
 
 /// Reads a `.map` file (also with gzip); a character becomes a box with a side of `box_size_m`
-/// metres (the benchmarks have no unit; 1 is customary).
+/// meters (the benchmarks have no unit; 1 is customary).
 ///
 /// # Errors
 /// Those of [`parse_map`], and a file that cannot be read.
@@ -79,8 +80,8 @@ pub fn load_map(path: &Path, box_size_m: f64) -> Result<GridMap, InputError> {
 /// Reads `text` as a `.map` file; errors name `place`.
 ///
 /// # Errors
-/// When the header or a character is wrong, or rows are missing, too many or of another width
-/// than the header says.
+/// When the header or a character is wrong, or rows are missing, too many, or not as wide as the
+/// header says.
 pub fn parse_map(place: &str, text: &str, box_size_m: f64) -> Result<GridMap, InputError> {
     let source = Source { place, text };
     let mut lines = source.lines_of(text);
@@ -103,7 +104,7 @@ pub fn parse_map(place: &str, text: &str, box_size_m: f64) -> Result<GridMap, In
 
 const ROWS: &str = "give as many rows as `height` says";
 
-/// Reads the header up to and including `map`: the map's width and height.
+/// Reads the header up to and including `map`; returns the map's width and height.
 fn header<'a>(
     source: Source<'_>,
     lines: &mut impl Iterator<Item = Line<'a>>,
@@ -124,7 +125,7 @@ fn header<'a>(
 
 const HEADER: &str = "begin with the lines `type octile`, `height H`, `width W` and `map`";
 
-/// The number that the word `word` of the text writes.
+/// Reads the word `word` of the text as a number.
 fn size(source: Source<'_>, word: &str) -> Result<u64, InputError> {
     word.parse().map_err(|_| {
         let cause = format!("`{word}` is not a whole number");
@@ -153,8 +154,8 @@ pub fn load_scen(path: &Path) -> Result<Vec<ScenRow>, InputError> {
 /// Reads `text` as a `.scen` file; errors name `place`.
 ///
 /// # Errors
-/// When the first line is not `version 1`, or a row has not its nine fields between tabs, a
-/// field that is no number, or a start or goal outside the map.
+/// When the first line is not `version 1`, or a row does not have nine fields between tabs, a field
+/// is not a number, or a start or goal is outside the map.
 pub fn parse_scen(place: &str, text: &str) -> Result<Vec<ScenRow>, InputError> {
     let source = Source { place, text };
     let mut lines = source.lines_of(text);
@@ -185,13 +186,13 @@ fn scen_row(source: Source<'_>, line: usize, text: Line<'_>) -> Result<ScenRow, 
     Ok(ScenRow { line, bucket, map, width, height, start, goal, optimal_length })
 }
 
-/// The fields of a row, one after the other.
+/// The fields of a row, in order.
 struct Fields<'a> {
     source: Source<'a>,
     line: Line<'a>,
-    /// Where the rest of the row begins in the text.
+    /// The byte offset of the rest of the row in the text.
     offset: usize,
-    /// The rest of the row; none behind the last field.
+    /// The rest of the row; `None` after the last field.
     next: Option<&'a str>,
 }
 
@@ -199,7 +200,7 @@ const FIELDS: &str = "write bucket, map, width, height, start x, start y, goal x
                       optimal length, with a tab between each two";
 
 impl<'a> Fields<'a> {
-    /// The next field and where it begins.
+    /// Takes the next field; returns it with its byte offset.
     fn text(&mut self, name: &str) -> Result<(&'a str, usize), InputError> {
         let offset = self.offset;
         let rest = self.next.ok_or_else(|| {
@@ -223,7 +224,7 @@ impl<'a> Fields<'a> {
         })
     }
 
-    /// The column and, counted from the bottom, the row of a box.
+    /// Takes the column and, counted from the bottom, the row of a box.
     fn place(&mut self, name: &str, width: u32, height: u32) -> Result<(u32, u32), InputError> {
         let offset = self.offset;
         let (x, y): (u32, u32) = (self.number(name)?, self.number(name)?);

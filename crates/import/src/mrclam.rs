@@ -1,9 +1,9 @@
 //! UTIAS multi-robot cooperative localization and mapping (MRCLAM) data sets.
 //!
 //! A folder holds `Barcodes.dat`, `Landmark_Groundtruth.dat` and, for each robot `N`,
-//! `RobotN_Groundtruth.dat`, `RobotN_Odometry.dat` and `RobotN_Measurement.dat`; each may be
-//! packed as `.gz`. `#` starts a comment line; columns are separated by blanks. Every subject
-//! of `Barcodes.dat` without a surveyed position is a robot.
+//! `RobotN_Groundtruth.dat`, `RobotN_Odometry.dat` and `RobotN_Measurement.dat`; each may be packed
+//! as `.gz`. `#` starts a comment line; columns are separated by blanks. Every subject of
+//! `Barcodes.dat` without a surveyed position is a robot.
 //!
 //! The second column of the measurement files is the **barcode number**, although their
 //! header calls it a subject.
@@ -16,18 +16,18 @@ use super::table::{MAX_TEXT_BYTES, Word, find_file, rows};
 use sidestep_kernel::InputError;
 use sidestep_scenario::file::read_text;
 
-/// Everything in one folder.
+/// A data set: all files of one folder.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dataset {
-    /// Barcode number to subject number.
+    /// Subject number by barcode number.
     pub subject_of_barcode: BTreeMap<u32, u32>,
-    /// Subject number to position in the world, in m.
+    /// Position in the world by subject number, in meters.
     pub landmarks: BTreeMap<u32, [f64; 2]>,
-    /// Subject number to what that robot did and saw.
+    /// Log of each robot by subject number.
     pub robots: BTreeMap<u32, RobotLog>,
 }
 
-/// One robot's three streams; all stamps are of one clock, in s.
+/// One robot's three streams; all timestamps are of one clock, in s.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct RobotLog {
     /// Motion capture, sorted by time.
@@ -43,7 +43,7 @@ pub struct RobotLog {
 pub struct TruePose {
     /// Time in s.
     pub t_secs: f64,
-    /// Position in the world, in m.
+    /// Position in the world, in meters.
     pub position_m: [f64; 2],
     /// Heading in rad, counter-clockwise from the x axis.
     pub heading_rad: f64,
@@ -54,9 +54,9 @@ pub struct TruePose {
 pub struct Command {
     /// Time in s.
     pub t_secs: f64,
-    /// Forward velocity in m/s.
+    /// Forward velocity, in m/s.
     pub forward_mps: f64,
-    /// Angular velocity in rad/s, + to the left.
+    /// Angular velocity in rad/s, positive to the left.
     pub turn_radps: f64,
 }
 
@@ -67,9 +67,9 @@ pub struct Measurement {
     pub t_secs: f64,
     /// Barcode number as decoded, which may be a misreading.
     pub barcode: u32,
-    /// Range in m.
+    /// Range, in meters.
     pub range_m: f64,
-    /// Bearing in rad relative to the heading, + to the left.
+    /// Bearing in rad relative to the heading, positive to the left.
     pub bearing_rad: f64,
 }
 
@@ -142,7 +142,7 @@ fn refuse_second(place: &dyn fmt::Display, twice: bool, word: &Word) -> Result<(
     Err(word.error(place, format!("{} is listed twice", word.text), "list it once"))
 }
 
-/// Motion capture; sorted here, because poses are looked up by time.
+/// Parses motion capture; sorted here, because poses are looked up by time.
 fn parse_truth(place: &str, text: &str) -> Result<Vec<TruePose>, InputError> {
     let parse = |row: Result<[Word; 4], InputError>| {
         let [t, x, y, heading] = row?;

@@ -1,4 +1,4 @@
-//! A map of pixels, and the rule that makes boxes of them.
+//! A map of pixels, and the rule that turns pixels into boxes.
 
 use std::ops::Range;
 
@@ -8,7 +8,7 @@ use sidestep_map::{Cell, CellCounts, GridMap, UnknownPolicy, check_box_count, ch
 
 pub use super::image::MAX_PIXELS;
 
-/// An occupancy grid as a mapping robot makes it: square pixels, free, occupied or unknown.
+/// An occupancy grid from a mapping robot: square pixels, free, occupied or unknown.
 ///
 /// Pixel (0, 0) is the lower-left one: rows count from the bottom, unlike those of the image.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,8 +22,8 @@ pub struct PixelMap {
 }
 
 impl PixelMap {
-    /// A map of `width` x `height` pixels with a side of `resolution_m` metres whose lower-left
-    /// corner is at `origin_m`; `pixels` holds them row by row from the bottom.
+    /// Creates a map of `width` x `height` pixels with a side of `resolution_m` meters whose
+    /// lower-left corner is at `origin_m`; `pixels` holds them row by row from the bottom.
     ///
     /// # Panics
     /// When `pixels` has another length than `width * height`, or `resolution_m` is not a
@@ -40,44 +40,45 @@ impl PixelMap {
         Self { width, height, resolution_m, origin_m, pixels }
     }
 
-    /// Pixels from west to east.
+    /// Number of pixels from west to east.
     pub fn width(&self) -> u32 {
         self.width
     }
 
-    /// Pixels from south to north.
+    /// Number of pixels from south to north.
     pub fn height(&self) -> u32 {
         self.height
     }
 
-    /// Side of a pixel in metres.
+    /// Side of a pixel in meters.
     pub fn resolution_m(&self) -> f64 {
         self.resolution_m
     }
 
-    /// World position of the lower-left corner, in metres.
+    /// World position of the lower-left corner, in meters.
     pub fn origin_m(&self) -> [f64; 2] {
         self.origin_m
     }
 
-    /// All pixels, row by row from the bottom.
+    /// Returns all pixels, row by row from the bottom.
     pub fn pixels(&self) -> &[Cell] {
         &self.pixels
     }
 
-    /// Number of pixels of each sort.
+    /// Returns the number of pixels of each type.
     pub fn counts(&self) -> CellCounts {
         CellCounts::of(&self.pixels)
     }
 
-    /// The map in boxes with a side of `box_size_m` metres, counted from the lower-left corner.
+    /// Returns the map in boxes with a side of `box_size_m` meters, counted from the lower-left
+    /// corner.
     ///
-    /// A pixel belongs to the box that holds its center. A box is a wall when any of its pixels
-    /// is occupied, else unknown when any is unknown, else free; `unknown` then says what the
-    /// unknown boxes become. Where boxes are smaller than pixels, a box that holds no center of
-    /// a pixel is what the pixel around its own center is. The last column and row may reach
-    /// over the edge of the map; there is one for every pixel's center and for every box whose
-    /// center lies on the map.
+    /// A pixel belongs to the box that holds its center. A box is a wall when any of its pixels is
+    /// occupied, else unknown when any is unknown, else free; `unknown` then decides on the unknown
+    /// boxes. Where boxes are smaller than pixels, a box that holds no center of a pixel takes the
+    /// value of the pixel around its own center. The last column and row may extend past the edge
+    /// of the map; there is one for every pixel's center and for every box whose center lies on the
+    /// map.
     ///
     /// # Errors
     /// When `box_size_m` is not a positive number or makes more boxes than
@@ -96,7 +97,7 @@ impl PixelMap {
         Ok(GridMap::new(width, height, box_size_m, cells).with_origin(self.origin_m))
     }
 
-    /// What a box of these pixels is.
+    /// Returns the cell of a box of these pixels.
     fn whole(&self, cols: &Range<usize>, rows: &Range<usize>) -> Cell {
         let mut whole = Cell::Free;
         for row in rows.clone() {
@@ -113,7 +114,7 @@ impl PixelMap {
     }
 }
 
-/// How boxes lie over pixels, along one axis.
+/// The alignment of boxes with pixels, along one axis.
 #[derive(Clone, Copy)]
 struct Axis {
     /// Number of pixels, at least 1 where a method is called.
@@ -123,18 +124,18 @@ struct Axis {
 }
 
 impl Axis {
-    /// The box that holds the center of a pixel. Saturates far above any allowed size.
+    /// Returns the box that holds the center of a pixel. Saturates far above any allowed size.
     fn box_of(self, pixel: u32) -> u64 {
         ((f64::from(pixel) + 0.5) * self.resolution_m / self.box_size_m).floor() as u64
     }
 
-    /// The pixel around the center of a box.
+    /// Returns the pixel around the center of a box.
     fn pixel_around(self, index: u32) -> u32 {
         let pixel = ((f64::from(index) + 0.5) * self.box_size_m / self.resolution_m).floor();
         (pixel as u32).min(self.pixels - 1)
     }
 
-    /// The number of boxes.
+    /// Returns the number of boxes.
     fn boxes(self) -> u64 {
         let Some(last) = self.pixels.checked_sub(1) else { return 0 };
         let length = f64::from(self.pixels) * self.resolution_m / self.box_size_m;
@@ -142,7 +143,7 @@ impl Axis {
         with_center_on_map.max(self.box_of(last).saturating_add(1))
     }
 
-    /// The pixels that make up a box; at least one.
+    /// Returns the pixels that make up a box; at least one.
     fn pixels_of(self, index: u32) -> Range<usize> {
         let first = self.first_at_or_after(u64::from(index));
         let end = self.first_at_or_after(u64::from(index) + 1);
@@ -153,9 +154,10 @@ impl Axis {
         pixel..pixel + 1
     }
 
-    /// The first pixel whose center is in the box `index` or behind it.
+    /// Returns the first pixel whose center is in the box `index` or after it.
     fn first_at_or_after(self, index: u64) -> u32 {
-        // `box_of` never falls, so bisection finds the edge by the very formula that defines it.
+        // `box_of` never decreases, so bisection finds the edge with the very formula that defines
+        // it.
         let (mut low, mut high) = (0, self.pixels);
         while low < high {
             let middle = low + (high - low) / 2;

@@ -4,14 +4,14 @@
 //! `v / 255` where `negate` is set. The pixel is occupied where `p > occupied_thresh`, free
 //! where `p < free_thresh` and else unknown. The modes differ as follows.
 //!
-//! - `trinary`, the default: as said.
-//! - `scale`: what is neither occupied nor free gets a shade between the two; not being free
-//!   for sure, it is unknown here.
+//! - `trinary`, the default: as described above.
+//! - `scale`: a pixel that is neither occupied nor free gets a shade between the two; because it is
+//!   not certainly free, it is unknown here.
 //! - `raw`: `v` (`255 - v` where `negate` is set) is itself the occupancy in percent, compared
 //!   with both thresholds; above 100 it is unknown.
 //!
-//! Unlike `map_server`, whose trinary mode takes transparency for one more color, transparency
-//! is not looked at. Unknown keys are ignored, as `map_server` does.
+//! Transparency is ignored, unlike in `map_server`, whose trinary mode takes it for one more color.
+//! Unknown keys are ignored, as in `map_server`.
 
 use std::path::Path;
 
@@ -23,7 +23,7 @@ use super::map_yaml::{MAX_YAML_BYTES, Metadata};
 use sidestep_scenario::file::read_text;
 
 /// Reads the map whose YAML file is at `path`. YAML file and image may be packed with gzip; an
-/// image that is there only with `.gz` behind its name is found too.
+/// image that exists only with `.gz` after its name is found too.
 ///
 /// # Errors
 /// When a file is missing, damaged or absurdly large, a key is missing or has a wrong value, or

@@ -1,23 +1,23 @@
-//! Maps that are drawn with characters: what the two such formats share.
+//! The common parts of the two formats of maps that are drawn with characters.
 
 use sidestep_kernel::InputError;
 
 use sidestep_map::{Cell, GridMap, MAX_BOXES, check_box_count, check_box_size};
 
-/// The most bytes a map of characters may have: all boxes, and as much again for line ends.
+/// The maximum size of a map of characters in bytes: all boxes, and as much again for line ends.
 pub(super) const MAX_TEXT_BYTES: u64 = 2 * MAX_BOXES;
 
 /// The text of a file or of a part of it, for error messages.
 #[derive(Clone, Copy)]
 pub(super) struct Source<'a> {
-    /// The file's name, or the option's.
+    /// The name of the file or option.
     pub(super) place: &'a str,
-    /// All of the text.
+    /// The whole text.
     pub(super) text: &'a str,
 }
 
 impl<'a> Source<'a> {
-    /// An error at the byte `offset` of the text.
+    /// Creates an error at the byte `offset` of the text.
     pub(super) fn error(
         &self,
         offset: usize,
@@ -27,12 +27,12 @@ impl<'a> Source<'a> {
         InputError::new(self.place, cause, remedy).in_text(self.text, offset)
     }
 
-    /// Bytes of the text before `part`, a piece of that text.
+    /// Returns the number of bytes of the text before `part`, a piece of that text.
     pub(super) fn offset_of(&self, part: &str) -> usize {
         part.as_ptr() as usize - self.text.as_ptr() as usize
     }
 
-    /// The lines of `part`, a piece of the text, without their ends (LF or CR LF).
+    /// Returns the lines of `part`, a piece of the text, without their ends (LF or CR LF).
     pub(super) fn lines_of(self, part: &'a str) -> impl Iterator<Item = Line<'a>> {
         part.lines().map(move |text| Line { offset: self.offset_of(text), text })
     }
@@ -41,22 +41,22 @@ impl<'a> Source<'a> {
 /// A line of a text.
 #[derive(Clone, Copy)]
 pub(super) struct Line<'a> {
-    /// Bytes of the text before the line.
+    /// Number of bytes of the text before the line.
     pub(super) offset: usize,
     /// The line without its end.
     pub(super) text: &'a str,
 }
 
-/// What the characters of a map mean.
+/// The meaning of the characters of a map.
 pub(super) struct Legend {
-    /// The cell that a character stands for.
+    /// The cell that a character stands for, if any.
     pub(super) cell: fn(char) -> Option<Cell>,
-    /// The characters that stand for something, as a remedy.
+    /// The remedy for other characters: a list of those that stand for a cell.
     pub(super) remedy: &'static str,
 }
 
 impl Legend {
-    /// Appends to `cells` those of a line that has to have `width` characters.
+    /// Appends the cells of a line to `cells`; the line must have `width` characters.
     pub(super) fn read_row(
         &self,
         source: Source<'_>,
@@ -79,17 +79,18 @@ impl Legend {
     }
 }
 
-/// The error of a row of `length` characters that had to have `width`, where it should end.
+/// Returns the error of a row of `length` instead of `width` characters, at the place where it
+/// should end.
 fn ragged(source: Source<'_>, line: Line<'_>, length: usize, width: usize) -> InputError {
     let at = line.text.char_indices().nth(width).map_or(line.text.len(), |(at, _)| at);
     let cause = format!("this row has {length} characters, not {width}");
     source.error(line.offset + at, cause, "give all rows the same number of characters")
 }
 
-/// A map of `cells` that are given row by row from the top, `width` in a row.
+/// Creates a map of `cells` that are given row by row from the top, `width` in a row.
 ///
 /// # Errors
-/// When there are no boxes or too many, or a box has no positive size.
+/// When there are no boxes or too many, or the side of a box is not positive.
 pub(super) fn map_from_top(
     place: &str,
     cells: &[Cell],

@@ -1,5 +1,5 @@
-//! The importers against results that others have computed for the same real files: pixel and
-//! box counts, components and distances of every map in `../shared/data`.
+//! Tests of the importers against results that others have computed for the same real files: pixel
+//! and box counts, components and distances of every map in `../shared/data`.
 
 use sidestep_testing::shared_data as shared;
 use std::collections::BTreeSet;
@@ -112,7 +112,7 @@ fn every_movingai_scenario_has_the_expected_lengths() {
 }
 
 fn has_octile_length(free: &FreeSpace, row: &movingai::ScenRow) -> bool {
-    // The files give 8 digits behind the point.
+    // The files give 8 digits after the decimal point.
     octile_distance(free, row.start, row.goal)
         .is_some_and(|length| (length - row.optimal_length).abs() < 1e-6)
 }

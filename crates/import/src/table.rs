@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 use sidestep_kernel::InputError;
 use sidestep_scenario::file::read_text;
 
-/// The longest text that is read, in bytes after unpacking: some 20 times the largest known log.
+/// The maximum size of a text in bytes after unpacking: some 20 times the largest known log.
 pub const MAX_TEXT_BYTES: u64 = 1 << 29;
 
-/// The file `name` in `folder`, or `name.gz` where only that exists.
+/// Returns the path of the file `name` in `folder`, or of `name.gz` where only that exists.
 ///
 /// # Errors
 /// When neither exists.
@@ -24,10 +24,10 @@ pub fn find_file(folder: &Path, name: &str) -> Result<PathBuf, InputError> {
     })
 }
 
-/// The longest CSV table that is read, in bytes after unpacking.
+/// The maximum size of a CSV table in bytes after unpacking.
 pub const MAX_CSV_BYTES: u64 = 1 << 28;
 
-/// One word of a text and where it stands.
+/// One word of a text, with its position.
 #[derive(Debug, Clone, Copy)]
 pub struct Word<'a> {
     /// The word without the blanks around it.
@@ -39,15 +39,15 @@ pub struct Word<'a> {
 }
 
 impl Word<'_> {
-    /// An error that points at this word.
+    /// Creates an error that points at this word.
     pub fn error(&self, place: &dyn fmt::Display, cause: String, remedy: &str) -> InputError {
         InputError::new(place, cause, remedy).at(self.line, self.column)
     }
 
-    /// The word as a finite number.
+    /// Reads the word as a finite number.
     ///
     /// # Errors
-    /// When it is no number, infinite or not a number.
+    /// When it is not a number, or not finite.
     pub fn number(&self, place: &dyn fmt::Display) -> Result<f64, InputError> {
         match self.text.parse::<f64>() {
             Ok(value) if value.is_finite() => Ok(value),
@@ -59,7 +59,7 @@ impl Word<'_> {
         }
     }
 
-    /// The word as a whole number from 0.
+    /// Reads the word as a whole number from 0.
     ///
     /// # Errors
     /// When it is something else.
@@ -74,12 +74,12 @@ impl Word<'_> {
     }
 }
 
-/// A word as it is quoted in an error: its first 40 characters.
+/// Returns a word as it is quoted in an error: its first 40 characters.
 fn shorten(text: &str) -> &str {
     text.char_indices().nth(40).map_or(text, |(end, _)| &text[..end])
 }
 
-/// The words of line number `line`, separated by blanks or tabs.
+/// Returns the words of line number `line`, separated by blanks or tabs.
 pub fn words(line: usize, text: &str) -> impl Iterator<Item = Word<'_>> {
     text.split_ascii_whitespace().map(move |word| {
         let offset = word.as_ptr() as usize - text.as_ptr() as usize;
@@ -87,7 +87,7 @@ pub fn words(line: usize, text: &str) -> impl Iterator<Item = Word<'_>> {
     })
 }
 
-/// The lines that hold data: neither blank nor a `#` comment. Numbered from 1.
+/// Returns the lines that hold data, neither blank nor a `#` comment, with their numbers from 1.
 pub fn data_lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
     let numbered = text.lines().enumerate().map(|(i, line)| (i + 1, line));
     numbered.filter(|(_, line)| {
@@ -96,16 +96,16 @@ pub fn data_lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
     })
 }
 
-/// All data lines as rows of exactly `N` words.
+/// Returns all data lines as rows of exactly `N` words.
 ///
 /// # Errors
-/// Each item where the line has more or fewer words.
+/// Each item is an error where the line has more or fewer words.
 pub fn rows<'a, const N: usize>(
     place: &dyn fmt::Display,
     text: &'a str,
 ) -> impl Iterator<Item = Result<[Word<'a>; N], InputError>> {
     data_lines(text).map(move |(line, content)| {
-        // One word more than wanted is enough to see that there are too many.
+        // One word more than wanted is enough to detect that there are too many.
         let found: Vec<Word> = words(line, content).take(N + 1).collect();
         let wrong = found.get(N).or(found.last()).map_or(1, |word| word.column);
         let count = if found.len() > N { "more" } else { "fewer" };
@@ -125,14 +125,14 @@ pub struct CsvTable {
     header: Vec<String>,
     /// Line of each row, from 1.
     lines: Vec<u32>,
-    /// All fields of all rows, one after the other.
+    /// All fields of all rows in one string.
     fields: String,
-    /// Where each field ends in `fields`; as many per row as the header has.
+    /// The end of each field in `fields`; as many per row as the header has.
     ends: Vec<u32>,
 }
 
 impl CsvTable {
-    /// Reads a file, plain or packed.
+    /// Reads a CSV file, plain or packed with gzip.
     ///
     /// # Errors
     /// When it cannot be read or a row has another number of fields than the header.
@@ -140,7 +140,7 @@ impl CsvTable {
         Self::parse(&path.display(), &read_text(path, MAX_CSV_BYTES)?)
     }
 
-    /// Parses text; `place` is named in errors.
+    /// Parses the text of a CSV file; `place` is named in errors.
     ///
     /// # Errors
     /// When a row has another number of fields than the header, there is no header, or the text
@@ -182,17 +182,17 @@ impl CsvTable {
         }
     }
 
-    /// The file, as errors name it.
+    /// Returns the name of the file in errors.
     pub fn place(&self) -> &str {
         &self.place
     }
 
-    /// The position of the column called `name`, where there is one.
+    /// Returns the index of the column called `name`, where there is one.
     pub fn find(&self, name: &str) -> Option<usize> {
         self.header.iter().position(|column| column == name)
     }
 
-    /// The position of the column called `name`.
+    /// Returns the index of the column called `name`.
     ///
     /// # Errors
     /// When there is none.
@@ -204,7 +204,7 @@ impl CsvTable {
         })
     }
 
-    /// The rows, in the order of the file.
+    /// Returns the rows, in the order of the file.
     pub fn rows(&self) -> impl Iterator<Item = CsvRow<'_>> {
         (0..self.lines.len()).map(|index| CsvRow { table: self, index })
     }
@@ -218,13 +218,13 @@ pub struct CsvRow<'a> {
 }
 
 impl<'a> CsvRow<'a> {
-    /// The field in the column at `index`, which [`CsvTable::column`] gave.
+    /// Returns the field in the column at `index`, which [`CsvTable::column`] returned.
     ///
     /// # Panics
     /// When the header has no such column.
     pub fn field(&self, index: usize) -> Word<'a> {
         assert!(index < self.table.header.len(), "a column of the header");
-        // Quotes and trimmed blanks are not kept, so the column may be off by those.
+        // Quotes and trimmed blanks are not kept, so the column may be off by these.
         let before: usize = (0..index).map(|i| self.text(i).chars().count() + 1).sum();
         let line = self.table.lines[self.index] as usize;
         Word { text: self.text(index), line, column: before + 1 }

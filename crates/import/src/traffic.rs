@@ -17,20 +17,21 @@ use sidestep_kernel::InputError;
 pub struct RecordedTraffic {
     /// One track per aircraft, sorted by `icao24`.
     pub tracks: Vec<Track>,
-    /// Rows of the table, without the header.
+    /// Number of rows of the table, without the header.
     pub rows: usize,
-    /// Rows that repeat the instant of an earlier row of the same aircraft; they are left out.
+    /// Number of rows that repeat the instant of an earlier row of the same aircraft; they are left
+    /// out.
     pub repeated_rows: usize,
 }
 
-/// What one aircraft flew.
+/// The track of one aircraft.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Track {
     /// Address of the transponder, as written.
     pub icao24: String,
-    /// The first call sign that is given; empty where there is none.
+    /// The first call sign in the file; empty where there is none.
     pub callsign: String,
-    /// At least one sample, their times strictly ascending.
+    /// The samples, at least one, with strictly increasing times.
     pub samples: Vec<Sample>,
 }
 
@@ -39,15 +40,15 @@ pub struct Track {
 pub struct Sample {
     /// Time in s since the start of 1970, UTC.
     pub time_s: f64,
-    /// Where it was.
+    /// Its position.
     pub position: LatLon,
-    /// Barometric altitude in ft.
+    /// Barometric altitude, in ft.
     pub altitude_ft: f64,
     /// Speed over the ground in kt, not negative.
     pub ground_speed_kt: f64,
     /// Direction of motion over the ground in degrees, clockwise from true north, in [0, 360).
     pub track_deg: f64,
-    /// Vertical speed in ft/min, + up.
+    /// Vertical speed in ft/min, positive upwards.
     pub vertical_speed_fpm: Option<f64>,
 }
 
@@ -67,7 +68,7 @@ pub fn parse(place: &dyn fmt::Display, text: &str) -> Result<RecordedTraffic, In
     tracks(&CsvTable::parse(place, text)?)
 }
 
-/// The columns' positions.
+/// The indices of the columns.
 struct Columns<'a> {
     place: &'a str,
     time: usize,
@@ -155,7 +156,7 @@ fn tracks(table: &CsvTable) -> Result<RecordedTraffic, InputError> {
     Ok(RecordedTraffic { tracks, rows, repeated_rows })
 }
 
-/// Sorts the samples; of several at one instant the first stays. Returns how many went.
+/// Sorts the samples; of several at one instant the first is kept. Returns how many were removed.
 fn sort_by_time(track: &mut Track) -> usize {
     let before = track.samples.len();
     track.samples.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));

@@ -1,11 +1,11 @@
-//! Maps written as `map_server` reads them, so that a run can keep the ones that it saw.
+//! Maps written in the format of `map_server`, so that a run can store the maps that it saw.
 
 use sidestep_map::Cell;
 
-/// Name of the image that [`map_files`] speaks of.
+/// Name of the image to which [`map_files`] refers.
 const IMAGE: &str = "map.pgm";
 
-/// YAML file and image of a map, with their names; rows of cells begin at the bottom.
+/// Returns YAML file and image of a map, with their names; rows of cells start at the bottom.
 pub fn map_files(
     [width, height]: [u32; 2],
     resolution_m: f64,
@@ -25,8 +25,8 @@ pub fn map_files(
     [("map.yaml", yaml.into_bytes()), (IMAGE, image)]
 }
 
-/// Binary PGM of gray values whose rows begin at the bottom: the first row of the file is the
-/// north edge.
+/// Returns a binary PGM of gray values whose rows start at the bottom: the first row of the file is
+/// the north edge.
 pub fn pgm(width: u32, height: u32, grays: impl Iterator<Item = u8>) -> Vec<u8> {
     let grays: Vec<u8> = grays.collect();
     let mut bytes = format!("P5\n{width} {height}\n255\n").into_bytes();

@@ -1,11 +1,11 @@
-//! XML files: what their readers share. Every error names the place in the file.
+//! The common parts of XML readers. Every error names the position in the file.
 
 use std::str::FromStr;
 
 use roxmltree::{Attribute, Document, Node, ParsingOptions};
 use sidestep_kernel::InputError;
 
-/// The most elements, comments and pieces of text that one file may have.
+/// The maximum number of elements, comments and pieces of text in one file.
 const MAX_NODES: u32 = 1 << 20;
 
 /// An XML file in memory.
@@ -24,7 +24,7 @@ impl<'a> XmlFile<'a> {
         Ok(Self { place, text, document })
     }
 
-    /// The outermost element, which must be called `name`.
+    /// Returns the outermost element, which must be called `name`.
     pub(super) fn root(&self, name: &str) -> Result<Element<'_>, InputError> {
         let root = Element { file: self, node: self.document.root_element() };
         if root.name() == name {
@@ -34,7 +34,7 @@ impl<'a> XmlFile<'a> {
         Err(root.error(cause, "check that this is the right sort of file"))
     }
 
-    /// All elements in the order of the file.
+    /// Returns all elements in the order of the file.
     pub(super) fn elements(&self) -> impl Iterator<Item = Element<'_>> {
         let nodes = self.document.descendants().filter(Node::is_element);
         nodes.map(|node| Element { file: self, node })
@@ -70,7 +70,8 @@ fn malformed(place: &str, text: &str, error: &roxmltree::Error) -> InputError {
     InputError::new(place, cause, remedy).in_text(text, offset)
 }
 
-/// Bytes before a place that is given by line and column, the column in characters.
+/// Returns the byte offset of a position that is given by line and column, the column in
+/// characters.
 fn offset_of(text: &str, at: roxmltree::TextPos) -> usize {
     let mut lines = text.split_inclusive('\n');
     let before: usize = lines.by_ref().take(at.row as usize - 1).map(str::len).sum();
@@ -86,17 +87,17 @@ pub(super) struct Element<'a> {
 }
 
 impl<'a> Element<'a> {
-    /// Its name without prefix.
+    /// Returns its name without prefix.
     pub(super) fn name(&self) -> &'a str {
         self.node.tag_name().name()
     }
 
-    /// The address that its prefix stands for, if it has a prefix.
+    /// Returns the namespace that its prefix stands for, if it has a prefix.
     pub(super) fn namespace(&self) -> Option<&'a str> {
         self.node.tag_name().namespace()
     }
 
-    /// The elements directly in it that are called `name` and have no prefix.
+    /// Returns its direct children that are called `name` and have no prefix.
     pub(super) fn children(self, name: &'a str) -> impl Iterator<Item = Element<'a>> {
         let nodes = self.node.children().filter(move |n| {
             n.is_element() && n.tag_name().name() == name && n.tag_name().namespace().is_none()
@@ -104,7 +105,7 @@ impl<'a> Element<'a> {
         nodes.map(move |node| Element { node, ..self })
     }
 
-    /// The element directly in it that is called `name`, if there is one.
+    /// Returns its direct child called `name`, if there is one.
     pub(super) fn child(self, name: &'a str) -> Result<Option<Element<'a>>, InputError> {
         let mut found = self.children(name);
         let first = found.next();
@@ -116,7 +117,7 @@ impl<'a> Element<'a> {
         }
     }
 
-    /// The element directly in it that is called `name` and must be there.
+    /// Returns its direct child called `name`, which must exist.
     pub(super) fn required_child(self, name: &'a str) -> Result<Element<'a>, InputError> {
         self.child(name)?.ok_or_else(|| {
             let cause = format!("<{}> lacks <{name}>", self.described());
@@ -124,12 +125,12 @@ impl<'a> Element<'a> {
         })
     }
 
-    /// The value of an attribute, if it is there.
+    /// Returns the value of an attribute, if it exists.
     pub(super) fn attribute(self, name: &str) -> Option<Value<'a>> {
         self.node.attribute_node(name).map(|attribute| Value { element: self, attribute })
     }
 
-    /// The value of an attribute that must be there and not be empty.
+    /// Returns the value of an attribute that must exist and not be empty.
     pub(super) fn required(self, name: &str) -> Result<Value<'a>, InputError> {
         let value = self.attribute(name).ok_or_else(|| {
             let cause = format!("<{}> has no `{name}`", self.described());
@@ -141,18 +142,18 @@ impl<'a> Element<'a> {
         Ok(value)
     }
 
-    /// All attributes.
+    /// Returns all attributes.
     pub(super) fn attributes(self) -> impl Iterator<Item = Value<'a>> {
         self.node.attributes().map(move |attribute| Value { element: self, attribute })
     }
 
-    /// An error at the beginning of the element.
+    /// Creates an error at the start of the element.
     pub(super) fn error(&self, cause: impl Into<String>, remedy: impl Into<String>) -> InputError {
         let offset = self.node.range().start;
         InputError::new(self.file.place, cause, remedy).in_text(self.file.text, offset)
     }
 
-    /// The element's name, and which one it is.
+    /// Returns the element's name, and the attribute that identifies it.
     fn described(&self) -> String {
         match self.node.attribute("name") {
             Some(name) => format!("{} name=\"{name}\"", self.name()),
@@ -169,17 +170,17 @@ pub(super) struct Value<'a> {
 }
 
 impl<'a> Value<'a> {
-    /// The text between the quotation marks, without blanks around it.
+    /// Returns the text between the quotation marks, without blanks around it.
     pub(super) fn text(&self) -> &'a str {
         self.attribute.value().trim()
     }
 
-    /// One finite number.
+    /// Reads one finite number.
     pub(super) fn number(&self) -> Result<f64, InputError> {
         self.parse_number(self.text())
     }
 
-    /// Three finite numbers between blanks.
+    /// Reads three finite numbers between blanks.
     pub(super) fn triple(&self) -> Result<[f64; 3], InputError> {
         let numbers: Result<Vec<_>, _> =
             self.text().split_whitespace().map(|word| self.parse_number(word)).collect();
@@ -197,7 +198,7 @@ impl<'a> Value<'a> {
         })
     }
 
-    /// An error at the value.
+    /// Creates an error at the value.
     pub(super) fn error(&self, cause: impl Into<String>, remedy: impl Into<String>) -> InputError {
         let file = self.element.file;
         let offset = self.attribute.range_value().start;

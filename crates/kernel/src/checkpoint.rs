@@ -1,4 +1,4 @@
-//! A state as bytes that continue a run bit for bit, or say why they cannot.
+//! Checkpoints: a state as bytes that continue a run bit for bit, or an error that says why not.
 //!
 //! ```text
 //! magic 8 | header (postcard) | state (postcard) | BLAKE3 of all before, 16 bytes
@@ -10,15 +10,15 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 const MAGIC: &[u8; 8] = b"SIDESTEP";
 
-/// Raised when the layout of checkpoints changes; older ones are then refused.
+/// Version of the checkpoint layout; checkpoints of any other version are refused.
 pub const FORMAT: u32 = 1;
 
-/// What a checkpoint belongs to.
+/// The program, world, scenario and cycle that a checkpoint belongs to.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Header {
     /// [`FORMAT`] of the writer.
     pub format: u32,
-    /// Version of the program that wrote it; results may differ between versions.
+    /// Version of the program that wrote it, because results may differ between versions.
     pub program_version: String,
     /// Name of the world.
     pub world: String,
@@ -28,7 +28,7 @@ pub struct Header {
     pub cycle: Cycle,
 }
 
-/// Why a checkpoint cannot be continued.
+/// A reason why a checkpoint cannot be continued.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CheckpointError {
@@ -41,22 +41,22 @@ pub enum CheckpointError {
     /// Written with another layout.
     #[error("the checkpoint has format {found}, this program reads format {FORMAT}")]
     Format {
-        /// Its format.
+        /// The format that was found.
         found: u32,
     },
-    /// Of another program version, world or scenario.
+    /// From another program version, world or scenario.
     #[error("the checkpoint belongs to {what} `{found}`, not `{expected}`")]
     Foreign {
-        /// What differs.
+        /// The property that differs.
         what: &'static str,
-        /// What the checkpoint says.
+        /// Its value in the checkpoint.
         found: String,
-        /// What was asked for.
+        /// The expected value.
         expected: String,
     },
 }
 
-/// Encodes a state.
+/// Encodes a state as a checkpoint.
 ///
 /// # Panics
 /// When the state cannot be serialized, which is a bug of the world.
@@ -69,7 +69,7 @@ pub fn encode(header: &Header, state: &impl Serialize) -> Vec<u8> {
     bytes
 }
 
-/// Reads the header alone, after checking the whole.
+/// Reads the header alone, after checking the checksum of all bytes.
 ///
 /// # Errors
 /// When the bytes are no checkpoint, damaged, or of another format.

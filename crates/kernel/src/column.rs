@@ -1,17 +1,17 @@
 //! A column of a state that workers share: one plain value per slot.
 //!
-//! The kernel's phases guarantee one writer per slot and phase, and a barrier between
-//! phases; so a relaxed load or store, an ordinary `mov` on every machine, is all that is
-//! needed, and no code is `unsafe`. A broken guarantee would show as a wrong value (and in
-//! the determinism tests), never as undefined behavior.
+//! The kernel's phases guarantee one writer per slot and phase, and a barrier between phases. A
+//! relaxed load or store, an ordinary `mov` on every machine, is therefore enough, and no code is
+//! `unsafe`. A broken guarantee would show as a wrong value (and in the determinism tests), never
+//! as undefined behavior.
 
 use std::sync::atomic::{AtomicU8, AtomicU16, AtomicU32, AtomicU64, Ordering::Relaxed};
 
-/// A word that fits an atomic.
+/// A plain value that fits into an atomic.
 pub trait Word: Copy + Default + Send + Sync + 'static {
     /// The atomic that holds it.
     type Cell: Send + Sync;
-    /// A cell with this value.
+    /// Returns a cell with this value.
     fn cell(self) -> Self::Cell;
     /// Reads a cell.
     fn load(cell: &Self::Cell) -> Self;
@@ -66,7 +66,7 @@ impl<T: Word> Shared<T> {
         T::load(&self.0)
     }
 
-    /// Sets the value; only the cell's one writer of the phase may.
+    /// Sets the value; allowed only to the cell's one writer of the phase.
     #[inline(always)]
     pub fn set(&self, value: T) {
         T::store(&self.0, value);
@@ -89,7 +89,7 @@ impl<T: Word + std::fmt::Debug> std::fmt::Debug for Shared<T> {
 pub struct Column<T: Word>(Box<[T::Cell]>);
 
 impl<T: Word> Column<T> {
-    /// `n` slots that hold `value`.
+    /// Creates `n` slots that hold `value`.
     pub fn filled(n: usize, value: T) -> Self {
         (0..n).map(|_| value).collect()
     }
@@ -100,7 +100,7 @@ impl<T: Word> Column<T> {
         T::load(&self.0[slot])
     }
 
-    /// Sets a slot; only its one writer of the phase may.
+    /// Sets a slot; allowed only to its one writer of the phase.
     #[inline(always)]
     pub fn set(&self, slot: usize, value: T) {
         T::store(&self.0[slot], value);
@@ -117,7 +117,7 @@ impl<T: Word> Column<T> {
         self.0.len()
     }
 
-    /// True without slots.
+    /// Whether there are no slots.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
@@ -152,7 +152,7 @@ impl<T: Word + std::fmt::Debug> std::fmt::Debug for Column<T> {
 }
 
 impl Column<u32> {
-    /// Adds to a slot's counter, wrapping never in practice (2^32 events).
+    /// Adds to a slot's counter, which in practice never wraps (2^32 events).
     #[inline(always)]
     pub fn add(&self, slot: usize, by: u32) {
         self.set(slot, self.get(slot).wrapping_add(by));

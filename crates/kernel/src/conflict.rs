@@ -1,10 +1,10 @@
-//! Conflict groups: bodies whose claims intersect, and what hangs together by that.
+//! Conflict groups: bodies whose claims intersect, directly or through other bodies.
 //!
-//! A lock-free union-find over slots. Joining is commutative and associative, so the groups
-//! depend neither on the worker that found a conflict nor on the order of finding: a group's
-//! leader is its smallest slot, and its members are what hangs below the leader in the
-//! forest of joins. A body hangs below another at most once a cycle, so the forest needs
-//! three words per body and no allocation.
+//! A lock-free union-find over slots. Joining is commutative and associative, so the groups depend
+//! neither on the worker that found a conflict nor on the order in which conflicts are found: a
+//! group's leader is its smallest slot, and its members are the leader's descendants in the forest
+//! of joins. A slot gets a parent at most once a cycle, so the forest needs three words per body
+//! and no allocation.
 
 use crate::column::Column;
 use crate::units::Slot;
@@ -17,14 +17,14 @@ const NONE: Slot = Slot::MAX;
 pub struct Groups {
     /// Towards the leader; a leader points at itself.
     parent: Column<Slot>,
-    /// Last slot that was hung below this one.
+    /// Last slot that became a child of this one.
     first_child: Column<Slot>,
-    /// The slot that was hung below the same one before this.
+    /// The previous child of the same parent.
     next_sibling: Column<Slot>,
 }
 
 impl Groups {
-    /// Every one of `n` slots alone.
+    /// Creates groups of one slot each, for `n` slots.
     pub fn new(n: usize) -> Self {
         Self {
             parent: (0..n as Slot).collect(),
@@ -33,14 +33,15 @@ impl Groups {
         }
     }
 
-    /// Makes `slot` alone again; by one worker, before the first join of a cycle.
+    /// Makes `slot` a group of its own again; called by one worker, before the first join of a
+    /// cycle.
     #[inline]
     pub fn reset(&self, slot: Slot) {
         self.parent.set(slot as usize, slot);
         self.first_child.set(slot as usize, NONE);
     }
 
-    /// The leader of a slot's group: its smallest member, once all joins are done.
+    /// Returns the leader of a slot's group: its smallest member, once all joins are done.
     #[inline]
     pub fn leader(&self, mut slot: Slot) -> Slot {
         loop {
@@ -49,14 +50,14 @@ impl Groups {
                 return slot;
             }
             let grandparent = self.parent.get(parent as usize);
-            // Path halving. A slot that hangs stays hanging and parents only shrink, so a
-            // racing store can but shorten the way less.
+            // Path halving. A slot that has a parent keeps one, and parents only decrease, so a
+            // racing store can at worst shorten the path less.
             self.parent.set(slot as usize, grandparent);
             slot = grandparent;
         }
     }
 
-    /// Puts two slots into one group. Any worker may, at any time between two barriers.
+    /// Puts two slots into one group. Any worker may call it, at any time between two barriers.
     pub fn join(&self, a: Slot, b: Slot) {
         let (mut a, mut b) = (a, b);
         loop {
@@ -73,13 +74,13 @@ impl Groups {
         }
     }
 
-    /// True for a slot that leads its group; read after the barrier that ends joining.
+    /// Whether a slot leads its group; valid after the barrier that ends joining.
     #[inline]
     pub fn is_leader(&self, slot: Slot) -> bool {
         self.parent.get(slot as usize) == slot
     }
 
-    /// True for a leader without other members.
+    /// Whether a leader is the only member of its group.
     #[inline]
     pub fn is_alone(&self, slot: Slot) -> bool {
         self.first_child.get(slot as usize) == NONE && self.is_leader(slot)

@@ -6,11 +6,11 @@
 //!                         barrier                barrier          barrier
 //! ```
 //!
-//! Where agents decide together ([`crate::world::Decides`]), they do it in the last phase.
+//! Agents that decide together ([`crate::world::Decides`]) do so in the last phase.
 //!
-//! The source paper merges tasks while they are inserted into pool two and so needs two
-//! barriers, but a lock or an atomic exchange per claimed box. Here claims are plain stores
-//! and joining is a pass of its own, for the price of one more barrier a cycle.
+//! The source paper merges tasks while they are inserted into pool two and so needs two barriers,
+//! but a lock or an atomic exchange per claimed box. Here claims are plain stores and joining is a
+//! pass of its own, at the price of one more barrier per cycle.
 
 use crate::conflict::Groups;
 use crate::ports::Clock;
@@ -21,10 +21,10 @@ use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// Time spent in each phase by worker 0, waiting at the barrier included, in nanoseconds.
+/// Time of worker 0 in each phase, waiting at the barrier included, in nanoseconds.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct PhaseTimes {
-    /// Every body perceives, decides where agents decide alone, and claims.
+    /// Every body perceives, decides (where agents decide alone), and claims.
     pub claim_ns: u64,
     /// Claims become groups.
     pub join_ns: u64,
@@ -55,14 +55,14 @@ pub struct Mate<S> {
     pub tally: Tally,
 }
 
-/// What a worker has seen and spent, and its buffers.
+/// A worker's group sizes, processor time and buffers.
 #[derive(Debug, Default)]
 pub struct Tally {
     /// Conflict groups seen by size: index k counts groups of `2^k .. 2^(k+1)` bodies.
     pub group_sizes: [u64; 32],
     /// The largest group seen.
     pub largest_group: u64,
-    /// Processor time of the worker's thread.
+    /// Processor time of the worker's thread, in nanoseconds.
     pub cpu_ns: u64,
     members: Vec<Slot>,
     /// Bodies in conflict that have not acted yet, in worlds with an auction.
@@ -70,7 +70,7 @@ pub struct Tally {
 }
 
 impl<S> Mate<S> {
-    /// A worker that has done nothing yet.
+    /// Creates a worker that has done nothing yet.
     pub fn new(scratch: S) -> Self {
         Self { scratch, tally: Tally::default() }
     }
@@ -88,15 +88,15 @@ pub(crate) type Crew<S> = [Mutex<Mate<S>>];
 
 /// Looks on between the cycles of a run, on the calling thread, while all workers wait.
 ///
-/// It sees the state and takes what the workers have gathered, so that a caller who must look
-/// after every cycle (keep poses, gather events, ask whether the run is over) costs no thread
-/// and no call of the system per cycle. It cannot change the state.
+/// It sees the state and takes over the results of the workers, so that a caller who must look
+/// after every cycle (keep poses, gather events, ask whether the run is over) costs no thread and
+/// no system call per cycle. It cannot change the state.
 pub trait Observer<W: Phases> {
-    /// Sees the state as cycle `now` begins.
+    /// Sees the state at the start of cycle `now`.
     fn before_cycle(&mut self, _now: Cycle, _state: &W::State) {}
 
-    /// Sees the state that cycle `now` has left, and what the workers have gathered.
-    /// `Break` ends the run there.
+    /// Sees the state after cycle `now`, and the results of the workers. `Break` ends the run
+    /// there.
     fn after_cycle(
         &mut self,
         now: Cycle,
@@ -105,19 +105,19 @@ pub trait Observer<W: Phases> {
     ) -> ControlFlow<()>;
 }
 
-/// The scratches of all workers, while they wait.
+/// The scratches of all workers, while these wait.
 #[derive(Debug)]
 pub struct Scratches<'a, S>(&'a Crew<S>);
 
 impl<S> Scratches<'_, S> {
-    /// Calls `take` for the scratch of each worker. Which worker has gathered what differs from
-    /// run to run: no result may depend on the order.
+    /// Calls `take` for the scratch of each worker. The share of each worker differs from run to
+    /// run: no result may depend on the order.
     pub fn for_each(&mut self, mut take: impl FnMut(&mut S)) {
         self.0.iter().for_each(|mate| take(&mut lock(mate).scratch));
     }
 }
 
-/// A worker that panicked ends the run, so what it left behind is never looked at.
+/// A worker that panicked ends the run, so nothing it left behind is ever read.
 pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -127,20 +127,20 @@ pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 pub(crate) struct Stretch {
     /// The first cycle.
     pub(crate) from: Cycle,
-    /// How many at most,
+    /// The maximum number of cycles.
     pub(crate) cycles: u64,
-    /// and how long: no cycle begins later than this after the first.
+    /// The longest time in nanoseconds: no cycle starts later than this after the first.
     pub(crate) limit_ns: u64,
 }
 
-/// What became of a [`Stretch`].
+/// The result of a [`Stretch`].
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Ran {
     /// Cycles done, at least 1.
     pub(crate) cycles: u64,
-    /// Their time, with the start of the threads and the observer,
+    /// Their time in nanoseconds, including the start of the threads and the observer.
     pub(crate) took_ns: u64,
-    /// and the time until the first of them was done.
+    /// Nanoseconds until the first of them was done.
     pub(crate) first_ns: u64,
     /// Whether the observer ended the run.
     pub(crate) is_ended: bool,
@@ -181,7 +181,7 @@ pub(crate) fn advance<W: Phases, C: Clock>(
     Ran { took_ns: clock.now_ns() - started_ns, ..lead.ran }
 }
 
-/// What all workers see of a stretch.
+/// The data of a stretch that all workers share.
 struct Shared<'a, W: Phases> {
     world: &'a W,
     state: &'a W::State,
@@ -195,12 +195,12 @@ struct Shared<'a, W: Phases> {
     stop: AtomicBool,
 }
 
-/// The part of worker 0 alone: it reads the clock, calls the observer, and says when to stop.
+/// The part of worker 0 alone: it reads the clock, calls the observer, and ends the stretch.
 struct Lead<'a, 'b, W: Phases, C> {
     clock: &'a C,
     observer: Option<&'a mut (dyn Observer<W> + 'b)>,
     started_ns: u64,
-    /// When the present phase began.
+    /// Clock reading at the start of the present phase, in nanoseconds.
     mark_ns: u64,
     ran: Ran,
 }
@@ -213,7 +213,7 @@ impl<W: Phases, C: Clock> Lead<'_, '_, W, C> {
         self.mark_ns = now_ns;
     }
 
-    /// Counts a cycle, and says whether the stretch ends with it.
+    /// Counts a cycle, and returns whether the stretch ends with it.
     fn count(&mut self, stretch: Stretch) -> bool {
         let since_ns = self.mark_ns - self.started_ns;
         self.ran.cycles += 1;
@@ -239,6 +239,7 @@ impl<W: Phases> Shared<'_, W> {
             let mate = held.get_or_insert_with(|| lock(&self.crew[worker.index()]));
             self.one_cycle(worker, mate, (now, round), lead.as_deref_mut());
             if self.is_observed {
+                // The observer locks the scratches of all workers, so each releases its own first.
                 held = None;
                 worker.barrier();
                 if let Some(lead) = &mut lead {
@@ -246,6 +247,7 @@ impl<W: Phases> Shared<'_, W> {
                 }
             }
             if let Some(lead) = &mut lead
+                // `observe` has counted the cycle already.
                 && !self.is_observed
                 && lead.count(self.stretch)
             {
@@ -255,7 +257,7 @@ impl<W: Phases> Shared<'_, W> {
             if let Some(lead) = &mut lead
                 && worker.team_size() > 1
             {
-                // The wait for the others.
+                // The wait for the others counts as part of the phase.
                 lead.end_phase(|times| &mut times.act_ns);
             }
             if self.stop.load(Ordering::Relaxed) {
@@ -275,10 +277,12 @@ impl<W: Phases> Shared<'_, W> {
         } else {
             observer.before_cycle(now + 1, self.state);
         }
+        // The observer's own time belongs to no phase.
         lead.mark_ns = lead.clock.now_ns();
     }
 
-    /// All phases of one cycle; what the last one has done is seen after the next barrier.
+    /// Runs all phases of one cycle; the effects of the last one are visible after the next
+    /// barrier.
     #[inline]
     fn one_cycle<C: Clock>(
         &self,
@@ -331,6 +335,7 @@ fn act_as_leader<W: Phases>(
     if !groups.is_leader(body) {
         return;
     }
+    // A body without a conflict needs neither a list of members nor an auction.
     if groups.is_alone(body) {
         own.group_sizes[0] += 1;
         return W::act(turn, &mut [body]);

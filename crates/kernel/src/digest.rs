@@ -1,8 +1,8 @@
 //! A digest of a state: 128 bits of BLAKE3 over its canonical bytes.
 //!
-//! Worlds write every value of a state in an order of their own that does not depend on
-//! storage (by entity id), little-endian; so equal digests mean equal states, on every
-//! machine, whatever the number of workers was.
+//! Worlds write every value of a state, little-endian, in a fixed order (by entity id) that does
+//! not depend on storage. Equal digests therefore mean equal states, on every machine and for every
+//! number of workers.
 
 use std::fmt;
 
@@ -11,7 +11,7 @@ use std::fmt;
 pub struct Digest([u8; 16]);
 
 impl Digest {
-    /// The digest of one piece of text or bytes.
+    /// Returns the digest of one piece of text or bytes.
     pub fn of(bytes: &[u8]) -> Self {
         let mut hasher = Hasher::default();
         hasher.bytes(bytes);
@@ -36,11 +36,11 @@ impl fmt::Debug for Digest {
     }
 }
 
-/// Takes a state's values one after the other.
+/// Hashes a state's values one after the other.
 #[derive(Default)]
 pub struct Hasher {
     inner: blake3::Hasher,
-    /// Values are gathered, since the hash is fastest on long inputs.
+    /// Values are gathered, because the hash is fastest on long inputs.
     buffer: Vec<u8>,
 }
 
@@ -69,12 +69,12 @@ impl Hasher {
         self.bytes(&value.to_le_bytes());
     }
 
-    /// Adds a float by its bits; the two zeros count as one.
+    /// Adds a float by its bits; the two zeros count as one, because they compare equal.
     pub fn f64(&mut self, value: f64) {
         self.u64((value + 0.0).to_bits());
     }
 
-    /// The digest of all that was added.
+    /// Returns the digest of everything that was added.
     pub fn finish(mut self) -> Digest {
         self.inner.update(&self.buffer);
         let mut short = [0; 16];

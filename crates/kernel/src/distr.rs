@@ -4,10 +4,10 @@
 use crate::math;
 use crate::stream::Draws;
 
-/// How far the probabilities of a row may be from summing to 1.
+/// The largest deviation of a row's sum from 1.
 pub const ROW_TOLERANCE: f64 = 1e-6;
 
-/// What is wrong with a row of probabilities.
+/// A reason why a row is no probability distribution.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum RowError {
     /// No outcome at all.
@@ -21,10 +21,10 @@ pub enum RowError {
         /// Its value.
         value: f64,
     },
-    /// The row sums to something else than 1 (promise L2).
+    /// The row does not sum to 1 (promise L2).
     #[error("the row sums to {sum}, {} 1 by {:.6}", if *.sum < 1.0 { "short of" } else { "above" }, (.sum - 1.0).abs())]
     Sum {
-        /// What it sums to.
+        /// Its sum.
         sum: f64,
     },
 }
@@ -54,7 +54,7 @@ pub fn check_row(row: &[f64]) -> Result<(), RowError> {
 pub struct Chance(u64);
 
 impl Chance {
-    /// The chance `p`, clamped to [0, 1].
+    /// Returns the chance `p`, clamped to [0, 1].
     pub fn new(p: f64) -> Self {
         Self((p.clamp(0.0, 1.0) * (1u64 << 32) as f64).round() as u64)
     }
@@ -67,19 +67,18 @@ impl Chance {
 }
 
 /// A finite distribution over `0..n`, drawn with one word.
-///
-/// Outcome `i` has probability `row[i]` within 2^-32; outcomes of probability 0 are never
-/// drawn. The order of the outcomes is the order of comparison: put the likely one first.
+/// Outcome `i` has probability `row[i]` within 2^-32; outcomes of probability 0 are never drawn.
+/// Outcomes are compared in their order, so put the likely one first.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Categorical {
     /// Outcome of each threshold; the last one is taken when no threshold is above the word.
     outcomes: Vec<u16>,
-    /// Cumulated probability times 2^32, strictly rising, one fewer than outcomes.
+    /// Cumulative probability times 2^32, strictly increasing, one fewer than outcomes.
     thresholds: Vec<u32>,
 }
 
 impl Categorical {
-    /// The distribution with these probabilities.
+    /// Creates the distribution with these probabilities.
     ///
     /// # Errors
     /// See [`check_row`].
@@ -92,6 +91,7 @@ impl Categorical {
             cumulated += p / sum;
             let threshold = (cumulated * (1u64 << 32) as f64).round() as u64;
             let before = thresholds.last().map_or(0, |&t| u64::from(t));
+            // An outcome whose threshold is not above the one before could never be drawn.
             if p == 0.0 || threshold <= before {
                 continue;
             }
@@ -105,7 +105,7 @@ impl Categorical {
         Ok(Self { outcomes, thresholds })
     }
 
-    /// The outcome for the uniform word `u`.
+    /// Returns the outcome for the uniform word `u`.
     #[inline]
     pub fn sample(&self, u: u32) -> usize {
         let mut i = 0;
@@ -116,7 +116,7 @@ impl Categorical {
     }
 }
 
-/// A standard normal value (Box-Muller), from two 64-bit draws.
+/// Draws a standard normal value (Box-Muller) from two 64-bit draws.
 pub fn normal(draws: &mut Draws) -> f64 {
     let radius = (-2.0 * math::ln(1.0 - draws.uniform())).sqrt();
     radius * math::cos(std::f64::consts::TAU * draws.uniform())

@@ -1,7 +1,7 @@
 //! Runs a world for many cycles: the crew, the groups, and how many workers are worth it.
 //!
-//! A cycle that is too small to share out runs on one worker by itself. The engine measures
-//! instead of guessing, see [`Pace`]. Results do not depend on it.
+//! A cycle that is too small to share out runs on one worker alone. The engine measures instead of
+//! guessing, see [`Pace`]. Results do not depend on its choice.
 
 use crate::conflict::Groups;
 use crate::cycle::{Mate, Observer, PhaseTimes, Ran, Stretch, advance, lock};
@@ -11,25 +11,25 @@ use crate::workers::Team;
 use crate::world::Phases;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// Bodies are arranged anew after at least this many cycles: they have not gone far by then,
+/// Bodies are rearranged after at least this many cycles, because they have not gone far by then,
 /// and sorting is below 1 % of the work.
 const ARRANGE_EVERY: u64 = 64;
 
-/// Runs a world with as many workers as asked for, and keeps what they share.
+/// Runs a world with as many workers as asked for, and keeps their shared data.
 #[derive(Debug)]
 pub struct Engine<W: Phases> {
     groups: Groups,
     /// Cycles since the bodies were arranged.
     since_arranged: u64,
     crew: Vec<Mutex<Mate<W::Scratch>>>,
-    /// What all workers need to work together: made when they first do.
+    /// Barrier and cursors of all workers, created when they first work together.
     team: Option<Team>,
     pace: Pace,
     times: PhaseTimes,
 }
 
 impl<W: Phases> Engine<W> {
-    /// An engine of `workers` workers (at least 1) for `bodies` bodies.
+    /// Creates an engine of `workers` workers (at least 1) for `bodies` bodies.
     pub fn new(world: &W, bodies: usize, workers: usize) -> Self {
         let mate = || Mutex::new(Mate::new(world.scratch()));
         Self {
@@ -47,28 +47,28 @@ impl<W: Phases> Engine<W> {
         self.pace.share_always = true;
     }
 
-    /// The workers, for what they have gathered.
+    /// Returns the workers, for reading their results.
     pub fn crew(&self) -> impl Iterator<Item = MutexGuard<'_, Mate<W::Scratch>>> {
         self.crew.iter().map(lock)
     }
 
-    /// The workers, to take what they have gathered.
+    /// Returns the workers, for taking over their results.
     pub fn crew_mut(&mut self) -> impl Iterator<Item = &mut Mate<W::Scratch>> {
         self.crew.iter_mut().map(|mate| mate.get_mut().unwrap_or_else(PoisonError::into_inner))
     }
 
-    /// Time per phase so far.
+    /// Time spent in each phase so far.
     pub fn times(&self) -> PhaseTimes {
         self.times
     }
 
-    /// Bytes on the heap that grow with the bodies.
+    /// Bytes on the heap, which grow with the number of bodies.
     pub fn heap_bytes(&self) -> usize {
         self.groups.heap_bytes()
     }
 
-    /// Runs `cycles` cycles from `from` on. For worlds that nobody needs to look at in between:
-    /// events carry their cycle, and wait in the scratches.
+    /// Runs `cycles` cycles from `from` on, for worlds that need no look in between: events carry
+    /// their cycle, and wait in the scratches.
     pub fn advance(
         &mut self,
         world: &W,
@@ -80,8 +80,8 @@ impl<W: Phases> Engine<W> {
     }
 
     /// Runs up to `cycles` cycles from `from` on, and returns how many: fewer where `observer`,
-    /// which is called between all cycles, has ended the run. One call with many cycles is
-    /// cheaper than many calls, which start the threads anew each time.
+    /// which is called between all cycles, has ended the run. One call with many cycles is cheaper
+    /// than many calls, because every call starts the threads anew.
     pub fn advance_observed(
         &mut self,
         world: &W,
@@ -138,62 +138,63 @@ impl<W: Phases> Engine<W> {
     }
 }
 
-/// A stretch with one worker lasts about this long,
+/// Approximate duration of a stretch with one worker.
 const ALONE_NS: u64 = 5_000_000;
-/// one with all so long that starting their threads is below 1 % of it,
+/// Duration of a stretch with all workers: starting their threads is below 1 % of it.
 const TEAM_NS: u64 = 20_000_000;
-/// and a look at the other way this long, or as long as so many cycles take with one worker: the
-/// first of them says little, since a thread is started in it and caches are cold.
+/// Duration of a look at the other way, or that of `LOOK_CYCLES` cycles with one worker where that
+/// is longer: the first cycle says little, because a thread is started in it and caches are cold.
 const LOOK_NS: u64 = 1_000_000;
 const LOOK_CYCLES: f64 = 2.0;
 
-/// A cycle of less work is never shared out: waiting for each other three times costs about
-/// 1 us where every worker has a processor of its own, and 100 times that where not.
+/// A cycle of less work than this is never shared out, because three barriers cost about 1 us where
+/// every worker has a processor of its own, and 100 times that where not.
 const SMALLEST_NS: f64 = 10_000.0;
-/// A cycle of so much work is tried with all workers from the beginning: runs are of hundreds
-/// of cycles, and a look takes two or three.
+/// A cycle of more work than this is tried with all workers from the start, because runs have
+/// hundreds of cycles and a look takes two or three.
 const LARGE_NS: f64 = 1_000_000.0;
 
-/// All workers must be so much faster than one to be taken.
+/// All workers are chosen only if a cycle takes them less than this share of one worker's time.
 const WORTHWHILE: f64 = 0.9;
 
-/// Time before the first look, and between looks that may be worth it,
+/// Time before the first look, and between looks that may be worth it.
 const SHORTEST_WAIT_NS: f64 = 64e6;
-/// and the longest between looks that were not, each time twice as long; but
+/// Longest time between looks that were not worth it; each of these waits is twice as long as the
+/// one before.
 const LONGEST_WAIT_NS: f64 = 5e9;
-/// a look is followed by at least this many times its own time without one.
+/// A look is followed by at least this many times its own duration without one.
 const WAIT_PER_COST: f64 = 64.0;
 
-/// Weight of the newest stretch in what a cycle is taken to cost.
+/// Weight of the newest stretch in the estimated cost of a cycle.
 const NEWEST: f64 = 0.25;
 
 /// Decides by measurement whether one worker or all run the next stretch.
 ///
-/// It keeps to the faster of the two, its favorite, and looks at the other now and then.
-/// Whatever the other costs (with a barrier on processors that are busy with other work,
-/// a thousand times as much), looking takes at most 1 part in [`WAIT_PER_COST`] of the time:
-/// a look ends after [`LOOK_NS`] or [`LOOK_CYCLES`], and its own cost says when the next is due. One
-/// that finds nothing doubles the wait for the next, up to [`LONGEST_WAIT_NS`], so that a
-/// change is still noticed. Only a look can make all workers the favorite, so an old measurement
-/// never does; one worker takes over as soon as all are slower.
+/// It keeps to the faster of the two, its favorite, and looks at the other now and then. Whatever
+/// the other costs (with a barrier on processors that are busy with other work, a thousand times as
+/// much), looking takes at most 1 part in [`WAIT_PER_COST`] of the time: a look ends after
+/// [`LOOK_NS`] or [`LOOK_CYCLES`], and its own cost determines when the next is due. A look that
+/// finds nothing doubles the wait for the next, up to [`LONGEST_WAIT_NS`], so that a change is
+/// still noticed. Only a look can make all workers the favorite, so an old measurement never does;
+/// one worker takes over as soon as all are slower.
 #[derive(Debug)]
 struct Pace {
-    /// Nanoseconds per cycle with one worker and with all; nothing where not measured yet.
+    /// Nanoseconds per cycle with one worker and with all; `None` where not measured yet.
     alone_ns: Option<f64>,
     team_ns: Option<f64>,
     favors_team: bool,
-    /// Time since the last look, and until the next.
+    /// Nanoseconds since the last look, and until the next.
     since_ns: f64,
     wait_ns: f64,
     share_always: bool,
 }
 
-/// What the next stretch is to be.
+/// The way in which the next stretch runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Plan {
     workers: usize,
     limit_ns: u64,
-    /// Whether this is not the favorite, but a look at the other way.
+    /// Whether this is a look at the other way, not the favorite.
     is_look: bool,
 }
 
@@ -239,7 +240,7 @@ impl Pace {
         let with_all = self.favors_team != plan.is_look;
         let measured = if with_all { &mut self.team_ns } else { &mut self.alone_ns };
         if plan.is_look {
-            // What was measured long ago says nothing about now.
+            // An old measurement says nothing about the present load, so the look replaces it.
             *measured = Some(per_cycle_ns(ran, ran.cycles > 1));
             self.since_ns = 0.0;
             self.choose_after_look(took_ns);
@@ -253,7 +254,7 @@ impl Pace {
 
     fn choose_after_look(&mut self, took_ns: f64) {
         let (Some(alone_ns), Some(team_ns)) = (self.alone_ns, self.team_ns) else { return };
-        // What is the favorite stays it in doubt.
+        // In doubt the favorite stays: all workers must be clearly faster to replace one.
         let bar_ns = if self.favors_team { alone_ns } else { WORTHWHILE * alone_ns };
         let favored_team = std::mem::replace(&mut self.favors_team, team_ns < bar_ns);
         self.wait_ns = if favored_team == self.favors_team {
@@ -276,8 +277,8 @@ impl Pace {
     }
 }
 
-/// Nanoseconds per cycle, without the first one if that is to be left out: threads were started
-/// in it, and caches were cold.
+/// Nanoseconds per cycle, without the first one if it is to be left out: threads were started in
+/// it, and caches were cold.
 fn per_cycle_ns(ran: &Ran, without_first: bool) -> f64 {
     let (took_ns, cycles) = if without_first {
         (ran.took_ns - ran.first_ns, ran.cycles - 1)
@@ -493,7 +494,7 @@ mod tests {
         assert!(engine.team.is_none());
     }
 
-    /// Notes what it is shown, and ends the run after `last`.
+    /// Notes the cycles it sees, and ends the run after `last`.
     #[derive(Default)]
     struct Notes {
         last: Cycle,

@@ -1,11 +1,11 @@
-//! The one error for wrong input, whatever file or option it stands in.
+//! The one error for wrong input, whatever file or option it comes from.
 //!
-//! Promise E1: no input panics the program. Every error says what was wrong, where, and
-//! what would be right; the command ends with exit code 2 and has written nothing.
+//! Promise E1: no input panics the program. Every error says what was wrong, where, and what would
+//! be right; the command then ends with exit code 2 and has written nothing.
 
 use std::fmt;
 
-/// Wrong input: a file, an option, a table that does not sum to one.
+/// Wrong input: a file, an option, a table that does not sum to 1.
 ///
 /// Displayed as `place:line:column: cause`, the offending line with a caret under it where
 /// the text is known, and `help: remedy`.
@@ -27,7 +27,7 @@ struct Position {
 }
 
 impl InputError {
-    /// An error in `place` (a file's path, or an option's name as the user typed it).
+    /// Creates an error in `place` (a file's path, or an option's name as the user typed it).
     pub fn new(
         place: impl fmt::Display,
         cause: impl Into<String>,
@@ -41,14 +41,14 @@ impl InputError {
         }
     }
 
-    /// Names line and column (both from 1).
+    /// Adds line and column (both from 1).
     #[must_use]
     pub fn at(mut self, line: usize, column: usize) -> Self {
         self.position = Some(Position { line, column, text: None });
         self
     }
 
-    /// Finds line and column of the byte at `offset` in `text` and quotes that line.
+    /// Adds line and column of the byte at `offset` in `text`, and quotes that line.
     #[must_use]
     pub fn in_text(mut self, text: &str, offset: usize) -> Self {
         let mut offset = offset.min(text.len());
@@ -73,12 +73,12 @@ impl InputError {
         self.position.as_ref().map(|p| (p.line, p.column))
     }
 
-    /// What is wrong.
+    /// The cause: a sentence that says what is wrong.
     pub fn cause(&self) -> &str {
         &self.cause
     }
 
-    /// What would be right.
+    /// The remedy: a sentence that says what would be right.
     pub fn remedy(&self) -> &str {
         &self.remedy
     }

@@ -20,7 +20,7 @@ pub fn sub<const D: usize>(a: Point<D>, b: Point<D>) -> Point<D> {
     std::array::from_fn(|i| a[i] - b[i])
 }
 
-/// `a` made `k` times as long.
+/// `a` scaled by the factor `k`.
 #[inline]
 pub fn scaled<const D: usize>(a: Point<D>, k: f64) -> Point<D> {
     std::array::from_fn(|i| a[i] * k)
@@ -32,7 +32,7 @@ pub fn along<const D: usize>(a: Point<D>, u: Point<D>, k: f64) -> Point<D> {
     std::array::from_fn(|i| a[i] + u[i] * k)
 }
 
-/// The point at part `part` of the way from `a` to `b`.
+/// The point at the fraction `part` of the way from `a` to `b`.
 #[inline]
 pub fn between<const D: usize>(a: Point<D>, b: Point<D>, part: f64) -> Point<D> {
     std::array::from_fn(|i| a[i] + (b[i] - a[i]) * part)
@@ -78,13 +78,13 @@ pub fn unit<const D: usize>(a: Point<D>) -> Option<Point<D>> {
     (length > 0.0).then(|| scaled(a, 1.0 / length))
 }
 
-/// The part of `a` across the unit vector `axis`.
+/// The component of `a` perpendicular to the unit vector `axis`.
 #[inline]
 pub fn across<const D: usize>(a: Point<D>, axis: Point<D>) -> Point<D> {
     sub(a, scaled(axis, dot(a, axis)))
 }
 
-/// At most `step_m` of the way from a place to another.
+/// The point reached from `from` towards `to` after at most `step_m` meters.
 pub fn towards<const D: usize>(from: Point<D>, to: Point<D>, step_m: f64) -> Point<D> {
     let far_m = distance(from, to);
     if far_m <= step_m { to } else { along(from, sub(to, from), step_m / far_m) }

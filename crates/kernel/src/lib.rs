@@ -1,5 +1,5 @@
 #![deny(clippy::disallowed_methods)]
-//! How any world is simulated: no files, no sockets, no wall clock.
+//! The simulation kernel of every world: no files, no sockets, no wall clock.
 //!
 //! ```text
 //! World (immutable) + State (columns)         one cycle, run by W workers
@@ -7,14 +7,14 @@
 //!   join  : claims -> conflict groups │ barrier │   conflict.rs
 //!   act   : groups act                │ barrier │   workers.rs knows the threads
 //!
-//! Run<World>: the one simulation; Simulation: what everybody else sees of it
+//! Run<World>: the one simulation; Simulation: its face towards all other crates
 //! ```
 //!
-//! What the modules promise:
+//! Guarantees of the modules:
 //! - [`stream`]: a draw is a function of (seed, entity, cycle, purpose, index) alone.
 //! - [`workers`], [`cycle`]: the same bits for every number of workers.
 //! - [`digest`], [`checkpoint`]: a state has one digest, and continues bit for bit.
-//! - [`view`]: what can be seen of any world; looking changes nothing.
+//! - [`view`]: the scenery and the frames of any world; looking at them changes nothing.
 //! - [`math`], [`distr`], [`geometry`]: numbers that are the same on every platform.
 //! - [`ports`]: recorder, transport and clock, each with an in-memory version.
 

@@ -1,7 +1,7 @@
 //! The float functions whose last bits differ between platforms, from `libm`.
 //!
-//! `+ - * /` and `sqrt` are exact everywhere and stay with std; the rest is banned by
-//! `clippy.toml` and lives here, so that a result has the same bits on every machine.
+//! `+ - * /` and `sqrt` are exact everywhere and stay with std; `clippy.toml` bans all others,
+//! which live here, so that a result has the same bits on every machine.
 
 macro_rules! unary {
     ($($name:ident = $libm:ident, $meaning:literal;)*) => {$(
@@ -49,7 +49,7 @@ pub fn powf(x: f64, y: f64) -> f64 {
 pub fn wrap_angle(angle_rad: f64) -> f64 {
     use std::f64::consts::{PI, TAU};
     let turned = (angle_rad + PI).rem_euclid(TAU);
-    // rem_euclid may round up to the modulus itself.
+    // rem_euclid may round up to the modulus itself, which is outside the range.
     if turned >= TAU { -PI } else { turned - PI }
 }
 

@@ -1,4 +1,4 @@
-//! The one simulation: a world, its state, the engine, and what is recorded.
+//! The one simulation: a world, its state, the engine, and the rows to record.
 
 use crate::checkpoint::{self, CheckpointError, Header};
 use crate::cycle::{Observer, PhaseTimes, Scratches};
@@ -20,7 +20,7 @@ use std::sync::Arc;
 pub struct Run<W: World> {
     world: Arc<W>,
     plan: Plan,
-    /// Digest of the scenario's text: what checkpoints belong to.
+    /// Digest of the scenario's text, to which checkpoints belong.
     scenario: [u8; 16],
     state: W::State,
     books: W::Books,
@@ -30,8 +30,8 @@ pub struct Run<W: World> {
 }
 
 impl<W: World> Run<W> {
-    /// A run at its start, with `workers` workers; the world is shared, not copied. `scenario` is
-    /// the resolved scenario's text.
+    /// Creates a run at its start, with `workers` workers; the world is shared, not copied.
+    /// `scenario` is the resolved scenario's text.
     pub fn new(
         world: Arc<W>,
         plan: Plan,
@@ -60,17 +60,17 @@ impl<W: World> Run<W> {
         &self.state
     }
 
-    /// What is kept beside the state.
+    /// The sums, rows and events that are kept beside the state.
     pub fn books(&self) -> &W::Books {
         &self.books
     }
 
-    /// What a checkpoint would keep of the present state.
+    /// Returns the content that a checkpoint of the present state would have.
     pub fn saved(&self) -> W::Saved {
         self.world.save(&self.state, &self.books, self.cycle)
     }
 
-    /// What the run measured so far.
+    /// Returns the measurements of the run so far.
     pub fn metrics(&self) -> W::Metrics {
         self.world.metrics(&self.state, &self.books, self.cycle, &self.effort())
     }
@@ -80,7 +80,7 @@ impl<W: World> Run<W> {
         self.engine.heap_bytes()
     }
 
-    /// What the workers have seen and spent.
+    /// Returns the group sizes and the processor time of all workers.
     pub fn effort(&self) -> Effort {
         let mut effort = Effort::default();
         for mate in self.engine.crew() {
@@ -102,14 +102,14 @@ impl<W: World> Run<W> {
         }
     }
 
-    /// Takes over what the workers have gathered.
+    /// Takes over the results of all workers.
     fn gather(&mut self) {
         let Self { world, books, engine, .. } = self;
         engine.crew_mut().for_each(|mate| world.gather(books, &mut mate.scratch));
         world.book(books);
     }
 
-    /// Lets the workers gather what is wanted by now.
+    /// Sets up all workers for gathering the rows and events that are now wanted.
     fn prepare(&mut self) {
         let Self { world, books, engine, .. } = self;
         engine.crew_mut().for_each(|mate| world.prepare(books, &mut mate.scratch));
@@ -122,7 +122,7 @@ impl<W: World> fmt::Debug for Run<W> {
     }
 }
 
-/// Looks on between cycles, for worlds that ask for it.
+/// An observer between cycles, for worlds that ask for one.
 struct Onlooker<'a, W: World> {
     world: &'a W,
     books: &'a mut W::Books,

@@ -1,4 +1,4 @@
-//! The object-safe face of a run: what the command, a server or a binding sees of any world.
+//! The object-safe face of a run, through which the command, a server or a binding uses any world.
 
 use crate::checkpoint::CheckpointError;
 use crate::cycle::PhaseTimes;
@@ -15,13 +15,13 @@ pub trait Simulation: Send {
     /// Name of the world, e.g. `robots`.
     fn world(&self) -> &'static str;
 
-    /// Noun for one of its agents, e.g. `robot`.
+    /// The noun for one of its agents, e.g. `robot`.
     fn agent(&self) -> &'static str;
 
-    /// Where its agents decide: it names the phases in reports.
+    /// The phase in which its agents decide, by which reports name the phases.
     fn decides(&self) -> Decides;
 
-    /// What the scenario asks for.
+    /// The plan that the scenario asks for.
     fn plan(&self) -> &Plan;
 
     /// Cycles done.
@@ -30,66 +30,66 @@ pub trait Simulation: Send {
     /// Number of entities that act (robots, connectors of chains, airplanes).
     fn agents(&self) -> usize;
 
-    /// Whether nothing can happen any more, e.g. when everybody has arrived: then a run is
+    /// Whether nothing can happen anymore, e.g. because everybody has arrived; the run is then
     /// complete before its planned number of cycles.
     fn is_over(&self) -> bool;
 
-    /// Runs up to `cycles` cycles and returns how many were done: fewer when a buffer for
-    /// recording is full or the run is over, never 0 unless `cycles` is 0.
+    /// Runs up to `cycles` cycles and returns how many were done: fewer when a buffer for recording
+    /// is full or the run is over, and 0 only if `cycles` is 0.
     fn advance(&mut self, cycles: u64) -> u64;
 
-    /// The digest of the present state: equal for equal scenario, seed and cycle.
+    /// Returns the digest of the present state: equal for equal scenario, seed and cycle.
     fn digest(&self) -> Digest;
 
-    /// The present state as bytes for [`Simulation::restore`].
+    /// Returns the present state as bytes for [`Simulation::restore`].
     fn checkpoint(&self) -> Vec<u8>;
 
     /// Continues from a checkpoint of the same scenario and program version.
     ///
     /// # Errors
-    /// When the checkpoint is damaged or belongs to something else.
+    /// When the checkpoint is damaged or belongs to another world, scenario or version.
     fn restore(&mut self, checkpoint: &[u8]) -> Result<(), CheckpointError>;
 
-    /// Begins to keep what [`Simulation::record`] hands over.
+    /// Starts to keep the rows that [`Simulation::record`] hands over.
     fn begin_recording(&mut self);
 
     /// The tables that [`Simulation::record`] fills.
     fn schemas(&self) -> Vec<TableSchema>;
 
-    /// Hands everything that happened since the last call to a recorder.
+    /// Hands all rows since the last call to a recorder.
     ///
     /// # Errors
     /// When the recorder cannot store it.
     fn record(&mut self, recorder: &mut dyn Recorder) -> Result<(), RecordError>;
 
-    /// What stays as it is during the run.
+    /// The scenery: everything that stays as it is during the run.
     fn scenery(&self) -> Scenery;
 
-    /// Begins to keep what happens for the next [`Simulation::frame`]; no result depends on it.
+    /// Starts to keep events for the next [`Simulation::frame`]; no result depends on it.
     fn watch(&mut self);
 
-    /// How things are now, and what happened since the last call (nothing without
-    /// [`Simulation::watch`]). It changes no result.
+    /// Returns the present frame, with the events since the last call (none without
+    /// [`Simulation::watch`]). No result depends on it.
     fn frame(&mut self, look: Look) -> Frame;
 
-    /// Which recorded rows say where bodies were.
+    /// The recorded tables and columns that hold the places of bodies.
     fn place_rows(&self) -> Vec<PlaceRows>;
 
-    /// What the run measured so far, as JSON (`metrics` of the summary).
+    /// Returns the metrics of the run so far, as JSON (`metrics` of the summary).
     fn metrics(&self) -> serde_json::Value;
 
-    /// Metrics of every agent by itself, as a JSON array.
+    /// Returns the metrics of each agent, as a JSON array.
     fn agent_metrics(&self) -> serde_json::Value;
 
-    /// Metrics of pairs of agents; null in worlds without.
+    /// Returns the metrics of pairs of agents; null in worlds without any.
     fn pair_metrics(&self) -> serde_json::Value;
 
-    /// What came of the run so far, in lines for people.
+    /// Returns the outcome of the run so far, in lines for people.
     fn outcome(&self) -> Lines;
 
-    /// Where every body is.
+    /// Returns the pose of every body.
     fn poses(&self) -> Said;
 
-    /// Time spent per phase since the start of this process's run.
+    /// Returns the time spent in each phase in this process.
     fn phase_times(&self) -> PhaseTimes;
 }

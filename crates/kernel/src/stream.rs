@@ -1,9 +1,9 @@
 //! Randomness as a function of coordinates: `draw = f(seed, entity, cycle, purpose, index)`.
 //!
-//! The generator is Philox4x32-10 (Salmon, Moraes, Dror, Shaw, "Parallel random numbers: as
-//! easy as 1, 2, 3", SC'11). It has no state: a draw depends on its coordinates alone, so no
-//! result depends on the number of workers, the order of tasks, idle entities, storage
-//! order, or on what else was drawn.
+//! The generator is Philox4x32-10 (Salmon, Moraes, Dror, Shaw, "Parallel random numbers: as easy as
+//! 1, 2, 3", SC'11). It has no state: a draw depends on its coordinates alone, so no result depends
+//! on the number of workers, the order of tasks, idle entities, the order of storage, or any other
+//! draw.
 //!
 //! ```text
 //! key     = seed (two words)
@@ -32,8 +32,8 @@ pub fn philox4x32(mut counter: [u32; 4], mut key: [u32; 2]) -> [u32; 4] {
     counter
 }
 
-/// What a draw is for. Each purpose has its own stream, so that adding a draw for one
-/// purpose never shifts the draws of another. Worlds define their own constants.
+/// The purpose of a draw. Each purpose has its own stream, so that adding a draw for one purpose
+/// never shifts the draws of another. Worlds define their own constants.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Purpose(pub u16);
 
@@ -44,19 +44,19 @@ pub struct Streams {
 }
 
 impl Streams {
-    /// The streams that grow from `seed`.
+    /// Creates the streams that grow from `seed`.
     pub fn new(seed: Seed) -> Self {
         Self { key: [seed.0 as u32, (seed.0 >> 32) as u32] }
     }
 
-    /// Four independent uniform words at the given coordinates.
+    /// Returns four independent uniform words at the given coordinates.
     #[inline]
     pub fn block(&self, entity: EntityId, cycle: Cycle, purpose: Purpose, block: u16) -> [u32; 4] {
         let first = u32::from(purpose.0) << 16 | u32::from(block);
         philox4x32([first, entity, cycle as u32, (cycle >> 32) as u32], self.key)
     }
 
-    /// Four words for a pair of entities, e.g. a message from one to the other.
+    /// Returns four words for a pair of entities, e.g. a message from one to the other.
     pub fn pair(
         &self,
         entity: EntityId,
@@ -69,7 +69,7 @@ impl Streams {
         philox4x32([other, index, 0, 0], [k0, k1])
     }
 
-    /// The stream of words at (entity, cycle, purpose), computed as it is read.
+    /// Returns the stream of words at (entity, cycle, purpose), computed as it is read.
     #[inline]
     pub fn draws(&self, entity: EntityId, cycle: Cycle, purpose: Purpose) -> Draws {
         Draws { streams: *self, entity, cycle, purpose, words: [0; 4], index: 0 }
@@ -88,7 +88,7 @@ pub struct Draws {
 }
 
 impl Draws {
-    /// The next 32 uniform bits.
+    /// Returns the next 32 uniform bits.
     #[inline]
     pub fn next_u32(&mut self) -> u32 {
         let lane = self.index % 4;
@@ -100,19 +100,19 @@ impl Draws {
         self.words[lane as usize]
     }
 
-    /// The next 64 uniform bits.
+    /// Returns the next 64 uniform bits.
     #[inline]
     pub fn next_u64(&mut self) -> u64 {
         u64::from(self.next_u32()) | u64::from(self.next_u32()) << 32
     }
 
-    /// Uniform in [0, 1), from 53 bits.
+    /// Returns a uniform number in [0, 1), from 53 bits.
     #[inline]
     pub fn uniform(&mut self) -> f64 {
         (self.next_u64() >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
     }
 
-    /// Uniform in `0..n` without bias (Lemire's rejection); 0 when `n` is 0.
+    /// Returns a uniform number in `0..n` without bias (Lemire's rejection); 0 when `n` is 0.
     #[inline]
     pub fn below(&mut self, n: u32) -> u32 {
         loop {

@@ -2,15 +2,15 @@
 
 use serde::{Deserialize, Serialize};
 
-/// The number all randomness of a run grows from.
+/// The seed from which all randomness of a run grows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Seed(pub u64);
 
 /// A cycle of the synchronous loop, counted from 0.
 pub type Cycle = u64;
 
-/// The place of an entity in a state's columns. Slots may be permuted without changing any
-/// result; what a draw or a tie depends on is the entity's [`EntityId`].
+/// The place of an entity in a state's columns. Slots may be permuted without changing any result,
+/// because draws and ties depend on the entity's [`EntityId`].
 pub type Slot = u32;
 
 /// The identity of an entity: constant through a run and independent of storage.

@@ -1,11 +1,11 @@
-//! What worlds say to people, as data: whoever shows it lays it out.
+//! Texts of a world for people, as data: the caller that shows them decides on the layout.
 
 use serde_json::Value;
 
 /// Names and values, one per line.
 pub type Lines = Vec<(String, String)>;
 
-/// Something to say about a state: as JSON, and in words.
+/// A statement about a state: as JSON, and in words.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Said {
     /// For machines.

@@ -1,29 +1,29 @@
 //! The only file that names threads: W workers, their pools of tasks, and the barrier.
 //!
-//! A pool holds the numbers `0..n`. Each worker has a share of it, takes chunks of its own
-//! share first (its caches still hold those bodies) and then helps with the others' shares,
-//! so the load balances itself and nobody waits for a lock. One worker runs the very same
-//! code on the calling thread; it takes the pool from front to back, has nobody to wait for,
-//! and asks nothing of the system.
+//! A pool holds the numbers `0..n`. Each worker has a share of it, takes chunks of its own share
+//! first (its caches still hold those bodies) and then helps with the others' shares, so the load
+//! balances itself and nobody waits for a lock. A single worker runs the very same code on the
+//! calling thread; it takes the pool from front to back, waits for nobody, and makes no system
+//! call.
 
 use std::num::NonZeroUsize;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering};
 use std::sync::{Condvar, Mutex, PoisonError};
 
-/// Pools that may be in use between two barriers and the one after: a pool's cursors are
-/// put back by the next pool but one, when nobody reads them any more.
+/// Pools that may be in use between two barriers and the one after: a pool's cursors are reset by
+/// the next pool but one, when nobody reads them anymore.
 const POOLS: usize = 4;
 
 /// Numbers in the largest chunk of a pool.
 const CHUNK: usize = 64;
 
-/// Spins before a waiting worker offers its processor to others, and before it sleeps.
+/// Spins before a waiting worker offers its processor to others, and yields before it sleeps.
 const SPINS_BEFORE_YIELD: u32 = 4_000;
 const YIELDS_BEFORE_SLEEP: u32 = 200;
 
-/// How many processors this process may use, at least 1. The answer takes system calls that
-/// read files: ask once.
+/// Returns how many processors this process may use, at least 1. The answer takes system calls that
+/// read files, so ask once.
 pub fn available() -> usize {
     std::thread::available_parallelism().map_or(1, NonZeroUsize::get)
 }
@@ -44,7 +44,7 @@ pub fn run<S: Send>(crew: &mut [S], work: impl Fn(&Worker<'_>, &mut S) + Sync) {
 /// One of the workers of a [`run`].
 #[derive(Debug)]
 pub struct Worker<'a> {
-    /// Nothing for a worker that is alone.
+    /// `None` for a worker that is alone.
     team: Option<&'a Team>,
     index: usize,
 }
@@ -58,7 +58,7 @@ impl Worker<'_> {
         self.index
     }
 
-    /// How many work together.
+    /// Number of workers in the team.
     pub fn team_size(&self) -> usize {
         self.team.map_or(1, Team::size)
     }
@@ -71,7 +71,10 @@ impl Worker<'_> {
             return (0..n).step_by(CHUNK).for_each(|from| task(from..n.min(from + CHUNK)));
         };
         let size = team.size();
+        // Nobody uses the cursors of the next pool but one now, so they can be reset without a
+        // barrier.
         team.cursor((pool + 2) % POOLS as u64, self.index).store(0, Ordering::Relaxed);
+        // At least eight chunks per share, so that the others find something to help with.
         let chunk = (n / (size * 8)).clamp(1, CHUNK);
         for k in 0..size {
             let owner = (self.index + k) % size;
@@ -87,7 +90,7 @@ impl Worker<'_> {
         }
     }
 
-    /// Waits until every worker is here; what any wrote before, all see after.
+    /// Waits until every worker is here; all writes before it are visible to every worker after it.
     ///
     /// # Panics
     /// When another worker panicked.
@@ -98,7 +101,7 @@ impl Worker<'_> {
         }
     }
 
-    /// Whether `own` is true for any worker. All must call it; it waits for all.
+    /// Returns whether `own` is true for any worker. All must call it, because it waits for all.
     pub fn any(&self, own: bool) -> bool {
         let Some(Team { votes, .. }) = self.team else { return own };
         if own {
@@ -114,26 +117,26 @@ impl Worker<'_> {
     }
 }
 
-/// A counter alone on its cache lines.
+/// A counter on cache lines of its own, so that workers do not slow each other down.
 #[derive(Debug, Default)]
 #[repr(align(128))]
 struct Padded(AtomicUsize);
 
-/// What workers that run together share. It outlives a run and serves the next one.
+/// The shared data of workers that run together. It outlives a run and serves the next one.
 #[derive(Debug)]
 pub(crate) struct Team {
     size: usize,
     /// `POOLS` cursors per worker.
     cursors: Vec<Padded>,
     barrier: Barrier,
-    /// Workers that answer yes, see [`Worker::any`].
+    /// Number of workers that answer yes, see [`Worker::any`].
     votes: AtomicUsize,
-    /// 0 where there are more workers than processors: spinning would keep them from work.
+    /// 0 where there are more workers than processors: spinning would keep the others from working.
     spins: u32,
 }
 
 impl Team {
-    /// A team of `size` workers. Asks the system for its processors.
+    /// Creates a team of `size` workers. Asks the system for the number of its processors.
     pub(crate) fn new(size: usize) -> Self {
         Self {
             size,
@@ -164,7 +167,7 @@ impl Team {
         let (team, work) = (&*self, &work);
         let Some((first, others)) = crew.split_first_mut() else { return };
         std::thread::scope(|scope| {
-            // Also where a thread cannot be started: those that wait are let go.
+            // Also released where a thread cannot be started, so that waiting workers do not hang.
             let _release = ReleaseOnPanic(team);
             for (i, own) in others.iter_mut().enumerate() {
                 std::thread::Builder::new()
@@ -179,7 +182,8 @@ impl Team {
         });
     }
 
-    /// Pools are counted from 0 in each run, and a run that panicked left things as they were.
+    /// Resets the cursors because pools are counted from 0 in each run, and all the rest because a
+    /// run that panicked left it in disorder.
     fn put_back(&mut self) {
         self.cursors.iter_mut().for_each(|cursor| *cursor.0.get_mut() = 0);
         *self.votes.get_mut() = 0;
@@ -192,7 +196,7 @@ impl Team {
     }
 }
 
-/// Spins, then yields, then sleeps.
+/// A barrier at which workers spin, then yield, then sleep.
 #[derive(Debug, Default)]
 #[repr(align(128))]
 struct Barrier {
@@ -218,8 +222,8 @@ impl Barrier {
     }
 
     fn open(&self, next: u32) {
-        // Both sides store first and look at the other's word after (SeqCst), so either the
-        // sleeper sees the new generation or this sees the sleeper.
+        // Both sides store first and then read the other's word (SeqCst), so either the sleeper
+        // sees the new generation or this worker sees the sleeper.
         self.generation.store(next, Ordering::SeqCst);
         if self.sleepers.load(Ordering::SeqCst) > 0 {
             drop(self.sleeping.lock().unwrap_or_else(PoisonError::into_inner));
@@ -228,7 +232,7 @@ impl Barrier {
     }
 
     fn wait_past(&self, generation: u32, spins: u32) {
-        // Whoever comes after a panic must not wait either: its generation never ends.
+        // A worker that arrives after a panic must not wait either: its generation never ends.
         let passed = || {
             self.generation.load(Ordering::SeqCst) != generation
                 || self.broken.load(Ordering::SeqCst)
@@ -254,7 +258,7 @@ impl Barrier {
     }
 }
 
-/// Lets the others go when a worker panics, so that a bug ends the run instead of hanging it.
+/// Releases the other workers when one panics, so that a bug ends the run instead of hanging it.
 struct ReleaseOnPanic<'a>(&'a Team);
 
 impl Drop for ReleaseOnPanic<'_> {

@@ -1,9 +1,9 @@
-//! What a world supplies to the kernel: the phases of a cycle, and what a run of it needs.
+//! The traits that a world implements: the phases of a cycle, and everything else a run needs.
 //!
 //! ```text
 //! Phases   claim, join, act: called by the cycle, on any number of workers
 //! Auction  bids for what is claimed, an extension of some worlds
-//! World    all that a run asks besides: rows, frames, metrics, what to save, what to say
+//! World    everything else a run needs: rows, frames, metrics, checkpoints, texts
 //! ```
 
 use crate::checkpoint::CheckpointError;
@@ -19,24 +19,24 @@ use serde::de::DeserializeOwned;
 use serde_json::Value;
 use std::ops::Range;
 
-/// A worker's turn in one phase of one cycle: what it reads, and what it keeps for itself.
+/// A worker's turn in one phase of one cycle: its inputs and its own buffers.
 pub struct Turn<'a, W: Phases> {
     /// The immutable world.
     pub world: &'a W,
     /// The state; every slot of a column has one writer in each phase.
     pub state: &'a W::State,
-    /// The cycle.
+    /// The present cycle.
     pub now: Cycle,
-    /// For measuring what something takes; nothing that it says may reach the state.
+    /// The clock, for measuring durations; none of its readings may reach the state.
     pub clock: &'a dyn Clock,
     /// The worker's own buffers, events and sums.
     pub scratch: &'a mut W::Scratch,
 }
 
-/// Where agents decide what to do.
+/// The phase in which agents decide on their actions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Decides {
-    /// Each by itself in the phase *claim*, before anybody knows of conflicts.
+    /// Each alone in the phase *claim*, before conflicts are known.
     Alone,
     /// Together with their conflict group in the phase *act*.
     Together,
@@ -49,36 +49,36 @@ pub enum Decides {
 /// [`crate::column::Column`]s (or other cells) with one writer per slot and phase. No result may
 /// depend on a clock, a shared generator, or anything else that is not in the state.
 pub trait Phases: Sync + Sized {
-    /// All that changes.
+    /// The mutable state: everything that changes from cycle to cycle.
     type State: Sync;
-    /// What one worker keeps for itself between tasks: buffers, events, sums.
+    /// A worker's own buffers, events and sums, kept between tasks.
     type Scratch: Send;
 
-    /// Where agents decide: it names the phases in reports.
+    /// The phase in which agents decide, by which reports name the phases.
     const DECIDES: Decides = Decides::Alone;
 
-    /// A fresh scratch.
+    /// Returns a fresh scratch.
     fn scratch(&self) -> Self::Scratch;
 
-    /// Number of bodies: tasks that the pools hold.
+    /// Number of bodies, which is the number of tasks in a pool.
     fn bodies(&self, state: &Self::State) -> usize;
 
-    /// Moves bodies to other slots now and then between cycles, so that what is near in the world
-    /// is near in memory and each worker keeps to a part of both. No result may depend on it.
+    /// Moves bodies to other slots now and then between cycles, so that neighbors in the world are
+    /// neighbors in memory and each worker stays in one part of both. No result may depend on it.
     fn arrange(&self, _: &mut Self::State) {}
 
-    /// *Claim*: each body of `bodies` that is due perceives the frozen state, decides (where
-    /// agents decide alone), and publishes what it may come to need. Writes only the intents and
-    /// claims of these bodies.
+    /// *Claim*: each body of `bodies` that is due perceives the frozen state, decides (where agents
+    /// decide alone), and publishes everything it may need. Writes only the intents and claims of
+    /// these bodies.
     fn claim(turn: &mut Turn<'_, Self>, bodies: Range<usize>);
 
     /// *Join*: joins each body of `bodies` with every other whose claims meet its own. Writes
     /// only `groups`.
     fn join(turn: &mut Turn<'_, Self>, bodies: Range<usize>, groups: &Groups);
 
-    /// *Act*: the bodies of one conflict group decide (where agents decide together) and act, in
-    /// an order that depends on state and seed alone. Writes only what the group has claimed.
-    /// `group` comes in no particular order.
+    /// *Act*: the bodies of one conflict group decide (where agents decide together) and act, in an
+    /// order that depends on state and seed alone. Writes only what the group has claimed. The
+    /// order of `group` itself is arbitrary.
     fn act(turn: &mut Turn<'_, Self>, group: &mut [Slot]);
 
     /// The auction by which bodies in conflict act, in worlds that hold one.
@@ -87,73 +87,75 @@ pub trait Phases: Sync + Sized {
     }
 }
 
-/// Bodies in conflict that act in rounds instead of group by group: in each round those act that
-/// hold the highest bid on all they claim, until all have. Inside a large group this is parallel,
-/// and the outcome is the same as in the order of the bids.
+/// Bodies in conflict that act in rounds instead of group by group: in each round, the bodies with
+/// the highest bid on everything they claim act, until all have acted. This runs in parallel even
+/// inside a large group, and the outcome is the same as acting in the order of the bids.
 pub trait Auction<W: Phases> {
-    /// Bids for all that a body claims, and notes it in the scratch.
+    /// Bids for everything that a body claims, and notes it in the scratch.
     fn bid(&self, turn: &mut Turn<'_, W>, body: Slot);
 
-    /// Lets those of `pending` act whose bids are the highest, and takes them from the list.
+    /// Lets the bodies of `pending` with the highest bids act, and removes them from the list.
     fn act_on_bids(&self, turn: &mut Turn<'_, W>, pending: &mut Vec<Slot>);
 
-    /// Takes back all bids noted in the scratch.
+    /// Withdraws all bids noted in the scratch.
     fn retract_bids(&self, turn: &mut Turn<'_, W>);
 }
 
-/// A world that [`crate::Run`] runs: its phases, and all that a run asks besides.
+/// A world that [`crate::Run`] runs: its phases, and everything else a run needs.
 ///
-/// `state` is all that changes and that results depend on; `books` are what a run keeps beside
-/// it: sums that metrics are made of, rows and events that wait to be handed over.
+/// `state` holds everything that changes and that results depend on; `books` hold the rest of a
+/// run: sums for metrics, and rows and events that wait to be handed over.
 pub trait World: Phases<State: Send> + Send + 'static {
-    /// Name of the world, as scenarios give it.
+    /// Name of the world, as scenarios write it.
     const NAME: &'static str;
-    /// Noun for one of its agents, e.g. `robot`.
+    /// The noun for one of its agents, e.g. `robot`.
     const AGENT: &'static str;
-    /// Whether [`World::before_cycle`] and [`World::is_over`] are asked before every cycle; a
-    /// world whose cycles take microseconds leaves it at `false`.
+    /// Whether [`World::before_cycle`] and [`World::is_over`] are called before every cycle. A
+    /// world whose cycles take microseconds leaves it at `false`, because each look takes one more
+    /// barrier.
     const LOOKS_EACH_CYCLE: bool = false;
 
-    /// What a run keeps beside the state.
+    /// The sums, rows and events that a run keeps beside the state.
     type Books: Send;
-    /// The state, and what of the books results depend on, by entity id: a checkpoint's content.
+    /// The content of a checkpoint: the state and those books on which results depend, by entity
+    /// id.
     type Saved: Serialize + DeserializeOwned;
-    /// What a run measures.
+    /// The measurements of a run.
     type Metrics: Serialize;
 
     /// Number of agents.
     fn agents(&self) -> usize;
 
-    /// Cycles that may run before rows must be handed over.
+    /// Number of cycles that may run before rows must be handed over.
     fn room(&self, _: &Self::State, _: &Self::Books, _: Cycle) -> u64 {
         u64::MAX
     }
 
-    /// Keeps rows of the state at the start of a cycle, if somebody records them.
+    /// Keeps rows of the state at the start of a cycle, if they are recorded.
     fn before_cycle(&self, _: &Self::State, _: &mut Self::Books, _: Cycle) {}
 
-    /// Whether nothing can happen any more, e.g. when everybody has arrived: then a run is
+    /// Whether nothing can happen anymore, e.g. because everybody has arrived; the run is then
     /// complete before its planned number of cycles.
     fn is_over(&self, _: &Self::State) -> bool {
         false
     }
 
-    /// Takes over what one worker has gathered in one or more cycles. Which worker has gathered
-    /// what differs from run to run.
+    /// Takes over the results of one worker from one or more cycles. The share of each worker
+    /// differs from run to run.
     fn gather(&self, books: &mut Self::Books, scratch: &mut Self::Scratch);
 
-    /// Books what was gathered of all workers, in an order that does not depend on who has
-    /// gathered what.
+    /// Books the gathered results of all workers, in an order that does not depend on each worker's
+    /// share.
     fn book(&self, books: &mut Self::Books);
 
-    /// Begins to keep what [`World::record`] hands over.
+    /// Starts to keep the rows that [`World::record`] hands over.
     fn begin_recording(&self, state: &mut Self::State, books: &mut Self::Books, now: Cycle);
 
-    /// Begins to keep events for frames.
+    /// Starts to keep events for frames.
     fn watch(&self, books: &mut Self::Books);
 
-    /// Tells a worker's scratch what to gather, after [`World::begin_recording`] and
-    /// [`World::watch`].
+    /// Sets up a worker's scratch for gathering rows and events, after [`World::begin_recording`]
+    /// and [`World::watch`].
     fn prepare(&self, _: &Self::Books, _: &mut Self::Scratch) {}
 
     /// The tables that are recorded.
@@ -171,13 +173,13 @@ pub trait World: Phases<State: Send> + Send + 'static {
         recorder: &mut dyn Recorder,
     ) -> Result<(), RecordError>;
 
-    /// The digest of a state.
+    /// Returns the digest of a state.
     fn digest(&self, state: &Self::State, now: Cycle) -> Digest;
 
-    /// What a checkpoint keeps.
+    /// Returns the content of a checkpoint.
     fn save(&self, state: &Self::State, books: &Self::Books, now: Cycle) -> Self::Saved;
 
-    /// The state that was saved; the books take over what belongs to them.
+    /// Returns the state that was saved; the books take over their part.
     ///
     /// # Errors
     /// When it does not fit this world.
@@ -187,18 +189,18 @@ pub trait World: Phases<State: Send> + Send + 'static {
         books: &mut Self::Books,
     ) -> Result<Self::State, CheckpointError>;
 
-    /// What stays as it is during the run.
+    /// Returns the scenery: everything that stays as it is during the run.
     fn scenery(&self, name: &str) -> Scenery;
 
-    /// How things are now, and what happened since the last frame.
+    /// Returns the present frame, with the events since the last one.
     fn frame(&self, state: &Self::State, books: &mut Self::Books, now: Cycle, look: Look) -> Frame;
 
-    /// Which recorded rows say where bodies were.
+    /// The recorded tables and columns that hold the places of bodies.
     fn place_rows(&self, _: &Self::Books) -> Vec<PlaceRows> {
         Vec::new()
     }
 
-    /// What the run measured so far.
+    /// Returns the metrics of the run so far.
     fn metrics(
         &self,
         state: &Self::State,
@@ -207,17 +209,17 @@ pub trait World: Phases<State: Send> + Send + 'static {
         effort: &Effort,
     ) -> Self::Metrics;
 
-    /// Metrics of every agent by itself, as a JSON array.
+    /// Returns the metrics of each agent, as a JSON array.
     fn agent_metrics(&self, state: &Self::State, books: &Self::Books, now: Cycle) -> Value;
 
-    /// Metrics of pairs of agents, in worlds that have any.
+    /// Returns the metrics of pairs of agents, in worlds that have any.
     fn pair_metrics(&self, _: &Self::Books) -> Value {
         Value::Null
     }
 
-    /// What came of a run, in lines for people.
+    /// Returns the outcome of a run, in lines for people.
     fn outcome(&self, metrics: &Self::Metrics) -> Lines;
 
-    /// Where every body is.
+    /// Returns the pose of every body.
     fn poses(&self, state: &Self::State, now: Cycle) -> Said;
 }

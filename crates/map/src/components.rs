@@ -1,4 +1,4 @@
-//! Which boxes can be reached from which: the 4-connected components of a map.
+//! The connected parts of a map: boxes that can be reached from each other in 4-connected steps.
 
 use super::{Cell, GridMap, UnknownPolicy};
 
@@ -8,9 +8,9 @@ use super::{Cell, GridMap, UnknownPolicy};
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Components {
     width: u32,
-    /// Per box, row by row from the bottom: its component, or `BLOCKED`.
+    /// Component of each box, row by row from the bottom, or `BLOCKED`.
     label: Vec<u32>,
-    /// Boxes of each component.
+    /// Number of boxes of each component.
     sizes: Vec<usize>,
 }
 
@@ -20,24 +20,24 @@ const BLOCKED: u32 = u32::MAX;
 const UNCLAIMED: u32 = u32::MAX - 1;
 
 impl Components {
-    /// The component of a box, or `None` where it is not free.
+    /// Returns the component of a box, or `None` where it is not free.
     pub fn of(&self, col: u32, row: u32) -> Option<u32> {
         let label = self.label[row as usize * self.width as usize + col as usize];
         (label != BLOCKED).then_some(label)
     }
 
-    /// Number of boxes of each component, by component.
+    /// Returns the number of boxes of each component, by component.
     pub fn sizes(&self) -> &[usize] {
         &self.sizes
     }
 
-    /// The component with the most boxes; of several, the first. `None` without a free box.
+    /// Returns the component with the most boxes, of several the first; `None` without a free box.
     pub fn largest(&self) -> Option<u32> {
         let most = self.sizes.iter().max()?;
         self.sizes.iter().position(|size| size == most).and_then(|i| u32::try_from(i).ok())
     }
 
-    /// Number of boxes of the largest component; 0 without a free box.
+    /// Returns the number of boxes of the largest component; 0 without a free box.
     pub fn largest_size(&self) -> usize {
         self.sizes.iter().copied().max().unwrap_or(0)
     }
@@ -61,7 +61,7 @@ impl Components {
     }
 }
 
-/// The boxes east, north, west and south of the box at index `at`, where the map has them.
+/// Returns the boxes east, north, west and south of the box at index `at`, where the map has them.
 fn neighbors(at: usize, width: usize, boxes: usize) -> [Option<usize>; 4] {
     let col = at % width;
     [
@@ -73,7 +73,7 @@ fn neighbors(at: usize, width: usize, boxes: usize) -> [Option<usize>; 4] {
 }
 
 impl GridMap {
-    /// The 4-connected components of the free boxes; `unknown` says what unknown boxes are
+    /// Returns the 4-connected components of the free boxes; `unknown` decides on unknown boxes
     /// ([`UnknownPolicy::Keep`] keeps them apart, hence not free).
     pub fn components(&self, unknown: UnknownPolicy) -> Components {
         let label = |&cell| match unknown.apply(cell) {

@@ -6,11 +6,11 @@ use serde::{Deserialize, Serialize};
 use sidestep_kernel::InputError;
 use sidestep_kernel::view::{Floor, Occupancy};
 
-/// The most boxes a map may have. More is taken for a mistake (a resolution in millimetres, a
-/// size in the wrong unit) and refused before memory is allocated.
+/// The maximum number of boxes of a map. A larger number is taken for a mistake (a resolution in
+/// millimeters, a size in the wrong unit) and refused before memory is allocated.
 pub const MAX_BOXES: u64 = 1 << 26;
 
-/// What a box of a map is before any body stands in it.
+/// The content of a box of a map before any body stands in it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Cell {
@@ -22,11 +22,11 @@ pub enum Cell {
     Unknown,
 }
 
-/// What becomes of the boxes that nobody has mapped.
+/// The treatment of boxes that nobody has mapped.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum UnknownPolicy {
-    /// Unknown boxes are walls: nobody plans through what nobody has seen.
+    /// Unknown boxes are walls, because a path must not lead through unmapped space.
     #[default]
     Wall,
     /// Unknown boxes are free.
@@ -36,7 +36,7 @@ pub enum UnknownPolicy {
 }
 
 impl UnknownPolicy {
-    /// `cell` under this policy; free boxes and walls stay what they are.
+    /// Returns `cell` under this policy; free boxes and walls are left as they are.
     pub fn apply(self, cell: Cell) -> Cell {
         match (cell, self) {
             (Cell::Unknown, Self::Wall) => Cell::Wall,
@@ -46,7 +46,7 @@ impl UnknownPolicy {
     }
 }
 
-/// How many cells are what; the three add up to the number of cells.
+/// The number of cells of each type; the three add up to the number of cells.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct CellCounts {
     /// Cells that are [`Cell::Free`].
@@ -86,7 +86,7 @@ pub struct Rect {
 }
 
 impl Rect {
-    /// Whether the box in column `col` and row `row` is one of this rectangle's.
+    /// Whether the box in column `col` and row `row` is inside this rectangle.
     pub fn contains(&self, col: u32, row: u32) -> bool {
         let inside = |at: u32, start: u32, length: u32| at >= start && at - start < length;
         inside(col, self.col, self.width) && inside(row, self.row, self.height)
@@ -98,17 +98,17 @@ impl Rect {
 pub struct GridMap {
     width: u32,
     height: u32,
-    /// Side of a box in metres.
+    /// Side of a box in meters.
     pub box_size_m: f64,
-    /// World position of the lower-left corner of box (0, 0), in metres.
+    /// World position of the lower-left corner of box (0, 0), in meters.
     pub origin_m: [f64; 2],
     /// Row by row from the bottom; length `width * height`.
     cells: Vec<Cell>,
 }
 
 impl GridMap {
-    /// A map of `width` x `height` boxes; `cells` holds them row by row from the bottom. Its
-    /// lower-left corner is the origin of the world.
+    /// Creates a map of `width` x `height` boxes; `cells` holds them row by row from the bottom.
+    /// Its lower-left corner is the origin of the world.
     ///
     /// # Panics
     /// When `cells` has another length than `width * height`.
@@ -117,7 +117,7 @@ impl GridMap {
         Self { width, height, box_size_m, origin_m: [0.0, 0.0], cells }
     }
 
-    /// The map as it is seen.
+    /// Returns the map as the floor of a scenery.
     pub fn floor(&self) -> Floor {
         let occupancy = |cell: &Cell| match cell {
             Cell::Free => Occupancy::Free,
@@ -133,14 +133,14 @@ impl GridMap {
         }
     }
 
-    /// The same map with its lower-left corner at `origin_m` (metres, world frame).
+    /// Returns the same map with its lower-left corner at `origin_m` (meters, world frame).
     #[must_use]
     pub fn with_origin(mut self, origin_m: [f64; 2]) -> Self {
         self.origin_m = origin_m;
         self
     }
 
-    /// The same map with its unknown boxes turned into what `policy` says.
+    /// Returns the same map with `policy` applied to its unknown boxes.
     #[must_use]
     pub fn with_unknown(mut self, policy: UnknownPolicy) -> Self {
         for cell in &mut self.cells {
@@ -159,7 +159,7 @@ impl GridMap {
         self.height
     }
 
-    /// The box in column `col` (from the west) and row `row` (from the south).
+    /// Returns the box in column `col` (from the west) and row `row` (from the south).
     ///
     /// # Panics
     /// When the box lies outside the map.
@@ -168,23 +168,23 @@ impl GridMap {
         self.cells[(row as usize) * self.width as usize + col as usize]
     }
 
-    /// All boxes, row by row from the bottom.
+    /// Returns all boxes, row by row from the bottom.
     pub fn cells(&self) -> &[Cell] {
         &self.cells
     }
 
-    /// Number of boxes that are `cell`.
+    /// Returns the number of boxes that are `cell`.
     pub fn count(&self, cell: Cell) -> usize {
         self.cells.iter().filter(|&&c| c == cell).count()
     }
 
-    /// Number of boxes of each sort.
+    /// Returns the number of boxes of each type.
     pub fn counts(&self) -> CellCounts {
         CellCounts::of(&self.cells)
     }
 }
 
-/// `width` x `height` as a map's size.
+/// Checks `width` x `height` as the size of a map.
 ///
 /// # Errors
 /// When there is no box at all, or more than [`MAX_BOXES`].
@@ -208,10 +208,10 @@ pub fn check_box_count(
     }
 }
 
-/// `box_size_m`, when it can be the side of a box.
+/// Checks `box_size_m` as the side of a box, in meters.
 ///
 /// # Errors
-/// When it is not a positive number of metres.
+/// When it is not a positive number of meters.
 pub fn check_box_size(box_size_m: f64) -> Result<f64, InputError> {
     if box_size_m.is_finite() && box_size_m > 0.0 {
         return Ok(box_size_m);

@@ -1,5 +1,5 @@
 #![deny(clippy::disallowed_methods)]
-//! Floors of square boxes that are free, wall or unknown, and ways on them.
+//! Floors of square boxes that are free, wall or unknown, and paths on them.
 //!
 //! Axes are those of ROS `map_server`: `x` (columns) runs east, `y` (rows) north, box (0, 0)
 //! is the lower-left corner. Every importer turns its file into this one type.

@@ -1,4 +1,4 @@
-//! An office building of any size, without a file: corridors with rooms on both sides.
+//! A generated office building of any size: corridors with rooms on both sides.
 //!
 //! ```text
 //!  #############################      A floor has `corridors` corridors from west to east, each
@@ -18,7 +18,7 @@ use sidestep_kernel::InputError;
 
 use crate::{Cell, GridMap, MAX_BOXES, Rect, check_box_count, check_box_size};
 
-/// What the building is like. Lengths are rounded to whole boxes.
+/// The dimensions of the building. Lengths are rounded to whole boxes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct OfficeSpec {
@@ -28,13 +28,13 @@ pub struct OfficeSpec {
     pub corridors: u32,
     /// Rooms on either side of each corridor, at least 1.
     pub rooms_per_side: u32,
-    /// Inner width of a room along the corridor, in metres.
+    /// Inner width of a room along the corridor, in meters.
     pub room_width_m: f64,
-    /// Inner depth of a room away from the corridor, in metres.
+    /// Inner depth of a room away from the corridor, in meters.
     pub room_depth_m: f64,
-    /// Width of all corridors and passages, in metres.
+    /// Width of all corridors and passages, in meters.
     pub corridor_width_m: f64,
-    /// Width of the doors, in metres; not more than `room_width_m`.
+    /// Width of the doors, in meters; not more than `room_width_m`.
     pub door_width_m: f64,
 }
 
@@ -61,17 +61,17 @@ pub struct Office {
     pub map: GridMap,
     /// One door per room, in the order of `rooms`.
     pub doors: Vec<Rect>,
-    /// Corridors from west to east, floor by floor and from the south; of a floor, its cross
-    /// corridors (west, east) follow; last the passages between floors. Corridors overlap where
-    /// they meet.
+    /// Corridors from west to east, floor by floor and from the south, followed on each floor by
+    /// its cross corridors (west, east); the passages between floors come last. Corridors overlap
+    /// where they meet.
     pub corridors: Vec<Rect>,
-    /// Rooms floor by floor; within one, corridor by corridor from the south; of a corridor,
-    /// from the west those to the south of it, then those to the north.
+    /// Rooms floor by floor; on a floor, corridor by corridor from the south; at a corridor, the
+    /// rooms to the south of it from the west, then those to the north.
     pub rooms: Vec<Rect>,
 }
 
 impl OfficeSpec {
-    /// Builds the office of boxes with a side of `box_size_m` metres.
+    /// Builds the office from boxes with a side of `box_size_m` meters.
     ///
     /// # Errors
     /// When a number is 0 or a length less than half a box, the doors are wider than the rooms,
@@ -131,7 +131,7 @@ impl Plan {
         Ok(Office { map, doors, corridors, rooms })
     }
 
-    /// Width and height of the building, all walls included.
+    /// Returns width and height of the building in boxes, all walls included.
     fn size(&self) -> Result<(u32, u32), InputError> {
         let wide = |n: u32| u64::from(n);
         let rooms = wide(self.rooms_per_side).saturating_mul(wide(self.room_width) + 1);
@@ -142,24 +142,25 @@ impl Plan {
         check_box_count("office", width, bands.saturating_add(1))
     }
 
-    /// Boxes from one corridor to the next: two rows of rooms, three walls and a corridor.
+    /// Number of boxes from one corridor to the next: two rows of rooms, three walls and a
+    /// corridor.
     fn band_pitch(&self) -> u64 {
         2 * u64::from(self.room_depth) + u64::from(self.corridor_width) + 3
     }
 
-    /// Boxes that a cross corridor and its wall take; 0 where there is none.
+    /// Number of boxes of a cross corridor and its wall; 0 where there is none.
     fn cross_pitch(&self) -> u64 {
         if self.corridors > 1 { u64::from(self.corridor_width) + 1 } else { 0 }
     }
 
     // The sums below stay within the building, whose size `size` has checked.
 
-    /// Boxes that a cross corridor and its wall take, within a building of checked size.
+    /// Number of boxes of a cross corridor and its wall, within a building of checked size.
     fn cross_width(&self) -> u32 {
         self.cross_pitch() as u32
     }
 
-    /// Boxes from the west edge of a floor to that of the next.
+    /// Number of boxes from the west edge of a floor to that of the next.
     fn floor_pitch(&self) -> u32 {
         self.floor_width() + self.corridor_width
     }
@@ -192,7 +193,7 @@ impl Plan {
         layout.corridors.push(Rect { col: west + 1, row, width, height });
     }
 
-    /// Rooms with their lowest row at `row` and their doors in the row `door_row`.
+    /// Builds rooms with their lowest row at `row` and their doors in the row `door_row`.
     fn build_rooms(&self, layout: &mut Layout, west: u32, row: u32, door_row: u32) {
         for room in 0..self.rooms_per_side {
             let col = west + room * (self.room_width + 1);
@@ -213,7 +214,7 @@ impl Plan {
         }
     }
 
-    /// The passage to the floor that begins at column `west` from the one before it.
+    /// Builds the passage to the floor that starts at column `west` from the one before it.
     fn build_passage(&self, layout: &mut Layout, west: u32) {
         let col = west - self.corridor_width - 1;
         let (row, width, height) =
@@ -222,7 +223,7 @@ impl Plan {
     }
 }
 
-/// What is hollow in the solid building.
+/// The hollow parts of the solid building.
 #[derive(Debug, Default)]
 struct Layout {
     doors: Vec<Rect>,
@@ -231,7 +232,7 @@ struct Layout {
 }
 
 impl Layout {
-    /// The boxes of a `width` x `height` building: free where the layout has a rectangle.
+    /// Returns the boxes of a `width` x `height` building: free where the layout has a rectangle.
     fn carved(&self, width: u32, height: u32) -> Vec<Cell> {
         let mut cells = vec![Cell::Wall; width as usize * height as usize];
         for rect in self.rooms.iter().chain(&self.doors).chain(&self.corridors) {
@@ -244,10 +245,10 @@ impl Layout {
     }
 }
 
-/// `length_m` in whole boxes.
+/// Returns `length_m` in whole boxes.
 fn boxes(key: &str, length_m: f64, box_size_m: f64) -> Result<u32, InputError> {
     let boxes = (length_m / box_size_m).round();
-    // NaN is refused too: it is in no range.
+    // NaN is refused too, because it is in no range.
     if (1.0..=MAX_BOXES as f64).contains(&boxes) {
         return Ok(boxes as u32);
     }

@@ -3,12 +3,12 @@
 use super::{Cell, GridMap};
 
 impl GridMap {
-    /// The map in characters, north up: `#` wall, `.` free, `?` unknown, one line per row of
-    /// characters, each ended by a line feed.
+    /// Returns the map in characters, north up: `#` wall, `.` free, `?` unknown, one line per row
+    /// of characters, each ended by a line feed.
     ///
-    /// A map of more than `max_cols` columns is drawn smaller: a character then stands for a
-    /// square of boxes and follows the rule that makes boxes of pixels (wall where any of them
-    /// is a wall, else unknown where any is unknown), so that no wall is lost.
+    /// A map of more than `max_cols` columns is drawn smaller: a character then stands for a square
+    /// of boxes and follows the rule that makes boxes of pixels (wall where any of them is a wall,
+    /// else unknown where any is unknown), so that no wall is lost.
     pub fn to_text(&self, max_cols: u32) -> String {
         let step = self.width().div_ceil(max_cols.max(1));
         let cols = self.width().div_ceil(step);
@@ -21,7 +21,8 @@ impl GridMap {
         text
     }
 
-    /// What the square of `side` boxes with the lower-left box (`col`, `row`) is as a whole.
+    /// Returns the combined cell of the square of `side` boxes with the lower-left box (`col`,
+    /// `row`).
     fn square(&self, col: u32, row: u32, side: u32) -> Cell {
         let mut whole = Cell::Free;
         for row in row..(row + side).min(self.height()) {

@@ -1,4 +1,4 @@
-//! A scenario with the files that it names: what a run folder keeps.
+//! A scenario with the files that it names, as a run folder keeps it.
 
 use super::Source;
 use super::file::read_bytes;
@@ -6,12 +6,12 @@ use sidestep_kernel::InputError;
 use std::fmt::Display;
 use std::path::Path;
 
-/// The folder of the files, seen from the scenario.
+/// The folder of the files, relative to the scenario.
 const FOLDER: &str = "inputs";
-/// Largest file that goes along as it is, unpacked.
+/// Size in bytes of the largest file that is copied as it is, after unpacking.
 const MAX_BYTES: u64 = 64 << 20;
 
-/// A scenario that needs no other file any more, and the files it has instead.
+/// A scenario that needs no other file, together with the files that it contains instead.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Resolved {
     /// The TOML text.
@@ -29,9 +29,10 @@ pub struct Bundle<'a> {
 }
 
 impl<'a> Bundle<'a> {
-    /// Begins with the scenario's text; seed and cycles are told even where they are the preset.
+    /// Starts with the scenario's text; seed and cycles are written even where they are the
+    /// default.
     pub fn new(source: &'a Source, seed: u64, cycles: u64) -> Self {
-        // TOML has no larger numbers.
+        // TOML has no larger integers.
         let cycles = cycles.min(i64::MAX as u64);
         let overrides = vec![format!("seed={seed}"), format!("cycles={cycles}")];
         Self { source, overrides, files: Vec::new() }
@@ -49,24 +50,24 @@ impl<'a> Bundle<'a> {
         path
     }
 
-    /// Adds a file as it is, found relative to the scenario's folder; returns its new path.
+    /// Copies a file, found relative to the scenario's folder; returns its new path.
     ///
     /// # Errors
-    /// When it cannot be read any more.
+    /// When it can no longer be read.
     pub fn copy(&mut self, name: &str, path: &str) -> Result<String, InputError> {
         let bytes = read_bytes(&self.source.path(Path::new(path)), MAX_BYTES)?;
         Ok(self.add(name, bytes))
     }
 
-    /// Returns how many files were added so far.
+    /// Returns the number of files that were added so far.
     pub fn count(&self) -> usize {
         self.files.len()
     }
 
-    /// Makes the whole of it.
+    /// Completes the bundle.
     ///
     /// # Errors
-    /// When a key leads through something that is no table.
+    /// When a key leads through something that is not a table.
     pub fn finish(self) -> Result<Resolved, InputError> {
         let text = self.source.clone().with(&self.overrides)?.text;
         Ok(Resolved { text: format!("{}{text}", self.source.heading()), files: self.files })

@@ -1,8 +1,8 @@
 //! Numbers that check themselves on reading.
 //!
-//! A field of such a type holds a right value, or the file was refused:
-//! [`Source::parse`](crate::Source::parse) points at the wrong number and tells the remedy. A
-//! later check that needs the place as well wraps it: `Spanned<Positive>`.
+//! A field of such a type holds a valid number, or the file was refused:
+//! [`Source::parse`](crate::Source::parse) points at the invalid number and gives the remedy. A
+//! type for a later check that needs the position too is wrapped: `Spanned<Positive>`.
 //!
 //! ```
 //! use sidestep_scenario::{Positive, Share, Source, Whole};
@@ -26,15 +26,15 @@ use serde::{Deserialize, Deserializer};
 use std::fmt;
 use std::marker::PhantomData;
 
-/// A rule that numbers obey.
+/// A rule for valid numbers.
 pub trait Rule {
-    /// Returns whether a number obeys.
+    /// Returns whether a number is valid.
     fn allows(number: f64) -> bool;
 
-    /// Right numbers in words, as they follow "give": "a number above 0".
+    /// Returns the valid numbers in words that follow "give", e.g. "a number above 0".
     fn words() -> String;
 
-    /// Right points in the same words.
+    /// Returns the valid points in words that follow "give".
     fn words_of_point(dimensions: usize) -> String {
         format!("{dimensions} numbers, each {}", Self::words())
     }
@@ -82,7 +82,8 @@ impl Rule for FromZero {
     }
 }
 
-/// Numbers from `LEAST` to `MOST`; whether the bounds themselves are right is told by the last two.
+/// Numbers from `LEAST` to `MOST`; the last two parameters say whether the bounds themselves are
+/// valid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Between<const LEAST: i64, const MOST: i64, const HAS_LEAST: bool, const HAS_MOST: bool>;
 
@@ -115,7 +116,7 @@ impl<const LEAST: i64, const MOST: i64, const HAS_LEAST: bool, const HAS_MOST: b
     }
 }
 
-/// A bound as people write it: 1e6 rather than 1000000.
+/// A bound in short form: 1e6 rather than 1000000.
 fn short(bound: i64) -> String {
     match bound.abs() < 1_000_000 {
         true => bound.to_string(),
@@ -123,7 +124,7 @@ fn short(bound: i64) -> String {
     }
 }
 
-/// A number that obeys a rule.
+/// A number that is valid under a rule.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Number<R>(f64, PhantomData<R>);
 
@@ -133,11 +134,11 @@ pub type Finite = Number<Any>;
 pub type Positive = Number<AboveZero>;
 /// A number of at least 0.
 pub type NonNegative = Number<FromZero>;
-/// A number from 0 to 1: a share, a probability.
+/// A number from 0 to 1, such as a share or a probability.
 pub type Share = Number<FromTo<0, 1>>;
 
 impl<R: Rule> Number<R> {
-    /// The number.
+    /// Returns the number.
     pub fn get(self) -> f64 {
         self.0
     }
@@ -156,7 +157,7 @@ impl<R> From<Number<R>> for f64 {
     }
 }
 
-/// Checked inside the visitor, so that the reader knows the place even in an array.
+/// The check is inside the visitor, so that the reader knows the position even in an array.
 impl<'de, R: Rule> Deserialize<'de> for Number<R> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct Reader<R>(PhantomData<R>);
@@ -189,20 +190,20 @@ impl<'de, R: Rule> Deserialize<'de> for Number<R> {
 pub struct Whole<const LEAST: u64, const MOST: u64 = { u64::MAX }>(u64);
 
 impl<const LEAST: u64, const MOST: u64> Whole<LEAST, MOST> {
-    /// The number.
+    /// Returns the number.
     pub fn get(self) -> u64 {
         self.0
     }
 
-    /// Reads such a number into a field that holds a plain one: `deserialize_with`.
+    /// Reads such a number into a field of a plain type, by `deserialize_with`.
     ///
     /// # Errors
-    /// As reading `Self`.
+    /// The same as for reading `Self`.
     pub fn read<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u64, D::Error> {
         Self::deserialize(deserializer).map(Self::get)
     }
 
-    /// A bound that nobody reaches is not worth a word.
+    /// A bound that nobody reaches is left out.
     fn remedy(is_below: bool) -> String {
         match is_below && MOST >= u64::from(u32::MAX) {
             true => format!("give {LEAST} or more"),
@@ -240,12 +241,12 @@ impl<'de, const LEAST: u64, const MOST: u64> Deserialize<'de> for Whole<LEAST, M
     }
 }
 
-/// A point: as many numbers as there are dimensions, each of which obeys a rule.
+/// A point: one number per dimension, each of them valid under a rule.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Point<const D: usize, R = Any>([f64; D], PhantomData<R>);
 
 impl<const D: usize, R: Rule> Point<D, R> {
-    /// Its coordinates.
+    /// Returns its coordinates.
     pub fn get(self) -> [f64; D] {
         self.0
     }
@@ -267,12 +268,12 @@ impl<'de, const D: usize, R: Rule> Deserialize<'de> for Point<D, R> {
     }
 }
 
-/// One number, or the least and the greatest: `0.5` or `[0.4, 0.6]`.
+/// One number, or a minimum and a maximum: `0.5` or `[0.4, 0.6]`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
-    /// The least.
+    /// The minimum.
     pub least: f64,
-    /// The greatest; may be the same.
+    /// The maximum; may equal the minimum.
     pub greatest: f64,
 }
 
@@ -297,7 +298,7 @@ enum Numbers {
     Many(Vec<f64>),
 }
 
-/// Reads numbers, one or an array of them; holds what is expected.
+/// A visitor that reads numbers, one or an array of them; holds the expected form in words.
 struct Reader(&'static str);
 
 impl<'de> Visitor<'de> for Reader {
@@ -328,16 +329,16 @@ impl<'de> Visitor<'de> for Reader {
     }
 }
 
-/// Words between a wrong value and its remedy, in the reader's one message.
+/// Separator between an invalid value and its remedy, in the reader's one message.
 const BEFORE: &str = "wrong value `";
 const BETWEEN: &str = "`, ";
 
-/// The error of a value that a type refuses by itself: `Source::parse` adds key and place.
+/// Creates the error of a type that refuses a value; `Source::parse` adds key and position.
 pub fn refused<E: Error>(value: impl fmt::Display, remedy: &str) -> E {
     E::custom(format_args!("{BEFORE}{value}{BETWEEN}{remedy}"))
 }
 
-/// Value and remedy of such an error's message.
+/// Splits such an error's message into value and remedy.
 pub(crate) fn told_by_a_value(message: &str) -> Option<(&str, &str)> {
     message.strip_prefix(BEFORE)?.split_once(BETWEEN)
 }

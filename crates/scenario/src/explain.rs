@@ -1,8 +1,9 @@
-//! Messages of the TOML reader in words that help.
+//! Errors of the TOML reader in words that help.
 
 use super::checked::told_by_a_value;
 
-/// Cause and remedy of an error of the TOML reader; `also` are known keys that it did not see.
+/// Returns cause and remedy of an error of the TOML reader; `also` are known keys that it did not
+/// see.
 pub(crate) fn explain(error: &toml::de::Error, also: &[&str]) -> (String, String) {
     let message = error.message().trim();
     let path = path_of(error);
@@ -12,6 +13,7 @@ pub(crate) fn explain(error: &toml::de::Error, also: &[&str]) -> (String, String
     }
     if let Some((found, known)) = named(message, "unknown field `") {
         let mut known = quoted(known);
+        // The keys of the head are known at the top level only.
         if path.is_none() {
             known.extend(also);
         }
@@ -27,13 +29,13 @@ pub(crate) fn explain(error: &toml::de::Error, also: &[&str]) -> (String, String
     (message.replace('\n', " "), remedy.into())
 }
 
-/// The name that stands in backticks behind a beginning, and the rest of the message.
+/// Returns the name in backticks after a prefix, and the rest of the message.
 fn named<'a>(message: &'a str, beginning: &str) -> Option<(&'a str, &'a str)> {
     message.strip_prefix(beginning)?.split_once('`')
 }
 
-/// Keys on the way to the error, joined by dots; the reader tells them in its words only, and
-/// only where it has no text to quote.
+/// Returns the keys on the way to the error, joined by dots. The reader gives them in its message
+/// only, and only where it has no text to quote.
 fn path_of(error: &toml::de::Error) -> Option<String> {
     let mut error = error.clone();
     error.set_input(None);
@@ -50,7 +52,7 @@ fn quoted(text: &str) -> Vec<&str> {
     text.split('`').skip(1).step_by(2).collect()
 }
 
-/// "did you mean" with the nearest of `known`, or the whole list.
+/// Returns "did you mean" with the nearest of `known`, or the whole list.
 pub fn nearest(found: &str, known: &[&str]) -> String {
     let distance = |k: &&&str| strsim::osa_distance(found, k);
     match known.iter().min_by_key(distance) {

@@ -9,8 +9,8 @@ use sidestep_kernel::InputError;
 
 const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
 
-/// The content of the file at `path`, unpacked where it is packed with gzip (told by its first
-/// bytes, not by its name).
+/// Returns the content of the file at `path`, unpacked where it is packed with gzip (recognized by
+/// its first bytes, not by its name).
 ///
 /// # Errors
 /// When the file cannot be read or unpacked, or has more than `max_bytes` (unpacked).
@@ -23,7 +23,7 @@ pub fn read_bytes(path: &Path, max_bytes: u64) -> Result<Vec<u8>, InputError> {
     Ok(bytes)
 }
 
-/// The content of a UTF-8 text file, as [`read_bytes`] reads it, without a byte order mark.
+/// Returns the content of a UTF-8 text file, read by [`read_bytes`], without a byte order mark.
 ///
 /// # Errors
 /// Those of [`read_bytes`], and bytes that are not UTF-8, with their line and column.

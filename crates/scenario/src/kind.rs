@@ -1,4 +1,4 @@
-//! What a world is to those who run scenarios and know no world.
+//! The interface of a world for programs that run scenarios and know no world.
 
 use crate::{Resolved, Source, nearest};
 use sidestep_kernel::words::{Lines, Said};
@@ -8,20 +8,20 @@ use std::path::Path;
 
 /// A world: its name, its files, and how its scenarios compile.
 pub trait Kind: Sync {
-    /// Name, as scenarios give it.
+    /// The name, as scenarios write it.
     fn name(&self) -> &'static str;
 
-    /// Noun for one of its agents, e.g. `robot`.
+    /// The noun for one of its agents, e.g. `robot`.
     fn agent(&self) -> &'static str;
 
-    /// One line that says what it simulates.
+    /// One line about the subject of its simulation.
     fn about(&self) -> &'static str;
 
     /// A commented scenario with every key.
     fn default_scenario(&self) -> &'static str;
 
-    /// The scenario that a file of another program's form stands for; `None` for files that this
-    /// world does not read.
+    /// Translates a file of another program into a scenario; `None` for files that this world does
+    /// not read.
     ///
     /// # Errors
     /// When such a file cannot be read.
@@ -32,64 +32,64 @@ pub trait Kind: Sync {
     /// Compiles a scenario of this world.
     ///
     /// # Errors
-    /// With place, line, column, cause and remedy for anything that is wrong in it.
+    /// When anything in it is wrong; with place, line, column, cause and remedy.
     fn compile(&self, source: &Source) -> Result<Box<dyn Compiled>, InputError>;
 }
 
-/// A scenario that has been found right; many runs of it share one world.
+/// A scenario that was checked and compiled; many runs of it share one world.
 pub trait Compiled: Send + Sync {
     /// Name of its world.
     fn world(&self) -> &'static str;
 
-    /// What the scenario asks for.
+    /// The plan that the scenario asks for.
     fn plan(&self) -> Plan;
 
-    /// Number of bodies that are simulated: what a run's size is told by.
+    /// Number of simulated bodies, by which the size of a run is measured.
     fn bodies(&self) -> usize;
 
-    /// What the scenario holds, for people who check it.
+    /// Returns the contents of the scenario, for people who check it.
     fn contents(&self, source: &Source) -> Said;
 
-    /// The scenario as it goes into a run folder: complete in itself.
+    /// Returns the scenario as it is stored in a run folder: complete, with all its files.
     ///
     /// # Errors
-    /// When a file that it names cannot be read any more.
+    /// When a file that it names can no longer be read.
     fn resolve(&self, source: &Source) -> Result<Resolved, InputError>;
 
-    /// A run at its start; `source` names it in checkpoints.
+    /// Creates a run at its start; `source` identifies it in checkpoints.
     fn start(&self, source: &Source, workers: usize) -> Box<dyn Simulation>;
 
-    /// The world's own type, for what is about one world alone.
+    /// Returns the world's own type, for features of one world alone.
     fn as_any(&self) -> &dyn Any;
 }
 
-/// What a file of another program's form stands for.
+/// The translation of a file of another program.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Foreign {
-    /// The scenario's text, or why nobody in the file can be simulated.
+    /// The scenario's text, or the reason why nothing in the file can be simulated.
     pub scenario: Result<String, InputError>,
-    /// What was found in the file beside it, for machines,
+    /// Further findings in the file, as JSON.
     pub json: serde_json::Value,
-    /// and for people.
+    /// The same for people.
     pub lines: Lines,
 }
 
-/// The worlds that there are.
+/// All worlds of a program.
 #[derive(Clone, Copy)]
 pub struct Worlds(pub &'static [&'static dyn Kind]);
 
 impl Worlds {
-    /// Names of the worlds.
+    /// Returns the names of the worlds.
     pub fn names(self) -> Vec<&'static str> {
         self.0.iter().map(|kind| kind.name()).collect()
     }
 
-    /// The world of this name.
+    /// Returns the world with this name.
     pub fn named(self, name: &str) -> Option<&'static dyn Kind> {
         self.0.iter().copied().find(|kind| kind.name() == name)
     }
 
-    /// Compiles a scenario of whatever world it names.
+    /// Compiles a scenario of any of these worlds.
     ///
     /// # Errors
     /// When no such world is known, or the scenario is wrong.
@@ -102,7 +102,7 @@ impl Worlds {
         kind.compile(source)
     }
 
-    /// What a file of another program's form stands for; `None` for files of our own.
+    /// Translates a file of another program; `None` for scenario files.
     ///
     /// # Errors
     /// When it cannot be read.

@@ -1,11 +1,11 @@
 #![deny(clippy::disallowed_methods)]
 //! Scenario files: TOML text with overrides -> typed sections, and errors that point.
 //!
-//! This crate knows the form of the file that all worlds share. Its content is each world's own
-//! business. The way through the files: [`Source`] reads the text and applies overrides
-//! (`overrides.rs`), serde makes sections of it ([`Sections`]) whose numbers check themselves
-//! ([`Number`], [`Whole`], [`Point`]), errors of the TOML reader get cause and remedy
-//! (`explain.rs`), and a [`Bundle`] gathers a scenario with all the files that it names.
+//! This crate knows the file format that all worlds share; each world defines its own keys. The way
+//! through the files: [`Source`] reads the text and applies overrides (`overrides.rs`), serde turns
+//! it into sections ([`Sections`]) whose numbers check themselves ([`Number`], [`Whole`],
+//! [`Point`]), errors of the TOML reader get cause and remedy (`explain.rs`), and a [`Bundle`]
+//! gathers a scenario with all the files that it names.
 
 mod bundle;
 mod checked;

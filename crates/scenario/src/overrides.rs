@@ -1,4 +1,4 @@
-//! Overrides: `key=value` set in the text of a scenario, comments and order kept.
+//! Overrides: `key=value` set in the text of a scenario, keeping its comments and its order.
 
 use sidestep_kernel::InputError;
 use toml_edit::{DocumentMut, Item, Value};
@@ -13,6 +13,7 @@ pub(crate) fn set(document: &mut DocumentMut, override_text: &str) -> Result<(),
             "write --set key=value, e.g. --set robots.count=20",
         )
     })?;
+    // Text needs no quotes on a command line, so a value that is not TOML is text.
     let value: Value = value.trim().parse().unwrap_or_else(|_| Value::from(value.trim()));
     let keys: Vec<&str> = key.trim().split('.').collect();
     let (last, path) = keys.split_last().expect("split gives at least one part");
@@ -26,7 +27,7 @@ pub(crate) fn set(document: &mut DocumentMut, override_text: &str) -> Result<(),
     let item = only_element(item);
     let table = item.as_table_like_mut().ok_or_else(|| not_a_table(&place, last))?;
     match table.get_mut(last).and_then(Item::as_value_mut) {
-        // Comments around the old value stay where they are.
+        // The comments around the old value are kept.
         Some(old) => {
             let decor = old.decor().clone();
             *old = value;
@@ -58,7 +59,7 @@ fn descend<'a>(item: &'a mut Item, part: &str, place: &str) -> Result<&'a mut It
     Ok(table.get_mut(part).expect("inserted just now"))
 }
 
-/// The table itself, or the only table of an array of tables.
+/// Returns the table itself, or the only table of an array of tables.
 fn only_element(item: &mut Item) -> &mut Item {
     let is_single = item.as_array_of_tables().is_some_and(|a| a.len() == 1)
         || item.as_array().is_some_and(|a| a.len() == 1);

@@ -1,10 +1,10 @@
-//! Sections that stand once or many times.
+//! Sections that occur once or several times.
 
 use serde::Deserialize;
 use toml::Spanned;
 
-/// One table or an array of tables under one key, `[robots]` or `[[robots]]`; each knows where it
-/// stands.
+/// One table or an array of tables under one key, `[robots]` or `[[robots]]`; each keeps its
+/// position in the file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sections<T>(pub Vec<Spanned<T>>);
 

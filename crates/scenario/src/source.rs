@@ -1,4 +1,4 @@
-//! The text of a scenario, and how it is read.
+//! The text of a scenario, and its parser.
 
 use super::explain::explain;
 use super::overrides::set;
@@ -14,7 +14,7 @@ use toml_edit::DocumentMut;
 /// Version of the scenario format that this program reads.
 pub const FORMAT: u32 = 1;
 
-/// The end of a changed scenario's place.
+/// The suffix of the place of a scenario with overrides.
 const WITH_OVERRIDES: &str = " (with --set)";
 
 /// The text of a scenario, where it came from, and the folder its paths are relative to.
@@ -22,13 +22,13 @@ const WITH_OVERRIDES: &str = " (with --set)";
 pub struct Source {
     /// Its name in errors.
     pub place: String,
-    /// The TOML text, overrides applied: the resolved scenario.
+    /// The TOML text with overrides applied: the resolved scenario.
     pub text: String,
-    /// Files named in the scenario are relative to this folder.
+    /// The folder that paths in the scenario are relative to.
     pub folder: PathBuf,
 }
 
-/// The beginning of every scenario: what is needed to tell whose it is.
+/// The first keys of every scenario, by which its world is recognized.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 pub struct Preamble {
     /// See [`FORMAT`].
@@ -40,7 +40,7 @@ pub struct Preamble {
 /// Keys of [`Head`].
 const HEAD: [&str; 5] = ["format", "world", "name", "seed", "cycles"];
 
-/// The part of a scenario that is the same in all worlds.
+/// The keys that all worlds share.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Head {
@@ -48,13 +48,13 @@ pub struct Head {
     _format: u32,
     #[serde(rename = "world")]
     _world: String,
-    /// Name of the scenario, may be empty.
+    /// Name of the scenario; may be empty.
     #[serde(default)]
     pub name: String,
-    /// The seed; 1 unless it is given.
+    /// The seed; 1 by default.
     #[serde(default = "first_seed")]
     pub seed: u64,
-    /// Cycles to run, if it is said.
+    /// Number of cycles to run, if given.
     pub cycles: Option<u64>,
 }
 
@@ -73,7 +73,7 @@ impl Source {
         Self::new(path.display().to_string(), text, folder).with(overrides)
     }
 
-    /// A scenario from text; `place` names it in errors.
+    /// Creates a scenario from text; `place` names it in errors.
     pub fn new(
         place: impl Into<String>,
         text: impl Into<String>,
@@ -82,9 +82,9 @@ impl Source {
         Self { place: place.into(), text: text.into(), folder: folder.into() }
     }
 
-    /// Applies `key=value` overrides: `seed=3`, `robots.count=20`, `map.file="x.yaml"`. A
-    /// value that is not TOML is taken as text. A table that stands alone in an array needs
-    /// no index; others are counted from 0 (`robots.1.count`).
+    /// Applies `key=value` overrides: `seed=3`, `robots.count=20`, `map.file="x.yaml"`. A value
+    /// that is not TOML is taken as text. A table that stands alone in an array needs no index;
+    /// others are counted from 0 (`robots.1.count`).
     ///
     /// # Errors
     /// When the text is not TOML, or a key leads through something that is not a table.
@@ -108,7 +108,8 @@ impl Source {
     /// Parses the text into a type whose fields refuse unknown keys.
     ///
     /// # Errors
-    /// With line and column; an unknown key is answered with the nearest known one.
+    /// When the text does not fit the type, with line and column; the error for an unknown key
+    /// suggests the nearest known one.
     pub fn parse<T: DeserializeOwned>(&self) -> Result<T, InputError> {
         toml::from_str(&self.text).map_err(|error| self.explained(&error, &[]))
     }
@@ -116,7 +117,7 @@ impl Source {
     /// Parses a scenario: the head that all worlds share, and the sections of one world.
     ///
     /// # Errors
-    /// As [`Self::parse`].
+    /// The same as for [`Self::parse`].
     pub fn parse_world<T: DeserializeOwned>(&self) -> Result<(Head, T), InputError> {
         let told = |error| self.explained(&error, &HEAD);
         let table = DeTable::parse(&self.text).map_err(told)?;
@@ -137,7 +138,7 @@ impl Source {
         }
     }
 
-    /// Reads format and world, and refuses a format that this program does not know.
+    /// Reads format and world, and refuses a format that this program cannot read.
     ///
     /// # Errors
     /// When either is missing or the format is another.
@@ -150,7 +151,7 @@ impl Source {
         Err(self.error(Some(preamble.format.span()), cause, format!("write `format = {FORMAT}`")))
     }
 
-    /// The error of a file that is wrong as a scenario because it is a sweep.
+    /// Returns the error for a file that is not a scenario because it is a sweep.
     fn sweep_instead(&self) -> Option<InputError> {
         let table = self.text.parse::<toml::Table>().ok()?;
         let is_sweep = table.contains_key("scenario") && !table.contains_key("world");
@@ -158,7 +159,8 @@ impl Source {
         is_sweep.then(|| self.error(None, "this is a sweep, not a scenario", remedy))
     }
 
-    /// An error in the text, at a span if one is given. The empty span of a default is none.
+    /// Creates an error in the text, at a span if one is given. The empty span of a default counts
+    /// as none.
     pub fn error(
         &self,
         span: impl Into<Option<Range<usize>>>,
@@ -172,7 +174,7 @@ impl Source {
         }
     }
 
-    /// The error of a part that does not know the text, told where its section stands.
+    /// Adds the position of a section to the error of a part that does not know the text.
     pub fn error_of(
         &self,
         span: impl Into<Option<Range<usize>>>,
@@ -181,14 +183,14 @@ impl Source {
         self.error(span, format!("{}: {}", error.place(), error.cause()), error.remedy())
     }
 
-    /// The first line of a resolved scenario: what it was made from, and by whom.
+    /// Returns the first line of a resolved scenario: its source, and the program that resolved it.
     pub fn heading(&self) -> String {
         let place = self.place.trim_end_matches(WITH_OVERRIDES);
         let name = Path::new(place).file_name().unwrap_or_default().display();
         format!("# {name}, resolved by sidestep {}\n", env!("CARGO_PKG_VERSION"))
     }
 
-    /// A path of the scenario, relative to its folder.
+    /// Resolves a path of the scenario against its folder.
     pub fn path(&self, path: &Path) -> PathBuf {
         self.folder.join(path)
     }

@@ -1,10 +1,10 @@
-//! Intervals from the values themselves: the bias-corrected and accelerated bootstrap.
+//! Bootstrap intervals: the bias-corrected and accelerated bootstrap (BCa).
 //!
-//! Efron, "Better bootstrap confidence intervals", Journal of the American Statistical
-//! Association 82 (1987); Efron and Tibshirani, An Introduction to the Bootstrap (1993), chapter
-//! 14. Resamples say how the statistic varies; `z0` corrects for a statistic that is biased,
-//! `a` (by the jackknife) for one whose spread depends on its value. Its error of coverage falls
-//! with `1 / n`, where that of Student's interval falls with `1 / sqrt(n)` on skewed values.
+//! Efron, "Better bootstrap confidence intervals", Journal of the American Statistical Association
+//! 82 (1987); Efron and Tibshirani, An Introduction to the Bootstrap (1993), chapter 14. Resamples
+//! show how the statistic varies; `z0` corrects for a statistic that is biased, `a` (by the
+//! jackknife) for one whose spread depends on its value. Its coverage error decreases with `1 / n`,
+//! that of Student's interval with `1 / sqrt(n)` on skewed values.
 
 use super::Interval;
 use super::moments::percentile;
@@ -13,22 +13,22 @@ use sidestep_kernel::stream::{Purpose, Streams};
 use sidestep_kernel::{EntityId, Seed};
 use statrs::distribution::{ContinuousCDF, Normal};
 
-/// Draws of this kind choose the members of a resample.
+/// The purpose of draws that choose the members of a resample.
 const RESAMPLE: Purpose = Purpose(0xB007);
 
-/// Values chosen from one stream. A stream has 2^18 words before it repeats, and choosing one
-/// of `n` takes less than two on average.
+/// Number of values chosen from one stream. A stream has 2^18 words before it repeats, and choosing
+/// one of `n` takes less than two on average.
 const STREAM: usize = 1 << 16;
 
-/// How to draw a bootstrap interval.
+/// The settings of a bootstrap interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bootstrap {
-    /// Resamples. With the default of 2,000 the chance error of an end moves the coverage by
-    /// about half a percent.
+    /// Number of resamples. With the default of 2,000 the random error of an end changes the
+    /// coverage by about half a percent.
     pub resamples: u32,
     /// Nominal coverage, 0.95 by default.
     pub level: f64,
-    /// What the draws grow from: the same values and seed give the same interval, to the bit.
+    /// The seed of the draws: the same values and seed give the same interval, to the bit.
     pub seed: Seed,
 }
 
@@ -39,29 +39,29 @@ impl Default for Bootstrap {
 }
 
 impl Bootstrap {
-    /// The interval of the mean.
+    /// Returns the interval of the mean.
     ///
-    /// `None` of fewer than three values, of equal ones (resamples of what never varied say
-    /// nothing of how it varies), where some value is not finite, and where the correction asks
-    /// for a more extreme resample than were drawn.
+    /// `None` for fewer than three values, for equal values (their resamples do not vary), where
+    /// some value is not finite, and where the correction asks for a more extreme resample than
+    /// were drawn.
     pub fn mean(&self, values: &[f64]) -> Option<Interval> {
         let center = mean(values)?;
         if is_constant(values) || !values.iter().all(|v| v.is_finite()) {
             return None;
         }
-        // The mean of deviations: it loses no digits, and the jackknife has a closed form.
+        // The mean of deviations, because it loses no digits and the jackknife has a closed form.
         let deviations: Vec<f64> = values.iter().map(|v| v - center).collect();
         let mean_of = |chosen: &[f64]| Some(chosen.iter().sum::<f64>() / chosen.len() as f64);
         let interval = self.corrected(&deviations, 0.0, acceleration(&deviations), mean_of)?;
         Some(Interval { low: center + interval.low, high: center + interval.high })
     }
 
-    /// The interval of any `statistic` of independent, equally distributed items; an item may
-    /// be a pair. Takes `resamples + n` evaluations.
+    /// Returns the interval of any `statistic` of independent, identically distributed items; an
+    /// item may be a pair. Takes `resamples + n` evaluations.
     ///
     /// The statistic must vary smoothly with its items: for a quantile see
-    /// [`super::quantile_interval`]. `None` as for [`Self::mean`], and where the statistic of
-    /// the sample, a resample, or the sample without one item is `None` or not finite.
+    /// [`super::quantile_interval`]. `None` as for [`Self::mean`], and where the statistic of the
+    /// sample, a resample, or the sample without one item is `None` or not finite.
     pub fn interval<T: Copy>(
         &self,
         items: &[T],
@@ -82,7 +82,7 @@ impl Bootstrap {
         self.corrected(items, estimate, acceleration(&influences), statistic)
     }
 
-    /// The corrected percentiles of what `statistic` says of the resamples.
+    /// Returns the corrected percentiles of `statistic` over the resamples.
     fn corrected<T: Copy>(
         &self,
         items: &[T],
@@ -103,7 +103,7 @@ impl Bootstrap {
             return None;
         }
         resampled.sort_by(f64::total_cmp);
-        // What differs from the estimate by rounding alone is a tie, whatever the magnitudes.
+        // A difference from the estimate by rounding alone is a tie, whatever the magnitudes.
         let rounding = 1e-10 * (resampled[resampled.len() - 1] - resampled[0]);
         let below = resampled.partition_point(|v| *v < estimate - rounding);
         let ties = resampled.partition_point(|v| *v <= estimate + rounding) - below;
@@ -120,7 +120,7 @@ impl Bootstrap {
         Some(Interval { low: end(tail)?, high: end(1.0 - tail)? })
     }
 
-    /// As many of `items` as there are, each drawn from all, in place of what is in `chosen`.
+    /// Draws as many of `items` as there are, each from all of them, into `chosen`.
     fn resample<T: Copy>(&self, items: &[T], resample: EntityId, chosen: &mut Vec<T>) {
         chosen.clear();
         let (streams, n) = (Streams::new(self.seed), items.len() as u32);
@@ -132,7 +132,7 @@ impl Bootstrap {
     }
 }
 
-/// A sixth of the skewness of the influences: how fast the spread changes with the value.
+/// Returns a sixth of the skewness of the influences: how fast the spread changes with the value.
 fn acceleration(influences: &[f64]) -> f64 {
     let largest = influences.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
     if largest == 0.0 {
@@ -147,7 +147,7 @@ fn inverse(normal: &Normal, p: f64) -> Option<f64> {
     (p > 0.0 && p < 1.0).then(|| normal.inverse_cdf(p))
 }
 
-/// The value at rank `p * (n + 1)` of `sorted`, between two by linear interpolation.
+/// Returns the value at rank `p * (n + 1)` of `sorted`, by linear interpolation between two values.
 fn order_statistic(sorted: &[f64], p: f64) -> Option<f64> {
     let rank = p * (sorted.len() + 1) as f64;
     let inside = rank >= 1.0 && rank <= sorted.len() as f64;
@@ -246,7 +246,7 @@ mod tests {
         close(distinct.len() as f64 / items.len() as f64, 1.0 - math::exp(-1.0), 0.01);
     }
 
-    /// Share of 1,000 samples whose interval holds the mean of what they were drawn from.
+    /// Share of 1,000 samples whose interval contains the mean of their distribution.
     fn coverage(
         n: usize,
         truth: f64,

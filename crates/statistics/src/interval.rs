@@ -1,4 +1,4 @@
-//! Intervals of shares and of means.
+//! Intervals of proportions and of means.
 
 use super::moments::{mean, sample_sd};
 use serde::Serialize;
@@ -23,7 +23,7 @@ impl Interval {
         self.low <= value && value <= self.high
     }
 
-    /// Half the distance of its ends.
+    /// Half the distance between its ends.
     pub fn half_width(&self) -> f64 {
         0.5 * self.high - 0.5 * self.low
     }
@@ -39,11 +39,11 @@ impl From<Interval> for [f64; 2] {
     }
 }
 
-/// Wilson's 95 % score interval for a probability after `successes` in `n` trials.
+/// Returns Wilson's 95 % score interval for a probability after `successes` in `n` trials.
 ///
-/// `successes` may be fractional: the sum of `n` weights from 0 to 1. A weight varies at most
-/// as much as a coin of the same mean, so the interval is then wider than it need be, never
-/// too narrow. No trials: all of [0, 1].
+/// `successes` may be fractional: the sum of `n` weights from 0 to 1. A weight varies at most as
+/// much as a coin of the same mean, so the interval is then wider than necessary, never too narrow.
+/// Without trials it is all of [0, 1].
 pub fn wilson(successes: f64, n: f64) -> Interval {
     if n <= 0.0 {
         return Interval { low: 0.0, high: 1.0 };
@@ -53,16 +53,17 @@ pub fn wilson(successes: f64, n: f64) -> Interval {
     let center = (p + z2 / (2.0 * n)) / (1.0 + z2 / n);
     let spread = (p * (1.0 - p) / n + z2 / (4.0 * n * n)).sqrt();
     let half_width = Z_975 * spread / (1.0 + z2 / n);
-    // At p = 0 and p = 1 the end is exactly p; rounding must not push it past.
+    // At p = 0 and p = 1 the end is exactly p, and rounding must not push it past.
     Interval {
         low: if p == 0.0 { 0.0 } else { (center - half_width).max(0.0) },
         high: if p == 1.0 { 1.0 } else { (center + half_width).min(1.0) },
     }
 }
 
-/// Clopper and Pearson's exact 95 % interval for a probability after `successes` in `n` trials.
+/// Returns Clopper and Pearson's exact 95 % interval for a probability after `successes` in `n`
+/// trials.
 ///
-/// Never covers less than 95 %; wider than [`wilson`]. No trials: all of [0, 1].
+/// Never covers less than 95 %; wider than [`wilson`]. Without trials it is all of [0, 1].
 ///
 /// # Panics
 /// When `successes` exceeds `n`.
@@ -77,10 +78,10 @@ pub fn clopper_pearson(successes: u64, n: u64) -> Interval {
     }
 }
 
-/// The 0.975 quantile of Student's t with this freedom, at least 1.
+/// Returns the 0.975 quantile of Student's t with this many degrees of freedom, at least 1.
 ///
-/// From 100 on by its expansion around the normal's (Abramowitz and Stegun 26.7.5), right to
-/// 1e-9 there; the library's inverse stops too early and is 7e-6 off at 100,000.
+/// From 100 on by its expansion around the normal's (Abramowitz and Stegun 26.7.5), which is
+/// accurate to 1e-9 there; the library's inverse stops too early and is 7e-6 off at 100,000.
 pub(super) fn student_t(freedom: usize) -> f64 {
     let n = freedom.max(1) as f64;
     if freedom < 100 {
@@ -96,9 +97,9 @@ pub(super) fn student_t(freedom: usize) -> f64 {
     z * (1.0 + terms.iter().rev().fold(0.0, |rest, term| (rest + term) / n))
 }
 
-/// Student's 95 % interval for the mean of independent, roughly normal values.
+/// Returns Student's 95 % interval for the mean of independent, roughly normal values.
 ///
-/// `None` of fewer than two values, and where some value is not finite. An end past the largest
+/// `None` for fewer than two values, and where some value is not finite. An end past the largest
 /// number is infinite.
 pub fn mean_interval(values: &[f64]) -> Option<Interval> {
     if !values.iter().all(|v| v.is_finite()) {
@@ -109,9 +110,9 @@ pub fn mean_interval(values: &[f64]) -> Option<Interval> {
     Some(Interval::around(center, t * (sd / (values.len() as f64).sqrt())))
 }
 
-/// Student's 95 % interval for the mean of `a[i] - b[i]`: two treatments of the same cases.
+/// Returns Student's 95 % interval for the mean of `a[i] - b[i]`: two treatments of the same cases.
 ///
-/// `None` of fewer than two pairs.
+/// `None` for fewer than two pairs.
 ///
 /// # Panics
 /// When the slices differ in length.
@@ -121,11 +122,11 @@ pub fn paired_difference(a: &[f64], b: &[f64]) -> Option<Interval> {
     mean_interval(&differences)
 }
 
-/// The smallest number of runs whose mean is expected to have an interval of at most
+/// Returns the smallest number of runs whose mean is expected to have an interval of at most
 /// `half_width` to either side, if runs vary by `sd`: `t(n - 1) * sd / sqrt(n) <= half_width`.
 ///
-/// An expectation, not a promise: `sd` is itself estimated, and at this number about half of
-/// all samples are a little wider. `None` where no number of runs (below 2^53) would do.
+/// An expectation, not a guarantee: `sd` is itself estimated, and at this number about half of
+/// all samples are a little wider. `None` where no number of runs (below 2^53) is enough.
 pub fn runs_for_half_width(sd: f64, half_width: f64) -> Option<u64> {
     if !(sd >= 0.0 && sd.is_finite() && half_width >= 0.0) {
         return None;

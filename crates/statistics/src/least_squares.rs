@@ -9,7 +9,7 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 pub struct Fit {
     /// One coefficient per column, in the unit of `y` per unit of that column.
     pub coefficients: Vec<f64>,
-    /// 95 % intervals of the coefficients by Student's t; absent without freedom.
+    /// 95 % intervals of the coefficients by Student's t; absent without degrees of freedom.
     pub intervals: Option<Vec<Interval>>,
     /// Coefficient of determination: the share of the variance of `y` that is explained.
     pub r_squared: f64,
@@ -18,7 +18,7 @@ pub struct Fit {
 }
 
 /// A pivot below this share of its column's square means that the column is a combination of
-/// others: its coefficient cannot be told.
+/// others, so its coefficient cannot be determined.
 const SINGULAR: f64 = 1e-10;
 
 impl Fit {
@@ -31,7 +31,8 @@ impl Fit {
     pub fn new(x: &[Vec<f64>], y: &[f64]) -> Option<Self> {
         assert_eq!(x.len(), y.len(), "one row per observation");
         let (n, k) = (y.len(), x.first()?.len());
-        // Columns of length 1: how well the system is posed must not depend on units.
+        // Columns are scaled to length 1, because the condition of the system must not depend on
+        // units.
         let lengths: Vec<f64> = (0..k).map(|j| dot(x, j, j).sqrt()).collect();
         if n < k || lengths.contains(&0.0) {
             return None;
@@ -53,7 +54,7 @@ impl Fit {
         Some(Self { coefficients, intervals, r_squared, n })
     }
 
-    /// What the model says for a row.
+    /// Returns the prediction of the model for a row.
     pub fn predict(&self, row: &[f64]) -> f64 {
         self.coefficients.iter().zip(row).map(|(c, x)| c * x).sum()
     }
@@ -88,7 +89,8 @@ fn intervals(
     Some(coefficients.iter().enumerate().map(around).collect())
 }
 
-/// The inverse of a symmetric positive matrix with ones on its diagonal, by Gauss and Jordan.
+/// Returns the inverse of a symmetric positive matrix with ones on its diagonal, by Gauss and
+/// Jordan.
 fn inverse(mut a: Vec<Vec<f64>>) -> Option<Vec<Vec<f64>>> {
     let k = a.len();
     for pivot in 0..k {

@@ -1,13 +1,13 @@
 #![deny(clippy::disallowed_methods)]
-//! Intervals, moments and tests with which every reported number is qualified.
+//! Intervals, moments and tests that qualify every reported number.
 //!
-//! Intervals are two-sided at 95 % unless a function says otherwise. The bootstrap draws from
-//! the kernel's streams, so it gives the same ends for the same values, always; nothing else
-//! here draws random numbers. Sums run in the order of the values and are compensated, so that
-//! huge and tiny magnitudes keep their digits.
+//! Intervals are two-sided at 95 % unless a function says otherwise. The bootstrap draws from the
+//! kernel's streams, so it always gives the same ends for the same values; nothing else here draws
+//! random numbers. Sums run in the order of the values and are compensated, so that huge and tiny
+//! magnitudes keep their digits.
 //!
 //! ```text
-//! moments.rs     mean, standard deviation, Moments; what counts as a value (Sample)
+//! moments.rs     mean, standard deviation, Moments; Sample: the values of a metric
 //! interval.rs    intervals of shares (Wilson, Clopper and Pearson) and of means (Student)
 //! quantile.rs    percentiles, and their intervals by order statistics
 //! bootstrap.rs   BCa intervals of the mean and of any other statistic
@@ -20,21 +20,21 @@
 //!
 //! | the question | use | trust it | do not |
 //! |---|---|---|---|
-//! | how often does it happen (a share of runs) | [`wilson`] | from the first run on; its coverage is 95 % on average over shares | where 95 % must never be undercut: [`clopper_pearson`] |
-//! | mean of a roughly symmetric metric | [`mean_interval`] | from 5 runs on; exact for normal values at any n >= 2 | with a long tail below some 50 runs: it is too low on the side of the tail |
+//! | how often does it happen (a share of runs) | [`wilson`] | from the first run on; its coverage is 95 % on average over shares | where coverage must never fall below 95 %: [`clopper_pearson`] |
+//! | mean of a roughly symmetric metric | [`mean_interval`] | from 5 runs on; exact for normal values at any n >= 2 | with a long tail and fewer than 50 runs: it is too low on the side of the tail |
 //! | mean of a skewed metric | [`Bootstrap::mean`] | from some 20 runs on; it leans to the side of the tail | below 10 runs: it cannot know a tail it has not seen, and is too narrow |
-//! | a typical run (median), a bad run (95th percentile) | [`quantile_interval`] | always, whatever the distribution; it tells its exact coverage | it is absent below 6 runs (median) or 72 runs (5th, 95th): no interval would be honest |
-//! | is A better than B | [`Pairs`]: run both on the same seeds | the interval of the difference; `k of n pairs` needs no assumption | the two separate intervals: that they overlap says nothing of pairs |
-//! | by which factor | [`Pairs::ratio`] (Fieller) | with a baseline whose mean is well away from 0 | a ratio to a mean that may be 0: it is absent |
+//! | a typical run (median), a bad run (95th percentile) | [`quantile_interval`] | always, whatever the distribution; it reports its exact coverage | it is absent below 6 runs (median) or 72 runs (5th, 95th): no interval would be honest |
+//! | is A better than B | [`Pairs`]: run both on the same seeds | the interval of the difference; `k of n pairs` needs no assumption | the two separate intervals: their overlap says nothing about pairs |
+//! | by which factor does A differ from B | [`Pairs::ratio`] (Fieller) | with a baseline whose mean is well away from 0 | a ratio to a mean that may be 0: it is absent |
 //! | which of many variants differ | [`holm`] on the p-values | the adjusted ones | the smallest of twenty raw p-values |
 //!
-//! Where Student's interval and the bootstrap's differ much, the values are skewed and n is
-//! small: believe neither to its last digit, and run more. All of them take runs as independent,
-//! which different seeds make them; robots of one run are not. Constant values give Student's
-//! interval no width: by the rule of three (Hanley and Lippman-Hand 1983), `n` equal values only
-//! say that at most about `3 / n` of all runs differ.
+//! Where Student's interval and the bootstrap's differ much, the values are skewed and n is small:
+//! trust neither to its last digit, and run more. All of them take runs as independent, which
+//! different seeds make them; robots of one run are not. Constant values give Student's interval no
+//! width: by the rule of three (Hanley and Lippman-Hand 1983), `n` equal values only show that at
+//! most about `3 / n` of all runs differ.
 //!
-//! What is not a finite number is no value: [`Sample`] counts it as missing instead.
+//! A number that is not finite does not count as a value: [`Sample`] counts it as missing instead.
 
 mod bootstrap;
 mod interval;
@@ -55,9 +55,9 @@ pub use stopping::{Next, Reason, StoppingRule};
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-/// Probability of a chi-square statistic at least this large when the model holds.
+/// Returns the probability of a chi-square statistic at least this large if the model holds.
 ///
-/// Without freedom nothing can deviate: 1.
+/// Without degrees of freedom nothing can deviate, and it returns 1.
 pub fn chi_square_p(statistic: f64, degrees_of_freedom: usize) -> f64 {
     if degrees_of_freedom == 0 {
         return 1.0;

@@ -1,21 +1,21 @@
-//! Mean, spread and percentiles, summed so that magnitudes do no harm.
+//! Mean, spread and percentiles, summed so that extreme magnitudes do no harm.
 
 use serde::Serialize;
 
-/// What there is of a metric over runs: its finite values, in the order of the runs, and how
-/// many runs have none.
+/// The values of a metric over runs: the finite ones, in the order of the runs, and the number of
+/// runs without one.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Sample {
-    /// The finite values, in the order they came.
+    /// The finite values, in the order of the runs.
     pub values: Vec<f64>,
-    /// Runs without a value, or with one that is infinite or not a number.
+    /// Number of runs without a value, or with one that is infinite or not a number.
     pub missing: usize,
-    /// Of these, runs whose value is infinite or not a number.
+    /// Number of runs among these whose value is infinite or not a number.
     pub not_finite: usize,
 }
 
 impl Sample {
-    /// The sample of these runs.
+    /// Creates the sample of these runs.
     pub fn of(runs: impl IntoIterator<Item = Option<f64>>) -> Self {
         let mut sample = Self::default();
         for value in runs {
@@ -31,7 +31,7 @@ impl Sample {
         sample
     }
 
-    /// The values from the smallest to the largest.
+    /// Returns the values from the smallest to the largest.
     pub fn sorted(&self) -> Vec<f64> {
         let mut sorted = self.values.clone();
         sorted.sort_by(f64::total_cmp);
@@ -39,15 +39,15 @@ impl Sample {
     }
 }
 
-/// A power of two near the largest magnitude: what is divided by it can be squared and summed
-/// without overflow, and loses no digit by the division.
+/// Returns a power of two near the largest magnitude: a value divided by it can be squared and
+/// summed without overflow, and loses no digit by the division.
 fn scale(values: &[f64]) -> f64 {
     let largest = values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
     let power = f64::from_bits(largest.to_bits() & 0x7ff0_0000_0000_0000);
     if power > 0.0 && power.is_finite() { power } else { 1.0 }
 }
 
-/// Neumaier's compensated sum: the error does not grow with the number of terms.
+/// Returns Neumaier's compensated sum: the error does not grow with the number of terms.
 pub(super) fn sum(terms: impl IntoIterator<Item = f64>) -> f64 {
     let (mut total, mut lost) = (0.0_f64, 0.0);
     for term in terms {
@@ -56,16 +56,17 @@ pub(super) fn sum(terms: impl IntoIterator<Item = f64>) -> f64 {
             if total.abs() >= term.abs() { (total - next) + term } else { (term - next) + total };
         total = next;
     }
-    // Past the range of numbers the compensation is no number either.
+    // Past the range of numbers the compensation is not a number either.
     if lost.is_finite() { total + lost } else { total }
 }
 
-/// Whether all values are equal; true of nothing.
+/// Whether all values are equal; true without values.
 pub(super) fn is_constant(values: &[f64]) -> bool {
     values.windows(2).all(|pair| pair[0] == pair[1])
 }
 
-/// Arithmetic mean; `None` of nothing. Of equal values it is that value, to the bit.
+/// Returns the arithmetic mean; `None` without values. For equal values it is that value, to the
+/// bit.
 pub fn mean(values: &[f64]) -> Option<f64> {
     let first = *values.first()?;
     if is_constant(values) {
@@ -75,25 +76,25 @@ pub fn mean(values: &[f64]) -> Option<f64> {
     Some(sum(values.iter().map(|v| v / scale)) / values.len() as f64 * scale)
 }
 
-/// Standard deviation of a sample (divisor `n - 1`); `None` of fewer than two values. Of equal
-/// values it is exactly 0.
+/// Returns the standard deviation of a sample (divisor `n - 1`); `None` for fewer than two values.
+/// For equal values it is exactly 0.
 pub fn sample_sd(values: &[f64]) -> Option<f64> {
     let (squares, scale) = squares(values)?;
     (values.len() > 1).then(|| (squares / (values.len() - 1) as f64).sqrt() * scale)
 }
 
-/// Sum of squared deviations from the mean in units of `scale * scale`, and that scale; `None`
-/// of nothing.
+/// Returns the sum of squared deviations from the mean in units of `scale * scale`, and that scale;
+/// `None` without values.
 fn squares(values: &[f64]) -> Option<(f64, f64)> {
     if is_constant(values) {
         return values.first().map(|_| (0.0, 1.0));
     }
     let center = mean(values)?;
-    // Halves, since two values may lie further apart than the largest number.
+    // Halves, because two values may lie further apart than the largest number.
     let deviations: Vec<f64> = values.iter().map(|v| 0.5 * v - 0.5 * center).collect();
     let scale = scale(&deviations);
     let square = sum(deviations.iter().map(|d| (d / scale) * (d / scale)));
-    // What the rounding of the mean adds to every deviation.
+    // The error that the rounding of the mean adds to every deviation.
     let off = sum(deviations.iter().map(|d| d / scale));
     Some(((square - off * off / values.len() as f64).max(0.0) * 4.0, scale))
 }
@@ -115,7 +116,7 @@ pub struct Moments {
     pub n: usize,
     /// Arithmetic mean.
     pub mean: f64,
-    /// Standard deviation of these very values (divisor `n`).
+    /// Standard deviation of exactly these values (divisor `n`).
     pub sd: f64,
     /// 1st percentile.
     pub p01: f64,
@@ -130,7 +131,7 @@ pub struct Moments {
 }
 
 impl Moments {
-    /// The moments of `values`; `None` of nothing.
+    /// Returns the moments of `values`; `None` without values.
     pub fn of(values: impl IntoIterator<Item = f64>) -> Option<Self> {
         let mut sorted: Vec<f64> = values.into_iter().collect();
         sorted.sort_by(f64::total_cmp);

@@ -7,7 +7,7 @@ use super::quantile::at_most;
 use statrs::function::beta::checked_beta_reg;
 
 /// Values of a treatment and of a baseline on the same cases (runs of the same seed), so that
-/// what the cases have in common cancels.
+/// effects common to both cancel.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Pairs {
     pairs: Vec<(f64, f64)>,
@@ -15,8 +15,8 @@ pub struct Pairs {
 }
 
 impl Pairs {
-    /// The pairs `(a[i], b[i])` of which both have a finite value; the others, and what one has
-    /// beyond the other's end, count as incomplete.
+    /// Creates the pairs `(a[i], b[i])` of which both have a finite value; all others, and the rest
+    /// of the longer list, count as incomplete.
     pub fn of(a: &[Option<f64>], b: &[Option<f64>]) -> Self {
         let finite = |value: &Option<f64>| value.filter(|v| v.is_finite());
         let complete = |(a, b)| Some((finite(a)?, finite(b)?));
@@ -25,36 +25,36 @@ impl Pairs {
         Self { pairs, incomplete }
     }
 
-    /// Complete pairs.
+    /// Number of complete pairs.
     pub fn n(&self) -> usize {
         self.pairs.len()
     }
 
-    /// Cases of which one or both have no value.
+    /// Number of cases of which one or both have no value.
     pub fn incomplete(&self) -> usize {
         self.incomplete
     }
 
-    /// `a - b`, pair by pair.
+    /// Returns `a - b`, pair by pair.
     pub fn differences(&self) -> Vec<f64> {
         self.pairs.iter().map(|(a, b)| a - b).collect()
     }
 
-    /// Mean of `a - b`; `None` without pairs.
+    /// Returns the mean of `a - b`; `None` without pairs.
     pub fn difference(&self) -> Option<f64> {
         mean(&self.differences())
     }
 
-    /// Student's 95 % interval of the mean difference; `None` of fewer than two pairs.
+    /// Returns Student's 95 % interval of the mean difference; `None` for fewer than two pairs.
     pub fn difference_interval(&self) -> Option<Interval> {
         mean_interval(&self.differences())
     }
 
-    /// The mean of `a` over the mean of `b`, with its 95 % interval.
+    /// Returns the mean of `a` over the mean of `b`, with its 95 % interval.
     ///
     /// The interval is Fieller's (1954) for pairs: exact where both are normal. `None` where a
-    /// value is negative (a ratio of signed quantities says little), with fewer than two pairs,
-    /// and where the interval of the baseline's mean holds 0, so that no factor is excluded.
+    /// value is negative (a ratio of signed quantities means little), with fewer than two pairs,
+    /// and where the interval of the baseline's mean contains 0, so that no factor is excluded.
     pub fn ratio(&self) -> Option<(f64, Interval)> {
         let (a, b) = self.sides();
         if self.n() < 2 || self.pairs.iter().any(|(a, b)| *a < 0.0 || *b < 0.0) {
@@ -64,7 +64,7 @@ impl Pairs {
         if center_b <= 0.0 {
             return None;
         }
-        // In units of the baseline's mean: the equation is then about 1.
+        // In units of the baseline's mean, so that the equation is about 1.
         let (unit, t) = (center_b, student_t(self.n() - 1));
         let relative = |values: &[f64], center: f64| -> Vec<f64> {
             values.iter().map(|v| (v - center) / unit).collect()
@@ -84,12 +84,13 @@ impl Pairs {
         (curve > 0.0 && ratio.is_finite()).then_some((ratio, interval))
     }
 
-    /// The bootstrap's 95 % interval of the mean difference.
+    /// Returns the bootstrap's 95 % interval of the mean difference.
     pub fn difference_bootstrap(&self, bootstrap: &Bootstrap) -> Option<Interval> {
         bootstrap.mean(&self.differences())
     }
 
-    /// The bootstrap's 95 % interval of the ratio of means; where there is a [`Self::ratio`].
+    /// Returns the bootstrap's 95 % interval of the ratio of means; present where [`Self::ratio`]
+    /// is.
     pub fn ratio_bootstrap(&self, bootstrap: &Bootstrap) -> Option<Interval> {
         self.ratio()?;
         bootstrap.interval(&self.pairs, |pairs| {
@@ -98,17 +99,17 @@ impl Pairs {
         })
     }
 
-    /// Pairs in which `a` is lower than `b`, equal, and higher.
+    /// Returns the number of pairs in which `a` is lower than `b`, equal, and higher.
     pub fn signs(&self) -> (usize, usize, usize) {
         let lower = self.pairs.iter().filter(|(a, b)| a < b).count();
         let higher = self.pairs.iter().filter(|(a, b)| a > b).count();
         (lower, self.n() - lower - higher, higher)
     }
 
-    /// Two-sided p-value of Student's paired test of no difference.
+    /// Returns the two-sided p-value of Student's paired test of no difference.
     ///
-    /// 1 where no pair differs at all. `None` of fewer than two pairs, and where all differ by
-    /// the same amount: the test needs a spread.
+    /// 1 where no pair differs at all. `None` for fewer than two pairs, and where all differ by the
+    /// same amount, because the test needs a spread.
     pub fn p_value(&self) -> Option<f64> {
         let differences = self.differences();
         let (center, sd) = (mean(&differences)?, sample_sd(&differences)?);
@@ -121,8 +122,8 @@ impl Pairs {
         checked_beta_reg(0.5 * freedom, 0.5, x).ok().filter(|p| p.is_finite())
     }
 
-    /// Two-sided p-value of the exact sign test: of pairs that differ, `a` is as often lower as
-    /// higher. 1 where none differs; `None` without pairs.
+    /// Returns the two-sided p-value of the exact sign test: among pairs that differ, `a` is as
+    /// often lower as higher. 1 where none differs; `None` without pairs.
     pub fn sign_p_value(&self) -> Option<f64> {
         let (lower, _, higher) = self.signs();
         let rarer = at_most(lower.min(higher), lower + higher, 0.5);
@@ -134,10 +135,10 @@ impl Pairs {
     }
 }
 
-/// Holm's adjustment ("A simple sequentially rejective multiple test procedure", Scandinavian
-/// Journal of Statistics 6, 1979) of the p-values of one family: to call those below 0.05
-/// different is wrong anywhere in the family with at most 5 %, however the tests depend on each
-/// other. Absent values are no part of the family and stay absent.
+/// Returns Holm's adjustment ("A simple sequentially rejective multiple test procedure",
+/// Scandinavian Journal of Statistics 6, 1979) of the p-values of one family: calling those below
+/// 0.05 different is wrong anywhere in the family with at most 5 %, however the tests depend on
+/// each other. Absent values are not part of the family and stay absent.
 pub fn holm(p_values: &[Option<f64>]) -> Vec<Option<f64>> {
     let known = |i: &usize| p_values[*i].is_some_and(|p| !p.is_nan());
     let mut order: Vec<usize> = (0..p_values.len()).filter(known).collect();

@@ -1,4 +1,4 @@
-//! Percentiles, and intervals of them that assume no distribution.
+//! Percentiles, and distribution-free intervals of them.
 
 use super::interval::{Interval, Z_975};
 use serde::Serialize;
@@ -12,21 +12,21 @@ pub struct QuantileInterval {
     pub interval: Interval,
     /// Their ranks, from 1.
     pub ranks: (usize, usize),
-    /// How often such an interval holds the quantile: exact for continuous values, at least
-    /// this for values with ties; at least 0.95.
+    /// Probability that such an interval contains the quantile: exact for continuous values, a
+    /// lower bound for values with ties; at least 0.95.
     pub coverage: f64,
 }
 
-/// What may be missed on either side.
+/// The largest probability of a miss on either side.
 const TAIL: f64 = 0.025;
 
-/// Above this many values the ranks are the normal approximation's, widened to whole ranks
-/// outward: the library's incomplete beta function converges too slowly there.
+/// Above this many values the ranks are those of the normal approximation, widened outward to whole
+/// ranks, because the library's incomplete beta function converges too slowly there.
 const EXACT: usize = 10_000;
 
-/// The interval of the `q`-quantile of whatever distribution the values of `sorted` come from,
-/// by order statistics (Conover, Practical Nonparametric Statistics, 3.2): the number of values
-/// below the quantile is binomial, so that each end misses with at most 2.5 %.
+/// Returns an interval of the `q`-quantile of whatever distribution the values of `sorted` come
+/// from, by order statistics (Conover, Practical Nonparametric Statistics, 3.2): the number of
+/// values below the quantile is binomial, so that each end misses with at most 2.5 %.
 ///
 /// `None` where `n` is too small for 95 %, see [`runs_for_quantile`], and for `q` outside (0, 1).
 pub fn quantile_interval(sorted: &[f64], q: f64) -> Option<QuantileInterval> {
@@ -44,14 +44,14 @@ pub fn quantile_interval(sorted: &[f64], q: f64) -> Option<QuantileInterval> {
     Some(QuantileInterval { interval, ranks: (low, high), coverage })
 }
 
-/// The smallest number of runs for which [`quantile_interval`] has an answer: 6 for the median,
-/// 72 for the 5th and 95th percentile. `None` for `q` outside (0, 1).
+/// Returns the smallest number of runs for which [`quantile_interval`] has an answer: 6 for the
+/// median, 72 for the 5th and 95th percentile. `None` for `q` outside (0, 1).
 pub fn runs_for_quantile(q: f64) -> Option<usize> {
     let inner = q.max(1.0 - q);
     (q > 0.0 && q < 1.0).then(|| (math::ln(TAIL) / math::ln(inner)).ceil() as usize)
 }
 
-/// Probability of at most `k` successes in `n` trials of probability `q`.
+/// Returns the probability of at most `k` successes in `n` trials of probability `q`.
 pub(super) fn at_most(k: usize, n: usize, q: f64) -> f64 {
     if k >= n {
         return 1.0;
@@ -59,7 +59,8 @@ pub(super) fn at_most(k: usize, n: usize, q: f64) -> f64 {
     checked_beta_reg((n - k) as f64, k as f64 + 1.0, 1.0 - q).expect("q is in (0, 1)")
 }
 
-/// The smallest rank from 1 on that `holds`, or `n + 1`; what holds for a rank holds for all above.
+/// Returns the smallest rank from 1 on that `holds`, or `n + 1`; where it holds for a rank, it
+/// holds for all above.
 fn first_rank(n: usize, holds: impl Fn(usize) -> bool) -> usize {
     let (mut below, mut found) = (0, n + 1);
     while found - below > 1 {

@@ -7,8 +7,8 @@ pub fn root() -> &'static Path {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
 }
 
-/// Returns a file or folder of the shared data, or `None` (said once) where that folder is not at
-/// hand: recorded data of others are no part of the repository.
+/// Returns a file or folder of the shared data, or `None` (with one message) where that folder is
+/// missing, because recorded data of others are not part of the repository.
 pub fn shared_data(name: &str) -> Option<PathBuf> {
     let path = root().join("../shared/data").join(name);
     if !path.exists() {
@@ -18,7 +18,7 @@ pub fn shared_data(name: &str) -> Option<PathBuf> {
     Some(path)
 }
 
-/// Returns a robot model of the shared data, or `None` where that folder is not at hand.
+/// Returns a robot model of the shared data, or `None` where that folder is missing.
 pub fn robot_model(name: &str) -> Option<PathBuf> {
     shared_data(&format!("urdf/{name}"))
 }

@@ -1,4 +1,4 @@
-//! What the commands of a scenario do.
+//! The effects of the commands of a scenario.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -15,14 +15,14 @@ use crate::local_plane::LatLon;
 use crate::table::Word;
 use sidestep_kernel::InputError;
 
-/// Commands to one aircraft, which may stand in front of them.
+/// Commands to one aircraft, whose name may stand in front of them.
 const AIRCRAFT_COMMANDS: [&str; 27] = [
     "ADDWPT", "AFTER", "ALT", "AT", "ATALT", "ATDIST", "ATSPD", "BEFORE", "DEL", "DELETE",
     "DELRTE", "DELWPT", "DEST", "DIRECT", "HDG", "HEADING", "LISTRTE", "LNAV", "MOVE", "ORIG",
     "POS", "SPD", "SPEED", "SWTOC", "TURN", "VNAV", "VS",
 ];
 
-/// Commands that change or ask for a display.
+/// Commands that change or query a display.
 const DISPLAY_COMMANDS: [&str; 12] = [
     "ECHO",
     "FILTERALT",
@@ -38,17 +38,18 @@ const DISPLAY_COMMANDS: [&str; 12] = [
     "ZOOM",
 ];
 
-/// Modes that `ADDWPT` takes in the place of a way-point. All are flown by, so both say nothing.
+/// Modes that `ADDWPT` takes in place of a way-point. All way-points are flown by, so both change
+/// nothing.
 const TURN_MODES: [&str; 2] = ["FLYBY", "FLYOVER"];
 
-/// How a command ended.
+/// The result of a command.
 enum Outcome {
     Done,
-    /// It is not acted on; counted under this name.
+    /// It has no effect here, and is counted under this name.
     NotUnderstood(String),
 }
 
-/// Why a command did nothing.
+/// The reason why a command had no effect.
 enum Problem {
     Unparsed(InputError),
     Refused(InputError),
@@ -65,7 +66,7 @@ type Done = Result<Outcome, Problem>;
 /// An aircraft that is being built.
 struct Draft {
     aircraft: ScnAircraft,
-    /// Where it starts when that is not known.
+    /// The name of its starting place, where the position of that is not known.
     unresolved_start: Option<String>,
 }
 
@@ -74,9 +75,9 @@ pub(super) struct Interpreter<'p> {
     place: &'p dyn fmt::Display,
     file: ScnFile,
     drafts: Vec<Draft>,
-    /// The last draft of each identifier.
+    /// The last draft with each identifier.
     by_id: BTreeMap<String, usize>,
-    /// What `DEFWPT` has defined.
+    /// The way-points that `DEFWPT` has defined.
     defined: BTreeMap<String, LatLon>,
 }
 
@@ -117,14 +118,14 @@ impl<'p> Interpreter<'p> {
         }
     }
 
-    /// Brings an aircraft that stands in front of its command behind it.
+    /// Moves an aircraft that stands in front of its command behind it.
     fn name_and_arguments<'a>(&self, mut words: Vec<Word<'a>>) -> (String, Arguments<'a>)
     where
         'p: 'a,
     {
         let first = upper(words[0]);
         let second = words.get(1).map(|word| upper(*word));
-        // An aircraft of whose creation we do not know, as by MCRE, is told by the command.
+        // An aircraft that was created in an unknown way, as by MCRE, is recognized by its command.
         let is_aircraft = self.by_id.contains_key(&first)
             || (!is_command(&first)
                 && second.as_ref().is_some_and(|name| AIRCRAFT_COMMANDS.contains(&&**name)));
@@ -190,7 +191,7 @@ impl<'p> Interpreter<'p> {
         Ok(Outcome::Done)
     }
 
-    /// Takes a new aircraft in, where `word` asks for it.
+    /// Adds a new aircraft; errors point at `word`.
     fn admit(&mut self, word: Word, draft: Draft) -> Result<(), Problem> {
         if self.drafts.len() >= MAX_AIRCRAFT {
             let cause = format!("this is more than {MAX_AIRCRAFT} aircraft");
@@ -223,7 +224,7 @@ impl<'p> Interpreter<'p> {
         }
     }
 
-    /// The next argument, an aircraft that is there.
+    /// Returns the next argument, which must be an existing aircraft.
     fn existing(&self, arguments: &mut Arguments) -> Result<usize, Problem> {
         let word = arguments.required("an aircraft")?;
         let found = self.by_id.get(&upper(word)).copied();
@@ -282,7 +283,7 @@ impl<'p> Interpreter<'p> {
         })
     }
 
-    /// Inserts into a route behind the last way-point called `after`, or at its end.
+    /// Inserts into a route after the last way-point called `after`, or at its end.
     fn insert(
         &mut self,
         index: usize,
@@ -328,7 +329,8 @@ impl<'p> Interpreter<'p> {
         Ok(Outcome::Done)
     }
 
-    /// `HDG aircraft,heading` and the like. Without a value they ask and change nothing.
+    /// `HDG aircraft,heading` and similar commands. Without a value they are queries and change
+    /// nothing.
     fn change(&mut self, name: &str, time_s: f64, arguments: &mut Arguments) -> Done {
         let index = self.existing(arguments)?;
         let change = match name {
@@ -339,7 +341,7 @@ impl<'p> Interpreter<'p> {
             "VNAV" => arguments.optional(switch)?.map(Change::VerticalNavigation),
             _ => arguments.optional(number)?.map(Change::VerticalSpeedFpm),
         };
-        // ALT may give the vertical speed as well.
+        // ALT may have the vertical speed as a further argument.
         let climb = if name == "ALT" { arguments.optional(number)? } else { None };
         let changes = change.into_iter().chain(climb.map(Change::VerticalSpeedFpm));
         self.drafts[index].aircraft.changes.extend(changes.map(|change| (time_s, change)));
@@ -366,7 +368,7 @@ impl<'p> Interpreter<'p> {
         Ok(Outcome::Done)
     }
 
-    /// The size of a pattern that has `per_size` aircraft for each unit of it.
+    /// Returns the size of a pattern that has `per_size` aircraft for each unit of size.
     fn size(&self, arguments: &mut Arguments, per_size: usize) -> Result<u32, Problem> {
         let word = arguments.required("a number of aircraft")?;
         let size = word.integer(&self.place)?;
@@ -377,7 +379,7 @@ impl<'p> Interpreter<'p> {
         Ok(size)
     }
 
-    /// A setting. Without a value it asks and changes nothing.
+    /// A setting. Without a value it is a query and changes nothing.
     fn set(&mut self, name: &str, arguments: &mut Arguments) -> Done {
         if arguments.peek().is_none() {
             return Ok(Outcome::Done);
@@ -413,8 +415,8 @@ impl<'p> Interpreter<'p> {
         }
     }
 
-    /// `WIND place,direction,speed`, or `WIND place` and for each altitude
-    /// `altitude,direction,speed`, where the altitude may be left out.
+    /// `WIND place,direction,speed`, or `WIND place` followed by `altitude,direction,speed` for
+    /// each altitude, where the altitude may be left out.
     fn add_wind(&mut self, arguments: &mut Arguments) -> Done {
         let place = self.place(arguments)?;
         let has_altitudes = arguments.remaining() != 2;
@@ -441,7 +443,7 @@ impl<'p> Interpreter<'p> {
         Ok(Outcome::Done)
     }
 
-    /// A latitude and a longitude, a defined way-point, or a name with or without a runway.
+    /// Reads a latitude and a longitude, a defined way-point, or a name with or without a runway.
     fn place(&self, arguments: &mut Arguments) -> Result<Place, InputError> {
         let next = arguments.peek().unwrap_or("").to_ascii_uppercase();
         if let Some(&position) = self.defined.get(&next) {
@@ -460,7 +462,7 @@ impl<'p> Interpreter<'p> {
         Ok(Place::Unresolved(name))
     }
 
-    /// Lists a place that has no position.
+    /// Adds a place without a known position to the list.
     fn note_unresolved(&mut self, command: Word, aircraft: Option<&str>, place: &Place) {
         if let Place::Unresolved(name) = place {
             self.file.unresolved_places.push(UnresolvedPlace {
@@ -485,13 +487,13 @@ fn count(counts: &mut BTreeMap<String, u64>, name: String) {
     *counts.entry(name).or_default() += 1;
 }
 
-/// Whether a command is about the display only: a name of the list, or zooming with `+` and `-`.
+/// Whether a command affects the display only: a name of the list, or zooming with `+` and `-`.
 fn is_display(name: &str) -> bool {
     let is_zoom = !name.is_empty() && name.chars().all(|c| "+-=".contains(c));
     is_zoom || DISPLAY_COMMANDS.contains(&name)
 }
 
-/// Whether a word in front is a command and no aircraft.
+/// Whether the first word is a command, not an aircraft.
 fn is_command(name: &str) -> bool {
     const OTHERS: [&str; 12] = [
         "ASAS", "CDMETHOD", "CRE", "CREATE", "DEFWPT", "DTLOOK", "NOISE", "RESO", "SYN", "WIND",

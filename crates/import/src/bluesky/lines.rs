@@ -6,13 +6,15 @@ use std::fmt;
 use crate::table::Word;
 use sidestep_kernel::InputError;
 
-/// Lines with fewer characters are skipped, as the scenarios' own simulator does.
+/// The minimum number of characters of a line; shorter ones are skipped, as in the scenarios' own
+/// simulator.
 const MIN_LINE_CHARS: usize = 10;
 
-/// The longest line in bytes, continued ones together. Bounds the time to find a word's column.
+/// The maximum length of a line in bytes, including its continuations. It bounds the time to find a
+/// word's column.
 const MAX_LINE_BYTES: usize = 10_000;
 
-/// What separates words besides the comma.
+/// The separators of words besides the comma.
 const BLANKS: [char; 2] = [' ', '\t'];
 
 /// One command and its words, the first of which is its name or an aircraft.
@@ -24,15 +26,15 @@ pub(super) struct Command<'a> {
     pub(super) words: Vec<Word<'a>>,
 }
 
-/// A line with all its continuations, without comment.
+/// A line with all its continuations, without the comment.
 #[derive(Debug, Default)]
 pub(super) struct Line<'a> {
     text: Cow<'a, str>,
-    /// For each physical line its first byte in `text` and its number from 1.
+    /// For each physical line the index of its first byte in `text` and its number, from 1.
     pieces: Vec<(usize, usize)>,
 }
 
-/// The lines that hold commands, and how many were skipped for being short.
+/// Returns the lines that hold commands, and the number of those skipped because they are short.
 pub(super) fn join_lines(text: &str) -> (Vec<Line<'_>>, u64) {
     let mut lines: Vec<Line> = Vec::new();
     let mut short_lines = 0;
@@ -42,7 +44,8 @@ pub(super) fn join_lines(text: &str) -> (Vec<Line<'_>>, u64) {
         if content.trim().is_empty() {
             continue;
         }
-        // A short line is skipped only where it starts one: the end of a continued line counts.
+        // Only a short line that is no continuation is skipped, because the end of a continued line
+        // counts.
         if !is_continued && physical.trim().chars().count() < MIN_LINE_CHARS {
             short_lines += 1;
             continue;
@@ -60,8 +63,8 @@ pub(super) fn join_lines(text: &str) -> (Vec<Line<'_>>, u64) {
     (lines, short_lines)
 }
 
-/// Lines and their numbers from 1. They end with LF, CR LF, CR CR LF or a lone CR: files from
-/// three systems are around, and some went through two of them.
+/// Returns lines and their numbers from 1. They end with LF, CR LF, CR CR LF or a lone CR, because
+/// files from three systems are in use, and some have been converted twice.
 fn physical_lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
     let ended_by_lf = text.split('\n').map(|line| line.trim_end_matches('\r'));
     ended_by_lf.flat_map(|line| line.split('\r')).enumerate().map(|(i, line)| (i + 1, line))
@@ -72,7 +75,7 @@ fn before_comment(line: &str) -> &str {
 }
 
 impl<'a> Line<'a> {
-    /// Adds a continuation exactly as it stands, its leading blanks included.
+    /// Appends a continuation unchanged, including its leading blanks.
     fn append(&mut self, number: usize, content: &str) {
         if self.text.len() <= MAX_LINE_BYTES {
             self.pieces.push((self.text.len(), number));
@@ -80,7 +83,7 @@ impl<'a> Line<'a> {
         }
     }
 
-    /// The commands on this line.
+    /// Returns the commands on this line.
     pub(super) fn commands(
         &self,
         place: &dyn fmt::Display,
@@ -101,7 +104,7 @@ impl<'a> Line<'a> {
     }
 
     /// Splits at blanks, at commas with blanks around them, or both; two commas with nothing
-    /// between leave an argument out.
+    /// between them leave an argument out.
     fn words(&self, command: &str) -> Vec<Word<'_>> {
         let mut words = Vec::new();
         let mut rest = command.trim_matches(BLANKS);
@@ -114,7 +117,7 @@ impl<'a> Line<'a> {
         words
     }
 
-    /// `part` of this line's text with its place in the file.
+    /// Returns `part` of this line's text with its position in the file.
     fn word(&self, part: &str) -> Word<'_> {
         let offset = part.as_ptr() as usize - self.text.as_ptr() as usize;
         let piece = self.pieces.iter().rev().find(|(start, _)| *start <= offset);
@@ -126,7 +129,7 @@ impl<'a> Line<'a> {
 
 const STAMP_REMEDY: &str = "start the line with a time such as 00:01:30.00>";
 
-/// `HH:MM:SS.ss` in seconds; one digit per part is enough.
+/// Reads `HH:MM:SS.ss` in seconds; one digit per part is enough.
 fn parse_stamp(place: &dyn fmt::Display, stamp: Word) -> Result<f64, InputError> {
     let parts: Vec<&str> = stamp.text.split(':').map(str::trim).collect();
     let seconds = match parts[..] {

@@ -1,18 +1,18 @@
 //! Scenario files (`.scn`) of the air traffic simulator BlueSky.
 //!
-//! A line is `HH:MM:SS.ss>COMMAND arguments`. What the text of such files can hold:
+//! A line is `HH:MM:SS.ss>COMMAND arguments`. The syntax of such files:
 //! - `#` starts a comment, `;` separates commands, `\` at the end continues a line exactly as
 //!   it stands, and a line of fewer than 10 characters that continues none is skipped.
 //! - Arguments are separated by blanks, a comma, or both; `,,` and `*` leave one out. Letters
-//!   may be small or capital. `KL204 ALT FL200` is `ALT KL204 FL200`; an aircraft alone is `POS`.
+//! may be small or capital. `KL204 ALT FL200` is `ALT KL204 FL200`; an aircraft alone is `POS`.
 //! - Commands take effect in the order of their times, at one time in the order of the file. So
 //!   a way-point must be defined, and an aircraft created, before it is used.
 //!
-//! What is acted on: `CRE`, `DEL`, `DEFWPT`, `ADDWPT`, `AFTER .. ADDWPT`, `ORIG`, `DEST`, `HDG`,
-//! `SPD`, `ALT`, `VS`, `LNAV`, `VNAV`, `SYN SUPER|WALL|MATRIX`, `ASAS`, `CDMETHOD`, `RESO`,
-//! `ZONER`, `ZONEDH`, `DTLOOK`, `WIND` and `NOISE`. Nothing is dropped in silence: any other
-//! command is counted, and what is wrong or needs a navigation database is listed. Arguments
-//! behind those that are named at each command are not read.
+//! The commands that take effect are `CRE`, `DEL`, `DEFWPT`, `ADDWPT`, `AFTER .. ADDWPT`, `ORIG`,
+//! `DEST`, `HDG`, `SPD`, `ALT`, `VS`, `LNAV`, `VNAV`, `SYN SUPER|WALL|MATRIX`, `ASAS`, `CDMETHOD`,
+//! `RESO`, `ZONER`, `ZONEDH`, `DTLOOK`, `WIND` and `NOISE`. Nothing is dropped silently: any other
+//! command is counted, and errors and names that need a navigation database are listed. Arguments
+//! after those named at each command are not read.
 
 mod interpreter;
 mod lines;
@@ -33,72 +33,72 @@ use interpreter::Interpreter;
 use sidestep_kernel::InputError;
 use sidestep_scenario::file::read_text;
 
-/// The longest scenario that is read, in bytes after unpacking: some 160 times the longest known.
+/// The maximum size of a scenario in bytes after unpacking: some 160 times the longest known.
 pub const MAX_SCN_BYTES: u64 = 1 << 24;
 
-/// The most aircraft that one scenario may create.
+/// The maximum number of aircraft that one scenario may create.
 pub const MAX_AIRCRAFT: usize = 100_000;
 
-/// The most way-points that one aircraft's route may have.
+/// The maximum number of way-points in one aircraft's route.
 pub const MAX_WAY_POINTS: usize = 10_000;
 
-/// What a scenario file says.
+/// The content of a scenario file.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ScnFile {
-    /// Lines that hold at least one command; a line and its continuations are one.
+    /// Number of lines with at least one command; a line and its continuations are one.
     pub command_lines: u64,
-    /// Lines that were skipped because they have fewer than 10 characters; blank lines and
-    /// comments do not count.
+    /// Number of lines that were skipped because they have fewer than 10 characters; blank lines
+    /// and comments do not count.
     pub short_lines: u64,
-    /// How often each command was given: its name as written, in capital letters.
+    /// Number of occurrences of each command, by its name in capital letters.
     pub commands: BTreeMap<String, u64>,
-    /// How often those were given that are not acted on. `SYN` and `AFTER` are followed by the
-    /// variant that is not understood.
+    /// Number of occurrences of each command that has no effect here. `SYN` and `AFTER` are
+    /// followed by the variant that is not understood.
     pub not_understood: BTreeMap<String, u64>,
-    /// How often those were given that only change or ask for a display.
+    /// Number of occurrences of each command that only changes or queries a display.
     pub ignored: BTreeMap<String, u64>,
-    /// Lines and commands that cannot be read, in the order of the file.
+    /// Lines and commands that cannot be parsed, in the order of the file.
     pub unparsed: Vec<InputError>,
-    /// Commands that can be read but not be carried out, such as those to an aircraft that is
-    /// not there; in the order of their times.
+    /// Commands that can be parsed but not be carried out, such as those to an aircraft that does
+    /// not exist; in the order of their times.
     pub refused: Vec<InputError>,
     /// Names of places that the file does not define, one entry for each use.
     pub unresolved_places: Vec<UnresolvedPlace>,
-    /// Aircraft and the rules for them.
+    /// The aircraft and their rules.
     pub traffic: Traffic,
 }
 
-/// A use of a name that only a navigation database explains.
+/// A use of a name that only a navigation database can resolve.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct UnresolvedPlace {
-    /// The airport, runway or fix in capital letters.
+    /// The name of the airport, runway or fix, in capital letters.
     pub name: String,
     /// The command that names it.
     pub command: String,
     /// The aircraft it is for, if any.
     pub aircraft: Option<String>,
-    /// Line of the file, from 1.
+    /// Line in the file, from 1.
     pub line: usize,
 }
 
-/// Aircraft and the rules for them. Of settings that are given several times the last holds.
+/// The aircraft and their rules. Of settings that are given several times the last holds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Traffic {
-    /// In the order of their creation. An identifier comes twice where its first aircraft was
-    /// deleted before.
+    /// Aircraft in the order of their creation. An identifier occurs twice where its first aircraft
+    /// was deleted before.
     pub aircraft: Vec<ScnAircraft>,
-    /// Aircraft that start at a place which the file does not define.
+    /// Aircraft that start at a place that the file does not define.
     pub unplaced: Vec<UnplacedAircraft>,
     /// Radius of the protected zone in nautical miles (`ZONER`).
     pub zone_radius_nm: f64,
     /// Half the height of the protected zone in ft (`ZONEDH`).
     pub zone_half_height_ft: f64,
-    /// How far ahead conflicts are looked for, in s (`DTLOOK`).
+    /// Time for which conflicts are predicted, in s (`DTLOOK`).
     pub lookahead_s: f64,
-    /// Whether conflicts are detected (`ASAS`, `CDMETHOD`); none where the file does not say.
-    /// Without detection nothing is resolved.
+    /// Whether conflicts are detected (`ASAS`, `CDMETHOD`); `None` where the file has no such
+    /// command. Without detection nothing is resolved.
     pub detection: Option<bool>,
-    /// How conflicts are resolved (`RESO`); none where the file does not say.
+    /// The method of resolving conflicts (`RESO`); `None` where the file has no such command.
     pub resolution: Option<Resolution>,
     /// Winds at places (`WIND`).
     pub wind: Vec<Wind>,
@@ -125,7 +125,7 @@ impl Default for Traffic {
 /// A method of resolving conflicts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Resolution {
-    /// None.
+    /// No resolution.
     Off,
     /// Modified voltage potential.
     Mvp,
@@ -138,28 +138,28 @@ pub enum Resolution {
 /// The wind at a place.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wind {
-    /// Where.
+    /// Its position.
     pub position: LatLon,
-    /// Altitude in ft; none where it is the same at all.
+    /// Altitude in ft; `None` where the wind is the same at all altitudes.
     pub altitude_ft: Option<f64>,
-    /// Where it blows from, in degrees from true north, in [0, 360).
+    /// The direction it blows from, in degrees from true north, in [0, 360).
     pub from_deg: f64,
-    /// How fast, in kt.
+    /// Its speed, in kt.
     pub speed_kt: f64,
 }
 
-/// An aircraft and what it is told.
+/// An aircraft and its commands.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScnAircraft {
     /// Identifier in capital letters.
     pub id: String,
     /// Type of airplane as written, such as `B744`; empty where it is left out.
     pub kind: String,
-    /// When it appears, in s.
+    /// Time of its creation, in s.
     pub created_s: f64,
-    /// Latitude in degrees, + to the north.
+    /// Latitude in degrees, positive to the north.
     pub lat_deg: f64,
-    /// Longitude in degrees, + to the east, in [-180, 180].
+    /// Longitude in degrees, positive to the east, in [-180, 180].
     pub lon_deg: f64,
     /// Heading in degrees from true north, in [0, 360); 0 where it is left out.
     pub heading_deg: f64,
@@ -169,26 +169,26 @@ pub struct ScnAircraft {
     pub speed: Speed,
     /// The route, without origin and destination.
     pub way_points: Vec<WayPoint>,
-    /// Where it comes from.
+    /// The place that it comes from.
     pub origin: Option<Place>,
-    /// Where it goes after the last way-point.
+    /// The place that it goes to after the last way-point.
     pub destination: Option<Place>,
-    /// When it was told so, in s.
+    /// Time of the command that set the destination, in s.
     pub destination_s: Option<f64>,
-    /// What it is told at a time in s, sorted by time.
+    /// Changes with the time of their command in s, sorted by time.
     pub changes: Vec<(f64, Change)>,
-    /// When it vanishes, in s.
+    /// Time of its deletion, in s.
     pub deleted_s: Option<f64>,
 }
 
 impl ScnAircraft {
-    /// Where it appears.
+    /// Returns the position of its creation.
     pub fn position(&self) -> LatLon {
         LatLon { lat_deg: self.lat_deg, lon_deg: self.lon_deg }
     }
 
-    /// The way-points whose position is known, then the destination where it is: what can be
-    /// flown without a navigation database.
+    /// Returns the way-points with a known position, followed by the destination where its position
+    /// is known: the goals that can be flown without a navigation database.
     pub fn known_goals(&self) -> impl Iterator<Item = LatLon> {
         let places = self.way_points.iter().map(|way_point| &way_point.place);
         places.chain(&self.destination).filter_map(Place::position)
@@ -200,42 +200,42 @@ impl ScnAircraft {
 pub struct UnplacedAircraft {
     /// The name of the place where it starts.
     pub place: String,
-    /// The rest of what is known of it; its latitude and longitude are 0 and mean nothing.
+    /// All other data of the aircraft; its latitude and longitude are 0 and mean nothing.
     pub aircraft: ScnAircraft,
 }
 
 /// One point of a route.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WayPoint {
-    /// Where.
+    /// Its place.
     pub place: Place,
-    /// Altitude there in ft; none where it is left out.
+    /// Altitude there in ft; `None` where it is left out.
     pub altitude_ft: Option<f64>,
-    /// Speed there; none where it is left out.
+    /// Speed there; `None` where it is left out.
     pub speed: Option<Speed>,
-    /// When it was added to the route, in s.
+    /// Time at which it was added to the route, in s.
     pub added_s: f64,
 }
 
-/// A place as a scenario gives it.
+/// A place in a scenario.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Place {
     /// A latitude and a longitude.
     At(LatLon),
-    /// A way-point that the file defines before.
+    /// A way-point that the file has defined before its use.
     Defined {
         /// Its name in capital letters.
         name: String,
-        /// Where it is.
+        /// Its position.
         position: LatLon,
     },
-    /// A name that only a navigation database explains, in capital letters. A runway follows
-    /// its airport after a blank or a slash.
+    /// A name that only a navigation database can resolve, in capital letters. A runway follows its
+    /// airport after a blank or a slash.
     Unresolved(String),
 }
 
 impl Place {
-    /// Where it is, if that is known.
+    /// Returns its position, if that is known.
     pub fn position(&self) -> Option<LatLon> {
         match self {
             Self::At(position) | Self::Defined { position, .. } => Some(*position),
@@ -243,7 +243,7 @@ impl Place {
         }
     }
 
-    /// Its name, if it has one.
+    /// Returns its name, if it has one.
     pub fn name(&self) -> Option<&str> {
         match self {
             Self::Defined { name, .. } | Self::Unresolved(name) => Some(name),
@@ -252,7 +252,7 @@ impl Place {
     }
 }
 
-/// What an aircraft is told.
+/// A command that changes the flight of an aircraft.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Change {
     /// Turn to a heading in degrees from true north, in [0, 360), and leave the route.
@@ -261,23 +261,23 @@ pub enum Change {
     Speed(Speed),
     /// Climb or descend to an altitude in ft.
     AltitudeFt(f64),
-    /// Climb (+) or descend with ft/min.
+    /// Climb (positive) or descend with this vertical speed, in ft/min.
     VerticalSpeedFpm(f64),
-    /// Follow the route in the plane, or stop doing so. Adding a way-point switches it on.
+    /// Follow the route horizontally, or stop doing so. Adding a way-point switches it on.
     LateralNavigation(bool),
     /// Follow the altitudes and speeds of the route, or stop doing so.
     VerticalNavigation(bool),
 }
 
-/// Reads a file, plain or packed with gzip.
+/// Reads a scenario file, plain or packed with gzip.
 ///
 /// # Errors
-/// When it cannot be read; what is wrong in it is listed in the result.
+/// When it cannot be read; errors in its text are listed in the result.
 pub fn read(path: &Path) -> Result<ScnFile, InputError> {
     Ok(parse(&path.display(), &read_text(path, MAX_SCN_BYTES)?))
 }
 
-/// Parses text; `place` is named in errors.
+/// Parses the text of a scenario; `place` is named in errors.
 pub fn parse(place: &dyn fmt::Display, text: &str) -> ScnFile {
     let (lines, short_lines) = lines::join_lines(text);
     let mut file = ScnFile { short_lines, ..ScnFile::default() };
@@ -291,7 +291,7 @@ pub fn parse(place: &dyn fmt::Display, text: &str) -> ScnFile {
             Err(error) => file.unparsed.push(error),
         }
     }
-    // Stable: commands of one time stay in the order of the file.
+    // A stable sort, so that commands of one time stay in the order of the file.
     commands.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
     let mut file = Interpreter::new(place, file).run(commands);
     file.unparsed.sort_by_key(InputError::position);

@@ -1,4 +1,4 @@
-//! Speeds as scenarios give them, and what they are through the air.
+//! Speeds in the units of scenarios, and the true airspeeds that they stand for.
 
 use sidestep_kernel::math;
 
@@ -17,8 +17,8 @@ const GAMMA: f64 = 1.4;
 /// The speed of sound at sea level, in m/s.
 const SEA_LEVEL_SOUND_MPS: f64 = 340.294;
 
-/// Layers of the standard atmosphere: base in m, temperature at the base in K, its gradient
-/// in K/m. The last one goes on for ever.
+/// Layers of the standard atmosphere: base in m, temperature at the base in K, its gradient in K/m.
+/// The last one has no upper end.
 const LAYERS: [(f64, f64, f64); 4] = [
     (0.0, 288.15, -0.0065),
     (11_000.0, 216.65, 0.0),
@@ -36,16 +36,16 @@ pub enum Speed {
 }
 
 impl Speed {
-    /// The true airspeed in m/s at a pressure altitude in ft, by the international standard
-    /// atmosphere: exact below the speed of sound up to 32 km (105 000 ft), and above that
-    /// with the temperature held. Pitot tubes are taken as subsonic at every speed.
+    /// Returns the true airspeed in m/s at a pressure altitude in ft, by the international standard
+    /// atmosphere: exact below the speed of sound up to 32 km (105 000 ft), and above that with a
+    /// constant temperature. Pitot tubes are treated as subsonic at every speed.
     pub fn true_airspeed_mps(self, altitude_ft: f64) -> f64 {
         let (temperature_k, pressure_pa) = standard_air(altitude_ft * FOOT_M);
         let sound_mps = (GAMMA * AIR_GAS_CONSTANT * temperature_k).sqrt();
         match self {
             Self::Mach(mach) => mach * sound_mps,
             Self::CasKt(cas_kt) => {
-                // The pressure that a pitot tube adds is the same at sea level and up here.
+                // The pressure that a pitot tube adds is the same at sea level and at altitude.
                 let sea_level_mach = cas_kt * KNOT_MPS / SEA_LEVEL_SOUND_MPS;
                 let impact_pa = SEA_LEVEL_PRESSURE_PA * impact_ratio(sea_level_mach);
                 mach_of(impact_pa / pressure_pa) * sound_mps
@@ -54,17 +54,17 @@ impl Speed {
     }
 }
 
-/// Impact pressure over static pressure at a Mach number.
+/// Returns impact pressure over static pressure at a Mach number.
 fn impact_ratio(mach: f64) -> f64 {
     math::powf(1.0 + 0.5 * (GAMMA - 1.0) * mach * mach, GAMMA / (GAMMA - 1.0)) - 1.0
 }
 
-/// The Mach number at which impact pressure over static pressure is `ratio`.
+/// Returns the Mach number at which impact pressure over static pressure is `ratio`.
 fn mach_of(ratio: f64) -> f64 {
     (2.0 / (GAMMA - 1.0) * (math::powf(1.0 + ratio, (GAMMA - 1.0) / GAMMA) - 1.0)).sqrt()
 }
 
-/// Temperature in K and pressure in Pa at a geopotential altitude.
+/// Returns temperature in K and pressure in Pa at a geopotential altitude in m.
 fn standard_air(altitude_m: f64) -> (f64, f64) {
     let mut pressure_pa = SEA_LEVEL_PRESSURE_PA;
     for (i, &(base_m, base_k, gradient)) in LAYERS.iter().enumerate() {

@@ -1,9 +1,8 @@
 //! The traffic patterns that `SYN` creates, about latitude and longitude 0.
 //!
-//! Sizes are those of the simulator the scenarios are written for, and so are identifiers.
-//! Every aircraft flies at FL200 with a calibrated airspeed of 200 m/s and goes straight to the
-//! mirror image of its start, which is also its destination. Aircraft that are there already
-//! stay.
+//! Sizes and identifiers are those of the simulator that the scenarios are written for. Every
+//! aircraft flies at FL200 with a calibrated airspeed of 200 m/s and goes straight to the mirror
+//! image of its start, which is also its destination. Existing aircraft stay.
 
 use std::f64::consts::TAU;
 
@@ -14,10 +13,10 @@ use sidestep_kernel::math;
 /// Radius of the circle of a super-conflict in degrees: 55.6 km.
 const SUPER_RADIUS_DEG: f64 = 0.5;
 
-/// Distance of a wall, and of the one that meets it, from the middle in degrees.
+/// Distance of a wall, and of the aircraft that meets it, from the center in degrees.
 const WALL_DISTANCE_DEG: f64 = 0.6;
 
-/// Aircraft in a wall.
+/// Number of aircraft in a wall.
 const WALL_SIZE: u32 = 20;
 
 const ALTITUDE_FT: f64 = 20_000.0;
@@ -27,13 +26,13 @@ const M_PER_NM: f64 = 1852.0;
 /// Meters per degree in these patterns.
 const M_PER_DEG: f64 = 111_319.0;
 
-/// How much further apart neighbors are than the protected zone's radius.
+/// Distance of neighbors as a multiple of the protected zone's radius.
 const SPACING_FACTOR: f64 = 1.1;
 
-/// How long a matrix flies until its first lines cross, in s.
+/// Time that a matrix flies until its first lines cross, in s.
 const MATRIX_APPROACH_S: f64 = 330.0;
 
-/// `n` aircraft, evenly spaced on a circle of half a degree, each with the opposite goal.
+/// Returns `n` aircraft, evenly spaced on a circle of half a degree, each with the opposite goal.
 pub(super) fn super_conflict(n: u32, created_s: f64) -> Vec<ScnAircraft> {
     let on_circle = |i: u32| {
         let turn = f64::from(i) / f64::from(n);
@@ -47,7 +46,7 @@ pub(super) fn super_conflict(n: u32, created_s: f64) -> Vec<ScnAircraft> {
     (0..n).map(on_circle).collect()
 }
 
-/// One aircraft that flies east against a wall of 20 that fly west, 1.1 zone radii apart.
+/// Returns one aircraft that flies east against a wall of 20 that fly west, 1.1 zone radii apart.
 pub(super) fn wall(zone_radius_nm: f64, created_s: f64) -> Vec<ScnAircraft> {
     let pattern = Pattern { kind: "WALL", created_s };
     let across = |id: String, lat_deg: f64, lon_deg: f64| {
@@ -63,7 +62,7 @@ pub(super) fn wall(zone_radius_nm: f64, created_s: f64) -> Vec<ScnAircraft> {
     [own].into_iter().chain(others).collect()
 }
 
-/// `n` aircraft from each side, 1.1 zone radii apart, that cross in a grid.
+/// Returns `n` aircraft from each side, 1.1 zone radii apart, that cross in a grid.
 pub(super) fn matrix(n: u32, zone_radius_nm: f64, created_s: f64) -> Vec<ScnAircraft> {
     let pattern = Pattern { kind: "MATRIX", created_s };
     let half_deg = spacing_deg(zone_radius_nm) * (f64::from(n) - 1.0) / 2.0;
@@ -84,12 +83,12 @@ pub(super) fn matrix(n: u32, zone_radius_nm: f64, created_s: f64) -> Vec<ScnAirc
     (0..n).flat_map(four).collect()
 }
 
-/// The distance of neighbors in degrees.
+/// Returns the distance of neighbors in degrees.
 fn spacing_deg(zone_radius_nm: f64) -> f64 {
     SPACING_FACTOR * zone_radius_nm * M_PER_NM / M_PER_DEG
 }
 
-/// What the aircraft of one pattern have in common.
+/// Common data of the aircraft of one pattern.
 struct Pattern {
     kind: &'static str,
     created_s: f64,

@@ -273,7 +273,7 @@ fn absurd_patterns_are_refused() {
     }
 }
 
-/// What others have read from the shared files.
+/// Results that others have read from the shared files.
 fn expected(name: &str) -> Option<Value> {
     let text = std::fs::read_to_string(shared(name)?).expect("readable");
     Some(serde_json::from_str(&text).expect("JSON"))
@@ -375,7 +375,7 @@ fn a_super_conflict_is_as_fast_as_where_it_was_first_flown() {
     }
 }
 
-/// Only the demonstration asks for what cannot be done: it was recorded from traffic in which
+/// Only the demonstration asks for the impossible: it was recorded from traffic in which
 /// two identifiers came back, and deletes aircraft twice.
 #[test]
 fn only_the_shared_demonstration_holds_commands_that_cannot_be_carried_out() {

@@ -1,4 +1,4 @@
-//! The values that arguments of commands have.
+//! The values of the arguments of commands.
 
 use std::fmt;
 use std::ops::RangeInclusive;
@@ -8,11 +8,11 @@ use crate::local_plane::{LatLon, wrap_deg};
 use crate::table::Word;
 use sidestep_kernel::InputError;
 
-/// The arguments of one command, taken from the left.
+/// The arguments of one command, read from the left.
 pub(super) struct Arguments<'a> {
-    /// The file, as errors name it.
+    /// The name of the file in errors.
     pub(super) place: &'a dyn fmt::Display,
-    /// Name of the command, which errors point at where an argument is missing.
+    /// Name of the command, where errors about a missing argument point.
     pub(super) command: Word<'a>,
     words: std::vec::IntoIter<Word<'a>>,
 }
@@ -26,12 +26,12 @@ impl<'a> Arguments<'a> {
         Self { place, command, words: words.into_iter() }
     }
 
-    /// The next argument; none where it is left out, is `*`, or the line ends.
+    /// Takes the next argument; `None` where it is left out, is `*`, or the line ends.
     pub(super) fn next(&mut self) -> Option<Word<'a>> {
         self.words.next().filter(|word| !word.text.is_empty() && word.text != "*")
     }
 
-    /// The next argument, which `what` names.
+    /// Takes the next argument, called `what` in errors.
     pub(super) fn required(&mut self, what: &str) -> Result<Word<'a>, InputError> {
         self.next().ok_or_else(|| {
             let cause = format!("{} lacks {what}", self.command.text);
@@ -39,17 +39,17 @@ impl<'a> Arguments<'a> {
         })
     }
 
-    /// How many are left.
+    /// Returns the number of arguments left.
     pub(super) fn remaining(&self) -> usize {
         self.words.len()
     }
 
-    /// The next argument, which is not taken.
+    /// Returns the next argument without taking it.
     pub(super) fn peek(&self) -> Option<&'a str> {
         self.words.as_slice().first().map(|word| word.text)
     }
 
-    /// The next argument as `parse` reads it, where it is not left out.
+    /// Takes the next argument as `parse` reads it, where it is not left out.
     pub(super) fn optional<T>(
         &mut self,
         parse: impl Fn(&dyn fmt::Display, Word) -> Result<T, InputError>,
@@ -57,7 +57,7 @@ impl<'a> Arguments<'a> {
         self.next().map(|word| parse(self.place, word)).transpose()
     }
 
-    /// A latitude and a longitude.
+    /// Takes a latitude and a longitude.
     pub(super) fn lat_lon(&mut self) -> Result<LatLon, InputError> {
         let latitude = self.required("a latitude")?;
         let lat_deg = degrees(self.place, latitude, LATITUDE)?;
@@ -66,7 +66,7 @@ impl<'a> Arguments<'a> {
     }
 }
 
-/// Which letters a coordinate may have, and how large it may be.
+/// The letters and the range of a coordinate.
 #[derive(Clone, Copy)]
 struct Axis {
     positive: char,
@@ -77,27 +77,27 @@ struct Axis {
 const LATITUDE: Axis = Axis { positive: 'N', negative: 'S', max_deg: 90.0 };
 const LONGITUDE: Axis = Axis { positive: 'E', negative: 'W', max_deg: 360.0 };
 
-/// The altitudes that are flown; true airspeeds are finite at all of them.
+/// The range of altitudes, in ft; true airspeeds are finite at all of them.
 const ALTITUDES_FT: RangeInclusive<f64> = -10_000.0..=300_000.0;
 
 const MAX_SPEED_KT: f64 = 10_000.0;
 const MAX_MACH: f64 = 20.0;
 
-/// What separates degrees, minutes and seconds.
+/// Separators of degrees, minutes and seconds.
 const DEGREE_SIGNS: [char; 3] = ['\'', '"', '°'];
 
-/// Whether a word is meant as a latitude and not as a name: names have other letters.
+/// Whether a word is meant as a latitude and not as a name, because names have other letters.
 pub(super) fn is_latitude(word: &str) -> bool {
     let is_sign = |c: char| c.is_ascii_digit() || DEGREE_SIGNS.contains(&c) || "+-.".contains(c);
-    // The exponent's letter stands between digits, those of the hemisphere at an end.
+    // The exponent's letter stands between digits, that of the hemisphere at an end.
     let trimmed = word.trim_matches(['N', 'S', 'n', 's']);
     trimmed.contains(|c: char| c.is_ascii_digit())
         && trimmed.chars().all(|c| is_sign(c) || "eE".contains(c))
         && !trimmed.starts_with(['e', 'E'])
 }
 
-/// Degrees with a fraction, or `degrees'minutes'seconds`; a sign or a letter of the
-/// hemisphere in front or behind.
+/// Reads degrees with a fraction, or `degrees'minutes'seconds`; a sign or a letter of the
+/// hemisphere in front or at the end.
 fn degrees(place: &dyn fmt::Display, word: Word, axis: Axis) -> Result<f64, InputError> {
     let value = signed_degrees(word.text, axis).filter(|deg| deg.abs() <= axis.max_deg);
     let value = value.ok_or_else(|| {
@@ -132,7 +132,7 @@ fn unsigned_degrees(text: &str) -> Option<f64> {
     for (i, part) in text.split(DEGREE_SIGNS).enumerate() {
         let unit = *[1.0, 60.0, 3600.0].get(i)?;
         let number = part.parse::<f64>().ok().filter(|number| *number >= 0.0)?;
-        // Not `<= 60`: 60 minutes are a degree. Infinity is no number of degrees.
+        // Not `<= 60`, because 60 minutes are a degree. Infinity is not a number of degrees.
         if !number.is_finite() || (i > 0 && number >= 60.0) {
             return None;
         }
@@ -141,7 +141,7 @@ fn unsigned_degrees(text: &str) -> Option<f64> {
     Some(value)
 }
 
-/// A heading or a wind direction in degrees from true north, in [0, 360).
+/// Reads a heading or a wind direction in degrees from true north, in [0, 360).
 pub(super) fn heading_deg(place: &dyn fmt::Display, word: Word) -> Result<f64, InputError> {
     let text = word.text.strip_suffix(['T', 't']).unwrap_or(word.text);
     let value = Word { text, ..word }.number(place).map_err(|_| {
@@ -149,11 +149,11 @@ pub(super) fn heading_deg(place: &dyn fmt::Display, word: Word) -> Result<f64, I
         word.error(place, cause, "write degrees from true north such as 326.8 or 326.8T")
     })?;
     let turned = value.rem_euclid(360.0);
-    // rem_euclid may round up to the modulus itself.
+    // rem_euclid may round up to the modulus itself, which is outside the range.
     Ok(if turned >= 360.0 { 0.0 } else { turned })
 }
 
-/// An altitude in ft: a number, or a flight level such as `FL200`.
+/// Reads an altitude in ft: a number, or a flight level such as `FL200`.
 pub(super) fn altitude_ft(place: &dyn fmt::Display, word: Word) -> Result<f64, InputError> {
     let level = word.text.get(..2).filter(|start| start.eq_ignore_ascii_case("FL"));
     let (text, unit_ft) = level.map_or((word.text, 1.0), |_| (&word.text[2..], 100.0));
@@ -168,7 +168,7 @@ pub(super) fn altitude_ft(place: &dyn fmt::Display, word: Word) -> Result<f64, I
     Ok(value * unit_ft)
 }
 
-/// A speed: knots, or a Mach number as `.8`, `M0.8`, `M.8` or `M80`.
+/// Reads a speed: knots, or a Mach number as `.8`, `M0.8`, `M.8` or `M80`.
 pub(super) fn speed(place: &dyn fmt::Display, word: Word) -> Result<Speed, InputError> {
     let wrong = || {
         let cause = format!("`{}` is no speed", word.text);
@@ -180,16 +180,16 @@ pub(super) fn speed(place: &dyn fmt::Display, word: Word) -> Result<Speed, Input
     };
     let Some(mach) = word.text.strip_prefix(['M', 'm']) else {
         let value = up_to(MAX_SPEED_KT, word.text)?;
-        // Nobody flies with less than a knot: a number below 1 is meant as a Mach number.
+        // No aircraft flies at less than a knot, so a number below 1 is meant as a Mach number.
         let is_mach = 0.1 < value && value < 1.0;
         return Ok(if is_mach { Speed::Mach(value) } else { Speed::CasKt(value) });
     };
-    // Without a point the digits stand behind it.
+    // Without a point the digits are decimals.
     let digits = if mach.contains('.') { mach.to_owned() } else { format!(".{mach}") };
     Ok(Speed::Mach(up_to(MAX_MACH, &digits)?))
 }
 
-/// A number that must be larger than 0.
+/// Reads a number that must be greater than 0.
 pub(super) fn positive(place: &dyn fmt::Display, word: Word) -> Result<f64, InputError> {
     let value = word.number(place)?;
     if value > 0.0 {
@@ -198,12 +198,12 @@ pub(super) fn positive(place: &dyn fmt::Display, word: Word) -> Result<f64, Inpu
     Err(word.error(place, format!("{value} is not larger than 0"), "write a number such as 5"))
 }
 
-/// Any number.
+/// Reads any number.
 pub(super) fn number(place: &dyn fmt::Display, word: Word) -> Result<f64, InputError> {
     word.number(place)
 }
 
-/// `ON` or `OFF`.
+/// Reads `ON` or `OFF`.
 pub(super) fn switch(place: &dyn fmt::Display, word: Word) -> Result<bool, InputError> {
     match word.text.to_ascii_uppercase().as_str() {
         "ON" | "TRUE" | "YES" | "1" => Ok(true),

@@ -1,17 +1,17 @@
-//! Worlds of the Stage simulator: `.world` files and what they include.
+//! Worlds of the Stage simulator: `.world` files and the files that they include.
 //!
 //! ```text
 //! parse.rs   text -> items: include, define, models, properties
 //! read.rs    items -> a world: floor plans, boxes, robots
 //! ```
 //!
-//! Read are the models that stand in the way and the robots: a model with a `bitmap` is a floor
-//! plan, one that descends from `position` a robot, every other one that descends from `model` a
-//! box of its `size` (its `block` shapes are not used), unless neither a robot can hit it
-//! (`obstacle_return 0`) nor a ranger see it (`ranger_return` below 0). Models in models stand
-//! where their parents say; those of a robot are its own. What a bitmap shows is stretched to the
-//! model's size; pixels of brightness 127 and less are solid, as in Stage. Everything else is
-//! counted in [`World::not_used`].
+//! The models that are read are obstacles and robots: a model with a `bitmap` is a floor plan, one
+//! that descends from `position` a robot, every other one that descends from `model` a box of its
+//! `size` (its `block` shapes are not used), unless neither a robot can hit it (`obstacle_return
+//! 0`) nor a ranger see it (`ranger_return` below 0). Models within models are placed in the frame
+//! of their parents; those of a robot belong to it. A bitmap is stretched to the model's size;
+//! pixels of brightness 127 and less are solid, as in Stage. Everything else is counted in
+//! [`World::not_used`].
 //!
 //! Lengths are meters, angles radians (degrees in the files).
 
@@ -24,30 +24,30 @@ use std::path::Path;
 
 use sidestep_kernel::InputError;
 
-/// The longest file that is read, in bytes.
+/// The maximum size of a file, in bytes.
 pub const MAX_WORLD_BYTES: u64 = 1 << 24;
 
-/// What a world holds.
+/// The content of a world.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct World {
-    /// Bitmaps with their size and place, in the order of the file.
+    /// Bitmaps with their size and pose, in the order of the file.
     pub floor_plans: Vec<FloorPlan>,
-    /// Boxes in the way.
+    /// Boxes that are obstacles.
     pub boxes: Vec<Body>,
     /// Robots.
     pub robots: Vec<Robot>,
-    /// Properties and kinds of models that were passed over, by name, and how often.
+    /// Properties and kinds of models that were ignored, by name, with their number.
     pub not_used: Vec<(String, usize)>,
 }
 
-/// Where a model is, and how it is turned: `yaw_rad` counter-clockwise.
+/// Position and heading of a model; `yaw_rad` is counterclockwise.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Pose {
-    /// East.
+    /// Coordinate to the east, in meters.
     pub x_m: f64,
-    /// North.
+    /// Coordinate to the north, in meters.
     pub y_m: f64,
-    /// Counter-clockwise from east.
+    /// Angle counterclockwise from east, in radians.
     pub yaw_rad: f64,
 }
 
@@ -56,15 +56,15 @@ pub struct Pose {
 pub struct FloorPlan {
     /// Its name; may be empty.
     pub name: String,
-    /// Pixels along a row.
+    /// Number of pixels in a row.
     pub width: u32,
-    /// Rows.
+    /// Number of rows.
     pub height: u32,
-    /// Row by row from the bottom: whether a pixel is in the way.
+    /// Whether each pixel is an obstacle, row by row from the bottom.
     pub solid: Vec<bool>,
-    /// Its extent along rows and across; pixels may be longer than wide.
+    /// Its extent along rows and columns in meters; pixels need not be square.
     pub size_m: [f64; 2],
-    /// Its middle.
+    /// The pose of its center.
     pub pose: Pose,
     /// Whether it has a wall all around.
     pub has_boundary: bool,
@@ -75,9 +75,9 @@ pub struct FloorPlan {
 pub struct Body {
     /// Its name; may be empty.
     pub name: String,
-    /// Its middle.
+    /// The pose of its center.
     pub pose: Pose,
-    /// Its extent along its own axes.
+    /// Its extent along its own axes, in meters.
     pub size_m: [f64; 2],
 }
 
@@ -88,20 +88,20 @@ pub struct Robot {
     pub name: String,
     /// The name of its model.
     pub kind: String,
-    /// Where it starts: the point about which it turns.
+    /// The initial pose of the point about which it turns.
     pub pose: Pose,
-    /// Extent of its body, ahead and across.
+    /// Extent of its body in meters, lengthwise and sideways.
     pub size_m: [f64; 2],
-    /// Radius of the least disc around [`Self::pose`] that holds its body.
+    /// Radius in meters of the smallest disc around [`Self::pose`] that contains its body.
     pub radius_m: f64,
 }
 
-/// Reads a world, with all that it includes and its bitmaps; their paths are relative to the file
+/// Reads a world, with all included files and its bitmaps; their paths are relative to the file
 /// that names them.
 ///
 /// # Errors
 /// Files that cannot be read, wrong syntax, wrong values: with file, line and column. Files that
-/// include themselves; more than 1000 files, 100,000 models, or 64 models in each other.
+/// include themselves; more than 1000 files, 100,000 models, or 64 levels of models within models.
 pub fn load(path: &Path) -> Result<World, InputError> {
     read::world(path)
 }

@@ -11,7 +11,7 @@ use sidestep_kernel::InputError;
 
 type Input<'a> = LocatingSlice<&'a str>;
 
-/// The most models in each other.
+/// The maximum depth of models within models.
 pub(super) const MAX_NESTING: usize = 64;
 
 /// A top-level part of a file.
@@ -44,14 +44,14 @@ pub(super) struct Value {
     pub(super) at: Place,
 }
 
-/// Which file, and which byte of it.
+/// A file, and a byte offset in it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Place {
     pub(super) file: usize,
     pub(super) offset: usize,
 }
 
-/// The items of a file.
+/// Parses the items of a file.
 pub(super) fn items(place: &str, text: &str, file: usize) -> Result<Vec<Item>, InputError> {
     check_nesting(place, text)?;
     let mut parser = preceded(blank, repeat(0.., |input: &mut Input| item(input, file)));
@@ -71,7 +71,8 @@ pub(super) fn items(place: &str, text: &str, file: usize) -> Result<Vec<Item>, I
     })
 }
 
-/// The parser calls itself for each model in a model; the stack must not decide how deep.
+/// Checks the depth of models, because the parser calls itself for each model in a model and must
+/// not overflow the stack.
 fn check_nesting(place: &str, text: &str) -> Result<(), InputError> {
     let (mut depth, mut in_comment, mut in_text) = (0usize, false, false);
     for (at, c) in text.char_indices() {
@@ -156,7 +157,7 @@ fn entry(input: &mut Input, file: usize) -> ModalResult<Entry> {
     entry_of(input, word, at)
 }
 
-/// What a word begins: a model, or a property.
+/// Parses the entry that starts with a word: a model, or a property.
 fn entry_of(input: &mut Input, word: String, at: Place) -> ModalResult<Entry> {
     if opt(sign('(')).parse_next(input)?.is_some() {
         return model(input, word, at).map(Entry::Model);
@@ -164,7 +165,7 @@ fn entry_of(input: &mut Input, word: String, at: Place) -> ModalResult<Entry> {
     Ok(Entry::Property { key: word, value: value(input, at.file)? })
 }
 
-/// The rest of a model, behind its opening bracket.
+/// Parses the rest of a model, after its opening bracket.
 fn model(input: &mut Input, kind: String, at: Place) -> ModalResult<Model> {
     let entries = repeat(0.., |input: &mut Input| entry(input, at.file)).parse_next(input)?;
     cut_err(sign(')')).context(expected("a property, a model or `)`")).parse_next(input)?;

@@ -13,9 +13,9 @@ use sidestep_scenario::file::read_text;
 
 const MAX_FILES: usize = 1000;
 const MAX_MODELS: usize = 100_000;
-/// What Stage gives models without a size.
+/// The size that Stage gives to models without one, in meters.
 const DEFAULT_SIZE_M: f64 = 0.1;
-/// Pixels brighter than this are free, as in Stage.
+/// The greatest brightness of a solid pixel, as in Stage; brighter ones are free.
 const DARKEST_FREE: f64 = 127.0;
 
 pub(super) fn world(path: &Path) -> Result<World, InputError> {
@@ -31,12 +31,12 @@ struct Source {
     text: String,
 }
 
-/// A model with all that it has from those it descends from.
+/// A model with all properties that it inherits.
 #[derive(Debug, Clone, Default)]
 struct Definition {
     /// The built-in kind at its root.
     root: String,
-    /// The last value of each property counts.
+    /// The last value of each property.
     properties: BTreeMap<String, Value>,
     children: Vec<Model>,
 }
@@ -94,7 +94,7 @@ impl Reader {
         }
     }
 
-    /// A path that a file names, relative to that file.
+    /// Resolves a path in a file, relative to that file.
     fn path(&self, name: &Value) -> Result<PathBuf, InputError> {
         let [file] = &name.words[..] else {
             return Err(self.error(name.at, "a list where a file's name is expected", "give one"));
@@ -112,7 +112,7 @@ impl Reader {
         *self.not_used.entry(name.into()).or_default() += 1;
     }
 
-    /// What a model has, its own properties before inherited ones.
+    /// Returns the properties of a model, its own before inherited ones.
     fn resolved(&self, model: &Model) -> Definition {
         let mut definition = match self.definitions.get(&model.kind) {
             Some(base) => (**base).clone(),
@@ -140,7 +140,7 @@ impl Reader {
             "position" => self.robot(model, &definition, parent),
             "model" => self.thing(model, &definition, parent, depth),
             _ if definition.properties.contains_key("bitmap") => {
-                // A floor plan whose definition is in a file that is not at hand.
+                // A floor plan whose definition is in a file that is missing.
                 self.thing(model, &definition, parent, depth)
             }
             root => {
@@ -198,7 +198,7 @@ impl Reader {
         Ok(is_hit || self.number(def, "ranger_return", 1.0)? >= 0.0)
     }
 
-    /// The pixels of a bitmap.
+    /// Reads the pixels of a bitmap.
     fn floor_plan(&self, bitmap: &Value) -> Result<FloorPlan, InputError> {
         let image = Bitmap::load(&self.path(bitmap)?)?;
         let from_top = image.map_brightness(|brightness| brightness <= DARKEST_FREE);
@@ -269,12 +269,12 @@ impl Reader {
     }
 }
 
-/// Properties that are read.
+/// The properties that are read.
 const USED: [&str; 8] =
     ["name", "pose", "origin", "size", "bitmap", "boundary", "obstacle_return", "ranger_return"];
 
 impl Pose {
-    /// A pose that is given in the frame of another.
+    /// Returns a pose that is given in the frame of another in the frame of that one's parent.
     fn on(self, parent: Self) -> Self {
         let (s, c) = (sin(parent.yaw_rad), cos(parent.yaw_rad));
         Self {

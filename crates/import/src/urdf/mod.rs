@@ -1,11 +1,11 @@
 //! Robot models: URDF (links and joints) and SRDF (groups, named postures).
 //!
-//! Only kinematics is read: joints with their origins, axes, limits and mimicry. Masses, shapes
-//! and meshes are passed over, so a mesh that is missing is no error. Lengths are meters, angles
-//! radians. Formats: <https://wiki.ros.org/urdf/XML>, <https://wiki.ros.org/srdf>.
+//! Only kinematics is read: joints with their origins, axes, limits and mimicry. Masses, shapes and
+//! meshes are ignored, so a missing mesh is not an error. Lengths are meters, angles radians.
+//! Formats: <https://wiki.ros.org/urdf/XML>, <https://wiki.ros.org/srdf>.
 //!
-//! The XML is read with `roxmltree` and not with `urdf-rs`: the latter's errors name no line, it
-//! reads no SRDF, and it would add an XML reader of its own.
+//! The XML is read with `roxmltree` instead of `urdf-rs`, because errors of the latter name no
+//! line, it does not read SRDF, and it would add an XML reader of its own.
 
 mod read;
 pub mod srdf;
@@ -19,10 +19,10 @@ use sidestep_kernel::InputError;
 use sidestep_scenario::file::read_text;
 use sidestep_scenario::nearest;
 
-/// The longest model that is read, in bytes after unpacking: some 400 times the longest known.
+/// The maximum size of a model in bytes after unpacking: some 400 times the longest known.
 pub const MAX_URDF_BYTES: u64 = 1 << 24;
 
-/// A tree of links that joints connect.
+/// A tree of links connected by joints.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Model {
     /// The robot's name.
@@ -35,50 +35,51 @@ pub struct Model {
     pub root: usize,
 }
 
-/// What holds one link to another.
+/// A connection of one link to another.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Joint {
-    /// Its name; no other joint has it.
+    /// Its name, which is unique among joints.
     pub name: String,
-    /// How the child can move.
+    /// The motion of the child.
     pub kind: JointKind,
-    /// The link that it is mounted on.
+    /// The link that it is mounted on, as an index of [`Model::links`].
     pub parent: usize,
-    /// The link that it carries.
+    /// The link that it carries, as an index of [`Model::links`].
     pub child: usize,
     /// The joint's frame in the parent's frame.
     pub origin: Origin,
-    /// Unit vector in the joint's frame, about or along which it moves. (1, 0, 0) where it cannot.
+    /// Unit vector in the joint's frame, about or along which it moves; (1, 0, 0) where it has no
+    /// axis.
     pub axis: [f64; 3],
-    /// Lowest and highest value, in rad or m; none of joints without such limits.
+    /// Lowest and highest value, in rad or m; `None` for joints without such limits.
     pub limits: Option<Limits>,
-    /// The joint that drives this one.
+    /// The joint that this one follows.
     pub mimic: Option<Mimic>,
 }
 
-/// A frame in another: turned by `rpy_rad`, then moved by `xyz_m`.
+/// A frame in another: rotated by `rpy_rad`, then moved by `xyz_m`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Origin {
-    /// Displacement in m.
+    /// Displacement, in meters.
     pub xyz_m: [f64; 3],
     /// Roll, pitch and yaw about the fixed axes x, y, z in rad: R = Rz(yaw) Ry(pitch) Rx(roll).
     pub rpy_rad: [f64; 3],
 }
 
-/// How a joint's child can move.
+/// The motion of a joint's child.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum JointKind {
-    /// Not at all.
+    /// No motion.
     Fixed,
-    /// About the axis, between limits in rad.
+    /// Rotation about the axis, between limits in rad.
     Revolute,
-    /// About the axis, without limits.
+    /// Rotation about the axis, without limits.
     Continuous,
-    /// Along the axis, between limits in m.
+    /// Translation along the axis, between limits in m.
     Prismatic,
-    /// In all six ways.
+    /// Motion in all six degrees of freedom.
     Floating,
-    /// In the plane across the axis.
+    /// Motion in the plane perpendicular to the axis.
     Planar,
 }
 
@@ -92,7 +93,7 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// Whether `value` is in the range, give or take the rounding of a printed value.
+    /// Whether `value` is in the range, up to the rounding of a printed value.
     pub fn contain(&self, value: f64) -> bool {
         const SLACK: f64 = 1e-9;
         (self.lower - SLACK..=self.upper + SLACK).contains(&value)
@@ -102,16 +103,16 @@ impl Limits {
 /// A joint's value as a function of another's: `multiplier * value + offset`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mimic {
-    /// Index of the joint that drives, in [`Model::joints`].
+    /// Index of the other joint in [`Model::joints`].
     pub joint: usize,
-    /// Factor.
+    /// The factor on its value.
     pub multiplier: f64,
-    /// In rad or m.
+    /// The offset, in rad or m.
     pub offset: f64,
 }
 
 impl JointKind {
-    /// Whether one value says where the child is.
+    /// Whether a single value determines the position of the child.
     pub fn has_one_value(self) -> bool {
         matches!(self, Self::Revolute | Self::Continuous | Self::Prismatic)
     }
@@ -121,8 +122,8 @@ impl Model {
     /// Reads the URDF file at `path`, plain or packed with gzip.
     ///
     /// # Errors
-    /// When the file cannot be read, is xacro, is no URDF, or describes no tree of links; with
-    /// file, line and column.
+    /// When the file cannot be read, is xacro, is not URDF, or does not describe a tree of links;
+    /// with file, line and column.
     pub fn load(path: &Path) -> Result<Self, InputError> {
         let place = path.display().to_string();
         if place.trim_end_matches(".gz").ends_with(".xacro") {
@@ -134,15 +135,16 @@ impl Model {
     /// Reads the text of a URDF file, which errors call `place`.
     ///
     /// # Errors
-    /// Those of [`Model::load`], but for reading.
+    /// Those of [`Model::load`], except for reading.
     pub fn parse(place: &str, text: &str) -> Result<Self, InputError> {
         read::model(place, text)
     }
 
-    /// The link called `name`, which stands in `place` (a file or an option).
+    /// Returns the index of the link called `name`, which was read from `place` (a file or an
+    /// option).
     ///
     /// # Errors
-    /// When there is none; with the nearest name.
+    /// When there is none; the error suggests the nearest name.
     pub fn link(&self, place: &str, name: &str) -> Result<usize, InputError> {
         self.links.iter().position(|link| link == name).ok_or_else(|| {
             let known: Vec<&str> = self.links.iter().map(String::as_str).collect();
@@ -151,10 +153,11 @@ impl Model {
         })
     }
 
-    /// The joint called `name`, which stands in `place` (a file or an option).
+    /// Returns the index of the joint called `name`, which was read from `place` (a file or an
+    /// option).
     ///
     /// # Errors
-    /// When there is none; with the nearest name.
+    /// When there is none; the error suggests the nearest name.
     pub fn joint(&self, place: &str, name: &str) -> Result<usize, InputError> {
         self.joints.iter().position(|joint| joint.name == name).ok_or_else(|| {
             let known: Vec<&str> = self.joints.iter().map(|j| j.name.as_str()).collect();
@@ -163,7 +166,7 @@ impl Model {
         })
     }
 
-    /// The joint that carries `link`; none of the root.
+    /// Returns the joint that carries `link`; `None` for the root.
     pub fn joint_above(&self, link: usize) -> Option<usize> {
         self.joints.iter().position(|joint| joint.child == link)
     }

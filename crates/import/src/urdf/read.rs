@@ -9,7 +9,7 @@ use sidestep_scenario::nearest;
 pub(super) const XACRO: &str = "is xacro, macros that have to become URDF first";
 pub(super) const EXPAND: &str = "expand it with ROS: xacro FILE.urdf.xacro > FILE.urdf";
 
-/// Names that files give to the sorts of joints.
+/// The names of joint types in files.
 const KINDS: [(&str, JointKind); 6] = [
     ("fixed", JointKind::Fixed),
     ("revolute", JointKind::Revolute),
@@ -19,13 +19,13 @@ const KINDS: [(&str, JointKind); 6] = [
     ("planar", JointKind::Planar),
 ];
 
-/// Coordinates beyond this are no robot's, and their squares must stay finite.
+/// The maximum of a coordinate in meters: no robot has a larger one, and squares must stay finite.
 const MAX_COORDINATE: f64 = 1e6;
 
-/// More links than any known robot has by far.
+/// The maximum number of links, far above that of any known robot.
 const MAX_LINKS: usize = 10_000;
 
-/// Shorter axes have no direction worth the name.
+/// The minimum length of an axis; a shorter one has no reliable direction.
 const MIN_AXIS: f64 = 1e-6;
 
 pub(super) fn model(place: &str, text: &str) -> Result<Model, InputError> {
@@ -52,7 +52,7 @@ pub(super) fn model(place: &str, text: &str) -> Result<Model, InputError> {
     Ok(Model { name, links: links.in_order, joints, root })
 }
 
-/// `error` at the place of another.
+/// Moves `error` to the position of another.
 fn at(other: &InputError, error: InputError) -> InputError {
     match other.position() {
         Some((line, column)) => error.at(line, column),
@@ -60,7 +60,8 @@ fn at(other: &InputError, error: InputError) -> InputError {
     }
 }
 
-/// A file may declare the prefix and not use it: files that were expanded often do.
+/// Refuses files with xacro elements or macros. A file may declare the prefix without using it, as
+/// expanded files often do.
 fn refuse_xacro(file: &XmlFile) -> Result<(), InputError> {
     for element in file.elements() {
         if element.namespace().is_some_and(|address| address.contains("xacro")) {
@@ -74,14 +75,14 @@ fn refuse_xacro(file: &XmlFile) -> Result<(), InputError> {
     Ok(())
 }
 
-/// The links and where their names stand.
+/// The links and the positions of their names.
 struct Links {
     in_order: Vec<String>,
     names: tree::Names,
 }
 
 impl Links {
-    /// The link that an element's attribute `link` names.
+    /// Returns the link that an element's attribute `link` names.
     fn named_in(&self, element: Element) -> Result<usize, InputError> {
         let value = element.required("link")?;
         self.names.get(value.text()).ok_or_else(|| {
@@ -151,7 +152,8 @@ fn bounded(value: Value) -> Result<[f64; 3], InputError> {
     }
 }
 
-/// Files give fixed joints a zero axis; it means nothing there and is not read.
+/// Reads the axis of a joint. Files give fixed joints a zero axis, which means nothing and is not
+/// read.
 fn axis(joint: Element, kind: JointKind) -> Result<[f64; 3], InputError> {
     const DEFAULT: [f64; 3] = [1.0, 0.0, 0.0];
     if !kind.has_one_value() && kind != JointKind::Planar {

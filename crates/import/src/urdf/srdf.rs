@@ -1,4 +1,4 @@
-//! SRDF: what a URDF does not say about a robot. Groups of joints, named postures, end effectors
+//! SRDF: the data about a robot that a URDF lacks. Groups of joints, named postures, end effectors
 //! and the pairs of links that need no collision check.
 
 use std::path::Path;
@@ -9,7 +9,7 @@ use sidestep_kernel::InputError;
 use sidestep_scenario::file::read_text;
 use sidestep_scenario::nearest;
 
-/// What an SRDF file says of a model.
+/// The content of an SRDF file for a model.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Semantics {
     /// Groups, in the order of the file.
@@ -25,15 +25,15 @@ pub struct Semantics {
 /// A part of a robot, given in one or several ways.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Group {
-    /// Its name; no other group has it.
+    /// Its name, which is unique among groups.
     pub name: String,
-    /// Joints that are listed, as indices of [`Model::joints`].
+    /// The listed joints, as indices of [`Model::joints`].
     pub joints: Vec<usize>,
-    /// Links that are listed, as indices of [`Model::links`].
+    /// The listed links, as indices of [`Model::links`].
     pub links: Vec<usize>,
-    /// Chains: base and tip, as indices of [`Model::links`]. The tip hangs on the base.
+    /// Chains: base and tip, as indices of [`Model::links`]. The tip is a descendant of the base.
     pub chains: Vec<(usize, usize)>,
-    /// Names of groups that belong to it.
+    /// Names of its subgroups.
     pub groups: Vec<String>,
 }
 
@@ -53,18 +53,18 @@ pub struct NamedPosture {
 pub struct EndEffector {
     /// Its name.
     pub name: String,
-    /// The link that it is mounted on, as index of [`Model::links`].
+    /// The link that it is mounted on, as an index of [`Model::links`].
     pub parent_link: usize,
-    /// The group that it consists of, as the file says.
+    /// The group that it consists of, by its name in the file.
     pub group: String,
 }
 
 /// Two links that may touch.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DisabledCollision {
-    /// The two, as indices of [`Model::links`].
+    /// The two links, as indices of [`Model::links`].
     pub links: (usize, usize),
-    /// Why, such as `Adjacent`, `Never` or `Default`; empty where the file does not say.
+    /// The reason, such as `Adjacent`, `Never` or `Default`; empty where the file gives none.
     pub reason: String,
 }
 
@@ -72,8 +72,8 @@ impl Semantics {
     /// Reads the SRDF file at `path` for `model`, plain or packed with gzip.
     ///
     /// # Errors
-    /// When the file cannot be read, is no SRDF, or names a link, joint or group that is not
-    /// there; with file, line, column and the nearest name.
+    /// When the file cannot be read, is not SRDF, or names a link, joint or group that does not
+    /// exist; with file, line, column and the nearest name.
     pub fn load(path: &Path, model: &Model) -> Result<Self, InputError> {
         Self::parse(&path.display().to_string(), &read_text(path, MAX_URDF_BYTES)?, model)
     }
@@ -81,7 +81,7 @@ impl Semantics {
     /// Reads the text of an SRDF file, which errors call `place`.
     ///
     /// # Errors
-    /// Those of [`Semantics::load`], but for reading.
+    /// Those of [`Semantics::load`], except for reading.
     pub fn parse(place: &str, text: &str, model: &Model) -> Result<Self, InputError> {
         let file = XmlFile::parse(place, text)?;
         let reader = Reader { robot: file.root("robot")?, model };
@@ -94,11 +94,11 @@ impl Semantics {
         })
     }
 
-    /// The values of all postures called `name`, later ones over earlier ones. `place` is the
-    /// option that names it.
+    /// Returns the values of all postures called `name`; later ones replace earlier ones. `place`
+    /// is the option that names it.
     ///
     /// # Errors
-    /// When there is none; with the names that there are.
+    /// When there is none; the error lists the existing names.
     pub fn posture(&self, place: &str, name: &str) -> Result<Vec<(usize, f64)>, InputError> {
         let named: Vec<_> = self.postures.iter().filter(|p| p.name == name).collect();
         if named.is_empty() {
@@ -109,10 +109,10 @@ impl Semantics {
         Ok(named.iter().flat_map(|posture| posture.values.iter().copied()).collect())
     }
 
-    /// The group called `name`. `place` is the option that names it.
+    /// Returns the group called `name`. `place` is the option that names it.
     ///
     /// # Errors
-    /// When there is none; with the nearest name.
+    /// When there is none; the error suggests the nearest name.
     pub fn group(&self, place: &str, name: &str) -> Result<&Group, InputError> {
         self.groups.iter().find(|group| group.name == name).ok_or_else(|| {
             let known: Vec<&str> = self.groups.iter().map(|g| g.name.as_str()).collect();
@@ -120,11 +120,12 @@ impl Semantics {
         })
     }
 
-    /// The links that the group `name` leads from and to: its chain, or the ends of the way that
-    /// its joints and those of its parts lie on. `place` is the option that names it.
+    /// Returns the first and the last link of the group `name`: those of its chain, or the ends of
+    /// the path on which its joints and those of its subgroups lie. `place` is the option that
+    /// names it.
     ///
     /// # Errors
-    /// When there is no such group, or it is no single way.
+    /// When there is no such group, or it is not a single path.
     pub fn ends(
         &self,
         place: &str,
@@ -136,7 +137,7 @@ impl Semantics {
         }
         let mut names = vec![name];
         let mut joints = Vec::new();
-        // Groups that name each other in a circle are each looked at once.
+        // Groups that name each other in a circle are each visited once.
         let mut next = 0;
         while let Some(name) = names.get(next) {
             let group = self.group(place, name)?;
@@ -156,7 +157,7 @@ impl Semantics {
     }
 }
 
-/// The ends of the way that holds all of these joints.
+/// Returns the ends of the path that holds all of these joints.
 fn way_of(joints: &[usize], model: &Model) -> Option<(usize, usize)> {
     let depth = |&joint: &usize| model.way(model.root, model.joints[joint].child).map(|w| w.len());
     let first = *joints.iter().min_by_key(|j| depth(j))?;
@@ -172,7 +173,7 @@ struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    /// What `read` makes of each element called `name`.
+    /// Returns the result of `read` for each element called `name`.
     fn each<T>(
         &self,
         name: &'a str,
@@ -236,7 +237,7 @@ impl<'a> Reader<'a> {
         })
     }
 
-    /// Whether a joint is one that only the SRDF knows, which places the robot in the world.
+    /// Whether a joint exists in the SRDF only, and places the robot in the world.
     fn is_virtual(&self, joint: Element<'a>) -> bool {
         let name = |e: Element<'a>| e.attribute("name").map(|value| value.text());
         self.robot.children("virtual_joint").any(|v| name(v).is_some() && name(v) == name(joint))

@@ -1,4 +1,4 @@
-//! Links and joints as a tree: names, the root, ways from link to link.
+//! Links and joints as a tree: names, the root, paths from link to link.
 
 use std::collections::BTreeMap;
 
@@ -6,15 +6,15 @@ use super::{Joint, Model};
 use crate::xml::Element;
 use sidestep_kernel::InputError;
 
-/// How many names an error lists.
+/// The maximum number of names that an error lists.
 const LISTED: usize = 8;
 
-/// Names and the indices that they stand for.
+/// Names and their indices.
 #[derive(Default)]
 pub(super) struct Names(BTreeMap<String, usize>);
 
 impl Names {
-    /// Adds a name, or gives it back where it is taken.
+    /// Adds a name, or returns it as an error where it is taken.
     pub(super) fn add(&mut self, name: &str, index: usize) -> Result<(), String> {
         match self.0.insert(name.to_owned(), index) {
             None => Ok(()),
@@ -39,7 +39,7 @@ pub(super) fn mimics_in_a_circle(joints: &[Joint], joint: usize) -> bool {
     true
 }
 
-/// The one link without a joint above it, from which all others are reached.
+/// Returns the one link without a joint above it, from which all others are reached.
 pub(super) fn root(
     robot: Element,
     elements: &[Element],
@@ -67,7 +67,7 @@ fn listed(names: impl ExactSizeIterator<Item = String>) -> String {
     names.take(LISTED).collect::<Vec<_>>().join(", ") + more
 }
 
-/// For each link the joint that carries it.
+/// Returns for each link the joint that carries it.
 fn joints_above(
     elements: &[Element],
     links: &[String],
@@ -88,7 +88,7 @@ fn joints_above(
     Ok(above)
 }
 
-/// With one root, a link that is not reached from it is in a loop or hangs on one.
+/// Checks that all links are reached from the root; a link that is not is in a loop or below one.
 fn all_hang_on(
     root: usize,
     above: &[Option<usize>],
@@ -114,8 +114,8 @@ fn all_hang_on(
 }
 
 impl Model {
-    /// The joints from `base` out to `tip`, in this order; empty where they are the same link.
-    /// None where `tip` does not hang on `base`.
+    /// Returns the joints from `base` out to `tip`, in this order; empty where they are the same
+    /// link, `None` where `tip` is not a descendant of `base`.
     pub fn way(&self, base: usize, tip: usize) -> Option<Vec<usize>> {
         let mut above = vec![None; self.links.len()];
         for (i, joint) in self.joints.iter().enumerate() {
@@ -132,7 +132,7 @@ impl Model {
         Some(way)
     }
 
-    /// The links that carry no other, in the order of the file.
+    /// Returns the links that carry no other, in the order of the file.
     pub fn leaves(&self) -> Vec<usize> {
         let mut is_parent = vec![false; self.links.len()];
         for joint in &self.joints {
@@ -141,7 +141,7 @@ impl Model {
         (0..self.links.len()).filter(|&link| !is_parent[link]).collect()
     }
 
-    /// The leaf with the most joints that move on its way from the root; of several the first
+    /// Returns the leaf with the most moving joints on its path from the root; of several the first
     /// in the file.
     pub fn default_tip(&self) -> usize {
         let moving = |tip: usize| {

@@ -5,10 +5,10 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// A monotonic clock.
 pub trait Clock: Sync {
-    /// Nanoseconds since some fixed moment; never decreases.
+    /// Returns the nanoseconds since some fixed moment; never decreases.
     fn now_ns(&self) -> u64;
 
-    /// Processor time of the calling thread in nanoseconds; never decreases.
+    /// Returns the processor time of the calling thread in nanoseconds; never decreases.
     fn thread_cpu_ns(&self) -> u64;
 }
 
@@ -33,12 +33,12 @@ impl Clock for SystemClock {
     }
 }
 
-/// A clock that a test moves by hand.
+/// A clock that a test sets by hand.
 #[derive(Debug, Default)]
 pub struct ManualClock(AtomicU64);
 
 impl ManualClock {
-    /// Moves the clock forward.
+    /// Moves the clock forward by `by_ns` nanoseconds.
     pub fn advance_ns(&self, by_ns: u64) {
         self.0.fetch_add(by_ns, Ordering::Relaxed);
     }
@@ -54,7 +54,7 @@ impl Clock for ManualClock {
     }
 }
 
-/// What every [`Clock`] must hold to; call it from the tests of a new one.
+/// Checks the guarantees of a [`Clock`]; call it from the tests of a new one.
 ///
 /// # Panics
 /// When the clock runs backwards.

@@ -1,5 +1,5 @@
-//! What the kernel asks of the outside, each with an in-memory version and a conformance
-//! suite that every other version must pass too.
+//! The kernel's interfaces to the outside, each with an in-memory version and a conformance suite
+//! that every other version must pass too.
 
 pub mod clock;
 pub mod recorder;

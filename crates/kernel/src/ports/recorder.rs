@@ -1,9 +1,9 @@
-//! Where a run's rows go: typed columns of named tables, in blocks.
+//! The destination of a run's rows: typed columns of named tables, in blocks.
 //!
-//! A recorder knows no world. A world says which tables it has ([`TableSchema`]); the run
-//! hands over blocks of rows, in an order that is a function of scenario and seed alone.
-//! A recorder may be slow (the run waits) but never changes the run, and what it has not
-//! finished is never taken for whole.
+//! A recorder knows no world. A world declares its tables ([`TableSchema`]); the run hands over
+//! blocks of rows, in an order that is a function of scenario and seed alone. A recorder may be
+//! slow (the run waits) but never changes the run, and a recording that it has not finished is
+//! never taken for complete.
 
 use super::table::{ColumnSpec, ColumnType, TableSchema, Values};
 use std::fmt;
@@ -14,18 +14,18 @@ use std::fmt;
 pub struct RecordError {
     /// The file or table.
     pub place: String,
-    /// What the system said.
+    /// The system's message.
     pub cause: String,
 }
 
 impl RecordError {
-    /// Wraps what the system said about `place`.
+    /// Wraps the system's message about `place`.
     pub fn new(place: impl fmt::Display, cause: impl fmt::Display) -> Self {
         Self { place: place.to_string(), cause: cause.to_string() }
     }
 }
 
-/// Takes a run's rows.
+/// Stores a run's rows.
 ///
 /// A block that does not fit its schema is refused and leaves the recording as it was. When
 /// rows cannot be stored, the recording is incomplete from then on: it stays marked so, and
@@ -38,10 +38,10 @@ pub trait Recorder: Send {
     /// When the block does not fit the schema, or when rows cannot be stored.
     fn append(&mut self, table: usize, block: &[Values]) -> Result<(), RecordError>;
 
-    /// Makes all rows so far durable, so that a checkpoint may rely on them: all of them
-    /// belong to cycles before `next_cycle`, all later ones to `next_cycle` or after it. To
-    /// be called before the checkpoint at `next_cycle` is stored; `next_cycle` rises from
-    /// call to call. It changes no row. Recorders that outlive no process have nothing to do.
+    /// Makes all rows so far durable, so that a checkpoint may rely on them: all of them belong to
+    /// cycles before `next_cycle`, all later ones to `next_cycle` or after it. It must be called
+    /// before the checkpoint at `next_cycle` is stored; `next_cycle` increases from call to call.
+    /// It changes no row. Recorders that do not outlive the process have nothing to do.
     ///
     /// # Errors
     /// When rows cannot be stored.
@@ -49,14 +49,14 @@ pub trait Recorder: Send {
         Ok(())
     }
 
-    /// Declares every table whole.
+    /// Declares every table complete.
     ///
     /// # Errors
     /// When the last rows cannot be stored.
     fn finish(&mut self) -> Result<(), RecordError>;
 }
 
-/// Keeps everything in memory; the test double and what the library's users read from.
+/// Keeps everything in memory; a test double, and the source from which users of the library read.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MemoryRecorder {
     schemas: Vec<TableSchema>,
@@ -65,27 +65,27 @@ pub struct MemoryRecorder {
 }
 
 impl MemoryRecorder {
-    /// Empty tables of these schemas.
+    /// Creates empty tables of these schemas.
     pub fn new(schemas: &[TableSchema]) -> Self {
         let empty = |s: &TableSchema| s.columns.iter().map(|c| Values::empty(c.ty)).collect();
         let tables = schemas.iter().map(empty).collect();
         Self { schemas: schemas.to_vec(), tables, finished: false }
     }
 
-    /// The column `name` of table `table`, if both exist.
+    /// Returns the column `name` of table `table`, if both exist.
     pub fn column(&self, table: &str, name: &str) -> Option<&Values> {
         let t = self.schemas.iter().position(|s| s.name == table)?;
         let c = self.schemas[t].columns.iter().position(|c| c.name == name)?;
         Some(&self.tables[t][c])
     }
 
-    /// Number of rows of table `table`; 0 for one that does not exist.
+    /// Returns the number of rows of table `table`; 0 for one that does not exist.
     pub fn rows(&self, table: &str) -> usize {
         let t = self.schemas.iter().position(|s| s.name == table);
         t.map_or(0, |t| self.tables[t].first().map_or(0, Values::len))
     }
 
-    /// True after [`Recorder::finish`].
+    /// Whether [`Recorder::finish`] was called.
     pub fn is_finished(&self) -> bool {
         self.finished
     }
@@ -94,7 +94,7 @@ impl MemoryRecorder {
 /// Checks that `block` fits `schema`.
 ///
 /// # Errors
-/// Names the first column that does not fit.
+/// When a column does not fit; the error names the first one.
 pub fn check_block(schema: &TableSchema, block: &[Values]) -> Result<(), RecordError> {
     let wrong = |cause: String| Err(RecordError::new(&schema.name, cause));
     if block.len() != schema.columns.len() {
@@ -115,7 +115,7 @@ pub fn check_block(schema: &TableSchema, block: &[Values]) -> Result<(), RecordE
         if !spec.is_nullable && values.valid().is_some() {
             return wrong(format!("column `{}` has missing values", spec.name));
         }
-        // The maximum, not the first wrong one: this runs for every row of a recorded run.
+        // The maximum, not the first wrong one, because this runs for every row of a recorded run.
         if let Values::Label(indices) = values
             && let Some(bad) = indices.iter().max().filter(|&&i| i as usize >= spec.labels.len())
         {
@@ -142,7 +142,7 @@ impl Recorder for MemoryRecorder {
     }
 }
 
-/// The schema that [`conformance`] writes to: create the recorder under test with it.
+/// Returns the schemas that [`conformance`] writes to: create the recorder under test with them.
 pub fn conformance_schemas() -> Vec<TableSchema> {
     let column = |name: &str, ty| ColumnSpec::new(name, ty, &format!("test column {name}"));
     let event = ColumnSpec::label("event", "test column event", ["contact", "trip"]);
@@ -163,14 +163,14 @@ pub fn conformance_schemas() -> Vec<TableSchema> {
     ]
 }
 
-/// A table's column, both by index, after the recording is finished.
+/// A function that returns a table's column, both by index, after the recording is finished.
 pub type ReadBack = Box<dyn Fn(usize, usize) -> Values>;
 
-/// What every [`Recorder`] must hold to. `recorder` is fresh, made with
-/// [`conformance_schemas`]; `read_back` opens what the finished recorder has stored.
+/// Checks the guarantees of a [`Recorder`]. `recorder` is fresh, made with [`conformance_schemas`];
+/// `read_back` opens the finished recording.
 ///
 /// # Panics
-/// When a promise is broken.
+/// When a guarantee is broken.
 pub fn conformance<R: Recorder>(mut recorder: R, read_back: impl FnOnce(R) -> ReadBack) {
     recorder.append(0, &first_block(10)).expect("a block that fits is stored");
     recorder.append(1, &second_block()).expect("tables are independent");

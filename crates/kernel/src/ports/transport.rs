@@ -1,9 +1,8 @@
 //! Messages between agents, in lockstep with the cycle.
 //!
-//! An agent sends envelopes in one cycle and receives, in a later one, what reached it,
-//! sorted by (cycle, sender, sequence), so that the order of arrival never matters
-//! (promise D2). The in-memory version can lose, delay and duplicate, all drawn from the
-//! run's streams.
+//! An agent sends envelopes in one cycle and receives those that reached it in a later one, sorted
+//! by (cycle, sender, sequence), so that the order of arrival never matters (promise D2). The
+//! in-memory version can lose, delay and duplicate messages, all drawn from the run's streams.
 
 use crate::distr::Chance;
 use crate::stream::{Purpose, Streams};
@@ -16,11 +15,11 @@ use std::collections::BTreeMap;
 pub struct Envelope {
     /// Cycle in which it was sent.
     pub cycle: Cycle,
-    /// Who sent it.
+    /// The sender.
     pub sender: EntityId,
     /// Number of the message among the sender's in that cycle.
     pub sequence: u32,
-    /// Whom it is for.
+    /// The receiver.
     pub receiver: EntityId,
     /// The content, serialized.
     pub payload: Vec<u8>,
@@ -28,21 +27,22 @@ pub struct Envelope {
 
 /// Delivers envelopes.
 pub trait Transport {
-    /// Takes a message; it may be received from the next cycle on.
+    /// Sends a message, which may be received from the next cycle on.
     fn send(&mut self, envelope: Envelope);
 
-    /// What has reached `receiver` by cycle `now` and was not received before, sorted.
+    /// Returns the messages that have reached `receiver` by cycle `now` and were not received
+    /// before, sorted.
     fn receive(&mut self, receiver: EntityId, now: Cycle) -> Vec<Envelope>;
 }
 
-/// What may go wrong on the way; the default is a faultless network.
+/// The faults of a network; the default is a network without any.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Faults {
     /// Probability that a message is lost.
     pub loss: f64,
     /// Probability that a message arrives twice.
     pub duplication: f64,
-    /// A message takes 1 cycle and up to this many more, uniformly.
+    /// The maximum of additional cycles that a message takes, beyond 1; drawn uniformly.
     pub max_delay_cycles: u32,
 }
 
@@ -52,7 +52,7 @@ impl Default for Faults {
     }
 }
 
-/// The in-memory transport; counts what it carries.
+/// The in-memory transport, which counts the messages it carries.
 #[derive(Debug)]
 pub struct MemoryTransport {
     streams: Streams,
@@ -67,12 +67,12 @@ pub struct MemoryTransport {
 }
 
 impl MemoryTransport {
-    /// An empty network with these faults, drawn for `purpose`.
+    /// Creates an empty network with these faults, drawn for `purpose`.
     pub fn new(streams: Streams, purpose: Purpose, faults: Faults) -> Self {
         Self { streams, purpose, faults, waiting: BTreeMap::new(), messages: 0, bytes: 0 }
     }
 
-    /// The first cycle in which anything arrives.
+    /// Returns the first cycle in which a message arrives.
     pub fn next_arrival(&self) -> Option<Cycle> {
         self.waiting.keys().map(|&(_, at)| at).min()
     }
@@ -110,10 +110,10 @@ impl Transport for MemoryTransport {
     }
 }
 
-/// What every faultless [`Transport`] must hold to.
+/// Checks the guarantees of a faultless [`Transport`].
 ///
 /// # Panics
-/// When a promise is broken.
+/// When a guarantee is broken.
 pub fn conformance(transport: &mut impl Transport) {
     let envelope = |cycle, sender, sequence, receiver| Envelope {
         cycle,

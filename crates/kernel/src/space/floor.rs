@@ -1,27 +1,27 @@
-//! Who stands in each box of a grid, or claims it: one word per box, and no lock.
+//! The occupants and claimants of the boxes of a grid: one word per box, and no lock.
 //!
-//! A box is free, a wall, or has a body standing in it. Bodies that may come to a free box
-//! write a *claim* into it, an ordinary store; where several do, the last writer stays. To
-//! whoever perceives, a claimed box is a free one. After a barrier every body reads its boxes
-//! again: any other body's number, of one that stands there or of one that claims, means a
-//! conflict with that body. All claimants of a box thus meet in its last writer, whoever that
-//! was, so the connected components are the same for every order of stores.
+//! A box is free, a wall, or has a body standing in it. Bodies that may move into a free box write
+//! a *claim* into it, an ordinary store; where several do, the last writer stays. For perception a
+//! claimed box is a free one. After a barrier every body reads its boxes again: the number of any
+//! other body, whether it stands there or claims the box, means a conflict with that body. All
+//! claimants of a box thus meet in its last writer, whichever that was, so the connected components
+//! are the same for every order of stores.
 //!
-//! Claims are not taken back: a claim of an earlier cycle is only ever read by a body that
+//! Claims are not withdrawn, because a claim of an earlier cycle is only ever read by a body that
 //! has written its own over it.
 
 use crate::column::{Column, Word};
 use crate::units::Slot;
 use std::ops::BitAnd;
 
-/// What a box holds, in one word. The highest bit says that nothing stands there, so the
+/// The content of a box in one word. The highest bit says that nothing stands there, so the bitwise
 /// conjunction of several boxes is free when all are.
 pub trait BoxWord: Word + Eq + BitAnd<Output = Self> {
-    /// Nothing stands here, nobody claims it.
+    /// Nothing stands here, and no body claims it.
     const FREE: Self;
-    /// Here stands a wall.
+    /// A wall stands here.
     const WALL: Self;
-    /// Bodies that can be told apart.
+    /// The number of bodies that can be distinguished.
     const MAX_BODIES: usize;
     /// The body in `slot` stands here.
     fn standing(slot: Slot) -> Self;
@@ -29,8 +29,8 @@ pub trait BoxWord: Word + Eq + BitAnd<Output = Self> {
     fn claimed(slot: Slot) -> Self;
     /// Whether nothing stands here.
     fn is_free(self) -> bool;
-    /// The slot of the body that stands here or claims it; of no body for a wall or where
-    /// nobody claims.
+    /// The slot of the body that stands here or claims it; an invalid slot for a wall or an
+    /// unclaimed box.
     fn slot(self) -> Slot;
 }
 
@@ -67,11 +67,11 @@ box_word! { u32 }
 pub enum Floor {
     /// For up to 32,767 bodies.
     Narrow(Column<u16>),
-    /// For more.
+    /// For more bodies.
     Wide(Column<u32>),
 }
 
-/// What stands in a box.
+/// The occupant of a box.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Occupant {
     /// Nothing.
@@ -83,8 +83,8 @@ pub enum Occupant {
 }
 
 impl Floor {
-    /// A floor for `bodies` bodies, none of which stands on it yet; one entry of `walls` per
-    /// box.
+    /// Creates a floor for `bodies` bodies, none of which stands on it yet; `walls` has one entry
+    /// per box.
     pub fn new(walls: impl Iterator<Item = bool>, bodies: usize) -> Self {
         fn column<T: BoxWord>(walls: impl Iterator<Item = bool>) -> Column<T> {
             walls.map(|wall| if wall { T::WALL } else { T::FREE }).collect()
@@ -96,7 +96,7 @@ impl Floor {
         }
     }
 
-    /// What stands in the box with this index.
+    /// Returns the occupant of the box with this index.
     pub fn occupant(&self, index: usize) -> Occupant {
         fn of<T: BoxWord>(word: T) -> Occupant {
             match word {
@@ -111,7 +111,7 @@ impl Floor {
         }
     }
 
-    /// Lets the body in `slot` stand in the box with this index.
+    /// Places the body in `slot` on the box with this index.
     pub fn stand(&self, index: usize, slot: Slot) {
         match self {
             Self::Narrow(boxes) => boxes.set(index, BoxWord::standing(slot)),

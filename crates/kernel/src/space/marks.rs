@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 pub struct Marks(Box<[AtomicU64]>);
 
 impl Marks {
-    /// None of `boxes` boxes.
+    /// Creates an empty set for `boxes` boxes.
     pub fn none(boxes: usize) -> Self {
         Self((0..boxes.div_ceil(64)).map(|_| AtomicU64::new(0)).collect())
     }
@@ -18,12 +18,13 @@ impl Marks {
         self.0[index / 64].load(Relaxed) >> (index % 64) & 1 == 1
     }
 
-    /// Marks a box, and says whether it was not marked before. Workers may mark boxes at the
-    /// same time; of those who mark the same one, one is told so.
+    /// Marks a box, and returns whether it was unmarked before. Workers may mark boxes at the same
+    /// time; of several that mark the same box, exactly one gets `true`.
     #[inline]
     pub fn insert(&self, index: usize) -> bool {
         let (word, bit) = (&self.0[index / 64], 1 << (index % 64));
-        // Almost always it is marked already, and looking is far cheaper than exchanging.
+        // Read first, because the box is almost always marked already and a load is far cheaper
+        // than an atomic exchange.
         word.load(Relaxed) & bit == 0 && word.fetch_or(bit, Relaxed) & bit == 0
     }
 

@@ -1,4 +1,4 @@
-//! Where things are on a grid: positions, who stands in or claims which box, marked boxes.
+//! Places on a grid: positions, the occupants and claimants of boxes, marked boxes.
 
 pub mod floor;
 pub mod marks;

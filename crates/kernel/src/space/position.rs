@@ -5,14 +5,14 @@
 pub struct Position(u32);
 
 impl Position {
-    /// The box in this column and row.
+    /// Creates the position in this column and row.
     #[inline(always)]
     pub fn new(col: u32, row: u32) -> Self {
         debug_assert!(col < 1 << 16 && row < 1 << 16);
         Self(row << 16 | col)
     }
 
-    /// From the word of [`Position::word`].
+    /// Creates a position from the word of [`Position::word`].
     #[inline(always)]
     pub fn from_word(word: u32) -> Self {
         Self(word)
@@ -42,12 +42,12 @@ impl Position {
         self.row() * width + self.col()
     }
 
-    /// The position of an index of such a grid.
+    /// Returns the position of an index in such a grid.
     pub fn from_index(index: u32, width: u32) -> Self {
         Self::new(index % width, index / width)
     }
 
-    /// The box `dx` columns east and `dy` rows north; the caller knows that it exists.
+    /// Returns the box `dx` columns east and `dy` rows north; the caller makes sure that it exists.
     #[inline(always)]
     pub fn offset(self, dx: i32, dy: i32) -> Self {
         Self::new(self.col().wrapping_add_signed(dx), self.row().wrapping_add_signed(dy))

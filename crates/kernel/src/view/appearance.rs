@@ -1,11 +1,11 @@
-//! How kinds of things look: one table for pictures, films and recordings for viewers.
+//! The look of each kind of body: one table for pictures, films and recordings for viewers.
 
 use super::body::{Body, Condition, Kind};
 
-/// Red, green, blue.
+/// Red, green and blue, 0 to 255 each.
 pub type Color = [u8; 3];
 
-/// Colors by which numbered bodies are told apart: Okabe and Ito's, without yellow and black.
+/// Colors that distinguish numbered bodies: Okabe and Ito's, without yellow and black.
 pub const COLORS: [Color; 6] = [
     [0x00, 0x72, 0xB2],
     [0xD5, 0x5E, 0x00],
@@ -14,37 +14,37 @@ pub const COLORS: [Color; 6] = [
     [0xE6, 0x9F, 0x00],
     [0x56, 0xB4, 0xE9],
 ];
-/// Walls and what else stands still.
+/// Color of walls and everything else that stands still.
 pub const WALL: Color = [0x3C, 0x3C, 0x3C];
-/// What nobody has mapped.
+/// Color of boxes that nobody has mapped.
 pub const UNKNOWN: Color = [0xED, 0xEB, 0xE6];
-/// Things that move but do not act.
+/// Color of things that move but do not act.
 pub const MOBILE: Color = [0xA6, 0xA6, 0xA6];
-/// Doors.
+/// Color of doors.
 pub const DOOR: Color = [0x8B, 0x5A, 0x2B];
-/// What should not be.
+/// Color of collisions and other errors.
 pub const ALERT: Color = [0xD0, 0x10, 0x10];
 
-/// What a body looks like, beside its shape.
+/// The look of a body, apart from its shape.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Appearance {
     /// Its color.
     pub color: Color,
-    /// 0 to be seen through entirely, 1 for not at all.
+    /// From 0 (fully transparent) to 1 (opaque).
     pub opacity: f64,
-    /// Seen from above, things of a higher layer cover those of a lower one.
+    /// The drawing order: seen from above, higher layers cover lower ones.
     pub layer: u8,
     /// Its line in a legend; empty for agents, which have names of their own.
     pub words: &'static str,
 }
 
-/// The color of the things of this number.
+/// Returns the color of the body with this number.
 pub fn color_of(number: u32) -> Color {
     COLORS[number as usize % COLORS.len()]
 }
 
 impl Body {
-    /// What it looks like in a world of so many dimensions.
+    /// Returns its look in a world with this number of dimensions.
     pub fn appearance(&self, dimensions: u8) -> Appearance {
         let (color, opacity) = self.color(dimensions);
         let layer = match self.kind {
@@ -59,7 +59,7 @@ impl Body {
 
     fn color(&self, dimensions: u8) -> (Color, f64) {
         let own = color_of(self.number);
-        // In space an obstacle would hide what is behind it.
+        // In space an opaque obstacle would hide everything behind it.
         let opacity = if dimensions == 2 { 1.0 } else { 0.22 };
         match (self.kind, self.state) {
             (Kind::Zone, Condition::Touching) => (ALERT, 0.4),

@@ -1,4 +1,4 @@
-//! Bodies: what they are, where, and what they look like.
+//! Bodies: kind, pose, shape and condition.
 
 use super::pose::{Place, Pose};
 use serde::{Deserialize, Serialize};
@@ -10,24 +10,24 @@ pub type Who = (Kind, u32, Option<u32>);
 /// Something that can be seen.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Body {
-    /// What it is.
+    /// Its kind.
     pub kind: Kind,
-    /// Which one of its kind.
+    /// Its number among the bodies of its kind.
     pub number: u32,
-    /// Which part of it, of things that have parts.
+    /// Its part, where the thing has parts.
     pub part: Option<u32>,
-    /// Where it is and where it looks.
+    /// Its position and orientation.
     pub pose: Pose,
-    /// What it looks like.
+    /// Its shape.
     pub shape: Shape,
-    /// How it is.
+    /// Its condition.
     pub state: Condition,
-    /// Where it is carried, of things that do not act; zero for those that stand still.
+    /// The velocity of a thing that is moved without acting; zero for all that stand still.
     pub velocity_m_s: Place,
 }
 
 impl Body {
-    /// A body without parts, in order.
+    /// Creates a body without parts, in plain condition.
     pub fn new(kind: Kind, number: u32, pose: Pose, shape: Shape) -> Self {
         Self {
             kind,
@@ -40,35 +40,35 @@ impl Body {
         }
     }
 
-    /// The same as a part of a larger thing.
+    /// Returns the same body as a part of a larger thing.
     #[must_use]
     pub fn part(self, part: u32) -> Self {
         Self { part: Some(part), ..self }
     }
 
-    /// The same in another condition, if `is_so`.
+    /// Returns the same body in another condition, if `is_so`.
     #[must_use]
     pub fn when(self, is_so: bool, state: Condition) -> Self {
         if is_so { Self { state, ..self } } else { self }
     }
 
-    /// The same, carried along.
+    /// Returns the same body with a velocity.
     #[must_use]
     pub fn moving(self, velocity_m_s: Place) -> Self {
         Self { velocity_m_s, ..self }
     }
 
-    /// Whether it is carried along.
+    /// Whether it has a velocity.
     pub fn moves(&self) -> bool {
         self.velocity_m_s != [0.0; 3]
     }
 
-    /// Which body it is.
+    /// Returns its identity.
     pub fn who(&self) -> Who {
         (self.kind, self.number, self.part)
     }
 
-    /// A name that it keeps during the run, such as `robot/3` or `connector/0/7`.
+    /// Returns a name that it keeps during the run, such as `robot/3` or `connector/0/7`.
     pub fn name(&self) -> String {
         match self.part {
             Some(part) => format!("{}/{}/{part}", self.kind, self.number),
@@ -77,13 +77,13 @@ impl Body {
     }
 }
 
-/// Kinds of things.
+/// Kinds of bodies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
     /// A robot.
     Robot,
-    /// A person, or something else that walks about.
+    /// A person, or another pedestrian.
     Person,
     /// A door.
     Door,
@@ -93,13 +93,13 @@ pub enum Kind {
     Rods,
     /// An airplane.
     Airplane,
-    /// What is to be kept free around an airplane.
+    /// The zone around an airplane that is to be kept free.
     Zone,
-    /// Something in the way.
+    /// An obstacle.
     Obstacle,
-    /// A place to go to.
+    /// A destination.
     Goal,
-    /// A place to come from.
+    /// A starting place.
     Start,
 }
 
@@ -120,7 +120,7 @@ impl Kind {
         }
     }
 
-    /// Whether it acts: what a table of trajectories is about.
+    /// Whether it is an agent: the subject of a table of trajectories.
     pub fn is_agent(self) -> bool {
         matches!(self, Self::Robot | Self::Connector | Self::Airplane)
     }
@@ -132,53 +132,53 @@ impl fmt::Display for Kind {
     }
 }
 
-/// How a body is.
+/// The condition of a body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Condition {
     /// Nothing special.
     Plain,
-    /// Open, of doors.
+    /// Open (doors).
     Open,
-    /// Touches something, or is too near to somebody.
+    /// In contact with something, or too close to another agent.
     Touching,
-    /// Does not work any more.
+    /// Out of order.
     Failed,
 }
 
-/// What a body looks like, around its pose.
+/// The shape of a body, around its pose.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase", tag = "type")]
 pub enum Shape {
     /// A box.
     Cuboid {
-        /// Its extent along its axes.
+        /// Its extent along its axes, in meters.
         size_m: Place,
     },
     /// An upright cylinder.
     Cylinder {
-        /// Its radius.
+        /// Its radius, in meters.
         radius_m: f64,
-        /// Its extent along its third axis.
+        /// Its extent along its third axis, in meters.
         height_m: f64,
     },
     /// A ball.
     Sphere {
-        /// Its radius.
+        /// Its radius, in meters.
         radius_m: f64,
     },
-    /// A line from point to point; the points are those of the world, whatever the pose.
+    /// A polyline; its points are in the frame of the world, whatever the pose.
     Line {
-        /// Its points.
+        /// Its points, in meters.
         points_m: Vec<Place>,
-        /// How thick it is; 0 for as thin as can be drawn.
+        /// Its thickness in meters; 0 for the thinnest line that can be drawn.
         thickness_m: f64,
     },
     /// An arrowhead along its first axis.
     Dart {
-        /// From tail to tip.
+        /// From tail to tip, in meters.
         length_m: f64,
-        /// Across.
+        /// Width, in meters.
         width_m: f64,
     },
 }

@@ -1,43 +1,43 @@
-//! What happened, for those who look on.
+//! The events of a run, for viewers.
 
 use crate::units::Cycle;
 use serde::{Deserialize, Serialize};
 
-/// Something that happened.
+/// An event.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Entry {
     /// The cycle in which it happened.
     pub cycle: Cycle,
-    /// How bad it is.
+    /// Its severity.
     pub level: Level,
-    /// To whom: the name of a body.
+    /// The name of the body it happened to.
     pub who: String,
-    /// What, in words.
+    /// The event in words.
     pub words: String,
 }
 
-/// How bad something is.
+/// The severity of an event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Level {
-    /// As it should be.
+    /// Normal.
     Info,
     /// Worth a look.
     Warning,
-    /// What the run is meant to avoid.
+    /// An event that the run is meant to avoid.
     Error,
 }
 
-/// Events kept for the next frame, up to a number; later ones are counted.
+/// Events kept for the next frame, up to a maximum; further ones are only counted.
 #[derive(Debug, Clone)]
 pub struct Log<E> {
     events: Vec<E>,
     left_out: u64,
-    /// Whether anybody watches.
+    /// Whether events are kept, because somebody watches.
     pub is_kept: bool,
 }
 
-/// More events than this between two frames are only counted.
+/// The maximum number of events between two frames; further ones are only counted.
 const MOST_EVENTS: usize = 10_000;
 
 impl<E> Default for Log<E> {
@@ -47,7 +47,7 @@ impl<E> Default for Log<E> {
 }
 
 impl<E> Log<E> {
-    /// Keeps an event, if anybody watches.
+    /// Keeps an event, if somebody watches.
     pub fn push(&mut self, event: E) {
         if !self.is_kept {
             return;
@@ -58,7 +58,7 @@ impl<E> Log<E> {
         }
     }
 
-    /// All events since the last call, and how many were left out.
+    /// Takes all events since the last call, and the number of those that were left out.
     pub fn take(&mut self) -> (Vec<E>, u64) {
         (std::mem::take(&mut self.events), std::mem::take(&mut self.left_out))
     }

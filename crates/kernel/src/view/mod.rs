@@ -1,8 +1,8 @@
-//! What can be seen of a run, whatever its world: scenery that stays, and frames that come and go.
+//! The visible part of a run, whatever its world: constant scenery, and frames of single moments.
 //!
 //! Recordings for viewers, films and live pages draw from this and nothing else. A frame is
-//! computed from the state when somebody asks; looking never changes a run. Lengths are meters,
-//! x runs east, y north and z up; angles are radians, counter-clockwise.
+//! computed from the state on request; looking never changes a run. Lengths are meters, x runs
+//! east, y north and z up; angles are radians, counterclockwise.
 
 mod appearance;
 mod body;
@@ -19,20 +19,20 @@ pub use trails::{Axis, PlaceRows, Trail, corner};
 use crate::units::Cycle;
 use serde::{Deserialize, Serialize};
 
-/// What stays as it is during a run.
+/// Everything that stays as it is during a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Scenery {
     /// The scenario's name.
     pub name: String,
-    /// 2 where all lies in a plane, else 3.
+    /// 2 where everything lies in a plane, else 3.
     pub dimensions: u8,
-    /// Seconds that a cycle stands for.
+    /// Simulated seconds per cycle.
     pub cycle_s: f64,
     /// The floor, where it is known box by box.
     pub floor: Option<Floor>,
-    /// Walls, obstacles that stand still, places to go to.
+    /// Walls, obstacles that stand still, starts and goals.
     pub bodies: Vec<Body>,
-    /// Names of things that have one of their own, by kind and number.
+    /// Names of bodies that have their own, by kind and number.
     pub names: Vec<(Kind, u32, String)>,
 }
 
@@ -43,15 +43,15 @@ pub struct Floor {
     pub width: u32,
     /// Boxes from south to north.
     pub height: u32,
-    /// Side of a box.
+    /// Side of a box, in meters.
     pub box_m: f64,
-    /// The lower-left corner of the first box.
+    /// The lower-left corner of the first box, in meters.
     pub origin_m: [f64; 2],
-    /// What is in each box, row by row from the south.
+    /// The content of each box, row by row from the south.
     pub boxes: Vec<Occupancy>,
 }
 
-/// What a box of the floor is.
+/// The content of a box of the floor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Occupancy {
@@ -59,58 +59,58 @@ pub enum Occupancy {
     Free,
     /// A wall.
     Wall,
-    /// Nobody has seen it.
+    /// Nobody has mapped it.
     Unknown,
 }
 
-/// The present moment.
+/// The bodies, scans and events of one moment.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Frame {
-    /// Cycles done: this is how things are at the beginning of this cycle.
+    /// Cycles done: the frame shows the start of this cycle.
     pub cycle: Cycle,
     /// Simulated seconds since the start.
     pub time_s: f64,
-    /// Everything that can move, in an order that stays.
+    /// Everything that can move, in an order that is the same in all frames.
     pub bodies: Vec<Body>,
-    /// What sensors see just now.
+    /// The present readings of sensors.
     pub scans: Vec<Scan>,
-    /// What happened since the frame before, by time.
+    /// The events since the frame before, by time.
     pub log: Vec<Entry>,
     /// Entries that were left out because there were too many.
     pub log_left_out: u64,
 }
 
-/// How much a frame is to hold.
+/// The options of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Look {
-    /// Scans of at most so many bodies; reading sensors costs as much as simulating them.
+    /// The maximum number of bodies with scans; reading sensors costs as much as simulating them.
     pub scanning_bodies: usize,
 }
 
 impl Look {
-    /// Bodies and events.
+    /// A frame with bodies and events, without scans.
     pub const BODIES: Self = Self { scanning_bodies: 0 };
 }
 
-/// Ranges all around, or in a part of it.
+/// Ranges of one sensor, all around or in a sector.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Scan {
-    /// Whose: kind, number and part of a body of the frame.
+    /// The body with the sensor: kind, number and part.
     pub of: Who,
     /// The sensor's name.
     pub sensor: String,
-    /// Where the sensor is and where its bearing 0 looks.
+    /// The sensor's position, and the direction of its bearing 0.
     pub pose: Pose,
-    /// Bearing of each beam.
+    /// Bearing of each beam, in radians.
     pub bearings_rad: Vec<f64>,
-    /// How far each sees, from the pose; infinite where there is nothing in range.
+    /// Range of each beam in meters, from the pose; infinite where there is nothing in range.
     pub ranges_m: Vec<f64>,
-    /// The farthest that it can see.
+    /// The maximum range, in meters.
     pub range_m: f64,
 }
 
 impl Scan {
-    /// The name of the body with the sensor, then the sensor's.
+    /// Returns the name of the body with the sensor, followed by the sensor's.
     pub fn name(&self) -> String {
         let (kind, number, part) = self.of;
         let of = match part {

@@ -1,38 +1,38 @@
-//! Where bodies are and how they are turned.
+//! Positions and orientations of bodies.
 
 use serde::{Deserialize, Serialize};
 
-/// A place in space; worlds of the plane have height 0.
+/// A place in space, in meters; worlds of the plane have height 0.
 pub type Place = [f64; 3];
 
-/// Position and orientation of a body's middle.
+/// Position and orientation of a body's center.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Pose {
-    /// Where it is.
+    /// The position, in meters.
     pub at_m: Place,
-    /// How it is turned: a unit quaternion x, y, z, w.
+    /// The orientation: a unit quaternion x, y, z, w.
     pub turn: [f64; 4],
 }
 
 impl Pose {
-    /// Somewhere, looking along x.
+    /// Creates a pose at a place, facing along x.
     pub fn at(at_m: Place) -> Self {
         Self { at_m, turn: [0.0, 0.0, 0.0, 1.0] }
     }
 
-    /// Somewhere, turned about the upright axis.
+    /// Creates a pose at a place, turned about the vertical axis.
     pub fn heading(at_m: Place, heading_rad: f64) -> Self {
         let half = 0.5 * heading_rad;
         Self { at_m, turn: [0.0, 0.0, crate::math::sin(half), crate::math::cos(half)] }
     }
 
-    /// Somewhere, with these unit vectors, at right angles to each other and right-handed, as its
-    /// axes.
+    /// Creates a pose at a place with these unit vectors as its axes; they must be perpendicular to
+    /// each other and right-handed.
     pub fn axes(at_m: Place, axes: [Place; 3]) -> Self {
         // Entry [row][column] of the rotation is axes[column][row].
         let m = |row: usize, column: usize| axes[column][row];
         let trace = m(0, 0) + m(1, 1) + m(2, 2);
-        // The largest of the four components is computed first: the others divide by it.
+        // The largest of the four components is computed first, because the others divide by it.
         let largest = (0..3).max_by(|&a, &b| m(a, a).total_cmp(&m(b, b))).unwrap_or(0);
         let turn = if trace > m(largest, largest) {
             let w4 = 2.0 * (1.0 + trace).max(0.0).sqrt();
@@ -51,7 +51,7 @@ impl Pose {
         Self { at_m, turn }
     }
 
-    /// A vector of the body in the world.
+    /// Rotates a vector from the frame of the body into that of the world.
     pub fn turned(&self, [x, y, z]: Place) -> Place {
         let [qx, qy, qz, w] = self.turn;
         // v + 2 q x (q x v + w v)
@@ -63,7 +63,7 @@ impl Pose {
         ]
     }
 
-    /// A point of the body in the world.
+    /// Transforms a point from the frame of the body into that of the world.
     pub fn place(&self, of_body: Place) -> Place {
         let turned = self.turned(of_body);
         std::array::from_fn(|i| self.at_m[i] + turned[i])

@@ -1,4 +1,4 @@
-//! The ways that bodies have gone, and how rows of recorded tables tell them.
+//! The trails of bodies, and the recorded rows that they are made of.
 
 use super::body::{Body, Kind, Shape, Who};
 use super::pose::Place;
@@ -10,18 +10,18 @@ use std::collections::BTreeMap;
 /// The way that a body has gone.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trail {
-    /// Whose way it is.
+    /// The body.
     pub of: Who,
-    /// Where its middle was at the beginning of a cycle, the earliest first.
+    /// The places of its center at the start of cycles, the earliest first.
     pub way: Vec<(Cycle, Place)>,
 }
 
 /// Rows of a recorded table as places of bodies.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlaceRows {
-    /// Name of the table; its column `cycle` says when.
+    /// Name of the table; its column `cycle` has the cycle of each row.
     pub table: &'static str,
-    /// What the bodies are.
+    /// The kind of the bodies.
     pub kind: Kind,
     /// The column with their numbers.
     pub number: &'static str,
@@ -30,35 +30,35 @@ pub struct PlaceRows {
     /// Columns with the coordinates x, y and perhaps z.
     pub axes: Vec<Axis>,
     /// Whether the places are those of a body's corner with the lowest coordinates, not those of
-    /// its middle.
+    /// its center.
     pub is_corner: bool,
-    /// The column with headings in quarter turns from east, of bodies that go straight ahead
-    /// before they slip to a side.
+    /// The column with headings in quarter turns from east, of bodies that go straight ahead before
+    /// they slip to a side.
     pub ahead: Option<&'static str>,
     /// Cycles between two rows of a body.
     pub every: Cycle,
-    /// So many cycles before the present are worth showing.
+    /// Number of cycles before the present that are worth showing.
     pub worth: Cycle,
 }
 
-/// A column with coordinates: meters are `offset_m` and the value times `scale_m`.
+/// A column with coordinates: a coordinate in meters is `offset_m` plus the value times `scale_m`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Axis {
     /// Its name.
     pub column: &'static str,
-    /// Meters of a step of 1.
+    /// Meters per unit of the value.
     pub scale_m: f64,
-    /// Where the value 0 is.
+    /// The coordinate of the value 0, in meters.
     pub offset_m: f64,
 }
 
-/// A row: when, where, and the heading in quarter turns.
+/// A row: the cycle, the place, and the heading in quarter turns.
 type Row = (Cycle, Place, Option<u32>);
 
 impl PlaceRows {
-    /// The ways of some bodies up to the moment of a frame, from the columns of the table;
-    /// `None` where it has other columns. Those whose rows end before that moment, though they are
-    /// still there, have no way: it would leap.
+    /// Returns the trails of some bodies up to the moment of a frame, from the columns of the
+    /// table; `None` where it has other columns. A body whose rows end before that moment, though
+    /// it is still there, has no trail, because its trail would leap.
     pub fn trails<'a>(
         &self,
         scenery: &Scenery,
@@ -75,7 +75,7 @@ impl PlaceRows {
         Some(rows.into_iter().filter_map(trail).collect())
     }
 
-    /// The rows of some bodies before a cycle.
+    /// Returns the rows of some bodies before a cycle.
     fn rows<'a>(
         &self,
         before: Cycle,
@@ -88,7 +88,7 @@ impl PlaceRows {
             _ => None,
         };
         let numbers = words(self.number)?;
-        // A column that is asked for and not there makes it another table.
+        // A table that lacks a column asked for is another table.
         let parts = self.part.map(|name| words(name).ok_or(())).transpose().ok()?;
         let ahead = self.ahead.map(|name| words(name).ok_or(())).transpose().ok()?;
         let axes = self.axes.iter().map(|axis| Some((axis, column(axis.column)?)));
@@ -127,7 +127,7 @@ impl PlaceRows {
         let middle = |at: Place| -> Place {
             std::array::from_fn(|k| match k < self.axes.len() {
                 true => at[k] + half_m[k],
-                // A height that is not recorded.
+                // The table has no heights, so the body's own is taken.
                 false => like.map_or(0.0, |body| body.pose.at_m[k]),
             })
         };
@@ -152,14 +152,14 @@ fn number(values: &Values, row: usize) -> Option<f64> {
 }
 
 impl Axis {
-    /// A column that is in meters already.
+    /// Creates the axis of a column that is in meters already.
     pub fn meters(column: &'static str) -> Self {
         Self { column, scale_m: 1.0, offset_m: 0.0 }
     }
 }
 
-/// Where a body is between two places, if it has gone ahead before it slipped to a side: in the
-/// heading, in quarter turns from east, in which it left the first one.
+/// Returns the place between two others where a body was if it went ahead before it slipped to a
+/// side: `quarters` is the heading, in quarter turns from east, in which it left the first one.
 pub fn corner(from: Place, quarters: u32, to: Place) -> Place {
     if quarters.is_multiple_of(2) { [to[0], from[1], from[2]] } else { [from[0], to[1], from[2]] }
 }

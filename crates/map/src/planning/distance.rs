@@ -1,8 +1,8 @@
-//! Steps to the nearest goal, by breadth-first search.
+//! Number of steps to the nearest goal, by breadth-first search.
 
 use super::{FreeSpace, STEPS};
 
-/// How many 4-connected steps every box of a grid is away from the nearest goal.
+/// The number of 4-connected steps from every box of a grid to the nearest goal.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Distances {
     width: u32,
@@ -14,9 +14,9 @@ pub struct Distances {
 impl Distances {
     pub(super) const UNREACHED: u32 = u32::MAX;
 
-    /// Distances to the nearest of `goals` (column, row) for a body of `size` x `size` boxes that
-    /// has to fit into `free` on its way; boxes and goals mean its lower-left box. Goals where
-    /// the body does not fit do not count.
+    /// Computes the distances to the nearest of `goals` (column, row) for a body of `size` x `size`
+    /// boxes that has to fit into `free` on its way; boxes and goals mean its lower-left box. Goals
+    /// where the body does not fit do not count.
     ///
     /// # Panics
     /// When `size` is 0.
@@ -24,7 +24,7 @@ impl Distances {
         Self::between_anchors(&free.anchors(size), goals)
     }
 
-    /// Distances in the space of a body's anchors.
+    /// Computes the distances in the space of a body's anchors.
     pub(super) fn between_anchors(anchors: &FreeSpace, goals: &[(u32, u32)]) -> Self {
         let mut distances = Self {
             width: anchors.width(),
@@ -40,7 +40,7 @@ impl Distances {
         distances
     }
 
-    /// Steps from a box to the nearest goal, or `None` where no way leads to one.
+    /// Returns the steps from a box to the nearest goal, or `None` where no path leads to one.
     pub fn steps(&self, col: u32, row: u32) -> Option<u32> {
         if col >= self.width || row >= self.height {
             return None;
@@ -49,22 +49,22 @@ impl Distances {
         (steps != Self::UNREACHED).then_some(steps)
     }
 
-    /// The most steps that any box with a way to a goal is away; `None` without a goal.
+    /// Returns the largest number of steps of any box with a path to a goal; `None` without a goal.
     pub fn max(&self) -> Option<u32> {
         self.steps.iter().copied().filter(|&steps| steps != Self::UNREACHED).max()
     }
 
-    /// Columns of the grid.
+    /// Number of columns of the grid.
     pub fn width(&self) -> u32 {
         self.width
     }
 
-    /// Rows of the grid.
+    /// Number of rows of the grid.
     pub fn height(&self) -> u32 {
         self.height
     }
 
-    /// Steps of all boxes, row by row from the bottom.
+    /// Returns the steps of all boxes, row by row from the bottom.
     pub(super) fn all(&self) -> &[u32] {
         &self.steps
     }
@@ -82,7 +82,7 @@ impl Distances {
         queue
     }
 
-    /// Gives the unreached neighbors of a box their distance and puts them into the queue.
+    /// Sets the distance of the unreached neighbors of a box and adds them to the queue.
     fn spread(&mut self, anchors: &FreeSpace, (col, row): (u32, u32), queue: &mut Vec<(u32, u32)>) {
         let steps = self.steps[anchors.index(col, row)] + 1;
         for (east, north) in STEPS {

@@ -1,12 +1,11 @@
-//! The way to the nearest goal from everywhere, in half a byte per box.
+//! The direction to the nearest goal from every box, in half a byte per box.
 
 use super::{Distances, FreeSpace, STEPS};
 
-/// For every box of a grid the first step of a shortest 4-connected way to the nearest goal.
+/// The first step of a shortest 4-connected path to the nearest goal, for every box of a grid.
 ///
-/// Of several shortest ways it takes the one whose step has the lowest direction (0 east,
-/// 1 north, 2 west, 3 south), so it depends neither on the order of the goals nor on that of
-/// the search.
+/// Of several shortest paths it takes the one whose step has the lowest direction (0 east, 1 north,
+/// 2 west, 3 south), so it depends neither on the order of the goals nor on that of the search.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FlowField {
     width: u32,
@@ -17,12 +16,12 @@ pub struct FlowField {
 
 /// Code of a goal; the codes below are directions.
 const GOAL: u8 = 4;
-/// Code of a box without a way to a goal.
+/// Code of a box without a path to a goal.
 const UNREACHED: u8 = 5;
 
 impl FlowField {
-    /// The field for a body of `size` x `size` boxes that has to fit into `free` on its way to
-    /// the nearest of `goals` (column, row); boxes and goals mean its lower-left box. Goals
+    /// Computes the field for a body of `size` x `size` boxes that has to fit into `free` on its
+    /// way to the nearest of `goals` (column, row); boxes and goals mean its lower-left box. Goals
     /// where the body does not fit do not count.
     ///
     /// # Panics
@@ -31,7 +30,7 @@ impl FlowField {
         Self::descending(&Distances::to_nearest(free, size, goals))
     }
 
-    /// The field that follows `distances` down.
+    /// Computes the field that descends along `distances`.
     pub fn descending(distances: &Distances) -> Self {
         let (width, height) = (distances.width(), distances.height());
         let boxes = distances.all().len();
@@ -44,8 +43,8 @@ impl FlowField {
         field
     }
 
-    /// The direction of the next step: 0 east, 1 north, 2 west, 3 south. `None` at a goal, where
-    /// no way leads to one, and outside the grid.
+    /// Returns the direction of the next step: 0 east, 1 north, 2 west, 3 south. `None` at a goal,
+    /// where no path leads to one, and outside the grid.
     pub fn direction(&self, col: u32, row: u32) -> Option<u8> {
         self.code(col, row).filter(|&code| code < GOAL)
     }
@@ -55,17 +54,17 @@ impl FlowField {
         self.code(col, row) == Some(GOAL)
     }
 
-    /// Whether a way leads from the box to a goal; a goal reaches itself.
+    /// Whether a path leads from the box to a goal; a goal reaches itself.
     pub fn reaches_goal(&self, col: u32, row: u32) -> bool {
         self.code(col, row).is_some_and(|code| code != UNREACHED)
     }
 
-    /// Columns of the grid.
+    /// Number of columns of the grid.
     pub fn width(&self) -> u32 {
         self.width
     }
 
-    /// Rows of the grid.
+    /// Number of rows of the grid.
     pub fn height(&self) -> u32 {
         self.height
     }
@@ -97,7 +96,7 @@ fn code(distances: &Distances, col: u32, row: u32) -> u8 {
     }
 }
 
-/// The lowest direction to a neighbor that is `steps` away.
+/// Returns the lowest direction to a neighbor that is `steps` away.
 fn downhill(distances: &Distances, (col, row): (u32, u32), steps: u32) -> u8 {
     let leads_down = |&(east, north): &(i32, i32)| {
         let (col, row) = (col.wrapping_add_signed(east), row.wrapping_add_signed(north));

@@ -1,8 +1,8 @@
-//! Which boxes are free, one bit per box.
+//! The free boxes of a grid, one bit per box.
 
 use crate::{Cell, GridMap};
 
-/// A set of boxes of a grid: those where a body may stand.
+/// The set of boxes of a grid where a body may stand.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FreeSpace {
     width: u32,
@@ -12,7 +12,7 @@ pub struct FreeSpace {
 }
 
 impl FreeSpace {
-    /// The boxes of a `width` x `height` grid for which `is_free(col, row)` holds.
+    /// Creates the set of boxes of a `width` x `height` grid for which `is_free(col, row)` holds.
     pub fn new(width: u32, height: u32, mut is_free: impl FnMut(u32, u32) -> bool) -> Self {
         let mut space = Self::empty(width, height);
         for row in 0..height {
@@ -25,29 +25,29 @@ impl FreeSpace {
         space
     }
 
-    /// The free boxes of `map`; unknown boxes are not among them (see
+    /// Creates the set of free boxes of `map`, without unknown boxes (see
     /// [`GridMap::with_unknown`]).
     pub fn of_map(map: &GridMap) -> Self {
         Self::new(map.width(), map.height(), |col, row| map.cell(col, row) == Cell::Free)
     }
 
-    /// Columns of the grid.
+    /// Number of columns of the grid.
     pub fn width(&self) -> u32 {
         self.width
     }
 
-    /// Rows of the grid.
+    /// Number of rows of the grid.
     pub fn height(&self) -> u32 {
         self.height
     }
 
-    /// Whether the box is free; boxes outside the grid are not.
+    /// Whether the box is free; a box outside the grid is not.
     pub fn is_free(&self, col: u32, row: u32) -> bool {
         col < self.width && row < self.height && self.has(self.index(col, row))
     }
 
-    /// The anchors of a body of `size` x `size` boxes: the boxes that can be the lower-left one
-    /// of a square that is free as a whole. A step from one anchor to the next sweeps free
+    /// Returns the anchors of a body of `size` x `size` boxes: the boxes that can be the lower-left
+    /// one of a square that is free as a whole. A step from one anchor to the next sweeps free
     /// boxes only.
     ///
     /// # Panics
@@ -63,7 +63,7 @@ impl FreeSpace {
         // one column more, for the east edge.
         let mut above = vec![0; self.width as usize + 1];
         for row in (0..self.height).rev() {
-            // The value above and east, which the pass to the west has overwritten already.
+            // The value above and to the east, which the pass to the west has already overwritten.
             let mut above_east = 0;
             for col in (0..self.width).rev() {
                 let at = col as usize;
@@ -83,7 +83,7 @@ impl FreeSpace {
         Self { width, height, bits: vec![0; boxes.div_ceil(64)] }
     }
 
-    /// Position of a box in row-major order; the box has to be inside.
+    /// Returns the index of a box in row-major order; the box must be inside the grid.
     pub(super) fn index(&self, col: u32, row: u32) -> usize {
         row as usize * self.width as usize + col as usize
     }

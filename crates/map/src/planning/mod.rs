@@ -1,9 +1,9 @@
-//! Distances and ways on a grid of boxes.
+//! Distances and shortest paths on a grid of boxes.
 //!
-//! [`FreeSpace`] says where a body may stand, [`Distances`] how many steps it is to the nearest
-//! goal, and [`FlowField`] which way; [`octile_distance`] is the measure of the MovingAI
-//! benchmarks. Everything here is a pure function of its arguments; ties are broken by
-//! documented rules.
+//! [`FreeSpace`] holds the boxes where a body may stand, [`Distances`] the number of steps to the
+//! nearest goal, and [`FlowField`] the direction of the next step; [`octile_distance`] is the
+//! measure of the MovingAI benchmarks. Everything here is a pure function of its arguments; ties
+//! are broken by documented rules.
 
 mod distance;
 mod flow_field;

@@ -7,11 +7,11 @@ use std::f64::consts::SQRT_2;
 
 use super::{FreeSpace, STEPS};
 
-/// Length in boxes of a shortest octile way from `start` to `goal` (column, row), by A*; `None`
-/// where there is no way.
+/// Returns the length in boxes of a shortest octile path from `start` to `goal` (column, row), by
+/// A*; `None` where there is no path.
 ///
-/// A diagonal step needs both boxes beside it free. The length is computed once from whole
-/// numbers of straight and diagonal steps, so it carries no error summed along the way.
+/// A diagonal step needs both boxes beside it free. The length is computed once from whole numbers
+/// of straight and diagonal steps, so it carries no error summed along the path.
 pub fn octile_distance(free: &FreeSpace, start: (u32, u32), goal: (u32, u32)) -> Option<f64> {
     if !free.is_free(start.0, start.1) || !free.is_free(goal.0, goal.1) {
         return None;
@@ -37,7 +37,7 @@ pub fn octile_distance(free: &FreeSpace, start: (u32, u32), goal: (u32, u32)) ->
     None
 }
 
-/// A length as steps along the axes and across.
+/// A length in straight and diagonal steps.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
 struct Length {
     straight: u32,
@@ -49,18 +49,18 @@ impl Length {
         f64::from(self.straight) + f64::from(self.diagonal) * SQRT_2
     }
 
-    /// The octile distance on a grid without walls.
+    /// Returns the octile distance on a grid without walls.
     fn between(a: (u32, u32), b: (u32, u32)) -> Self {
         let (x, y) = (a.0.abs_diff(b.0), a.1.abs_diff(b.1));
         Self { straight: x.abs_diff(y), diagonal: x.min(y) }
     }
 }
 
-/// A box on the search's frontier; the least is the one to look at next.
+/// A box on the search's frontier; the least is expanded next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Visit {
-    /// Bits of the least length of a way through here: lengths are not negative, so their bits
-    /// are ordered as they are.
+    /// Bits of the least length of a path through this box: lengths are not negative, so their bits
+    /// have the same order as the lengths.
     estimate_bits: u64,
     at: (u32, u32),
     length: Length,
@@ -77,7 +77,7 @@ impl Visit {
     }
 }
 
-/// The boxes one step away and the length of the way to them.
+/// Returns the boxes one step away and the length of the path to them.
 fn moves(
     free: &FreeSpace,
     (col, row): (u32, u32),

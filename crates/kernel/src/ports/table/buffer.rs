@@ -1,4 +1,4 @@
-//! Rows that wait for being recorded.
+//! Rows that wait to be recorded.
 
 use super::declare::Table;
 use super::schema::TableSchema;
@@ -6,28 +6,27 @@ use super::values::Values;
 use crate::ports::recorder::{RecordError, Recorder};
 use std::fmt;
 
-/// Rows of a table that are kept at most before they must be recorded.
+/// The maximum number of rows of a table before they must be recorded.
 const MAX_ROWS: usize = 1 << 20;
 
-/// What waits for being recorded in one table.
+/// The rows of one table that wait to be recorded.
 pub trait Buffer {
-    /// The table; `None` of one that is not recorded.
+    /// The table's schema; `None` for a table that is not recorded.
     fn schema(&self) -> Option<TableSchema>;
 
-    /// Number of rows that wait.
+    /// Number of waiting rows.
     fn rows(&self) -> usize;
 
-    /// All rows that wait, as one block; none wait afterwards. `None` of a table that is not
-    /// recorded.
+    /// Takes all waiting rows as one block. `None` for a table that is not recorded.
     fn take(&mut self) -> Option<Vec<Values>>;
 }
 
-/// The tables of a run; those that are recorded are numbered in their order.
+/// The tables of a run; the recorded ones are numbered in their order.
 pub trait Buffers {
-    /// All tables.
+    /// Returns all tables.
     fn buffers(&self) -> Vec<&dyn Buffer>;
 
-    /// All tables, in the same order.
+    /// Returns all tables, in the same order.
     fn buffers_mut(&mut self) -> Vec<&mut dyn Buffer>;
 
     /// Whether rows must be recorded before more can be kept.
@@ -35,7 +34,7 @@ pub trait Buffers {
         self.buffers().iter().any(|buffer| buffer.rows() >= MAX_ROWS)
     }
 
-    /// The tables that are recorded.
+    /// Returns the schemas of the recorded tables.
     fn schemas(&self) -> Vec<TableSchema> {
         self.buffers().iter().filter_map(|buffer| buffer.schema()).collect()
     }
@@ -111,7 +110,7 @@ impl<R> Buffer for RowBuffer<R> {
     }
 }
 
-/// Whole columns, for tables whose rows are too many to be kept one by one.
+/// Whole columns, for tables that have too many rows to keep them one by one.
 #[derive(Debug, Default)]
 pub struct BlockBuffer {
     schema: Option<TableSchema>,
@@ -129,7 +128,7 @@ impl BlockBuffer {
         self.schema.is_some()
     }
 
-    /// Keeps the block that is recorded next, in place of one that waits.
+    /// Keeps the block that is recorded next, and replaces one that waits.
     pub fn set(&mut self, block: Vec<Values>) {
         self.block = Some(block);
     }

@@ -1,8 +1,8 @@
-//! Values side by side, and which of them are missing.
+//! Values side by side, and a mask of the missing ones.
 
 use std::ops::Deref;
 
-/// Which cells have a value; without a mask all have.
+/// A mask of the cells that have a value; without a mask all have one.
 #[derive(Debug, Clone, PartialEq, Default)]
 struct Mask(Option<Vec<bool>>);
 
@@ -63,7 +63,7 @@ fn retain<T>(values: &mut Vec<T>, keep: &[bool]) {
 /// The cells of a column of numbers or truth values, some of which may be missing.
 ///
 /// Dereferences to the values as they lie in memory, where a missing one is the type's default;
-/// [`get`](Self::get) tells missing ones apart.
+/// [`get`](Self::get) distinguishes missing ones.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cells<T> {
     values: Vec<T>,
@@ -71,17 +71,17 @@ pub struct Cells<T> {
 }
 
 impl<T> Cells<T> {
-    /// The value in `row`; `None` where it is missing or there is no such row.
+    /// Returns the value in `row`; `None` where it is missing or there is no such row.
     pub fn get(&self, row: usize) -> Option<&T> {
         self.values.get(row).filter(|_| self.mask.is_valid(row))
     }
 
-    /// Goes through all cells; `None` stands for a missing value.
+    /// Iterates over all cells; `None` stands for a missing value.
     pub fn options(&self) -> impl Iterator<Item = Option<&T>> {
         (0..self.values.len()).map(|row| self.get(row))
     }
 
-    /// Which cells have a value; `None` where all have.
+    /// Returns a mask of the cells that have a value; `None` where all have one.
     pub fn valid(&self) -> Option<&[bool]> {
         self.mask.0.as_deref()
     }
@@ -100,7 +100,7 @@ impl<T: Clone + Default> Cells<T> {
         self.values.push(value.unwrap_or_default());
     }
 
-    /// Makes it `rows` long; new cells are missing.
+    /// Makes the column `rows` long; new cells are missing.
     pub fn resize(&mut self, rows: usize) {
         self.mask.resize(self.values.len(), rows);
         self.values.resize(rows, T::default());
@@ -112,7 +112,7 @@ impl<T: Clone + Default> Cells<T> {
         self.values.extend_from_slice(&more.values);
     }
 
-    /// The cells of these rows, in this order.
+    /// Returns the cells of these rows, in this order.
     #[must_use]
     pub fn pick(&self, order: &[usize]) -> Self {
         let values = order.iter().map(|&row| self.values[row].clone()).collect();
@@ -163,8 +163,8 @@ impl<T: Clone + Default> FromIterator<Option<T>> for Cells<T> {
     }
 }
 
-/// The cells of a column of text, some of which may be missing: one string, and where each cell
-/// ends in it.
+/// The cells of a column of text, some of which may be missing: one string, and the end of each
+/// cell in it.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Texts {
     text: String,
@@ -173,7 +173,7 @@ pub struct Texts {
 }
 
 impl Texts {
-    /// The text in `row`; `None` where it is missing or there is no such row.
+    /// Returns the text in `row`; `None` where it is missing or there is no such row.
     pub fn get(&self, row: usize) -> Option<&str> {
         let end = *self.ends.get(row).filter(|_| self.mask.is_valid(row))?;
         Some(&self.text[self.start(row)..end])
@@ -183,22 +183,23 @@ impl Texts {
         row.checked_sub(1).map_or(0, |before| self.ends[before])
     }
 
-    /// Goes through all cells; `None` stands for a missing text.
+    /// Iterates over all cells; `None` stands for a missing text.
     pub fn options(&self) -> impl Iterator<Item = Option<&str>> {
         (0..self.ends.len()).map(|row| self.get(row))
     }
 
-    /// All texts one behind the other.
+    /// Returns all texts in one string.
     pub fn text(&self) -> &str {
         &self.text
     }
 
-    /// Where each text ends, in bytes of [`text`](Self::text); it begins where the one before ends.
+    /// Returns the end of each text, in bytes of [`text`](Self::text); a text starts where the
+    /// previous one ends.
     pub fn ends(&self) -> &[usize] {
         &self.ends
     }
 
-    /// Which cells have a text; `None` where all have.
+    /// Returns a mask of the cells that have a text; `None` where all have one.
     pub fn valid(&self) -> Option<&[bool]> {
         self.mask.0.as_deref()
     }
@@ -208,7 +209,7 @@ impl Texts {
         self.ends.len()
     }
 
-    /// True without cells.
+    /// Whether there are no cells.
     pub fn is_empty(&self) -> bool {
         self.ends.is_empty()
     }
@@ -220,7 +221,7 @@ impl Texts {
         self.ends.push(self.text.len());
     }
 
-    /// Makes it `rows` long; new cells are missing.
+    /// Makes the column `rows` long; new cells are missing.
     pub fn resize(&mut self, rows: usize) {
         self.mask.resize(self.ends.len(), rows);
         self.ends.resize(rows, self.text.len());
@@ -237,7 +238,7 @@ impl Texts {
         *self = self.options().zip(keep).filter(|(_, keep)| **keep).map(|(text, _)| text).collect();
     }
 
-    /// The cells of these rows, in this order.
+    /// Returns the cells of these rows, in this order.
     #[must_use]
     pub fn pick(&self, order: &[usize]) -> Self {
         order.iter().map(|&row| self.get(row)).collect()

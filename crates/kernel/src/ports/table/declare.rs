@@ -6,7 +6,7 @@ use super::schema::{ColumnSpec, TableSchema};
 use super::values::Values;
 use std::fmt;
 
-/// A table of rows `R`: each column is declared once, with what reads it from a row.
+/// A table of rows `R`: each column is declared once, with the getter that reads it from a row.
 ///
 /// ```
 /// use sidestep_kernel::ports::{Table, Values};
@@ -25,8 +25,8 @@ pub struct Table<R> {
     columns: Vec<Column<R>>,
 }
 
-/// Reads all values of a column from a block of rows: one call a block, so that the getter is
-/// inlined into its loop.
+/// A function that reads all values of a column from a block of rows: one call per block, so that
+/// the getter is inlined into its loop.
 type ReadColumn<R> = Box<dyn Fn(&[R]) -> Values + Send + Sync>;
 
 struct Column<R> {
@@ -34,7 +34,7 @@ struct Column<R> {
     values: ReadColumn<R>,
 }
 
-/// What a getter of a column with the cells `C` returns: the value, or an `Option` of it where it
+/// The result of a getter of a column with the cells `C`: the value, or an `Option` of it where it
 /// may be missing.
 pub trait Cell<C> {
     /// Whether it may be missing.
@@ -57,7 +57,7 @@ impl Cell<Texts> for Option<String> {
     const IS_NULLABLE: bool = true;
 }
 
-/// Methods that declare a column of one type.
+/// Generates methods that declare a column of one type.
 macro_rules! typed {
     ($($name:ident, $variant:ident, $cells:ty, $what:literal;)*) => {$(
         #[doc = concat!("Adds a column of ", $what, "; `get` reads it from a row.")]
@@ -79,7 +79,7 @@ macro_rules! typed {
 }
 
 impl<R> Table<R> {
-    /// A table without columns.
+    /// Creates a table without columns.
     pub fn new(name: &str) -> Self {
         Self { name: name.into(), columns: Vec::new() }
     }
@@ -120,13 +120,13 @@ impl<R> Table<R> {
         self
     }
 
-    /// Its name and columns.
+    /// Returns its name and columns.
     pub fn schema(&self) -> TableSchema {
         let columns = self.columns.iter().map(|column| column.spec.clone()).collect();
         TableSchema { name: self.name.clone(), columns }
     }
 
-    /// The values of all columns in these rows.
+    /// Returns the values of all columns in these rows.
     pub fn block(&self, rows: &[R]) -> Vec<Values> {
         self.columns.iter().map(|column| (column.values)(rows)).collect()
     }
@@ -138,10 +138,10 @@ impl<R> fmt::Debug for Table<R> {
     }
 }
 
-/// The label of a thing: its place in the list of all, from which a column's labels are made.
+/// Returns the index of a thing in the list of all, from which a column's labels are made.
 ///
 /// # Panics
-/// When the list leaves it out.
+/// When the thing is not in the list.
 pub fn label_of<T: PartialEq>(all: &[T], one: &T) -> u32 {
     all.iter().position(|other| other == one).expect("the list has all of them") as u32
 }

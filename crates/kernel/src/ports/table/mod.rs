@@ -1,4 +1,4 @@
-//! Tables: columns that are declared once, and their values as they lie in memory.
+//! Tables: columns that are declared once, and their values in memory.
 //!
 //! ```text
 //! schema.rs   ColumnSpec, TableSchema: name, type, unit and meaning of a column
@@ -6,10 +6,10 @@
 //! cells.rs    Cells, Texts: values side by side, and which of them are missing
 //! values.rs   Values: the cells of one column, of any type; RoleColumn: with a name and a role
 //! declare.rs  Table: columns with their getters; rows -> a block of values
-//! buffer.rs   rows that wait for being recorded
+//! buffer.rs   rows that wait to be recorded
 //! ```
 //!
-//! The values of a column lie as Arrow wants them: one behind the other, with a mask beside them
+//! The values of a column lie as Arrow wants them: one after the other, with a mask beside them
 //! only where some are missing; text as offsets into one string.
 
 mod buffer;

@@ -20,13 +20,13 @@ pub struct ColumnSpec {
 }
 
 impl ColumnSpec {
-    /// A column without labels, of which no value is missing.
+    /// Creates a column without labels and without missing values.
     pub fn new(name: &str, ty: ColumnType, meaning: &str) -> Self {
         let (name, meaning) = (name.into(), meaning.into());
         Self { name, ty, meaning, labels: Vec::new(), is_nullable: false }
     }
 
-    /// A column of labels, of which none is missing.
+    /// Creates a column of labels, without missing values.
     pub fn label<L: Into<String>>(
         name: &str,
         meaning: &str,
@@ -36,7 +36,7 @@ impl ColumnSpec {
         Self { labels, ..Self::new(name, ColumnType::Label, meaning) }
     }
 
-    /// The value in `row` of its values, as [`Values::write`] writes it.
+    /// Returns the value in `row` as text, as [`Values::write`] writes it.
     pub fn text(&self, values: &Values, row: usize) -> String {
         let mut text = String::new();
         // Writing to a string cannot fail.
@@ -44,7 +44,7 @@ impl ColumnSpec {
         text
     }
 
-    /// The unit of its values, where its name ends in one.
+    /// Returns the unit of its values, where its name ends in one.
     pub fn unit(&self) -> Option<&'static str> {
         split_unit(&self.name).1
     }

@@ -1,6 +1,6 @@
-//! The unit that a name ends in.
+//! Units at the end of names.
 
-/// Endings of names and the units they stand for; an ending stands before what it ends with.
+/// Name endings and their units; a longer ending comes before the shorter one that it ends with.
 const UNITS: [(&str, &str); 27] = [
     ("_m_s2", "m/s²"),
     ("_m_s", "m/s"),
@@ -31,7 +31,7 @@ const UNITS: [(&str, &str); 27] = [
     ("_s", "s"),
 ];
 
-/// The quantity and the unit in a name: `min_separation_m` is `min_separation`, in m. A name, or
+/// Splits a name into quantity and unit: `min_separation_m` is `min_separation`, in m. A name, or
 /// the last part of a path, that is nothing but an ending has no unit.
 pub fn split_unit(name: &str) -> (&str, Option<&'static str>) {
     let split = UNITS.iter().find_map(|(ending, unit)| {

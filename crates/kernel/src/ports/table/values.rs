@@ -26,7 +26,7 @@ pub enum Values {
     Text(Texts),
 }
 
-/// Does the same for the cells of any type.
+/// Runs the same code for the cells of any type.
 macro_rules! each {
     ($values:expr, $cells:ident => $work:expr) => {
         match $values {
@@ -42,7 +42,7 @@ macro_rules! each {
 }
 
 impl Values {
-    /// No values of this type.
+    /// Creates a column of this type without values.
     pub fn empty(ty: ColumnType) -> Self {
         match ty {
             ColumnType::U32 => Self::U32(Cells::default()),
@@ -56,7 +56,7 @@ impl Values {
         }
     }
 
-    /// The column type these values belong to.
+    /// Returns the type of these values.
     pub fn ty(&self) -> ColumnType {
         match self {
             Self::U32(_) => ColumnType::U32,
@@ -75,12 +75,12 @@ impl Values {
         each!(self, cells => cells.len())
     }
 
-    /// True without values.
+    /// Whether there are no values.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Which rows have a value; `None` where all have.
+    /// Returns a mask of the rows that have a value; `None` where all have one.
     pub fn valid(&self) -> Option<&[bool]> {
         each!(self, cells => cells.valid())
     }
@@ -108,7 +108,7 @@ impl Values {
         }
     }
 
-    /// Makes it `rows` long; new values are missing.
+    /// Makes the column `rows` long; new values are missing.
     pub fn resize(&mut self, rows: usize) {
         each!(self, cells => cells.resize(rows));
     }
@@ -118,7 +118,7 @@ impl Values {
         each!(self, cells => cells.retain_rows(keep));
     }
 
-    /// The values of these rows, in this order.
+    /// Returns the values of these rows, in this order.
     #[must_use]
     pub fn pick(&self, order: &[usize]) -> Self {
         match self {
@@ -138,7 +138,8 @@ impl Values {
         !matches!(self, Self::Bool(_) | Self::Label(_) | Self::Text(_))
     }
 
-    /// The value in `row` as a number; true is 1, false 0, a label its index, text is none.
+    /// Returns the value in `row` as a number; true is 1, false 0, a label its index, and text
+    /// `None`.
     pub fn number(&self, row: usize) -> Option<f64> {
         match self {
             Self::U32(cells) | Self::Label(cells) => cells.get(row).map(|&v| f64::from(v)),
@@ -151,7 +152,7 @@ impl Values {
         }
     }
 
-    /// The value in `row` as JSON; a missing one is null, a label its index.
+    /// Returns the value in `row` as JSON; a missing one is null, a label its index.
     pub fn json(&self, row: usize) -> Value {
         fn of<T: Clone + Into<Value>>(value: Option<&T>) -> Value {
             value.cloned().map_or(Value::Null, Into::into)
@@ -167,8 +168,8 @@ impl Values {
         }
     }
 
-    /// Writes the value in `row` as text, nothing where it is missing. Floats have as many digits
-    /// as bring them back exactly; a label is its text in `labels`, or its index.
+    /// Writes the value in `row` as text, or nothing where it is missing. Floats have as many
+    /// digits as an exact round trip needs; a label is its text in `labels`, or its index.
     ///
     /// # Errors
     /// When nothing can be written to `to`.
@@ -181,7 +182,7 @@ impl Values {
         each!(self, cells => cells.get(row).map_or(Ok(()), |value| write!(to, "{value}")))
     }
 
-    /// The value in `row` as [`write`](Self::write) writes it, a label as its index; see
+    /// Returns the value in `row` as [`write`](Self::write) writes it, a label as its index; see
     /// [`ColumnSpec::text`](super::ColumnSpec::text) for its text.
     pub fn text(&self, row: usize) -> String {
         let mut text = String::new();
@@ -191,15 +192,15 @@ impl Values {
     }
 }
 
-/// A column of a table that is whole in memory, with what it is to the table, e.g. a parameter or a
+/// A column of a table that is whole in memory, with its role in the table, e.g. a parameter or a
 /// metric of runs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RoleColumn<R> {
     /// Its name, with its unit where the quantity has one.
     pub name: String,
-    /// What it is.
+    /// Its role.
     pub role: R,
-    /// Its values, one a row.
+    /// Its values, one per row.
     pub values: Values,
 }
 
