@@ -1,4 +1,4 @@
-//! A scenario's text -> an immutable world and where everybody starts.
+//! From a scenario's text to an immutable world and everybody's start.
 
 mod bodies;
 mod map;
@@ -32,24 +32,24 @@ use std::ops::Range;
 use std::sync::Arc;
 use toml::Spanned;
 
-/// Most bodies of a scenario.
+/// Largest number of bodies of a scenario.
 const MAX_BODIES: u64 = 10_000_000;
-/// Cycles of a run whose scenario does not say it.
+/// Number of cycles of a run whose scenario does not give it.
 const CYCLES: u64 = 10_000;
 const MAX_RANGE_BOXES: f64 = 4096.0;
 
-/// Behaviours of the library's user, by the name a scenario gives them.
+/// Behaviors that the library's user adds, by the name that a scenario gives them.
 pub type Behaviours = BTreeMap<String, Arc<dyn Behaviour>>;
 
 /// The order in which bodies are stored; no result depends on it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum StorageOrder {
-    /// Neighbors on the map are neighbors in memory; arranged anew now and then.
+    /// Neighbors on the map are neighbors in memory; rearranged now and then.
     #[default]
     Spatial,
     /// By entity id.
     ById,
-    /// Shuffled by this number; for tests.
+    /// Shuffled with this number as seed; for tests.
     Shuffled(u64),
 }
 
@@ -60,11 +60,11 @@ pub struct Compiled {
     pub world: Arc<RobotsWorld>,
     /// Place and facing of each entity at the start, by id.
     pub start: Arc<[((u32, u32), u8)]>,
-    /// Name of the scenario, may be empty.
+    /// Name of the scenario; may be empty.
     pub name: String,
-    /// The seed.
+    /// The random seed.
     pub seed: u64,
-    /// Cycles that the scenario asks for.
+    /// Number of cycles that the scenario asks for.
     pub cycles: u64,
     /// The tables to keep.
     pub record: RecordSection,
@@ -95,11 +95,11 @@ struct Compiler<'a> {
     bodies: Vec<Body>,
     start: Vec<((u32, u32), u8)>,
     floor: Floor,
-    /// Spans by id, to name the other body when two stand on each other.
+    /// Spans by id, to name the other body when two bodies stand on each other.
     spans: Vec<Range<usize>>,
-    /// Rings of wall to put around the map.
+    /// Number of rings of wall to put around the map.
     border: u32,
-    /// Most boxes that a claim reaches beside a body.
+    /// Largest distance in boxes from a body to a box that it claims.
     reach: u32,
 }
 
@@ -145,8 +145,8 @@ impl<'a> Compiler<'a> {
 
     fn compile(mut self, order: StorageOrder) -> Result<Compiled, InputError> {
         let groups = self.groups()?;
-        // Doors and bodies with a given place first, so that draws find what is left; ids
-        // go robots, people, doors whatever is placed first.
+        // Doors and bodies with a given place are placed first, because draws must find the
+        // remaining free boxes. Ids go robots, people, doors, whatever is placed first.
         let mut first_id = 0;
         let mut firsts: Vec<EntityId> = Vec::new();
         for group in &groups {
@@ -212,7 +212,7 @@ impl<'a> Compiler<'a> {
         Some(Radio::new(radio.range_m.get(), self.map.box_size_m, loss))
     }
 
-    /// Rank of each kind in `kind_order`; kinds that are not named come last.
+    /// Returns the rank of each kind in `kind_order`; kinds that are not named come last.
     fn kind_rank(&self) -> Result<Vec<u8>, InputError> {
         let mut rank = vec![self.file.kind_order.len() as u8; self.kinds.len()];
         for (k, kind) in self.file.kind_order.iter().enumerate() {
@@ -241,7 +241,8 @@ impl<'a> Compiler<'a> {
     }
 }
 
-/// As many rings of wall as the longest path has steps, and as a beam may be read past a wall.
+/// Returns as many rings of wall as the longest path has steps, and as a beam may be read past a
+/// wall.
 fn border(file: &RobotsFile, effectors: &BTreeMap<String, Located<EffectorSection>>) -> u32 {
     let named = file.robots.0.iter().filter_map(|robots| robots.get_ref().effector.as_ref());
     let known = named.filter_map(|name| effectors.get(name.get_ref()));
@@ -250,7 +251,7 @@ fn border(file: &RobotsFile, effectors: &BTreeMap<String, Located<EffectorSectio
     steps.max().unwrap_or(1).clamp(BEAM_STEP, MAX_PATH) as u32
 }
 
-/// Every action at every heading, see `BodyType::actions`.
+/// Returns every action at every heading, see `BodyType::actions`.
 fn actions_at_headings(
     actions: &[Vec<Transition>],
     size: (u32, u32),
@@ -263,7 +264,8 @@ fn actions_at_headings(
     (0..4).flat_map(at).collect()
 }
 
-/// Names of the kinds: `free` and `wall` first, then the built-in ones, then the user's own.
+/// Returns the names of the kinds: `free` and `wall` first, then the built-in ones, then the user's
+/// own.
 fn kinds(source: &Source, file: &RobotsFile) -> Result<Vec<String>, InputError> {
     let mut kinds: Vec<String> =
         ["free", "wall", "door", "person", "robot"].map(String::from).to_vec();
@@ -310,11 +312,12 @@ fn add_all<T: Clone>(
 }
 
 impl StorageOrder {
-    /// Entity ids in the order of storage.
+    /// Returns the entity ids in the order of storage.
     pub(in super::super) fn ids(self, world: &RobotsWorld) -> Vec<EntityId> {
         let mut ids: Vec<EntityId> = (0..world.bodies.len() as EntityId).collect();
         match self {
-            // Arranged as it goes.
+            // `Spatial` needs no order at the start, because the state is rearranged as the run
+            // goes.
             Self::ById | Self::Spatial => {}
             Self::Shuffled(by) => {
                 let streams = Streams::new(Seed(by));
@@ -325,7 +328,7 @@ impl StorageOrder {
     }
 }
 
-/// The presets as text, for `sidestep new` and the documentation.
+/// Returns the presets as text, for `sidestep new` and the documentation.
 pub fn presets() -> &'static str {
     include_str!("../presets.toml")
 }
