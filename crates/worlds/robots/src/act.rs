@@ -34,6 +34,7 @@ impl<T: BoxWord> Scene<'_, T> {
             return;
         }
         let body = self.type_of(cell);
+        // A door has no actions in its type, so it toggles.
         let Some(action) = body.actions.get(usize::from(cell.action.get())) else {
             return self.toggle(slot, scratch);
         };
@@ -91,6 +92,7 @@ impl<T: BoxWord> Scene<'_, T> {
             _ => 0,
         };
         self.make(walk, made, slot);
+        // Only robots feel contacts and have samples to learn from.
         if is_mover {
             return;
         }

@@ -148,6 +148,6 @@ impl From<ActionId> for Decision {
 /// `examples/own_behaviour.rs`.
 pub trait Behaviour: std::fmt::Debug + Send + Sync {
     /// Returns the next action. It may depend only on the percept, the memory (which it may change)
-    /// and the robot's random stream of this cycle, because robots decide in parallel.
+    /// and the robot's random stream of this cycle, because robots decide in any order.
     fn decide(&self, percept: &Percept<'_>, memory: &mut Memory, draws: &mut Draws) -> Decision;
 }

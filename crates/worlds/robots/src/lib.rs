@@ -56,7 +56,7 @@ pub struct Event {
     pub cycle: Cycle,
     /// The body that it happened to.
     pub body: EntityId,
-    /// What happened, with its details.
+    /// The kind of event, with its details.
     pub event: EventKind,
 }
 

@@ -60,7 +60,7 @@ pub struct SensorReport {
     pub probabilities: Vec<Estimate>,
     /// Rows with few counts.
     pub thin: Vec<ThinRow>,
-    /// How well a part of the events predicts the rest.
+    /// Tests of how well a part of the events predicts the rest.
     pub hold_out: Vec<Fit>,
     /// The rule by which counts become probabilities.
     pub estimate: EstimateOptions,
