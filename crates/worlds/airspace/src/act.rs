@@ -1,4 +1,4 @@
-//! Pool two: the airplanes of a group decide together and fly for `dt`.
+//! *Act*: the airplanes of a group decide together and fly for `dt`.
 
 mod approaches;
 mod entry;
@@ -15,7 +15,7 @@ use super::shield::Way;
 use flight::{Course, Flight};
 use sidestep_kernel::Slot;
 
-/// Lets a group decide, the shield filter, and all fly, those on recorded ways beside them.
+/// Lets a group decide, the shield filter, and all fly, together with those on recorded ways.
 pub(super) fn act(turn: &mut Turn<'_>, group: &[Slot]) {
     let Turn { world, state, now, .. } = *turn;
     let mut flying = std::mem::take(&mut turn.scratch.flying);
@@ -28,7 +28,7 @@ pub(super) fn act(turn: &mut Turn<'_>, group: &[Slot]) {
     turn.scratch.flying = flying;
 }
 
-/// `group` are the airplanes in the air, by id.
+/// Flies a group for one `dt`; `group` are the airplanes in the air, by id.
 fn fly(turn: &mut Turn<'_>, group: &[Slot]) {
     let Turn { world, state, now, .. } = *turn;
     let flown: Vec<Slot> =
@@ -49,7 +49,7 @@ fn fly(turn: &mut Turn<'_>, group: &[Slot]) {
     step::step_all(turn, flights);
 }
 
-/// The ways that those fly whom the method flies.
+/// Returns the ways of the airplanes that the method flies.
 fn ways(turn: &mut Turn<'_>, flown: &[Slot]) -> Vec<Way> {
     let Turn { world, state, now, clock, .. } = *turn;
     let group: Vec<Known> = flown.iter().map(|&slot| known(world, state, now, slot)).collect();

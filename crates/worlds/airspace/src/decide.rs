@@ -1,4 +1,4 @@
-//! Decisions of the airplanes of a group, by the method of the world.
+//! *Decide*: the choice of actions for the airplanes of a group, by the world's method.
 
 mod velocity;
 mod wishes;
@@ -23,30 +23,30 @@ use wishes::straight;
 /// One optimization: of a group, in a cycle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Optimization {
-    /// When.
+    /// Cycle of the optimization.
     pub cycle: Cycle,
-    /// The member of the group with the smallest id,
+    /// The member of the group with the smallest id.
     pub airplane: EntityId,
-    /// and how many they are.
+    /// Number of airplanes of the group.
     pub airplanes: u32,
-    /// Rounds, of that airplane's agent.
+    /// Number of rounds, of that airplane's agent.
     pub rounds: u32,
     /// Whether the distributions had settled.
     pub converged: bool,
-    /// Messages and bytes that went over the network.
+    /// Messages and bytes on the network.
     pub traffic: Traffic,
 }
 
 /// Sums over optimizations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Effort {
-    /// Optimizations.
+    /// Number of optimizations.
     pub optimizations: u64,
-    /// Their rounds.
+    /// Sum of their rounds.
     pub rounds: u64,
-    /// Those that ended before they had converged.
+    /// Number of those that ended before they had converged.
     pub unconverged: u64,
-    /// Messages over the network, the shield's exchanges included.
+    /// Messages on the network, including the shield's exchanges.
     pub traffic: Traffic,
 }
 
@@ -80,8 +80,8 @@ fn all_straight(world: &AirspaceWorld, group: &[Known]) -> Vec<Vec<Action>> {
     group.iter().map(|known| straight(world, *known)).collect()
 }
 
-/// By probability collectives: the chosen action, and the others by what the optimizer
-/// expects of them.
+/// Returns the wishes by probability collectives: the chosen action first, then the others by the
+/// cost that the optimizer expects of them.
 fn optimized(turn: &mut Turn<'_>, group: &[Known], contacts: &mut [Contacts]) -> Vec<Vec<Action>> {
     let &mut Turn { world, now, ref mut scratch, .. } = turn;
     if group_takes_bytes(world, group) > world.group_bytes {
@@ -104,13 +104,13 @@ fn optimized(turn: &mut Turn<'_>, group: &[Known], contacts: &mut [Contacts]) ->
     });
     let ranked = |(decided, known): (&Option<Decided>, &Known)| match decided {
         Some(decided) => wishes::by_cost(world, *known, decided),
-        // Nobody has told it what to do.
+        // No decision reached it, so it flies straight on.
         None => straight(world, *known),
     };
     decided.iter().zip(group).map(ranked).collect()
 }
 
-/// One process decides for all.
+/// Lets one process decide for all.
 fn direct(world: &AirspaceWorld, group: &[Known], now: Cycle) -> Vec<Option<Decided>> {
     let options: Vec<Options> = group.iter().map(|known| world.options(*known)).collect();
     let game = game(&world.objective, &options);

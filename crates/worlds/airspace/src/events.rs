@@ -1,4 +1,4 @@
-//! What happened, and when.
+//! The events of a run.
 
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::{Cycle, EntityId};
@@ -7,24 +7,24 @@ use sidestep_kernel::{Cycle, EntityId};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum EventKind {
-    /// Two airplanes have come nearer than their separation; the value is how near
-    /// they were at first, in meters.
+    /// Two airplanes have come nearer than their separation; the value is their distance at that
+    /// moment, in meters.
     LossOfSeparation,
-    /// An airplane has done with its last way-point; the value is its delay in seconds.
+    /// An airplane has finished with its last way-point; the value is its delay in seconds.
     Arrival,
-    /// The shield has changed what an airplane wanted; the value is the number of the way it
-    /// flies instead, counted from the one it wanted.
+    /// The shield has changed an airplane's wish; the value is the number of the way it flies
+    /// instead, counted from the wanted one.
     Override,
     /// The shield keeps an airplane on its stored orbit.
     Orbit,
-    /// An airplane heard nothing of another one in spite of asking.
+    /// An airplane has not heard another one in spite of asking.
     Unheard,
     /// Time was up before an airplane's agent was done.
     Deadline,
-    /// An airplane stays on its orbit since not everybody has agreed to what it wanted.
+    /// An airplane stays on its orbit because not all others have agreed to its wish.
     HeldBack,
     /// A group is too large for the memory allowed: its airplanes fly straight on, as far as the
-    /// shield lets them; the value is how many they are.
+    /// shield lets them; the value is the number of airplanes.
     GroupTooLarge,
 }
 
@@ -41,7 +41,7 @@ impl EventKind {
         Self::GroupTooLarge,
     ];
 
-    /// Its name in files.
+    /// Returns its name in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::LossOfSeparation => "loss-of-separation",
@@ -61,34 +61,35 @@ impl EventKind {
 pub struct Event {
     /// Cycle in which it happened.
     pub cycle: Cycle,
-    /// What.
+    /// Kind of the event.
     pub kind: EventKind,
-    /// To whom.
+    /// The airplane to which it happened.
     pub airplane: EntityId,
-    /// With whom; the airplane itself where there is nobody else.
+    /// The other airplane involved; the airplane itself where there is none.
     pub other: EntityId,
     /// See [`EventKind`]; 0 where a kind has none.
     pub value: f64,
 }
 
 impl Event {
-    /// An event of one airplane.
+    /// Returns an event of one airplane.
     pub fn of(cycle: Cycle, kind: EventKind, airplane: EntityId) -> Self {
         Self { cycle, kind, airplane, other: airplane, value: 0.0 }
     }
 
-    /// An event between two.
+    /// Returns an event of two airplanes.
     pub fn of_pair(cycle: Cycle, kind: EventKind, airplane: EntityId, other: EntityId) -> Self {
         Self { other, ..Self::of(cycle, kind, airplane) }
     }
 
-    /// The same with a value.
+    /// Returns the same event with a value.
     #[must_use]
     pub fn with(self, value: f64) -> Self {
         Self { value, ..self }
     }
 
-    /// The order of a table's rows: a group's events in whatever order groups were looked at.
+    /// Returns the sort key of the table's rows, which does not depend on the order in which groups
+    /// were handled.
     pub(super) fn key(&self) -> (Cycle, EntityId, EventKind, EntityId) {
         (self.cycle, self.airplane, self.kind, self.other)
     }

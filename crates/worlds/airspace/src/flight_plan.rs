@@ -1,5 +1,5 @@
-//! The text of one airplane of a scenario: where it begins, its way-points, its recorded track,
-//! and its orders.
+//! The text of one airplane of a scenario: its start, its way-points, its recorded track, and its
+//! orders.
 
 use super::flight::{FlightOrder, MAX_ORDERS, Task, Track, TrackPoint};
 use super::scenario::{Measure, TurnRate, Turns};
@@ -8,11 +8,11 @@ use sidestep_kernel::{InputError, math};
 use sidestep_scenario::{AboveTo, FromTo, Number, Point, Source};
 use toml::Spanned;
 
-/// How fast levels are changed when an order does not say it: 1500 ft/min.
+/// Rate at which levels are changed when an order does not give one: 1500 ft/min.
 pub(super) const CLIMB_M_S: f64 = 7.62;
-/// No position, height or angle is beyond this.
+/// A position, height or angle within reasonable bounds.
 type Value = Number<FromTo<-1_000_000_000, 1_000_000_000>>;
-/// No time either, nor before the start.
+/// A time within reasonable bounds, not before the start.
 type Time = Number<FromTo<0, 1_000_000_000>>;
 type Place = Point<2, FromTo<-1_000_000_000, 1_000_000_000>>;
 
@@ -46,7 +46,7 @@ struct OrderSection {
     leaves: Option<bool>,
 }
 
-/// Orders in their order, and when the airplane is removed: never at infinity.
+/// Orders in their order, and when the airplane is removed: infinity for never.
 type Orders = (Vec<FlightOrder>, f64);
 
 fn places(given: Option<&Vec<Place>>) -> Vec<[f64; 2]> {
@@ -54,12 +54,12 @@ fn places(given: Option<&Vec<Place>>) -> Vec<[f64; 2]> {
 }
 
 impl AirplaneSection {
-    /// The way-points in their order; none if none are given.
+    /// Returns the way-points in their order; none if none are given.
     pub(super) fn way_points_m(&self) -> Vec<[f64; 2]> {
         places(self.way_points_m.as_ref())
     }
 
-    /// The recorded track, if there is one.
+    /// Returns the recorded track, if there is one.
     pub(super) fn track(&self, source: &Source) -> Result<Option<Track>, InputError> {
         let Some(rows) = &self.track else { return Ok(None) };
         let own = self.at_m.is_some() || self.heading_deg.is_some() || self.way_points_m.is_some();
@@ -81,7 +81,7 @@ impl AirplaneSection {
         }
     }
 
-    /// What it is told on its way.
+    /// Returns its orders, and the time at which it is removed.
     pub(super) fn orders(&self, source: &Source) -> Result<Orders, InputError> {
         let (mut orders, mut leaves_s) = (Vec::new(), f64::INFINITY);
         let mut last_s = 0.0;
@@ -108,7 +108,7 @@ impl AirplaneSection {
 }
 
 impl OrderSection {
-    /// The one task that the order is; `None` for leaving.
+    /// Returns the one task of the order; `None` for leaving.
     fn task(&self) -> Result<Option<Task>, (&'static str, &'static str)> {
         if self.climb_m_s.is_some() && self.altitude_m.is_none() {
             return Err(("climb_m_s without altitude_m", "say to which altitude_m"));

@@ -1,4 +1,4 @@
-//! Traffic in other programs' files, taken as scenarios.
+//! Traffic in other programs' files, read as scenarios.
 
 use super::traffic::{from_bluesky, from_tracks, has_length, not_flown};
 use serde_json::{Value, json};
@@ -10,7 +10,7 @@ use sidestep_scenario::Foreign;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-/// Forms of files, by their names' ends.
+/// Forms of files, by the ends of their names.
 enum Form {
     Bluesky,
     Tracks,
@@ -27,10 +27,10 @@ fn form(file: &Path) -> Form {
     }
 }
 
-/// Returns the scenario that a file of another form stands for, and what else is in it.
+/// Returns the scenario that a file of another form stands for, and a report on the rest of it.
 ///
 /// # Errors
-/// When it cannot be read.
+/// When the file cannot be read.
 pub(super) fn translate(file: &Path) -> Result<Option<Foreign>, InputError> {
     let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let (scenario, (json, lines)) = match form(file) {
@@ -77,13 +77,14 @@ fn told_of_bluesky(scn: &ScnFile) -> (Value, Lines) {
     (json, lines)
 }
 
-/// Aircraft that begin where only a navigation database knows, with the names of these places.
+/// Returns the aircraft that start at places known only to a navigation database, with the names of
+/// these places.
 fn without_place(scn: &ScnFile) -> Vec<String> {
     let unplaced = scn.traffic.unplaced.iter();
     unplaced.map(|one| format!("{} at {}", one.aircraft.id, one.place)).collect()
 }
 
-/// Names that the file does not define of places to fly to, each once.
+/// Returns the names of places to fly to that the file does not define, each once.
 fn unresolved_names(scn: &ScnFile) -> Vec<String> {
     let creates = |command: &str| matches!(command, "CRE" | "CREATE");
     let uses = scn.unresolved_places.iter().filter(|used| !creates(&used.command));
@@ -112,13 +113,13 @@ fn told_of_tracks(recorded: &RecordedTraffic) -> (Value, Lines) {
     (json, lines)
 }
 
-/// Names with their counts on one line; no line for none.
+/// Returns names with their counts on one line; no line for none.
 fn counted(name: &str, counts: &BTreeMap<String, u64>) -> Option<(String, String)> {
     let words: Vec<String> = counts.iter().map(|(name, n)| format!("{name} {n}")).collect();
     (!words.is_empty()).then(|| (name.to_string(), words.join(", ")))
 }
 
-/// The first few names, and how many more there are; no line for none.
+/// Returns the first few names, and the number of others; no line for none.
 fn first_named(name: &str, all: &[String]) -> Option<(String, String)> {
     const NAMED: usize = 5;
     let mut words = all[..all.len().min(NAMED)].join(", ");
@@ -128,9 +129,9 @@ fn first_named(name: &str, all: &[String]) -> Option<(String, String)> {
     (!all.is_empty()).then(|| (name.to_string(), words))
 }
 
-/// A line per error, which says where in the file it is.
+/// Returns a line per error, which says where in the file it is.
 fn listed(name: &str, errors: &[InputError]) -> impl Iterator<Item = (String, String)> {
-    // The remedy stands on a line of its own, which would look like a line of the report.
+    // The remedy is on a line of its own, which would look like a line of the report.
     let in_one_line = |error: &InputError| error.to_string().replace("\n  help: ", "; ");
     errors.iter().map(move |error| (name.to_string(), in_one_line(error)))
 }

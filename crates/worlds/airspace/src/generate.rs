@@ -1,4 +1,4 @@
-//! Traffic that is made up: the super-conflict, random crossings, converging streams.
+//! Generated traffic: the super-conflict, random crossings, and converging streams.
 
 use super::flight::{Airplane, Model, Point, Pose, distance_m};
 use super::purpose;
@@ -7,10 +7,10 @@ use sidestep_kernel::math;
 use sidestep_kernel::stream::{Draws, Streams};
 use std::f64::consts::TAU;
 
-/// Draws until a place is far enough from all others, at most this often per airplane.
+/// Largest number of draws, per airplane, for a place far enough from all others.
 const TRIES: usize = 2_000;
 
-/// Kinds of made-up traffic.
+/// Kinds of generated traffic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum GeneratorKind {
@@ -22,7 +22,7 @@ pub(crate) enum GeneratorKind {
     Streams,
 }
 
-/// What is to be generated.
+/// Parameters of the traffic to generate.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Order<'a> {
     pub(super) kind: GeneratorKind,
@@ -32,7 +32,7 @@ pub(super) struct Order<'a> {
     pub(super) model: &'a Model,
 }
 
-/// The airplanes, or how many found a place before there was none left.
+/// Returns the airplanes, or, as an error, how many found a place before there was none left.
 pub(super) fn generate(order: &Order<'_>, streams: &Streams) -> Result<Vec<Airplane>, usize> {
     match order.kind {
         GeneratorKind::Superconflict => Ok(superconflict(order, streams)),
@@ -64,8 +64,8 @@ fn draws(streams: &Streams, id: usize) -> Draws {
     streams.draws(id as u32, 0, purpose::PLACE)
 }
 
-/// Evenly spread on a circle, each to the opposite point. The seed turns the circle, and moves
-/// each airplane along it by up to the jitter.
+/// Returns airplanes evenly spread on a circle, each flying to the opposite point. The seed turns
+/// the circle, and moves each airplane along it by up to the jitter.
 fn superconflict(order: &Order<'_>, streams: &Streams) -> Vec<Airplane> {
     let turned = TAU * draws(streams, order.n).uniform();
     let place = |k: usize| {
@@ -80,8 +80,9 @@ fn superconflict(order: &Order<'_>, streams: &Streams) -> Vec<Airplane> {
         .collect()
 }
 
-/// Anywhere in a disc, each to a point of the disc at least half its radius away. Starts are so
-/// far apart that first fallbacks are: an orbit's diameter each, and the separation.
+/// Returns airplanes anywhere in a disc, each flying to a point of the disc at least half its
+/// radius away. Starts are so far apart that first fallbacks are, too: an orbit's diameter each,
+/// and the separation.
 fn random(order: &Order<'_>, streams: &Streams) -> Result<Vec<Airplane>, usize> {
     let gap_m = 4.0 * order.model.turn_radius_m() + order.model.separation_m + 1.0;
     let mut starts: Vec<Point> = Vec::new();
@@ -104,9 +105,9 @@ fn in_disc(radius_m: f64, draws: &mut Draws) -> Point {
     on_circle(r, TAU * draws.uniform())
 }
 
-/// Three streams that meet at the center and go on together; airplanes of a stream follow each
-/// other at four separations, and the first of each stream come to the center at once, so do the
-/// second, and so on.
+/// Returns three streams that meet at the center and continue together. Airplanes of a stream
+/// follow each other at four separations; the first of each stream reach the center at the same
+/// time, and so do the second, and so on.
 fn converging(order: &Order<'_>, streams: &Streams) -> Vec<Airplane> {
     let spacing_m = 4.0 * order.model.separation_m;
     (0..order.n)

@@ -22,7 +22,7 @@ pub(super) fn join(turn: &mut Turn<'_>, bodies: Range<usize>, groups: &Groups) {
     }
 }
 
-/// Whether two airplanes have to mind each other.
+/// Returns whether two airplanes have to mind each other.
 fn is_near(turn: &Turn<'_>, a: Slot, b: Slot) -> bool {
     let Turn { world, state, .. } = turn;
     let at = |slot: Slot| state.airplanes[slot as usize].pose().at;
@@ -30,7 +30,7 @@ fn is_near(turn: &Turn<'_>, a: Slot, b: Slot) -> bool {
         && levels(turn, a).meets(&levels(turn, b), world.vertical_m)
 }
 
-/// All levels that an airplane is on, or is told to go to by now.
+/// Returns all levels that an airplane is on, or has been ordered to change to by now.
 fn levels(turn: &Turn<'_>, slot: Slot) -> Levels {
     let Turn { world, state, now, .. } = turn;
     if world.is_replayed(slot, *now) {

@@ -1,4 +1,4 @@
-//! The world as those see it who run scenarios and know no world.
+//! The world as it appears to code that runs scenarios of any world.
 
 use super::scenario::Compiled;
 use super::{AirspaceWorld, bundle, foreign, words};

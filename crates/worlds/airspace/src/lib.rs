@@ -9,7 +9,7 @@
 //! perceive.rs -> join.rs -> decide.rs -> act.rs                            one cycle of dt
 //! flight/: motion, orders, tracks       objective.rs: what is minimized    behind it
 //! shield/: what is safe for ever        agents/, deploy/: who decides, over which network
-//! baseline/: other methods              metrics.rs: what came of it
+//! baseline/: other methods              metrics.rs: the sums of a run
 //! ```
 
 mod act;
@@ -56,18 +56,20 @@ pub use world::AirspaceWorld;
 /// A worker's turn in one phase of one cycle.
 type Turn<'a> = sidestep_kernel::Turn<'a, AirspaceWorld>;
 
-/// What a worker keeps between tasks.
+/// A worker's buffers and sums, kept between tasks.
 #[derive(Debug, Default)]
 pub struct Scratch {
     /// Pairs that came near each other.
     pairs: BTreeMap<(Slot, Slot), PairRecord>,
     optimizations: Vec<Optimization>,
-    /// What the shield has sent.
+    /// Messages and bytes that the shield has sent.
     exchanged: Traffic,
     events: Vec<Event>,
-    /// Pairs without fallbacks that are apart, of which one came in: cycle and both.
+    /// Pairs without fallbacks that are apart, one of which has just come in: cycle and both
+    /// airplanes.
     too_close: Vec<(Cycle, Slot, Slot)>,
-    /// Processor time spent deciding: told beside the results, never part of them.
+    /// Processor time spent deciding, in nanoseconds: reported beside the results, never part of
+    /// them.
     decide_ns: u64,
     flying: Vec<Slot>,
 }

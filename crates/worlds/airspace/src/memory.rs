@@ -1,4 +1,4 @@
-//! How much memory optimizing a group takes: said before, not after.
+//! The memory that optimizing a group takes, computed in advance.
 
 use super::deploy::Deployment;
 use super::flight::{Known, Point, distance_m};
@@ -12,8 +12,8 @@ use sidestep_kernel::Slot;
 use sidestep_kernel::conflict::Groups;
 use sidestep_kernel::ports::ManualClock;
 
-/// Bytes that optimizing a group takes at most: tables of its pairs, and predictions, in as
-/// many copies as its deployment has of them.
+/// Returns the largest number of bytes that optimizing a group takes: tables of its pairs, and
+/// predictions, in all the copies that its deployment has of them.
 pub(super) fn group_takes_bytes(world: &AirspaceWorld, group: &[Known]) -> u64 {
     let (tables, predictions) = (table_bytes(world, group), prediction_bytes(world, group));
     let members = group.len() as u64;
@@ -25,7 +25,7 @@ pub(super) fn group_takes_bytes(world: &AirspaceWorld, group: &[Known]) -> u64 {
         (Deployment::Team | Deployment::CompactTeam, Estimator::Exact) => {
             2 * tables + members * predictions
         }
-        // Each computes what all samples cost all.
+        // Each agent computes the costs of all samples to all members.
         (Deployment::CompactTeam, Estimator::Sampled { .. }) => members * (tables + predictions),
         // Each has the sampled ways of all others, of this round and the one before.
         (Deployment::Team, Estimator::Sampled { block, .. }) => {
@@ -35,13 +35,13 @@ pub(super) fn group_takes_bytes(world: &AirspaceWorld, group: &[Known]) -> u64 {
     }
 }
 
-/// Bytes of the predicted ways of all actions of a group.
+/// Returns the bytes of the predicted ways of all actions of a group.
 fn prediction_bytes(world: &AirspaceWorld, group: &[Known]) -> u64 {
     let ways: u64 = group.iter().map(|known| world.actions_of(known.slot).len() as u64).sum();
     ways * world.timing.horizon as u64 * size_of::<Point>() as u64
 }
 
-/// Bytes that the tables of a group's pairs take at most.
+/// Returns the largest number of bytes that the tables of a group's pairs take.
 fn table_bytes(world: &AirspaceWorld, group: &[Known]) -> u64 {
     let actions = |known: &Known| world.actions_of(known.slot).len() as u64;
     let mut entries = 0;
@@ -57,7 +57,7 @@ fn table_bytes(world: &AirspaceWorld, group: &[Known]) -> u64 {
     entries * PairwiseGame::BYTES_PER_ENTRY
 }
 
-/// The members of the group that takes most at the start of a run, and its bytes.
+/// Returns the size of the group that takes most memory at the start of a run, and its bytes.
 pub(super) fn largest_at_start(world: &AirspaceWorld, state: &AirspaceState) -> (usize, u64) {
     let n = world.airplanes.len();
     let (groups, mut scratch) = (Groups::new(n), Scratch::default());
@@ -82,7 +82,8 @@ mod tests {
     use super::*;
     use sidestep_scenario::Source;
 
-    /// Bytes of four airplanes, all near each other, each with so many actions.
+    /// Returns the bytes of four airplanes, all near each other, and the number of each one's
+    /// actions.
     fn taken(deployment: &str, preset: &str) -> (u64, u64) {
         let text = format!(
             "format = 1\nworld = \"airspace\"\n[airspace]\npreset = \"{preset}\"\nhorizon = 200\n\

@@ -1,4 +1,4 @@
-//! What came of a run.
+//! The metrics of a run.
 
 use super::decide::Effort;
 use super::events::{Event, EventKind};
@@ -8,17 +8,17 @@ use serde::{Deserialize, Serialize};
 use sidestep_kernel::{Cycle, EntityId};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Everything that a run books beside its state, and that a checkpoint keeps.
+/// Everything that a run counts beside its state, and that a checkpoint keeps.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Ledger {
     /// Pairs that came near each other, by ids.
     pub pairs: BTreeMap<(EntityId, EntityId), PairRecord>,
     /// Pairs without fallbacks that are apart when the later one of them came under the method,
-    /// after the cycle in which that was.
+    /// each with the cycle of that event.
     pub too_close: BTreeSet<(Cycle, EntityId, EntityId)>,
     /// Sums over optimizations.
     pub effort: Effort,
-    /// How often what happened.
+    /// Number of events of each kind.
     pub events: BTreeMap<EventKind, u64>,
 }
 
@@ -39,55 +39,56 @@ impl Ledger {
 /// Metrics of a run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Metrics {
-    /// Closest approach of any two airplanes; none if no two came near each other.
+    /// Closest approach of any two airplanes, in meters; none if no two came near each other.
     pub min_separation_m: Option<f64>,
-    /// How often two airplanes have come nearer than their separation.
+    /// Number of times that two airplanes came nearer than their separation.
     pub losses_of_separation: u64,
     /// Seconds that pairs spent nearer than their separation.
     pub lost_s: f64,
-    /// Airplanes that have reached their last way-point.
+    /// Number of airplanes that have reached their last way-point.
     pub arrived: u64,
-    /// All airplanes.
+    /// Number of all airplanes.
     pub airplanes: u64,
-    /// Mean over those that have arrived: time beyond what the flight takes alone, percent of
+    /// Mean delay of those that have arrived: time beyond that of the flight alone, in percent of
     /// that. Those whose flight alone would never end are left out.
     pub mean_delay_percent: Option<f64>,
-    /// Messages between agents, or migrations of a coordinator; none where one process decides
-    /// for all.
+    /// Number of messages between agents, or migrations of a coordinator; none where one process
+    /// decides for all.
     pub messages: u64,
-    /// Bytes of those messages.
+    /// Number of bytes of those messages.
     pub bytes: u64,
-    /// Messages, if one could reach all of a group,
+    /// Number of messages if one could reach all of a group.
     pub multicasts: u64,
-    /// and their bytes.
+    /// Number of bytes if one message could reach all of a group.
     pub multicast_bytes: u64,
-    /// Optimizations run.
+    /// Number of optimizations run.
     pub optimisations: u64,
-    /// Their rounds on average.
+    /// Mean number of their rounds.
     pub rounds_mean: Option<f64>,
-    /// Optimizations whose rounds ran out.
+    /// Number of optimizations whose rounds ran out.
     pub unconverged: u64,
-    /// Processor time spent deciding in this process's run, all workers together.
+    /// Processor time in seconds spent deciding in this process's run, all workers together.
     pub optimise_cpu_s: f64,
-    /// Times that the shield changed what an airplane wanted,
+    /// Number of times that the shield changed an airplane's wish.
     pub shield_overrides: u64,
-    /// of these, falls back to an orbit for one `dt`,
+    /// Number of those times when the airplane fell back to an orbit for one `dt`.
     pub shield_orbits: u64,
-    /// and of these, since not everybody had agreed in time.
+    /// Number of those times when the cause was that not all others had agreed in time.
     pub shield_held_back: u64,
-    /// Times that an airplane lost contact with another one.
+    /// Number of times that an airplane lost contact with another one.
     pub contacts_lost: u64,
-    /// Times that an airplane's agent ran out of time.
+    /// Number of times that an airplane's agent ran out of time.
     pub deadlines_missed: u64,
-    /// Times that a group was too large to be optimized.
+    /// Number of times that a group was too large to be optimized.
     pub groups_too_large: u64,
-    /// Airplanes that were removed before they had arrived.
+    /// Number of airplanes that were removed before they had arrived.
     pub left: u64,
-    /// Airplanes that arrived at the end of their recorded way, which nobody changed.
+    /// Number of airplanes that arrived at the end of their recorded way, which nothing changed.
     pub replayed: u64,
-    /// Orders carried out.
+    /// Number of orders carried out.
     pub orders: u64,
-    /// Times that an order waited for the next `dt`, because no orbit was apart from those of others.
+    /// Number of times that an order waited for the next `dt`, because no orbit was apart from
+    /// those of others.
     pub orders_delayed: u64,
     /// Pairs for which the shield promises nothing.
     pub too_close: Vec<TooClose>,
@@ -96,60 +97,60 @@ pub struct Metrics {
 /// Two airplanes that were too near each other for the shield when the later one came in.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct TooClose {
-    /// When that was, seconds after the start.
+    /// Time when the later one came in, in seconds after the start of the run.
     pub at_s: f64,
-    /// The two.
+    /// Ids of the two.
     pub airplanes: [EntityId; 2],
 }
 
-/// What came of one airplane.
+/// Metrics of one airplane.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AirplaneMetrics {
     /// Its id.
     pub airplane: EntityId,
-    /// Seconds from its appearance to its arrival, if it has arrived; of a recorded one, from
-    /// when it was handed over.
+    /// Seconds from its appearance to its arrival, if it has arrived; for a recorded airplane, from
+    /// its handover to the method.
     pub flown_s: Option<f64>,
     /// Seconds that the flight takes alone; 0 where it flew its recorded way to the end, infinite
     /// where it would never end.
     pub alone_s: f64,
-    /// Time beyond that, percent of it.
+    /// Time beyond that of the flight alone, in percent of it.
     pub delay_percent: Option<f64>,
-    /// Times that the shield changed what it wanted,
+    /// Number of times that the shield changed its wish.
     pub shield_overrides: u32,
-    /// of these, falls back to its orbit.
+    /// Number of those times when it fell back to its orbit.
     pub shield_orbits: u32,
     /// Whether it was removed before it had arrived.
     pub left: bool,
-    /// Orders carried out.
+    /// Number of orders carried out.
     pub orders: u16,
-    /// Times that one had to wait for the next `dt`.
+    /// Number of times that an order had to wait for the next `dt`.
     pub orders_delayed: u16,
 }
 
-/// What came of two airplanes that came near each other.
+/// Metrics of two airplanes that came near each other.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct PairMetrics {
     /// Their ids.
     pub airplanes: [EntityId; 2],
-    /// Closest approach.
+    /// Closest approach in meters.
     pub nearest_m: f64,
-    /// How often they have come nearer than their separation,
+    /// Number of times that they came nearer than their separation.
     pub losses: u32,
-    /// seconds spent so,
+    /// Seconds that they spent nearer than their separation.
     pub lost_s: f64,
-    /// and the part of the separation that was lost at most, from 0 to 1.
+    /// Largest part of the separation that was lost, from 0 to 1.
     pub severity: f64,
 }
 
 impl AirplaneMetrics {
-    /// Seconds beyond what the flight takes alone; none where alone it would never end.
+    /// Returns the seconds beyond the flight alone; none where alone it would never end.
     pub(super) fn delay_s(&self) -> Option<f64> {
         self.flown_s.map(|flown_s| flown_s - self.alone_s).filter(|delay_s| delay_s.is_finite())
     }
 }
 
-/// Metrics of one airplane.
+/// Returns the metrics of one airplane.
 pub fn airplane_metrics(
     world: &AirspaceWorld,
     state: &AirspaceState,
@@ -180,7 +181,7 @@ fn is_replayed_to_the_end(world: &AirspaceWorld, id: EntityId) -> bool {
     track.as_ref().is_some_and(|track| track.ends_s() <= joined_s)
 }
 
-/// Metrics of all pairs that came near each other, by ids.
+/// Returns the metrics of all pairs that came near each other, by ids.
 pub fn pair_metrics(world: &AirspaceWorld, ledger: &Ledger) -> Vec<PairMetrics> {
     let separation_m = |id: EntityId| world.airplanes[id as usize].model.separation_m;
     let one = |(&(a, b), record): (&(EntityId, EntityId), &PairRecord)| PairMetrics {
@@ -201,7 +202,7 @@ fn count(state: &AirspaceState, is: impl Fn(&Cell) -> bool) -> u64 {
     state.airplanes.iter().filter(|cell| is(cell)).count() as u64
 }
 
-/// How many have flown their recorded way to its end.
+/// Returns the number of airplanes that have flown their recorded way to its end.
 fn replayed(world: &AirspaceWorld, state: &AirspaceState) -> u64 {
     let all = (0..).zip(&state.airplanes);
     let ended = all.filter(|(_, cell)| cell.arrived_step().is_some());
@@ -212,7 +213,7 @@ fn mean(sum: f64, n: usize) -> Option<f64> {
     (n > 0).then(|| sum / n as f64)
 }
 
-/// Metrics of a run so far; `decide_s` is the time spent deciding.
+/// Returns the metrics of a run so far; `decide_s` is the time spent deciding, in seconds.
 pub fn metrics(
     world: &AirspaceWorld,
     state: &AirspaceState,
@@ -258,7 +259,7 @@ fn too_close(world: &AirspaceWorld, &(cycle, a, b): &(Cycle, EntityId, EntityId)
     TooClose { at_s: world.starts_s(cycle), airplanes: [a, b] }
 }
 
-/// Whether everybody has arrived or left by now.
+/// Returns whether all airplanes have arrived or left by now.
 pub fn everybody_has_arrived(state: &AirspaceState) -> bool {
     state.airplanes.iter().all(|cell| !cell.is_flying())
 }
@@ -269,7 +270,7 @@ mod tests {
     use sidestep_kernel::Simulation;
     use sidestep_scenario::Source;
 
-    /// Alone, the first is told to keep a heading before it comes to its way-point. In traffic an
+    /// Alone, the first is ordered to keep a heading before it reaches its way-point. In traffic an
     /// order may have to wait, and so it may arrive after all.
     #[test]
     fn a_flight_that_alone_would_never_end_has_no_delay() {

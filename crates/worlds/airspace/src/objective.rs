@@ -10,24 +10,25 @@ use super::flight::{Levels, Point, Prediction};
 use serde::{Deserialize, Serialize};
 use sidestep_collectives::PairwiseGame;
 
-/// What is weighed against what.
+/// The weights of separation and deviation.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Objective {
     /// Weight of deviations from the optimal way.
     pub alpha: f64,
     /// Factor on penalties per step into the future, in (0, 1].
     pub beta: f64,
-    /// Factor on separations in the objective: above 1, some margin is asked for.
+    /// Factor on separations in the objective; above 1, it asks for a margin.
     pub inflation: f64,
-    /// Whether steps after either has arrived do not count.
+    /// Whether steps after the arrival of either airplane do not count.
     pub mask: bool,
-    /// Airplanes at least this far above each other cost each other nothing.
+    /// Airplanes at least this many meters above each other add no cost to each other.
     pub vertical_m: f64,
 }
 
 impl Objective {
-    /// `Gcol_i` and `Gcol_j` of two predictions, for separations `r` of `i` and `j` (eq. 9):
-    /// slice by slice of time, so that whoever knows slices apart comes to the same bits.
+    /// Returns `Gcol_i` and `Gcol_j` of two predictions, for separations `r` of `i` and `j` in
+    /// meters (eq. 9). Sums slice by slice of time, so that a caller that skips slices which are
+    /// apart gets the same bits.
     pub fn collision(&self, a: &Prediction, b: &Prediction, r: [f64; 2]) -> [f64; 2] {
         let counted = |way: &Prediction| if self.mask { way.counted } else { way.points.len() };
         let most = counted(a).min(counted(b));
@@ -41,7 +42,7 @@ impl Objective {
         sums
     }
 
-    /// The same over the points of one slice, of which the first weighs `weight`.
+    /// Returns the same over the points of one slice, of which the first has the weight `weight`.
     fn slice_collision(&self, a: &[Point], b: &[Point], mut weight: f64, r: [f64; 2]) -> [f64; 2] {
         let [ra, rb] = r.map(|r| r * self.inflation);
         let widest = ra.max(rb) * ra.max(rb);
@@ -60,12 +61,13 @@ impl Objective {
         sums
     }
 
-    /// What the first point of a slice weighs if that of the slice before weighs `weight`.
+    /// Returns the weight of a slice's first point if that of the slice before has the weight
+    /// `weight`.
     fn aged(&self, weight: f64) -> f64 {
         (0..SLICE).fold(weight, |weight, _| weight * self.beta)
     }
 
-    /// `Gdev_i`, from the ends of a prediction and of the optimal one (eq. 10).
+    /// Returns `Gdev_i`, from the ends of a prediction and of the optimal one (eq. 10).
     pub fn deviation(&self, of: &Prediction, optimal: &Prediction) -> f64 {
         match (of.points.last(), optimal.points.last()) {
             (Some(p), Some(q)) => {
@@ -77,7 +79,8 @@ impl Objective {
     }
 }
 
-/// Points of a slice of time. Within a slice ways move little, so bounds around it are tight.
+/// Number of points of a slice of time. Within a slice ways move little, so bounds around it are
+/// tight.
 const SLICE: usize = 16;
 
 /// An airplane's predictions, one per action, the optimal action last.
@@ -85,15 +88,15 @@ const SLICE: usize = 16;
 pub struct Options {
     /// One prediction per action.
     pub predictions: Vec<Prediction>,
-    /// Separation asked for.
+    /// Separation asked for, in meters.
     pub separation_m: f64,
-    /// The levels it takes.
+    /// The levels that the airplane occupies.
     pub levels: Levels,
     slices: Vec<Slice>,
 }
 
 impl Options {
-    /// Options with their slices.
+    /// Returns options with their slices.
     pub fn new(predictions: Vec<Prediction>, separation_m: f64, levels: Levels) -> Self {
         let longest = predictions.iter().map(|p| p.points.len()).max().unwrap_or(0);
         let slices = (0..longest).step_by(SLICE).map(|from| Slice::new(&predictions, from));
@@ -108,15 +111,15 @@ impl Options {
     }
 }
 
-/// What all actions of an airplane come to in one slice of time.
+/// The ways of all actions of an airplane in one slice of time.
 #[derive(Debug, Clone)]
 struct Slice {
     pieces: Vec<Piece>,
-    /// Around all of them.
+    /// Bounds around all of them.
     all: Bounds,
 }
 
-/// Points of a slice that some actions share: those that turn alike differ only later.
+/// Points of a slice that some actions share: actions with the same turn differ only later.
 #[derive(Debug, Clone)]
 struct Piece {
     /// The actions, at least one.
@@ -133,7 +136,7 @@ impl Slice {
             let end = way.points.len().min(from + SLICE);
             let points = &way.points[from.min(end)..end];
             let counted = way.counted.clamp(from.min(end), end);
-            // Most ways that differ do so at the end.
+            // Compared from the end, because most ways that differ do so there.
             let is_alike = |piece: &&mut Piece| {
                 let other = &predictions[piece.actions[0]].points;
                 let other = &other[from.min(other.len())..other.len().min(from + SLICE)];
@@ -177,7 +180,7 @@ impl Bounds {
 /// The objective of a group as a game: players are airplanes, strategies actions, and
 /// `G = sum own + sum pairs` with `own_i = alpha Gdev_i` and `pair_ij = Gcol_i + Gcol_j`.
 ///
-/// All that does not change during an optimization is computed here, once.
+/// Everything that does not change during an optimization is computed here, once.
 pub fn game(objective: &Objective, group: &[Options]) -> PairwiseGame {
     let own = group.iter().map(|options| own_costs(objective, options)).collect();
     let mut game = PairwiseGame::new(own);
@@ -189,14 +192,14 @@ pub fn game(objective: &Objective, group: &[Options]) -> PairwiseGame {
     game
 }
 
-/// `alpha Gdev` of every action.
+/// Returns `alpha Gdev` of every action.
 pub(super) fn own_costs(objective: &Objective, options: &Options) -> Vec<f64> {
     let optimal = options.predictions.last().expect("every airplane has an optimal action");
     let deviation = |p: &Prediction| objective.alpha * objective.deviation(p, optimal);
     options.predictions.iter().map(deviation).collect()
 }
 
-/// Adds what two airplanes cost each other to a game, if anything.
+/// Adds the costs of two airplanes to each other to a game, if there are any.
 pub(super) fn couple(
     game: &mut PairwiseGame,
     objective: &Objective,
@@ -210,11 +213,11 @@ pub(super) fn couple(
     }
 }
 
-/// `Gcol` of both for every two actions, if any two cost anything. Most slices of ways never
-/// come near each other, and what several actions share is computed once.
+/// Returns `Gcol` of both for every two actions, if any two cost anything. Most slices of ways
+/// never come near each other, and the points that several actions share are computed once.
 fn pair_costs(objective: &Objective, a: &Options, b: &Options) -> Option<Vec<[f64; 2]>> {
     let r = [a.separation_m, b.separation_m];
-    // A hair more, so that no rounding of bounds leaves out what costs anything.
+    // Slightly more, so that no rounding of bounds leaves out points that add a cost.
     let gap_m = objective.inflation * r[0].max(r[1]) * (1.0 + 1e-9);
     let columns = b.predictions.len();
     let mut costs = None;
@@ -356,7 +359,7 @@ mod tests {
         near(game.cost(&vec![0; options.len()]), &expected["G"], name);
     }
 
-    /// What slices, bounds and shared pieces leave out is what costs nothing, to the bit.
+    /// The parts left out by slices, bounds and shared pieces cost nothing, to the bit.
     #[test]
     fn tables_hold_what_two_predictions_cost_to_the_bit() {
         use super::super::flight::{Legs, actions};

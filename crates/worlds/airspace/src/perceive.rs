@@ -1,4 +1,4 @@
-//! Pool one: airplanes list themselves in the neighborhood, and are perceived there.
+//! *Perceive*: airplanes list themselves in the neighborhood, and are perceived there.
 
 use super::Turn;
 use super::flight::Known;
@@ -9,7 +9,7 @@ use sidestep_kernel::distr::normal;
 use sidestep_kernel::{Cycle, Slot};
 use std::ops::Range;
 
-/// Lists those of `bodies` that are there.
+/// Lists those of `bodies` that are in the air.
 pub(super) fn claim(turn: &mut Turn<'_>, bodies: Range<usize>) {
     let Turn { world, state, now, .. } = *turn;
     for slot in bodies {
@@ -20,7 +20,7 @@ pub(super) fn claim(turn: &mut Turn<'_>, bodies: Range<usize>) {
     }
 }
 
-/// Returns what the group knows of an airplane: its position with an error.
+/// Returns the group's knowledge of an airplane: its position with an error.
 pub(super) fn known(world: &AirspaceWorld, state: &AirspaceState, now: Cycle, slot: Slot) -> Known {
     let cell = &state.airplanes[slot as usize];
     let mut pose = cell.pose();

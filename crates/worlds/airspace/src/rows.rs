@@ -1,4 +1,4 @@
-//! What a run records: its tables, and their rows until they are recorded.
+//! The tables that a run records, and their rows until they are recorded.
 
 use super::decide::Optimization;
 use super::events::{Event, EventKind};
@@ -8,7 +8,7 @@ use sidestep_kernel::ports::table::label_of;
 use sidestep_kernel::ports::{Buffer, Buffers, RowBuffer, Table};
 use sidestep_kernel::{Cycle, EntityId};
 
-/// Where an airplane is at the start of a cycle.
+/// Place of an airplane at the start of a cycle.
 #[derive(Debug)]
 struct Place {
     cycle: Cycle,
@@ -48,7 +48,7 @@ fn optimizations() -> Table<Optimization> {
         .u64("bytes", "their bytes", |o| o.traffic.bytes)
 }
 
-/// Rows that wait for being recorded.
+/// Rows that wait to be recorded.
 #[derive(Debug, Default)]
 pub(super) struct Rows {
     record: RecordSection,
@@ -58,12 +58,12 @@ pub(super) struct Rows {
 }
 
 impl Rows {
-    /// Nothing yet; later what `record` asks for.
+    /// Returns empty rows, which later keep the tables that `record` asks for.
     pub(super) fn new(record: RecordSection) -> Self {
         Self { record, ..Self::default() }
     }
 
-    /// Begins to keep rows.
+    /// Starts to keep rows.
     pub(super) fn begin(&mut self) {
         self.places.begin(self.record.trajectories.then(trajectories));
         self.events.begin(self.record.events.then(events));

@@ -1,4 +1,4 @@
-//! What a run asks of the world beside its phases.
+//! The hooks by which a run asks the world for more than its phases.
 
 use super::decide::Optimization;
 use super::events::Event;
@@ -28,7 +28,8 @@ pub fn airspace_run(source: &Source, workers: usize) -> Result<AirspaceRun, Inpu
 }
 
 impl Compiled {
-    /// A run at its start; the world is shared, not copied. `source` names it in checkpoints.
+    /// Returns a run at its start; the world is shared, not copied. `source` names it in
+    /// checkpoints.
     pub fn start(self, source: &Source, workers: usize) -> AirspaceRun {
         let state = AirspaceState::restore(&self.world, &self.start_snapshot());
         let too_close = self.too_close.iter().map(|&(a, b)| (0, a, b)).collect();
@@ -38,7 +39,7 @@ impl Compiled {
         Run::new(self.world, plan, (state, books), &source.text, workers)
     }
 
-    /// What the scenario asks for.
+    /// Returns the plan that the scenario asks for.
     pub fn plan(&self) -> Plan {
         Plan {
             name: self.name.clone(),
@@ -49,14 +50,14 @@ impl Compiled {
     }
 }
 
-/// What a run keeps beside its state.
+/// Data that a run keeps beside its state.
 #[derive(Debug, Default)]
 pub struct Books {
-    /// Sums that metrics are made of.
+    /// Sums from which metrics are computed.
     pub ledger: Ledger,
-    /// Processor time spent deciding in this process.
+    /// Processor time in nanoseconds spent deciding in this process.
     decide_ns: u64,
-    /// What is to be recorded; nothing without recording.
+    /// Rows that wait to be recorded; none without recording.
     rows: Rows,
     /// Events that wait for the next frame.
     log: Log<Event>,

@@ -1,4 +1,4 @@
-//! The text of an airspace scenario, and what it compiles to.
+//! The text of an airspace scenario, and its compiled form.
 
 mod airplanes;
 mod compile;
@@ -31,7 +31,7 @@ pub(super) use values::{Measure, TurnRate, Turns};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Preset {
-    /// The safe one: exact expectations, hardly any weight on deviations, a margin on the
+    /// The safe set: exact expectations, hardly any weight on deviations, a margin on the
     /// separation, legs around others.
     #[default]
     Default,
@@ -80,15 +80,15 @@ struct AirspaceSection {
     replay_until_s: Option<Number<UntilWhen>>,
     group_memory_gib: Option<Positive>,
     wind_m_s: Option<Spanned<Point<2>>>,
-    /// Larger errors of known positions than this mean nothing.
+    /// Standard deviation in meters; larger errors of known positions make no sense.
     position_noise_m: Option<Number<FromTo<0, 1_000_000>>>,
     heading_noise_deg: Option<NonNegative>,
 }
 
-/// A weight or a factor that only takes away.
+/// A weight or a factor that can only reduce.
 type UpToOne = Number<AboveTo<0, 1>>;
 
-/// The times until which tracks may be replayed: infinity is one as well.
+/// The times until which tracks may be replayed, infinity included.
 #[derive(Debug, Clone, Copy)]
 struct UntilWhen;
 
@@ -112,7 +112,7 @@ pub struct RecordSection {
     pub events: bool,
     /// A row per optimization.
     pub optimizations: bool,
-    /// Cycles between two checkpoints; 0 for none.
+    /// Number of cycles between two checkpoints; 0 for none.
     pub checkpoint_every: u64,
 }
 
@@ -127,11 +127,11 @@ impl Default for RecordSection {
 pub struct Compiled {
     /// The immutable world.
     pub world: Arc<AirspaceWorld>,
-    /// Name of the scenario, may be empty.
+    /// Name of the scenario; may be empty.
     pub name: String,
-    /// The seed.
+    /// The random seed.
     pub seed: u64,
-    /// Cycles at most; a run ends when all have arrived.
+    /// Largest number of cycles; a run ends when all have arrived.
     pub cycles: u64,
     /// The tables to keep.
     pub record: RecordSection,
@@ -151,7 +151,7 @@ impl Compiled {
         Compiler { source, head, file: &file }.compile()
     }
 
-    /// The state at the start.
+    /// Returns the state at the start.
     pub fn start_snapshot(&self) -> Snapshot {
         let close: BTreeSet<u32> = self.too_close.iter().flat_map(|&(a, b)| [a, b]).collect();
         let record = |(id, (airplane, &fallback)): (u32, (&Airplane, &Side))| AirplaneRecord {

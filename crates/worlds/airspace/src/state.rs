@@ -1,4 +1,4 @@
-//! All that changes in a run, and its snapshot.
+//! The state of a run, and its snapshot.
 
 use super::agents::contact::Contacts;
 use super::flight::{Point, Pose, Stage};
@@ -11,30 +11,30 @@ use sidestep_kernel::{Column, Cycle, Digest, Slot};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::sync::{Mutex, PoisonError};
 
-/// Not arrived yet.
+/// Marks an airplane that has not arrived yet.
 pub const FLYING: u64 = u64::MAX;
-/// Set beside the time at which an airplane was removed, rather than arrived.
+/// Flag added to the time at which an airplane was removed, rather than arrived.
 const LEFT: u64 = 1 << 63;
-/// See [`Cell::fallback`].
+/// Value of [`Cell::fallback`] for an airplane that came in too close to another.
 const TOO_CLOSE: u8 = 2;
 const NOBODY: u32 = u32::MAX;
 
-/// How a flight ends, and in which step of `dtau` since the run's start.
+/// The end of a flight, with its step of `dtau` since the run's start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum End {
     /// At the last way-point, or at the end of the recorded way.
     Arrived(u64),
-    /// Removed before that.
+    /// Removed before it arrived.
     Left(u64),
 }
 
 /// The state of an airspace; slots are ids.
 #[derive(Debug)]
 pub struct AirspaceState {
-    /// What changes of each airplane.
+    /// The changing part of each airplane.
     pub airplanes: Box<[Cell]>,
     pub(super) neighborhood: Neighborhood,
-    /// What each airplane knows of others; nothing where the network can be relied on.
+    /// Each airplane's knowledge of others; empty where the network loses nothing.
     contacts: Box<[Mutex<Contacts>]>,
 }
 
@@ -42,52 +42,52 @@ pub struct AirspaceState {
 #[derive(Debug, Default)]
 #[repr(align(64))]
 pub struct Cell {
-    /// Position east, meters,
+    /// Position east, in meters.
     pub x_m: Shared<f64>,
-    /// and north.
+    /// Position north, in meters.
     pub y_m: Shared<f64>,
-    /// Heading.
+    /// Heading in radians, counter-clockwise from east.
     pub heading_rad: Shared<f64>,
-    /// Altitude, meters.
+    /// Altitude in meters.
     pub altitude_m: Shared<f64>,
     /// Steps of `dtau` since the run's start when it arrived, or [`FLYING`]; with the highest bit
-    /// set, when it was removed.
+    /// set, the step in which it was removed.
     pub arrived: Shared<u64>,
-    /// Way-points done with.
+    /// Number of way-points done with.
     pub next: Shared<u32>,
-    /// Times that the shield changed what it wanted,
+    /// Number of times that the shield changed its wish.
     pub overrides: Shared<u32>,
-    /// of these, falls back to its orbit,
+    /// Number of those times when it fell back to its orbit.
     pub orbits: Shared<u32>,
-    /// and how many of those in a row just now.
+    /// Number of those times in a row up to now.
     pub orbiting: Shared<u32>,
-    /// Orders carried out,
+    /// Number of orders carried out.
     pub orders: Shared<u16>,
-    /// and times that one had to wait for the next `dt`.
+    /// Number of times that an order had to wait for the next `dt`.
     pub waits: Shared<u16>,
-    /// Stored fallback, 0 left, 1 right; and 2 for having come in too close to another.
+    /// Stored fallback: 0 left, 1 right; 2 is added for having come in too close to another.
     pub fallback: Shared<u8>,
 }
 
 impl Cell {
-    /// Its pose.
+    /// Returns its pose.
     pub fn pose(&self) -> Pose {
         Pose { at: [self.x_m.get(), self.y_m.get()], heading_rad: self.heading_rad.get() }
     }
 
-    /// Puts it somewhere.
+    /// Sets its pose.
     pub fn set_pose(&self, pose: Pose) {
         self.x_m.set(pose.at[0]);
         self.y_m.set(pose.at[1]);
         self.heading_rad.set(pose.heading_rad);
     }
 
-    /// Whether it has not arrived yet.
+    /// Returns whether it has not arrived yet.
     pub fn is_flying(&self) -> bool {
         self.arrived.get() == FLYING
     }
 
-    /// How its flight has ended, if it has.
+    /// Returns the end of its flight, if it has ended.
     pub fn end(&self) -> Option<End> {
         match self.arrived.get() {
             FLYING => None,
@@ -96,7 +96,7 @@ impl Cell {
         }
     }
 
-    /// Ends its flight.
+    /// Stores the end of its flight.
     pub(super) fn set_end(&self, end: End) {
         self.arrived.set(match end {
             End::Arrived(step) => step,
@@ -104,7 +104,7 @@ impl Cell {
         });
     }
 
-    /// Steps of `dtau` since the run's start when it arrived, if it has.
+    /// Returns the steps of `dtau` since the run's start when it arrived, if it has.
     pub fn arrived_step(&self) -> Option<u64> {
         match self.end() {
             Some(End::Arrived(step)) => Some(step),
@@ -112,44 +112,44 @@ impl Cell {
         }
     }
 
-    /// Whether it was removed before it arrived.
+    /// Returns whether it was removed before it arrived.
     pub fn has_left(&self) -> bool {
         matches!(self.end(), Some(End::Left(_)))
     }
 
-    /// The stored fallback.
+    /// Returns the side of the stored fallback.
     pub fn side(&self) -> Side {
         Side::BOTH[usize::from(self.fallback.get() & 1)]
     }
 
-    /// Whether it came in too close to another for the shield.
+    /// Returns whether it came in too close to another for the shield.
     pub fn came_too_close(&self) -> bool {
         self.fallback.get() & TOO_CLOSE != 0
     }
 
-    /// Notes that it did.
+    /// Notes that it came in too close to another.
     pub(super) fn set_too_close(&self) {
         self.fallback.set(self.fallback.get() | TOO_CLOSE);
     }
 
-    /// Stores a fallback.
+    /// Stores the side of a fallback.
     pub fn set_side(&self, side: Side) {
         self.fallback.set(self.fallback.get() & TOO_CLOSE | side as u8);
     }
 }
 
-/// Who is near whom: lists of airplanes by square of the plane, built anew each cycle.
+/// The airplanes near each other: lists of airplanes by square of the plane, built anew each cycle.
 #[derive(Debug)]
 pub(super) struct Neighborhood {
     side_m: f64,
-    /// Per bucket: cycle (upper half) and last airplane listed (lower half).
+    /// For each bucket: cycle (upper half) and last airplane listed (lower half).
     first: Box<[AtomicU64]>,
-    /// Per airplane: the one listed before it.
+    /// For each airplane: the one listed before it.
     next: Column<u32>,
 }
 
 impl Neighborhood {
-    /// For `n` airplanes that mind each other up to `side_m` away.
+    /// Returns lists for `n` airplanes that mind each other up to `side_m` meters away.
     fn new(n: usize, side_m: f64) -> Self {
         let buckets = (2 * n).next_power_of_two();
         Self {
@@ -178,7 +178,7 @@ impl Neighborhood {
     }
 
     /// Calls `meet` for every airplane listed in this cycle in the squares around `at`, and
-    /// maybe for others.
+    /// possibly for others.
     pub(super) fn around(&self, at: Point, now: Cycle, mut meet: impl FnMut(Slot)) {
         let [x, y] = self.square(at);
         for square in (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| [x + dx, y + dy])) {
@@ -199,34 +199,33 @@ fn held(contacts: &Mutex<Contacts>) -> std::sync::MutexGuard<'_, Contacts> {
 /// One airplane in a snapshot.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct AirplaneRecord {
-    /// Its pose.
+    /// Pose at the start of the cycle.
     pub pose: Pose,
     /// See [`Cell::arrived`].
     pub arrived: u64,
-    /// Way-points done with, overrides, orbits, orbits in a row.
+    /// Number of way-points done with, overrides, orbits, and orbits in a row.
     pub counts: [u32; 4],
-    /// Stored fallback.
+    /// Side of the stored fallback.
     pub fallback: Side,
     /// Whether it came in too close to another for the shield.
     pub came_too_close: bool,
-    /// Altitude.
+    /// Altitude in meters.
     pub altitude_m: f64,
-    /// Orders carried out, and times that one had to wait.
+    /// Number of orders carried out, and of times that one had to wait.
     pub orders: [u16; 2],
 }
 
-/// Looks at the distance of a pair in one step of `dtau`.
+/// Number of looks at the distance of a pair in one step of `dtau`.
 pub const LOOKS_PER_STEP: usize = 10;
 
-/// What a pair of airplanes has come to.
+/// Closest approach and losses of a pair of airplanes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PairRecord {
-    /// Closest approach.
+    /// Closest approach in meters.
     pub nearest_m: f64,
-    /// Looks at which they were nearer than their separation, see
-    /// [`LOOKS_PER_STEP`].
+    /// Number of looks at which they were nearer than their separation, see [`LOOKS_PER_STEP`].
     pub lost_looks: u64,
-    /// Separate losses of separation.
+    /// Number of separate losses of separation.
     pub losses: u32,
 }
 
@@ -239,19 +238,19 @@ impl PairRecord {
     }
 }
 
-/// A state by id: what a checkpoint holds and a digest covers.
+/// A state by id: the content of a checkpoint, and the input of a digest.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Snapshot {
-    /// Cycles done.
+    /// Number of cycles done.
     pub cycle: Cycle,
     /// The airplanes by id.
     pub airplanes: Vec<AirplaneRecord>,
-    /// What each knows of others; empty where the network can be relied on.
+    /// Each airplane's knowledge of others; empty where the network loses nothing.
     pub contacts: Vec<Contacts>,
 }
 
 impl AirspaceState {
-    /// The state that a snapshot describes.
+    /// Returns the state that a snapshot describes.
     pub(super) fn restore(world: &AirspaceWorld, snapshot: &Snapshot) -> Self {
         let n = snapshot.airplanes.len();
         let all = 0..n;
@@ -282,15 +281,15 @@ impl AirspaceState {
         Self { airplanes, neighborhood: Neighborhood::new(n, farthest), contacts }
     }
 
-    /// Takes out what the airplanes of a group know of others. Groups share no airplane, so
-    /// nobody else asks for the same.
+    /// Takes out the knowledge that the airplanes of a group have of others. No two groups share an
+    /// airplane, so no other worker asks for the same.
     pub(super) fn take_contacts(&self, group: &[Slot]) -> Vec<Contacts> {
         let take =
             |&slot: &Slot| self.contacts.get(slot as usize).map(|c| std::mem::take(&mut *held(c)));
         group.iter().map(|slot| take(slot).unwrap_or_default()).collect()
     }
 
-    /// Puts it back.
+    /// Puts the knowledge back.
     pub(super) fn put_contacts(&self, group: &[Slot], known: Vec<Contacts>) {
         for (&slot, known) in group.iter().zip(known) {
             if let Some(contacts) = self.contacts.get(slot as usize) {
@@ -299,7 +298,7 @@ impl AirspaceState {
         }
     }
 
-    /// The state after `cycle` cycles.
+    /// Returns the state after `cycle` cycles.
     pub fn snapshot(&self, cycle: Cycle) -> Snapshot {
         let record = |cell: &Cell| AirplaneRecord {
             pose: cell.pose(),
@@ -314,7 +313,7 @@ impl AirspaceState {
         Snapshot { cycle, airplanes: self.airplanes.iter().map(record).collect(), contacts }
     }
 
-    /// Whether an airplane is there in a cycle: it has appeared and has not arrived.
+    /// Returns whether an airplane is there in a cycle: it has appeared and has not arrived.
     pub(super) fn is_there(&self, world: &AirspaceWorld, slot: Slot, now: Cycle) -> bool {
         self.airplanes[slot as usize].is_flying() && world.appears_in(slot as usize) <= now
     }
@@ -326,7 +325,7 @@ impl AirspaceState {
 }
 
 impl Snapshot {
-    /// The digest of this state (promise D1): every value by id.
+    /// Returns the digest of this state (promise D1): every value by id.
     pub fn digest(&self) -> Digest {
         let mut hasher = Hasher::default();
         hasher.u64(self.cycle);
@@ -338,7 +337,8 @@ impl Snapshot {
             airplane.counts.iter().for_each(|&n| hasher.u32(n));
             let too_close = if airplane.came_too_close { TOO_CLOSE } else { 0 };
             hasher.u8(airplane.fallback as u8 | too_close);
-            // Without orders the altitude is the scenario's, or that of the track at this time.
+            // Left out without orders, because the altitude then is the scenario's, or that of the
+            // track.
             let [orders, waits] = airplane.orders;
             if orders > 0 || waits > 0 {
                 hasher.u64(airplane.altitude_m.to_bits());

@@ -1,15 +1,15 @@
-//! Traffic of others -> a scenario: BlueSky `.scn` files and recorded tracks.
+//! From other programs' traffic to a scenario: BlueSky `.scn` files and recorded tracks.
 //!
-//! The text that comes out is a scenario like any other, complete in itself: it goes into the run
-//! folder and can be edited. Latitude and longitude become a plane about the traffic's center.
-//! Turn rates are those of a turn at 25 degrees of bank at the airplane's greatest speed.
+//! The resulting text is a scenario like any other, complete in itself: it goes into the run folder
+//! and can be edited. Latitude and longitude become a plane about the traffic's center. Turn rates
+//! are those of a turn at 25 degrees of bank at the airplane's greatest speed.
 //!
-//! Aircraft of BlueSky files fly their routes, and what they are told on the way (`HDG`, `SPD`,
-//! `ALT`, `LNAV ON`, `DEL`). One that has nowhere to go flies half an hour ahead. A true airspeed
-//! stays as it is until the next `SPD`, also in climbs. `not_flown` counts what else they say.
+//! Aircraft of BlueSky files fly their routes, and follow the commands on the way (`HDG`, `SPD`,
+//! `ALT`, `LNAV ON`, `DEL`). One without a destination flies half an hour ahead. A true airspeed
+//! stays as it is until the next `SPD`, also in climbs. `not_flown` counts all other commands.
 //!
-//! Recorded tracks are replayed as they are; from `airspace.replay_until_s` on, which stands at
-//! infinity, they are flown anew.
+//! Recorded tracks are replayed as they are; from `airspace.replay_until_s` on, which is infinity
+//! by default, they are flown anew.
 
 use super::flight::Point;
 use super::flight_plan::CLIMB_M_S;
@@ -25,14 +25,14 @@ const FOOT_M: f64 = 0.3048;
 const KNOT_M_S: f64 = NAUTICAL_MILE_M / 3600.0;
 /// The turn rate at 25 degrees of bank is this over the airspeed: g tan 25.
 const BANKED_M_S2: f64 = 9.80665 * 0.466_307_658_154_998_6;
-/// How far ahead an airplane flies that has nowhere to go.
+/// Time in seconds for which an airplane without a destination flies ahead.
 const AHEAD_S: f64 = 1800.0;
-/// Time between two decisions: a route that is told no later than this counts as known at once.
+/// Seconds between two decisions: a route that is given no later than this counts as known at once.
 const DT_S: f64 = 10.0;
-/// Separation of recorded traffic: five nautical miles and a thousand feet.
+/// Separation of recorded traffic in meters: five nautical miles and a thousand feet.
 const ZONE: (f64, f64) = (5.0 * NAUTICAL_MILE_M, 1000.0 * FOOT_M);
 
-/// The scenario of a BlueSky file; `None` when no aircraft of it has a place.
+/// Returns the scenario of a BlueSky file; `None` when none of its aircraft has a place.
 pub fn from_bluesky(name: &str, file: &ScnFile) -> Option<String> {
     let traffic = &file.traffic;
     let plane = LocalPlane::about_all(traffic.aircraft.iter().map(ScnAircraft::position))?;
@@ -44,10 +44,10 @@ pub fn from_bluesky(name: &str, file: &ScnFile) -> Option<String> {
     Some(text)
 }
 
-/// Settings of conflict detection and resolution: here that is the scenario's method.
+/// Settings of conflict detection and resolution, for which the scenario has its method.
 const SETTINGS: [&str; 4] = ["ASAS", "CDMETHOD", "DTLOOK", "RESO"];
 
-/// What a BlueSky file tells its aircraft and the scenario leaves out, with counts.
+/// Returns the commands of a BlueSky file that the scenario leaves out, with counts.
 pub(crate) fn not_flown(file: &ScnFile) -> BTreeMap<String, u64> {
     let mut counts = BTreeMap::new();
     let mut count = |what: &str, n: usize| {
@@ -74,7 +74,7 @@ pub(crate) fn not_flown(file: &ScnFile) -> BTreeMap<String, u64> {
     counts
 }
 
-/// What an airplane is told, as a scenario says it.
+/// A command to an airplane, in the scenario's terms.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Told {
     /// Degrees counter-clockwise from east.
@@ -138,7 +138,7 @@ fn write_aircraft(text: &mut String, aircraft: &ScnAircraft, plane: &LocalPlane)
     text.push_str("]\n");
 }
 
-/// What an aircraft is told on its way, by rising time.
+/// Returns the commands to an aircraft on its way, by rising time.
 fn orders(aircraft: &ScnAircraft, has_route: bool) -> Vec<(f64, Told)> {
     let mut orders: Vec<(f64, Told)> = Vec::new();
     let mut routed_s: Vec<f64> = route_times_s(aircraft);
@@ -146,12 +146,12 @@ fn orders(aircraft: &ScnAircraft, has_route: bool) -> Vec<(f64, Told)> {
         orders.push((aircraft.created_s, Told::Heading(90.0 - aircraft.heading_deg)));
     }
     routed_s.retain(|at_s| has_route && *at_s > aircraft.created_s);
-    // Whoever gets a way-point flies there, whatever heading it was told before.
+    // An aircraft that gets a way-point flies there, whatever heading it was given before.
     orders.extend(routed_s.into_iter().map(|at_s| (at_s, Told::Proceeds)));
     orders.extend(changes(aircraft, has_route));
     orders.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut keeps_heading = false;
-    // Proceeding changes nothing for an airplane that does.
+    // Proceeding changes nothing for an airplane that is already doing so.
     orders.retain(|(_, told)| match told {
         Told::Heading(_) => {
             keeps_heading = true;
@@ -169,7 +169,7 @@ fn orders(aircraft: &ScnAircraft, has_route: bool) -> Vec<(f64, Told)> {
     orders
 }
 
-/// When an aircraft was told where to go, rising.
+/// Returns the times at which an aircraft was told where to go, rising.
 fn route_times_s(aircraft: &ScnAircraft) -> Vec<f64> {
     let known = aircraft.way_points.iter().filter(|p| p.place.position().is_some());
     let destination = aircraft.destination.as_ref().filter(|place| place.position().is_some());
@@ -195,7 +195,7 @@ fn changes(aircraft: &ScnAircraft, has_route: bool) -> Vec<(f64, Told)> {
             }
             Change::VerticalSpeedFpm(fpm) if fpm != 0.0 => {
                 climb_m_s = fpm.abs() * FOOT_M / 60.0;
-                // Behind an ALT of the same time it is meant for that one.
+                // A rate after an `ALT` of the same time belongs to that command.
                 if let Some((last_s, Told::Altitude(_, rate_m_s))) = told.last_mut()
                     && *last_s == at_s
                 {
@@ -209,7 +209,7 @@ fn changes(aircraft: &ScnAircraft, has_route: bool) -> Vec<(f64, Told)> {
     told
 }
 
-/// The scenario of recorded tracks, which replays them. `None` without any track.
+/// Returns the scenario of recorded tracks, which replays them. `None` without any track.
 pub fn from_tracks(name: &str, traffic: &RecordedTraffic) -> Option<String> {
     let samples = || traffic.tracks.iter().flat_map(|track| &track.samples);
     let plane = LocalPlane::about_all(samples().map(|s| s.position))?;
@@ -222,7 +222,7 @@ pub fn from_tracks(name: &str, traffic: &RecordedTraffic) -> Option<String> {
     tracks().next().map(|_| text)
 }
 
-/// Whether a track has the two samples of which a way can be made.
+/// Returns whether a track has the two samples that a way needs at least.
 pub fn has_length(track: &Track) -> bool {
     track.samples.len() >= 2
 }

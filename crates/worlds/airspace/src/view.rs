@@ -1,4 +1,4 @@
-//! What can be seen of an airspace: airplanes, the zones around them, whence and where they go.
+//! The visible part of an airspace: airplanes, the zones around them, their starts and goals.
 
 use super::events::{Event, EventKind};
 use super::flight::{Airplane, Point, distance_m};
@@ -9,18 +9,17 @@ use sidestep_kernel::view::{
 };
 use sidestep_kernel::{Cycle, Slot};
 
-/// An airplane as it is drawn is so much as long as the radius of its zone: large enough to be
-/// seen, while touching zones leave it apart from others.
+/// Length of a drawn airplane, as a part of its zone's radius: large enough to be seen, and small
+/// enough that airplanes whose zones touch are drawn apart.
 const LENGTH_OF_RADIUS: f64 = 0.6;
-/// An airplane across, compared with its length.
+/// Width of a drawn airplane, as a part of its length.
 const WIDTH_OF_LENGTH: f64 = 0.7;
-/// The zone's height, compared with its radius.
+/// Height of a zone, as a part of its radius.
 const ZONE_HEIGHT: f64 = 0.02;
-/// A place to go to, compared with the zone's radius.
+/// Radius of a goal, as a part of the zone's radius.
 const GOAL_OF_RADIUS: f64 = 0.15;
 
-/// The places that airplanes start from, as wide as their zones, and those that they are to
-/// reach at last.
+/// Returns the starts of airplanes, as wide as their zones, and their last way-points.
 pub(super) fn scenery(world: &AirspaceWorld, name: &str) -> Scenery {
     let start = |(id, airplane): (u32, &Airplane)| {
         let ([x_m, y_m], radius_m) = (airplane.start.at, zone_radius_m(world, id));
@@ -44,7 +43,7 @@ pub(super) fn scenery(world: &AirspaceWorld, name: &str) -> Scenery {
     }
 }
 
-/// Recorded poses as places of airplanes.
+/// Returns how recorded poses give the places of airplanes.
 pub(super) fn place_rows() -> Vec<PlaceRows> {
     vec![PlaceRows {
         table: "trajectories",
@@ -59,7 +58,7 @@ pub(super) fn place_rows() -> Vec<PlaceRows> {
     }]
 }
 
-/// Whether all fly on one level from the beginning to the end.
+/// Returns whether all airplanes fly on one level from start to end.
 fn is_level(world: &AirspaceWorld) -> bool {
     let first_m = world.airplanes.first().map_or(0.0, |airplane| airplane.altitude_m);
     world.airplanes.iter().all(|airplane| {
@@ -68,12 +67,12 @@ fn is_level(world: &AirspaceWorld) -> bool {
     })
 }
 
-/// Half the separation: airplanes are apart when their zones do not meet.
+/// Returns half the separation in meters: airplanes are apart when their zones do not meet.
 fn zone_radius_m(world: &AirspaceWorld, slot: Slot) -> f64 {
     0.5 * world.airplanes[slot as usize].model.separation_m
 }
 
-/// The airplanes that are there, each followed by its zone.
+/// Returns the airplanes that are in the air, each followed by its zone.
 pub(super) fn visible_bodies(
     world: &AirspaceWorld,
     state: &AirspaceState,
@@ -101,11 +100,11 @@ fn airplane_and_zone(
     bodies.map(|body| body.when(too_near.binary_search(&id).is_ok(), Condition::Touching))
 }
 
-/// Who is nearer to somebody than is allowed, by id.
+/// Returns the airplanes that are nearer to another than allowed, by id.
 fn too_near(world: &AirspaceWorld, state: &AirspaceState, there: &[Slot]) -> Vec<Slot> {
     let at = |slot: Slot| state.airplanes[slot as usize].pose().at;
     let widest_m = world.airplanes.iter().map(|a| a.model.separation_m).fold(0.0, f64::max);
-    // From west to east, so that only neighbors are compared.
+    // Sorted from west to east, so that only neighbors have to be compared.
     let mut by_x: Vec<(Point, Slot)> = there.iter().map(|&slot| (at(slot), slot)).collect();
     by_x.sort_by(|a, b| a.0[0].total_cmp(&b.0[0]).then(a.1.cmp(&b.1)));
     let mut near = Vec::new();
@@ -128,7 +127,7 @@ fn are_level(world: &AirspaceWorld, state: &AirspaceState, a: Slot, b: Slot) -> 
     (altitude_m(a) - altitude_m(b)).abs() < world.vertical_m
 }
 
-/// An event in words.
+/// Returns an event in words.
 pub(super) fn entry(event: &Event) -> Entry {
     let (value, other) = (event.value, event.other);
     let (level, words) = match event.kind {

@@ -1,4 +1,4 @@
-//! What the world says to people: a scenario's contents, a run's outcome, where everybody is.
+//! Texts for people: a scenario's contents, a run's outcome, and the place of every airplane.
 
 use super::metrics::{Metrics, TooClose};
 use super::scenario::Compiled;
@@ -7,12 +7,12 @@ use serde_json::json;
 use sidestep_kernel::Cycle;
 use sidestep_kernel::words::{Lines, Said, grouped, line};
 
-/// Returns what a compiled scenario holds.
+/// Returns the contents of a compiled scenario.
 pub(super) fn contents(compiled: &Compiled) -> Said {
     let world = &*compiled.world;
     let shield = if world.shield { "on" } else { "off" };
     let recorded = world.airplanes.iter().filter(|a| a.track.is_some()).count() as u64;
-    // The JSON of a time that never comes is null.
+    // JSON has no infinity, so a time that is never reached is null.
     let until_s = match world.replay_cycles {
         Cycle::MAX => f64::INFINITY,
         cycles => world.starts_s(cycles),
@@ -41,7 +41,7 @@ pub(super) fn contents(compiled: &Compiled) -> Said {
     Said { json, text }
 }
 
-/// Returns what came of a run.
+/// Returns the outcome of a run.
 pub(super) fn outcome(metrics: &Metrics) -> Lines {
     let mut lines = flights(metrics);
     lines.extend(network(metrics));
@@ -50,7 +50,7 @@ pub(super) fn outcome(metrics: &Metrics) -> Lines {
     lines
 }
 
-/// Returns where every airplane is, by entity id.
+/// Returns the place of every airplane, by entity id.
 pub(super) fn poses(snapshot: &Snapshot) -> Said {
     let json = serde_json::to_value(&snapshot.airplanes).unwrap_or_default();
     let heading = "  airplane       x_m         y_m    heading_deg\n".to_string();
@@ -62,7 +62,7 @@ pub(super) fn poses(snapshot: &Snapshot) -> Said {
     Said { json, text }
 }
 
-/// Pairs whose first fallbacks are not apart, in words.
+/// Returns the pairs whose first fallbacks are not apart, in words.
 fn too_close(pairs: &[(u32, u32)]) -> String {
     let warn = |(a, b): &(u32, u32)| {
         format!("  warning          airplanes {a} and {b} start too close for the shield\n")
@@ -70,7 +70,7 @@ fn too_close(pairs: &[(u32, u32)]) -> String {
     pairs.iter().map(warn).collect()
 }
 
-/// What went over the network, and what went wrong on it.
+/// Returns the traffic on the network, and its faults.
 fn network(m: &Metrics) -> Lines {
     let mut lines = Lines::new();
     if m.messages > 0 {
@@ -91,7 +91,7 @@ fn network(m: &Metrics) -> Lines {
     lines
 }
 
-/// What was recorded, told or removed; no lines where there was nothing of that.
+/// Returns lines on recorded ways, orders and removals; none where there were none.
 fn on_the_way(m: &Metrics) -> Lines {
     let mut lines = Vec::new();
     if m.replayed > 0 {
@@ -107,7 +107,7 @@ fn on_the_way(m: &Metrics) -> Lines {
     lines
 }
 
-/// Names the first pairs that came in too close, and counts the others.
+/// Returns the first pairs that came in too close, and the number of others.
 fn warning(too_close: &[TooClose]) -> Option<(String, String)> {
     const NAMED: usize = 5;
     let named = too_close.iter().take(NAMED).map(|TooClose { at_s, airplanes: [a, b] }| {

@@ -1,4 +1,4 @@
-//! A compiled airspace: everything that never changes during a run.
+//! A compiled airspace: everything that stays fixed during a run.
 
 use super::agents::network::Network;
 use super::deploy::Deployment;
@@ -13,7 +13,7 @@ use sidestep_collectives::{Estimator, Order, Settings};
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{Cycle, Slot};
 
-/// How airplanes choose what to do.
+/// The methods by which airplanes choose their actions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
@@ -24,7 +24,7 @@ pub enum Method {
     Orca,
     /// Modified voltage potential.
     Mvp,
-    /// Straight to the way-point, whoever is there.
+    /// Straight to the way-point, without regard to others.
     None,
 }
 
@@ -32,7 +32,7 @@ impl Method {
     /// All methods.
     pub const ALL: [Self; 4] = [Self::Pc, Self::Orca, Self::Mvp, Self::None];
 
-    /// Its name in files.
+    /// Returns its name in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Pc => "pc",
@@ -43,69 +43,71 @@ impl Method {
     }
 }
 
-/// What the optimizer is not told.
+/// Random errors that the optimizer does not know of.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Disturbance {
-    /// Standard deviation of known positions, per coordinate.
+    /// Standard deviation of known positions, per coordinate, in meters.
     pub position_m: f64,
-    /// Standard deviation of the heading's change per `dt` that nobody wanted.
+    /// Standard deviation of the unwanted change of heading per `dt`, in radians.
     pub heading_rad: f64,
 }
 
-/// The immutable world that runs share.
+/// The immutable world, shared by all runs of a scenario.
 #[derive(Debug, Clone)]
 pub struct AirspaceWorld {
     /// The airplanes by id.
     pub airplanes: Vec<Airplane>,
-    /// Steps of time.
+    /// The steps of time.
     pub timing: Timing,
     /// Rule by which way-points count as reached.
     pub passing: Passing,
-    /// What is optimized,
+    /// The objective that is minimized.
     pub objective: Objective,
-    /// and how.
+    /// Settings of the optimizer.
     pub settings: Settings,
-    /// Further hold times of actions.
+    /// Further hold times of actions, in seconds.
     pub holds_s: Vec<f64>,
     /// Legs to the sides, which take the place of held turns.
     pub legs: Legs,
-    /// Who decides.
+    /// The method by which airplanes choose their actions.
     pub method: Method,
-    /// A deployment of the optimizer.
+    /// The deployment of the optimizer.
     pub deployment: Deployment,
-    /// What its messages go over, if that is not to be relied on.
+    /// The network that carries its messages, unless it is faultless.
     pub network: Option<Network>,
     /// Bytes that the pair tables of a group may take; larger groups are not optimized.
     pub group_bytes: u64,
     /// Whether the shield filters decisions.
     pub shield: bool,
-    /// Airplanes at least this far above each other do not mind each other: what the scenario
-    /// asks for, less a hair, so that levels in feet are apart when they say they are.
+    /// Airplanes at least this many meters above each other need not mind each other. It is
+    /// slightly less than the scenario asks for, so that levels in feet are apart when they say
+    /// they are.
     pub vertical_m: f64,
-    /// Cycles in which recorded airplanes follow their tracks; after these the method flies them.
+    /// Number of cycles in which recorded airplanes follow their tracks; then the method flies
+    /// them.
     pub replay_cycles: Cycle,
-    /// A wind that all know.
+    /// The wind, which everybody knows, in meters per second.
     pub wind_m_s: Point,
-    /// What nobody knows.
+    /// Random errors that nobody knows.
     pub disturbance: Disturbance,
     pub(crate) streams: Streams,
     /// Actions of each airplane.
     pub(crate) actions: Vec<Vec<Action>>,
-    /// What each airplane flies after each of its orders.
+    /// The stage of each airplane's flight after each of its orders.
     pub(crate) later: Vec<Vec<Later>>,
-    /// The greatest speed that each airplane flies.
+    /// The greatest speed of each airplane, in meters per second.
     pub(crate) top_m_s: Vec<f64>,
-    /// Seconds that each airplane would need alone.
+    /// Seconds that each airplane would need if it were alone.
     pub(crate) alone_s: Vec<f64>,
     /// Sides of the first fallbacks.
     pub(crate) first_fallbacks: Vec<Side>,
 }
 
-/// A flight alone that takes longer than this many steps is not expected to end.
+/// Number of steps after which a flight alone is taken to be endless.
 const ENDLESS_STEPS: usize = 1_000_000;
 
 impl AirspaceWorld {
-    /// Prepares what follows from the fields.
+    /// Fills in the fields that follow from the others.
     #[must_use]
     pub(crate) fn prepared(mut self) -> Self {
         let of = |a: &Airplane| actions(&a.model, self.timing.dt_s, &self.holds_s, &self.legs);
@@ -126,12 +128,13 @@ impl AirspaceWorld {
         told.fold(airplane.model.v_m_s.max(recorded), f64::max)
     }
 
-    /// Returns what is the same for all airplanes that fly.
+    /// Returns the properties of the air, which are the same for all airplanes.
     pub fn air(&self) -> Air {
         Air { timing: self.timing, passing: self.passing, wind_m_s: self.wind_m_s }
     }
 
-    /// From when the method takes it over; infinite where it never would come to its end.
+    /// Returns the seconds that a flight would take alone, from when the method takes it over;
+    /// infinite if it would never end.
     fn alone_s(&self, i: usize) -> f64 {
         let airplane = &self.airplanes[i];
         let joins_s = self.starts_s(self.joins_in(i));
@@ -151,7 +154,7 @@ impl AirspaceWorld {
             if next == mission.len() || joins_s + flown_s >= airplane.leaves_s {
                 return flown_s;
             }
-            // It may come to its end before it is told to keep a heading.
+            // Endless only after the last order, because the flight may end before that one.
             if is_endless && orders as usize == airplane.orders.len() {
                 return f64::INFINITY;
             }
@@ -163,8 +166,8 @@ impl AirspaceWorld {
         f64::INFINITY
     }
 
-    /// When an airplane would come to its end if it were alone, seconds after the start of the
-    /// run.
+    /// Returns when an airplane's flight would end if it were alone, in seconds after the start of
+    /// the run.
     pub(crate) fn ends_alone_s(&self, i: usize) -> f64 {
         let joins_s = self.starts_s(self.joins_in(i));
         match &self.airplanes[i].track {
@@ -173,12 +176,13 @@ impl AirspaceWorld {
         }
     }
 
-    /// When a cycle starts, seconds after the start.
+    /// Returns when a cycle starts, in seconds after the start of the run.
     pub fn starts_s(&self, now: Cycle) -> f64 {
         now as f64 * self.timing.dt_s
     }
 
-    /// The cycle in which an airplane appears: at its start, or within it on a recorded way.
+    /// Returns the cycle in which an airplane appears: at its start, or within it on a recorded
+    /// way.
     pub fn appears_in(&self, i: usize) -> Cycle {
         let airplane = &self.airplanes[i];
         let cycles = airplane.appears_s / self.timing.dt_s;
@@ -187,19 +191,19 @@ impl AirspaceWorld {
         (if is_on_track { cycles.floor() } else { cycles.ceil() }) as Cycle
     }
 
-    /// The cycle from which the method flies an airplane.
+    /// Returns the cycle from which the method flies an airplane.
     pub fn joins_in(&self, i: usize) -> Cycle {
         let recorded = if self.airplanes[i].track.is_some() { self.replay_cycles } else { 0 };
         self.appears_in(i).max(recorded)
     }
 
-    /// Whether an airplane follows its recorded way in a cycle.
+    /// Returns whether an airplane follows its recorded way in a cycle.
     pub fn is_replayed(&self, slot: Slot, now: Cycle) -> bool {
         self.airplanes[slot as usize].track.is_some() && now < self.joins_in(slot as usize)
     }
 
-    /// How far apart two airplanes may be and still have to mind each other: they could come
-    /// too near within the horizon, or on orbits after the next `dt`.
+    /// Returns the distance in meters up to which two airplanes have to mind each other, because
+    /// they could come too near within the horizon, or on orbits after the next `dt`.
     pub fn look_m(&self, a: usize, b: usize) -> f64 {
         let ((a, a_m_s), (b, b_m_s)) = (self.fastest(a), self.fastest(b));
         let horizon_s = self.timing.horizon as f64 * self.timing.dtau_s;
@@ -211,7 +215,7 @@ impl AirspaceWorld {
         reach(a, a_m_s) + reach(b, b_m_s) + gap_m + 1.0
     }
 
-    /// What an airplane flies that has carried out so many orders.
+    /// Returns the stage of an airplane that has carried out this number of orders.
     pub(crate) fn stage(&self, slot: Slot, orders: u32) -> Stage<'_> {
         match self.later[slot as usize].get((orders as usize).wrapping_sub(1)) {
             Some(later) => later.stage(),
@@ -222,7 +226,8 @@ impl AirspaceWorld {
         }
     }
 
-    /// Orders done and way-points done with after those that are due at a time, if none waits.
+    /// Returns the orders and way-points done with after those that are due at a time, if none
+    /// waits.
     pub(crate) fn after_orders(
         &self,
         slot: usize,
@@ -238,17 +243,17 @@ impl AirspaceWorld {
         (orders, next)
     }
 
-    /// Actions of an airplane, for whoever knows its model.
+    /// Returns the actions of an airplane, for others that know its model.
     pub(crate) fn actions_of(&self, slot: Slot) -> &[Action] {
         &self.actions[slot as usize]
     }
 
-    /// The levels that an airplane is on and comes to.
+    /// Returns the levels that an airplane is on and changes to.
     pub(crate) fn levels(&self, known: Known) -> Levels {
         Levels::between(known.altitude_m, self.stage(known.slot, known.orders).altitude_m)
     }
 
-    /// Where each action would lead an airplane.
+    /// Returns where each action would lead an airplane.
     pub(crate) fn options(&self, known: Known) -> Options {
         let Stage { model, mission, .. } = self.stage(known.slot, known.orders);
         let actions = self.actions_of(known.slot);
@@ -256,17 +261,17 @@ impl AirspaceWorld {
         Options::new(predictions, model.separation_m, self.levels(known))
     }
 
-    /// Numbers that one optimization may draw from an airplane's stream at most; none if that
-    /// is beyond all counting.
+    /// Returns the largest number of samples that one optimization may draw from an airplane's
+    /// stream; none if that number overflows.
     pub(crate) fn most_samples(&self) -> Option<u64> {
         let Estimator::Sampled { block, .. } = self.settings.estimator else { return Some(1) };
         let blocks_per_round = match self.settings.order {
             Order::Parallel => 1,
-            // One at the beginning of a round, and one after each player of the largest group.
+            // One at the start of a round, and one after each player of the largest group.
             Order::Sequence => self.airplanes.len() as u64 + 1,
         };
         let per_round = (block as u64).checked_mul(blocks_per_round)?;
-        // And the final draw.
+        // Plus one for the final draw.
         per_round.checked_mul(self.settings.stop.max_rounds.into())?.checked_add(1)
     }
 
@@ -283,7 +288,7 @@ mod tests {
     use sidestep_scenario::Source;
 
     proptest! {
-        /// Wherever a way-point lies and however the wind blows, flying to it ends.
+        /// Flying to a way-point ends, wherever it lies and however the wind blows.
         #[test]
         fn nobody_circles_in_the_wind_for_ever(
             speed in 0.0f64..30.0, from_rad in -3.2f64..3.2, x in -2000.0f64..2000.0,

@@ -9,24 +9,24 @@ use sidestep_kernel::Slot;
 use sidestep_kernel::distr::Categorical;
 use sidestep_kernel::space::BoxWord;
 
-/// What a walk comes to in the present state.
+/// The result that a walk would have in the present state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Verdict {
-    /// Steps that are made.
+    /// Number of steps that are made.
     pub(super) steps: usize,
-    /// Kind and side of what stopped it.
+    /// Kind of the obstacle that stopped it, and side of the body that touched it.
     pub(super) contact: Option<(u8, Side)>,
 }
 
 impl<T: BoxWord> Scene<'_, T> {
-    /// One body acts with the draw of its own stream.
+    /// Lets one body act with the draw of its own stream.
     #[inline]
     pub(super) fn act_drawn(&self, slot: Slot, scratch: &mut Scratch) {
         let [word, _] = self.act_words(self.cell(slot).id);
         self.act(slot, word, scratch);
     }
 
-    /// One body acts on the state as left by those before it; `word` is its draw.
+    /// Lets one body act on the state left by those before it; `word` is its draw.
     #[inline]
     pub(super) fn act(&self, slot: Slot, word: u32, scratch: &mut Scratch) {
         let cell = self.cell(slot);
@@ -34,6 +34,7 @@ impl<T: BoxWord> Scene<'_, T> {
             return;
         }
         let body = self.type_of(cell);
+        // A door has no actions in its type, so it toggles.
         let Some(action) = body.actions.get(usize::from(cell.action.get())) else {
             return self.toggle(slot, scratch);
         };
@@ -56,7 +57,7 @@ impl<T: BoxWord> Scene<'_, T> {
         }
     }
 
-    /// Makes all of a walk that meets nothing.
+    /// Makes a whole walk that meets no obstacle.
     #[inline]
     fn make_whole(&self, walk: &Walk, slot: Slot) {
         let (floor, cell) = (self.floor, self.cell(slot));
@@ -80,7 +81,7 @@ impl<T: BoxWord> Scene<'_, T> {
         }
     }
 
-    /// A walk that may be cut short by something in the way.
+    /// Makes a walk that an obstacle may cut short.
     fn blocked(&self, walk: &Walk, slot: Slot, scratch: &mut Scratch) {
         let cell = self.cell(slot);
         let verdict = self.judge(walk, slot);
@@ -91,6 +92,7 @@ impl<T: BoxWord> Scene<'_, T> {
             _ => 0,
         };
         self.make(walk, made, slot);
+        // Only robots feel contacts and have samples to learn from.
         if is_mover {
             return;
         }
@@ -109,7 +111,7 @@ impl<T: BoxWord> Scene<'_, T> {
         }
     }
 
-    /// Notes a contact in the body's cell, in its counters and, where anybody wants it, as event.
+    /// Notes a contact in the body's cell, in its counters and, where events are kept, as an event.
     fn touch(&self, cell: &BodyCell, kind: u8, side: Side, scratch: &mut Scratch) {
         cell.contact.set(contact_word(kind, side as u8));
         let (body, kinds) = (cell.id, self.world.kinds.len());
@@ -120,7 +122,7 @@ impl<T: BoxWord> Scene<'_, T> {
         }
     }
 
-    /// How far a walk gets: to the first step that enters a box that is not free.
+    /// Returns how far a walk gets: to the first step that enters a box that is not free.
     #[inline]
     fn judge(&self, walk: &Walk, slot: Slot) -> Verdict {
         let base = self.base(self.cell(slot));
@@ -160,8 +162,8 @@ impl<T: BoxWord> Scene<'_, T> {
         cell.first_visits.set(cell.first_visits.get() + first_visits);
     }
 
-    /// The distribution over the walks that are not blocked here, or the first blocked one
-    /// when none is left.
+    /// Returns the distribution over the walks that are not blocked here, or, when none is left,
+    /// the first blocked one as an error.
     fn rescaled(&self, action: &Action, slot: Slot) -> Result<Categorical, usize> {
         let free = |walk: &Walk| self.judge(walk, slot).contact.is_none();
         let mut row: Vec<f64> = action
@@ -178,7 +180,7 @@ impl<T: BoxWord> Scene<'_, T> {
         Ok(Categorical::new(&row).expect("a rescaled row is a distribution"))
     }
 
-    /// Opens, or closes when nobody stands in the way; otherwise the closing waits.
+    /// Opens a door, or closes it when nobody stands in the way; otherwise closing waits.
     fn toggle(&self, slot: Slot, scratch: &mut Scratch) {
         let (floor, cell) = (self.floor, self.cell(slot));
         let (base, own) = (self.base(cell), &self.type_of(cell).own);
@@ -195,8 +197,8 @@ impl<T: BoxWord> Scene<'_, T> {
         }
     }
 
-    /// Notes what an action came to, for a log to learn from: the steps and the turn that were
-    /// made, not those that the drawn transition would have made in a free place.
+    /// Records the result of an action in a log for learning: the steps and the turn that were
+    /// really made, not those that the drawn transition would have made in free space.
     fn sample_motion(&self, walk: &Walk, verdict: Verdict, cell: &BodyCell, scratch: &mut Scratch) {
         let (mut ahead, mut left) = (0, 0);
         for step in &walk.steps[..verdict.steps] {

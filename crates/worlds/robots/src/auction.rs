@@ -1,8 +1,8 @@
 //! The policy `rounds`: bids on boxes instead of an order within a group.
 //!
-//! A body bids its priority for every box it covers or may come to cover. It acts when its
-//! bid is the highest in all of them: then all that conflict with it and come before it have
-//! acted. So the outcome is that of the policy `random`, whose draws the bids are.
+//! A body bids its priority for every box it covers or may come to cover. It acts when its bid is
+//! the highest in all of them, because then all bodies that conflict with it and come before it
+//! have acted. So the outcome is that of the policy `random`, whose draws the bids are.
 
 use super::scene::{Scene, at, with_scene};
 use super::world::RobotsWorld;
@@ -15,20 +15,20 @@ use std::sync::atomic::Ordering::Relaxed;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Bid {
     pub(super) slot: Slot,
-    /// The body's draw of what its action comes to.
+    /// The body's draw of its action's outcome.
     pub(super) word: u32,
-    /// Where it stood when it bid.
+    /// Position of the body when it bid.
     at: Position,
-    /// Higher acts first; never 0, unique per body.
+    /// Value of the bid: the higher one acts first. Never 0, and unique per body.
     value: u64,
 }
 
 impl<T: BoxWord> Scene<'_, T> {
-    /// Bids for all that a body covers or may come to cover.
+    /// Bids for all boxes that a body covers or may come to cover.
     fn bid(&self, slot: Slot) -> Bid {
         let cell = self.cell(slot);
         let [word, draw] = self.act_words(cell.id);
-        // The smallest (draw, id) acts first.
+        // Inverted, because the smallest (draw, id) acts first.
         let value = !(u64::from(draw) << 32 | u64::from(cell.id));
         let bid = Bid { slot, word, at: cell.at(), value };
         self.for_each_box_of(bid, |index| {
@@ -49,8 +49,8 @@ impl<T: BoxWord> Scene<'_, T> {
         self.for_each_box_of(bid, |index| self.state.bids[index].store(0, Relaxed));
     }
 
-    /// All boxes that a bidder covers, or may come to cover if it acts; walls included, which
-    /// nobody contends for.
+    /// Calls `each` for all boxes that a bidder covers, or may come to cover if it acts; walls
+    /// included, which nobody contends for.
     fn for_each_box_of(&self, bid: Bid, mut each: impl FnMut(usize)) {
         let cell = self.cell(bid.slot);
         let body = self.type_of(cell);

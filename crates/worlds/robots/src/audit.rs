@@ -1,4 +1,4 @@
-//! A check of the whole state against the world's laws (promise L1), for tests and doubt.
+//! A check of the whole state against the world's laws (promise L1), for tests and debugging.
 
 use super::state::{FREE, RobotsState};
 use super::world::RobotsWorld;
@@ -6,11 +6,11 @@ use sidestep_kernel::Slot;
 use sidestep_kernel::space::Occupant;
 
 impl RobotsWorld {
-    /// Checks that no two bodies share a box, nobody stands in a wall, and the grid shows
-    /// exactly the bodies.
+    /// Checks that no two bodies share a box, that no body stands in a wall, and that the grid
+    /// shows exactly the bodies.
     ///
     /// # Errors
-    /// Says what is wrong; that is a bug, not an outcome.
+    /// Returns a description of the first fault found; that is a bug, not an outcome.
     pub fn audit(&self, state: &RobotsState) -> Result<(), String> {
         let mut owner = vec![None; self.walls.len()];
         for slot in 0..self.bodies.len() as Slot {

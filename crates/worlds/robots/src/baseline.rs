@@ -1,21 +1,21 @@
 //! The two parallel strategies that the source paper rejects, for measuring against them.
 //!
-//! Both use the very functions of the double pool (perceive and decide, claim, act); they
-//! differ in who does what when. Neither promises what the double pool promises: results
-//! depend on the number of workers, and under the lock also on the scheduling of the moment.
-//! What they do keep are the world's laws: no two bodies in a box, nobody in a wall, every
+//! Both use the very functions of the double pool (perceive and decide, claim, act); they differ in
+//! which worker does what, and when. Neither promises what the double pool promises: results depend
+//! on the number of workers, and under the lock also on the scheduling of threads. Both keep the
+//! world's laws: no two bodies in a box, no body in a wall, and
 //! body acts once a cycle when it is due.
 //!
 //! - *Spatial partition*: each worker owns a vertical band of the map and the bodies anchored
-//!   in it. It perceives for them, then moves those whose claims stay inside the band. What
-//!   stands or may come across a border is done by one worker, after all others; then bodies
-//!   are handed over to the bands they have entered. Within a band the order is that of a
+//!   in it. It perceives for them, then moves those whose claims stay inside the band. Bodies
+//!   that stand or may come across a border are moved by one worker, after all others; then
+//!   bodies are handed over to the bands they have entered. Within a band the order is that of a
 //!   list, without draws for priority: cheaper than the double pool, and less fair.
 //! - *One lock*: each worker takes a body, locks the world, perceives and acts, and unlocks, as
 //!   krABMaga's parallel schedule does per agent (which also starts its threads anew every
-//!   step; here they live on). Bodies so perceive a world that others have half changed.
+//!   step; here they live on). So bodies perceive a world that others have half changed.
 //!
-//! Both write claims, as the double pool does; the lock has no use for them.
+//! Both write claims, as the double pool does; the lock does not use them.
 
 use super::Scratch;
 use super::metrics::Metrics;
@@ -43,7 +43,7 @@ impl Strategy {
     /// Both.
     pub const ALL: [Self; 2] = [Self::SpatialPartition, Self::OneLock];
 
-    /// Its name in tables.
+    /// Returns its name in tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::SpatialPartition => "spatial partition",
@@ -63,29 +63,29 @@ pub struct Baseline {
     serial_acts: u64,
 }
 
-/// What a worker keeps.
+/// A worker's own data.
 #[derive(Debug, Default)]
 struct Hand {
     scratch: Scratch,
     /// Bodies anchored in this worker's band.
     own: Vec<Slot>,
-    /// Bodies that this worker did while all others waited.
+    /// Number of cycles of bodies that this worker did while all others waited.
     serial_acts: u64,
 }
 
-/// What the workers of a partition pass to each other.
+/// Data that the workers of a partition pass to each other.
 #[derive(Debug)]
 struct Borders {
-    /// Columns of each band in the padded grid; the outer ones reach over the map's edge.
+    /// Columns of each band in the padded grid; the outer bands reach over the map's edge.
     bands: Vec<Range<u32>>,
     /// Bodies of this cycle that are not inside one band.
     crossing: Mutex<Vec<Slot>>,
-    /// Bodies that have come into each band.
+    /// Bodies that have moved into each band.
     inboxes: Vec<Mutex<Vec<Slot>>>,
 }
 
 impl Baseline {
-    /// A run at its start, with `workers` workers (at least 1).
+    /// Returns a run at its start, with `workers` workers (at least 1).
     pub fn new(compiled: Compiled, strategy: Strategy, workers: usize) -> Self {
         let state = RobotsState::restore(&compiled.world, &compiled.start_snapshot());
         let mut crew = Vec::new();
@@ -108,17 +108,17 @@ impl Baseline {
         self.serial_acts = self.crew.iter().map(|hand| hand.serial_acts).sum();
     }
 
-    /// The state by entity id.
+    /// Returns the state by entity id.
     pub fn snapshot(&self) -> Snapshot {
         self.state.snapshot(&self.compiled.world, self.cycle)
     }
 
-    /// Metrics so far; there are no conflict groups.
+    /// Returns the metrics so far; there are no conflict groups.
     pub fn metrics(&self) -> Metrics {
         self.compiled.world.metrics(&self.state, self.cycle, &[], 0)
     }
 
-    /// Share of the bodies' cycles that one worker did while all others waited.
+    /// Returns the share of the bodies' cycles that one worker did while all others waited.
     pub fn serial_share(&self) -> f64 {
         let all = self.compiled.world.bodies.len() as u64 * self.cycle;
         self.serial_acts as f64 / all.max(1) as f64
@@ -178,7 +178,7 @@ fn partition_cycle<T: BoxWord>(
     worker.barrier();
     if worker.index() == 0 {
         let mut crossing = std::mem::take(&mut *lock(&borders.crossing));
-        // The order in which workers came is that of the moment; the slots are not.
+        // The order in which workers arrive depends on scheduling; that of the slots does not.
         crossing.sort_unstable();
         *serial_acts += crossing.len() as u64;
         for slot in crossing {
@@ -201,18 +201,18 @@ impl Borders {
     }
 }
 
-/// A worker that panicked has ended the run anyway.
+/// Locks a mutex even when it is poisoned, because a worker that panicked has ended the run anyway.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// The band of a column.
+/// Returns the band of a column.
 fn band_of(bands: &[Range<u32>], col: u32) -> usize {
     bands.partition_point(|band| band.end <= col).min(bands.len() - 1)
 }
 
 impl RobotsWorld {
-    /// `n` vertical bands of equal width.
+    /// Returns `n` vertical bands of equal width.
     fn bands(&self, n: usize) -> Vec<Range<u32>> {
         let border = |k: usize| match k {
             0 => 0,
@@ -224,7 +224,7 @@ impl RobotsWorld {
 }
 
 impl<T: BoxWord> Scene<'_, T> {
-    /// Whether all boxes that a body covers, and may come to cover, lie in these columns.
+    /// Returns whether all boxes that a body covers, or may come to cover, lie in these columns.
     fn stays_inside(&self, slot: Slot, band: &Range<u32>) -> bool {
         let (world, cell) = (self.world, self.cell(slot));
         let (col, width) = (cell.at().col(), self.type_of(cell).size.0);
@@ -244,7 +244,7 @@ impl<T: BoxWord> Scene<'_, T> {
     }
 }
 
-/// The first breach of the laws in a state: two bodies in a box, or one in a wall.
+/// Returns the first breach of the laws in a state: two bodies in a box, or one in a wall.
 pub fn breach(world: &RobotsWorld, snapshot: &Snapshot) -> Option<String> {
     let width = world.map.width();
     let mut owner: Vec<Option<EntityId>> = vec![None; world.map.cells().len()];
@@ -274,7 +274,7 @@ mod tests {
     use crate::scenario::{Behaviours, StorageOrder};
     use sidestep_scenario::Source;
 
-    /// A crowded hall with people and a door that closes on whoever stands in it.
+    /// A crowded hall with people and a door that tries to close on bodies standing in it.
     fn crowd() -> Compiled {
         let row = format!("{}\n", ".".repeat(40));
         let text = format!(
@@ -300,7 +300,7 @@ mod tests {
                     run.advance(5);
                     assert_eq!(breach(&compiled.world, &run.snapshot()), None);
                 }
-                // A replay remembers how many actions it has begun.
+                // A replay remembers how many actions it has started.
                 let snapshot = run.snapshot();
                 assert!(snapshot.bodies[..60].iter().all(|robot| robot.memory[0] == 200));
             }

@@ -1,7 +1,7 @@
-//! A robots scenario that needs no other file: what a run folder keeps.
+//! A robots scenario that needs no other file, as a run folder keeps it.
 //!
 //! The map goes along as the program saw it, one pixel per box, so that a later version of
-//! an importer cannot change what is replayed. Profiles and lists of starts go along as they are.
+//! an importer cannot change what is replayed. Profiles and lists of starts are kept as they are.
 
 use super::scenario::Compiled;
 use serde_json::Value;
@@ -10,14 +10,14 @@ use sidestep_kernel::InputError;
 use sidestep_map::GridMap;
 use sidestep_scenario::{Bundle, Resolved, Source};
 
-/// The scenario with every file that it names beside it.
+/// Returns the scenario with every file that it names beside it.
 ///
 /// # Errors
-/// When such a file cannot be read any more.
+/// When such a file can no longer be read.
 pub fn resolve(source: &Source, compiled: &Compiled) -> Result<Resolved, InputError> {
     let file: Value = source.parse()?;
     let mut bundle = Bundle::new(source, compiled.seed, compiled.cycles);
-    // A run depends on it even where it is the preset.
+    // Written even where it is the preset, because the run depends on it.
     bundle.set("regime", format_args!("{:?}", compiled.world.regime.name()));
     if !file["map"]["file"].is_null() {
         add_map(&mut bundle, &compiled.world.map);

@@ -1,8 +1,8 @@
-//! Behaviours: from a percept, a small memory and an own random stream to one action.
+//! Behaviors: from a percept, a small memory and a random stream of its own to one action.
 //!
-//! A behaviour never sees the world's state, only its percept (paper: agents propose, the
-//! environment decides). It is shared by all robots of its type and keeps nothing of its
-//! own; what a robot remembers is in its [`Memory`], which is part of the state.
+//! A behavior never sees the world's state, only its percept (in the paper agents propose, and the
+//! environment decides). It is shared by all robots of its type and has no state of its own; a
+//! robot's knowledge is in its [`Memory`], which is part of the state.
 
 mod goto;
 mod random;
@@ -20,32 +20,32 @@ use super::sensor::{NOTHING, Reading};
 use sidestep_kernel::Cycle;
 use sidestep_kernel::stream::Draws;
 
-/// What a robot remembers between its actions: four words whose meaning is the behaviour's.
+/// A robot's memory between its actions: four words whose meaning is up to the behavior.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Memory {
-    /// All 0 at the start of a run.
+    /// The words; all 0 at the start of a run.
     pub words: [u32; 4],
 }
 
-/// What stopped the last action.
+/// The obstacle that stopped the last action.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Contact {
-    /// Kind of the thing touched, an index into the scenario's kinds.
+    /// Kind of the obstacle, an index into the scenario's kinds.
     pub kind: u8,
-    /// Which side of the body touched it.
+    /// Side of the body that touched it.
     pub side: Side,
 }
 
 /// A message heard over the radio.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Heard {
-    /// Who sent it.
+    /// Id of the robot that sent it.
     pub sender: u32,
-    /// What was sent.
+    /// The message itself.
     pub word: u64,
 }
 
-/// Where a beam looks, seen from the robot.
+/// The direction of a beam, seen from the robot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sector {
     /// Within 45 degrees of the heading.
@@ -59,7 +59,7 @@ pub enum Sector {
 }
 
 impl Sector {
-    /// The sector of a bearing in degrees, positive to the left. The diagonals belong to
+    /// Returns the sector of a bearing in degrees, positive to the left. The diagonals belong to
     /// the sides.
     pub fn of(bearing_deg: f64) -> Self {
         let turned = bearing_deg.rem_euclid(360.0);
@@ -78,26 +78,26 @@ impl Sector {
 /// Everything a robot knows when it decides.
 #[derive(Debug)]
 pub struct Percept<'a> {
-    /// The cycle.
+    /// The present cycle.
     pub now: Cycle,
     /// One reading per beam, the sensors one after the other in the scenario's order.
     pub readings: &'a [Reading],
-    /// Where each beam looks (shape: that of `readings`).
+    /// Sector of each beam (shape: that of `readings`).
     pub sectors: &'a [Sector],
     /// Nearest distance class reported in each sector, [`UNSEEN`] where nothing is; see
     /// [`Percept::nearest`].
     pub nearest_in: [u8; 4],
-    /// What stopped the last action, if anything did.
+    /// The obstacle that stopped the last action, if there was one.
     pub contact: Option<Contact>,
-    /// Column and row of the robot's lower-left box: it is localized.
+    /// Column and row of the robot's lower-left box; robots know where they are.
     pub at: (u32, u32),
     /// Heading: 0 east, 1 north, 2 west, 3 south.
     pub heading: u8,
-    /// What the robots in radio range last broadcast, by sender.
+    /// Last broadcasts of the robots in radio range, by sender.
     pub heard: &'a [Heard],
 }
 
-/// The nearest class reported in each sector, for percepts that are made by hand.
+/// Returns the nearest class reported in each sector, for percepts that are made by hand.
 pub fn nearest_in(readings: &[Reading], sectors: &[Sector]) -> [u8; 4] {
     let mut nearest = [UNSEEN; 4];
     for (reading, &sector) in readings.iter().zip(sectors) {
@@ -109,30 +109,30 @@ pub fn nearest_in(readings: &[Reading], sectors: &[Sector]) -> [u8; 4] {
 }
 
 impl Percept<'_> {
-    /// The nearest distance class at which something is reported in a sector, if anything.
+    /// Returns the nearest distance class at which something is reported in a sector, if any.
     pub fn nearest(&self, sector: Sector) -> Option<u8> {
         let class = self.nearest_in[sector as usize];
         (class != UNSEEN).then_some(class)
     }
 }
 
-/// A mark on the way.
+/// A mark on the robot's way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Trip {
-    /// The robot stands where its trips begin; time counts from here.
+    /// The robot is where its trips start; time counts from here.
     Begun,
-    /// A trip is complete, and the next begins.
+    /// A trip is complete, and the next one starts.
     Done,
 }
 
-/// What a robot does next.
+/// A robot's choice for this cycle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Decision {
-    /// The action tried.
+    /// The action to try.
     pub action: ActionId,
-    /// Whether the last action began or completed a trip; trips are counted and timed.
+    /// Whether the last action started or completed a trip; trips are counted and timed.
     pub trip: Option<Trip>,
-    /// What others in radio range hear from the next cycle on; `None` keeps the last word.
+    /// Message that others in radio range hear from the next cycle on; `None` keeps the last one.
     pub broadcast: Option<u64>,
 }
 
@@ -142,10 +142,10 @@ impl From<ActionId> for Decision {
     }
 }
 
-/// How a robot decides. Implement it for behaviours of your own; see
+/// The rule by which a robot chooses actions. Implement it for behaviors of your own; see
 /// `examples/own_behaviour.rs`.
 pub trait Behaviour: std::fmt::Debug + Send + Sync {
-    /// The next action, from the percept, the memory (which it may change) and the robot's
-    /// random stream of this cycle alone.
+    /// Returns the next action. It may depend only on the percept, the memory (which it may change)
+    /// and the robot's random stream of this cycle, because robots decide in any order.
     fn decide(&self, percept: &Percept<'_>, memory: &mut Memory, draws: &mut Draws) -> Decision;
 }

@@ -1,12 +1,12 @@
-//! Effectors that slip: the transitions an action may end in, and what obstacles make of them.
+//! Effectors that slip: the transitions in which an action may end, and the effect of obstacles.
 //!
-//! Source: the paper's action modeling (a set of transitions with probabilities per agent
-//! type and action, learned in a free place) and its adaptation to a place with obstacles.
+//! Source: the paper's action modeling (a set of transitions with probabilities per agent type and
+//! action, learned in free space) and its adaptation to places with obstacles.
 
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::distr::{Categorical, RowError};
 
-/// An action of a body, an index into its effector's actions.
+/// Number of an action: its index among its effector's actions.
 pub type ActionId = u8;
 /// Go one box ahead.
 pub const FORWARD: ActionId = 0;
@@ -19,7 +19,7 @@ pub const STAY: ActionId = 3;
 /// The actions every effector has, in the order of their ids.
 pub const STANDARD_ACTIONS: [&str; 4] = ["forward", "left", "right", "stay"];
 
-/// A direction relative to a body: where a step goes, or which side is touched.
+/// A direction relative to a body: that of a step, or the side that is touched.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Side {
@@ -37,7 +37,7 @@ impl Side {
     /// All sides in the order of their numbers.
     pub const ALL: [Self; 4] = [Self::Front, Self::Left, Self::Back, Self::Right];
 
-    /// The side for a letter of a path: `F`, `L`, `B` or `R`.
+    /// Returns the side for a letter of a path: `F`, `L`, `B` or `R`.
     pub fn from_letter(letter: char) -> Option<Self> {
         match letter {
             'F' => Some(Self::Front),
@@ -48,27 +48,27 @@ impl Side {
         }
     }
 
-    /// Its name in files.
+    /// Returns its name in files.
     pub fn name(self) -> &'static str {
         ["front", "left", "back", "right"][self as usize]
     }
 }
 
-/// Most steps of a path.
+/// Largest number of steps of a path.
 pub const MAX_PATH: usize = 16;
 
 /// One way an action may end, in free space.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Transition {
-    /// Probability.
+    /// Probability of the transition.
     pub p: f64,
-    /// Unit steps in the frame of the heading before the turn.
+    /// Unit steps, in the frame of the heading before the turn.
     pub path: Vec<Side>,
     /// Quarter turns to the left, 0 to 3, made after the path.
     pub turn: u8,
 }
 
-/// An effector type as data: per action its transitions, the intended one first.
+/// An effector type as data: for each action its transitions, the intended one first.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EffectorModel {
     /// Name in the scenario.
@@ -80,7 +80,7 @@ pub struct EffectorModel {
 }
 
 impl EffectorModel {
-    /// Does what it is told: one box ahead, quarter turns, nothing.
+    /// Returns an effector that never errs: one box ahead, quarter turns, nothing.
     pub fn perfect() -> Self {
         let only = |path: Vec<Side>, turn| vec![Transition { p: 1.0, path, turn }];
         Self {
@@ -95,32 +95,32 @@ impl EffectorModel {
         }
     }
 
-    /// The transitions of an action; only the intended one where `reliable`.
+    /// Returns the transitions of an action; only the intended one where `reliable`.
     pub fn transitions_of(&self, action: ActionId, reliable: bool) -> Vec<Transition> {
         let all = &self.transitions[usize::from(action)];
         if reliable { vec![Transition { p: 1.0, ..all[0].clone() }] } else { all.clone() }
     }
 }
 
-/// What becomes of a transition whose path meets something: the obstacle rule.
+/// The rule for a transition whose path meets an obstacle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ObstacleRule {
     /// The path is cut at the first box that is not free.
     #[default]
     Cut,
-    /// The whole transition becomes a contact in place.
+    /// The whole transition is given up, and becomes a contact in place.
     Stay,
-    /// Blocked transitions are struck out and the rest rescaled (the paper's "inhibited");
-    /// when nothing is left, the body stays with a contact.
+    /// Blocked transitions are removed and the rest is rescaled (the paper's "inhibited"); when
+    /// none is left, the body stays with a contact.
     Renormalise,
 }
 
 impl ObstacleRule {
-    /// All laws.
+    /// All rules.
     pub const ALL: [Self; 3] = [Self::Cut, Self::Stay, Self::Renormalise];
 
-    /// Its name in files.
+    /// Returns its name in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Cut => "cut",
@@ -134,37 +134,37 @@ impl ObstacleRule {
 /// that the body had before the whole transition.
 #[derive(Debug, Clone)]
 pub struct Step {
-    /// Boxes that the body enters (index offsets).
+    /// Boxes that the body enters, as index offsets.
     pub enter: Box<[i32]>,
-    /// Boxes that it leaves.
+    /// Boxes that it leaves, as index offsets.
     pub leave: Box<[i32]>,
-    /// Move of the anchor, columns and rows.
+    /// Move of the anchor in columns and rows.
     pub delta: (i32, i32),
     /// Side of the body that moves first.
     pub side: Side,
 }
 
-/// A transition at a heading, ready to walk.
+/// A transition at a heading, prepared for walking on the grid.
 #[derive(Debug, Clone)]
 pub struct Walk {
     /// Its steps.
     pub steps: Vec<Step>,
     /// Quarter turns to the left.
     pub turn: u8,
-    /// All steps together, for the many walks that meet nothing.
+    /// All steps together, for the many walks that meet no obstacle.
     pub whole: Whole,
 }
 
-/// What a walk does that meets nothing (index offsets from the anchor before it).
+/// The effect of a walk that meets no obstacle, as index offsets from the anchor before it.
 #[derive(Debug, Clone, Default)]
 pub struct Whole {
-    /// Boxes entered that the body did not cover at the start; all must be free.
+    /// Boxes entered that the body did not cover at the start; all of them must be free.
     pub enter: Box<[i32]>,
     /// Boxes covered at the start and not at the end.
     pub leave: Box<[i32]>,
     /// Boxes covered at the end and not at the start.
     pub fill: Box<[i32]>,
-    /// Move of the anchor, columns and rows.
+    /// Move of the anchor in columns and rows.
     pub delta: (i32, i32),
 }
 
@@ -191,8 +191,8 @@ impl Whole {
     }
 }
 
-/// The boxes an action may sweep, as a tree of steps, depth first: what lies behind a wall is
-/// not claimed.
+/// The boxes that an action may sweep, as a tree of steps, depth first. It is a tree because boxes
+/// behind a wall need not be claimed: a blocked step leaves out its subtree.
 #[derive(Debug, Clone, Default)]
 pub struct Sweep {
     /// The steps.
@@ -204,11 +204,11 @@ pub struct Sweep {
 /// One step of a [`Sweep`].
 #[derive(Debug, Clone, Copy)]
 pub struct SweepNode {
-    /// Where its boxes begin,
+    /// Start of its boxes in [`Sweep::boxes`].
     pub first: u32,
-    /// and end.
+    /// End of its boxes there.
     pub end: u32,
-    /// The next step to look at when a wall blocks this one: behind its whole subtree.
+    /// Index of the next step when a wall blocks this one: the one behind its whole subtree.
     pub after: u32,
 }
 
@@ -217,13 +217,13 @@ pub struct SweepNode {
 pub struct Action {
     /// Probability of each walk.
     pub distribution: Categorical,
-    /// Probabilities as given, for exact computations and for rescaling.
+    /// Probabilities as given, kept for exact computations and for rescaling.
     pub probabilities: Vec<f64>,
-    /// What the outcomes do.
+    /// The walk of each outcome.
     pub walks: Vec<Walk>,
-    /// Everything that may be swept.
+    /// The tree of everything that the action may sweep.
     pub sweep: Sweep,
-    /// The boxes of `sweep`, each once.
+    /// The boxes of `sweep`, each listed once.
     pub claims: Box<[i32]>,
 }
 
@@ -234,7 +234,8 @@ impl Action {
     /// Prepares an action of a `width` x `height` body for grid rows of `stride` boxes.
     ///
     /// # Errors
-    /// When the probabilities are no distribution; scenarios check that earlier.
+    /// Returns an error when the probabilities are not a distribution; scenarios check that
+    /// earlier.
     pub fn new(
         transitions: &[Transition],
         heading: u8,
@@ -267,13 +268,13 @@ impl Action {
     }
 }
 
-/// Offsets of the boxes that a body covers, row by row from its anchor.
+/// Returns the offsets of the boxes that a body covers, row by row from its anchor.
 pub fn own_boxes(body: (u32, u32), stride: u32) -> Box<[i32]> {
     let row = |y: u32| (0..body.0).map(move |x| (y * stride + x) as i32);
     (0..body.1).flat_map(row).collect()
 }
 
-/// Appends the tree of the paths' steps from `depth` on: paths that start alike share nodes.
+/// Appends the tree of the paths' steps from `depth` on; paths that start alike share nodes.
 fn push_sweep(
     paths: &[(&[Side], &[Step])],
     depth: usize,
@@ -306,8 +307,8 @@ fn steps(path: &[Side], heading: u8, body: (u32, u32), stride: u32) -> Vec<Step>
         .collect()
 }
 
-/// The row of boxes just outside a body in direction `u` (`ahead`), or its hindmost own row,
-/// from the left to the right as seen along `u`.
+/// Returns the row of boxes just outside a body in direction `u` (`ahead`), or the body's own
+/// hindmost row, from left to right as seen along `u`.
 fn edge(body: (u32, u32), (ux, uy): (i32, i32), ahead: bool) -> Vec<(i32, i32)> {
     let (w, h) = (body.0 as i32, body.1 as i32);
     let across = if ux != 0 { h } else { w };

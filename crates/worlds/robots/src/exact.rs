@@ -1,9 +1,9 @@
-//! The exact Markov chain of one robot in a building, without a single draw.
+//! The exact Markov chain of one robot in a building, computed without random draws.
 //!
-//! A robot that is alone, with walls and closed doors around it, is a Markov chain over its
-//! poses. This module computes the chain from the same tables that the simulator draws from,
-//! by other code, so that each can be held against the other; and it writes the model as a
-//! POMDP for planners.
+//! A robot that is alone, with walls and closed doors around it, is a Markov chain over its poses.
+//! This module computes the chain from the same tables that the simulator draws from, but by other
+//! code, so that each can be checked against the other; and it writes the model as a POMDP for
+//! planners.
 //!
 //! ```text
 //! Compiled -> Model   outcomes of every action at every pose      obstacle.rs building.rs
@@ -37,16 +37,16 @@ use sidestep_kernel::InputError;
 use sparse::Sparse;
 use std::collections::BTreeMap;
 
-/// Most poses of a model.
+/// Largest number of poses of a model.
 pub const MAX_STATES: usize = 200_000;
-/// Most outcomes over all poses and actions.
+/// Largest number of outcomes over all poses and actions.
 const MAX_OUTCOMES: usize = 20_000_000;
 
-/// The policies that have a name.
+/// The names of the policies that have one.
 pub const POLICIES: [&str; 3] = ["uniform", "forward", "bounce"];
 
-/// The policy of a name: `uniform` (each standard action alike), `forward` (always ahead),
-/// `bounce` (ahead, and a turn to either side after a contact).
+/// Returns the policy of a name: `uniform` (each standard action alike), `forward` (always ahead),
+/// or `bounce` (ahead, and a turn to either side after a contact).
 ///
 /// # Errors
 /// When there is no such policy.
@@ -62,7 +62,7 @@ pub fn policy(name: &str) -> Result<Random, InputError> {
     }
 }
 
-/// Every pose that a robot can reach from its start, and what each action comes to there.
+/// Every pose that a robot can reach from its start, with the outcomes of each action there.
 #[derive(Debug, Clone)]
 pub struct Model {
     place: String,
@@ -70,9 +70,9 @@ pub struct Model {
     robot: Robot,
     rule: ObstacleRule,
     kinds: Vec<String>,
-    /// In the order in which a search finds them; the first is the start.
+    /// In the order in which the search finds them; the first is the start.
     poses: Vec<Pose>,
-    /// Row `pose * actions + action`.
+    /// Outcomes, in row `pose * actions + action`.
     outcomes: Sparse<Arrival>,
 }
 
@@ -106,7 +106,7 @@ impl Model {
         Ok(model)
     }
 
-    /// Follows every action from every pose found, until no pose is new.
+    /// Follows every action from every pose found, until there is no new pose.
     fn explore(&mut self) -> Result<(), InputError> {
         let mut index_of = BTreeMap::from([(self.robot.start, 0)]);
         let mut next = 0;
@@ -140,7 +140,7 @@ impl Model {
         Err(InputError::new(&self.place, cause, remedy))
     }
 
-    /// The distribution of outcomes of an action at a pose, merged; sums to 1.
+    /// Returns the distribution of outcomes of an action at a pose, merged; it sums to 1.
     ///
     /// # Panics
     /// When the robot has no such action.
@@ -150,28 +150,28 @@ impl Model {
         here_and_now(transitions, self.robot.size, pose, self.rule, kind_at)
     }
 
-    /// Every pose that can be reached; the first is the start.
+    /// Returns every pose that can be reached; the first is the start.
     pub fn poses(&self) -> &[Pose] {
         &self.poses
     }
 
-    /// Names of the actions, by id.
+    /// Returns the names of the actions, by id.
     pub fn actions(&self) -> &[String] {
         &self.robot.body.effector.actions
     }
 
-    /// Outcomes over all poses and actions.
+    /// Returns the number of outcomes over all poses and actions.
     pub fn outcomes(&self) -> usize {
         self.outcomes.len()
     }
 
-    /// How often the robot acts in the first `cycles` cycles.
+    /// Returns how often the robot acts in the first `cycles` cycles.
     pub fn actions_in(&self, cycles: u64) -> u64 {
         let (period, phase) = (u64::from(self.robot.timing.period), self.robot.timing.phase);
         (cycles + u64::from(phase)).div_ceil(period) - u64::from(phase).div_ceil(period)
     }
 
-    /// The chain that the robot is under a policy.
+    /// Returns the Markov chain of the robot under a policy.
     ///
     /// # Errors
     /// When the policy chooses an action that the robot does not have.
@@ -179,7 +179,7 @@ impl Model {
         Chain::new(self, policy)
     }
 
-    /// The model with its observations, as planners read it.
+    /// Returns the model with its observations, in the form that planners read.
     ///
     /// # Errors
     /// When `options` do not fit the scenario, or ask for too much.
@@ -187,7 +187,7 @@ impl Model {
         Pomdp::new(self, options)
     }
 
-    /// What an action comes to at the pose with this index.
+    /// Returns the outcomes of an action at the pose with this index.
     fn arrivals(&self, pose: usize, action: usize) -> &[Arrival] {
         self.outcomes.row(pose * self.actions().len() + action)
     }

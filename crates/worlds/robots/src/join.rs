@@ -1,4 +1,4 @@
-//! *Join*: who meets whom, and in which order the bodies of a conflict group act.
+//! *Join*: groups of bodies whose claims meet, and the order in which a group's bodies act.
 
 use super::Scratch;
 use super::policy::ConflictPolicy;
@@ -18,8 +18,8 @@ pub(super) struct Place {
 }
 
 impl<T: BoxWord> Scene<'_, T> {
-    /// Joins a body with all whose claims meet its own: a box that it may come to cover names
-    /// another, be it one that stands there or one that may come too.
+    /// Joins a body with all bodies whose claims meet its own: those named in a box that it may
+    /// come to cover, because they stand there or may come there too.
     #[inline]
     pub(super) fn join(&self, slot: Slot, groups: &Groups) {
         let cell = self.cell(slot);
@@ -27,7 +27,7 @@ impl<T: BoxWord> Scene<'_, T> {
         if intent.is_idle() {
             return;
         }
-        // A neighbor is often met in several boxes.
+        // The same neighbor is often met in several boxes; joining it once is enough.
         let mut last_met = slot;
         let mut meet = |word: T| {
             let other = word.slot();
@@ -44,8 +44,8 @@ impl<T: BoxWord> Scene<'_, T> {
         boxes.iter().for_each(|&offset| meet(self.floor.get(at(base, offset))));
     }
 
-    /// Fills `scratch.order` with a group in its order of acting, and each body's draw of
-    /// what its action comes to (the priority is drawn beside it).
+    /// Fills `scratch.order` with a group in its order of acting, each body with the draw of its
+    /// action's outcome (drawn together with the priority).
     pub(super) fn order(&self, group: &[Slot], scratch: &mut Scratch) {
         let first = match self.world.policy {
             ConflictPolicy::RightOfWay => self.first_heading(group),
@@ -61,7 +61,8 @@ impl<T: BoxWord> Scene<'_, T> {
         order.sort_unstable_by_key(|place| place.key);
     }
 
-    /// Smaller acts earlier: rank by the policy, fair draw, id. Unique per body.
+    /// Returns the key by which the smaller acts earlier: rank by the policy, fair draw, id. It is
+    /// unique per body because the id is part of it.
     #[inline]
     fn priority(&self, cell: &BodyCell, draw: u32, first_heading: u8) -> (u8, u32, u32) {
         let id = cell.id;
@@ -82,15 +83,15 @@ impl<T: BoxWord> Scene<'_, T> {
         }
     }
 
-    /// Doors have no heading and go first.
+    /// Returns the heading of a body; none for doors, which have no heading and go first.
     fn heading_of(&self, cell: &BodyCell) -> Option<u8> {
         let is_door = matches!(self.type_of(cell).role, Role::Door(_));
         (!is_door).then(|| cell.facing.get())
     }
 
-    /// Whoever heads `h` sees on its right those that head `h + 1` (a quarter to the left),
-    /// so a heading begins when the next one is absent; among several, and when all four are
-    /// there, a fair draw per cycle decides.
+    /// Returns the heading that goes first. A body with heading `h` sees on its right those with
+    /// heading `h + 1` (a quarter to the left), so a heading starts when the next one is absent.
+    /// Among several such headings, and when all four are present, a fair draw per cycle decides.
     fn first_heading(&self, group: &[Slot]) -> u8 {
         let mut present = [false; 4];
         for heading in group.iter().filter_map(|&slot| self.heading_of(self.cell(slot))) {

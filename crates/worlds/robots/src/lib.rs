@@ -7,7 +7,7 @@
 //! ```text
 //! scenario.rs -> world.rs (immutable), state.rs (columns)
 //! perceive.rs + decide.rs  ->  join.rs  ->  act.rs, auction.rs   one cycle
-//! sensor.rs, ray.rs, effector.rs: the tables behind it         metrics.rs: what came of it
+//! sensor.rs, ray.rs, effector.rs: the tables behind it         metrics.rs: the sums of a run
 //! ```
 
 mod act;
@@ -54,22 +54,22 @@ use world::StorageOrder;
 /// Something that happened to a body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Event {
-    /// When.
+    /// Cycle in which it happened.
     pub cycle: Cycle,
-    /// To whom.
+    /// The body that it happened to.
     pub body: EntityId,
-    /// What.
+    /// The kind of event, with its details.
     pub event: EventKind,
 }
 
-/// What can happen.
+/// Kinds of events.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum EventKind {
-    /// A robot's action met something.
+    /// A robot's action ran into something.
     Contact {
-        /// Kind of the thing.
+        /// Kind of the obstacle.
         kind: u8,
-        /// Side of the robot.
+        /// Side of the robot that touched it.
         side: Side,
     },
     /// A door has opened.
@@ -78,29 +78,29 @@ pub enum EventKind {
     Closed,
 }
 
-/// One beam's truth and report, kept where a log for learning is wanted.
+/// The true and the reported reading of one beam, kept where a log for learning is wanted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SensorSample {
-    /// When.
+    /// Cycle of the reading.
     pub cycle: Cycle,
-    /// Whose.
+    /// The robot that carries the sensor.
     pub robot: EntityId,
-    /// Which of its sensors.
+    /// Number of the sensor on its robot, from 0.
     pub sensor: u16,
-    /// What the beam met.
+    /// The true reading: the first obstacle that the beam meets.
     pub truth: Reading,
-    /// What it reported.
+    /// The reading that the sensor reported.
     pub reported: Reading,
 }
 
-/// What one action came to, kept where a log for learning is wanted.
+/// The result of one action, kept where a log for learning is wanted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MotionSample {
-    /// When.
+    /// Cycle of the action.
     pub cycle: Cycle,
-    /// Whose.
+    /// The robot that acted.
     pub robot: EntityId,
-    /// Which action.
+    /// Number of the action in the robot's effector.
     pub action: u8,
     /// Boxes moved ahead.
     pub ahead: i32,
@@ -108,15 +108,15 @@ pub struct MotionSample {
     pub left: i32,
     /// Quarter turns to the left that were made; an action that ends in a contact makes none.
     pub quarter_turns: u8,
-    /// Whether an obstacle cut it.
+    /// Whether an obstacle cut it short.
     pub contact: bool,
 }
 
-/// What a worker keeps between tasks.
+/// A worker's buffers and sums, kept between tasks.
 #[derive(Debug, Default)]
 pub struct Scratch {
     readings: Vec<Reading>,
-    /// What a sensor's beams truly meet.
+    /// The rows of the readings that a sensor's beams truly have.
     truths: Vec<sensor::Row>,
     heard: Vec<decide::Heard>,
     order: Vec<join::Place>,

@@ -1,4 +1,4 @@
-//! What a run reports: per robot and in all.
+//! The metrics of a run: per robot, and in total.
 
 use super::state::RobotsState;
 use super::world::RobotsWorld;
@@ -10,19 +10,19 @@ use std::collections::BTreeMap;
 /// Counters of one robot, or their sums over all robots.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Counts {
-    /// Actions begun.
+    /// Number of actions started.
     pub actions: u64,
-    /// Contacts in all.
+    /// Number of contacts in total.
     pub contacts: u64,
-    /// Contacts by the kind touched; 0 for kinds that nobody touched.
+    /// Number of contacts by the kind touched; 0 for kinds that were never touched.
     pub contacts_by_kind: BTreeMap<String, u64>,
-    /// Way made, in metres.
+    /// Distance traveled, in meters.
     pub distance_m: f64,
-    /// Trips completed.
+    /// Number of trips completed.
     pub trips: u64,
-    /// Mean cycles per completed trip; absent without trips.
+    /// Mean number of cycles per completed trip; absent without trips.
     pub trip_cycles_mean: Option<f64>,
-    /// Boxes that no robot had covered before.
+    /// Number of boxes that no robot had covered before.
     pub first_visits: u64,
 }
 
@@ -32,18 +32,18 @@ pub struct Metrics {
     /// Sums over all robots.
     #[serde(flatten)]
     pub total: Counts,
-    /// Share of the free boxes that some robot has covered.
+    /// Share of the free boxes that have been covered by a robot.
     pub coverage: f64,
     /// Share of actions that ended in a contact.
     pub contacts_per_action: f64,
-    /// How many conflict groups had 1, 2-3, 4-7, ... bodies, over all cycles of this process.
+    /// Number of conflict groups with 1, 2-3, 4-7, ... bodies, over all cycles of this process.
     pub group_sizes: Vec<u64>,
-    /// The largest conflict group of this process's run.
+    /// Number of bodies of the largest conflict group in this process.
     pub largest_group: u64,
 }
 
 impl RobotsWorld {
-    /// Counters of a robot after `cycle` cycles.
+    /// Returns the counters of a robot after `cycle` cycles.
     pub fn counts(&self, state: &RobotsState, cycle: Cycle, id: EntityId) -> Counts {
         let (i, kinds) = (id as usize, self.kinds.len());
         let cell = state.body(id);
@@ -61,7 +61,7 @@ impl RobotsWorld {
         }
     }
 
-    /// Counters of all robots together after `cycle` cycles.
+    /// Returns the counters of all robots together after `cycle` cycles.
     pub fn totals(&self, state: &RobotsState, cycle: Cycle) -> Counts {
         let mut total = Counts::default();
         let mut trip_cycles = 0;
@@ -81,7 +81,7 @@ impl RobotsWorld {
         total
     }
 
-    /// Metrics of a run, with the group sizes its workers have seen.
+    /// Returns the metrics of a run, with the group sizes that its workers have seen.
     pub fn metrics(
         &self,
         state: &RobotsState,
@@ -101,7 +101,7 @@ impl RobotsWorld {
         }
     }
 
-    /// Boxes under robots at the start; nobody visits them for the first time.
+    /// Returns the number of boxes under robots at the start, which do not count as first visits.
     fn covered_at_start(&self) -> u64 {
         let boxes = |&id: &EntityId| self.type_of(id).own.len() as u64;
         self.robots.iter().map(boxes).sum()

@@ -12,7 +12,7 @@ use sidestep_kernel::space::BoxWord;
 use sidestep_kernel::{Column, Cycle, Slot};
 
 impl<T: BoxWord> Scene<'_, T> {
-    /// Lets a body perceive and decide, and claims what it may come to cover.
+    /// Lets a body perceive and decide, and claims the boxes that it may come to cover.
     #[inline]
     pub(super) fn perceive(&self, slot: Slot, scratch: &mut Scratch) {
         let (world, cell) = (self.world, self.cell(slot));
@@ -59,7 +59,7 @@ impl<T: BoxWord> Scene<'_, T> {
         if known { Intent::action(decision.action) } else { Intent::IDLE }
     }
 
-    /// Counts what the decision says beside the action.
+    /// Records the parts of a decision beside the action: trips and broadcasts.
     #[inline]
     fn note(&self, cell: &BodyCell, decision: Decision) {
         let now = self.now;
@@ -77,8 +77,8 @@ impl<T: BoxWord> Scene<'_, T> {
         }
     }
 
-    /// Fills `scratch.readings` with what each beam reports of what it truly meets, and
-    /// returns the nearest class reported per sector.
+    /// Fills `scratch.readings` with each beam's report, and returns the nearest class reported per
+    /// sector.
     #[inline]
     pub(super) fn sense(
         &self,
@@ -109,7 +109,8 @@ impl<T: BoxWord> Scene<'_, T> {
         nearest
     }
 
-    /// People and other movers go on as before or draw a new direction.
+    /// Returns the intent of a mover: people and the like continue as before or draw a new
+    /// direction.
     fn mover_draws(&self, mover: &Mover, cell: &BodyCell) -> Intent {
         let words = self.world.streams.block(cell.id, self.now, purpose::MOVE, 0);
         if !mover.straight.happens(words[0]) {
@@ -118,7 +119,8 @@ impl<T: BoxWord> Scene<'_, T> {
         Intent::ONLY
     }
 
-    /// A door tries to toggle when its schedule says so; a closing that is in the way waits.
+    /// Returns the intent of a door: it tries to toggle when its schedule says so. A closing that
+    /// somebody blocks waits.
     fn door_wants(&self, door: &Door, cell: &BodyCell) -> Intent {
         let is_open = cell.facing.get() == 1;
         let draw = || self.world.streams.block(cell.id, self.now, purpose::DOOR, 0)[0];
@@ -126,8 +128,8 @@ impl<T: BoxWord> Scene<'_, T> {
         if wants_open == is_open { Intent::IDLE } else { Intent::ONLY }
     }
 
-    /// Claims every free box that the body may come to cover, and says whether all of them
-    /// are free.
+    /// Claims every free box that the body may come to cover, and returns whether all of them are
+    /// free.
     #[inline]
     fn claim(&self, slot: Slot, intent: Intent) -> bool {
         let (floor, cell, claim) = (self.floor, self.cell(slot), T::claimed(slot));
@@ -149,8 +151,9 @@ impl<T: BoxWord> Scene<'_, T> {
         false
     }
 
-    /// Calls `each` for every box that the body may come to cover, walls excepted, with what
-    /// it holds now: boxes outside the body, of a door its own. The body is not idle.
+    /// Calls `each` for every box that the body may come to cover, walls excepted, with the present
+    /// content of the box: boxes outside the body, or a door's own boxes. The body must not be
+    /// idle.
     pub(super) fn for_each_claimed(&self, slot: Slot, mut each: impl FnMut(usize, T)) {
         let (floor, cell) = (self.floor, self.cell(slot));
         let (base, body) = (self.base(cell), self.type_of(cell));
@@ -163,7 +166,7 @@ impl<T: BoxWord> Scene<'_, T> {
         }
     }
 
-    /// What the robots in range last broadcast, by sender; each reception may be lost.
+    /// Collects the last broadcasts of the robots in range, by sender; each reception may be lost.
     fn listen(&self, radio: &Radio, slot: Slot, heard: &mut Vec<Heard>) {
         let (world, state, id) = (self.world, self.state, self.cell(slot).id);
         let voice = &state.voice[(self.now % 2) as usize];
@@ -180,7 +183,7 @@ impl<T: BoxWord> Scene<'_, T> {
     }
 
     fn in_radio_range(&self, radio: &Radio, a: Slot, b: Slot) -> bool {
-        // Twice the distance between centers, so that all is integer.
+        // Twice the distance between centers, because then all numbers are integers.
         let center = |slot: Slot| {
             let cell = self.cell(slot);
             let (at, size) = (cell.at(), self.type_of(cell).size);
@@ -195,7 +198,7 @@ impl<T: BoxWord> Scene<'_, T> {
     }
 }
 
-/// Walks the tree of an action's steps; what lies behind a wall is left out.
+/// Walks the tree of an action's steps, and leaves out the boxes behind a wall.
 #[inline]
 fn sweep<T: BoxWord>(floor: &Column<T>, sweep: &Sweep, base: u32, mut each: impl FnMut(usize, T)) {
     let mut node = 0;
@@ -214,10 +217,10 @@ fn sweep<T: BoxWord>(floor: &Column<T>, sweep: &Sweep, base: u32, mut each: impl
     }
 }
 
-/// Writes the row of what each beam truly meets.
+/// Writes the row of each beam's true reading.
 ///
-/// This and [`report`] are two small loops, each with a function to itself, since together
-/// they would run out of registers.
+/// This and [`report`] are two small loops, each in a function of its own, because together they
+/// would run out of registers.
 #[inline(never)]
 fn cast<T: BoxWord>(
     scene: &Scene<'_, T>,
@@ -239,7 +242,7 @@ fn cast<T: BoxWord>(
     }));
 }
 
-/// The first box along a beam that holds something: what it holds, and its distance class.
+/// Returns the first box along a beam that holds something: its content and distance class.
 #[inline]
 fn first_hit<T: BoxWord>(floor: &Column<T>, base: u32, beam: &[Crossed]) -> Option<(T, u8)> {
     let look = |offset: i32| floor.get(at(base, offset));
@@ -254,8 +257,8 @@ fn first_hit<T: BoxWord>(floor: &Column<T>, base: u32, beam: &[Crossed]) -> Opti
     None
 }
 
-/// Draws what each beam reports of what it truly meets, and notes the nearest per sector;
-/// `words` are the sensor's draws, four at a time.
+/// Draws each beam's report from its true reading, and notes the nearest class per sector; `words`
+/// are the sensor's draws, four at a time.
 #[inline(never)]
 fn report<'a>(
     sensor: &MountedSensor,
@@ -275,7 +278,7 @@ fn report<'a>(
     }
 }
 
-/// The contact of a [`super::state::contact_word`].
+/// Returns the contact of a [`super::state::contact_word`].
 pub(super) fn contact_of_word(word: u16) -> Option<Contact> {
     let side = Side::ALL[usize::from(word >> 8 & 3)];
     (word != 0).then_some(Contact { kind: (word & 0x7f) as u8, side })
@@ -291,7 +294,7 @@ fn store_memory(cell: &BodyCell, memory: Memory) {
     cell.memory.iter().zip(memory.words).for_each(|(word, value)| word.set(value));
 }
 
-/// A true or reported reading by name of its sensor's entries, for logs.
+/// Returns the names of a reading's observation and class in its sensor, for logs.
 pub(super) fn name_of(reading: Reading, sensor: &super::sensor::SensorModel) -> (&str, &str) {
     let observation = &sensor.observations[usize::from(reading.observation)];
     let class = sensor.distance_classes.get(usize::from(reading.class));

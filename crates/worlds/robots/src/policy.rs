@@ -1,4 +1,4 @@
-//! In which order the bodies of a conflict group act.
+//! The order in which the bodies of a conflict group act.
 
 use serde::{Deserialize, Serialize};
 
@@ -13,11 +13,12 @@ pub enum ConflictPolicy {
     Fixed,
     /// By the rank of the kind (`kind_order`), then a fair draw.
     ByKind,
-    /// Who comes from the right goes first; where all four headings meet, a fair draw says
-    /// which heading begins.
+    /// The body that comes from the right goes first; where all four headings meet, a fair draw
+    /// says which heading starts.
     RightOfWay,
-    /// The fair draw of `random`, but in rounds: whoever has the highest key among its
-    /// neighbors acts, until all have. The same outcome, in parallel inside large groups.
+    /// The fair draw of `random`, but in rounds: a body acts when it has the highest key among its
+    /// neighbors, until all have acted. The outcome is the same, but found in parallel inside large
+    /// groups.
     Rounds,
 }
 
@@ -26,7 +27,7 @@ impl ConflictPolicy {
     pub const ALL: [Self; 5] =
         [Self::Random, Self::Fixed, Self::ByKind, Self::RightOfWay, Self::Rounds];
 
-    /// Its name in files.
+    /// Returns its name in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Random => "random",

@@ -1,8 +1,8 @@
 //! Beams on a grid: the boxes a beam crosses, in order, with their distances.
 //!
-//! A body always lies on the grid in the same way, so the exact traversal (Amanatides and
-//! Woo, "A fast voxel traversal algorithm for ray tracing", 1987) of a beam is done once per
-//! body type and heading, and a cycle only walks a list of offsets.
+//! A body is always aligned with the grid, so the exact traversal (Amanatides and Woo, "A fast
+//! voxel traversal algorithm for ray tracing", 1987) of a beam is done once per body type and
+//! heading, and a cycle only walks a list of offsets.
 
 use sidestep_kernel::math;
 
@@ -13,15 +13,15 @@ pub struct Crossing {
     pub dx: i32,
     /// Rows north of the anchor.
     pub dy: i32,
-    /// From the body's boundary along the beam to this box's boundary, in boxes.
+    /// Distance in boxes along the beam, from the body's boundary to this box's boundary.
     pub distance: f64,
 }
 
 /// Differences below this are rounding errors of the direction's sine and cosine.
 const EPSILON: f64 = 1e-9;
 
-/// The boxes that a beam from the center of a `size` x `size` body crosses, nearest first,
-/// for a body that heads east; `range` in boxes, exclusive.
+/// Returns the boxes that a beam from the center of a `size` x `size` body crosses, nearest first,
+/// for a body that heads east; `range` is in boxes, exclusive.
 ///
 /// A beam through a corner of boxes goes on to the box across it. A beam that runs along a
 /// line between boxes (even sizes, multiples of 90 degrees) counts as running on the left
@@ -35,7 +35,7 @@ pub fn crossings(size: u32, bearing_deg: f64, range: f64) -> Vec<Crossing> {
     along.into_iter().map(|c| turn_crossing(c, size, turns)).collect()
 }
 
-/// The same crossing for a body turned `turns` quarters to the left.
+/// Returns the same crossing for a body turned `turns` quarters to the left.
 pub fn turn_crossing(c: Crossing, size: u32, turns: u8) -> Crossing {
     let last = size as i32 - 1;
     let (dx, dy) = match turns % 4 {
@@ -47,12 +47,13 @@ pub fn turn_crossing(c: Crossing, size: u32, turns: u8) -> Crossing {
     Crossing { dx, dy, ..c }
 }
 
-/// Bearings in [0, 90): both direction components are non-negative.
+/// Returns the crossings for bearings in [0, 90), where both components are non-negative.
 fn first_quadrant(size: u32, bearing_deg: f64, range: f64) -> Vec<Crossing> {
     let (ux, uy) = direction(bearing_deg);
     let center = f64::from(size) / 2.0;
     let exit = (center / ux.max(uy)).min(f64::INFINITY);
-    // Start in the box at the center; on a line, the left side of an eastward beam is north.
+    // Start in the box at the center; on a line, in the box north of it, to the left of an eastward
+    // beam.
     let (mut col, mut row) = (center.floor() as i32, center.floor() as i32);
     let mut crossings = Vec::new();
     loop {
@@ -75,12 +76,12 @@ fn first_quadrant(size: u32, bearing_deg: f64, range: f64) -> Vec<Crossing> {
     }
 }
 
-/// Distance along the beam to the grid line `line`.
+/// Returns the distance along the beam to the grid line `line`.
 fn boundary(line: f64, center: f64, component: f64) -> f64 {
     if component == 0.0 { f64::INFINITY } else { (line - center) / component }
 }
 
-/// Unit vector of a bearing in [0, 90) degrees, exact at 0 and 45.
+/// Returns the unit vector of a bearing in [0, 90) degrees, exact at 0 and 45.
 fn direction(bearing_deg: f64) -> (f64, f64) {
     if bearing_deg.abs() < EPSILON {
         return (1.0, 0.0);
@@ -127,7 +128,7 @@ mod tests {
         assert_eq!(boxes(2, 270.0, 1.0), [(1, -1)]);
     }
 
-    /// Against a walk in tiny steps, for many sizes and bearings.
+    /// Compares with a walk in tiny steps, for many sizes and bearings.
     #[test]
     fn traversal_agrees_with_dense_sampling() {
         for size in 1..6 {
@@ -149,7 +150,8 @@ mod tests {
                         sampled.push(at);
                     }
                 }
-                // Sampling may miss a box cut for less than its step, never invent one.
+                // Sampling may miss a box that is cut for less than its step, but never invents
+                // one.
                 assert!(
                     sampled[..found.len().min(sampled.len()) / 2].iter().all(|b| found.contains(b))
                 );

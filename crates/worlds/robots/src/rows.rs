@@ -1,4 +1,4 @@
-//! What a run records: tables, and what waits for being recorded.
+//! The tables that a run records, and the rows that wait to be recorded.
 
 use super::effector::Side;
 use super::perceive::name_of;
@@ -15,13 +15,13 @@ use sidestep_kernel::view::Log;
 use sidestep_kernel::{Cycle, EntityId};
 use std::ops::Range;
 
-/// Poses kept before they must be recorded: what a processor's cache holds,
+/// Number of poses kept before they must be recorded: as many as fit a processor's cache,
 const FEW_POSES: usize = 1 << 18;
 /// or more for very many bodies, so that cycles run at least sixteen in a row,
 const CYCLES_IN_A_ROW: usize = 16;
 /// but never more than this.
 const MAX_POSES: usize = 1 << 24;
-/// Bodies whose poses are brought together at a time: a cache line of each cycle.
+/// Number of bodies whose poses are collected together: a cache line of each cycle.
 const TRANSPOSED: usize = 16;
 
 /// Names of the headings by number.
@@ -74,7 +74,7 @@ fn events(world: &RobotsWorld) -> Table<Event> {
         )
 }
 
-/// A beam: what it met and what was reported, each an observation and a class of distance.
+/// The true and the reported reading of a beam, each an observation and a class of distance.
 struct Reading {
     cycle: Cycle,
     robot: EntityId,
@@ -128,7 +128,7 @@ impl Buffers for Rows {
     }
 }
 
-/// What a run keeps beside its state: events and samples that wait.
+/// Data that a run keeps beside its state: events and samples that wait to be recorded.
 #[derive(Debug, Default)]
 pub struct Books {
     record: RecordSection,
@@ -145,12 +145,12 @@ pub struct Books {
 }
 
 impl Books {
-    /// Empty books of a run that may come to record what `record` says.
+    /// Returns the empty books of a run that records what `record` says once recording starts.
     pub fn new(record: RecordSection) -> Self {
         Self { record, ..Self::default() }
     }
 
-    /// Begins to keep rows from cycle `now` on.
+    /// Starts to keep rows from cycle `now` on.
     pub(super) fn begin(&mut self, world: &RobotsWorld, state: &mut RobotsState, now: Cycle) {
         let record = &self.record;
         self.rows.trajectories.begin(record.trajectories.then(trajectories));
@@ -166,7 +166,7 @@ impl Books {
         (self.is_recording, self.recorded) = (true, now);
     }
 
-    /// Goes on from cycle `now`, whose state was restored.
+    /// Continues from cycle `now`, whose state was restored.
     pub(super) fn go_on(&mut self, world: &RobotsWorld, state: &mut RobotsState, now: Cycle) {
         self.recorded = now;
         if self.is_recording {
@@ -174,7 +174,7 @@ impl Books {
         }
     }
 
-    /// Lets a worker keep what is wanted.
+    /// Makes a worker keep the events and samples that are wanted.
     pub(super) fn prepare(&self, scratch: &mut Scratch) {
         scratch.keep_events = self.log.is_kept || self.rows.events.is_kept();
         scratch.keep_samples = self.rows.readings.is_kept();
@@ -187,14 +187,14 @@ impl Books {
         self.motion_samples.append(&mut scratch.motion_samples);
     }
 
-    /// Files what was gathered, in an order that does not depend on who has seen what.
+    /// Files the gathered rows in an order that does not depend on the workers that saw them.
     pub(super) fn book(&mut self) {
         self.gathered.sort_unstable_by_key(|e| (e.cycle, e.body));
         self.gathered.iter().for_each(|&event| self.log.push(event));
         self.rows.events.extend(self.gathered.drain(..));
     }
 
-    /// The tables that are recorded.
+    /// Returns the tables that are recorded.
     pub(super) fn schemas(&self) -> Vec<TableSchema> {
         self.rows.schemas()
     }
@@ -224,7 +224,7 @@ impl Books {
     }
 }
 
-/// The columns of the table of poses in these cycles.
+/// Returns the columns of the table of poses in these cycles.
 fn poses(world: &RobotsWorld, frames: &Frames, span: Range<Cycle>) -> Vec<Values> {
     let cycles = (span.end - span.start) as usize;
     let moving: Vec<EntityId> =
@@ -233,8 +233,8 @@ fn poses(world: &RobotsWorld, frames: &Frames, span: Range<Cycle>) -> Vec<Values
         std::array::from_fn(|_| Vec::with_capacity(cycles * moving.len()));
     let mut at_cycle = Vec::with_capacity(cycles * moving.len());
     let from = (span.start - frames.first) as usize;
-    // Poses come by cycle and leave by body: a few bodies at a time, so that what is read
-    // of a cycle lies together.
+    // Poses are stored by cycle and written by body: a few bodies at a time, so that reads within a
+    // cycle lie together.
     let mut ways = vec![Vec::new(); TRANSPOSED];
     for some in moving.chunks(TRANSPOSED) {
         ways.iter_mut().for_each(Vec::clear);
@@ -260,7 +260,7 @@ fn poses(world: &RobotsWorld, frames: &Frames, span: Range<Cycle>) -> Vec<Values
     ]
 }
 
-/// The labels of readings, sorted: observations and classes of distance of all sensors.
+/// The labels of readings, sorted: observations and distance classes of all sensors.
 struct Vocabulary {
     observations: Vec<String>,
     classes: Vec<String>,
@@ -280,7 +280,7 @@ impl Vocabulary {
         Self { observations, classes }
     }
 
-    /// The row of a sample; `None` for a body without sensors.
+    /// Returns the row of a sample; `None` for a body without sensors.
     fn reading(&self, world: &RobotsWorld, sample: &SensorSample) -> Option<Reading> {
         let Role::Robot(model) = &world.type_of(sample.robot).role else { return None };
         let sensor = &model.body.sensors[usize::from(sample.sensor)].model;
@@ -301,7 +301,7 @@ impl Vocabulary {
 }
 
 impl RobotsWorld {
-    /// The sensors of all robot types.
+    /// Returns the sensors of all robot types.
     pub fn sensors(&self) -> impl Iterator<Item = &SensorModel> {
         self.types.iter().flat_map(|ty| match &ty.role {
             Role::Robot(model) => model.body.sensors.iter().map(|s| &s.model).collect(),

@@ -1,4 +1,4 @@
-//! What a run asks of the world beside its phases.
+//! The hooks by which a run asks the world for more than its phases.
 
 use super::metrics::Metrics;
 use super::rows::Books;
@@ -28,14 +28,15 @@ pub fn robots_run(source: &Source, workers: usize) -> Result<RobotsRun, InputErr
 }
 
 impl Compiled {
-    /// A run at its start; the world is shared, not copied. `source` names it in checkpoints.
+    /// Returns a run at its start; the world is shared, not copied. `source` names it in
+    /// checkpoints.
     pub fn start(self, source: &Source, workers: usize) -> RobotsRun {
         let state = RobotsState::restore(&self.world, &self.start_snapshot());
         let (plan, books) = (self.plan(), Books::new(self.record));
         Run::new(self.world, plan, (state, books), &source.text, workers)
     }
 
-    /// What the scenario asks for.
+    /// Returns the plan that the scenario asks for.
     pub fn plan(&self) -> Plan {
         Plan {
             name: self.name.clone(),
@@ -45,7 +46,7 @@ impl Compiled {
         }
     }
 
-    /// The state at the start, by entity id.
+    /// Returns the state at the start, by entity id.
     pub fn start_snapshot(&self) -> Snapshot {
         let kinds = self.world.kinds.len();
         let record = |&(at, facing): &((u32, u32), u8)| BodyRecord {
@@ -64,7 +65,7 @@ impl Compiled {
 }
 
 impl RobotsState {
-    /// Orders an action for the next cycle of a robot with the behavior `external`.
+    /// Orders an action for the next cycle from a robot with the behavior `external`.
     pub fn order(&self, robot: EntityId, action: u8) {
         use super::decide::ORDER;
         self.body(robot).memory[ORDER].set(u32::from(action) + 1);

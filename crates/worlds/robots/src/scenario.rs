@@ -1,4 +1,4 @@
-//! The sections of a robots scenario, as they stand in the file. Unknown keys are errors.
+//! The sections of a robots scenario, in the form of the file. Unknown keys are errors.
 
 mod compile;
 mod parts;
@@ -109,13 +109,13 @@ pub(super) struct SensorSection {
 /// Rows of a matrix by name.
 pub(super) type Rows = BTreeMap<Spanned<String>, Spanned<Vec<f64>>>;
 
-/// Actions by name; `box_m` and `evidence` say what they rest on.
+/// Actions by name; `box_m` and `evidence` say on what data they rest.
 #[derive(Debug, Clone, Default)]
 pub(super) struct EffectorSection {
     pub(super) actions: BTreeMap<String, Spanned<Vec<TransitionSection>>>,
 }
 
-/// By hand, since flattened maps lose the places of their entries.
+/// Written by hand, because flattened maps lose the positions of their entries.
 impl<'de> Deserialize<'de> for EffectorSection {
     fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct Visitor;
@@ -244,7 +244,7 @@ pub(super) struct RadioSection {
     pub(super) loss: Option<Share>,
 }
 
-/// The tables that a run keeps beside its summary.
+/// The tables that a run keeps in addition to its summary.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RecordSection {
@@ -252,9 +252,9 @@ pub struct RecordSection {
     pub trajectories: bool,
     /// Contacts and doors.
     pub events: bool,
-    /// Truth and report of every beam, and what every action came to: logs to learn from.
+    /// True and reported reading of every beam, and the result of every action: logs to learn from.
     pub calibration: bool,
-    /// Cycles between two checkpoints.
+    /// Number of cycles between two checkpoints.
     pub checkpoint_every: u64,
 }
 

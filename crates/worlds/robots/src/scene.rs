@@ -1,4 +1,4 @@
-//! What a phase works on: world, state and cycle, with the floor in the width of its words.
+//! The data of a phase: world, state and cycle, with the floor in the width of its words.
 
 use super::RobotsState;
 use super::state::BodyCell;
@@ -11,13 +11,13 @@ use sidestep_kernel::{Column, Cycle, EntityId, Slot};
 pub(super) struct Scene<'a, T: BoxWord> {
     pub(super) world: &'a RobotsWorld,
     pub(super) state: &'a RobotsState,
-    /// Who stands in each box or claims it.
+    /// The body that stands in each box or claims it.
     pub(super) floor: &'a Column<T>,
     pub(super) now: Cycle,
 }
 
-/// Evaluates an expression with the scene of a world's state, whatever the width of the words on
-/// its floor is: the phases are compiled for either.
+/// Evaluates an expression with the scene of a world's state. The phases are compiled for each
+/// width of the floor's words; this picks the right one.
 macro_rules! with_scene {
     ($world:expr, $state:expr, $now:expr, |$scene:ident| $value:expr) => {{
         let (world, state, now) = ($world, $state, $now);
@@ -36,25 +36,25 @@ macro_rules! with_scene {
 pub(super) use with_scene;
 
 impl<'a, T: BoxWord> Scene<'a, T> {
-    /// What changes of a body.
+    /// Returns the changing part of a body.
     #[inline(always)]
     pub(super) fn cell(&self, slot: Slot) -> &'a BodyCell {
         &self.state.bodies[slot as usize]
     }
 
-    /// What a body has in common with those of its type.
+    /// Returns the properties that a body shares with others of its type.
     #[inline(always)]
     pub(super) fn type_of(&self, cell: &BodyCell) -> &'a BodyType {
         &self.world.types[usize::from(cell.ty)]
     }
 
-    /// Index of a body's lower-left box on the floor.
+    /// Returns the index of a body's lower-left box on the floor.
     #[inline(always)]
     pub(super) fn base(&self, cell: &BodyCell) -> u32 {
         cell.at().index(self.world.stride)
     }
 
-    /// The draws of a body's action: what it comes to, and its priority.
+    /// Returns the draws of a body's action: that of its outcome, and that of its priority.
     #[inline]
     pub(super) fn act_words(&self, id: EntityId) -> [u32; 2] {
         let [effect, priority, ..] = self.world.streams.block(id, self.now, super::purpose::ACT, 0);
@@ -62,13 +62,13 @@ impl<'a, T: BoxWord> Scene<'a, T> {
     }
 }
 
-/// Index of the box at an offset from a body's lower-left one.
+/// Returns the index of the box at an offset from a body's lower-left one.
 #[inline(always)]
 pub(super) fn at(base: u32, offset: i32) -> usize {
     base.wrapping_add_signed(offset) as usize
 }
 
-/// Whether nothing stands in any of some boxes.
+/// Returns whether some boxes are all empty.
 #[inline]
 pub(super) fn all_free<T: BoxWord>(floor: &Column<T>, base: u32, offsets: &[i32]) -> bool {
     offsets.iter().fold(T::FREE, |all, &offset| all & floor.get(at(base, offset))).is_free()

@@ -1,4 +1,4 @@
-//! Sensors that confuse: what a beam truly meets, and what it reports.
+//! Sensors that err: the true reading of a beam, and the reading that it reports.
 //!
 //! Source: the paper's perception model (confusion matrix over observations, distance
 //! classes with a confusion matrix of their own). Both draws, observation and class, are
@@ -12,7 +12,7 @@ pub const UNSEEN: u8 = u8::MAX;
 /// Index of the observation `nothing`, always the first.
 pub const NOTHING: u8 = 0;
 
-/// What one beam reports: an observation of its sensor and a distance class.
+/// One beam's report: an observation of its sensor and a distance class.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Reading {
     /// Index into the sensor's observations; 0 is `nothing`.
@@ -28,35 +28,35 @@ pub struct SensorModel {
     pub name: String,
     /// Bearings of the beams relative to the heading, degrees, positive to the left.
     pub bearings_deg: Vec<f64>,
-    /// Farthest distance from the body's boundary at which something is met, in metres
-    /// (exclusive).
+    /// Distance in meters from the body's boundary (exclusive) up to which obstacles are met.
     pub range_m: f64,
     /// Observations; the first is `nothing`.
     pub observations: Vec<String>,
-    /// `confusion[class][true][reported]`; one matrix per true class, `beyond` the last.
+    /// `confusion[class][true][reported]`; one matrix per true class, the last for `beyond`.
     pub confusion: Vec<Vec<Vec<f64>>>,
-    /// Interior edges of the distance classes in metres, rising; a class is closed below.
+    /// Interior edges of the distance classes in meters, rising; a class is closed below.
     pub distance_edges_m: Vec<f64>,
-    /// Names of the classes, near to far: one more than edges.
+    /// Names of the classes, near to far: one more than there are edges.
     pub distance_classes: Vec<String>,
     /// `distance_confusion[true class][reported class]`; the last row is `beyond`.
     pub distance_confusion: Vec<Vec<f64>>,
-    /// True observation of each kind (shape: kinds of the scenario).
+    /// True observation of each kind of the scenario.
     pub designates: Vec<u8>,
 }
 
 impl SensorModel {
-    /// The class of a distance in metres.
+    /// Returns the class of a distance in meters.
     pub fn class_of(&self, distance_m: f64) -> u8 {
         self.distance_edges_m.iter().filter(|&&edge| edge <= distance_m).count() as u8
     }
 
-    /// The class that stands for "nothing in range".
+    /// Returns the class that stands for "nothing in range".
     pub fn beyond(&self) -> u8 {
         self.distance_classes.len() as u8
     }
 
-    /// `P(reported | true)` over all readings, or the certain reading where `reliable`.
+    /// Returns `P(reported
+    /// true)` over all readings, or the certain reading where `reliable`.
     ///
     /// A spurious report of something where there is nothing draws its class from the row
     /// `beyond`; a missed report has class `beyond`.
@@ -76,13 +76,13 @@ impl SensorModel {
         row
     }
 
-    /// The reading of a beam that reports nothing.
+    /// Returns the reading of a beam that reports nothing.
     pub fn nothing(&self) -> Reading {
         Reading { observation: NOTHING, class: self.beyond() }
     }
 }
 
-/// The joint distribution of readings, ready to draw from with one word and no branch.
+/// The joint distribution of readings, ready to be drawn from with one word and no branch.
 ///
 /// Each true reading has a row of `2^bits` columns of equal probability; a column is split
 /// between at most two reports (Walker's alias method, built by Vose's algorithm). A report
@@ -92,7 +92,7 @@ pub struct ReadingTable {
     classes: usize,
     bits: u32,
     columns: Box<[Split]>,
-    /// True when every reading is the truth and no draw is needed.
+    /// Whether every reading is the truth, so that no draw is needed.
     pub reliable: bool,
 }
 
@@ -100,19 +100,19 @@ pub struct ReadingTable {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Row(u32);
 
-/// One column of a row: below the threshold the first is reported, else the second.
+/// One column of a row: below the threshold the first reading is reported, else the second.
 #[derive(Debug, Clone, Copy)]
 struct Split {
     threshold: u32,
     reports: [Report; 2],
 }
 
-/// What a beam reports.
+/// A drawn reading, with its nearness.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Report {
     /// The reading.
     pub reading: Reading,
-    /// Its class, or [`UNSEEN`] where nothing is reported.
+    /// Its distance class, or [`UNSEEN`] where nothing is reported.
     pub nearness: u8,
 }
 
@@ -127,7 +127,8 @@ impl ReadingTable {
     /// Prepares the table of a sensor.
     ///
     /// # Errors
-    /// When a row is no distribution; scenarios check that earlier and say where.
+    /// Returns an error when a row is not a distribution; scenarios check that earlier and say
+    /// where.
     pub fn new(sensor: &SensorModel, reliable: bool) -> Result<Self, RowError> {
         let classes = sensor.distance_classes.len() + 1;
         let observations = sensor.observations.len();
@@ -144,20 +145,20 @@ impl ReadingTable {
         Ok(Self { classes, bits, columns: columns.into(), reliable })
     }
 
-    /// The row of a true reading.
+    /// Returns the row of a true reading.
     #[inline]
     pub fn row(&self, truth: Reading) -> Row {
         let row = usize::from(truth.observation) * self.classes + usize::from(truth.class);
         Row((row << self.bits) as u32)
     }
 
-    /// The true reading of a row.
+    /// Returns the true reading of a row.
     pub fn truth(&self, row: Row) -> Reading {
         let row = row.0 as usize >> self.bits;
         Reading { observation: (row / self.classes) as u8, class: (row % self.classes) as u8 }
     }
 
-    /// What is reported for the true reading of `row` with the uniform word `u`.
+    /// Returns the report for the true reading of `row`, drawn with the uniform word `u`.
     #[inline]
     pub fn report(&self, row: Row, u: u32) -> Report {
         let column = (u64::from(u) << self.bits >> 32) as usize;
@@ -166,7 +167,7 @@ impl ReadingTable {
     }
 }
 
-/// Splits a row into `n` columns of probability 1/n each.
+/// Returns the columns of a row, `n` of them with probability 1/n each.
 fn alias_columns(mut row: Vec<(Reading, f64)>, n: usize) -> Vec<Split> {
     let padding = row[0].0;
     row.resize(n, (padding, 0.0));
@@ -184,7 +185,8 @@ fn alias_columns(mut row: Vec<(Reading, f64)>, n: usize) -> Vec<Split> {
             small.push(from);
         }
     }
-    // What is left is full but for rounding; an impossible reading must not be among it.
+    // The columns that are left are full but for rounding. An impossible reading must not be among
+    // them, because even a tiny share would let it be reported.
     for i in small.into_iter().filter(|&i| row[i].1 == 0.0) {
         columns[i] = columns[(0..n).max_by(|&a, &b| row[a].1.total_cmp(&row[b].1)).unwrap_or(i)];
         columns[i].reports[0] = columns[i].reports[1];

@@ -1,4 +1,4 @@
-//! All that changes in a run, in columns by slot, and its snapshot by entity id.
+//! The state of a run, in columns by slot, and its snapshot by entity id.
 
 use super::policy::ConflictPolicy;
 use super::world::{Body, BodyType, RobotsWorld};
@@ -9,48 +9,48 @@ use sidestep_kernel::space::{BoxWord, Floor, Marks, Position};
 use sidestep_kernel::{Column, Cycle, Digest, EntityId, Slot};
 use std::sync::atomic::{AtomicU8, AtomicU64};
 
-/// The kind of a box in which nothing stands.
+/// The kind of an empty box.
 pub const FREE: u8 = 0;
 /// The kind of the static map's walls.
 pub const WALL: u8 = 1;
 
-/// What a body is about to do in this cycle.
+/// The action that a body is about to do in this cycle, in one byte.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Intent(u8);
 
 impl Intent {
-    /// Nothing.
+    /// No action.
     pub(super) const IDLE: Self = Self(0);
-    /// The only thing that bodies without a choice do: people go on, doors toggle.
+    /// The only action of bodies without a choice: people go on, doors toggle.
     pub(super) const ONLY: Self = Self(1);
-    /// Added when every box that the action may sweep is free.
+    /// Flag added when every box that the action may sweep is free.
     const CLEAR: u8 = 0x80;
 
-    /// The action of this number; there are fewer than 127.
+    /// Returns the intent to do the action of this number; there are fewer than 127.
     #[inline(always)]
     pub(super) fn action(number: u8) -> Self {
         Self(number + 1)
     }
 
-    /// The same, with every box that it may sweep free.
+    /// Returns the same intent, marked that every box it may sweep is free.
     #[inline(always)]
     pub(super) fn clear(self) -> Self {
         Self(self.0 | Self::CLEAR)
     }
 
-    /// Whether nothing is intended.
+    /// Returns whether nothing is intended.
     #[inline(always)]
     pub(super) fn is_idle(self) -> bool {
         self == Self::IDLE
     }
 
-    /// Whether every box that the action may sweep is free.
+    /// Returns whether every box that the action may sweep is free.
     #[inline(always)]
     pub(super) fn is_clear(self) -> bool {
         self.0 & Self::CLEAR != 0
     }
 
-    /// Number of the action; the body is not idle.
+    /// Returns the number of the action; the body must not be idle.
     #[inline(always)]
     pub(super) fn number(self) -> u8 {
         (self.0 & !Self::CLEAR) - 1
@@ -79,22 +79,23 @@ impl Word for Intent {
 /// The state of a robots world.
 #[derive(Debug)]
 pub struct RobotsState {
-    /// Who stands in each box of the padded grid, or claims it.
+    /// The body that stands in, or claims, each box of the padded grid.
     pub floor: Floor,
     /// Boxes that a robot has ever covered.
     pub visited: Marks,
-    /// What changes of each body, by slot.
+    /// The changing part of each body, by slot.
     pub bodies: Box<[BodyCell]>,
     /// Kind of each body, by slot.
     pub kinds: Box<[u8]>,
     /// Slot of each entity, by id.
     pub slot_of_id: Box<[Slot]>,
-    /// Contacts of each body by kind touched: `id * kinds + kind`.
+    /// Number of contacts of each body by kind touched, at `id * kinds + kind`.
     pub contacts: Column<u32>,
     /// Highest bid per box in the present round; empty unless the policy is `rounds`.
     pub bids: Box<[AtomicU64]>,
-    /// Last broadcast of each robot by id, for either parity of the cycle in which it is read;
-    /// empty columns without radio.
+    /// Last broadcast of each robot by id. There are two columns, because words broadcast in one
+    /// cycle are heard in the next: one is read while the other is written, by parity of the cycle
+    /// in which it is read. Empty without radio.
     pub voice: [Column<u64>; 2],
     /// Poses at the start of each cycle, while a run is recorded.
     pub frames: Option<Frames>,
@@ -104,33 +105,33 @@ pub struct RobotsState {
 #[derive(Debug, Default)]
 #[repr(align(64))]
 pub struct BodyCell {
-    /// Lower-left box, a [`Position`] word.
+    /// Lower-left box, as a [`Position`] word.
     pub anchor: Shared<u32>,
     /// Heading (0 east, 1 north, 2 west, 3 south); of a door: 1 open, 0 closed.
     pub facing: Shared<u8>,
-    /// What the body is about to do this cycle.
+    /// The action that the body is about to do in this cycle.
     pub intent: Shared<Intent>,
     /// Outcome of the last action, see [`contact_word`].
     pub contact: Shared<u16>,
-    /// A robot's memory.
+    /// A robot's memory; its behavior gives the words their meaning.
     pub memory: [Shared<u32>; 4],
-    /// Cycles from one action to the next, constant.
+    /// Cycles from one action to the next; constant.
     pub period: u32,
     /// Unit moves made, in boxes.
     pub moves: Shared<u32>,
-    /// Boxes this robot was the first to cover.
+    /// Number of boxes that this robot was the first to cover.
     pub first_visits: Shared<u32>,
-    /// Trips completed.
+    /// Number of trips completed.
     pub trips: Shared<u32>,
     /// Cycles spent on completed trips.
     pub trip_cycles: Shared<u64>,
-    /// Cycle in which the present trip began.
+    /// Cycle in which the present trip started.
     pub trip_begun: Shared<u64>,
-    /// The entity, constant.
+    /// Entity id; constant.
     pub id: u32,
-    /// Its type, constant.
+    /// Index of its type; constant.
     pub ty: u16,
-    /// Which of its type's actions it is about to do, see `BodyType::actions`.
+    /// Index of the action that it is about to do, see `BodyType::actions`.
     pub action: Shared<u16>,
 }
 
@@ -140,45 +141,49 @@ impl BodyCell {
         Self { id, ty, period, ..Self::default() }
     }
 
-    /// The lower-left box.
+    /// Returns the position of the lower-left box.
     #[inline(always)]
     pub fn at(&self) -> Position {
         Position::from_word(self.anchor.get())
     }
 }
 
-/// Poses of all bodies over some cycles; those of a cycle are together.
+/// Poses of all bodies over some cycles; those of one cycle are stored together.
 #[derive(Debug)]
 pub struct Frames {
     /// Cycle of the first pose.
     pub first: Cycle,
-    /// Room for this many cycles.
+    /// Number of cycles for which there is room.
     pub capacity: usize,
-    /// Poses of one cycle.
+    /// Number of poses per cycle, one for each body.
     pub bodies: usize,
-    /// `(cycle - first) * bodies + id`, see [`pose_word`].
+    /// Poses at `(cycle - first) * bodies + id`, see [`pose_word`].
     pub poses: Column<u32>,
 }
 
 impl Frames {
-    /// Room for `capacity` cycles of `bodies` bodies, from `first` on.
+    /// Returns room for `capacity` cycles of `bodies` bodies, starting with cycle `first`.
     pub fn new(first: Cycle, capacity: usize, bodies: usize) -> Self {
         Self { first, capacity, bodies, poses: Column::filled(capacity * bodies, 0) }
     }
 }
 
-/// Column, row and heading in one word: `heading << 30 | row << 15 | col`.
+/// Returns column, row and heading in one word: `heading << 30
+/// row << 15
+/// col`.
 #[inline]
 pub fn pose_word(at: Position, facing: u8) -> u32 {
     u32::from(facing) << 30 | at.row() << 15 | at.col()
 }
 
-/// Column, row and heading of a [`pose_word`].
+/// Returns column, row and heading of a [`pose_word`].
 pub fn pose_of_word(word: u32) -> (u32, u32, u8) {
     (word & 0x7fff, word >> 15 & 0x7fff, (word >> 30) as u8)
 }
 
-/// `1 << 15 | side << 8 | kind` for a contact; 0 for none.
+/// Returns the word of a contact, `1 << 15
+/// side << 8
+/// kind`; 0 stands for no contact.
 #[inline]
 pub fn contact_word(kind: u8, side: u8) -> u16 {
     1 << 15 | u16::from(side) << 8 | u16::from(kind)
@@ -197,19 +202,19 @@ pub struct BodyRecord {
     pub memory: [u32; 4],
     /// Last broadcast.
     pub voice: u64,
-    /// moves, first visits, trips.
+    /// Number of moves, first visits and trips.
     pub counts: [u32; 3],
-    /// Cycles of completed trips, and the cycle in which the present one began.
+    /// Cycles spent on completed trips, and the cycle in which the present one started.
     pub trip: [u64; 2],
-    /// Contacts by kind.
+    /// Number of contacts by kind.
     pub contacts: Vec<u32>,
 }
 
-/// A state in the order of entity ids, independent of storage: what a checkpoint holds and
-/// a digest covers.
+/// A state in the order of entity ids, independent of storage: the content of a checkpoint, and the
+/// input of a digest.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Snapshot {
-    /// Cycles done.
+    /// Number of cycles done.
     pub cycle: Cycle,
     /// The bodies by id.
     pub bodies: Vec<BodyRecord>,
@@ -218,7 +223,7 @@ pub struct Snapshot {
 }
 
 impl RobotsState {
-    /// An empty building: no body stands anywhere yet.
+    /// Returns an empty building, in which no body stands yet.
     pub(super) fn empty(world: &RobotsWorld) -> Self {
         let n = world.bodies.len();
         let ids = world.storage.ids(world);
@@ -240,7 +245,7 @@ impl RobotsState {
         }
     }
 
-    /// Kind of what a word of the floor stands for.
+    /// Returns the kind of the occupant that a word of the floor stands for.
     #[inline(always)]
     pub fn kind_of<T: BoxWord>(&self, word: T) -> u8 {
         match word {
@@ -250,25 +255,25 @@ impl RobotsState {
         }
     }
 
-    /// What changes of the body with this id.
+    /// Returns the changing part of the body with this id.
     pub fn body(&self, id: EntityId) -> &BodyCell {
         &self.bodies[self.slot_of_id[id as usize] as usize]
     }
 
-    /// The anchor of the body in a slot.
+    /// Returns the anchor of the body in a slot.
     #[inline(always)]
     pub fn at(&self, slot: Slot) -> Position {
         self.bodies[slot as usize].at()
     }
 
-    /// The type of the body in a slot.
+    /// Returns the type of the body in a slot.
     #[inline]
     pub fn type_in<'a>(&self, world: &'a RobotsWorld, slot: Slot) -> &'a BodyType {
         &world.types[usize::from(self.bodies[slot as usize].ty)]
     }
 
-    /// Stores what is near on the map near in memory: bands of eight rows, each from west to
-    /// east.
+    /// Stores bodies that are near on the map near in memory, because bodies mostly read the boxes
+    /// around them: in bands of eight rows, each from west to east.
     pub(super) fn arrange(&mut self, world: &RobotsWorld) {
         let place = |cell: &BodyCell| (cell.at().row() >> 3, cell.at().col(), cell.id);
         self.bodies.sort_unstable_by_key(place);
@@ -282,13 +287,13 @@ impl RobotsState {
         }
     }
 
-    /// Whether the body in a slot is a door through which one may go.
+    /// Returns whether the body in a slot is a door that is open.
     pub(super) fn is_open_door(&self, world: &RobotsWorld, slot: Slot) -> bool {
         let cell = &self.bodies[slot as usize];
         world.is_door(cell.id) && cell.facing.get() == 1
     }
 
-    /// The state in the order of ids after `cycle` cycles.
+    /// Returns the state in the order of ids after `cycle` cycles.
     pub fn snapshot(&self, world: &RobotsWorld, cycle: Cycle) -> Snapshot {
         let bodies = self.slot_of_id.iter().map(|&slot| self.record(world, slot, cycle));
         Snapshot { cycle, bodies: bodies.collect(), visited: self.visited(world) }
@@ -320,7 +325,7 @@ impl RobotsState {
         bits
     }
 
-    /// The state that a snapshot describes.
+    /// Returns the state that a snapshot describes.
     pub(super) fn restore(world: &RobotsWorld, snapshot: &Snapshot) -> Self {
         let state = Self::empty(world);
         for (k, index) in world.map_indices().enumerate() {
@@ -355,7 +360,7 @@ impl RobotsState {
         }
     }
 
-    /// Lets a body stand in the boxes it covers.
+    /// Writes a body into the boxes it covers.
     pub(super) fn occupy(&self, world: &RobotsWorld, slot: Slot) {
         let body = self.type_in(world, slot);
         let base = self.at(slot).index(world.stride);
@@ -368,7 +373,7 @@ impl RobotsState {
         }
     }
 
-    /// Bytes on the heap that grow with the boxes, and with the bodies.
+    /// Returns the bytes on the heap that grow with the number of boxes, and with that of bodies.
     pub fn heap_bytes(&self) -> (usize, usize) {
         let bodies = std::mem::size_of_val(&*self.bodies)
             + std::mem::size_of_val(&*self.kinds)
@@ -381,7 +386,7 @@ impl RobotsState {
 }
 
 impl Snapshot {
-    /// The digest of this state (promise D1): every value, by id, little-endian.
+    /// Returns the digest of this state (promise D1): every value, by id, little-endian.
     pub fn digest(&self) -> Digest {
         let mut hasher = Hasher::default();
         hasher.u64(self.cycle);

@@ -1,4 +1,4 @@
-//! What can be seen of a building: floor, bodies, sensors' readings, events in words.
+//! The visible part of a building: floor, bodies, sensors' readings, and events in words.
 
 use super::effector::Side;
 use super::scene::with_scene;
@@ -11,13 +11,13 @@ use sidestep_kernel::view::{self, Body, Condition, Entry, Kind, Level, Pose, Sca
 use sidestep_kernel::{Cycle, EntityId, Phases};
 use std::f64::consts::FRAC_PI_2;
 
-/// What a cycle counts as where seconds are asked for: the model itself knows no other time.
+/// Length of a cycle in seconds for pictures; the model itself has no time but cycles.
 pub(super) const CYCLE_S: f64 = 1.0;
-/// Longer ways cover a floor.
+/// Number of cycles worth showing as trails: longer ways cover the floor.
 const WORTH_CYCLES: Cycle = 400;
 
 impl RobotsWorld {
-    /// The building without bodies.
+    /// Returns the building without bodies.
     pub(super) fn scenery(&self, name: &str) -> view::Scenery {
         view::Scenery {
             name: name.into(),
@@ -29,7 +29,7 @@ impl RobotsWorld {
         }
     }
 
-    /// Recorded poses as places of robots and people.
+    /// Returns how recorded poses give the places of robots and people.
     pub(super) fn place_rows(&self) -> Vec<view::PlaceRows> {
         let (scale_m, origin_m) = (self.map.box_size_m, self.map.origin_m);
         let axis = |column, offset_m| view::Axis { column, scale_m, offset_m };
@@ -46,7 +46,7 @@ impl RobotsWorld {
         }]
     }
 
-    /// All bodies by id.
+    /// Returns all bodies by id.
     pub(super) fn visible_bodies(&self, state: &RobotsState) -> Vec<Body> {
         let ids = 0..self.bodies.len() as EntityId;
         ids.map(|id| self.visible_body(id, state.body(id))).collect()
@@ -55,7 +55,7 @@ impl RobotsWorld {
     fn visible_body(&self, id: EntityId, cell: &BodyCell) -> Body {
         let kind = self.visible_kind(id);
         let is_open = kind == Kind::Door && cell.facing.get() == 1;
-        // How high things are is made up: the model is a plane.
+        // Heights are made up, because the model is a plane.
         let side_m = self.side_m(id);
         let height_m = match kind {
             Kind::Door if is_open => 0.05 * side_m,
@@ -78,13 +78,13 @@ impl RobotsWorld {
         }
     }
 
-    /// The shorter side of a body.
+    /// Returns the shorter side of a body in meters.
     fn side_m(&self, id: EntityId) -> f64 {
         let (width, height) = self.type_of(id).size;
         f64::from(width.min(height)) * self.map.box_size_m
     }
 
-    /// The middle of a body at a height, and where it looks.
+    /// Returns the middle of a body at a height, and its heading.
     fn pose(&self, id: EntityId, cell: &BodyCell, z_m: f64) -> Pose {
         let ((width, height), (col, row)) = (self.type_of(id).size, self.map_position(cell.at()));
         let [x_m, y_m] = self.map.origin_m;
@@ -97,7 +97,7 @@ impl RobotsWorld {
         }
     }
 
-    /// What the first robots are about to perceive.
+    /// Returns the readings that the first robots are about to perceive.
     pub(super) fn scans(&self, state: &RobotsState, now: Cycle, robots: usize) -> Vec<Scan> {
         let mut scratch = self.scratch();
         let shown = self.robots.iter().take(robots);
@@ -124,7 +124,7 @@ impl RobotsWorld {
         model.body.sensors.iter().map(scan).collect()
     }
 
-    /// An event in words.
+    /// Returns an event in words.
     pub(super) fn entry(&self, event: &Event) -> Entry {
         let (level, words) = match event.event {
             EventKind::Contact { kind, side } => {
@@ -143,7 +143,7 @@ fn side_in_words(side: Side) -> String {
     format!("{} side", side.name())
 }
 
-/// A sensor's readings as ranges from the middle of its robot.
+/// Returns a sensor's readings as ranges from the middle of its robot.
 fn scan(
     sensor: &SensorModel,
     readings: &[Reading],
@@ -165,7 +165,7 @@ fn scan(
     }
 }
 
-/// The middle of the distance class that is reported; infinite for nothing.
+/// Returns the middle of the reported distance class in meters; infinite for nothing.
 fn beyond_boundary_m(sensor: &SensorModel, reading: Reading) -> f64 {
     if reading.observation == NOTHING || reading.class >= sensor.beyond() {
         return f64::INFINITY;

@@ -1,4 +1,4 @@
-//! What the world says to people: a scenario's contents, a run's outcome, where every body is.
+//! Texts for people: a scenario's contents, a run's outcome, and the place of every body.
 
 use super::metrics::{Metrics, heap_bytes};
 use super::rows::HEADING_NAMES;
@@ -11,7 +11,7 @@ use sidestep_kernel::words::{Lines, Said, aligned, grouped, line};
 use sidestep_scenario::Source;
 use std::collections::BTreeMap;
 
-/// Returns what came of a run.
+/// Returns the outcome of a run.
 pub(super) fn outcome(metrics: &Metrics) -> Lines {
     let total = &metrics.total;
     let mut lines = vec![
@@ -20,7 +20,7 @@ pub(super) fn outcome(metrics: &Metrics) -> Lines {
         line("distance", distance(total.distance_m)),
         line("coverage", format!("{:.1} % of the free boxes", 100.0 * metrics.coverage)),
     ];
-    // A continued run at its end has seen no group in this process.
+    // A resumed run that is at its end has seen no group in this process.
     if metrics.largest_group > 0 {
         lines.push(line("conflict groups", groups(metrics)));
     }
@@ -56,7 +56,7 @@ fn trips(trips: u64, mean_cycles: Option<f64>) -> String {
     }
 }
 
-/// How many conflict groups had how many bodies: index k counts those of `2^k .. 2^(k+1)`.
+/// Returns the number of conflict groups by size: index k counts those of `2^k .. 2^(k+1)` bodies.
 fn groups(metrics: &Metrics) -> String {
     let sizes = metrics.group_sizes.iter().enumerate().filter(|(_, n)| **n > 0);
     let bins = sizes.map(|(k, n)| match k {
@@ -160,7 +160,7 @@ fn map(world: &RobotsWorld) -> Value {
     })
 }
 
-/// Number of bodies of each kind.
+/// Returns the number of bodies of each kind.
 fn bodies(world: &RobotsWorld) -> BTreeMap<&str, u64> {
     let mut count = BTreeMap::new();
     for id in 0..world.bodies.len() as u32 {
@@ -170,7 +170,7 @@ fn bodies(world: &RobotsWorld) -> BTreeMap<&str, u64> {
     count
 }
 
-/// One entry per `[[robots]]` section.
+/// Returns one entry per `[[robots]]` section.
 fn robots(file: &Value) -> Vec<Value> {
     let sections = match &file["robots"] {
         Value::Array(many) => many.as_slice(),
@@ -194,7 +194,7 @@ fn robot_section(section: &Value) -> Value {
     })
 }
 
-/// The sensors in use, each once.
+/// Returns the sensors in use, each once.
 fn sensors(world: &RobotsWorld) -> Vec<Value> {
     let by_name: BTreeMap<&str, &SensorModel> =
         world.sensors().map(|s| (s.name.as_str(), s)).collect();
@@ -282,7 +282,7 @@ fn sensor_words(sensor: &Value) -> String {
     )
 }
 
-/// A JSON value without quotes.
+/// Returns a JSON value without quotes.
 fn plain(value: &Value) -> String {
     value.as_str().map_or_else(|| value.to_string(), str::to_string)
 }

@@ -1,4 +1,4 @@
-//! A compiled building: everything that never changes during a run.
+//! A compiled building: everything that stays fixed during a run.
 
 use super::decide::{Behaviour, Sector};
 use super::effector::{Action, EffectorModel, ObstacleRule};
@@ -64,7 +64,7 @@ impl Regime {
     /// The paper's four cases.
     pub const ALL: [Self; 4] = [Self::Reliable, Self::Effectors, Self::Sensors, Self::Both];
 
-    /// Its name in files.
+    /// Returns its name in files.
     pub fn name(self) -> &'static str {
         ["reliable", "effectors", "sensors", "both"][self as usize]
     }
@@ -80,50 +80,50 @@ impl Regime {
     }
 }
 
-/// The immutable world that runs share.
+/// The immutable world, shared by all runs of a scenario.
 #[derive(Debug, Clone)]
 pub struct RobotsWorld {
     /// The map without bodies.
     pub map: Arc<GridMap>,
     /// Names of the kinds by number: 0 `free`, 1 `wall`, then bodies' kinds.
     pub kinds: Vec<String>,
-    /// Which errors are on.
+    /// The kinds of errors that are switched on.
     pub regime: Regime,
-    /// The law for blocked paths.
+    /// The rule for paths that meet an obstacle.
     pub obstacle_rule: ObstacleRule,
-    /// The order in conflict groups.
+    /// The order in which the bodies of a conflict group act.
     pub policy: ConflictPolicy,
     /// All bodies by id.
     pub bodies: Vec<Body>,
-    /// What bodies have in common.
+    /// Properties that bodies have in common, one entry per type.
     pub types: Vec<BodyType>,
     pub(super) kind_rank: Vec<u8>,
     pub(super) radio: Option<Radio>,
     pub(super) robots: Vec<EntityId>,
-    /// In which order states keep the bodies.
+    /// The order in which states store the bodies.
     pub(super) storage: StorageOrder,
     pub(super) streams: Streams,
-    /// Rings of wall around the map, since whole paths, and [`BEAM_STEP`] boxes of a beam, are
-    /// read at once.
+    /// Rings of wall around the map. They are there because whole paths, and [`BEAM_STEP`] boxes of
+    /// a beam, are read at once without a check against the map's edge.
     pub(super) border: u32,
-    /// Width of the padded grid.
+    /// Width of the padded grid, in boxes.
     pub(super) stride: u32,
     /// The padded grid without bodies.
     pub(super) walls: Vec<u8>,
-    /// Most boxes that a claim reaches beside a body.
+    /// Largest distance in boxes from a body to a box that it claims.
     pub(super) reach: u32,
 }
 
-/// One body: who it is and when it acts.
+/// One body: its identity, its type, and the cycles in which it acts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Body {
     /// Identity: its place in the list of bodies.
     pub id: EntityId,
-    /// Index into the types.
+    /// Index into [`RobotsWorld::types`].
     pub ty: u16,
-    /// Acts every `period` cycles,
+    /// Number of cycles from one action to the next.
     pub period: u32,
-    /// in those where `(cycle + phase) % period` is 0.
+    /// The body acts in the cycles where `(cycle + phase) % period` is 0.
     pub phase: u32,
 }
 
@@ -134,7 +134,7 @@ impl Body {
         (now + u64::from(self.phase)).is_multiple_of(u64::from(self.period))
     }
 
-    /// How many actions the body has begun before this cycle.
+    /// Returns the number of actions that the body has started before this cycle.
     pub fn actions_before(&self, cycle: Cycle) -> u64 {
         let (period, phase) = (u64::from(self.period), u64::from(self.phase));
         // Multiples of the period in `phase..cycle + phase`.
@@ -142,7 +142,7 @@ impl Body {
     }
 }
 
-/// What bodies of one type share.
+/// Properties shared by the bodies of one type.
 #[derive(Debug, Clone)]
 pub struct BodyType {
     /// Number of its kind.
@@ -151,16 +151,16 @@ pub struct BodyType {
     pub size: (u32, u32),
     /// Offsets of the boxes it covers from its anchor, in the padded grid.
     pub own: Box<[i32]>,
-    /// Robots mark the boxes they cover as visited.
+    /// Whether it marks the boxes that it covers as visited, as robots do.
     pub marks: bool,
     /// Its actions: `heading * actions per heading + action`; none for a door.
     pub actions: Arc<[Action]>,
-    /// What it does.
+    /// Its part in the world, with the data for it.
     pub role: Role,
 }
 
 impl BodyType {
-    /// Where an action at a heading stands in `actions`.
+    /// Returns the index in `actions` of an action at a heading.
     #[inline]
     pub fn action_index(&self, heading: u8, action: u8) -> u16 {
         u16::from(heading) * (self.actions.len() / 4) as u16 + u16::from(action)
@@ -181,16 +181,16 @@ pub enum Role {
 /// A robot type: its body and its mind.
 #[derive(Debug, Clone)]
 pub struct RobotModel {
-    /// Sensors and effectors, shared by types that differ in behaviour only.
+    /// Sensors and effectors, shared by types that differ only in behavior.
     pub body: Arc<RobotBody>,
-    /// How it decides.
+    /// The behavior, which chooses its actions.
     pub behaviour: Arc<dyn Behaviour>,
 }
 
 /// Sensors and effectors of a robot type.
 #[derive(Debug)]
 pub struct RobotBody {
-    /// Sensors in order.
+    /// Sensors, in the scenario's order.
     pub sensors: Vec<MountedSensor>,
     /// Sector of each beam of all sensors in order.
     pub sectors: Vec<Sector>,
@@ -206,21 +206,21 @@ pub struct MountedSensor {
     /// The sensor as data.
     pub model: SensorModel,
     pub(super) table: ReadingTable,
-    /// The boxes that its beams cross, at each heading.
+    /// The boxes that its beams cross, for each heading.
     pub(super) boxes: [Box<[Crossed]>; 4],
-    /// Where each beam's boxes end in the lists of `boxes`.
+    /// End of each beam's boxes in the lists of `boxes`.
     pub(super) ends: Box<[u16]>,
-    /// The row of each beam's report where there is nothing.
+    /// The row of each beam's report when it meets nothing.
     pub(super) nothing_row: Row,
     pub(super) nothing: Reading,
 }
 
-/// Some boxes in a row on a beam's way.
+/// Consecutive boxes on a beam's way.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Crossed {
     /// Index offsets from the anchor.
     pub(super) offsets: [i32; BEAM_STEP],
-    /// Distance class of what stands there.
+    /// Distance class of an obstacle in each of them.
     pub(super) classes: [u8; BEAM_STEP],
 }
 
@@ -228,7 +228,7 @@ impl MountedSensor {
     /// Mounts a sensor on a `size` x `size` body.
     ///
     /// # Errors
-    /// When a row of its matrices is no distribution.
+    /// Returns an error when a row of its matrices is not a distribution.
     pub fn new(
         model: SensorModel,
         size: u32,
@@ -259,13 +259,13 @@ impl MountedSensor {
         Ok(Self { model, table, boxes, ends, nothing_row, nothing })
     }
 
-    /// Whether every reading is the truth.
+    /// Returns whether every reading is the truth.
     pub fn is_reliable(&self) -> bool {
         self.table.reliable
     }
 
-    /// The true reading of a beam that meets `kind` at distance class `class`. What the
-    /// sensor cannot observe at all reads as nothing.
+    /// Returns the true reading of a beam that meets `kind` at distance class `class`. A kind that
+    /// the sensor cannot observe reads as nothing.
     #[inline]
     pub fn truth(&self, kind: u8, class: u8) -> Reading {
         match self.model.designates[usize::from(kind)] {
@@ -275,8 +275,8 @@ impl MountedSensor {
     }
 }
 
-/// A beam's crossings in fours; the last one is repeated, so that what is met first stays the
-/// same.
+/// Returns a beam's crossings in groups of [`BEAM_STEP`]. The last crossing is repeated to fill the
+/// last group, so that the first box met stays the same.
 fn in_fours(mut beam: Vec<Crossing>) -> Vec<[Crossing; BEAM_STEP]> {
     if let Some(&last) = beam.last() {
         beam.resize(beam.len().next_multiple_of(BEAM_STEP), last);
@@ -287,33 +287,33 @@ fn in_fours(mut beam: Vec<Crossing>) -> Vec<[Crossing; BEAM_STEP]> {
 /// A mobile object: tries one box per action.
 #[derive(Debug, Clone)]
 pub struct Mover {
-    /// Chance to go on in the same direction; otherwise a new one is drawn.
+    /// Chance to continue in the same direction; otherwise a new one is drawn.
     pub straight: Chance,
 }
 
-/// A door's will.
+/// The rule by which a door opens and closes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Door {
-    /// Open for `open` cycles, closed for `closed`, shifted by `phase`.
+    /// Open for `open` cycles, then closed for `closed`, shifted by `phase`.
     Periodic {
-        /// Cycles open.
+        /// Number of cycles for which it is open.
         open: u64,
-        /// Cycles closed.
+        /// Number of cycles for which it is closed.
         closed: u64,
         /// Cycles by which the schedule is ahead.
         phase: u64,
     },
     /// Opens or closes by chance.
     Random {
-        /// Chance per cycle to open when closed.
+        /// Chance per cycle that a closed door opens.
         open: Chance,
-        /// Chance per cycle to close when open.
+        /// Chance per cycle that an open door closes.
         close: Chance,
     },
 }
 
 impl Door {
-    /// Whether the door wants to be open now.
+    /// Returns whether the door wants to be open in this cycle.
     pub fn wants_open(&self, is_open: bool, now: Cycle, draw: impl FnOnce() -> u32) -> bool {
         match *self {
             Self::Periodic { open, closed, phase } => (now + phase) % (open + closed) < open,
@@ -325,7 +325,7 @@ impl Door {
     }
 }
 
-/// Robots that hear each other.
+/// Radio contact between robots.
 #[derive(Debug, Clone, Copy)]
 pub struct Radio {
     /// Square of the range, in half boxes.
@@ -335,7 +335,7 @@ pub struct Radio {
 }
 
 impl Radio {
-    /// Radio with this range and this chance of losing a reception.
+    /// Returns a radio with this range in meters and this chance of losing a reception.
     pub fn new(range_m: f64, box_size_m: f64, loss: f64) -> Self {
         let reach = 2.0 * range_m / box_size_m;
         Self { reach2_half_boxes: (reach * reach) as u64, loss: Chance::new(loss) }
@@ -343,38 +343,38 @@ impl Radio {
 }
 
 impl RobotsWorld {
-    /// The type of a body.
+    /// Returns the type of a body.
     pub fn type_of(&self, id: EntityId) -> &BodyType {
         &self.types[usize::from(self.bodies[id as usize].ty)]
     }
 
-    /// The robots.
+    /// Returns the ids of the robots.
     pub fn robots(&self) -> &[EntityId] {
         &self.robots
     }
 
-    /// Whether a body is a door.
+    /// Returns whether a body is a door.
     pub fn is_door(&self, id: EntityId) -> bool {
         matches!(self.type_of(id).role, Role::Door(_))
     }
 
-    /// Map column and row of a position in the padded grid.
+    /// Returns the map column and row of a position in the padded grid.
     #[inline]
     pub(super) fn map_position(&self, at: Position) -> (u32, u32) {
         (at.col() - self.border, at.row() - self.border)
     }
 
-    /// Position in the padded grid of a map column and row.
+    /// Returns the position in the padded grid of a map column and row.
     pub(super) fn grid_position(&self, (col, row): (u32, u32)) -> Position {
         Position::new(col + self.border, row + self.border)
     }
 
-    /// Number of boxes of the map.
+    /// Returns the number of boxes of the map.
     pub(super) fn map_boxes(&self) -> usize {
         self.map.cells().len()
     }
 
-    /// Indices in the padded grid of the map's boxes, row by row.
+    /// Returns the indices in the padded grid of the map's boxes, row by row.
     pub(super) fn map_indices(&self) -> impl Iterator<Item = usize> + '_ {
         let (width, height) = (self.map.width(), self.map.height());
         (0..height).flat_map(move |row| {

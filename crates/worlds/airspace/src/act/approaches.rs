@@ -1,4 +1,4 @@
-//! Closest approaches: how near pairs of airplanes come to each other, whoever flies them.
+//! Closest approaches of pairs of airplanes, whether the method flies them or not.
 
 use super::flight::{Flight, Moment};
 use crate::Scratch;
@@ -7,12 +7,12 @@ use crate::flight::distance_m;
 use crate::state::{LOOKS_PER_STEP, PairRecord};
 use crate::world::AirspaceWorld;
 
-/// Pairs farther apart than this many separations are not kept in the books.
+/// Pairs farther apart than this many separations are not recorded.
 const WORTH_NOTING: f64 = 4.0;
-/// Two times nearer than this part of a step are the same.
+/// Part of a step below which two times count as the same.
 const ROUNDING: f64 = 1e-6;
 
-/// Books the distances of all pairs during a step.
+/// Records the distances of all pairs during a step.
 pub(super) fn book(
     world: &AirspaceWorld,
     flights: &[Flight<'_>],
@@ -38,7 +38,7 @@ pub(super) fn book(
     }
 }
 
-/// Whether two may come so near each other within a step that it is to be booked.
+/// Returns whether two airplanes may come so near within a step that it is to be recorded.
 fn is_worth_noting(world: &AirspaceWorld, a: &Flight<'_>, b: &Flight<'_>) -> bool {
     let dtau_s = world.timing.dtau_s;
     let step_m = (world.top_m_s[a.slot as usize] + world.top_m_s[b.slot as usize]) * dtau_s;
@@ -46,7 +46,7 @@ fn is_worth_noting(world: &AirspaceWorld, a: &Flight<'_>, b: &Flight<'_>) -> boo
         && a.levels(dtau_s).meets(&b.levels(dtau_s), world.vertical_m)
 }
 
-/// The separation of a pair.
+/// Returns the separation of a pair in meters.
 fn gap_m(world: &AirspaceWorld, a: &Flight<'_>, b: &Flight<'_>) -> f64 {
     let own_m = |f: &Flight<'_>| world.airplanes[f.slot as usize].model.separation_m;
     own_m(a).max(own_m(b))
@@ -59,15 +59,15 @@ fn closest(
     moment: Moment,
 ) -> PairRecord {
     let (dtau_s, gap_m) = (world.timing.dtau_s, gap_m(world, a, b));
-    // Only where both are in the air, and on one level.
+    // Distances count only while both are in the air, and on one level.
     let apart_m = |t_s: f64| {
         let at = |f: &Flight<'_>| f.at(world.wind_m_s, moment, t_s);
         let ((place_a, height_a), (place_b, height_b)) = at(a).zip(at(b))?;
         let on_one_level = (height_a - height_b).abs() < world.vertical_m;
         on_one_level.then(|| distance_m(place_a, place_b))
     };
-    // A loss goes on where the step before has ended; only when one of the two has just
-    // come into the air there is none before.
+    // A loss continues from the end of the step before; there is no step before when one of the two
+    // has just come into the air.
     let begins = moment.step_s <= a.since_s.max(b.since_s) + ROUNDING * dtau_s;
     let mut was_lost = !begins && apart_m(0.0).is_some_and(|d| d < gap_m);
     let mut record = PairRecord { nearest_m: f64::INFINITY, lost_looks: 0, losses: 0 };

@@ -1,5 +1,5 @@
-//! Airplanes that come under the method during a run: they appear, or their recorded way is
-//! handed over.
+//! Airplanes that come under the method during a run: they appear, or the method takes over from
+//! their recorded way.
 
 use super::protect::flyer;
 use crate::Turn;
@@ -7,13 +7,13 @@ use crate::shield::{Flyer, entry_fallbacks};
 use sidestep_kernel::Slot;
 
 /// Lets airplanes of a group that come in now choose fallbacks apart from the stored ones, which
-/// nobody changes for them. Pairs for which there are none are noted: the shield promises nothing
-/// for them. `flown` are the group's airplanes that the method flies, by id.
+/// stay as they are. Pairs without such fallbacks are noted: the shield promises nothing for them.
+/// `flown` are the group's airplanes that the method flies, by id.
 ///
-/// Whoever could be too near an airplane that comes in is in its group, so this is complete.
+/// Airplanes that could be too near one that comes in are in its group, so none is missed.
 pub(super) fn admit(turn: &mut Turn<'_>, flown: &[Slot]) {
     let &mut Turn { world, state, now, ref mut scratch, .. } = turn;
-    // First fallbacks at the start are the compiled scenario's.
+    // At the start, the first fallbacks are those of the compiled scenario.
     let enters = |slot: &Slot| now > 0 && world.joins_in(*slot as usize) == now;
     if !flown.iter().any(enters) {
         return;

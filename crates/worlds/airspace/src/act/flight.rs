@@ -10,11 +10,11 @@ use sidestep_kernel::{Cycle, Slot};
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Moment {
     pub(super) now: Cycle,
-    /// Number of the step in this `dt`,
+    /// Number of the step in this `dt`.
     pub(super) k: usize,
-    /// and in the run.
+    /// Number of the step in the run.
     pub(super) step: u64,
-    /// Its beginning, seconds after the start.
+    /// Start of the step, in seconds after the start of the run.
     pub(super) step_s: f64,
 }
 
@@ -24,23 +24,23 @@ pub(super) struct Flight<'a> {
     pub(super) course: Course<'a>,
     pub(super) pose: Pose,
     pub(super) altitude_m: f64,
-    /// Time at which it came into the air, seconds after the start.
+    /// Time at which it came into the air, in seconds after the start of the run.
     pub(super) since_s: f64,
     pub(super) next: usize,
-    /// Its end, if it has come.
+    /// End of its flight, if it has ended.
     pub(super) ended: Option<End>,
 }
 
 /// The course of an airplane.
 pub(super) enum Course<'a> {
-    /// A decided way.
+    /// A way that was decided, and the stage of the flight.
     Way(Way, Stage<'a>),
-    /// Its recorded way.
+    /// A recorded way.
     Track(&'a Track),
 }
 
 impl<'a> Flight<'a> {
-    /// An airplane as it is at the start of the cycle.
+    /// Returns an airplane as it is at the start of the cycle.
     pub(super) fn new(turn: &Turn<'_>, slot: Slot, course: Course<'a>) -> Self {
         let Turn { world, state, .. } = turn;
         let cell = &state.airplanes[slot as usize];
@@ -52,7 +52,7 @@ impl<'a> Flight<'a> {
         Self { slot, course, pose, altitude_m, since_s, next, ended: None }
     }
 
-    /// Its altitude some seconds after `altitude_m`, on a decided way.
+    /// Returns its altitude in meters some seconds after `altitude_m`, on a decided way.
     pub(super) fn altitude_after_m(&self, stage: &Stage<'_>, seconds: f64) -> f64 {
         let most_m = stage.climb_m_s * seconds;
         self.altitude_m + (stage.altitude_m - self.altitude_m).clamp(-most_m, most_m)
@@ -76,7 +76,7 @@ impl<'a> Flight<'a> {
         }
     }
 
-    /// All levels that it is on during one step.
+    /// Returns all levels that it is on during one step.
     pub(super) fn levels(&self, dtau_s: f64) -> Levels {
         match &self.course {
             Course::Way(_, stage) => {

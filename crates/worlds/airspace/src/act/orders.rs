@@ -1,9 +1,9 @@
-//! Orders that are due, and when they may be carried out.
+//! Orders that are due, and the conditions for carrying them out.
 //!
-//! With the shield, a new speed or level is taken only when the airplane then has a fallback apart
-//! from all stored ones, so that the invariant holds; else the order waits for the next `dt`, and
-//! those after it wait with it. While it changes its level, an airplane occupies the old one, the
-//! new one and all between.
+//! With the shield, a new speed or level is accepted only when the airplane then has a fallback
+//! apart from all stored ones, because otherwise the invariant would be lost; until then the order
+//! waits, and those after it wait with it. While it changes its level, an airplane occupies the old
+//! one, the new one and all between.
 
 use super::protect::flyer;
 use crate::Turn;
@@ -30,7 +30,7 @@ pub(super) fn carry_out(turn: &Turn<'_>, flown: &[Slot]) {
     }
 }
 
-/// The fallback that an airplane has when it carries out its next order, if it may.
+/// Returns the fallback that an airplane has when it carries out its next order, if it may.
 fn fallback_after(
     turn: &Turn<'_>,
     flown: &[Slot],

@@ -1,4 +1,4 @@
-//! Airplanes as the shield knows them, and the ways it leaves them.
+//! Airplanes in the form that the shield knows, and the ways that it allows them.
 
 use crate::Turn;
 use crate::agents::contact::Contacts;
@@ -11,13 +11,13 @@ use crate::state::{AirspaceState, Cell};
 use crate::world::AirspaceWorld;
 use sidestep_kernel::Slot;
 
-/// Goals farther away than this rank alike.
+/// Distance in meters beyond which all goals rank alike.
 const FARTHEST_M: f64 = 2e9;
-/// To be refused what it wants for `dt` brings an airplane forward as if it had flown this part
-/// of the way meanwhile.
+/// Part of a `dt`'s way by which a refusal brings an airplane forward in rank, so that it does not
+/// wait for ever.
 const REFUSED_PART: f64 = 0.125;
 
-/// Returns what the shield knows of an airplane.
+/// Returns the part of an airplane that the shield knows.
 pub(super) fn flyer(world: &AirspaceWorld, state: &AirspaceState, slot: Slot) -> Flyer {
     let (cell, stage) = (&state.airplanes[slot as usize], state.stage(world, slot));
     Flyer {
@@ -34,21 +34,21 @@ pub(super) fn flyer(world: &AirspaceWorld, state: &AirspaceState, slot: Slot) ->
     }
 }
 
-/// Who goes first: whoever is nearer to its goal, so that it is soon out of the others' way;
-/// and whoever has often been refused what it wanted, so that nobody waits for ever. Whole
-/// meters in the upper half, unique by the id in the lower one.
+/// Returns the rank of an airplane. It is higher the nearer its goal is, so that it is soon out of
+/// the others' way, and the more often its wish was refused, so that nobody waits for ever. Whole
+/// meters in the upper half; the id in the lower half makes it unique.
 fn rank(dt_s: f64, cell: &Cell, stage: &Stage<'_>, slot: Slot) -> u64 {
     let ahead = &stage.mission[(cell.next.get() as usize).min(stage.mission.len())..];
     let legs = ahead
         .iter()
         .scan(cell.pose().at, |from, &to| Some(distance_m(std::mem::replace(from, to), to)));
     let refused_m = f64::from(cell.overrides.get()) * stage.model.v_m_s * dt_s;
-    // A conversion of what is out of range ends at the range.
+    // The conversion saturates at the ends of the range.
     let first = (FARTHEST_M + REFUSED_PART * refused_m - legs.sum::<f64>()) as u32;
     u64::from(first) << 32 | u64::from(!slot)
 }
 
-/// Returns the ways that the airplanes of a group fly, out of those that they would.
+/// Returns the ways that the airplanes of a group fly, out of those that they wish to fly.
 pub(super) fn shielded(
     turn: &mut Turn<'_>,
     group: &[Slot],
@@ -75,7 +75,7 @@ pub(super) fn shielded(
     flown.collect()
 }
 
-/// Stores what was decided for an airplane, and tells of it.
+/// Stores the decision for an airplane, and records it as an event.
 fn note(turn: &mut Turn<'_>, slot: Slot, decision: &Decision) {
     let &mut Turn { state, now, ref mut scratch, .. } = turn;
     let cell = &state.airplanes[slot as usize];
@@ -99,7 +99,7 @@ fn note(turn: &mut Turn<'_>, slot: Slot, decision: &Decision) {
     }
 }
 
-/// The stored fallback of an airplane, for one `dt`.
+/// Returns the stored fallback of an airplane, for one `dt`.
 fn orbit(world: &AirspaceWorld, flyer: &Flyer) -> Way {
     let omega = flyer.fallback.sign() * flyer.omega_max_rad_s;
     Way { omegas_rad_s: vec![omega; world.timing.points_per_dt()] }

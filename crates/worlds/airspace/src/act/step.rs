@@ -1,4 +1,4 @@
-//! The steps of one `dt`: all fly, and what becomes of them is stored.
+//! The steps of one `dt`: all airplanes fly, and the results are stored.
 
 use super::approaches;
 use super::flight::{Course, Flight, Moment};

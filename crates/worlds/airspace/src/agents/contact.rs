@@ -7,57 +7,57 @@ use serde::{Deserialize, Serialize};
 use sidestep_kernel::{Cycle, EntityId, math};
 use std::collections::BTreeMap;
 
-/// Factor on the separation from an airplane of which nothing is heard.
+/// Factor on the separation from an airplane that is not heard.
 const WIDER: f64 = 1.5;
 
-/// Message in which an airplane tells of itself.
+/// A message in which an airplane describes itself.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Beacon {
-    /// Its pose.
+    /// Pose at the start of the cycle.
     pub pose: Pose,
     /// Its next way-point.
     pub goal: Option<Point>,
-    /// Its airspeed.
+    /// Airspeed in meters per second.
     pub v_m_s: f64,
-    /// Its largest turn rate.
+    /// Largest turn rate in radians per second.
     pub omega_max_rad_s: f64,
-    /// The separation it asks for.
+    /// The separation that it asks for, in meters.
     pub separation_m: f64,
-    /// The levels that it is on and comes to.
+    /// The levels that it is on and changes to.
     pub levels: Levels,
 }
 
-/// An orbit that somebody may be on: where, to which side, and when that was.
+/// An orbit that an airplane may be on: pose, cycle and side.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Orbiting {
-    /// Where it is at the beginning of a cycle,
+    /// Pose at the start of the cycle `as_of`.
     pub pose: Pose,
-    /// of this one.
+    /// Cycle of the pose.
     pub as_of: Cycle,
-    /// The side it turns to.
+    /// The side to which it turns.
     pub side: Side,
 }
 
-/// Knowledge of one airplane about another one.
+/// One airplane's knowledge of another one.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Contact {
-    /// Cycle in which it was last heard of.
+    /// Cycle in which the other was last heard.
     pub heard_in: Cycle,
-    /// Its message then.
+    /// Its message in that cycle.
     pub beacon: Beacon,
-    /// The orbits it may be on since then, under the shield.
+    /// The orbits that it may have been on since then, under the shield.
     pub possible: Vec<Orbiting>,
-    /// Exchanges of the shield in a row in which it was there and not heard,
+    /// Number of exchanges in a row, up to `met_in`, in which it was present and not heard.
     pub unheard: u32,
-    /// up to this one.
+    /// Cycle of the last of these exchanges.
     pub met_in: Cycle,
 }
 
-/// Knowledge of an airplane about others, by id.
+/// One airplane's knowledge of others, by id.
 pub type Contacts = BTreeMap<EntityId, Contact>;
 
 impl Orbiting {
-    /// Returns its place at the beginning of cycle `now`.
+    /// Returns its pose at the start of cycle `now`.
     fn pose(&self, air: &Air, beacon: &Beacon, now: Cycle) -> Pose {
         let gone_s = now.saturating_sub(self.as_of) as f64 * air.timing.dt_s;
         let omega_rad_s = self.side.sign() * beacon.omega_max_rad_s;
@@ -68,7 +68,7 @@ impl Orbiting {
 }
 
 impl Beacon {
-    /// Returns all that can be told of one without knowing where it wants to go.
+    /// Returns the beacon of an airplane whose wishes are not known.
     pub(crate) fn of(flyer: &Flyer) -> Self {
         Self {
             pose: flyer.pose,
@@ -82,13 +82,14 @@ impl Beacon {
 }
 
 impl Contact {
-    /// One that has just been heard.
+    /// Returns the knowledge of an airplane that has just been heard.
     pub(crate) fn heard(beacon: Beacon, now: Cycle) -> Self {
         Self { heard_in: now, beacon, possible: Vec::new(), unheard: 0, met_in: now }
     }
 
-    /// Where one that is not heard is taken to fly: on the orbit on which the shield keeps it,
-    /// or else straight to the way-point it had. Others keep farther away from it.
+    /// Returns the presumed flight of an airplane that is not heard: on the orbit on which the
+    /// shield keeps it, or else straight to its last known way-point. Others keep farther away from
+    /// it.
     pub(crate) fn options(&self, air: &Air, is_shielded: bool, now: Cycle) -> Options {
         let points = match self.possible.first() {
             Some(orbiting) if is_shielded => self.on_orbit(air, orbiting, now),
@@ -125,7 +126,7 @@ impl Contact {
     }
 }
 
-/// Notes what another has told of itself in cycle `now`.
+/// Notes the message in which another airplane described itself in cycle `now`.
 pub(crate) fn note(contacts: &mut Contacts, id: EntityId, beacon: Beacon, now: Cycle) {
     match contacts.get_mut(&id) {
         Some(contact) => (contact.beacon, contact.heard_in) = (beacon, now),

@@ -1,23 +1,23 @@
 //! The process integrated mechanism: coordinators whose state migrates.
 //!
 //! A coordinator visits the airplanes in turn. While it is on an airplane it can read that
-//! airplane's model: it lets it predict ways, which it then carries along. Its whole state is
-//! serialized for every hop, and read back on the other side; these bytes are what is counted.
-//! With sampled expectations it makes a tour per round, since each round has new samples; with
-//! exact ones it gathers the ways of all actions in a first tour, and can then go through the
-//! rounds wherever it is. A last tour brings each airplane its control.
+//! airplane's model: it predicts ways with it, which it then carries along. Its whole state is
+//! serialized for every hop, and read back on the other side; these are the bytes that are counted.
+//! With sampled expectations it makes a tour per round, because each round has new samples; with
+//! exact ones it gathers the ways of all actions in a first tour, and can then compute the rounds
+//! on any airplane. A last tour brings each airplane its control.
 //!
-//! `pim` has one coordinator for a group. `hierarchical-pim` (the paper's outlook) splits the
-//! group by proximity into about as many parts as each has members: a coordinator tours each
-//! part, side by side, and one above them migrates between the parts, gathers what they have
-//! gathered, and takes back what all samples cost, from which every part learns by itself. So no
-//! coordinator carries the ways of all through every airplane. The algorithm is the same, and so
-//! are the controls.
+//! `pim` has one coordinator for a group. `hierarchical-pim` (the paper's outlook) splits the group
+//! by proximity into about as many parts as each has members: a coordinator tours each part, all at
+//! the same time, and one above them migrates between the parts, gathers their data, and brings
+//! back the costs of all samples, from which every part learns on its own. So no coordinator
+//! carries the ways of all through every airplane. The algorithm is the same, and so are the
+//! controls.
 //!
 //! A hop is a message like any other, over the [`Transport`] that is handed in. On a network that
-//! loses messages it is made again until it is acknowledged. An airplane that cannot be reached is
-//! left out: it is presumed where it was last heard of, and decides for itself. When time is up,
-//! whoever has not been told yet decides for itself too.
+//! loses messages it is repeated until it is acknowledged. An airplane that cannot be reached is
+//! left out: it is presumed where it was last heard, and decides for itself. When time is up, an
+//! airplane without a control decides for itself too.
 
 mod migration;
 
@@ -32,27 +32,27 @@ pub use migration::{Journey, Migration};
 use serde::{Deserialize, Serialize};
 use sidestep_collectives::{Estimator, PairwiseGame, Player, optimize};
 
-/// The part of a coordinator that is about one airplane.
+/// A coordinator's data about one airplane.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 struct Visited {
-    /// Place in the group.
+    /// Place of the airplane in the group.
     place: usize,
     beacon: Option<Beacon>,
-    /// Its learning player, of samples,
+    /// Its learning player, when expectations are sampled.
     player: Option<Player>,
-    /// those of this round, and the ways gathered in this tour.
+    /// Its samples of this round; the ways gathered in this tour are beside them.
     samples: Vec<usize>,
     ways: Vec<Prediction>,
     /// Cost of the ways to the airplane itself.
     own_costs: Vec<f64>,
     separation_m: f64,
     levels: Levels,
-    /// It could not be reached: its only way is presumed.
+    /// Whether it could not be reached, so that its only way is presumed.
     is_presumed: bool,
     decided: Option<Decided>,
 }
 
-/// A coordinator: what it carries of the airplanes it is for.
+/// A coordinator with its data about the airplanes that it serves.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 struct Coordinator {
     /// Place of the airplane that it starts from and returns to.
@@ -62,8 +62,8 @@ struct Coordinator {
     airplanes: Vec<Visited>,
 }
 
-/// Runs the coordinators of a group, one for each part of it. Returns what each airplane comes to,
-/// and what went over the network.
+/// Runs the coordinators of a group, one for each part of it. Returns each airplane's conclusion,
+/// and the traffic on the network.
 pub fn run(
     mut migration: Migration<'_>,
     parts: &[Vec<usize>],
@@ -86,7 +86,7 @@ pub fn run(
 }
 
 impl Coordinator {
-    /// The coordinator of a part; none where all radios are dead.
+    /// Returns the coordinator of a part; none where all radios are dead.
     fn new(migration: &Migration<'_>, part: &[usize]) -> Option<Self> {
         let can_hear = |place: &usize| !migration.silent[*place];
         let head = part.iter().copied().find(can_hear)?;
@@ -111,12 +111,12 @@ impl Coordinator {
             }
         }
         if at != head {
-            // It goes on from there if it cannot return.
+            // It continues from there if it cannot return.
             self.head = if migration.hop(self, [at, head]) { head } else { at };
         }
     }
 
-    /// The others' ways are known: forgets them, and what has become of their samples.
+    /// Forgets the ways of others and the results of their samples, which are no longer needed.
     fn drop_ways(&mut self) {
         for airplane in &mut self.airplanes {
             airplane.ways.clear();
@@ -127,7 +127,7 @@ impl Coordinator {
 }
 
 impl Visited {
-    /// On the airplane: reads its model.
+    /// Reads the model of the airplane that it is on.
     fn see(&mut self, host: &OwnShip, round: u32, block: Option<usize>) {
         let options = &host.options;
         self.is_presumed = false;
@@ -145,7 +145,7 @@ impl Visited {
         self.own_costs = self.samples.iter().map(|&x| costs[x]).collect();
     }
 
-    /// Out of reach, as seen from another airplane.
+    /// Presumes an airplane that is out of reach, as seen from another one.
     fn presume(&mut self, from: &OwnShip, block: Option<usize>) {
         let options = from.presumed(self.place);
         self.is_presumed = true;
@@ -156,8 +156,8 @@ impl Visited {
     }
 }
 
-/// Tours all parts, side by side, and gathers what they have: by a coordinator above them, which
-/// goes from head to head and ends on the last.
+/// Tours all parts, all at the same time, and gathers their data: by a coordinator above them,
+/// which goes from head to head and ends on the last.
 fn gather(
     team: &mut [Coordinator],
     migration: &mut Migration<'_>,
@@ -189,7 +189,7 @@ fn gather(
     above
 }
 
-/// Takes what has become of it back to all parts.
+/// Brings the results back to all parts.
 fn hand_back(mut above: Coordinator, team: &mut [Coordinator], migration: &mut Migration<'_>) {
     above.drop_ways();
     for part in team.iter_mut().rev() {
@@ -255,7 +255,8 @@ fn sampled(team: &mut [Coordinator], (block, ageing): (usize, f64), migration: &
     }
 }
 
-/// All ways of a round are known: costs, summed as everywhere else, and everybody's update.
+/// Computes the costs once all ways of a round are known, summed in the same order as everywhere
+/// else, and updates every player.
 fn learn(above: &mut Coordinator, host: &OwnShip, (block, ageing): (usize, f64)) -> f64 {
     let objective = &host.briefing.objective;
     let all = &above.airplanes;
@@ -265,7 +266,7 @@ fn learn(above: &mut Coordinator, host: &OwnShip, (block, ageing): (usize, f64))
             other.place != own.place && other.levels.meets(&own.levels, objective.vertical_m)
         };
         all.iter().filter(minds).fold(own.own_costs[k], |sum, other| {
-            // One that is presumed wants to be kept farther away from.
+            // Others are to keep farther away from one that is presumed.
             let wanted_m = if other.is_presumed { other.separation_m } else { 0.0 };
             let r = own.separation_m.max(wanted_m);
             sum + objective.collision(&own.ways[k], &other.ways[k], [r, r])[0]
@@ -285,7 +286,7 @@ fn learn(above: &mut Coordinator, host: &OwnShip, (block, ageing): (usize, f64))
     above.airplanes.iter_mut().map(update).fold(0.0, f64::max)
 }
 
-/// Every part's coordinator brings its airplanes their controls.
+/// Lets every part's coordinator bring its airplanes their controls.
 fn deliver(team: Vec<Coordinator>, migration: &mut Migration<'_>, told: &mut [Ended<Conclusion>]) {
     let began = migration.gone;
     for mut part in team {
@@ -312,8 +313,8 @@ fn deliver(team: Vec<Coordinator>, migration: &mut Migration<'_>, told: &mut [En
     }
 }
 
-/// Splits a group by proximity into parts of about as many members as there are parts: the first
-/// that is left and those nearest to it.
+/// Splits a group by proximity into parts of about as many members as there are parts: each time
+/// the first that is left and those nearest to it.
 pub fn parts(hosts: &[OwnShip]) -> Vec<Vec<usize>> {
     let size = (hosts.len() as f64).sqrt().ceil() as usize;
     let mut left: Vec<usize> = (0..hosts.len()).collect();

@@ -1,26 +1,28 @@
 //! The shield between airplanes that talk over a network.
 //!
-//! On a network that loses nothing, everybody tells everybody its place, its stored fallback and
-//! the ways it would fly; all know the same, filter the same, and come to the same plans.
+//! On a network that loses nothing, all airplanes send all others their place, their stored
+//! fallback and the ways they would fly; all know the same, filter the same, and compute the same
+//! plans.
 //!
-//! On one that loses messages nobody can be sure what others know. So plans must stay safe
-//! whichever of them are flown, and nobody flies one of which others may not know:
+//! On one that loses messages no airplane can be sure what others know. So plans must stay safe
+//! whichever of them are flown, and no airplane flies one that others may not know:
 //!
-//! 1. Everybody tells its *proposal* as above.
-//! 2. From the proposals it has heard each works out plans by [`filter`] that are *mixable*: each
-//!    plan keeps apart from every other one's plan and from its fallback too. Whoever was not
-//!    heard is taken to be on any orbit it may be on. Each tells its own *plan*.
+//! 1. Each airplane sends its *proposal* as above.
+//! 2. From the proposals it has heard each computes plans by [`filter`] that are *mixable*: each
+//!    plan keeps apart from every other one's plan and from its fallback too. An airplane that
+//!    was not heard is taken to be on any orbit it may be on. Each sends its own *plan*.
 //! 3. Each *accepts* the plans of others that keep apart from its own plan and its own fallback,
-//!    and tells whom it accepts.
+//!    and sends the list of those it accepts.
 //! 4. An airplane flies its plan if all others near it have accepted it, else its fallback.
 //!
-//! Who is near can be seen, heard or not: where it is, and to which side it turns if it is on an
-//! orbit. What cannot be seen is what it wants, and the fallback of one that flies a way. So the
-//! orbits that an unheard airplane may be on are: those that follow from what was heard in the
-//! exchange before; or the one on which it is seen; or else both from where it is seen.
+//! Airplanes nearby can be seen, heard or not: their place, and the side to which they turn if they
+//! are on an orbit. What cannot be seen is what an airplane wants, and the fallback of one that
+//! flies a way. So the orbits that an unheard airplane may be on are: those that follow from what
+//! was heard in the exchange before; or the one on which it is seen; or else both from where it is
+//! seen.
 //!
-//! **Invariant.** For any two airplanes, every orbit that the one may be on as far as the other
-//! knows includes the one it is on, and those that they are on keep apart.
+//! **Invariant.** For any two airplanes, the orbits that the one may be on, as far as the other
+//! knows, include the one it is on; and the orbits that the two are on keep apart.
 //!
 //! *Why it is kept.* Take `i` and `j`. If `i` has accepted `j`'s plan, it knows that `j` is on
 //! that plan's orbit or on its fallback; both keep apart from `i`'s plan and from its fallback,
@@ -29,10 +31,10 @@
 //! plan keeps apart. The same holds the other way round. So both are on orbits that the other
 //! knows of, and those that they are on keep apart.
 //!
-//! An airplane whose radio is dead knows it, and stays on its fallback. Others wait in vain for
-//! it to accept anything. After some exchanges in a row without hearing from it they take its radio
-//! to be dead, and fly without its consent what keeps apart from every orbit it may be on. That it
-//! is alive all the same, and everything was lost, is the one chance which is taken here: below
+//! An airplane whose radio is dead knows it, and stays on its fallback. Others wait in vain for it
+//! to accept anything. After some exchanges in a row without hearing from it they take its radio to
+//! be dead, and fly without its consent any plan that keeps apart from every orbit it may be on.
+//! The one risk taken here is that its radio works all the same, and everything was lost: below
 //! 1e-12 each time ([`super::network::Network::silent_after`]).
 
 mod scene;
@@ -50,9 +52,10 @@ use std::sync::Arc;
 pub enum Message {
     /// Place of the sender, and the ways it would fly.
     Proposal(Proposal),
-    /// The way it will fly if all agree, and the side it turns to then; `None`: its fallback.
+    /// The way it will fly if all agree, and the side to which it turns then; `None` for its
+    /// fallback.
     Plan(Option<(Way, Side)>),
-    /// Places of those whose plans it accepts.
+    /// Places of the airplanes whose plans it accepts.
     Accepts(Vec<u16>),
 }
 
@@ -67,7 +70,7 @@ pub struct Proposal {
 }
 
 impl Proposal {
-    /// Returns what an airplane proposes: the ways that it may fly, the wanted one first.
+    /// Returns the proposal of an airplane: the ways that it may fly, the wanted one first.
     pub fn new(flyer: &Flyer, ways: &[Way]) -> Self {
         Self {
             beacon: Beacon::of(flyer),
@@ -83,7 +86,7 @@ impl Proposal {
 #[derive(Debug, Default)]
 struct Member {
     proposal: Option<Proposal>,
-    /// Its plan, when it is known; `Some(None)` is its fallback.
+    /// Its plan, when it is known; `Some(None)` stands for its fallback.
     plan: Option<Option<(Way, Side)>>,
     accepts: Option<Vec<u16>>,
     gone: bool,
@@ -94,9 +97,9 @@ struct Member {
 /// Outcome of the exchange for one airplane.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Agreed {
-    /// Its decision.
+    /// Decision of the shield for the airplane.
     pub decision: Decision,
-    /// It would have flown another way, had all agreed.
+    /// Whether it would have flown another way if all had agreed.
     pub held_back: bool,
     /// Its knowledge of others after the exchange.
     pub contacts: Contacts,
@@ -116,8 +119,8 @@ pub struct Agent {
 }
 
 impl Agent {
-    /// An agent that has not said anything yet, of the airplane at place `me`, which may fly
-    /// `ways`.
+    /// Returns an agent that has not sent anything yet, for the airplane at place `me`, which may
+    /// fly `ways`.
     pub fn new(scene: Arc<Scene>, me: usize, ways: &[Way], contacts: Contacts) -> Self {
         let flyer = scene.seen[me].flyer;
         Self {
@@ -168,7 +171,7 @@ impl Agent {
         }
     }
 
-    /// All orbits that an unheard airplane may be on.
+    /// Returns all orbits that an unheard airplane may be on.
     fn possible(&self, place: usize) -> Vec<Flyer> {
         let Seen { flyer, orbits } = self.scene.seen[place];
         let told = self.contacts.get(&flyer.id).map_or(&[][..], |contact| &contact.possible);
@@ -183,7 +186,7 @@ impl Agent {
         }
     }
 
-    /// Goes on as far as what has been heard allows.
+    /// Continues as far as the messages heard allow.
     fn go_on(&mut self) -> Vec<Message> {
         let mut said = Vec::new();
         while self.agreed.is_none() && link::Agent::awaits(self).is_empty() {
@@ -198,7 +201,7 @@ impl Agent {
         said
     }
 
-    /// Works out plans for all, and tells its own.
+    /// Computes plans for all, and sends its own.
     fn plan(&mut self) -> Message {
         let mut flyers = Vec::new();
         let mut candidates = Vec::new();
@@ -225,7 +228,7 @@ impl Agent {
         Message::Plan(way)
     }
 
-    /// The plan of a member, as told.
+    /// Returns the plan of a member, from its message.
     fn plan_of(&self, flyer: Flyer, way: &Option<(Way, Side)>) -> Plan {
         match way {
             Some((way, side)) => Plan::new(flyer, way, self.dtau_s(), *side),
@@ -233,7 +236,7 @@ impl Agent {
         }
     }
 
-    /// Accepts what keeps apart from both what it would fly and what it will fly else.
+    /// Accepts the plans that keep apart from both its own plan and its own fallback.
     fn accept(&mut self) -> Message {
         let own = self.members[self.me].plan.clone().flatten();
         let mine = [self.plan_of(self.flyer, &own), self.fallback(self.flyer)];
@@ -254,7 +257,7 @@ impl Agent {
         Message::Accepts(accepts)
     }
 
-    /// Whether a member has agreed to this airplane's plan, or need not be asked.
+    /// Returns whether a member has agreed to this airplane's plan, or need not be asked.
     fn agrees(&self, place: usize) -> bool {
         let member = &self.members[place];
         let me = self.me as u16;
@@ -265,13 +268,14 @@ impl Agent {
             || (member.proposal.is_none() && self.unheard_before(place) >= self.scene.silent_after)
     }
 
-    /// Exchanges in a row up to the one before in which a member was there and not heard.
+    /// Returns the number of exchanges in a row, up to the one before, in which a member was
+    /// present and not heard.
     fn unheard_before(&self, place: usize) -> u32 {
         let contact = self.contacts.get(&self.id(place));
         contact.filter(|c| c.met_in + 1 == self.scene.now).map_or(0, |contact| contact.unheard)
     }
 
-    /// The end: flies its plan, or its fallback.
+    /// Ends the exchange: the airplane flies its plan, or its fallback.
     fn agree(&mut self) {
         let fallback = Decision { candidate: None, fallback: self.flyer.fallback };
         let wanted = self.decision.unwrap_or(fallback);
@@ -284,14 +288,14 @@ impl Agent {
         });
     }
 
-    /// Its knowledge of others after this `dt`.
+    /// Returns its knowledge of others after this `dt`.
     fn known_now(&self) -> Contacts {
         let mut contacts = self.contacts.clone();
         for (place, member) in self.members.iter().enumerate().filter(|(k, _)| *k != self.me) {
             let id = self.id(place);
             let Some(proposal) = &member.proposal else {
                 let unheard = self.unheard_before(place) + 1;
-                // Seen, if never heard.
+                // Use what is seen of it, if it was never heard.
                 let sighted =
                     || Contact::heard(Beacon::of(&self.scene.seen[place].flyer), self.scene.now);
                 let contact = contacts.entry(id).or_insert_with(sighted);
@@ -312,7 +316,7 @@ impl Agent {
         contacts
     }
 
-    /// The orbit at the end of a plan.
+    /// Returns the orbit at the end of a plan.
     fn orbiting(&self, plan: &Plan) -> Orbiting {
         let [wx, wy] = self.scene.air.wind_m_s.map(|w| w * self.scene.air.timing.dt_s);
         let mut pose = plan.end();
@@ -336,7 +340,7 @@ impl link::Agent for Agent {
         let has_accepted = self.members[self.me].accepts.is_some();
         let member = &mut self.members[from];
         match message {
-            // From one that was given up, what it would do comes too late.
+            // The proposal of one that was given up is too late once plans are made.
             Message::Proposal(proposal) if !has_planned => member.proposal = Some(proposal),
             Message::Plan(plan) if !has_accepted => member.plan = Some(plan),
             Message::Accepts(accepted) => member.accepts = Some(accepted),
@@ -368,7 +372,7 @@ impl link::Agent for Agent {
         self.go_on()
     }
 
-    /// Whatever is still undecided stays on its fallback.
+    /// A member that is still undecided stays on its fallback.
     fn at_deadline(&mut self) {
         if self.agreed.is_none() {
             self.agree();

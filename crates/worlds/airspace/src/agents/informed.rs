@@ -1,5 +1,5 @@
-//! Agents that first tell each other all they may do, and then only what they make of it:
-//! samples' numbers, or distributions.
+//! Agents that first send each other all their possible ways, and then only the results of using
+//! them: numbers of samples, or distributions.
 
 use super::contact::Beacon;
 use super::own_ship::OwnShip;
@@ -20,19 +20,19 @@ pub enum Message {
         /// The ways, by action.
         ways: Vec<Prediction>,
     },
-    /// From which the others predict its ways themselves.
+    /// A model, from which the others predict the sender's ways themselves.
     Model {
         /// Beacon of the sender.
         beacon: Beacon,
-        /// Way-points done with.
+        /// Number of way-points done with.
         next: u32,
         /// Way-points that it is to reach.
         mission: Vec<Point>,
-        /// Which airplane it is,
+        /// Number of the airplane.
         airplane: u32,
-        /// how many of its orders are carried out,
+        /// Number of its orders that are carried out.
         orders: u32,
-        /// and its altitude.
+        /// Altitude in meters.
         altitude_m: f64,
     },
     /// The numbers of the round's samples, and how far the sender has moved in the round before.
@@ -60,16 +60,16 @@ pub enum Message {
 struct Member {
     beacon: Option<Beacon>,
     options: Option<Options>,
-    /// Distributions after each round; round 0 is the beginning.
+    /// Distributions after each round; round 0 is the start.
     q: BTreeMap<u32, Vec<f64>>,
     samples: BTreeMap<u32, Vec<usize>>,
     changes: BTreeMap<u32, f64>,
-    /// Nothing more comes of it: its last word holds for all later rounds.
+    /// Whether nothing more is heard from it: its last message holds for all later rounds.
     gone: bool,
 }
 
 impl Member {
-    /// Returns its word that holds in a round, if that is known.
+    /// Returns its message that holds in a round, if that is known.
     fn at<'a, T>(&self, of_rounds: &'a BTreeMap<u32, T>, round: u32) -> Option<&'a T> {
         match of_rounds.get(&round) {
             None if self.gone => of_rounds.range(..round).next_back().map(|(_, value)| value),
@@ -107,14 +107,14 @@ pub struct Agent {
     members: Vec<Member>,
     game: Option<PairwiseGame>,
     player: Player,
-    /// Rounds made.
+    /// Number of rounds made.
     round: u32,
     calm: u32,
     decided: Option<Conclusion>,
 }
 
 impl Agent {
-    /// An agent that has not said anything yet.
+    /// Returns an agent that has not sent anything yet.
     pub fn new(own: OwnShip, by_model: bool) -> Self {
         let mut members: Vec<Member> =
             (0..own.briefing.ids.len()).map(|_| Member::default()).collect();
@@ -137,7 +137,7 @@ impl Agent {
         self.own.settings().estimator == Estimator::Exact
     }
 
-    /// Goes on as far as what has been heard allows.
+    /// Continues as far as the messages heard allow.
     fn go_on(&mut self) -> Vec<Message> {
         let mut said = Vec::new();
         if self.game.is_none() {
@@ -152,14 +152,14 @@ impl Agent {
         said
     }
 
-    /// Everybody's options are known: the game, and the distributions at the beginning.
+    /// Sets up the game and the first distributions, once everybody's options are known.
     fn meet(&mut self) {
         let objective = &self.own.briefing.objective;
         let all: Vec<&Options> = self.members.iter().filter_map(|m| m.options.as_ref()).collect();
         let mut game = PairwiseGame::new(all.iter().map(|o| own_costs(objective, o)).collect());
         for i in 0..all.len() {
             for j in i + 1..all.len() {
-                // An exact player needs only its own pairs.
+                // An exact player needs only the pairs that it is part of.
                 if !self.is_exact() || i == self.own.me || j == self.own.me {
                     couple(&mut game, objective, (i, all[i]), (j, all[j]));
                 }
@@ -175,9 +175,9 @@ impl Agent {
         self.game = Some(game);
     }
 
-    /// Whose word is missing for the next step. With exact expectations round `r` leads to the
-    /// distributions `q_r`, and steps are one's own update and everybody's; samples are those of
-    /// the round after `round` rounds.
+    /// Returns the agents whose message is missing for the next step. With exact expectations round
+    /// `r` leads to the distributions `q_r`, and a step is the agent's own update or everybody's;
+    /// samples are those of the round after `round` rounds.
     fn awaits_in_round(&self) -> Vec<usize> {
         let (me, sequence) = (self.own.me, self.own.settings().order == Order::Sequence);
         let (round, all) = (self.round, self.members.iter().enumerate());
@@ -190,7 +190,7 @@ impl Agent {
         all.filter(|(j, member)| missing((*j, member))).map(|(j, _)| j).collect()
     }
 
-    /// Whether its own update of this round is made.
+    /// Returns whether its own update of this round is made.
     fn has_moved(&self) -> bool {
         self.members[self.own.me].q.contains_key(&(self.round + 1))
     }
@@ -228,7 +228,7 @@ impl Agent {
         Message::Distribution { round, change, q }
     }
 
-    /// Draws, if it has not; else learns from what all have drawn.
+    /// Draws samples, unless it has; else learns from everybody's samples.
     fn sampled_step(&mut self) -> Option<Message> {
         let Estimator::Sampled { block, ageing } = self.own.settings().estimator else {
             return None;
@@ -308,7 +308,7 @@ impl link::Agent for Agent {
                 member.options.get_or_insert(options);
                 member.beacon = Some(beacon);
             }
-            // What it comes to after it was given up concerns nobody.
+            // Messages of one that was given up no longer matter.
             _ if member.gone => {}
             Message::Samples { round, change, samples } => {
                 let samples = samples.iter().map(|&x| usize::from(x)).collect();
@@ -342,11 +342,11 @@ impl link::Agent for Agent {
         let member = &mut self.members[other];
         member.gone = true;
         if member.options.is_none() {
-            // What it may have said of options that nobody knows means nothing.
+            // Samples are numbers of options, which nobody knows here, so they mean nothing.
             *member = Member { gone: true, beacon: member.beacon.take(), ..Member::default() };
             member.options = Some(self.own.presumed(other));
         }
-        // Who was heard of, but said nothing yet of what it samples.
+        // One that was heard, but has not sent any samples yet.
         if self.game.is_some() && member.samples.is_empty() {
             member.samples.insert(0, Vec::new());
         }

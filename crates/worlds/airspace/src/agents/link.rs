@@ -1,10 +1,10 @@
 //! Talking over a network that loses, delays, doubles and reorders messages.
 //!
-//! Every agent says all it says to all the others of its group. An [`Endpoint`] numbers what its
-//! agent says and keeps it; whoever misses something asks for it again. One that does not answer
-//! although it was asked several times is given up for this talk: the agent goes on with what it
-//! knows of it. Whoever was not heard in the talk before is asked once. So nobody waits for ever,
-//! and a loss costs time instead of agreement.
+//! Every agent sends all its messages to all the others of its group. An [`Endpoint`] numbers its
+//! agent's messages and keeps them; an endpoint that misses one asks for it again. One that does
+//! not answer although it was asked several times is given up for this talk: the agent goes on with
+//! its knowledge of it. One that was not heard in the talk before is asked once. So nobody waits
+//! for ever, and a loss costs time instead of agreement.
 //!
 //! Endpoints and agents are state machines without a clock or a network of their own: the tick and
 //! the [`Transport`] are handed in.
@@ -17,50 +17,50 @@ use sidestep_kernel::ports::{Envelope, Transport};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-/// An agent as a state machine: messages in, messages to all others out. Others are known by
-/// their place in the group.
+/// An agent as a state machine: messages in, messages to all others out. Others are known by their
+/// place in the group.
 pub trait Agent {
-    /// Messages that it sends and receives.
+    /// Type of the messages that it sends and receives.
     type Message: Serialize + DeserializeOwned;
-    /// Its outcome.
+    /// Type of its outcome.
     type Outcome;
 
     /// Returns its messages before it has heard anything.
     fn start(&mut self) -> Vec<Self::Message>;
 
-    /// Takes a message of agent `from`, and says what it has to say then. Messages come in any
-    /// order, each once.
+    /// Takes a message of agent `from`, and returns its own messages in response. Messages come in
+    /// any order, each once.
     fn on_message(&mut self, from: usize, message: Self::Message) -> Vec<Self::Message>;
 
     /// Returns the places of those whose messages it needs in order to go on.
     fn awaits(&self) -> Vec<usize>;
 
-    /// Whether an answer of agent `other` can be expected.
+    /// Returns whether an answer of agent `other` can be expected.
     fn expects(&self, _other: usize) -> bool {
         true
     }
 
-    /// Nothing more will come of agent `other`: goes on with what is known of it. It is settled
-    /// if it has come to an end itself, rather than fallen silent.
+    /// Goes on without agent `other`, from which nothing more will come. The other is settled if it
+    /// has ended regularly, rather than fallen silent.
     fn without(&mut self, other: usize, is_settled: bool) -> Vec<Self::Message>;
 
-    /// Time is up: makes the best of what it knows.
+    /// Ends because time is up, with the best outcome from what it knows.
     fn at_deadline(&mut self);
 
-    /// Returns its outcome, if it has come to one.
+    /// Returns its outcome, if it has one.
     fn outcome(&self) -> Option<Self::Outcome>;
 }
 
 /// A packet on the wire.
 #[derive(Debug, Serialize, Deserialize)]
 enum Packet<M> {
-    /// The message of this number of the sender's.
+    /// A message, with its number among the sender's.
     Said(u32, M),
-    /// "Say again whatever you have said from this number on."
+    /// "Send again all your messages from this number on."
     Ask(u32),
-    /// "I have said no more than that yet."
+    /// "I have not sent more than that yet."
     Wait,
-    /// "I have said no more than that, and shall not."
+    /// "I have not sent more than that, and shall not."
     Done,
 }
 
@@ -78,9 +78,9 @@ pub struct Radio {
     pub group: Arc<[EntityId]>,
     /// Place of its airplane in the group.
     pub me: usize,
-    /// Time that it waits for others.
+    /// The time that it waits for others.
     pub patience: Patience,
-    /// Whether the radio is dead: it sends nothing, hears nothing, and knows.
+    /// Whether the radio is dead: it sends nothing, hears nothing, and knows it.
     pub is_silent: bool,
 }
 
@@ -94,17 +94,17 @@ pub struct Endpoint<A> {
     others: Vec<Other>,
     quiet_since: u64,
     late: bool,
-    /// Packets sent so far: what tells those of one tick apart.
+    /// Number of packets sent so far, which distinguishes those of one tick.
     sent: u32,
     traffic: Traffic,
 }
 
-/// Knowledge of an endpoint about another one.
+/// An endpoint's knowledge of another one.
 #[derive(Debug, Clone, Default)]
 struct Other {
-    /// All messages below this number have come,
+    /// All messages below this number have come.
     next: u32,
-    /// and these.
+    /// Later messages that have come out of order.
     early: BTreeSet<u32>,
     unanswered: u32,
     gone: bool,
@@ -112,7 +112,7 @@ struct Other {
 }
 
 impl Other {
-    /// Whether a number is new.
+    /// Returns whether a number is new.
     fn takes(&mut self, number: u32) -> bool {
         let is_new = number >= self.next && self.early.insert(number);
         while self.early.remove(&self.next) {
@@ -122,24 +122,24 @@ impl Other {
     }
 }
 
-/// A packet as it goes over the wire.
+/// Returns a packet in the form in which it travels.
 pub(crate) fn bytes_of<M: Serialize>(message: &M) -> Vec<u8> {
     postcard::to_stdvec(message).expect("messages are plain data")
 }
 
-/// End of a talk for one agent.
+/// The end of a talk for one agent.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ended<O> {
-    /// Its outcome, if it has come to one.
+    /// Its outcome, if it has one.
     pub outcome: Option<O>,
-    /// The others, by place, of whom it has heard nothing in spite of asking.
+    /// The others, by place, that it has not heard in spite of asking.
     pub unheard: Vec<usize>,
     /// Whether time was up before it was done.
     pub late: bool,
 }
 
 impl<A: Agent> Endpoint<A> {
-    /// Returns an agent that has not said anything yet.
+    /// Returns an endpoint whose agent has not sent anything yet.
     pub fn new(agent: A, radio: Radio) -> Self {
         let others = vec![Other::default(); radio.group.len()];
         Self {
@@ -154,7 +154,7 @@ impl<A: Agent> Endpoint<A> {
         }
     }
 
-    /// Says what the agent has to say before it has heard anything.
+    /// Sends the messages that the agent has before it hears anything.
     pub fn start(&mut self, transport: &mut dyn Transport, tick: u64) {
         self.quiet_since = tick;
         let first = self.agent.start();
@@ -165,11 +165,11 @@ impl<A: Agent> Endpoint<A> {
         self.send(transport, tick, said);
     }
 
-    /// Takes what has arrived by a tick, and says what the agent has to say then.
+    /// Takes the packets that have arrived by a tick, and sends the agent's responses.
     pub fn step(&mut self, transport: &mut dyn Transport, tick: u64) {
         for envelope in transport.receive(self.radio.group[self.radio.me], tick) {
             let sender = self.radio.group.binary_search(&envelope.sender);
-            // Whoever is not of the group has nothing to say here.
+            // Senders outside the group are ignored.
             let Some(from) = sender.ok().filter(|_| !self.radio.is_silent) else { continue };
             let said = self.on_packet(from, &envelope.payload, tick);
             self.send(transport, tick, said);
@@ -210,7 +210,7 @@ impl<A: Agent> Endpoint<A> {
         out
     }
 
-    /// Takes a packet. One that cannot be read is as good as lost.
+    /// Takes a packet. One that cannot be read counts as lost.
     fn on_packet(&mut self, from: usize, bytes: &[u8], tick: u64) -> Vec<Outgoing> {
         let Ok(packet) = postcard::from_bytes::<Packet<A::Message>>(bytes) else {
             return Vec::new();
@@ -224,7 +224,7 @@ impl<A: Agent> Endpoint<A> {
             }
             Packet::Said(..) | Packet::Wait => Vec::new(),
             Packet::Ask(number) => self.answer(from, number),
-            // Whoever says so was asked for what had not come: all of it has come.
+            // This answers a question for missing messages, so all of them have come.
             Packet::Done => self.go_on_without(from, true),
         }
     }
@@ -248,7 +248,8 @@ impl<A: Agent> Endpoint<A> {
         self.say(said)
     }
 
-    /// Asks whom it waits for, if it has waited long enough, and gives up who never answers.
+    /// Asks those that it waits for, if it has waited long enough, and gives up those that never
+    /// answer.
     fn on_timer(&mut self, tick: u64) -> Vec<Outgoing> {
         if self.next_timer().is_none_or(|due| due > tick) {
             return Vec::new();
@@ -270,12 +271,12 @@ impl<A: Agent> Endpoint<A> {
         out
     }
 
-    /// The tick in which its patience ends.
+    /// Returns the tick in which its patience ends.
     pub fn next_timer(&self) -> Option<u64> {
         (!self.is_done()).then(|| self.quiet_since.saturating_add(self.radio.patience.ticks))
     }
 
-    /// Nobody hears it, and it hears nobody.
+    /// Ends the talk of an airplane that nobody hears and that hears nobody.
     fn is_alone(&mut self) {
         let me = self.radio.me;
         for j in (0..self.others.len()).filter(|&j| j != me) {
@@ -284,7 +285,7 @@ impl<A: Agent> Endpoint<A> {
         }
     }
 
-    /// Whether its agent has come to an end.
+    /// Returns whether its agent has ended.
     pub fn is_done(&self) -> bool {
         self.agent.outcome().is_some()
     }
@@ -294,7 +295,7 @@ impl<A: Agent> Endpoint<A> {
         self.traffic
     }
 
-    /// The end of the talk.
+    /// Returns the end of the talk.
     pub fn end(mut self) -> Ended<A::Outcome> {
         if !self.is_done() {
             self.late = true;

@@ -1,19 +1,20 @@
-//! Agents: what runs aboard an airplane, each with its own data.
+//! Agents: the programs aboard the airplanes, each with its own data.
 //!
-//! An agent owns what it knows of its airplane and has learned of others ([`OwnShip`]), what all
-//! have agreed on ([`Briefing`]), and its part of the optimization. It is a state machine: messages
-//! in, messages out. An [`Endpoint`] is an agent with all that makes its messages arrive; it is
-//! stepped with any [`Transport`](sidestep_kernel::ports::Transport), in memory or between
+//! An agent owns its knowledge of its airplane and of others ([`OwnShip`]), the knowledge that all
+//! share ([`Briefing`]), and its part of the optimization. It is a state machine: messages in,
+//! messages out. An [`Endpoint`] is an agent together with the code that makes its messages arrive;
+//! it is stepped with any [`Transport`](sidestep_kernel::ports::Transport), in memory or between
 //! processes.
 //!
 //! | Module | What it does |
 //! |---|---|
 //! | [`sampling`] | the paper's Algorithm 1: samples, predicts, and shares both |
-//! | [`informed`] | tells all it may do once, and then only what it makes of it |
+//! | [`informed`] | sends all its possible ways once, and then only samples or distributions |
 //! | [`coordinator`] | migrates from airplane to airplane, and decides for all |
-//! | [`exchange`] | the shield: whether plans go together |
+//! | [`exchange`] | the shield: whether plans are safe together |
 //!
-//! Nobody waits for ever: who is not heard is presumed where it was last heard of ([`contact`]).
+//! No agent waits for ever: one that is not heard is presumed where it was last heard
+//! ([`contact`]).
 
 pub mod contact;
 pub mod coordinator;
@@ -35,9 +36,9 @@ use serde::{Deserialize, Serialize};
 pub struct Decided {
     /// Number of the chosen action.
     pub chosen: usize,
-    /// The estimate of every action in the end.
+    /// The estimate of every action at the end.
     pub expected: Vec<f64>,
-    /// Rounds made.
+    /// Number of rounds made.
     pub rounds: u32,
     /// Whether the distributions had settled.
     pub converged: bool,
@@ -46,8 +47,8 @@ pub struct Decided {
 /// Outcome of an agent.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Conclusion {
-    /// Nothing, if time was up before it had learned anything.
+    /// The decision; none if time was up before the agent had learned anything.
     pub decided: Option<Decided>,
-    /// Beacons of the others that it has heard, by place.
+    /// Beacons of the others that were heard, by place.
     pub beacons: Vec<Option<Beacon>>,
 }

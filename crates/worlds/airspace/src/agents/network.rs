@@ -1,4 +1,4 @@
-//! The network of the agents: what may go wrong on it, and what it has carried.
+//! The network of the agents: its faults, and the traffic on it.
 
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::ports::Faults;
@@ -7,18 +7,18 @@ use sidestep_kernel::{EntityId, math};
 /// Messages and bytes that went over the network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Traffic {
-    /// Messages, one per receiver; of a coordinator, its migrations.
+    /// Number of messages, one per receiver; for a coordinator, its migrations.
     pub messages: u64,
-    /// Messages if one could reach all.
+    /// Number of messages if one could reach all.
     pub multicasts: u64,
-    /// Bytes of the messages, in their serialized form.
+    /// Number of bytes of the messages, in their serialized form.
     pub bytes: u64,
-    /// Bytes if one message could reach all.
+    /// Number of bytes if one message could reach all.
     pub multicast_bytes: u64,
 }
 
 impl Traffic {
-    /// Adds other traffic.
+    /// Adds the counts of other traffic.
     pub fn add(&mut self, other: Self) {
         self.messages += other.messages;
         self.multicasts += other.multicasts;
@@ -35,35 +35,36 @@ impl Traffic {
     }
 }
 
-/// A network that is not to be relied on.
+/// A network that may lose, delay and repeat messages.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Network {
     /// Probability that a message is lost on its way to a receiver.
     pub loss: f64,
-    /// Probability that it arrives twice.
+    /// Probability that a message arrives twice.
     pub duplication: f64,
-    /// Time that every message takes: one tick.
+    /// Time in seconds that every message takes: one tick.
     pub latency_s: f64,
-    /// Further delay at most, drawn uniformly: messages overtake each other.
+    /// Largest further delay in seconds, drawn uniformly, so that messages overtake each other.
     pub max_delay_s: f64,
-    /// An agent that has heard nothing new for so long asks those it waits for.
+    /// Time in seconds without a new message after which an agent asks those it waits for.
     pub patience_s: f64,
-    /// An optimization ends after this, and so does what the shield exchanges after it.
+    /// Time in seconds after which an optimization ends; the same for the shield's exchange after
+    /// it.
     pub deadline_s: f64,
-    /// Airplanes whose radio is dead, and times.
+    /// Airplanes whose radio is dead, and the times.
     pub silences: Vec<Silence>,
 }
 
-/// An airplane whose radio is dead for a while: it sends nothing, it hears nothing, and it knows.
+/// A while in which an airplane's radio is dead: it sends nothing, hears nothing, and knows it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Silence {
-    /// Its id.
+    /// Id of the airplane.
     pub airplane: EntityId,
-    /// From when on, seconds after the start.
+    /// Start of the silence, in seconds after the start of the run.
     #[serde(default)]
     pub from_s: f64,
-    /// Until when; for ever, if not said.
+    /// End of the silence, in seconds after the start of the run; infinite unless given.
     #[serde(default = "for_ever")]
     pub until_s: f64,
 }
@@ -73,7 +74,7 @@ fn for_ever() -> f64 {
 }
 
 impl Network {
-    /// Whether an airplane is silent at a time.
+    /// Returns whether an airplane is silent at a time.
     pub fn is_silent(&self, id: EntityId, at_s: f64) -> bool {
         let now = |s: &&Silence| s.from_s <= at_s && at_s < s.until_s;
         self.silences.iter().filter(now).any(|s| s.airplane == id)
@@ -87,21 +88,21 @@ impl Network {
         self.ticks(self.deadline_s)
     }
 
-    /// How long and how often somebody is asked: whoever is silent is given up in a quarter of
-    /// the time, so that enough is left to go on without it.
+    /// Returns how long and how often an agent asks another: a silent one is given up in a quarter
+    /// of the time, so that enough is left to go on without it.
     pub(crate) fn patience(&self) -> Patience {
         let tries = (self.deadline_s / (4.0 * self.patience_s)).clamp(2.0, 12.0) as u32;
         Patience { ticks: self.ticks(self.patience_s), tries }
     }
 
-    /// Talks in a row without a word from somebody after which its radio is taken to be dead:
-    /// at least three, and so many that the chance is below 1e-12 that all it has said was lost,
-    /// and all questions to it or the answers.
+    /// Returns the number of talks in a row without a message from an airplane after which its
+    /// radio is taken to be dead: at least three, and enough that the chance is below 1e-12 that
+    /// all its messages were lost, together with all questions to it or the answers.
     pub(crate) fn silent_after(&self) -> u32 {
         const CHANCE: f64 = 1e-12;
         let unanswered = 1.0 - (1.0 - self.loss) * (1.0 - self.loss);
         let tries = f64::from(self.patience().tries);
-        // In the first of these talks all questions are asked, and one in each later one.
+        // In the first of these talks all questions are asked, in each later one a single question.
         let first = math::ln(self.loss) + tries * math::ln(unanswered);
         let later = math::ln(self.loss * unanswered);
         let talks = 1.0 + ((math::ln(CHANCE) - first) / later).ceil().max(0.0);
@@ -118,11 +119,11 @@ impl Network {
     }
 }
 
-/// Time after which an endpoint asks, and how often.
+/// The time after which an endpoint asks, and the number of questions.
 #[derive(Debug, Clone, Copy)]
 pub struct Patience {
-    /// Ticks without anything new after which it asks.
+    /// Number of ticks without a new message after which it asks.
     pub ticks: u64,
-    /// Questions to somebody before it is given up.
+    /// Number of questions to another before it is given up.
     pub tries: u32,
 }

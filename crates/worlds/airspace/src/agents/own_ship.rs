@@ -1,4 +1,4 @@
-//! Knowledge of an agent about its own airplane, and of all agents of a group alike.
+//! An agent's knowledge of its own airplane, and the knowledge that all agents of a group share.
 
 use super::Decided;
 use super::contact::{Beacon, Contact, Contacts};
@@ -10,22 +10,22 @@ use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{Cycle, EntityId};
 use std::sync::Arc;
 
-/// Knowledge that all agents of a group share before they talk.
+/// The knowledge that all agents of a group share before they talk.
 #[derive(Debug, Clone)]
 pub struct Briefing {
-    /// The cycle.
+    /// The present cycle.
     pub now: Cycle,
     /// Ids of the group, rising.
     pub ids: Arc<[EntityId]>,
-    /// Their flights as they were filed, in this order.
+    /// The flights of the group as filed, in the order of the ids.
     pub filed: Vec<Filed>,
     /// The air that all fly through.
     pub air: Air,
-    /// What is optimized,
+    /// The objective that is minimized.
     pub objective: Objective,
-    /// and how.
+    /// Settings of the optimizer.
     pub settings: Settings,
-    /// From which samples are drawn.
+    /// The random streams from which samples are drawn.
     pub streams: Streams,
     /// Whether the shield keeps airplanes that are not heard on their orbits.
     pub is_shielded: bool,
@@ -36,14 +36,14 @@ pub struct Briefing {
 pub struct Filed {
     /// Abilities of the airplane.
     pub model: Model,
-    /// Actions that it may choose from.
+    /// Actions from which it may choose.
     pub actions: Vec<Action>,
-    /// Knowledge that all have of it before they have heard of it.
+    /// The knowledge that all others have of it before they have heard it.
     pub contact: Contact,
 }
 
 impl Briefing {
-    /// Returns where the actions of an airplane lead it, by what it tells of itself.
+    /// Returns where the actions of an airplane lead it, by the state that it sends.
     pub fn options(
         &self,
         place: usize,
@@ -63,22 +63,22 @@ impl Briefing {
     }
 }
 
-/// Knowledge of an agent about its own airplane, and hearsay about others.
+/// An agent's knowledge of its own airplane, and of others from messages.
 #[derive(Debug, Clone)]
 pub struct OwnShip {
     /// Place in the group.
     pub me: usize,
-    /// Its place, and the number of way-points behind it.
+    /// State of the airplane, and the number of way-points behind it.
     pub known: Known,
-    /// Message in which it tells of itself.
+    /// The message in which it describes itself.
     pub beacon: Beacon,
     /// Way-points that it is to reach.
     pub mission: Vec<Point>,
-    /// Predictions of its actions.
+    /// Predictions of its own actions.
     pub options: Options,
-    /// Hearsay about others from earlier cycles.
+    /// Knowledge of others from earlier cycles.
     pub contacts: Contacts,
-    /// Knowledge that all share.
+    /// The knowledge that all share.
     pub briefing: Arc<Briefing>,
 }
 
@@ -91,13 +91,13 @@ impl OwnShip {
         purpose::sample(&self.briefing.streams, self.known.slot, self.briefing.now, k)
     }
 
-    /// The next `block` samples of a player after `drawn`.
+    /// Returns the next `block` samples of a player after `drawn`.
     pub(super) fn samples(&self, player: &Player, drawn: u64, block: usize) -> Vec<usize> {
         (drawn..drawn + block as u64).map(|k| player.draw(self.uniform(k))).collect()
     }
 
-    /// What a player of samples or of distributions comes to after some rounds, of which the
-    /// last `calm` were calm; nothing, if it has not learned anything.
+    /// Returns the decision of a player of samples or of distributions after some rounds, of which
+    /// the last `calm` were calm; none, if it has not learned anything.
     pub(super) fn decided(&self, player: &Player, rounds: u32, calm: u32) -> Option<Decided> {
         let Settings { estimator, choice, stop, .. } = *self.settings();
         let drawn = match estimator {
@@ -112,20 +112,20 @@ impl OwnShip {
         })
     }
 
-    /// Whether another one was heard of late, or never yet.
+    /// Returns whether another one was heard lately, or is met for the first time.
     pub(super) fn expects(&self, other: usize) -> bool {
         let contact = self.contacts.get(&self.briefing.ids[other]);
         contact.is_none_or(|contact| contact.heard_in + 1 >= self.briefing.now)
     }
 
-    /// Predictions for another one that is not heard.
+    /// Returns the predictions for another one that is not heard.
     pub(super) fn presumed(&self, other: usize) -> Options {
         let id = self.briefing.ids[other];
         let filed = || &self.briefing.filed[other].contact;
         self.taken_to_fly(self.contacts.get(&id).unwrap_or_else(filed))
     }
 
-    /// The same of one that was heard a moment ago.
+    /// Returns the same for one that was heard a moment ago.
     pub(super) fn presumed_from(&self, beacon: &Beacon) -> Options {
         self.taken_to_fly(&Contact::heard(beacon.clone(), self.briefing.now))
     }

@@ -9,15 +9,15 @@ use serde::{Deserialize, Serialize};
 use sidestep_collectives::Player;
 use std::collections::BTreeMap;
 
-/// Messages between agents.
+/// The messages between agents.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub enum Message {
     /// Lines 6 to 9: the predicted ways of the round's samples, and how far the sender's
     /// probabilities have moved in the round before.
     Predictions {
-        /// The round, from 0.
+        /// Number of the round, from 0.
         round: u32,
-        /// Largest move of the probabilities.
+        /// Largest change of the probabilities.
         change: f64,
         /// Beacon of the sender.
         beacon: Beacon,
@@ -26,7 +26,7 @@ pub enum Message {
     },
     /// Line 17: the sender's part of the cost of each joint sample (eq. 11).
     Costs {
-        /// The round, from 0.
+        /// Number of the round, from 0.
         round: u32,
         /// The costs, by sample.
         costs: Vec<f64>,
@@ -37,13 +37,13 @@ pub enum Message {
 #[derive(Debug, Default)]
 struct Member {
     beacon: Option<Beacon>,
-    /// The ways of its samples, by round,
+    /// The ways of its samples, by round.
     ways: BTreeMap<u32, Vec<Prediction>>,
-    /// how far it has moved in the round before,
+    /// Its changes of probabilities in the round before, by round.
     changes: BTreeMap<u32, f64>,
-    /// and its part of the costs.
+    /// Its part of the costs, by round.
     costs: BTreeMap<u32, Vec<f64>>,
-    /// Predictions for it, since nothing more comes of it.
+    /// Predictions for it, when no more messages come from it.
     presumed: Option<Options>,
 }
 
@@ -62,7 +62,8 @@ impl Member {
         self.beacon.as_ref().map(|beacon| beacon.levels).or_else(presumed)
     }
 
-    /// Keeps the ways of the round before: they may be the last ones heard of.
+    /// Drops old rounds. The ways of the round before are kept, because they may be the last ones
+    /// heard.
     fn forget_before(&mut self, round: u32) {
         self.ways.retain(|r, _| *r + 1 >= round);
         self.changes.retain(|r, _| *r >= round);
@@ -87,7 +88,7 @@ pub struct Agent {
 }
 
 impl Agent {
-    /// An agent that has not said anything yet.
+    /// Returns an agent that has not sent anything yet.
     pub fn new(own: OwnShip, block: usize, ageing: f64) -> Self {
         Self {
             own_costs: own_costs(&own.briefing.objective, &own.options),
@@ -123,12 +124,12 @@ impl Agent {
         self.members.iter().enumerate().filter(|(j, _)| *j != self.own.me)
     }
 
-    /// Whether this round's own costs are out.
+    /// Returns whether its own costs of this round are sent.
     fn has_costed(&self) -> bool {
         self.members[self.own.me].costs.contains_key(&self.round)
     }
 
-    /// Goes on as far as what has been heard allows.
+    /// Continues as far as the messages heard allow.
     fn go_on(&mut self) -> Vec<Message> {
         let mut said = Vec::new();
         while self.decided.is_none() && link::Agent::awaits(self).is_empty() {
@@ -146,7 +147,8 @@ impl Agent {
         said
     }
 
-    /// Line 25: all know how far anybody has moved, so all stop in the same round.
+    /// Returns whether the distributions have settled (line 25). All agents know how far each has
+    /// moved, so all stop in the same round.
     fn is_settled(&mut self) -> bool {
         let stop = self.own.settings().stop;
         if self.round > 0 {
@@ -157,14 +159,14 @@ impl Agent {
         self.calm >= stop.calm_rounds || self.round >= stop.max_rounds
     }
 
-    /// Lines 10 to 15.
+    /// Computes its part of the costs (lines 10 to 15).
     fn cost(&mut self) -> Message {
         let costs: Vec<f64> = (0..self.block).map(|k| self.cost_of(k)).collect();
         self.members[self.own.me].costs.insert(self.round, costs.clone());
         Message::Costs { round: self.round, costs }
     }
 
-    /// The own part of the cost of joint sample `k`.
+    /// Returns its part of the cost of joint sample `k`.
     fn cost_of(&self, k: usize) -> f64 {
         let objective = &self.own.briefing.objective;
         let OwnShip { options, .. } = &self.own;
@@ -182,7 +184,8 @@ impl Agent {
         })
     }
 
-    /// Lines 18 to 24: sums in the order of the airplanes, so that all come to the same bits.
+    /// Learns (lines 18 to 24). Costs are summed in the order of the airplanes, because then all
+    /// agents compute the same bits.
     fn learn(&mut self) {
         let mut total = vec![0.0; self.block];
         for costs in self.members.iter().filter_map(|m| m.costs.get(&self.round)) {
@@ -243,8 +246,8 @@ impl link::Agent for Agent {
         self.own.expects(other)
     }
 
-    /// Its part of the costs is left out from now on. One that is settled goes on as it last
-    /// said; one that is silent is presumed where it was.
+    /// Leaves out the other's part of the costs from now on. A settled agent keeps its last
+    /// message; a silent one is presumed where it was.
     fn without(&mut self, other: usize, is_settled: bool) -> Vec<Message> {
         let member = &mut self.members[other];
         let last = member.ways.values().next_back().and_then(|ways| ways.first());

@@ -1,18 +1,18 @@
-//! Other methods under the same limits, to compare with: every one is asked for a heading, and
-//! the airplane turns towards it as fast as it can.
+//! Other methods under the same limits, for comparison: each computes a heading, and the airplane
+//! turns toward it as fast as it can.
 
 pub(super) mod mvp;
 pub(super) mod orca;
 
 use super::flight::{Levels, Point};
 
-/// What a method is told of an airplane.
+/// The part of an airplane that a method knows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Moving {
     pub(super) at: Point,
-    /// Meters per second.
+    /// Velocity in meters per second.
     pub(super) velocity: Point,
-    /// Where it would fly if it were alone, meters per second.
+    /// The velocity that it would have if it were alone, in meters per second.
     pub(super) preferred: Point,
     pub(super) separation_m: f64,
     pub(super) levels: Levels,

@@ -1,18 +1,18 @@
-//! Modified voltage potential, after Hoekstra's method as BlueSky has it, heading only: an
-//! airplane shifts its velocity by what moves the predicted closest point of approach out of the
-//! other's zone.
+//! Modified voltage potential, after Hoekstra's method in BlueSky's form, heading only: an airplane
+//! shifts its velocity so that the predicted closest point of approach moves out of the other's
+//! zone.
 
 use super::Moving;
 use crate::flight::Point;
 use sidestep_kernel::math;
 
-/// Closest approaches nearer than this have no direction of their own; then everybody gives way
+/// Closest approaches nearer than this have no direction of their own, so every airplane gives way
 /// to the right.
 const HEAD_ON_M: f64 = 10.0;
 
-/// The velocity that airplane `own` should fly: its preferred one, shifted away from everybody
-/// with whom that would lead to a loss of separation within `look_ahead_s`. `margin` is a factor
-/// on separations.
+/// Returns the velocity that airplane `own` should fly: its preferred one, shifted away from all
+/// airplanes with which it would lose separation within `look_ahead_s`. `margin` is a factor on
+/// separations.
 pub(in super::super) fn velocity<'a>(
     own: &Moving,
     others: impl Iterator<Item = &'a Moving>,
@@ -23,7 +23,7 @@ pub(in super::super) fn velocity<'a>(
     shifts.fold(own.preferred, |v, s| [v[0] - s[0], v[1] - s[1]])
 }
 
-/// How the other's velocity would have to change, seen from `own`, to miss its zone.
+/// Returns the change of the other's velocity, seen from `own`, with which it would miss its zone.
 fn shift(own: &Moving, other: &Moving, look_ahead_s: f64, margin: f64) -> Option<Point> {
     let zone_m = own.separation_m.max(other.separation_m) * margin;
     let apart = [other.at[0] - own.at[0], other.at[1] - own.at[1]];
@@ -43,7 +43,7 @@ fn shift(own: &Moving, other: &Moving, look_ahead_s: f64, margin: f64) -> Option
     }
     let distance_m = math::hypot(apart[0], apart[1]).max(1e-9);
     if miss_m <= HEAD_ON_M {
-        // To the left of the line of sight is where the other should pass.
+        // The other should pass to the left of the line of sight.
         miss_m = HEAD_ON_M;
         cpa = [-apart[1] / distance_m * miss_m, apart[0] / distance_m * miss_m];
     }

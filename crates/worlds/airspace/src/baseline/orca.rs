@@ -1,12 +1,12 @@
 //! Optimal reciprocal collision avoidance (van den Berg and others, 2011), by a library; its
-//! velocities are made flyable by the same turn rates as everybody's.
+//! velocities are made flyable with the same turn rates as for the other methods.
 
 use super::Moving;
 use crate::flight::Point;
 use dodgy_2d::{Agent, AvoidanceOptions, Vec2};
 use std::borrow::Cow;
 
-/// The velocity that airplane `own` should fly among the others.
+/// Returns the velocity that airplane `own` should fly among the others.
 pub(in super::super) fn velocity<'a>(
     own: &Moving,
     others: impl Iterator<Item = &'a Moving>,
@@ -14,7 +14,7 @@ pub(in super::super) fn velocity<'a>(
     dt_s: f64,
     margin: f64,
 ) -> Point {
-    // Single precision is finer near the origin.
+    // Positions relative to the airplane, because single precision is finer near the origin.
     let near = |at: Point| Vec2::new((at[0] - own.at[0]) as f32, (at[1] - own.at[1]) as f32);
     let plain = |v: Point| Vec2::new(v[0] as f32, v[1] as f32);
     let agent = |m: &Moving| Agent {

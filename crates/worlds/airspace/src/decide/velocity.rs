@@ -1,4 +1,4 @@
-//! Wishes by a method that tells each airplane a velocity of which the direction is taken.
+//! Wishes by a method that gives each airplane a velocity, of which only the direction is used.
 
 use super::wishes::{by_turn, straight};
 use crate::baseline::{Moving, mvp, orca};
@@ -26,7 +26,8 @@ pub(super) fn by_velocity(world: &AirspaceWorld, group: &[Known]) -> Vec<Vec<Act
     all.iter().enumerate().map(toward).collect()
 }
 
-/// Turning towards a velocity, and the other actions by how little they differ from that.
+/// Returns the turn toward a velocity, and then the other actions by how little they differ from
+/// it.
 fn turning(world: &AirspaceWorld, known: Known, [vx, vy]: [f64; 2]) -> Vec<Action> {
     let (pose, dt_s) = (known.pose, world.timing.dt_s);
     let omega_max = world.airplanes[known.slot as usize].model.omega_max_rad_s;

@@ -1,18 +1,19 @@
-//! Wishes: actions of an airplane, those it would rather fly first, and the ways that these are.
+//! Wishes: the actions of an airplane in order of preference, and the ways that they lead.
 
 use crate::agents::Decided;
 use crate::flight::{Action, Known, Stage};
 use crate::shield::Way;
 use crate::world::AirspaceWorld;
 
-/// Straight to the way-point, and the other actions by how little they differ from that.
+/// Returns the action straight to the way-point, and then the others by how little they differ from
+/// it.
 pub(super) fn straight(world: &AirspaceWorld, known: Known) -> Vec<Action> {
     let Stage { model, mission, .. } = world.stage(known.slot, known.orders);
     let air = world.air();
     by_turn(world, known, air.steer(&air.pilot(model, mission), known.pose, known.next))
 }
 
-/// Proceeding, and the other actions by how little they differ from a turn rate.
+/// Returns proceeding, and then the other actions by how little they differ from a turn rate.
 pub(super) fn by_turn(world: &AirspaceWorld, known: Known, wanted_rad_s: f64) -> Vec<Action> {
     let mut others: Vec<Action> = world.actions_of(known.slot).to_vec();
     let turn = |action: &Action| match *action {
@@ -25,7 +26,7 @@ pub(super) fn by_turn(world: &AirspaceWorld, known: Known, wanted_rad_s: f64) ->
     others
 }
 
-/// The chosen action, and then the others, what is expected of them rising.
+/// Returns the chosen action, and then the others by rising expected cost.
 pub(super) fn by_cost(world: &AirspaceWorld, known: Known, decided: &Decided) -> Vec<Action> {
     let Decided { chosen, expected, .. } = decided;
     let mut order: Vec<usize> = (0..expected.len()).collect();
@@ -35,7 +36,7 @@ pub(super) fn by_cost(world: &AirspaceWorld, known: Known, decided: &Decided) ->
     order.iter().map(|&k| world.actions_of(known.slot)[k]).collect()
 }
 
-/// The different motions of the next `dt` among some actions, in their order.
+/// Returns the different motions of the next `dt` among some actions, in their order.
 pub(super) fn ways(world: &AirspaceWorld, known: Known, wishes: &[Action]) -> Vec<Way> {
     let mut ways: Vec<Way> = Vec::new();
     for &action in wishes {

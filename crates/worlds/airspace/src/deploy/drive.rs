@@ -1,8 +1,8 @@
 //! Agents of a group on a network in memory, which can lose, delay, double and reorder messages,
 //! and silence an airplane.
 //!
-//! Time on it goes by in ticks: a message takes one, or more when it is delayed. Every draw
-//! depends on who sends to whom in which tick, never on the order in which agents are looked at.
+//! Time on it passes in ticks: a message takes one, or more when it is delayed. Every draw depends
+//! on sender, receiver and tick, never on the order in which agents are visited.
 
 use crate::agents::network::{Network, Patience, Traffic};
 use crate::agents::{Agent, Ended, Endpoint, Radio};
@@ -13,22 +13,22 @@ use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{Cycle, EntityId};
 use std::sync::Arc;
 
-/// Agents wait for each other as long as it takes.
+/// Patience of agents that wait for each other as long as it takes.
 const FOR_EVER: Patience = Patience { ticks: u64::MAX, tries: 1 };
 
-/// Topics of a `dt`, one after the other: each has ticks of its own.
+/// The topics of a `dt`, one after the other: each has ticks of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Topic {
     /// The optimization.
     Optimization,
-    /// Whether that is safe.
+    /// The shield's exchange, which checks that the decisions are safe.
     Shield,
 }
 
 /// A network for one talk of a group.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Talk<'a> {
-    /// `None`: it loses nothing, and agents wait for each other as long as it takes.
+    /// Faults of the network; with `None` it loses nothing, and agents wait as long as it takes.
     pub(super) network: Option<&'a Network>,
     pub(super) streams: Streams,
     pub(super) topic: Topic,
@@ -43,7 +43,7 @@ impl<'a> Talk<'a> {
         Self { network, streams, topic, now, at_s: world.starts_s(now) }
     }
 
-    /// The tick in which the talk begins, and the one in which it ends at the latest.
+    /// Returns the tick in which the talk starts, and the one in which it ends at the latest.
     pub(super) fn ticks(&self) -> (u64, u64) {
         let Some(network) = self.network else { return (0, u64::MAX) };
         let long = network.deadline_ticks();
@@ -51,24 +51,24 @@ impl<'a> Talk<'a> {
         (talk * (long + 1), talk * (long + 1) + long)
     }
 
-    /// Whether an airplane's radio is dead meanwhile.
+    /// Returns whether an airplane's radio is dead during the talk.
     pub(super) fn is_silent(&self, id: EntityId) -> bool {
         self.network.is_some_and(|network| network.is_silent(id, self.at_s))
     }
 
-    /// Returns how agents are asked that do not answer; `None` where nothing is lost.
+    /// Returns how agents that do not answer are asked again; `None` where nothing is lost.
     pub(super) fn patience(&self) -> Option<Patience> {
         self.network.map(Network::patience)
     }
 
-    /// An empty network with the faults of the scenario.
+    /// Returns an empty network with the faults of the scenario.
     pub(super) fn transport(&self) -> MemoryTransport {
         let faults = self.network.map(Network::faults).unwrap_or_default();
         MemoryTransport::new(self.streams, purpose::NETWORK, faults)
     }
 }
 
-/// Lets agents talk until all are done or time is up; `ids[i]` is whose agent `agents[i]` is.
+/// Lets agents talk until all are done or time is up; `agents[i]` is the agent of `ids[i]`.
 pub(super) fn run<A: Agent>(
     talk: &Talk<'_>,
     ids: &Arc<[EntityId]>,
@@ -105,7 +105,7 @@ mod tests {
     use proptest::prelude::*;
     use sidestep_kernel::Seed;
 
-    /// Tells a number in each of some rounds, and adds up what all have told; who is given up
+    /// Sends a number in each of some rounds, and adds up the numbers of all; one that is given up
     /// counts 1000 from then on.
     struct Adder {
         me: usize,

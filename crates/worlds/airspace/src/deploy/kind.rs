@@ -1,4 +1,4 @@
-//! The deployments, as scenarios name them.
+//! The deployments, by their names in scenarios.
 
 use serde::{Deserialize, Serialize};
 use sidestep_collectives::{Estimator, Order, Settings, Utility};
@@ -10,7 +10,7 @@ pub enum Deployment {
     /// One process decides for all.
     #[default]
     Direct,
-    /// An agent per airplane, which sends what it may fly.
+    /// An agent per airplane, which sends its possible ways.
     Team,
     /// A coordinator that migrates.
     Pim,
@@ -21,7 +21,7 @@ pub enum Deployment {
 }
 
 impl Deployment {
-    /// Its name in files.
+    /// Returns its name in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Direct => "direct",
@@ -33,7 +33,7 @@ impl Deployment {
     }
 }
 
-/// Why a deployment cannot run with some settings.
+/// Returns the reason why a deployment cannot run with some settings, if there is one.
 pub(crate) fn refuses(deployment: Deployment, settings: &Settings) -> Option<&'static str> {
     let sampled = matches!(settings.estimator, Estimator::Sampled { .. });
     let as_in_the_paper = settings.order == Order::Parallel && settings.utility == Utility::Joint;

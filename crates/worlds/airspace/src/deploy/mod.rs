@@ -1,4 +1,4 @@
-//! Deployments of a group's optimizer: one and the same algorithm in several places.
+//! Deployments of a group's optimizer: the same algorithm run in several places.
 //!
 //! - `direct`: one process decides for all. The reference: on a faultless network every other
 //!   deployment chooses the same controls, bit for bit.
@@ -11,9 +11,9 @@
 //!   integrated mechanism) and reads an airplane's model only while it is there.
 //! - `hierarchical-pim`: a coordinator for each part of the group, and one above them.
 //!
-//! [`crate::agents`] are what runs aboard; a deployment builds those of a group and a network in
-//! memory for them, and drives them (`drive.rs`). What the shield needs to know goes over the same
-//! network (`shield.rs`).
+//! [`crate::agents`] are the programs aboard; a deployment builds those of a group and a network in
+//! memory for them, and drives them (`drive.rs`). The shield's data goes over the same network
+//! (`shield.rs`).
 
 mod drive;
 mod kind;
@@ -31,7 +31,7 @@ pub use optimization::{brief, own_ship};
 pub(crate) use shield::shielded;
 use sidestep_kernel::{Cycle, EntityId};
 
-/// Notes how a talk has ended for an airplane, and of whom nothing is heard any more.
+/// Notes how a talk has ended for an airplane, and which others it no longer hears.
 fn note_end<O>(
     world: &AirspaceWorld,
     now: Cycle,
@@ -87,7 +87,7 @@ mod tests {
         }
     }
 
-    /// Parts of the paper's figures 6 and 7, and what compact messages save.
+    /// Checks parts of the paper's figures 6 and 7, and the savings of compact messages.
     #[test]
     fn a_coordinator_sends_fewer_messages_than_a_team_and_more_bytes_than_one_that_multicasts() {
         let [team, compact, pim] =
@@ -109,8 +109,8 @@ mod tests {
         airspace_run(&Source::new("s", text, ""), 1).expect("a scenario")
     }
 
-    /// Whatever is lost, everybody ends in time, nobody comes too near, and all arrive but the
-    /// one that nobody hears, which waits on its orbit.
+    /// Whatever is lost, all agents end in time, no airplanes come too near, and all arrive except
+    /// the one that nobody hears, which waits on its orbit.
     #[test]
     fn on_a_network_that_loses_messages_and_an_airplane_the_shield_keeps_all_apart() {
         for deployment in ["team", "compact-team", "pim", "hierarchical-pim"] {
@@ -126,7 +126,7 @@ mod tests {
         }
     }
 
-    /// Also where most messages are lost, and where time is up before anything is agreed.
+    /// Also where most messages are lost, and where time is up before anything is agreed on.
     #[test]
     fn with_hardly_any_message_or_any_time_the_shield_keeps_all_apart() {
         let worse = [
@@ -142,7 +142,7 @@ mod tests {
         }
     }
 
-    /// Delays that leave time for few questions only: whoever is silent is given up soon enough.
+    /// Delays that leave time for few questions only: a silent airplane is given up soon enough.
     #[test]
     fn a_silent_airplane_stops_nobody_where_messages_are_slow() {
         for deployment in ["team", "pim"] {
@@ -168,8 +168,8 @@ mod tests {
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(12))]
-        /// Whoever falls silent wherever and whenever, met before or not, whoever comes in later:
-        /// all whose orbits were apart when they came in stay apart.
+        /// Whichever airplane falls silent, wherever and whenever, met before or not, and whichever
+        /// comes in later: all airplanes whose orbits were apart when they came in stay apart.
         #[test]
         fn nobody_comes_near_a_silent_airplane(
             seed in any::<u32>(), n in 3usize..9, loss in 0.0f64..0.6, deployment in 0usize..2,
@@ -198,7 +198,7 @@ mod tests {
         }
     }
 
-    /// Without the shield too nobody waits for ever; whoever is not heard flies on.
+    /// Without the shield, too, nobody waits for ever; an airplane that is not heard flies on.
     #[test]
     fn without_the_shield_a_silent_airplane_stops_nobody() {
         for deployment in ["team", "compact-team", "pim", "hierarchical-pim"] {

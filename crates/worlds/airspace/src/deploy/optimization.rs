@@ -13,7 +13,7 @@ use sidestep_collectives::Estimator;
 use sidestep_kernel::{Cycle, EntityId};
 use std::sync::Arc;
 
-/// Outcomes of the agents of a group, if any, and the count of messages.
+/// Decisions of the agents of a group, where there are any, and the traffic.
 pub(crate) type Deployed = (Vec<Option<Decided>>, Traffic);
 
 /// Lets the agents of a group decide, and notes in `contacts` what they hear of each other.
@@ -80,7 +80,7 @@ fn migrated(
     coordinator::run(Migration::new(&mut transport, own, &silent, journey), parts)
 }
 
-/// Returns what all agents of a group know alike before they talk.
+/// Returns the knowledge that all agents of a group share before they talk.
 pub fn brief(world: &AirspaceWorld, now: Cycle, group: &[Known]) -> Arc<Briefing> {
     let filed = |known: &Known| Filed {
         model: world.stage(known.slot, known.orders).model.clone(),
@@ -99,8 +99,8 @@ pub fn brief(world: &AirspaceWorld, now: Cycle, group: &[Known]) -> Arc<Briefing
     })
 }
 
-/// Returns what the agent at place `me` of a group knows of its own airplane; `contacts` are what
-/// it has heard of others before.
+/// Returns the knowledge of the agent at place `me` of a group about its own airplane; `contacts`
+/// hold what it has heard of others before.
 pub fn own_ship(
     world: &AirspaceWorld,
     briefing: &Arc<Briefing>,
@@ -120,7 +120,7 @@ pub fn own_ship(
     }
 }
 
-/// Message in which an airplane tells of itself.
+/// Returns the message in which an airplane describes itself.
 fn beacon(world: &AirspaceWorld, known: Known) -> Beacon {
     let stage = world.stage(known.slot, known.orders);
     Beacon {
@@ -133,7 +133,7 @@ fn beacon(world: &AirspaceWorld, known: Known) -> Beacon {
     }
 }
 
-/// Knowledge that all have of a flight before they have heard of it: as it was filed.
+/// Returns the knowledge that all have of a flight before they have heard it: its filed plan.
 fn filed(world: &AirspaceWorld, id: EntityId) -> Contact {
     let i = id as usize;
     let heard_in = world.appears_in(i);

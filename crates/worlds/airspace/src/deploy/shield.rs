@@ -12,8 +12,8 @@ use crate::world::AirspaceWorld;
 use sidestep_kernel::{Cycle, EntityId};
 use std::sync::Arc;
 
-/// Filters what the airplanes of a group would fly. Returns what is decided for each, and what
-/// went over the network; `contacts` take what they have heard of each other.
+/// Filters the wishes of the airplanes of a group. Returns the decision for each, and the traffic
+/// on the network; `contacts` receive what they have heard of each other.
 pub(crate) fn shielded(
     world: &AirspaceWorld,
     now: Cycle,
@@ -37,14 +37,14 @@ pub(crate) fn shielded(
     let mut decisions = Vec::with_capacity(ids.len());
     for (me, end) in ended.into_iter().enumerate() {
         note_end(world, now, &end, (me, &ids), &contacts[me], events);
-        // An airplane whose radio is dead stays on its fallback, whatever it would like.
+        // An airplane whose radio is dead stays on its fallback, whatever its wish.
         let agreed = end.outcome.filter(|_| !talk.is_silent(ids[me]));
         if agreed.as_ref().is_some_and(|agreed| agreed.held_back) {
             events.push(Event::of(now, EventKind::HeldBack, ids[me]));
         }
         let fallback = Decision { candidate: None, fallback: scene.seen[me].flyer.fallback };
         let decided = |agreed: Agreed| (agreed.decision, agreed.contacts);
-        // Without an agreement it knows of nobody any more where they are.
+        // Without an agreement it no longer knows where any other airplane is.
         let (decision, known) = agreed.map_or((fallback, Contacts::new()), decided);
         contacts[me] = known;
         decisions.push(decision);
@@ -57,7 +57,7 @@ fn scene(world: &AirspaceWorld, now: Cycle, network: &Network, seen: Vec<Seen>) 
     Scene { air: world.air(), vertical_m: world.vertical_m, now, silent_after, seen }
 }
 
-/// Returns the messages that the proposals alone take on a network that loses nothing.
+/// Returns the traffic that the proposals alone take on a network that loses nothing.
 fn proposals(deployment: Deployment, flyers: &[Flyer], candidates: &[Vec<Way>]) -> Traffic {
     let mut traffic = Traffic::default();
     if deployment == Deployment::Direct || flyers.len() < 2 {

@@ -1,4 +1,4 @@
-//! Actions: what an airplane may do in the next time, as the optimizer knows it.
+//! Actions: the possible motions of an airplane in the near future, as the optimizer knows them.
 
 use super::motion::Model;
 use serde::{Deserialize, Serialize};
@@ -6,37 +6,37 @@ use serde::{Deserialize, Serialize};
 /// An action: a turn rate, held for some time, and then proceeding to the way-point.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Action {
-    /// The turn rate, for the whole horizon (the paper's g = 0).
+    /// The turn rate, held for the whole horizon (the paper's g = 0).
     Hold {
-        /// Turn rate.
+        /// Turn rate in radians per second, positive to the left.
         omega_rad_s: f64,
     },
-    /// The turn rate for `hold_s` (the paper's g = 1 has dt) and then proceed.
+    /// The turn rate for `hold_s` (dt in the paper, g = 1), and then proceeding.
     Then {
-        /// Turn rate.
+        /// Turn rate in radians per second, positive to the left.
         omega_rad_s: f64,
-        /// Time for which it is held.
+        /// Time in seconds for which it is held.
         hold_s: f64,
     },
-    /// The turn rate, then straight on, and then proceed: a leg to one side.
+    /// The turn rate, then straight on, and then proceeding: a leg to one side.
     Leg {
-        /// Turn rate.
+        /// Turn rate in radians per second, positive to the left.
         omega_rad_s: f64,
-        /// Time for which it is turned.
+        /// Time in seconds for which it turns.
         turn_s: f64,
-        /// End of the leg, from the start of the turn.
+        /// End of the leg, in seconds from the start of the turn.
         until_s: f64,
     },
-    /// Proceed from the start: the optimal action.
+    /// Proceeding from the start: the optimal action.
     Proceed,
 }
 
 impl Action {
-    /// The turn rate that the action asks for after `flown_s` seconds of it, if it does not
-    /// proceed to the way-point by then.
+    /// Returns the turn rate of the action after `flown_s` seconds of it, unless it proceeds to the
+    /// way-point by then.
     #[inline]
     pub fn held_rad_s(self, flown_s: f64) -> Option<f64> {
-        // Rounding of step times must not decide.
+        // A tolerance, because rounding of step times must not decide.
         let before = |end_s: f64| flown_s < end_s - 1e-9;
         match self {
             Self::Hold { omega_rad_s } => Some(omega_rad_s),
@@ -52,25 +52,26 @@ impl Action {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Legs {
-    /// Times that the turns may last.
+    /// Times in seconds that the turns may last.
     pub turns_s: Vec<f64>,
-    /// Ends of the legs, from the start of the turn.
+    /// Ends of the legs, in seconds from the start of the turn.
     pub until_s: Vec<f64>,
 }
 
 impl Legs {
-    /// Those of the default preset: heading changes of 10 to 60 degrees at the paper's turn
-    /// rates, held for as long as most conflicts take to pass.
+    /// Returns the legs of the default preset: heading changes of 10 to 60 degrees at the paper's
+    /// turn rates, held for as long as most conflicts take to pass.
     pub fn usual() -> Self {
         Self { turns_s: vec![5.0, 10.0, 15.0], until_s: vec![60.0] }
     }
 
-    /// Whether there are none.
+    /// Returns whether there are no legs.
     pub fn is_empty(&self) -> bool {
         self.turns_s.is_empty() || self.until_s.is_empty()
     }
 
-    /// Those that begin at a turn rate; straight on, how long one turns makes no difference.
+    /// Returns the legs that start with a turn rate. For straight on there is one turning time
+    /// only, because all of them lead the same way.
     fn of(&self, omega_rad_s: f64) -> Vec<Action> {
         let straight = |&hold_s: &f64| Action::Then { omega_rad_s: 0.0, hold_s };
         if omega_rad_s == 0.0 {
@@ -84,14 +85,14 @@ impl Legs {
     }
 }
 
-/// The action set of a model, ordered by turn rate, the optimal one last. Without legs it is the
-/// paper's: `2 m + 1` actions, every rate held for ever and for `dt_s`. With legs, which never
-/// begin a turn only to undo it, these take the place of the held turns; straight on for ever
-/// remains. `holds_s` are further times for which turns are held.
+/// Returns the action set of a model, ordered by turn rate, the optimal action last. Without legs
+/// it is the paper's: `2 m + 1` actions, every rate held for ever and for `dt_s`. With legs, which
+/// never start a turn only to undo it, these take the place of the held turns; straight on for ever
+/// remains. `holds_s` are further times in seconds for which turns are held.
 pub fn actions(model: &Model, dt_s: f64, holds_s: &[f64], legs: &Legs) -> Vec<Action> {
     let m = model.turns;
     let rate = |k: usize| match 2.0 * k as f64 / (m - 1) as f64 - 1.0 {
-        // The middle one is exactly straight.
+        // The middle rate is exactly 0, free of rounding.
         _ if 2 * k + 1 == m => 0.0,
         part => part * model.omega_max_rad_s,
     };

@@ -1,21 +1,21 @@
-//! The air that all fly through: how time is cut, when way-points count as reached, and the wind.
+//! The air that all fly through: the steps of time, the rule for way-points, and the wind.
 //!
-//! In a wind, predictions are made in the moving air, towards way-points that drift; what is flown
-//! is flown over the ground.
+//! In a wind, predictions are made in the moving air, toward way-points that drift; the real flight
+//! is over the ground.
 
 use super::action::Action;
 use super::motion::{Model, Point, Pose, Timing, distance_m};
 use super::pilot::{After, Passing, Pilot, Prediction};
 use sidestep_kernel::math;
 
-/// The air: all that is the same for every airplane.
+/// The air: everything that is the same for all airplanes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Air {
-    /// Steps of time.
+    /// The steps of time.
     pub timing: Timing,
     /// Rule by which way-points count as reached.
     pub passing: Passing,
-    /// A wind that all know.
+    /// The wind, which everybody knows, in meters per second.
     pub wind_m_s: Point,
 }
 
@@ -35,15 +35,15 @@ impl Air {
         self.wind_m_s == [0.0, 0.0]
     }
 
-    /// Returns the turn rate that leads to way-point `next` on the ground, wind allowed for.
+    /// Returns the turn rate that leads to way-point `next` on the ground, corrected for the wind.
     pub fn steer(&self, pilot: &Pilot<'_>, pose: Pose, next: usize) -> f64 {
         let Some(&goal) = pilot.mission.get(next) else { return 0.0 };
         let omega_max = pilot.model.omega_max_rad_s;
         pose.steer(self.aim(pose.at, goal, pilot.model.v_m_s), omega_max, pilot.dtau_s)
     }
 
-    /// Returns where to head from `at` to come to `goal` on the ground: against the wind by the
-    /// angle at which the airspeed cancels the wind's part across the way.
+    /// Returns the point to head for from `at` in order to reach `goal` on the ground: turned into
+    /// the wind by the angle at which the airspeed cancels the wind's part across the way.
     pub fn aim(&self, at: Point, goal: Point, v_m_s: f64) -> Point {
         if self.is_still() {
             return goal;
@@ -81,8 +81,8 @@ impl Air {
         actions.iter().map(|action| pilot.predict(*action, pose, next, &self.timing)).collect()
     }
 
-    /// The mission as seen from the moving air: each way-point where it will be when the
-    /// airplane comes to it.
+    /// Returns the mission as seen from the moving air: each way-point at its place when the
+    /// airplane reaches it.
     fn drifted(&self, mission: &[Point], (mut at, next): (Point, usize), v_m_s: f64) -> Vec<Point> {
         let mut drifted = mission.to_vec();
         if self.is_still() {

@@ -1,11 +1,11 @@
-//! Airplanes as a scenario has them, and as their group knows them.
+//! Airplanes as a scenario gives them, and as their group knows them.
 
 use super::motion::{Model, Point, Pose};
 use super::order::{FlightOrder, Task};
 use super::track::Track;
 use sidestep_kernel::Slot;
 
-/// One airplane as it begins.
+/// One airplane at its start.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Airplane {
     /// Its abilities.
@@ -14,20 +14,20 @@ pub struct Airplane {
     pub start: Pose,
     /// Way-points that it is to reach.
     pub mission: Vec<Point>,
-    /// The level with which the method takes it over.
+    /// Altitude in meters of the level on which the method takes it over.
     pub altitude_m: f64,
-    /// Time of its appearance, seconds after the start.
+    /// Time of its appearance, in seconds after the start of the run.
     pub appears_s: f64,
-    /// Time at which it vanishes, seconds after the start; infinite for never.
+    /// Time at which it vanishes, in seconds after the start of the run; infinite for never.
     pub leaves_s: f64,
     /// Orders on its way, by rising time.
     pub orders: Vec<FlightOrder>,
-    /// The way that it is recorded to have flown, and follows until it is handed over.
+    /// Its recorded way, which it follows until the method takes it over.
     pub track: Option<Track>,
 }
 
 impl Airplane {
-    /// Whether its last order about where to fly leads to no way-point.
+    /// Returns whether its last order about where to fly leads to no way-point.
     pub(crate) fn keeps_a_heading(&self) -> bool {
         let is_about_the_way = |order: &&FlightOrder| {
             matches!(order.task, Task::Heading(_) | Task::Proceed | Task::WayPoints(_))
@@ -36,7 +36,7 @@ impl Airplane {
         last.is_some_and(|order| matches!(order.task, Task::Heading(_)))
     }
 
-    /// The order after the first `done` ones, if its time has come.
+    /// Returns the order after the first `done` ones, if its time has come.
     pub(crate) fn due(&self, done: usize, now_s: f64) -> Option<&FlightOrder> {
         self.orders.get(done).filter(|order| order.at_s <= now_s)
     }
@@ -45,14 +45,14 @@ impl Airplane {
 /// An airplane of a group, as the group knows it.
 #[derive(Debug, Clone, Copy)]
 pub struct Known {
-    /// Which airplane.
+    /// Slot of the airplane.
     pub slot: Slot,
     /// Its assumed pose.
     pub pose: Pose,
-    /// Way-points done with.
+    /// Number of way-points done with.
     pub next: usize,
-    /// Orders carried out.
+    /// Number of orders carried out.
     pub orders: u32,
-    /// Altitude.
+    /// Altitude in meters.
     pub altitude_m: f64,
 }

@@ -1,13 +1,13 @@
-//! Levels: what part of the height an airplane takes.
+//! Levels: the part of the height that an airplane occupies.
 
 use serde::{Deserialize, Serialize};
 
 /// The levels that an airplane is on or passes while it changes its level.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Levels {
-    /// The lowest, meters.
+    /// Altitude of the lowest, in meters.
     pub low_m: f64,
-    /// The highest, meters.
+    /// Altitude of the highest, in meters.
     pub high_m: f64,
 }
 
@@ -15,23 +15,24 @@ impl Levels {
     /// Every level.
     pub const ALL: Self = Self { low_m: f64::NEG_INFINITY, high_m: f64::INFINITY };
 
-    /// One level.
+    /// Returns one level.
     pub fn at(altitude_m: f64) -> Self {
         Self { low_m: altitude_m, high_m: altitude_m }
     }
 
-    /// Two levels and all between.
+    /// Returns two levels and all between.
     pub fn between(a_m: f64, b_m: f64) -> Self {
         Self { low_m: a_m.min(b_m), high_m: a_m.max(b_m) }
     }
 
-    /// These levels, another, and all between.
+    /// Returns these levels, another, and all between.
     #[must_use]
     pub fn with(self, altitude_m: f64) -> Self {
         Self { low_m: self.low_m.min(altitude_m), high_m: self.high_m.max(altitude_m) }
     }
 
-    /// Whether some level of one is nearer than `vertical_m` to some level of the other.
+    /// Returns whether some level of one is less than `vertical_m` meters from some level of the
+    /// other.
     pub fn meets(&self, other: &Self, vertical_m: f64) -> bool {
         self.low_m - other.high_m < vertical_m && other.low_m - self.high_m < vertical_m
     }

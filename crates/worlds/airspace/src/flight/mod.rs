@@ -2,8 +2,8 @@
 //!
 //! ```text
 //! motion.rs                          a pose, and one step of it
-//! action.rs  pilot.rs  air.rs        what may be done, where it leads, in which wind
-//! airplane.rs  order.rs  stage.rs    one airplane, what it is told, what it flies in between
+//! action.rs  pilot.rs  air.rs        possible actions, where they lead, in which wind
+//! airplane.rs  order.rs  stage.rs    one airplane, its orders, and the flight between them
 //! track.rs  levels.rs                recorded ways, and heights
 //! ```
 

@@ -1,4 +1,4 @@
-//! Motion: where an airplane is, how it turns, and how fast.
+//! Motion: place, heading and speed of an airplane.
 //!
 //! Plane meters, x east and y north; headings in radians, counter-clockwise from east; a
 //! positive turn rate turns left. Source: section 3 of the paper; the step is exact.
@@ -9,7 +9,7 @@ use sidestep_kernel::math;
 /// A point of the plane, meters.
 pub type Point = [f64; 2];
 
-/// Distance of two points in meters.
+/// Returns the distance of two points in meters.
 #[inline]
 pub fn distance_m(a: Point, b: Point) -> f64 {
     math::hypot(a[0] - b[0], a[1] - b[1])
@@ -18,18 +18,18 @@ pub fn distance_m(a: Point, b: Point) -> f64 {
 /// Abilities and separation of an airplane.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Model {
-    /// Airspeed, constant.
+    /// Airspeed in meters per second, constant.
     pub v_m_s: f64,
-    /// Largest rate of turn.
+    /// Largest rate of turn in radians per second.
     pub omega_max_rad_s: f64,
-    /// Nobody else should come nearer than this.
+    /// Distance in meters within which no other airplane should come.
     pub separation_m: f64,
     /// Number of evenly spaced turn rates, odd and at least 3.
     pub turns: usize,
 }
 
 impl Model {
-    /// Radius of the tightest turn.
+    /// Returns the radius of the tightest turn in meters.
     pub fn turn_radius_m(&self) -> f64 {
         self.v_m_s / self.omega_max_rad_s
     }
@@ -38,16 +38,16 @@ impl Model {
 /// Place and heading of an airplane.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Pose {
-    /// Position.
+    /// Position in meters, x east and y north.
     pub at: Point,
-    /// Heading.
+    /// Heading in radians, counter-clockwise from east.
     #[serde(rename = "psi_rad")]
     pub heading_rad: f64,
 }
 
 impl Pose {
-    /// The pose after `dtau_s` seconds at the turn rate `omega_rad_s`: exactly, in chord form,
-    /// which stays exact as the turn rate goes to 0.
+    /// Returns the pose after `dtau_s` seconds at the turn rate `omega_rad_s`: exactly, in chord
+    /// form, because that form stays exact as the turn rate goes to 0.
     #[inline]
     pub fn step(self, v_m_s: f64, omega_rad_s: f64, dtau_s: f64) -> Self {
         let half = 0.5 * omega_rad_s * dtau_s;
@@ -59,7 +59,7 @@ impl Pose {
         }
     }
 
-    /// The turn rate that would head for `goal` after `dtau_s`, within the limits.
+    /// Returns the turn rate that would head for `goal` after `dtau_s` seconds, within the limits.
     #[inline]
     pub fn steer(self, goal: Point, omega_max_rad_s: f64, dtau_s: f64) -> f64 {
         let bearing = math::atan2(goal[1] - self.at[1], goal[0] - self.at[0]);
@@ -68,25 +68,25 @@ impl Pose {
     }
 }
 
-/// sin(a) / a.
+/// Returns sin(a) / a.
 #[inline]
 pub(super) fn sinc(a: f64) -> f64 {
     if a.abs() < 1e-4 { 1.0 - a * a / 6.0 } else { math::sin(a) / a }
 }
 
-/// Steps of time.
+/// The steps of time.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Timing {
-    /// Time between two optimizations.
+    /// Seconds between two optimizations.
     pub dt_s: f64,
-    /// Time between two points of a prediction; divides `dt_s`.
+    /// Seconds between two points of a prediction; divides `dt_s`.
     pub dtau_s: f64,
-    /// Points of a prediction.
+    /// Number of points of a prediction.
     pub horizon: usize,
 }
 
 impl Timing {
-    /// Points of a prediction within one `dt_s`.
+    /// Returns the number of points of a prediction within one `dt_s`.
     pub fn points_per_dt(&self) -> usize {
         (self.dt_s / self.dtau_s).round() as usize
     }

@@ -1,18 +1,18 @@
-//! Orders: what airplanes are told on their way.
+//! Orders that airplanes are given on their way.
 //!
-//! An order to head somewhere or to follow way-points changes only what an airplane wants, so
-//! it is carried out at once. A new speed changes the orbit that it has stored as its fallback,
-//! and a new level those whom it has to mind: with the shield, such an order has to wait until it
-//! is safe.
+//! An order to keep a heading or to follow way-points changes only an airplane's wishes, so it is
+//! carried out at once. A new speed changes the orbit that it has stored as its fallback, and a new
+//! level the set of airplanes that it has to mind: with the shield, such an order has to wait until
+//! it is safe.
 
 use super::motion::Point;
 
-/// Most orders for one airplane.
+/// Largest number of orders for one airplane.
 pub const MAX_ORDERS: usize = 10_000;
 /// An order and its time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FlightOrder {
-    /// Time at which it is given, seconds after the start.
+    /// Time at which it is given, in seconds after the start of the run.
     pub at_s: f64,
     /// The task.
     pub task: Task,
@@ -27,9 +27,9 @@ pub enum Task {
     Speed(f64),
     /// Change to another level.
     Altitude {
-        /// The new level.
+        /// Altitude of the new level, in meters.
         altitude_m: f64,
-        /// Rate of climb or descent.
+        /// Rate of climb or descent, in meters per second.
         climb_m_s: f64,
     },
     /// Go on to the next way-point.

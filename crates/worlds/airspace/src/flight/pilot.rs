@@ -1,39 +1,39 @@
-//! Predictions: a pilot flies actions and missions step by step, and says where that leads.
+//! Predictions: a pilot flies actions and missions step by step, and returns the way.
 
 use super::action::Action;
 use super::motion::{Model, Point, Pose, Timing, sinc};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::math;
 
-/// Flight after the last way-point, in predictions.
+/// The flight after the last way-point, in predictions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum After {
     /// Flies straight on.
     #[default]
     Straight,
-    /// Goes on steering for the last way-point.
+    /// Continues to steer for the last way-point.
     Pursue,
 }
 
-/// Rule by which an airplane has done with a way-point.
+/// The rule by which an airplane is done with a way-point.
 ///
 /// It is reached within a tolerance. But an airplane whose way-point lies inside one of its two
-/// tightest turning circles would orbit it for ever: steering for it keeps the airplane on that
-/// circle. Such a way-point counts as *passed* when it is abeam on the near side: within one turn
-/// round the circle that is so, and there the airplane is as near as it comes without flying away
-/// first.
+/// tightest turning circles would orbit it for ever, because steering for it keeps the airplane on
+/// that circle. Such a way-point counts as *passed* when it is abeam on the near side. That happens
+/// within one turn round the circle, and there the airplane is as near as it can be without flying
+/// away first.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Passing {
-    /// A way-point nearer than this is reached.
+    /// Distance in meters below which a way-point is reached.
     pub tolerance_m: f64,
     /// Whether a way-point inside a turning circle can be passed.
     pub passes: bool,
 }
 
 impl Passing {
-    /// Whether an airplane at `pose` has done with the way-point `goal`; its tightest turn has
-    /// this radius, and it flies `step_m` from one look to the next.
+    /// Returns whether an airplane at `pose` is done with the way-point `goal`; its tightest turn
+    /// has this radius, and it flies `step_m` meters from one look to the next.
     #[inline]
     pub fn is_done(&self, pose: Pose, goal: Point, radius_m: f64, step_m: f64) -> bool {
         let (dx, dy) = (goal[0] - pose.at[0], goal[1] - pose.at[1]);
@@ -58,20 +58,20 @@ impl Passing {
 /// The way that an action leads.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Prediction {
-    /// Positions after 1, 2, ... steps of `dtau`.
+    /// Positions in meters after 1, 2, ... steps of `dtau`.
     pub points: Vec<Point>,
-    /// How many points count against others: those up to arrival at the last way-point.
+    /// Number of points that count against others: those up to arrival at the last way-point.
     pub counted: usize,
 }
 
-/// An airplane on a predicted way: a pose, and what saves computing its sine and cosine anew in
-/// every step. Equal to [`Pose::step`] but for rounding (a test holds them together).
+/// An airplane on a predicted way: a pose, and values that save computing its sine and cosine anew
+/// in every step. Equal to [`Pose::step`] but for rounding (a test compares them).
 #[derive(Debug, Clone, Copy)]
 struct Flight {
     pose: Pose,
     /// Cosine and sine of the heading.
     along: Point,
-    /// The turn rate of the last step and, for half of its turn, cosine, sine and sinc.
+    /// The turn rate of the last step; beside it, for half of its turn, cosine, sine and sinc.
     omega_rad_s: f64,
     half_turn: [f64; 3],
 }
@@ -82,7 +82,8 @@ impl Flight {
         Self { pose, along, omega_rad_s: 0.0, half_turn: [1.0, 0.0, 1.0] }
     }
 
-    /// Whether the goal lies dead ahead, so that steering for it changes nothing any more.
+    /// Returns whether the goal lies dead ahead, so that steering for it no longer changes
+    /// anything.
     #[inline]
     fn heads_for(&self, goal: Point) -> bool {
         let [dx, dy] = [goal[0] - self.pose.at[0], goal[1] - self.pose.at[1]];
@@ -113,23 +114,23 @@ impl Flight {
     }
 }
 
-/// Flies step by step: an action, the way-points, what comes after the last.
+/// Flies step by step: an action, the way-points, and the flight after the last.
 #[derive(Debug, Clone, Copy)]
 pub struct Pilot<'a> {
     /// The airplane's model.
     pub model: &'a Model,
-    /// Its way-points.
+    /// Way-points of the airplane.
     pub mission: &'a [Point],
     /// Rule by which way-points count as reached.
     pub passing: Passing,
-    /// Flight after the last.
+    /// The flight after the last way-point.
     pub after: After,
     /// Seconds per step.
     pub dtau_s: f64,
 }
 
 impl Pilot<'_> {
-    /// The turn rate of an action in the step that begins after `flown_s` seconds of it.
+    /// Returns the turn rate of an action in the step that starts after `flown_s` seconds of it.
     #[inline]
     pub fn omega_rad_s(&self, action: Action, pose: Pose, next: usize, flown_s: f64) -> f64 {
         match action.held_rad_s(flown_s) {
@@ -145,7 +146,7 @@ impl Pilot<'_> {
         }
     }
 
-    /// The way-point after those that are done with at `pose`.
+    /// Returns the way-point after those that are done with at `pose`.
     #[inline]
     pub fn next(&self, pose: Pose, mut next: usize) -> usize {
         let (radius_m, step_m) = (self.model.turn_radius_m(), self.model.v_m_s * self.dtau_s);
@@ -166,8 +167,8 @@ impl Pilot<'_> {
             let flown_s = k as f64 * self.dtau_s;
             let goal = self.mission.get(next).filter(|_| action.held_rad_s(flown_s).is_none());
             if self.after == After::Pursue {
-                // One that comes back to its last way-point turns to the side that rounding
-                // says, so it must be the rounding of the motion itself.
+                // An airplane that returns to its last way-point turns to the side that rounding
+                // decides, so the rounding must be that of the motion itself.
                 let omega = self.omega_rad_s(action, flight.pose, next, flown_s);
                 flight.pose = flight.pose.step(self.model.v_m_s, omega, self.dtau_s);
             } else if goal.is_some_and(|&g| flight.heads_for(g)) {
@@ -211,7 +212,7 @@ mod tests {
             prop_assert!((once.heading_rad - twice.heading_rad).abs() < 1e-12);
         }
 
-        /// The prediction is the motion, step by step.
+        /// A prediction equals the motion, step by step.
         #[test]
         fn a_predicted_way_is_the_one_that_is_flown(
             heading_rad in -3.2f64..3.2, x in -6000.0f64..6000.0, y in -6000.0f64..6000.0, which in 0usize..36,
@@ -240,7 +241,7 @@ mod tests {
             }
         }
 
-        /// Wherever a way-point lies, an airplane that proceeds has done with it before long.
+        /// Wherever a way-point lies, an airplane that proceeds is done with it before long.
         #[test]
         fn nobody_orbits_a_way_point_for_ever(
             heading_rad in -3.2f64..3.2, x in -3000.0f64..3000.0, y in -3000.0f64..3000.0,
@@ -259,7 +260,7 @@ mod tests {
             let timing = Timing { dt_s: 5.0, dtau_s: 1.0, horizon: 400 };
             let flown = pilot.predict(Action::Proceed, pose, 0, &timing);
             prop_assert!(flown.counted < 400, "still flying to {mission:?}");
-            // It ends within the tolerance, or where it was about as near as it came at all.
+            // It ends within the tolerance, or where it was about as near as it ever was.
             let apart_m = |k: usize| distance_m(flown.points[k], mission[0]);
             let last = flown.counted - 1;
             let nearest_m = (0..=last).map(apart_m).fold(f64::INFINITY, f64::min);

@@ -1,12 +1,12 @@
-//! Stages of a flight: what an airplane flies between two of its orders.
+//! Stages of a flight: the flight between two orders.
 
 use super::airplane::Airplane;
 use super::motion::{Model, Point};
 use super::order::Task;
 use sidestep_kernel::math;
 
-/// Where an airplane that keeps a heading steers for: so far ahead that the bearing is the
-/// heading wherever it is.
+/// Distance of the point for which an airplane that keeps a heading steers: so far ahead that the
+/// bearing equals the heading wherever the airplane is.
 const FAR_AHEAD_M: f64 = 1e12;
 
 /// The part of a flight between two orders.
@@ -14,9 +14,9 @@ const FAR_AHEAD_M: f64 = 1e12;
 pub(crate) struct Stage<'a> {
     pub(crate) model: &'a Model,
     pub(crate) mission: &'a [Point],
-    /// The level it keeps or changes to,
+    /// Altitude in meters of the level that it keeps or changes to.
     pub(crate) altitude_m: f64,
-    /// and how fast.
+    /// Rate of that change, in meters per second.
     pub(crate) climb_m_s: f64,
 }
 
@@ -27,7 +27,7 @@ pub(crate) struct Later {
     mission: Vec<Point>,
     altitude_m: f64,
     climb_m_s: f64,
-    /// Way-points done with when this begins, if not as many as before.
+    /// Number of way-points done with when it starts, if not as many as before.
     pub(crate) next: Option<u32>,
 }
 
@@ -55,7 +55,7 @@ pub(crate) fn later(airplane: &Airplane) -> Vec<Later> {
             Task::Heading(heading_rad) => {
                 let ahead =
                     [FAR_AHEAD_M * math::cos(*heading_rad), FAR_AHEAD_M * math::sin(*heading_rad)];
-                // As many as on the route, so that the number of those done with still holds.
+                // As many as on the route, so that the number of those done with stays valid.
                 now.mission = vec![ahead; route.len()];
             }
             Task::Speed(v_m_s) => now.model.v_m_s = *v_m_s,

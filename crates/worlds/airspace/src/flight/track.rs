@@ -1,19 +1,19 @@
-//! Recorded ways: where an airplane was at any time, and what of its way is left.
+//! Recorded ways: the place of an airplane at any time, and the rest of its way.
 
 use super::motion::{Point, Pose, distance_m};
 use sidestep_kernel::math;
 
-/// Way-points along the rest of a track are this far apart in time.
+/// Seconds between two way-points along the rest of a track.
 const WAY_POINT_EVERY_S: f64 = 120.0;
 
 /// Place of an airplane at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrackPoint {
-    /// Seconds after the start of the scenario.
+    /// Time in seconds after the start of the scenario.
     pub t_s: f64,
-    /// Position.
+    /// Position in meters, x east and y north.
     pub at: Point,
-    /// Altitude.
+    /// Altitude in meters.
     pub altitude_m: f64,
 }
 
@@ -26,7 +26,8 @@ pub struct Track {
 }
 
 impl Track {
-    /// A track of at least two points with finite numbers and rising times; `None` otherwise.
+    /// Returns a track of at least two points with finite numbers and rising times; `None`
+    /// otherwise.
     pub fn new(points: Vec<TrackPoint>) -> Option<Self> {
         let finite =
             |p: &TrackPoint| [p.t_s, p.at[0], p.at[1], p.altitude_m].iter().all(|v| v.abs() <= 1e9);
@@ -35,22 +36,22 @@ impl Track {
         is_track.then(|| Self { headings_rad: headings_rad(&points), points })
     }
 
-    /// Its beginning, seconds after the start.
+    /// Returns the time of its first point, in seconds after the start.
     pub fn begins_s(&self) -> f64 {
         self.points[0].t_s
     }
 
-    /// Its end, seconds after the start.
+    /// Returns the time of its last point, in seconds after the start.
     pub fn ends_s(&self) -> f64 {
         self.points[self.points.len() - 1].t_s
     }
 
-    /// Whether the airplane was there at a time.
+    /// Returns whether the airplane was there at a time.
     pub fn covers(&self, t_s: f64) -> bool {
         (self.begins_s()..=self.ends_s()).contains(&t_s)
     }
 
-    /// Returns its pose; before the beginning and after the end as there.
+    /// Returns its pose at a time; before the first point and after the last one, the pose there.
     pub fn pose_at(&self, t_s: f64) -> Pose {
         let (k, part) = self.between(t_s);
         let ([x0, y0], [x1, y1]) = (self.points[k].at, self.points[k + 1].at);
@@ -58,14 +59,14 @@ impl Track {
         Pose { at, heading_rad: self.headings_rad[k] }
     }
 
-    /// Returns its altitude.
+    /// Returns its altitude in meters.
     pub fn altitude_at_m(&self, t_s: f64) -> f64 {
         let (k, part) = self.between(t_s);
         let (from_m, to_m) = (self.points[k].altitude_m, self.points[k + 1].altitude_m);
         from_m + part * (to_m - from_m)
     }
 
-    /// The last point before a time that has a next one, and the part of the way to that.
+    /// Returns the last point before a time that has a next one, and the part of the way to that.
     fn between(&self, t_s: f64) -> (usize, f64) {
         let after = self.points.partition_point(|p| p.t_s <= t_s);
         let k = after.clamp(1, self.points.len() - 1) - 1;
@@ -73,7 +74,7 @@ impl Track {
         (k, ((t_s - from_s) / (to_s - from_s)).clamp(0.0, 1.0))
     }
 
-    /// Way-points for whoever flies on from where it was at a time: one every two minutes, and
+    /// Returns the way-points for flying on from its place at a time: one every two minutes, and
     /// the last point.
     pub fn rest(&self, from_s: f64) -> Vec<Point> {
         let mut due_s = from_s + WAY_POINT_EVERY_S;
@@ -87,7 +88,8 @@ impl Track {
         way_points
     }
 
-    /// Mean speed over the ground from a time to the end; over the whole track after that.
+    /// Returns the mean speed over the ground from a time to the end; over the whole track after
+    /// that.
     pub fn mean_speed_m_s(&self, from_s: f64) -> f64 {
         let from_s =
             if from_s < self.ends_s() { from_s.max(self.begins_s()) } else { self.begins_s() };
@@ -100,7 +102,7 @@ impl Track {
         length_m / (self.ends_s() - from_s)
     }
 
-    /// The greatest speed over the ground.
+    /// Returns the greatest speed over the ground, in meters per second.
     pub fn top_speed_m_s(&self) -> f64 {
         let speed =
             |pair: &[TrackPoint]| distance_m(pair[0].at, pair[1].at) / (pair[1].t_s - pair[0].t_s);
@@ -108,7 +110,8 @@ impl Track {
     }
 }
 
-/// An airplane that is recorded at one place twice keeps the heading in which it goes on.
+/// Returns the headings. An airplane that is recorded at one place twice keeps the heading in which
+/// it flies on.
 fn headings_rad(points: &[TrackPoint]) -> Vec<f64> {
     let bearing = |pair: &[TrackPoint]| {
         let (dx, dy) = (pair[1].at[0] - pair[0].at[0], pair[1].at[1] - pair[0].at[1]);

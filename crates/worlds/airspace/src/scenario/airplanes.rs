@@ -1,4 +1,4 @@
-//! Airplanes: their model, made-up traffic, flight plans and recorded tracks.
+//! Airplanes: their model, generated traffic, flight plans and recorded tracks.
 
 use super::compile::Compiler;
 use super::values::{Measure, TurnRate, Turns};
@@ -33,7 +33,7 @@ pub(super) struct ModelSection {
 }
 
 impl ModelSection {
-    /// Values of one airplane, filled up with those for all.
+    /// Returns the values of one airplane, completed with those for all.
     fn with_own(&self, s: &AirplaneSection) -> Self {
         Self {
             v_m_s: s.v_m_s.or(self.v_m_s),
@@ -57,7 +57,7 @@ impl ModelSection {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Replay {
     pub(super) cycles: u64,
-    /// The end of these cycles.
+    /// End of these cycles, in seconds after the start of the run.
     until_s: f64,
     dt_s: f64,
 }
@@ -95,7 +95,8 @@ impl Compiler<'_> {
     ) -> Result<Vec<Airplane>, InputError> {
         let s = section.get_ref();
         let n = s.n.get() as usize;
-        // Random traffic is as dense as ten airplanes in the paper's circle, whatever their number.
+        // By default, random traffic is as dense as ten airplanes in the paper's circle, for any
+        // number.
         let usual_m = match s.kind {
             GeneratorKind::Random => 6_500.0 * (n as f64 / 5.0).max(1.0).sqrt(),
             _ => 6_500.0,
@@ -109,7 +110,7 @@ impl Compiler<'_> {
         })
     }
 
-    /// An airplane with a flight plan of its own.
+    /// Returns an airplane with a flight plan of its own.
     fn planned(
         &self,
         section: &Spanned<AirplaneSection>,
@@ -141,8 +142,8 @@ impl Compiler<'_> {
         })
     }
 
-    /// An airplane that follows its track, and then flies on along the rest of it, as fast as
-    /// recorded unless it is said.
+    /// Returns an airplane that follows its track, and then flies on along the rest of it, with the
+    /// recorded speed unless another one is given.
     fn recorded(
         &self,
         section: &Spanned<AirplaneSection>,
@@ -161,10 +162,10 @@ impl Compiler<'_> {
         Ok(following(track, model, replay))
     }
 
-    /// The time for which recorded airplanes follow their tracks.
+    /// Returns the time for which recorded airplanes follow their tracks.
     pub(super) fn replay(&self, timing: &Timing) -> Replay {
         let until_s = self.file.airspace.replay_until_s.map_or(f64::INFINITY, f64::from);
-        // Beyond the largest number of cycles this is that number.
+        // The conversion saturates at the largest number of cycles.
         let cycles = (until_s / timing.dt_s).ceil() as u64;
         Replay { cycles, until_s: cycles as f64 * timing.dt_s, dt_s: timing.dt_s }
     }
@@ -172,7 +173,7 @@ impl Compiler<'_> {
 
 fn following(track: Track, model: Model, replay: Replay) -> Airplane {
     let begins_s = track.begins_s();
-    // One that appears later comes in at the start of a cycle.
+    // An airplane that appears later comes in at the start of a cycle.
     let appears_s = if (begins_s / replay.dt_s).floor() < replay.cycles as f64 {
         begins_s
     } else {

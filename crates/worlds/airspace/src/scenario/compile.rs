@@ -1,4 +1,4 @@
-//! A scenario's sections -> an immutable world.
+//! From a scenario's sections to an immutable world.
 
 use super::{AirspaceFile, Compiled, Preset};
 use crate::deploy::refuses;
@@ -15,14 +15,14 @@ use sidestep_scenario::{Head, Source};
 use std::sync::Arc;
 use toml::Spanned;
 
-/// Levels that are apart by what is asked for may seem nearer by this when they were rounded.
+/// Meters by which levels that are far enough apart may seem nearer because they were rounded.
 const ROUNDED_M: f64 = 1e-6;
-/// A run whose length is not given may take so many cycles,
+/// Smallest limit on the cycles of a run whose length is not given.
 const FEWEST_CYCLES: u64 = 400;
-/// or so many times what the last airplane to come in would need alone, if that is more: room for
-/// detours and orbits.
+/// Factor on the time that the last airplane to come in would need alone, which gives a larger
+/// limit: there is room for detours and orbits.
 const TIMES_ALONE: f64 = 3.0;
-/// Most steps of a horizon.
+/// Largest number of steps of a horizon.
 const MOST_STEPS: usize = 10_000;
 const GIB: f64 = (1_u64 << 30) as f64;
 
@@ -93,7 +93,7 @@ impl Compiler<'_> {
         Ok(world.prepared())
     }
 
-    /// The wind, if everybody can fly against it.
+    /// Returns the wind, if every airplane can fly against it.
     fn wind_m_s(&self, airplanes: &[Airplane]) -> Result<[f64; 2], InputError> {
         let given = self.file.airspace.wind_m_s.as_ref();
         let wind_m_s = given.map_or([0.0; 2], |given| given.get_ref().get());
@@ -124,7 +124,7 @@ impl Compiler<'_> {
         Ok(())
     }
 
-    /// Refuses groups at the start that need more memory than allowed.
+    /// Refuses groups that need more memory at the start than allowed.
     fn fits_memory(&self, compiled: &Compiled) -> Result<(), InputError> {
         let world = &compiled.world;
         if world.method != Method::Pc {
@@ -173,14 +173,14 @@ impl Compiler<'_> {
     }
 }
 
-/// Cycles in which everybody should arrive. Flights that never end do not count.
+/// Returns a number of cycles in which all should arrive. Flights that never end do not count.
 fn enough_cycles(world: &AirspaceWorld) -> u64 {
     let ends = (0..world.airplanes.len()).map(|i| world.ends_alone_s(i));
     let longest_s = ends.filter(|s| s.is_finite()).fold(0.0, f64::max);
     FEWEST_CYCLES.max((TIMES_ALONE * longest_s / world.timing.dt_s).ceil() as u64)
 }
 
-/// First fallbacks that are apart as far as there are any, and the pairs that are not.
+/// Returns first fallbacks that are apart as far as possible, and the pairs that are not apart.
 fn first(world: &AirspaceWorld) -> (Vec<Side>, Vec<(u32, u32)>) {
     let mut sides = vec![Side::default(); world.airplanes.len()];
     // Airplanes that come in at other times do not meet at the start.

@@ -1,4 +1,4 @@
-//! The section of a network that is not to be relied on.
+//! The section of a network that may lose and delay messages.
 
 use super::compile::Compiler;
 use crate::agents::network::{Network, Silence};
@@ -22,10 +22,10 @@ pub(super) struct NetworkSection {
     silent: Vec<Silence>,
 }
 
-/// A probability below 1: something must come through at last.
+/// A probability below 1, because some messages must get through in the end.
 type Chance = Number<FromBelow<0, 1>>;
 
-/// Times above 0 that a clock can tell apart.
+/// A time above 0 that a clock can resolve.
 #[derive(Debug, Clone, Copy)]
 struct Latency;
 
@@ -56,7 +56,7 @@ impl NetworkSection {
 }
 
 impl Compiler<'_> {
-    /// The network, if the scenario has one.
+    /// Returns the network, if the scenario has one.
     pub(super) fn network(
         &self,
         timing: &Timing,
@@ -88,7 +88,7 @@ impl Compiler<'_> {
     }
 }
 
-/// Cause and remedy of times that do not fit into a cycle.
+/// Returns cause and remedy of times that do not fit into a cycle.
 fn wrong_times(n: &Network, timing: &Timing) -> Option<(String, String)> {
     let waits_s = n.patience_s.max(n.latency_s + n.max_delay_s);
     if 2.0 * n.deadline_s <= timing.dt_s && 8.0 * waits_s <= n.deadline_s {
@@ -104,7 +104,7 @@ fn wrong_times(n: &Network, timing: &Timing) -> Option<(String, String)> {
     Some((cause, remedy.into()))
 }
 
-/// Cause and remedy of a silence of nobody, or at no time.
+/// Returns cause and remedy of a silence of an airplane that does not exist, or at undefined times.
 fn wrong_silence(network: &Network, airplanes: usize) -> Option<(String, String)> {
     let wrong = network.silences.iter().find(|one| {
         one.airplane as usize >= airplanes || one.from_s.is_nan() || one.until_s.is_nan()

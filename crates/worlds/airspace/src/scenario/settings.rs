@@ -1,4 +1,4 @@
-//! What is optimized, and how.
+//! The objective and the settings of the optimizer.
 
 use super::compile::Compiler;
 use crate::flight::Legs;
@@ -8,9 +8,9 @@ use sidestep_collectives::{Choice, Estimator, Order, Settings, Stop, Update};
 use sidestep_kernel::InputError;
 use sidestep_scenario::{AboveZero, Rule as _, refused};
 
-/// Most samples of a block.
+/// Largest number of samples of a block.
 const MOST_SAMPLES: usize = 10_000;
-/// Most times of a list.
+/// Largest number of times in a list.
 const MOST_TIMES: usize = 20;
 
 /// A list of times above 0.
@@ -35,7 +35,7 @@ pub(super) struct LegsSection {
     until_s: Times,
 }
 
-/// A word for yes or no; yes unless it is said.
+/// A yes or no; yes unless given.
 #[derive(Debug)]
 pub(super) struct Switch(pub(super) bool);
 

@@ -1,17 +1,17 @@
-//! Fallbacks of airplanes that come in, or that are about to fly otherwise.
+//! Fallbacks of airplanes that come in, or that are about to change speed or level.
 
 use super::flyer::{Flyer, SLACK_M};
 use super::orbit::Side;
 use crate::flight::distance_m;
 
-/// Sides for first fallbacks that are pairwise apart, as far as there are any, and the pairs that
-/// are not: they start too close.
+/// Returns sides for first fallbacks that are pairwise apart, as far as there are any, and the
+/// pairs that are not: they start too close.
 pub(crate) fn first_fallbacks(flyers: &[Flyer]) -> (Vec<Side>, Vec<(usize, usize)>) {
     entry_fallbacks(flyers, |_| true)
 }
 
-/// The same among airplanes some of which have their fallbacks already and keep them: only those
-/// that `enters` choose, and only pairs with one of them are named.
+/// Returns the same for airplanes some of which keep the fallbacks that they have: only the
+/// airplanes in `enters` choose, and only pairs with one of them are named.
 pub(crate) fn entry_fallbacks(
     flyers: &[Flyer],
     enters: impl Fn(usize) -> bool,
@@ -24,7 +24,8 @@ pub(crate) fn entry_fallbacks(
     let clashes = |sides: &[Side], i: usize, side: Side| {
         near[i].iter().filter(|&&j| clash(i, side, j, sides[j])).count()
     };
-    // Whoever has fewer clashes on the other side changes over; clashes only become fewer.
+    // An airplane with fewer clashes on the other side changes over. Clashes only decrease, so this
+    // ends.
     let mut changed = true;
     while changed {
         changed = false;
@@ -45,14 +46,14 @@ pub(crate) fn entry_fallbacks(
     (sides, left)
 }
 
-/// The side on which an airplane that flies as `now` and is about to fly as `changed` has an orbit
-/// apart from the stored fallbacks of others, if there is one; rather the one it has stored.
+/// Returns the side on which an airplane that flies as `now` and is about to fly as `changed` has
+/// an orbit apart from the stored fallbacks of others, if there is one; preferably the stored side.
 pub(crate) fn side_apart(
     now: &Flyer,
     changed: &Flyer,
     others: impl Iterator<Item = Flyer>,
 ) -> Option<Side> {
-    // A pair that came in too close is so as it is now, not as it would be.
+    // A pair came in too close as it is now, not as it would be after the change.
     let minds = |other: &Flyer| changed.is_on_level(other) && !now.is_left_alone_with(other);
     let minded: Vec<Flyer> = others.filter(minds).collect();
     let is_apart = |side: &Side| {
@@ -65,8 +66,8 @@ pub(crate) fn side_apart(
     [changed.fallback].into_iter().chain(sides).find(is_apart)
 }
 
-/// Per airplane all others whose orbits might come too near its own, by rising number. Sorted by
-/// x, only neighbors in that order have to be looked at.
+/// Returns for each airplane all others whose orbits might come too near its own, by rising number.
+/// They are sorted by x, so that only neighbors in that order have to be compared.
 fn near_each_other(flyers: &[Flyer]) -> Vec<Vec<usize>> {
     let reach_m = |f: &Flyer| 2.0 * f.v_m_s / f.omega_max_rad_s + f.separation_m + SLACK_M;
     let widest_m = flyers.iter().map(reach_m).fold(0.0, f64::max);

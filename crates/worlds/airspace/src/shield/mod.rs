@@ -1,6 +1,6 @@
-//! The shield: separation that is proved, not hoped for.
+//! The shield: a filter that provably keeps airplanes apart.
 //!
-//! A filter between any method and the airplanes. Every airplane stores a *fallback* that it can
+//! It stands between any method and the airplanes. Every airplane stores a *fallback* that it can
 //! fly for ever: an orbit at its largest turn rate, to the left or to the right.
 //!
 //! **Invariant.** The stored fallbacks of all airplanes are pairwise at least `R` apart, from now
@@ -13,14 +13,14 @@
 //! 1. *Start.* If the fallbacks are apart, staying on them for `dt` and ever after is a plan for
 //!    each, and these plans are pairwise compatible: they are the same motions as the invariant
 //!    speaks of. So an assignment of compatible plans exists.
-//! 2. *Search.* Everybody begins with what the method proposes. While some pair is not
-//!    compatible, one of the two, the one with the lower rank unless it is on its fallback
+//! 2. *Search.* Each airplane starts with the plan that the method proposes. While some pair is
+//!    not compatible, one of the two, the one with the lower rank unless it is on its fallback
 //!    already, takes another plan that is compatible with all present ones, or its fallback. The
 //!    first lowers the number of incompatible pairs, the second raises the number of airplanes on
-//!    fallbacks, and nobody leaves a fallback during the search, so it ends. It can only end
-//!    without an incompatible pair: two airplanes on fallbacks are compatible by the invariant.
-//! 3. *Better again.* Whoever has fallen back may take another plan if that is compatible with
-//!    all present ones. Compatibility of all pairs is kept by each such exchange.
+//!    fallbacks, and none leaves a fallback during the search, so it ends. It can only end without
+//!    an incompatible pair, because two airplanes on fallbacks are compatible by the invariant.
+//! 3. *Better again.* An airplane that has fallen back may take another plan if that is compatible
+//!    with all present ones. Each such exchange keeps all pairs compatible.
 //! 4. *Step.* All fly `dt` of their plans, and store the orbit at its end. The plans were
 //!    compatible, so nobody came nearer than `R` during `dt`, and the stored orbits keep the
 //!    invariant.
@@ -31,8 +31,8 @@
 //! every other pair as it was. A wind that all know moves everybody alike and changes no distance.
 //! Each step is a property test in `tests.rs`.
 //!
-//! Numbers: `orbit.rs` never says wrongly that motions stay apart. New plans must keep
-//! a hair (`SLACK_M`) more than `R`, so that rounding never adds up to a loss.
+//! Numbers: `orbit.rs` never wrongly finds that motions stay apart. New plans must keep slightly
+//! more than `R` (by `SLACK_M`), so that rounding never adds up to a loss.
 
 mod fallback;
 mod flyer;

@@ -1,4 +1,4 @@
-//! Orbits, which the shield falls back to, and whether motions stay apart.
+//! Orbits, which are the shield's fallbacks, and a test of whether motions stay apart.
 //!
 //! Ways are compared with a safe bound on how fast two airplanes can close in, halving intervals
 //! until the bound decides ([`stays_apart`]); orbits of one turn rate have a closed form, of
@@ -9,10 +9,10 @@ use crate::flight::{Point, Pose, distance_m};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::math;
 
-/// Intervals below this are not halved any more: undecided counts as too near.
+/// Length in seconds below which an interval is no longer halved: undecided counts as too near.
 const FINEST_S: f64 = 1e-4;
 
-/// Which way an airplane orbits.
+/// The direction of an orbit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Side {
@@ -24,10 +24,10 @@ pub enum Side {
 }
 
 impl Side {
-    /// Both.
+    /// Both sides.
     pub const BOTH: [Self; 2] = [Self::Left, Self::Right];
 
-    /// +1 for left, -1 for right.
+    /// Returns +1 for left, -1 for right.
     pub fn sign(self) -> f64 {
         match self {
             Self::Left => 1.0,
@@ -41,14 +41,14 @@ impl Side {
 pub(crate) struct Orbit {
     center: Point,
     pub(crate) radius_m: f64,
-    /// Positive to the left.
+    /// Turn rate in radians per second, positive to the left.
     omega_rad_s: f64,
-    /// Direction from the center at time 0.
+    /// Direction from the center at time 0, in radians.
     phase_rad: f64,
 }
 
 impl Orbit {
-    /// The orbit that an airplane enters at `pose`.
+    /// Returns the orbit that an airplane enters at `pose`.
     pub(crate) fn from(pose: Pose, v_m_s: f64, omega_rad_s: f64) -> Self {
         let radius_m = v_m_s / omega_rad_s.abs();
         // The center is at a right angle to the heading, on the side of the turn.
@@ -73,17 +73,17 @@ impl Orbit {
         self.radius_m * self.omega_rad_s.abs()
     }
 
-    /// Whether two orbits stay `gap_m` apart for all time.
+    /// Returns whether two orbits stay `gap_m` meters apart for all time.
     pub(crate) fn stays_apart(&self, other: &Self, gap_m: f64) -> bool {
         let between = distance_m(self.center, other.center);
         let (ra, rb) = (self.radius_m, other.radius_m);
-        // As whole circles, side by side or one inside the other.
+        // Apart as whole circles: side by side, or one inside the other.
         if between - ra - rb >= gap_m || (ra - rb).abs() - between >= gap_m {
             return true;
         }
         let same = |a: f64, b: f64| (a - b).abs() <= 1e-12 * a.abs();
         if same(self.omega_rad_s, other.omega_rad_s) {
-            // The offset within the circles is a vector of one length that turns round.
+            // The offset within the circles is a vector of constant length that rotates.
             let offset = math::hypot(
                 ra * math::cos(self.phase_rad) - rb * math::cos(other.phase_rad),
                 ra * math::sin(self.phase_rad) - rb * math::sin(other.phase_rad),
@@ -100,8 +100,8 @@ impl Orbit {
     }
 }
 
-/// Whether a distance that changes by at most `closing_m_s` per second stays at least `gap_m`
-/// during the interval: decided by halving, never wrongly yes.
+/// Returns whether a distance that changes by at most `closing_m_s` per second stays at least
+/// `gap_m` during the interval. Found by halving; the answer is never wrongly yes.
 pub(crate) fn stays_apart(
     distance_m: &impl Fn(f64) -> f64,
     (from_s, to_s): (f64, f64),
@@ -122,7 +122,7 @@ fn halve(
     closing_m_s: f64,
     gap_m: f64,
 ) -> bool {
-    // The nearest the distance can have come between its two ends.
+    // The smallest distance possible between the two ends.
     let nearest = 0.5 * (at_from + at_to - closing_m_s * (to_s - from_s));
     if nearest >= gap_m {
         return true;
@@ -143,7 +143,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// An orbit is where the airplane flies with that turn rate.
+        /// An orbit is the place where the airplane flies with that turn rate.
         #[test]
         fn an_orbit_is_the_motion_it_stands_for(
             x in -1e3f64..1e3, psi in -3.1f64..3.1, left in any::<bool>(), t_s in 0.0f64..300.0,
@@ -154,7 +154,7 @@ mod tests {
             prop_assert!(distance_m(flown, Orbit::from(pose, 35.0, omega).at(t_s)) < 1e-6);
         }
 
-        /// The search never says yes wrongly: dense sampling finds no nearer moment.
+        /// The search never wrongly says yes: dense sampling finds no nearer moment.
         #[test]
         fn what_is_found_apart_is_apart(
             base in 300.0f64..800.0, swing in 0.0f64..300.0, rate in 0.01f64..0.2, gap_m in 200.0f64..600.0,

@@ -8,15 +8,15 @@ use serde::{Deserialize, Serialize};
 /// Motion for one `dt`: a turn rate per step of `dtau`.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Way {
-    /// Turn rate in each step.
+    /// Turn rate in each step, in radians per second.
     pub omegas_rad_s: Vec<f64>,
 }
 
-/// A way, and an orbit on which to wait after that.
+/// A way, and an orbit on which the airplane waits after that.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Plan {
     flyer: Flyer,
-    /// Poses at the beginning of each step, and at the end.
+    /// Poses at the start of each step, and at the end.
     poses: Vec<Pose>,
     omegas_rad_s: Vec<f64>,
     dtau_s: f64,
@@ -27,7 +27,7 @@ pub(crate) struct Plan {
 }
 
 impl Plan {
-    /// A way, and then an orbit to a side.
+    /// Returns a plan: a way, and then an orbit to a side.
     pub(crate) fn new(flyer: Flyer, way: &Way, dtau_s: f64, side: Side) -> Self {
         Self::of(flyer, way.omegas_rad_s.clone(), dtau_s, (None, side))
     }
@@ -49,7 +49,7 @@ impl Plan {
         Self { flyer, poses, omegas_rad_s, dtau_s, orbit, candidate, side }
     }
 
-    /// The stored fallback, for some steps and ever after.
+    /// Returns the stored fallback as a plan, for some steps and ever after.
     pub(crate) fn fallback(flyer: Flyer, steps: usize, dtau_s: f64) -> Self {
         let omega = flyer.fallback.sign() * flyer.omega_max_rad_s;
         Self::of(flyer, vec![omega; steps], dtau_s, (None, flyer.fallback))
@@ -60,12 +60,12 @@ impl Plan {
         self.poses[self.poses.len() - 1]
     }
 
-    /// The side of the orbit.
+    /// Returns the side of the orbit.
     pub(crate) fn side(&self) -> Side {
         self.side
     }
 
-    /// Whether two plans stay apart during `dt` and on the orbits ever after.
+    /// Returns whether two plans stay apart during `dt` and on the orbits ever after.
     pub(crate) fn is_compatible(&self, other: &Self) -> bool {
         if !self.flyer.minds(&other.flyer) {
             return true;
@@ -93,7 +93,7 @@ impl Plan {
         })
     }
 
-    /// Whether this is the stored fallback.
+    /// Returns whether this is the stored fallback.
     pub(super) fn is_fallback(&self) -> bool {
         self.candidate.is_none()
     }

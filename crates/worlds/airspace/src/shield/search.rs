@@ -13,19 +13,19 @@ pub struct Decision {
     pub fallback: Side,
 }
 
-/// Certainty that everybody will fly the plan it is given.
+/// The certainty that all airplanes fly the plans they are given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Certainty {
-    /// Everybody will.
+    /// All of them do.
     Sure,
-    /// Each may fly its stored fallback instead: plans have to keep apart from those of others
-    /// too. They are compatible in whatever mixture they are flown.
+    /// Each may fly its stored fallback instead, so plans have to keep apart from those of others
+    /// too. They are compatible in any mixture in which they are flown.
     Mixable,
 }
 
 /// Decides for airplanes whose stored fallbacks are pairwise apart. `candidates[i]` are the ways
-/// that airplane `i` may fly, the one it wants first, `steps` of `dtau_s` each; with none it
-/// stays on its fallback.
+/// that airplane `i` may fly, the wanted one first, each of `steps` steps of `dtau_s` seconds;
+/// without any it stays on its fallback.
 pub fn filter(
     flyers: &[Flyer],
     candidates: &[Vec<Way>],
@@ -70,7 +70,7 @@ impl<'a> Search<'a> {
         Self { flyers, candidates, dtau_s, certainty, plans, fallbacks, by_rank }
     }
 
-    /// Whether a plan of airplane `i` goes with what `j` may fly.
+    /// Returns whether a plan of airplane `i` is compatible with everything that `j` may fly.
     fn fits(&self, i: usize, plan: &Plan, j: usize) -> bool {
         plan.is_compatible(&self.plans[j])
             && (self.certainty == Certainty::Sure
@@ -88,7 +88,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// The airplane of lowest rank that has to give way in some pair.
+    /// Returns the airplane of lowest rank that has to give way in some pair.
     fn loser(&self, pairs: &[(usize, usize)]) -> Option<usize> {
         let gives_way = |i: usize| {
             !self.plans[i].is_fallback()
@@ -113,7 +113,7 @@ impl<'a> Search<'a> {
         others.filter(|&j| !self.fits(i, &self.plans[i], j)).map(|j| (i, j)).collect()
     }
 
-    /// The first plan of an airplane that is compatible with all present ones.
+    /// Returns the first plan of an airplane that is compatible with all present ones.
     fn another_plan(&self, i: usize) -> Option<Plan> {
         let flyer = self.flyers[i];
         let others: Vec<usize> = (0..self.plans.len()).filter(|&j| j != i).collect();
@@ -126,7 +126,7 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// By falling rank, those that have fallen back try once more, as long as that helps anyone.
+    /// Lets those that have fallen back try once more, by falling rank, as long as that helps any.
     fn better_again(&mut self) {
         let mut helped = true;
         while helped {

@@ -39,7 +39,7 @@ fn some_flyers() -> impl Strategy<Value = Vec<Flyer>> {
         })
 }
 
-/// Airplanes with fallbacks that are apart: those that clash are left out.
+/// Airplanes with fallbacks that are apart; those that clash are left out.
 fn with_fallbacks(mut flyers: Vec<Flyer>) -> Vec<Flyer> {
     loop {
         let (sides, clashes) = first_fallbacks(&flyers);
@@ -79,8 +79,8 @@ proptest! {
         prop_assert!(nearest_on_orbits(&flyers, 400) >= 500.0);
     }
 
-    /// Steps 2 to 4: whatever is wanted, what is flown keeps apart, and what is stored
-    /// keeps the invariant. Mixable plans do in every mixture with fallbacks.
+    /// Steps 2 to 4: whatever the wishes, the motions flown keep apart, and the stored orbits keep
+    /// the invariant. Mixable plans do in every mixture with fallbacks.
     #[test]
     fn a_filtered_step_keeps_separation_and_the_invariant(
         flyers in some_flyers(),
@@ -126,7 +126,7 @@ proptest! {
         prop_assert!(nearest_on_orbits(&now, 400) >= 500.0);
     }
 
-    /// Whoever is far from everybody flies what it wants.
+    /// An airplane that is far from all others flies its wish.
     #[test]
     fn nobody_falls_back_without_need(x in 20_000.0f64..1e6, part in -1.0f64..1.0) {
         let flyers = [flyer(0.0, 0.0, 0.0, 0), flyer(x, 0.0, 3.0, 1)];

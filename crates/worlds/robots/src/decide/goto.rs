@@ -1,4 +1,4 @@
-//! Going somewhere: along shortest ways on the static map, around what is sensed.
+//! Going somewhere: along shortest ways on the static map, and around sensed obstacles.
 
 use super::{Behaviour, Decision, Memory, Percept, Sector, Trip};
 use crate::effector::{ActionId, FORWARD, LEFT, RIGHT, STAY};
@@ -9,22 +9,22 @@ use std::sync::Arc;
 /// Visits goals in order; each robot starts with the goals of its own list.
 #[derive(Debug, Clone)]
 pub struct Goto {
-    /// Ways to the goals, in order.
+    /// Shortest ways to the goals, in order.
     pub goals: Vec<Arc<FlowField>>,
-    /// After the last goal: start again, or stay there.
+    /// Whether it starts again after the last goal, rather than staying there.
     pub repeat: bool,
 }
 
-/// To and fro between two regions; a trip is there and back again.
+/// Goes back and forth between two regions; a trip is there and back again.
 #[derive(Debug, Clone)]
 pub struct Shuttle {
-    /// Ways to the two regions.
+    /// Shortest ways to the two regions.
     pub ends: [Arc<FlowField>; 2],
 }
 
 /// Word 0: number of goals reached (wraps at the length for a repeated list).
 const REACHED: usize = 0;
-/// Word 1: actions of an evasion still to do.
+/// Word 1: actions of an evasion that are left to do.
 const EVADING: usize = 1;
 
 impl Behaviour for Goto {
@@ -41,7 +41,7 @@ impl Behaviour for Goto {
             memory.words[REACHED] += 1;
             if self.repeat && memory.words[REACHED] == n {
                 memory.words[REACHED] = 0;
-                // A list whose goals all are here must not loop for ever.
+                // Stop here, because a list whose goals all are here would loop for ever.
                 break;
             }
         }
@@ -56,7 +56,7 @@ impl Behaviour for Shuttle {
         if self.ends[target].is_goal(percept.at.0, percept.at.1) {
             memory.words[REACHED] = memory.words[REACHED].wrapping_add(1);
             if target == 0 {
-                // The first arrival at end 0 only begins the first trip.
+                // The first arrival at end 0 only starts the first trip.
                 trip = Some(if memory.words[REACHED] > 1 { Trip::Done } else { Trip::Begun });
             }
             target = 1 - target;
@@ -66,7 +66,7 @@ impl Behaviour for Shuttle {
     }
 }
 
-/// One action along the way; after a contact or before something near, a short evasion.
+/// Returns one action along the way; after a contact or before a near obstacle, a short evasion.
 fn follow(
     field: &FlowField,
     percept: &Percept<'_>,
@@ -91,7 +91,7 @@ fn follow(
     }
 }
 
-/// Waits or sidesteps, by a fair draw: two robots that meet must not mirror each other.
+/// Waits or sidesteps, by a fair draw, because two robots that meet must not mirror each other.
 fn evade(percept: &Percept<'_>, memory: &mut Memory, draws: &mut Draws) -> ActionId {
     if draws.below(3) == 0 {
         return STAY;

@@ -1,12 +1,12 @@
-//! Draws its actions: the baseline of comparisons, and what the exact chains are made of.
+//! Random actions: the baseline of comparisons, and the policy of the exact chains.
 
 use super::{Behaviour, Decision, Memory, Percept};
 use crate::effector::{ActionId, FORWARD, LEFT, RIGHT, STANDARD_ACTIONS};
 use sidestep_kernel::distr::{Categorical, RowError};
 use sidestep_kernel::stream::Draws;
 
-/// Draws each action from fixed probabilities: one row while the way is free, another after
-/// a contact. It remembers nothing and looks at nothing else, so a robot alone in a building
+/// Draws each action from fixed probabilities: one row while the way is free, another after a
+/// contact. It has no memory and uses no other part of its percept, so a robot alone in a building
 /// is a Markov chain over its poses.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Random {
@@ -21,39 +21,39 @@ struct Row {
 }
 
 impl Random {
-    /// Draws from `usual`, after a contact from `after_contact`; both hold one probability
-    /// per action, by action id. Actions at the end may be left out.
+    /// Returns the behavior that draws from `usual`, and after a contact from `after_contact`; both
+    /// hold one probability per action, by action id. Actions at the end may be left out.
     ///
     /// # Errors
-    /// When a row is no distribution.
+    /// When a row is not a distribution.
     pub fn new(usual: Vec<f64>, after_contact: Vec<f64>) -> Result<Self, RowError> {
         Ok(Self { usual: Row::new(usual)?, after_contact: Row::new(after_contact)? })
     }
 
-    /// Each standard action with equal probability.
+    /// Returns the behavior that draws each standard action with equal probability.
     pub fn uniform() -> Self {
         let row = Row::over(&[0, 1, 2, 3]);
         Self { usual: row.clone(), after_contact: row }
     }
 
-    /// Always the same action.
+    /// Returns the behavior that always chooses the same action.
     pub fn always(action: ActionId) -> Self {
         let row = Row::over(&[action]);
         Self { usual: row.clone(), after_contact: row }
     }
 
-    /// Ahead, and after a contact a quarter turn to either side: what
-    /// [`Wander`](super::Wander) does without sensors and without voluntary turns.
+    /// Returns the behavior that goes ahead, and after a contact makes a quarter turn to either
+    /// side, as [`Wander`](super::Wander) does without sensors and without voluntary turns.
     pub fn bounce() -> Self {
         Self { usual: Row::over(&[FORWARD]), after_contact: Row::over(&[LEFT, RIGHT]) }
     }
 
-    /// Probability of each action, by action id, after a contact or without.
+    /// Returns the probability of each action, by action id, after a contact or without.
     pub fn probabilities(&self, after_contact: bool) -> &[f64] {
         &self.row(after_contact).probabilities
     }
 
-    /// Whether a contact changes anything.
+    /// Returns whether a contact changes the probabilities.
     pub fn minds_contacts(&self) -> bool {
         self.usual.probabilities != self.after_contact.probabilities
     }
@@ -69,7 +69,7 @@ impl Row {
         Ok(Self { probabilities, distribution })
     }
 
-    /// Equal shares for `actions`.
+    /// Returns equal shares for `actions`.
     fn over(actions: &[ActionId]) -> Self {
         let longest = actions.iter().max().map_or(0, |&a| usize::from(a) + 1);
         let mut row = vec![0.0; longest.max(STANDARD_ACTIONS.len())];

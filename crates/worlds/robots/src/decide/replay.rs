@@ -1,4 +1,4 @@
-//! Actions that are known beforehand, or handed in by a caller.
+//! Actions that are known in advance, or handed in by a caller.
 
 use super::{Behaviour, Decision, Memory, Percept};
 use crate::effector::{ActionId, STAY};
@@ -9,7 +9,7 @@ use sidestep_kernel::stream::Draws;
 pub struct Replay {
     /// The actions in order.
     pub actions: Vec<ActionId>,
-    /// Start again at the end of the list.
+    /// Whether it starts again at the end of the list.
     pub repeat: bool,
 }
 
@@ -27,13 +27,13 @@ impl Behaviour for Replay {
     }
 }
 
-/// Does what the caller has put into the robot's order before the cycle; stays without one.
+/// Does the action that the caller ordered before the cycle; stays when there is no order.
 ///
-/// The world hands the order over in word 3 of the memory as `action + 1` and takes it back.
+/// The world stores the order in word 3 of the memory as `action + 1`, and removes it afterwards.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct External;
 
-/// Word of the memory that holds the order.
+/// Index of the memory's word that holds the order.
 pub const ORDER: usize = 3;
 
 impl Behaviour for External {

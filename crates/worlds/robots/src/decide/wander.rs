@@ -1,14 +1,14 @@
-//! Obstacle avoidance and corridor following, as the Nomad's basic behaviour in the paper.
+//! Obstacle avoidance and corridor following, like the Nomad's basic behavior in the paper.
 
 use super::{Behaviour, Decision, Memory, Percept, Sector};
 use crate::effector::{ActionId, FORWARD, LEFT, RIGHT};
 use sidestep_kernel::stream::Draws;
 
-/// Goes ahead; turns to the freer side before what is near or after a contact; now and then
+/// Goes ahead; turns to the freer side before a near obstacle or after a contact; now and then
 /// turns into an open side, so that it explores crossings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Wander {
-    /// Mean number of own actions between two voluntary turns.
+    /// Mean number of its actions between two voluntary turns.
     pub turn_every: u32,
 }
 
@@ -46,7 +46,8 @@ impl Behaviour for Wander {
 }
 
 impl Wander {
-    /// Counts an action down; at the end draws the next stride.
+    /// Counts down one action of the stride, and returns whether it is over; then it draws the
+    /// next.
     #[inline]
     fn stride_is_over(self, memory: &mut Memory, draws: &mut Draws) -> bool {
         let stride = &mut memory.words[STRIDE];
@@ -60,7 +61,7 @@ impl Wander {
     }
 }
 
-/// Turns to the freer side, and goes on turning that way until the way is free.
+/// Turns to the freer side, and keeps turning that way until the way is free.
 fn avoid(left: u8, right: u8, memory: &mut Memory, draws: &mut Draws) -> ActionId {
     let turn = match memory.words[AVOIDING] {
         0 if left != right => {

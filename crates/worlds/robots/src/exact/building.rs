@@ -1,4 +1,4 @@
-//! What a chain needs of a scenario: one robot, and everything else at rest.
+//! The part of a scenario that a chain needs: one robot, and everything else at rest.
 
 use super::obstacle::Pose;
 use crate::effector::{ActionId, Transition};
@@ -23,16 +23,16 @@ pub(super) struct Building {
 pub(super) struct Robot {
     pub(super) start: Pose,
     pub(super) size: u32,
-    /// When it acts.
+    /// The cycles in which it acts.
     pub(super) timing: Body,
-    /// Sensors, and names of the actions.
+    /// Sensors, and the names of the actions.
     pub(super) body: Arc<RobotBody>,
-    /// What each action does in a free place, in the scenario's regime.
+    /// Transitions of each action in free space, in the scenario's regime.
     pub(super) actions: Vec<Vec<Transition>>,
 }
 
 impl Building {
-    /// Kind of what stands in a box; walls all around the map.
+    /// Returns the kind of a box's occupant; there are walls all around the map.
     pub(super) fn kind_at(&self, col: i32, row: i32) -> u8 {
         let (Ok(c), Ok(r)) = (u32::try_from(col), u32::try_from(row)) else { return WALL };
         if c >= self.map.width() || r >= self.map.height() || self.map.cell(c, r) != Cell::Free {
@@ -42,7 +42,7 @@ impl Building {
     }
 }
 
-/// How errors name the scenario.
+/// Returns the name of the scenario in errors.
 pub(super) fn place(compiled: &Compiled) -> String {
     if compiled.name.is_empty() {
         "the scenario".into()
@@ -51,7 +51,7 @@ pub(super) fn place(compiled: &Compiled) -> String {
     }
 }
 
-/// Takes a scenario apart, and refuses what is no chain over one robot's poses.
+/// Takes a scenario apart, and refuses one that is not a chain over one robot's poses.
 pub(super) fn only_robot(compiled: &Compiled) -> Result<(Building, Robot), InputError> {
     let world = &compiled.world;
     let refuse = |cause: String, remedy: &str| Err(InputError::new(place(compiled), cause, remedy));
@@ -94,7 +94,7 @@ fn stays_closed(door: &Door) -> bool {
     }
 }
 
-/// The boxes that a body covers at the start.
+/// Returns the boxes that a body covers at the start.
 fn covered(
     compiled: &Compiled,
     id: EntityId,

@@ -1,4 +1,5 @@
-//! A model under a fixed policy: a Markov chain, its distributions over time and at rest.
+//! A model under a fixed policy: a Markov chain with its distributions over time and in the long
+//! run.
 
 use super::obstacle::Pose;
 use super::sparse::Sparse;
@@ -8,12 +9,12 @@ use serde::Serialize;
 use sidestep_kernel::InputError;
 use std::collections::BTreeMap;
 
-/// A state of a chain: the pose, and what else the policy looks at.
+/// A state of a chain: the pose, and the contact as far as the policy depends on it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct ChainState {
-    /// Where the robot is.
+    /// The pose of the robot.
     pub pose: Pose,
-    /// Whether its last action met something; always false for a policy that does not mind.
+    /// Whether the last action met an obstacle; always false when the policy ignores contacts.
     pub after_contact: bool,
 }
 
@@ -24,19 +25,18 @@ pub struct Chain {
     rows: Sparse<(u32, f64)>,
 }
 
-/// Where a chain is in the long run.
+/// The distribution of a chain in the long run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stationary {
     /// Probability of each state.
     pub distribution: Vec<f64>,
-    /// Total variation between the distribution and itself one action later: 0 were it
-    /// exact.
+    /// Total variation between the distribution and itself one action later; 0 if it were exact.
     pub residual: f64,
-    /// Iterations made.
+    /// Number of iterations made.
     pub iterations: u32,
 }
 
-/// How a chain's long run is described in a report.
+/// The description of a chain's long run in a report.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(super) struct Convergence {
     pub(super) residual: f64,
@@ -51,7 +51,7 @@ impl From<&Stationary> for Convergence {
 
 /// Iterations stop when one changes the distribution by less than this (total variation).
 const CONVERGED: f64 = 1e-13;
-/// Multiplications after which iterating stops without having converged.
+/// Number of multiplications after which iterating stops without having converged.
 const MAX_WORK: usize = 5_000_000_000;
 
 impl Chain {
@@ -80,17 +80,18 @@ impl Chain {
         Ok(Self { states: found.iter().map(state).collect(), rows })
     }
 
-    /// The states; the first is the start.
+    /// Returns the states; the first is the start.
     pub fn states(&self) -> &[ChainState] {
         &self.states
     }
 
-    /// Successors of a state by index, with their probabilities.
+    /// Returns the successors of a state by index, with their probabilities.
     pub fn row(&self, state: usize) -> &[(u32, f64)] {
         self.rows.row(state)
     }
 
-    /// The distribution one action later. Shape: that of [`Chain::states`], as the result.
+    /// Returns the distribution one action later. Shape: that of [`Chain::states`], as the
+    /// argument.
     pub fn step(&self, distribution: &[f64]) -> Vec<f64> {
         let mut next = vec![0.0; self.states.len()];
         for (&mass, row) in distribution.iter().zip(self.rows.rows()) {
@@ -101,12 +102,12 @@ impl Chain {
         next
     }
 
-    /// The distribution after `actions` actions from the start.
+    /// Returns the distribution after `actions` actions from the start.
     pub fn distribution_after(&self, actions: u64) -> Vec<f64> {
         let mut distribution = self.start();
         for _ in 0..actions {
             let next = self.step(&distribution);
-            // A fixed point stays what it is, however many actions are left.
+            // A fixed point stays the same, however many actions are left.
             if next == distribution {
                 break;
             }
@@ -115,11 +116,11 @@ impl Chain {
         distribution
     }
 
-    /// The share of actions spent in each state in the long run from the start.
+    /// Returns the share of actions spent in each state in the long run from the start.
     ///
-    /// Power iteration on the chain that does nothing half of the time: it has the same long
-    /// run, and converges where the chain itself is periodic. Where it does not within the
-    /// work allowed, [`Stationary::residual`] says how far it got.
+    /// Uses power iteration on the chain that stays in place half of the time, because that chain
+    /// has the same long run and converges even where the chain itself is periodic. Where it does
+    /// not converge within the work allowed, [`Stationary::residual`] says how close it is.
     pub fn stationary(&self) -> Stationary {
         let mut distribution = self.start();
         let limit = (MAX_WORK / self.rows.len().max(1)).clamp(100, 1_000_000) as u32;
@@ -135,7 +136,7 @@ impl Chain {
         Stationary { distribution, residual, iterations: limit }
     }
 
-    /// A distribution over states as one over poses.
+    /// Returns a distribution over states as one over poses.
     pub fn over_poses(&self, distribution: &[f64]) -> BTreeMap<Pose, f64> {
         let mut poses = BTreeMap::new();
         for (state, p) in self.states.iter().zip(distribution) {
@@ -151,8 +152,8 @@ impl Chain {
     }
 }
 
-/// Half the sum of absolute differences: the largest difference in the probability of any
-/// event.
+/// Returns the total variation, half the sum of absolute differences: the largest difference in the
+/// probability of any event.
 ///
 /// # Panics
 /// When the distributions are over different numbers of states.
@@ -171,7 +172,7 @@ fn check_actions(model: &Model, policy: &Random) -> Result<(), InputError> {
     Err(InputError::new(&model.place, cause, "give weights to the robot's own actions only"))
 }
 
-/// States after one action chosen by the policy, unmerged.
+/// Returns the states after one action chosen by the policy, unmerged.
 fn successors<'a>(
     model: &'a Model,
     policy: &'a Random,

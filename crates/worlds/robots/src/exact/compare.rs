@@ -1,4 +1,4 @@
-//! The simulator against the exact chain: are the robots where they ought to be?
+//! The simulator against the exact chain: a test of the distribution of final poses.
 
 use super::Model;
 use super::chain::total_variation;
@@ -14,19 +14,19 @@ use sidestep_scenario::Source;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Chance that a simulator without fault is found to disagree.
+/// Chance that a simulator without fault is reported to disagree.
 pub const SIGNIFICANCE: f64 = 1e-4;
 
-/// Where independent runs end, against the exact distribution.
+/// The final poses of independent runs, compared with the exact distribution.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Comparison {
-    /// Length of each run.
+    /// Length of each run in cycles.
     pub cycles: u64,
-    /// Number of runs, each with its own seed.
+    /// Number of runs, each with a seed of its own.
     pub runs: u32,
-    /// Total variation between the runs' last poses and the exact distribution.
+    /// Total variation between the runs' final poses and the exact distribution.
     pub total_variation: f64,
-    /// What sampling alone stays below, but for one time in `1 / significance`.
+    /// Limit that sampling alone exceeds with a probability of at most `significance`.
     pub limit: f64,
     /// See [`SIGNIFICANCE`].
     pub significance: f64,
@@ -38,10 +38,10 @@ pub struct Comparison {
 /// (run k with the scenario's seed plus k) and compares where it ends with
 /// [`Chain::distribution_after`](super::Chain::distribution_after).
 ///
-/// Runs are independent, so that the limit holds whether or not the chain mixes.
+/// The runs are independent, so the limit holds whether or not the chain mixes.
 ///
 /// # Errors
-/// When the scenario is no chain, see [`Model::new`], or `runs` is 0.
+/// When the scenario is not a chain, see [`Model::new`], or `runs` is 0.
 pub fn compare(
     compiled: &Compiled,
     source: &Source,
@@ -66,7 +66,7 @@ impl Comparison {
         cycles: u64,
         runs: u32,
     ) -> Self {
-        // Poses that the model does not know count in full.
+        // Poses that the model does not know count in full, because their exact probability is 0.
         let unknown = counts.keys().filter(|pose| !exact.contains_key(pose));
         let poses: Vec<Pose> = exact.keys().chain(unknown).copied().collect();
         let expected: Vec<f64> =
@@ -80,7 +80,7 @@ impl Comparison {
     }
 }
 
-/// The total variation that the shares of `samples` independent samples of `distribution`
+/// Returns the total variation that the shares of `samples` independent samples of `distribution`
 /// exceed with a probability of at most `significance`.
 ///
 /// The mean is at most half the sum of the shares' standard deviations; one sample more or
@@ -92,7 +92,7 @@ pub fn sampling_limit(distribution: &[f64], samples: f64, significance: f64) -> 
     mean + (math::ln(1.0 / significance) / (2.0 * samples)).sqrt()
 }
 
-/// How often each pose is the last.
+/// Counts how often each pose is the final one.
 fn last_poses(
     compiled: &Compiled,
     source: &Source,
@@ -113,7 +113,7 @@ fn last_poses(
     counts
 }
 
-/// Gives the robots another behaviour.
+/// Gives the robots another behavior.
 fn follow(world: &mut RobotsWorld, policy: &Random) {
     for ty in &mut world.types {
         if let Role::Robot(model) = &mut ty.role {

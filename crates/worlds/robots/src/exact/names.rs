@@ -22,7 +22,7 @@ const RESERVED: [&str; 16] = [
     "cost",
 ];
 
-/// Valid names, all different, as near to the given ones as can be.
+/// Returns valid names, all different, as close to the given ones as possible.
 pub(super) fn valid(names: impl IntoIterator<Item = String>) -> Vec<String> {
     let mut used = BTreeSet::new();
     let unique = |name: String| {

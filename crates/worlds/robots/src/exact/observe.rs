@@ -1,4 +1,4 @@
-//! What a robot's beams report at a pose, with probabilities.
+//! The reports of a robot's beams at a pose, with their probabilities.
 
 use super::Model;
 use super::building::Building;
@@ -19,7 +19,7 @@ pub struct Beam {
     pub index: usize,
 }
 
-/// A beam with the boxes it crosses, for every heading.
+/// A beam with the boxes that it crosses, for every heading.
 pub(super) struct MountedBeam<'a> {
     pub(super) sensor: &'a MountedSensor,
     reliable: bool,
@@ -45,14 +45,15 @@ impl<'a> MountedBeam<'a> {
         Ok(Self { sensor, reliable: sensor.is_reliable(), crossed })
     }
 
-    /// `P(reading | pose)`, readings of probability 0 left out.
+    /// Returns `P(reading
+    /// pose)`; readings of probability 0 are left out.
     pub(super) fn readings(&self, building: &Building, pose: Pose) -> Vec<(Reading, f64)> {
         let mut row = self.sensor.model.reading_row(self.truth(building, pose), self.reliable);
         row.retain(|reading| reading.1 > 0.0);
         row
     }
 
-    /// What the beam truly meets.
+    /// Returns the beam's true reading.
     fn truth(&self, building: &Building, pose: Pose) -> Reading {
         let kind_at = |c: &Crossing| building.kind_at(pose.col + c.dx, pose.row + c.dy);
         let mut met = self.crossed[usize::from(pose.heading)].iter().map(|c| (c, kind_at(c)));
@@ -70,7 +71,7 @@ fn unknown_sensor(name: &str, sensors: &[MountedSensor]) -> InputError {
     InputError::new("--sensor", format!("the robot has no sensor `{name}`"), remedy)
 }
 
-/// The beam of the first sensor that looks most nearly ahead, if there is a sensor.
+/// Returns the beam of the first sensor that points most nearly ahead, if there is a sensor.
 pub(super) fn ahead(model: &Model) -> Option<Beam> {
     let sensor = &model.robot.body.sensors.first()?.model;
     let off_ahead = |deg: f64| (deg - 360.0 * (deg / 360.0).round()).abs();

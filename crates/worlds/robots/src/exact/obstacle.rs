@@ -1,35 +1,34 @@
-//! The obstacle rule as arithmetic: what an action comes to at a place, with probabilities.
+//! The obstacle rule as arithmetic: the outcomes of an action at a place, with probabilities.
 //!
 //! Written from the model's description alone, not from the simulator: boxes are found by
-//! coordinates, where the simulator walks lists of prepared offsets. The tests hold the two
-//! against each other.
+//! coordinates, where the simulator walks lists of prepared offsets. The tests compare the two.
 
 use crate::effector::{ObstacleRule, Side, Transition};
 use crate::state::FREE;
 use std::collections::BTreeMap;
 
-/// Where a body stands and how it is turned.
+/// Place and heading of a body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Pose {
     /// Column of its lower-left box, from the west.
     pub col: i32,
     /// Row of its lower-left box, from the south.
     pub row: i32,
-    /// 0 east, 1 north, 2 west, 3 south.
+    /// Heading: 0 east, 1 north, 2 west, 3 south.
     pub heading: u8,
 }
 
-/// How an action ends.
+/// The end of an action.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Outcome {
-    /// Where the body is then.
+    /// The pose of the body afterwards.
     pub pose: Pose,
-    /// Kind of the thing that stopped it, and the side of the body that touched it.
+    /// Kind of the obstacle that stopped it, and the side of the body that touched it.
     pub contact: Option<(u8, Side)>,
 }
 
 impl Pose {
-    /// The pose one box further to `side`.
+    /// Returns the pose one box farther to `side`.
     fn shifted(self, side: Side) -> Self {
         let (dx, dy) = unit(self.heading, side);
         Self { col: self.col + dx, row: self.row + dy, ..self }
@@ -39,14 +38,14 @@ impl Pose {
         Self { heading: (self.heading + quarters) % 4, ..self }
     }
 
-    /// The boxes next to a `size` x `size` body on `side`, from the left to the right as
-    /// seen looking that way.
+    /// Returns the boxes next to a `size` x `size` body on `side`, from left to right as seen
+    /// looking that way.
     fn beside(self, size: u32, side: Side) -> impl Iterator<Item = (i32, i32)> {
         let last = size as i32 - 1;
         let (dx, dy) = unit(self.heading, side);
         // The body's own boxes on that side lie on the line through this corner ...
         let corner = (self.col + last * i32::from(dx > 0), self.row + last * i32::from(dy > 0));
-        // ... along the direction a quarter to the right, which may begin at its far end.
+        // ... along the direction a quarter to the right, which may start at its far end.
         let (rx, ry) = (dy, -dx);
         let first =
             (corner.0 + last * i32::from(rx < 0) + dx, corner.1 + last * i32::from(ry < 0) + dy);
@@ -54,12 +53,12 @@ impl Pose {
     }
 }
 
-/// The distribution of outcomes of an action of a `size` x `size` body, here and now.
+/// Returns the distribution of outcomes of an action of a `size` x `size` body at its present
+/// place.
 ///
-/// `transitions` hold in a free place; `kind_at(col, row)` is the kind of what stands in a
-/// box, 0 for nothing, and knows nothing of the body itself. Equal outcomes are merged, and
-/// come in the order of their poses. Probabilities are those of `transitions`, so they sum
-/// to 1 when those do.
+/// `transitions` hold in free space; `kind_at(col, row)` is the kind of a box's occupant, 0 for an
+/// empty box, and does not count the body itself. Equal outcomes are merged, and sorted by their
+/// poses. Probabilities are those of `transitions`, so they sum to 1 when those do.
 pub fn here_and_now(
     transitions: &[Transition],
     size: u32,
@@ -96,8 +95,7 @@ fn walk(
     Outcome { pose: at.turned(transition.turn), contact: None }
 }
 
-/// Strikes out what is blocked and rescales the rest; keeps the first contact when nothing
-/// is left.
+/// Removes the blocked outcomes and rescales the rest; keeps the first contact when none is left.
 fn renormalised(walked: Vec<(Outcome, f64)>) -> Vec<(Outcome, f64)> {
     let free = |w: &&(Outcome, f64)| w.0.contact.is_none();
     let left: f64 = walked.iter().filter(free).map(|w| w.1).sum();
@@ -115,7 +113,7 @@ fn merged(outcomes: Vec<(Outcome, f64)>) -> Vec<(Outcome, f64)> {
     sums.into_iter().collect()
 }
 
-/// The unit vector to a side of a body with this heading.
+/// Returns the unit vector to a side of a body with this heading.
 fn unit(heading: u8, side: Side) -> (i32, i32) {
     match (heading + side as u8) % 4 {
         0 => (1, 0),

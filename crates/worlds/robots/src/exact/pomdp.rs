@@ -1,10 +1,10 @@
 //! The model as a POMDP in Cassandra's text format, for planners.
 //!
-//! - A state is a pose, with the contact that the last action ended in (`c3r4-east`,
+//! - A state is a pose, with the contact in which the last action ended (`c3r4-east`,
 //!   `c3r4-east-front-wall`).
-//! - An observation is that contact, which a robot feels without error, and what some beams
-//!   report (`free_wall-near`): all beams of a ring at once would be too many observations
-//!   for any planner.
+//! - An observation is that contact, which a robot feels without error, and the reports of some
+//!   beams (`free_wall-near`). It is only some, because all beams of a ring together would make too
+//!   many observations for any planner.
 //! - The reward is 1 for each action that ends at the goal; without a goal, 0 throughout.
 //!
 //! Format: <https://www.pomdp.org/code/pomdp-file-spec.html>.
@@ -22,23 +22,23 @@ use serde::Serialize;
 use sidestep_kernel::InputError;
 use std::collections::BTreeMap;
 
-/// What to write.
+/// The contents of a POMDP to write.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PomdpOptions {
     /// Discount per action, above 0 and below 1.
     pub discount: f64,
-    /// Column and row to reach, of the robot's lower-left box.
+    /// Column and row that the robot's lower-left box is to reach.
     pub goal: Option<(u32, u32)>,
     /// Whether the robot feels its contacts; they become part of the states.
     pub contacts: bool,
-    /// The beams whose readings are observed, at most [`MAX_BEAMS`]; `None` for the one that
-    /// looks most nearly ahead.
+    /// The beams whose readings are observed, at most [`MAX_BEAMS`]; `None` for the one that points
+    /// most nearly ahead.
     pub beams: Option<Vec<Beam>>,
 }
 
-/// Most beams that are observed together.
+/// Largest number of beams that are observed together.
 pub const MAX_BEAMS: usize = 3;
-/// Most lines of a file.
+/// Largest number of lines of a file.
 const MAX_LINES: usize = 10_000_000;
 
 impl Default for PomdpOptions {
@@ -47,18 +47,18 @@ impl Default for PomdpOptions {
     }
 }
 
-/// How large a POMDP is.
+/// The size of a POMDP.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct PomdpSize {
     /// Number of states.
     pub states: usize,
     /// Number of actions.
     pub actions: usize,
-    /// Number of observations that some state gives rise to.
+    /// Number of observations that can occur in some state.
     pub observations: usize,
-    /// Entries of the transition matrices above 0.
+    /// Number of entries of the transition matrices above 0.
     pub transitions: usize,
-    /// Entries of the observation matrix above 0.
+    /// Number of entries of the observation matrix above 0.
     pub readings: usize,
 }
 
@@ -70,9 +70,9 @@ pub struct Pomdp {
     states: Vec<String>,
     actions: Vec<String>,
     observations: Vec<String>,
-    /// Row `state * actions + action`: successors.
+    /// Successors, in row `state * actions + action`.
     transitions: Sparse<(u32, f64)>,
-    /// Row `state`: observations.
+    /// Observations, in row `state`.
     readings: Sparse<(u32, f64)>,
     /// States at the goal.
     goals: Vec<u32>,
@@ -81,7 +81,7 @@ pub struct Pomdp {
 type Contact = Option<(u8, Side)>;
 /// A contact and the (observation, class) of each beam.
 type Observation = (Contact, Vec<(u8, u8)>);
-/// Index of a pose, and the contact in which the action before ended there.
+/// Index of a pose, and the contact in which the last action ended there.
 type State = (u32, Contact);
 
 impl Pomdp {
@@ -106,7 +106,7 @@ impl Pomdp {
         })
     }
 
-    /// How large it is.
+    /// Returns its size.
     pub fn size(&self) -> PomdpSize {
         PomdpSize {
             states: self.states.len(),
@@ -146,7 +146,7 @@ fn beams<'a>(model: &'a Model, options: &PomdpOptions) -> Result<Vec<MountedBeam
     chosen.iter().map(|beam| MountedBeam::new(model, beam)).collect()
 }
 
-/// The states with their numbers, and in the order of these; the start is the first.
+/// Returns the number of each state, and the states in that order; the start is the first.
 fn states(model: &Model, contacts: bool) -> (BTreeMap<State, u32>, Vec<State>) {
     let start = (0, None);
     let (mut numbers, mut order) = (BTreeMap::from([(start, 0)]), vec![start]);
@@ -209,7 +209,8 @@ fn observed(
     Ok((observations.into_iter().map(|o| o.0).collect(), rows))
 }
 
-/// Readings of all beams at a pose: independent given the pose, so a product.
+/// Returns the readings of all beams at a pose: a product, because they are independent given the
+/// pose.
 fn joint(model: &Model, beams: &[MountedBeam<'_>], pose: u32) -> Vec<(Vec<(u8, u8)>, f64)> {
     let pose = model.poses[pose as usize];
     let mut joint = vec![(Vec::new(), 1.0)];

@@ -1,6 +1,6 @@
-//! Rows of few entries, one after the other in memory.
+//! Sparse rows, one after the other in memory.
 
-/// A matrix by rows; an entry is whatever names its column and value.
+/// A matrix by rows; an entry is any type that holds its column and value.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Sparse<T> {
     ends: Vec<usize>,
@@ -20,18 +20,18 @@ impl<T> Sparse<T> {
         self.ends.push(self.entries.len());
     }
 
-    /// The row with this number.
+    /// Returns the row with this number.
     pub(super) fn row(&self, index: usize) -> &[T] {
         let begin = if index == 0 { 0 } else { self.ends[index - 1] };
         &self.entries[begin..self.ends[index]]
     }
 
-    /// All rows in order.
+    /// Returns all rows in order.
     pub(super) fn rows(&self) -> impl Iterator<Item = &[T]> {
         (0..self.ends.len()).map(|index| self.row(index))
     }
 
-    /// Number of entries of all rows.
+    /// Returns the number of entries of all rows.
     pub(super) fn len(&self) -> usize {
         self.entries.len()
     }

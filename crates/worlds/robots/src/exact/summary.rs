@@ -1,4 +1,4 @@
-//! What the command reports of a model.
+//! The command's report of a model.
 
 use super::chain::{Convergence, Stationary};
 use super::{Chain, Comparison, Model, PomdpSize};
@@ -14,35 +14,35 @@ pub struct Summary {
     pub poses: usize,
     /// Names of its actions.
     pub actions: Vec<String>,
-    /// Outcomes over all poses and actions.
+    /// Number of outcomes over all poses and actions.
     pub outcomes: usize,
     /// The policy, as the caller names it.
     pub policy: String,
-    /// States of the chain under the policy.
+    /// Number of states of the chain under the policy.
     pub chain_states: usize,
-    /// How well the long run is known.
+    /// The accuracy of the long run.
     stationary: Convergence,
     /// The boxes that hold the robot's lower-left box most often in the long run.
     pub most_visited: Vec<VisitedBox>,
-    /// The exported POMDP, where one was made.
+    /// Size of the exported POMDP, where one was made.
     pub pomdp: Option<PomdpSize>,
-    /// The simulator against the chain, where it was run.
+    /// The comparison of the simulator with the chain, where it was made.
     pub comparison: Option<Comparison>,
 }
 
-/// A box and how often the robot is there.
+/// A box, and the share of time that the robot is there.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct VisitedBox {
     /// Column, from the west.
     pub col: i32,
     /// Row, from the south.
     pub row: i32,
-    /// Share of the actions that begin there.
+    /// Share of the actions that start there.
     pub share: f64,
 }
 
 impl Model {
-    /// The model under `policy`, named `name`, with the `top` most visited boxes.
+    /// Summarizes the model under `policy`, named `name`, with the `top` most visited boxes.
     ///
     /// # Errors
     /// When the policy does not fit the robot.
@@ -63,7 +63,7 @@ impl Model {
     }
 }
 
-/// Boxes by falling share; equal ones by row and column.
+/// Returns the boxes by falling share; equal ones by row and column.
 fn most_visited(chain: &Chain, stationary: &Stationary, top: usize) -> Vec<VisitedBox> {
     let mut shares = BTreeMap::new();
     for (pose, p) in chain.over_poses(&stationary.distribution) {

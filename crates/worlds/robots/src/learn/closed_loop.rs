@@ -1,5 +1,5 @@
-//! Promise: simulate with known tables, record, learn, and the tables come back within the
-//! stated error.
+//! Promise: when a run with known tables is simulated and recorded, learning from the recording
+//! gives back the tables within the stated error.
 
 use std::collections::BTreeMap;
 
@@ -14,7 +14,7 @@ use sidestep_statistics::chi_square_p;
 
 const CYCLES: u64 = 4000;
 
-/// Twelve robots in an open hall, whose sensor and effector are told here.
+/// Twelve robots in an open hall, with the sensor and effector that are known here.
 fn scenario() -> Source {
     let row = ".".repeat(80) + "\n";
     let text = format!(
@@ -87,8 +87,8 @@ fn as_csv(recorder: &MemoryRecorder, schema: &TableSchema) -> String {
 }
 
 /// Asserts that the known probabilities of (row, column) are found: each within an interval's
-/// width, and each row as near as chance brings it in 999 of 1000 runs. (Of twenty intervals
-/// at 95 % one may miss, so that all contain the truth is not to be expected.)
+/// width, and each row as near as chance brings it in 999 of 1000 runs. (Of twenty intervals at 95
+/// % one may miss, so it cannot be expected that all contain the truth.)
 fn assert_recovered(estimates: &[Estimate], table: &str, known: &[(&str, &str, f64)]) {
     let mut rows: BTreeMap<&str, (f64, usize)> = BTreeMap::new();
     for (row, column, p) in known {

@@ -1,12 +1,12 @@
-//! Tables of counts: rows are what was true, columns what came out.
+//! Tables of counts: rows are the truth, columns the outcomes.
 
 use serde::Serialize;
 use serde::ser::{SerializeMap, Serializer};
 
 use sidestep_statistics::{Interval, wilson};
 
-/// Counts of outcomes by row. A count may be fractional where one event is spread over
-/// outcomes (phase averaging); a row's total is its number of events all the same.
+/// Counts of outcomes by row. A count may be fractional where one event is spread over outcomes
+/// (phase averaging); the total of a row is its number of events all the same.
 ///
 /// Serialized as `{row: {column: count}}` without empty cells and rows.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,18 +18,18 @@ pub struct Counts {
     cells: Vec<Vec<f64>>,
 }
 
-/// One estimated probability and what it rests on.
+/// One estimated probability and the counts on which it rests.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Estimate {
-    /// Which table of counts.
+    /// Name of the table of counts.
     pub table: String,
-    /// What was true, or commanded.
+    /// The truth, or the command.
     pub row: String,
-    /// What came out.
+    /// The outcome.
     pub column: String,
-    /// How often.
+    /// Number of times that the outcome occurred.
     pub count: f64,
-    /// Out of how many.
+    /// Number of events of the row.
     pub of: f64,
     /// `count / of`, without smoothing.
     pub probability: f64,
@@ -40,16 +40,16 @@ pub struct Estimate {
 /// A row that rests on few counts.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ThinRow {
-    /// Which table of counts.
+    /// Name of the table of counts.
     pub table: String,
-    /// What was true, or commanded.
+    /// The truth, or the command.
     pub row: String,
-    /// Counts in the row.
+    /// Number of counts in the row.
     pub count: f64,
 }
 
 impl Counts {
-    /// A table without counts.
+    /// Returns a table without counts.
     pub fn new(name: &str, rows: &[String], columns: &[String]) -> Self {
         Self {
             name: name.to_owned(),
@@ -64,43 +64,43 @@ impl Counts {
         self.cells[row][column] += weight;
     }
 
-    /// What the table counts.
+    /// Returns the name of the table.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Names of the rows.
+    /// Returns the names of the rows.
     pub fn rows(&self) -> &[String] {
         &self.rows
     }
 
-    /// Names of the columns.
+    /// Returns the names of the columns.
     pub fn columns(&self) -> &[String] {
         &self.columns
     }
 
-    /// All counts, shape `(rows, columns)`.
+    /// Returns all counts, shape `(rows, columns)`.
     pub fn cells(&self) -> &[Vec<f64>] {
         &self.cells
     }
 
-    /// The counts of one row.
+    /// Returns the counts of one row.
     pub fn row(&self, row: usize) -> &[f64] {
         &self.cells[row]
     }
 
-    /// Sum of one row.
+    /// Returns the sum of one row.
     pub fn total(&self, row: usize) -> f64 {
         self.cells[row].iter().sum()
     }
 
-    /// The row as probabilities after `alpha` is added to every cell; `None` when the row has
-    /// no counts, because then all it would tell is the shape of the table.
+    /// Returns the row as probabilities after `alpha` is added to every cell; `None` when the row
+    /// has no counts, because then only the shape of the table would show.
     pub fn smoothed(&self, row: usize, alpha: f64) -> Option<Vec<f64>> {
         (self.total(row) > 0.0).then(|| smooth(&self.cells[row], alpha))
     }
 
-    /// Every cell of every row that has counts, as a probability.
+    /// Returns every cell of every row that has counts, as a probability.
     pub fn estimates(&self) -> Vec<Estimate> {
         (0..self.rows.len())
             .filter(|&row| self.total(row) > 0.0)
@@ -121,7 +121,7 @@ impl Counts {
         }
     }
 
-    /// The rows with fewer than `below` counts, those with none included.
+    /// Returns the rows with fewer than `below` counts, including those with none.
     pub fn thin(&self, below: u32) -> Vec<ThinRow> {
         let totals = self.rows.iter().enumerate().map(|(i, row)| (row, self.total(i)));
         let thin = totals.filter(|(_, total)| *total < f64::from(below));
@@ -130,7 +130,7 @@ impl Counts {
     }
 }
 
-/// Probabilities from counts, `alpha` added to each; all equal when there is nothing to go by.
+/// Returns probabilities from counts, `alpha` added to each; all equal when every sum is zero.
 pub(crate) fn smooth(counts: &[f64], alpha: f64) -> Vec<f64> {
     let total: f64 = counts.iter().map(|count| count + alpha).sum();
     if total <= 0.0 {
@@ -139,7 +139,7 @@ pub(crate) fn smooth(counts: &[f64], alpha: f64) -> Vec<f64> {
     counts.iter().map(|count| (count + alpha) / total).collect()
 }
 
-/// Probabilities with nine decimals that sum to 1: what rounding takes or gives goes to the
+/// Returns probabilities with nine decimals that sum to 1: the rounding error is given to the
 /// greatest.
 pub(crate) fn rounded(probabilities: &[f64]) -> Vec<f64> {
     let nine = |p: f64| (p * 1e9).round() / 1e9;
@@ -152,7 +152,7 @@ pub(crate) fn rounded(probabilities: &[f64]) -> Vec<f64> {
     row
 }
 
-/// A count is written as an integer where it is one.
+/// A count, written as an integer where it is one.
 struct Count(f64);
 
 impl Serialize for Count {

@@ -6,18 +6,18 @@ use super::holdout::Fit;
 use super::{Estimate, ThinRow};
 use sidestep_statistics::Moments;
 
-/// What rows and columns of a table are.
+/// The names of a table's rows and columns.
 pub(super) struct Heading {
     pub(super) row: &'static str,
     pub(super) column: &'static str,
 }
 
-/// Warnings, one a line.
+/// Writes warnings, one per line.
 pub(super) fn warnings(f: &mut Formatter<'_>, warnings: &[String]) -> Result {
     warnings.iter().try_for_each(|warning| writeln!(f, "WARNING: {warning}"))
 }
 
-/// Named moments, one a line; those of nothing are left out.
+/// Writes named moments, one per line; those without values are left out.
 pub(super) fn moments(f: &mut Formatter<'_>, named: &[(String, Option<Moments>)]) -> Result {
     if named.iter().all(|(_, moments)| moments.is_none()) {
         return Ok(());
@@ -36,7 +36,7 @@ pub(super) fn moments(f: &mut Formatter<'_>, named: &[(String, Option<Moments>)]
     Ok(())
 }
 
-/// Estimates, a table for each name; cells without counts are left out.
+/// Writes estimates, one table for each name; cells without counts are left out.
 pub(super) fn estimates(f: &mut Formatter<'_>, all: &[Estimate], heading: &Heading) -> Result {
     let mut table = "";
     for estimate in all.iter().filter(|estimate| estimate.count > 0.0) {
@@ -54,7 +54,7 @@ pub(super) fn estimates(f: &mut Formatter<'_>, all: &[Estimate], heading: &Headi
 }
 
 fn line(f: &mut Formatter<'_>, e: &Estimate) -> Result {
-    // Counts of events spread over outcomes are fractional.
+    // Counts of events that are spread over outcomes are fractional.
     let decimals = if e.count.fract() == 0.0 { 0 } else { 2 };
     writeln!(
         f,
@@ -63,7 +63,7 @@ fn line(f: &mut Formatter<'_>, e: &Estimate) -> Result {
     )
 }
 
-/// Rows with few counts.
+/// Writes the rows with few counts.
 pub(super) fn thin(f: &mut Formatter<'_>, thin: &[ThinRow], below: u32) -> Result {
     if thin.is_empty() {
         return writeln!(f, "\nEvery row has at least {below} counts.");
@@ -72,7 +72,7 @@ pub(super) fn thin(f: &mut Formatter<'_>, thin: &[ThinRow], below: u32) -> Resul
     thin.iter().try_for_each(|row| writeln!(f, "  {} {}: {}", row.table, row.row, row.count))
 }
 
-/// How well a part of the events predicts the rest.
+/// Writes how well a part of the events predicts the rest.
 pub(super) fn hold_out(f: &mut Formatter<'_>, fits: &[Fit]) -> Result {
     writeln!(f, "\nHold-out fit (same law in both parts? log-loss in nat per event)")?;
     let heads = ["table", "learned", "held out", "chi2", "df", "p", "log-loss", "floor"];

@@ -1,4 +1,4 @@
-//! How well a part of the events predicts the rest.
+//! A test of how well a part of the events predicts the rest.
 
 use serde::Serialize;
 
@@ -9,31 +9,31 @@ use sidestep_statistics::chi_square_p;
 /// Cells expected to hold fewer counts than this are pooled before a chi-square test.
 const EXPECTED_MIN: f64 = 5.0;
 
-/// What the events held out say about the table learned from the others.
+/// The agreement of held-out events with the table learned from the others.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Fit {
-    /// Which table of counts.
+    /// Name of the table of counts.
     pub table: String,
-    /// Events learned from.
+    /// Number of events used for learning.
     pub trained_on: f64,
-    /// Events held out.
+    /// Number of events held out.
     pub held_out: f64,
     /// Chi-square statistic of the hypothesis that both parts follow one law.
     pub chi_square: f64,
     /// Its degrees of freedom, after cells that expect fewer than 5 counts are pooled.
     pub degrees_of_freedom: usize,
     /// Probability of a statistic at least this large under that hypothesis, if events are
-    /// independent. Readings of one image are not: there a small value says no more than that.
-    /// Where an event is spread over outcomes (phase averaging) it errs to the high side.
+    /// independent. Readings of one image are not independent: there a small value says nothing
+    /// more. Where an event is spread over outcomes (phase averaging) the value is too high.
     pub p_value: f64,
-    /// Mean of `-ln P(outcome)` over the events held out, in nat, with the smoothed
-    /// probabilities learned; `None` when nothing was held out or a probability was 0.
+    /// Mean of `-ln P(outcome)` over the events held out, in nat, with the smoothed learned
+    /// probabilities; `None` when nothing was held out or a probability was 0.
     pub log_loss: Option<f64>,
-    /// The same with the best probabilities possible, those of the held-out part itself.
+    /// The same with the best possible probabilities, those of the held-out part itself.
     pub log_loss_floor: Option<f64>,
 }
 
-/// Splits events into those to learn from and every `every`-th, held out.
+/// Splits events into those for learning and every `every`-th, which is held out.
 pub fn split<T>(events: &[T], every: usize) -> (Vec<&T>, Vec<&T>) {
     let held = |index: usize| index % every == every - 1;
     let part = |wanted: bool| {
@@ -63,7 +63,7 @@ pub fn fit(trained: &Counts, held: &Counts, alpha: f64) -> Fit {
     }
 }
 
-/// Chi-square statistic and freedom of "two samples, one law".
+/// Returns chi-square statistic and degrees of freedom of "two samples, one law".
 fn homogeneity(a: &[f64], b: &[f64]) -> (f64, usize) {
     let (n_a, n_b): (f64, f64) = (a.iter().sum(), b.iter().sum());
     if n_a <= 0.0 || n_b <= 0.0 {
@@ -80,7 +80,7 @@ fn homogeneity(a: &[f64], b: &[f64]) -> (f64, usize) {
     (statistic.sum(), cells.len() - 1)
 }
 
-/// The cells of two samples, the rarest joined until each holds `least` counts.
+/// Returns the cells of two samples, the rarest joined until each holds `least` counts.
 fn pool_rare(a: &[f64], b: &[f64], least: f64) -> Vec<(f64, f64)> {
     let mut cells: Vec<(f64, f64)> = a.iter().copied().zip(b.iter().copied()).collect();
     cells.sort_by(|x, y| (x.0 + x.1).total_cmp(&(y.0 + y.1)));
@@ -105,7 +105,7 @@ fn log_loss(trained: &Counts, held: &Counts, alpha: f64) -> Option<f64> {
     for row in 0..held.rows().len() {
         let probabilities = smooth(trained.row(row), alpha);
         for (count, p) in held.row(row).iter().zip(probabilities) {
-            // 0 * ln 0 is 0: what did not happen costs nothing.
+            // 0 * ln 0 is 0: an outcome that did not occur costs nothing.
             if *count > 0.0 {
                 loss -= count * ln(p);
                 events += count;

@@ -1,12 +1,12 @@
 //! Learns a real robot's sensor and effector errors from its logs.
 //!
-//! Reads logs through [`sidestep_import`], counts ([`Counts`]), and writes what it found as a
-//! profile that a scenario loads by name ([`profile`]). [`sensor`] learns confusion, distance
-//! and detection; [`effector`] learns what a commanded move or turn really does.
+//! Reads logs through [`sidestep_import`], counts ([`Counts`]), and writes the result as a profile
+//! that a scenario loads by name ([`profile`]). [`sensor`] learns confusion, distance and
+//! detection; [`effector`] learns the real motion after a commanded move or turn.
 //!
 //! Every probability is reported with its count and a 95 % interval
-//! ([`statistics::wilson`](sidestep_statistics::wilson)); a part of the events is held out to
-//! say how well the rest predicts it ([`holdout`]). Learning draws no random numbers.
+//! ([`statistics::wilson`](sidestep_statistics::wilson)); a part of the events is held out to test
+//! how well the rest predicts it ([`holdout`]). Learning draws no random numbers.
 
 pub mod effector;
 pub mod sensor;
@@ -28,11 +28,12 @@ use serde::Serialize;
 
 use sidestep_kernel::InputError;
 
-/// How counts become probabilities.
+/// The rule by which counts become probabilities.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct EstimateOptions {
-    /// Added to every count of a row before it is normalized. The default, 0.5, is Jeffreys'
-    /// prior: nothing is impossible because it was not seen, and a hundred counts outweigh it.
+    /// Count added to every cell of a row before the row is normalized. The default, 0.5, is
+    /// Jeffreys' prior: an outcome is not impossible because it was not seen, and a hundred counts
+    /// outweigh it.
     pub alpha: f64,
     /// Rows with fewer counts than this are reported as thin.
     pub thin_below: u32,
@@ -47,7 +48,7 @@ impl Default for EstimateOptions {
 }
 
 impl EstimateOptions {
-    /// Refuses options that mean nothing.
+    /// Checks that the options are valid.
     ///
     /// # Errors
     /// When `alpha` is negative or not finite, or `hold_out_every` is below 2.

@@ -3,7 +3,7 @@
 use sidestep_import::mrclam::TruePose;
 use sidestep_kernel::math::{atan2, cos, hypot, sin, wrap_angle};
 
-/// Motion capture with a gap wider than this says nothing about the time between.
+/// Motion capture with a wider gap than this says nothing about the time between.
 const BRACKET_SECS_MAX: f64 = 0.5;
 
 /// A pose in the plane.
@@ -30,7 +30,7 @@ impl From<[f64; 3]> for Pose {
 }
 
 impl Pose {
-    /// How one gets from here to `to`.
+    /// Returns the motion from here to `to`.
     pub(crate) fn motion_to(&self, to: &Pose) -> Motion {
         let (dx, dy) = (to.x_m - self.x_m, to.y_m - self.y_m);
         let (s, c) = (sin(self.heading_rad), cos(self.heading_rad));
@@ -41,14 +41,14 @@ impl Pose {
         }
     }
 
-    /// Range in m and bearing in rad (+ = left) of a point.
+    /// Returns the range in meters and the bearing in radians (+ = left) of a point.
     pub(crate) fn sees(&self, [x_m, y_m]: [f64; 2]) -> (f64, f64) {
         let (dx, dy) = (x_m - self.x_m, y_m - self.y_m);
         (hypot(dx, dy), wrap_angle(atan2(dy, dx) - self.heading_rad))
     }
 }
 
-/// The pose at `t_secs`: linear between the two samples around it, the heading along the
+/// Returns the pose at `t_secs`: linear between the two samples around it, the heading along the
 /// shorter arc. `None` outside the track and inside a gap wider than 0.5 s.
 pub(crate) fn pose_at(track: &[TruePose], t_secs: f64) -> Option<Pose> {
     let after = track.partition_point(|sample| sample.t_secs < t_secs);

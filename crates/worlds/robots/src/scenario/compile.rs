@@ -1,4 +1,4 @@
-//! A scenario's text -> an immutable world and where everybody starts.
+//! From a scenario's text to an immutable world and everybody's start.
 
 mod bodies;
 mod map;
@@ -33,13 +33,13 @@ use std::ops::Range;
 use std::sync::Arc;
 use toml::Spanned;
 
-/// Most bodies of a scenario.
+/// Largest number of bodies of a scenario.
 const MAX_BODIES: u64 = 10_000_000;
-/// Cycles of a run whose scenario does not say it.
+/// Number of cycles of a run whose scenario does not give it.
 const CYCLES: u64 = 10_000;
 const MAX_RANGE_BOXES: f64 = 4096.0;
 
-/// Behaviours of the library's user, by the name a scenario gives them.
+/// Behaviors that the library's user adds, by the name that a scenario gives them.
 pub type Behaviours = BTreeMap<String, Arc<dyn Behaviour>>;
 
 /// A compiled scenario.
@@ -49,11 +49,11 @@ pub struct Compiled {
     pub world: Arc<RobotsWorld>,
     /// Place and facing of each entity at the start, by id.
     pub start: Arc<[((u32, u32), u8)]>,
-    /// Name of the scenario, may be empty.
+    /// Name of the scenario; may be empty.
     pub name: String,
-    /// The seed.
+    /// The random seed.
     pub seed: u64,
-    /// Cycles that the scenario asks for.
+    /// Number of cycles that the scenario asks for.
     pub cycles: u64,
     /// The tables to keep.
     pub record: RecordSection,
@@ -84,11 +84,11 @@ struct Compiler<'a> {
     bodies: Vec<Body>,
     start: Vec<((u32, u32), u8)>,
     floor: Floor,
-    /// Spans by id, to name the other body when two stand on each other.
+    /// Spans by id, to name the other body when two bodies stand on each other.
     spans: Vec<Range<usize>>,
-    /// Rings of wall to put around the map.
+    /// Number of rings of wall to put around the map.
     border: u32,
-    /// Most boxes that a claim reaches beside a body.
+    /// Largest distance in boxes from a body to a box that it claims.
     reach: u32,
 }
 
@@ -134,8 +134,8 @@ impl<'a> Compiler<'a> {
 
     fn compile(mut self, order: StorageOrder) -> Result<Compiled, InputError> {
         let groups = self.groups()?;
-        // Doors and bodies with a given place first, so that draws find what is left; ids
-        // go robots, people, doors whatever is placed first.
+        // Doors and bodies with a given place are placed first, because draws must find the
+        // remaining free boxes. Ids go robots, people, doors, whatever is placed first.
         let mut first_id = 0;
         let mut firsts: Vec<EntityId> = Vec::new();
         for group in &groups {
@@ -201,7 +201,7 @@ impl<'a> Compiler<'a> {
         Some(Radio::new(radio.range_m.get(), self.map.box_size_m, loss))
     }
 
-    /// Rank of each kind in `kind_order`; kinds that are not named come last.
+    /// Returns the rank of each kind in `kind_order`; kinds that are not named come last.
     fn kind_rank(&self) -> Result<Vec<u8>, InputError> {
         let mut rank = vec![self.file.kind_order.len() as u8; self.kinds.len()];
         for (k, kind) in self.file.kind_order.iter().enumerate() {
@@ -230,7 +230,8 @@ impl<'a> Compiler<'a> {
     }
 }
 
-/// As many rings of wall as the longest path has steps, and as a beam may be read past a wall.
+/// Returns as many rings of wall as the longest path has steps, and as a beam may be read past a
+/// wall.
 fn border(file: &RobotsFile, effectors: &BTreeMap<String, Located<EffectorSection>>) -> u32 {
     let named = file.robots.0.iter().filter_map(|robots| robots.get_ref().effector.as_ref());
     let known = named.filter_map(|name| effectors.get(name.get_ref()));
@@ -239,7 +240,7 @@ fn border(file: &RobotsFile, effectors: &BTreeMap<String, Located<EffectorSectio
     steps.max().unwrap_or(1).clamp(BEAM_STEP, MAX_PATH) as u32
 }
 
-/// Every action at every heading, see `BodyType::actions`.
+/// Returns every action at every heading, see `BodyType::actions`.
 fn actions_at_headings(
     actions: &[Vec<Transition>],
     size: (u32, u32),
@@ -252,7 +253,8 @@ fn actions_at_headings(
     (0..4).flat_map(at).collect()
 }
 
-/// Names of the kinds: `free` and `wall` first, then the built-in ones, then the user's own.
+/// Returns the names of the kinds: `free` and `wall` first, then the built-in ones, then the user's
+/// own.
 fn kinds(source: &Source, file: &RobotsFile) -> Result<Vec<String>, InputError> {
     let mut kinds: Vec<String> =
         ["free", "wall", "door", "person", "robot"].map(String::from).to_vec();

@@ -1,15 +1,15 @@
-//! Values of a scenario that check themselves on reading.
+//! Values of a scenario that are checked when they are read.
 
 use crate::effector::{self, MAX_PATH};
 use serde::{Deserialize, Deserializer};
 use sidestep_scenario::{Rule, Whole, refused};
 
-/// A side of a body in boxes.
+/// Number of boxes of a body's side.
 pub(crate) type Side = Whole<1, 64>;
 /// Cycles from one action to the next.
 pub(crate) type Period = Whole<1, { u32::MAX as u64 }>;
 
-/// A side of a box in meters.
+/// Length of a box's side in meters.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct BoxSide;
 
@@ -23,7 +23,7 @@ impl Rule for BoxSide {
     }
 }
 
-/// Column and row, and the facing if it is not to be drawn.
+/// Column and row, and the facing unless it is to be drawn.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Placing {
     pub(crate) at: (u32, u32),

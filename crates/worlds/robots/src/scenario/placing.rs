@@ -1,15 +1,15 @@
-//! Where bodies stand at the start: where the scenario says, or in a free place by draw.
+//! Start places of bodies: as the scenario says, or in a free place by draw.
 
 use crate::purpose;
 use sidestep_kernel::EntityId;
 use sidestep_kernel::stream::Streams;
 use sidestep_map::{Cell, GridMap};
 
-/// Nobody stands here yet.
+/// Marks a box without an occupant.
 const NOBODY: u32 = u32::MAX;
-/// A wall.
+/// Marks a wall.
 const WALL: u32 = u32::MAX - 1;
-/// Draws before a free place is looked for in order.
+/// Number of draws before a free place is searched for in order.
 const TRIES: u32 = 200;
 
 /// The occupant of each box of the map.
@@ -19,7 +19,7 @@ pub(super) struct Floor {
     occupant: Vec<u32>,
 }
 
-/// Why a body cannot stand somewhere.
+/// The reason why a body cannot stand somewhere.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Obstacle {
     Outside,
@@ -34,7 +34,7 @@ impl Floor {
         Self { width: map.width(), height: map.height(), occupant }
     }
 
-    /// Lets a body stand at `(col, row)`.
+    /// Places a body at `(col, row)`.
     pub(super) fn place(
         &mut self,
         id: EntityId,
@@ -71,7 +71,7 @@ impl Floor {
         None
     }
 
-    /// A free place inside `region` (column, row, width, height), drawn for this body.
+    /// Returns a free place inside `region` (column, row, width, height), drawn for this body.
     pub(super) fn draw_place(
         &mut self,
         streams: &Streams,
@@ -92,7 +92,7 @@ impl Floor {
                 return Some(at);
             }
         }
-        // Crowded: the first free place after the last one drawn.
+        // The region is crowded: take the first free place after the last one drawn.
         let boxes = u64::from(across) * u64::from(up);
         let from = u64::from(at.1 - row) * u64::from(across) + u64::from(at.0 - col);
         (0..boxes).map(|k| (from + k) % boxes).find_map(|k| {
@@ -101,7 +101,7 @@ impl Floor {
         })
     }
 
-    /// The whole map as a region.
+    /// Returns the whole map as a region.
     pub(super) fn region(&self) -> [u32; 4] {
         [0, 0, self.width, self.height]
     }

@@ -1,15 +1,15 @@
-//! The behaviour `random` of a scenario: weights by the actions' names.
+//! The behavior `random` of a scenario: weights by the actions' names.
 
 use super::BehaviourSection;
 use crate::decide::Random;
 use sidestep_scenario::nearest;
 use std::collections::BTreeMap;
 
-/// Cause and remedy of what is wrong with a behaviour; the caller knows the place.
+/// Cause and remedy of an error in a behavior; the caller knows the place.
 pub(super) type Wrong = (String, String);
 
-/// The standard actions alike where no weights are given; after a contact the same weights
-/// unless others are given.
+/// Returns the behavior. Without weights the standard actions are equally likely; after a contact
+/// the same weights hold unless others are given.
 pub(super) fn behaviour(s: &BehaviourSection, actions: &[String]) -> Result<Random, Wrong> {
     let Some(usual) = &s.weights else {
         return match &s.weights_after_contact {
@@ -25,7 +25,7 @@ pub(super) fn behaviour(s: &BehaviourSection, actions: &[String]) -> Result<Rand
     Ok(random.expect("the rows were brought to sum to 1"))
 }
 
-/// Weights by the actions' names as probabilities by their ids.
+/// Returns weights by the actions' names as probabilities by their ids.
 fn row(weights: &BTreeMap<String, f64>, actions: &[String]) -> Result<Vec<f64>, Wrong> {
     let sum: f64 = weights.values().sum();
     if !(sum > 0.0 && sum.is_finite() && weights.values().all(|w| *w >= 0.0)) {
@@ -39,7 +39,7 @@ fn row(weights: &BTreeMap<String, f64>, actions: &[String]) -> Result<Vec<f64>, 
     Ok(row)
 }
 
-/// Index of an action among those of an effector.
+/// Returns the index of an action among those of an effector.
 pub(super) fn action_id(name: &str, actions: &[String]) -> Result<usize, Wrong> {
     actions.iter().position(|action| action == name).ok_or_else(|| {
         let known: Vec<&str> = actions.iter().map(String::as_str).collect();

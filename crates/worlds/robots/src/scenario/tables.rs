@@ -1,4 +1,4 @@
-//! Sensor and effector sections -> checked models.
+//! From sensor and effector sections to checked models.
 
 use super::{EffectorSection, Rows, SensorSection, TransitionSection};
 use crate::effector::{EffectorModel, STANDARD_ACTIONS, Transition};
@@ -10,9 +10,10 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use toml::Spanned;
 
-/// Most beams, observations, classes and actions; readings name them with a byte.
+/// Largest number of beams, observations, classes and actions, because readings name them with a
+/// byte.
 const MAX_NAMES: usize = 250;
-/// Most actions; an intent holds an action and a flag in one byte.
+/// Largest number of actions, because an intent holds an action and a flag in one byte.
 const MAX_ACTIONS: usize = 120;
 const MAX_BEAMS: usize = 1024;
 
@@ -34,15 +35,15 @@ impl<T> Located<T> {
     }
 }
 
-/// Kinds of the scenario and the observation each designates.
+/// The scenario's kinds and the observation that each designates.
 pub(super) struct Kinds {
     pub(super) names: Vec<String>,
     pub(super) observations: Vec<String>,
-    /// Kinds that really occur: only these must be known to every sensor.
+    /// Whether each kind really occurs: only those that do must be known to every sensor.
     pub(super) used: Vec<bool>,
 }
 
-/// Checks a sensor and brings its rows into order.
+/// Checks a sensor and puts its rows in order.
 pub(super) fn sensor(
     name: &str,
     at: &Located<SensorSection>,
@@ -70,7 +71,8 @@ pub(super) fn sensor(
     })
 }
 
-/// One matrix for each distance class and one beyond: what is not said of a class is as anywhere.
+/// Returns one matrix for each distance class and one beyond; a class without rows of its own has
+/// those that hold anywhere.
 fn confusion(
     at: &Located<SensorSection>,
     observations: &[String],
@@ -115,7 +117,7 @@ fn observations(at: &Located<SensorSection>) -> Result<Vec<String>, InputError> 
     Ok(names.clone())
 }
 
-/// Edges and names of the distance classes; without edges there is one class, `near`.
+/// Returns edges and names of the distance classes; without edges there is one class, `near`.
 fn classes(at: &Located<SensorSection>) -> Result<(Vec<f64>, Vec<String>), InputError> {
     let s = at.section.get_ref();
     let edges = s.distance_edges_m.as_ref().map_or(vec![], |e| e.get_ref().clone());
@@ -140,8 +142,8 @@ fn classes(at: &Located<SensorSection>) -> Result<(Vec<f64>, Vec<String>), Input
     Ok((edges, names))
 }
 
-/// Rows over the classes; the row `beyond`, for spurious reports, may be left out and then
-/// puts all on the farthest class. Without any row every class is reported as it is.
+/// Returns rows over the classes. The row `beyond`, for spurious reports, may be left out and then
+/// puts all probability on the farthest class. Without any row every class is reported as it is.
 fn distance_confusion(
     at: &Located<SensorSection>,
     classes: &[String],
@@ -230,7 +232,7 @@ fn checked_row<T>(
     Ok(values.iter().map(|v| v / sum).collect())
 }
 
-/// The observation that each kind truly is for this sensor.
+/// Returns this sensor's true observation of each kind.
 fn designates(
     sensor: &str,
     at: &Located<SensorSection>,

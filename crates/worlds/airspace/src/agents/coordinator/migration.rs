@@ -9,15 +9,15 @@ use serde::de::DeserializeOwned;
 use sidestep_collectives::Settings;
 use sidestep_kernel::ports::{Envelope, Transport};
 
-/// Message that a coordinator has arrived.
+/// Message which says that a coordinator has arrived.
 const ACKNOWLEDGED: [u8; 1] = [1];
 
-/// Time in which coordinators may travel, and how often a hop is made again.
+/// The time in which coordinators may travel, and the rule for repeating a hop.
 #[derive(Debug, Clone, Copy)]
 pub struct Journey {
-    /// The tick in which the first one sets out,
+    /// The tick in which the first one sets out.
     pub begin: u64,
-    /// and the one in which time is up.
+    /// The tick in which time is up.
     pub end: u64,
     /// Repetition of hops that are not acknowledged; `None` on a network that loses nothing.
     pub patience: Option<Patience>,
@@ -26,20 +26,21 @@ pub struct Journey {
 /// Coordinators of a group, on the airplanes that they visit.
 pub struct Migration<'a> {
     transport: &'a mut dyn Transport,
-    /// Data aboard each airplane,
+    /// Data aboard each airplane.
     pub(super) hosts: &'a [OwnShip],
-    /// and whether its radio is dead.
+    /// Whether each airplane's radio is dead.
     pub(super) silent: &'a [bool],
     journey: Journey,
-    /// Ticks gone by.
+    /// Number of ticks gone by.
     pub(super) gone: u64,
-    /// Messages so far: what tells them apart.
+    /// Number of messages so far, which distinguishes them.
     sent: u32,
     pub(super) traffic: Traffic,
 }
 
 impl<'a> Migration<'a> {
-    /// Coordinators that have not set out yet. `silent` says whose radio is dead.
+    /// Returns coordinators that have not set out yet. `silent` says for each airplane whether its
+    /// radio is dead.
     pub fn new(
         transport: &'a mut dyn Transport,
         hosts: &'a [OwnShip],
@@ -57,7 +58,7 @@ impl<'a> Migration<'a> {
         &self.hosts[0].briefing.objective
     }
 
-    /// Whether time is up.
+    /// Returns whether time is up.
     pub(super) fn is_late(&self) -> bool {
         self.gone >= self.journey.end - self.journey.begin
     }
@@ -80,7 +81,7 @@ impl<'a> Migration<'a> {
     }
 
     /// Waits for a message numbered `first` or later, sent before `after` ticks had gone by.
-    /// Returns what arrives by tick `until` of the journey, and when.
+    /// Returns the message that arrives by tick `until` of the journey, and the tick.
     fn await_from(
         &mut self,
         [from, to]: [usize; 2],
@@ -90,7 +91,7 @@ impl<'a> Migration<'a> {
         let (sender, receiver) = (self.id(from), self.id(to));
         for tick in after + 1..=until {
             let arrived = self.transport.receive(receiver, self.journey.begin + tick);
-            // Copies of earlier hops concern nobody any more, and a dead radio hears nothing.
+            // Copies of earlier hops no longer matter, and a dead radio hears nothing.
             let awaited = |e: &Envelope| e.sender == sender && e.sequence >= first;
             if let Some(envelope) = arrived.into_iter().find(awaited).filter(|_| !self.silent[to]) {
                 return Some((envelope.payload, tick));
@@ -99,7 +100,7 @@ impl<'a> Migration<'a> {
         None
     }
 
-    /// Takes a coordinator's state from one airplane to another. Whether it has arrived.
+    /// Takes a coordinator's state from one airplane to another. Returns whether it has arrived.
     pub(super) fn hop<S: Serialize + DeserializeOwned>(
         &mut self,
         state: &mut S,
@@ -126,7 +127,7 @@ impl<'a> Migration<'a> {
             }
             self.gone = set_out + wait;
         }
-        // On the other side it is read back.
+        // The state is read back on the other side.
         match arrived.as_deref().map(postcard::from_bytes) {
             Some(Ok(read)) => *state = read,
             _ => return false,
@@ -134,8 +135,8 @@ impl<'a> Migration<'a> {
         true
     }
 
-    /// Tells whoever has sent a coordinator that it has arrived at tick `tick` of the journey.
-    /// Whether that is known by tick `until`.
+    /// Acknowledges to the sender of a coordinator that it has arrived at tick `tick` of the
+    /// journey. Returns whether the sender knows that by tick `until`.
     fn is_acknowledged(&mut self, [from, to]: [usize; 2], (tick, until): (u64, u64)) -> bool {
         if self.journey.patience.is_none() {
             return true;

@@ -1,4 +1,4 @@
-//! The scene that all of a group see before they exchange their plans.
+//! The scene as all airplanes of a group see it before they exchange their plans.
 
 use crate::flight::Air;
 use crate::shield::Flyer;
@@ -13,18 +13,18 @@ pub struct Seen {
     pub orbits: bool,
 }
 
-/// The scene that all of a group see, and numbers they have agreed on, before they exchange their
-/// plans.
+/// The scene as all of a group see it, and numbers on which they have agreed, before they exchange
+/// their plans.
 #[derive(Debug, Clone)]
 pub struct Scene {
     /// The air that all fly through.
     pub air: Air,
-    /// Airplanes at least this far above each other do not mind each other.
+    /// Airplanes at least this many meters above each other need not mind each other.
     pub vertical_m: f64,
-    /// The cycle.
+    /// The present cycle.
     pub now: Cycle,
     /// See [`crate::agents::network::Network::silent_after`].
     pub silent_after: u32,
-    /// All of the group as they can be seen, by rising id.
+    /// All airplanes of the group as they can be seen, by rising id.
     pub seen: Vec<Seen>,
 }

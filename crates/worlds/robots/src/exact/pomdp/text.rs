@@ -30,7 +30,7 @@ impl fmt::Display for Pomdp {
     }
 }
 
-/// Digits behind the point.
+/// Number of digits after the decimal point.
 const DIGITS: u32 = 12;
 const UNITS: u64 = 10u64.pow(DIGITS);
 
@@ -50,8 +50,8 @@ fn write_row(
     Ok(())
 }
 
-/// Probabilities in units of the last printed digit that sum to 1 exactly: rounded down, and
-/// what is left given to those that lost most.
+/// Returns the probabilities in units of the last printed digit, so that they sum to 1 exactly:
+/// rounded down, and the remainder given to those that lost most.
 fn in_units(row: impl Iterator<Item = f64> + Clone) -> Vec<u64> {
     let sum: f64 = row.clone().sum();
     let exact: Vec<f64> = row.map(|p| p / sum * UNITS as f64).collect();

@@ -9,21 +9,21 @@ use sidestep_kernel::InputError;
 use sidestep_kernel::math::{hypot, tan, wrap_angle};
 use sidestep_statistics::Moments;
 
-/// More turn than this is no move ahead.
+/// A move with more turn than this is not a move ahead.
 const FORWARD_TURN_MAX_DEG: f64 = 10.0;
-/// A shorter move is none.
+/// A shorter move does not count as a move.
 const FORWARD_MIN_M: f64 = 0.3;
-/// A smaller turn is none.
+/// A smaller turn does not count as a turn.
 const TURN_MIN_DEG: f64 = 20.0;
-/// A longer path is no turn in place.
+/// A turn with a longer path is not a turn in place.
 const TURN_PATH_MAX_M: f64 = 0.3;
-/// A shorter step of odometry is too short to tell its slip.
+/// A shorter step of odometry is too short to show its slip.
 const SLIP_STEP_MIN_M: f64 = 0.03;
-/// Wheels slip sideways by less than 1 % of their way; the particles of a SLAM program, logged
+/// Real wheels slip sideways by less than 1 % of their way; the particles of a SLAM program, logged
 /// in place of odometry, by 3 % to 13 %.
 const SLIP_SD_MAX: f64 = 0.02;
 
-/// How events become transitions.
+/// The rule by which events become transitions.
 const RULE: &str = "odometry against corrected poses, displacement over commanded path, \
     phase-averaged (L6), outcomes beyond the five spread in proportion; turns in place, true \
     over commanded taken for the share of a quarter turn, phase-averaged; every count plus alpha";
@@ -58,7 +58,7 @@ pub(super) fn learn(
     Ok(EffectorModel { report, profile: events.profile(RULE, options) })
 }
 
-/// What happened between two scans, in the frame of the first.
+/// The motion between two scans, in the frame of the first.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Pair {
     /// According to odometry.
@@ -69,7 +69,7 @@ struct Pair {
 }
 
 impl Pair {
-    /// `None` where no odometry lies between the scans.
+    /// Returns the motion; `None` where no odometry lies between the scans.
     fn of(scans: &[Scan]) -> Option<Self> {
         let start = Pose::from(scans[0].pose);
         let claimed = Pose::from(*scans[0].odometry.last()?);
@@ -105,8 +105,8 @@ impl Pair {
     }
 }
 
-/// Sideways motion of each step of odometry as a share of its length, beyond what an arc of
-/// the turned angle brings.
+/// Returns the sideways motion of each step of odometry as a share of its length, beyond the part
+/// that an arc of the turned angle explains.
 fn slip_ratios(log: &CorrectedLog) -> Vec<f64> {
     let runs = std::iter::once(&log.odometry_before).chain(log.scans.iter().map(|s| &s.odometry));
     let steps = runs.flat_map(|run| run.windows(2));

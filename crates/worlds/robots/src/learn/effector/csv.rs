@@ -1,4 +1,4 @@
-//! An effector learned from displacements already measured.
+//! An effector learned from displacements that were already measured.
 
 use std::collections::BTreeMap;
 
@@ -12,14 +12,14 @@ use crate::learn::{Counts, EstimateOptions};
 use sidestep_import::table::{CsvRow, CsvTable, Word};
 use sidestep_kernel::InputError;
 
-/// What a robot can be told to do.
+/// The commands of a robot.
 const ACTIONS: [&str; 4] = ["forward", "left", "right", "stay"];
-/// A longer displacement is no single action; two such make the longest path of a profile.
+/// A longer displacement is not a single action; two such make the longest path of a profile.
 const BOXES_MAX: f64 = 8.0;
-/// A wider turn is none either.
+/// A wider turn is not a single action either.
 const TURN_MAX_DEG: f64 = 360.0;
 
-/// How events become transitions.
+/// The rule by which events become transitions.
 const RULE: &str = "counts of measured displacements, phase-averaged where they are no whole \
     boxes or quarter turns; every outcome that was seen, plus alpha";
 
@@ -34,7 +34,7 @@ struct Displacement {
 }
 
 impl Displacement {
-    /// Where it ends; turns that end alike, such as 270 and -90 degrees, are one outcome.
+    /// Returns where it ends; turns that end alike, such as 270 and -90 degrees, are one outcome.
     fn outcomes(&self) -> Vec<(Outcome, f64)> {
         let mut ends = outcomes(self.ahead_boxes, self.left_boxes, self.turn_deg / 90.0);
         for (outcome, _) in &mut ends {
@@ -96,7 +96,7 @@ impl ActionLog {
         for (outcome, weight) in events.iter().flat_map(Displacement::outcomes) {
             *weights.entry(outcome).or_insert(0.0) += weight;
         }
-        // Infinite, so that what was intended comes first whether or not it was seen.
+        // Infinite, so that the intended outcome comes first whether or not it was seen.
         weights.insert(intended(ACTIONS[action]), f64::INFINITY);
         let mut ranked: Vec<(Outcome, f64)> = weights.into_iter().collect();
         ranked.sort_by(|a, b| b.1.total_cmp(&a.1));
@@ -122,7 +122,7 @@ impl ActionLog {
         from_outcomes(&self.outcomes, self.counts(&self.events).row(0), alpha)
     }
 
-    /// Shares of the paper's classes.
+    /// Returns the shares of the paper's classes.
     fn forward_shares(&self) -> Option<ForwardShares> {
         let mut shares = vec![0.0; FORWARD_CLASSES.len()];
         for (outcome, weight) in self.events.iter().flat_map(Displacement::outcomes) {
@@ -158,7 +158,7 @@ fn report(source: &str, logs: &[ActionLog], options: &EstimateOptions) -> Effect
     }
 }
 
-/// The outcomes of a table's only row, by name.
+/// Returns the outcomes of a table's only row, by name.
 fn by_name(table: &Counts) -> (String, BTreeMap<String, f64>) {
     let named = table.columns().iter().cloned().zip(table.row(0).iter().copied());
     (table.rows()[0].clone(), named.collect())
@@ -174,7 +174,7 @@ fn profile(logs: &[ActionLog], options: &EstimateOptions) -> EffectorProfile {
     EffectorProfile { box_m: None, actions: actions.collect(), assumed, rule: RULE.to_string() }
 }
 
-/// The rows without contact, and the number of those with.
+/// Returns the rows without contact, and the number of those with contact.
 fn parse(table: &CsvTable) -> Result<(Vec<Displacement>, u64), InputError> {
     let place = table.place();
     let columns = Columns::find(table)?;
@@ -194,7 +194,7 @@ fn parse(table: &CsvTable) -> Result<(Vec<Displacement>, u64), InputError> {
     Ok((free, n_cut))
 }
 
-/// Where the columns are.
+/// The indices of the columns.
 struct Columns {
     action: usize,
     ahead: usize,
@@ -233,7 +233,7 @@ impl Columns {
     }
 }
 
-/// An action by its name, or by the number that a recording gives it.
+/// Returns an action by its name, or by the number that a recording gives it.
 fn action(place: &str, word: Word<'_>) -> Result<usize, InputError> {
     let by_name = ACTIONS.iter().position(|name| *name == word.text);
     let by_number = || word.text.parse().ok().filter(|number| *number < ACTIONS.len());

@@ -1,4 +1,4 @@
-//! Measured moves and turns, from whatever log, and their counts.
+//! Measured moves and turns, from any kind of log, and their counts.
 
 use std::collections::BTreeMap;
 
@@ -9,23 +9,23 @@ use crate::learn::holdout::{Fit, fit, split};
 use crate::learn::{Counts, EstimateOptions};
 use sidestep_statistics::Moments;
 
-/// One commanded box ahead and what became of it.
+/// One commanded box ahead, and the motion that followed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Move {
     pub(super) ahead_boxes: f64,
     pub(super) left_boxes: f64,
     /// True turn minus commanded turn.
     pub(super) turn_error_rad: f64,
-    /// `None` where the log does not tell.
+    /// `None` where the log does not say.
     pub(super) duration_s: Option<f64>,
 }
 
-/// One commanded turn and what became of it; both in rad, + to the left.
+/// One commanded turn, and the motion that followed; both in rad, + to the left.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Turn {
     pub(super) commanded_rad: f64,
     pub(super) true_rad: f64,
-    /// `None` where the log does not tell.
+    /// `None` where the log does not say.
     pub(super) duration_s: Option<f64>,
 }
 
@@ -34,7 +34,7 @@ impl Turn {
         self.true_rad / self.commanded_rad
     }
 
-    /// Degrees turned along the command.
+    /// Returns the degrees turned in the direction of the command.
     fn along_deg(&self) -> f64 {
         (self.true_rad * self.commanded_rad.signum()).to_degrees()
     }
@@ -48,7 +48,7 @@ impl Turn {
     }
 }
 
-/// All that a log tells of a robot's moves and turns.
+/// All moves and turns of a robot's log.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Events {
     pub(super) moves: Vec<Move>,
@@ -56,7 +56,7 @@ pub(super) struct Events {
 }
 
 impl Events {
-    /// Everything that follows from moves and turns; the rest of the report is left empty.
+    /// Returns the parts of a report that follow from moves and turns; the rest is left empty.
     pub(super) fn report(&self, source: &str, options: &EstimateOptions) -> EffectorReport {
         let all: Vec<&Move> = self.moves.iter().collect();
         let (forward, turns) = (forward_counts(&all), self.turn_counts());
@@ -78,7 +78,7 @@ impl Events {
         }
     }
 
-    /// Transitions of all three actions.
+    /// Returns the transitions of all three actions.
     pub(super) fn profile(&self, rule: &str, options: &EstimateOptions) -> EffectorProfile {
         let forward = forward_counts(&self.moves.iter().collect::<Vec<_>>());
         let mut assumed = Vec::new();
@@ -120,8 +120,8 @@ impl Events {
         turn_counts(self.turns.iter())
     }
 
-    /// Turns to one side; without any, those to the other side mirrored; without any at all,
-    /// turns that never fail.
+    /// Returns the transitions of turns to one side; without any, those to the other side mirrored;
+    /// without any at all, turns that never fail.
     fn turn_transitions(
         &self,
         action: &str,
@@ -158,7 +158,7 @@ impl Events {
     }
 }
 
-/// Phase-averaged classes of moves ahead.
+/// Counts the phase-averaged classes of moves ahead.
 fn forward_counts(moves: &[&Move]) -> Counts {
     let mut counts = empty_forward();
     for (outcome, weight) in moves.iter().flat_map(|m| outcomes(m.ahead_boxes, m.left_boxes, 0.0)) {
@@ -167,7 +167,7 @@ fn forward_counts(moves: &[&Move]) -> Counts {
     counts
 }
 
-/// Classes of moves ahead by rounding.
+/// Counts the classes of moves ahead by rounding.
 fn rounded_counts(moves: &[&Move]) -> Counts {
     let mut counts = empty_forward();
     for m in moves {
@@ -180,8 +180,8 @@ fn empty_forward() -> Counts {
     Counts::new("moves", &["forward".to_string()], &FORWARD_CLASSES.map(String::from))
 }
 
-/// Turns by side, phase-averaged: the ratio of true to commanded turn is what a turn of 90
-/// degrees would be in quarters.
+/// Counts turns by side, phase-averaged: the ratio of true to commanded turn gives the result of a
+/// turn of 90 degrees in quarters.
 fn turn_counts<'t>(turns: impl Iterator<Item = &'t Turn>) -> Counts {
     let rows = ["left", "right"].map(String::from);
     let mut counts = Counts::new("turns", &rows, &TURN_CLASSES.map(String::from));
@@ -193,7 +193,7 @@ fn turn_counts<'t>(turns: impl Iterator<Item = &'t Turn>) -> Counts {
     counts
 }
 
-/// Phase-averaged share of each box, `"ahead,left"`.
+/// Returns the phase-averaged share of each box, `"ahead,left"`.
 fn box_shares(moves: &[&Move]) -> BTreeMap<String, f64> {
     let mut shares = BTreeMap::new();
     for (outcome, weight) in moves.iter().flat_map(|m| outcomes(m.ahead_boxes, m.left_boxes, 0.0)) {
@@ -212,7 +212,7 @@ fn boxes_by_rounding(moves: &[&Move]) -> BTreeMap<String, u64> {
     counts
 }
 
-/// Values by their nearest multiple of `width`.
+/// Returns the number of values by their nearest multiple of `width`.
 fn histogram(values: impl Iterator<Item = f64>, width: i32) -> BTreeMap<i32, u64> {
     let mut bins = BTreeMap::new();
     for value in values {

@@ -1,18 +1,18 @@
-//! What a commanded move or turn really does.
+//! The real motion of a robot after a commanded move or turn.
 //!
-//! [`from_mrclam`] holds velocity commands against motion capture (L5, L7), [`from_carmen`]
-//! odometry against a corrected log (L6); [`from_csv`] takes displacements already measured.
-//! A displacement is told in the frame of the pose it starts from: ahead, left, and turn
-//! (+ = left).
+//! [`from_mrclam`] compares velocity commands with motion capture (L5, L7), [`from_carmen`]
+//! odometry with a corrected log (L6); [`from_csv`] takes displacements that were already measured.
+//! A displacement is given in the frame of the pose it starts from: ahead, left, and turn (+ =
+//! left).
 //!
 //! - L5, one box ahead: velocity commands are integrated with zero-order hold; a step of more
 //!   than 1.5 s starts the window again, more than 10 degrees of commanded turn starts it again
 //!   at the next line; when the commanded path reaches the side of a box, the window is an
 //!   event and the next starts there.
-//! - L6, the same from a corrected log: what odometry claims between two scans is the command,
-//!   what the corrected poses say the motion. Forward: at least 0.3 m ahead, at most 10
-//!   degrees of turn; displacements are told in units of the commanded path. Turn in place: at
-//!   least 20 degrees, at most 0.3 m of path.
+//! - L6, the same from a corrected log: the motion that odometry claims between two scans is the
+//!   command, the motion between the corrected poses is the result. Forward: at least 0.3 m ahead,
+//!   at most 10 degrees of turn; displacements are given in units of the commanded path. Turn in
+//!   place: at least 20 degrees, at most 0.3 m of path.
 //! - L7, turn: commands of at least 0.1 rad/s with one sign, until 45 degrees are commanded.
 //!
 //! A displacement becomes grid transitions by *phase averaging*, see [`phase`].
@@ -34,20 +34,20 @@ use super::EstimateOptions;
 use sidestep_import::table::CsvTable;
 use sidestep_kernel::InputError;
 
-/// A learned effector: what was counted, and the transitions a simulation draws from.
+/// A learned effector: its counts, and the transitions from which a simulation draws.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EffectorModel {
     /// Counts, probabilities with intervals, fit; serializable and printable.
     pub report: EffectorReport,
-    /// The effector as a profile holds it.
+    /// The effector in the form of a profile.
     pub profile: EffectorProfile,
 }
 
 /// Learns moves of `box_m` meters and turns of 90 degrees from an MRCLAM folder.
 ///
 /// # Errors
-/// When a file is missing or damaged, `options` mean nothing, `box_m` is not from 0.001 to
-/// 1000 m, or no commanded path is as long as a box.
+/// When a file is missing or damaged, `options` are not valid, `box_m` is not from 0.001 to 1000 m,
+/// or no commanded path is as long as a box.
 pub fn from_mrclam(
     folder: &Path,
     box_m: f64,
@@ -60,11 +60,11 @@ pub fn from_mrclam(
 
 /// Learns moves and turns from a corrected CARMEN log, in units of the commanded move.
 ///
-/// The report warns when the odometry in the log slips sideways by more than 2 % of its
-/// steps: then the log holds the samples of a SLAM program instead of what wheels measured.
+/// The report warns when the odometry in the log slips sideways by more than 2 % of its steps,
+/// because then the log holds the samples of a SLAM program instead of wheel measurements.
 ///
 /// # Errors
-/// When the file is missing or damaged, `options` mean nothing, or no move is long enough.
+/// When the file is missing or damaged, `options` are not valid, or no move is long enough.
 pub fn from_carmen(file: &Path, options: &EstimateOptions) -> Result<EffectorModel, InputError> {
     options.check()?;
     let log = sidestep_import::carmen::read(file)?;
@@ -77,22 +77,22 @@ pub fn from_carmen(file: &Path, options: &EstimateOptions) -> Result<EffectorMod
 /// - `action`: `forward`, `left`, `right` or `stay`, or 0 to 3 in that order;
 /// - `ahead_boxes`, `left_boxes`: displacement in boxes in the start frame, at most 8;
 /// - `turn_deg`: turn in degrees, + to the left;
-/// - optional `contact`, `yes` or `no`: whether an obstacle cut it; such rows are left out.
+/// - optional `contact`, `yes` or `no`: whether an obstacle stopped it; such rows are left out.
 ///
 /// The table `motions` that a simulated run records for calibration has these columns.
 ///
 /// Whole boxes and multiples of 90 degrees are counted as they are, others are phase-averaged.
 ///
 /// # Errors
-/// When the file is missing or damaged, holds no row, or `options` mean nothing.
+/// When the file is missing or damaged, holds no row, or `options` are not valid.
 pub fn from_csv(file: &Path, options: &EstimateOptions) -> Result<EffectorModel, InputError> {
     learn_csv(&CsvTable::read(file)?, options)
 }
 
-/// Learns from a CSV table already read, see [`from_csv`].
+/// Learns from a CSV table that was already read, see [`from_csv`].
 ///
 /// # Errors
-/// When the table is damaged or `options` mean nothing.
+/// When the table is damaged or `options` are not valid.
 pub fn learn_csv(table: &CsvTable, options: &EstimateOptions) -> Result<EffectorModel, InputError> {
     options.check()?;
     csv::learn(table, options)

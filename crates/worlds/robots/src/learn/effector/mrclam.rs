@@ -10,18 +10,18 @@ use sidestep_import::mrclam::{Command, Dataset, RobotLog};
 use sidestep_kernel::InputError;
 use sidestep_kernel::math::wrap_angle;
 
-/// A longer step between commands says nothing about what was commanded in between.
+/// Longest step between commands, because a longer one says nothing about the commands between.
 const STEP_SECS_MAX: f64 = 1.5;
-/// More commanded turn than this is no move ahead.
+/// A move with more commanded turn than this is not a move ahead.
 const FORWARD_TURN_MAX_DEG: f64 = 10.0;
-/// A slower command is no turn.
+/// A slower command is not a turn.
 const TURN_RATE_MIN_RADPS: f64 = 0.1;
 /// A turn ends when this much is commanded.
 const TURN_DEG: f64 = 45.0;
 /// Sides of a box that make sense for a robot, in m.
 const BOX_M: std::ops::RangeInclusive<f64> = 0.001..=1000.0;
 
-/// How events become transitions.
+/// The rule by which events become transitions.
 const RULE: &str = "commands integrated to one box ahead against motion capture, \
     phase-averaged (L5), outcomes beyond the five spread in proportion; turns of 45 degrees \
     (L7), true over commanded taken for the share of a quarter turn, phase-averaged; every \
@@ -55,7 +55,7 @@ pub(super) fn learn(
     Ok(EffectorModel { report, profile })
 }
 
-/// What was commanded from a line on.
+/// The motion commanded since a line.
 #[derive(Debug, Clone, Copy)]
 struct Window {
     start_secs: f64,
@@ -74,19 +74,19 @@ impl Window {
         self.turn_rad += command.turn_radps * step_secs;
     }
 
-    /// What the robot really did until `end_secs`.
+    /// Returns the robot's real motion until `end_secs`.
     fn motion(&self, robot: &RobotLog, end_secs: f64) -> Option<Motion> {
         let start = pose_at(&robot.truth, self.start_secs)?;
         Some(start.motion_to(&pose_at(&robot.truth, end_secs)?))
     }
 }
 
-/// Whether a command holds for so long, or time goes back, that nobody knows what was done.
+/// Returns whether a command holds too long, or time goes back, so that the motion is unknown.
 fn is_gap(step_secs: f64) -> bool {
     !(0.0..=STEP_SECS_MAX).contains(&step_secs)
 }
 
-/// All moves of one box ahead; counts in `rejected` the windows that were none.
+/// Returns all moves of one box ahead; counts in `rejected` the windows that were not used.
 fn moves(robot: &RobotLog, box_m: f64, rejected: &mut BTreeMap<String, u64>) -> Vec<Move> {
     let Some(first) = robot.commands.first() else { return Vec::new() };
     let mut moves = Vec::new();
@@ -124,7 +124,7 @@ fn as_move(window: &Window, motion: &Motion, end_secs: f64, box_m: f64) -> Move 
     }
 }
 
-/// All turns of 45 degrees.
+/// Returns all turns of 45 degrees.
 fn turns(robot: &RobotLog) -> Vec<Turn> {
     let mut turns = Vec::new();
     let mut open: Option<Window> = None;

@@ -1,29 +1,29 @@
 //! From a displacement in the plane to moves on a grid.
 //!
-//! The simulation knows boxes only. Where in its box a robot stood when it began to move is
-//! not told by a log; *phase averaging* takes all places as equally likely and asks how often
-//! each box is reached: a displacement of 1.2 boxes ends 1 box ahead with probability 0.8 and
-//! 2 ahead with 0.2. Ahead, left and turn are averaged independently, the turn in quarters of
-//! 90 degrees. *Rounding* instead puts the robot in the center of its box, and calls nearly
-//! every real move perfect.
+//! The simulation knows whole boxes only. A log does not say where in its box a robot was when it
+//! started to move; *phase averaging* takes all places as equally likely and asks how often each
+//! box is reached: a displacement of 1.2 boxes ends 1 box ahead with probability 0.8 and 2 ahead
+//! with 0.2. Ahead, left and turn are averaged independently, the turn in quarters of 90 degrees.
+//! *Rounding*, in contrast, puts the robot in the center of its box, and calls nearly every real
+//! move perfect.
 
 use serde::Serialize;
 
-/// Where a robot ends, in whole boxes and quarter turns of the start frame.
+/// The end of a displacement, in whole boxes and quarter turns of the start frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 pub struct Outcome {
-    /// Boxes ahead.
+    /// Number of boxes ahead.
     pub ahead: i32,
-    /// Boxes to the left.
+    /// Number of boxes to the left.
     pub left: i32,
-    /// Turns of 90 degrees to the left.
+    /// Number of quarter turns (90 degrees) to the left.
     pub quarters: i32,
 }
 
-/// Closer to a whole number than this is taken for it: the rounding of text files.
+/// A number this close to a whole one counts as whole, because text files round.
 const WHOLE_TOLERANCE: f64 = 1e-6;
 
-/// The two whole numbers around `x` and their probabilities; one alone where `x` is whole.
+/// Returns the two whole numbers around `x` and their probabilities; one alone where `x` is whole.
 pub fn average(x: f64) -> Vec<(i32, f64)> {
     let whole = x.round();
     if (x - whole).abs() <= WHOLE_TOLERANCE {
@@ -33,7 +33,7 @@ pub fn average(x: f64) -> Vec<(i32, f64)> {
     vec![(below as i32, 1.0 - fraction), (below as i32 + 1, fraction)]
 }
 
-/// The outcomes of a displacement (boxes ahead, boxes left, quarter turns left) and their
+/// Returns the outcomes of a displacement (boxes ahead, boxes left, quarter turns left) and their
 /// probabilities, which sum to 1.
 pub fn outcomes(ahead: f64, left: f64, quarters: f64) -> Vec<(Outcome, f64)> {
     let mut outcomes = Vec::new();
@@ -48,16 +48,16 @@ pub fn outcomes(ahead: f64, left: f64, quarters: f64) -> Vec<(Outcome, f64)> {
     outcomes
 }
 
-/// The nearest whole number, halves up.
+/// Returns the nearest whole number, halves rounded up.
 pub fn rounded(x: f64) -> i32 {
     (x + 0.5).floor() as i32
 }
 
-/// What one box ahead may become: the classes of the paper.
+/// The possible results of one box ahead: the classes of the paper.
 pub const FORWARD_CLASSES: [&str; 6] =
     ["stay", "ahead", "ahead2", "ahead_left", "ahead_right", "other"];
 
-/// Index of the class of a move in [`FORWARD_CLASSES`].
+/// Returns the index of the class of a move in [`FORWARD_CLASSES`].
 pub fn forward_class(ahead: i32, left: i32) -> usize {
     match (ahead, left) {
         (0, 0) => 0,

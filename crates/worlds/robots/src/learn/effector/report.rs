@@ -1,4 +1,4 @@
-//! What was learned about an effector, for people and for programs.
+//! The report on a learned effector, for people and for programs.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -11,29 +11,29 @@ use crate::learn::holdout::Fit;
 use crate::learn::{Estimate, EstimateOptions, ThinRow};
 use sidestep_statistics::Moments;
 
-/// What was learned about an effector. Displayed as readable tables, serialized for programs.
+/// The report on a learned effector. Displayed as readable tables, serialized for programs.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct EffectorReport {
-    /// The folder or file learned from.
+    /// The folder or file from which it was learned.
     pub source: String,
-    /// Side of a box in m; `None` where displacements are in units of the commanded move.
+    /// Side of a box in meters; `None` where displacements are in units of the commanded move.
     pub box_m: Option<f64>,
-    /// Moves of one box ahead.
+    /// Number of moves of one box ahead.
     pub events: u64,
-    /// Windows that were not used, by cause.
+    /// Number of windows that were not used, by cause.
     pub rejected: BTreeMap<String, u64>,
-    /// What became of a move ahead, phase-averaged; `None` without such moves.
+    /// The results of a move ahead, phase-averaged; `None` without such moves.
     pub transitions: Option<ForwardShares>,
     /// The same with displacements rounded to whole boxes.
     pub transitions_rounded: Option<ForwardShares>,
     /// Phase-averaged probability of each box, `"ahead,left"`.
     pub outcomes: BTreeMap<String, f64>,
-    /// Moves by the box they round to, `"ahead,left"`.
+    /// Number of moves by the box to which they round, `"ahead,left"`.
     pub rounded_counts: BTreeMap<String, u64>,
     /// Displacements: `ahead_boxes`, `left_boxes`, `dtheta_minus_cmd_rad`, `duration_s` and
-    /// what else the source tells, by name with unit.
+    /// whatever else the source gives, by name with unit.
     pub moments: BTreeMap<String, Moments>,
-    /// Turns.
+    /// The turns.
     pub turns: Option<TurnReport>,
     /// Counts of every action's outcomes, phase-averaged, where the source names actions.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
@@ -44,35 +44,35 @@ pub struct EffectorReport {
     pub lateral_slip: Option<Moments>,
     /// Every estimated probability with its count and interval.
     pub probabilities: Vec<Estimate>,
-    /// Rows that rest on few counts.
+    /// Rows with few counts.
     pub thin: Vec<ThinRow>,
-    /// How well a part predicts the rest.
+    /// Tests of how well a part of the events predicts the rest.
     pub hold_out: Vec<Fit>,
-    /// How counts become probabilities.
+    /// The rule by which counts become probabilities.
     pub estimate: EstimateOptions,
-    /// What the reader should know before trusting the numbers.
+    /// Warnings that the reader should see before trusting the numbers.
     pub warnings: Vec<String>,
 }
 
-/// What became of one box ahead; shares of all events.
+/// The results of one box ahead, as shares of all events.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct ForwardShares {
-    /// In the same box.
+    /// Share that stayed in the same box.
     pub stay: f64,
-    /// One box ahead.
+    /// Share that went one box ahead.
     pub ahead: f64,
-    /// Two ahead.
+    /// Share that went two boxes ahead.
     pub ahead2: f64,
-    /// One ahead, one to the left.
+    /// Share that went one ahead and one to the left.
     pub ahead_left: f64,
-    /// One ahead, one to the right.
+    /// Share that went one ahead and one to the right.
     pub ahead_right: f64,
-    /// Anywhere else.
+    /// Share that went anywhere else.
     pub other: f64,
 }
 
 impl ForwardShares {
-    /// Shares from counts in the order of [`FORWARD_CLASSES`]; `None` without counts.
+    /// Returns shares from counts in the order of [`FORWARD_CLASSES`]; `None` without counts.
     pub(super) fn of(counts: &[f64]) -> Option<Self> {
         let total: f64 = counts.iter().sum();
         let [stay, ahead, ahead2, ahead_left, ahead_right, other] =
@@ -82,24 +82,24 @@ impl ForwardShares {
     }
 }
 
-/// What became of commanded turns.
+/// The results of commanded turns.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TurnReport {
-    /// Turns.
+    /// Number of turns.
     pub n: usize,
-    /// Those to the left.
+    /// Number of turns to the left.
     pub n_left: usize,
-    /// Those to the right.
+    /// Number of turns to the right.
     pub n_right: usize,
-    /// True turn over commanded turn.
+    /// Ratio of true to commanded turn.
     pub true_over_commanded: Option<Moments>,
     /// True turn minus commanded turn in degrees, + = too far.
     pub error_deg_along_turn: Option<Moments>,
-    /// Duration in s, where known.
+    /// Duration in seconds, where known.
     pub duration_s: Option<Moments>,
-    /// True turns, rounded to 15 degrees: turns by degrees along the command.
+    /// Number of true turns by degrees along the command, rounded to 15 degrees.
     pub hist_15deg: BTreeMap<i32, u64>,
-    /// Errors, rounded to 5 degrees: turns by degrees too far.
+    /// Number of errors by degrees too far, rounded to 5 degrees.
     pub error_hist_5deg: BTreeMap<i32, u64>,
 }
 

@@ -1,34 +1,34 @@
-//! The transitions that a simulation draws a move from.
+//! The transitions from which a simulation draws a move.
 
 use super::phase::{FORWARD_CLASSES, Outcome};
 use crate::learn::Counts;
 use crate::learn::counts::{rounded, smooth};
 
-/// An effector as a profile holds it; the probabilities of each action sum to 1.
+/// An effector in the form of a profile; the probabilities of each action sum to 1.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EffectorProfile {
-    /// Side of a box in m, where the transitions hold for boxes of that size only.
+    /// Side of a box in meters, where the transitions hold for boxes of that size only.
     pub box_m: Option<f64>,
-    /// What each action may do, by its name; the first transition is the intended one.
+    /// The transitions of each action, by its name; the first transition is the intended one.
     pub actions: Vec<(String, Vec<Transition>)>,
-    /// Actions that no event speaks for, and what was assumed.
+    /// Actions without any event, and the transitions that were assumed for them.
     pub assumed: Vec<String>,
-    /// How events became transitions.
+    /// The rule by which events became transitions.
     pub rule: String,
 }
 
 impl EffectorProfile {
-    /// The transitions of an action.
+    /// Returns the transitions of an action.
     pub fn action(&self, name: &str) -> Option<&[Transition]> {
         let found = self.actions.iter().find(|(action, _)| action == name);
         found.map(|(_, transitions)| transitions.as_slice())
     }
 }
 
-/// One thing an action may do.
+/// One possible result of an action.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Transition {
-    /// How likely.
+    /// Probability of the result.
     pub p: f64,
     /// Boxes walked, in the robot's frame: `F`, `B`, `L`, `R`; empty where it stays.
     pub path: String,
@@ -36,7 +36,7 @@ pub struct Transition {
     pub turn_deg: i32,
 }
 
-/// The path to an outcome: ahead first, then sideways.
+/// Returns the path to an outcome: ahead first, then sideways.
 fn path(ahead: i32, left: i32) -> String {
     let steps = |n: i32, plus: &str, minus: &str| {
         if n < 0 { minus } else { plus }.repeat(n.unsigned_abs() as usize)
@@ -44,7 +44,7 @@ fn path(ahead: i32, left: i32) -> String {
     steps(ahead, "F", "B") + &steps(left, "L", "R")
 }
 
-/// What an outcome is called in tables.
+/// Returns the name of an outcome in tables.
 pub(super) fn label(outcome: &Outcome) -> String {
     let path = path(outcome.ahead, outcome.left);
     match (path.as_str(), 90 * outcome.quarters) {
@@ -55,7 +55,7 @@ pub(super) fn label(outcome: &Outcome) -> String {
     }
 }
 
-/// Transitions for outcomes and their weights, the first being the intended one.
+/// Returns transitions for outcomes with weights; the first is the intended one.
 pub(super) fn from_outcomes(outcomes: &[Outcome], weights: &[f64], alpha: f64) -> Vec<Transition> {
     let probabilities = rounded(&smooth(weights, alpha));
     let transition = |(outcome, p): (&Outcome, f64)| Transition {
@@ -66,8 +66,8 @@ pub(super) fn from_outcomes(outcomes: &[Outcome], weights: &[f64], alpha: f64) -
     outcomes.iter().zip(probabilities).map(transition).collect()
 }
 
-/// Transitions of one box ahead by the paper's classes, `counts` having one row and a column
-/// per class. What is in none of the first five is spread over them in proportion.
+/// Returns the transitions of one box ahead by the paper's classes; `counts` has one row and a
+/// column per class. Counts outside the first five classes are spread over them in proportion.
 pub(super) fn forward(counts: &Counts, alpha: f64) -> Vec<Transition> {
     let order = [1, 0, 2, 3, 4];
     debug_assert_eq!(FORWARD_CLASSES[order[0]], "ahead");
@@ -76,10 +76,10 @@ pub(super) fn forward(counts: &Counts, alpha: f64) -> Vec<Transition> {
     from_outcomes(&outcomes, &order.map(|class| counts.row(0)[class]), alpha)
 }
 
-/// What a commanded turn of 90 degrees may become.
+/// The possible results of a commanded turn of 90 degrees.
 pub(super) const TURN_CLASSES: [&str; 4] = ["turn", "stay", "overshoot", "other"];
 
-/// Index in [`TURN_CLASSES`] of a turn by `quarters` along the command.
+/// Returns the index in [`TURN_CLASSES`] of a turn by `quarters` along the command.
 pub(super) fn turn_class(quarters: i32) -> usize {
     match quarters {
         1 => 0,
@@ -89,18 +89,18 @@ pub(super) fn turn_class(quarters: i32) -> usize {
     }
 }
 
-/// Transitions of a turn, `side` being 1 for left, -1 for right; `other` is spread.
+/// Returns the transitions of a turn, `side` being 1 for left, -1 for right; `other` is spread.
 pub(super) fn turn(counts: &Counts, row: usize, side: i32, alpha: f64) -> Vec<Transition> {
     let outcomes = [1, 0, 2].map(|n| Outcome { ahead: 0, left: 0, quarters: n * side });
     from_outcomes(&outcomes, &counts.row(row)[..3], alpha)
 }
 
-/// The transition of an action that never fails.
+/// Returns the transition of an action that never fails.
 pub(super) fn exact(outcome: Outcome) -> Vec<Transition> {
     from_outcomes(&[outcome], &[1.0], 0.0)
 }
 
-/// What an action is meant to do, by its name in a profile.
+/// Returns the intended result of an action, by its name in a profile.
 pub(super) fn intended(action: &str) -> Outcome {
     let (ahead, quarters) = match action {
         "forward" => (1, 0),

@@ -1,6 +1,5 @@
-//! Promise: what is learned from the public logs equals what independent programs learned
-//! from them, within their stated tolerances: counts to 2, events to 1, probabilities to
-//! 0.002, moments to 0.001.
+//! Promise: learning from the public logs gives the same results as independent programs, within
+//! their stated tolerances: counts to 2, events to 1, probabilities to 0.002, moments to 0.001.
 
 mod effector;
 mod sensor;
@@ -8,7 +7,7 @@ mod sensor;
 use serde_json::Value;
 use sidestep_testing::shared_data as shared;
 
-/// What the independent program found.
+/// The results of the independent program.
 fn expected(name: &str) -> Value {
     let path = shared("expected").expect("the data are here").join(name);
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()

@@ -1,4 +1,4 @@
-//! What a profile rests on, as the table `evidence` of each of its sections.
+//! The evidence for a profile, as the table `evidence` of each of its sections.
 
 use std::collections::BTreeMap;
 
@@ -24,14 +24,14 @@ pub(super) fn of_sensor(model: &SensorModel) -> Table {
         warnings: &report.warnings,
         thin: &report.thin,
         hold_out: &report.hold_out,
-        // Who was taken for whom says more about one arena than about the camera.
+        // Confusion between single subjects says more about one arena than about the camera.
         estimates: report.probabilities.iter().filter(|e| is_of_kinds(model, e)).collect(),
     };
     certainty.write(&mut table);
     table
 }
 
-/// Whether an estimate speaks of kinds; `confusion` speaks of subjects where kinds are known.
+/// Returns whether an estimate is about kinds; `confusion` is about subjects where kinds are known.
 fn is_of_kinds(model: &SensorModel, estimate: &Estimate) -> bool {
     model.report.kinds.is_none() || estimate.table != "confusion"
 }
@@ -60,7 +60,7 @@ pub(super) fn of_effector(model: &EffectorModel) -> Table {
     table
 }
 
-/// How sure the numbers are; the same for sensors and effectors.
+/// The certainty of the numbers; the same for sensors and effectors.
 struct Certainty<'a> {
     options: &'a EstimateOptions,
     assumed: &'a [String],
@@ -93,7 +93,7 @@ impl Certainty<'_> {
     }
 }
 
-/// One table of counts: a table for each row, in it an entry for each column.
+/// Returns one table of counts: a table for each row, in it an entry for each column.
 fn estimates(rows: &BTreeMap<&str, Vec<&Estimate>>) -> Table {
     let mut table = implicit();
     for (row, cells) in rows {
@@ -140,13 +140,13 @@ fn fit(fit: &Fit) -> Table {
     table
 }
 
-/// A count: whole where it is, else (events spread over outcomes) with four decimals.
+/// Returns a count: whole where it is, else (events spread over outcomes) with four decimals.
 fn count(count: f64) -> Value {
     let near = (count * 1e4).round() / 1e4;
     if near.fract() == 0.0 { (near as i64).into() } else { near.into() }
 }
 
-/// Six decimals: more than any interval warrants.
+/// Returns a value with six decimals: more than any interval justifies.
 fn significant(value: f64) -> f64 {
     (value * 1e6).round() / 1e6
 }

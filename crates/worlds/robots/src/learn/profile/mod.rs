@@ -1,9 +1,9 @@
 //! Profiles: files of sensors and effectors that a scenario loads by name.
 //!
-//! [`empty`] makes one, [`with_sensor`] and [`with_effector`] add to it what was learned and
-//! leave the rest of the text as it is, comments included. Each section ends with a table
-//! `evidence` that the simulation ignores: source, rule, every probability with its count and
-//! 95 % interval, rows that are thin or assumed, and the hold-out fit.
+//! [`empty`] makes one, [`with_sensor`] and [`with_effector`] add learned sections to it and leave
+//! the rest of the text as it is, comments included. Each section ends with a table `evidence` that
+//! the simulation ignores: source, rule, every probability with its count and 95 % interval, rows
+//! that are thin or assumed, and the hold-out fit.
 
 mod evidence;
 
@@ -14,7 +14,7 @@ use super::sensor::{NamedRow, SensorModel};
 use sidestep_kernel::InputError;
 use sidestep_scenario::FORMAT;
 
-/// A profile without sensors and effectors, called `name`.
+/// Returns a profile without sensors and effectors, called `name`.
 pub fn empty(name: &str) -> String {
     let mut document = DocumentMut::new();
     document["format"] = value(i64::from(FORMAT));
@@ -22,11 +22,11 @@ pub fn empty(name: &str) -> String {
     document.to_string()
 }
 
-/// The profile `text` with the sensor `name` added, or replaced; `place` names the text in
+/// Returns the profile `text` with the sensor `name` added, or replaced; `place` names the text in
 /// errors.
 ///
 /// # Errors
-/// When `text` is no profile or `name` is empty.
+/// When `text` is not a profile or `name` is empty.
 pub fn with_sensor(
     place: &str,
     text: &str,
@@ -36,11 +36,11 @@ pub fn with_sensor(
     with_section(place, text, ["sensors", name], sensor(model))
 }
 
-/// The profile `text` with the effector `name` added, or replaced; `place` names the text in
-/// errors.
+/// Returns the profile `text` with the effector `name` added, or replaced; `place` names the text
+/// in errors.
 ///
 /// # Errors
-/// When `text` is no profile or `name` is empty.
+/// When `text` is not a profile or `name` is empty.
 pub fn with_effector(
     place: &str,
     text: &str,
@@ -72,7 +72,7 @@ fn with_section(
     Ok(document.to_string())
 }
 
-/// The document, if it is a profile of the format that is written here.
+/// Returns the document, if it is a profile of the format that is written here.
 fn parse(place: &str, text: &str) -> Result<DocumentMut, InputError> {
     let document: DocumentMut = text.parse().map_err(|e: toml_edit::TomlError| {
         let error = InputError::new(place, e.message(), "write valid TOML");
@@ -86,7 +86,7 @@ fn parse(place: &str, text: &str) -> Result<DocumentMut, InputError> {
     Ok(document)
 }
 
-/// A table without a header of its own.
+/// Returns a table without a header of its own.
 fn implicit() -> Table {
     let mut table = Table::new();
     table.set_implicit(true);
@@ -130,7 +130,8 @@ fn effector(model: &EffectorModel) -> Table {
     section
 }
 
-/// `{ p = 0.9, path = "F" }`; a turn of 0 is left out, and so is the path of a turn in place.
+/// Returns `{ p = 0.9, path = "F" }`; a turn of 0 is left out, and so is the path of a turn in
+/// place.
 fn transition(transition: &Transition) -> Value {
     let mut fields = InlineTable::new();
     fields.insert("p", transition.p.into());

@@ -1,4 +1,4 @@
-//! Promise: a profile holds what was learned in the form that a scenario loads, and adding to
+//! Promise: a profile holds the learned numbers in the form that a scenario loads, and adding to
 //! one leaves the rest of its text as it is.
 
 use super::*;
@@ -35,7 +35,7 @@ fn both() -> String {
     with_effector("p.toml", &text, "wheels", &effector_model()).unwrap()
 }
 
-/// A scenario whose one robot has the sensor and the effector named.
+/// Loads a scenario whose one robot has the sensor and the effector named.
 fn loads(profile: &str, sensor: &str, effector: &str) -> Result<Compiled, InputError> {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("p.toml"), profile).unwrap();

@@ -1,4 +1,4 @@
-//! The rows that a simulation draws a sensor's reports from.
+//! The rows from which a simulation draws a sensor's reports.
 
 use super::detection::Detection;
 use super::options::{BEYOND, DistanceClasses, SensorOptions};
@@ -6,21 +6,21 @@ use super::tables::{LANDMARK, NOBODY, ROBOT};
 use crate::learn::Counts;
 use crate::learn::counts::{rounded, smooth};
 
-/// What is reported when nothing is.
+/// The report when nothing is seen.
 pub(super) const NOTHING: &str = "nothing";
 
-/// A sensor as a profile holds it; every row sums to 1.
+/// A sensor in the form of a profile; every row sums to 1.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SensorProfile {
     /// Bearings of the beams in degrees relative to the heading, + to the left.
     pub bearings_deg: Vec<f64>,
-    /// Range in m.
+    /// Range in meters.
     pub range_m: f64,
-    /// What can be reported; the first is `nothing`.
+    /// The possible reports; the first is `nothing`.
     pub observations: Vec<String>,
-    /// Kinds of objects that are taken for another observation than their own name.
+    /// Kinds of objects that are observed under another name than their own.
     pub designates: Vec<(String, String)>,
-    /// Edges between the distance classes in m.
+    /// Edges between the distance classes, in meters.
     pub distance_edges_m: Vec<f64>,
     /// Names of the distance classes, near to far.
     pub distance_classes: Vec<String>,
@@ -31,16 +31,16 @@ pub struct SensorProfile {
     /// P(reported class | true class): a row per class and one, `beyond`, for spurious
     /// reports; columns in the order of the classes.
     pub distance_confusion: Vec<NamedRow>,
-    /// Rows that no count speaks for, and what was assumed.
+    /// Rows without any count, and the values that were assumed for them.
     pub assumed: Vec<String>,
-    /// How counts became rows.
+    /// The rule by which counts became rows.
     pub rule: String,
 }
 
 /// One row of a table of probabilities.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NamedRow {
-    /// What is true.
+    /// Name of the true value.
     pub name: String,
     /// One probability per column; they sum to 1.
     pub probabilities: Vec<f64>,
@@ -52,13 +52,13 @@ impl NamedRow {
     }
 }
 
-/// How the rows of a camera come about.
+/// The rule by which the rows of a camera are computed.
 const RULE: &str = "P(nothing | subject) is 1 minus the detection rate of its kind in 1 s bins \
     (one simulation cycle stands for one bin), per distance class; a detected subject is \
     reported by the kind confusion, where an unknown code counts as nothing; P(spurious | \
     nothing) is spurious readings per beam and bin without a subject; every count plus alpha";
 
-/// What a camera's rows are made of.
+/// The counts that a camera's rows are computed from.
 pub(super) struct Looks<'a> {
     /// True kind against decoded kind.
     pub(super) kinds: &'a Counts,
@@ -96,7 +96,7 @@ pub(super) fn camera(
         bearings_deg: options.bearings_deg.clone(),
         range_m: options.range_m,
         observations: [NOTHING, "robot", "landmark"].map(String::from).to_vec(),
-        // The arena has landmarks where a building has walls; nothing else wears a code.
+        // The arena has landmarks where a building has walls; no other kind has a code.
         designates: [("wall", "landmark"), ("door", NOTHING), ("person", NOTHING)]
             .map(|(kind, observation)| (kind.to_string(), observation.to_string()))
             .to_vec(),
@@ -110,7 +110,7 @@ pub(super) fn camera(
     }
 }
 
-/// What is reported in the direction of nothing.
+/// Returns the row of reports in a direction where nothing stands.
 fn spurious_row(looks: &Looks<'_>, options: &SensorOptions) -> Vec<f64> {
     let beams = looks.detection.looks as f64 * options.bearings_deg.len() as f64;
     let in_view: f64 = looks.detection.all.cells().iter().flatten().sum();
@@ -120,7 +120,7 @@ fn spurious_row(looks: &Looks<'_>, options: &SensorOptions) -> Vec<f64> {
     smooth(&[empty, spurious[ROBOT], spurious[LANDMARK]], options.estimate.alpha)
 }
 
-/// What is reported in the direction of a robot or landmark, in one class or in all.
+/// Returns the row of reports in the direction of a robot or landmark, in one class or in all.
 fn subject_row(looks: &Looks<'_>, kind: usize, class: Option<usize>, alpha: f64) -> Vec<f64> {
     let detected = detection_rate(looks, kind, class, alpha);
     let mut as_kind = looks.kinds.smoothed(kind, alpha).unwrap_or_else(|| {
@@ -132,7 +132,7 @@ fn subject_row(looks: &Looks<'_>, kind: usize, class: Option<usize>, alpha: f64)
     vec![1.0 - as_kind[ROBOT] - as_kind[LANDMARK], as_kind[ROBOT], as_kind[LANDMARK]]
 }
 
-/// Rate in a class; where none was in view there, over all classes.
+/// Returns the detection rate in a class; over all classes where none was in view in that one.
 fn detection_rate(looks: &Looks<'_>, kind: usize, class: Option<usize>, alpha: f64) -> f64 {
     let table = detection_table(looks, kind);
     if let Some(row) = class.and_then(|class| table.smoothed(class, alpha)) {
@@ -153,8 +153,8 @@ fn assumed_detections(looks: &Looks<'_>, kind: usize, name: &str) -> Vec<String>
     thin.into_iter().map(|row| assumed(row.row)).collect()
 }
 
-/// Rows of the distance classes and of `beyond`. A class without counts reports truly; a
-/// spurious report without counts may have any class.
+/// Returns the rows of the distance classes and of `beyond`. A class without counts is reported
+/// truly; a spurious report without counts may have any class.
 pub(super) fn distance_rows(
     distance: &Counts,
     beyond: &Counts,
@@ -176,7 +176,7 @@ pub(super) fn distance_rows(
     rows
 }
 
-/// The row of what is always reported as it is.
+/// Returns the row of a value that is always reported truly.
 pub(super) fn truly(n: usize, column: usize) -> Vec<f64> {
     let mut row = vec![0.0; n];
     row[column] = 1.0;

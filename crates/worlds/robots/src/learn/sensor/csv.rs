@@ -1,4 +1,4 @@
-//! A sensor learned from readings whose truth is known.
+//! A sensor learned from readings whose true values are known.
 
 use std::collections::BTreeMap;
 
@@ -75,7 +75,7 @@ impl<'a> ReadingLog<'a> {
         counts
     }
 
-    /// The confusion of what stands in each class; of `nothing` there is none.
+    /// Counts the confusion of objects in each distance class; `nothing` has none.
     fn by_class(&self) -> Vec<Counts> {
         let table = |class: &String| {
             Counts::new(&format!("confusion_{class}"), &self.observations[1..], &self.observations)
@@ -123,7 +123,7 @@ impl<'a> ReadingLog<'a> {
         }
     }
 
-    /// Class of what was reported where nothing was.
+    /// Counts the classes of reports where nothing was.
     fn beyond(&self) -> Counts {
         let mut counts = Counts::new(BEYOND, &[BEYOND.to_string()], &self.classes.names);
         let spurious = self.readings.iter().filter(|r| r.truth == 0);
@@ -162,7 +162,7 @@ impl<'a> ReadingLog<'a> {
         }
     }
 
-    /// The standard kinds that the sensor was never shown: it takes them for nothing.
+    /// Returns the standard kinds that the sensor was never shown: it takes them for nothing.
     fn unseen_kinds(&self) -> Vec<(String, String)> {
         let known = |kind: &&str| self.observations.iter().any(|name| name == kind);
         let kinds = ["wall", "door", "person", "robot"].into_iter();
@@ -186,8 +186,8 @@ impl<'a> ReadingLog<'a> {
         self.observations.iter().enumerate().map(row).collect()
     }
 
-    /// Rows for each class; without counts in a class, that of all classes. `pooled` has them
-    /// in the order of the observations. Empty where the file tells no distances.
+    /// Returns the rows for each class; without counts in a class, that of all classes. `pooled`
+    /// has them in the order of the observations. Empty where the file gives no distances.
     fn rows_by_class(&self, pooled: &[NamedRow], alpha: f64) -> Vec<(String, Vec<NamedRow>)> {
         if self.readings.iter().all(|reading| reading.true_at.is_none()) {
             return Vec::new();

@@ -1,4 +1,4 @@
-//! How often a subject in view is read (rule L4).
+//! The rate at which a subject in view is read (rule L4).
 
 use serde::Serialize;
 
@@ -8,33 +8,32 @@ use crate::learn::Counts;
 use crate::learn::track::pose_at;
 use sidestep_import::mrclam::{Dataset, RobotLog};
 
-/// Half of the field in which a subject is surely in view.
+/// Half of the angle within which a subject is surely in view.
 const FIELD_HALF_RAD: f64 = 0.40;
-/// Length of a bin.
+/// Length of a bin in seconds.
 const BIN_SECS: f64 = 1.0;
-/// A longer log is taken for damaged time stamps: eleven days.
+/// Largest number of bins; a longer log (eleven days) is taken for damaged time stamps.
 const BINS_MAX: f64 = 1e6;
 
 /// Detection by distance class: rows are classes, columns `seen` and `missed`.
 ///
-/// Time is cut into bins of 1 s from the observer's first to its last common time stamp. A
-/// subject is in view of a bin when its true bearing at mid-bin is within 0.40 rad, and seen
-/// when its code was read in the bin. Nothing is known of occlusion: a subject hidden behind
-/// another counts as missed.
+/// Time is cut into bins of 1 s from the observer's first to its last common time stamp. A subject
+/// is in view in a bin when its true bearing at mid-bin is within 0.40 rad, and seen when its code
+/// was read in the bin. Occlusion is not known: a subject hidden behind another counts as missed.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Detection {
-    /// Bins of all observers in which the observer's pose is known.
+    /// Number of bins, over all observers, in which the observer's pose is known.
     pub looks: u64,
-    /// All subjects.
+    /// Counts over all subjects.
     pub all: Counts,
-    /// Robots only.
+    /// Counts over robots only.
     pub robots: Counts,
-    /// Landmarks only.
+    /// Counts over landmarks only.
     pub landmarks: Counts,
 }
 
 impl Detection {
-    /// The tables, most general first.
+    /// Returns the tables, most general first.
     pub fn tables(&self) -> [&Counts; 3] {
         [&self.all, &self.robots, &self.landmarks]
     }
@@ -72,7 +71,8 @@ pub(super) struct View {
     seen: bool,
 }
 
-/// All subjects in view of all bins of all observers, and the number of bins with a pose.
+/// Returns all subjects in view, over all bins of all observers, and the number of bins with a
+/// pose.
 pub(super) fn views(dataset: &Dataset, classes: &DistanceClasses) -> (Vec<View>, u64) {
     let mut views = Vec::new();
     let mut looks = 0;
@@ -88,7 +88,7 @@ pub(super) fn views(dataset: &Dataset, classes: &DistanceClasses) -> (Vec<View>,
     (views, looks)
 }
 
-/// Start of the first bin and the number of whole bins common to all three streams.
+/// Returns the start of the first bin and the number of whole bins common to all three streams.
 fn bins(robot: &RobotLog) -> Option<(f64, usize)> {
     let truth = robot.truth.iter().map(|sample| sample.t_secs);
     let commands = robot.commands.iter().map(|command| command.t_secs);
@@ -99,13 +99,13 @@ fn bins(robot: &RobotLog) -> Option<(f64, usize)> {
     (1.0..=BINS_MAX).contains(&n_bins).then_some((start_secs, n_bins as usize))
 }
 
-/// First and last of the time stamps.
+/// Returns the first and last of the time stamps.
 fn ends(mut stamps: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     let first = stamps.next()?;
     Some((first, stamps.last().unwrap_or(first)))
 }
 
-/// The subjects read in each bin.
+/// Returns the subjects read in each bin.
 fn codes_by_bin(
     dataset: &Dataset,
     robot: &RobotLog,

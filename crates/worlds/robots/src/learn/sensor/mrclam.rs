@@ -146,7 +146,7 @@ fn count(sightings: &[Sighting], is_counted: impl Fn(&Sighting) -> bool) -> u64 
     sightings.iter().filter(|sighting| is_counted(sighting)).count() as u64
 }
 
-/// The estimates of cells with counts.
+/// Returns the estimates of cells with counts.
 pub(super) fn filled(table: &Counts) -> impl Iterator<Item = Estimate> {
     table.estimates().into_iter().filter(|estimate| estimate.count > 0.0)
 }
@@ -155,7 +155,7 @@ fn three_classes(sightings: &[Sighting]) -> CountMatrix {
     CountMatrix(distance("distance3", sightings, &DistanceClasses::very_near_near_far()))
 }
 
-/// Errors over the correct readings; by class of the true range where `classes` are given.
+/// Returns errors over the correct readings; by class of the true range where `classes` are given.
 fn errors<'s>(
     sightings: impl IntoIterator<Item = &'s Sighting>,
     classes: Option<&DistanceClasses>,

@@ -1,26 +1,26 @@
-//! How a sensor is learned.
+//! Options of learning a sensor.
 
 use crate::learn::EstimateOptions;
 use sidestep_kernel::InputError;
 
-/// More distance classes than this are taken for a mistake.
+/// Largest number of distance classes; more are taken for a mistake.
 const CLASSES_MAX: usize = 64;
 
-/// How a sensor is learned.
+/// Options of learning a sensor.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SensorOptions {
-    /// How counts become probabilities.
+    /// The rule by which counts become probabilities.
     pub estimate: EstimateOptions,
-    /// Edges between distance classes in m, increasing; `k` edges make `k + 1` classes. A
-    /// class holds its lower edge. A leading 0 is allowed and adds no class.
+    /// Edges between distance classes in meters, increasing; `k` edges make `k + 1` classes. A
+    /// class includes its lower edge. A leading 0 is allowed and adds no class.
     pub distance_edges_m: Vec<f64>,
     /// Names of the classes, near to far; `d0`, `d1`, ... when empty.
     pub distance_classes: Vec<String>,
     /// Bearings of the profile's beams in degrees relative to the heading, + to the left.
     pub bearings_deg: Vec<f64>,
-    /// Range of the profile's sensor in m.
+    /// Range of the profile's sensor in meters.
     pub range_m: f64,
-    /// Which sensor of a CSV file with several.
+    /// Name of the sensor to learn, for a CSV file with several.
     pub sensor: Option<String>,
 }
 
@@ -57,9 +57,9 @@ impl SensorOptions {
 /// Distances cut into classes, near to far.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct DistanceClasses {
-    /// Between the classes, in m.
+    /// Edges between the classes, in meters.
     pub(super) edges_m: Vec<f64>,
-    /// One more than edges.
+    /// Names of the classes: one more than there are edges.
     pub(super) names: Vec<String>,
 }
 
@@ -96,7 +96,7 @@ impl DistanceClasses {
         Ok(self)
     }
 
-    /// The three classes that every report has, cut at [`THREE_EDGES_M`].
+    /// Returns the three classes that every report has, cut at [`THREE_EDGES_M`].
     pub(super) fn very_near_near_far() -> Self {
         Self {
             edges_m: THREE_EDGES_M[1..].to_vec(),
@@ -108,21 +108,21 @@ impl DistanceClasses {
         self.names.len()
     }
 
-    /// The class of a distance in m; an edge belongs to the farther class.
+    /// Returns the class of a distance in meters; an edge belongs to the farther class.
     pub(super) fn of(&self, distance_m: f64) -> usize {
         self.edges_m.partition_point(|edge| *edge <= distance_m)
     }
 
-    /// The edges with the leading 0.
+    /// Returns the edges with the leading 0.
     pub(super) fn edges_from_zero_m(&self) -> Vec<f64> {
         std::iter::once(0.0).chain(self.edges_m.iter().copied()).collect()
     }
 }
 
-/// Lower edges in m of very near, near and far.
+/// Lower edges in meters of very near, near and far.
 pub(super) const THREE_EDGES_M: [f64; 3] = [0.0, 2.0, 4.0];
 
-/// What the class of a distance is called where there is nothing.
+/// Name of the distance class where there is nothing.
 pub(super) const BEYOND: &str = "beyond";
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Readings whose truth is known, from a CSV table.
+//! Readings whose true values are known, from a CSV table.
 
 use std::collections::BTreeSet;
 
@@ -7,7 +7,7 @@ use super::options::{BEYOND, DistanceClasses};
 use sidestep_import::table::{CsvRow, CsvTable, Word};
 use sidestep_kernel::InputError;
 
-/// So many observations are taken for a column of numbers.
+/// Largest number of observations; a column with more is taken for a column of numbers.
 const OBSERVATIONS_MAX: usize = 250;
 
 /// One row of the file.
@@ -17,29 +17,29 @@ pub(super) struct Reading {
     pub(super) truth: usize,
     /// Index of the reported one.
     pub(super) reported: usize,
-    /// Where there was something.
+    /// True distance, where there was something.
     pub(super) true_at: Option<Distance>,
-    /// Where something was reported.
+    /// Reported distance, where something was reported.
     pub(super) reported_at: Option<Distance>,
 }
 
 impl Reading {
-    /// True and reported distance of a right report of something.
+    /// Returns true and reported distance of a correct report of something.
     pub(super) fn right_distances(&self) -> Option<(Distance, Distance)> {
         (self.truth == self.reported).then_some((self.true_at?, self.reported_at?))
     }
 }
 
-/// A distance as the file tells it.
+/// A distance as the file gives it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Distance {
     pub(super) class: usize,
-    /// In m; `None` where only the class is told.
+    /// In meters; `None` where only the class is given.
     pub(super) range_m: Option<f64>,
 }
 
-/// The observations of a table, `nothing` first and the others by name, and its readings of the
-/// sensor `wanted`.
+/// Returns the observations of a table, `nothing` first and the others by name, and its readings of
+/// the sensor `wanted`.
 pub(super) fn read(
     table: &CsvTable,
     wanted: Option<&str>,
@@ -53,13 +53,13 @@ pub(super) fn read(
     Ok((parser.observations, readings))
 }
 
-/// Where the columns are.
+/// The indices of the columns.
 struct Columns {
     truth: usize,
     reported: usize,
     true_at: usize,
     reported_at: usize,
-    /// Whether distances are told in m, else by class.
+    /// Whether distances are given in meters, else by class.
     in_meters: bool,
 }
 
@@ -81,7 +81,7 @@ impl Columns {
     }
 }
 
-/// The rows of the sensor that is to be learned.
+/// Returns the rows of the sensor that is to be learned.
 fn rows_of_sensor<'t>(
     table: &'t CsvTable,
     wanted: Option<&str>,
@@ -106,7 +106,7 @@ fn rows_of_sensor<'t>(
     Ok(rows)
 }
 
-/// `nothing`, then every other observation of the file by name.
+/// Returns `nothing`, then every other observation of the file by name.
 fn observations(
     place: &str,
     rows: &[CsvRow<'_>],
@@ -141,7 +141,7 @@ impl RowParser<'_> {
     fn reading(&self, row: &CsvRow<'_>) -> Result<Reading, InputError> {
         let truth = self.observation(row.field(self.columns.truth));
         let reported = self.observation(row.field(self.columns.reported));
-        // A distance beside `nothing` means nothing, but must not be garbage.
+        // A distance beside `nothing` is ignored, but it must still be a valid distance.
         let true_at = self.distance(row.field(self.columns.true_at))?;
         let reported_at = self.distance(row.field(self.columns.reported_at))?;
         Ok(Reading {

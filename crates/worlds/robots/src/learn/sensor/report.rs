@@ -1,4 +1,4 @@
-//! What was learned about a sensor, for people and for programs.
+//! The report on a learned sensor, for people and for programs.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -11,30 +11,30 @@ use crate::learn::holdout::Fit;
 use crate::learn::{CountMatrix, Counts, Estimate, EstimateOptions, ThinRow};
 use sidestep_statistics::Moments;
 
-/// What was learned about a sensor. Displayed as readable tables, serialized for programs.
+/// The report on a learned sensor. Displayed as readable tables, serialized for programs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SensorReport {
-    /// The folder or file learned from.
+    /// The folder or file from which it was learned.
     pub source: String,
-    /// Readings in the source.
+    /// Number of readings in the source.
     pub measurements: u64,
-    /// Readings that could be judged: `measurements - skipped`.
+    /// Number of readings that could be judged: `measurements - skipped`.
     pub sightings: u64,
-    /// Readings that could not.
+    /// Number of readings that could not be judged.
     pub skipped: u64,
     /// The same by cause.
     pub skipped_by_cause: BTreeMap<String, u64>,
-    /// Sightings whose report was right.
+    /// Number of sightings whose report was correct.
     pub correct: u64,
-    /// Sightings whose report agrees with the subject that geometry alone would choose.
+    /// Number of sightings whose report agrees with the subject that geometry alone would choose.
     pub nearest_agrees: Option<u64>,
-    /// Barcodes that nobody wears, and how often they were read.
+    /// Barcodes that no subject has, and how often they were read.
     pub unknown_codes: BTreeMap<u32, u64>,
-    /// What was true against what was reported: `{true: {reported: count}}`.
+    /// Counts of the true against the reported value: `{true: {reported: count}}`.
     pub confusion: Counts,
     /// The same by kind of subject.
     pub kinds: Option<Counts>,
-    /// Lower edges of the distance classes in m.
+    /// Lower edges of the distance classes in meters.
     pub distance_edges_m: Vec<f64>,
     /// Names of the distance classes.
     pub distance_classes: Vec<String>,
@@ -44,39 +44,39 @@ pub struct SensorReport {
     pub distance_counts_robots: Option<CountMatrix>,
     /// The same over landmarks only.
     pub distance_counts_landmarks: Option<CountMatrix>,
-    /// Lower edges in m of the three classes very near, near and far.
+    /// Lower edges in meters of the three classes very near, near and far.
     pub distance3_edges_m: [f64; 3],
-    /// [`Self::distance_counts`] by those; `None` where distances are known by class only.
+    /// [`Self::distance_counts`] by those classes; `None` where distances are known by class only.
     pub distance3_counts: Option<CountMatrix>,
     /// Errors of range and bearing, over correct reports.
     #[serde(flatten)]
     pub errors: ErrorMoments,
     /// The same by observer.
     pub per_observer: BTreeMap<u32, ErrorMoments>,
-    /// How often a subject in view was read.
+    /// Counts of subjects in view that were read or missed.
     pub detection: Option<Detection>,
-    /// Every estimated probability with its count and interval. Of `confusion` only the
-    /// cells with counts.
+    /// Every estimated probability with its count and interval. Of `confusion`, only the cells with
+    /// counts.
     pub probabilities: Vec<Estimate>,
-    /// Rows that rest on few counts.
+    /// Rows with few counts.
     pub thin: Vec<ThinRow>,
-    /// How well a part predicts the rest.
+    /// Tests of how well a part of the events predicts the rest.
     pub hold_out: Vec<Fit>,
-    /// How counts become probabilities.
+    /// The rule by which counts become probabilities.
     pub estimate: EstimateOptions,
-    /// What the reader should know before trusting the numbers.
+    /// Warnings that the reader should see before trusting the numbers.
     pub warnings: Vec<String>,
 }
 
 /// Errors of measurement, measured minus true; `None` where nothing was measured.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct ErrorMoments {
-    /// Of the range, in m.
+    /// Error of the range in meters.
     pub range_error_m: Option<Moments>,
-    /// Of the range, in m, by class of the true range.
+    /// Error of the range in meters, by class of the true range.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub range_error_by_true_class: Vec<Option<Moments>>,
-    /// Of the bearing, in rad.
+    /// Error of the bearing in radians.
     pub bearing_error_rad: Option<Moments>,
 }
 

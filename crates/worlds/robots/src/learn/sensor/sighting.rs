@@ -1,4 +1,4 @@
-//! Whom a barcode reading was really of (rule L2).
+//! The true subject of a barcode reading (rule L2).
 
 use std::collections::BTreeMap;
 
@@ -6,7 +6,7 @@ use crate::learn::track::{Pose, pose_at};
 use sidestep_import::mrclam::{Dataset, Measurement};
 use sidestep_kernel::math::wrap_angle;
 
-/// A subject is where a reading says when the bearing differs by no more than this ...
+/// A subject is consistent with a reading when the bearing differs by no more than this ...
 const BEARING_TOLERANCE_RAD: f64 = 0.15;
 /// ... and the range by no more than the greater of this ...
 const RANGE_TOLERANCE_M: f64 = 0.5;
@@ -20,49 +20,49 @@ const RANGE_SPREAD_SHARE: f64 = 0.1;
 /// One judged reading.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Sighting {
-    /// Who read.
+    /// Number of the observing robot.
     pub(super) observer: u32,
     pub(super) barcode: u32,
-    /// The subject that wears the barcode; `None` when nobody does.
+    /// The subject that has the barcode; `None` when nobody has it.
     pub(super) decoded: Option<u32>,
-    /// Who stood there.
+    /// The subject that was really there.
     pub(super) truth: Option<Candidate>,
-    /// Whom geometry alone would choose.
+    /// The subject that geometry alone would choose.
     pub(super) nearest: Option<u32>,
     pub(super) range_m: f64,
     pub(super) bearing_rad: f64,
 }
 
 impl Sighting {
-    /// The true subject.
+    /// Returns the true subject.
     pub(super) fn subject(&self) -> Option<u32> {
         self.truth.map(|candidate| candidate.subject)
     }
 
-    /// The true subject's geometry, where the reading named it.
+    /// Returns the true subject's geometry, where the reading named it.
     pub(super) fn correct(&self) -> Option<Candidate> {
         self.truth.filter(|candidate| self.decoded == Some(candidate.subject))
     }
 }
 
-/// A subject that stands where a reading says.
+/// A subject that is consistent with a reading.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Candidate {
     pub(super) subject: u32,
-    /// True range, center to center.
+    /// True range in meters, center to center.
     pub(super) range_m: f64,
-    /// True bearing.
+    /// True bearing in radians.
     pub(super) bearing_rad: f64,
     /// Squared distance from the reading, in spreads.
     misfit: f64,
 }
 
-/// Why a reading cannot be judged.
+/// The reason why a reading cannot be judged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Skip {
     /// The observer's own pose is unknown at that time.
     ObserverLost,
-    /// The pose of the decoded robot is.
+    /// The pose of the decoded robot is unknown at that time.
     SubjectLost,
 }
 
@@ -112,7 +112,7 @@ fn judge(dataset: &Dataset, observer: u32, reading: &Measurement) -> Result<Sigh
     })
 }
 
-/// All other subjects that stand where the reading says, by subject number.
+/// Returns all other subjects that are consistent with the reading, by subject number.
 fn consistent(
     dataset: &Dataset,
     observer: u32,
@@ -140,13 +140,13 @@ fn weigh(subject: u32, range_m: f64, bearing_rad: f64, reading: &Measurement) ->
     })
 }
 
-/// All subjects but `observer`: robots, then landmarks.
+/// Returns all subjects but `observer`: robots, then landmarks.
 pub(super) fn others(dataset: &Dataset, observer: u32) -> impl Iterator<Item = u32> {
     let subjects = dataset.robots.keys().chain(dataset.landmarks.keys());
     subjects.copied().filter(move |subject| *subject != observer)
 }
 
-/// Where a subject stands at a time; `None` for a robot without ground truth then.
+/// Returns the position of a subject at a time; `None` for a robot without ground truth then.
 pub(super) fn position_of(dataset: &Dataset, subject: u32, t_secs: f64) -> Option<[f64; 2]> {
     if let Some(position_m) = dataset.landmarks.get(&subject) {
         return Some(*position_m);

@@ -9,10 +9,10 @@ use sidestep_import::mrclam::Dataset;
 pub(super) const ROBOT: usize = 0;
 /// Row of a table of kinds, and column: a landmark.
 pub(super) const LANDMARK: usize = 1;
-/// Row of a table of kinds: nobody. The column is a code that nobody wears.
+/// Row of a table of kinds: nobody. The column is a code that no subject has.
 pub(super) const NOBODY: usize = 2;
 
-/// How a data set's subjects are called in tables.
+/// The names of a data set's subjects in tables.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Labels {
     /// Subject numbers, in increasing order.
@@ -32,7 +32,7 @@ impl Labels {
         Self { subjects, robots }
     }
 
-    /// Position of a subject among rows and columns; nobody comes last.
+    /// Returns the position of a subject among rows and columns; nobody comes last.
     fn index(&self, subject: Option<u32>) -> usize {
         let known = subject.and_then(|subject| self.subjects.binary_search(&subject).ok());
         known.unwrap_or(self.subjects.len())
@@ -46,7 +46,7 @@ impl Labels {
         }
     }
 
-    /// True subject against decoded subject.
+    /// Counts the true subject against the decoded subject.
     pub(super) fn confusion(&self, sightings: &[Sighting]) -> Counts {
         let mut rows: Vec<String> = self.subjects.iter().map(|s| format!("S{s}")).collect();
         let mut columns = rows.clone();
@@ -70,13 +70,13 @@ impl Labels {
         counts
     }
 
-    /// Whether the true subject is of `kind`.
+    /// Returns whether the true subject is of `kind`.
     pub(super) fn is_of(&self, sighting: &Sighting, kind: usize) -> bool {
         self.kind(sighting.subject()) == kind
     }
 }
 
-/// Class of the true range against class of the measured range, over correct readings.
+/// Counts the class of the true range against that of the measured range, over correct readings.
 pub(super) fn distance<'a>(
     name: &str,
     sightings: impl IntoIterator<Item = &'a Sighting>,
@@ -91,7 +91,7 @@ pub(super) fn distance<'a>(
     counts
 }
 
-/// Class of the measured range where nobody stood.
+/// Counts the class of the measured range where nobody was.
 pub(super) fn beyond(sightings: &[Sighting], classes: &DistanceClasses) -> Counts {
     let mut counts = Counts::new(BEYOND, &[BEYOND.to_string()], &classes.names);
     for sighting in sightings.iter().filter(|sighting| sighting.truth.is_none()) {

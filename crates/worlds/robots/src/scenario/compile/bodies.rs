@@ -1,4 +1,4 @@
-//! What all bodies have in common: how many, where, how large, how often they act.
+//! Properties that all bodies have in common: number, places, size, and how often they act.
 
 use super::super::{Period, Placing, Side};
 use super::*;
@@ -124,7 +124,7 @@ impl Compiler<'_> {
         self.source.error(span, cause, remedy)
     }
 
-    /// Number of bodies: given, or that of the given places.
+    /// Returns the number of bodies: given, or that of the given places.
     pub(super) fn count(
         &self,
         count: Option<&Spanned<u32>>,
@@ -202,12 +202,12 @@ impl Compiler<'_> {
     }
 }
 
-/// The cycles from one action to the next.
+/// Returns the number of cycles from one action to the next.
 pub(super) fn cycles_of(period: Option<Period>) -> u32 {
     period.map_or(1, |period| period.get() as u32)
 }
 
-/// Width and height in boxes.
+/// Returns width and height in boxes.
 pub(super) fn boxes(size: Option<[Side; 2]>) -> (u32, u32) {
     size.map_or((1, 1), |[width, height]| (width.get() as u32, height.get() as u32))
 }

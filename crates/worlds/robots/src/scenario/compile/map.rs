@@ -1,14 +1,14 @@
-//! The map section -> boxes.
+//! From the map section to boxes.
 
 use super::*;
 
 /// Farthest corner of a map: poses are recorded with 15 bits per coordinate.
 const MAX_SIDE: u32 = (1 << 15) - 2 * MAX_PATH as u32;
 
-/// The map of a scenario, and the doors that a generated office has.
+/// Returns the map of a scenario, and the doors that a generated office has.
 ///
 /// # Errors
-/// When it cannot be read, is absurdly large, or has no free box.
+/// When the map cannot be read, is absurdly large, or has no free box.
 pub(super) fn load_map(
     source: &Source,
     section: &Spanned<MapSection>,
@@ -55,7 +55,7 @@ fn read_map(
     }
 }
 
-/// The map with its border, one byte per box, as states begin.
+/// Returns the map with its border, one byte per box, in the form in which states start.
 pub(super) fn padded(map: &GridMap, border: u32, stride: u32, rows: u32) -> Vec<u8> {
     use crate::state::{FREE, WALL};
     let mut grid = vec![WALL; stride as usize * rows as usize];

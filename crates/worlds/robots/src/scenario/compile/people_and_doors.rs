@@ -8,7 +8,7 @@ use crate::effector::Side;
 /// Longest side of a door that a map brings, in boxes.
 const MAX_SIDE: u32 = 64;
 
-/// Where a door is, and its columns and rows.
+/// Place of a door, and its columns and rows.
 type SizedPlace = (Spanned<Placing>, (u32, u32));
 
 impl Compiler<'_> {
@@ -44,7 +44,8 @@ impl Compiler<'_> {
         let doors = self.door_places(s, &span)?;
         let (mut places, mut types) = (Vec::new(), Vec::new());
         for (k, (place, size)) in doors.iter().enumerate() {
-            // Without a given phase the doors of a section do not all toggle at once.
+            // Each door gets a phase, because otherwise all doors of a section would toggle at
+            // once.
             let door = self.door(s, &span, k as u64, doors.len() as u64)?;
             let ty = self.body_type(&s.kind, *size, Arc::new([]), Role::Door(door))?;
             types.push(self.add_type(ty, &span)?);
@@ -61,7 +62,7 @@ impl Compiler<'_> {
         })
     }
 
-    /// Where doors are, and how large; they all face the same way.
+    /// Returns the places and sizes of doors; they all face the same way.
     fn door_places(
         &self,
         s: &DoorSection,

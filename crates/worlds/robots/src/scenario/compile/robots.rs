@@ -1,4 +1,4 @@
-//! Robot sections: bodies with sensors and effectors, and behaviours.
+//! Robot sections: bodies with sensors and effectors, and behaviors.
 
 use super::super::Placing;
 use super::bodies::{Group, TypeOf, cycles_of};
@@ -33,7 +33,7 @@ impl Compiler<'_> {
         })
     }
 
-    /// Starts and goals from a MovingAI list: the first `count` rows, one robot each.
+    /// Reads starts and goals from a MovingAI list: the first `count` rows, one robot each.
     fn robots_of_scen(
         &mut self,
         s: &RobotSection,
@@ -118,7 +118,8 @@ impl Compiler<'_> {
         tables::sensor(name.get_ref(), section, &kinds)
     }
 
-    /// The observation each kind designates: its own name where nothing else is said.
+    /// Returns the observation that each kind designates: its own name unless the file says
+    /// otherwise.
     fn observations(&self) -> Vec<String> {
         let own = |kind: &String| {
             let section = self.file.kinds.iter().find(|(name, _)| name.get_ref() == kind);
@@ -190,10 +191,10 @@ impl Compiler<'_> {
     }
 }
 
-/// Behaviours that need nobody to bring them.
+/// Names of the built-in behaviors.
 const BEHAVIOURS: [&str; 6] = ["wander", "shuttle", "goto", "replay", "random", "external"];
 
-/// Ways of robots of one size, asked for at one place of the scenario.
+/// Ways for robots of one size, asked for at one place of the scenario.
 struct Ways<'c, 'a> {
     compiler: &'c Compiler<'a>,
     size: u32,
@@ -201,7 +202,7 @@ struct Ways<'c, 'a> {
 }
 
 impl Ways<'_, '_> {
-    /// The way to a region in which a robot finds room.
+    /// Returns the way to a region in which there is room for a robot.
     fn to(&self, rect: [u32; 4]) -> Result<Arc<FlowField>, InputError> {
         let (compiler, size) = (self.compiler, self.size);
         compiler.check_rect(rect, self.span.clone())?;
@@ -219,7 +220,7 @@ impl Ways<'_, '_> {
     }
 }
 
-/// A key without which a behaviour does not know what to do.
+/// Returns the value of a key that a behavior cannot do without.
 fn needed<T>(s: &BehaviourSection, key: &str, given: Option<T>, example: &str) -> Result<T, Wrong> {
     given.ok_or_else(|| {
         (format!("behaviour `{}` needs `{key}`", s.kind), format!("add {key} = {example}"))
@@ -232,7 +233,7 @@ fn replay(s: &BehaviourSection, actions: &[String]) -> Result<Replay, Wrong> {
     Ok(Replay { actions: ids.collect::<Result<_, _>>()?, repeat: s.repeat.unwrap_or(false) })
 }
 
-/// Boxes of a robot's side.
+/// Returns the number of boxes of a robot's side.
 fn side(s: &RobotSection) -> u32 {
     s.size.map_or(1, |side| side.get() as u32)
 }
