@@ -1,8 +1,7 @@
 //! A chain scenario that needs no other file, as a run folder keeps it.
 //!
 //! Floors are stored as the program read them, because a later version of an importer must not
-//! change
-//! the replay. Scripts and arm models are stored unchanged.
+//! change the replay. Scripts and arm models are stored unchanged.
 
 use super::scenario::Compiled;
 use serde_json::Value;

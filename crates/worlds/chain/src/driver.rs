@@ -1,6 +1,5 @@
 //! Tasks of a chain's initiator, carried out one after the other: what moves the chain, and where
-//! to
-//! (slides R4, R9).
+//! to (slides R4, R9).
 
 use super::events::EventKind;
 use super::motion::replan::Memory;

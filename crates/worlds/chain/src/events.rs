@@ -9,8 +9,7 @@ use sidestep_kernel::{Cycle, EntityId};
 #[serde(rename_all = "kebab-case")]
 pub enum EventKind {
     /// A connector has objected to a motion that the driver wanted; the value is the distance that
-    /// the
-    /// initiator could have gone, in meters.
+    /// the initiator could have gone, in meters.
     Veto,
     /// Some part of the chain has entered an obstacle; the value is the depth in meters.
     Penetration,
@@ -32,8 +31,7 @@ pub enum EventKind {
     /// Parts of the chain were scattered; the value is their number.
     Broken,
     /// The scattered parts start to be joined again; the value is the number of double passes
-    /// needed to
-    /// find their places.
+    /// needed to find their places.
     Reforming,
     /// The scattered parts are joined again.
     Reformed,
@@ -41,8 +39,7 @@ pub enum EventKind {
     /// meters.
     GapTooLong,
     /// No places were found where the scattered parts are joined; the value is the error of the
-    /// worst
-    /// rod, in meters.
+    /// worst rod, in meters.
     NotReformed,
     /// A target has been reached; the value is its number.
     Target,

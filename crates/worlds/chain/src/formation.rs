@@ -12,8 +12,7 @@ pub(crate) struct Robots {
     /// Behavior of each robot.
     pub(crate) follower: Follower,
     /// Distance between a robot and its connector at which a leader on wheels stops to wait,
-    /// meters; it
-    /// slows down from half of that on. Infinite for never.
+    /// meters; it slows down from half of that on. Infinite for never.
     pub(crate) lag_limit_m: f64,
 }
 

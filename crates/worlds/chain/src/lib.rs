@@ -2,8 +2,7 @@
 //! Chains of connectors and rods that creep among obstacles.
 //!
 //! Source: "Serpentine motion" (Birbilis and Aspragathos, 2005); where this world departs from it,
-//! the
-//! modules say why. The same code serves two and three dimensions.
+//! the modules say why. The same code serves two and three dimensions.
 //!
 //! ```text
 //! rods/:   chains, constraints, propagation, search      arms/:   joints as rods, inverse kinematics

@@ -63,8 +63,7 @@ impl Goal {
     }
 
     /// Returns the part of the way that is done: by the points of a line, or by the distance left
-    /// to a
-    /// target compared with the distance at the start.
+    /// to a target compared with the distance at the start.
     pub(crate) fn progress(&self, index: usize, start: Point<2>, nearest_m: f64) -> f64 {
         match self {
             Self::Target { at, .. } if nearest_m.is_finite() => {

@@ -1,6 +1,5 @@
 //! Perception and decisions of navigators at the start of a cycle, with everybody else where they
-//! are
-//! at that moment.
+//! are at that moment.
 
 use super::driver::Driver;
 use super::navigate::{Goal, Navigator};

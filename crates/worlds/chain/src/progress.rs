@@ -7,8 +7,7 @@ use super::world::ChainWorld;
 
 impl<const D: usize> ChainWorld<D> {
     /// Returns the part of its tasks that a chain has done, from 0 to 1. Several tasks have equal
-    /// weight;
-    /// parts that were given up do not count as done.
+    /// weight; parts that were given up do not count as done.
     pub fn progress(&self, slot: usize, body: &Body<D>) -> f64 {
         let tasks = &self.chains[slot].tasks;
         let part = tasks.get(body.driving.task as usize).map(|task| self.part_done(body, task));
@@ -18,10 +17,8 @@ impl<const D: usize> ChainWorld<D> {
     }
 
     /// Returns the part of its present task that an initiator has finished: for scripts by motions,
-    /// for
-    /// targets by targets, for timed tasks by time; for wandering the part of the distance that its
-    /// speed
-    /// allows in the whole run; for resting the part of the run.
+    /// for targets by targets, for timed tasks by time; for wandering the part of the distance that
+    /// its speed allows in the whole run; for resting the part of the run.
     pub(crate) fn part_done(&self, body: &Body<D>, task: &Task<D>) -> f64 {
         let part = match &task.driver {
             _ if task.lasts_s.is_finite() => self.starts_s(body.driving.cycles) / task.lasts_s,

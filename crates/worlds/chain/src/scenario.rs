@@ -320,8 +320,7 @@ impl<const D: usize> Compiler<'_, D> {
     }
 
     /// Returns the rule by which chains escape; none if nothing moves. By default chains escape at
-    /// twice
-    /// the speed at which they are led, or twice that of the fastest moving obstacle.
+    /// twice the speed at which they are led, or twice that of the fastest moving obstacle.
     fn escape(&self, chains: &[ChainSpec<D>], movers: &Movers<D>, dt_s: f64) -> Option<Escape> {
         let section = &self.file.chain;
         if section.escape == EscapeWord::Off || movers.is_empty() {
@@ -357,8 +356,7 @@ impl<const D: usize> Compiler<'_, D> {
     }
 
     /// Refuses a key that is given and has no effect; the arguments are the key, whether it is
-    /// given,
-    /// and whether it has an effect.
+    /// given, and whether it has an effect.
     fn has_no_idle_key(
         &self,
         keys: &[(&str, bool, bool)],

@@ -17,8 +17,7 @@ pub struct Scratch<const D: usize> {
     pub(crate) propagator: Propagator<D>,
     pub(crate) escaper: Option<Escaper<D>>,
     /// The world's obstacles, the moving ones where they are at the start of `moment`, and the
-    /// parts
-    /// of other chains.
+    /// parts of other chains.
     pub(crate) obstacles: Obstacles<D>,
     /// The same without other chains, if there are any.
     solid: Obstacles<D>,
@@ -60,8 +59,7 @@ impl<const D: usize> Scratch<D> {
     }
 
     /// Puts moving obstacles where they are at the start of cycle `moment`, and other chains where
-    /// they
-    /// are now.
+    /// they are now.
     pub(crate) fn gather(
         &mut self,
         world: &ChainWorld<D>,
@@ -99,8 +97,7 @@ impl<const D: usize> Scratch<D> {
 }
 
 /// Adds the parts of a chain that robots can touch: its robots, or its connectors and rods if it
-/// has
-/// none.
+/// has none.
 fn push_robots<const D: usize>(parts: &mut Vec<Obstacle<D>>, slot: Slot, state: &ChainState<D>) {
     let body = state.body(slot as usize);
     if body.robots.is_empty() {

@@ -41,8 +41,7 @@ pub struct Body<const D: usize> {
     /// Progress of its initiator through its tasks.
     pub driving: Driving,
     /// Scattered connectors, and the places where they will be joined again; none while the chain
-    /// is
-    /// whole.
+    /// is whole.
     pub scattered: Option<Scattered>,
     /// The robots that keep to its connectors; empty if nothing is on wheels.
     pub robots: Vec<Robot>,

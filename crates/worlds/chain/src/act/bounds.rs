@@ -33,8 +33,7 @@ impl<const D: usize> Acting<'_, D> {
     }
 
     /// Takes back moves that would leave the claim, because other chains do not expect the chain
-    /// there;
-    /// also moves that, together with escapes, would be faster than escapes may be.
+    /// there; also moves that, together with escapes, would be faster than escapes may be.
     pub(super) fn keep_to_bounds(&mut self) {
         let most_m = match &self.world.escape {
             Some(escape) => escape.speed_max_m_s * self.world.dt_s * (1.0 + ROUNDING),

@@ -41,8 +41,7 @@ impl<const D: usize> Acting<'_, D> {
     }
 
     /// Throws parts about: each to a free place near its own, if there is one. Parts that are fixed
-    /// or
-    /// have failed stay.
+    /// or have failed stay.
     fn scatter(&mut self, connectors: &RangeInclusive<usize>, by_m: f64) {
         let draws = &mut self.world.streams.draws(self.slot, self.now, purpose::SCATTER);
         let chain = &mut self.body.chain;
@@ -86,8 +85,7 @@ impl<const D: usize> Acting<'_, D> {
     }
 
     /// Returns where the connectors would be if the chain were whole, and whether it can be.
-    /// Connectors
-    /// that never move do not move for that either.
+    /// Connectors that never move do not move for that either.
     fn reformed(
         &self,
         scattered: RangeInclusive<usize>,

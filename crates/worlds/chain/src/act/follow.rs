@@ -1,6 +1,5 @@
 //! Robots on wheels that keep to the connectors of their chain: the link between the swarm's
-//! followers
-//! and this world (slides E2, K5 to K7).
+//! followers and this world (slides E2, K5 to K7).
 
 use super::Acting;
 use crate::events::EventKind;

@@ -157,8 +157,7 @@ impl<const D: usize> Acting<'_, D> {
     }
 
     /// Gives up a task that made no progress for too long. Around a target there is always some way
-    /// to
-    /// go, so there the time counts in which none of them led nearer.
+    /// to go, so there the time counts in which none of them led nearer.
     fn lose_patience(&mut self, task: &Task<D>) {
         let tried = self.body.driving.idle.max(self.body.driving.late);
         if self.world.starts_s(u64::from(tried)) <= task.patience_s {

@@ -69,8 +69,7 @@ pub struct Corridor {
 
 impl Corridor {
     /// Returns a corridor of a width. If a bend's radius is less than half the width, its inner
-    /// wall
-    /// crosses itself.
+    /// wall crosses itself.
     ///
     /// # Errors
     /// When there is no leg, or a length, radius, turn or width is not positive (a turn: 0) or
@@ -98,8 +97,8 @@ impl Corridor {
     }
 
     /// Returns the corridor of the measurements: 14 m straight, 90 degrees left (radius 2 m), 90
-    /// right
-    /// (1.5), a U-turn (1.6), an S of 60, 120 and 60 degrees (1.3), a U-turn (2), 8 m straight.
+    /// right (1.5), a U-turn (1.6), an S of 60, 120 and 60 degrees (1.3), a U-turn (2), 8 m
+    /// straight.
     ///
     /// # Errors
     /// When the width is not positive.
@@ -135,8 +134,7 @@ impl Corridor {
     }
 
     /// Returns poses along the center line, from its start to its end, at most `step_m` apart; the
-    /// ends
-    /// of legs are among them.
+    /// ends of legs are among them.
     ///
     /// # Panics
     /// If `step_m` is not positive.
@@ -160,8 +158,7 @@ impl Corridor {
     }
 
     /// Returns its walls, without thickness, in pieces of about [`WALL_PIECE_M`]: first the right
-    /// one,
-    /// then the left one, numbered on from `first_id` in the direction of the corridor.
+    /// one, then the left one, numbered on from `first_id` in the direction of the corridor.
     pub fn walls(&self, first_id: u32) -> Vec<Obstacle<2>> {
         let line = self.line(WALL_PIECE_M);
         let sides = [-1.0, 1.0].map(|side| line.windows(2).map(move |piece| (side, piece)));

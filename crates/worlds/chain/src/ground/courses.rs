@@ -1,8 +1,7 @@
 //! Courses of moving obstacles, as functions of time.
 //!
 //! Every course is a closed formula of time: nothing keeps a state, any worker computes any
-//! obstacle
-//! at any moment, and a checkpoint needs nothing but the time.
+//! obstacle at any moment, and a checkpoint needs nothing but the time.
 
 use crate::rods::geometry::{Bounds, Point, between, distance, is_finite, norm, scaled, sub, unit};
 use crate::rods::obstacle::Obstacle;
@@ -48,8 +47,7 @@ impl<const D: usize> Mover<D> {
     ///
     /// # Errors
     /// When numbers are not finite, a course does not move, the body does not fit into its room or
-    /// is
-    /// not in it, or a patrol has fewer than two way points or two equal neighbors.
+    /// is not in it, or a patrol has fewer than two way points or two equal neighbors.
     pub fn new(body: Obstacle<D>, course: Course<D>) -> Result<Self, InputError> {
         let mover = Self { bounds: body.bounds(), body, course };
         match mover.fault() {

@@ -20,8 +20,7 @@ pub(crate) struct Field<const D: usize> {
     /// Region of their middles.
     pub(crate) room: Bounds<D>,
     /// Their total size, as a part of the room's. They may overlap, and those that would come too
-    /// near
-    /// to `keep_clear` are left out, so they cover less.
+    /// near to `keep_clear` are left out, so they cover less.
     pub(crate) part: f64,
     /// Radius of each, meters.
     pub(crate) radius_m: f64,
@@ -108,8 +107,7 @@ impl<const D: usize> Crowd<D> {
     ///
     /// # Errors
     /// When a room is too small for them, or has no place away from `keep_clear`; when sizes or
-    /// speeds
-    /// are not finite and positive.
+    /// speeds are not finite and positive.
     pub(crate) fn gather(&self, seed: Seed, first_id: u32) -> Result<Vec<Mover<D>>, InputError> {
         if f64::from(self.n) > MAX_OBSTACLES {
             let cause = format!("{} moving obstacles", self.n);

@@ -33,8 +33,7 @@ pub struct Floor {
 
 impl Floor {
     /// Returns a floor of `width` x `height` pixels of size `pixel_m`; `solid` holds them row by
-    /// row
-    /// from the bottom. Its lower-left corner lies at the origin, and everything around it is
+    /// row from the bottom. Its lower-left corner lies at the origin, and everything around it is
     /// solid.
     ///
     /// # Panics
@@ -132,8 +131,7 @@ impl Floor {
     }
 
     /// Returns the walls between free and solid pixels, numbered on from `first_id`: first those
-    /// along
-    /// rows, from the bottom, then those along columns, from the left.
+    /// along rows, from the bottom, then those along columns, from the left.
     pub fn walls(&self, first_id: u32) -> Vec<Obstacle<2>> {
         let (width, height) = (i64::from(self.width), i64::from(self.height));
         let mut ends = Vec::new();

@@ -29,8 +29,7 @@ pub(crate) struct Wanted {
     /// Length of way ahead of the leader that has to be free as well, meters.
     pub(crate) ahead_m: f64,
     /// Region where the leader starts; by default anywhere on the site. Many sites have blocks
-    /// whose
-    /// insides are free and lead nowhere.
+    /// whose insides are free and lead nowhere.
     pub(crate) within: Option<Bounds<2>>,
 }
 

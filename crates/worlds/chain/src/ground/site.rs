@@ -23,9 +23,8 @@ impl Site {
     }
 
     /// Returns the site of a Stage world, without its robots (see [`stage::Robot`] for their
-    /// starts). A
-    /// floor plan with a boundary has thin walls around it; without one, nothing beside it is
-    /// solid.
+    /// starts). A floor plan with a boundary has thin walls around it; without one, nothing beside
+    /// it is solid.
     pub fn of_stage(world: &stage::World) -> Self {
         let mut site = Self::default();
         for plan in &world.floor_plans {

@@ -2,16 +2,13 @@
 //!
 //! After the obstacles of a tick have moved, parts of the chain that are too near to one become
 //! initiators, the deepest first, and go where nothing gets deeper. The slides set no limit to
-//! that.
-//! Here no connector, slaves included, is farther from its place at the start of the tick than its
-//! speed allows, and a part that only this limit keeps from escaping is reported.
+//! that. Here no connector, slaves included, is farther from its place at the start of the tick
+//! than its speed allows, and a part that only this limit keeps from escaping is reported.
 //!
-//! Measured in `scenarios/papers`: among discs that leave room for a robot between them, a chain
-//! with twice their speed is never in one. Two obstacles that close in on a chain from both sides
-//! hold
-//! it like a pair of tongs, at any speed: it cannot pass through them, and only a jump over them
-//! gets
-//! it free.
+//! The sweep `scenarios/papers/serpentine/movers.sweep.toml` measures what that can do: among discs
+//! that leave room for a robot between them, a chain with twice their speed is never in one. Two
+//! obstacles that close in on a chain from both sides hold it like a pair of tongs, at any speed:
+//! it cannot pass through them, and only a jump over them gets it free.
 
 #[cfg(test)]
 mod tests;
@@ -36,8 +33,7 @@ pub struct Escape {
     /// Length of a tick, s.
     pub dt_s: f64,
     /// Greatest speed: no connector is farther from its place at the start of the tick than this
-    /// times
-    /// the tick; infinite for no limit.
+    /// times the tick; infinite for no limit.
     pub speed_max_m_s: f64,
     /// Number of ticks before contact at which parts give way, with 0.05 m to spare; 0 for only on
     /// contact.
@@ -87,8 +83,7 @@ pub struct Escaped<const D: usize> {
     /// That part.
     pub left: Option<Left<D>>,
     /// The first part that got away: its connector, or the one at the start of its rod, and the
-    /// obstacle
-    /// that it got away from.
+    /// obstacle that it got away from.
     pub first: Option<(usize, u32)>,
 }
 
@@ -161,8 +156,7 @@ impl<const D: usize> Escaper<D> {
     }
 
     /// Moves the parts of a chain that are too near to a moving obstacle. `start` holds the
-    /// connectors'
-    /// positions at the start of the tick.
+    /// connectors' positions at the start of the tick.
     ///
     /// # Errors
     /// When a tick is not positive, a speed limit is below 0, or `start` belongs to another chain.
@@ -272,8 +266,7 @@ impl<const D: usize> Escaper<D> {
     }
 
     /// Tries to reduce one violation; returns the objection if nothing works. A base that objects
-    /// is led
-    /// back to its place by a return pass, so the elbows of an arm get out of the way too.
+    /// is led back to its place by a return pass, so the elbows of an arm get out of the way too.
     fn relieve(
         &mut self,
         tick: &mut Tick<'_, D>,
@@ -301,8 +294,7 @@ impl<const D: usize> Escaper<D> {
     }
 
     /// Returns how far from its start a connector may be, meters: as far as its speed allows, or as
-    /// far
-    /// as it already is.
+    /// far as it already is.
     fn room_m(&self, tick: &Tick<'_, D>, k: usize) -> f64 {
         self.rules.most_m().max(distance(tick.start[k], self.before[k]))
     }

@@ -42,9 +42,8 @@ pub(super) fn go<const D: usize>(
 }
 
 /// Finds a posture, or reports that the target is out of reach. Passes converge slowly if a chain
-/// is
-/// nearly straight, so damped least squares find the nearest posture that gets there, and the chain
-/// goes straight to it if neither the posture nor the way to it is blocked.
+/// is nearly straight, so damped least squares find the nearest posture that gets there, and the
+/// chain goes straight to it if neither the posture nor the way to it is blocked.
 fn by_posture<const D: usize>(
     rules: Rules,
     chain: &mut Chain<D>,

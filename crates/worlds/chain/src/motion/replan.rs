@@ -2,12 +2,9 @@
 //!
 //! A ladder with six rungs: shorter steps, other headings, a turn on the spot, waiting, letting the
 //! other end of the chain lead for a while, and the report that it is stuck. Each rung is tried
-//! once
-//! in a tick, and the first that works ends the climb. The slides do not say what follows a veto;
-//! the
-//! other end leads because a chain can be pulled out of a fold that it was pushed into. A planner
-//! or
-//! an operator gets the veto and no ladder.
+//! once in a tick, and the first that works ends the climb. The slides do not say what follows a
+//! veto; the other end leads because a chain can be pulled out of a fold that it was pushed into. A
+//! planner or an operator gets the veto and no ladder.
 
 mod memory;
 #[cfg(test)]
@@ -57,8 +54,7 @@ impl Default for Rungs {
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Situation {
     /// Distance of its goal, if it has one, meters. Without a goal there is no progress to miss,
-    /// and
-    /// detours through the same place are not counted.
+    /// and detours through the same place are not counted.
     pub goal_distance_m: Option<f64>,
     /// Whether something moves nearby, so that waiting may help.
     pub movers_near: bool,
@@ -110,8 +106,7 @@ pub enum Climbed<const D: usize> {
     /// Nothing moved, and no rung is left; all objections, each once.
     Stuck {
         /// From the wanted motion to the last rung; empty if the wanted motion would now be free
-        /// and only
-        /// detours have led here.
+        /// and only detours have led here.
         vetoes: Vec<Veto<D>>,
     },
     /// Nothing moved: a planner or an operator wanted the motion, and gets the veto.
@@ -355,8 +350,7 @@ fn other_end<const D: usize>(chain: &Chain<D>, k: usize) -> Option<(usize, Point
 
 /// Returns planes and turns in the order in which they are tried. If no side is known to be good,
 /// the least turn comes first; otherwise all of that side before the other, so that the chain does
-/// not
-/// alternate between two ways round.
+/// not alternate between two ways round.
 fn fan(memory: &Memory, planes: usize) -> impl Iterator<Item = (usize, f64)> + use<> {
     let side = f64::from(memory.side_or_left());
     let keeps_side = memory.side != 0;

@@ -32,8 +32,7 @@ pub(super) struct Work<const D: usize> {
     /// blocked.
     pub(super) all_lengths: bool,
     /// Whether a plane rod looks for a way on both sides, or on the farther one only if the nearer
-    /// has
-    /// none.
+    /// has none.
     pub(super) both_sides: bool,
     /// Places found by [`Scene::candidates`], best first.
     pub(super) found: Vec<Candidate<D>>,
@@ -78,8 +77,7 @@ fn guide_line<const D: usize>(step: &Step<D>) -> Point<D> {
 
 impl<const D: usize> Scene<'_, D> {
     /// Puts all good places for a slave, best first, into `work.found`; only the one on the guide
-    /// line
-    /// if it is good.
+    /// line if it is good.
     pub(super) fn candidates(&self, step: &Step<D>, work: &mut Work<D>) -> Result<(), Refusal> {
         work.found.clear();
         work.has_other_side = false;
@@ -113,8 +111,7 @@ impl<const D: usize> Scene<'_, D> {
     }
 
     /// Returns a place that the rod allows for a slave confined to a box, by alternating between
-    /// the
-    /// box and the rod's lengths.
+    /// the box and the rod's lengths.
     fn in_its_box(&self, step: &Step<D>, guided: Point<D>) -> Option<Point<D>> {
         let mobility = &self.chain.connectors()[step.slave].mobility;
         let mut at = guided;
@@ -291,8 +288,7 @@ impl<const D: usize> Scene<'_, D> {
     }
 
     /// Collects everything that a rod of a length may meet on any side. The order is that of the
-    /// grid
-    /// or the tree, and must not matter, so ties go to the lower name.
+    /// grid or the tree, and must not matter, so ties go to the lower name.
     fn collect(&self, step: &Step<D>, length_m: f64, work: &mut Work<D>) {
         let reach_m = length_m + step.rod.radius_m.max(step.tip_radius_m) + 2.0 * SKIN_M;
         work.blocks.clear();

@@ -111,8 +111,7 @@ pub struct Rod {
     /// Greatest length, meters; equal to the least for a rod of fixed length.
     pub max_m: f64,
     /// Radius of its body, meters; at most that of the connectors at its ends. It should be well
-    /// below
-    /// theirs for swarms, whose rods are virtual, because thick rods make slaves jump.
+    /// below theirs for swarms, whose rods are virtual, because thick rods make slaves jump.
     pub radius_m: f64,
 }
 
@@ -146,8 +145,7 @@ impl<const D: usize> Chain<D> {
     ///
     /// # Errors
     /// When counts do not match, numbers are not finite or not in range, neighbors coincide, or
-    /// rods
-    /// are outside their limits (the place names the connector or rod).
+    /// rods are outside their limits (the place names the connector or rod).
     pub fn new(
         points: Vec<Point<D>>,
         connectors: Vec<Connector<D>>,
@@ -202,8 +200,7 @@ impl<const D: usize> Chain<D> {
     }
 
     /// Returns a chain of equal rods and connectors, straight from `start` along the unit vector
-    /// `u`,
-    /// every rod at its greatest length.
+    /// `u`, every rod at its greatest length.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -272,8 +269,7 @@ impl<const D: usize> Chain<D> {
     }
 
     /// Returns the angle between the directions of the rods at an inner connector, rad; `None` at
-    /// the
-    /// ends.
+    /// the ends.
     pub fn bend_rad(&self, i: usize) -> Option<f64> {
         (i > 0 && i + 1 < self.points.len()).then(|| {
             let into = sub(self.points[i], self.points[i - 1]);
@@ -287,8 +283,7 @@ impl<const D: usize> Chain<D> {
     }
 
     /// Returns how far an initiator goes at once if something may be in the way, meters: a quarter
-    /// of
-    /// the least rod or radius.
+    /// of the least rod or radius.
     pub fn step_m(&self) -> f64 {
         0.25 * self.still.least_m
     }

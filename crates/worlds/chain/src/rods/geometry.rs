@@ -1,10 +1,8 @@
 //! Segments, boxes and their distances, in two and three dimensions with the same code.
 //!
 //! The distance between segments is the least of the four distances from an end to the other
-//! segment
-//! and, if both feet are inside, the distance of the lines. The usual clamped formula is off by up
-//! to
-//! 4e-8 for nearly parallel segments, too much for a promise of 1e-9 m.
+//! segment and, if both feet are inside, the distance of the lines. The usual clamped formula is
+//! off by up to 4e-8 for nearly parallel segments, too much for a promise of 1e-9 m.
 
 pub use sidestep_kernel::geometry::{
     Point, across, add, along, angle_rad, between, cross, cross_2d, distance, dot, first_axis,
@@ -46,8 +44,8 @@ pub fn between_segments<const D: usize>(
     between_insides([p, q], [a, b]).map_or(ends, |inside| ends.or(inside))
 }
 
-/// Squared sine of the angle below which segments count as parallel: then the lines are nearer
-/// than the ends by far less than any tolerance, and the nearest place is lost in rounding.
+/// Squared sine of the angle below which segments count as parallel: then the lines are nearer than
+/// the ends by far less than any tolerance, and the nearest place is lost in rounding.
 const PARALLEL2: f64 = 1e-14;
 
 /// Returns the nearest points of the lines, if both lie inside the segments.
@@ -109,8 +107,7 @@ impl<const D: usize> Cuboid<D> {
     /// Returns the nearest points of the segment `p q` and the box (which is solid).
     ///
     /// The squared distance along the segment is convex and made of parabolas; its slope rises, so
-    /// the
-    /// minimum lies where the slope changes sign between two of the at most `2 D` joints.
+    /// the minimum lies where the slope changes sign between two of the at most `2 D` joints.
     pub fn nearest_to_segment(&self, [p, q]: [Point<D>; 2]) -> Nearest<D> {
         let (from, to) = (self.to_local(p), self.to_local(q));
         let d = sub(to, from);
@@ -204,8 +201,7 @@ impl<const D: usize> Core<D> {
     }
 
     /// Whether no point of the core is nearer than `reach_m` to a segment. The answer is that of
-    /// the
-    /// distance, but faster in the usual case.
+    /// the distance, but faster in the usual case.
     #[inline]
     pub fn is_clear_of_segment(&self, [p, q]: [Point<D>; 2], reach_m: f64) -> bool {
         if reach_m <= 0.0 {

@@ -19,8 +19,7 @@ const CELLS_PER_BOX: usize = 64;
 
 impl<const D: usize> Grid<D> {
     /// Builds the grid anew, in the memory it has. Queries measure about `reach_m`, which sets the
-    /// size
-    /// of the cells, never the result.
+    /// size of the cells, never the result.
     pub(super) fn rebuild(&mut self, bounds: impl Iterator<Item = Bounds<D>>, reach_m: f64) {
         self.bounds.clear();
         self.bounds.extend(bounds);
@@ -31,8 +30,7 @@ impl<const D: usize> Grid<D> {
     }
 
     /// Lists the boxes of every cell by counting sort: `starts` holds the counts first, then the
-    /// next
-    /// write positions, and in the end the start of each list.
+    /// next write positions, and in the end the start of each list.
     fn fill(&mut self) {
         let Self { cells, starts, entries, bounds, first } = self;
         first.clear();

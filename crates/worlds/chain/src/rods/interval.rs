@@ -1,14 +1,11 @@
 //! The blocked directions of a plane rod, computed exactly: the union rule.
 //!
 //! A rod turns about its master. The directions in which a rod of one length meets one convex
-//! obstacle
-//! are one interval: how wide the obstacle, grown by the rod's radius and cut to the reach of the
-//! rod,
-//! looks from the master. A thicker connector at the rod's end adds arcs, a bend limit one more
-//! interval. The rod turns to the free direction nearest to where the slave was, on either side.
-//! That
-//! is the smallest turn that clears everything at once; avoiding one obstacle after the other would
-//! lead from one into the next.
+//! obstacle are one interval: how wide the obstacle, grown by the rod's radius and cut to the reach
+//! of the rod, looks from the master. A thicker connector at the rod's end adds arcs, a bend limit
+//! one more interval. The rod turns to the free direction nearest to where the slave was, on either
+//! side. That is the smallest turn that clears everything at once; avoiding one obstacle after the
+//! other would lead from one into the next.
 
 use super::geometry::{Core, Point, cross_2d, dot, nearest_on_segment, norm, sub};
 use sidestep_kernel::math;
@@ -75,8 +72,7 @@ fn block_by_capsule(
         return false;
     }
     // Seen from outside, a convex body lies within a quarter turn of its nearest point, so angles
-    // from
-    // there never wrap.
+    // from there never wrap.
     let seen = Seen { middle: nearest, length_m: reach.length_m, radius_m };
     let mut low_high = (0.0f64, 0.0f64);
     seen.widen_by_disc(a, &mut low_high);

@@ -1,9 +1,8 @@
 //! Obstacles, and the search for those nearby.
 //!
 //! Static obstacles lie in a uniform grid, which copies share; moving ones are a list, with a grid
-//! of
-//! its own if they are many. A query names a box and visits every obstacle whose own box meets it
-//! exactly once, without allocating (slide P3: proximity is sensed locally).
+//! of its own if they are many. A query names a box and visits every obstacle whose own box meets
+//! it exactly once, without allocating (slide P3: proximity is sensed locally).
 
 use super::geometry::{self, Bounds, Core, Point, add, scaled};
 use super::grid::Grid;
@@ -79,8 +78,7 @@ impl<const D: usize> Obstacle<D> {
 }
 
 /// Returns the walls of a plane polygon, all with one id. They guard its inside: a chain that
-/// starts
-/// outside never gets in.
+/// starts outside never gets in.
 pub(crate) fn outline(id: u32, corners: &[Point<2>], radius_m: f64) -> Vec<Obstacle<2>> {
     let wall =
         |k: usize| Obstacle::capsule(id, [corners[k], corners[(k + 1) % corners.len()]], radius_m);
@@ -118,8 +116,7 @@ impl<const D: usize> Obstacles<D> {
     }
 
     /// Returns obstacles for chains whose longest rod, with its ends, measures about `reach_m`;
-    /// that
-    /// sets the cells of the grid, never the result.
+    /// that sets the cells of the grid, never the result.
     ///
     /// # Errors
     /// When a number is not finite, a radius is negative, or an obstacle is farther than 1e7 m
@@ -152,8 +149,7 @@ impl<const D: usize> Obstacles<D> {
     }
 
     /// Replaces the moving obstacles, in the memory they have. Their velocities may be zero,
-    /// because
-    /// parts of other chains rest at times.
+    /// because parts of other chains rest at times.
     ///
     /// # Errors
     /// As [`Self::new`]; then nothing has changed.
@@ -183,8 +179,7 @@ impl<const D: usize> Obstacles<D> {
     }
 
     /// Visits every obstacle whose box meets `near`, each once: the static ones first, in an order
-    /// that
-    /// depends only on the obstacles and the box.
+    /// that depends only on the obstacles and the box.
     #[inline]
     pub fn visit<'a>(&'a self, near: &Bounds<D>, mut look: impl FnMut(&'a Obstacle<D>)) {
         self.still.grid.visit(near, |k| look(&self.still.all[k]));
@@ -197,8 +192,7 @@ impl<const D: usize> Obstacles<D> {
     }
 
     /// Returns the least distance of a capsule's surface from the obstacles within `look_m`;
-    /// `look_m` if
-    /// nothing is as near.
+    /// `look_m` if nothing is as near.
     pub fn clearance_m(&self, [p, q]: [Point<D>; 2], radius_m: f64, look_m: f64) -> f64 {
         let mut least_m = look_m;
         self.visit(&Bounds::of(&[p, q]).grown(radius_m + look_m), |o| {

@@ -1,10 +1,8 @@
 //! A tree of boxes over the rods, which finds the chain's own parts nearby.
 //!
 //! Neighbors along the chain are neighbors in space, so the tree over the index needs no sorting
-//! and
-//! never changes its shape. A rod that moves gets its new box at once; the boxes above it grow as
-//! far
-//! as they must and shrink when the tree is rebuilt, which every motion does.
+//! and never changes its shape. A rod that moves gets its new box at once; the boxes above it grow
+//! as far as they must and shrink when the tree is rebuilt, which every motion does.
 
 use super::geometry::Bounds;
 

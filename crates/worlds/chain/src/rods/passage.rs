@@ -1,19 +1,14 @@
 //! Passages through obstacles between two states of a chain and of its surroundings.
 //!
 //! A request guarantees that in every sub-step both ends of a rod go straight from their old to
-//! their
-//! new place while obstacles stand still, and that no rod and no connector passes through the core
-//! of
-//! an obstacle or of the chain's own parts. So nothing tunnels through static obstacles, however
-//! thin.
+//! their new place while obstacles stand still, and that no rod and no connector passes through the
+//! core of an obstacle or of the chain's own parts. So nothing tunnels through static obstacles,
+//! however thin.
 //!
 //! Moving obstacles move between requests, when a world advances them. One that is fast and thin
-//! may
-//! jump over a rod and touch it neither before nor after: a ball only if it moves at once by more
-//! than
-//! twice its radius and the rod's together. A caller that advances obstacles so fast asks
-//! [`passed`],
-//! which looks at the motion relative to each of them.
+//! may jump over a rod and touch it neither before nor after: a ball only if it moves at once by
+//! more than twice its radius and the rod's together. A caller that advances obstacles so fast asks
+//! [`passed`], which looks at the motion relative to each of them.
 
 use super::chain::Chain;
 use super::geometry::{Bounds, Point, add, norm, scaled};
@@ -31,8 +26,7 @@ pub(crate) struct Passed {
 
 /// Returns the first rod that passed through an obstacle, while the chain went straight from
 /// `before` to its present place, and every moving obstacle along its velocity for `dt_s` seconds
-/// to
-/// its present place. Of several obstacles, it names the one with the lowest id.
+/// to its present place. Of several obstacles, it names the one with the lowest id.
 ///
 /// `before` has one point for every connector.
 pub(crate) fn passed<const D: usize>(

@@ -83,8 +83,7 @@ impl<const D: usize> Propagator<D> {
     ///
     /// # Errors
     /// When a target is not finite or more than 1e6 m from the origin, or the chain does not have
-    /// the
-    /// index. An impossible motion is no error but a veto.
+    /// the index. An impossible motion is no error but a veto.
     pub fn propagate(
         &mut self,
         chain: &mut Chain<D>,
@@ -219,9 +218,8 @@ impl<const D: usize> Propagator<D> {
     }
 
     /// Sweeps from a head outward. Rods keep their lengths when they turn, which is cheap and
-    /// nearly
-    /// always enough; if that ends in a veto, the sweep is repeated with every length they may
-    /// have.
+    /// nearly always enough; if that ends in a veto, the sweep is repeated with every length they
+    /// may have.
     fn sweep(
         &mut self,
         chain: &Chain<D>,
@@ -346,8 +344,7 @@ impl<const D: usize> Propagator<D> {
     }
 
     /// Whether the rest of the chain has nothing to react to: this slave stays, and the bend at it
-    /// and
-    /// the rod beyond it are good as they are.
+    /// and the rod beyond it are good as they are.
     fn may_stop(
         &self,
         chain: &Chain<D>,
@@ -431,8 +428,7 @@ impl<const D: usize> Scene<'_, D> {
             Direction::Down => (master + 1 < points.len()).then_some(master + 1),
         };
         // In the first sweep the connector on the initiator's other side has yet to move, and the
-        // second
-        // sweep will check the bend.
+        // second sweep will check the bend.
         let prev =
             before.filter(|&b| direction == Direction::Down || self.overlay.get(b).is_some());
         Step {

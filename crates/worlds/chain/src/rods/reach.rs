@@ -2,8 +2,7 @@
 //!
 //! A fixed base vetoes every pull of rods of fixed length, so the base's objection is answered by a
 //! return pass: it moves tentatively, and is then led back to its place. Both passes and the check
-//! of
-//! the whole way are one transaction.
+//! of the whole way are one transaction.
 
 use super::chain::{Chain, Mobility};
 use super::geometry::{Point, distance};

@@ -3,8 +3,7 @@
 //!
 //! Passes from one stub to the other and back, each slave by push, pull and resize, bring every rod
 //! into its limits; the whole ends keep every bit. If the gap is longer than the remaining parts,
-//! one
-//! end must come, and only an end that may.
+//! one end must come, and only an end that may.
 
 use super::candidates::guided;
 use super::chain::{Chain, LENGTH_TOLERANCE_M, Rod};

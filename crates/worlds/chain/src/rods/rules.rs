@@ -7,10 +7,8 @@ pub enum Rotation {
     #[default]
     Union,
     /// Turns once, to the tangent of the obstacle that is hit nearest to the master, as the slides
-    /// say,
-    /// and does not check again. Unsafe: it leads from one obstacle into the next, up to 0.19 m
-    /// deep
-    /// where measured.
+    /// say, and does not check again. Unsafe: it leads from one obstacle into the next, up to 0.19
+    /// m deep where measured.
     Literal,
     /// Does not turn: every hit is a veto.
     Never,
@@ -22,16 +20,14 @@ pub struct Rules {
     /// Reaction of a rod that hits an obstacle.
     pub rotation: Rotation,
     /// Whether the chain's own parts are obstacles to it (discs more than one index apart, rods
-    /// more
-    /// than two).
+    /// more than two).
     pub self_collision: bool,
     /// Longest move of a slave in one sub-step, meters; infinite for no limit.
     pub slave_step_max_m: f64,
     /// Number of times that one sweep may try another direction for an earlier slave.
     pub backtracks: usize,
     /// Longest move of an initiator in one sub-step, meters. By default it is a quarter of the
-    /// least
-    /// rod or radius, and unlimited if nothing is in the way.
+    /// least rod or radius, and unlimited if nothing is in the way.
     pub step_m: Option<f64>,
 }
 

@@ -3,9 +3,8 @@
 //! Both ends go straight from their old to their new place. In the plane the test is exact: the rod
 //! passes a core only where its moving end crosses it, or where an end of the core crosses the rod.
 //! In space a rod may go round anything, so only its distance counts: it is never nearer to the
-//! core
-//! than half of the distance that it must keep at rest. [`super::passage`] describes what that does
-//! and does not guarantee.
+//! core than half of the distance that it must keep at rest. [`super::passage`] describes what that
+//! does and does not guarantee.
 
 use super::geometry::{Core, Point, along, between, cross_2d, cross_each_other, dot, sub};
 
@@ -34,8 +33,7 @@ impl<const D: usize> Sweep<D> {
     }
 
     /// Whether the rod passes no point of the core on its way; in space, whether it stays half as
-    /// far
-    /// away as `keep_m`, the distance that it must keep at rest.
+    /// far away as `keep_m`, the distance that it must keep at rest.
     pub(super) fn is_clear(&self, core: &Core<D>, keep_m: f64) -> bool {
         let way_m = self.longest_way_m();
         core.is_clear_of_segment(self.to, Self::sure_m(way_m, keep_m))
@@ -43,9 +41,8 @@ impl<const D: usize> Sweep<D> {
     }
 
     /// Returns the distance at the end of a move, in meters, from which on a rod whose points move
-    /// at
-    /// most `way_m` is surely clear of a core: no point was nearer than its end distance less its
-    /// way.
+    /// at most `way_m` is surely clear of a core: no point was nearer than its end distance less
+    /// its way.
     pub(super) fn sure_m(way_m: f64, keep_m: f64) -> f64 {
         way_m + Self::kept_m(keep_m) + TOUCH_M
     }

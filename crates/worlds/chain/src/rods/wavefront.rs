@@ -1,9 +1,8 @@
 //! Several motions of one end of a chain at once, if nothing is in the way.
 //!
 //! One motion is a series of dependent square roots and divisions, each of which the processor
-//! waits
-//! for. Motion `w` can be at connector `j - w` while motion 0 is at connector `j`: all lanes are
-//! independent, and each computes the same bits as the motions one after the other.
+//! waits for. Motion `w` can be at connector `j - w` while motion 0 is at connector `j`: all lanes
+//! are independent, and each computes the same bits as the motions one after the other.
 
 #![expect(
     clippy::needless_range_loop,
@@ -161,8 +160,8 @@ fn react_one_by_one<const D: usize>(
     }
 }
 
-/// Makes as many motions as there are heads, at most one per lane. Lanes without a head, not yet
-/// at a connector, or past the last one compute values that nothing reads.
+/// Makes as many motions as there are heads, at most one per lane. Lanes without a head, not yet at
+/// a connector, or past the last one compute values that nothing reads.
 fn pull_lanes<const D: usize>(chain: &mut Chain<D>, heads: &[Point<D>]) {
     let least_move_m = chain.least_move_m();
     let (points, rods) = chain.parts_mut();

@@ -21,8 +21,7 @@ struct Inside {
 
 impl<const D: usize> Compiler<'_, D> {
     /// Refuses chains that start in obstacles, or in each other, because no motion leads out of
-    /// there
-    /// without passing through something.
+    /// there without passing through something.
     pub(super) fn starts(
         &self,
         chains: &[ChainSpec<D>],

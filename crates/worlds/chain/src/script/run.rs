@@ -48,8 +48,7 @@ impl Turtle {
     }
 
     /// Makes the axes orthonormal again: rounding bends them a little, and each turn multiplies
-    /// earlier
-    /// errors.
+    /// earlier errors.
     fn straighten(&mut self) {
         self.ahead = unit(self.ahead);
         self.left = unit(mixed(self.left, 1.0, self.ahead, -dot(self.left, self.ahead)));

@@ -1,16 +1,12 @@
 //! A leader and its followers, a tick at a time.
 //!
 //! In each tick the leader perceives, decides and proposes the pose that its wheels would take it
-//! to;
-//! the chain moves there or objects. Then every follower steers toward its own connector. All
-//! perceive
-//! the robots as they were before the tick.
+//! to; the chain moves there or objects. Then every follower steers toward its own connector. All
+//! perceive the robots as they were before the tick.
 //!
 //! A connector that is pulled round a sharp corner goes up to three times as fast as the leader,
-//! too
-//! fast for wheels. A late follower cuts the corner and gets stuck there. Therefore each robot
-//! reports
-//! its lag to the robot before it, as it would report a veto, and the leader slows down.
+//! too fast for wheels. A late follower cuts the corner and gets stuck there. Therefore each robot
+//! reports its lag to the robot before it, as it would report a veto, and the leader slows down.
 
 use super::drive::{Drive, Pose};
 use super::follower::{Follower, Goal};
@@ -39,8 +35,7 @@ pub struct Plan {
     /// Amount by which followers' connectors are larger than their bodies, meters.
     pub margin_m: f64,
     /// Lag of a follower at which the leader stops, meters; from half of it on the leader slows
-    /// down.
-    /// Infinite for a leader that never waits.
+    /// down. Infinite for a leader that never waits.
     pub lag_limit_m: f64,
     /// Rules by which the chain reacts.
     pub rules: Rules,
@@ -50,8 +45,7 @@ pub struct Plan {
 
 impl Plan {
     /// Returns the convoy of the slides: robots of radius 0.25 m on wheels 0.4 m apart, 0.6 to 0.8
-    /// m
-    /// behind each other, connectors 0.08 m larger, wheels 20 % faster than the leader's.
+    /// m behind each other, connectors 0.08 m larger, wheels 20 % faster than the leader's.
     ///
     /// # Errors
     /// When the speed is not above 0.

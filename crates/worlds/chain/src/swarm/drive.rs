@@ -90,8 +90,7 @@ impl Drive {
     }
 
     /// Returns wheel speeds for a speed and a turn. If both together are too fast, the turn comes
-    /// first,
-    /// because a robot that faces the right way gets there, if late.
+    /// first, because a robot that faces the right way gets there, if late.
     pub fn wheels(&self, speed_m_s: f64, turn_rad_s: f64) -> Wheels {
         let max = self.max_wheel_m_s;
         let half = (0.5 * turn_rad_s * self.wheelbase_m).clamp(-max, max);

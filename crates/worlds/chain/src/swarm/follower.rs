@@ -2,9 +2,8 @@
 //!
 //! The chain says where the robot shall be; wheels get there late, and face elsewhere on the way.
 //! Short-range sensors let it slide along nearby obstacles and keep it from touching them. Robots
-//! that
-//! only stop get stuck at walls when they have to graze them, so their connectors' radius has to
-//! exceed their own by a margin.
+//! that only stop get stuck at walls when they have to graze them, so their connectors' radius has
+//! to exceed their own by a margin.
 
 use super::drive::{Drive, Pose, Wheels};
 use super::laser::Body;
@@ -93,8 +92,7 @@ impl Follower {
     }
 
     /// Returns wheel speeds that keep to a connector, limited by the sensors' readings. The wheels
-    /// will
-    /// turn for `dt_s`.
+    /// will turn for `dt_s`.
     pub fn decide(&self, pose: &Pose, goal: &Goal, gaps: &Gaps, dt_s: f64) -> Command {
         let wished = along(goal.velocity_m_s, sub(goal.at, pose.at), self.gain_per_s);
         let wanted = self.aside(wished, pose.heading_rad, gaps);
@@ -132,8 +130,7 @@ impl Follower {
     }
 
     /// Returns a wish without its part toward nearby obstacles, which is reduced more the nearer
-    /// they
-    /// are: the robot slides along.
+    /// they are: the robot slides along.
     fn aside(&self, mut wished: Point<2>, heading_rad: f64, gaps: &Gaps) -> Point<2> {
         for (k, gap_m) in gaps.iter().enumerate().filter(|&(_, &gap_m)| gap_m < self.slide_m) {
             let toward = heading_rad + k as f64 * SECTOR_RAD;

@@ -56,13 +56,11 @@ pub struct Scan {
 
 impl Laser {
     /// Returns a laser with `beams` around the full circle, which reads those within
-    /// `half_field_rad`
-    /// of straight ahead.
+    /// `half_field_rad` of straight ahead.
     ///
     /// # Errors
     /// When there are no beams, or more than 3600; a range is not above 0; a field is outside (0,
-    /// pi];
-    /// or errors are not finite or negative.
+    /// pi]; or errors are not finite or negative.
     pub fn new(
         beams: usize,
         range_m: f64,
@@ -102,8 +100,7 @@ impl Laser {
     }
 
     /// Reads every beam of the field: the distance from the robot's middle to the nearest obstacle
-    /// or
-    /// body, with a random error if the laser has errors, up to the range.
+    /// or body, with a random error if the laser has errors, up to the range.
     ///
     /// One query of the obstacles' grid serves all beams; each obstacle is then checked only by the
     /// beams that may meet it.
@@ -190,8 +187,7 @@ impl Laser {
     }
 
     /// Returns the bearing, left positive, and the range of every beam that it reads, from the
-    /// rightmost
-    /// on.
+    /// rightmost on.
     pub fn readings<'a>(&'a self, scan: &'a Scan) -> impl Iterator<Item = (f64, f64)> + 'a {
         let rightmost = -(self.beams_per_side as f64);
         let bearing_rad = move |k: usize| (rightmost + k as f64) * self.step_rad();
@@ -200,8 +196,7 @@ impl Laser {
     }
 
     /// Returns the least range within a sector of beams, given by its ends relative to the heading,
-    /// left
-    /// positive; `None` if [`Self::sees`] returns false.
+    /// left positive; `None` if [`Self::sees`] returns false.
     pub fn least_m(&self, scan: &Scan, sector_rad: [f64; 2]) -> Option<f64> {
         let n = self.directions.len() as isize;
         let range_m = |k: isize| scan.ranges_m[k.rem_euclid(n) as usize];

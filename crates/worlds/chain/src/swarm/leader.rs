@@ -47,8 +47,7 @@ pub enum Leaving {
     /// Its distance is between far and lost.
     Range,
     /// Its distance is above far: the slides' words taken literally. A leader in the open then
-    /// turns
-    /// forever, because it leaves walls that are not there.
+    /// turns forever, because it leaves walls that are not there.
     Level,
 }
 
@@ -89,8 +88,7 @@ pub enum Turning {
     #[default]
     AboutAWheel,
     /// About the resting wheel, and on the spot if that is blocked: for corridors too narrow to
-    /// swing
-    /// round in.
+    /// swing round in.
     OnTheSpotWhereBlocked,
 }
 

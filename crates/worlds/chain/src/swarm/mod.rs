@@ -1,10 +1,8 @@
 //! A chain of robots on wheels: one navigates, the others follow (slides N1 to N6, E2).
 //!
 //! The leader sees with a laser and decides by six layers; the chain's first connector goes where
-//! the
-//! leader goes. The other robots follow their own connectors on real wheels, with sensors that
-//! report
-//! only imminent contact. Plain data in, plain data out:
+//! the leader goes. The other robots follow their own connectors on real wheels, with sensors that
+//! report only imminent contact. Plain data in, plain data out:
 //!
 //! ```text
 //! leader.rs:    perceive (laser.rs, ray.rs) -> Percept -> decide -> wheels and the layer that acted

@@ -1,6 +1,5 @@
 //! Short-range sensors around a round body: they report the directions of imminent collisions
-//! (slide
-//! E2: the followers' simpler sensors).
+//! (slide E2: the followers' simpler sensors).
 
 use super::drive::Pose;
 use super::laser::Body;

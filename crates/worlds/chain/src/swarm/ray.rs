@@ -6,8 +6,7 @@ use crate::rods::geometry::{
 use crate::rods::obstacle::Obstacles;
 
 /// Returns the distance at which a ray from `from` along the unit vector `u` enters the region
-/// within
-/// `radius_m` of a core; 0 from inside, `None` if it never does.
+/// within `radius_m` of a core; 0 from inside, `None` if it never does.
 pub(crate) fn distance_m(
     from: Point<2>,
     u: Point<2>,

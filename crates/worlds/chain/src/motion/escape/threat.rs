@@ -40,8 +40,7 @@ pub(super) struct Nearness<const D: usize> {
     /// Distance of the surfaces, meters; negative if they overlap.
     pub(super) gap_m: f64,
     /// Unit vector from the obstacle to the part. If the cores overlap it is across the obstacle's
-    /// way,
-    /// to its left.
+    /// way, to its left.
     pub(super) away: Point<D>,
     /// Position on the rod: 0 at its first end, 1 at its second.
     pub(super) along_rod: f64,

@@ -61,8 +61,7 @@ impl Memory {
     }
 
     /// Notes the distance of the goal. Coming a cell nearer than ever before is progress, after
-    /// which
-    /// what failed may be tried again.
+    /// which what failed may be tried again.
     pub(super) fn note_goal(&mut self, goal_m: Option<f64>) {
         let Some(goal_m) = goal_m else { return };
         if self.best_m.is_none_or(|best_m| goal_m < best_m - CELL_M) {
