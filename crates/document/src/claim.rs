@@ -1,4 +1,4 @@
-//! Claims of a paper, and what came of them.
+//! Claims of a paper, and our verdicts on them.
 
 use serde::Serialize;
 use sidestep_statistics::Interval;
@@ -11,27 +11,27 @@ pub enum Verdict {
     Held,
     /// Our figures disagree, or agree under some conditions only.
     NotHeld,
-    /// It cannot be judged: what the paper measured is lost, takes another machine, or a
+    /// It cannot be judged: the paper's measurements are lost, or need another machine, or a
     /// quieter one.
     Lost,
 }
 
 impl Verdict {
-    /// All of them.
+    /// All verdicts.
     pub const ALL: [Self; 3] = [Self::Held, Self::NotHeld, Self::Lost];
 
-    /// Its name in tables.
+    /// Returns its name in tables.
     pub fn name(self) -> &'static str {
         ["held", "not held", "lost"][self as usize]
     }
 
-    /// Held, or not.
+    /// Returns `Held` or `NotHeld`.
     pub fn of(holds: bool) -> Self {
         if holds { Self::Held } else { Self::NotHeld }
     }
 
-    /// Held where the interval lies above 0, not held where it lies below; where it holds 0,
-    /// or there is none, it cannot be judged.
+    /// Returns `Held` if the interval lies above 0 and `NotHeld` if it lies below; if it contains
+    /// 0, or there is none, the claim cannot be judged.
     pub fn by_sign(interval: Option<Interval>) -> Self {
         match interval {
             Some(i) if i.low > 0.0 => Self::Held,
@@ -41,38 +41,38 @@ impl Verdict {
     }
 }
 
-/// A claim of the paper and what came of it.
+/// A claim of the paper, with our figures and verdict.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Claim {
-    /// Number; a letter where one sentence of the paper makes several claims.
+    /// Number, with a letter if one sentence of the paper makes several claims.
     pub id: &'static str,
-    /// What the paper says, in our words.
+    /// The paper's statement, in our words.
     pub paper: &'static str,
-    /// The paper's own figure, where it states one. None of the three papers gives an interval.
+    /// The paper's own figure, if it states one. None of the three papers gives an interval.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub papers_figure: Option<&'static str>,
     /// Our figures.
     pub ours: String,
     /// The verdict.
     pub verdict: Verdict,
-    /// The rule by which it follows, and what limits it.
+    /// The rule by which the verdict follows, and its limits.
     pub reason: String,
 }
 
 impl Claim {
-    /// The same claim beside the figure that the paper states.
+    /// Adds the figure that the paper states.
     #[must_use]
     pub fn with_papers_figure(self, figure: &'static str) -> Self {
         Self { papers_figure: Some(figure), ..self }
     }
 }
 
-/// How many of the claims have this verdict.
+/// Returns the number of claims with this verdict.
 pub fn count(claims: &[Claim], verdict: Verdict) -> usize {
     claims.iter().filter(|claim| claim.verdict == verdict).count()
 }
 
-/// What came of all the claims, in a sentence.
+/// Summarizes the verdicts on all claims in a sentence.
 pub fn tally(claims: &[Claim]) -> String {
     format!(
         "Of {} claims {} held, {} did not hold, and {} cannot be judged.",

@@ -1,5 +1,5 @@
-//! A report as plain data: what it says, in which order. It knows no file and no markup; others
-//! make a page or a text of it.
+//! A report as plain data: its content, in order. It knows no file and no markup; other crates make
+//! a page or a text of it.
 
 use super::claim::Claim;
 use super::{Figure, Table};
@@ -8,9 +8,9 @@ use serde::Serialize;
 /// A report.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Document {
-    /// What it is about.
+    /// Its subject.
     pub title: String,
-    /// What came out, in a sentence or two.
+    /// The result, in a sentence or two.
     pub lead: Text,
     /// Everything else, from top to bottom.
     pub blocks: Vec<Block>,
@@ -22,11 +22,11 @@ pub struct Document {
 pub enum Block {
     /// The head of all that follows, up to the next one.
     Section(String),
-    /// Some sentences.
+    /// A few sentences.
     Paragraph(Text),
-    /// What must not be overlooked: a rehearsal, a run that has not ended.
+    /// A warning: the report is a rehearsal, or a run has not ended.
     Warning(Text),
-    /// Text to be kept as it is: commands, a scenario.
+    /// Verbatim text: commands, a scenario.
     Code(Code),
     /// Names and values.
     Facts(Vec<(String, Text)>),
@@ -34,18 +34,18 @@ pub enum Block {
     Table(Table),
     /// A figure to draw.
     Figure(Figure),
-    /// A picture that is drawn already.
+    /// A finished picture.
     Picture(Picture),
-    /// Claims of a paper, and what came of them.
+    /// Claims of a paper, with our verdicts.
     Claims(Vec<Claim>),
 }
 
-/// One experiment of a report: what was done, and what came of it.
+/// One experiment of a report: its setup and its results.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Experiment {
     /// Its name.
     pub title: &'static str,
-    /// What was run, and what to look for. Marked as [`Text::marked`] reads it.
+    /// Its setup, and the effect to look for. Marked as [`Text::marked`] reads it.
     pub about: &'static str,
     /// Its figures.
     pub figures: Vec<Figure>,
@@ -53,10 +53,10 @@ pub struct Experiment {
     pub tables: Vec<Table>,
 }
 
-/// Text to be kept as it is.
+/// Verbatim text.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Code {
-    /// What it is; where it is long, the page shows this until it is opened.
+    /// Its title; if the text is long, the page shows only this until it is opened.
     pub title: String,
     /// `sh`, `toml`, ...
     pub language: &'static str,
@@ -64,10 +64,10 @@ pub struct Code {
     pub text: String,
 }
 
-/// A picture that is drawn already.
+/// A finished picture.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Picture {
-    /// What it shows.
+    /// Its title: the content of the picture.
     pub title: String,
     /// Small print.
     pub caption: String,
@@ -76,11 +76,11 @@ pub struct Picture {
     pub svg: String,
 }
 
-/// Some sentences.
+/// A few sentences.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
 pub struct Text(pub Vec<Span>);
 
-/// Words that look alike.
+/// A stretch of words with one look.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Span {
@@ -88,13 +88,13 @@ pub enum Span {
     Plain(String),
     /// A name from a scenario, a command, a digest.
     Code(String),
-    /// What the eye is to find.
+    /// Emphasized words.
     Strong(String),
 }
 
 impl Text {
-    /// Reads marks: `` `code` `` and `**strong**`. A mark that is not closed is plain text. For
-    /// words of our own only; what comes from elsewhere is plain: `Text::from`.
+    /// Reads marks: `` `code` `` and `**strong**`. A mark that is not closed is plain text. Use
+    /// this only for words of our own; foreign text stays plain through `Text::from`.
     pub fn marked(text: &str) -> Self {
         let mut spans = Vec::new();
         let mut rest = text;
@@ -110,19 +110,19 @@ impl Text {
         Self(spans)
     }
 
-    /// A name or a command alone.
+    /// Returns a name or a command alone.
     pub fn code(text: impl Into<String>) -> Self {
         Self(vec![Span::Code(text.into())])
     }
 
-    /// The same text, and more of it.
+    /// Appends more text.
     #[must_use]
     pub fn and(mut self, more: impl Into<Text>) -> Self {
         self.0.extend(more.into().0);
         self
     }
 
-    /// The words without their marks.
+    /// Returns the words without their marks.
     pub fn words(&self) -> String {
         let words = |span: &Span| match span {
             Span::Plain(text) | Span::Code(text) | Span::Strong(text) => text.clone(),
@@ -148,7 +148,7 @@ impl From<String> for Text {
 const CODE: &str = "`";
 const STRONG: &str = "**";
 
-/// What is before the first pair of marks, in it, the mark, and what is after.
+/// Returns the text before the first pair of marks, the text in it, the mark, and the text after.
 fn next_mark(text: &str) -> Option<(&str, &str, &'static str, &str)> {
     let pair = |mark: &'static str| {
         let start = text.find(mark)?;
@@ -167,12 +167,12 @@ fn push_plain(spans: &mut Vec<Span>, text: &str) {
 }
 
 impl Document {
-    /// A report that says no more than its title and `lead`.
+    /// Returns a report that has only a title and `lead`.
     pub fn new(title: impl Into<String>, lead: impl Into<Text>) -> Self {
         Self { title: title.into(), lead: lead.into(), blocks: Vec::new() }
     }
 
-    /// Begins a section.
+    /// Starts a section.
     pub fn section(&mut self, title: impl Into<String>) -> &mut Self {
         self.push(Block::Section(title.into()))
     }
@@ -183,12 +183,12 @@ impl Document {
         self
     }
 
-    /// Appends some sentences.
+    /// Appends a few sentences.
     pub fn paragraph(&mut self, text: impl Into<Text>) -> &mut Self {
         self.push(Block::Paragraph(text.into()))
     }
 
-    /// Appends what must not be overlooked.
+    /// Appends a warning.
     pub fn warning(&mut self, text: impl Into<Text>) -> &mut Self {
         self.push(Block::Warning(text.into()))
     }

@@ -1,11 +1,11 @@
-//! A mean that says how sure it is.
+//! A mean with its uncertainty.
 
 use super::figure::Point;
 use serde::Serialize;
 use sidestep_statistics::{Interval, mean, mean_interval};
 use std::fmt;
 
-/// A mean over runs, its 95 % interval by Student's t, and how many runs it rests on.
+/// A mean over runs, its 95 % interval by Student's t, and the number of runs behind it.
 ///
 /// Displayed as `12.3 [11.9, 12.7] n=20`; without runs as `-`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -19,19 +19,20 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// The mean of those runs that have a value.
+    /// Returns the mean of those runs that have a value.
     pub fn of(values: impl IntoIterator<Item = Option<f64>>) -> Self {
         let values: Vec<f64> = values.into_iter().flatten().filter(|v| v.is_finite()).collect();
         Self { mean: mean(&values), interval: mean_interval(&values), n: values.len() }
     }
 
-    /// The mean of `a[i] - b[i]` over those pairs of which both have a value: two treatments
-    /// of the same case, so that what the cases have in common cancels.
+    /// Returns the mean of `a[i] - b[i]` over the pairs in which both have a value: two treatments
+    /// of the same case, so that effects of the case itself cancel.
     pub fn paired(a: &[Option<f64>], b: &[Option<f64>]) -> Self {
         Self::of(a.iter().zip(b).map(|(a, b)| Some((*a)? - (*b)?)))
     }
 
-    /// The mean of `a[i] / b[i]` over those pairs of which both have a value and `b` is not 0.
+    /// Returns the mean of `a[i] / b[i]` over the pairs in which both have a value and `b` is not
+    /// 0.
     pub fn ratio(a: &[Option<f64>], b: &[Option<f64>]) -> Self {
         let quotient = |(a, b): (&Option<f64>, &Option<f64>)| Some((*a)? / (*b)?);
         Self::of(a.iter().zip(b).map(quotient))
@@ -47,19 +48,19 @@ impl Estimate {
         self.interval.is_some_and(|i| i.high < value)
     }
 
-    /// The mean, or 0 without values; for figures.
+    /// Returns the mean, or 0 without values; for figures.
     pub fn or_zero(&self) -> f64 {
         self.mean.unwrap_or(0.0)
     }
 
-    /// A point of a figure at `x`, if there is a mean.
+    /// Returns a point of a figure at `x`, if there is a mean.
     pub fn point(&self, x: f64) -> Option<Point> {
         let interval = self.interval.map(|i| (i.low, i.high));
         self.mean.map(|y| Point::new(x, y).with_interval(interval).of_runs(self.n))
     }
 }
 
-/// A number with enough digits to tell it apart, and no more.
+/// Returns a number with just enough digits.
 pub fn short(value: f64) -> String {
     match value.abs() {
         0.0 => "0".into(),

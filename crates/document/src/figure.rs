@@ -1,40 +1,40 @@
-//! Figures and tables as plain data; others draw them.
+//! Figures and tables as plain data; other crates draw them.
 
 use serde::Serialize;
 
 /// A figure to draw.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Figure {
-    /// What it shows.
+    /// Its title: the content of the figure.
     pub title: String,
-    /// What the intervals are, how many runs there were; may be empty.
+    /// The meaning of the intervals and the number of runs; may be empty.
     pub note: String,
     /// The horizontal quantity, with its unit.
     pub x_label: String,
     /// The vertical quantity, with its unit.
     pub y_label: String,
-    /// How `x` runs along its axis.
+    /// Scale of the horizontal axis.
     pub x_scale: Scale,
-    /// How `y` runs along its axis.
+    /// Scale of the vertical axis.
     pub y_scale: Scale,
-    /// How to draw the points.
+    /// The way in which the points are drawn.
     pub kind: FigureKind,
     /// The series, in the order of the legend.
     pub series: Vec<Series>,
 }
 
-/// How values run along an axis.
+/// The scale of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Scale {
     /// Equal steps are equal differences.
     #[default]
     Linear,
-    /// Equal steps are equal ratios; values of 0 and below have no place.
+    /// Equal steps are equal ratios; values of 0 and below have no place on the axis.
     Log,
 }
 
-/// How the points of a figure are drawn.
+/// The way in which the points of a figure are drawn.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum FigureKind {
@@ -45,7 +45,7 @@ pub enum FigureKind {
     Bands,
     /// Points alone.
     Points,
-    /// Ways in the plane: points joined by lines, both axes to one scale.
+    /// Ways in the plane: points joined by lines, both axes with the same scale.
     Ways,
     /// Bars side by side; `x` is the number of a category.
     Bars {
@@ -61,21 +61,21 @@ pub struct Point {
     pub x: f64,
     /// The value.
     pub y: f64,
-    /// Lower and upper end of the value's interval, where it has one.
+    /// Lower and upper end of the value's interval, if it has one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub interval: Option<(f64, f64)>,
-    /// Number of runs that the value rests on, where it is known.
+    /// Number of runs behind the value, if known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub n: Option<usize>,
 }
 
 impl Figure {
-    /// Whether some point has an interval.
+    /// Whether any point has an interval.
     pub fn has_intervals(&self) -> bool {
         self.series.iter().flat_map(|s| &s.points).any(|p| p.interval.is_some())
     }
 
-    /// Says what its intervals are: those that an [`Estimate`](super::Estimate) gives.
+    /// Adds a note on its intervals: those that an [`Estimate`](super::Estimate) gives.
     #[must_use]
     pub fn with_intervals_told(mut self) -> Self {
         if self.note.is_empty() && self.has_intervals() {
@@ -86,18 +86,18 @@ impl Figure {
 }
 
 impl Point {
-    /// A value without an interval.
+    /// Returns a value without an interval.
     pub fn new(x: f64, y: f64) -> Self {
         Self { x, y, interval: None, n: None }
     }
 
-    /// The same value with its interval.
+    /// Adds an interval to the value.
     #[must_use]
     pub fn with_interval(self, interval: Option<(f64, f64)>) -> Self {
         Self { interval, ..self }
     }
 
-    /// The same value, resting on `n` runs.
+    /// Adds the number of runs behind the value.
     #[must_use]
     pub fn of_runs(self, n: usize) -> Self {
         Self { n: Some(n), ..self }
@@ -107,7 +107,7 @@ impl Point {
 /// A named series of points.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Series {
-    /// Name in the legend; one without a name has no place there.
+    /// Name in the legend; a series without a name is not listed there.
     pub name: String,
     /// The points.
     pub points: Vec<Point>,
@@ -116,9 +116,9 @@ pub struct Series {
 /// A table to print.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Table {
-    /// What it shows.
+    /// Its title: the content of the table.
     pub title: String,
-    /// What the numbers are: units, number of runs, how they were taken. Marked as
+    /// The meaning of the numbers: units, number of runs, method. Marked as
     /// [`Text::marked`](super::document::Text::marked) reads it.
     pub note: String,
     /// Heads of the columns.
@@ -128,7 +128,7 @@ pub struct Table {
 }
 
 impl Table {
-    /// A table without rows.
+    /// Returns a table without rows.
     pub fn new(title: impl Into<String>, note: impl Into<String>, columns: &[&str]) -> Self {
         let columns = columns.iter().map(|c| (*c).to_string()).collect();
         Self { title: title.into(), note: note.into(), columns, rows: Vec::new() }
@@ -139,7 +139,7 @@ impl Table {
         self.rows.push(cells.into_iter().collect());
     }
 
-    /// The cells of a row, one per column.
+    /// Returns the cells of a row, one per column.
     pub fn cells<'a>(&'a self, row: &'a [String]) -> impl Iterator<Item = &'a str> {
         (0..self.columns.len()).map(|k| row.get(k).map_or("", String::as_str))
     }

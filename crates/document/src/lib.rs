@@ -1,4 +1,4 @@
-//! A report as plain data; others draw figures and write pages.
+//! A report as plain data; other crates draw figures and write pages.
 //!
 //! ```text
 //! estimate.rs   a mean with its 95 % interval and the number of runs behind it
@@ -7,8 +7,8 @@
 //! document.rs   a report: text, tables, figures, pictures and claims in their order
 //! ```
 //!
-//! It knows no world, no file and no markup, and carries neither font nor rasterizer: both the
-//! library that sums up runs and the crate that writes pages depend on it.
+//! It knows no world, no file and no markup, and carries neither font nor rasterizer, because both
+//! the library that sums up runs and the crate that writes pages depend on it.
 
 pub mod claim;
 pub mod document;

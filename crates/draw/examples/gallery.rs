@@ -1,6 +1,6 @@
 //! Draws one picture of each kind, as SVG and PNG: `gallery OUTDIR`.
 //!
-//! The numbers are made up; they have the shape of what a study of a robot team measures.
+//! The numbers are made up; they have the shape of results from a study of a robot team.
 
 use std::path::{Path, PathBuf};
 use std::{env, error::Error, fs};

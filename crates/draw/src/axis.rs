@@ -1,15 +1,15 @@
-//! Axes: what a user asks for, the range that data and request give, and values to pixels.
+//! Axes: the user's settings, the range that follows from data and settings, and the map to pixels.
 
 use libm::{floor, log10, pow};
 
 use crate::error::DrawError;
 use crate::ticks::{Ticks, nice_step};
 
-/// Numbers beyond this are taken for missing: no measurement is so large, and spans between
-/// them would overflow.
+/// Largest number that counts as a value: no measurement is larger, and spans between larger
+/// numbers would overflow.
 const MOST: f64 = 1e100;
 
-/// A numeric axis: its label, its scale and, where the data shall not decide, its range and ticks.
+/// A numeric axis: its label, its scale and, unless the data decide, its range and ticks.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
     label: String,
@@ -21,7 +21,7 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// A linear axis; `label` names the quantity and its unit, e.g. `"trip time (s)"`.
+    /// Returns a linear axis; `label` names the quantity and its unit, e.g. `"trip time (s)"`.
     pub fn linear(label: impl Into<String>) -> Self {
         Self {
             label: label.into(),
@@ -33,12 +33,12 @@ impl Axis {
         }
     }
 
-    /// A logarithmic axis. Values of zero and below have no place on it and are left out.
+    /// Returns a logarithmic axis. Values of zero and below have no place on it and are left out.
     pub fn log(label: impl Into<String>) -> Self {
         Self { log: true, ..Self::linear(label) }
     }
 
-    /// Shows exactly the values from `low` to `high`; without it the data decide.
+    /// Shows exactly the values from `low` to `high`; without this the data decide.
     #[must_use]
     pub fn range(mut self, low: f64, high: f64) -> Self {
         self.range = Some((low, high));
@@ -53,21 +53,22 @@ impl Axis {
         self
     }
 
-    /// Ends where the data end, not at the next round number.
+    /// Ends the axis where the data end, not at the next round number.
     #[must_use]
     pub(crate) fn tight(mut self) -> Self {
         self.tight = true;
         self
     }
 
-    /// Holds counts: a logarithmic axis begins at one half, so that a count of one has a height.
+    /// Marks the axis as one of counts: a logarithmic one starts at one half, so that a count of
+    /// one has a height.
     #[must_use]
     pub(crate) fn counting(mut self) -> Self {
         self.counts = true;
         self
     }
 
-    /// The label.
+    /// Returns the label.
     pub(crate) fn label(&self) -> &str {
         &self.label
     }
@@ -78,7 +79,7 @@ impl Axis {
     }
 
     /// Fixes the range, given the smallest and largest of the `values` that have a place on the
-    /// axis; `most` is how many ticks there is room for.
+    /// axis; `most` is the number of ticks that fit.
     pub(crate) fn fit(
         &self,
         values: impl Iterator<Item = f64>,
@@ -116,8 +117,8 @@ impl Axis {
         Ok((low, high))
     }
 
-    /// The range that shows all of `extent` and ends at round numbers, or, around given ticks, a
-    /// little beyond the outermost.
+    /// Returns the range that shows all of `extent` and ends at round numbers; with given ticks, it
+    /// ends a little beyond the outermost.
     fn round_out(&self, extent: Option<(f64, f64)>, most: usize) -> (f64, f64) {
         match (self.log, self.ticks.is_some(), extent) {
             (true, _, None) => (1.0, 10.0),
@@ -146,7 +147,7 @@ fn round_linear(extent: (f64, f64), ticks_given: bool, most: usize) -> (f64, f64
     (floor(low / step + 1e-9) * step, -floor(1e-9 - high / step) * step)
 }
 
-/// An extent that is more than one point.
+/// Returns an extent that is more than one point.
 pub(crate) fn widened((low, high): (f64, f64)) -> (f64, f64) {
     let size = low.abs().max(high.abs());
     if high - low > 1e-9 * size && high - low > 1.0 / MOST {
@@ -163,7 +164,7 @@ fn extent(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     })
 }
 
-/// Ends a log range at powers of ten, or at 1, 2, 5 times one where it is less than three decades.
+/// Ends a log range at powers of ten, or at 1, 2, 5 times one if it spans less than three decades.
 fn round_log((low, high): (f64, f64)) -> (f64, f64) {
     let digits: &[f64] = if high / low > 1000.0 { &[1.0, 10.0] } else { &[1.0, 2.0, 5.0, 10.0] };
     let round = |value: f64| {
@@ -183,7 +184,7 @@ fn inside(mut ticks: Ticks, low: f64, high: f64) -> Ticks {
     ticks
 }
 
-/// An axis whose range is known, but not yet its place in the picture.
+/// An axis with a known range, but not yet a place in the picture.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Fitted {
     pub(crate) log: bool,
@@ -205,7 +206,7 @@ impl Fitted {
         }
     }
 
-    /// The value that lies at `part` (0 to 1) of the axis.
+    /// Returns the value that lies at `part` (0 to 1) of the axis.
     pub(crate) fn value_at(&self, part: f64) -> f64 {
         if self.log {
             return self.low * pow(self.high / self.low, part);
@@ -218,7 +219,7 @@ impl Fitted {
     }
 }
 
-/// Values to pixels.
+/// The map from values to pixels.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Scale {
     log: bool,
@@ -229,15 +230,15 @@ pub(crate) struct Scale {
 }
 
 impl Scale {
-    /// The pixel of `value`; values that a log axis cannot hold lie at its low end. Far outside
-    /// the picture distances shrink to 100 000 px, which a clip hides.
+    /// Returns the pixel of `value`; values that a log axis cannot hold lie at its low end. Far
+    /// outside the picture distances are limited to 100 000 px, which a clip hides.
     pub(crate) fn px(&self, value: f64) -> f64 {
         let value = if self.log { log10(value.max(1.0 / MOST)) } else { value };
         let offset = (value - self.low) * self.per_unit;
         self.from + offset.clamp(-1e5, 1e5)
     }
 
-    /// The pixel where bars begin: zero, or the low end of a log axis.
+    /// Returns the pixel where bars start: zero, or the low end of a log axis.
     pub(crate) fn base_px(&self) -> f64 {
         self.px(if self.log { self.low_value } else { 0.0 })
     }

@@ -1,4 +1,4 @@
-//! What a picture can be refused for.
+//! Reasons for refusing a picture.
 
 /// A picture that cannot be drawn, and why.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -9,9 +9,9 @@ pub enum DrawError {
     Length {
         /// The list that is too short or too long.
         what: &'static str,
-        /// How many entries the other input asks for.
+        /// Number of entries that the other input requires.
         expected: usize,
-        /// How many entries it has.
+        /// Number of entries that it has.
         found: usize,
     },
     /// A number that no picture can be drawn with, such as a box of -1 m.
@@ -19,19 +19,19 @@ pub enum DrawError {
     Value {
         /// The quantity, with its unit.
         what: &'static str,
-        /// What was given.
+        /// The given value.
         value: f64,
-        /// What would be right.
+        /// The condition that a right value meets.
         must: &'static str,
     },
-    /// A picture larger than memory should be spent on.
+    /// A picture that would take too much memory.
     #[error("{what}: {found} asked for, at most {limit} can be drawn")]
     TooLarge {
-        /// What there is too much of.
+        /// The part that is too large.
         what: &'static str,
-        /// How much was asked for.
+        /// The requested amount.
         found: u64,
-        /// How much is possible.
+        /// The largest possible amount.
         limit: u64,
     },
     /// The text given to [`to_png`](crate::to_png) is no SVG.
@@ -43,7 +43,7 @@ pub enum DrawError {
 }
 
 impl DrawError {
-    /// Passes `value` on if it is finite and above zero.
+    /// Returns `value` if it is finite and above zero.
     pub(crate) fn positive(what: &'static str, value: f64) -> Result<f64, Self> {
         if value.is_finite() && value > 0.0 {
             return Ok(value);
@@ -51,12 +51,12 @@ impl DrawError {
         Err(Self::Value { what, value, must: "finite and above zero" })
     }
 
-    /// Passes if there is at least one of `what`.
+    /// Checks that there is at least one of `what`.
     pub(crate) fn some(what: &'static str, count: usize) -> Result<(), Self> {
         Self::positive(what, count as f64).map(drop)
     }
 
-    /// Passes if `found` equals `expected`.
+    /// Checks that `found` equals `expected`.
     pub(crate) fn length(what: &'static str, expected: usize, found: usize) -> Result<(), Self> {
         if expected == found { Ok(()) } else { Err(Self::Length { what, expected, found }) }
     }

@@ -1,7 +1,7 @@
-//! Films: the same view again and again, with things in it that move, without axes and legend.
+//! Films: the same view again and again, with moving things in it, without axes and legend.
 //!
-//! What stays is drawn once, and each picture is a copy of it with the moving things on top: a film
-//! has hundreds of pictures.
+//! The static part is drawn once, and each picture is a copy of it with the moving things on top,
+//! because a film has hundreds of pictures.
 
 use resvg::tiny_skia::{Color, Pixmap, Transform};
 use sidestep_kernel::view::{Frame, Place, Scenery, Trail};
@@ -12,12 +12,12 @@ use crate::picture::{Scene, around, check, seen};
 use crate::raster::parse;
 use crate::svg::{Anchor, Rect, Svg, TextLook};
 
-/// The longest side that a picture may have.
+/// Longest side of a picture, pixels.
 const MOST_PX: u32 = 4096;
 /// Height of the line of text under the picture, pixels.
 const CAPTION_PX: u32 = 24;
 
-/// A view of a run, and what never moves in it.
+/// A view of a run, with the parts of it that never move.
 pub struct Film {
     scenery: Scenery,
     canvas: Canvas,
@@ -26,11 +26,11 @@ pub struct Film {
 }
 
 impl Film {
-    /// A film that shows what is in all frames so that it is `width_px` wide, or less where it would
-    /// be higher than that. Width and height in pixels are even, which films ask for.
+    /// Returns a film that shows the content of all frames, `width_px` wide, or less if it would be
+    /// higher than that. Width and height in pixels are even, because video formats require it.
     ///
     /// # Errors
-    /// A width of 0 or above 4096; places that are not finite.
+    /// When the width is 0 or above 4096, or places are not finite.
     pub fn new(scenery: Scenery, frames: &[Frame], width_px: u32) -> Result<Self, DrawError> {
         if width_px > MOST_PX {
             let (found, limit) = (u64::from(width_px), u64::from(MOST_PX));
@@ -53,15 +53,15 @@ impl Film {
         Ok(film)
     }
 
-    /// Width and height of its pictures in pixels.
+    /// Returns the width and height of its pictures in pixels.
     pub fn size_px(&self) -> (u32, u32) {
         (self.still.width(), self.still.height())
     }
 
-    /// The picture of a moment with the ways that led to it, and a line of text under it.
+    /// Draws a moment with the ways that led to it, and a line of text under it.
     ///
     /// # Errors
-    /// Places that are not finite.
+    /// When places are not finite.
     pub fn still(
         &self,
         frame: &Frame,
@@ -78,7 +78,7 @@ impl Film {
         Ok(Still(self.with(svg)?))
     }
 
-    /// What stays, with more on top.
+    /// Returns the static part with more on top.
     fn with(&self, svg: Svg) -> Result<Pixmap, DrawError> {
         let mut picture = self.still.clone();
         let (width, height) = self.size_px();
@@ -92,7 +92,8 @@ fn no_area() -> DrawError {
     DrawError::Svg("the picture has no area".into())
 }
 
-/// The canvas that shows a box in a picture so wide, and the part of the picture that it takes.
+/// Returns the canvas that shows a box in a picture of this width, and the part of the picture that
+/// it takes.
 fn view(scenery: &Scenery, box_m: [Place; 2], width_px: u32) -> (Canvas, Rect) {
     let camera = if scenery.dimensions == 2 { Camera::ABOVE } else { Camera::CORNER };
     let [lo, hi] = seen(camera, box_m);
@@ -112,15 +113,15 @@ fn view(scenery: &Scenery, box_m: [Place; 2], width_px: u32) -> (Canvas, Rect) {
 pub struct Still(Pixmap);
 
 impl Still {
-    /// Four bytes per pixel: red, green, blue, and 255.
+    /// Returns four bytes per pixel: red, green, blue, and 255.
     pub fn rgba(&self) -> &[u8] {
         self.0.data()
     }
 
-    /// As PNG.
+    /// Encodes the picture as PNG.
     ///
     /// # Errors
-    /// What the encoder says.
+    /// When the encoder fails.
     pub fn to_png(&self) -> Result<Vec<u8>, DrawError> {
         self.0.encode_png().map_err(|error| DrawError::Png(error.to_string()))
     }
@@ -132,7 +133,7 @@ mod tests {
     use crate::testing::{ball, plane};
     use sidestep_kernel::view::{ALERT, Body, COLORS, Condition, Kind};
 
-    /// 20 meters by 10, 200 pixels wide.
+    /// A film of 20 by 10 meters, 200 pixels wide.
     fn film(bodies: Vec<Body>) -> Film {
         Film::new(Scenery { bodies, ..plane(20, 10) }, &[], 200).unwrap()
     }

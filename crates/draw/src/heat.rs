@@ -8,7 +8,7 @@ use crate::svg::{Anchor, Rect, Svg, TextLook};
 use crate::text::{self, Weight};
 use crate::ticks::{Ticks, label};
 
-/// More cells than this are not readable as a matrix.
+/// Most cells of a readable matrix.
 const MOST_CELLS: usize = 40_000;
 const EDGE_PX: f64 = 10.0;
 const BAR_PX: f64 = 14.0;
@@ -29,8 +29,8 @@ pub struct Matrix {
 }
 
 impl Matrix {
-    /// A matrix whose `values` stand row by row, the first row on top. A value that is not a
-    /// number is an empty gray cell.
+    /// Returns a matrix whose `values` stand row by row, the first row on top. A value that is not
+    /// a number is an empty gray cell.
     ///
     /// # Errors
     /// [`DrawError::Length`] if there is not one value per row and column, [`DrawError::TooLarge`]
@@ -62,29 +62,29 @@ impl Matrix {
         })
     }
 
-    /// Names what the rows and the columns are, e.g. `"true"` and `"reported"`.
+    /// Names the rows and the columns as a whole, e.g. `"true"` and `"reported"`.
     #[must_use]
     pub fn titles(mut self, rows: impl Into<String>, columns: impl Into<String>) -> Self {
         (self.row_title, self.column_title) = (rows.into(), columns.into());
         self
     }
 
-    /// Sets how many decimals the numbers have (2 otherwise, 9 at most).
+    /// Sets the number of decimals (2 by default, 9 at most).
     #[must_use]
     pub fn digits(mut self, digits: usize) -> Self {
         self.digits = digits.min(9);
         self
     }
 
-    /// Colors go from white at `low` to dark at `high`. Otherwise 0 to 1 if all values lie there,
-    /// else from the least value to the greatest.
+    /// Sets the color range, from white at `low` to dark at `high`. By default it is 0 to 1 if all
+    /// values lie there, otherwise from the least value to the greatest.
     #[must_use]
     pub fn range(mut self, low: f64, high: f64) -> Self {
         self.range = Some((low, high));
         self
     }
 
-    /// A second, smaller line for each cell, row by row, e.g. the count behind a probability.
+    /// Adds a second, smaller line to each cell, row by row, e.g. the count behind a probability.
     ///
     /// # Errors
     /// [`DrawError::Length`] if there is not one per cell.
@@ -101,7 +101,7 @@ impl Matrix {
         self
     }
 
-    /// Draws the matrix. The style's width is the most it takes; its height follows from the rows.
+    /// Draws the matrix. The style's width is an upper bound; the height follows from the rows.
     ///
     /// # Errors
     /// [`DrawError::Value`] if the style or the color range is impossible.
@@ -143,8 +143,8 @@ impl Matrix {
         if value.is_finite() { label(value, self.digits) } else { "–".into() }
     }
 
-    /// Size of a cell where each may be `room` wide; whether the column names must read upward;
-    /// whether numbers fit.
+    /// Returns the size of a cell if each may be `room` wide, whether the column names must read
+    /// upward, and whether numbers fit.
     fn cell_size(&self, font_px: f64, room: f64) -> ((f64, f64), bool, bool) {
         let numbers: Vec<String> = self.values.iter().map(|&v| self.number(v)).collect();
         let number_px = widest(numbers.iter().chain(&self.subscripts), font_px);
@@ -203,7 +203,7 @@ impl Matrix {
     }
 }
 
-/// Where everything stands.
+/// Positions of all parts.
 struct Layout {
     width: f64,
     left: f64,
@@ -212,7 +212,7 @@ struct Layout {
     cell: (f64, f64),
     rows: Vec<String>,
     columns: Vec<Vec<String>>,
-    /// Column names do not fit across and read upward.
+    /// Whether column names do not fit across and read upward.
     upright: bool,
     numbers: bool,
     extent: (f64, f64),
@@ -232,7 +232,7 @@ impl Layout {
         let title_px = if matrix.column_title.is_empty() { 0.0 } else { 1.6 * style.font_px };
         let above = names_px(&columns, small, upright) + title_px + 8.0;
         let extent = (cell.0 * matrix.columns.len() as f64, cell.1 * rows.len() as f64);
-        // A small matrix still leaves its title some room.
+        // A small matrix still leaves some room for its title.
         let width = (left + extent.0 + right).max(0.5 * style.width_px);
         Self { width, left, above, cell, rows, columns, upright, numbers, extent }
     }
@@ -247,12 +247,12 @@ impl Layout {
     }
 }
 
-/// The width of the widest of `texts`.
+/// Returns the width of the widest of `texts`.
 fn widest(texts: impl Iterator<Item = impl AsRef<str>>, size: f64) -> f64 {
     texts.map(|t| text::width(t.as_ref(), size, Weight::Regular)).fold(0.0, f64::max)
 }
 
-/// The lines of each column's name.
+/// Returns the lines of each column's name.
 fn column_lines(matrix: &Matrix, size: f64, width: f64, upright: bool) -> Vec<Vec<String>> {
     let lines = |name: &String| match upright {
         true => vec![text::shorten(name, size, Weight::Regular, 10.0 * size)],
@@ -261,7 +261,7 @@ fn column_lines(matrix: &Matrix, size: f64, width: f64, upright: bool) -> Vec<Ve
     matrix.columns.iter().map(lines).collect()
 }
 
-/// The height that the column names take.
+/// Returns the height that the column names take.
 fn names_px(columns: &[Vec<String>], size: f64, upright: bool) -> f64 {
     if upright {
         return widest(columns.iter().flatten(), size);
@@ -294,13 +294,13 @@ fn draw_number(svg: &mut Svg, style: &Style, cell: Rect, number: &str, subscript
     svg.text(x, y + 0.7 * look.size_px, subscript, &small);
 }
 
-/// The bar that says which color means what.
+/// Draws the bar that explains the colors.
 fn draw_color_bar(svg: &mut Svg, style: &Style, grid: Rect, (low, high): (f64, f64)) {
     const STEPS: u32 = 48;
     let (x, height) = (grid.right() + 1.2 * style.font_px, grid.height / f64::from(STEPS));
     for step in 0..STEPS {
         let fill = shade((f64::from(step) + 0.5) / f64::from(STEPS));
-        // Each step reaches under the one below it, which leaves no seam.
+        // Each step reaches under the one below it, so that there is no seam.
         let overlap = if step > 0 { 0.5 } else { 0.0 };
         let y = grid.bottom() - f64::from(step + 1) * height;
         svg.rect(
@@ -318,7 +318,8 @@ fn draw_color_bar(svg: &mut Svg, style: &Style, grid: Rect, (low, high): (f64, f
     }
 }
 
-/// White to dark blue, of evenly falling lightness, so that it also reads in gray.
+/// Returns a shade from white to dark blue, of evenly falling lightness, so that it also reads in
+/// gray.
 fn shade(part: f64) -> String {
     const STOPS: [[f64; 3]; 5] = [
         [255.0, 255.0, 255.0],

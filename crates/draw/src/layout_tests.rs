@@ -1,4 +1,4 @@
-//! Promises that hold for every kind of picture: well-formed, nothing clipped, no text on text,
+//! Promises that hold for every kind of picture: well-formed, nothing clipped, no overlapping text,
 //! equal bytes for equal input, no panic whatever the numbers are.
 
 use proptest::prelude::*;
@@ -10,7 +10,7 @@ use crate::raster::parse;
 use crate::testing::{ball, moment, open, plane};
 use crate::*;
 
-/// The boxes of all texts in the picture, and the picture's size.
+/// Returns the boxes of all texts in the picture, and the picture's size.
 fn texts(svg: &str) -> (Vec<(String, Rect)>, f32, f32) {
     fn walk(group: &Group, found: &mut Vec<(String, Rect)>) {
         for node in group.children() {
@@ -30,7 +30,7 @@ fn texts(svg: &str) -> (Vec<(String, Rect)>, f32, f32) {
     (found, tree.size().width(), tree.size().height())
 }
 
-/// Nothing sticks out of the picture and no two texts overlap.
+/// Checks that nothing sticks out of the picture and no two texts overlap.
 fn assert_readable(name: &str, svg: &str) {
     let (found, width, height) = texts(svg);
     assert!(!found.is_empty(), "{name} has no text");
@@ -87,7 +87,7 @@ fn map(width: u32, height: u32) -> String {
     draw(&scenery, &Frame::default(), &[], &options(Style::MAP, &scenery)).unwrap()
 }
 
-/// Chains, and robots that have met in one corner.
+/// Draws chains, and robots that have met in one corner.
 fn bodies(dimensions: u8, n: u32, style: Style) -> String {
     let at = |k: u32| [0, 1, 2].map(|i| f64::from(k) * (1.0 - 0.3 * f64::from(i)));
     let still = |k| ball(Kind::Obstacle, k, at(k), 0.3).moving([f64::from(k % 2); 3]);
@@ -108,7 +108,7 @@ fn bodies(dimensions: u8, n: u32, style: Style) -> String {
     draw(&scenery, &frame, &trails, &options(style, &scenery)).unwrap()
 }
 
-/// Airplanes that have come together in one place, each with its name.
+/// Draws airplanes that have met in one place, each with its name.
 fn meeting(dimensions: u8, n: u32, apart_m: f64) -> String {
     let dart = Shape::Dart { length_m: 500.0, width_m: 300.0 };
     let at = |k: u32| [apart_m * f64::from(k % 4), apart_m * f64::from(k / 4), 3000.0];
@@ -214,7 +214,7 @@ fn lists_that_do_not_match_are_refused() {
     assert!(matches!(picture(floor(u32::MAX, u32::MAX)), Err(DrawError::TooLarge { .. })));
 }
 
-/// Any double: also NaN, infinities, subnormals and the very large.
+/// Any double, including NaN, infinities, subnormals and very large ones.
 fn number() -> impl Strategy<Value = f64> {
     prop_oneof![any::<f64>(), -10.0..10.0, Just(0.0), Just(f64::NAN), Just(f64::INFINITY)]
 }

@@ -6,7 +6,7 @@ use crate::style::{FAINT_INK, INK};
 use crate::svg::{Anchor, Num, Rect, Svg, TextLook};
 use crate::text::{self, Weight};
 
-/// The shape that tells a series apart besides its color.
+/// The shape that distinguishes a series besides its color.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Marker {
     Circle,
@@ -17,8 +17,8 @@ pub(crate) enum Marker {
 }
 
 impl Marker {
-    /// The marker of the series of this number. Five shapes and seven colors are coprime, so that
-    /// 35 series differ.
+    /// Returns the marker of the series with this number. Five shapes and seven colors are coprime,
+    /// so 35 series differ.
     pub(crate) fn of_series(index: usize) -> Self {
         let all = [Self::Circle, Self::Square, Self::Triangle, Self::Diamond, Self::Cross];
         all[index % all.len()]
@@ -47,7 +47,7 @@ impl Marker {
     }
 }
 
-/// An upright cross of bars 0.8 radii wide.
+/// An upright cross with bars 0.8 radii wide.
 const CROSS: [(f64, f64); 12] = [
     (-0.4, -1.2),
     (0.4, -1.2),
@@ -63,10 +63,10 @@ const CROSS: [(f64, f64); 12] = [
     (-0.4, -0.4),
 ];
 
-/// A color as SVG has it.
+/// A color in SVG notation.
 pub(crate) type Paint = Cow<'static, str>;
 
-/// What stands before a legend's label.
+/// The symbol before a legend's label.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Symbol {
     /// A stretch of line, perhaps with its marker.
@@ -81,7 +81,7 @@ pub(crate) enum Symbol {
     Ring,
 }
 
-/// A line of a legend.
+/// An entry of a legend.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Entry {
     pub(crate) symbol: Symbol,
@@ -125,7 +125,7 @@ impl Legend {
         self.font_px * 1.6
     }
 
-    /// The height of all rows.
+    /// Returns the height of all rows.
     pub(crate) fn height_px(&self) -> f64 {
         self.placed.last().map_or(0.0, |(_, row, _)| (*row as f64 + 1.0) * self.row_px())
     }
@@ -172,12 +172,12 @@ impl Legend {
     }
 }
 
-/// The look of a reference line.
+/// Returns the look of a reference line.
 pub(crate) fn dashes(color: &str) -> String {
     format!(r#"stroke="{color}" stroke-width="1.4" stroke-dasharray="6 4" fill="none""#)
 }
 
-/// The mark where a track begins.
+/// Draws the mark where a track starts.
 pub(crate) fn start_mark(svg: &mut Svg, center: (f64, f64), radius: f64, color: &str) {
     svg.circle(
         center,
@@ -186,7 +186,7 @@ pub(crate) fn start_mark(svg: &mut Svg, center: (f64, f64), radius: f64, color: 
     );
 }
 
-/// The mark where a track ends.
+/// Draws the mark where a track ends.
 pub(crate) fn end_mark(svg: &mut Svg, center: (f64, f64), radius: f64, color: &str) {
     svg.circle(center, radius + 1.0, format_args!(r##"fill="{color}" stroke="#FFFFFF""##));
 }
@@ -205,12 +205,12 @@ pub(crate) fn paragraph(
     top + lines.len() as f64 * line_px
 }
 
-/// The look of a picture's title.
+/// Returns the look of a picture's title.
 pub(crate) fn title_look(size_px: f64) -> TextLook<'static> {
     TextLook { weight: Weight::Bold, fill: INK, ..TextLook::new(size_px, Anchor::Start) }
 }
 
-/// Small print's look.
+/// Returns the look of small print.
 pub(crate) fn faint(size_px: f64) -> TextLook<'static> {
     TextLook { fill: FAINT_INK, ..TextLook::new(size_px, Anchor::Start) }
 }

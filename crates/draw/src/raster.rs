@@ -1,4 +1,4 @@
-//! SVG to PNG.
+//! Conversion of SVG to PNG.
 
 use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg::{ImageHrefResolver, Options, Tree};
@@ -6,13 +6,13 @@ use resvg::usvg::{ImageHrefResolver, Options, Tree};
 use crate::error::DrawError;
 use crate::text;
 
-/// The longest side a PNG may have: 256 MiB of pixels.
+/// Longest side of a PNG in pixels: 256 MiB of pixels.
 const MOST_PX: u32 = 8192;
 
 /// Rasterizes an SVG picture so that its longer side is `max_px` pixels.
 ///
 /// Text is drawn in the embedded DejaVu Sans, whatever fonts the machine has, and nothing outside
-/// `svg` is read (an `<image>` in it stays undrawn), so the bytes depend on the arguments only.
+/// `svg` is read (an `<image>` in it stays undrawn), so the bytes depend only on the arguments.
 ///
 /// # Errors
 /// [`DrawError::Svg`] if `svg` is no SVG, [`DrawError::Value`] or [`DrawError::TooLarge`] if `max_px`
@@ -32,7 +32,7 @@ pub fn to_png(svg: &str, max_px: u32) -> Result<Vec<u8>, DrawError> {
     pixmap.encode_png().map_err(|error| DrawError::Png(error.to_string()))
 }
 
-/// A side's length in whole pixels, never 0 and never above the limit.
+/// Returns a side's length in whole pixels, never 0 and never above the limit.
 fn side(length_px: f32) -> u32 {
     (length_px.round() as u32).clamp(1, MOST_PX)
 }

@@ -15,20 +15,21 @@ pub(crate) const FAINT_INK: &str = "#555555";
 /// Grid lines behind the data.
 pub(crate) const GRID: &str = "#E4E4E4";
 
-/// The color of the series (or track) of this number; colors repeat after seven.
+/// Returns the color of the series (or track) with this number; colors repeat after seven.
 pub(crate) fn series_color(index: usize) -> &'static str {
     SERIES_COLORS[index % SERIES_COLORS.len()]
 }
 
-/// A color as SVG has it.
+/// Returns a color in SVG notation.
 pub(crate) fn hex([r, g, b]: Color) -> String {
     format!("#{r:02X}{g:02X}{b:02X}")
 }
 
-/// The room a picture may take and the size of its text.
+/// The room that a picture may take, and the size of its text.
 ///
-/// A chart takes the whole `width_px` x `height_px`, and grows in height where a title, a legend or
-/// labels need it. A map is scaled to fit that room, and its title, axes and legend come on top.
+/// A chart takes the whole `width_px` x `height_px`, and grows in height if a title, a legend or
+/// labels need it. A map is scaled to fit that room, and its title, axes and legend are added to
+/// it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Style {
     /// Width in SVG pixels.
@@ -45,12 +46,12 @@ impl Style {
     /// A map as large as a page.
     pub const MAP: Self = Self { width_px: 900.0, height_px: 900.0, font_px: 13.0 };
 
-    /// Title text size in pixels.
+    /// Returns the size of title text in pixels.
     pub(crate) fn title_px(&self) -> f64 {
         self.font_px * 1.15
     }
 
-    /// Notes, tick labels.
+    /// Returns the size of notes and tick labels in pixels.
     pub(crate) fn small_px(&self) -> f64 {
         self.font_px * 0.88
     }

@@ -6,7 +6,7 @@ use crate::style::INK;
 use crate::text::{FAMILIES, Weight};
 
 /// A number with at most two decimals and no trailing zeros, so that bytes are few and equal on
-/// every machine. What is not finite becomes 0: no picture depends on it.
+/// every machine. Non-finite values become 0; no picture depends on them.
 #[derive(Clone, Copy)]
 pub(crate) struct Num(pub(crate) f64);
 
@@ -37,7 +37,7 @@ impl Rect {
         self.y + self.height
     }
 
-    /// The same rectangle with `margin` more on every side.
+    /// Returns the same rectangle with `margin` more on every side.
     pub(crate) fn grown(&self, margin: f64) -> Self {
         Self {
             x: self.x - margin,
@@ -48,7 +48,7 @@ impl Rect {
     }
 }
 
-/// Which point of a text stands at its position.
+/// The point of a text that stands at its position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Anchor {
     Start,
@@ -56,26 +56,26 @@ pub(crate) enum Anchor {
     End,
 }
 
-/// How a text looks.
+/// The look of a text.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TextLook<'a> {
     pub(crate) size_px: f64,
     pub(crate) anchor: Anchor,
     pub(crate) weight: Weight,
     pub(crate) fill: &'a str,
-    /// Reads upward instead of to the right.
+    /// Whether it reads upward instead of to the right.
     pub(crate) upward: bool,
-    /// Has a white rim, for text on top of a drawing.
+    /// Whether it has a white rim, for text on top of a drawing.
     pub(crate) halo: bool,
 }
 
 impl TextLook<'_> {
-    /// Regular dark text of this size.
+    /// Returns regular dark text of this size.
     pub(crate) fn new(size_px: f64, anchor: Anchor) -> Self {
         Self { size_px, anchor, weight: Weight::Regular, fill: INK, upward: false, halo: false }
     }
 
-    /// How far the baseline lies below the middle of a capital letter.
+    /// Returns how far the baseline lies below the middle of a capital letter.
     pub(crate) fn middle_px(&self) -> f64 {
         self.size_px * 0.365
     }
@@ -93,7 +93,7 @@ impl Svg {
         let _ = writeln!(self.body, "{element}");
     }
 
-    /// A rectangle with the attributes `look`.
+    /// Writes a rectangle with the attributes `look`.
     pub(crate) fn rect(&mut self, r: Rect, look: impl Display) {
         let Rect { x, y, width, height } = r;
         let (x, y, width, height) = (Num(x), Num(y), Num(width), Num(height));
@@ -102,24 +102,24 @@ impl Svg {
         ));
     }
 
-    /// A straight line with the attributes `look`.
+    /// Writes a straight line with the attributes `look`.
     pub(crate) fn line(&mut self, from: (f64, f64), to: (f64, f64), look: impl Display) {
         let (x1, y1, x2, y2) = (Num(from.0), Num(from.1), Num(to.0), Num(to.1));
         self.raw(format_args!(r#"<line x1="{x1}" y1="{y1}" x2="{x2}" y2="{y2}" {look}/>"#));
     }
 
-    /// A path of the path data `data`.
+    /// Writes a path with the path data `data`.
     pub(crate) fn path(&mut self, data: &str, look: impl Display) {
         self.raw(format_args!(r#"<path d="{data}" {look}/>"#));
     }
 
-    /// A circle around `center`.
+    /// Writes a circle around `center`.
     pub(crate) fn circle(&mut self, center: (f64, f64), radius: f64, look: impl Display) {
         let (x, y, r) = (Num(center.0), Num(center.1), Num(radius));
         self.raw(format_args!(r#"<circle cx="{x}" cy="{y}" r="{r}" {look}/>"#));
     }
 
-    /// `text` with its baseline at `y`.
+    /// Writes `text` with its baseline at `y`.
     pub(crate) fn text(&mut self, x: f64, y: f64, text: &str, look: &TextLook<'_>) {
         let (x, y, size, fill) = (Num(x), Num(y), Num(look.size_px), look.fill);
         let anchor = match look.anchor {
@@ -140,10 +140,10 @@ impl Svg {
         ));
     }
 
-    /// Opens a group that shows only what lies in `window`.
+    /// Opens a group that shows only the part inside `window`.
     ///
-    /// The clip's name tells its place, so that names agree only where clips do: several pictures
-    /// may stand in one HTML page.
+    /// The clip's name contains its place, so that names are equal only if clips are: several
+    /// pictures may stand in one HTML page.
     pub(crate) fn open_clip(&mut self, window: Rect) {
         let Rect { x, y, width, height } = window;
         let id = format!("clip_{}_{}_{}_{}", Num(x), Num(y), Num(width), Num(height));
@@ -157,13 +157,13 @@ impl Svg {
         self.raw("</g>");
     }
 
-    /// The whole document on a white ground; `title` is what screen readers say.
+    /// Returns the whole document on a white ground; `title` is read by screen readers.
     pub(crate) fn finish(self, width_px: f64, height_px: f64, title: &str) -> String {
         let ground = r##"<rect width="100%" height="100%" fill="#FFFFFF"/>"##;
         self.document((width_px, height_px), title, ground)
     }
 
-    /// The whole document without a ground, to be drawn over another picture.
+    /// Returns the whole document without a ground, to be drawn over another picture.
     pub(crate) fn finish_clear(self, width_px: f64, height_px: f64) -> String {
         self.document((width_px, height_px), "", "")
     }
@@ -183,7 +183,7 @@ impl Svg {
 const HALO: &str =
     r##" stroke="#FFFFFF" stroke-width="3" stroke-linejoin="round" paint-order="stroke""##;
 
-/// Text as XML character data; what XML 1.0 forbids becomes the replacement character.
+/// Text as XML character data; characters that XML 1.0 forbids become the replacement character.
 struct Escaped<'a>(&'a str);
 
 impl Display for Escaped<'_> {

@@ -2,14 +2,14 @@
 
 use sidestep_kernel::view::{Body, Floor, Frame, Kind, Occupancy, Place, Pose, Scenery, Shape};
 
-/// An empty floor of boxes of 1 m.
+/// Returns an empty floor of boxes of 1 m.
 pub(crate) fn plane(width: u32, height: u32) -> Scenery {
     let boxes = vec![Occupancy::Free; (width * height) as usize];
     let floor = Floor { width, height, box_m: 1.0, origin_m: [0.0; 2], boxes };
     Scenery { floor: Some(floor), ..open(2) }
 }
 
-/// Nothing at all.
+/// Returns empty scenery.
 pub(crate) fn open(dimensions: u8) -> Scenery {
     let name = "A title that wraps where the picture is small, as it is here".into();
     Scenery { name, dimensions, cycle_s: 1.0, floor: None, bodies: vec![], names: vec![] }

@@ -1,4 +1,4 @@
-//! The embedded font: how wide a text is, and how it breaks into lines.
+//! The embedded font: widths of texts, and line breaks.
 //!
 //! SVG viewers bring their own fonts and a bare machine has none, so pictures are laid out with
 //! the metrics of DejaVu Sans, which `to_png` also draws with. Viewers without it fall back to a
@@ -9,17 +9,17 @@ use std::sync::{Arc, OnceLock};
 use resvg::usvg::fontdb;
 use skrifa::{FontRef, MetadataProvider, instance::LocationRef, instance::Size};
 
-/// What the SVG names; the first is the embedded one.
+/// Font families that the SVG names; the first is the embedded one.
 pub(crate) const FAMILIES: &str = "DejaVu Sans, Verdana, Helvetica, Arial, sans-serif";
 
-/// How heavy letters are.
+/// The weight of letters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Weight {
     Regular,
     Bold,
 }
 
-/// The database `to_png` takes fonts from: DejaVu Sans, regular and bold, and nothing else.
+/// Returns the font database of `to_png`: DejaVu Sans, regular and bold, and nothing else.
 pub(crate) fn fonts() -> Arc<fontdb::Database> {
     static FONTS: OnceLock<Arc<fontdb::Database>> = OnceLock::new();
     Arc::clone(FONTS.get_or_init(|| {
@@ -27,13 +27,13 @@ pub(crate) fn fonts() -> Arc<fontdb::Database> {
         fonts.load_font_data(dejavu::sans::regular().to_vec());
         fonts.load_font_data(dejavu::sans::bold().to_vec());
         fonts.set_sans_serif_family("DejaVu Sans");
-        // What a text falls back to when its own font is not here.
+        // The fallback for text whose own font is missing.
         fonts.set_serif_family("DejaVu Sans");
         Arc::new(fonts)
     }))
 }
 
-/// The width of `text` in pixels at a font size of `size_px`.
+/// Returns the width of `text` in pixels at a font size of `size_px`.
 pub(crate) fn width(text: &str, size_px: f64, weight: Weight) -> f64 {
     let data = match weight {
         Weight::Regular => dejavu::sans::regular(),
@@ -44,18 +44,18 @@ pub(crate) fn width(text: &str, size_px: f64, weight: Weight) -> f64 {
     let metrics = font.glyph_metrics(Size::new(1000.0), LocationRef::default());
     let thousandths: f64 = text
         .chars()
-        // A character the font lacks is some other font's: reckon with a full square.
+        // The viewer takes a missing character from another font, so assume a full square.
         .map(|c| charmap.map(c).and_then(|g| metrics.advance_width(g)).unwrap_or(1000.0))
         .map(f64::from)
         .sum();
     thousandths * size_px / 1000.0
 }
 
-/// Breaks `text` at spaces (not at no-break spaces) into lines at most `room_px` wide; a word wider than that is cut short
-/// with an ellipsis. Empty text has no lines.
+/// Breaks `text` at spaces (not at no-break spaces) into lines at most `room_px` wide; a word wider
+/// than that is shortened with an ellipsis. Empty text has no lines.
 pub(crate) fn wrap(text: &str, size_px: f64, weight: Weight, room_px: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
-    // Not `split_whitespace`: a no-break space holds words together.
+    // Not `split_whitespace`, because a no-break space holds words together.
     for word in text.split([' ', '\t', '\n']).filter(|word| !word.is_empty()) {
         let word = shorten(word, size_px, weight, room_px);
         match lines.last_mut() {
@@ -69,7 +69,7 @@ pub(crate) fn wrap(text: &str, size_px: f64, weight: Weight, room_px: f64) -> Ve
     lines
 }
 
-/// `text` itself where it fits, else as much of it as fits before an ellipsis.
+/// Returns `text` itself if it fits, otherwise as much of it as fits before an ellipsis.
 pub(crate) fn shorten(text: &str, size_px: f64, weight: Weight, room_px: f64) -> String {
     if width(text, size_px, weight) <= room_px {
         return text.to_string();

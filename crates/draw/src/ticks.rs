@@ -1,4 +1,4 @@
-//! Where tick marks stand and what they say.
+//! Positions and labels of tick marks.
 
 use libm::{floor, log10, pow};
 
@@ -12,14 +12,14 @@ pub(crate) struct Ticks {
 }
 
 impl Ticks {
-    /// Marks at these very places.
+    /// Returns labeled marks at exactly these values.
     pub(crate) fn at(places: &[f64]) -> Self {
         let round_trips = |digits: &usize| places.iter().all(|v| shown_exactly(*v, *digits));
         let digits = (0..6).find(round_trips).unwrap_or(6);
         Self { major: places.iter().map(|&v| (v, label(v, digits))).collect(), minor: vec![] }
     }
 
-    /// Marks at the multiples of a 1-2-5 step from `low` to `high`, `most` at most.
+    /// Returns marks at the multiples of a 1-2-5 step from `low` to `high`, `most` at most.
     pub(crate) fn linear(low: f64, high: f64, most: usize) -> Self {
         let step = nice_step(high - low, most);
         let digits = decimals(step);
@@ -30,8 +30,8 @@ impl Ticks {
         Self { major, minor: vec![] }
     }
 
-    /// Marks at the powers of ten, and unlabeled ones at their multiples; where there is room for
-    /// more labels, at 1, 2 and 5 times the powers of ten.
+    /// Returns marks at the powers of ten, and unlabeled ones at their multiples; if there is room
+    /// for more labels, also labeled ones at 2 and 5 times the powers of ten.
     pub(crate) fn log(low: f64, high: f64, most: usize) -> Self {
         let span = Decades { low, high };
         for multiples in [&[1u8, 2, 5][..], &[1, 3], &[1]] {
@@ -49,13 +49,13 @@ impl Ticks {
         Self { major: log_labels(&span.multiples(&[1], stride)), minor }
     }
 
-    /// The width of the widest label, by `width_px`.
+    /// Returns the width of the widest label, measured by `width_px`.
     pub(crate) fn widest_px(&self, width_px: impl Fn(&str) -> f64) -> f64 {
         self.major.iter().map(|(_, label)| width_px(label)).fold(0.0, f64::max)
     }
 }
 
-/// Keeps labels apart: those that would touch the one before are not written.
+/// Spacing of labels: a label that would touch the one before it is not written.
 pub(crate) struct Spacing {
     free_from: f64,
 }
@@ -83,7 +83,7 @@ struct Decades {
 }
 
 impl Decades {
-    /// `digits` times every `stride`-th power of ten, as far as in the range.
+    /// Returns `digits` times every `stride`-th power of ten within the range.
     fn multiples(&self, digits: &[u8], stride: i32) -> Vec<f64> {
         let first = floor(log10(self.low)) as i32;
         let last = floor(log10(self.high)) as i32;
@@ -96,7 +96,7 @@ impl Decades {
     }
 }
 
-/// Ten to the power of `exponent`, exact where a double can be.
+/// Returns ten to the power of `exponent`, exact if a double can be.
 fn power(exponent: i32) -> f64 {
     if exponent < 0 {
         1.0 / pow(10.0, f64::from(-exponent))
@@ -105,7 +105,7 @@ fn power(exponent: i32) -> f64 {
     }
 }
 
-/// The smallest of 1, 2, 5 times a power of ten that cuts `span` into at most `most` parts.
+/// Returns the smallest of 1, 2, 5 times a power of ten that cuts `span` into at most `most` parts.
 pub(crate) fn nice_step(span: f64, most: usize) -> f64 {
     let raw = span / most.max(1) as f64;
     let exponent = floor(log10(raw)) as i32;
@@ -114,7 +114,7 @@ pub(crate) fn nice_step(span: f64, most: usize) -> f64 {
     steps.into_iter().find(enough).unwrap_or_else(|| power(exponent + 1))
 }
 
-/// How many decimals multiples of `step` need.
+/// Returns the number of decimals that multiples of `step` need.
 pub(crate) fn decimals(step: f64) -> usize {
     (-floor(log10(step) + 1e-9)).clamp(0.0, 12.0) as usize
 }
@@ -131,7 +131,7 @@ fn log_labels(marks: &[f64]) -> Vec<(f64, String)> {
     marks.iter().map(|&v| (v, say(v))).collect()
 }
 
-/// `value` with `digits` decimals; in powers of ten where that would be long.
+/// Returns `value` with `digits` decimals, or in powers of ten if that would be long.
 pub(crate) fn label(value: f64, digits: usize) -> String {
     if value == 0.0 && digits > 5 {
         return "0".into();
@@ -142,7 +142,7 @@ pub(crate) fn label(value: f64, digits: usize) -> String {
     minus(&format!("{value:.digits$}"))
 }
 
-/// `value` as mantissa (at most `digits` decimals) times a power of ten.
+/// Returns `value` as mantissa (at most `digits` decimals) times a power of ten.
 fn scientific(value: f64, digits: usize) -> String {
     let exponent = floor(log10(value.abs()) + 1e-9) as i32;
     let mantissa = format!("{:.digits$}", value / power(exponent));
@@ -160,7 +160,7 @@ fn scientific(value: f64, digits: usize) -> String {
     }
 }
 
-/// Writes a leading hyphen as the minus sign it stands for; `-0` loses it.
+/// Replaces a leading hyphen by the minus sign it stands for; `-0` loses it.
 fn minus(number: &str) -> String {
     match number.strip_prefix('-') {
         Some(rest) if rest.chars().all(|c| matches!(c, '0' | '.')) => rest.to_string(),
@@ -175,7 +175,7 @@ fn superscript(exponent: i32) -> String {
         '2' => '²',
         '3' => '³',
         '-' => '⁻',
-        // The rest stand in a row: ⁰, ⁴ to ⁹.
+        // The other superscripts are consecutive: ⁰, ⁴ to ⁹.
         digit => char::from_u32(0x2070 + u32::from(digit) - u32::from('0')).unwrap_or(digit),
     };
     exponent.to_string().chars().map(raise).collect()

@@ -1,4 +1,4 @@
-//! What a map's picture shows, pixel by pixel, and how large it may become.
+//! Tests of a map's picture, pixel by pixel, and of how large it may become.
 
 use image::{Rgba, RgbaImage};
 use sidestep_draw::{Options, draw, to_png};
@@ -14,7 +14,7 @@ const RIBBON: [u8; 3] = [127, 184, 216];
 /// Side of a box.
 const BOX_M: f64 = 0.25;
 
-/// What is on a floor.
+/// The content of a floor.
 #[derive(Clone)]
 struct Scene {
     floor: Floor,
@@ -59,7 +59,7 @@ impl Picture {
         }
     }
 
-    /// The color at a point in boxes.
+    /// Returns the color at a point in boxes.
     fn at(&self, col: f64, row: f64) -> [u8; 3] {
         let (x, y) = (self.left + col * self.px, self.bottom - row * self.px);
         let Rgba([r, g, b, _]) = *self.pixels.get_pixel(x as u32, y as u32);
@@ -100,22 +100,22 @@ fn body(kind: Kind, number: u32, at: (f64, f64), size: (f64, f64), quarters: u8)
     Body::new(kind, number, pose, Shape::Cuboid { size_m })
 }
 
-/// A robot as wide as that many boxes at the end of its way.
+/// A robot of that many boxes' width at the end of its way.
 fn went(number: u32, width: f64, way: &[(f64, f64)]) -> (Body, Trail) {
-    // All in one cycle, so that all has one shade.
+    // All in one cycle, so that the whole trail has one shade.
     let places = way.iter().map(|&at| (0 as Cycle, place(at))).collect();
     let robot = body(Kind::Robot, number, way[way.len() - 1], (width, width), 0);
     (robot, Trail { of: (Kind::Robot, number, None), way: places })
 }
 
-/// The room with robots that have gone ways.
+/// Returns the room with robots that have gone ways.
 fn ways(ways: &[(f64, &[(f64, f64)])]) -> Scene {
     let ways = ways.iter().zip(0..).map(|((width, way), number)| went(number, *width, way));
     let (bodies, trails) = ways.unzip();
     Scene { bodies, trails, ..room() }
 }
 
-/// With a newest cycle elsewhere, a trail would be old: all of a trail is the newest shade here.
+/// Makes all of a trail the newest: with a newer cycle elsewhere, it would be drawn as old.
 fn newest(mut scene: Scene) -> Scene {
     for trail in &mut scene.trails {
         trail.way.insert(0, (0, trail.way[0].1));
@@ -156,7 +156,7 @@ fn row_zero_is_at_the_bottom() {
 #[test]
 fn a_ribbon_covers_the_boxes_the_body_covered_and_no_others() {
     let picture = Picture::of(&newest(ways(&[(3.0, &[(12.5, 9.5), (3.5, 9.5), (12.5, 9.5)])])));
-    // A little inside and a little outside of the three rows and of the first column.
+    // Slightly inside and slightly outside the three rows and the first column.
     for (row, color) in [(7.97, WHITE), (8.03, RIBBON), (10.97, RIBBON), (11.03, WHITE)] {
         assert_eq!(picture.at(8.5, row), color, "row {row}");
     }
@@ -176,7 +176,7 @@ fn a_place_crossed_often_is_no_darker() {
 #[test]
 fn a_robot_that_never_moved_covers_its_boxes() {
     let mut scene = newest(ways(&[(3.0, &[(9.5, 9.5)])]));
-    // Gone a little aside, so that the place where it was can be seen.
+    // Moved slightly aside, so that the place where it was is visible.
     scene.bodies[0] = body(Kind::Robot, 0, (15.5, 15.5), (3.0, 3.0), 0);
     let picture = Picture::of(&scene);
     assert_eq!(picture.at(8.1, 8.1), RIBBON);

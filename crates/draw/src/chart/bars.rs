@@ -10,10 +10,10 @@ use crate::svg::Rect;
 
 /// The part of a category's slot that its bars fill.
 const FILLED: f64 = 0.78;
-/// Bars are never wider than this.
+/// Greatest width of a bar.
 const WIDEST_PX: f64 = 60.0;
 
-/// The height of a bar, perhaps with its interval.
+/// The height of a bar, optionally with its interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bar {
     /// Height in units of the vertical axis; a bar that is not a number is left out.
@@ -23,12 +23,12 @@ pub struct Bar {
 }
 
 impl Bar {
-    /// A bar without an error bar.
+    /// Returns a bar without an error bar.
     pub fn new(value: f64) -> Self {
         Self { value, interval: None }
     }
 
-    /// The same bar with an error bar from `low` to `high`, e.g. a 95 % confidence interval.
+    /// Adds an error bar from `low` to `high`, e.g. a 95 % confidence interval.
     #[must_use]
     pub fn with_interval(mut self, low: f64, high: f64) -> Self {
         self.interval = Some((low, high));
@@ -39,20 +39,20 @@ impl Bar {
 /// The bars of one color: one per category.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BarSeries {
-    /// What the legend says.
+    /// Label in the legend.
     pub label: String,
     /// One bar per category, in their order.
     pub bars: Vec<Bar>,
 }
 
 impl BarSeries {
-    /// A series of `bars`, one per category.
+    /// Returns a series of `bars`, one per category.
     pub fn new(label: impl Into<String>, bars: Vec<Bar>) -> Self {
         Self { label: label.into(), bars }
     }
 }
 
-/// A chart of bars in groups, e.g. contacts by what was hit, for each regime.
+/// A chart of bars in groups, e.g. contacts by kind of obstacle, for each regime.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BarChart {
     title: String,
@@ -64,7 +64,7 @@ pub struct BarChart {
 }
 
 impl BarChart {
-    /// An empty chart with these categories along the horizontal axis.
+    /// Returns an empty chart with these categories along the horizontal axis.
     pub fn new(
         title: impl Into<String>,
         categories: impl IntoIterator<Item = impl Into<String>>,
@@ -79,14 +79,14 @@ impl BarChart {
         }
     }
 
-    /// Sets what the categories are called together.
+    /// Names the categories as a whole.
     #[must_use]
     pub fn x_label(mut self, label: impl Into<String>) -> Self {
         self.x_label = label.into();
         self
     }
 
-    /// Sets the vertical axis. Bars begin at zero, or at the low end of a logarithmic axis.
+    /// Sets the vertical axis. Bars start at zero, or at the low end of a logarithmic axis.
     #[must_use]
     pub fn y_axis(mut self, axis: Axis) -> Self {
         self.y = axis;
@@ -100,7 +100,7 @@ impl BarChart {
         self
     }
 
-    /// Sets the small print under the chart, e.g. what the error bars mean.
+    /// Sets the small print under the chart, e.g. the meaning of the error bars.
     #[must_use]
     pub fn note(mut self, note: impl Into<String>) -> Self {
         self.note = note.into();
@@ -111,7 +111,7 @@ impl BarChart {
     ///
     /// # Errors
     /// [`DrawError::Length`] if a series has not one bar per category, [`DrawError::Value`] if the
-    /// style or the axis' given range is impossible.
+    /// style or the axis's given range is impossible.
     pub fn to_svg(&self, style: &Style) -> Result<String, DrawError> {
         style.check()?;
         for series in &self.series {
@@ -136,7 +136,7 @@ impl BarChart {
         Ok(frame.finish())
     }
 
-    /// All values the axis must show; zero, where bars begin, among them.
+    /// Returns all values that the axis must show, including zero, where bars start.
     fn heights(&self) -> impl Iterator<Item = f64> {
         let bars = self.series.iter().flat_map(|series| &series.bars);
         let reach = |bar: &Bar| {
@@ -158,7 +158,7 @@ impl BarChart {
         let slot = frame.area.width / self.categories.len().max(1) as f64;
         let count = self.series.len() as f64;
         let width = (slot * FILLED / count).min(WIDEST_PX);
-        // From the middle of the slot to the middle of this series' bar.
+        // Offset from the middle of the slot to the middle of this series' bar.
         let aside = (index as f64 - (count - 1.0) / 2.0) * width;
         for (category, bar) in series.bars.iter().enumerate() {
             if self.y.holds(bar.value) {
@@ -179,7 +179,7 @@ fn draw_bar(frame: &mut Frame, bar: &Bar, center: f64, width: f64, color: &str) 
     }
 }
 
-/// A filled column from the axis' base to `value`.
+/// Draws a filled column from the axis's base to `value`.
 pub(crate) fn column(frame: &mut Frame, (x, width): (f64, f64), value: f64, color: &str) {
     let (base, end) = (frame.y.base_px(), frame.y.px(value));
     let column = Rect { x, y: base.min(end), width, height: (base - end).abs() };

@@ -11,10 +11,10 @@ const TICK_PX: f64 = 5.0;
 const EDGE_PX: f64 = 10.0;
 const LABEL_GAP_PX: f64 = 5.0;
 const NOTE_GAP_PX: f64 = 8.0;
-/// The part of the picture's height that the data have at least; the picture grows to grant it.
+/// Least part of the picture's height for the data; the picture grows to provide it.
 const LEAST_AREA: f64 = 0.55;
 
-/// What runs along the horizontal axis.
+/// The content of the horizontal axis.
 pub(crate) enum Across<'a> {
     /// Numbers.
     Values(Fitted),
@@ -22,7 +22,7 @@ pub(crate) enum Across<'a> {
     Categories(&'a [String]),
 }
 
-/// All that a frame says.
+/// The words of a frame.
 pub(crate) struct Words<'a> {
     pub(crate) title: &'a str,
     pub(crate) note: &'a str,
@@ -31,17 +31,17 @@ pub(crate) struct Words<'a> {
     pub(crate) legend: Vec<Entry>,
 }
 
-/// How many labeled ticks a picture of this style has room for, across and upward.
+/// Returns the number of labeled ticks that fit a picture of this style, across and upward.
 pub(crate) fn most_ticks(style: &Style) -> (usize, usize) {
     let across = style.width_px / (7.0 * style.font_px);
     let upward = style.height_px / (4.5 * style.font_px);
     ((across as usize).clamp(2, 12), (upward as usize).clamp(2, 10))
 }
 
-/// A chart under construction: its axes stand, the data come next.
+/// A chart under construction: its axes are drawn, the data come next.
 pub(crate) struct Frame {
     pub(crate) svg: Svg,
-    /// Where the data go.
+    /// The area of the data.
     pub(crate) area: Rect,
     pub(crate) y: Scale,
     style: Style,
@@ -50,7 +50,7 @@ pub(crate) struct Frame {
     note_top: f64,
 }
 
-/// The lines of text around the area, broken for the room there is.
+/// The lines of text around the area, broken to fit.
 struct Labels {
     title: Vec<String>,
     note: Vec<String>,
@@ -63,13 +63,13 @@ struct Labels {
 #[derive(Default)]
 struct SlotNames {
     names: Vec<Vec<String>>,
-    /// The slots are too narrow for a word: names read upward.
+    /// Whether the slots are too narrow for a word, so that names read upward.
     upright: bool,
     height_px: f64,
 }
 
 impl Labels {
-    /// Breaks all text for an area `width` pixels wide; `y` is broken already.
+    /// Breaks all text for an area `width` pixels wide; `y` is already broken.
     fn wrap(
         style: &Style,
         words: &Words<'_>,
@@ -87,7 +87,7 @@ impl Labels {
         }
     }
 
-    /// The height of all that stands between the area and the note.
+    /// Returns the height of everything between the area and the note.
     fn below_px(&self, style: &Style) -> f64 {
         let ticks = TICK_PX + self.slots.height_px.max(style.small_px() * 1.35);
         ticks + self.x.len() as f64 * line_px(style) + LABEL_GAP_PX + NOTE_GAP_PX
@@ -116,7 +116,7 @@ impl SlotNames {
 }
 
 impl Frame {
-    /// Lays out and draws everything but the data.
+    /// Lays out and draws everything except the data.
     pub(crate) fn open(style: &Style, words: Words<'_>, across: &Across<'_>, up: &Fitted) -> Self {
         let least_height = LEAST_AREA * style.height_px;
         let y = text::wrap(words.y_label, style.font_px, Weight::Regular, least_height);
@@ -141,17 +141,17 @@ impl Frame {
         frame
     }
 
-    /// The horizontal scale of `across`.
+    /// Returns the horizontal scale of `across`.
     pub(crate) fn x_scale(&self, across: &Fitted) -> Scale {
         across.between(self.area.x, self.area.right())
     }
 
-    /// Opens a group for data, of which only what lies in the area is seen.
+    /// Opens a group for data, of which only the part inside the area is visible.
     pub(crate) fn open_data(&mut self) {
         self.svg.open_clip(self.area.grown(6.0));
     }
 
-    /// The finished picture.
+    /// Returns the finished picture.
     pub(crate) fn finish(mut self) -> String {
         let look =
             TextLook { fill: FAINT_INK, ..TextLook::new(self.style.small_px(), Anchor::Start) };
@@ -200,7 +200,7 @@ impl Frame {
             self.svg.line((at, top), (at, bottom), grid_ink());
             self.svg.line((at, bottom), (at, bottom + TICK_PX), axis_ink());
             let label_px = text::width(label, look.size_px, Weight::Regular);
-            // Given ticks may stand too close for all their labels.
+            // Given ticks may be too close together for all their labels.
             if spacing.admits(at, label_px + 0.4 * look.size_px) {
                 self.svg.text(at, bottom + TICK_PX + 2.0 + look.size_px, label, &look);
             }
@@ -253,21 +253,21 @@ fn line_px(style: &Style) -> f64 {
     style.font_px * 1.35
 }
 
-/// Half of the last tick's label may stand out beyond the area.
+/// Returns the room on the right, because half of the last tick's label may extend beyond the area.
 fn right_room(style: &Style, across: &Across<'_>) -> f64 {
     let Across::Values(fitted) = across else { return 0.0 };
     let last = fitted.ticks.major.last();
     last.map_or(0.0, |(_, label)| text::width(label, style.small_px(), Weight::Regular) / 2.0)
 }
 
-/// Draws title and legend; returns where the area may begin.
+/// Draws title and legend; returns where the area may start.
 fn draw_head(svg: &mut Svg, style: &Style, title: &[String], legend: &Legend) -> f64 {
     let top = paragraph(svg, title, (EDGE_PX, EDGE_PX), &title_look(style.title_px()));
     legend.draw(svg, EDGE_PX, top + 2.0);
     top + legend.height_px() + 14.0
 }
 
-/// A polyline's path data through points in pixels.
+/// Returns path data of a polyline through points in pixels.
 pub(crate) fn polyline(points: impl Iterator<Item = (f64, f64)>) -> String {
     let mut data = String::new();
     for (x, y) in points {

@@ -6,10 +6,10 @@ use crate::chart::frame::{Across, Frame, Words, most_ticks};
 use crate::error::DrawError;
 use crate::style::{Style, series_color};
 
-/// More bins than a screen has pixels show nothing more.
+/// Most bins: more bins than a screen has pixels show nothing more.
 const MOST_BINS: usize = 10_000;
 
-/// How often values fell between edges.
+/// A histogram: counts of values between edges.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Histogram {
     title: String,
@@ -21,7 +21,7 @@ pub struct Histogram {
 }
 
 impl Histogram {
-    /// A histogram of counts: `counts[i]` values lie between `edges[i]` and `edges[i + 1]`.
+    /// Returns a histogram of counts: `counts[i]` values lie between `edges[i]` and `edges[i + 1]`.
     ///
     /// # Errors
     /// [`DrawError::Length`] if there is not one edge more than counts, [`DrawError::Value`] if the
@@ -41,8 +41,8 @@ impl Histogram {
         Ok(Self { title: title.into(), note: String::new(), x, y, edges, counts })
     }
 
-    /// A histogram of `values` in `bins` bins of equal width from the least value to the greatest.
-    /// What is not finite is not counted; without any values all counts are zero.
+    /// Returns a histogram of `values` in `bins` bins of equal width from the least value to the
+    /// greatest. Non-finite values are not counted; without any values all counts are zero.
     ///
     /// # Errors
     /// [`DrawError::Value`] for zero bins, [`DrawError::TooLarge`] above 10 000.
@@ -57,7 +57,7 @@ impl Histogram {
         let values = || values.iter().copied().filter(|v| axis.holds(*v));
         let low = values().reduce(f64::min).unwrap_or(0.0);
         let high = values().reduce(f64::max).unwrap_or(1.0);
-        // A bin that is lost in the values' last bits would have no width.
+        // A bin narrower than the rounding of the values would have no width.
         let least = 1e-9 * low.abs().max(high.abs()).max(1e-90) * bins as f64;
         let width = (high - low).max(least) / bins as f64;
         let mut counts = vec![0; bins];
@@ -75,7 +75,7 @@ impl Histogram {
         self
     }
 
-    /// Sets the vertical axis, labeled `count` and linear otherwise.
+    /// Sets the vertical axis, which is linear and labeled `count` by default.
     #[must_use]
     pub fn y_axis(mut self, axis: Axis) -> Self {
         self.y = axis;
@@ -92,7 +92,7 @@ impl Histogram {
     /// Draws the histogram.
     ///
     /// # Errors
-    /// [`DrawError::Value`] if the style or an axis' given range is impossible.
+    /// [`DrawError::Value`] if the style or an axis's given range is impossible.
     pub fn to_svg(&self, style: &Style) -> Result<String, DrawError> {
         style.check()?;
         let (most_across, most_up) = most_ticks(style);

@@ -1,4 +1,4 @@
-//! Charts: a frame with axes, title and legend, and what is drawn in it.
+//! Charts: a frame with axes, title and legend, and the data in it.
 
 pub(crate) mod bars;
 pub(crate) mod frame;

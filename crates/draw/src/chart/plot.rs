@@ -7,12 +7,12 @@ use crate::error::DrawError;
 use crate::legend::{Entry, Marker, Symbol, dashes};
 use crate::style::{FAINT_INK, Style, series_color};
 
-/// How many straight pieces stand for an ideal line, which is a curve if one axis is logarithmic.
+/// Straight pieces of an ideal line, which is a curve if one axis is logarithmic.
 const IDEAL_PIECES: u32 = 64;
-/// Series longer than this show their line without a marker at each point.
+/// Longest series with a marker at each point; longer ones show only their line.
 const MOST_MARKERS: usize = 60;
 
-/// A measured value, perhaps with its interval.
+/// A measured value, optionally with its interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Point {
     /// Position along the horizontal axis. A point that is not a number interrupts its line.
@@ -24,12 +24,12 @@ pub struct Point {
 }
 
 impl Point {
-    /// A value without an error bar.
+    /// Returns a value without an error bar.
     pub fn new(x: f64, y: f64) -> Self {
         Self { x, y, interval: None }
     }
 
-    /// The same value with an error bar from `low` to `high`, e.g. a 95 % confidence interval.
+    /// Adds an error bar from `low` to `high`, e.g. a 95 % confidence interval.
     #[must_use]
     pub fn with_interval(mut self, low: f64, high: f64) -> Self {
         self.interval = Some((low, high));
@@ -37,10 +37,10 @@ impl Point {
     }
 }
 
-/// How the points of a series are drawn.
+/// The way in which the points of a series are drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mark {
-    /// A line, with markers where the points are few.
+    /// A line, with markers if the points are few.
     Line,
     /// A line alone, within a band of the intervals.
     Band,
@@ -51,7 +51,7 @@ pub enum Mark {
 /// Points that belong together; color and marker follow from the series' number.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
-    /// What the legend says; an empty label has no place in the legend.
+    /// Label in the legend; an empty label has no place there.
     pub label: String,
     /// The points, in the order in which the line runs.
     pub points: Vec<Point>,
@@ -60,17 +60,17 @@ pub struct Series {
 }
 
 impl Series {
-    /// Points joined by a line.
+    /// Returns points joined by a line.
     pub fn line(label: impl Into<String>, points: Vec<Point>) -> Self {
         Self { label: label.into(), points, mark: Mark::Line }
     }
 
-    /// Points joined by a line, their intervals as a band around it.
+    /// Returns points joined by a line, their intervals as a band around it.
     pub fn band(label: impl Into<String>, points: Vec<Point>) -> Self {
         Self { mark: Mark::Band, ..Self::line(label, points) }
     }
 
-    /// Points that are not joined.
+    /// Returns points that are not joined.
     pub fn points(label: impl Into<String>, points: Vec<Point>) -> Self {
         Self { mark: Mark::Points, ..Self::line(label, points) }
     }
@@ -107,7 +107,7 @@ pub struct Plot {
 }
 
 impl Plot {
-    /// An empty plot with linear axes `x` and `y`. An empty title takes no room.
+    /// Returns an empty plot with linear axes `x` and `y`. An empty title takes no room.
     pub fn new(title: impl Into<String>) -> Self {
         Self {
             title: title.into(),
@@ -148,7 +148,7 @@ impl Plot {
         self
     }
 
-    /// Sets the small print under the plot, e.g. what the error bars mean.
+    /// Sets the small print under the plot, e.g. the meaning of the error bars.
     #[must_use]
     pub fn note(mut self, note: impl Into<String>) -> Self {
         self.note = note.into();
@@ -158,7 +158,7 @@ impl Plot {
     /// Draws the plot.
     ///
     /// # Errors
-    /// [`DrawError::Value`] if the style or an axis' given range is impossible.
+    /// [`DrawError::Value`] if the style or an axis's given range is impossible.
     pub fn to_svg(&self, style: &Style) -> Result<String, DrawError> {
         style.check()?;
         let (most_across, most_up) = most_ticks(style);
@@ -193,7 +193,7 @@ impl Plot {
         self.series.iter().flat_map(|s| &s.points).filter(|p| self.holds(p))
     }
 
-    /// One entry per series and ideal line.
+    /// Returns one entry per series and ideal line.
     fn legend(&self) -> Vec<Entry> {
         let series = self.series.iter().enumerate().map(|(index, series)| {
             let (color, marker) = (series_color(index), Marker::of_series(index));
@@ -247,7 +247,7 @@ impl Plot {
         }
     }
 
-    /// Fills what lies between the ends of the intervals, over each stretch that has them.
+    /// Fills the area between the ends of the intervals, over each stretch that has them.
     fn draw_band(&self, frame: &mut Frame, x: Scale, color: &str, series: &Series) {
         let y = frame.y;
         let is_out = |p: &Point| !self.holds(p) || bounds(p).is_none();
@@ -261,19 +261,19 @@ impl Plot {
     }
 }
 
-/// A point's interval, where it can be drawn.
+/// Returns a point's interval, if it can be drawn.
 fn bounds(point: &Point) -> Option<(f64, f64)> {
     point.interval.filter(|(low, high)| low.is_finite() && high.is_finite())
 }
 
-/// The vertical values a point covers.
+/// Returns the vertical values that a point covers.
 fn reach(point: &Point) -> impl Iterator<Item = f64> {
     let (low, high) = point.interval.unwrap_or((point.y, point.y));
     [low, point.y, high].into_iter()
 }
 
-/// Leaves out points less than half a pixel from the last one kept: they are not seen. The last
-/// point always stays.
+/// Leaves out points less than half a pixel from the last one kept, because they would not be
+/// visible. The last point always stays.
 fn thinned(points: impl Iterator<Item = (f64, f64)>) -> impl Iterator<Item = (f64, f64)> {
     let mut points = points.peekable();
     let mut kept: Option<(f64, f64)> = None;

@@ -1,4 +1,4 @@
-//! Everything that has a shape.
+//! Bodies: everything that has a shape.
 
 use std::fmt::Write as _;
 
@@ -9,26 +9,26 @@ use crate::style::{INK, hex};
 use crate::svg::{Num, Svg};
 use sidestep_kernel::view::{Body, Color, Condition, Kind, Place, Pose, Scenery, Shape, WALL};
 
-/// Thinner lines than this would vanish.
+/// Least width of a line, because thinner ones would vanish.
 const LEAST_LINE_PX: f64 = 1.4;
-/// Smaller things are drawn with this radius.
+/// Least radius of a body.
 const LEAST_RADIUS_PX: f64 = 1.2;
-/// Arrowheads are drawn at least this long.
+/// Least length of an arrowhead.
 const LEAST_DART_PX: f64 = 9.0;
-/// The mark of those who lead has at least this radius, from above and in space.
+/// Least radius of a leader's mark, from above and in space.
 const LEADER_PX: [f64; 2] = [3.0, 5.0];
-/// A goal has at least this radius.
+/// Least radius of a goal.
 const LEAST_GOAL_PX: f64 = 3.5;
-/// The time whose way a moving body's arrow shows, in seconds.
+/// Time whose way a moving body's arrow shows, seconds.
 const ARROW_S: f64 = 1.0;
 /// Corners of a circle that is seen from the side.
 const CORNERS: usize = 32;
-/// Agents without a trail, where others have one.
+/// Color of agents without a trail, if others have one.
 const DARK: Color = [0x22, 0x22, 0x22];
-/// What is far away in space is as pale as this.
+/// Gray level toward which distant things in space fade.
 const FAR: f64 = 215.0;
 
-/// Walls without thickness that stand still, seen from above, as one path.
+/// Draws static walls without thickness, seen from above, as one path.
 pub(super) fn draw_walls(svg: &mut Svg, scenery: &Scenery, canvas: &Canvas) {
     let mut data = String::new();
     for body in scenery.bodies.iter().filter(|body| is_wall(body)) {
@@ -47,7 +47,7 @@ fn is_wall(body: &Body) -> bool {
     body.kind == Kind::Obstacle && is_thin && !body.moves()
 }
 
-/// Bodies seen from above, those of lower layers first.
+/// Draws bodies seen from above, those of lower layers first.
 pub(super) fn draw_layers(
     svg: &mut Svg,
     scene: &Scene<'_>,
@@ -58,12 +58,12 @@ pub(super) fn draw_layers(
     let layer = |body: &Body| body.appearance(scene.scenery.dimensions).layer;
     let mut shown: Vec<&Body> =
         bodies.iter().filter(|body| layers.contains(&layer(body)) && !is_wall(body)).collect();
-    // Stable: of bodies of a layer the one named first is drawn first.
+    // The sort is stable: in a layer, the body named first is drawn first.
     shown.sort_by_key(|body| layer(body));
     shown.into_iter().for_each(|body| draw_body(svg, scene, canvas, body));
 }
 
-/// Bodies in space, far ones first; a line with many points by its parts.
+/// Draws bodies in space, far ones first; a line with many points is drawn part by part.
 pub(super) fn draw_by_depth<'a>(
     svg: &mut Svg,
     scene: &Scene<'_>,
@@ -82,7 +82,7 @@ pub(super) fn draw_by_depth<'a>(
             _ => parts.push((depth(canvas, body.pose.at_m), body, None)),
         }
     }
-    // Stable: of things equally far the one named first is drawn first.
+    // The sort is stable: of bodies at the same depth, the one named first is drawn first.
     parts.sort_by(|a, b| a.0.total_cmp(&b.0));
     for (_, body, segment) in parts {
         match (&body.shape, segment) {
@@ -98,7 +98,7 @@ fn depth(canvas: &Canvas, at: Place) -> f64 {
     canvas.camera.depth_m(at)
 }
 
-/// The color of a body, and how much of what is behind it it hides.
+/// Returns the color of a body, and its opacity.
 fn fill(scene: &Scene<'_>, canvas: &Canvas, body: &Body) -> (Color, f64) {
     let look = body.appearance(scene.scenery.dimensions);
     let acts = body.kind.is_agent() || body.kind == Kind::Rods;
@@ -112,7 +112,7 @@ fn fill(scene: &Scene<'_>, canvas: &Canvas, body: &Body) -> (Color, f64) {
 }
 
 impl Scene<'_> {
-    /// Whether others have a trail and this one has none.
+    /// Whether others have a trail and this body has none.
     fn is_beside_trails(&self, body: &Body) -> bool {
         !self.trails.is_empty() && self.trails.iter().all(|trail| trail.of.1 != body.number)
     }
@@ -126,7 +126,7 @@ fn darker(color: Color) -> Color {
     color.map(|byte| (0.66 * f64::from(byte)) as u8)
 }
 
-/// The line around a body.
+/// Returns the line around a body.
 fn rim(canvas: &Canvas, body: &Body, color: Color) -> String {
     let line =
         |color: Color, width: f64| format!(r#"stroke="{}" stroke-width="{width}""#, hex(color));
@@ -175,7 +175,7 @@ fn draw_body(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, body: &Body) {
     draw_heading(svg, canvas, body);
 }
 
-/// A line as thick as it is, round at its ends.
+/// Draws a line with its thickness, round at its ends.
 fn draw_line(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, body: &Body, points_m: &[Place]) {
     let Shape::Line { thickness_m, .. } = body.shape else { return };
     let (color, opacity) = fill(scene, canvas, body);
@@ -188,7 +188,7 @@ fn draw_line(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, body: &Body, poi
     svg.path(&data, look);
 }
 
-/// An arrowhead on a robot that shows where it looks.
+/// Draws an arrowhead on a robot that shows its heading.
 fn draw_heading(svg: &mut Svg, canvas: &Canvas, body: &Body) {
     let (side_m, top_m) = match body.shape {
         Shape::Cuboid { size_m: [x, y, z] } => (x.min(y), 0.5 * z),
@@ -204,7 +204,7 @@ fn draw_heading(svg: &mut Svg, canvas: &Canvas, body: &Body) {
     }
 }
 
-/// What is drawn over everything: where moving things go, and who leads.
+/// Draws marks over everything: the targets of moving things, and the leaders.
 pub(super) fn draw_marks(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas) {
     let bodies = || scene.scenery.bodies.iter().chain(&scene.frame.bodies);
     for body in bodies().filter(|body| body.kind == Kind::Obstacle && body.moves()) {
@@ -222,12 +222,12 @@ pub(super) fn draw_marks(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas) {
     }
 }
 
-/// The first connector of a chain leads.
+/// Whether a body leads: the first connector of a chain does.
 pub(super) fn leads(body: &Body) -> bool {
     body.kind == Kind::Connector && body.part == Some(0)
 }
 
-/// The middle of a body, wherever its pose is.
+/// Returns the middle of a body, wherever its pose is.
 fn middle(body: &Body) -> Place {
     match &body.shape {
         Shape::Line { points_m, .. } => {
@@ -238,7 +238,7 @@ fn middle(body: &Body) -> Place {
     }
 }
 
-/// The faces of a box that look toward the eye.
+/// Returns the faces of a box that look toward the viewer.
 fn faces(pose: &Pose, size_m: Place, canvas: &Canvas) -> Vec<[Place; 4]> {
     let half = size_m.map(|side_m| 0.5 * side_m);
     let corners = corners([half.map(|m| -m), half]).map(|corner| pose.place(corner));
@@ -247,7 +247,7 @@ fn faces(pose: &Pose, size_m: Place, canvas: &Canvas) -> Vec<[Place; 4]> {
         axis[k] = 1.0;
         dot(pose.turned(axis), canvas.camera.to_eye)
     };
-    // A face that is seen from its edge alone has no extent.
+    // A face that is seen edge-on has no extent.
     let facing = (0..3).map(|k| (k, turn(k))).filter(|(_, turn)| turn.abs() > 1e-9);
     let face = |(k, turn): (usize, f64)| {
         let (i, j) = ((k + 1) % 3, (k + 2) % 3);
@@ -257,7 +257,7 @@ fn faces(pose: &Pose, size_m: Place, canvas: &Canvas) -> Vec<[Place; 4]> {
     facing.map(face).collect()
 }
 
-/// A circle that lies flat.
+/// Returns a circle that lies flat.
 fn circle(pose: &Pose, radius_m: f64) -> [Place; CORNERS] {
     std::array::from_fn(|k| {
         let angle = k as f64 * std::f64::consts::TAU / CORNERS as f64;
@@ -265,14 +265,14 @@ fn circle(pose: &Pose, radius_m: f64) -> [Place; CORNERS] {
     })
 }
 
-/// An arrowhead whose middle is at the pose.
+/// Returns an arrowhead whose middle is at the pose.
 fn dart(pose: &Pose, length_m: f64, width_m: f64) -> [Place; 4] {
     let (half_m, wing_m) = (0.5 * length_m, 0.5 * width_m);
     let corners = [[half_m, 0.0], [-half_m, wing_m], [-0.5 * half_m, 0.0], [-half_m, -wing_m]];
     corners.map(|[x, y]| pose.place([x, y, 0.0]))
 }
 
-/// An arrow; shorter than its head it is not drawn.
+/// Draws an arrow, unless it is shorter than its head.
 fn arrow(svg: &mut Svg, from: Px, to: Px) {
     const HEAD_PX: f64 = 6.0;
     let (dx, dy) = (to.0 - from.0, to.1 - from.1);
@@ -292,7 +292,7 @@ fn outline(points: impl IntoIterator<Item = Px>) -> String {
     path_data(points) + "Z"
 }
 
-/// A line through points.
+/// Returns path data of a line through points.
 fn path_data(points: impl IntoIterator<Item = Px>) -> String {
     let mut data = String::new();
     for (index, (x, y)) in points.into_iter().enumerate() {

@@ -1,4 +1,4 @@
-//! From places in meters to pixels, equally long in all directions.
+//! The map from places in meters to pixels, with the same scale in all directions.
 
 use crate::svg::Rect;
 use sidestep_kernel::view::Place;
@@ -6,10 +6,10 @@ use sidestep_kernel::view::Place;
 /// A point in pixels, y downward.
 pub(crate) type Px = (f64, f64);
 
-/// Nothing is drawn further than this outside a picture.
+/// Limit of drawing outside a picture, pixels.
 const FURTHEST_PX: f64 = 1e5;
 
-/// From where one looks.
+/// The direction of view.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Camera {
     pub(crate) right: Place,
@@ -18,15 +18,15 @@ pub(crate) struct Camera {
 }
 
 impl Camera {
-    /// From above: x to the right, y up.
+    /// View from above: x to the right, y up.
     pub(crate) const ABOVE: Self =
         Self { right: [1.0, 0.0, 0.0], up: [0.0, 1.0, 0.0], to_eye: [0.0, 0.0, 1.0] };
-    /// From a corner: 37 degrees about the vertical and 37 degrees above the horizon, in numbers
-    /// that doubles nearly hold.
+    /// View from a corner: 37 degrees about the vertical and 37 degrees above the horizon, in
+    /// numbers that doubles hold almost exactly.
     pub(crate) const CORNER: Self =
         Self { right: [0.8, 0.6, 0.0], up: [-0.36, 0.48, 0.8], to_eye: [0.48, -0.64, 0.6] };
 
-    /// Where a place is seen: meters to the right and up.
+    /// Returns where a place is seen: meters to the right and up.
     pub(crate) fn seen(&self, at: Place) -> [f64; 2] {
         [dot(self.right, at), dot(self.up, at)]
     }
@@ -35,7 +35,7 @@ impl Camera {
         dot(self.to_eye, at)
     }
 
-    /// The least and the greatest of a box's corners in some direction.
+    /// Returns the least and the greatest coordinate of a box's corners in some direction.
     pub(crate) fn range(direction: Place, box_m: [Place; 2]) -> [f64; 2] {
         let along = corners(box_m).map(|corner| dot(corner, direction));
         let least = along.into_iter().fold(f64::INFINITY, f64::min);
@@ -47,27 +47,27 @@ pub(crate) fn dot(a: Place, b: Place) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// The corners of a box; bit k of a corner's number says at which end of axis k it is.
+/// Returns the corners of a box; bit k of a corner's number says at which end of axis k it is.
 pub(crate) fn corners([lo, hi]: [Place; 2]) -> [Place; 8] {
     std::array::from_fn(|bits| {
         std::array::from_fn(|k| if bits >> k & 1 == 1 { hi[k] } else { lo[k] })
     })
 }
 
-/// Where a picture's places are.
+/// The map from places to a picture's pixels.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Canvas {
     pub(crate) camera: Camera,
     pub(crate) px_per_m: f64,
-    /// The pixel of what is seen at `seen_m`.
+    /// The pixel of the point seen at `seen_m`.
     pub(crate) zero: Px,
     pub(crate) seen_m: [f64; 2],
-    /// The nearest and the furthest depth.
+    /// The nearest and the farthest depth.
     pub(crate) depths_m: [f64; 2],
 }
 
 impl Canvas {
-    /// Seen from above; `lo_m` is in the lower left corner of `map`.
+    /// Returns a view from above; `lo_m` is in the lower left corner of `map`.
     pub(crate) fn above(lo_m: [f64; 2], px_per_m: f64, map: Rect) -> Self {
         let zero = (map.x, map.bottom());
         Self { camera: Camera::ABOVE, px_per_m, zero, seen_m: lo_m, depths_m: [0.0, 1.0] }
@@ -83,7 +83,7 @@ impl Canvas {
         self.camera == Camera::ABOVE
     }
 
-    /// 0 for the furthest, 1 for the nearest.
+    /// Returns 0 for the farthest place, 1 for the nearest.
     pub(crate) fn nearness(&self, place: Place) -> f64 {
         let [far_m, near_m] = self.depths_m;
         ((self.camera.depth_m(place) - far_m) / (near_m - far_m)).clamp(0.0, 1.0)

@@ -1,22 +1,22 @@
-//! Where everything is, and whether it can be drawn at all.
+//! The extent of a picture, and checks that it can be drawn at all.
 
 use super::Scene;
 use super::canvas::Camera;
 use crate::error::DrawError;
 use sidestep_kernel::view::{Body, Floor, Frame, Kind, Place, Scenery, Shape, Trail};
 
-/// The most boxes a map may have: 16384 x 16384.
+/// Most boxes of a map: 16384 x 16384.
 const MOST_BOXES: u64 = 1 << 28;
-/// The most bodies, their points, and points of trails together.
+/// Most bodies, their points, and points of trails together.
 const MOST_PARTS: u64 = 1 << 22;
-/// Beyond this, in meters, pictures say nothing.
+/// Largest coordinate, meters: beyond it, pictures show nothing useful.
 const FURTHEST_M: f64 = 1e9;
-/// Air around what is shown, compared with its longest side.
+/// Margin around the shown area, as a part of its longest side.
 const MARGIN: f64 = 0.03;
-/// No side is shorter than this, compared with the longest.
+/// Least length of a side, as a part of the longest.
 const LEAST_SIDE: f64 = 0.2;
 
-/// Refuses what no picture can be drawn of.
+/// Refuses content that no picture can be drawn of.
 pub(crate) fn check(scenery: &Scenery, frame: &Frame, trails: &[Trail]) -> Result<(), DrawError> {
     if let Some(floor) = &scenery.floor {
         check_floor(floor)?;
@@ -91,7 +91,7 @@ fn around_floor(floor: &Floor) -> [Place; 2] {
     [[x, y, 0.0], [end(x, floor.width), end(y, floor.height), 0.0]]
 }
 
-/// Lower and upper corner of all that is shown; never empty.
+/// Returns the lower and upper corner of everything shown; never empty.
 pub(super) fn whole(scene: &Scene<'_>) -> Result<[Place; 2], DrawError> {
     if let (Some(floor), true) = (&scene.scenery.floor, scene.is_plane()) {
         return Ok(around_floor(floor));
@@ -104,8 +104,8 @@ pub(super) fn whole(scene: &Scene<'_>) -> Result<[Place; 2], DrawError> {
     bounds.grown()
 }
 
-/// Lower and upper corner of what a film shows: a floor, else wherever things come to be that are
-/// not in the way.
+/// Returns the lower and upper corner of a film's view: those of the floor, or otherwise of all
+/// places where things other than obstacles are at some time.
 pub(crate) fn around(scenery: &Scenery, frames: &[Frame]) -> Result<[Place; 2], DrawError> {
     if let (Some(floor), 2) = (&scenery.floor, scenery.dimensions) {
         check_floor(floor)?;
@@ -121,7 +121,7 @@ pub(crate) fn around(scenery: &Scenery, frames: &[Frame]) -> Result<[Place; 2], 
     bounds.grown()
 }
 
-/// The rectangle in which a box is seen.
+/// Returns the rectangle in which a box is seen.
 pub(crate) fn seen(camera: Camera, box_m: [Place; 2]) -> [[f64; 2]; 2] {
     let (across, upward) = (Camera::range(camera.right, box_m), Camera::range(camera.up, box_m));
     [[across[0], upward[0]], [across[1], upward[1]]]
@@ -165,7 +165,7 @@ impl Bounds {
         }
     }
 
-    /// With air on all sides, and no side that is hardly there beside the others.
+    /// Adds a margin on all sides, and widens a side that is very short compared with the others.
     fn grown(self) -> Result<[Place; 2], DrawError> {
         if self.lo[0] > self.hi[0] {
             return Ok([[0.0; 3], [1.0; 3]]);

@@ -1,4 +1,4 @@
-//! Floors: all boxes of one sort as one path of few rectangles.
+//! Floors: all boxes of one kind as one path of few rectangles.
 
 use std::fmt::Write as _;
 
@@ -7,7 +7,7 @@ use crate::style::hex;
 use crate::svg::{Num, Svg};
 use sidestep_kernel::view::{Floor, Occupancy, UNKNOWN, WALL};
 
-/// More rectangles than this (some megabytes of SVG) are drawn at a coarser grain.
+/// Most rectangles of a floor (some megabytes of SVG); with more it is drawn at a coarser grain.
 const MOST_RECTANGLES: usize = 100_000;
 
 /// A run of columns over a span of rows.
@@ -37,10 +37,10 @@ pub(super) fn draw(svg: &mut Svg, floor: &Floor, canvas: &Canvas) {
     svg.close_group();
 }
 
-/// Path data of the boxes where `is` holds.
+/// Returns path data of the boxes for which `is` holds.
 ///
-/// Where they need more than [`MOST_RECTANGLES`], squares of 2, 4, 8, ... boxes are filled if any
-/// of their boxes is: nothing vanishes, and such boxes are smaller than a pixel anyway.
+/// If they need more than [`MOST_RECTANGLES`], squares of 2, 4, 8, ... boxes are filled if any of
+/// their boxes is: nothing vanishes, and such boxes are smaller than a pixel anyway.
 fn path_data(width: u32, height: u32, is: &dyn Fn(u32, u32) -> bool) -> String {
     let mut grain = 1;
     loop {
@@ -56,15 +56,15 @@ fn path_data(width: u32, height: u32, is: &dyn Fn(u32, u32) -> bool) -> String {
     }
 }
 
-/// Covers the boxes where `is` holds with blocks that do not overlap: runs of a row, merged with
-/// the equal run in the row below. `None` above [`MOST_RECTANGLES`].
+/// Covers the boxes for which `is` holds with blocks that do not overlap: runs of a row, merged
+/// with the equal run in the row below. Returns `None` above [`MOST_RECTANGLES`].
 fn merged(width: u32, height: u32, is: &dyn Fn(u32, u32) -> bool) -> Option<Vec<Block>> {
     let (mut done, mut open) = (Vec::new(), Vec::<Block>::new());
     for row in 0..height {
         let mut above = Vec::new();
         let mut old = open.into_iter().peekable();
         for (col, width) in runs(width, |col| is(col, row)) {
-            // Both lists are in order of columns.
+            // Both lists are ordered by columns.
             while let Some(block) = old.next_if(|b| b.col < col) {
                 done.push(block);
             }
@@ -83,7 +83,7 @@ fn merged(width: u32, height: u32, is: &dyn Fn(u32, u32) -> bool) -> Option<Vec<
     Some(done)
 }
 
-/// First column and length of each unbroken run where `is` holds.
+/// Returns first column and length of each unbroken run for which `is` holds.
 fn runs(width: u32, is: impl Fn(u32) -> bool) -> impl Iterator<Item = (u32, u32)> {
     let mut col = 0;
     std::iter::from_fn(move || {

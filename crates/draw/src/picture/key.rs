@@ -1,4 +1,4 @@
-//! The legend, and what a picture shows in words.
+//! The legend, and a picture's content in words.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,14 +9,14 @@ use crate::style::hex;
 use sidestep_kernel::Cycle;
 use sidestep_kernel::view::{Frame, Kind, Occupancy, Scenery, Trail, UNKNOWN, WALL, color_of};
 
-/// Things with a color of their own beyond this share one line of the legend.
+/// Most things with a color of their own in the legend; more share one line.
 const MOST_NAMED: usize = 10;
-/// The color of a symbol that stands for things of all colors.
+/// Color of a symbol that stands for things of all colors.
 const ANY: [u8; 3] = [0x70, 0x70, 0x70];
-/// How a trail on a floor looks in the legend.
+/// Opacity of a trail on a floor in the legend.
 const RIBBON: f64 = 0.5;
 
-/// What a picture of these shows, in a sentence; nothing where nobody acts.
+/// Describes the content of a picture in a sentence; empty if there are no agents.
 pub fn describe(scenery: &Scenery, frame: &Frame, trails: &[Trail]) -> String {
     let agents = agents(scenery, frame);
     let Some((kind, _)) = agents.first() else { return String::new() };
@@ -37,7 +37,7 @@ fn plural(kind: Kind, n: usize) -> String {
     if n == 1 { one.into() } else { format!("{one}s") }
 }
 
-/// A number with its thousands set apart by spaces: `1 234 567`.
+/// Returns a number with its thousands separated by spaces: `1 234 567`.
 fn grouped(number: u64) -> String {
     let digits = number.to_string();
     let mut grouped = String::new();
@@ -50,7 +50,7 @@ fn grouped(number: u64) -> String {
     grouped
 }
 
-/// The legend: only what the picture has.
+/// Returns the legend: only entries for things in the picture.
 pub(super) fn entries(scene: &Scene<'_>) -> Vec<Entry> {
     let swatch = |color, opacity| Symbol::Swatch {
         fill: hex(color).into(),
@@ -67,7 +67,7 @@ pub(super) fn entries(scene: &Scene<'_>) -> Vec<Entry> {
         let (fill, rim) = (hex(UNKNOWN).into(), "#CCCCCC".into());
         entries.push(Entry::new(Symbol::Swatch { fill, rim, opacity: 1.0 }, "unknown"));
     }
-    // By layer, then in the order of the alphabet.
+    // By layer, then alphabetically.
     let mut kinds = BTreeMap::new();
     for body in scene.scenery.bodies.iter().chain(&scene.frame.bodies) {
         let look = body.appearance(scene.scenery.dimensions);
@@ -89,7 +89,7 @@ pub(super) fn entries(scene: &Scene<'_>) -> Vec<Entry> {
     entries
 }
 
-/// A line for everybody with a color: those with a trail, and chains.
+/// Returns an entry for everything with a color of its own: agents with a trail, and chains.
 fn named(scene: &Scene<'_>) -> Vec<Entry> {
     let trails = scene.trails.iter().map(|trail| (trail.of.1, (trail.of.0, trail.width_m)));
     let chains = scene.frame.bodies.iter().filter(|body| bodies::leads(body));
@@ -115,7 +115,7 @@ fn named(scene: &Scene<'_>) -> Vec<Entry> {
     entries
 }
 
-/// What something is called.
+/// Returns the name of a thing.
 pub(super) fn name(scene: &Scene<'_>, kind: Kind, number: u32) -> String {
     let own = scene.scenery.names.iter().find(|(k, n, _)| (*k, *n) == (kind, number));
     match own {

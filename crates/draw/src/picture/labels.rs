@@ -1,4 +1,4 @@
-//! Names beside those who have gone a way, where they cover neither each other nor anybody.
+//! Names beside the bodies with trails, placed where they cover neither each other nor any body.
 
 use super::canvas::{Canvas, Px};
 use super::{Scene, key};
@@ -8,14 +8,14 @@ use crate::svg::{Anchor, Rect, Svg, TextLook};
 use crate::text::{self, Weight};
 use sidestep_kernel::view::{Body, Kind, Shape};
 
-/// With more trails than this there is no room for names.
+/// Most trails in a picture with names: with more there is no room.
 const MOST_LABELS: usize = 12;
-/// Between a name and what it names.
+/// Distance between a name and the named body.
 const GAP_PX: f64 = 4.0;
-/// Distances at which room is looked for, in gaps.
+/// Distances at which room is searched, in gaps.
 const FURTHER: [f64; 4] = [1.0, 3.0, 6.0, 10.0];
 
-/// Where a trail begins and ends, and the name of the one whose it is, if there is room.
+/// Marks where a trail starts and ends, and writes the name of its body if there is room.
 pub(super) fn draw(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, room: Rect, style: &Style) {
     let mut taken: Vec<Rect> = Vec::new();
     let mut wanted = Vec::new();
@@ -27,7 +27,7 @@ pub(super) fn draw(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, room: Rect
         let body = scene.frame.bodies.iter().find(|body| body.who() == trail.of);
         let radius_px = body.map_or(0.0, |body| radius_m(body) * canvas.px_per_m);
         let mark_px = (0.56 * radius_px).clamp(3.0, 6.0);
-        // Where the body itself is drawn it needs no mark.
+        // If the body itself is drawn there, it needs no mark.
         if trail.width_m.is_some() && contains(room, start) {
             start_mark(svg, start, mark_px, &color);
         }
@@ -36,7 +36,7 @@ pub(super) fn draw(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, room: Rect
         }
         let clear_px = if body.is_some() { radius_px.max(mark_px) } else { mark_px };
         taken.push(around(end, clear_px));
-        // Parts of a thing have no name of their own.
+        // Parts of a body have no name of their own.
         if trail.of.2.is_none() && contains(room, end) {
             wanted.push((end, clear_px, key::name(scene, trail.of.0, trail.of.1)));
         }
@@ -73,7 +73,7 @@ fn contains(room: Rect, (x, y): Px) -> bool {
     (room.x..=room.right()).contains(&x) && (room.y..=room.bottom()).contains(&y)
 }
 
-/// Writes words beside a point where there is room; nothing where there is none.
+/// Writes words beside a point if there is room; otherwise nothing.
 fn write(
     svg: &mut Svg,
     ((x, y), clear_px): (Px, f64),
@@ -85,7 +85,7 @@ fn write(
     let size = style.small_px();
     let look = TextLook { halo: true, weight: Weight::Bold, ..TextLook::new(size, Anchor::Start) };
     let width = text::width(words, size, Weight::Bold);
-    // Letters reach a little beyond their size.
+    // Letters reach slightly beyond their font size.
     let height = 1.3 * size;
     let places = FURTHER.iter().flat_map(|&gaps| {
         let out = clear_px + gaps * GAP_PX;

@@ -1,4 +1,4 @@
-//! Pictures of what can be seen of a run: scenery, a frame, and the ways that led to it.
+//! Pictures of a run: scenery, a frame, and the ways that led to it.
 //!
 //! ```text
 //! trails.rs   which ways are shown, and how much of them    canvas.rs   from meters to pixels
@@ -34,10 +34,10 @@ use sheet::{Area, Sheet};
 use sidestep_kernel::view::{Frame, Scenery, Trail};
 use trails::Shown;
 
-/// A box is never drawn larger than this.
+/// Largest side of a drawn box.
 const LARGEST_BOX_PX: f64 = 28.0;
 
-/// How a picture is drawn, and the words around it.
+/// Options of a picture, and the words around it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Options {
     /// The room that it may take.
@@ -49,23 +49,23 @@ pub struct Options {
 }
 
 impl Options {
-    /// A picture as large as a page, under the scenario's name.
+    /// Returns options for a picture as large as a page, under the scenario's name.
     pub fn page(scenery: &Scenery, caption: impl Into<String>) -> Self {
         Self { style: Style::MAP, title: scenery.name.clone(), caption: caption.into() }
     }
 }
 
-/// Draws a moment of a run, with the ways that led to it: from above where all lies in a plane,
-/// else in parallel projection from a corner. A meter is as long in every direction.
+/// Draws a moment of a run, with the ways that led to it: from above if everything lies in a plane,
+/// otherwise in parallel projection from a corner. The scale is the same in all directions.
 ///
-/// Of the trails those are drawn that can be told apart ([`worth_a_trail`]): as wide as the body on
-/// a floor, else as lines; the older, the paler. Agents without a trail are dark where others have
+/// Only trails that can be distinguished are drawn ([`worth_a_trail`]): as wide as the body on a
+/// floor, otherwise as lines; the older, the paler. Agents without a trail are dark if others have
 /// one.
 ///
 /// # Errors
 /// [`DrawError::Length`] if a floor has not one entry per box; [`DrawError::TooLarge`] above 2^28
-/// boxes or four million bodies and points; [`DrawError::Value`] for places and sizes that are not
-/// finite, sizes below zero, a floor without boxes, an impossible style.
+/// boxes or four million bodies and points; [`DrawError::Value`] if places or sizes are not finite,
+/// sizes are below zero, a floor has no boxes, or the style is impossible.
 pub fn draw(
     scenery: &Scenery,
     frame: &Frame,
@@ -81,7 +81,7 @@ pub fn draw(
     }
 }
 
-/// What is drawn: a moment, and those of the ways that are shown.
+/// The content of a picture: a moment, and the trails that are shown.
 pub(crate) struct Scene<'a> {
     pub(crate) scenery: &'a Scenery,
     pub(crate) frame: &'a Frame,
@@ -93,7 +93,7 @@ impl<'a> Scene<'a> {
         Self { scenery, frame, trails: trails::shown(scenery, frame, trails) }
     }
 
-    /// The same with trails as thin lines, for those whose steps are far apart.
+    /// Returns the same scene with trails as thin lines, for bodies whose steps are far apart.
     pub(crate) fn with_thin_trails(mut self) -> Self {
         self.trails.iter_mut().for_each(|trail| trail.width_m = None);
         self
@@ -103,7 +103,7 @@ impl<'a> Scene<'a> {
         self.scenery.dimensions == 2
     }
 
-    /// Walls and what stands still.
+    /// Draws walls and everything else that stands still.
     pub(crate) fn draw_still(&self, svg: &mut Svg, canvas: &Canvas) {
         if !canvas.is_above() {
             return bodies::draw_by_depth(svg, self, canvas, self.scenery.bodies.iter());
@@ -115,7 +115,7 @@ impl<'a> Scene<'a> {
         bodies::draw_layers(svg, self, canvas, &self.scenery.bodies, 0..=u8::MAX);
     }
 
-    /// What moves. Seen from above, trails lie over doors and under those who walk.
+    /// Draws everything that moves. Seen from above, trails lie over doors and under bodies.
     pub(crate) fn draw_moving(&self, svg: &mut Svg, canvas: &Canvas) {
         if !canvas.is_above() {
             bodies::draw_by_depth(svg, self, canvas, self.frame.bodies.iter());
@@ -127,7 +127,7 @@ impl<'a> Scene<'a> {
         bodies::draw_marks(svg, self, canvas);
     }
 
-    /// Everything in space, far things first; trails over it.
+    /// Draws everything in space, far things first, and trails over it.
     fn draw_space(&self, svg: &mut Svg, canvas: &Canvas) {
         let bodies = self.scenery.bodies.iter().chain(&self.frame.bodies);
         bodies::draw_by_depth(svg, self, canvas, bodies);
@@ -158,8 +158,8 @@ fn from_above(scene: &Scene<'_>, options: &Options) -> Result<String, DrawError>
     Ok(sheet.close(svg, &area, key::entries(scene), &options.style))
 }
 
-/// The scale at which all fits the style's room; whole pixels a box where boxes are large, so that
-/// walls have sharp edges.
+/// Returns the scale at which everything fits the style's room; whole pixels per box if boxes are
+/// large, so that walls have sharp edges.
 fn px_per_m(scene: &Scene<'_>, size_m: [f64; 2], style: &Style) -> f64 {
     let px = (style.width_px / size_m[0]).min(style.height_px / size_m[1]);
     let Some(floor) = &scene.scenery.floor else { return px };

@@ -1,4 +1,4 @@
-//! What surrounds the map: title, axes in meters, scale bar, legend, caption.
+//! The surroundings of the map: title, axes in meters, scale bar, legend, caption.
 
 use crate::legend::{Entry, Legend, faint, paragraph, title_look};
 use crate::style::{INK, Style};
@@ -10,17 +10,17 @@ pub(super) const EDGE_PX: f64 = 10.0;
 const TICK_PX: f64 = 4.0;
 /// The length of "y (m)" in letter sizes.
 const Y_LABEL_LETTERS: f64 = 3.0;
-/// Pictures are at least this wide, in letters, for the sake of title and legend.
+/// Least width of a picture, in letters, to make room for title and legend.
 const LEAST_LETTERS: f64 = 32.0;
-/// From this extent on axes are in kilometers.
+/// Extent from which on axes are in kilometers, meters.
 const FAR_M: f64 = 5000.0;
 
-/// The unit of length for something of this extent, and how many meters it is.
+/// Returns the unit of length for something of this extent, and its length in meters.
 pub(super) fn unit(extent_m: f64) -> (&'static str, f64) {
     if extent_m < FAR_M { ("m", 1.0) } else { ("km", 1000.0) }
 }
 
-/// What a sheet shows: a rectangle in meters, and the words around it.
+/// The content of a sheet: a rectangle in meters, and the words around it.
 pub(super) struct Area<'a> {
     /// World coordinates of its lower left corner.
     pub(super) origin_m: [f64; 2],
@@ -30,7 +30,7 @@ pub(super) struct Area<'a> {
     pub(super) caption: &'a str,
 }
 
-/// Where the map stands in the picture.
+/// The position of the map in the picture.
 pub(super) struct Sheet {
     /// The map in pixels.
     pub(super) map: Rect,
@@ -38,7 +38,7 @@ pub(super) struct Sheet {
     px: f64,
     unit: (&'static str, f64),
     width: f64,
-    /// How far the label of a low map's vertical axis stands out above and below it.
+    /// Length by which the label of a low map's vertical axis extends above and below it.
     spill: f64,
 }
 
@@ -52,21 +52,21 @@ struct Edge {
 impl Edge {
     fn new(origin: f64, length: f64, length_px: f64, tick_room_px: f64) -> Self {
         let most = ((length_px / tick_room_px) as usize).clamp(1, 12);
-        // Sizes that a double cannot tell apart at this origin have no ticks.
+        // Sizes that a double cannot resolve at this origin have no ticks.
         let exact = length > 1e-9 * origin.abs() && length.is_finite();
         let ticks =
             if exact { Ticks::linear(origin, origin + length, most) } else { Ticks::default() };
         Self { origin, length, ticks }
     }
 
-    /// Each tick's distance from the edge's beginning, as part of the edge, and its label.
+    /// Returns each tick's distance from the edge's start, as part of the edge, and its label.
     fn marks(&self) -> impl Iterator<Item = (f64, &str)> {
         self.ticks.major.iter().map(|(v, label)| ((v - self.origin) / self.length, label.as_str()))
     }
 }
 
 impl Sheet {
-    /// Draws title and axes, and says where the map goes.
+    /// Draws title and axes, and returns the place of the map.
     pub(super) fn open(svg: &mut Svg, area: &Area<'_>, style: &Style, px: f64) -> Self {
         let size = style.small_px();
         let ([x0, y0], [width, height]) = (area.origin_m, area.size_m);
@@ -91,7 +91,7 @@ impl Sheet {
         sheet
     }
 
-    /// Draws what stands under the map and ends the picture.
+    /// Draws everything below the map and finishes the picture.
     pub(super) fn close(
         &self,
         mut svg: Svg,
@@ -151,7 +151,7 @@ impl Sheet {
     }
 
     /// Draws a bar of round length, about a fifth of the map's longer side but less than half the
-    /// picture's width. Returns the room it takes, in pixels.
+    /// picture's width. Returns its height, in pixels.
     fn draw_scale_bar(&self, svg: &mut Svg, style: &Style, top: f64) -> f64 {
         let per_px = 1.0 / (self.px * self.unit.1);
         let wanted_px = (0.2 * self.map.width.max(self.map.height)).min(0.18 * self.width);

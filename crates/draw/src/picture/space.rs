@@ -1,4 +1,4 @@
-//! Pictures in space: the edges of what is shown, and the words around it.
+//! Pictures in space: the edges of the shown box, and the words around it.
 
 use super::canvas::{Camera, Canvas, corners};
 use super::sheet::{EDGE_PX, unit};
@@ -34,7 +34,7 @@ pub(super) fn draw(scene: &Scene<'_>, options: &Options) -> Result<String, DrawE
     Ok(svg.finish(style.width_px, end + EDGE_PX, &options.title))
 }
 
-/// The canvas that shows a box as large as there is room, below `top`, and how high it is.
+/// Returns the canvas that shows a box as large as fits below `top`, and its height.
 fn canvas(box_m: [Place; 2], style: &Style, top: f64) -> (Canvas, f64) {
     let camera = Camera::CORNER;
     let [lo, hi] = extent::seen(camera, box_m);
@@ -54,7 +54,7 @@ fn canvas(box_m: [Place; 2], style: &Style, top: f64) -> (Canvas, f64) {
     (canvas, 2.0 * margin + px_per_m * (hi[1] - lo[1]))
 }
 
-/// The edges of what is shown, and the names of the axes.
+/// Draws the edges of the shown box, and the names of the axes.
 fn draw_box(svg: &mut Svg, canvas: &Canvas, box_m: [Place; 2], style: &Style) {
     let all = corners(box_m);
     for from in 0..8 {
@@ -75,7 +75,7 @@ fn draw_box(svg: &mut Svg, canvas: &Canvas, box_m: [Place; 2], style: &Style) {
     }
 }
 
-/// The extent of what is shown, in words.
+/// Describes the extent of the shown box in words.
 fn box_words([lo, hi]: [Place; 2]) -> String {
     let longest_m = (0..3).map(|k| hi[k] - lo[k]).fold(0.0, f64::max);
     let (unit, unit_m) = unit(longest_m);

@@ -1,4 +1,4 @@
-//! What pictures show, where, and in which colors.
+//! Tests of pictures: which parts they show, where, and in which colors.
 
 use super::{Options, draw};
 use crate::raster::to_png;
@@ -12,7 +12,7 @@ fn picture(scenery: &Scenery, frame: &Frame) -> String {
     draw(scenery, frame, &[], &Options::page(scenery, "")).unwrap()
 }
 
-/// Two marks that make what is shown 10 meters square, but for the margin.
+/// Two marks that make the shown area 10 meters square, apart from the margin.
 fn corners() -> Vec<Body> {
     [[-2.0, 0.0, 0.0], [8.0, 10.0, 0.0]].map(|at| ball(Kind::Goal, 0, at, 0.0)).to_vec()
 }
@@ -22,7 +22,7 @@ fn numbers(text: &str) -> Vec<f64> {
     text.split(|c| !is_number(c)).filter_map(|word| word.parse().ok()).collect()
 }
 
-/// Where a circle of this color is drawn, and its radius.
+/// Returns the center of the circle with this color, and its radius.
 fn circle(svg: &str, color: &str) -> [f64; 3] {
     let is_it = |line: &&str| line.starts_with("<circle") && line.contains(color);
     let line = svg.lines().find(is_it).expect("a circle");
@@ -30,7 +30,7 @@ fn circle(svg: &str, color: &str) -> [f64; 3] {
     [values[0], values[1], values[2]]
 }
 
-/// The colors of a picture of ten meters square at places in meters.
+/// Returns the colors of a picture of ten meters square at places in meters.
 fn colors<const N: usize>(
     bodies: Vec<Body>,
     still: Vec<Body>,
@@ -45,7 +45,7 @@ fn colors<const N: usize>(
     let picture = image::load_from_memory(&to_png(&svg, longer).unwrap()).unwrap().to_rgba8();
     let clip = svg.split("clip_").nth(1).unwrap().split('"').next().unwrap();
     let map: Vec<f64> = clip.split('_').map(|n| n.parse().unwrap()).collect();
-    // Three percent of air on each side.
+    // Three percent of margin on each side.
     let px = map[2] / 10.6;
     places.map(|[x, y]| {
         let at = (map[0] + (x + 2.3) * px, map[1] + map[3] - (y + 0.3) * px);

@@ -1,4 +1,4 @@
-//! Which ways are shown, in which colors, and how much of them.
+//! The choice of trails to show, their colors, and their lengths.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,12 +7,13 @@ use sidestep_kernel::view::{
     Body, COLORS, Color, Floor, Frame, Kind, Place, Scenery, Shape, Trail, Who, color_of,
 };
 
-/// Lines are so thin that more of them than there are colors can be told apart.
+/// Most lines in a picture: they are thin, so more of them than there are colors can be
+/// distinguished.
 const MOST_LINES: usize = 60;
 /// Lengths of ribbons in cycles, the longest first: shorter ones are for crowds, where long ones
 /// would cover each other.
 const LENGTHS: [Cycle; 4] = [400, 200, 100, 50];
-/// Ribbons are shortened while more than this share of what they cover is covered twice.
+/// Largest share of the covered area that may be covered twice before ribbons are shortened.
 const MOST_SHARED: f64 = 0.3;
 
 /// A trail that is drawn.
@@ -21,14 +22,14 @@ pub(crate) struct Shown<'a> {
     pub(crate) of: Who,
     pub(crate) way: &'a [(Cycle, Place)],
     pub(crate) color: Color,
-    /// The body's width, where the trail is what it has swept on a floor.
+    /// The body's width, if the trail is the area that it has swept on a floor.
     pub(crate) width_m: Option<f64>,
     /// First and last cycle of all trails.
     pub(crate) span: [Cycle; 2],
 }
 
 impl Shown<'_> {
-    /// Which of so many shades a cycle has, 0 for the longest ago.
+    /// Returns the shade of a cycle, one of `shades`, 0 for the oldest.
     pub(super) fn shade(&self, cycle: Cycle, shades: usize) -> usize {
         let [from, to] = self.span;
         let (age, span) = (cycle.saturating_sub(from), to.saturating_sub(from).max(1));
@@ -36,8 +37,8 @@ impl Shown<'_> {
     }
 }
 
-/// Agents whose ways can be told apart in one picture: at most one of each color, or sixty where
-/// ways are thin lines; of chains the first and the last connector.
+/// Returns agents whose ways can be distinguished in one picture: at most one of each color, or
+/// sixty if ways are thin lines; for chains the first and the last connector.
 pub fn worth_a_trail(scenery: &Scenery, frame: &Frame) -> Vec<Who> {
     let agents = agents(scenery, frame);
     let kind = agents.first().map(|&(kind, _)| kind);
@@ -55,10 +56,10 @@ pub fn worth_a_trail(scenery: &Scenery, frame: &Frame) -> Vec<Who> {
     }
 }
 
-/// Kinds and numbers of those that act, by number; those that start somewhere are airplanes, also
-/// when they are not there.
+/// Returns kinds and numbers of the agents, by number; everything with a start is an airplane, even
+/// if it is not present.
 pub(super) fn agents(scenery: &Scenery, frame: &Frame) -> BTreeSet<(Kind, u32)> {
-    // Robots that are parts of something keep to its connectors.
+    // Robots that are parts of a chain keep to its connectors.
     let acts = |body: &&Body| {
         body.kind.is_agent() && (body.kind == Kind::Connector || body.part.is_none())
     };
@@ -67,7 +68,7 @@ pub(super) fn agents(scenery: &Scenery, frame: &Frame) -> BTreeSet<(Kind, u32)> 
     here.chain(starts.map(|start| (Kind::Airplane, start.number))).collect()
 }
 
-/// The first and the last connector of a chain.
+/// Returns the first and the last connector of a chain.
 fn ends(frame: &Frame, number: u32) -> Vec<Who> {
     let is_its = |body: &&Body| body.kind == Kind::Connector && body.number == number;
     let mut parts = frame.bodies.iter().filter(is_its).map(Body::who);
@@ -75,7 +76,7 @@ fn ends(frame: &Frame, number: u32) -> Vec<Who> {
     first.into_iter().chain(parts.next_back()).collect()
 }
 
-/// At most one number of each color, at about equal steps, the first among them.
+/// Returns at most one number of each color, at about equal steps, including the first.
 fn of_each_color(numbers: &[u32]) -> Vec<u32> {
     let most = numbers.len().min(COLORS.len());
     let mut chosen: Vec<u32> = Vec::new();
@@ -88,7 +89,7 @@ fn of_each_color(numbers: &[u32]) -> Vec<u32> {
     chosen
 }
 
-/// Those of the trails that are drawn, and how much of them.
+/// Returns the trails that are drawn, and how much of them.
 pub(super) fn shown<'a>(scenery: &Scenery, frame: &Frame, trails: &'a [Trail]) -> Vec<Shown<'a>> {
     let worth = worth_a_trail(scenery, frame);
     let sizes = sizes(scenery, frame);
@@ -110,20 +111,20 @@ pub(super) fn shown<'a>(scenery: &Scenery, frame: &Frame, trails: &'a [Trail]) -
     shown
 }
 
-/// Width and height of the bodies that sweep a floor.
+/// Returns the width and height of the bodies that sweep a floor.
 fn sizes(scenery: &Scenery, frame: &Frame) -> BTreeMap<Who, [f64; 2]> {
     if scenery.floor.is_none() {
         return BTreeMap::new();
     }
     let size = |body: &Body| match body.shape {
-        // Smaller than nothing is no ribbon.
+        // A body without extent leaves no ribbon.
         Shape::Cuboid { size_m: [x, y, _] } if x > 0.0 && y > 0.0 => Some((body.who(), [x, y])),
         _ => None,
     };
     frame.bodies.iter().filter(|body| body.kind.is_agent()).filter_map(size).collect()
 }
 
-/// Keeps the last part of the trails that leaves them distinguishable.
+/// Keeps the longest last part of the trails that leaves them distinguishable.
 fn shorten(trails: &mut [Shown<'_>], floor: &Floor, sizes: &BTreeMap<Who, [f64; 2]>) {
     let now = trails.iter().filter_map(|trail| trail.way.last()).map(|(cycle, _)| *cycle).max();
     let now = now.unwrap_or(0);
@@ -138,7 +139,7 @@ fn shorten(trails: &mut [Shown<'_>], floor: &Floor, sizes: &BTreeMap<Who, [f64; 
     }
 }
 
-/// The share of the covered boxes that two bodies or more have covered.
+/// Returns the share of the covered boxes that two bodies or more have covered.
 fn shared(trails: &[Shown<'_>], floor: &Floor, sizes: &BTreeMap<Who, [f64; 2]>) -> f64 {
     let mut covered_by = BTreeMap::<(i64, i64), u64>::new();
     for (index, trail) in trails.iter().enumerate() {

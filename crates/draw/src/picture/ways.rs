@@ -1,4 +1,4 @@
-//! A trail as a line, or as the area that the body swept, paler with age.
+//! Trails as lines, or as the area that the body swept, paler with age.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -9,15 +9,15 @@ use crate::style::hex;
 use crate::svg::{Num, Svg};
 use sidestep_kernel::view::Color;
 
-/// Shades of a trail, the first for what is longest ago.
+/// Shades of a trail, the first for the oldest part.
 const SHADES: usize = 8;
-/// How much of its color the oldest part of a trail keeps.
+/// Part of its color that the oldest part of a trail keeps.
 const OLDEST: f64 = 0.3;
-/// How much of what is under it a ribbon hides, and a line.
+/// Opacity of a ribbon, and of a line.
 const OPACITY: [f64; 2] = [0.5, 0.8];
 /// Width of a trail that is a line.
 const LINE_PX: f64 = 1.8;
-/// Of a line, points nearer to each other than this cannot be told apart.
+/// Distance below which points of a line cannot be distinguished.
 const APART_PX: f64 = 0.7;
 
 /// A point in hundredths of a pixel, which compares equal.
@@ -25,9 +25,9 @@ type Point = (i64, i64);
 
 /// Draws a trail.
 ///
-/// As a ribbon it is as wide as the body; square ends and sharp corners make it exactly the boxes
-/// that a body moving along the grid has covered. All shades are opaque in one group that can be
-/// seen through, the newest on top: a place crossed often is no darker than one crossed once.
+/// A ribbon is as wide as the body; square ends and sharp corners make it exactly the boxes that a
+/// body moving along the grid has covered. All shades are opaque in one translucent group, the
+/// newest on top, so that a place crossed often is no darker than one crossed once.
 pub(super) fn draw(svg: &mut Svg, trail: &Shown<'_>, canvas: &Canvas) {
     let (width_px, ends) = match trail.width_m {
         Some(width_m) => {
@@ -53,13 +53,13 @@ pub(super) fn draw(svg: &mut Svg, trail: &Shown<'_>, canvas: &Canvas) {
     svg.close_group();
 }
 
-/// The color of a shade.
+/// Returns the color of a shade.
 fn aged(color: Color, shade: usize) -> Color {
     let part = OLDEST + (1.0 - OLDEST) * shade as f64 / (SHADES - 1) as f64;
     color.map(|byte| (255.0 - part * (255.0 - f64::from(byte))).round() as u8)
 }
 
-/// Points without those that nobody could tell from the one before.
+/// Leaves out points that cannot be distinguished from the one before.
 fn thinned(points: impl Iterator<Item = (usize, Px)>) -> Vec<(usize, Px)> {
     let mut kept: Vec<(usize, Px)> = Vec::new();
     let mut last = None;
@@ -74,8 +74,8 @@ fn thinned(points: impl Iterator<Item = (usize, Px)>) -> Vec<(usize, Px)> {
     kept
 }
 
-/// Path data of every shade: only corners, and every stretch once however often the body went
-/// there, in the shade of the last time.
+/// Returns path data of every shade: only corners, and every stretch once however often the body
+/// went there, in the shade of the last time.
 fn path_data(points: &[(usize, Px)]) -> [String; SHADES] {
     let mut pieces: [Vec<Vec<Point>>; SHADES] = std::array::from_fn(|_| Vec::new());
     let mut seen = BTreeSet::new();
@@ -138,7 +138,7 @@ fn write_piece(data: &mut String, points: &[Point]) {
         let _ = write!(data, "{command}{x} {y}");
     }
     if let [only] = points {
-        // A stroke of no length is not drawn: one of a hundredth of a pixel is.
+        // A stroke of no length is not drawn, but one of a hundredth of a pixel is.
         let _ = write!(data, "H{}", Num((only.0 + 1) as f64 / 100.0));
     }
 }
@@ -147,7 +147,7 @@ fn write_piece(data: &mut String, points: &[Point]) {
 mod tests {
     use super::*;
 
-    /// Path data of a trail in one shade.
+    /// Returns path data of a trail in one shade.
     fn data(points: &[Px]) -> String {
         let points: Vec<_> = points.iter().map(|&p| (SHADES - 1, p)).collect();
         let data = path_data(&points);

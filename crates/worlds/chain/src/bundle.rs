@@ -1,7 +1,7 @@
-//! A scenario of chains that needs no other file: what a run folder keeps.
+//! A chain scenario that needs no other file, as a run folder keeps it.
 //!
-//! Floors go along as the program saw them, so that a later version of an importer cannot change
-//! what is replayed. Scripts and models of arms go along as they are.
+//! Floors are stored as the program read them, because a later version of an importer must not
+//! change the replay. Scripts and arm models are stored unchanged.
 
 use super::scenario::Compiled;
 use serde_json::Value;
@@ -12,13 +12,13 @@ use sidestep_kernel::InputError;
 use sidestep_scenario::{Bundle, Resolved, Source};
 use std::path::Path;
 
-/// Keys whose values name files that go along as they are.
+/// Keys whose values name files that are stored unchanged.
 const PLAIN: [&str; 3] = ["script_file", "urdf", "srdf"];
 
-/// The scenario with every file that it names beside it.
+/// Returns the scenario together with every file that it names.
 ///
 /// # Errors
-/// When such a file cannot be read any more.
+/// When such a file can no longer be read.
 pub(crate) fn resolve<const D: usize>(
     source: &Source,
     compiled: &Compiled<D>,
@@ -35,7 +35,7 @@ pub(crate) fn resolve<const D: usize>(
     bundle.finish()
 }
 
-/// Adds all files that are named below a key.
+/// Adds all files that are named under a key.
 fn add_plain(bundle: &mut Bundle<'_>, value: &Value, key: &str) -> Result<(), InputError> {
     match value {
         Value::Array(items) => items
@@ -73,7 +73,7 @@ fn add_stage(bundle: &mut Bundle<'_>, world: &stage::World) {
     for (k, plan) in world.floor_plans.iter().enumerate() {
         let bitmap = format!("floor-{k}.pgm");
         text.push_str(&floor_plan(plan, &bitmap));
-        // Black is in the way.
+        // Black marks solid pixels.
         let grays = plan.solid.iter().map(|solid| if *solid { 0 } else { 255 });
         bundle.add(&bitmap, pgm(plan.width, plan.height, grays));
     }
@@ -82,7 +82,7 @@ fn add_stage(bundle: &mut Bundle<'_>, world: &stage::World) {
     bundle.set("ground.stage", format_args!("{path:?}"));
 }
 
-/// Stage wants degrees; these numbers are read back as the angle that they were.
+/// Stage expects degrees; these digits parse back to exactly the same angle.
 fn pose(pose: &Pose) -> String {
     format!("[{:?} {:?} 0.0 {:?}]", pose.x_m, pose.y_m, pose.yaw_rad.to_degrees())
 }

@@ -1,5 +1,5 @@
 //! Phase *claim*: a navigator looks around and decides, and every chain claims the box that it may
-//! come to be in.
+//! enter during the cycle.
 
 use super::perceive::Looking;
 use super::rods::geometry::Bounds;
@@ -7,7 +7,7 @@ use super::state::Body;
 use super::world::{ChainSpec, ChainWorld};
 use sidestep_kernel::{Cycle, Slot, Turn};
 
-/// Claims for one chain.
+/// Makes the claim of one chain.
 pub(crate) fn claim<const D: usize>(turn: &mut Turn<'_, ChainWorld<D>>, slot: usize) {
     let &mut Turn { world, state, now, .. } = turn;
     let claim = reach(world, &world.chains[slot], &state.body(slot), now);
@@ -16,7 +16,7 @@ pub(crate) fn claim<const D: usize>(turn: &mut Turn<'_, ChainWorld<D>>, slot: us
     state.set_decision(slot, decision);
 }
 
-/// The box in which a chain may come to be during one cycle: nobody of it leaves that box.
+/// Returns the box that a chain may enter during one cycle; no part of the chain leaves that box.
 fn reach<const D: usize>(
     world: &ChainWorld<D>,
     spec: &ChainSpec<D>,
@@ -29,7 +29,7 @@ fn reach<const D: usize>(
     let fastest_m_s = spec.tasks.iter().map(|t| t.speed_m_s).fold(0.0, f64::max);
     let way_m = match &world.escape {
         Some(escape) => escape.speed_max_m_s * world.dt_s,
-        // Who turns round what is in its way goes as far as its rod reaches to both sides.
+        // A rod that turns aside for an obstacle can swing as far as its length to either side.
         None => 2.0 * longest_m.min(world.rules.slave_step_max_m) + fastest_m_s * world.dt_s,
     };
     let thrown_m = spec.changes.iter().map(|change| change.throws_m(now)).fold(0.0, f64::max);

@@ -1,5 +1,5 @@
-//! Who moves a chain, and where to: tasks that its initiator carries out one after the other
-//! (slides R4, R9).
+//! Tasks of a chain's initiator, carried out one after the other: what moves the chain, and where
+//! to (slides R4, R9).
 
 use super::events::EventKind;
 use super::motion::replan::Memory;
@@ -14,7 +14,7 @@ use sidestep_kernel::stream::Draws;
 use sidestep_kernel::{Cycle, InputError, math};
 use std::sync::Arc;
 
-/// Motions that a script may come to.
+/// Largest number of motions in a script.
 pub(crate) const MAX_MOTIONS: usize = 1_000_000;
 
 /// One task.
@@ -22,17 +22,17 @@ pub(crate) const MAX_MOTIONS: usize = 1_000_000;
 pub(crate) struct Task<const D: usize> {
     /// The connector that moves.
     pub(crate) agent: usize,
-    /// How fast.
+    /// Speed of the connector, m/s.
     pub(crate) speed_m_s: f64,
-    /// What it is to do.
+    /// The goal of the task.
     pub(crate) driver: Driver<D>,
-    /// For how long at most; infinite for as long as it takes.
+    /// Longest duration of the task, s; infinite if it may take as long as it needs.
     pub(crate) lasts_s: f64,
-    /// How long it tries what is vetoed before it gives up.
+    /// How long a vetoed motion is retried before the task is given up, s.
     pub(crate) patience_s: f64,
 }
 
-/// What an initiator is to do.
+/// Kinds of goals for an initiator.
 #[derive(Debug, Clone)]
 pub(crate) enum Driver<const D: usize> {
     /// Nothing: it moves only to get out of the way.
@@ -47,12 +47,12 @@ pub(crate) enum Driver<const D: usize> {
     Navigate(Arc<Navigator>),
 }
 
-/// Going anywhere: ahead, and a little to any side.
+/// Wandering: ahead, with small random turns to either side.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Wander<const D: usize> {
-    /// Standard deviation of the change of direction per square root of a meter gone.
+    /// Standard deviation of the turn per square root of a meter of travel.
     pub(crate) turn_rad: f64,
-    /// Where it stays, if it is to stay somewhere: outside it turns back.
+    /// Region to stay in, if any: outside it the initiator turns back.
     pub(crate) within: Option<Bounds<D>>,
 }
 
@@ -61,12 +61,12 @@ pub(crate) struct Wander<const D: usize> {
 pub(crate) struct Targets<const D: usize> {
     /// The places.
     pub(crate) places: Vec<Point<D>>,
-    /// How near counts as there, meters.
+    /// Distance at which a place counts as reached, meters.
     pub(crate) tolerance_m: f64,
 }
 
 impl<const D: usize> Task<D> {
-    /// Who asks for its motions.
+    /// Returns the source of the task's motions.
     pub(crate) fn source(&self) -> Source {
         match self.driver {
             Driver::Script(_) => Source::Operator,
@@ -75,59 +75,59 @@ impl<const D: usize> Task<D> {
     }
 }
 
-/// Where an initiator is in its tasks: a part of the state.
+/// Progress of an initiator through its tasks: a part of the state.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Driving {
     /// The present task.
     pub task: u32,
-    /// Cycles since it began,
+    /// Cycles since the task started,
     pub cycles: Cycle,
-    /// of these, the last ones in which it came nowhere.
+    /// of these, the most recent ones without progress.
     pub idle: u32,
-    /// Cycles since it came nearer to its present target than ever.
+    /// Cycles since it last came nearer to its present target than ever before.
     pub late: u32,
-    /// Motions of the script, or targets, that are done with.
+    /// Motions of the script, or targets, that are finished.
     pub next: u32,
-    /// Cycles that it has rested on order of the script.
+    /// Cycles that it has rested because the script says so.
     pub rested: u32,
-    /// Where the task began.
+    /// Place and heading at the start of the task.
     pub start: Turtle,
     /// The direction ahead, a unit vector.
     pub ahead: [f64; 3],
-    /// The nearest that it came to its present target.
+    /// Smallest distance to its present target so far, meters.
     pub nearest_m: f64,
-    /// The kind of event that was told last since a motion as wanted.
+    /// Kind of the last event reported since a motion went as wanted.
     pub told: Option<EventKind>,
-    /// Who objected last in this part of the task, and why.
+    /// The last objection in this part of the task.
     pub objection: Option<Objection>,
-    /// Where it is on the ladder after vetoes.
+    /// Its rung on the ladder after vetoes.
     pub ladder: Memory,
-    /// What it remembers as a navigator on wheels.
+    /// Memory of a navigator on wheels.
     pub leader: Option<LeaderState>,
-    /// Its ways in this task, meters.
+    /// Lengths of way in this task, meters.
     pub way_m: Way,
 }
 
-/// An objection to what an initiator wanted.
+/// An objection to a motion that an initiator wanted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Objection {
     /// The connector that objected.
     pub by: u32,
-    /// Why.
+    /// The reason.
     pub reason: Reason,
 }
 
-/// How far an initiator came, of how far it wanted.
+/// How far an initiator got, compared with how far it wanted to go.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Way {
-    /// The way that it wanted to go.
+    /// Length of the way that it wanted to go, meters.
     pub wanted: f64,
-    /// The way that it went.
+    /// Length of the way that it went, meters.
     pub gone: f64,
 }
 
 impl Driving {
-    /// At the start of the first task.
+    /// Returns the state at the start of the first task.
     pub fn new<const D: usize>(agent: usize, points: &[Point<D>]) -> Self {
         let mut driving = Self {
             task: 0,
@@ -149,7 +149,7 @@ impl Driving {
         driving
     }
 
-    /// Begins a task where its initiator is.
+    /// Starts a task at the place of its initiator.
     fn begin<const D: usize>(&mut self, agent: usize, points: &[Point<D>]) {
         self.start = turtle(agent, points);
         self.ahead = self.start.ahead;
@@ -173,10 +173,10 @@ impl Driving {
         self.begin(agent, points);
     }
 
-    /// All motions of a script that began here.
+    /// Returns all motions of a script that started here.
     ///
     /// # Errors
-    /// What the script comes to that is no motion, or too many of them.
+    /// When the script contains something that is no motion, or too many motions.
     pub fn motions(&self, script: &Script) -> Result<Vec<Motion>, InputError> {
         let motions = script.motions(self.start);
         let motions: Vec<Motion> = motions.take(MAX_MOTIONS + 1).collect::<Result<_, _>>()?;
@@ -188,7 +188,7 @@ impl Driving {
     }
 }
 
-/// A turtle at a connector, looking away from the chain.
+/// Returns a turtle at a connector, facing away from the chain.
 fn turtle<const D: usize>(agent: usize, points: &[Point<D>]) -> Turtle {
     let at = points[agent];
     let behind = match agent {
@@ -197,7 +197,7 @@ fn turtle<const D: usize>(agent: usize, points: &[Point<D>]) -> Turtle {
     };
     let ahead = behind.and_then(|b| unit(std::array::from_fn::<f64, D, _>(|i| at[i] - b[i])));
     let ahead = ahead.map_or([1.0, 0.0, 0.0], in_dimensions);
-    // Left is level: across the upward axis, or along y where that is ahead.
+    // Left is level: across the upward axis, or along y if the turtle faces straight up or down.
     let across = math::hypot(ahead[0], ahead[1]);
     let left = match across > 1e-9 {
         true => [-ahead[1] / across, ahead[0] / across, 0.0],
@@ -206,7 +206,7 @@ fn turtle<const D: usize>(agent: usize, points: &[Point<D>]) -> Turtle {
     Turtle { position_m: in_dimensions(at), ahead, left }
 }
 
-/// The direction of a wandering initiator for the next step.
+/// Returns the direction of a wandering initiator's next step.
 pub(crate) fn wander<const D: usize>(
     rule: &Wander<D>,
     at: Point<D>,
@@ -220,7 +220,7 @@ pub(crate) fn wander<const D: usize>(
 }
 
 impl<const D: usize> Wander<D> {
-    /// Towards the inside, where `at` is outside.
+    /// Returns the direction toward the inside, if `at` is outside.
     fn home(&self, at: Point<D>) -> Point<D> {
         let Some(within) = &self.within else { return [0.0; D] };
         let inside: Point<D> = std::array::from_fn(|i| at[i].clamp(within.lo[i], within.hi[i]));
@@ -229,7 +229,7 @@ impl<const D: usize> Wander<D> {
     }
 }
 
-/// How fast a wandering initiator turns back that is outside, per step.
+/// How strongly a wandering initiator that is outside turns back, per step.
 const HOMESICK: f64 = 0.1;
 
 #[cfg(test)]

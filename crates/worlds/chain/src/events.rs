@@ -1,4 +1,4 @@
-//! What happened, and when.
+//! Events of a run, with their cycles.
 
 use super::rods::veto::Reason;
 use serde::{Deserialize, Serialize};
@@ -8,15 +8,15 @@ use sidestep_kernel::{Cycle, EntityId};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum EventKind {
-    /// A connector has spoken against what the driver wanted; the value is the way that the
-    /// initiator could have gone, in meters.
+    /// A connector has objected to a motion that the driver wanted; the value is the distance that
+    /// the initiator could have gone, in meters.
     Veto,
-    /// Some part of the chain has come into an obstacle; the value is the depth in meters.
+    /// Some part of the chain has entered an obstacle; the value is the depth in meters.
     Penetration,
     /// The chain is clear of obstacles again.
     Clear,
-    /// A part got out of the way of something, after a cycle in which none had to; the value is how
-    /// many motions that took.
+    /// A part got out of the way of something, after a cycle in which none had to; the value is the
+    /// number of motions that took.
     Escape,
     /// A robot's body touches something; the value is its distance from its connector in meters.
     Bumper,
@@ -28,18 +28,18 @@ pub enum EventKind {
     Stuck,
     /// A connector has broken down, or got another bend limit or mobility.
     Changed,
-    /// Parts of the chain were scattered; the value is how many.
+    /// Parts of the chain were scattered; the value is their number.
     Broken,
-    /// The scattered parts set out to be joined again; the value is the number of double passes
-    /// that it took to find where to.
+    /// The scattered parts start to be joined again; the value is the number of double passes
+    /// needed to find their places.
     Reforming,
-    /// They are joined again.
+    /// The scattered parts are joined again.
     Reformed,
-    /// The gap between the whole ends is longer than the parts; the value is what is wanting, in
+    /// The gap between the whole ends is longer than the parts; the value is the missing length in
     /// meters.
     GapTooLong,
-    /// No places were found where the scattered parts are joined; the value is by how much the
-    /// worst rod was off, in meters.
+    /// No places were found where the scattered parts are joined; the value is the error of the
+    /// worst rod, in meters.
     NotReformed,
     /// A target has been reached; the value is its number.
     Target,
@@ -71,7 +71,7 @@ impl EventKind {
         Self::GivenUp,
     ];
 
-    /// Its name in files.
+    /// Returns its name in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Veto => "veto",
@@ -102,13 +102,13 @@ pub(crate) struct Event {
     pub(crate) cycle: Cycle,
     /// The chain.
     pub(crate) chain: EntityId,
-    /// What.
+    /// Its kind.
     pub(crate) kind: EventKind,
-    /// The connector that it is about.
+    /// The connector concerned.
     pub(crate) connector: u32,
-    /// Why, of vetoes.
+    /// The reason of a veto.
     pub(crate) reason: Option<Reason>,
-    /// The obstacle that it is about, if it is about one.
+    /// The obstacle concerned, if any.
     pub(crate) obstacle: Option<u32>,
     /// See [`EventKind`]; 0 where a kind has none.
     pub(crate) value: f64,

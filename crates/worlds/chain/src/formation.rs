@@ -9,23 +9,23 @@ use serde::{Deserialize, Serialize};
 /// The robots of a swarm.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Robots {
-    /// How each behaves.
+    /// Behavior of each robot.
     pub(crate) follower: Follower,
-    /// A leader on wheels waits for a robot that is so far from its connector, and is slower from
-    /// half of that on; infinite for never.
+    /// Distance between a robot and its connector at which a leader on wheels stops to wait,
+    /// meters; it slows down from half of that on. Infinite for never.
     pub(crate) lag_limit_m: f64,
 }
 
 /// A robot of a swarm.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Robot {
-    /// Where it is.
+    /// Its place and heading.
     pub pose: Pose,
     /// Whether its bumper is pressed.
     pub is_bumped: bool,
 }
 
-/// A round solid thing in the plane.
+/// A round solid body in the plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Solid {
     pub(crate) at: Point<2>,
@@ -33,7 +33,7 @@ pub(crate) struct Solid {
 }
 
 impl Solid {
-    /// The thing as lasers and bumpers see it.
+    /// Returns the body as lasers and bumpers see it.
     pub(crate) fn as_seen(&self) -> Seen {
         Seen::disc(self.at, self.radius_m)
     }

@@ -1,4 +1,4 @@
-//! The world as those see it who run scenarios and know no world.
+//! The world's entry in the list of worlds, for code that runs scenarios without knowing any world.
 
 use super::scenario::{AnyCompiled as EitherCompiled, Compiled};
 use super::{bundle, words, world::ChainWorld};

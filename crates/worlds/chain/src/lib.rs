@@ -1,8 +1,8 @@
 #![deny(clippy::disallowed_methods)]
 //! Chains of connectors and rods that creep among obstacles.
 //!
-//! Source: "Serpentine motion" (Birbilis and Aspragathos, 2005); where this world does otherwise, the modules say
-//! why. One code for two and three dimensions.
+//! Source: "Serpentine motion" (Birbilis and Aspragathos, 2005); where this world departs from it,
+//! the modules say why. The same code serves two and three dimensions.
 //!
 //! ```text
 //! rods/:   chains, constraints, propagation, search      arms/:   joints as rods, inverse kinematics
@@ -13,7 +13,8 @@
 //! one cycle: claim.rs (perceive.rs) -> join.rs -> act/ -> metrics.rs, events.rs, rows.rs
 //! ```
 //!
-//! `rods` and `arms` know nothing of the world and of runs: a library that needs no cycle.
+//! `rods` and `arms` know neither the world nor runs: they can be used as a library, without
+//! cycles.
 
 mod act;
 pub mod arms;

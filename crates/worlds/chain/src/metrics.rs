@@ -1,4 +1,4 @@
-//! What came of a run.
+//! Metrics of a run.
 
 use super::motion::escape::Escaped;
 use super::motion::replan::Climbed;
@@ -8,35 +8,35 @@ use serde::{Deserialize, Serialize};
 use sidestep_kernel::EntityId;
 use std::collections::BTreeMap;
 
-/// A part that is deeper than this in an obstacle counts as a penetration, meters.
+/// Depth in an obstacle beyond which a part counts as a penetration, meters.
 pub const PENETRATION_M: f64 = 1e-6;
 
-/// What came of one chain: counts that a run keeps beside its state.
+/// Counts for one chain that a run keeps beside its state.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Tally {
-    /// Cycles in which it could act.
+    /// Cycles in which the chain could act.
     pub steps: u64,
-    /// Vetoes that drivers met with, by [`Reason::ALL`].
+    /// Vetoes that drivers received, by [`Reason::ALL`].
     pub vetoes: [u64; Reason::ALL.len()],
     /// Steps at whose end some part was in an obstacle,
     pub penetrations: u64,
-    /// and whether it was so at the end of the last step.
+    /// and whether the last step ended so.
     pub is_inside: bool,
     /// Whether parts got out of the way in the last step.
     pub is_escaping: bool,
-    /// The least distance of any part from obstacles; infinite where none came near.
+    /// Least distance of any part from obstacles, meters; infinite if none came near.
     pub min_clearance_m: f64,
-    /// The greatest amount by which a rod was outside its limits while the chain was whole.
+    /// Greatest amount by which a rod was outside its limits while the chain was whole, meters.
     pub max_rod_violation_m: f64,
-    /// The longest way of a connector, other than the initiator's, in one sub-step.
+    /// Longest distance that a connector other than the initiator moved in one sub-step, meters.
     pub max_slave_step_m: f64,
-    /// The greatest speed of any connector.
+    /// Greatest speed of any connector, m/s.
     pub max_speed_m_s: f64,
-    /// The way of its initiators.
+    /// Distance traveled by its initiators, meters.
     pub way_m: f64,
     /// Rods turned to avoid something.
     pub rotations: u64,
-    /// Connectors moved, sums over the sub-steps.
+    /// Connectors moved, summed over the sub-steps.
     pub moved: u64,
     /// Tasks done, targets reached.
     pub done: u64,
@@ -48,11 +48,11 @@ pub struct Tally {
     pub not_reformed: u64,
     /// Steps in which each layer of a navigator acted, layer 1 first.
     pub layers: [u64; 6],
-    /// What came of the robots on wheels.
+    /// Counts for the robots on wheels.
     pub robots: RobotTally,
-    /// How initiators went on after vetoes.
+    /// Rungs by which initiators continued after vetoes.
     pub rungs: RungTally,
-    /// How parts got out of the way.
+    /// Counts of parts that got out of the way.
     pub escapes: EscapeTally,
 }
 
@@ -69,7 +69,7 @@ pub struct RungTally {
     pub waited: u64,
     /// Cycles in which the other end led.
     pub pulled_back: u64,
-    /// Ends of the ladder.
+    /// Climbs that reached the end of the ladder without success.
     pub stuck: u64,
 }
 
@@ -100,19 +100,19 @@ impl RungTally {
     }
 }
 
-/// What getting out of the way came to.
+/// Results of getting out of the way.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct EscapeTally {
-    /// Parts that moved.
+    /// Moves of parts.
     pub moves: u64,
-    /// Parts that could not,
+    /// Vetoes against such moves,
     pub vetoes: u64,
-    /// of these, because of their speed limit alone.
+    /// of these, the ones due to the speed limit alone.
     pub capped: u64,
 }
 
 impl EscapeTally {
-    /// Adds what a cycle came to.
+    /// Adds the result of a cycle.
     pub(super) fn add<const D: usize>(&mut self, escaped: &Escaped<D>) {
         self.moves += escaped.moves as u64;
         self.vetoes += escaped.vetoes as u64;
@@ -128,22 +128,22 @@ impl EscapeTally {
     }
 }
 
-/// What came of robots that keep to connectors.
+/// Counts for robots that keep to connectors.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct RobotTally {
-    /// Steps of all of them.
+    /// Steps of all robots.
     pub steps: u64,
     /// Times that a bumper was pressed,
     pub bumper_events: u64,
     /// and steps with a pressed bumper.
     pub bumper_steps: u64,
-    /// Steps in which sensors made a robot slower.
+    /// Steps in which sensors slowed a robot down.
     pub held_steps: u64,
-    /// Distances from their connectors, summed over steps,
+    /// Distances from their connectors, summed over steps, meters,
     pub lag_sum_m: f64,
     /// and the greatest.
     pub max_lag_m: f64,
-    /// The least air between a body and anything, up to 1 m.
+    /// Least gap between a body and anything else, up to 1 m, meters.
     pub min_gap_m: f64,
 }
 
@@ -162,7 +162,7 @@ impl Default for RobotTally {
 }
 
 impl RobotTally {
-    /// Counts the step of a robot that ended `lag_m` from its connector.
+    /// Counts a step of a robot that ended `lag_m` from its connector.
     pub(crate) fn count(&mut self, followed: &Followed, lag_m: f64) {
         self.steps += 1;
         self.lag_sum_m += lag_m;
@@ -227,37 +227,37 @@ impl Default for Tally {
     }
 }
 
-/// Something that an initiator gave up.
+/// A motion or target that an initiator gave up.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GivenUp {
     /// The task.
     pub task: u32,
     /// The motion of its script, or the target.
     pub part: u32,
-    /// The nearest that the initiator came to it, meters.
+    /// Smallest distance from the initiator to it, meters.
     pub nearest_m: f64,
-    /// The part of the task that is not done because of it, 0 to 1.
+    /// Part of the task that is left undone because of it, 0 to 1.
     pub undone: f64,
-    /// Who objected at last, if somebody did,
+    /// The last connector that objected, if any,
     pub by: Option<u32>,
-    /// and why.
+    /// and the reason.
     pub reason: Option<String>,
 }
 
-/// Metrics of a run. The names of the first seven are fixed: others' scripts rely on them.
+/// Metrics of a run. The names of the first seven are fixed, because scripts of users rely on them.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Metrics {
-    /// Cycles of all chains together.
+    /// Cycles of all chains, summed.
     pub steps: u64,
-    /// Vetoes that drivers met with.
+    /// Vetoes that drivers received.
     pub vetoes: u64,
     /// Steps at whose end some part of a chain was in an obstacle.
     pub penetrations: u64,
-    /// The least distance of any part from obstacles; none where nothing came near.
+    /// Least distance of any part from obstacles, meters; none if nothing came near.
     pub min_clearance_m: Option<f64>,
-    /// The greatest amount by which a rod was outside its limits.
+    /// Greatest amount by which a rod was outside its limits, meters.
     pub max_rod_violation_m: f64,
-    /// The part of their tasks that the chains have done, 0 to 1, on average; see
+    /// Part of their tasks that the chains have done, 0 to 1, on average; see
     /// [`super::world::ChainWorld::progress`].
     pub progress: f64,
     /// Steps per second of processor time, of this process's part of the run.
@@ -266,11 +266,11 @@ pub struct Metrics {
     pub vetoes_by_reason: BTreeMap<&'static str, u64>,
     /// Rods turned to avoid something.
     pub rotations: u64,
-    /// Connectors moved per step, sums over the sub-steps.
+    /// Connectors moved per step, summed over the sub-steps.
     pub moved_per_step: f64,
-    /// The longest way of a connector, other than an initiator's, in one sub-step.
+    /// Longest distance that a connector other than an initiator moved in one sub-step, meters.
     pub max_slave_step_m: f64,
-    /// The greatest speed of any connector.
+    /// Greatest speed of any connector, m/s.
     pub max_speed_m_s: f64,
     /// Tasks done, targets reached.
     pub done: u64,
@@ -278,34 +278,34 @@ pub struct Metrics {
     pub reformed: u64,
     /// and how often they could not be: the gap was too long, or no way was found.
     pub not_reformed: u64,
-    /// Arms whose joints cannot bring their connectors where they are, and why; by chain.
+    /// Arms whose joints cannot reproduce their connectors' positions, and why; by chain.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub joints_errors: BTreeMap<EntityId, String>,
-    /// What was given up, by chain.
+    /// Motions and targets that were given up, by chain.
     pub given_up: Vec<ChainGivenUp>,
-    /// How initiators went on after vetoes.
+    /// Rungs by which initiators continued after vetoes.
     pub rungs: RungTally,
-    /// How parts got out of the way.
+    /// Counts of parts that got out of the way.
     pub escapes: EscapeTally,
-    /// What came of robots on wheels, where there are any.
+    /// Metrics of robots on wheels, if there are any.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub robots: Option<RobotMetrics>,
 }
 
-/// What came of the robots on wheels of all swarms.
+/// Metrics of the robots on wheels of all swarms.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RobotMetrics {
     /// Times that a bumper was pressed,
     pub bumper_events: u64,
     /// and the part of all robots' steps with a pressed bumper.
     pub bumper_part: f64,
-    /// The part of all steps in which sensors made a robot slower.
+    /// Part of all steps in which sensors slowed a robot down.
     pub held_part: f64,
-    /// Mean distance of robots from their connectors,
+    /// Mean distance of robots from their connectors, meters,
     pub mean_lag_m: f64,
     /// and the greatest.
     pub max_lag_m: f64,
-    /// The least air between a body and anything, up to 1 m.
+    /// Least gap between a body and anything else, up to 1 m, meters.
     pub min_gap_m: f64,
 }
 
@@ -323,38 +323,38 @@ impl RobotMetrics {
     }
 }
 
-/// Something that a chain's initiator gave up.
+/// A motion or target that a chain's initiator gave up.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ChainGivenUp {
     /// The chain.
     pub chain: EntityId,
-    /// What.
+    /// The motion or target.
     #[serde(flatten)]
     pub what: GivenUp,
 }
 
-/// What came of one chain.
+/// Metrics of one chain.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ChainMetrics {
     /// Its id.
     pub chain: EntityId,
-    /// Its name, may be empty.
+    /// Its name; may be empty.
     pub name: String,
     /// See [`Metrics::progress`].
     pub progress: f64,
-    /// Joint values of an arm that bring its connectors where they are, rad or m, by name.
+    /// Joint values of an arm that reproduce its connectors' positions, rad or m, by name.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub joints: Option<BTreeMap<String, f64>>,
-    /// Why there are none, if an arm has none.
+    /// Why an arm has no joint values, if it has none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub joints_error: Option<String>,
-    /// What was counted.
+    /// Counts of the run.
     #[serde(flatten)]
     pub tally: Tally,
 }
 
 impl Metrics {
-    /// Sums over chains; `progress` of each.
+    /// Sums the tallies of the chains; `progress` has one entry per chain.
     pub(super) fn of(tallies: &[Tally], progress: &[f64], cpu_s: f64, timed_steps: u64) -> Self {
         let sum = |count: fn(&Tally) -> u64| tallies.iter().map(count).sum::<u64>();
         let most = |value: fn(&Tally) -> f64| tallies.iter().map(value).fold(0.0, f64::max);

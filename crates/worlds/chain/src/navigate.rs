@@ -1,46 +1,46 @@
-//! An initiator on wheels that finds its way with a laser, and where it is to come (slides N1 to N6).
+//! An initiator on wheels that finds its way with a laser, and its goal (slides N1 to N6).
 
 use super::rods::geometry::{Point, distance};
 use super::swarm::drive::Drive;
 use super::swarm::leader::{Leader, Turning};
 
-/// The end of a line counts as reached so far before it, meters.
+/// Distance before the end of a line at which the end counts as reached, meters.
 const BEFORE_THE_END_M: f64 = 0.5;
 
 /// An initiator that navigates.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Navigator {
-    /// How it behaves.
+    /// Its behavior.
     pub(crate) leader: Leader,
     /// Its wheels.
     pub(crate) drive: Drive,
-    /// Where it is to come; without a goal it goes on and on.
+    /// Its destination; without a goal it goes on and on.
     pub(crate) goal: Option<Goal>,
 }
 
-/// Where a navigator is to come.
+/// Destination of a navigator.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Goal {
-    /// To a place that it can detect.
+    /// A place that it can detect.
     Target {
         /// The place.
         at: Point<2>,
-        /// How near counts as there.
+        /// Distance at which the place counts as reached, meters.
         tolerance_m: f64,
     },
-    /// To the end of a line, such as the middle of a corridor, which it does not know of.
+    /// The end of a line, such as the middle of a corridor, which the navigator does not know.
     EndOf(Vec<Point<2>>),
 }
 
 impl Navigator {
-    /// Whether it may turn without going.
+    /// Whether it may turn without moving.
     pub(crate) fn can_turn_on_the_spot(&self) -> bool {
         self.leader.turning == Turning::OnTheSpotWhereBlocked
     }
 }
 
 impl Goal {
-    /// What the leader can detect.
+    /// Returns the target that the leader can detect.
     pub(crate) fn target(&self) -> Option<Point<2>> {
         match self {
             Self::Target { at, .. } => Some(*at),
@@ -48,7 +48,7 @@ impl Goal {
         }
     }
 
-    /// The point of the line that a navigator at `at` has come to, if it was at `index`.
+    /// Returns the point of the line that a navigator at `at` has reached, if it was at `index`.
     pub(crate) fn passed(&self, at: Point<2>, index: usize) -> usize {
         let Self::EndOf(line) = self else { return index };
         let nearer = |i: usize| distance(line[i + 1], at) <= distance(line[i], at);
@@ -62,8 +62,8 @@ impl Goal {
         }
     }
 
-    /// The part of the way that is done: by the points of a line, or by what is left to a target
-    /// compared with what was left at the start.
+    /// Returns the part of the way that is done: by the points of a line, or by the distance left
+    /// to a target compared with the distance at the start.
     pub(crate) fn progress(&self, index: usize, start: Point<2>, nearest_m: f64) -> f64 {
         match self {
             Self::Target { at, .. } if nearest_m.is_finite() => {

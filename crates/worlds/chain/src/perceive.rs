@@ -1,4 +1,5 @@
-//! What navigators see and decide, at the start of a cycle: everybody else is where they are then.
+//! Perception and decisions of navigators at the start of a cycle, with everybody else where they
+//! are at that moment.
 
 use super::driver::Driver;
 use super::navigate::{Goal, Navigator};
@@ -9,7 +10,7 @@ use super::swarm::leader::{Decision, LeaderState, Percept, Surroundings};
 use super::world::{ChainWorld, purpose};
 use sidestep_kernel::{Cycle, Slot};
 
-/// A worker that looks at a state which nobody changes meanwhile.
+/// A worker's read-only look at a state that nobody changes meanwhile.
 pub(crate) struct Looking<'a, const D: usize> {
     pub(crate) world: &'a ChainWorld<D>,
     pub(crate) state: &'a ChainState<D>,
@@ -17,23 +18,23 @@ pub(crate) struct Looking<'a, const D: usize> {
     pub(crate) scratch: &'a mut Scratch<D>,
 }
 
-/// What a navigator perceives.
+/// A navigator's perception.
 pub(crate) struct Sight<'a> {
     pub(crate) navigator: &'a Navigator,
-    /// The connector that it is.
+    /// The connector that navigates.
     pub(crate) agent: usize,
     pub(crate) leader: LeaderState,
     pub(crate) percept: Percept,
 }
 
 impl<'a, const D: usize> Looking<'a, D> {
-    /// What a navigator decides; none of other drivers.
+    /// Returns a navigator's decision; none for other drivers.
     pub(crate) fn decide(&mut self, slot: Slot) -> Option<Decision> {
         let sight = self.sight(slot)?;
         Some(sight.navigator.leader.decide(sight.leader.followed, &sight.percept))
     }
 
-    /// What a navigator perceives; its laser's ranges are in the scratch.
+    /// Returns a navigator's perception; its laser's ranges are in the scratch.
     pub(crate) fn sight(&mut self, slot: Slot) -> Option<Sight<'a>> {
         let Self { world, state, now, .. } = *self;
         let body = state.body(slot as usize);
@@ -51,7 +52,7 @@ impl<'a, const D: usize> Looking<'a, D> {
         Some(Sight { navigator, agent: task.agent, leader, percept })
     }
 
-    /// Gathers what a navigator may see of chains, its own included, but itself.
+    /// Gathers all parts of chains that a navigator may see, its own chain included, except itself.
     fn see_others(
         &mut self,
         slot: Slot,

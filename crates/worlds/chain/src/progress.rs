@@ -1,4 +1,4 @@
-//! How much of its tasks a chain has done.
+//! Progress of a chain through its tasks.
 
 use super::driver::{Driver, Task};
 use super::rods::geometry::in_dimensions;
@@ -6,8 +6,8 @@ use super::state::{Body, ChainState};
 use super::world::ChainWorld;
 
 impl<const D: usize> ChainWorld<D> {
-    /// The part of its tasks that a chain has done, from 0 to 1. Several tasks count alike; what
-    /// was given up is not done.
+    /// Returns the part of its tasks that a chain has done, from 0 to 1. Several tasks have equal
+    /// weight; parts that were given up do not count as done.
     pub fn progress(&self, slot: usize, body: &Body<D>) -> f64 {
         let tasks = &self.chains[slot].tasks;
         let part = tasks.get(body.driving.task as usize).map(|task| self.part_done(body, task));
@@ -16,9 +16,9 @@ impl<const D: usize> ChainWorld<D> {
         (done / tasks.len() as f64).clamp(0.0, 1.0)
     }
 
-    /// The part of its present task that an initiator is through with: of scripts by motions, of
-    /// targets by targets, of tasks that take a time by time; of going anywhere the part that was
-    /// gone of the way that its speed allows in the whole run; of resting the part of the run.
+    /// Returns the part of its present task that an initiator has finished: for scripts by motions,
+    /// for targets by targets, for timed tasks by time; for wandering the part of the distance that
+    /// its speed allows in the whole run; for resting the part of the run.
     pub(crate) fn part_done(&self, body: &Body<D>, task: &Task<D>) -> f64 {
         let part = match &task.driver {
             _ if task.lasts_s.is_finite() => self.starts_s(body.driving.cycles) / task.lasts_s,

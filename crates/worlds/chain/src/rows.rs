@@ -1,4 +1,4 @@
-//! What a run records: its tables, and their rows until they are recorded.
+//! Recorded tables of a run, and their rows until they are written.
 
 use super::events::{Event, EventKind};
 use super::rods::geometry::{Core, Point, in_dimensions};
@@ -11,21 +11,21 @@ use sidestep_kernel::ports::table::label_of;
 use sidestep_kernel::ports::{Buffer, Buffers, RowBuffer, Table};
 use sidestep_kernel::{Cycle, EntityId};
 
-/// The number of an obstacle in an event that is about none.
+/// Obstacle number of an event that concerns no obstacle.
 const NO_OBSTACLE: u32 = u32::MAX;
 
-/// Where a connector, a robot or an obstacle is at the start of a cycle.
+/// Position of a connector, a robot or an obstacle at the start of a cycle.
 #[derive(Debug)]
 struct Place {
     cycle: Cycle,
-    /// The chain it belongs to, of connectors and robots.
+    /// The chain that a connector or robot belongs to.
     chain: EntityId,
-    /// Its index there, or its number.
+    /// Its index in the chain, or the obstacle's number.
     id: u32,
     at: [f64; 3],
 }
 
-/// The columns of a position in as many dimensions.
+/// Adds one column per dimension of a position.
 fn axes(table: Table<Place>, dimensions: usize) -> Table<Place> {
     let axes = ["x_m", "y_m", "z_m"].into_iter().take(dimensions).enumerate();
     axes.fold(table, |table, (i, axis)| table.f64(axis, "position", move |p| p.at[i]))
@@ -60,7 +60,7 @@ fn movers(dimensions: usize) -> Table<Place> {
 
 fn events() -> Table<Event> {
     let kinds = EventKind::ALL.map(EventKind::name);
-    // The first label is that of events without a reason.
+    // The first label stands for events without a reason.
     let reasons = std::iter::once("none").chain(Reason::ALL.map(Reason::name));
     let reason = |reason: &Reason| label_of(&Reason::ALL, reason) + 1;
     Table::new("events")
@@ -73,7 +73,7 @@ fn events() -> Table<Event> {
         .f64("value", "meters, radians or a number, by event", |e| e.value)
 }
 
-/// Rows that wait for being recorded.
+/// Rows that wait to be recorded.
 #[derive(Debug, Default)]
 pub(super) struct Rows {
     record: RecordSection,
@@ -84,17 +84,17 @@ pub(super) struct Rows {
 }
 
 impl Rows {
-    /// Nothing yet; later what `record` asks for.
+    /// Returns no rows yet; later they hold the tables that `record` asks for.
     pub(super) fn new(record: RecordSection) -> Self {
         Self { record, ..Self::default() }
     }
 
-    /// Every how many cycles places are kept.
+    /// Returns the number of cycles from one recorded cycle to the next.
     pub(super) fn every(&self) -> Cycle {
         self.record.every
     }
 
-    /// Begins to keep rows, of those tables that will have some.
+    /// Starts to keep rows, for those tables that will have some.
     pub(super) fn begin<const D: usize>(&mut self, world: &ChainWorld<D>) {
         let record = self.record;
         let has_robots = world.chains.iter().any(|spec| spec.robots.is_some());
@@ -105,7 +105,7 @@ impl Rows {
         self.events.begin(record.events.then(events));
     }
 
-    /// Keeps where everything is at the start of cycle `now`.
+    /// Keeps the positions of everything at the start of cycle `now`.
     pub(super) fn places<const D: usize>(
         &mut self,
         world: &ChainWorld<D>,
@@ -142,7 +142,7 @@ impl Rows {
     }
 }
 
-/// The places of a chain's connectors.
+/// Adds the positions of a chain's connectors.
 fn connectors<const D: usize>(
     cycle: Cycle,
     slot: usize,
@@ -152,7 +152,7 @@ fn connectors<const D: usize>(
     (0..).zip(points).map(move |(id, at)| Place { cycle, chain, id, at: in_dimensions(*at) })
 }
 
-/// A point of a core that moves with it.
+/// Returns a point of a core that moves with it.
 fn middle<const D: usize>(core: &Core<D>) -> [f64; D] {
     match core {
         Core::Point(c) => *c,

@@ -1,4 +1,4 @@
-//! What a run asks of the world beside its phases.
+//! The hooks that a run calls on the world beside its phases.
 
 use super::arms::arm::Arm;
 use super::arms::kinematics::Recovered;
@@ -24,10 +24,11 @@ use sidestep_scenario::Source;
 pub type ChainRun<const D: usize> = Run<ChainWorld<D>>;
 
 impl<const D: usize> Compiled<D> {
-    /// A run at its start; the world is shared, not copied. `source` names it in checkpoints.
+    /// Returns a run at its start; the world is shared, not copied. `source` names it in
+    /// checkpoints.
     ///
     /// # Panics
-    /// Never: scripts are tried when they are compiled.
+    /// Never, because scripts are tried out when they are compiled.
     pub fn start(self, source: &Source, workers: usize) -> ChainRun<D> {
         let state = ChainState::new(&self.world).expect("scripts are tried when they are compiled");
         let books = Books { rows: Rows::new(self.record), ..Books::default() };
@@ -35,7 +36,7 @@ impl<const D: usize> Compiled<D> {
         Run::new(self.world, plan, (state, books), &source.text, workers)
     }
 
-    /// What the scenario asks for.
+    /// Returns the plan that the scenario asks for.
     pub fn plan(&self) -> Plan {
         Plan {
             name: self.name.clone(),
@@ -46,21 +47,21 @@ impl<const D: usize> Compiled<D> {
     }
 }
 
-/// What a run keeps beside its state.
+/// Bookkeeping of a run beside its state.
 #[derive(Debug, Default)]
 pub struct Books {
-    /// Steps that were made before this process took the run up.
+    /// Steps made before this process resumed the run.
     steps_before: u64,
-    /// What is to be recorded; nothing without recording.
+    /// Rows to be recorded; none without recording.
     rows: Rows,
     /// Events that wait for the next frame.
     log: Log<Event>,
-    /// Events as the workers have gathered them.
+    /// Events gathered from the workers.
     gathered: Vec<Event>,
 }
 
 impl<const D: usize> ChainWorld<D> {
-    /// Metrics of one chain.
+    /// Returns the metrics of one chain.
     pub fn metrics_of(&self, state: &ChainState<D>, slot: usize) -> ChainMetrics {
         let body = state.body(slot);
         let spec = &self.chains[slot];
@@ -116,7 +117,7 @@ impl<const D: usize> World for ChainWorld<D> {
     }
 
     fn book(&self, books: &mut Books) {
-        // One chain's events are in their order already.
+        // Events of one chain are already in order, so a stable sort by cycle and chain is enough.
         books.gathered.sort_by_key(|event| (event.cycle, event.chain));
         for event in books.gathered.drain(..) {
             books.log.push(event);

@@ -1,4 +1,4 @@
-//! The text of a scenario of chains, and what it compiles to.
+//! The text of a chain scenario, and the world that it compiles to.
 
 mod arms;
 mod chains;
@@ -25,9 +25,9 @@ use std::ops::Range;
 use std::sync::Arc;
 use toml::Spanned;
 
-/// No length, time or coordinate of a scenario is beyond this.
+/// Largest length, time or coordinate of a scenario.
 const MOST: f64 = 1e6;
-/// Cycles of a run whose scenario does not say it.
+/// Cycles of a run whose scenario does not set them.
 const CYCLES: u64 = 2000;
 
 /// A length, time or speed.
@@ -35,7 +35,7 @@ type Measure = Number<AboveTo<0, 1_000_000>>;
 /// A place or a direction.
 type Place<const D: usize> = sidestep_scenario::Point<D, Coordinate>;
 
-/// Coordinates that a world may have.
+/// Coordinates that a world accepts.
 #[derive(Debug, Clone, Copy)]
 struct Coordinate;
 
@@ -53,7 +53,7 @@ impl Rule for Coordinate {
     }
 }
 
-/// Numbers above 0; infinity sets no bound.
+/// Numbers above 0; infinity means no bound.
 #[derive(Debug, Clone, Copy)]
 struct Unbounded;
 
@@ -67,7 +67,7 @@ impl Rule for Unbounded {
     }
 }
 
-/// The same up to 1e6.
+/// Numbers above 0 up to 1e6.
 #[derive(Debug, Clone, Copy)]
 struct StepMost;
 
@@ -81,7 +81,7 @@ impl Rule for StepMost {
     }
 }
 
-/// A box by its lower and its upper corner.
+/// A box given by its lower and its upper corner.
 #[derive(Debug, Clone, Copy)]
 struct Room<const D: usize>(Bounds<D>);
 
@@ -99,13 +99,13 @@ impl<'de, const D: usize> Deserialize<'de> for Room<D> {
 }
 
 impl<const D: usize> Room<D> {
-    /// Its floor.
+    /// Returns the floor of the box.
     fn in_the_plane(&self) -> Bounds<2> {
         Bounds { lo: fitted(self.0.lo), hi: fitted(self.0.hi) }
     }
 }
 
-/// As much of a scenario as tells how its points are to be read.
+/// The part of a scenario that says how its points are to be read.
 #[derive(Debug, Deserialize)]
 struct Shape {
     #[serde(default)]
@@ -134,7 +134,7 @@ struct ChainFile<const D: usize> {
     record: RecordSection,
 }
 
-/// The behavior of a rod that hits an obstacle, in words.
+/// The behavior of a rod that hits an obstacle, by name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 enum RotationWord {
@@ -175,19 +175,19 @@ enum EscapeWord {
     Off,
 }
 
-/// The tables that a run keeps.
+/// The tables that a run records.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RecordSection {
-    /// A row per connector and recorded cycle.
+    /// One row per connector and recorded cycle.
     pub trajectories: bool,
-    /// A row per robot of a swarm and recorded cycle.
+    /// One row per robot of a swarm and recorded cycle.
     pub robots: bool,
-    /// A row per obstacle that moves and recorded cycle.
+    /// One row per moving obstacle and recorded cycle.
     pub movers: bool,
-    /// A row per event, see [`super::events`].
+    /// One row per event, see [`super::events`].
     pub events: bool,
-    /// Of how many cycles one is recorded; events are recorded of all.
+    /// One cycle in this many is recorded; events are recorded in all.
     #[serde(deserialize_with = "Whole::<1>::read")]
     pub every: u64,
     /// Cycles between two checkpoints; 0 for none.
@@ -216,13 +216,13 @@ pub struct Compiled<const D: usize> {
     pub name: String,
     /// The seed.
     pub seed: u64,
-    /// Cycles at most; a run ends when all tasks are done.
+    /// Most cycles of a run; it ends earlier when all tasks are done.
     pub cycles: u64,
     /// The tables to keep.
     pub record: RecordSection,
 }
 
-/// A compiled scenario of either number of dimensions.
+/// A compiled scenario in two or three dimensions.
 #[derive(Debug, Clone)]
 pub enum AnyCompiled {
     /// In the plane.
@@ -235,7 +235,7 @@ impl AnyCompiled {
     /// Compiles a scenario.
     ///
     /// # Errors
-    /// With place, line, column, cause and remedy for anything that is wrong in it.
+    /// With place, line, column, cause and remedy for anything that is wrong in the scenario.
     pub fn new(source: &Source) -> Result<Self, InputError> {
         let dimensions = source.parse::<Shape>()?.chain.dimensions;
         match dimensions.as_ref().map_or(2, |n| *n.get_ref()) {
@@ -258,7 +258,7 @@ impl<const D: usize> Compiled<D> {
     /// Compiles a scenario that is known to have `D` dimensions.
     ///
     /// # Errors
-    /// As [`AnyCompiled::new`]; when it has another number of dimensions.
+    /// As [`AnyCompiled::new`]; also when the scenario has another number of dimensions.
     pub fn new(source: &Source) -> Result<Self, InputError> {
         let shape = source.parse::<Shape>()?.chain;
         let dimensions = shape.dimensions.map_or(2, Spanned::into_inner);
@@ -314,13 +314,13 @@ impl<const D: usize> Compiler<'_, D> {
         })
     }
 
-    /// Carries the scripts out once, so that they cannot fail during a run.
+    /// Runs the scripts once, so that they cannot fail during a run.
     fn try_out(&self, compiled: &Compiled<D>) -> Result<(), InputError> {
         super::state::ChainState::new(&compiled.world).map(drop)
     }
 
-    /// The rule by which chains escape; none where nothing moves. Unless it is said, they may do so twice
-    /// as fast as they are led, or as the fastest that moves.
+    /// Returns the rule by which chains escape; none if nothing moves. By default chains escape at
+    /// twice the speed at which they are led, or twice that of the fastest moving obstacle.
     fn escape(&self, chains: &[ChainSpec<D>], movers: &Movers<D>, dt_s: f64) -> Option<Escape> {
         let section = &self.file.chain;
         if section.escape == EscapeWord::Off || movers.is_empty() {
@@ -346,7 +346,7 @@ impl<const D: usize> Compiler<'_, D> {
                 RotationWord::Never => Rotation::Never,
             },
             self_collision: section.self_collision.unwrap_or(true),
-            // Nobody escapes faster than allowed, and nobody is led faster either.
+            // The limit of escaping chains holds for led ones too.
             slave_step_max_m: escape.map_or(slave_step_max_m, |escape| {
                 slave_step_max_m.min(escape.speed_max_m_s * escape.dt_s)
             }),
@@ -355,8 +355,8 @@ impl<const D: usize> Compiler<'_, D> {
         }
     }
 
-    /// Refuses a key that is given and does nothing; told are key, whether it is given, and
-    /// whether it does something.
+    /// Refuses a key that is given and has no effect; the arguments are the key, whether it is
+    /// given, and whether it has an effect.
     fn has_no_idle_key(
         &self,
         keys: &[(&str, bool, bool)],

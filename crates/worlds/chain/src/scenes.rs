@@ -8,7 +8,7 @@ use super::rods::obstacle::{Obstacle, Obstacles};
 use sidestep_kernel::Seed;
 use sidestep_kernel::stream::{Purpose, Streams};
 
-/// Numbers in [0, 1) by (seed, index).
+/// Pseudo-random numbers in [0, 1) by (seed, index).
 pub(super) struct Numbers {
     streams: Streams,
     next: u64,
@@ -44,14 +44,14 @@ pub(super) fn corridor_walls(width_m: f64) -> Vec<Obstacle<2>> {
     Corridor::pinned(width_m).expect("a width").walls(0)
 }
 
-/// Robots behind each other on the first axis, the leader at `lead_m`; the tail of a long convoy
-/// is still outside of the corridor.
+/// Robots in a row on the first axis, the leader at `lead_m`; the tail of a long convoy is still
+/// outside the corridor.
 pub(super) fn convoy(lead_m: f64, followers: usize, rod: Rod, radius_m: f64) -> Chain<2> {
     Chain::straight([lead_m, 0.0], [-1.0, 0.0], followers, rod, Connector::free(radius_m))
         .expect("a straight chain is right")
 }
 
-/// A leader's wandering: at every step somewhere into a cone around where it goes.
+/// A wandering leader: every step goes somewhere into a cone around the last direction.
 pub(super) struct Wanderer<const D: usize> {
     numbers: Numbers,
     u: Point<D>,
@@ -69,7 +69,7 @@ impl<const D: usize> Wanderer<D> {
         super::rods::geometry::along(from, self.u, step_m)
     }
 
-    /// Anywhere else, after a veto.
+    /// Turns to any other direction, after a veto.
     pub(super) fn turn(&mut self) {
         let by = self.numbers.point(1.0);
         self.u = super::rods::geometry::unit(by).unwrap_or(self.u);
@@ -97,7 +97,7 @@ pub(super) fn ball_field<const D: usize>(
     field.fill(Seed(seed), 0).expect("a field")
 }
 
-/// The least clearance of any connector and any rod from obstacles, up to 1 m.
+/// Returns the least clearance of any connector and any rod from obstacles, up to 1 m.
 pub(super) fn clearance_m<const D: usize>(chain: &Chain<D>, obstacles: &Obstacles<D>) -> f64 {
     let points = chain.points();
     let tip = |i: usize| obstacles.clearance_m([points[i]; 2], chain.connectors()[i].radius_m, 1.0);
@@ -107,8 +107,8 @@ pub(super) fn clearance_m<const D: usize>(chain: &Chain<D>, obstacles: &Obstacle
     (0..chain.rods().len()).map(rod).fold(tips, f64::min)
 }
 
-/// The least clearance of a chain to itself: of discs further apart than one index, rods further
-/// than two, and discs from rods that are no neighbors.
+/// Returns the least clearance of a chain from itself: of discs more than one index apart, rods
+/// more than two, and discs from rods that are not neighbors.
 pub(super) fn own_clearance_m<const D: usize>(chain: &Chain<D>) -> f64 {
     let (points, rods, connectors) = (chain.points(), chain.rods(), chain.connectors());
     let rod = |i: usize| [points[i], points[i + 1]];

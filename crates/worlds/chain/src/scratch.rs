@@ -1,4 +1,4 @@
-//! What a worker keeps between tasks: buffers, and obstacles as they are at a moment.
+//! A worker's buffers, kept between tasks, and the obstacles at a given moment.
 
 use super::events::Event;
 use super::formation::Solid;
@@ -11,18 +11,18 @@ use super::swarm::laser::{Body as Seen, Scan};
 use super::world::{ChainWorld, OTHER_CHAIN, push_parts};
 use sidestep_kernel::{Cycle, Slot};
 
-/// What a worker keeps between tasks.
+/// A worker's buffers, kept between tasks.
 #[derive(Debug, Clone)]
 pub struct Scratch<const D: usize> {
     pub(crate) propagator: Propagator<D>,
     pub(crate) escaper: Option<Escaper<D>>,
-    /// The world's obstacles, with those that move where they are at the begin of `moment`, and
-    /// the parts of other chains.
+    /// The world's obstacles, the moving ones where they are at the start of `moment`, and the
+    /// parts of other chains.
     pub(crate) obstacles: Obstacles<D>,
-    /// The same without other chains, where there are any.
+    /// The same without other chains, if there are any.
     solid: Obstacles<D>,
     moment: Option<Cycle>,
-    /// Obstacles that move, and parts of other chains.
+    /// Moving obstacles, and parts of other chains.
     guests: Vec<Obstacle<D>>,
     has_others: bool,
     /// Robots around a robot.
@@ -30,16 +30,16 @@ pub struct Scratch<const D: usize> {
     pub(crate) scan: Scan,
     /// Positions before a cycle.
     pub(crate) before: Vec<Point<D>>,
-    /// The least air around a robot in this cycle.
+    /// Least gap around a robot in this cycle, meters.
     pub(crate) robots_gap_m: f64,
     /// Positions after parts got out of the way.
     pub(crate) escaped: Vec<Point<D>>,
-    /// What happened.
+    /// Events of this task.
     pub(crate) events: Vec<Event>,
 }
 
 impl<const D: usize> Scratch<D> {
-    /// A scratch that has gathered nothing yet.
+    /// Returns a scratch that has gathered nothing yet.
     pub(crate) fn new(world: &ChainWorld<D>) -> Self {
         Self {
             propagator: Propagator::new(world.rules),
@@ -58,8 +58,8 @@ impl<const D: usize> Scratch<D> {
         }
     }
 
-    /// Puts the movers where they are at the begin of cycle `moment`, and other chains where they
-    /// are now.
+    /// Puts moving obstacles where they are at the start of cycle `moment`, and other chains where
+    /// they are now.
     pub(crate) fn gather(
         &mut self,
         world: &ChainWorld<D>,
@@ -90,13 +90,14 @@ impl<const D: usize> Scratch<D> {
         (self.moment, self.has_others) = (Some(moment), has_others);
     }
 
-    /// What is solid to robots: other chains are their robots, not their rods.
+    /// Returns the obstacles that are solid to robots: of other chains the robots, not the rods.
     pub(crate) fn solid(&self) -> &Obstacles<D> {
         if self.has_others { &self.solid } else { &self.obstacles }
     }
 }
 
-/// What of a chain robots can touch: its robots, or its parts where it has none.
+/// Adds the parts of a chain that robots can touch: its robots, or its connectors and rods if it
+/// has none.
 fn push_robots<const D: usize>(parts: &mut Vec<Obstacle<D>>, slot: Slot, state: &ChainState<D>) {
     let body = state.body(slot as usize);
     if body.robots.is_empty() {

@@ -1,4 +1,4 @@
-//! All that changes in a run, and its snapshot.
+//! The changing state of a run, and its snapshot.
 
 use super::driver::{Driving, Task};
 use super::formation::{Robot, Solid};
@@ -22,14 +22,14 @@ pub struct ChainState<const D: usize> {
     cells: Box<[Cell<D>]>,
 }
 
-/// One chain's share of the state. Locks are never waited for: in the first phase all only read
-/// the bodies, in the last one those who write a body are of one group, which one worker has.
+/// One chain's share of the state. No lock is ever waited for: in the first phase all workers only
+/// read the bodies, and in the last phase only the one worker that has a group writes its bodies.
 #[derive(Debug)]
 struct Cell<const D: usize> {
     body: RwLock<Body<D>>,
-    /// The box that the chain may come to be in during this cycle.
+    /// The box that the chain may enter during this cycle.
     claim: Mutex<Bounds<D>>,
-    /// What its navigator has decided in this cycle.
+    /// Decision of its navigator in this cycle.
     decision: Mutex<Option<Decision>>,
 }
 
@@ -38,18 +38,18 @@ struct Cell<const D: usize> {
 pub struct Body<const D: usize> {
     /// Its connectors and rods.
     pub chain: Chain<D>,
-    /// Where its initiator is in its tasks.
+    /// Progress of its initiator through its tasks.
     pub driving: Driving,
-    /// Connectors that were scattered, and where they go to be joined again; none while the chain
+    /// Scattered connectors, and the places where they will be joined again; none while the chain
     /// is whole.
     pub scattered: Option<Scattered>,
-    /// The robots that keep to its connectors; none where nothing is on wheels.
+    /// The robots that keep to its connectors; empty if nothing is on wheels.
     pub robots: Vec<Robot>,
-    /// Radius of their bodies.
+    /// Radius of their bodies, meters.
     pub(crate) robot_radius_m: f64,
-    /// What came of it so far.
+    /// Counts so far.
     pub tally: Tally,
-    /// The motions of the present script: they follow from where it began.
+    /// The motions of the present script, which follow from the place where it started.
     pub(crate) motions: Vec<Motion>,
 }
 
@@ -60,10 +60,10 @@ pub struct Scattered {
     pub first: u32,
     /// and the last.
     pub last: u32,
-    /// How fast each goes,
+    /// Speed of each, m/s,
     pub speed_m_s: f64,
-    /// and where all connectors go to be joined again, coordinate after coordinate; empty while the
-    /// parts lie where they are.
+    /// and the places where all connectors will be joined again, coordinate after coordinate; empty
+    /// while the parts lie where they are.
     pub goals_m: Vec<f64>,
 }
 
@@ -80,7 +80,7 @@ pub struct ChainRecord {
     pub robots: Vec<Robot>,
 }
 
-/// A state by id: what a checkpoint holds and a digest covers.
+/// A state by id: the content of a checkpoint, covered by the digest.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Snapshot {
     /// Cycles done.
@@ -90,7 +90,7 @@ pub struct Snapshot {
 }
 
 impl<const D: usize> Body<D> {
-    /// A chain at its start.
+    /// Returns a chain at its start.
     pub(crate) fn new(spec: &ChainSpec<D>) -> Result<Self, InputError> {
         let chain = spec.start.clone();
         let driving = Driving::new(spec.tasks[0].agent, chain.points());
@@ -107,7 +107,8 @@ impl<const D: usize> Body<D> {
         Ok(body)
     }
 
-    /// What others see of the chain: its robots, or its connectors where it has none.
+    /// Returns the solid parts that others see: the chain's robots, or its connectors if it has
+    /// none.
     pub(crate) fn solids(&self) -> impl Iterator<Item = (usize, Solid)> + '_ {
         let solid = |k: usize| match self.robots.get(k) {
             Some(robot) => Solid { at: robot.pose.at, radius_m: self.robot_radius_m },
@@ -119,8 +120,8 @@ impl<const D: usize> Body<D> {
         (0..self.chain.points().len()).map(move |k| (k, solid(k)))
     }
 
-    /// A navigator as it remembers itself; at the start of its task it stands at its connector and
-    /// looks ahead.
+    /// Returns a navigator's memory; at the start of its task it stands at its connector and looks
+    /// ahead.
     pub(crate) fn leader(&self, task: &Task<D>) -> LeaderState {
         self.driving.leader.unwrap_or_else(|| {
             let [x, y, _] = self.driving.ahead;
@@ -139,7 +140,7 @@ impl<const D: usize> Body<D> {
         }
     }
 
-    /// The body that a record describes, after `cycle` cycles.
+    /// Returns the body that a record describes, after `cycle` cycles.
     fn restore(
         spec: &ChainSpec<D>,
         record: &ChainRecord,
@@ -168,7 +169,7 @@ impl<const D: usize> Body<D> {
     }
 }
 
-/// Coordinate after coordinate.
+/// Returns the coordinates one after the other.
 pub(crate) fn flat<const D: usize>(points: &[Point<D>]) -> Vec<f64> {
     points.iter().flatten().copied().collect()
 }
@@ -183,19 +184,19 @@ impl<const D: usize> ChainState<D> {
         Self { cells: bodies.map(cell).collect() }
     }
 
-    /// The state at the start.
+    /// Returns the state at the start.
     ///
     /// # Errors
-    /// A script that comes to no motions.
+    /// When a script contains no motions.
     pub fn new(world: &ChainWorld<D>) -> Result<Self, InputError> {
         let bodies = world.chains.iter().map(Body::new).collect::<Result<Vec<_>, _>>()?;
         Ok(Self::of(bodies.into_iter()))
     }
 
-    /// The state that a snapshot describes.
+    /// Returns the state that a snapshot describes.
     ///
     /// # Errors
-    /// When it is of other chains.
+    /// When the snapshot belongs to other chains.
     pub(crate) fn restore(
         world: &ChainWorld<D>,
         snapshot: &Snapshot,
@@ -211,7 +212,7 @@ impl<const D: usize> ChainState<D> {
         Ok(Self::of(bodies.into_iter()))
     }
 
-    /// How many chains there are.
+    /// Returns the number of chains.
     pub fn len(&self) -> usize {
         self.cells.len()
     }
@@ -221,17 +222,17 @@ impl<const D: usize> ChainState<D> {
         self.cells.is_empty()
     }
 
-    /// One chain, to look at.
+    /// Locks one chain for reading.
     pub fn body(&self, slot: usize) -> RwLockReadGuard<'_, Body<D>> {
         self.cells[slot].body.read().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// One chain, to change.
+    /// Locks one chain for writing.
     pub(crate) fn body_mut(&self, slot: usize) -> RwLockWriteGuard<'_, Body<D>> {
         self.cells[slot].body.write().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The box that a chain has claimed for this cycle.
+    /// Returns the box that a chain has claimed for this cycle.
     pub(crate) fn claim(&self, slot: usize) -> Bounds<D> {
         *self.cells[slot].claim.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -240,7 +241,7 @@ impl<const D: usize> ChainState<D> {
         *self.cells[slot].claim.lock().unwrap_or_else(PoisonError::into_inner) = claim;
     }
 
-    /// What a chain's navigator has decided.
+    /// Returns the decision of a chain's navigator.
     pub(crate) fn decision(&self, slot: usize) -> Option<Decision> {
         *self.cells[slot].decision.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -249,19 +250,19 @@ impl<const D: usize> ChainState<D> {
         *self.cells[slot].decision.lock().unwrap_or_else(PoisonError::into_inner) = decision;
     }
 
-    /// The state after `cycle` cycles.
+    /// Returns the state after `cycle` cycles.
     pub fn snapshot(&self, cycle: Cycle) -> Snapshot {
         Snapshot { cycle, chains: (0..self.len()).map(|slot| self.body(slot).record()).collect() }
     }
 
-    /// What came of each chain so far.
+    /// Returns the counts of each chain so far.
     pub(crate) fn tallies(&self) -> Vec<Tally> {
         (0..self.len()).map(|slot| self.body(slot).tally.clone()).collect()
     }
 }
 
 impl Snapshot {
-    /// The digest of this state (promise D1): every value by id.
+    /// Returns the digest of this state: it covers every value, by id.
     pub fn digest(&self) -> Digest {
         let mut hasher = Hasher::default();
         let bytes = postcard::to_stdvec(self).expect("a snapshot is plain data");

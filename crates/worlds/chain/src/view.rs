@@ -1,4 +1,4 @@
-//! What can be seen of chains: connectors and rods, robots on wheels, what is in the way.
+//! The visible parts of chains: connectors and rods, robots on wheels, and obstacles.
 
 use super::driver::{Driver, Task};
 use super::events::{Event, EventKind};
@@ -16,15 +16,15 @@ use sidestep_kernel::view::{
 use sidestep_kernel::{Cycle, EntityId, Slot};
 use std::ops::RangeInclusive;
 
-/// Connectors without a body are drawn so large, compared with the longest rod.
+/// Drawn radius of connectors without a body, as a part of the longest rod.
 const POINT_OF_ROD: f64 = 0.05;
-/// What has a place in the plane only is drawn so high, meters.
+/// Drawn height of bodies that have a place in the plane only, meters.
 const HEIGHT_M: f64 = 0.1;
 /// The name of a leader's laser.
 const LASER: &str = "laser";
 
 impl<const D: usize> ChainWorld<D> {
-    /// What stands still, and the places to go to.
+    /// Returns the static obstacles, and the places to go to.
     pub(crate) fn scenery(&self, name: &str) -> Scenery {
         // Walls of one room share their number.
         let still = (0..).zip(self.obstacles.still());
@@ -43,7 +43,7 @@ impl<const D: usize> ChainWorld<D> {
         }
     }
 
-    /// Recorded positions as places of connectors; a row every so many cycles.
+    /// Describes recorded positions as places of connectors, one row every `every` cycles.
     pub(crate) fn place_rows(every: Cycle) -> Vec<PlaceRows> {
         vec![PlaceRows {
             table: "trajectories",
@@ -58,7 +58,7 @@ impl<const D: usize> ChainWorld<D> {
         }]
     }
 
-    /// All chains by id, then what moves among them.
+    /// Returns all chains by id, then the moving obstacles.
     pub(crate) fn visible_bodies(&self, state: &ChainState<D>, now: Cycle) -> Vec<Body> {
         let mut bodies = Vec::new();
         for (id, spec) in (0..).zip(&self.chains) {
@@ -68,7 +68,7 @@ impl<const D: usize> ChainWorld<D> {
         bodies
     }
 
-    /// What the leaders on wheels of the first chains are about to see.
+    /// Returns the laser scans that the leaders on wheels of the first chains are about to take.
     pub(crate) fn scans(&self, state: &ChainState<D>, now: Cycle, leaders: usize) -> Vec<Scan> {
         let scratch = &mut Scratch::new(self);
         let mut looking = Looking { world: self, state, now, scratch };
@@ -77,7 +77,7 @@ impl<const D: usize> ChainWorld<D> {
     }
 }
 
-/// What a leader on wheels is about to see; none of other chains.
+/// Returns the scan that a leader on wheels is about to take; none for other chains.
 fn scan_of<const D: usize>(looking: &mut Looking<'_, D>, slot: Slot) -> Option<Scan> {
     let sight = looking.sight(slot)?;
     let (laser, [x_m, y_m]) = (&sight.navigator.leader.laser, sight.leader.pose.at);
@@ -94,7 +94,7 @@ fn scan_of<const D: usize>(looking: &mut Looking<'_, D>, slot: Slot) -> Option<S
     })
 }
 
-/// The places that a chain is to reach.
+/// Returns the places that a chain shall reach.
 fn goals<const D: usize>(id: EntityId, spec: &ChainSpec<D>) -> Vec<Body> {
     let of_task = |task: &Task<D>| -> Vec<(Place, f64)> {
         match &task.driver {
@@ -116,12 +116,12 @@ fn goals<const D: usize>(id: EntityId, spec: &ChainSpec<D>) -> Vec<Body> {
     (0..).zip(spec.tasks.iter().flat_map(of_task)).map(goal).collect()
 }
 
-/// How large a point of a chain is drawn.
+/// Returns the drawn radius of a chain's points, meters.
 fn point_radius_m<const D: usize>(chain: &Chain<D>) -> f64 {
     POINT_OF_ROD * chain.rods().iter().map(|rod| rod.max_m).fold(0.0, f64::max)
 }
 
-/// A chain: its rods, its connectors, the robots that keep to these.
+/// Adds a chain: its rods, its connectors, and the robots that keep to them.
 fn push_chain<const D: usize>(
     bodies: &mut Vec<Body>,
     id: EntityId,
@@ -151,7 +151,7 @@ fn push_chain<const D: usize>(
     }));
 }
 
-/// Connectors that hang together: a broken chain has rods that hold nothing.
+/// Returns runs of connectors that are joined, because a broken chain has rods that hold nothing.
 fn whole_parts<const D: usize>(chain: &Chain<D>) -> Vec<RangeInclusive<usize>> {
     let (mut parts, mut first) = (Vec::new(), 0);
     for rod in 0..chain.rods().len() {
@@ -165,7 +165,7 @@ fn whole_parts<const D: usize>(chain: &Chain<D>) -> Vec<RangeInclusive<usize>> {
     parts
 }
 
-/// An obstacle as it is.
+/// Returns an obstacle as a drawn body.
 fn seen<const D: usize>(obstacle: &Obstacle<D>) -> Body {
     let radius_m = obstacle.radius_m;
     let (pose, shape) = match &obstacle.core {
@@ -194,11 +194,11 @@ fn cuboid_shape<const D: usize>(cuboid: &Cuboid<D>, radius_m: f64) -> Shape {
 fn cuboid_pose<const D: usize>(cuboid: &Cuboid<D>) -> Pose {
     let axis = |i: usize| cuboid.axes.get(i).map_or([0.0; 3], |axis| in_dimensions(*axis));
     let (x, y) = (axis(0), axis(1));
-    // Two axes say what the third is, or is opposite to: a box looks the same both ways.
+    // Two axes give the third up to its sign, and a box looks the same both ways.
     Pose::axes(in_dimensions(cuboid.center), [x, y, cross(x, y)])
 }
 
-/// An event in words.
+/// Describes an event in words.
 pub(crate) fn entry(event: &Event) -> Entry {
     let value = event.value;
     let what = event.obstacle.map(obstacle_in_words);

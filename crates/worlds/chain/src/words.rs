@@ -1,4 +1,4 @@
-//! What the world says to people: a scenario's contents, a run's outcome, where everything is.
+//! Texts for people: a scenario's contents, a run's outcome, and all positions.
 
 use super::metrics::{ChainGivenUp, Metrics};
 use super::scenario::Compiled;
@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use sidestep_kernel::World;
 use sidestep_kernel::words::{Lines, Said, grouped, line};
 
-/// Returns what a compiled scenario holds.
+/// Returns the contents of a compiled scenario.
 pub(super) fn contents<const D: usize>(compiled: &Compiled<D>) -> Said {
     let world = &compiled.world;
     let rods: usize = world.chains.iter().map(|spec| spec.start.rods().len()).sum();
@@ -36,7 +36,7 @@ pub(super) fn contents<const D: usize>(compiled: &Compiled<D>) -> Said {
     Said { json, text }
 }
 
-/// Returns where every connector is.
+/// Returns the position of every connector.
 pub(super) fn poses<const D: usize>(snapshot: &Snapshot) -> Said {
     let mut rows = Vec::new();
     let axes: String =
@@ -52,7 +52,7 @@ pub(super) fn poses<const D: usize>(snapshot: &Snapshot) -> Said {
     Said { json: Value::Array(rows), text }
 }
 
-/// Returns what came of a run.
+/// Returns the outcome of a run.
 pub(super) fn outcome(m: &Metrics) -> Lines {
     let clearance = match m.min_clearance_m {
         None => "nothing came near".into(),
@@ -110,8 +110,8 @@ pub(super) fn outcome(m: &Metrics) -> Lines {
     lines
 }
 
-/// How initiators went on after vetoes, and what getting out of the way came to; no lines where
-/// there was nothing of that.
+/// Returns how initiators continued after vetoes, and the results of getting out of the way; no
+/// lines if there were none.
 fn after_vetoes(m: &Metrics) -> Lines {
     let some = |counts: &[(u64, &str)]| {
         let said = counts.iter().filter(|(n, _)| *n > 0);
@@ -136,9 +136,9 @@ fn after_vetoes(m: &Metrics) -> Lines {
     went_on.into_iter().chain(escaped.map(|said| line("escapes", said))).collect()
 }
 
-/// What is nearer than this touches, meters.
+/// Distance below which bodies touch, meters.
 const TOUCH_M: f64 = 1e-6;
-/// More that was given up is only counted.
+/// Largest number of given-up parts that are listed; the others are only counted.
 const MOST_TOLD: usize = 5;
 
 fn vetoes(m: &Metrics) -> String {

@@ -19,24 +19,24 @@ use sidestep_kernel::{Cycle, InputError, Slot};
 use std::ops::RangeInclusive;
 use std::sync::Arc;
 
-/// What random draws of this world are for.
+/// Purposes of this world's random draws.
 pub(crate) mod purpose {
     use sidestep_kernel::stream::Purpose;
 
-    /// How a wandering initiator turns.
+    /// Turns of a wandering initiator.
     pub(crate) const WANDER: Purpose = Purpose(2);
-    /// Where the parts of a broken chain lie.
+    /// Places of the parts of a broken chain.
     pub(crate) const SCATTER: Purpose = Purpose(3);
-    /// Where a wandering initiator goes that is stuck.
+    /// Direction of a wandering initiator that is stuck.
     pub(crate) const TURN_AWAY: Purpose = Purpose(5);
     /// Errors of a laser.
     pub(crate) const LASER: Purpose = Purpose(4);
 }
 
-/// Nothing is thrown further than so many standard deviations.
+/// Cutoff of a random throw, in standard deviations.
 pub(crate) const FARTHEST_THROW: f64 = 8.0;
 
-/// From this id on, obstacles are parts of other chains: its number is added.
+/// Ids from here on stand for parts of other chains: the chain's number is added.
 pub(crate) const OTHER_CHAIN: u32 = 1 << 31;
 
 /// The immutable world that runs share.
@@ -48,91 +48,91 @@ pub struct ChainWorld<const D: usize> {
     pub obstacles: Obstacles<D>,
     /// Obstacles that move.
     pub movers: Movers<D>,
-    /// What a cycle takes.
+    /// Duration of a cycle, s.
     pub(crate) dt_s: f64,
-    /// Cycles that a run has: what an endless task is measured by.
+    /// Cycles of the run, by which the progress of an endless task is measured.
     pub(crate) cycles: Cycle,
-    /// How chains react.
+    /// Rules by which chains react.
     pub(crate) rules: Rules,
-    /// How they get out of the way of what moves, if they do.
+    /// Rule for getting out of the way of moving obstacles, if they do.
     pub(crate) escape: Option<Escape>,
-    /// How long initiators try on each rung of the ladder after a veto.
+    /// Time that initiators spend on each rung of the ladder after a veto.
     pub(crate) rungs: Rungs,
-    /// How far around its parts a chain looks for its least distance from obstacles.
+    /// Distance around its parts in which a chain looks for its least clearance, meters.
     pub look_m: f64,
     pub(crate) streams: Streams,
 }
 
-/// One chain, and what it is to do.
+/// One chain and its tasks.
 #[derive(Debug, Clone)]
 pub(crate) struct ChainSpec<const D: usize> {
-    /// Its name, may be empty.
+    /// Its name; may be empty.
     pub(crate) name: String,
     /// The chain at the start.
     pub(crate) start: Chain<D>,
-    /// What its initiators do, one task after the other; at least one.
+    /// Tasks of its initiators, one after the other; at least one.
     pub(crate) tasks: Vec<Task<D>>,
-    /// What happens to it, by cycle.
+    /// Changes to it, by cycle.
     pub(crate) changes: Vec<Change<D>>,
-    /// The arm that it stands for, if it stands for one.
+    /// The arm that it represents, if any.
     pub(crate) arm: Option<Arc<Arm>>,
-    /// How the robots behave that keep to its connectors, if it is a swarm on wheels.
+    /// Behavior of the robots that keep to its connectors, if it is a swarm on wheels.
     pub(crate) robots: Option<Robots>,
 }
 
-/// Something that happens to a chain at the begin of a cycle (slides R8, R10, F3).
+/// A change to a chain at the start of a cycle (slides R8, R10, F3).
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Change<const D: usize> {
     /// The cycle.
     pub(crate) cycle: Cycle,
-    /// What happens.
+    /// The change.
     pub(crate) what: What<D>,
 }
 
-/// What happens to a chain.
+/// Kinds of changes.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum What<const D: usize> {
     /// A connector breaks down, or works again.
     Failed {
-        /// Which one.
+        /// Its index.
         connector: usize,
         /// Whether it has failed.
         failed: bool,
     },
-    /// A connector gets another mobility.
+    /// A connector gets a new mobility.
     Mobility {
-        /// Which one.
+        /// Its index.
         connector: usize,
-        /// Where it may be.
+        /// The new mobility.
         mobility: Mobility<D>,
     },
-    /// A connector gets another bend limit.
+    /// A connector gets a new bend limit.
     MaxBend {
-        /// Which one.
+        /// Its index.
         connector: usize,
-        /// The greatest angle.
+        /// The greatest angle, rad.
         max_bend_rad: f64,
     },
-    /// The chain breaks: connectors are thrown about.
+    /// The chain breaks: connectors are thrown about at random.
     Scatter {
-        /// Which ones.
+        /// Their indices.
         connectors: RangeInclusive<usize>,
-        /// Standard deviation of each coordinate.
+        /// Standard deviation of each coordinate, meters.
         by_m: f64,
-        /// The whole end behind them is moved by this: then parts are wanting.
+        /// Shift of the whole end behind them: a gap that the parts may be too short for.
         apart_m: Point<D>,
     },
-    /// The scattered connectors come back, at most so fast.
+    /// The scattered connectors come back.
     Reform {
-        /// Which whole end may come along.
+        /// The whole end that may come along.
         may_come: MayCome,
-        /// Speed of each part.
+        /// Speed limit of each part, m/s.
         speed_m_s: f64,
     },
 }
 
 impl<const D: usize> Change<D> {
-    /// How far it may throw parts in a cycle.
+    /// Returns how far the change may throw parts in a cycle, meters.
     pub(crate) fn throws_m(&self, now: Cycle) -> f64 {
         match &self.what {
             What::Scatter { by_m, apart_m, .. } if self.cycle == now => {
@@ -142,7 +142,7 @@ impl<const D: usize> Change<D> {
         }
     }
 
-    /// Applies what is a constraint.
+    /// Applies a change of constraints.
     pub(crate) fn constrain(&self, chain: &mut Chain<D>) {
         let done = match &self.what {
             What::Failed { connector, failed } => {
@@ -160,7 +160,7 @@ impl<const D: usize> Change<D> {
 }
 
 impl<const D: usize> ChainSpec<D> {
-    /// The robots of a swarm at their connectors, all looking ahead of their chain.
+    /// Returns the robots of a swarm at their connectors, all facing ahead along their chain.
     pub(crate) fn robots_at(&self, points: &[Point<D>], driving: &Driving) -> Vec<Robot> {
         let [x, y, _] = driving.ahead;
         let heading_rad = atan2(y, x);
@@ -175,7 +175,7 @@ impl<const D: usize> ChainSpec<D> {
         self.robots.as_ref().map_or(0.0, |robots| robots.follower.ring.radius_m)
     }
 
-    /// The motions of the script that a driver is in; none where it is in no script.
+    /// Returns the motions of the script that a driver is carrying out; empty if there is none.
     pub(crate) fn motions(&self, driving: &Driving) -> Result<Vec<Motion>, InputError> {
         match self.tasks.get(driving.task as usize).map(|task| &task.driver) {
             Some(Driver::Script(script)) => driving.motions(script),
@@ -185,13 +185,13 @@ impl<const D: usize> ChainSpec<D> {
 }
 
 impl<const D: usize> ChainWorld<D> {
-    /// Seconds from the start to the begin of a cycle.
+    /// Returns the seconds from the start of the run to the start of a cycle.
     pub fn starts_s(&self, now: Cycle) -> f64 {
         now as f64 * self.dt_s
     }
 }
 
-/// The parts of a chain as obstacles to others.
+/// Adds the parts of a chain as obstacles to others.
 pub(crate) fn push_parts<const D: usize>(
     parts: &mut Vec<Obstacle<D>>,
     slot: Slot,

@@ -1,15 +1,15 @@
-//! Out of the way of what comes too near, and back from where a chain must not be.
+//! Moves out of the way of approaching obstacles, and back from places where a chain must not be.
 
 use super::Acting;
 use crate::events::{Event, EventKind};
 use crate::rods::geometry::{Bounds, Point, distance, in_dimensions};
 use crate::rods::veto::{Reason, Veto};
 
-/// Ways of exactly the greatest speed may seem longer by this part.
+/// Relative tolerance for ways at exactly the greatest speed.
 const ROUNDING: f64 = 1e-9;
 
 impl<const D: usize> Acting<'_, D> {
-    /// Parts that something comes too near to move away, whoever leads.
+    /// Moves parts that an obstacle comes too near to, whichever connector leads.
     pub(super) fn get_out_of_the_way(&mut self) {
         let Some(escaper) = &mut self.scratch.escaper else { return };
         let escaped = escaper.escape(
@@ -18,12 +18,12 @@ impl<const D: usize> Acting<'_, D> {
             &mut self.scratch.propagator,
             &self.scratch.before,
         );
-        // Out of the world nobody escapes.
+        // Out of the range of coordinates nothing escapes.
         let Ok(escaped) = escaped else { return };
         self.body.tally.escapes.add(&escaped);
         self.scratch.escaped.copy_from_slice(self.body.chain.points());
         self.take_leader_along();
-        // Only the first of cycles in a row in which it escapes is an event.
+        // Only the first of several cycles of escape in a row is an event.
         let first = escaped.first.filter(|_| !self.body.tally.is_escaping);
         if let Some((connector, obstacle)) = first {
             let event = self.event(EventKind::Escape, connector, escaped.moves as f64);
@@ -32,8 +32,8 @@ impl<const D: usize> Acting<'_, D> {
         self.body.tally.is_escaping = escaped.moves > 0;
     }
 
-    /// What would leave the claim is taken back, for nobody else counts on the chain there; and so
-    /// is what would be faster than escapes may be, together with them.
+    /// Takes back moves that would leave the claim, because other chains do not expect the chain
+    /// there; also moves that, together with escapes, would be faster than escapes may be.
     pub(super) fn keep_to_bounds(&mut self) {
         let most_m = match &self.world.escape {
             Some(escape) => escape.speed_max_m_s * self.world.dt_s * (1.0 + ROUNDING),
@@ -52,7 +52,7 @@ impl<const D: usize> Acting<'_, D> {
         self.vetoed(&Veto { by, from, reason: Reason::StepLimit, obstacle: None, reached });
     }
 
-    /// A leader on wheels is where its connector is, wherever that was moved to.
+    /// Keeps a leader on wheels at its connector, wherever that was moved to.
     fn take_leader_along(&mut self) {
         let agent = self.task().map(|task| task.agent);
         if let (Some(leader), Some(agent)) = (&mut self.body.driving.leader, agent) {

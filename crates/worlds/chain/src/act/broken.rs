@@ -1,5 +1,5 @@
-//! What happens to chains: parts that fail, and chains that break and are joined again (slides R8,
-//! R10, F3).
+//! Changes to chains: parts that fail, and chains that break and are joined again (slides R8, R10,
+//! F3).
 
 use super::Acting;
 use crate::events::EventKind;
@@ -10,11 +10,11 @@ use crate::world::{Change, FARTHEST_THROW, What, purpose};
 use sidestep_kernel::distr::normal;
 use std::ops::RangeInclusive;
 
-/// How often a free place is looked for where a part may fall.
+/// Attempts to find a free place where a part may fall.
 const THROWS: usize = 100;
 
 impl<const D: usize> Acting<'_, D> {
-    /// What happens to the chain at the start of a cycle.
+    /// Applies the changes at the start of a cycle.
     pub(super) fn change(&mut self) {
         let (spec, now) = (self.spec, self.now);
         for change in spec.changes.iter().filter(|change| change.cycle == now) {
@@ -40,8 +40,8 @@ impl<const D: usize> Acting<'_, D> {
         }
     }
 
-    /// Throws parts about: each to some place near where it is that is free, if there is one. Who
-    /// is fixed or has failed stays.
+    /// Throws parts about: each to a free place near its own, if there is one. Parts that are fixed
+    /// or have failed stay.
     fn scatter(&mut self, connectors: &RangeInclusive<usize>, by_m: f64) {
         let draws = &mut self.world.streams.draws(self.slot, self.now, purpose::SCATTER);
         let chain = &mut self.body.chain;
@@ -65,7 +65,7 @@ impl<const D: usize> Acting<'_, D> {
         });
     }
 
-    /// Finds where the scattered parts have to be.
+    /// Finds the places where the scattered parts have to be.
     fn begin_reform(&mut self, may_come: MayCome, speed_m_s: f64) {
         let Some(scattered) = &self.body.scattered else { return };
         let (first, last) = (scattered.first as usize, scattered.last as usize);
@@ -84,8 +84,8 @@ impl<const D: usize> Acting<'_, D> {
         self.tell(kind, first, value);
     }
 
-    /// Where the connectors of the chain would be, were it whole, and whether it can be. What never
-    /// moves may not move for that either.
+    /// Returns where the connectors would be if the chain were whole, and whether it can be.
+    /// Connectors that never move do not move for that either.
     fn reformed(
         &self,
         scattered: RangeInclusive<usize>,
@@ -93,7 +93,7 @@ impl<const D: usize> Acting<'_, D> {
     ) -> (Vec<Point<D>>, Reformed) {
         let chain = &self.body.chain;
         let mut whole = chain.clone();
-        // An end cannot come out of the world.
+        // An end cannot come from outside the range of coordinates.
         let came = reform(&mut whole, scattered, may_come)
             .unwrap_or(Reformed::NotReached { off_m: chain.max_rod_violation_m() });
         let stays = |k: &usize| chain.connectors()[*k].is_still();
@@ -108,7 +108,7 @@ impl<const D: usize> Acting<'_, D> {
         (whole.points().to_vec(), came)
     }
 
-    /// Scattered parts go to where they are joined again, each straight, and the chain is whole
+    /// Moves scattered parts straight to the places where they are joined again; the chain is whole
     /// when all are there.
     pub(super) fn come_together(&mut self) {
         let body = &mut *self.body;

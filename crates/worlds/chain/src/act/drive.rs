@@ -1,4 +1,4 @@
-//! The present task of a chain, for one cycle: what its driver wants.
+//! The present task of a chain, for one cycle: the wish of its driver.
 
 use super::Acting;
 use crate::driver::{Driver, Targets, Task, Wander, wander};
@@ -8,14 +8,14 @@ use crate::script::Motion;
 use crate::swarm::drive::Pose;
 use crate::world::purpose;
 
-/// What a driver wants in a cycle.
+/// A driver's wish in a cycle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Wish<const D: usize> {
     /// Nothing.
     Rest,
-    /// The initiator elsewhere.
+    /// The initiator at another place.
     Go(Point<D>),
-    /// The same of a robot on wheels.
+    /// A robot on wheels at another pose.
     Steer(Pose),
     /// Its task is done.
     Done,
@@ -40,7 +40,7 @@ impl<const D: usize> Acting<'_, D> {
         }
     }
 
-    /// Where the initiator wants to be at the end of the cycle.
+    /// Returns where the initiator wants to be at the end of the cycle.
     fn wish(&mut self, task: &Task<D>) -> Wish<D> {
         let at = self.body.chain.points()[task.agent];
         let step_m = task.speed_m_s * self.world.dt_s;
@@ -66,7 +66,8 @@ impl<const D: usize> Acting<'_, D> {
         Wish::Go(along(at, ahead, step_m))
     }
 
-    /// To the next target. A cycle in which one is reached is one of rest.
+    /// Returns a step to the next target. In the cycle in which a target is reached, the initiator
+    /// rests.
     fn next_target(
         &mut self,
         task: &Task<D>,
@@ -93,7 +94,7 @@ impl<const D: usize> Acting<'_, D> {
         Wish::Rest
     }
 
-    /// What the script says. Turning takes no time.
+    /// Returns the wish of a script. Turning takes no time.
     fn by_script(&mut self, at: Point<D>, step_m: f64) -> Wish<D> {
         let driving = &mut self.body.driving;
         loop {
@@ -119,7 +120,7 @@ impl<const D: usize> Acting<'_, D> {
         }
     }
 
-    /// Ends the present task, done or given up, and begins the next.
+    /// Ends the present task, done or given up, and starts the next.
     pub(super) fn next_task(&mut self, how: EventKind) {
         let Some(task) = self.task() else { return };
         let driving = &mut self.body.driving;

@@ -1,5 +1,5 @@
-//! Robots on wheels that keep to the connectors of their chain: where the swarm's followers meet
-//! this world (slides E2, K5 to K7).
+//! Robots on wheels that keep to the connectors of their chain: the link between the swarm's
+//! followers and this world (slides E2, K5 to K7).
 
 use super::Acting;
 use crate::events::EventKind;
@@ -11,7 +11,7 @@ use crate::swarm::laser::Body as Seen;
 use sidestep_kernel::math::atan2;
 
 impl<const D: usize> Acting<'_, D> {
-    /// Moves the robots of a swarm after their connectors. All perceive each other as they were
+    /// Moves the robots of a swarm toward their connectors. All perceive each other as they were
     /// before.
     pub(super) fn follow(&mut self) {
         let Some(Robots { follower, .. }) = &self.spec.robots else { return };
@@ -29,7 +29,7 @@ impl<const D: usize> Acting<'_, D> {
         self.scratch.seen = others;
     }
 
-    /// The initiator is where its connector is.
+    /// Puts the initiator's robot at its connector.
     fn carry(&mut self, k: usize) {
         let [x, y, _] = self.body.driving.ahead;
         let at = in_dimensions(self.body.chain.points()[k]);

@@ -1,4 +1,4 @@
-//! One motion of an initiator, and what is made of a veto.
+//! One motion of an initiator, and the reaction to a veto.
 
 use super::Acting;
 use crate::driver::{Driver, Objection, Task};
@@ -11,7 +11,8 @@ use crate::rods::veto::{Mode, Motion, Moved, Reason, Request, Veto};
 use crate::world::purpose;
 use sidestep_kernel::distr::normal;
 
-/// What moves so much further away than a chain looks may still come near.
+/// Extra distance, beyond a chain's own look, at which a moving obstacle may still come near,
+/// meters.
 const MOVER_NEAR_M: f64 = 1.0;
 
 /// Whether an initiator went where it wanted, or near it.
@@ -38,7 +39,7 @@ impl<const D: usize> Acting<'_, D> {
             &situation,
         );
         self.body.driving.ladder = ladder.memory;
-        // Out of the world there is no way.
+        // There is no way out of the range of coordinates.
         let (by, reason) = (task.agent, Reason::Limit);
         let beyond = Veto { by, from: by, reason, obstacle: None, reached: at };
         let (climbed, objection) = climbed.unwrap_or((Climbed::Vetoed(beyond), Some(beyond)));
@@ -52,7 +53,7 @@ impl<const D: usize> Acting<'_, D> {
         self.take_note(task, &climbed, way)
     }
 
-    /// What an initiator knows beside its neighborhood.
+    /// Returns an initiator's knowledge beside its neighborhood.
     fn situation(&self, task: &Task<D>) -> Situation {
         let at = self.body.chain.points()[task.agent];
         let near_m = self.world.look_m + MOVER_NEAR_M;
@@ -73,7 +74,7 @@ impl<const D: usize> Acting<'_, D> {
         Situation { goal_distance_m, movers_near, can_turn, keeps_heading }
     }
 
-    /// Books what came of a motion; whether the initiator moved.
+    /// Counts the result of a motion; returns whether the initiator moved.
     fn take_note(&mut self, task: &Task<D>, climbed: &Climbed<D>, way: Point<D>) -> Went {
         self.body.tally.rungs.count(climbed);
         let went = match climbed {
@@ -113,7 +114,8 @@ impl<const D: usize> Acting<'_, D> {
         went
     }
 
-    /// Of events of a kind in a row, between two motions as wanted, only the first is told.
+    /// Reports only the first of several events of one kind between two motions that went as
+    /// wanted.
     fn tell_once(&mut self, kind: EventKind, connector: usize, value: f64) {
         if self.body.driving.told != Some(kind) {
             self.body.driving.told = Some(kind);
@@ -121,7 +123,7 @@ impl<const D: usize> Acting<'_, D> {
         }
     }
 
-    /// Who wanders and is stuck goes on in any direction.
+    /// Lets a wandering initiator that is stuck go on in any direction.
     fn look_elsewhere(&mut self, task: &Task<D>) {
         if matches!(task.driver, Driver::Wander(_)) {
             let draws = &mut self.world.streams.draws(self.slot, self.now, purpose::TURN_AWAY);
@@ -138,7 +140,8 @@ impl<const D: usize> Acting<'_, D> {
         self.body.tally.add_moved(moved);
     }
 
-    /// Counts a veto; of those of one connector and reason in a row only the first is an event.
+    /// Counts a veto; of several in a row by one connector for one reason only the first is an
+    /// event.
     pub(super) fn vetoed(&mut self, veto: &Veto<D>) {
         self.body.tally.add_veto(veto.reason);
         let objection = Some(Objection { by: veto.by as u32, reason: veto.reason });
@@ -153,8 +156,8 @@ impl<const D: usize> Acting<'_, D> {
         self.body.driving.objection = objection;
     }
 
-    /// A task that came no further for too long is given up. Around a target there is always some
-    /// way to go: there it counts for how long none of them led nearer.
+    /// Gives up a task that made no progress for too long. Around a target there is always some way
+    /// to go, so there the time counts in which none of them led nearer.
     fn lose_patience(&mut self, task: &Task<D>) {
         let tried = self.body.driving.idle.max(self.body.driving.late);
         if self.world.starts_s(u64::from(tried)) <= task.patience_s {

@@ -1,4 +1,4 @@
-//! What is measured of a chain at the end of each of its cycles.
+//! Measures of a chain at the end of each of its cycles.
 
 use super::Acting;
 use crate::events::EventKind;
@@ -8,7 +8,7 @@ use crate::rods::geometry::{Bounds, distance};
 use crate::rods::obstacle::Obstacles;
 
 impl<const D: usize> Acting<'_, D> {
-    /// Looks at the chain as it is after its cycle.
+    /// Measures the chain after its cycle.
     pub(super) fn measure(&mut self) {
         let (look_m, dt_s) = (self.world.look_m, self.world.dt_s);
         let (chain, tally) = (&self.body.chain, &mut self.body.tally);
@@ -16,7 +16,7 @@ impl<const D: usize> Acting<'_, D> {
         let ways = self.scratch.before.iter().zip(chain.points());
         let longest_m = ways.map(|(a, b)| distance(*a, *b)).fold(0.0, f64::max);
         tally.max_speed_m_s = tally.max_speed_m_s.max(longest_m / dt_s);
-        // Of a broken chain the parts count, and no rods.
+        // In a broken chain only the parts count, because its rods hold nothing.
         let is_whole = self.body.scattered.is_none();
         if is_whole {
             tally.max_rod_violation_m = tally.max_rod_violation_m.max(chain.max_rod_violation_m());
@@ -35,7 +35,7 @@ impl<const D: usize> Acting<'_, D> {
     }
 }
 
-/// The least distance of any connector, and of any rod if they count, from obstacles, up to
+/// Returns the least distance of any connector, and of any rod if rods count, from obstacles, up to
 /// `look_m`, and the connector at or before that part.
 fn least_clearance<const D: usize>(
     chain: &Chain<D>,
@@ -53,7 +53,7 @@ fn least_clearance<const D: usize>(
             least = (apart_m, part);
         }
     };
-    // One query for a rod and its ends: what is near to one of them mostly is near to all.
+    // One query serves a rod and its ends, because obstacles near one of them are mostly near all.
     for k in 0..points.len() {
         let end = if with_rods { (k + 1).min(points.len() - 1) } else { k };
         let radii_m = [k, end].map(|i| chain.connectors()[i].radius_m);

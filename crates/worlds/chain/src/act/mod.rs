@@ -1,4 +1,4 @@
-//! Phase *act*: what one chain does in a cycle.
+//! Phase *act*: the actions of one chain in a cycle.
 //!
 //! ```text
 //! broken.rs -> bounds.rs (out of the way) -> drive.rs -> go.rs, wheels.rs -> bounds.rs (back into the claim)
@@ -28,7 +28,7 @@ pub(crate) struct Acting<'a, const D: usize> {
     spec: &'a ChainSpec<D>,
     slot: Slot,
     now: Cycle,
-    /// What its navigator has decided.
+    /// Decision of its navigator.
     decision: Option<Decision>,
     /// The box that it stays in.
     claim: Bounds<D>,
@@ -36,7 +36,7 @@ pub(crate) struct Acting<'a, const D: usize> {
     scratch: &'a mut Scratch<D>,
 }
 
-/// The chains of one conflict group act, one after the other.
+/// Lets the chains of one conflict group act, one after the other.
 pub(crate) fn act<const D: usize>(turn: &mut Turn<'_, ChainWorld<D>>, group: &mut [Slot]) {
     let &mut Turn { world, state, now, .. } = turn;
     group.sort_unstable();
@@ -60,7 +60,7 @@ pub(crate) fn act<const D: usize>(turn: &mut Turn<'_, ChainWorld<D>>, group: &mu
 }
 
 impl<'a, const D: usize> Acting<'a, D> {
-    /// One cycle of the chain, which stays in its claim.
+    /// Makes one cycle of the chain, which stays in its claim.
     fn act(&mut self) {
         self.change();
         self.scratch.before.clear();
@@ -78,18 +78,18 @@ impl<'a, const D: usize> Acting<'a, D> {
         self.measure();
     }
 
-    /// The present task; none after the last.
+    /// Returns the present task; none after the last.
     fn task(&self) -> Option<&'a Task<D>> {
         self.spec.tasks.get(self.body.driving.task as usize)
     }
 
-    /// An event of this chain.
+    /// Returns an event of this chain.
     fn event(&self, kind: EventKind, connector: usize, value: f64) -> Event {
         let (cycle, chain, connector) = (self.now, self.slot, connector as u32);
         Event { cycle, chain, kind, connector, reason: None, obstacle: None, value }
     }
 
-    /// Notes that something has happened.
+    /// Records an event.
     fn tell(&mut self, kind: EventKind, connector: usize, value: f64) {
         self.scratch.events.push(self.event(kind, connector, value));
     }

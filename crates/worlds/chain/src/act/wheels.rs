@@ -1,4 +1,4 @@
-//! An initiator on wheels: where the swarm's leader meets this world (slides N1 to N6).
+//! An initiator on wheels: the link between the swarm's leader and this world (slides N1 to N6).
 
 use super::Acting;
 use super::go::Went;
@@ -11,14 +11,14 @@ use crate::swarm::drive::Pose;
 use sidestep_kernel::math::{cos, sin};
 
 impl<const D: usize> Acting<'_, D> {
-    /// Whether a navigator has come where it is to come.
+    /// Whether a navigator has reached its goal.
     pub(super) fn has_arrived(&self, task: &Task<D>, navigator: &Navigator) -> bool {
         let at = in_dimensions(self.body.chain.points()[task.agent]);
         let index = self.body.driving.next as usize;
         navigator.goal.as_ref().is_some_and(|goal| goal.is_reached(at, index))
     }
 
-    /// Where its wheels would take a navigator.
+    /// Returns the pose that a navigator's wheels would take it to.
     pub(super) fn steered(&mut self, task: &Task<D>, navigator: &Navigator) -> Option<Pose> {
         let decision = self.decision?;
         let mut leader = self.body.leader(task);
@@ -29,7 +29,7 @@ impl<const D: usize> Acting<'_, D> {
         Some(navigator.drive.step(leader.pose, wheels, self.world.dt_s))
     }
 
-    /// Moves an initiator on wheels; one whose way is blocked may turn where it stands.
+    /// Moves an initiator on wheels; one whose way is blocked may turn on the spot.
     pub(super) fn go_on_wheels(&mut self, task: &Task<D>, pose: Pose) {
         let Driver::Navigate(navigator) = &task.driver else { return };
         match self.go(task, in_dimensions(pose.at)) {
@@ -38,7 +38,7 @@ impl<const D: usize> Acting<'_, D> {
         }
     }
 
-    /// A navigator that has moved, by a heading that the chain did not object to.
+    /// Updates a navigator that has moved, by a heading that the chain did not object to.
     fn has_steered(&mut self, task: &Task<D>, navigator: &Navigator, heading_rad: f64) {
         let at: Point<2> = in_dimensions(self.body.chain.points()[task.agent]);
         let driving = &mut self.body.driving;
@@ -53,7 +53,7 @@ impl<const D: usize> Acting<'_, D> {
         }
     }
 
-    /// A navigator whose way is blocked turns, if it can, where it stands.
+    /// Turns a navigator whose way is blocked on the spot, if it can.
     fn turn_where_blocked(&mut self, task: &Task<D>, navigator: &Navigator) {
         let (Some(leader), Some(decision)) = (self.body.driving.leader, self.decision) else {
             return;
@@ -63,7 +63,7 @@ impl<const D: usize> Acting<'_, D> {
         self.has_steered(task, navigator, turned.heading_rad);
     }
 
-    /// What part of its speed a leader may go for the sake of the latest robot.
+    /// Returns the part of its speed at which a leader may go, so that the latest robot keeps up.
     fn pace(&self) -> f64 {
         let Some(robots) = &self.spec.robots else { return 1.0 };
         let lag_m = |(robot, at): (&Robot, &Point<D>)| distance(robot.pose.at, in_dimensions(*at));

@@ -6,9 +6,9 @@ use crate::rods::obstacle::Obstacle;
 use sidestep_kernel::InputError;
 use sidestep_kernel::math::{cos, sin};
 
-/// About how long a piece of wall is: bends are polygons of such pieces.
+/// Approximate length of a piece of wall: bends are polygons of such pieces.
 pub const WALL_PIECE_M: f64 = 0.16;
-/// Longer corridors are taken for a mistake.
+/// Longest corridor; longer ones are taken for a mistake.
 const MAX_LENGTH_M: f64 = 1e6;
 
 /// A part of a corridor's center line.
@@ -16,20 +16,20 @@ const MAX_LENGTH_M: f64 = 1e6;
 pub enum Leg {
     /// Straight on.
     Straight {
-        /// How far.
+        /// Its length.
         length_m: f64,
     },
     /// Along an arc of a circle.
     Bend {
         /// The circle's radius.
         radius_m: f64,
-        /// How far around, positive to the left.
+        /// Its angle, positive to the left, degrees.
         turn_deg: f64,
     },
 }
 
 impl Leg {
-    /// Length of the center line, and how far it turns to the left.
+    /// Returns the length of the center line, and its turn to the left.
     fn measures(self) -> (f64, f64) {
         match self {
             Self::Straight { length_m } => (length_m, 0.0),
@@ -40,7 +40,7 @@ impl Leg {
         }
     }
 
-    /// What is wrong with it.
+    /// Returns what is wrong with it, if anything.
     fn fault(self) -> Option<String> {
         let is_good = |x: f64| x > 0.0 && x <= MAX_LENGTH_M;
         let is_good_turn = |deg: f64| deg != 0.0 && deg.abs() <= 3600.0;
@@ -68,11 +68,12 @@ pub struct Corridor {
 }
 
 impl Corridor {
-    /// A corridor of a width. Where a bend's radius is less than half the width, its inner wall
-    /// crosses itself.
+    /// Returns a corridor of a width. If a bend's radius is less than half the width, its inner
+    /// wall crosses itself.
     ///
     /// # Errors
-    /// No leg; a length, radius, turn or width that is not positive (a turn: not 0) or absurd.
+    /// When there is no leg, or a length, radius, turn or width is not positive (a turn: 0) or
+    /// absurd.
     pub fn new(legs: Vec<Leg>, width_m: f64) -> Result<Self, InputError> {
         let fault = |place: String, cause: String| {
             Err(InputError::new(place, cause, "give it in meters above 0, turns in degrees"))
@@ -95,11 +96,12 @@ impl Corridor {
         }
     }
 
-    /// The corridor of the measurements: 14 m straight, 90 degrees left (radius 2 m), 90 right
-    /// (1.5), a U-turn (1.6), an S of 60, 120 and 60 degrees (1.3), a U-turn (2), 8 m straight.
+    /// Returns the corridor of the measurements: 14 m straight, 90 degrees left (radius 2 m), 90
+    /// right (1.5), a U-turn (1.6), an S of 60, 120 and 60 degrees (1.3), a U-turn (2), 8 m
+    /// straight.
     ///
     /// # Errors
-    /// A width that is not positive.
+    /// When the width is not positive.
     pub fn pinned(width_m: f64) -> Result<Self, InputError> {
         let bend = |radius_m, turn_deg| Leg::Bend { radius_m, turn_deg };
         let legs = vec![
@@ -116,26 +118,26 @@ impl Corridor {
         Self::new(legs, width_m)
     }
 
-    /// Its legs.
+    /// Returns its legs.
     pub fn legs(&self) -> &[Leg] {
         &self.legs
     }
 
-    /// From wall to wall.
+    /// Returns the distance from wall to wall, meters.
     pub fn width_m(&self) -> f64 {
         self.width_m
     }
 
-    /// Length of the center line.
+    /// Returns the length of the center line, meters.
     pub fn length_m(&self) -> f64 {
         self.legs.iter().map(|leg| leg.measures().0).sum()
     }
 
-    /// Poses along the center line, from its start to its end, at most `step_m` apart; the ends
-    /// of legs are among them.
+    /// Returns poses along the center line, from its start to its end, at most `step_m` apart; the
+    /// ends of legs are among them.
     ///
     /// # Panics
-    /// Where `step_m` is not positive.
+    /// If `step_m` is not positive.
     pub fn line(&self, step_m: f64) -> Vec<Pose> {
         assert!(step_m > 0.0, "poses lie apart");
         let mut line = vec![Pose { at: [0.0; 2], heading_rad: 0.0 }];
@@ -155,8 +157,8 @@ impl Corridor {
         line
     }
 
-    /// Its walls, without thickness, in pieces of about [`WALL_PIECE_M`]: first the right one,
-    /// then the left one, numbered on from `first_id` in the direction of the corridor.
+    /// Returns its walls, without thickness, in pieces of about [`WALL_PIECE_M`]: first the right
+    /// one, then the left one, numbered on from `first_id` in the direction of the corridor.
     pub fn walls(&self, first_id: u32) -> Vec<Obstacle<2>> {
         let line = self.line(WALL_PIECE_M);
         let sides = [-1.0, 1.0].map(|side| line.windows(2).map(move |piece| (side, piece)));
@@ -168,7 +170,7 @@ impl Corridor {
             .collect()
     }
 
-    /// The point of a wall beside a pose; `side` is 1 to the left, -1 to the right.
+    /// Returns the point of a wall beside a pose; `side` is 1 to the left, -1 to the right.
     fn beside(&self, Pose { at: [x, y], heading_rad }: Pose, side: f64) -> Point<2> {
         let half_m = 0.5 * self.width_m;
         [x - side * half_m * sin(heading_rad), y + side * half_m * cos(heading_rad)]

@@ -1,53 +1,53 @@
-//! Where what moves is at a time.
+//! Courses of moving obstacles, as functions of time.
 //!
-//! Every course is a closed formula of time: nobody keeps a state, any worker computes any
+//! Every course is a closed formula of time: nothing keeps a state, any worker computes any
 //! obstacle at any moment, and a checkpoint needs nothing but the time.
 
 use crate::rods::geometry::{Bounds, Point, between, distance, is_finite, norm, scaled, sub, unit};
 use crate::rods::obstacle::Obstacle;
 use sidestep_kernel::InputError;
 
-/// How something moves.
+/// The course of a moving body.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Course<const D: usize> {
-    /// On and on.
+    /// Straight on without end.
     Straight {
-        /// How fast, and where to.
+        /// Its velocity.
         velocity_m_s: Point<D>,
     },
-    /// In a room whose sides throw it back: on each axis a triangle wave.
+    /// Inside a room whose sides throw it back: on each axis a triangle wave.
     Bouncing {
-        /// Its velocity at the beginning.
+        /// Its velocity at time 0.
         velocity_m_s: Point<D>,
-        /// What it never leaves, with its whole body.
+        /// The room that its whole body never leaves.
         room: Bounds<D>,
     },
     /// From way point to way point. The middle of the body is at the first one at time 0.
     Patrol {
         /// At least two; neighbors lie apart.
         way_points: Vec<Point<D>>,
-        /// From the last straight to the first again, or back the way it came.
+        /// Whether it goes from the last way point straight to the first, or back the way it came.
         closed: bool,
-        /// How fast.
+        /// Its speed.
         speed_m_s: f64,
     },
 }
 
-/// An obstacle that moves.
+/// A moving obstacle.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mover<const D: usize> {
-    /// What it is, and where it is at time 0 (on a patrol: anywhere).
+    /// The body, with its place at time 0 (on a patrol: anywhere).
     body: Obstacle<D>,
     course: Course<D>,
     bounds: Bounds<D>,
 }
 
 impl<const D: usize> Mover<D> {
-    /// A body on a course.
+    /// Returns a body on a course.
     ///
     /// # Errors
-    /// Numbers that are not finite, a course that does not move, a room that the body does not
-    /// fit into or is not in, a patrol of fewer than two way points or with two equal neighbors.
+    /// When numbers are not finite, a course does not move, the body does not fit into its room or
+    /// is not in it, or a patrol has fewer than two way points or two equal neighbors.
     pub fn new(body: Obstacle<D>, course: Course<D>) -> Result<Self, InputError> {
         let mover = Self { bounds: body.bounds(), body, course };
         match mover.fault() {
@@ -75,13 +75,13 @@ impl<const D: usize> Mover<D> {
         }
     }
 
-    /// The obstacle at a time, with the velocity that it has from then on.
+    /// Returns the obstacle at a time, with the velocity that it has from then on.
     pub fn at(&self, t_s: f64) -> Obstacle<D> {
         let (shift_m, velocity_m_s) = self.motion(t_s);
         Obstacle { core: self.body.core.shifted(shift_m), velocity_m_s, ..self.body }
     }
 
-    /// How far the body is from where it was given, and its velocity.
+    /// Returns the shift of the body from its given place, and its velocity.
     fn motion(&self, t_s: f64) -> (Point<D>, Point<D>) {
         match &self.course {
             Course::Straight { velocity_m_s } => (scaled(*velocity_m_s, t_s), *velocity_m_s),
@@ -102,7 +102,7 @@ impl<const D: usize> Mover<D> {
     }
 }
 
-/// Whether a box holds another, but for rounding.
+/// Whether a box holds another, apart from rounding.
 fn holds<const D: usize>(room: &Bounds<D>, body: &Bounds<D>) -> bool {
     let slack_m = 1e-9;
     is_finite(&room.lo)
@@ -121,7 +121,8 @@ fn patrol_fault<const D: usize>(way_points: &[Point<D>]) -> Option<(&'static str
     stays.then_some(("has two equal way points behind each other", "leave one of them out"))
 }
 
-/// A point that starts at 0 and is thrown back at `lo_m` (at most 0) and `hi_m` (at least 0).
+/// Returns a point that starts at 0 and is thrown back at `lo_m` (at most 0) and `hi_m` (at least
+/// 0).
 fn bounce([lo_m, hi_m]: [f64; 2], v_m_s: f64, t_s: f64) -> (f64, f64) {
     if v_m_s < 0.0 {
         let (x_m, v_m_s) = bounce([-hi_m, -lo_m], -v_m_s, t_s);
@@ -135,15 +136,15 @@ fn bounce([lo_m, hi_m]: [f64; 2], v_m_s: f64, t_s: f64) -> (f64, f64) {
     (lo_m + x_m, if forward { v_m_s } else { -v_m_s })
 }
 
-/// How far along a way of `length_m` one is after `way_m` of going to and fro on it, and whether
-/// one goes forward from there.
+/// Returns the position on a way of `length_m` after `way_m` of going to and fro on it, and whether
+/// the body goes forward from there.
 fn there_and_back(way_m: f64, length_m: f64) -> (f64, bool) {
     let m = way_m.rem_euclid(2.0 * length_m);
     // The remainder may round up to the modulus itself.
     if m < length_m { (m, true) } else { ((2.0 * length_m - m).max(0.0), false) }
 }
 
-/// Where one is on a patrol, and the velocity.
+/// Returns the place on a patrol, and the velocity.
 fn patrol<const D: usize>(
     way_points: &[Point<D>],
     closed: bool,
@@ -164,7 +165,7 @@ fn patrol<const D: usize>(
         let Some(along) = unit(sub(*b, *a)) else { continue };
         at = between(*a, *b, (left_m / leg_m).min(1.0));
         u = along;
-        // At a way point the next leg counts going forward, the one before going back.
+        // At a way point the next leg counts when going forward, the one before when going back.
         if left_m < leg_m || (!forward && left_m <= leg_m) {
             break;
         }
@@ -173,15 +174,15 @@ fn patrol<const D: usize>(
     (at, scaled(u, if forward { speed_m_s } else { -speed_m_s }))
 }
 
-/// All obstacles of a world that move.
+/// All moving obstacles of a world.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Movers<const D: usize>(Vec<Mover<D>>);
 
 impl<const D: usize> Movers<D> {
-    /// Obstacles that move; sorted by their ids.
+    /// Returns moving obstacles, sorted by their ids.
     ///
     /// # Errors
-    /// Two with one id.
+    /// When two have the same id.
     pub fn new(mut movers: Vec<Mover<D>>) -> Result<Self, InputError> {
         movers.sort_by_key(|m| m.body.id);
         match movers.windows(2).find(|w| w[0].body.id == w[1].body.id) {
@@ -194,7 +195,7 @@ impl<const D: usize> Movers<D> {
         }
     }
 
-    /// How many there are.
+    /// Returns their number.
     pub fn len(&self) -> usize {
         self.0.len()
     }
@@ -204,7 +205,7 @@ impl<const D: usize> Movers<D> {
         self.0.is_empty()
     }
 
-    /// All of them at a time, by id.
+    /// Returns all of them at a time, by id.
     pub fn at(&self, t_s: f64) -> impl Iterator<Item = Obstacle<D>> {
         self.0.iter().map(move |mover| mover.at(t_s))
     }

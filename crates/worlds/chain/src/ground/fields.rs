@@ -9,34 +9,35 @@ use sidestep_kernel::{InputError, Seed};
 use std::f64::consts::PI;
 use std::ops::RangeInclusive;
 
-/// More obstacles are taken for a mistake.
+/// Largest number of obstacles; more are taken for a mistake.
 const MAX_OBSTACLES: f64 = 1e7;
-/// How often something looks for a place before there is said to be none.
+/// Attempts to find a place for an obstacle before the search fails.
 const ATTEMPTS: u64 = 1000;
 
 /// Balls, or capsules in all directions, spread evenly over a box.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Field<const D: usize> {
-    /// Where their middles are.
+    /// Region of their middles.
     pub(crate) room: Bounds<D>,
-    /// Their sizes together, as a part of the room's. They may overlap, and those that would
-    /// come too near to `keep_clear` are left out, so they cover less.
+    /// Their total size, as a part of the room's. They may overlap, and those that would come too
+    /// near to `keep_clear` are left out, so they cover less.
     pub(crate) part: f64,
-    /// Radius of each.
+    /// Radius of each, meters.
     pub(crate) radius_m: f64,
-    /// From end to end of a capsule's core; 0 for balls.
+    /// Length of a capsule's core, meters; 0 for balls.
     pub(crate) length_m: f64,
-    /// What they keep away from: where chains start.
+    /// Bodies that they keep away from: the places where chains start.
     pub(crate) keep_clear: Vec<Core<D>>,
-    /// How far their surfaces stay away from it.
+    /// Distance that their surfaces keep from these, meters.
     pub(crate) keep_m: f64,
 }
 
 impl<const D: usize> Field<D> {
-    /// The obstacles, numbered from `first_id`; gaps in the numbers are those left out.
+    /// Returns the obstacles, numbered from `first_id`; gaps in the numbers are those left out.
     ///
     /// # Errors
-    /// A room, part or size that is not finite or not positive; more than ten million obstacles.
+    /// When a room, part or size is not finite or not positive, or there are over ten million
+    /// obstacles.
     pub(crate) fn fill(&self, seed: Seed, first_id: u32) -> Result<Vec<Obstacle<D>>, InputError> {
         let n = self.count()?;
         let streams = Streams::new(seed);
@@ -49,7 +50,7 @@ impl<const D: usize> Field<D> {
         Ok((0..n).filter_map(one).collect())
     }
 
-    /// The ends of a core somewhere in the room.
+    /// Returns the ends of a core somewhere in the room.
     fn ends(&self, draws: &mut Draws) -> [Point<D>; 2] {
         let middle = point_in(draws, &self.room);
         let u = direction(draws);
@@ -74,7 +75,7 @@ impl<const D: usize> Field<D> {
         ))
     }
 
-    /// Area or volume of one obstacle.
+    /// Returns the area or volume of one obstacle.
     fn size_of_one(&self) -> f64 {
         let r = self.radius_m;
         match D {
@@ -87,26 +88,26 @@ impl<const D: usize> Field<D> {
 /// Balls that wander about in a room.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Crowd<const D: usize> {
-    /// What they never leave.
+    /// The room that they never leave.
     pub(crate) room: Bounds<D>,
-    /// How many.
+    /// Their number.
     pub(crate) n: u32,
     /// Their radii, evenly spread.
     pub(crate) radius_m: RangeInclusive<f64>,
     /// Their speeds, evenly spread.
     pub(crate) speed_m_s: RangeInclusive<f64>,
-    /// What they keep away from at time 0.
+    /// Bodies that they keep away from at time 0.
     pub(crate) keep_clear: Vec<Core<D>>,
-    /// How far their surfaces stay away from it at time 0.
+    /// Distance that their surfaces keep from these at time 0, meters.
     pub(crate) keep_m: f64,
 }
 
 impl<const D: usize> Crowd<D> {
-    /// The obstacles, numbered from `first_id`.
+    /// Returns the obstacles, numbered from `first_id`.
     ///
     /// # Errors
-    /// A room that is too small for them, or has no place away from `keep_clear`; sizes or
-    /// speeds that are not finite and positive.
+    /// When a room is too small for them, or has no place away from `keep_clear`; when sizes or
+    /// speeds are not finite and positive.
     pub(crate) fn gather(&self, seed: Seed, first_id: u32) -> Result<Vec<Mover<D>>, InputError> {
         if f64::from(self.n) > MAX_OBSTACLES {
             let cause = format!("{} moving obstacles", self.n);
@@ -160,7 +161,7 @@ fn point_in<const D: usize>(draws: &mut Draws, room: &Bounds<D>) -> Point<D> {
     std::array::from_fn(|i| within(draws, &(room.lo[i]..=room.hi[i])))
 }
 
-/// A unit vector, all directions alike: a point in the unit ball, scaled.
+/// Returns a unit vector, all directions equally likely: a point in the unit ball, scaled.
 fn direction<const D: usize>(draws: &mut Draws) -> Point<D> {
     loop {
         let p: Point<D> = std::array::from_fn(|_| 2.0 * draws.uniform() - 1.0);

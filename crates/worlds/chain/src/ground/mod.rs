@@ -1,4 +1,4 @@
-//! Where chains move: what obstacles there are, and where.
+//! The ground on which chains move: its obstacles, and their places.
 //!
 //! ```text
 //! corridor.rs: winding corridors          fields.rs: balls and capsules at random
@@ -21,16 +21,16 @@ pub use site::Site;
 use super::rods::geometry::Point;
 use sidestep_kernel::stream::Purpose;
 
-/// A place in the plane and a direction.
+/// A place in the plane and a heading.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pose {
-    /// Where.
+    /// The place, meters.
     pub at: Point<2>,
-    /// Counter-clockwise from the first axis.
+    /// Heading, counter-clockwise from the first axis, rad.
     pub heading_rad: f64,
 }
 
-/// What random numbers are for here; entities are obstacles or attempts.
+/// Purposes of random draws here; entities are obstacles or attempts.
 mod purposes {
     use super::Purpose;
 

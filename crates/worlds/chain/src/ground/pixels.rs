@@ -1,12 +1,12 @@
-//! Floors of pixels: ROS maps, bitmaps of Stage.
+//! Floors of pixels: ROS maps and Stage bitmaps.
 //!
 //! A floor becomes walls without thickness along the edges between free and solid pixels, each as
-//! long as the edge is straight. That is exact: for a body outside, the nearest point of what is
-//! solid lies on such an edge. It is also little: a straight wall is one segment where a box would
-//! have four sides, and the inside of what is solid is nothing at all. Nobody gets there: walls
-//! that meet share their corners bit for bit, and no motion passes through a wall, however thin
-//! (see [`sweep`](crate::rods::sweep)). Who starts inside what is solid is not noticed by
-//! the walls; [`Floor::is_free`] tells.
+//! long as the edge is straight. That is exact: for a body outside, the nearest solid point lies on
+//! such an edge. It is also compact: a straight wall is one segment, where a box would have four
+//! sides, and the inside of solid areas needs nothing. No chain gets there, because walls that meet
+//! share their corners bit for bit, and no motion passes through a wall, however thin (see
+//! [`sweep`](crate::rods::sweep)). The walls do not detect a chain that starts inside a solid area;
+//! [`Floor::is_free`] does.
 
 use crate::rods::geometry::{Bounds, Point, add, along, dot, scaled, sub};
 use crate::rods::obstacle::Obstacle;
@@ -21,23 +21,23 @@ pub struct Floor {
     height: u32,
     /// Row by row from the bottom; length `width * height`.
     solid: Vec<bool>,
-    /// Extent of a pixel along its row, and across.
+    /// Size of a pixel along its row, and across, meters.
     pixel_m: [f64; 2],
-    /// Where the lower-left corner of the lower-left pixel is.
+    /// Position of the lower-left corner of the lower-left pixel.
     corner_m: Point<2>,
     /// Unit vectors along rows and columns.
     axes: [Point<2>; 2],
-    /// Whether all around the floor is solid.
+    /// Whether everything around the floor is solid.
     is_walled: bool,
 }
 
 impl Floor {
-    /// A floor of `width` x `height` pixels that are `pixel_m` wide and high; `solid` holds them
-    /// row by row from the bottom. Its lower-left corner lies at the origin, and all around it is
+    /// Returns a floor of `width` x `height` pixels of size `pixel_m`; `solid` holds them row by
+    /// row from the bottom. Its lower-left corner lies at the origin, and everything around it is
     /// solid.
     ///
     /// # Panics
-    /// When `solid` has another length, there is no pixel, or pixels have no size.
+    /// If `solid` has another length, there is no pixel, or pixels have no size.
     pub fn new(width: u32, height: u32, pixel_m: [f64; 2], solid: Vec<bool>) -> Self {
         assert_eq!(solid.len(), width as usize * height as usize, "one entry per pixel");
         assert!(!solid.is_empty(), "a floor has a pixel");
@@ -46,14 +46,15 @@ impl Floor {
         Self { width, height, solid, pixel_m, corner_m: [0.0; 2], axes, is_walled: true }
     }
 
-    /// The floor of a map; unknown pixels are solid unless `unknown` says that they are free.
+    /// Returns the floor of a map; unknown pixels are solid unless `unknown` says that they are
+    /// free.
     pub fn of_map(map: &PixelMap, unknown: UnknownPolicy) -> Self {
         let solid = map.pixels().iter().map(|&cell| unknown.apply(cell) != Cell::Free).collect();
         let floor = Self::new(map.width(), map.height(), [map.resolution_m(); 2], solid);
         Self { corner_m: map.origin_m(), ..floor }
     }
 
-    /// The same floor with its middle at a place, turned about it.
+    /// Returns the same floor with its middle at a place, turned about it.
     #[must_use]
     pub fn centered(mut self, middle: Point<2>, yaw_rad: f64) -> Self {
         let (s, c) = (sin(yaw_rad), cos(yaw_rad));
@@ -63,38 +64,38 @@ impl Floor {
         self
     }
 
-    /// The same floor with open ground around it.
+    /// Returns the same floor with open ground around it.
     #[must_use]
     pub fn open(self) -> Self {
         Self { is_walled: false, ..self }
     }
 
-    /// Pixels along a row.
+    /// Returns the number of pixels along a row.
     pub fn width(&self) -> u32 {
         self.width
     }
 
-    /// Rows.
+    /// Returns the number of rows.
     pub fn height(&self) -> u32 {
         self.height
     }
 
-    /// Extent of a pixel along its row, and across.
+    /// Returns the size of a pixel along its row, and across, meters.
     pub fn pixel_m(&self) -> [f64; 2] {
         self.pixel_m
     }
 
-    /// Extent of the floor along its rows, and across.
+    /// Returns the size of the floor along its rows, and across, meters.
     fn extent_m(&self) -> [f64; 2] {
         [f64::from(self.width) * self.pixel_m[0], f64::from(self.height) * self.pixel_m[1]]
     }
 
-    /// How many pixels are solid.
+    /// Returns the number of solid pixels.
     pub fn count_solid(&self) -> usize {
         self.solid.iter().filter(|&&solid| solid).count()
     }
 
-    /// Whether a pixel is solid; those beside the floor are what is around it.
+    /// Whether a pixel is solid; pixels outside the floor are like its surroundings.
     pub fn is_solid(&self, col: i64, row: i64) -> bool {
         let inside =
             (0..i64::from(self.width)).contains(&col) && (0..i64::from(self.height)).contains(&row);
@@ -112,25 +113,25 @@ impl Floor {
         !self.is_solid(pixel(0), pixel(1))
     }
 
-    /// The middle of a pixel.
+    /// Returns the middle of a pixel.
     pub fn middle(&self, col: u32, row: u32) -> Point<2> {
         self.place(f64::from(col) + 0.5, f64::from(row) + 0.5)
     }
 
-    /// The box around the floor.
+    /// Returns the box around the floor.
     pub fn bounds(&self) -> Bounds<2> {
         let (w, h) = (f64::from(self.width), f64::from(self.height));
         Bounds::of(&[(0.0, 0.0), (w, 0.0), (0.0, h), (w, h)].map(|(x, y)| self.place(x, y)))
     }
 
-    /// The place of a point counted in pixels; the same bits for the same point.
+    /// Returns the place of a point counted in pixels; the same bits for the same point.
     fn place(&self, col: f64, row: f64) -> Point<2> {
         let [x, y] = [col * self.pixel_m[0], row * self.pixel_m[1]];
         add(self.corner_m, add(scaled(self.axes[0], x), scaled(self.axes[1], y)))
     }
 
-    /// The walls between free and solid pixels, numbered on from `first_id`: first those along
-    /// rows, from the bottom, then those along columns, from the left.
+    /// Returns the walls between free and solid pixels, numbered on from `first_id`: first those
+    /// along rows, from the bottom, then those along columns, from the left.
     pub fn walls(&self, first_id: u32) -> Vec<Obstacle<2>> {
         let (width, height) = (i64::from(self.width), i64::from(self.height));
         let mut ends = Vec::new();
@@ -150,7 +151,7 @@ impl Floor {
     }
 }
 
-/// Tells every run `from..to` of numbers below `n` for which `is` holds.
+/// Calls `tell` for every run `from..to` of numbers below `n` for which `is` holds.
 fn runs(n: i64, is: impl Fn(i64) -> bool, mut tell: impl FnMut(i64, i64)) {
     let mut start = None;
     for k in 0..=n {

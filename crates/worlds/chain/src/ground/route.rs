@@ -1,4 +1,4 @@
-//! Where a chain has room on a floor: a start for its leader, and a free way behind it.
+//! Room for a chain on a floor: a start for its leader, and a free way behind it.
 
 use super::{Pose, Site, purposes};
 use crate::rods::geometry::{Bounds, Point, along, between, distance, dot, sub, unit};
@@ -8,41 +8,41 @@ use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{InputError, Seed};
 use sidestep_map::planning::{Distances, FreeSpace, STEPS};
 
-/// Random places that are tried as such.
+/// Random places that are tried.
 const PLACES: u64 = 20_000;
-/// Free places among them from which a way for the chain is looked for.
+/// Free places among them for which a way for the chain is searched.
 const STARTS: u32 = 64;
-/// The way behind the leader is looked for on a grid with at most this many boxes on each side.
+/// Largest half side, in boxes, of the grid in which the way behind the leader is searched.
 const MAX_HALF_BOXES: f64 = 500.0;
 
-/// What a chain needs.
+/// Needs of a chain.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Wanted {
     /// Leader and followers.
     pub(crate) connectors: usize,
-    /// From each to the next.
+    /// Distance from each connector to the next, meters.
     pub(crate) spacing_m: f64,
-    /// Free around every connector's middle, and along the way.
+    /// Free distance around every connector's middle, and along the way, meters.
     pub(crate) clearance_m: f64,
-    /// Free around the straight line from each to the next.
+    /// Free distance around the straight line from each connector to the next, meters.
     pub(crate) rod_clearance_m: f64,
-    /// The way ahead of the leader that has to be free as well.
+    /// Length of way ahead of the leader that has to be free as well, meters.
     pub(crate) ahead_m: f64,
-    /// Where the leader starts: anywhere on the site where not given. Many sites have insides of
-    /// blocks that are free and lead nowhere.
+    /// Region where the leader starts; by default anywhere on the site. Many sites have blocks
+    /// whose insides are free and lead nowhere.
     pub(crate) within: Option<Bounds<2>>,
 }
 
-/// Where a chain starts.
+/// The start of a chain.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Start {
-    /// The leader, which looks away from its chain.
+    /// The leader, which faces away from its chain.
     pub(crate) leader: Pose,
     /// All connectors, the leader first.
     pub(crate) points: Vec<Point<2>>,
 }
 
-/// What was wanting where no start was found.
+/// Counts of what was missing if no start was found.
 #[derive(Debug, Default)]
 struct Wanting {
     free_places: u32,
@@ -50,14 +50,13 @@ struct Wanting {
     laid: u32,
 }
 
-/// A start for a chain on a site, from the seed alone; `obstacles` are all that is there.
-///
-/// Random places are tried. From a free one, a breadth-first search finds the places that it takes
-/// the longest to get to within the chain's reach; the way to one of them, pulled straight, is
-/// where the chain lies.
+/// Returns a start for a chain on a site, from the seed alone; `obstacles` are all obstacles there.
+/// Random places are tried. From a free one, a breadth-first search finds the places that are the
+/// most steps away within the chain's reach; the way to one of them, pulled straight, is where the
+/// chain lies.
 ///
 /// # Errors
-/// Sizes that are not positive; no room, with what was wanting.
+/// When sizes are not positive, or there is no room, with what was missing.
 pub(crate) fn find(
     site: &Site,
     obstacles: &Obstacles<2>,
@@ -92,7 +91,7 @@ pub(crate) fn find(
 }
 
 impl Wanted {
-    /// Length of the chain.
+    /// Returns the length of the chain.
     fn length_m(&self) -> f64 {
         self.spacing_m * (self.connectors.max(1) - 1) as f64
     }
@@ -154,10 +153,10 @@ impl Search<'_> {
         self.site.is_free(at) && self.is_clear([at; 2], self.wanted.clearance_m)
     }
 
-    /// A long way away from a place, pulled straight.
+    /// Returns a long way away from a place, pulled straight.
     fn way_from(&self, leader: Point<2>, choice: u32) -> Vec<Point<2>> {
         let Wanted { spacing_m, clearance_m, .. } = *self.wanted;
-        // On 4 neighbors a way counts up to sqrt 2 as long as it is.
+        // On 4 neighbors a way counts up to sqrt(2) times its length.
         let reach_m = 1.5 * self.wanted.length_m() + spacing_m;
         let box_m = (0.5 * clearance_m.min(spacing_m)).max(reach_m / MAX_HALF_BOXES);
         let half = (reach_m / box_m).ceil() as u32;
@@ -172,7 +171,7 @@ impl Search<'_> {
         self.pulled(way.into_iter().rev().map(place).collect())
     }
 
-    /// A way with fewer corners: from each, straight on as far as there is clearance.
+    /// Returns a way with fewer corners: from each, straight on as far as there is clearance.
     fn pulled(&self, way: Vec<Point<2>>) -> Vec<Point<2>> {
         let (mut pulled, mut from) = (vec![way[0]], 0);
         while from + 1 < way.len() {
@@ -185,7 +184,7 @@ impl Search<'_> {
         pulled
     }
 
-    /// Connectors along a way, each at the spacing from the one before; `None` where it is too
+    /// Returns connectors along a way, each at the spacing from the one before; `None` if it is too
     /// short, or a rod would come too near to something.
     fn lay(&self, way: &[Point<2>]) -> Option<Vec<Point<2>>> {
         let Wanted { connectors, spacing_m, rod_clearance_m, .. } = *self.wanted;
@@ -209,7 +208,7 @@ impl Search<'_> {
             .then_some(points)
     }
 
-    /// The start of a chain that lies at `points`, if there is room ahead of it.
+    /// Returns the start of a chain that lies at `points`, if there is room ahead of it.
     fn start(&self, points: Vec<Point<2>>) -> Option<Start> {
         let at = points[0];
         let u = points.get(1).and_then(|&next| unit(sub(at, next))).unwrap_or([1.0, 0.0]);
@@ -219,7 +218,7 @@ impl Search<'_> {
     }
 }
 
-/// One of the boxes that are nearly the most steps away.
+/// Returns one of the boxes that are nearly the most steps away.
 fn furthest(steps: &Distances, half: u32, choice: u32) -> (u32, u32) {
     let most = steps.max().unwrap_or(0);
     let all = (0..=2 * half).flat_map(|row| (0..=2 * half).map(move |col| (col, row)));
@@ -229,7 +228,7 @@ fn furthest(steps: &Distances, half: u32, choice: u32) -> (u32, u32) {
     far.get(choice as usize % far.len().max(1)).copied().unwrap_or((half, half))
 }
 
-/// The boxes from one to that at 0 steps, each a step nearer.
+/// Returns the boxes from one to that at 0 steps, each a step nearer.
 fn back_from(steps: &Distances, mut at: (u32, u32)) -> Vec<(u32, u32)> {
     let mut way = vec![at];
     while let Some(n) = steps.steps(at.0, at.1).filter(|&n| n > 0) {
@@ -243,7 +242,8 @@ fn back_from(steps: &Distances, mut at: (u32, u32)) -> Vec<(u32, u32)> {
     way
 }
 
-/// At which part of a segment a way along it leaves the circle around a point, if it does.
+/// Returns the part of a segment at which a way along it leaves the circle around a point, if it
+/// does.
 fn leaves_at(center: Point<2>, radius_m: f64, [a, b]: [Point<2>; 2]) -> Option<f64> {
     let (d, r) = (sub(b, a), sub(a, center));
     let (dd, dr) = (dot(d, d), dot(d, r));

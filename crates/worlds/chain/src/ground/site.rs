@@ -1,4 +1,4 @@
-//! Ground as files tell it: floors of pixels and boxes.
+//! Ground read from files: floors of pixels and boxes.
 
 use super::Pose;
 use super::pixels::Floor;
@@ -17,13 +17,14 @@ pub struct Site {
 }
 
 impl Site {
-    /// The site of a map, solid all around.
+    /// Returns the site of a map, solid all around.
     pub fn of_map(map: &PixelMap, unknown: UnknownPolicy) -> Self {
         Self { floors: vec![Floor::of_map(map, unknown)], solids: Vec::new() }
     }
 
-    /// The site of a Stage world, without its robots (see [`stage::Robot`] for where they start).
-    /// A floor plan with a boundary has thin walls around it, none is solid beside it.
+    /// Returns the site of a Stage world, without its robots (see [`stage::Robot`] for their
+    /// starts). A floor plan with a boundary has thin walls around it; without one, nothing beside
+    /// it is solid.
     pub fn of_stage(world: &stage::World) -> Self {
         let mut site = Self::default();
         for plan in &world.floor_plans {
@@ -43,25 +44,25 @@ impl Site {
         site
     }
 
-    /// The floors.
+    /// Returns the floors.
     pub fn floors(&self) -> &[Floor] {
         &self.floors
     }
 
-    /// Everything in the way, numbered on from `first_id`.
+    /// Returns all obstacles, numbered on from `first_id`.
     pub fn obstacles(&self, first_id: u32) -> Vec<Obstacle<2>> {
         let walls = self.floors.iter().flat_map(|floor| floor.walls(0));
         let all = walls.chain(self.solids.iter().copied());
         (first_id..).zip(all).map(|(id, obstacle)| Obstacle { id, ..obstacle }).collect()
     }
 
-    /// Whether a place is on no solid pixel. Boxes are not looked at: see
+    /// Whether a place is on no solid pixel. Boxes are ignored: see
     /// [`Obstacles::clearance_m`](crate::rods::Obstacles::clearance_m).
     pub fn is_free(&self, at: Point<2>) -> bool {
         self.floors.iter().all(|floor| floor.is_free(at))
     }
 
-    /// The box around all floors.
+    /// Returns the box around all floors.
     pub fn bounds(&self) -> Bounds<2> {
         self.floors.iter().fold(Bounds::nothing(), |all, floor| all.joined(&floor.bounds()))
     }
@@ -73,7 +74,7 @@ impl From<stage::Pose> for Pose {
     }
 }
 
-/// A box around a pose.
+/// Returns a box around a pose.
 fn cuboid(pose: Pose, size_m: [f64; 2]) -> Cuboid<2> {
     let (s, c) = (sin(pose.heading_rad), cos(pose.heading_rad));
     Cuboid { center: pose.at, axes: [[c, s], [-s, c]], half_m: size_m.map(|m| 0.5 * m) }

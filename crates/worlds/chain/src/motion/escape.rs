@@ -1,14 +1,14 @@
-//! Getting out of the way of what moves (slides P2, R4).
+//! Escape: getting out of the way of moving obstacles (slides P2, R4).
 //!
 //! After the obstacles of a tick have moved, parts of the chain that are too near to one become
-//! initiators, the deepest first, and go where nothing gets deeper. The slides know no limit to
-//! that; here no connector is further from where it was at the start of the tick than its speed
-//! allows, slaves included, and a part that only the limit keeps from escaping is told.
+//! initiators, the deepest first, and go where nothing gets deeper. The slides set no limit to
+//! that. Here no connector, slaves included, is farther from its place at the start of the tick
+//! than its speed allows, and a part that only this limit keeps from escaping is reported.
 //!
-//! What that can do is measured by `examples/chain_movers.rs`: among discs that leave room for a
-//! robot between them, a chain with twice their speed is never in one. Two obstacles that close in
-//! on a chain from both sides hold it like a pair of tongs, at any speed: it cannot pass through
-//! them, and only what jumps over them gets free.
+//! The sweep `scenarios/papers/serpentine/movers.sweep.toml` measures what that can do: among discs
+//! that leave room for a robot between them, a chain with twice their speed is never in one. Two
+//! obstacles that close in on a chain from both sides hold it like a pair of tongs, at any speed:
+//! it cannot pass through them, and only a jump over them gets it free.
 
 #[cfg(test)]
 mod tests;
@@ -27,23 +27,23 @@ use sidestep_kernel::math::{cos, sin};
 pub(crate) use threat::Part;
 use threat::{Nearness, Threat, collect, nearness};
 
-/// How a chain gets out of the way.
+/// Rules for getting out of the way.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Escape {
-    /// Length of a tick.
+    /// Length of a tick, s.
     pub dt_s: f64,
-    /// No connector is further than this times the tick from where it was at its start;
-    /// infinite for no limit.
+    /// Greatest speed: no connector is farther from its place at the start of the tick than this
+    /// times the tick; infinite for no limit.
     pub speed_max_m_s: f64,
-    /// So many ticks before they are touched, and with 0.05 m to spare, parts give way; 0 for not
-    /// before they are touched.
+    /// Number of ticks before contact at which parts give way, with 0.05 m to spare; 0 for only on
+    /// contact.
     pub ticks_ahead: f64,
-    /// The most violations that are looked at in a tick; half of them at least are contacts.
+    /// Most violations handled in a tick; at least half of them are contacts.
     pub most: usize,
 }
 
 impl Escape {
-    /// The rules with a look-ahead of 20 ticks and up to 40 violations a tick.
+    /// Returns rules with a look-ahead of 20 ticks and up to 40 violations a tick.
     pub fn new(dt_s: f64, speed_max_m_s: f64) -> Self {
         Self { dt_s, speed_max_m_s, ticks_ahead: 20.0, most: 40 }
     }
@@ -69,57 +69,57 @@ impl Escape {
     }
 }
 
-/// What came of it.
+/// Outcome of an escape.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Escaped<const D: usize> {
-    /// Motions that brought a part further away.
+    /// Motions that brought a part farther away.
     pub moves: usize,
-    /// Violations that no motion made less.
+    /// Violations that no motion reduced.
     pub vetoes: usize,
-    /// How many of those the speed limit alone stood in the way of.
+    /// Number of those for which the speed limit was the only reason.
     pub capped: usize,
-    /// How deep the deepest part still is in a moving obstacle; 0 where none is.
+    /// Depth of the deepest part still in a moving obstacle, meters; 0 if none is.
     pub deepest_m: f64,
     /// That part.
     pub left: Option<Left<D>>,
-    /// The first part that got away: its connector, or the one at the begin of its rod, and from
-    /// which obstacle.
+    /// The first part that got away: its connector, or the one at the start of its rod, and the
+    /// obstacle that it got away from.
     pub first: Option<(usize, u32)>,
 }
 
 /// A part that is still in a moving obstacle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Left<const D: usize> {
-    /// Which.
+    /// The part.
     pub part: Part,
     /// The obstacle.
     pub obstacle: u32,
-    /// Why it could not leave; `None` where the tick's motions were used up.
+    /// The reason why it could not leave; `None` if the tick's motions were used up.
     pub veto: Option<Veto<D>>,
 }
 
 /// Leads chains out of the way. It owns its buffers and remembers nothing from tick to tick.
 #[derive(Debug, Clone)]
 pub struct Escaper<const D: usize> {
-    /// How.
+    /// Its rules.
     pub rules: Escape,
     body: OwnBody<D>,
     threats: Vec<Threat>,
     vetoes: Vec<(Threat, Veto<D>)>,
-    /// The chain as it was before the motion that is being tried.
+    /// The chain as it was before the motion under trial.
     before: Vec<Point<D>>,
 }
 
-/// What a tick works on.
+/// The working data of a tick.
 struct Tick<'a, const D: usize> {
     chain: &'a mut Chain<D>,
     obstacles: &'a Obstacles<D>,
     propagator: &'a mut Propagator<D>,
-    /// Where the connectors were when the tick began.
+    /// Positions of the connectors at the start of the tick.
     start: &'a [Point<D>],
 }
 
-/// The free space that is asked for around moving obstacles.
+/// The free space required around moving obstacles.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Margin {
     ahead_s: f64,
@@ -134,32 +134,32 @@ impl Margin {
     }
 }
 
-/// Air that is kept besides the way of the obstacle.
+/// Gap that is kept beyond the way of the obstacle, meters.
 const SPARE_M: f64 = 0.05;
-/// How far a push goes beyond what is needed.
+/// Distance by which a push goes beyond what is needed, meters.
 const BEYOND_M: f64 = 1e-6;
-/// A motion that brings less than this part of its length is no help.
+/// Least gain of a helpful motion, as a part of its length.
 const LEAST_GAIN: f64 = 0.05;
-/// An end of a rod that moves the point of contact by less than this part of its way is no help.
+/// Least motion of the point of contact, as a part of the way of a rod's end, for a helpful end.
 const LEAST_LEVER: f64 = 0.1;
 /// Parts of the push that are tried, each in all directions.
 const PARTS: [f64; 3] = [1.0, 0.5, 0.25];
-/// Directions that are tried, from straight away to nearly across; the first of both signs leads
-/// off the obstacle's way.
+/// Directions that are tried, rad, from straight away to nearly across; the first of both signs
+/// leads off the obstacle's way.
 const TURNS_RAD: [f64; 7] = [0.0, 0.5, -0.5, 1.0, -1.0, 1.5, -1.5];
 
 impl<const D: usize> Escaper<D> {
-    /// An escaper for rules.
+    /// Returns an escaper for rules.
     pub fn new(rules: Escape) -> Self {
         let (body, threats, vetoes, before) = Default::default();
         Self { rules, body, threats, vetoes, before }
     }
 
-    /// Moves the parts of a chain that are too near to a moving obstacle. `start` is where the
-    /// connectors were when the tick began.
+    /// Moves the parts of a chain that are too near to a moving obstacle. `start` holds the
+    /// connectors' positions at the start of the tick.
     ///
     /// # Errors
-    /// A tick that is not positive, a speed limit below 0, a start of another chain.
+    /// When a tick is not positive, a speed limit is below 0, or `start` belongs to another chain.
     pub fn escape(
         &mut self,
         chain: &mut Chain<D>,
@@ -210,7 +210,7 @@ impl<const D: usize> Escaper<D> {
         }
     }
 
-    /// How far from its start a connector may be, or already is.
+    /// Returns how far from its start a connector may be, or already is, meters.
     fn longest_way_m(&self, tick: &Tick<'_, D>) -> f64 {
         let ways_m = tick.start.iter().zip(tick.chain.points()).map(|(s, p)| distance(*s, *p));
         ways_m.fold(self.rules.most_m(), f64::max)
@@ -254,7 +254,7 @@ impl<const D: usize> Escaper<D> {
         }
     }
 
-    /// The deepest violation; of equals the first by part and obstacle.
+    /// Returns the deepest violation; of equals the first by part and obstacle.
     fn deepest(&self) -> Option<usize> {
         let order = |&a: &usize, &b: &usize| {
             let (a, b) = (&self.threats[a], &self.threats[b]);
@@ -265,8 +265,8 @@ impl<const D: usize> Escaper<D> {
             .max_by(order)
     }
 
-    /// Tries to make one violation less; the objection where nothing does. A base that objects is
-    /// led back to its place by a return pass, so the elbows of an arm get out of the way too.
+    /// Tries to reduce one violation; returns the objection if nothing works. A base that objects
+    /// is led back to its place by a return pass, so the elbows of an arm get out of the way too.
     fn relieve(
         &mut self,
         tick: &mut Tick<'_, D>,
@@ -283,7 +283,8 @@ impl<const D: usize> Escaper<D> {
                 let to = along(tick.chain.points()[k], way, push_m);
                 match self.attempt(tick, margin, which, k, to)? {
                     Ok(()) => return Ok(Ok(())),
-                    // That the speed limit alone was in the way says more than anything else.
+                    // If the speed limit was the only obstacle, that says more than any other
+                    // reason.
                     Err(veto) if why.reason != Reason::StepLimit => why = veto,
                     Err(_) => (),
                 }
@@ -292,7 +293,8 @@ impl<const D: usize> Escaper<D> {
         Ok(Err(why))
     }
 
-    /// How far from its start a connector may be: what its speed allows, or where it already is.
+    /// Returns how far from its start a connector may be, meters: as far as its speed allows, or as
+    /// far as it already is.
     fn room_m(&self, tick: &Tick<'_, D>, k: usize) -> f64 {
         self.rules.most_m().max(distance(tick.start[k], self.before[k]))
     }
@@ -341,14 +343,15 @@ impl<const D: usize> Escaper<D> {
         Ok(refused.map_or(Ok(()), Err))
     }
 
-    /// The first connector that went further than its speed allows.
+    /// Returns the first connector that went farther than its speed allows.
     fn too_far(&self, tick: &Tick<'_, D>, touched: std::ops::Range<usize>) -> Option<usize> {
         touched.into_iter().find(|&i| {
             distance(tick.start[i], tick.chain.points()[i]) > self.room_m(tick, i) + 1e-12
         })
     }
 
-    /// An objection where a motion did not bring the part further away, or another as deep.
+    /// Returns an objection if a motion did not bring the part farther away, or brought another as
+    /// deep.
     fn no_help(
         &self,
         tick: &Tick<'_, D>,
@@ -390,8 +393,8 @@ fn depth_of<const D: usize>(tick: &Tick<'_, D>, threat: &Threat, margin: Margin)
     margin.around(mover) - nearness(tick.chain, threat.part, mover).gap_m
 }
 
-/// Who may move for a part, and how much of its way the point of contact moves: for a rod the end
-/// nearer to the contact, then the other.
+/// Returns the connectors that may move for a part, and how much of their way the point of contact
+/// moves: for a rod the end nearer to the contact, then the other.
 fn agents<const D: usize>(
     chain: &Chain<D>,
     part: Part,
@@ -408,14 +411,14 @@ fn agents<const D: usize>(
     ends.map(|end| end.filter(may_move))
 }
 
-/// The objection of a part that nobody may move.
+/// Returns the objection of a part that nothing may move.
 fn nobody<const D: usize>(chain: &Chain<D>, part: Part, obstacle: u32) -> Veto<D> {
     let (Part::Connector(k) | Part::Rod(k)) = part;
     let reason = if chain.connectors()[k].failed { Reason::Failed } else { Reason::Fixed };
     objection(chain, k, reason, obstacle)
 }
 
-/// The ways that are tried, as parts of the push: all of it in every direction, then half.
+/// Returns the ways that are tried, as parts of the push: all of it in every direction, then half.
 fn ways<const D: usize>(away: Point<D>, velocity: Point<D>) -> impl Iterator<Item = Point<D>> {
     let planes = planes(away, velocity);
     let turned = move |turn_rad: f64| {
@@ -429,7 +432,7 @@ fn ways<const D: usize>(away: Point<D>, velocity: Point<D>) -> impl Iterator<Ite
     PARTS.into_iter().flat_map(all)
 }
 
-/// Directions across `away`, to turn it towards: the first off the obstacle's way.
+/// Returns directions across `away`, to turn it toward: the first off the obstacle's way.
 fn planes<const D: usize>(away: Point<D>, velocity: Point<D>) -> [Point<D>; 2] {
     let off = unit(velocity)
         .map(|v| along(away, v, -dot(away, v)))
@@ -438,13 +441,14 @@ fn planes<const D: usize>(away: Point<D>, velocity: Point<D>) -> [Point<D>; 2] {
     [first, across(away, first)]
 }
 
-/// The vector across two that are perpendicular; in the plane there is none, and it is not used.
+/// Returns the vector across two that are perpendicular; in the plane there is none, and it is not
+/// used.
 fn across<const D: usize>(u: Point<D>, v: Point<D>) -> Point<D> {
     let at = |i: usize| u[(i + 1) % D] * v[(i + 2) % D] - u[(i + 2) % D] * v[(i + 1) % D];
     std::array::from_fn(at)
 }
 
-/// The point of a ball around `center` that is nearest to `to`.
+/// Returns the point of a ball around `center` that is nearest to `to`.
 fn clipped<const D: usize>(center: Point<D>, to: Point<D>, radius_m: f64) -> Point<D> {
     let way_m = distance(center, to);
     if way_m <= radius_m { to } else { along(center, sub(to, center), radius_m / way_m) }

@@ -1,4 +1,4 @@
-//! One motion of a chain, by propagation, and where a base that is fixed objects by a reach.
+//! One motion of a chain: by propagation, or by a reach if a fixed base objects.
 
 use crate::arms::ik::{Engine, Goal, Solver};
 use crate::rods::chain::Chain;
@@ -11,7 +11,7 @@ use crate::rods::rules::Rules;
 use crate::rods::veto::{Motion, Moved, Outcome, Reason, Request, Veto};
 use sidestep_kernel::InputError;
 
-/// Moves a chain as requested; where a base that is fixed objects, by [`reach`].
+/// Moves a chain as requested; if a fixed base objects, by [`reach`].
 ///
 /// # Errors
 /// As [`Propagator::propagate`].
@@ -41,9 +41,9 @@ pub(super) fn go<const D: usize>(
     })
 }
 
-/// What is out of reach is told as that. Passes crawl where a chain is nearly straight: there damped
-/// least squares find the nearest posture that gets there, and the chain goes straight to it if
-/// nothing is in the way of it and on the way.
+/// Finds a posture, or reports that the target is out of reach. Passes converge slowly if a chain
+/// is nearly straight, so damped least squares find the nearest posture that gets there, and the
+/// chain goes straight to it if neither the posture nor the way to it is blocked.
 fn by_posture<const D: usize>(
     rules: Rules,
     chain: &mut Chain<D>,
@@ -84,17 +84,17 @@ fn by_posture<const D: usize>(
     Ok(Outcome::Moved(moved_since(&before, chain, k)))
 }
 
-/// From this part of its reach on a chain counts as nearly straight.
+/// Part of its reach from which on a chain counts as nearly straight.
 const STRETCHED: f64 = 0.95;
 
-/// A posture is taken as a motion where no connector goes further than this part of the longest
-/// rod.
+/// Longest move of a connector, as a part of the longest rod, for which a posture is accepted as a
+/// motion.
 const LONGEST_JUMP: f64 = 0.5;
 
-/// How near counts as there, for a connector that goes a step.
+/// Distance at which a connector's step counts as complete, meters.
 const TOLERANCE_M: f64 = 1e-7;
 
-/// What has moved, by comparison.
+/// Returns what has moved, by comparison.
 fn moved_since<const D: usize>(before: &[Point<D>], chain: &Chain<D>, k: usize) -> Moved<D> {
     let ways_m = before.iter().zip(chain.points()).map(|(a, b)| distance(*a, *b));
     let slaves = ways_m.enumerate().filter(|(i, _)| *i != k);

@@ -1,4 +1,4 @@
-//! Ways of a chain to get somewhere, made of motions of its rods.
+//! Ways for a chain to get somewhere, made of motions of its rods.
 //!
 //! ```text
 //! go.rs:     one motion; a base that is fixed is answered by a reach

@@ -1,10 +1,10 @@
-//! What an initiator that moves by itself tries after a veto (slides R8, R9).
+//! Alternatives of an autonomous initiator after a veto (slides R8, R9).
 //!
-//! A ladder with six rungs: shorter steps, other headings, a turn on the spot, waiting, the other
-//! end of the chain leads for a while, and the report that it is stuck. Each rung is tried once in
-//! a tick, and the first that works ends the climb. The slides leave open what follows a veto;
-//! that the other end leads is because a chain can be pulled out of where it was pushed into a
-//! fold (design 2.4). A planner or an operator gets the veto and no ladder.
+//! A ladder with six rungs: shorter steps, other headings, a turn on the spot, waiting, letting the
+//! other end of the chain lead for a while, and the report that it is stuck. Each rung is tried
+//! once in a tick, and the first that works ends the climb. The slides do not say what follows a
+//! veto; the other end leads because a chain can be pulled out of a fold that it was pushed into. A
+//! planner or an operator gets the veto and no ladder.
 
 mod memory;
 #[cfg(test)]
@@ -22,25 +22,25 @@ pub(crate) use memory::Memory;
 use sidestep_kernel::InputError;
 use sidestep_kernel::math::{cos, sin};
 
-/// Parts of a step that are tried when all of it is vetoed.
+/// Parts of a step that are tried when the whole step is vetoed.
 const PARTS: [f64; 3] = [0.5, 0.25, 0.125];
-/// Other headings that are tried.
+/// Other headings that are tried, rad.
 const FAN_RAD: [f64; 5] = [0.4, 0.8, 1.2, 1.6, 2.0];
 
-/// How long the rungs are.
+/// Lengths of the rungs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Rungs {
-    /// Turns on the spot in a row before it is given up.
+    /// Turns on the spot in a row before this rung is given up.
     pub turns: u32,
-    /// Ticks in a row that are waited while something moves nearby.
+    /// Ticks of waiting in a row while something moves nearby.
     pub waits: u32,
-    /// Ticks that the other end leads.
+    /// Ticks for which the other end leads.
     pub pull_back: u32,
-    /// How often the other end may lead without progress before the chain is stuck.
+    /// Number of times that the other end may lead without progress before the chain is stuck.
     pub hand_overs: u32,
-    /// How often a detour may lead through the same place without progress.
+    /// Number of times that a detour may lead through the same place without progress.
     pub visits: u32,
-    /// Straight ticks after which it is forgotten which side was good.
+    /// Straight ticks after which the good side is forgotten.
     pub straight: u32,
 }
 
@@ -50,37 +50,38 @@ impl Default for Rungs {
     }
 }
 
-/// What an initiator knows beside its neighborhood.
+/// An initiator's knowledge beside its neighborhood.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Situation {
-    /// How far its goal is, if it has one. Without there is no progress to miss, and detours
-    /// through the same place are not counted.
+    /// Distance of its goal, if it has one, meters. Without a goal there is no progress to miss,
+    /// and detours through the same place are not counted.
     pub goal_distance_m: Option<f64>,
     /// Whether something moves nearby, so that waiting may help.
     pub movers_near: bool,
     /// Whether its drive can turn on the spot.
     pub can_turn: bool,
-    /// Whether it only goes where it looks, as on wheels: then no other headings are tried.
+    /// Whether it only goes where it looks, as robots on wheels do: then no other headings are
+    /// tried.
     pub keeps_heading: bool,
 }
 
-/// What a climb came to. The chain has moved where a motion is told, and nowhere else.
+/// Outcome of a climb. The chain has moved only in the variants that hold a motion.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Climbed<const D: usize> {
     /// As wanted.
     Straight(Moved<D>),
     /// A part of the step.
     Shorter {
-        /// Which part.
+        /// The part.
         part: f64,
         /// The motion.
         moved: Moved<D>,
     },
     /// In another direction.
     Sideways {
-        /// The turn from the wanted direction; positive to the left, in space towards the axis.
+        /// The turn from the wanted direction, rad; positive to the left, in space toward the axis.
         turn_rad: f64,
-        /// In space: 0 where the turn was towards the second axis, 1 towards the third.
+        /// In space: 0 if the turn was toward the second axis, 1 if toward the third.
         plane: usize,
         /// The motion.
         moved: Moved<D>,
@@ -90,7 +91,7 @@ pub enum Climbed<const D: usize> {
         /// 1 to the left, -1 to the right.
         side: i8,
     },
-    /// Nothing moved: what is near may go away.
+    /// Nothing moved: the obstacle nearby may go away.
     Waiting {
         /// Ticks waited so far.
         n: u32,
@@ -104,24 +105,24 @@ pub enum Climbed<const D: usize> {
     },
     /// Nothing moved, and no rung is left; all objections, each once.
     Stuck {
-        /// From the wanted motion to the last rung; none where the wanted motion would now be free,
+        /// From the wanted motion to the last rung; empty if the wanted motion would now be free
         /// and only detours have led here.
         vetoes: Vec<Veto<D>>,
     },
-    /// Nothing moved: a planner or an operator wanted it, and is told.
+    /// Nothing moved: a planner or an operator wanted the motion, and gets the veto.
     Vetoed(Veto<D>),
 }
 
-/// A ladder, and where on it an initiator stands.
+/// A ladder, and an initiator's position on it.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Ladder {
-    /// How long the rungs are.
+    /// Lengths of the rungs.
     pub rungs: Rungs,
-    /// What is remembered from tick to tick; part of a checkpoint.
+    /// Memory from tick to tick; part of a checkpoint.
     pub memory: Memory,
 }
 
-/// What a climb works on.
+/// The working data of a climb.
 struct Climb<'a, const D: usize> {
     chain: &'a mut Chain<D>,
     obstacles: &'a Obstacles<D>,
@@ -131,7 +132,7 @@ struct Climb<'a, const D: usize> {
 }
 
 impl<const D: usize> Climb<'_, D> {
-    /// All of a motion, or none.
+    /// Tries all of a motion, or none.
     fn attempt(&mut self, motion: Motion<D>) -> Result<Option<Moved<D>>, InputError> {
         let request = Request { motion, mode: Mode::Exact, ..self.wanted };
         Ok(match go(self.propagator, self.chain, self.obstacles, &request)? {
@@ -150,7 +151,7 @@ impl<const D: usize> Climb<'_, D> {
         }
     }
 
-    /// The wanted motion with another way from where the initiator is.
+    /// Returns the wanted motion with another way from the initiator's place.
     fn varied(&self, way: impl Fn(Point<D>) -> Point<D>) -> Motion<D> {
         let at = self.chain.points();
         let to = |k: usize, to: Point<D>| add(at[k], way(sub(to, at[k])));
@@ -160,7 +161,7 @@ impl<const D: usize> Climb<'_, D> {
         }
     }
 
-    /// The initiator and its wanted way.
+    /// Returns the initiator and its wanted way.
     fn wanted_way(&self) -> (usize, Point<D>) {
         let (k, to) = head(&self.wanted.motion);
         (k, sub(to, self.chain.points()[k]))
@@ -168,13 +169,13 @@ impl<const D: usize> Climb<'_, D> {
 }
 
 impl Ladder {
-    /// A ladder whose initiator has met nothing yet.
+    /// Returns a ladder whose initiator has met nothing yet.
     pub fn new(rungs: Rungs) -> Self {
         Self { rungs, memory: Memory::default() }
     }
 
-    /// Moves as wanted, or as near to it as a rung allows. The wanted motion is asked for exactly,
-    /// whatever its mode: part of the way is a rung of its own.
+    /// Moves as wanted, or as near to it as a rung allows. The wanted motion is requested exactly,
+    /// whatever its mode, because part of the way is a rung of its own.
     ///
     /// # Errors
     /// As [`Propagator::propagate`].
@@ -190,7 +191,7 @@ impl Ladder {
         told.map(|(climbed, _)| climbed)
     }
 
-    /// The same, and the objection to the wanted motion itself, if there was one.
+    /// Climbs, and also returns the objection to the wanted motion itself, if there was one.
     ///
     /// # Errors
     /// As [`Propagator::propagate`].
@@ -222,7 +223,7 @@ impl Ladder {
         Ok((self.after_a_veto(&mut climb, situation)?, objection))
     }
 
-    /// The rungs one after the other.
+    /// Tries the rungs one after the other.
     fn after_a_veto<const D: usize>(
         &mut self,
         climb: &mut Climb<'_, D>,
@@ -238,7 +239,7 @@ impl Ladder {
         }
     }
 
-    /// Other headings, first those on the side where one was good.
+    /// Tries other headings, first those on the side where one was good.
     fn sideways<const D: usize>(
         &mut self,
         climb: &mut Climb<'_, D>,
@@ -260,7 +261,7 @@ impl Ladder {
         Ok(None)
     }
 
-    /// The rungs for an initiator that cannot move at all.
+    /// Tries the rungs for an initiator that cannot move at all.
     fn without_a_way<const D: usize>(
         &mut self,
         climb: &mut Climb<'_, D>,
@@ -279,7 +280,7 @@ impl Ladder {
         self.pull_back(climb)
     }
 
-    /// The other end goes on along its rod, or beside it; the initiator is dragged.
+    /// Lets the other end go on along its rod, or beside it; the initiator is dragged.
     fn pull_back<const D: usize>(
         &mut self,
         climb: &mut Climb<'_, D>,
@@ -311,7 +312,8 @@ impl Ladder {
     ) -> Result<Climbed<D>, InputError> {
         self.memory.starts_afresh();
         if climb.vetoes.is_empty() {
-            // Its detours have led nowhere, and it has tried nothing since: what is in the way?
+            // Its detours have led nowhere, and it has tried nothing since, so ask what is in the
+            // way.
             let request = Request { mode: Mode::Exact, ..climb.wanted };
             let mut chain = climb.chain.clone();
             let tried = go(climb.propagator, &mut chain, climb.obstacles, &request)?;
@@ -337,8 +339,8 @@ fn head<const D: usize>(motion: &Motion<D>) -> (usize, Point<D>) {
     }
 }
 
-/// The end further from an initiator, and the direction in which its rod points out of the chain;
-/// `None` for a chain of one connector.
+/// Returns the end farther from an initiator, and the direction in which its rod points out of the
+/// chain; `None` for a chain of one connector.
 fn other_end<const D: usize>(chain: &Chain<D>, k: usize) -> Option<(usize, Point<D>)> {
     let last = chain.points().len() - 1;
     let (by, neighbor) = if 2 * k <= last { (last, last.checked_sub(1)?) } else { (0, 1) };
@@ -346,9 +348,9 @@ fn other_end<const D: usize>(chain: &Chain<D>, k: usize) -> Option<(usize, Point
     Some((by, u))
 }
 
-/// Planes and turns in the order in which they are tried. Where no side is known to be good, the
-/// least turn first; otherwise all of that side before the other, so that two ways round do not
-/// take turns.
+/// Returns planes and turns in the order in which they are tried. If no side is known to be good,
+/// the least turn comes first; otherwise all of that side before the other, so that the chain does
+/// not alternate between two ways round.
 fn fan(memory: &Memory, planes: usize) -> impl Iterator<Item = (usize, f64)> + use<> {
     let side = f64::from(memory.side_or_left());
     let keeps_side = memory.side != 0;
@@ -365,8 +367,8 @@ fn fan(memory: &Memory, planes: usize) -> impl Iterator<Item = (usize, f64)> + u
     })
 }
 
-/// Unit vectors across a direction: in the plane to its left, in space towards the second and the
-/// third axis.
+/// Returns unit vectors across a direction: in the plane to its left, in space toward the second
+/// and the third axis.
 fn axes_across<const D: usize>(u: Point<D>) -> [Point<D>; 2] {
     if D == 2 {
         return [perpendicular(u); 2];
@@ -374,12 +376,12 @@ fn axes_across<const D: usize>(u: Point<D>) -> [Point<D>; 2] {
     [1, 2].map(|axis| {
         let e: Point<D> = std::array::from_fn(|i| if i == axis { 1.0 } else { 0.0 });
         let across = along(e, u, -dot(e, u));
-        // Along an axis there is no turn towards it, and any other does.
+        // Along an axis there is no turn toward that axis, and any other does.
         if norm(across) > 1e-6 { unit(across).unwrap_or(first_axis()) } else { perpendicular(u) }
     })
 }
 
-/// A vector, turned in the plane of two unit vectors from the first towards the second.
+/// Returns a vector, turned in the plane of two unit vectors from the first toward the second.
 fn turned<const D: usize>(v: Point<D>, u: Point<D>, across: Point<D>, turn_rad: f64) -> Point<D> {
     let (x, y) = (dot(v, u), dot(v, across));
     let (c, s) = (cos(turn_rad), sin(turn_rad));

@@ -1,4 +1,5 @@
-//! Where a slave may go when its master has moved: push, pull, resize, rotate (slides A1 to A8).
+//! Possible places of a slave when its master has moved: push, pull, resize, rotate (slides A1 to
+//! A8).
 
 use super::chain::{Mobility, Rod};
 use super::geometry::{
@@ -13,7 +14,7 @@ use super::search::{Search, away, cosine_of_half_angle};
 use super::veto::Reason;
 use std::f64::consts::PI;
 
-/// A place for a slave.
+/// A possible place for a slave.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Candidate<const D: usize> {
     pub(super) at: Point<D>,
@@ -27,18 +28,19 @@ pub(super) struct Candidate<const D: usize> {
 pub(super) struct Work<const D: usize> {
     blocks: Vec<Block<D>>,
     arcs: Arcs,
-    /// Whether a rod that turns tries all its lengths, or others only where its own is blocked.
+    /// Whether a rod that turns tries all its lengths, or others only if its present one is
+    /// blocked.
     pub(super) all_lengths: bool,
-    /// Whether a plane rod looks for a way on both sides, or on the further one only where the
-    /// nearer has none.
+    /// Whether a plane rod looks for a way on both sides, or on the farther one only if the nearer
+    /// has none.
     pub(super) both_sides: bool,
-    /// What [`Scene::candidates`] found, best first.
+    /// Places found by [`Scene::candidates`], best first.
     pub(super) found: Vec<Candidate<D>>,
-    /// Whether a side is left that nobody has looked at.
+    /// Whether one side has not been examined yet.
     pub(super) has_other_side: bool,
 }
 
-/// The push, pull or resize of one rod: the slave's new place, bit-identical where it stays.
+/// Pushes, pulls or resizes one rod; returns the slave's new place, bit-identical if it stays.
 #[inline]
 pub(super) fn guided<const D: usize>(
     [mo, mn, so]: [Point<D>; 3],
@@ -57,25 +59,25 @@ pub(super) fn guided<const D: usize>(
     }
 }
 
-/// The length within a rod's limits that is nearest to `d`. Unlike `f64::clamp` it takes no care of
-/// what is no number, and so takes two instructions.
+/// Returns the length within a rod's limits that is nearest to `d`. Unlike `f64::clamp` it does not
+/// handle NaN, and so takes only two instructions.
 #[inline]
 pub(super) fn clamped(d: f64, min_m: f64, max_m: f64) -> f64 {
     let t = if d > min_m { d } else { min_m };
     if t < max_m { t } else { max_m }
 }
 
-/// How often a place is brought into a box and back onto a rod's lengths.
+/// Most rounds that bring a place into a box and back onto a rod's lengths.
 const TURNS_INTO_A_BOX: usize = 200;
 
-/// Direction of the guide line (A1); that of the old rod where the master is at the slave's place.
+/// Direction of the guide line (A1), or of the old rod if the master is at the slave's place.
 fn guide_line<const D: usize>(step: &Step<D>) -> Point<D> {
     unit(sub(step.so, step.mn)).or(unit(sub(step.so, step.mo))).unwrap_or(first_axis())
 }
 
 impl<const D: usize> Scene<'_, D> {
-    /// All good places for a slave, best first, into `work.found`: the one on the guide line
-    /// alone if it is good.
+    /// Puts all good places for a slave, best first, into `work.found`; only the one on the guide
+    /// line if it is good.
     pub(super) fn candidates(&self, step: &Step<D>, work: &mut Work<D>) -> Result<(), Refusal> {
         work.found.clear();
         work.has_other_side = false;
@@ -108,8 +110,8 @@ impl<const D: usize> Scene<'_, D> {
         }
     }
 
-    /// A slave that may leave its box nowhere: a place in it that the rod allows, by turns back into
-    /// the box and onto the rod's lengths.
+    /// Returns a place that the rod allows for a slave confined to a box, by alternating between
+    /// the box and the rod's lengths.
     fn in_its_box(&self, step: &Step<D>, guided: Point<D>) -> Option<Point<D>> {
         let mobility = &self.chain.connectors()[step.slave].mobility;
         let mut at = guided;
@@ -132,7 +134,7 @@ impl<const D: usize> Scene<'_, D> {
         self.judge(step, at)
     }
 
-    /// A slave that never moves: it objects unless the rod is good as it is.
+    /// Handles a slave that never moves: it objects unless the rod is good as it is.
     fn stay(&self, step: &Step<D>, work: &mut Work<D>) -> Result<(), Refusal> {
         if !fits(step.rod, distance(step.mn, step.so)) {
             return Err(Refusal::of(self.chain.connectors()[step.slave].why_still()));
@@ -142,7 +144,7 @@ impl<const D: usize> Scene<'_, D> {
         Ok(())
     }
 
-    /// A slave on a line or in a plane: the nearest places there that the rod allows.
+    /// Handles a slave on a line or in a plane: finds the nearest places there that the rod allows.
     fn on_its_line(&self, step: &Step<D>, work: &mut Work<D>) -> Result<(), Refusal> {
         let d = distance(step.mn, step.so);
         let t = d.max(step.rod.min_m).min(step.rod.max_m);
@@ -168,7 +170,8 @@ impl<const D: usize> Scene<'_, D> {
         if work.found.is_empty() { Err(refusal) } else { Ok(()) }
     }
 
-    /// The slides' rule, literally: one turn to the tangent of what is hit nearest the master.
+    /// Applies the slides' rule literally: one turn to the tangent of the obstacle nearest to the
+    /// master.
     fn rotate_once(
         &self,
         step: &Step<D>,
@@ -202,8 +205,8 @@ impl<const D: usize> Scene<'_, D> {
         Ok(())
     }
 
-    /// The union rule: for the rod's length, and for others it may have, the nearest directions
-    /// that are free of everything.
+    /// Applies the union rule: for the rod's length, and for others it may have, finds the nearest
+    /// directions that are free of everything.
     fn rotate(
         &self,
         step: &Step<D>,
@@ -231,7 +234,7 @@ impl<const D: usize> Scene<'_, D> {
         Err(why.or(inside).unwrap_or(refusal))
     }
 
-    /// Adds the good places for one length of the rod; returns what the master is inside of.
+    /// Adds the good places for one length of the rod; returns the block that contains the master.
     fn turns(
         &self,
         step: &Step<D>,
@@ -250,7 +253,8 @@ impl<const D: usize> Scene<'_, D> {
                     true
                 }
                 Err(refusal) => {
-                    // What speaks against a free direction says more than that the first was not.
+                    // A free direction that fails for another reason is more informative than the
+                    // first objection.
                     if !matches!(refusal.reason, Reason::BothSidesBlocked | Reason::BendLimit) {
                         *why = why.or(Some(refusal));
                     }
@@ -269,7 +273,7 @@ impl<const D: usize> Scene<'_, D> {
             }
             return arcs.inside;
         }
-        // A master inside something cannot turn out of it.
+        // A master inside an obstacle cannot turn out of it.
         let inside = blocks.iter().filter(|b| contains_master(step, b)).map(|b| b.name).min();
         blocks.retain(|b| !contains_master(step, b));
         let search = Search { step, length_m, blocks };
@@ -283,8 +287,8 @@ impl<const D: usize> Scene<'_, D> {
         inside
     }
 
-    /// All that a rod of a length may meet on any side. The order is that of the grid or the tree,
-    /// and must not matter: ties go to the lower name.
+    /// Collects everything that a rod of a length may meet on any side. The order is that of the
+    /// grid or the tree, and must not matter, so ties go to the lower name.
     fn collect(&self, step: &Step<D>, length_m: f64, work: &mut Work<D>) {
         let reach_m = length_m + step.rod.radius_m.max(step.tip_radius_m) + 2.0 * SKIN_M;
         work.blocks.clear();
@@ -303,20 +307,21 @@ fn contains_master<const D: usize>(step: &Step<D>, block: &Block<D>) -> bool {
 }
 
 fn sort<const D: usize>(step: &Step<D>, found: &mut [Candidate<D>]) {
-    // Stable: of equals the one found first stays first, which is the counter-clockwise one.
+    // The sort is stable, so of equal candidates the counter-clockwise one, found first, stays
+    // first.
     found.sort_by(|a, b| {
         let way = |c: &Candidate<D>| distance(c.at, step.so);
         way(a).total_cmp(&way(b)).then(a.turn_rad.total_cmp(&b.turn_rad))
     });
 }
 
-/// Blocked directions, as far as anybody asked.
+/// Blocked directions, computed only where needed.
 #[derive(Debug, Clone, Default)]
 struct Arcs {
     arcs: Vec<Arc>,
-    /// Of which blocks the arcs are there.
+    /// Whether the arcs of each block have been computed.
     known: Vec<bool>,
-    /// What the master is inside of.
+    /// The block that contains the master.
     inside: Option<Name>,
 }
 
@@ -329,7 +334,7 @@ struct Plane<'a, const D: usize> {
 }
 
 impl<const D: usize> Plane<'_, D> {
-    /// The nearest free directions to the left and to the right, the nearer one first.
+    /// Returns the nearest free directions to the left and to the right, the nearer one first.
     fn sides<'a>(&'a self, known: &'a mut Arcs) -> Sides<'a, D> {
         known.arcs.clear();
         known.known.clear();
@@ -343,7 +348,7 @@ impl<const D: usize> Plane<'_, D> {
         Sides { plane: self, known, start_rad, is_open: [true; 2] }
     }
 
-    /// Adds the arcs of all blocks that a rod in a direction meets; whether there were any.
+    /// Adds the arcs of all blocks that a rod in a direction meets; returns whether there were any.
     fn learns(&self, u: Point<2>, known: &mut Arcs) -> bool {
         let u: Point<D> = std::array::from_fn(|i| u[i]);
         let s = along(self.step.mn, u, self.length_m);
@@ -365,14 +370,14 @@ impl<const D: usize> Plane<'_, D> {
             || block.stops_tip && !block.core.is_clear_of_point(s, near_m + self.step.tip_radius_m)
     }
 
-    /// All directions that one block blocks.
+    /// Adds all directions that one block blocks.
     fn block(&self, block: &Block<D>, known: &mut Arcs) {
         let step = self.step;
         let reach = Reach { master: plane(step.mn), length_m: self.length_m };
         let core = plane_core(&block.core);
         let apart_m = core.nearest_to_point(reach.master).distance_m;
         let rod_m = block.radius_m + step.rod.radius_m;
-        // Within the skin of a surface the master blocks the half-plane behind it.
+        // If the master is within the skin of a surface, the half-plane behind it is blocked.
         let skinned_m = if apart_m >= rod_m { (rod_m + SKIN_M).min(apart_m) } else { rod_m };
         if block.stops_rod && !block_rod(&reach, &core, skinned_m, &mut known.arcs) {
             known.inside = Some(known.inside.map_or(block.name, |name| name.min(block.name)));
@@ -384,15 +389,16 @@ impl<const D: usize> Plane<'_, D> {
     }
 }
 
-/// The free directions on both sides, the nearer one first.
+/// An iterator over the free directions on both sides, the nearer one first.
 ///
-/// Only blocks that are met on the way are turned into arcs: the first direction that is in no
-/// arc, and where the rod meets no other block, is the first that is in no arc of any.
+/// Only blocks that are met on the way are turned into arcs: a direction that is the first outside
+/// all these arcs, and in which the rod meets no other block, is also the first outside the arcs of
+/// all blocks.
 struct Sides<'a, const D: usize> {
     plane: &'a Plane<'a, D>,
     known: &'a mut Arcs,
     start_rad: f64,
-    /// Whether there may be a direction to the left, and to the right.
+    /// Whether there may be a direction to the left, and one to the right.
     is_open: [bool; 2],
 }
 
@@ -439,7 +445,7 @@ fn plane_core<const D: usize>(core: &Core<D>) -> Core<2> {
     }
 }
 
-/// The points of a segment at a distance from `m`.
+/// Returns the points of a segment at a given distance from `m`.
 fn on_segment_at<const D: usize>(
     m: Point<D>,
     t: f64,
@@ -457,7 +463,8 @@ fn on_segment_at<const D: usize>(
     })
 }
 
-/// The points of a plane at a distance from `m` that are nearest to and furthest from `so`.
+/// Returns the points of a plane at a given distance from `m` that are nearest to and farthest from
+/// `so`.
 fn on_plane_at<const D: usize>(
     m: Point<D>,
     t: f64,

@@ -1,41 +1,41 @@
 //! The chain: connectors joined by rods (slides V1 to V7, K1 to K6).
 //!
-//! A rod's length is never stored: it is the distance of its ends (V7).
+//! A rod's length is never stored: it is the distance between its ends (V7).
 
 use super::geometry::{self, Point, angle_rad, distance, dot, norm, sub};
 use super::veto::Reason;
 use sidestep_kernel::InputError;
 use std::f64::consts::PI;
 
-/// Rods are within their lengths to this, meters.
+/// Tolerance of the rods' lengths, meters.
 pub(crate) const LENGTH_TOLERANCE_M: f64 = 1e-9;
 
-/// Further from the origin, rounding is no longer small against the tolerances.
+/// Largest coordinate: farther from the origin, rounding is no longer small against the tolerances.
 const MAX_COORDINATE_M: f64 = 1e6;
 
-/// Whether a connector may be at a point at all: finite, and at most 1e6 m from the origin along
-/// every axis.
+/// Whether a connector may be at a point at all: it must be finite, and at most 1e6 m from the
+/// origin along every axis.
 pub(super) fn is_in_range<const D: usize>(point: &Point<D>) -> bool {
     point.iter().all(|x| x.abs() <= MAX_COORDINATE_M)
 }
 
-/// A target that no connector can be sent to.
+/// Returns the error for a target that no connector can be sent to.
 pub(super) fn out_of_range<const D: usize>(target: &Point<D>) -> InputError {
     InputError::new("target", format!("is {target:?}"), "give finite coordinates up to 1e6 m")
 }
 
-/// Where a connector may be (slide K1).
+/// Constraint on the places of a connector (slide K1).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Mobility<const D: usize> {
     /// Anywhere.
     Free,
     /// On the segment between two points.
     OnSegment([Point<D>; 2]),
-    /// Where `normal . x = offset_m`: a plane, in two dimensions a line. The normal has length 1.
+    /// On a plane, in two dimensions a line: `normal . x = offset_m`. The normal has length 1.
     OnPlane {
         /// Unit vector perpendicular to the plane.
         normal: Point<D>,
-        /// Distance of the plane from the origin along the normal.
+        /// Distance of the plane from the origin along the normal, meters.
         offset_m: f64,
     },
     /// Inside a box along the axes.
@@ -45,12 +45,12 @@ pub enum Mobility<const D: usize> {
         /// Upper corner.
         hi: Point<D>,
     },
-    /// Nowhere else: the base of an arm (slide R7).
+    /// Only where it is, as the base of an arm (slide R7).
     Fixed,
 }
 
 impl<const D: usize> Mobility<D> {
-    /// The allowed point nearest to `p`; `at` is where the connector is.
+    /// Returns the allowed point nearest to `p`; `at` is the connector's present place.
     pub fn project(&self, p: Point<D>, at: Point<D>) -> Point<D> {
         match self {
             Self::Free => p,
@@ -63,7 +63,7 @@ impl<const D: usize> Mobility<D> {
         }
     }
 
-    /// Whether `p` is allowed, to 1e-9 m.
+    /// Whether `p` is allowed, within 1e-9 m.
     pub fn allows(&self, p: Point<D>, at: Point<D>) -> bool {
         matches!(self, Self::Free) || distance(self.project(p, at), p) <= LENGTH_TOLERANCE_M
     }
@@ -72,9 +72,9 @@ impl<const D: usize> Mobility<D> {
 /// A ball joint between two rods, or an end of the chain.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Connector<const D: usize> {
-    /// Radius of its body.
+    /// Radius of its body, meters.
     pub radius_m: f64,
-    /// Where it may be.
+    /// Constraint on its place.
     pub mobility: Mobility<D>,
     /// Whether it has broken down and stays where it is (slide R8).
     pub failed: bool,
@@ -83,7 +83,7 @@ pub struct Connector<const D: usize> {
 }
 
 impl<const D: usize> Connector<D> {
-    /// A connector that may go anywhere and bend at will.
+    /// Returns a connector that may go anywhere and bend without limit.
     pub fn free(radius_m: f64) -> Self {
         Self { radius_m, mobility: Mobility::Free, failed: false, max_bend_rad: PI }
     }
@@ -93,7 +93,7 @@ impl<const D: usize> Connector<D> {
         self.failed || self.mobility == Mobility::Fixed
     }
 
-    /// What a connector that never moves objects with.
+    /// Returns the reason for which a connector that never moves objects.
     pub(super) fn why_still(&self) -> Reason {
         if self.failed { Reason::Failed } else { Reason::Fixed }
     }
@@ -103,20 +103,20 @@ impl<const D: usize> Connector<D> {
     }
 }
 
-/// What joins two connectors: a distance within limits (slides V3, K2, K3, K5).
+/// A link of two connectors: a distance within limits (slides V3, K2, K3, K5).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rod {
-    /// Least length; above 0.
+    /// Least length, meters; above 0.
     pub min_m: f64,
-    /// Greatest length; equal to the least for a rod of fixed length.
+    /// Greatest length, meters; equal to the least for a rod of fixed length.
     pub max_m: f64,
-    /// Radius of its body; at most that of the connectors at its ends. Well below theirs for
-    /// swarms, whose rods are virtual: thick rods make slaves jump (pitfall 5).
+    /// Radius of its body, meters; at most that of the connectors at its ends. It should be well
+    /// below theirs for swarms, whose rods are virtual, because thick rods make slaves jump.
     pub radius_m: f64,
 }
 
 impl Rod {
-    /// A rod of one length.
+    /// Returns a rod of fixed length.
     pub fn fixed(length_m: f64, radius_m: f64) -> Self {
         Self { min_m: length_m, max_m: length_m, radius_m }
     }
@@ -128,12 +128,12 @@ pub struct Chain<const D: usize> {
     points: Vec<Point<D>>,
     connectors: Vec<Connector<D>>,
     rods: Vec<Rod>,
-    /// How many connectors are not free, have failed, or have a bend limit.
+    /// Number of connectors that are not free, have failed, or have a bend limit.
     special: usize,
     still: StillMeasures,
 }
 
-/// What only new rods or radii change.
+/// Measures that only new rods or radii change.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct StillMeasures {
     longest_m: f64,
@@ -141,11 +141,11 @@ struct StillMeasures {
 }
 
 impl<const D: usize> Chain<D> {
-    /// A chain with its connectors at `points`.
+    /// Returns a chain with its connectors at `points`.
     ///
     /// # Errors
-    /// Numbers that do not match, are not finite or not in range; coincident neighbors; rods
-    /// whose ends are not within their limits (the place names the connector or rod).
+    /// When counts do not match, numbers are not finite or not in range, neighbors coincide, or
+    /// rods are outside their limits (the place names the connector or rod).
     pub fn new(
         points: Vec<Point<D>>,
         connectors: Vec<Connector<D>>,
@@ -167,10 +167,11 @@ impl<const D: usize> Chain<D> {
         }
     }
 
-    /// A chain whose rods need not be within their limits yet: one that is to be re-formed.
+    /// Returns a chain whose rods need not be within their limits yet, because it is to be
+    /// re-formed.
     ///
     /// # Errors
-    /// As [`Self::new`], but for the lengths.
+    /// As [`Self::new`], except for the lengths.
     pub fn broken(
         points: Vec<Point<D>>,
         connectors: Vec<Connector<D>>,
@@ -198,8 +199,8 @@ impl<const D: usize> Chain<D> {
         Ok(Self { points, connectors, rods, special, still })
     }
 
-    /// A chain of equal rods and connectors, straight from `start` along the unit vector `u`,
-    /// every rod at its greatest length.
+    /// Returns a chain of equal rods and connectors, straight from `start` along the unit vector
+    /// `u`, every rod at its greatest length.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -215,7 +216,7 @@ impl<const D: usize> Chain<D> {
         Self::new(points, vec![connector; n_rods + 1], vec![rod; n_rods])
     }
 
-    /// Positions of the connectors.
+    /// Returns the positions of the connectors.
     pub fn points(&self) -> &[Point<D>] {
         &self.points
     }
@@ -224,40 +225,41 @@ impl<const D: usize> Chain<D> {
         &mut self.points
     }
 
-    /// The positions, to be changed, and the rods.
+    /// Returns the positions, to be changed, and the rods.
     pub(super) fn parts_mut(&mut self) -> (&mut [Point<D>], &[Rod]) {
         (&mut self.points, &self.rods)
     }
 
-    /// The connectors.
+    /// Returns the connectors.
     pub fn connectors(&self) -> &[Connector<D>] {
         &self.connectors
     }
 
-    /// The rods; rod `i` joins connectors `i` and `i + 1`.
+    /// Returns the rods; rod `i` joins connectors `i` and `i + 1`.
     pub fn rods(&self) -> &[Rod] {
         &self.rods
     }
 
-    /// The rod between two neighbors.
+    /// Returns the rod between two neighbors.
     #[inline]
     pub fn rod_between(&self, i: usize, j: usize) -> Rod {
         self.rods[i.min(j)]
     }
 
-    /// Length of a rod.
+    /// Returns the length of a rod, meters.
     pub fn length_m(&self, rod: usize) -> f64 {
         distance(self.points[rod], self.points[rod + 1])
     }
 
-    /// Whether a rod is within its limits, to [`LENGTH_TOLERANCE_M`].
+    /// Whether a rod is within its limits, to a tolerance of [`LENGTH_TOLERANCE_M`].
     pub fn is_rod_within(&self, i: usize) -> bool {
         let rod = self.rods[i];
         let allowed = rod.min_m - LENGTH_TOLERANCE_M..=rod.max_m + LENGTH_TOLERANCE_M;
         allowed.contains(&self.length_m(i))
     }
 
-    /// The greatest amount by which a rod is outside its limits; 0 where all are inside.
+    /// Returns the greatest amount by which a rod is outside its limits, meters; 0 if all are
+    /// inside.
     pub fn max_rod_violation_m(&self) -> f64 {
         let outside = |(i, rod): (usize, &Rod)| {
             let length_m = self.length_m(i);
@@ -266,7 +268,8 @@ impl<const D: usize> Chain<D> {
         self.rods.iter().enumerate().map(outside).fold(0.0, f64::max)
     }
 
-    /// The angle between the directions of the rods at an inner connector; `None` at the ends.
+    /// Returns the angle between the directions of the rods at an inner connector, rad; `None` at
+    /// the ends.
     pub fn bend_rad(&self, i: usize) -> Option<f64> {
         (i > 0 && i + 1 < self.points.len()).then(|| {
             let into = sub(self.points[i], self.points[i - 1]);
@@ -274,41 +277,41 @@ impl<const D: usize> Chain<D> {
         })
     }
 
-    /// A move that is shorter than this changes nothing.
+    /// Returns the length below which a move counts as none, meters.
     pub fn least_move_m(&self) -> f64 {
         1e-12 * self.still.longest_m
     }
 
-    /// A quarter of the least rod or radius: how far an initiator goes at once where something
-    /// may be in the way.
+    /// Returns how far an initiator goes at once if something may be in the way, meters: a quarter
+    /// of the least rod or radius.
     pub fn step_m(&self) -> f64 {
         0.25 * self.still.least_m
     }
 
-    /// Whether every connector is free and bends at will.
+    /// Whether every connector is free and bends without limit.
     pub fn is_plain(&self) -> bool {
         self.special == 0
     }
 
-    /// Breaks a connector down, or repairs it (slide R8).
+    /// Marks a connector as failed, or as repaired (slide R8).
     pub fn set_failed(&mut self, i: usize, failed: bool) {
         self.change(i, |c| c.failed = failed);
     }
 
-    /// Gives a connector another mobility (slide R10).
+    /// Gives a connector a new mobility (slide R10).
     ///
     /// # Errors
-    /// Numbers that are not finite, a normal that is not of length 1, a box with lo above hi.
+    /// When numbers are not finite, a normal is not of length 1, or a box has lo above hi.
     pub fn set_mobility(&mut self, i: usize, mobility: Mobility<D>) -> Result<(), InputError> {
         check_mobility(i, &mobility)?;
         self.change(i, |c| c.mobility = mobility);
         Ok(())
     }
 
-    /// Gives a connector another bend limit, in (0, pi].
+    /// Gives a connector a new bend limit, rad, in (0, pi].
     ///
     /// # Errors
-    /// A limit out of range.
+    /// When the limit is out of range.
     pub fn set_max_bend_rad(&mut self, i: usize, max_bend_rad: f64) -> Result<(), InputError> {
         check_bend(i, max_bend_rad)?;
         self.change(i, |c| c.max_bend_rad = max_bend_rad);

@@ -1,9 +1,8 @@
-//! Segments, boxes and their distances, in two and three dimensions with one code.
+//! Segments, boxes and their distances, in two and three dimensions with the same code.
 //!
-//! Distances between segments are the least of the four distances from an end to the other
-//! segment and, where both feet are inside, of the distance of the lines. The usual clamped
-//! formula is off by up to 4e-8 for nearly parallel segments, which a promise of 1e-9 m cannot
-//! afford.
+//! The distance between segments is the least of the four distances from an end to the other
+//! segment and, if both feet are inside, the distance of the lines. The usual clamped formula is
+//! off by up to 4e-8 for nearly parallel segments, too much for a promise of 1e-9 m.
 
 pub use sidestep_kernel::geometry::{
     Point, across, add, along, angle_rad, between, cross, cross_2d, distance, dot, first_axis,
@@ -11,19 +10,19 @@ pub use sidestep_kernel::geometry::{
     unit,
 };
 
-/// How near something comes, and where.
+/// Nearest points of two bodies, and their distance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Nearest<const D: usize> {
-    /// Distance between the nearest points.
+    /// Distance between the nearest points, meters.
     pub distance_m: f64,
-    /// The nearest point of the segment or point that was asked about.
+    /// The nearest point of the segment or point in question.
     pub on_body: Point<D>,
     /// The nearest point of the other one.
     pub on_core: Point<D>,
 }
 
 impl<const D: usize> Nearest<D> {
-    /// Two points.
+    /// Returns the distance between two points.
     pub fn of(on_body: Point<D>, on_core: Point<D>) -> Self {
         Self { distance_m: distance(on_body, on_core), on_body, on_core }
     }
@@ -33,7 +32,7 @@ impl<const D: usize> Nearest<D> {
     }
 }
 
-/// The nearest points of the segments `p q` (the body) and `a b` (the core).
+/// Returns the nearest points of the segments `p q` (the body) and `a b` (the core).
 pub fn between_segments<const D: usize>(
     [p, q]: [Point<D>; 2],
     [a, b]: [Point<D>; 2],
@@ -45,11 +44,11 @@ pub fn between_segments<const D: usize>(
     between_insides([p, q], [a, b]).map_or(ends, |inside| ends.or(inside))
 }
 
-/// Segments at a smaller angle (its sine squared) are parallel: then what the lines between their
-/// ends are nearer than the ends is far below any tolerance, and where is lost in rounding.
+/// Squared sine of the angle below which segments count as parallel: then the lines are nearer than
+/// the ends by far less than any tolerance, and the nearest place is lost in rounding.
 const PARALLEL2: f64 = 1e-14;
 
-/// The nearest points of the lines, where both lie inside the segments.
+/// Returns the nearest points of the lines, if both lie inside the segments.
 fn between_insides<const D: usize>(
     [p, q]: [Point<D>; 2],
     [a, b]: [Point<D>; 2],
@@ -69,14 +68,14 @@ fn between_insides<const D: usize>(
     let is_inside = s > 0.0 && s < 1.0 && t > 0.0 && t < 1.0;
     (is_inside && norm2(n) > PARALLEL2 * aa * ee).then(|| {
         let (on_body, on_core) = (along(p, d1, s), along(a, d2, t));
-        // The points are a little off along the lines; their distance across the lines is not.
+        // The points are slightly off along the lines; their distance across the lines is not.
         let r = sub(on_body, on_core);
         let distance_m = dot([r[0], r[1], r[2]], n).abs() / norm(n);
         Nearest { distance_m, on_body, on_core }
     })
 }
 
-/// Whether two plane segments cross: the ends of each strictly on both sides of the other.
+/// Whether two plane segments cross: the ends of each are strictly on both sides of the other.
 #[inline]
 pub fn cross_each_other<const D: usize>([p, q]: [Point<D>; 2], [a, b]: [Point<D>; 2]) -> bool {
     let (d1, d2) = (sub(q, p), sub(b, a));
@@ -91,7 +90,7 @@ pub struct Cuboid<const D: usize> {
     pub center: Point<D>,
     /// Directions of its edges: unit vectors, each perpendicular to the others.
     pub axes: [Point<D>; D],
-    /// Half its extent along each axis.
+    /// Half its extent along each axis, meters.
     pub half_m: Point<D>,
 }
 
@@ -105,10 +104,10 @@ impl<const D: usize> Cuboid<D> {
         (0..D).fold(self.center, |at, i| along(at, self.axes[i], local[i]))
     }
 
-    /// The nearest points of the segment `p q` and the box (which is solid).
+    /// Returns the nearest points of the segment `p q` and the box (which is solid).
     ///
-    /// The squared distance along the segment is convex and made of parabolas; its slope rises,
-    /// so the least lies where the slope changes sign between two of the at most `2 D` joints.
+    /// The squared distance along the segment is convex and made of parabolas; its slope rises, so
+    /// the minimum lies where the slope changes sign between two of the at most `2 D` joints.
     pub fn nearest_to_segment(&self, [p, q]: [Point<D>; 2]) -> Nearest<D> {
         let (from, to) = (self.to_local(p), self.to_local(q));
         let d = sub(to, from);
@@ -123,7 +122,7 @@ impl<const D: usize> Cuboid<D> {
         }
     }
 
-    /// Half the slope of the squared distance at one part of the way.
+    /// Returns half the slope of the squared distance at one part of the way.
     fn slope(&self, from: Point<D>, d: Point<D>, part: f64) -> f64 {
         let outside = |i: usize| {
             let x = from[i] + d[i] * part;
@@ -153,12 +152,12 @@ impl<const D: usize> Cuboid<D> {
         if b > a { low + (high - low) * (-a / (b - a)) } else { low }
     }
 
-    /// The corners' greatest distance from the middle along each world axis.
+    /// Returns the corners' greatest distance from the middle along each world axis.
     fn extent(&self) -> Point<D> {
         std::array::from_fn(|w| (0..D).map(|i| (self.axes[i][w] * self.half_m[i]).abs()).sum())
     }
 
-    /// The outline of a plane box, counter-clockwise.
+    /// Returns the outline of a plane box, counter-clockwise.
     pub fn edges_2d(&self) -> [[Point<D>; 2]; 4] {
         let corner = |sx: f64, sy: f64| {
             let mut local = [0.0; D];
@@ -171,7 +170,7 @@ impl<const D: usize> Cuboid<D> {
     }
 }
 
-/// The inner part of an obstacle or of a chain's own part; with a radius it is the body.
+/// The inner part of an obstacle or of a chain's own part; with a radius it becomes the body.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Core<const D: usize> {
     /// A disc or a sphere.
@@ -183,7 +182,7 @@ pub enum Core<const D: usize> {
 }
 
 impl<const D: usize> Core<D> {
-    /// The nearest points of a segment and the core.
+    /// Returns the nearest points of a segment and the core.
     pub fn nearest_to_segment(&self, body: [Point<D>; 2]) -> Nearest<D> {
         match self {
             Self::Point(c) => Nearest::of(nearest_on_segment(*c, body[0], body[1]), *c),
@@ -192,7 +191,7 @@ impl<const D: usize> Core<D> {
         }
     }
 
-    /// The nearest point of the core.
+    /// Returns the nearest point of the core.
     pub fn nearest_to_point(&self, p: Point<D>) -> Nearest<D> {
         match self {
             Self::Point(c) => Nearest::of(p, *c),
@@ -201,8 +200,8 @@ impl<const D: usize> Core<D> {
         }
     }
 
-    /// Whether no point of the core is nearer than `reach_m` to a segment: the same answer as
-    /// the distance gives, sooner in the usual case.
+    /// Whether no point of the core is nearer than `reach_m` to a segment. The answer is that of
+    /// the distance, but faster in the usual case.
     #[inline]
     pub fn is_clear_of_segment(&self, [p, q]: [Point<D>; 2], reach_m: f64) -> bool {
         if reach_m <= 0.0 {
@@ -238,7 +237,7 @@ impl<const D: usize> Core<D> {
         }
     }
 
-    /// The box around the core.
+    /// Returns the box around the core.
     pub fn bounds(&self) -> Bounds<D> {
         match self {
             Self::Point(c) => Bounds::of(&[*c]),
@@ -247,7 +246,7 @@ impl<const D: usize> Core<D> {
         }
     }
 
-    /// The core elsewhere.
+    /// Returns the core, shifted.
     #[must_use]
     pub fn shifted(self, by: Point<D>) -> Self {
         match self {
@@ -269,7 +268,7 @@ impl<const D: usize> Core<D> {
     }
 }
 
-/// Whether a point is at least `reach_m` from a segment: no division, no root.
+/// Whether a point is at least `reach_m` from a segment, without division or root.
 #[inline]
 fn is_far_from_segment<const D: usize>(c: Point<D>, [p, q]: [Point<D>; 2], reach_m: f64) -> bool {
     let (d, r) = (sub(q, p), sub(c, p));
@@ -285,7 +284,7 @@ fn is_far_from_segment<const D: usize>(c: Point<D>, [p, q]: [Point<D>; 2], reach
     across2 >= reach2 * whole
 }
 
-/// Whether a plane segment `a b` lies on one side of the line `p q`, further than `reach_m`.
+/// Whether a plane segment `a b` lies on one side of the line `p q`, farther away than `reach_m`.
 #[inline]
 fn is_beside<const D: usize>(
     a: Point<D>,
@@ -310,7 +309,7 @@ pub struct Bounds<const D: usize> {
 }
 
 impl<const D: usize> Bounds<D> {
-    /// The least box around points.
+    /// Returns the least box around points.
     #[inline]
     pub fn of(points: &[Point<D>]) -> Self {
         let (mut lo, mut hi) = (points[0], points[0]);
@@ -323,19 +322,19 @@ impl<const D: usize> Bounds<D> {
         Self { lo, hi }
     }
 
-    /// The box that holds nothing.
+    /// Returns the empty box.
     pub fn nothing() -> Self {
         Self { lo: [f64::INFINITY; D], hi: [f64::NEG_INFINITY; D] }
     }
 
-    /// The box, larger by `by_m` on every side.
+    /// Returns the box, larger by `by_m` on every side.
     #[inline]
     #[must_use]
     pub fn grown(self, by_m: f64) -> Self {
         Self { lo: self.lo.map(|x| x - by_m), hi: self.hi.map(|x| x + by_m) }
     }
 
-    /// The least box around both.
+    /// Returns the least box around both.
     #[inline]
     #[must_use]
     pub fn joined(self, other: &Self) -> Self {
@@ -345,7 +344,7 @@ impl<const D: usize> Bounds<D> {
         }
     }
 
-    /// Whether all of the other box is in this one.
+    /// Whether the other box lies completely in this one.
     #[inline]
     pub fn contains(&self, other: &Self) -> bool {
         let mut contains = true;

@@ -1,8 +1,8 @@
-//! Which boxes are near: a uniform grid.
+//! A uniform grid that finds the boxes nearby.
 
 use super::geometry::{Bounds, Point};
 
-/// Boxes, and for every cell the list of those that meet it.
+/// Boxes, and for every cell the list of the boxes that meet it.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Grid<const D: usize> {
     cells: Cells<D>,
@@ -13,13 +13,13 @@ pub(super) struct Grid<const D: usize> {
     first: Vec<Cell<D>>,
 }
 
-/// The grid gets coarser until a box has at most this many entries on average.
+/// Largest mean number of entries per box; beyond it the grid gets coarser.
 const ENTRIES_PER_BOX: usize = 64;
 const CELLS_PER_BOX: usize = 64;
 
 impl<const D: usize> Grid<D> {
-    /// Builds the grid anew, in the memory it has. Queries measure about `reach_m`; that sets
-    /// the size of the cells, never the result.
+    /// Builds the grid anew, in the memory it has. Queries measure about `reach_m`, which sets the
+    /// size of the cells, never the result.
     pub(super) fn rebuild(&mut self, bounds: impl Iterator<Item = Bounds<D>>, reach_m: f64) {
         self.bounds.clear();
         self.bounds.extend(bounds);
@@ -29,8 +29,8 @@ impl<const D: usize> Grid<D> {
         }
     }
 
-    /// Lists the boxes of every cell by counting: `starts` holds the counts first, then where to
-    /// write next, and in the end where each list begins.
+    /// Lists the boxes of every cell by counting sort: `starts` holds the counts first, then the
+    /// next write positions, and in the end the start of each list.
     fn fill(&mut self) {
         let Self { cells, starts, entries, bounds, first } = self;
         first.clear();
@@ -65,7 +65,8 @@ impl<const D: usize> Grid<D> {
             let (from, to) = (self.starts[index] as usize, self.starts[index + 1] as usize);
             for &k in &self.entries[from..to] {
                 let k = k as usize;
-                // A box in several cells is told in the first that both share.
+                // A box in several cells is reported only in the first cell that it shares with the
+                // query.
                 let is_first = (0..D).all(|i| cell[i] == self.first[k][i].max(range[0][i]));
                 if is_first && self.bounds[k].meets(near) {
                     look(k);
@@ -78,7 +79,7 @@ impl<const D: usize> Grid<D> {
 /// A cell's number along every axis.
 type Cell<const D: usize> = [u32; D];
 
-/// How space is cut into cells. What lies outside belongs to the nearest cell.
+/// The division of space into cells. Everything outside belongs to the nearest cell.
 #[derive(Debug, Clone, Copy)]
 struct Cells<const D: usize> {
     origin: Point<D>,
@@ -93,7 +94,7 @@ impl<const D: usize> Default for Cells<D> {
 }
 
 impl<const D: usize> Cells<D> {
-    /// Cells for boxes, of which there is at least one, and queries of about `reach_m`.
+    /// Chooses cells for boxes, of which there is at least one, and queries of about `reach_m`.
     fn choose(bounds: &[Bounds<D>], reach_m: f64) -> Self {
         let n = bounds.len();
         let around = bounds.iter().fold(Bounds::nothing(), |all, b| all.joined(b));
@@ -123,11 +124,11 @@ impl<const D: usize> Cells<D> {
 
     #[inline]
     fn at(&self, p: Point<D>) -> Cell<D> {
-        // The cast saturates: what lies below the grid is in its first cell.
+        // The cast saturates, so anything below the grid falls into its first cell.
         std::array::from_fn(|i| (((p[i] - self.origin[i]) * self.per_m) as u32).min(self.n[i] - 1))
     }
 
-    /// The lowest and the highest cell that a box meets.
+    /// Returns the lowest and the highest cell that a box meets.
     #[inline]
     fn range(&self, b: &Bounds<D>) -> [Cell<D>; 2] {
         [self.at(b.lo), self.at(b.hi)]

@@ -1,22 +1,22 @@
-//! The directions in which a plane rod is blocked, exactly: the union rule.
+//! The blocked directions of a plane rod, computed exactly: the union rule.
 //!
 //! A rod turns about its master. The directions in which a rod of one length meets one convex
-//! obstacle are one interval: how wide the obstacle, grown by the rod's radius and cut to the
-//! reach of the rod, looks from the master. A thicker connector at the rod's end adds arcs, a
-//! bend limit one more interval. The free direction nearest to where the slave was, on either
-//! side, is what the rod turns to; that is the smallest turn that clears everything at once,
-//! where one obstacle after the other would be led from one into the next (pitfall 1).
+//! obstacle are one interval: how wide the obstacle, grown by the rod's radius and cut to the reach
+//! of the rod, looks from the master. A thicker connector at the rod's end adds arcs, a bend limit
+//! one more interval. The rod turns to the free direction nearest to where the slave was, on either
+//! side. That is the smallest turn that clears everything at once; avoiding one obstacle after the
+//! other would lead from one into the next.
 
 use super::geometry::{Core, Point, cross_2d, dot, nearest_on_segment, norm, sub};
 use sidestep_kernel::math;
 use std::f64::consts::TAU;
 
-/// Directions from `from_rad`, counter-clockwise, over `width_rad`.
+/// The directions from `from_rad`, counter-clockwise, over `width_rad`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Arc {
-    /// Where it begins.
+    /// Its start, rad.
     pub(crate) from_rad: f64,
-    /// How far it goes, counter-clockwise; 2 pi for all directions.
+    /// Its width, counter-clockwise, rad; 2 pi for all directions.
     pub(crate) width_rad: f64,
 }
 
@@ -35,9 +35,9 @@ impl Arc {
 /// A rod at its master.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Reach {
-    /// Where the master is.
+    /// Position of the master.
     pub(crate) master: Point<2>,
-    /// How long the rod is.
+    /// Length of the rod, meters.
     pub(crate) length_m: f64,
 }
 
@@ -71,8 +71,8 @@ fn block_by_capsule(
     if apart_m < radius_m || apart_m == 0.0 {
         return false;
     }
-    // Seen from outside a convex body all of it is within a quarter turn of its nearest point,
-    // so angles from there never wrap.
+    // Seen from outside, a convex body lies within a quarter turn of its nearest point, so angles
+    // from there never wrap.
     let seen = Seen { middle: nearest, length_m: reach.length_m, radius_m };
     let mut low_high = (0.0f64, 0.0f64);
     seen.widen_by_disc(a, &mut low_high);
@@ -85,7 +85,7 @@ fn block_by_capsule(
     true
 }
 
-/// What is seen from the master, in angles from the direction of the nearest point.
+/// The view of an obstacle from the master, in angles from the direction of the nearest point.
 struct Seen {
     middle: Point<2>,
     length_m: f64,
@@ -106,7 +106,7 @@ impl Seen {
         }
     }
 
-    /// The two edges of the capsule, as far as the rod reaches.
+    /// Adds the two edges of the capsule, as far as the rod reaches.
     fn widen_by_edges(&self, a: Point<2>, b: Point<2>, low_high: &mut (f64, f64)) {
         let d = sub(b, a);
         let length_m = norm(d);
@@ -122,9 +122,9 @@ impl Seen {
     }
 }
 
-/// Half the angle under which a disc (or a sphere) blocks a rod: up to the tangent, or, where
-/// that is out of reach, up to where the rod's tip touches (pitfall 2). `None` where the disc is
-/// out of reach; the master must not be inside.
+/// Returns half the angle under which a disc (or a sphere) blocks a rod: up to the tangent, or, if
+/// that is out of reach, up to where the rod's tip touches. `None` if the disc is out of reach; the
+/// master must not be inside.
 pub(super) fn half_angle_rad(apart_m: f64, radius_m: f64, length_m: f64) -> Option<f64> {
     if apart_m - radius_m >= length_m {
         return None;
@@ -137,7 +137,7 @@ pub(super) fn half_angle_rad(apart_m: f64, radius_m: f64, length_m: f64) -> Opti
     Some(math::acos(cosine.clamp(-1.0, 1.0)))
 }
 
-/// The ends of the part of the segment from `a` along `d` within `reach_m` of the origin.
+/// Returns the ends of the part of the segment from `a` along `d` within `reach_m` of the origin.
 fn clipped(a: Point<2>, d: Point<2>, reach_m: f64) -> [Option<Point<2>>; 2] {
     let (dd, ad) = (dot(d, d), dot(a, d));
     let inside = ad * ad - dd * (dot(a, a) - reach_m * reach_m);
@@ -153,7 +153,7 @@ fn clipped(a: Point<2>, d: Point<2>, reach_m: f64) -> [Option<Point<2>>; 2] {
 }
 
 /// Adds the directions in which the rod's far end is within `radius_m` of a core: arcs of the
-/// circle on which it turns, up to four for a capsule (pitfall 3).
+/// circle on which it turns, up to four for a capsule.
 pub(super) fn block_tip(reach: &Reach, core: &Core<2>, radius_m: f64, arcs: &mut Vec<Arc>) {
     match core {
         Core::Point(c) => block_tip_by_capsule(reach, [*c, *c], radius_m, arcs),
@@ -225,7 +225,7 @@ impl Borders {
         }
     }
 
-    /// Between two borders all directions are alike, so their middle speaks for them.
+    /// Between two borders all directions give the same answer, so the middle one is tested.
     fn arcs_where(&mut self, is_blocked: impl Fn(f64) -> bool, arcs: &mut Vec<Arc>) {
         let angles_rad = &mut self.angles_rad[..self.n];
         angles_rad.sort_unstable_by(f64::total_cmp);
@@ -245,14 +245,14 @@ impl Borders {
     }
 }
 
-/// The directions that bend a connector further than its limit, coming along `into`.
+/// Returns the directions that bend a connector beyond its limit, when it is reached along `into`.
 pub(super) fn beyond_bend(into: Point<2>, max_bend_rad: f64) -> Arc {
     let into_rad = math::atan2(into[1], into[0]);
     Arc { from_rad: into_rad + max_bend_rad, width_rad: (TAU - 2.0 * max_bend_rad).max(0.0) }
 }
 
-/// The same direction in [0, 2 pi]: `rem_euclid` without a division, for angles that are at most a
-/// few turns away.
+/// Returns the same direction in [0, 2 pi]: `rem_euclid` without a division, for angles that are at
+/// most a few turns away.
 fn wrapped_rad(mut angle_rad: f64) -> f64 {
     while angle_rad < 0.0 {
         angle_rad += TAU;
@@ -263,7 +263,7 @@ fn wrapped_rad(mut angle_rad: f64) -> f64 {
     angle_rad
 }
 
-/// Which way round.
+/// Sense of rotation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Side {
     /// Counter-clockwise.
@@ -272,10 +272,11 @@ pub(super) enum Side {
     Right,
 }
 
-/// The least turn from a direction to one in no arc, in [0, 2 pi); `None` where all are blocked.
+/// Returns the least turn from a direction to one in no arc, in [0, 2 pi); `None` if all are
+/// blocked.
 pub(super) fn least_turn_rad(arcs: &[Arc], start_rad: f64, side: Side) -> Option<f64> {
     let mut turn_rad = 0.0;
-    // Each round leaves at least one arc behind for good.
+    // Each round passes at least one arc for good.
     for _ in 0..=2 * arcs.len() {
         let mut next_rad: f64 = turn_rad;
         for arc in arcs {
@@ -284,7 +285,7 @@ pub(super) fn least_turn_rad(arcs: &[Arc], start_rad: f64, side: Side) -> Option
                 Side::Right => arc.from_rad + arc.width_rad - (start_rad - turn_rad),
             };
             let into_rad = wrapped_rad(into_rad);
-            // An arc that begins where another ends leaves no gap, however both were rounded.
+            // An arc that starts where another ends leaves no gap, however both were rounded.
             let into_rad = if into_rad > TAU - ARC_TOLERANCE_RAD { 0.0 } else { into_rad };
             if into_rad < arc.width_rad {
                 next_rad = next_rad.max(turn_rad + (arc.width_rad - into_rad));
@@ -301,18 +302,18 @@ pub(super) fn least_turn_rad(arcs: &[Arc], start_rad: f64, side: Side) -> Option
     None
 }
 
-/// Rounding may leave the end of an arc inside of it, or two arcs that touch apart, by this; the
-/// skin is far larger.
+/// Tolerance at the ends of arcs, rad: rounding may move an end into its arc, or two touching arcs
+/// apart, by this much; the skin is far larger.
 const ARC_TOLERANCE_RAD: f64 = 1e-13;
 
-/// The direction of a turn from a unit vector.
+/// Returns the direction of a turn from a unit vector.
 pub(super) fn turned(u: Point<2>, turn_rad: f64, side: Side) -> Point<2> {
     let signed_rad = if side == Side::Left { turn_rad } else { -turn_rad };
     let (c, s) = (math::cos(signed_rad), math::sin(signed_rad));
     [u[0] * c - u[1] * s, u[0] * s + u[1] * c]
 }
 
-/// Direction of a vector, in (-pi, pi].
+/// Returns the direction of a vector, in (-pi, pi].
 pub(super) fn direction_rad(u: Point<2>) -> f64 {
     math::atan2(u[1], u[0])
 }
@@ -323,7 +324,7 @@ mod tests {
     use proptest::prelude::*;
     use proptest::test_runner::{Config, TestRunner};
 
-    /// Cases of the oracle: `SIDESTEP_CASES`, or few enough for every day.
+    /// Number of random cases: `SIDESTEP_CASES`, or few enough for everyday runs.
     fn cases(usual: u32) -> u32 {
         std::env::var("SIDESTEP_CASES").ok().and_then(|n| n.parse().ok()).unwrap_or(usual)
     }
@@ -368,7 +369,7 @@ mod tests {
         )
     }
 
-    /// Blocked by intervals is blocked by distance, in random directions and beside every border.
+    /// Checks that intervals and distances agree, in random directions and beside every border.
     fn agree(case: &Case) -> Result<(), TestCaseError> {
         let Case { reach, core, radius_m, tip_radius_m, angles_rad } = case;
         let mut arcs = Vec::new();
@@ -419,7 +420,7 @@ mod tests {
         run(cases(1_000_000));
     }
 
-    /// What speaks against a direction: how deep the rod, or its end, would be in any core.
+    /// Returns how deep the rod, or its end, would be in any core, meters.
     fn depth_m(reach: &Reach, cores: &[Core<2>], [rod_m, tip_m]: [f64; 2], angle_rad: f64) -> f64 {
         let end = tip(reach, angle_rad);
         let depth_m = |core: &Core<2>| {

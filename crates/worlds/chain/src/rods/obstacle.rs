@@ -1,8 +1,8 @@
-//! Obstacles: what they are, and which of them are near.
+//! Obstacles, and the search for those nearby.
 //!
-//! Obstacles that stand still lie in a uniform grid, which copies share; those that move are a
-//! list, with a grid of its own where they are many. A query names a box and visits every obstacle
-//! whose own box meets it exactly once, without allocating (slide P3: proximity is sensed locally).
+//! Static obstacles lie in a uniform grid, which copies share; moving ones are a list, with a grid
+//! of its own if they are many. A query names a box and visits every obstacle whose own box meets
+//! it exactly once, without allocating (slide P3: proximity is sensed locally).
 
 use super::geometry::{self, Bounds, Core, Point, add, scaled};
 use super::grid::Grid;
@@ -10,31 +10,31 @@ use sidestep_kernel::InputError;
 use std::any::Any;
 use std::sync::Arc;
 
-/// Something in the way: all points within a radius of a convex core.
+/// An obstacle: all points within a radius of a convex core.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Obstacle<const D: usize> {
-    /// Its name in vetoes. Several may share one, as the walls of a room do.
+    /// Its name in vetoes. Several obstacles may share one, as the walls of a room do.
     pub id: u32,
     /// Its inner part.
     pub core: Core<D>,
-    /// How far it reaches beyond its core; 0 for a thin wall.
+    /// How far it reaches beyond its core, meters; 0 for a thin wall.
     pub radius_m: f64,
-    /// Where it goes; zero for obstacles that stand still.
+    /// Its velocity; zero for static obstacles.
     pub velocity_m_s: Point<D>,
 }
 
 impl<const D: usize> Obstacle<D> {
-    /// An obstacle that stands still.
+    /// Returns a static obstacle.
     pub fn still(id: u32, core: Core<D>, radius_m: f64) -> Self {
         Self { id, core, radius_m, velocity_m_s: [0.0; D] }
     }
 
-    /// A disc or a sphere that stands still.
+    /// Returns a static disc or sphere.
     pub fn ball(id: u32, center: Point<D>, radius_m: f64) -> Self {
         Self::still(id, Core::Point(center), radius_m)
     }
 
-    /// A thin wall or a capsule that stands still.
+    /// Returns a static thin wall or capsule.
     pub fn capsule(id: u32, ends: [Point<D>; 2], radius_m: f64) -> Self {
         Self::still(id, Core::Segment(ends), radius_m)
     }
@@ -44,12 +44,13 @@ impl<const D: usize> Obstacle<D> {
         self.velocity_m_s.iter().any(|&v| v != 0.0)
     }
 
-    /// The box around it.
+    /// Returns the box around it.
     pub fn bounds(&self) -> Bounds<D> {
         self.core.bounds().grown(self.radius_m)
     }
 
-    /// Whether it is where obstacles may be: what flies on and on leaves the world in the end.
+    /// Whether it is in the range of coordinates: an obstacle that flies on and on leaves it in the
+    /// end.
     pub(crate) fn is_in_range(&self) -> bool {
         self.check().is_ok()
     }
@@ -76,49 +77,50 @@ impl<const D: usize> Obstacle<D> {
     }
 }
 
-/// The walls of a plane polygon, all with one id. Its inside is guarded by them: who starts
-/// outside never gets in.
+/// Returns the walls of a plane polygon, all with one id. They guard its inside: a chain that
+/// starts outside never gets in.
 pub(crate) fn outline(id: u32, corners: &[Point<2>], radius_m: f64) -> Vec<Obstacle<2>> {
     let wall =
         |k: usize| Obstacle::capsule(id, [corners[k], corners[(k + 1) % corners.len()]], radius_m);
     (0..corners.len()).map(wall).collect()
 }
 
-/// Beyond this, rounding is no longer small against the tolerances.
+/// Largest coordinate: beyond it, rounding is no longer small against the tolerances.
 const MAX_EXTENT_M: f64 = 1e7;
 
-/// All obstacles of a world. A copy shares those that stand still with the original and has
-/// moving ones of its own, so every worker may have one.
+/// All obstacles of a world. A copy shares the static ones with the original and has its own moving
+/// ones, so every worker may have a copy.
 #[derive(Debug, Clone, Default)]
 pub struct Obstacles<const D: usize> {
     still: Arc<Still<D>>,
     moving: Vec<Obstacle<D>>,
-    /// Where those that move are, if they are many.
+    /// Index of the moving ones, if they are many.
     moving_grid: Grid<D>,
     reach_m: f64,
 }
 
-/// What never moves.
+/// The obstacles that never move.
 #[derive(Debug, Default)]
 struct Still<const D: usize> {
     all: Vec<Obstacle<D>>,
     grid: Grid<D>,
 }
 
-/// As many moving obstacles are looked at one by one sooner than by a grid.
+/// Number of moving obstacles up to which a linear scan is faster than a grid.
 const FEW: usize = 12;
 
 impl<const D: usize> Obstacles<D> {
-    /// The same obstacles in a world of the plane; none where `D` is not 2.
+    /// Returns the same obstacles for a world in the plane; none if `D` is not 2.
     pub(crate) fn in_plane(&self) -> Option<&Obstacles<2>> {
         (self as &dyn Any).downcast_ref()
     }
 
-    /// Obstacles for chains whose longest rod, with its ends, measures about `reach_m`; that
-    /// sets the cells of the grid, never the result.
+    /// Returns obstacles for chains whose longest rod, with its ends, measures about `reach_m`;
+    /// that sets the cells of the grid, never the result.
     ///
     /// # Errors
-    /// A number that is not finite, a negative radius, an obstacle further than 1e7 m away.
+    /// When a number is not finite, a radius is negative, or an obstacle is farther than 1e7 m
+    /// away.
     pub fn new(mut all: Vec<Obstacle<D>>, reach_m: f64) -> Result<Self, InputError> {
         all.iter().try_for_each(Obstacle::check)?;
         all.sort_by_key(|o| o.id);
@@ -136,21 +138,21 @@ impl<const D: usize> Obstacles<D> {
         self.still.all.is_empty() && self.moving.is_empty()
     }
 
-    /// Those that stand still, by id.
+    /// Returns the static obstacles, by id.
     pub fn still(&self) -> &[Obstacle<D>] {
         &self.still.all
     }
 
-    /// Those that move, by id.
+    /// Returns the moving obstacles, by id.
     pub fn moving(&self) -> &[Obstacle<D>] {
         &self.moving
     }
 
-    /// Replaces those that move, in the memory they have. Their velocities may be zero: parts of
-    /// other chains rest at times.
+    /// Replaces the moving obstacles, in the memory they have. Their velocities may be zero,
+    /// because parts of other chains rest at times.
     ///
     /// # Errors
-    /// As [`Self::new`]; nothing has changed then.
+    /// As [`Self::new`]; then nothing has changed.
     pub fn set_moving(&mut self, moving: &[Obstacle<D>]) -> Result<(), InputError> {
         moving.iter().try_for_each(Obstacle::check)?;
         self.moving.clear();
@@ -162,7 +164,7 @@ impl<const D: usize> Obstacles<D> {
         Ok(())
     }
 
-    /// Moves those that move along their velocities.
+    /// Moves the moving obstacles along their velocities.
     pub fn advance(&mut self, dt_s: f64) {
         for obstacle in &mut self.moving {
             obstacle.core = obstacle.core.shifted(scaled(obstacle.velocity_m_s, dt_s));
@@ -176,8 +178,8 @@ impl<const D: usize> Obstacles<D> {
         }
     }
 
-    /// Visits every obstacle whose box meets `near`, each once: those that stand still first, in
-    /// an order that depends on nothing but the obstacles and the box.
+    /// Visits every obstacle whose box meets `near`, each once: the static ones first, in an order
+    /// that depends only on the obstacles and the box.
     #[inline]
     pub fn visit<'a>(&'a self, near: &Bounds<D>, mut look: impl FnMut(&'a Obstacle<D>)) {
         self.still.grid.visit(near, |k| look(&self.still.all[k]));
@@ -189,8 +191,8 @@ impl<const D: usize> Obstacles<D> {
         }
     }
 
-    /// The least distance of a ball's surface from the obstacles within `look_m`; `look_m` where
-    /// nothing is as near.
+    /// Returns the least distance of a capsule's surface from the obstacles within `look_m`;
+    /// `look_m` if nothing is as near.
     pub fn clearance_m(&self, [p, q]: [Point<D>; 2], radius_m: f64, look_m: f64) -> f64 {
         let mut least_m = look_m;
         self.visit(&Bounds::of(&[p, q]).grown(radius_m + look_m), |o| {
@@ -201,13 +203,13 @@ impl<const D: usize> Obstacles<D> {
     }
 }
 
-/// The box around a segment and where it was before.
+/// Returns the box around a segment and its earlier place.
 #[inline]
 pub(super) fn swept<const D: usize>(points: [Point<D>; 4], by_m: f64) -> Bounds<D> {
     Bounds::of(&points).grown(by_m)
 }
 
-/// A box of `half_m` around a point.
+/// Returns a box of `half_m` around a point.
 #[inline]
 pub(crate) fn around<const D: usize>(at: Point<D>, half_m: f64) -> Bounds<D> {
     Bounds { lo: add(at, [-half_m; D]), hi: add(at, [half_m; D]) }

@@ -1,8 +1,9 @@
-//! Motions where nothing can object: no obstacle, every connector free. Straight into the chain.
+//! Motions without any possible objection: no obstacle, every connector free. They are written
+//! straight into the chain.
 //!
-//! A sweep is a chain of dependent roots and divisions, and a processor that waits. The two
-//! sweeps of an initiator in the middle depend on nothing but the initiator, so they take turns
-//! in one loop and a processor computes both at once; no bit differs from one after the other.
+//! A sweep is a series of dependent roots and divisions, each of which the processor waits for. The
+//! two sweeps of an initiator in the middle depend only on the initiator, so they take turns in one
+//! loop and the processor computes both at once; every bit is the same as one after the other.
 
 use super::candidates::guided;
 use super::chain::{Chain, Rod};
@@ -10,7 +11,7 @@ use super::geometry::{Point, distance, dot, sub};
 use super::pass::{Direction, Tally};
 use super::scene::fits;
 
-/// Moves connector `k`, and all that must follow.
+/// Moves connector `k`, and all connectors that must follow.
 pub(super) fn pull<const D: usize>(
     chain: &mut Chain<D>,
     k: usize,
@@ -40,17 +41,17 @@ pub(super) fn pull<const D: usize>(
 /// One sweep on its way outward.
 struct Sweep<const D: usize> {
     direction: Direction,
-    /// Who moved last, and where it was and is.
+    /// The connector that moved last, with its old and new place.
     master: usize,
     was: Point<D>,
     is: Point<D>,
     changed: usize,
-    /// Square of the longest way of a slave.
+    /// Square of the longest distance that a slave moved.
     longest2: f64,
 }
 
 impl<const D: usize> Sweep<D> {
-    /// Moves the next slave; false, now and ever after, where the motion ends.
+    /// Moves the next slave; returns false, now and ever after, once the motion ends.
     #[inline(always)]
     fn advance(&mut self, points: &mut [Point<D>], rods: &[Rod], least_move_m: f64) -> bool {
         let Some(slave) = self.direction.next(self.master, points.len()) else { return false };
@@ -68,8 +69,8 @@ impl<const D: usize> Sweep<D> {
         true
     }
 
-    /// Whether the rod beyond a slave that stays is good as it is; it need not be in a chain that
-    /// is broken.
+    /// Whether the rod beyond a slave that stays is good as it is; in a broken chain it need not
+    /// be.
     fn may_end_at(&self, slave: usize, points: &[Point<D>], rods: &[Rod]) -> bool {
         let Some(next) = self.direction.next(slave, points.len()) else { return true };
         fits(rods[slave.min(next)], distance(points[slave], points[next]))

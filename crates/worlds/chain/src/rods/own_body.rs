@@ -1,12 +1,12 @@
-//! Which parts of the chain itself are near: a tree of boxes over the rods.
+//! A tree of boxes over the rods, which finds the chain's own parts nearby.
 //!
 //! Neighbors along the chain are neighbors in space, so the tree over the index needs no sorting
-//! and never changes its shape. A rod that moves has its own box at once; those above it grow as
-//! far as they must and shrink when the tree is built anew, which every motion does.
+//! and never changes its shape. A rod that moves gets its new box at once; the boxes above it grow
+//! as far as they must and shrink when the tree is rebuilt, which every motion does.
 
 use super::geometry::Bounds;
 
-/// Rods below one leaf.
+/// Rods per leaf.
 const LEAF: usize = 4;
 
 /// Boxes around the rods and their connectors, and around groups of them.
@@ -40,11 +40,11 @@ impl<const D: usize> OwnBody<D> {
         self.rods[from..to].iter().fold(Bounds::nothing(), |all, b| all.joined(b))
     }
 
-    /// A rod is elsewhere.
+    /// Updates the box of a rod that has moved.
     pub(crate) fn set(&mut self, rod: usize, bounds: Bounds<D>) {
         self.rods[rod] = bounds;
         let mut node = self.leaves + rod / LEAF;
-        // A node that holds the box is held by all above it.
+        // If a node contains the box, so do all above it.
         while node > 0 && !self.nodes[node].contains(&bounds) {
             self.nodes[node] = self.nodes[node].joined(&bounds);
             node /= 2;
@@ -53,7 +53,7 @@ impl<const D: usize> OwnBody<D> {
 
     /// Visits the rods whose boxes meet `near`, in the order of the chain.
     pub(crate) fn visit(&self, near: &Bounds<D>, mut look: impl FnMut(usize)) {
-        // The depth of the tree is at most that of a usize.
+        // The depth of the tree is at most the number of bits of a usize.
         let mut waiting = [0usize; 66];
         let mut n = usize::from(!self.rods.is_empty());
         waiting[0] = 1;

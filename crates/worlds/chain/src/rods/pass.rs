@@ -1,8 +1,8 @@
-//! One motion on its way outward: in which direction, and what it has come to.
+//! One motion on its way outward: its direction, and its results so far.
 
 use std::ops::Range;
 
-/// What a request has done so far.
+/// Results of a request so far.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Tally {
     /// First and one past the last connector that reacted.
@@ -19,13 +19,13 @@ impl Tally {
         Self { from: first, to: first, ..Self::default() }
     }
 
-    /// Connectors around the initiator have reacted.
+    /// Counts the connectors around the initiator that have reacted.
     #[inline]
     pub(super) fn touch(&mut self, run: Range<usize>) {
         (self.from, self.to) = (self.from.min(run.start), self.to.max(run.end));
     }
 
-    /// A connector other than the initiator went some way.
+    /// Counts a connector other than the initiator that moved by `way_m`.
     #[inline]
     pub(super) fn slave_went(&mut self, way_m: f64) {
         self.max_slave_step_m = self.max_slave_step_m.max(way_m);
@@ -35,14 +35,14 @@ impl Tally {
 /// Direction along the chain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Direction {
-    /// To higher indices.
+    /// Toward higher indices.
     Up,
-    /// To lower ones.
+    /// Toward lower indices.
     Down,
 }
 
 impl Direction {
-    /// The master of a slave.
+    /// Returns the master of a slave.
     #[inline]
     pub(super) fn before(self, slave: usize) -> usize {
         match self {
@@ -51,7 +51,7 @@ impl Direction {
         }
     }
 
-    /// The connector after `i` of `n`, if there is one.
+    /// Returns the connector after `i` of `n`, if there is one.
     #[inline]
     pub(super) fn next(self, i: usize, n: usize) -> Option<usize> {
         match self {

@@ -1,14 +1,14 @@
-//! Who passed through what, between two states of a chain and of what is around it.
+//! Passages through obstacles between two states of a chain and of its surroundings.
 //!
-//! What a request guarantees: in every sub-step both ends of a rod go straight from their old to
-//! their new place, obstacles stand still, and no rod and no connector passes through the core of
-//! an obstacle or of the chain's own parts. So nothing tunnels through obstacles that stand
-//! still, however thin.
+//! A request guarantees that in every sub-step both ends of a rod go straight from their old to
+//! their new place while obstacles stand still, and that no rod and no connector passes through the
+//! core of an obstacle or of the chain's own parts. So nothing tunnels through static obstacles,
+//! however thin.
 //!
-//! Obstacles that move do so between requests, when a world advances them, and one that is fast
-//! and thin may jump over a rod and touch it neither before nor after: a ball only if it goes
-//! further at once than twice its radius and the rod's together. Whoever advances obstacles so
-//! fast asks [`passed`], which looks at the motion relative to each of them.
+//! Moving obstacles move between requests, when a world advances them. One that is fast and thin
+//! may jump over a rod and touch it neither before nor after: a ball only if it moves at once by
+//! more than twice its radius and the rod's together. A caller that advances obstacles so fast asks
+//! [`passed`], which looks at the motion relative to each of them.
 
 use super::chain::Chain;
 use super::geometry::{Bounds, Point, add, norm, scaled};
@@ -24,9 +24,9 @@ pub(crate) struct Passed {
     pub(crate) obstacle: u32,
 }
 
-/// The first rod that passed through an obstacle, while the chain went straight from `before` to
-/// where it is, and every moving obstacle along its velocity for `dt_s` seconds to where it is.
-/// Of several obstacles, the one with the lowest id.
+/// Returns the first rod that passed through an obstacle, while the chain went straight from
+/// `before` to its present place, and every moving obstacle along its velocity for `dt_s` seconds
+/// to its present place. Of several obstacles, it names the one with the lowest id.
 ///
 /// `before` has one point for every connector.
 pub(crate) fn passed<const D: usize>(
@@ -44,7 +44,7 @@ pub(crate) fn passed<const D: usize>(
         let near = Bounds::of(&[from[0], from[1], to[0], to[1]]).grown(radius_m + furthest_m);
         let mut hit: Option<u32> = None;
         obstacles.visit(&near, |o| {
-            // Seen from an obstacle that moves, the rod was elsewhere.
+            // In the frame of a moving obstacle, the rod started elsewhere.
             let by = scaled(o.velocity_m_s, dt_s);
             let sweep = Sweep { from: from.map(|p| add(p, by)), to };
             let is_first = hit.is_none_or(|id| o.id < id);
@@ -106,7 +106,7 @@ mod tests {
             let mut obstacles = Obstacles::new(vec![ball], 1.0).unwrap();
             obstacles.advance(1.0);
             let told = passed(&rod_at(after), &before, &obstacles, 1.0).is_some();
-            // Near at one of many times; a point that crosses comes nearer than any gap between.
+            // Test many times: a point that crosses comes nearer than any gap between them.
             let apart_m = |k: i32| {
                 let time = f64::from(k) / 2000.0;
                 let rod = [0, 1].map(|end| between(before[end], after[end], time));

@@ -1,4 +1,4 @@
-//! One motion through the whole chain, or not at all (slides R1 to R7).
+//! Propagation of one motion through the whole chain, or not at all (slides R1 to R7).
 //!
 //! The initiator moves; from it two sweeps go outward, each slave reacting to its master and
 //! becoming the next one's master. New positions are kept apart until both sweeps have agreed: a
@@ -17,30 +17,30 @@ use super::veto::{Mode, Motion, Moved, Outcome, Reason, Request, Veto};
 use sidestep_kernel::InputError;
 use std::ops::Range;
 
-/// A request that would take more sub-steps is refused.
+/// Most sub-steps of a request; one that would take more is refused.
 const MAX_SUB_STEPS: f64 = 1e6;
 
-/// Moves chains by the rules. It owns the buffers of a motion, so that none allocates, and
+/// Moves chains by the rules. It owns the buffers of a motion, so that no motion allocates, and
 /// remembers nothing from one motion to the next.
 #[derive(Debug, Clone, Default)]
 pub struct Propagator<const D: usize> {
-    /// How chains react.
+    /// Rules by which chains react.
     pub rules: Rules,
     overlay: Overlay<D>,
     own: OwnBody<D>,
     work: Work<D>,
     untried: Vec<Untried<D>>,
-    /// Positions before the request, of the run of connectors that have moved.
+    /// Positions before the request, for the run of connectors that have moved.
     before: Overlay<D>,
     tally: Tally,
 }
 
-/// What an earlier slave might do instead.
+/// An alternative for an earlier slave.
 #[derive(Debug, Clone, Copy)]
 enum Untried<const D: usize> {
-    /// Go to another place.
+    /// Another place.
     Place { slave: usize, candidate: Candidate<D> },
-    /// Turn its rod to the other side, where nobody has looked yet.
+    /// A turn of its rod to the other side, which has not been examined yet.
     OtherSide { slave: usize, tried: Point<D> },
 }
 
@@ -64,26 +64,26 @@ impl<const D: usize> Heads<D> {
         self.first..self.first + self.n
     }
 
-    /// Where they are.
+    /// Returns their positions.
     fn places(&self, chain: &Chain<D>) -> [Point<D>; 2] {
         [chain.points()[self.first], chain.points()[self.first + self.n - 1]]
     }
 }
 
-/// An objection and who raised it.
+/// An objection and the connector that raised it.
 type Objection = (usize, Refusal);
 
 impl<const D: usize> Propagator<D> {
-    /// A propagator for rules.
+    /// Returns a propagator for rules.
     pub fn new(rules: Rules) -> Self {
         Self { rules, ..Self::default() }
     }
 
-    /// Moves a chain as requested, in sub-steps where something may be in the way.
+    /// Moves a chain as requested, in sub-steps if something may be in the way.
     ///
     /// # Errors
-    /// A target that is not finite or more than 1e6 m from the origin, an index that the chain does not have. A
-    /// motion that cannot be is no error but a veto.
+    /// When a target is not finite or more than 1e6 m from the origin, or the chain does not have
+    /// the index. An impossible motion is no error but a veto.
     pub fn propagate(
         &mut self,
         chain: &mut Chain<D>,
@@ -150,7 +150,7 @@ impl<const D: usize> Propagator<D> {
         Moved { touched: from..to, changed, rotated, max_slave_step_m, cut_short }
     }
 
-    /// One short motion: all of it, or none.
+    /// Makes one short motion: all of it, or none.
     fn sub_step(
         &mut self,
         chain: &mut Chain<D>,
@@ -217,8 +217,9 @@ impl<const D: usize> Propagator<D> {
         Scene { chain, obstacles, rules, overlay, own }
     }
 
-    /// From a head outward. Rods keep their lengths when they turn, which is cheap and nearly
-    /// always enough; where that ends in a veto, all over again with every length they may have.
+    /// Sweeps from a head outward. Rods keep their lengths when they turn, which is cheap and
+    /// nearly always enough; if that ends in a veto, the sweep is repeated with every length they
+    /// may have.
     fn sweep(
         &mut self,
         chain: &Chain<D>,
@@ -242,7 +243,7 @@ impl<const D: usize> Propagator<D> {
         self.follow(chain, obstacles, head, direction)
     }
 
-    /// From a head outward, until a slave need not move or the chain ends.
+    /// Follows the chain from a head outward, until a slave need not move or the chain ends.
     fn follow(
         &mut self,
         chain: &Chain<D>,
@@ -274,7 +275,7 @@ impl<const D: usize> Propagator<D> {
         Ok(())
     }
 
-    /// The best place for a slave; what else it might do is remembered.
+    /// Returns the best place for a slave; its alternatives are remembered.
     fn react(
         &mut self,
         chain: &Chain<D>,
@@ -307,7 +308,8 @@ impl<const D: usize> Propagator<D> {
         scene.candidates(&scene.step(master, slave, direction, chain.points()[slave]), work)
     }
 
-    /// After an objection: the latest of the earlier slaves that might do something else does it.
+    /// Steps back after an objection: the latest of the earlier slaves with an alternative takes
+    /// it.
     fn step_back(
         &mut self,
         chain: &Chain<D>,
@@ -341,8 +343,8 @@ impl<const D: usize> Propagator<D> {
         Err(objection)
     }
 
-    /// Whether the rest of the chain has nothing to react to: this slave stays, and the bend at
-    /// it and the rod beyond it are good as they are (pitfall 7).
+    /// Whether the rest of the chain has nothing to react to: this slave stays, and the bend at it
+    /// and the rod beyond it are good as they are.
     fn may_stop(
         &self,
         chain: &Chain<D>,
@@ -407,8 +409,8 @@ impl<const D: usize> Propagator<D> {
     }
 }
 
-/// Whether a second look finds slaves more places: rods of other lengths, and in the plane also
-/// the other side.
+/// Whether a second try finds slaves more places: rods of other lengths, and in the plane also the
+/// other side.
 fn may_go_elsewhere<const D: usize>(chain: &Chain<D>, head: usize, direction: Direction) -> bool {
     let rods = match direction {
         Direction::Up => &chain.rods()[head..],
@@ -418,15 +420,15 @@ fn may_go_elsewhere<const D: usize>(chain: &Chain<D>, head: usize, direction: Di
 }
 
 impl<const D: usize> Scene<'_, D> {
-    /// The step of a slave whose master's new place is settled.
+    /// Returns the step of a slave whose master's new place is settled.
     fn step(&self, master: usize, slave: usize, direction: Direction, so: Point<D>) -> Step<D> {
         let points = self.chain.points();
         let before = match direction {
             Direction::Up => master.checked_sub(1),
             Direction::Down => (master + 1 < points.len()).then_some(master + 1),
         };
-        // In the first sweep the connector on the initiator's other side is yet to move, and the
-        // second sweep will mind the bend.
+        // In the first sweep the connector on the initiator's other side has yet to move, and the
+        // second sweep will check the bend.
         let prev =
             before.filter(|&b| direction == Direction::Down || self.overlay.get(b).is_some());
         Step {
@@ -442,8 +444,7 @@ impl<const D: usize> Scene<'_, D> {
         }
     }
 
-    /// Whether the way of an initiator is free of obstacles and of the chain's own parts
-    /// (pitfall 8).
+    /// Checks whether the way of an initiator is free of obstacles and of the chain's own parts.
     fn judge_initiator(&self, k: usize, to: Point<D>) -> Result<(), Refusal> {
         if self.rules.rotation == Rotation::Literal && self.obstacles.is_empty() {
             return Ok(());
@@ -472,7 +473,7 @@ impl<const D: usize> Scene<'_, D> {
     }
 }
 
-/// Brings the targets to where the heads may be, or says who may not be there.
+/// Projects the targets to allowed places of the heads, or returns the objection.
 fn project<const D: usize>(
     chain: &Chain<D>,
     heads: &mut Heads<D>,

@@ -1,8 +1,8 @@
 //! An arm's reach: moving one connector of a chain whose base is fixed.
 //!
-//! A strict base vetoes every pull of rods of fixed length, so the base's objection is answered by
-//! a return pass: it moves in thought, and is then led back to its place (pitfall 6). Both passes
-//! and the check of the whole way are one transaction.
+//! A fixed base vetoes every pull of rods of fixed length, so the base's objection is answered by a
+//! return pass: it moves tentatively, and is then led back to its place. Both passes and the check
+//! of the whole way are one transaction.
 
 use super::chain::{Chain, Mobility};
 use super::geometry::{Point, distance};
@@ -12,37 +12,38 @@ use super::propagate::Propagator;
 use super::veto::{Mode, Motion, Outcome, Reason, Request, Source, Veto};
 use sidestep_kernel::InputError;
 
-/// Double passes before it is given up.
+/// Most double passes before the search is given up.
 const MAX_DOUBLE_PASSES: usize = 40;
-/// A double pass that does not bring the connector nearer by this part ends the search.
+/// Least relative gain of a double pass; one that brings the connector nearer by less ends the
+/// search.
 const LEAST_GAIN: f64 = 1e-4;
 
-/// Where a connector shall be, and which one is the base.
+/// The target of a connector, and the base.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Reach<const D: usize> {
     /// The connector that is to move.
     pub(crate) k: usize,
-    /// Where to.
+    /// Its target.
     pub(crate) target: Point<D>,
     /// The fixed connector.
     pub(crate) base: usize,
-    /// How near counts as there, meters.
+    /// Distance at which the target counts as reached, meters.
     pub(crate) tolerance_m: f64,
 }
 
-/// What came of a reach.
+/// Outcome of a reach.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Reached<const D: usize> {
-    /// The connector is there.
+    /// The connector is at the target.
     There {
-        /// How far from the target.
+        /// Distance from the target, meters.
         off_m: f64,
         /// Passes to the target and back.
         double_passes: usize,
     },
-    /// It cannot be reached in this way; nothing has changed.
+    /// The target cannot be reached in this way; nothing has changed.
     Short {
-        /// The nearest that the connector could have come.
+        /// The place nearest to the target that the connector could have reached.
         nearest: Point<D>,
         /// The objection, if there was one; otherwise the passes came no nearer.
         veto: Option<Veto<D>>,
@@ -52,7 +53,7 @@ pub(crate) enum Reached<const D: usize> {
 /// Moves a connector to a target while the base keeps its place, bit for bit.
 ///
 /// # Errors
-/// As [`Propagator::propagate`]; a base that the chain does not have.
+/// As [`Propagator::propagate`]; also when the chain does not have the base.
 pub(crate) fn reach<const D: usize>(
     propagator: &mut Propagator<D>,
     chain: &mut Chain<D>,
@@ -108,7 +109,7 @@ fn passes<const D: usize>(
                 return Ok(Reached::Short { nearest, veto: Some(veto) });
             }
         }
-        // A last move that is shorter than the least counts as none: the base is at home.
+        // A last move shorter than the least counts as none, so the base is put exactly home.
         chain.points_mut()[order.base] = home;
         let now_m = distance(chain.points()[order.k], order.target);
         if now_m > off_m * (1.0 - LEAST_GAIN) && now_m > order.tolerance_m {
@@ -119,8 +120,8 @@ fn passes<const D: usize>(
     Ok(Reached::Short { nearest, veto: None })
 }
 
-/// What is in the way from the old state to the new one, which no pass has looked at
-/// (pitfall 16).
+/// Returns what is in the way from the old state to the new one, because no pass has checked that
+/// whole way.
 fn blocked_way<const D: usize>(
     chain: &Chain<D>,
     obstacles: &Obstacles<D>,

@@ -1,9 +1,9 @@
-//! Re-forming a broken chain (slide F3): the parts between two whole ends are scattered, or some
-//! of them are gone.
+//! Re-forming a broken chain (slide F3): the parts between two whole ends are scattered, or some of
+//! them are missing.
 //!
-//! Passes from the one stub to the other and back, each slave by push, pull and resize, bring
-//! every rod into its limits; the whole ends keep every bit. Where the gap is longer than the
-//! parts that are left, one end must come, and only an end that may.
+//! Passes from one stub to the other and back, each slave by push, pull and resize, bring every rod
+//! into its limits; the whole ends keep every bit. If the gap is longer than the remaining parts,
+//! one end must come, and only an end that may.
 
 use super::candidates::guided;
 use super::chain::{Chain, LENGTH_TOLERANCE_M, Rod};
@@ -16,53 +16,53 @@ use super::veto::Request;
 use sidestep_kernel::InputError;
 use std::ops::RangeInclusive;
 
-/// Double passes before it is given up. The worst case measured took 120.
+/// Most double passes before re-forming is given up. The worst case measured took 120.
 const MAX_DOUBLE_PASSES: usize = 1_000;
-/// A gap of this part of what the scattered parts reach stretches them out.
+/// Ratio of the gap to the reach of the scattered parts from which on they are stretched out.
 const STRETCHED: f64 = 0.999;
-/// An end that comes leaves a gap of this part of what the scattered parts reach.
+/// Ratio of the gap to the reach of the scattered parts that an end leaves when it comes.
 const SLACK_LEFT: f64 = 0.95;
 
-/// Which whole end may come where the gap is too long.
+/// The whole end that may come if the gap is too long.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MayCome {
-    /// None.
+    /// Neither end.
     Nobody,
-    /// The one with connector 0.
+    /// The end with connector 0.
     First,
-    /// The one with the last connector.
+    /// The end with the last connector.
     Last,
 }
 
-/// What came of re-forming.
+/// Outcome of re-forming.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Reformed {
     /// All rods are within their limits again.
     Whole {
-        /// Passes there and back.
+        /// Number of passes there and back.
         double_passes: usize,
     },
     /// The parts between the ends are too short; nothing has changed.
     GapTooLong {
-        /// How far the parts reach.
+        /// Reach of the parts, meters.
         have_m: f64,
-        /// How far they would have to.
+        /// Reach that they would need, meters.
         need_m: f64,
     },
-    /// Passes did not bring it together; nothing has changed.
+    /// Passes did not join the parts; nothing has changed.
     NotReached {
-        /// What the worst rod was off by.
+        /// Error of the worst rod, meters.
         off_m: f64,
     },
 }
 
-/// Brings the scattered connectors of a chain back between the two whole ends beside them.
-/// An end that may come is pulled as a chain of its own; the other keeps every bit. No obstacle
-/// is looked at: move the whole chain afterwards to avoid them.
+/// Brings the scattered connectors of a chain back between the two whole ends beside them. An end
+/// that may come is pulled as a chain of its own; the other keeps every bit. Obstacles are ignored:
+/// move the whole chain afterwards to avoid them.
 ///
 /// # Errors
-/// Scattered connectors that the chain does not have, or with no connector beside them on both
-/// sides.
+/// When the chain does not have the scattered connectors, or there is no connector beside them on
+/// both sides.
 pub fn reform<const D: usize>(
     chain: &mut Chain<D>,
     scattered: RangeInclusive<usize>,
@@ -100,8 +100,8 @@ pub fn reform<const D: usize>(
     Ok(Reformed::NotReached { off_m })
 }
 
-/// Where the parts reach across the gap only just, they lie on the straight line between the
-/// stubs: passes would come near that for ever.
+/// Lays the parts on the straight line between the stubs if they only just reach across the gap,
+/// because passes would converge to that line without end.
 fn lay_out<const D: usize>(chain: &mut Chain<D>, low: usize, high: usize, have_m: f64) {
     let [a, b] = [chain.points()[low], chain.points()[high]];
     let part = distance(a, b) / have_m;
@@ -116,7 +116,7 @@ fn lay_out<const D: usize>(chain: &mut Chain<D>, low: usize, high: usize, have_m
     }
 }
 
-/// From one stub to the connector before the other.
+/// Passes from one stub to the connector before the other.
 fn pass<const D: usize>(chain: &mut Chain<D>, from: usize, to: usize, direction: Direction) {
     let least_move_m = chain.least_move_m();
     let mut master = from;

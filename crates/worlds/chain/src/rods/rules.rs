@@ -1,33 +1,33 @@
-//! The named options of how a chain reacts.
+//! Named options for the reactions of a chain.
 
-/// What a rod does that hits an obstacle (slides A7, A8).
+/// Reaction of a rod that hits an obstacle (slides A7, A8).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Rotation {
     /// Turns to the nearest direction that is free of everything at once: the default.
     #[default]
     Union,
-    /// Turns once, to the tangent of the obstacle that is hit nearest to the master, as the
-    /// slides say, and does not look again. Unsafe: it leads from one obstacle into the next,
-    /// up to 0.19 m deep where measured.
+    /// Turns once, to the tangent of the obstacle that is hit nearest to the master, as the slides
+    /// say, and does not check again. Unsafe: it leads from one obstacle into the next, up to 0.19
+    /// m deep where measured.
     Literal,
     /// Does not turn: every hit is a veto.
     Never,
 }
 
-/// How a chain reacts.
+/// Rules by which a chain reacts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rules {
-    /// What a rod does that hits an obstacle.
+    /// Reaction of a rod that hits an obstacle.
     pub rotation: Rotation,
-    /// Whether the chain's own parts are obstacles to it (discs further than one index apart,
-    /// rods further than two).
+    /// Whether the chain's own parts are obstacles to it (discs more than one index apart, rods
+    /// more than two).
     pub self_collision: bool,
-    /// The longest way of a slave in one sub-step; infinite for no limit.
+    /// Longest move of a slave in one sub-step, meters; infinite for no limit.
     pub slave_step_max_m: f64,
-    /// How often one sweep may try another direction for an earlier slave.
+    /// Number of times that one sweep may try another direction for an earlier slave.
     pub backtracks: usize,
-    /// The longest way of an initiator in one sub-step; where there is none, a quarter of the
-    /// least rod or radius, and all at once where nothing is in the way.
+    /// Longest move of an initiator in one sub-step, meters. By default it is a quarter of the
+    /// least rod or radius, and unlimited if nothing is in the way.
     pub step_m: Option<f64>,
 }
 

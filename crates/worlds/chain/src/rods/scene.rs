@@ -1,7 +1,7 @@
-//! What one slave perceives and may do: the judge of every position of a chain's part.
+//! The perception and the options of one slave: the judge of every position of a chain's part.
 //!
-//! A slave's reaction depends on its master's move, its own place, the rod before, and what is
-//! near (slide E4), never on anything further along the chain.
+//! A slave's reaction depends on its master's move, its own place, the rod before, and its
+//! surroundings (slide E4), never on anything farther along the chain.
 
 use super::chain::{Chain, LENGTH_TOLERANCE_M, Rod};
 use super::geometry::{Bounds, Core, Point, angle_rad, distance, sub};
@@ -12,17 +12,17 @@ use super::sweep::Sweep;
 use super::veto::Reason;
 use std::f64::consts::PI;
 
-/// Clearance that a turn aims at, meters. Ten times the tolerance at least: otherwise the next
-/// step starts "inside" (pitfall 4).
+/// Clearance that a turn aims at, meters. It is at least ten times the tolerance, because otherwise
+/// the next step would start "inside".
 pub const SKIN_M: f64 = 1e-7;
 /// Penetration that counts as contact, meters.
 pub const TOLERANCE_M: f64 = 1e-9;
-/// Bends are within their limits to this.
+/// Tolerance of bend limits, rad.
 pub const BEND_TOLERANCE_RAD: f64 = 1e-9;
-/// What touches a body without any thickness.
+/// Distance below which a body without any thickness is touched, meters.
 const TOUCH_M: f64 = 1e-12;
 
-/// New positions before they are accepted: a run of connectors around the initiator.
+/// New positions before they are accepted, for a run of connectors around the initiator.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Overlay<const D: usize> {
     points: Vec<Point<D>>,
@@ -37,7 +37,7 @@ impl<const D: usize> Overlay<D> {
         (self.from, self.to) = (first, first);
     }
 
-    /// Gives a connector of the run, or one beside it, a position.
+    /// Sets the position of a connector of the run, or of one beside it.
     pub(super) fn set(&mut self, i: usize, p: Point<D>) {
         debug_assert!(self.from <= i + 1 && i <= self.to, "the run would have a gap");
         self.points[i] = p;
@@ -53,7 +53,7 @@ impl<const D: usize> Overlay<D> {
     }
 }
 
-/// What stands in the way.
+/// A part that may be in the way.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Block<const D: usize> {
     pub(super) core: Core<D>,
@@ -64,7 +64,7 @@ pub(super) struct Block<const D: usize> {
     pub(super) stops_tip: bool,
 }
 
-/// Whose part it is; the order breaks ties.
+/// The owner of a block; its order breaks ties.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Name {
     Obstacle(u32),
@@ -81,7 +81,7 @@ impl Name {
     }
 }
 
-/// An objection, before anybody knows how far the motion got.
+/// An objection, before the length of the motion is known.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Refusal {
     pub(super) reason: Reason,
@@ -108,7 +108,7 @@ pub(super) struct Step<const D: usize> {
     pub(super) mo: Point<D>,
     pub(super) mn: Point<D>,
     pub(super) so: Point<D>,
-    /// The connector on the master's other side, where its place is settled.
+    /// The connector on the master's other side, if its place is settled.
     pub(super) prev: Option<Point<D>>,
     pub(super) rod: Rod,
     /// Radius of the slave's body and bend limit of the master.
@@ -129,12 +129,12 @@ impl<const D: usize> Step<D> {
     }
 }
 
-/// What must be kept between a body and an obstacle so that they only touch.
+/// Returns the distance at which a body and an obstacle only touch, meters.
 pub(crate) fn needed_m(radius_m: f64) -> f64 {
     (radius_m - TOLERANCE_M).max(TOUCH_M)
 }
 
-/// Everything a motion reads.
+/// The inputs of a motion.
 pub(super) struct Scene<'a, const D: usize> {
     pub(super) chain: &'a Chain<D>,
     pub(super) obstacles: &'a Obstacles<D>,
@@ -144,13 +144,13 @@ pub(super) struct Scene<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> Scene<'a, D> {
-    /// Where a connector is now: its new place if it has one.
+    /// Returns the current place of a connector: its new place if it has one.
     pub(super) fn at(&self, i: usize) -> Point<D> {
         self.overlay.get(i).unwrap_or(self.chain.points()[i])
     }
 
-    /// Visits what may be in the way of a rod and the connector at its end. A rod that does not
-    /// exist (`rod` of `None`) stands for the connector alone.
+    /// Visits every block that may be in the way of a rod and the connector at its end. If `rod` is
+    /// `None`, the connector is alone.
     pub(super) fn visit_blocks(
         &self,
         near: &Bounds<D>,
@@ -175,8 +175,8 @@ impl<'a, const D: usize> Scene<'a, D> {
         }
     }
 
-    /// A rod of the chain and its connectors (the last rod's both) as obstacles to another.
-    /// Neighbors are exempt: they touch by construction.
+    /// Returns a rod of the chain and its connectors (the last rod's both) as obstacles to another.
+    /// Neighbors are exempt because they touch by construction.
     fn own_blocks(&self, other: usize, rod: Option<usize>, tip: usize) -> [Option<Block<D>>; 3] {
         let connectors = self.chain.connectors();
         let connector = |c: usize| {
@@ -201,7 +201,7 @@ impl<'a, const D: usize> Scene<'a, D> {
             .map(|b| b.filter(|b| b.stops_rod || b.stops_tip))
     }
 
-    /// Whether the slave may be at `s`; the first objection otherwise.
+    /// Checks whether the slave may be at `s`; returns the first objection otherwise.
     pub(super) fn judge(&self, step: &Step<D>, s: Point<D>) -> Result<(), Refusal> {
         if !step.bends_at(s) {
             return Err(Refusal::of(Reason::BendLimit));
@@ -237,8 +237,8 @@ impl<'a, const D: usize> Scene<'a, D> {
     }
 }
 
-/// How deep a rod or its end is in a block, and what that is called; `None` where all is well.
-/// No point of the rod goes further than `way_m`.
+/// Returns how deep a rod or its end is in a block, and the reason; `None` if all is well. No point
+/// of the rod moves by more than `way_m`.
 fn objection<const D: usize>(
     step: &Step<D>,
     s: Point<D>,
@@ -261,7 +261,7 @@ fn objection<const D: usize>(
     }
     let (now_m, before_m) =
         (depth_m(step.mn, s, step, block), depth_m(step.mo, step.so, step, block));
-    // Who starts inside may not go deeper.
+    // A part that starts inside may stay, but must not go deeper.
     if before_m > TOLERANCE_M && now_m <= before_m {
         return None;
     }
@@ -273,7 +273,7 @@ fn was_inside<const D: usize>(step: &Step<D>, block: &Block<D>) -> bool {
     depth_m(step.mo, step.so, step, block) > TOLERANCE_M
 }
 
-/// How deep a rod, or the connector at its end, is in a block; negative outside.
+/// Returns how deep a rod, or the connector at its end, is in a block, meters; negative outside.
 fn depth_m<const D: usize>(m: Point<D>, s: Point<D>, step: &Step<D>, block: &Block<D>) -> f64 {
     let rod_m =
         block.radius_m + step.rod.radius_m - block.core.nearest_to_segment([m, s]).distance_m;
@@ -283,7 +283,7 @@ fn depth_m<const D: usize>(m: Point<D>, s: Point<D>, step: &Step<D>, block: &Blo
     rod_m.max(tip_m)
 }
 
-/// Whether a rod's length is within its limits, to the tolerance.
+/// Whether a rod's length is within its limits, up to the tolerance.
 pub(crate) fn fits(rod: Rod, length_m: f64) -> bool {
     (rod.min_m - LENGTH_TOLERANCE_M..=rod.max_m + LENGTH_TOLERANCE_M).contains(&length_m)
 }

@@ -1,28 +1,28 @@
-//! The direction of a rod in space that is free of everything near: a search, since the blocked
-//! directions on a sphere have no order.
+//! A search for a direction of a rod in space that is free of everything nearby, because the
+//! blocked directions on a sphere have no order.
 //!
-//! First the rod turns away from the worst obstacle, again and again; that is nearly always
-//! enough. Where it is not, rings of directions around the wanted one are tried from the
-//! narrowest on, and the first free one is brought as near as it stays free.
+//! First the rod turns away from the worst obstacle, again and again; that is nearly always enough.
+//! If it is not, rings of directions around the wanted one are tried from the narrowest on, and the
+//! first free direction is brought as near to the wanted one as it stays free.
 
 use super::geometry::{Point, add, along, angle_rad, dot, norm, perpendicular, scaled, sub, unit};
 use super::scene::{Block, Name, SKIN_M, Step, needed_m};
 use sidestep_kernel::math;
 use std::f64::consts::{PI, TAU};
 
-/// Turns away from single obstacles before the rings.
+/// Most turns away from single obstacles before the rings.
 const MAX_TURNS: usize = 24;
-/// Cosine of the turn after which turning away has lost its way: 100 degrees.
+/// Cosine of the turn beyond which turning away counts as lost: 100 degrees.
 const LOST_COSINE: f64 = -0.173_648;
 /// Directions on a ring.
 const AZIMUTHS: usize = 24;
-/// The widest ring.
+/// The widest ring, rad.
 const MAX_RING_RAD: f64 = 2.0;
-/// Halvings that bring a free direction near the wanted one.
+/// Bisection steps that bring a free direction near the wanted one.
 const HALVINGS: usize = 20;
 
-/// A rod of one length at its master, and what may be in its way. The master is inside none of
-/// the blocks.
+/// A rod of one length at its master, and the blocks that may be in its way. The master is inside
+/// none of them.
 pub(super) struct Search<'a, const D: usize> {
     pub(super) step: &'a Step<D>,
     pub(super) length_m: f64,
@@ -39,7 +39,8 @@ struct Hit<const D: usize> {
 }
 
 impl<const D: usize> Search<'_, D> {
-    /// A free direction near `wanted` by turning away from the worst, if that leads to one.
+    /// Returns a free direction near `wanted`, found by turning away from the worst block, if that
+    /// works.
     pub(super) fn turn_away(&self, wanted: Point<D>) -> Option<Point<D>> {
         let mut u = self.within_bend(wanted);
         for _ in 0..MAX_TURNS {
@@ -52,7 +53,7 @@ impl<const D: usize> Search<'_, D> {
         None
     }
 
-    /// The first free direction on rings around `wanted`, brought near.
+    /// Returns the first free direction on rings around `wanted`, brought near it.
     pub(super) fn rings(
         &self,
         wanted: Point<D>,
@@ -82,7 +83,7 @@ impl<const D: usize> Search<'_, D> {
         self.step.bends_at(along(self.step.mn, u, self.length_m))
     }
 
-    /// The direction itself, or the nearest on the cone of the bend limit.
+    /// Returns the direction itself, or the nearest on the cone of the bend limit.
     fn within_bend(&self, u: Point<D>) -> Point<D> {
         let Some(prev) = self.step.prev.filter(|_| self.step.max_bend_rad < PI) else { return u };
         let Some(into) = unit(sub(self.step.mn, prev)) else { return u };
@@ -94,7 +95,7 @@ impl<const D: usize> Search<'_, D> {
         add(scaled(into, c), scaled(side, s))
     }
 
-    /// What a rod in a direction is deepest in.
+    /// Returns the block that a rod in a direction is deepest in.
     fn worst(&self, u: Point<D>) -> Option<Hit<D>> {
         let s = along(self.step.mn, u, self.length_m);
         let mut worst: Option<Hit<D>> = None;
@@ -136,21 +137,21 @@ impl<const D: usize> Search<'_, D> {
     }
 }
 
-/// The direction at an angle from `d`, in the plane of both, on the side of `u`.
+/// Returns the direction at an angle from `d`, in the plane of both, on the side of `u`.
 pub(super) fn away<const D: usize>(u: Point<D>, d: Point<D>, cosine: f64) -> Point<D> {
     let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
     let turned = add(scaled(d, cosine), scaled(side_of(d, u), sine));
     unit(turned).unwrap_or(u)
 }
 
-/// The unit vector perpendicular to `d` on the side of `u`.
+/// Returns the unit vector perpendicular to `d` on the side of `u`.
 fn side_of<const D: usize>(d: Point<D>, u: Point<D>) -> Point<D> {
     let across = along(u, d, -dot(u, d));
     if norm(across) > 1e-9 { unit(across).unwrap_or(across) } else { perpendicular(d) }
 }
 
-/// Cosine of half the angle under which a ball blocks a rod or its end; `None` where there is no
-/// such direction.
+/// Returns the cosine of half the angle under which a ball blocks a rod or its end; `None` if there
+/// is no such direction.
 pub(super) fn cosine_of_half_angle(
     apart_m: f64,
     radius_m: f64,
@@ -178,7 +179,7 @@ fn other_perpendicular<const D: usize>(u: Point<D>, e1: Point<D>) -> Point<D> {
     })
 }
 
-/// The least angle that is still free, between one that is not and one that is.
+/// Returns the least free angle, between one that is blocked and one that is free, rad.
 fn nearest_free_rad(mut blocked_rad: f64, mut free_rad: f64, is_free: impl Fn(f64) -> bool) -> f64 {
     for _ in 0..HALVINGS {
         let middle_rad = 0.5 * (blocked_rad + free_rad);

@@ -1,14 +1,14 @@
-//! Whether a rod passes through something between two good positions.
+//! A test whether a rod passes through something between two good positions.
 //!
-//! Both ends go straight from their old to their new place. In the plane the test is exact: the
-//! rod passes a core only where its moving end crosses it, or where an end of the core crosses
-//! the rod. In space a rod may go round anything, so what counts is how near it comes: at no time
-//! nearer to the core than half of what it must keep at rest. What that guarantees, and what not,
-//! is in [`super::passage`].
+//! Both ends go straight from their old to their new place. In the plane the test is exact: the rod
+//! passes a core only where its moving end crosses it, or where an end of the core crosses the rod.
+//! In space a rod may go round anything, so only its distance counts: it is never nearer to the
+//! core than half of the distance that it must keep at rest. [`super::passage`] describes what that
+//! does and does not guarantee.
 
 use super::geometry::{Core, Point, along, between, cross_2d, cross_each_other, dot, sub};
 
-/// A rod on its way: master and slave, before and after.
+/// A moving rod: master and slave, before and after.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Sweep<const D: usize> {
     /// The rod before: master, slave.
@@ -23,7 +23,7 @@ const PART_KEPT: f64 = 0.5;
 const MAX_ADVANCES: usize = 64;
 
 impl<const D: usize> Sweep<D> {
-    /// The longest way of any point of the rod.
+    /// Returns the longest distance that any point of the rod moves, meters.
     pub(super) fn longest_way_m(&self) -> f64 {
         let way2 = |end: usize| {
             let way = sub(self.to[end], self.from[end]);
@@ -32,16 +32,17 @@ impl<const D: usize> Sweep<D> {
         way2(0).max(way2(1)).sqrt()
     }
 
-    /// Whether the rod passes no core point on its way, resp. stays half as far away in space as
-    /// `keep_m`, the distance that it must keep at rest.
+    /// Whether the rod passes no point of the core on its way; in space, whether it stays half as
+    /// far away as `keep_m`, the distance that it must keep at rest.
     pub(super) fn is_clear(&self, core: &Core<D>, keep_m: f64) -> bool {
         let way_m = self.longest_way_m();
         core.is_clear_of_segment(self.to, Self::sure_m(way_m, keep_m))
             || self.is_clear_on_the_way(core, keep_m, way_m)
     }
 
-    /// A rod whose points go at most `way_m`, and end this far from a core or further, is clear of
-    /// it: no point can have been nearer than where it ends, less its way.
+    /// Returns the distance at the end of a move, in meters, from which on a rod whose points move
+    /// at most `way_m` is surely clear of a core: no point was nearer than its end distance less
+    /// its way.
     pub(super) fn sure_m(way_m: f64, keep_m: f64) -> f64 {
         way_m + Self::kept_m(keep_m) + TOUCH_M
     }
@@ -50,7 +51,7 @@ impl<const D: usize> Sweep<D> {
         if D == 2 { 0.0 } else { PART_KEPT * keep_m }
     }
 
-    /// The same without the look at where it ends.
+    /// Whether the way is clear, without checking where it ends.
     pub(super) fn is_clear_on_the_way(&self, core: &Core<D>, keep_m: f64, way_m: f64) -> bool {
         match core {
             Core::Point(c) if D == 2 => !self.is_crossed_by(*c),
@@ -68,7 +69,7 @@ impl<const D: usize> Sweep<D> {
         cross_each_other([self.from[1], self.to[1]], wall)
     }
 
-    /// Whether a plane point lies on the rod at some time: the roots of a parabola.
+    /// Whether a plane point lies on the rod at some time, by the roots of a parabola.
     fn is_crossed_by(&self, p: Point<D>) -> bool {
         let (m, r) = (sub(self.from[0], p), sub(self.from[1], self.from[0]));
         let dm = sub(self.to[0], self.from[0]);
@@ -83,7 +84,7 @@ impl<const D: usize> Sweep<D> {
         })
     }
 
-    /// Goes forward as far as is safe each time, however the ends move.
+    /// Advances as far as is safe each time, however the ends move.
     fn stays_away(&self, core: &Core<D>, kept_m: f64, way_m: f64) -> bool {
         let mut time = 0.0;
         for _ in 0..MAX_ADVANCES {
@@ -101,10 +102,10 @@ impl<const D: usize> Sweep<D> {
     }
 }
 
-/// What is nearer than this touches.
+/// Distance below which bodies touch, meters.
 const TOUCH_M: f64 = 1e-12;
 
-/// Real roots of `a x^2 + b x + c`; none where it is zero everywhere.
+/// Returns the real roots of `a x^2 + b x + c`; none if it is zero everywhere.
 fn roots(a: f64, b: f64, c: f64) -> [Option<f64>; 2] {
     if a == 0.0 {
         return [(b != 0.0).then(|| -c / b), None];
@@ -113,7 +114,7 @@ fn roots(a: f64, b: f64, c: f64) -> [Option<f64>; 2] {
     if inside < 0.0 {
         return [None; 2];
     }
-    // The sum without cancellation; the other root by the product of both.
+    // This sum has no cancellation; the other root follows from the product of both.
     let q = -0.5 * (b + inside.sqrt().copysign(b));
     [Some(q / a), (q != 0.0).then(|| c / q)]
 }

@@ -1,14 +1,14 @@
-//! Requests to move, and what comes of them: a move, or a veto that says who objects and why.
+//! Requests to move, and their outcomes: a move, or a veto that says which part objects and why.
 //!
-//! A veto is an outcome, not an error (slides R1, R6 to R9). Who asked decides what follows: an
-//! autonomous mover plans anew, a planner or an operator is told.
+//! A veto is an outcome, not an error (slides R1, R6 to R9). The source of the request decides what
+//! follows: an autonomous mover plans again, a planner or an operator gets a report.
 
 use super::geometry::Point;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::ops::Range;
 
-/// Who wants the motion (slide R4).
+/// Source of a request (slide R4).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Source {
     /// The connector itself.
@@ -19,53 +19,53 @@ pub enum Source {
     Operator,
 }
 
-/// What a veto on the way means.
+/// Effect of a veto on the way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mode {
     /// All the way or not at all.
     Exact,
-    /// As far as goes.
+    /// As far as possible.
     AsFarAsPossible,
 }
 
-/// What moves where.
+/// The motion of a request.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Motion<const D: usize> {
     /// One connector.
     Connector {
         /// Its index.
         k: usize,
-        /// Where it shall be.
+        /// Its target.
         to: Point<D>,
     },
     /// A rod: both its connectors in one request.
     Rod {
         /// Its index.
         i: usize,
-        /// Where connectors `i` and `i + 1` shall be.
+        /// Targets of connectors `i` and `i + 1`.
         to: [Point<D>; 2],
     },
 }
 
-/// An order to a chain.
+/// A request to a chain.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Request<const D: usize> {
-    /// What moves where.
+    /// The motion.
     pub motion: Motion<D>,
-    /// Who wants it.
+    /// The source of the request.
     pub source: Source,
-    /// What a veto on the way means.
+    /// Effect of a veto on the way.
     pub mode: Mode,
 }
 
 impl<const D: usize> Request<D> {
-    /// An operator's order that connector `k` goes to `to`, or nothing moves.
+    /// Returns an operator's request that connector `k` goes to `to`, or nothing moves.
     pub fn exact(k: usize, to: Point<D>) -> Self {
         Self { motion: Motion::Connector { k, to }, source: Source::Operator, mode: Mode::Exact }
     }
 }
 
-/// Which constraint speaks against a motion.
+/// The constraint that forbids a motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Reason {
     /// A fixed connector would have to move.
@@ -74,7 +74,7 @@ pub enum Reason {
     Failed,
     /// A connector would leave the line, plane or box that it belongs on.
     Mobility,
-    /// Something is where the initiator wants to go.
+    /// Something blocks the place where the initiator wants to go.
     TargetBlocked,
     /// Every direction of a rod is blocked.
     BothSidesBlocked,
@@ -86,9 +86,9 @@ pub enum Reason {
     BendLimit,
     /// The chain would run into itself.
     SelfCollision,
-    /// A slave would have to move further in one step than it may.
+    /// A slave would have to move farther in one step than it may.
     StepLimit,
-    /// The search for a way out was given up.
+    /// The search for a way out reached its limit and was given up.
     Limit,
     /// No posture of the chain reaches the target, or none was found.
     OutOfReach,
@@ -111,7 +111,7 @@ impl Reason {
         Self::OutOfReach,
     ];
 
-    /// Its name in files.
+    /// Returns its name in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Fixed => "fixed",
@@ -156,11 +156,11 @@ pub struct Veto<const D: usize> {
     pub by: usize,
     /// The initiator.
     pub from: usize,
-    /// Why.
+    /// The reason.
     pub reason: Reason,
-    /// The obstacle that it is about, if it is about one.
+    /// The obstacle concerned, if any.
     pub obstacle: Option<u32>,
-    /// How far the initiator could have gone.
+    /// The place that the initiator could have reached.
     pub reached: Point<D>,
 }
 
@@ -177,19 +177,19 @@ impl<const D: usize> fmt::Display for Veto<D> {
 /// A motion that took place.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Moved<const D: usize> {
-    /// Connectors that reacted, initiator included.
+    /// Connectors that reacted, including the initiator.
     pub touched: Range<usize>,
-    /// How many connectors are elsewhere than before, sums over the sub-steps.
+    /// Number of connectors that moved, summed over the sub-steps.
     pub changed: usize,
     /// How many times a rod was turned to avoid something.
     pub rotated: usize,
-    /// The longest way of a connector other than the initiator in one sub-step.
+    /// Longest distance that a connector other than the initiator moved in one sub-step, meters.
     pub max_slave_step_m: f64,
-    /// Why the motion ended early, where the mode allows that.
+    /// The veto that ended the motion early, if the mode allows that.
     pub cut_short: Option<Veto<D>>,
 }
 
-/// What came of a request.
+/// Outcome of a request.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Outcome<const D: usize> {
     /// The chain moved.
@@ -199,7 +199,7 @@ pub enum Outcome<const D: usize> {
 }
 
 impl<const D: usize> Outcome<D> {
-    /// The motion, if there was one.
+    /// Returns the motion, if there was one.
     pub fn moved(&self) -> Option<&Moved<D>> {
         match self {
             Self::Moved(moved) => Some(moved),
@@ -207,7 +207,7 @@ impl<const D: usize> Outcome<D> {
         }
     }
 
-    /// The veto, if nothing moved.
+    /// Returns the veto, if nothing moved.
     pub fn veto(&self) -> Option<&Veto<D>> {
         match self {
             Self::Moved(_) => None,

@@ -1,9 +1,8 @@
-//! Several motions of one end of a chain at once, where nothing is in the way.
+//! Several motions of one end of a chain at once, if nothing is in the way.
 //!
-//! One motion is a chain of dependent square roots and divisions, and a processor that waits.
-//! Motion `w` can be at connector `j - w` while motion 0 is at connector `j`: all lanes are
-//! independent, and every one computes what the motions one after the other would compute, to
-//! the bit.
+//! One motion is a series of dependent square roots and divisions, each of which the processor
+//! waits for. Motion `w` can be at connector `j - w` while motion 0 is at connector `j`: all lanes
+//! are independent, and each computes the same bits as the motions one after the other.
 
 #![expect(
     clippy::needless_range_loop,
@@ -18,17 +17,18 @@ use super::veto::Request;
 use super::{Obstacles, Rules};
 use sidestep_kernel::InputError;
 
-/// Motions at once: enough that the units for roots and divisions wait for nobody.
+/// Motions at once: enough to keep the units for roots and divisions busy.
 pub const LANES: usize = 12;
 
-/// Fewer motions are made sooner one by one.
+/// Number of motions below which one after the other is faster.
 const WORTH_IT: usize = 3;
 
-/// Moves the first connector through `heads`, one after the other, as as many requests would.
+/// Moves the first connector through `heads`, one after the other, like the same number of
+/// requests.
 ///
 /// # Errors
-/// A target that is not finite, a chain with a connector that is not free or has a bend limit:
-/// somebody might object, and then the motions must be made one by one.
+/// When a target is not finite, or the chain has a connector that is not free or has a bend limit:
+/// then a connector might object, and the motions must be made one by one.
 pub fn pull_first<const D: usize>(
     chain: &mut Chain<D>,
     heads: &[Point<D>],
@@ -60,14 +60,14 @@ pub fn pull_first<const D: usize>(
 /// master at `w + 1`, which is where lane `w + 1` has its slave.
 type Row = [f64; LANES + 1];
 
-/// Where the connectors are that lanes are at, lane 0 furthest along the chain.
+/// Positions of the connectors that lanes are at, lane 0 farthest along the chain.
 #[derive(Clone, Copy)]
 struct Front<const D: usize> {
     rows: [Row; D],
 }
 
 impl<const D: usize> Front<D> {
-    /// Places apart from each other, which nobody reads.
+    /// Returns positions apart from each other, which nothing reads.
     fn nobody() -> Self {
         Self { rows: [std::array::from_fn(|w| -4.0 * w as f64); D] }
     }
@@ -87,12 +87,12 @@ impl<const D: usize> Front<D> {
 struct Limits {
     min_m: [f64; LANES],
     max_m: [f64; LANES],
-    /// How many rods in a row were as the last.
+    /// Number of rods in a row that equal the last.
     alike: usize,
 }
 
 impl Limits {
-    /// Hands every lane's rod to the next lane, and a new one to the first.
+    /// Passes every lane's rod on to the next lane, and a new one to the first.
     #[inline]
     fn shift(&mut self, next: Rod) {
         let is_as_last = next.min_m == self.min_m[0] && next.max_m == self.max_m[0];
@@ -105,8 +105,8 @@ impl Limits {
     }
 }
 
-/// The reaction of every lane's slave: [`guided`], lane by lane. Before, `next` holds where
-/// everybody was one connector ago; after, where the slaves are that now become masters.
+/// Computes the reaction of every lane's slave: [`guided`], lane by lane. Before the call, `next`
+/// holds the positions of one connector ago; after it, those of the slaves that now become masters.
 #[inline]
 fn react<const D: usize>(now: &Front<D>, next: &mut Front<D>, limits: &Limits, least_move_m: f64) {
     let mut g = [[0.0; LANES]; D];
@@ -139,7 +139,7 @@ fn react<const D: usize>(now: &Front<D>, next: &mut Front<D>, limits: &Limits, l
     }
 }
 
-/// Looks at all lanes at once, where a search would branch at each.
+/// Whether any lane is true; looks at all lanes at once, because a search would branch at each.
 #[inline]
 fn any(lanes: [bool; LANES]) -> bool {
     lanes.iter().fold(false, |any, &is| any | is)
@@ -152,7 +152,7 @@ fn react_one_by_one<const D: usize>(
     limits: &Limits,
     least_move_m: f64,
 ) {
-    // Downward: lane w - 1 still needs where lane w - 1's master was, at w - 1.
+    // Downward, because lane w - 1 still needs its master's old position, at w - 1.
     for w in (0..LANES).rev() {
         let places = [next.get(w), now.get(w + 1), now.get(w)];
         let rod = Rod { min_m: limits.min_m[w], max_m: limits.max_m[w], radius_m: 0.0 };
@@ -160,8 +160,8 @@ fn react_one_by_one<const D: usize>(
     }
 }
 
-/// As many motions as there are heads, at most one for each lane. Lanes that have no head, are not
-/// at a connector yet, or are past the last, compute what nobody reads.
+/// Makes as many motions as there are heads, at most one per lane. Lanes without a head, not yet at
+/// a connector, or past the last one compute values that nothing reads.
 fn pull_lanes<const D: usize>(chain: &mut Chain<D>, heads: &[Point<D>]) {
     let least_move_m = chain.least_move_m();
     let (points, rods) = chain.parts_mut();
@@ -169,13 +169,13 @@ fn pull_lanes<const D: usize>(chain: &mut Chain<D>, heads: &[Point<D>]) {
     let mut limits = Limits { min_m: [1.0; LANES], max_m: [1.0; LANES], alike: LANES };
     let (mut now, mut next) = (Front::nobody(), Front::nobody());
     for j in 0..points.len() + heads.len() - 1 {
-        // Past the last, never at the place before, so that nobody's rod has no length.
+        // Past the last, never at the place before, so that no rod has length zero.
         let beyond = || super::geometry::scaled(super::geometry::first_axis(), 4.0 * j as f64);
         now.set(0, points.get(j).copied().unwrap_or_else(beyond));
         limits.shift(rods.get(j.wrapping_sub(1)).copied().unwrap_or(nobody));
         react(&now, &mut next, &limits, least_move_m);
         if let Some(head) = heads.get(j) {
-            // Lane j is at connector 0, which goes where it is told.
+            // Lane j is at connector 0, which goes to its head.
             next.set(j + 1, *head);
         }
         if j + 1 >= heads.len() {

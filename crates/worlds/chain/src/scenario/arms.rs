@@ -22,7 +22,7 @@ pub(super) struct ArmSection {
 }
 
 impl<const D: usize> Compiler<'_, D> {
-    /// An arm whose base is at `at_m`.
+    /// Returns an arm whose base is at `at_m`.
     pub(super) fn arm(
         &self,
         section: &Spanned<ArmSection>,
@@ -45,7 +45,7 @@ impl<const D: usize> Compiler<'_, D> {
         Ok(Arm::new(serial, at_m, values))
     }
 
-    /// Joint values at the start: given, of a named posture, or at rest.
+    /// Returns the joint values at the start: given, of a named posture, or at rest.
     fn values(
         &self,
         s: &ArmSection,

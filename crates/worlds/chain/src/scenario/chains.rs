@@ -1,4 +1,4 @@
-//! Chains: their shape, their limits, and where they begin.
+//! Chains: their shape, their limits, and their start.
 
 use super::super::arms::arm::Arm;
 use super::super::driver::{Driver, Task};
@@ -23,7 +23,7 @@ use std::ops::Range;
 use std::sync::Arc;
 use toml::Spanned;
 
-/// A chain that starts anywhere has this many times its radius of room around its parts.
+/// Room around the parts of a chain that starts anywhere, as a multiple of its radius.
 const ROOM: f64 = 1.2;
 /// Room for robots that follow their connectors on wheels, meters.
 const MARGIN_M: f64 = 0.08;
@@ -78,7 +78,7 @@ pub(super) struct LimitSection<const D: usize> {
 }
 
 impl<const D: usize> Compiler<'_, D> {
-    /// All chains.
+    /// Returns all chains.
     pub(super) fn chains(
         &self,
         dt_s: f64,
@@ -99,7 +99,7 @@ impl<const D: usize> Compiler<'_, D> {
         Ok(all)
     }
 
-    /// Refuses more connectors than memory is for, before any is made.
+    /// Refuses more connectors than fit in memory, before any is made.
     fn check_total(&self) -> Result<(), InputError> {
         let mut total: usize = 0;
         for section in &self.file.chains.0 {
@@ -116,7 +116,7 @@ impl<const D: usize> Compiler<'_, D> {
         Ok(())
     }
 
-    /// One more chain like `spec`, so many times `apart_m` further.
+    /// Returns one more chain like `spec`, shifted by a multiple of `apart_m`.
     fn copied(
         &self,
         spec: &ChainSpec<D>,
@@ -167,7 +167,8 @@ impl<const D: usize> Compiler<'_, D> {
         Ok(ChainSpec { name: s.name.clone(), start, tasks, changes, arm, robots })
     }
 
-    /// Tasks of a chain of `n` connectors: at least one, and an endless one only at the end.
+    /// Returns tasks of a chain of `n` connectors: at least one, and an endless one only at the
+    /// end.
     fn tasks(
         &self,
         s: &ChainSection<D>,
@@ -195,7 +196,7 @@ impl<const D: usize> Compiler<'_, D> {
         Ok(tasks)
     }
 
-    /// Changes of a chain by their time.
+    /// Returns the changes of a chain by their time.
     fn changes(
         &self,
         s: &ChainSection<D>,
@@ -214,7 +215,7 @@ impl<const D: usize> Compiler<'_, D> {
         Ok(changes)
     }
 
-    /// Refuses a way per cycle that would take more sub-steps than anybody waits for.
+    /// Refuses a speed that would take too many sub-steps per cycle to be practical.
     fn check_steps(
         &self,
         chain: &Chain<D>,
@@ -231,7 +232,7 @@ impl<const D: usize> Compiler<'_, D> {
         Err(self.source.error(at, cause, remedy))
     }
 
-    /// Refuses robots that overlap where their rods are shortest, and a margin below 0.
+    /// Refuses robots that overlap when their rods are shortest, and a margin below 0.
     fn check_room(
         &self,
         robots: &Robots,
@@ -288,7 +289,8 @@ impl<const D: usize> Compiler<'_, D> {
         Ok((chain, None))
     }
 
-    /// Radius of the connectors: of robots, with the margin that followers need.
+    /// Returns the radius of the connectors: that of the robots, with the margin that followers
+    /// need.
     fn radius_m(&self, s: &ChainSection<D>, at: Range<usize>) -> Result<f64, InputError> {
         match (&s.robots, s.radius_m) {
             (None, given) => Ok(given.unwrap_or(0.05)),
@@ -303,7 +305,7 @@ impl<const D: usize> Compiler<'_, D> {
         }
     }
 
-    /// Takes the margin from leaders: they are exactly where their connectors are.
+    /// Removes the margin from leaders, because they are exactly where their connectors are.
     fn trim_leaders(&self, s: &ChainSection<D>, connectors: &mut [Connector<D>]) {
         let Some(robots) = &s.robots else { return };
         for task in s.tasks.0.iter().map(Spanned::get_ref).filter(|task| task.navigates()) {
@@ -313,7 +315,7 @@ impl<const D: usize> Compiler<'_, D> {
         }
     }
 
-    /// The chain that an arm stands for.
+    /// Returns the chain that represents an arm.
     fn arm_shape(
         &self,
         s: &ChainSection<D>,
@@ -333,7 +335,7 @@ impl<const D: usize> Compiler<'_, D> {
         let arm = self.arm(section, fitted(base_m))?;
         let solid = arm.chain(radius_m, s.rod_radius_m.unwrap_or(0.8 * radius_m));
         let solid = solid.map_err(|error| self.source.error_of(section.span(), &error))?;
-        // The same in as many dimensions as asked for, which are three.
+        // The same in the required number of dimensions, which is three.
         let points = solid.points().iter().map(|p| fitted(*p)).collect();
         let connector = |c: &Connector<3>| Connector {
             mobility: if c.is_still() { Mobility::Fixed } else { Mobility::Free },
@@ -349,7 +351,7 @@ impl<const D: usize> Compiler<'_, D> {
     }
 
     fn rod(&self, s: &ChainSection<D>, radius_m: f64, at: Range<usize>) -> Result<Rod, InputError> {
-        // Thick rods make slaves jump: those of a swarm are virtual anyway.
+        // Thick rods make slaves jump, and those of a swarm are virtual anyway.
         let rod_radius_m = s.rod_radius_m.unwrap_or(0.2 * radius_m);
         match s.rod_m {
             Some(Limits { least, greatest }) => {
@@ -362,7 +364,7 @@ impl<const D: usize> Compiler<'_, D> {
         }
     }
 
-    /// Some place on the ground where the chain has room; another seed, another place.
+    /// Returns a random place on the ground where the chain has room; it depends on the seed.
     fn anywhere(
         &self,
         s: &ChainSection<D>,
@@ -395,7 +397,7 @@ impl<const D: usize> Compiler<'_, D> {
         Ok(start.points.iter().map(|p| std::array::from_fn(|i| p[i])).collect())
     }
 
-    /// Places of the connectors: one by one, or on a line from the first one.
+    /// Returns the places of the connectors: one by one, or on a line from the first one.
     fn points(
         &self,
         s: &ChainSection<D>,
@@ -426,7 +428,7 @@ impl<const D: usize> Compiler<'_, D> {
         Ok((0..n).map(|k| along(start, u, length_m * k as f64)).collect())
     }
 
-    /// The direction from the first connector to the last.
+    /// Returns the direction from the first connector to the last.
     fn direction(&self, s: &ChainSection<D>) -> Result<Point<D>, InputError> {
         match (&s.along, s.heading_deg) {
             (None, None) => Ok(first_axis().map(|x: f64| -x)),

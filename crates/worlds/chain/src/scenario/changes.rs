@@ -1,4 +1,4 @@
-//! What happens to a chain while it runs.
+//! Changes to a chain during a run.
 
 use super::super::rods::chain::Chain;
 use super::super::rods::rebuild::MayCome;
@@ -20,7 +20,7 @@ enum MayComeWord {
     Last,
 }
 
-/// One thing that happens: exactly one of the keys beside the time.
+/// One change: exactly one of the keys beside the time.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ChangeSection<const D: usize> {
@@ -38,7 +38,7 @@ pub(super) struct ChangeSection<const D: usize> {
 }
 
 impl<const D: usize> Compiler<'_, D> {
-    /// Something that happens to `chain`.
+    /// Returns a change of `chain`.
     pub(super) fn change(
         &self,
         section: &Spanned<ChangeSection<D>>,
@@ -83,7 +83,7 @@ impl<const D: usize> Compiler<'_, D> {
         Ok(what)
     }
 
-    /// Refuses two things at once, and keys that do nothing beside the one.
+    /// Refuses two changes at once, and keys that have no effect beside the one.
     fn is_one_thing(&self, s: &ChangeSection<D>, at: Range<usize>) -> Result<(), InputError> {
         let (throws, joins) = (s.scatter.is_some(), s.reform == Some(true));
         let others = [s.failed.is_some(), s.max_bend_deg.is_some(), s.mobility.is_some()];
@@ -102,7 +102,7 @@ impl<const D: usize> Compiler<'_, D> {
         self.has_no_idle_key(&keys, "in this change", at)
     }
 
-    /// Tries a constraint on a copy, so that it cannot fail while a run goes on.
+    /// Tries a constraint on a copy, so that it cannot fail during a run.
     fn try_constraint(
         &self,
         what: &What<D>,

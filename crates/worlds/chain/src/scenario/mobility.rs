@@ -1,4 +1,4 @@
-//! Where a connector may be.
+//! Constraints on the places of a connector.
 
 use super::super::rods::chain::Mobility;
 use super::Place;

@@ -13,14 +13,14 @@ use sidestep_scenario::{Number, Point, Rule};
 use std::f64::consts::PI;
 use toml::Spanned;
 
-/// A point of a corridor's middle so often.
+/// Distance between points of a corridor's middle, meters.
 const LINE_STEP_M: f64 = 0.1;
-/// A leader waits for a robot that is so late, unless it is said, meters.
+/// Default lag of a robot at which a leader waits for it, meters.
 const LAG_LIMIT_M: f64 = 0.15;
-/// Distance of the wheels of a robot, unless it is said.
+/// Default distance between the wheels of a robot, meters.
 const WHEELBASE_M: f64 = 0.4;
 
-/// A measure of a robot: with others, squares and quotients would be no numbers at all.
+/// A measure of a robot, limited because squares and quotients of others would overflow.
 type Size = Number<OfARobot>;
 
 #[derive(Debug, Clone, Copy)]
@@ -88,7 +88,7 @@ pub(super) struct RobotsSection {
 }
 
 impl<const D: usize> Compiler<'_, D> {
-    /// A navigator that drives with `speed_m_s`.
+    /// Returns a navigator that drives with `speed_m_s`.
     pub(super) fn navigator(
         &self,
         section: Option<&Spanned<NavigatorSection>>,
@@ -106,7 +106,7 @@ impl<const D: usize> Compiler<'_, D> {
         Ok(Navigator { leader, drive, goal: self.goal(s)? })
     }
 
-    /// The target, or the end of the corridor that the scenario has.
+    /// Returns the target, or the end of the scenario's corridor.
     fn goal(&self, s: &NavigatorSection) -> Result<Option<Goal>, InputError> {
         if let Some(at) = s.target_m {
             let tolerance_m = s.tolerance_m.map_or(0.5, f64::from);
@@ -116,7 +116,7 @@ impl<const D: usize> Compiler<'_, D> {
         Ok(line.map(Goal::EndOf))
     }
 
-    /// Robots of a swarm whose leader drives with `speed_m_s`.
+    /// Returns the robots of a swarm whose leader drives with `speed_m_s`.
     pub(super) fn robots(
         &self,
         section: &Spanned<RobotsSection>,
@@ -174,7 +174,7 @@ impl RobotsSection {
         Ok(Robots { follower, lag_limit_m: self.lag_limit_m.map_or(LAG_LIMIT_M, f64::from) })
     }
 
-    /// Radius of a robot's body.
+    /// Returns the radius of a robot's body.
     pub(super) fn radius_m(&self) -> f64 {
         self.radius_m.map_or(0.25, f64::from)
     }

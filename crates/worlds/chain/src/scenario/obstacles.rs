@@ -1,4 +1,4 @@
-//! What is in the way: grounds, obstacles one by one, and fields of them.
+//! Obstacles: grounds, single obstacles, and fields of them.
 
 use super::super::ground::fields::{Crowd, Field};
 use super::super::ground::{Corridor, Course, Leg, Mover, Movers, Site};
@@ -15,7 +15,7 @@ use sidestep_scenario::Limits;
 use std::ops::{Range, RangeInclusive};
 use toml::Spanned;
 
-/// Distance of generated obstacles from chains at the start, unless it is given.
+/// Default distance of generated obstacles from chains at the start, meters.
 const KEEP_M: f64 = 0.1;
 
 #[derive(Debug, Deserialize)]
@@ -87,13 +87,13 @@ pub(super) struct FieldSection<const D: usize> {
     keep_m: Option<f64>,
 }
 
-/// Everything in the way of a world's chains.
+/// All obstacles for a world's chains.
 pub(super) struct Ground<const D: usize> {
     pub(super) obstacles: Obstacles<D>,
     pub(super) movers: Movers<D>,
 }
 
-/// The part of it that is gathered so far.
+/// The obstacles gathered so far.
 struct Gathered<const D: usize> {
     still: Vec<Obstacle<D>>,
     movers: Vec<Mover<D>>,
@@ -110,7 +110,7 @@ impl<const D: usize> Gathered<D> {
 }
 
 impl<const D: usize> Compiler<'_, D> {
-    /// All obstacles.
+    /// Returns all obstacles.
     pub(super) fn ground(
         &self,
         site: Option<&Site>,
@@ -143,7 +143,7 @@ impl<const D: usize> Compiler<'_, D> {
         })
     }
 
-    /// The floors of a map or of a Stage world, if the scenario names one.
+    /// Returns the floors of a map or of a Stage world, if the scenario names one.
     pub(super) fn site(&self) -> Result<Option<Site>, InputError> {
         let Some(section) = &self.file.ground else { return Ok(None) };
         let (s, at) = (section.get_ref(), section.span());
@@ -185,7 +185,7 @@ impl<const D: usize> Compiler<'_, D> {
         Ok(())
     }
 
-    /// The middle of the corridor, if the scenario has one.
+    /// Returns the middle of the corridor, if the scenario has one.
     pub(super) fn corridor_line(&self, step_m: f64) -> Result<Option<Vec<Point<2>>>, InputError> {
         let section =
             self.file.ground.as_ref().and_then(|ground| ground.get_ref().corridor.as_ref());
@@ -234,7 +234,7 @@ impl<const D: usize> Compiler<'_, D> {
         Ok(())
     }
 
-    /// Refuses keys that do nothing for a shape or a way to move.
+    /// Refuses keys that have no effect for a shape or a way to move.
     fn shapes_one_thing(&self, s: &ObstacleSection<D>, at: Range<usize>) -> Result<(), InputError> {
         let is_box = s.size_m.is_some() && s.corners_m.is_none();
         let keys = [
@@ -282,7 +282,7 @@ impl<const D: usize> Compiler<'_, D> {
         }
     }
 
-    /// Course of an obstacle; `None` where it stands still.
+    /// Returns the course of an obstacle; `None` if it stands still.
     fn course(
         &self,
         s: &ObstacleSection<D>,
@@ -347,7 +347,7 @@ impl<const D: usize> Compiler<'_, D> {
         Ok(())
     }
 
-    /// Radii and speeds of a crowd.
+    /// Returns the radii and speeds of a crowd.
     fn sizes(
         &self,
         limits: [Limits; 2],
@@ -364,19 +364,19 @@ impl<const D: usize> Compiler<'_, D> {
     }
 }
 
-/// The rods of a chain.
+/// Returns the rods of a chain.
 fn parts<const D: usize>(chain: &Chain<D>) -> impl Iterator<Item = Core<D>> + '_ {
     let points = chain.points();
     let one = (points.len() == 1).then(|| Core::Point(points[0]));
     points.windows(2).map(|ends| Core::Segment([ends[0], ends[1]])).chain(one)
 }
 
-/// A point in as many dimensions as asked for.
+/// Returns a point in the required number of dimensions.
 pub(super) fn fitted<const FROM: usize, const TO: usize>(p: Point<FROM>) -> Point<TO> {
     std::array::from_fn(|i| p.get(i).copied().unwrap_or(0.0))
 }
 
-/// A plane wall in as many dimensions as asked for.
+/// Returns a plane wall in the required number of dimensions.
 fn lifted<const D: usize>(wall: &Obstacle<2>) -> Obstacle<D> {
     let core = match wall.core {
         Core::Point(c) => Core::Point(fitted(c)),
@@ -389,7 +389,7 @@ fn lifted<const D: usize>(wall: &Obstacle<2>) -> Obstacle<D> {
     Obstacle::still(wall.id, core, wall.radius_m)
 }
 
-/// Axes of a box turned in the plane of the first two.
+/// Returns the axes of a box turned in the plane of the first two.
 fn turned<const D: usize>(turn_deg: f64) -> [Point<D>; D] {
     let (s, c) = (math::sin(turn_deg.to_radians()), math::cos(turn_deg.to_radians()));
     std::array::from_fn(|i| {

@@ -1,4 +1,4 @@
-//! Whether chains have their places to themselves at the start.
+//! Checks that chains have their places to themselves at the start.
 
 use super::super::metrics::PENETRATION_M;
 use super::super::rods::chain::Chain;
@@ -10,18 +10,18 @@ use super::obstacles::Ground;
 use sidestep_kernel::{InputError, Slot};
 use std::ops::Range;
 
-/// A part of a chain that is in something.
+/// A part of a chain that is inside something.
 #[derive(Debug, Clone, Copy)]
 struct Inside {
-    /// The part's connector; of a rod the one before it.
+    /// The part's connector; for a rod the one before it.
     connector: usize,
     id: u32,
     depth_m: f64,
 }
 
 impl<const D: usize> Compiler<'_, D> {
-    /// Refuses chains that begin in obstacles, or in each other: no motion leads out of there
-    /// without passing through something.
+    /// Refuses chains that start in obstacles, or in each other, because no motion leads out of
+    /// there without passing through something.
     pub(super) fn starts(
         &self,
         chains: &[ChainSpec<D>],
@@ -65,7 +65,7 @@ impl<const D: usize> Compiler<'_, D> {
         self.source.error(self.section_of(slot), cause, remedy)
     }
 
-    /// Place of the section that a chain comes from.
+    /// Returns the place of the section that a chain comes from.
     fn section_of(&self, slot: usize) -> Option<Range<usize>> {
         let sections = self.file.chains.0.iter();
         let mut spans = sections.flat_map(|s| std::iter::repeat_n(s.span(), s.get_ref().count));
@@ -73,7 +73,7 @@ impl<const D: usize> Compiler<'_, D> {
     }
 }
 
-/// The deepest part of a chain in anything that is not called `own`.
+/// Returns the deepest part of a chain in anything that is not called `own`.
 fn deepest<const D: usize>(
     chain: &Chain<D>,
     obstacles: &Obstacles<D>,

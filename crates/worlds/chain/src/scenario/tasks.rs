@@ -1,4 +1,4 @@
-//! What initiators are to do.
+//! Tasks of initiators.
 
 use super::super::driver::{Driver, MAX_MOTIONS, Targets, Task, Wander};
 use super::super::script::{Motion, Script, Turtle};
@@ -12,7 +12,7 @@ use toml::Spanned;
 
 /// Speed of initiators, unless it is given.
 const SPEED_M_S: f64 = 0.5;
-/// Distance that counts as at a target, meters.
+/// Distance at which a target counts as reached, meters.
 const TOLERANCE_M: f64 = 1e-3;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
@@ -44,7 +44,7 @@ pub(super) struct TaskSection<const D: usize> {
 }
 
 impl<const D: usize> TaskSection<D> {
-    /// The connector that moves.
+    /// Returns the connector that moves.
     pub(super) fn connector(&self) -> usize {
         self.connector
     }
@@ -53,14 +53,14 @@ impl<const D: usize> TaskSection<D> {
         self.speed_m_s.map_or(SPEED_M_S, f64::from)
     }
 
-    /// Returns whether it drives on wheels.
+    /// Whether it drives on wheels.
     pub(super) fn navigates(&self) -> bool {
         self.kind == Kind::Navigate
     }
 }
 
 impl<const D: usize> Compiler<'_, D> {
-    /// A task of a chain of `n` connectors.
+    /// Returns a task of a chain of `n` connectors.
     pub(super) fn task(
         &self,
         section: &Spanned<TaskSection<D>>,
@@ -127,8 +127,8 @@ impl<const D: usize> Compiler<'_, D> {
         }
     }
 
-    /// Carries a script out once, so that it cannot fail while a run goes on: whether it comes to
-    /// motions does not depend on where it begins, but for places beyond all numbers.
+    /// Runs a script once, so that it cannot fail during a run: whether it yields motions does not
+    /// depend on where it starts, except for places beyond all numbers.
     fn try_script(&self, script: &Script, at: Range<usize>) -> Result<(), InputError> {
         for (n, motion) in script.motions(Turtle::default()).enumerate() {
             let is_far = match motion? {
@@ -155,7 +155,7 @@ impl<const D: usize> Compiler<'_, D> {
         Ok(Targets { places, tolerance_m: s.tolerance_m.map_or(TOLERANCE_M, f64::from) })
     }
 
-    /// Refuses keys that do nothing in a task of this kind.
+    /// Refuses keys that have no effect in a task of this kind.
     fn has_only_its_own(&self, s: &TaskSection<D>, at: Range<usize>) -> Result<(), InputError> {
         let keys = [
             ("turn_deg", s.turn_deg.is_some(), Kind::Wander),

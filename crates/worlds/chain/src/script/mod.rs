@@ -12,7 +12,7 @@
 //! goto 1, 2
 //! ```
 //!
-//! | statement | what it does |
+//! | statement | effect |
 //! | --- | --- |
 //! | `forward D` | D meters ahead (back where D is negative) |
 //! | `turn A` | A degrees to the left |
@@ -22,8 +22,8 @@
 //! | `repeat N [ ... ]` | N times; N is a whole number |
 //! | `to NAME :a :b ... end` | a procedure, outside of all others; `NAME 1, 2` carries it out |
 //!
-//! Values are numbers, parameters, `+ - * /` and parentheses. `#` begins a comment. A procedure
-//! may call itself: `repeat 0` ends that. A script begins where its [`Turtle`] is.
+//! Values are numbers, parameters, `+ - * /` and parentheses. `#` starts a comment. A procedure may
+//! call itself: `repeat 0` ends that. A script starts where its [`Turtle`] is.
 
 mod parse;
 mod run;
@@ -34,16 +34,16 @@ use sidestep_kernel::InputError;
 
 pub(crate) use run::{Motion, Motions, Turtle};
 
-/// The longest script that is read, in bytes.
+/// Longest script, in bytes.
 pub(crate) const MAX_BYTES: usize = 1 << 20;
 
-/// How deep brackets may stand in each other.
+/// Deepest nesting of brackets.
 pub(crate) const MAX_NESTING: usize = 64;
 
-/// How deep procedures and repetitions may be in each other while a script runs.
+/// Deepest nesting of procedures and repetitions while a script runs.
 pub(crate) const MAX_DEPTH: usize = 1000;
 
-/// Statements that a script may carry out. Repetitions count as one each time.
+/// Most statements that a script may carry out. Repetitions count as one each time.
 pub(crate) const MAX_STATEMENTS: u64 = 10_000_000;
 
 /// A script that can be run.
@@ -59,14 +59,14 @@ impl Script {
     /// Reads the text of a script, which errors call `place`.
     ///
     /// # Errors
-    /// When it is too long, is no script, or uses procedures or parameters that it does not have;
-    /// with line, column and what was expected there.
+    /// When the text is too long, is no script, or uses procedures or parameters that it does not
+    /// have; the error names line, column and what was expected there.
     pub fn parse(place: &str, text: &str) -> Result<Self, InputError> {
         parse::script(place, text)
     }
 
-    /// The motions of an initiator that is at `start`, one after the other. After an error there
-    /// are no more.
+    /// Returns the motions of an initiator that is at `start`, one after the other. After an error
+    /// there are no more.
     pub fn motions(&self, start: Turtle) -> Motions<'_> {
         Motions::new(self, start)
     }

@@ -1,4 +1,4 @@
-//! Text -> [`Script`].
+//! The parser: text -> [`Script`].
 
 use winnow::ascii::{digit0, digit1, multispace1, till_line_ending};
 use winnow::combinator::{alt, cut_err, opt, peek, preceded, repeat, separated, terminated};
@@ -13,10 +13,10 @@ use sidestep_scenario::nearest;
 
 type Input<'a> = LocatingSlice<&'a str>;
 
-/// Words that name no procedure.
+/// Words that cannot name a procedure.
 const RESERVED: [&str; 8] = ["forward", "turn", "pitch", "wait", "goto", "repeat", "to", "end"];
 
-/// What may stand where a statement may.
+/// Statements, listed in errors if something else is found.
 const STATEMENTS: &str = "a statement (forward, turn, pitch, wait, goto, repeat, a procedure)";
 
 pub(super) fn script(place: &str, text: &str) -> Result<Script, InputError> {
@@ -40,7 +40,8 @@ pub(super) fn script(place: &str, text: &str) -> Result<Script, InputError> {
     resolved(script)
 }
 
-/// The parser calls itself for each bracket; the stack must not decide how deep.
+/// Limits nesting, because the parser recurses for each bracket and the stack must not set the
+/// limit.
 fn check_nesting(place: &str, text: &str) -> Result<(), InputError> {
     let (mut depth, mut in_comment) = (0usize, false);
     for (at, c) in text.char_indices() {
@@ -59,7 +60,7 @@ fn check_nesting(place: &str, text: &str) -> Result<(), InputError> {
     Ok(())
 }
 
-/// What was expected, and what is there.
+/// Returns what was expected, and what was found.
 fn words(error: &ContextError, rest: &str) -> (String, String) {
     let expected = error.context().find_map(|context| match context {
         StrContext::Expected(value) => Some(value.to_string()),
@@ -159,7 +160,7 @@ fn coordinates(input: &mut Input) -> ModalResult<Vec<Expression>> {
     Ok(found)
 }
 
-/// Values behind a procedure's name; none where no value begins there.
+/// Parses the values behind a procedure's name; none if no value starts there.
 fn arguments(input: &mut Input) -> ModalResult<Vec<Expression>> {
     let begins = one_of(|c: char| c.is_ascii_digit() || ".:(-".contains(c));
     if opt(peek(begins)).parse_next(input)?.is_none() {
@@ -193,7 +194,7 @@ fn product(input: &mut Input, terms: &mut Vec<Term>) -> ModalResult<()> {
     Ok(())
 }
 
-/// What has to follow an operator.
+/// Parses the operand that has to follow an operator.
 fn operand(
     input: &mut Input,
     terms: &mut Vec<Term>,
@@ -230,7 +231,7 @@ fn parameter(input: &mut Input) -> ModalResult<Term> {
     preceded(':', named).map(|name| Term::Named(name.into(), at)).parse_next(input)
 }
 
-/// Names of procedures and parameters become indices.
+/// Replaces names of procedures and parameters by indices.
 fn resolved(mut script: Script) -> Result<Script, InputError> {
     for (i, procedure) in script.procedures.iter().enumerate() {
         if script.procedures[..i].iter().any(|earlier| earlier.name == procedure.name) {

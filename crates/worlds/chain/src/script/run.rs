@@ -5,10 +5,10 @@ use serde::{Deserialize, Serialize};
 use sidestep_kernel::InputError;
 use sidestep_kernel::math::{cos, sin};
 
-/// Where an initiator is, and which way it looks.
+/// Position and orientation of an initiator.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Turtle {
-    /// In m.
+    /// Position, m.
     pub position_m: [f64; 3],
     /// Unit vector ahead.
     pub ahead: [f64; 3],
@@ -17,7 +17,7 @@ pub struct Turtle {
 }
 
 impl Default for Turtle {
-    /// At the origin, looking along x, with z up.
+    /// Returns a turtle at the origin, facing along x, with z up.
     fn default() -> Self {
         Self { position_m: [0.0; 3], ahead: [1.0, 0.0, 0.0], left: [0.0, 1.0, 0.0] }
     }
@@ -33,7 +33,7 @@ impl Turtle {
         self.position_m = mixed(self.position_m, 1.0, self.ahead, distance_m);
     }
 
-    /// To the left about the upward axis.
+    /// Turns to the left about the upward axis.
     fn turn(&mut self, angle_rad: f64) {
         let (s, c) = (sin(angle_rad), cos(angle_rad));
         (self.ahead, self.left) =
@@ -41,13 +41,14 @@ impl Turtle {
         self.straighten();
     }
 
-    /// Nose up about the axis to the left.
+    /// Pitches the nose up about the axis to the left.
     fn pitch(&mut self, angle_rad: f64) {
         self.ahead = mixed(self.ahead, cos(angle_rad), self.up(), sin(angle_rad));
         self.straighten();
     }
 
-    /// Rounding bends the axes a little, and each turn multiplies what earlier ones have bent.
+    /// Makes the axes orthonormal again: rounding bends them a little, and each turn multiplies
+    /// earlier errors.
     fn straighten(&mut self) {
         self.ahead = unit(self.ahead);
         self.left = unit(mixed(self.left, 1.0, self.ahead, -dot(self.left, self.ahead)));
@@ -62,12 +63,12 @@ fn unit(a: [f64; 3]) -> [f64; 3] {
     mixed(a, 1.0 / dot(a, a).sqrt(), [0.0; 3], 0.0)
 }
 
-/// `a * by + b * times`.
+/// Returns `a * by + b * times`.
 fn mixed(a: [f64; 3], by: f64, b: [f64; 3], times: f64) -> [f64; 3] {
     [0, 1, 2].map(|i| a[i] * by + b[i] * times)
 }
 
-/// What an initiator is to do next.
+/// The next motion of an initiator.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Motion {
     /// Move straight to this position, in m.
@@ -75,7 +76,7 @@ pub enum Motion {
         /// The position.
         position_m: [f64; 3],
     },
-    /// Look this way.
+    /// Face this direction.
     Face {
         /// Unit vector.
         ahead: [f64; 3],
@@ -102,7 +103,7 @@ pub struct Motions<'a> {
 struct Frame<'a> {
     body: &'a [Statement],
     next: usize,
-    /// How often to begin again.
+    /// Number of repetitions left.
     again: u64,
     /// Values of the parameters of the procedure around.
     parameters: Vec<f64>,
@@ -114,12 +115,12 @@ impl<'a> Motions<'a> {
         Self { script, turtle, frames: vec![main], left: MAX_STATEMENTS }
     }
 
-    /// Where the initiator is after the motions so far.
+    /// Returns the turtle after the motions so far.
     pub fn turtle(&self) -> &Turtle {
         &self.turtle
     }
 
-    /// The next statement; none at the end of the script.
+    /// Returns the next statement; none at the end of the script.
     fn statement(&mut self) -> Option<Result<&'a Statement, InputError>> {
         loop {
             let frame = self.frames.last_mut()?;
@@ -133,7 +134,7 @@ impl<'a> Motions<'a> {
             }
             frame.again -= 1;
             frame.next = 0;
-            // A body without statements would go round unseen.
+            // Counted as a statement, because a body without statements would repeat unnoticed.
             let at = frame.body.first().map_or(0, |statement| statement.at);
             if let Err(error) = self.count(at) {
                 return Some(Err(error));
@@ -150,7 +151,7 @@ impl<'a> Motions<'a> {
         Ok(())
     }
 
-    /// What a statement comes to; none where it only opens a body.
+    /// Carries out a statement; returns its motion, or none if it only opens a body.
     fn carry_out(&mut self, statement: &'a Statement) -> Result<Option<Motion>, InputError> {
         match &statement.action {
             Action::Forward(distance) => {
@@ -215,7 +216,7 @@ impl<'a> Motions<'a> {
     }
 
     fn open(&mut self, at: usize, frame: Frame<'a>) -> Result<(), InputError> {
-        // A body that has nothing left to do needs no place: the last call of a procedure is free.
+        // A finished body is removed, so the last call of a procedure takes no depth.
         while self.frames.last().is_some_and(|f| f.next == f.body.len() && f.again == 0) {
             self.frames.pop();
         }
@@ -241,7 +242,7 @@ impl<'a> Motions<'a> {
     }
 }
 
-/// A postfix expression that the parser has made: it has two operands where it takes two.
+/// Evaluates a postfix expression from the parser, which has two operands wherever it takes two.
 fn evaluate(terms: &[Term], parameters: &[f64]) -> f64 {
     let mut stack = Vec::with_capacity(terms.len());
     for term in terms {

@@ -1,12 +1,12 @@
 //! A leader and its followers, a tick at a time.
 //!
-//! Each tick the leader perceives, decides and proposes where its wheels would take it; the chain
-//! moves there or objects. Then every follower steers toward its own connector. All perceive the
-//! robots as they were before the tick.
+//! In each tick the leader perceives, decides and proposes the pose that its wheels would take it
+//! to; the chain moves there or objects. Then every follower steers toward its own connector. All
+//! perceive the robots as they were before the tick.
 //!
 //! A connector that is pulled round a sharp corner goes up to three times as fast as the leader,
-//! which wheels cannot. A follower that is late cuts the corner and hangs on it. So each tells the
-//! robot before it how late it is, as it would tell a veto, and the leader slows down.
+//! too fast for wheels. A late follower cuts the corner and gets stuck there. Therefore each robot
+//! reports its lag to the robot before it, as it would report a veto, and the leader slows down.
 
 use super::drive::{Drive, Pose};
 use super::follower::{Follower, Goal};
@@ -19,36 +19,36 @@ use sidestep_kernel::InputError;
 use sidestep_kernel::math::{cos, sin};
 use sidestep_kernel::stream::Draws;
 
-/// What a convoy is.
+/// The design of a convoy.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
-    /// How the first robot behaves.
+    /// Behavior of the first robot.
     pub leader: Leader,
     /// Its wheels.
     pub drive: Drive,
-    /// How the others behave.
+    /// Behavior of the others.
     pub follower: Follower,
-    /// How many others there are.
+    /// Number of the others.
     pub followers: usize,
-    /// The distances that neighbors keep.
+    /// Distances that neighbors keep.
     pub rod: Rod,
-    /// By how much followers' connectors are larger than their bodies.
+    /// Amount by which followers' connectors are larger than their bodies, meters.
     pub margin_m: f64,
-    /// The leader slows down from half this distance of a follower from its connector on, and
-    /// stands when it is reached; infinite for a leader that does not care.
+    /// Lag of a follower at which the leader stops, meters; from half of it on the leader slows
+    /// down. Infinite for a leader that never waits.
     pub lag_limit_m: f64,
-    /// How the chain reacts.
+    /// Rules by which the chain reacts.
     pub rules: Rules,
-    /// Length of a tick.
+    /// Length of a tick, s.
     pub dt_s: f64,
 }
 
 impl Plan {
-    /// The convoy of the slides: robots of radius 0.25 m on wheels 0.4 m apart, 0.6 to 0.8 m
-    /// behind each other, connectors 0.08 m larger, wheels 20 % faster than the leader's.
+    /// Returns the convoy of the slides: robots of radius 0.25 m on wheels 0.4 m apart, 0.6 to 0.8
+    /// m behind each other, connectors 0.08 m larger, wheels 20 % faster than the leader's.
     ///
     /// # Errors
-    /// A speed that is not above 0.
+    /// When the speed is not above 0.
     pub fn new(followers: usize, speed_m_s: f64) -> Result<Self, InputError> {
         Ok(Self {
             leader: Leader::new(speed_m_s)?,
@@ -64,13 +64,13 @@ impl Plan {
     }
 }
 
-/// What part of its speed a leader may go whose latest follower is so far from its connector: it
+/// Returns the part of its speed at which a leader may go, given the largest lag of a follower: it
 /// slows down from half the limit on.
 pub(crate) fn pace(worst_lag_m: f64, limit_m: f64) -> f64 {
     (2.0 - 2.0 * worst_lag_m / limit_m).clamp(0.0, 1.0)
 }
 
-/// A convoy on its way.
+/// A moving convoy.
 #[derive(Debug, Clone)]
 pub struct Convoy {
     plan: Plan,
@@ -84,7 +84,7 @@ pub struct Convoy {
     bodies: Vec<Body>,
 }
 
-/// What happened in a tick.
+/// Results of a tick.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tick {
     /// The leader's layer that acted.
@@ -100,10 +100,10 @@ pub struct Tick {
 }
 
 impl Convoy {
-    /// A convoy that stands in line behind its leader, rods at their greatest length.
+    /// Returns a convoy that stands in line behind its leader, rods at their greatest length.
     ///
     /// # Errors
-    /// As [`Chain::new`] and [`Leader::check`]; a tick out of range.
+    /// As [`Chain::new`] and [`Leader::check`]; also when a tick is out of range.
     pub fn new(plan: Plan, start: Pose) -> Result<Self, InputError> {
         plan.leader.check()?;
         if plan.lag_limit_m.is_nan() || plan.lag_limit_m <= 0.0 {
@@ -115,7 +115,7 @@ impl Convoy {
             return Err(InputError::new("tick", cause, "give more than 0, up to 1 s"));
         }
         let radius_m = plan.follower.ring.radius_m;
-        // The leader is where its connector is, so that needs no margin.
+        // The leader is exactly at its connector, so that needs no margin.
         let mut connectors = vec![Connector::free(radius_m + plan.margin_m); plan.followers + 1];
         connectors[0] = Connector::free(radius_m);
         let back = [-cos(start.heading_rad), -sin(start.heading_rad)];
@@ -138,32 +138,32 @@ impl Convoy {
         })
     }
 
-    /// The chain that the robots keep to.
+    /// Returns the chain that the robots keep to.
     pub fn chain(&self) -> &Chain<2> {
         &self.chain
     }
 
-    /// The first robot.
+    /// Returns the first robot.
     pub fn leader(&self) -> &LeaderState {
         &self.leader
     }
 
-    /// The other robots; robot `i` keeps to connector `i + 1`.
+    /// Returns the other robots; robot `i` keeps to connector `i + 1`.
     pub fn followers(&self) -> &[Pose] {
         &self.followers
     }
 
-    /// Where the connectors were before the last tick; empty before the first.
+    /// Returns the positions of the connectors before the last tick; empty before the first.
     pub fn before(&self) -> &[Point<2>] {
         &self.before
     }
 
-    /// What it is.
+    /// Returns its design.
     pub fn plan(&self) -> &Plan {
         &self.plan
     }
 
-    /// One tick. `noise` is where the errors of the laser come from in this tick.
+    /// Makes one tick. `noise` is the source of the laser's errors in this tick.
     ///
     /// # Errors
     /// As [`Propagator::propagate`].
@@ -218,7 +218,8 @@ impl Convoy {
         Ok((decision.layer, veto))
     }
 
-    /// What part of its speed the leader may go for the sake of the latest follower.
+    /// Returns the part of its speed at which the leader may go, so that the latest follower keeps
+    /// up.
     fn pace(&self) -> f64 {
         let lag_m = |(f, at): (&Pose, &Point<2>)| distance(f.at, *at);
         let connectors = &self.chain.points()[1..];
@@ -226,7 +227,7 @@ impl Convoy {
         pace(worst_m, self.plan.lag_limit_m)
     }
 
-    /// Moves a follower; whether it was held back, and whether its bumper is pressed.
+    /// Moves a follower; returns whether it was held back, and whether its bumper is pressed.
     fn follow(&mut self, i: usize, obstacles: &Obstacles<2>) -> (bool, bool) {
         let Plan { follower, dt_s, .. } = &self.plan;
         let (was, at) = (self.before[i + 1], self.chain.points()[i + 1]);

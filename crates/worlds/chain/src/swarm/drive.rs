@@ -6,18 +6,17 @@ use sidestep_kernel::InputError;
 use sidestep_kernel::math::{cos, sin, wrap_angle};
 use std::f64::consts::FRAC_PI_4;
 
-/// Where a robot is and where it looks.
+/// Place and heading of a robot.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Pose {
     /// The middle of its axle, which is the middle of its body.
     pub at: Point<2>,
-    /// Counter-clockwise from the first axis.
+    /// Heading, counter-clockwise from the first axis.
     pub heading_rad: f64,
 }
 
 impl Pose {
-    /// The direction in which a point lies, relative to the heading, in [-pi, pi); left is
-    /// positive.
+    /// Returns the direction of a point relative to the heading, in [-pi, pi); left is positive.
     pub fn bearing_rad(&self, p: Point<2>) -> f64 {
         let away = sidestep_kernel::math::atan2(p[1] - self.at[1], p[0] - self.at[0]);
         wrap_angle(away - self.heading_rad)
@@ -27,30 +26,30 @@ impl Pose {
 /// Speeds of the two wheels; negative is backward.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Wheels {
-    /// Of the left wheel.
+    /// Speed of the left wheel.
     pub left_m_s: f64,
-    /// Of the right wheel.
+    /// Speed of the right wheel.
     pub right_m_s: f64,
 }
 
 impl Wheels {
-    /// The two wheels' speeds, left first.
+    /// Returns the two wheels' speeds, left first.
     pub fn new(left_m_s: f64, right_m_s: f64) -> Self {
         Self { left_m_s, right_m_s }
     }
 
-    /// The speed of the middle.
+    /// Returns the speed of the middle, m/s.
     pub fn speed_m_s(&self) -> f64 {
         0.5 * (self.left_m_s + self.right_m_s)
     }
 
-    /// The same arc, slower.
+    /// Returns the same arc, slower.
     #[must_use]
     pub fn slowed(self, pace: f64) -> Self {
         Self::new(pace * self.left_m_s, pace * self.right_m_s)
     }
 
-    /// The same turn with the middle at rest.
+    /// Returns the same turn with the middle at rest.
     #[must_use]
     pub fn on_the_spot(self) -> Self {
         let half = 0.5 * (self.right_m_s - self.left_m_s);
@@ -66,10 +65,10 @@ pub struct Drive {
 }
 
 impl Drive {
-    /// A drive whose wheels stand `wheelbase_m` apart and go up to `max_wheel_m_s`.
+    /// Returns a drive with wheels `wheelbase_m` apart and speeds up to `max_wheel_m_s`.
     ///
     /// # Errors
-    /// A number that is not finite and above 0.
+    /// When a number is not finite and above 0.
     pub fn new(wheelbase_m: f64, max_wheel_m_s: f64) -> Result<Self, InputError> {
         for (place, number) in [("wheelbase", wheelbase_m), ("greatest wheel speed", max_wheel_m_s)]
         {
@@ -80,18 +79,18 @@ impl Drive {
         Ok(Self { wheelbase_m, max_wheel_m_s })
     }
 
-    /// The greatest speed of a wheel.
+    /// Returns the greatest speed of a wheel, m/s.
     pub fn max_wheel_m_s(&self) -> f64 {
         self.max_wheel_m_s
     }
 
-    /// How fast wheels turn the robot; to the left is positive.
+    /// Returns the rate at which wheels turn the robot, rad/s; to the left is positive.
     pub fn turn_rad_s(&self, wheels: Wheels) -> f64 {
         (wheels.right_m_s - wheels.left_m_s) / self.wheelbase_m
     }
 
-    /// Wheel speeds for a speed and a turn. Where both together are too fast, the turn comes
-    /// first: a robot that looks where it should goes right, if late.
+    /// Returns wheel speeds for a speed and a turn. If both together are too fast, the turn comes
+    /// first, because a robot that faces the right way gets there, if late.
     pub fn wheels(&self, speed_m_s: f64, turn_rad_s: f64) -> Wheels {
         let max = self.max_wheel_m_s;
         let half = (0.5 * turn_rad_s * self.wheelbase_m).clamp(-max, max);
@@ -100,7 +99,7 @@ impl Drive {
         Wheels::new(speed_m_s - half, speed_m_s + half)
     }
 
-    /// Where wheels take a robot within `dt_s`: along an arc, exactly.
+    /// Returns the pose to which wheels take a robot within `dt_s`: along an arc, exactly.
     pub fn step(&self, pose: Pose, wheels: Wheels, dt_s: f64) -> Pose {
         let max = self.max_wheel_m_s;
         let [left_m_s, right_m_s] =
@@ -116,8 +115,8 @@ impl Drive {
     }
 }
 
-/// Wheel speeds toward a bearing, the faster wheel at `speed_m_s`: straight on when the bearing
-/// is 0, about the resting inner wheel from an eighth of a turn on.
+/// Returns wheel speeds toward a bearing, the faster wheel at `speed_m_s`: straight on when the
+/// bearing is 0, about the resting inner wheel from an eighth of a turn on.
 pub fn steer(bearing_rad: f64, speed_m_s: f64) -> Wheels {
     let inner_m_s = speed_m_s * (1.0 - bearing_rad.abs() / FRAC_PI_4).max(0.0);
     if bearing_rad > 0.0 {
@@ -127,9 +126,9 @@ pub fn steer(bearing_rad: f64, speed_m_s: f64) -> Wheels {
     }
 }
 
-/// `sin(x) / x`.
+/// Returns `sin(x) / x`.
 fn sine_ratio(x: f64) -> f64 {
-    // Below, the next term of the series is less than half a unit in the last place.
+    // Below this, the next term of the series is less than half a unit in the last place.
     if x.abs() < 1e-4 { 1.0 - x * x / 6.0 } else { sin(x) / x }
 }
 

@@ -1,9 +1,9 @@
 //! A robot on wheels that keeps to its connector (slide E2).
 //!
-//! The chain says where the robot shall be; wheels get there late, and look elsewhere on the way.
-//! Short-range sensors let it slide along what is near and hold it back from what it would touch.
-//! Robots that only stop hang on walls when they are asked to graze them: their connectors'
-//! radius has to exceed their own by a margin (pitfall 17).
+//! The chain says where the robot shall be; wheels get there late, and face elsewhere on the way.
+//! Short-range sensors let it slide along nearby obstacles and keep it from touching them. Robots
+//! that only stop get stuck at walls when they have to graze them, so their connectors' radius has
+//! to exceed their own by a margin.
 
 use super::drive::{Drive, Pose, Wheels};
 use super::laser::Body;
@@ -14,7 +14,7 @@ use sidestep_kernel::InputError;
 use sidestep_kernel::math::{atan2, cos, sin, wrap_angle};
 use std::f64::consts::PI;
 
-/// What a follower is.
+/// A follower: its wheels, its sensors and the parameters of its behavior.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Follower {
     /// Its wheels.
@@ -23,58 +23,58 @@ pub struct Follower {
     pub ring: Ring,
     /// Speed per distance from the connector, beyond the connector's own speed.
     pub gain_per_s: f64,
-    /// Turn per angle away from where it wants to go.
+    /// Turn rate per angle between its heading and where it wants to go.
     pub turn_gain_per_s: f64,
-    /// It goes no faster than to where a collision is so far away in time.
+    /// Time to collision that it keeps: it goes no faster than that allows.
     pub horizon_s: f64,
-    /// It slides along what is nearer than this; 0 for a robot that only stops.
+    /// Distance below which it slides along obstacles, meters; 0 for a robot that only stops.
     pub slide_m: f64,
 }
 
-/// Where the connector is that a follower keeps to.
+/// Position and velocity of the connector that a follower keeps to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Goal {
     /// Its place.
     pub at: Point<2>,
-    /// How fast it moves.
+    /// Its velocity.
     pub velocity_m_s: Point<2>,
 }
 
-/// What a follower does.
+/// A follower's decision.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Command {
     /// Speeds of its wheels.
     pub wheels: Wheels,
-    /// Whether its sensors made it slower.
+    /// Whether its sensors slowed it down.
     pub is_held: bool,
 }
 
 /// A follower after a tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Followed {
-    /// Where it is.
+    /// Its place and heading.
     pub pose: Pose,
-    /// Whether its sensors made it slower.
+    /// Whether its sensors slowed it down.
     pub is_held: bool,
     /// Whether its bumper is pressed.
     pub is_bumped: bool,
-    /// The air between its body and whatever is nearest, up to 1 m.
+    /// Gap between its body and the nearest obstacle, up to 1 m.
     pub gap_m: f64,
 }
 
-/// A bumper is pressed by what is nearer than this.
+/// Distance below which a bumper is pressed, meters.
 const BUMPER_M: f64 = 1e-3;
 
-/// A robot that looks this far away from where it wants to go drives backward.
+/// Angle between a robot's heading and its goal beyond which it drives backward.
 const BACKWARD_RAD: f64 = 2.0;
-/// Who wants to go no faster than this stands.
+/// Wanted speed up to which a robot stands still, m/s.
 const STANDING_M_S: f64 = 1e-3;
 
 impl Follower {
-    /// A follower of the usual gains, with sensors that see 0.15 m.
+    /// Returns a follower with the usual gains, and with sensors that see 0.15 m.
     ///
     /// # Errors
-    /// A radius that is not above 0.
+    /// When the radius is not above 0.
     pub fn new(drive: Drive, radius_m: f64) -> Result<Self, InputError> {
         if !(radius_m > 0.0 && radius_m.is_finite()) {
             let cause = format!("has a radius of {radius_m} m");
@@ -91,8 +91,8 @@ impl Follower {
         })
     }
 
-    /// Speeds of the wheels that keep to a connector, held back by what the sensors read. Its
-    /// wheels will turn for `dt_s`.
+    /// Returns wheel speeds that keep to a connector, limited by the sensors' readings. The wheels
+    /// will turn for `dt_s`.
     pub fn decide(&self, pose: &Pose, goal: &Goal, gaps: &Gaps, dt_s: f64) -> Command {
         let wished = along(goal.velocity_m_s, sub(goal.at, pose.at), self.gain_per_s);
         let wanted = self.aside(wished, pose.heading_rad, gaps);
@@ -108,7 +108,7 @@ impl Follower {
         self.held(wheels, is_backward, gaps, dt_s)
     }
 
-    /// One tick: it reads its sensors and turns its wheels. `others` are the bodies of other
+    /// Makes one tick: reads the sensors and turns the wheels. `others` are the bodies of other
     /// robots.
     pub fn follow(
         &self,
@@ -129,8 +129,8 @@ impl Follower {
         Followed { pose, is_held: command.is_held, is_bumped: gap_m < BUMPER_M, gap_m }
     }
 
-    /// What is left of a wish when its part toward what is near is taken away, the nearer the
-    /// more: the robot slides along.
+    /// Returns a wish without its part toward nearby obstacles, which is reduced more the nearer
+    /// they are: the robot slides along.
     fn aside(&self, mut wished: Point<2>, heading_rad: f64, gaps: &Gaps) -> Point<2> {
         for (k, gap_m) in gaps.iter().enumerate().filter(|&(_, &gap_m)| gap_m < self.slide_m) {
             let toward = heading_rad + k as f64 * SECTOR_RAD;
@@ -141,7 +141,8 @@ impl Follower {
         wished
     }
 
-    /// Slows the middle, never the turn: a round body that turns on the spot touches nothing.
+    /// Slows the middle, never the turn, because a round body that turns on the spot touches
+    /// nothing.
     fn held(&self, wheels: Wheels, is_backward: bool, gaps: &Gaps, dt_s: f64) -> Command {
         let turn_rad_s = self.drive.turn_rad_s(wheels);
         let (toward_rad, sign) = if is_backward { (PI, -1.0) } else { (0.0, 1.0) };

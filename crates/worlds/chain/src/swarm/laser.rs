@@ -1,4 +1,4 @@
-//! A laser that turns: distances from the robot's middle to what is around (slide N2).
+//! A rotating laser: distances from the robot's middle to its surroundings (slide N2).
 
 use super::drive::Pose;
 use super::ray;
@@ -14,17 +14,17 @@ use std::ops::RangeInclusive;
 /// Draws of the errors of a laser's ranges: one stream per chain and cycle.
 pub const LASER_NOISE: Purpose = Purpose(1);
 
-/// Something that is no obstacle of the world, but in the way all the same: another robot.
+/// A body in the way that is not an obstacle of the world: another robot.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Body {
     /// Its inner part.
     pub core: Core<2>,
-    /// How far it reaches beyond.
+    /// How far it reaches beyond its core, meters.
     pub radius_m: f64,
 }
 
 impl Body {
-    /// A round robot.
+    /// Returns a round robot.
     pub fn disc(at: Point<2>, radius_m: f64) -> Self {
         Self { core: Core::Point(at), radius_m }
     }
@@ -37,9 +37,9 @@ impl Body {
 /// A laser with equally spaced beams all around, of which it reads those within its field.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Laser {
-    /// How far it sees.
+    /// Its range.
     range_m: f64,
-    /// Standard deviation of its errors; 0 for none.
+    /// Standard deviation of its errors, meters; 0 for none.
     noise_std_m: f64,
     /// The beams it reads are those up to this many to each side of straight ahead.
     beams_per_side: usize,
@@ -47,7 +47,7 @@ pub struct Laser {
     directions: Vec<Point<2>>,
 }
 
-/// What a laser saw.
+/// The result of a laser's scan.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Scan {
     /// Range of every beam of the full circle, as in [`Laser`]; beams that are not read hold 0.
@@ -55,12 +55,12 @@ pub struct Scan {
 }
 
 impl Laser {
-    /// A laser with `beams` around the full circle, that reads those within `half_field_rad` of
-    /// straight ahead.
+    /// Returns a laser with `beams` around the full circle, which reads those within
+    /// `half_field_rad` of straight ahead.
     ///
     /// # Errors
-    /// No beams, or more than 3600; a range that is not above 0; a field outside (0, pi]; errors
-    /// that are not finite or negative.
+    /// When there are no beams, or more than 3600; a range is not above 0; a field is outside (0,
+    /// pi]; or errors are not finite or negative.
     pub fn new(
         beams: usize,
         range_m: f64,
@@ -90,7 +90,7 @@ impl Laser {
         })
     }
 
-    /// How far it sees.
+    /// Returns its range, meters.
     pub fn range_m(&self) -> f64 {
         self.range_m
     }
@@ -99,11 +99,11 @@ impl Laser {
         TAU / self.directions.len() as f64
     }
 
-    /// Reads every beam of the field: the distance from the robot's middle to the nearest
-    /// obstacle or body, with an error where it errs, up to the range.
+    /// Reads every beam of the field: the distance from the robot's middle to the nearest obstacle
+    /// or body, with a random error if the laser has errors, up to the range.
     ///
-    /// One query of the obstacles' grid for all beams; each obstacle is then looked at by those
-    /// beams only that may meet it.
+    /// One query of the obstacles' grid serves all beams; each obstacle is then checked only by the
+    /// beams that may meet it.
     pub fn scan(
         &self,
         pose: &Pose,
@@ -130,7 +130,7 @@ impl Laser {
         }
     }
 
-    /// The beams it reads, from the rightmost to the leftmost.
+    /// Returns the beams it reads, from the rightmost to the leftmost.
     fn read_beams(&self) -> impl Iterator<Item = usize> {
         let n = self.directions.len();
         let m = self.beams_per_side;
@@ -142,7 +142,7 @@ impl Laser {
             Core::Point(c) => self.look_at(pose, turn, [*c; 2], core, radius_m, scan),
             Core::Segment(ends) => self.look_at(pose, turn, *ends, core, radius_m, scan),
             Core::Cuboid(cuboid) => {
-                // From inside, the edges are not in every direction.
+                // From inside, the edges are not visible in every direction.
                 if core.nearest_to_point(pose.at).distance_m <= radius_m {
                     return scan.ranges_m.fill(0.0);
                 }
@@ -186,7 +186,8 @@ impl Laser {
         }
     }
 
-    /// Bearing, left positive, and range of every beam that it reads, from the rightmost on.
+    /// Returns the bearing, left positive, and the range of every beam that it reads, from the
+    /// rightmost on.
     pub fn readings<'a>(&'a self, scan: &'a Scan) -> impl Iterator<Item = (f64, f64)> + 'a {
         let rightmost = -(self.beams_per_side as f64);
         let bearing_rad = move |k: usize| (rightmost + k as f64) * self.step_rad();
@@ -194,8 +195,8 @@ impl Laser {
         ranges_m.enumerate().map(move |(k, range_m)| (bearing_rad(k), range_m))
     }
 
-    /// The least range within a sector of beams, given by its ends relative to the heading, left
-    /// positive; `None` where [`Self::sees`] says no.
+    /// Returns the least range within a sector of beams, given by its ends relative to the heading,
+    /// left positive; `None` if [`Self::sees`] returns false.
     pub fn least_m(&self, scan: &Scan, sector_rad: [f64; 2]) -> Option<f64> {
         let n = self.directions.len() as isize;
         let range_m = |k: isize| scan.ranges_m[k.rem_euclid(n) as usize];
@@ -203,12 +204,12 @@ impl Laser {
         Some(beams.map(range_m).fold(self.range_m, f64::min))
     }
 
-    /// Whether a sector is wholly in the field and has a beam.
+    /// Whether a sector lies completely in the field and has a beam.
     pub fn sees(&self, sector_rad: [f64; 2]) -> bool {
         self.sector(sector_rad).is_some()
     }
 
-    /// The beams of a sector; negative ones are to the right.
+    /// Returns the beams of a sector; negative ones are to the right.
     fn sector(&self, [from_rad, to_rad]: [f64; 2]) -> Option<RangeInclusive<isize>> {
         // Ends that are multiples of the step count as inside, whatever their rounding.
         let first = (from_rad / self.step_rad() - 1e-9).ceil() as isize;

@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 use sidestep_kernel::InputError;
 use sidestep_kernel::stream::Draws;
 
-/// One of the six layers; the number is the slides'.
+/// One of the six layers, with the number that the slides give it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Layer {
     /// 1: away from the left wall.
@@ -38,7 +38,7 @@ pub enum Layer {
     KeepMoving = 6,
 }
 
-/// When a wall counts as being left. The slides do not say.
+/// The rule for when a wall counts as being left. The slides do not say.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Leaving {
     /// It was near, is no longer, and is not lost yet: an event with a memory.
@@ -47,16 +47,16 @@ pub enum Leaving {
     /// Its distance is between far and lost.
     Range,
     /// Its distance is above far: the slides' words taken literally. A leader in the open then
-    /// turns for ever, as it leaves walls that are not there.
+    /// turns forever, because it leaves walls that are not there.
     Level,
 }
 
-/// When a target ends the following of a wall.
+/// The rule for when a target ends the following of a wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LeaveRule {
-    /// So far must the way to the target be free.
+    /// Length of way to the target that must be free, meters.
     pub free_m: f64,
-    /// In this angle to each side of its bearing.
+    /// Angle to each side of the target's bearing that must be free.
     pub half_angle_rad: f64,
 }
 
@@ -66,10 +66,10 @@ impl Default for LeaveRule {
     }
 }
 
-/// How targets are detected.
+/// The detection of targets.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TargetSense {
-    /// From how far; infinite for a beacon.
+    /// Range, meters; infinite for a beacon.
     pub range_m: f64,
     /// Whether obstacles hide it.
     pub needs_line_of_sight: bool,
@@ -81,48 +81,48 @@ impl Default for TargetSense {
     }
 }
 
-/// How a leader turns.
+/// The way in which a leader turns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Turning {
-    /// About the resting wheel, as in the slides; where that is blocked it stands.
+    /// About the resting wheel, as in the slides; if that is blocked it stands.
     #[default]
     AboutAWheel,
-    /// About the resting wheel, and on the spot where that is blocked: for corridors too narrow
-    /// to swing round in.
+    /// About the resting wheel, and on the spot if that is blocked: for corridors too narrow to
+    /// swing round in.
     OnTheSpotWhereBlocked,
 }
 
-/// What a leader is: its laser and the numbers of its behavior.
+/// A leader: its laser and the parameters of its behavior.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Leader {
-    /// Its eyes.
+    /// Its laser.
     pub laser: Laser,
-    /// Between which angles to each side of straight ahead it looks for walls.
+    /// Angles to each side of straight ahead between which it looks for walls.
     pub sector_rad: [f64; 2],
-    /// Speed of a wheel that drives.
+    /// Speed of a driven wheel, m/s.
     pub speed_m_s: f64,
-    /// A wall nearer than this is close.
+    /// Distance below which a wall is close, meters.
     pub near_m: f64,
-    /// A wall further than this may be being left.
+    /// Distance above which a wall may be being left, meters.
     pub far_m: f64,
-    /// A wall further than this is lost.
+    /// Distance above which a wall is lost, meters.
     pub lost_m: f64,
-    /// When a wall counts as being left.
+    /// Rule for when a wall counts as being left.
     pub leaving: Leaving,
-    /// When a target ends the following of a wall; `None` for never, as in the slides.
+    /// Rule for when a target ends the following of a wall; `None` for never, as in the slides.
     pub leave_rule: Option<LeaveRule>,
-    /// How targets are detected.
+    /// Detection of targets.
     pub target_sense: TargetSense,
-    /// How it turns.
+    /// Way in which it turns.
     pub turning: Turning,
 }
 
 impl Leader {
-    /// The leader of the slides: 0.7 to 0.9 m from walls, a laser of 3.2 m all around whose front
-    /// quarters count on each side, the latched reading and the leave rule.
+    /// Returns the leader of the slides: 0.7 to 0.9 m from walls, a laser of 3.2 m all around whose
+    /// front quarters count on each side, the latched reading and the leave rule.
     ///
     /// # Errors
-    /// A speed that is not above 0.
+    /// When the speed is not above 0.
     pub fn new(speed_m_s: f64) -> Result<Self, InputError> {
         let leader = Self {
             laser: Laser::new(180, 3.2, std::f64::consts::PI, 0.0)?,
@@ -140,11 +140,11 @@ impl Leader {
         Ok(leader)
     }
 
-    /// Whether its numbers make sense together.
+    /// Checks that its numbers make sense together.
     ///
     /// # Errors
-    /// A speed that is not above 0; distances that are not 0 < near <= far <= lost <= the
-    /// laser's range; a sector that the laser does not see.
+    /// When the speed is not above 0; the distances are not 0 < near <= far <= lost <= the laser's
+    /// range; or the laser does not see the sector.
     pub fn check(&self) -> Result<(), InputError> {
         let wrong = |cause: String, remedy: &str| Err(InputError::new("leader", cause, remedy));
         let Self { speed_m_s, near_m, far_m, lost_m, sector_rad: [from, to], .. } = *self;
@@ -166,23 +166,23 @@ impl Leader {
     }
 }
 
-/// What a leader remembers.
+/// A leader's memory.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct LeaderState {
-    /// Where it is.
+    /// Its place and heading.
     pub pose: Pose,
     /// The walls that it follows.
     pub followed: Sides<bool>,
 }
 
 impl LeaderState {
-    /// A leader that follows no wall yet.
+    /// Returns a leader that follows no wall yet.
     pub fn at(pose: Pose) -> Self {
         Self { pose, followed: Sides::default() }
     }
 }
 
-/// Something on each side.
+/// A value for each side.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Sides<T> {
     /// On the left.
@@ -191,36 +191,36 @@ pub struct Sides<T> {
     pub right: T,
 }
 
-/// What is around a leader.
+/// The surroundings of a leader.
 #[derive(Debug, Clone, Copy)]
 pub struct Surroundings<'a> {
     /// The world's obstacles.
     pub obstacles: &'a Obstacles<2>,
     /// Other robots.
     pub bodies: &'a [Body],
-    /// Where it shall go.
+    /// Its target.
     pub target: Option<Point<2>>,
 }
 
-/// What a leader perceives.
+/// A leader's perception.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Percept {
-    /// Nearest walls.
+    /// Distances of the nearest walls, meters.
     pub walls_m: Sides<f64>,
-    /// The target, where it is detected.
+    /// The target, if it is detected.
     pub target: Option<Sighting>,
 }
 
 /// A detected target.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sighting {
-    /// In which direction, relative to the heading, left positive.
+    /// Direction relative to the heading, left positive.
     pub bearing_rad: f64,
     /// Whether the leave rule finds the way to it free.
     pub way_is_free: bool,
 }
 
-/// What a leader does.
+/// A leader's decision.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Decision {
     /// Speeds of its wheels.
@@ -232,7 +232,8 @@ pub struct Decision {
 }
 
 impl Leader {
-    /// Reads the laser and the target's detector. `scan` is a buffer; what it held is forgotten.
+    /// Reads the laser and the target's detector. `scan` is a buffer; its old contents are
+    /// forgotten.
     pub fn perceive(
         &self,
         pose: &Pose,
@@ -269,7 +270,7 @@ impl Leader {
         Sighting { bearing_rad, way_is_free: self.leave_rule.is_some_and(is_free) }
     }
 
-    /// Which layer acts, and what it does.
+    /// Returns the layer that acts, and its wheel speeds.
     pub fn decide(&self, followed: Sides<bool>, percept: &Percept) -> Decision {
         let leaves_walls = percept.target.is_some_and(|target| target.way_is_free);
         let left = self.wall(followed.left, percept.walls_m.left, leaves_walls);
@@ -306,7 +307,7 @@ impl Leader {
         Wall { is_close: wall_m < self.near_m, is_followed, is_left_behind }
     }
 
-    /// What it does instead where the way of its wheels is blocked.
+    /// Returns the wheel speeds to use if the way of its wheels is blocked.
     pub fn when_blocked(&self, wheels: Wheels) -> Wheels {
         match self.turning {
             Turning::AboutAWheel => Wheels::default(),
@@ -315,7 +316,7 @@ impl Leader {
     }
 }
 
-/// What the layers make of a wall.
+/// The layers' view of a wall.
 #[derive(Debug, Clone, Copy)]
 struct Wall {
     is_close: bool,

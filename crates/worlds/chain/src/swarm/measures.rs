@@ -1,10 +1,10 @@
-//! What a convoy's run comes to, in numbers.
+//! Measures of a convoy's run.
 
 use super::convoy::{Convoy, Tick};
 use crate::rods::Obstacles;
 use crate::rods::geometry::{Point, distance};
 
-/// What came of a run, so far.
+/// Measures of a run so far.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measures {
     /// Ticks so far.
@@ -15,25 +15,25 @@ pub struct Measures {
     pub vetoes: usize,
     /// Ticks in which followers slowed the leader down.
     pub slowed: usize,
-    /// The way of the leader.
+    /// Distance traveled by the leader.
     pub way_m: f64,
-    /// The least air between the leader's body and anything, up to 1 m.
+    /// Least gap between the leader's body and anything, up to 1 m.
     pub leader_clearance_m: f64,
-    /// The least air between a connector and anything, up to 1 m.
+    /// Least gap between a connector and anything, up to 1 m.
     pub connector_clearance_m: f64,
-    /// The same of the followers' bodies.
+    /// Least gap between a follower's body and anything, up to 1 m.
     pub follower_clearance_m: f64,
-    /// Robot-ticks with a pressed bumper, and with sensors that held a robot back.
+    /// Robot-ticks with a pressed bumper.
     pub bumped: usize,
-    /// See [`Self::bumped`].
+    /// Robot-ticks with sensors that held a robot back.
     pub held: usize,
     /// Distances of followers from their connectors, summed over followers and ticks.
     pub lag_sum_m: f64,
     /// The greatest such distance.
     pub max_lag_m: f64,
-    /// The least and greatest distance of neighbors.
+    /// Least and greatest distance of neighbors.
     pub pairs_m: [f64; 2],
-    /// The fastest connector, as a multiple of the leader's speed.
+    /// Speed of the fastest connector, as a multiple of the leader's speed.
     pub fastest: f64,
 }
 
@@ -89,7 +89,7 @@ impl Measures {
         }
     }
 
-    /// The mean distance of followers from their connectors.
+    /// Returns the mean distance of followers from their connectors, meters.
     pub fn mean_lag_m(&self, followers: usize) -> f64 {
         self.lag_sum_m / (self.ticks * followers).max(1) as f64
     }

@@ -1,8 +1,8 @@
 //! A chain of robots on wheels: one navigates, the others follow (slides N1 to N6, E2).
 //!
-//! The leader sees with a laser and decides by six layers; where it goes is where the chain's
-//! first connector goes. The other robots follow their own connectors on real wheels, with
-//! sensors that only tell what is about to be touched. Plain data in, plain data out:
+//! The leader sees with a laser and decides by six layers; the chain's first connector goes where
+//! the leader goes. The other robots follow their own connectors on real wheels, with sensors that
+//! report only imminent contact. Plain data in, plain data out:
 //!
 //! ```text
 //! leader.rs:    perceive (laser.rs, ray.rs) -> Percept -> decide -> wheels and the layer that acted

@@ -1,4 +1,4 @@
-//! Short-range sensors around a round body: they tell in which direction a collision is imminent
+//! Short-range sensors around a round body: they report the directions of imminent collisions
 //! (slide E2: the followers' simpler sensors).
 
 use super::drive::Pose;
@@ -9,12 +9,12 @@ use crate::rods::obstacle::{Obstacles, around};
 use sidestep_kernel::math::{atan2, cos, sin, wrap_angle};
 use std::f64::consts::TAU;
 
-/// How many sensors there are. The first looks ahead, the others follow counter-clockwise.
+/// Number of sensors. The first looks ahead, the others follow counter-clockwise.
 pub(crate) const SECTORS: usize = 8;
 /// The angle that one sensor watches.
 pub(crate) const SECTOR_RAD: f64 = TAU / SECTORS as f64;
 
-/// The air between the body and what is nearest, sector by sector, up to the sensors' range.
+/// The gap between the body and the nearest obstacle, sector by sector, up to the sensors' range.
 pub(crate) type Gaps = [f64; SECTORS];
 
 /// A ring of sensors around a body.
@@ -22,12 +22,12 @@ pub(crate) type Gaps = [f64; SECTORS];
 pub struct Ring {
     /// Radius of the body.
     pub radius_m: f64,
-    /// How far beyond the body they see.
+    /// Range of the sensors beyond the body, meters.
     pub range_m: f64,
 }
 
 impl Ring {
-    /// Reads all sensors: the least gap to anything in each sector, exactly; 0 in contact.
+    /// Reads all sensors: the least gap in each sector, exactly; 0 in contact.
     pub fn read(
         &self,
         pose: &Pose,
@@ -47,7 +47,8 @@ impl Ring {
         gaps
     }
 
-    /// What is convex is nearest in a sector either where it is nearest at all or on a border.
+    /// Finds the nearest point of a convex body in a sector: the nearest of all, or one on a
+    /// border.
     fn look(
         &self,
         pose: &Pose,
@@ -78,14 +79,14 @@ impl Ring {
     }
 }
 
-/// The sensor that looks into a direction relative to the heading.
+/// Returns the sensor that looks into a direction relative to the heading.
 fn sector_of(bearing_rad: f64) -> usize {
     let k = (wrap_angle(bearing_rad) / SECTOR_RAD).round() as isize;
     k.rem_euclid(SECTORS as isize) as usize
 }
 
-/// How fast a body may go into a direction relative to its heading, so that nothing that stands
-/// still is reached within `horizon_s`. `slack_rad` is by how much it may turn meanwhile.
+/// Returns the speed at which a body may go into a direction relative to its heading without
+/// reaching a static obstacle within `horizon_s`. It may turn by up to `slack_rad` meanwhile.
 pub(crate) fn safe_speed_m_s(gaps: &Gaps, bearing_rad: f64, slack_rad: f64, horizon_s: f64) -> f64 {
     let limit = |(k, gap_m): (usize, &f64)| {
         let off_rad = wrap_angle(k as f64 * SECTOR_RAD - bearing_rad).abs();

@@ -1,12 +1,12 @@
-//! How far a ray goes before it meets something, in the plane, exactly.
+//! Exact distances from a point along a ray to the first obstacle, in the plane.
 
 use crate::rods::geometry::{
     Bounds, Core, Point, add, cross_2d, distance, dot, perpendicular, scaled, sub, unit,
 };
 use crate::rods::obstacle::Obstacles;
 
-/// The distance at which a ray from `from` along the unit vector `u` enters everything within
-/// `radius_m` of a core; 0 from inside, `None` where it never does.
+/// Returns the distance at which a ray from `from` along the unit vector `u` enters the region
+/// within `radius_m` of a core; 0 from inside, `None` if it never does.
 pub(crate) fn distance_m(
     from: Point<2>,
     u: Point<2>,
@@ -45,7 +45,7 @@ fn to_capsule(from: Point<2>, u: Point<2>, ends: [Point<2>; 2], radius_m: f64) -
     caps.chain(to_sides(from, u, ends, radius_m)).reduce(f64::min)
 }
 
-/// The two long sides of a capsule; without a radius, they are the segment.
+/// Returns the distance to the long sides of a capsule; without a radius, they are the segment.
 fn to_sides(from: Point<2>, u: Point<2>, ends: [Point<2>; 2], radius_m: f64) -> Option<f64> {
     let aside = scaled(perpendicular(unit(sub(ends[1], ends[0]))?), radius_m);
     let left = to_segment(from, u, ends.map(|end| add(end, aside)));
@@ -77,8 +77,8 @@ pub(crate) fn is_clear(obstacles: &Obstacles<2>, line: [Point<2>; 2]) -> bool {
     is_clear
 }
 
-/// The directions in which a capsule is seen, as seen from `from`: the middle one and half the
-/// angle between the outermost; `None` where it may be in any direction.
+/// Returns the directions in which a capsule is seen from `from`: the middle one and half the angle
+/// between the outermost; `None` if it may be in any direction.
 pub(super) fn extent_rad(from: Point<2>, ends: [Point<2>; 2], radius_m: f64) -> Option<(f64, f64)> {
     use sidestep_kernel::math::{asin, atan2, wrap_angle};
     if Core::Segment(ends).nearest_to_point(from).distance_m <= radius_m + 1e-9 {
@@ -101,7 +101,7 @@ pub(super) mod tests {
     use proptest::prelude::*;
     use sidestep_kernel::math::{cos, sin};
 
-    /// Goes along the ray by the distance to the core, which never oversteps.
+    /// Marches along the ray by the distance to the core, which never oversteps.
     pub(crate) fn marched_m(
         from: Point<2>,
         u: Point<2>,

@@ -1,4 +1,4 @@
-//! Which parts of a chain are near a moving obstacle, and how near.
+//! The parts of a chain near a moving obstacle, with their distances.
 
 use crate::rods::chain::Chain;
 use crate::rods::geometry::{Bounds, Point, distance, first_axis, perpendicular, sub, unit};
@@ -15,7 +15,7 @@ pub enum Part {
 }
 
 impl Part {
-    /// The connector, or the one at the begin of the rod.
+    /// Returns the connector, or the one at the start of the rod.
     pub fn connector(self) -> usize {
         let (Self::Connector(k) | Self::Rod(k)) = self;
         k
@@ -28,25 +28,25 @@ pub(super) struct Threat {
     pub(super) part: Part,
     /// Index among [`Obstacles::moving`].
     pub(super) mover: usize,
-    /// How deep the part was in what must stay free, when last looked at.
+    /// How deep the part was in the margin when last measured, meters.
     pub(super) depth_m: f64,
-    /// Whether nothing could be done about it.
+    /// Whether it could not be relieved.
     pub(super) given_up: bool,
 }
 
-/// How a part lies to an obstacle.
+/// The position of a part relative to an obstacle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Nearness<const D: usize> {
-    /// Distance of the surfaces; negative where they overlap.
+    /// Distance of the surfaces, meters; negative if they overlap.
     pub(super) gap_m: f64,
-    /// Unit vector from the obstacle to the part. Where the cores overlap it is across the
-    /// obstacle's way, to its left.
+    /// Unit vector from the obstacle to the part. If the cores overlap it is across the obstacle's
+    /// way, to its left.
     pub(super) away: Point<D>,
-    /// Where on the rod: 0 at its first end, 1 at its second.
+    /// Position on the rod: 0 at its first end, 1 at its second.
     pub(super) along_rod: f64,
 }
 
-/// How a part lies to an obstacle.
+/// Returns the position of a part relative to an obstacle.
 pub(super) fn nearness<const D: usize>(
     chain: &Chain<D>,
     part: Part,
@@ -67,12 +67,12 @@ pub(super) fn nearness<const D: usize>(
     }
 }
 
-/// Across the way of an obstacle.
+/// Returns the direction across the way of an obstacle, to its left.
 fn left_of<const D: usize>(mover: &Obstacle<D>) -> Point<D> {
     perpendicular(unit(mover.velocity_m_s).unwrap_or(first_axis()))
 }
 
-/// Collects all parts that are nearer to a moving obstacle than `within_m` of it.
+/// Collects all parts that are nearer than `within_m` to a moving obstacle.
 pub(super) fn collect<const D: usize>(
     chain: &Chain<D>,
     obstacles: &Obstacles<D>,
@@ -86,7 +86,7 @@ pub(super) fn collect<const D: usize>(
     }
     let n_rods = chain.rods().len();
     body.rebuild((0..n_rods).map(|i| rod_box(chain, i)));
-    // Parts of other chains stand among those that move, and are not fled from.
+    // Parts of other chains are among the moving obstacles, but chains do not flee from them.
     let movers = obstacles.moving().iter().enumerate();
     for (k, mover) in movers.filter(|(_, mover)| mover.is_moving()) {
         let within_m = within_m(mover);
@@ -99,7 +99,7 @@ pub(super) fn collect<const D: usize>(
             look(Part::Connector(rod));
             look(Part::Rod(rod));
         });
-        // The last connector begins no rod.
+        // The last connector starts no rod.
         look(Part::Connector(n_rods));
     }
 }

@@ -1,4 +1,4 @@
-//! What a ladder remembers from tick to tick.
+//! The memory of a ladder from tick to tick.
 
 use crate::rods::geometry::Point;
 use serde::{Deserialize, Serialize};
@@ -6,15 +6,15 @@ use sidestep_kernel::math::atan2;
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
 
-/// A place for the guard against going to and fro: cells of 0.1 m, 16 headings.
+/// Size of a place for the guard against going to and fro: cells of 0.1 m, and 16 headings.
 const CELL_M: f64 = 0.1;
 const HEADINGS: f64 = 16.0;
-/// Places that are remembered.
+/// Number of remembered places.
 const PLACES: usize = 64;
-/// Coming nearer to the goal by this part of a cell is progress.
+/// Approach to the goal, as a part of a cell, that counts as progress.
 const PROGRESS: f64 = 0.1;
 
-/// Where on the ladder an initiator stands.
+/// An initiator's position on the ladder.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Memory {
     /// The side of the last good turn: 1 left, -1 right, 0 unknown; and its plane.
@@ -26,10 +26,10 @@ pub struct Memory {
     pub(super) on_detour: bool,
     pub(super) turns: u32,
     pub(super) waits: u32,
-    /// Ticks that the other end still leads.
+    /// Ticks for which the other end still leads.
     pub(super) pulling_back: u32,
     pub(super) hand_overs: u32,
-    /// The least distance from the goal.
+    /// Least distance from the goal, meters.
     pub(super) best_m: Option<f64>,
     pub(super) places: VecDeque<Visit>,
 }
@@ -41,11 +41,11 @@ pub(super) type Place = ([i64; 3], i64);
 pub(super) struct Visit {
     place: Place,
     times: u32,
-    /// Distance from the goal at the first of these times.
+    /// Distance from the goal at the first of these times, meters.
     goal_m: f64,
 }
 
-/// The place of a point and a direction.
+/// Returns the place of a point and a direction.
 pub(super) fn place<const D: usize>(at: Point<D>, u: Point<D>) -> Place {
     let mut cell = [0; 3];
     for (i, x) in at.into_iter().enumerate() {
@@ -60,7 +60,8 @@ impl Memory {
         if self.side == 0 { 1 } else { self.side }
     }
 
-    /// Coming a cell nearer to the goal than ever is progress: what failed before may be tried.
+    /// Notes the distance of the goal. Coming a cell nearer than ever before is progress, after
+    /// which what failed may be tried again.
     pub(super) fn note_goal(&mut self, goal_m: Option<f64>) {
         let Some(goal_m) = goal_m else { return };
         if self.best_m.is_none_or(|best_m| goal_m < best_m - CELL_M) {
@@ -92,7 +93,7 @@ impl Memory {
         (self.turns, self.waits) = (0, 0);
     }
 
-    /// Counts a detour's way through a place; how often that was without progress.
+    /// Counts a detour through a place; returns the number of times without progress.
     pub(super) fn visit(&mut self, place: Place, goal_m: Option<f64>) -> u32 {
         let begins = !std::mem::replace(&mut self.on_detour, true);
         let Some(goal_m) = goal_m else { return 0 };
@@ -113,7 +114,7 @@ impl Memory {
         visit.times
     }
 
-    /// One tick in which the other end led. After the last, the other side is tried first.
+    /// Counts a tick in which the other end led. After the last, the other side is tried first.
     pub(super) fn pulled_back(&mut self) {
         self.pulling_back -= 1;
         if self.pulling_back == 0 {
@@ -122,7 +123,7 @@ impl Memory {
         }
     }
 
-    /// After it was told that nothing works, everything may be tried again.
+    /// Forgets failures after the report that nothing works, so that everything may be tried again.
     pub(super) fn starts_afresh(&mut self) {
         self.pulling_back = 0;
         self.hand_overs = 0;
