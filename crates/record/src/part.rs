@@ -112,7 +112,7 @@ fn append_chunks(
     Ok(checksum.finalize())
 }
 
-/// What the system said, without the library's wrapping.
+/// Returns the system's message, without the library's wrapping.
 pub(crate) fn cause(error: ParquetError) -> String {
     match error {
         ParquetError::External(inner) => inner.to_string(),

@@ -24,7 +24,7 @@ impl TableFile {
     /// Starts the file that will be called `path` once it is whole.
     ///
     /// # Errors
-    /// A schema that cannot become a file; what the system says.
+    /// A schema that cannot become a file; an I/O error.
     pub fn create(path: &Path, schema: &TableSchema, origin: &Origin) -> Result<Self, RecordError> {
         check_schema(schema)?;
         let failed = |e| RecordError::new(&schema.name, cause(e));
@@ -40,7 +40,7 @@ impl TableFile {
     /// Appends rows: one [`Values`] per column, all of one length.
     ///
     /// # Errors
-    /// A block that does not fit; what the system says.
+    /// A block that does not fit; an I/O error.
     pub fn append(&mut self, block: &[Values]) -> Result<(), RecordError> {
         check_block(&self.schema, block)?;
         let rows = block.first().map_or(0, Values::len);
@@ -63,7 +63,7 @@ impl TableFile {
     /// Ends the file: waits for the disk and gives it its name.
     ///
     /// # Errors
-    /// What the system says.
+    /// An I/O error.
     pub fn finish(mut self) -> Result<(), RecordError> {
         if !self.group.is_empty() {
             self.write_row_group()?;

@@ -57,7 +57,7 @@ pub struct WholeTable<R> {
 /// key-value pairs.
 ///
 /// # Errors
-/// A column of a type that such files do not hold; what the system says. A file that was there
+/// A column of a type that such files do not hold; an I/O error. A file that was there
 /// stays then.
 pub fn write<R: Serialize>(
     path: &Path,

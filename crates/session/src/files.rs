@@ -9,7 +9,7 @@ use std::path::Path;
 /// new one is complete.
 ///
 /// # Errors
-/// What the system says.
+/// An I/O error.
 pub fn replace(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<File>) -> Result<()>,

@@ -27,7 +27,7 @@ impl Recording {
     /// A new folder at `path`, with the resolved scenario in it.
     ///
     /// # Errors
-    /// A folder that is not to be taken, and what the system says.
+    /// A folder that is not to be taken, and an I/O error.
     pub fn create(
         path: &Path,
         resolved: &Resolved,
@@ -53,7 +53,7 @@ impl Recording {
     /// Takes up the recording of a run that stands where its folder's checkpoint is.
     ///
     /// # Errors
-    /// What the system says.
+    /// An I/O error.
     pub(crate) fn begin(folder: RunFolder, run: &mut dyn Simulation) -> Result<Self, RecordError> {
         run.begin_recording();
         let recorder = folder.recorder(&run.schemas(), run.cycle())?;
@@ -69,7 +69,7 @@ impl Recording {
     /// Takes the rows, and a checkpoint where one is due.
     ///
     /// # Errors
-    /// What the system says.
+    /// An I/O error.
     pub(crate) fn take(&mut self, run: &mut dyn Simulation) -> Result<(), RecordError> {
         let started = Instant::now();
         run.record(&mut self.recorder)?;
@@ -89,7 +89,7 @@ impl Recording {
     /// Declares the tables whole; reports and pictures may follow.
     ///
     /// # Errors
-    /// What the system says.
+    /// An I/O error.
     pub(crate) fn finish_tables(&mut self) -> Result<(), RecordError> {
         self.recorder.finish()
     }
@@ -97,7 +97,7 @@ impl Recording {
     /// Saves a run that stops before its end.
     ///
     /// # Errors
-    /// What the system says.
+    /// An I/O error.
     pub(crate) fn save_unfinished(&mut self, run: &mut dyn Simulation) -> Result<(), RecordError> {
         run.record(&mut self.recorder)?;
         self.save(run)
@@ -127,7 +127,7 @@ pub(crate) fn next(every: Cycle, cycle: Cycle) -> Cycle {
 /// Puts the files that a resolved scenario names beside it.
 ///
 /// # Errors
-/// What the system says.
+/// An I/O error.
 pub(crate) fn write_inputs(folder: &Path, files: &[(String, Vec<u8>)]) -> Result<(), RecordError> {
     for (name, bytes) in files {
         let path = folder.join(name);

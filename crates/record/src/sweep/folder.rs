@@ -98,7 +98,7 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
     /// [`create`](Self::create) makes.
     ///
     /// # Errors
-    /// What the system says.
+    /// An I/O error.
     pub fn write_variant(
         folder: &Path,
         variant: u32,
@@ -206,7 +206,7 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
     /// Writes the runs of a share as its part, and takes the journal away.
     ///
     /// # Errors
-    /// What the system says; the journal stays then.
+    /// An I/O error; the journal stays then.
     pub fn end_share<R: Serialize>(
         &self,
         share: Share,
@@ -261,7 +261,7 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
     /// sweep is done.
     ///
     /// # Errors
-    /// What the system says.
+    /// An I/O error.
     pub fn complete<R: Serialize>(
         &self,
         results: &[RoleColumn<R>],

@@ -72,7 +72,7 @@ impl Journal {
     /// Appends an entry. When this returns, no kill of the process can lose it.
     ///
     /// # Errors
-    /// What the system says; the journal has the entries before this one then.
+    /// An I/O error; the journal has the entries before this one then.
     pub fn append(&mut self, entry: &impl Serialize) -> Result<(), RecordError> {
         let line = line(entry).map_err(|e| RecordError::new(self.path.display(), e))?;
         let written = self.file.write_all(line.as_bytes());
@@ -88,7 +88,7 @@ impl Journal {
     /// Makes all entries durable against a power cut.
     ///
     /// # Errors
-    /// What the system says.
+    /// An I/O error.
     pub fn sync(&mut self) -> Result<(), RecordError> {
         self.file.sync_data().map_err(|e| RecordError::new(self.path.display(), e))?;
         self.synced = Instant::now();

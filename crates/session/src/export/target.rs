@@ -72,7 +72,7 @@ impl Target {
     /// is in it.
     ///
     /// # Errors
-    /// What `fill` returns, and what the system says; then nothing is left.
+    /// What `fill` returns, and an I/O error; then nothing is left.
     pub(super) fn make_folder<T>(
         &self,
         fill: impl FnOnce(&Path) -> Result<T, Error>,

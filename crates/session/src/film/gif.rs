@@ -17,7 +17,7 @@ const BITS: u32 = 5;
 /// Writes pictures of one size, each four bytes a pixel, at so many per second.
 ///
 /// # Errors
-/// What the system says, and what `pictures` returns.
+/// An I/O error, and what `pictures` returns.
 pub(crate) fn write_gif(
     to: impl Write,
     (width, height): (u32, u32),

@@ -37,7 +37,7 @@ impl McapFilm {
     /// A new file at `path`; the run is watched from now on.
     ///
     /// # Errors
-    /// What the system says.
+    /// An I/O error.
     pub fn begin(
         path: &Path,
         every: Cycle,
@@ -67,7 +67,7 @@ impl McapFilm {
     /// Ends the file, and says what it is called.
     ///
     /// # Errors
-    /// What the system says.
+    /// An I/O error.
     pub fn finish(self, run: &dyn Simulation, ending: Ending) -> Result<PathBuf, Error> {
         let status = match ending {
             Ending::Complete => Status::Complete,
