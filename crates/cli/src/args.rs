@@ -1,20 +1,20 @@
-//! What can be typed.
+//! The command line: options of every command, and examples.
 
 use crate::commands::Command;
 use clap::Parser;
 
-/// Behind the options that are a command's own.
+/// Display order of global options: after those of each command.
 const LAST: usize = 900;
 
-/// Simulate and compare decentralized multi-agent motion, with sensors that lie and wheels that slip.
+/// Simulate and compare decentralized multi-agent motion, with noisy sensors and slipping wheels.
 #[derive(Debug, Parser)]
 #[command(name = "sidestep", version = sidestep::BUILD, after_help = EXAMPLES, arg_required_else_help = true)]
 pub(crate) struct Cli {
-    /// Print one JSON object on standard output and nothing else
+    /// Print one JSON object to standard output and nothing else
     #[arg(long, global = true, display_order = LAST)]
     pub(crate) json: bool,
 
-    /// Show no progress, and of a run nothing but its digest
+    /// Show no progress bar, and print only the digest of a run
     #[arg(long, short, global = true, display_order = LAST)]
     pub(crate) quiet: bool,
 
@@ -23,7 +23,7 @@ pub(crate) struct Cli {
 }
 
 const EXAMPLES: &str = "\
-Begin with:
+Get started:
   sidestep new robots first.toml      write a commented scenario
   sidestep check first.toml           see what it describes
   sidestep run first.toml --out runs/first

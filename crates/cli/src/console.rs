@@ -1,4 +1,4 @@
-//! What the command prints: results on standard output, everything else on standard error.
+//! Output of the command: results on standard output, everything else on standard error.
 
 use serde::Serialize;
 use sidestep_document::Table;
@@ -8,10 +8,10 @@ use std::io::{IsTerminal, Write};
 pub(crate) use sidestep::kernel::words::{aligned, grouped};
 pub(crate) use sidestep_session::report::duration;
 
-/// Columns of text where the terminal does not say how many it has.
+/// Columns of text if the terminal does not report its width.
 const DEFAULT_COLS: u16 = 100;
 
-/// Where a command's words go.
+/// The destination of a command's output.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Console {
     json: bool,
@@ -19,17 +19,17 @@ pub(crate) struct Console {
 }
 
 impl Console {
-    /// A console for people, or for machines with `json`; `quiet` keeps to the result.
+    /// Returns a console for people, or with `json` for programs; `quiet` prints results alone.
     pub(crate) fn new(json: bool, quiet: bool) -> Self {
         Self { json, quiet }
     }
 
-    /// Whether progress may be shown: to a person who has not asked for silence.
+    /// Whether progress may be shown: not with `json` or `quiet`.
     pub(crate) fn shows_progress(self) -> bool {
         !self.quiet && std::io::stderr().is_terminal()
     }
 
-    /// Prints a command's result: one JSON object, or the words of `text`.
+    /// Prints a command's result: one JSON object, or the result of `text`.
     pub(crate) fn result(self, json: &impl Serialize, text: impl FnOnce() -> String) {
         if self.json {
             let object = serde_json::to_string_pretty(json).expect("results are plain data");
@@ -39,7 +39,7 @@ impl Console {
         }
     }
 
-    /// As [`Console::result`], with a shorter text for the quiet.
+    /// Prints a result like [`Console::result`], with a shorter text if the console is quiet.
     pub(crate) fn result_or_short(
         self,
         json: &impl Serialize,
@@ -49,36 +49,36 @@ impl Console {
         self.result(json, || if self.quiet { short() } else { text() });
     }
 
-    /// A remark for people, on standard error.
+    /// Prints a remark for people to standard error.
     pub(crate) fn note(self, text: impl Display) {
         if !self.quiet && !self.json {
             let _ = writeln!(std::io::stderr(), "{text}");
         }
     }
 
-    /// Something that is wrong but stops nothing.
+    /// Prints a warning: something is wrong, but the command goes on.
     pub(crate) fn warn(self, text: impl Display) {
         let _ = writeln!(std::io::stderr(), "warning: {text}");
     }
 
-    /// Why the command ends before its goal.
+    /// Prints the reason why the command failed.
     pub(crate) fn error(self, text: impl Display) {
         let _ = writeln!(std::io::stderr(), "error: {text}");
     }
 }
 
-/// Columns that text may take.
+/// Returns the number of columns that text may take.
 pub(crate) fn columns() -> u16 {
     terminal_size::terminal_size().map_or(DEFAULT_COLS, |(width, _)| width.0)
 }
 
-/// A reader that has gone (`| head`) is no error: it has seen what it wanted.
+/// Writes to standard output. A reader that has closed the pipe (`| head`) is not an error.
 fn write_out(text: &str) {
     let mut out = std::io::stdout().lock();
     let _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());
 }
 
-/// A table in columns, numbers to the right; what its cells say is left as it is.
+/// Returns a table as text in columns, with numbers aligned to the right.
 pub(crate) fn in_columns(table: &Table) -> String {
     let rows: Vec<Vec<&str>> = table.rows.iter().map(|row| table.cells(row).collect()).collect();
     let head: Vec<&str> = table.columns.iter().map(String::as_str).collect();

@@ -8,12 +8,12 @@ pub(crate) use sidestep_session::Error as Failure;
 pub(crate) enum ExitCode {
     /// The command did what was asked.
     Done = 0,
-    /// It could not be finished, or the answer is no: a full disk, a replay that differs from its
-    /// record, a target that no posture reaches.
+    /// The command could not finish, or the answer is no: a full disk, a replay that differs from
+    /// its recording, a target that no posture reaches.
     Failed = 1,
     /// An option, a file or a folder is wrong. Nothing was written.
     WrongInput = 2,
-    /// Stopped by Ctrl-C (or a termination signal) in good order; what was done is kept.
+    /// Ctrl-C (or a termination signal) stopped the command in good order; results so far are kept.
     Interrupted = 130,
 }
 

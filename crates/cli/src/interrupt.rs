@@ -1,4 +1,4 @@
-//! Ctrl-C: the first asks the run to stop in good order, the second ends the process.
+//! Ctrl-C: the first one asks the run to stop in good order, the second one ends the process.
 
 use crate::exit::{ExitCode, Failure};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -6,10 +6,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 static REQUESTED: AtomicBool = AtomicBool::new(false);
 static LISTENING: AtomicBool = AtomicBool::new(false);
 
-/// From now on Ctrl-C (and a termination signal) is noted instead of killing the process.
+/// Makes Ctrl-C (and a termination signal) a request to stop, instead of the end of the process.
 ///
 /// # Errors
-/// When the system does not let signals be caught.
+/// When the system does not allow signals to be caught.
 pub(crate) fn listen() -> Result<(), Failure> {
     if LISTENING.swap(true, Ordering::Relaxed) {
         return Ok(());
@@ -21,10 +21,10 @@ pub(crate) fn listen() -> Result<(), Failure> {
     })
 }
 
-/// From now on Ctrl-C (and a termination signal) ends the process after `cleanup`.
+/// Makes Ctrl-C (and a termination signal) end the process after `cleanup`.
 ///
 /// # Errors
-/// When the system does not let signals be caught.
+/// When the system does not allow signals to be caught.
 pub(crate) fn end_with(cleanup: impl Fn() + Send + 'static) -> Result<(), Failure> {
     catch(move || {
         cleanup();

@@ -1,14 +1,14 @@
 //! The `sidestep` command: arguments -> plan -> session -> words.
 //!
 //! ```text
-//! args.rs      what can be typed                 commands/*.rs   one file per command
-//! plan.rs      options -> a scenario             sweep/          options -> a sweep; its words
-//! watch.rs     progress and Ctrl-C for sessions  progress.rs     bars on a terminal
-//! report.rs    a run's summary in words          pages.rs        documents as files
-//! exit.rs      how the command ends              console.rs      what it prints, and where
+//! args.rs      the command line                  commands/*.rs   one file per command
+//! plan.rs      options -> a scenario             sweep/          options -> a sweep; its results
+//! watch.rs     progress and Ctrl-C for sessions  progress.rs     progress bars
+//! report.rs    a run's summary as text           pages.rs        documents as files
+//! exit.rs      exit codes and failures           console.rs      standard output and error
 //! ```
 //!
-//! What is done with runs is done by the crate `sidestep-session`.
+//! The crate `sidestep-session` drives the runs.
 
 mod args;
 mod commands;

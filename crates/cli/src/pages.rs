@@ -1,4 +1,4 @@
-//! Reports as files: the page, its Markdown twin, and the pictures of that.
+//! Reports as files: the page, the Markdown version, and its pictures.
 
 use crate::exit::Failure;
 use sidestep_document::Document;
@@ -7,32 +7,32 @@ use sidestep_session::{replace, write_png};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Where a report goes.
+/// The files of a report.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Pages {
-    /// The page; its Markdown twin has the same name with the ending `md`.
+    /// The page; the Markdown version has the same name with the ending `md`.
     pub(crate) html: PathBuf,
     /// Name of the folder beside it for pictures.
     pub(crate) pictures: String,
 }
 
-/// What pictures are stored as.
+/// The formats that pictures are stored in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Raster {
-    /// SVG alone.
+    /// Only SVG.
     None,
-    /// SVG, and PNG beside it.
+    /// SVG and PNG.
     AlsoPng,
 }
 
 impl Pages {
-    /// The Markdown twin.
+    /// Returns the path of the Markdown version.
     pub(crate) fn markdown(&self) -> PathBuf {
         self.html.with_extension("md")
     }
 
-    /// Writes a report. Every file is replaced as a whole, the page last: where it is new,
-    /// everything is.
+    /// Writes a report. Every file is replaced as a whole, and the page last: if it is new, all the
+    /// others are.
     ///
     /// # Errors
     /// When a figure cannot be drawn, or something cannot be written.

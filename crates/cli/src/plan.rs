@@ -1,4 +1,4 @@
-//! A scenario file and the options of the command line -> a scenario that is known to be right.
+//! A scenario file and the options of the command line -> a valid scenario.
 
 use clap::Args;
 use sidestep::kernel::{InputError, workers};
@@ -8,10 +8,10 @@ use sidestep::worlds::WORLDS;
 use sidestep_session::read;
 use std::path::PathBuf;
 
-/// The scenario, and what the command line changes in it.
+/// The scenario, and the options that change it.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct ScenarioArgs {
-    /// Scenario file (TOML, BlueSky .scn or recorded traffic .csv; may be packed with gzip)
+    /// Scenario file (TOML, BlueSky .scn or recorded traffic .csv; gzip is fine)
     #[arg(value_name = "SCENARIO")]
     pub(crate) file: PathBuf,
 
@@ -19,42 +19,42 @@ pub(crate) struct ScenarioArgs {
     pub(crate) changes: ChangeArgs,
 }
 
-/// What the command line changes in a scenario.
+/// The options that change a scenario.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct ChangeArgs {
-    /// Run this many cycles [default: the scenario's `cycles`]
+    /// Number of cycles to run [default: the scenario's `cycles`]
     #[arg(long, value_name = "N", value_parser = toml_integer())]
     pub(crate) cycles: Option<u64>,
 
-    /// Grow all randomness from this number [default: the scenario's `seed`]
+    /// Random seed [default: the scenario's `seed`]
     #[arg(long, value_name = "S", value_parser = toml_integer())]
     pub(crate) seed: Option<u64>,
 
-    /// Switch errors on: none, those of effectors, those of sensors, or both
+    /// Error regime: errors of nothing, of effectors, of sensors, or of both
     #[arg(long, value_name = "R", value_parser = ["reliable", "effectors", "sensors", "both"])]
     pub(crate) regime: Option<String>,
 
-    /// Replace any key of the scenario, e.g. robots.count=20; may be given often
+    /// Override a key of the scenario, e.g. robots.count=20; repeatable
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub(crate) overrides: Vec<String>,
 }
 
-/// How many threads work on a run.
+/// The option for the number of worker threads.
 #[derive(Debug, Clone, Copy, Args)]
 pub(crate) struct WorkersArg {
-    /// Run on this many threads; no result depends on it [default: all processors]
+    /// Number of worker threads; results do not depend on it [default: all processors]
     #[arg(long, value_name = "W", value_parser = clap::value_parser!(u16).range(1..=1024))]
     workers: Option<u16>,
 }
 
 impl WorkersArg {
-    /// The number of threads.
+    /// Returns the number of worker threads.
     pub(crate) fn count(self) -> usize {
         self.workers.map_or_else(workers::available, usize::from)
     }
 }
 
-/// TOML knows integers up to 2^63 - 1.
+/// Parses an integer that TOML can hold, up to 2^63 - 1, because it becomes a key of the scenario.
 fn toml_integer() -> clap::builder::RangedU64ValueParser<u64> {
     clap::value_parser!(u64).range(..=i64::MAX as u64)
 }
@@ -76,7 +76,8 @@ impl ScenarioArgs {
 }
 
 impl ChangeArgs {
-    /// All overrides but for the seed: `--set` first, so that the options of their own win.
+    /// Returns all overrides except the seed: `--set` first, because options with a name of their
+    /// own win.
     pub(crate) fn settings(&self) -> Vec<String> {
         let mut all = self.overrides.clone();
         all.extend(self.cycles.map(|cycles| format!("cycles={cycles}")));
@@ -85,10 +86,10 @@ impl ChangeArgs {
     }
 }
 
-/// The scenario itself, for commands that are about one world alone.
+/// Returns the scenario of one world, for commands that support this world alone.
 ///
 /// # Errors
-/// When it is of another world.
+/// When the scenario is of another world.
 pub(crate) fn of_world<'a, C: 'static>(
     compiled: &'a dyn Compiled,
     source: &Source,

@@ -6,23 +6,23 @@ use std::fmt::Write;
 
 use crate::console::{Console, grouped};
 
-/// How far a run is, or many of them.
+/// The progress bar of a run, or of many.
 #[derive(Debug)]
 pub(crate) struct Bar(ProgressBar);
 
 impl Bar {
-    /// A bar from `from` to `until`; silent where nobody looks.
+    /// Returns a bar from cycle `from` to `until`; hidden if the console shows no progress.
     pub(crate) fn of_cycles(console: Console, from: Cycle, until: Cycle) -> Self {
         let bar = bar(console, until);
         bar.set_style(style());
         bar.set_position(from);
-        // The rate is that of this process, not of what was done before.
+        // The rate counts this process alone, not the cycles of an earlier one.
         bar.reset_elapsed();
         bar.reset_eta();
         Self(bar)
     }
 
-    /// A bar of runs, of which `before` were done before.
+    /// Returns a bar of `all` runs, `before` of which were done earlier.
     pub(crate) fn of_runs(console: Console, before: u64, all: u64) -> Self {
         let bar = bar(console, all);
         bar.set_style(
@@ -35,7 +35,7 @@ impl Bar {
         Self(bar)
     }
 
-    /// Shows that so many cycles (or runs) are done.
+    /// Shows that `done` cycles (or runs) are done.
     pub(crate) fn at(&self, done: u64) {
         self.0.set_position(done);
     }
@@ -46,22 +46,22 @@ impl Bar {
     }
 }
 
-/// A bar that is silent where nobody looks.
+/// Returns a bar that is hidden if the console shows no progress.
 fn bar(console: Console, length: u64) -> ProgressBar {
     let shown = console.shows_progress();
     let target = if shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
     ProgressBar::with_draw_target(Some(length), target)
 }
 
-/// How far work of several stages is.
+/// The progress bar of work in several stages.
 #[derive(Debug)]
 pub(crate) struct Stages(ProgressBar);
 
-/// Steps of the bar of [`Stages`].
+/// Number of steps of the bar of [`Stages`].
 const STEPS: f64 = 1000.0;
 
 impl Stages {
-    /// A bar at its beginning; silent where nobody looks.
+    /// Returns a bar at its start; hidden if the console shows no progress.
     pub(crate) fn new(console: Console) -> Self {
         let bar = bar(console, STEPS as u64);
         let style = ProgressStyle::with_template("{bar:30} {percent} %  {eta} left  {msg}");
@@ -69,7 +69,7 @@ impl Stages {
         Self(bar)
     }
 
-    /// Shows what is being done, and the share of all that is done.
+    /// Shows the name of the stage, and the share of all work that is done (0 to 1).
     pub(crate) fn at(&self, what: &str, share: f64) {
         self.0.set_position((STEPS * share) as u64);
         self.0.set_message(what.to_string());

@@ -1,11 +1,11 @@
-//! The summary of a run in words.
+//! The summary of a run as text.
 
 use crate::console::{aligned, duration, grouped};
 use sidestep::kernel::words::line;
 use sidestep::kernel::world::Decides;
 use sidestep_session::{Phases, Status, Summary};
 
-/// Returns the report for people.
+/// Returns the summary as text for people.
 pub(crate) fn text(summary: &Summary) -> String {
     let mut lines = vec![
         line(&format!("{}s", summary.agent), grouped(summary.agents as u64)),
@@ -52,7 +52,7 @@ fn speed(summary: &Summary) -> String {
     )
 }
 
-/// Shares of the whole, in words.
+/// Returns the share of time of every phase, as text.
 fn phases_words(phases_s: &Phases) -> String {
     let [first, last] = match phases_s.decides {
         Decides::Alone => ["perceive, decide and claim", "act"],
@@ -69,7 +69,7 @@ fn phases_words(phases_s: &Phases) -> String {
     phases.iter().map(share).collect::<Vec<_>>().join(", ")
 }
 
-/// A rate with as many digits as tell it apart.
+/// Formats a rate with as many digits as it needs.
 fn rate(per_second: f64) -> String {
     match per_second < 1e5 {
         true => grouped(per_second as u64),

@@ -21,7 +21,7 @@ enum Shown {
 }
 
 impl Watch {
-    /// A watcher that shows on `console` what it may.
+    /// Returns a watcher that prints to `console`.
     pub(crate) fn new(console: Console) -> Self {
         Self { console, shown: Mutex::new(None) }
     }

@@ -1,4 +1,4 @@
-//! Files that are there in full or not at all, also after a power cut.
+//! Files that are written completely or not at all, even after a power failure.
 
 use std::fs::{self, File};
 use std::io::{self, Write};
@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use sidestep_kernel::InputError;
 use sidestep_kernel::ports::RecordError;
 
-/// The name under which a file or folder grows until it is whole: `NAME.partial`.
+/// Returns the name of a file or folder while it is incomplete: `NAME.partial`.
 pub(crate) fn partial(path: &Path) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(".partial");
@@ -18,7 +18,7 @@ pub(crate) fn partial(path: &Path) -> PathBuf {
 /// never a mixture. One writer at a time.
 ///
 /// # Errors
-/// What the system says; the old content stays.
+/// An I/O error; the old content stays.
 pub(crate) fn replace(path: &Path, bytes: &[u8]) -> Result<(), RecordError> {
     let growing = partial(path);
     let written = write_through(&growing, bytes);
@@ -36,7 +36,7 @@ fn write_through(path: &Path, bytes: &[u8]) -> io::Result<()> {
     file.sync_all()
 }
 
-/// Renames `from` to `to` in the same folder and makes the new name durable.
+/// Renames `from` to `to` in the same folder, and makes the new name durable.
 pub(crate) fn rename(from: &Path, to: &Path) -> Result<(), RecordError> {
     fs::rename(from, to)
         .and_then(|()| sync_folder(parent(to)))
@@ -51,13 +51,13 @@ pub(crate) fn parent(path: &Path) -> &Path {
     }
 }
 
-/// Makes the names in a folder durable, where the system can.
+/// Makes the names in a folder durable, if the system can.
 #[cfg(unix)]
 fn sync_folder(folder: &Path) -> io::Result<()> {
     File::open(folder)?.sync_all()
 }
 
-/// Other systems do not open folders; the rename itself is atomic there too.
+/// Does nothing: other systems do not open folders, and the rename itself is atomic there too.
 #[cfg(not(unix))]
 fn sync_folder(_folder: &Path) -> io::Result<()> {
     Ok(())

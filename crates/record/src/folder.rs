@@ -1,4 +1,4 @@
-//! The folder of one run: made in one step, written by one process, resumed after a stop.
+//! The folder of one run: created in one step, written by one process, resumed after a stop.
 
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::path::{Path, PathBuf};
@@ -13,62 +13,62 @@ use crate::parquet::ParquetRecorder;
 use crate::schema::Origin;
 use crate::staging::Staging;
 
-/// The manifest's name.
+/// File name of the manifest.
 pub(crate) const MANIFEST: &str = "run.json";
 const SCENARIO: &str = "scenario.toml";
 const SUMMARY: &str = "summary.json";
 const CHECKPOINT: &str = "checkpoint.bin";
 const LOCK: &str = "run.lock";
 
-/// What a new run is.
+/// The description of a new run.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NewRun {
     /// The world to simulate, e.g. `robots`.
     pub world: String,
     /// The build that makes it.
     pub build: String,
-    /// Where its rows will come from.
+    /// Scenario, seed and version that its rows result from.
     pub origin: Origin,
     /// Cycles that the scenario asks for.
     pub cycles_planned: u64,
 }
 
-/// What to do about a run that is in the folder already.
+/// How to treat an existing run in the folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Existing {
     /// Leave it alone and fail.
     Refuse,
-    /// Delete it. Folders that hold something else than a run are refused all the same.
+    /// Delete it. Folders that hold something other than a run are refused anyway.
     Replace,
 }
 
-/// Where a run is to go on.
+/// The point at which a run resumes.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum ResumePoint {
-    /// At cycle 0: the run was stopped before its first checkpoint.
+    /// Cycle 0: the run was stopped before its first checkpoint.
     Start,
-    /// At the checkpoint with these bytes, whose checksum the kernel verifies.
+    /// The checkpoint with these bytes, whose checksum the kernel verifies.
     Checkpoint(Vec<u8>),
 }
 
-/// A run folder that this process writes; no other process can while this value lives.
+/// A run folder that this process writes; no other process can write it while this value lives.
 #[derive(Debug)]
 pub struct RunFolder {
     path: PathBuf,
     manifest: Manifest,
     scenario: String,
-    /// Locked; the lock ends with the process, however that ends.
+    /// Locked; the system releases the lock when the process ends, in whatever way.
     _lock: File,
 }
 
 impl RunFolder {
-    /// Makes the folder at `path` with its manifest and scenario: all of it or nothing.
+    /// Creates the folder at `path` with its manifest and scenario: completely or not at all.
     ///
-    /// A folder that is missing or empty is taken; so is one with a run, if `existing` says
-    /// so and no process writes it.
+    /// The folder may be missing or empty; or it may hold a run, if `existing` allows that and no
+    /// process writes it.
     ///
     /// # Errors
-    /// A folder that is not to be taken; a place where none can be made.
+    /// A folder that may not be used; a place where none can be created.
     pub fn create(path: &Path, run: &NewRun, existing: Existing) -> Result<Self, InputError> {
         check_vacant(path, existing)?;
         let staging = Staging::new(path)?;
@@ -86,7 +86,7 @@ impl RunFolder {
         Ok(Self { path: path.to_path_buf(), manifest, scenario, _lock: lock })
     }
 
-    /// Opens the folder at `path` to go on with its run.
+    /// Opens the folder at `path` to continue its run.
     ///
     /// # Errors
     /// No run folder; a run that is complete, or that another process writes; a damaged
@@ -103,26 +103,26 @@ impl RunFolder {
         Ok((Self { path: path.to_path_buf(), manifest, scenario, _lock: lock }, point))
     }
 
-    /// Where the folder is.
+    /// Returns the path of the folder.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// What `run.json` says.
+    /// Returns the content of `run.json`.
     pub fn manifest(&self) -> &Manifest {
         &self.manifest
     }
 
-    /// The scenario's text.
+    /// Returns the text of the scenario.
     pub fn scenario(&self) -> &str {
         &self.scenario
     }
 
-    /// The recorder of the run's tables from `cycle` on: 0 for a new run, the checkpoint's
+    /// Returns the recorder of the run's tables from `cycle` on: 0 for a new run, the checkpoint's
     /// cycle for a resumed one, whose later rows are deleted.
     ///
     /// # Errors
-    /// A schema that cannot become a file; what the system says.
+    /// A schema that cannot become a file; an I/O error.
     pub fn recorder(
         &self,
         schemas: &[TableSchema],
@@ -137,12 +137,11 @@ impl RunFolder {
     }
 
     /// Replaces the checkpoint by the state before `cycle`.
-    /// [Seal](sidestep_kernel::ports::Recorder::seal) the recorder at `cycle` first: a kill
-    /// between the two then costs rows of the next stretch only, which the resumed run
-    /// writes again.
+    /// [Seal](sidestep_kernel::ports::Recorder::seal) the recorder at `cycle` first: a kill between
+    /// the two then loses only rows of the next stretch, which the resumed run writes again.
     ///
     /// # Errors
-    /// What the system says; the checkpoint before this one stays valid.
+    /// An I/O error; the checkpoint before this one stays valid.
     pub fn save_checkpoint(&mut self, cycle: u64, state: &[u8]) -> Result<(), RecordError> {
         disk::replace(&self.path.join(CHECKPOINT), state)?;
         self.update(|m| {
@@ -153,25 +152,25 @@ impl RunFolder {
     /// Writes `summary.json`.
     ///
     /// # Errors
-    /// What the system says, or a summary that is no JSON.
+    /// An I/O error, or a summary that is not JSON.
     pub fn write_summary(&self, summary: &impl Serialize) -> Result<(), RecordError> {
         let path = self.path.join(SUMMARY);
         disk::replace(&path, &json(summary, &path)?)
     }
 
-    /// Notes that the run stopped in good order after `cycles_done` cycles, to be resumed.
+    /// Records that the run stopped in good order after `cycles_done` cycles and can be resumed.
     ///
     /// # Errors
-    /// What the system says; the folder can be resumed all the same.
+    /// An I/O error; the folder can be resumed nevertheless.
     pub fn stop(mut self, cycles_done: u64) -> Result<(), RecordError> {
         self.update(|m| (m.status, m.cycles_done) = (Status::Incomplete, cycles_done))
     }
 
-    /// Declares the run complete, with the digest of its final state. The last step of a
-    /// run: its recorder is finished and its summary written.
+    /// Declares the run complete, with the digest of its final state. This is the last step of a
+    /// run, after its recorder is finished and its summary is written.
     ///
     /// # Errors
-    /// What the system says; the run can be resumed at its last checkpoint.
+    /// An I/O error; the run can be resumed at its last checkpoint.
     pub fn complete(mut self, cycles_done: u64, digest: &str) -> Result<(), RecordError> {
         self.update(|m| {
             (m.status, m.cycles_done) = (Status::Complete, cycles_done);
@@ -189,12 +188,12 @@ impl RunFolder {
     }
 }
 
-/// A run folder to read from; its run may still be under way.
+/// A run folder to read from; its run may still be in progress.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RunView {
-    /// Where the folder is.
+    /// Path of the folder.
     pub path: PathBuf,
-    /// What `run.json` says.
+    /// The content of `run.json`.
     pub manifest: Manifest,
     /// The scenario's text.
     pub scenario: String,
@@ -232,7 +231,7 @@ fn resume_point(checkpoint: &Path) -> Result<ResumePoint, InputError> {
     read(checkpoint, |p| fs::read(p)).map(ResumePoint::Checkpoint)
 }
 
-/// True for a folder that holds a run, be its manifest damaged or not.
+/// Whether a folder holds a run, even if its manifest is damaged.
 fn is_run(path: &Path) -> bool {
     path.join(MANIFEST).is_file()
 }
@@ -247,7 +246,7 @@ fn check_is_run(path: &Path) -> Result<(), InputError> {
     Err(InputError::new(path.display(), cause, "name the folder that a run was recorded to"))
 }
 
-/// Refuses a path at which a new run must not be made.
+/// Refuses a path at which a new run must not be created.
 pub(crate) fn check_vacant(path: &Path, existing: Existing) -> Result<(), InputError> {
     let refuse = |cause, remedy: &str| Err(InputError::new(path.display(), cause, remedy));
     let mut entries = match fs::read_dir(path) {

@@ -1,13 +1,13 @@
-//! The version of what a run folder holds.
+//! The version of the format of a run folder.
 //!
 //! | reader \ file | same major, older or same minor | same major, newer minor | other major |
 //! | --- | --- | --- | --- |
-//! | this version | read in full | read; what it does not know is ignored | refused with a remedy |
+//! | this version | read completely | read; unknown additions are ignored | refused with a remedy |
 //!
 //! The minor number rises when something is added that an older reader may ignore (a key in
-//! `run.json`, a key-value pair in a Parquet footer). The major number rises when an older
-//! reader would misread: another meaning, another unit, another layout of files. Columns are
-//! the world's, named in each file; they do not count.
+//! `run.json`, a key-value pair in a Parquet footer). The major number rises when an older reader
+//! would misread: another meaning, another unit, another layout of files. Columns belong to the
+//! world and are named in each file, so they do not count.
 
 use std::fmt;
 use std::str::FromStr;
@@ -18,7 +18,7 @@ use sidestep_kernel::InputError;
 /// The format that this build writes.
 pub const CURRENT: FormatVersion = FormatVersion { major: 1, minor: 0 };
 
-/// A format version, `major.minor`; the [module](self) says what each number promises.
+/// A format version, `major.minor`; the [module](self) explains what each number guarantees.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct FormatVersion {
@@ -29,7 +29,7 @@ pub struct FormatVersion {
 }
 
 impl FormatVersion {
-    /// Refuses what this build cannot read.
+    /// Refuses a version that this build cannot read.
     ///
     /// # Errors
     /// Another major version; `place` is the file that carries it.
@@ -53,7 +53,7 @@ impl fmt::Display for FormatVersion {
     }
 }
 
-/// The text is no `major.minor`.
+/// The error of a text that is not `major.minor`.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("`{0}` is no format version such as `1.0`")]
 pub struct BadFormatVersion(String);

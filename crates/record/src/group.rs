@@ -1,4 +1,4 @@
-//! The rows of a row group, encoded, until there are enough to be written.
+//! The rows of a row group, kept encoded until there are enough to be written.
 
 use parquet::errors::Result;
 use parquet::schema::types::{SchemaDescriptor, TypePtr};
@@ -6,17 +6,17 @@ use sidestep_kernel::ports::{TableSchema, Values};
 
 use crate::encode::ColumnEncoder;
 
-/// Rows in a row group. Only encoded rows wait in memory, a few bytes each.
+/// Number of rows in a row group. Only encoded rows wait in memory, at a few bytes each.
 const ROWS: usize = 1 << 20;
 
-/// The columns of the row group that is growing.
+/// The columns of the row group that is being filled.
 pub(crate) struct RowGroup {
     columns: Vec<ColumnEncoder>,
     rows: usize,
 }
 
 impl RowGroup {
-    /// No rows yet, of the columns of `schema`, which Parquet knows as `stored`.
+    /// Returns an empty group for the columns of `schema`, which Parquet knows as `stored`.
     pub(crate) fn new(schema: &TableSchema, stored: &TypePtr) -> Self {
         let descriptor = SchemaDescriptor::new(stored.clone());
         let columns = schema.columns.iter().zip(descriptor.columns());
@@ -24,7 +24,8 @@ impl RowGroup {
         Self { columns, rows: 0 }
     }
 
-    /// Takes rows of a block from `start` on, as many as fit; the first row that is left.
+    /// Takes as many rows of a block as fit, from `start` on, and returns the first row that is
+    /// left.
     pub(crate) fn fill(&mut self, block: &[Values], start: usize) -> Result<usize> {
         let rows = block.first().map_or(0, Values::len);
         let end = rows.min(start + ROWS - self.rows);
@@ -35,17 +36,17 @@ impl RowGroup {
         Ok(end)
     }
 
-    /// Whether it must be written before it takes more rows.
+    /// Whether the group must be written before it can take more rows.
     pub(crate) fn is_full(&self) -> bool {
         self.rows == ROWS
     }
 
-    /// Whether it has no rows.
+    /// Whether the group has no rows.
     pub(crate) fn is_empty(&self) -> bool {
         self.rows == 0
     }
 
-    /// The columns to be written; afterwards it has no rows.
+    /// Returns the columns to be written; afterwards the group has no rows.
     pub(crate) fn take(&mut self) -> &mut [ColumnEncoder] {
         self.rows = 0;
         &mut self.columns

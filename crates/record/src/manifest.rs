@@ -1,4 +1,4 @@
-//! `run.json`: what a run is and how far it has come.
+//! `run.json`: the description of a run, and its progress.
 
 use std::path::Path;
 
@@ -10,13 +10,13 @@ use sidestep_kernel::ports::RecordError;
 use crate::disk;
 use crate::format::{self, FormatVersion};
 
-/// How far a run has come.
+/// The progress of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Status {
-    /// Under way; or its process was killed, which nobody could write down.
+    /// In progress, or its process was killed and could not record that.
     Running,
-    /// Ended; every table is whole.
+    /// Finished; every table is complete.
     Complete,
     /// Stopped in good order before its end.
     Incomplete,
@@ -29,16 +29,16 @@ pub struct Manifest {
     pub format: FormatVersion,
     /// Version of the program that made the run.
     pub program_version: String,
-    /// Its build; early folders do not name it.
+    /// Build of the program; early folders do not have it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub build: Option<String>,
     /// The world that was simulated, e.g. `robots`.
     pub world: String,
     /// The seed.
     pub seed: u64,
-    /// How far the run has come.
+    /// Progress of the run.
     pub status: Status,
-    /// Cycles that are done for certain; for a killed run, those before its last checkpoint.
+    /// Cycles that are certainly done; for a killed run, those before its last checkpoint.
     pub cycles_done: u64,
     /// Cycles that the scenario asks for.
     pub cycles_planned: u64,
@@ -58,7 +58,7 @@ impl Manifest {
     /// Reads the manifest at `path`.
     ///
     /// # Errors
-    /// No such file, text that is no manifest (with line and column), another major format.
+    /// A missing file, text that is not a manifest (with line and column), another major format.
     pub(crate) fn read(path: &Path) -> Result<Self, InputError> {
         read_json(path)
     }
@@ -72,7 +72,7 @@ impl Manifest {
 /// Reads the manifest at `path`, of a run or a sweep.
 ///
 /// # Errors
-/// No such file, text that is no manifest (with line and column), another major format.
+/// A missing file, text that is not a manifest (with line and column), another major format.
 pub(crate) fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, InputError> {
     let text = std::fs::read_to_string(path).map_err(|e| {
         InputError::new(path.display(), e.to_string(), "make the file readable, or restore it")
@@ -83,7 +83,7 @@ pub(crate) fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, InputErro
     parse(path, &text)
 }
 
-/// Indented JSON that ends in a newline.
+/// Returns indented JSON that ends in a newline.
 pub(crate) fn json(value: &impl Serialize, path: &Path) -> Result<Vec<u8>, RecordError> {
     let mut text =
         serde_json::to_vec_pretty(value).map_err(|e| RecordError::new(path.display(), e))?;
@@ -99,7 +99,7 @@ fn parse<'a, T: Deserialize<'a>>(path: &Path, text: &'a str) -> Result<T, InputE
     })
 }
 
-/// The manifest of a run that begins now.
+/// Returns the manifest of a run that starts now.
 pub(crate) fn begin(
     world: &str,
     seed: u64,

@@ -1,11 +1,11 @@
-//! Rows into Parquet files: one folder of parts for each table.
+//! Rows written to Parquet files: one folder of parts for each table.
 //!
 //! A table `trajectories` is the folder `trajectories/` of files `part-CYCLE.parquet`, which
-//! pyarrow, polars and DuckDB read as one table. While the run goes on, the folder is called
-//! `trajectories.partial/`, and the part that grows in it ends in `.parquet.partial`. Each
-//! checkpoint [seals](sidestep_kernel::ports::Recorder::seal) the part; the name of the next one is the cycle at which it
-//! begins. So a folder without `.partial` holds every row of the run, and going back to a
-//! checkpoint at cycle C means to delete the parts that begin at C or later.
+//! pyarrow, polars and DuckDB read as one table. While the run continues, the folder is called
+//! `trajectories.partial/`, and the part that is being written ends in `.parquet.partial`. Each
+//! checkpoint [seals](sidestep_kernel::ports::Recorder::seal) the part; the name of the next one is
+//! the cycle at which it starts. So a folder without `.partial` holds every row of the run, and
+//! returning to a checkpoint at cycle C means deleting the parts that start at C or later.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -20,19 +20,18 @@ use crate::group::RowGroup;
 use crate::part::{PartWriter, cause, first_cycle, next_cycle, part_name};
 use crate::schema::{Origin, check_schema, key_values, parquet_schema};
 
-/// Writes every table to Parquet files; see the [module](self) for their names.
+/// Writes every table to Parquet files; the [module](self) describes their names.
 pub struct ParquetRecorder {
     tables: Vec<TableWriter>,
-    /// What broke the recording; rows are missing since then.
+    /// The error that broke the recording; rows are missing since then.
     broken: Option<RecordError>,
 }
 
 impl ParquetRecorder {
-    /// Starts new tables in `folder`, for a run that begins at cycle 0.
+    /// Starts new tables in `folder`, for a run that starts at cycle 0.
     ///
     /// # Errors
-    /// A schema that cannot become a file; a table that is there already; what the system
-    /// says.
+    /// A schema that cannot become a file; a table that exists already; an I/O error.
     pub fn create(
         folder: &Path,
         schemas: &[TableSchema],
@@ -46,14 +45,14 @@ impl ParquetRecorder {
         Self::resume(folder, schemas, origin, 0)
     }
 
-    /// Continues the tables in `folder` at `cycle`: what they hold of that cycle and later
-    /// ones is deleted, for the run is about to write it again. Cycle 0 starts afresh.
+    /// Continues the tables in `folder` at `cycle`: rows of that cycle and later ones are deleted,
+    /// because the run is about to write them again. Cycle 0 starts from the beginning.
     ///
     /// `cycle` must be one at which the recorder was [sealed](Recorder::seal).
     ///
     /// # Errors
-    /// A schema that cannot become a file; a cycle at which the recorder was not sealed; what
-    /// the system says.
+    /// A schema that cannot become a file; a cycle at which the recorder was not sealed; an I/O
+    /// error.
     pub fn resume(
         folder: &Path,
         schemas: &[TableSchema],
@@ -65,7 +64,7 @@ impl ParquetRecorder {
         Ok(Self { tables: schemas.iter().map(open).collect::<Result<_, _>>()?, broken: None })
     }
 
-    /// Does `work` unless rows are missing already; remembers when it fails.
+    /// Does `work` unless rows are missing already, and remembers a failure.
     fn unless_broken(
         &mut self,
         work: impl FnOnce(&mut [TableWriter]) -> Result<(), RecordError>,
@@ -95,12 +94,12 @@ impl Recorder for ParquetRecorder {
     }
 }
 
-/// One table on its way to disk.
+/// The writer of one table.
 struct TableWriter {
     schema: TableSchema,
     parquet_schema: TypePtr,
     key_values: Vec<KeyValue>,
-    /// The folder's name once the table is whole.
+    /// The folder's name once the table is complete.
     folder: PathBuf,
     /// The first cycle of the open part, and of the next one if none is open.
     part_cycle: u64,
@@ -165,7 +164,7 @@ impl TableWriter {
         PartWriter::create(path, self.parquet_schema.clone(), self.key_values.clone())
     }
 
-    /// Ends the open part, if it has rows; later rows begin at `next_cycle`.
+    /// Finishes the open part, if it has rows; later rows start at `next_cycle`.
     fn seal(&mut self, next_cycle: u64) -> Result<(), RecordError> {
         self.end_part(Some(next_cycle))?;
         self.part_cycle = next_cycle;
@@ -179,7 +178,7 @@ impl TableWriter {
         self.part.take().map_or(Ok(()), |part| part.close(next_cycle))
     }
 
-    /// Ends the table and gives its folder the final name. Once is enough.
+    /// Finishes the table and gives its folder the final name. Later calls do nothing.
     fn finish(&mut self) -> Result<(), RecordError> {
         if self.finished {
             return Ok(());
@@ -187,7 +186,7 @@ impl TableWriter {
         self.end_part(None)?;
         let growing = disk::partial(&self.folder);
         if parts(&growing)?.is_empty() {
-            // A table without rows still has columns.
+            // A table without rows still needs a file for its columns.
             self.new_part()?.close(None)?;
         }
         disk::rename(&growing, &self.folder)?;
@@ -196,16 +195,16 @@ impl TableWriter {
     }
 }
 
-/// Brings the table's folder back to where it was when the recorder was sealed at `cycle`.
+/// Returns the table's folder to its state when the recorder was sealed at `cycle`.
 fn rewind(folder: &Path, cycle: u64) -> Result<(), RecordError> {
     let growing = disk::partial(folder);
     if folder.exists() {
-        // The run was stopped between the end of this table and the end of the last one.
+        // The run was stopped after this table was finished, but before the last one was.
         disk::rename(folder, &growing)?;
     }
     let failed = |e| RecordError::new(growing.display(), e);
     fs::create_dir_all(&growing).map_err(failed)?;
-    // Before anything is deleted.
+    // This check must come before anything is deleted.
     check_sealed(&growing, cycle)?;
     for entry in fs::read_dir(&growing).map_err(failed)? {
         let path = entry.map_err(failed)?.path();
@@ -216,7 +215,7 @@ fn rewind(folder: &Path, cycle: u64) -> Result<(), RecordError> {
     Ok(())
 }
 
-/// The rows that stay must end before those to come begin.
+/// Checks that the remaining rows end before the new ones start.
 fn check_sealed(growing: &Path, cycle: u64) -> Result<(), RecordError> {
     let kept = parts(growing)?.into_iter().rfind(|path| !is_stale(path, cycle));
     let Some(last) = kept else { return Ok(()) };
@@ -227,7 +226,8 @@ fn check_sealed(growing: &Path, cycle: u64) -> Result<(), RecordError> {
     Err(RecordError::new(last.display(), cause))
 }
 
-/// True for a part that is not whole or begins at `cycle` or later. Other files are not ours.
+/// Whether a file is a part that is incomplete or starts at `cycle` or later. Other files are not
+/// ours.
 fn is_stale(path: &Path, cycle: u64) -> bool {
     let Some(name) = path.file_name().and_then(|n| n.to_str()) else { return false };
     match name.strip_suffix(".partial") {
@@ -236,7 +236,7 @@ fn is_stale(path: &Path, cycle: u64) -> bool {
     }
 }
 
-/// The whole parts in `folder`, in the order of their rows.
+/// Returns the complete parts in `folder`, in the order of their rows.
 pub(crate) fn parts(folder: &Path) -> Result<Vec<PathBuf>, RecordError> {
     let failed = |e| RecordError::new(folder.display(), e);
     let mut parts = Vec::new();

@@ -1,4 +1,4 @@
-//! One Parquet file: `part-CYCLE.parquet.partial` until it is whole, then without `.partial`.
+//! One Parquet file: `part-CYCLE.parquet.partial` while it is incomplete, then without `.partial`.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -17,12 +17,12 @@ use crate::disk;
 use crate::encode::ColumnEncoder;
 use crate::schema;
 
-/// The name of the part whose first cycle is `cycle`; names sort as the cycles do.
+/// Returns the name of the part whose first cycle is `cycle`; names sort in the order of cycles.
 pub(crate) fn part_name(cycle: u64) -> String {
     format!("part-{cycle:015}.parquet")
 }
 
-/// The first cycle of the part with this name; `None` for any other file.
+/// Returns the first cycle of the part with this name; `None` for any other file.
 pub(crate) fn first_cycle(name: &str) -> Option<u64> {
     name.strip_prefix("part-")?.strip_suffix(".parquet")?.parse().ok()
 }
@@ -31,18 +31,18 @@ pub(crate) fn first_cycle(name: &str) -> Option<u64> {
 pub(crate) struct PartWriter {
     path: PathBuf,
     file: SerializedFileWriter<File>,
-    /// CRC-32 of each row group's bytes.
+    /// CRC-32 of the bytes of each row group.
     checksums: Vec<u32>,
 }
 
 impl PartWriter {
-    /// Starts the file that will be called `path` once it is whole.
+    /// Starts the file that is called `path` once it is complete.
     pub(crate) fn create(
         path: PathBuf,
         schema: TypePtr,
         key_values: Vec<KeyValue>,
     ) -> std::result::Result<Self, RecordError> {
-        // The pages come encoded; the properties only say what the footer holds.
+        // The pages are encoded already; these properties only declare the contents of the footer.
         let properties = WriterProperties::builder()
             .set_created_by(concat!("sidestep-record ", env!("CARGO_PKG_VERSION")).into())
             .set_statistics_enabled(EnabledStatistics::Chunk)
@@ -57,7 +57,7 @@ impl PartWriter {
         Ok(Self { path, file, checksums: Vec::new() })
     }
 
-    /// Writes what the encoders hold as one row group.
+    /// Writes the contents of the encoders as one row group.
     pub(crate) fn write_row_group(
         &mut self,
         columns: &mut [ColumnEncoder],
@@ -68,8 +68,8 @@ impl PartWriter {
         Ok(())
     }
 
-    /// Writes the footer, waits for the disk, gives the file its final name. `next_cycle` is
-    /// where the rows after this part begin, none at the end of a run.
+    /// Writes the footer, waits for the disk, and gives the file its final name. `next_cycle` is
+    /// the first cycle of the next part; `None` at the end of a run.
     pub(crate) fn close(self, next_cycle: Option<u64>) -> std::result::Result<(), RecordError> {
         let Self { path, mut file, checksums } = self;
         let checksums = schema::checksums_to_text(&checksums);
@@ -85,7 +85,7 @@ impl PartWriter {
     }
 }
 
-/// Where the rows after the whole part at `path` begin; `None` at the end of a run.
+/// Returns the first cycle after the complete part at `path`; `None` at the end of a run.
 pub(crate) fn next_cycle(path: &Path) -> std::result::Result<Option<u64>, RecordError> {
     let failed = |cause: String| RecordError::new(path.display(), cause);
     let file = File::open(path).map_err(|e| failed(e.to_string()))?;
@@ -94,7 +94,7 @@ pub(crate) fn next_cycle(path: &Path) -> std::result::Result<Option<u64>, Record
     Ok(text.and_then(|cycle| cycle.parse().ok()))
 }
 
-/// Writes a row group; the checksum of its bytes.
+/// Writes a row group and returns the checksum of its bytes.
 fn append_chunks(
     file: &mut SerializedFileWriter<File>,
     columns: &mut [ColumnEncoder],
@@ -107,12 +107,12 @@ fn append_chunks(
         group.append_column(&bytes, closed)?;
     }
     group.close()?;
-    // A full disk is to be noticed now, not when the next row group comes.
+    // Detects a full disk now, not only at the next row group.
     file.flush().map_err(|e| ParquetError::External(Box::new(e)))?;
     Ok(checksum.finalize())
 }
 
-/// What the system said, without the library's wrapping.
+/// Returns the system's message, without the library's wrapping.
 pub(crate) fn cause(error: ParquetError) -> String {
     match error {
         ParquetError::External(inner) => inner.to_string(),

@@ -1,4 +1,4 @@
-//! Tables back from disk.
+//! Reading tables back from disk.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -24,29 +24,30 @@ use crate::schema::{self, Origin};
 
 /// The column by which rows are chosen.
 const CYCLE: &str = "cycle";
-/// Values decoded at a time: what a damaged file claims to hold is never reserved at once.
+/// Number of values decoded at a time, because a damaged file may claim any size: memory is never
+/// allocated for its claim at once.
 const BATCH: usize = 1 << 15;
 
 /// A table read back, in the order in which its rows were recorded.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
-    /// Name and columns, as they were declared.
+    /// Name and columns, as declared.
     pub schema: TableSchema,
     /// The values, one entry for each column of the schema, all of one length.
     pub columns: Vec<Values>,
-    /// What the run was.
+    /// Scenario, seed and version of the run.
     pub origin: Origin,
-    /// False for a run that has not ended: the rows reach up to its last checkpoint.
+    /// Whether the run has ended; otherwise the rows reach to its last checkpoint.
     pub complete: bool,
 }
 
 impl Table {
-    /// Number of rows.
+    /// Returns the number of rows.
     pub fn rows(&self) -> usize {
         self.columns.first().map_or(0, Values::len)
     }
 
-    /// The values of the column `name`, if there is one.
+    /// Returns the values of the column `name`, if it exists.
     pub fn column(&self, name: &str) -> Option<&Values> {
         Some(&self.columns[position(&self.schema, name)?])
     }
@@ -56,13 +57,13 @@ fn position(schema: &TableSchema, name: &str) -> Option<usize> {
     schema.columns.iter().position(|c| c.name == name)
 }
 
-/// Reads those rows of the table `name` in the run folder `folder` whose `cycle` lies in
-/// `cycles`; `..` reads all rows, also of a table without cycles. Parts of the files that
-/// hold no such cycle are not read.
+/// Reads the rows of the table `name` in the run folder `folder` whose `cycle` is in `cycles`; `..`
+/// reads all rows, also of a table without cycles. Parts of the files without such a cycle are not
+/// read.
 ///
 /// # Errors
-/// No such table, or nothing of it that is whole; a damaged file; a format that this version
-/// does not read; a range of cycles for a table without the column `cycle`.
+/// No such table, or nothing of it is complete; a damaged file; a format that this version cannot
+/// read; a range of cycles for a table without the column `cycle`.
 pub fn read_table(
     folder: &Path,
     name: &str,
@@ -82,11 +83,11 @@ pub fn read_table(
     table.ok_or_else(|| nothing_whole(folder, name))
 }
 
-/// Reads a table as [`read_table`] does, but a block of rows at a time, in their order: for tables
-/// that are larger than memory. A table without such rows comes as one block without rows.
+/// Reads a table like [`read_table`], but one block of rows at a time, in order: for tables that
+/// are larger than memory. A table without such rows gives one block without rows.
 ///
 /// # Errors
-/// As [`read_table`], and what `each` returns.
+/// Those of [`read_table`], and the errors that `each` returns.
 pub fn for_each_block<E: From<InputError>>(
     folder: &Path,
     name: &str,
@@ -120,7 +121,7 @@ pub fn for_each_block<E: From<InputError>>(
     }
 }
 
-/// Names of the tables in a run folder of which something is whole, sorted.
+/// Returns the names of the tables in a run folder that have a complete part, sorted.
 ///
 /// # Errors
 /// When the folder cannot be read.
@@ -146,7 +147,7 @@ fn nothing_whole(folder: &Path, name: &str) -> InputError {
     InputError::new(folder.join(name).display(), "no part of the table is whole yet", remedy)
 }
 
-/// The whole parts of a table, and whether they are all.
+/// Returns the complete parts of a table, and whether these are all.
 fn find_parts(folder: &Path, name: &str) -> Result<(Vec<PathBuf>, bool), InputError> {
     let table = folder.join(name);
     let growing = disk::partial(&table);
@@ -165,7 +166,7 @@ pub(crate) fn damaged(path: &Path, cause: impl Into<String>) -> InputError {
     InputError::new(path.display(), cause, remedy)
 }
 
-/// The range of cycles that is asked for.
+/// The requested range of cycles.
 #[derive(Debug, Clone, Copy)]
 struct Cycles {
     from: Bound<u64>,
@@ -181,7 +182,7 @@ impl Cycles {
         (self.from, self.to).contains(&cycle)
     }
 
-    /// False when nothing from `least` to `most` is asked for.
+    /// Whether a cycle from `least` to `most` is in the range.
     fn overlaps(self, least: u64, most: u64) -> bool {
         let starts_in_time = match self.from {
             Bound::Included(from) => most >= from,
@@ -230,7 +231,7 @@ impl<'a> Part<'a> {
         Ok(part)
     }
 
-    /// The columns must be what the key-value pairs say they are.
+    /// Checks that the columns have the types that the key-value pairs declare.
     fn check_types(&self) -> Result<(), InputError> {
         let stored = self.file.metadata().file_metadata().schema_descr();
         let fits = |(i, c): (usize, &ColumnSpec)| {
@@ -257,7 +258,7 @@ impl<'a> Part<'a> {
             .try_for_each(|group| self.read_group_into(group, columns, cycles))
     }
 
-    /// Appends those rows of a row group that are asked for.
+    /// Appends the requested rows of a row group.
     fn read_group_into(
         &self,
         group: usize,
@@ -277,7 +278,7 @@ impl<'a> Part<'a> {
         Ok(())
     }
 
-    /// All rows of one row group.
+    /// Returns all rows of one row group.
     fn read_group(&self, group: usize) -> ParquetResult<Vec<Values>> {
         check_bytes(&self.bytes, self.file.metadata(), group, &self.checksums)?;
         let group = self.file.get_row_group(group)?;
@@ -298,7 +299,7 @@ fn bad(path: &Path, cause: impl std::fmt::Display) -> InputError {
     damaged(path, cause.to_string())
 }
 
-/// The key-value pair `key` of a file.
+/// Returns the value of the key `key` of a file.
 pub(crate) fn text(
     path: &Path,
     metadata: &ParquetMetaData,
@@ -310,7 +311,7 @@ pub(crate) fn text(
     })
 }
 
-/// Compares a row group's bytes with their checksum: decoders may panic on damaged pages, or
+/// Compares a row group's bytes with their checksum, because decoders may panic on damaged pages or
 /// return other rows.
 pub(crate) fn check_bytes(
     bytes: &File,
@@ -321,7 +322,7 @@ pub(crate) fn check_bytes(
     let wrong = |cause: &str| ParquetError::General(format!("row group {group} {cause}"));
     let (start, length) =
         extent(metadata.row_group(group)).ok_or_else(|| wrong("has no place in the file"))?;
-    // Checked before so much memory is taken.
+    // Checked before that much memory is allocated.
     if start + length > Length::len(bytes) {
         return Err(wrong("reaches beyond the end of the file"));
     }
@@ -332,8 +333,8 @@ pub(crate) fn check_bytes(
     Ok(())
 }
 
-/// Start and length of a row group's bytes; `None` unless its columns lie one behind the
-/// other, as they were written.
+/// Returns start and length of a row group's bytes; `None` unless its columns are contiguous, as
+/// they were written.
 fn extent(group: &RowGroupMetaData) -> Option<(u64, u64)> {
     let begin = |c: &ColumnChunkMetaData| {
         u64::try_from(c.dictionary_page_offset().unwrap_or(c.data_page_offset())).ok()
@@ -349,7 +350,7 @@ fn extent(group: &RowGroupMetaData) -> Option<(u64, u64)> {
     Some((start, end - start))
 }
 
-/// Smallest and largest cycle of a row group, where stored.
+/// Returns the smallest and largest cycle of a row group, if they are stored.
 fn bounds(group: &RowGroupMetaData, column: usize) -> Option<(u64, u64)> {
     match group.column(column).statistics()? {
         Statistics::Int64(s) => Some((*s.min_opt()? as u64, *s.max_opt()? as u64)),
@@ -357,7 +358,7 @@ fn bounds(group: &RowGroupMetaData, column: usize) -> Option<(u64, u64)> {
     }
 }
 
-/// Appends those rows whose cycle is asked for.
+/// Appends the rows whose cycle is in the range.
 fn append(columns: &mut [Values], rows: Vec<Values>, cycle: Option<usize>, cycles: Cycles) {
     let keep: Option<Vec<bool>> = match cycle.map(|c| &rows[c]) {
         _ if cycles.is_all() => None,

@@ -1,4 +1,4 @@
-//! A table's schema as Parquet knows it, and the key-value pairs in every file.
+//! A table's schema in terms of Parquet, and the key-value pairs in every file.
 
 use std::ops::Not;
 use std::sync::Arc;
@@ -24,10 +24,10 @@ pub(crate) const SEED: &str = "sidestep.seed";
 pub(crate) const COLUMNS: &str = "sidestep.columns";
 /// Key of the row groups' checksums: a CRC-32 of each one's bytes, in hexadecimal.
 pub(crate) const CHECKSUMS: &str = "sidestep.crc32";
-/// Key of the cycle at which the next part begins; `end` in the last part of a run.
+/// Key of the cycle at which the next part starts; `end` in the last part of a run.
 pub(crate) const NEXT_CYCLE: &str = "sidestep.next_cycle";
 
-/// What every file of a run says about its origin.
+/// The origin of a run, recorded in each of its files.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Origin {
     /// Version of the program that made the run.
@@ -51,7 +51,7 @@ struct ColumnEntry {
     nullable: bool,
 }
 
-/// Column types by their names in [`COLUMNS`].
+/// Names of the column types in [`COLUMNS`].
 mod type_name {
     use serde::de::{Deserialize, Deserializer, Error};
     use serde::ser::Serializer;
@@ -68,8 +68,8 @@ mod type_name {
     }
 }
 
-/// Refuses a schema that cannot become a file: a name that is no plain file name, no
-/// columns, two columns of one name, two labels of one text.
+/// Refuses a schema that cannot become a file: a name that is not a plain file name, no columns,
+/// two columns with the same name, two labels with the same text.
 pub(crate) fn check_schema(schema: &TableSchema) -> std::result::Result<(), RecordError> {
     let wrong = |cause: String| Err(RecordError::new(&schema.name, cause));
     let plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
@@ -90,15 +90,15 @@ pub(crate) fn check_schema(schema: &TableSchema) -> std::result::Result<(), Reco
     Ok(())
 }
 
-/// The first in order of text that occurs more than once.
+/// Returns the first text, in sorted order, that occurs more than once.
 fn repeated<'a>(texts: impl Iterator<Item = &'a String>) -> Option<&'a String> {
     let mut sorted: Vec<_> = texts.collect();
     sorted.sort();
     sorted.windows(2).find(|pair| pair[0] == pair[1]).map(|pair| pair[0])
 }
 
-/// The Parquet schema: unsigned integers marked as such, labels as text, columns required unless
-/// values may be missing.
+/// Returns the Parquet schema: unsigned integers are marked as such, labels are text, and columns
+/// are required unless values may be missing.
 pub(crate) fn parquet_schema(schema: &TableSchema) -> Result<TypePtr> {
     let fields = schema.columns.iter().map(field).collect::<Result<_>>()?;
     Ok(Arc::new(Type::group_type_builder("schema").with_fields(fields).build()?))
@@ -121,7 +121,7 @@ fn field(column: &ColumnSpec) -> Result<TypePtr> {
     Ok(Arc::new(field))
 }
 
-/// How Parquet stores the values of a column.
+/// Returns the Parquet type that stores the values of a column.
 pub(crate) fn physical_type(ty: ColumnType) -> PhysicalType {
     match ty {
         ColumnType::U32 | ColumnType::I32 => PhysicalType::INT32,
@@ -132,7 +132,7 @@ pub(crate) fn physical_type(ty: ColumnType) -> PhysicalType {
     }
 }
 
-/// The key-value pairs of a file of `schema`.
+/// Returns the key-value pairs of a file of `schema`.
 pub(crate) fn key_values(schema: &TableSchema, origin: &Origin) -> Vec<KeyValue> {
     let pair = |key: &str, value: String| KeyValue::new(key.to_string(), value);
     vec![
@@ -144,7 +144,7 @@ pub(crate) fn key_values(schema: &TableSchema, origin: &Origin) -> Vec<KeyValue>
     ]
 }
 
-/// The value of `key` in a file's footer.
+/// Returns the value of `key` in a file's footer.
 pub(crate) fn key_value<'a>(metadata: &'a ParquetMetaData, key: &str) -> Option<&'a str> {
     let mut pairs = metadata.file_metadata().key_value_metadata().into_iter().flatten();
     pairs.find(|pair| pair.key == key)?.value.as_deref()
@@ -162,7 +162,7 @@ fn columns_to_json(columns: &[ColumnSpec]) -> String {
     serde_json::to_string(&entries).expect("texts and lists always become JSON")
 }
 
-/// The columns that [`key_values`] wrote.
+/// Reads the columns that [`key_values`] wrote.
 ///
 /// # Errors
 /// Text that is not a list of columns.
@@ -178,12 +178,12 @@ pub(crate) fn columns_from_json(text: &str) -> serde_json::Result<Vec<ColumnSpec
     Ok(entries.into_iter().map(spec).collect())
 }
 
-/// The value of [`CHECKSUMS`].
+/// Returns the value of [`CHECKSUMS`].
 pub(crate) fn checksums_to_text(checksums: &[u32]) -> String {
     checksums.iter().map(|c| format!("{c:08x}")).collect::<Vec<_>>().join(" ")
 }
 
-/// The checksums that [`checksums_to_text`] wrote.
+/// Reads the checksums that [`checksums_to_text`] wrote.
 pub(crate) fn checksums_from_text(
     text: &str,
 ) -> std::result::Result<Vec<u32>, std::num::ParseIntError> {

@@ -1,4 +1,4 @@
-//! A folder that is made beside its place and moved there in one step.
+//! A folder that is filled under a temporary name and then moved to its place in one step.
 
 use std::fs;
 use std::io;
@@ -9,15 +9,15 @@ use sidestep_kernel::InputError;
 use crate::disk;
 use crate::disk::cannot_make;
 
-/// A folder under a temporary name; dropped, it and the parents made for it are gone again.
+/// A folder with a temporary name. If it is dropped, it and the parents created for it are deleted.
 pub(crate) struct Staging {
     path: PathBuf,
-    /// Parents made for it, the outermost first.
+    /// Parents created for the folder, the outermost first.
     made: Vec<PathBuf>,
 }
 
 impl Staging {
-    /// Makes an empty folder in the parent of `target`, and that parent if it is missing.
+    /// Creates an empty folder in the parent of `target`, and that parent if it is missing.
     pub(crate) fn new(target: &Path) -> Result<Self, InputError> {
         let path = beside(target, "new")?;
         let mut made: Vec<_> = disk::parent(target)
@@ -33,7 +33,7 @@ impl Staging {
 
     fn make(&self) -> io::Result<()> {
         fs::create_dir_all(disk::parent(&self.path))?;
-        // What a killed process with this number left.
+        // Remains of a killed process with the same id.
         remove_if_there(&self.path)?;
         fs::create_dir(&self.path)
     }
@@ -42,7 +42,7 @@ impl Staging {
         &self.path
     }
 
-    /// Moves the folder to `target`, in place of what is there.
+    /// Moves the folder to `target`, replacing what is there.
     pub(crate) fn take_place_of(mut self, target: &Path) -> Result<(), InputError> {
         let failed = |e| cannot_make(target, e);
         let old = beside(target, "old")?;
@@ -66,13 +66,13 @@ impl Drop for Staging {
     fn drop(&mut self) {
         let _ = remove_if_there(&self.path);
         for parent in self.made.iter().rev() {
-            // Fails, as it should, where somebody has put something.
+            // Fails, as it should, if the folder is not empty.
             let _ = fs::remove_dir(parent);
         }
     }
 }
 
-/// A hidden name in the same folder, of this process alone.
+/// Returns a hidden name in the same folder that no other process uses.
 fn beside(target: &Path, role: &str) -> Result<PathBuf, InputError> {
     let name = target.file_name().ok_or_else(|| cannot_make(target, "it has no name"))?;
     let name = format!(".{}.{role}-{}", name.display(), std::process::id());

@@ -1,4 +1,4 @@
-//! A table as one Parquet file, for people who want to take it elsewhere.
+//! A table as one Parquet file, to be used in other programs.
 
 use std::path::{Path, PathBuf};
 
@@ -10,21 +10,21 @@ use crate::group::RowGroup;
 use crate::part::{PartWriter, cause};
 use crate::schema::{Origin, check_schema, key_values, parquet_schema};
 
-/// A table on its way into one file, with the same key-value pairs as a run's own parts. Dropped
-/// before it is finished, it takes the file away again.
+/// The writer of a table to one file, with the same key-value pairs as a run's own parts. If it is
+/// dropped before it is finished, it deletes the file.
 pub struct TableFile {
     path: PathBuf,
     schema: TableSchema,
     group: RowGroup,
-    /// None once the file is ended.
+    /// `None` once the file is finished.
     part: Option<PartWriter>,
 }
 
 impl TableFile {
-    /// Starts the file that will be called `path` once it is whole.
+    /// Starts the file that is called `path` once it is complete.
     ///
     /// # Errors
-    /// A schema that cannot become a file; what the system says.
+    /// A schema that cannot become a file; an I/O error.
     pub fn create(path: &Path, schema: &TableSchema, origin: &Origin) -> Result<Self, RecordError> {
         check_schema(schema)?;
         let failed = |e| RecordError::new(&schema.name, cause(e));
@@ -37,10 +37,10 @@ impl TableFile {
         })
     }
 
-    /// Appends rows: one [`Values`] per column, all of one length.
+    /// Appends rows: one [`Values`] per column, all of the same length.
     ///
     /// # Errors
-    /// A block that does not fit; what the system says.
+    /// A block that does not match the schema; an I/O error.
     pub fn append(&mut self, block: &[Values]) -> Result<(), RecordError> {
         check_block(&self.schema, block)?;
         let rows = block.first().map_or(0, Values::len);
@@ -60,10 +60,10 @@ impl TableFile {
         self.part.as_mut().map_or(Ok(()), |part| part.write_row_group(group))
     }
 
-    /// Ends the file: waits for the disk and gives it its name.
+    /// Finishes the file: waits for the disk and gives it its name.
     ///
     /// # Errors
-    /// What the system says.
+    /// An I/O error.
     pub fn finish(mut self) -> Result<(), RecordError> {
         if !self.group.is_empty() {
             self.write_row_group()?;

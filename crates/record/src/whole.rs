@@ -1,9 +1,9 @@
-//! Tables that are whole in memory, whose cells may be missing: one row a run.
+//! Tables that fit in memory and may have missing cells: one row per run.
 //!
-//! [`write()`] makes one Parquet file that is there in full or not at all; [`read()`] reads it back
-//! after comparing its checksums. Columns of runs are few and rows are some millions at most, so
-//! nothing here is streamed. Every column is optional in the file; it has an integer of 64 bits,
-//! a float, a truth value or text.
+//! [`write()`] creates one Parquet file, completely or not at all; [`read()`] reads it back after
+//! comparing its checksums. Columns of runs are few and rows are some millions at most, so nothing
+//! here is streamed. Every column is optional in the file; its type is a 64-bit integer, a float, a
+//! truth value or text.
 
 use std::fs::File;
 use std::io::{self, Write};
@@ -33,10 +33,10 @@ use crate::part::cause;
 use crate::read::{check_bytes, damaged, read_cells, read_texts, text};
 use crate::schema::{self, CHECKSUMS, COLUMNS, FORMAT, VERSION};
 
-/// Rows of a row group.
+/// Number of rows in a row group.
 const GROUP_ROWS: usize = 1 << 16;
 
-/// A column in the file's key-value pair [`COLUMNS`].
+/// One column in the key-value pair [`COLUMNS`] of the file.
 #[derive(Debug, Serialize, Deserialize)]
 struct ColumnEntry {
     name: String,
@@ -46,19 +46,18 @@ struct ColumnEntry {
 /// A table that was read back.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WholeTable<R> {
-    /// Its columns, all of one length; those of a role that this version does not know are left
-    /// out.
+    /// Its columns, all of the same length; those with a role that this version does not know are
+    /// left out.
     pub columns: Vec<RoleColumn<R>>,
     /// Version of the program that wrote it.
     pub program_version: String,
 }
 
-/// Writes the columns (all of one length) to the file at `path`, and what `extra` adds to its
+/// Writes the columns (all of the same length) to the file at `path`, and adds `extra` to its
 /// key-value pairs.
 ///
 /// # Errors
-/// A column of a type that such files do not hold; what the system says. A file that was there
-/// stays then.
+/// A column of a type that such files do not support; an I/O error. An earlier file stays then.
 pub fn write<R: Serialize>(
     path: &Path,
     columns: &[RoleColumn<R>],
@@ -181,7 +180,7 @@ fn write_column<R>(
     column.close()
 }
 
-/// The values in `rows` that are not missing.
+/// Returns the values in `rows` that are not missing.
 fn present<T: Copy>(cells: &Cells<T>, rows: Range<usize>) -> Vec<T> {
     rows.filter_map(|row| cells.get(row).copied()).collect()
 }
@@ -194,7 +193,7 @@ fn write_values<T: DataType>(
     column.write_batch(&present, Some(levels), None).map(drop)
 }
 
-/// A checksum that is shared with what writes through it.
+/// A checksum that is shared with the writer that updates it.
 #[derive(Debug, Clone, Default)]
 struct Hash(Arc<Mutex<crc32fast::Hasher>>);
 
@@ -203,13 +202,13 @@ impl Hash {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).update(bytes);
     }
 
-    /// The checksum of all bytes since the last call.
+    /// Returns the checksum of all bytes since the last call.
     fn take(&self) -> u32 {
         std::mem::take(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner)).finalize()
     }
 }
 
-/// A file whose bytes are hashed as they are written.
+/// A file whose bytes are hashed while they are written.
 #[derive(Debug)]
 struct Hashed {
     file: File,
@@ -231,7 +230,7 @@ impl Write for Hashed {
 /// Reads the table in the file at `path`.
 ///
 /// # Errors
-/// When it is missing, damaged, no table of this kind, or of another major format.
+/// A file that is missing, damaged, not a table of this kind, or of another major format.
 pub fn read<R: DeserializeOwned>(path: &Path) -> Result<WholeTable<R>, InputError> {
     let bytes = File::open(path).map_err(|e| {
         InputError::new(path.display(), e.to_string(), "name a table that a sweep wrote")
@@ -259,7 +258,7 @@ pub fn read<R: DeserializeOwned>(path: &Path) -> Result<WholeTable<R>, InputErro
     Ok(WholeTable { columns, program_version })
 }
 
-/// Columns without rows, of the file's types.
+/// Returns columns without rows, of the file's types.
 fn empty_values(
     file: &SerializedFileReader<File>,
     entries: &[ColumnEntry],

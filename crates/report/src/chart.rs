@@ -4,7 +4,7 @@ use sidestep_document::figure::{Point, Scale, Series};
 use sidestep_document::{Figure, FigureKind};
 use sidestep_draw::{Axis, Bar, BarChart, BarSeries, DrawError, Mark, Plot, Style};
 
-/// Room for ways in the plane: about square, so that a circle looks like one.
+/// Style of tracks in the plane: about square, so that a circle looks like one.
 const SQUARE: Style = Style { height_px: 620.0, ..Style::CHART };
 
 /// Draws a figure of an experiment.
@@ -46,7 +46,7 @@ fn point(p: &Point) -> sidestep_draw::Point {
     sidestep_draw::Point { x: p.x, y: p.y, interval: p.interval }
 }
 
-/// Both axes span the same length around the middle of what is drawn.
+/// Returns a plot whose axes span the same length around the middle of the drawing.
 fn ways(figure: &Figure) -> Plot {
     let plot = plot(figure, Mark::Line);
     let points = || figure.series.iter().flat_map(|s| &s.points);
@@ -61,7 +61,7 @@ fn ways(figure: &Figure) -> Plot {
     plot.x_axis(spanning(&figure.x_label, around(x))).y_axis(spanning(&figure.y_label, around(y)))
 }
 
-/// The least and the greatest of the finite values.
+/// Returns the smallest and the largest of the finite values.
 fn extent(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     values.filter(|v| v.is_finite()).fold(None, |extent, v| match extent {
         None => Some((v, v)),
@@ -80,7 +80,7 @@ fn bars(figure: &Figure, categories: &[String]) -> BarChart {
     figure.series.iter().map(series).fold(chart, BarChart::series)
 }
 
-/// The bar of the category `k`; a missing one has no value, so that nothing is drawn.
+/// Returns the bar of the category `k`; a missing one has no value, so that nothing is drawn.
 fn bar_at(points: &[Point], k: usize) -> Bar {
     let point = points.iter().find(|p| p.x == k as f64);
     point.map_or(Bar::new(f64::NAN), |p| Bar { value: p.y, interval: p.interval })

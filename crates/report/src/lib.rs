@@ -13,15 +13,15 @@ use sidestep_draw::DrawError;
 /// A report, ready to be stored.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Rendered {
-    /// The page; complete in itself.
+    /// The page; self-contained.
     pub html: String,
-    /// The Markdown twin; it shows the pictures below.
+    /// The Markdown version, which shows the pictures below.
     pub markdown: String,
     /// Every figure and picture, in the order of the document.
     pub pictures: Vec<SvgFile>,
 }
 
-/// A picture and what its file is called.
+/// A picture and its file name.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SvgFile {
     /// Name without its ending, e.g. `03-speed-up`.
@@ -30,7 +30,7 @@ pub struct SvgFile {
     pub svg: String,
 }
 
-/// Makes page, text and pictures of a document. `folder` is where the pictures will be, as seen
+/// Renders a document as page, text and pictures. `folder` is the folder of the pictures, as seen
 /// from the Markdown file.
 ///
 /// # Errors
@@ -44,7 +44,7 @@ pub fn render(document: &Document, folder: &str) -> Result<Rendered, DrawError> 
     })
 }
 
-/// All that is to be drawn, numbered in its order.
+/// Returns all figures and pictures, numbered in order.
 fn pictures(document: &Document) -> Result<Vec<SvgFile>, DrawError> {
     let drawn = document.blocks.iter().filter_map(|block| match block {
         Block::Figure(figure) => Some((&figure.title, chart_svg(figure))),
@@ -58,7 +58,7 @@ fn pictures(document: &Document) -> Result<Vec<SvgFile>, DrawError> {
     numbered.map(file).collect()
 }
 
-/// A title as part of a file name or an address: `Trip times, by regime` becomes
+/// Returns a title as part of a file name or an address: `Trip times, by regime` becomes
 /// `trip-times-by-regime`.
 fn slug(title: &str) -> String {
     let words = title.split(|c: char| !c.is_ascii_alphanumeric()).filter(|w| !w.is_empty());

@@ -7,7 +7,7 @@ use sidestep_document::claim::{self, Claim};
 use sidestep_document::document::{Block, Code, Span, Text};
 use std::fmt::Write;
 
-/// A document as text; `folder` holds the `pictures`, one for each figure and picture.
+/// Returns a document as text; `folder` holds the `pictures`, one for each figure and picture.
 pub(crate) fn text(document: &Document, folder: &str, pictures: &[SvgFile]) -> String {
     let mut parts = vec![format!("# {}", plain(&document.title)), spans(&document.lead)];
     let mut pictures = pictures.iter();
@@ -28,12 +28,12 @@ pub(crate) fn text(document: &Document, folder: &str, pictures: &[SvgFile]) -> S
     parts.join("\n\n") + "\n"
 }
 
-/// A document as text for a place that shows no pictures, such as a terminal.
+/// Returns a document as text for a place that shows no pictures, such as a terminal.
 pub fn without_pictures(document: &Document) -> String {
     text(document, "", &[])
 }
 
-/// A table, with its title as a heading of the third level.
+/// Returns a table, with its title as a heading of the third level.
 pub fn table(table: &Table) -> String {
     let columns: Vec<String> = table.columns.iter().map(|c| cell(c)).collect();
     let rows = table.rows.iter().map(|row| table.cells(row).map(cell).collect());
@@ -45,7 +45,7 @@ pub fn table(table: &Table) -> String {
     text
 }
 
-/// Cells that are Markdown already, in their columns.
+/// Returns cells that are Markdown already, in their columns.
 fn grid(columns: &[String], rows: impl Iterator<Item = Vec<String>>) -> String {
     let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
     let rule = format!("|{}\n", "---|".repeat(columns.len()));
@@ -83,7 +83,7 @@ fn pictured(title: &str, note: &str, folder: &str, picture: Option<&SvgFile>) ->
     format!("### {0}\n\n![{0}]({folder}/{1}.svg){note}", plain(title), picture.stem)
 }
 
-/// A fence is longer than every row of backticks in the text.
+/// Returns a code block whose fence is longer than every row of backticks in the text.
 fn fenced(code: &Code) -> String {
     let rows = code.text.split(|c| c != '`').map(str::len);
     let fence = "`".repeat(rows.max().unwrap_or(0).max(2) + 1);
@@ -100,7 +100,7 @@ fn spans(text: &Text) -> String {
     text.0.iter().map(of).collect()
 }
 
-/// Code that holds backticks stands between more of them.
+/// Returns inline code; if it has backticks, more of them surround it.
 fn code_span(code: &str) -> String {
     let code = code.replace('\n', " ");
     let most = code.split(|c| c != '`').map(str::len).max().unwrap_or(0);
@@ -108,18 +108,18 @@ fn code_span(code: &str) -> String {
     if most == 0 { format!("{mark}{code}{mark}") } else { format!("{mark} {code} {mark}") }
 }
 
-/// Words of our own, with marks, in a cell.
+/// Returns our own text, with markup, for a cell.
 fn marked(text: &str) -> String {
     let text = spans(&Text::marked(text));
     text.replace('|', "\\|")
 }
 
-/// Words in a cell: a bar would end it.
+/// Returns text for a cell, in which a bar would end the cell.
 fn cell(words: &str) -> String {
     plain(words).replace('|', "\\|")
 }
 
-/// Words without anything that Markdown or HTML inside it would read as a mark.
+/// Returns text in which Markdown and its HTML find no markup.
 fn plain(words: &str) -> String {
     let mut text = String::with_capacity(words.len());
     let is_word = |c: Option<char>| c.is_some_and(char::is_alphanumeric);
@@ -131,7 +131,8 @@ fn plain(words: &str) -> String {
             '\n' | '\r' => text.push(' '),
             '&' => text.push_str("&amp;"),
             '<' => text.push_str("&lt;"),
-            // Inside a word it is no mark; brackets are one only before an address.
+            // An underscore inside a word is not markup; brackets are markup only before an
+            // address.
             '_' if is_word(before) && is_word(next) => text.push(c),
             ']' if !matches!(next, Some('(' | '[' | ':')) => text.push(c),
             '\\' | '`' | '*' | '_' | ']' | '~' => text.extend(['\\', c]),

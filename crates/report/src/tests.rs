@@ -1,4 +1,4 @@
-//! What both renderers promise of every document.
+//! Properties that both renderers guarantee for every document.
 
 use super::*;
 use sidestep_document::claim::{Claim, Verdict};
@@ -6,7 +6,7 @@ use sidestep_document::document::{Picture, Text};
 use sidestep_document::figure::{Point, Scale};
 use sidestep_document::{Figure, FigureKind, Series, Table};
 
-/// What each language would read as its own.
+/// Text with the markup of each language.
 const HOSTILE: &str = "</script><img src=x onerror=alert(1)> | `a` **b** [c](d) & \"e\"";
 
 /// A document with every block, and [`HOSTILE`] words wherever there are words.

@@ -1,4 +1,4 @@
-//! Whether a state that was computed again is the one that was recorded.
+//! Comparison of a state that was computed again with the recorded one.
 
 use crate::Error;
 use crate::recorded::has_rows;
@@ -10,9 +10,9 @@ use sidestep_record::{Table, read_table};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Number of recorded poses of the present cycle that were compared; `again` is the same run at its
-/// start. What is recorded of a cycle is what a run records at its beginning, so a copy of the run
-/// records it once more, to the bit.
+/// Returns the number of recorded poses of the present cycle that were compared; `again` is the
+/// same run at its start. The rows of a cycle are recorded at its start, so a copy of the run
+/// records them once more, with the same bits.
 ///
 /// # Errors
 /// When a pose differs, or the folder is damaged.
@@ -63,7 +63,7 @@ fn differs(cycle: u64, bodies: usize, (kind, number, part): &Who) -> Error {
     Error::stopped(cause, remedy)
 }
 
-/// The bodies whose recorded rows are not those of now.
+/// Returns the bodies whose recorded rows differ from the present ones.
 fn differences<'a>(
     rows: &PlaceRows,
     table: &Table,
@@ -76,7 +76,7 @@ fn differences<'a>(
     recorded.iter().filter_map(differs).collect()
 }
 
-/// The bits of all columns by body.
+/// Returns the bits of all columns by body.
 fn by_body<'a>(
     rows: &PlaceRows,
     names: &[&str],
@@ -88,7 +88,7 @@ fn by_body<'a>(
     let body = |row: usize| {
         let number = word(rows.number, row).unwrap_or(u32::MAX);
         let of = (rows.kind, number, rows.part.and_then(|part| word(part, row)));
-        // What is missing has other bits than anything that is there.
+        // A missing value has bits that no present value has.
         let cells = columns.iter().flat_map(|values| match values {
             Some(values) if !values.is_missing(row) => [1, bits(values, row)],
             _ => [0, 0],
@@ -98,7 +98,7 @@ fn by_body<'a>(
     (0..count).map(body).collect()
 }
 
-/// The bits of a value; tables of places have no text.
+/// Returns the bits of a value; tables of poses have no text.
 fn bits(values: &Values, row: usize) -> u64 {
     match values {
         Values::Text(_) => 0,

@@ -1,4 +1,4 @@
-//! Advances a run to its end, in slices short enough for whoever watches.
+//! Drives a run to its end, in slices short enough for the watcher.
 
 use crate::Error;
 use crate::film::Film;
@@ -9,10 +9,10 @@ use sidestep::kernel::Cycle;
 use sidestep::kernel::Simulation;
 use std::time::{Duration, Instant};
 
-/// How long a slice lasts: nobody waits longer for a stop.
+/// Duration of a slice, and so the longest wait for a stop.
 const SLICE: Duration = Duration::from_millis(30);
 
-/// What a stretch of a run took in this process.
+/// The cycles and the time of a stretch of a run in this process.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Effort {
     /// Cycles done.
@@ -23,17 +23,17 @@ pub struct Effort {
     pub cpu: Duration,
 }
 
-/// Where rows and frames of a run go.
+/// The destinations of a run's rows and frames.
 #[derive(Default)]
 pub struct Sinks<'a> {
     /// Rows and checkpoints.
     pub recording: Option<&'a mut Recording>,
-    /// What can be seen.
+    /// The recording or animation that takes frames.
     pub film: Option<&'a mut dyn Film>,
 }
 
-/// Runs up to cycle `until`, or until the watcher says no. Whether the end was reached, the run's
-/// cycle says. A film begins with the run as it is.
+/// Drives the run up to cycle `until`, or until the watcher asks to stop; the run's cycle shows
+/// whether it reached the end. A film starts with the present state of the run.
 ///
 /// # Errors
 /// When rows, checkpoints or frames cannot be stored.
@@ -57,7 +57,7 @@ pub fn drive(
     Ok(Effort { cycles: run.cycle() - from, wall: wall.elapsed(), cpu: cpu.elapsed() })
 }
 
-/// Advances a little, and hands over what is due.
+/// Advances a little, and passes on rows and frames that are due.
 fn slice(
     run: &mut dyn Simulation,
     until: Cycle,
@@ -70,7 +70,7 @@ fn slice(
     let started = Instant::now();
     let done = run.advance(asked);
     pace.note(done, started.elapsed());
-    // A run may be over just where a slice ends: then there is no further one.
+    // A run may be over exactly at the end of a slice: then there is no further slice.
     let is_due = |due: Cycle, run: &dyn Simulation| run.cycle() == due || run.is_over();
     if let Some(recording) = &mut sinks.recording
         && (done < asked || is_due(rows_due, run))
@@ -85,7 +85,7 @@ fn slice(
     Ok(())
 }
 
-/// How many cycles make a slice.
+/// The number of cycles of a slice.
 #[derive(Debug)]
 struct Pace(u64);
 
@@ -100,7 +100,7 @@ impl Pace {
         self.0
     }
 
-    /// Aims at [`SLICE`], and grows at most fourfold at a time.
+    /// Adapts the number of cycles to [`SLICE`]; it grows at most fourfold at a time.
     fn note(&mut self, cycles: u64, took: Duration) {
         let per_cycle_s = took.as_secs_f64() / cycles.max(1) as f64;
         let fitting = (SLICE.as_secs_f64() / per_cycle_s.max(1e-12)) as u64;

@@ -1,14 +1,14 @@
-//! The one error of a session.
+//! The error type of sessions.
 
 use sidestep::kernel::InputError;
 use sidestep::kernel::ports::RecordError;
 use sidestep_draw::DrawError;
 use std::path::Path;
 
-/// The reason why work ends before its goal.
+/// The reason why work stopped before its end.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// Wrong input; says where and what would be right.
+    /// Wrong input, with its place and a remedy.
     #[error(transparent)]
     Input(#[from] InputError),
     /// Something could not be stored.
@@ -17,21 +17,21 @@ pub enum Error {
     /// A picture could not be drawn.
     #[error("the picture cannot be drawn: {0}")]
     Draw(#[from] DrawError),
-    /// The watcher said no before there was anything to keep.
+    /// The watcher asked to stop before there was anything to keep.
     #[error("interrupted; nothing was written")]
     Interrupted,
     /// Anything else that stopped the work, with its remedy.
     #[error("{cause}\n  help: {remedy}")]
     Stopped {
-        /// What happened.
+        /// The reason.
         cause: String,
-        /// What helps.
+        /// The remedy.
         remedy: String,
     },
 }
 
 impl Error {
-    /// Returns a stop with its remedy.
+    /// Returns a stop with its cause and remedy.
     pub fn stopped(cause: impl Into<String>, remedy: impl Into<String>) -> Self {
         Self::Stopped { cause: cause.into(), remedy: remedy.into() }
     }

@@ -1,15 +1,15 @@
-//! Files that are written whole or not at all.
+//! Files that are written completely or not at all.
 
 use crate::Error;
 use std::fs::File;
 use std::io::{BufWriter, Result, Write};
 use std::path::Path;
 
-/// Replaces the file at `path` by what `write` writes: a file that was there stays until the
-/// new one is complete.
+/// Replaces the file at `path` by the output of `write`: an earlier file stays until the new one is
+/// complete.
 ///
 /// # Errors
-/// What the system says.
+/// An I/O error.
 pub fn replace(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<File>) -> Result<()>,

@@ -1,21 +1,25 @@
-//! The identity of builds: only the build that began a run or a sweep goes on with it.
+//! The identity of builds: only the build that started a run or a sweep continues it.
 
 use sidestep::kernel::InputError;
 use sidestep::{BUILD, VERSION};
 use std::path::Path;
 
-/// The maker of a run or a sweep, as it is recorded.
+/// The program that made a run or a sweep, as recorded.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Maker {
     /// The version of the program.
     pub(crate) version: String,
-    /// The build; early recordings do not name it.
+    /// The build; early recordings do not have it.
     pub(crate) build: Option<String>,
 }
 
 impl Maker {
-    /// Refuses what another build has made, and another version where no build is known: results
-    /// may change from one to the other. `what` was made, at `place`; `remedy` is told the maker.
+    /// Refuses the work of another build, or of another version if no build is recorded, because
+    /// results may change between them. `what` was made, at `place`; `remedy` gets the maker's
+    /// name.
+    ///
+    ///  # Errors
+    /// When the makers differ.
     pub(crate) fn check(
         &self,
         place: &Path,

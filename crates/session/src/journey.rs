@@ -1,4 +1,4 @@
-//! One run, from where it is to its end, with all that it leaves behind.
+//! One run, from its present cycle to its end, with everything that it records.
 
 use crate::driver::{Effort, Sinks, drive};
 use crate::film::{Ending, Film, McapFilm};
@@ -15,7 +15,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::time::Duration;
 
-/// A run that is ready to go.
+/// A run that is ready to start or continue.
 pub struct Journey {
     run: Box<dyn Simulation>,
     recording: Option<Recording>,
@@ -23,18 +23,18 @@ pub struct Journey {
     workers: usize,
     /// The cycle to stop at, if before the planned end.
     until: Option<Cycle>,
-    /// What to report of the file that the scenario was made from.
+    /// The report about the file that the scenario was made from.
     told: Option<Foreign>,
 }
 
-/// Places where a run is recorded.
+/// The places where a run is recorded.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Keep<'a> {
-    /// A folder for its rows, checkpoints, summary and picture.
+    /// A folder for rows, checkpoints, summary and picture.
     pub folder: Option<&'a Path>,
-    /// An MCAP file for viewers, and the cycles from frame to frame.
+    /// An MCAP file for viewers, and the number of cycles between frames.
     pub mcap: Option<(&'a Path, Cycle)>,
-    /// Whether what is there already is deleted.
+    /// Whether existing files and folders there are replaced.
     pub replace: bool,
 }
 
@@ -43,21 +43,21 @@ impl Keep<'_> {
         if self.replace { Existing::Replace } else { Existing::Refuse }
     }
 
-    /// Refuses places that may not be taken, before anything is made.
+    /// Refuses places that may not be used, before anything is created.
     ///
     /// # Errors
-    /// When the MCAP file is there already, and is not to be replaced.
+    /// When the MCAP file exists already and may not be replaced.
     fn check(&self) -> Result<(), InputError> {
         self.mcap.map_or(Ok(()), |(file, _)| McapRecorder::check_vacant(file, self.existing()))
     }
 }
 
 impl Journey {
-    /// Returns a run of a scenario at its start; `told` is what to report of the file that the
+    /// Returns a run of a scenario at its start; `told` is the report about the file that the
     /// scenario was made from.
     ///
     /// # Errors
-    /// When a place to keep it is taken, or cannot be made.
+    /// When a place is taken, or cannot be created.
     pub fn start(
         compiled: &dyn Compiled,
         source: &Source,
@@ -88,7 +88,8 @@ impl Journey {
         Ok(Self { run, recording, film, workers, until: None, told })
     }
 
-    /// Returns the run in a folder where it was stopped, to go on to its end, or to cycle `until`.
+    /// Returns a stopped run at the point where its folder can continue, to go on to its end or to
+    /// cycle `until`.
     ///
     /// # Errors
     /// When the folder holds no run of one of `worlds` that this build can continue, or the run
@@ -115,12 +116,12 @@ impl Journey {
         Ok(Self { run, recording, film: None, workers, until, told: None })
     }
 
-    /// Cycles done since the run's start.
+    /// Returns the number of cycles done since the run's start.
     pub fn cycle(&self) -> Cycle {
         self.run.cycle()
     }
 
-    /// Goes to the end, or until the watcher says no, and stores all that is to be kept.
+    /// Drives the run to its end, or until the watcher asks to stop, and stores everything.
     ///
     /// # Errors
     /// When something cannot be stored; a bug of the simulation.
@@ -167,7 +168,7 @@ fn check_end(asked: Option<Cycle>, now: Cycle, planned: Cycle) -> Result<(), Inp
     Err(InputError::new(format!("--cycles {end}"), cause, remedy))
 }
 
-/// Goes to the end of a recorded run and stores all that belongs to it; whether it got there.
+/// Drives a recorded run to its end and stores all its results; returns whether it got there.
 ///
 /// # Errors
 /// When something cannot be stored.
@@ -187,7 +188,7 @@ pub(crate) fn recorded_run(
     Ok(summary.status == Status::Complete)
 }
 
-/// Ends the folder: whole tables and pictures, or a checkpoint to resume at.
+/// Completes the folder: with complete tables and pictures, or with a checkpoint to resume from.
 fn store(
     run: &mut dyn Simulation,
     mut recording: Recording,
@@ -212,7 +213,7 @@ fn store(
     Ok(())
 }
 
-/// Drives the run; a bug says what replays it.
+/// Drives the run; the error of a bug describes how to replay it.
 fn drive_guarded(
     run: &mut dyn Simulation,
     until: Cycle,
@@ -223,7 +224,7 @@ fn drive_guarded(
     driven.unwrap_or_else(|_| Err(bug(run)))
 }
 
-/// Adds what saves the run where something could not be stored.
+/// Adds how to continue the run, if something could not be stored.
 fn broken_by(error: Error, run: &dyn Simulation, recording: Option<&Recording>) -> Error {
     match error {
         Error::Record(error) => broken(run, recording, &error),
@@ -231,7 +232,7 @@ fn broken_by(error: Error, run: &dyn Simulation, recording: Option<&Recording>) 
     }
 }
 
-/// What replays a run up to where it failed.
+/// Returns how to replay a run up to the cycle at which it failed.
 fn whereabouts(run: &dyn Simulation) -> String {
     let plan = run.plan();
     let (cycle, version) = (run.cycle(), VERSION);
@@ -239,7 +240,7 @@ fn whereabouts(run: &dyn Simulation) -> String {
     format!("at cycle {cycle} of {cycles} of `{name}`, seed {seed}, sidestep {version}")
 }
 
-/// Recording failed: says what saves the run.
+/// Returns the error of a recording that failed, with how to continue the run.
 fn broken(run: &dyn Simulation, recording: Option<&Recording>, error: &RecordError) -> Error {
     let remedy = match recording.map(|r| r.folder().path().display()) {
         Some(folder) => format!("make room, then continue with: sidestep resume {folder}"),
@@ -248,7 +249,7 @@ fn broken(run: &dyn Simulation, recording: Option<&Recording>, error: &RecordErr
     Error::stopped(format!("{error}\n  {}", whereabouts(run)), remedy)
 }
 
-/// The simulation broke a rule of its own.
+/// Returns the error of a simulation that broke one of its own rules.
 fn bug(run: &dyn Simulation) -> Error {
     let cause = format!("this is a bug in sidestep, met shortly after\n  {}", whereabouts(run));
     Error::stopped(cause, "please report it with the scenario and the lines above")

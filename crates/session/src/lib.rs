@@ -1,19 +1,19 @@
-//! Drives runs of any world: starts, records, resumes and replays them, films and exports them, runs
-//! sweeps of them, and makes the documents of reports.
+//! Drives runs of any world: starts, records, resumes and replays them, makes animations and
+//! exports, runs sweeps, and makes the documents of reports.
 //!
 //! ```text
 //! scenario.rs   a file and overrides -> a scenario     journey.rs    one run, to its end
-//! driver.rs     advances in slices                     recording.rs  a run folder that grows
+//! driver.rs     advances in slices                     recording.rs  the folder of a run
 //! film/         frames into files                      picture.rs    pictures into files
 //! rerun.rs      recorded runs, computed again          replay.rs     ... and compared
-//! export/       recorded runs in other forms           report/       folders -> documents
-//! sweep/        many runs of one scenario              summary.rs    what a run came to
-//! watcher.rs    progress, and whether to go on         identity.rs   which build made it
+//! export/       recorded runs in other formats         report/       folders -> documents
+//! sweep/        many runs of one scenario              summary.rs    the results of a run
+//! watcher.rs    progress, and whether to go on         identity.rs   the build that made a run
 //! ```
 //!
-//! Nothing here knows a terminal, options of a command, or a world: functions that need to know
-//! which worlds there are take [`Worlds`](sidestep::scenario::Worlds), and tell a [`Watcher`] how
-//! far they are.
+//! Nothing here knows a terminal, the options of a command, or a world: functions that need the
+//! list of worlds take [`Worlds`](sidestep::scenario::Worlds), and report their progress to a
+//! [`Watcher`].
 
 mod compare;
 mod driver;

@@ -11,7 +11,7 @@ use sidestep_record::RunFolder;
 use std::io::Write;
 use std::path::Path;
 
-/// Longer side of a PNG.
+/// Longer side of a PNG in pixels.
 const PNG_PX: u32 = 1600;
 
 /// Draws the trajectory picture into a run folder, as SVG and PNG.
@@ -31,8 +31,8 @@ pub(crate) fn draw_run(run: &mut dyn Simulation, folder: &RunFolder) -> Result<(
     write_png(&folder.path().join("trajectories.png"), &svg)
 }
 
-/// The run as it is now, with the ways that its folder tells, as SVG. `origin` is small print that
-/// says which run this is.
+/// Returns the present state of the run as SVG, with the tracks that its folder has. `origin` is a
+/// line of small print that identifies the run.
 ///
 /// # Errors
 /// When the folder is damaged, or the picture cannot be drawn.
@@ -50,7 +50,7 @@ pub(crate) fn svg(
     Ok(draw(&scenery, &frame, &trails, &Options::page(&scenery, caption))?)
 }
 
-/// Small print under a picture.
+/// Returns the small print under a picture.
 pub(crate) fn origin(run: &dyn Simulation) -> String {
     format!("Seed {}, sidestep {}.", run.plan().seed, VERSION)
 }

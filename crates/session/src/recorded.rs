@@ -1,4 +1,4 @@
-//! Tables of a recorded run, also as CSV, the form in which logs are learned from.
+//! Tables of a recorded run, also as CSV, the format of logs to learn from.
 
 use sidestep::import::table::CsvTable;
 use sidestep::kernel::InputError;
@@ -7,10 +7,10 @@ use sidestep_draw::worth_a_trail;
 use sidestep_record::{Table, read_table};
 use std::path::Path;
 
-/// So many recorded places are read for trails; of longer runs the last ones.
+/// Largest number of recorded poses that are read for trails; longer runs use the last ones.
 const MOST_ROWS: u64 = 4_000_000;
 
-/// The ways that led to a moment, as far as they are recorded and worth showing.
+/// Returns the tracks that led to a cycle, as far as they are recorded and worth showing.
 ///
 /// # Errors
 /// When a table is damaged.
@@ -34,7 +34,8 @@ pub(crate) fn trails(
     Ok(trails)
 }
 
-/// The table `name` of the run in `folder`, which has it with `record.calibration = true`.
+/// Returns the table `name` of the run in `folder`, which records it with `record.calibration =
+/// true`.
 ///
 /// # Errors
 /// When the run has no such table, or it is damaged.
@@ -46,7 +47,7 @@ pub fn csv_table(folder: &Path, name: &str) -> Result<CsvTable, InputError> {
     CsvTable::parse(&folder.join(name).display(), &as_csv(&table))
 }
 
-/// A heading, then one line per row; a beam or an action per line.
+/// Returns a table as CSV: a heading, then one line per row (a beam or an action).
 fn as_csv(table: &Table) -> String {
     let columns = &table.schema.columns;
     let names: Vec<&str> = columns.iter().map(|c| c.name.as_str()).collect();
@@ -63,7 +64,7 @@ fn as_csv(table: &Table) -> String {
     text
 }
 
-/// Whether some part of the table is whole: a run that was killed early has none.
+/// Whether some part of the table is complete: a run that was killed early has none.
 pub(crate) fn has_rows(folder: &Path, table: &str) -> bool {
     let is_part = |name: &std::ffi::OsStr| Path::new(name).extension() == Some("parquet".as_ref());
     [table.to_string(), format!("{table}.partial")].iter().any(|table| {

@@ -1,4 +1,4 @@
-//! A run's folder while it is being written.
+//! The folder of a run while it is written.
 
 use crate::Error;
 use sidestep::kernel::Simulation;
@@ -10,11 +10,11 @@ use sidestep_record::{Existing, NewRun, Origin, ParquetRecorder, ResumePoint, Ru
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// Rows are handed over at multiples of this many cycles (and where buffers are full, and at
-/// checkpoints), never by the clock: so their order is a function of the scenario alone.
+/// Rows are passed on at multiples of this many cycles (and when buffers are full, and at
+/// checkpoints), never by the clock, so that their order is a function of the scenario alone.
 const BLOCK_CYCLES: Cycle = 1024;
 
-/// A folder, its recorder, and when to save.
+/// A folder, its recorder, and the times of its checkpoints.
 pub struct Recording {
     folder: RunFolder,
     recorder: ParquetRecorder,
@@ -24,10 +24,10 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// A new folder at `path`, with the resolved scenario in it.
+    /// Creates a new folder at `path`, with the resolved scenario in it.
     ///
     /// # Errors
-    /// A folder that is not to be taken, and what the system says.
+    /// A folder that may not be used, or an I/O error.
     pub fn create(
         path: &Path,
         resolved: &Resolved,
@@ -50,10 +50,10 @@ impl Recording {
         Ok(Self::begin(folder, run)?)
     }
 
-    /// Takes up the recording of a run that stands where its folder's checkpoint is.
+    /// Continues the recording of a run that is at the checkpoint of its folder.
     ///
     /// # Errors
-    /// What the system says.
+    /// An I/O error.
     pub(crate) fn begin(folder: RunFolder, run: &mut dyn Simulation) -> Result<Self, RecordError> {
         run.begin_recording();
         let recorder = folder.recorder(&run.schemas(), run.cycle())?;
@@ -61,15 +61,15 @@ impl Recording {
         Ok(Self { folder, recorder, checkpoint_every, took: Duration::ZERO })
     }
 
-    /// The first cycle after `cycle` at which rows must be handed over.
+    /// Returns the first cycle after `cycle` at which rows must be passed on.
     pub(crate) fn next_stop(&self, cycle: Cycle) -> Cycle {
         next(BLOCK_CYCLES, cycle).min(next(self.checkpoint_every, cycle))
     }
 
-    /// Takes the rows, and a checkpoint where one is due.
+    /// Takes the rows, and a checkpoint if one is due.
     ///
     /// # Errors
-    /// What the system says.
+    /// An I/O error.
     pub(crate) fn take(&mut self, run: &mut dyn Simulation) -> Result<(), RecordError> {
         let started = Instant::now();
         run.record(&mut self.recorder)?;
@@ -80,16 +80,16 @@ impl Recording {
         Ok(())
     }
 
-    /// Makes everything so far durable.
+    /// Makes everything recorded so far durable.
     fn save(&mut self, run: &dyn Simulation) -> Result<(), RecordError> {
         self.recorder.seal(run.cycle())?;
         self.folder.save_checkpoint(run.cycle(), &run.checkpoint())
     }
 
-    /// Declares the tables whole; reports and pictures may follow.
+    /// Declares the tables complete; reports and pictures may follow.
     ///
     /// # Errors
-    /// What the system says.
+    /// An I/O error.
     pub(crate) fn finish_tables(&mut self) -> Result<(), RecordError> {
         self.recorder.finish()
     }
@@ -97,37 +97,37 @@ impl Recording {
     /// Saves a run that stops before its end.
     ///
     /// # Errors
-    /// What the system says.
+    /// An I/O error.
     pub(crate) fn save_unfinished(&mut self, run: &mut dyn Simulation) -> Result<(), RecordError> {
         run.record(&mut self.recorder)?;
         self.save(run)
     }
 
-    /// The folder.
+    /// Returns the folder.
     pub(crate) fn folder(&self) -> &RunFolder {
         &self.folder
     }
 
-    /// The folder, for its last entries.
+    /// Returns the folder, for its last entries.
     pub(crate) fn into_folder(self) -> RunFolder {
         self.folder
     }
 
-    /// Time spent on recording so far.
+    /// Returns the time spent on recording so far.
     pub(crate) fn took(&self) -> Duration {
         self.took
     }
 }
 
-/// The first multiple of `every` after `cycle`.
+/// Returns the first multiple of `every` after `cycle`.
 pub(crate) fn next(every: Cycle, cycle: Cycle) -> Cycle {
     (cycle / every + 1).saturating_mul(every)
 }
 
-/// Puts the files that a resolved scenario names beside it.
+/// Writes the files that a resolved scenario names beside it.
 ///
 /// # Errors
-/// What the system says.
+/// An I/O error.
 pub(crate) fn write_inputs(folder: &Path, files: &[(String, Vec<u8>)]) -> Result<(), RecordError> {
     for (name, bytes) in files {
         let path = folder.join(name);
@@ -139,7 +139,7 @@ pub(crate) fn write_inputs(folder: &Path, files: &[(String, Vec<u8>)]) -> Result
     Ok(())
 }
 
-/// Brings a run to the point where its folder says it can go on.
+/// Sets a run to the point at which its folder can continue.
 ///
 /// # Errors
 /// When the checkpoint is damaged or belongs to another version or scenario.

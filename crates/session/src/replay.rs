@@ -7,20 +7,21 @@ use crate::{Error, Recorded, Watcher};
 use sidestep::kernel::{Cycle, InputError, Simulation};
 use std::path::Path;
 
-/// A run that was computed again.
+/// The result of computing a run again.
 pub struct Replayed {
-    /// The run, at the cycle that was asked for.
+    /// The run, at the requested cycle.
     pub run: Box<dyn Simulation>,
-    /// What computing it took.
+    /// Cycles and time that this took.
     pub effort: Effort,
-    /// Number of recorded poses of the cycle that it was compared with.
+    /// Number of recorded poses of that cycle that were compared.
     pub compared_poses: usize,
 }
 
 /// Computes the whole run again, and compares its last state with the recorded digest.
 ///
 /// # Errors
-/// When no digest is recorded, or it is another; [`Error::Interrupted`] when the watcher said no.
+/// When no digest is recorded, or it differs; [`Error::Interrupted`] when the watcher asked to
+/// stop.
 pub fn replay_all(
     recorded: &Recorded,
     workers: usize,
@@ -46,12 +47,12 @@ pub fn replay_all(
     Ok(Replayed { run, effort, compared_poses: 0 })
 }
 
-/// Computes the state at the beginning of a cycle, and compares it with the poses that are
-/// recorded of that cycle.
+/// Computes the state at the start of a cycle, and compares it with the poses that are recorded of
+/// that cycle.
 ///
 /// # Errors
-/// When the run has no such cycle, or a pose differs; [`Error::Interrupted`] when the watcher said
-/// no.
+/// When the run has no such cycle, or a pose differs; [`Error::Interrupted`] when the watcher asked
+/// to stop.
 pub fn replay_to(
     recorded: &Recorded,
     cycle: Cycle,
@@ -84,7 +85,7 @@ fn no_such_cycle(cycle: Cycle, last: Cycle) -> InputError {
 }
 
 impl Replayed {
-    /// Draws the state to a PNG file, with the ways that are recorded.
+    /// Draws the state to a PNG file, with the recorded tracks.
     ///
     /// # Errors
     /// When it cannot be drawn or written.

@@ -11,35 +11,35 @@ use sidestep::scenario::{Source, Worlds};
 use sidestep_record::{McapRun, ResumePoint, RunView, Status, is_mcap};
 use std::path::{Path, PathBuf};
 
-/// What is recorded of a run, whatever it was recorded to.
+/// A recorded run, whatever it was recorded to.
 pub struct Recorded {
     /// The folder or file.
     pub path: PathBuf,
     worlds: Worlds,
     maker: Maker,
-    /// Whether it came to its end.
+    /// Whether the run reached its end.
     pub is_complete: bool,
-    /// Cycles that are done for certain.
+    /// Number of cycles that are certainly done.
     pub cycles_done: Cycle,
-    /// The digest of the state after these, where it is known.
+    /// Digest of the state after these cycles, if it is known.
     pub digest: Option<String>,
-    /// The run folder, where it is one.
+    /// The run folder, if the run was recorded to one.
     pub folder: Option<PathBuf>,
     source: Source,
-    /// The folder that the scenario's files lie in.
+    /// The folder of the scenario's files.
     base: PathBuf,
-    /// The same, where it lasts only as long as this.
+    /// Deletes that folder when this value is dropped, if it is temporary.
     _unpacked: Option<tempfile::TempDir>,
 }
 
-/// Where resolved scenarios have their files.
+/// Name of the folder of files beside a resolved scenario.
 const INPUTS: &str = "inputs";
 
 impl Recorded {
-    /// Opens a run folder or an MCAP file of ours, of a run of one of `worlds`.
+    /// Opens a run folder or an MCAP file of this program, with a run of one of `worlds`.
     ///
     /// # Errors
-    /// When it is neither, or damaged.
+    /// When it is neither, or is damaged.
     pub fn open(worlds: Worlds, path: &Path) -> Result<Self, Error> {
         if is_mcap(path) { Self::of_mcap(worlds, path) } else { Ok(Self::of_folder(worlds, path)?) }
     }
@@ -80,10 +80,10 @@ impl Recorded {
         })
     }
 
-    /// The scenario as it was recorded, and its files.
+    /// Returns the recorded scenario and its files.
     ///
     /// # Errors
-    /// When a file cannot be read any more.
+    /// When a file can no longer be read.
     pub fn resolved(&self) -> Result<Resolved, InputError> {
         let folder = self.base.join(INPUTS);
         let mut files = Vec::new();
@@ -101,11 +101,11 @@ impl Recorded {
         Ok(Resolved { text: self.source.text.clone(), files })
     }
 
-    /// The run at its start.
+    /// Returns the run at its start.
     ///
     /// # Errors
-    /// Results may change between builds, so only the writer's own can compute it again. A scenario
-    /// that is wrong by now.
+    /// When another build made the recording, because results may change between builds; or when
+    /// the scenario is no longer valid.
     pub fn start(&self, workers: usize) -> Result<Box<dyn Simulation>, InputError> {
         let compiled = self.worlds.compile(&self.source)?;
         self.maker.check(&self.path, "run", |wrote| {
@@ -114,10 +114,10 @@ impl Recorded {
         Ok(compiled.start(&self.source, workers))
     }
 
-    /// The run at its last checkpoint, if that lies before `cycle`; else at its start.
+    /// Returns the run at its last checkpoint, if that is before `cycle`; otherwise at its start.
     ///
     /// # Errors
-    /// As [`Self::start`]; a damaged checkpoint.
+    /// Those of [`Self::start`]; a damaged checkpoint.
     pub fn start_near(
         &self,
         cycle: Cycle,
@@ -133,8 +133,8 @@ impl Recorded {
         Ok(run)
     }
 
-    /// Compares the state of a run that was computed again with what is recorded of its last one.
-    /// Whether there was anything to compare.
+    /// Compares the state of a run that was computed again with its recorded last state. Returns
+    /// whether there was anything to compare.
     ///
     /// # Errors
     /// When they differ.

@@ -1,4 +1,4 @@
-//! A scenario file and overrides -> a scenario that is known to be right.
+//! A scenario file and overrides -> a valid scenario.
 
 use sidestep::kernel::InputError;
 use sidestep::scenario::{Compiled, Source, Worlds};
@@ -7,7 +7,7 @@ use std::path::Path;
 /// Reads a scenario, applies `key=value` overrides and compiles it.
 ///
 /// # Errors
-/// When anything in it is wrong.
+/// When the scenario or an override is wrong.
 pub fn read(
     worlds: Worlds,
     file: &Path,
@@ -21,11 +21,11 @@ pub fn read(
     }
 }
 
-/// Returns the scenario in a file, or the one that a file of another form stands for, with
+/// Returns the scenario in a file, or the one that a file of another format stands for, with
 /// overrides.
 ///
 /// # Errors
-/// When it cannot be read, or an override does not fit.
+/// When the file cannot be read, or an override does not fit.
 pub(crate) fn source_of(
     worlds: Worlds,
     file: &Path,
@@ -39,7 +39,7 @@ pub(crate) fn source_of(
     }
 }
 
-/// Returns the same error where it stands in the file, if no override has brought it in: overrides
+/// Returns the same error with its position in the file, unless an override caused it: overrides
 /// may move lines.
 fn in_the_file_itself(worlds: Worlds, file: &Path, error: InputError) -> InputError {
     if !matches!(worlds.translate(file), Ok(None)) {

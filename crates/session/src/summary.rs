@@ -1,4 +1,4 @@
-//! The summary of a run: the content of `summary.json`, and lines for people.
+//! The summary of a run: the content of `summary.json`, and text for people.
 
 use crate::driver::Effort;
 use serde::Serialize;
@@ -18,23 +18,23 @@ use std::time::Duration;
 pub enum Status {
     /// All cycles are done.
     Complete,
-    /// It was stopped before.
+    /// The run was stopped before its end.
     Incomplete,
 }
 
-/// The summary of a run as it stands.
+/// The summary of the present state of a run.
 #[derive(Debug, Clone, Serialize)]
 pub struct Summary {
     /// Version of the program.
     pub version: &'static str,
     /// Name of the world.
     pub world: &'static str,
-    /// Noun for one of its agents.
+    /// Noun for an agent of the world.
     #[serde(skip)]
     pub agent: &'static str,
     /// Name of the scenario.
     pub name: String,
-    /// Whether it reached its end.
+    /// Whether the run reached its end.
     pub status: Status,
     /// The seed.
     pub seed: u64,
@@ -48,54 +48,54 @@ pub struct Summary {
     pub agents: usize,
     /// Alias of `agents`, for readers of earlier summaries.
     robots: usize,
-    /// Number of workers.
+    /// Number of worker threads.
     pub workers: usize,
-    /// Cycles done by this process; the times below are theirs.
+    /// Number of cycles done by this process; the times below are theirs.
     pub cycles_timed: u64,
-    /// Elapsed time.
+    /// Elapsed time in seconds.
     pub wall_s: f64,
-    /// CPU time of all threads.
+    /// CPU time of all threads in seconds.
     pub cpu_s: f64,
-    /// Speed: agents times cycles by CPU time.
+    /// Speed: agents times cycles per second of CPU time.
     pub agent_cycles_per_cpu_s: f64,
     /// Alias of `agent_cycles_per_cpu_s`.
     robot_cycles_per_cpu_s: f64,
-    /// Seconds per phase.
+    /// Seconds spent in each phase.
     pub phases_s: Phases,
-    /// Metrics of its world.
+    /// Metrics of the world.
     pub metrics: Value,
     /// The run folder, if there is one.
     pub folder: Option<PathBuf>,
     /// The recording for viewers, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mcap: Option<PathBuf>,
-    /// What was found in the file of another program's form that the scenario was made from.
+    /// Report about a file of another program that the scenario was made from.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<Value>,
-    /// The same for people.
+    /// The same report as text.
     #[serde(skip)]
     pub file_lines: Lines,
-    /// The world's own results, for people.
+    /// The world's own results as text.
     #[serde(skip)]
     pub outcome: Lines,
 }
 
-/// Seconds per phase, by the clock of worker 0.
+/// Seconds spent in each phase, by the clock of worker 0.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct Phases {
-    /// Of the phase *claim*,
+    /// Time of the phase *claim*.
     pub claim: f64,
-    /// of *join*,
+    /// Time of the phase *join*.
     pub join: f64,
-    /// of *act*,
+    /// Time of the phase *act*.
     pub act: f64,
-    /// and of recording.
+    /// Time of recording.
     pub record: f64,
     /// Aliases of the first three, for readers of earlier summaries.
     perceive_decide: f64,
     conflicts: f64,
     react: f64,
-    /// Where agents decide: what the phases are called.
+    /// The phase in which agents decide, which determines the names of phases for people.
     #[serde(skip)]
     pub decides: Decides,
 }
@@ -128,7 +128,7 @@ pub(crate) struct Cost {
 }
 
 impl Summary {
-    /// Returns the summary of a run as it stands.
+    /// Returns the summary of the present state of a run.
     pub(crate) fn new(run: &dyn Simulation, cost: Cost, folder: Option<&Path>) -> Self {
         let plan = run.plan();
         let (cycles, agents, effort) = (run.cycle(), run.agents(), cost.effort);
@@ -166,13 +166,13 @@ impl Summary {
         }
     }
 
-    /// Adds what was found in the file that the scenario was made from.
+    /// Adds the report about the file that the scenario was made from.
     pub(crate) fn tell_of_file(&mut self, foreign: Foreign) {
         self.file = Some(foreign.json);
         self.file_lines = foreign.lines;
     }
 
-    /// Adds where the recording for viewers is.
+    /// Adds the path of the recording for viewers.
     pub(crate) fn tell_of_mcap(&mut self, path: PathBuf) {
         self.mcap = Some(path);
     }
@@ -183,9 +183,9 @@ impl Summary {
 pub(crate) struct SummaryFile<'a> {
     #[serde(flatten)]
     pub(crate) summary: &'a Summary,
-    /// Metrics of every agent by itself,
+    /// Metrics of each agent.
     pub(crate) per_agent: Value,
-    /// and of pairs of agents, in worlds that have any.
+    /// Metrics of pairs of agents, in worlds that have any.
     #[serde(skip_serializing_if = "Value::is_null")]
     pub(crate) per_pair: Value,
 }

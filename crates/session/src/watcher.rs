@@ -1,14 +1,14 @@
-//! Watchers: they look on while work is done, and may ask it to stop.
+//! Watchers: they observe the progress of work, and may ask it to stop.
 
 use crate::Error;
 use sidestep::kernel::Cycle;
 
-/// How far work is.
+/// The progress of work.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Progress<'a> {
     /// A run advances.
     Cycles {
-        /// The cycle at which this stretch of the run began.
+        /// The cycle at which this stretch of the run started.
         from: Cycle,
         /// Cycles done since the run's start.
         done: Cycle,
@@ -17,11 +17,11 @@ pub enum Progress<'a> {
     },
     /// A sweep advances.
     Runs {
-        /// Runs that were finished when this stretch began.
+        /// Number of runs that were finished when this stretch started.
         before: u64,
-        /// Finished runs.
+        /// Number of finished runs.
         done: u64,
-        /// Runs of which these are.
+        /// Number of all runs.
         of: u64,
     },
     /// Other work advances.
@@ -31,17 +31,17 @@ pub enum Progress<'a> {
         /// The part of it that is done, from 0 to 1.
         share: f64,
     },
-    /// The work that was told of last has ended, or failed.
+    /// The work that was reported last has ended, or failed.
     Ended,
 }
 
-/// A terminal, a server or a program in another language that looks on. Runs of a sweep call it
-/// from several threads, so it takes `&self`.
+/// A terminal, a server or a program in another language that observes work. Runs of a sweep call
+/// it from several threads, so it takes `&self`.
 pub trait Watcher: Sync {
-    /// Takes note of how far work is: now and then, at the latest every 30 ms of a run.
+    /// Takes note of progress: at irregular times, at least every 30 ms of a run.
     fn at(&self, _: Progress<'_>) {}
 
-    /// Takes note of something that failed and stops nothing, e.g. the picture of a run.
+    /// Takes note of a failure that stops nothing, e.g. of the picture of a run.
     fn warn(&self, _: &Error) {}
 
     /// Returns whether to go on; asked between slices of a run.
@@ -50,13 +50,13 @@ pub trait Watcher: Sync {
     }
 }
 
-/// Nobody: work goes to its end.
+/// A watcher that does nothing: work runs to its end.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Unwatched;
 
 impl Watcher for Unwatched {}
 
-/// A watcher of something larger, which is not told of the cycles of its parts.
+/// A watcher of larger work, which does not report the cycles of its parts.
 pub(crate) struct Within<'a>(pub(crate) &'a dyn Watcher);
 
 impl Watcher for Within<'_> {
@@ -69,7 +69,7 @@ impl Watcher for Within<'_> {
     }
 }
 
-/// A piece of work that is being watched; its end is told however it ends.
+/// A piece of work that is being watched; its end is always reported.
 pub(crate) struct Watched<'a>(pub(crate) &'a dyn Watcher);
 
 impl Watched<'_> {

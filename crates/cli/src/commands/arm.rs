@@ -1,4 +1,4 @@
-//! Arms of robot models: what names one, which posture it is in, and how both are said.
+//! Arms of robot models: the options that choose one and its posture, and both as text and JSON.
 
 use crate::console::aligned;
 use clap::Args;
@@ -9,22 +9,22 @@ use sidestep::kernel::InputError;
 use sidestep::worlds::chain::kinematics::{Pose, Rod, SerialChain, Variable, Vector};
 use std::path::PathBuf;
 
-/// An arm and its posture, as typed.
+/// The options that choose an arm and its posture.
 #[derive(Debug, Args)]
 pub(crate) struct ArmArgs {
-    /// Robot model
+    /// Robot model (URDF file)
     #[arg(value_name = "URDF")]
     urdf: PathBuf,
 
-    /// The link that positions are relative to [default: the root]
+    /// Base link, which positions are relative to [default: the root link]
     #[arg(long, value_name = "LINK")]
     base: Option<String>,
 
-    /// The link whose place is wanted [default: the end of the longest arm]
+    /// Tip link, whose position is computed [default: the end of the longest arm]
     #[arg(long, value_name = "LINK")]
     tip: Option<String>,
 
-    /// File with groups and named postures
+    /// SRDF file with groups and named postures
     #[arg(long, value_name = "FILE")]
     srdf: Option<PathBuf>,
 
@@ -32,11 +32,11 @@ pub(crate) struct ArmArgs {
     #[arg(long, value_name = "NAME", requires = "srdf", conflicts_with_all = ["base", "tip"])]
     group: Option<String>,
 
-    /// The posture: a value for each moving joint from base to tip, in rad or m
+    /// Joint values, one for each moving joint from base to tip, in rad or m
     #[arg(long, value_name = "Q1,Q2,...", allow_hyphen_values = true)]
     joints: Option<String>,
 
-    /// Take the values from this named posture of the SRDF file
+    /// Take the joint values from this named posture (group state) of the SRDF file
     #[arg(long, value_name = "NAME", requires = "srdf", conflicts_with = "joints")]
     posture: Option<String>,
 }
@@ -49,7 +49,7 @@ pub(crate) struct Arm {
 }
 
 impl ArmArgs {
-    /// Reads the files.
+    /// Reads the files and returns the arm in its posture.
     ///
     /// # Errors
     /// When a file, a link, a group, the posture or the values are wrong.
@@ -93,10 +93,10 @@ impl ArmArgs {
     }
 }
 
-/// Numbers with commas between.
+/// Reads numbers separated by commas.
 ///
 /// # Errors
-/// A word that is no number.
+/// When a word is not a number.
 pub(crate) fn numbers(option: &str, text: &str) -> Result<Vec<f64>, InputError> {
     let words = text.split(',').map(str::trim).filter(|_| !text.trim().is_empty());
     let number = |word: &str| {
@@ -108,7 +108,7 @@ pub(crate) fn numbers(option: &str, text: &str) -> Result<Vec<f64>, InputError> 
     words.map(number).collect()
 }
 
-/// Where an arm is.
+/// The posture of an arm and the positions that follow from it.
 #[derive(Debug, Serialize)]
 pub(crate) struct Placed {
     robot: String,
@@ -118,13 +118,13 @@ pub(crate) struct Placed {
     tip: Vector,
     /// Rows of the tip's rotation matrix.
     rotation: [Vector; 3],
-    /// Joint values from the base out, rad or m, as `--joints` takes them,
+    /// Joint values from the base out, in rad or m, as `--joints` takes them.
     joints: Vec<f64>,
-    /// and what they are the values of.
+    /// The joints that these values belong to, in the same order.
     joint_info: Vec<JointPlaced>,
-    /// Names of joints outside their limits, also of those that mimic others.
+    /// Names of joints outside their limits, including those that mimic others.
     pub(crate) outside_limits: Vec<String>,
-    /// Positions in m, from the base out.
+    /// Positions of the connectors in m, from the base out.
     connectors: Vec<Vector>,
     rods: Vec<RodSize>,
 }
@@ -134,11 +134,11 @@ struct JointPlaced {
     name: String,
     value: f64,
     unit: &'static str,
-    /// Lowest and highest value; null where there are none.
+    /// Lowest and highest value in rad or m; null where the joint has no limits.
     limits: Option<[f64; 2]>,
 }
 
-/// Lengths that the rod between two connectors can have; null where there is no longest.
+/// Shortest and longest length in m of the rod between two connectors; null where it has no limit.
 #[derive(Debug, Serialize)]
 struct RodSize {
     min_m: f64,
@@ -146,7 +146,7 @@ struct RodSize {
 }
 
 impl Arm {
-    /// Where it is at `values`.
+    /// Returns the positions of the arm at these joint values.
     pub(crate) fn at(&self, values: &[f64]) -> Placed {
         let chain = &self.chain;
         let frames = chain.forward(values);
@@ -181,7 +181,7 @@ fn rod(rod: &Rod) -> RodSize {
 }
 
 impl Placed {
-    /// Words for people.
+    /// Returns the positions as text for people.
     pub(crate) fn text(&self) -> String {
         let joints: Vec<_> =
             self.joint_info.iter().map(|j| (j.name.clone(), joint_words(j))).collect();
@@ -208,7 +208,7 @@ fn joint_words(joint: &JointPlaced) -> String {
     format!("{:>9.4} {:<3}  ({limits})", joint.value, joint.unit)
 }
 
-/// A position in aligned columns.
+/// Formats a position in m in aligned columns.
 pub(crate) fn meters(p: &Vector) -> String {
     // Adding zero turns the -0 of rounding into 0.
     let rounded = p.map(|x| (x * 1e6).round() / 1e6 + 0.0);

@@ -1,4 +1,4 @@
-//! `sidestep check`: what a scenario describes, or what is wrong with it.
+//! `sidestep check`: validates a scenario and describes it.
 
 use crate::console::{Console, aligned};
 use crate::exit::{ExitCode, Failure};
@@ -14,7 +14,7 @@ Examples:
   sidestep check office.toml --set robots.0.size=3
   sidestep check office.toml --json | jq .bodies";
 
-/// Say what a scenario describes, or what is wrong with it; run nothing.
+/// Validate a scenario and describe it, without running it.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct CheckArgs {
@@ -29,8 +29,8 @@ pub(crate) struct CheckArgs {
 pub(crate) fn check(args: &CheckArgs, console: Console) -> Result<ExitCode, Failure> {
     let foreign = WORLDS.translate(&args.scenario.file)?;
     if let Some(Foreign { scenario: Err(error), json, lines }) = foreign {
-        // A file of another program that can be read may be right and still hold nobody whom we
-        // can place. Whatever else is wrong is wrong as in any scenario.
+        // A file of another program may be readable and correct and still hold no agent that can be
+        // placed. Any other error is one, as in every scenario.
         let mut json = json;
         json["airplanes"] = 0.into();
         json["no_scenario"] = error.to_string().into();

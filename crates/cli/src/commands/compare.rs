@@ -1,4 +1,4 @@
-//! `sidestep compare`: methods on the same traffic, side by side.
+//! `sidestep compare`: collision avoidance methods on the same traffic, side by side.
 
 use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
@@ -16,7 +16,7 @@ Examples:
   sidestep compare scenarios/airspace/superconflict.toml --runs 20
   sidestep compare superconflict.toml --methods pc,mvp --set airspace.shield=off --json";
 
-/// Run methods of avoiding each other on the same traffic.
+/// Compare collision avoidance methods on the same air traffic.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct CompareArgs {
@@ -26,25 +26,25 @@ pub(crate) struct CompareArgs {
     #[command(flatten)]
     workers: WorkersArg,
 
-    /// The methods
+    /// Methods to compare, separated by commas
     #[arg(long, value_delimiter = ',', default_value = "pc,orca,mvp,none")]
     methods: Vec<Name>,
 
-    /// Runs of each, by seed from the scenario's on
+    /// Number of runs of each method, with consecutive seeds from the scenario's on
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..))]
     runs: u32,
 }
 
-/// Methods by name.
+/// The collision avoidance methods.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum Name {
     /// Probability collectives
     Pc,
-    /// Optimal reciprocal collision avoidance
+    /// Optimal reciprocal collision avoidance (ORCA)
     Orca,
-    /// Modified voltage potential
+    /// Modified voltage potential (MVP)
     Mvp,
-    /// Straight on
+    /// No avoidance: everybody flies straight on
     None,
 }
 

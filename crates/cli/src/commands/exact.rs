@@ -17,12 +17,13 @@ const EXAMPLES: &str = "\
 Examples:
   sidestep exact scenarios/robots/one-robot.toml
   sidestep exact office.toml --set robots.count=1 --policy bounce --json
-  sidestep exact one-robot.toml --runs 2000 --cycles 50     hold the simulator against it
+  sidestep exact one-robot.toml --runs 2000 --cycles 50     compare the simulator with it
   sidestep exact one-robot.toml --pomdp model.pomdp --goal 5,3 --beam sonar-8:0
 
 The scenario has one robot; doors stay closed, and nobody else moves. The policy replaces the
-robot's behaviour: `uniform` takes each standard action alike, `forward` goes ahead, `bounce`
-goes ahead and turns after a contact. A simulator that disagrees ends with exit code 1.";
+robot's behavior: `uniform` takes each standard action with the same probability, `forward` goes
+ahead, `bounce` goes ahead and turns after a contact. A simulator that disagrees ends with exit
+code 1.";
 
 /// Compute the exact Markov chain of a scenario with one robot.
 #[derive(Debug, Args)]
@@ -31,15 +32,15 @@ pub(crate) struct ExactArgs {
     #[command(flatten)]
     scenario: ScenarioArgs,
 
-    /// How the robot chooses its actions
+    /// Policy: how the robot chooses its actions
     #[arg(long, value_name = "P", value_parser = POLICIES, default_value = "uniform")]
     policy: String,
 
-    /// Name this many of the boxes where the robot is most often
+    /// List this many of the boxes where the robot is most often
     #[arg(long, value_name = "N", default_value_t = 10)]
     top: usize,
 
-    /// Compare with this many simulated runs of as many cycles as the scenario or --cycles says
+    /// Compare with this many simulated runs, of the cycles that the scenario or --cycles gives
     #[arg(long, value_name = "R")]
     runs: Option<u32>,
 
@@ -47,27 +48,27 @@ pub(crate) struct ExactArgs {
     export: ExportArgs,
 }
 
-/// What is exported for planners.
+/// Options of the model that is exported for planners.
 #[derive(Debug, Args)]
 struct ExportArgs {
-    /// Write the model with its observations in Cassandra's POMDP format
+    /// Write the model with its observations to this file, in Cassandra's POMDP format
     #[arg(long, value_name = "OUT.pomdp")]
     pomdp: Option<PathBuf>,
 
-    /// Column and row that the planner is to reach, of the robot's lower-left box
+    /// Goal of the planner: column and row of the robot's lower-left box
     #[arg(long, value_name = "COL,ROW", value_parser = parse_goal, requires = "pomdp")]
     goal: Option<(u32, u32)>,
 
-    /// Discount per action
+    /// Discount factor per action
     #[arg(long, value_name = "D", requires = "pomdp")]
     #[arg(default_value_t = PomdpOptions::default().discount)]
     discount: f64,
 
-    /// A beam that is observed, counted from 0; may be given often [default: the one ahead]
+    /// A beam that is observed, counted from 0; repeatable [default: the one ahead]
     #[arg(long, value_name = "SENSOR:N", value_parser = parse_beam, requires = "pomdp")]
     beam: Vec<Beam>,
 
-    /// Leave contacts out of what is observed, which makes the model smaller
+    /// Leave contacts out of the observations, which makes the model smaller
     #[arg(long, requires = "pomdp")]
     no_contacts: bool,
 }
@@ -100,7 +101,7 @@ impl ExportArgs {
 /// Runs the command.
 ///
 /// # Errors
-/// When the scenario is wrong or no chain, or the export cannot be written.
+/// When the scenario is wrong or is not a Markov chain, or the export cannot be written.
 pub(crate) fn exact(args: &ExactArgs, console: Console) -> Result<ExitCode, Failure> {
     let (source, compiled) = args.scenario.compile()?;
     let compiled: &Compiled = of_world(compiled.as_ref(), &source, "robots")?;
@@ -126,7 +127,7 @@ fn export(model: &Model, args: &ExportArgs) -> Result<Option<PomdpSize>, Failure
     Ok(Some(pomdp.size()))
 }
 
-/// The library names a beam's sensor by an option that is part of --beam here.
+/// Replaces the library's name of an option by `--beam`, which includes it here.
 fn named_as_typed(error: InputError) -> InputError {
     match error.place() {
         "--sensor" => InputError::new("--beam", error.cause(), error.remedy()),

@@ -1,4 +1,4 @@
-//! `sidestep export`: a recorded run in the forms of other programs.
+//! `sidestep export`: converts a recorded run to formats of other programs.
 
 use crate::console::{Console, grouped};
 use crate::exit::{ExitCode, Failure};
@@ -19,28 +19,28 @@ Examples:
   sidestep export runs/office --to parquet --table trajectories
   sidestep export runs/office --to mcap --every 10         runs/office.mcap, for Foxglove
   sidestep export runs/office --to gif --from 1000 --until 2000
-  sidestep export runs/office --to png --from 1234         the state at the begin of this cycle
-  sidestep export office.mcap --to mp4-frames              pictures, and how ffmpeg joins them
+  sidestep export runs/office --to png --from 1234         the state at the start of this cycle
+  sidestep export office.mcap --to mp4-frames              frames, and the ffmpeg call that joins them
 
 Tables are copied from the run folder. Everything else is computed again from the recorded
-scenario; whoever comes to the recorded end confirms the recorded digest there.";
+scenario; an export that includes the recorded end confirms the recorded digest there.";
 
-/// The forms.
+/// The output formats.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Form {
-    /// Tables as text
+    /// Tables as text (CSV)
     Csv,
-    /// Tables, each as one file
+    /// Tables as Parquet, one file each
     Parquet,
-    /// What can be seen, for Foxglove and other viewers
+    /// Recording for Foxglove and other viewers: bodies, scans, events
     Mcap,
-    /// The picture of the run, or of a moment
+    /// Picture of the run, or of one cycle, as SVG
     Svg,
-    /// The same as pixels
+    /// The same picture as PNG
     Png,
-    /// A film
+    /// Animated GIF
     Gif,
-    /// A film as numbered PNG files
+    /// Numbered PNG frames, to be made into a video
     #[value(name = "mp4-frames")]
     Mp4Frames,
 }
@@ -71,51 +71,51 @@ impl Form {
     }
 }
 
-/// Write a recorded run as tables, pictures, films or recordings for viewers.
+/// Export a recorded run as tables, pictures, animations or recordings for viewers.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct ExportArgs {
-    /// The run folder, or an MCAP file
+    /// Run folder, or MCAP file
     #[arg(value_name = "DIR|FILE")]
     recorded: PathBuf,
 
-    /// What to write
+    /// Output format
     #[arg(long, value_name = "FORM", value_enum)]
     to: Form,
 
-    /// Where to [default: beside DIR, by its name]
+    /// Output file or folder [default: beside DIR, with its name]
     #[arg(long, value_name = "PATH")]
     out: Option<PathBuf>,
 
-    /// Begin at this cycle; of svg and png, show the state at its begin
+    /// First cycle; svg and png show the state at the start of this cycle
     #[arg(long, value_name = "C")]
     from: Option<Cycle>,
 
-    /// End with this cycle [default: the last]
+    /// Last cycle [default: the end of the run]
     #[arg(long, value_name = "C")]
     until: Option<Cycle>,
 
-    /// Only cycles that are multiples of this; of films: so that they have 150 pictures at most,
-    /// else each; events are never left out of tables
+    /// Export every N-th cycle [default: every cycle; of animations, at most 150 frames]; tables
+    /// always have all events
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     every: Option<Cycle>,
 
-    /// Only this table, of csv and parquet
+    /// Export only this table (csv and parquet)
     #[arg(long, value_name = "NAME")]
     table: Option<String>,
 
-    /// Pictures of a film per second [default: 15]
+    /// Frames per second of an animation [default: 15]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=50))]
     fps: Option<u16>,
 
-    /// Longer side of pictures in pixels [default: 640 of gif, 1280 of mp4-frames, 1600 of png]
+    /// Longer side of pictures in pixels [default: gif 640, mp4-frames 1280, png 1600]
     #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u16).range(64..=4096))]
     width: Option<u16>,
 
     #[command(flatten)]
     workers: WorkersArg,
 
-    /// Replace what was exported before
+    /// Overwrite an earlier export
     #[arg(long)]
     replace: bool,
 }
@@ -163,7 +163,7 @@ fn wanted(args: &ExportArgs) -> Export<'_> {
     }
 }
 
-/// Refuses options that would do nothing.
+/// Refuses options that have no effect on the chosen format.
 fn check_options(args: &ExportArgs) -> Result<(), InputError> {
     let form = args.to;
     let given = [
@@ -182,7 +182,7 @@ fn check_options(args: &ExportArgs) -> Result<(), InputError> {
     }
 }
 
-/// Says what was written.
+/// Prints which files were written.
 fn report(form: Form, written: &Written, console: Console) {
     let Written { paths, is_confirmed, film } = written;
     let json = json!({ "written": paths, "digest_confirmed": is_confirmed });
@@ -199,7 +199,7 @@ fn report(form: Form, written: &Written, console: Console) {
     });
 }
 
-/// Says how long a film is, or how to join its pictures.
+/// Returns how long a film is, or how to join its frames.
 fn film_words(form: Form, (pictures, fps): (usize, u16), path: &Path) -> String {
     if form == Form::Gif {
         return format!("  {pictures} pictures, {:.1} s\n", pictures as f64 / f64::from(fps));

@@ -1,4 +1,4 @@
-//! What `run` and `resume` share: the way to the end, and what is said there.
+//! The part that `run` and `resume` share: driving the run to its end, and its report.
 
 use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
@@ -7,7 +7,7 @@ use crate::report::text;
 use crate::watch::Watch;
 use sidestep_session::{Journey, Status, Summary};
 
-/// Goes to the end (or until Ctrl-C), stores and prints the report.
+/// Drives the run to its end (or until Ctrl-C), and stores and prints the summary.
 ///
 /// # Errors
 /// When something cannot be stored.

@@ -1,4 +1,4 @@
-//! `sidestep fk`: where a robot arm's tip and connectors are.
+//! `sidestep fk`: forward kinematics of a robot arm.
 
 use super::arm::ArmArgs;
 use crate::console::Console;
@@ -12,13 +12,13 @@ Examples:
   sidestep fk panda.urdf --tip panda_link8 --posture default --srdf panda.srdf
   sidestep fk panda.urdf --group arm --srdf panda.srdf
 
-Values are rad and m, for the joints that move from the base to the tip; without any, each is as
+Values are in rad or m, one for each moving joint from the base to the tip; without any, each is as
 near to zero as its limits allow. Values outside the limits are computed too, with a warning. The
-tip is the leaf with the most moving joints, unless told otherwise. Connectors are the points that
-the chain world moves: where axes meet or come nearest to each other, and the tip. Positions are m
-in the frame of the base. xacro has to be expanded first.";
+default tip is the leaf with the most moving joints. Connectors are the points that the chain world
+moves: where axes meet or come nearest to each other, and the tip. Positions are in m in the frame
+of the base. Expand xacro files first.";
 
-/// Compute where a robot arm's tip and connectors are (forward kinematics).
+/// Forward kinematics: compute the positions of a robot arm's tip and connectors.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct FkArgs {

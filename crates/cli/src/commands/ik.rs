@@ -1,4 +1,4 @@
-//! `sidestep ik`: joint values that bring a robot arm's tip to a target.
+//! `sidestep ik`: inverse kinematics of a robot arm.
 
 use super::arm::{Arm, ArmArgs, Placed, meters, numbers};
 use crate::console::{Console, aligned};
@@ -16,62 +16,62 @@ Examples:
   sidestep ik arm.urdf --target 0.3,0.1,0.4 --obstacle 0.2,0,0.3,0.05 --obstacle 0,0.2,0.3,0.05
 
 The target is a position in m in the frame of the base. The search starts from --joints or
---posture (else from rest) and goes on from random postures; joints stay inside their limits.
-Obstacles are spheres (center and radius in m) that no rod between two connectors may be in: rods
-are thin lines, so add the arm's thickness to the radius. The answer is a posture; the way there is
-not looked at. Its joints can be given to `sidestep fk --joints`.
+--posture (otherwise from rest) and continues from random postures; joints stay inside their limits.
+Obstacles are spheres (center and radius in m) that no rod between two connectors may enter: rods
+are thin lines, so add the arm's thickness to the radius. The answer is a posture; the path to it is
+not checked. Its joint values can be passed to `sidestep fk --joints`.
 
-Exit code 0 when the target is reached, 1 when not: then the nearest posture found is told, and
-what is in the way.";
+The exit code is 0 if the target is reached and 1 if not: then the nearest posture found is printed,
+and what is in the way.";
 
-/// Compute joint values that bring a robot arm's tip to a target (inverse kinematics).
+/// Inverse kinematics: compute joint values that bring a robot arm's tip to a target.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct IkArgs {
     #[command(flatten)]
     arm: ArmArgs,
 
-    /// Where the tip shall be, in m
+    /// Target position of the tip, in m
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     target: String,
 
-    /// Start from the connectors' solution, or work on the joints at once
+    /// Solver
     #[arg(long, value_name = "ENGINE", default_value = "auto")]
     engine: EngineName,
 
-    /// How near counts as there
+    /// Largest distance in m at which the target counts as reached
     #[arg(long, value_name = "M", default_value_t = 1e-6)]
     tolerance_m: f64,
 
-    /// Random postures to start from after the first
+    /// Number of random postures to start from after the first
     #[arg(long, value_name = "N", default_value_t = 100)]
     restarts: usize,
 
-    /// What they grow from
+    /// Random seed of these postures
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
 
-    /// A sphere that the arm may not be in; may be given several times
+    /// Spherical obstacle (center and radius in m); repeatable
     #[arg(long = "obstacle", value_name = "X,Y,Z,R", allow_hyphen_values = true)]
     obstacles: Vec<String>,
 
-    /// Let joints leave their limits
+    /// Ignore joint limits
     #[arg(long)]
     ignore_limits: bool,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum EngineName {
-    /// The faster one: dls
+    /// The faster one, which is dls
     Auto,
-    /// Connectors first, by the rules of the chain (on links of fixed length: FABRIK), then the joints
+    /// Connectors first, by the rules of the chain (FABRIK on links of fixed length), then the joints
     #[value(alias = "fabrik")]
     Chain,
     /// Damped least squares on the joints
     Dls,
 }
 
-/// What the command says.
+/// The answer of the command.
 #[derive(Debug, Serialize)]
 struct Found {
     reached: bool,
@@ -81,9 +81,9 @@ struct Found {
     reason: Option<String>,
     target: Vector,
     engine: &'static str,
-    /// Steps over all starts.
+    /// Number of steps, over all starts.
     iterations: usize,
-    /// Postures that the search started from.
+    /// Number of postures that the search started from.
     starts: usize,
     #[serde(flatten)]
     placed: Placed,
@@ -133,7 +133,7 @@ impl IkArgs {
     }
 }
 
-/// As many numbers as an option takes, each finite and not absurdly large.
+/// Reads the `N` numbers that an option takes, each of a size that a place in m can have.
 fn fixed<const N: usize>(option: &str, form: &str, text: &str) -> Result<[f64; N], InputError> {
     let remedy =
         || format!("write {form} in m, such as {}", ["0.3", "0.1", "0.4", "0.05"][..N].join(","));

@@ -31,7 +31,7 @@ Examples:
   sidestep learn sensor --csv readings.csv --range 3.75 --profile mine.toml --name sonar
   sidestep learn sensor --run runs/hall --edges 0.3,1.5 --classes near,medium,far
 
-CSV columns: true, reported (observations in one word; `nothing`), and true_distance_m,
+CSV columns: true, reported (one word each; `nothing` for no observation), and true_distance_m,
 reported_distance_m, or true_class, reported_class.";
 
 const EFFECTOR_EXAMPLES: &str = "\
@@ -42,9 +42,9 @@ Examples:
   sidestep learn effector --run runs/hall       recorded with --set record.calibration=true
 
 CSV columns: action (forward, left, right, stay), ahead_boxes, left_boxes, turn_deg.
-Moves that an obstacle cut are left out: log in an open place.";
+Moves that an obstacle cut short are left out: record logs in an open place.";
 
-/// Learn the errors of a real robot's sensors and wheels from its logs.
+/// Learn the error models of a real robot's sensors and wheels from its logs.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct LearnArgs {
@@ -54,9 +54,9 @@ pub(crate) struct LearnArgs {
 
 #[derive(Debug, Subcommand)]
 enum What {
-    /// What a sensor reports against what was there
+    /// Learn the errors of a sensor: its readings against the truth
     Sensor(SensorArgs),
-    /// What a commanded move or turn really does
+    /// Learn the errors of an effector: the real motion against the command
     Effector(EffectorArgs),
 }
 
@@ -75,15 +75,15 @@ struct SensorArgs {
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     classes: Vec<String>,
 
-    /// Bearings of the beams that the profile gets, in degrees, positive to the left
+    /// Bearings of the beams in the profile, in degrees, positive to the left
     #[arg(long, value_name = "DEG,...", value_delimiter = ',', allow_negative_numbers = true)]
     bearings: Option<Vec<f64>>,
 
-    /// Range that the profile gets, in meters
+    /// Range of the sensor in the profile, in meters
     #[arg(long, value_name = "M")]
     range: Option<f64>,
 
-    /// The sensor to learn, where the log has several
+    /// Name of the sensor, if the log has several
     #[arg(long, value_name = "SENSOR", conflicts_with = "mrclam")]
     sensor: Option<String>,
 
@@ -101,7 +101,7 @@ struct SensorLog {
     #[arg(long, value_name = "DIR")]
     mrclam: Option<PathBuf>,
 
-    /// Readings whose truth is known
+    /// CSV file of readings with their true values
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
 
@@ -117,7 +117,7 @@ struct EffectorArgs {
     #[command(flatten)]
     log: EffectorLog,
 
-    /// Side of a box in meters, for --mrclam (other logs tell moves in boxes) [default: 0.25]
+    /// Side of a box in meters, for --mrclam (other logs give moves in boxes) [default: 0.25]
     #[arg(long = "box", value_name = "B")]
     box_size_m: Option<f64>,
 
@@ -139,7 +139,7 @@ struct EffectorLog {
     #[arg(long, value_name = "FILE")]
     carmen: Option<PathBuf>,
 
-    /// Displacements that were measured
+    /// CSV file of measured displacements
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
 
@@ -151,12 +151,12 @@ struct EffectorLog {
 /// How counts become probabilities.
 #[derive(Debug, Args)]
 struct EstimateArgs {
-    /// Added to every count before rows are normalized
+    /// Smoothing: added to every count before rows are normalized
     #[arg(long, value_name = "A", allow_negative_numbers = true)]
     #[arg(default_value_t = EstimateOptions::default().alpha)]
     alpha: f64,
 
-    /// Hold out every so many events to test the fit
+    /// Hold out every N-th event to test the fit
     #[arg(long, value_name = "N", default_value_t = EstimateOptions::default().hold_out_every)]
     hold_out: usize,
 }
@@ -171,10 +171,10 @@ impl EstimateArgs {
     }
 }
 
-/// Where what was learned goes.
+/// The profile that the result is added to.
 #[derive(Debug, Args)]
 struct TargetArgs {
-    /// Add the result to this profile; it is made where it is missing
+    /// Profile to add the result to; created if missing
     #[arg(long, value_name = "OUT.toml")]
     profile: Option<PathBuf>,
 
@@ -249,11 +249,11 @@ fn no_log() -> InputError {
     InputError::new("sidestep learn", "no log is named", "see `sidestep learn --help`")
 }
 
-/// Largest profile that is read to be added to.
+/// Largest profile in bytes that can be added to.
 const MAX_PROFILE_BYTES: u64 = 64 << 20;
 
 impl TargetArgs {
-    /// Adds to the profile, if one is named; it is replaced in one step.
+    /// Adds a section to the profile, if one is named. The file is replaced in one step.
     fn add(
         &self,
         section: impl FnOnce(&str, &str, &str) -> Result<String, InputError>,

@@ -1,4 +1,4 @@
-//! `sidestep map`: a map as the program sees it.
+//! `sidestep map`: a map as the simulator sees it.
 
 use crate::console::{Console, columns};
 use crate::exit::{ExitCode, Failure};
@@ -20,9 +20,9 @@ Examples:
   sidestep map building.yaml --box 0.5 --json
 
 Reads ROS map_server (.yaml), MovingAI (.map) and character maps (.txt), each also with .gz.
-On the terminal: # wall, . free, ? unknown; a wide map is drawn smaller and loses no wall.";
+In the terminal: # wall, . free, ? unknown; a wide map is drawn smaller and loses no wall.";
 
-/// Show a map as the program sees it, on the terminal and as PNG.
+/// Show a map as the simulator sees it, in the terminal or as PNG.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct MapArgs {
@@ -34,15 +34,15 @@ pub(crate) struct MapArgs {
     #[arg(long = "box", value_name = "B", default_value_t = 0.25)]
     box_size_m: f64,
 
-    /// What boxes that nobody has mapped become (in scenarios: wall, unless told otherwise)
+    /// How to treat unmapped (unknown) boxes; in scenarios the default is wall
     #[arg(long, value_enum, default_value_t = Unknown::Keep)]
     unknown: Unknown,
 
-    /// Draw the boxes to this PNG file
+    /// Save a picture of the boxes to this PNG file
     #[arg(long, value_name = "OUT")]
     png: Option<PathBuf>,
 
-    /// Columns of text at most [default: those of the terminal]
+    /// Largest number of text columns [default: width of the terminal]
     #[arg(long, value_name = "COLS", value_parser = clap::value_parser!(u16).range(1..))]
     width: Option<u16>,
 }
@@ -64,7 +64,7 @@ impl From<Unknown> for UnknownPolicy {
     }
 }
 
-/// What is counted: pixels of the file, and boxes.
+/// Size and number of pixels of the file, and of boxes.
 #[derive(Debug, Serialize)]
 struct Counts {
     width: u32,
@@ -108,7 +108,7 @@ fn read(args: &MapArgs) -> Result<(Counts, GridMap), InputError> {
     Ok((counts(&map, size, pixels.counts(), pixels.resolution_m()), map))
 }
 
-/// Other maps have one character per box.
+/// Whether the map is a ROS map: only these have pixels that differ from boxes in size.
 fn is_yaml(file: &Path) -> bool {
     let name = file.to_string_lossy().to_lowercase();
     let name = name.strip_suffix(".gz").unwrap_or(&name);

@@ -22,45 +22,45 @@ use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
 use clap::Subcommand;
 
-/// The commands.
+/// The commands of `sidestep`.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Run a scenario, and record it with --out
+    /// Run a scenario; record it with --out
     Run(run::RunArgs),
-    /// Say what a scenario describes, or what is wrong with it; run nothing
+    /// Validate a scenario and describe it, without running it
     Check(check::CheckArgs),
-    /// Write a commented scenario to begin with
+    /// Create a commented scenario as a starting point
     New(new::NewArgs),
-    /// Show a map as the program sees it, on the terminal and as PNG
+    /// Show a map as the simulator sees it, in the terminal or as PNG
     Map(map::MapArgs),
-    /// Learn the errors of a real robot's sensors and wheels from its logs
+    /// Learn the error models of a real robot's sensors and wheels from its logs
     Learn(learn::LearnArgs),
     /// Compute the exact Markov chain of a scenario with one robot
     Exact(exact::ExactArgs),
-    /// Run many variants of a scenario, each with many seeds, and sum them up
+    /// Run a parameter sweep: many variants of a scenario, each with many seeds
     Sweep(Box<sweep::SweepArgs>),
-    /// Run methods of avoiding each other on the same traffic
+    /// Compare collision avoidance methods on the same air traffic
     Compare(compare::CompareArgs),
-    /// Compute where a robot arm's tip and connectors are
+    /// Forward kinematics: compute the positions of a robot arm's tip and connectors
     Fk(fk::FkArgs),
-    /// Compute joint values that bring a robot arm's tip to a target
+    /// Inverse kinematics: compute joint values that bring a robot arm's tip to a target
     Ik(ik::IkArgs),
     /// Continue a recorded run or a sweep that was stopped or killed
     Resume(resume::ResumeArgs),
-    /// Write a report of a run folder: one HTML file, and Markdown
+    /// Write a report of a run or a sweep: one HTML file, and Markdown
     Report(report::ReportArgs),
-    /// Run a paper's experiments anew and judge its claims
+    /// Reproduce a paper's experiments and judge its claims
     Reproduce(reproduce::ReproduceArgs),
-    /// Compute a recorded run again and compare it with what was recorded
+    /// Compute a recorded run again and compare it with the recording
     Replay(replay::ReplayArgs),
-    /// Write a recorded run as tables, pictures, films or recordings for viewers
+    /// Export a recorded run as tables, pictures, animations or recordings for viewers
     Export(export::ExportArgs),
 }
 
-/// Does what was typed.
+/// Executes a command and returns its exit code.
 ///
 /// # Errors
-/// When it cannot be done; the failure knows its exit code.
+/// When the command fails; the failure knows its exit code.
 pub(crate) fn execute(command: Command, console: &Console) -> Result<ExitCode, Failure> {
     match command {
         Command::Run(args) => run::run(&args, *console),

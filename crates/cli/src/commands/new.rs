@@ -1,4 +1,4 @@
-//! `sidestep new`: a commented scenario to begin with.
+//! `sidestep new`: a commented scenario as a starting point.
 
 use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
@@ -17,20 +17,20 @@ Examples:
   sidestep new robots warehouse.toml
   sidestep new robots w.toml && sidestep check w.toml";
 
-/// Write a commented scenario to begin with.
+/// Create a commented scenario as a starting point.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct NewArgs {
-    /// The world
+    /// World of the scenario
     #[arg(value_name = "WORLD", value_parser = worlds())]
     world: String,
 
-    /// The file to write; an existing one is left alone [default: WORLD.toml]
+    /// Output file; an existing one is never overwritten [default: WORLD.toml]
     #[arg(value_name = "NAME.toml")]
     file: Option<PathBuf>,
 }
 
-/// The names of the worlds, each with what it simulates.
+/// The names of the worlds, each with a description.
 fn worlds() -> PossibleValuesParser {
     let named = |kind: &&dyn Kind| PossibleValue::new(kind.name()).help(kind.about());
     PossibleValuesParser::new(WORLDS.0.iter().map(named))

@@ -21,19 +21,19 @@ Examples:
   sidestep replay runs/office --cycle 1234 --json | jq '.bodies[0]'
 
 Without --cycle the whole run is computed again from the recorded scenario, and the digest of
-its last state compared with the recorded one. With --cycle the state is computed from the
-last checkpoint before the cycle, else from the start, and compared with the recorded poses of
-that cycle. A difference ends with exit code 1.";
+its last state is compared with the recorded one. With --cycle the state is computed from the
+last checkpoint before the cycle, or from the start, and compared with the recorded poses of
+that cycle. If they differ, the exit code is 1.";
 
-/// Compute a recorded run again, and compare it with what was recorded.
+/// Compute a recorded run again, and compare it with the recording.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct ReplayArgs {
-    /// The run folder, or an MCAP file
+    /// Run folder, or MCAP file
     #[arg(value_name = "DIR|FILE")]
     recorded: PathBuf,
 
-    /// Show the state at the beginning of this cycle [default: confirm the whole run]
+    /// Show the state at the start of this cycle [default: verify the whole run]
     #[arg(long, value_name = "N")]
     cycle: Option<Cycle>,
 
@@ -48,7 +48,7 @@ pub(crate) struct ReplayArgs {
 /// Runs the command.
 ///
 /// # Errors
-/// When the folder or the cycle is wrong, or the state differs from what was recorded.
+/// When the folder or the cycle is wrong, or the state differs from the recorded one.
 pub(crate) fn replay(args: &ReplayArgs, console: Console) -> Result<ExitCode, Failure> {
     let recorded = Recorded::open(WORLDS, &args.recorded)?;
     let (workers, watch) = (args.workers.count(), Watch::new(console));

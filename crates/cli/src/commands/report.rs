@@ -1,4 +1,4 @@
-//! `sidestep report`: a folder of results as a page, and as Markdown.
+//! `sidestep report`: a report of a run or a sweep, as a page and as Markdown.
 
 use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
@@ -15,20 +15,20 @@ const EXAMPLES: &str = "\
 Examples:
   sidestep report runs/office                  runs/office/report.html and report.md
   sidestep report runs/office --out office.html
-  sidestep report sweeps/methods               of all runs: intervals, comparisons, figures
+  sidestep report sweeps/methods               all runs: intervals, comparisons, figures
 
-The page is one file that needs no network. A run that has not ended can be reported too; the
+The page is one file that needs no network. A run that is not complete can be reported too; its
 report says so.";
 
 /// Write a report of a run or a sweep: one HTML file, and Markdown.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct ReportArgs {
-    /// The folder of a run or a sweep
+    /// Folder of a run or a sweep
     #[arg(value_name = "DIR")]
     folder: PathBuf,
 
-    /// Write the page to this file, and its Markdown twin beside it [default: DIR/report.html]
+    /// Output file; the Markdown version is written beside it [default: DIR/report.html]
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
@@ -48,7 +48,10 @@ pub(crate) fn report(args: &ReportArgs, console: Console) -> Result<ExitCode, Fa
     Ok(ExitCode::Done)
 }
 
-/// Where the report goes; its Markdown twin must not be the page itself.
+/// Returns the files of the report.
+///
+/// # Errors
+/// When the page's name does not end in `.html` or `.htm`.
 fn pages(args: &ReportArgs) -> Result<Pages, InputError> {
     let html = args.out.clone().unwrap_or_else(|| args.folder.join("report.html"));
     let ending = html.extension().and_then(|e| e.to_str());

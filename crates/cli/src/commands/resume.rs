@@ -1,4 +1,4 @@
-//! `sidestep resume`: goes on with a run that was stopped or killed.
+//! `sidestep resume`: continues a run or a sweep that was stopped or killed.
 
 use super::finish::travel;
 use crate::console::{Console, grouped};
@@ -18,22 +18,22 @@ Examples:
   sidestep resume runs/office
   sidestep resume sweeps/methods
   sidestep resume runs/office --workers 8
-  sidestep resume runs/office --cycles 20000     go on to cycle 20000 only, still incomplete
+  sidestep resume runs/office --cycles 20000     continue to cycle 20000 only, still incomplete
 
-The result has the same digest and the same rows as a run in one go.";
+The result has the same digest and the same rows as an uninterrupted run.";
 
 /// Continue a recorded run or a sweep that was stopped or killed.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct ResumeArgs {
-    /// The folder of a run or a sweep
+    /// Folder of a run or a sweep
     #[arg(value_name = "DIR")]
     folder: PathBuf,
 
     #[command(flatten)]
     workers: WorkersArg,
 
-    /// Stop at this cycle [default: the end that was planned]
+    /// Stop at this cycle [default: the planned end]
     #[arg(long, value_name = "N")]
     cycles: Option<Cycle>,
 }

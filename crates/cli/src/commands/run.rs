@@ -22,12 +22,12 @@ Examples:
   sidestep run office.toml --json | jq .metrics.contacts
   sidestep run office.toml --mcap office.mcap               for Foxglove and other viewers
   sidestep run tracks.csv                                   replay recorded traffic
-  sidestep run tracks.csv --set airspace.replay_until_s=600 fly it anew from then on
+  sidestep run tracks.csv --set airspace.replay_until_s=600 simulate it from that time on
 
-Without --out and --mcap nothing is written. The folder holds scenario.toml (resolved), summary.json,
+Without --out and --mcap nothing is written. The folder holds scenario.toml (complete), summary.json,
 trajectories/ and events/ (Parquet), trajectories.svg and .png, and a checkpoint.";
 
-/// Run a scenario, and record it with --out.
+/// Run a scenario; record it with --out.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 #[command(group = ArgGroup::new("written").args(["out", "mcap"]).multiple(true))]
@@ -41,20 +41,20 @@ pub(crate) struct RunArgs {
     #[command(flatten)]
     workers: WorkersArg,
 
-    /// Record the run to this folder, which must be new or empty
+    /// Output folder for the recorded run; it must be new or empty
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 
-    /// Record what can be seen to this MCAP file, for viewers: bodies, scans, events
+    /// Record bodies, scans and events to this MCAP file, for Foxglove and other viewers
     #[arg(long, value_name = "FILE")]
     mcap: Option<PathBuf>,
 
-    /// Cycles from frame to frame of the MCAP file
+    /// Number of cycles between frames of the MCAP file
     #[arg(long, value_name = "N", default_value_t = 1, requires = "mcap",
         value_parser = clap::value_parser!(u64).range(1..))]
     mcap_every: Cycle,
 
-    /// Delete the run that DIR holds already, and FILE
+    /// Overwrite an earlier run in DIR, and FILE
     #[arg(long, requires = "written")]
     replace: bool,
 }

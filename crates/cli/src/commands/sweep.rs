@@ -28,10 +28,10 @@ On a cluster (docs/clusters.md has a Slurm array and a Kubernetes job):
 
 A sweep file is TOML: format = 1, scenario = \"FILE\", replicates, [set], [vary], [[variant]],
 [latin_hypercube], [until], metrics, baseline; scenarios/sweeps/ has commented ones. Replicate k of
-every variant has the same seed. DIR/results.parquet has a row a run. The same command again goes
-on where a killed one stopped, as does `sidestep resume DIR`; no finished run is made again.";
+every variant has the same seed. DIR/results.parquet has one row per run. The same command again
+continues where a killed one stopped, as does `sidestep resume DIR`; no finished run is repeated.";
 
-/// Run many variants of a scenario, each with many seeds, and sum them up.
+/// Run a parameter sweep: many variants of a scenario, each with many seeds.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES, args_conflicts_with_subcommands = true)]
 pub(crate) struct SweepArgs {
@@ -51,18 +51,18 @@ pub(crate) struct SweepArgs {
     #[command(flatten)]
     workers: WorkersArg,
 
-    /// Keep all runs in this folder, which must be new, empty, or hold this very sweep
+    /// Output folder; it must be new, empty, or hold this same sweep
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
 
 #[derive(Debug, Subcommand)]
 enum Step {
-    /// Check all variants and write what is to be run
+    /// Plan a sweep for a cluster: check all variants and list the runs
     Plan(Box<PlanArgs>),
-    /// Run a share of a planned sweep
+    /// Run one share (shard) of a planned sweep
     Run(ShareArgs),
-    /// Join the shares of a sweep into one table
+    /// Collect the shares of a sweep into one table
     Collect(CollectArgs),
 }
 
@@ -78,18 +78,18 @@ struct PlanArgs {
     #[command(flatten)]
     many: ManyArgs,
 
-    /// The sweep's folder, which must be new or empty
+    /// Folder of the sweep; it must be new or empty
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
 }
 
 #[derive(Debug, Args)]
 struct ShareArgs {
-    /// The sweep's folder
+    /// Folder of the sweep
     #[arg(value_name = "DIR")]
     folder: PathBuf,
 
-    /// Run share I of N, I from 0 to N-1
+    /// Share to run: I of N, with I from 0 to N-1
     #[arg(long, value_name = "I/N")]
     shard: Shard,
 
@@ -99,7 +99,7 @@ struct ShareArgs {
 
 #[derive(Debug, Args)]
 struct CollectArgs {
-    /// The sweep's folder
+    /// Folder of the sweep
     #[arg(value_name = "DIR")]
     folder: PathBuf,
 }
@@ -124,7 +124,7 @@ pub(crate) fn sweep(args: &SweepArgs, console: Console) -> Result<ExitCode, Fail
     }
 }
 
-/// All runs that a file and options ask for.
+/// Runs the sweep that a file and the options describe.
 ///
 /// # Errors
 /// When the sweep or the folder is wrong, or results cannot be stored.

@@ -1,4 +1,4 @@
-//! What was typed -> a sweep.
+//! Options of the command line -> a sweep.
 
 use crate::plan::ChangeArgs;
 use clap::Args;
@@ -7,51 +7,50 @@ use sidestep::experiment::sweep::{Factor, Setting, Sweep, Until};
 use sidestep::kernel::InputError;
 use std::path::Path;
 
-/// What makes many runs of one.
+/// The options that turn one run into many.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Many runs")]
 pub(crate) struct ManyArgs {
-    /// Run every variant this often, with the seeds S, S+1, ... [default of a sweep: 10]
+    /// Number of runs per variant, with the seeds S, S+1, ... [default of a sweep: 10]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub(crate) replicate: Option<u32>,
 
-    /// Run with each of these values; given often: with every combination
+    /// Run with each of these values; repeatable, for every combination (a grid)
     #[arg(long, value_name = "KEY=V,V,...")]
     pub(crate) vary: Vec<String>,
 
-    /// Run each variant until 95 % intervals of means are so narrow: ci=0.05 (half a width, of the
-    /// mean) or abs=2.5 (in the metric's unit)
+    /// Run each variant until the 95 % confidence intervals of means are this narrow: ci=0.05 (half
+    /// width relative to the mean) or abs=2.5 (half width in the metric's unit)
     #[arg(long, value_name = "PRECISION", conflicts_with = "replicate")]
     pub(crate) until: Option<Until>,
 
-    /// Runs of each variant at most, where a precision ends them: with --until, or where the file
-    /// has `[until]` [default: 1000]
+    /// Largest number of runs per variant, with --until or a file that has `[until]` [default: 1000]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub(crate) max: Option<u32>,
 
-    /// Report these metrics, and apply --until to them [default: all that vary]
+    /// Metrics to report, and to apply --until to [default: all that vary]
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     pub(crate) metrics: Vec<String>,
 
-    /// Compare every variant with the one of these values, seed by seed
+    /// Baseline: compare every variant with the one that has this value, seed by seed
     #[arg(long, value_name = "KEY=V")]
     pub(crate) baseline: Vec<String>,
 
-    /// Record every run to a folder of its own, in DIR/runs
+    /// Record every run in a folder of its own, in DIR/runs
     #[arg(long)]
     pub(crate) record_runs: bool,
 }
 
 impl ManyArgs {
-    /// Whether many runs are asked for.
+    /// Whether an option asks for many runs.
     pub(crate) fn is_asked(&self) -> bool {
         self.replicate.is_some() || !self.vary.is_empty() || self.until.is_some()
     }
 
-    /// Refuses options that say something of many runs where one is asked for.
+    /// Refuses options that apply only to many runs, for a single run.
     ///
     /// # Errors
-    /// Names the first such option.
+    /// When there is such an option; the error names the first.
     pub(crate) fn check_one_run(&self) -> Result<(), InputError> {
         let given = [
             (!self.metrics.is_empty(), "--metrics"),
@@ -66,7 +65,7 @@ impl ManyArgs {
         Err(InputError::new(option, "it is about many runs, and this is one", remedy))
     }
 
-    /// The sweep that the file asks for, with what the options change in it.
+    /// Returns the sweep that the file describes, with the changes of the options.
     ///
     /// # Errors
     /// When the file or an option is wrong.
@@ -77,7 +76,7 @@ impl ManyArgs {
             sweep.design.factors.push(Factor::parse(text)?);
         }
         if let Some(until) = &self.until {
-            // What else the file says of it stays.
+            // An option replaces the precision alone; the other keys of the file's `until` stay.
             let metrics = sweep.until.take().map(|of_file| of_file.metrics);
             sweep.replicates = if metrics.is_some() { sweep.replicates } else { MAX_RUNS };
             sweep.until = Some(Until { metrics: metrics.unwrap_or_default(), ..until.clone() });

@@ -1,7 +1,7 @@
-//! Many runs: what was typed -> a sweep, and what came of it in words.
+//! Many runs: options -> a sweep, and its results as text.
 //!
 //! ```text
-//! ask.rs      options and files -> what to run         say.rs       what it came to, in words
+//! ask.rs      options and files -> a sweep         say.rs       its results, as text and JSON
 //! ```
 
 mod ask;
@@ -16,7 +16,7 @@ pub(crate) use say::{Told, tell, tell_share};
 use sidestep::worlds::WORLDS;
 use sidestep_session::sweep::{self, Folder};
 
-/// Runs whatever is not finished yet in the folder of a sweep.
+/// Runs all cells of a sweep's folder that are not finished.
 ///
 /// # Errors
 /// When runs cannot be read or stored.

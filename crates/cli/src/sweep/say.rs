@@ -1,4 +1,4 @@
-//! What a sweep came to, in words and as JSON.
+//! The results of a sweep, as text and as JSON.
 
 use crate::console::{Console, aligned, duration, grouped, in_columns};
 use crate::exit::{ExitCode, Failure};
@@ -9,7 +9,7 @@ use sidestep_session::sweep::{Done, Effort, Ended, Folder};
 use std::fmt::Write;
 use std::path::Path;
 
-/// Failed runs that are named.
+/// Largest number of failed runs that are listed.
 const NAMED: usize = 5;
 
 fn time_words(effort: &Effort) -> String {
@@ -33,17 +33,17 @@ fn time_json(effort: &Effort) -> serde_json::Value {
     })
 }
 
-/// The sweep that is spoken of, and to whom.
+/// A sweep and the console that it is reported to.
 #[derive(Clone, Copy)]
 pub(crate) struct Told<'a> {
     pub(crate) plan: &'a Plan,
-    /// Its folder, if it has one.
+    /// The sweep's folder, if it has one.
     pub(crate) folder: Option<&'a Folder>,
     pub(crate) console: Console,
 }
 
-/// Sums the runs up and prints it; `already` is for runs that were finished before. Runs that
-/// failed are told, and end with exit code 1.
+/// Summarizes the runs and prints the results; `already` mentions runs that were finished before.
+/// Failed runs are listed, and make the exit code 1.
 ///
 /// # Errors
 /// When a metric that is to be reported does not exist.
@@ -76,7 +76,7 @@ pub(crate) fn tell(told: Told<'_>, ended: Ended, already: &str) -> Result<ExitCo
     Ok(if failed == 0 { ExitCode::Done } else { ExitCode::Failed })
 }
 
-/// Says how far an interrupted sweep is.
+/// Prints how many runs of an interrupted sweep are finished.
 fn interrupted(told: Told<'_>, finished: usize) -> ExitCode {
     let Told { plan, folder, console } = told;
     let path = folder.map(Folder::path);
@@ -115,7 +115,7 @@ fn text(
         let _ = write!(text, "\n{}\n{}", table.title, in_columns(&table));
     }
     let mut lines = Vec::new();
-    // Who names metrics knows that the others are not shown.
+    // Metrics that the user did not ask for need no remark.
     if plan.metrics.is_empty()
         && let Some(words) = left_out(summary)
     {
@@ -138,7 +138,7 @@ fn text(
     format!("{text}\n{}", aligned(&lines))
 }
 
-/// Metrics that have no table, by the reason.
+/// Returns which metrics have no table, and why.
 fn left_out(summary: &Summary) -> Option<String> {
     let mut reasons: Vec<(&str, Vec<&str>)> = Vec::new();
     for LeftOut { metric, reason } in &summary.left_out {
@@ -157,7 +157,7 @@ fn left_out(summary: &Summary) -> Option<String> {
     (!all.is_empty()).then(|| all.join("; "))
 }
 
-/// Tells the first runs that failed, and how to run them again; their number.
+/// Prints the first failed runs and how to run them again, and returns the number of all.
 fn failures(told: Told<'_>, table: &RunTable) -> usize {
     let Told { plan, folder, console } = told;
     let Some(column) = table.column("failure") else { return 0 };
@@ -184,7 +184,7 @@ fn failures(told: Told<'_>, table: &RunTable) -> usize {
     failed.len()
 }
 
-/// Says that a share is done, or how far it is.
+/// Prints that a share is done, or how many of its runs are finished.
 pub(crate) fn tell_share(told: Told<'_>, shard: Shard, ended: Ended) -> ExitCode {
     let console = told.console;
     let Done { table, effort, was_done } = match ended {

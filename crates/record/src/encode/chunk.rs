@@ -1,4 +1,4 @@
-//! Pages put together to a column chunk that the `parquet` crate can place into a file.
+//! Pages assembled into a column chunk that the `parquet` crate can place in a file.
 
 use bytes::Bytes;
 use parquet::basic::{Compression, Encoding};
@@ -10,7 +10,7 @@ use parquet::file::statistics::Statistics;
 use parquet::file::writer::{SerializedPageWriter, TrackedWrite};
 use parquet::schema::types::ColumnDescPtr;
 
-/// Appends a text as plain pages have it: its length, then its bytes.
+/// Appends a text as plain pages store it: its length, then its bytes.
 pub(super) fn put_text(text: &str, page: &mut Vec<u8>) {
     page.extend_from_slice(&(text.len() as u32).to_le_bytes());
     page.extend_from_slice(text.as_bytes());
@@ -31,12 +31,12 @@ impl ColumnChunk {
         Self { descriptor, bytes, rows: 0, dictionary_bytes: 0, encodings: Vec::new() }
     }
 
-    /// Rows in the pages so far.
+    /// Returns the number of rows in the pages so far.
     pub(crate) fn rows(&self) -> u64 {
         self.rows
     }
 
-    /// Puts the vocabulary first; once, before any data page.
+    /// Adds the vocabulary; only once, before any data page.
     pub(crate) fn add_dictionary(&mut self, labels: &[String]) -> Result<()> {
         let mut page = Vec::new();
         labels.iter().for_each(|label| put_text(label, &mut page));
@@ -57,8 +57,8 @@ impl ColumnChunk {
             buf: page.into(),
             num_values: rows,
             encoding,
-            // Of a nullable column; of a required one no levels are written, yet readers want a
-            // name.
+            // The encoding applies to nullable columns. Required ones have no levels, but readers
+            // expect a name here too.
             def_level_encoding: Encoding::RLE,
             rep_level_encoding: Encoding::RLE,
             statistics: None,
@@ -75,7 +75,7 @@ impl ColumnChunk {
         Ok(())
     }
 
-    /// The chunk's bytes and the description that goes into the footer.
+    /// Returns the chunk's bytes and the description that goes into the footer.
     pub(crate) fn close(
         self,
         statistics: Option<Statistics>,

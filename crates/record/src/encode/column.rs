@@ -1,4 +1,4 @@
-//! One column on its way into a row group: values in, pages out.
+//! The encoder of one column: values in, pages out.
 
 use std::ops::Range;
 
@@ -15,18 +15,18 @@ use super::delta::DeltaEncoder;
 use super::labels::LabelEncoder;
 use super::{ColumnChunk, PAGE_ROWS};
 
-/// Encodes a column's values, row group after row group.
+/// Encodes a column's values, one row group after another.
 pub(crate) struct ColumnEncoder {
     descriptor: ColumnDescPtr,
     labels: Vec<String>,
     encoder: Encoder,
-    /// Whether each value of the page is there (1) or missing (0); of a nullable column.
+    /// Whether each value of the page is present (1) or missing (0); only for a nullable column.
     levels: Option<LabelEncoder>,
     rows_in_page: usize,
     chunk: ColumnChunk,
 }
 
-/// The encoding that fits the column's type.
+/// The encoder for the column's type.
 enum Encoder {
     U32(DeltaEncoder<u32>),
     I32(DeltaEncoder<i32>),
@@ -34,16 +34,16 @@ enum Encoder {
     I64(DeltaEncoder<i64>),
     /// Little-endian doubles.
     F64(Vec<u8>),
-    /// A bit a value.
+    /// One bit per value.
     Bool(Vec<bool>),
     Label(LabelEncoder),
     /// Length and bytes of each text.
     Text(Vec<u8>),
 }
 
-/// The smallest and the largest counter of the row group. Only counters have bounds: rows
-/// come nearly sorted by cycle, so these let a reader skip row groups; others never would,
-/// yet cost as much as the encoding itself.
+/// The smallest and the largest counter of the row group. Only counters have bounds: rows are
+/// nearly sorted by cycle, so bounds let a reader skip row groups. For other columns they would not
+/// help, and would cost as much as the encoding itself.
 #[derive(Default)]
 struct Bounds(Option<(u64, u64)>);
 
@@ -66,7 +66,7 @@ impl Bounds {
 }
 
 impl ColumnEncoder {
-    /// An encoder for the column `spec`, whose place in the file is `descriptor`.
+    /// Returns an encoder for the column `spec`, whose place in the file is `descriptor`.
     pub(crate) fn new(spec: &ColumnSpec, descriptor: ColumnDescPtr) -> Self {
         let encoder = match spec.ty {
             ColumnType::U32 => Encoder::U32(DeltaEncoder::new()),
@@ -97,7 +97,7 @@ impl ColumnEncoder {
         Ok(())
     }
 
-    /// Appends values that the page has room for.
+    /// Appends values that fit into the page.
     fn extend(&mut self, values: &Values, range: Range<usize>) {
         let Some(levels) = &mut self.levels else { return self.encoder.extend(values, range) };
         let is_there = |row: &usize| !values.is_missing(*row);
@@ -113,7 +113,7 @@ impl ColumnEncoder {
         }
         let (mut page, encoding) = self.encoder.take_page();
         if let Some(levels) = &mut self.levels {
-            // A page of labels begins with their width, one of levels with its length.
+            // A page of labels starts with their width, a page of levels with its length.
             let levels = &levels.take_page()[1..];
             page = [&(levels.len() as u32).to_le_bytes(), levels, &page].concat();
         }
@@ -122,13 +122,13 @@ impl ColumnEncoder {
         Ok(())
     }
 
-    /// Ends the row group's chunk; the next one starts empty.
+    /// Ends the row group's chunk and returns it; the next one starts empty.
     pub(crate) fn take_chunk(&mut self) -> Result<(Bytes, ColumnCloseResult)> {
         if self.rows_in_page > 0 {
             self.end_page()?;
         }
         let empty = ColumnChunk::new(self.descriptor.clone());
-        // The bounds say that no value is missing.
+        // Bounds declare that no value is missing, so nullable columns have none.
         let statistics = self.encoder.take_statistics().filter(|_| self.levels.is_none());
         std::mem::replace(&mut self.chunk, empty).close(statistics)
     }
@@ -183,7 +183,7 @@ fn put_doubles(values: &[f64], page: &mut Vec<u8>) {
     }
 }
 
-/// Eight values a byte, the first in its lowest bit.
+/// Packs eight values per byte, the first in the lowest bit.
 fn packed(values: &[bool]) -> Vec<u8> {
     let byte = |eight: &[bool]| {
         (0..).zip(eight).fold(0, |byte, (bit, &value)| byte | u8::from(value) << bit)

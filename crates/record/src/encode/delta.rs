@@ -1,14 +1,14 @@
 //! DELTA_BINARY_PACKED: differences of consecutive integers, bit-packed.
 //!
-//! A page is a header, then blocks of 128 differences: the smallest one, then four groups
-//! of 32 packed with just as many bits as the group needs. A robot that moves by one box
-//! costs two bits per coordinate.
+//! A page is a header, then blocks of 128 differences: the smallest one, then four groups of 32,
+//! each packed with as many bits as the group needs. For a robot that moves by one box, a
+//! coordinate takes two bits.
 
 use super::packing::{PACK, Packer, bits, put_varint, put_zigzag, width_u32};
 
-/// Differences in a block.
+/// Number of differences in a block.
 const BLOCK: usize = 128;
-/// Groups of [`PACK`] differences in a block.
+/// Number of groups of [`PACK`] differences in a block.
 const GROUPS: usize = BLOCK / PACK;
 
 /// An integer whose differences wrap around in its own width.
@@ -90,8 +90,8 @@ impl Integer for i64 {
     }
 }
 
-/// Appends a block of 64 bits. Nearly every block of a counter has small differences; those go the
-/// narrow way.
+/// Appends a block of 64-bit differences. Nearly every block of a counter has small differences,
+/// which take the narrow path.
 fn put_any_block(deltas: &[i64; BLOCK], packer: &Packer, out: &mut Vec<u8>) {
     let narrow = deltas.map(|d| d as i32);
     let changed = deltas.iter().zip(&narrow).fold(0, |all, (d, n)| all | (d ^ i64::from(*n)));
@@ -118,8 +118,8 @@ fn put_narrow_block(deltas: &[i32; BLOCK], packer: &Packer, out: &mut Vec<u8>) {
     }
 }
 
-/// Appends a block in which some difference needs more than 32 bits. Groups that do are
-/// stored with 64: rare, so speed and size matter little.
+/// Appends a block with some difference of more than 32 bits. Groups that need it are stored with
+/// 64 bits: this is rare, so speed and size matter little.
 fn put_wide_block(deltas: &[i64; BLOCK], packer: &Packer, out: &mut Vec<u8>) {
     let least = deltas.iter().copied().fold(i64::MAX, i64::min);
     let above = deltas.map(|d| d.wrapping_sub(least) as u64);
@@ -138,7 +138,7 @@ fn put_wide_block(deltas: &[i64; BLOCK], packer: &Packer, out: &mut Vec<u8>) {
     }
 }
 
-/// Encodes one page after the other.
+/// Encodes one page after another.
 pub(crate) struct DeltaEncoder<V: Integer> {
     packer: Packer,
     first: Option<V>,
@@ -150,7 +150,7 @@ pub(crate) struct DeltaEncoder<V: Integer> {
 }
 
 impl<V: Integer> DeltaEncoder<V> {
-    /// An empty page.
+    /// Returns an encoder with an empty page.
     pub(crate) fn new() -> Self {
         Self {
             packer: Packer::new(),
@@ -204,10 +204,10 @@ impl<V: Integer> DeltaEncoder<V> {
         self.pending = 0;
     }
 
-    /// Ends the page: its bytes; the next one starts empty.
+    /// Ends the page and returns its bytes; the next one starts empty.
     pub(crate) fn take_page(&mut self) -> Vec<u8> {
         if let Some(&least) = self.deltas[..self.pending].iter().min() {
-            // Unused groups become all zero, so get the width 0 that the format asks for.
+            // Unused groups become all zero, so that their width is 0, as the format requires.
             self.deltas[self.pending..].fill(least);
             self.put_block();
         }

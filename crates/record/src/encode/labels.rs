@@ -1,11 +1,11 @@
-//! RLE_DICTIONARY: labels as indices into the vocabulary, runs counted, the rest bit-packed.
+//! RLE_DICTIONARY: labels as indices into the vocabulary; runs are counted, the rest is bit-packed.
 
 use super::packing::{PACK, Packer, bits, put_varint};
 
-/// Indices looked at together: either all equal, or bit-packed.
+/// Number of indices handled together: either all equal, or bit-packed.
 const CHUNK: usize = 4 * PACK;
 
-/// Encodes one page of indices after the other.
+/// Encodes one page of indices after another.
 pub(crate) struct LabelEncoder {
     packer: Packer,
     width: u8,
@@ -17,9 +17,9 @@ pub(crate) struct LabelEncoder {
 }
 
 impl LabelEncoder {
-    /// An encoder for indices below `labels`.
+    /// Returns an encoder for indices below `labels`.
     pub(crate) fn new(labels: usize) -> Self {
-        // At least one bit: width 0 is legal, yet some readers stumble over it.
+        // At least one bit: width 0 is legal, but some readers fail on it.
         let width = bits(labels.saturating_sub(1) as u64).max(1);
         let packer = Packer::new();
         Self {
@@ -73,7 +73,7 @@ impl LabelEncoder {
         self.run.1 = 0;
     }
 
-    /// Appends the chunk bit-packed; a short last one is padded to a multiple of eight.
+    /// Appends the chunk bit-packed; a short last chunk is padded to a multiple of eight.
     fn put_packed(&mut self) {
         self.put_run();
         self.chunk[self.pending..].fill(0);
@@ -87,7 +87,7 @@ impl LabelEncoder {
         self.body.truncate(end);
     }
 
-    /// Ends the page: its bytes; the next one starts empty.
+    /// Ends the page and returns its bytes; the next one starts empty.
     pub(crate) fn take_page(&mut self) -> Vec<u8> {
         if self.pending > 0 {
             self.put_chunk();

@@ -2,10 +2,10 @@
 
 use bitpacking::{BitPacker, BitPacker1x};
 
-/// Values that [`Packer::pack`] takes at once.
+/// Number of values that [`Packer::pack`] takes at once.
 pub(super) const PACK: usize = BitPacker1x::BLOCK_LEN;
 
-/// Appends values of few bits, least significant bit first, as both Parquet encodings want.
+/// Appends values of few bits, least significant bit first, as both Parquet encodings require.
 pub(super) struct Packer(BitPacker1x);
 
 impl Packer {
@@ -21,12 +21,12 @@ impl Packer {
     }
 }
 
-/// Bits that the largest of `values` needs; 0 when all are 0.
+/// Returns the number of bits that the largest of `values` needs; 0 if all are 0.
 pub(super) fn width_u32(values: &[u32]) -> u8 {
     bits(u64::from(values.iter().fold(0, |all, v| all | v)))
 }
 
-/// Bits that `value` needs; 0 for 0.
+/// Returns the number of bits that `value` needs; 0 for 0.
 pub(super) fn bits(value: u64) -> u8 {
     (u64::BITS - value.leading_zeros()) as u8
 }
@@ -40,7 +40,7 @@ pub(super) fn put_varint(mut value: u64, out: &mut Vec<u8>) {
     out.push(value as u8);
 }
 
-/// Appends a signed integer, small magnitudes short.
+/// Appends a signed integer; small magnitudes take few bytes.
 pub(super) fn put_zigzag(value: i64, out: &mut Vec<u8>) {
     put_varint(((value << 1) ^ (value >> 63)) as u64, out);
 }

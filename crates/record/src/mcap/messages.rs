@@ -1,4 +1,4 @@
-//! Frames in the words of Foxglove's schemas.
+//! Frames as messages of Foxglove's schemas.
 
 use std::collections::BTreeSet;
 
@@ -15,12 +15,12 @@ use sidestep_kernel::view::{
 use super::WORLD;
 
 const NS_PER_S: u64 = 1_000_000_000;
-/// Beams whose steps differ by less count as evenly spaced.
+/// Largest difference in rad between steps of beams that count as evenly spaced.
 const EVEN_RAD: f64 = 1e-6;
-/// Beams that are not evenly spaced go into a raster of this step.
+/// Step in rad of the raster for beams that are not evenly spaced.
 const RASTER_RAD: f64 = std::f64::consts::PI / 180.0;
 
-/// Simulated seconds as nanoseconds.
+/// Converts simulated seconds to nanoseconds.
 pub(super) fn to_ns(time_s: f64) -> u64 {
     (time_s.max(0.0) * NS_PER_S as f64).round() as u64
 }
@@ -30,7 +30,7 @@ fn timestamp(ns: u64) -> Option<Timestamp> {
     Some(Timestamp::new(seconds, (ns % NS_PER_S) as u32))
 }
 
-/// When a log entry happened.
+/// Returns the time of a log entry.
 pub(super) fn nanoseconds(entry: &Log) -> u64 {
     entry.timestamp.map_or(0, |t| u64::from(t.sec()) * NS_PER_S + u64::from(t.nsec()))
 }
@@ -58,7 +58,7 @@ fn color_of(body: &Body, dimensions: u8) -> Option<Color> {
     color(look.color, look.opacity)
 }
 
-/// The floor as bytes: 0 free, 100 wall, 255 unknown.
+/// Returns the floor as bytes: 0 free, 100 wall, 255 unknown.
 pub(super) fn grid(floor: &Floor) -> Grid {
     let byte = |occupancy: &Occupancy| match occupancy {
         Occupancy::Free => 0,
@@ -84,20 +84,20 @@ pub(super) fn grid(floor: &Floor) -> Grid {
     }
 }
 
-/// All that never moves, as one thing to show or hide.
+/// Returns everything that never moves, as one entity to show or hide.
 pub(super) fn scenery(scenery: &Scenery) -> SceneUpdate {
     let mut whole = entity("scenery", 0);
     scenery.bodies.iter().for_each(|body| add(&mut whole, body, scenery.dimensions));
     SceneUpdate { deletions: Vec::new(), entities: vec![whole] }
 }
 
-/// Bodies that are there; those of the frame before that are not are deleted.
+/// Returns the bodies of a frame; those of the frame before that are gone are deleted.
 pub(super) fn scene(frame: &Frame, dimensions: u8, shown: &mut BTreeSet<String>) -> SceneUpdate {
     let now_ns = to_ns(frame.time_s);
     let mut entities: Vec<SceneEntity> = Vec::new();
     for body in &frame.bodies {
         let name = entity_name(body);
-        // Parts of a thing are next to each other.
+        // Parts of an entity are adjacent.
         match entities.last_mut().filter(|last| last.id == name) {
             Some(last) => add(last, body, dimensions),
             None => {
@@ -118,7 +118,7 @@ pub(super) fn scene(frame: &Frame, dimensions: u8, shown: &mut BTreeSet<String>)
     SceneUpdate { deletions, entities }
 }
 
-/// Connectors of a chain are one thing in a viewer, as its rods are.
+/// Returns the entity that a body belongs to: all connectors of a chain are one, as its rods are.
 fn entity_name(body: &Body) -> String {
     format!("{}/{}", body.kind, body.number)
 }
@@ -153,7 +153,7 @@ fn add(entity: &mut SceneEntity, body: &Body, dimensions: u8) {
         Shape::Line { points_m, thickness_m } => entity.lines.push(LinePrimitive {
             r#type: line_primitive::Type::LineStrip as i32,
             pose: at,
-            // A line without thickness is as thin as the screen allows, near and far.
+            // A line without thickness is drawn as thin as the screen allows, near and far.
             thickness: if *thickness_m > 0.0 { *thickness_m } else { 1.0 },
             scale_invariant: *thickness_m <= 0.0,
             points: points_m.iter().map(|&[x, y, z]| Point3 { x, y, z }).collect(),
@@ -169,7 +169,7 @@ fn add(entity: &mut SceneEntity, body: &Body, dimensions: u8) {
     }
 }
 
-/// An arrow whose middle is at the body's place: nearly all head.
+/// Returns an arrow centered on the body, nearly all head.
 fn dart(body: &Body, length_m: f64, width_m: f64) -> ArrowPrimitive {
     let tail = ViewPose { at_m: body.pose.place([-0.5 * length_m, 0.0, 0.0]), ..body.pose };
     ArrowPrimitive {
@@ -182,7 +182,7 @@ fn dart(body: &Body, length_m: f64, width_m: f64) -> ArrowPrimitive {
     }
 }
 
-/// An arrow on top of a body that shows where it looks.
+/// Returns an arrow on top of a body that shows its heading.
 fn heading(body: &Body) -> Option<ArrowPrimitive> {
     let (half_m, top_m) = match body.shape {
         Shape::Cuboid { size_m: [x, _, z] } => (0.5 * x, 0.5 * z),
@@ -204,7 +204,7 @@ fn agents(frame: &Frame) -> impl Iterator<Item = &Body> {
     frame.bodies.iter().filter(|body| body.kind.is_agent())
 }
 
-/// Where each agent is, as the frame of reference of its name.
+/// Returns the pose of each agent, as the frame of reference of its name.
 pub(super) fn transforms(frame: &Frame) -> FrameTransforms {
     let now = timestamp(to_ns(frame.time_s));
     let transform = |body: &Body| FrameTransform {
@@ -217,7 +217,7 @@ pub(super) fn transforms(frame: &Frame) -> FrameTransforms {
     FrameTransforms { transforms: agents(frame).map(transform).collect() }
 }
 
-/// Where the agents of a kind are; `None` where there are none.
+/// Returns the poses of the agents of a kind; `None` if there are none.
 pub(super) fn poses(frame: &Frame, kind: Kind) -> Option<PosesInFrame> {
     let poses: Vec<Pose> = agents(frame)
         .filter(|body| body.kind == kind)
@@ -227,7 +227,7 @@ pub(super) fn poses(frame: &Frame, kind: Kind) -> Option<PosesInFrame> {
     (!poses.is_empty()).then(|| PosesInFrame { timestamp, frame_id: WORLD.into(), poses })
 }
 
-/// A scan with evenly spaced beams, as the schema has it.
+/// Returns a scan with evenly spaced beams, as the schema requires.
 pub(super) fn laser_scan(scan: &Scan, now_ns: u64) -> LaserScan {
     let (start_angle, end_angle, ranges) = evenly_spaced(&scan.bearings_rad, &scan.ranges_m);
     LaserScan {
@@ -241,8 +241,9 @@ pub(super) fn laser_scan(scan: &Scan, now_ns: u64) -> LaserScan {
     }
 }
 
-/// First and last bearing, and ranges at equal steps between them. Other beams are put into a
-/// raster of degrees, in which directions without a beam see nothing.
+/// Returns the first and last bearing, and ranges at equal steps between them. Beams that are not
+/// evenly spaced are put into a raster of degrees, in which directions without a beam have no
+/// range.
 fn evenly_spaced(bearings_rad: &[f64], ranges_m: &[f64]) -> (f64, f64, Vec<f64>) {
     let (Some(&first), Some(&last)) = (bearings_rad.first(), bearings_rad.last()) else {
         return (0.0, 0.0, Vec::new());
@@ -265,7 +266,7 @@ fn evenly_spaced(bearings_rad: &[f64], ranges_m: &[f64]) -> (f64, f64, Vec<f64>)
     (low, low + (raster.len() - 1) as f64 * RASTER_RAD, raster)
 }
 
-/// What happened, and how much of it is not told.
+/// Returns the events of a frame, and how many are left out.
 pub(super) fn log(frame: &Frame, cycle_s: f64) -> Vec<Log> {
     let level = |level: Level| match level {
         Level::Info => log::Level::Info,

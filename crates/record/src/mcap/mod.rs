@@ -10,12 +10,12 @@
 //! | `/scan/BODY/SENSOR` | `foxglove.LaserScan` | each frame: ranges in the frame `world` |
 //! | `/log` | `foxglove.Log` | each event, at its own time |
 //!
-//! What never moves has a topic of its own because a viewer that jumps to a moment takes the last
+//! What never moves has a topic of its own, because a viewer that jumps to a moment shows the last
 //! message of each topic before it.
 //!
 //! `log_time` is simulated time in nanoseconds. The scenario and its files are attachments; the
-//! metadata record `sidestep` says what the run was and how it ended. While it grows, the file is
-//! called `NAME.partial`. Equal runs give equal bytes.
+//! metadata record `sidestep` describes the run and how it ended. While it is incomplete, the file
+//! is called `NAME.partial`. Equal runs give equal bytes.
 
 mod messages;
 mod reader;
@@ -24,9 +24,9 @@ mod writer;
 pub use reader::{McapRun, is_mcap};
 pub use writer::{McapEnd, McapOrigin, McapRecorder};
 
-/// The name of the metadata record.
+/// Name of the metadata record.
 const METADATA: &str = "sidestep";
-/// The attachment with the scenario.
+/// Name of the attachment with the scenario.
 const SCENARIO: &str = "scenario.toml";
 /// The frame of reference that all others are in.
 const WORLD: &str = "world";

@@ -1,4 +1,4 @@
-//! What our recordings say of themselves.
+//! The metadata of our recordings.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -18,50 +18,51 @@ use crate::manifest::Status;
 /// The first bytes of every MCAP file.
 const MAGIC: [u8; 8] = [0x89, b'M', b'C', b'A', b'P', 0x30, b'\r', b'\n'];
 
-/// Whether a file begins as MCAP files do.
+/// Whether a file starts like an MCAP file.
 pub fn is_mcap(path: &Path) -> bool {
     let mut begin = [0; MAGIC.len()];
     File::open(path).and_then(|mut file| file.read_exact(&mut begin)).is_ok() && begin == MAGIC
 }
 
-/// A recording of ours: what the run was, without its messages.
+/// A recording made by this program: the description of its run, without its messages.
 #[derive(Debug, Clone, PartialEq)]
 pub struct McapRun {
-    /// Where it is.
+    /// Path of the file.
     pub path: PathBuf,
     /// Version of its format.
     pub format: FormatVersion,
     /// Version of the program that made it.
     pub program_version: String,
-    /// Its build; early recordings do not name it.
+    /// Build of the program; early recordings do not have it.
     pub build: Option<String>,
     /// The world.
     pub world: String,
     /// The seed.
     pub seed: u64,
-    /// Whether the run came to its end.
+    /// Whether the run reached its end.
     pub status: Status,
     /// Cycles done.
     pub cycles_done: u64,
     /// Cycles that the scenario asks for.
     pub cycles_planned: u64,
-    /// Cycles from frame to frame.
+    /// Number of cycles between frames.
     pub every: u64,
     /// Digest of the last state.
     pub digest: String,
     /// The scenario's text.
     pub scenario: String,
-    /// Files that it names, by their path relative to it.
+    /// Files that the scenario names, by their path relative to it.
     pub files: Vec<(String, Vec<u8>)>,
-    /// Messages by topic.
+    /// Number of messages by topic.
     pub messages: BTreeMap<String, u64>,
 }
 
 impl McapRun {
-    /// Reads what a recording says of itself.
+    /// Reads the metadata of a recording.
     ///
     /// # Errors
-    /// No such file; none of ours; one that is cut off or damaged; another major format.
+    /// A missing file; one of another program; one that is cut off or damaged; another major
+    /// format.
     pub fn open(path: &Path) -> Result<Self, InputError> {
         let mut source = Source::open(path)?;
         let summary = source.summary()?;
@@ -123,7 +124,7 @@ impl<'a> Source<'a> {
         Ok(Self { path, file, length })
     }
 
-    /// The end of the file, which says where everything is.
+    /// Reads the end of the file, which lists the position of everything.
     fn summary(&mut self) -> Result<Summary, InputError> {
         let path = self.path;
         let summary = self.read_summary().map_err(|e| damaged(path, e))?;
@@ -150,7 +151,7 @@ impl<'a> Source<'a> {
         Ok(reader.finish())
     }
 
-    /// The bytes of a record; no more is reserved than the file has.
+    /// Reads the bytes of a record; never allocates more than the size of the file.
     fn record(&mut self, offset: u64, length: u64) -> Result<Vec<u8>, InputError> {
         if offset.checked_add(length).is_none_or(|end| end > self.length) {
             return Err(damaged(self.path, "an index points beyond its end"));
@@ -174,7 +175,8 @@ impl<'a> Source<'a> {
             let bytes = self.record(index.offset, index.length)?;
             let own = AttachmentIndex { offset: 0, ..index.clone() };
             let found = attachment(&bytes, &own).map_err(|e| damaged(self.path, e))?;
-            // Files are put beside a scenario by these names: none may lead out of there.
+            // Files are written beside a scenario with these names, so none may point outside of
+            // its folder.
             let parts = Path::new(&found.name).components();
             let is_inside = parts.clone().count() > 0
                 && parts.into_iter().all(|part| matches!(part, Component::Normal(_)));

@@ -1,4 +1,4 @@
-//! Frames into a file.
+//! Frames written to a file.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
@@ -20,30 +20,30 @@ use crate::format;
 use crate::manifest::Status;
 use crate::schema::Origin;
 
-/// Uncompressed bytes of a chunk: what a viewer reads to show a moment.
+/// Uncompressed bytes of a chunk: the amount a viewer reads to show one moment.
 const CHUNK_BYTES: u64 = 1 << 20;
 
-/// What a recording is of.
+/// The origin of a recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct McapOrigin {
     /// The world, e.g. `robots`.
     pub world: String,
-    /// The build that makes it.
+    /// The build that makes the recording.
     pub build: String,
-    /// Where its frames come from.
+    /// Scenario, seed and version that the frames result from.
     pub origin: Origin,
     /// Files that the scenario names, by their path relative to it.
     pub files: Vec<(String, Vec<u8>)>,
     /// Cycles that the scenario asks for.
     pub cycles_planned: u64,
-    /// Cycles from frame to frame.
+    /// Number of cycles between frames.
     pub every: u64,
 }
 
-/// How a recorded run ended.
+/// The end of a recorded run.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct McapEnd {
-    /// Whether it came to its end.
+    /// Whether the run reached its end.
     pub status: Status,
     /// Cycles done.
     pub cycles_done: u64,
@@ -51,27 +51,27 @@ pub struct McapEnd {
     pub digest: String,
 }
 
-/// Writes frames to an MCAP file. Dropped before it is finished, it takes the file away again.
+/// Writes frames to an MCAP file. If it is dropped before it is finished, it deletes the file.
 pub struct McapRecorder {
     path: PathBuf,
-    /// None once the file is ended.
+    /// `None` once the file is finished.
     writer: Option<Writer<BufWriter<File>>>,
     origin: McapOrigin,
     cycle_s: f64,
     dimensions: u8,
     /// Channels by topic.
     channels: BTreeMap<String, u16>,
-    /// Bodies of the frame before, by name.
+    /// Bodies of the previous frame, by name.
     shown: BTreeSet<String>,
     frames: u32,
     buffer: Vec<u8>,
 }
 
 impl McapRecorder {
-    /// Refuses a path at which no recording may be made.
+    /// Refuses a path at which a recording must not be created.
     ///
     /// # Errors
-    /// Something is there that is not to be replaced, or that is no file.
+    /// Something is there that may not be replaced, or that is not a file.
     pub fn check_vacant(path: &Path, existing: Existing) -> Result<(), InputError> {
         let refuse = |cause, remedy| Err(InputError::new(path.display(), cause, remedy));
         match fs::metadata(path) {
@@ -84,17 +84,17 @@ impl McapRecorder {
         }
     }
 
-    /// Starts the file that will be called `path` once it is whole, with the scenario and what
-    /// never moves in it.
+    /// Starts the file that is called `path` once it is complete, with the scenario and everything
+    /// that never moves.
     ///
     /// # Errors
-    /// What the system says.
+    /// An I/O error.
     pub fn create(path: &Path, origin: McapOrigin, scenery: &Scenery) -> Result<Self, RecordError> {
         let growing = disk::partial(path);
         let failed = |cause: String| RecordError::new(path.display(), cause);
         let file = fs::create_dir_all(disk::parent(path)).and_then(|()| File::create(&growing));
         let file = file.map_err(|e| failed(e.to_string()))?;
-        // Several threads would compress to other bytes than one.
+        // Several threads would compress to bytes that differ from those of one.
         let options = WriteOptions::new()
             .compression(Some(Compression::Zstd))
             .compression_threads(0)
@@ -117,7 +117,7 @@ impl McapRecorder {
         Ok(recorder)
     }
 
-    /// The file's name once it is whole.
+    /// Returns the file's name once it is complete.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -146,10 +146,10 @@ impl McapRecorder {
         self.with(|writer| writer.attach(&attachment))
     }
 
-    /// Appends a frame; frames come by rising time.
+    /// Appends a frame; frames must be in order of time.
     ///
     /// # Errors
-    /// What the system says; the recording is over then.
+    /// An I/O error; the recording is over then.
     pub fn frame(&mut self, frame: &Frame) -> Result<(), RecordError> {
         for entry in messages::log(frame, self.cycle_s) {
             self.write::<Log>("/log", messages::nanoseconds(&entry), &entry)?;
@@ -171,21 +171,21 @@ impl McapRecorder {
         Ok(())
     }
 
-    /// Ends the file: waits for the disk, and gives it its name.
+    /// Finishes the file: waits for the disk, and gives it its name.
     ///
     /// # Errors
-    /// What the system says.
+    /// An I/O error.
     pub fn finish(self, end: &McapEnd) -> Result<PathBuf, RecordError> {
         let path = self.path.clone();
         disk::rename(&self.stop(end)?, &path)?;
         Ok(path)
     }
 
-    /// Ends the file of a run that was stopped: it can be opened, but keeps `.partial` at its end.
-    /// Says what it is called.
+    /// Finishes the file of a run that was stopped: it can be opened, but its name keeps the ending
+    /// `.partial`. Returns this name.
     ///
     /// # Errors
-    /// What the system says.
+    /// An I/O error.
     pub fn stop(mut self, end: &McapEnd) -> Result<PathBuf, RecordError> {
         let metadata = Metadata { name: METADATA.into(), metadata: self.metadata(end) };
         self.with(|writer| writer.write_metadata(&metadata))?;
@@ -223,7 +223,7 @@ impl McapRecorder {
         pairs.into_iter().map(|(key, value)| (key.to_string(), value)).collect()
     }
 
-    /// Appends a message, to a channel that is made where the topic is new.
+    /// Appends a message, and creates a channel for a new topic.
     fn write<T: Encode>(
         &mut self,
         topic: &str,
@@ -271,13 +271,13 @@ impl Drop for McapRecorder {
     fn drop(&mut self) {
         if let Some(writer) = self.writer.take() {
             drop(writer.into_inner());
-            // What is not whole, or was refused by a full disk, must not keep its space.
+            // An incomplete file, or one that a full disk refused, must not keep its space.
             let _ = fs::remove_file(disk::partial(&self.path));
         }
     }
 }
 
-/// What the system said, without the library's wrapping.
+/// Returns the system's message, without the library's wrapping.
 fn said(error: McapError) -> String {
     match error {
         McapError::Io(error) => error.to_string(),

@@ -1,4 +1,4 @@
-//! The folder itself: made in one step, then only added to.
+//! The folder of a sweep: created in one step, then only added to.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ use crate::manifest::{self, json};
 use crate::staging::Staging;
 use crate::whole::{self, WholeTable};
 
-/// The manifest's name.
+/// File name of the manifest.
 pub(crate) const MANIFEST: &str = "sweep.json";
 const CELLS: &str = "cells.parquet";
 const RESULTS: &str = "results.parquet";
@@ -31,12 +31,12 @@ const SCENARIO: &str = "scenario.toml";
 pub struct SweepManifest<P> {
     /// Version of the folder's format.
     pub format: FormatVersion,
-    /// Version of the program that made the plan; the same makes the runs.
+    /// Version of the program that made the plan; the same version makes the runs.
     pub program_version: String,
-    /// Its build; early folders do not name it.
+    /// Build of the program; early folders do not have it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub build: Option<String>,
-    /// Of the scenario of each variant and the files it names, see [`fingerprint`].
+    /// Fingerprint of the scenario of each variant and the files it names, see [`fingerprint`].
     pub fingerprints: Vec<String>,
     /// The plan.
     pub plan: P,
@@ -47,7 +47,7 @@ pub struct SweepManifest<P> {
 pub struct Share {
     /// Its number, from 0.
     pub index: u32,
-    /// Of how many.
+    /// The number of shares.
     pub count: u32,
 }
 
@@ -59,12 +59,12 @@ pub struct SweepFolder<P> {
 }
 
 impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
-    /// Makes the folder at `path`, all of it or nothing. `fill` writes the variants into what will
-    /// become the folder (see [`write_variant`](Self::write_variant)) and returns the plan, its
+    /// Creates the folder at `path`, completely or not at all. `fill` writes the variants into what
+    /// becomes the folder (see [`write_variant`](Self::write_variant)) and returns the plan, the
     /// fingerprints of its variants and the table of its cells.
     ///
     /// # Errors
-    /// When something else is there, no folder can be made there, or `fill` fails.
+    /// Something else is there, no folder can be created there, or `fill` fails.
     pub fn create<R: Serialize, E: From<InputError> + From<RecordError>>(
         path: &Path,
         program_version: &str,
@@ -98,7 +98,7 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
     /// [`create`](Self::create) makes.
     ///
     /// # Errors
-    /// What the system says.
+    /// An I/O error.
     pub fn write_variant(
         folder: &Path,
         variant: u32,
@@ -115,7 +115,7 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         disk::replace(&folder.join(SCENARIO), text.as_bytes())
     }
 
-    /// True for a folder that holds a sweep, be its manifest damaged or not.
+    /// Whether a folder holds a sweep, even if its manifest is damaged.
     pub fn is_at(path: &Path) -> bool {
         path.join(MANIFEST).is_file()
     }
@@ -123,7 +123,7 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
     /// Opens the folder at `path`.
     ///
     /// # Errors
-    /// No sweep; a damaged manifest; another major format.
+    /// A folder without a sweep; a damaged manifest; another major format.
     pub fn open(path: &Path) -> Result<Self, InputError> {
         if !Self::is_at(path) {
             let cause = format!("this is no sweep: it holds no `{MANIFEST}`");
@@ -134,30 +134,31 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         Ok(Self { path: path.to_path_buf(), manifest })
     }
 
-    /// Where the folder is.
+    /// Returns the path of the folder.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// What `sweep.json` says.
+    /// Returns the content of `sweep.json`.
     pub fn manifest(&self) -> &SweepManifest<P> {
         &self.manifest
     }
 
-    /// The plan.
+    /// Returns the plan.
     pub fn plan(&self) -> &P {
         &self.manifest.plan
     }
 
-    /// The scenario file of a variant.
+    /// Returns the path of the scenario file of a variant.
     pub fn scenario(&self, variant: u32) -> PathBuf {
         variant_folder(&self.path, variant).join(SCENARIO)
     }
 
-    /// That the scenario of a variant and its files are as they were planned.
+    /// Checks that the scenario of a variant and its files have not changed since they were
+    /// planned.
     ///
     /// # Errors
-    /// When they are not, or cannot be read.
+    /// A scenario or file that has changed, or cannot be read.
     pub fn check_variant(&self, variant: u32) -> Result<(), InputError> {
         let folder = variant_folder(&self.path, variant);
         let mut files = Vec::new();
@@ -176,21 +177,21 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         Err(InputError::new(folder.display(), cause, remedy))
     }
 
-    /// One digest of all variants, in hexadecimal.
+    /// Returns one digest of all variants, in hexadecimal.
     pub fn fingerprint(&self) -> String {
         Digest::of(self.manifest.fingerprints.concat().as_bytes()).to_string()
     }
 
-    /// Where the run of a cell is recorded, if it is.
+    /// Returns the folder in which the run of a cell is recorded, if it is.
     pub fn run_folder(&self, cell: u64) -> PathBuf {
         self.path.join(RUNS).join(format!("{cell:06}"))
     }
 
-    /// Opens the journal of a share to write, and hands over what it has; `None` if the share is
+    /// Opens the journal of a share to write, and passes its entries on; `None` if the share is
     /// done.
     ///
     /// # Errors
-    /// When another process writes it, or it is damaged.
+    /// A journal that another process writes, or that is damaged.
     pub fn journal<T: DeserializeOwned>(
         &self,
         share: Share,
@@ -203,10 +204,10 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         Journal::open(&path, &self.manifest.program_version, each).map(Some)
     }
 
-    /// Writes the runs of a share as its part, and takes the journal away.
+    /// Writes the runs of a share as its part, and deletes the journal.
     ///
     /// # Errors
-    /// What the system says; the journal stays then.
+    /// An I/O error; the journal stays then.
     pub fn end_share<R: Serialize>(
         &self,
         share: Share,
@@ -220,10 +221,10 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         fs::remove_file(&path).map_err(|e| RecordError::new(path.display(), e))
     }
 
-    /// Hands over the parts of shares that are done, one by one.
+    /// Passes on the parts of shares that are done, one by one.
     ///
     /// # Errors
-    /// When one of them cannot be read.
+    /// A part that cannot be read.
     pub fn parts<R: DeserializeOwned>(
         &self,
         mut each: impl FnMut(WholeTable<R>),
@@ -237,11 +238,11 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         Ok(())
     }
 
-    /// Hands over the runs of shares that are under way or were stopped; not of those with a part,
+    /// Passes on the runs of shares that are in progress or were stopped; not of those with a part,
     /// nor of `but`.
     ///
     /// # Errors
-    /// When a journal cannot be read.
+    /// A journal that cannot be read.
     pub fn journals<T: DeserializeOwned>(
         &self,
         but: Option<Share>,
@@ -257,11 +258,11 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         Ok(())
     }
 
-    /// Writes the table of all runs, and that of what they took first: where the results are, the
-    /// sweep is done.
+    /// Writes the table of runs. The table of timings comes first, because the sweep is done once
+    /// the results exist.
     ///
     /// # Errors
-    /// What the system says.
+    /// An I/O error.
     pub fn complete<R: Serialize>(
         &self,
         results: &[RoleColumn<R>],
@@ -275,20 +276,20 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         whole::write(&self.path.join(RESULTS), results, version, &extra)
     }
 
-    /// Whether the table of all runs is there.
+    /// Whether the table of all runs exists.
     pub fn is_complete(&self) -> bool {
         self.results_file().is_file()
     }
 
-    /// Where the table of all runs is, or will be.
+    /// Returns the path of the table of all runs.
     pub fn results_file(&self) -> PathBuf {
         self.path.join(RESULTS)
     }
 
-    /// The table of all runs.
+    /// Reads the table of all runs.
     ///
     /// # Errors
-    /// When the sweep is not done, or the table is damaged.
+    /// A sweep that is not done, or a damaged table.
     pub fn results<R: DeserializeOwned>(&self) -> Result<WholeTable<R>, InputError> {
         if !self.is_complete() {
             let remedy = "go on with `sidestep resume DIR`, or run its shares and \
@@ -302,10 +303,10 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         })
     }
 
-    /// The table of what the runs took.
+    /// Reads the table of the times that the runs took.
     ///
     /// # Errors
-    /// When the sweep is not done, or the table is damaged.
+    /// A sweep that is not done, or a damaged table.
     pub fn timings<R: DeserializeOwned>(&self) -> Result<WholeTable<R>, InputError> {
         whole::read(&self.path.join(TIMINGS))
     }
@@ -324,7 +325,7 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         self.path.join(SHARES).join(format!("{index}-of-{count}.{extension}"))
     }
 
-    /// The shares that have a file of this kind, in order.
+    /// Returns the shares that have a file with this extension, in order.
     fn shares_with(&self, extension: &str) -> Result<Vec<Share>, InputError> {
         let folder = self.path.join(SHARES);
         let failed = |e: std::io::Error| {
@@ -340,7 +341,8 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
     }
 }
 
-/// A digest of a scenario and the files it names, in hexadecimal; their order does not matter.
+/// Returns a digest of a scenario and the files it names, in hexadecimal; their order does not
+/// matter.
 pub fn fingerprint(scenario: &[u8], files: &[(String, Vec<u8>)]) -> String {
     let mut sorted: Vec<_> = files.iter().collect();
     sorted.sort();
@@ -350,7 +352,7 @@ pub fn fingerprint(scenario: &[u8], files: &[(String, Vec<u8>)]) -> String {
     print(all.join("\n").as_bytes())
 }
 
-/// All files below a folder, by their path in it.
+/// Reads all files below a folder, by their path in it.
 fn read_files(
     folder: &Path,
     under: &str,
@@ -372,7 +374,7 @@ fn read_files(
     Ok(())
 }
 
-/// The share whose file has this name.
+/// Returns the share whose file has this name.
 fn share_of(name: &str, extension: &str) -> Option<Share> {
     let (index, count) = name.strip_suffix(extension)?.strip_suffix('.')?.split_once("-of-")?;
     Some(Share { index: index.parse().ok()?, count: count.parse().ok()? })

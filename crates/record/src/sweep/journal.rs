@@ -1,9 +1,9 @@
 //! Finished runs, one line each, appended by one process.
 //!
 //! A line is the CRC-32 of a JSON text in hexadecimal, a space, the text, a newline. The first line
-//! says which version wrote it. What a kill left of a line has no newline, or a wrong checksum at
-//! the very end; it is taken away when the journal is opened to write. A wrong checksum elsewhere
-//! is damage, and an error.
+//! records the version that wrote it. A line that a kill cut off has no newline, or a wrong
+//! checksum at the very end; it is deleted when the journal is opened to write. A wrong checksum
+//! elsewhere is damage, and an error.
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{BufRead, BufReader, Seek, SeekFrom, Write};
@@ -17,7 +17,8 @@ use sidestep_kernel::ports::RecordError;
 
 use crate::format::{self, FormatVersion};
 
-/// Lines that a power cut may cost are at most this old: they are run again. A kill costs none.
+/// Largest age of lines that a power failure may lose: their cells are run again. A kill loses
+/// none.
 const SYNC_EVERY: Duration = Duration::from_millis(200);
 
 /// The first line.
@@ -27,22 +28,22 @@ struct Head {
     program_version: String,
 }
 
-/// A journal that this process writes; no other can while this value lives.
+/// A journal that this process writes; no other can write it while this value lives.
 #[derive(Debug)]
 pub struct Journal {
     path: PathBuf,
     file: File,
-    /// Bytes of whole lines.
+    /// Number of bytes of complete lines.
     length: u64,
     synced: Instant,
 }
 
 impl Journal {
-    /// Opens the journal at `path`, or makes it, takes away half a line at its end, and hands
-    /// over its entries one by one.
+    /// Opens or creates the journal at `path`, deletes an incomplete line at its end, and passes
+    /// its entries on one by one.
     ///
     /// # Errors
-    /// When another process writes it, it is damaged, or another version of the program wrote it.
+    /// A journal that another process writes, that is damaged, or that another version wrote.
     pub fn open<T: DeserializeOwned>(
         path: &Path,
         program_version: &str,
@@ -69,15 +70,15 @@ impl Journal {
         Ok(journal)
     }
 
-    /// Appends an entry. When this returns, no kill of the process can lose it.
+    /// Appends an entry. Once this returns, no kill of the process can lose it.
     ///
     /// # Errors
-    /// What the system says; the journal has the entries before this one then.
+    /// An I/O error; the journal then has the entries before this one.
     pub fn append(&mut self, entry: &impl Serialize) -> Result<(), RecordError> {
         let line = line(entry).map_err(|e| RecordError::new(self.path.display(), e))?;
         let written = self.file.write_all(line.as_bytes());
         if let Err(error) = written {
-            // Half a line must not stand before later ones.
+            // An incomplete line must not precede later ones.
             let _ = self.file.set_len(self.length);
             return Err(RecordError::new(self.path.display(), error));
         }
@@ -85,10 +86,10 @@ impl Journal {
         if self.synced.elapsed() < SYNC_EVERY { Ok(()) } else { self.sync() }
     }
 
-    /// Makes all entries durable against a power cut.
+    /// Makes all entries durable against a power failure.
     ///
     /// # Errors
-    /// What the system says.
+    /// An I/O error.
     pub fn sync(&mut self) -> Result<(), RecordError> {
         self.file.sync_data().map_err(|e| RecordError::new(self.path.display(), e))?;
         self.synced = Instant::now();
@@ -100,7 +101,8 @@ fn lock(file: &File, path: &Path) -> Result<(), InputError> {
     let cause = match file.try_lock() {
         Ok(()) => return Ok(()),
         Err(TryLockError::WouldBlock) => "another process is running this share".to_string(),
-        // Some network file systems know no locks: then the user's scheduler sees to it.
+        // Some network file systems have no locks: there, the user's scheduler must prevent two
+        // writers.
         Err(TryLockError::Error(e)) if e.kind() == std::io::ErrorKind::Unsupported => return Ok(()),
         Err(TryLockError::Error(e)) => e.to_string(),
     };
@@ -112,10 +114,11 @@ fn line(entry: &impl Serialize) -> serde_json::Result<String> {
     Ok(format!("{:08x} {json}\n", crc32fast::hash(json.as_bytes())))
 }
 
-/// Hands over the entries of the journal at `path`, which may be growing: up to the last whole line.
+/// Passes on the entries of the journal at `path`, which may be growing: up to the last complete
+/// line.
 ///
 /// # Errors
-/// When it cannot be read, is damaged, or another version of the program wrote it.
+/// A journal that cannot be read, is damaged, or was written by another version of the program.
 pub fn read_journal<T: DeserializeOwned>(
     path: &Path,
     program_version: &str,
@@ -124,7 +127,7 @@ pub fn read_journal<T: DeserializeOwned>(
     whole_lines(path, program_version, each).map(drop)
 }
 
-/// Hands over the entries, and returns the bytes of whole lines.
+/// Passes on the entries, and returns the number of bytes of complete lines.
 fn whole_lines<T: DeserializeOwned>(
     path: &Path,
     program_version: &str,
@@ -141,7 +144,7 @@ fn whole_lines<T: DeserializeOwned>(
         bytes.clear();
         let n = reader.read_until(b'\n', &mut bytes).map_err(|e| damaged(number, e.to_string()))?;
         let Some(json) = json(&bytes) else {
-            // Half a line is what a kill leaves, at the end and nowhere else.
+            // A kill leaves an incomplete line at the end and nowhere else.
             let is_last = reader.fill_buf().is_ok_and(<[u8]>::is_empty);
             if is_last {
                 break;
@@ -158,7 +161,7 @@ fn whole_lines<T: DeserializeOwned>(
     Ok(length)
 }
 
-/// The text of a line that is whole.
+/// Returns the text of a line if the line is complete.
 fn json(line: &[u8]) -> Option<&[u8]> {
     let (checksum, json) = line.strip_suffix(b"\n")?.split_at_checked(9)?;
     let checksum = std::str::from_utf8(checksum).ok()?.strip_suffix(' ')?;
@@ -204,7 +207,8 @@ mod tests {
         (0..5u32).for_each(|n| journal.append(&n).unwrap());
         drop(journal);
         let whole = std::fs::read(&path).unwrap();
-        // Killed at any byte: what is whole stays, what is not is gone, and more can be appended.
+        // Killed at any byte: complete lines stay, the incomplete one is gone, and more can be
+        // appended.
         for cut in 0..=whole.len() {
             std::fs::write(&path, &whole[..cut]).unwrap();
             let lines = whole[..cut].iter().filter(|b| **b == b'\n').count();

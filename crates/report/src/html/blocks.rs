@@ -4,7 +4,7 @@ use super::{Part, figures, tables, text};
 use maud::{Markup, html};
 use sidestep_document::document::{Block, Code, Text};
 
-/// Text of more lines than this is shown when it is asked for.
+/// Number of lines above which text is folded.
 const LONG_LINES: usize = 24;
 
 pub(super) fn markup(part: &Part<'_>) -> Markup {
@@ -22,7 +22,7 @@ pub(super) fn markup(part: &Part<'_>) -> Markup {
 }
 
 fn code(it: &Code) -> Markup {
-    // What scrolls can be reached by keyboard.
+    // A scrolling block must be reachable by keyboard.
     let text = html! { pre tabindex="0" { code .{ "language-" (it.language) } { (it.text) } } };
     html! {
         @if it.text.lines().count() > LONG_LINES {

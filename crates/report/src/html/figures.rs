@@ -1,4 +1,4 @@
-//! Figures that answer the mouse, with their still form beneath, and pictures.
+//! Interactive figures with a static version beneath, and pictures.
 
 use super::tables;
 use crate::SvgFile;
@@ -8,7 +8,7 @@ use sidestep_document::document::Picture;
 use sidestep_document::{Figure, FigureKind, Table};
 use sidestep_draw::SERIES_COLORS;
 
-/// A figure of more points than this has no table of its numbers.
+/// Largest number of points of a figure that has a table of its numbers.
 const MOST_ROWS: usize = 200;
 
 pub(super) fn figure(figure: &Figure, id: &str, still: Option<&SvgFile>) -> Markup {
@@ -44,7 +44,7 @@ pub(super) fn picture(picture: &Picture, id: &str) -> Markup {
     }
 }
 
-/// A figure for those who do not see it.
+/// Returns the description of a figure for screen readers.
 fn words(figure: &Figure) -> String {
     let names: Vec<&str> =
         figure.series.iter().map(|s| s.name.as_str()).filter(|n| !n.is_empty()).collect();
@@ -52,7 +52,7 @@ fn words(figure: &Figure) -> String {
     format!("{}. {} over {}{of}.", figure.title, figure.y_label, figure.x_label)
 }
 
-/// The figure's points as a table, if they are few.
+/// Returns the figure's points as a table, if they are few.
 fn numbers(figure: &Figure) -> Option<Table> {
     let count: usize = figure.series.iter().map(|s| s.points.len()).sum();
     if count > MOST_ROWS || figure.kind == FigureKind::Ways {
@@ -80,18 +80,18 @@ fn numbers(figure: &Figure) -> Option<Table> {
     Some(table)
 }
 
-/// Six digits tell any two measurements apart.
+/// Formats a value with six digits, which distinguish any two measurements.
 fn short(value: f64) -> String {
     let digits = format!("{value:.5e}").parse::<f64>();
     digits.map_or_else(|_| value.to_string(), |rounded| rounded.to_string())
 }
 
-/// JSON for a script: no text in it can end the script.
+/// Returns JSON for a script: no text in it can end the script.
 fn safe_json(value: &serde_json::Value) -> String {
     value.to_string().replace('<', "\\u003c").replace('\u{2028}', "\\u2028")
 }
 
-/// An SVG as the address of an image.
+/// Returns an SVG as the address of an image.
 fn data_address(svg: &str) -> String {
     let mut address = String::with_capacity(svg.len() + svg.len() / 4);
     address.push_str("data:image/svg+xml;charset=utf-8,");
@@ -101,7 +101,7 @@ fn data_address(svg: &str) -> String {
             '#' => address.push_str("%23"),
             '<' => address.push_str("%3C"),
             '>' => address.push_str("%3E"),
-            // Shorter than the entity that it would become in an attribute.
+            // Shorter than the entity that an attribute would need.
             '"' => address.push_str("%22"),
             '&' => address.push_str("%26"),
             '\n' => address.push_str("%0A"),

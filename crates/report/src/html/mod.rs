@@ -1,10 +1,10 @@
-//! Documents as a page that needs nothing but itself.
+//! Documents as a self-contained page.
 //!
 //! ```text
 //! blocks.rs    the parts of a document       figures.rs   figures and pictures
-//! tables.rs    tables and claims             page.css     looks
+//! tables.rs    tables and claims             page.css     style
 //! page.js      sorting of tables             axes.js      ranges and ticks of figures
-//! figures.js   figures from their data       mouse.js     what they answer to the mouse
+//! figures.js   figures from their data       mouse.js     reactions to the mouse
 //! ```
 
 mod blocks;
@@ -18,22 +18,22 @@ use sidestep_document::document::{Block, Span, Text};
 
 const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("page.js");
-/// Draws figures; a page without any does not carry it.
+/// The script that draws figures; a page without figures does not contain it.
 const FIGURES_SCRIPT: &str =
     concat!(include_str!("axes.js"), include_str!("figures.js"), include_str!("mouse.js"));
 
-/// Nothing may be loaded; what is inside may be shown and run.
+/// Security policy: nothing may be loaded; inline styles and scripts may be used.
 const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; \
                       img-src data: blob:; font-src data:; base-uri 'none'; form-action 'none'";
 
-/// How to use figures, for those who have a mouse.
+/// A hint on how to use figures with a mouse.
 const HINT: &str = "Figures: point at a mark for its values, drag to zoom, double-click to see \
                     all again, click a name in a legend to hide or show its series.";
 
-/// From so many sections on there is a table of contents.
+/// Number of sections from which the page has a table of contents.
 const LONG: usize = 3;
 
-/// The page; `pictures` has one for each figure and picture, in their order.
+/// Returns the page; `pictures` has one for each figure and picture, in order.
 pub(crate) fn page(document: &Document, pictures: &[SvgFile]) -> String {
     let sections = Section::all(document, pictures);
     let has_contents = sections.iter().filter(|s| s.title.is_some()).count() >= LONG;
@@ -71,14 +71,14 @@ pub(crate) fn page(document: &Document, pictures: &[SvgFile]) -> String {
     page.into_string()
 }
 
-/// A part of the page under one head.
+/// A part of the page under one heading.
 struct Section<'a> {
     title: Option<&'a str>,
     id: String,
     blocks: Vec<Part<'a>>,
 }
 
-/// A block, its place in the page, and its picture if it is one.
+/// A block, its place in the page, and its picture if it has one.
 struct Part<'a> {
     block: &'a Block,
     id: String,
@@ -86,7 +86,7 @@ struct Part<'a> {
 }
 
 impl<'a> Section<'a> {
-    /// The blocks of a document by the sections that they stand in.
+    /// Returns the blocks of a document by section.
     fn all(document: &'a Document, pictures: &'a [SvgFile]) -> Vec<Self> {
         let mut sections = vec![Self { title: None, id: String::new(), blocks: Vec::new() }];
         let mut pictures = pictures.iter();
@@ -122,7 +122,7 @@ impl<'a> Section<'a> {
     }
 }
 
-/// What a block is called in the table of contents.
+/// Returns the title of a block in the table of contents.
 fn title_of(block: &Block) -> Option<&str> {
     match block {
         Block::Table(table) => Some(&table.title),
@@ -155,7 +155,7 @@ fn contents(sections: &[Section<'_>]) -> Markup {
     }
 }
 
-/// Words with their marks.
+/// Returns text with its markup.
 fn text(text: &Text) -> Markup {
     html! {
         @for span in &text.0 {

@@ -6,7 +6,7 @@ use sidestep_document::Table;
 use sidestep_document::claim::{self, Claim, Verdict};
 use sidestep_document::document::Text;
 
-/// A table that is sorted by a click on a head and scrolls inside itself.
+/// Returns a table that can be sorted by a click on a heading, and scrolls if it is wide.
 pub(super) fn table(table: &Table, id: &str) -> Markup {
     html! {
         div .table id=(id) {
@@ -16,7 +16,7 @@ pub(super) fn table(table: &Table, id: &str) -> Markup {
     }
 }
 
-/// Columns and rows, with the title as caption.
+/// Returns columns and rows, with the title as caption.
 pub(super) fn grid(table: &Table, caption: Option<&str>) -> Markup {
     let numbers: Vec<bool> = (0..table.columns.len()).map(|k| holds_numbers(table, k)).collect();
     html! {
@@ -41,12 +41,12 @@ pub(super) fn grid(table: &Table, caption: Option<&str>) -> Markup {
     }
 }
 
-/// Numbers stand to the right.
+/// Returns the class that aligns numbers to the right.
 fn class(is_number: bool) -> Option<&'static str> {
     is_number.then_some("number")
 }
 
-/// Names may break where their words meet; numbers never do.
+/// Returns a name that may break between its words; numbers never do.
 fn breakable(name: &str) -> Markup {
     let ends_word = |part: &str| {
         part.ends_with(['_', '.', '/']) && part.starts_with(|c: char| c.is_ascii_alphabetic())
@@ -58,17 +58,17 @@ fn breakable(name: &str) -> Markup {
     }
 }
 
-/// The two ends of an interval stay on one line.
+/// Returns a cell in which the two ends of an interval stay on one line.
 fn kept(cell: &str) -> String {
     if cell.contains('[') { cell.replace(", ", ",\u{a0}") } else { cell.into() }
 }
 
-/// What scrolls by itself can be reached by keyboard, and has a name.
+/// Returns a scrolling block that has a name and can be reached by keyboard.
 fn scrolled(name: &str, inside: Markup) -> Markup {
     html! { div .scrolled role="region" tabindex="0" aria-label=(name) { (inside) } }
 }
 
-/// Whether every cell that says something begins like a number.
+/// Whether every cell that is not empty starts like a number.
 fn holds_numbers(table: &Table, k: usize) -> bool {
     let cells = || table.rows.iter().filter_map(|row| row.get(k));
     let is_number = |cell: &str| {
@@ -78,7 +78,7 @@ fn holds_numbers(table: &Table, k: usize) -> bool {
     cells().any(|cell| !cell.is_empty()) && cells().all(|cell| is_number(cell))
 }
 
-/// Claims, with how many of them held above.
+/// Returns the claims, below how many of them held.
 pub(super) fn claims(claims: &[Claim]) -> Markup {
     let has_figure = claims.iter().any(|c| c.papers_figure.is_some());
     let heads = html! {
@@ -124,7 +124,7 @@ pub(super) fn claims(claims: &[Claim]) -> Markup {
     }
 }
 
-/// A verdict by color, sign and word.
+/// Returns a verdict as color, sign and word.
 fn badge(verdict: Verdict) -> Markup {
     let (class, sign) = match verdict {
         Verdict::Held => ("held", "\u{2713}"),

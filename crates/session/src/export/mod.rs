@@ -1,4 +1,4 @@
-//! Recorded runs in the forms of other programs. Tables are copied from the run folder; everything
+//! Exports of recorded runs to other formats. Tables are copied from the run folder; everything
 //! else is computed again from the recorded scenario.
 
 mod pictures;
@@ -12,65 +12,65 @@ use sidestep::kernel::{Cycle, InputError, Simulation};
 use std::path::{Path, PathBuf};
 use target::Target;
 
-/// The forms, each with its own options.
+/// The output formats, each with its own options.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Form {
     /// Tables as text: one of this name, or all.
     Csv(Option<String>),
-    /// Tables, each as one file: one of this name, or all.
+    /// Tables as Parquet, one file each: one of this name, or all.
     Parquet(Option<String>),
     /// Bodies, scans and events, for Foxglove and other viewers.
     Mcap,
-    /// The picture of the run, or of a moment.
+    /// Picture of the run, or of one cycle.
     Svg,
-    /// The same as pixels.
+    /// The same picture as PNG.
     Png {
-        /// The longer side, where it is not the usual one.
+        /// The longer side in pixels; `None` for the default.
         width_px: Option<u16>,
     },
-    /// A film.
+    /// Animated GIF.
     Gif(Film),
-    /// A film as numbered PNG files.
+    /// Animation as numbered PNG files.
     Frames(Film),
 }
 
-/// Options of a film.
+/// Options of an animation.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Film {
-    /// Pictures per second, where it is not the usual number.
+    /// Frames per second; `None` for the default.
     pub fps: Option<u16>,
-    /// The longer side, where it is not the usual one.
+    /// The longer side in pixels; `None` for the default.
     pub width_px: Option<u16>,
 }
 
-/// An export that is wanted: its form, its part of the run and its place.
+/// A requested export: its format, its part of the run and its place.
 #[derive(Debug, Clone)]
 pub struct Export<'a> {
-    /// The form.
+    /// The format.
     pub form: Form,
-    /// The place; `None` for one beside the recorded run, by its name.
+    /// The place; `None` for one beside the recorded run, with its name.
     pub out: Option<&'a Path>,
-    /// Whether what was exported before is replaced.
+    /// Whether an earlier export is replaced.
     pub replace: bool,
-    /// The first cycle; of pictures, the moment that is shown.
+    /// The first cycle; of pictures, the cycle that is shown.
     pub from: Option<Cycle>,
     /// The last cycle.
     pub until: Option<Cycle>,
-    /// Only cycles that are multiples of this; events are never left out of tables. Films have 150
-    /// pictures at most where it is not given.
+    /// Only cycles that are multiples of this; tables always have all events. Without it,
+    /// animations have at most 150 frames.
     pub every: Option<Cycle>,
-    /// Number of workers, where something is computed again.
+    /// Number of workers, if something is computed again.
     pub workers: usize,
 }
 
 /// Files that were written.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Written {
-    /// The files, or the folder of a film's pictures.
+    /// The files, or the folder of an animation's frames.
     pub paths: Vec<PathBuf>,
-    /// Whether a run that was computed again came to the recorded digest.
+    /// Whether a run that was computed again reached the recorded digest.
     pub is_confirmed: bool,
-    /// Pictures of a film, and how many are shown per second.
+    /// Number of frames of an animation, and how many are shown per second.
     pub film: Option<(usize, u16)>,
 }
 
@@ -83,8 +83,8 @@ impl Written {
 /// Exports a recorded run.
 ///
 /// # Errors
-/// When the part or the place is wrong, the result cannot be stored, or the run differs from what
-/// was recorded; [`Error::Interrupted`] when the watcher said no.
+/// When the part or the place is wrong, the result cannot be stored, or the run differs from the
+/// recorded one; [`Error::Interrupted`] when the watcher asked to stop.
 pub fn export(
     recorded: &Recorded,
     wanted: &Export<'_>,
@@ -102,7 +102,7 @@ pub fn export(
     }
 }
 
-/// An export that has been found possible.
+/// An export that has been checked.
 struct Job<'a> {
     recorded: &'a Recorded,
     wanted: &'a Export<'a>,
@@ -110,7 +110,7 @@ struct Job<'a> {
     watcher: &'a dyn Watcher,
 }
 
-/// The cycles that are asked for, both ends included.
+/// The requested cycles, both ends included.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Span {
     from: Cycle,
@@ -137,14 +137,14 @@ impl Span {
 }
 
 impl Job<'_> {
-    /// The run at the beginning of a cycle.
+    /// Returns the run at the start of a cycle.
     fn run_up_to(&self, cycle: Cycle) -> Result<Box<dyn Simulation>, Error> {
         let mut run = self.recorded.start_near(cycle, self.wanted.workers)?;
         self.drive(run.as_mut(), cycle, Sinks::default())?;
         Ok(run)
     }
 
-    /// Goes on to a cycle, or to the end of the run if that comes first.
+    /// Drives the run to a cycle, or to its end if that comes first.
     fn drive(&self, run: &mut dyn Simulation, until: Cycle, sinks: Sinks<'_>) -> Result<(), Error> {
         drive(run, until, sinks, self.watcher)?;
         match run.cycle() < until && !run.is_over() {

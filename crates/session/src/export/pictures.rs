@@ -1,4 +1,4 @@
-//! Pictures and films of a run that is computed again.
+//! Pictures and animations of a run that is computed again.
 
 use super::target::Target;
 use super::{Film as Options, Job, Written};
@@ -13,20 +13,20 @@ use sidestep_draw::{Film, Still, to_png};
 use std::io::Write;
 use std::path::Path;
 
-/// A film has no more pictures than this unless more are asked for.
+/// Largest number of frames of an animation, unless more are requested.
 const MOST_PICTURES: Cycle = 150;
-/// Pictures per second.
+/// Frames per second.
 const FPS: u16 = 15;
 const GIF_PX: u16 = 640;
 const FRAME_PX: u16 = 1280;
 const PNG_PX: u16 = 1600;
 
-/// The picture of the run at its end, or at a moment.
+/// Exports the picture of the run at its end, or at one cycle.
 pub(super) fn export_svg(job: &Job<'_>) -> Result<Written, Error> {
     export_picture(job, ".svg", |svg| Ok(svg.into_bytes()))
 }
 
-/// The same as pixels.
+/// Exports the same picture as PNG.
 pub(super) fn export_png(job: &Job<'_>, width_px: Option<u16>) -> Result<Written, Error> {
     export_picture(job, ".png", |svg| Ok(to_png(&svg, width_px.unwrap_or(PNG_PX).into())?))
 }
@@ -46,7 +46,7 @@ fn export_picture(
     Ok(Written::one(target.path(), is_confirmed))
 }
 
-/// A film as GIF.
+/// Exports an animation as GIF.
 pub(super) fn export_gif(job: &Job<'_>, options: Options) -> Result<Written, Error> {
     let target = Target::file(job, ".gif")?;
     export_film(job, options, &target, |film| {
@@ -54,7 +54,7 @@ pub(super) fn export_gif(job: &Job<'_>, options: Options) -> Result<Written, Err
     })
 }
 
-/// A film as numbered pictures in a folder.
+/// Exports an animation as numbered pictures in a folder.
 pub(super) fn export_frames(job: &Job<'_>, options: Options) -> Result<Written, Error> {
     let target = Target::folder(job, "-frames", "png")?;
     export_film(job, options, &target, |film| {
@@ -86,7 +86,7 @@ fn export_film(
     Ok(Written { film: Some(shown), ..Written::one(target.path(), is_confirmed) })
 }
 
-/// A film that is being drawn.
+/// An animation that is being drawn.
 struct Drawn<'a> {
     pictures: Pictures,
     fps: u16,
@@ -104,13 +104,13 @@ impl Drawn<'_> {
         replace(to, |file| write_gif(file, view.size_px(), f64::from(self.fps), pixels))
     }
 
-    /// Numbered pictures in `folder`.
+    /// Writes numbered pictures to `folder`.
     fn write_frames(&self, width_px: u16, folder: &Path) -> Result<(), Error> {
         let view = self.pictures.view(width_px.into())?;
         let watched = Watched(self.watcher);
         for index in 0..self.pictures.len() {
             let png = self.draw(&view, index, &watched)?.to_png()?;
-            // From 1 on, as ffmpeg counts.
+            // Numbers start at 1, as ffmpeg expects.
             let path = folder.join(format!("frame-{:05}.png", index + 1));
             std::fs::write(&path, png).map_err(|e| Error::write(&path, &e))?;
         }

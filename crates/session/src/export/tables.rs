@@ -1,4 +1,4 @@
-//! Recorded tables as CSV, or each as one Parquet file.
+//! Recorded tables as CSV, or as one Parquet file each.
 
 use super::target::Target;
 use super::{Job, Written};
@@ -11,10 +11,10 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-/// The table of which no row is left out for coming between.
+/// Name of the table of which every row is kept, whatever `every` is.
 const EVENTS: &str = "events";
 
-/// The forms of tables.
+/// The formats of tables.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Form {
     Csv,
@@ -54,7 +54,7 @@ pub(super) fn export(job: &Job<'_>, form: Form, only: Option<&str>) -> Result<Wr
     Ok(Written { paths, is_confirmed: false, film: None })
 }
 
-/// What is exported.
+/// The tables that are exported.
 struct Source<'a> {
     folder: &'a Path,
     job: &'a Job<'a>,
@@ -79,7 +79,7 @@ impl Source<'_> {
         }
     }
 
-    /// Goes through the rows that are asked for.
+    /// Passes on the requested rows, block by block.
     fn each_block(
         &self,
         name: &str,
@@ -91,7 +91,7 @@ impl Source<'_> {
             thin(&mut block, every);
             each(block)
         };
-        // The whole table may be one without cycles.
+        // Without a range all rows are read, because the table may have no cycles.
         match wanted.from.is_some() || wanted.until.is_some() {
             true => for_each_block(self.folder, name, span.from..=span.until, thinned),
             false => for_each_block(self.folder, name, .., thinned),

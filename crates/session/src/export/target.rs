@@ -1,4 +1,4 @@
-//! Where an export goes.
+//! The place of an export.
 
 use super::Job;
 use crate::Error;
@@ -6,23 +6,23 @@ use sidestep::kernel::InputError;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
-/// A file or folder that is not there yet, or may be replaced.
+/// A file or folder that does not exist yet, or may be replaced.
 #[derive(Debug)]
 pub(super) struct Target {
     path: PathBuf,
 }
 
 impl Target {
-    /// The place that was asked for, else one beside the recorded run, with its name and `ending`.
+    /// Returns the requested place, or one beside the recorded run, with its name and `ending`.
     fn named(job: &Job<'_>, ending: &str) -> Self {
         let beside = || beside(&job.recorded.path, ending);
         Self { path: job.wanted.out.map_or_else(beside, Path::to_path_buf) }
     }
 
-    /// A file: what was asked for, else the run's name with `ending`.
+    /// Returns the requested file, or the run's name with `ending`.
     ///
     /// # Errors
-    /// When it is there and not to be replaced.
+    /// When the file exists and may not be replaced.
     pub(super) fn file(job: &Job<'_>, ending: &str) -> Result<Self, InputError> {
         let target = Self::named(job, ending);
         match std::fs::metadata(&target.path) {
@@ -32,10 +32,10 @@ impl Target {
         }
     }
 
-    /// A folder, of files with the extension `holds` only where it is to be replaced.
+    /// Returns a folder; one that is replaced may hold only files with the extension `holds`.
     ///
     /// # Errors
-    /// When it is there and not to be replaced, or holds something else.
+    /// When the folder exists and may not be replaced, or holds something else.
     pub(super) fn folder(job: &Job<'_>, ending: &str, holds: &str) -> Result<Self, InputError> {
         let target = Self::named(job, ending);
         let Ok(mut entries) = std::fs::read_dir(&target.path) else {
@@ -63,16 +63,16 @@ impl Target {
         InputError::new(self.path.display(), cause, remedy)
     }
 
-    /// Its name.
+    /// Returns the path.
     pub(super) fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Makes the folder: `fill` is given one with another name, which takes its place when all
-    /// is in it.
+    /// Creates the folder: `fill` gets one with another name, which takes the place of the folder
+    /// when it is complete.
     ///
     /// # Errors
-    /// What `fill` returns, and what the system says; then nothing is left.
+    /// The error of `fill`, or an I/O error; nothing is left then.
     pub(super) fn make_folder<T>(
         &self,
         fill: impl FnOnce(&Path) -> Result<T, Error>,
@@ -81,7 +81,7 @@ impl Target {
         growing.push(".partial");
         let growing = PathBuf::from(growing);
         let failed = |e: std::io::Error| Error::write(&self.path, &e);
-        // What a process that was killed left.
+        // Remains of a process that was killed.
         remove(&growing).map_err(failed)?;
         std::fs::create_dir_all(&growing).map_err(failed)?;
         let filled = fill(&growing).and_then(|done| {
@@ -104,7 +104,7 @@ fn remove(folder: &Path) -> std::io::Result<()> {
     }
 }
 
-/// The place beside a recording, by its name.
+/// Returns the place beside a recording, with its name.
 fn beside(recorded: &Path, ending: &str) -> PathBuf {
     // `.` and `..` have no name of their own.
     let whole = std::fs::canonicalize(recorded).unwrap_or_else(|_| recorded.to_path_buf());

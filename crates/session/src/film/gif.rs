@@ -1,23 +1,23 @@
-//! Films as GIF: one palette for all pictures, and of each picture only what has changed.
+//! Animated GIFs: one palette for all frames, and of each frame only the part that has changed.
 
 use gif::{DisposalMethod, Encoder, Frame, Repeat};
 use sidestep::kernel::view::{ALERT, COLORS, DOOR, MOBILE, UNKNOWN, WALL};
 use std::borrow::Cow;
 use std::io::{Error, Result, Write};
 
-/// The color that stands for "as before".
+/// The palette entry for "same as before".
 const AS_BEFORE: u8 = 255;
-/// Steps from a color to what lies under it, by edges and what can be seen through.
+/// Number of steps between a color and the color beneath it, for edges and transparent areas.
 const STEPS: u32 = 7;
-/// Grays for text.
+/// Number of grays for text.
 const GRAYS: u32 = 16;
-/// Bits of each color part by which palette entries are looked up.
+/// Bits of each color component by which palette entries are looked up.
 const BITS: u32 = 5;
 
-/// Writes pictures of one size, each four bytes a pixel, at so many per second.
+/// Writes frames of one size, with four bytes per pixel, at a number of frames per second.
 ///
 /// # Errors
-/// What the system says, and what `pictures` returns.
+/// An I/O error, or an error of `pictures`.
 pub(crate) fn write_gif(
     to: impl Write,
     (width, height): (u32, u32),
@@ -42,7 +42,7 @@ pub(crate) fn write_gif(
     Ok(())
 }
 
-/// The rectangle in which a picture differs from the one before.
+/// Returns the rectangle in which a frame differs from the one before.
 fn changed(before: Option<&[u8]>, now: &[u8], (width, height): (u16, u16)) -> Frame<'static> {
     let row = usize::from(width);
     let Some(before) = before else {
@@ -77,11 +77,11 @@ fn plain() -> Frame<'static> {
     Frame { dispose: DisposalMethod::Keep, transparent: Some(AS_BEFORE), ..Frame::default() }
 }
 
-/// The colors of all films: what things are drawn with, and mixtures of it with what may lie
-/// under it.
+/// The colors of all animations: those of the drawings, and their mixtures with possible colors
+/// beneath.
 struct Palette {
     colors: Vec<[u8; 3]>,
-    /// The nearest color by the upper bits of red, green and blue.
+    /// The nearest color, by the upper bits of red, green and blue.
     nearest: Vec<u8>,
 }
 
@@ -95,7 +95,7 @@ impl Palette {
             colors.extend((0..=STEPS).map(|k| mixed(color, white, k)));
             colors.extend([2, 4].map(|k| mixed(color, WALL, k)));
         }
-        // Lines of a zone's color on the zone of another.
+        // Lines in the color of a zone that cross another zone.
         for (k, &color) in COLORS.iter().enumerate() {
             let under = mixed(COLORS[(k + 1) % COLORS.len()], white, 5);
             colors.extend([1, 3, 5].map(|k| mixed(color, under, k)));
@@ -123,7 +123,7 @@ impl Palette {
     }
 }
 
-/// `k` of [`STEPS`] steps from a color to what lies under it.
+/// Returns the color that is `k` of [`STEPS`] steps from a color to the one beneath it.
 fn mixed(color: [u8; 3], under: [u8; 3], k: u32) -> [u8; 3] {
     let part = |i: usize| (u32::from(color[i]) * (STEPS - k) + u32::from(under[i]) * k) / STEPS;
     std::array::from_fn(|i| part(i) as u8)

@@ -11,22 +11,22 @@ use sidestep_record::{McapEnd, McapOrigin, McapRecorder, Origin, Status};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// Scans of more bodies than this are left out: each is a topic of its own, and reading sensors
-/// for it costs what the simulation does.
+/// Scans of more bodies than this are left out: each has its own topic, and reading sensors for a
+/// scan costs as much as simulating.
 const LOOK: Look = Look { scanning_bodies: 64 };
 
-/// Why a recording ends.
+/// The reason why a recording ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ending {
     /// The run is complete.
     Complete,
-    /// No more of the run is wanted.
+    /// The requested part of the run is complete.
     Extract,
-    /// The run was stopped: the file keeps `.partial` at its end.
+    /// The run was stopped: the file name keeps the ending `.partial`.
     Stopped,
 }
 
-/// An MCAP file that grows with a run.
+/// An MCAP file that is written while a run advances.
 pub struct McapFilm {
     recorder: McapRecorder,
     every: Cycle,
@@ -34,10 +34,10 @@ pub struct McapFilm {
 }
 
 impl McapFilm {
-    /// A new file at `path`; the run is watched from now on.
+    /// Starts a new file at `path`; from now on it records the run.
     ///
     /// # Errors
-    /// What the system says.
+    /// An I/O error.
     pub fn begin(
         path: &Path,
         every: Cycle,
@@ -64,10 +64,10 @@ impl McapFilm {
         Ok(Self { recorder, every, took: Duration::ZERO })
     }
 
-    /// Ends the file, and says what it is called.
+    /// Finishes the file and returns its name.
     ///
     /// # Errors
-    /// What the system says.
+    /// An I/O error.
     pub fn finish(self, run: &dyn Simulation, ending: Ending) -> Result<PathBuf, Error> {
         let status = match ending {
             Ending::Complete => Status::Complete,
@@ -81,7 +81,7 @@ impl McapFilm {
         })
     }
 
-    /// Time spent so far.
+    /// Returns the time spent so far.
     pub fn took(&self) -> Duration {
         self.took
     }

@@ -1,4 +1,4 @@
-//! What is made of frames while a run goes on: recordings for viewers, and films.
+//! Recordings for viewers and animations, made from frames while a run advances.
 
 mod gif;
 mod mcap;
@@ -12,12 +12,13 @@ use crate::Error;
 use sidestep::kernel::Cycle;
 use sidestep::kernel::Simulation;
 
-/// Takes a picture of a run now and then.
+/// Takes frames of a run at regular cycles.
 pub trait Film {
-    /// Pictures are taken in cycles that are multiples of this, and at the end.
+    /// Returns the number of cycles between frames: they are taken at its multiples, and at the
+    /// end.
     fn every(&self) -> Cycle;
 
-    /// Takes one of the run as it is now.
+    /// Takes a frame of the present state of the run.
     ///
     /// # Errors
     /// When it cannot be stored.

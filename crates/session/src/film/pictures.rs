@@ -1,4 +1,5 @@
-//! Frames of a run, kept until all are there, then drawn: the view depends on all of them.
+//! Frames of a run, kept until all are there and then drawn, because the view depends on all of
+//! them.
 
 use super::Film;
 use crate::Error;
@@ -8,12 +9,12 @@ use sidestep::kernel::words::grouped;
 use sidestep::kernel::{Cycle, InputError};
 use sidestep_draw::{Film as View, Still, worth_a_trail};
 
-/// More bodies in all frames would take too much memory.
+/// Largest number of bodies in all frames; more would take too much memory.
 const MOST_BODIES: usize = 4_000_000;
-/// Frames before a picture in which ways are shown.
+/// Number of frames before a picture whose tracks are shown.
 const TRAIL: usize = 30;
 
-/// The frames of a film.
+/// The frames of an animation.
 pub(crate) struct Pictures {
     scenery: Scenery,
     every: Cycle,
@@ -22,17 +23,17 @@ pub(crate) struct Pictures {
 }
 
 impl Pictures {
-    /// A film of a run with a picture every so many cycles.
+    /// Returns an animation of a run with a frame every `every` cycles.
     pub(crate) fn new(run: &dyn Simulation, every: Cycle) -> Self {
         Self { scenery: run.scenery(), every, frames: Vec::new(), bodies: 0 }
     }
 
-    /// How many pictures there are.
+    /// Returns the number of frames.
     pub(crate) fn len(&self) -> usize {
         self.frames.len()
     }
 
-    /// The view that all pictures have.
+    /// Returns the view that all frames share.
     ///
     /// # Errors
     /// When it cannot be drawn.
@@ -40,7 +41,7 @@ impl Pictures {
         Ok(View::new(self.scenery.clone(), &self.frames, width_px)?)
     }
 
-    /// One picture.
+    /// Draws one frame.
     ///
     /// # Errors
     /// When it cannot be drawn.
@@ -83,7 +84,7 @@ impl Film for Pictures {
     }
 }
 
-/// Where a body was in these frames; nothing of one that is not in the last of them.
+/// Returns the track of a body in these frames; empty if it is not in the last of them.
 fn trail(of: Who, frames: &[Frame]) -> Trail {
     let find = |frame: &Frame| {
         frame.bodies.iter().find(|body| body.who() == of).map(|body| body.pose.at_m)

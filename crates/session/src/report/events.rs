@@ -1,4 +1,4 @@
-//! What happened in a run and when, for every table that has the columns `cycle` and `event`.
+//! Timeline of the events of a run, for every table that has the columns `cycle` and `event`.
 
 use super::metrics::{digits, left_out};
 use super::recorded::{cell, rows};
@@ -9,14 +9,14 @@ use sidestep_document::{Document, document::Text};
 use sidestep_record::{Table as Recorded, read_table};
 use std::path::Path;
 
-/// Events that are listed one by one.
+/// Largest number of events that are listed one by one.
 const MOST_ROWS: usize = 100;
-/// Stretches of cycles over which events are counted.
+/// Number of stretches of cycles over which events are counted.
 const STRETCHES: u64 = 50;
-/// Kinds of events with a line of their own; palettes have no more colors.
+/// Largest number of kinds of events with a line of their own; palettes have no more colors.
 const MOST_KINDS: usize = 7;
 
-/// Appends what the table `name` tells, if it is one of events.
+/// Appends the events of the table `name`, if it is a table of events.
 ///
 /// # Errors
 /// When the table is damaged.
@@ -59,13 +59,13 @@ impl<'a> Events<'a> {
         Some(Self { table, cycles, kinds, names })
     }
 
-    /// Cycles of the events of a kind.
+    /// Returns the cycles of the events of a kind.
     fn cycles_of(&self, kind: usize) -> impl Iterator<Item = u64> {
         let is_its = move |(_, k): &(&u64, &u32)| **k as usize == kind;
         self.cycles.iter().zip(self.kinds).filter(is_its).map(|(cycle, _)| *cycle)
     }
 
-    /// Kinds that occur with their numbers, most frequent first.
+    /// Returns the kinds that occur and their numbers, most frequent first.
     fn frequent(&self) -> Vec<(usize, usize)> {
         let mut counts: Vec<(usize, usize)> = (0..self.names.len()).map(|k| (k, 0)).collect();
         for &kind in self.kinds {
@@ -99,7 +99,7 @@ impl<'a> Events<'a> {
         table
     }
 
-    /// The least and the greatest value of a kind.
+    /// Returns the smallest and the largest value of a kind.
     fn ends(&self, kind: usize, values: &[f64]) -> [String; 2] {
         let its = || {
             let all = values.iter().zip(self.kinds);
@@ -108,7 +108,7 @@ impl<'a> Events<'a> {
         [its().reduce(f64::min), its().reduce(f64::max)].map(|end| end.map_or("-".into(), digits))
     }
 
-    /// How many of each kind there were in each stretch of cycles; nothing of one stretch.
+    /// Returns the number of events of each kind in each stretch of cycles; `None` for one stretch.
     fn over_time(&self) -> Option<Figure> {
         let last = self.cycles.iter().max()? + 1;
         let length = last.div_ceil(STRETCHES);

@@ -4,12 +4,12 @@ use super::words::count;
 use serde_json::{Map, Value};
 use sidestep_document::Table;
 
-/// More rows than this are left out, and told.
+/// Largest number of rows; the number of rows left out is shown.
 const MOST_ROWS: usize = 200;
-/// Lists of more values than this are counted only.
+/// Largest number of values of a list that are shown; longer lists are only counted.
 const MOST_VALUES: usize = 16;
 
-/// Ends of names that tell a unit; longer ones first.
+/// Endings of names that stand for a unit; longer ones first.
 const UNITS: [(&str, &str); 18] = [
     ("_m_s", "m/s"),
     ("_percent", "%"),
@@ -31,14 +31,14 @@ const UNITS: [(&str, &str); 18] = [
     ("_s", "s"),
 ];
 
-/// The unit that a name ends in, or nothing: `steps_per_cpu_s` are so many in a second.
+/// Returns the unit that a name ends in, or nothing: `steps_per_cpu_s` is a number per second.
 pub(super) fn unit(name: &str) -> String {
     let unit = UNITS.iter().find(|(end, _)| name.ends_with(end)).map_or("", |(_, unit)| unit);
     let is_rate = name.contains("_per_") && !unit.is_empty();
     if is_rate { format!("1/{unit}") } else { unit.into() }
 }
 
-/// A tree of values as a row for each leaf, by its path; `None` without any.
+/// Returns a tree of values as one row for each leaf, with its path; `None` without any.
 pub(super) fn flat(title: &str, tree: &Value) -> Option<Table> {
     let mut table = Table::new(title, "", &["metric", "value", "unit"]);
     for (path, value) in leaves(tree) {
@@ -48,7 +48,7 @@ pub(super) fn flat(title: &str, tree: &Value) -> Option<Table> {
     (!table.rows.is_empty()).then_some(table)
 }
 
-/// A list of trees as a row for each of them, a column for each of their leaves.
+/// Returns a list of trees as one row for each of them, with a column for each of their leaves.
 pub(super) fn listed(title: &str, list: &Value) -> Option<Table> {
     let rows: Vec<Vec<(String, String)>> = list.as_array()?.iter().map(leaves).collect();
     let shown = &rows[..rows.len().min(MOST_ROWS)];
@@ -70,7 +70,8 @@ pub(super) fn listed(title: &str, list: &Value) -> Option<Table> {
     Some(table)
 }
 
-/// Paths without the first step that all longer ones share, where they stay apart without it.
+/// Returns paths without the first step that all longer ones share, if they stay distinct without
+/// it.
 fn without_shared_head<'a>(paths: &[&'a str]) -> Vec<&'a str> {
     let head = |path: &&'a str| path.split_once('.').map(|(head, _)| head);
     let mut heads: Vec<&str> = paths.iter().filter_map(head).collect();
@@ -83,7 +84,7 @@ fn without_shared_head<'a>(paths: &[&'a str]) -> Vec<&'a str> {
     if heads.len() == 1 && apart.len() == paths.len() { tails } else { paths.to_vec() }
 }
 
-/// How many rows are not shown, in words; nothing if all are.
+/// Returns how many rows are not shown, as text; empty if all are.
 pub(super) fn left_out(all: usize, shown: usize) -> String {
     match all - shown {
         0 => String::new(),
@@ -96,7 +97,7 @@ pub(super) fn left_out(all: usize, shown: usize) -> String {
     }
 }
 
-/// Every leaf of a tree with its path, `contacts.wall`; what is null has none.
+/// Returns every leaf of a tree with its path, such as `contacts.wall`; null values are left out.
 fn leaves(tree: &Value) -> Vec<(String, String)> {
     let mut found = Vec::new();
     match tree {
@@ -132,7 +133,7 @@ fn word(value: &Value) -> String {
     }
 }
 
-/// Whole numbers as they are; others with six digits.
+/// Formats whole numbers as they are, and others with six digits.
 fn number(number: &serde_json::Number) -> String {
     match (number.as_u64(), number.as_f64()) {
         (Some(whole), _) => whole.to_string(),
@@ -141,7 +142,7 @@ fn number(number: &serde_json::Number) -> String {
     }
 }
 
-/// A value with six digits, as short as it can be.
+/// Formats a value with six digits, as short as possible.
 pub(super) fn digits(value: f64) -> String {
     let rounded = format!("{value:.5e}").parse().unwrap_or(value);
     match rounded.abs() {

@@ -3,7 +3,7 @@
 //! ```text
 //! run.rs        a run folder -> a document       metrics.rs   numbers of a summary -> tables
 //! sweep.rs      the folder of a sweep -> a document
-//! recorded.rs   its tables: what is in them      events.rs    what happened, and when
+//! recorded.rs   its tables and columns             events.rs    timeline of events
 //! ```
 
 mod events;
@@ -21,8 +21,8 @@ use std::path::Path;
 
 pub use words::duration;
 
-/// Returns the report of a run folder or of the folder of a sweep. The one place that tells the
-/// two apart.
+/// Returns the report of a run folder or of the folder of a sweep. Only this function distinguishes
+/// the two.
 ///
 /// # Errors
 /// When the folder holds nothing to report, or something in it is damaged.

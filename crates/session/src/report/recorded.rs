@@ -1,4 +1,4 @@
-//! What the tables of a run folder hold, by their schemas.
+//! The contents of the tables of a run folder, by their schemas.
 
 use super::metrics::unit;
 use crate::recorded::has_rows;
@@ -8,7 +8,7 @@ use sidestep_document::{Document, Table};
 use sidestep_record::read_table;
 use std::path::Path;
 
-/// Names of the tables in a run folder of which something is whole, sorted.
+/// Returns the names of the tables in a run folder that have a complete part, sorted.
 ///
 /// # Errors
 /// When the folder cannot be read.
@@ -29,7 +29,7 @@ pub(super) fn names(folder: &Path) -> Result<Vec<String>, InputError> {
     Ok(names)
 }
 
-/// Appends what columns there are and what they mean.
+/// Appends the columns and their meanings.
 ///
 /// # Errors
 /// When a table is damaged.
@@ -38,7 +38,7 @@ pub(super) fn tell(document: &mut Document, folder: &Path) -> Result<(), InputEr
     let columns = ["table", "column", "type", "unit", "meaning"];
     let mut table = Table::new("Columns", note, &columns);
     for name in names(folder)? {
-        // Its first rows tell the schema; the whole may be large.
+        // The first rows are enough for the schema; the whole table may be large.
         let first = read_table(folder, &name, ..1).or_else(|_| read_table(folder, &name, ..))?;
         for column in &first.schema.columns {
             let unit = unit(&column.name);
@@ -52,10 +52,10 @@ pub(super) fn tell(document: &mut Document, folder: &Path) -> Result<(), InputEr
     Ok(())
 }
 
-/// A value of a column as people read it.
+/// Returns a value of a column as people read it.
 pub(super) fn cell(column: &ColumnSpec, values: &Values, row: usize) -> String {
     match values {
-        // What stands for none.
+        // The value that stands for none.
         Values::U32(v) if v[row] == u32::MAX => "-".into(),
         Values::F64(v) => super::metrics::digits(v[row]),
         _ if values.is_missing(row) => "-".into(),
@@ -63,7 +63,7 @@ pub(super) fn cell(column: &ColumnSpec, values: &Values, row: usize) -> String {
     }
 }
 
-/// A number of rows in words.
+/// Returns a number of rows as text.
 pub(super) fn rows(rows: usize) -> String {
     format!("{} row{}", super::words::count(rows as u64), if rows == 1 { "" } else { "s" })
 }

@@ -1,4 +1,4 @@
-//! A run folder as a document. Nothing here knows worlds: metrics are what `summary.json` holds,
+//! A run folder as a document. Nothing here knows worlds: metrics come from `summary.json`, and
 //! everything else follows from the schemas of the recorded tables.
 
 use super::words::{count, duration};
@@ -10,11 +10,11 @@ use sidestep_document::document::{Block, Code, Picture, Text};
 use sidestep_record::{Manifest, RunView, Status};
 use std::path::Path;
 
-/// What is said wherever numbers of one run stand.
+/// The remark beside all numbers of a single run.
 const ONE_RUN: &str = "**One run, n = 1**: these numbers have no interval, and say nothing of other \
                        seeds.";
 
-/// What there is to say about the run in `folder`.
+/// Returns the report of the run in `folder`.
 ///
 /// # Errors
 /// When it is no run folder, or something in it is damaged.
@@ -46,7 +46,7 @@ pub(super) fn document(folder: &Path) -> Result<Document, InputError> {
     Ok(document)
 }
 
-/// The scenario's name, else the world's.
+/// Returns the scenario's name, or the world's if it has none.
 fn name(view: &RunView, summary: Option<&Value>) -> String {
     let named = summary.and_then(|s| s.get("name")).and_then(Value::as_str);
     named.filter(|name| !name.is_empty()).unwrap_or(&view.manifest.world).into()
@@ -65,7 +65,7 @@ fn lead(view: &RunView) -> Text {
     Text::marked(&text)
 }
 
-/// What to say of a run that is not complete.
+/// Returns a remark about a run that is not complete.
 fn unfinished(view: &RunView) -> Option<Text> {
     let Manifest { status, cycles_done, .. } = &view.manifest;
     let how = match status {
@@ -109,7 +109,7 @@ fn facts(view: &RunView, summary: Option<&Value>) -> Vec<(String, Text)> {
     facts
 }
 
-/// Commands that give the same again.
+/// Returns the commands that reproduce the run.
 fn again(view: &RunView) -> String {
     let folder = quoted(&view.path.display().to_string());
     let scenario = quoted(&view.path.join("scenario.toml").display().to_string());
@@ -121,7 +121,7 @@ fn again(view: &RunView) -> String {
     )
 }
 
-/// A path as a shell takes it.
+/// Returns a path quoted for a shell.
 pub(super) fn quoted(path: &str) -> String {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "/._-+=:,@%".contains(c);
     if !path.is_empty() && path.chars().all(is_plain) {
@@ -130,7 +130,7 @@ pub(super) fn quoted(path: &str) -> String {
     format!("'{}'", path.replace('\'', "'\\''"))
 }
 
-/// `summary.json`, which a run writes at its end.
+/// Returns `summary.json`, which a run writes at its end.
 fn summary(folder: &Path) -> Result<Option<Value>, InputError> {
     let path = folder.join("summary.json");
     let Ok(text) = std::fs::read_to_string(&path) else { return Ok(None) };
@@ -151,7 +151,7 @@ fn tell_metrics(document: &mut Document, manifest: &Manifest, summary: &Value) {
     document.tables(metrics::listed("Metrics of pairs of agents", get("per_pair")));
 }
 
-/// The picture that the run left.
+/// Returns the picture in the run folder.
 fn picture(folder: &Path) -> Result<Option<Picture>, InputError> {
     let path = folder.join("trajectories.svg");
     match std::fs::read_to_string(&path) {

@@ -1,4 +1,4 @@
-//! The folder of a sweep as a document: what was run, what it came to, how sure that is.
+//! The folder of a sweep as a document: its runs, their results, and how precise these are.
 
 use super::run::quoted;
 use super::words::{count, duration};
@@ -11,14 +11,14 @@ use sidestep::scenario::Worlds;
 use sidestep_document::Table;
 use sidestep_document::document::{Block, Code, Document, Picture, Text};
 
-/// Variants of which a run is drawn.
+/// Number of variants of which a run is drawn.
 const DRAWN: usize = 4;
-/// A run that took longer is not made again for its picture.
+/// Largest time in seconds of a run that is made again for its picture.
 const LONGEST_S: f64 = 20.0;
-/// Failed runs that are named.
+/// Largest number of failed runs that are listed.
 const NAMED: usize = 20;
 
-/// What there is to say about the sweep in `folder`.
+/// Returns the report of the sweep in `folder`.
 ///
 /// # Errors
 /// When something in it is damaged, or no run is finished yet.
@@ -113,7 +113,7 @@ fn total(table: &RunTable, column: &str) -> Option<f64> {
     Some((0..table.runs()).filter_map(|row| values.number(row)).sum())
 }
 
-/// The variants, their parameters and numbers of runs.
+/// Returns the variants with their parameters and numbers of runs.
 fn variants(plan: &Plan, table: &RunTable) -> Option<Table> {
     if plan.parameters.is_empty() {
         return None;
@@ -137,7 +137,7 @@ fn variants(plan: &Plan, table: &RunTable) -> Option<Table> {
     Some(rows)
 }
 
-/// Why variants were run no more, where a precision ends them.
+/// Returns the reasons why variants stopped, if a precision ends them.
 fn why_enough(plan: &Plan, table: &RunTable) -> Option<Table> {
     let stopped = stopped(plan, table);
     let names = plan.names();
@@ -149,7 +149,7 @@ fn why_enough(plan: &Plan, table: &RunTable) -> Option<Table> {
     (!stopped.is_empty()).then_some(rows)
 }
 
-/// Commands that give the same again.
+/// Returns the commands that reproduce the sweep.
 fn again(folder: &Folder) -> String {
     let at = |rest: &str| quoted(&folder.path().join(rest).display().to_string());
     format!(
@@ -163,7 +163,7 @@ fn again(folder: &Folder) -> String {
     )
 }
 
-/// Every metric in a section of its own: its figures, then its tables.
+/// Appends every metric in a section of its own: its figures, then its tables.
 fn tell_results(document: &mut Document, summary: &Summary) {
     for section in summary.sections() {
         document.section(section.title).figures(section.figures).tables(section.tables);
@@ -199,7 +199,7 @@ fn tell_failures(document: &mut Document, plan: &Plan, table: &RunTable) {
     document.tables([rows]);
 }
 
-/// A run of each of the first variants, drawn; nothing of those that took long.
+/// Returns a picture of one run of each of the first variants, except of those that took long.
 fn pictures(
     worlds: Worlds,
     folder: &Folder,

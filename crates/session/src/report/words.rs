@@ -1,4 +1,4 @@
-//! Numbers in words.
+//! Numbers as text.
 
 use sidestep::kernel::words::grouped;
 
@@ -7,7 +7,7 @@ pub(super) fn count(number: u64) -> String {
     grouped(number).replace(' ', "\u{a0}")
 }
 
-/// Returns seconds as people say them: `0.83 s`, `4 min 12 s`, `2 h 05 min`.
+/// Returns a duration as people write it: `0.83 s`, `4 min 12 s`, `2 h 05 min`.
 pub fn duration(seconds: f64) -> String {
     let whole = seconds.round() as u64;
     match whole {

@@ -21,21 +21,21 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// The folder of a sweep.
 pub type Folder = SweepFolder<Plan>;
 
-/// The end of work on a sweep, or on a share of one.
+/// The result of working on a sweep, or on a share of one.
 pub enum Ended {
     /// All of its runs are finished.
     Done(Done),
-    /// The watcher said no; so many runs are finished.
+    /// The watcher asked to stop; this many runs are finished.
     Interrupted(usize),
 }
 
 /// Finished runs.
 pub struct Done {
-    /// A row a run.
+    /// One row per run.
     pub table: RunTable,
-    /// What making them took in this process.
+    /// The time that they took in this process.
     pub effort: Effort,
-    /// Whether they were finished before.
+    /// Whether they were finished already.
     pub was_done: bool,
 }
 
@@ -49,10 +49,10 @@ impl Done {
     }
 }
 
-/// Runs a sweep and keeps nothing but what it returns.
+/// Runs a sweep in memory, without writing anything.
 ///
 /// # Errors
-/// When the sweep is wrong, or the watcher says no before the first run.
+/// When the sweep is wrong, or the watcher asks to stop before the first run.
 pub fn in_memory(
     worlds: Worlds,
     sweep: &Sweep,
@@ -79,10 +79,10 @@ pub fn in_memory(
     Ok((plan, ended))
 }
 
-/// Plans a sweep into a folder: all of it or nothing.
+/// Plans a sweep into a folder: completely or not at all.
 ///
 /// # Errors
-/// When the sweep is wrong, or the folder taken.
+/// When the sweep is wrong, or the folder is taken.
 pub fn planned(
     worlds: Worlds,
     sweep: &Sweep,
@@ -101,7 +101,7 @@ pub fn planned(
     })
 }
 
-/// Plans a sweep into a folder, or opens the folder where the same sweep is there already.
+/// Plans a sweep into a folder, or opens the folder if it holds the same sweep already.
 ///
 /// # Errors
 /// When the sweep is wrong, or the folder holds something else, or is of another build.
@@ -117,7 +117,7 @@ pub fn planned_or_there(
     }
 }
 
-/// The sweep that is in the folder, which must be this one.
+/// Opens the sweep in the folder, which must be this one.
 fn the_same(
     worlds: Worlds,
     sweep: &Sweep,
@@ -140,7 +140,7 @@ fn the_same(
     Err(InputError::new(out.display(), "the folder holds another sweep", remedy).into())
 }
 
-/// Results may change between builds, so only one makes all runs.
+/// Refuses another build: results may change between builds, so only one makes all runs.
 fn check_build(folder: &Folder) -> Result<(), InputError> {
     let manifest = folder.manifest();
     let maker = Maker { version: manifest.program_version.clone(), build: manifest.build.clone() };
@@ -149,7 +149,7 @@ fn check_build(folder: &Folder) -> Result<(), InputError> {
     })
 }
 
-/// Runs whatever is not finished yet, and joins all runs into one table.
+/// Runs all cells that are not finished, and joins all runs into one table.
 ///
 /// # Errors
 /// When runs cannot be read or stored.
@@ -182,10 +182,10 @@ pub fn go_on(
     Ok(Done::now(table, effort))
 }
 
-/// Runs a share of the cells and writes its part.
+/// Runs one share of the cells and writes its part.
 ///
 /// # Errors
-/// When the sweep stops by precision or is of another build, or runs cannot be read or stored.
+/// When the sweep stops at a precision or is of another build, or runs cannot be read or stored.
 pub fn share(
     worlds: Worlds,
     folder: &Folder,
@@ -209,7 +209,8 @@ pub fn share(
     let Some(mut journal) = journal else {
         return Ok(Done::before(finished_of(folder, shard)?));
     };
-    // Shares of another count, or a sweep that went on here, may have made some of its runs.
+    // Shares of another count, or a sweep that continued here, may have finished some of these
+    // runs.
     let mut elsewhere = BTreeSet::new();
     gather(folder, Some(shard), |outcome| _ = elsewhere.insert(outcome.cell))?;
     let cells: Vec<Cell> = plan.share(shard).filter(|c| !elsewhere.contains(&c.id)).collect();
@@ -228,7 +229,7 @@ pub fn share(
     Ok(Done::now(table, effort))
 }
 
-/// The finished runs of the cells of a share, whoever made them.
+/// Returns the finished runs of the cells of a share, whoever made them.
 fn finished_of(folder: &Folder, shard: Shard) -> Result<RunTable, Error> {
     let own: BTreeSet<u64> = folder.plan().share(shard).map(|c| c.id).collect();
     let mut rows = Rows::default();
@@ -268,17 +269,17 @@ pub fn collect(folder: &Folder) -> Result<Ended, Error> {
     Ok(Done::now(table, Effort::default()))
 }
 
-/// The table of runs in a file.
+/// Returns the table of runs in a file.
 pub(super) fn table_of(file: WholeTable<Role>) -> RunTable {
     RunTable { columns: file.columns }
 }
 
-/// The same share, as folders name it.
+/// Converts a share to the type that folders use.
 fn share_of(shard: Shard) -> Share {
     Share { index: shard.index, count: shard.count }
 }
 
-/// Hands over all finished runs, but for those of the share `but`.
+/// Passes on all finished runs, except those of the share `but`.
 pub(super) fn gather(
     folder: &Folder,
     but: Option<Shard>,
@@ -288,7 +289,7 @@ pub(super) fn gather(
     folder.journals(but.map(share_of), &mut each)
 }
 
-/// Hands over what the cells of a folder are run with.
+/// Passes on what is needed to run the cells of a folder.
 fn with_work(
     worlds: Worlds,
     folder: &Folder,
@@ -299,7 +300,7 @@ fn with_work(
     let plan = folder.plan();
     let checked: Vec<AtomicBool> = plan.variants.iter().map(|_| AtomicBool::new(false)).collect();
     let source = |variant: u32| {
-        // Runs of a scenario that somebody has changed would be runs of another sweep.
+        // A scenario that was edited in between would make runs of another sweep.
         let checked = &checked[variant as usize];
         if !checked.load(Ordering::Relaxed) {
             folder.check_variant(variant)?;
@@ -313,7 +314,7 @@ fn with_work(
     run(&Work { worlds, plan, source: &source, record, workers, watcher })
 }
 
-/// Something could not be stored: says what is saved, and how to go on.
+/// Adds to an error of storing which runs are saved, and how to continue.
 fn saved(error: Error, folder: &Path) -> Error {
     match error {
         Error::Record(error) => {
@@ -347,7 +348,7 @@ impl<'a> Log<'a> {
         self.rows.push(outcome);
     }
 
-    /// Cells that are not finished: of the next round, or all.
+    /// Returns the cells that are not finished: of the next round, or all.
     fn open(&self) -> Vec<Cell> {
         match &self.rounds {
             Some(rounds) => rounds.next(),
@@ -361,7 +362,7 @@ impl<'a> Log<'a> {
         cells.filter(|cell| finished.binary_search(&cell.id).is_err()).collect()
     }
 
-    /// Runs all that is open, round by round where a precision is wanted.
+    /// Runs all open cells, round by round if a precision ends the sweep.
     fn run_all(&mut self, work: &Work<'_>, keep: &mut Keep<'_>) -> Result<Effort, Error> {
         let mut effort = Effort::default();
         loop {
@@ -373,7 +374,7 @@ impl<'a> Log<'a> {
         }
     }
 
-    /// Runs those of the cells that are not finished.
+    /// Runs the cells that are not finished.
     fn run(
         &mut self,
         work: &Work<'_>,

@@ -1,4 +1,4 @@
-//! What a report needs of a sweep: its finished runs, and pictures of some.
+//! The parts of a sweep that a report needs: its finished runs, and pictures of some.
 
 use super::journey::{Folder, gather, table_of};
 use super::work::recorded;
@@ -9,15 +9,15 @@ use sidestep::kernel::InputError;
 use sidestep::scenario::{Source, Worlds};
 use std::path::Path;
 
-/// The runs that are finished.
+/// The finished runs of a sweep.
 pub struct Finished {
-    /// A row a run, with what it took.
+    /// One row per run, with the times that it took.
     pub table: RunTable,
-    /// Whether these are all.
+    /// Whether these are all runs.
     pub is_complete: bool,
 }
 
-/// The finished runs of a sweep, be it done or under way.
+/// Returns the finished runs of a sweep, whether it is done or in progress.
 ///
 /// # Errors
 /// When there are none, or they cannot be read.
@@ -39,7 +39,8 @@ pub fn finished(folder: &Folder) -> Result<Finished, InputError> {
     Ok(Finished { table: rows.table(folder.plan())?, is_complete: false })
 }
 
-/// The picture of a cell's run, as SVG: of its run folder, else of a run made again for it.
+/// Returns the picture of a cell's run, as SVG: from its run folder, or from a run made again for
+/// it.
 ///
 /// # Errors
 /// When the run cannot be made again.

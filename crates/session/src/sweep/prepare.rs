@@ -1,4 +1,5 @@
-//! Every variant of a sweep, compiled once: what is wrong in any of them is told before any runs.
+//! Every variant of a sweep, compiled once, so that errors in any of them are reported before any
+//! runs.
 
 use crate::scenario::source_of;
 use crate::watcher::{Progress, Watched};
@@ -8,10 +9,10 @@ use sidestep::experiment::sweep::{Plan, Setting, Sweep, Variant};
 use sidestep::kernel::InputError;
 use sidestep::scenario::{Compiled, Source, Worlds, nearest};
 
-/// Compiles every variant, hands it to `each` with its number, and makes the plan.
+/// Compiles every variant, passes it to `each` with its number, and makes the plan.
 ///
 /// # Errors
-/// When the design or a variant is wrong, `each` fails, or the watcher says no.
+/// When the design or a variant is wrong, `each` fails, or the watcher asks to stop.
 pub(super) fn prepare(
     worlds: Worlds,
     sweep: &Sweep,
@@ -42,7 +43,7 @@ pub(super) fn prepare(
     Ok(Plan { agents, ..Plan::new(sweep, variants, first)? })
 }
 
-/// The metrics that are named must be there: better told now than after all runs.
+/// Checks that the requested metrics exist: it is better to know before all runs than after them.
 fn check_metrics(
     sweep: &Sweep,
     source: &Source,
@@ -54,7 +55,7 @@ fn check_metrics(
         return Ok(());
     }
     let mut simulation = compiled.start(source, 1);
-    // Some metrics are there only once something has happened.
+    // Some metrics appear only after something has happened.
     simulation.advance(1);
     let known = metric_names(simulation.as_ref());
     let Some(unknown) = wanted.find(|name| !known.contains(name)) else { return Ok(()) };
@@ -63,7 +64,7 @@ fn check_metrics(
     Err(InputError::new(&sweep.place, cause, nearest(unknown, &known)))
 }
 
-/// A variant's scenario; an error says which variant it is.
+/// Returns a variant's scenario; an error names the variant.
 fn variant(
     worlds: Worlds,
     base: &Source,

@@ -1,4 +1,4 @@
-//! Cells -> outcomes: many at once, or one after the other on all workers.
+//! Cells -> outcomes: many at once, or one after another on all workers.
 
 use crate::journey::recorded_run;
 use crate::recording::Recording;
@@ -14,32 +14,32 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Worlds of so many agents fill the caches by themselves: they are run one after the other, each
-/// on all workers, which also bounds the memory.
+/// Number of agents from which a world fills the caches alone: such runs are made one after
+/// another, each on all workers, which also bounds the memory.
 const LARGE: u64 = 20_000;
 
-/// What cells are run with.
+/// Everything that is needed to run cells.
 pub(super) struct Work<'a> {
     pub(super) worlds: Worlds,
     pub(super) plan: &'a Plan,
     /// The scenario of a variant.
     pub(super) source: &'a (dyn Fn(u32) -> Result<Source, InputError> + Sync),
-    /// Where the run of a cell is recorded, if it is.
+    /// Returns the folder in which the run of a cell is recorded, if it is.
     pub(super) record: Option<&'a (dyn Fn(u64) -> PathBuf + Sync)>,
     pub(super) workers: usize,
     pub(super) watcher: &'a dyn Watcher,
 }
 
-/// Takes an outcome: when it returns, the run is finished.
+/// Takes an outcome: once it returns, the run is finished.
 pub(super) type Take<'a> = work::Take<'a, Outcome, Error>;
 
 impl Work<'_> {
-    /// Runs the cells, in their order as far as there are workers, until all are done, something
-    /// fails, or somebody asks to stop. `before` and `total` are for the progress bar: runs that
+    /// Runs the cells, in order as far as there are workers, until all are done, something fails,
+    /// or the watcher asks to stop. `before` and `total` are for the progress bar: the runs that
     /// were done before, and all.
     ///
     /// # Errors
-    /// What `take` returns; no cell is begun after that.
+    /// The error of `take`; no cell starts after that.
     pub(super) fn run(
         &self,
         cells: &[Cell],
@@ -59,18 +59,18 @@ impl Work<'_> {
         })
     }
 
-    /// How many of so many runs are under way at once; each has its part of the workers.
+    /// Returns how many of `runs` are in progress at once; each has its part of the workers.
     pub(super) fn at_once(&self, runs: usize) -> usize {
         let most = if self.plan.agents >= LARGE { 1 } else { self.workers };
         most.min(runs).max(1)
     }
 
-    /// Runs a cell; `None` when it was broken off.
+    /// Runs a cell; `None` if it was interrupted.
     fn cell(&self, cell: Cell, workers: usize) -> Option<Result<Outcome, Error>> {
         if !self.watcher.go_on() {
             return None;
         }
-        // What is wrong with the folder is no outcome of a run: it may be mended.
+        // An error of the folder is not an outcome of a run, because it may be repaired.
         let source = match (self.source)(cell.variant) {
             Ok(source) => source,
             Err(e) => return Some(Err(e.into())),
@@ -84,14 +84,14 @@ impl Work<'_> {
         };
         match catch_unwind(AssertUnwindSafe(run)) {
             Ok(Ok(outcome)) => outcome.map(Ok),
-            // A seed for which a scenario has no start, say: the others go on.
+            // For example a seed for which a scenario has no start: the other runs continue.
             Ok(Err(Error::Input(e))) => Some(Ok(Outcome::failed(cell, e.to_string()))),
             Ok(Err(failure)) => Some(Err(failure)),
             Err(_) => Some(Ok(Outcome::failed(cell, "a bug in sidestep: see standard error"))),
         }
     }
 
-    /// Runs a cell and keeps nothing but its row.
+    /// Runs a cell and keeps only its row.
     fn plain(
         &self,
         cell: Cell,
@@ -106,8 +106,8 @@ impl Work<'_> {
     }
 }
 
-/// Runs a cell into a run folder of its own; `None` when it was broken off. A folder that a kill
-/// has left is begun anew.
+/// Runs a cell into a run folder of its own; `None` if it was interrupted. A folder that a kill has
+/// left is started again.
 ///
 /// # Errors
 /// When the scenario is wrong with this seed, or something cannot be stored.
@@ -133,7 +133,7 @@ pub(super) fn recorded(
     Ok(outcome.map(|outcome| timed(outcome, [compiled - begun, compiled.elapsed()])))
 }
 
-/// A folder that cannot be taken is nothing that a run comes to.
+/// Returns an error of the folder itself as a stop, because it is not an outcome of a run.
 fn no_outcome(failure: Error) -> Error {
     match failure {
         Error::Input(e) => Error::stopped(format!("{}: {}", e.place(), e.cause()), e.remedy()),

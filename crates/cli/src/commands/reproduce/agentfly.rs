@@ -8,19 +8,19 @@ use clap::Args;
 use sidestep_papers::agentfly;
 use std::path::PathBuf;
 
-/// How much to run.
+/// The extent of the experiments.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct AgentflyArgs {
-    /// Write report.html, report.md, report.json and the figures to this new or empty folder
+    /// Output folder (new or empty) for report.html, report.md, report.json and the figures
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 
-    /// Rehearse: run everything once, measure nothing well
+    /// Run everything once, in little time; its numbers are not precise
     #[arg(long)]
     quick: bool,
 
-    /// Seeds per number of airplanes
+    /// Number of seeds for each number of airplanes
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     seeds: Option<u32>,
 }

@@ -15,27 +15,27 @@ use sidestep_papers::loria::{LoriaError, NewRecorder, Plan, Report, in_memory, r
 use sidestep_record::{Origin, ParquetRecorder};
 use std::path::{Path, PathBuf};
 
-/// How much to run.
+/// The extent of the experiments.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct LoriaArgs {
-    /// Write report.html, report.md, report.json and the figures to this new or empty folder
+    /// Output folder (new or empty) for report.html, report.md, report.json and the figures
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 
-    /// Rehearse: run everything once, measure nothing well
+    /// Run everything once, in little time; its numbers are not precise
     #[arg(long)]
     quick: bool,
 
-    /// Seeds per variant
+    /// Number of seeds per variant
     #[arg(long, value_name = "N")]
     seeds: Option<usize>,
 
-    /// Cycles of each run whose behaviour is measured
+    /// Number of cycles of each run whose behavior is measured
     #[arg(long, value_name = "N")]
     cycles: Option<u64>,
 
-    /// Most threads; what is measured of behaviour does not depend on it [default: all processors]
+    /// Largest number of worker threads; behavior does not depend on it [default: all processors]
     #[arg(long, value_name = "W")]
     workers: Option<usize>,
 }
@@ -68,7 +68,7 @@ pub(super) fn reproduce(args: &LoriaArgs, console: Console) -> Result<ExitCode, 
     deliver(&report, &Outcome { document, claims, quick }, args.out.as_deref(), console)
 }
 
-/// A picture whose caption begins with what is seen.
+/// Returns a picture whose caption starts with a description of the scene.
 fn described(scene: &Scene) -> Result<Picture, DrawError> {
     let what = describe(&scene.scenery, &scene.frame, &scene.trails);
     let picture = drawn(scene)?;
@@ -85,8 +85,8 @@ fn run(plan: &Plan, recorders: &mut NewRecorder<'_>, console: Console) -> Result
     })
 }
 
-/// Runs with recordings on the disk, as the paper did; they are deleted in the end. Without a
-/// report nothing stays.
+/// Runs the experiments with recordings on disk, as the paper did, and deletes these at the end;
+/// after a failure also the folder, if it was made for them.
 fn recorded(plan: &Plan, folder: &Path, console: Console) -> Result<Report, Failure> {
     let timed = folder.join("timed-runs");
     let found = folder.exists();

@@ -1,4 +1,4 @@
-//! `sidestep reproduce`: the experiments of a paper, run anew. One file a paper.
+//! `sidestep reproduce`: the experiments of a paper, run again. One file per paper.
 
 mod agentfly;
 mod loria;
@@ -22,13 +22,13 @@ use std::path::Path;
 
 const EXAMPLES: &str = "\
 Examples:
-  sidestep reproduce loria --quick              a rehearsal of seconds
+  sidestep reproduce loria --quick              a trial of a few seconds
   sidestep reproduce loria --out runs/loria     some minutes: report, figures, all numbers
   sidestep reproduce loria --seeds 40 --json > loria.json
   sidestep reproduce agentfly --quick
   sidestep reproduce serpentine --out runs/serpentine";
 
-/// Run a paper's experiments anew and judge its claims.
+/// Reproduce a paper's experiments and judge its claims.
 #[derive(Debug, Args)]
 pub(crate) struct ReproduceArgs {
     #[command(subcommand)]
@@ -57,7 +57,7 @@ pub(crate) fn reproduce(args: &ReproduceArgs, console: Console) -> Result<ExitCo
     }
 }
 
-/// A picture whose words stand beside it.
+/// Returns a picture with its title and caption beside it.
 fn drawn(scene: &Scene) -> Result<Picture, DrawError> {
     let (title, caption) = (String::new(), String::new());
     let options = Options { style: Style::MAP, title, caption };
@@ -76,14 +76,14 @@ fn check_vacant(folder: &Path) -> Result<(), InputError> {
     Err(InputError::new(folder.display(), "there is something already", "name a new folder"))
 }
 
-/// What came of a paper's experiments.
+/// The results of a paper's experiments.
 struct Outcome<'a> {
     document: Document,
     claims: &'a [Claim],
     quick: bool,
 }
 
-/// Stores the report where it was asked for, and says what came out.
+/// Stores the report if a folder was given, and prints the results.
 fn deliver(
     report: &impl Serialize,
     outcome: &Outcome<'_>,
@@ -104,7 +104,7 @@ fn deliver(
     Ok(ExitCode::Done)
 }
 
-/// Verdicts in few lines, and where the rest is.
+/// Returns the verdicts in a few lines, and where the report is.
 fn summary(outcome: &Outcome<'_>, folder: &Path) -> String {
     let lines: Vec<_> = outcome.claims.iter().map(claim_line).collect();
     format!(

@@ -9,19 +9,19 @@ use sidestep_document::document::Picture;
 use sidestep_papers::serpentine::{self, Plan};
 use std::path::PathBuf;
 
-/// How much to run.
+/// The extent of the experiments.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct SerpentineArgs {
-    /// Write report.html, report.md, report.json, figures and pictures to this new or empty folder
+    /// Output folder (new or empty) for report.html, report.md, report.json, figures and pictures
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 
-    /// Rehearse: run everything once, measure nothing well
+    /// Run everything once, in little time; its numbers are not precise
     #[arg(long)]
     quick: bool,
 
-    /// Seeds of every case that is random; of the open field three times as many
+    /// Number of seeds of each random case; the open field has three times as many
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     seeds: Option<u32>,
 }
