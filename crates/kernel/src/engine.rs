@@ -1,7 +1,7 @@
 //! Runs a world for many cycles: the crew, the groups, and how many workers are worth it.
 //!
 //! A cycle that is too small to share out runs on one worker alone. The engine measures instead of
-//! guessing, see [`Pace`]. Results do not depend on its choice.
+//! guessing, see `Pace`. Results do not depend on its choice.
 
 use crate::conflict::Groups;
 use crate::cycle::{Mate, Observer, PhaseTimes, Ran, Stretch, advance, lock};

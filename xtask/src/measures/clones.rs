@@ -15,7 +15,7 @@ use crate::source::{self, Source};
 /// Lines that must be equal.
 const WINDOW: usize = 6;
 
-/// Two places with equal lines, as indices of the first line of each in [`Text::lines`].
+/// Two places with equal lines, as indices of the first line of each in `Text::lines`.
 struct Clone {
     first: usize,
     second: usize,

@@ -185,7 +185,7 @@ pub struct RecordSection {
     pub robots: bool,
     /// One row per moving obstacle and recorded cycle.
     pub movers: bool,
-    /// One row per event, see [`super::events`].
+    /// One row per event.
     pub events: bool,
     /// One cycle in this many is recorded; events are recorded in all.
     #[serde(deserialize_with = "Whole::<1>::read")]

@@ -14,7 +14,7 @@
 //! carries the ways of all through every airplane. The algorithm is the same, and so are the
 //! controls.
 //!
-//! A hop is a message like any other, over the [`Transport`] that is handed in. On a network that
+//! A hop is a message like any other, over the [`Transport`](sidestep_kernel::ports::Transport) that is handed in. On a network that
 //! loses messages it is repeated until it is acknowledged. An airplane that cannot be reached is
 //! left out: it is presumed where it was last heard, and decides for itself. When time is up, an
 //! airplane without a control decides for itself too.

@@ -35,7 +35,7 @@
 //! to accept anything. After some exchanges in a row without hearing from it they take its radio to
 //! be dead, and fly without its consent any plan that keeps apart from every orbit it may be on.
 //! The one risk taken here is that its radio works all the same, and everything was lost: below
-//! 1e-12 each time ([`super::network::Network::silent_after`]).
+//! 1e-12 each time (`Network::silent_after`).
 
 mod scene;
 

@@ -251,7 +251,7 @@ impl<const D: usize> Chain<D> {
         distance(self.points[rod], self.points[rod + 1])
     }
 
-    /// Whether a rod is within its limits, to a tolerance of [`LENGTH_TOLERANCE_M`].
+    /// Whether a rod is within its limits, to a tolerance of `LENGTH_TOLERANCE_M`.
     pub fn is_rod_within(&self, i: usize) -> bool {
         let rod = self.rods[i];
         let allowed = rod.min_m - LENGTH_TOLERANCE_M..=rod.max_m + LENGTH_TOLERANCE_M;

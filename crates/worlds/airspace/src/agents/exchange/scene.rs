@@ -23,7 +23,7 @@ pub struct Scene {
     pub vertical_m: f64,
     /// The present cycle.
     pub now: Cycle,
-    /// See [`crate::agents::network::Network::silent_after`].
+    /// Number of talks in a row without a message after which a radio is taken to be dead.
     pub silent_after: u32,
     /// All airplanes of the group as they can be seen, by rising id.
     pub seen: Vec<Seen>,
