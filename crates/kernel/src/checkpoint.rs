@@ -18,7 +18,7 @@ pub const FORMAT: u32 = 1;
 pub struct Header {
     /// [`FORMAT`] of the writer.
     pub format: u32,
-    /// Version of the program that wrote it, because results may differ between versions.
+    /// Version of the program that wrote it; results may differ between versions.
     pub program_version: String,
     /// Name of the world.
     pub world: String,
