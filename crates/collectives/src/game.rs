@@ -144,9 +144,8 @@ impl PairwiseGame {
         })
     }
 
-    /// Writes `E[G
-    /// x_i = x]`, less a part that is the same for all `x`, into `expected` (shape: strategies of
-    /// player `i`), where the others play `q`: the closed form of eq. 3.
+    /// Writes `E[G | x_i = x]`, less a part that is the same for all `x`, into `expected` (shape:
+    /// strategies of player `i`), where the others play `q`: the closed form of eq. 3.
     pub fn expect(&self, player: usize, q: &[Vec<f64>], expected: &mut Vec<f64>) {
         expected.clear();
         expected.extend_from_slice(&self.own[player]);

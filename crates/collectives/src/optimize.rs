@@ -4,8 +4,7 @@ use super::game::Game;
 use super::player::{Choice, Player, Update, Utility};
 use serde::{Deserialize, Serialize};
 
-/// The estimator of `E[G
-/// x_i]`.
+/// The estimator of `E[G | x_i]`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", tag = "kind")]
 pub enum Estimator {
@@ -76,8 +75,8 @@ pub struct Outcome {
     pub joint: Vec<usize>,
     /// The final distributions.
     pub q: Vec<Vec<f64>>,
-    /// Each player's final estimate of `E[G
-    /// x]`, up to a constant: it ranks the strategies that were not chosen.
+    /// Each player's final estimate of `E[G | x]`, up to a constant: it ranks the strategies that
+    /// were not chosen.
     pub expected: Vec<Vec<f64>>,
     /// Number of rounds.
     pub rounds: u32,
@@ -139,6 +138,7 @@ impl<'g, G: Game, U: Fn(usize, u64) -> f64> RoundTable<'g, G, U> {
             let player = &mut self.players[i];
             player.know(|expected| game.expect(i, &self.q, expected));
             change = change.max(player.update(self.settings.update, self.settings.cooling));
+            // In sequence, the players after this one see its new distribution.
             if self.settings.order == Order::Sequence {
                 self.q[i].clone_from(&player.q);
             }

@@ -79,6 +79,7 @@ impl Player {
             cumulated += p;
             u < cumulated
         };
+        // Rounding may leave the sum of all probabilities just below `u`.
         self.q.iter().position(below).unwrap_or(self.q.len() - 1)
     }
 
@@ -109,14 +110,12 @@ impl Player {
         self.expected.extend(each.map(|(sum, n)| if *n > 0.0 { sum / n } else { mean }));
     }
 
-    /// Sets `E[G
-    /// x]` to known values, which `write` fills in.
+    /// Sets `E[G | x]` to known values, which `write` fills in.
     pub fn know(&mut self, write: impl FnOnce(&mut Vec<f64>)) {
         write(&mut self.expected);
     }
 
-    /// Returns the present estimate of `E[G
-    /// x]`, up to a constant.
+    /// Returns the present estimate of `E[G | x]`, up to a constant.
     pub fn expected(&self) -> &[f64] {
         &self.expected
     }

@@ -96,6 +96,7 @@ fn parse_scan(place: &str, message: &[Word]) -> Result<Scan, InputError> {
     }
     let first = 2 + n_beams as usize;
     require_words(place, message, first + 9)?;
+    // Checked, although the scan keeps only their number, so that damage is found.
     for range in &message[2..first] {
         range.number(&place)?;
     }

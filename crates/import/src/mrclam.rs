@@ -45,7 +45,7 @@ pub struct TruePose {
     pub t_secs: f64,
     /// Position in the world, in meters.
     pub position_m: [f64; 2],
-    /// Heading in rad, counter-clockwise from the x axis.
+    /// Heading in rad, counterclockwise from the x axis.
     pub heading_rad: f64,
 }
 

@@ -18,7 +18,7 @@ pub const FORMAT: u32 = 1;
 pub struct Header {
     /// [`FORMAT`] of the writer.
     pub format: u32,
-    /// Version of the program that wrote it, because results may differ between versions.
+    /// Version of the program that wrote it; results may differ between versions.
     pub program_version: String,
     /// Name of the world.
     pub world: String,
@@ -72,7 +72,7 @@ pub fn encode(header: &Header, state: &impl Serialize) -> Vec<u8> {
 /// Reads the header alone, after checking the checksum of all bytes.
 ///
 /// # Errors
-/// When the bytes are no checkpoint, damaged, or of another format.
+/// When the bytes are not a checkpoint, damaged, or of another format.
 pub fn decode_header(bytes: &[u8]) -> Result<Header, CheckpointError> {
     split(bytes).map(|(header, _)| header)
 }
@@ -80,7 +80,7 @@ pub fn decode_header(bytes: &[u8]) -> Result<Header, CheckpointError> {
 /// Decodes a state written for `expected` (whose `cycle` is not compared).
 ///
 /// # Errors
-/// When the bytes are no checkpoint, damaged, of another format, or of another program
+/// When the bytes are not a checkpoint, damaged, of another format, or of another program
 /// version, world or scenario.
 pub fn decode<S: DeserializeOwned>(
     bytes: &[u8],
@@ -102,6 +102,7 @@ fn split(bytes: &[u8]) -> Result<(Header, &[u8]), CheckpointError> {
         return Err(CheckpointError::Damaged);
     }
     let body = &body[..body.len() - 16];
+    // The format is read on its own, because the rest of another layout cannot be decoded.
     let (found, _): (u32, _) =
         postcard::take_from_bytes(body).map_err(|_| CheckpointError::Damaged)?;
     if found != FORMAT {

@@ -7,7 +7,7 @@ use crate::stream::Draws;
 /// The largest deviation of a row's sum from 1.
 pub const ROW_TOLERANCE: f64 = 1e-6;
 
-/// A reason why a row is no probability distribution.
+/// A reason why a row is not a probability distribution.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum RowError {
     /// No outcome at all.

@@ -22,7 +22,7 @@ pub struct InputError {
 struct Position {
     line: usize,
     column: usize,
-    /// The line itself, when the text was at hand.
+    /// The line itself, where the text is known.
     text: Option<String>,
 }
 
@@ -52,6 +52,7 @@ impl InputError {
     #[must_use]
     pub fn in_text(mut self, text: &str, offset: usize) -> Self {
         let mut offset = offset.min(text.len());
+        // An offset inside a character counts as its start.
         while !text.is_char_boundary(offset) {
             offset -= 1;
         }

@@ -90,7 +90,7 @@ pub fn towards<const D: usize>(from: Point<D>, to: Point<D>, step_m: f64) -> Poi
     if far_m <= step_m { to } else { along(from, sub(to, from), step_m / far_m) }
 }
 
-/// A point with as many coordinates as asked for: further ones are left out, missing ones are 0.
+/// A point in another number of dimensions: further coordinates are left out, missing ones are 0.
 #[inline]
 pub fn in_dimensions<const D: usize, const N: usize>(p: Point<D>) -> Point<N> {
     std::array::from_fn(|i| if i < D { p[i] } else { 0.0 })

@@ -109,6 +109,7 @@ impl Worker<'_> {
         }
         self.barrier();
         let any = votes.load(Ordering::Relaxed) > 0;
+        // No vote may be withdrawn before all workers have read the count.
         self.barrier();
         if own {
             votes.fetch_sub(1, Ordering::Relaxed);

@@ -203,7 +203,7 @@ impl<const LEAST: u64, const MOST: u64> Whole<LEAST, MOST> {
         Self::deserialize(deserializer).map(Self::get)
     }
 
-    /// A bound that nobody reaches is left out.
+    /// Returns the remedy in words, without a maximum that nobody reaches.
     fn remedy(is_below: bool) -> String {
         match is_below && MOST >= u64::from(u32::MAX) {
             true => format!("give {LEAST} or more"),

@@ -56,6 +56,7 @@ fn quoted(text: &str) -> Vec<&str> {
 pub fn nearest(found: &str, known: &[&str]) -> String {
     let distance = |k: &&&str| strsim::osa_distance(found, k);
     match known.iter().min_by_key(distance) {
+        // The longer a name, the more typing errors it may have.
         Some(best) if strsim::osa_distance(found, best) <= 1 + found.len() / 3 => {
             format!("did you mean `{best}`?")
         }

@@ -89,6 +89,7 @@ impl Source {
     /// # Errors
     /// When the text is not TOML, or a key leads through something that is not a table.
     pub fn with(mut self, overrides: &[String]) -> Result<Self, InputError> {
+        // Without overrides the text stays as it is, byte for byte.
         if overrides.is_empty() {
             return Ok(self);
         }
@@ -99,6 +100,7 @@ impl Source {
             set(&mut document, override_text)?;
         }
         self.text = document.to_string();
+        // Overrides may be applied in several steps.
         if !self.place.ends_with(WITH_OVERRIDES) {
             self.place.push_str(WITH_OVERRIDES);
         }

@@ -315,6 +315,7 @@ impl<'p> Interpreter<'p> {
     fn set_end(&mut self, name: &str, time_s: f64, arguments: &mut Arguments) -> Done {
         let id = arguments.peek();
         let index = self.existing(arguments)?;
+        // Without a place the command is a query.
         if arguments.remaining() == 0 {
             return Ok(Outcome::Done);
         }

@@ -77,6 +77,7 @@ fn before_comment(line: &str) -> &str {
 impl<'a> Line<'a> {
     /// Appends a continuation unchanged, including its leading blanks.
     fn append(&mut self, number: usize, content: &str) {
+        // A longer line is refused by `commands`, so the rest of it is not needed.
         if self.text.len() <= MAX_LINE_BYTES {
             self.pieces.push((self.text.len(), number));
             self.text.to_mut().push_str(content);

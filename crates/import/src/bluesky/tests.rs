@@ -312,7 +312,7 @@ fn every_shared_scenario_reads_into_the_expected_commands() {
     assert_eq!((totals["DEL"], totals["ASAS"] + totals["CDMETHOD"]), (60, 21));
 }
 
-/// The expected counts, which list commands behind an aircraft apart.
+/// The expected counts, which list commands after an aircraft separately.
 fn with_aircraft_in_front(expected: &Value) -> BTreeMap<String, u64> {
     let mut commands = as_counts(&expected["commands"]);
     commands.remove("ACID-FIRST");

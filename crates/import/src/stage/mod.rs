@@ -7,11 +7,11 @@
 //!
 //! The models that are read are obstacles and robots: a model with a `bitmap` is a floor plan, one
 //! that descends from `position` a robot, every other one that descends from `model` a box of its
-//! `size` (its `block` shapes are not used), unless neither a robot can hit it (`obstacle_return
-//! 0`) nor a ranger see it (`ranger_return` below 0). Models within models are placed in the frame
-//! of their parents; those of a robot belong to it. A bitmap is stretched to the model's size;
-//! pixels of brightness 127 and less are solid, as in Stage. Everything else is counted in
-//! [`World::not_used`].
+//! `size` (its `block` shapes are not used), unless neither a robot can hit it
+//! (`obstacle_return 0`) nor a ranger see it (`ranger_return` below 0). Models within models are
+//! placed in the frame of their parents; those of a robot belong to it. A bitmap is stretched to
+//! the model's size; pixels of brightness 127 and less are solid, as in Stage. Everything else is
+//! counted in [`World::not_used`].
 //!
 //! Lengths are meters, angles radians (degrees in the files).
 

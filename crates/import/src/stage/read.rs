@@ -160,6 +160,7 @@ impl Reader {
             size_m,
             radius_m: match origin.yaw_rad == 0.0 {
                 true => hypot(far(origin.x_m, size_m[0]), far(origin.y_m, size_m[1])),
+                // An upper bound, because the corners of a turned body are not computed.
                 false => hypot(origin.x_m, origin.y_m) + 0.5 * hypot(size_m[0], size_m[1]),
             },
         };
@@ -202,6 +203,7 @@ impl Reader {
     fn floor_plan(&self, bitmap: &Value) -> Result<FloorPlan, InputError> {
         let image = Bitmap::load(&self.path(bitmap)?)?;
         let from_top = image.map_brightness(|brightness| brightness <= DARKEST_FREE);
+        // Image rows run from the top, those of the plan from the bottom.
         let rows = from_top.rchunks(image.width() as usize);
         Ok(FloorPlan {
             name: String::new(),

@@ -31,7 +31,7 @@ pub struct Model {
     pub links: Vec<String>,
     /// The joints, in the order of the file. Parents and children index [`Model::links`].
     pub joints: Vec<Joint>,
-    /// The link that is no joint's child.
+    /// The link that is not the child of any joint.
     pub root: usize,
 }
 

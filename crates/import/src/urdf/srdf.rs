@@ -142,6 +142,7 @@ impl Semantics {
         while let Some(name) = names.get(next) {
             let group = self.group(place, name)?;
             joints.extend(group.joints.iter().copied());
+            // A listed link stands for the joint that carries it.
             joints.extend(group.links.iter().filter_map(|&link| model.joint_above(link)));
             for part in &group.groups {
                 if !names.contains(&part.as_str()) {
@@ -226,6 +227,7 @@ impl<'a> Reader<'a> {
     fn posture(&self, element: Element<'a>, groups: &[Group]) -> Result<NamedPosture, InputError> {
         let group = element.required("group")?;
         known_group(group, groups)?;
+        // The model has no virtual joints, so their values are left out.
         let values = element.children("joint").filter(|joint| !self.is_virtual(*joint));
         let value = |joint: Element<'a>| {
             Ok((self.joint(joint.required("name")?)?, joint.required("value")?.number()?))

@@ -95,6 +95,7 @@ impl Transport for MemoryTransport {
             return;
         }
         if Chance::new(self.faults.duplication).happens(words[1]) {
+            // The duplicate has a delay of its own.
             self.deliver(envelope.clone(), words[3]);
         }
         self.deliver(envelope, words[2]);

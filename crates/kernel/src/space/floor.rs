@@ -89,6 +89,7 @@ impl Floor {
         fn column<T: BoxWord>(walls: impl Iterator<Item = bool>) -> Column<T> {
             walls.map(|wall| if wall { T::WALL } else { T::FREE }).collect()
         }
+        // Half the memory where the slots fit.
         if bodies <= u16::MAX_BODIES {
             Self::Narrow(column(walls))
         } else {

@@ -22,7 +22,7 @@ pub const UNKNOWN: Color = [0xED, 0xEB, 0xE6];
 pub const MOBILE: Color = [0xA6, 0xA6, 0xA6];
 /// Color of doors.
 pub const DOOR: Color = [0x8B, 0x5A, 0x2B];
-/// Color of collisions and other errors.
+/// Color of conditions that should not occur.
 pub const ALERT: Color = [0xD0, 0x10, 0x10];
 
 /// The look of a body, apart from its shape.

@@ -118,8 +118,10 @@ impl PlaceRows {
         if here.is_some_and(|(now, _)| last + self.every < now) {
             return None;
         }
+        // A body that is gone has no shape in the frame, so that of its start is taken.
         let is_start = |body: &&Body| (body.kind, body.number) == (Kind::Start, number);
         let like = here.map(|(_, body)| body).or_else(|| scenery.bodies.iter().find(is_start));
+        // The way from the corner to the center.
         let half_m = match like.map(|body| &body.shape) {
             Some(Shape::Cuboid { size_m }) if self.is_corner => size_m.map(|m| 0.5 * m),
             _ => [0.0; 3],

@@ -55,6 +55,7 @@ impl FreeSpace {
     #[must_use]
     pub fn anchors(&self, size: u32) -> Self {
         assert!(size > 0, "a body covers at least one box");
+        // Every free box is the anchor of a body of one box.
         if size == 1 {
             return self.clone();
         }

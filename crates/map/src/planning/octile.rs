@@ -23,6 +23,7 @@ pub fn octile_distance(free: &FreeSpace, start: (u32, u32), goal: (u32, u32)) ->
         if visit.at == goal {
             return Some(visit.length.in_boxes());
         }
+        // A shorter path was found after this one was queued.
         if visit.length.in_boxes() > best[free.index(visit.at.0, visit.at.1)] {
             continue;
         }
