@@ -295,7 +295,7 @@ impl Agent {
             let id = self.id(place);
             let Some(proposal) = &member.proposal else {
                 let unheard = self.unheard_before(place) + 1;
-                // Use what is seen of it, if it was never heard.
+                // Use the sighting, if it was never heard.
                 let sighted =
                     || Contact::heard(Beacon::of(&self.scene.seen[place].flyer), self.scene.now);
                 let contact = contacts.entry(id).or_insert_with(sighted);
