@@ -177,7 +177,7 @@ impl Bounds {
     }
 }
 
-/// The objective of a group as a game: players are airplanes, strategies actions, and
+/// Returns the objective of a group as a game: players are airplanes, strategies actions, and
 /// `G = sum own + sum pairs` with `own_i = alpha Gdev_i` and `pair_ij = Gcol_i + Gcol_j`.
 ///
 /// Everything that does not change during an optimization is computed here, once.

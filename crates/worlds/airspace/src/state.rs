@@ -13,9 +13,9 @@ use std::sync::{Mutex, PoisonError};
 
 /// Marks an airplane that has not arrived yet.
 pub const FLYING: u64 = u64::MAX;
-/// Flag added to the time at which an airplane was removed, rather than arrived.
+/// Flag set beside the time at which an airplane was removed, rather than arrived.
 const LEFT: u64 = 1 << 63;
-/// Value of [`Cell::fallback`] for an airplane that came in too close to another.
+/// Flag in [`Cell::fallback`] for an airplane that came in too close to another.
 const TOO_CLOSE: u8 = 2;
 const NOBODY: u32 = u32::MAX;
 
@@ -34,7 +34,7 @@ pub struct AirspaceState {
     /// The changing part of each airplane.
     pub airplanes: Box<[Cell]>,
     pub(super) neighborhood: Neighborhood,
-    /// Each airplane's knowledge of others; empty where the network loses nothing.
+    /// Each airplane's knowledge of others; empty where the network is reliable.
     contacts: Box<[Mutex<Contacts>]>,
 }
 
@@ -245,7 +245,7 @@ pub struct Snapshot {
     pub cycle: Cycle,
     /// The airplanes by id.
     pub airplanes: Vec<AirplaneRecord>,
-    /// Each airplane's knowledge of others; empty where the network loses nothing.
+    /// Each airplane's knowledge of others; empty where the network is reliable.
     pub contacts: Vec<Contacts>,
 }
 

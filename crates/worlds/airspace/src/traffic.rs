@@ -169,7 +169,7 @@ fn orders(aircraft: &ScnAircraft, has_route: bool) -> Vec<(f64, Told)> {
     orders
 }
 
-/// Returns the times at which an aircraft was told where to go, rising.
+/// Returns the times of an aircraft's commands about where to go, rising.
 fn route_times_s(aircraft: &ScnAircraft) -> Vec<f64> {
     let known = aircraft.way_points.iter().filter(|p| p.place.position().is_some());
     let destination = aircraft.destination.as_ref().filter(|place| place.position().is_some());

@@ -73,7 +73,7 @@ pub struct AirspaceWorld {
     pub method: Method,
     /// The deployment of the optimizer.
     pub deployment: Deployment,
-    /// The network that carries its messages, unless it is faultless.
+    /// The network that carries its messages, if it is unreliable.
     pub network: Option<Network>,
     /// Bytes that the pair tables of a group may take; larger groups are not optimized.
     pub group_bytes: u64,

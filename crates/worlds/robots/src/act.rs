@@ -92,7 +92,7 @@ impl<T: BoxWord> Scene<'_, T> {
             _ => 0,
         };
         self.make(walk, made, slot);
-        // Only robots feel contacts and have samples to learn from.
+        // Only robots keep contacts; people just try another time.
         if is_mover {
             return;
         }

@@ -154,8 +154,8 @@ impl Baseline {
     }
 }
 
-/// Own bodies perceive; barrier; those inside the band act; barrier; one worker does the
-/// rest and hands over; barrier.
+/// Runs a worker's part of one cycle: its own bodies perceive; barrier; those inside the band act;
+/// barrier; one worker moves the rest and hands over; barrier.
 fn partition_cycle<T: BoxWord>(
     scene: &Scene<'_, T>,
     borders: &Borders,

@@ -30,7 +30,7 @@ pub const HEADING_NAMES: [&str; 4] = ["east", "north", "west", "south"];
 const CYCLE: &str = "cycle, counted from 0";
 const BODY: &str = "entity id: robots first, then people, then doors";
 
-/// The table of poses, which are recorded as whole columns: they are many.
+/// Returns the table of poses, which are recorded as whole columns because they are many.
 fn trajectories() -> TableSchema {
     let column = ColumnSpec::new;
     let columns = vec![

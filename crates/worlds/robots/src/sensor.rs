@@ -186,7 +186,7 @@ fn alias_columns(mut row: Vec<(Reading, f64)>, n: usize) -> Vec<Split> {
         }
     }
     // The columns that are left are full but for rounding. An impossible reading must not be among
-    // them, because even a tiny share would let it be reported.
+    // them, because its whole column would report it.
     for i in small.into_iter().filter(|&i| row[i].1 == 0.0) {
         columns[i] = columns[(0..n).max_by(|&a, &b| row[a].1.total_cmp(&row[b].1)).unwrap_or(i)];
         columns[i].reports[0] = columns[i].reports[1];

@@ -69,12 +69,12 @@ impl Regime {
         ["reliable", "effectors", "sensors", "both"][self as usize]
     }
 
-    /// Whether sensors are reliable.
+    /// Returns whether sensors are reliable.
     pub fn reliable_sensors(self) -> bool {
         matches!(self, Self::Reliable | Self::Effectors)
     }
 
-    /// Whether effectors are reliable.
+    /// Returns whether effectors are reliable.
     pub fn reliable_effectors(self) -> bool {
         matches!(self, Self::Reliable | Self::Sensors)
     }
@@ -128,7 +128,7 @@ pub struct Body {
 }
 
 impl Body {
-    /// Whether the body acts in this cycle.
+    /// Returns whether the body acts in this cycle.
     #[inline]
     pub fn is_due(&self, now: Cycle) -> bool {
         (now + u64::from(self.phase)).is_multiple_of(u64::from(self.period))

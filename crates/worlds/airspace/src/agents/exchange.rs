@@ -215,6 +215,7 @@ impl Agent {
                 flyers.push(self.flyer_of(place, proposal));
                 candidates.push(proposal.ways.clone());
             } else {
+                // An unheard airplane takes part on every orbit it may be on, without a choice.
                 let possible = self.possible(place);
                 candidates.extend(possible.iter().map(|_| Vec::new()));
                 flyers.extend(possible);
@@ -264,6 +265,7 @@ impl Agent {
         if member.accepts.as_ref().is_some_and(|accepted| accepted.contains(&me)) {
             return true;
         }
+        // The shield need not keep them apart, or the radio is taken to be dead.
         !self.flyer.minds(&self.scene.seen[place].flyer)
             || (member.proposal.is_none() && self.unheard_before(place) >= self.scene.silent_after)
     }
@@ -280,6 +282,7 @@ impl Agent {
         let fallback = Decision { candidate: None, fallback: self.flyer.fallback };
         let wanted = self.decision.unwrap_or(fallback);
         let mut others = (0..self.size()).filter(|&place| place != self.me);
+        // The fallback needs no consent, because all others keep apart from it anyway.
         let all_agree = wanted.candidate.is_none() || others.all(|place| self.agrees(place));
         self.agreed = Some(Agreed {
             decision: if all_agree { wanted } else { fallback },
@@ -295,7 +298,7 @@ impl Agent {
             let id = self.id(place);
             let Some(proposal) = &member.proposal else {
                 let unheard = self.unheard_before(place) + 1;
-                // Use what is seen of it, if it was never heard.
+                // Use the sighting, if it was never heard.
                 let sighted =
                     || Contact::heard(Beacon::of(&self.scene.seen[place].flyer), self.scene.now);
                 let contact = contacts.entry(id).or_insert_with(sighted);
@@ -372,7 +375,8 @@ impl link::Agent for Agent {
         self.go_on()
     }
 
-    /// A member that is still undecided stays on its fallback.
+    /// Ends the exchange because time is up. Without a decision, or without the consent of others,
+    /// the airplane stays on its fallback.
     fn at_deadline(&mut self) {
         if self.agreed.is_none() {
             self.agree();

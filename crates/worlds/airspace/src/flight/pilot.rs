@@ -159,7 +159,7 @@ impl Pilot<'_> {
         next
     }
 
-    /// Predicts `timing.horizon` points of an action from `pose` towards way-point `next`.
+    /// Predicts `timing.horizon` points of an action from `pose` toward way-point `next`.
     pub fn predict(&self, action: Action, pose: Pose, next: usize, timing: &Timing) -> Prediction {
         let mut points = Vec::with_capacity(timing.horizon);
         let (mut flight, mut next, mut counted) = (Flight::new(pose), next, timing.horizon);

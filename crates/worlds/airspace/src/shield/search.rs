@@ -72,6 +72,7 @@ impl<'a> Search<'a> {
 
     /// Returns whether a plan of airplane `i` is compatible with everything that `j` may fly.
     fn fits(&self, i: usize, plan: &Plan, j: usize) -> bool {
+        // Unless all plans are sure to be flown, either one may fly its fallback instead.
         plan.is_compatible(&self.plans[j])
             && (self.certainty == Certainty::Sure
                 || (plan.is_compatible(&self.fallbacks[j])

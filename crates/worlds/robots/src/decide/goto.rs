@@ -87,6 +87,7 @@ fn follow(
         0 => FORWARD,
         1 => LEFT,
         3 => RIGHT,
+        // The way leads back, and two turns to either side do it.
         _ => turn_somewhere(draws),
     }
 }

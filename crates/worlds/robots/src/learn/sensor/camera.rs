@@ -70,7 +70,7 @@ pub(super) struct Looks<'a> {
     pub(super) beyond: &'a Counts,
 }
 
-/// A camera that reports `nothing`, `robot` or `landmark`.
+/// Returns a camera that reports `nothing`, `robot` or `landmark`.
 pub(super) fn camera(
     looks: &Looks<'_>,
     options: &SensorOptions,

@@ -25,7 +25,7 @@ pub struct SensorOptions {
 }
 
 impl Default for SensorOptions {
-    /// The camera of the MRCLAM robots: 60 degrees wide, barcodes read up to 6.5 m.
+    /// Returns the camera of the MRCLAM robots: 60 degrees wide, barcodes read up to 6.5 m.
     fn default() -> Self {
         Self {
             estimate: EstimateOptions::default(),

@@ -59,7 +59,7 @@ impl Labels {
         counts
     }
 
-    /// The same by kind.
+    /// Counts the same by kind.
     pub(super) fn kinds<'a>(&self, sightings: impl IntoIterator<Item = &'a Sighting>) -> Counts {
         let rows = ["ROBOT", "LANDMARK", "NONE"].map(String::from);
         let columns = ["ROBOT", "LANDMARK", "UNKNOWN"].map(String::from);
