@@ -6,11 +6,11 @@
 //! each claim whether it held, did not hold, or cannot be judged.
 //!
 //! ```text
-//! floor.rs, patrol.rs, errors.rs   the buildings, the behaviours, the error tables
-//! measure.rs   -> reliability.rs, genericity.rs               what runs come to
-//! timing.rs    -> performance.rs, strategies.rs, cost_model.rs   how long they take
-//! scenes.rs                        where robots go, as a picture shows it
-//! claims.rs                                                   what follows from all that
+//! floor.rs, patrol.rs, errors.rs   the buildings, the behaviors, the error tables
+//! measure.rs   -> reliability.rs, genericity.rs               results of runs
+//! timing.rs    -> performance.rs, strategies.rs, cost_model.rs   durations of runs
+//! scenes.rs                        ways of robots, as pictures
+//! claims.rs                                                   the verdicts
 //! ```
 
 mod claims;

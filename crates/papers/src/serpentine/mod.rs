@@ -7,10 +7,10 @@
 //!
 //! ```text
 //! corridor.rs, rotation.rs, field.rs    the swarm and its leader
-//! pushing.rs, movers.rs, snake.rs       chains among what stands and what moves
-//! scaling.rs, broken.rs, postures.rs, initiators.rs    what needs no world around it
+//! pushing.rs, movers.rs, snake.rs       chains among static and moving obstacles
+//! scaling.rs, broken.rs, postures.rs, initiators.rs    experiments without a world
 //! scenes.rs        pictures of bodies
-//! claims/          what follows from all that
+//! claims/          the verdicts
 //! ```
 
 mod broken;

@@ -2,7 +2,7 @@
 //! keeps its place.
 //!
 //! ```text
-//! goal       what is wanted, and what came of it
+//! goal       a goal, and its answer
 //! limb       the rods from base to tip; what they can reach
 //! dls        the nearest posture, by damped least squares in O(n)
 //! alternate  the chain's own rule there and back (FABRIK)

@@ -6,7 +6,7 @@
 //! joints only what that does not decide.
 //!
 //! ```text
-//! goal   what is wanted, what came of it, and why not
+//! goal   a goal, its answer, and the reason for a failure
 //! rows   errors of a posture and their Jacobian: the tip, and spheres that rods are in
 //! step   a damped step inside limits
 //! guide  the connectors' solution as a posture to start from
