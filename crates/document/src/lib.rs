@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! estimate.rs   a mean with its 95 % interval and the number of runs behind it
-//! figure.rs     what to draw and what to print
+//! figure.rs     figures and tables
 //! claim.rs      a paper's claims, each with a verdict
 //! document.rs   a report: text, tables, figures, pictures and claims in their order
 //! ```

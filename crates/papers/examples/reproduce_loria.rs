@@ -8,7 +8,7 @@ use sidestep_papers::loria::{self, Plan};
 use std::fs::File;
 use std::io::{BufWriter, Write};
 
-/// Writes every column to a file of its own, in the order of bytes of this machine.
+/// Writes every column to a file of its own, in the byte order of this machine.
 struct Columns(Vec<Vec<BufWriter<File>>>);
 
 fn bytes(values: &Values) -> Vec<u8> {

@@ -2,8 +2,8 @@
 //! optimized by a team of agents and by a migrating coordinator.
 //!
 //! The paper's figures 5 to 7 show time, messages and bytes against the number of airplanes. Its
-//! numbers are those of a Java platform of 2009; its claims are about which is more, and those
-//! are judged here. Both deployments choose the same controls, so flights are the same.
+//! numbers are those of a Java platform of 2009; its claims say which is more, and those are judged
+//! here. Both deployments choose the same controls, so flights are the same.
 
 use crate::cells::{Cell, Columns, Run, Runs, Value, column, figure, series};
 use crate::claims::{File, Words, all, listed};
@@ -16,14 +16,14 @@ use sidestep_document::claim::{Claim, Verdict, tally};
 use sidestep_document::figure::Point;
 use sidestep_document::{Document, Estimate, Figure, FigureKind, Series, Table};
 
-/// How much to run.
+/// The amount of work to run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Plan {
     /// Numbers of airplanes.
     pub airplanes: Vec<usize>,
-    /// Runs of each, by seed from 1.
+    /// Runs of each number, by seed from 1.
     pub seeds: usize,
-    /// Cycles of each run at most.
+    /// Most cycles of each run.
     pub cycles: u64,
     /// Workers.
     pub workers: usize,
@@ -39,28 +39,28 @@ impl Default for Plan {
 }
 
 impl Plan {
-    /// A rehearsal of minutes at most, long enough for airplanes to meet.
+    /// Returns a rehearsal of minutes at most, long enough for airplanes to meet.
     pub fn quick() -> Self {
         Self { airplanes: vec![2, 3, 5], seeds: 2, cycles: 60, quick: true, ..Self::default() }
     }
 }
 
-/// What came of all.
+/// All results of the experiments.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Report {
-    /// What was run.
+    /// The plan that was run.
     pub plan: Plan,
     /// Results by number of airplanes, the team before the coordinator.
     cells: Vec<Cell>,
     /// The paper's claims and our verdicts.
     pub claims: Vec<Claim>,
-    /// Where the airplanes of the largest team flew with the first seed, metres.
+    /// Ways of the airplanes of the largest team with the first seed, meters.
     tracks_m: Vec<Vec<AirPoint>>,
 }
 
-/// Time between two optimizations.
+/// Time between two optimizations, s.
 const DT_S: f64 = 5.0;
-/// From so many airplanes on the paper finds its coordinator slow.
+/// Number of airplanes from which on the paper finds its coordinator slow.
 const MANY: u64 = 5;
 const BOTH: [&str; 2] = ["team", "pim"];
 
@@ -94,8 +94,8 @@ const COLUMNS: Columns = Columns {
     ],
 };
 
-/// Seconds spent deciding, if every agent has a processor of its own: of a team the time of all
-/// agents divided by their number, of a coordinator all of it.
+/// Returns the seconds spent deciding, if every agent has a processor of its own: for a team the
+/// time of all agents divided by their number, for a coordinator all of it.
 fn elapsed_s(case: &Runs<'_>, run: &Run<'_>) -> f64 {
     let is_team = case.set("airspace.deployment") == Value::Word(BOTH[0].into());
     let processors = if is_team { case.set_number(AIRPLANES) } else { 1.0 };
@@ -105,7 +105,7 @@ fn elapsed_s(case: &Runs<'_>, run: &Run<'_>) -> f64 {
 /// Runs the experiments.
 ///
 /// # Errors
-/// When the plan asks for what no scenario can be.
+/// When the plan asks for an impossible scenario.
 pub fn run(plan: &Plan, progress: &mut Progress<'_>) -> Result<Report, InputError> {
     let study = Study::of_file(SWEEP, SCENARIO)?.sized(plan.seeds, Some(plan.cycles));
     let study = study.keep(|v| plan.airplanes.contains(&(number(v, AIRPLANES) as usize)));
@@ -116,7 +116,7 @@ pub fn run(plan: &Plan, progress: &mut Progress<'_>) -> Result<Report, InputErro
     Ok(Report { plan: plan.clone(), cells, claims, tracks_m })
 }
 
-/// Where `n` airplanes fly with the first seed.
+/// Returns the ways of `n` airplanes with the first seed.
 fn tracks_m(plan: &Plan, n: usize) -> Result<Vec<Vec<AirPoint>>, InputError> {
     let settings = [
         setting(AIRPLANES, n as i64),
@@ -138,14 +138,15 @@ fn tracks_m(plan: &Plan, n: usize) -> Result<Vec<Vec<AirPoint>>, InputError> {
     Ok(tracks)
 }
 
-/// Team and coordinator at each number of airplanes at which either had anything to say.
+/// Returns team and coordinator at each number of airplanes at which either sent any message.
 fn pairs(cells: &[Cell]) -> impl Iterator<Item = (&Cell, &Cell)> {
     let talks = |cell: &Cell| cell.number("messages") > 0.0;
     let both = cells.chunks_exact(2).map(|pair| (&pair[0], &pair[1]));
     both.filter(move |(team, pim)| talks(team) && talks(pim))
 }
 
-/// A value of the coordinator over one of the team, seed by seed, wherever there are both and any.
+/// Returns a value of the coordinator divided by one of the team, seed by seed, if both are there
+/// and not 0.
 fn ratios(cells: &[Cell], of_pim: &str, of_team: &str) -> Vec<Estimate> {
     pairs(cells).map(|(team, pim)| ratio((pim, of_pim), (team, of_team))).collect()
 }
@@ -157,7 +158,7 @@ fn ratio((a, of_a): (&Cell, &str), (b, of_b): (&Cell, &str)) -> Estimate {
     Estimate::ratio(&values(a, of_a), &values(b, of_b))
 }
 
-/// Held if each mean is more than the one before; lost if there are no two.
+/// Returns `Held` if each mean is more than the one before; `Lost` if there are not two.
 fn rising(values: &[Estimate]) -> Verdict {
     match values.windows(2).all(|two| two[0].mean < two[1].mean) {
         _ if values.len() < 2 => Verdict::Lost,
@@ -166,14 +167,14 @@ fn rising(values: &[Estimate]) -> Verdict {
     }
 }
 
-/// Numbers one after the other, or that there are none.
+/// Returns numbers one after the other, or that there are none.
 fn each(values: &[Estimate]) -> String {
     listed(values, ToString::to_string)
 }
 
 static WORDS: Words = Words::new(|| File::read(include_str!("agentfly.toml")));
 
-/// A claim by its number, its verdict, and our figures.
+/// Returns a claim by its number, its verdict, and our figures.
 fn claim(id: &str, verdict: Verdict, ours: impl Into<String>) -> Claim {
     WORDS.claim(id, verdict, ours.into())
 }
@@ -263,7 +264,7 @@ fn hardly_in_time(cells: &[Cell]) -> Claim {
 }
 
 impl Report {
-    /// Figures 4 to 7.
+    /// Returns figures 4 to 7.
     fn figures(&self) -> Vec<Figure> {
         let over = |title: &str, y_label: &str, y: &str| {
             let of = |deployment: &str| {
@@ -283,14 +284,14 @@ impl Report {
         ]
     }
 
-    /// All numbers.
+    /// Returns all numbers.
     fn table(&self) -> Table {
         let note = "Per run, with 95 % intervals. Time is what deciding takes if every agent has \
                     a processor of its own, without transmission.";
         COLUMNS.table("Team and migrating coordinator", note, &self.cells)
     }
 
-    /// The report, the claims first.
+    /// Returns the report, the claims first.
     pub fn document(&self) -> Document {
         let plan = &self.plan;
         let setting = format!(
@@ -321,7 +322,7 @@ mod tests {
 
     #[test]
     fn a_rehearsal_judges_every_claim() {
-        // As far as to the first cycles in which they must mind each other.
+        // Up to the first cycles in which they must avoid each other.
         let short = Plan { seeds: 1, cycles: 16, ..Plan::quick() };
         let report = run(&short, &mut |_, _| ()).expect("a valid plan");
         assert_eq!((report.cells.len(), report.claims.len()), (6, 6));

@@ -1,5 +1,5 @@
-//! What all papers share of results: columns, each declared once, that say how the runs of a case
-//! are summed up -> cells, which are printed as a table, kept as JSON and asked by claims.
+//! Results, shared by all papers: columns, each declared once, that say how the runs of a case are
+//! summed up -> cells, which are printed as a table, kept as JSON and read by claims.
 
 use crate::study::{Results, number};
 use serde::ser::SerializeMap;
@@ -25,22 +25,22 @@ pub(crate) struct Run<'a> {
 }
 
 impl Run<'_> {
-    /// A metric as a number; true is 1.
+    /// Returns a metric as a number; true is 1.
     pub(crate) fn number(&self, metric: &str) -> Option<f64> {
         self.results.table.column(metric)?.values.number(self.row)
     }
 
-    /// A metric in words.
+    /// Returns a metric as text.
     pub(crate) fn text(&self, metric: &str) -> String {
         self.results.table.column(metric).map_or_else(String::new, |c| c.values.text(self.row))
     }
 
-    /// A metric as a number; 0 where it is not there.
+    /// Returns a metric as a number; 0 if it is missing.
     pub(crate) fn or_zero(&self, metric: &str) -> f64 {
         self.number(metric).unwrap_or(0.0)
     }
 
-    /// A count of steps, in percent of all steps.
+    /// Returns a count of steps, in percent of all steps.
     pub(crate) fn percent(&self, metric: &str) -> f64 {
         100.0 * self.or_zero(metric) / self.or_zero("steps")
     }
@@ -52,7 +52,7 @@ impl Run<'_> {
 }
 
 impl Runs<'_> {
-    /// What the case sets a key to.
+    /// Returns the value that the case sets a key to.
     pub(crate) fn set(&self, key: &str) -> Value {
         match self.variant.value(key) {
             Some(toml::Value::Integer(n)) => Value::Count(*n as u64),
@@ -63,73 +63,73 @@ impl Runs<'_> {
         }
     }
 
-    /// What the case sets.
+    /// Returns the settings of the case.
     pub(crate) fn variant(&self) -> &Variant {
         self.variant
     }
 
-    /// What the case sets a key to, as a number.
+    /// Returns the value that the case sets a key to, as a number.
     pub(crate) fn set_number(&self, key: &str) -> f64 {
         number(self.variant, key)
     }
 
-    /// The runs, by seed.
+    /// Returns the runs, by seed.
     pub(crate) fn each(&self) -> impl Iterator<Item = Run<'_>> {
         self.rows.iter().map(|&row| Run { results: self.results, row })
     }
 
-    /// Mean of a metric over the runs.
+    /// Returns the mean of a metric over the runs.
     pub(crate) fn mean(&self, metric: &str) -> Value {
         Value::Estimate(Estimate::of(self.each().map(|run| run.number(metric))))
     }
 
-    /// Mean of what `of` gives for each run.
+    /// Returns the mean of the values that `of` gives for each run.
     pub(crate) fn mean_of(&self, of: impl Fn(&Run<'_>) -> f64) -> Value {
         Value::Estimate(Estimate::of(self.each().map(|run| Some(of(&run)))))
     }
 
-    /// The share of the runs of which this holds.
+    /// Returns the share of the runs for which this holds.
     pub(crate) fn share(&self, holds: impl Fn(&Run<'_>) -> bool) -> Value {
         Value::Share(Share::of(self.each().map(|run| holds(&run))))
     }
 
-    /// A count of all runs.
+    /// Returns the sum of a count over all runs.
     pub(crate) fn sum(&self, metric: &str) -> Value {
         Value::Count(self.each().map(|run| run.or_zero(metric) as u64).sum())
     }
 
-    /// Of how many runs this holds.
+    /// Returns the number of runs for which this holds.
     pub(crate) fn count(&self, holds: impl Fn(&Run<'_>) -> bool) -> Value {
         Value::Count(self.each().filter(|run| holds(run)).count() as u64)
     }
 
-    /// The least of those runs that have it.
+    /// Returns the least value of the runs that have it.
     pub(crate) fn least(&self, metric: &str) -> Option<f64> {
         least(self.each().map(|run| run.number(metric)))
     }
 
-    /// The greatest; 0 of none.
+    /// Returns the greatest value; 0 if there is none.
     pub(crate) fn most(&self, metric: &str) -> f64 {
         most(self.each().filter_map(|run| run.number(metric)))
     }
 
-    /// The one in the middle; 0 of none.
+    /// Returns the median; 0 if there is none.
     pub(crate) fn median(&self, metric: &str) -> f64 {
         median(self.each().filter_map(|run| run.number(metric)))
     }
 }
 
-/// How the runs of a case are summed up, and shown.
+/// A column: how the runs of a case are summed up, and shown.
 pub(crate) struct Column {
     /// Its name in JSON, and for claims.
     name: &'static str,
-    /// Its head in the table; without one it has no place there.
+    /// Its head in the table; a column without one is not shown there.
     head: &'static str,
     of: fn(&Runs<'_>) -> Value,
     show: Option<fn(&Cell) -> String>,
 }
 
-/// A column that is shown as its value prints.
+/// Returns a column that is shown as its value prints.
 pub(crate) const fn column(
     name: &'static str,
     head: &'static str,
@@ -139,20 +139,20 @@ pub(crate) const fn column(
 }
 
 impl Column {
-    /// The same column, shown otherwise.
+    /// Sets how the column is shown.
     pub(crate) const fn shown(self, show: fn(&Cell) -> String) -> Self {
         Self { show: Some(show), ..self }
     }
 }
 
-/// The columns of an experiment: what its cases are, and what comes of them.
+/// The columns of an experiment: the settings of its cases, and their results.
 pub(crate) struct Columns {
     pub(crate) case: &'static [Column],
     pub(crate) came: &'static [Column],
 }
 
 impl Columns {
-    /// A cell for every case.
+    /// Returns a cell for every case.
     pub(crate) fn cells(&self, results: &Results) -> Vec<Cell> {
         let named = |columns: &[Column], runs: &Runs<'_>| {
             columns.iter().map(|c| (c.name, (c.of)(runs))).collect()
@@ -162,7 +162,7 @@ impl Columns {
             .collect()
     }
 
-    /// The cells as a table.
+    /// Returns the cells as a table.
     pub(crate) fn table(&self, title: &str, note: &str, cells: &[Cell]) -> Table {
         let shown: Vec<&Column> =
             self.case.iter().chain(self.came).filter(|c| !c.head.is_empty()).collect();
@@ -179,7 +179,7 @@ impl Columns {
     }
 }
 
-/// The runs of every case.
+/// Returns the runs of every case.
 pub(crate) fn runs(results: &Results) -> impl Iterator<Item = Runs<'_>> {
     let variants = results.table.column("variant");
     (0u32..).zip(&results.variants).map(move |(k, variant)| {
@@ -233,7 +233,7 @@ impl fmt::Display for Value {
     }
 }
 
-/// What came of one case.
+/// Results of one case.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Cell {
     case: Vec<(&'static str, Value)>,
@@ -241,7 +241,7 @@ pub(crate) struct Cell {
 }
 
 impl Cell {
-    /// A made-up cell.
+    /// Returns a made-up cell.
     #[cfg(test)]
     pub(crate) fn new(
         case: impl IntoIterator<Item = (&'static str, Value)>,
@@ -257,17 +257,17 @@ impl Cell {
         all.find(|(own, _)| *own == name).expect("a column of this name").1 = value;
     }
 
-    /// The value of a column.
+    /// Returns the value of a column.
     ///
     /// # Panics
-    /// When the experiment has no such column.
+    /// If the experiment has no such column.
     pub(crate) fn value(&self, name: &str) -> &Value {
         let mut all = self.case.iter().chain(&self.came);
         let found = all.find(|(own, _)| *own == name).map(|(_, value)| value);
         found.unwrap_or_else(|| panic!("there is no column `{name}`"))
     }
 
-    /// A number of whatever kind; a mean is 0 where nothing was measured.
+    /// Returns a number of any kind; a mean is 0 if nothing was measured.
     pub(crate) fn number(&self, name: &str) -> f64 {
         match self.value(name) {
             Value::Count(n) => *n as f64,
@@ -280,7 +280,7 @@ impl Cell {
         }
     }
 
-    /// A count.
+    /// Returns a count.
     pub(crate) fn count(&self, name: &str) -> u64 {
         match self.value(name) {
             Value::Count(n) => *n,
@@ -288,7 +288,7 @@ impl Cell {
         }
     }
 
-    /// A number that may not be there.
+    /// Returns a number that may be missing.
     pub(crate) fn maybe(&self, name: &str) -> Option<f64> {
         match self.value(name) {
             Value::Maybe(x) => *x,
@@ -296,17 +296,17 @@ impl Cell {
         }
     }
 
-    /// Whether it is so.
+    /// Whether the value is true.
     pub(crate) fn is(&self, name: &str) -> bool {
         *self.value(name) == Value::Yes(true)
     }
 
-    /// Whether it is this word.
+    /// Whether the value is this word.
     pub(crate) fn says(&self, name: &str, word: &str) -> bool {
         matches!(self.value(name), Value::Word(own) if own == word)
     }
 
-    /// A share of runs.
+    /// Returns a share of runs.
     pub(crate) fn share(&self, name: &str) -> &Share {
         match self.value(name) {
             Value::Share(share) => share,
@@ -314,12 +314,12 @@ impl Cell {
         }
     }
 
-    /// Whether it is so in all runs, of which there are some.
+    /// Whether it is true in all runs, of which there is at least one.
     pub(crate) fn in_all(&self, name: &str) -> bool {
         self.share(name).is_all()
     }
 
-    /// A mean.
+    /// Returns a mean.
     pub(crate) fn estimate(&self, name: &str) -> &Estimate {
         match self.value(name) {
             Value::Estimate(estimate) => estimate,
@@ -327,19 +327,19 @@ impl Cell {
         }
     }
 
-    /// What runs came to, one by one.
+    /// Returns results of runs, one by one.
     pub(crate) fn by_seed(&self, column: &str, name: &str) -> Vec<Option<f64>> {
         let Value::BySeed(runs) = self.value(column) else { return Vec::new() };
         let of = |run: &Named| run.iter().find(|(own, _)| *own == name).map(|(_, x)| *x);
         runs.iter().map(of).collect()
     }
 
-    /// A length, in millimeters.
+    /// Returns a length, in millimeters.
     pub(crate) fn mm(&self, name: &str) -> String {
         mm(self.maybe(name))
     }
 
-    /// A point of a figure.
+    /// Returns a point of a figure.
     pub(crate) fn point(&self, x: f64, y: &str) -> Option<Point> {
         match self.value(y) {
             Value::Share(share) => Some(share.point(x)),
@@ -384,7 +384,7 @@ pub(crate) fn table<T>(
     table
 }
 
-/// A series of cells: column `y` over column `x`.
+/// Returns a series of cells: column `y` over column `x`.
 pub(crate) fn series<'a>(
     name: impl Into<String>,
     cells: impl IntoIterator<Item = &'a Cell>,
@@ -394,7 +394,7 @@ pub(crate) fn series<'a>(
     Series { name: name.into(), points }
 }
 
-/// A series over the numbers of categories.
+/// Returns a series over the numbers of categories.
 pub(crate) fn bars<'a>(
     name: impl Into<String>,
     cells: impl IntoIterator<Item = &'a Cell>,
@@ -404,26 +404,26 @@ pub(crate) fn bars<'a>(
     Series { name: name.into(), points }
 }
 
-/// A figure of lines.
+/// Returns a figure of lines.
 pub(crate) fn figure(title: &str, [x, y]: [&str; 2], series: impl Into<Vec<Series>>) -> Figure {
     let (title, x_label, y_label) = (title.into(), x.into(), y.into());
     Figure { title, x_label, y_label, series: series.into(), ..Figure::default() }
 }
 
-/// How many of some runs, and between which shares of all runs that may lie: 95 %, by Clopper
-/// and Pearson.
+/// A number of runs out of several, with the 95 % interval of its share of all runs, by Clopper and
+/// Pearson.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(crate) struct Share {
-    /// Runs in which it was so,
+    /// Number of runs in which it was true,
     pub(crate) hits: u64,
-    /// of so many.
+    /// out of this many.
     pub(crate) n: u64,
     /// Interval of the share, 0 to 1.
     interval: Interval,
 }
 
 impl Share {
-    /// The share of those that are true.
+    /// Returns the share of those that are true.
     pub(crate) fn of(all: impl IntoIterator<Item = bool>) -> Self {
         let (mut hits, mut n) = (0, 0);
         for hit in all {
@@ -433,17 +433,17 @@ impl Share {
         Self::new(hits, n)
     }
 
-    /// So many of `n`.
+    /// Returns a share of `hits` out of `n`.
     pub(crate) fn new(hits: u64, n: u64) -> Self {
         Self { hits, n, interval: clopper_pearson(hits, n) }
     }
 
-    /// All of one or more.
+    /// Whether it is all of one or more.
     pub(crate) fn is_all(&self) -> bool {
         self.n > 0 && self.hits == self.n
     }
 
-    /// Percent, 0 without runs.
+    /// Returns the share in percent, 0 without runs.
     pub(crate) fn percent(&self) -> f64 {
         100.0 * self.hits as f64 / self.n.max(1) as f64
     }
@@ -463,24 +463,24 @@ impl fmt::Display for Share {
     }
 }
 
-/// The one in the middle; 0 of none.
+/// Returns the median; 0 if there are no values.
 pub(crate) fn median(values: impl IntoIterator<Item = f64>) -> f64 {
     let mut values: Vec<f64> = values.into_iter().collect();
     values.sort_by(f64::total_cmp);
     percentile(&values, 0.5).unwrap_or(0.0)
 }
 
-/// The least of some that are there.
+/// Returns the least of the values that are present.
 pub(crate) fn least(values: impl IntoIterator<Item = Option<f64>>) -> Option<f64> {
     values.into_iter().flatten().reduce(f64::min)
 }
 
-/// The greatest; 0 of none.
+/// Returns the greatest; 0 if there are none.
 pub(crate) fn most(values: impl IntoIterator<Item = f64>) -> f64 {
     values.into_iter().fold(0.0, f64::max)
 }
 
-/// A length in millimeters, with its sign; what is nowhere near is told as such.
+/// Returns a length in millimeters, with its sign, or words if nothing came near.
 pub(crate) fn mm(value_m: Option<f64>) -> String {
     match value_m {
         None => "far".into(),

@@ -1,4 +1,4 @@
-//! What all papers share of reports: their words, and verdicts over all of something.
+//! Words of the reports, shared by all papers, and verdicts over several results.
 
 use serde::Deserialize;
 use sidestep_document::claim::{Claim, Verdict};
@@ -7,7 +7,7 @@ use sidestep_document::document::{Experiment, Picture};
 use sidestep_document::{Document, Figure, Table};
 use std::sync::LazyLock;
 
-/// The claims of a paper, as a file beside its experiments tells them.
+/// The claims of a paper, read from a file beside its experiments.
 pub(crate) type Words = LazyLock<File>;
 
 /// A file of claims.
@@ -19,7 +19,7 @@ pub(crate) struct File {
     claim: Vec<Told>,
 }
 
-/// An experiment in words: what was run, and what to look for.
+/// An experiment in words: its setup, and the effect to look for.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct About {
@@ -37,7 +37,7 @@ struct Told {
     id: String,
     paper: String,
     papers_figure: Option<String>,
-    /// The rule by which it is judged; without one the judgment itself says it.
+    /// The rule by which it is judged; if empty, the judgment itself states it.
     #[serde(default)]
     rule: String,
 }
@@ -48,7 +48,7 @@ impl File {
         toml::from_str(text).expect("the claims of a paper are right")
     }
 
-    /// The experiments, with their figures and tables in the order of the file.
+    /// Returns the experiments, with their figures and tables in the order of the file.
     pub(crate) fn experiments(
         &'static self,
         came: impl IntoIterator<Item = (Vec<Figure>, Vec<Table>)>,
@@ -60,7 +60,8 @@ impl File {
         self.experiment.iter().zip(came).map(told).collect()
     }
 
-    /// The report of a paper: its claims, pictures, experiments, and the command that makes it.
+    /// Returns the report of a paper: its claims, pictures, experiments, and the command that makes
+    /// it.
     pub(crate) fn document(
         &self,
         lead: String,
@@ -79,7 +80,7 @@ impl File {
         document
     }
 
-    /// A claim by its number, its verdict, and our figures.
+    /// Returns a claim by its number, its verdict, and our figures.
     pub(crate) fn claim(&'static self, id: &str, verdict: Verdict, ours: String) -> Claim {
         let told = self.claim.iter().find(|told| told.id == id);
         let told = told.unwrap_or_else(|| panic!("there is no claim `{id}`"));
@@ -88,13 +89,13 @@ impl File {
     }
 }
 
-/// Held if it is so in all of them; lost where there is none.
+/// Returns `Held` if the condition holds for all of them, `Lost` if there are none.
 pub(crate) fn all<T>(them: impl IntoIterator<Item = T>, holds: impl Fn(T) -> bool) -> Verdict {
     let verdicts: Vec<bool> = them.into_iter().map(holds).collect();
     if verdicts.is_empty() { Verdict::Lost } else { Verdict::of(verdicts.iter().all(|&it| it)) }
 }
 
-/// Held where all of them are.
+/// Returns `Held` if all verdicts are.
 pub(crate) fn both(verdicts: &[Verdict]) -> Verdict {
     if verdicts.contains(&Verdict::NotHeld) {
         Verdict::NotHeld
@@ -105,7 +106,7 @@ pub(crate) fn both(verdicts: &[Verdict]) -> Verdict {
     }
 }
 
-/// What there is of each, one after the other.
+/// Lists a text for each of them, one after the other.
 pub(crate) fn listed<T>(them: impl IntoIterator<Item = T>, told: impl Fn(T) -> String) -> String {
     let words: Vec<String> = them.into_iter().map(told).collect();
     if words.is_empty() { "nothing measured".into() } else { words.join("; ") }

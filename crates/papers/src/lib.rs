@@ -1,4 +1,4 @@
-//! The experiments of three papers, run anew, and what came of their claims.
+//! The experiments of three papers, rerun, and the verdicts on their claims.
 //!
 //! ```text
 //! agentfly.rs   the source paper of the airspace world
@@ -6,7 +6,7 @@
 //! serpentine/   the source of the chain world
 //! methods.rs    methods of the airspace world on the same traffic
 //! study.rs      a sweep file and its scenario -> the table of its runs
-//! scene.rs      what a picture shows
+//! scene.rs      the content of a picture
 //! cells.rs      the table of runs -> a cell for every case: as JSON, a table, points of figures
 //! claims.rs     verdicts over cells
 //! ```

@@ -1,4 +1,4 @@
-//! Methods of avoiding each other, compared on the same traffic.
+//! Methods of collision avoidance, compared on the same traffic.
 
 use crate::cells;
 use crate::study::{Progress, all_of, setting};
@@ -12,7 +12,7 @@ use sidestep::worlds::airspace::metrics::Metrics;
 use sidestep::worlds::airspace::world::Method;
 use sidestep_document::{Estimate, Table};
 
-/// What a method came to over all runs.
+/// Results of a method over all runs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MethodResult {
     /// Its name.
@@ -25,7 +25,7 @@ pub struct MethodResult {
     pub loss_free_interval: Interval,
     /// Losses of separation per run.
     pub losses: Estimate,
-    /// Closest approach over all runs, metres.
+    /// Closest approach over all runs, meters.
     pub min_separation_m: Option<f64>,
     /// Share of the airplanes that arrived.
     pub arrived: Estimate,
@@ -41,8 +41,8 @@ pub struct MethodResult {
     pub shield_overrides: Estimate,
 }
 
-/// Runs `source` with each method and `runs` seeds from its own on, until all have arrived or
-/// its cycles are over.
+/// Runs `source` with each method and `runs` seeds, starting at its own, until all airplanes have
+/// arrived or its cycles are over.
 ///
 /// # Errors
 /// When the scenario is wrong.
@@ -67,7 +67,7 @@ pub fn compare(
     Ok(results)
 }
 
-/// One run to its end.
+/// Runs a scenario to its end.
 fn flown(source: &Source) -> Result<Metrics, InputError> {
     let mut run = airspace_run(source, 1)?;
     let cycles = run.plan().cycles;
@@ -96,7 +96,7 @@ fn result(method: &'static str, all: &[Metrics]) -> MethodResult {
     }
 }
 
-/// The results side by side.
+/// Returns a table of the results side by side.
 pub fn table(title: &str, results: &[MethodResult]) -> Table {
     let note = "Means over runs with their 95 % intervals; every method flies the same traffic.";
     let loss_free = |r: &MethodResult| {

@@ -1,17 +1,17 @@
-//! What a picture of a report shows, as plain data.
+//! The content of a report's picture, as plain data.
 
 use sidestep::kernel::view::{Frame, Scenery, Trail};
 
 /// A moment of a run, the ways that led to it, and words.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scene {
-    /// What it shows.
+    /// Its title: the content of the picture.
     pub title: String,
     /// Small print.
     pub caption: String,
-    /// What stays as it is.
+    /// The parts that never move.
     pub scenery: Scenery,
-    /// What is there.
+    /// The visible bodies.
     pub frame: Frame,
     /// The ways that led to it.
     pub trails: Vec<Trail>,

@@ -1,7 +1,8 @@
-//! What all papers share of running: a sweep file and its scenario -> the table of its runs.
+//! Runs, shared by all papers: a sweep file and its scenario -> the table of its runs.
 //!
 //! The sweep files and scenarios are those of `scenarios/papers/`, which `sidestep sweep` and
-//! `sidestep run` take as they are. A plan keeps to some of a sweep's variants, or runs it longer.
+//! `sidestep run` accept unchanged. A plan keeps only some of a sweep's variants, or runs it
+//! longer.
 
 use serde_json::{Map, Value};
 use sidestep::experiment::sweep::work::run_cells;
@@ -12,10 +13,10 @@ use sidestep::kernel::{Cycle, InputError, Simulation};
 use sidestep::scenario::Source;
 use sidestep::worlds::WORLDS;
 
-/// Told how far an experiment is: what is being done, and the share done, from 0 to 1.
+/// A callback for progress: the current activity, and the share done, from 0 to 1.
 pub type Progress<'a> = dyn FnMut(&str, f64) + 'a;
 
-/// Progress of a part of the whole that goes from share `from` to share `to`.
+/// Returns the progress of a part of the whole that goes from share `from` to share `to`.
 pub(crate) fn stage(progress: &mut Progress<'_>, from: f64, to: f64) -> impl FnMut(&str, f64) {
     move |what, share| progress(what, from + (to - from) * share)
 }
@@ -26,7 +27,7 @@ const BATCH: usize = 8;
 /// Runs every item on one of up to `workers` workers; results in the order of the items.
 ///
 /// # Errors
-/// The first that `run` gives.
+/// The first error that `run` returns.
 pub(crate) fn all_of<C: Sync, T: Send, E: Send>(
     items: &[C],
     workers: usize,
@@ -47,12 +48,12 @@ pub(crate) fn all_of<C: Sync, T: Send, E: Send>(
     Ok(results.into_iter().map(|(_, result)| result).collect())
 }
 
-/// A setting of a variant.
+/// Returns a setting of a variant.
 pub(crate) fn setting(key: &str, value: impl Into<toml::Value>) -> Setting {
     Setting { key: key.into(), value: value.into() }
 }
 
-/// The scenario of this text, with some settings.
+/// Returns the scenario of this text, with some settings.
 ///
 /// # Errors
 /// When a setting does not fit.
@@ -61,7 +62,7 @@ pub(crate) fn source(text: &str, settings: &[Setting]) -> Result<Source, InputEr
     Source::new("a scenario of this experiment", text, "").with(&overrides)
 }
 
-/// Variants, how often each is run, and of which scenario.
+/// Variants, the number of runs of each, and their scenario.
 #[derive(Debug)]
 pub(crate) struct Study {
     scenario: &'static str,
@@ -70,7 +71,7 @@ pub(crate) struct Study {
 }
 
 impl Study {
-    /// A sweep file, and the scenario that it names.
+    /// Reads a sweep file, for the scenario that it names.
     ///
     /// # Errors
     /// When the file is wrong.
@@ -80,17 +81,17 @@ impl Study {
         Ok(Self { scenario, sweep, variants })
     }
 
-    /// Variants that no sweep file can tell, for what they set is no key of a scenario.
+    /// Returns variants that no sweep file can describe, because they set no keys of a scenario.
     pub(crate) fn of_variants(scenario: &'static str, variants: Vec<Vec<Setting>>) -> Self {
         let sweep = Sweep::of_scenario("a case of this experiment");
         Self { scenario, sweep, variants }
     }
 
-    /// Runs of each variant, and cycles of each run.
+    /// Sets the runs of each variant, and the cycles of each run.
     pub(crate) fn sized(mut self, seeds: usize, cycles: Option<Cycle>) -> Self {
         self.sweep.replicates = seeds as u32;
         self.sweep.first_seed = Some(1);
-        // A variant that says itself how long it is run keeps to it.
+        // A variant that sets its own number of cycles keeps it.
         let is_open = |v: &Vec<Setting>| v.iter().all(|s| s.key != "cycles");
         if let Some(cycles) = cycles.filter(|_| self.variants.iter().all(is_open)) {
             self.sweep.fixed.push(setting("cycles", cycles as i64));
@@ -98,18 +99,18 @@ impl Study {
         self
     }
 
-    /// The variants of which this holds.
+    /// Keeps the variants for which this holds.
     pub(crate) fn keep(mut self, holds: impl Fn(&Variant) -> bool) -> Self {
         self.variants.retain(|settings| holds(&Variant { settings: settings.clone() }));
         self
     }
 
-    /// The variants that set `key` to one of these numbers.
+    /// Keeps the variants that set `key` to one of these numbers.
     pub(crate) fn keep_numbers(self, key: &str, among: &[f64]) -> Self {
         self.keep(|v| among.contains(&number(v, key)))
     }
 
-    /// Number of the variants.
+    /// Returns the number of variants.
     #[cfg(test)]
     pub(crate) fn len(&self) -> usize {
         self.variants.len()
@@ -133,7 +134,7 @@ impl Study {
     /// Runs every variant by `run`, where a case and its seed say what the scenario sets.
     ///
     /// # Errors
-    /// The first that `run` gives.
+    /// The first error that `run` returns.
     pub(crate) fn run_with(
         &self,
         what: (usize, &str),
@@ -147,11 +148,11 @@ impl Study {
         })
     }
 
-    /// Runs every variant by `run`, seed by seed, so that what else the machine does meets all
-    /// variants alike. `run` is given what makes the variant's scenario.
+    /// Runs every variant by `run`, seed by seed, so that other load on the machine affects all
+    /// variants alike. `run` receives a function that makes the variant's scenario.
     ///
     /// # Errors
-    /// The first that `run` gives.
+    /// The first error that `run` returns.
     pub(crate) fn run_by(
         &self,
         (workers, what): (usize, &str),
@@ -184,7 +185,7 @@ impl Study {
 /// Makes the scenario of a cell.
 pub(crate) type Scenario<'a> = dyn Fn() -> Result<Source, InputError> + 'a;
 
-/// What a run came to that is no run of a scenario: its values by name.
+/// Returns the outcome of a run that is no run of a scenario: its values by name.
 pub(crate) fn outcome(cell: &Cell, values: Value) -> Outcome {
     let metrics = match values {
         Value::Object(metrics) => metrics,
@@ -194,7 +195,7 @@ pub(crate) fn outcome(cell: &Cell, values: Value) -> Outcome {
     Outcome { cell: cell.id, cycles: 0, digest, failure: None, metrics, costs }
 }
 
-/// Runs a simulation to its end, and tells `look` of every cycle.
+/// Runs a simulation to its end, and calls `look` after every cycle.
 pub(crate) fn finish<S: Simulation>(run: &mut S, mut look: impl FnMut(&S)) {
     let until = run.plan().cycles;
     while run.cycle() < until && !run.is_over() {
@@ -203,14 +204,15 @@ pub(crate) fn finish<S: Simulation>(run: &mut S, mut look: impl FnMut(&S)) {
     }
 }
 
-/// The table of runs, and the variants that its rows are of.
+/// The table of runs, and the variants that its rows belong to.
 #[derive(Debug)]
 pub(crate) struct Results {
     pub(crate) table: RunTable,
     pub(crate) variants: Vec<Variant>,
 }
 
-/// What a variant sets a key to, as a number; of a list its first; NaN where it is none.
+/// Returns the value that a variant sets a key to, as a number; for a list its first; NaN if it is
+/// none.
 pub(crate) fn number(variant: &Variant, key: &str) -> f64 {
     fn of(value: &toml::Value) -> Option<f64> {
         let first = || value.as_array().and_then(|all| all.first()).and_then(of);

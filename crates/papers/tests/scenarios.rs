@@ -1,4 +1,5 @@
-//! Scenarios and sweep files of the papers are right as they are, for whoever runs them by hand.
+//! A check that the papers' scenarios and sweep files are valid as they are, so that users can run
+//! them by hand.
 
 use sidestep::experiment::sweep::{Setting, Sweep};
 use sidestep::scenario::Source;

@@ -1,11 +1,11 @@
 //! Pictures of a run: scenery, a frame, and the ways that led to it.
 //!
 //! ```text
-//! trails.rs   which ways are shown, and how much of them    canvas.rs   from meters to pixels
+//! trails.rs   the choice of ways, and their lengths          canvas.rs   from meters to pixels
 //! ways.rs     a way as a line that fades with age           sheet.rs    axes, scale bar, caption
-//! floor.rs    walls as few rectangles                       space.rs    the edges of what is shown
+//! floor.rs    walls as few rectangles                       space.rs    the edges of the shown box
 //! bodies.rs   everything that has a shape                   labels.rs   names that do not overlap
-//! key.rs      the legend, and what is shown in words        extent.rs   where everything is
+//! key.rs      the legend, and the content in words          extent.rs   the extent of the content
 //! ```
 
 mod bodies;

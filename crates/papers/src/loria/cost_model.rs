@@ -7,20 +7,20 @@
 //! T2 = (n + m) c_d + p (n + m) c_s + f e_u            detect, solve, update
 //! ```
 //!
-//! with `n` agents, `m` active objects, `p` the share of bodies in conflict, and `f` the
-//! boxes whose occupation changes. (In the paper an update also refreshes the distributions
-//! around a body; here those are computed when needed, so a change costs its boxes alone.)
+//! with `n` agents, `m` active objects, `p` the share of bodies in conflict, and `f` the boxes
+//! whose occupation changes. (In the paper an update also refreshes the distributions around a
+//! body; here those are computed when needed, so a change costs only its boxes.)
 //!
-//! How each parameter can be told from the others:
+//! Each parameter is identified as follows:
 //! - `t_p`, `t_o`: by runs of different `n : m`.
-//! - `c_s`: by runs of like `n + m` but different crowding, hence different `p`. `p` itself is
-//!   counted, not fitted: bodies in groups of two or more, by bodies.
+//! - `c_s`: by runs of similar `n + m` but different crowding, hence different `p`. `p` itself is
+//!   counted, not fitted: bodies in groups of two or more, divided by bodies.
 //! - `e_u`: by bodies of different size (a step rewrites two rows of boxes per body).
-//! - `c_d`: what detection and reaction cost per body when `p` and `f` are taken away. It holds
-//!   everything that is paid per body: joining claims, judging paths, bookkeeping.
+//! - `c_d`: the cost of detection and reaction per body without the parts of `p` and `f`. It
+//!   contains everything that is paid per body: joining claims, judging paths, bookkeeping.
 //!
-//! Both sides are divided by `n + m` before fitting, so that all runs weigh alike; the share of
-//! variance explained is that of the cost *per body*, a harder test than that of whole cycles.
+//! Both sides are divided by `n + m` before fitting, so that all runs have equal weight; the share
+//! of variance explained is that of the cost *per body*, a harder test than that of whole cycles.
 
 use super::Plan;
 use super::floor::Floor;
@@ -60,7 +60,7 @@ pub(super) struct Point {
 pub(super) struct Parameter {
     /// Its name in the paper, as read.
     pub(super) name: String,
-    /// What it is.
+    /// Its meaning.
     pub(super) meaning: String,
     /// Value in ns.
     pub(super) value_ns: f64,
@@ -73,7 +73,7 @@ pub(super) struct Parameter {
 pub(super) struct CostModel {
     /// The runs.
     pub(super) points: Vec<Point>,
-    /// `t_p`, `t_o`, `c_d`, `c_s`, `e_u`; empty when they cannot be told apart.
+    /// `t_p`, `t_o`, `c_d`, `c_s`, `e_u`; empty if they cannot be separated.
     pub(super) parameters: Vec<Parameter>,
     /// Share of the variance of the cost per body explained, of step one and of step two.
     pub(super) r_squared: [f64; 2],
@@ -127,12 +127,12 @@ impl CostModel {
         }
     }
 
-    /// The parameter of a name.
+    /// Returns the parameter of a name.
     pub(super) fn parameter(&self, name: &str) -> Option<&Parameter> {
         self.parameters.iter().find(|p| p.name == name)
     }
 
-    /// The fitted parameters as a table.
+    /// Returns the fitted parameters as a table.
     pub(super) fn table(&self) -> Table {
         let note = format!(
             "{} runs with one worker, n = {:.0} to {:.0} robots of 1 to 3 boxes a side, m = {:.0} \
@@ -167,7 +167,7 @@ impl CostModel {
         )
     }
 
-    /// Predicted against measured time of a cycle.
+    /// Returns a figure of predicted against measured time of a cycle.
     pub(super) fn figure(&self) -> Figure {
         let value = |name| self.parameter(name).map_or(0.0, |p| p.value_ns);
         let predict = |p: &Point| {
@@ -232,7 +232,7 @@ fn parameters(first: &Option<Fit>, second: &Option<Fit>) -> Vec<Parameter> {
     }
 }
 
-/// Share of the variance of whole cycles' times that both fits together explain.
+/// Returns the share of the variance of whole cycles' times that both fits together explain.
 fn whole_cycles(points: &[Point], first: &Option<Fit>, second: &Option<Fit>) -> f64 {
     let (Some(first), Some(second)) = (first, second) else { return 0.0 };
     let measured: Vec<f64> = points.iter().map(|p| p.first_ns + p.second_ns).collect();
@@ -247,7 +247,7 @@ fn whole_cycles(points: &[Point], first: &Option<Fit>, second: &Option<Fit>) -> 
 /// Sides of robots in boxes.
 const SIZES: [u32; 3] = [1, 2, 3];
 
-/// Loads of different numbers, crowding and size.
+/// Returns loads of different numbers, crowding and size.
 fn grid(plan: &Plan) -> Vec<Load> {
     let small = (Arc::new(Floor::small()), [20, 50, 80], [0, 30, 80]);
     let large = (Arc::new(Floor::large()), [100, 300, 800], [0, 200, 600]);
@@ -265,7 +265,7 @@ fn grid(plan: &Plan) -> Vec<Load> {
 /// Blocks in which a load is timed; the shortest time per cycle of each phase counts.
 const BLOCKS: usize = 16;
 
-/// What has happened in a run so far.
+/// Sums over a run so far.
 #[derive(Debug, Clone, Copy)]
 struct Totals {
     first_ns: f64,

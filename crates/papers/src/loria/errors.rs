@@ -1,7 +1,7 @@
 //! Error tables from one number: the equal error level of sensors and effectors.
 //!
-//! The paper's tables are lost, and which errors hurt more depends on the tables. So, beside
-//! the presets, sensors and effectors are compared at *equal error level* `e`:
+//! The paper's tables are lost, and the tables decide which errors hurt more. Therefore, beside the
+//! presets, sensors and effectors are compared at *equal error level* `e`:
 //!
 //! - Sensor: every row of the confusion matrix has `1 - e` on its diagonal. Distance classes
 //!   are exact, so a reading is right with probability `1 - e` exactly. A spurious report
@@ -10,8 +10,8 @@
 //!   spread evenly over the paper's other transitions (forward: stays, slips two boxes, drifts
 //!   left, drifts right; turns: stays, turns half around).
 //!
-//! Where a sensor's error mass goes decides how much it hurts, so there are two recipes; and
-//! beams that look the same way make up for each other's errors, so there are two rings.
+//! The distribution of a sensor's error mass decides how much it hurts, so there are two recipes;
+//! and beams that look the same way compensate for each other's errors, so there are two rings.
 
 use crate::study::setting;
 use serde::Serialize;
@@ -21,14 +21,14 @@ use toml::Value;
 /// Observations of the sensor, `nothing` first.
 const OBSERVATIONS: [&str; 5] = ["nothing", "wall", "door", "person", "robot"];
 
-/// Where the error mass of a sensor's row goes.
+/// The distribution of the error mass in a sensor's row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Spread {
     /// Evenly over all other observations: a thing is missed with probability `e / 4`, and
     /// otherwise taken for another thing.
     Even,
-    /// What is something is taken for nothing: a thing is missed with probability `e`.
+    /// Onto `nothing`: a thing is missed with probability `e`.
     Blind,
 }
 
@@ -36,7 +36,7 @@ impl Spread {
     /// Both recipes.
     pub(super) const ALL: [Self; 2] = [Self::Even, Self::Blind];
 
-    /// Its name in tables.
+    /// Returns its name in tables.
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::Even => "even",
@@ -44,7 +44,7 @@ impl Spread {
         }
     }
 
-    /// The confusion matrix at error level `e` (true x reported).
+    /// Returns the confusion matrix at error level `e` (true x reported).
     pub(super) fn confusion(self, e: f64) -> [[f64; OBSERVATIONS.len()]; OBSERVATIONS.len()] {
         let others = (OBSERVATIONS.len() - 1) as f64;
         std::array::from_fn(|truth| {
@@ -58,19 +58,19 @@ impl Spread {
     }
 }
 
-/// How many beams a robot has for the same thing.
+/// The number of beams that a robot has for the same thing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Beams {
     /// The Nomad's ring: three beams look ahead, five to each side.
     Sixteen,
-    /// One beam in each direction, for a robot of one box: nothing makes up for an error. The
-    /// paper has one observation per sensor and object, which this is nearest to.
+    /// One beam in each direction, for a robot of one box: nothing compensates for an error. This
+    /// is nearest to the paper, which has one observation per sensor and object.
     Four,
 }
 
 impl Beams {
-    /// Bearings of the beams in degrees.
+    /// Returns the bearings of the beams in degrees.
     pub(super) fn bearings_deg(self) -> Vec<f64> {
         let (n, step) = match self {
             Self::Sixteen => (16, 22.5),
@@ -79,7 +79,7 @@ impl Beams {
         (0..n).map(|k| f64::from(k) * step).collect()
     }
 
-    /// Side of the robot that carries them, in boxes.
+    /// Returns the side of the robot that carries them, in boxes.
     pub(super) fn size(self) -> u32 {
         match self {
             Self::Sixteen => 2,
@@ -96,14 +96,14 @@ const ACTIONS: [(&str, &[(&str, i64)]); 3] = [
     ("right", &[("", -90), ("", 0), ("", 180)]),
 ];
 
-/// Probabilities of `n` outcomes at error level `e`, the intended one first.
+/// Returns the probabilities of `n` outcomes at error level `e`, the intended one first.
 fn outcomes(n: usize, e: f64) -> Vec<f64> {
     let other = e / (n - 1) as f64;
     (0..n).map(|k| if k == 0 { 1.0 - e } else { other }).collect()
 }
 
-/// What the sonar ring `equal-ring` and the effector `equal-wheels` of the scenario are set to, so
-/// that they err at level `e`.
+/// Returns settings of the sonar ring `equal-ring` and the effector `equal-wheels` of the scenario,
+/// so that they err at level `e`.
 pub(super) fn settings(e: f64, spread: Spread, beams: Beams) -> Vec<Setting> {
     let list = |row: &[f64]| Value::from(row.to_vec());
     let under = |section: &str, key: &str, value: Value| setting(&[section, key].join("."), value);

@@ -1,4 +1,4 @@
-//! The buildings of the experiments, our own: the paper's floor is not published.
+//! The buildings of the experiments, our own because the paper's floor is not published.
 
 use super::patrol::{Patrol, Trust};
 use serde::{Deserialize, Serialize};
@@ -16,13 +16,13 @@ const LARGE: &str = include_str!("../../../../scenarios/papers/loria/large.toml"
 /// Boxes at each end of a corridor that count as its end.
 const END_BOXES: u32 = 4;
 
-/// How a robot goes to and fro.
+/// The behavior of a robot that goes to and fro.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Mind {
     /// The built-in `shuttle`: keeps to its way until it touches something.
     Touch,
-    /// Steps around what its sonar reports, on one beam's word.
+    /// Steps around things that its sonar reports, as soon as one beam does.
     Avoid,
     /// The same, but believes only what two reports agree on.
     Filter,
@@ -33,7 +33,7 @@ impl Mind {
     #[cfg(test)]
     pub(super) const ALL: [Self; 3] = [Self::Touch, Self::Avoid, Self::Filter];
 
-    /// Its name in tables.
+    /// Returns its name in tables.
     pub(super) fn name(self) -> &'static str {
         ["touch", "avoid", "filter"][self as usize]
     }
@@ -47,7 +47,7 @@ impl Mind {
     }
 }
 
-/// A floor of corridors and rooms, and who is in it.
+/// A floor of corridors and rooms, with its robots and people.
 #[derive(Debug, Clone)]
 pub(super) struct Floor {
     /// Its name in tables.
@@ -60,7 +60,7 @@ pub(super) struct Floor {
     people: u32,
 }
 
-/// What of a scenario the experiments must know.
+/// The parts of a scenario that the experiments must know.
 #[derive(Deserialize)]
 struct Told {
     map: Map,
@@ -92,38 +92,38 @@ impl Floor {
         }
     }
 
-    /// One corridor with 8 rooms.
+    /// Returns one corridor with 8 rooms.
     pub(super) fn small() -> Self {
         Self::new("small", SMALL)
     }
 
-    /// Two corridors with 24 rooms; the floor of the experiments that name none.
+    /// Returns two corridors with 24 rooms; the floor of the experiments that name none.
     pub(super) fn medium() -> Self {
         Self::new("medium", MEDIUM)
     }
 
-    /// Two floors of three corridors with 96 rooms.
+    /// Returns two floors of three corridors with 96 rooms.
     pub(super) fn large() -> Self {
         Self::new("large", LARGE)
     }
 
-    /// The corridors along which robots go: not those across, nor passages.
+    /// Returns the corridors along which robots go: not those across, nor passages.
     pub(super) fn corridors(&self) -> impl Iterator<Item = &Rect> {
         self.office.corridors.iter().filter(|c| c.width > 4 * c.height)
     }
 
-    /// Robots on the floor.
+    /// Returns the number of robots on the floor.
     pub(super) fn robots(&self) -> u32 {
         self.robots_per_corridor * self.corridors().count() as u32
     }
 
-    /// The behaviour of the robots of each corridor, for bodies of `size` x `size` boxes.
+    /// Returns the behaviors of the robots of each corridor, for bodies of `size` x `size` boxes.
     pub(super) fn behaviours(&self, mind: Mind, size: u32) -> Vec<Arc<dyn Behaviour>> {
         let free = FreeSpace::of_map(&self.office.map);
         self.corridors().map(|corridor| mind.between(ends(&free, corridor, size))).collect()
     }
 
-    /// What the floor is, in words.
+    /// Describes the floor in words.
     pub(super) fn describe(&self) -> String {
         let map = &self.office.map;
         format!(
@@ -141,7 +141,7 @@ impl Floor {
     }
 }
 
-/// Ways to the west and to the east end of a corridor.
+/// Returns ways to the west and to the east end of a corridor.
 fn ends(free: &FreeSpace, corridor: &Rect, size: u32) -> [Arc<FlowField>; 2] {
     let last = corridor.col + corridor.width - size;
     let way = |from: u32| {

@@ -1,7 +1,7 @@
 //! Genericity: bodies of 1 to 5 boxes a side and an added camera, as data alone.
 //!
-//! The paper changed the number of occupied boxes in its source, and wrote code for the
-//! camera. Here the scenario says both, and the behaviour takes whatever beams there are.
+//! The paper changed the number of occupied boxes in its source, and wrote code for the camera.
+//! Here the scenario states both, and the behavior accepts any beams.
 
 use super::Plan;
 use super::floor::Floor;
@@ -51,8 +51,8 @@ impl Genericity {
         Self { builds: builds.collect(), cycles: plan.cycles }
     }
 
-    /// Of the runs with or without a camera: how many kept the laws, in how many trips were
-    /// completed, and how many there are.
+    /// Returns, of the runs with or without a camera, how many kept the laws, in how many trips
+    /// were completed, and how many there are.
     pub(super) fn runs(&self, camera: bool) -> [usize; 3] {
         let runs = || self.builds.iter().filter(|b| b.camera == camera).flat_map(|b| &b.outcomes);
         let lawful = runs().filter(|outcome| outcome.lawful).count();
@@ -60,7 +60,7 @@ impl Genericity {
         [lawful, with_trips, runs().count()]
     }
 
-    /// Contacts with a camera less those without, over all sizes and seeds.
+    /// Returns contacts with a camera minus those without, over all sizes and seeds.
     pub(super) fn camera_effect(&self) -> Estimate {
         let contacts = |camera| {
             let builds = self.builds.iter().filter(move |b| b.camera == camera);
@@ -69,7 +69,7 @@ impl Genericity {
         Estimate::paired(&contacts(true), &contacts(false))
     }
 
-    /// Contacts and trips by size and sensors.
+    /// Returns contacts and trips by size and sensors.
     pub(super) fn table(&self) -> Table {
         let note = format!(
             "Mean [95 % interval] over seeds, runs of {} cycles; sensors and effectors \
@@ -94,7 +94,7 @@ impl Genericity {
         )
     }
 
-    /// Contacts over body size.
+    /// Returns contacts over body size.
     pub(super) fn figure(&self) -> Figure {
         let series = [false, true].map(|camera| {
             let builds = self.builds.iter().filter(|b| b.camera == camera);

@@ -1,4 +1,4 @@
-//! One run of one variant, and what it came to.
+//! One run of one variant, and its results.
 
 use super::errors::{self, Beams, Spread};
 use super::floor::{Floor, Mind};
@@ -18,7 +18,7 @@ use std::sync::Arc;
 /// The medium floor, with sensors and effectors of an equal error level.
 const EQUAL: &str = include_str!("../../../../scenarios/papers/loria/equal.toml");
 
-/// Which tables sensors and effectors err by.
+/// The tables by which sensors and effectors err.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Tables {
@@ -28,19 +28,19 @@ pub(super) enum Tables {
     Equal(f64, Spread, Beams),
 }
 
-/// What is varied between runs; the seed is not part of it.
+/// The settings that differ between runs; the seed is not among them.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct Variant {
-    /// The building and who is in it.
+    /// The building with its robots and people.
     #[serde(skip)]
     pub(super) floor: Arc<Floor>,
-    /// Which errors are on.
+    /// The errors that are switched on.
     pub(super) regime: Regime,
     /// The law for blocked paths.
     pub(super) obstacle_rule: ObstacleRule,
-    /// How robots decide.
+    /// The behavior of robots.
     pub(super) mind: Mind,
-    /// How sensors and effectors err.
+    /// The errors of sensors and effectors.
     pub(super) tables: Tables,
     /// Robots cover `size` x `size` boxes.
     pub(super) size: u32,
@@ -49,8 +49,8 @@ pub(super) struct Variant {
 }
 
 impl Variant {
-    /// Robots of 2 x 2 boxes with a sonar ring that avoid what it reports, under the presets
-    /// and the rule `cut`.
+    /// Returns a variant with robots of 2 x 2 boxes with a sonar ring, which avoid the things that
+    /// it reports, under the presets and the rule `cut`.
     pub(super) fn new(floor: &Arc<Floor>, regime: Regime) -> Self {
         Self {
             floor: Arc::clone(floor),
@@ -63,8 +63,8 @@ impl Variant {
         }
     }
 
-    /// The scenario of a run: the floor's, with what this variant differs in; `patrol-0`... are
-    /// the behaviours of the corridors.
+    /// Returns the scenario of a run: the floor's, with the changes of this variant; `patrol-0`...
+    /// are the behaviors of the corridors.
     pub(super) fn source(&self, seed: u64) -> Source {
         let mut settings = vec![
             setting("seed", seed as i64),
@@ -91,14 +91,14 @@ impl Variant {
         source(text, &settings).expect("the experiments' scenarios are valid")
     }
 
-    /// The behaviours by name, shared by all runs of this variant.
+    /// Returns the behaviors by name, shared by all runs of this variant.
     pub(super) fn behaviours(&self) -> Behaviours {
         let all = self.floor.behaviours(self.mind, self.size);
         all.into_iter().enumerate().map(|(k, b)| (format!("patrol-{k}"), b)).collect()
     }
 }
 
-/// What a run of a variant came to.
+/// Results of a run of a variant.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub(super) struct Outcome {
     /// Contacts per 1000 actions, with anything.
@@ -111,7 +111,7 @@ pub(super) struct Outcome {
     pub(super) trip_cycles: Option<f64>,
     /// Completed trips per robot.
     pub(super) trips: Option<f64>,
-    /// Net displacement by path length over windows of [`WINDOW_CYCLES`], on average.
+    /// Net displacement divided by path length over windows of [`WINDOW_CYCLES`], on average.
     pub(super) straightness: Option<f64>,
     /// Moves with a sideways part per 1000 actions.
     pub(super) lateral_moves: Option<f64>,
@@ -123,7 +123,7 @@ pub(super) struct Outcome {
 /// A measure of an outcome.
 pub(super) type Measure = fn(&Outcome) -> Option<f64>;
 
-/// The values of a measure by run.
+/// Returns the values of a measure by run.
 pub(super) fn values(outcomes: &[Outcome], measure: Measure) -> Vec<Option<f64>> {
     outcomes.iter().map(measure).collect()
 }
@@ -131,13 +131,13 @@ pub(super) fn values(outcomes: &[Outcome], measure: Measure) -> Vec<Option<f64>>
 /// Length of the windows in which straightness is measured, in cycles.
 pub(super) const WINDOW_CYCLES: usize = 20;
 
-/// Windows with a shorter path say nothing about its shape, in boxes.
+/// Shortest path of a window whose shape means anything, in boxes.
 const SHORTEST_PATH_BOXES: f64 = 10.0;
 
 /// Runs every variant with seeds `1..=seeds`; the outcomes are by variant, then by seed.
 ///
-/// All variants see the same seeds: where they start, and every draw that a variant does not
-/// itself change, are the same, so that differences between variants are paired by seed.
+/// All variants use the same seeds: starts, and every draw that a variant does not itself change,
+/// are the same, so that differences between variants are paired by seed.
 pub(super) fn measure_all(
     variants: &[Variant],
     (seeds, cycles): (usize, u64),
@@ -166,7 +166,7 @@ pub(super) fn measure(
     outcome(&simulation, &tracks)
 }
 
-/// A variant's run at its end, and the poses of its robots by entity id.
+/// Returns a variant's run at its end, and the poses of its robots by entity id.
 pub(super) fn recorded(
     variant: &Variant,
     behaviours: &Behaviours,
@@ -230,8 +230,8 @@ fn outcome(simulation: &RobotsRun, tracks: &[Track]) -> Outcome {
     }
 }
 
-/// Mean over all windows of all tracks of net displacement by path length: 1 for a straight
-/// line, less for a zigzag.
+/// Returns the mean over all windows of all tracks of net displacement divided by path length: 1
+/// for a straight line, less for a zigzag.
 fn straightness(tracks: &[Track]) -> Option<f64> {
     let windows = tracks.iter().flat_map(|track| track.chunks_exact(WINDOW_CYCLES + 1));
     let shares: Vec<f64> = windows.filter_map(straightness_of).collect();
@@ -248,7 +248,7 @@ fn straightness_of(window: &[(u32, u32, u8)]) -> Option<f64> {
     (path >= SHORTEST_PATH_BOXES).then(|| net / path)
 }
 
-/// Moves between two cycles that lead aside from the heading before.
+/// Returns the number of moves between two cycles that lead aside from the heading before.
 fn lateral_moves(track: &[(u32, u32, u8)]) -> u64 {
     let aside = |pair: &&[(u32, u32, u8)]| {
         let ((x, y, heading), (u, v, _)) = (pair[0], pair[1]);

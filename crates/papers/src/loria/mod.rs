@@ -1,16 +1,16 @@
 //! The experiments of the robots world's source paper, "A parallel simulation of stochastic
-//! agent/environment interaction" (LORIA, 2001), run anew.
+//! agent/environment interaction" (LORIA, 2001), rerun.
 //!
-//! The paper's tables are lost, so its *claims* are examined: what larger, smaller, faster. Every
-//! figure is our own, with the number of runs and a 95 % interval. [`claims`] says of each claim
-//! whether it held, did not hold, or cannot be judged.
+//! The paper's tables are lost, so its *claims* are examined: which quantity is larger, smaller,
+//! faster. Every figure is our own, with the number of runs and a 95 % interval. [`claims`] says of
+//! each claim whether it held, did not hold, or cannot be judged.
 //!
 //! ```text
-//! floor.rs, patrol.rs, errors.rs   the buildings, the behaviours, the error tables
-//! measure.rs   -> reliability.rs, genericity.rs               what runs come to
-//! timing.rs    -> performance.rs, strategies.rs, cost_model.rs   how long they take
-//! scenes.rs                        where robots go, as a picture shows it
-//! claims.rs                                                   what follows from all that
+//! floor.rs, patrol.rs, errors.rs   the buildings, the behaviors, the error tables
+//! measure.rs   -> reliability.rs, genericity.rs               results of runs
+//! timing.rs    -> performance.rs, strategies.rs, cost_model.rs   durations of runs
+//! scenes.rs                        ways of robots, as pictures
+//! claims.rs                                                   the verdicts
 //! ```
 
 mod claims;
@@ -39,33 +39,33 @@ use sidestep_document::claim::{Claim, tally};
 use sidestep_document::document::{Document, Experiment, Picture};
 use strategies::Strategies;
 
-/// How much to run.
+/// The amount of work to run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Plan {
     /// Seeds per variant, at least 2 (an interval needs two).
     pub seeds: usize,
-    /// Cycles of each run whose behaviour is measured.
+    /// Cycles of each run in which behavior is measured.
     pub cycles: u64,
     /// Error levels at which sensors and effectors are compared, above 0 and below 1.
     pub error_levels: Vec<f64>,
-    /// Runs at once, where behaviour is measured; no result depends on it.
+    /// Runs at once, when behavior is measured; no result depends on it.
     pub workers: usize,
-    /// Most workers of one run, where time is measured.
+    /// Most workers of one run, when time is measured.
     pub most_workers: usize,
     /// Repeats of each timing, at least 2.
     pub repeats: usize,
     /// Robots of the timed loads, sparse to dense.
     pub robots: Vec<u32>,
-    /// Operations that a decision costs in the timed loads, cheap to dear.
+    /// Operations that a decision costs in the timed loads, from cheap to expensive.
     pub operations: Vec<u32>,
-    /// About how many decisions of the cheapest kind a timed stretch is as long as.
+    /// Length of a timed stretch, as an approximate number of decisions of the cheapest kind.
     pub timed_robot_cycles: u64,
     /// Whether this is a rehearsal: fewer points, and figures without weight.
     pub quick: bool,
 }
 
 impl Default for Plan {
-    /// 24 seeds; a few minutes on two processors.
+    /// The full plan: 24 seeds; a few minutes on two processors.
     fn default() -> Self {
         Self {
             seeds: 24,
@@ -82,11 +82,11 @@ impl Default for Plan {
     }
 }
 
-/// Bounds of a plan: what a machine can do in a day.
+/// Upper bound of a plan: a machine can do this much in a day.
 const MOST: u64 = 1_000_000;
 
 impl Plan {
-    /// A rehearsal of seconds: everything is run once, nothing is measured well.
+    /// Returns a rehearsal of seconds: everything is run once, and nothing is measured well.
     pub fn quick() -> Self {
         Self {
             seeds: 2,
@@ -143,7 +143,7 @@ pub fn in_memory(schemas: &[TableSchema]) -> Result<Box<dyn Recorder>, RecordErr
     Ok(Box::new(MemoryRecorder::new(schemas)))
 }
 
-/// Why the experiments could not be run.
+/// The reason why the experiments could not be run.
 #[derive(Debug, thiserror::Error)]
 pub enum LoriaError {
     /// The plan is out of range.
@@ -154,10 +154,10 @@ pub enum LoriaError {
     Record(#[from] RecordError),
 }
 
-/// Everything that came of the experiments.
+/// All results of the experiments.
 #[derive(Debug, Clone, Serialize)]
 pub struct Report {
-    /// What was run.
+    /// The plan that was run.
     pub plan: Plan,
     /// Version of the program.
     pub program_version: String,
@@ -172,7 +172,7 @@ pub struct Report {
 
 /// Runs all experiments; recordings are kept in memory.
 ///
-/// `progress` is told what is being done and the share of the whole that is done.
+/// `progress` is called with the current activity and the finished share of the whole.
 ///
 /// # Errors
 /// When the plan is out of range.
@@ -180,7 +180,7 @@ pub fn run(plan: &Plan, progress: &mut Progress<'_>) -> Result<Report, LoriaErro
     run_recorded(plan, &mut in_memory, progress)
 }
 
-/// Runs all experiments; `recorders` says where timed runs are recorded to.
+/// Runs all experiments; `recorders` makes the recorders of timed runs.
 ///
 /// # Errors
 /// When the plan is out of range, or a recording fails.
@@ -190,7 +190,7 @@ pub fn run_recorded(
     progress: &mut Progress<'_>,
 ) -> Result<Report, LoriaError> {
     plan.check()?;
-    // Shares of the whole as they take their time on two processors.
+    // Shares of the whole by the time they take on two processors.
     let reliability = Reliability::run(plan, &mut stage(progress, 0.0, 0.45));
     let genericity = Genericity::run(plan, &mut stage(progress, 0.45, 0.55));
     let performance = Performance::run(plan, recorders, &mut stage(progress, 0.55, 0.8))?;
@@ -212,7 +212,7 @@ pub fn run_recorded(
 }
 
 impl Report {
-    /// The experiments in the order of the report.
+    /// Returns the experiments in the order of the report.
     fn experiments(&self) -> Vec<Experiment> {
         claims::WORDS.experiments([
             (self.reliability.figures(), self.reliability.tables()),
@@ -223,7 +223,8 @@ impl Report {
         ])
     }
 
-    /// The report, the claims first; `pictures` are those of the [scenes](scenes::all), drawn.
+    /// Returns the report, the claims first; `pictures` are those of the [scenes](scenes::all),
+    /// drawn.
     pub fn document(&self, pictures: Vec<Picture>) -> Document {
         let plan = &self.plan;
         let lead = format!(

@@ -1,8 +1,8 @@
-//! The behaviours that are compared: to and fro along a corridor, trusting sensors more or less.
+//! The compared behaviors: to and fro along a corridor, trusting sensors more or less.
 //!
-//! All know where they are and the static map (the built-in `shuttle` does too); what else
-//! stands in the way they must sense. The paper's robot avoids obstacles and follows
-//! corridors by its sonar; [`Patrol`] is that, [`Trust`] says how far it believes a beam.
+//! All know where they are and the static map (as the built-in `shuttle` does); other obstacles
+//! they must sense. The paper's robot avoids obstacles and follows corridors by its sonar;
+//! [`Patrol`] does the same, and [`Trust`] says how far it believes a beam.
 
 use sidestep::kernel::stream::Draws;
 use sidestep::planning::FlowField;
@@ -12,14 +12,14 @@ use sidestep::worlds::robots::sensor::NOTHING;
 use std::hint::black_box;
 use std::sync::Arc;
 
-/// When a robot believes that something is near.
+/// The condition for believing that something is near.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Trust {
-    /// As soon as one beam of a sector says so.
+    /// As soon as one beam of a sector reports it.
     OneBeam,
-    /// Ahead, where a miss costs a contact, on one beam's word; at the sides only when two
-    /// reports say so, out of those of this cycle and of the one before if the heading was
-    /// the same. False alarms at the sides are many, and each costs a needless sidestep.
+    /// Ahead, where a miss costs a contact, as soon as one beam reports it; at the sides only if
+    /// two reports agree, out of those of this cycle and of the one before if the heading was the
+    /// same. False alarms at the sides are many, and each costs a needless sidestep.
     TwoReports,
 }
 
@@ -43,7 +43,7 @@ const SEEN: usize = 2;
 /// The sectors that matter, in the order of the bytes of `SEEN`.
 const SECTORS: [Sector; 3] = [Sector::Ahead, Sector::Left, Sector::Right];
 
-/// Where something near is believed to be.
+/// The sides on which something is believed to be near.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Near {
     ahead: bool,
@@ -66,7 +66,7 @@ impl Behaviour for Patrol {
 }
 
 impl Patrol {
-    /// The end to go to, and whether a trip begins or is done here.
+    /// Returns the end to go to, and whether a trip starts or ends here.
     fn arrive(&self, percept: &Percept<'_>, memory: &mut Memory) -> (usize, Option<Trip>) {
         let reached = &mut memory.words[REACHED];
         let target = (*reached % 2) as usize;
@@ -78,7 +78,7 @@ impl Patrol {
         (1 - target, (target == 0).then_some(first))
     }
 
-    /// What is believed near after this percept.
+    /// Returns the sides believed to be near something after this percept.
     fn near(&self, percept: &Percept<'_>, memory: &mut Memory) -> Near {
         let now = SECTORS.map(|sector| near_reports(percept, sector));
         let heading = percept.heading + 1;
@@ -119,7 +119,7 @@ impl Patrol {
     }
 }
 
-/// Near reports of a sector in one percept.
+/// Returns the number of near reports of a sector in one percept.
 fn near_reports(percept: &Percept<'_>, sector: Sector) -> u8 {
     let beams = percept.readings.iter().zip(percept.sectors);
     let near = beams.filter(|(r, s)| **s == sector && r.observation != NOTHING && r.class == 0);
@@ -134,10 +134,10 @@ fn turn(heading: u8, course: u8, draws: &mut Draws) -> ActionId {
     }
 }
 
-/// Ahead on course; around what is near, and away from a wall on one side.
+/// Goes ahead on course, around obstacles nearby, and away from a wall on one side.
 fn go(percept: &Percept<'_>, near: Near, memory: &mut Memory, draws: &mut Draws) -> ActionId {
     let (away, boxes) = match near {
-        // Two that meet must not mirror each other: wait or step aside, by a fair draw.
+        // Two robots that meet must not mirror each other, so wait or step aside by a fair draw.
         Near { ahead: true, .. } if draws.below(4) == 0 => return STAY,
         Near { ahead: true, .. } => (freer_side(percept, draws), 1 + draws.below(3)),
         Near { left: true, right: false, .. } => (RIGHT, 1),
@@ -162,16 +162,16 @@ fn either(draws: &mut Draws) -> ActionId {
     if draws.below(2) == 0 { LEFT } else { RIGHT }
 }
 
-/// A behaviour that thinks longer: decides as another does, after so many operations.
+/// A behavior that thinks longer: it decides as another does, after extra operations.
 #[derive(Debug, Clone)]
 pub(super) struct Costly {
-    /// Who really decides.
+    /// The behavior that really decides.
     pub(super) inner: Arc<dyn Behaviour>,
     /// Dependent multiply-and-adds per decision.
     pub(super) operations: u32,
 }
 
-/// Does so many dependent multiply-and-adds, for nothing.
+/// Does `operations` dependent multiply-and-adds, only to spend time.
 pub(super) fn burn(mut x: u64, operations: u32) {
     for _ in 0..operations {
         x = x.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);

@@ -1,9 +1,9 @@
 //! Parallel performance: 1 to W workers, recorded or not, over density and cost of decisions.
 //!
-//! Time is taken as the paper does: all cycles and the recording, without initialization, whose
-//! share is given apart. Runs of all worker counts take turns, so that what else the machine
-//! does hits all alike, and arithmetic without any world takes its turn too: its speed-up is
-//! what the machine could give at that moment.
+//! Time is measured as the paper does: all cycles and the recording, without initialization, whose
+//! share is given separately. Runs of all worker counts take turns, so that other load on the
+//! machine affects all alike. Arithmetic without any world takes its turn too, because its speed-up
+//! is the most that the machine could give at that moment.
 
 use super::floor::Floor;
 use super::timing::{Load, STRETCHES, Timed, arithmetic, race, seconds};
@@ -16,7 +16,7 @@ use sidestep::kernel::ports::RecordError;
 use sidestep_document::{Estimate, Figure, Series, Table};
 use std::sync::Arc;
 
-/// A load under a number of workers.
+/// Times of a load with a number of workers.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct Timing {
     /// Number of the load.
@@ -27,15 +27,15 @@ pub(super) struct Timing {
     pub(super) recorded: bool,
     /// Milliseconds per cycle.
     pub(super) cycle_ms: Estimate,
-    /// Time with one worker by time with these, both recorded or both not.
+    /// Time with one worker divided by time with these, both recorded or both not.
     pub(super) speed_up: Estimate,
     /// Speed-up by repeat, for pairs with other loads.
     pub(super) ratios: Vec<Option<f64>>,
-    /// Speed-up of mere arithmetic with as many workers, timed in turn with this.
+    /// Speed-up of plain arithmetic with as many workers, timed in turn with this.
     pub(super) machine: Estimate,
 }
 
-/// What a run costs before its first cycle.
+/// The cost of a run before its first cycle.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub(super) struct Initialization {
     /// Number of the load.
@@ -59,7 +59,7 @@ const DIGEST_WORKERS: [usize; 6] = [1, 2, 3, 4, 8, 16];
 pub(super) struct Performance {
     /// Processors that the run may use.
     pub(super) processors: usize,
-    /// What was timed.
+    /// The timed loads.
     pub(super) loads: Vec<Load>,
     /// The times.
     pub(super) timings: Vec<Timing>,
@@ -71,7 +71,7 @@ pub(super) struct Performance {
     pub(super) recorded_digest: String,
 }
 
-/// Loads of the experiment: sparse and dense, each at every cost of a decision.
+/// Returns the loads of the experiment: sparse and dense, each at every cost of a decision.
 pub(super) fn loads(plan: &Plan) -> Vec<Load> {
     let floor = Arc::new(Floor::large());
     let load = |&(robots, operations): &(u32, u32)| Load {
@@ -85,7 +85,7 @@ pub(super) fn loads(plan: &Plan) -> Vec<Load> {
     plan.robots.iter().copied().flat_map(costs).collect::<Vec<_>>().iter().map(load).collect()
 }
 
-/// Worker counts from 1 to `most`: all up to 4, then ever larger steps.
+/// Returns worker counts from 1 to `most`: all up to 4, then ever larger steps.
 pub(super) fn worker_counts(most: usize) -> Vec<usize> {
     let mut counts: Vec<usize> = [1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64]
         .into_iter()
@@ -130,27 +130,27 @@ impl Performance {
         self.digests.iter().all(|(_, digest)| *digest == self.recorded_digest)
     }
 
-    /// The greatest number of workers that was timed.
+    /// Returns the greatest number of workers that was timed.
     pub(super) fn most_workers(&self) -> usize {
         self.timings.iter().map(|timing| timing.workers).max().unwrap_or(1)
     }
 
-    /// Timings with the most workers.
+    /// Returns the timings with the most workers.
     pub(super) fn at_most_workers(&self, recorded: bool) -> impl Iterator<Item = &Timing> {
         let most = self.most_workers();
         self.timings.iter().filter(move |t| t.workers == most && t.recorded == recorded)
     }
 
-    /// Whether the machine itself gave less than this share of the workers' worth: others
-    /// were using it, and times say little.
+    /// Whether the machine itself gave less than this share of the workers' worth: then other
+    /// processes were using it, and times mean little.
     pub(super) fn was_busy(&self) -> bool {
         const SHARE: f64 = 0.85;
         let least = SHARE * self.most_workers() as f64;
         self.at_most_workers(false).any(|timing| timing.machine.or_zero() < least)
     }
 
-    /// Speed-up of the costliest decisions less that of the cheapest, same robots, unrecorded,
-    /// with the most workers; one value per repeat and number of robots.
+    /// Returns the speed-up of the costliest decisions minus that of the cheapest, same robots,
+    /// unrecorded, with the most workers; one value per repeat and number of robots.
     pub(super) fn gain_by_cost(&self) -> Estimate {
         let (mut cheap, mut costly) = (Vec::new(), Vec::new());
         let cost = |timing: &Timing| self.loads[timing.load].operations;
@@ -168,7 +168,7 @@ impl Performance {
         Estimate::paired(&costly, &cheap)
     }
 
-    /// The tables of this experiment.
+    /// Returns the tables of this experiment.
     pub(super) fn tables(&self) -> Vec<Table> {
         vec![self.times_table(), self.initialization_table(), self.digest_table()]
     }
@@ -235,7 +235,7 @@ impl Performance {
         table
     }
 
-    /// The figures of this experiment: speed-up and time over workers.
+    /// Returns the figures of this experiment: speed-up and time over workers.
     pub(super) fn figures(&self) -> Vec<Figure> {
         let speed_up: fn(&Timing) -> &Estimate = |t| &t.speed_up;
         let cycle_ms: fn(&Timing) -> &Estimate = |t| &t.cycle_ms;
@@ -266,14 +266,14 @@ impl Performance {
     }
 }
 
-/// What takes its turn.
+/// A participant of the timings, which take turns.
 enum Contestant {
     Run(Box<Timed>, usize, bool),
     Arithmetic(usize),
 }
 
-/// All contestants of a load: unrecorded, recorded, and arithmetic, each with every number of
-/// workers; each has been run once.
+/// Returns all contestants of a load: unrecorded, recorded, and arithmetic, each with every number
+/// of workers; each has been run once.
 fn contestants(
     plan: &Plan,
     load: &Load,
@@ -355,7 +355,7 @@ fn initialize(index: usize, load: &Load, timings: &[Timing]) -> Initialization {
     }
 }
 
-/// Digests of one run by number of workers, and of the recorded run.
+/// Returns the digests of one run by number of workers, and of the recorded run.
 fn digests(
     load: &Load,
     recorders: &mut NewRecorder<'_>,

@@ -1,5 +1,5 @@
-//! Reliability: the same floors under the four regimes, and sensors against effectors at
-//! equal error level.
+//! Reliability: the same floors under the four regimes, and sensors against effectors at equal
+//! error level.
 
 use super::Plan;
 use super::errors::{Beams, Spread};
@@ -18,9 +18,9 @@ use std::sync::Arc;
 pub(super) struct Cell {
     /// Name of the floor.
     pub(super) floor: String,
-    /// What was run.
+    /// The variant that was run.
     pub(super) variant: Variant,
-    /// What came of it.
+    /// Its outcomes.
     pub(super) outcomes: Vec<Outcome>,
 }
 
@@ -35,16 +35,16 @@ pub(super) struct Reliability {
     pub(super) levels: Vec<f64>,
 }
 
-/// What selects a cell.
+/// The selection of a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Key<'a> {
     /// Name of the floor.
     pub(super) floor: &'a str,
     /// Law for blocked paths.
     pub(super) rule: ObstacleRule,
-    /// How robots decide.
+    /// The behavior of the robots.
     pub(super) mind: Mind,
-    /// How they err.
+    /// Their errors.
     pub(super) tables: Tables,
 }
 
@@ -96,15 +96,15 @@ impl Reliability {
         }
     }
 
-    /// Values by seed of one measure in one cell; empty for a cell that was not run.
+    /// Returns the values by seed of one measure in one cell; empty for a cell that was not run.
     pub(super) fn values(
         &self,
         key: Key<'_>,
         regime: Regime,
         measure: Measure,
     ) -> Vec<Option<f64>> {
-        // A regime that switches an error off does not depend on that error's table, so those
-        // cells are run for one table only.
+        // A regime that switches an error off does not depend on that error's table, so those cells
+        // are run for one table only.
         let is_cell = |cell: &&Cell| {
             let v = &cell.variant;
             (cell.floor.as_str(), v.obstacle_rule, v.mind, v.regime)
@@ -114,12 +114,12 @@ impl Reliability {
         self.cells.iter().find(is_cell).map_or_else(Vec::new, |c| values(&c.outcomes, measure))
     }
 
-    /// The mean of a measure in one cell.
+    /// Returns the mean of a measure in one cell.
     pub(super) fn estimate(&self, key: Key<'_>, regime: Regime, measure: Measure) -> Estimate {
         Estimate::of(self.values(key, regime, measure))
     }
 
-    /// Paired difference of a measure between two regimes, `a - b`.
+    /// Returns the paired difference of a measure between two regimes, `a - b`.
     pub(super) fn difference(
         &self,
         key: Key<'_>,
@@ -129,12 +129,12 @@ impl Reliability {
         Estimate::paired(&self.values(key, a, measure), &self.values(key, b, measure))
     }
 
-    /// Ratio of a measure between two regimes seed by seed, `a / b`.
+    /// Returns the ratio of a measure between two regimes seed by seed, `a / b`.
     pub(super) fn ratio(&self, key: Key<'_>, [a, b]: [Regime; 2], measure: Measure) -> Estimate {
         Estimate::ratio(&self.values(key, a, measure), &self.values(key, b, measure))
     }
 
-    /// Paired difference of a measure between two minds under one regime, `a - b`.
+    /// Returns the paired difference of a measure between two minds under one regime, `a - b`.
     pub(super) fn between_minds(
         &self,
         [a, b]: [Mind; 2],
@@ -145,7 +145,7 @@ impl Reliability {
         Estimate::paired(&of(a), &of(b))
     }
 
-    /// Keys of the places where the four regimes were run under the presets.
+    /// Returns keys of the places where the four regimes were run under the presets.
     pub(super) fn places(&self) -> Vec<Key<'static>> {
         let rules = ObstacleRule::ALL.map(|rule| Key { rule, ..Key::BASE });
         let floors = ["small", "large"].map(|floor| Key { floor, ..Key::BASE });
@@ -153,12 +153,12 @@ impl Reliability {
         rules.into_iter().chain(floors).chain(minds).collect()
     }
 
-    /// Contacts by sensor errors alone less those by effector errors alone, at one level.
+    /// Returns contacts by sensor errors alone minus those by effector errors alone, at one level.
     pub(super) fn sensors_less_effectors(&self, case: SweepCase, e: f64) -> Estimate {
         self.difference(case.key(e), [Regime::Sensors, Regime::Effectors], CONTACTS)
     }
 
-    /// The tables of this experiment.
+    /// Returns the tables of this experiment.
     pub(super) fn tables(&self) -> Vec<Table> {
         vec![self.regimes_table(), self.differences_table(), self.sweep_table(), self.minds_table()]
     }
@@ -260,7 +260,7 @@ impl Reliability {
         table
     }
 
-    /// The figures of this experiment.
+    /// Returns the figures of this experiment.
     pub(super) fn figures(&self) -> Vec<Figure> {
         let bars = [
             self.bars("Contacts under the four regimes", "contacts per 1000 actions", CONTACTS),
@@ -275,7 +275,7 @@ impl Reliability {
         bars.into_iter().chain(sweeps).collect()
     }
 
-    /// One bar per regime, one series per obstacle rule.
+    /// Returns one bar per regime, one series per obstacle rule.
     fn bars(&self, title: &str, y_label: &str, measure: Measure) -> Figure {
         let series = ObstacleRule::ALL.map(|rule| {
             let at = |(x, &regime): (usize, &Regime)| {
@@ -310,14 +310,14 @@ impl Reliability {
     }
 }
 
-/// A behaviour, its beams and their recipe of errors, swept over the error level.
+/// A behavior, its beams and their recipe of errors, swept over the error level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct SweepCase {
-    /// How robots decide.
+    /// The behavior of the robots.
     pub(super) mind: Mind,
-    /// How many beams they have.
+    /// Their number of beams.
     pub(super) beams: Beams,
-    /// Where the sensor's error mass goes.
+    /// The distribution of the sensor's error mass.
     pub(super) spread: Spread,
 }
 
@@ -325,7 +325,7 @@ impl SweepCase {
     const MINDS: [(Mind, Beams); 3] =
         [(Mind::Avoid, Beams::Sixteen), (Mind::Filter, Beams::Sixteen), (Mind::Avoid, Beams::Four)];
 
-    /// All cases of the sweep.
+    /// Returns all cases of the sweep.
     pub(super) fn all() -> impl Iterator<Item = Self> {
         let case = |(mind, beams)| Spread::ALL.map(|spread| Self { mind, beams, spread });
         Self::MINDS.into_iter().flat_map(case)
@@ -336,14 +336,14 @@ impl SweepCase {
         Key { mind: self.mind, tables, ..Key::BASE }
     }
 
-    /// Behaviour, number of beams and recipe, for tables.
+    /// Returns behavior, number of beams and recipe, for tables.
     pub(super) fn names(self) -> [String; 3] {
         let beams = self.beams.bearings_deg().len().to_string();
         [self.mind.name().into(), beams, self.spread.name().into()]
     }
 }
 
-/// Which of the two causes more contacts, where the interval tells.
+/// Returns which of the two causes more contacts, if the interval is conclusive.
 pub(super) fn larger(sensors_less_effectors: &Estimate) -> &'static str {
     if sensors_less_effectors.is_above(0.0) {
         "sensors"

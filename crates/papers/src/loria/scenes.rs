@@ -1,4 +1,4 @@
-//! Where robots go, as a picture shows it: on the medium floor, all reliable and nothing.
+//! Ways of robots as pictures: on the medium floor, without errors and with both kinds.
 
 use super::Plan;
 use super::floor::Floor;
@@ -10,14 +10,14 @@ use sidestep::kernel::{Cycle, Simulation};
 use sidestep::worlds::robots::world::Regime;
 use std::sync::Arc;
 
-/// Cycles of a run: all robots are on their way then.
+/// Cycles of a run: by then all robots are on their way.
 const CYCLES: Cycle = 600;
-/// Of which so many are seen.
+/// Cycles at the end of the run whose ways are shown.
 const SEEN: Cycle = 400;
 /// The seed of all scenes.
 const SEED: u64 = 1;
 
-/// All pictures: the same floor and seed, without errors and with both.
+/// Returns all pictures: the same floor and seed, without errors and with both.
 pub fn all(plan: &Plan) -> [Scene; 2] {
     let floor = Arc::new(Floor::medium());
     let scene =
@@ -48,7 +48,7 @@ fn scene(title: &str, variant: &Variant, cycles: Cycle) -> Scene {
     }
 }
 
-/// The tracks from a cycle on as the table of trajectories has them.
+/// Returns the tracks from a cycle on as columns of the table of trajectories.
 fn columns(tracks: &[Track], from: Cycle) -> [(&'static str, Values); 5] {
     let rows = || {
         let of = |(body, track): (u32, &Track)| {

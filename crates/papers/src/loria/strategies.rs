@@ -12,7 +12,7 @@ use sidestep::worlds::robots::baseline::{Baseline, Strategy, breach};
 use sidestep_document::{Estimate, Figure, Series, Table};
 use std::convert::Infallible;
 
-/// A strategy's time for a load.
+/// Times of a load under a strategy.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct Trial {
     /// Number of the load.
@@ -23,13 +23,13 @@ pub(super) struct Trial {
     pub(super) workers: usize,
     /// Milliseconds per cycle.
     pub(super) cycle_ms: Estimate,
-    /// Time of the double pool with one worker by this time.
+    /// Time of the double pool with one worker divided by this time.
     pub(super) speed_up: Estimate,
     /// The same by repeat, for pairs with other strategies.
     pub(super) ratios: Vec<Option<f64>>,
-    /// Speed-up of mere arithmetic with as many workers, timed in turn with this.
+    /// Speed-up of plain arithmetic with as many workers, timed in turn with this.
     pub(super) machine: Estimate,
-    /// Contacts per 1000 actions: what a robot meets depends on the strategy.
+    /// Contacts per 1000 actions, which depend on the strategy.
     pub(super) contacts: f64,
     /// Share of the bodies' cycles that one worker does while all others wait.
     pub(super) serial_share: f64,
@@ -42,7 +42,7 @@ pub(super) struct Trial {
 /// All trials.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct Strategies {
-    /// What was timed.
+    /// The timed loads.
     pub(super) loads: Vec<Load>,
     /// The trials.
     pub(super) trials: Vec<Trial>,
@@ -50,10 +50,10 @@ pub(super) struct Strategies {
 
 /// Name of the kernel's strategy.
 const DOUBLE_POOL: &str = "double pool";
-/// Name of what shows what the machine can give.
+/// Name of the arithmetic that shows how much the machine can give.
 const ARITHMETIC: &str = "arithmetic";
 
-/// What takes its turn: a run under one of the three strategies, or arithmetic.
+/// A participant of the timings: a run under one of the three strategies, or arithmetic.
 enum Run {
     DoublePool(Box<RobotsRun>),
     Baseline(Box<Baseline>),
@@ -105,14 +105,14 @@ impl Strategies {
         Self { loads, trials }
     }
 
-    /// Whether every trial has kept the laws and left nobody out.
+    /// Whether every trial has kept the laws and every robot has acted.
     #[cfg(test)]
     pub(super) fn all_valid(&self) -> bool {
         self.trials.iter().all(|trial| trial.valid && trial.complete)
     }
 
-    /// Speed-up of the double pool less that of another strategy, with the most workers, one
-    /// estimate per load.
+    /// Returns the speed-up of the double pool minus that of another strategy, with the most
+    /// workers, one estimate per load.
     pub(super) fn lead_over(&self, strategy: Strategy) -> Vec<Estimate> {
         let most = self.trials.iter().map(|t| t.workers).max().unwrap_or(1);
         let ratios = |load: usize, name: &str| {
@@ -124,7 +124,7 @@ impl Strategies {
         (0..self.loads.len()).map(lead).collect()
     }
 
-    /// The comparison as a table.
+    /// Returns the comparison as a table.
     pub(super) fn table(&self) -> Table {
         let note = format!(
             "Mean [95 % interval] over repeats, each the best of {STRETCHES} stretches that take \
@@ -155,7 +155,7 @@ impl Strategies {
         )
     }
 
-    /// Speed-up over workers, one figure per load.
+    /// Returns speed-up over workers, one figure per load.
     pub(super) fn figures(&self) -> Vec<Figure> {
         let figure = |(index, load): (usize, &Load)| {
             figure(
@@ -210,7 +210,7 @@ fn try_load(plan: &Plan, index: usize, load: &Load) -> Vec<Trial> {
     all.iter().zip(&times_s).filter_map(trial).collect()
 }
 
-/// Every strategy with every number of workers, and arithmetic.
+/// Returns every strategy with every number of workers, and arithmetic.
 fn contestants(plan: &Plan, load: &Load) -> Vec<Contestant> {
     let mut all = Vec::new();
     for workers in worker_counts(plan.most_workers) {
@@ -225,7 +225,7 @@ fn contestants(plan: &Plan, load: &Load) -> Vec<Contestant> {
     all
 }
 
-/// Contacts per 1000 actions, the serial share, and whether laws and counts were kept.
+/// Returns contacts per 1000 actions, the serial share, and whether laws and counts were kept.
 /// `None` for arithmetic.
 fn judge(load: &Load, run: &Run) -> Option<(f64, f64, bool, bool)> {
     let (metrics, snapshot, share) = match run {

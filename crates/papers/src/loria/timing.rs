@@ -1,4 +1,4 @@
-//! Loads to time, and how they are timed.
+//! Loads to time, and the timing of them.
 
 use super::NewRecorder;
 use super::floor::Floor;
@@ -34,26 +34,27 @@ pub(super) struct Load {
 }
 
 impl Load {
-    /// Free boxes that robots and people cover, as a share.
+    /// Returns the share of the free boxes that robots and people cover.
     pub(super) fn density(&self) -> f64 {
         let free = self.floor.office.map.count(sidestep::map::Cell::Free).max(1);
         f64::from(self.robots * self.size * self.size + self.people * 4) / free as f64
     }
 
-    /// Its name in tables.
+    /// Returns its name in tables.
     pub(super) fn name(&self) -> String {
         let (robots, operations) = (self.robots, self.operations);
         format!("{robots} robots, {:.0} % covered, {operations} operations", 100.0 * self.density())
     }
 
-    /// Cycles that take about as long as `robot_cycles` decisions that cost nothing extra.
+    /// Returns the number of cycles that take about as long as `robot_cycles` decisions without
+    /// extra cost.
     pub(super) fn cycles(&self, robot_cycles: u64) -> u64 {
         let bodies = u64::from(self.robots + self.people).max(1);
         // A decision with its sensing takes about as long as 500 operations.
         (robot_cycles / (bodies * (1 + u64::from(self.operations) / 500))).max(10)
     }
 
-    /// The scenario.
+    /// Returns the scenario.
     fn source(&self) -> Source {
         let costly = toml::Table::from_iter([("kind".to_string(), "costly".into())]);
         let settings = [
@@ -66,10 +67,10 @@ impl Load {
         source(text, &settings).expect("the experiments' scenarios are valid")
     }
 
-    /// The compiled world.
+    /// Returns the compiled world.
     ///
     /// # Panics
-    /// When the load does not fit its floor; the experiments' own do.
+    /// If the load does not fit its floor; the experiments' own do.
     pub(super) fn compiled(&self) -> Compiled {
         let costly = Costly { inner: Arc::new(Wander::default()), operations: self.operations };
         let behaviours = Behaviours::from([("costly".into(), Arc::new(costly) as _)]);
@@ -77,28 +78,28 @@ impl Load {
             .expect("the experiments' scenarios are valid")
     }
 
-    /// A run at its start.
+    /// Returns a run at its start.
     pub(super) fn simulation(&self, workers: usize) -> RobotsRun {
         self.compiled().start(&self.source(), workers)
     }
 }
 
-/// Seconds that `work` takes.
+/// Returns the seconds that `work` takes, and its result.
 pub(super) fn seconds<T>(work: impl FnOnce() -> T) -> (f64, T) {
     let clock = SystemClock::default();
     let result = work();
     (clock.now_ns() as f64 * 1e-9, result)
 }
 
-/// Of so many stretches in turn the best one counts as one repeat.
+/// Number of stretches of which the best counts as one repeat.
 pub(super) const STRETCHES: usize = 8;
 
 /// Times contestants in turn. Each gets `repeats` values, and every value is the shortest of
-/// [`STRETCHES`] short stretches: what the machine gives when nothing else disturbs it.
-/// Contestants take turns stretch by stretch, so that what does disturb hits all alike.
+/// [`STRETCHES`] short stretches: the time of the machine when nothing else disturbs it.
+/// Contestants take turns stretch by stretch, so that disturbances affect all alike.
 ///
 /// # Errors
-/// The first that `run` gives.
+/// The first error that `run` returns.
 pub(super) fn race<C, E>(
     contestants: &mut [C],
     repeats: usize,
@@ -117,8 +118,8 @@ pub(super) fn race<C, E>(
     Ok(times_s)
 }
 
-/// Seconds that arithmetic without any world takes, shared out among workers: what the machine
-/// itself can give at the moment.
+/// Returns the seconds that arithmetic without any world takes, shared among workers: the most that
+/// the machine itself can give at the moment.
 pub(super) fn arithmetic(workers: usize, robot_cycles: u64) -> f64 {
     const OPERATIONS: u32 = 500;
     let work = |worker: &workers::Worker<'_>, (): &mut ()| {
@@ -129,19 +130,19 @@ pub(super) fn arithmetic(workers: usize, robot_cycles: u64) -> f64 {
     seconds(|| workers::run(&mut vec![(); workers], work)).0
 }
 
-/// A run, and where its rows go if it is recorded.
+/// A run, with the destination of its rows if it is recorded.
 pub(super) struct Timed {
     simulation: RobotsRun,
     recorder: Option<Box<dyn Recorder>>,
 }
 
 impl Timed {
-    /// A run that is not recorded.
+    /// Returns a run that is not recorded.
     pub(super) fn new(load: &Load, workers: usize) -> Self {
         Self { simulation: load.simulation(workers), recorder: None }
     }
 
-    /// A recorded run.
+    /// Returns a recorded run.
     ///
     /// # Errors
     /// When the recorder cannot be made.
@@ -156,7 +157,7 @@ impl Timed {
         Ok(Self { simulation, recorder })
     }
 
-    /// Runs `cycles` cycles, and says how many seconds they took, recording included.
+    /// Runs `cycles` cycles, and returns the seconds they took, recording included.
     ///
     /// # Errors
     /// When rows cannot be stored.
@@ -174,7 +175,7 @@ impl Timed {
         result.map(|()| took_s)
     }
 
-    /// The run.
+    /// Returns the run.
     pub(super) fn simulation(&self) -> &RobotsRun {
         &self.simulation
     }

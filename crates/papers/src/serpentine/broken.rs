@@ -1,4 +1,4 @@
-//! A chain whose middle parts are thrown about, or partly gone, is joined again between its two
+//! A chain whose middle parts are thrown about, or partly missing, is joined again between its two
 //! whole ends (slide F3).
 
 use super::{Plan, draws};
@@ -43,14 +43,14 @@ const COLUMNS: Columns = Columns {
     ],
 };
 
-/// What is run.
+/// A case of the experiment.
 #[derive(Debug, Clone, Copy)]
 struct Case {
     /// Middle connectors that are thrown about,
     scattered: usize,
     /// by this standard deviation.
     by_m: f64,
-    /// Middle connectors that are gone.
+    /// Middle connectors that are missing.
     gone: usize,
     /// Whether the end with the last connector may come.
     may_come: bool,
@@ -80,7 +80,7 @@ pub(super) struct Broken {
     pub(super) cells: Vec<Cell>,
 }
 
-/// A chain that bends a little at every connector.
+/// Returns a chain that bends a little at every connector.
 fn whole(draws: &mut Draws) -> Vec<Point<2>> {
     let (mut at, mut heading_rad) = ([0.0, 0.0], 0.0);
     let mut points = vec![at];
@@ -92,7 +92,7 @@ fn whole(draws: &mut Draws) -> Vec<Point<2>> {
     points
 }
 
-/// The chain after it broke, and the indices of its scattered connectors.
+/// Returns the chain after it broke, and the indices of its scattered connectors.
 fn broken(
     case: &Case,
     seed: u64,
@@ -110,7 +110,7 @@ fn broken(
     Ok((chain, first..=last))
 }
 
-/// The same before and after, for the picture.
+/// Returns the same chain before and after, for the picture.
 pub(super) fn before_and_after(seed: u64) -> Result<[Vec<Point<2>>; 2], InputError> {
     let case = Case { scattered: 20, by_m: 5.0, gone: 2, may_come: true };
     let (mut chain, scattered) = broken(&case, seed)?;
@@ -136,7 +136,7 @@ fn joined(case: &Case, seed: u64) -> Result<Json, InputError> {
         "whole": passes.is_some(),
         "too_long": matches!(came, Reformed::GapTooLong { .. }),
         "passes": passes,
-        // An end that may come keeps its place only where it need not.
+        // An end that may come need not keep its place if the gap is too long.
         "ends_kept": kept(0..low + 1) && ((case.may_come && !can) || kept(high..before.len())),
         "rod_violation_m": passes.map(|_| chain.max_rod_violation_m()),
     }))

@@ -54,12 +54,12 @@ const COLUMNS: Columns = Columns {
     ],
 };
 
-/// The least distance of any part from what it must not touch.
+/// Least distance of any part from anything that it must not touch.
 pub(super) const CLEARANCE: Column =
     column("min_clearance_m", "clearance, mm", |r| Value::Maybe(r.least("min_clearance_m")))
         .shown(|c| c.mm("min_clearance_m"));
 
-/// The greatest amount by which a rod was outside its limits.
+/// Greatest amount by which a rod was outside its limits.
 pub(super) const ROD_VIOLATION: Column =
     column("rod_violation_m", "", |r| Value::Number(r.most("max_rod_violation_m")));
 
@@ -77,7 +77,7 @@ pub(super) struct Corridor {
     pub(super) cells: Vec<Cell>,
 }
 
-/// The sweep of a plan.
+/// Returns the sweep of a plan.
 pub(super) fn study(plan: &Plan) -> Result<Study, InputError> {
     let followers = |v: &Variant| plan.followers.contains(&(number(v, CONNECTORS) as usize - 1));
     let study = Study::of_file(SWEEP, SCENARIO)?.keep_numbers(WIDTH, &plan.widths_m);
@@ -100,12 +100,12 @@ impl Corridor {
         Ok(Self { cells: COLUMNS.cells(&results) })
     }
 
-    /// Cells of a reading, the fewest followers first.
+    /// Returns the cells of a reading, the fewest followers first.
     pub(super) fn of<'a>(&'a self, leaving: &'a str) -> impl Iterator<Item = &'a Cell> {
         self.cells.iter().filter(move |c| c.says("leaving", leaving))
     }
 
-    /// Cells of a reading with the fewest followers.
+    /// Returns the cells of a reading with the fewest followers.
     pub(super) fn of_few<'a>(&'a self, leaving: &'a str) -> impl Iterator<Item = &'a Cell> {
         let fewest = self.cells.iter().map(|c| c.count("followers")).min();
         self.of(leaving).filter(move |c| Some(c.count("followers")) == fewest)

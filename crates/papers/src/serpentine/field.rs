@@ -23,7 +23,7 @@ const SCENARIO: &str = include_str!("../../../../scenarios/papers/serpentine/fie
 const HALF_M: f64 = 10.0;
 /// Start and target, in opposite corners.
 const ENDS_M: [Point<2>; 2] = [[-8.5, -8.5], [8.5, 8.5]];
-/// Air around them.
+/// Free distance around them.
 const AIR_M: f64 = 1.5;
 
 /// Readings of "leaving a wall", and whether the leave rule is added.
@@ -47,8 +47,9 @@ const COLUMNS: Columns = Columns {
     ],
 };
 
-/// What is run: discs of 0.2 to 0.5 m, their speed over the robot's (0 where they stand), when a
-/// wall counts as being left, and whether a free way to the target ends following a wall.
+/// Returns the settings of a case: discs of 0.2 to 0.5 m, their speed divided by the robot's (0 if
+/// they stand), when a wall counts as being left, and whether a free way to the target ends
+/// following a wall.
 fn case(discs: usize, speed_ratio: f64, (leaving, leave_rule): (&str, bool)) -> Vec<Setting> {
     vec![
         setting("discs", discs as i64),
@@ -66,7 +67,8 @@ fn cases(plan: &Plan) -> Vec<Vec<Setting>> {
     standing.chain(moving).collect()
 }
 
-/// What a case with this seed sets in the scenario: the robot's heading and the discs.
+/// Returns the settings of a case with this seed in the scenario: the robot's heading and the
+/// discs.
 fn settings(case: &Variant, seed: u64) -> Vec<Setting> {
     let draws = &mut draws(seed);
     let heading_deg = 360.0 * draws.uniform();
@@ -84,7 +86,7 @@ fn settings(case: &Variant, seed: u64) -> Vec<Setting> {
     settings
 }
 
-/// A disc at random, if it leaves air around start and target.
+/// Returns a random disc, if it leaves room around start and target.
 fn disc(draws: &mut Draws, speed_ratio: f64) -> Option<Value> {
     let [u, v, w, turn] = [0; 4].map(|_: u8| draws.uniform());
     let (at, radius_m) = ([u, v].map(|x| HALF_M * (2.0 * x - 1.0)), 0.2 + 0.3 * w);
@@ -122,14 +124,14 @@ impl Fields {
         Ok(Self { cells: COLUMNS.cells(&results) })
     }
 
-    /// Cells with discs at rest, of a reading with or without the rule.
+    /// Returns cells with discs at rest, for a reading with or without the rule.
     pub(super) fn at_rest(&self, leaving: &str, leave_rule: bool) -> impl Iterator<Item = &Cell> {
         let is_its =
             move |c: &&Cell| c.says("leaving", leaving) && c.is("leave_rule") == leave_rule;
         self.cells.iter().filter(|c| c.number("speed_ratio") == 0.0).filter(is_its)
     }
 
-    /// Cells with discs that move.
+    /// Returns cells with discs that move.
     pub(super) fn moving(&self) -> impl Iterator<Item = &Cell> {
         self.cells.iter().filter(|c| c.number("speed_ratio") > 0.0)
     }

@@ -1,5 +1,5 @@
-//! Who may begin a motion, and who may object (slides R4, R5, R7, R8), and whether bends keep
-//! their limits (slide F1).
+//! Tests of which parts may start a motion, and which may object (slides R4, R5, R7, R8), and
+//! whether bends keep their limits (slide F1).
 
 use super::{Plan, draws};
 use crate::cells::{Share, table};
@@ -20,7 +20,7 @@ const FAILING: &str = include_str!("../../../../scenarios/papers/serpentine/fail
 
 /// Connectors of the chain: an arm as redundant as the slides' snake of 25 degrees of freedom.
 const CONNECTORS: usize = 26;
-/// Way of an initiator.
+/// Length of an initiator's step.
 const STEP_M: f64 = 0.05;
 /// Motions of each chain with bend limits.
 const MOTIONS: usize = 400;
@@ -28,7 +28,7 @@ const MOTIONS: usize = 400;
 /// Every connector as initiator.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Initiators {
-    /// Motions that every connector of a free chain began, and that were made.
+    /// Motions that every connector of a free chain started, and that were made.
     pub(super) moved: Share,
     /// Of these, motions of a connector in the middle after which each half is where it would be
     /// as a chain of its own, to the bit.
@@ -39,14 +39,14 @@ pub(super) struct Initiators {
     pub(super) failed_objected: Share,
     /// Vetoes that left every bit of the chain as it was.
     pub(super) kept: Share,
-    /// Runs of a world in which a connector fails on the way, and the operator is told that it was
-    /// that one.
+    /// Runs of a world in which a connector fails on the way, and the veto that the operator
+    /// receives names that one.
     pub(super) told: Share,
     /// Bend limits.
     pub(super) bends: Vec<Bend>,
 }
 
-/// What bend limits come to.
+/// Results for bend limits.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Bend {
     /// The limit.
@@ -136,7 +136,7 @@ fn seen(seed: u64) -> Result<Seen, InputError> {
     Ok(seen)
 }
 
-/// Whether a motion is vetoed by the one who is expected to, for the reason expected.
+/// Whether a motion is vetoed by the expected connector, for the expected reason.
 fn objects(
     chain: &mut Chain<3>,
     (k, to): (usize, Point<3>),
@@ -150,7 +150,7 @@ fn objects(
     Ok(veto.by == by && veto.reason == reason)
 }
 
-/// An operator leads a chain, a connector of it fails, and the operator is told who objects.
+/// Lets an operator lead a chain of which a connector fails; returns whether the veto names it.
 fn told(seed: u64) -> Result<bool, InputError> {
     let failing = 1 + (draws(seed).below(14)) as usize;
     let source = source(
@@ -168,7 +168,7 @@ fn told(seed: u64) -> Result<bool, InputError> {
     Ok(!told.is_empty() && told.iter().all(|&it| it))
 }
 
-/// What a wandering head with a bend limit came to.
+/// Results of a wandering head with a bend limit.
 struct Bent {
     moved: Vec<bool>,
     other_vetoes: u64,
@@ -276,7 +276,7 @@ fn bend((limit_deg, in_space): (f64, bool), runs: &[Bent]) -> Bend {
 }
 
 impl Seen {
-    /// Everything that some runs saw.
+    /// Sums the results of some runs.
     fn all(runs: Vec<Self>) -> Self {
         runs.into_iter().fold(Self::default(), |mut all, run| {
             all.moved.extend(run.moved);

@@ -1,5 +1,5 @@
 //! The experiments of the chain world's source, "Multi-agent serpentine motion with reactive
-//! obstacle avoidance" (Birbilis and Aspragathos, slides of 2005), run anew.
+//! obstacle avoidance" (Birbilis and Aspragathos, slides of 2005), rerun.
 //!
 //! The slides show pictures and no numbers, so their *claims* are examined. Every figure is our
 //! own, with the number of runs, and an interval where runs are random. [`claims`] says of each
@@ -7,10 +7,10 @@
 //!
 //! ```text
 //! corridor.rs, rotation.rs, field.rs    the swarm and its leader
-//! pushing.rs, movers.rs, snake.rs       chains among what stands and what moves
-//! scaling.rs, broken.rs, postures.rs, initiators.rs    what needs no world around it
+//! pushing.rs, movers.rs, snake.rs       chains among static and moving obstacles
+//! scaling.rs, broken.rs, postures.rs, initiators.rs    experiments without a world
 //! scenes.rs        pictures of bodies
-//! claims/          what follows from all that
+//! claims/          the verdicts
 //! ```
 
 mod broken;
@@ -34,17 +34,17 @@ use sidestep::kernel::{InputError, Seed};
 use sidestep_document::claim::{Claim, tally};
 use sidestep_document::document::{Document, Experiment, Picture};
 
-/// How fast initiators go, m/s, as the prototypes' did.
+/// Speed of initiators, m/s.
 const SPEED_M_S: f64 = 0.5;
-/// What a cycle takes unless an experiment is about it.
+/// Duration of a cycle unless an experiment varies it, s.
 const DT_S: f64 = 0.02;
 
-/// Random numbers of an experiment that drives no world.
+/// Returns random draws of an experiment that drives no world.
 fn draws(seed: u64) -> Draws {
     Streams::new(Seed(seed)).draws(0, 0, Purpose(1))
 }
 
-/// How much to run.
+/// The amount of work to run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Plan {
     /// Seeds of every case that is random,
@@ -53,19 +53,19 @@ pub struct Plan {
     pub field_seeds: usize,
     /// and of the snake in space.
     pub snake_seeds: usize,
-    /// Widths of the corridor.
+    /// Widths of the corridor, meters.
     pub widths_m: Vec<f64>,
     /// Numbers of followers in it.
     pub followers: Vec<usize>,
-    /// Cycles of a run in it, at most.
+    /// Most cycles of a run in it.
     pub corridor_cycles: u64,
-    /// Steps of its leader, where rules of rotation are compared.
+    /// Steps of its leader, in the comparison of rotation rules, meters.
     pub steps_m: Vec<f64>,
     /// Numbers of discs in the open field, beside none.
     pub discs: Vec<usize>,
-    /// Cycles of a run in it, at most.
+    /// Most cycles of a run in it.
     pub field_cycles: u64,
-    /// Speeds of what moves over those of what it meets.
+    /// Speeds of moving obstacles as multiples of the speed of the chain or robot that they meet.
     pub speed_ratios: Vec<f64>,
     /// Numbers of discs that run into a chain.
     pub mover_discs: Vec<usize>,
@@ -79,7 +79,7 @@ pub struct Plan {
     pub sizes: Vec<usize>,
     /// Numbers of far obstacles.
     pub far_balls: Vec<usize>,
-    /// About how many motions of a single connector a timing is as long as.
+    /// Length of a timing, as an approximate number of motions of a single connector.
     pub timed_motions: usize,
     /// Broken chains of each kind.
     pub breaks: usize,
@@ -89,14 +89,14 @@ pub struct Plan {
     pub ik_targets: usize,
     /// The cycle of the swarm's picture.
     pub pictured_cycles: u64,
-    /// Workers; nothing but times depends on them.
+    /// Workers; only times depend on them.
     pub workers: usize,
     /// Whether this is a rehearsal.
     pub quick: bool,
 }
 
 impl Default for Plan {
-    /// Half an hour on two processors, most of it for snakes among balls that fly.
+    /// The full plan: half an hour on two processors, most of it for snakes among balls that fly.
     fn default() -> Self {
         Self {
             seeds: 10,
@@ -127,7 +127,7 @@ impl Default for Plan {
 }
 
 impl Plan {
-    /// A rehearsal of seconds: everything is run, nothing is measured well.
+    /// Returns a rehearsal of seconds: everything is run, and nothing is measured well.
     pub fn quick() -> Self {
         Self {
             seeds: 2,
@@ -162,10 +162,10 @@ impl Plan {
     }
 }
 
-/// Everything that came of the experiments.
+/// All results of the experiments.
 #[derive(Debug, Clone, Serialize)]
 pub struct Report {
-    /// What was run.
+    /// The plan that was run.
     pub plan: Plan,
     /// Version of the program.
     pub program_version: String,
@@ -181,21 +181,21 @@ pub struct Report {
     initiators: initiators::Initiators,
     /// The slides' claims and our verdicts.
     pub claims: Vec<Claim>,
-    /// Pictures of bodies: no numbers of them are kept.
+    /// Pictures of bodies: no numbers are taken from them.
     #[serde(skip)]
     pub scenes: Vec<crate::Scene>,
 }
 
 /// Runs all experiments.
 ///
-/// `progress` is told what is being done and the share of the whole that is done.
+/// `progress` is called with the current activity and the finished share of the whole.
 ///
 /// # Errors
-/// When the plan asks for what no scenario can be.
+/// When the plan asks for an impossible scenario.
 pub fn run(plan: &Plan, progress: &mut Progress<'_>) -> Result<Report, InputError> {
     plan.check()?;
-    // Shares of the whole as they take their time on two processors. What is timed comes first,
-    // when the machine is quiet.
+    // Shares of the whole by the time they take on two processors. Timings come first, when the
+    // machine is quiet.
     let scaling = scaling::Scaling::run(plan, &mut stage(progress, 0.0, 0.05))?;
     let corridor = corridor::Corridor::run(plan, &mut stage(progress, 0.05, 0.25))?;
     let rotations = rotation::Rotations::run(plan, &mut stage(progress, 0.25, 0.35))?;
@@ -229,7 +229,7 @@ pub fn run(plan: &Plan, progress: &mut Progress<'_>) -> Result<Report, InputErro
 }
 
 impl Report {
-    /// The experiments in the order of the report.
+    /// Returns the experiments in the order of the report.
     fn experiments(&self) -> Vec<Experiment> {
         let (scaling, corridor) = (&self.scaling, &self.corridor);
         claims::WORDS.experiments([
@@ -246,7 +246,8 @@ impl Report {
         ])
     }
 
-    /// The report, the claims first; `pictures` are those of the [scenes](Self::scenes), drawn.
+    /// Returns the report, the claims first; `pictures` are those of the [scenes](Self::scenes),
+    /// drawn.
     pub fn document(&self, pictures: Vec<Picture>) -> Document {
         let plan = &self.plan;
         let lead = format!(

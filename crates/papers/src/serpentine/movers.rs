@@ -51,7 +51,7 @@ fn moves(case: &Variant) -> bool {
     task.and_then(|task| task.get("kind")).is_some_and(|kind| kind.as_str() == Some("wander"))
 }
 
-/// The speed of the discs over the leader's.
+/// Returns the speed of the discs divided by the leader's.
 fn ratio(case: &Variant) -> f64 {
     number(case, SPEED) / SPEED_M_S
 }
@@ -63,7 +63,7 @@ pub(super) struct Movers {
     pub(super) cells: Vec<Cell>,
 }
 
-/// The sweep of a plan.
+/// Returns the sweep of a plan.
 pub(super) fn study(plan: &Plan) -> Result<Study, InputError> {
     let study = Study::of_file(SWEEP, SCENARIO)?;
     let study = study.keep(|v| plan.mover_discs.contains(&(number(v, DISCS) as usize)));
@@ -77,7 +77,7 @@ impl Movers {
         Ok(Self { cells: COLUMNS.cells(&results) })
     }
 
-    /// Cells of a way to react.
+    /// Returns the cells of a way to react.
     pub(super) fn of<'a>(&'a self, escape: &'a str) -> impl Iterator<Item = &'a Cell> {
         self.cells.iter().filter(move |c| c.says("escape", escape))
     }

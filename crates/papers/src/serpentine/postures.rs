@@ -20,9 +20,9 @@ use sidestep::worlds::chain::{
 use sidestep_document::figure::Scale;
 use sidestep_document::{Figure, FigureKind, Table};
 
-/// Targets are within this part of the reach.
+/// Part of the reach within which targets lie.
 const WITHIN: f64 = 0.9;
-/// Near enough, in parts of the reach.
+/// Distance at which a target counts as reached, in parts of the reach.
 const TOLERANCE: f64 = 1e-4;
 
 /// Ways to bring a tip to a target.
@@ -30,7 +30,7 @@ const TOLERANCE: f64 = 1e-4;
 pub(super) enum Way {
     /// One motion of the tip; the base always objects to being moved, as the slides have it.
     Veto,
-    /// One motion of the tip, nobody is fixed.
+    /// One motion of the tip, with no connector fixed.
     FreeBase,
     /// The chain's rule there and back until tip and base are where they belong.
     ThereAndBack,
@@ -41,7 +41,7 @@ pub(super) enum Way {
 impl Way {
     const ALL: [Self; 4] = [Self::Veto, Self::FreeBase, Self::ThereAndBack, Self::LeastSquares];
 
-    /// Its name in settings and JSON.
+    /// Returns its name in settings and JSON.
     pub(super) fn key(self) -> &'static str {
         ["veto", "free-base", "there-and-back", "least-squares"][self as usize]
     }
@@ -77,14 +77,14 @@ const COLUMNS: Columns = Columns {
     ],
 };
 
-/// What is run.
+/// A case of the experiment.
 #[derive(Debug, Clone, Copy)]
 struct Case {
-    /// How.
+    /// The way.
     way: Way,
     /// Rods.
     links: usize,
-    /// How much longer and shorter than their mean rods may be.
+    /// Largest relative deviation of a rod's length from the mean.
     slack: f64,
 }
 
@@ -111,7 +111,7 @@ fn direction(draws: &mut Draws) -> Point<3> {
     unit([0; 3].map(|_: u8| normal(draws))).unwrap_or([1.0, 0.0, 0.0])
 }
 
-/// A chain at random whose rods are as long as on average.
+/// Returns a random chain whose rods are as long as on average.
 fn chain(case: &Case, draws: &mut Draws) -> Result<Chain<3>, InputError> {
     let (slack, n) = (case.slack, case.links);
     let rod = Rod { min_m: 1.0 - slack, max_m: 1.0 + slack, radius_m: 0.01 };
@@ -126,7 +126,7 @@ fn chain(case: &Case, draws: &mut Draws) -> Result<Chain<3>, InputError> {
     if case.way == Way::Veto {
         connectors[0].mobility = Mobility::Fixed;
     }
-    // Of fixed length to the bit: as long as they came out.
+    // Rods of fixed length take exactly the lengths that the points gave, to the bit.
     let rods = points.windows(2).map(|ends| match slack {
         0.0 => Rod::fixed(distance(ends[0], ends[1]), 0.01),
         _ => rod,
@@ -181,7 +181,7 @@ impl Postures {
         Ok(Self { cells: COLUMNS.cells(&results) })
     }
 
-    /// Cells of a way.
+    /// Returns the cells of a way.
     pub(super) fn of(&self, way: Way) -> impl Iterator<Item = &Cell> {
         self.cells.iter().filter(move |c| c.says("way", way.key()))
     }

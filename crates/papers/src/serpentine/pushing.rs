@@ -1,4 +1,4 @@
-//! A chain in a straight corridor is pushed back by its head until somebody objects, and pulled
+//! A chain in a straight corridor is pushed back by its head until some part objects, and pulled
 //! back by its tail (slides A3, A4, R4).
 
 use super::{Plan, draws};
@@ -17,11 +17,11 @@ use sidestep::worlds::chain::{
 use sidestep_document::{Figure, FigureKind, Table};
 use std::collections::BTreeSet;
 
-/// Standard deviation across the corridor of where the head is told to go: pushing a straight
-/// chain exactly along itself would never fold it.
+/// Standard deviation of the head's targets across the corridor, because pushing a straight chain
+/// exactly along itself would never fold it.
 const NOISE_M: f64 = 0.001;
 const STEP_M: f64 = 0.01;
-/// How far it is to go.
+/// Distance that it is to go.
 const WAY_M: f64 = 12.0;
 const WIDTH_M: f64 = 2.0;
 
@@ -49,8 +49,8 @@ const COLUMNS: Columns = Columns {
     ],
 };
 
-/// What is run: whether the chain's own parts are obstacles to it, and the greatest angle between
-/// two rods (180 for none); and whether the head leads, and pushes, or the tail, and pulls.
+/// Returns the cases: whether the chain's own parts are obstacles to it, the greatest angle between
+/// two rods (180 for none), and whether the head leads, and pushes, or the tail, and pulls.
 fn cases() -> Vec<Vec<Setting>> {
     let limits = [(false, 180.0), (true, 180.0), (true, 60.0), (true, 30.0)];
     let case = |by_head: bool, (self_collision, max_bend_deg): (bool, f64)| {
@@ -77,7 +77,7 @@ fn chain(max_bend_deg: f64) -> Result<Chain<2>, InputError> {
     Chain::straight([30.0, 0.0], [-1.0, 0.0], 15, rod, connector)
 }
 
-/// How far a case goes until somebody objects, and what it comes to on the way.
+/// Runs a case until some part objects; returns the distance and the measures on the way.
 fn pushed(case: &Variant, seed: u64) -> Result<Json, InputError> {
     let is = |key: &str| case.value(key).and_then(toml::Value::as_bool) == Some(true);
     let walls = Corridor::new(vec![Leg::Straight { length_m: 40.0 }], WIDTH_M)?.walls(0);
@@ -120,7 +120,7 @@ impl Pushing {
         Ok(Self { cells: COLUMNS.cells(&results) })
     }
 
-    /// Cells of pushing, or of pulling.
+    /// Returns cells of pushing, or of pulling.
     pub(super) fn of(&self, by_head: bool) -> impl Iterator<Item = &Cell> {
         self.cells.iter().filter(move |c| c.is("by_head") == by_head)
     }

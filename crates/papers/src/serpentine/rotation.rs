@@ -1,5 +1,5 @@
-//! What a rod does that hits an obstacle (slide A7): turn to the nearest direction that is free of
-//! everything, turn once as the slides say, or do not turn.
+//! Reactions of a rod that hits an obstacle (slide A7): turn to the nearest direction that is free
+//! of everything, turn once as the slides say, or do not turn.
 
 use super::Plan;
 use super::corridor::{CLEARANCE, ROD_VIOLATION, WIDTH};
@@ -49,7 +49,7 @@ pub(super) struct Rotations {
     pub(super) cells: Vec<Cell>,
 }
 
-/// The sweep of a plan: corridors of medium width.
+/// Returns the sweep of a plan: corridors of medium width.
 pub(super) fn study(plan: &Plan) -> Result<Study, InputError> {
     let study = Study::of_file(SWEEP, SCENARIO)?.keep_numbers(WIDTH, &plan.widths_m);
     Ok(study.keep_numbers(STEP, &plan.steps_m).sized(plan.seeds, None))
@@ -76,7 +76,7 @@ impl Rotations {
         Ok(Self { cells: COLUMNS.cells(&results) })
     }
 
-    /// Cells of a rule.
+    /// Returns the cells of a rule.
     pub(super) fn of<'a>(&'a self, rotation: &'a str) -> impl Iterator<Item = &'a Cell> {
         self.cells.iter().filter(move |c| c.says("rotation", rotation))
     }

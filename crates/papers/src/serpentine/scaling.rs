@@ -1,5 +1,5 @@
-//! What a motion costs (slides P5, P6, E4): by the number of connectors, by how many of them it
-//! reaches, and by how many obstacles there are that nobody is near to.
+//! The cost of a motion (slides P5, P6, E4): by the number of connectors, by how many of them it
+//! reaches, and by the number of obstacles that are far away.
 
 use super::{Plan, draws};
 use crate::cells::{figure, median, table};
@@ -17,7 +17,7 @@ use sidestep_document::{Figure, Series, Table};
 const REPEATS: usize = 5;
 /// Length of a rod.
 const ROD_M: f64 = 0.1;
-/// Way of the head in a motion.
+/// Length of the head's step in a motion.
 const STEP_M: f64 = 0.01;
 /// Connectors of the chain among obstacles.
 const AMONG: usize = 450;
@@ -31,7 +31,7 @@ pub(super) struct Size {
     pub(super) fixed_us: f64,
     /// and how many connectors move in one.
     pub(super) fixed_moved: f64,
-    /// The same of rods that may be half as long again,
+    /// The same for rods that may be half as long again,
     pub(super) slack_us: f64,
     /// of which fewer move.
     pub(super) slack_moved: f64,
@@ -40,7 +40,7 @@ pub(super) struct Size {
 /// One chain among balls, with others far away.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Far {
-    /// Balls that nobody comes near to.
+    /// Balls that the chain never comes near to.
     pub(super) balls: usize,
     /// Time of a motion, microseconds.
     pub(super) us: f64,
@@ -57,8 +57,8 @@ pub(super) struct Scaling {
     pub(super) far: Vec<Far>,
 }
 
-/// A slightly bent chain, so that every connector moves at every motion: a bend lets through only
-/// its cosine, so the longer the chain the less it is bent.
+/// Returns a slightly bent chain, so that every connector moves at every motion: a bend lets
+/// through only its cosine, so a longer chain is less bent.
 fn snake(n: usize, max_m: f64) -> Result<Chain<3>, InputError> {
     let mut points = vec![[0.0; 3]];
     let bent = 0.2_f64.min(90.0 / n as f64);
@@ -71,13 +71,13 @@ fn snake(n: usize, max_m: f64) -> Result<Chain<3>, InputError> {
     Chain::new(points, vec![Connector::free(0.02); n], vec![rod; n - 1])
 }
 
-/// Where the head is after `k` motions.
+/// Returns the position of the head after `k` motions.
 fn head(k: usize) -> Point<3> {
     let t = k as f64 * STEP_M;
     [t, 0.3 * sin(t), 0.3 * cos(t) - 0.3]
 }
 
-/// Leads a chain; microseconds and connectors per motion.
+/// Leads a chain; returns microseconds and connectors per motion.
 fn led(
     chain: &mut Chain<3>,
     obstacles: &Obstacles<3>,
@@ -93,7 +93,7 @@ fn led(
     Ok((1e6 * began.elapsed().as_secs_f64() / count, moved as f64 / count))
 }
 
-/// Time and connectors of a motion of a chain in the open: the median of some repeats.
+/// Returns time and connectors of a motion of a chain in the open: the median of some repeats.
 fn in_the_open(n: usize, max_m: f64, motions: usize) -> Result<(f64, f64), InputError> {
     let mut chain = snake(n, max_m)?;
     let (nothing, mut times_us, mut moved) = (Obstacles::default(), Vec::new(), 0.0);
@@ -106,7 +106,8 @@ fn in_the_open(n: usize, max_m: f64, motions: usize) -> Result<(f64, f64), Input
     Ok((median(times_us), moved))
 }
 
-/// Balls beside the way of the head, which rods turn from, and `far` ones that nobody meets.
+/// Returns balls beside the way of the head, which rods turn from, and `far` ones that nothing
+/// meets.
 fn balls(far: usize) -> Result<Obstacles<3>, InputError> {
     let beside = (0..60).map(|k| [0.5 * f64::from(k), 0.12, 0.0]);
     let mut all: Vec<_> = (0..).zip(beside).map(|(id, at)| Obstacle::ball(id, at, 0.05)).collect();
@@ -125,7 +126,7 @@ fn bits(chain: &Chain<3>) -> Digest {
 }
 
 impl Scaling {
-    /// Timings run alone, on one worker.
+    /// Runs the experiment; timings run alone, on one worker.
     pub(super) fn run(plan: &Plan, progress: &mut Progress<'_>) -> Result<Self, InputError> {
         let mut sizes = Vec::new();
         for (k, &connectors) in plan.sizes.iter().enumerate() {

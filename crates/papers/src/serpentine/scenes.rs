@@ -1,5 +1,4 @@
-//! What the pictures show: the swarm in its corridor, the snake in space, the broken
-//! chain before and after.
+//! The pictures: the swarm in its corridor, the snake in space, the broken chain before and after.
 
 use super::Plan;
 use super::{broken, corridor, snake};
@@ -12,12 +11,12 @@ use sidestep::worlds::chain::ChainRun;
 use sidestep::worlds::chain::geometry::Point;
 use sidestep::worlds::chain::scenario::Compiled;
 
-/// Of how many cycles one is a point of a trail.
+/// Number of cycles from one point of a trail to the next.
 const EVERY: u64 = 10;
-/// Balls further than this from every connector are left out of the picture in space.
+/// Balls farther than this from every connector are left out of the picture in space, meters.
 const NEAR_M: f64 = 0.7;
 
-/// All pictures.
+/// Returns all pictures.
 pub(super) fn all(plan: &Plan) -> Result<Vec<Scene>, InputError> {
     let mut scenes = vec![swarm(plan)?, creeping(plan)?];
     scenes.extend(broken_chain()?);
@@ -77,7 +76,7 @@ fn creeping(plan: &Plan) -> Result<Scene, InputError> {
     })
 }
 
-/// Whether a ball is near to one of these places; other things are.
+/// Whether a ball is near to one of these places; always true for other bodies.
 fn is_near(body: &Body, places: &[Place]) -> bool {
     let (Kind::Obstacle, Shape::Sphere { radius_m }) = (body.kind, &body.shape) else {
         return true;
@@ -110,7 +109,7 @@ fn broken_chain() -> Result<[Scene; 2], InputError> {
     ])
 }
 
-/// A chain as it is drawn.
+/// Returns a chain as drawn bodies.
 fn chain(points: Vec<Point<2>>) -> Vec<Body> {
     let points_m: Vec<Place> = points.into_iter().map(in_space).collect();
     let ball = |(part, at_m): (u32, &Place)| {

@@ -37,7 +37,7 @@ const COLUMNS: Columns = Columns {
     ],
 };
 
-/// What fields of a case set a key to, all together.
+/// Returns the total of a key over the fields of a case.
 fn of_fields(case: &Variant, key: &str) -> f64 {
     let number = |value: &toml::Value| value.as_float().or(value.as_integer().map(|n| n as f64));
     let fields = case.value("fields").and_then(toml::Value::as_array).into_iter().flatten();
@@ -51,7 +51,7 @@ pub(super) struct Snakes {
     pub(super) cells: Vec<Cell>,
 }
 
-/// The sweep of a plan.
+/// Returns the sweep of a plan.
 pub(super) fn study(plan: &Plan) -> Result<Study, InputError> {
     let study = Study::of_file(SWEEP, SCENARIO)?;
     let study = study.keep(|v| plan.snake_connectors.contains(&(number(v, CONNECTORS) as usize)));
@@ -64,7 +64,7 @@ impl Snakes {
         Ok(Self { cells: COLUMNS.cells(&results) })
     }
 
-    /// Cells among balls that all stand.
+    /// Returns cells among balls that all stand.
     pub(super) fn at_rest(&self) -> impl Iterator<Item = &Cell> {
         self.cells.iter().filter(|c| c.count("movers") == 0 && c.number("filled") > 0.0)
     }

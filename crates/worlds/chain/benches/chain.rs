@@ -226,7 +226,7 @@ fn corridor_walls(width_m: f64) -> Vec<Obstacle<2>> {
     walls(-0.5 * width_m).chain(walls(0.5 * width_m)).map(|(k, by_m)| wall(k, by_m)).collect()
 }
 
-/// What came of pulling a convoy through the corridor.
+/// Result of pulling a convoy through the corridor.
 struct Pulled {
     us_per_step: f64,
     turns_per_step: f64,

@@ -7,7 +7,7 @@
 //! ```text
 //! rods/:   chains, constraints, propagation, search      arms/:   joints as rods, inverse kinematics
 //! motion/: after a veto, out of the way                  script/: a turtle language for initiators
-//! ground/: where obstacles come from                     swarm/:  robots on wheels that follow a leader
+//! ground/: sources of obstacles                          swarm/:  robots on wheels that follow a leader
 //!
 //! scenario.rs -> world.rs (immutable), state.rs (bodies), driver.rs (tasks)
 //! one cycle: claim.rs (perceive.rs) -> join.rs -> act/ -> metrics.rs, events.rs, rows.rs

@@ -42,9 +42,9 @@ pub struct Tally {
     pub done: u64,
     /// Tasks and targets that were given up.
     pub given_up: Vec<GivenUp>,
-    /// How often broken parts were joined again,
+    /// Number of times that broken parts were joined again,
     pub reformed: u64,
-    /// and how often they could not be.
+    /// and that they could not be.
     pub not_reformed: u64,
     /// Steps in which each layer of a navigator acted, layer 1 first.
     pub layers: [u64; 6],
@@ -56,7 +56,7 @@ pub struct Tally {
     pub escapes: EscapeTally,
 }
 
-/// How often each rung of the ladder ended a climb.
+/// Number of climbs that each rung of the ladder ended.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct RungTally {
     /// Shorter steps.
@@ -274,9 +274,9 @@ pub struct Metrics {
     pub max_speed_m_s: f64,
     /// Tasks done, targets reached.
     pub done: u64,
-    /// How often broken parts were joined again,
+    /// Number of times that broken parts were joined again,
     pub reformed: u64,
-    /// and how often they could not be: the gap was too long, or no way was found.
+    /// and that they could not be: the gap was too long, or no way was found.
     pub not_reformed: u64,
     /// Arms whose joints cannot reproduce their connectors' positions, and why; by chain.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]

@@ -1,4 +1,4 @@
-//! E-8 to E-11: what errors do to trajectories, contacts, trips, and to behaviours.
+//! E-8 to E-11: effects of errors on trajectories, contacts, trips, and behaviors.
 
 use super::super::Report;
 use super::super::floor::Mind;
@@ -28,7 +28,7 @@ fn zigzag(r: &Reliability) -> Claim {
     )
 }
 
-/// A measure under each regime, in words.
+/// Returns a measure under each regime, in words.
 fn by_regime(of: impl Fn(Regime) -> Estimate) -> String {
     Regime::ALL.map(|regime| format!("{} {}", regime.name(), of(regime))).join(", ")
 }
@@ -61,11 +61,11 @@ fn collisions(r: &Reliability) -> Claim {
     )
 }
 
-/// From which error level on sensors cause more contacts, by case of the sweep.
+/// Returns the error level from which on sensors cause more contacts, by case of the sweep.
 fn flips(r: &Reliability) -> String {
     let sentence = |case: SweepCase| {
         let is_sensors = |e: f64| larger(&r.sensors_less_effectors(case, e)) == "sensors";
-        // The first level from which on it stays so.
+        // The first level from which on sensors stay worse.
         let first = r.levels.iter().rev().take_while(|&&e| is_sensors(e)).last();
         let [mind, beams, spread] = case.names();
         let from = first.map_or("at no level".into(), |e| format!("from e = {e} on"));
@@ -124,7 +124,8 @@ fn behaviours(r: &Reliability) -> Claim {
     )
 }
 
-/// Cycles that the filter saves under both errors, less those that it saves without any.
+/// Returns the cycles that the filter saves under both errors, minus those that it saves without
+/// any.
 fn difference_of_savings(r: &Reliability) -> Estimate {
     let of = |mind, regime| r.values(Key { mind, ..Key::BASE }, regime, TRIP);
     let saved = |regime| -> Vec<Option<f64>> {

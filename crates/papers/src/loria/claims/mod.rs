@@ -1,7 +1,7 @@
 //! The paper's claims, each with our figures and a verdict that follows from them by rule.
 //!
-//! Numbers E-1 to E-15 (experiments) and P-3 (parallelization) are those of the study of the
-//! paper; a letter tells apart what one sentence claims at once.
+//! The claims are numbered E-1 to E-15 (experiments) and P-3 (parallelization); a letter separates
+//! several claims of one sentence.
 
 mod behaviour;
 mod setting;
@@ -11,7 +11,7 @@ use super::Report;
 use crate::claims::{File, Words};
 use sidestep_document::claim::{Claim, Verdict};
 
-/// All claims, judged.
+/// Judges all claims.
 pub(super) fn judge(report: &Report) -> Vec<Claim> {
     let mut claims = setting::claims(report);
     claims.extend(behaviour::claims(report));
@@ -22,7 +22,7 @@ pub(super) fn judge(report: &Report) -> Vec<Claim> {
 /// The words of the report.
 pub(super) static WORDS: Words = Words::new(|| File::read(include_str!("../report.toml")));
 
-/// A claim by its number, its verdict, and our figures.
+/// Returns a claim by its number, its verdict, and our figures.
 fn claim(id: &str, verdict: Verdict, ours: impl Into<String>) -> Claim {
     WORDS.claim(id, verdict, ours.into())
 }

@@ -1,4 +1,4 @@
-//! E-1 to E-7: what the experiments are made of.
+//! E-1 to E-7: the setting of the experiments.
 
 use super::super::Report;
 use super::{Claim, Verdict, claim};
@@ -68,11 +68,11 @@ fn digests(report: &Report) -> &'static str {
     if report.performance.is_deterministic() { "one digest" } else { "different digests" }
 }
 
-/// Why a build is judged generic.
+/// The rule by which a build is judged generic.
 const GENERIC: &str = "Held when in every run every robot acts in every cycle and no two bodies \
                        come to share a box";
 
-/// Runs with or without a camera in words, and whether all kept the laws.
+/// Describes runs with or without a camera, and returns whether all kept the laws.
 fn builds(report: &Report, camera: bool) -> (String, Verdict) {
     let [lawful, with_trips, all] = report.genericity.runs(camera);
     let text = format!(

@@ -1,4 +1,4 @@
-//! E-12 to E-15 and P-3: time, and what takes it.
+//! E-12 to E-15 and P-3: time, and its parts.
 
 use super::super::Report;
 use super::super::performance::{Performance, REFERENCE_CYCLES, Timing};
@@ -6,10 +6,10 @@ use super::{Claim, Verdict, claim};
 use sidestep::worlds::robots::baseline::Strategy;
 use sidestep_document::Estimate;
 
-/// Initialization is called small below this share.
+/// Share below which initialization is called small.
 const SMALL_SHARE: f64 = 0.05;
 
-/// Efficiency is said to fall quickly where it is below this with the most workers.
+/// Efficiency with the most workers below which it is said to fall quickly.
 const LOW_EFFICIENCY: f64 = 0.75;
 
 pub(super) fn claims(report: &Report) -> Vec<Claim> {
@@ -46,7 +46,7 @@ fn initialization(p: &Performance) -> Claim {
     }
 }
 
-/// Why time over workers cannot be judged: there is one processor, or others were using them.
+/// Whether time over workers cannot be judged: there is one processor, or others were using them.
 fn is_excused(p: &Performance) -> bool {
     p.most_workers() == 1 || p.was_busy()
 }
@@ -71,7 +71,7 @@ fn time_falls(report: &Report) -> Claim {
     )
 }
 
-/// The mean speed-ups of some loads.
+/// Returns the mean speed-ups of some loads.
 fn range<'a>(timings: impl Iterator<Item = &'a Timing>) -> String {
     let means: Vec<f64> = timings.filter_map(|timing| timing.speed_up.mean).collect();
     let least = means.iter().copied().fold(f64::INFINITY, f64::min);
@@ -162,7 +162,7 @@ fn conflicts(report: &Report) -> Claim {
     )
 }
 
-/// The strategies that the paper rejects before any experiment.
+/// Judges the claim about strategies that the paper rejects before any experiment.
 fn rejected(report: &Report) -> Claim {
     let s = &report.strategies;
     let leads = Strategy::ALL.map(|strategy| (strategy.name(), s.lead_over(strategy)));

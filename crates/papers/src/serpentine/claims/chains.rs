@@ -1,4 +1,4 @@
-//! Claims about chains of any kind: what they keep, who may move them, what they cost.
+//! Claims about chains of any kind: their invariants, their initiators, their cost.
 
 use super::super::Report;
 use super::super::broken::Broken;
@@ -11,11 +11,12 @@ use super::super::snake::Snakes;
 use super::{Claim, all, both, claim, listed};
 use crate::cells::{Cell, least, mm, most};
 
-/// Rods keep their limits to this.
+/// Tolerance of the rods' limits, meters.
 const ROD_TOLERANCE_M: f64 = 1e-9;
-/// The time per moved connector may grow so much from the shortest chain to the longest.
+/// Largest growth of the time per moved connector from the shortest chain to the longest, as a
+/// factor.
 const GROWTH: f64 = 2.0;
-/// With any number of far obstacles a motion may take so much longer.
+/// Largest growth of the time of a motion with any number of far obstacles, as a factor.
 const FAR_GROWTH: f64 = 2.0;
 
 pub(super) fn claims(report: &Report) -> Vec<Claim> {

@@ -7,9 +7,9 @@ use super::super::snake::Snakes;
 use super::{Claim, Verdict, all, both, claim, listed};
 use crate::cells::{Cell, mm, most};
 
-/// The slides' swarm.
+/// Number of followers in the slides' swarm.
 const FOLLOWERS: u64 = 15;
-/// The slides' snake.
+/// Number of agents in the slides' snake.
 const AGENTS: u64 = 450;
 
 pub(super) fn claims(report: &Report) -> Vec<Claim> {
@@ -27,13 +27,13 @@ pub(super) fn claims(report: &Report) -> Vec<Claim> {
     ]
 }
 
-/// Cells of our reading with the fewest followers.
+/// Returns cells of our reading with the fewest followers.
 fn plain(corridor: &Corridor) -> impl Iterator<Item = &Cell> {
     corridor.of_few(READINGS[0])
 }
 
 fn band(corridor: &Corridor) -> Claim {
-    // In a corridor of up to 1.4 m no place is further than 0.7 m from both walls.
+    // In a corridor of up to 1.4 m no place is farther than 0.7 m from both walls.
     let wide = || plain(corridor).filter(|c| c.number("width_m") > 1.4);
     let ours = listed(plain(corridor), |c| {
         format!("{} m: {} %", c.number("width_m"), c.estimate("in_band_percent"))

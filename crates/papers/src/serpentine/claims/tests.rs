@@ -1,4 +1,4 @@
-//! Verdicts from made-up numbers.
+//! Tests of verdicts on made-up numbers.
 
 use super::super::*;
 use super::*;
@@ -24,7 +24,7 @@ fn word(text: &str) -> Value {
     Word(text.into())
 }
 
-/// What any cell of a run may come to, if all is well.
+/// Values of any cell of a run, if all is well.
 fn clean() -> Vec<(&'static str, Value)> {
     let counts = ["vetoes", "penetrations", "bumper_events", "too_long"];
     let shares = ["arrived", "untouched", "reached", "whole", "can", "ends_kept"];
@@ -47,7 +47,7 @@ fn clean() -> Vec<(&'static str, Value)> {
     all
 }
 
-/// What the slides would have liked to measure, and no more: one cell of each kind.
+/// A minimal report that satisfies the slides: one cell of each kind.
 fn ideal() -> Report {
     let ride = |leaving| {
         let case = [("width_m", Number(2.0)), ("followers", Count(15)), ("leaving", word(leaving))];

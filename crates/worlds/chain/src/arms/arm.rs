@@ -5,35 +5,35 @@ use crate::rods::chain::{Chain, Connector, Mobility, Rod};
 use sidestep_kernel::InputError;
 use std::f64::consts::PI;
 
-/// Rods whose joint can bring their ends together stay at least this long.
+/// Least length of rods whose joint can bring their ends together.
 const LEAST_ROD_M: f64 = 1e-6;
-/// Rods whose joint has no limits are at most this long.
+/// Greatest length of rods whose joint has no limits.
 const MOST_ROD_M: f64 = 1e6;
 
-/// An arm: its joints, its connectors, and where its base stands.
+/// An arm: its joints, its connectors, and the place of its base.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Arm {
     /// Joints from base to tip.
     pub serial: SerialChain,
     /// Connectors and rods.
     pub skeleton: Skeleton,
-    /// Where the frame of the base is; its axes are those of the world.
+    /// Position of the base's frame; its axes are those of the world.
     pub at_m: Vector,
     /// Joint values at the start, rad or m.
     pub values: Vec<f64>,
 }
 
 impl Arm {
-    /// An arm at a posture.
+    /// Returns an arm at a posture.
     pub fn new(serial: SerialChain, at_m: Vector, values: Vec<f64>) -> Self {
         Self { skeleton: serial.skeleton(), serial, at_m, values }
     }
 
-    /// The arm as a chain whose base is fixed. Joint limits are bend limits where those say the
-    /// same; others only [`Self::joints`] knows of.
+    /// Returns the arm as a chain whose base is fixed. Joint limits become bend limits if those are
+    /// equivalent; only [`Self::joints`] checks the others.
     ///
     /// # Errors
-    /// When its connectors make no chain, as those of an arm of one rod length 0 do not.
+    /// When its connectors make no chain, e.g. because a rod has length 0.
     pub fn chain(&self, radius_m: f64, rod_radius_m: f64) -> Result<Chain<3>, InputError> {
         let frames = self.serial.forward(&self.values);
         let points = self.serial.connectors(&self.skeleton, &frames);
@@ -53,7 +53,7 @@ impl Arm {
         Chain::new(points.clone(), (0..points.len()).map(connector).collect(), rods.collect())
     }
 
-    /// The joint values that bring the connectors where they are in the world.
+    /// Returns the joint values that reproduce the connectors' positions in the world.
     ///
     /// # Errors
     /// As [`SerialChain::recover`].

@@ -2,8 +2,8 @@
 //!
 //! ```text
 //! corridor.rs: winding corridors          fields.rs: balls and capsules at random
-//! pixels.rs:   floors of pixels           courses.rs: where what moves is at a time
-//! site.rs:     maps and Stage worlds       route.rs:   where a chain has room there
+//! pixels.rs:   floors of pixels           courses.rs: positions of movers at a time
+//! site.rs:     maps and Stage worlds       route.rs:   room for a chain
 //! ```
 
 pub mod corridor;

@@ -441,8 +441,8 @@ fn planes<const D: usize>(away: Point<D>, velocity: Point<D>) -> [Point<D>; 2] {
     [first, across(away, first)]
 }
 
-/// Returns the vector across two that are perpendicular; in the plane there is none, and it is not
-/// used.
+/// Returns the vector across two that are perpendicular; in the plane there is none, and the result
+/// is not used.
 fn across<const D: usize>(u: Point<D>, v: Point<D>) -> Point<D> {
     let at = |i: usize| u[(i + 1) % D] * v[(i + 2) % D] - u[(i + 2) % D] * v[(i + 1) % D];
     std::array::from_fn(at)

@@ -1,9 +1,9 @@
 //! Ways for a chain to get somewhere, made of motions of its rods.
 //!
 //! ```text
-//! go.rs:     one motion; a base that is fixed is answered by a reach
+//! go.rs:     one motion; the objection of a fixed base is answered by a reach
 //! replan.rs: after a veto, rung by rung: shorter, sideways, pulled back, stuck
-//! escape.rs: out of the way of what comes too near
+//! escape.rs: out of the way of obstacles that come too near
 //! ```
 
 pub(crate) mod escape;

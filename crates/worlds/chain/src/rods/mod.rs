@@ -1,13 +1,13 @@
 //! Chains of connectors and rods, and how one motion goes through them: no run, no clock, no cycle.
 //!
 //! ```text
-//! chain.rs, obstacle.rs: what there is          geometry.rs, grid.rs: distances, and what is near
+//! chain.rs, obstacle.rs: chains and obstacles   geometry.rs, grid.rs: distances, and the search nearby
 //! veto.rs: requests and outcomes                rules.rs: named options
 //! propagate.rs -> candidates.rs -> scene.rs     one motion: sweeps, a slave's choices, their judge
 //!                 interval.rs, search.rs        free directions: exact in the plane, searched in space
 //!                 sweep.rs, own_body.rs         nothing is passed through; the chain's own parts
 //!                 open.rs, pass.rs              the same where nothing is in the way
-//! wavefront.rs: many motions at once            passage.rs: what passed through what, between states
+//! wavefront.rs: many motions at once            passage.rs: passages between two states
 //! reach.rs: a base that keeps its place         rebuild.rs: broken chains
 //! ```
 

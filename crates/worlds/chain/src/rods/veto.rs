@@ -181,7 +181,7 @@ pub struct Moved<const D: usize> {
     pub touched: Range<usize>,
     /// Number of connectors that moved, summed over the sub-steps.
     pub changed: usize,
-    /// How many times a rod was turned to avoid something.
+    /// Number of times that a rod was turned to avoid something.
     pub rotated: usize,
     /// Longest distance that a connector other than the initiator moved in one sub-step, meters.
     pub max_slave_step_m: f64,

@@ -14,11 +14,11 @@
 //!
 //! | statement | effect |
 //! | --- | --- |
-//! | `forward D` | D meters ahead (back where D is negative) |
+//! | `forward D` | D meters ahead (back if D is negative) |
 //! | `turn A` | A degrees to the left |
 //! | `pitch A` | nose up by A degrees |
 //! | `wait S` | S seconds of rest |
-//! | `goto X, Y` or `goto X, Y, Z` | to that place in meters; the heading stays, and Z where left out |
+//! | `goto X, Y` or `goto X, Y, Z` | to that place in meters; the heading stays, and so does Z if left out |
 //! | `repeat N [ ... ]` | N times; N is a whole number |
 //! | `to NAME :a :b ... end` | a procedure, outside of all others; `NAME 1, 2` carries it out |
 //!

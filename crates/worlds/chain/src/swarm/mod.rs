@@ -8,7 +8,7 @@
 //! leader.rs:    perceive (laser.rs, ray.rs) -> Percept -> decide -> wheels and the layer that acted
 //! follower.rs:  perceive (proximity.rs)     -> gaps    -> decide -> wheels
 //! drive.rs:     wheels -> pose              convoy.rs: all of it, a tick at a time
-//!                                           measures.rs: what a run comes to
+//!                                           measures.rs: sums over a run
 //! ```
 
 pub(crate) mod convoy;

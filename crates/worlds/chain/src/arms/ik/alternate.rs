@@ -2,22 +2,22 @@
 //! the base, the base is pulled home and the others follow up to the tip, until the tip stays.
 //!
 //! With rods of fixed length this is FABRIK (Aristidou and Lasenby, 2011), whose inner step is the
-//! push and the pull of the chain (slides A2 and A3; design 3.1). With rods of variable length
-//! those that need not change keep their length (A4), and far fewer passes are needed.
+//! push and the pull of the chain (slides A2 and A3). Rods of variable length that need not change
+//! keep their length (A4), so far fewer passes are needed.
 
 use super::dls::bow;
 use super::limb::Span;
 use crate::rods::geometry::{Point, add, along, distance, first_axis, norm, sub};
 
-/// Double passes before it is given up.
+/// Most double passes before the search is given up.
 pub(super) const MAX_DOUBLE_PASSES: usize = 1000;
-/// Double passes in a row that hardly helped before it is given up.
+/// Double passes in a row with hardly any gain before the search is given up.
 const MAX_IDLE: usize = 8;
-/// The part of the error that a double pass must take away to count as help.
+/// Least part of the error that a double pass must remove to count as gain.
 const LEAST_GAIN: f64 = 1e-4;
 
-/// Alternates passes over `points`, the first of which is the base, until the last is at
-/// `target`. Returns the double passes and what is left.
+/// Alternates passes over `points`, the first of which is the base, until the last is at `target`.
+/// Returns the number of double passes and the remaining error.
 pub(super) fn solve<const D: usize>(
     points: &mut [Point<D>],
     spans: &[Span],
@@ -50,7 +50,7 @@ pub(super) fn solve<const D: usize>(
     (MAX_DOUBLE_PASSES, error_m)
 }
 
-/// Push, pull or resize.
+/// Returns the slave's place after a push, pull or resize.
 #[inline(always)]
 fn followed<const D: usize>(master: Point<D>, slave: Point<D>, span: Span) -> Point<D> {
     let g = sub(slave, master);
@@ -62,8 +62,8 @@ fn followed<const D: usize>(master: Point<D>, slave: Point<D>, span: Span) -> Po
     }
 }
 
-/// As [`solve`], for rod vectors from a base at the origin. A limb that lies in one line with the
-/// target, where passes get stuck, is bowed once.
+/// Solves like [`solve`], for rod vectors from a base at the origin. A limb that lies in one line
+/// with the target, where passes get stuck, is bowed once.
 pub(super) fn by_vectors<const D: usize>(
     vectors: &mut [Point<D>],
     spans: &[Span],

@@ -1,18 +1,18 @@
-//! A posture in closed form: straight but for at most two bends.
+//! A posture in closed form: straight except for at most two bends.
 //!
 //! Whatever a limb can reach, it reaches with its rods in three straight lines: those before the
 //! rod that holds the middle of its length, that rod, and those behind it (Hopcroft, Joseph and
 //! Whitesides, "On the movement of robot arms in 2-dimensional bounded regions", 1985). Two
-//! triangles give the bends. It is the last resort of the engines, which makes them certain, and
-//! near the full reach it is what any other posture looks like.
+//! triangles give the bends. The engines use it as a last resort, so that they always succeed; near
+//! the full reach every other posture looks like it.
 
 use super::limb::{Shell, Span};
 use crate::rods::geometry::{
     Point, along, dot, first_axis, norm, perpendicular, scaled, sub, unit,
 };
 
-/// Lays `vectors` so that their sum is `target`, or as near as they can come. Lengths of rods are
-/// kept where the target allows it.
+/// Lays `vectors` so that their sum is `target`, or as near as possible. Lengths of rods are kept
+/// if the target allows it.
 pub(super) fn solve<const D: usize>(vectors: &mut [Point<D>], spans: &[Span], target: Point<D>) {
     let target = Shell::of(spans).nearest(target);
     let far_m = norm(target);
@@ -40,7 +40,7 @@ pub(super) fn solve<const D: usize>(vectors: &mut [Point<D>], spans: &[Span], ta
     }
 }
 
-/// Changes lengths as little as brings the tip's distance within what they allow.
+/// Changes lengths as little as possible so that they allow the tip's distance.
 fn fit(lengths_m: &mut [f64], spans: &[Span], far_m: f64) {
     let sum_m: f64 = lengths_m.iter().sum();
     let longest =
@@ -61,7 +61,7 @@ fn fit(lengths_m: &mut [f64], spans: &[Span], far_m: f64) {
     }
 }
 
-/// The rod that holds the middle of the whole length.
+/// Returns the rod that holds the middle of the whole length.
 fn middle(lengths_m: &[f64]) -> usize {
     let half_m = 0.5 * lengths_m.iter().sum::<f64>();
     let mut until_m = 0.0;
@@ -72,8 +72,8 @@ fn middle(lengths_m: &[f64]) -> usize {
     lengths_m.iter().position(holds).unwrap_or(lengths_m.len() - 1)
 }
 
-/// The corner of a triangle over a base line of `base_m` along `u`, on the side of `side`, with
-/// the other two edges as given: the first from the line's start.
+/// Returns the corner of a triangle over a base line of `base_m` along `u`, on the side of `side`,
+/// with the other two edges as given: the first from the line's start.
 fn apex<const D: usize>(
     u: Point<D>,
     side: Point<D>,
@@ -89,7 +89,8 @@ fn apex<const D: usize>(
     along(scaled(u, x_m), side, height_m)
 }
 
-/// The unit vector across `u` in the plane of `toward` and `side`, so that the bends turn one way.
+/// Returns the unit vector across `u` in the plane of `toward` and `side`, so that both bends turn
+/// the same way.
 fn turned<const D: usize>(u: Point<D>, toward: Point<D>, side: Point<D>) -> Point<D> {
     along(scaled(toward, -dot(u, side)), side, dot(u, toward))
 }

@@ -3,15 +3,15 @@
 //! Of all rod vectors `v'` within their lengths whose sum is the target `t`, wanted are those with
 //! the least sum of `|v' - v|^2`, where `v` are the present ones. With one multiplier `y` for the
 //! sum, every rod can be solved alone: `v'` is the vector within the rod's lengths that is nearest
-//! to `v + y`. What remains is to find the `y` in 2 or 3 dimensions with `sum v'(y) = t`, and that
-//! is the gradient of a convex function: damped Newton steps get there from anywhere, each in
-//! O(n). Its matrix is the `J J^T` of damped least squares (design 3.2), and like there the damping
-//! falls by 0.3 after a step that helped and rises by 4 after one that did not. Unlike there the
-//! posture is not linearized anew at every step, so that steps need no limit, and rods of variable
+//! to `v + y`. It remains to find the `y` in 2 or 3 dimensions with `sum v'(y) = t`, and that is
+//! the gradient of a convex function: damped Newton steps get there from anywhere, each in O(n).
+//! Its matrix is the `J J^T` of damped least squares, and as there the damping falls by 0.3 after a
+//! step that helped and rises by 4 after one that did not. In contrast to damped least squares, the
+//! posture is not linearized anew at every step, so steps need no limit, and rods of variable
 //! length are no special case.
 //!
-//! Where the convex function has its least value at a kink (`v + y = 0` for some rod: it might turn
-//! anywhere), steps stop helping; the posture reached becomes the new `v` then, and the answer is
+//! If the convex function has its least value at a kink (`v + y = 0` for some rod: it might turn
+//! anywhere), steps stop helping; then the posture reached becomes the new `v`, and the answer is
 //! the nearest to that. A limb that is almost straight, and might buckle to any side, is bowed
 //! first if it has far to go.
 
@@ -20,34 +20,34 @@ use crate::rods::geometry::{
     Point, add, along, first_axis, norm, perpendicular, scaled, sub, unit,
 };
 
-/// Newton steps that hardly helped before the posture becomes the new reference.
+/// Newton steps with hardly any gain before the posture becomes the new reference.
 const POOR_STEPS: usize = 3;
-/// The part of the error that a step must leave at most not to be a poor one.
+/// Largest part of the error that a good step leaves.
 const GOOD: f64 = 0.5;
-/// New references before it is given up.
+/// New references before the search is given up.
 const REFERENCES: usize = 32;
-/// Every how many of them the limb is bowed anew, should it lie in a line with the target.
+/// Number of references after which the limb is bowed anew, in case it is in line with the target.
 const BOW_EVERY: usize = 6;
-/// The first damping, in parts of the mean of the matrix' diagonal.
+/// The first damping, in parts of the mean of the matrix's diagonal.
 const FIRST_DAMPING: f64 = 1e-3;
-/// A step that did not help is shortened to this part of it at least.
+/// Least part to which a step that did not help is shortened.
 const LEAST_PART: f64 = 0.1;
-/// Part of the greatest length beyond which a limb is straight, and buckles to no certain side.
+/// Part of the greatest length beyond which a limb is straight, and may buckle to any side.
 const STRAIGHT: f64 = 0.9;
-/// Part of the greatest length that a straight limb must have to go to be bowed first.
+/// Distance to go, as a part of the greatest length, from which on a straight limb is bowed first.
 const FAR: f64 = 0.03;
 
-/// Where a multiplier brings the tip.
+/// The tip's position for a multiplier.
 struct Pulled<const D: usize> {
-    /// What is missing to the target.
+    /// The remaining vector to the target.
     error: Point<D>,
     error_m: f64,
-    /// How the tip moves with the multiplier: the lower half of a symmetric matrix.
+    /// The derivative of the tip by the multiplier: the lower half of a symmetric matrix.
     slope: [[f64; D]; D],
 }
 
-/// Brings the sum of `vectors` to `target`. Returns the steps taken and what is left; the vectors
-/// are within their lengths then.
+/// Brings the sum of `vectors` to `target`. Returns the number of steps and the remaining error;
+/// the vectors are then within their lengths.
 pub(super) fn solve<const D: usize>(
     vectors: &mut [Point<D>],
     spans: &[Span],
@@ -76,7 +76,7 @@ pub(super) fn solve<const D: usize>(
     (steps, error_m)
 }
 
-/// Newton's method for the multiplier.
+/// Applies Newton's method to the multiplier.
 fn pull<const D: usize>(
     vectors: &[Point<D>],
     spans: &[Span],
@@ -134,7 +134,7 @@ fn pulled<const D: usize>(
     Pulled { error, error_m: norm(error), slope }
 }
 
-/// Solves `(slope + damping) x = error` by Cholesky's decomposition.
+/// Solves `(slope + damping) x = error` by Cholesky decomposition.
 #[inline]
 fn damped<const D: usize>(slope: &[[f64; D]; D], error: Point<D>, damping: f64) -> Point<D> {
     let mean = (0..D).map(|i| slope[i][i]).sum::<f64>() / D as f64;
@@ -163,7 +163,7 @@ fn damped<const D: usize>(slope: &[[f64; D]; D], error: Point<D>, damping: f64) 
     x
 }
 
-/// Takes over the posture of a multiplier.
+/// Adopts the posture of a multiplier.
 fn settle<const D: usize>(vectors: &mut [Point<D>], spans: &[Span], y: Point<D>) {
     for (v, span) in vectors.iter_mut().zip(spans) {
         let w = add(*v, y);
@@ -173,7 +173,7 @@ fn settle<const D: usize>(vectors: &mut [Point<D>], spans: &[Span], y: Point<D>)
     }
 }
 
-/// Bends the limb to an arc, to the side that `perpendicular` names.
+/// Bends the limb to an arc, to the side given by `perpendicular`.
 pub(super) fn bow<const D: usize>(vectors: &mut [Point<D>], target: Point<D>) {
     let total = vectors.iter().fold([0.0; D], |sum, v| add(sum, *v));
     let side = perpendicular(unit(total).or(unit(target)).unwrap_or(first_axis()));

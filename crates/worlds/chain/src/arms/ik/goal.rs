@@ -1,28 +1,29 @@
-//! What is wanted of a chain, and what came of it.
+//! Goals of a chain, and the answers.
 
 use crate::rods::geometry::Point;
 use crate::rods::veto::Veto;
 use std::fmt;
 
-/// How a posture is found.
+/// The method that finds a posture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Engine {
-    /// What is fastest: without constraints the chain's own rule up to 10 rods and damped least
-    /// squares beyond; otherwise a motion by the rules of the chain, then postures.
+    /// The fastest: without constraints the chain's own rule up to 10 rods and damped least squares
+    /// beyond; otherwise a motion by the rules of the chain, then postures.
     #[default]
     Auto,
-    /// The chain's own rule, there and back. With rods of fixed length it is FABRIK. Where
-    /// something constrains the chain: a motion from the present posture, and nothing else.
+    /// The chain's own rule, there and back. With rods of fixed length it is FABRIK. If anything
+    /// constrains the chain: a motion from the present posture, and nothing else.
     Chain,
-    /// Damped least squares: of all postures the nearest. Where something constrains the chain:
-    /// postures alone.
+    /// Damped least squares, which find the nearest of all postures. If anything constrains the
+    /// chain: postures alone.
     Dls,
-    /// Closed form: straight but for two bends. The others come to it where they do not converge.
+    /// Closed form: straight except for two bends. The others fall back to it if they do not
+    /// converge.
     Direct,
 }
 
 impl Engine {
-    /// Its name in files and commands.
+    /// Returns its name in files and commands.
     pub fn name(self) -> &'static str {
         match self {
             Self::Auto => "auto",
@@ -33,29 +34,29 @@ impl Engine {
     }
 }
 
-/// A connector that is to be somewhere.
+/// A target for a connector.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Goal<const D: usize> {
     /// The connector.
     pub k: usize,
     /// The connector that keeps its place.
     pub base: usize,
-    /// Where `k` shall be.
+    /// The target of `k`.
     pub target: Point<D>,
-    /// How near counts as there, meters.
+    /// Distance at which the target counts as reached, meters.
     pub tolerance_m: f64,
-    /// How a posture is found.
+    /// The method that finds a posture.
     pub engine: Engine,
-    /// Postures to start from, beside the present one, where something is in the way.
+    /// Postures to start from, beside the present one, if something is in the way.
     pub restarts: usize,
-    /// What the random ones of them grow from.
+    /// Random seed of these postures.
     pub seed: u64,
     /// Whether only a motion from the present posture counts.
     pub motion_only: bool,
 }
 
 impl<const D: usize> Goal<D> {
-    /// Connector `k` at `target` to 1e-6 m, with 100 restarts.
+    /// Returns a goal for connector `k` at `target` to 1e-6 m, with 100 restarts.
     pub fn new(k: usize, base: usize, target: Point<D>) -> Self {
         Self {
             k,
@@ -70,54 +71,55 @@ impl<const D: usize> Goal<D> {
     }
 }
 
-/// What an answer is good for.
+/// The kind of an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// The chain can go there from where it is: every state on the way has been checked.
+    /// A motion: the chain can go there from where it is, and every state on the way has been
+    /// checked.
     Motion,
-    /// Good in itself; whether the chain can get there has not been looked at.
+    /// A posture: good in itself; it has not been checked whether the chain can get there.
     Posture,
 }
 
-/// What came of a goal.
+/// The answer to a goal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Answer<const D: usize> {
     /// Whether the posture meets the goal and all constraints.
     pub reached: bool,
-    /// Distance of the connector from the target.
+    /// Distance of the connector from the target, meters.
     pub error_m: f64,
     /// All connectors of the chain. They meet all constraints, reached or not.
     pub points: Vec<Point<D>>,
     /// Steps or passes of the engine, over all starts.
     pub iterations: usize,
-    /// What found the posture.
+    /// The engine that found the posture.
     pub engine: Engine,
     /// Whether a motion leads to it.
     pub kind: Kind,
-    /// Why the goal is not met; `None` if it is.
+    /// The reason why the goal is not met; `None` if it is.
     pub reason: Option<Unreached<D>>,
 }
 
-/// Why a goal is not met.
+/// The reason why a goal is not met.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Unreached<const D: usize> {
     /// The rods are too short.
     TooFar {
-        /// Distance of the target from the base.
+        /// Distance of the target from the base, meters.
         far_m: f64,
-        /// The greatest that the rods allow.
+        /// The greatest distance that the rods allow, meters.
         reach_m: f64,
     },
     /// One rod is longer than all the others together.
     TooNear {
-        /// Distance of the target from the base.
+        /// Distance of the target from the base, meters.
         far_m: f64,
-        /// The least that the rods allow.
+        /// The least distance that the rods allow, meters.
         hole_m: f64,
     },
-    /// A constraint is in the way of the best that was found.
+    /// A constraint forbids the best posture that was found.
     Blocked {
-        /// Who objects, and which constraint it is.
+        /// The objection, with the connector and the constraint.
         veto: Veto<D>,
     },
     /// The search was given up.

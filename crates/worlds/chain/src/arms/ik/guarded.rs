@@ -1,7 +1,7 @@
-//! Goals of chains that something constrains.
+//! Goals of constrained chains.
 //!
-//! First the chain is moved there from where it is. Where that fails, postures are relaxed from
-//! the present one, its mirror image, and random ones, until one is good.
+//! First the chain is moved there from where it is. If that fails, postures are relaxed from the
+//! present one, its mirror image, and random ones, until one is good.
 
 use super::goal::{Answer, Engine, Goal, Kind, Unreached};
 use super::legal::Judge;
@@ -54,7 +54,7 @@ struct Search<'a, const D: usize> {
     best: Vec<Point<D>>,
     engine: Engine,
     iterations: usize,
-    /// The first objection, which is the one to the present posture's way.
+    /// The first objection, which is the one on the present posture's way.
     veto: Option<Veto<D>>,
 }
 

@@ -1,5 +1,5 @@
-//! Whether a posture is good in itself: rods, bends, mobilities, obstacles and the own body, as
-//! propagation judges them, but without a motion that led there.
+//! A check that a posture is good in itself: rods, bends, mobilities, obstacles and the chain's own
+//! body, as propagation judges them, but without a motion that led there.
 
 use crate::rods::chain::Chain;
 use crate::rods::geometry::{Bounds, Point, angle_rad, between_segments, distance, sub};
@@ -8,7 +8,7 @@ use crate::rods::scene::{BEND_TOLERANCE_RAD, fits, needed_m};
 use crate::rods::veto::{Reason, Veto};
 use std::f64::consts::PI;
 
-/// A chain and what constrains it.
+/// A chain and its constraints.
 #[derive(Clone, Copy)]
 pub(super) struct Judge<'a, const D: usize> {
     pub(super) chain: &'a Chain<D>,
@@ -17,8 +17,8 @@ pub(super) struct Judge<'a, const D: usize> {
 }
 
 impl<const D: usize> Judge<'_, D> {
-    /// The first objection to a posture, in the order of the connectors. What is where it was in
-    /// the chain is not judged.
+    /// Returns the first objection to a posture, in the order of the connectors. Parts that are
+    /// where they were in the chain are not judged.
     pub(super) fn objection(&self, points: &[Point<D>], k: usize) -> Option<Veto<D>> {
         let veto =
             |(by, reason, obstacle)| Veto { by, from: k, reason, obstacle, reached: points[k] };
@@ -98,8 +98,8 @@ impl<const D: usize> Judge<'_, D> {
         self.obstacles.visit(&Bounds::of(ends).grown(by_m), look);
     }
 
-    /// The later parts of the chain that rod `i` and its inner connector may run into: rods
-    /// further than two apart, connectors further than one.
+    /// Returns the later parts of the chain that rod `i` and its inner connector may run into: rods
+    /// more than two apart, connectors more than one.
     pub(super) fn own_pairs<'a>(
         &'a self,
         points: &'a [Point<D>],
@@ -160,7 +160,7 @@ impl<const D: usize> OwnPair<D> {
     }
 }
 
-/// The angle between the directions of the rods at an inner connector.
+/// Returns the angle between the directions of the rods at an inner connector.
 pub(super) fn bend_rad<const D: usize>(points: &[Point<D>], i: usize) -> f64 {
     angle_rad(sub(points[i], points[i - 1]), sub(points[i + 1], points[i]))
 }

@@ -4,10 +4,10 @@
 use crate::rods::chain::{Chain, Mobility, Rod};
 use crate::rods::geometry::{Point, first_axis, norm, scaled, sub};
 
-/// Rods from a base outward, and where the tip is wanted, seen from the base.
+/// Rods from a base outward, and the target of the tip, relative to the base.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Limb<const D: usize> {
-    /// Least and greatest lengths.
+    /// Their least and greatest lengths.
     pub(super) spans: Vec<Span>,
     /// Each rod as a vector from its inner to its outer connector.
     pub(super) vectors: Vec<Point<D>>,
@@ -41,15 +41,15 @@ pub struct Shell {
 }
 
 impl Shell {
-    /// Of limbs with these rods.
+    /// Returns the shell of limbs with these rods.
     pub(super) fn of(spans: &[Span]) -> Self {
         let reach_m: f64 = spans.iter().map(|s| s.max_m).sum();
-        // A rod that is as short as it goes, against all others as long as they go.
+        // Take one rod as short as possible, against all others as long as possible.
         let longest_m = spans.iter().map(|s| s.min_m + s.max_m).fold(0.0, f64::max);
         Self { hole_m: (longest_m - reach_m).max(0.0), reach_m }
     }
 
-    /// The point nearest to `target` that a tip can come to, from a base at the origin.
+    /// Returns the point nearest to `target` that a tip can reach, from a base at the origin.
     pub(super) fn nearest<const D: usize>(&self, target: Point<D>) -> Point<D> {
         let far_m = norm(target);
         if far_m > self.reach_m {
@@ -64,14 +64,14 @@ impl Shell {
     }
 }
 
-/// Indices of the connectors from `base` to `k`, both included.
+/// Returns the indices of the connectors from `base` to `k`, both included.
 pub(super) fn path(base: usize, k: usize) -> impl Iterator<Item = usize> + Clone {
     let n = base.abs_diff(k);
     (0..=n).map(move |i| if k > base { base + i } else { base - i })
 }
 
 impl<const D: usize> Limb<D> {
-    /// Takes the rods from `base` to `k` of a chain whose connectors are at `points`.
+    /// Reads the rods from `base` to `k` of a chain whose connectors are at `points`.
     pub(super) fn read(&mut self, chain: &Chain<D>, points: &[Point<D>], base: usize, k: usize) {
         self.spans.clear();
         self.vectors.clear();
@@ -86,7 +86,7 @@ impl<const D: usize> Limb<D> {
     }
 }
 
-/// The connector nearest to `k` on the way to `base` that never moves: the base that counts.
+/// Returns the connector nearest to `k` on the way to `base` that never moves: the effective base.
 pub(super) fn nearest_still<const D: usize>(chain: &Chain<D>, base: usize, k: usize) -> usize {
     let still = |&i: &usize| i != k && chain.connectors()[i].is_still();
     let (lo, hi) = (base.min(k), base.max(k));
@@ -94,7 +94,7 @@ pub(super) fn nearest_still<const D: usize>(chain: &Chain<D>, base: usize, k: us
     found.unwrap_or(base)
 }
 
-/// Whether all connectors but the base move and bend at will.
+/// Whether all connectors except the base move and bend without limit.
 pub(super) fn is_free<const D: usize>(chain: &Chain<D>, base: usize) -> bool {
     let is_plain = |i: usize| {
         let c = &chain.connectors()[i];

@@ -2,7 +2,7 @@
 //! keeps its place.
 //!
 //! ```text
-//! goal       what is wanted, and what came of it
+//! goal       a goal, and its answer
 //! limb       the rods from base to tip; what they can reach
 //! dls        the nearest posture, by damped least squares in O(n)
 //! alternate  the chain's own rule there and back (FABRIK)
@@ -11,10 +11,10 @@
 //!            motion, then relax from several postures, judged by legal
 //! ```
 //!
-//! Where nothing constrains the connectors every target within reach is reached: what an engine
-//! leaves is finished in closed form. Guarded chains are first *moved* there by the rules of
-//! propagation, every state on the way checked; where that fails, postures are searched that are
-//! good in themselves, and [`Kind`] says which of the two an answer is.
+//! If nothing constrains the connectors every target within reach is reached: the remaining error
+//! of an engine is removed in closed form. Guarded chains are first *moved* there by the rules of
+//! propagation, every state on the way checked; if that fails, postures are searched that are good
+//! in themselves, and [`Kind`] says which of the two an answer is.
 
 mod alternate;
 mod direct;
@@ -40,7 +40,7 @@ use crate::rods::rules::Rules;
 use limb::{Limb, Span};
 use sidestep_kernel::InputError;
 
-/// Up to this many rods the chain's own rule is the faster (bench `ik`, part `free`).
+/// Number of rods up to which the chain's own rule is faster (bench `ik`, part `free`).
 const FEW_RODS: usize = 10;
 
 /// Solves goals. It owns the buffers, and remembers nothing from one goal to the next.
@@ -51,26 +51,26 @@ pub struct Solver<const D: usize> {
     points: Vec<Point<D>>,
 }
 
-/// What an engine came to.
+/// Result of an engine.
 struct Solved {
     iterations: usize,
     engine: Engine,
 }
 
 impl<const D: usize> Solver<D> {
-    /// A solver for chains that react by `rules`; of these only self-collision concerns postures,
-    /// the others motions.
+    /// Returns a solver for chains that react by `rules`; of these only self-collision concerns
+    /// postures, the others concern motions.
     pub fn new(rules: Rules) -> Self {
         Self { propagator: Propagator::new(rules), ..Self::default() }
     }
 
-    /// A posture of `chain` that meets the goal, or the nearest one found. The chain itself is
-    /// not changed. The connector nearest to the goal's that never moves is the base that
-    /// counts; connectors behind the base stay where they are, those beyond the goal's follow.
+    /// Returns a posture of `chain` that meets the goal, or the nearest one found. The chain itself
+    /// is not changed. The connector nearest to the goal's that never moves is the effective base;
+    /// connectors behind the base stay where they are, those beyond the goal's follow.
     ///
     /// # Errors
-    /// A target that is not finite, a tolerance that is not above zero, connectors that the chain
-    /// does not have, or one that may not move. A target that cannot be reached is no error.
+    /// When a target is not finite, a tolerance is not above zero, the chain does not have the
+    /// connectors, or one of them may not move. A target that cannot be reached is no error.
     pub fn solve(
         &mut self,
         chain: &Chain<D>,
@@ -95,7 +95,7 @@ impl<const D: usize> Solver<D> {
         Ok(answer.against(goal, &shell, home))
     }
 
-    /// Without anything in the way.
+    /// Solves a goal without constraints.
     fn solve_free(&mut self, chain: &Chain<D>, goal: &Goal<D>) -> Answer<D> {
         self.points.clear();
         self.points.extend_from_slice(chain.points());
@@ -136,7 +136,7 @@ impl<const D: usize> Solver<D> {
         Solved { iterations, engine: Engine::Direct }
     }
 
-    /// Lays the limb out from the base.
+    /// Writes the limb's positions from the base on.
     fn write(&mut self, goal: &Goal<D>) {
         let mut at = self.points[goal.base];
         for (i, v) in limb::path(goal.base, goal.k).skip(1).zip(&self.limb.vectors) {
@@ -146,7 +146,7 @@ impl<const D: usize> Solver<D> {
     }
 }
 
-/// The connectors beyond the goal's, pushed and pulled by it.
+/// Pushes and pulls the connectors beyond the goal's along with it.
 fn follow_beyond<const D: usize>(points: &mut [Point<D>], chain: &Chain<D>, goal: &Goal<D>) {
     let end = if goal.k > goal.base { points.len() - 1 } else { 0 };
     let mut master = goal.k;
@@ -190,7 +190,7 @@ fn check<const D: usize>(chain: &Chain<D>, goal: &Goal<D>) -> Result<(), InputEr
 }
 
 impl<const D: usize> Answer<D> {
-    /// The answer seen from the goal as it was given, which may be out of reach.
+    /// Returns the answer compared with the goal as it was given, which may be out of reach.
     fn against(mut self, goal: &Goal<D>, shell: &Shell, home: Point<D>) -> Self {
         self.error_m = distance(self.points[goal.k], goal.target);
         self.reached = self.error_m <= goal.tolerance_m && self.reason.is_none();

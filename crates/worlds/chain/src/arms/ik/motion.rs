@@ -1,5 +1,5 @@
-//! Moving an arm to a target by the chain's rules: at once if that goes, otherwise step by step,
-//! with other headings where one is blocked. The result is a motion: every state was checked.
+//! Motion of an arm to a target by the chain's rules: at once if possible, otherwise step by step,
+//! with other headings if one is blocked. The result is a motion: every state was checked.
 
 use super::Goal;
 use crate::rods::chain::Chain;
@@ -12,16 +12,16 @@ use crate::rods::reach::{Reach, Reached, reach};
 use crate::rods::veto::Veto;
 use sidestep_kernel::{InputError, math};
 
-/// Headings to either side of the target's, in rad (design 5.5).
+/// Headings to either side of the target's, in rad.
 const FAN_RAD: [f64; 5] = [0.4, 0.8, 1.2, 1.6, 2.0];
-/// Steps that bring the tip no nearer before it is given up.
+/// Steps without approach of the tip before the motion is given up.
 const PATIENCE: usize = 10;
-/// Attempts to move, over all steps.
+/// Most attempts to move, over all steps.
 const MAX_ATTEMPTS: usize = 120;
-/// Part of the shortest rod that the tip goes at once.
+/// Length of a step of the tip, as a part of the shortest rod.
 const STEP: f64 = 0.5;
 
-/// What came of it; the chain is where it got.
+/// Result of a motion; the chain is where it got.
 pub(super) struct Went<const D: usize> {
     pub(super) arrived: bool,
     pub(super) attempts: usize,
@@ -65,7 +65,7 @@ struct Walk<'a, const D: usize> {
     goal: &'a Goal<D>,
     attempts: usize,
     veto: Option<Veto<D>>,
-    /// The side that last went, which is tried first.
+    /// The side that worked last, which is tried first.
     side: f64,
 }
 
@@ -92,7 +92,7 @@ impl<const D: usize> Walk<'_, D> {
         }
     }
 
-    /// One step toward the target, or along the first heading of the fan that goes.
+    /// Makes one step toward the target, or along the first heading of the fan that works.
     fn fan(&mut self, chain: &mut Chain<D>, step_m: f64) -> Result<bool, InputError> {
         let from = chain.points()[self.goal.k];
         let ahead = unit(sub(self.goal.target, from)).unwrap_or(first_axis());
@@ -115,7 +115,7 @@ impl<const D: usize> Walk<'_, D> {
     }
 }
 
-/// Directions across `u`: two in the plane, four in space; the one named by `sign` first.
+/// Returns directions across `u`: two in the plane, four in space; the one named by `sign` first.
 fn sides<const D: usize>(u: Point<D>, sign: f64) -> [Option<Point<D>>; 4] {
     let e = scaled(perpendicular(u), sign);
     let other = (D == 3).then(|| -> Point<D> {

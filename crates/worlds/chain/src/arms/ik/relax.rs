@@ -1,7 +1,7 @@
-//! A posture that meets all constraints, by turns: every part that breaks one is pushed out of it,
-//! and the nearest posture with whole rods and the tip at the target is taken ([`dls`]), which
-//! takes everything else along. Pushes go a little further than they must, so that the step back
-//! to whole rods leaves them good; what comes out is judged without any of that.
+//! Relaxation to a posture that meets all constraints: every part that breaks one is pushed out of
+//! it, and then the nearest posture with whole rods and the tip at the target is taken ([`dls`]),
+//! which takes everything else along. Pushes go a little farther than they must, so that the step
+//! back to whole rods leaves them good; the result is judged without these margins.
 
 use super::legal::{Judge, OwnPair, bend_rad};
 use super::limb::{self, Limb};
@@ -14,25 +14,25 @@ use crate::rods::veto::Veto;
 use sidestep_kernel::math;
 use std::f64::consts::PI;
 
-/// Rounds before it is given up.
+/// Most rounds before relaxation is given up.
 const MAX_ROUNDS: usize = 400;
-/// Rounds without a new best before it is given up.
+/// Rounds without a new best before relaxation is given up.
 const PATIENCE: usize = 60;
-/// How much further than needed bodies are pushed, in parts of the longest rod.
+/// Extra distance by which bodies are pushed, in parts of the longest rod.
 const MARGIN: f64 = 1e-3;
-/// How much below its limit a bend is pushed.
+/// Margin below its limit to which a bend is pushed.
 const BEND_MARGIN_RAD: f64 = 2e-3;
-/// Pushes go this part of the way; more than 1, as the step back takes some of it away.
+/// Length of a push as a part of the way; more than 1, because the step back undoes some of it.
 const PUSH: f64 = 1.3;
 
-/// What came of a start.
+/// Result of a start.
 pub(super) struct Relaxed<const D: usize> {
     pub(super) rounds: usize,
-    /// The objection to the best posture; `None` where it is good.
+    /// The objection to the best posture; `None` if it is good.
     pub(super) veto: Option<Veto<D>>,
 }
 
-/// Changes `points` from a start to a good posture, or shows what is in the way.
+/// Changes `points` from a start to a good posture, or returns the objection to the best one.
 pub(super) fn relax<const D: usize>(
     judge: &Judge<D>,
     limb: &mut Limb<D>,
@@ -71,12 +71,12 @@ fn lay<const D: usize>(limb: &Limb<D>, points: &mut [Point<D>], judge: &Judge<D>
     follow_beyond(points, judge.chain, goal);
 }
 
-/// Pushes parts out of what they are in.
+/// A round of pushes that move parts out of obstacles and bends.
 struct Pusher<'a, const D: usize> {
     judge: &'a Judge<'a, D>,
     goal: &'a Goal<D>,
     margin_m: f64,
-    /// The sum of all that was broken in a round, in meters.
+    /// The sum of all violations in a round, in meters.
     broken_m: f64,
 }
 
@@ -94,7 +94,8 @@ impl<const D: usize> Pusher<'_, D> {
         }
     }
 
-    /// Whether a connector may be pushed: one on the base's far side may not, nor the tip.
+    /// Returns whether a connector may be pushed, as a weight: not on the base's far side, nor the
+    /// tip.
     fn weight(&self, i: usize) -> f64 {
         let Goal { k, base, .. } = *self.goal;
         let is_before_base = if k > base { i <= base } else { i >= base };
@@ -178,12 +179,12 @@ impl<const D: usize> Pusher<'_, D> {
     }
 }
 
-/// A direction across a rod.
+/// Returns a direction across a rod.
 fn across<const D: usize>(rod: [Point<D>; 2]) -> Point<D> {
     perpendicular(unit(sub(rod[1], rod[0])).unwrap_or(first_axis()))
 }
 
-/// Where on a segment a point of it is.
+/// Returns the position of a point along a segment.
 fn part_of<const D: usize>(p: Point<D>, [a, b]: [Point<D>; 2]) -> f64 {
     let d = sub(b, a);
     let square = dot(d, d);

@@ -8,10 +8,10 @@ use sidestep_kernel::Seed;
 use sidestep_kernel::distr::normal;
 use sidestep_kernel::stream::{Draws, Purpose, Streams};
 
-/// Draws for starts.
+/// Random draws for starts.
 const START: Purpose = Purpose(0x1C);
 
-/// The start number `index`: 0 is the present posture, 1 its mirror image across the line from
+/// Returns start number `index`: 0 is the present posture, 1 its mirror image across the line from
 /// base to target, the others are random walks of random stiffness.
 pub(super) fn start<const D: usize>(
     chain: &Chain<D>,

@@ -1,8 +1,8 @@
 //! Joint limits as bend limits.
 //!
-//! The bend at a connector is the angle by which the next rod turns away from the direction of
-//! the one before. Where one revolute joint alone changes it, cos(bend) = A + B cos(q - q0), and
-//! the joint's limits become a limit of the bend.
+//! The bend at a connector is the angle by which the next rod turns away from the direction of the
+//! one before. If one revolute joint alone changes it, cos(bend) = A + B cos(q - q0), and the
+//! joint's limits become a limit of the bend.
 
 use std::f64::consts::PI;
 
@@ -12,7 +12,7 @@ use super::skeleton::Skeleton;
 use sidestep_kernel::geometry::{across, cross, dot, norm, scaled, sub};
 use sidestep_kernel::math::{acos, atan2, cos, wrap_angle};
 
-/// Angles that differ by less are equal: models are written with some ten digits.
+/// Angles that differ by less count as equal, because models are written with some ten digits.
 const SAME_ANGLE_RAD: f64 = 1e-9;
 
 /// A limit of the bend at a connector.
@@ -29,7 +29,7 @@ pub struct BendLimit {
 }
 
 impl SerialChain {
-    /// For each connector the limit of its bend; none where several joints bend it, where nothing
+    /// Returns for each connector the limit of its bend; none if several joints bend it or nothing
     /// does, and at the tip. The bend at the first connector is measured from
     /// [`Skeleton::base_direction`].
     pub fn bend_limits(&self, skeleton: &Skeleton) -> Vec<Option<BendLimit>> {
@@ -72,7 +72,7 @@ struct Bend {
 }
 
 impl Bend {
-    /// None where the joint turns one of the rods about itself.
+    /// Returns the bend, or none if the joint turns one of the rods about itself.
     fn new(before: Vector, after: Vector, axis: Vector) -> Option<Self> {
         let before = scaled(before, 1.0 / norm(before));
         let after = scaled(after, 1.0 / norm(after));
@@ -104,7 +104,7 @@ impl Bend {
         (1.0 - self.along - self.across).abs() < SAME_ANGLE_RAD
     }
 
-    /// The largest bend within limits of the joint, and whether it says the same as they do.
+    /// Returns the largest bend within limits of the joint, and whether it is equivalent to them.
     fn limit(&self, lower_rad: f64, upper_rad: f64) -> (f64, bool) {
         let half_rad = 0.5 * (upper_rad - lower_rad);
         let middle_rad = wrap_angle(0.5 * (upper_rad + lower_rad) - self.straight_rad);

@@ -11,14 +11,14 @@
 //! ```
 //!
 //! A **connector** of an arm is a point that is fixed in two or more links at once: where axes
-//! meet, or the foot of their common perpendicular. The origins that a URDF gives its joints are
-//! not such points; they may lie anywhere on an axis. Two connectors that are fixed in a common
-//! link have a constant distance: a rod of fixed length. Two on either side of a prismatic joint
-//! have the distance sqrt(offset^2 + (a + q)^2): a rod of variable length.
+//! meet, or the foot of their common perpendicular. The joint origins in a URDF are not such
+//! points; they may lie anywhere on an axis. Two connectors that are fixed in a common link have a
+//! constant distance: a rod of fixed length. Two on either side of a prismatic joint have the
+//! distance sqrt(offset^2 + (a + q)^2): a rod of variable length.
 //!
 //! A point says nothing about the twist of a rod about itself. [`recover`](SerialChain::recover)
-//! says which joints that leaves open, and refuses with a reason where points do not determine
-//! the joints at all.
+//! reports which joints that leaves open, and refuses with a reason if points do not determine the
+//! joints at all.
 
 mod bend;
 mod inverse;

@@ -1,4 +1,4 @@
-//! Rotations and frames of three dimensions, in m and rad.
+//! Rotations and frames in three dimensions, in m and rad.
 
 use sidestep_import::urdf::Origin;
 use sidestep_kernel::geometry::{Point, add, cross, dot, norm, scaled, sub};
@@ -7,7 +7,7 @@ use sidestep_kernel::math::{cos, sin};
 /// A point or a direction.
 pub type Vector = Point<3>;
 
-/// A frame in another: a point `p` of it is at `rotation * p + origin_m` in the other.
+/// A frame in another: its point `p` is at `rotation * p + origin_m` in the other.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pose {
     /// Rows of the rotation matrix.
@@ -17,11 +17,11 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// The frame itself.
+    /// The identity: the frame itself.
     pub const IDENTITY: Self =
         Self { rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], origin_m: [0.0; 3] };
 
-    /// The frame that a URDF's `<origin>` describes.
+    /// Returns the frame that a URDF's `<origin>` describes.
     pub fn from_origin(origin: &Origin) -> Self {
         let [roll, pitch, yaw] = origin.rpy_rad;
         let about = |axis, angle_rad| Self::turn(axis, angle_rad).rotation;
@@ -30,7 +30,7 @@ impl Pose {
         Self { rotation, origin_m: origin.xyz_m }
     }
 
-    /// A turn by `angle_rad` about the unit vector `axis` (Rodrigues' formula).
+    /// Returns a turn by `angle_rad` about the unit vector `axis` (Rodrigues' formula).
     pub(super) fn turn(axis: Vector, angle_rad: f64) -> Self {
         let (s, c) = (sin(angle_rad), cos(angle_rad));
         let [x, y, z] = axis;
@@ -43,12 +43,12 @@ impl Pose {
         Self { rotation, origin_m: [0.0; 3] }
     }
 
-    /// A displacement.
+    /// Returns a displacement.
     pub(super) fn shift(by_m: Vector) -> Self {
         Self { origin_m: by_m, ..Self::IDENTITY }
     }
 
-    /// `inner`, which is given in this frame, in the frame that this one is given in.
+    /// Returns `inner`, which is given in this frame, in this frame's parent.
     #[must_use]
     pub fn then(&self, inner: &Self) -> Self {
         Self {
@@ -57,17 +57,17 @@ impl Pose {
         }
     }
 
-    /// A point of this frame, in the outer one.
+    /// Returns a point of this frame in the outer one.
     pub fn point(&self, p_m: Vector) -> Vector {
         add(self.direction(p_m), self.origin_m)
     }
 
-    /// A direction of this frame, in the outer one.
+    /// Returns a direction of this frame in the outer one.
     pub fn direction(&self, d: Vector) -> Vector {
         self.rotation.map(|row| dot(row, d))
     }
 
-    /// A point of the outer frame, in this one.
+    /// Returns a point of the outer frame in this one.
     pub fn point_inside(&self, p_m: Vector) -> Vector {
         let d = sub(p_m, self.origin_m);
         let [x, y, z] = self.rotation;
@@ -89,20 +89,21 @@ pub(super) struct Line {
 }
 
 impl Line {
-    /// The point on the line that is nearest to `p_m`.
+    /// Returns the point on the line that is nearest to `p_m`.
     pub(super) fn nearest(&self, p_m: Vector) -> Vector {
         let t = dot(sub(p_m, self.through_m), self.along);
         add(self.through_m, scaled(self.along, t))
     }
 
-    /// Distance of `p_m` from the line.
+    /// Returns the distance of `p_m` from the line.
     pub(super) fn distance_m(&self, p_m: Vector) -> f64 {
         norm(sub(p_m, self.nearest(p_m)))
     }
 
-    /// The ends of the common perpendicular, on this line and on `other`; none of parallel lines.
+    /// Returns the ends of the common perpendicular, on this line and on `other`; none for parallel
+    /// lines.
     pub(super) fn feet(&self, other: &Self) -> Option<(Vector, Vector)> {
-        // The sine of the smallest angle between lines that are not called parallel.
+        // The sine of the smallest angle between lines that do not count as parallel.
         const PARALLEL: f64 = 1e-6;
         let normal = cross(self.along, other.along);
         let sine_squared = dot(normal, normal);

@@ -1,11 +1,11 @@
 //! Joint values from the positions of connectors.
 //!
 //! From the base out, each connector determines the joints that move it and none before it: none,
-//! one (an angle about an axis, or a displacement along it), or two (the circles that two axes
-//! draw meet in at most two points; Paden and Kahan's second subproblem, here for axes that need
-//! not meet). Where a step has two solutions, both are tried, the one nearer to the reference
-//! first. Iiwa arms and UR5 are solved this way, exactly; a Panda's elbow offsets couple three
-//! joints to one connector, which is refused with [`RecoverError::Coupled`].
+//! one (an angle about an axis, or a displacement along it), or two (the circles that two axes draw
+//! meet in at most two points; Paden and Kahan's second subproblem, here for axes that need not
+//! meet). If a step has two solutions, both are tried, the one nearer to the reference first. Iiwa
+//! arms and UR5 are solved this way, exactly; a Panda's elbow offsets couple three joints to one
+//! connector, which is refused with [`RecoverError::Coupled`].
 
 use std::f64::consts::TAU;
 
@@ -16,39 +16,39 @@ use sidestep_import::urdf::Limits;
 use sidestep_kernel::geometry::{across, add, cross, dot, norm, scaled, sub};
 use sidestep_kernel::math::{atan2, wrap_angle};
 
-/// Connectors further from where joints can bring them, as a share of the reach, do not fit.
+/// Largest distance between a connector and its nearest possible place, as a share of the reach.
 const FITS: f64 = 1e-6;
 
-/// Points nearer to an axis than this share of the reach are on it: no turn moves them.
+/// Distance from an axis, as a share of the reach, within which a point is on it: no turn moves it.
 const ON_AXIS: f64 = 1e-10;
 
 /// Joint values tried before the search gives up; an arm of 7 joints needs at most some 20.
 const MAX_TRIES: usize = 20_000;
 
-/// Joint values that bring the connectors where they are.
+/// Joint values that reproduce the connectors' positions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recovered {
     /// One for each variable, inside its limits, in rad or m.
     pub values: Vec<f64>,
-    /// The largest distance between a connector and where forward kinematics puts it, in m.
+    /// The largest distance between a connector and its place by forward kinematics, in m.
     pub residual_m: f64,
     /// Variables that no connector depends on (the twist of the last rod, or of any rod that is
     /// straight on with its joint's axis); they have their reference value.
     pub open: Vec<String>,
 }
 
-/// Why there are no joint values for connectors.
+/// The reason why there are no joint values for connectors.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum RecoverError {
     /// More or fewer positions than the skeleton has connectors, or one that is not finite.
     #[error("{found} finite positions where the arm has {expected} connectors")]
     WrongCount {
-        /// Positions that were given and are finite.
+        /// Number of positions that were given and are finite.
         found: usize,
-        /// Connectors of the arm.
+        /// Number of connectors of the arm.
         expected: usize,
     },
-    /// Points leave these joints open, or couple them to connectors further out.
+    /// Points leave these joints open, or couple them to connectors farther out.
     #[error("connector {connector} depends on {} at once; its position does not tell them apart", .joints.join(", "))]
     Coupled {
         /// Index of the connector.
@@ -87,17 +87,17 @@ pub enum RecoverError {
 }
 
 impl SerialChain {
-    /// The joint values that bring the connectors of `skeleton` (this chain's) to `positions_m`
-    /// in the base's frame. Of several the first found inside the limits, trying at each step
-    /// what is nearest to `reference`, which has a value for each variable. A posture that was
-    /// moved a little is found again from itself as reference.
+    /// Returns the joint values that bring the connectors of `skeleton` (this chain's) to
+    /// `positions_m` in the base's frame. Of several solutions it returns the first found inside
+    /// the limits, trying at each step the value nearest to `reference`, which has a value for each
+    /// variable. A posture that was moved a little is found again from itself as reference.
     ///
     /// # Errors
-    /// When the points do not determine the joints, do not fit the arm, or need a joint outside
-    /// its limits.
+    /// When the points do not determine the joints, do not fit the arm, or need a joint outside its
+    /// limits.
     ///
     /// # Panics
-    /// When `reference` has not one value for each variable.
+    /// If `reference` has not one value for each variable.
     pub fn recover(
         &self,
         skeleton: &Skeleton,
@@ -158,22 +158,22 @@ struct Search<'a> {
     positions_m: &'a [Vector],
     reference: &'a [f64],
     values: Vec<f64>,
-    /// Whether a variable has its reference value because nothing says otherwise.
+    /// Whether each variable has its reference value because no point determines it.
     open: Vec<bool>,
     tries: usize,
-    /// The failure of the branch that came furthest; a limit tells more than a misfit.
+    /// The failure of the branch that got farthest; a limit is more informative than a misfit.
     best_failure: Option<((usize, bool), RecoverError)>,
 }
 
 impl Search<'_> {
     /// Places the connectors from `connector` on, with the first `known` joints decided and the
-    /// link behind them at `link`. Whether that worked.
+    /// link behind them at `link`. Returns whether that worked.
     fn place(&mut self, connector: usize, known: usize, link: Pose) -> bool {
         let Some(anchor) = self.skeleton.connectors.get(connector) else { return true };
         let target_m = self.positions_m[connector];
         let until = anchor.first.max(known);
         if until == known {
-            // Fixed in a link that is already placed.
+            // This connector is fixed in a link that is already placed.
             let frames = self.chain.forward(&self.values);
             return self.fits(connector, sub(anchor.position_m(&frames), target_m))
                 && self.place(connector + 1, known, link);
@@ -233,7 +233,7 @@ impl Search<'_> {
         }
     }
 
-    /// Values of one or two joints that bring the point `p_m` of the link behind them to
+    /// Returns values of one or two joints that bring the point `p_m` of the link behind them to
     /// `target_m`, those nearer to the reference first.
     fn solutions(
         &self,
@@ -271,7 +271,7 @@ impl Search<'_> {
         }
     }
 
-    /// The turn about `line` that brings `p_m` to the direction of `target_m`.
+    /// Returns the turn about `line` that brings `p_m` to the direction of `target_m`.
     fn turn(
         &self,
         joint: &MovingJoint,
@@ -292,9 +292,9 @@ impl Search<'_> {
         Value::found(nearest_turn(angle_rad, reference, joint.limits))
     }
 
-    /// Two turns: the inner one brings to `target_m` what the outer one leaves at `z`, which is
-    /// on the circle that the outer axis draws through `p_m` and on the one that the inner axis
-    /// draws through `target_m`.
+    /// Returns two turns: the inner one brings to `target_m` the point that the outer one leaves at
+    /// `z`, which is on the circle that the outer axis draws through `p_m` and on the one that the
+    /// inner axis draws through `target_m`.
     fn two(
         &self,
         inner: &MovingJoint,
@@ -356,24 +356,25 @@ fn outside(joint: &MovingJoint, value: f64, limits: Limits) -> RecoverError {
     RecoverError::OutsideLimits { joint: joint.name.clone(), value, lower, upper }
 }
 
-/// Of all angles that differ from `angle_rad` by full turns, the one nearest to `reference_rad`
-/// that is inside the limits; the nearest of all where none is.
+/// Returns, of all angles that differ from `angle_rad` by full turns, the one nearest to
+/// `reference_rad` that is inside the limits; the nearest of all if none is.
 fn nearest_turn(angle_rad: f64, reference_rad: f64, limits: Option<Limits>) -> f64 {
     let nearest = reference_rad + wrap_angle(angle_rad - reference_rad);
     let turns = [nearest, nearest - TAU, nearest + TAU];
     let legal = |value: &f64| limits.is_none_or(|limits| limits.contain(*value));
     turns.into_iter().find(legal).unwrap_or_else(|| {
-        // Far references end up here: bring the angle near to the middle of the limits.
+        // Distant references end up here: bring the angle near to the middle of the limits.
         let middle = limits.map_or(0.0, |limits| 0.5 * (limits.lower + limits.upper));
         middle + wrap_angle(angle_rad - middle)
     })
 }
 
-/// Where the circle about `first` through `a` meets the circle about `second` through `b`.
+/// Returns the points where the circle about `first` through `a` meets that about `second` through
+/// `b`.
 ///
 /// The planes of the circles meet in a line, and that meets the sphere about a point of `second`
-/// through `b`. Circles about parallel axes lie in one plane; the line is that of the points with
-/// equal power then. One point where circles just touch, or miss each other by rounding.
+/// through `b`. Circles about parallel axes lie in one plane; then the line is that of the points
+/// with equal power. There is one point if circles just touch, or miss each other by rounding.
 fn meeting_points(first: &Line, a: Vector, second: &Line, b: Vector) -> Vec<Vector> {
     // Everything relative to the second circle's center.
     let center = second.nearest(b);
@@ -392,7 +393,7 @@ fn meeting_points(first: &Line, a: Vector, second: &Line, b: Vector) -> Vec<Vect
     let along = cross(n1, n2);
     let square = dot(along, along);
     if square == 0.0 {
-        // One axis twice: the inner turn does it all.
+        // Both axes are the same, so the inner turn does it all.
         return vec![b];
     }
     // The point of the line {n1 x = d1, n2 x = 0} that is nearest to the center.

@@ -15,26 +15,26 @@ pub struct SerialChain {
     pub base: String,
     /// Name of the tip link.
     pub tip: String,
-    /// What has a value, in the order from base to tip.
+    /// The variables, in the order from base to tip.
     pub variables: Vec<Variable>,
     pub(super) joints: Vec<MovingJoint>,
     /// The tip in the last link.
     pub(super) to_tip: Pose,
 }
 
-/// A value that a posture consists of.
+/// A variable of a posture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Variable {
-    /// The joint whose value it is. It need not be between base and tip where one that is
+    /// The joint whose value it is. The joint need not be between base and tip if one that is
     /// mimics it.
     pub name: String,
     /// Whether the value is an angle in rad or a displacement in m.
     pub motion: Motion,
-    /// Lowest and highest value; none of continuous joints.
+    /// Lowest and highest value; none for continuous joints.
     pub limits: Option<Limits>,
 }
 
-/// How a joint moves.
+/// The kind of a joint's motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Motion {
     /// About its axis, in rad.
@@ -44,7 +44,7 @@ pub enum Motion {
 }
 
 impl Motion {
-    /// The unit of its values.
+    /// Returns the unit of its values.
     pub fn unit(self) -> &'static str {
         match self {
             Self::Turn => "rad",
@@ -53,7 +53,7 @@ impl Motion {
     }
 }
 
-/// A joint that can move, fixed joints before it merged.
+/// A joint that can move, with the fixed joints before it merged into it.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct MovingJoint {
     pub(super) name: String,
@@ -84,7 +84,7 @@ impl Drive {
 }
 
 impl MovingJoint {
-    /// What `value` does.
+    /// Returns the motion of the joint at `value`.
     pub(super) fn moved(&self, value: f64) -> Pose {
         match self.motion {
             Motion::Turn => Pose::turn(self.axis, value),
@@ -92,14 +92,14 @@ impl MovingJoint {
         }
     }
 
-    /// Its axis, where the link before it stands at `before`.
+    /// Returns its axis, if the link before it stands at `before`.
     pub(super) fn line(&self, before: &Pose) -> Line {
         let frame = before.then(&self.origin);
         Line { through_m: frame.origin_m, along: frame.direction(self.axis) }
     }
 }
 
-/// Where everything is, in the base's frame.
+/// Poses of all links, in the base's frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frames {
     /// Link 0 (the base), then the link that each joint carries.
@@ -109,11 +109,12 @@ pub struct Frames {
 }
 
 impl SerialChain {
-    /// The joints from the link `base` to the link `tip` of `model` (indices of its links).
-    /// `place` is what named the tip.
+    /// Returns the joints from the link `base` to the link `tip` of `model` (indices of its links).
+    /// `place` names the source of the tip's name in errors.
     ///
     /// # Errors
-    /// When the tip does not hang on the base, or over a joint that no single value moves.
+    /// When the tip is not attached to the base, or only through a joint that no single value
+    /// moves.
     pub fn new(model: &Model, base: usize, tip: usize, place: &str) -> Result<Self, InputError> {
         let way = model.way(base, tip).ok_or_else(|| {
             let cause = format!("`{}` does not hang on `{}`", model.links[tip], model.links[base]);
@@ -133,7 +134,7 @@ impl SerialChain {
         Ok(chain)
     }
 
-    /// Appends a joint of the model. `drivers` are the joints that the variables belong to.
+    /// Appends a joint of the model. `drivers` are the joints that own the variables.
     fn push(
         &mut self,
         model: &Model,
@@ -174,11 +175,11 @@ impl SerialChain {
         Ok(())
     }
 
-    /// Forward kinematics: where links and tip are when the variables have these values, inside
-    /// their limits or not.
+    /// Computes forward kinematics: the poses of links and tip at these values of the variables,
+    /// inside their limits or not.
     ///
     /// # Panics
-    /// When there are not as many values as variables.
+    /// If there are not as many values as variables.
     pub fn forward(&self, values: &[f64]) -> Frames {
         assert_eq!(values.len(), self.variables.len(), "one value for each variable");
         let mut links = Vec::with_capacity(self.joints.len() + 1);
@@ -191,8 +192,8 @@ impl SerialChain {
         Frames { tip: link.then(&self.to_tip), links }
     }
 
-    /// The values of a named posture of `model`, by joint; joints that it leaves out are at rest.
-    /// Of several values for one joint the last one holds.
+    /// Returns the values of a named posture of `model`, by joint; joints that it leaves out are at
+    /// rest. Of several values for one joint the last one holds.
     pub fn with_posture(&self, model: &Model, posture: &[(usize, f64)]) -> Vec<f64> {
         let said = |variable: &Variable| {
             posture.iter().rfind(|(joint, _)| model.joints[*joint].name == variable.name)
@@ -201,16 +202,17 @@ impl SerialChain {
         at_rest.map(|(variable, rest)| said(variable).map_or(rest, |(_, value)| *value)).collect()
     }
 
-    /// The values nearest to zero that are inside the limits.
+    /// Returns the values nearest to zero that are inside the limits.
     pub fn rest(&self) -> Vec<f64> {
         let nearest = |v: &Variable| v.limits.map_or(0.0, |l| 0f64.clamp(l.lower, l.upper));
         self.variables.iter().map(nearest).collect()
     }
 
-    /// Whether there is a finite value for each variable. `place` is what gave the values.
+    /// Checks that there is a finite value for each variable. `place` names the source of the
+    /// values.
     ///
     /// # Errors
-    /// When there are more or fewer, with the names; or when one is not finite.
+    /// When there are more or fewer values, with the names; or when one is not finite.
     pub fn check_count(&self, place: &str, values: &[f64]) -> Result<(), InputError> {
         let names: Vec<&str> = self.variables.iter().map(|v| v.name.as_str()).collect();
         if values.len() != names.len() {
@@ -232,11 +234,11 @@ impl SerialChain {
         }
     }
 
-    /// Whether all joints are inside their limits, those that mimic others too. `place` is what
-    /// gave the values.
+    /// Checks that all joints, including mimicking ones, are inside their limits. `place` names the
+    /// source of the values.
     ///
     /// # Errors
-    /// When one is outside: its name and its limits.
+    /// When one is outside, with its name and its limits.
     pub fn check_limits(&self, place: &str, values: &[f64]) -> Result<(), InputError> {
         match self.outside(values).next() {
             None => Ok(()),
@@ -249,7 +251,7 @@ impl SerialChain {
         }
     }
 
-    /// Names of the joints outside their limits, those that mimic others too, each once.
+    /// Returns the names of the joints outside their limits, including mimicking ones, each once.
     pub fn outside_limits<'a>(&'a self, values: &'a [f64]) -> Vec<&'a str> {
         let mut names = Vec::new();
         for (name, ..) in self.outside(values) {
@@ -280,10 +282,11 @@ impl SerialChain {
     }
 }
 
-/// The joint at the end of the mimicry from `joint`, and `joint`'s value as a function of its.
+/// Returns the joint at the end of the mimicry from `joint`, and `joint`'s value as a function of
+/// its.
 fn driver(model: &Model, joint: usize) -> (usize, f64, f64) {
     let (mut driver, mut multiplier, mut offset) = (joint, 1.0, 0.0);
-    // Models hold no circles of mimicry.
+    // Models contain no cycles of mimicry.
     while let Some(mimic) = &model.joints[driver].mimic {
         offset += multiplier * mimic.offset;
         multiplier *= mimic.multiplier;

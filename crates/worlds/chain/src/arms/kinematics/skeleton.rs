@@ -1,44 +1,44 @@
 //! Connectors from joint axes, and the rods between them.
 //!
-//! Every connector is fixed in a range of links: a point on the axis of joint j is fixed in links
-//! j and j + 1, a point where three axes meet in four links. From the base on, the next connector
-//! is the one furthest out that shares a link with the last one, so that points between which
-//! nothing bends (such as the elbow offsets of a Panda) drop out.
+//! Every connector is fixed in a range of links: a point on the axis of joint j is fixed in links j
+//! and j + 1, a point where three axes meet in four links. From the base on, the next connector is
+//! the one farthest out that shares a link with the last one, so that points between which nothing
+//! bends (such as the elbow offsets of a Panda) drop out.
 
 use super::pose::{Line, Vector};
 use super::serial::{Frames, Motion, SerialChain};
 use sidestep_kernel::geometry::{across, add, dot, norm, scaled, sub};
 
-/// Points nearer to each other than this share of the arm's reach are one point.
+/// Points nearer to each other than this share of the arm's reach count as one.
 const SAME: f64 = 1e-9;
 
 /// An arm as a chain of rods.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Skeleton {
-    /// One more than rods; the last is the tip.
+    /// The connectors, one more than rods; the last is the tip.
     pub(super) connectors: Vec<Anchor>,
     /// The rods between them.
     pub rods: Vec<Rod>,
     /// Unit vector in the base's frame along the first joint's axis, from which the bend at the
-    /// first connector is measured. None where that joint slides or the connector is not on it.
+    /// first connector is measured. None if that joint slides or the connector is not on it.
     pub base_direction: Option<Vector>,
-    /// The sum of the links' lengths in m, which is no less than the arm's reach.
+    /// The sum of the links' lengths in m, an upper bound of the arm's reach.
     pub reach_m: f64,
 }
 
 /// Lengths that a rod can have.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rod {
-    /// Shortest length in m. It is zero where a prismatic joint can bring its ends together.
+    /// Shortest length in m. It is zero if a prismatic joint can bring its ends together.
     pub min_m: f64,
-    /// Longest length in m; infinite where a prismatic joint has no limits.
+    /// Longest length in m; infinite if a prismatic joint has no limits.
     pub max_m: f64,
 }
 
 /// A point that is fixed in the links `first..=last`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Anchor {
-    /// In the frame of link `first`, in m.
+    /// Its position in the frame of link `first`, in m.
     pub(super) point_m: Vector,
     pub(super) first: usize,
     pub(super) last: usize,
@@ -51,7 +51,7 @@ impl Anchor {
 }
 
 impl SerialChain {
-    /// The arm's connectors and rods. They do not depend on the posture.
+    /// Returns the arm's connectors and rods. They do not depend on the posture.
     pub fn skeleton(&self) -> Skeleton {
         let frames = self.forward(&vec![0.0; self.variables.len()]);
         let reach_m = self.reach_m();
@@ -61,12 +61,13 @@ impl SerialChain {
         Skeleton { rods, base_direction: builder.base_direction(&connectors), reach_m, connectors }
     }
 
-    /// Where the connectors of `skeleton` (this chain's) are at `frames`, in m in the base's frame.
+    /// Returns the positions of the connectors of `skeleton` (this chain's) at `frames`, in m in
+    /// the base's frame.
     pub fn connectors(&self, skeleton: &Skeleton, frames: &Frames) -> Vec<Vector> {
         skeleton.connectors.iter().map(|anchor| anchor.position_m(frames)).collect()
     }
 
-    /// The joints' axes at `frames`.
+    /// Returns the joints' axes at `frames`.
     fn lines(&self, frames: &Frames) -> Vec<Line> {
         self.joints.iter().zip(&frames.links).map(|(joint, before)| joint.line(before)).collect()
     }
@@ -110,13 +111,14 @@ impl Builder<'_> {
         connectors
     }
 
-    /// A single rigid body: its base and its tip.
+    /// Returns the anchors of a single rigid body: its base and its tip.
     fn without_joints(&self, tip: Anchor) -> Vec<Anchor> {
         let base = self.anchor([0.0; 3], 0);
         if self.coincide(&base, &tip) { vec![tip] } else { vec![base, tip] }
     }
 
-    /// Points on the axes, from the base out: feet of the common perpendiculars of neighbors.
+    /// Returns points on the axes, from the base out: feet of the common perpendiculars of
+    /// neighbors.
     fn candidates(&self) -> Vec<Anchor> {
         let Some(first) = self.lines.first() else { return Vec::new() };
         let mut candidates = Vec::new();
@@ -134,7 +136,7 @@ impl Builder<'_> {
         candidates
     }
 
-    /// The point at `p_m` that is fixed in `link`, with all links in which it is fixed too.
+    /// Returns the point at `p_m` that is fixed in `link`, with all links in which it is fixed too.
     fn anchor(&self, p_m: Vector, link: usize) -> Anchor {
         let on_axis = |joint: usize| {
             self.chain.joints[joint].motion == Motion::Turn
@@ -200,7 +202,7 @@ impl Builder<'_> {
     }
 }
 
-/// The one that is fixed further out; of several the first.
+/// Returns the anchor that is fixed farther out; of several the first.
 fn further<'a>(a: &'a Anchor, b: &'a Anchor) -> &'a Anchor {
     if b.last > a.last { b } else { a }
 }

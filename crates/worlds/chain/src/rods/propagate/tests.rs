@@ -1,4 +1,4 @@
-//! Motions of whole chains. What must hold of them (design 5.8), and the tests that say so:
+//! Tests of motions of whole chains. The invariants, and the tests that hold them:
 //!
 //! 1. rods keep their limits: [`laws`] `rods_bends_clearances_and_bases_keep_the_laws_in_any_world`
 //! 2. nobody comes nearer than 1e-9 m, or goes deeper: the same;

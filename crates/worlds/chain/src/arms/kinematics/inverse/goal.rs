@@ -1,41 +1,41 @@
-//! What is wanted of an arm, and what came of it.
+//! Goals of an arm, and the answers.
 
 use super::super::pose::Vector;
 use crate::arms::ik::Engine;
 use sidestep_kernel::InputError;
 
-/// Something that no rod of the arm may be in. Rods are thin lines: the radius must hold the arm's
-/// thickness too.
+/// A sphere that no rod of the arm may enter. Rods are thin lines, so the radius must include the
+/// arm's thickness.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sphere {
-    /// In m, in the base's frame.
+    /// Center in m, in the base's frame.
     pub center_m: Vector,
-    /// In m.
+    /// Radius in m.
     pub radius_m: f64,
 }
 
-/// Where the tip of an arm shall be.
+/// A target for the tip of an arm.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ArmGoal {
-    /// In m, in the base's frame.
+    /// Target in m, in the base's frame.
     pub target_m: Vector,
-    /// How near counts as there, in m.
+    /// Distance at which the target counts as reached, in m.
     pub tolerance_m: f64,
-    /// [`Engine::Chain`] starts from what the connectors say; all others work on the joints from
-    /// the first step.
+    /// The engine. [`Engine::Chain`] starts from the connectors' solution; all others work on the
+    /// joints from the first step.
     pub engine: Engine,
     /// Random postures to start from after the given one.
     pub restarts: usize,
-    /// What they grow from.
+    /// Random seed of these postures.
     pub seed: u64,
     /// Whether joints may be outside their limits.
     pub ignore_limits: bool,
-    /// What no rod may be in.
+    /// Spheres that no rod may enter.
     pub spheres: Vec<Sphere>,
 }
 
 impl ArmGoal {
-    /// The tip at `target_m` to 1e-6 m, with 100 restarts, inside the limits.
+    /// Returns a goal for the tip at `target_m` to 1e-6 m, with 100 restarts, inside the limits.
     pub fn new(target_m: Vector) -> Self {
         Self {
             target_m,
@@ -71,38 +71,38 @@ impl ArmGoal {
     }
 }
 
-/// What came of a goal.
+/// The answer to a goal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ArmAnswer {
     /// Whether the goal is met, with all joints inside their limits and no rod in a sphere.
     pub reached: bool,
-    /// Distance of the tip from the target, by forward kinematics at the values.
+    /// Distance of the tip from the target in m, by forward kinematics at the values.
     pub error_m: f64,
-    /// A value for each variable, inside the limits unless they are ignored; where the goal is not
-    /// met, of those that came nearest.
+    /// A value for each variable, inside the limits unless they are ignored; if the goal is not
+    /// met, the values that came nearest.
     pub values: Vec<f64>,
-    /// [`Engine::Chain`] where the connectors led to the answer.
+    /// The engine that found the answer; [`Engine::Chain`] if the connectors led to it.
     pub engine: Engine,
     /// Steps over all starts.
     pub iterations: usize,
     /// Postures that it started from.
     pub starts: usize,
-    /// Why the goal is not met; `None` if it is.
+    /// The reason why the goal is not met; `None` if it is.
     pub reason: Option<ArmReason>,
 }
 
 /// A rod that is in a sphere.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hit {
-    /// The rod leads from this connector (from 0) to the next.
+    /// Index of the connector (from 0) from which the rod leads to the next.
     pub rod: usize,
     /// Index of the sphere.
     pub sphere: usize,
-    /// How deep, in m.
+    /// Depth in m.
     pub depth_m: f64,
 }
 
-/// Why a goal is not met.
+/// The reason why a goal is not met.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ArmReason {
     /// The rods are too short.

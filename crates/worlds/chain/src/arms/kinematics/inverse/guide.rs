@@ -9,16 +9,16 @@ use crate::rods::{Chain, Connector, Mobility, Obstacle, Obstacles, Rod, Rules};
 use sidestep_kernel::InputError;
 use sidestep_kernel::geometry::{add, scaled};
 
-/// Rods that a prismatic joint can close altogether have at least this length in m.
+/// Least length, in m, of rods that a prismatic joint can close altogether.
 const LEAST_ROD_M: f64 = 1e-6;
-/// Rods without a greatest length have this part of the target's distance and the reach.
+/// Longest length of rods without a limit, as a multiple of the target's distance and the reach.
 const LONGEST: f64 = 4.0;
 /// Postures of the connectors that are tried.
 const RESTARTS: usize = 20;
 
-/// Joint values inside the limits at which the connectors are where the chain engine brings them;
-/// none where it does not reach the target, or points do not determine the joints. With it, the
-/// iterations that it took.
+/// Returns joint values inside the limits at which the connectors are where the chain engine puts
+/// them; none if it does not reach the target, or points do not determine the joints. Also returns
+/// the number of iterations.
 pub(super) fn posture(
     arm: &SerialChain,
     skeleton: &Skeleton,
@@ -45,8 +45,8 @@ pub(super) fn posture(
     Some((recovered.values, answer.iterations))
 }
 
-/// The arm as a chain: its connectors, with a fixed one before the first from which the bend there
-/// is measured, if there is a direction for it. Returns also the index of the base.
+/// Returns the arm as a chain: its connectors, with a fixed one before the first from which the
+/// bend there is measured, if there is a direction for it. Also returns the index of the base.
 fn chain_of(
     arm: &SerialChain,
     skeleton: &Skeleton,

@@ -1,12 +1,12 @@
 //! Inverse kinematics of real arms: joint values that bring the tip to a target.
 //!
 //! Damped least squares on the joints themselves, inside their limits: points leave twist open and
-//! couple the joints of some arms (design 3.4 and 4), joints do not. The engine
-//! [`Engine::Chain`] solves for the connectors first, with joint limits as bend limits, reads the
-//! joints off them, and leaves to the joints only what that does not decide.
+//! couple the joints of some arms, joints do not. The engine [`Engine::Chain`] solves for the
+//! connectors first, with joint limits as bend limits, reads the joints off them, and leaves to the
+//! joints only what that does not decide.
 //!
 //! ```text
-//! goal   what is wanted, what came of it, and why not
+//! goal   a goal, its answer, and the reason for a failure
 //! rows   errors of a posture and their Jacobian: the tip, and spheres that rods are in
 //! step   a damped step inside limits
 //! guide  the connectors' solution as a posture to start from
@@ -35,20 +35,20 @@ use sidestep_kernel::{InputError, Seed};
 use std::f64::consts::PI;
 use step::Bounds;
 
-/// Draws for postures to start from.
+/// Random draws for postures to start from.
 const START: Purpose = Purpose(0x1D);
-/// Steps from one start, also those that did not help.
+/// Most steps from one start, including those that did not help.
 const STEPS: usize = 200;
-/// Restarts where no answer can be expected, to come near or to find out why.
+/// Restarts if no answer can be expected, to come near or to find the reason.
 const FEW: usize = 8;
-/// The part of the errors that a step must take away to count as gain.
+/// Least part of the errors that a step must remove to count as gain.
 const LEAST_GAIN: f64 = 1e-3;
 /// Steps without gain before the next start.
 const PATIENCE: usize = 16;
-/// The first damping, in parts of the mean of the matrix' diagonal.
+/// The first damping, in parts of the mean of the matrix's diagonal.
 const FIRST_DAMPING: f64 = 1e-3;
 
-/// Where a start led.
+/// The end of a descent from one start.
 struct Descent {
     values: Vec<f64>,
     errors: Errors,
@@ -56,11 +56,11 @@ struct Descent {
 }
 
 impl SerialChain {
-    /// Joint values that bring the tip to the goal's target, from the posture `start` on, which
-    /// has a value for each variable; if that does not lead there, from random ones.
+    /// Returns joint values that bring the tip to the goal's target, starting from the posture
+    /// `start`, which has a value for each variable; if that does not lead there, from random ones.
     ///
     /// # Errors
-    /// A target, tolerance, sphere or start that is not in range. A target that cannot be reached
+    /// When a target, tolerance, sphere or start is not in range. A target that cannot be reached
     /// is no error.
     pub fn solve(&self, goal: &ArmGoal, start: &[f64]) -> Result<ArmAnswer, InputError> {
         goal.check()?;
@@ -135,7 +135,7 @@ impl Search<'_> {
         errors.tip_m <= self.goal.tolerance_m && errors.hit.is_none()
     }
 
-    /// Damped steps from a start, until the goal is met or they lead no further.
+    /// Makes damped steps from a start, until the goal is met or there is no more gain.
     fn descend(&self, mut values: Vec<f64>, steps_before: usize) -> Descent {
         self.bounds.clamp(&mut values);
         let mut errors = self.scene.errors(&values);
@@ -160,7 +160,7 @@ impl Search<'_> {
         Descent { values, errors, steps }
     }
 
-    /// Brings turns without limits to less than half a turn from zero.
+    /// Brings angles without limits to less than half a turn from zero.
     fn unwind(&self, values: &mut [f64]) {
         let is_whole = |i: usize| {
             let mut driven = self.chain.joints.iter().filter(|j| j.drive.variable == i);
@@ -173,7 +173,7 @@ impl Search<'_> {
         }
     }
 
-    /// A posture inside the limits.
+    /// Returns a random posture inside the limits.
     fn random(&self, index: usize) -> Vec<f64> {
         let mut draws = Streams::new(Seed(self.goal.seed)).draws(0, index as u64, START);
         let variables = self.chain.variables.iter().zip(&self.bounds.ranges);
@@ -191,14 +191,14 @@ impl Search<'_> {
         lower + draws.uniform() * (upper - lower)
     }
 
-    /// What the rods alone rule out.
+    /// Returns a reason that follows from the rods alone, if they rule the target out.
     fn out_of_reach(&self, skeleton: &Skeleton, start: &[f64]) -> Option<ArmReason> {
         let connectors = self.chain.connectors(skeleton, &self.chain.forward(start));
         let far_m = norm(sub(self.goal.target_m, connectors[0]));
         let reach_m: f64 = skeleton.rods.iter().map(|rod| rod.max_m).sum();
         let longest_m = skeleton.rods.iter().map(|rod| rod.min_m + rod.max_m).fold(0.0, f64::max);
         let hole_m = longest_m - reach_m;
-        // The first connector must be the base's for its distance to mean anything.
+        // The distance means something only if the first connector is fixed in the base.
         let is_still = skeleton.connectors[0].first == 0;
         if is_still && far_m > reach_m + self.goal.tolerance_m {
             return Some(ArmReason::TooFar { far_m, reach_m });
@@ -207,7 +207,7 @@ impl Search<'_> {
             .then_some(ArmReason::TooNear { far_m, hole_m })
     }
 
-    /// The constraint without which there would be an answer.
+    /// Returns the constraint without which there would be an answer.
     fn why_not(&self, skeleton: &Skeleton, best: &Descent, starts: usize) -> ArmReason {
         let without = |ignore_limits: bool, spheres: Vec<Sphere>| {
             let restarts = self.goal.restarts.min(FEW);
@@ -251,7 +251,7 @@ impl Search<'_> {
     }
 }
 
-/// The distance of two points.
+/// Returns the distance of two points.
 fn apart_m(a: Vector, b: Vector) -> f64 {
     norm(sub(a, b))
 }

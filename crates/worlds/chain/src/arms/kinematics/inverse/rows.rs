@@ -8,10 +8,10 @@ use super::goal::{ArmGoal, Hit, Sphere};
 use crate::rods::geometry::nearest_on_segment;
 use sidestep_kernel::geometry::{cross, dot, scaled, sub};
 
-/// How far from spheres steps aim to stay, in parts of the reach.
+/// Distance from spheres that steps aim at, in parts of the reach.
 const MARGIN: f64 = 1e-4;
 
-/// What a posture is judged by.
+/// The criteria for a posture.
 pub(super) struct Scene<'a> {
     chain: &'a SerialChain,
     anchors: &'a [Anchor],
@@ -22,7 +22,7 @@ pub(super) struct Scene<'a> {
 
 /// Errors of a posture in m, one for each row of the Jacobian.
 pub(super) struct Errors {
-    /// What the rows are to change by.
+    /// Wanted changes of the rows.
     pub(super) wanted: Vec<f64>,
     /// Rows of the Jacobian, each with an entry for each variable.
     pub(super) rows: Vec<Vec<f64>>,
@@ -32,7 +32,7 @@ pub(super) struct Errors {
 }
 
 impl Errors {
-    /// What steps must lessen.
+    /// Returns the quantity that steps must reduce.
     pub(super) fn merit(&self) -> f64 {
         self.wanted.iter().map(|x| x * x).sum::<f64>().sqrt()
     }
@@ -70,7 +70,8 @@ impl<'a> Scene<'a> {
         errors
     }
 
-    /// How a point of link `link` moves with each of the joints before that link.
+    /// Calls a function with the motion of a point of link `link` for each of the joints before
+    /// that link.
     fn each_joint(
         &self,
         lines: &[Line],
@@ -87,7 +88,7 @@ impl<'a> Scene<'a> {
         }
     }
 
-    /// A row for each rod that is in a sphere or nearly so.
+    /// Adds a row for each rod that is in a sphere or nearly so.
     fn add_hits(&self, frames: &Frames, lines: &[Line], errors: &mut Errors) {
         for (rod, pair) in self.anchors.windows(2).enumerate() {
             let ends = [pair[0].position_m(frames), pair[1].position_m(frames)];
@@ -121,7 +122,7 @@ impl<'a> Scene<'a> {
     }
 }
 
-/// How far along a segment a point of it is, in [0, 1].
+/// Returns the position of a point along a segment, in [0, 1].
 fn share(p_m: Vector, [a, b]: [Vector; 2]) -> f64 {
     let d = sub(b, a);
     let square = dot(d, d);

@@ -12,12 +12,12 @@ impl Bounds {
     /// No limits.
     pub(super) const ANY: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
 
-    /// Anything goes.
+    /// Returns bounds without limits.
     pub(super) fn none(chain: &SerialChain) -> Self {
         Self { ranges: vec![Self::ANY; chain.variables.len()] }
     }
 
-    /// The limits of all joints: those that mimic another narrow its range.
+    /// Returns the limits of all joints: those that mimic another narrow its range.
     pub(super) fn of(chain: &SerialChain) -> Self {
         let own =
             chain.variables.iter().map(|v| v.limits.map_or(Self::ANY, |l| [l.lower, l.upper]));
@@ -34,14 +34,14 @@ impl Bounds {
         Self { ranges }
     }
 
-    /// Brings values to their ranges; of ranges that contradict each other the lower end counts.
+    /// Clamps values to their ranges; if ranges contradict each other the lower end counts.
     pub(super) fn clamp(&self, values: &mut [f64]) {
         for (value, [lower, upper]) in values.iter_mut().zip(&self.ranges) {
             *value = value.min(*upper).max(*lower);
         }
     }
 
-    /// The first variable outside its range: name, value and range.
+    /// Returns the first variable outside its range: name, value and range.
     pub(super) fn first_outside(
         &self,
         chain: &SerialChain,
@@ -52,8 +52,8 @@ impl Bounds {
             .find(|(_, value, lower, upper)| value < lower || value > upper)
     }
 
-    /// `values` after one damped step toward lesser errors. A variable that would leave its range
-    /// stops at its end, and the others do without it.
+    /// Returns `values` after one damped step toward smaller errors. A variable that would leave
+    /// its range stops at its end, and the others do without it.
     pub(super) fn step(&self, values: &[f64], errors: &Errors, damping: f64) -> Vec<f64> {
         let mut moved = vec![0.0; values.len()];
         let mut is_free = vec![true; values.len()];
@@ -83,8 +83,8 @@ impl Bounds {
     }
 }
 
-/// The least moves of the free variables that bring about what is wanted, damped:
-/// `J^T (J J^T + damping)^-1 wanted`. `J J^T` has a row for each error, few in number.
+/// Returns the least moves of the free variables that produce the wanted changes, damped: `J^T (J
+/// J^T + damping)^-1 wanted`. `J J^T` has only a few rows, one for each error.
 fn least_squares(errors: &Errors, wanted: &[f64], is_free: &[bool], damping: f64) -> Vec<f64> {
     let rows = &errors.rows;
     let product = |a: &[f64], b: &[f64]| -> f64 {
@@ -101,7 +101,7 @@ fn least_squares(errors: &Errors, wanted: &[f64], is_free: &[bool], damping: f64
     is_free.iter().enumerate().map(|(i, free)| if *free { change(i) } else { 0.0 }).collect()
 }
 
-/// Solves a symmetric, positive system in place of its matrix.
+/// Solves a symmetric, positive definite system, overwriting its matrix.
 fn cholesky_solve(matrix: &mut [Vec<f64>], right: &[f64]) -> Vec<f64> {
     let n = right.len();
     let mut x = right.to_vec();

@@ -1,4 +1,4 @@
-//! What holds after every request, in worlds of every kind.
+//! Laws that hold after every request, in worlds of every kind.
 
 use super::random_worlds::{AnyWorld, apart_m, depth_of_part_m};
 use super::*;

@@ -109,12 +109,12 @@ fn any_axes<const D: usize>(numbers: &mut Numbers) -> [Point<D>; D] {
     std::array::from_fn(|axis| [u, v, w][axis])
 }
 
-/// How near a chain comes to an obstacle.
+/// Returns the distance of a chain from an obstacle.
 pub(super) fn apart_m<const D: usize>(chain: &Chain<D>, o: &Obstacle<D>) -> f64 {
     (0..chain.points().len()).map(|i| -depth_of_part_m(chain, i, o)).fold(f64::INFINITY, f64::min)
 }
 
-/// How deep connector `i` and the rod before it are in an obstacle.
+/// Returns how deep connector `i` and the rod before it are in an obstacle.
 pub(super) fn depth_of_part_m<const D: usize>(chain: &Chain<D>, i: usize, o: &Obstacle<D>) -> f64 {
     let p = chain.points();
     let depth_m = |nearest: Nearest<D>, radius_m: f64| radius_m + o.radius_m - nearest.distance_m;

@@ -1,10 +1,10 @@
-//! What must not matter: far obstacles, the scale, the side one counts from, the place of the world.
+//! Changes that must not matter: far obstacles, scale, side of counting, place of the world.
 
 use super::random_worlds::apart_m;
 use super::*;
 use crate::rods::geometry::first_axis;
 
-/// Where a chain gets to among balls, with other balls far away and cells of any size.
+/// Returns where a chain gets to among balls, with other balls far away and cells of any size.
 fn wandered<const D: usize>(far: &[Obstacle<D>], reach_m: f64) -> Vec<[u64; D]> {
     let field = ball_field::<D>(5, 2.5, 0.15, 0.2, 0.06);
     let obstacles = Obstacles::new(field.iter().chain(far).copied().collect(), reach_m).unwrap();
