@@ -1,20 +1,20 @@
 //! Gives the build an identity beside its version: a digest over the sources that results follow
-//! from. Runs and sweeps that were begun by one build are not continued by another.
+//! from. Runs and sweeps that one build started are not continued by another.
 
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Folders of crates beside this one whose sources decide about results.
+/// Folders of crates beside this one whose sources determine results.
 const CRATES: [&str; 6] = ["kernel", "scenario", "map", "import", "collectives", "statistics"];
-/// The sources of this crate that do.
+/// The sources of this crate that determine results.
 const OWN: &str = "src/experiment/sweep";
 
 fn main() {
     let here = PathBuf::from(std::env::var("CARGO_MANIFEST_DIR").expect("cargo says where"));
     let version = std::env::var("CARGO_PKG_VERSION").expect("cargo says which");
     println!("cargo::rerun-if-changed=build.rs");
-    // A package that stands alone, outside of the repository, has its version only.
+    // A package outside of the repository, with nothing beside it, has only its version.
     let build = match digest(&here) {
         Ok(digest) => format!("{version}+{digest}"),
         Err(_) => version,
@@ -22,7 +22,7 @@ fn main() {
     println!("cargo::rustc-env=SIDESTEP_BUILD={build}");
 }
 
-/// Twelve hexadecimal digits over the names and the text of all sources.
+/// Returns twelve hexadecimal digits over the names and the text of all sources.
 fn digest(here: &Path) -> io::Result<String> {
     let crates = here.parent().ok_or(io::ErrorKind::NotFound)?;
     let mut roots: Vec<PathBuf> = CRATES.iter().map(|name| crates.join(name)).collect();

@@ -1,9 +1,9 @@
-//! What recording costs: CPU time and bytes for a row of robots' trajectories.
+//! The cost of recording: CPU time and bytes for a row of robots' trajectories.
 //!
 //! `cargo run --release -p sidestep-record --example record_speed -- [ROBOTS] [CYCLES_PER_BLOCK]`
 //!
-//! Robots walk at random on a grid and hand over blocks of `CYCLES_PER_BLOCK` cycles, robot
-//! after robot, as a world does.
+//! Robots walk at random on a grid and pass on blocks of `CYCLES_PER_BLOCK` cycles, one robot after
+//! another, as a world does.
 
 use cpu_time::ProcessTime;
 use sidestep_kernel::ports::{ColumnSpec, ColumnType, Recorder, TableSchema, Values};

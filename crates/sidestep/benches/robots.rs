@@ -1,8 +1,8 @@
-//! Speed of the robots world: robot-cycles per CPU second, speed-up, and their like.
+//! Speed of the robots world: robot-cycles per CPU second, speed-up, and related numbers.
 //!
-//! `cargo bench -p sidestep [-- PART ...]` with the parts `rates`, `teams`,
-//! `corridor`, `loop` and `recording`; every figure is a ratio or a rate taken
-//! in one run, since the machine may be noisy. Sensors and effectors are both unreliable.
+//! `cargo bench -p sidestep [-- PART ...]` with the parts `rates`, `teams`, `corridor`, `loop` and
+//! `recording`; every number is a ratio or a rate taken in one run, because the machine may be
+//! noisy. Sensors and effectors are both unreliable.
 
 use cpu_time::ProcessTime;
 use sidestep::scenario::Source;
@@ -14,12 +14,12 @@ use sidestep_kernel::{Phases, Simulation, Turn};
 use sidestep_record::{Origin, ParquetRecorder};
 use std::time::Instant;
 
-/// One case: bodies in a walled hall of which they cover 5 %.
+/// One case: bodies in a walled hall, 5 % of which they cover.
 struct Case {
     name: &'static str,
     robots: u32,
     size: u32,
-    /// Beams of this many boxes, or none.
+    /// Beams of this many boxes; `None` for no beams.
     ray_boxes: Option<u32>,
     /// Robot-cycles per CPU second that the project promises.
     promised: f64,
@@ -80,20 +80,20 @@ beyond = [0.1, 0.3, 0.6]
         robots_run(&self.scenario(), workers).expect("the case is a valid scenario")
     }
 
-    /// Cycles that take about a second.
+    /// Returns a number of cycles that takes about a second.
     fn cycles(&self) -> u64 {
         (5_000_000 / u64::from(self.robots)).max(20)
     }
 }
 
-/// CPU and wall seconds of `cycles` cycles.
+/// Returns the CPU and wall time of `cycles` cycles in seconds.
 fn time(simulation: &mut RobotsRun, cycles: u64) -> (f64, f64) {
     let (cpu, wall) = (ProcessTime::now(), Instant::now());
     advance(simulation, cycles);
     (cpu.elapsed().as_secs_f64(), wall.elapsed().as_secs_f64())
 }
 
-/// Advances over recording buffers too.
+/// Advances past full recording buffers as well.
 fn advance(simulation: &mut RobotsRun, cycles: u64) {
     let mut done = 0;
     while done < cycles {
@@ -101,7 +101,7 @@ fn advance(simulation: &mut RobotsRun, cycles: u64) {
     }
 }
 
-/// Best rate of several repeats: what the machine gives when nobody disturbs it.
+/// Returns the best rate of several repeats: the speed of the machine when nothing disturbs it.
 fn rate(case: &Case) -> f64 {
     let mut simulation = case.simulation(1);
     time(&mut simulation, case.cycles() / 4);
@@ -109,14 +109,14 @@ fn rate(case: &Case) -> f64 {
     case.cycles() as f64 * f64::from(case.robots) / best
 }
 
-/// Median of `n` ratios, each taken in one go.
+/// Returns the median of `n` ratios, each taken in one go.
 fn median_of(n: usize, ratio: impl FnMut() -> f64) -> f64 {
     let mut ratios: Vec<f64> = std::iter::repeat_with(ratio).take(n).collect();
     ratios.sort_by(f64::total_cmp);
     ratios[n / 2]
 }
 
-/// Median of wall(1 worker) / wall(`workers`), taken in turn.
+/// Returns the median of wall(1 worker) / wall(`workers`), taken in turn.
 fn speed_up(source: &Source, workers: usize, cycles: u64) -> f64 {
     let mut alone = robots_run(source, 1).expect("a valid scenario");
     let mut team = robots_run(source, workers).expect("a valid scenario");
@@ -159,7 +159,7 @@ fn teams() {
     }
 }
 
-/// All robots in one corridor: large groups, the worst case of merging.
+/// Measures all robots in one corridor: large groups, the worst case of merging.
 fn corridor() {
     let row = |c: &str| format!("{}\n", c.repeat(240));
     let art = format!("{}{}", row("."), row(".").repeat(5));
@@ -179,7 +179,7 @@ fn corridor() {
     }
 }
 
-/// The engine with one worker against a plain loop over the phases.
+/// Compares the engine with one worker with a plain loop over the phases.
 fn plain_loop() {
     for case in &CASES[..2] {
         let source = case.scenario();
@@ -213,7 +213,7 @@ fn plain_loop() {
     }
 }
 
-/// CPU time with and without recording every pose to Parquet, and bytes on disk.
+/// Measures CPU time with and without recording every pose to Parquet, and bytes on disk.
 fn recording() {
     let case = &CASES[1];
     let folder = std::env::temp_dir().join(format!("sidestep-bench-{}", std::process::id()));

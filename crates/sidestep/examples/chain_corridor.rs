@@ -1,4 +1,4 @@
-//! A swarm that passes narrow corridors and open fields, in numbers (slides E2, N6).
+//! A swarm that passes narrow corridors and open fields, in numbers.
 //!
 //! `cargo run --release -p sidestep --example chain_corridor [-- PART ...]` with the parts
 //! `leader` (alone in the corridor), `field` (discs and a target), `chain` (a leader and the
@@ -22,7 +22,7 @@ const READINGS: [Leaving; 3] = [Leaving::Latched, Leaving::Range, Leaving::Level
 
 type Measure = fn() -> Result<(), Box<dyn Error>>;
 
-/// A scene and where it is done.
+/// A scene and its finish.
 struct Course {
     obstacles: Obstacles<2>,
     target: Option<Point<2>>,
@@ -32,8 +32,8 @@ struct Course {
     limit_s: f64,
 }
 
-/// Thin walls on both sides of the middle; the start is 0.8 m from the right wall, or in the
-/// middle where there is no such place, and the finish is 1 m before the end.
+/// Returns thin walls on both sides of the middle. The start is 0.8 m from the right wall, or in
+/// the middle if the corridor is too narrow for that, and the finish is 1 m before the end.
 fn corridor(width_m: f64, start_m: f64) -> Result<Course, Box<dyn Error>> {
     let corridor = Corridor::pinned(width_m)?;
     let (line, walls) = (corridor.line(WALL_PIECE_M), corridor.walls(0));
@@ -47,8 +47,8 @@ fn corridor(width_m: f64, start_m: f64) -> Result<Course, Box<dyn Error>> {
     })
 }
 
-/// Discs of 0.2 to 0.5 m anywhere in 20 m x 20 m, but 1.5 m away from start and target, which
-/// lie in opposite corners.
+/// Returns discs of 0.2 to 0.5 m anywhere in 20 m x 20 m, but at least 1.5 m away from start and
+/// target, which are in opposite corners.
 fn field(seed: u64, discs: u32) -> Result<Course, Box<dyn Error>> {
     let mut draws = Streams::new(Seed(seed)).draws(0, 0, LASER_NOISE);
     let (start, target) = ([-8.5, -8.5], [8.5, 8.5]);
@@ -94,7 +94,7 @@ fn yes(arrived: bool) -> &'static str {
     if arrived { "yes" } else { "NO" }
 }
 
-/// A leader alone: every reading, sector and width.
+/// Measures a leader alone: every reading, sector and width.
 fn leader() -> Result<(), Box<dyn Error>> {
     println!(
         "\n| sector | reading | arrived | least clearance m | mean speed m/s at 1.6 m | at 2 m |"
@@ -133,7 +133,7 @@ fn leader() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// A leader and a target in a field of discs, 30 runs a cell.
+/// Measures a leader and a target in a field of discs, with 30 runs per cell.
 fn fields() -> Result<(), Box<dyn Error>> {
     println!("\n| discs | reading | leave rule | arrived of 30 | runs with a veto | mean s |");
     println!("| --- | --- | --- | --- | --- | --- |");
@@ -160,7 +160,7 @@ fn fields() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// A leader and followers that are where their connectors are.
+/// Measures a leader and followers that are exactly at their connectors.
 fn chain() -> Result<(), Box<dyn Error>> {
     println!(
         "\n| width m | followers | rods m | arrived | vetoes | leader clearance m | connector clearance m | fastest connector, leader = 1 |"
@@ -188,8 +188,8 @@ fn chain() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Followers on real wheels: margins and spare speed. Plain followers only stop before what they
-/// would touch, and their leader does not wait for them; the others slide, and are waited for.
+/// Measures followers on real wheels: margins and spare speed. Plain followers only stop before a
+/// contact, and their leader does not wait for them; the others slide, and their leader waits.
 fn wheels() -> Result<(), Box<dyn Error>> {
     println!(
         "\n| width m | margin m | wheels, leader = 1 | kind | arrived in s | vetoes | bumped % | held % | lag mean, max m | clearance m | pairs m |"
@@ -235,7 +235,7 @@ fn wheel_row(plan: &Plan, Run { arrived, measures: m }: &Run) -> String {
     )
 }
 
-/// Where there is no room to swing round.
+/// Measures a corridor without room to swing around.
 fn narrow() -> Result<(), Box<dyn Error>> {
     println!(
         "\n| width m | turning | near, far m | arrived | vetoes | leader clearance m | seconds |"

@@ -19,13 +19,13 @@ const ROD_M: f64 = 0.05;
 const TICKS: usize = 4000;
 const ROBOTS: usize = 16;
 const LEADER_M_S: f64 = 0.5;
-/// The discs stay in a square of 20 m.
+/// Half the side in m of the square in which the discs stay.
 const HALF_M: f64 = 10.0;
-/// Discs that keep apart leave so much between them that a robot fits through.
+/// Gap in m between discs that keep apart, wide enough for a robot.
 const APART_M: f64 = 0.7;
 const PENETRATION_M: f64 = 1e-3;
 
-/// Numbers in [0, 1), by (seed, index).
+/// Random numbers in [0, 1), by (seed, index).
 struct Numbers {
     streams: Streams,
     next: u64,
@@ -50,7 +50,7 @@ fn toward(heading_rad: f64) -> Point<2> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Reaction {
     None,
-    /// With so many ticks of look-ahead.
+    /// Escape, with this many ticks of look-ahead.
     Escape(f64),
 }
 
@@ -66,11 +66,11 @@ struct Cell {
     limit_m_s: f64,
 }
 
-/// What a cell's runs came to.
+/// The results of a cell's runs.
 #[derive(Debug, Clone, Copy, Default)]
 struct Tally {
     ticks: usize,
-    /// Ticks in which a robot, or a rod or a robot, was in a disc.
+    /// Ticks in which a robot was in a disc, and ticks in which any part (robot or rod) was.
     robots_in: usize,
     parts_in: usize,
     deepest_m: f64,
@@ -78,8 +78,8 @@ struct Tally {
     vetoes: usize,
     capped: usize,
     fastest_m_s: f64,
-    /// How often a part got into a disc, and how often of those there was another disc less than a
-    /// robot away from that one, and near the chain too.
+    /// Number of times that a part entered a disc, and how many of these had another disc less than
+    /// a robot away from that one, and near the chain too.
     episodes: usize,
     squeezed: usize,
     is_in: bool,
@@ -91,7 +91,7 @@ fn chain() -> Result<Chain<2>, InputError> {
     Chain::straight([half_m, 0.0], [-1.0, 0.0], ROBOTS - 1, rod, Connector::free(ROBOT_M))
 }
 
-/// Discs anywhere but on the chain.
+/// Returns discs anywhere but on the chain.
 fn discs(cell: &Cell, chain: &Chain<2>, numbers: &mut Numbers) -> Vec<Obstacle<2>> {
     let mut disc = |id: u32| loop {
         let center = [0; 2].map(|_| numbers.within(-HALF_M, HALF_M));
@@ -119,7 +119,7 @@ fn reflect(obstacles: &mut Obstacles<2>) {
     obstacles.set_moving(&discs).expect("discs are finite");
 }
 
-/// Turns two discs that come nearer to each other than [`APART_M`] away from each other.
+/// Turns two discs away from each other if they come nearer than [`APART_M`].
 fn keep_apart(obstacles: &mut Obstacles<2>) {
     let mut discs = obstacles.moving().to_vec();
     for a in 0..discs.len() {
@@ -129,7 +129,7 @@ fn keep_apart(obstacles: &mut Obstacles<2>) {
             let Some(u) = unit(sub(to, from)) else { continue };
             let (va, vb) = (dot(discs[a].velocity_m_s, u), dot(discs[b].velocity_m_s, u));
             if apart_m < APART_M && va > vb {
-                // Each keeps its speed: what leads it towards the other is turned round.
+                // Each disc keeps its speed: the component towards the other is reversed.
                 if va > 0.0 {
                     discs[a].velocity_m_s = along(discs[a].velocity_m_s, u, -2.0 * va);
                 }
@@ -147,7 +147,7 @@ fn center(disc: &Obstacle<2>) -> Point<2> {
     [0.5 * (lo[0] + hi[0]), 0.5 * (lo[1] + hi[1])]
 }
 
-/// A leader that wanders and stays in the square.
+/// A leader that wanders within the square.
 struct Leader {
     heading_rad: f64,
 }
@@ -204,7 +204,7 @@ fn run(cell: &Cell, seed: u64, tally: &mut Tally) -> Result<(), InputError> {
     Ok(())
 }
 
-/// Least distance of a disc's surface from robots and from rods.
+/// Returns the smallest distance of a disc's surface from robots and from rods, in m.
 fn gaps_m(chain: &Chain<2>, disc: &Obstacle<2>) -> [f64; 2] {
     let points = chain.points();
     let robots = points.iter().map(|p| disc.core.nearest_to_point(*p).distance_m);
@@ -297,7 +297,8 @@ fn main() -> Result<(), InputError> {
     Ok(())
 }
 
-/// Number of discs, their speed as a multiple of the leader's, whether the leader moves.
+/// Returns the number of discs, their speed as a multiple of the leader's, and whether the leader
+/// moves.
 fn cells() -> impl Iterator<Item = (u32, f64, bool)> {
     [8, 16].into_iter().flat_map(|discs| {
         [0.25, 0.5, 1.0, 2.0, 4.0]
@@ -306,7 +307,7 @@ fn cells() -> impl Iterator<Item = (u32, f64, bool)> {
     })
 }
 
-/// Reactions and limits of the robots' speed, the tightest last.
+/// Returns reactions and limits of the robots' speed, the tightest last.
 fn reactions(disc_m_s: f64) -> Vec<(Reaction, f64)> {
     let limits_m_s = [3.0, 2.0, 1.5].map(|times| f64::max(1.0, times * disc_m_s));
     let mut all = vec![

@@ -1,6 +1,6 @@
 #![deny(clippy::disallowed_methods)]
-//! Simulate and compare decentralized motion coordination, with sensors that lie and wheels
-//! that slip, bit for bit the same on any number of threads.
+//! Simulates and compares decentralized motion coordination, with noisy sensors and slipping
+//! wheels. Results are the same to the bit on any number of threads.
 //!
 //! A scenario is TOML text. It compiles to an immutable world, and a run advances a state:
 //!
@@ -31,7 +31,7 @@
 //! # Ok::<(), sidestep::kernel::InputError>(())
 //! ```
 //!
-//! Wrong input is an error that says where it stands and what would be right:
+//! Wrong input is an error that reports its position and a remedy:
 //!
 //! ```
 //! use sidestep::scenario::Source;
@@ -43,27 +43,27 @@
 //! assert_eq!(error.remedy(), "did you mean `seed`?");
 //! ```
 //!
-//! # Where things are
+//! # Modules
 //!
 //! ```text
-//! scenario        TOML text + overrides -> typed sections, and errors that point
+//! scenario        TOML text + overrides -> typed sections, and errors with positions
 //!    │            map: boxes of a floor      office: a generated building
 //!    │            import: ROS, MovingAI, CARMEN and MRCLAM files
 //!    ▼
-//! worlds::robots  scenario -> world + state; perceive, decide, resolve, react; metrics
-//!    │            planning: ways on the static map, for behaviors that go somewhere
+//! worlds          scenario -> world + state; the phases of a cycle; metrics
+//!    │            planning: paths on the static map, for behaviors with a goal
 //!    ▼
 //! kernel          the cycle, workers, random streams, digests, checkpoints, recorder port
 //!
 //! learn           logs of a real robot -> error tables that a scenario loads
-//! experiment      many runs and sweeps, and what they come to with intervals
-//! statistics      intervals, tests, and when there are runs enough
+//! experiment      many runs and sweeps, and their results with confidence intervals
+//! statistics      intervals, tests, and when there are enough runs
 //! ```
 //!
-//! A behavior of your own is one trait, [`worlds::robots::decide::Behaviour`]; the example
-//! `own_behaviour` writes, registers and runs one in less than 40 lines. To record a run, hand
-//! [`kernel::Simulation::record`] a [`kernel::ports::Recorder`]: the one in memory is here, the
-//! one that writes Parquet is in the crate `sidestep-record`.
+//! To define a behavior of your own, implement the trait [`worlds::robots::decide::Behaviour`]; the
+//! example `own_behaviour` defines, registers and runs one in less than 40 lines. To record a run,
+//! pass a [`kernel::ports::Recorder`] to [`kernel::Simulation::record`]: the recorder in memory is
+//! part of the kernel, and the crate `sidestep-record` has one that writes Parquet.
 
 pub mod experiment;
 pub mod worlds;
@@ -78,11 +78,11 @@ pub use sidestep_robots::learn;
 pub use sidestep_scenario as scenario;
 pub use sidestep_statistics as statistics;
 
-/// The version.
+/// The version of this crate.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// The build: the version and a digest over the sources that results follow from, as
-/// `0.1.0+0123456789ab`. Only the build that began a run or a sweep goes on with it.
+/// `0.1.0+0123456789ab`. Only the build that started a run or a sweep continues it.
 pub const BUILD: &str = env!("SIDESTEP_BUILD");
 
 #[cfg(test)]

@@ -1,5 +1,5 @@
-//! ARCHITECTURE.md and README.md name files and folders; every one of them exists. Scenarios
-//! that the README shows are right.
+//! All files and folders that ARCHITECTURE.md and README.md name exist, and the scenarios in the
+//! README are valid.
 
 use sidestep::scenario::Source;
 use sidestep::worlds::robots::scenario::{Behaviours, Compiled, StorageOrder};
@@ -9,9 +9,9 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
-/// What stands between single backticks outside of code blocks and looks like a path: it has
-/// a `/` and nothing that a path of this repository has not. What a run writes, and data that
-/// are no part of the repository, are left out.
+/// Returns the text between single backticks, outside of code blocks, that looks like a path: it
+/// has a `/` and only characters that paths of this repository have. Outputs of runs, and data
+/// outside of the repository, are left out.
 fn named_paths(text: &str) -> Vec<&str> {
     let is_path = |span: &&str| {
         let plain = |c: char| c.is_ascii_alphanumeric() || "/._-".contains(c);
@@ -23,7 +23,7 @@ fn named_paths(text: &str) -> Vec<&str> {
     spans.filter(is_path).filter(is_ours).collect()
 }
 
-/// Targets of links and pictures within the repository.
+/// Returns the targets of links and pictures within the repository.
 fn linked_paths(text: &str) -> Vec<&str> {
     let targets = text.split("](").skip(1).filter_map(|rest| rest.split([')', '#']).next());
     targets.filter(|target| !target.is_empty() && !target.contains("://")).collect()

@@ -1,4 +1,4 @@
-//! A page in real Chromium: what stands in it after its scripts ran, and what it looks like.
+//! A page in real Chromium: its content after its scripts ran, and its appearance.
 
 use serde_json::Value;
 use std::fs::File;
@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// A machine that does other work besides may take this long for a page.
+/// Longest time that a busy machine may take for a page.
 const PATIENCE: Duration = Duration::from_secs(240);
 
-/// Looks at the page, does what a reader does, and leaves what came of it in the page.
+/// A script that inspects the page, acts like a reader, and leaves its findings in the page.
 const PROBE: &str = include_str!("browser.js");
 
 /// The browser, if there is one. Where `SIDESTEP_REQUIRE` names `chromium` there must be.
@@ -29,7 +29,7 @@ pub(crate) fn chromium() -> Option<Browser> {
 pub(crate) struct Browser(String);
 
 impl Browser {
-    /// Opens the page, lets its scripts run, and tells what [`PROBE`] found.
+    /// Opens the page, lets its scripts run, and returns the findings of [`PROBE`].
     ///
     /// # Panics
     /// When the browser prints an error of the page.
@@ -98,8 +98,8 @@ impl Browser {
     }
 }
 
-/// Asserts what holds of every page: it is whole, quiet, and keeps to itself. Returns what the
-/// probe found.
+/// Asserts properties of every page: it is complete, has no errors, and loads nothing. Returns the
+/// findings of the probe.
 pub(crate) fn assert_sound(browser: &Browser, page: &Path) -> Value {
     let found = browser.probe(page);
     for key in ["errors", "violations", "requests"] {

@@ -26,7 +26,8 @@ targets_m = [[1.0, 0.0]]
 speed_m_s = 0.5
 "#;
 
-/// Runs, checks that it is refused and that nothing was written; returns the words.
+/// Runs the command, checks that the input is refused and that nothing was written, and returns the
+/// error.
 fn refused(place: &Place, name: &str, more: &[&str]) -> String {
     let before = place.names();
     let mut told = String::new();
@@ -41,14 +42,14 @@ fn refused(place: &Place, name: &str, more: &[&str]) -> String {
     told
 }
 
-/// `file:LINE:COLUMN: ` stands at the beginning.
+/// Whether a text starts with `file:LINE:COLUMN: `.
 fn has_position(err: &str, file: &str) -> bool {
     let Some((_, rest)) = err.split_once(&format!("{file}:")) else { return false };
     let mut parts = rest.splitn(3, ':');
     (0..2).all(|_| parts.next().is_some_and(|p| p.parse::<u32>().is_ok_and(|n| n > 0)))
 }
 
-/// What must be refused in [`RIGHT`] when `find` is replaced, and what is said.
+/// Cases: if `find` is replaced in [`RIGHT`], the input must be refused with these words.
 #[rustfmt::skip]
 const TABLE: &[(&str, &str, &str, &str)] = &[
     ("no time", "dt_s = 0.1", "dt_s = 0.0", "dt_s = 0"),
@@ -186,7 +187,7 @@ fn a_wrong_script_is_refused_where_it_is_wrong() {
     assert!(refused(&place, "no file", &[]).contains("gone.txt"));
 }
 
-/// A second script is looked at when the first one is: not in the middle of a run.
+/// All scripts are checked with the first one, not in the middle of a run.
 #[test]
 fn every_script_is_tried_before_a_run_begins() {
     let place = Place::new();

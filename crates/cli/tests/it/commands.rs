@@ -1,4 +1,4 @@
-//! What each command does, beyond its JSON.
+//! The effects of each command, beyond its JSON.
 
 use crate::support::{Place, names};
 use sidestep_record::read_table;

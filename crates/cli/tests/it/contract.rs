@@ -1,9 +1,9 @@
-//! The fixed words of `--json`: scripts rely on them.
+//! The fixed keys of `--json`, which scripts rely on.
 
 use crate::support::Place;
 use serde_json::Value;
 
-/// All of `keys` are there and none is null.
+/// Asserts that all of `keys` exist and none is null.
 fn assert_keys(value: &Value, keys: &[&str]) {
     for key in keys {
         assert!(!value[key].is_null(), "`{key}` is missing in {value:#}");

@@ -1,4 +1,5 @@
-//! A full disk: the run fails with what replays it, and goes on when there is room.
+//! A full disk: the error describes how to replay the run, and the run continues once there is
+//! room.
 
 use crate::support::{Place, SmallDisk};
 

@@ -1,4 +1,5 @@
-//! `exact`: the chain of one robot, the simulator against it, and the planners' file.
+//! `exact`: the Markov chain of one robot, the comparison with the simulator, and the file for
+//! planners.
 
 use crate::support::Place;
 

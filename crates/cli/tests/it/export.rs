@@ -1,4 +1,4 @@
-//! Recorded runs in the forms of other programs, and runs computed again from what is recorded.
+//! Exports of recorded runs, and runs computed again from their recordings.
 
 use crate::support::{Place, names};
 use serde_json::json;
@@ -19,7 +19,7 @@ fn a_whole_run_is_computed_again_and_its_digest_confirmed() {
     }
     let words = place.run(&["replay", "r"]);
     assert!(words.out().starts_with("Confirmed: 400 cycles"), "{}", words.out());
-    // The recording needs nothing beside it.
+    // The recording must be self-contained.
     std::fs::rename(place.path("r.mcap"), place.path("alone.mcap")).expect("moved");
     std::fs::remove_dir_all(place.path("r")).expect("removed");
     assert_eq!(place.run(&["replay", "alone.mcap", "--workers", "3"]).code(), 0);
@@ -69,7 +69,7 @@ fn frames_change_no_result_and_equal_runs_give_equal_bytes() {
     let args = ["run", "s.toml", "--cycles", "400", "--workers", "2", "--mcap", "again.mcap"];
     assert_eq!(place.json(&args)["digest"], plain["digest"]);
     let bytes = |name: &str| std::fs::read(place.path(name)).expect("read");
-    // The scenario of a run folder is the resolved one, as that of a recording is.
+    // The scenario of a run folder is the resolved one, like that of a recording.
     assert!(bytes("r.mcap") == bytes("again.mcap"), "the recordings differ");
     place.json(&["export", "r", "--to", "mcap", "--out", "exported.mcap"]);
     assert!(bytes("r.mcap") == bytes("exported.mcap"), "the exported recording differs");

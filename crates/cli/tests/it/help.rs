@@ -1,4 +1,4 @@
-//! Help texts, and words that no command knows.
+//! Help texts, and arguments that no command accepts.
 
 use crate::support::Place;
 

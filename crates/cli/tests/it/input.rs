@@ -3,7 +3,8 @@
 
 use crate::support::{Place, SCENARIO};
 
-/// Runs, checks that it is refused and that nothing was written; returns the words.
+/// Runs the command, checks that the input is refused and that nothing was written, and returns the
+/// error.
 fn refused(place: &Place, file: &str, more: &[&str]) -> String {
     let before = place.names();
     let ended = place.run(&[&["run", file, "--out", "out"], more].concat());
@@ -15,7 +16,7 @@ fn refused(place: &Place, file: &str, more: &[&str]) -> String {
     err
 }
 
-/// What must be refused in [`SCENARIO`] when `find` is replaced, and what is said.
+/// Cases: if `find` is replaced in [`SCENARIO`], the input must be refused with these words.
 const TABLE: [(&str, &str, &str, &[&str]); 17] = [
     ("unknown key", "cycles = 3000", "cylces = 3000", &["did you mean `cycles`?"]),
     ("unknown key inside", "count = 1\nsensors", "cuont = 1\nsensors", &["did you mean `count`?"]),
@@ -77,7 +78,7 @@ fn a_wrong_scenario_is_refused_where_it_is_wrong() {
     }
 }
 
-/// `file:LINE:COLUMN: ` stands at the beginning.
+/// Whether a text starts with `file:LINE:COLUMN: `.
 fn has_position(err: &str, file: &str) -> bool {
     let Some((_, rest)) = err.split_once(&format!("{file}:")) else { return false };
     let mut parts = rest.splitn(3, ':');

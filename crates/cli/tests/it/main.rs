@@ -1,4 +1,4 @@
-//! The real binary, from outside: what it prints, writes and ends with.
+//! Tests of the real program from outside: its output, its files and its exit codes.
 
 mod airspace;
 mod browser;

@@ -1,4 +1,4 @@
-//! `report`: a run folder of any world becomes a page that keeps to itself, and Markdown.
+//! `report`: a run folder of any world becomes a self-contained page, and Markdown.
 
 use crate::browser::{assert_sound, chromium};
 use crate::support::{Place, names};
@@ -15,10 +15,10 @@ const CHAIN: &str = "format = 1\nworld = \"chain\"\nname = \"Wanderer\"\nseed = 
                      radius_m = 0.05\n\
                      [[chains.tasks]]\nkind = \"wander\"\nspeed_m_s = 0.6\n";
 
-/// A page heavier than this is not one to send around.
+/// Largest size of a page in bytes that is fit to be sent around.
 const MOST_BYTES: usize = 400_000;
 
-/// A place with a recorded run of each world and its report.
+/// Returns a place with a recorded run of each world and its report.
 fn reported(scenario: &str) -> Place {
     let place = Place::new();
     place.write("x.toml", scenario);
@@ -68,7 +68,7 @@ fn the_same_run_gives_the_same_report_and_leaves_no_half_file() {
     assert_eq!((place.read("r/report.html"), place.read("r/report.md")), first);
     let left = names(&place.path("r"));
     assert!(!left.iter().any(|name| name.ends_with(".partial")), "{left:?}");
-    // The run can be read, replayed and checked as before.
+    // The run can still be read, replayed and checked.
     assert_eq!(place.run(&["replay", "r", "--cycle", "20"]).code(), 0);
 }
 

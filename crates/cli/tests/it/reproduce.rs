@@ -1,10 +1,10 @@
-//! `reproduce`: a rehearsal leaves a report, its figures and all its numbers.
+//! `reproduce`: a quick run writes a report, its figures and all its numbers.
 
 use crate::browser::{assert_sound, chromium};
 use crate::support::{Ended, Place, names, signal, wait_for};
 use serde_json::Value;
 
-/// What stands in the folder of a report.
+/// The names in the folder of a report.
 const WHOLE: [&str; 4] = ["figures", "report.html", "report.json", "report.md"];
 
 #[test]

@@ -1,12 +1,12 @@
-//! Stopped runs: by Ctrl-C, by a kill; and what `resume` makes of them.
+//! Runs stopped by Ctrl-C or by a kill, and `resume` of them.
 
 use crate::support::{Ended, Place, names, signal, wait_for};
 use serde_json::Value;
 use sidestep_record::read_table;
 
-/// More cycles than anybody waits for.
+/// More cycles than any test waits for.
 const ENDLESS: [&str; 6] = ["run", "s.toml", "--out", "r", "--cycles", "1000000000"];
-/// Long enough to be stopped on the way.
+/// Long enough to be stopped before the end.
 const LONG: [&str; 4] = ["run", "s.toml", "--cycles", "60000"];
 
 fn manifest(place: &Place) -> Value {
@@ -29,7 +29,7 @@ fn killed(place: &Place) {
     child.wait().expect("ended");
 }
 
-/// The rows of a table are the same, in the same order.
+/// Asserts that the rows of a table are the same, in the same order.
 fn assert_same_rows(place: &Place, a: &str, b: &str) {
     for table in ["trajectories", "events"] {
         let read = |folder: &str| read_table(&place.path(folder), table, ..).expect("a table");
@@ -94,7 +94,7 @@ fn killed_then_resumed_to(place: &Place, stops: &[&str]) -> Value {
     killed(place);
     for stop in stops {
         let ended = place.run(&["resume", "r", "--cycles", stop, "--json"]);
-        // A fast machine may have been farther already.
+        // A fast machine may have gone farther already.
         assert!([0, 2].contains(&ended.code()), "{}", ended.err());
         assert_ne!(manifest(place)["status"], "complete");
     }

@@ -1,4 +1,4 @@
-//! A workplace with the binary in it.
+//! A temporary folder for the program to run in.
 
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -49,7 +49,7 @@ random = { p_open = 0.05, p_close = 0.02 }
 checkpoint_every = 700
 "##;
 
-/// A folder of its own, and the binary run in it.
+/// A temporary folder, and the program run in it.
 pub(crate) struct Place(tempfile::TempDir);
 
 impl Place {
@@ -83,18 +83,18 @@ impl Place {
         command
     }
 
-    /// Runs to the end.
+    /// Runs the program to its end.
     pub(crate) fn run(&self, args: &[&str]) -> Ended {
         Ended(self.command(args).output().expect("the binary starts"))
     }
 
-    /// Starts, with its words kept.
+    /// Starts the program and keeps its output.
     pub(crate) fn start(&self, args: &[&str]) -> Child {
         let mut command = self.command(args);
         command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the binary starts")
     }
 
-    /// The JSON of a command that must succeed.
+    /// Returns the JSON of a command that must succeed.
     pub(crate) fn json(&self, args: &[&str]) -> Value {
         let mut all = args.to_vec();
         all.push("--json");
@@ -112,7 +112,7 @@ pub(crate) fn names(folder: &Path) -> Vec<String> {
     names
 }
 
-/// What a command left.
+/// The output of a command.
 pub(crate) struct Ended(pub(crate) Output);
 
 impl Ended {
@@ -152,11 +152,11 @@ pub(crate) fn signal(child: &Child, name: &str) {
     assert!(sent.expect("kill is there").success());
 }
 
-/// A small file system of its own, as long as this lives.
+/// A small file system that lasts as long as this value.
 pub(crate) struct SmallDisk<'a>(&'a Path);
 
 impl<'a> SmallDisk<'a> {
-    /// `None` where this user may not mount.
+    /// Mounts it; `None` if this user may not mount.
     pub(crate) fn mount(at: &'a Path, size: &str) -> Option<Self> {
         std::fs::create_dir(at).expect("made");
         mount(&["-t", "tmpfs", "-o", &format!("size={size}"), "tmpfs"], at).then_some(Self(at))
@@ -178,8 +178,8 @@ fn mount(options: &[&str], at: &Path) -> bool {
     tried.is_ok_and(|o| o.status.success())
 }
 
-/// A test that needs `what`, which is not here: skips it with a word, or fails where
-/// `SIDESTEP_REQUIRE` names it.
+/// Skips a test that needs `what`, which is missing, with a message; fails if `SIDESTEP_REQUIRE`
+/// names it.
 pub(crate) fn requires(what: &str, why: &str) {
     let required = std::env::var("SIDESTEP_REQUIRE").unwrap_or_default();
     assert!(!required.split(',').any(|word| word.trim() == what), "{what} is required: {why}");

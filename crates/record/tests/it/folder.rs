@@ -1,4 +1,4 @@
-//! Run folders: made whole or not at all, written by one, resumed after a stop.
+//! Run folders: created completely or not at all, written by one process, resumed after a stop.
 
 use std::fs;
 use std::path::Path;
@@ -13,7 +13,7 @@ fn create(path: &Path) -> RunFolder {
     RunFolder::create(path, &new_run(), Existing::Refuse).unwrap()
 }
 
-/// Why `path` cannot become a run folder.
+/// Returns the reason why `path` cannot become a run folder.
 fn refusal(path: &Path, existing: Existing) -> String {
     RunFolder::create(path, &new_run(), existing).unwrap_err().to_string()
 }

@@ -1,4 +1,4 @@
-//! What the crate promises about files, tested through its public face.
+//! Tests of the guarantees of the crate about files, through its public interface.
 
 mod damage;
 mod folder;

@@ -1,4 +1,4 @@
-//! Recordings for viewers: whole or not there, the same bytes for the same run, read back.
+//! Recordings for viewers: complete or absent, the same bytes for the same run, read back.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! Other programs read what we write.
+//! Files read by other programs.
 
 use std::process::Command;
 

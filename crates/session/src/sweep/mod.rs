@@ -2,8 +2,8 @@
 //!
 //! ```text
 //! prepare.rs   every variant compiled, a plan     work.rs      cells -> outcomes, many at once
-//! journey.rs   from the plan to the table         columns.rs   tables of runs <-> files
-//! look.rs      finished runs, for reports         effort.rs    the time that all took
+//! journey.rs   from the plan to the table         effort.rs    the time that all took
+//! look.rs      finished runs, for reports
 //! ```
 
 mod effort;

@@ -1,4 +1,4 @@
-//! One build goes on with what it began, and no other.
+//! A build continues its own runs and sweeps; another one is refused.
 
 use crate::support::{Place, StopAt, WORLDS, edit};
 use crate::sweeps::sweep;
@@ -32,7 +32,7 @@ fn two_builds_do_not_mix_in_one_sweep() {
     is_refused(collect(&folder));
     is_refused(go_on(WORLDS, &folder, 1, &Unwatched));
     is_refused(planned_or_there(WORLDS, &sweep, &path, &Unwatched));
-    // A folder of before builds were told apart.
+    // A folder from before builds had identities.
     edit(&manifest, &format!("  \"build\": \"{OTHER}\",\n"), "");
     run("1/2").expect("the version is the same");
     collect(&Folder::open(&path).expect("a sweep")).expect("collected");

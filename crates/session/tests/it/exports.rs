@@ -1,4 +1,4 @@
-//! Recorded runs in other forms.
+//! Recorded runs in other formats.
 
 use crate::support::{Place, StopAt, WORLDS};
 use sidestep_session::export::{Export, Film, Form, export};

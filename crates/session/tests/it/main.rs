@@ -1,4 +1,4 @@
-//! Everything that a session does, with a world that only these tests know.
+//! Tests of everything that a session does, with a world that only these tests know.
 
 mod builds;
 mod exports;

@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// The one world of these tests.
 pub(crate) const WORLDS: Worlds = Worlds(&[&Pond]);
 
-/// A folder that is deleted in the end.
+/// A folder that is deleted when dropped.
 pub(crate) struct Place(tempfile::TempDir);
 
 impl Place {
@@ -25,13 +25,13 @@ impl Place {
         self.0.path().join(name)
     }
 
-    /// The run of the scenario, at its start.
+    /// Returns the run of the scenario, at its start.
     pub(crate) fn start(&self, workers: usize, keep: Keep<'_>) -> Result<Journey, Error> {
         let (source, compiled) = read(WORLDS, &self.path("pond.toml"), &[])?;
         Journey::start(compiled.as_ref(), &source, workers, keep, None)
     }
 
-    /// The whole run, recorded to the folder `name`.
+    /// Returns the whole run, recorded to the folder `name`.
     pub(crate) fn record(&self, name: &str) -> (PathBuf, Summary) {
         let folder = self.path(name);
         let keep = Keep { folder: Some(&folder), ..Keep::default() };
@@ -41,7 +41,7 @@ impl Place {
     }
 }
 
-/// Says no once a run has come to a cycle.
+/// A watcher that asks to stop once a run has reached a cycle.
 pub(crate) struct StopAt {
     cycle: Cycle,
     is_there: AtomicBool,

@@ -1,6 +1,6 @@
-//! Experiments: many runs under controlled differences, told apart with intervals.
+//! Experiments: many runs under controlled differences, compared with confidence intervals.
 //!
-//! `sweep/` runs many variants of one scenario, each with many seeds, and sums up what came of them
-//! as tables and figures: plain data of `sidestep_document`, which others draw.
+//! `sweep/` runs many variants of one scenario, each with many seeds, and summarizes the results as
+//! tables and figures: plain data of `sidestep_document`, which other crates draw.
 
 pub mod sweep;

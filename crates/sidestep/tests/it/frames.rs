@@ -1,4 +1,4 @@
-//! D1 for those who look on: frames change no result, of no world, and say what is so.
+//! D1 for observers: frames change no result of any world, and show the true state.
 
 use crate::chain::{SEVERAL, SWARM};
 use crate::common::{CROWD, source};

@@ -1,4 +1,4 @@
-//! Promises of the library, one module each; every module begins by quoting its promise.
+//! Promises of the library, one module each; every module starts by quoting its promise.
 
 mod airspace;
 mod airspace_traffic;

@@ -10,10 +10,10 @@ use sidestep_scenario::{Compiled, Kind, Resolved, Source};
 use std::any::Any;
 use std::sync::Arc;
 
-/// Frogs on lily pads.
+/// The world of frogs on lily pads, as the list of worlds names it.
 pub(crate) struct Pond;
 
-/// A scenario file.
+/// The sections of a scenario file.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
@@ -100,7 +100,7 @@ impl Compiled for CompiledPond {
     fn start(&self, source: &Source, workers: usize) -> Box<dyn Simulation> {
         let begin = (self.world.start(), Books::default());
         let mut run = Run::new(self.world.clone(), self.plan.clone(), begin, &source.text, workers);
-        // So small a pond would be left to one worker.
+        // A pond this small would be left to one worker.
         run.share_always();
         Box::new(run)
     }

@@ -1,5 +1,5 @@
-//! A world of frogs on lily pads, written against the kernel and the scenario format alone. It is
-//! what a fourth world needs: phases, a run, rows, a picture, and its `Kind`.
+//! A world of frogs on lily pads, written against the kernel and the scenario format alone. It
+//! shows the parts of a new world: phases, a run, rows, a picture, and its `Kind`.
 
 mod kind;
 mod rows;
@@ -16,7 +16,7 @@ use std::ops::Range;
 
 const HOP: Purpose = Purpose(1);
 
-/// Pads in rows, and frogs that hop from one to another. No pad carries two.
+/// Pads in rows, and frogs that hop from one to another. No pad carries two frogs.
 pub(crate) struct PondWorld {
     frogs: u32,
     width: u32,
@@ -24,13 +24,13 @@ pub(crate) struct PondWorld {
     streams: Streams,
 }
 
-/// The pads of all frogs.
+/// The pads of all frogs: everything that changes in a run, except sums.
 pub(crate) struct PondState {
-    /// The pad under each frog,
+    /// The pad under each frog.
     pad: Column<u32>,
-    /// the pad it wants,
+    /// The pad that each frog wants.
     goal: Column<u32>,
-    /// and the frog on each pad, counted from 1; 0 where there is none.
+    /// The frog on each pad, counted from 1; 0 if there is none.
     frog: Column<u32>,
 }
 
@@ -41,7 +41,7 @@ pub(crate) struct Saved {
     sums: Sums,
 }
 
-/// What has happened so far.
+/// Sums over the run so far.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Sums {
     hops: u64,
@@ -49,7 +49,7 @@ pub(crate) struct Sums {
 }
 
 impl PondWorld {
-    /// Frogs on every other pad.
+    /// Returns the start: frogs on every other pad.
     fn start(&self) -> PondState {
         self.with_pads((0..self.frogs).map(|frog| 2 * frog).collect())
     }
@@ -60,7 +60,7 @@ impl PondWorld {
         PondState { goal: pads.iter().copied().collect(), pad: pads.into_iter().collect(), frog }
     }
 
-    /// The pad that a frog wants: one beside its own, or its own at the bank.
+    /// Returns the pad that a frog wants: one beside its own, or its own at the bank.
     fn wanted(&self, frog: Slot, pad: u32, now: Cycle) -> u32 {
         let (column, row) = (pad % self.width, pad / self.width);
         match self.streams.draws(frog, now, HOP).below(4) {

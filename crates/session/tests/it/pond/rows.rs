@@ -1,10 +1,10 @@
-//! What is recorded of a pond.
+//! The tables that are recorded of a pond.
 
 use super::{PondState, PondWorld};
 use sidestep_kernel::ports::{Buffer, Buffers, RowBuffer, Table};
 use sidestep_kernel::{Cycle, Slot};
 
-/// Something that a frog did.
+/// An action of a frog.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Event {
     pub(super) cycle: Cycle,
@@ -18,7 +18,7 @@ pub(crate) enum What {
     Bump,
 }
 
-/// Where a frog sits at the start of a cycle.
+/// The pad of a frog at the start of a cycle.
 #[derive(Debug)]
 struct Place {
     cycle: Cycle,
@@ -41,7 +41,7 @@ fn events() -> Table<Event> {
         .label("event", "what happened", ["hop", "bump"], |e| e.what as u32)
 }
 
-/// Rows that wait to be handed over.
+/// Rows that wait to be passed on.
 #[derive(Debug, Default)]
 pub(super) struct Rows {
     places: RowBuffer<Place>,

@@ -1,4 +1,4 @@
-//! What a run asks of a pond beside its phases.
+//! The hooks of a run of the pond, beside its phases.
 
 use super::rows::{Event, Rows, What};
 use super::{PondState, PondWorld, Saved, Sums};
@@ -10,7 +10,7 @@ use sidestep_kernel::view::{Axis, Body, Frame, Kind, Look, PlaceRows, Pose, Scen
 use sidestep_kernel::words::{Lines, Said, line};
 use sidestep_kernel::{Cycle, Digest, Effort, World};
 
-/// What a run keeps beside the state.
+/// The part of a run that is kept beside the state.
 #[derive(Debug, Default)]
 pub(crate) struct Books {
     sums: Sums,

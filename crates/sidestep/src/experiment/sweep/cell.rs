@@ -6,39 +6,39 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use sidestep_kernel::{Cycle, InputError, Simulation};
 
-/// Cycles between two looks at whether to go on.
+/// Cycles between two checks whether to go on.
 const SLICE: Cycle = 256;
 
-/// How a metric's name ends that a clock has measured: it is told beside the results, for it is not
-/// the same when the cell is run again.
+/// Endings of the names of metrics that a clock measured: they are kept beside the results, because
+/// they differ when the cell is run again.
 const BY_CLOCK: [&str; 2] = ["cpu_s", "wall_s"];
 
-/// What came of a cell.
+/// The outcome of a cell.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
     /// Number of the cell.
     pub cell: u64,
     /// Cycles that were run.
     pub cycles: Cycle,
-    /// Digest of the last state, in hexadecimal; empty where the run failed.
+    /// Digest of the last state, in hexadecimal; empty if the run failed.
     pub digest: String,
-    /// Why the run failed: a bug, for wrong scenarios are found before.
+    /// The reason why the run failed: a bug, because wrong scenarios are found earlier.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub failure: Option<String>,
     /// The metrics, by dotted name: numbers, truth values and text.
     pub metrics: Map<String, Value>,
-    /// What it took, by dotted name, in seconds; not the same when it is run again.
+    /// The times that it took, by dotted name, in seconds; they differ when it is run again.
     pub costs: Map<String, Value>,
 }
 
-/// A cell's simulation.
+/// The simulation of a cell, at its start.
 pub struct Started {
     cell: Cell,
     simulation: Box<dyn Simulation>,
     until: Cycle,
 }
 
-/// The simulation of a cell of the variant `source`, of one of `worlds`, at its start.
+/// Returns the simulation of a cell of the variant `source`, of one of `worlds`, at its start.
 ///
 /// # Errors
 /// When the scenario is wrong with this seed.
@@ -54,7 +54,7 @@ pub fn start(
     Ok(Started { cell, simulation: compiled.start(&source, workers), until })
 }
 
-/// Names of the metrics that runs of a scenario have, in order.
+/// Returns the names of the metrics that runs of a scenario have, in order.
 pub fn metric_names(simulation: &dyn Simulation) -> Vec<String> {
     let names = flat(&simulation.metrics()).into_iter().map(|(name, _)| name);
     let names = names.filter(|name| !is_by_clock(name));
@@ -66,7 +66,7 @@ fn is_by_clock(name: &str) -> bool {
 }
 
 impl Started {
-    /// Runs to the end; `None` as soon as `go_on` says no.
+    /// Runs to the end; returns `None` as soon as `go_on` returns false.
     pub fn run(mut self, go_on: &dyn Fn() -> bool) -> Option<Outcome> {
         let simulation = self.simulation.as_mut();
         while simulation.cycle() < self.until && !simulation.is_over() {
@@ -80,7 +80,7 @@ impl Started {
 }
 
 impl Outcome {
-    /// What came of a simulation that has ended.
+    /// Returns the outcome of a simulation that has ended.
     pub fn of(cell: Cell, simulation: &dyn Simulation) -> Self {
         let (costs, metrics) =
             flat(&simulation.metrics()).into_iter().partition(|(name, _)| is_by_clock(name));
@@ -94,7 +94,7 @@ impl Outcome {
         }
     }
 
-    /// A cell whose simulation broke a rule of its own.
+    /// Returns the outcome of a cell whose simulation broke one of its own rules.
     pub fn failed(cell: Cell, why: impl Into<String>) -> Self {
         Self {
             cell: cell.id,
@@ -107,8 +107,8 @@ impl Outcome {
     }
 }
 
-/// Nested tables as dotted names. Lists of tables become their number (`NAME_count`); lists of
-/// numbers (histograms) are left out, for they are no single figure.
+/// Returns nested tables as dotted names. Lists of tables become their number (`NAME_count`); lists
+/// of numbers (histograms) are left out, because they are not a single value.
 fn flat(value: &Value) -> Map<String, Value> {
     let mut found = Map::new();
     add(&mut found, "", value);

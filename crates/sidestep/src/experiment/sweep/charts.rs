@@ -1,10 +1,10 @@
 //! A summary as figures: each metric over each parameter.
 //!
-//! A numeric parameter gives lines, one for each combination of the other parameters; where
-//! these are more than [`SERIES`], numbers among them are averaged over, then words too. A
-//! parameter of words gives bars. Averages are only taken in full grids. Where no line would
-//! have two points, as in a Latin hypercube, the variants are points. Without parameters the
-//! variants are bars, and one variant is its distribution over runs.
+//! A numeric parameter gives lines, one for each combination of the other parameters; if there are
+//! more than [`SERIES`] of these, numeric parameters among them are averaged over, then also
+//! parameters of words. A parameter of words gives bars. Averages are only taken in full grids. If
+//! no line would have two points, as in a Latin hypercube, the variants are points. Without
+//! parameters the variants are bars, and a single variant is shown by its distribution over runs.
 
 use super::Label;
 use super::groups::Groups;
@@ -16,10 +16,10 @@ use sidestep_document::{Figure, FigureKind, Series};
 use sidestep_kernel::ports::Values;
 use std::collections::BTreeMap;
 
-/// Series in a figure at most: more cannot be told apart.
+/// Largest number of series in a figure: more cannot be distinguished.
 const SERIES: usize = 8;
 
-/// Steps of a distribution at most.
+/// Largest number of steps of a distribution.
 const STEPS: usize = 200;
 
 pub(super) fn figures(groups: &Groups<'_>, metric: &RunColumn) -> Vec<Figure> {
@@ -45,7 +45,7 @@ fn others(groups: &Groups<'_>, parameter: usize) -> Vec<usize> {
     (0..groups.parameters.len()).filter(|p| *p != parameter).collect()
 }
 
-/// The variants by their levels of these parameters.
+/// Returns the variants by their levels of these parameters.
 fn grouped(groups: &Groups<'_>, parameters: &[usize]) -> BTreeMap<Vec<usize>, Vec<usize>> {
     let mut found: BTreeMap<Vec<usize>, Vec<usize>> = BTreeMap::new();
     for variant in 0..groups.variants.len() {
@@ -55,7 +55,7 @@ fn grouped(groups: &Groups<'_>, parameters: &[usize]) -> BTreeMap<Vec<usize>, Ve
     found
 }
 
-/// The parameters that tell the series of a figure over `parameter` apart; `None` where there
+/// Returns the parameters that distinguish the series of a figure over `parameter`; `None` if there
 /// would be too many, and an average would mix.
 fn apart(groups: &Groups<'_>, parameter: usize) -> Option<Vec<usize>> {
     let all = others(groups, parameter);
@@ -107,7 +107,7 @@ fn over_parameter(groups: &Groups<'_>, metric: &RunColumn, parameter: usize) -> 
     Some(figure(title, over.to_string(), metric, kind, series.collect()))
 }
 
-/// Where a level stands on the axis.
+/// Returns the position of a level on the axis.
 fn place(groups: &Groups<'_>, parameter: usize, level: usize) -> f64 {
     match groups.parameters[parameter].levels[level] {
         super::groups::Level::Number(value) => value,
@@ -115,7 +115,7 @@ fn place(groups: &Groups<'_>, parameter: usize, level: usize) -> f64 {
     }
 }
 
-/// Each variant a point.
+/// Returns a figure with one point per variant.
 fn scatter(groups: &Groups<'_>, metric: &RunColumn, parameter: usize) -> Figure {
     let axis = &groups.parameters[parameter];
     let point = |variant: usize| {
@@ -146,7 +146,7 @@ fn of_variants(groups: &Groups<'_>, metric: &RunColumn) -> Figure {
     figure(title, "variant".into(), metric, kind, vec![Series { name: String::new(), points }])
 }
 
-/// The share of runs up to each value, with Wilson's intervals. A share of runs has none.
+/// Returns the share of runs up to each value, with Wilson's intervals; `None` for a share of runs.
 fn distribution(groups: &Groups<'_>, metric: &RunColumn) -> Option<Figure> {
     if matches!(metric.values, Values::Bool(_)) {
         return None;
@@ -188,7 +188,7 @@ fn figure(
     Figure { title, x_label, y_label, kind, series, ..Figure::default() }
 }
 
-/// How many runs the variants have.
+/// Returns the number of runs of the variants as text.
 fn runs(groups: &Groups<'_>) -> String {
     let of = |v| groups.runs_of(v);
     let all = 0..groups.variants.len();

@@ -6,44 +6,45 @@ use crate::statistics::{Bootstrap, Interval, Pairs, holm};
 use serde::Serialize;
 use sidestep_kernel::ports::Values;
 
-/// How a variant differs from the baseline in one metric, pair by pair of equal replicates.
+/// Difference between a variant and the baseline in one metric, over pairs of equal replicates.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Comparison {
     /// The variant.
     pub variant: String,
-    /// Pairs of which both have a value.
+    /// Number of pairs in which both have a value.
     pub pairs: usize,
-    /// Replicates of which one has a value and the other none.
+    /// Number of replicates in which only one has a value.
     pub incomplete: usize,
     /// Mean of variant minus baseline.
     pub difference: Option<f64>,
-    /// Student's 95 % interval of it.
+    /// Student's 95 % confidence interval of the difference.
     pub interval: Option<Interval>,
-    /// The bootstrap's 95 % interval of it.
+    /// The bootstrap's 95 % confidence interval of the difference.
     pub bootstrap: Option<Interval>,
-    /// Mean of the variant over mean of the baseline; where no value is negative and the
+    /// Mean of the variant divided by the mean of the baseline, if no value is negative and the
     /// baseline's mean is well away from 0.
     pub ratio: Option<f64>,
-    /// Fieller's 95 % interval of it.
+    /// Fieller's 95 % confidence interval of the ratio.
     pub ratio_interval: Option<Interval>,
-    /// The bootstrap's 95 % interval of it.
+    /// The bootstrap's 95 % confidence interval of the ratio.
     pub ratio_bootstrap: Option<Interval>,
-    /// Pairs in which the variant is lower,
+    /// Number of pairs in which the variant is lower.
     pub lower: usize,
-    /// equal,
+    /// Number of pairs in which both are equal.
     pub equal: usize,
-    /// and higher.
+    /// Number of pairs in which the variant is higher.
     pub higher: usize,
-    /// P-value of no difference: Student's paired test; of a share the exact sign test, which
-    /// is McNemar's.
+    /// P-value of no difference: Student's paired test; for a share the exact sign test, which is
+    /// McNemar's.
     pub p: Option<f64>,
-    /// The same, adjusted by Holm over all variants compared in this metric.
+    /// The same p-value, adjusted by Holm over all variants compared in this metric.
     pub p_holm: Option<f64>,
-    /// P-value of the exact sign test, which assumes nothing of the distribution; not adjusted.
+    /// P-value of the exact sign test, which makes no assumption about the distribution; not
+    /// adjusted.
     pub p_sign: Option<f64>,
 }
 
-/// All other variants against `baseline` in one metric.
+/// Returns the comparison of every other variant with `baseline` in one metric.
 pub(super) fn comparisons(
     groups: &Groups<'_>,
     metric: &RunColumn,
@@ -55,7 +56,7 @@ pub(super) fn comparisons(
     let others = (0..groups.variants.len()).filter(|v| *v != baseline);
     let mut all: Vec<Comparison> = others
         .map(|variant| {
-            // Replicates that neither has are no pairs.
+            // Replicates that neither has are not pairs.
             let own = groups.by_replicate(metric, variant);
             let there = own.iter().zip(&base).filter(|(a, b)| a.is_some() || b.is_some());
             let (own, base): (Vec<_>, Vec<_>) = there.map(|(a, b)| (*a, *b)).unzip();

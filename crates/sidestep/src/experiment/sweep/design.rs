@@ -1,17 +1,17 @@
-//! Which variants of a scenario are run.
+//! The variants of a scenario that a sweep runs.
 
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::math::{exp, ln};
 use sidestep_kernel::{InputError, Seed, stream::Purpose, stream::Streams};
 use toml::Value;
 
-/// Variants that a sweep may have.
+/// Largest number of variants of a sweep.
 pub const MAX_VARIANTS: usize = 1_000_000;
 
-/// The stream of a hypercube's permutations and places.
+/// The random stream of a hypercube's permutations and places.
 const PLACES: Purpose = Purpose(0);
 
-/// A key of the scenario, and what it is set to.
+/// A key of the scenario, and the value that it is set to.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Setting {
     /// Path of the key, e.g. `robots.count`.
@@ -21,10 +21,10 @@ pub struct Setting {
 }
 
 impl Setting {
-    /// Parses `key=value`, where the value is TOML, or else text.
+    /// Parses `key=value`, where the value is TOML, or otherwise text.
     ///
     /// # Errors
-    /// Without `=` or key.
+    /// When `=` or the key is missing.
     pub fn parse(text: &str) -> Result<Self, InputError> {
         let remedy = "write key=value, e.g. robots.count=20";
         let wrong = |cause: &str| InputError::new(text, cause, remedy);
@@ -36,7 +36,8 @@ impl Setting {
         Ok(Self { key: key.into(), value: parse_value(value.trim()) })
     }
 
-    /// As an override of a scenario, see [`Source::with`](crate::scenario::Source::with).
+    /// Returns the setting as an override of a scenario, see
+    /// [`Source::with`](crate::scenario::Source::with).
     pub fn to_override(&self) -> String {
         format!("{}={}", self.key, self.value)
     }
@@ -52,11 +53,11 @@ pub struct Factor {
 }
 
 impl Factor {
-    /// Parses `robots.count=10,20,40` or `regime=both,sensors`. Values are TOML; what is not is
-    /// taken as text.
+    /// Parses `robots.count=10,20,40` or `regime=both,sensors`. Values are TOML; anything else is
+    /// text.
     ///
     /// # Errors
-    /// Without `=`, key or value.
+    /// When `=`, the key or all values are missing.
     pub fn parse(text: &str) -> Result<Self, InputError> {
         let place = format!("--vary {text}");
         let remedy = "write --vary key=value,value, e.g. --vary robots.count=10,20,40";
@@ -73,7 +74,7 @@ impl Factor {
     }
 }
 
-/// A list of TOML values, else of words between commas.
+/// Returns a list of TOML values, or otherwise of words separated by commas.
 fn parse_values(text: &str) -> Vec<Value> {
     if let Ok(table) = format!("v = [{text}]").parse::<toml::Table>()
         && let Some(Value::Array(values)) = table.get("v")
@@ -83,22 +84,22 @@ fn parse_values(text: &str) -> Vec<Value> {
     text.split(',').map(|word| parse_value(word.trim())).collect()
 }
 
-/// A TOML value, else a word.
+/// Returns a TOML value, or otherwise a word.
 fn parse_value(word: &str) -> Value {
     let table = format!("v = {word}").parse::<toml::Table>().ok();
     let only = table.filter(|t| t.len() == 1).and_then(|mut t| t.remove("v"));
     only.unwrap_or_else(|| Value::String(word.into()))
 }
 
-/// Samples that fill a box evenly: of each range every n-th part is met once (McKay, Beckman,
-/// Conover, "A comparison of three methods for selecting values of input variables", 1979).
+/// Latin hypercube sampling: of each range, every n-th part is used once (McKay, Beckman, Conover,
+/// "A comparison of three methods for selecting values of input variables", 1979).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hypercube {
     /// Number of samples, at least 1.
     pub samples: usize,
-    /// From which places and pairings grow.
+    /// Random seed of places and pairings.
     pub seed: u64,
-    /// The sides.
+    /// The sides of the box.
     pub ranges: Vec<Range>,
 }
 
@@ -107,20 +108,20 @@ pub struct Hypercube {
 pub struct Range {
     /// Path of the key.
     pub key: String,
-    /// Its least value.
+    /// Its smallest value.
     pub low: f64,
-    /// Its greatest value; `low` < `high`.
+    /// Its largest value; `low` < `high`.
     pub high: f64,
-    /// Whether parts are equal in the logarithm; both ends are above 0 then.
+    /// Whether parts are equal in the logarithm; both ends must be above 0 then.
     pub is_log: bool,
     /// Whether the values are whole numbers, both ends included.
     pub is_integer: bool,
 }
 
 impl Range {
-    /// The value at `share` (from 0 up to, not including, 1) of the way from `low` to `high`.
+    /// Returns the value at `share` (0 included, 1 excluded) of the way from `low` to `high`.
     fn at(&self, share: f64) -> Value {
-        // Each whole number has an equal part of the way.
+        // Each whole number gets an equal part of the range.
         let (low, high) =
             if self.is_integer { (self.low, self.high + 1.0) } else { (self.low, self.high) };
         let value = match self.is_log {
@@ -136,13 +137,14 @@ impl Range {
 }
 
 impl Hypercube {
-    /// All samples, in order.
+    /// Returns all samples, in order.
     fn samples(&self) -> Vec<Vec<Setting>> {
         let streams = Streams::new(Seed(self.seed));
         let sides: Vec<Vec<Value>> = (0u32..)
             .zip(&self.ranges)
             .map(|(side, range)| {
-                // One stream a side and sample: a stream has 2^18 words, samples may be more.
+                // One stream per side and sample, because a stream has 2^18 words and there may be
+                // more samples.
                 let mut parts: Vec<usize> = (0..self.samples).collect();
                 for k in (1..self.samples).rev() {
                     let mut draws = streams.draws(side, 2 * k as u64, PLACES);
@@ -166,26 +168,26 @@ impl Hypercube {
 }
 
 /// All variants of a sweep: every entry of the list (or sample of the hypercube) with every
-/// combination of the factors' values. Without any of them, the scenario as it is.
+/// combination of the factors' values. Without any of them, the scenario unchanged.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Design {
     /// Variants that are listed one by one.
     pub list: Vec<Vec<Setting>>,
-    /// Samples of a box.
+    /// Samples of a hypercube.
     pub hypercube: Option<Hypercube>,
-    /// Keys that are varied each by itself; the last one changes first.
+    /// Keys that are varied independently; the last one changes first.
     pub factors: Vec<Factor>,
 }
 
 impl Design {
-    /// Number of variants, or `None` beyond what a number holds.
+    /// Returns the number of variants, or `None` if it is too large for an integer.
     fn len(&self) -> Option<usize> {
         let samples = self.hypercube.as_ref().map_or(1, |h| h.samples);
         let start = self.list.len().max(1).checked_mul(samples)?;
         self.factors.iter().try_fold(start, |n, factor| n.checked_mul(factor.values.len()))
     }
 
-    /// The settings of each variant.
+    /// Returns the settings of each variant.
     ///
     /// # Errors
     /// When a key is set twice in a variant, or there are more than [`MAX_VARIANTS`].
@@ -225,7 +227,8 @@ impl Design {
 }
 
 impl Design {
-    /// What is asked for twice, if anything. Samples of a hypercube may meet: whole numbers are few.
+    /// Checks that nothing is requested twice. Samples of a hypercube may coincide, because whole
+    /// numbers are few.
     fn check_different(&self) -> Result<(), String> {
         for (k, entry) in self.list.iter().enumerate() {
             if self.list[..k].contains(entry) {
@@ -244,7 +247,7 @@ impl Design {
     }
 }
 
-/// Every one of `firsts` with every one of `seconds`; the firsts where there are no seconds.
+/// Returns every one of `firsts` with every one of `seconds`; the firsts if there are no seconds.
 fn product(firsts: Vec<Vec<Setting>>, seconds: &[Vec<Setting>]) -> Vec<Vec<Setting>> {
     if seconds.is_empty() {
         return firsts;
@@ -253,7 +256,7 @@ fn product(firsts: Vec<Vec<Setting>>, seconds: &[Vec<Setting>]) -> Vec<Vec<Setti
     firsts.iter().flat_map(|a| seconds.iter().map(move |b| joined(a, b))).collect()
 }
 
-/// The first key that is set twice.
+/// Checks that no key is set twice; the error is the first such key.
 fn check_keys(variant: &[Setting]) -> Result<(), &str> {
     let twice = |k: &usize| variant[..*k].iter().any(|s| s.key == variant[*k].key);
     match (0..variant.len()).find(twice) {

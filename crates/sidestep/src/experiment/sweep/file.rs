@@ -1,4 +1,4 @@
-//! A sweep file: which scenario, what differs, how often it is run.
+//! A sweep file: the scenario, its variants, and the number of runs.
 
 use super::design::{self, Design, Factor, Hypercube, Setting};
 use crate::scenario::{FORMAT, Source};
@@ -9,52 +9,53 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use toml::{Spanned, Value};
 
-/// Runs of each variant, unless it is said.
+/// Default number of runs of each variant.
 const REPLICATES: u32 = 10;
-/// Runs of each variant at most, where a wanted precision ends them, unless it is said.
+/// Default of the largest number of runs of each variant, if a precision ends them.
 pub const MAX_RUNS: u32 = 1000;
-/// Samples of a hypercube and runs of a variant are at most so many.
+/// Largest number of samples of a hypercube, and of runs of a variant.
 const MOST: u64 = 1_000_000;
 
-/// A sweep as it is asked for.
+/// The description of a sweep, as requested.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sweep {
-    /// How errors name it.
+    /// The name that errors give for its place.
     pub place: String,
     /// Its name; may be empty.
     pub name: String,
     /// The scenario's file.
     pub scenario: PathBuf,
-    /// What every variant sets, before its own settings.
+    /// Settings of every variant, applied before its own.
     pub fixed: Vec<Setting>,
-    /// What differs.
+    /// The variants.
     pub design: Design,
-    /// Runs of each variant, at most; at least 1.
+    /// Largest number of runs of each variant; at least 1.
     pub replicates: u32,
-    /// The first run's seed, if not the scenario's.
+    /// The seed of the first run, if it is not the scenario's.
     pub first_seed: Option<u64>,
-    /// When a variant has been run often enough, if not after all its replicates.
+    /// The precision at which a variant has had enough runs, if it is not run for all replicates.
     pub until: Option<Until>,
-    /// The metrics to report; all that vary if none are named.
+    /// The metrics to report; all that vary if empty.
     pub metrics: Vec<String>,
-    /// Settings of the variant that others are compared with; none for no comparison.
+    /// Settings of the variant that others are compared with; empty for no comparison.
     pub baseline: Vec<Setting>,
-    /// Whether every run is recorded to a folder of its own.
+    /// Whether every run is recorded in a folder of its own.
     pub record: bool,
 }
 
-/// A wanted precision: a variant is run until 95 % intervals of means are so narrow.
+/// A requested precision: a variant is run until the 95 % confidence intervals of means are this
+/// narrow.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Until {
-    /// Half the width of the interval, at most; above 0.
+    /// Largest half width of the interval; above 0.
     pub half_width: f64,
-    /// Whether that is a share of the mean.
+    /// Whether the half width is a share of the mean.
     pub is_relative: bool,
-    /// Of which metrics; of all that vary if none are named.
+    /// The metrics it applies to; all that vary if empty.
     pub metrics: Vec<String>,
 }
 
-/// `ci=0.05` is a share of the mean, `abs=2.5` is in the metric's unit.
+/// Parses `ci=0.05`, a share of the mean, or `abs=2.5`, in the metric's unit.
 impl FromStr for Until {
     type Err = String;
 
@@ -74,7 +75,7 @@ impl FromStr for Until {
     }
 }
 
-/// The file as it stands.
+/// The keys of the file.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct SweepFile {
@@ -134,7 +135,7 @@ const OF_SWEEPS: [&str; 6] =
     ["replicates", "vary", "variant", "latin_hypercube", "until", "baseline"];
 
 impl Sweep {
-    /// A sweep of the scenario as it is, ten times.
+    /// Returns a sweep of the unchanged scenario, with ten runs.
     pub fn of_scenario(scenario: impl Into<PathBuf>) -> Self {
         let scenario = scenario.into();
         Self {
@@ -152,11 +153,11 @@ impl Sweep {
         }
     }
 
-    /// Reads a sweep file; a scenario file stands for [`Sweep::of_scenario`]. Which it is, the key
-    /// `scenario` says.
+    /// Reads a sweep file; a scenario file stands for [`Sweep::of_scenario`]. The key `scenario`
+    /// distinguishes the two.
     ///
     /// # Errors
-    /// When it cannot be read, or anything in it is wrong.
+    /// When the file cannot be read, or anything in it is wrong.
     pub fn read(path: &Path) -> Result<Self, InputError> {
         let is_toml = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
         if !is_toml {
@@ -164,7 +165,7 @@ impl Sweep {
         }
         let source = Source::read(path, &[])?;
         let table: toml::Table = source.parse()?;
-        // A misspelled `scenario` is better told by the reader of sweeps.
+        // A file with a misspelled `scenario` gets a better error from the reader of sweeps.
         let is_sweep = |t: &toml::Table| OF_SWEEPS.iter().any(|key| t.contains_key(*key));
         if table.contains_key("scenario") || (!table.contains_key("world") && is_sweep(&table)) {
             Self::parse(&source)
@@ -173,7 +174,7 @@ impl Sweep {
         }
     }
 
-    /// A sweep from the text of a sweep file.
+    /// Reads a sweep from the text of a sweep file.
     ///
     /// # Errors
     /// When anything in it is wrong.
@@ -225,7 +226,7 @@ impl Sweep {
         })
     }
 
-    /// Checks what no scenario can be swept over.
+    /// Checks for keys that a sweep cannot vary.
     ///
     /// # Errors
     /// When seeds are varied as if they were a parameter.
@@ -243,12 +244,12 @@ impl Sweep {
     }
 }
 
-/// Nested tables as dotted keys.
+/// Returns nested tables as dotted keys.
 fn settings(table: &toml::Table) -> Vec<Setting> {
     leaves(table, &|_| false).into_iter().map(|(key, value)| Setting { key, value }).collect()
 }
 
-/// All values below a table with their dotted keys; tables of which `is_leaf` holds are values.
+/// Returns all values below a table with dotted keys; tables for which `is_leaf` holds are values.
 fn leaves(table: &toml::Table, is_leaf: &impl Fn(&toml::Table) -> bool) -> Vec<(String, Value)> {
     let mut found = Vec::new();
     for (key, value) in table {

@@ -14,7 +14,7 @@ use std::collections::{BTreeMap, BTreeSet};
 pub enum Level {
     /// A number.
     Number(f64),
-    /// Words; empty where the parameter is not given.
+    /// Text; empty if the parameter is not set.
     Text(String),
 }
 
@@ -35,9 +35,9 @@ pub struct Parameter {
     pub name: String,
     /// Whether all its values are numbers.
     pub numeric: bool,
-    /// Its values: numbers ascending, words in the order they first come.
+    /// Its values: numbers in ascending order, text in order of first use.
     pub levels: Vec<Level>,
-    /// The level of every variant, by its place in `levels`.
+    /// The level of every variant, as an index into `levels`.
     #[serde(skip)]
     pub(super) of_variant: Vec<usize>,
 }
@@ -47,9 +47,9 @@ pub(super) struct Groups<'a> {
     pub(super) table: &'a RunTable,
     /// Names of the variants, in the order of their first runs.
     pub(super) variants: Vec<String>,
-    /// All replicates that any variant has.
+    /// All replicates of any variant.
     pub(super) replicates: Vec<i64>,
-    /// Whether the same replicate of two variants has something in common.
+    /// Whether equal replicates of two variants are related by a common seed.
     pub(super) paired: bool,
     pub(super) parameters: Vec<Parameter>,
     /// The run of each variant and replicate.
@@ -57,7 +57,7 @@ pub(super) struct Groups<'a> {
 }
 
 impl<'a> Groups<'a> {
-    /// Sorts the runs of `table`.
+    /// Groups the runs of `table`.
     pub(super) fn of(table: &'a RunTable) -> Result<Self, InputError> {
         table.check()?;
         let runs = ordered(table);
@@ -90,33 +90,33 @@ impl<'a> Groups<'a> {
         Ok(Self { table, variants, replicates, paired, parameters, run: run_of })
     }
 
-    /// Number of runs of a variant.
+    /// Returns the number of runs of a variant.
     pub(super) fn runs_of(&self, variant: usize) -> usize {
         self.run.range((variant, i64::MIN)..=(variant, i64::MAX)).count()
     }
 
-    /// Rows of a variant, by replicate.
+    /// Returns the rows of a variant, by replicate.
     pub(super) fn rows(&self, variant: usize) -> impl Iterator<Item = usize> {
         self.run.range((variant, i64::MIN)..=(variant, i64::MAX)).map(|(_, run)| *run)
     }
 
-    /// Values of a variant, one for each of its runs.
+    /// Returns the values of a variant, one for each of its runs.
     pub(super) fn values(&self, metric: &RunColumn, variant: usize) -> Vec<Option<f64>> {
         self.rows(variant).map(|run| metric.values.number(run)).collect()
     }
 
-    /// Values of a variant, one for each replicate of the whole table.
+    /// Returns the values of a variant, one for each replicate of the whole table.
     pub(super) fn by_replicate(&self, metric: &RunColumn, variant: usize) -> Vec<Option<f64>> {
         let value = |r: &i64| metric.values.number(*self.run.get(&(variant, *r))?);
         self.replicates.iter().map(value).collect()
     }
 
-    /// The mean over a group of variants.
+    /// Returns the mean over a group of variants.
     ///
-    /// Of one variant it is the mean of its runs, with Wilson's interval for a share. Of several
-    /// each replicate gives one number, the mean over the group, and Student's interval is that
-    /// of these numbers: replicates are independent, the variants of one replicate are not.
-    /// Replicates of which a variant has no value do not count.
+    /// For one variant it is the mean of its runs, with Wilson's interval for a share. For several,
+    /// each replicate gives one number, the mean over the group, and Student's interval is that of
+    /// these numbers, because replicates are independent but the variants of one replicate are not.
+    /// Replicates without a value in some variant do not count.
     pub(super) fn mean_over(&self, metric: &RunColumn, group: &[usize]) -> Estimate {
         if let [variant] = group {
             let values = self.values(metric, *variant);
@@ -134,7 +134,7 @@ impl<'a> Groups<'a> {
         Estimate::of((0..self.replicates.len()).map(mean))
     }
 
-    /// Whether every level of `parameter` meets the same levels of all others, as in a full
+    /// Whether every level of `parameter` occurs with the same levels of all others, as in a full
     /// grid: only then does a mean over the others compare like with like.
     pub(super) fn is_balanced(&self, parameter: usize) -> bool {
         let mut others = vec![Vec::new(); self.parameters[parameter].levels.len()];
@@ -149,7 +149,7 @@ impl<'a> Groups<'a> {
         others.windows(2).all(|pair| pair[0] == pair[1])
     }
 
-    /// Variants that have this level.
+    /// Returns the variants that have this level.
     pub(super) fn with_level(&self, parameter: usize, level: usize) -> Vec<usize> {
         let of = &self.parameters[parameter].of_variant;
         (0..of.len()).filter(|v| of[*v] == level).collect()
@@ -163,7 +163,7 @@ fn share(values: &[Option<f64>]) -> Estimate {
     Estimate { mean: crate::statistics::mean(&values), interval, n }
 }
 
-/// Rows in the order of their cells.
+/// Returns the rows in the order of their cells.
 fn ordered(table: &RunTable) -> Vec<usize> {
     let mut rows: Vec<usize> = (0..table.runs()).collect();
     if let Some(cell) = table.of_role(Role::Cell).next() {
@@ -175,7 +175,7 @@ fn ordered(table: &RunTable) -> Vec<usize> {
     rows
 }
 
-/// The variant's name, or where the table has none what its parameters are.
+/// Returns the variant's name, or its parameters if the table has no names.
 fn variant_name(table: &RunTable, run: usize) -> String {
     if let Some(column) = table.of_role(Role::Variant).next() {
         return column.values.text(run);
@@ -187,7 +187,7 @@ fn variant_name(table: &RunTable, run: usize) -> String {
     if parts.is_empty() { "all runs".into() } else { parts.join(", ") }
 }
 
-/// The parameters that differ between variants and not within one.
+/// Returns the parameters that differ between variants and not within one.
 fn parameters(
     table: &RunTable,
     run_of: &BTreeMap<(usize, i64), usize>,

@@ -1,21 +1,21 @@
-//! Names with units in them, taken apart.
+//! Names with units in them, split into words and unit.
 
 use serde::Serialize;
 use sidestep_kernel::ports::table::split_unit;
 use std::fmt;
 
-/// What a column is called on an axis. Displayed as `mean delay (%)`.
+/// The label of a column on an axis. Displayed as `mean delay (%)`.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Label {
     /// The quantity in words.
     pub text: String,
-    /// Its unit, where the name ends with one.
+    /// Its unit, if the name ends with one.
     pub unit: Option<&'static str>,
 }
 
 impl Label {
-    /// The label of a column: `mean_delay_percent` is "mean delay", in %. The path of a key
-    /// stays as it is, since it is what one writes: `chains.gap_m` is "chains.gap", in m.
+    /// Returns the label of a column: `mean_delay_percent` is "mean delay", in %. The path of a key
+    /// stays as it is, because users write it so: `chains.gap_m` is "chains.gap", in m.
     pub fn of(name: &str) -> Self {
         let (quantity, unit) = split_unit(name);
         let text = if name.contains('.') { quantity.into() } else { quantity.replace('_', " ") };

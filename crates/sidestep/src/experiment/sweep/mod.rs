@@ -1,27 +1,27 @@
-//! Sweeps: one scenario, many variants of it, each run with many seeds, and what they come to.
+//! Sweeps: many variants of one scenario, each run with many seeds, and their results.
 //!
 //! ```text
 //! file.rs      a sweep file (TOML) -> Sweep, with errors that point
-//! design.rs    which variants: a full grid, a list, a Latin hypercube, or products of them
-//! plan.rs      variants x replicates -> cells, and who runs which
+//! design.rs    the variants: a full grid, a list, a Latin hypercube, or products of them
+//! plan.rs      variants x replicates -> cells, and shares of them
 //! cell.rs      one cell -> one outcome: a deterministic run, so a lost one is simply run again
 //! work.rs      cells -> results, many at once
-//! rounds.rs    which cells are next, where a wanted precision says when to stop
-//! rows.rs      outcomes -> a table of runs, the same in whatever order they came
+//! rounds.rs    the next cells, if a requested precision decides when to stop
+//! rows.rs      outcomes -> a table of runs, the same for any order of arrival
 //!
-//! table.rs     a table of runs: a row a run, typed columns with a role
-//! label.rs     what a column is called on an axis, with its unit
+//! table.rs     a table of runs: one row per run, typed columns with a role
+//! label.rs     the label of a column on an axis, with its unit
 //! groups.rs    runs by variant and replicate, and the mean over any group of variants
 //! compare.rs   a variant against the baseline, on the same replicates
-//! summary.rs   the table summed up: every number with its interval and number of runs
+//! summary.rs   a summary of the table: every number with its interval and number of runs
 //! text.rs      the summary as tables
 //! charts.rs    the summary as figures
 //! ```
 //!
 //! The unit of work is a *cell*: a variant and a seed. Replicate `k` of every variant has the same
 //! seed (common random numbers), so that differences between variants are compared pair by pair.
-//! Nothing here knows of files that are written, nor of processes: a row is a function of its
-//! cell alone, whoever computes it, where and in what order.
+//! Nothing here writes files or starts processes: a row is a function of its cell alone, whoever
+//! computes it, where and in what order.
 
 pub mod cell;
 mod charts;

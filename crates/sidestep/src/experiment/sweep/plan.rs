@@ -1,4 +1,4 @@
-//! The cells of a sweep, and who runs which.
+//! The cells of a sweep, and their shares.
 
 use super::design::Setting;
 use super::file::{Sweep, Until};
@@ -12,10 +12,11 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::str::FromStr;
 
-/// Everything that is to be run: variants times replicates.
+/// All runs of a sweep: variants times replicates.
 ///
-/// Cell `variant * replicates + replicate`, so rows sorted by cell are sorted by variant. They are
-/// run replicate by replicate: what is done first is a small whole experiment.
+/// A cell has the number `variant * replicates + replicate`, so rows sorted by cell are sorted by
+/// variant. Cells are run replicate by replicate, so that the first results are a small complete
+/// experiment.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
     /// Name of the sweep; may be empty.
@@ -26,39 +27,39 @@ pub struct Plan {
     pub parameters: Vec<String>,
     /// The variants.
     pub variants: Vec<Variant>,
-    /// Runs of each variant, at most.
+    /// Largest number of runs of each variant.
     pub replicates: u32,
     /// The seed of replicate 0; replicate `k` has this plus `k`.
     pub first_seed: u64,
-    /// When a variant has been run often enough, if not after all its replicates.
+    /// The precision at which a variant has had enough runs, if it is not run for all replicates.
     pub until: Option<Until>,
-    /// The metrics to report; all that vary if none are named.
+    /// The metrics to report; all that vary if empty.
     pub metrics: Vec<String>,
     /// The variant that others are compared with.
     pub baseline: Option<u32>,
-    /// Agents of the largest variant.
+    /// Number of agents of the largest variant.
     pub agents: u64,
-    /// Whether every run is recorded to a folder of its own.
+    /// Whether every run is recorded in a folder of its own.
     pub record: bool,
 }
 
 /// One variant of the scenario.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Variant {
-    /// What it sets, beside what all variants have in common.
+    /// Its settings, beside those that all variants share.
     pub settings: Vec<Setting>,
 }
 
-/// Runs of a sweep: the table of ten million takes some gigabytes where it is joined.
+/// Largest number of runs of a sweep: joining a table of ten million takes some gigabytes.
 const MOST_RUNS: u64 = 10_000_000;
 
 impl Variant {
-    /// The value of a parameter, if this variant sets it.
+    /// Returns the value of a parameter, if this variant sets it.
     pub fn value(&self, key: &str) -> Option<&toml::Value> {
         self.settings.iter().find(|s| s.key == key).map(|s| &s.value)
     }
 
-    /// Whether it sets this; 2 and 2.0 are the same.
+    /// Whether the variant has this setting; 2 and 2.0 are the same.
     fn has(&self, setting: &Setting) -> bool {
         let number = |v: &toml::Value| v.as_float().or(v.as_integer().map(|n| n as f64));
         self.value(&setting.key).is_some_and(|value| {
@@ -68,7 +69,7 @@ impl Variant {
     }
 }
 
-/// In words: `robots.count = 10, regime = "both"`.
+/// Writes the settings as text: `robots.count = 10, regime = "both"`.
 impl fmt::Display for Variant {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.settings.is_empty() {
@@ -96,10 +97,10 @@ pub struct Cell {
 }
 
 impl Plan {
-    /// A plan of these variants, which are known to be right.
+    /// Returns a plan of these variants, which are known to be valid.
     ///
     /// # Errors
-    /// When seeds run over, or the baseline is no variant or not one alone.
+    /// When seeds overflow, or the baseline is no variant or matches several.
     pub fn new(
         sweep: &Sweep,
         variants: Vec<Vec<Setting>>,
@@ -135,7 +136,7 @@ impl Plan {
         })
     }
 
-    /// What the variants are called in tables and figures: their parameters, in short
+    /// Returns the names of the variants in tables and figures: their parameters, in short
     /// (`method=pc, n=8`).
     pub fn names(&self) -> Vec<String> {
         let last = |key: &str| key.rsplit('.').next().unwrap_or(key).to_string();
@@ -154,7 +155,7 @@ impl Plan {
         names
     }
 
-    /// The runs of this plan, summed up as it says.
+    /// Returns the summary of the runs of this plan, with its metrics and baseline.
     ///
     /// # Errors
     /// When a metric that is to be reported does not exist, or the table is not of this plan.
@@ -170,7 +171,7 @@ impl Plan {
         }
         let options = SummaryOptions {
             metrics: (!self.metrics.is_empty()).then(|| self.metrics.clone()),
-            // A sweep under way may have no run of it yet.
+            // A sweep in progress may have no run of the baseline yet.
             baseline: self
                 .baseline
                 .filter(|variant| has_runs(runs, *variant))
@@ -180,10 +181,10 @@ impl Plan {
         Summary::of(&named, &options)
     }
 
-    /// Whether there are no more runs than a machine can keep in mind.
+    /// Checks that there are not too many runs for the memory of a machine.
     ///
     /// # Errors
-    /// When there are.
+    /// When there are too many.
     pub fn check_size(variants: usize, replicates: u32, place: &str) -> Result<(), InputError> {
         let runs = variants as u64 * u64::from(replicates);
         if runs <= MOST_RUNS {
@@ -193,17 +194,17 @@ impl Plan {
         Err(InputError::new(place, format!("there are {runs} runs"), remedy))
     }
 
-    /// Number of cells, at most.
+    /// Returns the largest number of cells.
     pub fn len(&self) -> u64 {
         self.variants.len() as u64 * u64::from(self.replicates)
     }
 
-    /// True without cells; a plan has some.
+    /// Whether there are no cells; a plan always has some.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// The cell of a variant and a replicate.
+    /// Returns the cell of a variant and a replicate.
     pub fn cell(&self, variant: u32, replicate: u32) -> Cell {
         Cell {
             id: u64::from(variant) * u64::from(self.replicates) + u64::from(replicate),
@@ -213,15 +214,16 @@ impl Plan {
         }
     }
 
-    /// The cell with this number, if it is one.
+    /// Returns the cell with this number, if it exists.
     pub fn cell_of(&self, id: u64) -> Option<Cell> {
         let replicates = u64::from(self.replicates);
         let cell = || self.cell((id / replicates) as u32, (id % replicates) as u32);
         (id < self.len()).then(cell)
     }
 
-    /// The cells of a share, in the order in which they are run: every `count`-th cell, counted
-    /// over variants and replicates alike, so that no share has the costly variants alone.
+    /// Returns the cells of a share, in the order in which they are run: every `count`-th cell,
+    /// counted over variants and replicates alike, so that no share gets all the expensive
+    /// variants.
     pub fn share(&self, shard: Shard) -> impl Iterator<Item = Cell> + '_ {
         let (index, count) = (u64::from(shard.index), u64::from(shard.count));
         let variants = self.variants.len() as u32;
@@ -237,7 +239,7 @@ fn has_runs(runs: &RunTable, variant: u32) -> bool {
     columns.any(|c| (0..runs.runs()).any(|k| c.values.number(k) == Some(f64::from(variant))))
 }
 
-/// Samples of whole numbers may meet: from the second on they are numbered.
+/// Numbers equal names from the second on, because samples of whole numbers may coincide.
 fn number_twins(names: &mut [String]) {
     let mut seen: BTreeMap<String, u32> = BTreeMap::new();
     for name in names {
@@ -249,7 +251,7 @@ fn number_twins(names: &mut [String]) {
     }
 }
 
-/// The variant that has all these settings.
+/// Returns the variant that has all these settings.
 fn baseline(
     wanted: &[Setting],
     variants: &[Variant],
@@ -270,7 +272,7 @@ fn baseline(
     }
 }
 
-/// Which of the settings no variant has, and what there is.
+/// Returns an error that names the settings that no variant has, and the existing values.
 fn no_baseline(wanted: &[Setting], variants: &[Variant], place: &str) -> InputError {
     let is_missing = |s: &&Setting| !variants.iter().any(|v| v.has(s));
     let Some(Setting { key, value }) = wanted.iter().find(is_missing) else {
@@ -301,7 +303,7 @@ fn no_baseline(wanted: &[Setting], variants: &[Variant], place: &str) -> InputEr
     InputError::new(place, cause, remedy)
 }
 
-/// Values that an error lists at most.
+/// Largest number of values that an error lists.
 const MOST_NAMED: usize = 20;
 
 /// A share of the cells: number `index` of `count`, from 0.
@@ -309,16 +311,16 @@ const MOST_NAMED: usize = 20;
 pub struct Shard {
     /// Its number.
     pub index: u32,
-    /// Of how many.
+    /// The number of shares.
     pub count: u32,
 }
 
 impl Shard {
-    /// All cells.
+    /// The share of all cells.
     pub const ALL: Self = Self { index: 0, count: 1 };
 }
 
-/// `0/4` is the first of four.
+/// Parses `0/4`, the first of four shares.
 impl FromStr for Shard {
     type Err = String;
 

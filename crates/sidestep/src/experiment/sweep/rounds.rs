@@ -1,4 +1,4 @@
-//! Which cells are next, where a wanted precision says when a variant has been run enough.
+//! The next cells to run, if a requested precision decides when a variant has had enough runs.
 
 use super::cell::Outcome;
 use super::file::Until;
@@ -8,35 +8,35 @@ use crate::statistics::{Next, Reason, StoppingRule};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Runs of each variant before the first look.
+/// Number of runs of each variant before the first check.
 const MIN_RUNS: usize = 10;
 
-/// What the metrics of the variants are so far: all that the decision rests on.
+/// The metrics of the variants so far: the decision depends on nothing else.
 ///
-/// A function of the outcomes alone, whatever their order: so it does not matter how many workers
-/// there are, or whether the sweep was killed in between.
+/// They are a function of the outcomes alone, in any order, so the number of workers does not
+/// matter, nor whether the sweep was killed in between.
 #[derive(Debug)]
 pub struct Rounds<'a> {
     plan: &'a Plan,
     until: &'a Until,
-    /// Per variant, by metric, the values by replicate.
+    /// For each variant, by metric, the values by replicate.
     values: Vec<BTreeMap<String, Values>>,
-    /// Per variant the replicates that have an outcome.
+    /// For each variant, the replicates that have an outcome.
     done: Vec<BTreeSet<u32>>,
 }
 
-/// Why a variant is not run any more.
+/// The reason why a variant is not run any more.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Stopped {
     /// Number of the variant.
     pub variant: u32,
-    /// Its runs.
+    /// Number of its runs.
     pub runs: usize,
-    /// Why they are enough.
+    /// The reason why they are enough.
     pub reason: Reason,
 }
 
-/// Why the variants of a plan were run no more, if a precision ended them.
+/// Returns the reasons why the variants of a plan stopped, if a precision ended them.
 pub fn stopped(plan: &Plan, runs: &RunTable) -> Vec<Stopped> {
     let Some(until) = &plan.until else { return Vec::new() };
     let mut rounds = Rounds::new(plan, until);
@@ -45,13 +45,13 @@ pub fn stopped(plan: &Plan, runs: &RunTable) -> Vec<Stopped> {
 }
 
 impl<'a> Rounds<'a> {
-    /// Nothing is run yet.
+    /// Returns the rounds before any run.
     pub fn new(plan: &'a Plan, until: &'a Until) -> Self {
         let n = plan.variants.len();
         Self { plan, until, values: vec![BTreeMap::new(); n], done: vec![BTreeSet::new(); n] }
     }
 
-    /// Takes note of an outcome.
+    /// Adds an outcome.
     pub fn note(&mut self, outcome: &Outcome) {
         let Some(cell) = self.plan.cell_of(outcome.cell) else { return };
         let variant = cell.variant as usize;
@@ -65,7 +65,8 @@ impl<'a> Rounds<'a> {
         }
     }
 
-    /// The cells of the next round that have no outcome yet; none when all variants are done.
+    /// Returns the cells of the next round that have no outcome yet; empty if all variants are
+    /// done.
     pub fn next(&self) -> Vec<Cell> {
         let mut cells = Vec::new();
         for variant in 0..self.plan.variants.len() as u32 {
@@ -79,7 +80,7 @@ impl<'a> Rounds<'a> {
         cells
     }
 
-    /// Why variants are done.
+    /// Returns the reasons why variants are done.
     pub fn stopped(&self) -> Vec<Stopped> {
         let of = |variant: u32| match self.ask(variant) {
             Next::Enough(runs, reason) => Some(Stopped { variant, runs, reason }),
@@ -96,7 +97,7 @@ impl<'a> Rounds<'a> {
             max_runs: self.plan.replicates as usize,
         };
         let done = &self.done[variant as usize];
-        // Only what has no gap: a round that was broken off is gone on with.
+        // Only runs without a gap count: an interrupted round is completed first.
         let whole = (0u32..).zip(done).take_while(|(k, replicate)| k == *replicate).count();
         let column = |values: &Values| -> Vec<Option<f64>> {
             (0..whole as u32).map(|k| values.get(&k).copied().flatten()).collect()
@@ -106,7 +107,7 @@ impl<'a> Rounds<'a> {
         let there: Vec<_> =
             of_variant.iter().filter(|(_, values)| named || first(values).any(is_there)).collect();
         let asks = |name: &str| named || self.varies(name);
-        // Where nothing varies, it takes as many runs to believe it as of a single metric.
+        // If nothing varies, it takes as many runs to believe that as for a single metric.
         let any_asks = there.iter().any(|(name, _)| asks(name));
         let asking = there.iter().filter(|(name, _)| !any_asks || asks(name));
         let columns: Vec<Vec<Option<f64>>> = asking.map(|(_, values)| column(values)).collect();
@@ -121,8 +122,8 @@ impl<'a> Rounds<'a> {
         rule.next_of(&columns)
     }
 
-    /// Whether a metric differs between two runs of a variant's first round, of any variant: what
-    /// happens rarely is then looked for in those too that have not seen it.
+    /// Whether a metric differs between two runs of a variant's first round, for any variant: a
+    /// rare event is then looked for also in variants that have not had it.
     fn varies(&self, name: &str) -> bool {
         let differ = |values: &Values| {
             let mut all = first(values);
@@ -133,10 +134,10 @@ impl<'a> Rounds<'a> {
     }
 }
 
-/// Values of a metric by replicate.
+/// Values of a metric, by replicate.
 type Values = BTreeMap<u32, Option<f64>>;
 
-/// Those of the first round.
+/// Returns the values of the first round.
 fn first(values: &Values) -> impl Iterator<Item = &Option<f64>> {
     (0..MIN_RUNS as u32).filter_map(|k| values.get(&k))
 }

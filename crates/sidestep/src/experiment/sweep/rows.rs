@@ -1,4 +1,4 @@
-//! Outcomes -> a table of runs, the same in whatever order they came.
+//! Outcomes -> a table of runs, the same for any order of arrival.
 
 use super::cell::Outcome;
 use super::plan::Plan;
@@ -8,16 +8,16 @@ use sidestep_kernel::InputError;
 use sidestep_kernel::ports::{ColumnType, Values};
 use std::collections::BTreeMap;
 
-/// The column of why a run failed; only there when one did.
+/// Name of the column of reasons why runs failed; it exists only if one did.
 const FAILURE: &str = "failure";
 
-/// A table that grows by outcomes. A number takes its 8 or 9 bytes, so a million runs of 40
-/// metrics fit into less than half a gigabyte.
+/// A table that grows by outcomes. A number takes 8 or 9 bytes, so a million runs of 40 metrics fit
+/// into less than half a gigabyte.
 #[derive(Debug, Default)]
 pub struct Rows {
     cells: Vec<u64>,
     columns: Vec<Growing>,
-    /// Numbers of the columns by role and name.
+    /// Indices of the columns, by role and name.
     index: BTreeMap<(Role, String), usize>,
 }
 
@@ -25,23 +25,23 @@ pub struct Rows {
 #[derive(Debug)]
 struct Growing {
     column: RunColumn,
-    /// The first cell in which it has a value, and its place there: the order of columns, whatever
-    /// shares they come in. Columns without any value come last.
+    /// The first cell in which it has a value, and its place there: the order of columns,
+    /// independent of the order of shares. Columns without any value come last.
     first: (u64, usize),
 }
 
 impl Rows {
-    /// Number of outcomes.
+    /// Returns the number of outcomes.
     pub fn len(&self) -> usize {
         self.cells.len()
     }
 
-    /// True without outcomes.
+    /// Whether there are no outcomes.
     pub fn is_empty(&self) -> bool {
         self.cells.is_empty()
     }
 
-    /// The cells that have an outcome, in the order in which they came.
+    /// Returns the cells that have an outcome, in the order of arrival.
     pub fn cells(&self) -> &[u64] {
         &self.cells
     }
@@ -81,11 +81,12 @@ impl Rows {
         add(&mut growing.column.values, value);
     }
 
-    /// The table of all runs, sorted by cell: numbers of cell, variant and replicate, seed,
-    /// parameters, metrics, digest, costs. Outcomes of no cell of the plan are left out.
+    /// Returns the table of all runs, sorted by cell: numbers of cell, variant and replicate, seed,
+    /// parameters, metrics, digest, costs. Outcomes of cells that are not in the plan are left out.
     ///
     /// # Errors
-    /// When a cell has two outcomes that differ: they come from different programs or machines.
+    /// When a cell has two outcomes that differ, because they come from different programs or
+    /// machines.
     pub fn table(mut self, plan: &Plan) -> Result<RunTable, InputError> {
         let rows = self.cells.len();
         self.columns.iter_mut().for_each(|c| c.column.values.resize(rows));
@@ -102,7 +103,7 @@ impl Rows {
         Ok(RunTable { columns })
     }
 
-    /// A cell that was run twice must have come to the same.
+    /// Checks that cells that were run twice have the same outcome.
     fn check_twins(&self, order: &[usize]) -> Result<(), InputError> {
         let digest = self.columns.iter().find(|c| c.column.role == Role::Digest);
         let Some(digest) = digest else { return Ok(()) };
@@ -120,19 +121,19 @@ impl Rows {
 }
 
 impl RunTable {
-    /// The table without what runs took: nothing in it changes when runs are made again.
+    /// Returns the table without the times that runs took: it is the same when runs are made again.
     pub fn results(&self) -> Self {
         let keep = |c: &&RunColumn| c.role != Role::Cost;
         Self { columns: self.columns.iter().filter(keep).cloned().collect() }
     }
 
-    /// What each run took.
+    /// Returns the times that each run took.
     pub fn timings(&self) -> Self {
         let keep = |c: &&RunColumn| matches!(c.role, Role::Cell | Role::Cost);
         Self { columns: self.columns.iter().filter(keep).cloned().collect() }
     }
 
-    /// Hands over the outcomes that the rows of a share's table stand for.
+    /// Passes on the outcomes that the rows of a share's table stand for.
     pub fn outcomes(&self, mut each: impl FnMut(Outcome)) {
         let number = |row: usize, column: Option<&RunColumn>| match column.map(|c| &c.values) {
             Some(Values::I64(values)) => values.get(row).and_then(|n| u64::try_from(*n).ok()),
@@ -160,12 +161,12 @@ impl RunTable {
     }
 }
 
-/// The table of all cells of a plan: a row a run to come.
+/// Returns the table of all cells of a plan: one row for each future run.
 pub fn cells(plan: &Plan) -> RunTable {
     RunTable { columns: identity(plan, 0..plan.len()) }
 }
 
-/// What a run is: the columns that follow from its cell.
+/// Returns the identity of runs: the columns that follow from their cells.
 fn identity(plan: &Plan, cells: impl Iterator<Item = u64>) -> Vec<RunColumn> {
     let cells: Vec<_> = cells.filter_map(|id| plan.cell_of(id)).collect();
     let ints = |name: &str, role, value: fn(&super::Cell) -> u64| RunColumn {
@@ -188,7 +189,7 @@ fn identity(plan: &Plan, cells: impl Iterator<Item = u64>) -> Vec<RunColumn> {
     columns
 }
 
-/// The parameter's value in every variant: numbers and words together are all words.
+/// Returns the parameter's value in every variant: if numbers and words mix, all are words.
 fn levels(plan: &Plan, name: &str) -> Vec<Value> {
     let of = |variant: &super::Variant| variant.value(name).map_or(Value::Null, json);
     let levels: Vec<Value> = plan.variants.iter().map(of).collect();
@@ -197,7 +198,7 @@ fn levels(plan: &Plan, name: &str) -> Vec<Value> {
     levels.into_iter().map(level).collect()
 }
 
-/// Numbers, truth values and text as they are; anything else as TOML.
+/// Returns numbers, truth values and text unchanged; anything else as TOML.
 fn json(value: &toml::Value) -> Value {
     match value {
         toml::Value::Integer(n) => (*n).into(),
@@ -208,7 +209,7 @@ fn json(value: &toml::Value) -> Value {
     }
 }
 
-/// Appends a value; the column takes a wider type where it must.
+/// Appends a value; the column gets a wider type if necessary.
 fn add(values: &mut Values, value: &Value) {
     if value.is_null() {
         return values.resize(values.len() + 1);
@@ -227,7 +228,7 @@ fn words(value: &Value) -> String {
     value.as_str().map_or_else(|| value.to_string(), str::to_string)
 }
 
-/// Makes the column's type one that holds the value.
+/// Widens the column's type so that it can hold the value.
 fn widen(values: &mut Values, value: &Value) {
     let fits = match values {
         Values::I64(_) => value.as_i64().is_some(),

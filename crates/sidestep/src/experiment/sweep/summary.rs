@@ -1,14 +1,14 @@
-//! A table of runs summed up.
+//! The summary of a table of runs.
 //!
 //! # Which metrics are shown
 //!
-//! Those asked for, in that order. Otherwise all that differ between any two runs, the most
-//! informative first: by the share of their variance that lies between the variants, adjusted
-//! for the number of variants (epsilon squared, Kelley 1935: 1 - mean square within / mean
-//! square in total), so that what the parameters move comes before what is mere noise. Equals
-//! stay in the order of the columns, and so does everything where the share cannot be told: one
-//! variant, or one run of each. Beyond [`SummaryOptions::max_metrics`] metrics are left out.
-//! [`Summary::left_out`] tells every metric that is not shown, and why.
+//! The requested ones, in that order. Otherwise all that differ between any two runs, the most
+//! informative first: by the share of their variance that lies between the variants, adjusted for
+//! the number of variants (epsilon squared, Kelley 1935: 1 - mean square within / mean square in
+//! total), so that effects of the parameters come before noise. Ties stay in the order of the
+//! columns, and so do all metrics if the share cannot be computed: with one variant, or one run of
+//! each. Metrics beyond [`SummaryOptions::max_metrics`] are left out. [`Summary::left_out`] lists
+//! every metric that is not shown, and why.
 
 use super::Label;
 use super::compare::{Comparison, comparisons};
@@ -25,26 +25,27 @@ use sidestep_document::{Estimate, Figure, Table};
 use sidestep_kernel::InputError;
 use sidestep_kernel::ports::Values;
 
-/// Quantiles that are told.
+/// The quantiles that are reported.
 pub const QUANTILES: [f64; 5] = [0.05, 0.25, 0.5, 0.75, 0.95];
 
-/// Above this many runs of a variant no bootstrap is drawn: Student's interval is as good there.
+/// Number of runs of a variant above which no bootstrap is drawn: Student's interval is as good
+/// there.
 const BOOTSTRAP_RUNS: usize = 10_000;
 
-/// Why a metric is not shown where others are named.
+/// The reason why a metric is not shown if others were requested.
 pub(super) const NOT_ASKED_FOR: &str = "not asked for";
 
-/// What to sum up, and how.
+/// Options of a summary.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SummaryOptions {
-    /// Metrics to show, in this order; without, see the module.
+    /// Metrics to show, in this order; `None` for the default order of the module.
     pub metrics: Option<Vec<String>>,
-    /// Metrics shown at most where none are named.
+    /// Largest number of metrics shown if none are requested.
     pub max_metrics: usize,
-    /// Name of the variant that the others are compared with; without, the first, but in
-    /// scattered designs none.
+    /// Name of the variant that the others are compared with; `None` for the first, except in
+    /// scattered designs, which have none.
     pub baseline: Option<String>,
-    /// How bootstrap intervals are drawn.
+    /// Options of bootstrap intervals.
     pub bootstrap: Bootstrap,
 }
 
@@ -59,20 +60,20 @@ impl Default for SummaryOptions {
 pub struct Variant {
     /// Its name.
     pub name: String,
-    /// Its runs.
+    /// Number of its runs.
     pub runs: usize,
-    /// Its values of [`Summary::parameters`].
+    /// Its values of the [`Summary::parameters`].
     pub levels: Vec<Level>,
 }
 
 /// A quantile of the runs.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Quantile {
-    /// Which one, from 0 to 1.
+    /// Its probability, from 0 to 1.
     pub q: f64,
     /// Its estimate.
     pub value: f64,
-    /// Its interval; absent with fewer runs than
+    /// Its confidence interval; absent with fewer runs than
     /// [`runs_for_quantile`](crate::statistics::runs_for_quantile).
     pub interval: Option<QuantileInterval>,
 }
@@ -84,32 +85,33 @@ pub struct Numbers {
     pub mean: Option<f64>,
     /// Standard deviation of the runs (divisor `n - 1`).
     pub sd: Option<f64>,
-    /// Student's 95 % interval of the mean.
+    /// Student's 95 % confidence interval of the mean.
     pub interval: Option<Interval>,
-    /// The bootstrap's (BCa).
+    /// The bootstrap's (BCa) 95 % confidence interval of the mean.
     pub bootstrap: Option<Interval>,
-    /// [`QUANTILES`], where there is any run.
+    /// The [`QUANTILES`], if there is any run.
     pub quantiles: Vec<Quantile>,
-    /// Smallest value seen.
+    /// Smallest value.
     pub min: Option<f64>,
-    /// Largest value seen.
+    /// Largest value.
     pub max: Option<f64>,
-    /// Runs that would give an interval of 5 % of the mean to either side, if runs vary as now.
+    /// Number of runs that would give an interval of 5 % of the mean to either side, if runs vary
+    /// as now.
     pub runs_for_5_percent: Option<u64>,
 }
 
 /// A share of the runs of a variant.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Share {
-    /// Runs of which it is true.
+    /// Number of runs for which it is true.
     pub yes: usize,
     /// Their share; absent without runs.
     pub share: Option<f64>,
-    /// Wilson's 95 % interval.
+    /// Wilson's 95 % confidence interval.
     pub interval: Interval,
 }
 
-/// What a metric is.
+/// The values of a metric, by kind.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Described {
@@ -124,13 +126,13 @@ pub enum Described {
 pub struct VariantMetric {
     /// The variant.
     pub variant: String,
-    /// Runs with a value.
+    /// Number of runs with a value.
     pub n: usize,
-    /// Runs without one,
+    /// Number of runs, among those without a value, whose value is infinite or not a number.
     pub missing: usize,
-    /// of these, runs whose value is infinite or not a number.
+    /// Number of those runs without a value whose value is infinite or not a number.
     pub not_finite: usize,
-    /// What the values come to.
+    /// The description of the values.
     pub values: Described,
 }
 
@@ -139,7 +141,7 @@ pub struct VariantMetric {
 pub struct EffectLevel {
     /// The level.
     pub level: Level,
-    /// Variants that have it.
+    /// Number of variants that have it.
     pub variants: usize,
     /// Mean over these, of each replicate, and over replicates: `n` is the number of replicates.
     pub estimate: Estimate,
@@ -154,23 +156,23 @@ pub struct Effect {
     pub levels: Vec<EffectLevel>,
 }
 
-/// A metric summed up.
+/// The summary of a metric.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MetricSummary {
     /// Name of its column.
     pub name: String,
-    /// What it is called, with its unit.
+    /// Its label, with its unit.
     pub label: Label,
     /// Whether it is a share of runs.
     pub is_share: bool,
-    /// Share of its variance that lies between variants, adjusted; at least 0. A rank, not a
-    /// result.
+    /// Share of its variance that lies between variants, adjusted; at least 0. It is used as a
+    /// rank, not as a result.
     pub explained: Option<f64>,
-    /// In each variant.
+    /// Its values in each variant.
     pub variants: Vec<VariantMetric>,
-    /// Each other variant against the baseline.
+    /// Comparison of each other variant with the baseline.
     pub comparisons: Vec<Comparison>,
-    /// Main effects, where there are several parameters in a full grid.
+    /// Main effects, if there are several parameters in a full grid.
     pub effects: Vec<Effect>,
 }
 
@@ -179,35 +181,35 @@ pub struct MetricSummary {
 pub struct LeftOut {
     /// Its column.
     pub metric: String,
-    /// Why.
+    /// The reason.
     pub reason: String,
 }
 
-/// A table of runs summed up, as plain data.
+/// The summary of a table of runs, as plain data.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
-    /// Runs in all.
+    /// Number of runs.
     pub runs: usize,
     /// The variants.
     pub variants: Vec<Variant>,
-    /// Parameters that differ between variants.
+    /// The parameters that differ between variants.
     pub parameters: Vec<Parameter>,
     /// The variant that others are compared with.
     pub baseline: Option<String>,
     /// The metrics shown.
     pub metrics: Vec<MetricSummary>,
-    /// The others.
+    /// The metrics that are not shown.
     pub left_out: Vec<LeftOut>,
-    /// What a reader must know.
+    /// Remarks that a reader must know.
     pub notes: Vec<String>,
     #[serde(skip)]
     figures: Vec<(String, Figure)>,
 }
 
-/// What there is to say about a metric.
+/// The part of the summary about one metric.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Section {
-    /// The metric, in words.
+    /// The metric as text.
     pub title: String,
     /// Its figures.
     pub figures: Vec<Figure>,
@@ -216,7 +218,7 @@ pub struct Section {
 }
 
 impl Summary {
-    /// Sums up a table of runs.
+    /// Summarizes a table of runs.
     ///
     /// # Errors
     /// When columns differ in length, a variant has a replicate twice, or a metric or the
@@ -247,17 +249,17 @@ impl Summary {
         Ok(summary)
     }
 
-    /// The summary as tables.
+    /// Returns the summary as tables.
     pub fn tables(&self) -> Vec<Table> {
         text::tables(self)
     }
 
-    /// The summary in short, for a terminal: means and differences with their intervals.
+    /// Returns a short summary for a terminal: means and differences with their intervals.
     pub fn brief(&self) -> Vec<Table> {
         text::brief(self)
     }
 
-    /// The summary metric by metric.
+    /// Returns the summary metric by metric.
     pub fn sections(&self) -> Vec<Section> {
         let section = |metric: &MetricSummary| Section {
             title: super::label::sentence(&Label { unit: None, ..metric.label.clone() }),
@@ -272,12 +274,12 @@ impl Summary {
         self.metrics.iter().map(section).collect()
     }
 
-    /// The metrics that are not shown, if there are any.
+    /// Returns the metrics that are not shown, if there are any.
     pub fn left_out(&self) -> Option<Table> {
         text::left_out(self)
     }
 
-    /// The summary as figures: each metric over each parameter.
+    /// Returns the summary as figures: each metric over each parameter.
     pub fn figures(&self) -> Vec<Figure> {
         self.figures.iter().map(|(_, figure)| figure.clone()).collect()
     }
@@ -316,7 +318,7 @@ fn baseline(
 
 type Chosen<'a> = (Vec<&'a RunColumn>, Vec<LeftOut>);
 
-/// The metrics shown, and those that are not.
+/// Returns the metrics shown, and those that are not.
 fn chosen<'a>(groups: &Groups<'a>, options: &SummaryOptions) -> Result<Chosen<'a>, InputError> {
     let all: Vec<&RunColumn> = groups.table.of_role(Role::Metric).collect();
     if let Some(names) = &options.metrics {
@@ -361,7 +363,7 @@ fn named<'a>(all: &[&'a RunColumn], names: &[String]) -> Result<Chosen<'a>, Inpu
     Ok((shown, others.map(left_out).collect()))
 }
 
-/// Why a metric has nothing to tell, if so.
+/// Returns the reason why a metric is uninformative, if it is.
 fn uninformative(column: &RunColumn) -> Option<String> {
     if matches!(column.values, Values::Text(_)) {
         return Some("words, not numbers".into());
@@ -377,7 +379,8 @@ fn uninformative(column: &RunColumn) -> Option<String> {
     }
 }
 
-/// Epsilon squared of a metric over the variants, at least 0; `None` without freedom within.
+/// Returns epsilon squared of a metric over the variants, at least 0; `None` without degrees of
+/// freedom within.
 fn explained(groups: &Groups<'_>, column: &RunColumn) -> Option<f64> {
     let of = |variant| Sample::of(groups.values(column, variant)).values;
     let samples: Vec<Vec<f64>> = (0..groups.variants.len()).map(of).collect();
@@ -385,7 +388,7 @@ fn explained(groups: &Groups<'_>, column: &RunColumn) -> Option<f64> {
     let all: Vec<f64> = samples.iter().flat_map(|s| s.iter().copied()).collect();
     let within = all.len().checked_sub(samples.len()).filter(|f| *f > 0)? as f64;
     let total = sample_sd(&all).filter(|sd| *sd > 0.0 && sd.is_finite() && samples.len() > 1)?;
-    // In units of the total spread, so that squares keep their digits.
+    // Computed in units of the total spread, so that squares keep their digits.
     let square = |s: &&Vec<f64>| {
         let relative = sample_sd(s).unwrap_or(0.0) / total;
         relative * relative * (s.len() as f64 - 1.0)
@@ -464,7 +467,7 @@ fn numbers(sample: &Sample, bootstrap: Option<&Bootstrap>) -> Numbers {
     }
 }
 
-/// Main effects; of one parameter they are the variants themselves.
+/// Returns the main effects; with one parameter these are the variants themselves.
 fn effects(groups: &Groups<'_>, column: &RunColumn) -> Vec<Effect> {
     if groups.parameters.len() < 2 {
         return Vec::new();

@@ -4,32 +4,32 @@ use serde::{Deserialize, Serialize};
 use sidestep_kernel::InputError;
 use sidestep_kernel::ports::RoleColumn;
 
-/// What a column is to the runs.
+/// The role of a column in a table of runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Role {
-    /// Number of the cell; runs are taken in its order.
+    /// Number of the cell; runs are in its order.
     Cell,
     /// Name of the variant: runs that differ by their seeds alone.
     Variant,
-    /// Number of the replicate: the same one has the same seed in all variants.
+    /// Number of the replicate: equal ones have the same seed in all variants.
     Replicate,
     /// The seed.
     Seed,
     /// A parameter, equal in all runs of a variant.
     Parameter,
-    /// What came of the run. A column of `Bool` is a share.
+    /// A result of the run. A column of `Bool` is a share.
     Metric,
     /// Digest of the run.
     Digest,
-    /// What the run took, by a clock: not the same when it is made again.
+    /// A time that the run took: it differs when the run is made again.
     Cost,
 }
 
-/// A column of a table of runs; of a parameter its name is the path of its key.
+/// A column of a table of runs; the name of a parameter is the path of its key.
 pub type RunColumn = RoleColumn<Role>;
 
-/// A table of runs: a row a run.
+/// A table of runs, with one row per run.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct RunTable {
     /// The columns.
@@ -37,25 +37,26 @@ pub struct RunTable {
 }
 
 impl RunTable {
-    /// Number of runs.
+    /// Returns the number of runs.
     pub fn runs(&self) -> usize {
         self.columns.first().map_or(0, |c| c.values.len())
     }
 
-    /// The columns of this role, in their order.
+    /// Returns the columns with this role, in order.
     pub fn of_role(&self, role: Role) -> impl Iterator<Item = &RunColumn> {
         self.columns.iter().filter(move |c| c.role == role)
     }
 
-    /// The column of this name.
+    /// Returns the column with this name.
     pub fn column(&self, name: &str) -> Option<&RunColumn> {
         self.columns.iter().find(|c| c.name == name)
     }
 
-    /// That all columns have the same number of runs, and no two of a kind the same name.
+    /// Checks that all columns have the same number of runs, and no two with one role the same
+    /// name.
     ///
     /// # Errors
-    /// Names the first column that is wrong.
+    /// When a column is wrong; the error names the first.
     pub fn check(&self) -> Result<(), InputError> {
         let wrong =
             |cause: String, remedy: &str| Err(InputError::new("the table of runs", cause, remedy));

@@ -1,4 +1,4 @@
-//! What a summary promises, on tables whose answer is known.
+//! Guarantees of a summary, on tables whose answer is known.
 
 use super::summary::Described;
 use super::*;
@@ -117,7 +117,7 @@ fn main_effects_are_means_over_the_other_parameters() {
     assert!((mean(0, 1) - mean(0, 0) - 3.0).abs() < 0.1);
     assert!((mean(1, 2) - mean(1, 0) - 3.0).abs() < 0.1);
     assert!(effects.iter().flat_map(|e| &e.levels).all(|l| l.estimate.n == 20));
-    // Replicates are what is independent: their spread of 2 stays, however many variants.
+    // Replicates are the independent units: their spread of 2 stays, for any number of variants.
     assert!(effects[0].levels[0].estimate.interval.unwrap().half_width() > 0.6);
 }
 

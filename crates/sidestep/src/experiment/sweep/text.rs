@@ -1,4 +1,4 @@
-//! A summary as tables.
+//! The summary as tables.
 
 use super::compare::Comparison;
 use super::label::sentence;
@@ -15,7 +15,7 @@ pub(super) fn tables(summary: &Summary) -> Vec<Table> {
     of_metrics.chain(left_out(summary)).collect()
 }
 
-/// A table a metric with what a reader looks for first: means and differences, each with its
+/// Returns a table per metric with the most important numbers: means and differences, each with its
 /// interval and number of runs.
 pub(super) fn brief(summary: &Summary) -> Vec<Table> {
     summary.metrics.iter().map(|metric| brief_of(summary, metric)).collect()
@@ -43,7 +43,7 @@ fn brief_of(summary: &Summary, metric: &MetricSummary) -> Table {
     table
 }
 
-/// The tables of a metric.
+/// Returns the tables of a metric.
 pub(super) fn of_metric(summary: &Summary, metric: &MetricSummary) -> Vec<Table> {
     let mut tables = vec![values(metric)];
     if let Some(baseline) = &summary.baseline {
@@ -200,7 +200,7 @@ fn effects(metric: &MetricSummary) -> Table {
     table
 }
 
-/// Why metrics are not shown, if any are not.
+/// Returns the reasons why metrics are not shown, if there are such metrics.
 pub(super) fn left_out(summary: &Summary) -> Option<Table> {
     let mut table = Table::new("Metrics not shown", "", &["metric", "why"]);
     let asked = |l: &&LeftOut| l.reason != NOT_ASKED_FOR;
@@ -229,8 +229,8 @@ fn brackets(interval: Interval) -> String {
     format!("[{}, {}]", end(interval.low), end(interval.high))
 }
 
-/// A number to two digits of the half-width of its interval: more would be noise, fewer would
-/// hide the interval. Without a width it has four digits.
+/// Formats a number with two digits of the half width of its interval: more would be noise, fewer
+/// would hide the interval. Without a width it has four digits.
 fn number(value: f64, half_width: Option<f64>) -> String {
     let width = half_width.filter(|w| *w > 0.0 && w.is_finite());
     let scale = width.unwrap_or(value.abs() * 0.01);
@@ -238,14 +238,14 @@ fn number(value: f64, half_width: Option<f64>) -> String {
         return "0".into();
     }
     let decimals = 1.0 - math::log10(scale).floor();
-    // Where runs agree to the last bits, more than six decimals of a usual number tell nothing.
+    // If runs agree to the last bits, more than six decimals of a number of usual size say nothing.
     let decimals = if value.abs() >= 1e-3 { decimals.min(6.0) } else { decimals };
     let text = if !value.is_finite() || decimals > 8.0 || value.abs() >= 1e9 {
         format!("{value:.3e}")
     } else {
         format!("{value:.*}", decimals.max(0.0) as usize)
     };
-    // A width of 0 is no precision: what is constant is written as it is.
+    // A width of 0 is not a precision: constants are written as they are.
     if half_width == Some(0.0) && text.contains('.') && !text.contains('e') {
         return text.trim_end_matches('0').trim_end_matches('.').into();
     }

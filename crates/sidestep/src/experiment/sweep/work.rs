@@ -4,20 +4,20 @@ use sidestep_kernel::workers;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-/// Takes a result: when it returns, the cell is finished.
+/// Takes a result: once it returns, the cell is finished.
 pub type Take<'a, T, E> = dyn FnMut(T) -> Result<(), E> + Send + 'a;
 
-/// What all workers share.
+/// The state that all workers share.
 struct Shared<'a, 'b, T, E> {
     take: &'a mut Take<'b, T, E>,
     failure: Option<E>,
 }
 
-/// Runs the cells, `at_once` of them at a time and in their order as far as that goes, and hands
-/// every result over as it comes. `run` says `None` where a cell was broken off.
+/// Runs the cells, `at_once` at a time and as far as possible in order, and passes every result on
+/// as it arrives. `run` returns `None` if a cell was interrupted.
 ///
 /// # Errors
-/// The first that `run` or `take` gives; no cell is begun after that.
+/// The first error of `run` or `take`; no cell starts after that.
 pub fn run_cells<C: Sync, T: Send, E: Send>(
     cells: &[C],
     at_once: usize,
@@ -26,12 +26,12 @@ pub fn run_cells<C: Sync, T: Send, E: Send>(
 ) -> Result<(), E> {
     let next = AtomicUsize::new(0);
     let shared = Mutex::new(Shared { take, failure: None });
-    // A worker that panicked outside of a run has left whole values behind.
+    // A worker that panicked outside of a run has left the values intact.
     let lock = || shared.lock().unwrap_or_else(PoisonError::into_inner);
     let mut crew = vec![(); at_once.clamp(1, cells.len().max(1))];
     workers::run(&mut crew, |_, ()| {
         while let Some(cell) = cells.get(next.fetch_add(1, Ordering::Relaxed)) {
-            // Nobody holds the lock while a run is under way.
+            // No thread holds the lock while a run is in progress.
             let is_broken = lock().failure.is_some();
             let result = if is_broken { None } else { run(cell) };
             let Some(result) = result else { return };
