@@ -6,7 +6,8 @@ pub(crate) const HELP: &str = "\
 Usage: cargo xtask test [ARGUMENTS OF THE TEST RUNNER]
        cargo xtask shape [OPTIONS]
 
-`test` runs all tests in the profile `release`, by nextest where it is installed. `shape` counts the sources of every workspace member but xtask, per crate and in total.
+The first runs all tests, or those chosen. The second counts the sources of every workspace
+member but xtask, per crate and in total.
 
 Options:
       --root DIR     Workspace to count, an old checkout for example [default: this one]
@@ -42,7 +43,7 @@ pub(crate) fn parse(mut words: impl Iterator<Item = String>) -> Result<Arguments
     match words.next().as_deref() {
         Some("shape") => {}
         None | Some("help" | "-h" | "--help") => arguments.print = Print::Help,
-        Some(other) => return Err(format!("no task `{other}`; there are: test, shape")),
+        Some(other) => return Err(format!("no task `{other}`; there are: shape, test")),
     }
     while let Some(word) = words.next() {
         let mut path = || {

@@ -1,4 +1,4 @@
-//! Tools of the house, started by `cargo xtask`: `test` runs every test, `shape` counts the sources.
+//! Tools of the house, started by `cargo xtask`: `test` runs all tests, `shape` counts the sources.
 
 mod arguments;
 mod counts;
@@ -20,10 +20,10 @@ use members::Member;
 
 fn main() -> ExitCode {
     let words: Vec<String> = std::env::args().skip(1).collect();
-    if let Some((name, rest)) = words.split_first()
-        && name == "test"
+    if let [task, chosen @ ..] = words.as_slice()
+        && task == "test"
     {
-        return test::run(rest);
+        return test::run(chosen);
     }
     match run(words.into_iter()) {
         Ok(text) => {

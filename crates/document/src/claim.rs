@@ -1,12 +1,7 @@
 //! Claims of a paper, and what came of them.
 
-use super::document::{Block, Document, Text};
 use serde::Serialize;
 use sidestep_statistics::Interval;
-
-/// What stands above a report of little weight.
-const REHEARSAL: &str = "**A rehearsal: its figures have no weight.** Everything was run, with \
-                             too few runs to measure anything; without `--quick` it is measured.";
 
 /// What we say of a claim.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -86,16 +81,6 @@ pub fn tally(claims: &[Claim]) -> String {
         count(claims, Verdict::NotHeld),
         count(claims, Verdict::Lost),
     )
-}
-
-/// The begin of a paper's report: its lead, and the claims before all else.
-pub fn document(title: &str, lead: String, quick: bool, claims: &[Claim]) -> Document {
-    let mut document = Document::new(title, lead);
-    if quick {
-        document.warning(Text::marked(REHEARSAL));
-    }
-    document.section("Claims").push(Block::Claims(claims.to_vec()));
-    document
 }
 
 /// How to read a list of claims.

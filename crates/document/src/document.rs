@@ -223,6 +223,20 @@ impl Document {
     }
 }
 
+/// What stands above a report of little weight.
+const REHEARSAL: &str = "**A rehearsal: its figures have no weight.** Everything was run, with \
+                             too few runs to measure anything; without `--quick` it is measured.";
+
+/// Returns the start of a paper's report: its lead, and the claims before all else.
+pub fn of_paper(title: &str, lead: String, quick: bool, claims: &[Claim]) -> Document {
+    let mut document = Document::new(title, lead);
+    if quick {
+        document.warning(Text::marked(REHEARSAL));
+    }
+    document.section("Claims").push(Block::Claims(claims.to_vec()));
+    document
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

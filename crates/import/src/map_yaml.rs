@@ -4,8 +4,7 @@ use std::path::{Path, PathBuf};
 
 use saphyr::{LoadableYamlNode, MarkedYaml, Scalar, ScanError, YamlData};
 use sidestep_kernel::InputError;
-
-use super::rosmap::{Mode, Reading};
+use sidestep_map::Cell;
 
 /// The largest YAML file; the keys take 150 bytes.
 pub(super) const MAX_YAML_BYTES: u64 = 64 << 10;
@@ -198,6 +197,51 @@ fn malformed(place: &str, text: &str, error: &ScanError) -> InputError {
 /// Where the character number `index` begins.
 fn byte_offset(text: &str, index: usize) -> usize {
     text.char_indices().nth(index).map_or(text.len(), |(offset, _)| offset)
+}
+
+/// What a pixel's brightness stands for; see [`super::rosmap`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Mode {
+    Trinary,
+    Scale,
+    Raw,
+}
+
+/// How a brightness is read as a cell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Reading {
+    pub(super) mode: Mode,
+    pub(super) negate: bool,
+    pub(super) occupied_thresh: f64,
+    pub(super) free_thresh: f64,
+}
+
+impl Reading {
+    pub(super) fn cell(&self, brightness: f64) -> Cell {
+        let shade = if self.negate { brightness } else { 255.0 - brightness };
+        match self.mode {
+            Mode::Trinary | Mode::Scale => self.occupancy_cell(shade / 255.0),
+            Mode::Raw => self.raw_cell(255.0 - shade),
+        }
+    }
+
+    /// `map_server` stores a raw value as a whole number; 101 to 255 mean unknown.
+    fn raw_cell(&self, value: f64) -> Cell {
+        match value.floor() {
+            percent if percent > 100.0 => Cell::Unknown,
+            percent => self.occupancy_cell(percent / 100.0),
+        }
+    }
+
+    fn occupancy_cell(&self, occupancy: f64) -> Cell {
+        if occupancy > self.occupied_thresh {
+            Cell::Wall
+        } else if occupancy < self.free_thresh {
+            Cell::Free
+        } else {
+            Cell::Unknown
+        }
+    }
 }
 
 #[cfg(test)]

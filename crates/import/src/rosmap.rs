@@ -20,7 +20,6 @@ use sidestep_kernel::InputError;
 use super::PixelMap;
 use super::image::Bitmap;
 use super::map_yaml::{MAX_YAML_BYTES, Metadata};
-use sidestep_map::Cell;
 use sidestep_scenario::file::read_text;
 
 /// Reads the map whose YAML file is at `path`. YAML file and image may be packed with gzip; an
@@ -43,57 +42,13 @@ fn pixel_map(meta: &Metadata, image: &Bitmap) -> PixelMap {
     PixelMap::new(image.width(), image.height(), meta.resolution_m, meta.origin_m, from_bottom)
 }
 
-/// What a pixel's brightness stands for; see the module.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Mode {
-    Trinary,
-    Scale,
-    Raw,
-}
-
-/// How a brightness is read as a cell.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Reading {
-    pub(super) mode: Mode,
-    pub(super) negate: bool,
-    pub(super) occupied_thresh: f64,
-    pub(super) free_thresh: f64,
-}
-
-impl Reading {
-    fn cell(&self, brightness: f64) -> Cell {
-        let shade = if self.negate { brightness } else { 255.0 - brightness };
-        match self.mode {
-            Mode::Trinary | Mode::Scale => self.occupancy_cell(shade / 255.0),
-            Mode::Raw => self.raw_cell(255.0 - shade),
-        }
-    }
-
-    /// `map_server` stores a raw value as a whole number; 101 to 255 mean unknown.
-    fn raw_cell(&self, value: f64) -> Cell {
-        match value.floor() {
-            percent if percent > 100.0 => Cell::Unknown,
-            percent => self.occupancy_cell(percent / 100.0),
-        }
-    }
-
-    fn occupancy_cell(&self, occupancy: f64) -> Cell {
-        if occupancy > self.occupied_thresh {
-            Cell::Wall
-        } else if occupancy < self.free_thresh {
-            Cell::Free
-        } else {
-            Cell::Unknown
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use std::path::PathBuf;
 
     use super::*;
     use Cell::{Free, Unknown, Wall};
+    use sidestep_map::Cell;
 
     const READING: Reading =
         Reading { mode: Mode::Trinary, negate: false, occupied_thresh: 0.65, free_thresh: 0.196 };

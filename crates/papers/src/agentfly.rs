@@ -10,7 +10,7 @@ use crate::claims::{File, Words, all, listed};
 use crate::study::{Progress, Study, finish, number, setting, source};
 use serde::Serialize;
 use sidestep::kernel::InputError;
-use sidestep::worlds::airspace::airplane::Point as AirPoint;
+use sidestep::worlds::airspace::flight::Point as AirPoint;
 use sidestep::worlds::airspace::{AirspaceRun, airspace_run};
 use sidestep_document::claim::{Claim, Verdict, tally};
 use sidestep_document::figure::Point;

@@ -1,7 +1,8 @@
 //! What all papers share of reports: their words, and verdicts over all of something.
 
 use serde::Deserialize;
-use sidestep_document::claim::{self, Claim, Verdict};
+use sidestep_document::claim::{Claim, Verdict};
+use sidestep_document::document;
 use sidestep_document::document::{Experiment, Picture};
 use sidestep_document::{Document, Figure, Table};
 use std::sync::LazyLock;
@@ -67,7 +68,7 @@ impl File {
         (claims, pictures, experiments): Parts<'_>,
         command: String,
     ) -> Document {
-        let mut document = claim::document(&self.title, lead, quick, claims);
+        let mut document = document::of_paper(&self.title, lead, quick, claims);
         if !pictures.is_empty() {
             document.section("Pictures").pictures(pictures);
         }

@@ -62,6 +62,12 @@ fn sync_folder(_folder: &Path) -> io::Result<()> {
     Ok(())
 }
 
+/// The error of a run folder that cannot be made.
+pub(crate) fn cannot_make(path: &Path, cause: impl std::fmt::Display) -> InputError {
+    let cause = format!("cannot make the run folder: {cause}");
+    InputError::new(path.display(), cause, "name a folder in a place where you may write")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

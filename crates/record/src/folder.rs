@@ -76,7 +76,7 @@ impl RunFolder {
         let begun = manifest::begin(&run.world, *seed, program_version, run.cycles_planned);
         let manifest = Manifest { build: Some(run.build.clone()), ..begun };
         fill(staging.path(), &manifest, scenario)
-            .map_err(|e| cannot_make(path, format!("{}: {}", e.place, e.cause)))?;
+            .map_err(|e| disk::cannot_make(path, format!("{}: {}", e.place, e.cause)))?;
         // Nobody may be writing the run that is about to be deleted.
         let old_lock = if is_run(path) { Some(lock(path)?) } else { None };
         staging.take_place_of(path)?;
@@ -253,7 +253,7 @@ pub(crate) fn check_vacant(path: &Path, existing: Existing) -> Result<(), InputE
     let mut entries = match fs::read_dir(path) {
         Ok(entries) => entries,
         Err(_) if !path.exists() => return Ok(()),
-        Err(e) => return Err(cannot_make(path, e)),
+        Err(e) => return Err(disk::cannot_make(path, e)),
     };
     match (entries.next().is_some(), is_run(path), existing) {
         (false, _, _) | (true, true, Existing::Replace) => Ok(()),
@@ -269,11 +269,6 @@ pub(crate) fn check_vacant(path: &Path, existing: Existing) -> Result<(), InputE
             refuse(what, "name a new or empty folder")
         }
     }
-}
-
-pub(crate) fn cannot_make(path: &Path, cause: impl std::fmt::Display) -> InputError {
-    let cause = format!("cannot make the run folder: {cause}");
-    InputError::new(path.display(), cause, "name a folder in a place where you may write")
 }
 
 fn lock(folder: &Path) -> Result<File, InputError> {

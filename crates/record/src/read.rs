@@ -407,7 +407,10 @@ pub(crate) fn read_cells<T: DataType, V: Clone + Default>(
 ) -> ParquetResult<Cells<V>> {
     if is_nullable {
         let mut cells = Cells::default();
-        read_values(reader, true, |v| Ok(cells.push(v.map(&mut convert).transpose()?)))?;
+        read_values(reader, true, |v| {
+            cells.push(v.map(&mut convert).transpose()?);
+            Ok(())
+        })?;
         return Ok(cells);
     }
     let mut values = Vec::new();
@@ -427,7 +430,8 @@ pub(crate) fn read_texts(
 ) -> ParquetResult<Texts> {
     let mut texts = Texts::default();
     read_values(reader, is_nullable, |bytes| {
-        Ok(texts.push(bytes.as_ref().map(ByteArray::as_utf8).transpose()?))
+        texts.push(bytes.as_ref().map(ByteArray::as_utf8).transpose()?);
+        Ok(())
     })?;
     Ok(texts)
 }

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use sidestep_kernel::InputError;
 
 use crate::disk;
-use crate::folder::cannot_make;
+use crate::disk::cannot_make;
 
 /// A folder under a temporary name; dropped, it and the parents made for it are gone again.
 pub(crate) struct Staging {

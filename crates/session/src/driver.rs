@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::film::Film;
-use crate::recording::Recording;
+use crate::recording::{Recording, next};
 use crate::watcher::{Progress, Watched, Watcher};
 use cpu_time::ProcessTime;
 use sidestep::kernel::Cycle;
@@ -83,11 +83,6 @@ fn slice(
         film.shoot(run)?;
     }
     Ok(())
-}
-
-/// The first multiple of `every` after `cycle`.
-pub(crate) fn next(every: Cycle, cycle: Cycle) -> Cycle {
-    (cycle / every + 1).saturating_mul(every)
 }
 
 /// How many cycles make a slice.

@@ -5,7 +5,7 @@ use sidestep::kernel::ports::RecordError;
 use sidestep_draw::DrawError;
 use std::path::Path;
 
-/// Why work ends before its goal.
+/// The reason why work ends before its goal.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// Wrong input; says where and what would be right.

@@ -1,10 +1,10 @@
-//! Builds: what one has made, another must not go on with.
+//! The identity of builds: only the build that began a run or a sweep goes on with it.
 
 use sidestep::kernel::InputError;
 use sidestep::{BUILD, VERSION};
 use std::path::Path;
 
-/// What made a run or a sweep, as it is recorded.
+/// The maker of a run or a sweep, as it is recorded.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Maker {
     /// The version of the program.

@@ -1,5 +1,5 @@
-//! Whatever drives runs of any world: starts, records, resumes and replays them, films and exports
-//! them, runs sweeps of them, and makes the documents of reports.
+//! Drives runs of any world: starts, records, resumes and replays them, films and exports them, runs
+//! sweeps of them, and makes the documents of reports.
 //!
 //! ```text
 //! scenario.rs   a file and overrides -> a scenario     journey.rs    one run, to its end

@@ -1,7 +1,6 @@
 //! A run's folder while it is being written.
 
 use crate::Error;
-use crate::driver::next;
 use sidestep::kernel::Simulation;
 use sidestep::kernel::ports::{RecordError, Recorder};
 use sidestep::kernel::{Cycle, InputError};
@@ -118,6 +117,11 @@ impl Recording {
     pub(crate) fn took(&self) -> Duration {
         self.took
     }
+}
+
+/// The first multiple of `every` after `cycle`.
+pub(crate) fn next(every: Cycle, cycle: Cycle) -> Cycle {
+    (cycle / every + 1).saturating_mul(every)
 }
 
 /// Puts the files that a resolved scenario names beside it.

@@ -1,4 +1,4 @@
-//! The one who looks on while work is done, and may ask it to stop.
+//! Watchers: they look on while work is done, and may ask it to stop.
 
 use crate::Error;
 use sidestep::kernel::Cycle;

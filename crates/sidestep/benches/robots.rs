@@ -6,7 +6,7 @@
 
 use cpu_time::ProcessTime;
 use sidestep::scenario::Source;
-use sidestep::worlds::robots::run::heap_bytes;
+use sidestep::worlds::robots::heap_bytes;
 use sidestep::worlds::robots::{RobotsRun, RobotsWorld, robots_run};
 use sidestep_kernel::conflict::Groups;
 use sidestep_kernel::ports::{Recorder, SystemClock};

@@ -48,9 +48,9 @@ pub use bootstrap::Bootstrap;
 pub use interval::{
     Interval, clopper_pearson, mean_interval, paired_difference, runs_for_half_width, wilson,
 };
-pub use moments::{Moments, Sample, mean, sample_sd};
+pub use moments::{Moments, Sample, mean, percentile, sample_sd};
 pub use paired::{Pairs, holm};
-pub use quantile::{QuantileInterval, percentile, quantile_interval, runs_for_quantile};
+pub use quantile::{QuantileInterval, quantile_interval, runs_for_quantile};
 pub use stopping::{Next, Reason, StoppingRule};
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};

@@ -1,6 +1,5 @@
 //! Mean, spread and percentiles, summed so that magnitudes do no harm.
 
-use super::quantile::percentile;
 use serde::Serialize;
 
 /// What there is of a metric over runs: its finite values, in the order of the runs, and how
@@ -97,6 +96,16 @@ fn squares(values: &[f64]) -> Option<(f64, f64)> {
     // What the rounding of the mean adds to every deviation.
     let off = sum(deviations.iter().map(|d| d / scale));
     Some(((square - off * off / values.len() as f64).max(0.0) * 4.0, scale))
+}
+
+/// The value below which a fraction `q` of `sorted` lies, between two order statistics by
+/// linear interpolation (type 7 of Hyndman and Fan); `None` of nothing.
+pub fn percentile(sorted: &[f64], q: f64) -> Option<f64> {
+    let last = sorted.len().checked_sub(1)?;
+    let position = q.clamp(0.0, 1.0) * last as f64;
+    let below = position.floor() as usize;
+    let above = (below + 1).min(last);
+    Some(sorted[below] + (position - below as f64) * (sorted[above] - sorted[below]))
 }
 
 /// Size, mean, spread and percentiles of a set of measurements, in their unit.

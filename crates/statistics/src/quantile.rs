@@ -5,16 +5,6 @@ use serde::Serialize;
 use sidestep_kernel::math;
 use statrs::function::beta::checked_beta_reg;
 
-/// The value below which a fraction `q` of `sorted` lies, between two order statistics by
-/// linear interpolation (type 7 of Hyndman and Fan); `None` of nothing.
-pub fn percentile(sorted: &[f64], q: f64) -> Option<f64> {
-    let last = sorted.len().checked_sub(1)?;
-    let position = q.clamp(0.0, 1.0) * last as f64;
-    let below = position.floor() as usize;
-    let above = (below + 1).min(last);
-    Some(sorted[below] + (position - below as f64) * (sorted[above] - sorted[below]))
-}
-
 /// An interval of a quantile between two order statistics.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct QuantileInterval {
@@ -95,6 +85,7 @@ fn normal_ranks(n: usize, q: f64) -> Option<(usize, usize)> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::moments::percentile;
     use super::super::testing::close;
     use super::*;
     use proptest::prelude::*;

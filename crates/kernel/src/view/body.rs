@@ -1,9 +1,11 @@
 //! Bodies: what they are, where, and what they look like.
 
 use super::pose::{Place, Pose};
-use super::trails::Who;
 use serde::{Deserialize, Serialize};
 use std::fmt;
+
+/// Which body: its kind, its number, and its part of things that have parts.
+pub type Who = (Kind, u32, Option<u32>);
 
 /// Something that can be seen.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

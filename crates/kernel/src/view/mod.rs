@@ -11,10 +11,10 @@ mod pose;
 mod trails;
 
 pub use appearance::{ALERT, Appearance, COLORS, Color, DOOR, MOBILE, UNKNOWN, WALL, color_of};
-pub use body::{Body, Condition, Kind, Shape};
+pub use body::{Body, Condition, Kind, Shape, Who};
 pub use log::{Entry, Level, Log};
 pub use pose::{Place, Pose};
-pub use trails::{Axis, PlaceRows, Trail, Who, corner};
+pub use trails::{Axis, PlaceRows, Trail, corner};
 
 use crate::units::Cycle;
 use serde::{Deserialize, Serialize};

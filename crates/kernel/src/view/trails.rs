@@ -1,14 +1,11 @@
 //! The ways that bodies have gone, and how rows of recorded tables tell them.
 
-use super::body::{Body, Kind, Shape};
+use super::body::{Body, Kind, Shape, Who};
 use super::pose::Place;
 use super::{Frame, Scenery};
 use crate::ports::Values;
 use crate::units::Cycle;
 use std::collections::BTreeMap;
-
-/// Which body: its kind, its number, and its part of things that have parts.
-pub type Who = (Kind, u32, Option<u32>);
 
 /// The way that a body has gone.
 #[derive(Debug, Clone, PartialEq)]

@@ -325,7 +325,7 @@ mod tests {
                 let look = body.appearance(dimensions);
                 let frame = Frame { bodies: vec![body], ..Frame::default() };
                 let update = scene(&frame, dimensions, &mut BTreeSet::new());
-                let shown = update.entities[0].spheres[0].color.clone().expect("a color");
+                let shown = update.entities[0].spheres[0].color.expect("a color");
                 let bytes = [shown.r, shown.g, shown.b].map(|part| (255.0 * part).round() as u8);
                 assert_eq!((bytes, shown.a), (look.color, look.opacity), "{kind}");
             }

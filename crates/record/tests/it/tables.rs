@@ -263,7 +263,8 @@ fn columns_of_every_type_come_back_also_where_values_are_missing() {
         let (schema, block) = every_type(rows, missing);
         let folder = tempfile::tempdir().unwrap();
         let mut recorder =
-            ParquetRecorder::create(folder.path(), &[schema.clone()], &origin()).unwrap();
+            ParquetRecorder::create(folder.path(), std::slice::from_ref(&schema), &origin())
+                .unwrap();
         recorder.append(0, &block).unwrap();
         recorder.append(0, &block).unwrap();
         recorder.finish().unwrap();

@@ -43,7 +43,7 @@ pub struct Film {
     pub width_px: Option<u16>,
 }
 
-/// What is exported, and where to.
+/// An export that is wanted: its form, its part of the run and its place.
 #[derive(Debug, Clone)]
 pub struct Export<'a> {
     /// The form.
@@ -63,7 +63,7 @@ pub struct Export<'a> {
     pub workers: usize,
 }
 
-/// What was written.
+/// Files that were written.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Written {
     /// The files, or the folder of a film's pictures.

@@ -15,8 +15,8 @@ mod words;
 
 use crate::sweep::Folder;
 use crate::{Error, Watcher};
-use sidestep_document::Document;
 use sidestep::scenario::Worlds;
+use sidestep_document::Document;
 use std::path::Path;
 
 pub use words::duration;

@@ -101,7 +101,7 @@ fn facts(view: &RunView, summary: Option<&Value>) -> Vec<(String, Text)> {
     let mut fact = |name: &str, value: Option<String>| {
         facts.extend(value.map(|value| (name.to_string(), Text::from(value))));
     };
-    fact("Agents", number("robots").map(|n| count(n as u64)));
+    fact("Agents", number("agents").or(number("robots")).map(|n| count(n as u64)));
     fact("Took", number("wall_s").map(duration));
     fact("Workers", number("workers").map(|n| n.to_string()));
     let digest = manifest.digest.clone();

@@ -4,12 +4,12 @@ use super::run::quoted;
 use super::words::{count, duration};
 use crate::sweep::{Finished, Folder, finished, picture_of};
 use crate::{Error, Watcher};
-use sidestep_document::Table;
-use sidestep_document::document::{Block, Code, Document, Picture, Text};
 use sidestep::experiment::sweep::rounds::{Stopped, stopped};
 use sidestep::experiment::sweep::{Plan, RunTable, Summary};
 use sidestep::kernel::ports::Values;
 use sidestep::scenario::Worlds;
+use sidestep_document::Table;
+use sidestep_document::document::{Block, Code, Document, Picture, Text};
 
 /// Variants of which a run is drawn.
 const DRAWN: usize = 4;
@@ -45,7 +45,7 @@ pub(super) fn document(
     }
     tell_results(&mut document, &summary);
     tell_failures(&mut document, plan, &table);
-    let pictures = pictures((worlds, watcher), folder, &table)?;
+    let pictures = pictures(worlds, folder, &table, watcher)?;
     if !pictures.is_empty() {
         document.section("Where everybody went");
         let text = "The run of the first seed, of the first variants.";
@@ -201,9 +201,10 @@ fn tell_failures(document: &mut Document, plan: &Plan, table: &RunTable) {
 
 /// A run of each of the first variants, drawn; nothing of those that took long.
 fn pictures(
-    (worlds, watcher): (Worlds, &dyn Watcher),
+    worlds: Worlds,
     folder: &Folder,
     table: &RunTable,
+    watcher: &dyn Watcher,
 ) -> Result<Vec<Picture>, Error> {
     let plan = folder.plan();
     let cells = table.column("cell");
@@ -216,7 +217,7 @@ fn pictures(
     for (variant, name) in (0u32..).zip(plan.names()).take(DRAWN) {
         let cell = plan.cell(variant, 0);
         if took_s(cell.id).is_some_and(|took_s| took_s <= LONGEST_S)
-            && let Some(svg) = picture_of((worlds, watcher), folder, cell)?
+            && let Some(svg) = picture_of(worlds, folder, cell, watcher)?
         {
             let caption =
                 format!("Seed {}, digest and metrics in row {} of the table.", cell.seed, cell.id);

@@ -44,9 +44,10 @@ pub fn finished(folder: &Folder) -> Result<Finished, InputError> {
 /// # Errors
 /// When the run cannot be made again.
 pub(crate) fn picture_of(
-    (worlds, watcher): (Worlds, &dyn Watcher),
+    worlds: Worlds,
     folder: &Folder,
     cell: Cell,
+    watcher: &dyn Watcher,
 ) -> Result<Option<String>, Error> {
     let kept = folder.run_folder(cell.id);
     if let Some(svg) = picture_in(&kept) {
@@ -55,7 +56,7 @@ pub(crate) fn picture_of(
     let place = tempfile::tempdir().map_err(|e| Error::write(&std::env::temp_dir(), &e))?;
     let again = place.path().join("run");
     let source = Source::read(&folder.scenario(cell.variant), &[])?;
-    recorded((worlds, &Within(watcher)), cell, source, 1, &again)?;
+    recorded(worlds, cell, source, 1, &again, &Within(watcher))?;
     Ok(picture_in(&again))
 }
 

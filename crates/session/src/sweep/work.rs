@@ -78,8 +78,8 @@ impl Work<'_> {
         let run = || match self.record {
             None => self.plain(cell, &source, workers),
             Some(folder) => {
-                let place = (self.worlds, self.watcher);
-                recorded(place, cell, source, workers, &folder(cell.id))
+                let folder = folder(cell.id);
+                recorded(self.worlds, cell, source, workers, &folder, self.watcher)
             }
         };
         match catch_unwind(AssertUnwindSafe(run)) {
@@ -112,11 +112,12 @@ impl Work<'_> {
 /// # Errors
 /// When the scenario is wrong with this seed, or something cannot be stored.
 pub(super) fn recorded(
-    (worlds, watcher): (Worlds, &dyn Watcher),
+    worlds: Worlds,
     cell: Cell,
     variant: Source,
     workers: usize,
     folder: &Path,
+    watcher: &dyn Watcher,
 ) -> Result<Option<Outcome>, Error> {
     let begun = Instant::now();
     let source = variant.with(&[format!("seed={}", cell.seed)])?;

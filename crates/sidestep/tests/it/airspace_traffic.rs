@@ -116,7 +116,7 @@ fn orders_are_carried_out_at_their_times() {
     assert!((now(&run).pose.at[0] - 700.0).abs() < 1e-6);
     run.advance(16);
     let turned = now(&run);
-    assert!((turned.pose.psi_rad - std::f64::consts::FRAC_PI_2).abs() < 1e-6, "{turned:?}");
+    assert!((turned.pose.heading_rad - std::f64::consts::FRAC_PI_2).abs() < 1e-6, "{turned:?}");
     run.advance(4);
     let faster = now(&run);
     assert!((faster.pose.at[1] - turned.pose.at[1] - 1400.0).abs() < 1e-3, "{faster:?}");
@@ -125,7 +125,7 @@ fn orders_are_carried_out_at_their_times() {
     run.advance(6);
     assert!((now(&run).altitude_m - 100.0).abs() < 1e-9);
     run.advance(40);
-    assert!(now(&run).pose.psi_rad.abs() < 0.05, "to the way-point again");
+    assert!(now(&run).pose.heading_rad.abs() < 0.05, "to the way-point again");
     run.advance(400);
     let metrics = run.metrics();
     assert!(run.is_over());

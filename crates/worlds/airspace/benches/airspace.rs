@@ -4,11 +4,10 @@
 //! `many`; CPU time, and ratios taken in one run, since the machine may be noisy.
 
 use cpu_time::ProcessTime;
-use sidestep_airspace::airplane::{
-    Action, After, Legs, Model, Passing, Pilot, Point, Pose, Timing, actions,
-};
 use sidestep_airspace::airspace_run;
-use sidestep_airspace::levels::Levels;
+use sidestep_airspace::flight::{
+    Action, After, Legs, Levels, Model, Passing, Pilot, Point, Pose, Timing, actions,
+};
 use sidestep_airspace::objective::{Objective, Options, game};
 use sidestep_collectives::{
     Choice, Estimator, Game, Order, Settings, Stop, Update, Utility, optimize,
@@ -44,7 +43,7 @@ impl Conflict {
             [radius_m * cos(angle), radius_m * sin(angle)]
         };
         let turn = std::f64::consts::PI;
-        let pose = |k| Pose { at: on(3000.0, angle(k)), psi_rad: angle(k) + turn };
+        let pose = |k| Pose { at: on(3000.0, angle(k)), heading_rad: angle(k) + turn };
         Self {
             poses: (0..n).map(pose).collect(),
             goals: (0..n).map(|k| [on(6500.0, angle(k) + turn)]).collect(),

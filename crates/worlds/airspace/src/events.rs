@@ -8,7 +8,7 @@ use sidestep_kernel::{Cycle, EntityId};
 #[serde(rename_all = "kebab-case")]
 pub enum EventKind {
     /// Two airplanes have come nearer than their separation; the value is how near
-    /// they were at first, in metres.
+    /// they were at first, in meters.
     LossOfSeparation,
     /// An airplane has done with its last way-point; the value is its delay in seconds.
     Arrival,

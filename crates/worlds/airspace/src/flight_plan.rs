@@ -1,9 +1,8 @@
 //! The text of one airplane of a scenario: where it begins, its way-points, its recorded track,
 //! and its orders.
 
-use super::orders::{FlightOrder, MAX_ORDERS, Task};
+use super::flight::{FlightOrder, MAX_ORDERS, Task, Track, TrackPoint};
 use super::scenario::{Measure, TurnRate, Turns};
-use super::track::{Track, TrackPoint};
 use serde::Deserialize;
 use sidestep_kernel::{InputError, math};
 use sidestep_scenario::{AboveTo, FromTo, Number, Point, Source};

@@ -1,14 +1,26 @@
 //! Traffic that is made up: the super-conflict, random crossings, converging streams.
 
-use super::airplane::{Model, Point, Pose, distance_m};
-use super::scenario::GeneratorKind;
-use super::world::{Airplane, purpose};
+use super::flight::{Airplane, Model, Point, Pose, distance_m};
+use super::purpose;
+use serde::{Deserialize, Serialize};
 use sidestep_kernel::math;
 use sidestep_kernel::stream::{Draws, Streams};
 use std::f64::consts::TAU;
 
 /// Draws until a place is far enough from all others, at most this often per airplane.
 const TRIES: usize = 2_000;
+
+/// Kinds of made-up traffic.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum GeneratorKind {
+    /// On a circle, each to the opposite point.
+    Superconflict,
+    /// From anywhere to anywhere in a disc.
+    Random,
+    /// Three streams that meet.
+    Streams,
+}
 
 /// What is to be generated.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,10 +43,10 @@ pub(super) fn generate(order: &Order<'_>, streams: &Streams) -> Result<Vec<Airpl
 
 fn airplane(order: &Order<'_>, from: Point, to: Vec<Point>) -> Airplane {
     let first = to.first().copied().unwrap_or(from);
-    let psi_rad = math::atan2(first[1] - from[1], first[0] - from[0]);
+    let heading_rad = math::atan2(first[1] - from[1], first[0] - from[0]);
     Airplane {
         model: order.model.clone(),
-        start: Pose { at: from, psi_rad },
+        start: Pose { at: from, heading_rad },
         mission: to,
         altitude_m: 0.0,
         appears_s: 0.0,
@@ -92,8 +104,8 @@ fn in_disc(radius_m: f64, draws: &mut Draws) -> Point {
     on_circle(r, TAU * draws.uniform())
 }
 
-/// Three streams that meet at the centre and go on together; airplanes of a stream follow each
-/// other at four separations, and the first of each stream come to the centre at once, so do the
+/// Three streams that meet at the center and go on together; airplanes of a stream follow each
+/// other at four separations, and the first of each stream come to the center at once, so do the
 /// second, and so on.
 fn converging(order: &Order<'_>, streams: &Streams) -> Vec<Airplane> {
     let spacing_m = 4.0 * order.model.separation_m;

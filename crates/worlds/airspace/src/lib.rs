@@ -6,55 +6,55 @@
 //!
 //! ```text
 //! scenario.rs, flight_plan.rs, generate.rs -> world.rs (immutable), state.rs (cells)
-//! near each other -> groups;  entry.rs, orders.rs, track.rs: who comes in, and what it is told
-//! decide.rs -> shield.rs -> react.rs                                      one cycle of dt
-//! airplane.rs, levels.rs, objective.rs: motion and cost behind it
-//! orbit.rs: what is flown for ever     books.rs: how near pairs come     metrics.rs: what came of it
+//! perceive.rs -> join.rs -> decide.rs -> act.rs                            one cycle of dt
+//! flight/: motion, orders, tracks       objective.rs: what is minimized    behind it
+//! shield/: what is safe for ever        agents/, deploy/: who decides, over which network
+//! baseline/: other methods              metrics.rs: what came of it
 //! ```
 
-pub mod airplane;
+mod act;
+pub mod agents;
 mod baseline;
-mod books;
 pub mod bundle;
 mod decide;
 pub mod deploy;
-mod entry;
 pub mod events;
+pub mod flight;
 mod flight_plan;
 mod foreign;
 mod generate;
+mod join;
 mod kind;
-pub mod levels;
 mod memory;
 pub mod metrics;
 pub mod objective;
-mod orbit;
-pub mod orders;
-mod react;
+mod perceive;
+mod purpose;
 mod rows;
-pub mod run;
+mod run;
 pub mod scenario;
 pub mod shield;
 pub mod state;
-pub mod track;
 pub mod traffic;
 mod view;
 mod words;
 pub mod world;
 
-pub use books::LOOKS_PER_STEP;
+use agents::network::Traffic;
 pub use decide::{Effort, Optimization};
-use deploy::Traffic;
 use events::Event;
 pub use kind::Airspace;
-pub use run::{AirspaceRun, airspace_run};
+pub use run::{AirspaceRun, Books, airspace_run};
 use sidestep_kernel::conflict::Groups;
 use sidestep_kernel::world::Decides;
-use sidestep_kernel::{Cycle, Phases, Slot, Turn};
+use sidestep_kernel::{Cycle, Phases, Slot};
 use state::{AirspaceState, PairRecord};
 use std::collections::BTreeMap;
 use std::ops::Range;
 pub use world::AirspaceWorld;
+
+/// A worker's turn in one phase of one cycle.
+type Turn<'a> = sidestep_kernel::Turn<'a, AirspaceWorld>;
 
 /// What a worker keeps between tasks.
 #[derive(Debug, Default)]
@@ -86,40 +86,15 @@ impl Phases for AirspaceWorld {
         self.airplanes.len()
     }
 
-    fn claim(turn: &mut Turn<'_, Self>, bodies: Range<usize>) {
-        let Turn { world, state, now, .. } = *turn;
-        for slot in bodies {
-            if state.is_there(world, slot as Slot, now) {
-                let at = state.airplanes[slot].pose().at;
-                state.neighborhood.enter(slot as Slot, at, now);
-            }
-        }
+    fn claim(turn: &mut Turn<'_>, bodies: Range<usize>) {
+        perceive::claim(turn, bodies);
     }
 
-    fn join(turn: &mut Turn<'_, Self>, bodies: Range<usize>, groups: &Groups) {
-        let Turn { world, state, now, .. } = *turn;
-        for slot in bodies.map(|slot| slot as Slot) {
-            let cell = &state.airplanes[slot as usize];
-            if !state.is_there(world, slot, now) {
-                continue;
-            }
-            state.neighborhood.around(cell.pose().at, now, |other| {
-                if other < slot && state.is_near(world, (slot, other), now) {
-                    groups.join(slot, other);
-                }
-            });
-        }
+    fn join(turn: &mut Turn<'_>, bodies: Range<usize>, groups: &Groups) {
+        join::join(turn, bodies, groups);
     }
 
-    fn act(turn: &mut Turn<'_, Self>, group: &mut [Slot]) {
-        let Turn { world, state, now, .. } = *turn;
-        let mut flying = std::mem::take(&mut turn.scratch.flying);
-        flying.clear();
-        flying.extend(group.iter().filter(|&&slot| state.is_there(world, slot, now)));
-        flying.sort_unstable();
-        if !flying.is_empty() {
-            world.fly(turn, &flying);
-        }
-        turn.scratch.flying = flying;
+    fn act(turn: &mut Turn<'_>, group: &mut [Slot]) {
+        act::act(turn, group);
     }
 }

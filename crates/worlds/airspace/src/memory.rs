@@ -1,83 +1,79 @@
 //! How much memory optimizing a group takes: said before, not after.
 
-use super::Scratch;
-use super::airplane::{Point, distance_m};
-use super::decide::Known;
 use super::deploy::Deployment;
+use super::flight::{Known, Point, distance_m};
+use super::join::join;
+use super::perceive::{claim, known};
 use super::state::AirspaceState;
 use super::world::AirspaceWorld;
+use super::{Scratch, Turn};
 use sidestep_collectives::{Estimator, PairwiseGame};
+use sidestep_kernel::Slot;
 use sidestep_kernel::conflict::Groups;
 use sidestep_kernel::ports::ManualClock;
-use sidestep_kernel::{Phases, Slot, Turn};
 
-impl AirspaceWorld {
-    /// Bytes that optimizing a group takes at most: tables of its pairs, and predictions, in as
-    /// many copies as its deployment has of them.
-    pub(super) fn group_takes_bytes(&self, group: &[Known]) -> u64 {
-        let (tables, predictions) = (self.table_bytes(group), self.prediction_bytes(group));
-        let members = group.len() as u64;
-        match (self.deployment, self.settings.estimator) {
-            (Deployment::Direct | Deployment::Pim | Deployment::HierarchicalPim, _) => {
-                tables + predictions
-            }
-            // Each agent has the tables of its own pairs, and everybody's predictions.
-            (Deployment::Team | Deployment::CompactTeam, Estimator::Exact) => {
-                2 * tables + members * predictions
-            }
-            // Each computes what all samples cost all.
-            (Deployment::CompactTeam, Estimator::Sampled { .. }) => {
-                members * (tables + predictions)
-            }
-            // Each has the sampled ways of all others, of this round and the one before.
-            (Deployment::Team, Estimator::Sampled { block, .. }) => {
-                let way = self.timing.horizon as u64 * size_of::<Point>() as u64;
-                predictions + 2 * members * members.saturating_sub(1) * block as u64 * way
-            }
+/// Bytes that optimizing a group takes at most: tables of its pairs, and predictions, in as
+/// many copies as its deployment has of them.
+pub(super) fn group_takes_bytes(world: &AirspaceWorld, group: &[Known]) -> u64 {
+    let (tables, predictions) = (table_bytes(world, group), prediction_bytes(world, group));
+    let members = group.len() as u64;
+    match (world.deployment, world.settings.estimator) {
+        (Deployment::Direct | Deployment::Pim | Deployment::HierarchicalPim, _) => {
+            tables + predictions
+        }
+        // Each agent has the tables of its own pairs, and everybody's predictions.
+        (Deployment::Team | Deployment::CompactTeam, Estimator::Exact) => {
+            2 * tables + members * predictions
+        }
+        // Each computes what all samples cost all.
+        (Deployment::CompactTeam, Estimator::Sampled { .. }) => members * (tables + predictions),
+        // Each has the sampled ways of all others, of this round and the one before.
+        (Deployment::Team, Estimator::Sampled { block, .. }) => {
+            let way = world.timing.horizon as u64 * size_of::<Point>() as u64;
+            predictions + 2 * members * members.saturating_sub(1) * block as u64 * way
         }
     }
+}
 
-    /// Bytes of the predicted ways of all actions of a group.
-    fn prediction_bytes(&self, group: &[Known]) -> u64 {
-        let ways: u64 = group.iter().map(|known| self.actions_of(known.slot).len() as u64).sum();
-        ways * self.timing.horizon as u64 * size_of::<Point>() as u64
-    }
+/// Bytes of the predicted ways of all actions of a group.
+fn prediction_bytes(world: &AirspaceWorld, group: &[Known]) -> u64 {
+    let ways: u64 = group.iter().map(|known| world.actions_of(known.slot).len() as u64).sum();
+    ways * world.timing.horizon as u64 * size_of::<Point>() as u64
+}
 
-    /// Bytes that the tables of a group's pairs take at most.
-    fn table_bytes(&self, group: &[Known]) -> u64 {
-        let actions = |known: &Known| self.actions_of(known.slot).len() as u64;
-        let mut entries = 0;
-        for (k, a) in group.iter().enumerate() {
-            let meets = |b: &&Known| {
-                let apart_m = distance_m(a.pose.at, b.pose.at);
-                (a.altitude_m - b.altitude_m).abs() < self.vertical_m
-                    && apart_m <= self.look_m(a.slot as usize, b.slot as usize)
-            };
-            entries +=
-                group[k + 1..].iter().filter(meets).map(|b| actions(a) * actions(b)).sum::<u64>();
-        }
-        entries * PairwiseGame::BYTES_PER_ENTRY
+/// Bytes that the tables of a group's pairs take at most.
+fn table_bytes(world: &AirspaceWorld, group: &[Known]) -> u64 {
+    let actions = |known: &Known| world.actions_of(known.slot).len() as u64;
+    let mut entries = 0;
+    for (k, a) in group.iter().enumerate() {
+        let meets = |b: &&Known| {
+            let apart_m = distance_m(a.pose.at, b.pose.at);
+            (a.altitude_m - b.altitude_m).abs() < world.vertical_m
+                && apart_m <= world.look_m(a.slot as usize, b.slot as usize)
+        };
+        entries +=
+            group[k + 1..].iter().filter(meets).map(|b| actions(a) * actions(b)).sum::<u64>();
     }
+    entries * PairwiseGame::BYTES_PER_ENTRY
+}
 
-    /// The members of the group that takes most at the start of a run, and its bytes.
-    pub(super) fn largest_at_start(&self, state: &AirspaceState) -> (usize, u64) {
-        let n = self.airplanes.len();
-        let (groups, mut scratch) = (Groups::new(n), Scratch::default());
-        let clock = &ManualClock::default();
-        let turn = &mut Turn { world: self, state, now: 0, clock, scratch: &mut scratch };
-        Self::claim(turn, 0..n);
-        Self::join(turn, 0..n, &groups);
-        let mut members = Vec::new();
-        let leaders =
-            (0..n as Slot).filter(|&slot| groups.is_leader(slot) && !groups.is_alone(slot));
-        let taken = leaders.map(|leader| {
-            groups.members(leader, &mut members);
-            let flown = members.iter().filter(|&&slot| !self.is_replayed(slot, 0));
-            let known: Vec<Known> = flown.map(|&slot| self.known(state, 0, slot)).collect();
-            (known.len(), self.group_takes_bytes(&known))
-        });
-        taken.max_by_key(|(_, bytes)| *bytes).unwrap_or_default()
-    }
+/// The members of the group that takes most at the start of a run, and its bytes.
+pub(super) fn largest_at_start(world: &AirspaceWorld, state: &AirspaceState) -> (usize, u64) {
+    let n = world.airplanes.len();
+    let (groups, mut scratch) = (Groups::new(n), Scratch::default());
+    let clock = &ManualClock::default();
+    let turn = &mut Turn { world, state, now: 0, clock, scratch: &mut scratch };
+    claim(turn, 0..n);
+    join(turn, 0..n, &groups);
+    let mut members = Vec::new();
+    let leaders = (0..n as Slot).filter(|&slot| groups.is_leader(slot) && !groups.is_alone(slot));
+    let taken = leaders.map(|leader| {
+        groups.members(leader, &mut members);
+        let flown = members.iter().filter(|&&slot| !world.is_replayed(slot, 0));
+        let known: Vec<Known> = flown.map(|&slot| known(world, state, 0, slot)).collect();
+        (known.len(), group_takes_bytes(world, &known))
+    });
+    taken.max_by_key(|(_, bytes)| *bytes).unwrap_or_default()
 }
 
 #[cfg(test)]
@@ -94,7 +90,7 @@ mod tests {
         );
         let compiled = Compiled::new(&Source::new("m", text, "")).expect("a scenario");
         let state = AirspaceState::restore(&compiled.world, &compiled.start_snapshot());
-        let (airplanes, bytes) = compiled.world.largest_at_start(&state);
+        let (airplanes, bytes) = largest_at_start(&compiled.world, &state);
         assert_eq!(airplanes, 4);
         (bytes, compiled.world.actions_of(0).len() as u64)
     }

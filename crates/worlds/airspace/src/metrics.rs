@@ -1,9 +1,8 @@
 //! What came of a run.
 
-use super::books::LOOKS_PER_STEP;
 use super::decide::Effort;
 use super::events::{Event, EventKind};
-use super::state::{AirspaceState, Cell, PairRecord};
+use super::state::{AirspaceState, Cell, LOOKS_PER_STEP, PairRecord};
 use super::world::AirspaceWorld;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::{Cycle, EntityId};
@@ -17,7 +16,7 @@ pub struct Ledger {
     /// Pairs without fallbacks that are apart when the later one of them came under the method,
     /// after the cycle in which that was.
     pub too_close: BTreeSet<(Cycle, EntityId, EntityId)>,
-    /// What optimizations took.
+    /// Sums over optimizations.
     pub effort: Effort,
     /// How often what happened.
     pub events: BTreeMap<EventKind, u64>,
@@ -150,102 +149,118 @@ impl AirplaneMetrics {
     }
 }
 
-impl AirspaceWorld {
-    /// Metrics of one airplane.
-    pub fn airplane_metrics(&self, state: &AirspaceState, id: EntityId) -> AirplaneMetrics {
-        let (cell, alone_s) = (&state.airplanes[id as usize], self.alone_s[id as usize]);
-        let joined_s = self.starts_s(self.joins_in(id as usize));
-        let arrived_s = cell.arrived_step().map(|step| step as f64 * self.timing.dtau_s);
-        let flown_s = arrived_s.map(|s| s - joined_s).filter(|_| !self.is_replayed_to_the_end(id));
-        AirplaneMetrics {
-            airplane: id,
-            flown_s,
-            alone_s,
-            delay_percent: flown_s
-                .filter(|_| alone_s > 0.0 && alone_s.is_finite())
-                .map(|s| 100.0 * (s - alone_s) / alone_s),
-            shield_overrides: cell.overrides.get(),
-            shield_orbits: cell.orbits.get(),
-            left: cell.has_left(),
-            orders: cell.orders.get(),
-            orders_delayed: cell.waits.get(),
-        }
+/// Metrics of one airplane.
+pub fn airplane_metrics(
+    world: &AirspaceWorld,
+    state: &AirspaceState,
+    id: EntityId,
+) -> AirplaneMetrics {
+    let (cell, alone_s) = (&state.airplanes[id as usize], world.alone_s[id as usize]);
+    let joined_s = world.starts_s(world.joins_in(id as usize));
+    let arrived_s = cell.arrived_step().map(|step| step as f64 * world.timing.dtau_s);
+    let flown_s = arrived_s.map(|s| s - joined_s).filter(|_| !is_replayed_to_the_end(world, id));
+    AirplaneMetrics {
+        airplane: id,
+        flown_s,
+        alone_s,
+        delay_percent: flown_s
+            .filter(|_| alone_s > 0.0 && alone_s.is_finite())
+            .map(|s| 100.0 * (s - alone_s) / alone_s),
+        shield_overrides: cell.overrides.get(),
+        shield_orbits: cell.orbits.get(),
+        left: cell.has_left(),
+        orders: cell.orders.get(),
+        orders_delayed: cell.waits.get(),
     }
+}
 
-    fn is_replayed_to_the_end(&self, id: EntityId) -> bool {
-        let joined_s = self.starts_s(self.joins_in(id as usize));
-        let track = &self.airplanes[id as usize].track;
-        track.as_ref().is_some_and(|track| track.ends_s() <= joined_s)
-    }
+fn is_replayed_to_the_end(world: &AirspaceWorld, id: EntityId) -> bool {
+    let joined_s = world.starts_s(world.joins_in(id as usize));
+    let track = &world.airplanes[id as usize].track;
+    track.as_ref().is_some_and(|track| track.ends_s() <= joined_s)
+}
 
-    /// Metrics of all pairs that came near each other, by ids.
-    pub fn pair_metrics(&self, ledger: &Ledger) -> Vec<PairMetrics> {
-        let separation_m = |id: EntityId| self.airplanes[id as usize].model.separation_m;
-        let one = |(&(a, b), record): (&(EntityId, EntityId), &PairRecord)| PairMetrics {
-            airplanes: [a, b],
-            nearest_m: record.nearest_m,
-            losses: record.losses,
-            lost_s: self.lost_s(record.lost_looks),
-            severity: (1.0 - record.nearest_m / separation_m(a).max(separation_m(b))).max(0.0),
-        };
-        ledger.pairs.iter().map(one).collect()
-    }
+/// Metrics of all pairs that came near each other, by ids.
+pub fn pair_metrics(world: &AirspaceWorld, ledger: &Ledger) -> Vec<PairMetrics> {
+    let separation_m = |id: EntityId| world.airplanes[id as usize].model.separation_m;
+    let one = |(&(a, b), record): (&(EntityId, EntityId), &PairRecord)| PairMetrics {
+        airplanes: [a, b],
+        nearest_m: record.nearest_m,
+        losses: record.losses,
+        lost_s: lost_s(world, record.lost_looks),
+        severity: (1.0 - record.nearest_m / separation_m(a).max(separation_m(b))).max(0.0),
+    };
+    ledger.pairs.iter().map(one).collect()
+}
 
-    fn lost_s(&self, looks: u64) -> f64 {
-        looks as f64 * self.timing.dtau_s / LOOKS_PER_STEP as f64
-    }
+fn lost_s(world: &AirspaceWorld, looks: u64) -> f64 {
+    looks as f64 * world.timing.dtau_s / LOOKS_PER_STEP as f64
+}
 
-    /// Metrics of a run so far; `decide_s` is the time spent deciding.
-    pub fn metrics(&self, state: &AirspaceState, ledger: &Ledger, decide_s: f64) -> Metrics {
-        let all = (0..self.airplanes.len() as EntityId).map(|id| self.airplane_metrics(state, id));
-        let all: Vec<AirplaneMetrics> = all.collect();
-        let delays: Vec<f64> = all.iter().filter_map(|a| a.delay_percent).collect();
-        let count =
-            |is: &dyn Fn(&Cell) -> bool| state.airplanes.iter().filter(|c| is(c)).count() as u64;
-        let ended =
-            |a: &&AirplaneMetrics| state.airplanes[a.airplane as usize].arrived_step().is_some();
-        let replayed = all.iter().filter(ended).filter(|a| self.is_replayed_to_the_end(a.airplane));
-        let mean = |sum: f64, n: usize| (n > 0).then(|| sum / n as f64);
-        let nearest = ledger.pairs.values().map(|r| r.nearest_m).min_by(f64::total_cmp);
-        let looks: u64 = ledger.pairs.values().map(|r| r.lost_looks).sum();
-        let Effort { optimizations: optimisations, rounds, unconverged, traffic } = ledger.effort;
-        Metrics {
-            min_separation_m: nearest,
-            losses_of_separation: ledger.pairs.values().map(|r| u64::from(r.losses)).sum(),
-            lost_s: self.lost_s(looks),
-            arrived: count(&|cell| cell.arrived_step().is_some()),
-            airplanes: all.len() as u64,
-            mean_delay_percent: mean(delays.iter().sum(), delays.len()),
-            messages: traffic.messages,
-            bytes: traffic.bytes,
-            multicasts: traffic.multicasts,
-            multicast_bytes: traffic.multicast_bytes,
-            optimisations,
-            rounds_mean: mean(rounds as f64, optimisations as usize),
-            unconverged,
-            optimise_cpu_s: decide_s,
-            shield_overrides: all.iter().map(|a| u64::from(a.shield_overrides)).sum(),
-            shield_orbits: all.iter().map(|a| u64::from(a.shield_orbits)).sum(),
-            shield_held_back: ledger.count(EventKind::HeldBack),
-            contacts_lost: ledger.count(EventKind::Unheard),
-            deadlines_missed: ledger.count(EventKind::Deadline),
-            groups_too_large: ledger.count(EventKind::GroupTooLarge),
-            left: count(&Cell::has_left),
-            replayed: replayed.count() as u64,
-            orders: all.iter().map(|a| u64::from(a.orders)).sum(),
-            orders_delayed: all.iter().map(|a| u64::from(a.orders_delayed)).sum(),
-            too_close: ledger.too_close.iter().map(|pair| self.too_close(pair)).collect(),
-        }
-    }
+fn count(state: &AirspaceState, is: impl Fn(&Cell) -> bool) -> u64 {
+    state.airplanes.iter().filter(|cell| is(cell)).count() as u64
+}
 
-    fn too_close(&self, &(cycle, a, b): &(Cycle, EntityId, EntityId)) -> TooClose {
-        TooClose { at_s: self.starts_s(cycle), airplanes: [a, b] }
-    }
+/// How many have flown their recorded way to its end.
+fn replayed(world: &AirspaceWorld, state: &AirspaceState) -> u64 {
+    let all = (0..).zip(&state.airplanes);
+    let ended = all.filter(|(_, cell)| cell.arrived_step().is_some());
+    ended.filter(|(id, _)| is_replayed_to_the_end(world, *id)).count() as u64
+}
 
-    /// Whether everybody has arrived or left by now.
-    pub fn everybody_has_arrived(&self, state: &AirspaceState) -> bool {
-        state.airplanes.iter().all(|cell| !cell.is_flying())
+fn mean(sum: f64, n: usize) -> Option<f64> {
+    (n > 0).then(|| sum / n as f64)
+}
+
+/// Metrics of a run so far; `decide_s` is the time spent deciding.
+pub fn metrics(
+    world: &AirspaceWorld,
+    state: &AirspaceState,
+    ledger: &Ledger,
+    decide_s: f64,
+) -> Metrics {
+    let all = (0..world.airplanes.len() as EntityId).map(|id| airplane_metrics(world, state, id));
+    let all: Vec<AirplaneMetrics> = all.collect();
+    let delays: Vec<f64> = all.iter().filter_map(|a| a.delay_percent).collect();
+    let nearest = ledger.pairs.values().map(|r| r.nearest_m).min_by(f64::total_cmp);
+    let looks: u64 = ledger.pairs.values().map(|r| r.lost_looks).sum();
+    let Effort { optimizations: optimisations, rounds, unconverged, traffic } = ledger.effort;
+    Metrics {
+        min_separation_m: nearest,
+        losses_of_separation: ledger.pairs.values().map(|r| u64::from(r.losses)).sum(),
+        lost_s: lost_s(world, looks),
+        arrived: count(state, |cell| cell.arrived_step().is_some()),
+        airplanes: all.len() as u64,
+        mean_delay_percent: mean(delays.iter().sum(), delays.len()),
+        messages: traffic.messages,
+        bytes: traffic.bytes,
+        multicasts: traffic.multicasts,
+        multicast_bytes: traffic.multicast_bytes,
+        optimisations,
+        rounds_mean: mean(rounds as f64, optimisations as usize),
+        unconverged,
+        optimise_cpu_s: decide_s,
+        shield_overrides: all.iter().map(|a| u64::from(a.shield_overrides)).sum(),
+        shield_orbits: all.iter().map(|a| u64::from(a.shield_orbits)).sum(),
+        shield_held_back: ledger.count(EventKind::HeldBack),
+        contacts_lost: ledger.count(EventKind::Unheard),
+        deadlines_missed: ledger.count(EventKind::Deadline),
+        groups_too_large: ledger.count(EventKind::GroupTooLarge),
+        left: count(state, Cell::has_left),
+        replayed: replayed(world, state),
+        orders: all.iter().map(|a| u64::from(a.orders)).sum(),
+        orders_delayed: all.iter().map(|a| u64::from(a.orders_delayed)).sum(),
+        too_close: ledger.too_close.iter().map(|pair| too_close(world, pair)).collect(),
     }
+}
+
+fn too_close(world: &AirspaceWorld, &(cycle, a, b): &(Cycle, EntityId, EntityId)) -> TooClose {
+    TooClose { at_s: world.starts_s(cycle), airplanes: [a, b] }
+}
+
+/// Whether everybody has arrived or left by now.
+pub fn everybody_has_arrived(state: &AirspaceState) -> bool {
+    state.airplanes.iter().all(|cell| !cell.is_flying())
 }
 
 #[cfg(test)]
@@ -268,7 +283,7 @@ mod tests {
         let world = run.world();
         assert_eq!(world.alone_s[0], f64::INFINITY);
         run.state().airplanes[0].arrived.set(20);
-        let first = world.airplane_metrics(run.state(), 0);
+        let first = super::airplane_metrics(world, run.state(), 0);
         assert_eq!((first.flown_s, first.delay_s(), first.delay_percent), (Some(20.0), None, None));
         let metrics = run.metrics();
         assert!(metrics.mean_delay_percent.is_some_and(f64::is_finite), "{metrics:?}");

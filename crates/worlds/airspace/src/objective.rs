@@ -6,8 +6,7 @@
 //! Gdev_i     = |f_i(x_i, kmax) - f_i(x_i_opt, kmax)|^2                                (10)
 //! ```
 
-use super::airplane::{Point, Prediction};
-use super::levels::Levels;
+use super::flight::{Levels, Point, Prediction};
 use serde::{Deserialize, Serialize};
 use sidestep_collectives::PairwiseGame;
 
@@ -257,7 +256,7 @@ fn add_to_all(
 
 #[cfg(test)]
 mod tests {
-    use super::super::airplane::{Action, After, Model, Passing, Pilot, Pose, Timing};
+    use super::super::flight::{Action, After, Model, Passing, Pilot, Pose, Timing};
     use super::*;
     use serde_json::Value;
     use sidestep_collectives::Game;
@@ -317,7 +316,7 @@ mod tests {
                 plane["wps"].as_array().expect("way-points").iter().map(point).collect();
             let pilot =
                 Pilot { model: &model, mission: &mission, passing, after, dtau_s: timing.dtau_s };
-            let pose = Pose { at: [number("x"), number("y")], psi_rad: number("psi") };
+            let pose = Pose { at: [number("x"), number("y")], heading_rad: number("psi") };
             let chosen = match action["omega"].as_f64() {
                 None => Action::Proceed,
                 Some(omega_rad_s) if action["g"] == 0 => Action::Hold { omega_rad_s },
@@ -360,7 +359,7 @@ mod tests {
     /// What slices, bounds and shared pieces leave out is what costs nothing, to the bit.
     #[test]
     fn tables_hold_what_two_predictions_cost_to_the_bit() {
-        use super::super::airplane::{Legs, actions};
+        use super::super::flight::{Legs, actions};
         let model = Model { v_m_s: 35.0, omega_max_rad_s: 0.07, separation_m: 500.0, turns: 5 };
         let timing = Timing { dt_s: 5.0, dtau_s: 1.0, horizon: 90 };
         let passing = Passing { tolerance_m: 100.0, passes: true };
@@ -369,7 +368,8 @@ mod tests {
         for (k, mask) in (0..12).flat_map(|k| [(k, true), (k, false)]) {
             let options = [0.0, 1.0].map(|side| {
                 let angle = side * 0.5 * f64::from(k);
-                let pose = Pose { at: [900.0 * side, 700.0 * side], psi_rad: angle + 3.0 * side };
+                let pose =
+                    Pose { at: [900.0 * side, 700.0 * side], heading_rad: angle + 3.0 * side };
                 let mission = [[2000.0 - 2500.0 * side, 300.0]];
                 let after = After::Straight;
                 let pilot = Pilot { model: &model, mission: &mission, passing, after, dtau_s: 1.0 };

@@ -1,8 +1,8 @@
 //! What a run records: its tables, and their rows until they are recorded.
 
-use super::airplane::Pose;
 use super::decide::Optimization;
 use super::events::{Event, EventKind};
+use super::flight::Pose;
 use super::scenario::RecordSection;
 use sidestep_kernel::ports::table::label_of;
 use sidestep_kernel::ports::{Buffer, Buffers, RowBuffer, Table};
@@ -22,7 +22,7 @@ fn trajectories() -> Table<Place> {
         .u32("airplane", "entity id", |p| p.airplane)
         .f64("x_m", "position east", |p| p.pose.at[0])
         .f64("y_m", "position north", |p| p.pose.at[1])
-        .f64("heading_rad", "heading, counter-clockwise from east", |p| p.pose.psi_rad)
+        .f64("heading_rad", "heading, counter-clockwise from east", |p| p.pose.heading_rad)
 }
 
 fn events() -> Table<Event> {

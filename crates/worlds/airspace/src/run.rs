@@ -2,13 +2,12 @@
 
 use super::decide::Optimization;
 use super::events::Event;
-use super::metrics::{Ledger, Metrics};
+use super::metrics::{self, Ledger, Metrics};
 use super::rows::Rows;
 use super::scenario::Compiled;
 use super::state::{AirspaceState, Snapshot};
-use super::view::entry;
 use super::world::AirspaceWorld;
-use super::{Scratch, words};
+use super::{Scratch, view, words};
 use serde_json::Value;
 use sidestep_kernel::checkpoint::CheckpointError;
 use sidestep_kernel::ports::{Buffers, RecordError, Recorder, TableSchema};
@@ -91,7 +90,7 @@ impl World for AirspaceWorld {
     }
 
     fn is_over(&self, state: &AirspaceState) -> bool {
-        self.everybody_has_arrived(state)
+        metrics::everybody_has_arrived(state)
     }
 
     fn gather(&self, books: &mut Books, scratch: &mut Scratch) {
@@ -164,7 +163,7 @@ impl World for AirspaceWorld {
     }
 
     fn scenery(&self, name: &str) -> Scenery {
-        AirspaceWorld::scenery(self, name)
+        view::scenery(self, name)
     }
 
     fn frame(&self, state: &AirspaceState, books: &mut Books, now: Cycle, _: Look) -> Frame {
@@ -172,28 +171,30 @@ impl World for AirspaceWorld {
         Frame {
             cycle: now,
             time_s: self.starts_s(now),
-            bodies: self.visible_bodies(state, now),
+            bodies: view::visible_bodies(self, state, now),
             scans: Vec::new(),
-            log: events.iter().map(entry).collect(),
+            log: events.iter().map(view::entry).collect(),
             log_left_out,
         }
     }
 
     fn place_rows(&self, _: &Books) -> Vec<PlaceRows> {
-        AirspaceWorld::place_rows()
+        view::place_rows()
     }
 
     fn metrics(&self, state: &AirspaceState, books: &Books, _: Cycle, _: &Effort) -> Metrics {
-        AirspaceWorld::metrics(self, state, &books.ledger, books.decide_ns as f64 / 1e9)
+        metrics::metrics(self, state, &books.ledger, books.decide_ns as f64 / 1e9)
     }
 
     fn agent_metrics(&self, state: &AirspaceState, _: &Books, _: Cycle) -> Value {
-        let one = |id| serde_json::to_value(self.airplane_metrics(state, id)).unwrap_or_default();
+        let one = |id| {
+            serde_json::to_value(metrics::airplane_metrics(self, state, id)).unwrap_or_default()
+        };
         (0..self.airplanes.len() as EntityId).map(one).collect()
     }
 
     fn pair_metrics(&self, books: &Books) -> Value {
-        serde_json::to_value(AirspaceWorld::pair_metrics(self, &books.ledger)).unwrap_or_default()
+        serde_json::to_value(metrics::pair_metrics(self, &books.ledger)).unwrap_or_default()
     }
 
     fn outcome(&self, metrics: &Metrics) -> Lines {

@@ -4,14 +4,15 @@ mod airplanes;
 mod compile;
 mod network;
 mod settings;
+mod values;
 
 use super::deploy::Deployment;
+use super::flight::Airplane;
 use super::flight_plan::AirplaneSection;
 use super::shield::Side;
 use super::state::{AirplaneRecord, FLYING, Snapshot};
-use super::world::{Airplane, AirspaceWorld, Method};
+use super::world::{AirspaceWorld, Method};
 use airplanes::{GeneratorSection, ModelSection};
-pub(super) use airplanes::{Measure, TurnRate, Turns};
 use compile::Compiler;
 use network::NetworkSection;
 use serde::{Deserialize, Serialize};
@@ -24,18 +25,7 @@ use sidestep_scenario::{
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use toml::Spanned;
-
-/// Kinds of made-up traffic.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum GeneratorKind {
-    /// On a circle, each to the opposite point.
-    Superconflict,
-    /// From anywhere to anywhere in a disc.
-    Random,
-    /// Three streams that meet.
-    Streams,
-}
+pub(super) use values::{Measure, TurnRate, Turns};
 
 /// Sets of parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize)]

@@ -1,8 +1,7 @@
 //! All that changes in a run, and its snapshot.
 
-use super::airplane::{Point, Pose, distance_m};
-use super::deploy::contact::Contacts;
-use super::levels::Levels;
+use super::agents::contact::Contacts;
+use super::flight::{Point, Pose, Stage};
 use super::shield::Side;
 use super::world::AirspaceWorld;
 use serde::{Deserialize, Serialize};
@@ -15,10 +14,19 @@ use std::sync::{Mutex, PoisonError};
 /// Not arrived yet.
 pub const FLYING: u64 = u64::MAX;
 /// Set beside the time at which an airplane was removed, rather than arrived.
-pub(super) const LEFT: u64 = 1 << 63;
+const LEFT: u64 = 1 << 63;
 /// See [`Cell::fallback`].
 const TOO_CLOSE: u8 = 2;
 const NOBODY: u32 = u32::MAX;
+
+/// How a flight ends, and in which step of `dtau` since the run's start.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum End {
+    /// At the last way-point, or at the end of the recorded way.
+    Arrived(u64),
+    /// Removed before that.
+    Left(u64),
+}
 
 /// The state of an airspace; slots are ids.
 #[derive(Debug)]
@@ -34,13 +42,13 @@ pub struct AirspaceState {
 #[derive(Debug, Default)]
 #[repr(align(64))]
 pub struct Cell {
-    /// Position east, metres,
+    /// Position east, meters,
     pub x_m: Shared<f64>,
     /// and north.
     pub y_m: Shared<f64>,
     /// Heading.
-    pub psi_rad: Shared<f64>,
-    /// Altitude, metres.
+    pub heading_rad: Shared<f64>,
+    /// Altitude, meters.
     pub altitude_m: Shared<f64>,
     /// Steps of `dtau` since the run's start when it arrived, or [`FLYING`]; with the highest bit
     /// set, when it was removed.
@@ -62,16 +70,16 @@ pub struct Cell {
 }
 
 impl Cell {
-    /// Where it is.
+    /// Its pose.
     pub fn pose(&self) -> Pose {
-        Pose { at: [self.x_m.get(), self.y_m.get()], psi_rad: self.psi_rad.get() }
+        Pose { at: [self.x_m.get(), self.y_m.get()], heading_rad: self.heading_rad.get() }
     }
 
     /// Puts it somewhere.
     pub fn set_pose(&self, pose: Pose) {
         self.x_m.set(pose.at[0]);
         self.y_m.set(pose.at[1]);
-        self.psi_rad.set(pose.psi_rad);
+        self.heading_rad.set(pose.heading_rad);
     }
 
     /// Whether it has not arrived yet.
@@ -79,14 +87,34 @@ impl Cell {
         self.arrived.get() == FLYING
     }
 
+    /// How its flight has ended, if it has.
+    pub fn end(&self) -> Option<End> {
+        match self.arrived.get() {
+            FLYING => None,
+            step if step & LEFT != 0 => Some(End::Left(step & !LEFT)),
+            step => Some(End::Arrived(step)),
+        }
+    }
+
+    /// Ends its flight.
+    pub(super) fn set_end(&self, end: End) {
+        self.arrived.set(match end {
+            End::Arrived(step) => step,
+            End::Left(step) => step | LEFT,
+        });
+    }
+
     /// Steps of `dtau` since the run's start when it arrived, if it has.
     pub fn arrived_step(&self) -> Option<u64> {
-        Some(self.arrived.get()).filter(|step| step & LEFT == 0)
+        match self.end() {
+            Some(End::Arrived(step)) => Some(step),
+            _ => None,
+        }
     }
 
     /// Whether it was removed before it arrived.
     pub fn has_left(&self) -> bool {
-        !self.is_flying() && self.arrived.get() & LEFT != 0
+        matches!(self.end(), Some(End::Left(_)))
     }
 
     /// The stored fallback.
@@ -171,7 +199,7 @@ fn held(contacts: &Mutex<Contacts>) -> std::sync::MutexGuard<'_, Contacts> {
 /// One airplane in a snapshot.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct AirplaneRecord {
-    /// Where it is.
+    /// Its pose.
     pub pose: Pose,
     /// See [`Cell::arrived`].
     pub arrived: u64,
@@ -187,13 +215,16 @@ pub struct AirplaneRecord {
     pub orders: [u16; 2],
 }
 
+/// Looks at the distance of a pair in one step of `dtau`.
+pub const LOOKS_PER_STEP: usize = 10;
+
 /// What a pair of airplanes has come to.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PairRecord {
     /// Closest approach.
     pub nearest_m: f64,
     /// Looks at which they were nearer than their separation, see
-    /// [`super::LOOKS_PER_STEP`].
+    /// [`LOOKS_PER_STEP`].
     pub lost_looks: u64,
     /// Separate losses of separation.
     pub losses: u32,
@@ -288,15 +319,9 @@ impl AirspaceState {
         self.airplanes[slot as usize].is_flying() && world.appears_in(slot as usize) <= now
     }
 
-    /// Whether two airplanes have to mind each other.
-    pub(super) fn is_near(&self, world: &AirspaceWorld, (a, b): (Slot, Slot), now: Cycle) -> bool {
-        let at = |slot: Slot| self.airplanes[slot as usize].pose().at;
-        let levels = |slot: Slot| match world.is_replayed(slot, now) {
-            true => Levels::ALL,
-            false => world.claimed_levels(&self.airplanes[slot as usize], slot, now),
-        };
-        distance_m(at(a), at(b)) <= world.look_m(a as usize, b as usize)
-            && levels(a).meets(&levels(b), world.vertical_m)
+    /// Returns the part of a flight that an airplane is on now.
+    pub(super) fn stage<'a>(&self, world: &'a AirspaceWorld, slot: Slot) -> Stage<'a> {
+        world.stage(slot, self.airplanes[slot as usize].orders.get().into())
     }
 }
 
@@ -307,8 +332,8 @@ impl Snapshot {
         hasher.u64(self.cycle);
         hasher.u64(self.airplanes.len() as u64);
         for airplane in &self.airplanes {
-            let Pose { at: [x, y], psi_rad } = airplane.pose;
-            [x, y, psi_rad].iter().for_each(|v| hasher.u64(v.to_bits()));
+            let Pose { at: [x, y], heading_rad } = airplane.pose;
+            [x, y, heading_rad].iter().for_each(|v| hasher.u64(v.to_bits()));
             hasher.u64(airplane.arrived);
             airplane.counts.iter().for_each(|&n| hasher.u32(n));
             let too_close = if airplane.came_too_close { TOO_CLOSE } else { 0 };

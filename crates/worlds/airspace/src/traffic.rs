@@ -1,17 +1,17 @@
 //! Traffic of others -> a scenario: BlueSky `.scn` files and recorded tracks.
 //!
 //! The text that comes out is a scenario like any other, complete in itself: it goes into the run
-//! folder and can be edited. Latitude and longitude become a plane about the traffic's centre.
+//! folder and can be edited. Latitude and longitude become a plane about the traffic's center.
 //! Turn rates are those of a turn at 25 degrees of bank at the airplane's greatest speed.
 //!
 //! Aircraft of BlueSky files fly their routes, and what they are told on the way (`HDG`, `SPD`,
 //! `ALT`, `LNAV ON`, `DEL`). One that has nowhere to go flies half an hour ahead. A true airspeed
-//! stays as it is until the next `SPD`, also in climbs. [`not_flown`] counts what else they say.
+//! stays as it is until the next `SPD`, also in climbs. `not_flown` counts what else they say.
 //!
 //! Recorded tracks are replayed as they are; from `airspace.replay_until_s` on, which stands at
 //! infinity, they are flown anew.
 
-use super::airplane::Point;
+use super::flight::Point;
 use super::flight_plan::CLIMB_M_S;
 use sidestep_import::bluesky::{Change, ScnAircraft, ScnFile};
 use sidestep_import::local_plane::LocalPlane;
@@ -48,7 +48,7 @@ pub fn from_bluesky(name: &str, file: &ScnFile) -> Option<String> {
 const SETTINGS: [&str; 4] = ["ASAS", "CDMETHOD", "DTLOOK", "RESO"];
 
 /// What a BlueSky file tells its aircraft and the scenario leaves out, with counts.
-pub fn not_flown(file: &ScnFile) -> BTreeMap<String, u64> {
+pub(crate) fn not_flown(file: &ScnFile) -> BTreeMap<String, u64> {
     let mut counts = BTreeMap::new();
     let mut count = |what: &str, n: usize| {
         if n > 0 {
@@ -80,7 +80,7 @@ enum Told {
     /// Degrees counter-clockwise from east.
     Heading(f64),
     Speed(f64),
-    /// Metres, and metres per second.
+    /// Meters, and meters per second.
     Altitude(f64, f64),
     Proceeds,
     Leaves,
@@ -108,8 +108,11 @@ fn write_aircraft(text: &mut String, aircraft: &ScnAircraft, plane: &LocalPlane)
         aircraft.known_goals().map(|at| plane.to_plane_m(at)).collect();
     let orders = orders(aircraft, !way_points_m.is_empty());
     if way_points_m.is_empty() {
-        let (psi_rad, ahead_m) = (heading_deg.to_radians(), AHEAD_S * v_m_s);
-        let goal = [at_m[0] + ahead_m * math::cos(psi_rad), at_m[1] + ahead_m * math::sin(psi_rad)];
+        let (heading_rad, ahead_m) = (heading_deg.to_radians(), AHEAD_S * v_m_s);
+        let goal = [
+            at_m[0] + ahead_m * math::cos(heading_rad),
+            at_m[1] + ahead_m * math::sin(heading_rad),
+        ];
         way_points_m.push(goal);
     }
     let told_m_s = orders.iter().filter_map(|(_, told)| match told {

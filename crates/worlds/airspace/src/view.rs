@@ -1,7 +1,7 @@
 //! What can be seen of an airspace: airplanes, the zones around them, whence and where they go.
 
-use super::airplane::{Point, distance_m};
 use super::events::{Event, EventKind};
+use super::flight::{Airplane, Point, distance_m};
 use super::state::AirspaceState;
 use super::world::AirspaceWorld;
 use sidestep_kernel::view::{
@@ -19,107 +19,113 @@ const ZONE_HEIGHT: f64 = 0.02;
 /// A place to go to, compared with the zone's radius.
 const GOAL_OF_RADIUS: f64 = 0.15;
 
-impl AirspaceWorld {
-    /// The places that airplanes start from, as wide as their zones, and those that they are to
-    /// reach at last.
-    pub(super) fn scenery(&self, name: &str) -> Scenery {
-        let start = |(id, airplane): (u32, &super::world::Airplane)| {
-            let ([x_m, y_m], radius_m) = (airplane.start.at, self.zone_radius_m(id));
-            let disc = Shape::Cylinder { radius_m, height_m: ZONE_HEIGHT * radius_m };
-            Body::new(Kind::Start, id, Pose::at([x_m, y_m, airplane.altitude_m]), disc)
-        };
-        let goal = |(id, airplane): (u32, &super::world::Airplane)| {
-            let at = airplane.mission.last()?;
-            let radius_m = GOAL_OF_RADIUS * self.zone_radius_m(id);
-            let pose = Pose::at([at[0], at[1], airplane.altitude_m]);
-            Some(Body::new(Kind::Goal, id, pose, Shape::Sphere { radius_m }))
-        };
-        let starts = (0..).zip(&self.airplanes).map(start);
-        Scenery {
-            name: name.into(),
-            dimensions: if self.is_level() { 2 } else { 3 },
-            cycle_s: self.timing.dt_s,
-            floor: None,
-            bodies: starts.chain((0..).zip(&self.airplanes).filter_map(goal)).collect(),
-            names: Vec::new(),
-        }
+/// The places that airplanes start from, as wide as their zones, and those that they are to
+/// reach at last.
+pub(super) fn scenery(world: &AirspaceWorld, name: &str) -> Scenery {
+    let start = |(id, airplane): (u32, &Airplane)| {
+        let ([x_m, y_m], radius_m) = (airplane.start.at, zone_radius_m(world, id));
+        let disc = Shape::Cylinder { radius_m, height_m: ZONE_HEIGHT * radius_m };
+        Body::new(Kind::Start, id, Pose::at([x_m, y_m, airplane.altitude_m]), disc)
+    };
+    let goal = |(id, airplane): (u32, &Airplane)| {
+        let at = airplane.mission.last()?;
+        let radius_m = GOAL_OF_RADIUS * zone_radius_m(world, id);
+        let pose = Pose::at([at[0], at[1], airplane.altitude_m]);
+        Some(Body::new(Kind::Goal, id, pose, Shape::Sphere { radius_m }))
+    };
+    let starts = (0..).zip(&world.airplanes).map(start);
+    Scenery {
+        name: name.into(),
+        dimensions: if is_level(world) { 2 } else { 3 },
+        cycle_s: world.timing.dt_s,
+        floor: None,
+        bodies: starts.chain((0..).zip(&world.airplanes).filter_map(goal)).collect(),
+        names: Vec::new(),
     }
+}
 
-    /// Recorded poses as places of airplanes.
-    pub(super) fn place_rows() -> Vec<PlaceRows> {
-        vec![PlaceRows {
-            table: "trajectories",
-            kind: Kind::Airplane,
-            number: "airplane",
-            part: None,
-            axes: ["x_m", "y_m"].map(Axis::meters).to_vec(),
-            is_corner: false,
-            ahead: None,
-            every: 1,
-            worth: Cycle::MAX,
-        }]
-    }
+/// Recorded poses as places of airplanes.
+pub(super) fn place_rows() -> Vec<PlaceRows> {
+    vec![PlaceRows {
+        table: "trajectories",
+        kind: Kind::Airplane,
+        number: "airplane",
+        part: None,
+        axes: ["x_m", "y_m"].map(Axis::meters).to_vec(),
+        is_corner: false,
+        ahead: None,
+        every: 1,
+        worth: Cycle::MAX,
+    }]
+}
 
-    /// Whether all fly on one level from the beginning to the end.
-    fn is_level(&self) -> bool {
-        let first_m = self.airplanes.first().map_or(0.0, |airplane| airplane.altitude_m);
-        self.airplanes.iter().all(|airplane| {
-            let keeps_level = airplane.track.is_none() && airplane.orders.is_empty();
-            keeps_level && airplane.altitude_m == first_m
-        })
-    }
+/// Whether all fly on one level from the beginning to the end.
+fn is_level(world: &AirspaceWorld) -> bool {
+    let first_m = world.airplanes.first().map_or(0.0, |airplane| airplane.altitude_m);
+    world.airplanes.iter().all(|airplane| {
+        let keeps_level = airplane.track.is_none() && airplane.orders.is_empty();
+        keeps_level && airplane.altitude_m == first_m
+    })
+}
 
-    /// Half the separation: airplanes are apart when their zones do not meet.
-    fn zone_radius_m(&self, slot: Slot) -> f64 {
-        0.5 * self.airplanes[slot as usize].model.separation_m
-    }
+/// Half the separation: airplanes are apart when their zones do not meet.
+fn zone_radius_m(world: &AirspaceWorld, slot: Slot) -> f64 {
+    0.5 * world.airplanes[slot as usize].model.separation_m
+}
 
-    /// The airplanes that are there, each followed by its zone.
-    pub(super) fn visible_bodies(&self, state: &AirspaceState, now: Cycle) -> Vec<Body> {
-        let ids = 0..self.airplanes.len() as Slot;
-        let there: Vec<Slot> = ids.filter(|&id| state.is_there(self, id, now)).collect();
-        let too_near = self.too_near(state, &there);
-        there.iter().flat_map(|&id| self.airplane_and_zone(state, id, &too_near)).collect()
-    }
+/// The airplanes that are there, each followed by its zone.
+pub(super) fn visible_bodies(
+    world: &AirspaceWorld,
+    state: &AirspaceState,
+    now: Cycle,
+) -> Vec<Body> {
+    let ids = 0..world.airplanes.len() as Slot;
+    let there: Vec<Slot> = ids.filter(|&id| state.is_there(world, id, now)).collect();
+    let too_near = too_near(world, state, &there);
+    there.iter().flat_map(|&id| airplane_and_zone(world, state, id, &too_near)).collect()
+}
 
-    fn airplane_and_zone(&self, state: &AirspaceState, id: Slot, too_near: &[Slot]) -> [Body; 2] {
-        let cell = &state.airplanes[id as usize];
-        let ([x_m, y_m], radius_m) = (cell.pose().at, self.zone_radius_m(id));
-        let pose = Pose::heading([x_m, y_m, cell.altitude_m.get()], cell.pose().psi_rad);
-        let length_m = LENGTH_OF_RADIUS * radius_m;
-        let dart = Shape::Dart { length_m, width_m: WIDTH_OF_LENGTH * length_m };
-        let zone = Shape::Cylinder { radius_m, height_m: ZONE_HEIGHT * radius_m };
-        let bodies =
-            [Body::new(Kind::Airplane, id, pose, dart), Body::new(Kind::Zone, id, pose, zone)];
-        bodies.map(|body| body.when(too_near.binary_search(&id).is_ok(), Condition::Touching))
-    }
+fn airplane_and_zone(
+    world: &AirspaceWorld,
+    state: &AirspaceState,
+    id: Slot,
+    too_near: &[Slot],
+) -> [Body; 2] {
+    let cell = &state.airplanes[id as usize];
+    let ([x_m, y_m], radius_m) = (cell.pose().at, zone_radius_m(world, id));
+    let pose = Pose::heading([x_m, y_m, cell.altitude_m.get()], cell.pose().heading_rad);
+    let length_m = LENGTH_OF_RADIUS * radius_m;
+    let dart = Shape::Dart { length_m, width_m: WIDTH_OF_LENGTH * length_m };
+    let zone = Shape::Cylinder { radius_m, height_m: ZONE_HEIGHT * radius_m };
+    let bodies = [Body::new(Kind::Airplane, id, pose, dart), Body::new(Kind::Zone, id, pose, zone)];
+    bodies.map(|body| body.when(too_near.binary_search(&id).is_ok(), Condition::Touching))
+}
 
-    /// Who is nearer to somebody than is allowed, by id.
-    fn too_near(&self, state: &AirspaceState, there: &[Slot]) -> Vec<Slot> {
-        let at = |slot: Slot| state.airplanes[slot as usize].pose().at;
-        let widest_m = self.airplanes.iter().map(|a| a.model.separation_m).fold(0.0, f64::max);
-        // From west to east, so that only neighbors are compared.
-        let mut by_x: Vec<(Point, Slot)> = there.iter().map(|&slot| (at(slot), slot)).collect();
-        by_x.sort_by(|a, b| a.0[0].total_cmp(&b.0[0]).then(a.1.cmp(&b.1)));
-        let mut near = Vec::new();
-        for (k, &(p, a)) in by_x.iter().enumerate() {
-            let candidates = by_x[k + 1..].iter().take_while(|(q, _)| q[0] - p[0] < widest_m);
-            for &(q, b) in candidates {
-                let gap_m = 2.0 * self.zone_radius_m(a).max(self.zone_radius_m(b));
-                if distance_m(p, q) < gap_m && self.are_level(state, a, b) {
-                    near.extend([a, b]);
-                }
+/// Who is nearer to somebody than is allowed, by id.
+fn too_near(world: &AirspaceWorld, state: &AirspaceState, there: &[Slot]) -> Vec<Slot> {
+    let at = |slot: Slot| state.airplanes[slot as usize].pose().at;
+    let widest_m = world.airplanes.iter().map(|a| a.model.separation_m).fold(0.0, f64::max);
+    // From west to east, so that only neighbors are compared.
+    let mut by_x: Vec<(Point, Slot)> = there.iter().map(|&slot| (at(slot), slot)).collect();
+    by_x.sort_by(|a, b| a.0[0].total_cmp(&b.0[0]).then(a.1.cmp(&b.1)));
+    let mut near = Vec::new();
+    for (k, &(p, a)) in by_x.iter().enumerate() {
+        let candidates = by_x[k + 1..].iter().take_while(|(q, _)| q[0] - p[0] < widest_m);
+        for &(q, b) in candidates {
+            let gap_m = 2.0 * zone_radius_m(world, a).max(zone_radius_m(world, b));
+            if distance_m(p, q) < gap_m && are_level(world, state, a, b) {
+                near.extend([a, b]);
             }
         }
-        near.sort_unstable();
-        near.dedup();
-        near
     }
+    near.sort_unstable();
+    near.dedup();
+    near
+}
 
-    fn are_level(&self, state: &AirspaceState, a: Slot, b: Slot) -> bool {
-        let altitude_m = |slot: Slot| state.airplanes[slot as usize].altitude_m.get();
-        (altitude_m(a) - altitude_m(b)).abs() < self.vertical_m
-    }
+fn are_level(world: &AirspaceWorld, state: &AirspaceState, a: Slot, b: Slot) -> bool {
+    let altitude_m = |slot: Slot| state.airplanes[slot as usize].altitude_m.get();
+    (altitude_m(a) - altitude_m(b)).abs() < world.vertical_m
 }
 
 /// An event in words.

@@ -55,8 +55,8 @@ pub(super) fn poses(snapshot: &Snapshot) -> Said {
     let json = serde_json::to_value(&snapshot.airplanes).unwrap_or_default();
     let heading = "  airplane       x_m         y_m    heading_deg\n".to_string();
     let row = |(id, a): (usize, &AirplaneRecord)| {
-        let ([x, y], psi_deg) = (a.pose.at, a.pose.psi_rad.to_degrees());
-        format!("  {id:<8} {x:>10.1}  {y:>10.1}  {psi_deg:>13.1}\n")
+        let ([x, y], heading_deg) = (a.pose.at, a.pose.heading_rad.to_degrees());
+        format!("  {id:<8} {x:>10.1}  {y:>10.1}  {heading_deg:>13.1}\n")
     };
     let text = snapshot.airplanes.iter().enumerate().map(row).fold(heading, |t, r| t + &r);
     Said { json, text }

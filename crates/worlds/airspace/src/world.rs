@@ -1,31 +1,17 @@
 //! A compiled airspace: everything that never changes during a run.
 
-use super::airplane::{Action, After, Legs, Model, Passing, Pilot, Point, Pose, Timing, actions};
-use super::deploy::{Deployment, Network};
-use super::objective::Objective;
-use super::orders::{FlightOrder, Later, Stage, Task, later};
+use super::agents::network::Network;
+use super::deploy::Deployment;
+use super::flight::{
+    Action, Air, Airplane, Known, Later, Legs, Levels, Model, Passing, Point, Stage, Task, Timing,
+    Track, actions, later,
+};
+use super::objective::{Objective, Options};
 use super::shield::Side;
-use super::track::Track;
 use serde::{Deserialize, Serialize};
-use sidestep_collectives::Settings;
+use sidestep_collectives::{Estimator, Order, Settings};
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{Cycle, Slot};
-
-/// What random draws of this world are for.
-pub mod purpose {
-    use sidestep_kernel::stream::Purpose;
-
-    /// Where generated airplanes begin and go.
-    pub const PLACE: Purpose = Purpose(1);
-    /// Samples of the optimizer, one stream per airplane and cycle.
-    pub const SAMPLE: Purpose = Purpose(2);
-    /// Errors of known positions.
-    pub const POSITION: Purpose = Purpose(3);
-    /// Disturbed headings.
-    pub const HEADING: Purpose = Purpose(4);
-    /// What happens to messages.
-    pub const NETWORK: Purpose = Purpose(5);
-}
 
 /// How airplanes choose what to do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -66,35 +52,14 @@ pub struct Disturbance {
     pub heading_rad: f64,
 }
 
-/// One airplane as it begins.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Airplane {
-    /// What it can do.
-    pub model: Model,
-    /// Where it begins.
-    pub start: Pose,
-    /// What it is to reach.
-    pub mission: Vec<Point>,
-    /// The level with which the method takes it over.
-    pub altitude_m: f64,
-    /// When it appears, seconds after the start.
-    pub appears_s: f64,
-    /// When it vanishes, seconds after the start; infinite for never.
-    pub leaves_s: f64,
-    /// What it is told on its way, by rising time.
-    pub orders: Vec<FlightOrder>,
-    /// The way that it is recorded to have flown, and follows until it is handed over.
-    pub track: Option<Track>,
-}
-
 /// The immutable world that runs share.
 #[derive(Debug, Clone)]
 pub struct AirspaceWorld {
     /// The airplanes by id.
     pub airplanes: Vec<Airplane>,
-    /// How time is cut.
+    /// Steps of time.
     pub timing: Timing,
-    /// When way-points count as reached.
+    /// Rule by which way-points count as reached.
     pub passing: Passing,
     /// What is optimized,
     pub objective: Objective,
@@ -106,7 +71,7 @@ pub struct AirspaceWorld {
     pub legs: Legs,
     /// Who decides.
     pub method: Method,
-    /// Where the optimizer runs.
+    /// A deployment of the optimizer.
     pub deployment: Deployment,
     /// What its messages go over, if that is not to be relied on.
     pub network: Option<Network>,
@@ -123,32 +88,26 @@ pub struct AirspaceWorld {
     pub wind_m_s: Point,
     /// What nobody knows.
     pub disturbance: Disturbance,
-    pub(super) streams: Streams,
+    pub(crate) streams: Streams,
     /// Actions of each airplane.
-    pub(super) actions: Vec<Vec<Action>>,
+    pub(crate) actions: Vec<Vec<Action>>,
     /// What each airplane flies after each of its orders.
-    pub(super) later: Vec<Vec<Later>>,
+    pub(crate) later: Vec<Vec<Later>>,
     /// The greatest speed that each airplane flies.
-    pub(super) top_m_s: Vec<f64>,
+    pub(crate) top_m_s: Vec<f64>,
     /// Seconds that each airplane would need alone.
-    pub(super) alone_s: Vec<f64>,
+    pub(crate) alone_s: Vec<f64>,
     /// Sides of the first fallbacks.
-    pub(super) first_fallbacks: Vec<Side>,
+    pub(crate) first_fallbacks: Vec<Side>,
 }
 
 /// A flight alone that takes longer than this many steps is not expected to end.
 const ENDLESS_STEPS: usize = 1_000_000;
 
 impl AirspaceWorld {
-    /// The `k`-th uniform number in [0, 1) of an airplane's samples in a cycle.
-    pub(super) fn uniform(&self, slot: Slot, now: Cycle, k: u64) -> f64 {
-        let words = self.streams.block(slot, now, purpose::SAMPLE, (k / 4) as u16);
-        f64::from(words[(k % 4) as usize]) / 4_294_967_296.0
-    }
-
     /// Prepares what follows from the fields.
     #[must_use]
-    pub(super) fn prepared(mut self) -> Self {
+    pub(crate) fn prepared(mut self) -> Self {
         let of = |a: &Airplane| actions(&a.model, self.timing.dt_s, &self.holds_s, &self.legs);
         self.actions = self.airplanes.iter().map(of).collect();
         self.later = self.airplanes.iter().map(later).collect();
@@ -167,17 +126,9 @@ impl AirspaceWorld {
         told.fold(airplane.model.v_m_s.max(recorded), f64::max)
     }
 
-    /// How an airplane flies through still air. In a wind, predictions are made in the moving
-    /// air, towards way-points that drift; what is flown is flown over the ground, see
-    /// [`AirspaceWorld::steer`] and [`AirspaceWorld::blown`].
-    pub(super) fn pilot<'a>(&self, model: &'a Model, mission: &'a [Point]) -> Pilot<'a> {
-        Pilot {
-            model,
-            mission,
-            passing: self.passing,
-            after: After::Straight,
-            dtau_s: self.timing.dtau_s,
-        }
+    /// Returns what is the same for all airplanes that fly.
+    pub fn air(&self) -> Air {
+        Air { timing: self.timing, passing: self.passing, wind_m_s: self.wind_m_s }
     }
 
     /// From when the method takes it over; infinite where it never would come to its end.
@@ -188,6 +139,7 @@ impl AirspaceWorld {
             return 0.0;
         }
         let is_endless = airplane.keeps_a_heading() && airplane.leaves_s == f64::INFINITY;
+        let air = self.air();
         let mut pose = airplane.track.as_ref().map_or(airplane.start, |t| t.pose_at(joins_s));
         let (mut orders, mut next) = (0, 0);
         for step in 0..ENDLESS_STEPS {
@@ -203,9 +155,9 @@ impl AirspaceWorld {
             if is_endless && orders as usize == airplane.orders.len() {
                 return f64::INFINITY;
             }
-            let pilot = self.pilot(model, mission);
-            let omega = self.steer(&pilot, pose, next);
-            pose = self.blown(pose.step(model.v_m_s, omega, self.timing.dtau_s));
+            let pilot = air.pilot(model, mission);
+            let omega = air.steer(&pilot, pose, next);
+            pose = air.blown(pose.step(model.v_m_s, omega, self.timing.dtau_s));
             next = pilot.next(pose, next);
         }
         f64::INFINITY
@@ -213,43 +165,12 @@ impl AirspaceWorld {
 
     /// When an airplane would come to its end if it were alone, seconds after the start of the
     /// run.
-    pub(super) fn ends_alone_s(&self, i: usize) -> f64 {
+    pub(crate) fn ends_alone_s(&self, i: usize) -> f64 {
         let joins_s = self.starts_s(self.joins_in(i));
         match &self.airplanes[i].track {
             Some(track) if track.ends_s() <= joins_s => track.ends_s(),
             _ => joins_s + self.alone_s[i],
         }
-    }
-
-    /// The turn rate that leads to way-point `next` on the ground, wind allowed for.
-    pub(super) fn steer(&self, pilot: &Pilot<'_>, pose: Pose, next: usize) -> f64 {
-        let Some(&goal) = pilot.mission.get(next) else { return 0.0 };
-        let omega_max = pilot.model.omega_max_rad_s;
-        pose.steer(self.aim(pose.at, goal, pilot.model.v_m_s), omega_max, pilot.dtau_s)
-    }
-
-    /// Where to head from `at` to come to `goal` on the ground: against the wind by the angle at
-    /// which the airspeed cancels the wind's part across the way.
-    pub(super) fn aim(&self, at: Point, goal: Point, v_m_s: f64) -> Point {
-        let [wx, wy] = self.wind_m_s;
-        if wx == 0.0 && wy == 0.0 {
-            return goal;
-        }
-        let (dx, dy) = (goal[0] - at[0], goal[1] - at[1]);
-        let length_m = sidestep_kernel::math::hypot(dx, dy).max(1e-9);
-        let (ux, uy) = (dx / length_m, dy / length_m);
-        let across = (wx * uy - wy * ux).clamp(-v_m_s, v_m_s);
-        let along = (v_m_s * v_m_s - across * across).sqrt();
-        // Along the way by `along`, against the crosswind by `across`.
-        let heading = [ux * along - uy * across, uy * along + ux * across];
-        [at[0] + heading[0], at[1] + heading[1]]
-    }
-
-    /// A pose after the wind has blown for one step.
-    pub(super) fn blown(&self, pose: Pose) -> Pose {
-        let dtau_s = self.timing.dtau_s;
-        let at = [pose.at[0] + self.wind_m_s[0] * dtau_s, pose.at[1] + self.wind_m_s[1] * dtau_s];
-        Pose { at, ..pose }
     }
 
     /// When a cycle starts, seconds after the start.
@@ -288,6 +209,65 @@ impl AirspaceWorld {
         };
         let gap_m = a.separation_m.max(b.separation_m) * self.objective.inflation.max(1.0);
         reach(a, a_m_s) + reach(b, b_m_s) + gap_m + 1.0
+    }
+
+    /// What an airplane flies that has carried out so many orders.
+    pub(crate) fn stage(&self, slot: Slot, orders: u32) -> Stage<'_> {
+        match self.later[slot as usize].get((orders as usize).wrapping_sub(1)) {
+            Some(later) => later.stage(),
+            None => {
+                let Airplane { model, mission, altitude_m, .. } = &self.airplanes[slot as usize];
+                Stage { model, mission, altitude_m: *altitude_m, climb_m_s: 0.0 }
+            }
+        }
+    }
+
+    /// Orders done and way-points done with after those that are due at a time, if none waits.
+    pub(crate) fn after_orders(
+        &self,
+        slot: usize,
+        orders: u32,
+        next: usize,
+        now_s: f64,
+    ) -> (u32, usize) {
+        let (mut orders, mut next) = (orders, next);
+        while self.airplanes[slot].due(orders as usize, now_s).is_some() {
+            next = self.later[slot][orders as usize].next.map_or(next, |next| next as usize);
+            orders += 1;
+        }
+        (orders, next)
+    }
+
+    /// Actions of an airplane, for whoever knows its model.
+    pub(crate) fn actions_of(&self, slot: Slot) -> &[Action] {
+        &self.actions[slot as usize]
+    }
+
+    /// The levels that an airplane is on and comes to.
+    pub(crate) fn levels(&self, known: Known) -> Levels {
+        Levels::between(known.altitude_m, self.stage(known.slot, known.orders).altitude_m)
+    }
+
+    /// Where each action would lead an airplane.
+    pub(crate) fn options(&self, known: Known) -> Options {
+        let Stage { model, mission, .. } = self.stage(known.slot, known.orders);
+        let actions = self.actions_of(known.slot);
+        let predictions = self.air().predictions(model, actions, mission, (known.pose, known.next));
+        Options::new(predictions, model.separation_m, self.levels(known))
+    }
+
+    /// Numbers that one optimization may draw from an airplane's stream at most; none if that
+    /// is beyond all counting.
+    pub(crate) fn most_samples(&self) -> Option<u64> {
+        let Estimator::Sampled { block, .. } = self.settings.estimator else { return Some(1) };
+        let blocks_per_round = match self.settings.order {
+            Order::Parallel => 1,
+            // One at the beginning of a round, and one after each player of the largest group.
+            Order::Sequence => self.airplanes.len() as u64 + 1,
+        };
+        let per_round = (block as u64).checked_mul(blocks_per_round)?;
+        // And the final draw.
+        per_round.checked_mul(self.settings.stop.max_rounds.into())?.checked_add(1)
     }
 
     fn fastest(&self, i: usize) -> (&Model, f64) {

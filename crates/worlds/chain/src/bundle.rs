@@ -19,7 +19,7 @@ const PLAIN: [&str; 3] = ["script_file", "urdf", "srdf"];
 ///
 /// # Errors
 /// When such a file cannot be read any more.
-pub fn resolve<const D: usize>(
+pub(crate) fn resolve<const D: usize>(
     source: &Source,
     compiled: &Compiled<D>,
 ) -> Result<Resolved, InputError> {

@@ -4,7 +4,6 @@
 use super::events::EventKind;
 use super::motion::replan::Memory;
 use super::navigate::Navigator;
-pub(crate) use super::rods::geometry::in_dimensions as out_of_space;
 use super::rods::geometry::{Bounds, Point, in_dimensions, unit};
 use super::rods::veto::{Reason, Source};
 use super::script::{Motion, Script, Turtle};
@@ -16,26 +15,26 @@ use sidestep_kernel::{Cycle, InputError, math};
 use std::sync::Arc;
 
 /// Motions that a script may come to.
-pub const MAX_MOTIONS: usize = 1_000_000;
+pub(crate) const MAX_MOTIONS: usize = 1_000_000;
 
 /// One task.
 #[derive(Debug, Clone)]
-pub struct Task<const D: usize> {
+pub(crate) struct Task<const D: usize> {
     /// The connector that moves.
-    pub agent: usize,
+    pub(crate) agent: usize,
     /// How fast.
-    pub speed_m_s: f64,
+    pub(crate) speed_m_s: f64,
     /// What it is to do.
-    pub driver: Driver<D>,
+    pub(crate) driver: Driver<D>,
     /// For how long at most; infinite for as long as it takes.
-    pub lasts_s: f64,
+    pub(crate) lasts_s: f64,
     /// How long it tries what is vetoed before it gives up.
-    pub patience_s: f64,
+    pub(crate) patience_s: f64,
 }
 
 /// What an initiator is to do.
 #[derive(Debug, Clone)]
-pub enum Driver<const D: usize> {
+pub(crate) enum Driver<const D: usize> {
     /// Nothing: it moves only to get out of the way.
     Rest,
     /// Go anywhere, autonomously.
@@ -50,25 +49,25 @@ pub enum Driver<const D: usize> {
 
 /// Going anywhere: ahead, and a little to any side.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Wander<const D: usize> {
+pub(crate) struct Wander<const D: usize> {
     /// Standard deviation of the change of direction per square root of a meter gone.
-    pub turn_rad: f64,
+    pub(crate) turn_rad: f64,
     /// Where it stays, if it is to stay somewhere: outside it turns back.
-    pub within: Option<Bounds<D>>,
+    pub(crate) within: Option<Bounds<D>>,
 }
 
 /// Places to go to.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Targets<const D: usize> {
+pub(crate) struct Targets<const D: usize> {
     /// The places.
-    pub places: Vec<Point<D>>,
+    pub(crate) places: Vec<Point<D>>,
     /// How near counts as there, meters.
-    pub tolerance_m: f64,
+    pub(crate) tolerance_m: f64,
 }
 
 impl<const D: usize> Task<D> {
     /// Who asks for its motions.
-    pub fn source(&self) -> Source {
+    pub(crate) fn source(&self) -> Source {
         match self.driver {
             Driver::Script(_) => Source::Operator,
             _ => Source::Autonomous,

@@ -97,19 +97,19 @@ impl EventKind {
 
 /// One event.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Event {
+pub(crate) struct Event {
     /// Cycle in which it happened.
-    pub cycle: Cycle,
+    pub(crate) cycle: Cycle,
     /// The chain.
-    pub chain: EntityId,
+    pub(crate) chain: EntityId,
     /// What.
-    pub kind: EventKind,
+    pub(crate) kind: EventKind,
     /// The connector that it is about.
-    pub connector: u32,
+    pub(crate) connector: u32,
     /// Why, of vetoes.
-    pub reason: Option<Reason>,
+    pub(crate) reason: Option<Reason>,
     /// The obstacle that it is about, if it is about one.
-    pub obstacle: Option<u32>,
+    pub(crate) obstacle: Option<u32>,
     /// See [`EventKind`]; 0 where a kind has none.
-    pub value: f64,
+    pub(crate) value: f64,
 }

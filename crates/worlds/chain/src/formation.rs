@@ -8,12 +8,12 @@ use serde::{Deserialize, Serialize};
 
 /// The robots of a swarm.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Robots {
+pub(crate) struct Robots {
     /// How each behaves.
-    pub follower: Follower,
+    pub(crate) follower: Follower,
     /// A leader on wheels waits for a robot that is so far from its connector, and is slower from
     /// half of that on; infinite for never.
-    pub lag_limit_m: f64,
+    pub(crate) lag_limit_m: f64,
 }
 
 /// A robot of a swarm.

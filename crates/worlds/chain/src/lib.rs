@@ -17,32 +17,32 @@
 
 mod act;
 pub mod arms;
-pub mod bundle;
+mod bundle;
 mod claim;
-pub mod driver;
-pub mod events;
-pub mod formation;
+mod driver;
+mod events;
+mod formation;
 pub mod ground;
 mod join;
 mod kind;
 pub mod metrics;
-pub mod motion;
-pub mod navigate;
+mod motion;
+mod navigate;
 mod perceive;
 mod progress;
 pub mod rods;
 mod rows;
-pub mod run;
+mod run;
 pub mod scenario;
 #[cfg(test)]
 mod scenes;
 mod scratch;
-pub mod script;
-pub mod state;
+mod script;
+mod state;
 pub mod swarm;
 mod view;
 mod words;
-pub mod world;
+mod world;
 
 pub use arms::{ik, kinematics};
 pub use kind::Chains;
@@ -54,17 +54,14 @@ pub use rods::{
     geometry, rebuild, wavefront,
 };
 pub use run::ChainRun;
+pub use state::{Body, ChainState};
+pub use world::ChainWorld;
 
-use arms::arm;
-use motion::{escape, replan};
-use rods::{chain, obstacle, rules, veto};
 use scratch::Scratch;
 use sidestep_kernel::conflict::Groups;
 use sidestep_kernel::world::Decides;
 use sidestep_kernel::{Phases, Slot, Turn};
-use state::ChainState;
 use std::ops::Range;
-use world::ChainWorld;
 
 impl<const D: usize> Phases for ChainWorld<D> {
     const DECIDES: Decides = Decides::Together;

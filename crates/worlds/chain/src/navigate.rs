@@ -9,18 +9,18 @@ const BEFORE_THE_END_M: f64 = 0.5;
 
 /// An initiator that navigates.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Navigator {
+pub(crate) struct Navigator {
     /// How it behaves.
-    pub leader: Leader,
+    pub(crate) leader: Leader,
     /// Its wheels.
-    pub drive: Drive,
+    pub(crate) drive: Drive,
     /// Where it is to come; without a goal it goes on and on.
-    pub goal: Option<Goal>,
+    pub(crate) goal: Option<Goal>,
 }
 
 /// Where a navigator is to come.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Goal {
+pub(crate) enum Goal {
     /// To a place that it can detect.
     Target {
         /// The place.

@@ -1,11 +1,11 @@
 //! What a run records: its tables, and their rows until they are recorded.
 
 use super::events::{Event, EventKind};
-use super::geometry::{Core, Point};
+use super::rods::geometry::{Core, Point, in_dimensions};
+use super::rods::veto::Reason;
 use super::scenario::RecordSection;
 use super::state::ChainState;
 use super::swarm::drive::Pose;
-use super::veto::Reason;
 use super::world::ChainWorld;
 use sidestep_kernel::ports::table::label_of;
 use sidestep_kernel::ports::{Buffer, Buffers, RowBuffer, Table};
@@ -131,7 +131,7 @@ impl Rows {
         }
         if self.movers.is_kept() {
             for mover in world.movers.at(world.starts_s(now)) {
-                let at = in_space(&middle(&mover.core));
+                let at = in_dimensions(middle(&mover.core));
                 self.movers.push(Place { cycle: now, chain: 0, id: mover.id, at });
             }
         }
@@ -149,7 +149,7 @@ fn connectors<const D: usize>(
     points: &[Point<D>],
 ) -> impl Iterator<Item = Place> {
     let chain = slot as EntityId;
-    (0..).zip(points).map(move |(id, at)| Place { cycle, chain, id, at: in_space(at) })
+    (0..).zip(points).map(move |(id, at)| Place { cycle, chain, id, at: in_dimensions(*at) })
 }
 
 /// A point of a core that moves with it.
@@ -159,11 +159,6 @@ fn middle<const D: usize>(core: &Core<D>) -> [f64; D] {
         Core::Segment([a, b]) => std::array::from_fn(|i| 0.5 * (a[i] + b[i])),
         Core::Cuboid(cuboid) => cuboid.center,
     }
-}
-
-/// A point with zeros for the axes that it has not.
-fn in_space<const D: usize>(point: &Point<D>) -> [f64; 3] {
-    std::array::from_fn(|i| point.get(i).copied().unwrap_or(0.0))
 }
 
 impl Buffers for Rows {

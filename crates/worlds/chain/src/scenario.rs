@@ -3,16 +3,17 @@
 mod arms;
 mod chains;
 mod changes;
+mod mobility;
 mod navigators;
 mod obstacles;
 mod starts;
 mod tasks;
 
-use super::escape::Escape;
-use super::geometry::{Bounds, norm};
 use super::ground::Movers;
-use super::replan::Rungs;
-use super::rules::{Rotation, Rules};
+use super::motion::escape::Escape;
+use super::motion::replan::Rungs;
+use super::rods::geometry::{Bounds, norm};
+use super::rods::rules::{Rotation, Rules};
 use super::world::{ChainSpec, ChainWorld};
 use chains::ChainSection;
 use obstacles::{FieldSection, GroundSection, ObstacleSection, fitted};

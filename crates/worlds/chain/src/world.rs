@@ -20,44 +20,44 @@ use std::ops::RangeInclusive;
 use std::sync::Arc;
 
 /// What random draws of this world are for.
-pub mod purpose {
+pub(crate) mod purpose {
     use sidestep_kernel::stream::Purpose;
 
     /// How a wandering initiator turns.
-    pub const WANDER: Purpose = Purpose(2);
+    pub(crate) const WANDER: Purpose = Purpose(2);
     /// Where the parts of a broken chain lie.
-    pub const SCATTER: Purpose = Purpose(3);
+    pub(crate) const SCATTER: Purpose = Purpose(3);
     /// Where a wandering initiator goes that is stuck.
-    pub const TURN_AWAY: Purpose = Purpose(5);
+    pub(crate) const TURN_AWAY: Purpose = Purpose(5);
     /// Errors of a laser.
-    pub const LASER: Purpose = Purpose(4);
+    pub(crate) const LASER: Purpose = Purpose(4);
 }
 
 /// Nothing is thrown further than so many standard deviations.
 pub(crate) const FARTHEST_THROW: f64 = 8.0;
 
 /// From this id on, obstacles are parts of other chains: its number is added.
-pub const OTHER_CHAIN: u32 = 1 << 31;
+pub(crate) const OTHER_CHAIN: u32 = 1 << 31;
 
 /// The immutable world that runs share.
 #[derive(Debug, Clone)]
 pub struct ChainWorld<const D: usize> {
     /// The chains by id.
-    pub chains: Vec<ChainSpec<D>>,
+    pub(crate) chains: Vec<ChainSpec<D>>,
     /// Obstacles that stand still.
     pub obstacles: Obstacles<D>,
     /// Obstacles that move.
     pub movers: Movers<D>,
     /// What a cycle takes.
-    pub dt_s: f64,
+    pub(crate) dt_s: f64,
     /// Cycles that a run has: what an endless task is measured by.
-    pub cycles: Cycle,
+    pub(crate) cycles: Cycle,
     /// How chains react.
-    pub rules: Rules,
+    pub(crate) rules: Rules,
     /// How they get out of the way of what moves, if they do.
-    pub escape: Option<Escape>,
+    pub(crate) escape: Option<Escape>,
     /// How long initiators try on each rung of the ladder after a veto.
-    pub rungs: Rungs,
+    pub(crate) rungs: Rungs,
     /// How far around its parts a chain looks for its least distance from obstacles.
     pub look_m: f64,
     pub(crate) streams: Streams,
@@ -65,33 +65,33 @@ pub struct ChainWorld<const D: usize> {
 
 /// One chain, and what it is to do.
 #[derive(Debug, Clone)]
-pub struct ChainSpec<const D: usize> {
+pub(crate) struct ChainSpec<const D: usize> {
     /// Its name, may be empty.
-    pub name: String,
+    pub(crate) name: String,
     /// The chain at the start.
-    pub start: Chain<D>,
+    pub(crate) start: Chain<D>,
     /// What its initiators do, one task after the other; at least one.
-    pub tasks: Vec<Task<D>>,
+    pub(crate) tasks: Vec<Task<D>>,
     /// What happens to it, by cycle.
-    pub changes: Vec<Change<D>>,
+    pub(crate) changes: Vec<Change<D>>,
     /// The arm that it stands for, if it stands for one.
-    pub arm: Option<Arc<Arm>>,
+    pub(crate) arm: Option<Arc<Arm>>,
     /// How the robots behave that keep to its connectors, if it is a swarm on wheels.
-    pub robots: Option<Robots>,
+    pub(crate) robots: Option<Robots>,
 }
 
 /// Something that happens to a chain at the begin of a cycle (slides R8, R10, F3).
 #[derive(Debug, Clone, PartialEq)]
-pub struct Change<const D: usize> {
+pub(crate) struct Change<const D: usize> {
     /// The cycle.
-    pub cycle: Cycle,
+    pub(crate) cycle: Cycle,
     /// What happens.
-    pub what: What<D>,
+    pub(crate) what: What<D>,
 }
 
 /// What happens to a chain.
 #[derive(Debug, Clone, PartialEq)]
-pub enum What<const D: usize> {
+pub(crate) enum What<const D: usize> {
     /// A connector breaks down, or works again.
     Failed {
         /// Which one.

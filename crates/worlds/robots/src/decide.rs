@@ -15,6 +15,7 @@ pub use replay::{External, ORDER, Replay};
 pub use wander::Wander;
 
 use super::effector::{ActionId, Side};
+pub use super::sensor::UNSEEN;
 use super::sensor::{NOTHING, Reading};
 use sidestep_kernel::Cycle;
 use sidestep_kernel::stream::Draws;
@@ -73,9 +74,6 @@ impl Sector {
         }
     }
 }
-
-/// Stands for the class of a sector in which nothing is reported; greater than any class.
-pub const UNSEEN: u8 = u8::MAX;
 
 /// Everything a robot knows when it decides.
 #[derive(Debug)]

@@ -24,6 +24,7 @@ pub mod learn;
 pub mod metrics;
 mod perceive;
 pub mod policy;
+mod purpose;
 pub mod ray;
 pub mod rows;
 pub mod run;
@@ -37,9 +38,9 @@ pub mod world;
 
 use effector::Side;
 pub use kind::Robots;
+pub use metrics::heap_bytes;
 use policy::ConflictPolicy;
 pub use run::{RobotsRun, robots_run};
-use scenario::StorageOrder;
 use scene::with_scene;
 use sensor::Reading;
 use sidestep_kernel::conflict::Groups;
@@ -48,6 +49,7 @@ use sidestep_kernel::{Cycle, EntityId, Phases, Slot, Turn};
 use state::RobotsState;
 use std::ops::Range;
 pub use world::RobotsWorld;
+use world::StorageOrder;
 
 /// Something that happened to a body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -3,7 +3,7 @@
 use super::state::RobotsState;
 use super::world::RobotsWorld;
 use serde::Serialize;
-use sidestep_kernel::{Cycle, EntityId};
+use sidestep_kernel::{Cycle, EntityId, Run};
 use sidestep_map::Cell;
 use std::collections::BTreeMap;
 
@@ -106,6 +106,14 @@ impl RobotsWorld {
         let boxes = |&id: &EntityId| self.type_of(id).own.len() as u64;
         self.robots.iter().map(boxes).sum()
     }
+}
+
+/// Returns the bytes on the heap that grow with the boxes, and with the bodies.
+pub fn heap_bytes(run: &Run<RobotsWorld>) -> (usize, usize) {
+    let (boxes, bodies) = run.state().heap_bytes();
+    let world = run.world();
+    let per_body = std::mem::size_of_val(&*world.bodies) + std::mem::size_of_val(&*world.robots);
+    (boxes, bodies + run.engine_heap_bytes() + per_body)
 }
 
 #[cfg(test)]

@@ -2,10 +2,11 @@
 
 use super::decide::{Contact, Decision, Heard, Memory, Percept, Sector, Trip, UNSEEN};
 use super::effector::{Side, Sweep};
+use super::purpose;
 use super::scene::{Scene, all_free, at};
 use super::sensor::{Reading, Row};
 use super::state::{BodyCell, Intent, pose_word};
-use super::world::{Crossed, Door, MountedSensor, Mover, Radio, RobotModel, Role, purpose};
+use super::world::{Crossed, Door, MountedSensor, Mover, Radio, RobotModel, Role};
 use super::{Scratch, SensorSample};
 use sidestep_kernel::space::BoxWord;
 use sidestep_kernel::{Column, Cycle, Slot};

@@ -71,14 +71,6 @@ impl RobotsState {
     }
 }
 
-/// Returns the bytes on the heap that grow with the boxes, and with the bodies.
-pub fn heap_bytes(run: &RobotsRun) -> (usize, usize) {
-    let (boxes, bodies) = run.state().heap_bytes();
-    let world = run.world();
-    let per_body = std::mem::size_of_val(&*world.bodies) + std::mem::size_of_val(&*world.robots);
-    (boxes, bodies + run.engine_heap_bytes() + per_body)
-}
-
 impl World for RobotsWorld {
     const NAME: &'static str = "robots";
     const AGENT: &'static str = "robot";

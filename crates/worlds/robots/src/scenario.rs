@@ -6,7 +6,8 @@ mod placing;
 mod random;
 mod tables;
 
-pub use compile::{Behaviours, Compiled, StorageOrder, presets};
+pub use crate::world::StorageOrder;
+pub use compile::{Behaviours, Compiled, presets};
 
 use super::effector::ObstacleRule;
 use super::policy::ConflictPolicy;

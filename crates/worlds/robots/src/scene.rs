@@ -57,8 +57,7 @@ impl<'a, T: BoxWord> Scene<'a, T> {
     /// The draws of a body's action: what it comes to, and its priority.
     #[inline]
     pub(super) fn act_words(&self, id: EntityId) -> [u32; 2] {
-        let [effect, priority, ..] =
-            self.world.streams.block(id, self.now, super::world::purpose::ACT, 0);
+        let [effect, priority, ..] = self.world.streams.block(id, self.now, super::purpose::ACT, 0);
         [effect, priority]
     }
 }

@@ -4,8 +4,10 @@
 //! classes with a confusion matrix of their own). Both draws, observation and class, are
 //! independent given the true pair, so they are one draw from their joint distribution.
 
-use super::decide::UNSEEN;
 use sidestep_kernel::distr::{RowError, check_row};
+
+/// Stands for the class of a sector in which nothing is reported; greater than any class.
+pub const UNSEEN: u8 = u8::MAX;
 
 /// Index of the observation `nothing`, always the first.
 pub const NOTHING: u8 = 0;

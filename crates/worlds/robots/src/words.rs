@@ -1,8 +1,7 @@
 //! What the world says to people: a scenario's contents, a run's outcome, where every body is.
 
-use super::metrics::Metrics;
+use super::metrics::{Metrics, heap_bytes};
 use super::rows::HEADING_NAMES;
-use super::run::heap_bytes;
 use super::scenario::Compiled;
 use super::sensor::SensorModel;
 use super::state::{BodyRecord, Snapshot};

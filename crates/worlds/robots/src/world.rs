@@ -4,44 +4,46 @@ use super::decide::{Behaviour, Sector};
 use super::effector::{Action, EffectorModel, ObstacleRule};
 use super::policy::ConflictPolicy;
 use super::ray::{Crossing, crossings, turn_crossing};
-use super::scenario::StorageOrder;
 use super::sensor::{Reading, ReadingTable, Row, SensorModel};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::Cycle;
 use sidestep_kernel::EntityId;
 use sidestep_kernel::distr::{Chance, RowError};
 use sidestep_kernel::space::Position;
-use sidestep_kernel::stream::Streams;
+use sidestep_kernel::stream::{Purpose, Streams};
 use sidestep_map::GridMap;
 use std::sync::Arc;
 
-/// What random draws of this world are for.
-pub mod purpose {
-    use sidestep_kernel::stream::Purpose;
-
-    /// Where bodies without a given place begin.
-    pub const PLACE: Purpose = Purpose(1);
-    /// Phases of periods.
-    pub const PHASE: Purpose = Purpose(2);
-    /// A behaviour's own stream.
-    pub const DECIDE: Purpose = Purpose(3);
-    /// An action: index 0 says which transition it ends in, index 1 is the body's priority
-    /// in its conflict group.
-    pub const ACT: Purpose = Purpose(4);
-    /// Random doors.
-    pub const DOOR: Purpose = Purpose(6);
-    /// Directions of people.
-    pub const MOVE: Purpose = Purpose(7);
-    /// Lost receptions.
-    pub const RADIO: Purpose = Purpose(8);
-    /// Readings of the sensor with this number on its robot.
-    pub const fn sense(sensor: usize) -> Purpose {
-        Purpose(16 + sensor as u16)
-    }
-}
-
 /// Boxes of a beam that are read together, even past a wall.
 pub(super) const BEAM_STEP: usize = 4;
+
+/// The order in which bodies are stored; no result depends on it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum StorageOrder {
+    /// Neighbors on the map are neighbors in memory; arranged anew now and then.
+    #[default]
+    Spatial,
+    /// By entity id.
+    ById,
+    /// Shuffled by this number; for tests.
+    Shuffled(u64),
+}
+
+impl StorageOrder {
+    /// Entity ids in the order of storage.
+    pub(super) fn ids(self, world: &RobotsWorld) -> Vec<EntityId> {
+        let mut ids: Vec<EntityId> = (0..world.bodies.len() as EntityId).collect();
+        match self {
+            // Arranged as it goes.
+            Self::ById | Self::Spatial => {}
+            Self::Shuffled(by) => {
+                let streams = Streams::new(Seed(by));
+                ids.sort_by_key(|&id| streams.block(id, 0, Purpose(0), 0));
+            }
+        }
+        ids
+    }
+}
 
 /// Which errors are switched on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]

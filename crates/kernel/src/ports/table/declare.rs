@@ -1,7 +1,8 @@
 //! Columns with their getters: rows -> a block of values.
 
 use super::cells::{Cells, Texts};
-use super::schema::{ColumnSpec, ColumnType, TableSchema};
+use super::column_type::ColumnType;
+use super::schema::{ColumnSpec, TableSchema};
 use super::values::Values;
 use std::fmt;
 
@@ -24,10 +25,13 @@ pub struct Table<R> {
     columns: Vec<Column<R>>,
 }
 
+/// Reads all values of a column from a block of rows: one call a block, so that the getter is
+/// inlined into its loop.
+type ReadColumn<R> = Box<dyn Fn(&[R]) -> Values + Send + Sync>;
+
 struct Column<R> {
     spec: ColumnSpec,
-    /// All values of the column: one call a block, so that the getter is inlined into its loop.
-    values: Box<dyn Fn(&[R]) -> Values + Send + Sync>,
+    values: ReadColumn<R>,
 }
 
 /// What a getter of a column with the cells `C` returns: the value, or an `Option` of it where it

@@ -14,6 +14,7 @@
 
 mod buffer;
 mod cells;
+mod column_type;
 mod declare;
 mod schema;
 mod unit;
@@ -21,7 +22,8 @@ mod values;
 
 pub use buffer::{BlockBuffer, Buffer, Buffers, RowBuffer};
 pub use cells::{Cells, Texts};
+pub use column_type::ColumnType;
 pub use declare::{Table, label_of};
-pub use schema::{ColumnSpec, ColumnType, TableSchema};
+pub use schema::{ColumnSpec, TableSchema};
 pub use unit::split_unit;
 pub use values::{RoleColumn, Values};

@@ -1,7 +1,7 @@
 //! The cells of one column, of any type.
 
 use super::cells::{Cells, Texts};
-use super::schema::ColumnType;
+use super::column_type::ColumnType;
 use serde_json::Value;
 use std::fmt::{self, Write};
 

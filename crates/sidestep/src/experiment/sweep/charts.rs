@@ -8,8 +8,8 @@
 
 use super::Label;
 use super::groups::Groups;
+use super::label::sentence;
 use super::table::RunColumn;
-use super::text::sentence;
 use crate::statistics::{Sample, wilson};
 use sidestep_document::figure::Point;
 use sidestep_document::{Figure, FigureKind, Series};

@@ -32,6 +32,14 @@ impl fmt::Display for Label {
     }
 }
 
+/// The label with a capital, as a title begins.
+pub(super) fn sentence(label: &Label) -> String {
+    let text = label.to_string();
+    let mut letters = text.chars();
+    let first = letters.next().map(|c| c.to_uppercase().to_string()).unwrap_or_default();
+    first + letters.as_str()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,7 +1,7 @@
 //! A summary as tables.
 
-use super::Label;
 use super::compare::Comparison;
+use super::label::sentence;
 use super::summary::{
     Described, LeftOut, MetricSummary, NOT_ASKED_FOR, Numbers, Quantile, Share, Summary,
     VariantMetric,
@@ -210,14 +210,6 @@ pub(super) fn left_out(summary: &Summary) -> Option<Table> {
         .filter(asked)
         .for_each(|l| table.row([l.metric.clone(), l.reason.clone()]));
     (!table.rows.is_empty()).then_some(table)
-}
-
-/// With a capital.
-pub(super) fn sentence(label: &Label) -> String {
-    let text = label.to_string();
-    let mut letters = text.chars();
-    let first = letters.next().map(|c| c.to_uppercase().to_string()).unwrap_or_default();
-    first + letters.as_str()
 }
 
 /// `12.3 [11.9, 12.7]`; `-` for what is absent.

@@ -4,16 +4,15 @@
 pub(super) mod mvp;
 pub(super) mod orca;
 
-use super::airplane::Point;
-use super::levels::Levels;
+use super::flight::{Levels, Point};
 
 /// What a method is told of an airplane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Moving {
     pub(super) at: Point,
-    /// Metres per second.
+    /// Meters per second.
     pub(super) velocity: Point,
-    /// Where it would fly if it were alone, metres per second.
+    /// Where it would fly if it were alone, meters per second.
     pub(super) preferred: Point,
     pub(super) separation_m: f64,
     pub(super) levels: Levels,

@@ -3,7 +3,7 @@
 //! other's zone.
 
 use super::Moving;
-use crate::airplane::Point;
+use crate::flight::Point;
 use sidestep_kernel::math;
 
 /// Closest approaches nearer than this have no direction of their own; then everybody gives way
@@ -58,7 +58,7 @@ fn shift(own: &Moving, other: &Moving, look_ahead_s: f64, margin: f64) -> Option
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::levels::Levels;
+    use super::super::super::flight::Levels;
     use super::*;
 
     fn moving(x: f64, y: f64, velocity: Point) -> Moving {

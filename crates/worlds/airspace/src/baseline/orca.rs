@@ -2,7 +2,7 @@
 //! velocities are made flyable by the same turn rates as everybody's.
 
 use super::Moving;
-use crate::airplane::Point;
+use crate::flight::Point;
 use dodgy_2d::{Agent, AvoidanceOptions, Vec2};
 use std::borrow::Cow;
 

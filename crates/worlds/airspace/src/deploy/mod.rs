@@ -1,4 +1,4 @@
-//! Where the optimizer of a group runs: one and the same algorithm, deployed in several ways.
+//! Deployments of a group's optimizer: one and the same algorithm in several places.
 //!
 //! - `direct`: one process decides for all. The reference: on a faultless network every other
 //!   deployment chooses the same controls, bit for bit.
@@ -11,274 +11,43 @@
 //!   integrated mechanism) and reads an airplane's model only while it is there.
 //! - `hierarchical-pim`: a coordinator for each part of the group, and one above them.
 //!
-//! Agents are state machines without input or output of their own: messages in, messages out
-//! (`link.rs`). Here they are run on a network in memory (`network.rs`), which counts every message
-//! in its serialized form and can lose, delay, double and reorder them, and silence an airplane.
-//! Nobody waits for ever: who is not heard is presumed where it was last heard of ([`contact`]),
-//! and every talk has a deadline. What the shield needs to know goes over the same network
-//! (`exchange.rs`).
+//! [`crate::agents`] are what runs aboard; a deployment builds those of a group and a network in
+//! memory for them, and drives them (`drive.rs`). What the shield needs to know goes over the same
+//! network (`shield.rs`).
 
-pub mod contact;
-mod exchange;
-mod informed;
-mod link;
-mod network;
-mod pim;
-mod team;
+mod drive;
+mod kind;
+mod optimization;
+mod shield;
 
-use super::airplane::{Action, Point};
-use super::decide::Known;
+use super::agents::Ended;
+use super::agents::contact::Contacts;
 use super::events::{Event, EventKind};
-use super::objective::Options;
 use super::world::AirspaceWorld;
-use contact::{Beacon, Contact, Contacts};
-pub(super) use exchange::Seen;
-use network::{Ended, Talk, Topic};
-pub use network::{Network, Silence, Traffic};
-use serde::{Deserialize, Serialize};
-use sidestep_collectives::{Estimator, Order, Player, Settings, Utility};
+pub use kind::Deployment;
+pub(crate) use kind::refuses;
+pub(crate) use optimization::optimized;
+pub use optimization::{brief, own_ship};
+pub(crate) use shield::shielded;
 use sidestep_kernel::{Cycle, EntityId};
 
-/// Where the optimizer runs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Deployment {
-    /// One process decides for all.
-    #[default]
-    Direct,
-    /// An agent per airplane, which sends what it may fly.
-    Team,
-    /// A coordinator that migrates.
-    Pim,
-    /// Coordinators that migrate, one above the others.
-    HierarchicalPim,
-    /// An agent per airplane, which sends its model.
-    CompactTeam,
-}
-
-impl Deployment {
-    /// Its name in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Direct => "direct",
-            Self::Team => "team",
-            Self::Pim => "pim",
-            Self::HierarchicalPim => "hierarchical-pim",
-            Self::CompactTeam => "compact-team",
-        }
-    }
-}
-
-/// What the optimizer of an airplane comes to.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) struct Decided {
-    /// Number of the chosen action.
-    pub(super) chosen: usize,
-    /// The estimate of every action in the end.
-    pub(super) expected: Vec<f64>,
-    pub(super) rounds: u32,
-    pub(super) converged: bool,
-}
-
-/// What an agent comes to.
-#[derive(Debug, Clone, PartialEq)]
-struct Came {
-    /// Nothing, if time was up before it had learned anything.
-    decided: Option<Decided>,
-    /// What it has heard the others tell of themselves, by place.
-    beacons: Vec<Option<Beacon>>,
-}
-
-/// What one airplane knows of itself, and what all have agreed on.
-#[derive(Debug, Clone)]
-struct Own<'a> {
-    world: &'a AirspaceWorld,
-    /// Place in the group.
-    me: usize,
-    /// Ids of the group.
-    group: &'a [EntityId],
-    known: Known,
+/// Notes how a talk has ended for an airplane, and of whom nothing is heard any more.
+fn note_end<O>(
+    world: &AirspaceWorld,
     now: Cycle,
-    options: Options,
-    contacts: &'a Contacts,
-}
-
-impl Own<'_> {
-    fn settings(&self) -> &Settings {
-        &self.world.settings
-    }
-
-    fn uniform(&self, k: u64) -> f64 {
-        self.world.uniform(self.known.slot, self.now, k)
-    }
-
-    fn mission(&self) -> &[Point] {
-        self.world.stage(self.known.slot, self.known.orders).mission
-    }
-
-    /// The next `block` samples of a player after `drawn`.
-    fn samples(&self, player: &Player, drawn: u64, block: usize) -> Vec<usize> {
-        (drawn..drawn + block as u64).map(|k| player.draw(self.uniform(k))).collect()
-    }
-
-    /// What a player of samples or of distributions comes to after some rounds, of which the
-    /// last `calm` were calm; nothing, if it has not learned anything.
-    fn decided(&self, player: &Player, rounds: u32, calm: u32) -> Option<Decided> {
-        let Settings { estimator, choice, stop, .. } = *self.settings();
-        let drawn = match estimator {
-            Estimator::Exact => 0,
-            Estimator::Sampled { block, .. } => u64::from(rounds) * block as u64,
-        };
-        (!player.expected().is_empty()).then(|| Decided {
-            chosen: player.choose(choice, self.uniform(drawn)),
-            expected: player.expected().to_vec(),
-            rounds,
-            converged: calm >= stop.calm_rounds,
-        })
-    }
-
-    /// What it tells of itself.
-    fn beacon(&self) -> Beacon {
-        self.world.beacon(self.known)
-    }
-
-    /// Whether another one was heard of late, or never yet.
-    fn expects(&self, other: usize) -> bool {
-        let contact = self.contacts.get(&self.group[other]);
-        contact.is_none_or(|contact| contact.heard_in + 1 >= self.now)
-    }
-
-    /// Where another one is taken to fly that is not heard.
-    fn presumed(&self, other: usize) -> Options {
-        let id = self.group[other];
-        let contact = self.contacts.get(&id).cloned().unwrap_or_else(|| self.world.filed(id));
-        contact.options(self.world, self.now)
-    }
-
-    /// The same of one that was heard a moment ago.
-    fn presumed_from(&self, beacon: &Beacon) -> Options {
-        Contact::heard(beacon.clone(), self.now).options(self.world, self.now)
-    }
-}
-
-/// Why a deployment cannot run with some settings.
-pub(super) fn refuses(deployment: Deployment, settings: &Settings) -> Option<&'static str> {
-    let sampled = matches!(settings.estimator, Estimator::Sampled { .. });
-    let as_in_the_paper = settings.order == Order::Parallel && settings.utility == Utility::Joint;
-    (deployment != Deployment::Direct && sampled && !as_in_the_paper)
-        .then_some("agents that sample update in parallel and learn from the joint cost")
-}
-
-/// What the agents of a group come to: each what, if anything; and what went over the network.
-pub(super) type Deployed = (Vec<Option<Decided>>, Traffic);
-
-impl AirspaceWorld {
-    /// Lets the agents of a group decide, and notes in `contacts` what they hear of each other.
-    pub(super) fn deployed(
-        &self,
-        group: &[Known],
-        now: Cycle,
-        contacts: &mut [Contacts],
-        events: &mut Vec<Event>,
-    ) -> Deployed {
-        let ids: Vec<EntityId> = group.iter().map(|known| known.slot).collect();
-        let own = |(me, known): (usize, &Known)| Own {
-            world: self,
-            me,
-            group: &ids,
-            known: *known,
-            now,
-            options: self.options(*known),
-            contacts: &contacts[me],
-        };
-        let own: Vec<Own<'_>> = group.iter().enumerate().map(own).collect();
-        let (ended, traffic) = self.talk_of(own, &self.talk(Topic::Optimization, now));
-        if self.network.is_some() {
-            for (me, end) in ended.iter().enumerate() {
-                self.tell(end, (ids[me], &ids), now, &contacts[me], events);
-                let beacons = end.outcome.iter().flat_map(|came| came.beacons.iter().zip(&ids));
-                for (beacon, &id) in beacons {
-                    if let Some(beacon) = beacon {
-                        contact::note(&mut contacts[me], id, beacon.clone(), now);
-                    }
-                }
-            }
-        }
-        let decided = ended.into_iter().map(|end| end.outcome.and_then(|came| came.decided));
-        (decided.collect(), traffic)
-    }
-
-    fn talk_of(&self, own: Vec<Own<'_>>, talk: &Talk<'_>) -> pim::Run {
-        let ids = own[0].group;
-        match (self.deployment, self.settings.estimator) {
-            (Deployment::Pim, _) => {
-                let all = (0..own.len()).collect();
-                pim::run(talk, &own, vec![all])
-            }
-            (Deployment::HierarchicalPim, _) => pim::run(talk, &own, pim::parts(&own)),
-            (Deployment::Team, Estimator::Sampled { block, ageing }) => {
-                let agents = own.into_iter().map(|own| team::Agent::new(own, block, ageing));
-                network::run(talk, ids, agents.collect())
-            }
-            (deployment, _) => {
-                let by_model = deployment == Deployment::CompactTeam;
-                let agents = own.into_iter().map(|own| informed::Agent::new(own, by_model));
-                network::run(talk, ids, agents.collect())
-            }
-        }
-    }
-
-    fn talk(&self, topic: Topic, now: Cycle) -> Talk<'_> {
-        Talk {
-            network: self.network.as_ref(),
-            streams: self.streams,
-            topic,
-            now,
-            at_s: now as f64 * self.timing.dt_s,
-        }
-    }
-
-    /// Whether an airplane's radio is dead in a cycle.
-    pub(super) fn is_silent(&self, id: EntityId, now: Cycle) -> bool {
-        self.talk(Topic::Optimization, now).is_silent(id)
-    }
-
-    /// What an airplane tells of itself.
-    fn beacon(&self, known: Known) -> Beacon {
-        let stage = self.stage(known.slot, known.orders);
-        Beacon {
-            pose: known.pose,
-            goal: stage.mission.get(known.next).copied(),
-            v_m_s: stage.model.v_m_s,
-            omega_max_rad_s: stage.model.omega_max_rad_s,
-            separation_m: stage.model.separation_m,
-            levels: self.levels(known),
-        }
-    }
-
-    /// Actions of airplane `i`, for whoever knows its model.
-    pub(super) fn actions_of(&self, slot: u32) -> &[Action] {
-        &self.actions[slot as usize]
-    }
-
-    /// Books how a talk has ended for an airplane, and of whom nothing is heard any more.
-    fn tell<O>(
-        &self,
-        end: &Ended<O>,
-        (id, ids): (EntityId, &[EntityId]),
-        now: Cycle,
-        contacts: &Contacts,
-        events: &mut Vec<Event>,
-    ) {
-        let heard_in = |other: &EntityId| match contacts.get(other) {
-            Some(contact) => contact.heard_in,
-            None => self.appears_in(*other as usize),
-        };
-        let lost = end.unheard.iter().map(|&place| ids[place]).filter(|id| heard_in(id) + 1 >= now);
-        events.extend(lost.map(|other| Event::of_pair(now, EventKind::Unheard, id, other)));
-        if end.late {
-            events.push(Event::of(now, EventKind::Deadline, id));
-        }
+    end: &Ended<O>,
+    (me, ids): (usize, &[EntityId]),
+    contacts: &Contacts,
+    events: &mut Vec<Event>,
+) {
+    let heard_in = |other: &EntityId| match contacts.get(other) {
+        Some(contact) => contact.heard_in,
+        None => world.appears_in(*other as usize),
+    };
+    let lost = end.unheard.iter().map(|&place| ids[place]).filter(|id| heard_in(id) + 1 >= now);
+    events.extend(lost.map(|other| Event::of_pair(now, EventKind::Unheard, ids[me], other)));
+    if end.late {
+        events.push(Event::of(now, EventKind::Deadline, ids[me]));
     }
 }
 
@@ -444,7 +213,7 @@ mod tests {
     fn a_network_needs_agents_that_use_it_and_sane_numbers() {
         let wrong = [
             ("direct", "loss = 0.1", "one process decides for all"),
-            ("team", "loss = 1.5", "no probability"),
+            ("team", "loss = 1.5", "give 0 or more and less than 1"),
             ("team", "deadline_s = 4.0", "at most half of dt_s"),
             ("team", "silent = [{ airplane = 9 }]", "ids from 0 to 2"),
         ];

@@ -1,50 +1,19 @@
 //! Airplanes: their model, made-up traffic, flight plans and recorded tracks.
 
-use super::GeneratorKind;
 use super::compile::Compiler;
-use crate::airplane::{Model, Pose, Timing};
+use super::values::{Measure, TurnRate, Turns};
+use crate::flight::Airplane;
+use crate::flight::Task;
+use crate::flight::Track;
+use crate::flight::{Model, Pose, Timing};
 use crate::flight_plan::AirplaneSection;
+use crate::generate::GeneratorKind;
 use crate::generate::{Order, generate};
-use crate::orders::Task;
-use crate::track::Track;
-use crate::world::Airplane;
 use serde::Deserialize;
 use sidestep_kernel::InputError;
 use sidestep_kernel::stream::Streams;
 use sidestep_scenario::{AboveBelow, FromBelow, Number, Rule, Whole, refused};
 use toml::Spanned;
-
-/// A speed or a separation.
-pub(crate) type Measure = Number<AboveBelow<0, 1_000_000>>;
-
-/// Turn rates of airplanes: slower ones would make orbits without end.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct TurnRate;
-
-impl Rule for TurnRate {
-    fn allows(deg_s: f64) -> bool {
-        (1e-3..=360.0).contains(&deg_s)
-    }
-
-    fn words() -> String {
-        "0.001 to 360 degrees per second".into()
-    }
-}
-
-/// A number of turns to choose from.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Turns(usize);
-
-impl<'de> Deserialize<'de> for Turns {
-    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let turns = i64::deserialize(deserializer)?;
-        if !(3..=99).contains(&turns) || turns % 2 == 0 {
-            let remedy = "give an odd number from 3 to 99, so that straight flight is among them";
-            return Err(refused(turns, remedy));
-        }
-        Ok(Self(turns as usize))
-    }
-}
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -159,11 +128,11 @@ impl Compiler<'_> {
             let remedy = "add way_points_m = [[x, y], ...]";
             return error("an airplane without way-points", remedy);
         }
-        let psi_rad = sidestep_kernel::math::wrap_angle(heading_deg.get().to_radians());
+        let heading_rad = sidestep_kernel::math::wrap_angle(heading_deg.get().to_radians());
         let (orders, leaves_s) = s.orders(self.source)?;
         Ok(Airplane {
             model,
-            start: Pose { at: at_m.get(), psi_rad },
+            start: Pose { at: at_m.get(), heading_rad },
             mission,
             altitude_m: s.altitude_m.map_or(0.0, f64::from),
             appears_s: s.appears_s.map_or(0.0, f64::from),
@@ -221,13 +190,4 @@ fn following(track: Track, model: Model, replay: Replay) -> Airplane {
         orders: Vec::new(),
         track: Some(track),
     }
-}
-
-/// All speeds that an airplane is to fly with.
-pub(super) fn speeds_m_s(airplane: &Airplane) -> impl Iterator<Item = f64> {
-    let told = airplane.orders.iter().filter_map(|order| match order.task {
-        Task::Speed(v_m_s) => Some(v_m_s),
-        _ => None,
-    });
-    told.chain([airplane.model.v_m_s])
 }

@@ -1,13 +1,14 @@
 //! A scenario's sections -> an immutable world.
 
-use super::airplanes::speeds_m_s;
 use super::{AirspaceFile, Compiled, Preset};
-use crate::airplane::{Passing, Timing};
 use crate::deploy::refuses;
-use crate::levels::Levels;
+use crate::flight::Levels;
+use crate::flight::{Airplane, Task};
+use crate::flight::{Passing, Timing};
+use crate::memory::largest_at_start;
 use crate::shield::{Flyer, Side, first_fallbacks};
 use crate::state::AirspaceState;
-use crate::world::{Airplane, AirspaceWorld, Disturbance, Method};
+use crate::world::{AirspaceWorld, Disturbance, Method};
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{InputError, Seed};
 use sidestep_scenario::{Head, Source};
@@ -130,7 +131,7 @@ impl Compiler<'_> {
             return Ok(());
         }
         let state = AirspaceState::restore(world, &compiled.start_snapshot());
-        let (airplanes, bytes) = world.largest_at_start(&state);
+        let (airplanes, bytes) = largest_at_start(world, &state);
         if bytes <= world.group_bytes {
             return Ok(());
         }
@@ -203,4 +204,13 @@ fn first(world: &AirspaceWorld) -> (Vec<Side>, Vec<(u32, u32)>) {
     let (chosen, pairs) = first_fallbacks(&flyers);
     starts.iter().zip(chosen).for_each(|(&i, side)| sides[i] = side);
     (sides, pairs.into_iter().map(|(i, j)| (starts[i] as u32, starts[j] as u32)).collect())
+}
+
+/// All speeds that an airplane is to fly with.
+fn speeds_m_s(airplane: &Airplane) -> impl Iterator<Item = f64> {
+    let told = airplane.orders.iter().filter_map(|order| match order.task {
+        Task::Speed(v_m_s) => Some(v_m_s),
+        _ => None,
+    });
+    told.chain([airplane.model.v_m_s])
 }

@@ -1,10 +1,11 @@
 //! The section of a network that is not to be relied on.
 
 use super::compile::Compiler;
-use crate::airplane::Timing;
-use crate::deploy::{Deployment, Network, Silence};
-use crate::orders::{FlightOrder, Task};
-use crate::world::Airplane;
+use crate::agents::network::{Network, Silence};
+use crate::deploy::Deployment;
+use crate::flight::Airplane;
+use crate::flight::Timing;
+use crate::flight::{FlightOrder, Task};
 use serde::Deserialize;
 use sidestep_kernel::InputError;
 use sidestep_scenario::{FromBelow, NonNegative, Number, Positive, Rule};

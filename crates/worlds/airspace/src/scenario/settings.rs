@@ -1,7 +1,7 @@
 //! What is optimized, and how.
 
 use super::compile::Compiler;
-use crate::airplane::Legs;
+use crate::flight::Legs;
 use crate::objective::Objective;
 use serde::Deserialize;
 use sidestep_collectives::{Choice, Estimator, Order, Settings, Stop, Update};

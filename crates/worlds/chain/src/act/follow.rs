@@ -44,7 +44,7 @@ impl<const D: usize> Acting<'_, D> {
         let rest = || others.iter().enumerate().filter(move |(i, _)| *i != k).map(|(_, o)| *o);
         let goal = Goal { at, velocity_m_s };
         let pose = &self.body.robots[k].pose;
-        let followed = follower.follow(pose, &goal, (solid, rest()), self.world.dt_s);
+        let followed = follower.follow(pose, &goal, solid, rest(), self.world.dt_s);
         let lag_m = distance(followed.pose.at, at);
         self.body.tally.robots.count(&followed, lag_m);
         self.scratch.robots_gap_m = self.scratch.robots_gap_m.min(followed.gap_m);

@@ -6,6 +6,8 @@
 //! arm.rs: an arm with a place in the world, as a chain
 //! ```
 
-pub mod arm;
+pub(crate) mod arm;
 pub mod ik;
 pub mod kinematics;
+
+pub use arm::Arm;

@@ -16,20 +16,20 @@ const ATTEMPTS: u64 = 1000;
 
 /// Balls, or capsules in all directions, spread evenly over a box.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Field<const D: usize> {
+pub(crate) struct Field<const D: usize> {
     /// Where their middles are.
-    pub room: Bounds<D>,
+    pub(crate) room: Bounds<D>,
     /// Their sizes together, as a part of the room's. They may overlap, and those that would
     /// come too near to `keep_clear` are left out, so they cover less.
-    pub part: f64,
+    pub(crate) part: f64,
     /// Radius of each.
-    pub radius_m: f64,
+    pub(crate) radius_m: f64,
     /// From end to end of a capsule's core; 0 for balls.
-    pub length_m: f64,
+    pub(crate) length_m: f64,
     /// What they keep away from: where chains start.
-    pub keep_clear: Vec<Core<D>>,
+    pub(crate) keep_clear: Vec<Core<D>>,
     /// How far their surfaces stay away from it.
-    pub keep_m: f64,
+    pub(crate) keep_m: f64,
 }
 
 impl<const D: usize> Field<D> {
@@ -37,14 +37,13 @@ impl<const D: usize> Field<D> {
     ///
     /// # Errors
     /// A room, part or size that is not finite or not positive; more than ten million obstacles.
-    pub fn fill(&self, seed: Seed, first_id: u32) -> Result<Vec<Obstacle<D>>, InputError> {
+    pub(crate) fn fill(&self, seed: Seed, first_id: u32) -> Result<Vec<Obstacle<D>>, InputError> {
         let n = self.count()?;
         let streams = Streams::new(seed);
-        let clear = (&self.keep_clear[..], self.keep_m);
         let one = |k: u32| {
             let ends = self.ends(&mut streams.draws(k, 0, purposes::STILL));
             let core = if ends[0] == ends[1] { Core::Point(ends[0]) } else { Core::Segment(ends) };
-            is_away(ends, self.radius_m, clear)
+            is_away(ends, self.radius_m, &self.keep_clear, self.keep_m)
                 .then(|| Obstacle::still(first_id + k, core, self.radius_m))
         };
         Ok((0..n).filter_map(one).collect())
@@ -87,19 +86,19 @@ impl<const D: usize> Field<D> {
 
 /// Balls that wander about in a room.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Crowd<const D: usize> {
+pub(crate) struct Crowd<const D: usize> {
     /// What they never leave.
-    pub room: Bounds<D>,
+    pub(crate) room: Bounds<D>,
     /// How many.
-    pub n: u32,
+    pub(crate) n: u32,
     /// Their radii, evenly spread.
-    pub radius_m: RangeInclusive<f64>,
+    pub(crate) radius_m: RangeInclusive<f64>,
     /// Their speeds, evenly spread.
-    pub speed_m_s: RangeInclusive<f64>,
+    pub(crate) speed_m_s: RangeInclusive<f64>,
     /// What they keep away from at time 0.
-    pub keep_clear: Vec<Core<D>>,
+    pub(crate) keep_clear: Vec<Core<D>>,
     /// How far their surfaces stay away from it at time 0.
-    pub keep_m: f64,
+    pub(crate) keep_m: f64,
 }
 
 impl<const D: usize> Crowd<D> {
@@ -108,7 +107,7 @@ impl<const D: usize> Crowd<D> {
     /// # Errors
     /// A room that is too small for them, or has no place away from `keep_clear`; sizes or
     /// speeds that are not finite and positive.
-    pub fn gather(&self, seed: Seed, first_id: u32) -> Result<Vec<Mover<D>>, InputError> {
+    pub(crate) fn gather(&self, seed: Seed, first_id: u32) -> Result<Vec<Mover<D>>, InputError> {
         if f64::from(self.n) > MAX_OBSTACLES {
             let cause = format!("{} moving obstacles", self.n);
             return Err(InputError::new("crowd", cause, "give at most 1e7"));
@@ -129,7 +128,7 @@ impl<const D: usize> Crowd<D> {
                 return Err(InputError::new("crowd", cause, "make the room larger"));
             }
             let at = point_in(&mut draws, &places);
-            if is_away([at; 2], radius_m, (&self.keep_clear, self.keep_m)) {
+            if is_away([at; 2], radius_m, &self.keep_clear, self.keep_m) {
                 let ball = Obstacle::ball(id, at, radius_m);
                 return Mover::new(ball, Course::Bouncing { velocity_m_s, room: self.room });
             }
@@ -146,7 +145,8 @@ impl<const D: usize> Crowd<D> {
 fn is_away<const D: usize>(
     ends: [Point<D>; 2],
     radius_m: f64,
-    (keep_clear, keep_m): (&[Core<D>], f64),
+    keep_clear: &[Core<D>],
+    keep_m: f64,
 ) -> bool {
     let reach_m = radius_m + keep_m;
     keep_clear.iter().all(|core| core.nearest_to_segment(ends).distance_m > reach_m)

@@ -7,11 +7,11 @@
 //! ```
 
 pub mod corridor;
-pub mod courses;
-pub mod fields;
-pub mod pixels;
-pub mod route;
-pub mod site;
+pub(crate) mod courses;
+pub(crate) mod fields;
+pub(crate) mod pixels;
+pub(crate) mod route;
+pub(crate) mod site;
 
 pub use corridor::{Corridor, Leg};
 pub use courses::{Course, Mover, Movers};

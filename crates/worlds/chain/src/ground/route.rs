@@ -17,29 +17,29 @@ const MAX_HALF_BOXES: f64 = 500.0;
 
 /// What a chain needs.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Wanted {
+pub(crate) struct Wanted {
     /// Leader and followers.
-    pub connectors: usize,
+    pub(crate) connectors: usize,
     /// From each to the next.
-    pub spacing_m: f64,
+    pub(crate) spacing_m: f64,
     /// Free around every connector's middle, and along the way.
-    pub clearance_m: f64,
+    pub(crate) clearance_m: f64,
     /// Free around the straight line from each to the next.
-    pub rod_clearance_m: f64,
+    pub(crate) rod_clearance_m: f64,
     /// The way ahead of the leader that has to be free as well.
-    pub ahead_m: f64,
+    pub(crate) ahead_m: f64,
     /// Where the leader starts: anywhere on the site where not given. Many sites have insides of
     /// blocks that are free and lead nowhere.
-    pub within: Option<Bounds<2>>,
+    pub(crate) within: Option<Bounds<2>>,
 }
 
 /// Where a chain starts.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Start {
+pub(crate) struct Start {
     /// The leader, which looks away from its chain.
-    pub leader: Pose,
+    pub(crate) leader: Pose,
     /// All connectors, the leader first.
-    pub points: Vec<Point<2>>,
+    pub(crate) points: Vec<Point<2>>,
 }
 
 /// What was wanting where no start was found.
@@ -58,7 +58,7 @@ struct Wanting {
 ///
 /// # Errors
 /// Sizes that are not positive; no room, with what was wanting.
-pub fn find(
+pub(crate) fn find(
     site: &Site,
     obstacles: &Obstacles<2>,
     wanted: &Wanted,

@@ -24,7 +24,7 @@ use crate::rods::scene::TOLERANCE_M;
 use crate::rods::veto::{Mode, Motion, Outcome, Reason, Request, Source, Veto};
 use sidestep_kernel::InputError;
 use sidestep_kernel::math::{cos, sin};
-pub use threat::Part;
+pub(crate) use threat::Part;
 use threat::{Nearness, Threat, collect, nearness};
 
 /// How a chain gets out of the way.
@@ -281,7 +281,7 @@ impl<const D: usize> Escaper<D> {
             let push_m = ((threat.depth_m + BEYOND_M) / lever).min(self.room_m(tick, k));
             for way in ways(near.away, mover.velocity_m_s) {
                 let to = along(tick.chain.points()[k], way, push_m);
-                match self.attempt(tick, margin, which, (k, to))? {
+                match self.attempt(tick, margin, which, k, to)? {
                     Ok(()) => return Ok(Ok(())),
                     // That the speed limit alone was in the way says more than anything else.
                     Err(veto) if why.reason != Reason::StepLimit => why = veto,
@@ -303,7 +303,8 @@ impl<const D: usize> Escaper<D> {
         tick: &mut Tick<'_, D>,
         margin: Margin,
         which: usize,
-        (k, to): (usize, Point<D>),
+        k: usize,
+        to: Point<D>,
     ) -> Result<Result<(), Veto<D>>, InputError> {
         let at = tick.chain.points()[k];
         let to = clipped(tick.start[k], to, self.room_m(tick, k));
@@ -331,7 +332,7 @@ impl<const D: usize> Escaper<D> {
         let refused = self
             .too_far(tick, touched.clone())
             .map(|by| Veto { by, ..objection(tick.chain, k, Reason::StepLimit, None) })
-            .or_else(|| self.no_help(tick, margin, which, (k, distance(to, at))));
+            .or_else(|| self.no_help(tick, margin, which, k, distance(to, at)));
         let (from, to) = match refused {
             Some(_) => (&self.before[touched.clone()], &mut tick.chain.points_mut()[touched]),
             None => (&tick.chain.points()[touched.clone()], &mut self.before[touched]),
@@ -353,7 +354,8 @@ impl<const D: usize> Escaper<D> {
         tick: &Tick<'_, D>,
         margin: Margin,
         which: usize,
-        (k, way_m): (usize, f64),
+        k: usize,
+        way_m: f64,
     ) -> Option<Veto<D>> {
         let depth_m = self.threats[which].depth_m;
         let bound_m = depth_m - LEAST_GAIN * way_m.min(depth_m);

@@ -6,6 +6,6 @@
 //! escape.rs: out of the way of what comes too near
 //! ```
 
-pub mod escape;
+pub(crate) mod escape;
 mod go;
-pub mod replan;
+pub(crate) mod replan;

@@ -18,7 +18,7 @@ use crate::rods::geometry::{
 use crate::rods::obstacle::Obstacles;
 use crate::rods::propagate::Propagator;
 use crate::rods::veto::{Mode, Motion, Moved, Outcome, Request, Source, Veto};
-pub use memory::Memory;
+pub(crate) use memory::Memory;
 use sidestep_kernel::InputError;
 use sidestep_kernel::math::{cos, sin};
 

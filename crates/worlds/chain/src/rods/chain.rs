@@ -8,7 +8,7 @@ use sidestep_kernel::InputError;
 use std::f64::consts::PI;
 
 /// Rods are within their lengths to this, meters.
-pub const LENGTH_TOLERANCE_M: f64 = 1e-9;
+pub(crate) const LENGTH_TOLERANCE_M: f64 = 1e-9;
 
 /// Further from the origin, rounding is no longer small against the tolerances.
 const MAX_COORDINATE_M: f64 = 1e6;

@@ -13,11 +13,11 @@ use std::f64::consts::TAU;
 
 /// Directions from `from_rad`, counter-clockwise, over `width_rad`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Arc {
+pub(super) struct Arc {
     /// Where it begins.
-    pub from_rad: f64,
+    pub(crate) from_rad: f64,
     /// How far it goes, counter-clockwise; 2 pi for all directions.
-    pub width_rad: f64,
+    pub(crate) width_rad: f64,
 }
 
 impl Arc {
@@ -26,23 +26,24 @@ impl Arc {
     }
 
     /// Whether a direction is inside.
-    pub fn contains(&self, angle_rad: f64) -> bool {
+    #[cfg(test)]
+    pub(super) fn contains(&self, angle_rad: f64) -> bool {
         wrapped_rad(angle_rad - self.from_rad) < self.width_rad
     }
 }
 
 /// A rod at its master.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Reach {
+pub(super) struct Reach {
     /// Where the master is.
-    pub master: Point<2>,
+    pub(crate) master: Point<2>,
     /// How long the rod is.
-    pub length_m: f64,
+    pub(crate) length_m: f64,
 }
 
 /// Adds the directions in which a rod of no thickness meets the points within `radius_m` of a
 /// core. Returns false, and adds nothing, where the master itself is inside.
-pub fn block_rod(reach: &Reach, core: &Core<2>, radius_m: f64, arcs: &mut Vec<Arc>) -> bool {
+pub(super) fn block_rod(reach: &Reach, core: &Core<2>, radius_m: f64, arcs: &mut Vec<Arc>) -> bool {
     match core {
         Core::Point(c) => block_by_capsule(reach, [*c, *c], radius_m, arcs),
         Core::Segment(ends) => block_by_capsule(reach, *ends, radius_m, arcs),
@@ -124,7 +125,7 @@ impl Seen {
 /// Half the angle under which a disc (or a sphere) blocks a rod: up to the tangent, or, where
 /// that is out of reach, up to where the rod's tip touches (pitfall 2). `None` where the disc is
 /// out of reach; the master must not be inside.
-pub fn half_angle_rad(apart_m: f64, radius_m: f64, length_m: f64) -> Option<f64> {
+pub(super) fn half_angle_rad(apart_m: f64, radius_m: f64, length_m: f64) -> Option<f64> {
     if apart_m - radius_m >= length_m {
         return None;
     }
@@ -153,7 +154,7 @@ fn clipped(a: Point<2>, d: Point<2>, reach_m: f64) -> [Option<Point<2>>; 2] {
 
 /// Adds the directions in which the rod's far end is within `radius_m` of a core: arcs of the
 /// circle on which it turns, up to four for a capsule (pitfall 3).
-pub fn block_tip(reach: &Reach, core: &Core<2>, radius_m: f64, arcs: &mut Vec<Arc>) {
+pub(super) fn block_tip(reach: &Reach, core: &Core<2>, radius_m: f64, arcs: &mut Vec<Arc>) {
     match core {
         Core::Point(c) => block_tip_by_capsule(reach, [*c, *c], radius_m, arcs),
         Core::Segment(ends) => block_tip_by_capsule(reach, *ends, radius_m, arcs),
@@ -245,7 +246,7 @@ impl Borders {
 }
 
 /// The directions that bend a connector further than its limit, coming along `into`.
-pub fn beyond_bend(into: Point<2>, max_bend_rad: f64) -> Arc {
+pub(super) fn beyond_bend(into: Point<2>, max_bend_rad: f64) -> Arc {
     let into_rad = math::atan2(into[1], into[0]);
     Arc { from_rad: into_rad + max_bend_rad, width_rad: (TAU - 2.0 * max_bend_rad).max(0.0) }
 }
@@ -264,7 +265,7 @@ fn wrapped_rad(mut angle_rad: f64) -> f64 {
 
 /// Which way round.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Side {
+pub(super) enum Side {
     /// Counter-clockwise.
     Left,
     /// Clockwise.
@@ -272,7 +273,7 @@ pub enum Side {
 }
 
 /// The least turn from a direction to one in no arc, in [0, 2 pi); `None` where all are blocked.
-pub fn least_turn_rad(arcs: &[Arc], start_rad: f64, side: Side) -> Option<f64> {
+pub(super) fn least_turn_rad(arcs: &[Arc], start_rad: f64, side: Side) -> Option<f64> {
     let mut turn_rad = 0.0;
     // Each round leaves at least one arc behind for good.
     for _ in 0..=2 * arcs.len() {
@@ -305,14 +306,14 @@ pub fn least_turn_rad(arcs: &[Arc], start_rad: f64, side: Side) -> Option<f64> {
 const ARC_TOLERANCE_RAD: f64 = 1e-13;
 
 /// The direction of a turn from a unit vector.
-pub fn turned(u: Point<2>, turn_rad: f64, side: Side) -> Point<2> {
+pub(super) fn turned(u: Point<2>, turn_rad: f64, side: Side) -> Point<2> {
     let signed_rad = if side == Side::Left { turn_rad } else { -turn_rad };
     let (c, s) = (math::cos(signed_rad), math::sin(signed_rad));
     [u[0] * c - u[1] * s, u[0] * s + u[1] * c]
 }
 
 /// Direction of a vector, in (-pi, pi].
-pub fn direction_rad(u: Point<2>) -> f64 {
+pub(super) fn direction_rad(u: Point<2>) -> f64 {
     math::atan2(u[1], u[0])
 }
 

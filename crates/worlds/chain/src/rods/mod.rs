@@ -12,23 +12,23 @@
 //! ```
 
 mod candidates;
-pub mod chain;
+pub(crate) mod chain;
 pub mod geometry;
 mod grid;
-pub mod interval;
-pub mod obstacle;
+mod interval;
+pub(crate) mod obstacle;
 mod open;
 pub(crate) mod own_body;
 mod pass;
-pub mod passage;
-pub mod propagate;
-pub mod reach;
+pub(crate) mod passage;
+pub(crate) mod propagate;
+pub(crate) mod reach;
 pub mod rebuild;
-pub mod rules;
+pub(crate) mod rules;
 pub(crate) mod scene;
 mod search;
-pub mod sweep;
-pub mod veto;
+mod sweep;
+pub(crate) mod veto;
 pub mod wavefront;
 
 pub use chain::{Chain, Connector, Mobility, Rod};

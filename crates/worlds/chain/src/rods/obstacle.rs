@@ -78,7 +78,7 @@ impl<const D: usize> Obstacle<D> {
 
 /// The walls of a plane polygon, all with one id. Its inside is guarded by them: who starts
 /// outside never gets in.
-pub fn outline(id: u32, corners: &[Point<2>], radius_m: f64) -> Vec<Obstacle<2>> {
+pub(crate) fn outline(id: u32, corners: &[Point<2>], radius_m: f64) -> Vec<Obstacle<2>> {
     let wall =
         |k: usize| Obstacle::capsule(id, [corners[k], corners[(k + 1) % corners.len()]], radius_m);
     (0..corners.len()).map(wall).collect()

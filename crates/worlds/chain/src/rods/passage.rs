@@ -17,11 +17,11 @@ use super::sweep::Sweep;
 
 /// A rod that passed through an obstacle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Passed {
+pub(crate) struct Passed {
     /// Index of the rod.
-    pub rod: usize,
+    pub(crate) rod: usize,
     /// The obstacle's id.
-    pub obstacle: u32,
+    pub(crate) obstacle: u32,
 }
 
 /// The first rod that passed through an obstacle, while the chain went straight from `before` to
@@ -29,7 +29,7 @@ pub struct Passed {
 /// Of several obstacles, the one with the lowest id.
 ///
 /// `before` has one point for every connector.
-pub fn passed<const D: usize>(
+pub(crate) fn passed<const D: usize>(
     chain: &Chain<D>,
     before: &[Point<D>],
     obstacles: &Obstacles<D>,

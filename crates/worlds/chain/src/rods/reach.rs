@@ -19,20 +19,20 @@ const LEAST_GAIN: f64 = 1e-4;
 
 /// Where a connector shall be, and which one is the base.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Reach<const D: usize> {
+pub(crate) struct Reach<const D: usize> {
     /// The connector that is to move.
-    pub k: usize,
+    pub(crate) k: usize,
     /// Where to.
-    pub target: Point<D>,
+    pub(crate) target: Point<D>,
     /// The fixed connector.
-    pub base: usize,
+    pub(crate) base: usize,
     /// How near counts as there, meters.
-    pub tolerance_m: f64,
+    pub(crate) tolerance_m: f64,
 }
 
 /// What came of a reach.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Reached<const D: usize> {
+pub(crate) enum Reached<const D: usize> {
     /// The connector is there.
     There {
         /// How far from the target.
@@ -53,7 +53,7 @@ pub enum Reached<const D: usize> {
 ///
 /// # Errors
 /// As [`Propagator::propagate`]; a base that the chain does not have.
-pub fn reach<const D: usize>(
+pub(crate) fn reach<const D: usize>(
     propagator: &mut Propagator<D>,
     chain: &mut Chain<D>,
     obstacles: &Obstacles<D>,

@@ -10,11 +10,11 @@ use super::geometry::{Core, Point, along, between, cross_2d, cross_each_other, d
 
 /// A rod on its way: master and slave, before and after.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sweep<const D: usize> {
+pub(super) struct Sweep<const D: usize> {
     /// The rod before: master, slave.
-    pub from: [Point<D>; 2],
+    pub(crate) from: [Point<D>; 2],
     /// The rod after.
-    pub to: [Point<D>; 2],
+    pub(crate) to: [Point<D>; 2],
 }
 
 /// In space, the part of the distance at rest that a rod keeps on its way.
@@ -24,7 +24,7 @@ const MAX_ADVANCES: usize = 64;
 
 impl<const D: usize> Sweep<D> {
     /// The longest way of any point of the rod.
-    pub fn longest_way_m(&self) -> f64 {
+    pub(super) fn longest_way_m(&self) -> f64 {
         let way2 = |end: usize| {
             let way = sub(self.to[end], self.from[end]);
             dot(way, way)
@@ -34,7 +34,7 @@ impl<const D: usize> Sweep<D> {
 
     /// Whether the rod passes no core point on its way, resp. stays half as far away in space as
     /// `keep_m`, the distance that it must keep at rest.
-    pub fn is_clear(&self, core: &Core<D>, keep_m: f64) -> bool {
+    pub(super) fn is_clear(&self, core: &Core<D>, keep_m: f64) -> bool {
         let way_m = self.longest_way_m();
         core.is_clear_of_segment(self.to, Self::sure_m(way_m, keep_m))
             || self.is_clear_on_the_way(core, keep_m, way_m)

@@ -1,7 +1,7 @@
 //! Arms from URDF files.
 
-use super::super::arm::Arm;
-use super::super::kinematics::SerialChain;
+use super::super::arms::arm::Arm;
+use super::super::arms::kinematics::SerialChain;
 use super::Compiler;
 use serde::Deserialize;
 use sidestep_import::urdf::Model;

@@ -1,16 +1,17 @@
 //! Chains: their shape, their limits, and where they begin.
 
-use super::super::arm::Arm;
-use super::super::chain::{Chain, Connector, Mobility, Rod};
+use super::super::arms::arm::Arm;
 use super::super::driver::{Driver, Task};
 use super::super::formation::Robots;
-use super::super::geometry::{Point, along, first_axis, unit};
 use super::super::ground::Site;
 use super::super::ground::route::{Wanted, find};
-use super::super::obstacle::Obstacles;
+use super::super::rods::chain::{Chain, Connector, Mobility, Rod};
+use super::super::rods::geometry::{Point, along, first_axis, unit};
+use super::super::rods::obstacle::Obstacles;
 use super::super::world::{ChainSpec, Change, What};
 use super::arms::ArmSection;
 use super::changes::ChangeSection;
+use super::mobility::MobilitySection;
 use super::navigators::RobotsSection;
 use super::obstacles::fitted;
 use super::tasks::TaskSection;
@@ -74,31 +75,6 @@ pub(super) struct LimitSection<const D: usize> {
     max_bend_deg: Option<f64>,
     radius_m: Option<f64>,
     failed: Option<bool>,
-}
-
-/// The places where a connector may be.
-#[derive(Debug, Deserialize)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub(super) enum MobilitySection<const D: usize> {
-    Free,
-    Fixed,
-    OnSegment([Place<D>; 2]),
-    OnPlane { normal: Place<D>, offset_m: f64 },
-    InBox([Place<D>; 2]),
-}
-
-impl<const D: usize> MobilitySection<D> {
-    pub(super) fn mobility(&self) -> Mobility<D> {
-        match *self {
-            Self::Free => Mobility::Free,
-            Self::Fixed => Mobility::Fixed,
-            Self::OnSegment(ends) => Mobility::OnSegment(ends.map(Place::get)),
-            Self::OnPlane { normal, offset_m } => {
-                Mobility::OnPlane { normal: normal.get(), offset_m }
-            }
-            Self::InBox([lo, hi]) => Mobility::InBox { lo: lo.get(), hi: hi.get() },
-        }
-    }
 }
 
 impl<const D: usize> Compiler<'_, D> {

@@ -1,9 +1,9 @@
 //! What happens to a chain while it runs.
 
-use super::super::chain::Chain;
-use super::super::rebuild::MayCome;
+use super::super::rods::chain::Chain;
+use super::super::rods::rebuild::MayCome;
 use super::super::world::{Change, What};
-use super::chains::MobilitySection;
+use super::mobility::MobilitySection;
 use super::{Compiler, Measure, Place};
 use serde::Deserialize;
 use sidestep_kernel::InputError;

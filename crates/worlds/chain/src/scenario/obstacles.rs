@@ -1,10 +1,10 @@
 //! What is in the way: grounds, obstacles one by one, and fields of them.
 
-use super::super::chain::Chain;
-use super::super::geometry::{Bounds, Core, Cuboid, Point};
 use super::super::ground::fields::{Crowd, Field};
 use super::super::ground::{Corridor, Course, Leg, Mover, Movers, Site};
-use super::super::obstacle::{Obstacle, Obstacles, outline};
+use super::super::rods::chain::Chain;
+use super::super::rods::geometry::{Bounds, Core, Cuboid, Point};
+use super::super::rods::obstacle::{Obstacle, Obstacles, outline};
 use super::super::world::ChainSpec;
 use super::{Compiler, MOST, Measure, Place};
 use serde::Deserialize;

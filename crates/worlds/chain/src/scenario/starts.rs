@@ -1,9 +1,9 @@
 //! Whether chains have their places to themselves at the start.
 
-use super::super::chain::Chain;
-use super::super::geometry::Bounds;
 use super::super::metrics::PENETRATION_M;
-use super::super::obstacle::{Obstacle, Obstacles};
+use super::super::rods::chain::Chain;
+use super::super::rods::geometry::Bounds;
+use super::super::rods::obstacle::{Obstacle, Obstacles};
 use super::super::world::{ChainSpec, OTHER_CHAIN, push_parts};
 use super::Compiler;
 use super::obstacles::Ground;

@@ -32,19 +32,19 @@ mod tests;
 
 use sidestep_kernel::InputError;
 
-pub use run::{Motion, Motions, Turtle};
+pub(crate) use run::{Motion, Motions, Turtle};
 
 /// The longest script that is read, in bytes.
-pub const MAX_BYTES: usize = 1 << 20;
+pub(crate) const MAX_BYTES: usize = 1 << 20;
 
 /// How deep brackets may stand in each other.
-pub const MAX_NESTING: usize = 64;
+pub(crate) const MAX_NESTING: usize = 64;
 
 /// How deep procedures and repetitions may be in each other while a script runs.
-pub const MAX_DEPTH: usize = 1000;
+pub(crate) const MAX_DEPTH: usize = 1000;
 
 /// Statements that a script may carry out. Repetitions count as one each time.
-pub const MAX_STATEMENTS: u64 = 10_000_000;
+pub(crate) const MAX_STATEMENTS: u64 = 10_000_000;
 
 /// A script that can be run.
 #[derive(Debug, Clone, PartialEq)]

@@ -66,7 +66,7 @@ impl Plan {
 
 /// What part of its speed a leader may go whose latest follower is so far from its connector: it
 /// slows down from half the limit on.
-pub fn pace(worst_lag_m: f64, limit_m: f64) -> f64 {
+pub(crate) fn pace(worst_lag_m: f64, limit_m: f64) -> f64 {
     (2.0 - 2.0 * worst_lag_m / limit_m).clamp(0.0, 1.0)
 }
 
@@ -233,7 +233,7 @@ impl Convoy {
         let goal = Goal { at, velocity_m_s: scaled(sub(at, was), 1.0 / dt_s) };
         let pose = self.followers[i];
         let others = || self.bodies.iter().enumerate().filter(|&(k, _)| k != i).map(|(_, b)| *b);
-        let followed = follower.follow(&pose, &goal, (obstacles, others()), *dt_s);
+        let followed = follower.follow(&pose, &goal, obstacles, others(), *dt_s);
         self.followers[i] = followed.pose;
         (followed.is_held, followed.is_bumped)
     }

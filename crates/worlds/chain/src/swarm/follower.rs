@@ -114,7 +114,8 @@ impl Follower {
         &self,
         pose: &Pose,
         goal: &Goal,
-        (obstacles, others): (&Obstacles<2>, impl Iterator<Item = Body> + Clone),
+        obstacles: &Obstacles<2>,
+        others: impl Iterator<Item = Body> + Clone,
         dt_s: f64,
     ) -> Followed {
         let gaps = self.ring.read(pose, obstacles, others.clone());

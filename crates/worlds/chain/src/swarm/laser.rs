@@ -117,9 +117,9 @@ impl Laser {
         self.read_beams().for_each(|beam| scan.ranges_m[beam] = self.range_m);
         let turn = [cos(pose.heading_rad), sin(pose.heading_rad)];
         let near = around(pose.at, self.range_m);
-        obstacles.visit(&near, |o| self.look(pose, turn, (&o.core, o.radius_m), scan));
+        obstacles.visit(&near, |o| self.look(pose, turn, &o.core, o.radius_m, scan));
         for body in bodies.into_iter().filter(|body| body.bounds().meets(&near)) {
-            self.look(pose, turn, (&body.core, body.radius_m), scan);
+            self.look(pose, turn, &body.core, body.radius_m, scan);
         }
         if self.noise_std_m > 0.0 {
             for beam in self.read_beams() {
@@ -137,23 +137,17 @@ impl Laser {
         (0..(2 * m + 1).min(n)).map(move |k| (n + k - m) % n)
     }
 
-    fn look(
-        &self,
-        pose: &Pose,
-        turn: Point<2>,
-        (core, radius_m): (&Core<2>, f64),
-        scan: &mut Scan,
-    ) {
+    fn look(&self, pose: &Pose, turn: Point<2>, core: &Core<2>, radius_m: f64, scan: &mut Scan) {
         match core {
-            Core::Point(c) => self.look_at(pose, turn, [*c; 2], (core, radius_m), scan),
-            Core::Segment(ends) => self.look_at(pose, turn, *ends, (core, radius_m), scan),
+            Core::Point(c) => self.look_at(pose, turn, [*c; 2], core, radius_m, scan),
+            Core::Segment(ends) => self.look_at(pose, turn, *ends, core, radius_m, scan),
             Core::Cuboid(cuboid) => {
                 // From inside, the edges are not in every direction.
                 if core.nearest_to_point(pose.at).distance_m <= radius_m {
                     return scan.ranges_m.fill(0.0);
                 }
                 for edge in cuboid.edges_2d() {
-                    self.look_at(pose, turn, edge, (&Core::Segment(edge), radius_m), scan);
+                    self.look_at(pose, turn, edge, &Core::Segment(edge), radius_m, scan);
                 }
             }
         }
@@ -165,7 +159,8 @@ impl Laser {
         pose: &Pose,
         turn: Point<2>,
         ends: [Point<2>; 2],
-        (core, radius_m): (&Core<2>, f64),
+        core: &Core<2>,
+        radius_m: f64,
         scan: &mut Scan,
     ) {
         let n = self.directions.len();

@@ -11,14 +11,14 @@
 //!                                           measures.rs: what a run comes to
 //! ```
 
-pub mod convoy;
+pub(crate) mod convoy;
 pub mod drive;
-pub mod follower;
+pub(crate) mod follower;
 pub mod laser;
 pub mod leader;
-pub mod measures;
-pub mod proximity;
-pub mod ray;
+pub(crate) mod measures;
+pub(crate) mod proximity;
+pub(crate) mod ray;
 #[cfg(test)]
 mod tests;
 

@@ -10,12 +10,12 @@ use sidestep_kernel::math::{atan2, cos, sin, wrap_angle};
 use std::f64::consts::TAU;
 
 /// How many sensors there are. The first looks ahead, the others follow counter-clockwise.
-pub const SECTORS: usize = 8;
+pub(crate) const SECTORS: usize = 8;
 /// The angle that one sensor watches.
-pub const SECTOR_RAD: f64 = TAU / SECTORS as f64;
+pub(crate) const SECTOR_RAD: f64 = TAU / SECTORS as f64;
 
 /// The air between the body and what is nearest, sector by sector, up to the sensors' range.
-pub type Gaps = [f64; SECTORS];
+pub(crate) type Gaps = [f64; SECTORS];
 
 /// A ring of sensors around a body.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,9 +40,9 @@ impl Ring {
             let toward = pose.heading_rad + (k as f64 + 0.5) * SECTOR_RAD;
             [cos(toward), sin(toward)]
         });
-        obstacles.visit(&near, |o| self.look(pose, &borders, (&o.core, o.radius_m), &mut gaps));
+        obstacles.visit(&near, |o| self.look(pose, &borders, &o.core, o.radius_m, &mut gaps));
         for body in bodies.into_iter().filter(|body| body.bounds().meets(&near)) {
-            self.look(pose, &borders, (&body.core, body.radius_m), &mut gaps);
+            self.look(pose, &borders, &body.core, body.radius_m, &mut gaps);
         }
         gaps
     }
@@ -52,7 +52,8 @@ impl Ring {
         &self,
         pose: &Pose,
         borders: &[[f64; 2]; SECTORS],
-        (core, radius_m): (&Core<2>, f64),
+        core: &Core<2>,
+        radius_m: f64,
         gaps: &mut Gaps,
     ) {
         let nearest = core.nearest_to_point(pose.at);
@@ -85,7 +86,7 @@ fn sector_of(bearing_rad: f64) -> usize {
 
 /// How fast a body may go into a direction relative to its heading, so that nothing that stands
 /// still is reached within `horizon_s`. `slack_rad` is by how much it may turn meanwhile.
-pub fn safe_speed_m_s(gaps: &Gaps, bearing_rad: f64, slack_rad: f64, horizon_s: f64) -> f64 {
+pub(crate) fn safe_speed_m_s(gaps: &Gaps, bearing_rad: f64, slack_rad: f64, horizon_s: f64) -> f64 {
     let limit = |(k, gap_m): (usize, &f64)| {
         let off_rad = wrap_angle(k as f64 * SECTOR_RAD - bearing_rad).abs();
         let closing = cos((off_rad - 0.5 * SECTOR_RAD - slack_rad).max(0.0));

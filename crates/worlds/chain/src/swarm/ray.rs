@@ -7,7 +7,12 @@ use crate::rods::obstacle::Obstacles;
 
 /// The distance at which a ray from `from` along the unit vector `u` enters everything within
 /// `radius_m` of a core; 0 from inside, `None` where it never does.
-pub fn distance_m(from: Point<2>, u: Point<2>, core: &Core<2>, radius_m: f64) -> Option<f64> {
+pub(crate) fn distance_m(
+    from: Point<2>,
+    u: Point<2>,
+    core: &Core<2>,
+    radius_m: f64,
+) -> Option<f64> {
     match core {
         Core::Point(c) => to_disc(from, u, *c, radius_m),
         Core::Segment(ends) => to_capsule(from, u, *ends, radius_m),
@@ -64,7 +69,7 @@ fn to_segment(from: Point<2>, u: Point<2>, [a, b]: [Point<2>; 2]) -> Option<f64>
 }
 
 /// Whether no obstacle lies on a line.
-pub fn is_clear(obstacles: &Obstacles<2>, line: [Point<2>; 2]) -> bool {
+pub(crate) fn is_clear(obstacles: &Obstacles<2>, line: [Point<2>; 2]) -> bool {
     let mut is_clear = true;
     obstacles.visit(&Bounds::of(&line), |o| {
         is_clear &= o.core.nearest_to_segment(line).distance_m > o.radius_m;

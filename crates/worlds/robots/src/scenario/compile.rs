@@ -19,7 +19,7 @@ use crate::policy::ConflictPolicy;
 use crate::sensor::SensorModel;
 use crate::world::{
     BEAM_STEP, Body, BodyType, Door, MountedSensor, Mover, Radio, RobotBody, RobotModel,
-    RobotsWorld, Role, purpose,
+    RobotsWorld, Role, StorageOrder, purpose,
 };
 use sidestep_kernel::distr::Chance;
 use sidestep_kernel::stream::{Purpose, Streams};
@@ -40,18 +40,6 @@ const MAX_RANGE_BOXES: f64 = 4096.0;
 
 /// Behaviours of the library's user, by the name a scenario gives them.
 pub type Behaviours = BTreeMap<String, Arc<dyn Behaviour>>;
-
-/// The order in which bodies are stored; no result depends on it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum StorageOrder {
-    /// Neighbors on the map are neighbors in memory; arranged anew now and then.
-    #[default]
-    Spatial,
-    /// By entity id.
-    ById,
-    /// Shuffled by this number; for tests.
-    Shuffled(u64),
-}
 
 /// A compiled scenario.
 #[derive(Debug, Clone)]
@@ -306,22 +294,6 @@ fn add_all<T: Clone>(
 ) {
     for (name, section) in from {
         into.insert(name.clone(), Located { section: section.clone(), source: Arc::clone(source) });
-    }
-}
-
-impl StorageOrder {
-    /// Entity ids in the order of storage.
-    pub(in super::super) fn ids(self, world: &RobotsWorld) -> Vec<EntityId> {
-        let mut ids: Vec<EntityId> = (0..world.bodies.len() as EntityId).collect();
-        match self {
-            // Arranged as it goes.
-            Self::ById | Self::Spatial => {}
-            Self::Shuffled(by) => {
-                let streams = Streams::new(Seed(by));
-                ids.sort_by_key(|&id| streams.block(id, 0, Purpose(0), 0));
-            }
-        }
-        ids
     }
 }
 

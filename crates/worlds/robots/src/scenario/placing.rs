@@ -1,6 +1,6 @@
 //! Where bodies stand at the start: where the scenario says, or in a free place by draw.
 
-use crate::world::purpose;
+use crate::purpose;
 use sidestep_kernel::EntityId;
 use sidestep_kernel::stream::Streams;
 use sidestep_map::{Cell, GridMap};

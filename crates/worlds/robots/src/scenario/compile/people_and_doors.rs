@@ -8,6 +8,9 @@ use crate::effector::Side;
 /// Longest side of a door that a map brings, in boxes.
 const MAX_SIDE: u32 = 64;
 
+/// Where a door is, and its columns and rows.
+type SizedPlace = (Spanned<Placing>, (u32, u32));
+
 impl Compiler<'_> {
     pub(super) fn people(
         &mut self,
@@ -63,7 +66,7 @@ impl Compiler<'_> {
         &self,
         s: &DoorSection,
         span: &Range<usize>,
-    ) -> Result<Vec<(Spanned<Placing>, (u32, u32))>, InputError> {
+    ) -> Result<Vec<SizedPlace>, InputError> {
         let facing = Some(0);
         let given = s.at.iter().map(|place| {
             let place = Spanned::new(place.span(), Placing { facing, ..*place.get_ref() });

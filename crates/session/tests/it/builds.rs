@@ -1,0 +1,61 @@
+//! One build goes on with what it began, and no other.
+
+use crate::support::{Place, StopAt, WORLDS, edit};
+use crate::sweeps::sweep;
+use sidestep::experiment::sweep::Shard;
+use sidestep::{BUILD, VERSION};
+use sidestep_session::sweep::{Folder, collect, go_on, planned, planned_or_there, share};
+use sidestep_session::{Error, Journey, Keep, Recorded, Unwatched, replay_all};
+
+const OTHER: &str = "0.1.0+000000000000";
+
+fn is_refused<T>(result: Result<T, Error>) {
+    let error = result.map(drop).expect_err("another build").to_string();
+    assert!(error.contains(OTHER) && error.contains(BUILD) && error.contains("help"), "{error}");
+}
+
+#[test]
+fn two_builds_do_not_mix_in_one_sweep() {
+    let place = Place::new();
+    let (sweep, path) = (sweep(&place), place.path("sweep"));
+    planned(WORLDS, &sweep, &path, &Unwatched).expect("planned");
+    let run = |shard: &str| {
+        let folder = Folder::open(&path).expect("a sweep");
+        let shard: Shard = shard.parse().expect("a share");
+        share(WORLDS, &folder, shard, 1, &Unwatched)
+    };
+    run("0/2").expect("the build that planned it");
+    let manifest = path.join("sweep.json");
+    edit(&manifest, BUILD, OTHER);
+    is_refused(run("1/2"));
+    let folder = Folder::open(&path).expect("a sweep");
+    is_refused(collect(&folder));
+    is_refused(go_on(WORLDS, &folder, 1, &Unwatched));
+    is_refused(planned_or_there(WORLDS, &sweep, &path, &Unwatched));
+    // A folder of before builds were told apart.
+    edit(&manifest, &format!("  \"build\": \"{OTHER}\",\n"), "");
+    run("1/2").expect("the version is the same");
+    collect(&Folder::open(&path).expect("a sweep")).expect("collected");
+}
+
+#[test]
+fn a_run_of_another_build_is_neither_resumed_nor_replayed() {
+    let place = Place::new();
+    let folder = place.path("run");
+    let keep = Keep { folder: Some(&folder), ..Keep::default() };
+    place.start(1, keep).expect("started").travel(&StopAt::new(600)).expect("stopped");
+    let resume = || Journey::resume(WORLDS, &folder, 1, None);
+    let manifest = folder.join("run.json");
+    edit(&manifest, BUILD, OTHER);
+    is_refused(resume());
+    edit(&manifest, &format!("  \"build\": \"{OTHER}\",\n"), "");
+    resume().expect("the version is the same").travel(&Unwatched).expect("no bug");
+    let replay = || {
+        let recorded = Recorded::open(WORLDS, &folder).expect("recorded");
+        replay_all(&recorded, 1, &Unwatched)
+    };
+    replay().expect("the same digest");
+    let version = format!("\"program_version\": \"{VERSION}\",");
+    edit(&manifest, &version, &format!("{version}\n  \"build\": \"{OTHER}\","));
+    is_refused(replay());
+}

@@ -1,0 +1,76 @@
+//! Recorded runs in other forms.
+
+use crate::support::{Place, StopAt, WORLDS};
+use sidestep_session::export::{Export, Film, Form, export};
+use sidestep_session::{Error, Keep, Recorded, Unwatched, replay_all};
+use std::path::{Path, PathBuf};
+
+fn wanted(form: Form, out: &Path) -> Export<'_> {
+    Export {
+        form,
+        out: Some(out),
+        replace: false,
+        from: None,
+        until: None,
+        every: None,
+        workers: 1,
+    }
+}
+
+#[test]
+fn a_run_goes_out_in_every_form() {
+    let place = Place::new();
+    let (folder, _) = place.record("run");
+    let recorded = Recorded::open(WORLDS, &folder).expect("recorded");
+    let events = Some("events".to_string());
+    let film = Film { fps: Some(10), width_px: Some(160) };
+    let forms: [(&str, Form, &[u8]); 6] = [
+        ("events.csv", Form::Csv(events.clone()), b"cycle,frog,event\n"),
+        ("events.parquet", Form::Parquet(events), b"PAR1"),
+        ("run.mcap", Form::Mcap, b"\x89MCAP0\r\n"),
+        ("run.svg", Form::Svg, b"<svg"),
+        ("run.png", Form::Png { width_px: Some(300) }, b"\x89PNG"),
+        ("run.gif", Form::Gif(film), b"GIF89a"),
+    ];
+    for (name, form, begins) in forms {
+        let is_computed = !matches!(form, Form::Csv(_) | Form::Parquet(_));
+        let out = place.path(name);
+        let every = Some(500);
+        let written = export(&recorded, &Export { every, ..wanted(form, &out) }, &Unwatched);
+        let written = written.unwrap_or_else(|e| panic!("{name}: {e}"));
+        assert_eq!(written.is_confirmed, is_computed, "{name}");
+        assert!(std::fs::read(&out).expect("written").starts_with(begins), "{name}");
+    }
+    let frames = place.path("frames");
+    let last = Export { from: Some(5000), ..wanted(Form::Frames(film), &frames) };
+    let written = export(&recorded, &last, &Unwatched).expect("written");
+    assert_eq!(written.film, Some((145, 10)));
+    let tables = export(&recorded, &wanted(Form::Csv(None), &place.path("csv")), &Unwatched);
+    let names = |path: &PathBuf| path.file_name().map(|name| name.display().to_string());
+    let names: Vec<_> = tables.expect("written").paths.iter().filter_map(names).collect();
+    assert_eq!(names, ["events.csv", "trajectories.csv"]);
+}
+
+#[test]
+fn a_recording_for_viewers_is_replayed() {
+    let place = Place::new();
+    let file = place.path("live.mcap");
+    let keep = Keep { mcap: Some((&file, 100)), ..Keep::default() };
+    let summary = place.start(2, keep).expect("started").travel(&Unwatched).expect("no bug");
+    assert_eq!(summary.mcap.as_ref(), Some(&file));
+    let recorded = Recorded::open(WORLDS, &file).expect("recorded");
+    let replayed = replay_all(&recorded, 1, &Unwatched).expect("the same digest");
+    assert_eq!(replayed.run.digest().to_string(), summary.digest);
+}
+
+#[test]
+fn an_export_that_is_stopped_leaves_nothing() {
+    let place = Place::new();
+    let (folder, _) = place.record("run");
+    let recorded = Recorded::open(WORLDS, &folder).expect("recorded");
+    let out = place.path("run.gif");
+    let film = wanted(Form::Gif(Film::default()), &out);
+    let stopped = export(&recorded, &film, &StopAt::new(1));
+    assert!(matches!(stopped, Err(Error::Interrupted)));
+    assert!(!out.exists());
+}

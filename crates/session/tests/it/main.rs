@@ -1,0 +1,8 @@
+//! Everything that a session does, with a world that only these tests know.
+
+mod builds;
+mod exports;
+mod pond;
+mod runs;
+mod support;
+mod sweeps;

@@ -1,0 +1,111 @@
+//! Scenarios of ponds.
+
+use super::PondWorld;
+use super::run::Books;
+use serde::Deserialize;
+use sidestep_kernel::stream::Streams;
+use sidestep_kernel::words::{Said, aligned, line};
+use sidestep_kernel::{InputError, Plan, Run, Seed, Simulation};
+use sidestep_scenario::{Compiled, Kind, Resolved, Source};
+use std::any::Any;
+use std::sync::Arc;
+
+/// Frogs on lily pads.
+pub(crate) struct Pond;
+
+/// A scenario file.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    #[serde(rename = "format")]
+    _format: u32,
+    #[serde(rename = "world")]
+    _world: String,
+    #[serde(default)]
+    name: String,
+    #[serde(default)]
+    seed: u64,
+    cycles: u64,
+    pond: Section,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Section {
+    frogs: u32,
+    width: u32,
+    height: u32,
+    #[serde(default)]
+    checkpoint_every: u64,
+}
+
+struct CompiledPond {
+    world: Arc<PondWorld>,
+    plan: Plan,
+}
+
+impl Kind for Pond {
+    fn name(&self) -> &'static str {
+        "pond"
+    }
+
+    fn agent(&self) -> &'static str {
+        "frog"
+    }
+
+    fn about(&self) -> &'static str {
+        "Frogs on lily pads"
+    }
+
+    fn default_scenario(&self) -> &'static str {
+        "format = 1\nworld = \"pond\"\nname = \"evening\"\nseed = 1\ncycles = 6000\n\
+         [pond]\nfrogs = 12\nwidth = 8\nheight = 6\ncheckpoint_every = 500\n"
+    }
+
+    fn compile(&self, source: &Source) -> Result<Box<dyn Compiled>, InputError> {
+        let File { name, seed, cycles, pond, .. } = source.parse()?;
+        let Section { frogs, width, height, checkpoint_every } = pond;
+        if 2 * frogs > width * height {
+            return Err(source.error(None, "there are too few pads", "give two pads a frog"));
+        }
+        let streams = Streams::new(Seed(seed));
+        let world = Arc::new(PondWorld { frogs, width, height, streams });
+        Ok(Box::new(CompiledPond { world, plan: Plan { name, seed, cycles, checkpoint_every } }))
+    }
+}
+
+impl Compiled for CompiledPond {
+    fn world(&self) -> &'static str {
+        Pond.name()
+    }
+
+    fn plan(&self) -> Plan {
+        self.plan.clone()
+    }
+
+    fn bodies(&self) -> usize {
+        self.world.frogs as usize
+    }
+
+    fn contents(&self, _: &Source) -> Said {
+        let frogs = self.world.frogs;
+        let text = aligned(&[line("frogs", frogs.to_string())]);
+        Said { json: serde_json::json!({ "frogs": frogs }), text }
+    }
+
+    fn resolve(&self, source: &Source) -> Result<Resolved, InputError> {
+        Ok(Resolved { text: source.heading() + &source.text, files: Vec::new() })
+    }
+
+    fn start(&self, source: &Source, workers: usize) -> Box<dyn Simulation> {
+        let begin = (self.world.start(), Books::default());
+        let mut run = Run::new(self.world.clone(), self.plan.clone(), begin, &source.text, workers);
+        // So small a pond would be left to one worker.
+        run.share_always();
+        Box::new(run)
+    }
+
+    fn as_any(&self) -> &dyn Any {
+        self
+    }
+}

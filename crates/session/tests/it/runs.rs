@@ -1,0 +1,74 @@
+//! One run: started, recorded, stopped, resumed, replayed, reported.
+
+use crate::support::{Place, StopAt, WORLDS};
+use sidestep_record::read_table;
+use sidestep_session::report::document;
+use sidestep_session::{Error, Journey, Keep, Recorded, Status, Unwatched, replay_all, replay_to};
+
+#[test]
+fn the_number_of_workers_changes_nothing() {
+    let place = Place::new();
+    let run = |workers| {
+        let journey = place.start(workers, Keep::default()).expect("started");
+        journey.travel(&Unwatched).expect("no bug")
+    };
+    let one = run(1);
+    assert_eq!((one.world, one.agents, one.cycles), ("pond", 12, 6000));
+    let hops = one.metrics["hops"].as_u64();
+    assert!(hops > Some(1000), "frogs hop: {hops:?}");
+    for workers in [2, 3] {
+        let more = run(workers);
+        assert_eq!((&more.digest, &more.metrics), (&one.digest, &one.metrics));
+    }
+}
+
+#[test]
+fn a_run_that_was_stopped_comes_to_the_same_end_with_the_same_rows() {
+    let place = Place::new();
+    let (whole, in_one_go) = place.record("whole");
+    let parts = place.path("parts");
+    let keep = Keep { folder: Some(&parts), ..Keep::default() };
+    let stopped = place.start(1, keep).expect("started").travel(&StopAt::new(1700));
+    let stopped = stopped.expect("stopped in good order");
+    assert_eq!(stopped.status, Status::Incomplete);
+    assert!((1700..6000).contains(&stopped.cycles), "{}", stopped.cycles);
+    let resume = |until| Journey::resume(WORLDS, &parts, 3, until);
+    let early = resume(Some(100)).map(drop).expect_err("the run is past cycle 100");
+    assert!(early.to_string().contains("--cycles 100"), "{early}");
+    let half = resume(Some(5001)).expect("resumed").travel(&Unwatched).expect("no bug");
+    assert_eq!((half.cycles, half.status), (5001, Status::Incomplete));
+    let resumed = resume(None).expect("resumed").travel(&Unwatched).expect("no bug");
+    assert_eq!((&resumed.digest, &resumed.metrics), (&in_one_go.digest, &in_one_go.metrics));
+    for table in ["trajectories", "events"] {
+        let rows = |folder| read_table(folder, table, ..).expect("whole").columns;
+        assert!(rows(&whole) == rows(&parts), "{table}");
+    }
+}
+
+#[test]
+fn a_run_leaves_a_picture_and_is_replayed_to_any_cycle() {
+    let place = Place::new();
+    let (folder, _) = place.record("run");
+    let svg = std::fs::read_to_string(folder.join("trajectories.svg")).expect("drawn");
+    assert!(svg.starts_with("<svg") && svg.contains("evening"));
+    let recorded = Recorded::open(WORLDS, &folder).expect("recorded");
+    let whole = replay_all(&recorded, 3, &Unwatched).expect("the same digest");
+    assert_eq!(whole.run.cycle(), 6000);
+    let mut moment = replay_to(&recorded, 1234, 1, &Unwatched).expect("the same poses");
+    assert_eq!((moment.run.cycle(), moment.compared_poses), (1234, 12));
+    moment.draw(&recorded, &place.path("moment.png")).expect("drawn");
+    let stopped = replay_all(&recorded, 1, &StopAt::new(10));
+    assert!(matches!(stopped, Err(Error::Interrupted)));
+}
+
+#[test]
+fn a_run_is_reported() {
+    let place = Place::new();
+    let (folder, summary) = place.record("run");
+    let document = document(WORLDS, &folder, &Unwatched).expect("a document");
+    let pages = sidestep_report::render(&document, "pictures").expect("pages");
+    for words in ["evening, seed 1", "hops_per_frog", "bump", &summary.digest, "x_m"] {
+        assert!(pages.markdown.contains(words), "no {words} in the report");
+    }
+    assert!(!pages.pictures.is_empty());
+}

@@ -1,0 +1,75 @@
+//! Runs of the pond in a folder of their own.
+
+use crate::pond::Pond;
+use sidestep_kernel::Cycle;
+use sidestep_scenario::{Kind, Worlds};
+use sidestep_session::{Error, Journey, Keep, Progress, Summary, Unwatched, Watcher, read};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// The one world of these tests.
+pub(crate) const WORLDS: Worlds = Worlds(&[&Pond]);
+
+/// A folder that is deleted in the end.
+pub(crate) struct Place(tempfile::TempDir);
+
+impl Place {
+    /// A folder with the scenario `pond.toml`.
+    pub(crate) fn new() -> Self {
+        let place = Self(tempfile::tempdir().expect("a folder"));
+        std::fs::write(place.path("pond.toml"), Pond.default_scenario()).expect("written");
+        place
+    }
+
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    /// The run of the scenario, at its start.
+    pub(crate) fn start(&self, workers: usize, keep: Keep<'_>) -> Result<Journey, Error> {
+        let (source, compiled) = read(WORLDS, &self.path("pond.toml"), &[])?;
+        Journey::start(compiled.as_ref(), &source, workers, keep, None)
+    }
+
+    /// The whole run, recorded to the folder `name`.
+    pub(crate) fn record(&self, name: &str) -> (PathBuf, Summary) {
+        let folder = self.path(name);
+        let keep = Keep { folder: Some(&folder), ..Keep::default() };
+        let journey = self.start(2, keep).expect("started");
+        let summary = journey.travel(&Unwatched).expect("recorded");
+        (folder, summary)
+    }
+}
+
+/// Says no once a run has come to a cycle.
+pub(crate) struct StopAt {
+    cycle: Cycle,
+    is_there: AtomicBool,
+}
+
+impl StopAt {
+    pub(crate) fn new(cycle: Cycle) -> Self {
+        Self { cycle, is_there: AtomicBool::new(false) }
+    }
+}
+
+impl Watcher for StopAt {
+    fn at(&self, progress: Progress<'_>) {
+        if let Progress::Cycles { done, .. } = progress
+            && done >= self.cycle
+        {
+            self.is_there.store(true, Ordering::Relaxed);
+        }
+    }
+
+    fn go_on(&self) -> bool {
+        !self.is_there.load(Ordering::Relaxed)
+    }
+}
+
+/// Replaces `from` by `to` in a file, which must hold it.
+pub(crate) fn edit(file: &Path, from: &str, to: &str) {
+    let text = std::fs::read_to_string(file).expect("readable");
+    assert!(text.contains(from), "{} holds no {from}", file.display());
+    std::fs::write(file, text.replace(from, to)).expect("written");
+}

@@ -1,0 +1,55 @@
+//! Orders that are due, and when they may be carried out.
+//!
+//! With the shield, a new speed or level is taken only when the airplane then has a fallback apart
+//! from all stored ones, so that the invariant holds; else the order waits for the next `dt`, and
+//! those after it wait with it. While it changes its level, an airplane occupies the old one, the
+//! new one and all between.
+
+use super::protect::flyer;
+use crate::Turn;
+use crate::flight::{FlightOrder, Levels, Task};
+use crate::shield::{Flyer, Side, side_apart};
+use sidestep_kernel::Slot;
+
+/// Carries out the orders of a group that are due and, with the shield, may be; the others
+/// wait. `flown` are the group's airplanes that the method flies, by id.
+pub(super) fn carry_out(turn: &Turn<'_>, flown: &[Slot]) {
+    let Turn { world, state, now, .. } = turn;
+    for &slot in flown {
+        let (airplane, cell) = (&world.airplanes[slot as usize], &state.airplanes[slot as usize]);
+        while let Some(order) = airplane.due(cell.orders.get().into(), world.starts_s(*now)) {
+            let Some(side) = fallback_after(turn, flown, slot, order) else {
+                cell.waits.set(cell.waits.get().saturating_add(1));
+                break;
+            };
+            let later = &world.later[slot as usize][usize::from(cell.orders.get())];
+            cell.orders.set(cell.orders.get() + 1);
+            cell.next.set(later.next.unwrap_or(cell.next.get()));
+            cell.set_side(side);
+        }
+    }
+}
+
+/// The fallback that an airplane has when it carries out its next order, if it may.
+fn fallback_after(
+    turn: &Turn<'_>,
+    flown: &[Slot],
+    slot: Slot,
+    order: &FlightOrder,
+) -> Option<Side> {
+    let Turn { world, state, .. } = turn;
+    let cell = &state.airplanes[slot as usize];
+    let changes_safety = matches!(order.task, Task::Speed(_) | Task::Altitude { .. });
+    if !world.shield || !changes_safety {
+        return Some(cell.side());
+    }
+    let stage = world.stage(slot, u32::from(cell.orders.get()) + 1);
+    let now = flyer(world, state, slot);
+    let changed = Flyer {
+        v_m_s: stage.model.v_m_s,
+        levels: Levels::between(cell.altitude_m.get(), stage.altitude_m),
+        ..now
+    };
+    let others = flown.iter().filter(|&&other| other != slot);
+    side_apart(&now, &changed, others.map(|&other| flyer(world, state, other)))
+}

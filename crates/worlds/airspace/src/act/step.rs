@@ -1,0 +1,74 @@
+//! The steps of one `dt`: all fly, and what becomes of them is stored.
+
+use super::approaches;
+use super::flight::{Course, Flight, Moment};
+use crate::Turn;
+use crate::events::{Event, EventKind};
+use crate::metrics::airplane_metrics;
+use crate::purpose;
+use crate::state::End;
+use crate::world::AirspaceWorld;
+use sidestep_kernel::distr::normal;
+
+/// Flies all steps of this `dt`.
+pub(super) fn step_all(turn: &mut Turn<'_>, mut flights: Vec<Flight<'_>>) {
+    let (world, now) = (turn.world, turn.now);
+    let steps = world.timing.points_per_dt();
+    for k in 0..steps {
+        let step = now * steps as u64 + k as u64;
+        let moment = Moment { now, k, step, step_s: step as f64 * world.timing.dtau_s };
+        for flight in flights.iter_mut().filter(|f| f.ended.is_none()) {
+            let leaves_s = world.airplanes[flight.slot as usize].leaves_s;
+            flight.ended = (leaves_s <= moment.step_s).then_some(End::Left(step));
+        }
+        approaches::book(world, &flights, moment, turn.scratch);
+        for flight in flights.iter_mut().filter(|f| f.ended.is_none()) {
+            fly(world, flight, moment);
+        }
+    }
+    flights.into_iter().for_each(|flight| store(turn, flight));
+}
+
+fn fly(world: &AirspaceWorld, flight: &mut Flight<'_>, Moment { k, step, .. }: Moment) {
+    let (air, dtau_s) = (world.air(), world.timing.dtau_s);
+    let is_at_end = match &flight.course {
+        Course::Way(way, stage) => {
+            let omega = way.omegas_rad_s[k];
+            let altitude_m = flight.altitude_after_m(stage, dtau_s);
+            flight.altitude_m = altitude_m;
+            flight.pose = air.blown(flight.pose.step(stage.model.v_m_s, omega, dtau_s));
+            let pilot = air.pilot(stage.model, stage.mission);
+            flight.next = pilot.next(flight.pose, flight.next);
+            flight.next == stage.mission.len()
+        }
+        Course::Track(track) => {
+            let after_s = (step + 1) as f64 * dtau_s;
+            flight.pose = track.pose_at(after_s);
+            flight.altitude_m = track.altitude_at_m(after_s);
+            track.ends_s() <= after_s
+        }
+    };
+    flight.ended = is_at_end.then_some(End::Arrived(step + 1));
+}
+
+fn store(turn: &mut Turn<'_>, flight: Flight<'_>) {
+    let &mut Turn { world, state, now, ref mut scratch, .. } = turn;
+    let cell = &state.airplanes[flight.slot as usize];
+    let mut pose = flight.pose;
+    let is_disturbed = matches!(flight.course, Course::Way(..));
+    if is_disturbed && world.disturbance.heading_rad > 0.0 {
+        let mut draws = world.streams.draws(flight.slot, now, purpose::HEADING);
+        pose.heading_rad += world.disturbance.heading_rad * normal(&mut draws);
+    }
+    pose.heading_rad = sidestep_kernel::math::wrap_angle(pose.heading_rad);
+    cell.set_pose(pose);
+    cell.altitude_m.set(flight.altitude_m);
+    cell.next.set(flight.next as u32);
+    if let Some(end) = flight.ended {
+        cell.set_end(end);
+        if let Some(delay_s) = airplane_metrics(world, state, flight.slot).delay_s() {
+            let event = Event::of(now, EventKind::Arrival, flight.slot);
+            scratch.events.push(event.with(delay_s));
+        }
+    }
+}

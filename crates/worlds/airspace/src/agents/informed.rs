@@ -1,0 +1,363 @@
+//! Agents that first tell each other all they may do, and then only what they make of it:
+//! samples' numbers, or distributions.
+
+use super::contact::Beacon;
+use super::own_ship::OwnShip;
+use super::{Conclusion, link};
+use crate::flight::{Known, Point, Prediction};
+use crate::objective::{Options, couple, own_costs};
+use serde::{Deserialize, Serialize};
+use sidestep_collectives::{Estimator, Game, Order, PairwiseGame, Player};
+use std::collections::BTreeMap;
+
+/// Messages between agents.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub enum Message {
+    /// The ways of all the sender's actions.
+    Ways {
+        /// Beacon of the sender.
+        beacon: Beacon,
+        /// The ways, by action.
+        ways: Vec<Prediction>,
+    },
+    /// From which the others predict its ways themselves.
+    Model {
+        /// Beacon of the sender.
+        beacon: Beacon,
+        /// Way-points done with.
+        next: u32,
+        /// Way-points that it is to reach.
+        mission: Vec<Point>,
+        /// Which airplane it is,
+        airplane: u32,
+        /// how many of its orders are carried out,
+        orders: u32,
+        /// and its altitude.
+        altitude_m: f64,
+    },
+    /// The numbers of the round's samples, and how far the sender has moved in the round before.
+    Samples {
+        /// The round, from 0.
+        round: u32,
+        /// Largest move of the probabilities.
+        change: f64,
+        /// Numbers of actions.
+        samples: Vec<u16>,
+    },
+    /// The sender's distribution after a round, and how far it has moved in it.
+    Distribution {
+        /// The round, from 1.
+        round: u32,
+        /// Largest move of the probabilities.
+        change: f64,
+        /// Probabilities of the actions.
+        q: Vec<f64>,
+    },
+}
+
+/// A member of the group, as an agent knows it.
+#[derive(Debug, Default)]
+struct Member {
+    beacon: Option<Beacon>,
+    options: Option<Options>,
+    /// Distributions after each round; round 0 is the beginning.
+    q: BTreeMap<u32, Vec<f64>>,
+    samples: BTreeMap<u32, Vec<usize>>,
+    changes: BTreeMap<u32, f64>,
+    /// Nothing more comes of it: its last word holds for all later rounds.
+    gone: bool,
+}
+
+impl Member {
+    /// Returns its word that holds in a round, if that is known.
+    fn at<'a, T>(&self, of_rounds: &'a BTreeMap<u32, T>, round: u32) -> Option<&'a T> {
+        match of_rounds.get(&round) {
+            None if self.gone => of_rounds.range(..round).next_back().map(|(_, value)| value),
+            known => known,
+        }
+    }
+
+    fn q(&self, round: u32) -> Option<&Vec<f64>> {
+        self.at(&self.q, round)
+    }
+
+    fn samples(&self, round: u32) -> Option<&Vec<usize>> {
+        self.at(&self.samples, round)
+    }
+
+    /// Returns how far it has moved in a round.
+    fn change(&self, round: u32) -> f64 {
+        self.changes.get(&round).copied().unwrap_or(0.0)
+    }
+
+    fn forget_before(&mut self, round: u32) {
+        if !self.gone {
+            self.q.retain(|r, _| *r >= round);
+            self.samples.retain(|r, _| *r >= round);
+            self.changes.retain(|r, _| *r >= round);
+        }
+    }
+}
+
+/// One agent.
+#[derive(Debug)]
+pub struct Agent {
+    own: OwnShip,
+    by_model: bool,
+    members: Vec<Member>,
+    game: Option<PairwiseGame>,
+    player: Player,
+    /// Rounds made.
+    round: u32,
+    calm: u32,
+    decided: Option<Conclusion>,
+}
+
+impl Agent {
+    /// An agent that has not said anything yet.
+    pub fn new(own: OwnShip, by_model: bool) -> Self {
+        let mut members: Vec<Member> =
+            (0..own.briefing.ids.len()).map(|_| Member::default()).collect();
+        members[own.me].options = Some(own.options.clone());
+        let player = Player::new(own.options.predictions.len());
+        Self { own, by_model, members, game: None, player, round: 0, calm: 0, decided: None }
+    }
+
+    fn announcement(&self) -> Message {
+        let beacon = self.own.beacon.clone();
+        if !self.by_model {
+            return Message::Ways { beacon, ways: self.own.options.predictions.clone() };
+        }
+        let Known { slot, next, orders, altitude_m, .. } = self.own.known;
+        let mission = self.own.mission.clone();
+        Message::Model { beacon, next: next as u32, mission, airplane: slot, orders, altitude_m }
+    }
+
+    fn is_exact(&self) -> bool {
+        self.own.settings().estimator == Estimator::Exact
+    }
+
+    /// Goes on as far as what has been heard allows.
+    fn go_on(&mut self) -> Vec<Message> {
+        let mut said = Vec::new();
+        if self.game.is_none() {
+            if self.members.iter().any(|m| m.options.is_none()) {
+                return said;
+            }
+            self.meet();
+        }
+        while self.decided.is_none() && self.awaits_in_round().is_empty() {
+            said.extend(if self.is_exact() { self.exact_step() } else { self.sampled_step() });
+        }
+        said
+    }
+
+    /// Everybody's options are known: the game, and the distributions at the beginning.
+    fn meet(&mut self) {
+        let objective = &self.own.briefing.objective;
+        let all: Vec<&Options> = self.members.iter().filter_map(|m| m.options.as_ref()).collect();
+        let mut game = PairwiseGame::new(all.iter().map(|o| own_costs(objective, o)).collect());
+        for i in 0..all.len() {
+            for j in i + 1..all.len() {
+                // An exact player needs only its own pairs.
+                if !self.is_exact() || i == self.own.me || j == self.own.me {
+                    couple(&mut game, objective, (i, all[i]), (j, all[j]));
+                }
+            }
+        }
+        for member in &mut self.members {
+            let n = member.options.as_ref().map_or(1, |options| options.predictions.len());
+            member.q.insert(0, vec![1.0 / n as f64; n]);
+            if member.gone {
+                member.samples.insert(0, Vec::new());
+            }
+        }
+        self.game = Some(game);
+    }
+
+    /// Whose word is missing for the next step. With exact expectations round `r` leads to the
+    /// distributions `q_r`, and steps are one's own update and everybody's; samples are those of
+    /// the round after `round` rounds.
+    fn awaits_in_round(&self) -> Vec<usize> {
+        let (me, sequence) = (self.own.me, self.own.settings().order == Order::Sequence);
+        let (round, all) = (self.round, self.members.iter().enumerate());
+        let has_drawn = self.members[me].samples.contains_key(&round);
+        let missing = |(j, member): (usize, &Member)| match (self.is_exact(), self.has_moved()) {
+            (false, _) => has_drawn && member.samples(round).is_none(),
+            (true, true) => member.q(round + 1).is_none(),
+            (true, false) => member.q(if sequence && j < me { round + 1 } else { round }).is_none(),
+        };
+        all.filter(|(j, member)| missing((*j, member))).map(|(j, _)| j).collect()
+    }
+
+    /// Whether its own update of this round is made.
+    fn has_moved(&self) -> bool {
+        self.members[self.own.me].q.contains_key(&(self.round + 1))
+    }
+
+    fn exact_step(&mut self) -> Option<Message> {
+        let round = self.round + 1;
+        if !self.has_moved() {
+            return Some(self.exact_update(round));
+        }
+        let most = self.members.iter().map(|m| m.change(round)).fold(0.0, f64::max);
+        let stop = self.own.settings().stop;
+        self.calm = stop.calm(self.calm, most);
+        self.round = round;
+        self.members.iter_mut().for_each(|m| m.forget_before(round));
+        if self.calm >= stop.calm_rounds || round >= stop.max_rounds {
+            self.decide();
+        }
+        None
+    }
+
+    fn exact_update(&mut self, round: u32) -> Message {
+        let (me, settings) = (self.own.me, *self.own.settings());
+        let sequence = settings.order == Order::Sequence;
+        let seen = |(j, member): (usize, &Member)| {
+            member.q(if sequence && j < me { round } else { round - 1 }).cloned()
+        };
+        let q: Vec<Vec<f64>> = self.members.iter().enumerate().filter_map(seen).collect();
+        if let Some(game) = &self.game {
+            self.player.know(|expected| game.expect(me, &q, expected));
+        }
+        let change = self.player.update(settings.update, settings.cooling);
+        let q = self.player.q.clone();
+        self.members[me].q.insert(round, q.clone());
+        self.members[me].changes.insert(round, change);
+        Message::Distribution { round, change, q }
+    }
+
+    /// Draws, if it has not; else learns from what all have drawn.
+    fn sampled_step(&mut self) -> Option<Message> {
+        let Estimator::Sampled { block, ageing } = self.own.settings().estimator else {
+            return None;
+        };
+        let (me, round) = (self.own.me, self.round);
+        if !self.members[me].samples.contains_key(&round) {
+            return Some(self.draw(block));
+        }
+        if round > 0 {
+            let most = self.members.iter().map(|m| m.change(round)).fold(0.0, f64::max);
+            let stop = self.own.settings().stop;
+            self.calm = stop.calm(self.calm, most);
+            if self.calm >= stop.calm_rounds || round >= stop.max_rounds {
+                self.decide();
+                return None;
+            }
+        }
+        let change = self.learn(block, ageing);
+        self.round += 1;
+        self.members[me].changes.insert(self.round, change);
+        self.members.iter_mut().for_each(|m| m.forget_before(round));
+        Some(self.draw(block))
+    }
+
+    fn draw(&mut self, block: usize) -> Message {
+        let (me, round) = (self.own.me, self.round);
+        let samples = self.own.samples(&self.player, u64::from(round) * block as u64, block);
+        let change = *self.members[me].changes.entry(round).or_insert(f64::INFINITY);
+        self.members[me].samples.insert(round, samples.clone());
+        Message::Samples { round, change, samples: samples.iter().map(|&x| x as u16).collect() }
+    }
+
+    fn learn(&mut self, block: usize, ageing: f64) -> f64 {
+        let Some(game) = &self.game else { return 0.0 };
+        let of = |m: &Member, k: usize| {
+            // One that is only presumed has nothing to choose from.
+            m.samples(self.round).and_then(|all| all.get(k)).copied().unwrap_or(0)
+        };
+        let cost = |k: usize| {
+            let joint: Vec<usize> = self.members.iter().map(|m| of(m, k)).collect();
+            game.cost(&joint)
+        };
+        let costs: Vec<f64> = (0..block).map(cost).collect();
+        let own: Vec<usize> = (0..block).map(|k| of(&self.members[self.own.me], k)).collect();
+        self.player.learn(&own, &costs, ageing);
+        let settings = *self.own.settings();
+        self.player.update(settings.update, settings.cooling)
+    }
+
+    fn decide(&mut self) {
+        let decided = self.own.decided(&self.player, self.round, self.calm);
+        let beacons = self.members.iter_mut().map(|m| m.beacon.take()).collect();
+        self.decided = Some(Conclusion { decided, beacons });
+    }
+}
+
+impl link::Agent for Agent {
+    type Message = Message;
+    type Outcome = Conclusion;
+
+    fn start(&mut self) -> Vec<Message> {
+        let mut said = vec![self.announcement()];
+        said.extend(self.go_on());
+        said
+    }
+
+    fn on_message(&mut self, from: usize, message: Message) -> Vec<Message> {
+        let member = &mut self.members[from];
+        match message {
+            Message::Ways { beacon, ways } => {
+                let options = Options::new(ways, beacon.separation_m, beacon.levels);
+                member.options.get_or_insert(options);
+                member.beacon = Some(beacon);
+            }
+            Message::Model { beacon, next, mission, .. } => {
+                let options = self.own.briefing.options(from, &beacon, &mission, next as usize);
+                member.options.get_or_insert(options);
+                member.beacon = Some(beacon);
+            }
+            // What it comes to after it was given up concerns nobody.
+            _ if member.gone => {}
+            Message::Samples { round, change, samples } => {
+                let samples = samples.iter().map(|&x| usize::from(x)).collect();
+                member.samples.insert(round, samples);
+                member.changes.insert(round, change);
+            }
+            Message::Distribution { round, change, q } => {
+                member.q.insert(round, q);
+                member.changes.insert(round, change);
+            }
+        }
+        self.go_on()
+    }
+
+    fn awaits(&self) -> Vec<usize> {
+        if self.decided.is_some() {
+            return Vec::new();
+        }
+        if self.game.is_some() {
+            return self.awaits_in_round();
+        }
+        let unknown = |j: &usize| self.members[*j].options.is_none();
+        (0..self.members.len()).filter(unknown).collect()
+    }
+
+    fn expects(&self, other: usize) -> bool {
+        self.own.expects(other)
+    }
+
+    fn without(&mut self, other: usize, _: bool) -> Vec<Message> {
+        let member = &mut self.members[other];
+        member.gone = true;
+        if member.options.is_none() {
+            // What it may have said of options that nobody knows means nothing.
+            *member = Member { gone: true, beacon: member.beacon.take(), ..Member::default() };
+            member.options = Some(self.own.presumed(other));
+        }
+        // Who was heard of, but said nothing yet of what it samples.
+        if self.game.is_some() && member.samples.is_empty() {
+            member.samples.insert(0, Vec::new());
+        }
+        self.go_on()
+    }
+
+    fn at_deadline(&mut self) {
+        self.decide();
+    }
+
+    fn outcome(&self) -> Option<Conclusion> {
+        self.decided.clone()
+    }
+}

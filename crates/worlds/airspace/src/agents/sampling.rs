@@ -1,0 +1,268 @@
+//! The paper's Algorithm 1: an agent per airplane that samples, predicts, and shares both.
+
+use super::contact::Beacon;
+use super::own_ship::OwnShip;
+use super::{Conclusion, link};
+use crate::flight::{Levels, Prediction};
+use crate::objective::{Options, own_costs};
+use serde::{Deserialize, Serialize};
+use sidestep_collectives::Player;
+use std::collections::BTreeMap;
+
+/// Messages between agents.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub enum Message {
+    /// Lines 6 to 9: the predicted ways of the round's samples, and how far the sender's
+    /// probabilities have moved in the round before.
+    Predictions {
+        /// The round, from 0.
+        round: u32,
+        /// Largest move of the probabilities.
+        change: f64,
+        /// Beacon of the sender.
+        beacon: Beacon,
+        /// The ways, by sample.
+        ways: Vec<Prediction>,
+    },
+    /// Line 17: the sender's part of the cost of each joint sample (eq. 11).
+    Costs {
+        /// The round, from 0.
+        round: u32,
+        /// The costs, by sample.
+        costs: Vec<f64>,
+    },
+}
+
+/// A member of the group, as an agent knows it.
+#[derive(Debug, Default)]
+struct Member {
+    beacon: Option<Beacon>,
+    /// The ways of its samples, by round,
+    ways: BTreeMap<u32, Vec<Prediction>>,
+    /// how far it has moved in the round before,
+    changes: BTreeMap<u32, f64>,
+    /// and its part of the costs.
+    costs: BTreeMap<u32, Vec<f64>>,
+    /// Predictions for it, since nothing more comes of it.
+    presumed: Option<Options>,
+}
+
+impl Member {
+    fn is_gone(&self) -> bool {
+        self.presumed.is_some()
+    }
+
+    fn way(&self, round: u32, k: usize) -> Option<&Prediction> {
+        let presumed = || self.presumed.as_ref().and_then(|options| options.predictions.first());
+        self.ways.get(&round).and_then(|ways| ways.get(k)).or_else(presumed)
+    }
+
+    fn levels(&self) -> Option<Levels> {
+        let presumed = || self.presumed.as_ref().map(|options| options.levels);
+        self.beacon.as_ref().map(|beacon| beacon.levels).or_else(presumed)
+    }
+
+    /// Keeps the ways of the round before: they may be the last ones heard of.
+    fn forget_before(&mut self, round: u32) {
+        self.ways.retain(|r, _| *r + 1 >= round);
+        self.changes.retain(|r, _| *r >= round);
+        self.costs.retain(|r, _| *r >= round);
+    }
+}
+
+/// One agent.
+#[derive(Debug)]
+pub struct Agent {
+    own: OwnShip,
+    own_costs: Vec<f64>,
+    player: Player,
+    block: usize,
+    ageing: f64,
+    round: u32,
+    calm: u32,
+    change: f64,
+    samples: Vec<usize>,
+    members: Vec<Member>,
+    decided: Option<Conclusion>,
+}
+
+impl Agent {
+    /// An agent that has not said anything yet.
+    pub fn new(own: OwnShip, block: usize, ageing: f64) -> Self {
+        Self {
+            own_costs: own_costs(&own.briefing.objective, &own.options),
+            player: Player::new(own.options.predictions.len()),
+            members: own.briefing.ids.iter().map(|_| Member::default()).collect(),
+            own,
+            block,
+            ageing,
+            round: 0,
+            calm: 0,
+            change: f64::INFINITY,
+            samples: Vec::new(),
+            decided: None,
+        }
+    }
+
+    fn drawn(&self) -> u64 {
+        u64::from(self.round) * self.block as u64
+    }
+
+    fn predictions(&mut self) -> Message {
+        self.samples = self.own.samples(&self.player, self.drawn(), self.block);
+        let ways = self.samples.iter().map(|&x| self.own.options.predictions[x].clone());
+        Message::Predictions {
+            round: self.round,
+            change: self.change,
+            beacon: self.own.beacon.clone(),
+            ways: ways.collect(),
+        }
+    }
+
+    fn others(&self) -> impl Iterator<Item = (usize, &Member)> {
+        self.members.iter().enumerate().filter(|(j, _)| *j != self.own.me)
+    }
+
+    /// Whether this round's own costs are out.
+    fn has_costed(&self) -> bool {
+        self.members[self.own.me].costs.contains_key(&self.round)
+    }
+
+    /// Goes on as far as what has been heard allows.
+    fn go_on(&mut self) -> Vec<Message> {
+        let mut said = Vec::new();
+        while self.decided.is_none() && link::Agent::awaits(self).is_empty() {
+            if !self.has_costed() {
+                if self.is_settled() {
+                    self.decide();
+                    break;
+                }
+                said.push(self.cost());
+            } else {
+                self.learn();
+                said.push(self.predictions());
+            }
+        }
+        said
+    }
+
+    /// Line 25: all know how far anybody has moved, so all stop in the same round.
+    fn is_settled(&mut self) -> bool {
+        let stop = self.own.settings().stop;
+        if self.round > 0 {
+            let heard = self.others().filter_map(|(_, m)| m.changes.get(&self.round).copied());
+            let most = heard.fold(self.change, f64::max);
+            self.calm = stop.calm(self.calm, most);
+        }
+        self.calm >= stop.calm_rounds || self.round >= stop.max_rounds
+    }
+
+    /// Lines 10 to 15.
+    fn cost(&mut self) -> Message {
+        let costs: Vec<f64> = (0..self.block).map(|k| self.cost_of(k)).collect();
+        self.members[self.own.me].costs.insert(self.round, costs.clone());
+        Message::Costs { round: self.round, costs }
+    }
+
+    /// The own part of the cost of joint sample `k`.
+    fn cost_of(&self, k: usize) -> f64 {
+        let objective = &self.own.briefing.objective;
+        let OwnShip { options, .. } = &self.own;
+        let x = self.samples[k];
+        let way = &options.predictions[x];
+        let on_level = |(_, member): &(usize, &Member)| {
+            let theirs = member.levels();
+            theirs.is_none_or(|levels| levels.meets(&options.levels, objective.vertical_m))
+        };
+        self.others().filter(on_level).fold(self.own_costs[x], |sum, (_, member)| {
+            let Some(theirs) = member.way(self.round, k) else { return sum };
+            let wanted_m = member.presumed.as_ref().map_or(0.0, |options| options.separation_m);
+            let r = options.separation_m.max(wanted_m);
+            sum + objective.collision(way, theirs, [r, r])[0]
+        })
+    }
+
+    /// Lines 18 to 24: sums in the order of the airplanes, so that all come to the same bits.
+    fn learn(&mut self) {
+        let mut total = vec![0.0; self.block];
+        for costs in self.members.iter().filter_map(|m| m.costs.get(&self.round)) {
+            total.iter_mut().zip(costs).for_each(|(sum, cost)| *sum += cost);
+        }
+        self.player.learn(&self.samples, &total, self.ageing);
+        let settings = self.own.settings();
+        self.change = self.player.update(settings.update, settings.cooling);
+        self.round += 1;
+        let round = self.round;
+        self.members.iter_mut().for_each(|m| m.forget_before(round));
+    }
+
+    fn decide(&mut self) {
+        let decided = self.own.decided(&self.player, self.round, self.calm);
+        let beacons = self.members.iter_mut().map(|m| m.beacon.take()).collect();
+        self.decided = Some(Conclusion { decided, beacons });
+    }
+}
+
+impl link::Agent for Agent {
+    type Message = Message;
+    type Outcome = Conclusion;
+
+    fn start(&mut self) -> Vec<Message> {
+        let mut said = vec![self.predictions()];
+        said.extend(self.go_on());
+        said
+    }
+
+    fn on_message(&mut self, from: usize, message: Message) -> Vec<Message> {
+        let member = &mut self.members[from];
+        match message {
+            Message::Predictions { round, change, beacon, ways } => {
+                member.beacon = Some(beacon);
+                member.changes.insert(round, change);
+                member.ways.insert(round, ways);
+            }
+            Message::Costs { round, costs } => {
+                member.costs.insert(round, costs);
+            }
+        }
+        self.go_on()
+    }
+
+    fn awaits(&self) -> Vec<usize> {
+        if self.decided.is_some() {
+            return Vec::new();
+        }
+        let missing = |member: &Member| match self.has_costed() {
+            false => !member.ways.contains_key(&self.round),
+            true => !member.costs.contains_key(&self.round),
+        };
+        self.others().filter(|(_, m)| !m.is_gone() && missing(m)).map(|(j, _)| j).collect()
+    }
+
+    fn expects(&self, other: usize) -> bool {
+        self.own.expects(other)
+    }
+
+    /// Its part of the costs is left out from now on. One that is settled goes on as it last
+    /// said; one that is silent is presumed where it was.
+    fn without(&mut self, other: usize, is_settled: bool) -> Vec<Message> {
+        let member = &mut self.members[other];
+        let last = member.ways.values().next_back().and_then(|ways| ways.first());
+        member.presumed = Some(match (&member.beacon, last) {
+            (Some(beacon), Some(way)) if is_settled => {
+                Options::new(vec![way.clone()], beacon.separation_m, beacon.levels)
+            }
+            (Some(beacon), _) => self.own.presumed_from(beacon),
+            _ => self.own.presumed(other),
+        });
+        self.go_on()
+    }
+
+    fn at_deadline(&mut self) {
+        self.decide();
+    }
+
+    fn outcome(&self) -> Option<Conclusion> {
+        self.decided.clone()
+    }
+}

@@ -1,0 +1,42 @@
+//! The deployments, as scenarios name them.
+
+use serde::{Deserialize, Serialize};
+use sidestep_collectives::{Estimator, Order, Settings, Utility};
+
+/// A deployment of the optimizer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Deployment {
+    /// One process decides for all.
+    #[default]
+    Direct,
+    /// An agent per airplane, which sends what it may fly.
+    Team,
+    /// A coordinator that migrates.
+    Pim,
+    /// Coordinators that migrate, one above the others.
+    HierarchicalPim,
+    /// An agent per airplane, which sends its model.
+    CompactTeam,
+}
+
+impl Deployment {
+    /// Its name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Direct => "direct",
+            Self::Team => "team",
+            Self::Pim => "pim",
+            Self::HierarchicalPim => "hierarchical-pim",
+            Self::CompactTeam => "compact-team",
+        }
+    }
+}
+
+/// Why a deployment cannot run with some settings.
+pub(crate) fn refuses(deployment: Deployment, settings: &Settings) -> Option<&'static str> {
+    let sampled = matches!(settings.estimator, Estimator::Sampled { .. });
+    let as_in_the_paper = settings.order == Order::Parallel && settings.utility == Utility::Joint;
+    (deployment != Deployment::Direct && sampled && !as_in_the_paper)
+        .then_some("agents that sample update in parallel and learn from the joint cost")
+}

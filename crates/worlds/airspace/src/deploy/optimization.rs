@@ -1,0 +1,146 @@
+//! The optimization of a group, by the deployment of the world.
+
+use super::drive::{Talk, Topic, run};
+use super::{Deployment, note_end};
+use crate::agents::contact::{self, Beacon, Contact, Contacts, Orbiting};
+use crate::agents::coordinator::{self, Journey, Migration, parts};
+use crate::agents::network::Traffic;
+use crate::agents::{Briefing, Conclusion, Decided, Ended, Filed, OwnShip, informed, sampling};
+use crate::events::Event;
+use crate::flight::Known;
+use crate::world::AirspaceWorld;
+use sidestep_collectives::Estimator;
+use sidestep_kernel::{Cycle, EntityId};
+use std::sync::Arc;
+
+/// Outcomes of the agents of a group, if any, and the count of messages.
+pub(crate) type Deployed = (Vec<Option<Decided>>, Traffic);
+
+/// Lets the agents of a group decide, and notes in `contacts` what they hear of each other.
+pub(crate) fn optimized(
+    world: &AirspaceWorld,
+    now: Cycle,
+    group: &[Known],
+    contacts: &mut [Contacts],
+    events: &mut Vec<Event>,
+) -> Deployed {
+    let briefing = brief(world, now, group);
+    let own = |(me, contacts): (usize, &Contacts)| {
+        own_ship(world, &briefing, me, group[me], contacts.clone())
+    };
+    let own: Vec<OwnShip> = contacts.iter().enumerate().map(own).collect();
+    let (ended, traffic) = talked(world, &Talk::new(world, Topic::Optimization, now), own);
+    if world.network.is_some() {
+        for (me, end) in ended.iter().enumerate() {
+            note_end(world, now, end, (me, &briefing.ids), &contacts[me], events);
+            let heard = end.outcome.iter().flat_map(|came| came.beacons.iter().zip(&*briefing.ids));
+            for (beacon, &id) in heard {
+                if let Some(beacon) = beacon {
+                    contact::note(&mut contacts[me], id, beacon.clone(), now);
+                }
+            }
+        }
+    }
+    let decided = ended.into_iter().map(|end| end.outcome.and_then(|came| came.decided));
+    (decided.collect(), traffic)
+}
+
+/// Builds the agents of the deployment and a network for them, and lets them talk.
+fn talked(
+    world: &AirspaceWorld,
+    talk: &Talk<'_>,
+    own: Vec<OwnShip>,
+) -> (Vec<Ended<Conclusion>>, Traffic) {
+    let ids = own[0].briefing.ids.clone();
+    match (world.deployment, world.settings.estimator) {
+        (Deployment::Pim, _) => migrated(talk, &own, &[(0..own.len()).collect()]),
+        (Deployment::HierarchicalPim, _) => migrated(talk, &own, &parts(&own)),
+        (Deployment::Team, Estimator::Sampled { block, ageing }) => {
+            let agents = own.into_iter().map(|own| sampling::Agent::new(own, block, ageing));
+            run(talk, &ids, agents.collect())
+        }
+        (deployment, _) => {
+            let by_model = deployment == Deployment::CompactTeam;
+            let agents = own.into_iter().map(|own| informed::Agent::new(own, by_model));
+            run(talk, &ids, agents.collect())
+        }
+    }
+}
+
+/// Lets a coordinator for each part of a group migrate.
+fn migrated(
+    talk: &Talk<'_>,
+    own: &[OwnShip],
+    parts: &[Vec<usize>],
+) -> (Vec<Ended<Conclusion>>, Traffic) {
+    let (begin, end) = talk.ticks();
+    let silent: Vec<bool> = own.iter().map(|own| talk.is_silent(own.known.slot)).collect();
+    let journey = Journey { begin, end, patience: talk.patience() };
+    let mut transport = talk.transport();
+    coordinator::run(Migration::new(&mut transport, own, &silent, journey), parts)
+}
+
+/// Returns what all agents of a group know alike before they talk.
+pub fn brief(world: &AirspaceWorld, now: Cycle, group: &[Known]) -> Arc<Briefing> {
+    let filed = |known: &Known| Filed {
+        model: world.stage(known.slot, known.orders).model.clone(),
+        actions: world.actions_of(known.slot).to_vec(),
+        contact: filed(world, known.slot),
+    };
+    Arc::new(Briefing {
+        now,
+        ids: group.iter().map(|known| known.slot).collect(),
+        filed: group.iter().map(filed).collect(),
+        air: world.air(),
+        objective: world.objective,
+        settings: world.settings,
+        streams: world.streams,
+        is_shielded: world.shield,
+    })
+}
+
+/// Returns what the agent at place `me` of a group knows of its own airplane; `contacts` are what
+/// it has heard of others before.
+pub fn own_ship(
+    world: &AirspaceWorld,
+    briefing: &Arc<Briefing>,
+    me: usize,
+    known: Known,
+    contacts: Contacts,
+) -> OwnShip {
+    let (beacon, mission) = (beacon(world, known), world.stage(known.slot, known.orders).mission);
+    OwnShip {
+        me,
+        known,
+        options: briefing.options(me, &beacon, mission, known.next),
+        beacon,
+        mission: mission.to_vec(),
+        contacts,
+        briefing: briefing.clone(),
+    }
+}
+
+/// Message in which an airplane tells of itself.
+fn beacon(world: &AirspaceWorld, known: Known) -> Beacon {
+    let stage = world.stage(known.slot, known.orders);
+    Beacon {
+        pose: known.pose,
+        goal: stage.mission.get(known.next).copied(),
+        v_m_s: stage.model.v_m_s,
+        omega_max_rad_s: stage.model.omega_max_rad_s,
+        separation_m: stage.model.separation_m,
+        levels: world.levels(known),
+    }
+}
+
+/// Knowledge that all have of a flight before they have heard of it: as it was filed.
+fn filed(world: &AirspaceWorld, id: EntityId) -> Contact {
+    let i = id as usize;
+    let heard_in = world.appears_in(i);
+    let pose = world.airplanes[i].start;
+    let orbiting = Orbiting { pose, as_of: heard_in, side: world.first_fallbacks[i] };
+    let altitude_m = world.airplanes[i].altitude_m;
+    let known = Known { slot: id, pose, next: 0, orders: 0, altitude_m };
+    let beacon = beacon(world, known);
+    Contact { heard_in, beacon, possible: vec![orbiting], unheard: 0, met_in: heard_in }
+}

@@ -1,0 +1,71 @@
+//! The shield of a group, over the network of the deployment.
+
+use super::drive::{Talk, Topic, run};
+use super::{Deployment, note_end};
+use crate::agents::bytes_of;
+use crate::agents::contact::Contacts;
+use crate::agents::exchange::{Agent, Agreed, Message, Proposal, Scene, Seen};
+use crate::agents::network::{Network, Traffic};
+use crate::events::{Event, EventKind};
+use crate::shield::{Certainty, Decision, Flyer, Way, filter};
+use crate::world::AirspaceWorld;
+use sidestep_kernel::{Cycle, EntityId};
+use std::sync::Arc;
+
+/// Filters what the airplanes of a group would fly. Returns what is decided for each, and what
+/// went over the network; `contacts` take what they have heard of each other.
+pub(crate) fn shielded(
+    world: &AirspaceWorld,
+    now: Cycle,
+    (seen, candidates): (Vec<Seen>, &[Vec<Way>]),
+    contacts: &mut [Contacts],
+    events: &mut Vec<Event>,
+) -> (Vec<Decision>, Traffic) {
+    let Some(network) = &world.network else {
+        let flyers: Vec<Flyer> = seen.iter().map(|seen| seen.flyer).collect();
+        let frame = (world.timing.points_per_dt(), world.timing.dtau_s);
+        let decisions = filter(&flyers, candidates, frame, Certainty::Sure);
+        return (decisions, proposals(world.deployment, &flyers, candidates));
+    };
+    let ids: Arc<[EntityId]> = seen.iter().map(|seen| seen.flyer.id).collect();
+    let scene = Arc::new(scene(world, now, network, seen));
+    let agent =
+        |(me, ways): (usize, &Vec<Way>)| Agent::new(scene.clone(), me, ways, contacts[me].clone());
+    let agents = candidates.iter().enumerate().map(agent).collect();
+    let talk = Talk::new(world, Topic::Shield, now);
+    let (ended, traffic) = run(&talk, &ids, agents);
+    let mut decisions = Vec::with_capacity(ids.len());
+    for (me, end) in ended.into_iter().enumerate() {
+        note_end(world, now, &end, (me, &ids), &contacts[me], events);
+        // An airplane whose radio is dead stays on its fallback, whatever it would like.
+        let agreed = end.outcome.filter(|_| !talk.is_silent(ids[me]));
+        if agreed.as_ref().is_some_and(|agreed| agreed.held_back) {
+            events.push(Event::of(now, EventKind::HeldBack, ids[me]));
+        }
+        let fallback = Decision { candidate: None, fallback: scene.seen[me].flyer.fallback };
+        let decided = |agreed: Agreed| (agreed.decision, agreed.contacts);
+        // Without an agreement it knows of nobody any more where they are.
+        let (decision, known) = agreed.map_or((fallback, Contacts::new()), decided);
+        contacts[me] = known;
+        decisions.push(decision);
+    }
+    (decisions, traffic)
+}
+
+fn scene(world: &AirspaceWorld, now: Cycle, network: &Network, seen: Vec<Seen>) -> Scene {
+    let silent_after = network.silent_after();
+    Scene { air: world.air(), vertical_m: world.vertical_m, now, silent_after, seen }
+}
+
+/// Returns the messages that the proposals alone take on a network that loses nothing.
+fn proposals(deployment: Deployment, flyers: &[Flyer], candidates: &[Vec<Way>]) -> Traffic {
+    let mut traffic = Traffic::default();
+    if deployment == Deployment::Direct || flyers.len() < 2 {
+        return traffic;
+    }
+    for (flyer, ways) in flyers.iter().zip(candidates) {
+        let message = Message::Proposal(Proposal::new(flyer, ways));
+        traffic.count(flyers.len() - 1, bytes_of(&message).len());
+    }
+    traffic
+}

@@ -1,0 +1,143 @@
+//! Actions: what an airplane may do in the next time, as the optimizer knows it.
+
+use super::motion::Model;
+use serde::{Deserialize, Serialize};
+
+/// An action: a turn rate, held for some time, and then proceeding to the way-point.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum Action {
+    /// The turn rate, for the whole horizon (the paper's g = 0).
+    Hold {
+        /// Turn rate.
+        omega_rad_s: f64,
+    },
+    /// The turn rate for `hold_s` (the paper's g = 1 has dt) and then proceed.
+    Then {
+        /// Turn rate.
+        omega_rad_s: f64,
+        /// Time for which it is held.
+        hold_s: f64,
+    },
+    /// The turn rate, then straight on, and then proceed: a leg to one side.
+    Leg {
+        /// Turn rate.
+        omega_rad_s: f64,
+        /// Time for which it is turned.
+        turn_s: f64,
+        /// End of the leg, from the start of the turn.
+        until_s: f64,
+    },
+    /// Proceed from the start: the optimal action.
+    Proceed,
+}
+
+impl Action {
+    /// The turn rate that the action asks for after `flown_s` seconds of it, if it does not
+    /// proceed to the way-point by then.
+    #[inline]
+    pub fn held_rad_s(self, flown_s: f64) -> Option<f64> {
+        // Rounding of step times must not decide.
+        let before = |end_s: f64| flown_s < end_s - 1e-9;
+        match self {
+            Self::Hold { omega_rad_s } => Some(omega_rad_s),
+            Self::Then { omega_rad_s, hold_s } => before(hold_s).then_some(omega_rad_s),
+            Self::Leg { omega_rad_s, turn_s, .. } if before(turn_s) => Some(omega_rad_s),
+            Self::Leg { until_s, .. } => before(until_s).then_some(0.0),
+            Self::Proceed => None,
+        }
+    }
+}
+
+/// Ways around others: a turn, a straight leg, and then proceeding.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Legs {
+    /// Times that the turns may last.
+    pub turns_s: Vec<f64>,
+    /// Ends of the legs, from the start of the turn.
+    pub until_s: Vec<f64>,
+}
+
+impl Legs {
+    /// Those of the default preset: heading changes of 10 to 60 degrees at the paper's turn
+    /// rates, held for as long as most conflicts take to pass.
+    pub fn usual() -> Self {
+        Self { turns_s: vec![5.0, 10.0, 15.0], until_s: vec![60.0] }
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.turns_s.is_empty() || self.until_s.is_empty()
+    }
+
+    /// Those that begin at a turn rate; straight on, how long one turns makes no difference.
+    fn of(&self, omega_rad_s: f64) -> Vec<Action> {
+        let straight = |&hold_s: &f64| Action::Then { omega_rad_s: 0.0, hold_s };
+        if omega_rad_s == 0.0 {
+            return self.until_s.iter().map(straight).collect();
+        }
+        let leg = |(&turn_s, &until_s): (&f64, &f64)| Action::Leg { omega_rad_s, turn_s, until_s };
+        self.turns_s
+            .iter()
+            .flat_map(|turn_s| self.until_s.iter().map(move |until_s| leg((turn_s, until_s))))
+            .collect()
+    }
+}
+
+/// The action set of a model, ordered by turn rate, the optimal one last. Without legs it is the
+/// paper's: `2 m + 1` actions, every rate held for ever and for `dt_s`. With legs, which never
+/// begin a turn only to undo it, these take the place of the held turns; straight on for ever
+/// remains. `holds_s` are further times for which turns are held.
+pub fn actions(model: &Model, dt_s: f64, holds_s: &[f64], legs: &Legs) -> Vec<Action> {
+    let m = model.turns;
+    let rate = |k: usize| match 2.0 * k as f64 / (m - 1) as f64 - 1.0 {
+        // The middle one is exactly straight.
+        _ if 2 * k + 1 == m => 0.0,
+        part => part * model.omega_max_rad_s,
+    };
+    let mut all = Vec::new();
+    for omega_rad_s in (0..m).map(rate) {
+        if legs.is_empty() || omega_rad_s == 0.0 {
+            all.push(Action::Hold { omega_rad_s });
+        }
+        if legs.is_empty() {
+            all.push(Action::Then { omega_rad_s, hold_s: dt_s });
+        }
+        all.extend(holds_s.iter().map(|&hold_s| Action::Then { omega_rad_s, hold_s }));
+        all.extend(legs.of(omega_rad_s));
+    }
+    all.push(Action::Proceed);
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn model() -> Model {
+        Model { v_m_s: 35.0, omega_max_rad_s: 4f64.to_radians(), separation_m: 500.0, turns: 5 }
+    }
+
+    #[test]
+    fn the_action_set_is_ordered_and_contains_straight_flight() {
+        let all = actions(&model(), 5.0, &[30.0], &Legs::default());
+        assert_eq!(all.len(), 5 * 3 + 1);
+        assert_eq!(all[6], Action::Hold { omega_rad_s: 0.0 });
+        assert_eq!(all[8], Action::Then { omega_rad_s: 0.0, hold_s: 30.0 });
+        assert_eq!(all[15], Action::Proceed);
+    }
+
+    #[test]
+    fn legs_take_the_place_of_turns_that_are_undone() {
+        let legs = Legs { turns_s: vec![5.0, 15.0], until_s: vec![60.0] };
+        let all = actions(&model(), 5.0, &[], &legs);
+        let omega_rad_s = -4f64.to_radians();
+        assert_eq!(all.len(), 4 * 2 + 2 + 1);
+        assert_eq!(all[1], Action::Leg { omega_rad_s, turn_s: 15.0, until_s: 60.0 });
+        assert_eq!(all[4], Action::Hold { omega_rad_s: 0.0 });
+        assert_eq!(all[5], Action::Then { omega_rad_s: 0.0, hold_s: 60.0 });
+        assert_eq!(all[10], Action::Proceed);
+        let rates: Vec<_> = [0.0, 14.0, 15.0, 59.0, 60.0].map(|t| all[1].held_rad_s(t)).into();
+        assert_eq!(rates, [Some(omega_rad_s), Some(omega_rad_s), Some(0.0), Some(0.0), None]);
+    }
+}

@@ -1,0 +1,60 @@
+//! Levels: what part of the height an airplane takes.
+
+use serde::{Deserialize, Serialize};
+
+/// The levels that an airplane is on or passes while it changes its level.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Levels {
+    /// The lowest, meters.
+    pub low_m: f64,
+    /// The highest, meters.
+    pub high_m: f64,
+}
+
+impl Levels {
+    /// Every level.
+    pub const ALL: Self = Self { low_m: f64::NEG_INFINITY, high_m: f64::INFINITY };
+
+    /// One level.
+    pub fn at(altitude_m: f64) -> Self {
+        Self { low_m: altitude_m, high_m: altitude_m }
+    }
+
+    /// Two levels and all between.
+    pub fn between(a_m: f64, b_m: f64) -> Self {
+        Self { low_m: a_m.min(b_m), high_m: a_m.max(b_m) }
+    }
+
+    /// These levels, another, and all between.
+    #[must_use]
+    pub fn with(self, altitude_m: f64) -> Self {
+        Self { low_m: self.low_m.min(altitude_m), high_m: self.high_m.max(altitude_m) }
+    }
+
+    /// Whether some level of one is nearer than `vertical_m` to some level of the other.
+    pub fn meets(&self, other: &Self, vertical_m: f64) -> bool {
+        self.low_m - other.high_m < vertical_m && other.low_m - self.high_m < vertical_m
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn levels_meet_when_two_of_them_do(
+            a in prop::array::uniform2(0.0f64..1000.0), b in prop::array::uniform2(0.0f64..1000.0),
+        ) {
+            let (one, other) = (Levels::between(a[0], a[1]), Levels::between(b[0], b[1]));
+            let at = |levels: Levels, k: i32| levels.low_m + f64::from(k) / 50.0 * (levels.high_m - levels.low_m);
+            let nearest = (0..=50).flat_map(|i| (0..=50).map(move |j| (i, j)))
+                .map(|(i, j)| (at(one, i) - at(other, j)).abs()).fold(f64::INFINITY, f64::min);
+            // The grid is at most 20 m too coarse.
+            prop_assert!(!one.meets(&other, 100.0) || nearest < 120.0);
+            prop_assert!(one.meets(&other, 100.0) || nearest >= 100.0);
+            prop_assert_eq!(one.meets(&other, 100.0), other.meets(&one, 100.0));
+        }
+    }
+}

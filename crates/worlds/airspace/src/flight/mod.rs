@@ -1,0 +1,28 @@
+//! Flight of airplanes: motion, actions and predictions, orders, recorded tracks.
+//!
+//! ```text
+//! motion.rs                          a pose, and one step of it
+//! action.rs  pilot.rs  air.rs        what may be done, where it leads, in which wind
+//! airplane.rs  order.rs  stage.rs    one airplane, what it is told, what it flies in between
+//! track.rs  levels.rs                recorded ways, and heights
+//! ```
+
+mod action;
+mod air;
+mod airplane;
+mod levels;
+mod motion;
+mod order;
+mod pilot;
+mod stage;
+mod track;
+
+pub use action::{Action, Legs, actions};
+pub use air::Air;
+pub use airplane::{Airplane, Known};
+pub use levels::Levels;
+pub use motion::{Model, Point, Pose, Timing, distance_m};
+pub use order::{FlightOrder, MAX_ORDERS, Task};
+pub use pilot::{After, Passing, Pilot, Prediction};
+pub(crate) use stage::{Later, Stage, later};
+pub use track::{Track, TrackPoint};

@@ -1,0 +1,93 @@
+//! Motion: where an airplane is, how it turns, and how fast.
+//!
+//! Plane meters, x east and y north; headings in radians, counter-clockwise from east; a
+//! positive turn rate turns left. Source: section 3 of the paper; the step is exact.
+
+use serde::{Deserialize, Serialize};
+use sidestep_kernel::math;
+
+/// A point of the plane, meters.
+pub type Point = [f64; 2];
+
+/// Distance of two points in meters.
+#[inline]
+pub fn distance_m(a: Point, b: Point) -> f64 {
+    math::hypot(a[0] - b[0], a[1] - b[1])
+}
+
+/// Abilities and separation of an airplane.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Model {
+    /// Airspeed, constant.
+    pub v_m_s: f64,
+    /// Largest rate of turn.
+    pub omega_max_rad_s: f64,
+    /// Nobody else should come nearer than this.
+    pub separation_m: f64,
+    /// Number of evenly spaced turn rates, odd and at least 3.
+    pub turns: usize,
+}
+
+impl Model {
+    /// Radius of the tightest turn.
+    pub fn turn_radius_m(&self) -> f64 {
+        self.v_m_s / self.omega_max_rad_s
+    }
+}
+
+/// Place and heading of an airplane.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Pose {
+    /// Position.
+    pub at: Point,
+    /// Heading.
+    #[serde(rename = "psi_rad")]
+    pub heading_rad: f64,
+}
+
+impl Pose {
+    /// The pose after `dtau_s` seconds at the turn rate `omega_rad_s`: exactly, in chord form,
+    /// which stays exact as the turn rate goes to 0.
+    #[inline]
+    pub fn step(self, v_m_s: f64, omega_rad_s: f64, dtau_s: f64) -> Self {
+        let half = 0.5 * omega_rad_s * dtau_s;
+        let chord = v_m_s * dtau_s * sinc(half);
+        let along = self.heading_rad + half;
+        Self {
+            at: [self.at[0] + chord * math::cos(along), self.at[1] + chord * math::sin(along)],
+            heading_rad: self.heading_rad + omega_rad_s * dtau_s,
+        }
+    }
+
+    /// The turn rate that would head for `goal` after `dtau_s`, within the limits.
+    #[inline]
+    pub fn steer(self, goal: Point, omega_max_rad_s: f64, dtau_s: f64) -> f64 {
+        let bearing = math::atan2(goal[1] - self.at[1], goal[0] - self.at[0]);
+        let wanted = math::wrap_angle(bearing - self.heading_rad) / dtau_s;
+        wanted.clamp(-omega_max_rad_s, omega_max_rad_s)
+    }
+}
+
+/// sin(a) / a.
+#[inline]
+pub(super) fn sinc(a: f64) -> f64 {
+    if a.abs() < 1e-4 { 1.0 - a * a / 6.0 } else { math::sin(a) / a }
+}
+
+/// Steps of time.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Timing {
+    /// Time between two optimizations.
+    pub dt_s: f64,
+    /// Time between two points of a prediction; divides `dt_s`.
+    pub dtau_s: f64,
+    /// Points of a prediction.
+    pub horizon: usize,
+}
+
+impl Timing {
+    /// Points of a prediction within one `dt_s`.
+    pub fn points_per_dt(&self) -> usize {
+        (self.dt_s / self.dtau_s).round() as usize
+    }
+}

@@ -1,0 +1,39 @@
+//! Orders: what airplanes are told on their way.
+//!
+//! An order to head somewhere or to follow way-points changes only what an airplane wants, so
+//! it is carried out at once. A new speed changes the orbit that it has stored as its fallback,
+//! and a new level those whom it has to mind: with the shield, such an order has to wait until it
+//! is safe.
+
+use super::motion::Point;
+
+/// Most orders for one airplane.
+pub const MAX_ORDERS: usize = 10_000;
+/// An order and its time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FlightOrder {
+    /// Time at which it is given, seconds after the start.
+    pub at_s: f64,
+    /// The task.
+    pub task: Task,
+}
+
+/// A task for an airplane.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Task {
+    /// Keep a heading, radians counter-clockwise from east, until sent to a way-point again.
+    Heading(f64),
+    /// Fly with this airspeed, m/s.
+    Speed(f64),
+    /// Change to another level.
+    Altitude {
+        /// The new level.
+        altitude_m: f64,
+        /// Rate of climb or descent.
+        climb_m_s: f64,
+    },
+    /// Go on to the next way-point.
+    Proceed,
+    /// Follow these way-points instead.
+    WayPoints(Vec<Point>),
+}

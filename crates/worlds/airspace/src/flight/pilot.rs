@@ -1,0 +1,269 @@
+//! Predictions: a pilot flies actions and missions step by step, and says where that leads.
+
+use super::action::Action;
+use super::motion::{Model, Point, Pose, Timing, sinc};
+use serde::{Deserialize, Serialize};
+use sidestep_kernel::math;
+
+/// Flight after the last way-point, in predictions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum After {
+    /// Flies straight on.
+    #[default]
+    Straight,
+    /// Goes on steering for the last way-point.
+    Pursue,
+}
+
+/// Rule by which an airplane has done with a way-point.
+///
+/// It is reached within a tolerance. But an airplane whose way-point lies inside one of its two
+/// tightest turning circles would orbit it for ever: steering for it keeps the airplane on that
+/// circle. Such a way-point counts as *passed* when it is abeam on the near side: within one turn
+/// round the circle that is so, and there the airplane is as near as it comes without flying away
+/// first.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Passing {
+    /// A way-point nearer than this is reached.
+    pub tolerance_m: f64,
+    /// Whether a way-point inside a turning circle can be passed.
+    pub passes: bool,
+}
+
+impl Passing {
+    /// Whether an airplane at `pose` has done with the way-point `goal`; its tightest turn has
+    /// this radius, and it flies `step_m` from one look to the next.
+    #[inline]
+    pub fn is_done(&self, pose: Pose, goal: Point, radius_m: f64, step_m: f64) -> bool {
+        let (dx, dy) = (goal[0] - pose.at[0], goal[1] - pose.at[1]);
+        let square = dx * dx + dy * dy;
+        if square < self.tolerance_m * self.tolerance_m {
+            return true;
+        }
+        // No point farther than a diameter lies in a turning circle.
+        if !self.passes || square >= 4.0 * radius_m * radius_m {
+            return false;
+        }
+        // The circles' centers are a radius to the left and right: the goal is inside when its
+        // distance to the nearer center is below the radius.
+        let (sin, cos) = (math::sin(pose.heading_rad), math::cos(pose.heading_rad));
+        let (ahead, left) = (cos * dx + sin * dy, cos * dy - sin * dx);
+        let is_inside = square < 2.0 * radius_m * left.abs();
+        // Abeam since the last look: on a circle, ahead changes by less than a step per step.
+        is_inside && left.abs() < radius_m && (-step_m..=0.0).contains(&ahead)
+    }
+}
+
+/// The way that an action leads.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Prediction {
+    /// Positions after 1, 2, ... steps of `dtau`.
+    pub points: Vec<Point>,
+    /// How many points count against others: those up to arrival at the last way-point.
+    pub counted: usize,
+}
+
+/// An airplane on a predicted way: a pose, and what saves computing its sine and cosine anew in
+/// every step. Equal to [`Pose::step`] but for rounding (a test holds them together).
+#[derive(Debug, Clone, Copy)]
+struct Flight {
+    pose: Pose,
+    /// Cosine and sine of the heading.
+    along: Point,
+    /// The turn rate of the last step and, for half of its turn, cosine, sine and sinc.
+    omega_rad_s: f64,
+    half_turn: [f64; 3],
+}
+
+impl Flight {
+    fn new(pose: Pose) -> Self {
+        let along = [math::cos(pose.heading_rad), math::sin(pose.heading_rad)];
+        Self { pose, along, omega_rad_s: 0.0, half_turn: [1.0, 0.0, 1.0] }
+    }
+
+    /// Whether the goal lies dead ahead, so that steering for it changes nothing any more.
+    #[inline]
+    fn heads_for(&self, goal: Point) -> bool {
+        let [dx, dy] = [goal[0] - self.pose.at[0], goal[1] - self.pose.at[1]];
+        let [c, s] = self.along;
+        let (ahead, across) = (dx * c + dy * s, dy * c - dx * s);
+        ahead > 0.0 && across.abs() <= 1e-12 * ahead
+    }
+
+    #[inline]
+    fn step(&mut self, v_m_s: f64, omega_rad_s: f64, dtau_s: f64) {
+        if omega_rad_s != self.omega_rad_s {
+            let half = 0.5 * omega_rad_s * dtau_s;
+            self.omega_rad_s = omega_rad_s;
+            self.half_turn = match omega_rad_s {
+                0.0 => [1.0, 0.0, 1.0],
+                _ => [math::cos(half), math::sin(half), sinc(half)],
+            };
+        }
+        let [c, s, sinc] = self.half_turn;
+        let turned = |[x, y]: Point| [x * c - y * s, x * s + y * c];
+        let chord_m = v_m_s * dtau_s * sinc;
+        let middle = turned(self.along);
+        self.along = turned(middle);
+        self.pose = Pose {
+            at: [self.pose.at[0] + chord_m * middle[0], self.pose.at[1] + chord_m * middle[1]],
+            heading_rad: self.pose.heading_rad + omega_rad_s * dtau_s,
+        };
+    }
+}
+
+/// Flies step by step: an action, the way-points, what comes after the last.
+#[derive(Debug, Clone, Copy)]
+pub struct Pilot<'a> {
+    /// The airplane's model.
+    pub model: &'a Model,
+    /// Its way-points.
+    pub mission: &'a [Point],
+    /// Rule by which way-points count as reached.
+    pub passing: Passing,
+    /// Flight after the last.
+    pub after: After,
+    /// Seconds per step.
+    pub dtau_s: f64,
+}
+
+impl Pilot<'_> {
+    /// The turn rate of an action in the step that begins after `flown_s` seconds of it.
+    #[inline]
+    pub fn omega_rad_s(&self, action: Action, pose: Pose, next: usize, flown_s: f64) -> f64 {
+        match action.held_rad_s(flown_s) {
+            Some(omega_rad_s) => omega_rad_s,
+            None => match (self.mission.get(next), self.after) {
+                (Some(&goal), _) => pose.steer(goal, self.model.omega_max_rad_s, self.dtau_s),
+                (None, After::Pursue) => {
+                    let last = *self.mission.last().unwrap_or(&pose.at);
+                    pose.steer(last, self.model.omega_max_rad_s, self.dtau_s)
+                }
+                (None, After::Straight) => 0.0,
+            },
+        }
+    }
+
+    /// The way-point after those that are done with at `pose`.
+    #[inline]
+    pub fn next(&self, pose: Pose, mut next: usize) -> usize {
+        let (radius_m, step_m) = (self.model.turn_radius_m(), self.model.v_m_s * self.dtau_s);
+        while let Some(&goal) = self.mission.get(next) {
+            if !self.passing.is_done(pose, goal, radius_m, step_m) {
+                break;
+            }
+            next += 1;
+        }
+        next
+    }
+
+    /// Predicts `timing.horizon` points of an action from `pose` towards way-point `next`.
+    pub fn predict(&self, action: Action, pose: Pose, next: usize, timing: &Timing) -> Prediction {
+        let mut points = Vec::with_capacity(timing.horizon);
+        let (mut flight, mut next, mut counted) = (Flight::new(pose), next, timing.horizon);
+        for k in 0..timing.horizon {
+            let flown_s = k as f64 * self.dtau_s;
+            let goal = self.mission.get(next).filter(|_| action.held_rad_s(flown_s).is_none());
+            if self.after == After::Pursue {
+                // One that comes back to its last way-point turns to the side that rounding
+                // says, so it must be the rounding of the motion itself.
+                let omega = self.omega_rad_s(action, flight.pose, next, flown_s);
+                flight.pose = flight.pose.step(self.model.v_m_s, omega, self.dtau_s);
+            } else if goal.is_some_and(|&g| flight.heads_for(g)) {
+                flight.step(self.model.v_m_s, 0.0, self.dtau_s);
+            } else {
+                let omega = self.omega_rad_s(action, flight.pose, next, flown_s);
+                flight.step(self.model.v_m_s, omega, self.dtau_s);
+            }
+            points.push(flight.pose.at);
+            if next < self.mission.len() {
+                next = self.next(flight.pose, next);
+                if next == self.mission.len() {
+                    counted = k + 1;
+                }
+            }
+        }
+        Prediction { points, counted }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::action::{Legs, actions};
+    use super::super::motion::distance_m;
+    use super::*;
+    use proptest::prelude::*;
+
+    fn model() -> Model {
+        Model { v_m_s: 35.0, omega_max_rad_s: 4f64.to_radians(), separation_m: 500.0, turns: 5 }
+    }
+
+    proptest! {
+        #[test]
+        fn two_half_steps_are_one_step(
+            x in -1e4f64..1e4, heading_rad in -3.0f64..3.0, omega in -0.1f64..0.1, dtau_s in 0.1f64..5.0,
+        ) {
+            let pose = Pose { at: [x, -x], heading_rad };
+            let once = pose.step(35.0, omega, dtau_s);
+            let twice = pose.step(35.0, omega, dtau_s / 2.0).step(35.0, omega, dtau_s / 2.0);
+            prop_assert!(distance_m(once.at, twice.at) < 1e-8);
+            prop_assert!((once.heading_rad - twice.heading_rad).abs() < 1e-12);
+        }
+
+        /// The prediction is the motion, step by step.
+        #[test]
+        fn a_predicted_way_is_the_one_that_is_flown(
+            heading_rad in -3.2f64..3.2, x in -6000.0f64..6000.0, y in -6000.0f64..6000.0, which in 0usize..36,
+        ) {
+            let model = model();
+            let mission = [[x, y], [-y, x]];
+            let pilot = Pilot {
+                model: &model,
+                mission: &mission,
+                passing: Passing { tolerance_m: 100.0, passes: true },
+                after: After::Straight,
+                dtau_s: 1.0,
+            };
+            let timing = Timing { dt_s: 5.0, dtau_s: 1.0, horizon: 200 };
+            let some = Legs { turns_s: vec![5.0, 15.0], until_s: vec![20.0, 60.0] };
+            let held = actions(&model, 5.0, &[30.0], &Legs::default());
+            let all = [held, actions(&model, 5.0, &[], &some)].concat();
+            let action = all[which % all.len()];
+            let (mut pose, mut next) = (Pose { at: [0.0, 0.0], heading_rad }, 0);
+            let predicted = pilot.predict(action, pose, next, &timing);
+            for (k, point) in predicted.points.iter().enumerate() {
+                let omega = pilot.omega_rad_s(action, pose, next, k as f64);
+                pose = pose.step(model.v_m_s, omega, 1.0);
+                next = pilot.next(pose, next);
+                prop_assert!(distance_m(*point, pose.at) < 1e-6, "step {k}");
+            }
+        }
+
+        /// Wherever a way-point lies, an airplane that proceeds has done with it before long.
+        #[test]
+        fn nobody_orbits_a_way_point_for_ever(
+            heading_rad in -3.2f64..3.2, x in -3000.0f64..3000.0, y in -3000.0f64..3000.0,
+            tolerance_m in 1.0f64..100.0,
+        ) {
+            let model = model();
+            let mission = [[x, y]];
+            let pilot = Pilot {
+                model: &model,
+                mission: &mission,
+                passing: Passing { tolerance_m, passes: true },
+                after: After::Straight,
+                dtau_s: 1.0,
+            };
+            let pose = Pose { at: [0.0, 0.0], heading_rad };
+            let timing = Timing { dt_s: 5.0, dtau_s: 1.0, horizon: 400 };
+            let flown = pilot.predict(Action::Proceed, pose, 0, &timing);
+            prop_assert!(flown.counted < 400, "still flying to {mission:?}");
+            // It ends within the tolerance, or where it was about as near as it came at all.
+            let apart_m = |k: usize| distance_m(flown.points[k], mission[0]);
+            let last = flown.counted - 1;
+            let nearest_m = (0..=last).map(apart_m).fold(f64::INFINITY, f64::min);
+            prop_assert!(apart_m(last) < tolerance_m || apart_m(last) < nearest_m + 35.0);
+        }
+    }
+}

@@ -1,0 +1,178 @@
+//! Recorded ways: where an airplane was at any time, and what of its way is left.
+
+use super::motion::{Point, Pose, distance_m};
+use sidestep_kernel::math;
+
+/// Way-points along the rest of a track are this far apart in time.
+const WAY_POINT_EVERY_S: f64 = 120.0;
+
+/// Place of an airplane at one time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TrackPoint {
+    /// Seconds after the start of the scenario.
+    pub t_s: f64,
+    /// Position.
+    pub at: Point,
+    /// Altitude.
+    pub altitude_m: f64,
+}
+
+/// A recorded way: straight and at constant speed between its points.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Track {
+    points: Vec<TrackPoint>,
+    /// Heading from each point to the next one elsewhere.
+    headings_rad: Vec<f64>,
+}
+
+impl Track {
+    /// A track of at least two points with finite numbers and rising times; `None` otherwise.
+    pub fn new(points: Vec<TrackPoint>) -> Option<Self> {
+        let finite =
+            |p: &TrackPoint| [p.t_s, p.at[0], p.at[1], p.altitude_m].iter().all(|v| v.abs() <= 1e9);
+        let rises = points.windows(2).all(|pair| pair[0].t_s < pair[1].t_s);
+        let is_track = points.len() >= 2 && rises && points.iter().all(finite);
+        is_track.then(|| Self { headings_rad: headings_rad(&points), points })
+    }
+
+    /// Its beginning, seconds after the start.
+    pub fn begins_s(&self) -> f64 {
+        self.points[0].t_s
+    }
+
+    /// Its end, seconds after the start.
+    pub fn ends_s(&self) -> f64 {
+        self.points[self.points.len() - 1].t_s
+    }
+
+    /// Whether the airplane was there at a time.
+    pub fn covers(&self, t_s: f64) -> bool {
+        (self.begins_s()..=self.ends_s()).contains(&t_s)
+    }
+
+    /// Returns its pose; before the beginning and after the end as there.
+    pub fn pose_at(&self, t_s: f64) -> Pose {
+        let (k, part) = self.between(t_s);
+        let ([x0, y0], [x1, y1]) = (self.points[k].at, self.points[k + 1].at);
+        let at = [x0 + part * (x1 - x0), y0 + part * (y1 - y0)];
+        Pose { at, heading_rad: self.headings_rad[k] }
+    }
+
+    /// Returns its altitude.
+    pub fn altitude_at_m(&self, t_s: f64) -> f64 {
+        let (k, part) = self.between(t_s);
+        let (from_m, to_m) = (self.points[k].altitude_m, self.points[k + 1].altitude_m);
+        from_m + part * (to_m - from_m)
+    }
+
+    /// The last point before a time that has a next one, and the part of the way to that.
+    fn between(&self, t_s: f64) -> (usize, f64) {
+        let after = self.points.partition_point(|p| p.t_s <= t_s);
+        let k = after.clamp(1, self.points.len() - 1) - 1;
+        let (from_s, to_s) = (self.points[k].t_s, self.points[k + 1].t_s);
+        (k, ((t_s - from_s) / (to_s - from_s)).clamp(0.0, 1.0))
+    }
+
+    /// Way-points for whoever flies on from where it was at a time: one every two minutes, and
+    /// the last point.
+    pub fn rest(&self, from_s: f64) -> Vec<Point> {
+        let mut due_s = from_s + WAY_POINT_EVERY_S;
+        let mut way_points: Vec<Point> = Vec::new();
+        for (k, point) in self.points.iter().enumerate() {
+            if k + 1 == self.points.len() || point.t_s >= due_s {
+                way_points.push(point.at);
+                due_s = point.t_s + WAY_POINT_EVERY_S;
+            }
+        }
+        way_points
+    }
+
+    /// Mean speed over the ground from a time to the end; over the whole track after that.
+    pub fn mean_speed_m_s(&self, from_s: f64) -> f64 {
+        let from_s =
+            if from_s < self.ends_s() { from_s.max(self.begins_s()) } else { self.begins_s() };
+        let mut at = self.pose_at(from_s).at;
+        let mut length_m = 0.0;
+        for point in self.points.iter().filter(|p| p.t_s > from_s) {
+            length_m += distance_m(at, point.at);
+            at = point.at;
+        }
+        length_m / (self.ends_s() - from_s)
+    }
+
+    /// The greatest speed over the ground.
+    pub fn top_speed_m_s(&self) -> f64 {
+        let speed =
+            |pair: &[TrackPoint]| distance_m(pair[0].at, pair[1].at) / (pair[1].t_s - pair[0].t_s);
+        self.points.windows(2).map(speed).fold(0.0, f64::max)
+    }
+}
+
+/// An airplane that is recorded at one place twice keeps the heading in which it goes on.
+fn headings_rad(points: &[TrackPoint]) -> Vec<f64> {
+    let bearing = |pair: &[TrackPoint]| {
+        let (dx, dy) = (pair[1].at[0] - pair[0].at[0], pair[1].at[1] - pair[0].at[1]);
+        (dx != 0.0 || dy != 0.0).then(|| math::atan2(dy, dx))
+    };
+    let mut known: Vec<Option<f64>> = points.windows(2).map(bearing).collect();
+    for k in (1..known.len()).rev() {
+        known[k - 1] = known[k - 1].or(known[k]);
+    }
+    let mut before = 0.0;
+    let heading = |heading_rad: Option<f64>| {
+        before = heading_rad.unwrap_or(before);
+        before
+    };
+    known.into_iter().map(heading).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn track(points: &[[f64; 4]]) -> Option<Track> {
+        let point =
+            |&[t_s, x, y, altitude_m]: &[f64; 4]| TrackPoint { t_s, at: [x, y], altitude_m };
+        Track::new(points.iter().map(point).collect())
+    }
+
+    #[test]
+    fn between_two_points_all_is_linear_in_time() {
+        let track = track(&[[10.0, 0.0, 0.0, 900.0], [20.0, 0.0, 1000.0, 1100.0]]).expect("valid");
+        assert_eq!(track.pose_at(13.0).at, [0.0, 300.0]);
+        assert_eq!(track.altitude_at_m(15.0), 1000.0);
+        assert_eq!(track.pose_at(13.0).heading_rad, std::f64::consts::FRAC_PI_2);
+        assert_eq!((track.pose_at(0.0).at, track.pose_at(99.0).at), ([0.0, 0.0], [0.0, 1000.0]));
+        assert!(track.covers(10.0) && track.covers(20.0) && !track.covers(20.1));
+        assert_eq!((track.top_speed_m_s(), track.mean_speed_m_s(15.0)), (100.0, 100.0));
+    }
+
+    #[test]
+    fn the_rest_of_a_way_ends_where_the_track_does() {
+        let points: Vec<[f64; 4]> =
+            (0..40).map(|k| [f64::from(k) * 10.0, f64::from(k), 0.0, 0.0]).collect();
+        let track = track(&points).expect("valid");
+        assert_eq!(track.rest(0.0), [[12.0, 0.0], [24.0, 0.0], [36.0, 0.0], [39.0, 0.0]]);
+        assert_eq!(track.rest(385.0), [[39.0, 0.0]]);
+    }
+
+    #[test]
+    fn who_stands_keeps_the_heading_in_which_it_goes_on() {
+        let still = [
+            [0.0, 5.0, 0.0, 0.0],
+            [1.0, 5.0, 0.0, 0.0],
+            [2.0, 4.0, 0.0, 0.0],
+            [3.0, 4.0, 0.0, 0.0],
+        ];
+        let track = track(&still).expect("valid");
+        let west = std::f64::consts::PI;
+        assert_eq!([0.5, 1.5, 2.5].map(|t_s| track.pose_at(t_s).heading_rad), [west; 3]);
+    }
+
+    #[test]
+    fn what_is_no_track_is_refused() {
+        assert_eq!(track(&[[0.0; 4]]), None);
+        assert_eq!(track(&[[0.0; 4], [0.0; 4]]), None);
+        assert_eq!(track(&[[0.0; 4], [1.0, f64::NAN, 0.0, 0.0]]), None);
+    }
+}

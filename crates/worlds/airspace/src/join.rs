@@ -1,0 +1,51 @@
+//! Groups: airplanes that have to mind each other decide together.
+
+use super::Turn;
+use super::flight::{Levels, Task, distance_m};
+use sidestep_kernel::Slot;
+use sidestep_kernel::conflict::Groups;
+use std::ops::Range;
+
+/// Joins each of `bodies` with those before it that it has to mind.
+pub(super) fn join(turn: &mut Turn<'_>, bodies: Range<usize>, groups: &Groups) {
+    let Turn { world, state, now, .. } = *turn;
+    for slot in bodies.map(|slot| slot as Slot) {
+        if !state.is_there(world, slot, now) {
+            continue;
+        }
+        let at = state.airplanes[slot as usize].pose().at;
+        state.neighborhood.around(at, now, |other| {
+            if other < slot && is_near(turn, slot, other) {
+                groups.join(slot, other);
+            }
+        });
+    }
+}
+
+/// Whether two airplanes have to mind each other.
+fn is_near(turn: &Turn<'_>, a: Slot, b: Slot) -> bool {
+    let Turn { world, state, .. } = turn;
+    let at = |slot: Slot| state.airplanes[slot as usize].pose().at;
+    distance_m(at(a), at(b)) <= world.look_m(a as usize, b as usize)
+        && levels(turn, a).meets(&levels(turn, b), world.vertical_m)
+}
+
+/// All levels that an airplane is on, or is told to go to by now.
+fn levels(turn: &Turn<'_>, slot: Slot) -> Levels {
+    let Turn { world, state, now, .. } = turn;
+    if world.is_replayed(slot, *now) {
+        return Levels::ALL;
+    }
+    let cell = &state.airplanes[slot as usize];
+    let done = cell.orders.get();
+    let mut levels =
+        Levels::between(cell.altitude_m.get(), world.stage(slot, done.into()).altitude_m);
+    let orders = &world.airplanes[slot as usize].orders;
+    let due = orders.iter().skip(done.into()).take_while(|o| o.at_s <= world.starts_s(*now));
+    for order in due {
+        if let Task::Altitude { altitude_m, .. } = order.task {
+            levels = levels.with(altitude_m);
+        }
+    }
+    levels
+}

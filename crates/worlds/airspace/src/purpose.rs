@@ -1,0 +1,21 @@
+//! Purposes of random draws of this world.
+
+use sidestep_kernel::stream::{Purpose, Streams};
+use sidestep_kernel::{Cycle, Slot};
+
+/// Starts and goals of generated airplanes.
+pub(crate) const PLACE: Purpose = Purpose(1);
+/// Samples of the optimizer, one stream per airplane and cycle.
+pub(crate) const SAMPLE: Purpose = Purpose(2);
+/// Errors of known positions.
+pub(crate) const POSITION: Purpose = Purpose(3);
+/// Disturbed headings.
+pub(crate) const HEADING: Purpose = Purpose(4);
+/// Faults of messages.
+pub(crate) const NETWORK: Purpose = Purpose(5);
+
+/// Returns the `k`-th uniform number in [0, 1) of an airplane's samples in a cycle.
+pub(crate) fn sample(streams: &Streams, slot: Slot, now: Cycle, k: u64) -> f64 {
+    let words = streams.block(slot, now, SAMPLE, (k / 4) as u16);
+    f64::from(words[(k % 4) as usize]) / 4_294_967_296.0
+}

@@ -1,0 +1,89 @@
+//! Fallbacks of airplanes that come in, or that are about to fly otherwise.
+
+use super::flyer::{Flyer, SLACK_M};
+use super::orbit::Side;
+use crate::flight::distance_m;
+
+/// Sides for first fallbacks that are pairwise apart, as far as there are any, and the pairs that
+/// are not: they start too close.
+pub(crate) fn first_fallbacks(flyers: &[Flyer]) -> (Vec<Side>, Vec<(usize, usize)>) {
+    entry_fallbacks(flyers, |_| true)
+}
+
+/// The same among airplanes some of which have their fallbacks already and keep them: only those
+/// that `enters` choose, and only pairs with one of them are named.
+pub(crate) fn entry_fallbacks(
+    flyers: &[Flyer],
+    enters: impl Fn(usize) -> bool,
+) -> (Vec<Side>, Vec<(usize, usize)>) {
+    let clash = |i: usize, a: Side, j: usize, b: Side| {
+        !flyers[i].orbit(a).stays_apart(&flyers[j].orbit(b), flyers[i].gap_m(&flyers[j]))
+    };
+    let near = near_each_other(flyers);
+    let mut sides: Vec<Side> = flyers.iter().map(|flyer| flyer.fallback).collect();
+    let clashes = |sides: &[Side], i: usize, side: Side| {
+        near[i].iter().filter(|&&j| clash(i, side, j, sides[j])).count()
+    };
+    // Whoever has fewer clashes on the other side changes over; clashes only become fewer.
+    let mut changed = true;
+    while changed {
+        changed = false;
+        for i in (0..sides.len()).filter(|&i| enters(i)) {
+            let better = Side::BOTH.into_iter().min_by_key(|&side| clashes(&sides, i, side));
+            if let Some(better) = better
+                && clashes(&sides, i, better) < clashes(&sides, i, sides[i])
+            {
+                sides[i] = better;
+                changed = true;
+            }
+        }
+    }
+    let pairs = near.iter().enumerate().flat_map(|(i, near)| near.iter().map(move |&j| (i, j)));
+    let left = pairs
+        .filter(|&(i, j)| i < j && (enters(i) || enters(j)) && clash(i, sides[i], j, sides[j]))
+        .collect();
+    (sides, left)
+}
+
+/// The side on which an airplane that flies as `now` and is about to fly as `changed` has an orbit
+/// apart from the stored fallbacks of others, if there is one; rather the one it has stored.
+pub(crate) fn side_apart(
+    now: &Flyer,
+    changed: &Flyer,
+    others: impl Iterator<Item = Flyer>,
+) -> Option<Side> {
+    // A pair that came in too close is so as it is now, not as it would be.
+    let minds = |other: &Flyer| changed.is_on_level(other) && !now.is_left_alone_with(other);
+    let minded: Vec<Flyer> = others.filter(minds).collect();
+    let is_apart = |side: &Side| {
+        minded.iter().all(|other| {
+            let theirs = other.orbit(other.fallback);
+            changed.orbit(*side).stays_apart(&theirs, changed.gap_m(other))
+        })
+    };
+    let sides = Side::BOTH.into_iter().filter(|&side| side != changed.fallback);
+    [changed.fallback].into_iter().chain(sides).find(is_apart)
+}
+
+/// Per airplane all others whose orbits might come too near its own, by rising number. Sorted by
+/// x, only neighbors in that order have to be looked at.
+fn near_each_other(flyers: &[Flyer]) -> Vec<Vec<usize>> {
+    let reach_m = |f: &Flyer| 2.0 * f.v_m_s / f.omega_max_rad_s + f.separation_m + SLACK_M;
+    let widest_m = flyers.iter().map(reach_m).fold(0.0, f64::max);
+    let x = |i: usize| flyers[i].pose.at[0];
+    let mut by_x: Vec<usize> = (0..flyers.len()).collect();
+    by_x.sort_unstable_by(|&a, &b| x(a).total_cmp(&x(b)));
+    let mut near = vec![Vec::new(); flyers.len()];
+    for (k, &i) in by_x.iter().enumerate() {
+        let beside = by_x[k + 1..].iter().take_while(|&&j| x(j) - x(i) < 2.0 * widest_m);
+        for &j in beside {
+            let apart_m = distance_m(flyers[i].pose.at, flyers[j].pose.at);
+            if flyers[i].minds(&flyers[j]) && apart_m < reach_m(&flyers[i]) + reach_m(&flyers[j]) {
+                near[i].push(j);
+                near[j].push(i);
+            }
+        }
+    }
+    near.iter_mut().for_each(|all| all.sort_unstable());
+    near
+}

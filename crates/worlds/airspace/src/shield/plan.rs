@@ -1,0 +1,100 @@
+//! Plans: a way for one `dt`, and an orbit ever after.
+
+use super::flyer::Flyer;
+use super::orbit::{Orbit, Side, stays_apart};
+use crate::flight::{Pose, distance_m};
+use serde::{Deserialize, Serialize};
+
+/// Motion for one `dt`: a turn rate per step of `dtau`.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Way {
+    /// Turn rate in each step.
+    pub omegas_rad_s: Vec<f64>,
+}
+
+/// A way, and an orbit on which to wait after that.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Plan {
+    flyer: Flyer,
+    /// Poses at the beginning of each step, and at the end.
+    poses: Vec<Pose>,
+    omegas_rad_s: Vec<f64>,
+    dtau_s: f64,
+    orbit: Orbit,
+    /// Number of the candidate, `None` for the fallback.
+    pub(super) candidate: Option<usize>,
+    pub(super) side: Side,
+}
+
+impl Plan {
+    /// A way, and then an orbit to a side.
+    pub(crate) fn new(flyer: Flyer, way: &Way, dtau_s: f64, side: Side) -> Self {
+        Self::of(flyer, way.omegas_rad_s.clone(), dtau_s, (None, side))
+    }
+
+    pub(super) fn of(
+        flyer: Flyer,
+        omegas_rad_s: Vec<f64>,
+        dtau_s: f64,
+        orbit: (Option<usize>, Side),
+    ) -> Self {
+        let mut poses = vec![flyer.pose];
+        for &omega in &omegas_rad_s {
+            let last = poses[poses.len() - 1];
+            poses.push(last.step(flyer.v_m_s, omega, dtau_s));
+        }
+        let (candidate, side) = orbit;
+        let end = poses[poses.len() - 1];
+        let orbit = Orbit::from(end, flyer.v_m_s, side.sign() * flyer.omega_max_rad_s);
+        Self { flyer, poses, omegas_rad_s, dtau_s, orbit, candidate, side }
+    }
+
+    /// The stored fallback, for some steps and ever after.
+    pub(crate) fn fallback(flyer: Flyer, steps: usize, dtau_s: f64) -> Self {
+        let omega = flyer.fallback.sign() * flyer.omega_max_rad_s;
+        Self::of(flyer, vec![omega; steps], dtau_s, (None, flyer.fallback))
+    }
+
+    /// Returns the pose at the end of `dt`.
+    pub(crate) fn end(&self) -> Pose {
+        self.poses[self.poses.len() - 1]
+    }
+
+    /// The side of the orbit.
+    pub(crate) fn side(&self) -> Side {
+        self.side
+    }
+
+    /// Whether two plans stay apart during `dt` and on the orbits ever after.
+    pub(crate) fn is_compatible(&self, other: &Self) -> bool {
+        if !self.flyer.minds(&other.flyer) {
+            return true;
+        }
+        let gap_m = self.flyer.gap_m(&other.flyer);
+        let reach = |plan: &Self| {
+            let dt_s = plan.dtau_s * plan.omegas_rad_s.len() as f64;
+            plan.flyer.v_m_s * dt_s + 2.0 * plan.orbit.radius_m
+        };
+        let now_m = distance_m(self.poses[0].at, other.poses[0].at);
+        if now_m >= gap_m + reach(self) + reach(other) {
+            return true;
+        }
+        self.orbit.stays_apart(&other.orbit, gap_m) && self.ways_stay_apart(other, gap_m)
+    }
+
+    fn ways_stay_apart(&self, other: &Self, gap_m: f64) -> bool {
+        let closing_m_s = self.flyer.v_m_s + other.flyer.v_m_s;
+        (0..self.omegas_rad_s.len()).all(|k| {
+            let at = |plan: &Self, t_s: f64| {
+                plan.poses[k].step(plan.flyer.v_m_s, plan.omegas_rad_s[k], t_s).at
+            };
+            let apart = |t_s: f64| distance_m(at(self, t_s), at(other, t_s));
+            stays_apart(&apart, (0.0, self.dtau_s), closing_m_s, gap_m)
+        })
+    }
+
+    /// Whether this is the stored fallback.
+    pub(super) fn is_fallback(&self) -> bool {
+        self.candidate.is_none()
+    }
+}

@@ -1,0 +1,145 @@
+//! The search for plans that are pairwise compatible.
+
+use super::flyer::Flyer;
+use super::orbit::Side;
+use super::plan::{Plan, Way};
+
+/// Decision of the shield for one airplane.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Decision {
+    /// Number of the candidate to fly, `None` for the stored fallback.
+    pub candidate: Option<usize>,
+    /// The fallback to store after that.
+    pub fallback: Side,
+}
+
+/// Certainty that everybody will fly the plan it is given.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Certainty {
+    /// Everybody will.
+    Sure,
+    /// Each may fly its stored fallback instead: plans have to keep apart from those of others
+    /// too. They are compatible in whatever mixture they are flown.
+    Mixable,
+}
+
+/// Decides for airplanes whose stored fallbacks are pairwise apart. `candidates[i]` are the ways
+/// that airplane `i` may fly, the one it wants first, `steps` of `dtau_s` each; with none it
+/// stays on its fallback.
+pub fn filter(
+    flyers: &[Flyer],
+    candidates: &[Vec<Way>],
+    frame: (usize, f64),
+    certainty: Certainty,
+) -> Vec<Decision> {
+    let mut search = Search::new(flyers, candidates, frame, certainty);
+    search.until_compatible();
+    search.better_again();
+    search.plans.iter().map(|p| Decision { candidate: p.candidate, fallback: p.side }).collect()
+}
+
+struct Search<'a> {
+    flyers: &'a [Flyer],
+    candidates: &'a [Vec<Way>],
+    dtau_s: f64,
+    certainty: Certainty,
+    plans: Vec<Plan>,
+    fallbacks: Vec<Plan>,
+    /// Airplanes by rising rank.
+    by_rank: Vec<usize>,
+}
+
+impl<'a> Search<'a> {
+    fn new(
+        flyers: &'a [Flyer],
+        candidates: &'a [Vec<Way>],
+        (steps, dtau_s): (usize, f64),
+        certainty: Certainty,
+    ) -> Self {
+        let fallbacks: Vec<Plan> =
+            flyers.iter().map(|flyer| Plan::fallback(*flyer, steps, dtau_s)).collect();
+        let first = |((flyer, ways), fallback): ((&Flyer, &Vec<Way>), &Plan)| match ways.first() {
+            Some(way) => {
+                Plan::of(*flyer, way.omegas_rad_s.clone(), dtau_s, (Some(0), flyer.fallback))
+            }
+            None => fallback.clone(),
+        };
+        let plans = flyers.iter().zip(candidates).zip(&fallbacks).map(first).collect();
+        let mut by_rank: Vec<usize> = (0..flyers.len()).collect();
+        by_rank.sort_unstable_by_key(|&i| flyers[i].rank);
+        Self { flyers, candidates, dtau_s, certainty, plans, fallbacks, by_rank }
+    }
+
+    /// Whether a plan of airplane `i` goes with what `j` may fly.
+    fn fits(&self, i: usize, plan: &Plan, j: usize) -> bool {
+        plan.is_compatible(&self.plans[j])
+            && (self.certainty == Certainty::Sure
+                || (plan.is_compatible(&self.fallbacks[j])
+                    && self.fallbacks[i].is_compatible(&self.plans[j])))
+    }
+
+    fn until_compatible(&mut self) {
+        let mut pairs = self.incompatible_pairs();
+        while let Some(loser) = self.loser(&pairs) {
+            let other = self.another_plan(loser);
+            self.plans[loser] = other.unwrap_or_else(|| self.fallbacks[loser].clone());
+            pairs.retain(|&(i, j)| i != loser && j != loser);
+            pairs.extend(self.incompatible_with(loser));
+        }
+    }
+
+    /// The airplane of lowest rank that has to give way in some pair.
+    fn loser(&self, pairs: &[(usize, usize)]) -> Option<usize> {
+        let gives_way = |i: usize| {
+            !self.plans[i].is_fallback()
+                && pairs.iter().any(|&(a, b)| {
+                    let other = if a == i { b } else { a };
+                    (a == i || b == i)
+                        && (self.plans[other].is_fallback()
+                            || self.flyers[other].rank > self.flyers[i].rank)
+                })
+        };
+        self.by_rank.iter().copied().find(|&i| gives_way(i))
+    }
+
+    fn incompatible_pairs(&self) -> Vec<(usize, usize)> {
+        let n = self.plans.len();
+        let all = (0..n).flat_map(|i| (i + 1..n).map(move |j| (i, j)));
+        all.filter(|&(i, j)| !self.fits(i, &self.plans[i], j)).collect()
+    }
+
+    fn incompatible_with(&self, i: usize) -> Vec<(usize, usize)> {
+        let others = (0..self.plans.len()).filter(|&j| j != i);
+        others.filter(|&j| !self.fits(i, &self.plans[i], j)).map(|j| (i, j)).collect()
+    }
+
+    /// The first plan of an airplane that is compatible with all present ones.
+    fn another_plan(&self, i: usize) -> Option<Plan> {
+        let flyer = self.flyers[i];
+        let others: Vec<usize> = (0..self.plans.len()).filter(|&j| j != i).collect();
+        let fits = |plan: &Plan| others.iter().all(|&j| self.fits(i, plan, j));
+        self.candidates[i].iter().enumerate().find_map(|(k, way)| {
+            Side::BOTH
+                .into_iter()
+                .map(|side| Plan::of(flyer, way.omegas_rad_s.clone(), self.dtau_s, (Some(k), side)))
+                .find(|plan| fits(plan))
+        })
+    }
+
+    /// By falling rank, those that have fallen back try once more, as long as that helps anyone.
+    fn better_again(&mut self) {
+        let mut helped = true;
+        while helped {
+            helped = false;
+            for k in (0..self.by_rank.len()).rev() {
+                let i = self.by_rank[k];
+                if self.plans[i].is_fallback()
+                    && let Some(plan) = self.another_plan(i)
+                {
+                    self.plans[i] = plan;
+                    helped = true;
+                }
+            }
+        }
+    }
+}

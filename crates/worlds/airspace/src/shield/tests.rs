@@ -1,0 +1,192 @@
+//! The steps of the proof, as properties.
+
+use super::orbit::Orbit;
+use super::*;
+use crate::flight::{Levels, Point, Pose, distance_m};
+use proptest::prelude::*;
+
+const DTAU_S: f64 = 1.0;
+const STEPS: usize = 5;
+
+fn flyer(x: f64, y: f64, heading_rad: f64, rank: u64) -> Flyer {
+    Flyer {
+        id: rank as u32,
+        pose: Pose { at: [x, y], heading_rad },
+        v_m_s: 35.0,
+        omega_max_rad_s: 4f64.to_radians(),
+        separation_m: 500.0,
+        levels: Levels::at(0.0),
+        vertical_m: 300.0,
+        fallback: Side::Left,
+        came_too_close: false,
+        rank,
+    }
+}
+
+fn some_flyers() -> impl Strategy<Value = Vec<Flyer>> {
+    prop::collection::vec((-4000.0f64..4000.0, -4000.0f64..4000.0, -3.1f64..3.1, 0.5f64..1.0), 2..9)
+        .prop_map(|all| {
+            let build = |(i, (x, y, psi, slow)): (usize, (f64, f64, f64, f64))| {
+                // Every other airplane has a speed and turn rate of its own.
+                let mut flyer = flyer(x, y, psi, (i * 7 % 11) as u64);
+                if i % 3 == 2 {
+                    flyer.v_m_s *= slow;
+                    flyer.omega_max_rad_s *= 1.0 + slow;
+                }
+                flyer
+            };
+            all.into_iter().enumerate().map(build).collect()
+        })
+}
+
+/// Airplanes with fallbacks that are apart: those that clash are left out.
+fn with_fallbacks(mut flyers: Vec<Flyer>) -> Vec<Flyer> {
+    loop {
+        let (sides, clashes) = first_fallbacks(&flyers);
+        match clashes.first() {
+            Some(&(i, _)) => drop(flyers.remove(i)),
+            None => {
+                flyers.iter_mut().zip(sides).for_each(|(f, side)| f.fallback = side);
+                return flyers;
+            }
+        }
+    }
+}
+
+fn orbit_of(flyer: &Flyer) -> Orbit {
+    Orbit::from(flyer.pose, flyer.v_m_s, flyer.fallback.sign() * flyer.omega_max_rad_s)
+}
+
+fn nearest_on_orbits(flyers: &[Flyer], seconds: usize) -> f64 {
+    let orbits: Vec<Orbit> = flyers.iter().map(orbit_of).collect();
+    let mut nearest = f64::INFINITY;
+    for t in 0..seconds * 4 {
+        for (i, a) in orbits.iter().enumerate() {
+            for b in &orbits[i + 1..] {
+                let t_s = t as f64 / 4.0;
+                nearest = nearest.min(distance_m(a.at(t_s), b.at(t_s)));
+            }
+        }
+    }
+    nearest
+}
+
+proptest! {
+    /// Step 1 of the proof: first fallbacks without clashes stay apart for ever.
+    #[test]
+    fn first_fallbacks_stay_apart(flyers in some_flyers()) {
+        let flyers = with_fallbacks(flyers);
+        prop_assert!(nearest_on_orbits(&flyers, 400) >= 500.0);
+    }
+
+    /// Steps 2 to 4: whatever is wanted, what is flown keeps apart, and what is stored
+    /// keeps the invariant. Mixable plans do in every mixture with fallbacks.
+    #[test]
+    fn a_filtered_step_keeps_separation_and_the_invariant(
+        flyers in some_flyers(),
+        wishes in prop::collection::vec(prop::collection::vec(-1.0f64..1.0, 0..4), 9),
+        follow in prop::collection::vec(any::<bool>(), 9),
+        mixable in any::<bool>(),
+    ) {
+        let flyers = with_fallbacks(flyers);
+        let candidates: Vec<Vec<Way>> = flyers.iter().zip(&wishes).map(|(f, wishes)| {
+            let way = |part: &f64| Way { omegas_rad_s: vec![part * f.omega_max_rad_s; STEPS] };
+            wishes.iter().map(way).collect()
+        }).collect();
+        let certainty = if mixable { Certainty::Mixable } else { Certainty::Sure };
+        let mut decisions = filter(&flyers, &candidates, (STEPS, DTAU_S), certainty);
+        if mixable {
+            for ((decision, follows), flyer) in decisions.iter_mut().zip(follow).zip(&flyers) {
+                if !follows {
+                    *decision = Decision { candidate: None, fallback: flyer.fallback };
+                }
+            }
+        }
+        let omega = |i: usize, k: usize| match decisions[i].candidate {
+            Some(c) => candidates[i][c].omegas_rad_s[k],
+            None => flyers[i].fallback.sign() * flyers[i].omega_max_rad_s,
+        };
+        let mut now = flyers.clone();
+        for k in 0..STEPS {
+            for part in 1..=20 {
+                let t_s = DTAU_S * f64::from(part) / 20.0;
+                let at: Vec<Point> = now.iter().enumerate()
+                    .map(|(i, f)| f.pose.step(f.v_m_s, omega(i, k), t_s).at).collect();
+                for i in 0..at.len() {
+                    for j in i + 1..at.len() {
+                        prop_assert!(distance_m(at[i], at[j]) >= 500.0);
+                    }
+                }
+            }
+            for (i, f) in now.iter_mut().enumerate() {
+                f.pose = f.pose.step(f.v_m_s, omega(i, k), DTAU_S);
+            }
+        }
+        now.iter_mut().zip(&decisions).for_each(|(f, d)| f.fallback = d.fallback);
+        prop_assert!(nearest_on_orbits(&now, 400) >= 500.0);
+    }
+
+    /// Whoever is far from everybody flies what it wants.
+    #[test]
+    fn nobody_falls_back_without_need(x in 20_000.0f64..1e6, part in -1.0f64..1.0) {
+        let flyers = [flyer(0.0, 0.0, 0.0, 0), flyer(x, 0.0, 3.0, 1)];
+        let way = || Way { omegas_rad_s: vec![part * flyers[0].omega_max_rad_s; STEPS] };
+        let wishes = [vec![way()], vec![way()]];
+        let decisions = filter(&flyers, &wishes, (STEPS, DTAU_S), Certainty::Sure);
+        prop_assert!(decisions.iter().all(|d| d.candidate == Some(0)));
+    }
+}
+
+#[test]
+fn who_enters_chooses_a_side_apart_from_the_stored_ones_and_nobody_else_does() {
+    // On its left the newcomer would orbit over the other, on its right it would not.
+    let stored = flyer(0.0, 2002.0, std::f64::consts::PI, 0);
+    let flyers = [stored, flyer(0.0, 0.0, 0.0, 1)];
+    let (sides, too_close) = entry_fallbacks(&flyers, |i| i == 1);
+    assert_eq!((sides, too_close), (vec![Side::Left, Side::Right], vec![]));
+    let near = [stored, flyer(100.0, 2002.0, 0.0, 1), flyer(50.0, 2030.0, 0.0, 2)];
+    let (sides, too_close) = entry_fallbacks(&near, |i| i == 2);
+    assert_eq!(sides[..2], [Side::Left; 2]);
+    assert_eq!(too_close, [(0, 2), (1, 2)], "the pair that was there before is not named");
+}
+
+#[test]
+fn two_that_came_in_too_close_are_left_to_the_method_and_nobody_else_is() {
+    let close = |x: f64, rank: u64| Flyer { came_too_close: true, ..flyer(x, 0.0, 0.0, rank) };
+    let flyers = [close(0.0, 0), close(100.0, 1)];
+    let straight = || vec![Way { omegas_rad_s: vec![0.0; STEPS] }];
+    let wanted = filter(&flyers, &[straight(), straight()], (STEPS, DTAU_S), Certainty::Sure);
+    assert!(wanted.iter().all(|d| d.candidate == Some(0)), "{wanted:?}");
+    // In each other's way, but with fallbacks that are apart.
+    let mut apart = [close(0.0, 0), close(0.0, 1)];
+    apart[1].pose = Pose { at: [0.0, 620.0], heading_rad: -std::f64::consts::FRAC_PI_2 };
+    apart.iter_mut().for_each(|f| f.fallback = Side::Right);
+    assert!(nearest_on_orbits(&apart, 400) > 500.0);
+    let kept = filter(&apart, &[straight(), straight()], (STEPS, DTAU_S), Certainty::Sure);
+    assert!(kept.iter().any(|d| d.candidate.is_none()), "{kept:?}");
+}
+
+#[test]
+fn a_change_is_refused_when_neither_orbit_is_apart() {
+    let quick_turns = 6f64.to_radians();
+    let other = Flyer { omega_max_rad_s: quick_turns, ..flyer(1500.0, -100.0, 0.0, 0) };
+    let slow = flyer(0.0, 0.0, 0.0, 1);
+    let beside = |v_m_s: f64| side_apart(&slow, &Flyer { v_m_s, ..slow }, [other].into_iter());
+    assert_eq!(beside(35.0), Some(Side::Left));
+    assert_eq!(beside(150.0), None);
+    let above = Flyer { levels: Levels::at(1000.0), v_m_s: 150.0, ..slow };
+    assert_eq!(side_apart(&slow, &above, [other].into_iter()), Some(Side::Left));
+    // Both came in too close, but not to each other.
+    let came_too_close = |f: Flyer| Flyer { came_too_close: true, ..f };
+    let fast = came_too_close(Flyer { v_m_s: 150.0, ..slow });
+    let others = [came_too_close(other)].into_iter();
+    assert_eq!(side_apart(&came_too_close(slow), &fast, others), None);
+    let climbing = Flyer { levels: Levels::between(0.0, 1000.0), ..above };
+    assert_eq!(side_apart(&slow, &climbing, [other].into_iter()), None);
+}
+
+#[test]
+fn airplanes_that_start_too_close_are_named() {
+    let flyers = [flyer(0.0, 0.0, 0.0, 0), flyer(5e4, 0.0, 0.0, 1), flyer(100.0, 0.0, 0.0, 2)];
+    assert_eq!(first_fallbacks(&flyers).1, [(0, 2)]);
+}
