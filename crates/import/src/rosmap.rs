@@ -46,6 +46,7 @@ fn pixel_map(meta: &Metadata, image: &Bitmap) -> PixelMap {
 mod tests {
     use std::path::PathBuf;
 
+    use super::super::map_yaml::{Mode, Reading};
     use super::*;
     use Cell::{Free, Unknown, Wall};
     use sidestep_map::Cell;

@@ -4,6 +4,7 @@ use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+use sidestep_kernel::InputError;
 use sidestep_kernel::ports::RecordError;
 
 /// The name under which a file or folder grows until it is whole: `NAME.partial`.

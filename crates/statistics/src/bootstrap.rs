@@ -7,8 +7,8 @@
 //! with `1 / n`, where that of Student's interval falls with `1 / sqrt(n)` on skewed values.
 
 use super::Interval;
+use super::moments::percentile;
 use super::moments::{is_constant, mean, sum};
-use super::quantile::percentile;
 use sidestep_kernel::stream::{Purpose, Streams};
 use sidestep_kernel::{EntityId, Seed};
 use statrs::distribution::{ContinuousCDF, Normal};

@@ -236,7 +236,7 @@ proptest! {
 
 /// Columns of every type with `rows` rows; of those that may be missing, every so many are.
 fn every_type(rows: u64, missing: u64) -> (TableSchema, Vec<Values>) {
-    let value = |k: u64| (k % missing != 1).then_some(k);
+    let value = |k: u64| (missing > rows || k % missing != 1).then_some(k);
     let all = || (0..rows).map(value);
     let blocks = vec![
         Values::U32(all().map(|v| v.map(|k| k as u32)).collect()),

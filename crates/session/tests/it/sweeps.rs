@@ -56,7 +56,7 @@ fn runs_of_a_sweep_are_recorded_and_reported() {
     assert!(folder.run_folder(5).join("trajectories.svg").is_file());
     let document = document(WORLDS, &path, &Unwatched).expect("a document");
     let pages = sidestep_report::render(&document, "pictures").expect("pages");
-    for words in ["6 runs of 2 variants", "hops per frog"] {
+    for words in ["6 runs of 2 variants", "Hops per frog"] {
         assert!(
             pages.markdown.replace('\u{a0}', " ").contains(words),
             "no {words} in {}",

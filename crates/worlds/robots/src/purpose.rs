@@ -3,21 +3,21 @@
 use sidestep_kernel::stream::Purpose;
 
 /// Where bodies without a given place begin.
-pub const PLACE: Purpose = Purpose(1);
+pub(crate) const PLACE: Purpose = Purpose(1);
 /// Phases of periods.
-pub const PHASE: Purpose = Purpose(2);
+pub(crate) const PHASE: Purpose = Purpose(2);
 /// A behaviour's own stream.
-pub const DECIDE: Purpose = Purpose(3);
+pub(crate) const DECIDE: Purpose = Purpose(3);
 /// An action: index 0 says which transition it ends in, index 1 is the body's priority
 /// in its conflict group.
-pub const ACT: Purpose = Purpose(4);
+pub(crate) const ACT: Purpose = Purpose(4);
 /// Random doors.
-pub const DOOR: Purpose = Purpose(6);
+pub(crate) const DOOR: Purpose = Purpose(6);
 /// Directions of people.
-pub const MOVE: Purpose = Purpose(7);
+pub(crate) const MOVE: Purpose = Purpose(7);
 /// Lost receptions.
-pub const RADIO: Purpose = Purpose(8);
+pub(crate) const RADIO: Purpose = Purpose(8);
 /// Readings of the sensor with this number on its robot.
-pub const fn sense(sensor: usize) -> Purpose {
+pub(crate) const fn sense(sensor: usize) -> Purpose {
     Purpose(16 + sensor as u16)
 }

@@ -7,10 +7,10 @@ use super::ray::{Crossing, crossings, turn_crossing};
 use super::sensor::{Reading, ReadingTable, Row, SensorModel};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::Cycle;
-use sidestep_kernel::EntityId;
 use sidestep_kernel::distr::{Chance, RowError};
 use sidestep_kernel::space::Position;
 use sidestep_kernel::stream::{Purpose, Streams};
+use sidestep_kernel::{EntityId, Seed};
 use sidestep_map::GridMap;
 use std::sync::Arc;
 

@@ -260,7 +260,7 @@ impl Summary {
     /// The summary metric by metric.
     pub fn sections(&self) -> Vec<Section> {
         let section = |metric: &MetricSummary| Section {
-            title: text::sentence(&Label { unit: None, ..metric.label.clone() }),
+            title: super::label::sentence(&Label { unit: None, ..metric.label.clone() }),
             figures: self
                 .figures
                 .iter()

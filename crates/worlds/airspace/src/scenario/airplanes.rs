@@ -3,7 +3,6 @@
 use super::compile::Compiler;
 use super::values::{Measure, TurnRate, Turns};
 use crate::flight::Airplane;
-use crate::flight::Task;
 use crate::flight::Track;
 use crate::flight::{Model, Pose, Timing};
 use crate::flight_plan::AirplaneSection;
@@ -12,7 +11,7 @@ use crate::generate::{Order, generate};
 use serde::Deserialize;
 use sidestep_kernel::InputError;
 use sidestep_kernel::stream::Streams;
-use sidestep_scenario::{AboveBelow, FromBelow, Number, Rule, Whole, refused};
+use sidestep_scenario::{AboveBelow, FromBelow, Number, Whole};
 use toml::Spanned;
 
 #[derive(Debug, Deserialize)]

@@ -16,13 +16,14 @@ use super::{
 use crate::decide::{Behaviour, External, Goto, Replay, Sector, Shuttle, Wander};
 use crate::effector::{Action, EffectorModel, MAX_PATH, Transition, own_boxes};
 use crate::policy::ConflictPolicy;
+use crate::purpose;
 use crate::sensor::SensorModel;
 use crate::world::{
     BEAM_STEP, Body, BodyType, Door, MountedSensor, Mover, Radio, RobotBody, RobotModel,
-    RobotsWorld, Role, StorageOrder, purpose,
+    RobotsWorld, Role, StorageOrder,
 };
 use sidestep_kernel::distr::Chance;
-use sidestep_kernel::stream::{Purpose, Streams};
+use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{EntityId, InputError, Seed};
 use sidestep_map::planning::{FlowField, FreeSpace};
 use sidestep_map::{Cell, GridMap, Rect};
