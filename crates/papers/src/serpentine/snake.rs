@@ -41,7 +41,8 @@ const COLUMNS: Columns = Columns {
 fn of_fields(case: &Variant, key: &str) -> f64 {
     let number = |value: &toml::Value| value.as_float().or(value.as_integer().map(|n| n as f64));
     let fields = case.value("fields").and_then(toml::Value::as_array).into_iter().flatten();
-    fields.filter_map(|field| number(field.get(key)?)).sum()
+    // From 0, for the sum of none is -0.
+    fields.filter_map(|field| number(field.get(key)?)).fold(0.0, |all, of_one| all + of_one)
 }
 
 /// All cases.
@@ -74,5 +75,16 @@ impl Snakes {
                     includes looking for the least distance of every part. Real time is 50 steps \
                     a second.";
         COLUMNS.table("A snake in space", note, &self.cells)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_room_without_balls_is_filled_by_nothing_not_by_less() {
+        let none = of_fields(&Variant { settings: Vec::new() }, "part");
+        assert_eq!(none.to_string(), "0");
     }
 }
