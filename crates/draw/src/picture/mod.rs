@@ -1,7 +1,7 @@
 //! Pictures of a run: scenery, a frame, and the ways that led to it.
 //!
 //! ```text
-//! trails.rs   the choice of ways, and their lengths          canvas.rs   from meters to pixels
+//! trails.rs   the choice of ways, and their lengths         canvas.rs   from meters to pixels
 //! ways.rs     a way as a line that fades with age           sheet.rs    axes, scale bar, caption
 //! floor.rs    walls as few rectangles                       space.rs    the edges of the shown box
 //! bodies.rs   everything that has a shape                   labels.rs   names that do not overlap

@@ -10,7 +10,7 @@
 //! measure.rs   -> reliability.rs, genericity.rs               results of runs
 //! timing.rs    -> performance.rs, strategies.rs, cost_model.rs   durations of runs
 //! scenes.rs                        ways of robots, as pictures
-//! claims.rs                                                   the verdicts
+//! claims/                          the verdicts
 //! ```
 
 mod claims;
@@ -139,6 +139,9 @@ impl Plan {
 pub type NewRecorder<'a> = dyn FnMut(&[TableSchema]) -> Result<Box<dyn Recorder>, RecordError> + 'a;
 
 /// Keeps recordings in memory until their run ends.
+///
+/// # Errors
+/// Never: the result has the type that [`NewRecorder`] asks for.
 pub fn in_memory(schemas: &[TableSchema]) -> Result<Box<dyn Recorder>, RecordError> {
     Ok(Box::new(MemoryRecorder::new(schemas)))
 }

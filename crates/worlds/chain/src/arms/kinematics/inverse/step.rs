@@ -83,8 +83,8 @@ impl Bounds {
     }
 }
 
-/// Returns the least moves of the free variables that produce the wanted changes, damped: `J^T (J
-/// J^T + damping)^-1 wanted`. `J J^T` has only a few rows, one for each error.
+/// Returns the least moves of the free variables that produce the wanted changes, damped:
+/// `J^T (J J^T + damping)^-1 wanted`. `J J^T` has only a few rows, one for each error.
 fn least_squares(errors: &Errors, wanted: &[f64], is_free: &[bool], damping: f64) -> Vec<f64> {
     let rows = &errors.rows;
     let product = |a: &[f64], b: &[f64]| -> f64 {
