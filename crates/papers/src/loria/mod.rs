@@ -2,7 +2,7 @@
 //! agent/environment interaction" (LORIA, 2001), rerun.
 //!
 //! The paper's tables are lost, so its *claims* are examined: which quantity is larger, smaller,
-//! faster. Every figure is our own, with the number of runs and a 95 % interval. [`claims`] says of
+//! faster. Every figure is our own, with the number of runs and a 95 % interval. `claims` says of
 //! each claim whether it held, did not hold, or cannot be judged.
 //!
 //! ```text

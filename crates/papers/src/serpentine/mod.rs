@@ -2,7 +2,7 @@
 //! obstacle avoidance" (Birbilis and Aspragathos, slides of 2005), rerun.
 //!
 //! The slides show pictures and no numbers, so their *claims* are examined. Every figure is our
-//! own, with the number of runs, and an interval where runs are random. [`claims`] says of each
+//! own, with the number of runs, and an interval where runs are random. `claims` says of each
 //! claim whether it held, did not hold, or cannot be judged.
 //!
 //! ```text
