@@ -4,7 +4,7 @@
 //! - `#` starts a comment, `;` separates commands, `\` at the end continues a line exactly as
 //!   it stands, and a line of fewer than 10 characters that continues none is skipped.
 //! - Arguments are separated by blanks, a comma, or both; `,,` and `*` leave one out. Letters
-//! may be small or capital. `KL204 ALT FL200` is `ALT KL204 FL200`; an aircraft alone is `POS`.
+//!   may be small or capital. `KL204 ALT FL200` is `ALT KL204 FL200`; an aircraft alone is `POS`.
 //! - Commands take effect in the order of their times, at one time in the order of the file. So
 //!   a way-point must be defined, and an aircraft created, before it is used.
 //!
