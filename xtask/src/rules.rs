@@ -30,7 +30,8 @@ const RESERVED: [(&str, &str); 4] = [
 const WORLDS: &str = "crates/worlds";
 
 /// Crates that know no world, not even through another crate.
-const WITHOUT_WORLDS: [&str; 11] = [
+const WITHOUT_WORLDS: [&str; 12] = [
+    "crates/document",
     "crates/kernel",
     "crates/record",
     "crates/draw",
