@@ -11,6 +11,7 @@ mod bundle;
 mod checked;
 mod explain;
 pub mod file;
+mod keys;
 pub mod kind;
 mod overrides;
 mod remark;
@@ -23,6 +24,7 @@ pub use checked::{
     NonNegative, Number, Point, Positive, Rule, Share, Whole, refused,
 };
 pub use explain::nearest;
+pub use keys::Key;
 pub use kind::{Compiled, Foreign, Kind, Worlds};
 pub use remark::{Remark, Severity};
 pub use sections::Sections;
