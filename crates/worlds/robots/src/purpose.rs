@@ -17,6 +17,8 @@ pub(crate) const DOOR: Purpose = Purpose(6);
 pub(crate) const MOVE: Purpose = Purpose(7);
 /// Lost receptions.
 pub(crate) const RADIO: Purpose = Purpose(8);
+/// Seeds of runs that are compared with the exact chain.
+pub(crate) const RUN: Purpose = Purpose(9);
 /// Readings of the sensor with this number on its robot.
 pub(crate) const fn sense(sensor: usize) -> Purpose {
     Purpose(16 + sensor as u16)
