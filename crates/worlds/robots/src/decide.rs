@@ -19,6 +19,8 @@ pub use super::sensor::UNSEEN;
 use super::sensor::{NOTHING, Reading};
 use sidestep_kernel::Cycle;
 use sidestep_kernel::stream::Draws;
+use sidestep_map::planning::FlowField;
+use std::sync::Arc;
 
 /// A robot's memory between its actions: four words whose meaning is up to the behavior.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -148,4 +150,10 @@ pub trait Behaviour: std::fmt::Debug + Send + Sync {
     /// Returns the next action. It may depend only on the percept, the memory (which it may change)
     /// and the robot's random stream of this cycle, because robots decide in any order.
     fn decide(&self, percept: &Percept<'_>, memory: &mut Memory, draws: &mut Draws) -> Decision;
+
+    /// Returns the ways to all places that it wants to reach, so that a check can say which of them
+    /// are out of reach.
+    fn ways(&self) -> &[Arc<FlowField>] {
+        &[]
+    }
 }

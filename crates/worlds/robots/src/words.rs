@@ -1,6 +1,6 @@
 //! Texts for people: a scenario's contents, a run's outcome, and the place of every body.
 
-use super::metrics::{Metrics, heap_bytes};
+use super::metrics::Metrics;
 use super::rows::HEADING_NAMES;
 use super::scenario::Compiled;
 use super::sensor::SensorModel;
@@ -124,11 +124,10 @@ impl Body<'_> {
     }
 }
 
-/// Returns map, bodies, sensors, effectors and memory of a scenario.
+/// Returns map, bodies, sensors and effectors of a scenario.
 pub(super) fn contents(compiled: &Compiled, source: &Source) -> Said {
     let file: Value = source.parse().unwrap_or_default();
     let world = &*compiled.world;
-    let (boxes_bytes, bodies_bytes) = heap_bytes(&compiled.clone().start(source, 1));
     let json = json!({
         "world": "robots",
         "name": compiled.name,
@@ -141,7 +140,6 @@ pub(super) fn contents(compiled: &Compiled, source: &Source) -> Said {
         "bodies": bodies(world),
         "robots": robots(&file),
         "sensors": sensors(world),
-        "memory_bytes": boxes_bytes + bodies_bytes,
     });
     let text = text(&json);
     Said { json, text }
@@ -223,7 +221,6 @@ fn text(found: &Value) -> String {
             format!("obstacles {}, conflicts {}", plain("obstacle_rule"), plain("conflict_policy")),
         ),
         line("run", format!("{} cycles, seed {}", number(&found["cycles"]), plain("seed"))),
-        line("memory", memory(found["memory_bytes"].as_u64().unwrap_or(0))),
     ]);
     aligned(&lines)
 }
@@ -289,11 +286,4 @@ fn plain(value: &Value) -> String {
 
 fn number(value: &Value) -> String {
     value.as_u64().map_or_else(|| value.to_string(), grouped)
-}
-
-fn memory(bytes: u64) -> String {
-    match bytes {
-        0..1_000_000 => format!("about {} kB", bytes.div_ceil(1000)),
-        _ => format!("about {:.1} MB", bytes as f64 / 1e6),
-    }
 }
