@@ -2,6 +2,7 @@
 
 mod compile;
 mod kinds;
+mod located;
 mod parts;
 mod placing;
 mod random;

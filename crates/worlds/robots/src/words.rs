@@ -1,11 +1,12 @@
 //! Texts for people: a scenario's contents, a run's outcome, and the place of every body.
 
+use super::effector::EffectorModel;
 use super::metrics::Metrics;
 use super::rows::HEADING_NAMES;
 use super::scenario::Compiled;
 use super::sensor::SensorModel;
 use super::state::{BodyRecord, Snapshot};
-use super::world::RobotsWorld;
+use super::world::{RobotsWorld, Role};
 use serde_json::{Value, json};
 use sidestep_kernel::words::{Lines, Said, aligned, grouped, line};
 use sidestep_scenario::Source;
@@ -140,6 +141,7 @@ pub(super) fn contents(compiled: &Compiled, source: &Source) -> Said {
         "bodies": bodies(world),
         "robots": robots(&file),
         "sensors": sensors(world),
+        "effectors": effectors(world),
     });
     let text = text(&json);
     Said { json, text }
@@ -208,11 +210,27 @@ fn sensors(world: &RobotsWorld) -> Vec<Value> {
     by_name.into_values().map(one).collect()
 }
 
+/// Returns the effectors in use, each once, with the chance that an action comes to what it means.
+fn effectors(world: &RobotsWorld) -> Vec<Value> {
+    let robots = world.types.iter().filter_map(|ty| match &ty.role {
+        Role::Robot(model) => Some(&model.body.effector),
+        _ => None,
+    });
+    let by_name: BTreeMap<&str, &EffectorModel> = robots.map(|e| (e.name.as_str(), e)).collect();
+    let one = |e: &EffectorModel| {
+        let as_meant = e.transitions.iter().map(|transitions| transitions[0].p);
+        let actions: Vec<_> = e.actions.iter().zip(as_meant).collect();
+        json!({ "name": e.name, "as_meant": actions })
+    };
+    by_name.into_values().map(one).collect()
+}
+
 fn text(found: &Value) -> String {
     let mut lines =
         vec![line("map", map_words(&found["map"])), line("bodies", bodies_words(&found["bodies"]))];
     lines.extend(items(found, "robots").map(|r| line(&plain(&r["name"]), robots_words(r))));
     lines.extend(items(found, "sensors").map(|s| line("sensor", sensor_words(s))));
+    lines.extend(items(found, "effectors").map(|e| line("effector", effector_words(e))));
     let plain = |key: &str| plain(&found[key]);
     lines.extend([
         line("regime", plain("regime")),
@@ -277,6 +295,14 @@ fn sensor_words(sensor: &Value) -> String {
         sensor["range_m"],
         observations.join("/"),
     )
+}
+
+fn effector_words(effector: &Value) -> String {
+    let as_meant = |action: &Value| {
+        format!("{} {:.0} %", plain(&action[0]), 100.0 * action[1].as_f64().unwrap_or(0.0))
+    };
+    let actions: Vec<String> = items(effector, "as_meant").map(as_meant).collect();
+    format!("{}: as meant {}", plain(&effector["name"]), actions.join(", "))
 }
 
 /// Returns a JSON value without quotes.

@@ -9,9 +9,10 @@ mod robots;
 
 use self::map::{load_map, padded};
 use super::kinds::Kinds;
+use super::located::Located;
 use super::placing::{Floor, Obstacle};
 use super::random;
-use super::tables::{self, Located};
+use super::tables;
 use super::{
     BehaviourSection, DoorSection, EffectorSection, MapSection, MoverSection, ProfileFile,
     RecordSection, RobotSection, RobotsFile, SensorSection,

@@ -1,6 +1,6 @@
 //! The kinds of a scenario: what each designates, and which of them a sensor can meet.
 
-use super::tables::Located;
+use super::located::Located;
 use super::{RobotsFile, SensorSection};
 use sidestep_kernel::InputError;
 use sidestep_scenario::{Source, nearest};

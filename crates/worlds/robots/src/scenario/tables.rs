@@ -1,12 +1,13 @@
 //! From sensor and effector sections to checked models.
 
 use super::kinds::Kinds;
+use super::located::Located;
 use super::{EffectorSection, Rows, SensorSection, TransitionSection};
 use crate::effector::{EffectorModel, STANDARD_ACTIONS, Transition};
 use crate::sensor::SensorModel;
 use sidestep_kernel::InputError;
 use sidestep_kernel::distr::check_row;
-use sidestep_scenario::{Source, nearest};
+use sidestep_scenario::nearest;
 use std::collections::BTreeMap;
 use std::ops::Range;
 use toml::Spanned;
@@ -17,24 +18,6 @@ const MAX_NAMES: usize = 250;
 /// Largest number of actions, because an intent holds an action and a flag in one byte.
 const MAX_ACTIONS: usize = 120;
 const MAX_BEAMS: usize = 1024;
-
-/// A section and the text it stands in (scenario, profile or presets).
-#[derive(Debug, Clone)]
-pub(super) struct Located<T> {
-    pub(super) section: Spanned<T>,
-    pub(super) source: std::sync::Arc<Source>,
-}
-
-impl<T> Located<T> {
-    pub(super) fn error(
-        &self,
-        span: Range<usize>,
-        cause: impl Into<String>,
-        remedy: &str,
-    ) -> InputError {
-        self.source.error(Some(span), cause, remedy)
-    }
-}
 
 /// Checks a sensor and puts its rows in order.
 pub(super) fn sensor(
