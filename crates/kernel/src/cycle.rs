@@ -39,11 +39,6 @@ impl PhaseTimes {
         self.join_ns += other.join_ns;
         self.act_ns += other.act_ns;
     }
-
-    /// All phases together.
-    pub fn total_ns(&self) -> u64 {
-        self.claim_ns + self.join_ns + self.act_ns
-    }
 }
 
 /// One worker's share of a run: the world's scratch and the kernel's own.

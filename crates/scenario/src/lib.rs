@@ -20,8 +20,8 @@ mod source;
 
 pub use bundle::{Bundle, Resolved};
 pub use checked::{
-    AboveBelow, AboveTo, AboveZero, Any, Between, Finite, FromBelow, FromTo, FromZero, Limits,
-    NonNegative, Number, Point, Positive, Rule, Share, Whole, refused,
+    AboveBelow, AboveTo, AboveZero, Any, Between, FromBelow, FromTo, FromZero, Limits, NonNegative,
+    Number, Point, Positive, Rule, Share, Whole, refused,
 };
 pub use explain::nearest;
 pub use keys::Key;
