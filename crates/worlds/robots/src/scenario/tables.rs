@@ -9,7 +9,6 @@ use sidestep_kernel::InputError;
 use sidestep_kernel::distr::check_row;
 use sidestep_scenario::nearest;
 use std::collections::BTreeMap;
-use std::ops::Range;
 use toml::Spanned;
 
 /// Largest number of beams, observations, classes and actions, because readings name them with a

@@ -200,4 +200,6 @@ fn an_author_is_told_what_will_surprise() {
         assert!(remark.words.contains(words), "{remark:?}");
     }
     assert_eq!(remarks(&text("", "[robots]\ncount = 1\n"), Path::new("")), []);
+    let radio = remarks(&text("", "[robots]\ncount = 2\n[radio]\nrange_m = 9\n"), Path::new(""));
+    assert_eq!(radio.iter().map(|remark| remark.key.as_str()).collect::<Vec<_>>(), ["radio"]);
 }

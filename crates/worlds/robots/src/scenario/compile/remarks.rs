@@ -24,6 +24,19 @@ pub(super) fn on_effectors(
     remarks.collect()
 }
 
+/// Behaviors that never say anything.
+const SILENT: [&str; 5] = ["wander", "shuttle", "goto", "replay", "random"];
+
+/// Returns a note on a radio over which nobody speaks.
+pub(super) fn on_radio(file: &RobotsFile) -> Option<Remark> {
+    let speaks = |section: &Spanned<RobotSection>| {
+        let behaviour = section.get_ref().behaviour.as_ref();
+        behaviour.is_some_and(|b| !SILENT.contains(&b.get_ref().kind.as_str()))
+    };
+    let is_idle = file.radio.is_some() && !file.robots.0.iter().any(speaks);
+    is_idle.then(|| Remark::note("radio", "nobody speaks: no robot has a behavior that broadcasts"))
+}
+
 /// Returns words for an effector that was learned for boxes of another size.
 fn misfit(name: &str, section: &EffectorSection, map_m: f64) -> Option<String> {
     let box_m = section.box_m?.get();
