@@ -67,11 +67,13 @@ pub(super) fn wanted(
     contacts: &mut [Contacts],
 ) -> Vec<Vec<Way>> {
     let world = turn.world;
+    if let Method::Mvp | Method::Orca = world.method {
+        return velocity::by_velocity(turn, group);
+    }
     let wishes = match world.method {
         _ if group.len() < 2 => all_straight(world, group),
-        Method::None => all_straight(world, group),
         Method::Pc => optimized(turn, group, contacts),
-        Method::Mvp | Method::Orca => velocity::by_velocity(world, group),
+        _ => all_straight(world, group),
     };
     group.iter().zip(wishes).map(|(known, wishes)| wishes::ways(world, *known, &wishes)).collect()
 }

@@ -16,7 +16,7 @@ use airplanes::{GeneratorSection, ModelSection};
 use compile::Compiler;
 use network::NetworkSection;
 use serde::{Deserialize, Serialize};
-use settings::{LegsSection, Switch, Times};
+use settings::{LegsSection, ReactiveSection, Switch, Times};
 use sidestep_collectives::{Choice, Estimator, Order, Update, Utility};
 use sidestep_kernel::InputError;
 use sidestep_scenario::{
@@ -69,6 +69,8 @@ struct AirspaceSection {
     inflation: Option<Positive>,
     holds_s: Times,
     legs: Option<LegsSection>,
+    mvp: ReactiveSection,
+    orca: ReactiveSection,
     estimator: Option<Spanned<Estimator>>,
     update: Option<Spanned<Update>>,
     order: Option<Order>,
@@ -167,7 +169,12 @@ impl Compiled {
             orders: [0; 2],
         };
         let airplanes = (0..).zip(self.world.airplanes.iter().zip(&self.fallbacks)).map(record);
-        Snapshot { cycle: 0, airplanes: airplanes.collect(), contacts: Vec::new() }
+        Snapshot {
+            cycle: 0,
+            airplanes: airplanes.collect(),
+            contacts: Vec::new(),
+            resolving: Vec::new(),
+        }
     }
 }
 

@@ -1,6 +1,7 @@
 //! A compiled airspace: everything that stays fixed during a run.
 
 use super::agents::network::Network;
+use super::baseline::Reactive;
 use super::deploy::Deployment;
 use super::flight::{
     Action, Air, Airplane, Known, Later, Legs, Levels, Model, Passing, Point, Stage, Task, Timing,
@@ -71,6 +72,10 @@ pub struct AirspaceWorld {
     pub legs: Legs,
     /// The method by which airplanes choose their actions.
     pub method: Method,
+    /// Settings of MVP.
+    pub mvp: Reactive,
+    /// Settings of ORCA.
+    pub orca: Reactive,
     /// The deployment of the optimizer.
     pub deployment: Deployment,
     /// The network that carries its messages, if it is unreliable.
@@ -206,13 +211,25 @@ impl AirspaceWorld {
     /// they could come too near within the horizon, or on orbits after the next `dt`.
     pub fn look_m(&self, a: usize, b: usize) -> f64 {
         let ((a, a_m_s), (b, b_m_s)) = (self.fastest(a), self.fastest(b));
-        let horizon_s = self.timing.horizon as f64 * self.timing.dtau_s;
+        let Reactive { look_ahead_s: horizon_s, margin } = self.looks_ahead();
         let reach = |model: &Model, v_m_s: f64| {
             let orbit_m = v_m_s * self.timing.dt_s + 2.0 * (v_m_s / model.omega_max_rad_s);
             (v_m_s * horizon_s).max(orbit_m)
         };
-        let gap_m = a.separation_m.max(b.separation_m) * self.objective.inflation.max(1.0);
+        let gap_m = a.separation_m.max(b.separation_m) * margin.max(1.0);
         reach(a, a_m_s) + reach(b, b_m_s) + gap_m + 1.0
+    }
+
+    /// Returns how far the method looks ahead, and how much separation it asks for.
+    fn looks_ahead(&self) -> Reactive {
+        match self.method {
+            Method::Mvp => self.mvp,
+            Method::Orca => self.orca,
+            Method::Pc | Method::None => Reactive {
+                look_ahead_s: self.timing.horizon as f64 * self.timing.dtau_s,
+                margin: self.objective.inflation,
+            },
+        }
     }
 
     /// Returns the stage of an airplane that has carried out this number of orders.
