@@ -3,7 +3,7 @@
 use super::flight::{Flight, Moment};
 use crate::Scratch;
 use crate::events::{Event, EventKind};
-use crate::flight::{Approach, Zone, distance_m, is_lost};
+use crate::flight::{Approach, Leg, Zone, distance_m, is_lost};
 use crate::state::PairRecord;
 use crate::world::AirspaceWorld;
 
