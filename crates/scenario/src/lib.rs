@@ -13,6 +13,7 @@ mod explain;
 pub mod file;
 pub mod kind;
 mod overrides;
+mod remark;
 mod sections;
 mod source;
 
@@ -23,5 +24,6 @@ pub use checked::{
 };
 pub use explain::nearest;
 pub use kind::{Compiled, Foreign, Kind, Worlds};
+pub use remark::{Remark, Severity};
 pub use sections::Sections;
 pub use source::{FORMAT, Head, Preamble, Source};

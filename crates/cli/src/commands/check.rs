@@ -5,7 +5,7 @@ use crate::exit::{ExitCode, Failure};
 use crate::plan::ScenarioArgs;
 use clap::Args;
 use serde_json::Value;
-use sidestep::scenario::Foreign;
+use sidestep::scenario::{Foreign, Remark};
 use sidestep::worlds::WORLDS;
 
 const EXAMPLES: &str = "\
@@ -45,7 +45,15 @@ pub(crate) fn check(args: &CheckArgs, console: Console) -> Result<ExitCode, Fail
         }
         found.text.push_str(&aligned(&foreign.lines));
     }
+    let remarks = compiled.remarks();
+    found.json["remarks"] = serde_json::to_value(&remarks).expect("remarks are plain data");
     let heading = format!("{} is a valid scenario\n", args.scenario.file.display());
-    console.result(&found.json, || heading + &found.text);
+    console.result(&found.json, || heading + &found.text + &in_words(&remarks));
     Ok(ExitCode::Done)
+}
+
+/// Returns remarks as text: severity and key on a line, and what is to be said below.
+fn in_words(remarks: &[Remark]) -> String {
+    let one = |r: &Remark| format!("{}: {}\n  {}\n", r.severity.name(), r.key, r.words);
+    remarks.iter().map(one).collect()
 }

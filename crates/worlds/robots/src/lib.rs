@@ -27,6 +27,7 @@ mod perceive;
 pub mod policy;
 mod purpose;
 pub mod ray;
+mod remarks;
 pub mod rows;
 pub mod run;
 pub mod scenario;

@@ -27,7 +27,7 @@ use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{EntityId, InputError, Seed};
 use sidestep_map::planning::{FlowField, FreeSpace};
 use sidestep_map::{Cell, GridMap, Rect};
-use sidestep_scenario::{Head, Source, nearest};
+use sidestep_scenario::{Head, Remark, Source, nearest};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
@@ -57,6 +57,8 @@ pub struct Compiled {
     pub cycles: u64,
     /// The tables to keep.
     pub record: RecordSection,
+    /// What compiling found to be surprising.
+    pub remarks: Vec<Remark>,
 }
 
 impl Compiled {
@@ -90,6 +92,7 @@ struct Compiler<'a> {
     border: u32,
     /// Largest distance in boxes from a body to a box that it claims.
     reach: u32,
+    remarks: Vec<Remark>,
 }
 
 impl<'a> Compiler<'a> {
@@ -125,6 +128,7 @@ impl<'a> Compiler<'a> {
             spans: Vec::new(),
             border,
             reach: 0,
+            remarks: Vec::new(),
             map,
             office_doors,
             head,
@@ -188,6 +192,7 @@ impl<'a> Compiler<'a> {
             seed: self.head.seed,
             cycles: self.head.cycles.unwrap_or(CYCLES),
             record: self.file.record,
+            remarks: self.remarks,
         })
     }
 
