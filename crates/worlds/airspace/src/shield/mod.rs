@@ -34,17 +34,26 @@
 //! Numbers: `orbit.rs` never wrongly finds that motions stay apart. New plans must keep slightly
 //! more than `R` (by `SLACK_M`), so that rounding never adds up to a loss.
 
+mod errors;
 mod fallback;
 mod flyer;
 mod orbit;
 mod plan;
+#[cfg(test)]
+mod price;
+#[cfg(test)]
+mod promise;
 mod search;
 #[cfg(test)]
 mod tests;
 
+pub use errors::Bounds;
+pub(crate) use errors::{Holding, common_rates};
 pub(crate) use fallback::{entry_fallbacks, first_fallbacks, side_apart};
 pub use flyer::Flyer;
+pub(crate) use flyer::Named;
 pub use orbit::Side;
+pub(crate) use orbit::apart_for;
 pub(crate) use plan::Plan;
 pub use plan::Way;
 pub use search::{Certainty, Decision, filter};

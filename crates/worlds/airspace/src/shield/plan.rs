@@ -38,21 +38,32 @@ impl Plan {
         dtau_s: f64,
         orbit: (Option<usize>, Side),
     ) -> Self {
-        let mut poses = vec![flyer.pose];
+        Self::flown_from(flyer.pose, flyer, omegas_rad_s, dtau_s, orbit)
+    }
+
+    fn flown_from(
+        start: Pose,
+        flyer: Flyer,
+        omegas_rad_s: Vec<f64>,
+        dtau_s: f64,
+        orbit: (Option<usize>, Side),
+    ) -> Self {
+        let mut poses = vec![start];
         for &omega in &omegas_rad_s {
             let last = poses[poses.len() - 1];
             poses.push(last.step(flyer.v_m_s, omega, dtau_s));
         }
         let (candidate, side) = orbit;
         let end = poses[poses.len() - 1];
-        let orbit = Orbit::from(end, flyer.v_m_s, side.sign() * flyer.omega_max_rad_s);
+        let orbit = Orbit::from(end, flyer.v_m_s, side.sign() * flyer.orbit_rad_s);
         Self { flyer, poses, omegas_rad_s, dtau_s, orbit, candidate, side }
     }
 
     /// Returns the stored fallback as a plan, for some steps and ever after.
     pub(crate) fn fallback(flyer: Flyer, steps: usize, dtau_s: f64) -> Self {
-        let omega = flyer.fallback.sign() * flyer.omega_max_rad_s;
-        Self::of(flyer, vec![omega; steps], dtau_s, (None, flyer.fallback))
+        let omega = flyer.fallback.sign() * flyer.orbit_rad_s;
+        let orbit = (None, flyer.fallback);
+        Self::flown_from(flyer.held, flyer, vec![omega; steps], dtau_s, orbit)
     }
 
     /// Returns the pose at the end of `dt`.
