@@ -17,8 +17,10 @@ pub(super) fn contents(compiled: &Compiled) -> Said {
         Cycle::MAX => f64::INFINITY,
         cycles => world.starts_s(cycles),
     };
+    let intruders = world.airplanes.iter().filter(|a| a.is_intruder).count() as u64;
     let json = json!({
         "airplanes": world.airplanes.len(),
+        "intruders": intruders,
         "method": world.method.name(),
         "deployment": world.deployment.name(),
         "shield": shield,
@@ -36,6 +38,9 @@ pub(super) fn contents(compiled: &Compiled) -> Said {
     if recorded > 0 {
         let until = if until_s.is_finite() { format!("until {until_s} s") } else { "all".into() };
         text.push_str(&format!("  recorded         {}, replayed {until}\n", grouped(recorded)));
+    }
+    if intruders > 0 {
+        text.push_str(&format!("  intruders        {}\n", grouped(intruders)));
     }
     text.push_str(&too_close(&compiled.too_close));
     Said { json, text }

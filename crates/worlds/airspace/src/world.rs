@@ -130,8 +130,13 @@ impl AirspaceWorld {
             let held = self.bounds.holds_rad_s(&airplane.model, self.timing.dt_s);
             held.filter(|_| self.shield).unwrap_or(airplane.model.omega_max_rad_s)
         };
-        let largest: Vec<f64> = self.airplanes.iter().map(largest).collect();
-        if self.shield { common_rates(&largest) } else { largest }
+        let mut rates: Vec<f64> = self.airplanes.iter().map(largest).collect();
+        // Whoever minds nobody all the time never orbits.
+        let orbits = |&i: &usize| self.shield && !self.is_intruder(i as Slot, Cycle::MAX - 1);
+        let orbiting: Vec<usize> = (0..rates.len()).filter(orbits).collect();
+        let largest: Vec<f64> = orbiting.iter().map(|&i| rates[i]).collect();
+        orbiting.iter().zip(common_rates(&largest)).for_each(|(&i, rate)| rates[i] = rate);
+        rates
     }
 
     /// Returns how far an airplane may be from where its plans are seen, in meters.

@@ -56,7 +56,10 @@ impl<'a> Beset<'a> {
     }
 
     /// Returns the intruders that could come too near on a way within `dt`.
-    pub(super) fn reached_by<'b>(&'b self, way: &'b Way) -> impl Iterator<Item = &'a Intruder> + 'b {
+    pub(super) fn reached_by<'b>(
+        &'b self,
+        way: &'b Way,
+    ) -> impl Iterator<Item = &'a Intruder> + 'b {
         let poses = self.poses(way);
         self.intruders.iter().copied().filter(move |one| !self.is_clear(&poses, way, one))
     }

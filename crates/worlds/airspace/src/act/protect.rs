@@ -112,13 +112,7 @@ fn decided(
 
 /// Names an airplane with the intruders that could come too near on its way within `dt`, and ends
 /// the names of others.
-fn name_intruders(
-    turn: &mut Turn<'_>,
-    slot: Slot,
-    all: &[Intruder],
-    beset: &Beset<'_>,
-    way: &Way,
-) {
+fn name_intruders(turn: &mut Turn<'_>, slot: Slot, all: &[Intruder], beset: &Beset<'_>, way: &Way) {
     let &mut Turn { world, state, now, ref mut scratch, .. } = turn;
     let named = state.named_with(slot);
     if all.is_empty() && named.is_empty() {
@@ -182,7 +176,8 @@ fn on_orbit(turn: &Turn<'_>, slot: Slot) -> Way {
 /// Moves the stored pose of an airplane along its orbit for one `dt`.
 fn move_held(turn: &Turn<'_>, slot: Slot) {
     let Turn { world, state, .. } = turn;
-    let (side, v_m_s) = (state.airplanes[slot as usize].side(), state.stage(world, slot).model.v_m_s);
+    let (side, v_m_s) =
+        (state.airplanes[slot as usize].side(), state.stage(world, slot).model.v_m_s);
     let omega = side.sign() * world.orbit_rad_s[slot as usize];
     let mut held = state.held(slot);
     for _ in 0..world.timing.points_per_dt() {

@@ -114,7 +114,9 @@ impl Compiler<'_> {
     /// Refuses errors of heading against which an airplane could not hold an orbit.
     fn fits_errors(&self, world: &AirspaceWorld) -> Result<(), InputError> {
         let turned_rad = world.bounds.heading_rad;
-        let holds = |a: &Airplane| world.bounds.holds_rad_s(&a.model, world.timing.dt_s).is_some();
+        let holds = |a: &Airplane| {
+            a.is_intruder || world.bounds.holds_rad_s(&a.model, world.timing.dt_s).is_some()
+        };
         if !world.shield || turned_rad == 0.0 {
             return Ok(());
         }

@@ -48,10 +48,7 @@ pub(crate) fn entry_fallbacks(
 
 /// Returns the side on which an airplane that is about to fly as `changed` has an orbit apart from
 /// the stored fallbacks of others, if there is one; preferably the stored side.
-pub(crate) fn side_apart(
-    changed: &Flyer,
-    others: impl Iterator<Item = Flyer>,
-) -> Option<Side> {
+pub(crate) fn side_apart(changed: &Flyer, others: impl Iterator<Item = Flyer>) -> Option<Side> {
     let minded: Vec<Flyer> = others.filter(|other| changed.minds(other)).collect();
     let is_apart = |side: &Side| {
         minded.iter().all(|other| {
@@ -66,8 +63,7 @@ pub(crate) fn side_apart(
 /// Returns for each airplane all others whose orbits might come too near its own, by rising number.
 /// They are sorted by x, so that only neighbors in that order have to be compared.
 fn near_each_other(flyers: &[Flyer]) -> Vec<Vec<usize>> {
-    let reach_m =
-        |f: &Flyer| 2.0 * f.v_m_s / f.orbit_rad_s + f.separation_m + f.error_m + SLACK_M;
+    let reach_m = |f: &Flyer| 2.0 * f.v_m_s / f.orbit_rad_s + f.separation_m + f.error_m + SLACK_M;
     let widest_m = flyers.iter().map(reach_m).fold(0.0, f64::max);
     let x = |i: usize| flyers[i].held.at[0];
     let mut by_x: Vec<usize> = (0..flyers.len()).collect();

@@ -55,8 +55,7 @@ impl Flyer {
     /// apart: the pair needs no name any more.
     pub(crate) fn is_safe_with(&self, other: &Self) -> bool {
         let fallback = |flyer: &Self| flyer.orbit(flyer.fallback);
-        !self.is_on_level(other)
-            || fallback(self).stays_apart(&fallback(other), self.gap_m(other))
+        !self.is_on_level(other) || fallback(self).stays_apart(&fallback(other), self.gap_m(other))
     }
 
     /// Returns the orbit to a side that it holds, or that it enters where it is.

@@ -44,8 +44,9 @@ fn costs_little(name: &str, text: &str, method: &str) {
     assert!(on <= 1.5 * off + 1.0, "{name}, {method}: {on} % with the shield, {off} % without");
 }
 
-/// Random traffic of airplanes that each have a speed and a turn rate of their own.
-fn mixed(n: u32, seed: u64) -> String {
+/// Random traffic of airplanes that each have a speed and a turn rate of their own, up to five times
+/// as fast as the slowest.
+fn mixed(n: u32, seed: u64, slowest_deg_s: f64) -> String {
     let streams = Streams::new(Seed(seed));
     let radius_m = 6500.0 * (f64::from(n) / 5.0).sqrt();
     let mut text = "format = 1\nworld = \"airspace\"\n[airspace]\n".to_string();
@@ -67,7 +68,8 @@ fn mixed(n: u32, seed: u64) -> String {
         }
         starts.push(from);
         let heading_deg = math::atan2(to[1] - from[1], to[0] - from[0]).to_degrees();
-        let (v_m_s, rate) = (25.0 + 25.0 * draws.uniform(), 2.0 + 4.0 * draws.uniform());
+        let (v_m_s, rate) =
+            (25.0 + 25.0 * draws.uniform(), slowest_deg_s + 4.0 * slowest_deg_s * draws.uniform());
         text += &format!(
             "[[airplanes]]\nat_m = {from:?}\nheading_deg = {heading_deg:?}\nway_points_m = [{to:?}]\n\
              v_m_s = {v_m_s:?}\nomega_max_deg_s = {rate:?}\n"
@@ -78,8 +80,9 @@ fn mixed(n: u32, seed: u64) -> String {
 
 #[test]
 fn the_shield_costs_little_where_turn_rates_differ() {
-    for seed in 1..4 {
-        costs_little(&format!("mixed random traffic of 20, seed {seed}"), &mixed(20, seed), "pc");
+    for (seed, slowest_deg_s) in [(1, 2.0), (2, 2.0), (3, 1.0)] {
+        let name = format!("20 of {slowest_deg_s} to {} deg/s, seed {seed}", 5.0 * slowest_deg_s);
+        costs_little(&name, &mixed(20, seed, slowest_deg_s), "pc");
     }
 }
 

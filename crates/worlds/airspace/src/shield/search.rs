@@ -59,9 +59,7 @@ impl<'a> Search<'a> {
         let fallbacks: Vec<Plan> =
             flyers.iter().map(|flyer| Plan::fallback(flyer.clone(), steps, dtau_s)).collect();
         let first = |((flyer, ways), fallback): ((&Flyer, &Vec<Way>), &Plan)| match ways.first() {
-            Some(way) => {
-                Plan::of(flyer.clone(), way.omegas_rad_s.clone(), dtau_s, (Some(0), flyer.fallback))
-            }
+            Some(way) => Plan::of(flyer.clone(), way, dtau_s, Some(0), flyer.fallback),
             None => fallback.clone(),
         };
         let plans = flyers.iter().zip(candidates).zip(&fallbacks).map(first).collect();
@@ -121,10 +119,7 @@ impl<'a> Search<'a> {
         self.candidates[i].iter().enumerate().find_map(|(k, way)| {
             Side::BOTH
                 .into_iter()
-                .map(|side| {
-                    let turns = way.omegas_rad_s.clone();
-                    Plan::of(self.flyers[i].clone(), turns, self.dtau_s, (Some(k), side))
-                })
+                .map(|side| Plan::of(self.flyers[i].clone(), way, self.dtau_s, Some(k), side))
                 .find(|plan| fits(plan))
         })
     }

@@ -156,10 +156,8 @@ fn who_enters_chooses_a_side_apart_from_the_stored_ones_and_nobody_else_does() {
 
 #[test]
 fn two_that_came_in_too_close_are_left_to_the_method_and_nobody_else_is() {
-    let close = |x: f64, rank: u64, named: u32| Flyer {
-        named: [named].into(),
-        ..flyer(x, 0.0, 0.0, rank)
-    };
+    let close =
+        |x: f64, rank: u64, named: u32| Flyer { named: [named].into(), ..flyer(x, 0.0, 0.0, rank) };
     let straight = || vec![Way { omegas_rad_s: vec![0.0; STEPS] }];
     let wishes = [straight(), straight()];
     let of_each_other = [close(0.0, 0, 1), close(100.0, 1, 0)];
