@@ -20,6 +20,8 @@ pub(super) struct Moving {
     pub(super) preferred_rad: f64,
     pub(super) separation_m: f64,
     pub(super) levels: Levels,
+    /// Whether it gives way to others, too.
+    pub(super) yields: bool,
 }
 
 /// The settings of a method.

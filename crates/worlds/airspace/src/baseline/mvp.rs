@@ -146,6 +146,7 @@ mod tests {
             preferred_rad: heading_rad,
             separation_m: 500.0,
             levels: Levels::at(0.0),
+            yields: true,
         }
     }
 

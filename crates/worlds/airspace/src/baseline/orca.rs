@@ -54,7 +54,7 @@ pub(in super::super) fn heading_rad<'a>(
     best.map(|(_, off_rad)| own.preferred_rad + off_rad)
 }
 
-/// Returns the velocities of `own` that avoid one neighbor, if that one does its half.
+/// Returns the velocities of `own` that avoid one neighbor: if that one yields, it does its half.
 fn half_plane(own: &Moving, other: &Moving, settings: Reactive, step_s: f64) -> HalfPlane {
     let (apart, relative) = (minus(other.at, own.at), minus(own.velocity, other.velocity));
     let radius_m = own.zone_m(other, settings);
@@ -80,7 +80,8 @@ fn half_plane(own: &Moving, other: &Moving, settings: Reactive, step_s: f64) -> 
         ];
         (normal, -dot(relative, normal))
     };
-    HalfPlane { normal, least: dot(own.velocity, normal) + 0.5 * needed }
+    let share = if other.yields { 0.5 } else { 1.0 };
+    HalfPlane { normal, least: dot(own.velocity, normal) + share * needed }
 }
 
 #[cfg(test)]
@@ -102,6 +103,7 @@ mod tests {
             preferred_rad: heading_rad,
             separation_m: 500.0,
             levels: Levels::at(0.0),
+            yields: true,
         }
     }
 

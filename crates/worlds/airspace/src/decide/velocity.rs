@@ -8,6 +8,7 @@ use super::wishes::{by_turn, ways};
 use crate::Turn;
 use crate::baseline::{Moving, mvp, orca};
 use crate::flight::{Known, Pose, Stage};
+use crate::intruder::Intruder;
 use crate::shield::Way;
 use crate::world::{AirspaceWorld, Method};
 use sidestep_kernel::{Slot, math};
@@ -17,14 +18,21 @@ const AHEAD_M: f64 = 1e3;
 
 /// Returns the ways that each airplane of a group may fly in the next `dt`: the one that the method
 /// wants, and then the others by how little they differ from it.
-pub(super) fn by_velocity(turn: &Turn<'_>, group: &[Known]) -> Vec<Vec<Way>> {
+pub(super) fn by_velocity(
+    turn: &Turn<'_>,
+    group: &[Known],
+    intruders: &[Intruder],
+) -> Vec<Vec<Way>> {
     let &Turn { world, state, .. } = turn;
     let slots: Vec<Slot> = group.iter().map(|known| known.slot).collect();
     let mut memory = state.take_resolving(&slots);
     let mut ahead = group.to_vec();
     let mut wanted = vec![Way::default(); group.len()];
-    for _ in 0..world.timing.points_per_dt() {
-        let headings = headings(world, &ahead, &mut memory);
+    for k in 0..world.timing.points_per_dt() {
+        let seconds = k as f64 * world.timing.dtau_s;
+        let intruding: Vec<Moving> =
+            intruders.iter().map(|one| intruding(world, one, seconds)).collect();
+        let headings = headings(world, &ahead, &intruding, &mut memory);
         for ((known, way), heading_rad) in ahead.iter_mut().zip(&mut wanted).zip(headings) {
             way.omegas_rad_s.push(step(world, known, heading_rad));
         }
@@ -44,6 +52,7 @@ pub(super) fn by_velocity(turn: &Turn<'_>, group: &[Known]) -> Vec<Vec<Way>> {
 fn headings(
     world: &AirspaceWorld,
     ahead: &[Known],
+    intruding: &[Moving],
     memory: &mut [mvp::Resolving],
 ) -> Vec<Option<f64>> {
     let is_flying = |k: &usize| {
@@ -51,14 +60,15 @@ fn headings(
         known.next < world.stage(known.slot, known.orders).mission.len()
     };
     let flying: Vec<usize> = (0..ahead.len()).filter(is_flying).collect();
-    let all: Vec<Moving> = flying.iter().map(|&k| moving(world, ahead[k])).collect();
+    let own = flying.iter().map(|&k| moving(world, ahead[k]));
+    let all: Vec<Moving> = own.chain(intruding.iter().copied()).collect();
     let meets = |a: &Moving, b: &Moving| a.levels.meets(&b.levels, world.vertical_m);
     let found = if world.method == Method::Orca {
         let one = |own: &Moving| {
             let others = all.iter().filter(|other| other.slot != own.slot && meets(own, other));
             orca::heading_rad(own, others, world.orca, world.timing.dtau_s)
         };
-        all.iter().map(one).collect()
+        all[..flying.len()].iter().map(one).collect()
     } else {
         let mut kept: Vec<mvp::Resolving> =
             flying.iter().map(|&k| std::mem::take(&mut memory[k])).collect();
@@ -89,6 +99,22 @@ fn step(world: &AirspaceWorld, known: &mut Known, heading_rad: Option<f64>) -> f
     omega_rad_s
 }
 
+/// Returns an intruder after some seconds, which may come nearer than it seems.
+fn intruding(world: &AirspaceWorld, one: &Intruder, seconds: f64) -> Moving {
+    let ([x, y], [vx, vy], [wx, wy]) = (one.ahead(seconds), one.velocity_m_s, world.wind_m_s);
+    let heading_rad = math::atan2(vy, vx);
+    Moving {
+        slot: one.slot,
+        at: [x + wx * seconds, y + wy * seconds],
+        heading_rad,
+        velocity: one.velocity_m_s,
+        preferred_rad: heading_rad,
+        separation_m: one.wide_m(0.0),
+        levels: one.levels,
+        yields: false,
+    }
+}
+
 fn moving(world: &AirspaceWorld, known: Known) -> Moving {
     let Stage { model, mission, .. } = world.stage(known.slot, known.orders);
     let Pose { at, heading_rad } = known.pose;
@@ -105,5 +131,6 @@ fn moving(world: &AirspaceWorld, known: Known) -> Moving {
         preferred_rad,
         separation_m: model.separation_m,
         levels: world.levels(known),
+        yields: true,
     }
 }
