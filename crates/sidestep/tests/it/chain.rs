@@ -108,7 +108,7 @@ patience_s = 1000.0
 ";
 
 /// A chain that breaks in cycle 10 and is joined from cycle 20 on, and one that stays whole.
-const BROKEN: &str = "
+pub(crate) const BROKEN: &str = "
 [chain]
 dt_s = 0.1
 self_collision = false
@@ -138,7 +138,7 @@ lasts_s = 1.0
 ";
 
 /// Two tasks of an operator, one of targets, and connectors that break down.
-const TOLD: &str = "
+pub(crate) const TOLD: &str = "
 [chain]
 dt_s = 0.05
 [[obstacles]]

@@ -21,7 +21,7 @@ pub(super) fn outcome(metrics: &Metrics) -> Lines {
         line("distance", distance(total.distance_m)),
         line("coverage", format!("{:.1} % of the free boxes", 100.0 * metrics.coverage)),
     ];
-    // A resumed run that is at its end has seen no group in this process.
+    // Nothing to tell where no two bodies ever met.
     if metrics.largest_group > 0 {
         lines.push(line("conflict groups", groups(metrics)));
     }

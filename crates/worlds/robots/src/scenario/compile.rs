@@ -17,7 +17,7 @@ use super::{
     BehaviourSection, DoorSection, EffectorSection, MapSection, MoverSection, ProfileFile,
     RecordSection, RobotSection, RobotsFile, SensorSection,
 };
-use crate::decide::{Behaviour, External, Goto, Replay, Sector, Shuttle, Wander};
+use crate::decide::{Announce, Behaviour, External, Goto, Replay, Sector, Shuttle, Wander};
 use crate::effector::{Action, EffectorModel, MAX_PATH, Transition, own_boxes};
 use crate::policy::ConflictPolicy;
 use crate::purpose;

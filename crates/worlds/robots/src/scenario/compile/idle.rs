@@ -5,8 +5,9 @@ use super::super::{DoorSection, MoverSection, RobotSection, RobotsFile};
 use super::*;
 
 /// The built-in behaviors, and the keys of each.
-pub(super) const BEHAVIOURS: [(&str, &[&str]); 6] = [
+pub(super) const BEHAVIOURS: [(&str, &[&str]); 7] = [
     ("wander", &["turn_every"]),
+    ("announce", &["turn_every"]),
     ("shuttle", &["a", "b"]),
     ("goto", &["goals", "repeat"]),
     ("replay", &["actions", "repeat"]),

@@ -149,9 +149,8 @@ impl Compiler<'_> {
         let ways = Ways { compiler: self, size, span: section.span() };
         let actions = &body.effector.actions;
         Ok(match s.kind.as_str() {
-            "wander" => Arc::new(Wander {
-                turn_every: s.turn_every.unwrap_or(Wander::default().turn_every).max(1),
-            }),
+            "wander" => Arc::new(wander(s)),
+            "announce" => Arc::new(Announce { wander: wander(s), size }),
             "shuttle" => {
                 let end = |given: Option<[u32; 4]>, key: &str| {
                     ways.to(needed(s, key, given, "[col, row, width, height]").map_err(error)?)
@@ -212,6 +211,10 @@ fn needed<T>(s: &BehaviourSection, key: &str, given: Option<T>, example: &str) -
     given.ok_or_else(|| {
         (format!("behaviour `{}` needs `{key}`", s.kind), format!("add {key} = {example}"))
     })
+}
+
+fn wander(s: &BehaviourSection) -> Wander {
+    Wander { turn_every: s.turn_every.unwrap_or(Wander::default().turn_every).max(1) }
 }
 
 fn replay(s: &BehaviourSection, actions: &[String]) -> Result<Replay, Wrong> {
