@@ -114,7 +114,7 @@ impl<'a> Compiler<'a> {
         }
         add_all(&source, &file.sensors, &mut sensors);
         add_all(&source, &file.effectors, &mut effectors);
-        idle::refuse(&source, &file, !office_doors.is_empty())?;
+        idle::refuse(&source, &file, own, !office_doors.is_empty())?;
         let kinds = Kinds::new(&source, &file)?;
         check_tables(&kinds, &sensors, &effectors)?;
         let mut remarks = remarks::on_effectors(&file, map.box_size_m, &effectors);
