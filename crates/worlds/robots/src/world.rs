@@ -366,7 +366,7 @@ impl RobotsWorld {
     }
 
     /// Returns the position in the padded grid of a map column and row.
-    pub(super) fn grid_position(&self, (col, row): (u32, u32)) -> Position {
+    pub(super) fn grid_position(&self, col: u32, row: u32) -> Position {
         Position::new(col + self.border, row + self.border)
     }
 

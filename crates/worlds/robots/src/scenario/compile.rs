@@ -195,6 +195,8 @@ impl<'a> Compiler<'a> {
             stride,
             reach: self.reach,
         };
+        let mut remarks = self.remarks;
+        remarks.extend(crate::law::no_contacts(&world));
         Ok(Compiled {
             world: Arc::new(world),
             start: self.start.into(),
@@ -202,7 +204,7 @@ impl<'a> Compiler<'a> {
             seed: self.head.seed,
             cycles: self.head.cycles.unwrap_or(CYCLES),
             record: self.file.record,
-            remarks: self.remarks,
+            remarks,
         })
     }
 
