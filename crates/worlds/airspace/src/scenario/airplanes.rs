@@ -80,6 +80,9 @@ impl Compiler<'_> {
                 None => self.planned(section, own.model())?,
             });
         }
+        if self.file.airspace.replay_until_s.is_some() && all.iter().all(|a| a.track.is_none()) {
+            return Err(self.source.idle("airspace.replay_until_s", "without a recorded track"));
+        }
         if all.is_empty() {
             let remedy = "add [airspace.generator] with kind and n, or [[airplanes]]";
             return Err(self.source.error(None, "the scenario has no airplanes", remedy));
@@ -94,6 +97,10 @@ impl Compiler<'_> {
         streams: &Streams,
     ) -> Result<Vec<Airplane>, InputError> {
         let s = section.get_ref();
+        if s.kind == GeneratorKind::Random && s.jitter_m.is_some() {
+            let because = "for kind = \"random\", whose places are all drawn";
+            return Err(self.source.idle("airspace.generator.jitter_m", because));
+        }
         let n = s.n.get() as usize;
         // By default, random traffic is as dense as ten airplanes in the paper's circle, for any
         // number.
