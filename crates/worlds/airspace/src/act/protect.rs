@@ -55,16 +55,15 @@ pub(super) fn shielded(
     candidates: Vec<Vec<Way>>,
     contacts: &mut [Contacts],
 ) -> Vec<Way> {
-    let &mut Turn { world, state, now, ref mut scratch, .. } = turn;
+    let Turn { world, state, .. } = *turn;
     let seen = |&slot: &Slot| Seen {
         flyer: flyer(world, state, slot),
         orbits: state.airplanes[slot as usize].orbiting.get() > 0,
     };
     let seen: Vec<Seen> = group.iter().map(seen).collect();
     let fallbacks: Vec<Way> = seen.iter().map(|seen| orbit(world, &seen.flyer)).collect();
-    let events = &mut scratch.events;
-    let (decisions, traffic) = deploy::shielded(world, now, (seen, &candidates), contacts, events);
-    scratch.exchanged.add(traffic);
+    let (decisions, traffic) = deploy::shielded(turn, seen, &candidates, contacts);
+    turn.scratch.exchanged.add(traffic);
     for (decision, &slot) in decisions.iter().zip(group) {
         note(turn, slot, decision);
     }

@@ -1,5 +1,8 @@
 //! The network of the agents: its faults, and the traffic on it.
 
+mod links;
+
+pub use links::{Bursts, OneWay, Partition, Silence};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::ports::Faults;
 use sidestep_kernel::{EntityId, math};
@@ -51,33 +54,28 @@ pub struct Network {
     /// Time in seconds after which an optimization ends; the same for the shield's exchange after
     /// it.
     pub deadline_s: f64,
+    /// Distance in meters that messages reach.
+    pub range_m: f64,
+    /// Bursts of losses, if there are any.
+    pub bursts: Option<Bursts>,
     /// Airplanes whose radio is dead, and the times.
     pub silences: Vec<Silence>,
-}
-
-/// A while in which an airplane's radio is dead: it sends nothing, hears nothing, and knows it.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Silence {
-    /// Id of the airplane.
-    pub airplane: EntityId,
-    /// Start of the silence, in seconds after the start of the run.
-    #[serde(default)]
-    pub from_s: f64,
-    /// End of the silence, in seconds after the start of the run; infinite unless given.
-    #[serde(default = "for_ever")]
-    pub until_s: f64,
-}
-
-fn for_ever() -> f64 {
-    f64::INFINITY
+    /// Sides that do not hear each other, and the times.
+    pub partitions: Vec<Partition>,
+    /// Links that work one way only, and the times.
+    pub one_ways: Vec<OneWay>,
 }
 
 impl Network {
     /// Returns whether an airplane is silent at a time.
     pub fn is_silent(&self, id: EntityId, at_s: f64) -> bool {
-        let now = |s: &&Silence| s.from_s <= at_s && at_s < s.until_s;
-        self.silences.iter().filter(now).any(|s| s.airplane == id)
+        self.silences.iter().any(|silence| silence.airplane == id && silence.is_on(at_s))
+    }
+
+    /// Returns whether a link carries messages at a time, as far as distance does not matter.
+    pub(crate) fn carries(&self, [sender, receiver]: [EntityId; 2], at_s: f64) -> bool {
+        let is_cut = self.partitions.iter().any(|one| one.cuts([sender, receiver], at_s));
+        !is_cut && !self.one_ways.iter().any(|one| one.stops(sender, receiver, at_s))
     }
 
     fn ticks(&self, seconds: f64) -> u64 {

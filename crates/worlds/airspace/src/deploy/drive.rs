@@ -1,5 +1,5 @@
 //! Agents of a group on a network in memory, which can lose, delay, double and reorder messages,
-//! and silence an airplane.
+//! cut links, and silence an airplane.
 //!
 //! Time on it passes in ticks: a message takes one, or more when it is delayed. Every draw depends
 //! on sender, receiver and tick, never on the order in which agents are visited.
@@ -7,8 +7,11 @@
 use crate::agents::network::{Network, Patience, Traffic};
 use crate::agents::{Agent, Ended, Endpoint, Radio};
 use crate::purpose;
+use crate::state::AirspaceState;
 use crate::world::AirspaceWorld;
-use sidestep_kernel::ports::MemoryTransport;
+use sidestep_kernel::distr::Chance;
+use sidestep_kernel::math;
+use sidestep_kernel::ports::{Envelope, MemoryTransport, Transport};
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{Cycle, EntityId};
 use std::sync::Arc;
@@ -30,6 +33,8 @@ pub(super) enum Topic {
 pub(super) struct Talk<'a> {
     /// Faults of the network; with `None` it loses nothing, and agents wait as long as it takes.
     pub(super) network: Option<&'a Network>,
+    /// Where the airplanes are; without it, all reach all.
+    pub(super) state: Option<&'a AirspaceState>,
     pub(super) streams: Streams,
     pub(super) topic: Topic,
     pub(super) now: Cycle,
@@ -38,9 +43,15 @@ pub(super) struct Talk<'a> {
 
 impl<'a> Talk<'a> {
     /// Returns the talk of a group in a cycle.
-    pub(super) fn new(world: &'a AirspaceWorld, topic: Topic, now: Cycle) -> Self {
-        let (network, streams) = (world.network.as_ref(), world.streams);
-        Self { network, streams, topic, now, at_s: world.starts_s(now) }
+    pub(super) fn new(
+        world: &'a AirspaceWorld,
+        state: &'a AirspaceState,
+        topic: Topic,
+        now: Cycle,
+    ) -> Self {
+        let (network, streams, at_s) =
+            (world.network.as_ref(), world.streams, world.starts_s(now));
+        Self { network, state: Some(state), streams, topic, now, at_s }
     }
 
     /// Returns the tick in which the talk starts, and the one in which it ends at the latest.
@@ -62,9 +73,59 @@ impl<'a> Talk<'a> {
     }
 
     /// Returns an empty network with the faults of the scenario.
-    pub(super) fn transport(&self) -> MemoryTransport {
+    pub(super) fn transport(&self) -> Carrier<'a> {
         let faults = self.network.map(Network::faults).unwrap_or_default();
-        MemoryTransport::new(self.streams, purpose::NETWORK, faults)
+        let memory = MemoryTransport::new(self.streams, purpose::NETWORK, faults);
+        Carrier { memory, talk: *self }
+    }
+
+    /// Returns the time of a tick, in seconds after the start of the run: the optimization starts
+    /// with the cycle, and the shield's exchange when the optimization has to be over.
+    fn time_s(&self, network: &Network, tick: u64) -> f64 {
+        let before_s = if self.topic == Topic::Shield { network.deadline_s } else { 0.0 };
+        self.at_s + before_s + (tick - self.ticks().0) as f64 * network.latency_s
+    }
+
+    /// Returns the distance between two airplanes in meters, heights included.
+    fn apart_m(&self, [a, b]: [EntityId; 2]) -> f64 {
+        let Some(state) = self.state else { return 0.0 };
+        let [a, b] = [a, b].map(|id| &state.airplanes[id as usize]);
+        let ([ax, ay], [bx, by]) = (a.pose().at, b.pose().at);
+        let level_m = math::hypot(ax - bx, ay - by);
+        math::hypot(level_m, a.altitude_m.get() - b.altitude_m.get())
+    }
+
+    /// Returns whether the link of a message lets it through: it is not cut, within range, and not
+    /// in a burst that takes the message.
+    fn lets_through(&self, envelope: &Envelope) -> bool {
+        let Some(network) = self.network else { return true };
+        let &Envelope { cycle: tick, sender, receiver, sequence, .. } = envelope;
+        let (link, at_s) = ([sender, receiver], self.time_s(network, tick));
+        if !network.carries(link, at_s) || self.apart_m(link) > network.range_m {
+            return false;
+        }
+        let Some(bursts) = &network.bursts else { return true };
+        let words = self.streams.pair(sender, receiver, tick, purpose::BURST_LOSS, sequence);
+        !(Chance::new(bursts.loss).happens(words[0]) && bursts.is_on(&self.streams, link, at_s))
+    }
+}
+
+/// A network in memory, some of whose links may be cut.
+#[derive(Debug)]
+pub(super) struct Carrier<'a> {
+    memory: MemoryTransport,
+    talk: Talk<'a>,
+}
+
+impl Transport for Carrier<'_> {
+    fn send(&mut self, envelope: Envelope) {
+        if self.talk.lets_through(&envelope) {
+            self.memory.send(envelope);
+        }
+    }
+
+    fn receive(&mut self, receiver: EntityId, now: Cycle) -> Vec<Envelope> {
+        self.memory.receive(receiver, now)
     }
 }
 
@@ -87,7 +148,7 @@ pub(super) fn run<A: Agent>(
     endpoints.iter_mut().for_each(|endpoint| endpoint.start(&mut transport, begin));
     while !endpoints.iter().all(Endpoint::is_done) {
         let timers = endpoints.iter().filter_map(Endpoint::next_timer);
-        let next = timers.chain(transport.next_arrival()).min().unwrap_or(end);
+        let next = timers.chain(transport.memory.next_arrival()).min().unwrap_or(end);
         if next >= end {
             break;
         }
@@ -183,7 +244,7 @@ mod tests {
 
     fn talk(network: Option<&Network>, seed: u64) -> Talk<'_> {
         let streams = Streams::new(Seed(seed));
-        Talk { network, streams, topic: Topic::Optimization, now: 3, at_s: 15.0 }
+        Talk { network, state: None, streams, topic: Topic::Optimization, now: 3, at_s: 15.0 }
     }
 
     fn network(loss: f64, max_delay_s: f64, silences: Vec<Silence>) -> Network {
@@ -194,7 +255,11 @@ mod tests {
             max_delay_s,
             patience_s: 3.0 * (0.001 + max_delay_s),
             deadline_s: 1000.0,
+            range_m: f64::INFINITY,
+            bursts: None,
             silences,
+            partitions: Vec::new(),
+            one_ways: Vec::new(),
         }
     }
 

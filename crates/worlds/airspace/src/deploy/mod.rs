@@ -19,6 +19,8 @@ mod drive;
 mod kind;
 mod optimization;
 mod shield;
+#[cfg(test)]
+mod silence;
 
 use super::agents::Ended;
 use super::agents::contact::Contacts;

@@ -2,6 +2,7 @@
 
 use super::drive::{Talk, Topic, run};
 use super::{Deployment, note_end};
+use crate::Turn;
 use crate::agents::bytes_of;
 use crate::agents::contact::Contacts;
 use crate::agents::exchange::{Agent, Agreed, Message, Proposal, Scene, Seen};
@@ -15,12 +16,12 @@ use std::sync::Arc;
 /// Filters the wishes of the airplanes of a group. Returns the decision for each, and the traffic
 /// on the network; `contacts` receive what they have heard of each other.
 pub(crate) fn shielded(
-    world: &AirspaceWorld,
-    now: Cycle,
-    (seen, candidates): (Vec<Seen>, &[Vec<Way>]),
+    turn: &mut Turn<'_>,
+    seen: Vec<Seen>,
+    candidates: &[Vec<Way>],
     contacts: &mut [Contacts],
-    events: &mut Vec<Event>,
 ) -> (Vec<Decision>, Traffic) {
+    let &mut Turn { world, state, now, ref mut scratch, .. } = turn;
     let Some(network) = &world.network else {
         let flyers: Vec<Flyer> = seen.iter().map(|seen| seen.flyer).collect();
         let frame = (world.timing.points_per_dt(), world.timing.dtau_s);
@@ -32,15 +33,15 @@ pub(crate) fn shielded(
     let agent =
         |(me, ways): (usize, &Vec<Way>)| Agent::new(scene.clone(), me, ways, contacts[me].clone());
     let agents = candidates.iter().enumerate().map(agent).collect();
-    let talk = Talk::new(world, Topic::Shield, now);
+    let talk = Talk::new(world, state, Topic::Shield, now);
     let (ended, traffic) = run(&talk, &ids, agents);
     let mut decisions = Vec::with_capacity(ids.len());
     for (me, end) in ended.into_iter().enumerate() {
-        note_end(world, now, &end, (me, &ids), &contacts[me], events);
+        note_end(world, now, &end, (me, &ids), &contacts[me], &mut scratch.events);
         // An airplane whose radio is dead stays on its fallback, whatever its wish.
         let agreed = end.outcome.filter(|_| !talk.is_silent(ids[me]));
         if agreed.as_ref().is_some_and(|agreed| agreed.held_back) {
-            events.push(Event::of(now, EventKind::HeldBack, ids[me]));
+            scratch.events.push(Event::of(now, EventKind::HeldBack, ids[me]));
         }
         let fallback = Decision { candidate: None, fallback: scene.seen[me].flyer.fallback };
         let decided = |agreed: Agreed| (agreed.decision, agreed.contacts);
