@@ -38,6 +38,11 @@ impl Traffic {
     }
 }
 
+/// Chance of giving up one that is in touch.
+const GIVEN_UP: f64 = 1e-9;
+/// The same for one that was not heard in the talk before: a miss is no worse than that one was.
+const MISSED: f64 = 0.1;
+
 /// A network that may lose, delay and repeat messages.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Network {
@@ -86,26 +91,29 @@ impl Network {
         self.ticks(self.deadline_s)
     }
 
-    /// Returns how long and how often an agent asks another: a silent one is given up in a quarter
-    /// of the time, so that enough is left to go on without it.
+    /// Returns how long an agent waits before it asks, and how often it asks.
     pub(crate) fn patience(&self) -> Patience {
-        let tries = (self.deadline_s / (4.0 * self.patience_s)).clamp(2.0, 12.0) as u32;
-        Patience { ticks: self.ticks(self.patience_s), tries }
+        let (tries, first_tries) = (self.tries(GIVEN_UP), self.tries(MISSED));
+        Patience { ticks: self.ticks(self.patience_s), tries, first_tries }
     }
 
-    /// Returns the number of talks in a row without a message from an airplane after which its
-    /// radio is taken to be dead: at least three, and enough that the chance is below 1e-12 that
-    /// all its messages were lost, together with all questions to it or the answers.
-    pub(crate) fn silent_after(&self) -> u32 {
-        const CHANCE: f64 = 1e-12;
+    /// Returns the same for talks of many steps: one that has fallen silent is given up in a quarter
+    /// of the time at the latest, so that enough is left to go on without it.
+    pub(crate) fn short_patience(&self) -> Patience {
+        let most = (self.deadline_s / (4.0 * self.patience_s)).max(2.0) as u32;
+        let Patience { ticks, tries, first_tries } = self.patience();
+        Patience { ticks, tries: tries.min(most), first_tries: first_tries.min(most) }
+    }
+
+    /// Returns the number of questions after which the chance is at most `chance` that one that is
+    /// in touch has not answered any: each question or its answer was lost, or fell into a burst.
+    fn tries(&self, chance: f64) -> u32 {
         let unanswered = 1.0 - (1.0 - self.loss) * (1.0 - self.loss);
-        let tries = f64::from(self.patience().tries);
-        // In the first of these talks all questions are asked, in each later one a single question.
-        let first = math::ln(self.loss) + tries * math::ln(unanswered);
-        let later = math::ln(self.loss * unanswered);
-        let talks = 1.0 + ((math::ln(CHANCE) - first) / later).ceil().max(0.0);
-        // Without losses the logarithms are infinite, and three talks are enough.
-        if talks.is_finite() { (talks as u32).max(3) } else { 3 }
+        let burst_s = self.bursts.map_or(0.0, |bursts| bursts.lasts_s * -math::ln(chance));
+        let lost = (math::ln(chance) / math::ln(unanswered)).ceil();
+        let on_way_s = 2.0 * (self.latency_s + self.max_delay_s);
+        // The conversion saturates, and bursts may last longer than any talk.
+        ((lost + (burst_s + on_way_s) / self.patience_s) as u32).saturating_add(1)
     }
 
     pub(crate) fn faults(&self) -> Faults {
@@ -124,4 +132,6 @@ pub struct Patience {
     pub ticks: u64,
     /// Number of questions to another before it is given up.
     pub tries: u32,
+    /// The same for one that was not heard in the talk before.
+    pub first_tries: u32,
 }

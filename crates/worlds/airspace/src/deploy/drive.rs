@@ -17,7 +17,7 @@ use sidestep_kernel::{Cycle, EntityId};
 use std::sync::Arc;
 
 /// Patience of agents that wait for each other as long as it takes.
-const FOR_EVER: Patience = Patience { ticks: u64::MAX, tries: 1 };
+const FOR_EVER: Patience = Patience { ticks: u64::MAX, tries: 1, first_tries: 1 };
 
 /// The topics of a `dt`, one after the other: each has ticks of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -69,7 +69,10 @@ impl<'a> Talk<'a> {
 
     /// Returns how agents that do not answer are asked again; `None` where nothing is lost.
     pub(super) fn patience(&self) -> Option<Patience> {
-        self.network.map(Network::patience)
+        self.network.map(|network| match self.topic {
+            Topic::Optimization => network.short_patience(),
+            Topic::Shield => network.patience(),
+        })
     }
 
     /// Returns an empty network with the faults of the scenario.
@@ -141,6 +144,7 @@ pub(super) fn run<A: Agent>(
         group: ids.clone(),
         me,
         patience: talk.patience().unwrap_or(FOR_EVER),
+        ticks: end - begin,
         is_silent: talk.is_silent(ids[me]),
     };
     let endpoint = |(me, agent)| Endpoint::new(agent, radio(me));

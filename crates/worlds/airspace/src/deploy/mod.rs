@@ -122,7 +122,7 @@ mod tests {
                 let metrics = run.metrics();
                 let what = format!("{deployment}, {preset}, seed {seed}: {metrics:?}");
                 assert_eq!(metrics.losses_of_separation, 0, "{what}");
-                assert_eq!(metrics.arrived, 4, "{what}");
+                assert_eq!(metrics.arrived, 5, "{what}");
                 assert!(metrics.contacts_lost >= 4, "{what}");
             }
         }
@@ -153,7 +153,7 @@ mod tests {
             let mut run = over_a_bad_network("default", deployment, network, 1);
             run.advance(300);
             let metrics = run.metrics();
-            assert_eq!((metrics.losses_of_separation, metrics.arrived), (0, 4), "{metrics:?}");
+            assert_eq!((metrics.losses_of_separation, metrics.arrived), (0, 5), "{metrics:?}");
         }
     }
 

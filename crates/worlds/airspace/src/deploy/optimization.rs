@@ -141,5 +141,5 @@ fn filed(world: &AirspaceWorld, id: EntityId) -> Contact {
     let altitude_m = world.airplanes[i].altitude_m;
     let known = Known { slot: id, pose, next: 0, orders: 0, altitude_m };
     let beacon = beacon(world, known);
-    Contact { heard_in, beacon, possible: vec![orbiting], unheard: 0, met_in: heard_in }
+    Contact { presumed: Some(orbiting), ..Contact::heard(beacon, heard_in) }
 }

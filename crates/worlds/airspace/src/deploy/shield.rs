@@ -6,11 +6,10 @@ use crate::Turn;
 use crate::agents::bytes_of;
 use crate::agents::contact::Contacts;
 use crate::agents::exchange::{Agent, Agreed, Message, Proposal, Scene, Seen};
-use crate::agents::network::{Network, Traffic};
+use crate::agents::network::Traffic;
 use crate::events::{Event, EventKind};
 use crate::shield::{Certainty, Decision, Flyer, Way, filter};
-use crate::world::AirspaceWorld;
-use sidestep_kernel::{Cycle, EntityId};
+use sidestep_kernel::EntityId;
 use std::sync::Arc;
 
 /// Filters the wishes of the airplanes of a group. Returns the decision for each, and the traffic
@@ -22,14 +21,14 @@ pub(crate) fn shielded(
     contacts: &mut [Contacts],
 ) -> (Vec<Decision>, Traffic) {
     let &mut Turn { world, state, now, ref mut scratch, .. } = turn;
-    let Some(network) = &world.network else {
+    if world.network.is_none() {
         let flyers: Vec<Flyer> = seen.iter().map(|seen| seen.flyer).collect();
         let frame = (world.timing.points_per_dt(), world.timing.dtau_s);
         let decisions = filter(&flyers, candidates, frame, Certainty::Sure);
         return (decisions, proposals(world.deployment, &flyers, candidates));
-    };
+    }
     let ids: Arc<[EntityId]> = seen.iter().map(|seen| seen.flyer.id).collect();
-    let scene = Arc::new(scene(world, now, network, seen));
+    let scene = Arc::new(Scene { air: world.air(), vertical_m: world.vertical_m, now, seen });
     let agent =
         |(me, ways): (usize, &Vec<Way>)| Agent::new(scene.clone(), me, ways, contacts[me].clone());
     let agents = candidates.iter().enumerate().map(agent).collect();
@@ -38,8 +37,7 @@ pub(crate) fn shielded(
     let mut decisions = Vec::with_capacity(ids.len());
     for (me, end) in ended.into_iter().enumerate() {
         note_end(world, now, &end, (me, &ids), &contacts[me], &mut scratch.events);
-        // An airplane whose radio is dead stays on its fallback, whatever its wish.
-        let agreed = end.outcome.filter(|_| !talk.is_silent(ids[me]));
+        let agreed = end.outcome;
         if agreed.as_ref().is_some_and(|agreed| agreed.held_back) {
             scratch.events.push(Event::of(now, EventKind::HeldBack, ids[me]));
         }
@@ -51,11 +49,6 @@ pub(crate) fn shielded(
         decisions.push(decision);
     }
     (decisions, traffic)
-}
-
-fn scene(world: &AirspaceWorld, now: Cycle, network: &Network, seen: Vec<Seen>) -> Scene {
-    let silent_after = network.silent_after();
-    Scene { air: world.air(), vertical_m: world.vertical_m, now, silent_after, seen }
 }
 
 /// Returns the traffic that the proposals alone take on a network that loses nothing.

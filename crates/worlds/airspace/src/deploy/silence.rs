@@ -7,7 +7,7 @@ use sidestep_kernel::{Seed, Simulation};
 use sidestep_scenario::Source;
 
 /// Time in seconds that each scenario is flown.
-const FLOWN_S: f64 = 450.0;
+const FLOWN_S: f64 = 300.0;
 
 /// Random scenarios, each made of the draws of its own seed.
 struct Case {
@@ -106,8 +106,11 @@ impl Case {
         let late = if self.happens(0.5) { self.late() } else { String::new() };
         let deployment = ["team", "compact-team", "pim"][self.draws.below(3) as usize];
         let method = if self.happens(0.1) { "pc" } else { "none" };
-        let kind = ["superconflict", "random"][self.draws.below(2) as usize];
-        let radius_m = self.between(1800.0, 3500.0) * f64::from(self.n).sqrt();
+        let (kind, least_m) = match self.happens(0.7) {
+            true => ("superconflict", 350.0 * f64::from(self.n)),
+            false => ("random", 1300.0 * f64::from(self.n).sqrt()),
+        };
+        let radius_m = least_m + self.between(1000.0, 4000.0);
         let (seed, generated) = (self.draws.next_u32(), self.n);
         // Those that come in later have the ids after the generated ones.
         self.n += u32::from(!late.is_empty());

@@ -1,7 +1,7 @@
 //! An airplane as the shield knows it.
 
 use super::orbit::{Orbit, Side};
-use crate::flight::{Levels, Pose};
+use crate::flight::{Levels, Pose, distance_m};
 use sidestep_kernel::EntityId;
 
 /// Meters that new plans keep in addition to the separation.
@@ -53,6 +53,14 @@ impl Flyer {
     /// Returns the distance in meters that two airplanes have to keep on new plans.
     pub(super) fn gap_m(&self, other: &Self) -> f64 {
         self.separation_m.max(other.separation_m) + SLACK_M
+    }
+
+    /// Returns whether some ways of `dt_s` seconds, and orbits after them, could bring two airplanes
+    /// too near each other.
+    pub(crate) fn is_in_reach(&self, other: &Self, dt_s: f64) -> bool {
+        let reach_m = |f: &Self| f.v_m_s * dt_s + 2.0 * (f.v_m_s / f.omega_max_rad_s);
+        let apart_m = distance_m(self.pose.at, other.pose.at);
+        apart_m < self.gap_m(other) + reach_m(self) + reach_m(other)
     }
 
     /// Returns whether two different airplanes are on levels that meet.

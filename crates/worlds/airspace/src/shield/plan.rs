@@ -70,15 +70,10 @@ impl Plan {
         if !self.flyer.minds(&other.flyer) {
             return true;
         }
-        let gap_m = self.flyer.gap_m(&other.flyer);
-        let reach = |plan: &Self| {
-            let dt_s = plan.dtau_s * plan.omegas_rad_s.len() as f64;
-            plan.flyer.v_m_s * dt_s + 2.0 * plan.orbit.radius_m
-        };
-        let now_m = distance_m(self.poses[0].at, other.poses[0].at);
-        if now_m >= gap_m + reach(self) + reach(other) {
+        if !self.flyer.is_in_reach(&other.flyer, self.dtau_s * self.omegas_rad_s.len() as f64) {
             return true;
         }
+        let gap_m = self.flyer.gap_m(&other.flyer);
         self.orbit.stays_apart(&other.orbit, gap_m) && self.ways_stay_apart(other, gap_m)
     }
 
