@@ -14,8 +14,8 @@
 //! 3. Each *accepts* the plans of others that keep apart from its own plan and its own fallback,
 //!    and sends the list of those it accepts.
 //! 4. Of two airplanes one *goes first* (`Scene::goes_first`). An airplane flies its plan if all
-//!    those near it that go before it have accepted it, else its fallback. It does not ask those
-//!    that it goes before, nor those so far away that no two plans of theirs could meet.
+//!    those that go before it have accepted it, else its fallback. It does not ask those that it
+//!    goes before, nor those from whom its plan keeps apart whatever they do.
 //!
 //! Who goes first follows from ids, time and what can be seen, and so both know it without a word.
 //! It cannot follow from anything that was heard: whatever the one has heard, the other may not
@@ -30,14 +30,14 @@
 //! **Invariant.** For any two airplanes, the orbits that the one may be on, as far as the other
 //! knows, include the one it is on; and the orbits that the two are on keep apart.
 //!
-//! *Why it is kept.* Take two airplanes near each other, of which `i` goes first. Each flies its
-//! plan or its fallback. Whatever was heard, `i`'s plan keeps apart from `j`'s fallback: `j` has
-//! told it, or it is among the orbits possible, from all of which `i`'s plan keeps apart. The
-//! fallbacks keep apart from each other. So only `j`'s plan is left. `j` flies it only if it has
-//! heard that `i` accepts it, and `i` has compared it with both its own plan and its own fallback.
-//! So whatever the two fly keeps apart, during `dt` and on the orbits after it. What the one knows
-//! of the other's orbit after that it sees, or has heard as the only plan that the other could fly;
-//! where it has not, it takes both sides to be possible.
+//! *Why it is kept.* Take two airplanes, of which `i` goes first. Each flies its plan or its
+//! fallback. Whatever was heard, `i`'s plan keeps apart from `j`'s fallback: `j` has told it, or it
+//! is among the orbits possible, from all of which `i`'s plan keeps apart. The fallbacks keep apart
+//! from each other. So only `j`'s plan is left. `j` flies it only if it keeps apart from whatever
+//! `i` may do, or if it has heard that `i` accepts it; and `i` has compared it with both its own
+//! plan and its own fallback. So whatever the two fly keeps apart, during `dt` and on the orbits
+//! after it. The orbit on which the other is after that each sees, or has heard as the end of its
+//! only plan; where it has not, it takes both sides to be possible.
 //!
 //! Nothing in this depends on why an airplane is not heard, or for how long: a dead radio, a
 //! network in two parts, a link that works one way only, a burst of losses, or an airplane that has
@@ -97,8 +97,6 @@ struct Member {
     plan: Option<Option<(Way, Side)>>,
     accepts: Option<Vec<u16>>,
     gone: bool,
-    /// Whether this airplane has accepted its plan.
-    accepted: bool,
 }
 
 /// Outcome of the exchange for one airplane.
@@ -131,6 +129,8 @@ pub struct Agent {
     contacts: Contacts,
     members: Vec<Member>,
     decision: Option<Decision>,
+    /// Places of those without whose consent it does not fly its plan.
+    asked: Vec<usize>,
     agreed: Option<Agreed>,
 }
 
@@ -147,6 +147,7 @@ impl Agent {
             members: scene.seen.iter().map(|_| Member::default()).collect(),
             scene,
             decision: None,
+            asked: Vec::new(),
             agreed: None,
         }
     }
@@ -248,6 +249,11 @@ impl Agent {
         let decision = filter(&flyers, &candidates, frame, Certainty::Mixable)[mine];
         self.decision = Some(decision);
         let way = decision.candidate.map(|k| (self.own.ways[k].clone(), decision.fallback));
+        // Its fallback needs no consent, because all others keep apart from it anyway.
+        self.asked = match way.is_some() {
+            true => self.to_ask(&self.plan_of(self.flyer, &way)),
+            false => Vec::new(),
+        };
         self.members[self.me].plan = Some(way.clone());
         Message::Plan(way)
     }
@@ -264,7 +270,7 @@ impl Agent {
     fn accept(&mut self) -> Message {
         let own = self.members[self.me].plan.clone().flatten();
         let mine = [self.plan_of(self.flyer, &own), self.fallback(self.flyer)];
-        let mut accepted = Vec::new();
+        let mut accepts = Vec::new();
         for place in (0..self.size()).filter(|&place| place != self.me) {
             let Member { proposal: Some(proposal), plan: Some(plan), .. } = &self.members[place]
             else {
@@ -272,34 +278,28 @@ impl Agent {
             };
             let theirs = self.plan_of(self.flyer_of(place, proposal), plan);
             if mine.iter().all(|plan| plan.is_compatible(&theirs)) {
-                accepted.push(place);
+                accepts.push(place as u16);
             }
         }
-        accepted.iter().for_each(|&place| self.members[place].accepted = true);
-        let accepts: Vec<u16> = accepted.iter().map(|&place| place as u16).collect();
         self.members[self.me].accepts = Some(accepts.clone());
         Message::Accepts(accepts)
     }
 
-    /// Returns whether a member has agreed to this airplane's plan, or need not be asked.
+    /// Returns the members whose consent a plan of this airplane needs.
+    fn to_ask(&self, plan: &Plan) -> Vec<usize> {
+        let needs = |&place: &usize| {
+            let other = &self.scene.seen[place].flyer;
+            self.flyer.minds(other)
+                && self.scene.goes_first(place, self.me)
+                && !plan.is_clear_of(other)
+        };
+        (0..self.size()).filter(|&place| place != self.me).filter(needs).collect()
+    }
+
+    /// Returns whether a member has agreed to this airplane's plan.
     fn agrees(&self, place: usize) -> bool {
         let accepts = self.members[place].accepts.as_ref();
-        let [me, other] = [&self.flyer, &self.scene.seen[place].flyer];
         accepts.is_some_and(|accepted| accepted.contains(&(self.me as u16)))
-            || !me.minds(other)
-            || !self.is_near(place)
-            || self.scene.goes_first(self.me, place)
-    }
-
-    /// Returns whether some plans of this airplane and another one could meet.
-    fn is_near(&self, place: usize) -> bool {
-        self.flyer.is_in_reach(&self.scene.seen[place].flyer, self.scene.air.timing.dt_s)
-    }
-
-    /// Returns whether a member that was heard may have flown its plan.
-    fn may_fly_plan(&self, place: usize) -> bool {
-        let needs_no_consent = !self.is_near(place) || self.scene.goes_first(place, self.me);
-        self.members[place].accepted || needs_no_consent
     }
 
     /// Returns whether a member was present and not heard in the exchange before.
@@ -313,9 +313,7 @@ impl Agent {
     fn agree(&mut self) {
         let fallback = Decision { candidate: None, fallback: self.flyer.fallback };
         let wanted = self.decision.unwrap_or(fallback);
-        let mut others = (0..self.size()).filter(|&place| place != self.me);
-        // The fallback needs no consent, because all others keep apart from it anyway.
-        let all_agree = wanted.candidate.is_none() || others.all(|place| self.agrees(place));
+        let all_agree = self.asked.iter().all(|&place| self.agrees(place));
         self.agreed = Some(Agreed {
             decision: if all_agree { wanted } else { fallback },
             held_back: !all_agree,
@@ -340,8 +338,8 @@ impl Agent {
             let sighted = || Contact::heard(Beacon::of(&self.scene.seen[place].flyer), now);
             let contact = contacts.entry(id).or_insert_with(sighted);
             let is_heard = member.proposal.is_some();
-            let plan = member.plan.as_ref().filter(|_| is_heard && self.may_fly_plan(place));
-            let planned = plan.and_then(Option::as_ref);
+            // Where it is seen to fly a way, it has flown the plan that it has told.
+            let planned = member.plan.as_ref().and_then(Option::as_ref);
             contact.planned = planned.map(|(_, side)| Planned { as_of: now + 1, side: *side });
             contact.presumed = Some(self.orbiting(&self.fallback(flyer)));
             contact.unheard_in = (!is_heard).then_some(now);
@@ -387,15 +385,13 @@ impl link::Agent for Agent {
     }
 
     fn awaits(&self) -> Vec<usize> {
-        let (stage, own) = (self.stage(), self.decision);
+        let stage = self.stage();
         let is_missing = |place: usize| {
             let member = &self.members[place];
             match stage {
                 Stage::Proposals => member.proposal.is_none(),
-                Stage::Plans => member.plan.is_none() && self.is_near(place),
-                // Its fallback needs no consent.
-                Stage::Consent if own.is_none_or(|own| own.candidate.is_none()) => false,
-                Stage::Consent => member.accepts.is_none() && !self.agrees(place),
+                Stage::Plans => member.plan.is_none(),
+                Stage::Consent => member.accepts.is_none() && self.asked.contains(&place),
                 Stage::Over => false,
             }
         };

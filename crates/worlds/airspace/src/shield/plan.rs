@@ -88,6 +88,20 @@ impl Plan {
         })
     }
 
+    /// Returns whether it keeps apart from another airplane whatever that one does, for one `dt`
+    /// and on orbits ever after.
+    pub(crate) fn is_clear_of(&self, other: &Flyer) -> bool {
+        let dt_s = self.dtau_s * self.omegas_rad_s.len() as f64;
+        let (centers, radius_m) = other.reach(dt_s);
+        let apart_m = radius_m + self.flyer.gap_m(other);
+        // Between two poses it is within half a step of one of them.
+        let half_step_m = 0.5 * self.flyer.v_m_s * self.dtau_s;
+        centers.iter().all(|&center| {
+            let is_far = |pose: &Pose| distance_m(pose.at, center) >= apart_m + half_step_m;
+            self.poses.iter().all(is_far) && self.orbit.is_outside(center, apart_m)
+        })
+    }
+
     /// Returns whether this is the stored fallback.
     pub(super) fn is_fallback(&self) -> bool {
         self.candidate.is_none()

@@ -5,6 +5,9 @@ use crate::shield::Flyer;
 use sidestep_kernel::stream::philox4x32;
 use sidestep_kernel::{Cycle, EntityId};
 
+/// Number of cycles after which airplanes take turns.
+const TURN_CYCLES: Cycle = 12;
+
 /// An airplane as others see it.
 #[derive(Debug, Clone, Copy)]
 pub struct Seen {
@@ -43,11 +46,10 @@ impl Scene {
     }
 }
 
-/// Returns a number by which airplanes take turns: for each pair of cycles anew, and in the second
-/// one of the pair in reverse. It is drawn without a seed, because all have to know it.
+/// Returns a number by which airplanes take turns: drawn without a seed, because all have to know it,
+/// and anew when one has had time to get out of the others' way.
 fn turn(id: EntityId, now: Cycle) -> u64 {
-    let pair = now / 2;
-    let [high, low, ..] = philox4x32([id, pair as u32, (pair >> 32) as u32, 0], [0; 2]);
-    let drawn = u64::from(high) << 32 | u64::from(low);
-    if now % 2 == 0 { drawn } else { !drawn }
+    let round = now / TURN_CYCLES;
+    let [high, low, ..] = philox4x32([id, round as u32, (round >> 32) as u32, 0], [0; 2]);
+    u64::from(high) << 32 | u64::from(low)
 }
