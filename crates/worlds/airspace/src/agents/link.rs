@@ -103,6 +103,8 @@ pub struct Endpoint<A> {
     others: Vec<Other>,
     began: u64,
     quiet_since: u64,
+    /// Size of the largest packet that it has sent or heard, in bytes.
+    largest: usize,
     late: bool,
     /// Number of packets sent so far, which distinguishes those of one tick.
     sent: u32,
@@ -161,6 +163,7 @@ impl<A: Agent> Endpoint<A> {
             others,
             began: 0,
             quiet_since: 0,
+            largest: 0,
             late: false,
             sent: 0,
             traffic: Traffic::default(),
@@ -200,6 +203,7 @@ impl<A: Agent> Endpoint<A> {
                 None => (0..group.len()).filter(|place| place != me).collect(),
             };
             self.traffic.count(receivers.len(), payload.len());
+            self.largest = self.largest.max(payload.len());
             for place in receivers {
                 transport.send(Envelope {
                     cycle: tick,
@@ -229,6 +233,7 @@ impl<A: Agent> Endpoint<A> {
             return Vec::new();
         };
         (self.others[from].unanswered, self.others[from].is_there) = (0, true);
+        self.largest = self.largest.max(bytes.len());
         match packet {
             Packet::Said(number, message) if self.others[from].takes(number) => {
                 self.quiet_since = tick;
@@ -290,7 +295,8 @@ impl<A: Agent> Endpoint<A> {
 
     /// Returns the tick in which its patience ends.
     pub fn next_timer(&self) -> Option<u64> {
-        (!self.is_done()).then(|| self.quiet_since.saturating_add(self.radio.patience.ticks))
+        let ticks = self.radio.patience.ticks_for(self.largest);
+        (!self.is_done()).then(|| self.quiet_since.saturating_add(ticks))
     }
 
     /// Ends the talk of an airplane that nobody hears and that hears nobody.

@@ -18,6 +18,8 @@ pub struct Traffic {
     pub bytes: u64,
     /// Number of bytes if one message could reach all.
     pub multicast_bytes: u64,
+    /// Number of ticks that the talks took, one after the other.
+    pub ticks: u64,
 }
 
 impl Traffic {
@@ -27,6 +29,7 @@ impl Traffic {
         self.multicasts += other.multicasts;
         self.bytes += other.bytes;
         self.multicast_bytes += other.multicast_bytes;
+        self.ticks += other.ticks;
     }
 
     /// Counts a message to `receivers` others.
@@ -52,6 +55,8 @@ pub struct Network {
     pub duplication: f64,
     /// Time in seconds that every message takes: one tick.
     pub latency_s: f64,
+    /// Bits that go over each way of each link in a second, in addition to the latency.
+    pub bandwidth_bit_s: f64,
     /// Largest further delay in seconds, drawn uniformly, so that messages overtake each other.
     pub max_delay_s: f64,
     /// Time in seconds without a new message after which an agent asks those it waits for.
@@ -87,6 +92,16 @@ impl Network {
         (seconds / self.latency_s).round().max(1.0) as u64
     }
 
+    /// Returns the time that some ticks take.
+    pub(crate) fn seconds(&self, ticks: u64) -> f64 {
+        ticks as f64 * self.latency_s
+    }
+
+    /// Returns the number of bits that go over a link in a tick.
+    pub(crate) fn bits_per_tick(&self) -> f64 {
+        self.bandwidth_bit_s * self.latency_s
+    }
+
     pub(crate) fn deadline_ticks(&self) -> u64 {
         self.ticks(self.deadline_s)
     }
@@ -94,15 +109,16 @@ impl Network {
     /// Returns how long an agent waits before it asks, and how often it asks.
     pub(crate) fn patience(&self) -> Patience {
         let (tries, first_tries) = (self.tries(GIVEN_UP), self.tries(MISSED));
-        Patience { ticks: self.ticks(self.patience_s), tries, first_tries }
+        let bits_per_tick = self.bits_per_tick();
+        Patience { ticks: self.ticks(self.patience_s), bits_per_tick, tries, first_tries }
     }
 
     /// Returns the same for talks of many steps: one that has fallen silent is given up in a quarter
     /// of the time at the latest, so that enough is left to go on without it.
     pub(crate) fn short_patience(&self) -> Patience {
         let most = (self.deadline_s / (4.0 * self.patience_s)).max(2.0) as u32;
-        let Patience { ticks, tries, first_tries } = self.patience();
-        Patience { ticks, tries: tries.min(most), first_tries: first_tries.min(most) }
+        let long = self.patience();
+        Patience { tries: long.tries.min(most), first_tries: long.first_tries.min(most), ..long }
     }
 
     /// Returns the number of questions after which the chance is at most `chance` that one that is
@@ -130,8 +146,19 @@ impl Network {
 pub struct Patience {
     /// Number of ticks without a new message after which it asks.
     pub ticks: u64,
+    /// Number of bits that go over a link in a tick.
+    pub bits_per_tick: f64,
     /// Number of questions to another before it is given up.
     pub tries: u32,
     /// The same for one that was not heard in the talk before.
     pub first_tries: u32,
+}
+
+impl Patience {
+    /// Returns the number of ticks after which it asks where messages are of this size: those that
+    /// a message and its answer take on the way come on top.
+    pub(crate) fn ticks_for(&self, bytes: usize) -> u64 {
+        let on_way = (2.0 * 8.0 * bytes as f64 / self.bits_per_tick).ceil();
+        self.ticks.saturating_add(on_way as u64)
+    }
 }

@@ -14,10 +14,12 @@ use sidestep_kernel::math;
 use sidestep_kernel::ports::{Envelope, MemoryTransport, Transport};
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{Cycle, EntityId};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Patience of agents that wait for each other as long as it takes.
-const FOR_EVER: Patience = Patience { ticks: u64::MAX, tries: 1, first_tries: 1 };
+const FOR_EVER: Patience =
+    Patience { ticks: u64::MAX, bits_per_tick: f64::INFINITY, tries: 1, first_tries: 1 };
 
 /// The topics of a `dt`, one after the other: each has ticks of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -49,8 +51,7 @@ impl<'a> Talk<'a> {
         topic: Topic,
         now: Cycle,
     ) -> Self {
-        let (network, streams, at_s) =
-            (world.network.as_ref(), world.streams, world.starts_s(now));
+        let (network, streams, at_s) = (world.network.as_ref(), world.streams, world.starts_s(now));
         Self { network, state: Some(state), streams, topic, now, at_s }
     }
 
@@ -79,7 +80,7 @@ impl<'a> Talk<'a> {
     pub(super) fn transport(&self) -> Carrier<'a> {
         let faults = self.network.map(Network::faults).unwrap_or_default();
         let memory = MemoryTransport::new(self.streams, purpose::NETWORK, faults);
-        Carrier { memory, talk: *self }
+        Carrier { memory, talk: *self, free_at: BTreeMap::new() }
     }
 
     /// Returns the time of a tick, in seconds after the start of the run: the optimization starts
@@ -118,11 +119,31 @@ impl<'a> Talk<'a> {
 pub(super) struct Carrier<'a> {
     memory: MemoryTransport,
     talk: Talk<'a>,
+    /// Tick from which on each way of a link is free, where messages of some size take time.
+    free_at: BTreeMap<[EntityId; 2], f64>,
+}
+
+impl Carrier<'_> {
+    /// Returns the tick in which all of a message is on its way: its link carries one after the
+    /// other.
+    fn is_out_at(&mut self, envelope: &Envelope) -> u64 {
+        let bits_per_tick = self.talk.network.map_or(f64::INFINITY, Network::bits_per_tick);
+        if bits_per_tick == f64::INFINITY {
+            return envelope.cycle;
+        }
+        let free_at = self.free_at.entry([envelope.sender, envelope.receiver]).or_default();
+        let bits = 8.0 * envelope.payload.len() as f64;
+        *free_at = free_at.max(envelope.cycle as f64) + bits / bits_per_tick;
+        free_at.floor() as u64
+    }
 }
 
 impl Transport for Carrier<'_> {
-    fn send(&mut self, envelope: Envelope) {
-        if self.talk.lets_through(&envelope) {
+    fn send(&mut self, mut envelope: Envelope) {
+        let is_carried = self.talk.lets_through(&envelope);
+        // What is lost on the way takes its time on the link all the same.
+        envelope.cycle = self.is_out_at(&envelope);
+        if is_carried {
             self.memory.send(envelope);
         }
     }
@@ -150,15 +171,17 @@ pub(super) fn run<A: Agent>(
     let endpoint = |(me, agent)| Endpoint::new(agent, radio(me));
     let mut endpoints: Vec<Endpoint<A>> = agents.into_iter().enumerate().map(endpoint).collect();
     endpoints.iter_mut().for_each(|endpoint| endpoint.start(&mut transport, begin));
+    let mut now = begin;
     while !endpoints.iter().all(Endpoint::is_done) {
         let timers = endpoints.iter().filter_map(Endpoint::next_timer);
         let next = timers.chain(transport.memory.next_arrival()).min().unwrap_or(end);
-        if next >= end {
+        now = next.min(end);
+        if now == end {
             break;
         }
         endpoints.iter_mut().for_each(|endpoint| endpoint.step(&mut transport, next));
     }
-    let mut traffic = Traffic::default();
+    let mut traffic = Traffic { ticks: now - begin, ..Traffic::default() };
     endpoints.iter().for_each(|endpoint| traffic.add(endpoint.traffic()));
     (endpoints.into_iter().map(Endpoint::end).collect(), traffic)
 }
@@ -256,6 +279,7 @@ mod tests {
             loss,
             duplication: 0.2,
             latency_s: 0.001,
+            bandwidth_bit_s: f64::INFINITY,
             max_delay_s,
             patience_s: 3.0 * (0.001 + max_delay_s),
             deadline_s: 1000.0,

@@ -21,6 +21,7 @@ pub(super) struct NetworkSection {
     max_delay_s: Option<NonNegative>,
     patience_s: Option<Positive>,
     deadline_s: Option<Positive>,
+    bandwidth_bit_s: Option<Number<Bandwidth>>,
     range_m: Option<Positive>,
     bursts: Option<BurstsSection>,
     silent: Vec<Spanned<Silence>>,
@@ -60,6 +61,20 @@ impl Rule for Latency {
     }
 }
 
+/// A bandwidth that carries a message in the time of a flight.
+#[derive(Debug, Clone, Copy)]
+struct Bandwidth;
+
+impl Rule for Bandwidth {
+    fn allows(number: f64) -> bool {
+        number >= 1.0
+    }
+
+    fn words() -> String {
+        "at least 1 bit/s".into()
+    }
+}
+
 impl NetworkSection {
     fn network(&self, timing: &Timing) -> Network {
         let latency_s = self.latency_s.map_or(0.001, f64::from);
@@ -68,6 +83,7 @@ impl NetworkSection {
             loss: self.loss.map_or(0.0, f64::from),
             duplication: self.duplication.map_or(0.0, f64::from),
             latency_s,
+            bandwidth_bit_s: self.bandwidth_bit_s.map_or(f64::INFINITY, f64::from),
             max_delay_s,
             patience_s: self.patience_s.map_or(3.0 * (latency_s + max_delay_s), f64::from),
             deadline_s: self.deadline_s.map_or(0.45 * timing.dt_s, f64::from),

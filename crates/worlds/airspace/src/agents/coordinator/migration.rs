@@ -114,7 +114,7 @@ impl<'a> Migration<'a> {
             false => patience.first_tries,
         };
         let tries = self.journey.patience.map_or(1, tries);
-        let wait = self.journey.patience.map_or(1, |patience| patience.ticks);
+        let wait = self.journey.patience.map_or(1, |patience| patience.ticks_for(bytes.len()));
         let mut arrived = None;
         for _ in 0..tries {
             if self.is_late() {
