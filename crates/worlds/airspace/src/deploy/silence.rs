@@ -133,18 +133,31 @@ fn fault(seed: u64) -> Option<String> {
     (!is_kept).then(|| format!("seed {seed}: {metrics:?}\n{text}"))
 }
 
+/// Flies scenarios until one is wrong.
 fn nobody_is_lost(seeds: std::ops::Range<u64>) {
-    let faults: Vec<String> = seeds.filter_map(fault).collect();
-    assert!(faults.is_empty(), "{} of all, the first:\n{}", faults.len(), faults[0]);
+    for seed in seeds {
+        if let Some(fault) = fault(seed) {
+            panic!("{fault}");
+        }
+        if seed % 500 == 0 {
+            println!("nobody is lost up to seed {seed}");
+        }
+    }
 }
 
 #[test]
 fn nobody_comes_near_one_that_it_does_not_hear() {
-    nobody_is_lost(0..60);
+    nobody_is_lost(0..40);
 }
 
 #[test]
-#[ignore = "minutes: 10,000 scenarios"]
-fn nobody_of_10_000_scenarios_comes_near_one_that_it_does_not_hear() {
-    nobody_is_lost(60..10_060);
+#[ignore = "five minutes of processor time; 10,000 scenarios with the other half"]
+fn nobody_comes_near_one_that_it_does_not_hear_in_5_000_scenarios() {
+    nobody_is_lost(40..5_040);
+}
+
+#[test]
+#[ignore = "five minutes of processor time; 10,000 scenarios with the other half"]
+fn nobody_comes_near_one_that_it_does_not_hear_in_5_000_more_scenarios() {
+    nobody_is_lost(5_040..10_040);
 }
