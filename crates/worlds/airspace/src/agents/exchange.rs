@@ -71,7 +71,7 @@ pub enum Message {
 pub struct Proposal {
     beacon: Beacon,
     fallback: Side,
-    came_too_close: bool,
+    named: Vec<EntityId>,
     rank: u64,
     ways: Vec<Way>,
 }
@@ -82,7 +82,7 @@ impl Proposal {
         Self {
             beacon: Beacon::of(flyer),
             fallback: flyer.fallback,
-            came_too_close: flyer.came_too_close,
+            named: flyer.named.to_vec(),
             rank: flyer.rank,
             ways: ways.to_vec(),
         }
@@ -138,11 +138,11 @@ impl Agent {
     /// Returns an agent that has not sent anything yet, for the airplane at place `me`, which may
     /// fly `ways`.
     pub fn new(scene: Arc<Scene>, me: usize, ways: &[Way], contacts: Contacts) -> Self {
-        let flyer = scene.seen[me].flyer;
+        let flyer = scene.seen[me].flyer.clone();
         Self {
             me,
-            flyer,
             own: Proposal::new(&flyer, ways),
+            flyer,
             contacts,
             members: scene.seen.iter().map(|_| Member::default()).collect(),
             scene,
@@ -173,33 +173,36 @@ impl Agent {
     }
 
     fn flyer_of(&self, place: usize, proposal: &Proposal) -> Flyer {
-        let Proposal { beacon, fallback, came_too_close, rank, .. } = proposal;
+        let Proposal { beacon, fallback, named, rank, .. } = proposal;
         Flyer {
             id: self.id(place),
             pose: beacon.pose,
+            held: beacon.pose,
             v_m_s: beacon.v_m_s,
             omega_max_rad_s: beacon.omega_max_rad_s,
+            orbit_rad_s: beacon.orbit_rad_s,
             separation_m: beacon.separation_m,
+            error_m: self.scene.seen[place].flyer.error_m,
             levels: beacon.levels,
             vertical_m: self.scene.vertical_m,
             fallback: *fallback,
-            came_too_close: *came_too_close,
+            named: named.as_slice().into(),
             rank: *rank,
         }
     }
 
     /// Returns all orbits that an unheard airplane may be on.
     fn possible(&self, place: usize) -> Vec<Flyer> {
-        let Seen { flyer, orbits } = self.scene.seen[place];
-        if orbits {
-            return vec![flyer];
+        let Seen { flyer, orbits } = &self.scene.seen[place];
+        if *orbits {
+            return vec![flyer.clone()];
         }
         let told = self.contacts.get(&flyer.id).and_then(|contact| contact.planned);
         let sides = match told.filter(|planned| planned.as_of == self.scene.now) {
             Some(Planned { side, .. }) => vec![side],
             None => Side::BOTH.to_vec(),
         };
-        sides.into_iter().map(|fallback| Flyer { fallback, ..flyer }).collect()
+        sides.into_iter().map(|fallback| Flyer { fallback, ..flyer.clone() }).collect()
     }
 
     fn stage(&self) -> Stage {
@@ -233,7 +236,7 @@ impl Agent {
         for place in 0..self.size() {
             if place == self.me {
                 mine = flyers.len();
-                flyers.push(self.flyer);
+                flyers.push(self.flyer.clone());
                 candidates.push(self.own.ways.clone());
             } else if let Some(proposal) = &self.members[place].proposal {
                 flyers.push(self.flyer_of(place, proposal));
@@ -251,7 +254,7 @@ impl Agent {
         let way = decision.candidate.map(|k| (self.own.ways[k].clone(), decision.fallback));
         // Its fallback needs no consent, because all others keep apart from it anyway.
         self.asked = match way.is_some() {
-            true => self.to_ask(&self.plan_of(self.flyer, &way)),
+            true => self.to_ask(&self.plan_of(self.flyer.clone(), &way)),
             false => Vec::new(),
         };
         self.members[self.me].plan = Some(way.clone());
@@ -269,7 +272,7 @@ impl Agent {
     /// Accepts the plans that keep apart from both its own plan and its own fallback.
     fn accept(&mut self) -> Message {
         let own = self.members[self.me].plan.clone().flatten();
-        let mine = [self.plan_of(self.flyer, &own), self.fallback(self.flyer)];
+        let mine = [self.plan_of(self.flyer.clone(), &own), self.fallback(self.flyer.clone())];
         let mut accepts = Vec::new();
         for place in (0..self.size()).filter(|&place| place != self.me) {
             let Member { proposal: Some(proposal), plan: Some(plan), .. } = &self.members[place]
@@ -332,7 +335,7 @@ impl Agent {
                     note(&mut contacts, id, proposal.beacon.clone(), now);
                     self.flyer_of(place, proposal)
                 }
-                None => self.possible(place)[0],
+                None => self.possible(place).swap_remove(0),
             };
             // Use the sighting, if it was never heard.
             let sighted = || Contact::heard(Beacon::of(&self.scene.seen[place].flyer), now);

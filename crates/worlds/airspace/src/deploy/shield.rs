@@ -22,7 +22,7 @@ pub(crate) fn shielded(
 ) -> (Vec<Decision>, Traffic) {
     let &mut Turn { world, state, now, ref mut scratch, .. } = turn;
     if world.network.is_none() {
-        let flyers: Vec<Flyer> = seen.iter().map(|seen| seen.flyer).collect();
+        let flyers: Vec<Flyer> = seen.iter().map(|seen| seen.flyer.clone()).collect();
         let frame = (world.timing.points_per_dt(), world.timing.dtau_s);
         let decisions = filter(&flyers, candidates, frame, Certainty::Sure);
         return (decisions, proposals(world.deployment, &flyers, candidates));

@@ -9,7 +9,7 @@ use sidestep_kernel::{Cycle, EntityId};
 const TURN_CYCLES: Cycle = 12;
 
 /// An airplane as others see it.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Seen {
     /// Its place, its model, and its stored fallback.
     pub flyer: Flyer,
