@@ -6,7 +6,7 @@
 //! each claim whether it held, did not hold, or cannot be judged.
 //!
 //! ```text
-//! floor.rs, patrol.rs, errors.rs   the buildings, the behaviors, the error tables
+//! floor.rs, errors.rs              the buildings, the error tables
 //! measure.rs   -> reliability.rs, genericity.rs               results of runs
 //! timing.rs    -> performance.rs, strategies.rs, cost_model.rs   durations of runs
 //! scenes.rs                        ways of robots, as pictures
@@ -19,7 +19,6 @@ mod errors;
 mod floor;
 mod genericity;
 mod measure;
-mod patrol;
 mod performance;
 mod reliability;
 pub mod scenes;

@@ -187,8 +187,20 @@ pub(super) struct BehaviourSection {
     pub(super) goals: Option<Vec<(u32, u32)>>,
     pub(super) actions: Option<Vec<String>>,
     pub(super) repeat: Option<bool>,
+    pub(super) avoidance: Option<AvoidanceSection>,
     pub(super) weights: Option<BTreeMap<String, f64>>,
     pub(super) weights_after_contact: Option<BTreeMap<String, f64>>,
+}
+
+/// How robots that go somewhere get past what is in their way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum AvoidanceSection {
+    #[default]
+    Plan,
+    Avoid,
+    Filter,
+    Touch,
 }
 
 #[derive(Debug, Deserialize)]
