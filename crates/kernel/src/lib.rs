@@ -43,7 +43,7 @@ pub mod world;
 pub use column::Column;
 pub use digest::Digest;
 pub use error::InputError;
-pub use plan::{Effort, Plan};
+pub use plan::{Effort, GroupSizes, Plan};
 pub use run::Run;
 pub use simulation::Simulation;
 pub use units::{Cycle, EntityId, Seed, Slot};

@@ -30,6 +30,8 @@ pub(super) struct Order<'a> {
     pub(super) radius_m: f64,
     pub(super) jitter_m: f64,
     pub(super) model: &'a Model,
+    /// Further meters between the starts of random traffic, for errors that the shield allows for.
+    pub(super) errors_m: f64,
 }
 
 /// Returns the airplanes, or, as an error, how many found a place before there was none left.
@@ -53,6 +55,7 @@ fn airplane(order: &Order<'_>, from: Point, to: Vec<Point>) -> Airplane {
         leaves_s: f64::INFINITY,
         orders: Vec::new(),
         track: None,
+        is_intruder: false,
     }
 }
 
@@ -84,7 +87,7 @@ fn superconflict(order: &Order<'_>, streams: &Streams) -> Vec<Airplane> {
 /// radius away. Starts are so far apart that first fallbacks are, too: an orbit's diameter each,
 /// and the separation.
 fn random(order: &Order<'_>, streams: &Streams) -> Result<Vec<Airplane>, usize> {
-    let gap_m = 4.0 * order.model.turn_radius_m() + order.model.separation_m + 1.0;
+    let gap_m = 4.0 * order.model.turn_radius_m() + order.model.separation_m + order.errors_m + 1.0;
     let mut starts: Vec<Point> = Vec::new();
     let mut all = Vec::new();
     for id in 0..order.n {

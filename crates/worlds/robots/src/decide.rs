@@ -4,6 +4,7 @@
 //! environment decides). It is shared by all robots of its type and has no state of its own; a
 //! robot's knowledge is in its [`Memory`], which is part of the state.
 
+mod announce;
 pub(crate) mod ask;
 mod goto;
 mod patient;
@@ -14,6 +15,7 @@ mod sidestep;
 mod touch;
 mod wander;
 
+pub use announce::Announce;
 pub use goto::{Avoidance, Goto, Shuttle};
 pub use patient::Patient;
 pub use plan::Planner;
@@ -25,8 +27,10 @@ pub use wander::Wander;
 use super::effector::{ActionId, Side};
 pub use super::sensor::UNSEEN;
 use super::sensor::{NOTHING, Reading};
-use sidestep_kernel::Cycle;
 use sidestep_kernel::stream::Draws;
+use sidestep_kernel::{Cycle, EntityId};
+use sidestep_map::planning::FlowField;
+use std::sync::Arc;
 
 /// A robot's memory between its actions: four words whose meaning is up to the behavior.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -48,7 +52,7 @@ pub struct Contact {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Heard {
     /// Id of the robot that sent it.
-    pub sender: u32,
+    pub sender: EntityId,
     /// The message itself.
     pub word: u64,
 }
@@ -88,6 +92,8 @@ impl Sector {
 pub struct Percept<'a> {
     /// The present cycle.
     pub now: Cycle,
+    /// The robot's own id, by which others know it as a sender.
+    pub id: EntityId,
     /// One reading per beam, the sensors one after the other in the scenario's order.
     pub readings: &'a [Reading],
     /// Sector of each beam (shape: that of `readings`).
@@ -101,7 +107,8 @@ pub struct Percept<'a> {
     pub at: (u32, u32),
     /// Heading: 0 east, 1 north, 2 west, 3 south.
     pub heading: u8,
-    /// Last broadcasts of the robots in radio range, by sender.
+    /// Last broadcasts of the robots in radio range, by sender; those that have said nothing yet are
+    /// left out.
     pub heard: &'a [Heard],
 }
 
@@ -161,5 +168,11 @@ pub trait Behaviour: std::fmt::Debug + Send + Sync {
     /// robot's request, and the world writes the one that it hears into word 3.
     fn asks(&self) -> bool {
         false
+    }
+
+    /// Returns the ways to all places that it wants to reach, so that a check can say which of them
+    /// are out of reach.
+    fn ways(&self) -> &[Arc<FlowField>] {
+        &[]
     }
 }

@@ -101,9 +101,17 @@ impl Behaviour for Goto {
     fn asks(&self) -> bool {
         self.avoidance.asks()
     }
+
+    fn ways(&self) -> &[Arc<FlowField>] {
+        &self.goals
+    }
 }
 
 impl Behaviour for Shuttle {
+    fn ways(&self) -> &[Arc<FlowField>] {
+        &self.ends
+    }
+
     fn decide(&self, percept: &Percept<'_>, memory: &mut Memory, draws: &mut Draws) -> Decision {
         let mut trip = None;
         let mut target = (memory.words[REACHED] % 2) as usize;

@@ -6,6 +6,7 @@
 use super::{Behaviour, Contact, Decision, Memory, Percept};
 use crate::effector::{FORWARD, Side};
 use sidestep_kernel::stream::Draws;
+use sidestep_map::planning::FlowField;
 use std::sync::Arc;
 
 /// Decides as another behavior does, which perceives a contact in front after some vain steps. It
@@ -38,6 +39,10 @@ impl Behaviour for Patient {
         memory.words[WAITED] = vain << 13 | place;
         decision
     }
+
+    fn ways(&self) -> &[Arc<FlowField>] {
+        self.inner.ways()
+    }
 }
 
 #[cfg(test)]
@@ -55,6 +60,7 @@ mod tests {
             let action = |now: u32| {
                 let percept = Percept {
                     now: u64::from(now),
+                    id: 0,
                     readings: &[],
                     sectors: &[],
                     nearest_in: [UNSEEN; 4],

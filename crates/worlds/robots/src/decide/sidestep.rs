@@ -137,3 +137,68 @@ fn freer_side(percept: &Percept<'_>, draws: &mut Draws) -> ActionId {
 fn either(draws: &mut Draws) -> ActionId {
     if draws.below(2) == 0 { LEFT } else { RIGHT }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::decide::{Contact, nearest_in};
+    use crate::sensor::Reading;
+    use sidestep_kernel::Seed;
+    use sidestep_kernel::stream::{Purpose, Streams};
+    use sidestep_map::planning::FreeSpace;
+
+    const NOTHING_SEEN: Reading = Reading { observation: NOTHING, class: 3 };
+    const NEAR: Reading = Reading { observation: 1, class: 0 };
+    const ALL: [Sector; 4] = [Sector::Ahead, Sector::Ahead, Sector::Left, Sector::Right];
+
+    fn percept(heading: u8, readings: &[Reading; 4], contact: Option<Contact>) -> Percept<'_> {
+        let nearest_in = nearest_in(readings, &ALL);
+        Percept {
+            now: 0,
+            id: 0,
+            readings,
+            sectors: &ALL,
+            nearest_in,
+            contact,
+            at: (4, 1),
+            heading,
+            heard: &[],
+        }
+    }
+
+    /// Decides in a corridor of 9 x 3 boxes whose end in the west is the goal.
+    fn decide(trust: Trust, percept: &Percept<'_>, memory: &mut Memory) -> ActionId {
+        let free = FreeSpace::new(9, 3, |_, _| true);
+        let field = FlowField::towards(&free, 1, &[(0, 0), (0, 1), (0, 2)]);
+        let mut draws = Streams::new(Seed(1)).draws(0, percept.now, Purpose(0));
+        sidestep(trust, &field, percept, memory, &mut draws)
+    }
+
+    #[test]
+    fn a_single_report_at_the_side_is_believed_by_one_and_checked_by_the_other() {
+        let beside = [NOTHING_SEEN, NOTHING_SEEN, NEAR, NOTHING_SEEN];
+        let at = percept(2, &beside, None);
+        let first = |trust| decide(trust, &at, &mut Memory::default());
+        assert_eq!(first(Trust::OneBeam), RIGHT);
+        assert_eq!(first(Trust::TwoReports), FORWARD);
+        let mut memory = Memory::default();
+        decide(Trust::TwoReports, &at, &mut memory);
+        assert_eq!(decide(Trust::TwoReports, &at, &mut memory), RIGHT, "twice in a row");
+        let ahead = [NEAR, NOTHING_SEEN, NOTHING_SEEN, NOTHING_SEEN];
+        let action = decide(Trust::TwoReports, &percept(2, &ahead, None), &mut Memory::default());
+        assert_ne!(action, FORWARD);
+    }
+
+    #[test]
+    fn a_sidestep_survives_a_turn_that_fails() {
+        let (free, mut memory) = ([NOTHING_SEEN; 4], Memory::default());
+        let touched = Some(Contact { kind: 1, side: Side::Left });
+        let action = decide(Trust::OneBeam, &percept(2, &free, touched), &mut memory);
+        assert_eq!(action, RIGHT, "away from the wall");
+        let mut next =
+            |heading| decide(Trust::OneBeam, &percept(heading, &free, None), &mut memory);
+        assert_eq!(next(2), RIGHT, "again, since the turn has failed");
+        assert_eq!(next(1), FORWARD);
+        assert_eq!(next(1), LEFT, "back to course");
+    }
+}

@@ -17,6 +17,8 @@
 mod detour;
 mod mood;
 mod sight;
+#[cfg(test)]
+mod tests;
 
 use super::ask::Ask;
 use super::{Memory, Percept};

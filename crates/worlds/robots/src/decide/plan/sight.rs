@@ -214,7 +214,7 @@ fn beams(sensor: &MountedSensor, size: u32, heading: u8, box_size_m: f64) -> Vec
             Crossed {
                 col: turned.dx,
                 row: turned.dy,
-                class: model.class_of(c.distance * box_size_m),
+                class: model.class_of(c.distance, box_size_m),
             }
         });
         let crossed = crossed.take_while(|c| inside(c.col) && inside(c.row)).collect();
