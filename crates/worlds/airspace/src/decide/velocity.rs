@@ -9,7 +9,7 @@ use sidestep_kernel::math;
 /// Returns the wishes of a group.
 pub(super) fn by_velocity(world: &AirspaceWorld, group: &[Known]) -> Vec<Vec<Action>> {
     let all: Vec<Moving> = group.iter().map(|known| moving(world, *known)).collect();
-    let horizon_s = world.timing.horizon as f64 * world.timing.dtau_s;
+    let horizon_s = world.timing.horizon_s();
     let margin = world.objective.inflation;
     let toward = |(k, own): (usize, &Moving)| {
         let near = |other: &Moving| other.levels.meets(&own.levels, world.vertical_m);

@@ -107,8 +107,11 @@ fn wrong_times(n: &Network, timing: &Timing) -> Option<(String, String)> {
 /// Returns cause and remedy of a silence of an airplane that does not exist, or at undefined times.
 fn wrong_silence(network: &Network, airplanes: usize) -> Option<(String, String)> {
     let wrong = network.silences.iter().find(|one| {
-        one.airplane as usize >= airplanes || one.from_s.is_nan() || one.until_s.is_nan()
+        let is_a_while = one.from_s >= 0.0 && one.from_s < one.until_s;
+        one.airplane as usize >= airplanes || !is_a_while
     })?;
-    let cause = format!("airplane {} is to be silent", wrong.airplane);
-    Some((cause, format!("give ids from 0 to {} and times in seconds", airplanes - 1)))
+    let Silence { airplane, from_s, until_s } = wrong;
+    let cause = format!("airplane {airplane} is to be silent from {from_s} s until {until_s} s");
+    let last = airplanes - 1;
+    Some((cause, format!("give ids from 0 to {last}, from_s of at least 0, and until_s after from_s")))
 }

@@ -4,6 +4,7 @@ use super::flyer::Flyer;
 use super::orbit::{Orbit, Side, stays_apart};
 use crate::flight::{Pose, distance_m};
 use serde::{Deserialize, Serialize};
+use sidestep_kernel::interrupt;
 
 /// Motion for one `dt`: a turn rate per step of `dtau`.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -79,6 +80,7 @@ impl Plan {
         if now_m >= gap_m + reach(self) + reach(other) {
             return true;
         }
+        interrupt::look();
         self.orbit.stays_apart(&other.orbit, gap_m) && self.ways_stay_apart(other, gap_m)
     }
 
