@@ -1,6 +1,8 @@
 //! Small sceneries for tests.
 
-use sidestep_kernel::view::{Body, Floor, Frame, Kind, Occupancy, Place, Plane, Pose, Scenery, Shape};
+use sidestep_kernel::view::{
+    Body, Floor, Frame, Kind, Occupancy, Place, Plane, Pose, Scenery, Shape,
+};
 
 /// Returns an empty floor of boxes of 1 m.
 pub(crate) fn plane(width: u32, height: u32) -> Scenery {

@@ -82,7 +82,11 @@ impl<'a> Document<'a> {
         let yaw_rad = self.number(yaw, "origin")?;
         if yaw_rad.abs() > MAX_YAW_RAD {
             let cause = format!("an origin yaw of {yaw_rad} rad, more than a turn");
-            return Err(self.error(yaw, cause, "write radians from -6.2832 to 6.2832, not degrees"));
+            return Err(self.error(
+                yaw,
+                cause,
+                "write radians from -6.2832 to 6.2832, not degrees",
+            ));
         }
         // A zero with a minus sign is a zero.
         Ok(Plane { origin_m, yaw_rad: yaw_rad + 0.0 })
@@ -320,8 +324,10 @@ free_thresh: 0.196
 
     #[test]
     fn a_map_may_be_turned_about_its_origin() {
-        for (text, yaw_rad) in [("0.]", 0.0), ("-0.0]", 0.0), ("3.14]", 3.14), ("-1.5707963]", -1.570_796_3)] {
-            assert_eq!(with("0.]", text).expect(text).plane.yaw_rad.to_bits(), yaw_rad.to_bits());
+        for (text, yaw_rad) in
+            [("0.]", 0.0), ("-0.0]", 0.0), ("3.14]", 3.14), ("-1.5707963]", -1.570_796_3)]
+        {
+            assert_eq!(with("0.]", text).expect(text).plane.yaw_rad.to_bits(), f64::to_bits(yaw_rad));
         }
         let degrees = error("0.]", "90]");
         assert_eq!(degrees.position(), Some((3, 19)));

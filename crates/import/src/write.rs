@@ -47,7 +47,8 @@ mod tests {
     #[test]
     fn the_map_comes_back_as_it_was() {
         let cells = vec![Cell::Free, Cell::Wall, Cell::Unknown, Cell::Free, Cell::Free, Cell::Wall];
-        let map = GridMap::new(3, 2, 0.1 + 0.2, cells).with_plane(Plane { origin_m: [-1.5, 1e-7], yaw_rad: 0.1 + 0.2 });
+        let map = GridMap::new(3, 2, 0.1 + 0.2, cells)
+            .with_plane(Plane { origin_m: [-1.5, 1e-7], yaw_rad: 0.1 + 0.2 });
         let folder = tempfile::tempdir().expect("a folder");
         for (name, bytes) in map_files([3, 2], map.box_size_m, map.plane, map.cells()) {
             std::fs::write(folder.path().join(name), bytes).expect("written");

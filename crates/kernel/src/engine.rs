@@ -4,8 +4,8 @@
 //! guessing, see `Pace`. Results do not depend on its choice.
 
 use crate::conflict::Groups;
-use crate::interrupt::Interrupt;
 use crate::cycle::{Mate, Observer, PhaseTimes, Ran, Stretch, advance, lock};
+use crate::interrupt::Interrupt;
 use crate::ports::Clock;
 use crate::units::Cycle;
 use crate::workers::Team;

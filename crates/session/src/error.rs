@@ -1,7 +1,7 @@
 //! The error type of sessions.
 
-use sidestep::kernel::{Cycle, InputError};
 use sidestep::kernel::ports::RecordError;
+use sidestep::kernel::{Cycle, InputError};
 use sidestep_draw::DrawError;
 use std::path::Path;
 
@@ -22,7 +22,9 @@ pub enum Error {
     Interrupted,
     /// The watcher interrupted a run within a cycle that took too long to wait for. The number of
     /// cycles done; a folder continues from its last checkpoint.
-    #[error("interrupted within cycle {0}, which is lost; a run folder continues from its last checkpoint")]
+    #[error(
+        "interrupted within cycle {0}, which is lost; a run folder continues from its last checkpoint"
+    )]
     WithinACycle(Cycle),
     /// Anything else that stopped the work, with its remedy.
     #[error("{cause}\n  help: {remedy}")]

@@ -134,10 +134,17 @@ fn a_bluesky_file_is_a_scenario_and_check_counts_its_commands() {
     place.write("lost.scn", settings.to_string() + &lost.collect::<String>());
     let told = place.json(&["check", "lost.scn"]);
     assert_eq!(told["not_flown"], serde_json::json!({}), "{told}");
-    assert_eq!((&told["method"], &told["refused"]), (&"mvp".into(), &serde_json::json!([])), "{told}");
+    assert_eq!(
+        (&told["method"], &told["refused"]),
+        (&"mvp".into(), &serde_json::json!([])),
+        "{told}"
+    );
     place.write("refused.scn", format!("{settings}00:00:00.00>RESO SSD\n"));
     let told = place.json(&["check", "refused.scn"]);
-    assert!(told["refused"][0].as_str().is_some_and(|e| e.contains("refused.scn:8:1: RESO")), "{told}");
+    assert!(
+        told["refused"][0].as_str().is_some_and(|e| e.contains("refused.scn:8:1: RESO")),
+        "{told}"
+    );
     assert_eq!(told["unresolved_names"][0], "ARTIP", "{told}");
     let words = place.run(&["check", "lost.scn"]).out();
     assert!(words.contains("X5 at EHAM RWY18L and 2 more"), "{words}");

@@ -9,7 +9,8 @@ use foxglove::messages::{
     line_primitive, log, packed_element_field, scene_entity_deletion,
 };
 use sidestep_kernel::view::{
-    Body, Floor, Frame, Kind, Level, Occupancy, Place, Plane, Pose as ViewPose, Scan, Scenery, Shape,
+    Body, Floor, Frame, Kind, Level, Occupancy, Place, Plane, Pose as ViewPose, Scan, Scenery,
+    Shape,
 };
 
 use super::WORLD;

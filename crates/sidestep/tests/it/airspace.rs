@@ -2,8 +2,8 @@
 //! workers, recorded or not, resumed or not. L1 for airplanes: with the shield nobody comes
 //! nearer than the separation, whatever the method, once the first fallbacks are apart.
 
-use sidestep::kernel::{Interrupt, Simulation};
 use sidestep::kernel::ports::MemoryRecorder;
+use sidestep::kernel::{Interrupt, Simulation};
 use sidestep::scenario::Source;
 use sidestep::worlds::airspace::{AirspaceRun, airspace_run};
 

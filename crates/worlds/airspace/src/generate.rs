@@ -3,8 +3,8 @@
 use super::flight::{Airplane, Model, Point, Pose, distance_m};
 use super::purpose;
 use serde::{Deserialize, Serialize};
-use sidestep_kernel::{interrupt, math};
 use sidestep_kernel::stream::{Draws, Streams};
+use sidestep_kernel::{interrupt, math};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 

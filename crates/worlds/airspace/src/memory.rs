@@ -8,9 +8,9 @@ use super::state::AirspaceState;
 use super::world::AirspaceWorld;
 use super::{Scratch, Turn};
 use sidestep_collectives::{Estimator, PairwiseGame};
-use sidestep_kernel::{Slot, interrupt};
 use sidestep_kernel::conflict::Groups;
 use sidestep_kernel::ports::ManualClock;
+use sidestep_kernel::{Slot, interrupt};
 
 /// Returns the largest number of bytes that optimizing a group takes: tables of its pairs, and
 /// predictions, in all the copies that its deployment has of them.
@@ -51,8 +51,7 @@ fn table_bytes(world: &AirspaceWorld, group: &[Known]) -> u64 {
     by_x.sort_unstable_by(|a, b| a.pose.at[0].total_cmp(&b.pose.at[0]));
     let mut entries = 0;
     for (k, a) in by_x.iter().enumerate() {
-        let beside =
-            by_x[k + 1..].iter().take_while(|b| b.pose.at[0] - a.pose.at[0] <= widest_m);
+        let beside = by_x[k + 1..].iter().take_while(|b| b.pose.at[0] - a.pose.at[0] <= widest_m);
         let meets = |b: &&&Known| {
             interrupt::look();
             (a.altitude_m - b.altitude_m).abs() < world.vertical_m

@@ -23,11 +23,11 @@ use sidestep_scenario::{FromTo, Number, Point, Rule, Sections, Source};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use toml::Spanned;
-pub(super) use values::{Measure, TurnRate, Turns};
 use values::{
     Cooling, Decision, Fading, Gibibytes, HeadingNoise, Inflation, LevelGap, LookAhead, Rounds,
     Step, Tolerance, Weight,
 };
+pub(super) use values::{Measure, TurnRate, Turns};
 
 /// Sets of parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize)]
@@ -214,9 +214,8 @@ mod tests {
             // Two head-on airplanes, against the price of one that has left its way by 700 m.
             let price = |world: &AirspaceWorld| {
                 let way = |from_m: f64, v_m_s: f64| {
-                    let at = |k: usize| {
-                        [from_m + v_m_s * world.timing.dtau_s * (k + 1) as f64, 0.0]
-                    };
+                    let at =
+                        |k: usize| [from_m + v_m_s * world.timing.dtau_s * (k + 1) as f64, 0.0];
                     let points: Vec<_> = (0..world.timing.horizon).map(at).collect();
                     crate::flight::Prediction { counted: points.len(), points }
                 };

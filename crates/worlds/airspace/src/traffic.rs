@@ -58,7 +58,8 @@ pub(crate) fn bluesky_rules(place: &str, file: &ScnFile) -> Rules {
     let stands = |one: &&ScnAircraft| under_way(one).is_none();
     for ScnAircraft { id, .. } in file.traffic.aircraft.iter().filter(stands) {
         let cause = format!("aircraft {id} is never given a speed, and is left out");
-        let error = InputError::new(place, cause, "give it one with CRE or SPD before it is deleted");
+        let error =
+            InputError::new(place, cause, "give it one with CRE or SPD before it is deleted");
         rules.refused.push(error);
     }
     rules

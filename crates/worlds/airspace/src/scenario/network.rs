@@ -113,5 +113,8 @@ fn wrong_silence(network: &Network, airplanes: usize) -> Option<(String, String)
     let Silence { airplane, from_s, until_s } = wrong;
     let cause = format!("airplane {airplane} is to be silent from {from_s} s until {until_s} s");
     let last = airplanes - 1;
-    Some((cause, format!("give ids from 0 to {last}, from_s of at least 0, and until_s after from_s")))
+    Some((
+        cause,
+        format!("give ids from 0 to {last}, from_s of at least 0, and until_s after from_s"),
+    ))
 }

@@ -144,7 +144,8 @@ impl Compiler<'_> {
         let longest_s = turns_s.iter().copied().fold(0.0, f64::max);
         let soonest_s = until_s.iter().copied().fold(f64::INFINITY, f64::min);
         if longest_s >= soonest_s {
-            let cause = format!("a leg whose turn takes {longest_s} s, and that ends after {soonest_s} s");
+            let cause =
+                format!("a leg whose turn takes {longest_s} s, and that ends after {soonest_s} s");
             let remedy = "give turns_s that are all shorter than each until_s; turns without a leg \
                           are holds_s";
             return Err(wrong(cause, remedy));

@@ -137,7 +137,13 @@ fn halve(
     let middle_s = 0.5 * (from_s + to_s);
     let at_middle = distance_m(middle_s);
     at_middle >= gap_m
-        && halve(distance_m, (from_s, at_from), (middle_s, at_middle), (closing_m_s, finest_s), gap_m)
+        && halve(
+            distance_m,
+            (from_s, at_from),
+            (middle_s, at_middle),
+            (closing_m_s, finest_s),
+            gap_m,
+        )
         && halve(distance_m, (middle_s, at_middle), (to_s, at_to), (closing_m_s, finest_s), gap_m)
 }
 

@@ -225,7 +225,8 @@ mod tests {
         odometry[20][2] = 0.4;
         odometry[30][1] += 0.3;
         let report = learned(&odometry).report;
-        let (robust, plain) = (report.lateral_slip_robust_sd.unwrap(), report.lateral_slip_sd.unwrap());
+        let (robust, plain) =
+            (report.lateral_slip_robust_sd.unwrap(), report.lateral_slip_sd.unwrap());
         assert!(robust < 0.01 && plain > 0.5, "{robust} {plain}");
         assert_eq!(report.warnings, Vec::<String>::new());
     }
