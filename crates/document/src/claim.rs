@@ -1,43 +1,32 @@
 //! Claims of a paper, and our verdicts on them.
 
 use serde::Serialize;
-use sidestep_statistics::Interval;
 
 /// What we say of a claim.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
+#[serde(rename_all = "lowercase")]
 pub enum Verdict {
     /// Our figures agree.
     Held,
     /// Our figures disagree, or agree under some conditions only.
-    NotHeld,
-    /// It cannot be judged: the paper's measurements are lost, or need another machine, or a
-    /// quieter one.
+    Refuted,
+    /// Our figures do not tell: an interval contains the threshold, there were too few runs, or the
+    /// machine was not quiet or large enough.
+    Undecided,
+    /// It cannot be judged by anybody: what the paper measured or compared is lost.
     Lost,
+    /// It only states what was run, so there is nothing to judge.
+    Setting,
 }
 
 impl Verdict {
-    /// All verdicts.
-    pub const ALL: [Self; 3] = [Self::Held, Self::NotHeld, Self::Lost];
+    /// All verdicts, those that are counted first.
+    pub const ALL: [Self; 5] =
+        [Self::Held, Self::Refuted, Self::Undecided, Self::Lost, Self::Setting];
 
-    /// Returns its name in tables.
+    /// Returns its word.
     pub fn name(self) -> &'static str {
-        ["held", "not held", "lost"][self as usize]
-    }
-
-    /// Returns `Held` or `NotHeld`.
-    pub fn of(holds: bool) -> Self {
-        if holds { Self::Held } else { Self::NotHeld }
-    }
-
-    /// Returns `Held` if the interval lies above 0 and `NotHeld` if it lies below; if it contains
-    /// 0, or there is none, the claim cannot be judged.
-    pub fn by_sign(interval: Option<Interval>) -> Self {
-        match interval {
-            Some(i) if i.low > 0.0 => Self::Held,
-            Some(i) if i.high < 0.0 => Self::NotHeld,
-            _ => Self::Lost,
-        }
+        ["held", "refuted", "undecided", "lost", "setting"][self as usize]
     }
 }
 
@@ -72,32 +61,52 @@ pub fn count(claims: &[Claim], verdict: Verdict) -> usize {
     claims.iter().filter(|claim| claim.verdict == verdict).count()
 }
 
-/// Summarizes the verdicts on all claims in a sentence.
+/// Summarizes the verdicts on all claims in a sentence, by the words that stand at the claims.
 pub fn tally(claims: &[Claim]) -> String {
-    format!(
-        "Of {} claims {} held, {} did not hold, and {} cannot be judged.",
-        claims.len(),
-        count(claims, Verdict::Held),
-        count(claims, Verdict::NotHeld),
-        count(claims, Verdict::Lost),
-    )
+    let told = |verdict: &Verdict| format!("{} {}", count(claims, *verdict), verdict.name());
+    let judged: Vec<String> =
+        Verdict::ALL.iter().filter(|v| **v != Verdict::Setting).map(told).collect();
+    let settings = count(claims, Verdict::Setting);
+    let rest = match settings {
+        0 => String::new(),
+        _ => format!(" Not counted: {}.", told(&Verdict::Setting)),
+    };
+    format!("Of {} claims: {}.{rest}", claims.len() - settings, judged.join(", "))
 }
 
 /// How to read a list of claims.
 pub const NOTE: &str = "Every verdict follows from the figures by the rule in its row; intervals are \
-                        95 %. `lost`: what the paper measured is lost, takes another machine, or a \
-                        quieter one.";
+                        95 %, and fewer than 5 runs decide nothing but a counterexample. `held`: each \
+                        comparison of the claim is on its side of the threshold. `refuted`: one is \
+                        on the other side (of several by Holm's correction), or a run breaks what \
+                        was to hold in every run. `undecided`: neither. `lost`: what the paper \
+                        measured is lost. `setting`: says what was run; not counted.";
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn an_interval_that_holds_zero_is_no_verdict() {
-        let of = |low, high| Verdict::by_sign(Some(Interval { low, high }));
-        assert_eq!(of(0.1, 0.2), Verdict::Held);
-        assert_eq!(of(-0.2, -0.1), Verdict::NotHeld);
-        assert_eq!(of(-0.1, 0.1), Verdict::Lost);
-        assert_eq!(Verdict::by_sign(None), Verdict::Lost);
+    fn the_headline_counts_every_verdict_once_by_its_own_word() {
+        let claim = |verdict| Claim {
+            id: "C",
+            paper: "",
+            papers_figure: None,
+            ours: String::new(),
+            verdict,
+            reason: String::new(),
+        };
+        let mut claims: Vec<Claim> = Verdict::ALL.map(claim).into();
+        claims.push(claim(Verdict::Undecided));
+        let told = tally(&claims);
+        assert_eq!(
+            told,
+            "Of 5 claims: 1 held, 1 refuted, 2 undecided, 1 lost. Not counted: 1 setting."
+        );
+        for verdict in Verdict::ALL {
+            let word = serde_json::to_value(verdict).expect("a word");
+            assert_eq!(word, verdict.name(), "JSON says the same");
+        }
+        assert_eq!(tally(&[]), "Of 0 claims: 0 held, 0 refuted, 0 undecided, 0 lost.");
     }
 }

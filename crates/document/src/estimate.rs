@@ -2,7 +2,7 @@
 
 use super::figure::Point;
 use serde::Serialize;
-use sidestep_statistics::{Interval, mean, mean_interval};
+use sidestep_statistics::{Interval, mean, mean_interval, mean_p_value};
 use std::fmt;
 
 /// A mean over runs, its 95 % interval by Student's t, and the number of runs behind it.
@@ -16,13 +16,28 @@ pub struct Estimate {
     pub interval: Option<Interval>,
     /// Number of values.
     pub n: usize,
+    /// Whether it is a geometric mean, and Student's interval that of the logarithms.
+    #[serde(skip)]
+    is_factor: bool,
 }
 
 impl Estimate {
     /// Returns the mean of those runs that have a value.
     pub fn of(values: impl IntoIterator<Item = Option<f64>>) -> Self {
         let values: Vec<f64> = values.into_iter().flatten().filter(|v| v.is_finite()).collect();
-        Self { mean: mean(&values), interval: mean_interval(&values), n: values.len() }
+        let (mean, interval) = (mean(&values), mean_interval(&values));
+        Self { mean, interval, n: values.len(), is_factor: false }
+    }
+
+    /// Returns the geometric mean of those factors that are there and above 0, with the interval
+    /// of the mean of their logarithms: so no end of it is below 0, and the inverse of all factors
+    /// has the inverse interval.
+    pub fn of_factors(values: impl IntoIterator<Item = Option<f64>>) -> Self {
+        let logarithm = |factor: f64| (factor > 0.0).then(|| factor.ln());
+        let of = Self::of(values.into_iter().map(|factor| factor.and_then(logarithm)));
+        let factors = |i: Interval| Interval { low: i.low.exp(), high: i.high.exp() };
+        let (mean, interval) = (of.mean.map(f64::exp), of.interval.map(factors));
+        Self { mean, interval, is_factor: true, ..of }
     }
 
     /// Returns the mean of `a[i] - b[i]` over the pairs in which both have a value: two treatments
@@ -31,11 +46,22 @@ impl Estimate {
         Self::of(a.iter().zip(b).map(|(a, b)| Some((*a)? - (*b)?)))
     }
 
-    /// Returns the mean of `a[i] / b[i]` over the pairs in which both have a value and `b` is not
-    /// 0.
+    /// Returns the geometric mean of `a[i] / b[i]` over the pairs in which both are above 0.
     pub fn ratio(a: &[Option<f64>], b: &[Option<f64>]) -> Self {
         let quotient = |(a, b): (&Option<f64>, &Option<f64>)| Some((*a)? / (*b)?);
-        Self::of(a.iter().zip(b).map(quotient))
+        Self::of_factors(a.iter().zip(b).map(quotient))
+    }
+
+    /// Returns the two-sided p-value of Student's test that the mean is `value`; `None` with fewer
+    /// than two values.
+    pub fn p_value(&self, value: f64) -> Option<f64> {
+        let Interval { low, high } = self.interval?;
+        if !self.is_factor {
+            return Some(mean_p_value(Interval { low, high }, self.n, value));
+        }
+        // No factor is 0 or below.
+        let logarithms = Interval { low: low.ln(), high: high.ln() };
+        Some(if value > 0.0 { mean_p_value(logarithms, self.n, value.ln()) } else { 0.0 })
     }
 
     /// Whether the whole interval lies above `value`.
@@ -95,6 +121,19 @@ mod tests {
         assert_eq!((difference.mean, difference.n), (Some(1.0), 3));
         assert!(difference.is_above(0.5) && !difference.is_above(1.0));
         assert_eq!(Estimate::ratio(&[Some(1.0), Some(1.0)], &[Some(0.0), Some(2.0)]).n, 1);
+    }
+
+    #[test]
+    fn an_interval_of_a_ratio_is_never_negative_and_that_of_the_inverse_is_its_inverse() {
+        let (a, b) = ([1.0, 40.0].map(Some), [10.0, 1.0].map(Some));
+        let (there, back) = (Estimate::ratio(&a, &b), Estimate::ratio(&b, &a));
+        let (i, j) = (there.interval.unwrap(), back.interval.unwrap());
+        assert!(i.low > 0.0 && (there.mean.unwrap() - 2.0).abs() < 1e-12, "{there}");
+        assert!((i.low * j.high - 1.0).abs() < 1e-9 && (i.high * j.low - 1.0).abs() < 1e-9);
+        assert!(there.p_value(1.0) > Some(0.05) && there.p_value(0.0) == Some(0.0));
+        let twice = Estimate::ratio(&[2.0, 2.2, 1.9].map(Some), &[1.0; 3].map(Some));
+        assert!(twice.p_value(1.0) < Some(0.05) && twice.is_above(1.0));
+        assert_eq!(Estimate::ratio(&a[..1], &b[..1]).p_value(1.0), None);
     }
 
     #[test]

@@ -14,6 +14,7 @@
 
 use crate::conflict::Groups;
 use crate::interrupt::{self, Interrupt};
+use crate::plan::GroupSizes;
 use crate::ports::Clock;
 use crate::units::{Cycle, Slot};
 use crate::workers::{Team, Worker};
@@ -40,11 +41,6 @@ impl PhaseTimes {
         self.join_ns += other.join_ns;
         self.act_ns += other.act_ns;
     }
-
-    /// All phases together.
-    pub fn total_ns(&self) -> u64 {
-        self.claim_ns + self.join_ns + self.act_ns
-    }
 }
 
 /// One worker's share of a run: the world's scratch and the kernel's own.
@@ -59,10 +55,8 @@ pub struct Mate<S> {
 /// A worker's group sizes, processor time and buffers.
 #[derive(Debug, Default)]
 pub struct Tally {
-    /// Conflict groups seen by size: index k counts groups of `2^k .. 2^(k+1)` bodies.
-    pub group_sizes: [u64; 32],
-    /// The largest group seen.
-    pub largest_group: u64,
+    /// Conflict groups seen.
+    pub groups: GroupSizes,
     /// Processor time of the worker's thread, in nanoseconds.
     pub cpu_ns: u64,
     members: Vec<Slot>,
@@ -74,13 +68,6 @@ impl<S> Mate<S> {
     /// Creates a worker that has done nothing yet.
     pub fn new(scratch: S) -> Self {
         Self { scratch, tally: Tally::default() }
-    }
-}
-
-impl Tally {
-    fn count_group(&mut self, size: usize) {
-        self.group_sizes[size.ilog2() as usize] += 1;
-        self.largest_group = self.largest_group.max(size as u64);
     }
 }
 
@@ -346,12 +333,12 @@ fn act_as_leader<W: Phases>(
     }
     // A body without a conflict needs neither a list of members nor an auction.
     if groups.is_alone(body) {
-        own.group_sizes[0] += 1;
+        own.groups.counts[0] += 1;
         return W::act(turn, &mut [body]);
     }
     let mut members = std::mem::take(&mut own.members);
     groups.members(body, &mut members);
-    own.count_group(members.len());
+    own.groups.add(members.len());
     if by_auction {
         own.pending.extend_from_slice(&members);
     } else {

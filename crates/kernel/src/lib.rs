@@ -46,7 +46,7 @@ pub use column::Column;
 pub use digest::Digest;
 pub use error::InputError;
 pub use interrupt::Interrupt;
-pub use plan::{Effort, Plan};
+pub use plan::{Effort, GroupSizes, Plan};
 pub use run::Run;
 pub use simulation::Simulation;
 pub use units::{Cycle, EntityId, Seed, Slot};

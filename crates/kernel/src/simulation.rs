@@ -10,9 +10,11 @@ use crate::units::Cycle;
 use crate::view::{Frame, Look, PlaceRows, Scenery};
 use crate::words::{Lines, Said};
 use crate::world::Decides;
+use std::any::Any;
 
-/// A world and a state that advances. [`crate::Run`] is the one implementation.
-pub trait Simulation: Send {
+/// A world and a state that advances. [`crate::Run`] is the one implementation; code that knows the world finds its
+/// [`crate::Run`] by [`Any`].
+pub trait Simulation: Any + Send {
     /// Name of the world, e.g. `robots`.
     fn world(&self) -> &'static str;
 

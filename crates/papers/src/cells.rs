@@ -158,7 +158,11 @@ impl Columns {
             columns.iter().map(|c| (c.name, (c.of)(runs))).collect()
         };
         runs(results)
-            .map(|r| Cell { case: named(self.case, &r), came: named(self.came, &r) })
+            .map(|r| Cell {
+                case: named(self.case, &r),
+                came: named(self.came, &r),
+                runs: r.rows.len(),
+            })
             .collect()
     }
 
@@ -238,16 +242,17 @@ impl fmt::Display for Value {
 pub(crate) struct Cell {
     case: Vec<(&'static str, Value)>,
     came: Vec<(&'static str, Value)>,
+    runs: usize,
 }
 
 impl Cell {
-    /// Returns a made-up cell.
+    /// Returns a made-up cell of 10 runs.
     #[cfg(test)]
     pub(crate) fn new(
         case: impl IntoIterator<Item = (&'static str, Value)>,
         came: impl IntoIterator<Item = (&'static str, Value)>,
     ) -> Self {
-        Self { case: case.into_iter().collect(), came: came.into_iter().collect() }
+        Self { case: case.into_iter().collect(), came: came.into_iter().collect(), runs: 10 }
     }
 
     /// Replaces a value.
@@ -255,6 +260,11 @@ impl Cell {
     pub(crate) fn put(&mut self, name: &str, value: Value) {
         let mut all = self.case.iter_mut().chain(&mut self.came);
         all.find(|(own, _)| *own == name).expect("a column of this name").1 = value;
+    }
+
+    /// Returns the number of runs.
+    pub(crate) fn runs(&self) -> usize {
+        self.runs
     }
 
     /// Returns the value of a column.
@@ -361,6 +371,7 @@ impl Serialize for Cell {
         if !self.case.is_empty() {
             map.serialize_entry("case", &Case(&self.case))?;
         }
+        map.serialize_entry("runs", &self.runs)?;
         self.came.iter().try_for_each(|(name, value)| map.serialize_entry(name, value))?;
         map.end()
     }

@@ -1,7 +1,7 @@
 //! Properties that both renderers guarantee for every document.
 
 use super::*;
-use sidestep_document::claim::{Claim, Verdict};
+use sidestep_document::claim::{Claim, Verdict, tally};
 use sidestep_document::document::{Picture, Text};
 use sidestep_document::figure::{Point, Scale};
 use sidestep_document::{Figure, FigureKind, Series, Table};
@@ -34,7 +34,7 @@ fn claim(id: &'static str, papers_figure: Option<&'static str>) -> Claim {
         paper: HOSTILE,
         papers_figure,
         ours: "2.9 [2.8, 3.1] n=4".into(),
-        verdict: Verdict::NotHeld,
+        verdict: Verdict::Refuted,
         reason: "by the rule `r`".into(),
     }
 }
@@ -118,12 +118,36 @@ fn words_stay_words_in_markdown() {
 fn claims_stand_with_the_papers_figure_beside_ours_and_a_verdict_in_words() {
     let Rendered { html, markdown, .. } = render(&whole(), "figures").unwrap();
     assert!(
-        markdown.contains("| 3 m | 2.9 [2.8, 3.1] n=4 | **not held** | by the rule `r` |"),
+        markdown.contains("| 3 m | 2.9 [2.8, 3.1] n=4 | **refuted** | by the rule `r` |"),
         "{markdown}"
     );
     assert!(markdown.contains("| none | 2.9 [2.8, 3.1]"), "{markdown}");
     assert!(html.contains("<td>3 m</td><td>2.9 [2.8, 3.1] n=4</td>"));
-    assert_eq!(html.matches("class=\"badge not-held\"").count(), 3, "two claims and their count");
+    assert_eq!(html.matches("class=\"badge refuted\"").count(), 3, "two claims and their count");
+}
+
+/// The sentence above a report, the badges above its claims and those beside them say the same.
+#[test]
+fn the_headline_counts_the_same_words_as_the_badges() {
+    let verdicts: Vec<Verdict> =
+        (0..).zip(Verdict::ALL).flat_map(|(k, verdict)| vec![verdict; k + 1]).collect();
+    let claims: Vec<Claim> =
+        verdicts.iter().map(|&verdict| Claim { verdict, ..claim("C", None) }).collect();
+    let lead = tally(&claims);
+    let mut document = Document::new("T", lead.clone());
+    document.section("Claims").push(Block::Claims(claims));
+    let Rendered { html, markdown, .. } = render(&document, "figures").unwrap();
+    for (k, verdict) in (0..).zip(Verdict::ALL) {
+        let (word, count): (&str, usize) = (verdict.name(), k + 1);
+        assert!(lead.contains(&format!("{count} {word}")), "{lead}");
+        assert!(
+            html.contains(&format!("{word}</span> <strong>{count}</strong>")),
+            "{word}: {html}"
+        );
+        assert_eq!(html.matches(&format!("class=\"badge {word}\"")).count(), count + 1);
+        assert_eq!(markdown.matches(&format!("| **{word}** |")).count(), count);
+    }
+    assert!(html.contains(&lead) && markdown.contains(&lead));
 }
 
 #[test]

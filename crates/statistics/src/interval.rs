@@ -1,8 +1,10 @@
 //! Intervals of proportions and of means.
 
 use super::moments::{mean, sample_sd};
+use super::quantile::at_most;
 use serde::Serialize;
 use statrs::distribution::{Beta, ContinuousCDF, StudentsT};
+use statrs::function::beta::checked_beta_reg;
 
 /// The 0.975 quantile of the standard normal distribution.
 pub(super) const Z_975: f64 = 1.959_963_984_540_054;
@@ -76,6 +78,37 @@ pub fn clopper_pearson(successes: u64, n: u64) -> Interval {
         low: if k > 0.0 { quantile(k, n - k + 1.0, 0.025) } else { 0.0 },
         high: if k < n { quantile(k + 1.0, n - k, 0.975) } else { 1.0 },
     }
+}
+
+/// Returns the two-sided p-value of the exact binomial test that a probability is `share`, inside
+/// (0, 1), after `successes` in `n` trials.
+///
+/// Below 0.05 where the interval of [`clopper_pearson`] excludes `share`.
+pub fn share_p_value(successes: u64, n: u64, share: f64) -> f64 {
+    let (k, n) = (successes as usize, n as usize);
+    let at_least = if k == 0 { 1.0 } else { 1.0 - at_most(k - 1, n, share) };
+    (2.0 * at_most(k, n, share).min(at_least)).min(1.0)
+}
+
+/// Returns the two-sided p-value of Student's test that a mean is `value`, from the 95 % interval
+/// that [`mean_interval`] gives for `n` values.
+///
+/// Below 0.05 where the interval excludes `value`. An interval without width says that all values
+/// are equal: then 1 if they are `value`, and 0 otherwise.
+pub fn mean_p_value(interval: Interval, n: usize, value: f64) -> f64 {
+    let (half_width, freedom) = (interval.half_width(), n.max(2) - 1);
+    let off = (0.5 * interval.low + 0.5 * interval.high - value).abs();
+    if half_width == 0.0 || off == 0.0 {
+        return f64::from(off == 0.0);
+    }
+    student_p_value(off / half_width * student_t(freedom), freedom).unwrap_or(1.0)
+}
+
+/// Returns the probability that Student's t is at least this far from 0; `None` if `t` is no number.
+pub(super) fn student_p_value(t: f64, freedom: usize) -> Option<f64> {
+    let freedom = freedom as f64;
+    let x = freedom / (freedom + t * t);
+    checked_beta_reg(0.5 * freedom, 0.5, x).ok().filter(|p| p.is_finite())
 }
 
 /// Returns the 0.975 quantile of Student's t with this many degrees of freedom, at least 1.
@@ -229,6 +262,18 @@ mod tests {
     }
 
     #[test]
+    fn p_values_from_an_interval_are_those_of_the_test() {
+        // R: t.test(c(1, 2, 3, 4, 5), mu = 1): 0.04742; binom.test(8, 10, 0.5): 0.1094.
+        let interval = mean_interval(&[1.0, 2.0, 3.0, 4.0, 5.0]).unwrap();
+        close(mean_p_value(interval, 5, 1.0), 0.047_421, 1e-6);
+        close(mean_p_value(interval, 5, 3.0), 1.0, 0.0);
+        close(share_p_value(8, 10, 0.5), 0.109_375, 1e-9);
+        close(share_p_value(0, 10, 0.5), 2.0 / 1024.0, 1e-9);
+        let sure = Interval { low: 2.0, high: 2.0 };
+        assert_eq!([1.0, 2.0].map(|value| mean_p_value(sure, 7, value)), [0.0, 1.0]);
+    }
+
+    #[test]
     fn an_interval_is_written_as_a_pair() {
         let written = serde_json::to_string(&Interval { low: 0.25, high: 0.5 }).unwrap();
         assert_eq!(written, "[0.25,0.5]");
@@ -242,6 +287,20 @@ mod tests {
             if let Some(interval) = mean_interval(&values) {
                 prop_assert!(interval.contains(mean(&values).unwrap()));
             }
+        }
+
+        #[test]
+        fn a_p_value_below_a_twentieth_is_an_interval_that_excludes(
+            values in prop::collection::vec(-2.0_f64..3.0, 2..12),
+            (hits, n) in (1_u64..40).prop_flat_map(|n| (0..=n, Just(n))),
+            share in 0.01_f64..0.99,
+        ) {
+            let interval = mean_interval(&values).unwrap();
+            let p = mean_p_value(interval, values.len(), 0.0);
+            prop_assert!((p - 0.05).abs() < 1e-6 || (p > 0.05) == interval.contains(0.0), "{p}");
+            let p = share_p_value(hits, n, share);
+            let excluded = !clopper_pearson(hits, n).contains(share);
+            prop_assert!((p - 0.05).abs() < 1e-6 || (p < 0.05) == excluded, "{p}");
         }
 
         #[test]

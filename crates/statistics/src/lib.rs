@@ -46,7 +46,8 @@ mod stopping;
 
 pub use bootstrap::Bootstrap;
 pub use interval::{
-    Interval, clopper_pearson, mean_interval, paired_difference, runs_for_half_width, wilson,
+    Interval, clopper_pearson, mean_interval, mean_p_value, paired_difference, runs_for_half_width,
+    share_p_value, wilson,
 };
 pub use moments::{Moments, Sample, mean, percentile, sample_sd};
 pub use paired::{Pairs, holm};

@@ -1,10 +1,9 @@
 //! Two treatments of the same cases.
 
 use super::Bootstrap;
-use super::interval::{Interval, mean_interval, student_t};
+use super::interval::{Interval, mean_interval, student_p_value, student_t};
 use super::moments::{mean, sample_sd, sum};
 use super::quantile::at_most;
-use statrs::function::beta::checked_beta_reg;
 
 /// Values of a treatment and of a baseline on the same cases (runs of the same seed), so that
 /// effects common to both cancel.
@@ -116,10 +115,7 @@ impl Pairs {
         if sd == 0.0 {
             return (center == 0.0).then_some(1.0);
         }
-        let freedom = (self.n() - 1) as f64;
-        let t = center / sd * (self.n() as f64).sqrt();
-        let x = freedom / (freedom + t * t);
-        checked_beta_reg(0.5 * freedom, 0.5, x).ok().filter(|p| p.is_finite())
+        student_p_value(center / sd * (self.n() as f64).sqrt(), self.n() - 1)
     }
 
     /// Returns the two-sided p-value of the exact sign test: among pairs that differ, `a` is as

@@ -37,3 +37,15 @@ pub const ROBOT_MODELS: [&str; 11] = [
     "chain/snake16_own.urdf",
     "chain/ur5.urdf",
 ];
+
+#[cfg(test)]
+mod tests {
+    use proptest::test_runner::{Config, RngSeed};
+
+    /// The seed is in `.cargo/config.toml`, or given by `.ci/soak`.
+    #[test]
+    fn random_cases_begin_where_the_configuration_says() {
+        let seed = Config::default().rng_seed;
+        assert!(matches!(seed, RngSeed::Fixed(_)), "{seed:?}: run the tests by cargo");
+    }
+}

@@ -41,7 +41,7 @@ fn check_floor(floor: &Floor) -> Result<(), DrawError> {
         let (what, limit) = ("boxes of the map", MOST_BOXES);
         return Err(DrawError::TooLarge { what, found: boxes, limit });
     }
-    DrawError::some("number of the map's boxes", boxes as usize)?;
+    DrawError::positive("number of the map's boxes", boxes as f64)?;
     DrawError::length("boxes of the map", boxes as usize, floor.boxes.len())?;
     DrawError::positive("box size in m", floor.box_m)?;
     let [lo, hi] = around_floor(floor);

@@ -216,6 +216,7 @@ mod tests {
         let nearest_in = nearest_in(readings, &ALL);
         Percept {
             now: 0,
+            id: 0,
             readings,
             sectors: &ALL,
             nearest_in,

@@ -8,7 +8,7 @@
 use super::floor::Floor;
 use super::timing::{Load, STRETCHES, Timed, arithmetic, race, seconds};
 use super::{NewRecorder, Plan};
-use crate::cells::{figure, table};
+use crate::cells::{figure, median, table};
 use crate::study::Progress;
 use serde::Serialize;
 use sidestep::kernel::Simulation;
@@ -42,10 +42,10 @@ pub(super) struct Initialization {
     pub(super) load: usize,
     /// Seconds to read the scenario, compile the world and place all bodies.
     pub(super) seconds: f64,
-    /// Share of the whole time of a run of [`REFERENCE_CYCLES`] with one worker.
-    pub(super) share_alone: f64,
+    /// Share of the whole time of a run of [`REFERENCE_CYCLES`] with one worker, by repeat.
+    pub(super) share_alone: Estimate,
     /// The same with the most workers.
-    pub(super) share_together: f64,
+    pub(super) share_together: Estimate,
 }
 
 /// Cycles of the run whose initialization is counted; the paper's number is lost.
@@ -112,7 +112,7 @@ impl Performance {
             let times = time_load(plan, load, recorders)?;
             let of_load = timings.len()..;
             timings.extend(times.into_iter().map(|timing| Timing { load: index, ..timing }));
-            initialization.push(initialize(index, load, &timings[of_load]));
+            initialization.push(initialize(index, load, &timings[of_load], plan.repeats));
         }
         let (digests, recorded_digest) = digests(&loads[0], recorders)?;
         Ok(Self {
@@ -147,6 +147,18 @@ impl Performance {
         const SHARE: f64 = 0.85;
         let least = SHARE * self.most_workers() as f64;
         self.at_most_workers(false).any(|timing| timing.machine.or_zero() < least)
+    }
+
+    /// Returns the mean efficiency of all loads, unrecorded, with the most workers, by repeat.
+    pub(super) fn efficiency(&self) -> Estimate {
+        let workers = self.most_workers() as f64;
+        let loads: Vec<&Timing> = self.at_most_workers(false).collect();
+        let repeats = loads.iter().map(|t| t.ratios.len()).min().unwrap_or(0);
+        let mean = |k: usize| {
+            let of_repeat: Option<Vec<f64>> = loads.iter().map(|t| t.ratios[k]).collect();
+            Some(sidestep::statistics::mean(&of_repeat?)? / workers)
+        };
+        Estimate::of_factors((0..repeats).map(mean))
     }
 
     /// Returns the speed-up of the costliest decisions minus that of the cheapest, same robots,
@@ -207,10 +219,9 @@ impl Performance {
         let most = self.most_workers();
         let title = format!("Initialization, of a run of {REFERENCE_CYCLES} cycles");
         let together = format!("share, {most} workers");
-        let note = "Median of 3. Initialization is not parallel: the scenario is read, the world \
-                    compiled, all bodies placed. Shares from the measured time per cycle, \
-                    unrecorded.";
-        let percent = |share: f64| format!("{:.2} %", 100.0 * share);
+        let note = "Median of seconds, mean of shares over repeats. Initialization is not parallel: \
+                    the scenario is read, the world compiled, all bodies placed. Shares from the \
+                    measured time per cycle, unrecorded.";
         table(
             title,
             note,
@@ -218,8 +229,8 @@ impl Performance {
             &[
                 ("load", &|i| self.loads[i.load].name()),
                 ("seconds", &|i| format!("{:.4}", i.seconds)),
-                ("share, 1 worker", &|i| percent(i.share_alone)),
-                (&together, &|i| percent(i.share_together)),
+                ("share, 1 worker", &|i| i.share_alone.to_string()),
+                (&together, &|i| i.share_together.to_string()),
             ],
         )
     }
@@ -323,7 +334,7 @@ fn time_load(
             workers,
             recorded,
             cycle_ms: Estimate::of(times_s.iter().map(|t| t.map(|t| 1e3 * t / cycles as f64))),
-            speed_up: Estimate::of(ratios.iter().copied()),
+            speed_up: Estimate::of_factors(ratios.iter().copied()),
             ratios,
             machine: Estimate::ratio(machine(1), machine(workers)),
         })
@@ -338,18 +349,17 @@ fn time_load(
     Ok(timings)
 }
 
-fn initialize(index: usize, load: &Load, timings: &[Timing]) -> Initialization {
-    let mut times_s = [0; 3].map(|_| seconds(|| load.simulation(1)).0);
-    times_s.sort_by(f64::total_cmp);
-    let seconds = times_s[1];
+fn initialize(index: usize, load: &Load, timings: &[Timing], repeats: usize) -> Initialization {
+    let times_s: Vec<f64> = (0..repeats).map(|_| seconds(|| load.simulation(1)).0).collect();
     let unrecorded = || timings.iter().filter(|t| !t.recorded);
     let share = |timing: Option<&Timing>| {
         let cycle_s = timing.map_or(0.0, |t| t.cycle_ms.or_zero()) * 1e-3;
-        seconds / (seconds + cycle_s * REFERENCE_CYCLES as f64)
+        let of = |s: &f64| Some(s / (s + cycle_s * REFERENCE_CYCLES as f64));
+        Estimate::of(times_s.iter().map(of))
     };
     Initialization {
         load: index,
-        seconds,
+        seconds: median(times_s.iter().copied()),
         share_alone: share(unrecorded().next()),
         share_together: share(unrecorded().next_back()),
     }

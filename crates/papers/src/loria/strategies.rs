@@ -198,7 +198,7 @@ fn try_load(plan: &Plan, index: usize, load: &Load) -> Vec<Trial> {
             strategy: c.strategy.into(),
             workers: c.workers,
             cycle_ms: Estimate::of(own_s.iter().map(|t| t.map(|t| 1e3 * t / cycles as f64))),
-            speed_up: Estimate::of(ratios.iter().copied()),
+            speed_up: Estimate::of_factors(ratios.iter().copied()),
             ratios,
             machine: Estimate::ratio(times_of(ARITHMETIC, 1), times_of(ARITHMETIC, c.workers)),
             contacts,

@@ -3,7 +3,7 @@
 //!
 //! The slides show pictures and no numbers, so their *claims* are examined. Every figure is our
 //! own, with the number of runs, and an interval where runs are random. `claims` says of each
-//! claim whether it held, did not hold, or cannot be judged.
+//! claim whether it held, is refuted or undecided, or what it would take is lost.
 //!
 //! ```text
 //! corridor.rs, rotation.rs, field.rs    the swarm and its leader
@@ -101,7 +101,7 @@ impl Default for Plan {
         Self {
             seeds: 10,
             field_seeds: 30,
-            snake_seeds: 4,
+            snake_seeds: 5,
             widths_m: vec![1.2, 1.4, 1.6, 1.8, 2.0, 2.5, 3.0],
             followers: vec![15, 40],
             corridor_cycles: 12_000,

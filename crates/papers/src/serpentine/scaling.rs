@@ -11,9 +11,9 @@ use sidestep::kernel::{Digest, InputError};
 use sidestep::worlds::chain::geometry::{Point, along, unit};
 use sidestep::worlds::chain::{Chain, Connector, Obstacle, Obstacles, Propagator, Request, Rod};
 use sidestep_document::figure::{Point as FigurePoint, Scale};
-use sidestep_document::{Figure, Series, Table};
+use sidestep_document::{Estimate, Figure, Series, Table};
 
-/// Repeats of each timing; the median counts.
+/// Repeats of each timing.
 const REPEATS: usize = 5;
 /// Length of a rod.
 const ROD_M: f64 = 0.1;
@@ -29,6 +29,8 @@ pub(super) struct Size {
     pub(super) connectors: usize,
     /// Time of a motion, microseconds: rods of fixed length,
     pub(super) fixed_us: f64,
+    /// the same by repeat,
+    pub(super) fixed_us_by_repeat: Vec<f64>,
     /// and how many connectors move in one.
     pub(super) fixed_moved: f64,
     /// The same for rods that may be half as long again,
@@ -44,6 +46,8 @@ pub(super) struct Far {
     pub(super) balls: usize,
     /// Time of a motion, microseconds.
     pub(super) us: f64,
+    /// The same by repeat.
+    pub(super) us_by_repeat: Vec<f64>,
     /// Whether the chain ends where it does without them, to the bit.
     pub(super) same: bool,
 }
@@ -93,8 +97,8 @@ fn led(
     Ok((1e6 * began.elapsed().as_secs_f64() / count, moved as f64 / count))
 }
 
-/// Returns time and connectors of a motion of a chain in the open: the median of some repeats.
-fn in_the_open(n: usize, max_m: f64, motions: usize) -> Result<(f64, f64), InputError> {
+/// Returns times by repeat, and connectors of a motion of a chain in the open.
+fn in_the_open(n: usize, max_m: f64, motions: usize) -> Result<(Vec<f64>, f64), InputError> {
     let mut chain = snake(n, max_m)?;
     let (nothing, mut times_us, mut moved) = (Obstacles::default(), Vec::new(), 0.0);
     for repeat in 0..REPEATS {
@@ -103,7 +107,7 @@ fn in_the_open(n: usize, max_m: f64, motions: usize) -> Result<(f64, f64), Input
         times_us.push(us);
         moved += touched / REPEATS as f64;
     }
-    Ok((median(times_us), moved))
+    Ok((times_us, moved))
 }
 
 /// Returns balls beside the way of the head, which rods turn from, and `far` ones that nothing
@@ -132,9 +136,16 @@ impl Scaling {
         for (k, &connectors) in plan.sizes.iter().enumerate() {
             progress("cost of a motion", k as f64 / plan.sizes.len() as f64);
             let motions = (plan.timed_motions / connectors).max(4);
-            let (fixed_us, fixed_moved) = in_the_open(connectors, ROD_M, motions)?;
+            let (fixed_us_by_repeat, fixed_moved) = in_the_open(connectors, ROD_M, motions)?;
             let (slack_us, slack_moved) = in_the_open(connectors, 1.5 * ROD_M, motions)?;
-            sizes.push(Size { connectors, fixed_us, fixed_moved, slack_us, slack_moved });
+            sizes.push(Size {
+                connectors,
+                fixed_us: median(fixed_us_by_repeat.iter().copied()),
+                fixed_us_by_repeat,
+                fixed_moved,
+                slack_us: median(slack_us),
+                slack_moved,
+            });
         }
         let mut alone = None;
         let motions = (plan.timed_motions / AMONG).max(50);
@@ -149,10 +160,30 @@ impl Scaling {
                 end = Some(bits(&chain));
             }
             let alone = *alone.get_or_insert(end);
-            far.push(Far { balls: count, us: median(times_us), same: end == alone });
+            let us = median(times_us.iter().copied());
+            far.push(Far { balls: count, us, us_by_repeat: times_us, same: end == alone });
         }
         progress("cost of a motion", 1.0);
         Ok(Self { sizes, far })
+    }
+
+    /// Returns the time per moved connector of the longest chain divided by that of the shortest.
+    pub(super) fn growth(&self) -> Estimate {
+        let each = |size: Option<&Size>| -> Vec<Option<f64>> {
+            let per_moved = |s: &Size, us: &f64| Some(us / s.fixed_moved.max(1.0));
+            size.iter()
+                .flat_map(|s| s.fixed_us_by_repeat.iter().map(|us| per_moved(s, us)))
+                .collect()
+        };
+        Estimate::ratio(&each(self.sizes.last()), &each(self.sizes.first()))
+    }
+
+    /// Returns the time of a motion with the most far balls divided by that with the fewest.
+    pub(super) fn far_growth(&self) -> Estimate {
+        let each = |far: Option<&Far>| -> Vec<Option<f64>> {
+            far.iter().flat_map(|f| f.us_by_repeat.iter().map(|us| Some(*us))).collect()
+        };
+        Estimate::ratio(&each(self.far.last()), &each(self.far.first()))
     }
 
     pub(super) fn tables(&self) -> [Table; 2] {

@@ -78,7 +78,7 @@ fn holds_numbers(table: &Table, k: usize) -> bool {
     cells().any(|cell| !cell.is_empty()) && cells().all(|cell| is_number(cell))
 }
 
-/// Returns the claims, below how many of them held.
+/// Returns the claims, below how many have each verdict.
 pub(super) fn claims(claims: &[Claim]) -> Markup {
     let has_figure = claims.iter().any(|c| c.papers_figure.is_some());
     let heads = html! {
@@ -126,12 +126,14 @@ pub(super) fn claims(claims: &[Claim]) -> Markup {
 
 /// Returns a verdict as color, sign and word.
 fn badge(verdict: Verdict) -> Markup {
-    let (class, sign) = match verdict {
-        Verdict::Held => ("held", "\u{2713}"),
-        Verdict::NotHeld => ("not-held", "\u{2717}"),
-        Verdict::Lost => ("lost", "?"),
+    let sign = match verdict {
+        Verdict::Held => "\u{2713}",
+        Verdict::Refuted => "\u{2717}",
+        Verdict::Undecided => "?",
+        Verdict::Lost => "\u{2205}",
+        Verdict::Setting => "\u{2022}",
     };
     html! {
-        span .badge .(class) { span aria-hidden="true" { (sign) } " " (verdict.name()) }
+        span .badge .(verdict.name()) { span aria-hidden="true" { (sign) } " " (verdict.name()) }
     }
 }

@@ -8,7 +8,7 @@ use sidestep::scenario::Source;
 use sidestep::worlds::airspace::{AirspaceRun, airspace_run};
 
 /// Random traffic in which several groups form and part, with everything that can err.
-fn traffic(more: &str) -> Source {
+pub(crate) fn traffic(more: &str) -> Source {
     let text = format!(
         "format = 1\nworld = \"airspace\"\nseed = 7\n[airspace]\n{more}\n\
          [airspace.generator]\nkind = \"random\"\nn = 24\nradius_m = 16000.0\n"
@@ -22,7 +22,11 @@ fn run(source: &Source, workers: usize) -> AirspaceRun {
     run
 }
 
-const ERRING: &str = "position_noise_m = 20.0\nheading_noise_deg = 1.0\nwind_m_s = [5.0, -3.0]";
+pub(crate) const ERRING: &str =
+    "position_noise_m = 20.0\nheading_noise_deg = 1.0\nwind_m_s = [5.0, -3.0]";
+
+/// Nobody avoids anybody, so that pairs lose their separation.
+pub(crate) const LOSING: &str = "method = \"none\"\nshield = \"off\"";
 
 #[test]
 fn any_number_of_workers_gives_the_same_bits() {

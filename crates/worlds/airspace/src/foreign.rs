@@ -33,7 +33,7 @@ fn form(file: &Path) -> Form {
 /// When the file cannot be read.
 pub(super) fn translate(file: &Path) -> Result<Option<Foreign>, InputError> {
     let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let (scenario, (json, lines)) = match form(file) {
+    let (scenario, (mut json, lines)) = match form(file) {
         Form::Other => return Ok(None),
         Form::Bluesky => {
             let scn = bluesky::read(file)?;
@@ -45,6 +45,10 @@ pub(super) fn translate(file: &Path) -> Result<Option<Foreign>, InputError> {
             (from_tracks(&name, &tracks), told_of_tracks(&tracks))
         }
     };
+    if scenario.is_none() {
+        // As of a scenario, because whoever counts airplanes does not ask for the reason.
+        json["airplanes"] = 0.into();
+    }
     let scenario = scenario.ok_or_else(|| {
         let remedy = "give a file that creates aircraft at known places, with speeds";
         InputError::new(file.display(), "no aircraft in it has a place and a speed", remedy)

@@ -31,6 +31,8 @@ pub(super) struct Order<'a> {
     pub(super) radius_m: f64,
     pub(super) jitter_m: f64,
     pub(super) model: &'a Model,
+    /// Further meters between the starts of random traffic, for errors that the shield allows for.
+    pub(super) errors_m: f64,
 }
 
 /// Returns the airplanes, or, as an error, how many found a place before there was none left.
@@ -54,6 +56,7 @@ fn airplane(order: &Order<'_>, from: Point, to: Vec<Point>) -> Airplane {
         leaves_s: f64::INFINITY,
         orders: Vec::new(),
         track: None,
+        is_intruder: false,
     }
 }
 
@@ -85,7 +88,7 @@ fn superconflict(order: &Order<'_>, streams: &Streams) -> Vec<Airplane> {
 /// radius away. Starts are so far apart that first fallbacks are, too: an orbit's diameter each,
 /// and the separation.
 fn random(order: &Order<'_>, streams: &Streams) -> Result<Vec<Airplane>, usize> {
-    let gap_m = 4.0 * order.model.turn_radius_m() + order.model.separation_m + 1.0;
+    let gap_m = 4.0 * order.model.turn_radius_m() + order.model.separation_m + order.errors_m + 1.0;
     // Starts by squares as wide as the gap, so that only those around a place are compared with it.
     let mut starts: BTreeMap<[i64; 2], Vec<Point>> = BTreeMap::new();
     let square = |at: Point| at.map(|v| (v / gap_m).floor() as i64);

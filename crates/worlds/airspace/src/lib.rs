@@ -23,6 +23,7 @@ pub mod flight;
 mod flight_plan;
 mod foreign;
 mod generate;
+mod intruder;
 mod join;
 mod kind;
 mod memory;

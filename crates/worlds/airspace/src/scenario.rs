@@ -20,7 +20,6 @@ use settings::{LegsSection, Switch, Times};
 use sidestep_collectives::{Choice, Estimator, Order, Update, Utility};
 use sidestep_kernel::InputError;
 use sidestep_scenario::{FromTo, Number, Point, Rule, Sections, Source};
-use std::collections::BTreeSet;
 use std::sync::Arc;
 use toml::Spanned;
 use values::{
@@ -87,6 +86,7 @@ struct AirspaceSection {
     /// Standard deviation in meters; larger errors of known positions make no sense.
     position_noise_m: Option<Number<FromTo<0, 1_000_000>>>,
     heading_noise_deg: Option<Number<HeadingNoise>>,
+    error_sigmas: Option<Number<FromTo<0, 100>>>,
 }
 
 /// The times until which tracks may be replayed, infinity included.
@@ -154,21 +154,20 @@ impl Compiled {
 
     /// Returns the state at the start.
     pub fn start_snapshot(&self) -> Snapshot {
-        let close: BTreeSet<u32> = self.too_close.iter().flat_map(|&(a, b)| [a, b]).collect();
-        let record = |(id, (airplane, &fallback)): (u32, (&Airplane, &Side))| AirplaneRecord {
+        let record = |(airplane, &fallback): (&Airplane, &Side)| AirplaneRecord {
             pose: airplane.start,
             arrived: FLYING,
             counts: [0; 4],
             fallback,
-            came_too_close: close.contains(&id),
             altitude_m: match &airplane.track {
                 Some(track) => track.altitude_at_m(airplane.appears_s),
                 None => airplane.altitude_m,
             },
             orders: [0; 2],
         };
-        let airplanes = (0..).zip(self.world.airplanes.iter().zip(&self.fallbacks)).map(record);
-        Snapshot { cycle: 0, airplanes: airplanes.collect(), contacts: Vec::new() }
+        let airplanes = self.world.airplanes.iter().zip(&self.fallbacks).map(record).collect();
+        let named = self.too_close.clone();
+        Snapshot { cycle: 0, airplanes, contacts: Vec::new(), named, held: Vec::new() }
     }
 }
 

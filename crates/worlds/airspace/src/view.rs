@@ -146,6 +146,12 @@ pub(super) fn entry(event: &Event) -> Entry {
         EventKind::GroupTooLarge => {
             (Level::Warning, format!("is in a group of {value}, too large to optimize"))
         }
+        EventKind::BeyondBound => {
+            (Level::Warning, format!("errs {value:.1} times as much as the shield allows for"))
+        }
+        EventKind::Intruder => {
+            (Level::Warning, format!("can be reached by airplane/{other}, now {value:.0} m away"))
+        }
     };
     Entry { cycle: event.cycle, level, who: format!("airplane/{}", event.airplane), words }
 }

@@ -83,7 +83,7 @@ fn agents_in_threads_of_their_own_decide_as_one_process_does() {
     let compiled = Compiled::new(&Source::new("threads", text, "")).expect("a scenario");
     let world = &*compiled.world;
     let known = group(world);
-    let briefing = brief(world, 0, &known);
+    let briefing = brief(world, 0, &known, &[]);
     let own = |me: usize| own_ship(world, &briefing, me, known[me], Contacts::new());
     let own: Vec<OwnShip> = (0..known.len()).map(own).collect();
     let options: Vec<Options> = own.iter().map(|own| own.options.clone()).collect();

@@ -48,6 +48,11 @@ impl Side {
         }
     }
 
+    /// Returns its letter in paths, see [`Self::from_letter`].
+    pub fn letter(self) -> char {
+        ['F', 'L', 'B', 'R'][self as usize]
+    }
+
     /// Returns its name in files.
     pub fn name(self) -> &'static str {
         ["front", "left", "back", "right"][self as usize]

@@ -3,7 +3,7 @@
 use super::decide::{Behaviour, Sector};
 use super::effector::{Action, EffectorModel, ObstacleRule};
 use super::policy::ConflictPolicy;
-use super::ray::{Crossing, crossings, turn_crossing};
+use super::ray::{Crossing, EPSILON, crossings, turn_crossing};
 use super::sensor::{Reading, ReadingTable, Row, SensorModel};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::Cycle;
@@ -244,7 +244,7 @@ impl MountedSensor {
                 let turned = turn_crossing(c, size, heading);
                 turned.dy * stride as i32 + turned.dx
             }),
-            classes: four.map(|c| model.class_of(c.distance * box_size_m)),
+            classes: four.map(|c| model.class_of(c.distance, box_size_m)),
         };
         let boxes = [0, 1, 2, 3]
             .map(|heading| beams.iter().flatten().map(|&four| crossed(four, heading)).collect());
@@ -337,7 +337,8 @@ pub struct Radio {
 impl Radio {
     /// Returns a radio with this range in meters and this chance of losing a reception.
     pub fn new(range_m: f64, box_size_m: f64, loss: f64) -> Self {
-        let reach = 2.0 * range_m / box_size_m;
+        // Who is exactly at the range hears, also where rounding makes the quotient smaller.
+        let reach = 2.0 * (range_m / box_size_m + EPSILON);
         Self { reach2_half_boxes: (reach * reach) as u64, loss: Chance::new(loss) }
     }
 }

@@ -3,9 +3,9 @@
 use super::super::Report;
 use super::super::floor::Mind;
 use super::super::reliability::{
-    CONTACTS, Key, LATERAL, Reliability, STRAIGHTNESS, SweepCase, TRIP, larger,
+    CONTACTS, EFFECTORS, Key, LATERAL, NOBODY, Reliability, SENSORS, STRAIGHTNESS, SweepCase, TRIP,
 };
-use super::{Claim, Verdict, claim};
+use super::{Claim, Comparison, Verdict, claim, judged};
 use sidestep::worlds::robots::world::Regime::{self, Both, Effectors, Reliable, Sensors};
 use sidestep_document::Estimate;
 
@@ -16,14 +16,16 @@ pub(super) fn claims(report: &Report) -> Vec<Claim> {
 
 fn zigzag(r: &Reliability) -> Claim {
     let bent = r.difference(Key::BASE, [Both, Reliable], STRAIGHTNESS);
-    let lateral = r.estimate(Key::BASE, Both, LATERAL);
-    let means = by_regime(|regime| r.estimate(Key::BASE, regime, STRAIGHTNESS));
+    let lateral = r.difference(Key::BASE, [Both, Reliable], LATERAL);
+    let means = |measure| by_regime(|regime| r.estimate(Key::BASE, regime, measure));
     claim(
         "E-8",
-        Verdict::of(bent.is_below(0.0) && lateral.is_above(0.0)),
+        judged([Comparison::below(&bent, 0.0), Comparison::above(&lateral, 0.0)]),
         format!(
-            "Straightness: {means}; both - reliable {bent}. Sideways moves per 1000 actions: \
-             both {lateral}, reliable 0."
+            "Straightness: {}; both - reliable {bent}. Sideways moves per 1000 actions: {}; both - \
+             reliable {lateral}.",
+            means(STRAIGHTNESS),
+            means(LATERAL),
         ),
     )
 }
@@ -34,28 +36,35 @@ fn by_regime(of: impl Fn(Regime) -> Estimate) -> String {
 }
 
 fn collisions(r: &Reliability) -> Claim {
-    let sensors_more = |key| r.difference(key, [Sensors, Effectors], CONTACTS).is_above(0.0);
-    let effectors_harm = |key| r.difference(key, [Effectors, Reliable], CONTACTS).is_above(0.0);
     let places = r.places();
-    let above = places.iter().filter(|&&key| sensors_more(key)).count();
-    let whole = places.iter().filter(|&&key| sensors_more(key) && effectors_harm(key)).count();
-    let swept = SweepCase::all().flat_map(|case| r.levels.iter().map(move |&e| (case, e)));
-    let by: Vec<&str> = swept.map(|(case, e)| larger(&r.sensors_less_effectors(case, e))).collect();
-    let count = |name| by.iter().filter(|&&b| b == name).count();
-    let (sensors, effectors) = (count("sensors"), count("effectors"));
+    let more = |key, pair| Comparison::above(&r.difference(key, pair, CONTACTS), 0.0);
+    let orders =
+        |&key: &Key<'static>| [[Sensors, Effectors], [Effectors, Reliable]].map(|p| more(key, p));
+    let at_places = places.iter().flat_map(orders);
+    let larger = r.larger();
+    let at_levels = larger.iter().map(|l| Comparison::above(&l.sensors_less_effectors, 0.0));
+    let count = |name| larger.iter().filter(|l| l.by == name).count();
+    let above = |pair| {
+        let is = |key: &&Key<'static>| r.difference(**key, pair, CONTACTS).is_above(0.0);
+        places.iter().filter(is).count()
+    };
     claim(
         "E-9",
-        Verdict::of(whole == places.len() && effectors == 0),
+        judged(at_places.chain(at_levels)),
         format!(
             "Presets, rule cut, per 1000 actions: {}; sensors - effectors {}. Sensors are above \
-             effectors at {above} of {} places (floors, rules, behaviours), and effectors above \
-             reliable too at {whole}. At equal error level, of {} points: sensors more at \
-             {sensors}, effectors at {effectors}, not to be told at {}. {}",
+             effectors at {} of {} places (floors, rules, behaviours), and effectors above \
+             reliable at {}. At equal error level, of {} points: sensors more at {}, effectors at {}, \
+             not to be told at {} (by Holm). {}",
             by_regime(|regime| r.estimate(Key::BASE, regime, CONTACTS)),
             r.difference(Key::BASE, [Sensors, Effectors], CONTACTS),
+            above([Sensors, Effectors]),
             places.len(),
-            by.len(),
-            by.len() - sensors - effectors,
+            above([Effectors, Reliable]),
+            larger.len(),
+            count(SENSORS),
+            count(EFFECTORS),
+            count(NOBODY),
             flips(r),
         ),
     )
@@ -63,12 +72,13 @@ fn collisions(r: &Reliability) -> Claim {
 
 /// Returns the error level from which on sensors cause more contacts, by case of the sweep.
 fn flips(r: &Reliability) -> String {
+    let larger = r.larger();
     let sentence = |case: SweepCase| {
-        let is_sensors = |e: f64| larger(&r.sensors_less_effectors(case, e)) == "sensors";
+        let levels = larger.iter().rev().filter(|l| l.case == case);
         // The first level from which on sensors stay worse.
-        let first = r.levels.iter().rev().take_while(|&&e| is_sensors(e)).last();
+        let first = levels.take_while(|l| l.by == SENSORS).last();
         let [mind, beams, spread] = case.names();
-        let from = first.map_or("at no level".into(), |e| format!("from e = {e} on"));
+        let from = first.map_or("at no level".into(), |l| format!("from e = {} on", l.level));
         format!("{mind}, {beams} beams, {spread}: {from}")
     };
     let cases: Vec<String> = SweepCase::all().map(sentence).collect();
@@ -76,13 +86,16 @@ fn flips(r: &Reliability) -> String {
 }
 
 fn slowest_trips(r: &Reliability) -> Claim {
-    let slower = |key, other| r.difference(key, [Both, other], TRIP).is_above(0.0);
-    let slowest = |key| [Reliable, Effectors, Sensors].into_iter().all(|other| slower(key, other));
+    let longer = |key, other| r.difference(key, [Both, other], TRIP);
+    let others = [Reliable, Effectors, Sensors];
     let places = r.places();
-    let held = places.iter().filter(|&&key| slowest(key)).count();
+    let each = places.iter().flat_map(|&key| others.map(|other| longer(key, other)));
+    let slowest =
+        |&key: &Key<'static>| others.iter().all(|other| longer(key, *other).is_above(0.0));
+    let held = places.iter().filter(|key| slowest(key)).count();
     claim(
         "E-10a",
-        Verdict::of(held == places.len()),
+        judged(each.map(|longer| Comparison::above(&longer, 0.0))),
         format!(
             "Cycles per trip: {}. Both are slowest at {held} of {} places.",
             by_regime(|regime| r.estimate(Key::BASE, regime, TRIP)),
@@ -111,7 +124,7 @@ fn behaviours(r: &Reliability) -> Claim {
     let more = difference_of_savings(r);
     claim(
         "E-11",
-        Verdict::of(saved(Both).is_above(0.0) && more.is_above(0.0)),
+        judged([saved(Both), more].map(|saved| Comparison::above(&saved, 0.0))),
         format!(
             "A filter (two reports before a robot believes its side beams) saves cycles per \
              trip: reliable {}, both {}, the second less the first {more}. It costs contacts per \

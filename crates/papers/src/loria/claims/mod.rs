@@ -5,10 +5,12 @@
 
 mod behaviour;
 mod setting;
+#[cfg(test)]
+mod tests;
 mod time;
 
 use super::Report;
-use crate::claims::{File, Words};
+use crate::claims::{Comparison, File, Words, in_every_run, judged};
 use sidestep_document::claim::{Claim, Verdict};
 
 /// Judges all claims.

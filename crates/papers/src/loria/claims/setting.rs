@@ -1,7 +1,7 @@
 //! E-1 to E-7: the setting of the experiments.
 
 use super::super::Report;
-use super::{Claim, Verdict, claim};
+use super::{Claim, Verdict, claim, in_every_run};
 
 pub(super) fn claims(report: &Report) -> Vec<Claim> {
     vec![
@@ -22,7 +22,7 @@ fn suites(report: &Report) -> Claim {
     let fitted = report.cost_model.points.len();
     claim(
         "E-1",
-        Verdict::Held,
+        Verdict::Setting,
         format!(
             "{runs} reliability runs, {builds} genericity runs, {timed} timed series, {fitted} \
              runs for the cost model."
@@ -31,7 +31,7 @@ fn suites(report: &Report) -> Claim {
 }
 
 fn floors(report: &Report) -> Claim {
-    claim("E-2", Verdict::Held, report.reliability.floors.join("; "))
+    claim("E-2", Verdict::Setting, report.reliability.floors.join("; "))
 }
 
 fn processors(report: &Report) -> Claim {
@@ -39,13 +39,12 @@ fn processors(report: &Report) -> Claim {
     let workers: Vec<String> = p.digests.iter().map(|d| d.0.to_string()).collect();
     Claim {
         reason: format!(
-            "The same run gives the same bits with every number of workers; of time, this \
-             machine can show {} processors only.",
+            "Says what was run, on {} processors; whether the bits are the same is E-4.",
             p.processors
         ),
         ..claim(
             "E-3",
-            Verdict::of(p.is_deterministic()),
+            Verdict::Setting,
             format!("Workers {}: {}.", workers.join(", "), digests(report)),
         )
     }
@@ -55,7 +54,7 @@ fn sequential(report: &Report) -> Claim {
     let p = &report.performance;
     claim(
         "E-4",
-        Verdict::of(p.is_deterministic()),
+        in_every_run(p.digests.len() + 1, p.is_deterministic()),
         format!(
             "With 1 worker, with more, and recorded: {}, {}.",
             digests(report),
@@ -80,7 +79,7 @@ fn builds(report: &Report, camera: bool) -> (String, Verdict) {
          {} cycles",
         report.genericity.cycles
     );
-    (text, Verdict::of(lawful == all))
+    (text, in_every_run(all, lawful == all))
 }
 
 fn sizes(report: &Report) -> Claim {
@@ -108,7 +107,7 @@ fn regimes(report: &Report) -> Claim {
     let r = &report.reliability;
     claim(
         "E-7",
-        Verdict::Held,
+        Verdict::Setting,
         format!(
             "{} variants x {} seeds, four regimes at each of {} places.",
             r.cells.len(),

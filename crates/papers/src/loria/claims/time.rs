@@ -2,7 +2,7 @@
 
 use super::super::Report;
 use super::super::performance::{Performance, REFERENCE_CYCLES, Timing};
-use super::{Claim, Verdict, claim};
+use super::{Claim, Comparison, Verdict, claim, judged};
 use sidestep::worlds::robots::baseline::Strategy;
 use sidestep_document::Estimate;
 
@@ -27,39 +27,49 @@ pub(super) fn claims(report: &Report) -> Vec<Claim> {
 }
 
 fn initialization(p: &Performance) -> Claim {
-    let worst = p.initialization.iter().map(|i| i.share_alone).fold(0.0, f64::max);
+    let shares = || p.initialization.iter().map(|i| i.share_alone);
+    let worst = shares().max_by(|a, b| a.or_zero().total_cmp(&b.or_zero()));
     Claim {
         reason: format!(
-            "Held when below {:.0} % for every load; the paper's share and cycles are lost.",
+            "Held when below {:.0} % for every load, by its interval over repeats; the paper's share and \
+             cycles are lost.",
             100.0 * SMALL_SHARE
         ),
         ..claim(
             "E-12",
-            Verdict::of(worst < SMALL_SHARE),
+            judged(shares().map(|share| Comparison::below(&share, SMALL_SHARE))),
             format!(
-                "Initialization takes up to {:.2} % of a run of {REFERENCE_CYCLES} cycles with one \
-             worker (largest of {} loads).",
-                100.0 * worst,
+                "Initialization takes up to {} of a run of {REFERENCE_CYCLES} cycles with one \
+             worker (share, largest of {} loads).",
+                worst.map_or("-".into(), |share| share.to_string()),
                 p.loads.len()
             ),
         )
     }
 }
 
-/// Whether time over workers cannot be judged: there is one processor, or others were using them.
+/// Whether time over workers decides nothing: there is one processor, or others were using them.
 fn is_excused(p: &Performance) -> bool {
     p.most_workers() == 1 || p.was_busy()
+}
+
+/// Returns a verdict that does not blame a program for a machine that is busy or small.
+fn unless_excused(p: &Performance, verdict: Verdict) -> Verdict {
+    match verdict {
+        Verdict::Refuted if is_excused(p) => Verdict::Undecided,
+        verdict => verdict,
+    }
 }
 
 fn time_falls(report: &Report) -> Claim {
     let p = &report.performance;
     let most = p.most_workers();
     let timings = || p.at_most_workers(false).chain(p.at_most_workers(true));
-    let falls = timings().all(|timing| timing.speed_up.is_above(1.0));
+    let falls = judged(timings().map(|timing| Comparison::above(&timing.speed_up, 1.0)));
     let machine = Estimate::of(timings().map(|timing| timing.machine.mean));
     claim(
         "E-13a",
-        if !falls && is_excused(p) { Verdict::Lost } else { Verdict::of(falls) },
+        unless_excused(p, falls),
         format!(
             "Speed-up with {most} workers: {} unrecorded, {} recorded ({} loads, {} repeats of \
              each; mere arithmetic in turn with them: {machine}).",
@@ -81,24 +91,27 @@ fn range<'a>(timings: impl Iterator<Item = &'a Timing>) -> String {
 
 fn efficiency_falls(p: &Performance) -> Claim {
     let most = p.most_workers();
-    let efficiency = |t: &Timing| t.speed_up.or_zero() / most as f64;
-    let all = || p.at_most_workers(false).map(efficiency);
-    let (low, n) = (all().filter(|&e| e < LOW_EFFICIENCY).count(), all().count());
-    let listed: Vec<String> = all().map(|e| format!("{e:.2}")).collect();
+    let by_load: Vec<String> = p
+        .at_most_workers(false)
+        .map(|t| format!("{:.2}", t.speed_up.or_zero() / most as f64))
+        .collect();
+    let efficiency = p.efficiency();
     Claim {
         reason: format!(
-            "Held when efficiency is below {LOW_EFFICIENCY} for most loads; not judged where \
-             others were using the machine. The paper went to sixteen processors; {} can show \
-             the beginning of a fall only.",
+            "Held when the mean efficiency of all loads is below {LOW_EFFICIENCY} by its interval over \
+             repeats; undecided where others were using the machine. The paper went to sixteen \
+             processors; {} can show the beginning of a fall only.",
             p.processors
         ),
         ..claim(
             "E-13b",
-            if is_excused(p) { Verdict::Lost } else { Verdict::of(2 * low > n) },
+            match is_excused(p) {
+                true => Verdict::Undecided,
+                false => judged([Comparison::below(&efficiency, LOW_EFFICIENCY)]),
+            },
             format!(
-                "Efficiency with {most} workers, unrecorded, by load: {}; below {LOW_EFFICIENCY} for \
-             {low} of {n}.",
-                listed.join(", ")
+                "Efficiency with {most} workers, unrecorded: {efficiency}; by load: {}.",
+                by_load.join(", ")
             ),
         )
     }
@@ -122,11 +135,14 @@ fn costly_decisions(p: &Performance) -> Claim {
     let (least, most) = (operations().min().unwrap_or(0), operations().max().unwrap_or(0));
     let speed_up = |cost: u32| {
         let timings = p.at_most_workers(false).filter(|t| p.loads[t.load].operations == cost);
-        Estimate::of(timings.flat_map(|timing| timing.ratios.iter().copied()))
+        Estimate::of_factors(timings.flat_map(|timing| timing.ratios.iter().copied()))
     };
     claim(
         "E-15a",
-        Verdict::by_sign(gain.interval.filter(|_| !is_excused(p))),
+        match is_excused(p) {
+            true => Verdict::Undecided,
+            false => judged([Comparison::above(&gain, 0.0)]),
+        },
         format!(
             "Speed-up with {} workers: {} at {least} operations per decision, {} at {most}; \
              difference {gain}.",
@@ -139,6 +155,7 @@ fn costly_decisions(p: &Performance) -> Claim {
 
 fn conflicts(report: &Report) -> Claim {
     let model = &report.cost_model;
+    let c_s = model.parameter("c_s").and_then(|p| p.interval_ns);
     let shown = |name: &str| match model.parameter(name) {
         None => "not to be told".into(),
         Some(p) => match p.interval_ns {
@@ -148,7 +165,7 @@ fn conflicts(report: &Report) -> Claim {
     };
     claim(
         "E-15b",
-        Verdict::by_sign(model.parameter("c_s").and_then(|p| p.interval_ns)),
+        judged([Comparison::interval_above(c_s, 0.0)]),
         format!(
             "Per body in conflict c_s = {}, besides c_d = {} for every body; p = {:.3} to {:.3}; \
              {} runs, R2 of the second step {:.3}.",
@@ -177,16 +194,10 @@ fn rejected(report: &Report) -> Claim {
             listed.join("; ")
         )
     });
-    let verdict = if all().all(|lead| lead.is_above(0.0)) {
-        Verdict::Held
-    } else if all().any(|lead| lead.is_below(0.0)) && !is_excused(&report.performance) {
-        Verdict::NotHeld
-    } else {
-        Verdict::Lost
-    };
+    let ahead = judged(all().map(|lead| Comparison::above(lead, 0.0)));
     claim(
         "P-3",
-        verdict,
+        unless_excused(&report.performance, ahead),
         format!(
             "Speed-up of the double pool with the most workers less that of the other, {}.",
             shown.collect::<Vec<_>>().join("; ")

@@ -10,7 +10,9 @@ mod swarms;
 mod tests;
 
 use super::Report;
-use crate::claims::{File, Words, all, both, listed};
+use crate::claims::{
+    Comparison, File, Words, both, every, every_trial, in_every_run, judged, listed,
+};
 use sidestep_document::claim::{Claim, Verdict};
 
 /// Judges all claims.

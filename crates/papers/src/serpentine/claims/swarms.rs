@@ -4,7 +4,7 @@ use super::super::Report;
 use super::super::corridor::{Corridor, READINGS};
 use super::super::field::Fields;
 use super::super::snake::Snakes;
-use super::{Claim, Verdict, all, both, claim, listed};
+use super::{Claim, Comparison, Verdict, claim, every, judged, listed};
 use crate::cells::{Cell, mm, most};
 
 /// Number of followers in the slides' swarm.
@@ -40,7 +40,7 @@ fn band(corridor: &Corridor) -> Claim {
     });
     claim(
         "N3",
-        all(wide(), |c| c.number("in_band_percent") > 90.0),
+        judged(wide().map(|c| Comparison::above(c.estimate("in_band_percent"), 90.0))),
         format!("time with the nearest wall in the band, {ours}"),
     )
 }
@@ -49,7 +49,7 @@ fn layers_literally(fields: &Fields) -> Claim {
     let ours = listed(fields.at_rest("level", false), |c| {
         format!("{} discs: {}", c.count("discs"), c.share("arrived"))
     });
-    claim("N5a", all(fields.at_rest("level", false), |c| c.in_all("arrived")), ours)
+    claim("N5a", every(fields.at_rest("level", false), |c| c.in_all("arrived")), ours)
 }
 
 fn layers_latched(fields: &Fields) -> Claim {
@@ -60,7 +60,7 @@ fn layers_latched(fields: &Fields) -> Claim {
     };
     claim(
         "N5b",
-        all(fields.at_rest("latched", true), |c| c.in_all("arrived") && c.in_all("untouched")),
+        every(fields.at_rest("latched", true), |c| c.in_all("arrived") && c.in_all("untouched")),
         format!("with the leave rule, {}; without it, {}", told(true), told(false)),
     )
 }
@@ -76,7 +76,7 @@ fn narrow_corridors(corridor: &Corridor) -> Claim {
     });
     claim(
         "N6a",
-        all(plain(corridor), |c| c.in_all("arrived") && c.count("penetrations") == 0),
+        every(plain(corridor), |c| c.in_all("arrived") && c.count("penetrations") == 0),
         ours,
     )
 }
@@ -92,7 +92,7 @@ fn moving_discs(fields: &Fields) -> Claim {
             c.mm("min_clearance_m")
         )
     });
-    claim("N6b", all(near(), |c| c.in_all("arrived") && c.in_all("untouched")), ours)
+    claim("N6b", every(near(), |c| c.in_all("arrived") && c.in_all("untouched")), ours)
 }
 
 fn snake_in_real_time(snakes: &Snakes) -> Claim {
@@ -106,10 +106,8 @@ fn snake_in_real_time(snakes: &Snakes) -> Claim {
             c.estimate("real_time")
         )
     });
-    let lowest = |c: &Cell| {
-        c.estimate("real_time").interval.map_or(c.number("real_time"), |interval| interval.low)
-    };
-    claim("E1", all(cells(), |c| lowest(c) > 1.0), ours)
+    let faster = |c: &Cell| Comparison::above(c.estimate("real_time"), 1.0);
+    claim("E1", judged(cells().map(faster)), ours)
 }
 
 fn swarm(corridor: &Corridor) -> Claim {
@@ -128,7 +126,7 @@ fn swarm(corridor: &Corridor) -> Claim {
         mm(cells().map(|c| c.number("min_gap_m")).reduce(f64::min)),
         most(cells().map(|c| c.number("max_lag_m"))),
     );
-    claim("E2", all(cells(), is_clean), ours)
+    claim("E2", every(cells(), is_clean), ours)
 }
 
 fn one_master(corridor: &Corridor) -> Claim {
@@ -137,7 +135,7 @@ fn one_master(corridor: &Corridor) -> Claim {
     let steps: u64 = cells().map(|c| c.count("steps")).sum();
     claim(
         "E3",
-        both(&[all(cells(), |c| c.in_all("arrived")), all(cells(), |c| c.count("vetoes") == 0)]),
+        every(cells(), |c| c.in_all("arrived") && c.count("vetoes") == 0),
         format!("{vetoes} vetoes of {steps} motions of leaders that know nothing of who follows"),
     )
 }

@@ -159,8 +159,9 @@ impl<'a> Groups<'a> {
 fn share(values: &[Option<f64>]) -> Estimate {
     let values = Sample::of(values.iter().copied()).values;
     let (yes, n) = (values.iter().sum::<f64>(), values.len());
-    let interval = (n > 0).then(|| wilson(yes, n as f64));
-    Estimate { mean: crate::statistics::mean(&values), interval, n }
+    let mut share = Estimate::of(values.into_iter().map(Some));
+    share.interval = (n > 0).then(|| wilson(yes, n as f64));
+    share
 }
 
 /// Returns the rows in the order of their cells.

@@ -192,7 +192,7 @@ fn effects(metric: &MetricSummary) -> Table {
         Table::new(format!("{}: main effects", sentence(&metric.label)), note, &columns);
     for effect in &metric.effects {
         for level in &effect.levels {
-            let Estimate { mean, interval, n } = level.estimate;
+            let Estimate { mean, interval, n, .. } = level.estimate;
             let cells = [effect.parameter.clone(), level.level.name(), level.variants.to_string()];
             table.row(cells.into_iter().chain([with_interval(mean, interval), n.to_string()]));
         }

@@ -4,12 +4,14 @@ use super::approaches;
 use super::flight::{Course, Flight, Moment};
 use crate::Turn;
 use crate::events::{Event, EventKind};
+use crate::flight::Pose;
 use crate::metrics::airplane_metrics;
 use crate::purpose;
 use crate::state::End;
 use crate::world::AirspaceWorld;
 use sidestep_kernel::distr::normal;
 use sidestep_kernel::interrupt;
+use sidestep_kernel::math::wrap_angle;
 
 /// Flies all steps of this `dt`.
 pub(super) fn step_all(turn: &mut Turn<'_>, mut flights: Vec<Flight<'_>>) {
@@ -58,11 +60,15 @@ fn store(turn: &mut Turn<'_>, flight: Flight<'_>) {
     let cell = &state.airplanes[flight.slot as usize];
     let mut pose = flight.pose;
     let is_disturbed = matches!(flight.course, Course::Way(..));
+    // On its orbit it has moved the pose there already.
+    if cell.orbiting.get() == 0 {
+        state.set_held(flight.slot, Pose { heading_rad: wrap_angle(pose.heading_rad), ..pose });
+    }
     if is_disturbed && world.disturbance.heading_rad > 0.0 {
         let mut draws = world.streams.draws(flight.slot, now, purpose::HEADING);
         pose.heading_rad += world.disturbance.heading_rad * normal(&mut draws);
     }
-    pose.heading_rad = sidestep_kernel::math::wrap_angle(pose.heading_rad);
+    pose.heading_rad = wrap_angle(pose.heading_rad);
     cell.set_pose(pose);
     cell.altitude_m.set(flight.altitude_m);
     cell.next.set(flight.next as u32);

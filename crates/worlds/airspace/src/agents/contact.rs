@@ -21,6 +21,8 @@ pub struct Beacon {
     pub v_m_s: f64,
     /// Largest turn rate in radians per second.
     pub omega_max_rad_s: f64,
+    /// Turn rate of its orbits in radians per second.
+    pub orbit_rad_s: f64,
     /// The separation that it asks for, in meters.
     pub separation_m: f64,
     /// The levels that it is on and changes to.
@@ -60,7 +62,7 @@ impl Orbiting {
     /// Returns its pose at the start of cycle `now`.
     fn pose(&self, air: &Air, beacon: &Beacon, now: Cycle) -> Pose {
         let gone_s = now.saturating_sub(self.as_of) as f64 * air.timing.dt_s;
-        let omega_rad_s = self.side.sign() * beacon.omega_max_rad_s;
+        let omega_rad_s = self.side.sign() * beacon.orbit_rad_s;
         let Pose { at: [x, y], heading_rad } = self.pose.step(beacon.v_m_s, omega_rad_s, gone_s);
         let [wx, wy] = air.wind_m_s;
         Pose { at: [x + wx * gone_s, y + wy * gone_s], heading_rad: math::wrap_angle(heading_rad) }
@@ -74,7 +76,8 @@ impl Beacon {
             pose: flyer.pose,
             goal: None,
             v_m_s: flyer.v_m_s,
-            omega_max_rad_s: flyer.omega_max_rad_s,
+            omega_max_rad_s: flyer.orbit_rad_s,
+            orbit_rad_s: flyer.orbit_rad_s,
             separation_m: flyer.separation_m,
             levels: flyer.levels,
         }
@@ -101,9 +104,9 @@ impl Contact {
     }
 
     fn on_orbit(&self, air: &Air, orbiting: &Orbiting, now: Cycle) -> Vec<Point> {
-        let Beacon { v_m_s, omega_max_rad_s, .. } = self.beacon;
+        let Beacon { v_m_s, orbit_rad_s, .. } = self.beacon;
         let pose = orbiting.pose(air, &self.beacon, now);
-        let omega_rad_s = orbiting.side.sign() * omega_max_rad_s;
+        let omega_rad_s = orbiting.side.sign() * orbit_rad_s;
         let point = |k: usize| pose.step(v_m_s, omega_rad_s, k as f64 * air.timing.dtau_s).at;
         (1..=air.timing.horizon).map(point).collect()
     }

@@ -64,7 +64,7 @@ pub enum Message {
 pub struct Proposal {
     beacon: Beacon,
     fallback: Side,
-    came_too_close: bool,
+    named: Vec<EntityId>,
     rank: u64,
     ways: Vec<Way>,
 }
@@ -75,7 +75,7 @@ impl Proposal {
         Self {
             beacon: Beacon::of(flyer),
             fallback: flyer.fallback,
-            came_too_close: flyer.came_too_close,
+            named: flyer.named.to_vec(),
             rank: flyer.rank,
             ways: ways.to_vec(),
         }
@@ -122,11 +122,11 @@ impl Agent {
     /// Returns an agent that has not sent anything yet, for the airplane at place `me`, which may
     /// fly `ways`.
     pub fn new(scene: Arc<Scene>, me: usize, ways: &[Way], contacts: Contacts) -> Self {
-        let flyer = scene.seen[me].flyer;
+        let flyer = scene.seen[me].flyer.clone();
         Self {
             me,
-            flyer,
             own: Proposal::new(&flyer, ways),
+            flyer,
             contacts,
             members: scene.seen.iter().map(|_| Member::default()).collect(),
             scene,
@@ -156,33 +156,39 @@ impl Agent {
     }
 
     fn flyer_of(&self, place: usize, proposal: &Proposal) -> Flyer {
-        let Proposal { beacon, fallback, came_too_close, rank, .. } = proposal;
+        let Proposal { beacon, fallback, named, rank, .. } = proposal;
         Flyer {
             id: self.id(place),
             pose: beacon.pose,
+            held: beacon.pose,
             v_m_s: beacon.v_m_s,
-            omega_max_rad_s: beacon.omega_max_rad_s,
+            orbit_rad_s: beacon.orbit_rad_s,
             separation_m: beacon.separation_m,
+            error_m: self.scene.seen[place].flyer.error_m,
             levels: beacon.levels,
             vertical_m: self.scene.vertical_m,
             fallback: *fallback,
-            came_too_close: *came_too_close,
+            named: named.as_slice().into(),
             rank: *rank,
         }
     }
 
     /// Returns all orbits that an unheard airplane may be on.
     fn possible(&self, place: usize) -> Vec<Flyer> {
-        let Seen { flyer, orbits } = self.scene.seen[place];
+        let Seen { flyer, orbits } = &self.scene.seen[place];
         let told = self.contacts.get(&flyer.id).map_or(&[][..], |contact| &contact.possible);
         let fresh = told.iter().filter(|orbiting| orbiting.as_of == self.scene.now);
-        let at =
-            |orbiting: &Orbiting| Flyer { pose: orbiting.pose, fallback: orbiting.side, ..flyer };
+        let at = |&Orbiting { pose, side, .. }: &Orbiting| Flyer {
+            pose,
+            held: pose,
+            fallback: side,
+            ..flyer.clone()
+        };
         let heard: Vec<Flyer> = fresh.map(at).collect();
         match heard.is_empty() {
             false => heard,
-            true if orbits => vec![flyer],
-            true => Side::BOTH.map(|fallback| Flyer { fallback, ..flyer }).into(),
+            true if *orbits => vec![flyer.clone()],
+            true => Side::BOTH.map(|fallback| Flyer { fallback, ..flyer.clone() }).into(),
         }
     }
 
@@ -209,7 +215,7 @@ impl Agent {
         for place in 0..self.size() {
             if place == self.me {
                 mine = flyers.len();
-                flyers.push(self.flyer);
+                flyers.push(self.flyer.clone());
                 candidates.push(self.own.ways.clone());
             } else if let Some(proposal) = &self.members[place].proposal {
                 flyers.push(self.flyer_of(place, proposal));
@@ -240,7 +246,7 @@ impl Agent {
     /// Accepts the plans that keep apart from both its own plan and its own fallback.
     fn accept(&mut self) -> Message {
         let own = self.members[self.me].plan.clone().flatten();
-        let mine = [self.plan_of(self.flyer, &own), self.fallback(self.flyer)];
+        let mine = [self.plan_of(self.flyer.clone(), &own), self.fallback(self.flyer.clone())];
         let mut accepted = Vec::new();
         for place in (0..self.size()).filter(|&place| place != self.me) {
             let Member { proposal: Some(proposal), plan: Some(plan), .. } = &self.members[place]
@@ -306,7 +312,7 @@ impl Agent {
                 continue;
             };
             let flyer = self.flyer_of(place, proposal);
-            let mut plans = vec![self.fallback(flyer)];
+            let mut plans = vec![self.fallback(flyer.clone())];
             if let Some(plan) = member.plan.as_ref().filter(|_| member.accepted) {
                 plans.push(self.plan_of(flyer, plan));
             }

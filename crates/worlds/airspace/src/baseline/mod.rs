@@ -16,4 +16,6 @@ pub(super) struct Moving {
     pub(super) preferred: Point,
     pub(super) separation_m: f64,
     pub(super) levels: Levels,
+    /// Whether it gives way to others, too.
+    pub(super) yields: bool,
 }

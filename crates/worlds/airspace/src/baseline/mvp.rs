@@ -68,6 +68,7 @@ mod tests {
             preferred: velocity,
             separation_m: 500.0,
             levels: Levels::at(0.0),
+            yields: true,
         }
     }
 

@@ -21,7 +21,7 @@ pub(in super::super) fn velocity<'a>(
         position: near(m.at),
         velocity: plain(m.velocity),
         radius: (0.5 * m.separation_m * margin) as f32,
-        avoidance_responsibility: 1.0,
+        avoidance_responsibility: if m.yields { 1.0 } else { 0.0 },
     };
     let neighbors: Vec<Cow<'_, Agent>> = others.map(|m| Cow::Owned(agent(m))).collect();
     let preferred = plain(own.preferred);

@@ -3,12 +3,18 @@
 use super::wishes::{by_turn, straight};
 use crate::baseline::{Moving, mvp, orca};
 use crate::flight::{Action, Known, Pose, Stage};
+use crate::intruder::Intruder;
 use crate::world::{AirspaceWorld, Method};
 use sidestep_kernel::math;
 
 /// Returns the wishes of a group.
-pub(super) fn by_velocity(world: &AirspaceWorld, group: &[Known]) -> Vec<Vec<Action>> {
-    let all: Vec<Moving> = group.iter().map(|known| moving(world, *known)).collect();
+pub(super) fn by_velocity(
+    world: &AirspaceWorld,
+    group: &[Known],
+    intruders: &[Intruder],
+) -> Vec<Vec<Action>> {
+    let mut all: Vec<Moving> = group.iter().map(|known| moving(world, *known)).collect();
+    all.extend(intruders.iter().map(intruding));
     let horizon_s = world.timing.horizon_s();
     let margin = world.objective.inflation;
     let toward = |(k, own): (usize, &Moving)| {
@@ -23,7 +29,7 @@ pub(super) fn by_velocity(world: &AirspaceWorld, group: &[Known]) -> Vec<Vec<Act
             false => turning(world, group[k], velocity),
         }
     };
-    all.iter().enumerate().map(toward).collect()
+    all[..group.len()].iter().enumerate().map(toward).collect()
 }
 
 /// Returns the turn toward a velocity, and then the other actions by how little they differ from
@@ -35,6 +41,18 @@ fn turning(world: &AirspaceWorld, known: Known, [vx, vy]: [f64; 2]) -> Vec<Actio
     let mut wishes = vec![Action::Then { omega_rad_s, hold_s: dt_s }];
     wishes.extend(by_turn(world, known, omega_rad_s));
     wishes
+}
+
+/// Returns an intruder, which may come nearer than it seems.
+fn intruding(one: &Intruder) -> Moving {
+    Moving {
+        at: one.at,
+        velocity: one.velocity_m_s,
+        preferred: one.velocity_m_s,
+        separation_m: one.wide_m(0.0),
+        levels: one.levels,
+        yields: false,
+    }
 }
 
 fn moving(world: &AirspaceWorld, known: Known) -> Moving {
@@ -51,5 +69,6 @@ fn moving(world: &AirspaceWorld, known: Known) -> Moving {
         preferred: [v * math::cos(toward), v * math::sin(toward)],
         separation_m: model.separation_m,
         levels: world.levels(known),
+        yields: true,
     }
 }

@@ -8,6 +8,7 @@ use crate::agents::network::Traffic;
 use crate::agents::{Briefing, Conclusion, Decided, Ended, Filed, OwnShip, informed, sampling};
 use crate::events::Event;
 use crate::flight::Known;
+use crate::intruder::Intruder;
 use crate::world::AirspaceWorld;
 use sidestep_collectives::Estimator;
 use sidestep_kernel::{Cycle, EntityId};
@@ -21,10 +22,11 @@ pub(crate) fn optimized(
     world: &AirspaceWorld,
     now: Cycle,
     group: &[Known],
+    intruders: &[Intruder],
     contacts: &mut [Contacts],
     events: &mut Vec<Event>,
 ) -> Deployed {
-    let briefing = brief(world, now, group);
+    let briefing = brief(world, now, group, intruders);
     let own = |(me, contacts): (usize, &Contacts)| {
         own_ship(world, &briefing, me, group[me], contacts.clone())
     };
@@ -81,7 +83,12 @@ fn migrated(
 }
 
 /// Returns the knowledge that all agents of a group share before they talk.
-pub fn brief(world: &AirspaceWorld, now: Cycle, group: &[Known]) -> Arc<Briefing> {
+pub fn brief(
+    world: &AirspaceWorld,
+    now: Cycle,
+    group: &[Known],
+    intruders: &[Intruder],
+) -> Arc<Briefing> {
     let filed = |known: &Known| Filed {
         model: world.stage(known.slot, known.orders).model.clone(),
         actions: world.actions_of(known.slot).to_vec(),
@@ -95,6 +102,7 @@ pub fn brief(world: &AirspaceWorld, now: Cycle, group: &[Known]) -> Arc<Briefing
         objective: world.objective,
         settings: world.settings,
         streams: world.streams,
+        intruders: intruders.to_vec(),
         is_shielded: world.shield,
     })
 }
@@ -128,6 +136,7 @@ fn beacon(world: &AirspaceWorld, known: Known) -> Beacon {
         goal: stage.mission.get(known.next).copied(),
         v_m_s: stage.model.v_m_s,
         omega_max_rad_s: stage.model.omega_max_rad_s,
+        orbit_rad_s: world.orbit_rad_s[known.slot as usize],
         separation_m: stage.model.separation_m,
         levels: world.levels(known),
     }

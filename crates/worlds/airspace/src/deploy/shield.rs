@@ -22,7 +22,7 @@ pub(crate) fn shielded(
     events: &mut Vec<Event>,
 ) -> (Vec<Decision>, Traffic) {
     let Some(network) = &world.network else {
-        let flyers: Vec<Flyer> = seen.iter().map(|seen| seen.flyer).collect();
+        let flyers: Vec<Flyer> = seen.iter().map(|seen| seen.flyer.clone()).collect();
         let frame = (world.timing.points_per_dt(), world.timing.dtau_s);
         let decisions = filter(&flyers, candidates, frame, Certainty::Sure);
         return (decisions, proposals(world.deployment, &flyers, candidates));

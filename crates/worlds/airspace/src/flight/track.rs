@@ -102,6 +102,21 @@ impl Track {
         length_m / (self.ends_s() - from_s)
     }
 
+    /// Returns its speed over the ground at a time, in meters per second.
+    pub fn speed_m_s(&self, t_s: f64) -> f64 {
+        let (k, _) = self.between(t_s);
+        let (from, to) = (&self.points[k], &self.points[k + 1]);
+        distance_m(from.at, to.at) / (to.t_s - from.t_s)
+    }
+
+    /// Returns its greatest rate of climb or descent, in meters per second.
+    pub fn top_climb_m_s(&self) -> f64 {
+        let climb = |pair: &[TrackPoint]| {
+            (pair[1].altitude_m - pair[0].altitude_m).abs() / (pair[1].t_s - pair[0].t_s)
+        };
+        self.points.windows(2).map(climb).fold(0.0, f64::max)
+    }
+
     /// Returns the greatest speed over the ground, in meters per second.
     pub fn top_speed_m_s(&self) -> f64 {
         let speed =

@@ -6,7 +6,8 @@ use crate::flight::Levels;
 use crate::flight::{Airplane, Task};
 use crate::flight::{Passing, Timing};
 use crate::memory::largest_at_start;
-use crate::shield::{Flyer, Side, first_fallbacks};
+use crate::perceive::seen;
+use crate::shield::{Bounds, Flyer, Named, Side, first_fallbacks};
 use crate::state::AirspaceState;
 use crate::world::{AirspaceWorld, Disturbance, Method};
 use sidestep_kernel::stream::Streams;
@@ -30,6 +31,8 @@ const MOST_PARTS: f64 = 1000.0;
 const MOST_ACTIONS: usize = 1000;
 /// Largest number of pairs of points of two airplanes' actions: a tenth of a second's work.
 const MOST_PAIR_STEPS: usize = 100_000_000;
+/// Standard deviations of errors for which the shield allows, unless told otherwise.
+const USUAL_SIGMAS: f64 = 5.0;
 const GIB: f64 = (1_u64 << 30) as f64;
 
 pub(super) struct Compiler<'a> {
@@ -43,6 +46,7 @@ impl Compiler<'_> {
         let mut world = self.world()?;
         self.fits_deployment(&world)?;
         self.fits_a_pair(&world)?;
+        self.fits_errors(&world)?;
         let (fallbacks, too_close) = first(&world);
         world.first_fallbacks.clone_from(&fallbacks);
         let cycles = self.head.cycles.unwrap_or_else(|| enough_cycles(&world));
@@ -86,18 +90,59 @@ impl Compiler<'_> {
             shield: section.shield.0,
             vertical_m,
             replay_cycles: replay.cycles,
-            disturbance: Disturbance {
-                position_m: section.position_noise_m.map_or(0.0, f64::from),
-                heading_rad: section.heading_noise_deg.map_or(0.0, f64::from).to_radians(),
-            },
+            disturbance: self.disturbance(),
+            bounds: self.bounds(),
             streams,
             actions: Vec::new(),
             later: Vec::new(),
+            orbit_rad_s: Vec::new(),
             top_m_s: Vec::new(),
             alone_s: Vec::new(),
             first_fallbacks: Vec::new(),
         };
         Ok(world.prepared())
+    }
+
+    fn disturbance(&self) -> Disturbance {
+        let section = &self.file.airspace;
+        Disturbance {
+            position_m: section.position_noise_m.map_or(0.0, f64::from),
+            heading_rad: section.heading_noise_deg.map_or(0.0, f64::from).to_radians(),
+        }
+    }
+
+    /// Returns the bounds on errors for which the shield allows.
+    pub(super) fn bounds(&self) -> Bounds {
+        let sigmas = self.file.airspace.error_sigmas.map_or(USUAL_SIGMAS, f64::from);
+        let Disturbance { position_m, heading_rad } = self.disturbance();
+        Bounds { position_m: sigmas * position_m, heading_rad: sigmas * heading_rad }
+    }
+
+    /// Refuses errors of heading against which an airplane could not hold an orbit.
+    fn fits_errors(&self, world: &AirspaceWorld) -> Result<(), InputError> {
+        let turned_rad = world.bounds.heading_rad;
+        let holds = |a: &Airplane| {
+            a.is_intruder || world.bounds.holds_rad_s(&a.model, world.timing.dt_s).is_some()
+        };
+        if !world.shield || turned_rad == 0.0 {
+            return Ok(());
+        }
+        let error = |cause: &str, remedy: &str| Err(self.source.error(None, cause, remedy));
+        if world.network.is_some() {
+            let cause = "errors of heading, over a network that is not to be relied on";
+            let remedy = "nobody could see which orbit another one holds: leave out \
+                          heading_noise_deg or [airspace.network], or set shield = \"off\"";
+            return error(cause, remedy);
+        }
+        let Some(weak) = world.airplanes.iter().find(|a| !holds(a)) else { return Ok(()) };
+        let cause = format!(
+            "gusts turn airplanes by up to {:.2} deg per dt_s (error_sigmas times \
+             heading_noise_deg), and one of {:.2} deg/s cannot hold an orbit against them",
+            turned_rad.to_degrees(),
+            weak.model.omega_max_rad_s.to_degrees()
+        );
+        let remedy = "give a smaller heading_noise_deg or error_sigmas, or set shield = \"off\"";
+        error(&cause, remedy)
     }
 
     /// Returns the wind, if every airplane can fly against it.
@@ -232,18 +277,21 @@ fn enough_cycles(world: &AirspaceWorld) -> u64 {
 fn first(world: &AirspaceWorld) -> (Vec<Side>, Vec<(u32, u32)>) {
     let mut sides = vec![Side::default(); world.airplanes.len()];
     // Airplanes that come in at other times do not meet at the start.
-    let starts: Vec<usize> = (0..sides.len()).filter(|&i| world.joins_in(i) == 0).collect();
+    let flown = |&i: &usize| world.joins_in(i) == 0 && !world.is_intruder(i as u32, 0);
+    let starts: Vec<usize> = (0..sides.len()).filter(flown).collect();
     let flyer = |(rank, &i): (usize, &usize)| {
         let airplane = &world.airplanes[i];
         Flyer {
-            pose: airplane.start,
+            pose: seen(world, i as u32, 0, airplane.start),
+            held: seen(world, i as u32, 0, airplane.start),
             v_m_s: airplane.model.v_m_s,
-            omega_max_rad_s: airplane.model.omega_max_rad_s,
+            orbit_rad_s: world.orbit_rad_s[i],
             separation_m: airplane.model.separation_m,
+            error_m: world.error_m(i),
             levels: Levels::at(airplane.altitude_m),
             vertical_m: world.vertical_m,
             fallback: Side::Left,
-            came_too_close: false,
+            named: Named::default(),
             rank: rank as u64,
             id: i as u32,
         }

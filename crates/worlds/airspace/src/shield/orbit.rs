@@ -104,6 +104,17 @@ impl Orbit {
 }
 
 /// Returns whether a distance that changes by at most `closing_m_s` per second stays at least
+/// `gap_m` for some seconds; the answer is never wrongly yes.
+pub(crate) fn apart_for(
+    distance_m: &impl Fn(f64) -> f64,
+    seconds: f64,
+    closing_m_s: f64,
+    gap_m: f64,
+) -> bool {
+    stays_apart(distance_m, (0.0, seconds), closing_m_s, gap_m)
+}
+
+/// Returns whether a distance that changes by at most `closing_m_s` per second stays at least
 /// `gap_m` during the interval. Found by halving; the answer is never wrongly yes.
 pub(crate) fn stays_apart(
     distance_m: &impl Fn(f64) -> f64,

@@ -30,30 +30,43 @@ pub(crate) struct Plan {
 impl Plan {
     /// Returns a plan: a way, and then an orbit to a side.
     pub(crate) fn new(flyer: Flyer, way: &Way, dtau_s: f64, side: Side) -> Self {
-        Self::of(flyer, way.omegas_rad_s.clone(), dtau_s, (None, side))
+        Self::of(flyer, way, dtau_s, None, side)
     }
 
+    /// Returns the same for a candidate, by its number.
     pub(super) fn of(
+        flyer: Flyer,
+        way: &Way,
+        dtau_s: f64,
+        candidate: Option<usize>,
+        side: Side,
+    ) -> Self {
+        let flown = Self::flown_from(flyer.pose, flyer, way.omegas_rad_s.clone(), dtau_s, side);
+        Self { candidate, ..flown }
+    }
+
+    fn flown_from(
+        start: Pose,
         flyer: Flyer,
         omegas_rad_s: Vec<f64>,
         dtau_s: f64,
-        orbit: (Option<usize>, Side),
+        side: Side,
     ) -> Self {
-        let mut poses = vec![flyer.pose];
+        let mut poses = vec![start];
         for &omega in &omegas_rad_s {
             let last = poses[poses.len() - 1];
             poses.push(last.step(flyer.v_m_s, omega, dtau_s));
         }
-        let (candidate, side) = orbit;
         let end = poses[poses.len() - 1];
-        let orbit = Orbit::from(end, flyer.v_m_s, side.sign() * flyer.omega_max_rad_s);
-        Self { flyer, poses, omegas_rad_s, dtau_s, orbit, candidate, side }
+        let orbit = Orbit::from(end, flyer.v_m_s, side.sign() * flyer.orbit_rad_s);
+        Self { flyer, poses, omegas_rad_s, dtau_s, orbit, candidate: None, side }
     }
 
     /// Returns the stored fallback as a plan, for some steps and ever after.
     pub(crate) fn fallback(flyer: Flyer, steps: usize, dtau_s: f64) -> Self {
-        let omega = flyer.fallback.sign() * flyer.omega_max_rad_s;
-        Self::of(flyer, vec![omega; steps], dtau_s, (None, flyer.fallback))
+        let omega = flyer.fallback.sign() * flyer.orbit_rad_s;
+        let side = flyer.fallback;
+        Self::flown_from(flyer.held, flyer, vec![omega; steps], dtau_s, side)
     }
 
     /// Returns the pose at the end of `dt`.

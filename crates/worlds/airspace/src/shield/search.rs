@@ -57,11 +57,9 @@ impl<'a> Search<'a> {
         certainty: Certainty,
     ) -> Self {
         let fallbacks: Vec<Plan> =
-            flyers.iter().map(|flyer| Plan::fallback(*flyer, steps, dtau_s)).collect();
+            flyers.iter().map(|flyer| Plan::fallback(flyer.clone(), steps, dtau_s)).collect();
         let first = |((flyer, ways), fallback): ((&Flyer, &Vec<Way>), &Plan)| match ways.first() {
-            Some(way) => {
-                Plan::of(*flyer, way.omegas_rad_s.clone(), dtau_s, (Some(0), flyer.fallback))
-            }
+            Some(way) => Plan::of(flyer.clone(), way, dtau_s, Some(0), flyer.fallback),
             None => fallback.clone(),
         };
         let plans = flyers.iter().zip(candidates).zip(&fallbacks).map(first).collect();
@@ -116,13 +114,12 @@ impl<'a> Search<'a> {
 
     /// Returns the first plan of an airplane that is compatible with all present ones.
     fn another_plan(&self, i: usize) -> Option<Plan> {
-        let flyer = self.flyers[i];
         let others: Vec<usize> = (0..self.plans.len()).filter(|&j| j != i).collect();
         let fits = |plan: &Plan| others.iter().all(|&j| self.fits(i, plan, j));
         self.candidates[i].iter().enumerate().find_map(|(k, way)| {
             Side::BOTH
                 .into_iter()
-                .map(|side| Plan::of(flyer, way.omegas_rad_s.clone(), self.dtau_s, (Some(k), side)))
+                .map(|side| Plan::of(self.flyers[i].clone(), way, self.dtau_s, Some(k), side))
                 .find(|plan| fits(plan))
         })
     }

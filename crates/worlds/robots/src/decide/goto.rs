@@ -28,6 +28,10 @@ const REACHED: usize = 0;
 const EVADING: usize = 1;
 
 impl Behaviour for Goto {
+    fn ways(&self) -> &[Arc<FlowField>] {
+        &self.goals
+    }
+
     fn decide(&self, percept: &Percept<'_>, memory: &mut Memory, draws: &mut Draws) -> Decision {
         let mut trip = None;
         let n = self.goals.len() as u32;
@@ -50,6 +54,10 @@ impl Behaviour for Goto {
 }
 
 impl Behaviour for Shuttle {
+    fn ways(&self) -> &[Arc<FlowField>] {
+        &self.ends
+    }
+
     fn decide(&self, percept: &Percept<'_>, memory: &mut Memory, draws: &mut Draws) -> Decision {
         let mut trip = None;
         let mut target = (memory.words[REACHED] % 2) as usize;

@@ -5,7 +5,7 @@ use crate::shield::Flyer;
 use sidestep_kernel::Cycle;
 
 /// An airplane as others see it.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Seen {
     /// Its place, its model, and its stored fallback.
     pub flyer: Flyer,

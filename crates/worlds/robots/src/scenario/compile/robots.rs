@@ -2,6 +2,7 @@
 
 use super::super::Placing;
 use super::bodies::{Group, TypeOf, cycles_of};
+use super::idle::BEHAVIOURS;
 use super::random::Wrong;
 use super::*;
 
@@ -50,8 +51,16 @@ impl Compiler<'_> {
         let body = Arc::new(self.robot_body(s, size)?);
         let free = FreeSpace::of_map(&self.map);
         let (mut places, mut types) = (Vec::new(), Vec::new());
+        let place = self.source.path(scen.get_ref()).display().to_string();
         for row in &rows[..count] {
+            row.check_against(&place, &self.map)?;
             let goals = vec![Arc::new(FlowField::towards(&free, size, &[row.goal]))];
+            if !goals[0].is_goal(row.goal.0, row.goal.1) {
+                let cause =
+                    format!("a robot of {size} x {size} boxes does not fit at {:?}", row.goal);
+                let remedy = "give smaller robots, or another list";
+                return Err(InputError::new(&place, cause, remedy).at(row.line, 1));
+            }
             let behaviour: Arc<dyn Behaviour> = Arc::new(Goto { goals, repeat: false });
             let model = RobotModel { body: Arc::clone(&body), behaviour };
             let actions = Arc::clone(&body.actions);
@@ -106,26 +115,7 @@ impl Compiler<'_> {
 
     fn sensor_model(&self, name: &Spanned<String>) -> Result<SensorModel, InputError> {
         let section = self.lookup(&self.sensors, name, "sensor")?;
-        let mut used = vec![false; self.kinds.len()];
-        used[1] = true;
-        let people = self.file.people.0.iter().map(|p| &p.get_ref().kind);
-        let doors = self.file.doors.0.iter().map(|d| &d.get_ref().kind);
-        for kind in people.chain(doors) {
-            used[usize::from(self.kind(kind)?)] = true;
-        }
-        used[usize::from(self.kind(&super::super::robot_kind())?)] = true;
-        let kinds = Kinds { names: self.kinds.clone(), observations: self.observations(), used };
-        tables::sensor(name.get_ref(), section, &kinds)
-    }
-
-    /// Returns the observation that each kind designates: its own name unless the file says
-    /// otherwise.
-    fn observations(&self) -> Vec<String> {
-        let own = |kind: &String| {
-            let section = self.file.kinds.iter().find(|(name, _)| name.get_ref() == kind);
-            section.and_then(|(_, s)| s.observation.clone()).unwrap_or_else(|| kind.clone())
-        };
-        self.kinds.iter().map(own).collect()
+        tables::sensor(name.get_ref(), section, &self.kinds, true)
     }
 
     fn effector(&self, name: Option<&Spanned<String>>) -> Result<EffectorModel, InputError> {
@@ -159,9 +149,8 @@ impl Compiler<'_> {
         let ways = Ways { compiler: self, size, span: section.span() };
         let actions = &body.effector.actions;
         Ok(match s.kind.as_str() {
-            "wander" => Arc::new(Wander {
-                turn_every: s.turn_every.unwrap_or(Wander::default().turn_every).max(1),
-            }),
+            "wander" => Arc::new(wander(s)),
+            "announce" => Arc::new(Announce { wander: wander(s), size }),
             "shuttle" => {
                 let end = |given: Option<[u32; 4]>, key: &str| {
                     ways.to(needed(s, key, given, "[col, row, width, height]").map_err(error)?)
@@ -186,13 +175,10 @@ impl Compiler<'_> {
 
     fn unknown_behaviour(&self, name: &str) -> Wrong {
         let own = self.own.keys().map(String::as_str);
-        let known: Vec<&str> = BEHAVIOURS.into_iter().chain(own).collect();
+        let known: Vec<&str> = BEHAVIOURS.iter().map(|(name, _)| *name).chain(own).collect();
         (format!("unknown behaviour `{name}`"), nearest(name, &known))
     }
 }
-
-/// Names of the built-in behaviors.
-const BEHAVIOURS: [&str; 6] = ["wander", "shuttle", "goto", "replay", "random", "external"];
 
 /// Ways for robots of one size, asked for at one place of the scenario.
 struct Ways<'c, 'a> {
@@ -225,6 +211,10 @@ fn needed<T>(s: &BehaviourSection, key: &str, given: Option<T>, example: &str) -
     given.ok_or_else(|| {
         (format!("behaviour `{}` needs `{key}`", s.kind), format!("add {key} = {example}"))
     })
+}
+
+fn wander(s: &BehaviourSection) -> Wander {
+    Wander { turn_every: s.turn_every.unwrap_or(Wander::default().turn_every).max(1) }
 }
 
 fn replay(s: &BehaviourSection, actions: &[String]) -> Result<Replay, Wrong> {

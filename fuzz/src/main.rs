@@ -1,0 +1,150 @@
+//! One fuzzer for every parser and decoder: `SIDESTEP_FUZZ=NAME`, with a name of [`TARGETS`].
+//!
+//! An input may be refused, but it may not panic, overflow, hang or take all memory (promise E1).
+
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use sidestep::experiment::sweep::Sweep;
+use sidestep::import::table::CsvTable;
+use sidestep::import::urdf::{Model, srdf::Semantics};
+use sidestep::import::{
+    ascii, bluesky, carmen, image::Bitmap, movingai, mrclam, rosmap, stage, traffic,
+};
+use sidestep::kernel::checkpoint;
+use sidestep::learn::{effector, sensor};
+use sidestep::scenario::Source;
+use sidestep::worlds::WORLDS;
+use sidestep_record::sweep::read_journal;
+use sidestep_record::{McapRun, RunView, read_table};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+
+/// A reader of text or bytes, by its name. A folder of the same name in `seeds` has inputs to begin with.
+type Target = (&'static str, fn(&[u8]));
+
+const TARGETS: [Target; 24] = [
+    ("scenario", |data| text(data, scenario)),
+    ("override", |data| text(data, overridden)),
+    ("script", |data| text(data, script)),
+    ("sweep", |data| text(data, |t| drop(Sweep::parse(&Source::new("f", t, ""))))),
+    ("ascii_map", |data| text(data, |t| drop(ascii::parse("f", t, 0.25)))),
+    ("movingai_map", |data| text(data, |t| drop(movingai::parse_map("f", t, 0.25)))),
+    ("movingai_scen", |data| text(data, |t| drop(movingai::parse_scen("f", t)))),
+    ("ros_map", |data| drop(rosmap::load(&beside_an_image(data)))),
+    ("image", |data| drop(Bitmap::decode("f", data.to_vec()))),
+    ("stage", |data| drop(stage::load(&file("f.world", data)))),
+    ("urdf", |data| text(data, |t| drop(Model::parse("f", t)))),
+    ("srdf", |data| text(data, srdf)),
+    ("bluesky", |data| text(data, |t| drop(bluesky::parse(&"f", t)))),
+    ("traffic", |data| text(data, |t| drop(traffic::parse(&"f", t)))),
+    ("translate", |data| drop(WORLDS.translate(&file("f.scn", data)))),
+    ("carmen", |data| text(data, |t| drop(carmen::parse("f", t)))),
+    ("learn_carmen", |data| drop(effector::from_carmen(&file("f.log", data), &Default::default()))),
+    ("mrclam", |data| drop(mrclam::read(&mrclam_folder(data)))),
+    ("learn_csv", |data| text(data, learned)),
+    ("checkpoint", |data| drop(checkpoint::decode_header(data))),
+    ("journal", |data| drop(read_journal(&file("f.jsonl", data), "0", |_: serde_json::Value| {}))),
+    ("manifest", |data| drop(RunView::open(&run_folder(data)))),
+    ("mcap", |data| drop(McapRun::open(&file("f.mcap", data)))),
+    ("parquet", |data| drop(read_table(&folder_of(&file("f.parquet", data)), "f", ..))),
+];
+
+fuzz_target!(|data: &[u8]| (CHOSEN.1)(data));
+
+static CHOSEN: LazyLock<Target> = LazyLock::new(|| {
+    let name = std::env::var("SIDESTEP_FUZZ").unwrap_or_default();
+    let names = TARGETS.map(|(name, _)| name).join(", ");
+    let chosen = TARGETS.into_iter().find(|(own, _)| *own == name);
+    chosen.unwrap_or_else(|| panic!("SIDESTEP_FUZZ is one of {names}"))
+});
+
+/// The folder for files of this process, which whoever starts it makes and takes away.
+static SCRATCH: LazyLock<PathBuf> = LazyLock::new(|| {
+    let folder =
+        std::env::var_os("SIDESTEP_FUZZ_FILES").map_or_else(std::env::temp_dir, PathBuf::from);
+    fs::create_dir_all(&folder).expect("a folder for files");
+    folder
+});
+
+fn text(data: &[u8], read: impl Fn(&str)) {
+    if let Ok(text) = std::str::from_utf8(data) {
+        read(text);
+    }
+}
+
+fn file(name: &str, data: &[u8]) -> PathBuf {
+    let path = SCRATCH.join(name);
+    fs::write(&path, data).expect("a file");
+    path
+}
+
+fn folder_of(file: &Path) -> PathBuf {
+    file.parent().expect("a folder").to_path_buf()
+}
+
+fn scenario(text: &str) {
+    drop(WORLDS.compile(&Source::new("f", text, SCRATCH.as_path())));
+}
+
+/// Compiles the default scenario of each world with one setting.
+fn overridden(setting: &str) {
+    for kind in WORLDS.0 {
+        let source = Source::new("f", kind.default_scenario(), SCRATCH.as_path());
+        drop(
+            source.with(&[setting.to_string()]).and_then(|source| kind.compile(&source).map(drop)),
+        );
+    }
+}
+
+/// Compiles a scenario of a chain that follows a motion script.
+fn script(script: &str) {
+    let chain = "format = 1\nworld = \"chain\"\ncycles = 10\n[[chains]]\nconnectors = 4\n\
+                 [[chains.tasks]]\nkind = \"script\"\n";
+    let script = serde_json::Value::from(script).to_string();
+    // JSON and TOML write strings alike, but for the escape of a slash and of what is above 16 bits.
+    scenario(&format!("{chain}script = {script}\n"));
+}
+
+fn srdf(text: &str) {
+    static ARM: LazyLock<Model> = LazyLock::new(|| {
+        let urdf = include_str!("../../scenarios/chain/arm.urdf");
+        Model::parse("arm.urdf", urdf).expect("our own arm")
+    });
+    drop(Semantics::parse("f", text, &ARM));
+}
+
+fn learned(text: &str) {
+    if let Ok(table) = CsvTable::parse(&"f", text) {
+        drop(sensor::learn_csv(&table, &Default::default()));
+        drop(effector::learn_csv(&table, &Default::default()));
+    }
+}
+
+/// The YAML file of a map whose image is there.
+fn beside_an_image(data: &[u8]) -> PathBuf {
+    file("image.pgm", b"P2\n3 2\n255\n0 128 255\n255 205 0\n");
+    file("f.yaml", data)
+}
+
+/// A folder of logs: its files in one input, each after a line `% NAME`.
+fn mrclam_folder(data: &[u8]) -> PathBuf {
+    let text = String::from_utf8_lossy(data);
+    for name in [
+        "Barcodes",
+        "Landmark_Groundtruth",
+        "Robot1_Groundtruth",
+        "Robot1_Measurement",
+        "Robot1_Odometry",
+    ] {
+        let inside = text.split(&format!("% {name}\n")).nth(1).unwrap_or_default();
+        file(&format!("{name}.dat"), inside.split("% ").next().unwrap_or_default().as_bytes());
+    }
+    SCRATCH.clone()
+}
+
+fn run_folder(data: &[u8]) -> PathBuf {
+    file("scenario.toml", b"format = 1\n");
+    folder_of(&file("run.json", data))
+}
