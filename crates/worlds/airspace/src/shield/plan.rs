@@ -4,6 +4,7 @@ use super::flyer::Flyer;
 use super::orbit::{Orbit, Side, stays_apart};
 use crate::flight::{Pose, distance_m};
 use serde::{Deserialize, Serialize};
+use sidestep_kernel::interrupt;
 
 /// Motion for one `dt`: a turn rate per step of `dtau`.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -94,6 +95,7 @@ impl Plan {
             return true;
         }
         let gap_m = self.flyer.gap_m(&other.flyer);
+        interrupt::look();
         self.orbit.stays_apart(&other.orbit, gap_m) && self.ways_stay_apart(other, gap_m)
     }
 
