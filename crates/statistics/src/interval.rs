@@ -1,7 +1,6 @@
 //! Intervals of proportions and of means.
 
 use super::moments::{mean, sample_sd};
-use super::quantile::at_most;
 use serde::Serialize;
 use statrs::distribution::{Beta, ContinuousCDF, StudentsT};
 use statrs::function::beta::checked_beta_reg;
@@ -175,6 +174,14 @@ pub fn runs_for_half_width(sd: f64, half_width: f64) -> Option<u64> {
         if enough(middle) { high = middle } else { low = middle }
     }
     Some(high)
+}
+
+/// Returns the probability of at most `k` successes in `n` trials of probability `q`.
+pub(super) fn at_most(k: usize, n: usize, q: f64) -> f64 {
+    if k >= n {
+        return 1.0;
+    }
+    checked_beta_reg((n - k) as f64, k as f64 + 1.0, 1.0 - q).expect("q is in (0, 1)")
 }
 
 #[cfg(test)]

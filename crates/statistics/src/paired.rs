@@ -1,9 +1,9 @@
 //! Two treatments of the same cases.
 
 use super::Bootstrap;
+use super::interval::at_most;
 use super::interval::{Interval, mean_interval, student_p_value, student_t};
 use super::moments::{mean, sample_sd, sum};
-use super::quantile::at_most;
 
 /// Values of a treatment and of a baseline on the same cases (runs of the same seed), so that
 /// effects common to both cancel.

@@ -1,9 +1,8 @@
 //! Percentiles, and distribution-free intervals of them.
 
-use super::interval::{Interval, Z_975};
+use super::interval::{Interval, Z_975, at_most};
 use serde::Serialize;
 use sidestep_kernel::math;
-use statrs::function::beta::checked_beta_reg;
 
 /// An interval of a quantile between two order statistics.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -49,14 +48,6 @@ pub fn quantile_interval(sorted: &[f64], q: f64) -> Option<QuantileInterval> {
 pub fn runs_for_quantile(q: f64) -> Option<usize> {
     let inner = q.max(1.0 - q);
     (q > 0.0 && q < 1.0).then(|| (math::ln(TAIL) / math::ln(inner)).ceil() as usize)
-}
-
-/// Returns the probability of at most `k` successes in `n` trials of probability `q`.
-pub(super) fn at_most(k: usize, n: usize, q: f64) -> f64 {
-    if k >= n {
-        return 1.0;
-    }
-    checked_beta_reg((n - k) as f64, k as f64 + 1.0, 1.0 - q).expect("q is in (0, 1)")
 }
 
 /// Returns the smallest rank from 1 on that `holds`, or `n + 1`; where it holds for a rank, it

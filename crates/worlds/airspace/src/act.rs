@@ -13,7 +13,7 @@ use super::Turn;
 use super::decide::{straight_way, wanted};
 use super::flight::Known;
 use super::intruder::Intruder;
-use super::perceive::known;
+use super::perceive::{intruders, known};
 use super::shield::Way;
 use flight::{Course, Flight};
 use sidestep_kernel::Slot;
@@ -42,7 +42,7 @@ fn fly(turn: &mut Turn<'_>, group: &[Slot]) {
         errors::name(turn, &flown);
     }
     orders::carry_out(turn, group, &flown);
-    let intruders = Intruder::all(turn, group);
+    let intruders = intruders(turn, group);
     let mut ways = ways(turn, &flown, &intruders).into_iter();
     let flights = group.iter().map(|&slot| {
         let course = match &world.airplanes[slot as usize].track {

@@ -7,7 +7,7 @@
 //! ```
 
 use super::flight::{Levels, Point, Prediction};
-use super::intruder::{Intruder, Wanted};
+use super::intruder::Intruder;
 use serde::{Deserialize, Serialize};
 use sidestep_collectives::PairwiseGame;
 use sidestep_kernel::interrupt;
@@ -28,6 +28,15 @@ pub struct Objective {
 }
 
 impl Objective {
+    /// Returns the cost of a predicted way of an airplane with this separation beside an intruder, which is taken to
+    /// fly straight on.
+    fn beside(&self, one: &Intruder, way: &Prediction, separation_m: f64, dtau_s: f64) -> f64 {
+        let point = |k: usize| one.ahead(k as f64 * dtau_s);
+        let points: Vec<Point> = (1..=way.points.len()).map(point).collect();
+        let straight = Prediction { counted: points.len(), points };
+        self.collision(way, &straight, [one.wide_m(separation_m), 0.0])[0]
+    }
+
     /// Returns `Gcol_i` and `Gcol_j` of two predictions, for separations `r` of `i` and `j` in
     /// meters (eq. 9). Sums slice by slice of time, so that a caller that skips slices which are
     /// apart gets the same bits.
@@ -117,9 +126,10 @@ impl Options {
         dtau_s: f64,
     ) -> Self {
         if !intruders.is_empty() {
-            let wanted = Wanted { separation_m: self.separation_m, levels: self.levels, dtau_s };
+            let minds = |one: &&Intruder| one.levels.meets(&self.levels, objective.vertical_m);
             let cost = |way: &Prediction| {
-                intruders.iter().map(|one| one.cost(objective, way, &wanted)).sum()
+                let cost = |one| objective.beside(one, way, self.separation_m, dtau_s);
+                intruders.iter().filter(minds).map(cost).sum()
             };
             self.beside = self.predictions.iter().map(cost).collect();
         }

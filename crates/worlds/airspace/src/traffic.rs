@@ -8,14 +8,16 @@
 //! `ALT`, `LNAV ON`, `DEL`). One without a destination flies half an hour ahead, and one that is
 //! created without a speed comes in when it gets one. A true airspeed stays as it is until the next
 //! `SPD`, also in climbs. Settings are rules of the scenario or refused by name
-//! (`traffic_rules.rs`); `not_flown` counts all other commands.
+//! (`traffic/rules.rs`); `not_flown` counts all other commands.
 //!
 //! Recorded tracks are replayed as they are; from `airspace.replay_until_s` on, which is infinity
 //! by default, they are flown anew.
 
+mod rules;
+
 use super::flight::Point;
 use super::flight_plan::CLIMB_M_S;
-use super::traffic_rules::{Rules, rules};
+use rules::{Rules, rules};
 use sidestep_import::bluesky::{Change, ScnAircraft, ScnFile, Speed};
 use sidestep_import::local_plane::LocalPlane;
 use sidestep_import::traffic::{RecordedTraffic, Track};
@@ -25,7 +27,7 @@ use std::fmt::Write;
 
 const NAUTICAL_MILE_M: f64 = 1852.0;
 const FOOT_M: f64 = 0.3048;
-pub(super) const KNOT_M_S: f64 = NAUTICAL_MILE_M / 3600.0;
+const KNOT_M_S: f64 = NAUTICAL_MILE_M / 3600.0;
 /// The turn rate at 25 degrees of bank is this over the airspeed: g tan 25.
 const BANKED_M_S2: f64 = 9.80665 * 0.466_307_658_154_998_6;
 /// Time in seconds for which an airplane without a destination flies ahead.
@@ -67,11 +69,11 @@ pub(crate) fn bluesky_rules(place: &str, file: &ScnFile) -> Rules {
 
 /// An aircraft from the time on at which it moves.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct UnderWay(ScnAircraft);
+struct UnderWay(ScnAircraft);
 
 impl UnderWay {
     /// Returns the least speed that it has or is told.
-    pub(super) fn slowest_m_s(&self) -> f64 {
+    fn slowest_m_s(&self) -> f64 {
         let told = changes(&self.0, false).into_iter().filter_map(|(_, told)| match told {
             Told::Speed(v_m_s) => Some(v_m_s),
             _ => None,
@@ -82,7 +84,7 @@ impl UnderWay {
 
 /// Returns an aircraft as it is when it gets a speed: at its creation, or later, after which its
 /// heading and level are those told until then. `None` for one that never gets a speed.
-pub(super) fn under_way(aircraft: &ScnAircraft) -> Option<UnderWay> {
+fn under_way(aircraft: &ScnAircraft) -> Option<UnderWay> {
     let mut one = aircraft.clone();
     let moves = |speed: Speed, at_ft: f64| speed.true_airspeed_mps(at_ft) >= SLOWEST_M_S;
     if moves(one.speed, one.altitude_ft) {

@@ -1,20 +1,20 @@
 //! The settings of a BlueSky file that hold for all its aircraft: what is flown of them, and what
 //! cannot be.
 
-use super::traffic::{KNOT_M_S, under_way};
+use super::{KNOT_M_S, under_way};
 use sidestep_import::bluesky::{Resolution, ScnAircraft, ScnFile, Traffic, Wind};
 use sidestep_kernel::{InputError, math};
 
 /// Settings of a scenario; `None` leaves the scenario's own.
 #[derive(Debug, Default, PartialEq)]
-pub(super) struct Rules {
+pub(crate) struct Rules {
     pub(super) method: Option<&'static str>,
     /// Whether conflicts are left as they are, by the shield too.
     pub(super) is_bare: bool,
     pub(super) horizon_s: Option<f64>,
     pub(super) wind_m_s: Option<[f64; 2]>,
     /// Commands that cannot be flown.
-    pub(super) refused: Vec<InputError>,
+    pub(crate) refused: Vec<InputError>,
 }
 
 /// Returns the rules of a file, which `place` names in errors; a decision is made every `dt_s`.
