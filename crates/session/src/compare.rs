@@ -130,6 +130,7 @@ mod tests {
             number: "chain",
             part: Some("connector"),
             axes: vec![Axis::meters("x_m")],
+            plane: None,
             is_corner: false,
             ahead: None,
             every: 1,

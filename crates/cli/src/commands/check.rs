@@ -35,12 +35,11 @@ pub(crate) struct CheckArgs {
 pub(crate) fn check(args: &CheckArgs, console: Console) -> Result<ExitCode, Failure> {
     let foreign = WORLDS.translate(&args.scenario.file)?;
     if let Some(Foreign { scenario: Err(error), json, lines }) = foreign {
-        // A file of another program may be readable and correct and still hold no agent that can be
-        // placed. Any other error is one, as in every scenario.
+        // The report says what was found in the file, and the error why it cannot be run.
         let mut json = json;
         json["no_scenario"] = error.to_string().into();
-        console.result(&json, || format!("{error}\n{}", aligned(&lines)));
-        return Ok(ExitCode::Done);
+        console.result(&json, || aligned(&lines));
+        return Err(error.into());
     }
     let (source, compiled) = args.scenario.compile()?;
     let mut found = compiled.contents(&source);

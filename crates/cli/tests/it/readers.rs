@@ -132,6 +132,19 @@ fn the_mcap_library_reads_robots_where_the_table_has_them() {
 }
 
 #[test]
+fn the_mcap_library_reads_robots_on_a_turned_map_where_the_world_has_them() {
+    if !has(FOR_MCAP) {
+        return;
+    }
+    let place = Place::new();
+    let scenario = crate::turned_maps::on_a_map(&place, 30.0, 100);
+    let (_, read) = recorded(&place, &scenario, &["0.25", r#"{"0": 2, "1": 2, "2": 1}"#]);
+    assert_eq!(read["compared"], 100 * 3);
+    let yaw_rad = read["topics"]["/map"]["plane"][2].as_f64().expect("a number");
+    assert!((yaw_rad.to_degrees() - 30.0).abs() < 1e-9, "{yaw_rad}");
+}
+
+#[test]
 fn the_mcap_library_reads_chains_where_the_table_has_them() {
     if !has(FOR_MCAP) {
         return;

@@ -4,6 +4,7 @@ usage: read_mcap.py RECORDING TRAJECTORIES X Y   (columns of the table, or `boxe
 """
 
 import json
+import math
 import sys
 
 import pyarrow.parquet as pq
@@ -42,11 +43,13 @@ with open(recording, "rb") as stream:
         elif channel.topic == "/map":
             assert len(decoded.data) % decoded.column_count == 0
             topic["cells"] = len(decoded.data)
+            at, turn = decoded.pose.position, decoded.pose.orientation
+            topic["plane"] = [at.x, at.y, 2 * math.atan2(turn.z, turn.w)]
         elif channel.topic == "/log":
             assert decoded.name and decoded.message.startswith(decoded.name)
             levels[decoded.level] = levels.get(decoded.level, 0) + 1
 
-# Every position of the table is in the recording, to the bit.
+# Every position of the table is in the recording, to the bit where the map is not turned.
 table = pq.read_table(trajectories)
 world = metadata["sidestep"]["world"]
 rows = table.to_pydict()
@@ -54,12 +57,19 @@ compared, compared_rows = 0, table.num_rows
 if world == "robots":
     # Robots of two boxes and one, people of one: the middle of their boxes.
     box_m = float(sys.argv[3])
+    plane = topics["/map"]["plane"]
     size = {int(k): int(v) for k, v in json.loads(sys.argv[4]).items()}
     for cycle, body, col, row in zip(rows["cycle"], rows["body"], rows["col_boxes"], rows["row_boxes"]):
         at = positions.get((cycle, f"robot/{body}"))
         if at is not None:
-            middle = [(k + 0.5 * size[body]) * box_m for k in (col, row)]
-            assert list(at[:2]) == middle, (cycle, body, at, middle)
+            x, y = [(k + 0.5 * size[body]) * box_m for k in (col, row)]
+            if plane[2] == 0.0:
+                middle = [plane[0] + x, plane[1] + y]
+                assert list(at[:2]) == middle, (cycle, body, at, middle)
+            else:
+                s, c = math.sin(plane[2]), math.cos(plane[2])
+                middle = [plane[0] + c * x - s * y, plane[1] + s * x + c * y]
+                assert math.dist(at[:2], middle) < 1e-9, (cycle, body, at, middle)
             compared += 1
 else:
     parts = "connector" if world == "chain" else None

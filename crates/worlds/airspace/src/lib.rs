@@ -37,6 +37,7 @@ pub mod scenario;
 pub mod shield;
 pub mod state;
 pub mod traffic;
+mod traffic_rules;
 mod view;
 mod words;
 pub mod world;

@@ -51,6 +51,7 @@ pub(super) fn place_rows() -> Vec<PlaceRows> {
         number: "airplane",
         part: None,
         axes: ["x_m", "y_m", "altitude_m"].map(Axis::meters).to_vec(),
+        plane: None,
         is_corner: false,
         ahead: None,
         every: 1,

@@ -12,6 +12,7 @@ use crate::state::End;
 use crate::world::AirspaceWorld;
 use sidestep_kernel::Cycle;
 use sidestep_kernel::distr::normal;
+use sidestep_kernel::interrupt;
 use sidestep_kernel::math::wrap_angle;
 
 /// Flies all steps of this `dt`.
@@ -19,6 +20,7 @@ pub(super) fn step_all(turn: &mut Turn<'_>, mut flights: Vec<Flight<'_>>) {
     let (world, now) = (turn.world, turn.now);
     let steps = world.timing.points_per_dt();
     for k in 0..steps {
+        interrupt::look();
         let step = now * steps as u64 + k as u64;
         let moment = Moment { now, k, step, step_s: step as f64 * world.timing.dtau_s };
         for flight in flights.iter_mut().filter(|f| f.ended.is_none()) {

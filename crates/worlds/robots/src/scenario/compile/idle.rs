@@ -8,8 +8,8 @@ use super::*;
 pub(super) const BEHAVIOURS: [(&str, &[&str]); 7] = [
     ("wander", &["turn_every"]),
     ("announce", &["turn_every"]),
-    ("shuttle", &["a", "b"]),
-    ("goto", &["goals", "repeat"]),
+    ("shuttle", &["a", "b", "avoidance"]),
+    ("goto", &["goals", "repeat", "avoidance"]),
     ("replay", &["actions", "repeat"]),
     ("random", &["weights", "weights_after_contact"]),
     ("external", &[]),
