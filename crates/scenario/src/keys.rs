@@ -76,7 +76,7 @@ fn step<'t, 'i>(
         (DeValue::Array(many), Ok(index)) => many.get(index).map(|value| (value.span(), value)),
         // An array of one may be passed without a number, as in overrides.
         (DeValue::Array(many), Err(_)) if many.len() == 1 => {
-            let only = many.get(0)?;
+            let only = many.first()?;
             step((only.span(), only), part)
         }
         (DeValue::Table(_), Ok(0)) => Some((span, value)),
