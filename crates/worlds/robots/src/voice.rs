@@ -45,7 +45,7 @@ impl Voices {
 
     /// Restores the last word of a robot.
     pub(crate) fn restore(&self, id: EntityId, word: u64) {
-        self.0.iter().filter(|page| page.spoken.len() > 0).for_each(|page| page.set(id, word));
+        self.0.iter().filter(|page| !page.spoken.is_empty()).for_each(|page| page.set(id, word));
     }
 
     /// Returns the bytes on the heap.
