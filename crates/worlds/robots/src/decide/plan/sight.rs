@@ -30,10 +30,6 @@ impl Places {
         inside.then_some(((row + REACH) * SIDE + col + REACH) as usize)
     }
 
-    pub(super) fn is_empty(self) -> bool {
-        self.0 == 0
-    }
-
     /// Returns whether a place is in the set; none outside the square is.
     pub(super) fn has(self, col: i32, row: i32) -> bool {
         Self::number(col, row).is_some_and(|n| self.0 >> n & 1 == 1)
