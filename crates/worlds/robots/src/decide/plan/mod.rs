@@ -34,7 +34,7 @@ use std::sync::Arc;
 
 /// Actions without progress after which a robot strays, at least; its rank adds up to 31, so that
 /// not all stray at once.
-const STUCK: u8 = 32;
+const STUCK: u8 = 64;
 /// Decisions for which a robot believes that what it has touched is still there.
 const BUMP: u8 = 2;
 /// Decisions for which a robot keeps out of a place that it was asked to leave.
@@ -295,7 +295,7 @@ fn travel(mood: &mut Mood, view: &View<'_>, draws: &mut Draws) -> ActionId {
     } else {
         let blocked = 3 + 4 * u16::from(mood.waited);
         let moved = mood.moved.checked_sub(1);
-        let (beside, vague) = if view.is_careful { (4, 3) } else { (1, 1) };
+        let (beside, vague) = if view.is_careful { (6, 5) } else { (1, 1) };
         // Where nothing errs robots see enough to keep to every change of course.
         let gained = |moved: u8| view.rise((moved + 2) % 4) == Some(1);
         let is_sidestep = !view.is_careful || moved.is_some_and(|moved| !gained(moved));
@@ -312,7 +312,11 @@ fn travel(mood: &mut Mood, view: &View<'_>, draws: &mut Draws) -> ActionId {
         let tries = view.is_careful && mood.waited > PATIENCE && draws.below(4) == 0;
         return if tries { FORWARD } else { STAY };
     }
-    if meets(view, direction, draws) { STAY } else { FORWARD }
+    if mood.waited < 4 && meets(view, direction, draws) {
+        mood.waited += 1;
+        return STAY;
+    }
+    FORWARD
 }
 
 /// Returns whether to let somebody pass who may step into the same place: whoever comes from the
