@@ -327,7 +327,10 @@ free_thresh: 0.196
         for (text, yaw_rad) in
             [("0.]", 0.0), ("-0.0]", 0.0), ("3.14]", 3.14), ("-1.5707963]", -1.570_796_3)]
         {
-            assert_eq!(with("0.]", text).expect(text).plane.yaw_rad.to_bits(), f64::to_bits(yaw_rad));
+            assert_eq!(
+                with("0.]", text).expect(text).plane.yaw_rad.to_bits(),
+                f64::to_bits(yaw_rad)
+            );
         }
         let degrees = error("0.]", "90]");
         assert_eq!(degrees.position(), Some((3, 19)));
