@@ -9,7 +9,7 @@ use sidestep_draw::{
     Axis, Bar, BarChart, BarSeries, DrawError, Options, Plot, Point, Series, Style, draw, to_png,
 };
 use sidestep_kernel::view::{
-    Body, Condition, Floor, Frame, Kind, Occupancy, Pose, Scenery, Shape, Trail,
+    Body, Condition, Floor, Frame, Kind, Occupancy, Plane, Pose, Scenery, Shape, Trail,
 };
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -57,7 +57,7 @@ fn corridor() -> Result<String, DrawError> {
         width: 34,
         height: 14,
         box_m: 1.0,
-        origin_m: [0.0; 2],
+        plane: Plane::default(),
         boxes: PLAN.iter().rev().flat_map(|line| line.chars().map(occupancy)).collect(),
     };
     let body = |kind, number, (x, y): (f64, f64), (width, height): (f64, f64)| {

@@ -4,7 +4,7 @@
 use proptest::prelude::*;
 use resvg::usvg::{Group, Node, Rect};
 
-use sidestep_kernel::view::{Body, Floor, Frame, Kind, Pose, Scenery, Shape, Trail};
+use sidestep_kernel::view::{Body, Floor, Frame, Kind, Plane, Pose, Scenery, Shape, Trail};
 
 use crate::raster::parse;
 use crate::testing::{ball, moment, open, plane};
@@ -263,7 +263,7 @@ proptest! {
             Body::new(kind, k as u32, pose, shape).moving([speed; 3])
         };
         let bodies: Vec<Body> = kinds.into_iter().enumerate().map(body).collect();
-        let floor = Floor { box_m, origin_m: [speed, 0.0], ..plane(width, 3).floor.unwrap() };
+        let floor = Floor { box_m, plane: Plane { origin_m: [speed, 0.0], yaw_rad: 0.0 }, ..plane(width, 3).floor.unwrap() };
         let scenery = Scenery {
             floor: has_floor.then_some(floor),
             bodies: bodies.clone(),

@@ -13,6 +13,7 @@
 //! pass of its own, at the price of one more barrier per cycle.
 
 use crate::conflict::Groups;
+use crate::interrupt::{self, Interrupt};
 use crate::plan::GroupSizes;
 use crate::ports::Clock;
 use crate::units::{Cycle, Slot};
@@ -145,7 +146,7 @@ pub(crate) fn advance<W: Phases, C: Clock>(
     groups: &Groups,
     (crew, team): (&Crew<W::Scratch>, Option<&mut Team>),
     stretch: Stretch,
-    clock: &C,
+    (clock, interrupt): (&C, &Interrupt),
     mut observer: Option<&mut dyn Observer<W>>,
 ) -> Ran {
     let started_ns = clock.now_ns();
@@ -154,7 +155,8 @@ pub(crate) fn advance<W: Phases, C: Clock>(
     }
     let is_observed = observer.is_some();
     let stop = AtomicBool::new(false);
-    let shared = Shared { world, state, groups, crew, clock, stretch, is_observed, stop };
+    let shared =
+        Shared { world, state, groups, crew, clock, interrupt, stretch, is_observed, stop };
     let mark_ns = clock.now_ns();
     let mut lead = Lead { clock, observer, started_ns, mark_ns, ran: Ran::default() };
     match team {
@@ -175,6 +177,7 @@ struct Shared<'a, W: Phases> {
     groups: &'a Groups,
     crew: &'a Crew<W::Scratch>,
     clock: &'a dyn Clock,
+    interrupt: &'a Interrupt,
     stretch: Stretch,
     is_observed: bool,
     /// Whether the present cycle is the last one. Worker 0 writes it before a barrier, and all
@@ -215,6 +218,7 @@ impl<W: Phases> Shared<'_, W> {
     /// One worker's part of the stretch.
     fn work<C: Clock>(&self, worker: &Worker<'_>, lead: Option<&mut Lead<'_, '_, W, C>>) {
         let began_ns = self.clock.thread_cpu_ns();
+        let _heeded = self.interrupt.heeded_here();
         self.all_cycles(worker, lead);
         let took_ns = self.clock.thread_cpu_ns() - began_ns;
         lock(&self.crew[worker.index()]).tally.cpu_ns += took_ns;
@@ -283,6 +287,7 @@ impl<W: Phases> Shared<'_, W> {
         let turn = &mut Turn { world, state, now, clock, scratch };
         let n = world.bodies(state);
         worker.for_each_chunk(3 * round, n, |bodies| {
+            interrupt::look();
             bodies.clone().for_each(|body| groups.reset(body as Slot));
             W::claim(turn, bodies);
         });
@@ -290,13 +295,17 @@ impl<W: Phases> Shared<'_, W> {
         if let Some(lead) = &mut lead {
             lead.end_phase(|times| &mut times.claim_ns);
         }
-        worker.for_each_chunk(3 * round + 1, n, |bodies| W::join(turn, bodies, groups));
+        worker.for_each_chunk(3 * round + 1, n, |bodies| {
+            interrupt::look();
+            W::join(turn, bodies, groups);
+        });
         worker.barrier();
         if let Some(lead) = &mut lead {
             lead.end_phase(|times| &mut times.join_ns);
         }
         let auction = world.auction();
         worker.for_each_chunk(3 * round + 2, n, |bodies| {
+            interrupt::look();
             bodies.for_each(|body| {
                 act_as_leader(turn, groups, tally, auction.is_some(), body as Slot);
             });
@@ -347,6 +356,7 @@ fn hold_auction<W: Phases>(
     worker: &Worker<'_>,
 ) {
     while worker.any(!pending.is_empty()) {
+        interrupt::look();
         for &body in &*pending {
             auction.bid(turn, body);
         }

@@ -4,6 +4,7 @@ use crate::checkpoint::{self, CheckpointError, Header};
 use crate::cycle::{Observer, PhaseTimes, Scratches};
 use crate::digest::Digest;
 use crate::engine::Engine;
+use crate::interrupt::Interrupt;
 use crate::plan::{Effort, GroupSizes, Plan};
 use crate::ports::{RecordError, Recorder, SystemClock, TableSchema};
 use crate::simulation::Simulation;
@@ -195,6 +196,10 @@ impl<W: World> Simulation for Run<W> {
         };
         self.cycle += done;
         done
+    }
+
+    fn heed(&mut self, interrupt: Interrupt) {
+        self.engine.heed(interrupt);
     }
 
     fn digest(&self) -> Digest {

@@ -35,12 +35,11 @@ pub(crate) struct CheckArgs {
 pub(crate) fn check(args: &CheckArgs, console: Console) -> Result<ExitCode, Failure> {
     let foreign = WORLDS.translate(&args.scenario.file)?;
     if let Some(Foreign { scenario: Err(error), json, lines }) = foreign {
-        // A file of another program may be readable and correct and still hold no agent that can be
-        // placed. Any other error is one, as in every scenario.
+        // The report says what was found in the file, and the error why it cannot be run.
         let mut json = json;
         json["no_scenario"] = error.to_string().into();
-        console.result(&json, || format!("{error}\n{}", aligned(&lines)));
-        return Ok(ExitCode::Done);
+        console.result(&json, || aligned(&lines));
+        return Err(error.into());
     }
     let (source, compiled) = args.scenario.compile()?;
     let mut found = compiled.contents(&source);
@@ -66,7 +65,9 @@ fn measure_memory(source: &Source, compiled: &dyn Compiled, found: &mut Said) {
     let recorded = bytes + RECORDING_BYTES + RECORDING_BYTES_PER_BODY * compiled.bodies() as u64;
     found.json["memory_bytes"] = bytes.into();
     found.json["recorded_memory_bytes"] = recorded.into();
-    found.text.push_str(&aligned(&[memory(bytes, recorded)]));
+    let mb = |bytes: u64| bytes.div_ceil(1_000_000);
+    let words = format!("  A run takes about {} MB of memory", mb(bytes));
+    found.text.push_str(&format!("{words}, recorded up to {} MB\n", mb(recorded)));
 }
 
 /// Returns the most memory that this process has taken so far; `None` where the system does not
@@ -76,11 +77,6 @@ fn peak_bytes() -> Option<u64> {
     let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
     let kib: u64 = peak.trim().strip_suffix("kB")?.trim().parse().ok()?;
     Some(kib * 1024)
-}
-
-fn memory(bytes: u64, recorded: u64) -> (String, String) {
-    let mb = |bytes: u64| bytes.div_ceil(1_000_000);
-    ("memory".into(), format!("about {} MB, recorded up to {} MB", mb(bytes), mb(recorded)))
 }
 
 /// Returns remarks as text: severity and key on a line, and what is to be said below.

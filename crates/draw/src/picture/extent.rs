@@ -86,9 +86,9 @@ fn check_size(value: f64) -> Result<(), DrawError> {
 }
 
 fn around_floor(floor: &Floor) -> [Place; 2] {
-    let [x, y] = floor.origin_m;
-    let end = |origin: f64, boxes: u32| origin + f64::from(boxes) * floor.box_m;
-    [[x, y, 0.0], [end(x, floor.width), end(y, floor.height), 0.0]]
+    let mut bounds = Bounds::default();
+    floor.corners_m().into_iter().for_each(|[x, y]| bounds.hold([x, y, 0.0], 0.0));
+    [bounds.lo, bounds.hi]
 }
 
 /// Returns the lower and upper corner of everything shown; never empty.

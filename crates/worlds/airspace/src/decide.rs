@@ -70,12 +70,14 @@ pub(super) fn wanted(
     contacts: &mut [Contacts],
 ) -> Vec<Vec<Way>> {
     let world = turn.world;
+    if let Method::Mvp | Method::Orca = world.method {
+        return velocity::by_velocity(turn, group, intruders);
+    }
     let wishes = match world.method {
         _ if group.len() + intruders.len() < 2 => all_straight(world, group),
         _ if group.is_empty() => Vec::new(),
-        Method::None => all_straight(world, group),
         Method::Pc => optimized(turn, group, intruders, contacts),
-        Method::Mvp | Method::Orca => velocity::by_velocity(world, group, intruders),
+        _ => all_straight(world, group),
     };
     group.iter().zip(wishes).map(|(known, wishes)| wishes::ways(world, *known, &wishes)).collect()
 }
@@ -100,18 +102,18 @@ fn optimized(
     intruders: &[Intruder],
     contacts: &mut [Contacts],
 ) -> Vec<Vec<Action>> {
-    let &mut Turn { world, now, ref mut scratch, .. } = turn;
+    let &mut Turn { world, now, .. } = turn;
     if group_takes_bytes(world, group) > world.group_bytes {
         let event = Event::of(now, EventKind::GroupTooLarge, group[0].slot);
-        scratch.events.push(event.with(group.len() as f64));
+        turn.scratch.events.push(event.with(group.len() as f64));
         return all_straight(world, group);
     }
     let (decided, traffic) = match world.deployment {
         Deployment::Direct => (direct(world, group, intruders, now), Traffic::default()),
-        _ => deploy::optimized(world, now, group, intruders, contacts, &mut scratch.events),
+        _ => deploy::optimized(turn, group, intruders, contacts),
     };
     let first = decided.iter().flatten().next();
-    scratch.optimizations.push(Optimization {
+    turn.scratch.optimizations.push(Optimization {
         cycle: now,
         airplane: group[0].slot,
         airplanes: group.len() as u32,

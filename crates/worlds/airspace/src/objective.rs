@@ -10,6 +10,7 @@ use super::flight::{Levels, Point, Prediction};
 use super::intruder::{Intruder, Wanted};
 use serde::{Deserialize, Serialize};
 use sidestep_collectives::PairwiseGame;
+use sidestep_kernel::interrupt;
 
 /// The weights of separation and deviation.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -229,6 +230,7 @@ pub(super) fn couple(
     (i, a): (usize, &Options),
     (j, b): (usize, &Options),
 ) {
+    interrupt::look();
     if a.levels.meets(&b.levels, objective.vertical_m)
         && let Some(costs) = pair_costs(objective, a, b)
     {

@@ -1,6 +1,7 @@
 //! A compiled airspace: everything that stays fixed during a run.
 
 use super::agents::network::Network;
+use super::baseline::Reactive;
 use super::deploy::Deployment;
 use super::flight::{
     Action, Air, Airplane, Known, Later, Legs, Levels, Passing, Point, Stage, Task, Timing, Track,
@@ -12,7 +13,7 @@ use super::shield::{Bounds, Side, common_rates};
 use serde::{Deserialize, Serialize};
 use sidestep_collectives::{Estimator, Order, Settings};
 use sidestep_kernel::stream::Streams;
-use sidestep_kernel::{Cycle, Slot};
+use sidestep_kernel::{Cycle, Slot, interrupt};
 
 /// The methods by which airplanes choose their actions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -72,6 +73,10 @@ pub struct AirspaceWorld {
     pub legs: Legs,
     /// The method by which airplanes choose their actions.
     pub method: Method,
+    /// Settings of MVP.
+    pub mvp: Reactive,
+    /// Settings of ORCA.
+    pub orca: Reactive,
     /// The deployment of the optimizer.
     pub deployment: Deployment,
     /// The network that carries its messages, if it is unreliable.
@@ -171,7 +176,9 @@ impl AirspaceWorld {
         let air = self.air();
         let mut pose = airplane.track.as_ref().map_or(airplane.start, |t| t.pose_at(joins_s));
         let (mut orders, mut next) = (0, 0);
-        for step in 0..ENDLESS_STEPS {
+        let mut step = 0;
+        while step < ENDLESS_STEPS {
+            interrupt::look();
             let flown_s = step as f64 * self.timing.dtau_s;
             if step % self.timing.points_per_dt() == 0 {
                 (orders, next) = self.after_orders(i, orders, next, joins_s + flown_s);
@@ -185,9 +192,15 @@ impl AirspaceWorld {
                 return f64::INFINITY;
             }
             let pilot = air.pilot(model, mission);
+            if airplane.orders.is_empty() && airplane.leaves_s == f64::INFINITY {
+                let straight = air.straight_steps(&pilot, pose, next);
+                pose = air.glided(pose, model.v_m_s, straight);
+                step += straight;
+            }
             let omega = air.steer(&pilot, pose, next);
             pose = air.blown(pose.step(model.v_m_s, omega, self.timing.dtau_s));
             next = pilot.next(pose, next);
+            step += 1;
         }
         f64::INFINITY
     }
@@ -241,16 +254,28 @@ impl AirspaceWorld {
     /// Returns the distance in meters up to which two airplanes have to mind each other, because
     /// they could come too near within the horizon, or on orbits after the next `dt`.
     pub fn look_m(&self, a: usize, b: usize) -> f64 {
-        let horizon_s = self.timing.horizon as f64 * self.timing.dtau_s;
+        let Reactive { look_ahead_s, margin } = self.looks_ahead();
         let reach = |i: usize| {
             let v_m_s = self.top_m_s[i];
             let orbit_m = v_m_s * self.timing.dt_s + 2.0 * (v_m_s / self.orbit_rad_s[i]);
             // Places are seen with an error, too.
-            (v_m_s * horizon_s).max(orbit_m) + self.error_m(i) + self.bounds.position_m
+            (v_m_s * look_ahead_s).max(orbit_m) + self.error_m(i) + self.bounds.position_m
         };
         let separation_m = |i: usize| self.airplanes[i].model.separation_m;
-        let gap_m = separation_m(a).max(separation_m(b)) * self.objective.inflation.max(1.0);
+        let gap_m = separation_m(a).max(separation_m(b)) * margin.max(1.0);
         reach(a) + reach(b) + gap_m + 1.0
+    }
+
+    /// Returns how far the method looks ahead, and how much separation it asks for.
+    fn looks_ahead(&self) -> Reactive {
+        match self.method {
+            Method::Mvp => self.mvp,
+            Method::Orca => self.orca,
+            Method::Pc | Method::None => Reactive {
+                look_ahead_s: self.timing.horizon as f64 * self.timing.dtau_s,
+                margin: self.objective.inflation,
+            },
+        }
     }
 
     /// Returns the stage of an airplane that has carried out this number of orders.
@@ -326,6 +351,30 @@ mod tests {
     use sidestep_scenario::Source;
 
     proptest! {
+        /// Straight stretches that are not flown step by step end where the steps would have.
+        #[test]
+        fn a_flight_alone_takes_as_long_as_flying_it_step_by_step(
+            speed in 0.0f64..20.0, from_rad in -3.2f64..3.2, heading_deg in -180.0f64..180.0,
+            goals in prop::collection::vec(prop::array::uniform2(-40_000.0f64..40_000.0), 1..4),
+        ) {
+            let wind = [speed * math::cos(from_rad), speed * math::sin(from_rad)];
+            let text = format!(
+                "format = 1\nworld = \"airspace\"\n[airspace]\nwind_m_s = {wind:?}\n[[airplanes]]\n\
+                 at_m = [0, 0]\nheading_deg = {heading_deg:?}\nway_points_m = {goals:?}\n"
+            );
+            let world = Compiled::new(&Source::new("w", text, "")).expect("a scenario").world;
+            let air = world.air();
+            let pilot = air.pilot(&world.airplanes[0].model, &world.airplanes[0].mission);
+            let (mut pose, mut next, mut steps) = (world.airplanes[0].start, 0, 0);
+            while next < goals.len() {
+                let omega = air.steer(&pilot, pose, next);
+                pose = air.blown(pose.step(pilot.model.v_m_s, omega, 1.0));
+                next = pilot.next(pose, next);
+                steps += 1;
+            }
+            prop_assert_eq!(world.alone_s[0], f64::from(steps));
+        }
+
         /// Flying to a way-point ends, wherever it lies and however the wind blows.
         #[test]
         fn nobody_circles_in_the_wind_for_ever(

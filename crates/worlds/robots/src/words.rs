@@ -103,13 +103,19 @@ impl Body<'_> {
 
     fn json(&self) -> Value {
         let (col, row) = self.record.at;
+        let [x_m, y_m] = self.world.middle_m(self.id, self.record.at);
         let place = json!({
             "body": self.id, "kind": self.kind(), "col_boxes": col, "row_boxes": row,
+            "x_m": x_m, "y_m": y_m,
         });
         let Value::Object(mut place) = place else { return place };
         match self.is_door() {
             true => place.insert("open".into(), (self.record.facing == 1).into()),
-            false => place.insert("heading".into(), self.heading().into()),
+            false => {
+                let heading_rad = self.world.heading_rad(self.record.facing);
+                place.insert("heading_deg".into(), heading_rad.to_degrees().into());
+                place.insert("heading".into(), self.heading().into())
+            }
         };
         Value::Object(place)
     }
@@ -154,6 +160,8 @@ fn map(world: &RobotsWorld) -> Value {
         "width_boxes": map.width(),
         "height_boxes": map.height(),
         "box_size_m": map.box_size_m,
+        "origin_m": map.plane.origin_m,
+        "yaw_rad": map.plane.yaw_rad,
         "free": counts.free,
         "wall": counts.wall,
         "unknown": counts.unknown,

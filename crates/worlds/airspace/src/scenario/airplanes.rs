@@ -170,13 +170,14 @@ impl Compiler<'_> {
         track: Track,
         replay: Replay,
     ) -> Result<Airplane, InputError> {
+        let top_m_s = track.top_speed_m_s();
+        if top_m_s >= 1e6 {
+            let cause = format!("a track with {top_m_s:e} m/s between two of its points");
+            let remedy = "leave out points that nothing reaches: nothing is faster than 1e6 m/s";
+            return Err(self.source.error(section.span(), cause, remedy));
+        }
         if section.get_ref().v_m_s.is_none() {
             model.v_m_s = track.mean_speed_m_s(replay.until_s).max(1.0);
-        }
-        if model.v_m_s >= 1e6 {
-            let cause = format!("v_m_s = {}", model.v_m_s);
-            let remedy = "give more than 0 and less than 1e6";
-            return Err(self.source.error(section.span(), cause, remedy));
         }
         Ok(following(track, model, replay, section.get_ref().intruder))
     }

@@ -3,6 +3,7 @@
 use super::flyer::{Flyer, SLACK_M};
 use super::orbit::Side;
 use crate::flight::distance_m;
+use sidestep_kernel::interrupt;
 
 /// Returns sides for first fallbacks that are pairwise apart, as far as there are any, and the
 /// pairs that are not: they start too close.
@@ -72,6 +73,7 @@ fn near_each_other(flyers: &[Flyer]) -> Vec<Vec<usize>> {
     for (k, &i) in by_x.iter().enumerate() {
         let beside = by_x[k + 1..].iter().take_while(|&&j| x(j) - x(i) < 2.0 * widest_m);
         for &j in beside {
+            interrupt::look();
             let apart_m = distance_m(flyers[i].held.at, flyers[j].held.at);
             if flyers[i].minds(&flyers[j]) && apart_m < reach_m(&flyers[i]) + reach_m(&flyers[j]) {
                 near[i].push(j);

@@ -4,6 +4,7 @@ use super::flyer::Flyer;
 use super::orbit::{Orbit, Side, stays_apart};
 use crate::flight::{Pose, distance_m};
 use serde::{Deserialize, Serialize};
+use sidestep_kernel::interrupt;
 
 /// Motion for one `dt`: a turn rate per step of `dtau`.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -90,15 +91,11 @@ impl Plan {
         if !self.flyer.minds(&other.flyer) {
             return true;
         }
-        let gap_m = self.flyer.gap_m(&other.flyer);
-        let reach = |plan: &Self| {
-            let dt_s = plan.dtau_s * plan.omegas_rad_s.len() as f64;
-            plan.flyer.v_m_s * dt_s + 2.0 * plan.orbit.radius_m
-        };
-        let now_m = distance_m(self.poses[0].at, other.poses[0].at);
-        if now_m >= gap_m + reach(self) + reach(other) {
+        if !self.flyer.is_in_reach(&other.flyer, self.dtau_s * self.omegas_rad_s.len() as f64) {
             return true;
         }
+        let gap_m = self.flyer.gap_m(&other.flyer);
+        interrupt::look();
         self.orbit.stays_apart(&other.orbit, gap_m) && self.ways_stay_apart(other, gap_m)
     }
 
@@ -110,6 +107,20 @@ impl Plan {
             };
             let apart = |t_s: f64| distance_m(at(self, t_s), at(other, t_s));
             stays_apart(&apart, (0.0, self.dtau_s), closing_m_s, gap_m)
+        })
+    }
+
+    /// Returns whether it keeps apart from another airplane whatever that one does, for one `dt`
+    /// and on orbits ever after.
+    pub(crate) fn is_clear_of(&self, other: &Flyer) -> bool {
+        let dt_s = self.dtau_s * self.omegas_rad_s.len() as f64;
+        let (centers, radius_m) = other.reach(dt_s);
+        let apart_m = radius_m + self.flyer.gap_m(other);
+        // Between two poses it is within half a step of one of them.
+        let half_step_m = 0.5 * self.flyer.v_m_s * self.dtau_s;
+        centers.iter().all(|&center| {
+            let is_far = |pose: &Pose| distance_m(pose.at, center) >= apart_m + half_step_m;
+            self.poses.iter().all(is_far) && self.orbit.is_outside(center, apart_m)
         })
     }
 
