@@ -9,6 +9,7 @@
 //! perceive.rs -> join.rs -> decide.rs -> act.rs                            one cycle of dt
 //! flight/: motion, orders, tracks       objective.rs: what is minimized    behind it
 //! shield/: what is safe for ever        agents/, deploy/: who decides, over which network
+//! intruder.rs: airplanes that mind nobody
 //! baseline/: other methods              metrics.rs: the sums of a run
 //! ```
 

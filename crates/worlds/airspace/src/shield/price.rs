@@ -1,41 +1,41 @@
 //! The price of the shield where turn rates differ, in delay.
 
 use crate::airspace_run;
-use crate::traffic::from_tracks;
-use sidestep_import::traffic;
+use crate::metrics::Metrics;
+use crate::traffic::{from_bluesky, from_tracks};
+use sidestep_import::{bluesky, traffic};
 use sidestep_kernel::math;
 use sidestep_kernel::stream::{Purpose, Streams};
 use sidestep_kernel::{Seed, Simulation};
 use sidestep_scenario::Source;
 use std::f64::consts::TAU;
 
-/// Returns the mean delay in percent, and checks that all arrive and the shield keeps its promise.
-fn delay_percent(name: &str, text: &str, shield: &str, method: &str) -> f64 {
-    let set = ["shield", "method", "replay_until_s"].map(|key| match key {
-        "shield" => format!("airspace.shield=\"{shield}\""),
-        "method" => format!("airspace.method=\"{method}\""),
-        _ => "airspace.replay_until_s=0".to_string(),
-    });
+/// Returns the metrics of a flight to its end, and checks the promise of the shield.
+fn flown(name: &str, text: &str, shield: &str, method: &str) -> Metrics {
+    let set = [
+        format!("airspace.shield=\"{shield}\""),
+        format!("airspace.method=\"{method}\""),
+        "airspace.replay_until_s=0".to_string(),
+    ];
     let source = Source::new(name, text, "").with(&set).expect("known keys");
     let mut run = airspace_run(&source, 2).expect("a scenario");
     while !run.is_over() && run.cycle() < 1500 {
         run.advance(50);
     }
     let metrics = run.metrics();
-    println!(
-        "{name}, {method}, shield {shield}: {:.2} % delay, {} losses, {} named, {} of {} arrived, {} orbits",
-        metrics.mean_delay_percent.unwrap_or(f64::NAN),
-        metrics.losses_of_separation,
-        metrics.too_close.len(),
-        metrics.arrived,
-        metrics.airplanes,
-        metrics.shield_orbits,
-    );
-    assert_eq!(metrics.arrived, metrics.airplanes);
-    let lost = run.books().ledger.pairs.iter().filter(|(_, record)| record.losses > 0);
+    let mut lost = run.books().ledger.pairs.iter().filter(|(_, record)| record.losses > 0);
     let named: Vec<_> = metrics.too_close.iter().map(|pair| pair.airplanes).collect();
-    assert!(shield == "off" || lost.into_iter().all(|(&(a, b), _)| named.contains(&[a, b])));
-    metrics.mean_delay_percent.expect("a delay")
+    assert!(shield == "off" || lost.all(|(&(a, b), _)| named.contains(&[a, b])), "{name}");
+    metrics
+}
+
+/// Returns the mean delay in percent of a flight in which all arrive.
+fn delay_percent(name: &str, text: &str, shield: &str, method: &str) -> f64 {
+    let metrics = flown(name, text, shield, method);
+    let delay = metrics.mean_delay_percent.expect("a delay");
+    println!("{name}, {method}, shield {shield}: {delay:.2} % delay");
+    assert_eq!(metrics.arrived, metrics.airplanes);
+    delay
 }
 
 /// The bar: one and a half times the delay without the shield, and one percent.
@@ -106,5 +106,28 @@ fn the_shield_costs_random_traffic_little_on_average() {
         let (off, on) = (mean("off"), mean("on"));
         println!("MEAN {n} of {slowest_deg_s} to {} deg/s: {off:.2} {on:.2}", 5.0 * slowest_deg_s);
         assert!(on <= 1.5 * off + 1.0, "{on} {off}");
+    }
+}
+
+/// All files of which the aircraft turn at different rates, and arrive.
+#[test]
+#[ignore = "flies every shared file twice: a minute"]
+fn the_shield_costs_traffic_of_bluesky_files_little() {
+    let Some(folder) = sidestep_testing::shared_data("airspace/bluesky") else { return };
+    let files =
+        std::fs::read_dir(folder).expect("a folder").map(|file| file.expect("a file").path());
+    let mut files: Vec<_> = files.collect();
+    files.sort();
+    for file in files {
+        let name = file.file_stem().expect("a name").to_string_lossy().into_owned();
+        let scn = bluesky::read(&file).expect("a text");
+        let count = scn.traffic.aircraft.len();
+        let Some(text) = from_bluesky(&name, &scn).filter(|_| (2..60).contains(&count)) else {
+            continue;
+        };
+        let flown = ["off", "on"].map(|shield| flown(&name, &text, shield, "pc"));
+        if let [Some(off), Some(on)] = flown.map(|metrics| metrics.mean_delay_percent) {
+            println!("BLUESKY {name} {count} {off:.2} {on:.2}");
+        }
     }
 }
