@@ -200,7 +200,7 @@ fn recorded_tracks_are_replayed_or_flown_anew_from_a_chosen_time() {
     }
     let late = place.run(&["run", "tracks.csv", "--set", "airspace.replay_until_s=390"]);
     assert!(
-        late.out().contains("start too close for the shield: 0 and 1 at 390 s"),
+        late.out().contains("too close for the shield: 0 and 1 at 390 s"),
         "{}",
         late.out()
     );

@@ -70,12 +70,14 @@ pub(super) fn wanted(
     contacts: &mut [Contacts],
 ) -> Vec<Vec<Way>> {
     let world = turn.world;
+    if let Method::Mvp | Method::Orca = world.method {
+        return velocity::by_velocity(turn, group, intruders);
+    }
     let wishes = match world.method {
         _ if group.len() + intruders.len() < 2 => all_straight(world, group),
         _ if group.is_empty() => Vec::new(),
-        Method::None => all_straight(world, group),
         Method::Pc => optimized(turn, group, intruders, contacts),
-        Method::Mvp | Method::Orca => velocity::by_velocity(world, group, intruders),
+        _ => all_straight(world, group),
     };
     group.iter().zip(wishes).map(|(known, wishes)| wishes::ways(world, *known, &wishes)).collect()
 }

@@ -7,8 +7,8 @@ use sidestep_kernel::{Cycle, EntityId};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum EventKind {
-    /// Two airplanes have come nearer than their separation; the value is their distance at that
-    /// moment, in meters.
+    /// Two airplanes have come nearer than their separation; the value is their closest approach in
+    /// the step of `dtau` in which they did, in meters.
     LossOfSeparation,
     /// An airplane has finished with its last way-point; the value is its delay in seconds.
     Arrival,

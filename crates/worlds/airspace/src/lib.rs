@@ -14,7 +14,7 @@
 
 mod act;
 pub mod agents;
-mod baseline;
+pub mod baseline;
 pub mod bundle;
 mod decide;
 pub mod deploy;
@@ -45,6 +45,7 @@ use agents::network::Traffic;
 pub use decide::{Effort, Optimization};
 use events::Event;
 pub use kind::Airspace;
+use rows::FlownLeg;
 pub use run::{AirspaceRun, Books, airspace_run};
 use sidestep_kernel::conflict::Groups;
 use sidestep_kernel::world::Decides;
@@ -66,6 +67,7 @@ pub struct Scratch {
     /// Messages and bytes that the shield has sent.
     exchanged: Traffic,
     events: Vec<Event>,
+    flown: Vec<FlownLeg>,
     /// Pairs without fallbacks that are apart, one of which has just come in: cycle and both
     /// airplanes.
     too_close: Vec<(Cycle, Slot, Slot)>,

@@ -2,7 +2,7 @@
 
 use super::decide::Effort;
 use super::events::{Event, EventKind};
-use super::state::{AirspaceState, Cell, LOOKS_PER_STEP, PairRecord};
+use super::state::{AirspaceState, Cell, PairRecord};
 use super::world::AirspaceWorld;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::{Cycle, EntityId};
@@ -210,14 +210,10 @@ pub fn pair_metrics(world: &AirspaceWorld, ledger: &Ledger) -> Vec<PairMetrics> 
         airplanes: [a, b],
         nearest_m: record.nearest_m,
         losses: record.losses,
-        lost_s: lost_s(world, record.lost_looks),
+        lost_s: record.lost_ns as f64 / 1e9,
         severity: (1.0 - record.nearest_m / separation_m(a).max(separation_m(b))).max(0.0),
     };
     ledger.pairs.iter().map(one).collect()
-}
-
-fn lost_s(world: &AirspaceWorld, looks: u64) -> f64 {
-    looks as f64 * world.timing.dtau_s / LOOKS_PER_STEP as f64
 }
 
 fn count(state: &AirspaceState, is: impl Fn(&Cell) -> bool) -> u64 {
@@ -246,7 +242,7 @@ pub fn metrics(
     let all: Vec<AirplaneMetrics> = all.collect();
     let delays: Vec<f64> = all.iter().filter_map(|a| a.delay_percent).collect();
     let nearest = ledger.pairs.values().map(|r| r.nearest_m).min_by(f64::total_cmp);
-    let looks: u64 = ledger.pairs.values().map(|r| r.lost_looks).sum();
+    let lost_ns: u64 = ledger.pairs.values().map(|r| r.lost_ns).sum();
     let beyond_bound = |(&airplane, &cycle): (&EntityId, &Cycle)| BeyondBound {
         at_s: world.starts_s(cycle),
         airplane,
@@ -255,7 +251,7 @@ pub fn metrics(
     Metrics {
         min_separation_m: nearest,
         losses_of_separation: ledger.pairs.values().map(|r| u64::from(r.losses)).sum(),
-        lost_s: lost_s(world, looks),
+        lost_s: lost_ns as f64 / 1e9,
         arrived: count(state, |cell| cell.arrived_step().is_some()),
         airplanes: all.len() as u64,
         mean_delay_percent: mean(delays.iter().sum(), delays.len()),

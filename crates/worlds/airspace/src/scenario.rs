@@ -16,7 +16,7 @@ use airplanes::{GeneratorSection, ModelSection};
 use compile::Compiler;
 use network::NetworkSection;
 use serde::{Deserialize, Serialize};
-use settings::{LegsSection, Switch, Times};
+use settings::{LegsSection, ReactiveSection, Switch, Times};
 use sidestep_collectives::{Choice, Estimator, Order, Update, Utility};
 use sidestep_kernel::InputError;
 use sidestep_scenario::{
@@ -68,6 +68,8 @@ struct AirspaceSection {
     inflation: Option<Positive>,
     holds_s: Times,
     legs: Option<LegsSection>,
+    mvp: ReactiveSection,
+    orca: ReactiveSection,
     estimator: Option<Spanned<Estimator>>,
     update: Option<Spanned<Update>>,
     order: Option<Order>,
@@ -165,8 +167,14 @@ impl Compiled {
             orders: [0; 2],
         };
         let airplanes = self.world.airplanes.iter().zip(&self.fallbacks).map(record).collect();
-        let named = self.too_close.clone();
-        Snapshot { cycle: 0, airplanes, contacts: Vec::new(), named, held: Vec::new() }
+        Snapshot {
+            cycle: 0,
+            airplanes,
+            contacts: Vec::new(),
+            resolving: Vec::new(),
+            named: self.too_close.clone(),
+            held: Vec::new(),
+        }
     }
 }
 

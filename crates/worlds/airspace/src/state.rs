@@ -1,9 +1,10 @@
 //! The state of a run, and its snapshot.
 
 use super::agents::contact::Contacts;
+use super::baseline::mvp::Resolving;
 use super::flight::{Point, Pose, Stage};
 use super::shield::{Named, Side};
-use super::world::AirspaceWorld;
+use super::world::{AirspaceWorld, Method};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::column::Shared;
 use sidestep_kernel::digest::Hasher;
@@ -34,6 +35,8 @@ pub struct AirspaceState {
     pub(super) neighborhood: Neighborhood,
     /// Each airplane's knowledge of others; empty where the network is reliable.
     contacts: Box<[Mutex<Contacts>]>,
+    /// The conflicts that each airplane resolves; empty unless the method is MVP.
+    resolving: Box<[Mutex<Resolving>]>,
     /// For each airplane the others with which it is named, see [`Self::name`].
     named: Box<[Mutex<Named>]>,
     /// Each airplane's pose on its stored orbit; empty where no gust takes it off that.
@@ -196,6 +199,27 @@ fn held<T>(shared: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
     shared.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
+/// Takes out what the airplanes of a group remember; nothing where nobody remembers anything. No two
+/// groups share an airplane, so no other worker asks for the same.
+fn take<T: Default>(all: &[Mutex<T>], group: &[Slot]) -> Vec<T> {
+    let one = |&slot: &Slot| all.get(slot as usize).map(|one| std::mem::take(&mut *held(one)));
+    group.iter().map(|slot| one(slot).unwrap_or_default()).collect()
+}
+
+/// Puts it back.
+fn put<T>(all: &[Mutex<T>], group: &[Slot], memories: Vec<T>) {
+    for (&slot, memory) in group.iter().zip(memories) {
+        if let Some(one) = all.get(slot as usize) {
+            *held(one) = memory;
+        }
+    }
+}
+
+/// Returns the memories of `n` airplanes from a snapshot, which may have fewer.
+fn remembered<T: Clone + Default>(n: usize, saved: &[T]) -> Box<[Mutex<T>]> {
+    (0..n).map(|i| Mutex::new(saved.get(i).cloned().unwrap_or_default())).collect()
+}
+
 /// One airplane in a snapshot.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct AirplaneRecord {
@@ -213,16 +237,14 @@ pub struct AirplaneRecord {
     pub orders: [u16; 2],
 }
 
-/// Number of looks at the distance of a pair in one step of `dtau`.
-pub const LOOKS_PER_STEP: usize = 10;
-
 /// Closest approach and losses of a pair of airplanes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PairRecord {
     /// Closest approach in meters.
     pub nearest_m: f64,
-    /// Number of looks at which they were nearer than their separation, see [`LOOKS_PER_STEP`].
-    pub lost_looks: u64,
+    /// Time in which they were nearer than their separation: in whole nanoseconds, so that the sum
+    /// does not depend on the order.
+    pub lost_ns: u64,
     /// Number of separate losses of separation.
     pub losses: u32,
 }
@@ -231,7 +253,7 @@ impl PairRecord {
     /// Adds another record of the same pair, in any order.
     pub fn add(&mut self, other: Self) {
         self.nearest_m = self.nearest_m.min(other.nearest_m);
-        self.lost_looks += other.lost_looks;
+        self.lost_ns += other.lost_ns;
         self.losses += other.losses;
     }
 }
@@ -245,6 +267,8 @@ pub struct Snapshot {
     pub airplanes: Vec<AirplaneRecord>,
     /// Each airplane's knowledge of others; empty where the network is reliable.
     pub contacts: Vec<Contacts>,
+    /// The conflicts that each airplane resolves; empty unless the method is MVP.
+    pub resolving: Vec<Resolving>,
     /// The pairs for which the shield promises nothing now, by ids.
     pub named: Vec<(EntityId, EntityId)>,
     /// Each airplane's pose on its stored orbit; empty where no gust takes it off that.
@@ -272,16 +296,14 @@ impl AirspaceState {
             cell.orders.set(orders);
             cell.waits.set(waits);
         }
-        let contacts = match world.network {
-            Some(_) => (0..n).map(|i| snapshot.contacts.get(i).cloned()).collect(),
-            None => Vec::new(),
-        };
-        let contacts = contacts.into_iter().map(|c| Mutex::new(c.unwrap_or_default())).collect();
+        let contacts = remembered(world.network.as_ref().map_or(0, |_| n), &snapshot.contacts);
+        let is_mvp = world.method == Method::Mvp;
+        let resolving = remembered(if is_mvp { n } else { 0 }, &snapshot.resolving);
         let neighborhood = Neighborhood::new(n, farthest);
         let named = (0..n).map(|_| Mutex::default()).collect();
         let gusts = world.shield && world.disturbance.heading_rad > 0.0;
         let held = (0..if gusts { n } else { 0 }).map(|_| Held::default()).collect();
-        let state = Self { airplanes, neighborhood, contacts, named, held };
+        let state = Self { airplanes, neighborhood, contacts, resolving, named, held };
         let held = snapshot.held.iter().copied();
         let held = held.chain(snapshot.airplanes.iter().skip(snapshot.held.len()).map(|a| a.pose));
         (0..).zip(held).for_each(|(slot, pose)| state.set_held(slot, pose));
@@ -330,21 +352,24 @@ impl AirspaceState {
         *named = named.iter().copied().filter(|&other| stays(other)).collect();
     }
 
-    /// Takes out the knowledge that the airplanes of a group have of others. No two groups share an
-    /// airplane, so no other worker asks for the same.
+    /// Takes out the knowledge that the airplanes of a group have of others.
     pub(super) fn take_contacts(&self, group: &[Slot]) -> Vec<Contacts> {
-        let take =
-            |&slot: &Slot| self.contacts.get(slot as usize).map(|c| std::mem::take(&mut *held(c)));
-        group.iter().map(|slot| take(slot).unwrap_or_default()).collect()
+        take(&self.contacts, group)
     }
 
     /// Puts the knowledge back.
     pub(super) fn put_contacts(&self, group: &[Slot], known: Vec<Contacts>) {
-        for (&slot, known) in group.iter().zip(known) {
-            if let Some(contacts) = self.contacts.get(slot as usize) {
-                *held(contacts) = known;
-            }
-        }
+        put(&self.contacts, group, known);
+    }
+
+    /// Takes out the conflicts that the airplanes of a group resolve.
+    pub(super) fn take_resolving(&self, group: &[Slot]) -> Vec<Resolving> {
+        take(&self.resolving, group)
+    }
+
+    /// Puts the conflicts back.
+    pub(super) fn put_resolving(&self, group: &[Slot], resolving: Vec<Resolving>) {
+        put(&self.resolving, group, resolving);
     }
 
     /// Returns the state after `cycle` cycles.
@@ -357,6 +382,7 @@ impl AirspaceState {
             altitude_m: cell.altitude_m.get(),
             orders: [cell.orders.get(), cell.waits.get()],
         };
+        let resolving = self.resolving.iter().map(|resolving| held(resolving).clone()).collect();
         let contacts = self.contacts.iter().map(|contacts| held(contacts).clone()).collect();
         let named = (0..).zip(&self.named).flat_map(|(a, others)| {
             let others = held(others).clone();
@@ -366,7 +392,7 @@ impl AirspaceState {
         let named = named.collect();
         let held = (0..self.held.len() as Slot).map(|slot| self.held(slot)).collect();
         let airplanes = self.airplanes.iter().map(record).collect();
-        Snapshot { cycle, airplanes, contacts, named, held }
+        Snapshot { cycle, airplanes, contacts, resolving, named, held }
     }
 
     /// Returns whether an airplane is there in a cycle: it has appeared and has not arrived.
@@ -411,6 +437,10 @@ impl Snapshot {
         if !self.contacts.is_empty() {
             let known = postcard::to_stdvec(&self.contacts).expect("contacts are plain data");
             known.iter().for_each(|&byte| hasher.u8(byte));
+        }
+        if !self.resolving.is_empty() {
+            let resolving = postcard::to_stdvec(&self.resolving).expect("conflicts are plain data");
+            resolving.iter().for_each(|&byte| hasher.u8(byte));
         }
         hasher.finish()
     }

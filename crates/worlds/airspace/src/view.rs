@@ -50,7 +50,7 @@ pub(super) fn place_rows() -> Vec<PlaceRows> {
         kind: Kind::Airplane,
         number: "airplane",
         part: None,
-        axes: ["x_m", "y_m"].map(Axis::meters).to_vec(),
+        axes: ["x_m", "y_m", "altitude_m"].map(Axis::meters).to_vec(),
         is_corner: false,
         ahead: None,
         every: 1,

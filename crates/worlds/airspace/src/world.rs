@@ -1,6 +1,7 @@
 //! A compiled airspace: everything that stays fixed during a run.
 
 use super::agents::network::Network;
+use super::baseline::Reactive;
 use super::deploy::Deployment;
 use super::flight::{
     Action, Air, Airplane, Known, Later, Legs, Levels, Passing, Point, Stage, Task, Timing, Track,
@@ -72,6 +73,10 @@ pub struct AirspaceWorld {
     pub legs: Legs,
     /// The method by which airplanes choose their actions.
     pub method: Method,
+    /// Settings of MVP.
+    pub mvp: Reactive,
+    /// Settings of ORCA.
+    pub orca: Reactive,
     /// The deployment of the optimizer.
     pub deployment: Deployment,
     /// The network that carries its messages, if it is unreliable.
@@ -241,16 +246,28 @@ impl AirspaceWorld {
     /// Returns the distance in meters up to which two airplanes have to mind each other, because
     /// they could come too near within the horizon, or on orbits after the next `dt`.
     pub fn look_m(&self, a: usize, b: usize) -> f64 {
-        let horizon_s = self.timing.horizon as f64 * self.timing.dtau_s;
+        let Reactive { look_ahead_s, margin } = self.looks_ahead();
         let reach = |i: usize| {
             let v_m_s = self.top_m_s[i];
             let orbit_m = v_m_s * self.timing.dt_s + 2.0 * (v_m_s / self.orbit_rad_s[i]);
             // Places are seen with an error, too.
-            (v_m_s * horizon_s).max(orbit_m) + self.error_m(i) + self.bounds.position_m
+            (v_m_s * look_ahead_s).max(orbit_m) + self.error_m(i) + self.bounds.position_m
         };
         let separation_m = |i: usize| self.airplanes[i].model.separation_m;
-        let gap_m = separation_m(a).max(separation_m(b)) * self.objective.inflation.max(1.0);
+        let gap_m = separation_m(a).max(separation_m(b)) * margin.max(1.0);
         reach(a) + reach(b) + gap_m + 1.0
+    }
+
+    /// Returns how far the method looks ahead, and how much separation it asks for.
+    fn looks_ahead(&self) -> Reactive {
+        match self.method {
+            Method::Mvp => self.mvp,
+            Method::Orca => self.orca,
+            Method::Pc | Method::None => Reactive {
+                look_ahead_s: self.timing.horizon as f64 * self.timing.dtau_s,
+                margin: self.objective.inflation,
+            },
+        }
     }
 
     /// Returns the stage of an airplane that has carried out this number of orders.

@@ -4,11 +4,13 @@ use super::approaches;
 use super::flight::{Course, Flight, Moment};
 use crate::Turn;
 use crate::events::{Event, EventKind};
-use crate::flight::Pose;
+use crate::flight::{Leg, Pose};
 use crate::metrics::airplane_metrics;
 use crate::purpose;
+use crate::rows::FlownLeg;
 use crate::state::End;
 use crate::world::AirspaceWorld;
+use sidestep_kernel::Cycle;
 use sidestep_kernel::distr::normal;
 use sidestep_kernel::math::wrap_angle;
 
@@ -22,6 +24,9 @@ pub(super) fn step_all(turn: &mut Turn<'_>, mut flights: Vec<Flight<'_>>) {
         for flight in flights.iter_mut().filter(|f| f.ended.is_none()) {
             let leaves_s = world.airplanes[flight.slot as usize].leaves_s;
             flight.ended = (leaves_s <= moment.step_s).then_some(End::Left(step));
+        }
+        for flight in flights.iter_mut().filter(|f| f.ended.is_none()) {
+            flight.begin_step(world.wind_m_s, moment, world.timing.dtau_s);
         }
         approaches::book(world, &flights, moment, turn.scratch);
         for flight in flights.iter_mut().filter(|f| f.ended.is_none()) {
@@ -53,10 +58,24 @@ fn fly(world: &AirspaceWorld, flight: &mut Flight<'_>, Moment { k, step, .. }: M
     flight.ended = is_at_end.then_some(End::Arrived(step + 1));
 }
 
+/// Returns the rows of an airplane: its legs, and the place where its flight ended.
+fn rows(world: &AirspaceWorld, cycle: Cycle, flight: &Flight<'_>) -> Vec<FlownLeg> {
+    let airplane = flight.slot;
+    let mut rows: Vec<FlownLeg> =
+        flight.flown.iter().map(|&leg| FlownLeg { cycle, airplane, leg }).collect();
+    if let Some(End::Arrived(step) | End::Left(step)) = flight.ended {
+        let at_s = step as f64 * world.timing.dtau_s;
+        let end = Leg::new(at_s, at_s, flight.pose, 0.0, 0.0).climbing(flight.altitude_m, 0.0);
+        rows.push(FlownLeg { cycle, airplane, leg: end });
+    }
+    rows
+}
+
 fn store(turn: &mut Turn<'_>, flight: Flight<'_>) {
     let &mut Turn { world, state, now, ref mut scratch, .. } = turn;
     let cell = &state.airplanes[flight.slot as usize];
     let mut pose = flight.pose;
+    scratch.flown.extend(rows(world, now, &flight));
     let is_disturbed = matches!(flight.course, Course::Way(..));
     // On its orbit it has moved the pose there already.
     if cell.orbiting.get() == 0 {

@@ -1,6 +1,7 @@
 //! From a scenario's sections to an immutable world.
 
 use super::{AirspaceFile, Compiled, Preset};
+use crate::baseline::Reactive;
 use crate::deploy::refuses;
 use crate::flight::Levels;
 use crate::flight::{Airplane, Task};
@@ -25,6 +26,11 @@ const FEWEST_CYCLES: u64 = 400;
 const TIMES_ALONE: f64 = 3.0;
 /// Largest number of steps of a horizon.
 const MOST_STEPS: usize = 10_000;
+/// Settings with which MVP loses no separation in super-conflicts of up to 20 airplanes, at the
+/// smallest delay; the margin is BlueSky's own.
+const MVP: Reactive = Reactive { look_ahead_s: 90.0, margin: 1.05 };
+/// Settings with which ORCA loses no separation there, at the smallest delay.
+const ORCA: Reactive = Reactive { look_ahead_s: 45.0, margin: 1.05 };
 /// Standard deviations of errors for which the shield allows, unless told otherwise.
 const USUAL_SIGMAS: f64 = 5.0;
 const GIB: f64 = (1_u64 << 30) as f64;
@@ -78,6 +84,8 @@ impl Compiler<'_> {
             holds_s: section.holds_s.0.clone(),
             legs: self.legs(),
             method: section.method,
+            mvp: section.mvp.or(MVP),
+            orca: section.orca.or(ORCA),
             deployment: section.deployment,
             group_bytes: (group_memory_gib * GIB) as u64,
             shield: section.shield.0,

@@ -1,12 +1,13 @@
 //! The objective and the settings of the optimizer.
 
 use super::compile::Compiler;
+use crate::baseline::Reactive;
 use crate::flight::Legs;
 use crate::objective::Objective;
 use serde::Deserialize;
 use sidestep_collectives::{Choice, Estimator, Order, Settings, Stop, Update};
 use sidestep_kernel::InputError;
-use sidestep_scenario::{AboveZero, Rule as _, refused};
+use sidestep_scenario::{AboveTo, AboveZero, FromTo, Number, Rule as _, refused};
 
 /// Largest number of samples of a block.
 const MOST_SAMPLES: usize = 10_000;
@@ -33,6 +34,29 @@ impl<'de> Deserialize<'de> for Times {
 pub(super) struct LegsSection {
     turns_s: Times,
     until_s: Times,
+}
+
+/// The settings of a method that looks ahead anew in every step.
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct ReactiveSection {
+    look_ahead_s: Option<Number<LookAhead>>,
+    margin: Option<Number<Margin>>,
+}
+
+/// A time in which an airplane looks ahead.
+type LookAhead = AboveTo<0, 100_000>;
+/// A factor on separations.
+type Margin = FromTo<1, 10>;
+
+impl ReactiveSection {
+    /// Returns the settings, with other values where none are given.
+    pub(super) fn or(&self, usual: Reactive) -> Reactive {
+        Reactive {
+            look_ahead_s: self.look_ahead_s.map_or(usual.look_ahead_s, f64::from),
+            margin: self.margin.map_or(usual.margin, f64::from),
+        }
+    }
 }
 
 /// A yes or no; yes unless given.

@@ -44,6 +44,13 @@ impl Plan {
         Self { candidate, ..flown }
     }
 
+    /// Returns the same plan with an orbit to a side.
+    pub(super) fn turned(&self, side: Side) -> Self {
+        let omega_rad_s = side.sign() * self.flyer.orbit_rad_s;
+        let orbit = Orbit::from(self.end(), self.flyer.v_m_s, omega_rad_s);
+        Self { orbit, side, ..self.clone() }
+    }
+
     fn flown_from(
         start: Pose,
         flyer: Flyer,
