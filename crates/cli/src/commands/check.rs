@@ -66,7 +66,9 @@ fn measure_memory(source: &Source, compiled: &dyn Compiled, found: &mut Said) {
     let recorded = bytes + RECORDING_BYTES + RECORDING_BYTES_PER_BODY * compiled.bodies() as u64;
     found.json["memory_bytes"] = bytes.into();
     found.json["recorded_memory_bytes"] = recorded.into();
-    found.text.push_str(&aligned(&[memory(bytes, recorded)]));
+    let mb = |bytes: u64| bytes.div_ceil(1_000_000);
+    let words = format!("  A run takes about {} MB of memory", mb(bytes));
+    found.text.push_str(&format!("{words}, recorded up to {} MB\n", mb(recorded)));
 }
 
 /// Returns the most memory that this process has taken so far; `None` where the system does not
@@ -76,11 +78,6 @@ fn peak_bytes() -> Option<u64> {
     let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
     let kib: u64 = peak.trim().strip_suffix("kB")?.trim().parse().ok()?;
     Some(kib * 1024)
-}
-
-fn memory(bytes: u64, recorded: u64) -> (String, String) {
-    let mb = |bytes: u64| bytes.div_ceil(1_000_000);
-    ("memory".into(), format!("about {} MB, recorded up to {} MB", mb(bytes), mb(recorded)))
 }
 
 /// Returns remarks as text: severity and key on a line, and what is to be said below.

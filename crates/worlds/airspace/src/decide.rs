@@ -102,18 +102,18 @@ fn optimized(
     intruders: &[Intruder],
     contacts: &mut [Contacts],
 ) -> Vec<Vec<Action>> {
-    let &mut Turn { world, now, ref mut scratch, .. } = turn;
+    let &mut Turn { world, now, .. } = turn;
     if group_takes_bytes(world, group) > world.group_bytes {
         let event = Event::of(now, EventKind::GroupTooLarge, group[0].slot);
-        scratch.events.push(event.with(group.len() as f64));
+        turn.scratch.events.push(event.with(group.len() as f64));
         return all_straight(world, group);
     }
     let (decided, traffic) = match world.deployment {
         Deployment::Direct => (direct(world, group, intruders, now), Traffic::default()),
-        _ => deploy::optimized(world, now, group, intruders, contacts, &mut scratch.events),
+        _ => deploy::optimized(turn, group, intruders, contacts),
     };
     let first = decided.iter().flatten().next();
-    scratch.optimizations.push(Optimization {
+    turn.scratch.optimizations.push(Optimization {
         cycle: now,
         airplane: group[0].slot,
         airplanes: group.len() as u32,

@@ -66,6 +66,9 @@ pub struct Metrics {
     pub multicasts: u64,
     /// Number of bytes if one message could reach all of a group.
     pub multicast_bytes: u64,
+    /// Seconds that all talks took on the network, one after the other; none where one process
+    /// decides for all, or where messages take no time.
+    pub network_s: Option<f64>,
     /// Number of optimizations run.
     pub optimisations: u64,
     /// Mean number of their rounds.
@@ -256,6 +259,7 @@ pub fn metrics(
         bytes: traffic.bytes,
         multicasts: traffic.multicasts,
         multicast_bytes: traffic.multicast_bytes,
+        network_s: world.network.as_ref().map(|network| network.seconds(traffic.ticks)),
         optimisations,
         rounds_mean: mean(rounds as f64, optimisations as usize),
         unconverged,

@@ -81,7 +81,8 @@ fn network(m: &Metrics) -> Lines {
     let mut lines = Lines::new();
     if m.messages > 0 {
         let sent = format!("{}, {} bytes", grouped(m.messages), grouped(m.bytes));
-        lines.push(line("messages", sent));
+        let took = m.network_s.map_or(String::new(), |s| format!(", {s:.1} s on the network"));
+        lines.push(line("messages", sent + &took));
     }
     let counts = [
         (m.contacts_lost, "contacts lost"),

@@ -51,7 +51,13 @@ fn alone(own: OwnShip, mut wire: Wire) -> Option<Decided> {
     let radio = Radio {
         group: own.briefing.ids.clone(),
         me: own.me,
-        patience: Patience { ticks: u64::MAX, tries: 1 },
+        patience: Patience {
+            ticks: u64::MAX,
+            bits_per_tick: f64::INFINITY,
+            tries: 1,
+            first_tries: 1,
+        },
+        ticks: u64::MAX,
         is_silent: false,
     };
     let mut endpoint = Endpoint::new(informed::Agent::new(own, true), radio);

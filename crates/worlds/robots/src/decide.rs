@@ -5,15 +5,23 @@
 //! robot's knowledge is in its [`Memory`], which is part of the state.
 
 mod announce;
+pub(crate) mod ask;
 mod goto;
+mod patient;
+mod plan;
 mod random;
 mod replay;
+mod sidestep;
+mod touch;
 mod wander;
 
 pub use announce::Announce;
-pub use goto::{Goto, Shuttle};
+pub use goto::{Avoidance, Goto, Shuttle};
+pub use patient::Patient;
+pub use plan::Planner;
 pub use random::Random;
 pub use replay::{External, ORDER, Replay};
+pub use sidestep::Trust;
 pub use wander::Wander;
 
 use super::effector::{ActionId, Side};
@@ -155,6 +163,12 @@ pub trait Behaviour: std::fmt::Debug + Send + Sync {
     /// Returns the next action. It may depend only on the percept, the memory (which it may change)
     /// and the robot's random stream of this cycle, because robots decide in any order.
     fn decide(&self, percept: &Percept<'_>, memory: &mut Memory, draws: &mut Draws) -> Decision;
+
+    /// Returns whether its robots ask each other to make room. Then word 2 of the memory holds the
+    /// robot's request, and the world writes the one that it hears into word 3.
+    fn asks(&self) -> bool {
+        false
+    }
 
     /// Returns the ways to all places that it wants to reach, so that a check can say which of them
     /// are out of reach.

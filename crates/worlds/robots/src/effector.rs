@@ -100,6 +100,11 @@ impl EffectorModel {
         }
     }
 
+    /// Returns whether some action may end otherwise than intended.
+    pub(super) fn errs(&self) -> bool {
+        self.transitions.iter().any(|list| list[0].p < 1.0)
+    }
+
     /// Returns the transitions of an action; only the intended one where `reliable`.
     pub fn transitions_of(&self, action: ActionId, reliable: bool) -> Vec<Transition> {
         let all = &self.transitions[usize::from(action)];

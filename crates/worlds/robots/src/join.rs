@@ -1,11 +1,13 @@
 //! *Join*: groups of bodies whose claims meet, and the order in which a group's bodies act.
 
 use super::Scratch;
+use super::decide::ask::{ASKED, ASKING, REACH_BOXES, request};
+use super::effector::FORWARD;
 use super::policy::ConflictPolicy;
 use super::purpose;
 use super::scene::{Scene, at};
 use super::state::BodyCell;
-use super::world::Role;
+use super::world::{BodyType, Role};
 use sidestep_kernel::Slot;
 use sidestep_kernel::conflict::Groups;
 use sidestep_kernel::space::BoxWord;
@@ -28,6 +30,9 @@ impl<T: BoxWord> Scene<'_, T> {
         if intent.is_idle() {
             return;
         }
+        if self.world.has_asks {
+            self.hand_over_request(cell);
+        }
         // The same neighbor is often met in several boxes; joining it once is enough.
         let mut last_met = slot;
         let mut meet = |word: T| {
@@ -43,6 +48,34 @@ impl<T: BoxWord> Scene<'_, T> {
         let base = self.base(cell);
         let boxes = &*self.type_of(cell).actions[usize::from(cell.action.get())].claims;
         boxes.iter().for_each(|&offset| meet(self.floor.get(at(base, offset))));
+    }
+
+    /// Hands a robot's request to the first body in its direction, if that is a robot that takes
+    /// part. Bodies stand still in this phase, so it is the same one in every order.
+    fn hand_over_request(&self, cell: &BodyCell) {
+        let body = self.type_of(cell);
+        if !asks(body) {
+            return;
+        }
+        let Some((direction, word)) = request(cell.memory[ASKING].get()) else { return };
+        let forward = &body.actions[usize::from(body.action_index(direction, FORWARD))];
+        let Some(step) = forward.walks.first().and_then(|walk| walk.steps.first()) else { return };
+        let base = self.base(cell);
+        for k in 0..REACH_BOXES {
+            let far = k * (step.delta.1 * self.world.stride as i32 + step.delta.0);
+            let words = step.enter.iter().map(|&offset| self.floor.get(at(base, offset + far)));
+            // Whoever stands there is asked, and nobody behind it.
+            let mut taken = words.filter(|word| !word.is_free()).peekable();
+            let is_taken = taken.peek().is_some();
+            for other in taken.filter(|&word| word != T::WALL).map(|word| self.cell(word.slot())) {
+                if asks(self.type_of(other)) {
+                    other.memory[ASKED].raise(word);
+                }
+            }
+            if is_taken {
+                return;
+            }
+        }
     }
 
     /// Fills `scratch.order` with a group in its order of acting, each body with the draw of its
@@ -106,6 +139,11 @@ impl<T: BoxWord> Scene<'_, T> {
         let begins = |h: &usize| present[*h] && !present[(h + 1) % 4];
         candidates.clone().find(begins).unwrap_or(draw) as u8
     }
+}
+
+/// Returns whether a body is a robot that takes part in requests.
+fn asks(body: &BodyType) -> bool {
+    matches!(&body.role, Role::Robot(model) if model.behaviour.asks())
 }
 
 #[cfg(test)]

@@ -21,6 +21,7 @@ pub mod effector;
 pub mod exact;
 mod join;
 mod kind;
+mod law;
 pub mod learn;
 pub mod metrics;
 mod perceive;

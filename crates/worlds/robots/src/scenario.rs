@@ -190,13 +190,25 @@ pub(super) struct BehaviourSection {
     pub(super) goals: Option<Vec<(u32, u32)>>,
     pub(super) actions: Option<Vec<String>>,
     pub(super) repeat: Option<bool>,
+    pub(super) avoidance: Option<AvoidanceSection>,
     pub(super) weights: Option<BTreeMap<String, f64>>,
     pub(super) weights_after_contact: Option<BTreeMap<String, f64>>,
 }
 
+/// How robots that go somewhere get past what is in their way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum AvoidanceSection {
+    #[default]
+    Plan,
+    Avoid,
+    Filter,
+    Touch,
+}
+
 impl BehaviourSection {
     /// Returns every key but `kind`, and whether it is given.
-    fn given(&self) -> [(&'static str, bool); 8] {
+    fn given(&self) -> [(&'static str, bool); 9] {
         // Without `..`, so that nobody adds a key and forgets it here.
         let Self {
             kind: _,
@@ -206,6 +218,7 @@ impl BehaviourSection {
             goals,
             actions,
             repeat,
+            avoidance,
             weights,
             weights_after_contact,
         } = self;
@@ -216,6 +229,7 @@ impl BehaviourSection {
             ("goals", goals.is_some()),
             ("actions", actions.is_some()),
             ("repeat", repeat.is_some()),
+            ("avoidance", avoidance.is_some()),
             ("weights", weights.is_some()),
             ("weights_after_contact", weights_after_contact.is_some()),
         ]

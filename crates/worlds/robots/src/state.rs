@@ -353,7 +353,7 @@ impl RobotsState {
         body.trip_begun.set(record.trip[1]);
         let kinds = world.kinds.len();
         record.contacts.iter().enumerate().for_each(|(k, &c)| self.contacts.set(i * kinds + k, c));
-        body.anchor.set(world.grid_position(record.at).word());
+        body.anchor.set(world.grid_position(record.at.0, record.at.1).word());
         if !self.is_open_door(world, slot) {
             self.occupy(world, slot);
         }

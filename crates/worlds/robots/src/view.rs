@@ -119,7 +119,7 @@ impl RobotsWorld {
         let scan = |sensor: &MountedSensor| {
             let (own, others) = readings.split_at(sensor.model.bearings_deg.len());
             readings = others;
-            scan(&sensor.model, own, self.side_m(id), (id, pose))
+            scan(&sensor.model, own, self.side_m(id), id, pose)
         };
         model.body.sensors.iter().map(scan).collect()
     }
@@ -148,7 +148,8 @@ fn scan(
     sensor: &SensorModel,
     readings: &[Reading],
     side_m: f64,
-    (id, pose): (EntityId, Pose),
+    robot: EntityId,
+    pose: Pose,
 ) -> Scan {
     let bearings_rad: Vec<f64> = sensor.bearings_deg.iter().map(|deg| deg.to_radians()).collect();
     let range_m = |(&reading, &bearing_rad): (&Reading, &f64)| {
@@ -156,7 +157,7 @@ fn scan(
         to_boundary_m + beyond_boundary_m(sensor, reading)
     };
     Scan {
-        of: (Kind::Robot, id, None),
+        of: (Kind::Robot, robot, None),
         sensor: sensor.name.clone(),
         pose,
         ranges_m: readings.iter().zip(&bearings_rad).map(range_m).collect(),

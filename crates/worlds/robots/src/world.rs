@@ -100,6 +100,8 @@ pub struct RobotsWorld {
     pub(super) kind_rank: Vec<u8>,
     pub(super) radio: Option<Radio>,
     pub(super) robots: Vec<EntityId>,
+    /// Whether there are robots that ask each other to make room.
+    pub(super) has_asks: bool,
     /// The order in which states store the bodies.
     pub(super) storage: StorageOrder,
     pub(super) streams: Streams,
@@ -264,6 +266,20 @@ impl MountedSensor {
         self.table.reliable
     }
 
+    /// Returns whether every reading is the truth by its tables or because errors are off.
+    pub(super) fn never_errs(&self) -> bool {
+        let is_certain = |row: &[f64], truth: usize| row[truth] == 1.0;
+        let all = |matrix: &[Vec<f64>]| {
+            // The last row of a matrix of classes, `beyond`, is used only for spurious reports.
+            matrix
+                .iter()
+                .enumerate()
+                .all(|(truth, row)| row.len() <= truth || is_certain(row, truth))
+        };
+        self.is_reliable()
+            || all(&self.model.distance_confusion) && self.model.confusion.iter().all(|m| all(m))
+    }
+
     /// Returns the true reading of a beam that meets `kind` at distance class `class`. A kind that
     /// the sensor cannot observe reads as nothing.
     #[inline]
@@ -366,7 +382,7 @@ impl RobotsWorld {
     }
 
     /// Returns the position in the padded grid of a map column and row.
-    pub(super) fn grid_position(&self, (col, row): (u32, u32)) -> Position {
+    pub(super) fn grid_position(&self, col: u32, row: u32) -> Position {
         Position::new(col + self.border, row + self.border)
     }
 

@@ -29,6 +29,7 @@ pub(super) fn flyer(turn: &Turn<'_>, slot: Slot) -> Flyer {
         pose: seen(world, slot, now, cell.pose()),
         held: seen(world, slot, now, state.held(slot)),
         v_m_s: stage.model.v_m_s,
+        omega_max_rad_s: stage.model.omega_max_rad_s,
         orbit_rad_s: world.orbit_rad_s[slot as usize],
         separation_m: stage.model.separation_m,
         error_m: world.error_m(slot as usize),
@@ -90,7 +91,7 @@ fn decided(
     wishes: &[Vec<Way>],
     contacts: &mut [Contacts],
 ) -> Vec<Decision> {
-    let &mut Turn { world, state, now, ref mut scratch, .. } = turn;
+    let state = turn.state;
     let as_seen = |flyer: &Flyer| Seen {
         flyer: flyer.clone(),
         orbits: state.airplanes[flyer.id as usize].orbiting.get() > 0,
@@ -100,10 +101,8 @@ fn decided(
         allowed.iter().map(|&k| wishes[k].clone()).collect()
     };
     let candidates: Vec<Vec<Way>> = allowed.iter().zip(wishes).map(of).collect();
-    let events = &mut scratch.events;
-    let (mut decisions, traffic) =
-        deploy::shielded(world, now, (seen, &candidates), contacts, events);
-    scratch.exchanged.add(traffic);
+    let (mut decisions, traffic) = deploy::shielded(turn, seen, &candidates, contacts);
+    turn.scratch.exchanged.add(traffic);
     for (decision, allowed) in decisions.iter_mut().zip(allowed) {
         decision.candidate = decision.candidate.map(|k| allowed[k]);
     }

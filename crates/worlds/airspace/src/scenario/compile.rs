@@ -245,6 +245,7 @@ fn first(world: &AirspaceWorld) -> (Vec<Side>, Vec<(u32, u32)>) {
             pose: seen(world, i as u32, 0, airplane.start),
             held: seen(world, i as u32, 0, airplane.start),
             v_m_s: airplane.model.v_m_s,
+            omega_max_rad_s: airplane.model.omega_max_rad_s,
             orbit_rad_s: world.orbit_rad_s[i],
             separation_m: airplane.model.separation_m,
             error_m: world.error_m(i),

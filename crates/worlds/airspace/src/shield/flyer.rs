@@ -1,7 +1,7 @@
 //! An airplane as the shield knows it.
 
 use super::orbit::{Orbit, Side};
-use crate::flight::{Levels, Pose};
+use crate::flight::{Levels, Point, Pose, distance_m};
 use sidestep_kernel::EntityId;
 use std::sync::Arc;
 
@@ -24,7 +24,9 @@ pub struct Flyer {
     pub held: Pose,
     /// Airspeed in meters per second.
     pub v_m_s: f64,
-    /// Turn rate of its orbits in radians per second.
+    /// Largest turn rate of its ways in radians per second.
+    pub omega_max_rad_s: f64,
+    /// Turn rate of its orbits in radians per second, at most the largest one.
     pub orbit_rad_s: f64,
     /// Its separation in meters; of two airplanes the larger one counts.
     pub separation_m: f64,
@@ -67,6 +69,31 @@ impl Flyer {
     /// seen.
     pub(super) fn gap_m(&self, other: &Self) -> f64 {
         self.separation_m.max(other.separation_m) + self.error_m + other.error_m + SLACK_M
+    }
+
+    /// Returns whether some ways of `dt_s` seconds, and orbits after them, could bring two airplanes
+    /// too near each other.
+    pub(super) fn is_in_reach(&self, other: &Self, dt_s: f64) -> bool {
+        let reach_m = |f: &Self| f.v_m_s * dt_s + 2.0 * (f.v_m_s / f.orbit_rad_s);
+        let apart_m = distance_m(self.pose.at, other.pose.at);
+        apart_m < self.gap_m(other) + reach_m(self) + reach_m(other)
+    }
+
+    /// Returns two discs that it cannot leave, whatever way it flies for `dt_s` seconds and to
+    /// whichever side it turns for ever after that: their centers, and their radius in meters.
+    ///
+    /// At any time it is on the circle to its left that it would fly from there, whose center is at
+    /// right angles to its heading. Flown straight on, that center ends `v dt` ahead, which is the
+    /// center of the disc. A turn shifts the airplane by at most `v omega dt^2 / 2`, and the center
+    /// about it by at most `r omega dt`. Earlier it is nearer, because `r omega` is not less than
+    /// `v`. The same holds to the right.
+    pub(super) fn reach(&self, dt_s: f64) -> ([Point; 2], f64) {
+        let ahead = self.pose.step(self.v_m_s, 0.0, dt_s);
+        let orbit = |side: Side| Orbit::from(ahead, self.v_m_s, side.sign() * self.orbit_rad_s);
+        let centers = Side::BOTH.map(|side| orbit(side).center());
+        let (turn_rad, radius_m) = (self.omega_max_rad_s * dt_s, orbit(Side::Left).radius_m);
+        let shift_m = 0.5 * self.v_m_s * dt_s * turn_rad;
+        (centers, radius_m * (1.0 + turn_rad) + shift_m)
     }
 
     /// Returns whether two different airplanes are on levels that meet.

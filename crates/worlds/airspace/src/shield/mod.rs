@@ -16,8 +16,9 @@
 //!    speaks of. So an assignment of compatible plans exists.
 //! 2. *Search.* Each airplane starts with the plan that the method proposes. While some pair is
 //!    not compatible, one of the two, the one with the lower rank unless it is on its fallback
-//!    already, takes another plan that is compatible with all present ones, or its fallback. The
-//!    first lowers the number of incompatible pairs, the second raises the number of airplanes on
+//!    already, takes another plan that is compatible with all present ones, or its fallback; or it
+//!    and those with which it is not compatible turn to one side together, if that makes them
+//!    compatible with all. The first and the last lower the number of incompatible pairs, the second raises the number of airplanes on
 //!    fallbacks, and none leaves a fallback during the search, so it ends. It can only end without
 //!    an incompatible pair, because two airplanes on fallbacks are compatible by the invariant.
 //! 3. *Better again.* An airplane that has fallen back may take another plan if that is compatible

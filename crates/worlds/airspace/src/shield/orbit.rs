@@ -69,6 +69,16 @@ impl Orbit {
         ]
     }
 
+    /// Returns the center of the circle.
+    pub(crate) fn center(&self) -> Point {
+        self.center
+    }
+
+    /// Returns whether all of it is at least `apart_m` from a point, which is not inside of it.
+    pub(crate) fn is_outside(&self, point: Point, apart_m: f64) -> bool {
+        distance_m(self.center, point) >= self.radius_m + apart_m
+    }
+
     fn speed_m_s(&self) -> f64 {
         self.radius_m * self.omega_rad_s.abs()
     }

@@ -44,6 +44,13 @@ impl Plan {
         Self { candidate, ..flown }
     }
 
+    /// Returns the same plan with an orbit to a side.
+    pub(super) fn turned(&self, side: Side) -> Self {
+        let omega_rad_s = side.sign() * self.flyer.orbit_rad_s;
+        let orbit = Orbit::from(self.end(), self.flyer.v_m_s, omega_rad_s);
+        Self { orbit, side, ..self.clone() }
+    }
+
     fn flown_from(
         start: Pose,
         flyer: Flyer,
@@ -83,15 +90,10 @@ impl Plan {
         if !self.flyer.minds(&other.flyer) {
             return true;
         }
-        let gap_m = self.flyer.gap_m(&other.flyer);
-        let reach = |plan: &Self| {
-            let dt_s = plan.dtau_s * plan.omegas_rad_s.len() as f64;
-            plan.flyer.v_m_s * dt_s + 2.0 * plan.orbit.radius_m
-        };
-        let now_m = distance_m(self.poses[0].at, other.poses[0].at);
-        if now_m >= gap_m + reach(self) + reach(other) {
+        if !self.flyer.is_in_reach(&other.flyer, self.dtau_s * self.omegas_rad_s.len() as f64) {
             return true;
         }
+        let gap_m = self.flyer.gap_m(&other.flyer);
         self.orbit.stays_apart(&other.orbit, gap_m) && self.ways_stay_apart(other, gap_m)
     }
 
@@ -103,6 +105,20 @@ impl Plan {
             };
             let apart = |t_s: f64| distance_m(at(self, t_s), at(other, t_s));
             stays_apart(&apart, (0.0, self.dtau_s), closing_m_s, gap_m)
+        })
+    }
+
+    /// Returns whether it keeps apart from another airplane whatever that one does, for one `dt`
+    /// and on orbits ever after.
+    pub(crate) fn is_clear_of(&self, other: &Flyer) -> bool {
+        let dt_s = self.dtau_s * self.omegas_rad_s.len() as f64;
+        let (centers, radius_m) = other.reach(dt_s);
+        let apart_m = radius_m + self.flyer.gap_m(other);
+        // Between two poses it is within half a step of one of them.
+        let half_step_m = 0.5 * self.flyer.v_m_s * self.dtau_s;
+        centers.iter().all(|&center| {
+            let is_far = |pose: &Pose| distance_m(pose.at, center) >= apart_m + half_step_m;
+            self.poses.iter().all(is_far) && self.orbit.is_outside(center, apart_m)
         })
     }
 

@@ -93,3 +93,18 @@ fn the_shield_costs_recorded_traffic_little() {
     let recorded = traffic::read(&path).expect("a table");
     costs_little("recorded traffic", &from_tracks("ch", &recorded).expect("it has tracks"), "pc");
 }
+
+/// The table in the world's README.
+#[test]
+#[ignore = "sixty runs: a minute"]
+fn the_shield_costs_random_traffic_little_on_average() {
+    for (slowest_deg_s, n) in [(2.0, 20), (1.0, 20), (2.0, 10)] {
+        let mean = |shield: &str| {
+            let one = |seed| delay_percent("mixed", &mixed(n, seed, slowest_deg_s), shield, "pc");
+            (1..11).map(one).sum::<f64>() / 10.0
+        };
+        let (off, on) = (mean("off"), mean("on"));
+        println!("MEAN {n} of {slowest_deg_s} to {} deg/s: {off:.2} {on:.2}", 5.0 * slowest_deg_s);
+        assert!(on <= 1.5 * off + 1.0, "{on} {off}");
+    }
+}

@@ -274,7 +274,7 @@ proptest! {
 
     #[test]
     fn only_pairs_that_are_named_lose_separation_in_gusts(
-        airplanes in crowd(), sigma_m in 0.0f64..30.0, sigma_deg in 0.0f64..1.4,
+        airplanes in crowd(), sigma_m in 0.0f64..30.0, sigma_deg in 0.0f64..1.0,
         sigmas in prop::sample::select(vec![1.0, 5.0]),
     ) {
         let more = format!("error_sigmas = {sigmas:?}");

@@ -15,6 +15,7 @@ fn flyer(x: f64, y: f64, heading_rad: f64, rank: u64) -> Flyer {
         pose,
         held: pose,
         v_m_s: 35.0,
+        omega_max_rad_s: 4f64.to_radians(),
         orbit_rad_s: 4f64.to_radians(),
         separation_m: 500.0,
         error_m: 0.0,
@@ -128,6 +129,27 @@ proptest! {
         }
         now.iter_mut().zip(&decisions).for_each(|(f, d)| f.fallback = d.fallback);
         prop_assert!(nearest_on_orbits(&now, 400) >= 500.0);
+    }
+
+    /// A plan that is clear of another airplane needs no consent of it: whatever that one flies for
+    /// `dt`, and to whichever side it turns then, the two keep apart.
+    #[test]
+    fn a_plan_clear_of_another_keeps_apart_whatever_that_one_does(
+        x in 1200.0f64..3000.0, bearing in -3.1f64..3.1, psi in -3.1f64..3.1,
+        part in -1.0f64..1.0, others in prop::collection::vec(-1.0f64..1.0, STEPS),
+        slow in 0.5f64..1.0, left in any::<bool>(), own_left in any::<bool>(),
+    ) {
+        let own = flyer(0.0, 0.0, 0.0, 0);
+        let at = Pose { at: [0.0; 2], heading_rad: bearing }.step(x, 0.0, 1.0).at;
+        let other = Flyer { orbit_rad_s: slow * own.omega_max_rad_s, ..flyer(at[0], at[1], psi, 1) };
+        let plan = |of: &Flyer, parts: &[f64], left: bool| {
+            let omegas_rad_s = parts.iter().map(|part| part * of.omega_max_rad_s).collect();
+            Plan::new(of.clone(), &Way { omegas_rad_s }, DTAU_S, Side::BOTH[usize::from(left)])
+        };
+        let clear = plan(&own, &[part; STEPS], own_left);
+        if clear.is_clear_of(&other) {
+            prop_assert!(clear.is_compatible(&plan(&other, &others, left)));
+        }
     }
 
     /// An airplane that is far from all others flies its wish.

@@ -17,8 +17,13 @@ use super::{
     BehaviourSection, DoorSection, EffectorSection, MapSection, MoverSection, ProfileFile,
     RecordSection, RobotSection, RobotsFile, SensorSection,
 };
-use crate::decide::{Announce, Behaviour, External, Goto, Replay, Sector, Shuttle, Wander};
-use crate::effector::{Action, EffectorModel, MAX_PATH, Transition, own_boxes};
+use crate::decide::{
+    Announce, Avoidance, Behaviour, External, Goto, Patient, Planner, Replay, Sector, Shuttle,
+    Trust, Wander,
+};
+use crate::effector::{
+    Action, EffectorModel, FORWARD, MAX_PATH, ObstacleRule, Transition, own_boxes,
+};
 use crate::policy::ConflictPolicy;
 use crate::purpose;
 use crate::sensor::SensorModel;
@@ -114,7 +119,7 @@ impl<'a> Compiler<'a> {
         }
         add_all(&source, &file.sensors, &mut sensors);
         add_all(&source, &file.effectors, &mut effectors);
-        idle::refuse(&source, &file, !office_doors.is_empty())?;
+        idle::refuse(&source, &file, own, !office_doors.is_empty())?;
         let kinds = Kinds::new(&source, &file)?;
         check_tables(&kinds, &sensors, &effectors)?;
         let mut remarks = remarks::on_effectors(&file, map.box_size_m, &effectors);
@@ -176,6 +181,8 @@ impl<'a> Compiler<'a> {
         let stride = self.stride();
         let rows = self.map.height() + 2 * self.border;
         let radio = self.radio();
+        let asks = |ty: &BodyType| matches!(&ty.role, Role::Robot(model) if model.behaviour.asks());
+        let has_asks = self.types.iter().any(asks);
         let kind_rank = self.kind_rank()?;
         let world = RobotsWorld {
             walls: padded(&self.map, self.border, stride, rows),
@@ -189,12 +196,15 @@ impl<'a> Compiler<'a> {
             kind_rank,
             radio,
             robots,
+            has_asks,
             storage: order,
             streams: self.streams,
             border: self.border,
             stride,
             reach: self.reach,
         };
+        let mut remarks = self.remarks;
+        remarks.extend(crate::law::no_contacts(&world));
         Ok(Compiled {
             world: Arc::new(world),
             start: self.start.into(),
@@ -202,7 +212,7 @@ impl<'a> Compiler<'a> {
             seed: self.head.seed,
             cycles: self.head.cycles.unwrap_or(CYCLES),
             record: self.file.record,
-            remarks: self.remarks,
+            remarks,
         })
     }
 

@@ -156,14 +156,14 @@ impl Kinds {
         match (&kind.span, self.stand_in(at) && !kind.is_mapped) {
             (Some(span), false) => {
                 let remedy = format!(
-                    "{nearest} Write [kinds.{name}] with one of them as `observation`: \
+                    "{nearest}; write [kinds.{name}] with one of them as `observation`: \
                      \"nothing\" where sensors do not see it"
                 );
                 self.source.error(span.clone(), cause, remedy)
             }
             _ => {
                 let remedy = format!(
-                    "{nearest} Add it, or say what the sensor takes it for: \
+                    "{nearest}; add it, or say what the sensor takes it for: \
                      designates = {{ {name} = \"nothing\" }} where it does not see it"
                 );
                 at.error(list.span(), cause, &remedy)

@@ -97,11 +97,9 @@ impl Pair {
     fn as_turn(&self) -> Option<Turn> {
         let path_m = hypot(self.claimed.ahead_m, self.claimed.left_m);
         let is_turn = self.claimed.turn_rad.abs() >= TURN_MIN_DEG.to_radians();
-        (is_turn && path_m <= TURN_PATH_MAX_M).then_some(Turn {
-            commanded_rad: self.claimed.turn_rad,
-            true_rad: self.corrected.turn_rad,
-            duration_s: Some(self.duration_s),
-        })
+        let (claimed, corrected) = (self.claimed.turn_rad, self.corrected.turn_rad);
+        let turn = Turn::new(claimed, corrected, Some(self.duration_s));
+        (is_turn && path_m <= TURN_PATH_MAX_M).then_some(turn)
     }
 }
 

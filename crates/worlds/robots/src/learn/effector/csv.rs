@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::EffectorModel;
-use super::events::{Events, Move, Turn};
+use super::events::{Events, Move, Turn, nearest_turn};
 use super::phase::{FORWARD_CLASSES, Outcome, forward_class, outcomes};
 use super::report::{EffectorReport, ForwardShares};
 use super::transitions::{EffectorProfile, Transition, exact, from_outcomes, intended, label};
@@ -43,33 +43,18 @@ impl Displacement {
         ends
     }
 
-    /// Returns the turn in degrees, as the one nearest to the command of all that end alike: a right
-    /// turn that ends at 180 degrees has overshot by 90, and not turned left.
-    fn turn_near_deg(&self, commanded_deg: f64) -> f64 {
-        let error_deg = self.turn_deg - commanded_deg;
-        // Half a turn off is ambiguous, so the log's own sign stays.
-        match error_deg.abs() <= 180.0 {
-            true => self.turn_deg,
-            false => self.turn_deg - 360.0 * error_deg.signum(),
-        }
-    }
-
     fn as_move(&self) -> Move {
         Move {
             ahead_boxes: self.ahead_boxes,
             left_boxes: self.left_boxes,
-            turn_error_rad: self.turn_near_deg(0.0).to_radians(),
+            turn_error_rad: nearest_turn(0.0, self.turn_deg.to_radians()),
             duration_s: None,
         }
     }
 
     fn as_turn(&self) -> Turn {
         let commanded_deg = f64::from(90 * intended(ACTIONS[self.action]).quarters);
-        Turn {
-            commanded_rad: commanded_deg.to_radians(),
-            true_rad: self.turn_near_deg(commanded_deg).to_radians(),
-            duration_s: None,
-        }
+        Turn::new(commanded_deg.to_radians(), self.turn_deg.to_radians(), None)
     }
 }
 

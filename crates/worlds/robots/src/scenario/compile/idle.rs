@@ -8,8 +8,8 @@ use super::*;
 pub(super) const BEHAVIOURS: [(&str, &[&str]); 7] = [
     ("wander", &["turn_every"]),
     ("announce", &["turn_every"]),
-    ("shuttle", &["a", "b"]),
-    ("goto", &["goals", "repeat"]),
+    ("shuttle", &["a", "b", "avoidance"]),
+    ("goto", &["goals", "repeat", "avoidance"]),
     ("replay", &["actions", "repeat"]),
     ("random", &["weights", "weights_after_contact"]),
     ("external", &[]),
@@ -18,13 +18,15 @@ pub(super) const BEHAVIOURS: [(&str, &[&str]); 7] = [
 /// A key that does nothing, with the reason.
 struct Rule(&'static str, bool, &'static str);
 
-/// Refuses what does nothing in a scenario; `has_doors` says whether its map brings doors.
+/// Refuses what does nothing in a scenario; `own` are behaviors beside the built-in ones, and
+/// `has_doors` says whether its map brings doors.
 ///
 /// # Errors
 /// At the first such key.
 pub(super) fn refuse(
     source: &Source,
     file: &RobotsFile,
+    own: &Behaviours,
     has_doors: bool,
 ) -> Result<(), InputError> {
     let by_kind = file.conflict_policy == ConflictPolicy::ByKind;
@@ -37,7 +39,7 @@ pub(super) fn refuse(
     ];
     apply(source, "", &rules)?;
     for (k, section) in file.robots.0.iter().enumerate() {
-        robots(source, &format!("robots.{k}."), section.get_ref())?;
+        robots(source, &format!("robots.{k}."), section.get_ref(), own)?;
     }
     for (k, section) in file.people.0.iter().enumerate() {
         people(source, &format!("people.{k}."), section.get_ref())?;
@@ -55,7 +57,12 @@ fn apply(source: &Source, path: &str, rules: &[Rule]) -> Result<(), InputError> 
     }
 }
 
-fn robots(source: &Source, path: &str, s: &RobotSection) -> Result<(), InputError> {
+fn robots(
+    source: &Source,
+    path: &str,
+    s: &RobotSection,
+    own: &Behaviours,
+) -> Result<(), InputError> {
     let (scen, at) = (s.scen.is_some(), !s.at.is_empty());
     let listed = "beside `scen`, which lists starts and goals";
     let rules = [
@@ -67,36 +74,43 @@ fn robots(source: &Source, path: &str, s: &RobotSection) -> Result<(), InputErro
     apply(source, path, &rules)?;
     timing(source, path, s.period, s.phase)?;
     match &s.behaviour {
-        Some(section) => behaviour(source, &format!("{path}behaviour."), section.get_ref()),
+        Some(section) => behaviour(source, &format!("{path}behaviour."), section.get_ref(), own),
         None => Ok(()),
     }
 }
 
-fn behaviour(source: &Source, path: &str, s: &BehaviourSection) -> Result<(), InputError> {
-    let known =
-        BEHAVIOURS.iter().find(|(kind, _)| *kind == s.kind).map_or(&[][..], |(_, keys)| *keys);
-    for (key, is_given) in s.given() {
-        if is_given && !known.contains(&key) {
-            let kind = &s.kind;
-            let remedy = match BEHAVIOURS.iter().find(|(_, keys)| keys.contains(&key)) {
-                Some((other, _)) => format!("leave it out: it is a key of `{other}`"),
-                None => "leave it out".into(),
-            };
-            let cause = format!("`{key}` does nothing in the behaviour `{kind}`");
-            return Err(source.error_at(&format!("{path}{key}"), cause, remedy));
-        }
-    }
-    let error = |key: &str, cause: &str, remedy: &str| {
+fn behaviour(
+    source: &Source,
+    path: &str,
+    s: &BehaviourSection,
+    own: &Behaviours,
+) -> Result<(), InputError> {
+    let known = match BEHAVIOURS.iter().find(|(kind, _)| *kind == s.kind) {
+        Some((_, keys)) => *keys,
+        None if own.contains_key(&s.kind) => &[],
+        // Its name is wrong, and that is what is to be told.
+        None => return Ok(()),
+    };
+    let error = |key: &str, cause: String, remedy: String| {
         Err(source.error_at(&format!("{path}{key}"), cause, remedy))
     };
-    if s.goals.as_ref().is_some_and(Vec::is_empty) {
-        return error("goals", "`goals` is empty", "give at least one [col, row]");
+    let foreign = s.given().into_iter().find(|(key, is_given)| *is_given && !known.contains(key));
+    if let Some((key, _)) = foreign {
+        let remedy = match BEHAVIOURS.iter().find(|(_, keys)| keys.contains(&key)) {
+            Some((other, _)) => format!("leave it out: it is a key of `{other}`"),
+            None => "leave it out".into(),
+        };
+        return error(key, format!("`{key}` does nothing in the behaviour `{}`", s.kind), remedy);
     }
-    if s.actions.as_ref().is_some_and(Vec::is_empty) {
-        return error("actions", "`actions` is empty", "give at least one, e.g. \"forward\"");
+    let lists = [
+        ("goals", s.goals.as_ref().is_some_and(Vec::is_empty), "[col, row]"),
+        ("actions", s.actions.as_ref().is_some_and(Vec::is_empty), "action, e.g. \"forward\""),
+    ];
+    if let Some((key, _, one)) = lists.into_iter().find(|(_, is_empty, _)| *is_empty) {
+        return error(key, format!("`{key}` is empty"), format!("give at least one {one}"));
     }
     match s.turn_every {
-        Some(0) => error("turn_every", "turn_every = 0", "give 1 or more actions"),
+        Some(0) => error("turn_every", "turn_every = 0".into(), "give 1 or more actions".into()),
         _ => Ok(()),
     }
 }
