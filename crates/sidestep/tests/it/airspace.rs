@@ -30,7 +30,9 @@ pub(crate) const LOSING: &str = "method = \"none\"\nshield = \"off\"";
 
 #[test]
 fn any_number_of_workers_gives_the_same_bits() {
-    for more in ["", ERRING, "preset = \"paper\"\nmax_rounds = 20", "method = \"orca\""] {
+    for more in
+        ["", ERRING, "preset = \"paper\"\nmax_rounds = 20", "method = \"orca\"", "method = \"mvp\""]
+    {
         let source = traffic(more);
         let mut alone = run(&source, 1);
         alone.advance(40);
@@ -45,15 +47,21 @@ fn any_number_of_workers_gives_the_same_bits() {
 
 #[test]
 fn a_resumed_or_recorded_run_gives_the_same_bits() {
-    let source = traffic(ERRING);
-    let mut whole = run(&source, 2);
+    // MVP remembers conflicts from cycle to cycle.
+    for more in [ERRING, "method = \"mvp\"\nshield = \"off\""] {
+        resumed_and_recorded(&traffic(more));
+    }
+}
+
+fn resumed_and_recorded(source: &Source) {
+    let mut whole = run(source, 2);
     whole.advance(30);
-    let mut first = run(&source, 1);
+    let mut first = run(source, 1);
     first.begin_recording();
     first.advance(13);
     let mut recorder = MemoryRecorder::new(&first.schemas());
     first.record(&mut recorder).expect("memory has room");
-    let mut second = run(&source, 2);
+    let mut second = run(source, 2);
     second.restore(&first.checkpoint()).expect("its own checkpoint");
     second.advance(17);
     assert_eq!(second.digest(), whole.digest());

@@ -53,8 +53,8 @@ fn case(n: usize, run: usize) -> Vec<[f64; 5]> {
     (0..n).map(one).collect()
 }
 
-/// Flies a case with our MVP.
-fn ours(airplanes: &[[f64; 5]]) -> Flown {
+/// Returns a case for our MVP.
+fn scenario(airplanes: &[[f64; 5]]) -> Source {
     let mut text =
         "format = 1\nworld = \"airspace\"\n[airspace]\nmethod = \"mvp\"\nshield = \"off\"\n\
                     mvp = { look_ahead_s = 90.0, margin = 1.05 }\n"
@@ -65,7 +65,12 @@ fn ours(airplanes: &[[f64; 5]]) -> Flown {
              way_points_m = [[{to_x:?}, {to_y:?}]]\n"
         );
     }
-    let mut run = airspace_run(&Source::new("case", text, ""), 1).expect("a scenario");
+    Source::new("case", text, "")
+}
+
+/// Flies a case with our MVP.
+fn ours(airplanes: &[[f64; 5]]) -> Flown {
+    let mut run = airspace_run(&scenario(airplanes), 1).expect("a scenario");
     run.advance(300);
     let metrics = run.metrics();
     let one = |id| airplane_metrics(run.world(), run.state(), id).flown_s.expect("it has arrived");
@@ -107,6 +112,19 @@ fn mvp_flies_as_in_bluesky() {
     for (n, theirs) in fixture().flown {
         let ours: Vec<Flown> = (0..theirs.len()).map(|run| ours(&case(n, run))).collect();
         all_agree(n, &ours, &theirs);
+    }
+}
+
+#[test]
+fn conflicts_are_remembered_over_a_checkpoint() {
+    let source = scenario(&case(10, 0));
+    let mut whole = airspace_run(&source, 1).expect("a scenario");
+    for _ in 0..60 {
+        let mut resumed = airspace_run(&source, 1).expect("a scenario");
+        resumed.restore(&whole.checkpoint()).expect("its own checkpoint");
+        resumed.advance(1);
+        whole.advance(1);
+        assert_eq!(resumed.digest(), whole.digest(), "after cycle {}", whole.cycle());
     }
 }
 

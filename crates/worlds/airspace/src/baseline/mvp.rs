@@ -159,7 +159,8 @@ mod tests {
     /// `DTLOOK 90`, and the bearings of its module `_geo`.
     #[test]
     fn headings_are_those_of_bluesky() {
-        let cases: [(&[(Point, f64)], &[f64]); 5] = [
+        type Poses = &'static [(Point, f64)];
+        let cases: [(Poses, &[f64]); 5] = [
             (&[([0.0, 0.0], 0.0), ([2000.0, -1900.0], 90.0)], &[-11.3667, 81.8404]),
             (&[([0.0, 0.0], 0.0), ([-300.0, 50.0], 180.0)], &[-72.4744, 107.5256]),
             (&[([0.0, 0.0], 0.0), ([3000.0, 0.0], 180.0)], &[19.2191, -160.7809]),
