@@ -27,7 +27,7 @@ impl From<&Failure> for ExitCode {
     fn from(failure: &Failure) -> Self {
         match failure {
             Failure::Input(_) => Self::WrongInput,
-            Failure::Interrupted => Self::Interrupted,
+            Failure::Interrupted | Failure::WithinACycle(_) => Self::Interrupted,
             Failure::Record(_) | Failure::Draw(_) | Failure::Stopped { .. } => Self::Failed,
         }
     }

@@ -1,10 +1,20 @@
 //! Ctrl-C: the first one asks the run to stop in good order, the second one ends the process.
+//!
+//! Good order is between two cycles. A run that has not come to the end of its cycle after
+//! [`PATIENCE`] leaves it half done; what it has recorded continues from the last checkpoint.
 
 use crate::exit::{ExitCode, Failure};
+use sidestep::kernel::Interrupt;
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+/// Time that a cycle has to come to its end.
+const PATIENCE: Duration = Duration::from_secs(1);
 
 static REQUESTED: AtomicBool = AtomicBool::new(false);
 static LISTENING: AtomicBool = AtomicBool::new(false);
+static WITHIN_A_CYCLE: OnceLock<Interrupt> = OnceLock::new();
 
 /// Makes Ctrl-C (and a termination signal) a request to stop, instead of the end of the process.
 ///
@@ -18,7 +28,17 @@ pub(crate) fn listen() -> Result<(), Failure> {
         if REQUESTED.swap(true, Ordering::Relaxed) {
             std::process::exit(ExitCode::Interrupted as i32);
         }
+        // A thread of its own, so that the next signal is heard meanwhile.
+        std::thread::spawn(|| {
+            std::thread::sleep(PATIENCE);
+            within_a_cycle().raise();
+        });
     })
+}
+
+/// Returns the interrupt at which runs look within their cycles.
+pub(crate) fn within_a_cycle() -> Interrupt {
+    WITHIN_A_CYCLE.get_or_init(Interrupt::default).clone()
 }
 
 /// Makes Ctrl-C (and a termination signal) end the process after `cleanup`.

@@ -4,6 +4,7 @@ use crate::console::Console;
 use crate::exit::Failure;
 use crate::interrupt;
 use crate::progress::{Bar, Stages};
+use sidestep::kernel::Interrupt;
 use sidestep_session::{Progress, Watcher};
 use std::sync::{Mutex, PoisonError};
 
@@ -59,6 +60,10 @@ impl Watcher for Watch {
 
     fn go_on(&self) -> bool {
         !interrupt::requested()
+    }
+
+    fn interrupt(&self) -> Interrupt {
+        interrupt::within_a_cycle()
     }
 }
 

@@ -3,6 +3,7 @@
 use super::game::Game;
 use super::player::{Choice, Player, Update, Utility};
 use serde::{Deserialize, Serialize};
+use sidestep_kernel::interrupt;
 
 /// The estimator of `E[G | x_i]`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -135,6 +136,7 @@ impl<'g, G: Game, U: Fn(usize, u64) -> f64> RoundTable<'g, G, U> {
         let game = self.game.as_pairwise().expect("exact expectations need a sum over pairs");
         let mut change: f64 = 0.0;
         for i in 0..self.players.len() {
+            interrupt::look();
             let player = &mut self.players[i];
             player.know(|expected| game.expect(i, &self.q, expected));
             change = change.max(player.update(self.settings.update, self.settings.cooling));
@@ -177,6 +179,7 @@ impl<'g, G: Game, U: Fn(usize, u64) -> f64> RoundTable<'g, G, U> {
     }
 
     fn sample_cost(&self, samples: &[Vec<usize>], k: usize, player: usize) -> f64 {
+        interrupt::look();
         let joint: Vec<usize> = samples.iter().map(|of_player| of_player[k]).collect();
         match self.settings.utility {
             Utility::Joint => self.game.cost(&joint),

@@ -6,11 +6,10 @@ use std::path::{Path, PathBuf};
 use std::{env, error::Error, fs};
 
 use sidestep_draw::{
-    Axis, Bar, BarChart, BarSeries, DrawError, Histogram, Matrix, Options, Plot, Point, Series,
-    Style, draw, to_png,
+    Axis, Bar, BarChart, BarSeries, DrawError, Options, Plot, Point, Series, Style, draw, to_png,
 };
 use sidestep_kernel::view::{
-    Body, Condition, Floor, Frame, Kind, Occupancy, Pose, Scenery, Shape, Trail,
+    Body, Condition, Floor, Frame, Kind, Occupancy, Plane, Pose, Scenery, Shape, Trail,
 };
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -20,9 +19,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     save(&folder, "tracks", &corridor()?)?;
     save(&folder, "speed-up", &speed_up().to_svg(&chart)?)?;
     save(&folder, "density", &density().to_svg(&chart)?)?;
-    save(&folder, "contacts", &contacts().to_svg(&chart)?)?;
-    save(&folder, "groups", &group_sizes()?.to_svg(&chart)?)?;
-    save(&folder, "confusion", &confusion()?.to_svg(&chart)?)
+    save(&folder, "contacts", &contacts().to_svg(&chart)?)
 }
 
 fn save(folder: &Path, name: &str, svg: &str) -> Result<(), Box<dyn Error>> {
@@ -60,7 +57,7 @@ fn corridor() -> Result<String, DrawError> {
         width: 34,
         height: 14,
         box_m: 1.0,
-        origin_m: [0.0; 2],
+        plane: Plane::default(),
         boxes: PLAN.iter().rev().flat_map(|line| line.chars().map(occupancy)).collect(),
     };
     let body = |kind, number, (x, y): (f64, f64), (width, height): (f64, f64)| {
@@ -154,32 +151,4 @@ fn contacts() -> BarChart {
         .series(BarSeries::new("person", bars([2.0, 2.9, 6.1, 7.7])))
         .series(BarSeries::new("door", bars([0.5, 1.5, 2.4, 4.4])))
         .note("Means over 20 seeds with 95 % confidence intervals.")
-}
-
-fn group_sizes() -> Result<Histogram, Box<dyn Error>> {
-    let edges = (0..=20).map(|k| f64::from(k) + 0.5).collect();
-    let counts = (0..20).map(|k| 400_000_u64 >> (k * 9 / 10)).collect();
-    let title = "Bodies in conflict: sizes of groups";
-    Ok(Histogram::from_counts(title, edges, counts)?
-        .x_axis(Axis::linear("bodies in the group"))
-        .y_axis(Axis::log("groups")))
-}
-
-fn confusion() -> Result<Matrix, Box<dyn Error>> {
-    let names = || ["nothing", "wall", "door", "person", "robot"].map(String::from).to_vec();
-    #[rustfmt::skip]
-    let values = vec![
-        0.91, 0.04, 0.02, 0.02, 0.01,
-        0.05, 0.88, 0.05, 0.01, 0.01,
-        0.06, 0.21, 0.70, 0.02, 0.01,
-        0.09, 0.03, 0.02, 0.74, 0.12,
-        f64::NAN, f64::NAN, f64::NAN, f64::NAN, f64::NAN,
-    ];
-    let counts = [[8214; 5], [5120; 5], [611; 5], [287; 5], [0; 5]];
-    let counts = counts.iter().flatten().zip(&values);
-    let counts = counts.map(|(&n, p)| format!("{:.0}", f64::from(n) * p.max(0.0))).collect();
-    Ok(Matrix::new("Sonar: what is reported for what is there", names(), names(), values)?
-        .titles("true", "reported")
-        .subscripts(counts)?
-        .note("Small: counts. No robot was seen in the log."))
 }

@@ -16,21 +16,12 @@ pub struct Axis {
     log: bool,
     range: Option<(f64, f64)>,
     ticks: Option<Vec<f64>>,
-    tight: bool,
-    counts: bool,
 }
 
 impl Axis {
     /// Returns a linear axis; `label` names the quantity and its unit, e.g. `"trip time (s)"`.
     pub fn linear(label: impl Into<String>) -> Self {
-        Self {
-            label: label.into(),
-            log: false,
-            range: None,
-            ticks: None,
-            tight: false,
-            counts: false,
-        }
+        Self { label: label.into(), log: false, range: None, ticks: None }
     }
 
     /// Returns a logarithmic axis. Values of zero and below have no place on it and are left out.
@@ -50,21 +41,6 @@ impl Axis {
     #[must_use]
     pub fn ticks(mut self, at: impl IntoIterator<Item = f64>) -> Self {
         self.ticks = Some(at.into_iter().collect());
-        self
-    }
-
-    /// Ends the axis where the data end, not at the next round number.
-    #[must_use]
-    pub(crate) fn tight(mut self) -> Self {
-        self.tight = true;
-        self
-    }
-
-    /// Marks the axis as one of counts: a logarithmic one starts at one half, so that a count of
-    /// one has a height.
-    #[must_use]
-    pub(crate) fn counting(mut self) -> Self {
-        self.counts = true;
         self
     }
 
@@ -123,12 +99,8 @@ impl Axis {
         match (self.log, self.ticks.is_some(), extent) {
             (true, _, None) => (1.0, 10.0),
             (false, _, None) => (0.0, 1.0),
-            (true, false, Some((_, high))) if self.counts => {
-                (0.5, round_log((1.0, high.max(1.0))).1)
-            }
             (true, false, Some(extent)) => round_log(extent),
             (true, true, Some((low, high))) => (low / 1.1, high * 1.1),
-            (false, _, Some(extent)) if self.tight => widened(extent),
             (false, given, Some(extent)) => round_linear(extent, given, most),
         }
     }
@@ -148,7 +120,7 @@ fn round_linear(extent: (f64, f64), ticks_given: bool, most: usize) -> (f64, f64
 }
 
 /// Returns an extent that is more than one point.
-pub(crate) fn widened((low, high): (f64, f64)) -> (f64, f64) {
+fn widened((low, high): (f64, f64)) -> (f64, f64) {
     let size = low.abs().max(high.abs());
     if high - low > 1e-9 * size && high - low > 1.0 / MOST {
         return (low, high);

@@ -51,11 +51,6 @@ impl DrawError {
         Err(Self::Value { what, value, must: "finite and above zero" })
     }
 
-    /// Checks that there is at least one of `what`.
-    pub(crate) fn some(what: &'static str, count: usize) -> Result<(), Self> {
-        Self::positive(what, count as f64).map(drop)
-    }
-
     /// Checks that `found` equals `expected`.
     pub(crate) fn length(what: &'static str, expected: usize, found: usize) -> Result<(), Self> {
         if expected == found { Ok(()) } else { Err(Self::Length { what, expected, found }) }

@@ -4,7 +4,7 @@
 use proptest::prelude::*;
 use resvg::usvg::{Group, Node, Rect};
 
-use sidestep_kernel::view::{Body, Floor, Frame, Kind, Pose, Scenery, Shape, Trail};
+use sidestep_kernel::view::{Body, Floor, Frame, Kind, Plane, Pose, Scenery, Shape, Trail};
 
 use crate::raster::parse;
 use crate::testing::{ball, moment, open, plane};
@@ -72,12 +72,6 @@ fn crowded_bars() -> BarChart {
         .series(BarSeries::new("only", (0..14).map(bar).collect()))
 }
 
-fn matrix(side: usize) -> Matrix {
-    let names = || (0..side).map(|i| format!("observation {i}")).collect();
-    let values = (0..side * side).map(|i| (i * 7919 % 1000) as f64 / 1000.0).collect();
-    Matrix::new("Confusion", names(), names(), values).unwrap().titles("true", "reported")
-}
-
 fn options(style: Style, scenery: &Scenery) -> Options {
     Options { style, ..Options::page(scenery, "Small print.") }
 }
@@ -126,10 +120,6 @@ fn gallery() -> Vec<(&'static str, String)> {
     let chart = Style::CHART;
     let small = Style { width_px: 240.0, height_px: 180.0, font_px: 9.0 };
     let tight_ticks = Axis::linear("x").ticks([1.0, 1.01, 1.02, 50.0]);
-    let histogram = |y| {
-        let histogram = Histogram::from_values("Times", &[1.0, 2.0, 2.1, 9.0], 12).unwrap();
-        histogram.y_axis(y).to_svg(&chart).unwrap()
-    };
     vec![
         ("empty plot", Plot::new("").to_svg(&chart).unwrap()),
         ("long plot", long_plot().to_svg(&chart).unwrap()),
@@ -140,11 +130,6 @@ fn gallery() -> Vec<(&'static str, String)> {
         ),
         ("crowded bars", crowded_bars().to_svg(&chart).unwrap()),
         ("small bars", crowded_bars().to_svg(&small).unwrap()),
-        ("histogram", histogram(Axis::linear("count"))),
-        ("log histogram", histogram(Axis::log("count"))),
-        ("one cell", matrix(1).to_svg(&chart).unwrap()),
-        ("matrix", matrix(5).to_svg(&chart).unwrap()),
-        ("large matrix", matrix(24).to_svg(&chart).unwrap()),
         ("small map", map(5, 4)),
         ("low map", map(300, 1)),
         ("narrow map", map(1, 400)),
@@ -197,12 +182,6 @@ fn lists_that_do_not_match_are_refused() {
         |result: Result<String, DrawError>| matches!(result, Err(DrawError::Length { .. }));
     let bars = BarChart::new("", ["a", "b"]).series(BarSeries::new("", vec![Bar::new(1.0)]));
     assert!(length(bars.to_svg(&Style::CHART)));
-    assert!(Histogram::from_counts("", vec![0.0, 1.0], vec![1, 2]).is_err());
-    assert!(Histogram::from_counts("", vec![0.0, f64::NAN], vec![1]).is_err());
-    assert!(Histogram::from_values("", &[1.0], 0).is_err());
-    assert!(Histogram::from_values("", &[1.0], usize::MAX).is_err());
-    assert!(Matrix::new("", vec!["a".into()], vec!["b".into()], vec![]).is_err());
-    assert!(Matrix::new("", vec![], vec![], vec![]).is_err());
     let picture = |floor: Floor| {
         let scenery = Scenery { floor: Some(floor), ..open(2) };
         draw(&scenery, &Frame::default(), &[], &options(Style::MAP, &scenery))
@@ -252,29 +231,15 @@ proptest! {
     }
 
     #[test]
-    fn bars_and_bins_of_any_numbers_are_a_picture(
+    fn bars_of_any_numbers_are_a_picture(
         y in axis(),
         values in prop::collection::vec((number(), number(), number()), 0..9),
-        bins in 1usize..40,
     ) {
         let bar = |&(value, low, high): &_| Bar::new(value).with_interval(low, high);
         let chart = BarChart::new("", values.iter().map(|_| "name"))
-            .y_axis(y.clone())
+            .y_axis(y)
             .series(BarSeries::new("s", values.iter().map(bar).collect()));
         prop_assert!(parse(&chart.to_svg(&Style::CHART).unwrap()).is_ok());
-        let values: Vec<f64> = values.iter().map(|v| v.0).collect();
-        let histogram = Histogram::from_values("", &values, bins).unwrap().y_axis(y);
-        prop_assert!(parse(&histogram.to_svg(&Style::CHART).unwrap()).is_ok());
-    }
-
-    #[test]
-    fn a_matrix_of_any_numbers_is_a_picture(
-        values in prop::collection::vec(number(), 1..30),
-        digits in any::<usize>(),
-    ) {
-        let names = (0..values.len()).map(|i| i.to_string()).collect();
-        let matrix = Matrix::new("m", vec!["row".into()], names, values).unwrap().digits(digits);
-        prop_assert!(parse(&matrix.to_svg(&Style::CHART).unwrap()).is_ok());
     }
 
     #[test]
@@ -298,7 +263,7 @@ proptest! {
             Body::new(kind, k as u32, pose, shape).moving([speed; 3])
         };
         let bodies: Vec<Body> = kinds.into_iter().enumerate().map(body).collect();
-        let floor = Floor { box_m, origin_m: [speed, 0.0], ..plane(width, 3).floor.unwrap() };
+        let floor = Floor { box_m, plane: Plane { origin_m: [speed, 0.0], yaw_rad: 0.0 }, ..plane(width, 3).floor.unwrap() };
         let scenery = Scenery {
             floor: has_floor.then_some(floor),
             bodies: bodies.clone(),

@@ -1,9 +1,8 @@
 //! Pictures of runs and of measurements: the visible part of a run, or plain numbers, in; SVG text
 //! and PNG bytes out.
 //!
-//! There is one drawing path: every picture is first an SVG ([`draw`], [`Plot`], [`BarChart`],
-//! [`Histogram`], [`Matrix`]); [`to_png`] rasterizes exactly that SVG, and a [`Film`] does so
-//! repeatedly. The crate reads no files, asks for no system font and knows no world: of a run it
+//! There is one drawing path: every picture is first an SVG ([`draw`], [`Plot`], [`BarChart`]);
+//! [`to_png`] rasterizes exactly that SVG, and a [`Film`] does so repeatedly. The crate reads no files, asks for no system font and knows no world: of a run it
 //! sees scenery, frames and trails (`sidestep_kernel::view`).
 //!
 //! The same input gives the same bytes, whatever fonts and locale the machine has: numbers are
@@ -33,7 +32,6 @@ mod axis;
 mod chart;
 mod error;
 mod film;
-mod heat;
 #[cfg(test)]
 mod layout_tests;
 mod legend;
@@ -48,11 +46,9 @@ mod ticks;
 
 pub use axis::Axis;
 pub use chart::bars::{Bar, BarChart, BarSeries};
-pub use chart::histogram::Histogram;
 pub use chart::plot::{Mark, Plot, Point, Series};
 pub use error::DrawError;
 pub use film::{Film, Still};
-pub use heat::Matrix;
 pub use picture::{Options, describe, draw, worth_a_trail};
 pub use raster::to_png;
 pub use style::{SERIES_COLORS, Style};

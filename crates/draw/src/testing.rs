@@ -1,11 +1,13 @@
 //! Small sceneries for tests.
 
-use sidestep_kernel::view::{Body, Floor, Frame, Kind, Occupancy, Place, Pose, Scenery, Shape};
+use sidestep_kernel::view::{
+    Body, Floor, Frame, Kind, Occupancy, Place, Plane, Pose, Scenery, Shape,
+};
 
 /// Returns an empty floor of boxes of 1 m.
 pub(crate) fn plane(width: u32, height: u32) -> Scenery {
     let boxes = vec![Occupancy::Free; (width * height) as usize];
-    let floor = Floor { width, height, box_m: 1.0, origin_m: [0.0; 2], boxes };
+    let floor = Floor { width, height, box_m: 1.0, plane: Plane::default(), boxes };
     Scenery { floor: Some(floor), ..open(2) }
 }
 

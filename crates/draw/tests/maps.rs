@@ -4,8 +4,8 @@ use image::{Rgba, RgbaImage};
 use sidestep_draw::{Options, draw, to_png};
 use sidestep_kernel::Cycle;
 use sidestep_kernel::view::{
-    Body, Condition, DOOR, Floor, Frame, Kind, MOBILE, Occupancy, Place, Pose, Scenery, Shape,
-    Trail, WALL,
+    Body, Condition, DOOR, Floor, Frame, Kind, MOBILE, Occupancy, Place, Plane, Pose, Scenery,
+    Shape, Trail, WALL,
 };
 
 const WHITE: [u8; 3] = [255, 255, 255];
@@ -83,7 +83,13 @@ fn room() -> Scene {
 }
 
 fn floor(side: u32, boxes: Vec<Occupancy>) -> Scene {
-    let floor = Floor { width: side, height: side, box_m: BOX_M, origin_m: [-3.0, 2.0], boxes };
+    let floor = Floor {
+        width: side,
+        height: side,
+        box_m: BOX_M,
+        plane: Plane { origin_m: [-3.0, 2.0], yaw_rad: 0.0 },
+        boxes,
+    };
     Scene { floor, bodies: Vec::new(), trails: Vec::new() }
 }
 

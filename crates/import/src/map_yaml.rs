@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use saphyr::{LoadableYamlNode, MarkedYaml, Scalar, ScanError, YamlData};
 use sidestep_kernel::InputError;
+use sidestep_kernel::view::Plane;
 use sidestep_map::Cell;
 
 /// The maximum size of the YAML file in bytes; the keys take 150 bytes.
@@ -13,6 +14,9 @@ pub(super) const MAX_YAML_BYTES: u64 = 64 << 10;
 /// bounds their depth, and with it the stack that the parser's recursive tree takes.
 const MAX_LINE_BYTES: usize = 1000;
 
+/// The largest turn of an image in radians: a whole turn, with room for rounding.
+const MAX_YAW_RAD: f64 = 6.2832;
+
 /// The content of the YAML file.
 #[derive(Debug, PartialEq)]
 pub(super) struct Metadata {
@@ -20,8 +24,8 @@ pub(super) struct Metadata {
     pub(super) image: PathBuf,
     /// Side of a pixel in meters, positive.
     pub(super) resolution_m: f64,
-    /// World position of the lower-left corner in meters.
-    pub(super) origin_m: [f64; 2],
+    /// The lower-left corner of the image in the world, and the turn of the image about it.
+    pub(super) plane: Plane,
     /// The conversion of pixels into cells.
     pub(super) reading: Reading,
 }
@@ -32,7 +36,7 @@ impl Metadata {
         let document = Document::parse(place, text)?;
         Ok(Self {
             resolution_m: document.resolution_m()?,
-            origin_m: document.origin_m()?,
+            plane: document.plane()?,
             reading: document.reading()?,
             image: document.image(folder)?,
         })
@@ -63,26 +67,29 @@ impl<'a> Document<'a> {
             resolution_m if resolution_m > 0.0 => Ok(resolution_m),
             other => {
                 let cause = format!("a resolution of {other} m per pixel");
-                Err(self.error(value, cause, "give the side of a pixel in metres, such as 0.05"))
+                Err(self.error(value, cause, "give the side of a pixel in meters, such as 0.05"))
             }
         }
     }
 
-    fn origin_m(&self) -> Result<[f64; 2], InputError> {
+    fn plane(&self) -> Result<Plane, InputError> {
         let value = self.value("origin")?;
         let Some([x, y, yaw]) = value.data.as_sequence().map(Vec::as_slice) else {
-            let remedy = "write `origin: [x, y, 0]` in metres";
+            let remedy = "write `origin: [x, y, yaw]` in meters and radians";
             return Err(self.error(value, "`origin` is not a list of three numbers", remedy));
         };
         let origin_m = [self.number(x, "origin")?, self.number(y, "origin")?];
-        match self.number(yaw, "origin")? {
-            0.0 => Ok(origin_m),
-            yaw_rad => Err(self.error(
+        let yaw_rad = self.number(yaw, "origin")?;
+        if yaw_rad.abs() > MAX_YAW_RAD {
+            let cause = format!("an origin yaw of {yaw_rad} rad, more than a turn");
+            return Err(self.error(
                 yaw,
-                format!("the map is rotated by an origin yaw of {yaw_rad} rad; only 0 is read"),
-                "rotate the image itself and write 0 as the third number of `origin`",
-            )),
+                cause,
+                "write radians from -6.2832 to 6.2832, not degrees",
+            ));
         }
+        // A zero with a minus sign is a zero.
+        Ok(Plane { origin_m, yaw_rad: yaw_rad + 0.0 })
     }
 
     fn reading(&self) -> Result<Reading, InputError> {
@@ -276,7 +283,8 @@ free_thresh: 0.196
     #[test]
     fn the_six_keys_are_read_and_the_mode_is_trinary() {
         let meta = parse(YAML).expect("read");
-        assert_eq!((meta.resolution_m, meta.origin_m), (0.05, [-1.5, 2.0]));
+        let plane = Plane { origin_m: [-1.5, 2.0], yaw_rad: 0.0 };
+        assert_eq!((meta.resolution_m, meta.plane), (0.05, plane));
         assert!(meta.image.ends_with("src/map_yaml.rs"));
         let expected = Reading {
             mode: Mode::Trinary,
@@ -289,7 +297,7 @@ free_thresh: 0.196
 
     #[test]
     fn numbers_may_lack_digits_on_either_side_of_the_point_and_stand_in_quotes() {
-        let origin = |text| with("[-1.5, 2, 0.]", text).map(|meta| meta.origin_m);
+        let origin = |text| with("[-1.5, 2, 0.]", text).map(|meta| meta.plane.origin_m);
         assert_eq!(origin("[-.5, 2., .0]"), Ok([-0.5, 2.0]));
         assert_eq!(origin("[1e1, +3, -0.0]"), Ok([10.0, 3.0]));
         assert_eq!(origin("\n- 1\n- '2'\n- 0"), Ok([1.0, 2.0]));
@@ -315,11 +323,18 @@ free_thresh: 0.196
     }
 
     #[test]
-    fn a_rotated_map_is_refused_at_its_yaw() {
-        let rotated = error("0.]", "1.57]");
-        assert_eq!(rotated.position(), Some((3, 19)));
-        assert!(rotated.cause().contains("1.57 rad"), "{rotated}");
-        assert!(rotated.remedy().contains("rotate the image"), "{rotated}");
+    fn a_map_may_be_turned_about_its_origin() {
+        for (text, yaw_rad) in
+            [("0.]", 0.0), ("-0.0]", 0.0), ("3.14]", 3.14), ("-1.5707963]", -1.570_796_3)]
+        {
+            assert_eq!(
+                with("0.]", text).expect(text).plane.yaw_rad.to_bits(),
+                f64::to_bits(yaw_rad)
+            );
+        }
+        let degrees = error("0.]", "90]");
+        assert_eq!(degrees.position(), Some((3, 19)));
+        assert!(degrees.remedy().contains("not degrees"), "{degrees}");
     }
 
     #[test]

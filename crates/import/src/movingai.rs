@@ -55,7 +55,8 @@ impl ScenRow {
         let error = |cause, remedy| Err(InputError::new(place, cause, remedy).at(self.line, 1));
         if (self.width, self.height) != (map.width(), map.height()) {
             let (w, h) = (map.width(), map.height());
-            let cause = format!("a row for {} x {}, not {w} x {h}", self.width, self.height);
+            let made_for = format!("{} x {}", self.width, self.height);
+            let cause = format!("a row for a map of {made_for} boxes, and the map has {w} x {h}");
             return error(cause, "give the map that the scenario was made for");
         }
         for (name, (col, row)) in [("start", self.start), ("goal", self.goal)] {

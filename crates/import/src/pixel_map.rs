@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use sidestep_kernel::InputError;
+use sidestep_kernel::view::Plane;
 
 use sidestep_map::{Cell, CellCounts, GridMap, UnknownPolicy, check_box_count, check_box_size};
 
@@ -16,14 +17,14 @@ pub struct PixelMap {
     width: u32,
     height: u32,
     resolution_m: f64,
-    origin_m: [f64; 2],
+    plane: Plane,
     /// Row by row from the bottom; length `width * height`.
     pixels: Vec<Cell>,
 }
 
 impl PixelMap {
     /// Creates a map of `width` x `height` pixels with a side of `resolution_m` meters whose
-    /// lower-left corner is at `origin_m`; `pixels` holds them row by row from the bottom.
+    /// lower-left corner is the origin of `plane`; `pixels` holds them row by row from the bottom.
     ///
     /// # Panics
     /// When `pixels` has another length than `width * height`, or `resolution_m` is not a
@@ -32,12 +33,12 @@ impl PixelMap {
         width: u32,
         height: u32,
         resolution_m: f64,
-        origin_m: [f64; 2],
+        plane: Plane,
         pixels: Vec<Cell>,
     ) -> Self {
         assert_eq!(pixels.len(), width as usize * height as usize, "one cell per pixel");
         assert!(resolution_m.is_finite() && resolution_m > 0.0, "a pixel has a positive side");
-        Self { width, height, resolution_m, origin_m, pixels }
+        Self { width, height, resolution_m, plane, pixels }
     }
 
     /// Number of pixels from west to east.
@@ -55,9 +56,9 @@ impl PixelMap {
         self.resolution_m
     }
 
-    /// World position of the lower-left corner, in meters.
-    pub fn origin_m(&self) -> [f64; 2] {
-        self.origin_m
+    /// The place of the lower-left corner in the world, and the turn of the image about it.
+    pub fn plane(&self) -> Plane {
+        self.plane
     }
 
     /// Returns all pixels, row by row from the bottom.
@@ -94,7 +95,7 @@ impl PixelMap {
             let rows = y.pixels_of(row);
             cells.extend(columns.iter().map(|cols| unknown.apply(self.whole(cols, &rows))));
         }
-        Ok(GridMap::new(width, height, box_size_m, cells).with_origin(self.origin_m))
+        Ok(GridMap::new(width, height, box_size_m, cells).with_plane(self.plane))
     }
 
     /// Returns the cell of a box of these pixels.
@@ -177,8 +178,12 @@ mod tests {
     use Cell::{Free, Unknown, Wall};
     use proptest::{num, prelude::*};
 
+    fn at(origin_m: [f64; 2]) -> Plane {
+        Plane { origin_m, yaw_rad: 0.0 }
+    }
+
     fn row(pixels: &[Cell], resolution_m: f64) -> PixelMap {
-        PixelMap::new(pixels.len() as u32, 1, resolution_m, [1.0, 2.0], pixels.to_vec())
+        PixelMap::new(pixels.len() as u32, 1, resolution_m, at([1.0, 2.0]), pixels.to_vec())
     }
 
     /// The lowest row of boxes.
@@ -209,10 +214,11 @@ mod tests {
     }
 
     #[test]
-    fn boxes_keep_the_origin_the_size_and_the_rows_from_the_bottom() {
-        let map = PixelMap::new(1, 2, 0.5, [-3.0, 4.0], vec![Wall, Free]);
+    fn boxes_keep_the_plane_the_size_and_the_rows_from_the_bottom() {
+        let plane = Plane { origin_m: [-3.0, 4.0], yaw_rad: 3.14 };
+        let map = PixelMap::new(1, 2, 0.5, plane, vec![Wall, Free]);
         let boxes = map.to_boxes(0.5, UnknownPolicy::Wall).expect("boxes");
-        assert_eq!((boxes.origin_m, boxes.box_size_m), ([-3.0, 4.0], 0.5));
+        assert_eq!((boxes.plane, boxes.box_size_m), (plane, 0.5));
         assert_eq!(boxes.cells(), [Wall, Free]);
     }
 
@@ -234,7 +240,7 @@ mod tests {
         for wrong in [0.0, -0.5, f64::NAN, f64::INFINITY, 1e-9, f64::MIN_POSITIVE] {
             assert!(map.to_boxes(wrong, UnknownPolicy::Wall).is_err(), "{wrong}");
         }
-        let empty = PixelMap::new(0, 0, 0.5, [0.0; 2], Vec::new());
+        let empty = PixelMap::new(0, 0, 0.5, Plane::default(), Vec::new());
         assert!(empty.to_boxes(0.5, UnknownPolicy::Wall).is_err());
     }
 
@@ -249,7 +255,7 @@ mod tests {
         ) {
             let cell = |i: u32| [Free, Wall, Unknown][(seed.rotate_right(i) % 3) as usize];
             let pixels: Vec<_> = (0..width * height).map(cell).collect();
-            let map = PixelMap::new(width, height, resolution_m, [0.0; 2], pixels);
+            let map = PixelMap::new(width, height, resolution_m, Plane::default(), pixels);
             if let Ok(boxes) = map.to_boxes(box_size_m, UnknownPolicy::Keep) {
                 prop_assert_eq!(map.counts().wall > 0, boxes.count(Wall) > 0);
                 prop_assert!(map.counts().free > 0 || boxes.count(Free) == 0);

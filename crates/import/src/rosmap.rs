@@ -10,6 +10,9 @@
 //! - `raw`: `v` (`255 - v` where `negate` is set) is itself the occupancy in percent, compared
 //!   with both thresholds; above 100 it is unknown.
 //!
+//! The third number of `origin` turns the image about its lower-left corner, counterclockwise. Pixels and
+//! boxes stay along the image; only places in the world are turned.
+//!
 //! Transparency is ignored, unlike in `map_server`, whose trinary mode takes it for one more color.
 //! Unknown keys are ignored, as in `map_server`.
 
@@ -26,8 +29,8 @@ use sidestep_scenario::file::read_text;
 /// image that exists only with `.gz` after its name is found too.
 ///
 /// # Errors
-/// When a file is missing, damaged or absurdly large, a key is missing or has a wrong value, or
-/// the map is rotated (an origin yaw that is not 0).
+/// When a file is missing, damaged or absurdly large, or a key is missing or has a wrong
+/// value.
 pub fn load(path: &Path) -> Result<PixelMap, InputError> {
     let place = path.display().to_string();
     let text = read_text(path, MAX_YAML_BYTES)?;
@@ -39,7 +42,7 @@ pub fn load(path: &Path) -> Result<PixelMap, InputError> {
 fn pixel_map(meta: &Metadata, image: &Bitmap) -> PixelMap {
     let from_top = image.map_brightness(|brightness| meta.reading.cell(brightness));
     let from_bottom = from_top.rchunks(image.width() as usize).flatten().copied().collect();
-    PixelMap::new(image.width(), image.height(), meta.resolution_m, meta.origin_m, from_bottom)
+    PixelMap::new(image.width(), image.height(), meta.resolution_m, meta.plane, from_bottom)
 }
 
 #[cfg(test)]
@@ -111,7 +114,7 @@ mod tests {
         let (_folder, path) = written("a.pgm", IMAGE);
         let map = load(&path).expect("a map");
         assert_eq!((map.width(), map.height(), map.resolution_m()), (1, 2, 0.5));
-        assert_eq!((map.origin_m(), map.pixels()), ([1.0, 2.0], &[Wall, Free][..]));
+        assert_eq!((map.plane().origin_m, map.pixels()), ([1.0, 2.0], &[Wall, Free][..]));
     }
 
     #[test]

@@ -37,7 +37,11 @@ fn every_ros_map_has_the_expected_pixels_boxes_components_and_distances() {
         assert_eq!(map.height() as usize, number(&expected, "height"), "{name}");
         assert_eq!(Some(map.resolution_m()), expected["resolution"].as_f64(), "{name}");
         let origin = expected["origin"].as_array().expect("an origin");
-        assert_eq!(map.origin_m().map(Some), [origin[0].as_f64(), origin[1].as_f64()], "{name}");
+        assert_eq!(
+            map.plane().origin_m.map(Some),
+            [origin[0].as_f64(), origin[1].as_f64()],
+            "{name}"
+        );
         let (counts, cells) = (map.counts(), &expected["cells"]);
         assert_eq!(counts.free, number(cells, "free"), "{name}");
         assert_eq!(counts.wall, number(cells, "occupied"), "{name}");

@@ -1,5 +1,6 @@
 //! Maps written in the format of `map_server`, so that a run can store the maps that it saw.
 
+use sidestep_kernel::view::Plane;
 use sidestep_map::Cell;
 
 /// Name of the image to which [`map_files`] refers.
@@ -9,12 +10,13 @@ const IMAGE: &str = "map.pgm";
 pub fn map_files(
     [width, height]: [u32; 2],
     resolution_m: f64,
-    [x_m, y_m]: [f64; 2],
+    plane: Plane,
     cells: &[Cell],
 ) -> [(&'static str, Vec<u8>); 2] {
+    let Plane { origin_m: [x_m, y_m], yaw_rad } = plane;
     let yaml = format!(
         "# The map as the simulation saw it.\nimage: {IMAGE}\nresolution: {resolution_m:?}\n\
-         origin: [{x_m:?}, {y_m:?}, 0.0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
+         origin: [{x_m:?}, {y_m:?}, {yaw_rad:?}]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
     );
     let gray = |cell: &Cell| match cell {
         Cell::Free => 254,
@@ -45,9 +47,10 @@ mod tests {
     #[test]
     fn the_map_comes_back_as_it_was() {
         let cells = vec![Cell::Free, Cell::Wall, Cell::Unknown, Cell::Free, Cell::Free, Cell::Wall];
-        let map = GridMap::new(3, 2, 0.1 + 0.2, cells).with_origin([-1.5, 1e-7]);
+        let map = GridMap::new(3, 2, 0.1 + 0.2, cells)
+            .with_plane(Plane { origin_m: [-1.5, 1e-7], yaw_rad: 0.1 + 0.2 });
         let folder = tempfile::tempdir().expect("a folder");
-        for (name, bytes) in map_files([3, 2], map.box_size_m, map.origin_m, map.cells()) {
+        for (name, bytes) in map_files([3, 2], map.box_size_m, map.plane, map.cells()) {
             std::fs::write(folder.path().join(name), bytes).expect("written");
         }
         let back = map_file(&folder.path().join("map.yaml"), map.box_size_m, UnknownPolicy::Keep);

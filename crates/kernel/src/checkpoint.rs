@@ -1,7 +1,7 @@
 //! Checkpoints: a state as bytes that continue a run bit for bit, or an error that says why not.
 //!
 //! ```text
-//! magic 8 | header (postcard) | state (postcard) | BLAKE3 of all before, 16 bytes
+//! magic 8 | header (postcard) | conflict groups, state (postcard) | BLAKE3 of all before, 16 bytes
 //! ```
 
 use crate::digest::Digest;
@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 const MAGIC: &[u8; 8] = b"SIDESTEP";
 
 /// Version of the checkpoint layout; checkpoints of any other version are refused.
-pub const FORMAT: u32 = 1;
+pub const FORMAT: u32 = 2;
 
 /// The program, world, scenario and cycle that a checkpoint belongs to.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]

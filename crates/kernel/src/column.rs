@@ -73,6 +73,15 @@ impl<T: Word> Shared<T> {
     }
 }
 
+impl Shared<u32> {
+    /// Raises the value to `value` if it is smaller; several writers of a phase may do so, because
+    /// the outcome is the same in every order.
+    #[inline]
+    pub fn raise(&self, value: u32) {
+        self.0.fetch_max(value, Relaxed);
+    }
+}
+
 impl<T: Word> Default for Shared<T> {
     fn default() -> Self {
         Self::new(T::default())

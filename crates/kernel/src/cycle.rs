@@ -13,6 +13,8 @@
 //! pass of its own, at the price of one more barrier per cycle.
 
 use crate::conflict::Groups;
+use crate::interrupt::{self, Interrupt};
+use crate::plan::GroupSizes;
 use crate::ports::Clock;
 use crate::units::{Cycle, Slot};
 use crate::workers::{Team, Worker};
@@ -39,11 +41,6 @@ impl PhaseTimes {
         self.join_ns += other.join_ns;
         self.act_ns += other.act_ns;
     }
-
-    /// All phases together.
-    pub fn total_ns(&self) -> u64 {
-        self.claim_ns + self.join_ns + self.act_ns
-    }
 }
 
 /// One worker's share of a run: the world's scratch and the kernel's own.
@@ -58,10 +55,8 @@ pub struct Mate<S> {
 /// A worker's group sizes, processor time and buffers.
 #[derive(Debug, Default)]
 pub struct Tally {
-    /// Conflict groups seen by size: index k counts groups of `2^k .. 2^(k+1)` bodies.
-    pub group_sizes: [u64; 32],
-    /// The largest group seen.
-    pub largest_group: u64,
+    /// Conflict groups seen.
+    pub groups: GroupSizes,
     /// Processor time of the worker's thread, in nanoseconds.
     pub cpu_ns: u64,
     members: Vec<Slot>,
@@ -73,13 +68,6 @@ impl<S> Mate<S> {
     /// Creates a worker that has done nothing yet.
     pub fn new(scratch: S) -> Self {
         Self { scratch, tally: Tally::default() }
-    }
-}
-
-impl Tally {
-    fn count_group(&mut self, size: usize) {
-        self.group_sizes[size.ilog2() as usize] += 1;
-        self.largest_group = self.largest_group.max(size as u64);
     }
 }
 
@@ -158,7 +146,7 @@ pub(crate) fn advance<W: Phases, C: Clock>(
     groups: &Groups,
     (crew, team): (&Crew<W::Scratch>, Option<&mut Team>),
     stretch: Stretch,
-    clock: &C,
+    (clock, interrupt): (&C, &Interrupt),
     mut observer: Option<&mut dyn Observer<W>>,
 ) -> Ran {
     let started_ns = clock.now_ns();
@@ -167,7 +155,8 @@ pub(crate) fn advance<W: Phases, C: Clock>(
     }
     let is_observed = observer.is_some();
     let stop = AtomicBool::new(false);
-    let shared = Shared { world, state, groups, crew, clock, stretch, is_observed, stop };
+    let shared =
+        Shared { world, state, groups, crew, clock, interrupt, stretch, is_observed, stop };
     let mark_ns = clock.now_ns();
     let mut lead = Lead { clock, observer, started_ns, mark_ns, ran: Ran::default() };
     match team {
@@ -188,6 +177,7 @@ struct Shared<'a, W: Phases> {
     groups: &'a Groups,
     crew: &'a Crew<W::Scratch>,
     clock: &'a dyn Clock,
+    interrupt: &'a Interrupt,
     stretch: Stretch,
     is_observed: bool,
     /// Whether the present cycle is the last one. Worker 0 writes it before a barrier, and all
@@ -228,6 +218,7 @@ impl<W: Phases> Shared<'_, W> {
     /// One worker's part of the stretch.
     fn work<C: Clock>(&self, worker: &Worker<'_>, lead: Option<&mut Lead<'_, '_, W, C>>) {
         let began_ns = self.clock.thread_cpu_ns();
+        let _heeded = self.interrupt.heeded_here();
         self.all_cycles(worker, lead);
         let took_ns = self.clock.thread_cpu_ns() - began_ns;
         lock(&self.crew[worker.index()]).tally.cpu_ns += took_ns;
@@ -296,6 +287,7 @@ impl<W: Phases> Shared<'_, W> {
         let turn = &mut Turn { world, state, now, clock, scratch };
         let n = world.bodies(state);
         worker.for_each_chunk(3 * round, n, |bodies| {
+            interrupt::look();
             bodies.clone().for_each(|body| groups.reset(body as Slot));
             W::claim(turn, bodies);
         });
@@ -303,13 +295,17 @@ impl<W: Phases> Shared<'_, W> {
         if let Some(lead) = &mut lead {
             lead.end_phase(|times| &mut times.claim_ns);
         }
-        worker.for_each_chunk(3 * round + 1, n, |bodies| W::join(turn, bodies, groups));
+        worker.for_each_chunk(3 * round + 1, n, |bodies| {
+            interrupt::look();
+            W::join(turn, bodies, groups);
+        });
         worker.barrier();
         if let Some(lead) = &mut lead {
             lead.end_phase(|times| &mut times.join_ns);
         }
         let auction = world.auction();
         worker.for_each_chunk(3 * round + 2, n, |bodies| {
+            interrupt::look();
             bodies.for_each(|body| {
                 act_as_leader(turn, groups, tally, auction.is_some(), body as Slot);
             });
@@ -337,12 +333,12 @@ fn act_as_leader<W: Phases>(
     }
     // A body without a conflict needs neither a list of members nor an auction.
     if groups.is_alone(body) {
-        own.group_sizes[0] += 1;
+        own.groups.counts[0] += 1;
         return W::act(turn, &mut [body]);
     }
     let mut members = std::mem::take(&mut own.members);
     groups.members(body, &mut members);
-    own.count_group(members.len());
+    own.groups.add(members.len());
     if by_auction {
         own.pending.extend_from_slice(&members);
     } else {
@@ -360,6 +356,7 @@ fn hold_auction<W: Phases>(
     worker: &Worker<'_>,
 ) {
     while worker.any(!pending.is_empty()) {
+        interrupt::look();
         for &body in &*pending {
             auction.bid(turn, body);
         }

@@ -5,6 +5,7 @@
 
 use crate::conflict::Groups;
 use crate::cycle::{Mate, Observer, PhaseTimes, Ran, Stretch, advance, lock};
+use crate::interrupt::Interrupt;
 use crate::ports::Clock;
 use crate::units::Cycle;
 use crate::workers::Team;
@@ -26,6 +27,7 @@ pub struct Engine<W: Phases> {
     team: Option<Team>,
     pace: Pace,
     times: PhaseTimes,
+    interrupt: Interrupt,
 }
 
 impl<W: Phases> Engine<W> {
@@ -39,7 +41,13 @@ impl<W: Phases> Engine<W> {
             team: None,
             pace: Pace::default(),
             times: PhaseTimes::default(),
+            interrupt: Interrupt::default(),
         }
+    }
+
+    /// Leaves a cycle half done when `interrupt` is raised.
+    pub fn heed(&mut self, interrupt: Interrupt) {
+        self.interrupt = interrupt;
     }
 
     /// Uses all workers from now on, even where one would be faster; for tests and benchmarks.
@@ -134,7 +142,8 @@ impl<W: Phases> Engine<W> {
     ) -> Ran {
         let crew = &self.crew[..workers];
         let team = (workers > 1).then(|| self.team.get_or_insert_with(|| Team::new(workers)));
-        advance(world, state, &self.groups, (crew, team), stretch, clock, observer)
+        let signs = (clock, &self.interrupt);
+        advance(world, state, &self.groups, (crew, team), stretch, signs, observer)
     }
 }
 

@@ -14,6 +14,7 @@
 //! - [`stream`]: a draw is a function of (seed, entity, cycle, purpose, index) alone.
 //! - [`workers`], [`cycle`]: the same bits for every number of workers.
 //! - [`digest`], [`checkpoint`]: a state has one digest, and continues bit for bit.
+//! - [`interrupt`]: a cycle that takes long can be left half done.
 //! - [`view`]: the scenery and the frames of any world; looking at them changes nothing.
 //! - [`math`], [`distr`], [`geometry`]: numbers that are the same on every platform.
 //! - [`ports`]: recorder, transport and clock, each with an in-memory version.
@@ -27,6 +28,7 @@ pub mod distr;
 pub mod engine;
 pub mod error;
 pub mod geometry;
+pub mod interrupt;
 pub mod math;
 pub mod plan;
 pub mod ports;
@@ -43,7 +45,8 @@ pub mod world;
 pub use column::Column;
 pub use digest::Digest;
 pub use error::InputError;
-pub use plan::{Effort, Plan};
+pub use interrupt::Interrupt;
+pub use plan::{Effort, GroupSizes, Plan};
 pub use run::Run;
 pub use simulation::Simulation;
 pub use units::{Cycle, EntityId, Seed, Slot};

@@ -1,6 +1,7 @@
 //! The plan of a run, and the effort that it took.
 
 use crate::units::Cycle;
+use serde::{Deserialize, Serialize};
 
 /// The settings of a run that every scenario has, whatever its world.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -23,13 +24,34 @@ impl Plan {
     }
 }
 
-/// Conflict groups and processor time of a run in this process, beside its results.
+/// The conflict groups of a run since its start, and its processor time in this process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Effort {
-    /// Conflict groups by size: index k counts groups of `2^k .. 2^(k+1)` bodies.
-    pub group_sizes: [u64; 32],
-    /// The largest conflict group.
-    pub largest_group: u64,
+    /// The conflict groups.
+    pub groups: GroupSizes,
     /// Processor time of all workers, in nanoseconds.
     pub cpu_ns: u64,
+}
+
+/// Conflict groups by size: a sum over cycles, which checkpoints keep.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct GroupSizes {
+    /// Number of groups by size: index k counts groups of `2^k .. 2^(k+1)` bodies.
+    pub counts: [u64; 32],
+    /// Number of bodies of the largest group in which bodies met; 0 where none ever did.
+    pub largest: u64,
+}
+
+impl GroupSizes {
+    /// Counts a group of several bodies.
+    pub(crate) fn add(&mut self, size: usize) {
+        self.counts[size.ilog2() as usize] += 1;
+        self.largest = self.largest.max(size as u64);
+    }
+
+    /// Adds the groups of other cycles, or of another worker.
+    pub(crate) fn merge(&mut self, other: &Self) {
+        self.counts.iter_mut().zip(other.counts).for_each(|(sum, n)| *sum += n);
+        self.largest = self.largest.max(other.largest);
+    }
 }

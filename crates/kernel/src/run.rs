@@ -4,7 +4,8 @@ use crate::checkpoint::{self, CheckpointError, Header};
 use crate::cycle::{Observer, PhaseTimes, Scratches};
 use crate::digest::Digest;
 use crate::engine::Engine;
-use crate::plan::{Effort, Plan};
+use crate::interrupt::Interrupt;
+use crate::plan::{Effort, GroupSizes, Plan};
 use crate::ports::{RecordError, Recorder, SystemClock, TableSchema};
 use crate::simulation::Simulation;
 use crate::units::Cycle;
@@ -25,6 +26,8 @@ pub struct Run<W: World> {
     state: W::State,
     books: W::Books,
     engine: Engine<W>,
+    /// Conflict groups up to the checkpoint from which the run was resumed.
+    groups_before: GroupSizes,
     cycle: Cycle,
     clock: SystemClock,
 }
@@ -42,7 +45,8 @@ impl<W: World> Run<W> {
         let engine = Engine::new(&*world, world.bodies(&state), workers);
         let scenario = *Digest::of(scenario.as_bytes()).as_bytes();
         let clock = SystemClock::default();
-        Self { world, plan, scenario, state, books, engine, cycle: 0, clock }
+        let groups_before = GroupSizes::default();
+        Self { world, plan, scenario, state, books, engine, groups_before, cycle: 0, clock }
     }
 
     /// Uses all workers even where one would be faster; for tests and benchmarks.
@@ -80,14 +84,12 @@ impl<W: World> Run<W> {
         self.engine.heap_bytes()
     }
 
-    /// Returns the group sizes and the processor time of all workers.
+    /// Returns the conflict groups since the start of the run, and the processor time of all workers.
     pub fn effort(&self) -> Effort {
-        let mut effort = Effort::default();
+        let mut effort = Effort { groups: self.groups_before, cpu_ns: 0 };
         for mate in self.engine.crew() {
-            let tally = &mate.tally;
-            effort.group_sizes.iter_mut().zip(tally.group_sizes).for_each(|(sum, n)| *sum += n);
-            effort.largest_group = effort.largest_group.max(tally.largest_group);
-            effort.cpu_ns += tally.cpu_ns;
+            effort.groups.merge(&mate.tally.groups);
+            effort.cpu_ns += mate.tally.cpu_ns;
         }
         effort
     }
@@ -196,17 +198,23 @@ impl<W: World> Simulation for Run<W> {
         done
     }
 
+    fn heed(&mut self, interrupt: Interrupt) {
+        self.engine.heed(interrupt);
+    }
+
     fn digest(&self) -> Digest {
         self.world.digest(&self.state, self.cycle)
     }
 
     fn checkpoint(&self) -> Vec<u8> {
-        checkpoint::encode(&self.header(), &self.saved())
+        checkpoint::encode(&self.header(), &(self.effort().groups, self.saved()))
     }
 
     fn restore(&mut self, checkpoint: &[u8]) -> Result<(), CheckpointError> {
-        let (cycle, saved) = checkpoint::decode(checkpoint, &self.header())?;
+        let (cycle, (groups, saved)) = checkpoint::decode(checkpoint, &self.header())?;
         self.state = self.world.restore(saved, &mut self.books)?;
+        self.groups_before = groups;
+        self.engine.crew_mut().for_each(|mate| mate.tally.groups = GroupSizes::default());
         self.cycle = cycle;
         Ok(())
     }

@@ -3,15 +3,18 @@
 use crate::checkpoint::CheckpointError;
 use crate::cycle::PhaseTimes;
 use crate::digest::Digest;
+use crate::interrupt::Interrupt;
 use crate::plan::Plan;
 use crate::ports::{RecordError, Recorder, TableSchema};
 use crate::units::Cycle;
 use crate::view::{Frame, Look, PlaceRows, Scenery};
 use crate::words::{Lines, Said};
 use crate::world::Decides;
+use std::any::Any;
 
-/// A world and a state that advances. [`crate::Run`] is the one implementation.
-pub trait Simulation: Send {
+/// A world and a state that advances. [`crate::Run`] is the one implementation; code that knows the world finds its
+/// [`crate::Run`] by [`Any`].
+pub trait Simulation: Any + Send {
     /// Name of the world, e.g. `robots`.
     fn world(&self) -> &'static str;
 
@@ -37,6 +40,10 @@ pub trait Simulation: Send {
     /// Runs up to `cycles` cycles and returns how many were done: fewer when a buffer for recording
     /// is full or the run is over, and 0 only if `cycles` is 0.
     fn advance(&mut self, cycles: u64) -> u64;
+
+    /// Lets [`Simulation::advance`] unwind when `interrupt` is raised; the run is then of no more
+    /// use but for what was recorded of it.
+    fn heed(&mut self, interrupt: Interrupt);
 
     /// Returns the digest of the present state: equal for equal scenario, seed and cycle.
     fn digest(&self) -> Digest;

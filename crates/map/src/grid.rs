@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::InputError;
-use sidestep_kernel::view::{Floor, Occupancy};
+use sidestep_kernel::view::{Floor, Occupancy, Plane};
 
 /// The maximum number of boxes of a map. A larger number is taken for a mistake (a resolution in
 /// millimeters, a size in the wrong unit) and refused before memory is allocated.
@@ -93,15 +93,16 @@ impl Rect {
     }
 }
 
-/// A rectangle of boxes. `x` runs east, `y` north; box (0, 0) is the lower-left corner.
+/// A rectangle of boxes; box (0, 0) is the lower-left corner. `x` runs east and `y` north, except on
+/// a map whose plane is turned: there they are the axes of its image.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GridMap {
     width: u32,
     height: u32,
     /// Side of a box in meters.
     pub box_size_m: f64,
-    /// World position of the lower-left corner of box (0, 0), in meters.
-    pub origin_m: [f64; 2],
+    /// The place of the lower-left corner of box (0, 0) in the world, and the turn about it.
+    pub plane: Plane,
     /// Row by row from the bottom; length `width * height`.
     cells: Vec<Cell>,
 }
@@ -114,7 +115,7 @@ impl GridMap {
     /// When `cells` has another length than `width * height`.
     pub fn new(width: u32, height: u32, box_size_m: f64, cells: Vec<Cell>) -> Self {
         assert_eq!(cells.len(), width as usize * height as usize, "one cell per box");
-        Self { width, height, box_size_m, origin_m: [0.0, 0.0], cells }
+        Self { width, height, box_size_m, plane: Plane::default(), cells }
     }
 
     /// Returns the map as the floor of a scenery.
@@ -128,15 +129,15 @@ impl GridMap {
             width: self.width,
             height: self.height,
             box_m: self.box_size_m,
-            origin_m: self.origin_m,
+            plane: self.plane,
             boxes: self.cells.iter().map(occupancy).collect(),
         }
     }
 
-    /// Returns the same map with its lower-left corner at `origin_m` (meters, world frame).
+    /// Returns the same map, laid into the world.
     #[must_use]
-    pub fn with_origin(mut self, origin_m: [f64; 2]) -> Self {
-        self.origin_m = origin_m;
+    pub fn with_plane(mut self, plane: Plane) -> Self {
+        self.plane = plane;
         self
     }
 
@@ -203,7 +204,7 @@ pub fn check_box_count(
         _ => Err(InputError::new(
             place,
             format!("a map of {width} x {height} boxes is more than the {MAX_BOXES} allowed"),
-            "use larger boxes or a smaller map, and check the units (metres)",
+            "use larger boxes or a smaller map, and check the units (meters)",
         )),
     }
 }
@@ -217,7 +218,7 @@ pub fn check_box_size(box_size_m: f64) -> Result<f64, InputError> {
         return Ok(box_size_m);
     }
     let cause = format!("a box with a side of {box_size_m} m");
-    Err(InputError::new("box_size_m", cause, "give a positive number of metres, such as 0.25"))
+    Err(InputError::new("box_size_m", cause, "give a positive number of meters, such as 0.25"))
 }
 
 #[cfg(test)]

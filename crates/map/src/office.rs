@@ -253,7 +253,7 @@ fn boxes(key: &str, length_m: f64, box_size_m: f64) -> Result<u32, InputError> {
         return Ok(boxes as u32);
     }
     let cause = format!("{length_m} m are not from 1 to {MAX_BOXES} boxes of {box_size_m} m");
-    Err(wrong(key, cause, "give a length in metres that is at least one box"))
+    Err(wrong(key, cause, "give a length in meters that is at least one box"))
 }
 
 fn at_least_one(key: &str, number: u32) -> Result<u32, InputError> {

@@ -12,9 +12,9 @@
 
 use crate::cells::{Cell, Columns, Run, Runs, Value, column, figure, series};
 use crate::claims::{Comparison, File, Words, both, judged, listed};
-use crate::study::{Progress, Study, finish, number, setting, source};
+use crate::study::{Progress, Study, finish, known, number, setting, source};
 use serde::Serialize;
-use sidestep::kernel::InputError;
+use sidestep::kernel::{InputError, Simulation};
 use sidestep::statistics::least_squares::Fit;
 use sidestep::worlds::airspace::flight::Point as AirPoint;
 use sidestep::worlds::airspace::{AirspaceRun, airspace_run};
@@ -182,8 +182,8 @@ fn tracks_m(plan: &Plan, n: usize) -> Result<Vec<Vec<AirPoint>>, InputError> {
     ];
     let mut run = airspace_run(&source(SCENARIO, &settings)?, 1)?;
     let mut tracks = vec![Vec::new(); n];
-    let mut note = |run: &AirspaceRun| {
-        for (track, cell) in tracks.iter_mut().zip(&run.state().airplanes) {
+    let mut note = |run: &dyn Simulation| {
+        for (track, cell) in tracks.iter_mut().zip(&known::<AirspaceRun>(run).state().airplanes) {
             let at = cell.pose().at;
             if track.last() != Some(&at) {
                 track.push(at);

@@ -12,6 +12,7 @@ use sidestep::experiment::sweep::{
 use sidestep::kernel::{Cycle, InputError, Simulation};
 use sidestep::scenario::Source;
 use sidestep::worlds::WORLDS;
+use std::any::Any;
 
 /// A callback for progress: the current activity, and the share done, from 0 to 1.
 pub type Progress<'a> = dyn FnMut(&str, f64) + 'a;
@@ -196,12 +197,21 @@ pub(crate) fn outcome(cell: &Cell, values: Value) -> Outcome {
 }
 
 /// Runs a simulation to its end, and calls `look` after every cycle.
-pub(crate) fn finish<S: Simulation>(run: &mut S, mut look: impl FnMut(&S)) {
+pub(crate) fn finish(run: &mut dyn Simulation, mut look: impl FnMut(&dyn Simulation)) {
     let until = run.plan().cycles;
     while run.cycle() < until && !run.is_over() {
         run.advance(1);
         look(run);
     }
+}
+
+/// Returns a run as that of a world which is known, for what only that world's state says.
+///
+/// # Panics
+/// When it is a run of another world.
+pub(crate) fn known<R: Simulation>(run: &dyn Simulation) -> &R {
+    let run: &dyn Any = run;
+    run.downcast_ref().expect("a run of the world that the scenario names")
 }
 
 /// The table of runs, and the variants that its rows belong to.

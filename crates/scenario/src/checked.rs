@@ -128,8 +128,6 @@ fn short(bound: i64) -> String {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Number<R>(f64, PhantomData<R>);
 
-/// A finite number.
-pub type Finite = Number<Any>;
 /// A number above 0.
 pub type Positive = Number<AboveZero>;
 /// A number of at least 0.

@@ -3,8 +3,12 @@
 use super::checked::told_by_a_value;
 
 /// Returns cause and remedy of an error of the TOML reader; `also` are known keys that it did not
-/// see.
-pub(crate) fn explain(error: &toml::de::Error, also: &[&str]) -> (String, String) {
+/// see, and `otherwise` is the remedy of errors for which there is no better one.
+pub(crate) fn explain(
+    error: &toml::de::Error,
+    also: &[&str],
+    otherwise: String,
+) -> (String, String) {
     let message = error.message().trim();
     let path = path_of(error);
     if let Some((value, remedy)) = told_by_a_value(message) {
@@ -25,8 +29,7 @@ pub(crate) fn explain(error: &toml::de::Error, also: &[&str]) -> (String, String
     if let Some((missing, _)) = named(message, "missing field `") {
         return (format!("the key `{missing}` is missing"), format!("add `{missing} = ...`"));
     }
-    let remedy = "see what `sidestep new robots` (or airspace, chain) writes";
-    (message.replace('\n', " "), remedy.into())
+    (message.replace('\n', " "), otherwise)
 }
 
 /// Returns the name in backticks after a prefix, and the rest of the message.

@@ -1,6 +1,6 @@
 //! The interface of a world for programs that run scenarios and know no world.
 
-use crate::{Resolved, Source, nearest};
+use crate::{Remark, Resolved, Source, nearest};
 use sidestep_kernel::words::{Lines, Said};
 use sidestep_kernel::{InputError, Plan, Simulation};
 use std::any::Any;
@@ -49,6 +49,11 @@ pub trait Compiled: Send + Sync {
 
     /// Returns the contents of the scenario, for people who check it.
     fn contents(&self, source: &Source) -> Said;
+
+    /// Returns what will surprise the scenario's author, the weightiest first.
+    fn remarks(&self) -> Vec<Remark> {
+        Vec::new()
+    }
 
     /// Returns the scenario as it is stored in a run folder: complete, with all its files.
     ///

@@ -11,17 +11,21 @@ mod bundle;
 mod checked;
 mod explain;
 pub mod file;
+mod keys;
 pub mod kind;
 mod overrides;
+mod remark;
 mod sections;
 mod source;
 
 pub use bundle::{Bundle, Resolved};
 pub use checked::{
-    AboveBelow, AboveTo, AboveZero, Any, Between, Finite, FromBelow, FromTo, FromZero, Limits,
-    NonNegative, Number, Point, Positive, Rule, Share, Whole, refused,
+    AboveBelow, AboveTo, AboveZero, Any, Between, FromBelow, FromTo, FromZero, Limits, NonNegative,
+    Number, Point, Positive, Rule, Share, Whole, refused,
 };
 pub use explain::nearest;
+pub use keys::Key;
 pub use kind::{Compiled, Foreign, Kind, Worlds};
+pub use remark::{Remark, Severity};
 pub use sections::Sections;
 pub use source::{FORMAT, Head, Preamble, Source};

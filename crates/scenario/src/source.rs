@@ -132,11 +132,22 @@ impl Source {
     }
 
     fn explained(&self, error: &toml::de::Error, also: &[&str]) -> InputError {
-        let (cause, remedy) = explain(error, also);
+        let (cause, remedy) = explain(error, also, self.example());
         let told = InputError::new(&self.place, cause, remedy);
         match error.span() {
             Some(span) => told.in_text(&self.text, span.start),
             None => told,
+        }
+    }
+
+    /// Returns the remedy that points to an example of the scenario's own world.
+    fn example(&self) -> String {
+        let table = self.text.parse::<toml::Table>();
+        let world = table.as_ref().ok().and_then(|table| table.get("world")?.as_str());
+        match (&table, world) {
+            (Err(_), _) => "write valid TOML".into(),
+            (_, Some(world)) => format!("see what `sidestep new {world}` writes"),
+            (_, None) => "give a value of the right type".into(),
         }
     }
 
@@ -224,8 +235,9 @@ mod tests {
         for (line, at, remedy) in [
             ("cylces = 3", (3, 1), "did you mean `cycles`?"),
             ("m = 3", (3, 1), "did you mean `n`?"),
-            ("n = -1", (3, 5), "see what"),
-            ("seed = \"five\"", (3, 8), "see what"),
+            ("n = -1", (3, 5), "see what `sidestep new w` writes"),
+            ("seed = \"five\"", (3, 8), "see what `sidestep new w` writes"),
+            ("n = = 3", (3, 5), "write valid TOML"),
         ] {
             let error = read(&format!("format = 1\nworld = \"w\"\n{line}\n")).expect_err(line);
             assert_eq!(error.position(), Some(at), "{error}");

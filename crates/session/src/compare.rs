@@ -48,7 +48,7 @@ pub(crate) fn compare(
     different.sort_unstable();
     different.dedup();
     match different.first() {
-        None => Ok(recorded.iter().map(|(_, table)| table.rows()).sum()),
+        None => Ok(recorded.iter().map(|(rows, table)| bodies(rows, table)).sum()),
         Some(first) => Err(differs(cycle, different.len(), first)),
     }
 }
@@ -76,7 +76,12 @@ fn differences<'a>(
     recorded.iter().filter_map(differs).collect()
 }
 
-/// Returns the bits of all columns by body.
+/// Returns the number of bodies that have rows.
+fn bodies(rows: &PlaceRows, table: &Table) -> usize {
+    by_body(rows, &[], |name| table.column(name)).len()
+}
+
+/// Returns the bits of all columns by body, of all its rows.
 fn by_body<'a>(
     rows: &PlaceRows,
     names: &[&str],
@@ -84,8 +89,9 @@ fn by_body<'a>(
 ) -> BTreeMap<Who, Vec<u64>> {
     let word = |name: &str, row| column(name).map(|values| bits(values, row) as u32);
     let columns: Vec<Option<&Values>> = names.iter().map(|name| column(name)).collect();
-    let count = columns.iter().flatten().map(|values| values.len()).max().unwrap_or(0);
-    let body = |row: usize| {
+    let count = column(rows.number).map_or(0, Values::len);
+    let mut all: BTreeMap<Who, Vec<u64>> = BTreeMap::new();
+    for row in 0..count {
         let number = word(rows.number, row).unwrap_or(u32::MAX);
         let of = (rows.kind, number, rows.part.and_then(|part| word(part, row)));
         // A missing value has bits that no present value has.
@@ -93,9 +99,9 @@ fn by_body<'a>(
             Some(values) if !values.is_missing(row) => [1, bits(values, row)],
             _ => [0, 0],
         });
-        (of, cells.collect())
-    };
-    (0..count).map(body).collect()
+        all.entry(of).or_default().extend(cells);
+    }
+    all
 }
 
 /// Returns the bits of a value; tables of poses have no text.
@@ -124,6 +130,7 @@ mod tests {
             number: "chain",
             part: Some("connector"),
             axes: vec![Axis::meters("x_m")],
+            plane: None,
             is_corner: false,
             ahead: None,
             every: 1,

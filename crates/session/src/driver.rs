@@ -7,6 +7,7 @@ use crate::watcher::{Progress, Watched, Watcher};
 use cpu_time::ProcessTime;
 use sidestep::kernel::Cycle;
 use sidestep::kernel::Simulation;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::time::{Duration, Instant};
 
 /// Duration of a slice, and so the longest wait for a stop.
@@ -36,8 +37,37 @@ pub struct Sinks<'a> {
 /// whether it reached the end. A film starts with the present state of the run.
 ///
 /// # Errors
-/// When rows, checkpoints or frames cannot be stored.
+/// When rows, checkpoints or frames cannot be stored; [`Error::WithinACycle`] when the watcher's
+/// interrupt was raised.
 pub fn drive(
+    run: &mut dyn Simulation,
+    until: Cycle,
+    sinks: Sinks<'_>,
+    watcher: &dyn Watcher,
+) -> Result<Effort, Error> {
+    heeding(run, watcher, |run| slices(run, until, sinks, watcher))
+}
+
+/// Lets a run work in a way in which the watcher can interrupt it within a cycle.
+///
+/// # Errors
+/// Those of `work`; [`Error::WithinACycle`] when the watcher's interrupt was raised, and then the run
+/// is of no more use.
+pub(crate) fn heeding<T>(
+    run: &mut dyn Simulation,
+    watcher: &dyn Watcher,
+    work: impl FnOnce(&mut dyn Simulation) -> Result<T, Error>,
+) -> Result<T, Error> {
+    let interrupt = watcher.interrupt();
+    run.heed(interrupt.clone());
+    let worked = catch_unwind(AssertUnwindSafe(|| work(&mut *run)));
+    worked.unwrap_or_else(|payload| match interrupt.explains(payload.as_ref()) {
+        true => Err(Error::WithinACycle(run.cycle())),
+        false => resume_unwind(payload),
+    })
+}
+
+fn slices(
     run: &mut dyn Simulation,
     until: Cycle,
     mut sinks: Sinks<'_>,

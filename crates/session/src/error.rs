@@ -1,7 +1,7 @@
 //! The error type of sessions.
 
-use sidestep::kernel::InputError;
 use sidestep::kernel::ports::RecordError;
+use sidestep::kernel::{Cycle, InputError};
 use sidestep_draw::DrawError;
 use std::path::Path;
 
@@ -20,6 +20,12 @@ pub enum Error {
     /// The watcher asked to stop before there was anything to keep.
     #[error("interrupted; nothing was written")]
     Interrupted,
+    /// The watcher interrupted a run within a cycle that took too long to wait for. The number of
+    /// cycles done; a folder continues from its last checkpoint.
+    #[error(
+        "interrupted within cycle {0}, which is lost; a run folder continues from its last checkpoint"
+    )]
+    WithinACycle(Cycle),
     /// Anything else that stopped the work, with its remedy.
     #[error("{cause}\n  help: {remedy}")]
     Stopped {

@@ -1,7 +1,7 @@
 //! Watchers: they observe the progress of work, and may ask it to stop.
 
 use crate::Error;
-use sidestep::kernel::Cycle;
+use sidestep::kernel::{Cycle, Interrupt};
 
 /// The progress of work.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,6 +48,12 @@ pub trait Watcher: Sync {
     fn go_on(&self) -> bool {
         true
     }
+
+    /// Returns the interrupt at which a run looks within its cycles. A watcher raises it when the
+    /// run has not come to its next slice some time after it was asked to stop.
+    fn interrupt(&self) -> Interrupt {
+        Interrupt::default()
+    }
 }
 
 /// A watcher that does nothing: work runs to its end.
@@ -66,6 +72,10 @@ impl Watcher for Within<'_> {
 
     fn go_on(&self) -> bool {
         self.0.go_on()
+    }
+
+    fn interrupt(&self) -> Interrupt {
+        self.0.interrupt()
     }
 }
 

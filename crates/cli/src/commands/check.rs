@@ -5,7 +5,8 @@ use crate::exit::{ExitCode, Failure};
 use crate::plan::ScenarioArgs;
 use clap::Args;
 use serde_json::Value;
-use sidestep::scenario::Foreign;
+use sidestep::kernel::words::Said;
+use sidestep::scenario::{Compiled, Foreign, Remark, Source};
 use sidestep::worlds::WORLDS;
 
 const EXAMPLES: &str = "\
@@ -13,6 +14,11 @@ Examples:
   sidestep check office.toml
   sidestep check office.toml --set robots.0.size=3
   sidestep check office.toml --json | jq .bodies";
+
+/// Memory that recording takes beside the run, by measurement: writers of tables, and the picture.
+const RECORDING_BYTES: u64 = 35_000_000;
+/// The same for each body: rows that wait, its track, and its part of the picture.
+const RECORDING_BYTES_PER_BODY: u64 = 3000;
 
 /// Validate a scenario and describe it, without running it.
 #[derive(Debug, Args)]
@@ -29,13 +35,11 @@ pub(crate) struct CheckArgs {
 pub(crate) fn check(args: &CheckArgs, console: Console) -> Result<ExitCode, Failure> {
     let foreign = WORLDS.translate(&args.scenario.file)?;
     if let Some(Foreign { scenario: Err(error), json, lines }) = foreign {
-        // A file of another program may be readable and correct and still hold no agent that can be
-        // placed. Any other error is one, as in every scenario.
+        // The report says what was found in the file, and the error why it cannot be run.
         let mut json = json;
-        json["airplanes"] = 0.into();
         json["no_scenario"] = error.to_string().into();
-        console.result(&json, || format!("{error}\n{}", aligned(&lines)));
-        return Ok(ExitCode::Done);
+        console.result(&json, || aligned(&lines));
+        return Err(error.into());
     }
     let (source, compiled) = args.scenario.compile()?;
     let mut found = compiled.contents(&source);
@@ -45,7 +49,38 @@ pub(crate) fn check(args: &CheckArgs, console: Console) -> Result<ExitCode, Fail
         }
         found.text.push_str(&aligned(&foreign.lines));
     }
+    measure_memory(&source, compiled.as_ref(), &mut found);
+    let remarks = compiled.remarks();
+    found.json["remarks"] = serde_json::to_value(&remarks).expect("remarks are plain data");
     let heading = format!("{} is a valid scenario\n", args.scenario.file.display());
-    console.result(&found.json, || heading + &found.text);
+    console.result(&found.json, || heading + &found.text + &in_words(&remarks));
     Ok(ExitCode::Done)
+}
+
+/// Adds the memory that a run takes: that of this process, because a run begins in the same way.
+fn measure_memory(source: &Source, compiled: &dyn Compiled, found: &mut Said) {
+    // Kept until the memory is measured.
+    let _run = compiled.start(source, 1);
+    let Some(bytes) = peak_bytes() else { return };
+    let recorded = bytes + RECORDING_BYTES + RECORDING_BYTES_PER_BODY * compiled.bodies() as u64;
+    found.json["memory_bytes"] = bytes.into();
+    found.json["recorded_memory_bytes"] = recorded.into();
+    let mb = |bytes: u64| bytes.div_ceil(1_000_000);
+    let words = format!("  A run takes about {} MB of memory", mb(bytes));
+    found.text.push_str(&format!("{words}, recorded up to {} MB\n", mb(recorded)));
+}
+
+/// Returns the most memory that this process has taken so far; `None` where the system does not
+/// tell.
+fn peak_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    let kib: u64 = peak.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some(kib * 1024)
+}
+
+/// Returns remarks as text: severity and key on a line, and what is to be said below.
+fn in_words(remarks: &[Remark]) -> String {
+    let one = |r: &Remark| format!("{}: {}\n  {}\n", r.severity.name(), r.key, r.words);
+    remarks.iter().map(one).collect()
 }

@@ -5,6 +5,7 @@ use crate::exit::{ExitCode, Failure};
 use crate::plan::{ScenarioArgs, of_world};
 use clap::Args;
 use sidestep::kernel::InputError;
+use sidestep::scenario::Source;
 use sidestep::worlds::robots::exact::{
     Beam, Comparison, Model, POLICIES, PomdpOptions, PomdpSize, Summary, compare, policy,
 };
@@ -105,7 +106,9 @@ impl ExportArgs {
 pub(crate) fn exact(args: &ExactArgs, console: Console) -> Result<ExitCode, Failure> {
     let (source, compiled) = args.scenario.compile()?;
     let compiled: &Compiled = of_world(compiled.as_ref(), &source, "robots")?;
-    let model = Model::new(compiled)?;
+    // A scenario without a name is named by its file.
+    let in_file = |e: InputError| InputError::new(&source.place, e.cause(), e.remedy());
+    let model = Model::new(compiled).map_err(in_file)?;
     let chosen = policy(&args.policy)?;
     let mut summary = model.summary(&args.policy, &chosen, args.top)?;
     if let Some(runs) = args.runs {
@@ -113,11 +116,15 @@ pub(crate) fn exact(args: &ExactArgs, console: Console) -> Result<ExitCode, Fail
         summary.comparison = Some(compare(compiled, &source, &chosen, cycles, runs)?);
     }
     summary.pomdp = export(&model, &args.export)?;
-    console.result(&summary, || text(&summary, &compiled.name));
+    console.result(&summary, || text(&summary, named(compiled, &source)));
     Ok(match summary.comparison {
         Some(Comparison { agrees: false, .. }) => ExitCode::Failed,
         _ => ExitCode::Done,
     })
+}
+
+fn named<'a>(compiled: &'a Compiled, source: &'a Source) -> &'a str {
+    if compiled.name.is_empty() { &source.place } else { &compiled.name }
 }
 
 fn export(model: &Model, args: &ExportArgs) -> Result<Option<PomdpSize>, Failure> {

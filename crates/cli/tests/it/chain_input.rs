@@ -105,6 +105,8 @@ const TABLE: &[(&str, &str, &str, &str)] = &[
     ("unknown key of an obstacle", "radius_m = 0.5", "radus_m = 0.5", "did you mean `radius_m`?"),
     ("unknown kind", "kind = \"targets\"", "kind = \"target\"", "did you mean `targets`?"),
     ("foreign key", "speed_m_s = 0.5", "turn_deg = 5.0", "does nothing"),
+    ("escape that is off", "dt_s = 0.1", "dt_s = 0.1\nescape = \"off\"\nescape_speed_m_s = 1.0", "does nothing with escape = \"off\""),
+    ("look-ahead of a touch", "dt_s = 0.1", "dt_s = 0.1\nescape = \"touch\"\nescape_ahead_s = 1.0", "does nothing with escape = \"touch\""),
     ("no task", "[[chains.tasks]]\nkind = \"targets\"\ntargets_m = [[1.0, 0.0]]\nspeed_m_s = 0.5\n", "", "without a task"),
     ("dimensions", "dt_s = 0.1", "dimensions = 4", "dimensions = 4"),
     ("three dimensions", "dt_s = 0.1", "dimensions = 3", "chain.dimensions is 3"),

@@ -1,6 +1,6 @@
 //! The fixed keys of `--json`, which scripts rely on.
 
-use crate::support::Place;
+use crate::support::{Place, SCENARIO};
 use serde_json::Value;
 
 /// Asserts that all of `keys` exist and none is null.
@@ -45,6 +45,36 @@ fn check_says_what_it_found() {
     assert_eq!(found["bodies"], serde_json::json!({ "door": 1, "person": 1, "robot": 3 }));
     assert_eq!(found["robots"][0]["behaviour"], "shuttle");
     assert_eq!(found["robots"][1]["behaviour"], "wander");
+    assert_eq!(found["remarks"], serde_json::json!([]));
+}
+
+#[test]
+fn check_says_what_will_surprise() {
+    let place = Place::new();
+    let wheels = "\n[effectors.wheels]\nbox_m = 0.5\nforward = [{ p = 1.0, path = \"F\" }]\n";
+    place.write("s.toml", SCENARIO.replacen("\"nomad\"", "\"wheels\"", 1) + wheels);
+    let remarks = &place.json(&["check", "s.toml"])["remarks"];
+    assert_eq!(
+        (&remarks[0]["severity"], &remarks[0]["key"]),
+        (&"warning".into(), &"robots.0.effector".into())
+    );
+    let told = place.run(&["check", "s.toml"]).out();
+    assert!(told.contains("\nwarning: robots.0.effector\n") && told.contains("0.5 m"), "{told}");
+}
+
+#[test]
+fn check_tells_the_memory_of_a_whole_process() {
+    let place = Place::new();
+    let head = "format = 1\nworld = \"robots\"\n[map.office]\nfloors = 20\ncorridors = 6\n";
+    place.write("large.toml", format!("{head}[people]\ncount = 50000\n"));
+    let bytes = |file: &str, key: &str| {
+        place.json(&["check", file])[key].as_u64().expect("a number of bytes")
+    };
+    let small = bytes("s.toml", "memory_bytes");
+    // The program itself, and 64 bytes or more for each body.
+    assert!(small > 2_000_000, "{small}");
+    assert!(bytes("large.toml", "memory_bytes") > small + 64 * 50_000);
+    assert!(bytes("large.toml", "recorded_memory_bytes") > small + 1000 * 50_000);
 }
 
 #[test]

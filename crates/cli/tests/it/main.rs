@@ -24,3 +24,4 @@ mod stops;
 mod support;
 mod sweep;
 mod sweep_faults;
+mod turned_maps;

@@ -132,6 +132,19 @@ fn the_mcap_library_reads_robots_where_the_table_has_them() {
 }
 
 #[test]
+fn the_mcap_library_reads_robots_on_a_turned_map_where_the_world_has_them() {
+    if !has(FOR_MCAP) {
+        return;
+    }
+    let place = Place::new();
+    let scenario = crate::turned_maps::on_a_map(&place, 30.0, 100);
+    let (_, read) = recorded(&place, &scenario, &["0.25", r#"{"0": 2, "1": 2, "2": 1}"#]);
+    assert_eq!(read["compared"], 100 * 3);
+    let yaw_rad = read["topics"]["/map"]["plane"][2].as_f64().expect("a number");
+    assert!((yaw_rad.to_degrees() - 30.0).abs() < 1e-9, "{yaw_rad}");
+}
+
+#[test]
 fn the_mcap_library_reads_chains_where_the_table_has_them() {
     if !has(FOR_MCAP) {
         return;
@@ -153,6 +166,71 @@ fn the_mcap_library_reads_airplanes_where_the_table_has_them() {
     check(&run, &read, run["cycles"].as_u64().expect("a number"));
     assert_eq!(read["compared"], read["rows"]);
     assert_eq!(read["topics"]["/poses/airplane"]["schema"], "foxglove.PosesInFrame");
+}
+
+/// Airplanes in a wind that climb, change their speed, follow a recorded way, come in later, and
+/// lose separation.
+const TRAFFIC: &str = r#"format = 1
+world = "airspace"
+name = "traffic"
+cycles = 90
+[airspace]
+method = "mvp"
+shield = "off"
+wind_m_s = [4.0, -3.0]
+replay_until_s = inf
+[airspace.generator]
+kind = "superconflict"
+n = 6
+radius_m = 3000.0
+[[airplanes]]
+at_m = [-2000.0, 100.0]
+heading_deg = 10.0
+way_points_m = [[2500.0, 0.0]]
+orders = [
+    { at_s = 20.0, speed_m_s = 45.0 },
+    { at_s = 30.0, altitude_m = 350.0, climb_m_s = 3.3 },
+    { at_s = 60.0, heading_deg = 200.0 },
+    { at_s = 120.0, leaves = true },
+]
+[[airplanes]]
+track = [[3.3, -2500.0, -900.0, 0.0], [61.7, 0.0, 0.0, 200.0], [150.0, 3000.0, 500.0, 0.0]]
+[[airplanes]]
+at_m = [0.0, 700.0]
+heading_deg = 180.0
+way_points_m = [[-3000.0, 700.0]]
+appears_s = 40.0
+"#;
+
+#[test]
+fn the_rows_of_a_run_give_its_separation_to_another_program() {
+    if !has("numpy, pyarrow.parquet") {
+        return;
+    }
+    let place = Place::new();
+    place.write("any.toml", TRAFFIC);
+    let run = place.json(&["run", "any.toml", "--out", "r"]);
+    let table = place.path("r/trajectories");
+    let read = script("separation.py", &[&table, Path::new("500"), Path::new("299.999999")]);
+    let summary: Value = serde_json::from_str(&place.read("r/summary.json")).expect("JSON");
+    let told = summary["per_pair"].as_array().expect("pairs");
+    let lost = |pair: &&Value| pair["losses"] != 0;
+    assert!(told.iter().filter(lost).count() >= 3, "{told:?}");
+    for pair in told {
+        let same = |one: &&Value| one["airplanes"] == pair["airplanes"];
+        let found = read["pairs"].as_array().and_then(|all| all.iter().find(same)).expect("rows");
+        let differ = |key: &str| {
+            (pair[key].as_f64().expect("told") - found[key].as_f64().expect("found")).abs()
+        };
+        assert!(differ("nearest_m") < 1e-3, "{pair} {found}");
+        assert!(differ("lost_s") < 0.05 && pair["losses"] == found["losses"], "{pair} {found}");
+    }
+    // The last row of an airplane is the place where its flight has ended, which takes no time.
+    let arrived = run["metrics"]["arrived"].as_u64().zip(run["metrics"]["left"].as_u64());
+    let ends = read["ends"].as_object().expect("airplanes").values();
+    let ended = ends.filter(|end| end[2] == 0.0).count() as u64;
+    assert_eq!(Some(ended), arrived.map(|(arrived, left)| arrived + left), "{run}");
+    assert!(ended >= 8 && read["joints"].as_u64().is_some_and(|joints| joints > 300), "{read}");
 }
 
 #[test]

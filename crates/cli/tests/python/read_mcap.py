@@ -4,6 +4,7 @@ usage: read_mcap.py RECORDING TRAJECTORIES X Y   (columns of the table, or `boxe
 """
 
 import json
+import math
 import sys
 
 import pyarrow.parquet as pq
@@ -42,30 +43,45 @@ with open(recording, "rb") as stream:
         elif channel.topic == "/map":
             assert len(decoded.data) % decoded.column_count == 0
             topic["cells"] = len(decoded.data)
+            at, turn = decoded.pose.position, decoded.pose.orientation
+            topic["plane"] = [at.x, at.y, 2 * math.atan2(turn.z, turn.w)]
         elif channel.topic == "/log":
             assert decoded.name and decoded.message.startswith(decoded.name)
             levels[decoded.level] = levels.get(decoded.level, 0) + 1
 
-# Every position of the table is in the recording, to the bit.
+# Every position of the table is in the recording, to the bit where the map is not turned.
 table = pq.read_table(trajectories)
 world = metadata["sidestep"]["world"]
 rows = table.to_pydict()
-compared = 0
+compared, compared_rows = 0, table.num_rows
 if world == "robots":
     # Robots of two boxes and one, people of one: the middle of their boxes.
     box_m = float(sys.argv[3])
+    plane = topics["/map"]["plane"]
     size = {int(k): int(v) for k, v in json.loads(sys.argv[4]).items()}
     for cycle, body, col, row in zip(rows["cycle"], rows["body"], rows["col_boxes"], rows["row_boxes"]):
         at = positions.get((cycle, f"robot/{body}"))
         if at is not None:
-            middle = [(k + 0.5 * size[body]) * box_m for k in (col, row)]
-            assert list(at[:2]) == middle, (cycle, body, at, middle)
+            x, y = [(k + 0.5 * size[body]) * box_m for k in (col, row)]
+            if plane[2] == 0.0:
+                middle = [plane[0] + x, plane[1] + y]
+                assert list(at[:2]) == middle, (cycle, body, at, middle)
+            else:
+                s, c = math.sin(plane[2]), math.cos(plane[2])
+                middle = [plane[0] + c * x - s * y, plane[1] + s * x + c * y]
+                assert math.dist(at[:2], middle) < 1e-9, (cycle, body, at, middle)
             compared += 1
 else:
     parts = "connector" if world == "chain" else None
     of = rows["chain" if parts else "airplane"]
     dimensions = [rows[axis] for axis in ("x_m", "y_m", "z_m") if axis in rows]
+    # Of an airplane's legs, only the first one of a cycle starts where the frame shows it.
+    starts = rows.get("from_s")
+    compared_rows = 0
     for k, cycle in enumerate(rows["cycle"]):
+        if starts and abs(starts[k] - cycle * cycle_s) > 1e-9:
+            continue
+        compared_rows += 1
         name = f"connector/{of[k]}/{rows['connector'][k]}" if parts else f"airplane/{of[k]}"
         at = positions.get((cycle, name))
         if at is not None:
@@ -81,7 +97,7 @@ print(
             "sorted": times == sorted(times),
             "cycles": cycles,
             "compared": compared,
-            "rows": table.num_rows,
+            "rows": compared_rows,
             "entities": entities,
             "levels": levels,
             "pose_counts": {topic: sorted(counts) for topic, counts in frames.items()},

@@ -2,7 +2,6 @@
 
 pub(crate) mod bars;
 pub(crate) mod frame;
-pub(crate) mod histogram;
 pub(crate) mod plot;
 
 use crate::svg::{Num, Svg};

@@ -41,7 +41,7 @@ fn check_floor(floor: &Floor) -> Result<(), DrawError> {
         let (what, limit) = ("boxes of the map", MOST_BOXES);
         return Err(DrawError::TooLarge { what, found: boxes, limit });
     }
-    DrawError::some("number of the map's boxes", boxes as usize)?;
+    DrawError::positive("number of the map's boxes", boxes as f64)?;
     DrawError::length("boxes of the map", boxes as usize, floor.boxes.len())?;
     DrawError::positive("box size in m", floor.box_m)?;
     let [lo, hi] = around_floor(floor);
@@ -86,9 +86,9 @@ fn check_size(value: f64) -> Result<(), DrawError> {
 }
 
 fn around_floor(floor: &Floor) -> [Place; 2] {
-    let [x, y] = floor.origin_m;
-    let end = |origin: f64, boxes: u32| origin + f64::from(boxes) * floor.box_m;
-    [[x, y, 0.0], [end(x, floor.width), end(y, floor.height), 0.0]]
+    let mut bounds = Bounds::default();
+    floor.corners_m().into_iter().for_each(|[x, y]| bounds.hold([x, y, 0.0], 0.0));
+    [bounds.lo, bounds.hi]
 }
 
 /// Returns the lower and upper corner of everything shown; never empty.

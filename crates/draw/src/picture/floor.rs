@@ -21,10 +21,14 @@ struct Block {
 
 /// Draws a floor, in a group whose unit is one box, y upward.
 pub(super) fn draw(svg: &mut Svg, floor: &Floor, canvas: &Canvas) {
-    let [x_m, y_m] = floor.origin_m;
+    let [x_m, y_m] = floor.plane.origin_m;
     let (x, y) = canvas.at([x_m, y_m, 0.0]);
     let (x, y, px) = (Num(x), Num(y), canvas.px_per_m * floor.box_m);
-    svg.raw(format_args!(r#"<g transform="translate({x} {y}) scale({px} -{px})">"#));
+    let turn = match floor.plane.yaw_rad {
+        0.0 => String::new(),
+        yaw_rad => format!(" rotate({})", yaw_rad.to_degrees()),
+    };
+    svg.raw(format_args!(r#"<g transform="translate({x} {y}) scale({px} -{px}){turn}">"#));
     for (occupancy, color) in [(Occupancy::Unknown, UNKNOWN), (Occupancy::Wall, WALL)] {
         let is = |col: u32, row: u32| {
             floor.boxes[row as usize * floor.width as usize + col as usize] == occupancy

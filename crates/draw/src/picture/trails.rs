@@ -149,11 +149,12 @@ fn shared(trails: &[Shown<'_>], floor: &Floor, sizes: &BTreeMap<Who, [f64; 2]>) 
             ((size_m[k] / floor.box_m).round() as i64).clamp(1, i64::from(most))
         };
         let (width, height) = (boxes(0, floor.width), boxes(1, floor.height));
-        let low = |at: &Place, k: usize| {
-            ((at[k] - 0.5 * size_m[k] - floor.origin_m[k]) / floor.box_m).round() as i64
+        let corner = |&(_, [x, y, _]): &(Cycle, Place)| {
+            let middle_m = floor.plane.point([x, y]);
+            let low = |k: usize| ((middle_m[k] - 0.5 * size_m[k]) / floor.box_m).round() as i64;
+            (low(0), low(1))
         };
-        let corners: BTreeSet<(i64, i64)> =
-            trail.way.iter().map(|(_, at)| (low(at, 0), low(at, 1))).collect();
+        let corners: BTreeSet<(i64, i64)> = trail.way.iter().map(corner).collect();
         for (col, row) in corners {
             let boxes = (0..height).flat_map(|y| (0..width).map(move |x| (col + x, row + y)));
             boxes.for_each(|at| *covered_by.entry(at).or_default() |= 1 << (index % 64));

@@ -107,6 +107,7 @@ impl<'p> Interpreter<'p> {
         let time_s = command.time_s;
         let (name, mut arguments) = self.name_and_arguments(command.words);
         count(&mut self.file.commands, name.clone());
+        self.file.last_lines.insert(name.clone(), arguments.command.line);
         if is_display(&name) {
             return count(&mut self.file.ignored, name);
         }

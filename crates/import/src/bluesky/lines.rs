@@ -128,7 +128,11 @@ impl<'a> Line<'a> {
     }
 }
 
-const STAMP_REMEDY: &str = "start the line with a time such as 00:01:30.00>";
+/// The largest number of hours of a time: no scenario lasts six weeks.
+const MAX_HOURS: u32 = 999;
+
+const STAMP_REMEDY: &str =
+    "start the line with a time such as 00:01:30.00>, of up to 59 minutes and less than 60 seconds";
 
 /// Reads `HH:MM:SS.ss` in seconds; one digit per part is enough.
 fn parse_stamp(place: &dyn fmt::Display, stamp: Word) -> Result<f64, InputError> {
@@ -137,8 +141,9 @@ fn parse_stamp(place: &dyn fmt::Display, stamp: Word) -> Result<f64, InputError>
         [hours, minutes, seconds] => hours
             .parse::<u32>()
             .ok()
-            .zip(minutes.parse::<u32>().ok())
-            .zip(seconds.parse::<f64>().ok().filter(|seconds| (0.0..1e9).contains(seconds))),
+            .filter(|hours| *hours <= MAX_HOURS)
+            .zip(minutes.parse::<u32>().ok().filter(|minutes| *minutes < 60))
+            .zip(seconds.parse::<f64>().ok().filter(|seconds| (0.0..60.0).contains(seconds))),
         _ => None,
     };
     let Some(((hours, minutes), seconds)) = seconds else {
@@ -171,7 +176,7 @@ mod tests {
     #[test]
     fn stamps_may_have_blanks_one_digit_and_fractions() {
         for (stamp, time_s) in
-            [("00:00:26.9", 26.9), (" 0:15:00.00", 900.0), ("1:01:01", 3661.0), ("0:0:90.", 90.0)]
+            [("00:00:26.9", 26.9), (" 0:15:00.00", 900.0), ("1:01:01", 3661.0), ("0:0:59.", 59.0)]
         {
             assert_eq!(read(&format!("{stamp}>HOLD IT")), [(time_s, "HOLD|IT".to_string())]);
         }
@@ -185,6 +190,10 @@ mod tests {
             ("00:00:-1>CRE A B744", 1),
             ("00:xx:00>CRE A B744", 1),
             ("00:00:inf>CRE A B744", 1),
+            ("99:99:99>CRE A B744", 1),
+            ("00:60:00>CRE A B744", 1),
+            ("00:00:60>CRE A B744", 1),
+            ("1000:00:00>CRE A B744", 1),
         ];
         for (text, column) in wrong {
             let error = join_lines(text).0[0].commands(&"f.scn").unwrap_err();

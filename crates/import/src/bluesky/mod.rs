@@ -52,6 +52,8 @@ pub struct ScnFile {
     pub short_lines: u64,
     /// Number of occurrences of each command, by its name in capital letters.
     pub commands: BTreeMap<String, u64>,
+    /// Line of the last occurrence of each command, from 1.
+    pub last_lines: BTreeMap<String, usize>,
     /// Number of occurrences of each command that has no effect here. `SYN` and `AFTER` are
     /// followed by the variant that is not understood.
     pub not_understood: BTreeMap<String, u64>,

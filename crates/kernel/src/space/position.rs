@@ -42,11 +42,6 @@ impl Position {
         self.row() * width + self.col()
     }
 
-    /// Returns the position of an index in such a grid.
-    pub fn from_index(index: u32, width: u32) -> Self {
-        Self::new(index % width, index / width)
-    }
-
     /// Returns the box `dx` columns east and `dy` rows north; the caller makes sure that it exists.
     #[inline(always)]
     pub fn offset(self, dx: i32, dy: i32) -> Self {

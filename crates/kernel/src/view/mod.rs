@@ -13,7 +13,7 @@ mod trails;
 pub use appearance::{ALERT, Appearance, COLORS, Color, DOOR, MOBILE, UNKNOWN, WALL, color_of};
 pub use body::{Body, Condition, Kind, Shape, Who};
 pub use log::{Entry, Level, Log};
-pub use pose::{Place, Pose};
+pub use pose::{Place, Plane, Pose};
 pub use trails::{Axis, PlaceRows, Trail, corner};
 
 use crate::units::Cycle;
@@ -36,19 +36,27 @@ pub struct Scenery {
     pub names: Vec<(Kind, u32, String)>,
 }
 
-/// A floor of square boxes along the axes.
+/// A floor of square boxes, along the axes of its own plane.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Floor {
-    /// Boxes from west to east.
+    /// Boxes along the first axis: from west to east, where the floor is not turned.
     pub width: u32,
-    /// Boxes from south to north.
+    /// Boxes along the second axis: from south to north, where the floor is not turned.
     pub height: u32,
     /// Side of a box, in meters.
     pub box_m: f64,
-    /// The lower-left corner of the first box, in meters.
-    pub origin_m: [f64; 2],
-    /// The content of each box, row by row from the south.
+    /// The corner of the first box, and the turn about it.
+    pub plane: Plane,
+    /// The content of each box, row by row from the first.
     pub boxes: Vec<Occupancy>,
+}
+
+impl Floor {
+    /// Returns the corners of the floor in the world, counterclockwise from the first box's.
+    pub fn corners_m(&self) -> [[f64; 2]; 4] {
+        let [x, y] = [self.width, self.height].map(|boxes| f64::from(boxes) * self.box_m);
+        [[0.0, 0.0], [x, 0.0], [x, y], [0.0, y]].map(|point| self.plane.place(point))
+    }
 }
 
 /// The content of a box of the floor.

@@ -5,6 +5,31 @@ use serde::{Deserialize, Serialize};
 /// A place in space, in meters; worlds of the plane have height 0.
 pub type Place = [f64; 3];
 
+/// A plane that lies in that of the world, such as the image of a map: the place of its origin, and
+/// the turn of its axes.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Plane {
+    /// Its origin in the world, in meters.
+    pub origin_m: [f64; 2],
+    /// The direction of its x axis in the world, in radians, counterclockwise.
+    pub yaw_rad: f64,
+}
+
+impl Plane {
+    /// Returns the place in the world of a point of the plane, in meters.
+    pub fn place(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let (s, c) = (crate::math::sin(self.yaw_rad), crate::math::cos(self.yaw_rad));
+        [self.origin_m[0] + (c * x - s * y), self.origin_m[1] + (s * x + c * y)]
+    }
+
+    /// Returns the point of the plane that is at a place in the world, in meters.
+    pub fn point(&self, at_m: [f64; 2]) -> [f64; 2] {
+        let (s, c) = (crate::math::sin(self.yaw_rad), crate::math::cos(self.yaw_rad));
+        let [x, y] = [at_m[0] - self.origin_m[0], at_m[1] - self.origin_m[1]];
+        [c * x + s * y, c * y - s * x]
+    }
+}
+
 /// Position and orientation of a body's center.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Pose {
@@ -98,6 +123,17 @@ mod tests {
                 prop_assert!(near(pose.turned(axis), to), "{axis:?}: {:?} {to:?}", pose.turned(axis));
             }
         }
+    }
+
+    #[test]
+    fn a_plane_is_turned_about_its_origin_and_not_at_all_without_a_yaw() {
+        let quarter = Plane { origin_m: [10.0, 20.0], yaw_rad: 0.5 * std::f64::consts::PI };
+        let [x, y] = quarter.place([2.0, 1.0]);
+        assert!((x - 9.0).abs() < 1e-12 && (y - 22.0).abs() < 1e-12, "{x} {y}");
+        let [x, y] = quarter.point([9.0, 22.0]);
+        assert!((x - 2.0).abs() < 1e-12 && (y - 1.0).abs() < 1e-12, "{x} {y}");
+        let still = Plane { origin_m: [0.1, 0.2], yaw_rad: 0.0 };
+        assert_eq!(still.place([0.7, -0.3]), [0.1 + 0.7, 0.2 - 0.3]);
     }
 
     #[test]

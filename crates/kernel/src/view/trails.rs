@@ -1,7 +1,7 @@
 //! The trails of bodies, and the recorded rows that they are made of.
 
 use super::body::{Body, Kind, Shape, Who};
-use super::pose::Place;
+use super::pose::{Place, Plane};
 use super::{Frame, Scenery};
 use crate::ports::Values;
 use crate::units::Cycle;
@@ -29,6 +29,8 @@ pub struct PlaceRows {
     pub part: Option<&'static str>,
     /// Columns with the coordinates x, y and perhaps z.
     pub axes: Vec<Axis>,
+    /// The plane of the coordinates x and y, that of the world unless given.
+    pub plane: Option<Plane>,
     /// Whether the places are those of a body's corner with the lowest coordinates, not those of
     /// its center.
     pub is_corner: bool,
@@ -133,7 +135,12 @@ impl PlaceRows {
                 false => like.map_or(0.0, |body| body.pose.at_m[k]),
             })
         };
-        let now = here.map(|(now, body)| (now, body.pose.at_m, None));
+        let turned = |turn: &dyn Fn(&Plane, [f64; 2]) -> [f64; 2], [x, y, z]: Place| {
+            let [x, y] = self.plane.as_ref().map_or([x, y], |plane| turn(plane, [x, y]));
+            [x, y, z]
+        };
+        // Ways have their corners along the axes of the columns.
+        let now = here.map(|(now, body)| (now, turned(&Plane::point, body.pose.at_m), None));
         let rows = rows.into_iter().map(|(cycle, at, ahead)| (cycle, middle(at), ahead)).chain(now);
         let mut way: Vec<(Cycle, Place)> = Vec::new();
         let mut left: Option<(Place, u32)> = None;
@@ -145,6 +152,7 @@ impl PlaceRows {
             way.push((cycle, at));
             left = ahead.map(|ahead| (at, ahead));
         }
+        way.iter_mut().for_each(|(_, at)| *at = turned(&Plane::place, *at));
         Some(way)
     }
 }
@@ -187,6 +195,7 @@ mod tests {
             number: "body",
             part: None,
             axes: vec![axis("col"), axis("row")],
+            plane: None,
             is_corner: true,
             ahead: Some("heading"),
             every: 1,

@@ -2,7 +2,11 @@
 
 use super::{Distances, FreeSpace, STEPS};
 
-/// The first step of a shortest 4-connected path to the nearest goal, for every box of a grid.
+/// The first step of a shortest 4-connected path to the nearest goal, and the difference in distance
+/// to each neighbor, for every box of a grid.
+///
+/// Neighbors differ by at most one step, so the distance modulo 3 is enough to tell which of them is
+/// nearer to the goal.
 ///
 /// Of several shortest paths it takes the one whose step has the lowest direction (0 east, 1 north,
 /// 2 west, 3 south), so it depends neither on the order of the goals nor on that of the search.
@@ -14,10 +18,10 @@ pub struct FlowField {
     codes: Vec<u8>,
 }
 
-/// Code of a goal; the codes below are directions.
-const GOAL: u8 = 4;
+/// Code of a goal; the codes below are `direction + 4 * (distance % 3)`.
+const GOAL: u8 = 12;
 /// Code of a box without a path to a goal.
-const UNREACHED: u8 = 5;
+const UNREACHED: u8 = 13;
 
 impl FlowField {
     /// Computes the field for a body of `size` x `size` boxes that has to fit into `free` on its
@@ -46,7 +50,19 @@ impl FlowField {
     /// Returns the direction of the next step: 0 east, 1 north, 2 west, 3 south. `None` at a goal,
     /// where no path leads to one, and outside the grid.
     pub fn direction(&self, col: u32, row: u32) -> Option<u8> {
-        self.code(col, row).filter(|&code| code < GOAL)
+        self.code(col, row).filter(|&code| code < GOAL).map(|code| code % 4)
+    }
+
+    /// Returns how many steps farther from the nearest goal the neighbor in a direction is: -1, 0
+    /// or 1. `None` where no path leads from one of the two boxes to a goal.
+    pub fn rise(&self, col: u32, row: u32, direction: u8) -> Option<i8> {
+        let (east, north) = STEPS[usize::from(direction % 4)];
+        let rest =
+            |code: u8| (code != UNREACHED).then_some(if code == GOAL { 0 } else { code / 4 });
+        let here = rest(self.code(col, row)?)?;
+        let next = (col.wrapping_add_signed(east), row.wrapping_add_signed(north));
+        let there = rest(self.code(next.0, next.1)?)?;
+        Some([0, 1, -1][usize::from((3 + there - here) % 3)])
     }
 
     /// Whether the box is one of the goals.
@@ -92,7 +108,7 @@ fn code(distances: &Distances, col: u32, row: u32) -> u8 {
     match distances.steps(col, row) {
         None => UNREACHED,
         Some(0) => GOAL,
-        Some(steps) => downhill(distances, (col, row), steps - 1),
+        Some(steps) => downhill(distances, (col, row), steps - 1) + 4 * (steps % 3) as u8,
     }
 }
 
@@ -155,6 +171,11 @@ mod tests {
                     prop_assert!(anchors.is_free(at.0, at.1));
                 }
                 prop_assert_eq!(field.is_goal(at.0, at.1), goals.contains(&at) && anchors.is_free(at.0, at.1));
+                for (direction, (east, north)) in (0..).zip(STEPS) {
+                    let there = distances.steps(col.wrapping_add_signed(east), row.wrapping_add_signed(north));
+                    let rise = distances.steps(col, row).zip(there).map(|(a, b)| (i64::from(b) - i64::from(a)) as i8);
+                    prop_assert_eq!(field.rise(col, row, direction), rise);
+                }
                 let expected = distances.steps(col, row);
                 prop_assert_eq!(field.reaches_goal(col, row).then_some(steps), expected);
             }

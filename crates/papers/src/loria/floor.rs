@@ -1,11 +1,8 @@
 //! The buildings of the experiments, our own because the paper's floor is not published.
 
-use super::patrol::{Patrol, Trust};
 use serde::{Deserialize, Serialize};
 use sidestep::map::Rect;
 use sidestep::office::{Office, OfficeSpec};
-use sidestep::planning::{FlowField, FreeSpace};
-use sidestep::worlds::robots::decide::{Behaviour, Shuttle};
 use std::sync::Arc;
 
 /// The floors: boxes of 0.25 m, of which the paper's robot, 0.53 m across, covers 2 x 2.
@@ -16,11 +13,11 @@ const LARGE: &str = include_str!("../../../../scenarios/papers/loria/large.toml"
 /// Boxes at each end of a corridor that count as its end.
 const END_BOXES: u32 = 4;
 
-/// The behavior of a robot that goes to and fro.
+/// How a robot that goes to and fro gets past what is in its way, by the names of a scenario.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Mind {
-    /// The built-in `shuttle`: keeps to its way until it touches something.
+    /// Keeps to its way until it touches something.
     Touch,
     /// Steps around things that its sonar reports, as soon as one beam does.
     Avoid,
@@ -36,14 +33,6 @@ impl Mind {
     /// Returns its name in tables.
     pub(super) fn name(self) -> &'static str {
         ["touch", "avoid", "filter"][self as usize]
-    }
-
-    fn between(self, ends: [Arc<FlowField>; 2]) -> Arc<dyn Behaviour> {
-        match self {
-            Self::Touch => Arc::new(Shuttle { ends }),
-            Self::Avoid => Arc::new(Patrol { ends, trust: Trust::OneBeam }),
-            Self::Filter => Arc::new(Patrol { ends, trust: Trust::TwoReports }),
-        }
     }
 }
 
@@ -117,12 +106,6 @@ impl Floor {
         self.robots_per_corridor * self.corridors().count() as u32
     }
 
-    /// Returns the behaviors of the robots of each corridor, for bodies of `size` x `size` boxes.
-    pub(super) fn behaviours(&self, mind: Mind, size: u32) -> Vec<Arc<dyn Behaviour>> {
-        let free = FreeSpace::of_map(&self.office.map);
-        self.corridors().map(|corridor| mind.between(ends(&free, corridor, size))).collect()
-    }
-
     /// Describes the floor in words.
     pub(super) fn describe(&self) -> String {
         let map = &self.office.map;
@@ -141,16 +124,12 @@ impl Floor {
     }
 }
 
-/// Returns ways to the west and to the east end of a corridor.
-fn ends(free: &FreeSpace, corridor: &Rect, size: u32) -> [Arc<FlowField>; 2] {
+/// Returns the west and the east end of a corridor as regions of a scenario, for bodies of `size` x
+/// `size` boxes.
+pub(super) fn ends(corridor: &Rect, size: u32) -> [[u32; 4]; 2] {
     let last = corridor.col + corridor.width - size;
-    let way = |from: u32| {
-        let goals: Vec<_> = (from..from + END_BOXES)
-            .flat_map(|col| (corridor.row..corridor.row + corridor.height).map(move |r| (col, r)))
-            .collect();
-        Arc::new(FlowField::towards(free, size, &goals))
-    };
-    [way(corridor.col), way(last + 1 - END_BOXES)]
+    let end = |col| [col, corridor.row, END_BOXES, corridor.height];
+    [end(corridor.col), end(last + 1 - END_BOXES)]
 }
 
 #[cfg(test)]
@@ -158,19 +137,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn robots_of_every_size_find_a_way_along_every_corridor_of_every_floor() {
+    fn there_is_a_group_of_robots_for_every_corridor_and_its_ends_are_those_of_the_scenario() {
         for floor in [Floor::small(), Floor::medium(), Floor::large()] {
-            let free = FreeSpace::of_map(&floor.office.map);
-            // One group of robots for each.
-            let told: Told = toml::from_str(floor.scenario).expect("a right scenario");
-            assert_eq!(floor.corridors().count(), told.robots.len());
-            for (corridor, size) in floor.corridors().flat_map(|c| (1..=5).map(move |s| (c, s))) {
-                let [west, east] = ends(&free, corridor, size);
-                let middle = (corridor.col + corridor.width / 2, corridor.row);
-                assert_eq!(west.direction(middle.0, middle.1), Some(2));
-                assert_eq!(east.direction(middle.0, middle.1), Some(0));
-                assert!(west.is_goal(corridor.col, corridor.row));
-                assert!(east.is_goal(corridor.col + corridor.width - size, corridor.row));
+            let told: toml::Table = toml::from_str(floor.scenario).expect("a right scenario");
+            let groups = told["robots"].as_array().expect("a list");
+            assert_eq!(floor.corridors().count(), groups.len());
+            for (corridor, group) in floor.corridors().zip(groups) {
+                let end = |key: &str| group["behaviour"][key].clone().try_into().expect("a region");
+                let expected: [[u32; 4]; 2] = [end("a"), end("b")];
+                assert_eq!(ends(corridor, 2), expected);
             }
         }
     }

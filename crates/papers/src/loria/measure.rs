@@ -1,17 +1,16 @@
 //! One run of one variant, and its results.
 
 use super::errors::{self, Beams, Spread};
-use super::floor::{Floor, Mind};
+use super::floor::{Floor, Mind, ends};
 use crate::study::{Progress, all_of, setting, source};
 use serde::Serialize;
 use sidestep::kernel::Simulation;
 use sidestep::kernel::ports::{MemoryRecorder, Values};
 use sidestep::scenario::Source;
-use sidestep::worlds::robots::RobotsRun;
 use sidestep::worlds::robots::baseline::breach;
 use sidestep::worlds::robots::effector::ObstacleRule;
-use sidestep::worlds::robots::scenario::{Behaviours, Compiled, StorageOrder};
 use sidestep::worlds::robots::world::Regime;
+use sidestep::worlds::robots::{RobotsRun, robots_run};
 use std::convert::Infallible;
 use std::sync::Arc;
 
@@ -63,8 +62,7 @@ impl Variant {
         }
     }
 
-    /// Returns the scenario of a run: the floor's, with the changes of this variant; `patrol-0`...
-    /// are the behaviors of the corridors.
+    /// Returns the scenario of a run: the floor's, with the changes of this variant.
     pub(super) fn source(&self, seed: u64) -> Source {
         let mut settings = vec![
             setting("seed", seed as i64),
@@ -78,23 +76,16 @@ impl Variant {
             settings.extend(errors::settings(e, spread, beams));
         }
         sensors.extend(self.camera.then_some("camera"));
-        for k in 0..self.floor.corridors().count() {
+        for (k, corridor) in self.floor.corridors().enumerate() {
             let key = |name: &str| ["robots", &k.to_string(), name].join(".");
-            let patrol = format!("patrol-{k}");
+            let [a, b] = ends(corridor, self.size).map(|end| end.to_vec());
             settings.push(setting(&key("size"), self.size));
             settings.push(setting(&key("sensors"), sensors.clone()));
-            settings.push(setting(
-                &key("behaviour"),
-                toml::Table::from_iter([("kind".to_string(), patrol.into())]),
-            ));
+            settings.push(setting(&key("behaviour.a"), a));
+            settings.push(setting(&key("behaviour.b"), b));
+            settings.push(setting(&key("behaviour.avoidance"), self.mind.name()));
         }
         source(text, &settings).expect("the experiments' scenarios are valid")
-    }
-
-    /// Returns the behaviors by name, shared by all runs of this variant.
-    pub(super) fn behaviours(&self) -> Behaviours {
-        let all = self.floor.behaviours(self.mind, self.size);
-        all.into_iter().enumerate().map(|(k, b)| (format!("patrol-{k}"), b)).collect()
     }
 }
 
@@ -145,10 +136,9 @@ pub(super) fn measure_all(
     what: &str,
     report: &mut Progress<'_>,
 ) -> Vec<Vec<Outcome>> {
-    let behaviours: Vec<Behaviours> = variants.iter().map(Variant::behaviours).collect();
     let run = |i: &usize| {
         let (v, seed) = (i / seeds, (i % seeds) as u64 + 1);
-        Ok::<_, Infallible>(measure(&variants[v], &behaviours[v], seed, cycles))
+        Ok::<_, Infallible>(measure(&variants[v], seed, cycles))
     };
     let numbers: Vec<usize> = (0..variants.len() * seeds).collect();
     let Ok(outcomes) = all_of(&numbers, workers, |share| report(what, share), run);
@@ -156,27 +146,15 @@ pub(super) fn measure_all(
 }
 
 /// Runs one variant once, on one worker.
-pub(super) fn measure(
-    variant: &Variant,
-    behaviours: &Behaviours,
-    seed: u64,
-    cycles: u64,
-) -> Outcome {
-    let (simulation, tracks) = recorded(variant, behaviours, seed, cycles);
+pub(super) fn measure(variant: &Variant, seed: u64, cycles: u64) -> Outcome {
+    let (simulation, tracks) = recorded(variant, seed, cycles);
     outcome(&simulation, &tracks)
 }
 
 /// Returns a variant's run at its end, and the poses of its robots by entity id.
-pub(super) fn recorded(
-    variant: &Variant,
-    behaviours: &Behaviours,
-    seed: u64,
-    cycles: u64,
-) -> (RobotsRun, Vec<Track>) {
-    let source = variant.source(seed);
-    let compiled = Compiled::new(&source, behaviours, StorageOrder::Spatial)
-        .expect("the experiments' scenarios are valid");
-    let mut simulation = compiled.start(&source, 1);
+pub(super) fn recorded(variant: &Variant, seed: u64, cycles: u64) -> (RobotsRun, Vec<Track>) {
+    let run = robots_run(&variant.source(seed), 1);
+    let mut simulation = run.expect("the experiments' scenarios are valid");
     let tracks = record(&mut simulation, cycles);
     (simulation, tracks)
 }
@@ -278,7 +256,7 @@ mod tests {
         let floor = Arc::new(Floor::small());
         for mind in Mind::ALL {
             let variant = Variant { mind, ..Variant::new(&floor, Regime::Reliable) };
-            let outcome = measure(&variant, &variant.behaviours(), 1, 600);
+            let outcome = measure(&variant, 1, 600);
             assert_eq!(outcome.lateral_moves, Some(0.0));
             assert!(outcome.trips > Some(0.5), "{outcome:?}");
         }
@@ -287,7 +265,7 @@ mod tests {
             ..Variant::new(&floor, Regime::Both)
         };
         let reliable = Variant { regime: Regime::Reliable, ..level_0.clone() };
-        let [a, b] = [level_0, reliable].map(|v| measure(&v, &v.behaviours(), 1, 300));
+        let [a, b] = [level_0, reliable].map(|v| measure(&v, 1, 300));
         assert_eq!(a, b, "errors of level 0 are none");
     }
 

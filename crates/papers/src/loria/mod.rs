@@ -7,7 +7,7 @@
 //! that it states a setting.
 //!
 //! ```text
-//! floor.rs, patrol.rs, errors.rs   the buildings, the behaviors, the error tables
+//! floor.rs, errors.rs              the buildings, the error tables
 //! measure.rs   -> reliability.rs, genericity.rs               results of runs
 //! timing.rs    -> performance.rs, strategies.rs, cost_model.rs   durations of runs
 //! scenes.rs                        ways of robots, as pictures
@@ -20,7 +20,6 @@ mod errors;
 mod floor;
 mod genericity;
 mod measure;
-mod patrol;
 mod performance;
 mod reliability;
 pub mod scenes;

@@ -29,7 +29,7 @@ pub fn all(plan: &Plan) -> [Scene; 2] {
 }
 
 fn scene(title: &str, variant: &Variant, cycles: Cycle) -> Scene {
-    let (mut run, tracks) = recorded(variant, &variant.behaviours(), SEED, cycles);
+    let (mut run, tracks) = recorded(variant, SEED, cycles);
     let (scenery, frame) = (run.scenery(), run.frame(Look::BODIES));
     let columns = columns(&tracks, cycles.saturating_sub(SEEN));
     let column = |name: &str| columns.iter().find(|(n, _)| *n == name).map(|(_, values)| values);

@@ -2,16 +2,17 @@
 
 use super::NewRecorder;
 use super::floor::Floor;
-use super::patrol::{Costly, burn};
 use crate::study::{setting, source};
 use serde::Serialize;
 use sidestep::kernel::Simulation;
 use sidestep::kernel::ports::{Clock, RecordError, Recorder, SystemClock};
+use sidestep::kernel::stream::Draws;
 use sidestep::kernel::workers;
 use sidestep::scenario::Source;
 use sidestep::worlds::robots::RobotsRun;
-use sidestep::worlds::robots::decide::Wander;
+use sidestep::worlds::robots::decide::{Behaviour, Decision, Memory, Percept, Wander};
 use sidestep::worlds::robots::scenario::{Behaviours, Compiled, StorageOrder};
+use std::hint::black_box;
 use std::sync::Arc;
 
 const SMALL: &str = include_str!("../../../../scenarios/papers/loria/wander-small.toml");
@@ -72,7 +73,7 @@ impl Load {
     /// # Panics
     /// If the load does not fit its floor; the experiments' own do.
     pub(super) fn compiled(&self) -> Compiled {
-        let costly = Costly { inner: Arc::new(Wander::default()), operations: self.operations };
+        let costly = Costly { wander: Wander::default(), operations: self.operations };
         let behaviours = Behaviours::from([("costly".into(), Arc::new(costly) as _)]);
         Compiled::new(&self.source(), &behaviours, StorageOrder::Spatial)
             .expect("the experiments' scenarios are valid")
@@ -82,6 +83,29 @@ impl Load {
     pub(super) fn simulation(&self, workers: usize) -> RobotsRun {
         self.compiled().start(&self.source(), workers)
     }
+}
+
+/// A behavior that thinks longer: it decides as `wander` does, after extra operations.
+#[derive(Debug, Clone)]
+struct Costly {
+    wander: Wander,
+    /// Dependent multiply-and-adds per decision.
+    operations: u32,
+}
+
+impl Behaviour for Costly {
+    fn decide(&self, percept: &Percept<'_>, memory: &mut Memory, draws: &mut Draws) -> Decision {
+        burn(percept.now, self.operations);
+        self.wander.decide(percept, memory, draws)
+    }
+}
+
+/// Does `operations` dependent multiply-and-adds, only to spend time.
+fn burn(mut x: u64, operations: u32) {
+    for _ in 0..operations {
+        x = x.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+    }
+    black_box(x);
 }
 
 /// Returns the seconds that `work` takes, and its result.

@@ -3,12 +3,11 @@
 
 use super::{DT_S, Plan};
 use crate::cells::{Cell, Column, Columns, Value, column, figure, series};
-use crate::study::{Progress, Study, finish, number};
+use crate::study::{Progress, Study, finish, known, number};
 use serde::Serialize;
 use sidestep::experiment::sweep::{Outcome, Variant};
-use sidestep::kernel::InputError;
-use sidestep::worlds::chain::ChainRun;
-use sidestep::worlds::chain::scenario::Compiled;
+use sidestep::kernel::{InputError, Simulation};
+use sidestep::worlds::chain::{ChainRun, chain_run};
 use sidestep_document::{Figure, Table};
 
 /// The scenario.
@@ -64,7 +63,8 @@ pub(super) const ROD_VIOLATION: Column =
     column("rod_violation_m", "", |r| Value::Number(r.most("max_rod_violation_m")));
 
 /// Whether the leader's nearest wall is in the slides' band.
-fn is_in_band(run: &ChainRun<2>) -> bool {
+fn is_in_band(run: &dyn Simulation) -> bool {
+    let run = known::<ChainRun<2>>(run);
     let leader = run.state().body(0).chain.points()[0];
     let apart_m = run.world().obstacles.clearance_m([leader; 2], 0.0, 1.0);
     (BAND_M[0]..=BAND_M[1]).contains(&apart_m)
@@ -88,13 +88,13 @@ impl Corridor {
     pub(super) fn run(plan: &Plan, progress: &mut Progress<'_>) -> Result<Self, InputError> {
         let what = (plan.workers, "swarm in the corridor");
         let results = study(plan)?.run_by(what, progress, |scenario, _, cell| {
-            let source = scenario()?;
-            let mut run = Compiled::<2>::new(&source)?.start(&source, 1);
+            let mut run = chain_run(&scenario()?, 1)?;
             let mut in_band = 0_u64;
-            finish(&mut run, |run| in_band += u64::from(is_in_band(run)));
-            let mut outcome = Outcome::of(*cell, &run);
+            finish(&mut *run, |run| in_band += u64::from(is_in_band(run)));
+            let mut outcome = Outcome::of(*cell, &*run);
             outcome.metrics.insert("in_band".into(), in_band.into());
-            outcome.metrics.insert("way_m".into(), run.state().body(0).tally.way_m.into());
+            let way_m = known::<ChainRun<2>>(&*run).state().body(0).tally.way_m;
+            outcome.metrics.insert("way_m".into(), way_m.into());
             Ok(outcome)
         })?;
         Ok(Self { cells: COLUMNS.cells(&results) })

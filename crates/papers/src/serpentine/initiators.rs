@@ -3,16 +3,15 @@
 
 use super::{Plan, draws};
 use crate::cells::{Share, table};
-use crate::study::{Progress, all_of, finish, setting, source};
+use crate::study::{Progress, all_of, finish, known, setting, source};
 use serde::Serialize;
 use sidestep::kernel::InputError;
 use sidestep::kernel::distr::normal;
 use sidestep::kernel::stream::Draws;
 use sidestep::worlds::chain::geometry::{Point, along, distance, unit};
-use sidestep::worlds::chain::scenario::Compiled;
 use sidestep::worlds::chain::{
-    BEND_TOLERANCE_RAD, Chain, Connector, Mobility, Obstacles, Outcome, Propagator, Reason,
-    Request, Rod,
+    BEND_TOLERANCE_RAD, Chain, ChainRun, Connector, Mobility, Obstacles, Outcome, Propagator,
+    Reason, Request, Rod, chain_run,
 };
 use sidestep_document::Table;
 
@@ -157,9 +156,9 @@ fn told(seed: u64) -> Result<bool, InputError> {
         FAILING,
         &[setting("chains.changes.connector", failing as i64), setting("seed", seed as i64)],
     )?;
-    let mut run = Compiled::<2>::new(&source)?.start(&source, 1);
-    finish(&mut run, |_| ());
-    let metrics = run.metrics();
+    let mut run = chain_run(&source, 1)?;
+    finish(&mut *run, |_| ());
+    let metrics = known::<ChainRun<2>>(&*run).metrics();
     let by_it = metrics.given_up.iter().map(|given_up| {
         let what = &given_up.what;
         what.by == Some(failing as u32) && what.reason.as_deref() == Some(Reason::Failed.name())

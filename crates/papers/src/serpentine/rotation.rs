@@ -4,11 +4,11 @@
 use super::Plan;
 use super::corridor::{CLEARANCE, ROD_VIOLATION, WIDTH};
 use crate::cells::{Cell, Columns, Value, column, figure, least};
-use crate::study::{Progress, Study, finish};
+use crate::study::{Progress, Study, finish, known};
 use serde::Serialize;
 use sidestep::experiment::sweep::Outcome;
 use sidestep::kernel::InputError;
-use sidestep::worlds::chain::scenario::Compiled;
+use sidestep::worlds::chain::{ChainRun, chain_run};
 use sidestep_document::figure::Point;
 use sidestep_document::{Figure, Series, Table};
 
@@ -59,17 +59,18 @@ impl Rotations {
     pub(super) fn run(plan: &Plan, progress: &mut Progress<'_>) -> Result<Self, InputError> {
         let what = (plan.workers, "rules of rotation");
         let results = study(plan)?.run_by(what, progress, |scenario, _, cell| {
-            let source = scenario()?;
-            let mut run = Compiled::<2>::new(&source)?.start(&source, 1);
+            let mut run = chain_run(&scenario()?, 1)?;
             let mut furthest = 0.0_f64;
-            finish(&mut run, |run| {
+            finish(&mut *run, |run| {
+                let run = known::<ChainRun<2>>(run);
                 let body = run.state().body(0);
                 if body.driving.task == 0 {
                     furthest = furthest.max(run.world().progress(0, &body));
                 }
             });
-            let furthest = if run.metrics().done == 1 { 1.0 } else { furthest };
-            let mut outcome = Outcome::of(*cell, &run);
+            let furthest =
+                if known::<ChainRun<2>>(&*run).metrics().done == 1 { 1.0 } else { furthest };
+            let mut outcome = Outcome::of(*cell, &*run);
             outcome.metrics.insert("furthest".into(), furthest.into());
             Ok(outcome)
         })?;

@@ -3,13 +3,12 @@
 use super::Plan;
 use super::{broken, corridor, snake};
 use crate::Scene;
-use crate::study::{setting, source};
+use crate::study::{known, setting, source};
 use sidestep::experiment::sweep::Setting;
 use sidestep::kernel::view::{Body, Frame, Kind, Look, Place, Pose, Scenery, Shape, Trail};
 use sidestep::kernel::{InputError, Simulation};
-use sidestep::worlds::chain::ChainRun;
 use sidestep::worlds::chain::geometry::Point;
-use sidestep::worlds::chain::scenario::Compiled;
+use sidestep::worlds::chain::{ChainRun, chain_run};
 
 /// Number of cycles from one point of a trail to the next.
 const EVERY: u64 = 10;
@@ -23,20 +22,22 @@ pub(super) fn all(plan: &Plan) -> Result<Vec<Scene>, InputError> {
     Ok(scenes)
 }
 
+/// A run, and the ways of both ends of its chain.
+type Traced = (Box<dyn Simulation>, Vec<Trail>);
+
 /// Runs `cycles`, and keeps the ways of both ends of the chain.
 fn traced<const D: usize>(
     text: &str,
     settings: &[Setting],
     cycles: u64,
-) -> Result<(ChainRun<D>, Vec<Trail>), InputError> {
-    let source = source(text, settings)?;
-    let mut run = Compiled::<D>::new(&source)?.start(&source, 1);
+) -> Result<Traced, InputError> {
+    let mut run = chain_run(&source(text, settings)?, 1)?;
     let last = run.agents() as u32 - 1;
     let trail = |part| Trail { of: (Kind::Connector, 0, Some(part)), way: Vec::new() };
     let mut trails: Vec<Trail> = [0, last].map(trail).to_vec();
     while run.cycle() < cycles && !run.is_over() {
         if run.cycle().is_multiple_of(EVERY) {
-            let body = run.state().body(0);
+            let body = known::<ChainRun<D>>(&*run).state().body(0);
             let points = body.chain.points();
             for (trail, point) in trails.iter_mut().zip([points[0], points[points.len() - 1]]) {
                 trail.way.push((run.cycle(), in_space(point)));

@@ -9,7 +9,8 @@ use foxglove::messages::{
     line_primitive, log, packed_element_field, scene_entity_deletion,
 };
 use sidestep_kernel::view::{
-    Body, Floor, Frame, Kind, Level, Occupancy, Place, Pose as ViewPose, Scan, Scenery, Shape,
+    Body, Floor, Frame, Kind, Level, Occupancy, Place, Plane, Pose as ViewPose, Scan, Scenery,
+    Shape,
 };
 
 use super::WORLD;
@@ -66,11 +67,11 @@ pub(super) fn grid(floor: &Floor) -> Grid {
         Occupancy::Unknown => 255,
     };
     let data: Vec<u8> = floor.boxes.iter().map(byte).collect();
-    let [x_m, y_m] = floor.origin_m;
+    let Plane { origin_m: [x_m, y_m], yaw_rad } = floor.plane;
     Grid {
         timestamp: timestamp(0),
         frame_id: WORLD.into(),
-        pose: pose(&ViewPose::at([x_m, y_m, 0.0])),
+        pose: pose(&ViewPose::heading([x_m, y_m, 0.0], yaw_rad)),
         column_count: floor.width,
         cell_size: Some(Vector2 { x: floor.box_m, y: floor.box_m }),
         row_stride: floor.width,

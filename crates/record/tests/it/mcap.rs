@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use sidestep_kernel::view::{
-    Body, Condition, Entry, Floor, Frame, Kind, Level, Occupancy, Pose, Scan, Scenery, Shape,
+    Body, Condition, Entry, Floor, Frame, Kind, Level, Occupancy, Plane, Pose, Scan, Scenery, Shape,
 };
 use sidestep_record::{Existing, McapEnd, McapOrigin, McapRecorder, McapRun, Status, is_mcap};
 
@@ -23,7 +23,13 @@ fn about() -> McapOrigin {
 
 fn scenery() -> Scenery {
     let boxes = vec![Occupancy::Free, Occupancy::Wall, Occupancy::Unknown, Occupancy::Free];
-    let floor = Floor { width: 2, height: 2, box_m: 0.5, origin_m: [1.0, -1.0], boxes };
+    let floor = Floor {
+        width: 2,
+        height: 2,
+        box_m: 0.5,
+        plane: Plane { origin_m: [1.0, -1.0], yaw_rad: 0.0 },
+        boxes,
+    };
     let wall = Shape::Line { points_m: vec![[0.0; 3], [1.0, 0.0, 0.0]], thickness_m: 0.0 };
     Scenery {
         name: "small".into(),

@@ -86,7 +86,9 @@ impl Work<'_> {
             Ok(Ok(outcome)) => outcome.map(Ok),
             // For example a seed for which a scenario has no start: the other runs continue.
             Ok(Err(Error::Input(e))) => Some(Ok(Outcome::failed(cell, e.to_string()))),
+            Ok(Err(Error::WithinACycle(_))) => None,
             Ok(Err(failure)) => Some(Err(failure)),
+            Err(payload) if self.watcher.interrupt().explains(payload.as_ref()) => None,
             Err(_) => Some(Ok(Outcome::failed(cell, "a bug in sidestep: see standard error"))),
         }
     }
@@ -99,7 +101,7 @@ impl Work<'_> {
         workers: usize,
     ) -> Result<Option<Outcome>, Error> {
         let begun = Instant::now();
-        let started = start(self.worlds, cell, variant, workers)?;
+        let started = start(self.worlds, cell, variant, workers)?.heeding(self.watcher.interrupt());
         let compiled = Instant::now();
         let outcome = started.run(&|| self.watcher.go_on());
         Ok(outcome.map(|outcome| timed(outcome, [compiled - begun, compiled.elapsed()])))

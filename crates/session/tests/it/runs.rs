@@ -1,6 +1,7 @@
 //! One run: started, recorded, stopped, resumed, replayed, reported.
 
-use crate::support::{Place, StopAt, WORLDS};
+use crate::support::{InterruptAt, Place, StopAt, WORLDS};
+use sidestep_kernel::Interrupt;
 use sidestep_record::read_table;
 use sidestep_session::report::document;
 use sidestep_session::{Error, Journey, Keep, Recorded, Status, Unwatched, replay_all, replay_to};
@@ -42,6 +43,27 @@ fn a_run_that_was_stopped_comes_to_the_same_end_with_the_same_rows() {
     for table in ["trajectories", "events"] {
         let rows = |folder| read_table(folder, table, ..).expect("whole").columns;
         assert!(rows(&whole) == rows(&parts), "{table}");
+    }
+}
+
+#[test]
+fn a_run_that_was_interrupted_within_a_cycle_comes_to_the_same_end_with_the_same_rows() {
+    let place = Place::new();
+    let (whole, in_one_go) = place.record("whole");
+    for workers in [1, 3] {
+        let parts = place.path(&format!("parts-{workers}"));
+        let keep = Keep { folder: Some(&parts), ..Keep::default() };
+        let watcher = InterruptAt { cycle: 1700, interrupt: Interrupt::default() };
+        let ended = place.start(workers, keep).expect("started").travel(&watcher);
+        let Err(Error::WithinACycle(cycle)) = ended else { panic!("{ended:?}") };
+        assert!((1700..6000).contains(&cycle), "{cycle}");
+        let resumed = Journey::resume(WORLDS, &parts, 2, None).expect("as after a kill");
+        let resumed = resumed.travel(&Unwatched).expect("no bug");
+        assert_eq!((&resumed.digest, &resumed.metrics), (&in_one_go.digest, &in_one_go.metrics));
+        for table in ["trajectories", "events"] {
+            let rows = |folder| read_table(folder, table, ..).expect("whole").columns;
+            assert!(rows(&whole) == rows(&parts), "{table}");
+        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Runs of the pond in a folder of their own.
 
 use crate::pond::Pond;
-use sidestep_kernel::Cycle;
+use sidestep_kernel::{Cycle, Interrupt};
 use sidestep_scenario::{Kind, Worlds};
 use sidestep_session::{Error, Journey, Keep, Progress, Summary, Unwatched, Watcher, read};
 use std::path::{Path, PathBuf};
@@ -64,6 +64,27 @@ impl Watcher for StopAt {
 
     fn go_on(&self) -> bool {
         !self.is_there.load(Ordering::Relaxed)
+    }
+}
+
+/// A watcher that interrupts the first cycle of a slice once a run has reached a cycle, and never
+/// asks to stop between two.
+pub(crate) struct InterruptAt {
+    pub(crate) cycle: Cycle,
+    pub(crate) interrupt: Interrupt,
+}
+
+impl Watcher for InterruptAt {
+    fn at(&self, progress: Progress<'_>) {
+        if let Progress::Cycles { done, .. } = progress
+            && done >= self.cycle
+        {
+            self.interrupt.raise();
+        }
+    }
+
+    fn interrupt(&self) -> Interrupt {
+        self.interrupt.clone()
     }
 }
 

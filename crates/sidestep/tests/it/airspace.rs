@@ -2,13 +2,13 @@
 //! workers, recorded or not, resumed or not. L1 for airplanes: with the shield nobody comes
 //! nearer than the separation, whatever the method, once the first fallbacks are apart.
 
-use sidestep::kernel::Simulation;
 use sidestep::kernel::ports::MemoryRecorder;
+use sidestep::kernel::{Interrupt, Simulation};
 use sidestep::scenario::Source;
 use sidestep::worlds::airspace::{AirspaceRun, airspace_run};
 
 /// Random traffic in which several groups form and part, with everything that can err.
-fn traffic(more: &str) -> Source {
+pub(crate) fn traffic(more: &str) -> Source {
     let text = format!(
         "format = 1\nworld = \"airspace\"\nseed = 7\n[airspace]\n{more}\n\
          [airspace.generator]\nkind = \"random\"\nn = 24\nradius_m = 16000.0\n"
@@ -22,7 +22,11 @@ fn run(source: &Source, workers: usize) -> AirspaceRun {
     run
 }
 
-const ERRING: &str = "position_noise_m = 20.0\nheading_noise_deg = 1.0\nwind_m_s = [5.0, -3.0]";
+pub(crate) const ERRING: &str =
+    "position_noise_m = 20.0\nheading_noise_deg = 1.0\nwind_m_s = [5.0, -3.0]";
+
+/// Nobody avoids anybody, so that pairs lose their separation.
+pub(crate) const LOSING: &str = "method = \"none\"\nshield = \"off\"";
 
 #[test]
 fn any_number_of_workers_gives_the_same_bits() {
@@ -166,8 +170,40 @@ fn wrong_scenarios_are_refused_with_a_remedy() {
         ("[airspace]\nupdate = { kind = \"brouwer\", step = nan }\n", "above 0 and at most 1"),
         ("[airspace]\nupdate = { kind = \"nearest-newton\", step = 0.0 }\n", "above 0 and at most"),
         ("[airspace]\nposition_noise_m = 1e300\n", "give 0 to 1e6"),
+        ("[airspace]\nheading_noise_deg = 1e300\n", "nothing is left of a heading"),
+        ("[airspace]\ndt_s = 1e12\ndtau_s = 1e12\n", "one decision an hour"),
+        ("[airspace]\ndt_s = 3600\n", "up to 1000"),
+        ("[airspace]\ndt_s = 1e-9\ndtau_s = 1e-9\n", "0.01 to 3600 s"),
+        ("[airspace]\nhorizon = 60\ndtau_s = 5.0\n", "write horizon_s = 300.0"),
+        ("[airspace]\nhorizon_s = 4.0\n", "at least dt_s = 5"),
+        ("[airspace]\nhorizon_s = 1e300\n", "nobody predicts more than a day"),
+        ("[airspace]\nhorizon_s = 20000\n", "10000 steps"),
+        ("[airspace]\ntolerance_m = 1e300\n", "0.001 to 1e6 m"),
+        ("[airspace]\nalpha = 1e300\n", "1e-12 to 1e6"),
+        ("[airspace]\nbeta = 1e-300\n", "0.001 to 1"),
+        ("[airspace]\ninflation = 1e9\n", "0.1 to 10"),
+        ("[airspace]\ncooling = 1e-300\n", "0.01 to 1"),
+        ("[airspace]\nvertical_m = 1e-7\n", "1 to 1e9 m"),
+        ("[airspace]\ngroup_memory_gib = 1e300\n", "1e-6 to 1024 GiB"),
+        ("[airspace]\nholds_s = [1e300]\n", "0.001 to 86400 s"),
+        ("[airspace]\nlegs = { turns_s = [90.0], until_s = [60.0] }\n", "ends after 60 s"),
+        ("[airspace]\nlegs = { turns_s = [9.0] }\n", "give both"),
+        ("[airspace]\nutility = \"private\"\n", "expectations are exact"),
+        (
+            "[airplane]\nturns = 99\n[airspace]\nhorizon_s = 9000\nholds_s = [1, 2, 3]\n",
+            "steps to compare all of two airplanes",
+        ),
+        (
+            "[airspace]\ndeployment = \"team\"\n\
+             network = { silent = [{ airplane = 1, from_s = 9, until_s = 3 }] }\n",
+            "until_s after from_s",
+        ),
+        (
+            "[[airplanes]]\ntrack = [[0, 0, 0, 0], [1e-9, 1000, 0, 0], [9, 0, 0, 0]]\n",
+            "faster than 1e6 m/s",
+        ),
         ("[airspace]\nshield = false\n", "give \"on\" or \"off\""),
-        ("[airspace]\npreset = \"paper\"\nmax_rounds = 4000000000\n", "fewer rounds"),
+        ("[airspace]\npreset = \"paper\"\nmax_rounds = 4000000000\n", "up to 10000"),
         (
             "[airspace]\npreset = \"paper\"\norder = \"sequence\"\nmax_rounds = 4000\n",
             "order = \"parallel\"",
@@ -189,4 +225,47 @@ fn wrong_scenarios_are_refused_with_a_remedy() {
         let error = airspace_run(&Source::new("w.toml", text, ""), 1).expect_err(section);
         assert!(error.to_string().contains(cause), "{section}: {error}");
     }
+}
+
+/// Counts looks instead of time: between two of them lies at most the work of one pair of airplanes, or
+/// of one player, whose size the scenario's bounds limit.
+#[test]
+fn no_cycle_of_many_airplanes_works_long_without_a_look_at_the_interrupt() {
+    let looks = |n: u64, more: &str| {
+        let text = format!(
+            "format = 1\nworld = \"airspace\"\n[airspace]\n{more}\n\
+             [airspace.generator]\nkind = \"superconflict\"\nn = {n}\n"
+        );
+        let mut run = run(&Source::new("s", text, ""), 1);
+        let interrupt = Interrupt::default();
+        run.heed(interrupt.clone());
+        run.advance(1);
+        interrupt.looks()
+    };
+    let team = "deployment = \"compact-team\"";
+    for more in ["", "shield = \"off\"", team, "preset = \"paper\""] {
+        for n in [10, 20] {
+            let (pairs, found) = (n * (n - 1) / 2, looks(n, more));
+            assert!(found >= pairs, "{more}, {n} airplanes: {found} looks, {pairs} pairs");
+        }
+    }
+}
+
+/// Counts looks, of which there is one for each comparison and each step that is flown in advance.
+#[test]
+fn starting_up_takes_nearly_linear_work() {
+    let looks = |n: u32| {
+        let text = format!(
+            "format = 1\nworld = \"airspace\"\n[airspace.generator]\nkind = \"random\"\nn = {n}\n"
+        );
+        let interrupt = Interrupt::default();
+        let heeded = interrupt.heeded_here();
+        let started = run(&Source::new("s", text, ""), 1);
+        drop(heeded);
+        assert_eq!(started.agents(), n as usize);
+        interrupt.looks() as f64
+    };
+    // Four times as many may take eight times the work; the square would be sixteen.
+    let ratio = looks(1600) / looks(400);
+    assert!((3.0..8.0).contains(&ratio), "{ratio}");
 }

@@ -310,6 +310,12 @@ fn wrong_tracks_and_orders_are_refused_with_a_remedy() {
         ("", told("{ at_s = 9.0, climb_m_s = 3.0 }"), "altitude_m"),
         ("", told("{ at_s = 9.0, turn = 3.0 }"), "unknown key"),
         ("wind_m_s = [30.0, 0.0]", told("{ at_s = 9.0, speed_m_s = 20.0 }"), "wind"),
+        ("replay_until_s = 60.0", plane([0.0, 0.0], 0.0, [1.0, 1.0], ""), "leave it out"),
+        (
+            "[airspace.generator]\nkind = \"random\"\nn = 2\njitter_m = 9.0",
+            String::new(),
+            "leave it out",
+        ),
         ("replay_until_s = -1.0", plane([0.0, 0.0], 0.0, [1.0, 1.0], ""), "inf"),
     ];
     for (airspace, airplanes, remedy) in wrong {

@@ -4,9 +4,11 @@
 use sidestep::kernel::Simulation;
 use sidestep::kernel::ports::{MemoryRecorder, Recorder, Values};
 use sidestep::scenario::Source;
-use sidestep::worlds::chain::ChainRun;
-use sidestep::worlds::chain::scenario::Compiled;
+use sidestep::worlds::chain::metrics::Metrics;
+use sidestep::worlds::chain::{ChainRun, ChainState, ChainWorld, chain_run};
 use sidestep_kernel::math::hypot;
+use std::any::Any;
+use std::ops::{Deref, DerefMut};
 
 /// Four chains that wander among pillars in a room of 5 m, and often come near each other.
 pub(crate) const SEVERAL: &str = "
@@ -106,7 +108,7 @@ patience_s = 1000.0
 ";
 
 /// A chain that breaks in cycle 10 and is joined from cycle 20 on, and one that stays whole.
-const BROKEN: &str = "
+pub(crate) const BROKEN: &str = "
 [chain]
 dt_s = 0.1
 self_collision = false
@@ -136,7 +138,7 @@ lasts_s = 1.0
 ";
 
 /// Two tasks of an operator, one of targets, and connectors that break down.
-const TOLD: &str = "
+pub(crate) const TOLD: &str = "
 [chain]
 dt_s = 0.05
 [[obstacles]]
@@ -176,17 +178,55 @@ pub(crate) fn source(seed: u64, text: &str) -> Source {
     Source::new("s.toml", text, "")
 }
 
-fn run<const D: usize>(source: &Source, workers: usize) -> ChainRun<D> {
-    let compiled = Compiled::new(source).unwrap_or_else(|e| panic!("{e}"));
-    let mut run = compiled.start(source, workers);
-    run.share_always();
-    run
+/// A run whose state tests look into. It stays behind the face of all worlds, so that the chain is not
+/// compiled once more for its tests.
+struct Running<const D: usize>(Box<dyn Simulation>);
+
+impl<const D: usize> Running<D> {
+    fn state(&self) -> &ChainState<D> {
+        self.chains().state()
+    }
+
+    fn world(&self) -> &ChainWorld<D> {
+        self.chains().world()
+    }
+
+    fn metrics(&self) -> Metrics {
+        self.chains().metrics()
+    }
+
+    fn chains(&self) -> &ChainRun<D> {
+        let run: &dyn Any = &*self.0;
+        run.downcast_ref().expect("a run of that many dimensions")
+    }
+}
+
+impl<const D: usize> Deref for Running<D> {
+    type Target = dyn Simulation;
+
+    fn deref(&self) -> &dyn Simulation {
+        &*self.0
+    }
+}
+
+impl<const D: usize> DerefMut for Running<D> {
+    fn deref_mut(&mut self) -> &mut dyn Simulation {
+        &mut *self.0
+    }
+}
+
+fn run<const D: usize>(source: &Source, workers: usize) -> Running<D> {
+    let mut run = chain_run(source, workers).unwrap_or_else(|e| panic!("{e}"));
+    let chains: &mut dyn Any = &mut *run;
+    chains.downcast_mut::<ChainRun<D>>().expect("of that many dimensions").share_always();
+    Running(run)
 }
 
 /// To a cycle, or to the end of all tasks.
-fn advance_to<const D: usize>(run: &mut ChainRun<D>, cycle: u64) {
+fn advance_to<const D: usize>(run: &mut Running<D>, cycle: u64) {
     while run.cycle() < cycle && !run.is_over() {
-        run.advance(cycle - run.cycle());
+        let left = cycle - run.cycle();
+        run.advance(left);
     }
 }
 
@@ -194,12 +234,13 @@ fn recorded<const D: usize>(
     source: &Source,
     workers: usize,
     cycles: u64,
-) -> (ChainRun<D>, MemoryRecorder) {
+) -> (Running<D>, MemoryRecorder) {
     let mut run = run::<D>(source, workers);
     run.begin_recording();
     let mut recorder = MemoryRecorder::new(&run.schemas());
     while run.cycle() < cycles && !run.is_over() {
-        run.advance(7.min(cycles - run.cycle()));
+        let left = cycles - run.cycle();
+        run.advance(left.min(7));
         run.record(&mut recorder).expect("memory has room");
     }
     recorder.finish().expect("memory has room");
@@ -207,7 +248,7 @@ fn recorded<const D: usize>(
 }
 
 /// What came of each chain; nothing in it is about time that was spent.
-fn outcome<const D: usize>(run: &ChainRun<D>) -> String {
+fn outcome<const D: usize>(run: &Running<D>) -> String {
     let one = |slot| format!("{:?}", run.world().metrics_of(run.state(), slot));
     (0..run.state().len()).map(one).collect()
 }
@@ -338,7 +379,7 @@ fn are_far<const D: usize>(one: [[f64; D]; 2], two: [[f64; D]; 2]) -> bool {
 }
 
 /// Connectors and rods of a chain as capsules.
-fn parts<const D: usize>(run: &ChainRun<D>, slot: usize) -> Vec<([[f64; D]; 2], f64)> {
+fn parts<const D: usize>(run: &Running<D>, slot: usize) -> Vec<([[f64; D]; 2], f64)> {
     let body = run.state().body(slot);
     let (points, chain) = (body.chain.points(), &body.chain);
     let balls = points.iter().zip(chain.connectors()).map(|(p, c)| ([*p; 2], c.radius_m));
@@ -347,7 +388,7 @@ fn parts<const D: usize>(run: &ChainRun<D>, slot: usize) -> Vec<([[f64; D]; 2], 
 }
 
 /// The least distance of a chain from balls.
-fn clearance<const D: usize>(run: &ChainRun<D>, slot: usize, balls: &[([f64; D], f64)]) -> f64 {
+fn clearance<const D: usize>(run: &Running<D>, slot: usize, balls: &[([f64; D], f64)]) -> f64 {
     let least = |(ends, radius_m): ([[f64; D]; 2], f64)| {
         let to = |(at, r): &([f64; D], f64)| to_segment(*at, ends) - r - radius_m;
         balls.iter().map(to).fold(f64::INFINITY, f64::min)
@@ -356,7 +397,7 @@ fn clearance<const D: usize>(run: &ChainRun<D>, slot: usize, balls: &[([f64; D],
 }
 
 /// All balls of a world at a cycle.
-fn balls<const D: usize>(run: &ChainRun<D>, cycle: u64) -> Vec<([f64; D], f64)> {
+fn balls<const D: usize>(run: &Running<D>, cycle: u64) -> Vec<([f64; D], f64)> {
     use sidestep::worlds::chain::geometry::Core;
     let world = run.world();
     let moving: Vec<_> = world.movers.at(world.starts_s(cycle)).collect();
@@ -487,7 +528,7 @@ fn track(rows: &MemoryRecorder, connector: u32) -> Vec<[f64; 2]> {
 
 /// Events as (cycle, name, connector, reason, value).
 fn events<const D: usize>(
-    run: &ChainRun<D>,
+    run: &Running<D>,
     rows: &MemoryRecorder,
 ) -> Vec<(u64, String, u32, String, f64)> {
     let schemas = run.schemas();

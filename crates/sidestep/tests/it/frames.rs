@@ -7,7 +7,7 @@ use sidestep::kernel::ports::MemoryRecorder;
 use sidestep::kernel::view::{Kind, Look, Shape};
 use sidestep::scenario::Source;
 use sidestep::worlds::airspace::airspace_run;
-use sidestep::worlds::chain::scenario::Compiled;
+use sidestep::worlds::chain::chain_run;
 use sidestep::worlds::robots::robots_run;
 
 const LOOK: Look = Look { scanning_bodies: usize::MAX };
@@ -25,8 +25,7 @@ fn robots(workers: usize) -> Box<dyn Simulation> {
 fn chains(text: &str, workers: usize) -> Box<dyn Simulation> {
     let text = format!("format = 1\nworld = \"chain\"\nseed = 9\n{text}");
     let source = Source::new("chains", text, "");
-    let compiled = Compiled::<2>::new(&source).unwrap_or_else(|e| panic!("{e}"));
-    Box::new(compiled.start(&source, workers))
+    chain_run(&source, workers).unwrap_or_else(|e| panic!("{e}"))
 }
 
 fn airplanes(workers: usize) -> Box<dyn Simulation> {

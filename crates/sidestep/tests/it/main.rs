@@ -14,4 +14,6 @@ mod frames;
 mod laws;
 mod obstacle_rule;
 mod pomdp;
+mod radio;
+mod resumed;
 mod tiles;

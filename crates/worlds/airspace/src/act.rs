@@ -1,15 +1,18 @@
 //! *Act*: the airplanes of a group decide together and fly for `dt`.
 
 mod approaches;
+mod avoid;
 mod entry;
+mod errors;
 mod flight;
 mod orders;
 mod protect;
 mod step;
 
 use super::Turn;
-use super::decide::wanted;
+use super::decide::{straight_way, wanted};
 use super::flight::Known;
+use super::intruder::Intruder;
 use super::perceive::known;
 use super::shield::Way;
 use flight::{Course, Flight};
@@ -32,15 +35,21 @@ pub(super) fn act(turn: &mut Turn<'_>, group: &[Slot]) {
 fn fly(turn: &mut Turn<'_>, group: &[Slot]) {
     let Turn { world, state, now, .. } = *turn;
     let flown: Vec<Slot> =
-        group.iter().copied().filter(|&slot| !world.is_replayed(slot, now)).collect();
+        group.iter().copied().filter(|&slot| !world.is_intruder(slot, now)).collect();
     if world.shield {
+        entry::release(turn, &flown);
         entry::admit(turn, &flown);
+        errors::name(turn, &flown);
     }
-    orders::carry_out(turn, &flown);
-    let mut ways = ways(turn, &flown).into_iter();
+    orders::carry_out(turn, group, &flown);
+    let intruders = Intruder::all(turn, group);
+    let mut ways = ways(turn, &flown, &intruders).into_iter();
     let flights = group.iter().map(|&slot| {
         let course = match &world.airplanes[slot as usize].track {
             Some(track) if world.is_replayed(slot, now) => Course::Track(track),
+            _ if world.is_intruder(slot, now) => {
+                Course::Way(straight_way(turn, slot), state.stage(world, slot))
+            }
             _ => Course::Way(ways.next().unwrap_or_default(), state.stage(world, slot)),
         };
         Flight::new(turn, slot, course)
@@ -50,15 +59,15 @@ fn fly(turn: &mut Turn<'_>, group: &[Slot]) {
 }
 
 /// Returns the ways of the airplanes that the method flies.
-fn ways(turn: &mut Turn<'_>, flown: &[Slot]) -> Vec<Way> {
+fn ways(turn: &mut Turn<'_>, flown: &[Slot], intruders: &[Intruder]) -> Vec<Way> {
     let Turn { world, state, now, clock, .. } = *turn;
     let group: Vec<Known> = flown.iter().map(|&slot| known(world, state, now, slot)).collect();
     let began_ns = clock.thread_cpu_ns();
     let mut contacts = state.take_contacts(flown);
-    let candidates = wanted(turn, &group, &mut contacts);
+    let candidates = wanted(turn, &group, intruders, &mut contacts);
     turn.scratch.decide_ns += clock.thread_cpu_ns() - began_ns;
     let ways = if world.shield {
-        protect::shielded(turn, flown, candidates, &mut contacts)
+        protect::shielded(turn, flown, candidates, intruders, &mut contacts)
     } else {
         candidates.into_iter().map(|ways| ways.into_iter().next().unwrap_or_default()).collect()
     };

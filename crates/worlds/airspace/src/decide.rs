@@ -10,14 +10,16 @@ use super::agents::network::Traffic;
 use super::deploy::{self, Deployment};
 use super::events::{Event, EventKind};
 use super::flight::{Action, Known};
+use super::intruder::Intruder;
 use super::memory::group_takes_bytes;
 use super::objective::{Options, game};
+use super::perceive::known;
 use super::purpose;
 use super::shield::Way;
 use super::world::{AirspaceWorld, Method};
 use serde::{Deserialize, Serialize};
 use sidestep_collectives::optimize;
-use sidestep_kernel::{Cycle, EntityId};
+use sidestep_kernel::{Cycle, EntityId, Slot};
 use wishes::straight;
 
 /// One optimization: of a group, in a cycle.
@@ -64,16 +66,28 @@ impl Effort {
 pub(super) fn wanted(
     turn: &mut Turn<'_>,
     group: &[Known],
+    intruders: &[Intruder],
     contacts: &mut [Contacts],
 ) -> Vec<Vec<Way>> {
     let world = turn.world;
+    if let Method::Mvp | Method::Orca = world.method {
+        return velocity::by_velocity(turn, group, intruders);
+    }
     let wishes = match world.method {
-        _ if group.len() < 2 => all_straight(world, group),
-        Method::None => all_straight(world, group),
-        Method::Pc => optimized(turn, group, contacts),
-        Method::Mvp | Method::Orca => velocity::by_velocity(world, group),
+        _ if group.len() + intruders.len() < 2 => all_straight(world, group),
+        _ if group.is_empty() => Vec::new(),
+        Method::Pc => optimized(turn, group, intruders, contacts),
+        _ => all_straight(world, group),
     };
     group.iter().zip(wishes).map(|(known, wishes)| wishes::ways(world, *known, &wishes)).collect()
+}
+
+/// Returns the way straight to its next way-point of an airplane that minds nobody.
+pub(super) fn straight_way(turn: &Turn<'_>, slot: Slot) -> Way {
+    let Turn { world, state, now, .. } = *turn;
+    let known = known(world, state, now, slot);
+    let wishes = straight(world, known);
+    wishes::ways(world, known, &wishes[..1]).swap_remove(0)
 }
 
 fn all_straight(world: &AirspaceWorld, group: &[Known]) -> Vec<Vec<Action>> {
@@ -82,19 +96,24 @@ fn all_straight(world: &AirspaceWorld, group: &[Known]) -> Vec<Vec<Action>> {
 
 /// Returns the wishes by probability collectives: the chosen action first, then the others by the
 /// cost that the optimizer expects of them.
-fn optimized(turn: &mut Turn<'_>, group: &[Known], contacts: &mut [Contacts]) -> Vec<Vec<Action>> {
-    let &mut Turn { world, now, ref mut scratch, .. } = turn;
+fn optimized(
+    turn: &mut Turn<'_>,
+    group: &[Known],
+    intruders: &[Intruder],
+    contacts: &mut [Contacts],
+) -> Vec<Vec<Action>> {
+    let &mut Turn { world, now, .. } = turn;
     if group_takes_bytes(world, group) > world.group_bytes {
         let event = Event::of(now, EventKind::GroupTooLarge, group[0].slot);
-        scratch.events.push(event.with(group.len() as f64));
+        turn.scratch.events.push(event.with(group.len() as f64));
         return all_straight(world, group);
     }
     let (decided, traffic) = match world.deployment {
-        Deployment::Direct => (direct(world, group, now), Traffic::default()),
-        _ => deploy::optimized(world, now, group, contacts, &mut scratch.events),
+        Deployment::Direct => (direct(world, group, intruders, now), Traffic::default()),
+        _ => deploy::optimized(turn, group, intruders, contacts),
     };
     let first = decided.iter().flatten().next();
-    scratch.optimizations.push(Optimization {
+    turn.scratch.optimizations.push(Optimization {
         cycle: now,
         airplane: group[0].slot,
         airplanes: group.len() as u32,
@@ -111,8 +130,14 @@ fn optimized(turn: &mut Turn<'_>, group: &[Known], contacts: &mut [Contacts]) ->
 }
 
 /// Lets one process decide for all.
-fn direct(world: &AirspaceWorld, group: &[Known], now: Cycle) -> Vec<Option<Decided>> {
-    let options: Vec<Options> = group.iter().map(|known| world.options(*known)).collect();
+fn direct(
+    world: &AirspaceWorld,
+    group: &[Known],
+    intruders: &[Intruder],
+    now: Cycle,
+) -> Vec<Option<Decided>> {
+    let options: Vec<Options> =
+        group.iter().map(|known| world.options(*known, intruders)).collect();
     let game = game(&world.objective, &options);
     let uniform =
         |player: usize, k: u64| purpose::sample(&world.streams, group[player].slot, now, k);

@@ -7,8 +7,8 @@ use sidestep_kernel::{Cycle, EntityId};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum EventKind {
-    /// Two airplanes have come nearer than their separation; the value is their distance at that
-    /// moment, in meters.
+    /// Two airplanes have come nearer than their separation; the value is their closest approach in
+    /// the step of `dtau` in which they did, in meters.
     LossOfSeparation,
     /// An airplane has finished with its last way-point; the value is its delay in seconds.
     Arrival,
@@ -26,11 +26,17 @@ pub enum EventKind {
     /// A group is too large for the memory allowed: its airplanes fly straight on, as far as the
     /// shield lets them; the value is the number of airplanes.
     GroupTooLarge,
+    /// An airplane's errors exceed the bounds for which the shield allows; the value is how many
+    /// times.
+    BeyondBound,
+    /// Whatever an airplane flies in this `dt`, another one that minds nobody can reach it; the
+    /// value is their distance in meters.
+    Intruder,
 }
 
 impl EventKind {
     /// All kinds.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 10] = [
         Self::LossOfSeparation,
         Self::Arrival,
         Self::Override,
@@ -39,6 +45,8 @@ impl EventKind {
         Self::Deadline,
         Self::HeldBack,
         Self::GroupTooLarge,
+        Self::BeyondBound,
+        Self::Intruder,
     ];
 
     /// Returns its name in files.
@@ -52,6 +60,8 @@ impl EventKind {
             Self::Deadline => "deadline",
             Self::HeldBack => "held-back",
             Self::GroupTooLarge => "group-too-large",
+            Self::BeyondBound => "beyond-bound",
+            Self::Intruder => "intruder",
         }
     }
 }

@@ -31,6 +31,8 @@ pub(super) struct AirplaneSection {
     pub(super) omega_max_deg_s: Option<Number<TurnRate>>,
     pub(super) separation_m: Option<Measure>,
     pub(super) turns: Option<Turns>,
+    #[serde(default)]
+    pub(super) intruder: bool,
 }
 
 #[derive(Debug, Default, Deserialize)]

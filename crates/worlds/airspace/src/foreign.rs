@@ -1,6 +1,6 @@
 //! Traffic in other programs' files, read as scenarios.
 
-use super::traffic::{from_bluesky, from_tracks, has_length, not_flown};
+use super::traffic::{bluesky_rules, from_bluesky, from_tracks, has_length, not_flown};
 use serde_json::{Value, json};
 use sidestep_import::bluesky::{self, ScnFile};
 use sidestep_import::traffic::{self, RecordedTraffic};
@@ -33,31 +33,38 @@ fn form(file: &Path) -> Form {
 /// When the file cannot be read.
 pub(super) fn translate(file: &Path) -> Result<Option<Foreign>, InputError> {
     let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let (scenario, (json, lines)) = match form(file) {
+    let (scenario, (mut json, lines)) = match form(file) {
         Form::Other => return Ok(None),
         Form::Bluesky => {
             let scn = bluesky::read(file)?;
-            (from_bluesky(&name, &scn), told_of_bluesky(&scn))
+            let rules = bluesky_rules(&file.display().to_string(), &scn);
+            (from_bluesky(&name, &scn), told_of_bluesky(&scn, &rules.refused))
         }
         Form::Tracks => {
             let tracks = traffic::read(file)?;
             (from_tracks(&name, &tracks), told_of_tracks(&tracks))
         }
     };
+    if scenario.is_none() {
+        // As of a scenario, because whoever counts airplanes does not ask for the reason.
+        json["airplanes"] = 0.into();
+    }
     let scenario = scenario.ok_or_else(|| {
-        let remedy = "give a file that creates aircraft at known places";
-        InputError::new(file.display(), "no aircraft in it has a place", remedy)
+        let remedy = "give a file that creates aircraft at known places, with speeds";
+        InputError::new(file.display(), "no aircraft in it has a place and a speed", remedy)
     });
     Ok(Some(Foreign { scenario, json, lines }))
 }
 
-fn told_of_bluesky(scn: &ScnFile) -> (Value, Lines) {
+/// Returns the report on a file; `beside` are commands that could be read but not flown.
+fn told_of_bluesky(scn: &ScnFile, beside: &[InputError]) -> (Value, Lines) {
     let words = |errors: &[InputError]| errors.iter().map(ToString::to_string).collect::<Vec<_>>();
+    let refused = [&scn.refused[..], beside].concat();
     let json = json!({
         "command_lines": scn.command_lines,
         "unparsed_lines": scn.unparsed.len(),
         "unparsed": words(&scn.unparsed),
-        "refused": words(&scn.refused),
+        "refused": words(&refused),
         "commands": scn.commands,
         "not_understood": scn.not_understood,
         "not_flown": not_flown(scn),
@@ -73,7 +80,7 @@ fn told_of_bluesky(scn: &ScnFile) -> (Value, Lines) {
     lines.extend(first_named("left out, place unknown", &without_place(scn)));
     lines.extend(first_named("unknown way-points", &unresolved_names(scn)));
     lines.extend(listed("unparsed", &scn.unparsed));
-    lines.extend(listed("not carried out", &scn.refused));
+    lines.extend(listed("not carried out", &refused));
     (json, lines)
 }
 

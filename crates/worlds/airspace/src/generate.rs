@@ -3,8 +3,9 @@
 use super::flight::{Airplane, Model, Point, Pose, distance_m};
 use super::purpose;
 use serde::{Deserialize, Serialize};
-use sidestep_kernel::math;
 use sidestep_kernel::stream::{Draws, Streams};
+use sidestep_kernel::{interrupt, math};
+use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 /// Largest number of draws, per airplane, for a place far enough from all others.
@@ -30,6 +31,8 @@ pub(super) struct Order<'a> {
     pub(super) radius_m: f64,
     pub(super) jitter_m: f64,
     pub(super) model: &'a Model,
+    /// Further meters between the starts of random traffic, for errors that the shield allows for.
+    pub(super) errors_m: f64,
 }
 
 /// Returns the airplanes, or, as an error, how many found a place before there was none left.
@@ -53,6 +56,7 @@ fn airplane(order: &Order<'_>, from: Point, to: Vec<Point>) -> Airplane {
         leaves_s: f64::INFINITY,
         orders: Vec::new(),
         track: None,
+        is_intruder: false,
     }
 }
 
@@ -84,17 +88,27 @@ fn superconflict(order: &Order<'_>, streams: &Streams) -> Vec<Airplane> {
 /// radius away. Starts are so far apart that first fallbacks are, too: an orbit's diameter each,
 /// and the separation.
 fn random(order: &Order<'_>, streams: &Streams) -> Result<Vec<Airplane>, usize> {
-    let gap_m = 4.0 * order.model.turn_radius_m() + order.model.separation_m + 1.0;
-    let mut starts: Vec<Point> = Vec::new();
+    let gap_m = 4.0 * order.model.turn_radius_m() + order.model.separation_m + order.errors_m + 1.0;
+    // Starts by squares as wide as the gap, so that only those around a place are compared with it.
+    let mut starts: BTreeMap<[i64; 2], Vec<Point>> = BTreeMap::new();
+    let square = |at: Point| at.map(|v| (v / gap_m).floor() as i64);
     let mut all = Vec::new();
     for id in 0..order.n {
         let mut draws = draws(streams, id);
-        let free = |at: &Point| starts.iter().all(|other| distance_m(*at, *other) >= gap_m);
+        let free = |at: &Point| {
+            let [x, y] = square(*at);
+            let rows = (x - 1..=x + 1).map(|x| starts.range([x, y - 1]..=[x, y + 1]));
+            let mut near = rows.flatten().flat_map(|(_, starts)| starts);
+            near.all(|other| {
+                interrupt::look();
+                distance_m(*at, *other) >= gap_m
+            })
+        };
         let from = (0..TRIES).map(|_| in_disc(order.radius_m, &mut draws)).find(free);
         let from = from.ok_or(id)?;
         let far = |to: &Point| distance_m(from, *to) >= 0.5 * order.radius_m;
         let to = (0..TRIES).map(|_| in_disc(order.radius_m, &mut draws)).find(far);
-        starts.push(from);
+        starts.entry(square(from)).or_default().push(from);
         all.push(airplane(order, from, vec![to.unwrap_or([-from[0], -from[1]])]));
     }
     Ok(all)

@@ -14,7 +14,7 @@
 
 mod act;
 pub mod agents;
-mod baseline;
+pub mod baseline;
 pub mod bundle;
 mod decide;
 pub mod deploy;
@@ -23,6 +23,7 @@ pub mod flight;
 mod flight_plan;
 mod foreign;
 mod generate;
+mod intruder;
 mod join;
 mod kind;
 mod memory;
@@ -36,6 +37,7 @@ pub mod scenario;
 pub mod shield;
 pub mod state;
 pub mod traffic;
+mod traffic_rules;
 mod view;
 mod words;
 pub mod world;
@@ -44,6 +46,7 @@ use agents::network::Traffic;
 pub use decide::{Effort, Optimization};
 use events::Event;
 pub use kind::Airspace;
+use rows::FlownLeg;
 pub use run::{AirspaceRun, Books, airspace_run};
 use sidestep_kernel::conflict::Groups;
 use sidestep_kernel::world::Decides;
@@ -65,6 +68,7 @@ pub struct Scratch {
     /// Messages and bytes that the shield has sent.
     exchanged: Traffic,
     events: Vec<Event>,
+    flown: Vec<FlownLeg>,
     /// Pairs without fallbacks that are apart, one of which has just come in: cycle and both
     /// airplanes.
     too_close: Vec<(Cycle, Slot, Slot)>,

@@ -8,9 +8,9 @@ use super::state::AirspaceState;
 use super::world::AirspaceWorld;
 use super::{Scratch, Turn};
 use sidestep_collectives::{Estimator, PairwiseGame};
-use sidestep_kernel::Slot;
 use sidestep_kernel::conflict::Groups;
 use sidestep_kernel::ports::ManualClock;
+use sidestep_kernel::{Slot, interrupt};
 
 /// Returns the largest number of bytes that optimizing a group takes: tables of its pairs, and
 /// predictions, in all the copies that its deployment has of them.
@@ -44,15 +44,20 @@ fn prediction_bytes(world: &AirspaceWorld, group: &[Known]) -> u64 {
 /// Returns the largest number of bytes that the tables of a group's pairs take.
 fn table_bytes(world: &AirspaceWorld, group: &[Known]) -> u64 {
     let actions = |known: &Known| world.actions_of(known.slot).len() as u64;
+    let look_m = |a: &Known, b: &Known| world.look_m(a.slot as usize, b.slot as usize);
+    let widest_m = group.iter().map(|known| look_m(known, known)).fold(0.0, f64::max);
+    // Sorted by x, so that only neighbors in that order have to be compared.
+    let mut by_x: Vec<&Known> = group.iter().collect();
+    by_x.sort_unstable_by(|a, b| a.pose.at[0].total_cmp(&b.pose.at[0]));
     let mut entries = 0;
-    for (k, a) in group.iter().enumerate() {
-        let meets = |b: &&Known| {
-            let apart_m = distance_m(a.pose.at, b.pose.at);
+    for (k, a) in by_x.iter().enumerate() {
+        let beside = by_x[k + 1..].iter().take_while(|b| b.pose.at[0] - a.pose.at[0] <= widest_m);
+        let meets = |b: &&&Known| {
+            interrupt::look();
             (a.altitude_m - b.altitude_m).abs() < world.vertical_m
-                && apart_m <= world.look_m(a.slot as usize, b.slot as usize)
+                && distance_m(a.pose.at, b.pose.at) <= look_m(a, b)
         };
-        entries +=
-            group[k + 1..].iter().filter(meets).map(|b| actions(a) * actions(b)).sum::<u64>();
+        entries += beside.filter(meets).map(|b| actions(a) * actions(b)).sum::<u64>();
     }
     entries * PairwiseGame::BYTES_PER_ENTRY
 }
@@ -86,7 +91,7 @@ mod tests {
     /// actions.
     fn taken(deployment: &str, preset: &str) -> (u64, u64) {
         let text = format!(
-            "format = 1\nworld = \"airspace\"\n[airspace]\npreset = \"{preset}\"\nhorizon = 200\n\
+            "format = 1\nworld = \"airspace\"\n[airspace]\npreset = \"{preset}\"\nhorizon_s = 200.0\n\
              deployment = \"{deployment}\"\n[airspace.generator]\nkind = \"superconflict\"\nn = 4\n"
         );
         let compiled = Compiled::new(&Source::new("m", text, "")).expect("a scenario");

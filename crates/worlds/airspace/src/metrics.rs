@@ -2,7 +2,7 @@
 
 use super::decide::Effort;
 use super::events::{Event, EventKind};
-use super::state::{AirspaceState, Cell, LOOKS_PER_STEP, PairRecord};
+use super::state::{AirspaceState, Cell, PairRecord};
 use super::world::AirspaceWorld;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::{Cycle, EntityId};
@@ -20,6 +20,8 @@ pub struct Ledger {
     pub effort: Effort,
     /// Number of events of each kind.
     pub events: BTreeMap<EventKind, u64>,
+    /// Airplanes whose errors exceeded the shield's bounds, with the first cycle of each.
+    pub beyond_bound: BTreeMap<EntityId, Cycle>,
 }
 
 impl Ledger {
@@ -29,6 +31,9 @@ impl Ledger {
 
     pub(super) fn add_event(&mut self, event: &Event) {
         *self.events.entry(event.kind).or_default() += 1;
+        if event.kind == EventKind::BeyondBound {
+            self.beyond_bound.entry(event.airplane).or_insert(event.cycle);
+        }
     }
 
     fn count(&self, kind: EventKind) -> u64 {
@@ -61,6 +66,9 @@ pub struct Metrics {
     pub multicasts: u64,
     /// Number of bytes if one message could reach all of a group.
     pub multicast_bytes: u64,
+    /// Seconds that all talks took on the network, one after the other; none where one process
+    /// decides for all, or where messages take no time.
+    pub network_s: Option<f64>,
     /// Number of optimizations run.
     pub optimisations: u64,
     /// Mean number of their rounds.
@@ -92,12 +100,24 @@ pub struct Metrics {
     pub orders_delayed: u64,
     /// Pairs for which the shield promises nothing.
     pub too_close: Vec<TooClose>,
+    /// Airplanes whose errors exceeded the shield's bounds: it promises nothing for their pairs.
+    pub beyond_bound: Vec<BeyondBound>,
 }
 
-/// Two airplanes that were too near each other for the shield when the later one came in.
+/// An airplane whose errors exceeded the shield's bounds.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct BeyondBound {
+    /// Time of the first such error, in seconds after the start of the run.
+    pub at_s: f64,
+    /// Id of the airplane.
+    pub airplane: EntityId,
+}
+
+/// Two airplanes that were too near each other for the shield when the later one came in, or one of
+/// which minds nobody and could reach the other.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct TooClose {
-    /// Time when the later one came in, in seconds after the start of the run.
+    /// Time when that began, in seconds after the start of the run.
     pub at_s: f64,
     /// Ids of the two.
     pub airplanes: [EntityId; 2],
@@ -166,6 +186,8 @@ pub fn airplane_metrics(
         alone_s,
         delay_percent: flown_s
             .filter(|_| alone_s > 0.0 && alone_s.is_finite())
+            // One that minds nobody is never delayed.
+            .filter(|_| !world.airplanes[id as usize].is_intruder)
             .map(|s| 100.0 * (s - alone_s) / alone_s),
         shield_overrides: cell.overrides.get(),
         shield_orbits: cell.orbits.get(),
@@ -188,14 +210,10 @@ pub fn pair_metrics(world: &AirspaceWorld, ledger: &Ledger) -> Vec<PairMetrics> 
         airplanes: [a, b],
         nearest_m: record.nearest_m,
         losses: record.losses,
-        lost_s: lost_s(world, record.lost_looks),
+        lost_s: record.lost_ns as f64 / 1e9,
         severity: (1.0 - record.nearest_m / separation_m(a).max(separation_m(b))).max(0.0),
     };
     ledger.pairs.iter().map(one).collect()
-}
-
-fn lost_s(world: &AirspaceWorld, looks: u64) -> f64 {
-    looks as f64 * world.timing.dtau_s / LOOKS_PER_STEP as f64
 }
 
 fn count(state: &AirspaceState, is: impl Fn(&Cell) -> bool) -> u64 {
@@ -224,12 +242,16 @@ pub fn metrics(
     let all: Vec<AirplaneMetrics> = all.collect();
     let delays: Vec<f64> = all.iter().filter_map(|a| a.delay_percent).collect();
     let nearest = ledger.pairs.values().map(|r| r.nearest_m).min_by(f64::total_cmp);
-    let looks: u64 = ledger.pairs.values().map(|r| r.lost_looks).sum();
+    let lost_ns: u64 = ledger.pairs.values().map(|r| r.lost_ns).sum();
+    let beyond_bound = |(&airplane, &cycle): (&EntityId, &Cycle)| BeyondBound {
+        at_s: world.starts_s(cycle),
+        airplane,
+    };
     let Effort { optimizations: optimisations, rounds, unconverged, traffic } = ledger.effort;
     Metrics {
         min_separation_m: nearest,
         losses_of_separation: ledger.pairs.values().map(|r| u64::from(r.losses)).sum(),
-        lost_s: lost_s(world, looks),
+        lost_s: lost_ns as f64 / 1e9,
         arrived: count(state, |cell| cell.arrived_step().is_some()),
         airplanes: all.len() as u64,
         mean_delay_percent: mean(delays.iter().sum(), delays.len()),
@@ -237,6 +259,7 @@ pub fn metrics(
         bytes: traffic.bytes,
         multicasts: traffic.multicasts,
         multicast_bytes: traffic.multicast_bytes,
+        network_s: world.network.as_ref().map(|network| network.seconds(traffic.ticks)),
         optimisations,
         rounds_mean: mean(rounds as f64, optimisations as usize),
         unconverged,
@@ -252,6 +275,7 @@ pub fn metrics(
         orders: all.iter().map(|a| u64::from(a.orders)).sum(),
         orders_delayed: all.iter().map(|a| u64::from(a.orders_delayed)).sum(),
         too_close: ledger.too_close.iter().map(|pair| too_close(world, pair)).collect(),
+        beyond_bound: ledger.beyond_bound.iter().map(beyond_bound).collect(),
     }
 }
 

@@ -7,8 +7,10 @@
 //! ```
 
 use super::flight::{Levels, Point, Prediction};
+use super::intruder::{Intruder, Wanted};
 use serde::{Deserialize, Serialize};
 use sidestep_collectives::PairwiseGame;
+use sidestep_kernel::interrupt;
 
 /// The weights of separation and deviation.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -92,6 +94,8 @@ pub struct Options {
     pub separation_m: f64,
     /// The levels that the airplane occupies.
     pub levels: Levels,
+    /// Costs of the actions beside intruders; empty where there are none.
+    beside: Vec<f64>,
     slices: Vec<Slice>,
 }
 
@@ -101,7 +105,25 @@ impl Options {
         let longest = predictions.iter().map(|p| p.points.len()).max().unwrap_or(0);
         let slices = (0..longest).step_by(SLICE).map(|from| Slice::new(&predictions, from));
         let slices = slices.collect();
-        Self { predictions, separation_m, levels, slices }
+        Self { predictions, separation_m, levels, beside: Vec::new(), slices }
+    }
+
+    /// Returns the same options beside intruders, seen at each point of the predictions.
+    #[must_use]
+    pub(crate) fn beside(
+        mut self,
+        intruders: &[Intruder],
+        objective: &Objective,
+        dtau_s: f64,
+    ) -> Self {
+        if !intruders.is_empty() {
+            let wanted = Wanted { separation_m: self.separation_m, levels: self.levels, dtau_s };
+            let cost = |way: &Prediction| {
+                intruders.iter().map(|one| one.cost(objective, way, &wanted)).sum()
+            };
+            self.beside = self.predictions.iter().map(cost).collect();
+        }
+        self
     }
 
     fn piece(&self, piece: &Piece, from: usize, mask: bool) -> &[Point] {
@@ -192,11 +214,13 @@ pub fn game(objective: &Objective, group: &[Options]) -> PairwiseGame {
     game
 }
 
-/// Returns `alpha Gdev` of every action.
+/// Returns `alpha Gdev` of every action, and its cost beside intruders.
 pub(super) fn own_costs(objective: &Objective, options: &Options) -> Vec<f64> {
     let optimal = options.predictions.last().expect("every airplane has an optimal action");
     let deviation = |p: &Prediction| objective.alpha * objective.deviation(p, optimal);
-    options.predictions.iter().map(deviation).collect()
+    let mut costs: Vec<f64> = options.predictions.iter().map(deviation).collect();
+    costs.iter_mut().zip(&options.beside).for_each(|(cost, beside)| *cost += beside);
+    costs
 }
 
 /// Adds the costs of two airplanes to each other to a game, if there are any.
@@ -206,6 +230,7 @@ pub(super) fn couple(
     (i, a): (usize, &Options),
     (j, b): (usize, &Options),
 ) {
+    interrupt::look();
     if a.levels.meets(&b.levels, objective.vertical_m)
         && let Some(costs) = pair_costs(objective, a, b)
     {

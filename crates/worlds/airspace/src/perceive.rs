@@ -1,7 +1,7 @@
 //! *Perceive*: airplanes list themselves in the neighborhood, and are perceived there.
 
 use super::Turn;
-use super::flight::Known;
+use super::flight::{Known, Pose};
 use super::purpose;
 use super::state::AirspaceState;
 use super::world::AirspaceWorld;
@@ -20,14 +20,19 @@ pub(super) fn claim(turn: &mut Turn<'_>, bodies: Range<usize>) {
     }
 }
 
-/// Returns the group's knowledge of an airplane: its position with an error.
-pub(super) fn known(world: &AirspaceWorld, state: &AirspaceState, now: Cycle, slot: Slot) -> Known {
-    let cell = &state.airplanes[slot as usize];
-    let mut pose = cell.pose();
+/// Returns a pose of an airplane as all see it in a cycle: with the error of that cycle.
+pub(super) fn seen(world: &AirspaceWorld, slot: Slot, now: Cycle, mut pose: Pose) -> Pose {
     if world.disturbance.position_m > 0.0 {
         let mut draws = world.streams.draws(slot, now, purpose::POSITION);
         pose.at.iter_mut().for_each(|v| *v += world.disturbance.position_m * normal(&mut draws));
     }
+    pose
+}
+
+/// Returns the group's knowledge of an airplane: its position with an error.
+pub(super) fn known(world: &AirspaceWorld, state: &AirspaceState, now: Cycle, slot: Slot) -> Known {
+    let cell = &state.airplanes[slot as usize];
+    let pose = seen(world, slot, now, cell.pose());
     let (orders, altitude_m) = (u32::from(cell.orders.get()), cell.altitude_m.get());
     Known { slot, pose, next: cell.next.get() as usize, orders, altitude_m }
 }

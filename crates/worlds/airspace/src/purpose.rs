@@ -13,6 +13,10 @@ pub(crate) const POSITION: Purpose = Purpose(3);
 pub(crate) const HEADING: Purpose = Purpose(4);
 /// Faults of messages.
 pub(crate) const NETWORK: Purpose = Purpose(5);
+/// States of links: in a burst of losses or not.
+pub(crate) const BURST: Purpose = Purpose(6);
+/// Messages lost in a burst.
+pub(crate) const BURST_LOSS: Purpose = Purpose(7);
 
 /// Returns the `k`-th uniform number in [0, 1) of an airplane's samples in a cycle.
 pub(crate) fn sample(streams: &Streams, slot: Slot, now: Cycle, k: u64) -> f64 {

@@ -2,27 +2,43 @@
 
 use super::decide::Optimization;
 use super::events::{Event, EventKind};
-use super::flight::Pose;
+use super::flight::Leg;
 use super::scenario::RecordSection;
 use sidestep_kernel::ports::table::label_of;
 use sidestep_kernel::ports::{Buffer, Buffers, RowBuffer, Table};
 use sidestep_kernel::{Cycle, EntityId};
 
-/// Place of an airplane at the start of a cycle.
-#[derive(Debug)]
-struct Place {
-    cycle: Cycle,
-    airplane: EntityId,
-    pose: Pose,
+/// A leg that an airplane has flown in a cycle; at the end of its flight one that takes no time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct FlownLeg {
+    pub(super) cycle: Cycle,
+    pub(super) airplane: EntityId,
+    pub(super) leg: Leg,
 }
 
-fn trajectories() -> Table<Place> {
+impl FlownLeg {
+    /// Returns the sort key of the table's rows. The legs of one airplane in a cycle are gathered
+    /// together, in their order.
+    pub(super) fn key(&self) -> (Cycle, EntityId) {
+        (self.cycle, self.airplane)
+    }
+}
+
+fn trajectories() -> Table<FlownLeg> {
     Table::new("trajectories")
-        .u64("cycle", "cycle of dt at whose start this holds", |p: &Place| p.cycle)
-        .u32("airplane", "entity id", |p| p.airplane)
-        .f64("x_m", "position east", |p| p.pose.at[0])
-        .f64("y_m", "position north", |p| p.pose.at[1])
-        .f64("heading_rad", "heading, counter-clockwise from east", |p| p.pose.heading_rad)
+        .u64("cycle", "cycle of dt in which this leg is flown", |f: &FlownLeg| f.cycle)
+        .u32("airplane", "entity id", |f| f.airplane)
+        .f64("x_m", "position east at the start of the leg", |f| f.leg.pose.at[0])
+        .f64("y_m", "position north", |f| f.leg.pose.at[1])
+        .f64("heading_rad", "heading, counter-clockwise from east", |f| f.leg.pose.heading_rad)
+        .f64("altitude_m", "altitude", |f| f.leg.altitude_m)
+        .f64("from_s", "start of the leg, after the start of the run", |f| f.leg.from_s)
+        .f64("until_s", "its end; the same as its start where the flight ends", |f| f.leg.until_s)
+        .f64("speed_m_s", "airspeed, constant on the leg", |f| f.leg.v_m_s)
+        .f64("turn_rad_s", "turn rate, constant, positive to the left", |f| f.leg.omega_rad_s)
+        .f64("climb_m_s", "rate of climb, constant", |f| f.leg.climb_m_s)
+        .f64("drift_x_m_s", "velocity of the air east", |f| f.leg.drift_m_s[0])
+        .f64("drift_y_m_s", "velocity of the air north", |f| f.leg.drift_m_s[1])
 }
 
 fn events() -> Table<Event> {
@@ -52,7 +68,7 @@ fn optimizations() -> Table<Optimization> {
 #[derive(Debug, Default)]
 pub(super) struct Rows {
     record: RecordSection,
-    places: RowBuffer<Place>,
+    flown: RowBuffer<FlownLeg>,
     events: RowBuffer<Event>,
     optimizations: RowBuffer<Optimization>,
 }
@@ -65,13 +81,13 @@ impl Rows {
 
     /// Starts to keep rows.
     pub(super) fn begin(&mut self) {
-        self.places.begin(self.record.trajectories.then(trajectories));
+        self.flown.begin(self.record.trajectories.then(trajectories));
         self.events.begin(self.record.events.then(events));
         self.optimizations.begin(self.record.optimizations.then(optimizations));
     }
 
-    pub(super) fn pose(&mut self, cycle: Cycle, airplane: EntityId, pose: Pose) {
-        self.places.push(Place { cycle, airplane, pose });
+    pub(super) fn flown(&mut self, flown: FlownLeg) {
+        self.flown.push(flown);
     }
 
     pub(super) fn event(&mut self, event: Event) {
@@ -85,10 +101,10 @@ impl Rows {
 
 impl Buffers for Rows {
     fn buffers(&self) -> Vec<&dyn Buffer> {
-        vec![&self.places, &self.events, &self.optimizations]
+        vec![&self.flown, &self.events, &self.optimizations]
     }
 
     fn buffers_mut(&mut self) -> Vec<&mut dyn Buffer> {
-        vec![&mut self.places, &mut self.events, &mut self.optimizations]
+        vec![&mut self.flown, &mut self.events, &mut self.optimizations]
     }
 }

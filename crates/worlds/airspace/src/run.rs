@@ -3,7 +3,7 @@
 use super::decide::Optimization;
 use super::events::Event;
 use super::metrics::{self, Ledger, Metrics};
-use super::rows::Rows;
+use super::rows::{FlownLeg, Rows};
 use super::scenario::Compiled;
 use super::state::{AirspaceState, Snapshot};
 use super::world::AirspaceWorld;
@@ -50,6 +50,14 @@ impl Compiled {
     }
 }
 
+/// Rows in the order in which the workers have gathered them.
+#[derive(Debug, Default)]
+struct Gathered {
+    events: Vec<Event>,
+    optimizations: Vec<Optimization>,
+    flown: Vec<FlownLeg>,
+}
+
 /// Data that a run keeps beside its state.
 #[derive(Debug, Default)]
 pub struct Books {
@@ -61,8 +69,8 @@ pub struct Books {
     rows: Rows,
     /// Events that wait for the next frame.
     log: Log<Event>,
-    /// Events and optimizations as the workers have gathered them.
-    gathered: (Vec<Event>, Vec<Optimization>),
+    /// Rows as the workers have gathered them.
+    gathered: Gathered,
 }
 
 impl World for AirspaceWorld {
@@ -82,14 +90,6 @@ impl World for AirspaceWorld {
         if books.rows.is_full() { 0 } else { u64::MAX }
     }
 
-    fn before_cycle(&self, state: &AirspaceState, books: &mut Books, now: Cycle) {
-        for (id, cell) in (0..).zip(&state.airplanes) {
-            if state.is_there(self, id, now) {
-                books.rows.pose(now, id, cell.pose());
-            }
-        }
-    }
-
     fn is_over(&self, state: &AirspaceState) -> bool {
         metrics::everybody_has_arrived(state)
     }
@@ -102,14 +102,20 @@ impl World for AirspaceWorld {
         ledger.effort.traffic.add(std::mem::take(&mut scratch.exchanged));
         ledger.too_close.extend(std::mem::take(&mut scratch.too_close));
         books.decide_ns += std::mem::take(&mut scratch.decide_ns);
-        books.gathered.0.append(&mut scratch.events);
-        books.gathered.1.append(&mut scratch.optimizations);
+        books.gathered.events.append(&mut scratch.events);
+        books.gathered.optimizations.append(&mut scratch.optimizations);
+        books.gathered.flown.append(&mut scratch.flown);
     }
 
     fn book(&self, books: &mut Books) {
-        let (mut events, mut optimizations) = std::mem::take(&mut books.gathered);
-        events.sort_unstable_by_key(Event::key);
+        let Gathered { mut events, mut optimizations, mut flown } =
+            std::mem::take(&mut books.gathered);
+        // Stable, because a pair may lose separation more than once in a cycle.
+        events.sort_by_key(Event::key);
         optimizations.sort_unstable_by_key(|one| (one.cycle, one.airplane));
+        // Stable, because an airplane may fly several legs in a cycle.
+        flown.sort_by_key(FlownLeg::key);
+        flown.into_iter().for_each(|leg| books.rows.flown(leg));
         for event in events {
             books.ledger.add_event(&event);
             books.log.push(event);

@@ -16,15 +16,16 @@ use airplanes::{GeneratorSection, ModelSection};
 use compile::Compiler;
 use network::NetworkSection;
 use serde::{Deserialize, Serialize};
-use settings::{LegsSection, Switch, Times};
+use settings::{LegsSection, ReactiveSection, Switch, Times};
 use sidestep_collectives::{Choice, Estimator, Order, Update, Utility};
 use sidestep_kernel::InputError;
-use sidestep_scenario::{
-    AboveTo, FromTo, NonNegative, Number, Point, Positive, Rule, Sections, Source, Whole,
-};
-use std::collections::BTreeSet;
+use sidestep_scenario::{FromTo, Number, Point, Rule, Sections, Source};
 use std::sync::Arc;
 use toml::Spanned;
+use values::{
+    Cooling, Decision, Fading, Gibibytes, HeadingNoise, Inflation, LevelGap, LookAhead, Rounds,
+    Step, Tolerance, Weight,
+};
 pub(super) use values::{Measure, TurnRate, Turns};
 
 /// Sets of parameters.
@@ -60,33 +61,35 @@ struct AirspaceSection {
     deployment: Deployment,
     network: Option<Spanned<NetworkSection>>,
     generator: Option<Spanned<GeneratorSection>>,
-    dt_s: Option<Spanned<Positive>>,
-    dtau_s: Option<Spanned<Positive>>,
-    horizon: Option<Spanned<usize>>,
-    tolerance_m: Option<Positive>,
-    alpha: Option<Positive>,
-    beta: Option<UpToOne>,
-    inflation: Option<Positive>,
+    dt_s: Option<Spanned<Number<Decision>>>,
+    dtau_s: Option<Spanned<Number<Step>>>,
+    horizon_s: Option<Spanned<Number<LookAhead>>>,
+    /// The former key, which counted points; only its error is left.
+    horizon: Option<Spanned<toml::Value>>,
+    tolerance_m: Option<Number<Tolerance>>,
+    alpha: Option<Number<Weight>>,
+    beta: Option<Number<Fading>>,
+    inflation: Option<Number<Inflation>>,
     holds_s: Times,
-    legs: Option<LegsSection>,
+    legs: Option<Spanned<LegsSection>>,
+    mvp: ReactiveSection,
+    orca: ReactiveSection,
     estimator: Option<Spanned<Estimator>>,
     update: Option<Spanned<Update>>,
     order: Option<Order>,
-    utility: Option<Utility>,
-    cooling: Option<UpToOne>,
-    max_rounds: Option<Whole<1, { u32::MAX as u64 }>>,
+    utility: Option<Spanned<Utility>>,
+    cooling: Option<Number<Cooling>>,
+    max_rounds: Option<Rounds>,
     choice: Option<Choice>,
-    vertical_m: Option<Positive>,
+    vertical_m: Option<Number<LevelGap>>,
     replay_until_s: Option<Number<UntilWhen>>,
-    group_memory_gib: Option<Positive>,
+    group_memory_gib: Option<Number<Gibibytes>>,
     wind_m_s: Option<Spanned<Point<2>>>,
     /// Standard deviation in meters; larger errors of known positions make no sense.
     position_noise_m: Option<Number<FromTo<0, 1_000_000>>>,
-    heading_noise_deg: Option<NonNegative>,
+    heading_noise_deg: Option<Number<HeadingNoise>>,
+    error_sigmas: Option<Number<FromTo<0, 100>>>,
 }
-
-/// A weight or a factor that can only reduce.
-type UpToOne = Number<AboveTo<0, 1>>;
 
 /// The times until which tracks may be replayed, infinity included.
 #[derive(Debug, Clone, Copy)]
@@ -153,21 +156,26 @@ impl Compiled {
 
     /// Returns the state at the start.
     pub fn start_snapshot(&self) -> Snapshot {
-        let close: BTreeSet<u32> = self.too_close.iter().flat_map(|&(a, b)| [a, b]).collect();
-        let record = |(id, (airplane, &fallback)): (u32, (&Airplane, &Side))| AirplaneRecord {
+        let record = |(airplane, &fallback): (&Airplane, &Side)| AirplaneRecord {
             pose: airplane.start,
             arrived: FLYING,
             counts: [0; 4],
             fallback,
-            came_too_close: close.contains(&id),
             altitude_m: match &airplane.track {
                 Some(track) => track.altitude_at_m(airplane.appears_s),
                 None => airplane.altitude_m,
             },
             orders: [0; 2],
         };
-        let airplanes = (0..).zip(self.world.airplanes.iter().zip(&self.fallbacks)).map(record);
-        Snapshot { cycle: 0, airplanes: airplanes.collect(), contacts: Vec::new() }
+        let airplanes = self.world.airplanes.iter().zip(&self.fallbacks).map(record).collect();
+        Snapshot {
+            cycle: 0,
+            airplanes,
+            contacts: Vec::new(),
+            resolving: Vec::new(),
+            named: self.too_close.clone(),
+            held: Vec::new(),
+        }
     }
 }
 
@@ -195,5 +203,35 @@ mod tests {
         assert_eq!(compiled(endless).cycles, 400);
         let track = "[[airplanes]]\ntrack = [[0, 0, 0, 0], [3000, 100000, 0, 0]]\n";
         assert_eq!(compiled(track).cycles, 1800);
+    }
+
+    #[test]
+    fn halving_the_steps_of_a_prediction_halves_neither_the_look_ahead_nor_what_lies_in_it() {
+        let world = |dtau_s: f64, preset: &str| {
+            compiled(&format!(
+                "[airspace]\npreset = \"{preset}\"\ndtau_s = {dtau_s:?}\n\
+                 [airspace.generator]\nkind = \"superconflict\"\nn = 2\n"
+            ))
+            .world
+        };
+        for preset in ["default", "paper"] {
+            let (one, half) = (world(1.0, preset), world(0.5, preset));
+            assert_eq!(one.timing.horizon_s(), half.timing.horizon_s());
+            assert_eq!(one.look_m(0, 1), half.look_m(0, 1));
+            // Two head-on airplanes, against the price of one that has left its way by 700 m.
+            let price = |world: &AirspaceWorld| {
+                let way = |from_m: f64, v_m_s: f64| {
+                    let at =
+                        |k: usize| [from_m + v_m_s * world.timing.dtau_s * (k + 1) as f64, 0.0];
+                    let points: Vec<_> = (0..world.timing.horizon).map(at).collect();
+                    crate::flight::Prediction { counted: points.len(), points }
+                };
+                let (a, b) = (way(-2000.0, 35.0), way(2000.0, -35.0));
+                let [cost, _] = world.objective.collision(&a, &b, [500.0; 2]);
+                cost / world.objective.deviation(&a, &way(-1300.0, 35.0)) / world.objective.alpha
+            };
+            let ratio = price(&half) / price(&one);
+            assert!((ratio - 1.0).abs() < 0.01, "{preset}: {ratio}");
+        }
     }
 }

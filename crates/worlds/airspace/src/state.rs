@@ -1,13 +1,14 @@
 //! The state of a run, and its snapshot.
 
 use super::agents::contact::Contacts;
+use super::baseline::mvp::Resolving;
 use super::flight::{Point, Pose, Stage};
-use super::shield::Side;
-use super::world::AirspaceWorld;
+use super::shield::{Named, Side};
+use super::world::{AirspaceWorld, Method};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::column::Shared;
 use sidestep_kernel::digest::Hasher;
-use sidestep_kernel::{Column, Cycle, Digest, Slot};
+use sidestep_kernel::{Column, Cycle, Digest, EntityId, Slot};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::sync::{Mutex, PoisonError};
 
@@ -15,8 +16,6 @@ use std::sync::{Mutex, PoisonError};
 pub const FLYING: u64 = u64::MAX;
 /// Flag set beside the time at which an airplane was removed, rather than arrived.
 const LEFT: u64 = 1 << 63;
-/// Flag in [`Cell::fallback`] for an airplane that came in too close to another.
-const TOO_CLOSE: u8 = 2;
 const NOBODY: u32 = u32::MAX;
 
 /// The end of a flight, with its step of `dtau` since the run's start.
@@ -36,6 +35,12 @@ pub struct AirspaceState {
     pub(super) neighborhood: Neighborhood,
     /// Each airplane's knowledge of others; empty where the network is reliable.
     contacts: Box<[Mutex<Contacts>]>,
+    /// The conflicts that each airplane resolves; empty unless the method is MVP.
+    resolving: Box<[Mutex<Resolving>]>,
+    /// For each airplane the others with which it is named, see [`Self::name`].
+    named: Box<[Mutex<Named>]>,
+    /// Each airplane's pose on its stored orbit; empty where no gust takes it off that.
+    held: Box<[Held]>,
 }
 
 /// One airplane's share of the state.
@@ -65,8 +70,16 @@ pub struct Cell {
     pub orders: Shared<u16>,
     /// Number of times that an order had to wait for the next `dt`.
     pub waits: Shared<u16>,
-    /// Stored fallback: 0 left, 1 right; 2 is added for having come in too close to another.
+    /// Side of the stored fallback: 0 left, 1 right.
     pub fallback: Shared<u8>,
+}
+
+/// A pose on an orbit.
+#[derive(Debug, Default)]
+struct Held {
+    x_m: Shared<f64>,
+    y_m: Shared<f64>,
+    heading_rad: Shared<f64>,
 }
 
 impl Cell {
@@ -122,19 +135,9 @@ impl Cell {
         Side::BOTH[usize::from(self.fallback.get() & 1)]
     }
 
-    /// Returns whether it came in too close to another for the shield.
-    pub fn came_too_close(&self) -> bool {
-        self.fallback.get() & TOO_CLOSE != 0
-    }
-
-    /// Notes that it came in too close to another.
-    pub(super) fn set_too_close(&self) {
-        self.fallback.set(self.fallback.get() | TOO_CLOSE);
-    }
-
     /// Stores the side of a fallback.
     pub fn set_side(&self, side: Side) {
-        self.fallback.set(self.fallback.get() & TOO_CLOSE | side as u8);
+        self.fallback.set(side as u8);
     }
 }
 
@@ -192,8 +195,29 @@ impl Neighborhood {
     }
 }
 
-fn held(contacts: &Mutex<Contacts>) -> std::sync::MutexGuard<'_, Contacts> {
-    contacts.lock().unwrap_or_else(PoisonError::into_inner)
+fn held<T>(shared: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
+    shared.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Takes out what the airplanes of a group remember; nothing where nobody remembers anything. No two
+/// groups share an airplane, so no other worker asks for the same.
+fn take<T: Default>(all: &[Mutex<T>], group: &[Slot]) -> Vec<T> {
+    let one = |&slot: &Slot| all.get(slot as usize).map(|one| std::mem::take(&mut *held(one)));
+    group.iter().map(|slot| one(slot).unwrap_or_default()).collect()
+}
+
+/// Puts it back.
+fn put<T>(all: &[Mutex<T>], group: &[Slot], memories: Vec<T>) {
+    for (&slot, memory) in group.iter().zip(memories) {
+        if let Some(one) = all.get(slot as usize) {
+            *held(one) = memory;
+        }
+    }
+}
+
+/// Returns the memories of `n` airplanes from a snapshot, which may have fewer.
+fn remembered<T: Clone + Default>(n: usize, saved: &[T]) -> Box<[Mutex<T>]> {
+    (0..n).map(|i| Mutex::new(saved.get(i).cloned().unwrap_or_default())).collect()
 }
 
 /// One airplane in a snapshot.
@@ -207,24 +231,20 @@ pub struct AirplaneRecord {
     pub counts: [u32; 4],
     /// Side of the stored fallback.
     pub fallback: Side,
-    /// Whether it came in too close to another for the shield.
-    pub came_too_close: bool,
     /// Altitude in meters.
     pub altitude_m: f64,
     /// Number of orders carried out, and of times that one had to wait.
     pub orders: [u16; 2],
 }
 
-/// Number of looks at the distance of a pair in one step of `dtau`.
-pub const LOOKS_PER_STEP: usize = 10;
-
 /// Closest approach and losses of a pair of airplanes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PairRecord {
     /// Closest approach in meters.
     pub nearest_m: f64,
-    /// Number of looks at which they were nearer than their separation, see [`LOOKS_PER_STEP`].
-    pub lost_looks: u64,
+    /// Time in which they were nearer than their separation: in whole nanoseconds, so that the sum
+    /// does not depend on the order.
+    pub lost_ns: u64,
     /// Number of separate losses of separation.
     pub losses: u32,
 }
@@ -233,7 +253,7 @@ impl PairRecord {
     /// Adds another record of the same pair, in any order.
     pub fn add(&mut self, other: Self) {
         self.nearest_m = self.nearest_m.min(other.nearest_m);
-        self.lost_looks += other.lost_looks;
+        self.lost_ns += other.lost_ns;
         self.losses += other.losses;
     }
 }
@@ -247,6 +267,12 @@ pub struct Snapshot {
     pub airplanes: Vec<AirplaneRecord>,
     /// Each airplane's knowledge of others; empty where the network is reliable.
     pub contacts: Vec<Contacts>,
+    /// The conflicts that each airplane resolves; empty unless the method is MVP.
+    pub resolving: Vec<Resolving>,
+    /// The pairs for which the shield promises nothing now, by ids.
+    pub named: Vec<(EntityId, EntityId)>,
+    /// Each airplane's pose on its stored orbit; empty where no gust takes it off that.
+    pub held: Vec<Pose>,
 }
 
 impl AirspaceState {
@@ -265,37 +291,85 @@ impl AirspaceState {
             cell.orbits.set(orbits);
             cell.orbiting.set(orbiting);
             cell.set_side(record.fallback);
-            if record.came_too_close {
-                cell.set_too_close();
-            }
             cell.altitude_m.set(record.altitude_m);
             let [orders, waits] = record.orders;
             cell.orders.set(orders);
             cell.waits.set(waits);
         }
-        let contacts = match world.network {
-            Some(_) => (0..n).map(|i| snapshot.contacts.get(i).cloned()).collect(),
-            None => Vec::new(),
-        };
-        let contacts = contacts.into_iter().map(|c| Mutex::new(c.unwrap_or_default())).collect();
-        Self { airplanes, neighborhood: Neighborhood::new(n, farthest), contacts }
+        let contacts = remembered(world.network.as_ref().map_or(0, |_| n), &snapshot.contacts);
+        let is_mvp = world.method == Method::Mvp;
+        let resolving = remembered(if is_mvp { n } else { 0 }, &snapshot.resolving);
+        let neighborhood = Neighborhood::new(n, farthest);
+        let named = (0..n).map(|_| Mutex::default()).collect();
+        let gusts = world.shield && world.disturbance.heading_rad > 0.0;
+        let held = (0..if gusts { n } else { 0 }).map(|_| Held::default()).collect();
+        let state = Self { airplanes, neighborhood, contacts, resolving, named, held };
+        let held = snapshot.held.iter().copied();
+        let held = held.chain(snapshot.airplanes.iter().skip(snapshot.held.len()).map(|a| a.pose));
+        (0..).zip(held).for_each(|(slot, pose)| state.set_held(slot, pose));
+        snapshot.named.iter().for_each(|&(a, b)| state.name(a, b));
+        state
     }
 
-    /// Takes out the knowledge that the airplanes of a group have of others. No two groups share an
-    /// airplane, so no other worker asks for the same.
+    /// Returns the pose that an airplane has on its stored orbit, if no gust has taken it off that.
+    pub(super) fn held(&self, slot: Slot) -> Pose {
+        let on_orbit = |held: &Held| Pose {
+            at: [held.x_m.get(), held.y_m.get()],
+            heading_rad: held.heading_rad.get(),
+        };
+        let there = || self.airplanes[slot as usize].pose();
+        self.held.get(slot as usize).map_or_else(there, on_orbit)
+    }
+
+    /// Stores the pose that an airplane has on its orbit.
+    pub(super) fn set_held(&self, slot: Slot, pose: Pose) {
+        if let Some(held) = self.held.get(slot as usize) {
+            held.x_m.set(pose.at[0]);
+            held.y_m.set(pose.at[1]);
+            held.heading_rad.set(pose.heading_rad);
+        }
+    }
+
+    /// Returns the others with which an airplane is named.
+    pub(super) fn named_with(&self, slot: Slot) -> Named {
+        held(&self.named[slot as usize]).clone()
+    }
+
+    /// Names two airplanes of a group: from now on the shield promises nothing for this pair.
+    pub(super) fn name(&self, a: Slot, b: Slot) {
+        for (one, other) in [(a, b), (b, a)] {
+            let mut named = held(&self.named[one as usize]);
+            if let Err(place) = named.binary_search(&other) {
+                let (before, after) = named.split_at(place);
+                *named = before.iter().chain([&other]).chain(after).copied().collect();
+            }
+        }
+    }
+
+    /// Keeps only those others with which an airplane is to stay named.
+    pub(super) fn keep_named(&self, slot: Slot, stays: impl Fn(EntityId) -> bool) {
+        let mut named = held(&self.named[slot as usize]);
+        *named = named.iter().copied().filter(|&other| stays(other)).collect();
+    }
+
+    /// Takes out the knowledge that the airplanes of a group have of others.
     pub(super) fn take_contacts(&self, group: &[Slot]) -> Vec<Contacts> {
-        let take =
-            |&slot: &Slot| self.contacts.get(slot as usize).map(|c| std::mem::take(&mut *held(c)));
-        group.iter().map(|slot| take(slot).unwrap_or_default()).collect()
+        take(&self.contacts, group)
     }
 
     /// Puts the knowledge back.
     pub(super) fn put_contacts(&self, group: &[Slot], known: Vec<Contacts>) {
-        for (&slot, known) in group.iter().zip(known) {
-            if let Some(contacts) = self.contacts.get(slot as usize) {
-                *held(contacts) = known;
-            }
-        }
+        put(&self.contacts, group, known);
+    }
+
+    /// Takes out the conflicts that the airplanes of a group resolve.
+    pub(super) fn take_resolving(&self, group: &[Slot]) -> Vec<Resolving> {
+        take(&self.resolving, group)
+    }
+
+    /// Puts the conflicts back.
+    pub(super) fn put_resolving(&self, group: &[Slot], resolving: Vec<Resolving>) {
+        put(&self.resolving, group, resolving);
     }
 
     /// Returns the state after `cycle` cycles.
@@ -305,12 +379,20 @@ impl AirspaceState {
             arrived: cell.arrived.get(),
             counts: [cell.next.get(), cell.overrides.get(), cell.orbits.get(), cell.orbiting.get()],
             fallback: cell.side(),
-            came_too_close: cell.came_too_close(),
             altitude_m: cell.altitude_m.get(),
             orders: [cell.orders.get(), cell.waits.get()],
         };
+        let resolving = self.resolving.iter().map(|resolving| held(resolving).clone()).collect();
         let contacts = self.contacts.iter().map(|contacts| held(contacts).clone()).collect();
-        Snapshot { cycle, airplanes: self.airplanes.iter().map(record).collect(), contacts }
+        let named = (0..).zip(&self.named).flat_map(|(a, others)| {
+            let others = held(others).clone();
+            let pairs: Vec<_> = others.iter().filter(|b| **b > a).map(|b| (a, *b)).collect();
+            pairs
+        });
+        let named = named.collect();
+        let held = (0..self.held.len() as Slot).map(|slot| self.held(slot)).collect();
+        let airplanes = self.airplanes.iter().map(record).collect();
+        Snapshot { cycle, airplanes, contacts, resolving, named, held }
     }
 
     /// Returns whether an airplane is there in a cycle: it has appeared and has not arrived.
@@ -330,13 +412,16 @@ impl Snapshot {
         let mut hasher = Hasher::default();
         hasher.u64(self.cycle);
         hasher.u64(self.airplanes.len() as u64);
-        for airplane in &self.airplanes {
-            let Pose { at: [x, y], heading_rad } = airplane.pose;
+        let hash_pose = |hasher: &mut Hasher, pose: &Pose| {
+            let Pose { at: [x, y], heading_rad } = *pose;
             [x, y, heading_rad].iter().for_each(|v| hasher.u64(v.to_bits()));
+        };
+        self.held.iter().for_each(|pose| hash_pose(&mut hasher, pose));
+        for airplane in &self.airplanes {
+            hash_pose(&mut hasher, &airplane.pose);
             hasher.u64(airplane.arrived);
             airplane.counts.iter().for_each(|&n| hasher.u32(n));
-            let too_close = if airplane.came_too_close { TOO_CLOSE } else { 0 };
-            hasher.u8(airplane.fallback as u8 | too_close);
+            hasher.u8(airplane.fallback as u8);
             // Left out without orders, because the altitude then is the scenario's, or that of the
             // track.
             let [orders, waits] = airplane.orders;
@@ -345,9 +430,17 @@ impl Snapshot {
                 hasher.u32(u32::from(orders) << 16 | u32::from(waits));
             }
         }
+        for &(a, b) in &self.named {
+            hasher.u32(a);
+            hasher.u32(b);
+        }
         if !self.contacts.is_empty() {
             let known = postcard::to_stdvec(&self.contacts).expect("contacts are plain data");
             known.iter().for_each(|&byte| hasher.u8(byte));
+        }
+        if !self.resolving.is_empty() {
+            let resolving = postcard::to_stdvec(&self.resolving).expect("conflicts are plain data");
+            resolving.iter().for_each(|&byte| hasher.u8(byte));
         }
         hasher.finish()
     }

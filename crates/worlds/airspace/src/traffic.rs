@@ -5,24 +5,27 @@
 //! are those of a turn at 25 degrees of bank at the airplane's greatest speed.
 //!
 //! Aircraft of BlueSky files fly their routes, and follow the commands on the way (`HDG`, `SPD`,
-//! `ALT`, `LNAV ON`, `DEL`). One without a destination flies half an hour ahead. A true airspeed
-//! stays as it is until the next `SPD`, also in climbs. `not_flown` counts all other commands.
+//! `ALT`, `LNAV ON`, `DEL`). One without a destination flies half an hour ahead, and one that is
+//! created without a speed comes in when it gets one. A true airspeed stays as it is until the next
+//! `SPD`, also in climbs. Settings are rules of the scenario or refused by name
+//! (`traffic_rules.rs`); `not_flown` counts all other commands.
 //!
 //! Recorded tracks are replayed as they are; from `airspace.replay_until_s` on, which is infinity
 //! by default, they are flown anew.
 
 use super::flight::Point;
 use super::flight_plan::CLIMB_M_S;
-use sidestep_import::bluesky::{Change, ScnAircraft, ScnFile};
+use super::traffic_rules::{Rules, rules};
+use sidestep_import::bluesky::{Change, ScnAircraft, ScnFile, Speed};
 use sidestep_import::local_plane::LocalPlane;
 use sidestep_import::traffic::{RecordedTraffic, Track};
-use sidestep_kernel::math;
+use sidestep_kernel::{InputError, math};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
 const NAUTICAL_MILE_M: f64 = 1852.0;
 const FOOT_M: f64 = 0.3048;
-const KNOT_M_S: f64 = NAUTICAL_MILE_M / 3600.0;
+pub(super) const KNOT_M_S: f64 = NAUTICAL_MILE_M / 3600.0;
 /// The turn rate at 25 degrees of bank is this over the airspeed: g tan 25.
 const BANKED_M_S2: f64 = 9.80665 * 0.466_307_658_154_998_6;
 /// Time in seconds for which an airplane without a destination flies ahead.
@@ -32,20 +35,89 @@ const DT_S: f64 = 10.0;
 /// Separation of recorded traffic in meters: five nautical miles and a thousand feet.
 const ZONE: (f64, f64) = (5.0 * NAUTICAL_MILE_M, 1000.0 * FOOT_M);
 
-/// Returns the scenario of a BlueSky file; `None` when none of its aircraft has a place.
+/// Slowest speed in meters per second at which an aircraft is in the air.
+const SLOWEST_M_S: f64 = 1.0;
+
+/// Returns the scenario of a BlueSky file; `None` when none of its aircraft has a place and a speed.
 pub fn from_bluesky(name: &str, file: &ScnFile) -> Option<String> {
-    let traffic = &file.traffic;
-    let plane = LocalPlane::about_all(traffic.aircraft.iter().map(ScnAircraft::position))?;
+    let (traffic, rules) = (&file.traffic, &bluesky_rules(name, file));
+    let aircraft: Vec<UnderWay> = traffic.aircraft.iter().filter_map(under_way).collect();
+    let plane = LocalPlane::about_all(aircraft.iter().map(|one| one.0.position()))?;
     let zone = (traffic.zone_radius_nm * NAUTICAL_MILE_M, traffic.zone_half_height_ft * FOOT_M);
-    let mut text = heading(name, zone, "");
-    for aircraft in &traffic.aircraft {
-        write_aircraft(&mut text, aircraft, &plane);
+    let mut text = heading(name, zone, rules.horizon_s, &settings(rules));
+    for one in &aircraft {
+        write_aircraft(&mut text, &one.0, &plane);
     }
     Some(text)
 }
 
-/// Settings of conflict detection and resolution, for which the scenario has its method.
-const SETTINGS: [&str; 4] = ["ASAS", "CDMETHOD", "DTLOOK", "RESO"];
+/// Returns the rules of a BlueSky file, which `place` names in errors, and all aircraft that cannot
+/// fly among them.
+pub(crate) fn bluesky_rules(place: &str, file: &ScnFile) -> Rules {
+    let mut rules = rules(place, file, DT_S);
+    let stands = |one: &&ScnAircraft| under_way(one).is_none();
+    for ScnAircraft { id, .. } in file.traffic.aircraft.iter().filter(stands) {
+        let cause = format!("aircraft {id} is never given a speed, and is left out");
+        let error =
+            InputError::new(place, cause, "give it one with CRE or SPD before it is deleted");
+        rules.refused.push(error);
+    }
+    rules
+}
+
+/// An aircraft from the time on at which it moves.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct UnderWay(ScnAircraft);
+
+impl UnderWay {
+    /// Returns the least speed that it has or is told.
+    pub(super) fn slowest_m_s(&self) -> f64 {
+        let told = changes(&self.0, false).into_iter().filter_map(|(_, told)| match told {
+            Told::Speed(v_m_s) => Some(v_m_s),
+            _ => None,
+        });
+        told.fold(self.0.speed.true_airspeed_mps(self.0.altitude_ft), f64::min)
+    }
+}
+
+/// Returns an aircraft as it is when it gets a speed: at its creation, or later, after which its
+/// heading and level are those told until then. `None` for one that never gets a speed.
+pub(super) fn under_way(aircraft: &ScnAircraft) -> Option<UnderWay> {
+    let mut one = aircraft.clone();
+    let moves = |speed: Speed, at_ft: f64| speed.true_airspeed_mps(at_ft) >= SLOWEST_M_S;
+    if moves(one.speed, one.altitude_ft) {
+        return Some(UnderWay(one));
+    }
+    for (k, &(at_s, change)) in aircraft.changes.iter().enumerate() {
+        match change {
+            Change::HeadingDeg(deg) => one.heading_deg = deg,
+            Change::AltitudeFt(ft) => one.altitude_ft = ft,
+            Change::Speed(speed) if moves(speed, one.altitude_ft) => {
+                (one.speed, one.created_s) = (speed, at_s);
+                one.changes.drain(..=k);
+                return one.deleted_s.is_none_or(|end_s| end_s > at_s).then_some(UnderWay(one));
+            }
+            _ => {}
+        }
+    }
+    None
+}
+
+/// Returns the settings of a scenario that follow from rules.
+fn settings(rules: &Rules) -> String {
+    let mut text = String::new();
+    // Writing to a string cannot fail.
+    if let Some(method) = rules.method {
+        let _ = writeln!(text, "method = {method:?}");
+    }
+    if rules.is_bare {
+        text.push_str("shield = \"off\"\n");
+    }
+    if let Some(wind_m_s) = rules.wind_m_s {
+        let _ = writeln!(text, "wind_m_s = {wind_m_s:?}");
+    }
+    text
+}
 
 /// Returns the commands of a BlueSky file that the scenario leaves out, with counts.
 pub(crate) fn not_flown(file: &ScnFile) -> BTreeMap<String, u64> {
@@ -55,11 +127,6 @@ pub(crate) fn not_flown(file: &ScnFile) -> BTreeMap<String, u64> {
             *counts.entry(what.to_string()).or_default() += n as u64;
         }
     };
-    count("WIND", file.traffic.wind.len());
-    count("NOISE ON", usize::from(file.traffic.noise));
-    for name in SETTINGS {
-        count(name, file.commands.get(name).map_or(0, |n| *n as usize));
-    }
     for aircraft in &file.traffic.aircraft {
         let points = &aircraft.way_points;
         count("ADDWPT altitude", points.iter().filter(|p| p.altitude_ft.is_some()).count());
@@ -103,7 +170,7 @@ impl Told {
 fn write_aircraft(text: &mut String, aircraft: &ScnAircraft, plane: &LocalPlane) {
     let at_m = plane.to_plane_m(aircraft.position());
     let heading_deg = 90.0 - aircraft.heading_deg;
-    let v_m_s = aircraft.speed.true_airspeed_mps(aircraft.altitude_ft).max(1.0);
+    let v_m_s = aircraft.speed.true_airspeed_mps(aircraft.altitude_ft);
     let mut way_points_m: Vec<Point> =
         aircraft.known_goals().map(|at| plane.to_plane_m(at)).collect();
     let orders = orders(aircraft, !way_points_m.is_empty());
@@ -186,7 +253,7 @@ fn changes(aircraft: &ScnAircraft, has_route: bool) -> Vec<(f64, Told)> {
         match change {
             Change::HeadingDeg(deg) => told.push((at_s, Told::Heading(90.0 - deg))),
             Change::Speed(speed) => {
-                let v_m_s = speed.true_airspeed_mps(altitude_ft).max(1.0);
+                let v_m_s = speed.true_airspeed_mps(altitude_ft).max(SLOWEST_M_S);
                 told.push((at_s, Told::Speed(v_m_s)));
             }
             Change::AltitudeFt(to_ft) => {
@@ -216,7 +283,7 @@ pub fn from_tracks(name: &str, traffic: &RecordedTraffic) -> Option<String> {
     let begins_s = samples().map(|s| s.time_s).fold(f64::INFINITY, f64::min);
     let replay = "# seconds after which recorded airplanes are flown anew; inf: never\n\
                   replay_until_s = inf\n";
-    let mut text = heading(name, ZONE, replay);
+    let mut text = heading(name, ZONE, None, replay);
     let tracks = || traffic.tracks.iter().filter(|track| has_length(track));
     tracks().for_each(|track| write_track(&mut text, track, &plane, begins_s));
     tracks().next().map(|_| text)
@@ -250,10 +317,16 @@ fn banked_deg_s(v_m_s: f64) -> f64 {
     (BANKED_M_S2 / v_m_s).to_degrees()
 }
 
-fn heading(name: &str, (separation_m, vertical_m): (f64, f64), more: &str) -> String {
+fn heading(
+    name: &str,
+    (separation_m, vertical_m): (f64, f64),
+    horizon_s: Option<f64>,
+    more: &str,
+) -> String {
+    let horizon_s = horizon_s.unwrap_or(300.0);
     format!(
         "format = 1\nworld = \"airspace\"\nname = {name:?}\ncycles = 4000\n\n\
-         [airspace]\nvertical_m = {vertical_m:?}\nhorizon = 60\ndt_s = {DT_S:?}\ndtau_s = 5.0\n\
+         [airspace]\nvertical_m = {vertical_m:?}\nhorizon_s = {horizon_s:?}\ndt_s = {DT_S:?}\ndtau_s = 5.0\n\
          legs = {{ turns_s = [20.0, 40.0, 60.0], until_s = [240.0] }}\n{more}\n[airplane]\nseparation_m = {separation_m:?}\n"
     )
 }
@@ -282,5 +355,30 @@ mod tests {
         let metrics = run.metrics();
         assert_eq!(metrics.losses_of_separation, 0);
         assert!(metrics.min_separation_m.is_some_and(|d| d < 20_000.0), "they have met");
+    }
+
+    #[test]
+    fn a_flight_created_at_speed_0_flies_as_far_as_the_speed_that_it_gets_takes_it() {
+        let file = parse(
+            &"late.scn",
+            "00:00:00.00>CRE A1,B744,0,-0.4,90,FL200,0\n\
+             00:00:30.00>HDG A1 180\n00:01:00.00>SPD A1 250\n\
+             00:00:00.00>CRE B2,B744,1,0.4,270,FL200,250\n\
+             00:00:00.00>CRE C3,B744,2,0.4,270,FL200,0\n",
+        );
+        let rules = bluesky_rules("late.scn", &file);
+        let [stands] = &rules.refused[..] else { panic!("{:?}", rules.refused) };
+        assert!(stands.cause().contains("C3 is never given a speed"), "{stands}");
+        let text = from_bluesky("late", &file).expect("two fly");
+        let mut run = airspace_run(&Source::new("late", text, ""), 1).expect("valid");
+        run.advance(400);
+        let world = run.world().clone();
+        assert_eq!(world.airplanes[0].appears_s, 60.0);
+        for id in 0..2 {
+            let flown = crate::metrics::airplane_metrics(&world, run.state(), id);
+            let (s, delay) = (flown.flown_s, flown.delay_percent);
+            assert!(s.is_some_and(|s| s > 0.95 * AHEAD_S), "{id}: {s:?}");
+            assert!(delay.is_some_and(|percent| percent.abs() < 1.0), "{id}: {delay:?}");
+        }
     }
 }

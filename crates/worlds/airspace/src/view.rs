@@ -50,7 +50,8 @@ pub(super) fn place_rows() -> Vec<PlaceRows> {
         kind: Kind::Airplane,
         number: "airplane",
         part: None,
-        axes: ["x_m", "y_m"].map(Axis::meters).to_vec(),
+        axes: ["x_m", "y_m", "altitude_m"].map(Axis::meters).to_vec(),
+        plane: None,
         is_corner: false,
         ahead: None,
         every: 1,
@@ -144,6 +145,12 @@ pub(super) fn entry(event: &Event) -> Entry {
         EventKind::HeldBack => (Level::Warning, "stays on its orbit: not all agreed".into()),
         EventKind::GroupTooLarge => {
             (Level::Warning, format!("is in a group of {value}, too large to optimize"))
+        }
+        EventKind::BeyondBound => {
+            (Level::Warning, format!("errs {value:.1} times as much as the shield allows for"))
+        }
+        EventKind::Intruder => {
+            (Level::Warning, format!("can be reached by airplane/{other}, now {value:.0} m away"))
         }
     };
     Entry { cycle: event.cycle, level, who: format!("airplane/{}", event.airplane), words }

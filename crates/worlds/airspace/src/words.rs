@@ -1,6 +1,6 @@
 //! Texts for people: a scenario's contents, a run's outcome, and the place of every airplane.
 
-use super::metrics::{Metrics, TooClose};
+use super::metrics::{BeyondBound, Metrics, TooClose};
 use super::scenario::Compiled;
 use super::state::{AirplaneRecord, Snapshot};
 use serde_json::json;
@@ -17,8 +17,10 @@ pub(super) fn contents(compiled: &Compiled) -> Said {
         Cycle::MAX => f64::INFINITY,
         cycles => world.starts_s(cycles),
     };
+    let intruders = world.airplanes.iter().filter(|a| a.is_intruder).count() as u64;
     let json = json!({
         "airplanes": world.airplanes.len(),
+        "intruders": intruders,
         "method": world.method.name(),
         "deployment": world.deployment.name(),
         "shield": shield,
@@ -37,6 +39,9 @@ pub(super) fn contents(compiled: &Compiled) -> Said {
         let until = if until_s.is_finite() { format!("until {until_s} s") } else { "all".into() };
         text.push_str(&format!("  recorded         {}, replayed {until}\n", grouped(recorded)));
     }
+    if intruders > 0 {
+        text.push_str(&format!("  intruders        {}\n", grouped(intruders)));
+    }
     text.push_str(&too_close(&compiled.too_close));
     Said { json, text }
 }
@@ -47,6 +52,7 @@ pub(super) fn outcome(metrics: &Metrics) -> Lines {
     lines.extend(network(metrics));
     lines.extend(on_the_way(metrics));
     lines.extend(warning(&metrics.too_close));
+    lines.extend(beyond_bound(&metrics.beyond_bound));
     lines
 }
 
@@ -75,7 +81,8 @@ fn network(m: &Metrics) -> Lines {
     let mut lines = Lines::new();
     if m.messages > 0 {
         let sent = format!("{}, {} bytes", grouped(m.messages), grouped(m.bytes));
-        lines.push(line("messages", sent));
+        let took = m.network_s.map_or(String::new(), |s| format!(", {s:.1} s on the network"));
+        lines.push(line("messages", sent + &took));
     }
     let counts = [
         (m.contacts_lost, "contacts lost"),
@@ -107,9 +114,22 @@ fn on_the_way(m: &Metrics) -> Lines {
     lines
 }
 
-/// Returns the first pairs that came in too close, and the number of others.
+/// Number of pairs or airplanes that a warning names.
+const NAMED: usize = 5;
+
+/// Returns the first airplanes whose errors exceeded the shield's bounds, and the number of others.
+fn beyond_bound(all: &[BeyondBound]) -> Option<(String, String)> {
+    let named = all.iter().take(NAMED).map(|one| format!("{} at {} s", one.airplane, one.at_s));
+    let mut airplanes: Vec<String> = named.collect();
+    if all.len() > NAMED {
+        airplanes.push(format!("and {} more", grouped((all.len() - NAMED) as u64)));
+    }
+    let told = || line("WARNING", format!("errors beyond the bound: {}", airplanes.join(", ")));
+    (!all.is_empty()).then(told)
+}
+
+/// Returns the first pairs for which the shield promises nothing, and the number of others.
 fn warning(too_close: &[TooClose]) -> Option<(String, String)> {
-    const NAMED: usize = 5;
     let named = too_close.iter().take(NAMED).map(|TooClose { at_s, airplanes: [a, b] }| {
         if *at_s > 0.0 { format!("{a} and {b} at {at_s} s") } else { format!("{a} and {b}") }
     });
@@ -117,7 +137,7 @@ fn warning(too_close: &[TooClose]) -> Option<(String, String)> {
     if too_close.len() > NAMED {
         pairs.push(format!("and {} more", grouped((too_close.len() - NAMED) as u64)));
     }
-    let told = || line("WARNING", format!("start too close for the shield: {}", pairs.join(", ")));
+    let told = || line("WARNING", format!("too close for the shield: {}", pairs.join(", ")));
     (!too_close.is_empty()).then(told)
 }
 

@@ -1,17 +1,19 @@
 //! A compiled airspace: everything that stays fixed during a run.
 
 use super::agents::network::Network;
+use super::baseline::Reactive;
 use super::deploy::Deployment;
 use super::flight::{
-    Action, Air, Airplane, Known, Later, Legs, Levels, Model, Passing, Point, Stage, Task, Timing,
-    Track, actions, later,
+    Action, Air, Airplane, Known, Later, Legs, Levels, Passing, Point, Stage, Task, Timing, Track,
+    actions, later,
 };
+use super::intruder::Intruder;
 use super::objective::{Objective, Options};
-use super::shield::Side;
+use super::shield::{Bounds, Side, common_rates};
 use serde::{Deserialize, Serialize};
 use sidestep_collectives::{Estimator, Order, Settings};
 use sidestep_kernel::stream::Streams;
-use sidestep_kernel::{Cycle, Slot};
+use sidestep_kernel::{Cycle, Slot, interrupt};
 
 /// The methods by which airplanes choose their actions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -71,6 +73,10 @@ pub struct AirspaceWorld {
     pub legs: Legs,
     /// The method by which airplanes choose their actions.
     pub method: Method,
+    /// Settings of MVP.
+    pub mvp: Reactive,
+    /// Settings of ORCA.
+    pub orca: Reactive,
     /// The deployment of the optimizer.
     pub deployment: Deployment,
     /// The network that carries its messages, if it is unreliable.
@@ -90,11 +96,15 @@ pub struct AirspaceWorld {
     pub wind_m_s: Point,
     /// Random errors that nobody knows.
     pub disturbance: Disturbance,
+    /// Bounds on those errors for which the shield allows.
+    pub bounds: Bounds,
     pub(crate) streams: Streams,
     /// Actions of each airplane.
     pub(crate) actions: Vec<Vec<Action>>,
     /// The stage of each airplane's flight after each of its orders.
     pub(crate) later: Vec<Vec<Later>>,
+    /// The turn rate of each airplane's orbits, in radians per second.
+    pub(crate) orbit_rad_s: Vec<f64>,
     /// The greatest speed of each airplane, in meters per second.
     pub(crate) top_m_s: Vec<f64>,
     /// Seconds that each airplane would need if it were alone.
@@ -113,9 +123,30 @@ impl AirspaceWorld {
         let of = |a: &Airplane| actions(&a.model, self.timing.dt_s, &self.holds_s, &self.legs);
         self.actions = self.airplanes.iter().map(of).collect();
         self.later = self.airplanes.iter().map(later).collect();
+        self.orbit_rad_s = self.orbits_rad_s();
         self.top_m_s = (0..self.airplanes.len()).map(|i| self.top_m_s(i)).collect();
         self.alone_s = (0..self.airplanes.len()).map(|i| self.alone_s(i)).collect();
         self
+    }
+
+    /// Returns the turn rates at which airplanes orbit under the shield.
+    fn orbits_rad_s(&self) -> Vec<f64> {
+        let largest = |airplane: &Airplane| {
+            let held = self.bounds.holds_rad_s(&airplane.model, self.timing.dt_s);
+            held.filter(|_| self.shield).unwrap_or(airplane.model.omega_max_rad_s)
+        };
+        let mut rates: Vec<f64> = self.airplanes.iter().map(largest).collect();
+        // Whoever minds nobody all the time never orbits.
+        let orbits = |&i: &usize| self.shield && !self.is_intruder(i as Slot, Cycle::MAX - 1);
+        let orbiting: Vec<usize> = (0..rates.len()).filter(orbits).collect();
+        let largest: Vec<f64> = orbiting.iter().map(|&i| rates[i]).collect();
+        orbiting.iter().zip(common_rates(&largest)).for_each(|(&i, rate)| rates[i] = rate);
+        rates
+    }
+
+    /// Returns how far an airplane may be from where its plans are seen, in meters.
+    pub(crate) fn error_m(&self, i: usize) -> f64 {
+        self.bounds.error_m(self.top_m_s[i], self.timing.dt_s)
     }
 
     fn top_m_s(&self, i: usize) -> f64 {
@@ -145,7 +176,9 @@ impl AirspaceWorld {
         let air = self.air();
         let mut pose = airplane.track.as_ref().map_or(airplane.start, |t| t.pose_at(joins_s));
         let (mut orders, mut next) = (0, 0);
-        for step in 0..ENDLESS_STEPS {
+        let mut step = 0;
+        while step < ENDLESS_STEPS {
+            interrupt::look();
             let flown_s = step as f64 * self.timing.dtau_s;
             if step % self.timing.points_per_dt() == 0 {
                 (orders, next) = self.after_orders(i, orders, next, joins_s + flown_s);
@@ -159,9 +192,15 @@ impl AirspaceWorld {
                 return f64::INFINITY;
             }
             let pilot = air.pilot(model, mission);
+            if airplane.orders.is_empty() && airplane.leaves_s == f64::INFINITY {
+                let straight = air.straight_steps(&pilot, pose, next);
+                pose = air.glided(pose, model.v_m_s, straight);
+                step += straight;
+            }
             let omega = air.steer(&pilot, pose, next);
             pose = air.blown(pose.step(model.v_m_s, omega, self.timing.dtau_s));
             next = pilot.next(pose, next);
+            step += 1;
         }
         f64::INFINITY
     }
@@ -186,15 +225,25 @@ impl AirspaceWorld {
     pub fn appears_in(&self, i: usize) -> Cycle {
         let airplane = &self.airplanes[i];
         let cycles = airplane.appears_s / self.timing.dt_s;
-        let is_on_track =
-            airplane.track.is_some() && (cycles.floor() as Cycle) < self.replay_cycles;
+        let is_on_track = airplane.track.is_some()
+            && (airplane.is_intruder || (cycles.floor() as Cycle) < self.replay_cycles);
         (if is_on_track { cycles.floor() } else { cycles.ceil() }) as Cycle
     }
 
     /// Returns the cycle from which the method flies an airplane.
     pub fn joins_in(&self, i: usize) -> Cycle {
-        let recorded = if self.airplanes[i].track.is_some() { self.replay_cycles } else { 0 };
+        let recorded = match &self.airplanes[i] {
+            Airplane { track: None, .. } => 0,
+            Airplane { is_intruder: true, .. } => Cycle::MAX,
+            _ => self.replay_cycles,
+        };
         self.appears_in(i).max(recorded)
+    }
+
+    /// Returns whether an airplane minds no other in a cycle: it was recorded, or the scenario says
+    /// so. All that the method flies mind it.
+    pub fn is_intruder(&self, slot: Slot, now: Cycle) -> bool {
+        self.airplanes[slot as usize].is_intruder || self.is_replayed(slot, now)
     }
 
     /// Returns whether an airplane follows its recorded way in a cycle.
@@ -205,14 +254,28 @@ impl AirspaceWorld {
     /// Returns the distance in meters up to which two airplanes have to mind each other, because
     /// they could come too near within the horizon, or on orbits after the next `dt`.
     pub fn look_m(&self, a: usize, b: usize) -> f64 {
-        let ((a, a_m_s), (b, b_m_s)) = (self.fastest(a), self.fastest(b));
-        let horizon_s = self.timing.horizon as f64 * self.timing.dtau_s;
-        let reach = |model: &Model, v_m_s: f64| {
-            let orbit_m = v_m_s * self.timing.dt_s + 2.0 * (v_m_s / model.omega_max_rad_s);
-            (v_m_s * horizon_s).max(orbit_m)
+        let Reactive { look_ahead_s, margin } = self.looks_ahead();
+        let reach = |i: usize| {
+            let v_m_s = self.top_m_s[i];
+            let orbit_m = v_m_s * self.timing.dt_s + 2.0 * (v_m_s / self.orbit_rad_s[i]);
+            // Places are seen with an error, too.
+            (v_m_s * look_ahead_s).max(orbit_m) + self.error_m(i) + self.bounds.position_m
         };
-        let gap_m = a.separation_m.max(b.separation_m) * self.objective.inflation.max(1.0);
-        reach(a, a_m_s) + reach(b, b_m_s) + gap_m + 1.0
+        let separation_m = |i: usize| self.airplanes[i].model.separation_m;
+        let gap_m = separation_m(a).max(separation_m(b)) * margin.max(1.0);
+        reach(a) + reach(b) + gap_m + 1.0
+    }
+
+    /// Returns how far the method looks ahead, and how much separation it asks for.
+    fn looks_ahead(&self) -> Reactive {
+        match self.method {
+            Method::Mvp => self.mvp,
+            Method::Orca => self.orca,
+            Method::Pc | Method::None => Reactive {
+                look_ahead_s: self.timing.horizon as f64 * self.timing.dtau_s,
+                margin: self.objective.inflation,
+            },
+        }
     }
 
     /// Returns the stage of an airplane that has carried out this number of orders.
@@ -253,12 +316,16 @@ impl AirspaceWorld {
         Levels::between(known.altitude_m, self.stage(known.slot, known.orders).altitude_m)
     }
 
-    /// Returns where each action would lead an airplane.
-    pub(crate) fn options(&self, known: Known) -> Options {
+    /// Returns where each action would lead an airplane, and what that costs beside intruders.
+    pub(crate) fn options(&self, known: Known, intruders: &[Intruder]) -> Options {
         let Stage { model, mission, .. } = self.stage(known.slot, known.orders);
         let actions = self.actions_of(known.slot);
         let predictions = self.air().predictions(model, actions, mission, (known.pose, known.next));
-        Options::new(predictions, model.separation_m, self.levels(known))
+        Options::new(predictions, model.separation_m, self.levels(known)).beside(
+            intruders,
+            &self.objective,
+            self.timing.dtau_s,
+        )
     }
 
     /// Returns the largest number of samples that one optimization may draw from an airplane's
@@ -274,10 +341,6 @@ impl AirspaceWorld {
         // Plus one for the final draw.
         per_round.checked_mul(self.settings.stop.max_rounds.into())?.checked_add(1)
     }
-
-    fn fastest(&self, i: usize) -> (&Model, f64) {
-        (&self.airplanes[i].model, self.top_m_s[i])
-    }
 }
 
 #[cfg(test)]
@@ -288,6 +351,30 @@ mod tests {
     use sidestep_scenario::Source;
 
     proptest! {
+        /// Straight stretches that are not flown step by step end where the steps would have.
+        #[test]
+        fn a_flight_alone_takes_as_long_as_flying_it_step_by_step(
+            speed in 0.0f64..20.0, from_rad in -3.2f64..3.2, heading_deg in -180.0f64..180.0,
+            goals in prop::collection::vec(prop::array::uniform2(-40_000.0f64..40_000.0), 1..4),
+        ) {
+            let wind = [speed * math::cos(from_rad), speed * math::sin(from_rad)];
+            let text = format!(
+                "format = 1\nworld = \"airspace\"\n[airspace]\nwind_m_s = {wind:?}\n[[airplanes]]\n\
+                 at_m = [0, 0]\nheading_deg = {heading_deg:?}\nway_points_m = {goals:?}\n"
+            );
+            let world = Compiled::new(&Source::new("w", text, "")).expect("a scenario").world;
+            let air = world.air();
+            let pilot = air.pilot(&world.airplanes[0].model, &world.airplanes[0].mission);
+            let (mut pose, mut next, mut steps) = (world.airplanes[0].start, 0, 0);
+            while next < goals.len() {
+                let omega = air.steer(&pilot, pose, next);
+                pose = air.blown(pose.step(pilot.model.v_m_s, omega, 1.0));
+                next = pilot.next(pose, next);
+                steps += 1;
+            }
+            prop_assert_eq!(world.alone_s[0], f64::from(steps));
+        }
+
         /// Flying to a way-point ends, wherever it lies and however the wind blows.
         #[test]
         fn nobody_circles_in_the_wind_for_ever(

@@ -51,7 +51,13 @@ fn alone(own: OwnShip, mut wire: Wire) -> Option<Decided> {
     let radio = Radio {
         group: own.briefing.ids.clone(),
         me: own.me,
-        patience: Patience { ticks: u64::MAX, tries: 1 },
+        patience: Patience {
+            ticks: u64::MAX,
+            bits_per_tick: f64::INFINITY,
+            tries: 1,
+            first_tries: 1,
+        },
+        ticks: u64::MAX,
         is_silent: false,
     };
     let mut endpoint = Endpoint::new(informed::Agent::new(own, true), radio);
@@ -83,7 +89,7 @@ fn agents_in_threads_of_their_own_decide_as_one_process_does() {
     let compiled = Compiled::new(&Source::new("threads", text, "")).expect("a scenario");
     let world = &*compiled.world;
     let known = group(world);
-    let briefing = brief(world, 0, &known);
+    let briefing = brief(world, 0, &known, &[]);
     let own = |me: usize| own_ship(world, &briefing, me, known[me], Contacts::new());
     let own: Vec<OwnShip> = (0..known.len()).map(own).collect();
     let options: Vec<Options> = own.iter().map(|own| own.options.clone()).collect();

@@ -62,7 +62,7 @@ fn copy(bundle: &mut Bundle<'_>, key: &str, path: &str) -> Result<(), InputError
 
 fn add_map(bundle: &mut Bundle<'_>, map: &PixelMap) {
     let size = [map.width(), map.height()];
-    let [yaml, image] = map_files(size, map.resolution_m(), map.origin_m(), map.pixels());
+    let [yaml, image] = map_files(size, map.resolution_m(), map.plane(), map.pixels());
     let path = bundle.add(yaml.0, yaml.1);
     bundle.add(image.0, image.1);
     bundle.set("ground.map", format_args!("{path:?}"));

@@ -54,7 +54,7 @@ pub use rods::{
     Outcome, Propagator, Reason, Request, Rod, Rotation, Rules, SKIN_M, Source, TOLERANCE_M, Veto,
     geometry, rebuild, wavefront,
 };
-pub use run::ChainRun;
+pub use run::{ChainRun, chain_run};
 pub use state::{Body, ChainState};
 pub use world::ChainWorld;
 

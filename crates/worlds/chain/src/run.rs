@@ -6,7 +6,7 @@ use super::events::Event;
 use super::metrics::{ChainMetrics, Metrics, Tally};
 use super::rods::geometry::in_dimensions;
 use super::rows::Rows;
-use super::scenario::Compiled;
+use super::scenario::{AnyCompiled, Compiled};
 use super::scratch::Scratch;
 use super::state::{ChainState, Snapshot};
 use super::view::entry;
@@ -17,11 +17,23 @@ use sidestep_kernel::checkpoint::CheckpointError;
 use sidestep_kernel::ports::{Buffers, RecordError, Recorder, TableSchema};
 use sidestep_kernel::view::{Frame, Log, Look, PlaceRows, Scenery};
 use sidestep_kernel::words::{Lines, Said};
-use sidestep_kernel::{Cycle, Digest, Effort, EntityId, Plan, Run, World};
+use sidestep_kernel::{Cycle, Digest, Effort, EntityId, InputError, Plan, Run, Simulation, World};
 use sidestep_scenario::Source;
 
 /// A run of chains in `D` dimensions.
 pub type ChainRun<const D: usize> = Run<ChainWorld<D>>;
+
+/// Returns a run of a scenario at its start, in the plane or in space: a [`ChainRun`] behind the face that all worlds
+/// share. Generic code is compiled again wherever it is named, and this is the name for it that is not generic.
+///
+/// # Errors
+/// When the scenario is wrong; the error points at the place.
+pub fn chain_run(source: &Source, workers: usize) -> Result<Box<dyn Simulation>, InputError> {
+    Ok(match AnyCompiled::new(source)? {
+        AnyCompiled::Plane(compiled) => Box::new(compiled.start(source, workers)),
+        AnyCompiled::Space(compiled) => Box::new(compiled.start(source, workers)),
+    })
+}
 
 impl<const D: usize> Compiled<D> {
     /// Returns a run at its start; the world is shared, not copied. `source` names it in

@@ -278,6 +278,7 @@ struct Compiler<'a, const D: usize> {
 
 impl<const D: usize> Compiler<'_, D> {
     fn compile(&self) -> Result<Compiled<D>, InputError> {
+        self.escapes_by_its_keys()?;
         let cycles = self.head.cycles.unwrap_or(CYCLES);
         let compiled = Compiled {
             world: Arc::new(self.world(cycles)?),
@@ -334,6 +335,18 @@ impl<const D: usize> Compiler<'_, D> {
         let looks_ahead = section.escape == EscapeWord::LookAhead;
         let ticks_ahead = if looks_ahead { ahead_s / dt_s } else { 0.0 };
         Some(Escape { ticks_ahead, ..usual })
+    }
+
+    /// Refuses keys of escapes that the kind of escape leaves without effect.
+    fn escapes_by_its_keys(&self) -> Result<(), InputError> {
+        let RulesSection { escape, escape_speed_m_s, escape_ahead_s, .. } = &self.file.chain;
+        let (key, because) = match escape {
+            EscapeWord::Off if escape_speed_m_s.is_some() => ("escape_speed_m_s", "\"off\""),
+            EscapeWord::Off if escape_ahead_s.is_some() => ("escape_ahead_s", "\"off\""),
+            EscapeWord::Touch if escape_ahead_s.is_some() => ("escape_ahead_s", "\"touch\""),
+            _ => return Ok(()),
+        };
+        Err(self.source.idle(&format!("chain.{key}"), &format!("with escape = {because}")))
     }
 
     fn rules(&self, escape: Option<&Escape>) -> Rules {

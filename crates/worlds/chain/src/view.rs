@@ -51,6 +51,7 @@ impl<const D: usize> ChainWorld<D> {
             number: "chain",
             part: Some("connector"),
             axes: ["x_m", "y_m", "z_m"][..D].iter().map(|axis| Axis::meters(axis)).collect(),
+            plane: None,
             is_corner: false,
             ahead: None,
             every,

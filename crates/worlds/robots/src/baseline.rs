@@ -25,7 +25,7 @@ use super::state::{RobotsState, Snapshot};
 use super::world::RobotsWorld;
 use sidestep_kernel::space::BoxWord;
 use sidestep_kernel::workers::{self, Worker};
-use sidestep_kernel::{Cycle, EntityId, Slot};
+use sidestep_kernel::{Cycle, EntityId, GroupSizes, Slot};
 use sidestep_map::Cell;
 use std::ops::Range;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -115,7 +115,7 @@ impl Baseline {
 
     /// Returns the metrics so far; there are no conflict groups.
     pub fn metrics(&self) -> Metrics {
-        self.compiled.world.metrics(&self.state, self.cycle, &[], 0)
+        self.compiled.world.metrics(&self.state, self.cycle, &GroupSizes::default())
     }
 
     /// Returns the share of the bodies' cycles that one worker did while all others waited.

@@ -29,7 +29,7 @@ pub fn resolve(source: &Source, compiled: &Compiled) -> Result<Resolved, InputEr
 
 fn add_map(bundle: &mut Bundle<'_>, map: &GridMap) {
     let size = [map.width(), map.height()];
-    let [yaml, image] = map_files(size, map.box_size_m, map.origin_m, map.cells());
+    let [yaml, image] = map_files(size, map.box_size_m, map.plane, map.cells());
     let path = bundle.add(yaml.0, yaml.1);
     bundle.add(image.0, image.1);
     bundle.set("map.file", format_args!("{path:?}"));

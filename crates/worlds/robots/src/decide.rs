@@ -4,21 +4,33 @@
 //! environment decides). It is shared by all robots of its type and has no state of its own; a
 //! robot's knowledge is in its [`Memory`], which is part of the state.
 
+mod announce;
+pub(crate) mod ask;
 mod goto;
+mod patient;
+mod plan;
 mod random;
 mod replay;
+mod sidestep;
+mod touch;
 mod wander;
 
-pub use goto::{Goto, Shuttle};
+pub use announce::Announce;
+pub use goto::{Avoidance, Goto, Shuttle};
+pub use patient::Patient;
+pub use plan::Planner;
 pub use random::Random;
 pub use replay::{External, ORDER, Replay};
+pub use sidestep::Trust;
 pub use wander::Wander;
 
 use super::effector::{ActionId, Side};
 pub use super::sensor::UNSEEN;
 use super::sensor::{NOTHING, Reading};
-use sidestep_kernel::Cycle;
 use sidestep_kernel::stream::Draws;
+use sidestep_kernel::{Cycle, EntityId};
+use sidestep_map::planning::FlowField;
+use std::sync::Arc;
 
 /// A robot's memory between its actions: four words whose meaning is up to the behavior.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -40,7 +52,7 @@ pub struct Contact {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Heard {
     /// Id of the robot that sent it.
-    pub sender: u32,
+    pub sender: EntityId,
     /// The message itself.
     pub word: u64,
 }
@@ -80,6 +92,8 @@ impl Sector {
 pub struct Percept<'a> {
     /// The present cycle.
     pub now: Cycle,
+    /// The robot's own id, by which others know it as a sender.
+    pub id: EntityId,
     /// One reading per beam, the sensors one after the other in the scenario's order.
     pub readings: &'a [Reading],
     /// Sector of each beam (shape: that of `readings`).
@@ -93,7 +107,8 @@ pub struct Percept<'a> {
     pub at: (u32, u32),
     /// Heading: 0 east, 1 north, 2 west, 3 south.
     pub heading: u8,
-    /// Last broadcasts of the robots in radio range, by sender.
+    /// Last broadcasts of the robots in radio range, by sender; those that have said nothing yet are
+    /// left out.
     pub heard: &'a [Heard],
 }
 
@@ -148,4 +163,16 @@ pub trait Behaviour: std::fmt::Debug + Send + Sync {
     /// Returns the next action. It may depend only on the percept, the memory (which it may change)
     /// and the robot's random stream of this cycle, because robots decide in any order.
     fn decide(&self, percept: &Percept<'_>, memory: &mut Memory, draws: &mut Draws) -> Decision;
+
+    /// Returns whether its robots ask each other to make room. Then word 2 of the memory holds the
+    /// robot's request, and the world writes the one that it hears into word 3.
+    fn asks(&self) -> bool {
+        false
+    }
+
+    /// Returns the ways to all places that it wants to reach, so that a check can say which of them
+    /// are out of reach.
+    fn ways(&self) -> &[Arc<FlowField>] {
+        &[]
+    }
 }

@@ -48,6 +48,11 @@ impl Side {
         }
     }
 
+    /// Returns its letter in paths, see [`Self::from_letter`].
+    pub fn letter(self) -> char {
+        ['F', 'L', 'B', 'R'][self as usize]
+    }
+
     /// Returns its name in files.
     pub fn name(self) -> &'static str {
         ["front", "left", "back", "right"][self as usize]
@@ -93,6 +98,11 @@ impl EffectorModel {
                 only(vec![], 0),
             ],
         }
+    }
+
+    /// Returns whether some action may end otherwise than intended.
+    pub(super) fn errs(&self) -> bool {
+        self.transitions.iter().any(|list| list[0].p < 1.0)
     }
 
     /// Returns the transitions of an action; only the intended one where `reliable`.

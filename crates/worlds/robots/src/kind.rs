@@ -1,10 +1,10 @@
 //! The world as it appears to code that runs scenarios of any world.
 
 use super::scenario::{Behaviours, Compiled, StorageOrder};
-use super::{RobotsWorld, bundle, words};
+use super::{RobotsWorld, bundle, remarks, words};
 use sidestep_kernel::words::Said;
 use sidestep_kernel::{InputError, Plan, Simulation, World};
-use sidestep_scenario::{Compiled as AnyCompiled, Kind, Resolved, Source};
+use sidestep_scenario::{Compiled as AnyCompiled, Kind, Remark, Resolved, Source};
 use std::any::Any;
 
 /// Situated agents on a grid.
@@ -49,6 +49,10 @@ impl AnyCompiled for Compiled {
 
     fn contents(&self, source: &Source) -> Said {
         words::contents(self, source)
+    }
+
+    fn remarks(&self) -> Vec<Remark> {
+        remarks::remarks(self)
     }
 
     fn resolve(&self, source: &Source) -> Result<Resolved, InputError> {

@@ -8,6 +8,7 @@
 //! scenario.rs -> world.rs (immutable), state.rs (columns)
 //! perceive.rs + decide.rs  ->  join.rs  ->  act.rs, auction.rs   one cycle
 //! sensor.rs, ray.rs, effector.rs: the tables behind it         metrics.rs: the sums of a run
+//! voice.rs: the words of the radio
 //! ```
 
 mod act;
@@ -20,12 +21,14 @@ pub mod effector;
 pub mod exact;
 mod join;
 mod kind;
+mod law;
 pub mod learn;
 pub mod metrics;
 mod perceive;
 pub mod policy;
 mod purpose;
 pub mod ray;
+mod remarks;
 pub mod rows;
 pub mod run;
 pub mod scenario;
@@ -33,6 +36,7 @@ mod scene;
 pub mod sensor;
 pub mod state;
 mod view;
+mod voice;
 mod words;
 pub mod world;
 

@@ -3,7 +3,7 @@
 use super::state::RobotsState;
 use super::world::RobotsWorld;
 use serde::Serialize;
-use sidestep_kernel::{Cycle, EntityId, Run};
+use sidestep_kernel::{Cycle, EntityId, GroupSizes, Run};
 use sidestep_map::Cell;
 use std::collections::BTreeMap;
 
@@ -36,9 +36,9 @@ pub struct Metrics {
     pub coverage: f64,
     /// Share of actions that ended in a contact.
     pub contacts_per_action: f64,
-    /// Number of conflict groups with 1, 2-3, 4-7, ... bodies, over all cycles of this process.
+    /// Number of conflict groups with 1, 2-3, 4-7, ... bodies, over all cycles.
     pub group_sizes: Vec<u64>,
-    /// Number of bodies of the largest conflict group in this process.
+    /// Number of bodies of the largest conflict group; 0 where no two bodies ever met.
     pub largest_group: u64,
 }
 
@@ -81,22 +81,16 @@ impl RobotsWorld {
         total
     }
 
-    /// Returns the metrics of a run, with the group sizes that its workers have seen.
-    pub fn metrics(
-        &self,
-        state: &RobotsState,
-        cycle: Cycle,
-        group_sizes: &[u64],
-        largest_group: u64,
-    ) -> Metrics {
+    /// Returns the metrics of a run, with its conflict groups.
+    pub fn metrics(&self, state: &RobotsState, cycle: Cycle, groups: &GroupSizes) -> Metrics {
         let total = self.totals(state, cycle);
         let free = self.map.count(Cell::Free).max(1);
-        let used = group_sizes.iter().rposition(|&n| n > 0).map_or(0, |k| k + 1);
+        let used = groups.counts.iter().rposition(|&n| n > 0).map_or(0, |k| k + 1);
         Metrics {
             coverage: (self.covered_at_start() + total.first_visits) as f64 / free as f64,
             contacts_per_action: total.contacts as f64 / total.actions.max(1) as f64,
-            group_sizes: group_sizes[..used].to_vec(),
-            largest_group,
+            group_sizes: groups.counts[..used].to_vec(),
+            largest_group: groups.largest,
             total,
         }
     }

@@ -9,7 +9,7 @@ use super::state::{BodyCell, Intent, pose_word};
 use super::world::{Crossed, Door, MountedSensor, Mover, Radio, RobotModel, Role};
 use super::{Scratch, SensorSample};
 use sidestep_kernel::space::BoxWord;
-use sidestep_kernel::{Column, Cycle, Slot};
+use sidestep_kernel::{Column, Slot};
 
 impl<T: BoxWord> Scene<'_, T> {
     /// Lets a body perceive and decide, and claims the boxes that it may come to cover.
@@ -21,6 +21,9 @@ impl<T: BoxWord> Scene<'_, T> {
             frames.poses.set(index, pose_word(cell.at(), cell.facing.get()));
         }
         let is_due = cell.period == 1 || world.bodies[cell.id as usize].is_due(self.now);
+        if !is_due && world.radio.is_some() {
+            self.state.voices.say(cell.id, self.now, None);
+        }
         let intent = match &self.type_of(cell).role {
             _ if !is_due => Intent::IDLE,
             Role::Robot(model) => self.robot_decides(model, slot, scratch),
@@ -41,6 +44,7 @@ impl<T: BoxWord> Scene<'_, T> {
         }
         let percept = Percept {
             now: self.now,
+            id: cell.id,
             readings: &scratch.readings,
             sectors: &model.body.sectors,
             nearest_in: nearest,
@@ -71,9 +75,7 @@ impl<T: BoxWord> Scene<'_, T> {
             cell.trip_begun.set(now);
         }
         if self.world.radio.is_some() {
-            let voice = |cycle: Cycle| &self.state.voice[(cycle % 2) as usize];
-            let i = cell.id as usize;
-            voice(now + 1).set(i, decision.broadcast.unwrap_or_else(|| voice(now).get(i)));
+            self.state.voices.say(cell.id, now, decision.broadcast);
         }
     }
 
@@ -167,17 +169,18 @@ impl<T: BoxWord> Scene<'_, T> {
     }
 
     /// Collects the last broadcasts of the robots in range, by sender; each reception may be lost.
+    /// Robots that have said nothing yet are left out.
     fn listen(&self, radio: &Radio, slot: Slot, heard: &mut Vec<Heard>) {
         let (world, state, id) = (self.world, self.state, self.cell(slot).id);
-        let voice = &state.voice[(self.now % 2) as usize];
         for &sender in &world.robots {
             let other = state.slot_of_id[sender as usize];
             if other == slot || !self.in_radio_range(radio, slot, other) {
                 continue;
             }
-            let words = world.streams.pair(id, sender, self.now, purpose::RADIO, 0);
-            if !radio.loss.happens(words[0]) {
-                heard.push(Heard { sender, word: voice.get(sender as usize) });
+            let Some(word) = state.voices.heard(sender, self.now) else { continue };
+            let draws = world.streams.pair(id, sender, self.now, purpose::RADIO, 0);
+            if !radio.loss.happens(draws[0]) {
+                heard.push(Heard { sender, word });
             }
         }
     }

@@ -17,6 +17,11 @@ pub(crate) const DOOR: Purpose = Purpose(6);
 pub(crate) const MOVE: Purpose = Purpose(7);
 /// Lost receptions.
 pub(crate) const RADIO: Purpose = Purpose(8);
+/// Seeds of runs that are compared with the exact chain.
+pub(crate) const RUN: Purpose = Purpose(9);
+/// The heading that starts where the policy `right_of_way` leaves a tie; the entity is the group's
+/// smallest id.
+pub(crate) const RIGHT_OF_WAY: Purpose = Purpose(10);
 /// Readings of the sensor with this number on its robot.
 pub(crate) const fn sense(sensor: usize) -> Purpose {
     Purpose(16 + sensor as u16)

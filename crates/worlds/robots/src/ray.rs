@@ -17,8 +17,16 @@ pub struct Crossing {
     pub distance: f64,
 }
 
-/// Differences below this are rounding errors of the direction's sine and cosine.
-const EPSILON: f64 = 1e-9;
+/// Differences below this are rounding errors, of the direction's sine and cosine, or of a length
+/// divided by the side of a box; in boxes.
+pub(crate) const EPSILON: f64 = 1e-9;
+
+/// Returns whether a distance reaches a limit, both in boxes. This is the one rule for all edges of
+/// distance classes and ranges: what is at an edge is beyond it, also where the edge in meters is a
+/// multiple of the side of a box that floating-point numbers cannot hold, like 0.9 m of 0.3 m.
+pub(crate) fn reaches(distance: f64, limit: f64) -> bool {
+    distance >= limit - EPSILON
+}
 
 /// Returns the boxes that a beam from the center of a `size` x `size` body crosses, nearest first,
 /// for a body that heads east; `range` is in boxes, exclusive.
@@ -67,7 +75,7 @@ fn first_quadrant(size: u32, bearing_deg: f64, range: f64) -> Vec<Crossing> {
             row += 1;
         }
         let distance = (at - exit).max(0.0);
-        if distance >= range - EPSILON {
+        if reaches(distance, range) {
             return crossings;
         }
         if col >= size as i32 || row >= size as i32 {

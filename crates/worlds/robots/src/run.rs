@@ -54,7 +54,7 @@ impl Compiled {
             facing,
             contact: 0,
             memory: [0; 4],
-            voice: 0,
+            voice: None,
             counts: [0; 3],
             trip: [0; 2],
             contacts: vec![0; kinds],
@@ -162,7 +162,7 @@ impl World for RobotsWorld {
     }
 
     fn metrics(&self, state: &RobotsState, _: &Books, now: Cycle, effort: &Effort) -> Metrics {
-        RobotsWorld::metrics(self, state, now, &effort.group_sizes, effort.largest_group)
+        RobotsWorld::metrics(self, state, now, &effort.groups)
     }
 
     fn agent_metrics(&self, state: &RobotsState, _: &Books, now: Cycle) -> Value {

@@ -1,6 +1,8 @@
 //! The sections of a robots scenario, in the form of the file. Unknown keys are errors.
 
 mod compile;
+mod kinds;
+mod located;
 mod parts;
 mod placing;
 mod random;
@@ -16,7 +18,7 @@ use parts::{BoxSide, Period, Placing, QuarterTurns, Side, Steps};
 use serde::Deserialize;
 use sidestep_map::UnknownPolicy;
 use sidestep_map::office::OfficeSpec;
-use sidestep_scenario::{AboveBelow, AboveTo, Number, Sections, Share};
+use sidestep_scenario::{AboveBelow, AboveTo, Number, Positive, Sections, Share};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use toml::Spanned;
@@ -82,7 +84,7 @@ pub(super) struct MapSection {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct KindSection {
-    pub(super) observation: Option<String>,
+    pub(super) observation: Option<Spanned<String>>,
 }
 
 #[derive(Debug, Clone, Deserialize)]
@@ -112,6 +114,7 @@ pub(super) type Rows = BTreeMap<Spanned<String>, Spanned<Vec<f64>>>;
 /// Actions by name; `box_m` and `evidence` say on what data they rest.
 #[derive(Debug, Clone, Default)]
 pub(super) struct EffectorSection {
+    pub(super) box_m: Option<Positive>,
     pub(super) actions: BTreeMap<String, Spanned<Vec<TransitionSection>>>,
 }
 
@@ -134,7 +137,7 @@ impl<'de> Deserialize<'de> for EffectorSection {
                 let mut section = EffectorSection::default();
                 while let Some(key) = map.next_key::<String>()? {
                     match key.as_str() {
-                        "box_m" => drop(map.next_value::<f64>()?),
+                        "box_m" => section.box_m = Some(map.next_value()?),
                         "evidence" => drop(map.next_value::<toml::Table>()?),
                         _ => drop(section.actions.insert(key, map.next_value()?)),
                     }
@@ -187,8 +190,50 @@ pub(super) struct BehaviourSection {
     pub(super) goals: Option<Vec<(u32, u32)>>,
     pub(super) actions: Option<Vec<String>>,
     pub(super) repeat: Option<bool>,
+    pub(super) avoidance: Option<AvoidanceSection>,
     pub(super) weights: Option<BTreeMap<String, f64>>,
     pub(super) weights_after_contact: Option<BTreeMap<String, f64>>,
+}
+
+/// How robots that go somewhere get past what is in their way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum AvoidanceSection {
+    #[default]
+    Plan,
+    Avoid,
+    Filter,
+    Touch,
+}
+
+impl BehaviourSection {
+    /// Returns every key but `kind`, and whether it is given.
+    fn given(&self) -> [(&'static str, bool); 9] {
+        // Without `..`, so that nobody adds a key and forgets it here.
+        let Self {
+            kind: _,
+            turn_every,
+            a,
+            b,
+            goals,
+            actions,
+            repeat,
+            avoidance,
+            weights,
+            weights_after_contact,
+        } = self;
+        [
+            ("turn_every", turn_every.is_some()),
+            ("a", a.is_some()),
+            ("b", b.is_some()),
+            ("goals", goals.is_some()),
+            ("actions", actions.is_some()),
+            ("repeat", repeat.is_some()),
+            ("avoidance", avoidance.is_some()),
+            ("weights", weights.is_some()),
+            ("weights_after_contact", weights_after_contact.is_some()),
+        ]
+    }
 }
 
 #[derive(Debug, Deserialize)]
@@ -276,3 +321,6 @@ fn person_kind() -> Spanned<String> {
 fn door_kind() -> Spanned<String> {
     spanned("door".into())
 }
+
+#[cfg(test)]
+mod tests;

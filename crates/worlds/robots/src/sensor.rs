@@ -4,6 +4,7 @@
 //! classes with a confusion matrix of their own). Both draws, observation and class, are
 //! independent given the true pair, so they are one draw from their joint distribution.
 
+use super::ray::reaches;
 use sidestep_kernel::distr::{RowError, check_row};
 
 /// Stands for the class of a sector in which nothing is reported; greater than any class.
@@ -45,9 +46,11 @@ pub struct SensorModel {
 }
 
 impl SensorModel {
-    /// Returns the class of a distance in meters.
-    pub fn class_of(&self, distance_m: f64) -> u8 {
-        self.distance_edges_m.iter().filter(|&&edge| edge <= distance_m).count() as u8
+    /// Returns the class of a distance in boxes of side `box_size_m`. A distance equal to an edge is
+    /// in the upper class, see [`reaches`].
+    pub fn class_of(&self, distance: f64, box_size_m: f64) -> u8 {
+        let is_beyond = |&&edge_m: &&f64| reaches(distance, edge_m / box_size_m);
+        self.distance_edges_m.iter().filter(is_beyond).count() as u8
     }
 
     /// Returns the class that stands for "nothing in range".
@@ -197,7 +200,47 @@ fn alias_columns(mut row: Vec<(Reading, f64)>, n: usize) -> Vec<Split> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ray::crossings;
+    use crate::world::Radio;
     use proptest::prelude::*;
+
+    fn with_edges(distance_edges_m: Vec<f64>) -> SensorModel {
+        SensorModel {
+            name: "ruler".into(),
+            bearings_deg: vec![0.0],
+            range_m: 1.0,
+            observations: vec!["nothing".into()],
+            confusion: Vec::new(),
+            distance_classes: vec![String::new(); distance_edges_m.len() + 1],
+            distance_edges_m,
+            distance_confusion: Vec::new(),
+            designates: Vec::new(),
+        }
+    }
+
+    /// Every edge at a whole number of boxes, for the sides of boxes that people write.
+    #[test]
+    fn a_distance_equal_to_an_edge_is_in_the_upper_class_for_every_side_of_a_box() {
+        for side_mm in (10..=500).step_by(5) {
+            let side_m = f64::from(side_mm) / 1000.0;
+            for boxes in 1..=60 {
+                let edge_m = f64::from(boxes * side_mm) / 1000.0;
+                let sensor = with_edges(vec![edge_m]);
+                let classes = [boxes - 1, boxes].map(|k| sensor.class_of(f64::from(k), side_m));
+                assert_eq!(classes, [0, 1], "{boxes} boxes of {side_m} m");
+                assert_eq!(crossings(1, 0.0, edge_m / side_m).len(), boxes as usize);
+                let reach2 = Radio::new(edge_m, side_m, 0.0).reach2_half_boxes;
+                assert_eq!(reach2, (4 * boxes * boxes) as u64, "{boxes} boxes of {side_m} m");
+            }
+        }
+    }
+
+    #[test]
+    fn a_distance_off_an_edge_is_where_it_belongs() {
+        let sensor = with_edges(vec![0.3, 1.5]);
+        let classes = [0.0, 1.0, 1.19, 1.2, 1.3, 5.99, 6.0, 9.0].map(|d| sensor.class_of(d, 0.25));
+        assert_eq!(classes, [0, 0, 0, 1, 1, 1, 2, 2]);
+    }
 
     proptest! {
         #[test]

@@ -1,6 +1,7 @@
 //! The state of a run, in columns by slot, and its snapshot by entity id.
 
 use super::policy::ConflictPolicy;
+use super::voice::Voices;
 use super::world::{Body, BodyType, RobotsWorld};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::column::{Shared, Word};
@@ -93,10 +94,8 @@ pub struct RobotsState {
     pub contacts: Column<u32>,
     /// Highest bid per box in the present round; empty unless the policy is `rounds`.
     pub bids: Box<[AtomicU64]>,
-    /// Last broadcast of each robot by id. There are two columns, because words broadcast in one
-    /// cycle are heard in the next: one is read while the other is written, by parity of the cycle
-    /// in which it is read. Empty without radio.
-    pub voice: [Column<u64>; 2],
+    /// Last broadcast of each robot.
+    pub(crate) voices: Voices,
     /// Poses at the start of each cycle, while a run is recorded.
     pub frames: Option<Frames>,
 }
@@ -200,8 +199,8 @@ pub struct BodyRecord {
     pub contact: u16,
     /// The robot's memory.
     pub memory: [u32; 4],
-    /// Last broadcast.
-    pub voice: u64,
+    /// Last broadcast, if there was one.
+    pub voice: Option<u64>,
     /// Number of moves, first visits and trips.
     pub counts: [u32; 3],
     /// Cycles spent on completed trips, and the cycle in which the present one started.
@@ -229,7 +228,6 @@ impl RobotsState {
         let ids = world.storage.ids(world);
         let mut slot_of_id: Box<[Slot]> = vec![0; n].into();
         (0..).zip(&ids).for_each(|(slot, &id)| slot_of_id[id as usize] = slot);
-        let radio = || Column::filled(if world.radio.is_some() { n } else { 0 }, 0u64);
         let in_rounds = world.policy == ConflictPolicy::Rounds;
         let bids = if in_rounds { world.walls.len() } else { 0 };
         Self {
@@ -240,7 +238,7 @@ impl RobotsState {
             slot_of_id,
             contacts: Column::filled(n * world.kinds.len(), 0),
             bids: (0..bids).map(|_| AtomicU64::new(0)).collect(),
-            voice: [radio(), radio()],
+            voices: Voices::silent(if world.radio.is_some() { n } else { 0 }),
             frames: None,
         }
     }
@@ -302,13 +300,12 @@ impl RobotsState {
     fn record(&self, world: &RobotsWorld, slot: Slot, cycle: Cycle) -> BodyRecord {
         let body = &self.bodies[slot as usize];
         let (i, kinds) = (body.id as usize, world.kinds.len());
-        let voice = &self.voice[(cycle % 2) as usize];
         BodyRecord {
             at: world.map_position(body.at()),
             facing: body.facing.get(),
             contact: body.contact.get(),
             memory: std::array::from_fn(|k| body.memory[k].get()),
-            voice: if voice.is_empty() { 0 } else { voice.get(i) },
+            voice: self.voices.heard(body.id, cycle),
             counts: [body.moves.get(), body.first_visits.get(), body.trips.get()],
             trip: [body.trip_cycles.get(), body.trip_begun.get()],
             contacts: (0..kinds).map(|k| self.contacts.get(i * kinds + k)).collect(),
@@ -345,7 +342,9 @@ impl RobotsState {
         body.facing.set(record.facing);
         body.contact.set(record.contact);
         (0..4).for_each(|k| body.memory[k].set(record.memory[k]));
-        self.voice.iter().filter(|v| !v.is_empty()).for_each(|v| v.set(i, record.voice));
+        if let Some(word) = record.voice {
+            self.voices.restore(body.id, word);
+        }
         let [moves, first_visits, trips] = record.counts;
         body.moves.set(moves);
         body.first_visits.set(first_visits);
@@ -354,7 +353,7 @@ impl RobotsState {
         body.trip_begun.set(record.trip[1]);
         let kinds = world.kinds.len();
         record.contacts.iter().enumerate().for_each(|(k, &c)| self.contacts.set(i * kinds + k, c));
-        body.anchor.set(world.grid_position(record.at).word());
+        body.anchor.set(world.grid_position(record.at.0, record.at.1).word());
         if !self.is_open_door(world, slot) {
             self.occupy(world, slot);
         }
@@ -379,7 +378,7 @@ impl RobotsState {
             + std::mem::size_of_val(&*self.kinds)
             + std::mem::size_of_val(&*self.slot_of_id)
             + self.contacts.heap_bytes()
-            + self.voice.iter().map(Column::heap_bytes).sum::<usize>();
+            + self.voices.heap_bytes();
         let boxes = self.floor.heap_bytes() + self.visited.heap_bytes() + size_of_val(&*self.bids);
         (boxes, bodies)
     }
@@ -396,11 +395,15 @@ impl Snapshot {
             hasher.u32(body.at.1);
             hasher.u8(body.facing);
             hasher.u32(u32::from(body.contact));
-            body.trip.iter().chain([&body.voice]).for_each(|&w| hasher.u64(w));
+            let voice = body.voice.unwrap_or(0);
+            body.trip.iter().chain([&voice]).for_each(|&w| hasher.u64(w));
             let words = body.memory.iter().chain(&body.counts).chain(&body.contacts);
             words.for_each(|&w| hasher.u32(w));
         }
         hasher.bytes(&self.visited);
+        // Whether 0 is a word or silence; nothing is added where nobody has spoken.
+        let spoke = (0u32..).zip(&self.bodies).filter(|(_, body)| body.voice.is_some());
+        spoke.for_each(|(id, _)| hasher.u32(id));
         hasher.finish()
     }
 }

@@ -31,14 +31,15 @@ impl RobotsWorld {
 
     /// Returns how recorded poses give the places of robots and people.
     pub(super) fn place_rows(&self) -> Vec<view::PlaceRows> {
-        let (scale_m, origin_m) = (self.map.box_size_m, self.map.origin_m);
-        let axis = |column, offset_m| view::Axis { column, scale_m, offset_m };
+        let scale_m = self.map.box_size_m;
+        let axis = |column| view::Axis { column, scale_m, offset_m: 0.0 };
         vec![view::PlaceRows {
             table: "trajectories",
             kind: Kind::Robot,
             number: "body",
             part: None,
-            axes: vec![axis("col_boxes", origin_m[0]), axis("row_boxes", origin_m[1])],
+            axes: vec![axis("col_boxes"), axis("row_boxes")],
+            plane: Some(self.map.plane),
             is_corner: true,
             ahead: Some("heading"),
             every: 1,
@@ -86,15 +87,25 @@ impl RobotsWorld {
 
     /// Returns the middle of a body at a height, and its heading.
     fn pose(&self, id: EntityId, cell: &BodyCell, z_m: f64) -> Pose {
-        let ((width, height), (col, row)) = (self.type_of(id).size, self.map_position(cell.at()));
-        let [x_m, y_m] = self.map.origin_m;
+        let [x_m, y_m] = self.middle_m(id, self.map_position(cell.at()));
+        let facing = match self.type_of(id).role {
+            Role::Door(_) => 0,
+            _ => cell.facing.get(),
+        };
+        Pose::heading([x_m, y_m, z_m], self.heading_rad(facing))
+    }
+
+    /// Returns the middle in the world of a body whose lower-left box is `at`.
+    pub(super) fn middle_m(&self, id: EntityId, (col, row): (u32, u32)) -> [f64; 2] {
+        let (width, height) = self.type_of(id).size;
         let middle =
             |at: u32, size: u32| (f64::from(at) + 0.5 * f64::from(size)) * self.map.box_size_m;
-        let at_m = [x_m + middle(col, width), y_m + middle(row, height), z_m];
-        match self.type_of(id).role {
-            Role::Door(_) => Pose::at(at_m),
-            _ => Pose::heading(at_m, f64::from(cell.facing.get()) * FRAC_PI_2),
-        }
+        self.map.plane.place([middle(col, width), middle(row, height)])
+    }
+
+    /// Returns the direction in the world of a heading, which is along the axes of the map.
+    pub(super) fn heading_rad(&self, facing: u8) -> f64 {
+        self.map.plane.yaw_rad + f64::from(facing) * FRAC_PI_2
     }
 
     /// Returns the readings that the first robots are about to perceive.
@@ -119,7 +130,7 @@ impl RobotsWorld {
         let scan = |sensor: &MountedSensor| {
             let (own, others) = readings.split_at(sensor.model.bearings_deg.len());
             readings = others;
-            scan(&sensor.model, own, self.side_m(id), (id, pose))
+            scan(&sensor.model, own, self.side_m(id), id, pose)
         };
         model.body.sensors.iter().map(scan).collect()
     }
@@ -148,7 +159,8 @@ fn scan(
     sensor: &SensorModel,
     readings: &[Reading],
     side_m: f64,
-    (id, pose): (EntityId, Pose),
+    robot: EntityId,
+    pose: Pose,
 ) -> Scan {
     let bearings_rad: Vec<f64> = sensor.bearings_deg.iter().map(|deg| deg.to_radians()).collect();
     let range_m = |(&reading, &bearing_rad): (&Reading, &f64)| {
@@ -156,7 +168,7 @@ fn scan(
         to_boundary_m + beyond_boundary_m(sensor, reading)
     };
     Scan {
-        of: (Kind::Robot, id, None),
+        of: (Kind::Robot, robot, None),
         sensor: sensor.name.clone(),
         pose,
         ranges_m: readings.iter().zip(&bearings_rad).map(range_m).collect(),

@@ -1,11 +1,12 @@
 //! Texts for people: a scenario's contents, a run's outcome, and the place of every body.
 
-use super::metrics::{Metrics, heap_bytes};
+use super::effector::EffectorModel;
+use super::metrics::Metrics;
 use super::rows::HEADING_NAMES;
 use super::scenario::Compiled;
 use super::sensor::SensorModel;
 use super::state::{BodyRecord, Snapshot};
-use super::world::RobotsWorld;
+use super::world::{RobotsWorld, Role};
 use serde_json::{Value, json};
 use sidestep_kernel::words::{Lines, Said, aligned, grouped, line};
 use sidestep_scenario::Source;
@@ -20,7 +21,7 @@ pub(super) fn outcome(metrics: &Metrics) -> Lines {
         line("distance", distance(total.distance_m)),
         line("coverage", format!("{:.1} % of the free boxes", 100.0 * metrics.coverage)),
     ];
-    // A resumed run that is at its end has seen no group in this process.
+    // Nothing to tell where no two bodies ever met.
     if metrics.largest_group > 0 {
         lines.push(line("conflict groups", groups(metrics)));
     }
@@ -102,13 +103,19 @@ impl Body<'_> {
 
     fn json(&self) -> Value {
         let (col, row) = self.record.at;
+        let [x_m, y_m] = self.world.middle_m(self.id, self.record.at);
         let place = json!({
             "body": self.id, "kind": self.kind(), "col_boxes": col, "row_boxes": row,
+            "x_m": x_m, "y_m": y_m,
         });
         let Value::Object(mut place) = place else { return place };
         match self.is_door() {
             true => place.insert("open".into(), (self.record.facing == 1).into()),
-            false => place.insert("heading".into(), self.heading().into()),
+            false => {
+                let heading_rad = self.world.heading_rad(self.record.facing);
+                place.insert("heading_deg".into(), heading_rad.to_degrees().into());
+                place.insert("heading".into(), self.heading().into())
+            }
         };
         Value::Object(place)
     }
@@ -124,11 +131,10 @@ impl Body<'_> {
     }
 }
 
-/// Returns map, bodies, sensors, effectors and memory of a scenario.
+/// Returns map, bodies, sensors and effectors of a scenario.
 pub(super) fn contents(compiled: &Compiled, source: &Source) -> Said {
     let file: Value = source.parse().unwrap_or_default();
     let world = &*compiled.world;
-    let (boxes_bytes, bodies_bytes) = heap_bytes(&compiled.clone().start(source, 1));
     let json = json!({
         "world": "robots",
         "name": compiled.name,
@@ -141,7 +147,7 @@ pub(super) fn contents(compiled: &Compiled, source: &Source) -> Said {
         "bodies": bodies(world),
         "robots": robots(&file),
         "sensors": sensors(world),
-        "memory_bytes": boxes_bytes + bodies_bytes,
+        "effectors": effectors(world),
     });
     let text = text(&json);
     Said { json, text }
@@ -154,6 +160,8 @@ fn map(world: &RobotsWorld) -> Value {
         "width_boxes": map.width(),
         "height_boxes": map.height(),
         "box_size_m": map.box_size_m,
+        "origin_m": map.plane.origin_m,
+        "yaw_rad": map.plane.yaw_rad,
         "free": counts.free,
         "wall": counts.wall,
         "unknown": counts.unknown,
@@ -210,11 +218,27 @@ fn sensors(world: &RobotsWorld) -> Vec<Value> {
     by_name.into_values().map(one).collect()
 }
 
+/// Returns the effectors in use, each once, with the chance that an action comes to what it means.
+fn effectors(world: &RobotsWorld) -> Vec<Value> {
+    let robots = world.types.iter().filter_map(|ty| match &ty.role {
+        Role::Robot(model) => Some(&model.body.effector),
+        _ => None,
+    });
+    let by_name: BTreeMap<&str, &EffectorModel> = robots.map(|e| (e.name.as_str(), e)).collect();
+    let one = |e: &EffectorModel| {
+        let as_meant = e.transitions.iter().map(|transitions| transitions[0].p);
+        let actions: Vec<_> = e.actions.iter().zip(as_meant).collect();
+        json!({ "name": e.name, "as_meant": actions })
+    };
+    by_name.into_values().map(one).collect()
+}
+
 fn text(found: &Value) -> String {
     let mut lines =
         vec![line("map", map_words(&found["map"])), line("bodies", bodies_words(&found["bodies"]))];
     lines.extend(items(found, "robots").map(|r| line(&plain(&r["name"]), robots_words(r))));
     lines.extend(items(found, "sensors").map(|s| line("sensor", sensor_words(s))));
+    lines.extend(items(found, "effectors").map(|e| line("effector", effector_words(e))));
     let plain = |key: &str| plain(&found[key]);
     lines.extend([
         line("regime", plain("regime")),
@@ -223,7 +247,6 @@ fn text(found: &Value) -> String {
             format!("obstacles {}, conflicts {}", plain("obstacle_rule"), plain("conflict_policy")),
         ),
         line("run", format!("{} cycles, seed {}", number(&found["cycles"]), plain("seed"))),
-        line("memory", memory(found["memory_bytes"].as_u64().unwrap_or(0))),
     ]);
     aligned(&lines)
 }
@@ -282,6 +305,14 @@ fn sensor_words(sensor: &Value) -> String {
     )
 }
 
+fn effector_words(effector: &Value) -> String {
+    let as_meant = |action: &Value| {
+        format!("{} {:.0} %", plain(&action[0]), 100.0 * action[1].as_f64().unwrap_or(0.0))
+    };
+    let actions: Vec<String> = items(effector, "as_meant").map(as_meant).collect();
+    format!("{}: as meant {}", plain(&effector["name"]), actions.join(", "))
+}
+
 /// Returns a JSON value without quotes.
 fn plain(value: &Value) -> String {
     value.as_str().map_or_else(|| value.to_string(), str::to_string)
@@ -289,11 +320,4 @@ fn plain(value: &Value) -> String {
 
 fn number(value: &Value) -> String {
     value.as_u64().map_or_else(|| value.to_string(), grouped)
-}
-
-fn memory(bytes: u64) -> String {
-    match bytes {
-        0..1_000_000 => format!("about {} kB", bytes.div_ceil(1000)),
-        _ => format!("about {:.1} MB", bytes as f64 / 1e6),
-    }
 }

@@ -3,7 +3,7 @@
 use super::decide::{Behaviour, Sector};
 use super::effector::{Action, EffectorModel, ObstacleRule};
 use super::policy::ConflictPolicy;
-use super::ray::{Crossing, crossings, turn_crossing};
+use super::ray::{Crossing, EPSILON, crossings, turn_crossing};
 use super::sensor::{Reading, ReadingTable, Row, SensorModel};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::Cycle;
@@ -100,6 +100,8 @@ pub struct RobotsWorld {
     pub(super) kind_rank: Vec<u8>,
     pub(super) radio: Option<Radio>,
     pub(super) robots: Vec<EntityId>,
+    /// Whether there are robots that ask each other to make room.
+    pub(super) has_asks: bool,
     /// The order in which states store the bodies.
     pub(super) storage: StorageOrder,
     pub(super) streams: Streams,
@@ -244,7 +246,7 @@ impl MountedSensor {
                 let turned = turn_crossing(c, size, heading);
                 turned.dy * stride as i32 + turned.dx
             }),
-            classes: four.map(|c| model.class_of(c.distance * box_size_m)),
+            classes: four.map(|c| model.class_of(c.distance, box_size_m)),
         };
         let boxes = [0, 1, 2, 3]
             .map(|heading| beams.iter().flatten().map(|&four| crossed(four, heading)).collect());
@@ -262,6 +264,20 @@ impl MountedSensor {
     /// Returns whether every reading is the truth.
     pub fn is_reliable(&self) -> bool {
         self.table.reliable
+    }
+
+    /// Returns whether every reading is the truth by its tables or because errors are off.
+    pub(super) fn never_errs(&self) -> bool {
+        let is_certain = |row: &[f64], truth: usize| row[truth] == 1.0;
+        let all = |matrix: &[Vec<f64>]| {
+            // The last row of a matrix of classes, `beyond`, is used only for spurious reports.
+            matrix
+                .iter()
+                .enumerate()
+                .all(|(truth, row)| row.len() <= truth || is_certain(row, truth))
+        };
+        self.is_reliable()
+            || all(&self.model.distance_confusion) && self.model.confusion.iter().all(|m| all(m))
     }
 
     /// Returns the true reading of a beam that meets `kind` at distance class `class`. A kind that
@@ -337,7 +353,8 @@ pub struct Radio {
 impl Radio {
     /// Returns a radio with this range in meters and this chance of losing a reception.
     pub fn new(range_m: f64, box_size_m: f64, loss: f64) -> Self {
-        let reach = 2.0 * range_m / box_size_m;
+        // Who is exactly at the range hears, also where rounding makes the quotient smaller.
+        let reach = 2.0 * (range_m / box_size_m + EPSILON);
         Self { reach2_half_boxes: (reach * reach) as u64, loss: Chance::new(loss) }
     }
 }
@@ -365,7 +382,7 @@ impl RobotsWorld {
     }
 
     /// Returns the position in the padded grid of a map column and row.
-    pub(super) fn grid_position(&self, (col, row): (u32, u32)) -> Position {
+    pub(super) fn grid_position(&self, col: u32, row: u32) -> Position {
         Position::new(col + self.border, row + self.border)
     }
 

@@ -118,6 +118,7 @@ impl World for PondWorld {
             number: "frog",
             part: None,
             axes: vec![Axis::meters("x_m"), Axis::meters("y_m")],
+            plane: None,
             is_corner: false,
             ahead: None,
             every: 1,

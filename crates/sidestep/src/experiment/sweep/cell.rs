@@ -4,7 +4,7 @@ use super::plan::Cell;
 use crate::scenario::{Source, Worlds};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
-use sidestep_kernel::{Cycle, InputError, Simulation};
+use sidestep_kernel::{Cycle, InputError, Interrupt, Simulation};
 
 /// Cycles between two checks whether to go on.
 const SLICE: Cycle = 256;
@@ -66,6 +66,13 @@ fn is_by_clock(name: &str) -> bool {
 }
 
 impl Started {
+    /// Returns the same simulation, which unwinds within a cycle when `interrupt` is raised.
+    #[must_use]
+    pub fn heeding(mut self, interrupt: Interrupt) -> Self {
+        self.simulation.heed(interrupt);
+        self
+    }
+
     /// Runs to the end; returns `None` as soon as `go_on` returns false.
     pub fn run(mut self, go_on: &dyn Fn() -> bool) -> Option<Outcome> {
         let simulation = self.simulation.as_mut();

@@ -3,8 +3,8 @@
 use super::flight::{Flight, Moment};
 use crate::Scratch;
 use crate::events::{Event, EventKind};
-use crate::flight::distance_m;
-use crate::state::{LOOKS_PER_STEP, PairRecord};
+use crate::flight::{Approach, Leg, Zone, distance_m, is_lost};
+use crate::state::PairRecord;
 use crate::world::AirspaceWorld;
 
 /// Pairs farther apart than this many separations are not recorded.
@@ -19,23 +19,41 @@ pub(super) fn book(
     moment: Moment,
     scratch: &mut Scratch,
 ) {
-    for (i, a) in flights.iter().enumerate().filter(|(_, f)| f.ended.is_none()) {
-        for b in flights[i + 1..].iter().filter(|f| f.ended.is_none()) {
-            let record = match is_worth_noting(world, a, b) {
-                true => closest(world, (a, b), moment),
-                false => continue,
-            };
-            if record.nearest_m.is_finite() {
-                if record.losses > 0 {
-                    let event =
-                        Event::of_pair(moment.now, EventKind::LossOfSeparation, a.slot, b.slot);
-                    scratch.events.push(event.with(record.nearest_m));
-                }
-                let pairs = scratch.pairs.entry((a.slot, b.slot));
-                pairs.and_modify(|r| r.add(record)).or_insert(record);
+    let flying = flights.iter().enumerate().filter(|(_, flight)| flight.ended.is_none());
+    // Sorted from west to east, so that only neighbors have to be compared.
+    let mut by_x: Vec<(f64, usize)> = flying.map(|(k, flight)| (flight.pose.at[0], k)).collect();
+    by_x.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let most_m = most_worth_noting_m(world, flights);
+    for (k, &(x_m, i)) in by_x.iter().enumerate() {
+        for &(_, j) in by_x[k + 1..].iter().take_while(|(other_m, _)| other_m - x_m <= most_m) {
+            let (a, b) = (&flights[i.min(j)], &flights[i.max(j)]);
+            if is_worth_noting(world, a, b) {
+                note(a, b, closest(world, a, b, moment), moment, scratch);
             }
         }
     }
+}
+
+/// Stores the record of a pair in one step.
+fn note(a: &Flight<'_>, b: &Flight<'_>, record: PairRecord, moment: Moment, scratch: &mut Scratch) {
+    if record.nearest_m.is_infinite() {
+        return;
+    }
+    if record.losses > 0 {
+        let event = Event::of_pair(moment.now, EventKind::LossOfSeparation, a.slot, b.slot);
+        scratch.events.push(event.with(record.nearest_m));
+    }
+    scratch.pairs.entry((a.slot, b.slot)).and_modify(|r| r.add(record)).or_insert(record);
+}
+
+/// Returns a distance in meters beyond which no two airplanes are worth noting.
+fn most_worth_noting_m(world: &AirspaceWorld, flights: &[Flight<'_>]) -> f64 {
+    let most = |of: &dyn Fn(usize) -> f64| {
+        flights.iter().map(|flight| of(flight.slot as usize)).fold(0.0, f64::max)
+    };
+    let gap_m = most(&|slot| world.airplanes[slot].model.separation_m);
+    let step_m = 2.0 * most(&|slot| world.top_m_s[slot]) * world.timing.dtau_s;
+    WORTH_NOTING * gap_m + step_m
 }
 
 /// Returns whether two airplanes may come so near within a step that it is to be recorded.
@@ -53,31 +71,21 @@ fn gap_m(world: &AirspaceWorld, a: &Flight<'_>, b: &Flight<'_>) -> f64 {
 }
 
 /// Returns the record of a pair in one step.
-fn closest(
-    world: &AirspaceWorld,
-    (a, b): (&Flight<'_>, &Flight<'_>),
-    moment: Moment,
-) -> PairRecord {
-    let (dtau_s, gap_m) = (world.timing.dtau_s, gap_m(world, a, b));
-    // Distances count only while both are in the air, and on one level.
-    let apart_m = |t_s: f64| {
-        let at = |f: &Flight<'_>| f.at(world.wind_m_s, moment, t_s);
-        let ((place_a, height_a), (place_b, height_b)) = at(a).zip(at(b))?;
-        let on_one_level = (height_a - height_b).abs() < world.vertical_m;
-        on_one_level.then(|| distance_m(place_a, place_b))
-    };
+fn closest(world: &AirspaceWorld, a: &Flight<'_>, b: &Flight<'_>, moment: Moment) -> PairRecord {
+    let zone = Zone { gap_m: gap_m(world, a, b), vertical_m: world.vertical_m };
     // A loss continues from the end of the step before; there is no step before when one of the two
     // has just come into the air.
-    let begins = moment.step_s <= a.since_s.max(b.since_s) + ROUNDING * dtau_s;
-    let mut was_lost = !begins && apart_m(0.0).is_some_and(|d| d < gap_m);
-    let mut record = PairRecord { nearest_m: f64::INFINITY, lost_looks: 0, losses: 0 };
-    for look in 1..=LOOKS_PER_STEP {
-        let apart_m = apart_m(dtau_s * look as f64 / LOOKS_PER_STEP as f64);
-        let is_lost = apart_m.is_some_and(|d| d < gap_m);
-        record.nearest_m = record.nearest_m.min(apart_m.unwrap_or(f64::INFINITY));
-        record.lost_looks += u64::from(is_lost);
-        record.losses += u32::from(is_lost && !was_lost);
-        was_lost = is_lost;
+    let begins = moment.step_s <= a.since_s.max(b.since_s) + ROUNDING * world.timing.dtau_s;
+    let firsts = a.legs.first().zip(b.legs.first());
+    let goes_on = !begins && firsts.is_some_and(|(a, b)| is_lost(a, b, 0.0, zone));
+    let mut approach = Approach::new(goes_on.then_some(0.0));
+    for one in &a.legs {
+        let meets = |other: &&Leg| one.from_s < other.until_s && other.from_s < one.until_s;
+        b.legs.iter().filter(meets).for_each(|other| approach.add(one, other, zone));
     }
-    record
+    PairRecord {
+        nearest_m: approach.nearest_m,
+        lost_ns: (approach.lost_s * 1e9).round() as u64,
+        losses: approach.losses,
+    }
 }

@@ -1,7 +1,7 @@
 //! Airplanes in the air during one `dt`.
 
 use crate::Turn;
-use crate::flight::{Levels, Point, Pose, Stage, Track};
+use crate::flight::{Leg, Levels, Point, Pose, Stage, Track};
 use crate::shield::Way;
 use crate::state::End;
 use sidestep_kernel::{Cycle, Slot};
@@ -27,6 +27,10 @@ pub(super) struct Flight<'a> {
     /// Time at which it came into the air, in seconds after the start of the run.
     pub(super) since_s: f64,
     pub(super) next: usize,
+    /// Legs of the present step, with times after its start.
+    pub(super) legs: Vec<Leg>,
+    /// Legs flown in this `dt`, with times after the start of the run.
+    pub(super) flown: Vec<Leg>,
     /// End of its flight, if it has ended.
     pub(super) ended: Option<End>,
 }
@@ -49,7 +53,8 @@ impl<'a> Flight<'a> {
         let since_s = world.starts_s(world.appears_in(slot as usize)).max(recorded_s);
         let (pose, altitude_m) = (cell.pose(), cell.altitude_m.get());
         let next = cell.next.get() as usize;
-        Self { slot, course, pose, altitude_m, since_s, next, ended: None }
+        let (legs, flown) = (Vec::new(), Vec::new());
+        Self { slot, course, pose, altitude_m, since_s, next, legs, flown, ended: None }
     }
 
     /// Returns its altitude in meters some seconds after `altitude_m`, on a decided way.
@@ -58,20 +63,40 @@ impl<'a> Flight<'a> {
         self.altitude_m + (stage.altitude_m - self.altitude_m).clamp(-most_m, most_m)
     }
 
-    /// Returns its place and altitude `t_s` after the start of a step; `None` while it is not in
-    /// the air.
-    pub(super) fn at(&self, wind_m_s: Point, moment: Moment, t_s: f64) -> Option<(Point, f64)> {
+    /// Finds the legs that it flies in one step.
+    pub(super) fn begin_step(&mut self, wind_m_s: Point, moment: Moment, dtau_s: f64) {
+        self.legs.clear();
         match &self.course {
             Course::Way(way, stage) => {
                 let omega = way.omegas_rad_s[moment.k];
-                let [x, y] = self.pose.step(stage.model.v_m_s, omega, t_s).at;
-                let [wx, wy] = wind_m_s;
-                Some(([x + wx * t_s, y + wy * t_s], self.altitude_after_m(stage, t_s)))
+                let whole = Leg::new(0.0, dtau_s, self.pose, stage.model.v_m_s, omega);
+                let to_climb_m = stage.altitude_m - self.altitude_m;
+                let climbs_s = match stage.climb_m_s {
+                    rate if rate > 0.0 && to_climb_m != 0.0 => to_climb_m.abs() / rate,
+                    _ => 0.0,
+                };
+                let climb_m_s = if climbs_s > 0.0 { to_climb_m / climbs_s } else { 0.0 };
+                let first = whole.climbing(self.altitude_m, climb_m_s).in_wind(wind_m_s);
+                self.legs.push(first.timed(0.0, dtau_s.min(climbs_s)));
+                if climbs_s < dtau_s {
+                    self.legs.push(first.rest(climbs_s).climbing(stage.altitude_m, 0.0));
+                }
+                self.legs.retain(|leg| leg.from_s < leg.until_s);
             }
             Course::Track(track) => {
-                let now_s = moment.step_s + t_s;
-                let at = || (track.pose_at(now_s).at, track.altitude_at_m(now_s));
-                track.covers(now_s).then(at)
+                track.legs(moment.step_s, moment.step_s + dtau_s, &mut self.legs);
+            }
+        }
+        self.note_legs(moment.step_s);
+    }
+
+    /// Adds the legs of a step to those flown in this `dt`.
+    fn note_legs(&mut self, step_s: f64) {
+        for leg in &self.legs {
+            let leg = leg.timed(step_s + leg.from_s, step_s + leg.until_s);
+            match self.flown.last_mut().filter(|last| last.continues_in(&leg)) {
+                Some(last) => last.until_s = leg.until_s,
+                None => self.flown.push(leg),
             }
         }
     }

@@ -13,9 +13,9 @@ use sidestep_kernel::Slot;
 
 /// Carries out the orders of a group that are due and, with the shield, may be; the others
 /// wait. `flown` are the group's airplanes that the method flies, by id.
-pub(super) fn carry_out(turn: &Turn<'_>, flown: &[Slot]) {
+pub(super) fn carry_out(turn: &Turn<'_>, group: &[Slot], flown: &[Slot]) {
     let Turn { world, state, now, .. } = turn;
-    for &slot in flown {
+    for &slot in group.iter().filter(|&&slot| !world.is_replayed(slot, *now)) {
         let (airplane, cell) = (&world.airplanes[slot as usize], &state.airplanes[slot as usize]);
         while let Some(order) = airplane.due(cell.orders.get().into(), world.starts_s(*now)) {
             let Some(side) = fallback_after(turn, flown, slot, order) else {
@@ -37,19 +37,18 @@ fn fallback_after(
     slot: Slot,
     order: &FlightOrder,
 ) -> Option<Side> {
-    let Turn { world, state, .. } = turn;
+    let Turn { world, state, now, .. } = turn;
     let cell = &state.airplanes[slot as usize];
     let changes_safety = matches!(order.task, Task::Speed(_) | Task::Altitude { .. });
-    if !world.shield || !changes_safety {
+    if !world.shield || !changes_safety || world.is_intruder(slot, *now) {
         return Some(cell.side());
     }
     let stage = world.stage(slot, u32::from(cell.orders.get()) + 1);
-    let now = flyer(world, state, slot);
     let changed = Flyer {
         v_m_s: stage.model.v_m_s,
         levels: Levels::between(cell.altitude_m.get(), stage.altitude_m),
-        ..now
+        ..flyer(turn, slot)
     };
     let others = flown.iter().filter(|&&other| other != slot);
-    side_apart(&now, &changed, others.map(|&other| flyer(world, state, other)))
+    side_apart(&changed, others.map(|&other| flyer(turn, other)))
 }

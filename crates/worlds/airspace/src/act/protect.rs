@@ -1,15 +1,18 @@
 //! Airplanes in the form that the shield knows, and the ways that it allows them.
 
+use super::avoid::Beset;
 use crate::Turn;
 use crate::agents::contact::Contacts;
 use crate::agents::exchange::Seen;
 use crate::deploy;
 use crate::events::{Event, EventKind};
-use crate::flight::{Levels, Stage, distance_m};
-use crate::shield::{Decision, Flyer, Way};
-use crate::state::{AirspaceState, Cell};
-use crate::world::AirspaceWorld;
+use crate::flight::{Levels, Pose, Stage, distance_m};
+use crate::intruder::Intruder;
+use crate::perceive::seen;
+use crate::shield::{Decision, Flyer, Holding, Way};
+use crate::state::Cell;
 use sidestep_kernel::Slot;
+use sidestep_kernel::math::wrap_angle;
 
 /// Distance in meters beyond which all goals rank alike.
 const FARTHEST_M: f64 = 2e9;
@@ -17,19 +20,23 @@ const FARTHEST_M: f64 = 2e9;
 /// wait for ever.
 const REFUSED_PART: f64 = 0.125;
 
-/// Returns the part of an airplane that the shield knows.
-pub(super) fn flyer(world: &AirspaceWorld, state: &AirspaceState, slot: Slot) -> Flyer {
+/// Returns the part of an airplane that the shield knows: it is where all see it.
+pub(super) fn flyer(turn: &Turn<'_>, slot: Slot) -> Flyer {
+    let Turn { world, state, now, .. } = *turn;
     let (cell, stage) = (&state.airplanes[slot as usize], state.stage(world, slot));
     Flyer {
         id: slot,
-        pose: cell.pose(),
+        pose: seen(world, slot, now, cell.pose()),
+        held: seen(world, slot, now, state.held(slot)),
         v_m_s: stage.model.v_m_s,
         omega_max_rad_s: stage.model.omega_max_rad_s,
+        orbit_rad_s: world.orbit_rad_s[slot as usize],
         separation_m: stage.model.separation_m,
+        error_m: world.error_m(slot as usize),
         levels: Levels::between(cell.altitude_m.get(), stage.altitude_m),
         vertical_m: world.vertical_m,
         fallback: cell.side(),
-        came_too_close: cell.came_too_close(),
+        named: state.named_with(slot),
         rank: rank(world.timing.dt_s, cell, &stage, slot),
     }
 }
@@ -53,30 +60,83 @@ pub(super) fn shielded(
     turn: &mut Turn<'_>,
     group: &[Slot],
     candidates: Vec<Vec<Way>>,
+    intruders: &[Intruder],
     contacts: &mut [Contacts],
 ) -> Vec<Way> {
-    let &mut Turn { world, state, now, ref mut scratch, .. } = turn;
-    let seen = |&slot: &Slot| Seen {
-        flyer: flyer(world, state, slot),
-        orbits: state.airplanes[slot as usize].orbiting.get() > 0,
-    };
-    let seen: Vec<Seen> = group.iter().map(seen).collect();
-    let fallbacks: Vec<Way> = seen.iter().map(|seen| orbit(world, &seen.flyer)).collect();
-    let events = &mut scratch.events;
-    let (decisions, traffic) = deploy::shielded(world, now, (seen, &candidates), contacts, events);
-    scratch.exchanged.add(traffic);
-    for (decision, &slot) in decisions.iter().zip(group) {
-        note(turn, slot, decision);
+    let flyers: Vec<Flyer> = group.iter().map(|&slot| flyer(turn, slot)).collect();
+    let fallbacks: Vec<Way> = group.iter().map(|&slot| on_orbit(turn, slot)).collect();
+    let dtau_s = turn.world.timing.dtau_s;
+    let beset: Vec<Beset<'_>> =
+        flyers.iter().map(|flyer| Beset::new(flyer, intruders, dtau_s)).collect();
+    let wishes = candidates.iter().zip(&fallbacks);
+    let allowed = beset.iter().zip(wishes).map(|(one, (wishes, own))| one.allowed(wishes, own));
+    let allowed: Vec<Vec<usize>> = allowed.collect();
+    let decisions = decided(turn, &flyers, &allowed, &candidates, contacts);
+    let mut flown = Vec::with_capacity(group.len());
+    for (k, mut wishes) in candidates.into_iter().enumerate() {
+        let way = decisions[k].candidate.map(|wish| wishes.swap_remove(wish));
+        let way = way.unwrap_or_else(|| fallbacks[k].clone());
+        note(turn, group[k], &decisions[k]);
+        name_intruders(turn, group[k], intruders, &beset[k], &way);
+        flown.push(way);
     }
-    let wishes = candidates.into_iter().zip(fallbacks);
-    let flown = wishes.zip(decisions).map(|((mut wishes, fallback), decision)| {
-        decision.candidate.map_or(fallback, |k| wishes.swap_remove(k))
-    });
-    flown.collect()
+    flown
+}
+
+/// Returns the decisions of the shield for airplanes that may fly only some of their `wishes`.
+fn decided(
+    turn: &mut Turn<'_>,
+    flyers: &[Flyer],
+    allowed: &[Vec<usize>],
+    wishes: &[Vec<Way>],
+    contacts: &mut [Contacts],
+) -> Vec<Decision> {
+    let state = turn.state;
+    let as_seen = |flyer: &Flyer| Seen {
+        flyer: flyer.clone(),
+        orbits: state.airplanes[flyer.id as usize].orbiting.get() > 0,
+    };
+    let seen = flyers.iter().map(as_seen).collect();
+    let of = |(allowed, wishes): (&Vec<usize>, &Vec<Way>)| {
+        allowed.iter().map(|&k| wishes[k].clone()).collect()
+    };
+    let candidates: Vec<Vec<Way>> = allowed.iter().zip(wishes).map(of).collect();
+    let (mut decisions, traffic) = deploy::shielded(turn, seen, &candidates, contacts);
+    turn.scratch.exchanged.add(traffic);
+    for (decision, allowed) in decisions.iter_mut().zip(allowed) {
+        decision.candidate = decision.candidate.map(|k| allowed[k]);
+    }
+    decisions
+}
+
+/// Names an airplane with the intruders that could come too near on its way within `dt`, and ends
+/// the names of others.
+fn name_intruders(turn: &mut Turn<'_>, slot: Slot, all: &[Intruder], beset: &Beset<'_>, way: &Way) {
+    let &mut Turn { world, state, now, ref mut scratch, .. } = turn;
+    let named = state.named_with(slot);
+    if all.is_empty() && named.is_empty() {
+        return;
+    }
+    let reached: Vec<&Intruder> = beset.reached_by(way).collect();
+    let is_reached = |other: Slot| reached.iter().any(|one| one.slot == other);
+    state.keep_named(slot, |other| !world.is_intruder(other, now) || is_reached(other));
+    for one in all.iter().filter(|one| !is_reached(one.slot)) {
+        state.keep_named(one.slot, |other| other != slot);
+    }
+    for one in reached.iter().filter(|one| !named.contains(&one.slot)) {
+        state.name(slot, one.slot);
+        scratch.too_close.push((now, slot.min(one.slot), slot.max(one.slot)));
+        let apart_m = distance_m(state.airplanes[slot as usize].pose().at, one.at);
+        let event = Event::of_pair(now, EventKind::Intruder, slot, one.slot);
+        scratch.events.push(event.with(apart_m));
+    }
 }
 
 /// Stores the decision for an airplane, and records it as an event.
 fn note(turn: &mut Turn<'_>, slot: Slot, decision: &Decision) {
+    if decision.candidate.is_none() {
+        move_held(turn, slot);
+    }
     let &mut Turn { state, now, ref mut scratch, .. } = turn;
     let cell = &state.airplanes[slot as usize];
     cell.set_side(decision.fallback);
@@ -99,8 +159,28 @@ fn note(turn: &mut Turn<'_>, slot: Slot, decision: &Decision) {
     }
 }
 
-/// Returns the stored fallback of an airplane, for one `dt`.
-fn orbit(world: &AirspaceWorld, flyer: &Flyer) -> Way {
-    let omega = flyer.fallback.sign() * flyer.omega_max_rad_s;
-    Way { omegas_rad_s: vec![omega; world.timing.points_per_dt()] }
+/// Returns the way by which an airplane keeps to its stored orbit for one `dt`.
+fn on_orbit(turn: &Turn<'_>, slot: Slot) -> Way {
+    let Turn { world, state, .. } = turn;
+    let (cell, model) = (&state.airplanes[slot as usize], state.stage(world, slot).model);
+    let (side, rate_rad_s) = (cell.side(), world.orbit_rad_s[slot as usize]);
+    let (steps, gust_rad) = (world.timing.points_per_dt(), world.bounds.heading_rad);
+    if gust_rad == 0.0 {
+        return Way { omegas_rad_s: vec![side.sign() * rate_rad_s; steps] };
+    }
+    let holding = Holding::new(cell.pose(), state.held(slot), model, rate_rad_s, side);
+    Way { omegas_rad_s: holding.hold(steps, world.timing.dtau_s, gust_rad) }
+}
+
+/// Moves the stored pose of an airplane along its orbit for one `dt`.
+fn move_held(turn: &Turn<'_>, slot: Slot) {
+    let Turn { world, state, .. } = turn;
+    let (side, v_m_s) =
+        (state.airplanes[slot as usize].side(), state.stage(world, slot).model.v_m_s);
+    let omega = side.sign() * world.orbit_rad_s[slot as usize];
+    let mut held = state.held(slot);
+    for _ in 0..world.timing.points_per_dt() {
+        held = world.air().blown(held.step(v_m_s, omega, world.timing.dtau_s));
+    }
+    state.set_held(slot, Pose { heading_rad: wrap_angle(held.heading_rad), ..held });
 }

@@ -4,22 +4,31 @@ use super::approaches;
 use super::flight::{Course, Flight, Moment};
 use crate::Turn;
 use crate::events::{Event, EventKind};
+use crate::flight::{Leg, Pose};
 use crate::metrics::airplane_metrics;
 use crate::purpose;
+use crate::rows::FlownLeg;
 use crate::state::End;
 use crate::world::AirspaceWorld;
+use sidestep_kernel::Cycle;
 use sidestep_kernel::distr::normal;
+use sidestep_kernel::interrupt;
+use sidestep_kernel::math::wrap_angle;
 
 /// Flies all steps of this `dt`.
 pub(super) fn step_all(turn: &mut Turn<'_>, mut flights: Vec<Flight<'_>>) {
     let (world, now) = (turn.world, turn.now);
     let steps = world.timing.points_per_dt();
     for k in 0..steps {
+        interrupt::look();
         let step = now * steps as u64 + k as u64;
         let moment = Moment { now, k, step, step_s: step as f64 * world.timing.dtau_s };
         for flight in flights.iter_mut().filter(|f| f.ended.is_none()) {
             let leaves_s = world.airplanes[flight.slot as usize].leaves_s;
             flight.ended = (leaves_s <= moment.step_s).then_some(End::Left(step));
+        }
+        for flight in flights.iter_mut().filter(|f| f.ended.is_none()) {
+            flight.begin_step(world.wind_m_s, moment, world.timing.dtau_s);
         }
         approaches::book(world, &flights, moment, turn.scratch);
         for flight in flights.iter_mut().filter(|f| f.ended.is_none()) {
@@ -51,16 +60,34 @@ fn fly(world: &AirspaceWorld, flight: &mut Flight<'_>, Moment { k, step, .. }: M
     flight.ended = is_at_end.then_some(End::Arrived(step + 1));
 }
 
+/// Returns the rows of an airplane: its legs, and the place where its flight ended.
+fn rows(world: &AirspaceWorld, cycle: Cycle, flight: &Flight<'_>) -> Vec<FlownLeg> {
+    let airplane = flight.slot;
+    let mut rows: Vec<FlownLeg> =
+        flight.flown.iter().map(|&leg| FlownLeg { cycle, airplane, leg }).collect();
+    if let Some(End::Arrived(step) | End::Left(step)) = flight.ended {
+        let at_s = step as f64 * world.timing.dtau_s;
+        let end = Leg::new(at_s, at_s, flight.pose, 0.0, 0.0).climbing(flight.altitude_m, 0.0);
+        rows.push(FlownLeg { cycle, airplane, leg: end });
+    }
+    rows
+}
+
 fn store(turn: &mut Turn<'_>, flight: Flight<'_>) {
     let &mut Turn { world, state, now, ref mut scratch, .. } = turn;
     let cell = &state.airplanes[flight.slot as usize];
     let mut pose = flight.pose;
+    scratch.flown.extend(rows(world, now, &flight));
     let is_disturbed = matches!(flight.course, Course::Way(..));
+    // On its orbit it has moved the pose there already.
+    if cell.orbiting.get() == 0 {
+        state.set_held(flight.slot, Pose { heading_rad: wrap_angle(pose.heading_rad), ..pose });
+    }
     if is_disturbed && world.disturbance.heading_rad > 0.0 {
         let mut draws = world.streams.draws(flight.slot, now, purpose::HEADING);
         pose.heading_rad += world.disturbance.heading_rad * normal(&mut draws);
     }
-    pose.heading_rad = sidestep_kernel::math::wrap_angle(pose.heading_rad);
+    pose.heading_rad = wrap_angle(pose.heading_rad);
     cell.set_pose(pose);
     cell.altitude_m.set(flight.altitude_m);
     cell.next.set(flight.next as u32);

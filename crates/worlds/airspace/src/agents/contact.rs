@@ -21,6 +21,8 @@ pub struct Beacon {
     pub v_m_s: f64,
     /// Largest turn rate in radians per second.
     pub omega_max_rad_s: f64,
+    /// Turn rate of its orbits in radians per second.
+    pub orbit_rad_s: f64,
     /// The separation that it asks for, in meters.
     pub separation_m: f64,
     /// The levels that it is on and changes to.
@@ -45,12 +47,21 @@ pub struct Contact {
     pub heard_in: Cycle,
     /// Its message in that cycle.
     pub beacon: Beacon,
-    /// The orbits that it may have been on since then, under the shield.
-    pub possible: Vec<Orbiting>,
-    /// Number of exchanges in a row, up to `met_in`, in which it was present and not heard.
-    pub unheard: u32,
-    /// Cycle of the last of these exchanges.
-    pub met_in: Cycle,
+    /// The orbit on which it is presumed under the shield.
+    pub presumed: Option<Orbiting>,
+    /// The end of the plan that it told in the exchange before, if it may have flown that one.
+    pub planned: Option<Planned>,
+    /// The exchange, if it is the last one, in which it was present and not heard.
+    pub unheard_in: Option<Cycle>,
+}
+
+/// The side to which an airplane turns at the end of a plan.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Planned {
+    /// Cycle at whose start the plan ends.
+    pub as_of: Cycle,
+    /// The side to which it turns then.
+    pub side: Side,
 }
 
 /// One airplane's knowledge of others, by id.
@@ -60,7 +71,7 @@ impl Orbiting {
     /// Returns its pose at the start of cycle `now`.
     fn pose(&self, air: &Air, beacon: &Beacon, now: Cycle) -> Pose {
         let gone_s = now.saturating_sub(self.as_of) as f64 * air.timing.dt_s;
-        let omega_rad_s = self.side.sign() * beacon.omega_max_rad_s;
+        let omega_rad_s = self.side.sign() * beacon.orbit_rad_s;
         let Pose { at: [x, y], heading_rad } = self.pose.step(beacon.v_m_s, omega_rad_s, gone_s);
         let [wx, wy] = air.wind_m_s;
         Pose { at: [x + wx * gone_s, y + wy * gone_s], heading_rad: math::wrap_angle(heading_rad) }
@@ -75,6 +86,7 @@ impl Beacon {
             goal: None,
             v_m_s: flyer.v_m_s,
             omega_max_rad_s: flyer.omega_max_rad_s,
+            orbit_rad_s: flyer.orbit_rad_s,
             separation_m: flyer.separation_m,
             levels: flyer.levels,
         }
@@ -84,14 +96,14 @@ impl Beacon {
 impl Contact {
     /// Returns the knowledge of an airplane that has just been heard.
     pub(crate) fn heard(beacon: Beacon, now: Cycle) -> Self {
-        Self { heard_in: now, beacon, possible: Vec::new(), unheard: 0, met_in: now }
+        Self { heard_in: now, beacon, presumed: None, planned: None, unheard_in: None }
     }
 
     /// Returns the presumed flight of an airplane that is not heard: on the orbit on which the
     /// shield keeps it, or else straight to its last known way-point. Others keep farther away from
     /// it.
     pub(crate) fn options(&self, air: &Air, is_shielded: bool, now: Cycle) -> Options {
-        let points = match self.possible.first() {
+        let points = match &self.presumed {
             Some(orbiting) if is_shielded => self.on_orbit(air, orbiting, now),
             _ => self.straight(air, now),
         };
@@ -101,9 +113,9 @@ impl Contact {
     }
 
     fn on_orbit(&self, air: &Air, orbiting: &Orbiting, now: Cycle) -> Vec<Point> {
-        let Beacon { v_m_s, omega_max_rad_s, .. } = self.beacon;
+        let Beacon { v_m_s, orbit_rad_s, .. } = self.beacon;
         let pose = orbiting.pose(air, &self.beacon, now);
-        let omega_rad_s = orbiting.side.sign() * omega_max_rad_s;
+        let omega_rad_s = orbiting.side.sign() * orbit_rad_s;
         let point = |k: usize| pose.step(v_m_s, omega_rad_s, k as f64 * air.timing.dtau_s).at;
         (1..=air.timing.horizon).map(point).collect()
     }

@@ -82,7 +82,7 @@ pub fn run(
     deliver(team, &mut migration, &mut told);
     let late = migration.is_late();
     told.iter_mut().filter(|ended| ended.outcome.is_none()).for_each(|ended| ended.late = late);
-    (told, migration.traffic)
+    (told, Traffic { ticks: migration.gone, ..migration.traffic })
 }
 
 impl Coordinator {
@@ -289,6 +289,7 @@ fn learn(above: &mut Coordinator, host: &OwnShip, (block, ageing): (usize, f64))
 /// Lets every part's coordinator bring its airplanes their controls.
 fn deliver(team: Vec<Coordinator>, migration: &mut Migration<'_>, told: &mut [Ended<Conclusion>]) {
     let began = migration.gone;
+    let mut longest = began;
     for mut part in team {
         migration.gone = began;
         let mut at = part.head;
@@ -310,7 +311,9 @@ fn deliver(team: Vec<Coordinator>, migration: &mut Migration<'_>, told: &mut [En
                 late: false,
             };
         }
+        longest = longest.max(migration.gone);
     }
+    migration.gone = longest;
 }
 
 /// Splits a group by proximity into parts of about as many members as there are parts: each time

@@ -13,33 +13,40 @@
 //!    was not heard is taken to be on any orbit it may be on. Each sends its own *plan*.
 //! 3. Each *accepts* the plans of others that keep apart from its own plan and its own fallback,
 //!    and sends the list of those it accepts.
-//! 4. An airplane flies its plan if all others near it have accepted it, else its fallback.
+//! 4. Of two airplanes one *goes first* (`Scene::goes_first`). An airplane flies its plan if all
+//!    those that go before it have accepted it, else its fallback. It does not ask those that it
+//!    goes before, nor those from whom its plan keeps apart whatever they do.
 //!
-//! Airplanes nearby can be seen, heard or not: their place, and the side to which they turn if they
-//! are on an orbit. What cannot be seen is what an airplane wants, and the fallback of one that
-//! flies a way. So the orbits that an unheard airplane may be on are: those that follow from what
-//! was heard in the exchange before; or the one on which it is seen; or else both from where it is
-//! seen.
+//! Who goes first follows from ids, time and what can be seen, and so both know it without a word.
+//! It cannot follow from anything that was heard: whatever the one has heard, the other may not
+//! know of it, and both might believe that they go first.
+//!
+//! Airplanes nearby can be seen, heard or not: their place, whether they are on an orbit, and the
+//! side to which they then turn. What cannot be seen is what an airplane wants, and the fallback of
+//! one that flies a way. So the orbits that an unheard airplane may be on are: the one on which it
+//! is seen; or, if it flew a way, that at the end of the plan that was heard of it in the exchange
+//! before; or else both from where it is seen.
 //!
 //! **Invariant.** For any two airplanes, the orbits that the one may be on, as far as the other
 //! knows, include the one it is on; and the orbits that the two are on keep apart.
 //!
-//! *Why it is kept.* Take `i` and `j`. If `i` has accepted `j`'s plan, it knows that `j` is on
-//! that plan's orbit or on its fallback; both keep apart from `i`'s plan and from its fallback,
-//! as it has checked both. If it has not, `j` flies its fallback, which `i` knows of: from the
-//! proposal, or, if it has not heard it, as one of the orbits possible, from all of which `i`'s
-//! plan keeps apart. The same holds the other way round. So both are on orbits that the other
-//! knows of, and those that they are on keep apart.
+//! *Why it is kept.* Take two airplanes, of which `i` goes first. Each flies its plan or its
+//! fallback. Whatever was heard, `i`'s plan keeps apart from `j`'s fallback: `j` has told it, or it
+//! is among the orbits possible, from all of which `i`'s plan keeps apart. The fallbacks keep apart
+//! from each other. So only `j`'s plan is left. `j` flies it only if it keeps apart from whatever
+//! `i` may do, or if it has heard that `i` accepts it; and `i` has compared it with both its own
+//! plan and its own fallback. So whatever the two fly keeps apart, during `dt` and on the orbits
+//! after it. The orbit on which the other is after that each sees, or has heard as the end of its
+//! only plan; where it has not, it takes both sides to be possible.
 //!
-//! An airplane whose radio is dead knows it, and stays on its fallback. Others wait in vain for it
-//! to accept anything. After some exchanges in a row without hearing from it they take its radio to
-//! be dead, and fly without its consent any plan that keeps apart from every orbit it may be on.
-//! The one risk taken here is that its radio works all the same, and everything was lost: below
-//! 1e-12 each time (`Network::silent_after`).
+//! Nothing in this depends on why an airplane is not heard, or for how long: a dead radio, a
+//! network in two parts, a link that works one way only, a burst of losses, or an airplane that has
+//! just come in. Nobody has to tell one from the other, and nobody waits for an answer for ever,
+//! because two airplanes go first in turn.
 
 mod scene;
 
-use super::contact::{Beacon, Contact, Contacts, Orbiting, note};
+use super::contact::{Beacon, Contact, Contacts, Orbiting, Planned, note};
 use super::link;
 use crate::shield::{Certainty, Decision, Flyer, Plan, Side, Way, filter};
 pub use scene::{Scene, Seen};
@@ -64,7 +71,7 @@ pub enum Message {
 pub struct Proposal {
     beacon: Beacon,
     fallback: Side,
-    came_too_close: bool,
+    named: Vec<EntityId>,
     rank: u64,
     ways: Vec<Way>,
 }
@@ -75,7 +82,7 @@ impl Proposal {
         Self {
             beacon: Beacon::of(flyer),
             fallback: flyer.fallback,
-            came_too_close: flyer.came_too_close,
+            named: flyer.named.to_vec(),
             rank: flyer.rank,
             ways: ways.to_vec(),
         }
@@ -90,8 +97,6 @@ struct Member {
     plan: Option<Option<(Way, Side)>>,
     accepts: Option<Vec<u16>>,
     gone: bool,
-    /// Whether this airplane has accepted its plan.
-    accepted: bool,
 }
 
 /// Outcome of the exchange for one airplane.
@@ -105,6 +110,15 @@ pub struct Agreed {
     pub contacts: Contacts,
 }
 
+/// The messages that an agent waits for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Stage {
+    Proposals,
+    Plans,
+    Consent,
+    Over,
+}
+
 /// The shield's agent of one airplane.
 #[derive(Debug)]
 pub struct Agent {
@@ -115,6 +129,8 @@ pub struct Agent {
     contacts: Contacts,
     members: Vec<Member>,
     decision: Option<Decision>,
+    /// Places of those without whose consent it does not fly its plan.
+    asked: Vec<usize>,
     agreed: Option<Agreed>,
 }
 
@@ -122,15 +138,16 @@ impl Agent {
     /// Returns an agent that has not sent anything yet, for the airplane at place `me`, which may
     /// fly `ways`.
     pub fn new(scene: Arc<Scene>, me: usize, ways: &[Way], contacts: Contacts) -> Self {
-        let flyer = scene.seen[me].flyer;
+        let flyer = scene.seen[me].flyer.clone();
         Self {
             me,
-            flyer,
             own: Proposal::new(&flyer, ways),
+            flyer,
             contacts,
             members: scene.seen.iter().map(|_| Member::default()).collect(),
             scene,
             decision: None,
+            asked: Vec::new(),
             agreed: None,
         }
     }
@@ -156,46 +173,56 @@ impl Agent {
     }
 
     fn flyer_of(&self, place: usize, proposal: &Proposal) -> Flyer {
-        let Proposal { beacon, fallback, came_too_close, rank, .. } = proposal;
+        let Proposal { beacon, fallback, named, rank, .. } = proposal;
         Flyer {
             id: self.id(place),
             pose: beacon.pose,
+            held: beacon.pose,
             v_m_s: beacon.v_m_s,
             omega_max_rad_s: beacon.omega_max_rad_s,
+            orbit_rad_s: beacon.orbit_rad_s,
             separation_m: beacon.separation_m,
+            error_m: self.scene.seen[place].flyer.error_m,
             levels: beacon.levels,
             vertical_m: self.scene.vertical_m,
             fallback: *fallback,
-            came_too_close: *came_too_close,
+            named: named.as_slice().into(),
             rank: *rank,
         }
     }
 
     /// Returns all orbits that an unheard airplane may be on.
     fn possible(&self, place: usize) -> Vec<Flyer> {
-        let Seen { flyer, orbits } = self.scene.seen[place];
-        let told = self.contacts.get(&flyer.id).map_or(&[][..], |contact| &contact.possible);
-        let fresh = told.iter().filter(|orbiting| orbiting.as_of == self.scene.now);
-        let at =
-            |orbiting: &Orbiting| Flyer { pose: orbiting.pose, fallback: orbiting.side, ..flyer };
-        let heard: Vec<Flyer> = fresh.map(at).collect();
-        match heard.is_empty() {
-            false => heard,
-            true if orbits => vec![flyer],
-            true => Side::BOTH.map(|fallback| Flyer { fallback, ..flyer }).into(),
+        let Seen { flyer, orbits } = &self.scene.seen[place];
+        if *orbits {
+            return vec![flyer.clone()];
+        }
+        let told = self.contacts.get(&flyer.id).and_then(|contact| contact.planned);
+        let sides = match told.filter(|planned| planned.as_of == self.scene.now) {
+            Some(Planned { side, .. }) => vec![side],
+            None => Side::BOTH.to_vec(),
+        };
+        sides.into_iter().map(|fallback| Flyer { fallback, ..flyer.clone() }).collect()
+    }
+
+    fn stage(&self) -> Stage {
+        match (&self.decision, &self.members[self.me].accepts, &self.agreed) {
+            (_, _, Some(_)) => Stage::Over,
+            (None, ..) => Stage::Proposals,
+            (Some(_), None, _) => Stage::Plans,
+            (Some(_), Some(_), None) => Stage::Consent,
         }
     }
 
     /// Continues as far as the messages heard allow.
     fn go_on(&mut self) -> Vec<Message> {
         let mut said = Vec::new();
-        while self.agreed.is_none() && link::Agent::awaits(self).is_empty() {
-            if self.decision.is_none() {
-                said.push(self.plan());
-            } else if self.members[self.me].accepts.is_none() {
-                said.push(self.accept());
-            } else {
-                self.agree();
+        while link::Agent::awaits(self).is_empty() {
+            match self.stage() {
+                Stage::Proposals => said.push(self.plan()),
+                Stage::Plans => said.push(self.accept()),
+                Stage::Consent => self.agree(),
+                Stage::Over => break,
             }
         }
         said
@@ -209,7 +236,7 @@ impl Agent {
         for place in 0..self.size() {
             if place == self.me {
                 mine = flyers.len();
-                flyers.push(self.flyer);
+                flyers.push(self.flyer.clone());
                 candidates.push(self.own.ways.clone());
             } else if let Some(proposal) = &self.members[place].proposal {
                 flyers.push(self.flyer_of(place, proposal));
@@ -225,6 +252,11 @@ impl Agent {
         let decision = filter(&flyers, &candidates, frame, Certainty::Mixable)[mine];
         self.decision = Some(decision);
         let way = decision.candidate.map(|k| (self.own.ways[k].clone(), decision.fallback));
+        // Its fallback needs no consent, because all others keep apart from it anyway.
+        self.asked = match way.is_some() {
+            true => self.to_ask(&self.plan_of(self.flyer.clone(), &way)),
+            false => Vec::new(),
+        };
         self.members[self.me].plan = Some(way.clone());
         Message::Plan(way)
     }
@@ -240,8 +272,8 @@ impl Agent {
     /// Accepts the plans that keep apart from both its own plan and its own fallback.
     fn accept(&mut self) -> Message {
         let own = self.members[self.me].plan.clone().flatten();
-        let mine = [self.plan_of(self.flyer, &own), self.fallback(self.flyer)];
-        let mut accepted = Vec::new();
+        let mine = [self.plan_of(self.flyer.clone(), &own), self.fallback(self.flyer.clone())];
+        let mut accepts = Vec::new();
         for place in (0..self.size()).filter(|&place| place != self.me) {
             let Member { proposal: Some(proposal), plan: Some(plan), .. } = &self.members[place]
             else {
@@ -249,41 +281,42 @@ impl Agent {
             };
             let theirs = self.plan_of(self.flyer_of(place, proposal), plan);
             if mine.iter().all(|plan| plan.is_compatible(&theirs)) {
-                accepted.push(place);
+                accepts.push(place as u16);
             }
         }
-        accepted.iter().for_each(|&place| self.members[place].accepted = true);
-        let accepts: Vec<u16> = accepted.iter().map(|&place| place as u16).collect();
         self.members[self.me].accepts = Some(accepts.clone());
         Message::Accepts(accepts)
     }
 
-    /// Returns whether a member has agreed to this airplane's plan, or need not be asked.
-    fn agrees(&self, place: usize) -> bool {
-        let member = &self.members[place];
-        let me = self.me as u16;
-        if member.accepts.as_ref().is_some_and(|accepted| accepted.contains(&me)) {
-            return true;
-        }
-        // The shield need not keep them apart, or the radio is taken to be dead.
-        !self.flyer.minds(&self.scene.seen[place].flyer)
-            || (member.proposal.is_none() && self.unheard_before(place) >= self.scene.silent_after)
+    /// Returns the members whose consent a plan of this airplane needs.
+    fn to_ask(&self, plan: &Plan) -> Vec<usize> {
+        let needs = |&place: &usize| {
+            let other = &self.scene.seen[place].flyer;
+            self.flyer.minds(other)
+                && self.scene.goes_first(place, self.me)
+                && !plan.is_clear_of(other)
+        };
+        (0..self.size()).filter(|&place| place != self.me).filter(needs).collect()
     }
 
-    /// Returns the number of exchanges in a row, up to the one before, in which a member was
-    /// present and not heard.
-    fn unheard_before(&self, place: usize) -> u32 {
+    /// Returns whether a member has agreed to this airplane's plan.
+    fn agrees(&self, place: usize) -> bool {
+        let accepts = self.members[place].accepts.as_ref();
+        accepts.is_some_and(|accepted| accepted.contains(&(self.me as u16)))
+    }
+
+    /// Returns whether a member was present and not heard in the exchange before.
+    fn was_unheard(&self, place: usize) -> bool {
         let contact = self.contacts.get(&self.id(place));
-        contact.filter(|c| c.met_in + 1 == self.scene.now).map_or(0, |contact| contact.unheard)
+        let unheard_in = contact.and_then(|contact| contact.unheard_in);
+        unheard_in.is_some_and(|cycle| cycle + 1 == self.scene.now)
     }
 
     /// Ends the exchange: the airplane flies its plan, or its fallback.
     fn agree(&mut self) {
         let fallback = Decision { candidate: None, fallback: self.flyer.fallback };
         let wanted = self.decision.unwrap_or(fallback);
-        let mut others = (0..self.size()).filter(|&place| place != self.me);
-        // The fallback needs no consent, because all others keep apart from it anyway.
-        let all_agree = wanted.candidate.is_none() || others.all(|place| self.agrees(place));
+        let all_agree = self.asked.iter().all(|&place| self.agrees(place));
         self.agreed = Some(Agreed {
             decision: if all_agree { wanted } else { fallback },
             held_back: !all_agree,
@@ -293,28 +326,26 @@ impl Agent {
 
     /// Returns its knowledge of others after this `dt`.
     fn known_now(&self) -> Contacts {
+        let now = self.scene.now;
         let mut contacts = self.contacts.clone();
         for (place, member) in self.members.iter().enumerate().filter(|(k, _)| *k != self.me) {
             let id = self.id(place);
-            let Some(proposal) = &member.proposal else {
-                let unheard = self.unheard_before(place) + 1;
-                // Use the sighting, if it was never heard.
-                let sighted =
-                    || Contact::heard(Beacon::of(&self.scene.seen[place].flyer), self.scene.now);
-                let contact = contacts.entry(id).or_insert_with(sighted);
-                (contact.unheard, contact.met_in) = (unheard, self.scene.now);
-                continue;
+            let flyer = match &member.proposal {
+                Some(proposal) => {
+                    note(&mut contacts, id, proposal.beacon.clone(), now);
+                    self.flyer_of(place, proposal)
+                }
+                None => self.possible(place).swap_remove(0),
             };
-            let flyer = self.flyer_of(place, proposal);
-            let mut plans = vec![self.fallback(flyer)];
-            if let Some(plan) = member.plan.as_ref().filter(|_| member.accepted) {
-                plans.push(self.plan_of(flyer, plan));
-            }
-            note(&mut contacts, id, proposal.beacon.clone(), self.scene.now);
-            if let Some(contact) = contacts.get_mut(&id) {
-                (contact.unheard, contact.met_in) = (0, self.scene.now);
-                contact.possible = plans.iter().map(|plan| self.orbiting(plan)).collect();
-            }
+            // Use the sighting, if it was never heard.
+            let sighted = || Contact::heard(Beacon::of(&self.scene.seen[place].flyer), now);
+            let contact = contacts.entry(id).or_insert_with(sighted);
+            let is_heard = member.proposal.is_some();
+            // Where it is seen to fly a way, it has flown the plan that it has told.
+            let planned = member.plan.as_ref().and_then(Option::as_ref);
+            contact.planned = planned.map(|(_, side)| Planned { as_of: now + 1, side: *side });
+            contact.presumed = Some(self.orbiting(&self.fallback(flyer)));
+            contact.unheard_in = (!is_heard).then_some(now);
         }
         contacts
     }
@@ -353,21 +384,31 @@ impl link::Agent for Agent {
     }
 
     fn expects(&self, other: usize) -> bool {
-        self.unheard_before(other) == 0
+        !self.was_unheard(other)
     }
 
     fn awaits(&self) -> Vec<usize> {
-        if self.agreed.is_some() {
-            return Vec::new();
-        }
-        let has_accepted = self.members[self.me].accepts.is_some();
-        let missing = |member: &Member| match self.decision {
-            None => member.proposal.is_none(),
-            Some(_) if has_accepted => member.accepts.is_none(),
-            Some(_) => member.plan.is_none(),
+        let stage = self.stage();
+        let is_missing = |place: usize| {
+            let member = &self.members[place];
+            match stage {
+                Stage::Proposals => member.proposal.is_none(),
+                Stage::Plans => member.plan.is_none(),
+                Stage::Consent => member.accepts.is_none() && self.asked.contains(&place),
+                Stage::Over => false,
+            }
         };
         let others = (0..self.size()).filter(|&place| place != self.me);
-        others.filter(|&j| !self.members[j].gone && missing(&self.members[j])).collect()
+        others.filter(|&place| !self.members[place].gone && is_missing(place)).collect()
+    }
+
+    fn waits_until(&self) -> f64 {
+        match self.stage() {
+            Stage::Proposals => 0.5,
+            Stage::Plans => 0.75,
+            // Something is left for an end in good order.
+            Stage::Consent | Stage::Over => 0.95,
+        }
     }
 
     fn without(&mut self, other: usize, _: bool) -> Vec<Message> {

@@ -2,9 +2,10 @@
 //!
 //! Every agent sends all its messages to all the others of its group. An [`Endpoint`] numbers its
 //! agent's messages and keeps them; an endpoint that misses one asks for it again. One that does
-//! not answer although it was asked several times is given up for this talk: the agent goes on with
-//! its knowledge of it. One that was not heard in the talk before is asked once. So nobody waits
-//! for ever, and a loss costs time instead of agreement.
+//! not answer, although asked so often that it can hardly be alive and in touch, or until the time
+//! for this step is up, is given up for this talk: the agent goes on with its knowledge of it. One
+//! that was not heard in the talk before is asked less often. So nobody waits for ever, and a loss
+//! costs time instead of agreement.
 //!
 //! Endpoints and agents are state machines without a clock or a network of their own: the tick and
 //! the [`Transport`] are handed in.
@@ -38,6 +39,12 @@ pub trait Agent {
     /// Returns whether an answer of agent `other` can be expected.
     fn expects(&self, _other: usize) -> bool {
         true
+    }
+
+    /// Returns the part of the talk, from 0 to 1, after which it goes on without those that it
+    /// waits for now.
+    fn waits_until(&self) -> f64 {
+        1.0
     }
 
     /// Goes on without agent `other`, from which nothing more will come. The other is settled if it
@@ -80,6 +87,8 @@ pub struct Radio {
     pub me: usize,
     /// The time that it waits for others.
     pub patience: Patience,
+    /// Number of ticks after which the talk ends.
+    pub ticks: u64,
     /// Whether the radio is dead: it sends nothing, hears nothing, and knows it.
     pub is_silent: bool,
 }
@@ -92,7 +101,10 @@ pub struct Endpoint<A> {
     /// Its messages so far, serialized, by number.
     said: Vec<Vec<u8>>,
     others: Vec<Other>,
+    began: u64,
     quiet_since: u64,
+    /// Size of the largest packet that it has sent or heard, in bytes.
+    largest: usize,
     late: bool,
     /// Number of packets sent so far, which distinguishes those of one tick.
     sent: u32,
@@ -107,6 +119,8 @@ struct Other {
     /// Later messages that have come out of order.
     early: BTreeSet<u32>,
     unanswered: u32,
+    /// Whether anything has come from it in this talk.
+    is_there: bool,
     gone: bool,
     unheard: bool,
 }
@@ -147,7 +161,9 @@ impl<A: Agent> Endpoint<A> {
             radio,
             said: Vec::new(),
             others,
+            began: 0,
             quiet_since: 0,
+            largest: 0,
             late: false,
             sent: 0,
             traffic: Traffic::default(),
@@ -156,7 +172,7 @@ impl<A: Agent> Endpoint<A> {
 
     /// Sends the messages that the agent has before it hears anything.
     pub fn start(&mut self, transport: &mut dyn Transport, tick: u64) {
-        self.quiet_since = tick;
+        (self.began, self.quiet_since) = (tick, tick);
         let first = self.agent.start();
         let said = self.say(first);
         if self.radio.is_silent {
@@ -187,6 +203,7 @@ impl<A: Agent> Endpoint<A> {
                 None => (0..group.len()).filter(|place| place != me).collect(),
             };
             self.traffic.count(receivers.len(), payload.len());
+            self.largest = self.largest.max(payload.len());
             for place in receivers {
                 transport.send(Envelope {
                     cycle: tick,
@@ -215,7 +232,8 @@ impl<A: Agent> Endpoint<A> {
         let Ok(packet) = postcard::from_bytes::<Packet<A::Message>>(bytes) else {
             return Vec::new();
         };
-        self.others[from].unanswered = 0;
+        (self.others[from].unanswered, self.others[from].is_there) = (0, true);
+        self.largest = self.largest.max(bytes.len());
         match packet {
             Packet::Said(number, message) if self.others[from].takes(number) => {
                 self.quiet_since = tick;
@@ -256,10 +274,14 @@ impl<A: Agent> Endpoint<A> {
         }
         self.quiet_since = tick;
         let mut out = Vec::new();
+        let waited = (tick - self.began) as f64;
+        let has_time = waited < self.agent.waits_until() * self.radio.ticks as f64;
         for j in self.agent.awaits() {
-            let tries = if self.agent.expects(j) { self.radio.patience.tries } else { 1 };
+            let Patience { tries, first_tries, .. } = self.radio.patience;
+            let is_expected = self.others[j].is_there || self.agent.expects(j);
+            let tries = if is_expected { tries } else { first_tries };
             let other = &mut self.others[j];
-            if other.unanswered < tries {
+            if other.unanswered < tries && has_time {
                 other.unanswered += 1;
                 let payload = bytes_of(&Packet::<A::Message>::Ask(other.next));
                 out.push(Outgoing { to: Some(j), payload });
@@ -273,7 +295,8 @@ impl<A: Agent> Endpoint<A> {
 
     /// Returns the tick in which its patience ends.
     pub fn next_timer(&self) -> Option<u64> {
-        (!self.is_done()).then(|| self.quiet_since.saturating_add(self.radio.patience.ticks))
+        let ticks = self.radio.patience.ticks_for(self.largest);
+        (!self.is_done()).then(|| self.quiet_since.saturating_add(ticks))
     }
 
     /// Ends the talk of an airplane that nobody hears and that hears nobody.

@@ -1,5 +1,8 @@
 //! The network of the agents: its faults, and the traffic on it.
 
+mod links;
+
+pub use links::{Bursts, OneWay, Partition, Silence};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::ports::Faults;
 use sidestep_kernel::{EntityId, math};
@@ -15,6 +18,8 @@ pub struct Traffic {
     pub bytes: u64,
     /// Number of bytes if one message could reach all.
     pub multicast_bytes: u64,
+    /// Number of ticks that the talks took, one after the other.
+    pub ticks: u64,
 }
 
 impl Traffic {
@@ -24,6 +29,7 @@ impl Traffic {
         self.multicasts += other.multicasts;
         self.bytes += other.bytes;
         self.multicast_bytes += other.multicast_bytes;
+        self.ticks += other.ticks;
     }
 
     /// Counts a message to `receivers` others.
@@ -35,6 +41,11 @@ impl Traffic {
     }
 }
 
+/// Chance of giving up one that is in touch.
+const GIVEN_UP: f64 = 1e-9;
+/// The same for one that was not heard in the talk before: a miss is no worse than that one was.
+const MISSED: f64 = 0.1;
+
 /// A network that may lose, delay and repeat messages.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Network {
@@ -44,6 +55,8 @@ pub struct Network {
     pub duplication: f64,
     /// Time in seconds that every message takes: one tick.
     pub latency_s: f64,
+    /// Bits that go over each way of each link in a second, in addition to the latency.
+    pub bandwidth_bit_s: f64,
     /// Largest further delay in seconds, drawn uniformly, so that messages overtake each other.
     pub max_delay_s: f64,
     /// Time in seconds without a new message after which an agent asks those it waits for.
@@ -51,63 +64,72 @@ pub struct Network {
     /// Time in seconds after which an optimization ends; the same for the shield's exchange after
     /// it.
     pub deadline_s: f64,
+    /// Distance in meters that messages reach.
+    pub range_m: f64,
+    /// Bursts of losses, if there are any.
+    pub bursts: Option<Bursts>,
     /// Airplanes whose radio is dead, and the times.
     pub silences: Vec<Silence>,
-}
-
-/// A while in which an airplane's radio is dead: it sends nothing, hears nothing, and knows it.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Silence {
-    /// Id of the airplane.
-    pub airplane: EntityId,
-    /// Start of the silence, in seconds after the start of the run.
-    #[serde(default)]
-    pub from_s: f64,
-    /// End of the silence, in seconds after the start of the run; infinite unless given.
-    #[serde(default = "for_ever")]
-    pub until_s: f64,
-}
-
-fn for_ever() -> f64 {
-    f64::INFINITY
+    /// Sides that do not hear each other, and the times.
+    pub partitions: Vec<Partition>,
+    /// Links that work one way only, and the times.
+    pub one_ways: Vec<OneWay>,
 }
 
 impl Network {
     /// Returns whether an airplane is silent at a time.
     pub fn is_silent(&self, id: EntityId, at_s: f64) -> bool {
-        let now = |s: &&Silence| s.from_s <= at_s && at_s < s.until_s;
-        self.silences.iter().filter(now).any(|s| s.airplane == id)
+        self.silences.iter().any(|silence| silence.airplane == id && silence.is_on(at_s))
+    }
+
+    /// Returns whether a link carries messages at a time, as far as distance does not matter.
+    pub(crate) fn carries(&self, [sender, receiver]: [EntityId; 2], at_s: f64) -> bool {
+        let is_cut = self.partitions.iter().any(|one| one.cuts([sender, receiver], at_s));
+        !is_cut && !self.one_ways.iter().any(|one| one.stops(sender, receiver, at_s))
     }
 
     fn ticks(&self, seconds: f64) -> u64 {
         (seconds / self.latency_s).round().max(1.0) as u64
     }
 
+    /// Returns the time that some ticks take.
+    pub(crate) fn seconds(&self, ticks: u64) -> f64 {
+        ticks as f64 * self.latency_s
+    }
+
+    /// Returns the number of bits that go over a link in a tick.
+    pub(crate) fn bits_per_tick(&self) -> f64 {
+        self.bandwidth_bit_s * self.latency_s
+    }
+
     pub(crate) fn deadline_ticks(&self) -> u64 {
         self.ticks(self.deadline_s)
     }
 
-    /// Returns how long and how often an agent asks another: a silent one is given up in a quarter
-    /// of the time, so that enough is left to go on without it.
+    /// Returns how long an agent waits before it asks, and how often it asks.
     pub(crate) fn patience(&self) -> Patience {
-        let tries = (self.deadline_s / (4.0 * self.patience_s)).clamp(2.0, 12.0) as u32;
-        Patience { ticks: self.ticks(self.patience_s), tries }
+        let (tries, first_tries) = (self.tries(GIVEN_UP), self.tries(MISSED));
+        let bits_per_tick = self.bits_per_tick();
+        Patience { ticks: self.ticks(self.patience_s), bits_per_tick, tries, first_tries }
     }
 
-    /// Returns the number of talks in a row without a message from an airplane after which its
-    /// radio is taken to be dead: at least three, and enough that the chance is below 1e-12 that
-    /// all its messages were lost, together with all questions to it or the answers.
-    pub(crate) fn silent_after(&self) -> u32 {
-        const CHANCE: f64 = 1e-12;
+    /// Returns the same for talks of many steps: one that has fallen silent is given up in a quarter
+    /// of the time at the latest, so that enough is left to go on without it.
+    pub(crate) fn short_patience(&self) -> Patience {
+        let most = (self.deadline_s / (4.0 * self.patience_s)).max(2.0) as u32;
+        let long = self.patience();
+        Patience { tries: long.tries.min(most), first_tries: long.first_tries.min(most), ..long }
+    }
+
+    /// Returns the number of questions after which the chance is at most `chance` that one that is
+    /// in touch has not answered any: each question or its answer was lost, or fell into a burst.
+    fn tries(&self, chance: f64) -> u32 {
         let unanswered = 1.0 - (1.0 - self.loss) * (1.0 - self.loss);
-        let tries = f64::from(self.patience().tries);
-        // In the first of these talks all questions are asked, in each later one a single question.
-        let first = math::ln(self.loss) + tries * math::ln(unanswered);
-        let later = math::ln(self.loss * unanswered);
-        let talks = 1.0 + ((math::ln(CHANCE) - first) / later).ceil().max(0.0);
-        // Without losses the logarithms are infinite, and three talks are enough.
-        if talks.is_finite() { (talks as u32).max(3) } else { 3 }
+        let burst_s = self.bursts.map_or(0.0, |bursts| bursts.lasts_s * -math::ln(chance));
+        let lost = (math::ln(chance) / math::ln(unanswered)).ceil();
+        let on_way_s = 2.0 * (self.latency_s + self.max_delay_s);
+        // The conversion saturates, and bursts may last longer than any talk.
+        ((lost + (burst_s + on_way_s) / self.patience_s) as u32).saturating_add(1)
     }
 
     pub(crate) fn faults(&self) -> Faults {
@@ -124,6 +146,19 @@ impl Network {
 pub struct Patience {
     /// Number of ticks without a new message after which it asks.
     pub ticks: u64,
+    /// Number of bits that go over a link in a tick.
+    pub bits_per_tick: f64,
     /// Number of questions to another before it is given up.
     pub tries: u32,
+    /// The same for one that was not heard in the talk before.
+    pub first_tries: u32,
+}
+
+impl Patience {
+    /// Returns the number of ticks after which it asks where messages are of this size: those that
+    /// a message and its answer take on the way come on top.
+    pub(crate) fn ticks_for(&self, bytes: usize) -> u64 {
+        let on_way = (2.0 * 8.0 * bytes as f64 / self.bits_per_tick).ceil();
+        self.ticks.saturating_add(on_way as u64)
+    }
 }

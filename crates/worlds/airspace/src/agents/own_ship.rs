@@ -3,6 +3,7 @@
 use super::Decided;
 use super::contact::{Beacon, Contact, Contacts};
 use crate::flight::{Action, Air, Known, Model, Point};
+use crate::intruder::Intruder;
 use crate::objective::{Objective, Options};
 use crate::purpose;
 use sidestep_collectives::{Estimator, Player, Settings};
@@ -27,6 +28,8 @@ pub struct Briefing {
     pub settings: Settings,
     /// The random streams from which samples are drawn.
     pub streams: Streams,
+    /// Airplanes near the group that mind nobody, as all see them.
+    pub intruders: Vec<Intruder>,
     /// Whether the shield keeps airplanes that are not heard on their orbits.
     pub is_shielded: bool,
 }
@@ -59,7 +62,11 @@ impl Briefing {
             ..model.clone()
         };
         let predictions = self.air.predictions(&model, actions, mission, (beacon.pose, next));
-        Options::new(predictions, beacon.separation_m, beacon.levels)
+        Options::new(predictions, beacon.separation_m, beacon.levels).beside(
+            &self.intruders,
+            &self.objective,
+            self.air.timing.dtau_s,
+        )
     }
 }
 

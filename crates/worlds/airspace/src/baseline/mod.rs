@@ -1,19 +1,53 @@
-//! Other methods under the same limits, for comparison: each computes a heading, and the airplane
-//! turns toward it as fast as it can.
+//! Other methods under the same limits, for comparison: each looks at the airplanes near it once per
+//! step of `dtau`, and gives a heading, toward which the airplane turns as fast as it can.
 
 pub(super) mod mvp;
 pub(super) mod orca;
 
 use super::flight::{Levels, Point};
+use sidestep_kernel::{Slot, math};
 
 /// The part of an airplane that a method knows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Moving {
+    pub(super) slot: Slot,
     pub(super) at: Point,
+    /// Heading in radians, counter-clockwise from east.
+    pub(super) heading_rad: f64,
     /// Velocity in meters per second.
     pub(super) velocity: Point,
-    /// The velocity that it would have if it were alone, in meters per second.
-    pub(super) preferred: Point,
+    /// The heading that it would have if it were alone, in radians.
+    pub(super) preferred_rad: f64,
     pub(super) separation_m: f64,
     pub(super) levels: Levels,
+    /// Whether it gives way to others, too.
+    pub(super) yields: bool,
+}
+
+/// The settings of a method.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reactive {
+    /// Time in seconds within which losses of separation are avoided.
+    pub look_ahead_s: f64,
+    /// Factor on separations when avoiding.
+    pub margin: f64,
+}
+
+impl Moving {
+    /// Returns the distance in meters within which another airplane is to be avoided.
+    fn zone_m(&self, other: &Self, settings: Reactive) -> f64 {
+        self.separation_m.max(other.separation_m) * settings.margin
+    }
+}
+
+fn dot(a: Point, b: Point) -> f64 {
+    a[0] * b[0] + a[1] * b[1]
+}
+
+fn minus(a: Point, b: Point) -> Point {
+    [a[0] - b[0], a[1] - b[1]]
+}
+
+fn length(a: Point) -> f64 {
+    math::hypot(a[0], a[1])
 }

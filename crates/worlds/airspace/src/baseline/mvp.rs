@@ -1,59 +1,133 @@
-//! Modified voltage potential, after Hoekstra's method in BlueSky's form, heading only: an airplane
-//! shifts its velocity so that the predicted closest point of approach moves out of the other's
-//! zone.
+//! Modified voltage potential, as BlueSky flies it with resolutions by heading only (its version
+//! 1.1.1: `STATEBASED`, `MVP`, `RMETHH HDG`).
+//!
+//! A conflict is found from the present velocities, also between two that have already come too near
+//! and fly apart. Each airplane then changes its present velocity so that the closest point moves out
+//! of the other's zone. It keeps to this, also after the conflict is no longer predicted, until the
+//! two are past their closest point and apart; then it flies to its way-point again.
 
-use super::Moving;
+use super::{Moving, Reactive, dot, length, minus};
 use crate::flight::Point;
-use sidestep_kernel::math;
+use serde::{Deserialize, Serialize};
+use sidestep_kernel::{Slot, math};
 
-/// Closest approaches nearer than this have no direction of their own, so every airplane gives way
-/// to the right.
+/// Closest approaches nearer than this have no direction of their own, so every airplane turns to the
+/// left of the line of sight.
 const HEAD_ON_M: f64 = 10.0;
+/// Factor on the zone out of which the closest point is moved (`RFACH`), as BlueSky comes.
+const RESOLVES: f64 = 1.05;
+/// Difference of headings in radians below which two airplanes near each other fly side by side: they
+/// would soon be in conflict again.
+const SIDE_BY_SIDE_RAD: f64 = 30.0 * std::f64::consts::PI / 180.0;
+/// Squared speed in m²/s² below which two airplanes do not move against each other.
+const STILL: f64 = 1e-6;
 
-/// Returns the velocity that airplane `own` should fly: its preferred one, shifted away from all
-/// airplanes with which it would lose separation within `look_ahead_s`. `margin` is a factor on
-/// separations.
-pub(in super::super) fn velocity<'a>(
-    own: &Moving,
-    others: impl Iterator<Item = &'a Moving>,
-    look_ahead_s: f64,
-    margin: f64,
-) -> Point {
-    let shifts = others.filter_map(|other| shift(own, other, look_ahead_s, margin));
-    shifts.fold(own.preferred, |v, s| [v[0] - s[0], v[1] - s[1]])
+/// The conflicts that an airplane resolves, from one look to the next.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Resolving {
+    /// The others, by slot.
+    with: Vec<Slot>,
+    /// The heading that resolves them, in radians.
+    heading_rad: f64,
 }
 
-/// Returns the change of the other's velocity, seen from `own`, with which it would miss its zone.
-fn shift(own: &Moving, other: &Moving, look_ahead_s: f64, margin: f64) -> Option<Point> {
-    let zone_m = own.separation_m.max(other.separation_m) * margin;
-    let apart = [other.at[0] - own.at[0], other.at[1] - own.at[1]];
-    let closing = [other.velocity[0] - own.preferred[0], other.velocity[1] - own.preferred[1]];
-    let speed2 = closing[0] * closing[0] + closing[1] * closing[1];
-    if speed2 < 1e-9 {
+/// A closest approach that two airplanes will have, or have had, if both fly straight on.
+struct Closest {
+    /// The other's place then, seen from the airplane.
+    at: Point,
+    /// Seconds from now.
+    in_s: f64,
+}
+
+/// Returns the heading of each airplane, in radians; `None` for one that flies to its way-point.
+/// `meets` says whether two are on one level.
+pub(in super::super) fn headings(
+    all: &[Moving],
+    resolving: &mut [Resolving],
+    settings: Reactive,
+    meets: impl Fn(&Moving, &Moving) -> bool,
+) -> Vec<Option<f64>> {
+    let conflicts = |own: &Moving| -> Vec<(usize, Closest)> {
+        let others = (0..all.len()).filter(|&j| all[j].slot != own.slot && meets(own, &all[j]));
+        let found = others.map(|j| (j, conflict(own, &all[j], settings)));
+        found.filter_map(|(j, closest)| Some((j, closest?))).collect()
+    };
+    let found: Vec<Vec<(usize, Closest)>> = all.iter().map(conflicts).collect();
+    // As in BlueSky, the headings are kept only while nobody is in conflict.
+    let is_anybody_in_conflict = found.iter().any(|conflicts| !conflicts.is_empty());
+    for ((own, conflicts), memory) in all.iter().zip(&found).zip(&mut *resolving) {
+        if is_anybody_in_conflict {
+            memory.heading_rad = resolved_rad(all, own, conflicts, settings);
+        }
+        memory.with.extend(conflicts.iter().map(|(j, _)| all[*j].slot));
+        memory.with.sort_unstable();
+        memory.with.dedup();
+        let other = |slot: &Slot| all.iter().find(|other| other.slot == *slot);
+        let is_on = |other: &Moving| meets(own, other) && is_on(own, other, settings);
+        memory.with.retain(|slot| other(slot).is_some_and(is_on));
+    }
+    resolving.iter().map(|memory| (!memory.with.is_empty()).then_some(memory.heading_rad)).collect()
+}
+
+/// Returns the closest approach of two airplanes if one enters the other's zone within the time of
+/// looking ahead, or has entered it.
+fn conflict(own: &Moving, other: &Moving, settings: Reactive) -> Option<Closest> {
+    let (zone_m, apart) = (own.zone_m(other, settings), minus(other.at, own.at));
+    let closing = minus(other.velocity, own.velocity);
+    let speed2 = dot(closing, closing).max(STILL);
+    let in_s = -dot(apart, closing) / speed2;
+    let at = [apart[0] + closing[0] * in_s, apart[1] + closing[1] * in_s];
+    let miss2 = dot(at, at);
+    if miss2 >= zone_m * zone_m {
         return None;
     }
-    let cpa_s = -(apart[0] * closing[0] + apart[1] * closing[1]) / speed2;
-    if !(0.0..look_ahead_s).contains(&cpa_s) {
-        return None;
-    }
-    let mut cpa = [apart[0] + closing[0] * cpa_s, apart[1] + closing[1] * cpa_s];
-    let mut miss_m = math::hypot(cpa[0], cpa[1]);
-    if miss_m >= zone_m {
-        return None;
-    }
-    let distance_m = math::hypot(apart[0], apart[1]).max(1e-9);
+    let half_s = (zone_m * zone_m - miss2).sqrt() / speed2.sqrt();
+    (in_s + half_s > 0.0 && in_s - half_s < settings.look_ahead_s).then_some(Closest { at, in_s })
+}
+
+/// Returns the heading that resolves an airplane's conflicts; its present one without any.
+fn resolved_rad(
+    all: &[Moving],
+    own: &Moving,
+    conflicts: &[(usize, Closest)],
+    settings: Reactive,
+) -> f64 {
+    let change = |v: Point, (j, closest): &(usize, Closest)| {
+        let shift = shift(own, &all[*j], closest, settings);
+        [v[0] - shift[0], v[1] - shift[1]]
+    };
+    let [vx, vy] = conflicts.iter().fold(own.velocity, change);
+    if conflicts.is_empty() { own.heading_rad } else { math::atan2(vy, vx) }
+}
+
+/// Returns the change of the other's velocity, seen from `own`, with which it would miss the zone.
+fn shift(own: &Moving, other: &Moving, closest: &Closest, settings: Reactive) -> Point {
+    let zone_m = own.zone_m(other, settings) * RESOLVES;
+    let apart = minus(other.at, own.at);
+    let (distance_m, mut at) = (length(apart).max(1e-9), closest.at);
+    let mut miss_m = length(at);
     if miss_m <= HEAD_ON_M {
-        // The other should pass to the left of the line of sight.
         miss_m = HEAD_ON_M;
-        cpa = [-apart[1] / distance_m * miss_m, apart[0] / distance_m * miss_m];
+        at = [apart[1] / distance_m * miss_m, -apart[0] / distance_m * miss_m];
     }
-    let mut size = (zone_m - miss_m) / (cpa_s.max(1.0) * miss_m);
+    let mut reach_m = zone_m;
     if zone_m < distance_m && miss_m < distance_m {
-        // The shifted closest point lies on the zone's tangent, not on its rim.
+        // The way past the zone is its tangent, so a shift to its rim would cut it.
         let off = math::asin(zone_m / distance_m) - math::asin(miss_m / distance_m);
-        size /= math::cos(off).abs().max(0.1);
+        reach_m /= math::cos(off);
     }
-    Some([cpa[0] * size, cpa[1] * size])
+    let size = (reach_m - miss_m) / (closest.in_s.abs().max(1e-6) * miss_m);
+    [at[0] * size, at[1] * size]
+}
+
+/// Returns whether a conflict that was found is still to be minded.
+fn is_on(own: &Moving, other: &Moving, settings: Reactive) -> bool {
+    let (apart, closing) = (minus(other.at, own.at), minus(other.velocity, own.velocity));
+    let (distance_m, zone_m) = (length(apart), own.zone_m(other, settings));
+    let is_past = dot(apart, closing) > 0.0;
+    let angle_rad = math::wrap_angle(own.heading_rad - other.heading_rad).abs();
+    let is_beside = angle_rad < SIDE_BY_SIDE_RAD && distance_m < zone_m * RESOLVES;
+    !is_past || distance_m < zone_m || is_beside
 }
 
 #[cfg(test)]
@@ -61,23 +135,74 @@ mod tests {
     use super::super::super::flight::Levels;
     use super::*;
 
-    fn moving(x: f64, y: f64, velocity: Point) -> Moving {
+    const SETTINGS: Reactive = Reactive { look_ahead_s: 90.0, margin: 1.0 };
+
+    fn moving(slot: Slot, at: Point, heading_rad: f64) -> Moving {
         Moving {
-            at: [x, y],
-            velocity,
-            preferred: velocity,
+            slot,
+            at,
+            heading_rad,
+            velocity: [35.0 * math::cos(heading_rad), 35.0 * math::sin(heading_rad)],
+            preferred_rad: heading_rad,
             separation_m: 500.0,
             levels: Levels::at(0.0),
+            yields: true,
+        }
+    }
+
+    fn looked(all: &[Moving], memory: &mut [Resolving]) -> Vec<Option<f64>> {
+        headings(all, memory, SETTINGS, |_, _| true)
+    }
+
+    /// The headings that BlueSky 1.1.1 commands for the same poses after one look (`traf.cr.trk`, as
+    /// degrees counter-clockwise from east), with `RMETHH HDG`, a zone of 500 m, `RFACH 1.05`,
+    /// `DTLOOK 90`, and the bearings of its module `_geo`.
+    #[test]
+    fn headings_are_those_of_bluesky() {
+        let cases: [(&[(Point, f64)], &[f64]); 5] = [
+            (&[([0.0, 0.0], 0.0), ([2000.0, -1900.0], 90.0)], &[-11.3667, 81.8404]),
+            (&[([0.0, 0.0], 0.0), ([-300.0, 50.0], 180.0)], &[-72.4744, 107.5256]),
+            (&[([0.0, 0.0], 0.0), ([3000.0, 0.0], 180.0)], &[19.2191, -160.7809]),
+            (
+                &[([0.0, 0.0], 0.0), ([2000.0, -1900.0], 90.0), ([2500.0, 100.0], 170.0)],
+                &[-22.2605, 81.8404, 160.6297],
+            ),
+            (&[([0.0, 0.0], 0.0), ([100.0, -480.0], 10.0)], &[-1.0022, 9.2841]),
+        ];
+        for (poses, expected_deg) in cases {
+            let one =
+                |(slot, (at, deg)): (Slot, &(Point, f64))| moving(slot, *at, deg.to_radians());
+            let all: Vec<Moving> = (0..).zip(poses).map(one).collect();
+            let found = looked(&all, &mut vec![Resolving::default(); all.len()]);
+            for (found, expected) in found.iter().zip(expected_deg) {
+                let found_deg = found.expect("a conflict").to_degrees();
+                assert!((found_deg - expected).abs() < 1e-3, "{found_deg} for {expected}");
+            }
         }
     }
 
     #[test]
-    fn two_head_on_turn_to_the_same_side_and_those_apart_do_not_turn() {
-        let (a, b) = (moving(0.0, 0.0, [35.0, 0.0]), moving(4000.0, 0.0, [-35.0, 0.0]));
-        let va = velocity(&a, [b].iter(), 125.0, 1.0);
-        let vb = velocity(&b, [a].iter(), 125.0, 1.0);
-        assert!(va[1] < -1.0 && vb[1] > 1.0, "{va:?} {vb:?}");
-        let far = moving(0.0, 5000.0, [35.0, 0.0]);
-        assert_eq!(velocity(&a, [far].iter(), 125.0, 1.0), a.preferred);
+    fn a_conflict_is_minded_until_past_the_closest_point() {
+        let mut memory = [Resolving::default(), Resolving::default()];
+        let far = [moving(0, [0.0, 0.0], 0.0), moving(1, [4000.0, 0.0], std::f64::consts::PI)];
+        assert!(looked(&far, &mut memory).iter().all(Option::is_some));
+        // Both have turned away, so nothing is predicted any more.
+        let turned =
+            [moving(0, [1000.0, 0.0], 0.5), moving(1, [3000.0, 0.0], 0.5 - std::f64::consts::PI)];
+        let kept = looked(&turned, &mut memory);
+        assert!(kept.iter().all(Option::is_some), "{kept:?}");
+        let past =
+            [moving(0, [2500.0, 400.0], 0.0), moving(1, [1500.0, -400.0], std::f64::consts::PI)];
+        assert_eq!(looked(&past, &mut memory), [None, None]);
+    }
+
+    #[test]
+    fn two_that_have_lost_separation_and_fly_apart_still_resolve() {
+        let mut memory = [Resolving::default(), Resolving::default()];
+        let inside = [moving(0, [0.0, 0.0], 0.0), moving(1, [-300.0, 50.0], std::f64::consts::PI)];
+        assert!(looked(&inside, &mut memory).iter().all(Option::is_some));
+        let beyond =
+            [moving(0, [600.0, 0.0], 0.0), moving(1, [-300.0, 50.0], std::f64::consts::PI)];
+        assert_eq!(looked(&beyond, &mut memory), [None, None]);
     }
 }

@@ -1,42 +1,160 @@
-//! Optimal reciprocal collision avoidance (van den Berg and others, 2011), by a library; its
-//! velocities are made flyable with the same turn rates as for the other methods.
+//! Optimal reciprocal collision avoidance (van den Berg and others, 2011), for airplanes that fly
+//! with one speed.
+//!
+//! Each neighbor allows a half-plane of velocities, as in the paper. A velocity in the middle of the
+//! allowed ones is of no use to an airplane that cannot slow down: its direction alone, flown with
+//! full speed, may lie outside. So the choice is made among the velocities that it can have, which
+//! lie on a circle: the allowed heading nearest to the preferred one, or where none is allowed the
+//! one that violates the half-planes least. The margin on separations allows for the time that
+//! turning takes.
 
-use super::Moving;
+use super::{Moving, Reactive, dot, length, minus};
 use crate::flight::Point;
-use dodgy_2d::{Agent, AvoidanceOptions, Vec2};
-use std::borrow::Cow;
+use sidestep_kernel::math;
 
-/// Returns the velocity that airplane `own` should fly among the others.
-pub(in super::super) fn velocity<'a>(
+/// Number of headings among which an airplane chooses, evenly spaced from the preferred one on.
+const HEADINGS: u32 = 90;
+/// Weight in meters per second of a turn by one radian, beside violations: of headings that are
+/// equally bad, the nearest one is flown.
+const TURN_M_S: f64 = 1e-6;
+
+/// The velocities that one neighbor allows: those with at least `least` along `normal`.
+struct HalfPlane {
+    normal: Point,
+    least: f64,
+}
+
+/// Returns the heading in radians that an airplane should fly among the others; `None` if it may
+/// fly to its way-point. `step_s` is the time until it looks again.
+pub(in super::super) fn heading_rad<'a>(
     own: &Moving,
     others: impl Iterator<Item = &'a Moving>,
-    look_ahead_s: f64,
-    dt_s: f64,
-    margin: f64,
-) -> Point {
-    // Positions relative to the airplane, because single precision is finer near the origin.
-    let near = |at: Point| Vec2::new((at[0] - own.at[0]) as f32, (at[1] - own.at[1]) as f32);
-    let plain = |v: Point| Vec2::new(v[0] as f32, v[1] as f32);
-    let agent = |m: &Moving| Agent {
-        position: near(m.at),
-        velocity: plain(m.velocity),
-        radius: (0.5 * m.separation_m * margin) as f32,
-        avoidance_responsibility: 1.0,
+    settings: Reactive,
+    step_s: f64,
+) -> Option<f64> {
+    let planes: Vec<HalfPlane> =
+        others.map(|other| half_plane(own, other, settings, step_s)).collect();
+    let v_m_s = length(own.velocity);
+    let excess = |heading_rad: f64| {
+        let v = [v_m_s * math::cos(heading_rad), v_m_s * math::sin(heading_rad)];
+        planes.iter().map(|p| dot(p.normal, v) - p.least).fold(f64::INFINITY, f64::min)
     };
-    let neighbors: Vec<Cow<'_, Agent>> = others.map(|m| Cow::Owned(agent(m))).collect();
-    let preferred = plain(own.preferred);
-    let options = AvoidanceOptions {
-        obstacle_margin: 0.0,
-        time_horizon: look_ahead_s as f32,
-        obstacle_time_horizon: 0.0,
+    if excess(own.preferred_rad) >= 0.0 {
+        return None;
+    }
+    // Any allowed heading before all others, and then the nearest.
+    let worth = |off_rad: f64| {
+        let excess = excess(own.preferred_rad + off_rad);
+        (excess >= 0.0, excess.min(0.0) - TURN_M_S * off_rad.abs())
     };
-    let chosen = agent(own).compute_avoiding_velocity(
-        &neighbors,
-        &[],
-        preferred,
-        preferred.length(),
-        dt_s as f32,
-        &options,
-    );
-    [f64::from(chosen.x), f64::from(chosen.y)]
+    let one_rad = std::f64::consts::TAU / f64::from(HEADINGS);
+    let offs = (0..HEADINGS).map(|k| math::wrap_angle(f64::from(k) * one_rad));
+    let ranked = offs.map(|off_rad| (worth(off_rad), off_rad));
+    let best = ranked.max_by(|((a, x), _), ((b, y), _)| a.cmp(b).then(x.total_cmp(y)));
+    best.map(|(_, off_rad)| own.preferred_rad + off_rad)
+}
+
+/// Returns the velocities of `own` that avoid one neighbor: if that one yields, it does its half.
+fn half_plane(own: &Moving, other: &Moving, settings: Reactive, step_s: f64) -> HalfPlane {
+    let (apart, relative) = (minus(other.at, own.at), minus(own.velocity, other.velocity));
+    let radius_m = own.zone_m(other, settings);
+    let distance2 = dot(apart, apart);
+    let is_too_near = distance2 <= radius_m * radius_m;
+    // Who is too near already has to be out of the zone by the next look.
+    let within_s = if is_too_near { step_s } else { settings.look_ahead_s };
+    let from_center = [relative[0] - apart[0] / within_s, relative[1] - apart[1] / within_s];
+    let (size, along) = (length(from_center).max(1e-9), dot(from_center, apart));
+    let is_round = along < 0.0 && along * along > radius_m * radius_m * size * size;
+    let (normal, needed) = if is_too_near || is_round {
+        // To the rim of the disc of velocities that lead into the zone at the end of the time.
+        let normal = [from_center[0] / size, from_center[1] / size];
+        (normal, radius_m / within_s - size)
+    } else {
+        // To the nearer leg of the cone of velocities that lead into the zone before.
+        let leg_m = (distance2 - radius_m * radius_m).sqrt();
+        let turn =
+            if apart[0] * from_center[1] - apart[1] * from_center[0] > 0.0 { 1.0 } else { -1.0 };
+        let normal = [
+            -(apart[0] * radius_m + turn * apart[1] * leg_m) / distance2,
+            -(apart[1] * radius_m - turn * apart[0] * leg_m) / distance2,
+        ];
+        (normal, -dot(relative, normal))
+    };
+    let share = if other.yields { 0.5 } else { 1.0 };
+    HalfPlane { normal, least: dot(own.velocity, normal) + share * needed }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::flight::Levels;
+    use super::*;
+    use dodgy_2d::{Agent, AvoidanceOptions, Vec2};
+    use proptest::prelude::*;
+    use std::borrow::Cow;
+
+    const SETTINGS: Reactive = Reactive { look_ahead_s: 60.0, margin: 1.05 };
+
+    fn moving(slot: u32, at: Point, heading_rad: f64) -> Moving {
+        Moving {
+            slot,
+            at,
+            heading_rad,
+            velocity: [35.0 * math::cos(heading_rad), 35.0 * math::sin(heading_rad)],
+            preferred_rad: heading_rad,
+            separation_m: 500.0,
+            levels: Levels::at(0.0),
+            yields: true,
+        }
+    }
+
+    /// The velocity that another implementation chooses, without a limit of speed.
+    fn by_library(own: &Moving, other: &Moving) -> Point {
+        let plain = |v: Point| Vec2::new(v[0] as f32, v[1] as f32);
+        let agent = |m: &Moving| Agent {
+            position: plain(m.at),
+            velocity: plain(m.velocity),
+            radius: (0.5 * 500.0 * SETTINGS.margin) as f32,
+            avoidance_responsibility: 1.0,
+        };
+        let options = AvoidanceOptions {
+            obstacle_margin: 0.0,
+            time_horizon: SETTINGS.look_ahead_s as f32,
+            obstacle_time_horizon: 0.0,
+        };
+        let (neighbors, wanted) = ([Cow::Owned(agent(other))], plain(own.velocity));
+        let chosen =
+            agent(own).compute_avoiding_velocity(&neighbors, &[], wanted, 1e4, 1.0, &options);
+        [f64::from(chosen.x), f64::from(chosen.y)]
+    }
+
+    proptest! {
+        /// With its velocity free, an airplane would choose the nearest one of the half-plane: what a
+        /// library chooses.
+        #[test]
+        fn the_half_planes_are_those_of_the_paper(
+            x in -4000.0f64..4000.0, y in -4000.0f64..4000.0, heading_rad in -3.1f64..3.1,
+        ) {
+            let (own, other) = (moving(0, [0.0, 0.0], 0.3), moving(1, [x, y], heading_rad));
+            let HalfPlane { normal, least } = half_plane(&own, &other, SETTINGS, 1.0);
+            let lacks = (least - dot(normal, own.velocity)).max(0.0);
+            let nearest = [own.velocity[0] + lacks * normal[0], own.velocity[1] + lacks * normal[1]];
+            let theirs = by_library(&own, &other);
+            let off = minus(nearest, theirs);
+            prop_assert!(length(off) < 0.02 + 1e-3 * lacks, "{nearest:?} {theirs:?}");
+        }
+
+        /// Alone with one neighbor, both headings together keep the zone.
+        #[test]
+        fn a_heading_is_one_that_all_allow(x in 600.0f64..4000.0, y in -800.0f64..800.0) {
+            let (own, other) = (moving(0, [0.0, 0.0], 0.0), moving(1, [x, y], 3.1));
+            let plane = half_plane(&own, &other, SETTINGS, 1.0);
+            let excess = |rad: f64| {
+                dot(plane.normal, [35.0 * math::cos(rad), 35.0 * math::sin(rad)]) - plane.least
+            };
+            match heading_rad(&own, [other].iter(), SETTINGS, 1.0) {
+                Some(rad) => prop_assert!(excess(rad) >= 0.0 && excess(0.0) < 0.0),
+                None => prop_assert!(excess(0.0) >= 0.0),
+            }
+        }
+    }
 }

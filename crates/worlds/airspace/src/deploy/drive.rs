@@ -1,5 +1,5 @@
 //! Agents of a group on a network in memory, which can lose, delay, double and reorder messages,
-//! and silence an airplane.
+//! cut links, and silence an airplane.
 //!
 //! Time on it passes in ticks: a message takes one, or more when it is delayed. Every draw depends
 //! on sender, receiver and tick, never on the order in which agents are visited.
@@ -7,14 +7,19 @@
 use crate::agents::network::{Network, Patience, Traffic};
 use crate::agents::{Agent, Ended, Endpoint, Radio};
 use crate::purpose;
+use crate::state::AirspaceState;
 use crate::world::AirspaceWorld;
-use sidestep_kernel::ports::MemoryTransport;
+use sidestep_kernel::distr::Chance;
+use sidestep_kernel::math;
+use sidestep_kernel::ports::{Envelope, MemoryTransport, Transport};
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{Cycle, EntityId};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Patience of agents that wait for each other as long as it takes.
-const FOR_EVER: Patience = Patience { ticks: u64::MAX, tries: 1 };
+const FOR_EVER: Patience =
+    Patience { ticks: u64::MAX, bits_per_tick: f64::INFINITY, tries: 1, first_tries: 1 };
 
 /// The topics of a `dt`, one after the other: each has ticks of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,6 +35,8 @@ pub(super) enum Topic {
 pub(super) struct Talk<'a> {
     /// Faults of the network; with `None` it loses nothing, and agents wait as long as it takes.
     pub(super) network: Option<&'a Network>,
+    /// Where the airplanes are; without it, all reach all.
+    pub(super) state: Option<&'a AirspaceState>,
     pub(super) streams: Streams,
     pub(super) topic: Topic,
     pub(super) now: Cycle,
@@ -38,9 +45,14 @@ pub(super) struct Talk<'a> {
 
 impl<'a> Talk<'a> {
     /// Returns the talk of a group in a cycle.
-    pub(super) fn new(world: &'a AirspaceWorld, topic: Topic, now: Cycle) -> Self {
-        let (network, streams) = (world.network.as_ref(), world.streams);
-        Self { network, streams, topic, now, at_s: world.starts_s(now) }
+    pub(super) fn new(
+        world: &'a AirspaceWorld,
+        state: &'a AirspaceState,
+        topic: Topic,
+        now: Cycle,
+    ) -> Self {
+        let (network, streams, at_s) = (world.network.as_ref(), world.streams, world.starts_s(now));
+        Self { network, state: Some(state), streams, topic, now, at_s }
     }
 
     /// Returns the tick in which the talk starts, and the one in which it ends at the latest.
@@ -58,13 +70,86 @@ impl<'a> Talk<'a> {
 
     /// Returns how agents that do not answer are asked again; `None` where nothing is lost.
     pub(super) fn patience(&self) -> Option<Patience> {
-        self.network.map(Network::patience)
+        self.network.map(|network| match self.topic {
+            Topic::Optimization => network.short_patience(),
+            Topic::Shield => network.patience(),
+        })
     }
 
     /// Returns an empty network with the faults of the scenario.
-    pub(super) fn transport(&self) -> MemoryTransport {
+    pub(super) fn transport(&self) -> Carrier<'a> {
         let faults = self.network.map(Network::faults).unwrap_or_default();
-        MemoryTransport::new(self.streams, purpose::NETWORK, faults)
+        let memory = MemoryTransport::new(self.streams, purpose::NETWORK, faults);
+        Carrier { memory, talk: *self, free_at: BTreeMap::new() }
+    }
+
+    /// Returns the time of a tick, in seconds after the start of the run: the optimization starts
+    /// with the cycle, and the shield's exchange when the optimization has to be over.
+    fn time_s(&self, network: &Network, tick: u64) -> f64 {
+        let before_s = if self.topic == Topic::Shield { network.deadline_s } else { 0.0 };
+        self.at_s + before_s + (tick - self.ticks().0) as f64 * network.latency_s
+    }
+
+    /// Returns the distance between two airplanes in meters, heights included.
+    fn apart_m(&self, [a, b]: [EntityId; 2]) -> f64 {
+        let Some(state) = self.state else { return 0.0 };
+        let [a, b] = [a, b].map(|id| &state.airplanes[id as usize]);
+        let ([ax, ay], [bx, by]) = (a.pose().at, b.pose().at);
+        let level_m = math::hypot(ax - bx, ay - by);
+        math::hypot(level_m, a.altitude_m.get() - b.altitude_m.get())
+    }
+
+    /// Returns whether the link of a message lets it through: it is not cut, within range, and not
+    /// in a burst that takes the message.
+    fn lets_through(&self, envelope: &Envelope) -> bool {
+        let Some(network) = self.network else { return true };
+        let &Envelope { cycle: tick, sender, receiver, sequence, .. } = envelope;
+        let (link, at_s) = ([sender, receiver], self.time_s(network, tick));
+        if !network.carries(link, at_s) || self.apart_m(link) > network.range_m {
+            return false;
+        }
+        let Some(bursts) = &network.bursts else { return true };
+        let words = self.streams.pair(sender, receiver, tick, purpose::BURST_LOSS, sequence);
+        !(Chance::new(bursts.loss).happens(words[0]) && bursts.is_on(&self.streams, link, at_s))
+    }
+}
+
+/// A network in memory, some of whose links may be cut.
+#[derive(Debug)]
+pub(super) struct Carrier<'a> {
+    memory: MemoryTransport,
+    talk: Talk<'a>,
+    /// Tick from which on each way of a link is free, where messages of some size take time.
+    free_at: BTreeMap<[EntityId; 2], f64>,
+}
+
+impl Carrier<'_> {
+    /// Returns the tick in which all of a message is on its way: its link carries one after the
+    /// other.
+    fn is_out_at(&mut self, envelope: &Envelope) -> u64 {
+        let bits_per_tick = self.talk.network.map_or(f64::INFINITY, Network::bits_per_tick);
+        if bits_per_tick == f64::INFINITY {
+            return envelope.cycle;
+        }
+        let free_at = self.free_at.entry([envelope.sender, envelope.receiver]).or_default();
+        let bits = 8.0 * envelope.payload.len() as f64;
+        *free_at = free_at.max(envelope.cycle as f64) + bits / bits_per_tick;
+        free_at.floor() as u64
+    }
+}
+
+impl Transport for Carrier<'_> {
+    fn send(&mut self, mut envelope: Envelope) {
+        let is_carried = self.talk.lets_through(&envelope);
+        // What is lost on the way takes its time on the link all the same.
+        envelope.cycle = self.is_out_at(&envelope);
+        if is_carried {
+            self.memory.send(envelope);
+        }
+    }
+
+    fn receive(&mut self, receiver: EntityId, now: Cycle) -> Vec<Envelope> {
+        self.memory.receive(receiver, now)
     }
 }
 
@@ -80,20 +165,23 @@ pub(super) fn run<A: Agent>(
         group: ids.clone(),
         me,
         patience: talk.patience().unwrap_or(FOR_EVER),
+        ticks: end - begin,
         is_silent: talk.is_silent(ids[me]),
     };
     let endpoint = |(me, agent)| Endpoint::new(agent, radio(me));
     let mut endpoints: Vec<Endpoint<A>> = agents.into_iter().enumerate().map(endpoint).collect();
     endpoints.iter_mut().for_each(|endpoint| endpoint.start(&mut transport, begin));
+    let mut now = begin;
     while !endpoints.iter().all(Endpoint::is_done) {
         let timers = endpoints.iter().filter_map(Endpoint::next_timer);
-        let next = timers.chain(transport.next_arrival()).min().unwrap_or(end);
-        if next >= end {
+        let next = timers.chain(transport.memory.next_arrival()).min().unwrap_or(end);
+        now = next.min(end);
+        if now == end {
             break;
         }
         endpoints.iter_mut().for_each(|endpoint| endpoint.step(&mut transport, next));
     }
-    let mut traffic = Traffic::default();
+    let mut traffic = Traffic { ticks: now - begin, ..Traffic::default() };
     endpoints.iter().for_each(|endpoint| traffic.add(endpoint.traffic()));
     (endpoints.into_iter().map(Endpoint::end).collect(), traffic)
 }
@@ -183,7 +271,7 @@ mod tests {
 
     fn talk(network: Option<&Network>, seed: u64) -> Talk<'_> {
         let streams = Streams::new(Seed(seed));
-        Talk { network, streams, topic: Topic::Optimization, now: 3, at_s: 15.0 }
+        Talk { network, state: None, streams, topic: Topic::Optimization, now: 3, at_s: 15.0 }
     }
 
     fn network(loss: f64, max_delay_s: f64, silences: Vec<Silence>) -> Network {
@@ -191,10 +279,15 @@ mod tests {
             loss,
             duplication: 0.2,
             latency_s: 0.001,
+            bandwidth_bit_s: f64::INFINITY,
             max_delay_s,
             patience_s: 3.0 * (0.001 + max_delay_s),
             deadline_s: 1000.0,
+            range_m: f64::INFINITY,
+            bursts: None,
             silences,
+            partitions: Vec::new(),
+            one_ways: Vec::new(),
         }
     }
 

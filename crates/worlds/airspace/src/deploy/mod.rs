@@ -19,6 +19,8 @@ mod drive;
 mod kind;
 mod optimization;
 mod shield;
+#[cfg(test)]
+mod silence;
 
 use super::agents::Ended;
 use super::agents::contact::Contacts;
@@ -120,7 +122,7 @@ mod tests {
                 let metrics = run.metrics();
                 let what = format!("{deployment}, {preset}, seed {seed}: {metrics:?}");
                 assert_eq!(metrics.losses_of_separation, 0, "{what}");
-                assert_eq!(metrics.arrived, 4, "{what}");
+                assert_eq!(metrics.arrived, 5, "{what}");
                 assert!(metrics.contacts_lost >= 4, "{what}");
             }
         }
@@ -151,7 +153,7 @@ mod tests {
             let mut run = over_a_bad_network("default", deployment, network, 1);
             run.advance(300);
             let metrics = run.metrics();
-            assert_eq!((metrics.losses_of_separation, metrics.arrived), (0, 4), "{metrics:?}");
+            assert_eq!((metrics.losses_of_separation, metrics.arrived), (0, 5), "{metrics:?}");
         }
     }
 
@@ -198,6 +200,47 @@ mod tests {
         }
     }
 
+    /// Six of ten messages are lost, and as many answers: agents ask until they hear each other,
+    /// because the deadlines leave time for that.
+    #[test]
+    fn heavy_losses_cost_questions_and_hardly_any_delay() {
+        let text = "format = 1\nworld = \"airspace\"\nseed = 1\n[airspace]\ndeployment = \"team\"\n\
+                    network = { loss = 0.6 }\n\
+                    [airspace.generator]\nkind = \"superconflict\"\nn = 10\n";
+        let mut run = airspace_run(&Source::new("s", text, ""), 1).expect("a scenario");
+        run.advance(100);
+        let metrics = run.metrics();
+        assert_eq!((metrics.losses_of_separation, metrics.arrived), (0, 10), "{metrics:?}");
+        assert!(metrics.mean_delay_percent.is_some_and(|delay| delay < 20.0), "{metrics:?}");
+    }
+
+    /// Even and odd ids do not hear each other from 50 s on, and all arrive.
+    #[test]
+    fn in_a_partition_all_keep_apart_and_nobody_waits_for_ever() {
+        let more = "network = { partitions = [{ from_s = 50.0, sides = [[0, 2, 4], [1, 3]] }] }";
+        for (deployment, seed) in [("team", 1), ("team", 2), ("pim", 1)] {
+            let mut run = over_a_bad_network("default", deployment, more, seed);
+            run.advance(300);
+            let metrics = run.metrics();
+            assert_eq!((metrics.losses_of_separation, metrics.arrived), (0, 5), "{metrics:?}");
+        }
+    }
+
+    /// A coordinator's state goes over one link after the other, and agents' messages over all at
+    /// the same time.
+    #[test]
+    fn messages_take_time_by_their_size() {
+        let network_s = |deployment: &str, bandwidth: &str| {
+            let more = format!("shield = \"off\"\nnetwork = {{ {bandwidth} }}");
+            let mut run = over_a_bad_network("paper", deployment, &more, 5);
+            run.advance(3);
+            run.metrics().network_s.expect("a network")
+        };
+        let [team, pim] = ["team", "pim"].map(|name| network_s(name, "bandwidth_bit_s = 1e8"));
+        assert!(pim > 3.0 * team, "{pim} s, {team} s");
+        assert!(pim > 1.5 * network_s("pim", ""), "{pim} s");
+    }
+
     /// Without the shield, too, nobody waits for ever; an airplane that is not heard flies on.
     #[test]
     fn without_the_shield_a_silent_airplane_stops_nobody() {
@@ -216,6 +259,15 @@ mod tests {
             ("team", "loss = 1.5", "give 0 or more and less than 1"),
             ("team", "deadline_s = 4.0", "at most half of dt_s"),
             ("team", "silent = [{ airplane = 9 }]", "ids from 0 to 2"),
+            ("team", "silent = [{ airplane = 1, from_s = 9, until_s = 3 }]", "end after the start"),
+            ("team", "partitions = [{ sides = [[0, 1], [2, 3]] }]", "ids from 0 to 2"),
+            ("team", "partitions = [{ sides = [[0, 1], [1, 2]] }]", "name each airplane once"),
+            ("team", "partitions = [{ sides = [[0, 1]] }]", "at least two"),
+            ("team", "partitions = [{ sides = [[0], [1]], from_s = nan }]", "end after the start"),
+            ("team", "one_way = [{ sender = 1, receiver = 1 }]", "name each airplane once"),
+            ("team", "bursts = { loss = 0.5, lasts_s = 0, every_s = 1 }", "a number above 0"),
+            ("team", "range_m = -1", "a number above 0"),
+            ("team", "bandwidth_bit_s = 0", "at least 1 bit/s"),
         ];
         for (deployment, network, cause) in wrong {
             let text = format!(

@@ -2,12 +2,13 @@
 
 use super::drive::{Talk, Topic, run};
 use super::{Deployment, note_end};
+use crate::Turn;
 use crate::agents::contact::{self, Beacon, Contact, Contacts, Orbiting};
 use crate::agents::coordinator::{self, Journey, Migration, parts};
 use crate::agents::network::Traffic;
 use crate::agents::{Briefing, Conclusion, Decided, Ended, Filed, OwnShip, informed, sampling};
-use crate::events::Event;
 use crate::flight::Known;
+use crate::intruder::Intruder;
 use crate::world::AirspaceWorld;
 use sidestep_collectives::Estimator;
 use sidestep_kernel::{Cycle, EntityId};
@@ -18,21 +19,21 @@ pub(crate) type Deployed = (Vec<Option<Decided>>, Traffic);
 
 /// Lets the agents of a group decide, and notes in `contacts` what they hear of each other.
 pub(crate) fn optimized(
-    world: &AirspaceWorld,
-    now: Cycle,
+    turn: &mut Turn<'_>,
     group: &[Known],
+    intruders: &[Intruder],
     contacts: &mut [Contacts],
-    events: &mut Vec<Event>,
 ) -> Deployed {
-    let briefing = brief(world, now, group);
+    let &mut Turn { world, state, now, ref mut scratch, .. } = turn;
+    let briefing = brief(world, now, group, intruders);
     let own = |(me, contacts): (usize, &Contacts)| {
         own_ship(world, &briefing, me, group[me], contacts.clone())
     };
     let own: Vec<OwnShip> = contacts.iter().enumerate().map(own).collect();
-    let (ended, traffic) = talked(world, &Talk::new(world, Topic::Optimization, now), own);
+    let (ended, traffic) = talked(world, &Talk::new(world, state, Topic::Optimization, now), own);
     if world.network.is_some() {
         for (me, end) in ended.iter().enumerate() {
-            note_end(world, now, end, (me, &briefing.ids), &contacts[me], events);
+            note_end(world, now, end, (me, &briefing.ids), &contacts[me], &mut scratch.events);
             let heard = end.outcome.iter().flat_map(|came| came.beacons.iter().zip(&*briefing.ids));
             for (beacon, &id) in heard {
                 if let Some(beacon) = beacon {
@@ -81,7 +82,12 @@ fn migrated(
 }
 
 /// Returns the knowledge that all agents of a group share before they talk.
-pub fn brief(world: &AirspaceWorld, now: Cycle, group: &[Known]) -> Arc<Briefing> {
+pub fn brief(
+    world: &AirspaceWorld,
+    now: Cycle,
+    group: &[Known],
+    intruders: &[Intruder],
+) -> Arc<Briefing> {
     let filed = |known: &Known| Filed {
         model: world.stage(known.slot, known.orders).model.clone(),
         actions: world.actions_of(known.slot).to_vec(),
@@ -95,6 +101,7 @@ pub fn brief(world: &AirspaceWorld, now: Cycle, group: &[Known]) -> Arc<Briefing
         objective: world.objective,
         settings: world.settings,
         streams: world.streams,
+        intruders: intruders.to_vec(),
         is_shielded: world.shield,
     })
 }
@@ -128,6 +135,7 @@ fn beacon(world: &AirspaceWorld, known: Known) -> Beacon {
         goal: stage.mission.get(known.next).copied(),
         v_m_s: stage.model.v_m_s,
         omega_max_rad_s: stage.model.omega_max_rad_s,
+        orbit_rad_s: world.orbit_rad_s[known.slot as usize],
         separation_m: stage.model.separation_m,
         levels: world.levels(known),
     }
@@ -142,5 +150,5 @@ fn filed(world: &AirspaceWorld, id: EntityId) -> Contact {
     let altitude_m = world.airplanes[i].altitude_m;
     let known = Known { slot: id, pose, next: 0, orders: 0, altitude_m };
     let beacon = beacon(world, known);
-    Contact { heard_in, beacon, possible: vec![orbiting], unheard: 0, met_in: heard_in }
+    Contact { presumed: Some(orbiting), ..Contact::heard(beacon, heard_in) }
 }

@@ -2,45 +2,44 @@
 
 use super::drive::{Talk, Topic, run};
 use super::{Deployment, note_end};
+use crate::Turn;
 use crate::agents::bytes_of;
 use crate::agents::contact::Contacts;
 use crate::agents::exchange::{Agent, Agreed, Message, Proposal, Scene, Seen};
-use crate::agents::network::{Network, Traffic};
+use crate::agents::network::Traffic;
 use crate::events::{Event, EventKind};
 use crate::shield::{Certainty, Decision, Flyer, Way, filter};
-use crate::world::AirspaceWorld;
-use sidestep_kernel::{Cycle, EntityId};
+use sidestep_kernel::EntityId;
 use std::sync::Arc;
 
 /// Filters the wishes of the airplanes of a group. Returns the decision for each, and the traffic
 /// on the network; `contacts` receive what they have heard of each other.
 pub(crate) fn shielded(
-    world: &AirspaceWorld,
-    now: Cycle,
-    (seen, candidates): (Vec<Seen>, &[Vec<Way>]),
+    turn: &mut Turn<'_>,
+    seen: Vec<Seen>,
+    candidates: &[Vec<Way>],
     contacts: &mut [Contacts],
-    events: &mut Vec<Event>,
 ) -> (Vec<Decision>, Traffic) {
-    let Some(network) = &world.network else {
-        let flyers: Vec<Flyer> = seen.iter().map(|seen| seen.flyer).collect();
+    let &mut Turn { world, state, now, ref mut scratch, .. } = turn;
+    if world.network.is_none() {
+        let flyers: Vec<Flyer> = seen.iter().map(|seen| seen.flyer.clone()).collect();
         let frame = (world.timing.points_per_dt(), world.timing.dtau_s);
         let decisions = filter(&flyers, candidates, frame, Certainty::Sure);
         return (decisions, proposals(world.deployment, &flyers, candidates));
-    };
+    }
     let ids: Arc<[EntityId]> = seen.iter().map(|seen| seen.flyer.id).collect();
-    let scene = Arc::new(scene(world, now, network, seen));
+    let scene = Arc::new(Scene { air: world.air(), vertical_m: world.vertical_m, now, seen });
     let agent =
         |(me, ways): (usize, &Vec<Way>)| Agent::new(scene.clone(), me, ways, contacts[me].clone());
     let agents = candidates.iter().enumerate().map(agent).collect();
-    let talk = Talk::new(world, Topic::Shield, now);
+    let talk = Talk::new(world, state, Topic::Shield, now);
     let (ended, traffic) = run(&talk, &ids, agents);
     let mut decisions = Vec::with_capacity(ids.len());
     for (me, end) in ended.into_iter().enumerate() {
-        note_end(world, now, &end, (me, &ids), &contacts[me], events);
-        // An airplane whose radio is dead stays on its fallback, whatever its wish.
-        let agreed = end.outcome.filter(|_| !talk.is_silent(ids[me]));
+        note_end(world, now, &end, (me, &ids), &contacts[me], &mut scratch.events);
+        let agreed = end.outcome;
         if agreed.as_ref().is_some_and(|agreed| agreed.held_back) {
-            events.push(Event::of(now, EventKind::HeldBack, ids[me]));
+            scratch.events.push(Event::of(now, EventKind::HeldBack, ids[me]));
         }
         let fallback = Decision { candidate: None, fallback: scene.seen[me].flyer.fallback };
         let decided = |agreed: Agreed| (agreed.decision, agreed.contacts);
@@ -50,11 +49,6 @@ pub(crate) fn shielded(
         decisions.push(decision);
     }
     (decisions, traffic)
-}
-
-fn scene(world: &AirspaceWorld, now: Cycle, network: &Network, seen: Vec<Seen>) -> Scene {
-    let silent_after = network.silent_after();
-    Scene { air: world.air(), vertical_m: world.vertical_m, now, silent_after, seen }
 }
 
 /// Returns the traffic that the proposals alone take on a network that loses nothing.

@@ -6,7 +6,10 @@
 use super::action::Action;
 use super::motion::{Model, Point, Pose, Timing, distance_m};
 use super::pilot::{After, Passing, Pilot, Prediction};
-use sidestep_kernel::math;
+use sidestep_kernel::{interrupt, math};
+
+/// Difference of heading and bearing in radians below which an airplane no longer turns.
+const ALIGNED_RAD: f64 = 1e-10;
 
 /// The air: everything that is the same for all airplanes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -59,6 +62,30 @@ impl Air {
         [at[0] + heading[0], at[1] + heading[1]]
     }
 
+    /// Returns a number of steps in which an airplane certainly flies straight on to way-point `next`
+    /// without reaching it: none while it still turns there, or is near.
+    pub fn straight_steps(&self, pilot: &Pilot<'_>, pose: Pose, next: usize) -> usize {
+        let Some(&goal) = pilot.mission.get(next) else { return 0 };
+        let [x, y] = self.aim(pose.at, goal, pilot.model.v_m_s);
+        let bearing_rad = math::atan2(y - pose.at[1], x - pose.at[0]);
+        if math::wrap_angle(bearing_rad - pose.heading_rad).abs() > ALIGNED_RAD {
+            return 0;
+        }
+        let step_m = distance_m(pose.at, self.glided(pose, pilot.model.v_m_s, 1).at);
+        let near_m = self.passing.tolerance_m.max(2.0 * pilot.model.turn_radius_m()) + step_m;
+        // The conversion saturates, also where the distance is nearer than that.
+        ((distance_m(pose.at, goal) - near_m) / step_m) as usize
+    }
+
+    /// Returns a pose after some steps straight on.
+    pub fn glided(&self, pose: Pose, v_m_s: f64, steps: usize) -> Pose {
+        let flown_s = steps as f64 * self.timing.dtau_s;
+        let [wx, wy] = self.wind_m_s;
+        let along = [math::cos(pose.heading_rad), math::sin(pose.heading_rad)];
+        let [vx, vy] = [v_m_s * along[0] + wx, v_m_s * along[1] + wy];
+        Pose { at: [pose.at[0] + vx * flown_s, pose.at[1] + vy * flown_s], ..pose }
+    }
+
     /// Returns a pose after the wind has blown for one step.
     pub fn blown(&self, pose: Pose) -> Pose {
         let dtau_s = self.timing.dtau_s;
@@ -76,6 +103,7 @@ impl Air {
         mission: &[Point],
         (pose, next): (Pose, usize),
     ) -> Vec<Prediction> {
+        interrupt::look();
         let mission = self.drifted(mission, (pose.at, next), model.v_m_s);
         let pilot = self.pilot(model, &mission);
         actions.iter().map(|action| pilot.predict(*action, pose, next, &self.timing)).collect()

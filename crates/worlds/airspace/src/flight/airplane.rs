@@ -24,6 +24,9 @@ pub struct Airplane {
     pub orders: Vec<FlightOrder>,
     /// Its recorded way, which it follows until the method takes it over.
     pub track: Option<Track>,
+    /// Whether it minds no other airplane: it flies its recorded way to the end, or straight from
+    /// way-point to way-point.
+    pub is_intruder: bool,
 }
 
 impl Airplane {

@@ -5,11 +5,13 @@
 //! action.rs  pilot.rs  air.rs        possible actions, where they lead, in which wind
 //! airplane.rs  order.rs  stage.rs    one airplane, its orders, and the flight between them
 //! track.rs  levels.rs                recorded ways, and heights
+//! leg.rs                             stretches of flight, and how near two of them come
 //! ```
 
 mod action;
 mod air;
 mod airplane;
+mod leg;
 mod levels;
 mod motion;
 mod order;
@@ -20,6 +22,7 @@ mod track;
 pub use action::{Action, Legs, actions};
 pub use air::Air;
 pub use airplane::{Airplane, Known};
+pub use leg::{Approach, Leg, Zone, is_lost};
 pub use levels::Levels;
 pub use motion::{Model, Point, Pose, Timing, distance_m};
 pub use order::{FlightOrder, MAX_ORDERS, Task};

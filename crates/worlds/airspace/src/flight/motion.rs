@@ -86,6 +86,11 @@ pub struct Timing {
 }
 
 impl Timing {
+    /// Returns the time that a prediction covers, in seconds.
+    pub fn horizon_s(&self) -> f64 {
+        self.horizon as f64 * self.dtau_s
+    }
+
     /// Returns the number of points of a prediction within one `dt_s`.
     pub fn points_per_dt(&self) -> usize {
         (self.dt_s / self.dtau_s).round() as usize

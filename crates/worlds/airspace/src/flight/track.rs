@@ -1,5 +1,6 @@
 //! Recorded ways: the place of an airplane at any time, and the rest of its way.
 
+use super::leg::Leg;
 use super::motion::{Point, Pose, distance_m};
 use sidestep_kernel::math;
 
@@ -66,6 +67,26 @@ impl Track {
         from_m + part * (to_m - from_m)
     }
 
+    /// Adds the legs flown in an interval, with times after its start.
+    pub(crate) fn legs(&self, from_s: f64, until_s: f64, legs: &mut Vec<Leg>) {
+        let first = self.points.partition_point(|p| p.t_s <= from_s).max(1) - 1;
+        for (k, pair) in self.points.windows(2).enumerate().skip(first) {
+            if pair[0].t_s >= until_s {
+                break;
+            }
+            let (begins_s, ends_s) = (pair[0].t_s.max(from_s), pair[1].t_s.min(until_s));
+            if begins_s >= ends_s {
+                continue;
+            }
+            let lasts_s = pair[1].t_s - pair[0].t_s;
+            let climb_m_s = (pair[1].altitude_m - pair[0].altitude_m) / lasts_s;
+            let v_m_s = distance_m(pair[0].at, pair[1].at) / lasts_s;
+            let pose = Pose { heading_rad: self.headings_rad[k], ..self.pose_at(begins_s) };
+            let leg = Leg::new(begins_s - from_s, ends_s - from_s, pose, v_m_s, 0.0);
+            legs.push(leg.climbing(self.altitude_at_m(begins_s), climb_m_s));
+        }
+    }
+
     /// Returns the last point before a time that has a next one, and the part of the way to that.
     fn between(&self, t_s: f64) -> (usize, f64) {
         let after = self.points.partition_point(|p| p.t_s <= t_s);
@@ -100,6 +121,21 @@ impl Track {
             at = point.at;
         }
         length_m / (self.ends_s() - from_s)
+    }
+
+    /// Returns its speed over the ground at a time, in meters per second.
+    pub fn speed_m_s(&self, t_s: f64) -> f64 {
+        let (k, _) = self.between(t_s);
+        let (from, to) = (&self.points[k], &self.points[k + 1]);
+        distance_m(from.at, to.at) / (to.t_s - from.t_s)
+    }
+
+    /// Returns its greatest rate of climb or descent, in meters per second.
+    pub fn top_climb_m_s(&self) -> f64 {
+        let climb = |pair: &[TrackPoint]| {
+            (pair[1].altitude_m - pair[0].altitude_m).abs() / (pair[1].t_s - pair[0].t_s)
+        };
+        self.points.windows(2).map(climb).fold(0.0, f64::max)
     }
 
     /// Returns the greatest speed over the ground, in meters per second.

@@ -80,6 +80,9 @@ impl Compiler<'_> {
                 None => self.planned(section, own.model())?,
             });
         }
+        if self.file.airspace.replay_until_s.is_some() && all.iter().all(|a| a.track.is_none()) {
+            return Err(self.source.idle("airspace.replay_until_s", "without a recorded track"));
+        }
         if all.is_empty() {
             let remedy = "add [airspace.generator] with kind and n, or [[airplanes]]";
             return Err(self.source.error(None, "the scenario has no airplanes", remedy));
@@ -94,6 +97,10 @@ impl Compiler<'_> {
         streams: &Streams,
     ) -> Result<Vec<Airplane>, InputError> {
         let s = section.get_ref();
+        if s.kind == GeneratorKind::Random && s.jitter_m.is_some() {
+            let because = "for kind = \"random\", whose places are all drawn";
+            return Err(self.source.idle("airspace.generator.jitter_m", because));
+        }
         let n = s.n.get() as usize;
         // By default, random traffic is as dense as ten airplanes in the paper's circle, for any
         // number.
@@ -103,11 +110,22 @@ impl Compiler<'_> {
         };
         let radius_m = s.radius_m.map_or(usual_m, f64::from);
         let jitter_m = s.jitter_m.map_or(20.0, f64::from);
-        let order = Order { kind: s.kind, n, radius_m, jitter_m, model };
+        let errors_m = self.room_for_errors_m(model);
+        let order = Order { kind: s.kind, n, radius_m, jitter_m, model, errors_m };
         generate(&order, streams).map_err(|placed| {
             let cause = format!("no place is left after {placed} of {n} airplanes");
             self.source.error(section.span(), cause, "give a larger radius_m or a smaller n")
         })
+    }
+
+    /// Returns how much farther from each other two airplanes of a model have to start, because of
+    /// errors: they are seen elsewhere, and their orbits are wider.
+    fn room_for_errors_m(&self, model: &Model) -> f64 {
+        let bounds = self.bounds();
+        let dt_s = self.file.airspace.dt_s.as_ref().map_or(5.0, |v| v.get_ref().get());
+        let Some(rate_rad_s) = bounds.holds_rad_s(model, dt_s) else { return 0.0 };
+        let wider_m = model.v_m_s / rate_rad_s - model.turn_radius_m();
+        4.0 * wider_m + 2.0 * bounds.position_m + 2.0 * bounds.error_m(model.v_m_s, dt_s)
     }
 
     /// Returns an airplane with a flight plan of its own.
@@ -139,6 +157,7 @@ impl Compiler<'_> {
             leaves_s,
             orders,
             track: None,
+            is_intruder: s.intruder,
         })
     }
 
@@ -151,15 +170,16 @@ impl Compiler<'_> {
         track: Track,
         replay: Replay,
     ) -> Result<Airplane, InputError> {
+        let top_m_s = track.top_speed_m_s();
+        if top_m_s >= 1e6 {
+            let cause = format!("a track with {top_m_s:e} m/s between two of its points");
+            let remedy = "leave out points that nothing reaches: nothing is faster than 1e6 m/s";
+            return Err(self.source.error(section.span(), cause, remedy));
+        }
         if section.get_ref().v_m_s.is_none() {
             model.v_m_s = track.mean_speed_m_s(replay.until_s).max(1.0);
         }
-        if model.v_m_s >= 1e6 {
-            let cause = format!("v_m_s = {}", model.v_m_s);
-            let remedy = "give more than 0 and less than 1e6";
-            return Err(self.source.error(section.span(), cause, remedy));
-        }
-        Ok(following(track, model, replay))
+        Ok(following(track, model, replay, section.get_ref().intruder))
     }
 
     /// Returns the time for which recorded airplanes follow their tracks.
@@ -171,10 +191,10 @@ impl Compiler<'_> {
     }
 }
 
-fn following(track: Track, model: Model, replay: Replay) -> Airplane {
+fn following(track: Track, model: Model, replay: Replay, is_intruder: bool) -> Airplane {
     let begins_s = track.begins_s();
     // An airplane that appears later comes in at the start of a cycle.
-    let appears_s = if (begins_s / replay.dt_s).floor() < replay.cycles as f64 {
+    let appears_s = if is_intruder || (begins_s / replay.dt_s).floor() < replay.cycles as f64 {
         begins_s
     } else {
         (begins_s / replay.dt_s).ceil() * replay.dt_s
@@ -189,5 +209,6 @@ fn following(track: Track, model: Model, replay: Replay) -> Airplane {
         leaves_s: f64::INFINITY,
         orders: Vec::new(),
         track: Some(track),
+        is_intruder,
     }
 }

@@ -1,12 +1,14 @@
 //! From a scenario's sections to an immutable world.
 
 use super::{AirspaceFile, Compiled, Preset};
+use crate::baseline::Reactive;
 use crate::deploy::refuses;
 use crate::flight::Levels;
 use crate::flight::{Airplane, Task};
 use crate::flight::{Passing, Timing};
 use crate::memory::largest_at_start;
-use crate::shield::{Flyer, Side, first_fallbacks};
+use crate::perceive::seen;
+use crate::shield::{Bounds, Flyer, Named, Side, first_fallbacks};
 use crate::state::AirspaceState;
 use crate::world::{AirspaceWorld, Disturbance, Method};
 use sidestep_kernel::stream::Streams;
@@ -23,7 +25,20 @@ const FEWEST_CYCLES: u64 = 400;
 /// limit: there is room for detours and orbits.
 const TIMES_ALONE: f64 = 3.0;
 /// Largest number of steps of a horizon.
-const MOST_STEPS: usize = 10_000;
+const MOST_STEPS: f64 = 10_000.0;
+/// Largest number of steps of a `dt`.
+const MOST_PARTS: f64 = 1000.0;
+/// Largest number of actions of an airplane.
+const MOST_ACTIONS: usize = 1000;
+/// Largest number of pairs of points of two airplanes' actions: a tenth of a second's work.
+const MOST_PAIR_STEPS: usize = 100_000_000;
+/// Settings with which MVP loses no separation in super-conflicts of up to 20 airplanes, at the
+/// smallest delay; the margin is BlueSky's own.
+const MVP: Reactive = Reactive { look_ahead_s: 90.0, margin: 1.05 };
+/// Settings with which ORCA loses no separation there, at the smallest delay.
+const ORCA: Reactive = Reactive { look_ahead_s: 45.0, margin: 1.05 };
+/// Standard deviations of errors for which the shield allows, unless told otherwise.
+const USUAL_SIGMAS: f64 = 5.0;
 const GIB: f64 = (1_u64 << 30) as f64;
 
 pub(super) struct Compiler<'a> {
@@ -36,6 +51,8 @@ impl Compiler<'_> {
     pub(super) fn compile(&self) -> Result<Compiled, InputError> {
         let mut world = self.world()?;
         self.fits_deployment(&world)?;
+        self.fits_a_pair(&world)?;
+        self.fits_errors(&world)?;
         let (fallbacks, too_close) = first(&world);
         world.first_fallbacks.clone_from(&fallbacks);
         let cycles = self.head.cycles.unwrap_or_else(|| enough_cycles(&world));
@@ -69,28 +86,71 @@ impl Compiler<'_> {
             timing,
             network,
             passing: Passing { tolerance_m, passes: true },
-            objective: self.objective(vertical_m),
+            objective: self.objective(vertical_m, timing.dtau_s),
             settings: self.settings()?,
             holds_s: section.holds_s.0.clone(),
-            legs: self.legs(),
+            legs: self.legs()?,
             method: section.method,
+            mvp: section.mvp.or(MVP),
+            orca: section.orca.or(ORCA),
             deployment: section.deployment,
             group_bytes: (group_memory_gib * GIB) as u64,
             shield: section.shield.0,
             vertical_m,
             replay_cycles: replay.cycles,
-            disturbance: Disturbance {
-                position_m: section.position_noise_m.map_or(0.0, f64::from),
-                heading_rad: section.heading_noise_deg.map_or(0.0, f64::from).to_radians(),
-            },
+            disturbance: self.disturbance(),
+            bounds: self.bounds(),
             streams,
             actions: Vec::new(),
             later: Vec::new(),
+            orbit_rad_s: Vec::new(),
             top_m_s: Vec::new(),
             alone_s: Vec::new(),
             first_fallbacks: Vec::new(),
         };
         Ok(world.prepared())
+    }
+
+    fn disturbance(&self) -> Disturbance {
+        let section = &self.file.airspace;
+        Disturbance {
+            position_m: section.position_noise_m.map_or(0.0, f64::from),
+            heading_rad: section.heading_noise_deg.map_or(0.0, f64::from).to_radians(),
+        }
+    }
+
+    /// Returns the bounds on errors for which the shield allows.
+    pub(super) fn bounds(&self) -> Bounds {
+        let sigmas = self.file.airspace.error_sigmas.map_or(USUAL_SIGMAS, f64::from);
+        let Disturbance { position_m, heading_rad } = self.disturbance();
+        Bounds { position_m: sigmas * position_m, heading_rad: sigmas * heading_rad }
+    }
+
+    /// Refuses errors of heading against which an airplane could not hold an orbit.
+    fn fits_errors(&self, world: &AirspaceWorld) -> Result<(), InputError> {
+        let turned_rad = world.bounds.heading_rad;
+        let holds = |a: &Airplane| {
+            a.is_intruder || world.bounds.holds_rad_s(&a.model, world.timing.dt_s).is_some()
+        };
+        if !world.shield || turned_rad == 0.0 {
+            return Ok(());
+        }
+        let error = |cause: &str, remedy: &str| Err(self.source.error(None, cause, remedy));
+        if world.network.is_some() {
+            let cause = "errors of heading, over a network that is not to be relied on";
+            let remedy = "nobody could see which orbit another one holds: leave out \
+                          heading_noise_deg or [airspace.network], or set shield = \"off\"";
+            return error(cause, remedy);
+        }
+        let Some(weak) = world.airplanes.iter().find(|a| !holds(a)) else { return Ok(()) };
+        let cause = format!(
+            "gusts turn airplanes by up to {:.2} deg per dt_s (error_sigmas times \
+             heading_noise_deg), and one of {:.2} deg/s cannot hold an orbit against them",
+            turned_rad.to_degrees(),
+            weak.model.omega_max_rad_s.to_degrees()
+        );
+        let remedy = "give a smaller heading_noise_deg or error_sigmas, or set shield = \"off\"";
+        error(&cause, remedy)
     }
 
     /// Returns the wind, if every airplane can fly against it.
@@ -155,21 +215,62 @@ impl Compiler<'_> {
         let section = &self.file.airspace;
         let dt_s = section.dt_s.as_ref().map_or(5.0, |v| v.get_ref().get());
         let dtau_s = section.dtau_s.as_ref().map_or(1.0, |v| v.get_ref().get());
+        let span = || section.dtau_s.as_ref().map(Spanned::span);
+        let span = || span().or_else(|| section.dt_s.as_ref().map(Spanned::span));
         let parts = dt_s / dtau_s;
         if (parts - parts.round()).abs() > 1e-9 || parts < 1.0 {
             let cause = format!("dt_s = {dt_s} is no multiple of dtau_s = {dtau_s}");
-            let span = section.dtau_s.as_ref().or(section.dt_s.as_ref()).map(Spanned::span);
-            return Err(self.source.error(span, cause, "give a dtau_s that divides dt_s"));
+            return Err(self.source.error(span(), cause, "give a dtau_s that divides dt_s"));
         }
-        let preset = if self.is_paper() { 125 } else { 90 };
-        let horizon = section.horizon.as_ref().map_or(preset, |h| *h.get_ref());
-        if !((parts.round() as usize)..=MOST_STEPS).contains(&horizon) {
-            let cause = format!("a horizon of {horizon} steps");
-            let span = section.horizon.as_ref().map(Spanned::span);
-            let remedy = format!("give at least dt_s / dtau_s and at most {MOST_STEPS}");
-            return Err(self.source.error(span, cause, remedy));
+        if parts > MOST_PARTS {
+            let cause = format!("{parts} steps of dtau_s in each dt_s");
+            let remedy = format!("give up to {MOST_PARTS}: each is flown and watched by itself");
+            return Err(self.source.error(span(), cause, remedy));
         }
-        Ok(Timing { dt_s, dtau_s, horizon })
+        Ok(Timing { dt_s, dtau_s, horizon: self.horizon(dt_s, dtau_s)? })
+    }
+
+    /// Returns the number of points of a prediction, which reach as far as the scenario says.
+    fn horizon(&self, dt_s: f64, dtau_s: f64) -> Result<usize, InputError> {
+        let section = &self.file.airspace;
+        if let Some(former) = &section.horizon {
+            let remedy = match former.get_ref().as_integer() {
+                Some(points) => format!("write horizon_s = {:?}", points as f64 * dtau_s),
+                None => "write horizon_s, in seconds".into(),
+            };
+            let cause = "a horizon in points, which is a time now";
+            return Err(self.source.error(former.span(), cause, remedy));
+        }
+        let preset_s: f64 = if self.is_paper() { 125.0 } else { 90.0 };
+        let given = section.horizon_s.as_ref();
+        let horizon_s = given.map_or(preset_s.max(dt_s), |h| h.get_ref().get());
+        // A time that rounding puts behind a point ends at that point.
+        let points = (horizon_s / dtau_s - 1e-9).ceil();
+        if horizon_s < dt_s || points > MOST_STEPS {
+            let cause = format!("a horizon of {horizon_s} s, in steps of {dtau_s} s");
+            let remedy = format!(
+                "give at least dt_s = {dt_s}, which is flown before the next look, and at most \
+                 {MOST_STEPS} steps of dtau_s, for every action is predicted in all of them"
+            );
+            return Err(self.source.error(given.map(Spanned::span), cause, remedy));
+        }
+        Ok(points as usize)
+    }
+
+    /// Refuses sets of actions that are too large for one pair of airplanes: a run looks whether it
+    /// is to stop after every pair.
+    fn fits_a_pair(&self, world: &AirspaceWorld) -> Result<(), InputError> {
+        let actions = world.actions.iter().map(Vec::len).max().unwrap_or(0);
+        let horizon = world.timing.horizon;
+        if actions <= MOST_ACTIONS && actions * actions * horizon <= MOST_PAIR_STEPS {
+            return Ok(());
+        }
+        let cause = format!("{actions} actions of an airplane, in {horizon} steps each");
+        let remedy = format!(
+            "give fewer turns, holds_s or legs, or a shorter horizon_s: up to {MOST_ACTIONS} \
+             actions, and {MOST_PAIR_STEPS} steps to compare all of two airplanes"
+        );
+        Err(self.source.error(None, cause, remedy))
     }
 }
 
@@ -184,18 +285,22 @@ fn enough_cycles(world: &AirspaceWorld) -> u64 {
 fn first(world: &AirspaceWorld) -> (Vec<Side>, Vec<(u32, u32)>) {
     let mut sides = vec![Side::default(); world.airplanes.len()];
     // Airplanes that come in at other times do not meet at the start.
-    let starts: Vec<usize> = (0..sides.len()).filter(|&i| world.joins_in(i) == 0).collect();
+    let flown = |&i: &usize| world.joins_in(i) == 0 && !world.is_intruder(i as u32, 0);
+    let starts: Vec<usize> = (0..sides.len()).filter(flown).collect();
     let flyer = |(rank, &i): (usize, &usize)| {
         let airplane = &world.airplanes[i];
         Flyer {
-            pose: airplane.start,
+            pose: seen(world, i as u32, 0, airplane.start),
+            held: seen(world, i as u32, 0, airplane.start),
             v_m_s: airplane.model.v_m_s,
             omega_max_rad_s: airplane.model.omega_max_rad_s,
+            orbit_rad_s: world.orbit_rad_s[i],
             separation_m: airplane.model.separation_m,
+            error_m: world.error_m(i),
             levels: Levels::at(airplane.altitude_m),
             vertical_m: world.vertical_m,
             fallback: Side::Left,
-            came_too_close: false,
+            named: Named::default(),
             rank: rank as u64,
             id: i as u32,
         }

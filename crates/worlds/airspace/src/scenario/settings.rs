@@ -1,29 +1,31 @@
 //! The objective and the settings of the optimizer.
 
 use super::compile::Compiler;
+use super::values::Held;
+use crate::baseline::Reactive;
 use crate::flight::Legs;
 use crate::objective::Objective;
 use serde::Deserialize;
-use sidestep_collectives::{Choice, Estimator, Order, Settings, Stop, Update};
-use sidestep_kernel::InputError;
-use sidestep_scenario::{AboveZero, Rule as _, refused};
+use sidestep_collectives::{Choice, Estimator, Order, Settings, Stop, Update, Utility};
+use sidestep_kernel::{InputError, math};
+use sidestep_scenario::{AboveTo, FromTo, Number, Rule as _, refused};
 
 /// Largest number of samples of a block.
 const MOST_SAMPLES: usize = 10_000;
 /// Largest number of times in a list.
 const MOST_TIMES: usize = 20;
 
-/// A list of times above 0.
+/// A list of times.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Times(pub(super) Vec<f64>);
 
 impl<'de> Deserialize<'de> for Times {
     fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let times_s = Vec::<f64>::deserialize(deserializer)?;
-        if times_s.iter().all(|t| AboveZero::allows(*t)) && times_s.len() <= MOST_TIMES {
+        if times_s.iter().all(|t| Held::allows(*t)) && times_s.len() <= MOST_TIMES {
             return Ok(Self(times_s));
         }
-        let remedy = format!("give up to {MOST_TIMES} positive times in seconds");
+        let remedy = format!("give up to {MOST_TIMES} times, each {}", Held::words());
         Err(refused(format_args!("{times_s:?}"), &remedy))
     }
 }
@@ -33,6 +35,29 @@ impl<'de> Deserialize<'de> for Times {
 pub(super) struct LegsSection {
     turns_s: Times,
     until_s: Times,
+}
+
+/// The settings of a method that looks ahead anew in every step.
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct ReactiveSection {
+    look_ahead_s: Option<Number<LookAhead>>,
+    margin: Option<Number<Margin>>,
+}
+
+/// A time in which an airplane looks ahead.
+type LookAhead = AboveTo<0, 100_000>;
+/// A factor on separations.
+type Margin = FromTo<1, 10>;
+
+impl ReactiveSection {
+    /// Returns the settings, with other values where none are given.
+    pub(super) fn or(&self, usual: Reactive) -> Reactive {
+        Reactive {
+            look_ahead_s: self.look_ahead_s.map_or(usual.look_ahead_s, f64::from),
+            margin: self.margin.map_or(usual.margin, f64::from),
+        }
+    }
 }
 
 /// A yes or no; yes unless given.
@@ -57,12 +82,16 @@ impl<'de> Deserialize<'de> for Switch {
 }
 
 impl Compiler<'_> {
-    pub(super) fn objective(&self, vertical_m: f64) -> Objective {
+    /// Returns the objective. Its sums are over points, and the scenario's weights are per second:
+    /// however fine the points are, the same ways have the same order.
+    pub(super) fn objective(&self, vertical_m: f64, dtau_s: f64) -> Objective {
         let section = &self.file.airspace;
         let paper = self.is_paper();
+        let beta_per_s = section.beta.map_or(0.995, f64::from);
         Objective {
-            alpha: section.alpha.map_or(if paper { 1.0 } else { 0.001 }, f64::from),
-            beta: section.beta.map_or(0.995, f64::from),
+            alpha: section.alpha.map_or(if paper { 1.0 } else { 0.001 }, f64::from) / dtau_s,
+            // The power is left out where it changes nothing, so that it rounds nothing either.
+            beta: if dtau_s == 1.0 { beta_per_s } else { math::powf(beta_per_s, dtau_s) },
             inflation: section.inflation.map_or(if paper { 1.0 } else { 1.12 }, f64::from),
             mask: true,
             vertical_m,
@@ -74,18 +103,19 @@ impl Compiler<'_> {
         let paper = self.is_paper();
         let estimator =
             if paper { Estimator::Sampled { block: 20, ageing: 0.7 } } else { Estimator::Exact };
+        let estimator = self.estimator()?.unwrap_or(estimator);
         let choice = if paper { Choice::Draw } else { Choice::Argmax };
         let order = if paper { Order::Parallel } else { Order::Sequence };
         Ok(Settings {
-            estimator: self.estimator()?.unwrap_or(estimator),
+            estimator,
             update: self.update()?.unwrap_or(Update::NearestNewton { step: 0.5 }),
             order: section.order.unwrap_or(order),
-            utility: section.utility.unwrap_or_default(),
+            utility: self.utility(estimator)?,
             cooling: section.cooling.map_or(if paper { 0.8 } else { 0.7 }, f64::from),
             stop: Stop {
                 threshold: 1e-3,
                 calm_rounds: 3,
-                max_rounds: section.max_rounds.map_or(200, |rounds| rounds.get() as u32),
+                max_rounds: section.max_rounds.map_or(200, |rounds| rounds.0),
             },
             choice: section.choice.unwrap_or(choice),
         })
@@ -103,6 +133,18 @@ impl Compiler<'_> {
         Ok(Some(*given.get_ref()))
     }
 
+    /// Returns the cost that samples show. Exact expectations show all of it at once.
+    fn utility(&self, estimator: Estimator) -> Result<Utility, InputError> {
+        let Some(given) = &self.file.airspace.utility else { return Ok(Utility::default()) };
+        if estimator == Estimator::Exact {
+            let cause = "a utility, but expectations are exact: there are no samples to show it";
+            let remedy = "leave utility out, or set estimator = { kind = \"sampled\", block = 20, \
+                          ageing = 0.7 }";
+            return Err(self.source.error(given.span(), cause, remedy));
+        }
+        Ok(*given.get_ref())
+    }
+
     fn update(&self) -> Result<Option<Update>, InputError> {
         let Some(given) = &self.file.airspace.update else { return Ok(None) };
         let (Update::NearestNewton { step } | Update::Brouwer { step }) = *given.get_ref();
@@ -113,13 +155,25 @@ impl Compiler<'_> {
         Err(self.source.error(given.span(), cause, "give a step above 0 and at most 1"))
     }
 
-    pub(super) fn legs(&self) -> Legs {
-        match &self.file.airspace.legs {
-            Some(LegsSection { turns_s, until_s }) => {
-                Legs { turns_s: turns_s.0.clone(), until_s: until_s.0.clone() }
-            }
-            None if self.is_paper() => Legs::default(),
-            None => Legs::usual(),
+    pub(super) fn legs(&self) -> Result<Legs, InputError> {
+        let Some(given) = &self.file.airspace.legs else {
+            return Ok(if self.is_paper() { Legs::default() } else { Legs::usual() });
+        };
+        let LegsSection { turns_s: Times(turns_s), until_s: Times(until_s) } = given.get_ref();
+        let wrong = |cause: String, remedy: &str| self.source.error(given.span(), cause, remedy);
+        if turns_s.is_empty() != until_s.is_empty() {
+            let cause = "legs with one of turns_s and until_s";
+            return Err(wrong(cause.into(), "give both, or neither for no legs"));
         }
+        let longest_s = turns_s.iter().copied().fold(0.0, f64::max);
+        let soonest_s = until_s.iter().copied().fold(f64::INFINITY, f64::min);
+        if longest_s >= soonest_s {
+            let cause =
+                format!("a leg whose turn takes {longest_s} s, and that ends after {soonest_s} s");
+            let remedy = "give turns_s that are all shorter than each until_s; turns without a leg \
+                          are holds_s";
+            return Err(wrong(cause, remedy));
+        }
+        Ok(Legs { turns_s: turns_s.clone(), until_s: until_s.clone() })
     }
 }

@@ -6,17 +6,53 @@ use sidestep_scenario::{AboveBelow, Number, Rule, refused};
 /// A speed or a separation.
 pub(crate) type Measure = Number<AboveBelow<0, 1_000_000>>;
 
-/// Turn rates of airplanes: slower ones would make orbits without end.
+/// Defines rules for numbers with bounds, whose errors give the reason for the bounds.
+macro_rules! bounds {
+    ($($name:ident, $least:expr, $most:expr, $words:literal, $reason:literal;)*) => {$(
+        #[doc = concat!("Numbers from ", $words, ": ", $reason, ".")]
+        #[derive(Debug, Clone, Copy)]
+        pub(crate) struct $name;
+
+        impl Rule for $name {
+            fn allows(number: f64) -> bool {
+                ($least..=$most).contains(&number)
+            }
+
+            fn words() -> String {
+                concat!($words, ": ", $reason).into()
+            }
+        }
+    )*};
+}
+
+bounds! {
+    TurnRate, 1e-3, 360.0, "0.001 to 360 degrees per second", "slower turns make orbits without end";
+    Decision, 0.01, 3600.0, "0.01 to 3600 s", "nobody avoids others by one decision an hour";
+    Step, 0.001, 3600.0, "0.001 to 3600 s", "a step is part of dt_s, and a run has many";
+    LookAhead, 0.001, 86_400.0, "0.001 to 86400 s", "nobody predicts more than a day";
+    Held, 0.001, 86_400.0, "0.001 to 86400 s", "no turn or leg takes more than a day";
+    Tolerance, 0.001, 1e6, "0.001 to 1e6 m", "way-points are met to the millimeter at best";
+    Weight, 1e-12, 1e6, "1e-12 to 1e6", "beyond that rounding hides one part of the objective";
+    Fading, 1e-3, 1.0, "0.001 to 1", "the future counts less than the present, but it counts";
+    Inflation, 0.1, 10.0, "0.1 to 10", "it is a margin on the separation";
+    Cooling, 0.01, 1.0, "0.01 to 1", "faster than a hundredth a round leaves nothing to learn from";
+    LevelGap, 1.0, 1e9, "1 to 1e9 m", "levels nearer than that are one for any altimeter";
+    Gibibytes, 1e-6, 1024.0, "1e-6 to 1024 GiB", "it is memory of this machine";
+    HeadingNoise, 0.0, 180.0, "0 to 180 degrees", "beyond half a turn nothing is left of a heading";
+}
+
+/// A number of rounds of an optimization.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct TurnRate;
+pub(crate) struct Rounds(pub(super) u32);
 
-impl Rule for TurnRate {
-    fn allows(deg_s: f64) -> bool {
-        (1e-3..=360.0).contains(&deg_s)
-    }
-
-    fn words() -> String {
-        "0.001 to 360 degrees per second".into()
+impl<'de> Deserialize<'de> for Rounds {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let rounds = i64::deserialize(deserializer)?;
+        if (1..=10_000).contains(&rounds) {
+            return Ok(Self(rounds as u32));
+        }
+        let remedy = "give 1 or more rounds, up to 10000: temperatures are at rest long before";
+        Err(refused(rounds, remedy))
     }
 }
 

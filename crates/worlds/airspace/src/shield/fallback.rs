@@ -3,6 +3,7 @@
 use super::flyer::{Flyer, SLACK_M};
 use super::orbit::Side;
 use crate::flight::distance_m;
+use sidestep_kernel::interrupt;
 
 /// Returns sides for first fallbacks that are pairwise apart, as far as there are any, and the
 /// pairs that are not: they start too close.
@@ -46,16 +47,10 @@ pub(crate) fn entry_fallbacks(
     (sides, left)
 }
 
-/// Returns the side on which an airplane that flies as `now` and is about to fly as `changed` has
-/// an orbit apart from the stored fallbacks of others, if there is one; preferably the stored side.
-pub(crate) fn side_apart(
-    now: &Flyer,
-    changed: &Flyer,
-    others: impl Iterator<Item = Flyer>,
-) -> Option<Side> {
-    // A pair came in too close as it is now, not as it would be after the change.
-    let minds = |other: &Flyer| changed.is_on_level(other) && !now.is_left_alone_with(other);
-    let minded: Vec<Flyer> = others.filter(minds).collect();
+/// Returns the side on which an airplane that is about to fly as `changed` has an orbit apart from
+/// the stored fallbacks of others, if there is one; preferably the stored side.
+pub(crate) fn side_apart(changed: &Flyer, others: impl Iterator<Item = Flyer>) -> Option<Side> {
+    let minded: Vec<Flyer> = others.filter(|other| changed.minds(other)).collect();
     let is_apart = |side: &Side| {
         minded.iter().all(|other| {
             let theirs = other.orbit(other.fallback);
@@ -69,16 +64,17 @@ pub(crate) fn side_apart(
 /// Returns for each airplane all others whose orbits might come too near its own, by rising number.
 /// They are sorted by x, so that only neighbors in that order have to be compared.
 fn near_each_other(flyers: &[Flyer]) -> Vec<Vec<usize>> {
-    let reach_m = |f: &Flyer| 2.0 * f.v_m_s / f.omega_max_rad_s + f.separation_m + SLACK_M;
+    let reach_m = |f: &Flyer| 2.0 * f.v_m_s / f.orbit_rad_s + f.separation_m + f.error_m + SLACK_M;
     let widest_m = flyers.iter().map(reach_m).fold(0.0, f64::max);
-    let x = |i: usize| flyers[i].pose.at[0];
+    let x = |i: usize| flyers[i].held.at[0];
     let mut by_x: Vec<usize> = (0..flyers.len()).collect();
     by_x.sort_unstable_by(|&a, &b| x(a).total_cmp(&x(b)));
     let mut near = vec![Vec::new(); flyers.len()];
     for (k, &i) in by_x.iter().enumerate() {
         let beside = by_x[k + 1..].iter().take_while(|&&j| x(j) - x(i) < 2.0 * widest_m);
         for &j in beside {
-            let apart_m = distance_m(flyers[i].pose.at, flyers[j].pose.at);
+            interrupt::look();
+            let apart_m = distance_m(flyers[i].held.at, flyers[j].held.at);
             if flyers[i].minds(&flyers[j]) && apart_m < reach_m(&flyers[i]) + reach_m(&flyers[j]) {
                 near[i].push(j);
                 near[j].push(i);

@@ -1,22 +1,24 @@
 //! The shield: a filter that provably keeps airplanes apart.
 //!
 //! It stands between any method and the airplanes. Every airplane stores a *fallback* that it can
-//! fly for ever: an orbit at its largest turn rate, to the left or to the right.
+//! fly for ever: an orbit to the left or to the right.
 //!
-//! **Invariant.** The stored fallbacks of all airplanes are pairwise at least `R` apart, from now
-//! on and for all time.
+//! **Invariant.** The stored fallbacks of any two airplanes that are not *named* as a pair are at
+//! least `R` apart, from now on and for all time, unless the two are on levels that do not meet.
 //!
 //! Each `dt` every airplane is given a *plan*: some way for `dt`, and then an orbit from where
 //! that ends. Plans are *compatible* when they stay `R` apart during `dt` and on the orbits ever
-//! after. [`filter`] hands out plans that are pairwise compatible:
+//! after, or when nobody has to keep the pair apart: it is named, or the levels that the two keep
+//! or pass do not meet. [`filter`] hands out plans that are pairwise compatible:
 //!
 //! 1. *Start.* If the fallbacks are apart, staying on them for `dt` and ever after is a plan for
 //!    each, and these plans are pairwise compatible: they are the same motions as the invariant
 //!    speaks of. So an assignment of compatible plans exists.
 //! 2. *Search.* Each airplane starts with the plan that the method proposes. While some pair is
 //!    not compatible, one of the two, the one with the lower rank unless it is on its fallback
-//!    already, takes another plan that is compatible with all present ones, or its fallback. The
-//!    first lowers the number of incompatible pairs, the second raises the number of airplanes on
+//!    already, takes another plan that is compatible with all present ones, or its fallback; or it
+//!    and those with which it is not compatible turn to one side together, if that makes them
+//!    compatible with all. The first and the last lower the number of incompatible pairs, the second raises the number of airplanes on
 //!    fallbacks, and none leaves a fallback during the search, so it ends. It can only end without
 //!    an incompatible pair, because two airplanes on fallbacks are compatible by the invariant.
 //! 3. *Better again.* An airplane that has fallen back may take another plan if that is compatible
@@ -24,27 +26,45 @@
 //! 4. *Step.* All fly `dt` of their plans, and store the orbit at its end. The plans were
 //!    compatible, so nobody came nearer than `R` during `dt`, and the stored orbits keep the
 //!    invariant.
+//! 5. *Changes.* Between two `dt` a pair comes under the invariant in three ways, and never without
+//!    orbits that are apart: one of the two comes in, and chooses an orbit apart from the other's,
+//!    or else the pair is named (`entry_fallbacks`); one is ordered to a level or a speed, which is
+//!    carried out only with an orbit apart from those of all that it then minds, whatever other
+//!    pairs are named (`side_apart`); or the name of the pair ends, which it does once their orbits
+//!    are apart (`act/entry.rs`). An airplane that leaves the world keeps every other pair as it was.
 //!
-//! By induction over `dt` there is never a loss of separation once the first fallbacks are apart
-//! (`first_fallbacks` chooses them). Where they are not, the pair is left to the method until
-//! they are, and the induction is about all other pairs. An airplane that leaves the world keeps
-//! every other pair as it was. A wind that all know moves everybody alike and changes no distance.
-//! Each step is a property test in `tests.rs`.
+//! By induction over `dt` no pair that is not named ever loses separation. A wind that all know
+//! moves everybody alike and changes no distance. `errors.rs` has what errors of place and heading
+//! add to `R`, and `act/avoid.rs` what holds beside airplanes that mind nobody. Each step is a
+//! property test in `tests.rs`, the whole one in `promise.rs`.
+//!
+//! Airplanes that turn at different rates orbit at one rate, which all can fly (`common_rates`).
+//! Then plans of airplanes that pass each other are nearly always compatible, and the shield costs
+//! little (`price.rs`).
 //!
 //! Numbers: `orbit.rs` never wrongly finds that motions stay apart. New plans must keep slightly
 //! more than `R` (by `SLACK_M`), so that rounding never adds up to a loss.
 
+mod errors;
 mod fallback;
 mod flyer;
 mod orbit;
 mod plan;
+#[cfg(test)]
+mod price;
+#[cfg(test)]
+mod promise;
 mod search;
 #[cfg(test)]
 mod tests;
 
+pub use errors::Bounds;
+pub(crate) use errors::{Holding, common_rates};
 pub(crate) use fallback::{entry_fallbacks, first_fallbacks, side_apart};
 pub use flyer::Flyer;
+pub(crate) use flyer::Named;
 pub use orbit::Side;
+pub(crate) use orbit::apart_for;
 pub(crate) use plan::Plan;
 pub use plan::Way;
 pub use search::{Certainty, Decision, filter};

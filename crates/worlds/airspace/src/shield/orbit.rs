@@ -11,6 +11,9 @@ use sidestep_kernel::math;
 
 /// Length in seconds below which an interval is no longer halved: undecided counts as too near.
 const FINEST_S: f64 = 1e-4;
+/// The same as a part of the whole interval, so that slow orbits, whose periods are days, take no
+/// longer to compare: at most twice the inverse of it in looks at a distance.
+const FINEST_PART: f64 = 1e-6;
 
 /// The direction of an orbit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -69,6 +72,16 @@ impl Orbit {
         ]
     }
 
+    /// Returns the center of the circle.
+    pub(crate) fn center(&self) -> Point {
+        self.center
+    }
+
+    /// Returns whether all of it is at least `apart_m` from a point, which is not inside of it.
+    pub(crate) fn is_outside(&self, point: Point, apart_m: f64) -> bool {
+        distance_m(self.center, point) >= self.radius_m + apart_m
+    }
+
     fn speed_m_s(&self) -> f64 {
         self.radius_m * self.omega_rad_s.abs()
     }
@@ -101,6 +114,17 @@ impl Orbit {
 }
 
 /// Returns whether a distance that changes by at most `closing_m_s` per second stays at least
+/// `gap_m` for some seconds; the answer is never wrongly yes.
+pub(crate) fn apart_for(
+    distance_m: &impl Fn(f64) -> f64,
+    seconds: f64,
+    closing_m_s: f64,
+    gap_m: f64,
+) -> bool {
+    stays_apart(distance_m, (0.0, seconds), closing_m_s, gap_m)
+}
+
+/// Returns whether a distance that changes by at most `closing_m_s` per second stays at least
 /// `gap_m` during the interval. Found by halving; the answer is never wrongly yes.
 pub(crate) fn stays_apart(
     distance_m: &impl Fn(f64) -> f64,
@@ -112,14 +136,15 @@ pub(crate) fn stays_apart(
     if at_from < gap_m || at_to < gap_m {
         return false;
     }
-    halve(distance_m, (from_s, at_from), (to_s, at_to), closing_m_s, gap_m)
+    let finest_s = FINEST_S.max(FINEST_PART * (to_s - from_s));
+    halve(distance_m, (from_s, at_from), (to_s, at_to), (closing_m_s, finest_s), gap_m)
 }
 
 fn halve(
     distance_m: &impl Fn(f64) -> f64,
     (from_s, at_from): (f64, f64),
     (to_s, at_to): (f64, f64),
-    closing_m_s: f64,
+    (closing_m_s, finest_s): (f64, f64),
     gap_m: f64,
 ) -> bool {
     // The smallest distance possible between the two ends.
@@ -127,20 +152,42 @@ fn halve(
     if nearest >= gap_m {
         return true;
     }
-    if to_s - from_s < FINEST_S {
+    if to_s - from_s < finest_s {
         return false;
     }
     let middle_s = 0.5 * (from_s + to_s);
     let at_middle = distance_m(middle_s);
     at_middle >= gap_m
-        && halve(distance_m, (from_s, at_from), (middle_s, at_middle), closing_m_s, gap_m)
-        && halve(distance_m, (middle_s, at_middle), (to_s, at_to), closing_m_s, gap_m)
+        && halve(
+            distance_m,
+            (from_s, at_from),
+            (middle_s, at_middle),
+            (closing_m_s, finest_s),
+            gap_m,
+        )
+        && halve(distance_m, (middle_s, at_middle), (to_s, at_to), (closing_m_s, finest_s), gap_m)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    /// The distance that keeps just so far that the bound decides nothing for long.
+    #[test]
+    fn no_two_orbits_take_longer_to_compare_than_a_bounded_number_of_looks() {
+        for period_s in [1.0, 90.0, 1e4, 360_000.0, 1e9] {
+            for above_m in [0.0, 1e-9, 1e-6, 1e-3, 1.0] {
+                let looks = std::cell::Cell::new(0_u64);
+                let distance = |_: f64| {
+                    looks.set(looks.get() + 1);
+                    500.0 + above_m
+                };
+                let _ = stays_apart(&distance, (0.0, period_s), 70.0, 500.0);
+                assert!(looks.get() <= 2_200_000, "{period_s} s, {above_m} m: {}", looks.get());
+            }
+        }
+    }
 
     proptest! {
         /// An orbit is the place where the airplane flies with that turn rate.

@@ -4,6 +4,7 @@ use super::flyer::Flyer;
 use super::orbit::{Orbit, Side, stays_apart};
 use crate::flight::{Pose, distance_m};
 use serde::{Deserialize, Serialize};
+use sidestep_kernel::interrupt;
 
 /// Motion for one `dt`: a turn rate per step of `dtau`.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -29,30 +30,50 @@ pub(crate) struct Plan {
 impl Plan {
     /// Returns a plan: a way, and then an orbit to a side.
     pub(crate) fn new(flyer: Flyer, way: &Way, dtau_s: f64, side: Side) -> Self {
-        Self::of(flyer, way.omegas_rad_s.clone(), dtau_s, (None, side))
+        Self::of(flyer, way, dtau_s, None, side)
     }
 
+    /// Returns the same for a candidate, by its number.
     pub(super) fn of(
+        flyer: Flyer,
+        way: &Way,
+        dtau_s: f64,
+        candidate: Option<usize>,
+        side: Side,
+    ) -> Self {
+        let flown = Self::flown_from(flyer.pose, flyer, way.omegas_rad_s.clone(), dtau_s, side);
+        Self { candidate, ..flown }
+    }
+
+    /// Returns the same plan with an orbit to a side.
+    pub(super) fn turned(&self, side: Side) -> Self {
+        let omega_rad_s = side.sign() * self.flyer.orbit_rad_s;
+        let orbit = Orbit::from(self.end(), self.flyer.v_m_s, omega_rad_s);
+        Self { orbit, side, ..self.clone() }
+    }
+
+    fn flown_from(
+        start: Pose,
         flyer: Flyer,
         omegas_rad_s: Vec<f64>,
         dtau_s: f64,
-        orbit: (Option<usize>, Side),
+        side: Side,
     ) -> Self {
-        let mut poses = vec![flyer.pose];
+        let mut poses = vec![start];
         for &omega in &omegas_rad_s {
             let last = poses[poses.len() - 1];
             poses.push(last.step(flyer.v_m_s, omega, dtau_s));
         }
-        let (candidate, side) = orbit;
         let end = poses[poses.len() - 1];
-        let orbit = Orbit::from(end, flyer.v_m_s, side.sign() * flyer.omega_max_rad_s);
-        Self { flyer, poses, omegas_rad_s, dtau_s, orbit, candidate, side }
+        let orbit = Orbit::from(end, flyer.v_m_s, side.sign() * flyer.orbit_rad_s);
+        Self { flyer, poses, omegas_rad_s, dtau_s, orbit, candidate: None, side }
     }
 
     /// Returns the stored fallback as a plan, for some steps and ever after.
     pub(crate) fn fallback(flyer: Flyer, steps: usize, dtau_s: f64) -> Self {
-        let omega = flyer.fallback.sign() * flyer.omega_max_rad_s;
-        Self::of(flyer, vec![omega; steps], dtau_s, (None, flyer.fallback))
+        let omega = flyer.fallback.sign() * flyer.orbit_rad_s;
+        let side = flyer.fallback;
+        Self::flown_from(flyer.held, flyer, vec![omega; steps], dtau_s, side)
     }
 
     /// Returns the pose at the end of `dt`.
@@ -70,15 +91,11 @@ impl Plan {
         if !self.flyer.minds(&other.flyer) {
             return true;
         }
-        let gap_m = self.flyer.gap_m(&other.flyer);
-        let reach = |plan: &Self| {
-            let dt_s = plan.dtau_s * plan.omegas_rad_s.len() as f64;
-            plan.flyer.v_m_s * dt_s + 2.0 * plan.orbit.radius_m
-        };
-        let now_m = distance_m(self.poses[0].at, other.poses[0].at);
-        if now_m >= gap_m + reach(self) + reach(other) {
+        if !self.flyer.is_in_reach(&other.flyer, self.dtau_s * self.omegas_rad_s.len() as f64) {
             return true;
         }
+        let gap_m = self.flyer.gap_m(&other.flyer);
+        interrupt::look();
         self.orbit.stays_apart(&other.orbit, gap_m) && self.ways_stay_apart(other, gap_m)
     }
 
@@ -90,6 +107,20 @@ impl Plan {
             };
             let apart = |t_s: f64| distance_m(at(self, t_s), at(other, t_s));
             stays_apart(&apart, (0.0, self.dtau_s), closing_m_s, gap_m)
+        })
+    }
+
+    /// Returns whether it keeps apart from another airplane whatever that one does, for one `dt`
+    /// and on orbits ever after.
+    pub(crate) fn is_clear_of(&self, other: &Flyer) -> bool {
+        let dt_s = self.dtau_s * self.omegas_rad_s.len() as f64;
+        let (centers, radius_m) = other.reach(dt_s);
+        let apart_m = radius_m + self.flyer.gap_m(other);
+        // Between two poses it is within half a step of one of them.
+        let half_step_m = 0.5 * self.flyer.v_m_s * self.dtau_s;
+        centers.iter().all(|&center| {
+            let is_far = |pose: &Pose| distance_m(pose.at, center) >= apart_m + half_step_m;
+            self.poses.iter().all(is_far) && self.orbit.is_outside(center, apart_m)
         })
     }
 

@@ -3,6 +3,7 @@
 use super::flyer::Flyer;
 use super::orbit::Side;
 use super::plan::{Plan, Way};
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Decision of the shield for one airplane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,11 +58,9 @@ impl<'a> Search<'a> {
         certainty: Certainty,
     ) -> Self {
         let fallbacks: Vec<Plan> =
-            flyers.iter().map(|flyer| Plan::fallback(*flyer, steps, dtau_s)).collect();
+            flyers.iter().map(|flyer| Plan::fallback(flyer.clone(), steps, dtau_s)).collect();
         let first = |((flyer, ways), fallback): ((&Flyer, &Vec<Way>), &Plan)| match ways.first() {
-            Some(way) => {
-                Plan::of(*flyer, way.omegas_rad_s.clone(), dtau_s, (Some(0), flyer.fallback))
-            }
+            Some(way) => Plan::of(flyer.clone(), way, dtau_s, Some(0), flyer.fallback),
             None => fallback.clone(),
         };
         let plans = flyers.iter().zip(candidates).zip(&fallbacks).map(first).collect();
@@ -72,17 +71,29 @@ impl<'a> Search<'a> {
 
     /// Returns whether a plan of airplane `i` is compatible with everything that `j` may fly.
     fn fits(&self, i: usize, plan: &Plan, j: usize) -> bool {
+        self.fits_beside(i, plan, j, &self.plans[j])
+    }
+
+    /// Returns the same for another plan of `j`.
+    fn fits_beside(&self, i: usize, plan: &Plan, j: usize, other: &Plan) -> bool {
         // Unless all plans are sure to be flown, either one may fly its fallback instead.
-        plan.is_compatible(&self.plans[j])
+        plan.is_compatible(other)
             && (self.certainty == Certainty::Sure
                 || (plan.is_compatible(&self.fallbacks[j])
-                    && self.fallbacks[i].is_compatible(&self.plans[j])))
+                    && self.fallbacks[i].is_compatible(other)))
     }
 
     fn until_compatible(&mut self) {
         let mut pairs = self.incompatible_pairs();
         while let Some(loser) = self.loser(&pairs) {
             let other = self.another_plan(loser);
+            let present = self.plans[loser].candidate;
+            let keeps_way = other.as_ref().is_some_and(|plan| plan.candidate == present);
+            if !keeps_way && let Some(turned) = self.turned_together(loser, &pairs) {
+                pairs.retain(|&(i, j)| i != loser && j != loser);
+                turned.into_iter().for_each(|(k, plan)| self.plans[k] = plan);
+                continue;
+            }
             self.plans[loser] = other.unwrap_or_else(|| self.fallbacks[loser].clone());
             pairs.retain(|&(i, j)| i != loser && j != loser);
             pairs.extend(self.incompatible_with(loser));
@@ -103,6 +114,29 @@ impl<'a> Search<'a> {
         self.by_rank.iter().copied().find(|&i| gives_way(i))
     }
 
+    /// Returns the present plans of an airplane and of all with which it is not compatible, with
+    /// orbits to one side, if those are compatible with each other and with all others.
+    ///
+    /// Two that pass each other have to turn to the same side: to the one on which they part. If
+    /// they are set to the other side, neither of them can change alone.
+    fn turned_together(&self, i: usize, pairs: &[(usize, usize)]) -> Option<BTreeMap<usize, Plan>> {
+        let concerned = pairs.iter().filter(|&&(a, b)| a == i || b == i);
+        let all: BTreeSet<usize> = concerned.flat_map(|&(a, b)| [a, b]).collect();
+        if all.iter().any(|&k| self.plans[k].is_fallback()) {
+            return None;
+        }
+        Side::BOTH.into_iter().find_map(|side| {
+            let turned: BTreeMap<usize, Plan> =
+                all.iter().map(|&k| (k, self.plans[k].turned(side))).collect();
+            let fits = |(&k, plan): (&usize, &Plan)| {
+                (0..self.plans.len())
+                    .filter(|&j| j != k)
+                    .all(|j| self.fits_beside(k, plan, j, turned.get(&j).unwrap_or(&self.plans[j])))
+            };
+            turned.iter().all(fits).then_some(turned)
+        })
+    }
+
     fn incompatible_pairs(&self) -> Vec<(usize, usize)> {
         let n = self.plans.len();
         let all = (0..n).flat_map(|i| (i + 1..n).map(move |j| (i, j)));
@@ -116,13 +150,12 @@ impl<'a> Search<'a> {
 
     /// Returns the first plan of an airplane that is compatible with all present ones.
     fn another_plan(&self, i: usize) -> Option<Plan> {
-        let flyer = self.flyers[i];
         let others: Vec<usize> = (0..self.plans.len()).filter(|&j| j != i).collect();
         let fits = |plan: &Plan| others.iter().all(|&j| self.fits(i, plan, j));
         self.candidates[i].iter().enumerate().find_map(|(k, way)| {
             Side::BOTH
                 .into_iter()
-                .map(|side| Plan::of(flyer, way.omegas_rad_s.clone(), self.dtau_s, (Some(k), side)))
+                .map(|side| Plan::of(self.flyers[i].clone(), way, self.dtau_s, Some(k), side))
                 .find(|plan| fits(plan))
         })
     }

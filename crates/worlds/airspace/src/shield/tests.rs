@@ -9,16 +9,20 @@ const DTAU_S: f64 = 1.0;
 const STEPS: usize = 5;
 
 fn flyer(x: f64, y: f64, heading_rad: f64, rank: u64) -> Flyer {
+    let pose = Pose { at: [x, y], heading_rad };
     Flyer {
         id: rank as u32,
-        pose: Pose { at: [x, y], heading_rad },
+        pose,
+        held: pose,
         v_m_s: 35.0,
         omega_max_rad_s: 4f64.to_radians(),
+        orbit_rad_s: 4f64.to_radians(),
         separation_m: 500.0,
+        error_m: 0.0,
         levels: Levels::at(0.0),
         vertical_m: 300.0,
         fallback: Side::Left,
-        came_too_close: false,
+        named: Named::default(),
         rank,
     }
 }
@@ -31,7 +35,7 @@ fn some_flyers() -> impl Strategy<Value = Vec<Flyer>> {
                 let mut flyer = flyer(x, y, psi, (i * 7 % 11) as u64);
                 if i % 3 == 2 {
                     flyer.v_m_s *= slow;
-                    flyer.omega_max_rad_s *= 1.0 + slow;
+                    flyer.orbit_rad_s *= 1.0 + slow;
                 }
                 flyer
             };
@@ -54,7 +58,7 @@ fn with_fallbacks(mut flyers: Vec<Flyer>) -> Vec<Flyer> {
 }
 
 fn orbit_of(flyer: &Flyer) -> Orbit {
-    Orbit::from(flyer.pose, flyer.v_m_s, flyer.fallback.sign() * flyer.omega_max_rad_s)
+    Orbit::from(flyer.pose, flyer.v_m_s, flyer.fallback.sign() * flyer.orbit_rad_s)
 }
 
 fn nearest_on_orbits(flyers: &[Flyer], seconds: usize) -> f64 {
@@ -90,7 +94,7 @@ proptest! {
     ) {
         let flyers = with_fallbacks(flyers);
         let candidates: Vec<Vec<Way>> = flyers.iter().zip(&wishes).map(|(f, wishes)| {
-            let way = |part: &f64| Way { omegas_rad_s: vec![part * f.omega_max_rad_s; STEPS] };
+            let way = |part: &f64| Way { omegas_rad_s: vec![part * f.orbit_rad_s; STEPS] };
             wishes.iter().map(way).collect()
         }).collect();
         let certainty = if mixable { Certainty::Mixable } else { Certainty::Sure };
@@ -104,7 +108,7 @@ proptest! {
         }
         let omega = |i: usize, k: usize| match decisions[i].candidate {
             Some(c) => candidates[i][c].omegas_rad_s[k],
-            None => flyers[i].fallback.sign() * flyers[i].omega_max_rad_s,
+            None => flyers[i].fallback.sign() * flyers[i].orbit_rad_s,
         };
         let mut now = flyers.clone();
         for k in 0..STEPS {
@@ -120,17 +124,39 @@ proptest! {
             }
             for (i, f) in now.iter_mut().enumerate() {
                 f.pose = f.pose.step(f.v_m_s, omega(i, k), DTAU_S);
+                f.held = f.pose;
             }
         }
         now.iter_mut().zip(&decisions).for_each(|(f, d)| f.fallback = d.fallback);
         prop_assert!(nearest_on_orbits(&now, 400) >= 500.0);
     }
 
+    /// A plan that is clear of another airplane needs no consent of it: whatever that one flies for
+    /// `dt`, and to whichever side it turns then, the two keep apart.
+    #[test]
+    fn a_plan_clear_of_another_keeps_apart_whatever_that_one_does(
+        x in 1200.0f64..3000.0, bearing in -3.1f64..3.1, psi in -3.1f64..3.1,
+        part in -1.0f64..1.0, others in prop::collection::vec(-1.0f64..1.0, STEPS),
+        slow in 0.5f64..1.0, left in any::<bool>(), own_left in any::<bool>(),
+    ) {
+        let own = flyer(0.0, 0.0, 0.0, 0);
+        let at = Pose { at: [0.0; 2], heading_rad: bearing }.step(x, 0.0, 1.0).at;
+        let other = Flyer { orbit_rad_s: slow * own.omega_max_rad_s, ..flyer(at[0], at[1], psi, 1) };
+        let plan = |of: &Flyer, parts: &[f64], left: bool| {
+            let omegas_rad_s = parts.iter().map(|part| part * of.omega_max_rad_s).collect();
+            Plan::new(of.clone(), &Way { omegas_rad_s }, DTAU_S, Side::BOTH[usize::from(left)])
+        };
+        let clear = plan(&own, &[part; STEPS], own_left);
+        if clear.is_clear_of(&other) {
+            prop_assert!(clear.is_compatible(&plan(&other, &others, left)));
+        }
+    }
+
     /// An airplane that is far from all others flies its wish.
     #[test]
     fn nobody_falls_back_without_need(x in 20_000.0f64..1e6, part in -1.0f64..1.0) {
         let flyers = [flyer(0.0, 0.0, 0.0, 0), flyer(x, 0.0, 3.0, 1)];
-        let way = || Way { omegas_rad_s: vec![part * flyers[0].omega_max_rad_s; STEPS] };
+        let way = || Way { omegas_rad_s: vec![part * flyers[0].orbit_rad_s; STEPS] };
         let wishes = [vec![way()], vec![way()]];
         let decisions = filter(&flyers, &wishes, (STEPS, DTAU_S), Certainty::Sure);
         prop_assert!(decisions.iter().all(|d| d.candidate == Some(0)));
@@ -141,10 +167,10 @@ proptest! {
 fn who_enters_chooses_a_side_apart_from_the_stored_ones_and_nobody_else_does() {
     // On its left the newcomer would orbit over the other, on its right it would not.
     let stored = flyer(0.0, 2002.0, std::f64::consts::PI, 0);
-    let flyers = [stored, flyer(0.0, 0.0, 0.0, 1)];
+    let flyers = [stored.clone(), flyer(0.0, 0.0, 0.0, 1)];
     let (sides, too_close) = entry_fallbacks(&flyers, |i| i == 1);
     assert_eq!((sides, too_close), (vec![Side::Left, Side::Right], vec![]));
-    let near = [stored, flyer(100.0, 2002.0, 0.0, 1), flyer(50.0, 2030.0, 0.0, 2)];
+    let near = [stored.clone(), flyer(100.0, 2002.0, 0.0, 1), flyer(50.0, 2030.0, 0.0, 2)];
     let (sides, too_close) = entry_fallbacks(&near, |i| i == 2);
     assert_eq!(sides[..2], [Side::Left; 2]);
     assert_eq!(too_close, [(0, 2), (1, 2)], "the pair that was there before is not named");
@@ -152,37 +178,39 @@ fn who_enters_chooses_a_side_apart_from_the_stored_ones_and_nobody_else_does() {
 
 #[test]
 fn two_that_came_in_too_close_are_left_to_the_method_and_nobody_else_is() {
-    let close = |x: f64, rank: u64| Flyer { came_too_close: true, ..flyer(x, 0.0, 0.0, rank) };
-    let flyers = [close(0.0, 0), close(100.0, 1)];
+    let close =
+        |x: f64, rank: u64, named: u32| Flyer { named: [named].into(), ..flyer(x, 0.0, 0.0, rank) };
     let straight = || vec![Way { omegas_rad_s: vec![0.0; STEPS] }];
-    let wanted = filter(&flyers, &[straight(), straight()], (STEPS, DTAU_S), Certainty::Sure);
+    let wishes = [straight(), straight()];
+    let of_each_other = [close(0.0, 0, 1), close(100.0, 1, 0)];
+    let wanted = filter(&of_each_other, &wishes, (STEPS, DTAU_S), Certainty::Sure);
     assert!(wanted.iter().all(|d| d.candidate == Some(0)), "{wanted:?}");
-    // In each other's way, but with fallbacks that are apart.
-    let mut apart = [close(0.0, 0), close(0.0, 1)];
-    apart[1].pose = Pose { at: [0.0, 620.0], heading_rad: -std::f64::consts::FRAC_PI_2 };
-    apart.iter_mut().for_each(|f| f.fallback = Side::Right);
-    assert!(nearest_on_orbits(&apart, 400) > 500.0);
-    let kept = filter(&apart, &[straight(), straight()], (STEPS, DTAU_S), Certainty::Sure);
+    // In each other's way, and both are named with others.
+    let mut of_others = [close(0.0, 0, 7), close(0.0, 1, 8)];
+    let pose = Pose { at: [0.0, 620.0], heading_rad: -std::f64::consts::FRAC_PI_2 };
+    (of_others[1].pose, of_others[1].held) = (pose, pose);
+    of_others.iter_mut().for_each(|f| f.fallback = Side::Right);
+    assert!(nearest_on_orbits(&of_others, 400) > 500.0);
+    assert!(of_others[0].is_safe_with(&of_others[1]));
+    let kept = filter(&of_others, &wishes, (STEPS, DTAU_S), Certainty::Sure);
     assert!(kept.iter().any(|d| d.candidate.is_none()), "{kept:?}");
 }
 
 #[test]
 fn a_change_is_refused_when_neither_orbit_is_apart() {
     let quick_turns = 6f64.to_radians();
-    let other = Flyer { omega_max_rad_s: quick_turns, ..flyer(1500.0, -100.0, 0.0, 0) };
+    let other = Flyer { orbit_rad_s: quick_turns, ..flyer(1500.0, -100.0, 0.0, 0) };
     let slow = flyer(0.0, 0.0, 0.0, 1);
-    let beside = |v_m_s: f64| side_apart(&slow, &Flyer { v_m_s, ..slow }, [other].into_iter());
-    assert_eq!(beside(35.0), Some(Side::Left));
-    assert_eq!(beside(150.0), None);
-    let above = Flyer { levels: Levels::at(1000.0), v_m_s: 150.0, ..slow };
-    assert_eq!(side_apart(&slow, &above, [other].into_iter()), Some(Side::Left));
-    // Both came in too close, but not to each other.
-    let came_too_close = |f: Flyer| Flyer { came_too_close: true, ..f };
-    let fast = came_too_close(Flyer { v_m_s: 150.0, ..slow });
-    let others = [came_too_close(other)].into_iter();
-    assert_eq!(side_apart(&came_too_close(slow), &fast, others), None);
+    let beside = |changed: &Flyer| side_apart(changed, [other.clone()].into_iter());
+    let fast = Flyer { v_m_s: 150.0, ..slow.clone() };
+    assert_eq!((beside(&slow), beside(&fast)), (Some(Side::Left), None));
+    let above = Flyer { levels: Levels::at(1000.0), ..fast.clone() };
+    assert_eq!(beside(&above), Some(Side::Left));
+    // Named with another one, and then with this one.
+    assert_eq!(beside(&Flyer { named: [7].into(), ..fast.clone() }), None);
+    assert_eq!(beside(&Flyer { named: [0, 7].into(), ..fast }), Some(Side::Left));
     let climbing = Flyer { levels: Levels::between(0.0, 1000.0), ..above };
-    assert_eq!(side_apart(&slow, &climbing, [other].into_iter()), None);
+    assert_eq!(beside(&climbing), None);
 }
 
 #[test]

@@ -51,14 +51,14 @@ impl Floor {
     pub fn of_map(map: &PixelMap, unknown: UnknownPolicy) -> Self {
         let solid = map.pixels().iter().map(|&cell| unknown.apply(cell) != Cell::Free).collect();
         let floor = Self::new(map.width(), map.height(), [map.resolution_m(); 2], solid);
-        Self { corner_m: map.origin_m(), ..floor }
+        let plane = map.plane();
+        Self { corner_m: plane.origin_m, axes: axes(plane.yaw_rad), ..floor }
     }
 
     /// Returns the same floor with its middle at a place, turned about it.
     #[must_use]
     pub fn centered(mut self, middle: Point<2>, yaw_rad: f64) -> Self {
-        let (s, c) = (sin(yaw_rad), cos(yaw_rad));
-        self.axes = [[c, s], [-s, c]];
+        self.axes = axes(yaw_rad);
         let [w, h] = self.extent_m();
         self.corner_m = along(along(middle, self.axes[0], -0.5 * w), self.axes[1], -0.5 * h);
         self
@@ -151,6 +151,12 @@ impl Floor {
     }
 }
 
+/// Returns the unit vectors along rows and columns of a floor that is turned.
+fn axes(yaw_rad: f64) -> [Point<2>; 2] {
+    let (s, c) = (sin(yaw_rad), cos(yaw_rad));
+    [[c, s], [-s, c]]
+}
+
 /// Calls `tell` for every run `from..to` of numbers below `n` for which `is` holds.
 fn runs(n: i64, is: impl Fn(i64) -> bool, mut tell: impl FnMut(i64, i64)) {
     let mut start = None;
@@ -172,6 +178,7 @@ mod tests {
     use crate::rods::geometry::{Core, Cuboid, distance};
     use proptest::prelude::*;
     use sidestep_import::rosmap;
+    use sidestep_kernel::view::Plane;
     use sidestep_testing::shared_data as shared;
 
     /// A floor drawn at random, turned and stretched.
@@ -263,11 +270,27 @@ mod tests {
     #[test]
     fn unknown_pixels_are_solid_unless_they_are_said_to_be_free() {
         let pixels = vec![Cell::Free, Cell::Wall, Cell::Unknown];
-        let map = PixelMap::new(3, 1, 0.5, [1.0, 2.0], pixels);
+        let plane = Plane { origin_m: [1.0, 2.0], yaw_rad: 0.0 };
+        let map = PixelMap::new(3, 1, 0.5, plane, pixels);
         let solid = |policy| Floor::of_map(&map, policy).count_solid();
         let policies = [UnknownPolicy::Wall, UnknownPolicy::Keep, UnknownPolicy::Free];
         assert_eq!(policies.map(solid), [2, 2, 1]);
         assert!(Floor::of_map(&map, UnknownPolicy::Wall).is_free([1.25, 2.25]));
+    }
+
+    #[test]
+    fn a_turned_map_has_its_walls_where_the_world_has_them() {
+        let pixels = [Cell::Free, Cell::Wall, Cell::Free, Cell::Free, Cell::Free, Cell::Free];
+        for yaw_rad in [0.0, 0.5, 3.14] {
+            let plane = Plane { origin_m: [1.0, 2.0], yaw_rad };
+            let map = PixelMap::new(3, 2, 0.5, plane, pixels.to_vec());
+            let floor = Floor::of_map(&map, UnknownPolicy::Wall);
+            for (k, cell) in pixels.iter().enumerate() {
+                let middle = [0.5 * (k % 3) as f64 + 0.25, 0.5 * (k / 3) as f64 + 0.25];
+                let at = plane.place(middle);
+                assert_eq!(floor.is_free(at), *cell == Cell::Free, "{yaw_rad}: {at:?}");
+            }
+        }
     }
 
     #[test]

@@ -261,6 +261,7 @@ mod tests {
     use super::*;
     use crate::rods::chain::{Chain, Connector, Rod};
     use sidestep_import::{PixelMap, rosmap, stage};
+    use sidestep_kernel::view::Plane;
     use sidestep_map::{Cell, UnknownPolicy};
     use sidestep_testing::shared_data as shared;
 
@@ -285,7 +286,8 @@ mod tests {
         ];
         let pixels = rows.iter().rev().flat_map(|row| row.chars());
         let cell = |c| if c == '#' { Cell::Wall } else { Cell::Free };
-        let map = PixelMap::new(20, 6, 0.5, [-2.0, 1.0], pixels.map(cell).collect());
+        let plane = Plane { origin_m: [-2.0, 1.0], yaw_rad: 0.0 };
+        let map = PixelMap::new(20, 6, 0.5, plane, pixels.map(cell).collect());
         Site::of_map(&map, UnknownPolicy::Wall)
     }
 

@@ -1,10 +1,46 @@
-//! Going somewhere: along shortest ways on the static map, and around sensed obstacles.
+//! Going somewhere: along shortest ways on the static map, and past what is in the way.
 
-use super::{Behaviour, Decision, Memory, Percept, Sector, Trip};
-use crate::effector::{ActionId, FORWARD, LEFT, RIGHT, STAY};
+use super::plan::{Planner, Way};
+use super::sidestep::{Trust, sidestep};
+use super::touch::follow;
+use super::{Behaviour, Decision, Memory, Percept, Trip};
+use crate::effector::{ActionId, STAY};
 use sidestep_kernel::stream::Draws;
 use sidestep_map::planning::FlowField;
 use std::sync::Arc;
+
+/// The way in which a robot that goes somewhere deals with what is in its way.
+#[derive(Debug, Clone)]
+pub enum Avoidance {
+    /// Plans round what it senses, and makes room for others.
+    Plan(Arc<Planner>),
+    /// Steps aside from near things that its sensors report.
+    Sidestep(Trust),
+    /// Keeps to its way until it touches something, then waits or steps aside at random.
+    Touch,
+}
+
+impl Avoidance {
+    fn step(
+        &self,
+        way: Way<'_>,
+        percept: &Percept<'_>,
+        memory: &mut Memory,
+        draws: &mut Draws,
+    ) -> ActionId {
+        match self {
+            Self::Plan(planner) => planner.step(way, percept, memory, draws),
+            // Only planners know others, and leave a goal for them.
+            _ if way.is_done => STAY,
+            Self::Sidestep(trust) => sidestep(*trust, way.field, percept, memory, draws),
+            Self::Touch => follow(way.field, percept, memory, draws),
+        }
+    }
+
+    fn asks(&self) -> bool {
+        matches!(self, Self::Plan(_))
+    }
+}
 
 /// Visits goals in order; each robot starts with the goals of its own list.
 #[derive(Debug, Clone)]
@@ -13,6 +49,8 @@ pub struct Goto {
     pub goals: Vec<Arc<FlowField>>,
     /// Whether it starts again after the last goal, rather than staying there.
     pub repeat: bool,
+    /// How it gets past what is in its way.
+    pub avoidance: Avoidance,
 }
 
 /// Goes back and forth between two regions; a trip is there and back again.
@@ -20,36 +58,60 @@ pub struct Goto {
 pub struct Shuttle {
     /// Shortest ways to the two regions.
     pub ends: [Arc<FlowField>; 2],
+    /// How it gets past what is in its way.
+    pub avoidance: Avoidance,
 }
 
-/// Word 0: number of goals reached (wraps at the length for a repeated list).
+/// Word 0: number of goals reached (wraps at the length for a repeated list). The other words belong
+/// to the avoidance.
 const REACHED: usize = 0;
-/// Word 1: actions of an evasion that are left to do.
-const EVADING: usize = 1;
 
-impl Behaviour for Goto {
-    fn decide(&self, percept: &Percept<'_>, memory: &mut Memory, draws: &mut Draws) -> Decision {
-        let mut trip = None;
-        let n = self.goals.len() as u32;
-        while memory.words[REACHED] < n {
-            let field = &self.goals[memory.words[REACHED] as usize];
+impl Goto {
+    /// Counts the goals that are reached here, and returns the way to the next one; none where all
+    /// goals of a repeated list are here.
+    fn next(&self, percept: &Percept<'_>, memory: &mut Memory) -> (Option<Way<'_>>, Option<Trip>) {
+        let (mut trip, n) = (None, self.goals.len());
+        loop {
+            let reached = memory.words[REACHED] as usize;
+            let Some(field) = self.goals.get(reached) else {
+                let last = self.goals.last();
+                return (last.map(|field| Way { field, is_done: true }), trip);
+            };
             if !field.is_goal(percept.at.0, percept.at.1) {
-                let action = follow(field, percept, memory, draws);
-                return Decision { trip, ..action.into() };
+                return (Some(Way { field, is_done: false }), trip);
             }
             trip = Some(Trip::Done);
             memory.words[REACHED] += 1;
-            if self.repeat && memory.words[REACHED] == n {
+            if self.repeat && reached + 1 == n {
                 memory.words[REACHED] = 0;
                 // Stop here, because a list whose goals all are here would loop for ever.
-                break;
+                return (None, trip);
             }
         }
-        Decision { trip, ..STAY.into() }
+    }
+}
+
+impl Behaviour for Goto {
+    fn decide(&self, percept: &Percept<'_>, memory: &mut Memory, draws: &mut Draws) -> Decision {
+        let (way, trip) = self.next(percept, memory);
+        let action = way.map_or(STAY, |way| self.avoidance.step(way, percept, memory, draws));
+        Decision { trip, ..action.into() }
+    }
+
+    fn asks(&self) -> bool {
+        self.avoidance.asks()
+    }
+
+    fn ways(&self) -> &[Arc<FlowField>] {
+        &self.goals
     }
 }
 
 impl Behaviour for Shuttle {
+    fn ways(&self) -> &[Arc<FlowField>] {
+        &self.ends
+    }
+
     fn decide(&self, percept: &Percept<'_>, memory: &mut Memory, draws: &mut Draws) -> Decision {
         let mut trip = None;
         let mut target = (memory.words[REACHED] % 2) as usize;
@@ -61,51 +123,12 @@ impl Behaviour for Shuttle {
             }
             target = 1 - target;
         }
-        let action = follow(&self.ends[target], percept, memory, draws);
+        let way = Way { field: &self.ends[target], is_done: false };
+        let action = self.avoidance.step(way, percept, memory, draws);
         Decision { trip, ..action.into() }
     }
-}
 
-/// Returns one action along the way; after a contact or before a near obstacle, a short evasion.
-fn follow(
-    field: &FlowField,
-    percept: &Percept<'_>,
-    memory: &mut Memory,
-    draws: &mut Draws,
-) -> ActionId {
-    if memory.words[EVADING] > 0 {
-        memory.words[EVADING] -= 1;
-        let blocked = percept.contact.is_some() || percept.nearest(Sector::Ahead) == Some(0);
-        return if blocked { turn_somewhere(draws) } else { FORWARD };
+    fn asks(&self) -> bool {
+        self.avoidance.asks()
     }
-    let Some(direction) = field.direction(percept.at.0, percept.at.1) else {
-        // No way from here (yet): wander until there is one.
-        return if percept.contact.is_some() { turn_somewhere(draws) } else { FORWARD };
-    };
-    match (4 + direction - percept.heading) % 4 {
-        0 if percept.contact.is_some() => evade(percept, memory, draws),
-        0 => FORWARD,
-        1 => LEFT,
-        3 => RIGHT,
-        // The way leads back, and two turns to either side do it.
-        _ => turn_somewhere(draws),
-    }
-}
-
-/// Waits or sidesteps, by a fair draw, because two robots that meet must not mirror each other.
-fn evade(percept: &Percept<'_>, memory: &mut Memory, draws: &mut Draws) -> ActionId {
-    if draws.below(3) == 0 {
-        return STAY;
-    }
-    memory.words[EVADING] = 1 + draws.below(2);
-    let clear = |sector| percept.nearest(sector).unwrap_or(u8::MAX);
-    match clear(Sector::Left).cmp(&clear(Sector::Right)) {
-        std::cmp::Ordering::Greater => LEFT,
-        std::cmp::Ordering::Less => RIGHT,
-        std::cmp::Ordering::Equal => turn_somewhere(draws),
-    }
-}
-
-fn turn_somewhere(draws: &mut Draws) -> ActionId {
-    if draws.below(2) == 0 { LEFT } else { RIGHT }
 }

@@ -100,6 +100,7 @@ mod tests {
             let (at, heading) = ((0, 0), 0);
             let percept = Percept {
                 now,
+                id: 0,
                 readings: &[],
                 sectors: &[],
                 nearest_in: [UNSEEN; 4],

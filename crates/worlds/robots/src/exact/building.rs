@@ -67,7 +67,7 @@ pub(super) fn only_robot(compiled: &Compiled) -> Result<(Building, Robot), Input
                 return refuse(cause, "leave out [people]: a chain has one moving body");
             }
             Role::Door(door) if stays_closed(door) => {
-                doors.extend(covered(compiled, body.id, ty.size).map(|at| (at, ty.kind)));
+                doors.extend(covered(compiled, body.id).map(|at| (at, ty.kind)));
             }
             Role::Door(_) => {
                 return refuse(
@@ -95,11 +95,8 @@ fn stays_closed(door: &Door) -> bool {
 }
 
 /// Returns the boxes that a body covers at the start.
-fn covered(
-    compiled: &Compiled,
-    id: EntityId,
-    (width, height): (u32, u32),
-) -> impl Iterator<Item = (i32, i32)> {
+fn covered(compiled: &Compiled, id: EntityId) -> impl Iterator<Item = (i32, i32)> {
+    let (width, height) = compiled.world.type_of(id).size;
     let ((col, row), _) = compiled.start[id as usize];
     let boxes = (row..row + height).flat_map(move |r| (col..col + width).map(move |c| (c, r)));
     boxes.map(|(c, r)| (c as i32, r as i32))

@@ -5,6 +5,7 @@ use super::chain::total_variation;
 use super::obstacle::Pose;
 use crate::RobotsRun;
 use crate::decide::Random;
+use crate::purpose;
 use crate::scenario::Compiled;
 use crate::world::{RobotsWorld, Role};
 use serde::Serialize;
@@ -35,7 +36,7 @@ pub struct Comparison {
 }
 
 /// Runs the scenario's robot `runs` times for `cycles` cycles from its start under `policy`
-/// (run k with the scenario's seed plus k) and compares where it ends with
+/// (each run with a seed that is drawn from the scenario's) and compares where it ends with
 /// [`Chain::distribution_after`](super::Chain::distribution_after).
 ///
 /// The runs are independent, so the limit holds whether or not the chain mixes.
@@ -104,13 +105,19 @@ fn last_poses(
     follow(&mut world, policy);
     let mut counts = BTreeMap::new();
     for run in 0..u64::from(runs) {
-        world.streams = Streams::new(Seed(compiled.seed.wrapping_add(run)));
+        world.streams = Streams::new(seed_of(compiled.seed, run));
         let compiled = Compiled { world: Arc::new(world.clone()), ..compiled.clone() };
         let mut simulation = compiled.start(source, 1);
         simulation.advance(cycles);
         *counts.entry(pose(&simulation)).or_insert(0) += 1;
     }
     counts
+}
+
+/// Returns the seed of a run. It is drawn, because scenarios whose seeds are neighbors would share
+/// runs if it were counted up from theirs.
+fn seed_of(seed: u64, run: u64) -> Seed {
+    Seed(Streams::new(Seed(seed)).draws(0, run, purpose::RUN).next_u64())
 }
 
 /// Gives the robots another behavior.
@@ -128,4 +135,17 @@ fn pose(simulation: &RobotsRun) -> Pose {
     let (col, row) = world.map_position(state.at(slot));
     let heading = state.bodies[slot as usize].facing.get();
     Pose { col: col as i32, row: row as i32, heading }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::seed_of;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn scenarios_with_neighboring_seeds_share_no_run() {
+        let runs = |seed| (0..2000).map(move |run| seed_of(seed, run).0);
+        let all: BTreeSet<u64> = (1..=3).flat_map(runs).collect();
+        assert_eq!(all.len(), 3 * 2000);
+    }
 }

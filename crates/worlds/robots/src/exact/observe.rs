@@ -59,7 +59,7 @@ impl<'a> MountedBeam<'a> {
         let mut met = self.crossed[usize::from(pose.heading)].iter().map(|c| (c, kind_at(c)));
         let model = &self.sensor.model;
         met.find(|(_, kind)| *kind != FREE).map_or(model.nothing(), |(crossing, kind)| {
-            let class = model.class_of(crossing.distance * building.map.box_size_m);
+            let class = model.class_of(crossing.distance, building.map.box_size_m);
             self.sensor.truth(kind, class)
         })
     }

@@ -243,14 +243,16 @@ fn goals(model: &Model, goal: Option<(u32, u32)>, order: &[State]) -> Result<Vec
     Ok(states)
 }
 
-fn state_name(model: &Model, &(pose, contact): &State) -> String {
+fn state_name(model: &Model, state: &State) -> String {
+    let &(pose, contact) = state;
     let pose = model.poses[pose as usize];
     let heading = HEADING_NAMES[usize::from(pose.heading)];
-    let contact = contact.map(|c| format!("-{}", contact_name(model, c))).unwrap_or_default();
+    let contact = contact.map(|(kind, side)| format!("-{}", contact_name(model, kind, side)));
+    let contact = contact.unwrap_or_default();
     format!("c{}r{}-{heading}{contact}", pose.col, pose.row)
 }
 
-fn contact_name(model: &Model, (kind, side): (u8, Side)) -> String {
+fn contact_name(model: &Model, kind: u8, side: Side) -> String {
     format!("{}-{}", side.name(), model.kinds[usize::from(kind)])
 }
 
@@ -258,9 +260,10 @@ fn observation_name(
     model: &Model,
     beams: &[MountedBeam<'_>],
     contacts: bool,
-    (contact, readings): &Observation,
+    observation: &Observation,
 ) -> String {
-    let felt = contact.map_or("free".into(), |c| contact_name(model, c));
+    let (contact, readings) = observation;
+    let felt = contact.map_or("free".into(), |(kind, side)| contact_name(model, kind, side));
     let readings = readings.iter().zip(beams).map(|(&(observation, class), beam)| {
         let reading = Reading { observation, class };
         match name_of(reading, &beam.sensor.model) {

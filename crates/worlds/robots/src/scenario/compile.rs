@@ -1,20 +1,29 @@
 //! From a scenario's text to an immutable world and everybody's start.
 
 mod bodies;
+mod idle;
 mod map;
 mod people_and_doors;
+mod remarks;
 mod robots;
 
 use self::map::{load_map, padded};
+use super::kinds::Kinds;
+use super::located::Located;
 use super::placing::{Floor, Obstacle};
 use super::random;
-use super::tables::{self, Kinds, Located};
+use super::tables;
 use super::{
     BehaviourSection, DoorSection, EffectorSection, MapSection, MoverSection, ProfileFile,
     RecordSection, RobotSection, RobotsFile, SensorSection,
 };
-use crate::decide::{Behaviour, External, Goto, Replay, Sector, Shuttle, Wander};
-use crate::effector::{Action, EffectorModel, MAX_PATH, Transition, own_boxes};
+use crate::decide::{
+    Announce, Avoidance, Behaviour, External, Goto, Patient, Planner, Replay, Sector, Shuttle,
+    Trust, Wander,
+};
+use crate::effector::{
+    Action, EffectorModel, FORWARD, MAX_PATH, ObstacleRule, Transition, own_boxes,
+};
 use crate::policy::ConflictPolicy;
 use crate::purpose;
 use crate::sensor::SensorModel;
@@ -27,7 +36,7 @@ use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{EntityId, InputError, Seed};
 use sidestep_map::planning::{FlowField, FreeSpace};
 use sidestep_map::{Cell, GridMap, Rect};
-use sidestep_scenario::{Head, Source, nearest};
+use sidestep_scenario::{Head, Remark, Source, nearest};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
@@ -57,6 +66,8 @@ pub struct Compiled {
     pub cycles: u64,
     /// The tables to keep.
     pub record: RecordSection,
+    /// What compiling found to be surprising.
+    pub remarks: Vec<Remark>,
 }
 
 impl Compiled {
@@ -76,7 +87,7 @@ struct Compiler<'a> {
     file: RobotsFile,
     map: Arc<GridMap>,
     office_doors: Vec<Rect>,
-    kinds: Vec<String>,
+    kinds: Kinds,
     sensors: BTreeMap<String, Located<SensorSection>>,
     effectors: BTreeMap<String, Located<EffectorSection>>,
     streams: Streams,
@@ -90,6 +101,7 @@ struct Compiler<'a> {
     border: u32,
     /// Largest distance in boxes from a body to a box that it claims.
     reach: u32,
+    remarks: Vec<Remark>,
 }
 
 impl<'a> Compiler<'a> {
@@ -107,7 +119,11 @@ impl<'a> Compiler<'a> {
         }
         add_all(&source, &file.sensors, &mut sensors);
         add_all(&source, &file.effectors, &mut effectors);
-        let kinds = kinds(&source, &file)?;
+        idle::refuse(&source, &file, own, !office_doors.is_empty())?;
+        let kinds = Kinds::new(&source, &file)?;
+        check_tables(&kinds, &sensors, &effectors)?;
+        let mut remarks = remarks::on_effectors(&file, map.box_size_m, &effectors);
+        remarks.extend(remarks::on_radio(&file));
         let streams = Streams::new(Seed(head.seed));
         let floor = Floor::new(&map);
         let border = border(&file, &effectors);
@@ -125,6 +141,7 @@ impl<'a> Compiler<'a> {
             spans: Vec::new(),
             border,
             reach: 0,
+            remarks,
             map,
             office_doors,
             head,
@@ -133,6 +150,7 @@ impl<'a> Compiler<'a> {
     }
 
     fn compile(mut self, order: StorageOrder) -> Result<Compiled, InputError> {
+        let robots = self.file.robots.0.len();
         let groups = self.groups()?;
         // Doors and bodies with a given place are placed first, because draws must find the
         // remaining free boxes. Ids go robots, people, doors, whatever is placed first.
@@ -153,6 +171,7 @@ impl<'a> Compiler<'a> {
                 }
             }
         }
+        self.warn_of_goals(groups.iter().zip(firsts).take(robots));
         self.finish(order)
     }
 
@@ -162,25 +181,30 @@ impl<'a> Compiler<'a> {
         let stride = self.stride();
         let rows = self.map.height() + 2 * self.border;
         let radio = self.radio();
+        let asks = |ty: &BodyType| matches!(&ty.role, Role::Robot(model) if model.behaviour.asks());
+        let has_asks = self.types.iter().any(asks);
         let kind_rank = self.kind_rank()?;
         let world = RobotsWorld {
             walls: padded(&self.map, self.border, stride, rows),
             regime: self.file.regime,
             obstacle_rule: self.file.obstacle_rule,
             policy: self.file.conflict_policy,
-            kinds: self.kinds,
+            kinds: self.kinds.names(),
             map: self.map,
             types: self.types,
             bodies: self.bodies,
             kind_rank,
             radio,
             robots,
+            has_asks,
             storage: order,
             streams: self.streams,
             border: self.border,
             stride,
             reach: self.reach,
         };
+        let mut remarks = self.remarks;
+        remarks.extend(crate::law::no_contacts(&world));
         Ok(Compiled {
             world: Arc::new(world),
             start: self.start.into(),
@@ -188,6 +212,7 @@ impl<'a> Compiler<'a> {
             seed: self.head.seed,
             cycles: self.head.cycles.unwrap_or(CYCLES),
             record: self.file.record,
+            remarks,
         })
     }
 
@@ -203,30 +228,16 @@ impl<'a> Compiler<'a> {
 
     /// Returns the rank of each kind in `kind_order`; kinds that are not named come last.
     fn kind_rank(&self) -> Result<Vec<u8>, InputError> {
-        let mut rank = vec![self.file.kind_order.len() as u8; self.kinds.len()];
+        let mut rank = vec![self.file.kind_order.len() as u8; self.kinds.names().len()];
         for (k, kind) in self.file.kind_order.iter().enumerate() {
-            rank[usize::from(self.kind(kind)?)] = k as u8;
+            rank[usize::from(self.kinds.number(kind)?)] = k as u8;
         }
         if self.file.conflict_policy == ConflictPolicy::ByKind && self.file.kind_order.is_empty() {
             let remedy = "add kind_order = [\"person\", \"robot\"], first the kind that goes first";
-            return Err(self.source.error(
-                0..0,
-                "conflict_policy \"by_kind\" needs kind_order",
-                remedy,
-            ));
+            let cause = "conflict_policy \"by_kind\" needs kind_order";
+            return Err(self.source.error_at("conflict_policy", cause, remedy));
         }
         Ok(rank)
-    }
-
-    fn kind(&self, name: &Spanned<String>) -> Result<u8, InputError> {
-        let own = self.kinds.iter().skip(1);
-        if let Some(k) = own.clone().position(|kind| kind == name.get_ref()) {
-            return Ok(k as u8 + 1);
-        }
-        let known: Vec<&str> = own.map(String::as_str).collect();
-        let cause = format!("unknown kind `{}`", name.get_ref());
-        let remedy = nearest(name.get_ref(), &known) + "; new kinds are made by [kinds.NAME]";
-        Err(self.source.error(name.span(), cause, remedy))
     }
 }
 
@@ -253,25 +264,14 @@ fn actions_at_headings(
     (0..4).flat_map(at).collect()
 }
 
-/// Returns the names of the kinds: `free` and `wall` first, then the built-in ones, then the user's
-/// own.
-fn kinds(source: &Source, file: &RobotsFile) -> Result<Vec<String>, InputError> {
-    let mut kinds: Vec<String> =
-        ["free", "wall", "door", "person", "robot"].map(String::from).to_vec();
-    for name in file.kinds.keys() {
-        if name.get_ref() == "free" {
-            let remedy = "name the kind otherwise";
-            return Err(source.error(name.span(), "`free` is no kind", remedy));
-        }
-        if !kinds.contains(name.get_ref()) {
-            kinds.push(name.get_ref().clone());
-        }
-    }
-    if kinds.len() > 127 {
-        let remedy = "let kinds share a name";
-        return Err(source.error(None, "more than 122 kinds of your own", remedy));
-    }
-    Ok(kinds)
+/// Checks every table, whether or not a robot uses it.
+fn check_tables(
+    kinds: &Kinds,
+    sensors: &BTreeMap<String, Located<SensorSection>>,
+    effectors: &BTreeMap<String, Located<EffectorSection>>,
+) -> Result<(), InputError> {
+    sensors.iter().try_for_each(|(name, at)| tables::sensor(name, at, kinds, false).map(drop))?;
+    effectors.iter().try_for_each(|(name, at)| tables::effector(name, at).map(drop))
 }
 
 fn add_profile(

@@ -1,13 +1,14 @@
 //! From sensor and effector sections to checked models.
 
+use super::kinds::Kinds;
+use super::located::Located;
 use super::{EffectorSection, Rows, SensorSection, TransitionSection};
 use crate::effector::{EffectorModel, STANDARD_ACTIONS, Transition};
 use crate::sensor::SensorModel;
 use sidestep_kernel::InputError;
 use sidestep_kernel::distr::check_row;
-use sidestep_scenario::{Source, nearest};
+use sidestep_scenario::nearest;
 use std::collections::BTreeMap;
-use std::ops::Range;
 use toml::Spanned;
 
 /// Largest number of beams, observations, classes and actions, because readings name them with a
@@ -17,37 +18,12 @@ const MAX_NAMES: usize = 250;
 const MAX_ACTIONS: usize = 120;
 const MAX_BEAMS: usize = 1024;
 
-/// A section and the text it stands in (scenario, profile or presets).
-#[derive(Debug, Clone)]
-pub(super) struct Located<T> {
-    pub(super) section: Spanned<T>,
-    pub(super) source: std::sync::Arc<Source>,
-}
-
-impl<T> Located<T> {
-    pub(super) fn error(
-        &self,
-        span: Range<usize>,
-        cause: impl Into<String>,
-        remedy: &str,
-    ) -> InputError {
-        self.source.error(Some(span), cause, remedy)
-    }
-}
-
-/// The scenario's kinds and the observation that each designates.
-pub(super) struct Kinds {
-    pub(super) names: Vec<String>,
-    pub(super) observations: Vec<String>,
-    /// Whether each kind really occurs: only those that do must be known to every sensor.
-    pub(super) used: Vec<bool>,
-}
-
 /// Checks a sensor and puts its rows in order.
 pub(super) fn sensor(
     name: &str,
     at: &Located<SensorSection>,
     kinds: &Kinds,
+    is_mounted: bool,
 ) -> Result<SensorModel, InputError> {
     let s = at.section.get_ref();
     let observations = observations(at)?;
@@ -63,7 +39,7 @@ pub(super) fn sensor(
         bearings_deg: bearings.clone(),
         range_m: s.range_m.get(),
         confusion: confusion(at, &observations, &classes)?,
-        designates: designates(name, at, kinds, &observations)?,
+        designates: designates(name, at, kinds, is_mounted)?,
         distance_confusion: distance_confusion(at, &classes)?,
         observations,
         distance_edges_m: edges,
@@ -89,7 +65,7 @@ fn confusion(
             at.error(class.span(), cause, &nearest(class.get_ref(), &known))
         })?;
         for (row_name, row) in rows.get_ref() {
-            let observation = position(at, row_name, observations)?;
+            let observation = position(at, "row", row_name, observations)?;
             confusion[index][observation] = checked_row(at, row_name, row, observations.len())?;
         }
     }
@@ -139,7 +115,22 @@ fn classes(at: &Located<SensorSection>) -> Result<(Vec<f64>, Vec<String>), Input
         let cause = format!("{} class names for {} edges", names.len(), edges.len());
         return Err(at.error(span, cause, "give one name more than there are edges"));
     }
+    check_class_names(at, &names)?;
     Ok((edges, names))
+}
+
+fn check_class_names(at: &Located<SensorSection>, names: &[String]) -> Result<(), InputError> {
+    let doubled = (1..names.len()).find(|&k| names[..k].contains(&names[k]));
+    let cause = match doubled {
+        _ if names.iter().any(|name| name == "beyond") => {
+            "a class named `beyond`, which means out of range".into()
+        }
+        Some(k) => format!("the class `{}` stands twice", names[k]),
+        None => return Ok(()),
+    };
+    let section = &at.section;
+    let span = section.get_ref().distance_classes.as_ref().map_or(section.span(), Spanned::span);
+    Err(at.error(span, cause, "give each class a name of its own"))
 }
 
 /// Returns rows over the classes. The row `beyond`, for spurious reports, may be left out and then
@@ -156,7 +147,7 @@ fn distance_confusion(
     let mut names = classes.to_vec();
     names.push("beyond".into());
     for (row_name, row) in given.get_ref() {
-        let index = position(at, row_name, &names)?;
+        let index = position(at, "row", row_name, &names)?;
         rows[index] = checked_row(at, row_name, row, n)?;
     }
     if let Some(missing) =
@@ -179,7 +170,7 @@ fn matrix(
 ) -> Result<Vec<Vec<f64>>, InputError> {
     let mut by_index: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
     for (row_name, row) in rows.get_ref() {
-        let index = position(at, row_name, row_names)?;
+        let index = position(at, "row", row_name, row_names)?;
         by_index.insert(index, checked_row(at, row_name, row, columns.len())?);
     }
     let missing = (0..row_names.len()).find(|i| !by_index.contains_key(i));
@@ -196,6 +187,7 @@ fn matrix(
 
 fn position<T>(
     at: &Located<T>,
+    what: &str,
     name: &Spanned<String>,
     names: &[String],
 ) -> Result<usize, InputError> {
@@ -203,7 +195,7 @@ fn position<T>(
         let known: Vec<&str> = names.iter().map(String::as_str).collect();
         at.error(
             name.span(),
-            format!("unknown row `{}`", name.get_ref()),
+            format!("unknown {what} `{}`", name.get_ref()),
             &nearest(name.get_ref(), &known),
         )
     })
@@ -237,40 +229,17 @@ fn designates(
     sensor: &str,
     at: &Located<SensorSection>,
     kinds: &Kinds,
-    observations: &[String],
+    is_mounted: bool,
 ) -> Result<Vec<u8>, InputError> {
-    let own = &at.section.get_ref().designates;
-    for (kind, observation) in own {
-        position(at, observation, observations)?;
-        if !kinds.names.contains(kind.get_ref())
-            && !["wall", "door", "person", "robot"].contains(&kind.get_ref().as_str())
-        {
-            let known: Vec<&str> = kinds.names.iter().skip(1).map(String::as_str).collect();
-            let cause = format!("unknown kind `{}`", kind.get_ref());
-            return Err(at.error(kind.span(), cause, &nearest(kind.get_ref(), &known)));
-        }
+    let section = at.section.get_ref();
+    for observation in section.designates.values() {
+        position(at, "observation", observation, section.observations.get_ref())?;
     }
-    let mut table = vec![0u8];
-    for (k, kind) in kinds.names.iter().enumerate().skip(1) {
-        let chosen = own.iter().find(|(name, _)| name.get_ref() == kind);
-        let observation = chosen.map_or(&kinds.observations[k], |(_, o)| o.get_ref());
-        match observations.iter().position(|o| o == observation) {
-            Some(index) => table.push(index as u8),
-            None if !kinds.used[k] => table.push(0),
-            None => {
-                let cause = format!(
-                    "sensor `{sensor}` has no observation `{observation}` for the kind `{kind}`"
-                );
-                let remedy = format!(
-                    "add it to `observations`, or say what it takes the kind for: \
-                     designates = {{ {kind} = \"nothing\" }}"
-                );
-                let span = at.section.get_ref().observations.span();
-                return Err(at.error(span, cause, &remedy));
-            }
-        }
+    // A profile may name kinds of other scenarios, but not a sensor in use.
+    if is_mounted || kinds.stand_in(at) {
+        kinds.check_designates(at)?;
     }
-    Ok(table)
+    kinds.designated(sensor, at, is_mounted)
 }
 
 /// Checks an effector; `left`, `right` and `stay` are perfect where they are left out.

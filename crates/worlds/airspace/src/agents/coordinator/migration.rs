@@ -108,9 +108,13 @@ impl<'a> Migration<'a> {
     ) -> bool {
         let bytes = bytes_of(state);
         let first = self.sent;
-        let expected = self.hosts[way[0]].expects(way[1]);
-        let tries = self.journey.patience.filter(|_| expected).map_or(1, |patience| patience.tries);
-        let wait = self.journey.patience.map_or(1, |patience| patience.ticks);
+        let is_expected = self.hosts[way[0]].expects(way[1]);
+        let tries = |patience: Patience| match is_expected {
+            true => patience.tries,
+            false => patience.first_tries,
+        };
+        let tries = self.journey.patience.map_or(1, tries);
+        let wait = self.journey.patience.map_or(1, |patience| patience.ticks_for(bytes.len()));
         let mut arrived = None;
         for _ in 0..tries {
             if self.is_late() {

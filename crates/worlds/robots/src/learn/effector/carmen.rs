@@ -7,7 +7,7 @@ use crate::learn::track::{Motion, Pose};
 use sidestep_import::carmen::{CorrectedLog, Scan};
 use sidestep_kernel::InputError;
 use sidestep_kernel::math::{hypot, tan, wrap_angle};
-use sidestep_statistics::Moments;
+use sidestep_statistics::{Moments, percentile};
 
 /// A move with more turn than this is not a move ahead.
 const FORWARD_TURN_MAX_DEG: f64 = 10.0;
@@ -19,6 +19,11 @@ const TURN_MIN_DEG: f64 = 20.0;
 const TURN_PATH_MAX_M: f64 = 0.3;
 /// A shorter step of odometry is too short to show its slip.
 const SLIP_STEP_MIN_M: f64 = 0.03;
+/// A step of odometry as long as this, or a turn as wide, is none: the pose has jumped.
+const JUMP_MIN_M: f64 = 1.0;
+const JUMP_MIN_RAD: f64 = 0.3;
+/// Factor that makes the median absolute deviation of a normal distribution its standard deviation.
+const MAD_TO_SD: f64 = 1.4826;
 /// Real wheels slip sideways by less than 1 % of their way; the particles of a SLAM program, logged
 /// in place of odometry, by 3 % to 13 %.
 const SLIP_SD_MAX: f64 = 0.02;
@@ -43,9 +48,13 @@ pub(super) fn learn(
         return Err(InputError::new(source, cause, "name a corrected log with ODOM messages"));
     }
     let mut report = events.report(source, options);
-    report.lateral_slip = Moments::of(slip_ratios(log));
+    let steps = odometry_steps(log);
+    report.lateral_slip = Moments::of(steps.iter().filter_map(slip_ratio));
     report.lateral_slip_sd = report.lateral_slip.map(|slip| slip.sd);
-    report.warnings.extend(report.lateral_slip_sd.and_then(slip_warning));
+    let whole = steps.iter().filter(|step| !is_jump(step));
+    report.lateral_slip_robust_sd = robust_spread(whole.filter_map(slip_ratio).collect());
+    let spreads = report.lateral_slip_robust_sd.zip(report.lateral_slip_sd);
+    report.warnings.extend(spreads.and_then(|(robust, plain)| slip_warning(robust, plain)));
     let ahead: Vec<&Pair> = pairs.iter().filter(|pair| pair.is_ahead()).collect();
     let of = |value: fn(&&Pair) -> f64| Moments::of(ahead.iter().map(value));
     let moments = [
@@ -97,35 +106,49 @@ impl Pair {
     fn as_turn(&self) -> Option<Turn> {
         let path_m = hypot(self.claimed.ahead_m, self.claimed.left_m);
         let is_turn = self.claimed.turn_rad.abs() >= TURN_MIN_DEG.to_radians();
-        (is_turn && path_m <= TURN_PATH_MAX_M).then_some(Turn {
-            commanded_rad: self.claimed.turn_rad,
-            true_rad: self.corrected.turn_rad,
-            duration_s: Some(self.duration_s),
-        })
+        let (claimed, corrected) = (self.claimed.turn_rad, self.corrected.turn_rad);
+        let turn = Turn::new(claimed, corrected, Some(self.duration_s));
+        (is_turn && path_m <= TURN_PATH_MAX_M).then_some(turn)
     }
 }
 
-/// Returns the sideways motion of each step of odometry as a share of its length, beyond the part
-/// that an arc of the turned angle explains.
-fn slip_ratios(log: &CorrectedLog) -> Vec<f64> {
+/// Returns the steps of odometry, between poses that follow each other.
+fn odometry_steps(log: &CorrectedLog) -> Vec<Motion> {
     let runs = std::iter::once(&log.odometry_before).chain(log.scans.iter().map(|s| &s.odometry));
     let steps = runs.flat_map(|run| run.windows(2));
-    steps
-        .filter_map(|step| slip_ratio(&Pose::from(step[0]).motion_to(&Pose::from(step[1]))))
-        .collect()
+    steps.map(|step| Pose::from(step[0]).motion_to(&Pose::from(step[1]))).collect()
 }
 
+fn is_jump(step: &Motion) -> bool {
+    hypot(step.ahead_m, step.left_m) >= JUMP_MIN_M || step.turn_rad.abs() >= JUMP_MIN_RAD
+}
+
+/// Returns the sideways motion of a step as a share of its length, beyond the part that an arc of
+/// the turned angle explains.
 fn slip_ratio(step: &Motion) -> Option<f64> {
     (step.ahead_m.abs() > SLIP_STEP_MIN_M)
         .then(|| step.left_m / step.ahead_m - tan(step.turn_rad / 2.0))
 }
 
-fn slip_warning(sd: f64) -> Option<String> {
-    (sd > SLIP_SD_MAX).then(|| {
+/// Returns the spread of some values by their median absolute deviation, which up to half of them
+/// being wild changes little.
+fn robust_spread(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    let median = percentile(&values, 0.5)?;
+    let mut deviations: Vec<f64> = values.iter().map(|value| (value - median).abs()).collect();
+    deviations.sort_by(f64::total_cmp);
+    percentile(&deviations, 0.5).map(|deviation| MAD_TO_SD * deviation)
+}
+
+fn slip_warning(robust: f64, plain: f64) -> Option<String> {
+    (robust > SLIP_SD_MAX).then(|| {
         format!(
-            "odometry slips sideways by {:.1} % of each step (wheels: under 1 %): its poses look \
-             like the samples of a SLAM program, whose noise would be learned instead of the robot's",
-            100.0 * sd
+            "odometry slips sideways by {:.1} % of each step (1.4826 times the median absolute \
+             deviation, of steps below 1 m and 0.3 rad; {:.1} % by the standard deviation of all; \
+             wheels: under 1 %): its poses look like the samples of a SLAM program, whose noise would \
+             be learned instead of the robot's",
+            100.0 * robust,
+            100.0 * plain
         )
     })
 }
@@ -168,17 +191,42 @@ mod tests {
         assert_eq!((arc.unwrap().as_move(), arc.unwrap().as_turn()), (None, None));
     }
 
-    #[test]
-    fn odometry_that_slips_sideways_is_warned_of() {
-        let zigzag = |slip: f64| {
-            let step = |i: u32| [f64::from(i), if i.is_multiple_of(2) { 0.0 } else { slip }, 0.0];
-            let odometry: Vec<[f64; 3]> = (0..20).map(step).collect();
-            log(vec![scan(0.0, [0.0; 3], &odometry), scan(1.0, [19.0, 0.0, 0.0], &[])])
+    /// Steps of half a meter that slip to either side by up to 1.6 times a share of that.
+    fn slipping(slip: f64) -> Vec<[f64; 3]> {
+        let mut aside_m = 0.0;
+        let pose = |i: u32| {
+            let pose = [0.5 * f64::from(i), aside_m, 0.0];
+            aside_m += 0.5 * slip * 1.6 * (0.5 * f64::from(i % 5) - 1.0);
+            pose
         };
-        let warnings =
-            |slip| learn("f", &zigzag(slip), &EstimateOptions::default()).unwrap().report.warnings;
-        assert!(warnings(0.03)[0].contains("slips sideways by 3."));
+        (0..40).map(pose).collect()
+    }
+
+    fn learned(odometry: &[[f64; 3]]) -> EffectorModel {
+        let scans = vec![scan(0.0, [0.0; 3], odometry), scan(1.0, [19.0, 0.0, 0.0], &[])];
+        learn("f", &log(scans), &EstimateOptions::default()).unwrap()
+    }
+
+    #[test]
+    fn odometry_that_slips_sideways_is_warned_of_with_both_figures() {
+        let warnings = |slip| learned(&slipping(slip)).report.warnings;
+        assert!(warnings(0.03)[0].contains("slips sideways by 3.6 %"), "{:?}", warnings(0.03));
+        assert!(warnings(0.03)[0].contains("3.4 % by the standard deviation of all"));
         assert_eq!(warnings(0.01), Vec::<String>::new());
+    }
+
+    #[test]
+    fn a_good_log_in_which_a_few_poses_jump_is_not_warned_of() {
+        let mut odometry = slipping(0.005);
+        // A step of 5 m aside and back, one of 0.4 m that also turns, and a wild one of 0.6 m.
+        odometry[10][1] += 5.0;
+        odometry[20][2] = 0.4;
+        odometry[30][1] += 0.3;
+        let report = learned(&odometry).report;
+        let (robust, plain) =
+            (report.lateral_slip_robust_sd.unwrap(), report.lateral_slip_sd.unwrap());
+        assert!(robust < 0.01 && plain > 0.5, "{robust} {plain}");
+        assert_eq!(report.warnings, Vec::<String>::new());
     }
 
     #[test]

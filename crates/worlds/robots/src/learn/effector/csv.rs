@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::EffectorModel;
-use super::events::{Events, Move, Turn};
+use super::events::{Events, Move, Turn, nearest_turn};
 use super::phase::{FORWARD_CLASSES, Outcome, forward_class, outcomes};
 use super::report::{EffectorReport, ForwardShares};
 use super::transitions::{EffectorProfile, Transition, exact, from_outcomes, intended, label};
@@ -47,18 +47,14 @@ impl Displacement {
         Move {
             ahead_boxes: self.ahead_boxes,
             left_boxes: self.left_boxes,
-            turn_error_rad: self.turn_deg.to_radians(),
+            turn_error_rad: nearest_turn(0.0, self.turn_deg.to_radians()),
             duration_s: None,
         }
     }
 
     fn as_turn(&self) -> Turn {
         let commanded_deg = f64::from(90 * intended(ACTIONS[self.action]).quarters);
-        Turn {
-            commanded_rad: commanded_deg.to_radians(),
-            true_rad: self.turn_deg.to_radians(),
-            duration_s: None,
-        }
+        Turn::new(commanded_deg.to_radians(), self.turn_deg.to_radians(), None)
     }
 }
 
@@ -320,6 +316,19 @@ mod tests {
         assert_eq!((report.events, report.rejected["contact"]), (1, 1));
         assert!(report.warnings[0].contains("learn in the open"));
         assert_eq!(report.actions["left"]["turn -90"], 2.0, "270 degrees to the left end alike");
+    }
+
+    #[test]
+    fn a_turn_that_overshoots_has_the_same_moments_on_both_sides() {
+        let turns = |rows: &str| learned(rows, 0.0).unwrap().report.turns.unwrap();
+        // A recording calls two quarters 180 degrees, whichever way they were turned.
+        let (left, right) = (turns("left,0,0,180\n"), turns("right,0,0,180\n"));
+        assert_eq!(left.error_deg_along_turn.map(|m| m.mean.round()), Some(90.0));
+        assert_eq!(right.error_deg_along_turn, left.error_deg_along_turn);
+        assert_eq!(right.true_over_commanded, left.true_over_commanded);
+        assert_eq!(right.hist_15deg, left.hist_15deg);
+        let astray = learned("forward,1,0,270\n", 0.0).unwrap().report.moments;
+        assert!((astray["dtheta_minus_cmd_rad"].mean + std::f64::consts::FRAC_PI_2).abs() < 1e-12);
     }
 
     #[test]

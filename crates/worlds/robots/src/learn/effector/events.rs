@@ -1,6 +1,7 @@
 //! Measured moves and turns, from any kind of log, and their counts.
 
 use std::collections::BTreeMap;
+use std::f64::consts::{PI, TAU};
 
 use super::phase::{FORWARD_CLASSES, average, forward_class, outcomes, rounded};
 use super::report::{EffectorReport, ForwardShares, TurnReport};
@@ -30,6 +31,11 @@ pub(super) struct Turn {
 }
 
 impl Turn {
+    /// Creates a turn; see [`nearest_turn`].
+    pub(super) fn new(commanded_rad: f64, true_rad: f64, duration_s: Option<f64>) -> Self {
+        Self { commanded_rad, true_rad: nearest_turn(commanded_rad, true_rad), duration_s }
+    }
+
     fn ratio(&self) -> f64 {
         self.true_rad / self.commanded_rad
     }
@@ -45,6 +51,17 @@ impl Turn {
 
     fn is_left(&self) -> bool {
         self.commanded_rad > 0.0
+    }
+}
+
+/// Returns, of all turns that end like `true_rad`, the one nearest to the command. A log knows
+/// headings only: a commanded turn of -90 degrees that ends at 180 has overshot.
+pub(super) fn nearest_turn(commanded_rad: f64, true_rad: f64) -> f64 {
+    let error_rad = true_rad - commanded_rad;
+    // Half a turn off is ambiguous, so the log's own sign stays.
+    match error_rad.abs() <= PI + 1e-9 {
+        true => true_rad,
+        false => true_rad - TAU * error_rad.signum(),
     }
 }
 
@@ -242,6 +259,14 @@ mod tests {
         assert_eq!(p, [(90, 0.75), (0, 0.125), (180, 0.125)]);
         assert_eq!(profile.action("right").unwrap()[0].turn_deg, -90);
         assert_eq!(profile.assumed, ["right: mirrored from turns to the other side"]);
+    }
+
+    #[test]
+    fn a_wide_turn_that_overshoots_past_half_a_turn_has_not_turned_back() {
+        // 170 degrees were commanded; 190 were made, which a heading shows as -170.
+        let turn = Turn::new(170_f64.to_radians(), (-170_f64).to_radians(), None);
+        assert!((turn.error_deg() - 20.0).abs() < 1e-9);
+        assert_eq!(Turn::new(1.0, -1.0, None).true_rad, -1.0, "it may have turned the other way");
     }
 
     #[test]

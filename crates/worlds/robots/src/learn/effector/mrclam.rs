@@ -149,11 +149,7 @@ fn turns(robot: &RobotLog) -> Vec<Turn> {
 
 fn as_turn(window: &Window, robot: &RobotLog, end_secs: f64) -> Option<Turn> {
     let motion = window.motion(robot, end_secs)?;
-    Some(Turn {
-        commanded_rad: window.turn_rad,
-        true_rad: motion.turn_rad,
-        duration_s: Some(end_secs - window.start_secs),
-    })
+    Some(Turn::new(window.turn_rad, motion.turn_rad, Some(end_secs - window.start_secs)))
 }
 
 #[cfg(test)]

@@ -40,7 +40,10 @@ pub struct EffectorReport {
     pub actions: BTreeMap<String, BTreeMap<String, f64>>,
     /// Lateral slip of odometry per step as a share of its length: standard deviation.
     pub lateral_slip_sd: Option<f64>,
-    /// The same in full.
+    /// The same as a robust spread, to which poses that jump add nothing: 1.4826 times the median
+    /// absolute deviation, of the steps that odometry can make.
+    pub lateral_slip_robust_sd: Option<f64>,
+    /// The slip of all steps in full.
     pub lateral_slip: Option<Moments>,
     /// Every estimated probability with its count and interval.
     pub probabilities: Vec<Estimate>,
@@ -113,6 +116,10 @@ impl fmt::Display for EffectorReport {
         }
         display::warnings(f, &self.warnings)?;
         display::moments(f, &self.named_moments())?;
+        if let (Some(robust), Some(plain)) = (self.lateral_slip_robust_sd, self.lateral_slip_sd) {
+            let [robust, plain] = [100.0 * robust, 100.0 * plain];
+            writeln!(f, "lateral slip: {robust:.2} % robust, {plain:.2} % with all that jump")?;
+        }
         let heading = Heading { row: "action", column: "outcome" };
         display::estimates(f, &self.probabilities, &heading)?;
         display::thin(f, &self.thin, self.estimate.thin_below)?;

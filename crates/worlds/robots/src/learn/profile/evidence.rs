@@ -48,6 +48,9 @@ pub(super) fn of_effector(model: &EffectorModel) -> Table {
     if let Some(sd) = report.lateral_slip_sd {
         table["lateral_slip_sd"] = value(significant(sd));
     }
+    if let Some(sd) = report.lateral_slip_robust_sd {
+        table["lateral_slip_robust_sd"] = value(significant(sd));
+    }
     let certainty = Certainty {
         options: &report.estimate,
         assumed: &model.profile.assumed,

@@ -59,7 +59,7 @@ impl Compiler<'_> {
             let size = self.types[usize::from(ty)].size;
             let (at, span) = match group.places.get(k) {
                 Some(place) => (self.given_place(place, id, size)?, place.span()),
-                None => (self.drawn_place(group, id, size)?, group.span.clone()),
+                None => (self.drawn_place(group, k, id, size)?, group.span.clone()),
             };
             let facing = group.places.get(k).and_then(|place| place.get_ref().facing);
             let facing = facing.unwrap_or_else(|| {
@@ -92,13 +92,18 @@ impl Compiler<'_> {
     fn drawn_place(
         &mut self,
         group: &Group,
+        k: usize,
         id: EntityId,
         size: (u32, u32),
     ) -> Result<(u32, u32), InputError> {
         let region = group.region.unwrap_or_else(|| self.floor.region());
         self.floor.draw_place(&self.streams, id, size, region).ok_or_else(|| {
             let (width, height) = size;
-            let cause = format!("no free place is left for body {id} of {width} x {height} boxes");
+            let cause = format!(
+                "no free place is left for number {} of these {} bodies of {width} x {height} boxes",
+                k + 1,
+                group.count,
+            );
             let remedy = "give fewer or smaller bodies, or a larger map or region";
             self.source.error(group.span.clone(), cause, remedy)
         })
@@ -118,7 +123,11 @@ impl Compiler<'_> {
                 format!("{body} leaves the map of {width} x {height} boxes")
             }
             Obstacle::Wall(c, r) => format!("{body} stands in the wall at [{c}, {r}]"),
-            Obstacle::Body(id, c, r) => format!("{body} stands on body {id} at [{c}, {r}]"),
+            Obstacle::Body(id, c, r) => {
+                let other = self.source.error(self.spans[id as usize].clone(), "", "").position();
+                let line = other.map_or(String::new(), |(line, _)| format!(" (line {line})"));
+                format!("{body} stands on body {id}{line} at [{c}, {r}]")
+            }
         };
         let remedy = "place it in free boxes; `sidestep map FILE --box B` shows them";
         self.source.error(span, cause, remedy)
@@ -169,7 +178,7 @@ impl Compiler<'_> {
     ) -> Result<BodyType, InputError> {
         let own = own_boxes(size, self.stride());
         let marks = matches!(role, Role::Robot(_));
-        Ok(BodyType { kind: self.kind(kind)?, size, own, marks, actions, role })
+        Ok(BodyType { kind: self.kinds.number(kind)?, size, own, marks, actions, role })
     }
 
     pub(super) fn region(

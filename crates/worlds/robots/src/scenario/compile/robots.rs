@@ -1,7 +1,8 @@
 //! Robot sections: bodies with sensors and effectors, and behaviors.
 
-use super::super::Placing;
+use super::super::{AvoidanceSection, Placing};
 use super::bodies::{Group, TypeOf, cycles_of};
+use super::idle::BEHAVIOURS;
 use super::random::Wrong;
 use super::*;
 
@@ -48,11 +49,21 @@ impl Compiler<'_> {
         }
         let size = side(s);
         let body = Arc::new(self.robot_body(s, size)?);
-        let free = FreeSpace::of_map(&self.map);
+        let free = Arc::new(FreeSpace::of_map(&self.map));
+        let avoidance = self.avoidance(None, &free, size, &body);
         let (mut places, mut types) = (Vec::new(), Vec::new());
+        let place = self.source.path(scen.get_ref()).display().to_string();
         for row in &rows[..count] {
+            row.check_against(&place, &self.map)?;
             let goals = vec![Arc::new(FlowField::towards(&free, size, &[row.goal]))];
-            let behaviour: Arc<dyn Behaviour> = Arc::new(Goto { goals, repeat: false });
+            let avoidance = avoidance.clone();
+            if !goals[0].is_goal(row.goal.0, row.goal.1) {
+                let cause =
+                    format!("a robot of {size} x {size} boxes does not fit at {:?}", row.goal);
+                let remedy = "give smaller robots, or another list";
+                return Err(InputError::new(&place, cause, remedy).at(row.line, 1));
+            }
+            let behaviour: Arc<dyn Behaviour> = Arc::new(Goto { goals, repeat: false, avoidance });
             let model = RobotModel { body: Arc::clone(&body), behaviour };
             let actions = Arc::clone(&body.actions);
             let ty = self.body_type(&s.kind, (size, size), actions, Role::Robot(model))?;
@@ -106,26 +117,7 @@ impl Compiler<'_> {
 
     fn sensor_model(&self, name: &Spanned<String>) -> Result<SensorModel, InputError> {
         let section = self.lookup(&self.sensors, name, "sensor")?;
-        let mut used = vec![false; self.kinds.len()];
-        used[1] = true;
-        let people = self.file.people.0.iter().map(|p| &p.get_ref().kind);
-        let doors = self.file.doors.0.iter().map(|d| &d.get_ref().kind);
-        for kind in people.chain(doors) {
-            used[usize::from(self.kind(kind)?)] = true;
-        }
-        used[usize::from(self.kind(&super::super::robot_kind())?)] = true;
-        let kinds = Kinds { names: self.kinds.clone(), observations: self.observations(), used };
-        tables::sensor(name.get_ref(), section, &kinds)
-    }
-
-    /// Returns the observation that each kind designates: its own name unless the file says
-    /// otherwise.
-    fn observations(&self) -> Vec<String> {
-        let own = |kind: &String| {
-            let section = self.file.kinds.iter().find(|(name, _)| name.get_ref() == kind);
-            section.and_then(|(_, s)| s.observation.clone()).unwrap_or_else(|| kind.clone())
-        };
-        self.kinds.iter().map(own).collect()
+        tables::sensor(name.get_ref(), section, &self.kinds, true)
     }
 
     fn effector(&self, name: Option<&Spanned<String>>) -> Result<EffectorModel, InputError> {
@@ -153,26 +145,32 @@ impl Compiler<'_> {
         size: u32,
         body: &RobotBody,
     ) -> Result<Arc<dyn Behaviour>, InputError> {
-        let Some(section) = section else { return Ok(Arc::new(Wander::default())) };
+        let Some(section) = section else {
+            let wander = Arc::new(Wander::default());
+            let is_waiting = self.has_no_contacts(body);
+            return Ok(if is_waiting { Arc::new(Patient { inner: wander }) } else { wander });
+        };
         let s = section.get_ref();
         let error = |wrong: Wrong| self.source.error(section.span(), wrong.0, wrong.1);
-        let ways = Ways { compiler: self, size, span: section.span() };
+        let free = Arc::new(FreeSpace::of_map(&self.map));
+        let ways = Ways { compiler: self, free: &free, size, span: section.span() };
+        let avoidance = || self.avoidance(s.avoidance, &free, size, body);
         let actions = &body.effector.actions;
-        Ok(match s.kind.as_str() {
-            "wander" => Arc::new(Wander {
-                turn_every: s.turn_every.unwrap_or(Wander::default().turn_every).max(1),
-            }),
+        let behaviour: Arc<dyn Behaviour> = match s.kind.as_str() {
+            "wander" => Arc::new(wander(s)),
+            "announce" => Arc::new(Announce { wander: wander(s), size }),
             "shuttle" => {
                 let end = |given: Option<[u32; 4]>, key: &str| {
                     ways.to(needed(s, key, given, "[col, row, width, height]").map_err(error)?)
                 };
-                Arc::new(Shuttle { ends: [end(s.a, "a")?, end(s.b, "b")?] })
+                Arc::new(Shuttle { ends: [end(s.a, "a")?, end(s.b, "b")?], avoidance: avoidance() })
             }
             "goto" => {
                 let goals = needed(s, "goals", s.goals.as_ref(), "[[col, row], ...]");
                 let goals = goals.map_err(error)?.iter().map(|&(c, r)| ways.to([c, r, 1, 1]));
                 let goals = goals.collect::<Result<_, _>>()?;
-                Arc::new(Goto { goals, repeat: s.repeat.unwrap_or(false) })
+                let repeat = s.repeat.unwrap_or(false);
+                Arc::new(Goto { goals, repeat, avoidance: avoidance() })
             }
             "replay" => Arc::new(replay(s, actions).map_err(error)?),
             "random" => Arc::new(random::behaviour(s, actions).map_err(error)?),
@@ -181,22 +179,51 @@ impl Compiler<'_> {
                 Some(own) => Arc::clone(own),
                 None => return Err(error(self.unknown_behaviour(other))),
             },
-        })
+        };
+        let waits = ["wander", "shuttle", "goto", "random"].contains(&s.kind.as_str());
+        let is_waiting = waits && !behaviour.asks() && self.has_no_contacts(body);
+        Ok(if is_waiting { Arc::new(Patient { inner: behaviour }) } else { behaviour })
+    }
+
+    /// Returns whether a step that is blocked may do nothing, without a contact. Behaviors that turn
+    /// on contact then need another way to notice it.
+    fn has_no_contacts(&self, body: &RobotBody) -> bool {
+        let reliable = self.file.regime.reliable_effectors();
+        let may_stay = |t: &Transition| t.p > 0.0 && t.path.is_empty();
+        self.file.obstacle_rule == ObstacleRule::Renormalise
+            && body.effector.transitions_of(FORWARD, reliable).iter().any(may_stay)
+    }
+
+    fn avoidance(
+        &self,
+        section: Option<AvoidanceSection>,
+        free: &Arc<FreeSpace>,
+        size: u32,
+        body: &RobotBody,
+    ) -> Avoidance {
+        match section.unwrap_or_default() {
+            AvoidanceSection::Plan => {
+                let (free, box_size_m) = (Arc::clone(free), self.map.box_size_m);
+                let wheels_err = !self.file.regime.reliable_effectors() && body.effector.errs();
+                Avoidance::Plan(Arc::new(Planner::new(free, size, body, box_size_m, wheels_err)))
+            }
+            AvoidanceSection::Avoid => Avoidance::Sidestep(Trust::OneBeam),
+            AvoidanceSection::Filter => Avoidance::Sidestep(Trust::TwoReports),
+            AvoidanceSection::Touch => Avoidance::Touch,
+        }
     }
 
     fn unknown_behaviour(&self, name: &str) -> Wrong {
         let own = self.own.keys().map(String::as_str);
-        let known: Vec<&str> = BEHAVIOURS.into_iter().chain(own).collect();
+        let known: Vec<&str> = BEHAVIOURS.iter().map(|(name, _)| *name).chain(own).collect();
         (format!("unknown behaviour `{name}`"), nearest(name, &known))
     }
 }
 
-/// Names of the built-in behaviors.
-const BEHAVIOURS: [&str; 6] = ["wander", "shuttle", "goto", "replay", "random", "external"];
-
 /// Ways for robots of one size, asked for at one place of the scenario.
 struct Ways<'c, 'a> {
     compiler: &'c Compiler<'a>,
+    free: &'c FreeSpace,
     size: u32,
     span: Range<usize>,
 }
@@ -209,7 +236,7 @@ impl Ways<'_, '_> {
         let [col, row, width, height] = rect;
         let goals: Vec<_> =
             (row..row + height).flat_map(|r| (col..col + width).map(move |c| (c, r))).collect();
-        let field = FlowField::towards(&FreeSpace::of_map(&compiler.map), size, &goals);
+        let field = FlowField::towards(self.free, size, &goals);
         if goals.iter().any(|&(c, r)| field.is_goal(c, r)) {
             return Ok(Arc::new(field));
         }
@@ -225,6 +252,10 @@ fn needed<T>(s: &BehaviourSection, key: &str, given: Option<T>, example: &str) -
     given.ok_or_else(|| {
         (format!("behaviour `{}` needs `{key}`", s.kind), format!("add {key} = {example}"))
     })
+}
+
+fn wander(s: &BehaviourSection) -> Wander {
+    Wander { turn_every: s.turn_every.unwrap_or(Wander::default().turn_every).max(1) }
 }
 
 fn replay(s: &BehaviourSection, actions: &[String]) -> Result<Replay, Wrong> {

@@ -1,0 +1,134 @@
+//! A request to leave a cycle half done.
+//!
+//! A run stops in good order between two cycles. But one cycle of many airplanes may take minutes,
+//! and nobody who asks a run to end waits for them. So long computations look at an [`Interrupt`]
+//! again and again ([`look`]), and when it is raised they unwind. The half-done state is lost; a
+//! recorded run continues from its last checkpoint, as after a kill.
+//!
+//! The engine attaches the interrupt of a run to the threads of its workers for the time of a call, so
+//! that loops deep inside a world need not be handed it. Nothing else is attached to threads, for no
+//! result depends on an interrupt: a cycle is either done, or there is no state after it.
+
+use std::any::Any;
+use std::cell::RefCell;
+use std::panic::resume_unwind;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
+
+/// A flag that one thread raises and all workers of a run look at; clones share it.
+#[derive(Debug, Clone, Default)]
+pub struct Interrupt(Arc<Shared>);
+
+#[derive(Debug, Default)]
+struct Shared {
+    is_raised: AtomicBool,
+    looks: AtomicU64,
+}
+
+/// The payload of the unwinding after a look at a raised interrupt.
+#[derive(Debug)]
+struct Interrupted;
+
+/// The payload of the unwinding of a worker whose team has lost another worker.
+#[derive(Debug)]
+struct Deserted;
+
+thread_local! {
+    /// The interrupt that the present computation of this thread heeds.
+    static HEEDED: RefCell<Option<Interrupt>> = const { RefCell::new(None) };
+}
+
+/// Looks at the interrupt that this thread heeds, if it heeds any. A computation calls it at least
+/// once in some milliseconds of work, however deep inside it is.
+///
+/// # Panics
+/// When that interrupt is raised. The unwinding prints nothing; [`Interrupt::explains`] tells it
+/// from that of a bug.
+#[inline]
+pub fn look() {
+    let is_raised = HEEDED.with_borrow(|heeded| heeded.as_ref().is_some_and(Interrupt::seen));
+    if is_raised {
+        resume_unwind(Box::new(Interrupted));
+    }
+}
+
+impl Interrupt {
+    /// Asks for the end of the work at the next look.
+    pub fn raise(&self) {
+        self.0.is_raised.store(true, Relaxed);
+    }
+
+    /// Lets this thread heed the interrupt until the answer is dropped.
+    pub fn heeded_here(&self) -> Heeded {
+        Heeded { before: HEEDED.replace(Some(self.clone())) }
+    }
+
+    fn seen(&self) -> bool {
+        self.0.looks.fetch_add(1, Relaxed);
+        self.0.is_raised.load(Relaxed)
+    }
+
+    /// Number of looks so far, for tests of how often a computation looks.
+    pub fn looks(&self) -> u64 {
+        self.0.looks.load(Relaxed)
+    }
+
+    /// Returns whether a caught unwinding came from a look at this interrupt, rather than from a
+    /// bug.
+    pub fn explains(&self, payload: &(dyn Any + Send)) -> bool {
+        let is_raised = self.0.is_raised.load(Relaxed);
+        is_raised && (payload.is::<Interrupted>() || payload.is::<Deserted>())
+    }
+}
+
+/// A while in which a thread heeds an interrupt.
+#[derive(Debug)]
+pub struct Heeded {
+    before: Option<Interrupt>,
+}
+
+impl Drop for Heeded {
+    fn drop(&mut self) {
+        HEEDED.set(self.before.take());
+    }
+}
+
+/// Unwinds a worker that would wait for another one for ever, without a message: the other one has
+/// printed the reason, if there is anything to print.
+pub(crate) fn desert() -> ! {
+    resume_unwind(Box::new(Deserted))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::workers;
+    use std::panic::{AssertUnwindSafe, catch_unwind};
+
+    #[test]
+    fn a_raised_interrupt_ends_all_workers_and_is_told_from_a_bug() {
+        let caught = |raises: bool, workers: usize| {
+            let interrupt = Interrupt::default();
+            let work = |worker: &workers::Worker<'_>, (): &mut ()| {
+                let _heeded = interrupt.heeded_here();
+                look();
+                if worker.index() + 1 == workers && raises {
+                    interrupt.raise();
+                    look();
+                }
+                assert!(worker.index() + 1 < workers, "a bug");
+                worker.barrier();
+            };
+            let run = || workers::run(&mut vec![(); workers], work);
+            let payload = catch_unwind(AssertUnwindSafe(run)).expect_err("it unwinds");
+            assert!(interrupt.looks() >= u64::from(raises));
+            interrupt.explains(payload.as_ref())
+        };
+        for workers in [1, 3] {
+            assert!(caught(true, workers));
+            assert!(!caught(false, workers));
+        }
+        // Nothing is heeded any more.
+        look();
+    }
+}

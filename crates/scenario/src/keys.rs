@@ -1,0 +1,130 @@
+//! Where the keys of a scenario stand, for errors about keys that were read long ago.
+//!
+//! A key is named as overrides name it, `robots.1.count`: elements of arrays by their number, and
+//! a section that stands alone by 0 or without a number.
+
+use crate::Source;
+use sidestep_kernel::InputError;
+use std::ops::Range;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// A key of a table.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Key {
+    /// The key itself.
+    pub name: String,
+    /// Its place in the text.
+    pub span: Range<usize>,
+}
+
+impl Source {
+    /// Returns the keys of a table, in the order of the text; none where there is no such table.
+    pub fn keys(&self, path: &str) -> Vec<Key> {
+        let Ok(root) = DeTable::parse(&self.text) else { return Vec::new() };
+        let (span, root) = (root.span(), DeValue::Table(root.into_inner()));
+        let found = find(&Spanned::new(span, root), path).map(|(_, value)| keys_of(value));
+        let mut keys = found.unwrap_or_default();
+        keys.sort_by_key(|key| key.span.start);
+        keys
+    }
+
+    /// Creates an error at a key; without a position where the key is not in the text.
+    pub fn error_at(
+        &self,
+        path: &str,
+        cause: impl Into<String>,
+        remedy: impl Into<String>,
+    ) -> InputError {
+        let span = DeTable::parse(&self.text).ok().and_then(|root| {
+            let (span, root) = (root.span(), DeValue::Table(root.into_inner()));
+            find(&Spanned::new(span, root), path).map(|(key, _)| key)
+        });
+        self.error(span, cause, remedy)
+    }
+
+    /// Creates the error for a key that is given and does nothing; `because` completes the
+    /// sentence "`key` does nothing ...".
+    pub fn idle(&self, path: &str, because: &str) -> InputError {
+        let key = path.rsplit('.').next().unwrap_or(path);
+        self.error_at(path, format!("`{key}` does nothing {because}"), "leave it out")
+    }
+}
+
+fn keys_of(value: &Spanned<DeValue<'_>>) -> Vec<Key> {
+    let keys = value.get_ref().as_table().into_iter().flat_map(|table| table.keys());
+    keys.map(|key| Key { name: key.get_ref().to_string(), span: key.span() }).collect()
+}
+
+/// Returns the place of a key (of an element of an array, its own) and its value.
+fn find<'t, 'i>(
+    root: &'t Spanned<DeValue<'i>>,
+    path: &str,
+) -> Option<(Range<usize>, &'t Spanned<DeValue<'i>>)> {
+    let mut found = (root.span(), root);
+    for part in path.split('.') {
+        found = step(found, part)?;
+    }
+    Some(found)
+}
+
+fn step<'t, 'i>(
+    (span, value): (Range<usize>, &'t Spanned<DeValue<'i>>),
+    part: &str,
+) -> Option<(Range<usize>, &'t Spanned<DeValue<'i>>)> {
+    match (value.get_ref(), part.parse::<usize>()) {
+        (DeValue::Array(many), Ok(index)) => many.get(index).map(|value| (value.span(), value)),
+        // An array of one may be passed without a number, as in overrides.
+        (DeValue::Array(many), Err(_)) if many.len() == 1 => {
+            let only = many.get(0)?;
+            step((only.span(), only), part)
+        }
+        (DeValue::Table(_), Ok(0)) => Some((span, value)),
+        (DeValue::Table(table), _) => {
+            let (key, value) = table.iter().find(|(key, _)| *key.get_ref() == part)?;
+            Some((key.span(), value))
+        }
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str =
+        "a = 1\n[[robots]]\ncount = 2\n[[robots]]\nat = [[1, 2]]\nb = { c = 3 }\n[people]\nn = 1\n";
+
+    fn position(path: &str) -> Option<(usize, usize)> {
+        Source::new("s.toml", TEXT, "").error_at(path, "c", "r").position()
+    }
+
+    #[test]
+    fn keys_are_found_as_overrides_name_them() {
+        assert_eq!(position("a"), Some((1, 1)));
+        assert_eq!(position("robots.1.at"), Some((5, 1)));
+        assert_eq!(position("robots.1.b.c"), Some((6, 7)));
+        assert_eq!((position("people.n"), position("people.0.n")), (Some((8, 1)), Some((8, 1))));
+        assert_eq!(
+            (position("robots.2.at"), position("robots.at"), position("z")),
+            (None, None, None)
+        );
+    }
+
+    #[test]
+    fn the_keys_of_a_table_are_told_in_the_order_of_the_text() {
+        let source = Source::new("s.toml", "[t]\nz = 1\nb = 2\n", "");
+        let names: Vec<String> = source.keys("t").into_iter().map(|key| key.name).collect();
+        assert_eq!(names, ["z", "b"]);
+        assert_eq!((source.keys("t.z"), source.keys("u")), (vec![], vec![]));
+    }
+
+    #[test]
+    fn an_idle_key_is_refused_where_it_stands() {
+        let error = Source::new("s.toml", TEXT, "").idle("robots.1.at", "beside `scen`");
+        assert_eq!(
+            (error.position(), error.cause()),
+            (Some((5, 1)), "`at` does nothing beside `scen`")
+        );
+    }
+}

@@ -1,0 +1,46 @@
+//! Remarks on valid scenarios: what will surprise their author.
+
+use serde::Serialize;
+
+/// How much a remark matters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Severity {
+    /// The run will hardly be the one that its author wants.
+    Warning,
+    /// The run is all right, but may differ from what its author expects.
+    Note,
+}
+
+impl Severity {
+    /// Returns its name, as in JSON.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Warning => "warning",
+            Self::Note => "note",
+        }
+    }
+}
+
+/// A remark on a valid scenario.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Remark {
+    /// How much it matters.
+    pub severity: Severity,
+    /// The key that it is about, as overrides name it: `robots.0.effector`.
+    pub key: String,
+    /// One sentence, or a cause and a remedy: `it does so: do that`.
+    pub words: String,
+}
+
+impl Remark {
+    /// Creates a warning.
+    pub fn warning(key: impl Into<String>, words: impl Into<String>) -> Self {
+        Self { severity: Severity::Warning, key: key.into(), words: words.into() }
+    }
+
+    /// Creates a note.
+    pub fn note(key: impl Into<String>, words: impl Into<String>) -> Self {
+        Self { severity: Severity::Note, key: key.into(), words: words.into() }
+    }
+}

@@ -1,0 +1,125 @@
+//! Ways that keep clear of intruders, as far as there are any.
+//!
+//! Nobody knows where an intruder wants to go, so no orbit is safe from it for ever, and the
+//! invariant of the shield is about all others. What is promised beside it: **an airplane that
+//! loses separation from an intruder is named with it before.** Within `dt` the intruder stays in a
+//! circle that grows at its greatest speed `s`. A way is *clear* if at each moment `t` of `dt` the
+//! airplane is farther than `R + s t` from where the intruder is at its start, and farther by the
+//! bounds on errors. On a clear way there is no loss in this `dt`, whatever the intruder does. If
+//! the way that is flown in the end is not clear, the pair is named until it is again.
+//!
+//! To seldom come to that, an airplane prefers ways that would stay clear for as long as it takes to
+//! turn back, if it flew straight on after `dt`, and the intruder all the time.
+
+use crate::flight::{Point, Pose, distance_m};
+use crate::intruder::Intruder;
+use crate::shield::{Flyer, Way, apart_for};
+use std::f64::consts::PI;
+
+/// How well a way keeps clear of all intruders.
+#[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
+struct Merit {
+    /// Whether no intruder can come too near within `dt`.
+    is_clear: bool,
+    /// Meters beyond the distance wanted, at the closest; at most 0.
+    spare_m: f64,
+}
+
+/// An airplane among intruders.
+pub(super) struct Beset<'a> {
+    flyer: &'a Flyer,
+    /// Intruders on its levels.
+    intruders: Vec<&'a Intruder>,
+    dtau_s: f64,
+}
+
+impl<'a> Beset<'a> {
+    pub(super) fn new(flyer: &'a Flyer, all: &'a [Intruder], dtau_s: f64) -> Self {
+        let minds = |one: &&Intruder| one.levels.meets(&flyer.levels, flyer.vertical_m);
+        Self { flyer, intruders: all.iter().filter(minds).collect(), dtau_s }
+    }
+
+    /// Returns the ways that an airplane may fly, by their places in `wishes`: those that are better
+    /// than its fallback. Ways without fault keep their order, the others follow by merit.
+    pub(super) fn allowed(&self, wishes: &[Way], fallback: &Way) -> Vec<usize> {
+        if self.intruders.is_empty() {
+            return (0..wishes.len()).collect();
+        }
+        let least = self.merit(fallback);
+        let faultless = Merit { is_clear: true, spare_m: 0.0 };
+        let merits = wishes.iter().map(|way| self.merit(way)).enumerate();
+        let mut better: Vec<(usize, Merit)> =
+            merits.filter(|(_, merit)| *merit == faultless || *merit > least).collect();
+        // A stable sort by falling merit.
+        better.sort_by(|(_, a), (_, b)| b.partial_cmp(a).unwrap_or(std::cmp::Ordering::Equal));
+        better.into_iter().map(|(k, _)| k).collect()
+    }
+
+    /// Returns the intruders that could come too near on a way within `dt`.
+    pub(super) fn reached_by<'b>(
+        &'b self,
+        way: &'b Way,
+    ) -> impl Iterator<Item = &'a Intruder> + 'b {
+        let poses = self.poses(way);
+        self.intruders.iter().copied().filter(move |one| !self.is_clear(&poses, way, one))
+    }
+
+    fn merit(&self, way: &Way) -> Merit {
+        let poses = self.poses(way);
+        let spare_m = self.intruders.iter().map(|one| self.spare_m(&poses, one));
+        Merit {
+            is_clear: self.intruders.iter().all(|one| self.is_clear(&poses, way, one)),
+            spare_m: spare_m.fold(0.0, f64::min),
+        }
+    }
+
+    /// Returns its poses at the start of each step of a way, and at the end.
+    fn poses(&self, way: &Way) -> Vec<Pose> {
+        let mut poses = vec![self.flyer.pose];
+        for &omega in &way.omegas_rad_s {
+            poses.push(poses[poses.len() - 1].step(self.flyer.v_m_s, omega, self.dtau_s));
+        }
+        poses
+    }
+
+    /// Returns the distance in meters that it has to keep from an intruder, as both are seen.
+    fn gap_m(&self, one: &Intruder) -> f64 {
+        self.flyer.separation_m.max(one.separation_m) + self.flyer.error_m + one.error_m
+    }
+
+    fn is_clear(&self, poses: &[Pose], way: &Way, one: &Intruder) -> bool {
+        let Flyer { v_m_s, .. } = *self.flyer;
+        way.omegas_rad_s.iter().zip(poses).enumerate().all(|(k, (&omega, pose))| {
+            let from_s = k as f64 * self.dtau_s;
+            let left_m = |t_s: f64| {
+                distance_m(pose.step(v_m_s, omega, t_s).at, one.at) - one.top_m_s * (from_s + t_s)
+            };
+            apart_for(&left_m, self.dtau_s, v_m_s + one.top_m_s, self.gap_m(one))
+        })
+    }
+
+    /// Returns the meters to spare if it flew straight on after the way, and the intruder all the
+    /// time; at most 0.
+    fn spare_m(&self, poses: &[Pose], one: &Intruder) -> f64 {
+        let steps = poses.len() - 1;
+        let wanted_m = self.gap_m(one) + one.top_m_s * one.dt_s;
+        let nearest_m = |k: usize| distance_m(poses[k].at, one.ahead(k as f64 * self.dtau_s));
+        let during_m = (1..steps).map(nearest_m).fold(f64::INFINITY, f64::min);
+        let end = poses[steps];
+        let ahead = end.step(self.flyer.v_m_s, 0.0, 1.0).at;
+        let [vx, vy] = one.velocity_m_s;
+        let relative = [vx - (ahead[0] - end.at[0]), vy - (ahead[1] - end.at[1])];
+        let place = one.ahead(steps as f64 * self.dtau_s);
+        let from = [place[0] - end.at[0], place[1] - end.at[1]];
+        let after_m = nearest_within(from, relative, PI / self.flyer.orbit_rad_s);
+        (during_m.min(after_m) - wanted_m).min(0.0)
+    }
+}
+
+/// Returns the smallest distance from the origin to a point that moves straight on for some time.
+fn nearest_within(from: Point, velocity: Point, for_s: f64) -> f64 {
+    let speed2 = velocity[0] * velocity[0] + velocity[1] * velocity[1];
+    let toward = -(from[0] * velocity[0] + from[1] * velocity[1]);
+    let at_s = if speed2 > 0.0 { (toward / speed2).clamp(0.0, for_s) } else { 0.0 };
+    distance_m([from[0] + velocity[0] * at_s, from[1] + velocity[1] * at_s], [0.0; 2])
+}

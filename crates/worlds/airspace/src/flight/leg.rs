@@ -1,0 +1,403 @@
+//! Legs: stretches of flight at one turn rate, airspeed and rate of climb, and how near two of them
+//! come.
+//!
+//! The square of the distance of two legs is a smooth function of time, with bounds on how fast its
+//! second derivative changes. Where these show that the first derivative only rises or only falls,
+//! it has at most one zero, which is found to rounding; else the interval is halved. So no approach
+//! is missed, however short. Two straight legs need neither halving nor a second guess: the zero of
+//! a linear function has a closed form.
+
+use super::motion::{Point, Pose, sinc};
+use sidestep_kernel::math;
+
+/// Turn rate in radians per second below which a leg counts as straight: in a whole day it would
+/// turn by less than a tenth of a microradian.
+const STRAIGHT_RAD_S: f64 = 1e-12;
+/// Difference of headings in radians below which they count as the same.
+const SAME_RAD: f64 = 1e-9;
+/// Length in seconds below which an interval is no longer halved.
+const FINEST_S: f64 = 1e-7;
+/// Difference in seconds below which a moment is found.
+const FOUND_S: f64 = 1e-11;
+/// Meters by which two airplanes may seem too near because of rounding.
+const ROUNDED_M: f64 = 1e-6;
+
+/// A stretch of flight at one turn rate, airspeed and rate of climb.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Leg {
+    /// Its start, in seconds.
+    pub from_s: f64,
+    /// Its end, in seconds.
+    pub until_s: f64,
+    /// The pose at its start.
+    pub pose: Pose,
+    /// Cosine and sine of the heading at its start.
+    along: Point,
+    /// Altitude at its start, in meters.
+    pub altitude_m: f64,
+    /// Airspeed in meters per second.
+    pub v_m_s: f64,
+    /// Turn rate in radians per second, positive to the left.
+    pub omega_rad_s: f64,
+    /// Rate of climb in meters per second.
+    pub climb_m_s: f64,
+    /// Velocity of the air, in meters per second.
+    pub drift_m_s: Point,
+}
+
+/// Place, velocity and acceleration at one moment.
+#[derive(Debug, Clone, Copy)]
+struct Motion {
+    at: Point,
+    velocity: Point,
+    acceleration: Point,
+}
+
+impl Leg {
+    /// Returns a level leg in still air.
+    pub fn new(from_s: f64, until_s: f64, pose: Pose, v_m_s: f64, omega_rad_s: f64) -> Self {
+        let omega_rad_s = if omega_rad_s.abs() < STRAIGHT_RAD_S { 0.0 } else { omega_rad_s };
+        let along = [math::cos(pose.heading_rad), math::sin(pose.heading_rad)];
+        let (altitude_m, climb_m_s, drift_m_s) = (0.0, 0.0, [0.0; 2]);
+        Self { from_s, until_s, pose, along, altitude_m, v_m_s, omega_rad_s, climb_m_s, drift_m_s }
+    }
+
+    /// Returns the leg with another altitude and rate of climb.
+    #[must_use]
+    pub fn climbing(self, altitude_m: f64, climb_m_s: f64) -> Self {
+        Self { altitude_m, climb_m_s, ..self }
+    }
+
+    /// Returns the leg in moving air.
+    #[must_use]
+    pub fn in_wind(self, drift_m_s: Point) -> Self {
+        Self { drift_m_s, ..self }
+    }
+
+    /// Returns the altitude at a time, in meters.
+    pub fn altitude_at_m(&self, t_s: f64) -> f64 {
+        self.altitude_m + self.climb_m_s * (t_s - self.from_s)
+    }
+
+    /// Returns the same motion from its start on, with other times.
+    #[must_use]
+    pub fn timed(self, from_s: f64, until_s: f64) -> Self {
+        Self { from_s, until_s, ..self }
+    }
+
+    /// Returns whether a leg that starts at the end of this one continues it without any change.
+    pub fn continues_in(&self, next: &Self) -> bool {
+        let rates = |leg: &Self| (leg.v_m_s, leg.omega_rad_s, leg.climb_m_s, leg.drift_m_s);
+        let turned_rad = self.omega_rad_s * (next.from_s - self.from_s);
+        let off_rad = next.pose.heading_rad - self.pose.heading_rad - turned_rad;
+        rates(self) == rates(next) && math::wrap_angle(off_rad).abs() < SAME_RAD
+    }
+
+    /// Returns the part of the leg from a time on.
+    #[must_use]
+    pub fn rest(&self, from_s: f64) -> Self {
+        let turned_rad = self.omega_rad_s * (from_s - self.from_s);
+        let heading_rad = self.pose.heading_rad + turned_rad;
+        let pose = Pose { at: self.motion(from_s).at, heading_rad };
+        Self::new(from_s, self.until_s.max(from_s), pose, self.v_m_s, self.omega_rad_s)
+            .climbing(self.altitude_at_m(from_s), self.climb_m_s)
+            .in_wind(self.drift_m_s)
+    }
+
+    fn motion(&self, t_s: f64) -> Motion {
+        let s = t_s - self.from_s;
+        let half = 0.5 * self.omega_rad_s * s;
+        let (cos, sin) = match self.omega_rad_s {
+            0.0 => (1.0, 0.0),
+            _ => (math::cos(half), math::sin(half)),
+        };
+        let turned = |[x, y]: Point| [x * cos - y * sin, x * sin + y * cos];
+        let middle = turned(self.along);
+        let ahead = turned(middle);
+        let chord_m = self.v_m_s * s * sinc(half);
+        let ([wx, wy], [x, y], pull) =
+            (self.drift_m_s, self.pose.at, self.v_m_s * self.omega_rad_s);
+        Motion {
+            at: [x + wx * s + chord_m * middle[0], y + wy * s + chord_m * middle[1]],
+            velocity: [wx + self.v_m_s * ahead[0], wy + self.v_m_s * ahead[1]],
+            acceleration: [-pull * ahead[1], pull * ahead[0]],
+        }
+    }
+}
+
+/// The approach of two airplanes on their legs, up to some moment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Approach {
+    /// Closest approach in meters; infinite if they were never on one level.
+    pub nearest_m: f64,
+    /// Seconds that they were nearer than their separation.
+    pub lost_s: f64,
+    /// Number of times that they came nearer than their separation.
+    pub losses: u32,
+    /// End of the last time that they were nearer than their separation.
+    lost_until_s: f64,
+}
+
+/// The limits within which two airplanes are too near each other.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Zone {
+    /// Separation in meters.
+    pub gap_m: f64,
+    /// Difference of altitude in meters from which on they need not mind each other.
+    pub vertical_m: f64,
+}
+
+impl Approach {
+    /// Returns nothing yet. `since_s` is a time up to which two airplanes are known to have been too
+    /// near each other, so that a loss from then on is no new one.
+    pub fn new(since_s: Option<f64>) -> Self {
+        let lost_until_s = since_s.unwrap_or(f64::NEG_INFINITY);
+        Self { nearest_m: f64::INFINITY, lost_s: 0.0, losses: 0, lost_until_s }
+    }
+
+    /// Adds the time that two legs have in common; it must not lie before what was added already.
+    pub fn add(&mut self, a: &Leg, b: &Leg, zone: Zone) {
+        let (from_s, until_s) = (a.from_s.max(b.from_s), a.until_s.min(b.until_s));
+        let Some((from_s, until_s)) = on_one_level(a, b, (from_s, until_s), zone.vertical_m) else {
+            return;
+        };
+        let pair = Pair { a, b };
+        let mut moments = vec![from_s];
+        pair.turning_points((from_s, until_s), &mut moments);
+        moments.push(until_s);
+        let gap_m = zone.gap_m - ROUNDED_M;
+        for ends in moments.windows(2) {
+            let (at_from, at_to) = (pair.apart_m(ends[0]), pair.apart_m(ends[1]));
+            self.nearest_m = self.nearest_m.min(at_from).min(at_to);
+            // Between turning points the distance only grows or only shrinks.
+            let edge = || pair.edge_s((ends[0], ends[1]), at_from < at_to, gap_m);
+            match (at_from < gap_m, at_to < gap_m) {
+                (true, true) => self.lose(ends[0], ends[1]),
+                (true, false) => self.lose(ends[0], edge()),
+                (false, true) => self.lose(edge(), ends[1]),
+                (false, false) => {}
+            }
+        }
+    }
+
+    fn lose(&mut self, from_s: f64, until_s: f64) {
+        self.losses += u32::from(from_s > self.lost_until_s);
+        self.lost_s += until_s - from_s;
+        self.lost_until_s = until_s;
+    }
+}
+
+/// Returns whether two airplanes are too near each other at a time.
+pub fn is_lost(a: &Leg, b: &Leg, t_s: f64, zone: Zone) -> bool {
+    (a.altitude_at_m(t_s) - b.altitude_at_m(t_s)).abs() < zone.vertical_m
+        && (Pair { a, b }).apart_m(t_s) < zone.gap_m - ROUNDED_M
+}
+
+/// Returns the part of an interval in which two legs are on one level.
+fn on_one_level(
+    a: &Leg,
+    b: &Leg,
+    (from_s, until_s): (f64, f64),
+    vertical_m: f64,
+) -> Option<(f64, f64)> {
+    let above_m = a.altitude_at_m(from_s) - b.altitude_at_m(from_s);
+    let climb_m_s = a.climb_m_s - b.climb_m_s;
+    let (mut first_s, mut last_s) = (from_s, until_s);
+    if climb_m_s != 0.0 {
+        let passes = [-vertical_m, vertical_m].map(|m| from_s + (m - above_m) / climb_m_s);
+        first_s = first_s.max(passes[0].min(passes[1]));
+        last_s = last_s.min(passes[0].max(passes[1]));
+    } else if above_m.abs() >= vertical_m {
+        return None;
+    }
+    (first_s <= last_s && from_s <= until_s).then_some((first_s, last_s))
+}
+
+/// Two legs, seen from the first.
+#[derive(Clone, Copy)]
+struct Pair<'a> {
+    a: &'a Leg,
+    b: &'a Leg,
+}
+
+impl Pair<'_> {
+    fn motion(&self, t_s: f64) -> Motion {
+        let (a, b) = (self.a.motion(t_s), self.b.motion(t_s));
+        let minus = |b: Point, a: Point| [b[0] - a[0], b[1] - a[1]];
+        Motion {
+            at: minus(b.at, a.at),
+            velocity: minus(b.velocity, a.velocity),
+            acceleration: minus(b.acceleration, a.acceleration),
+        }
+    }
+
+    fn apart_m(&self, t_s: f64) -> f64 {
+        let [x, y] = self.motion(t_s).at;
+        math::hypot(x, y)
+    }
+
+    /// Returns half of the first and half of the second derivative of the squared distance.
+    fn slope(&self, t_s: f64) -> (f64, f64) {
+        let Motion { at, velocity, acceleration } = self.motion(t_s);
+        (dot(at, velocity), dot(velocity, velocity) + dot(at, acceleration))
+    }
+
+    /// Adds the moments within an interval at which the distance turns from shrinking to growing or
+    /// back, in order.
+    fn turning_points(&self, (from_s, until_s): (f64, f64), found: &mut Vec<f64>) {
+        let ends = [self.slope(from_s).0, self.slope(until_s).0];
+        self.search((from_s, until_s), ends, self.most_bend(from_s, until_s), found);
+    }
+
+    /// Returns a bound on how fast half of the second derivative changes in an interval.
+    fn most_bend(&self, from_s: f64, until_s: f64) -> f64 {
+        let sum = |of: fn(&Leg) -> f64| of(self.a) + of(self.b);
+        let pull = sum(|leg| leg.v_m_s * leg.omega_rad_s.abs());
+        if pull == 0.0 {
+            return 0.0;
+        }
+        let jerk = sum(|leg| leg.v_m_s * leg.omega_rad_s * leg.omega_rad_s);
+        let (start, s) = (self.motion(from_s), until_s - from_s);
+        let speed_m_s = math::hypot(start.velocity[0], start.velocity[1]) + pull * s;
+        let apart_m = math::hypot(start.at[0], start.at[1]) + speed_m_s * s;
+        3.0 * speed_m_s * pull + apart_m * jerk
+    }
+
+    fn search(
+        &self,
+        (from_s, until_s): (f64, f64),
+        ends: [f64; 2],
+        bend: f64,
+        found: &mut Vec<f64>,
+    ) {
+        let half_s = 0.5 * (until_s - from_s);
+        if half_s < FINEST_S {
+            return;
+        }
+        let middle_s = from_s + half_s;
+        let (at_middle, change) = self.slope(middle_s);
+        if change.abs() >= bend * half_s {
+            // The slope only rises or only falls, so it has at most one zero.
+            if (ends[0] < 0.0) != (ends[1] < 0.0) {
+                let slope = |t_s: f64| self.slope(t_s);
+                found.push(zero_s((from_s, until_s), ends[0] < 0.0, slope));
+            }
+            return;
+        }
+        self.search((from_s, middle_s), [ends[0], at_middle], bend, found);
+        self.search((middle_s, until_s), [at_middle, ends[1]], bend, found);
+    }
+
+    /// Returns when the distance passes `gap_m` in an interval in which it only grows or only
+    /// shrinks.
+    fn edge_s(&self, interval_s: (f64, f64), grows: bool, gap_m: f64) -> f64 {
+        zero_s(interval_s, grows, |t_s| {
+            let Motion { at, velocity, .. } = self.motion(t_s);
+            (0.5 * (dot(at, at) - gap_m * gap_m), dot(at, velocity))
+        })
+    }
+}
+
+fn dot(a: Point, b: Point) -> f64 {
+    a[0] * b[0] + a[1] * b[1]
+}
+
+/// Returns the zero of a function that only rises, or only falls, from its values and slopes: by
+/// Newton's steps, and by halving where these lead out of the interval.
+fn zero_s(
+    (mut from_s, mut until_s): (f64, f64),
+    rises: bool,
+    of: impl Fn(f64) -> (f64, f64),
+) -> f64 {
+    let mut t_s = 0.5 * (from_s + until_s);
+    for _ in 0..100 {
+        let (value, slope) = of(t_s);
+        if (value < 0.0) == rises {
+            from_s = t_s
+        } else {
+            until_s = t_s
+        }
+        let newton_s = t_s - value / slope;
+        let inside = from_s <= newton_s && newton_s <= until_s;
+        let next_s = if inside { newton_s } else { 0.5 * (from_s + until_s) };
+        if (next_s - t_s).abs() <= FOUND_S {
+            return next_s;
+        }
+        t_s = next_s;
+    }
+    t_s
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const ZONE: Zone = Zone { gap_m: 500.0, vertical_m: 300.0 };
+
+    fn leg(at: Point, heading_rad: f64, v_m_s: f64, omega_rad_s: f64) -> Leg {
+        Leg::new(0.0, 60.0, Pose { at, heading_rad }, v_m_s, omega_rad_s)
+    }
+
+    fn approach(a: &Leg, b: &Leg, zone: Zone) -> Approach {
+        let mut approach = Approach::new(None);
+        approach.add(a, b, zone);
+        approach
+    }
+
+    #[test]
+    fn a_head_on_pass_through_one_point_is_found_with_its_time() {
+        let (a, b) =
+            (leg([0.0, 0.0], 0.0, 35.0, 0.0), leg([1007.0, 0.0], std::f64::consts::PI, 35.0, 0.0));
+        let zone = Zone { gap_m: 5.0, ..ZONE };
+        let found = approach(&a, &b, zone);
+        assert!(found.nearest_m < 1e-9 && found.losses == 1, "{found:?}");
+        assert!((found.lost_s - 10.0 / 70.0).abs() < 1e-6, "{found:?}");
+    }
+
+    #[test]
+    fn a_loss_lasts_from_leg_to_leg_and_ends_with_the_level() {
+        let still = leg([0.0, 0.0], 0.0, 35.0, 0.0);
+        let beside = leg([0.0, 100.0], 0.0, 35.0, 0.0);
+        let mut found = Approach::new(None);
+        let climbs = beside.climbing(0.0, 10.0);
+        for (from_s, until_s) in [(0.0, 10.0), (10.0, 60.0)] {
+            let part = |leg: &Leg| Leg { until_s, ..leg.rest(from_s) };
+            found.add(&part(&still), &part(&climbs), ZONE);
+        }
+        assert_eq!((found.losses, found.nearest_m), (1, 100.0));
+        assert!((found.lost_s - 30.0).abs() < 1e-9, "{found:?}");
+        let mut goes_on = Approach::new(Some(0.0));
+        goes_on.add(&still, &beside, ZONE);
+        assert_eq!((goes_on.losses, goes_on.lost_s), (0, 60.0));
+        assert_eq!(approach(&still, &beside.climbing(300.0, 0.0), ZONE).nearest_m, f64::INFINITY);
+    }
+
+    proptest! {
+        /// However two airplanes turn, dense sampling finds no nearer moment, and as much time below
+        /// the separation.
+        #[test]
+        fn no_approach_of_turning_airplanes_is_missed(
+            x in -2000.0f64..2000.0, y in -2000.0f64..2000.0, heading_rad in -3.2f64..3.2,
+            v in prop::array::uniform2(5.0f64..120.0), omega in prop::array::uniform2(-0.2f64..0.2),
+            wind in prop::array::uniform2(-9.0f64..9.0), gap_m in 1.0f64..900.0,
+        ) {
+            let a = leg([0.0, 0.0], 0.0, v[0], omega[0]);
+            let b = leg([x, y], heading_rad, v[1], omega[1]).in_wind(wind);
+            let found = approach(&a, &b, Zone { gap_m, ..ZONE });
+            let looks = 6_000;
+            let apart_m = |k: u32| {
+                let t_s = f64::from(k) * 60.0 / f64::from(looks);
+                let p = a.pose.step(a.v_m_s, omega[0], t_s).at;
+                let q = b.pose.step(b.v_m_s, omega[1], t_s).at;
+                math::hypot(q[0] + wind[0] * t_s - p[0], q[1] + wind[1] * t_s - p[1])
+            };
+            let all: Vec<f64> = (0..=looks).map(apart_m).collect();
+            let nearest = all.iter().copied().fold(f64::INFINITY, f64::min);
+            prop_assert!(found.nearest_m <= nearest + 1e-6, "{} > {nearest}", found.nearest_m);
+            prop_assert!(found.nearest_m >= nearest - 3.0);
+            let below_s = all.iter().filter(|d| **d < gap_m).count() as f64 * 60.0 / f64::from(looks);
+            prop_assert!((found.lost_s - below_s).abs() < 0.06, "{} s, {below_s}", found.lost_s);
+        }
+    }
+}

@@ -1,0 +1,183 @@
+//! Errors of place and heading, as far as the shield allows for them.
+//!
+//! All see an airplane up to `position_m` from its place, and at the end of each `dt` a gust turns
+//! it by up to `heading_rad`; nobody knows the error, everybody these bounds. Airplanes that
+//! exceed them are named (`act/errors.rs`).
+//!
+//! **Places.** Let all be seen within `E` of their places. A plan is computed from where the
+//! airplane is seen, so what is flown is the plan, moved by at most `E`. Plans that keep
+//! `R + 2 E` as they are seen keep `R` as they are flown. The invariant of the shield speaks of
+//! orbits as they are flown: two airplanes that stay on theirs need not be seen apart anew, and
+//! the search never asks it of them. So the induction holds with this wider gap on new plans.
+//!
+//! **Headings.** A way is flown for one `dt` from a heading that is seen, so no gust disturbs it.
+//! An orbit is flown for ever. Airplanes orbit at less than their largest turn rate and have the
+//! rest, `a`, to correct ([`hold`]). Let `D` be the bound, `v` the speed, and let `held` be the pose
+//! on the orbit that was stored, moved along it. At the start of each `dt` on it
+//!
+//! - the airplane heads within `2 D` of `held`: at the end of a way by at most one gust of `D`;
+//!   later because `hold` steers for headings within `D`, never away from them, and has
+//!   `a dt >= 2 D` to get there, and then comes one gust;
+//! - it is within `4 v dt D` of `held`. At the end of a way it is at `held`. Later `hold` leads it
+//!   back; that is looked at in each `dt`, and who is farther away is named.
+//!
+//! During `dt` it heads within `2 D` of `held` all the time, so its place relative to `held`
+//! changes by at most `2 v sin(D) dt <= 2 v dt D`. So it is within `W = 6 v dt D` of its orbit, and
+//! gaps wider by `W` on either side keep `R`.
+
+use super::orbit::Side;
+use crate::flight::{Model, Pose};
+use serde::{Deserialize, Serialize};
+use sidestep_kernel::math;
+
+/// Part of the largest turn rate below which no airplane orbits.
+const SLOWEST_PART: f64 = 0.45;
+/// Airplanes orbit at one rate if none of them could turn this many times as fast as another. Were
+/// there no limit, a single airplane that hardly turns would put all others on circles that fill
+/// the sky.
+const ALIKE: f64 = 10.0;
+/// Part of its distance to the side that an airplane means to make good within a step.
+const GAIN: f64 = 0.5;
+
+/// Bounds on errors.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Bounds {
+    /// Distance in meters within which an airplane is of where all see it.
+    pub position_m: f64,
+    /// Largest unwanted change of heading per `dt`, in radians.
+    pub heading_rad: f64,
+}
+
+impl Bounds {
+    /// Returns the distance in meters within which an airplane is of where it should be at the
+    /// start of a `dt` on its orbit.
+    pub(crate) fn strays_m(&self, v_m_s: f64, dt_s: f64) -> f64 {
+        4.0 * v_m_s * dt_s * self.heading_rad
+    }
+
+    /// Returns how far an airplane may be from where its plans are seen.
+    pub(crate) fn error_m(&self, v_m_s: f64, dt_s: f64) -> f64 {
+        self.position_m + self.strays_m(v_m_s, dt_s) + 2.0 * v_m_s * dt_s * self.heading_rad
+    }
+
+    /// Returns the largest turn rate at which an airplane can hold an orbit, if there is one.
+    pub(crate) fn holds_rad_s(&self, model: &Model, dt_s: f64) -> Option<f64> {
+        let part = 1.0 - 2.0 * self.heading_rad / (model.omega_max_rad_s * dt_s);
+        (part >= SLOWEST_PART).then_some(part * model.omega_max_rad_s)
+    }
+}
+
+/// Returns the rates at which airplanes orbit, of the largest ones at which they could. On orbits
+/// of one rate the distance of two airplanes has a closed form, and those that fly side by side stay
+/// so; on orbits of other rates they sooner or later come to be wherever their circles come
+/// nearest. So airplanes share the rate of the slowest of them, which all can fly.
+pub(crate) fn common_rates(largest_rad_s: &[f64]) -> Vec<f64> {
+    let mut rising = largest_rad_s.to_vec();
+    rising.sort_unstable_by(f64::total_cmp);
+    let mut shared: Vec<f64> = Vec::new();
+    for rate in rising {
+        if shared.last().is_none_or(|slowest| rate >= ALIKE * slowest) {
+            shared.push(rate);
+        }
+    }
+    let of = |rate: &f64| shared[shared.partition_point(|slowest| slowest <= rate) - 1];
+    largest_rad_s.iter().map(of).collect()
+}
+
+/// An airplane on its orbit.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Holding {
+    /// Its pose.
+    pub(crate) pose: Pose,
+    /// Its pose on the orbit, if it had made no errors.
+    pub(crate) held: Pose,
+    pub(crate) v_m_s: f64,
+    pub(crate) omega_max_rad_s: f64,
+    /// Turn rate of the orbit, positive to the left.
+    pub(crate) orbit_rad_s: f64,
+}
+
+impl Holding {
+    /// Returns the orbiting airplane that flies with these abilities to a side.
+    pub(crate) fn new(pose: Pose, held: Pose, model: &Model, rate_rad_s: f64, side: Side) -> Self {
+        let Model { v_m_s, omega_max_rad_s, .. } = *model;
+        Self { pose, held, v_m_s, omega_max_rad_s, orbit_rad_s: side.sign() * rate_rad_s }
+    }
+
+    /// Returns the turn rates by which it keeps to its orbit for some steps, in spite of gusts that
+    /// turn it by up to `gust_rad`.
+    pub(crate) fn hold(mut self, steps: usize, dtau_s: f64, gust_rad: f64) -> Vec<f64> {
+        let step = |_| {
+            let off_rad = math::wrap_angle(self.pose.heading_rad - self.held.heading_rad);
+            let left = GAIN * self.left_m() / (self.v_m_s * dtau_s);
+            let wanted_rad = (-left).clamp(-gust_rad, gust_rad);
+            let omega = self.orbit_rad_s + (wanted_rad - off_rad) / dtau_s;
+            let omega = omega.clamp(-self.omega_max_rad_s, self.omega_max_rad_s);
+            self.pose = self.pose.step(self.v_m_s, omega, dtau_s);
+            self.held = self.held.step(self.v_m_s, self.orbit_rad_s, dtau_s);
+            omega
+        };
+        (0..steps).map(step).collect()
+    }
+
+    /// Returns how far to the left of its orbit it is, in meters.
+    fn left_m(&self) -> f64 {
+        let [x, y] = [self.pose.at[0] - self.held.at[0], self.pose.at[1] - self.held.at[1]];
+        let heading = self.held.heading_rad;
+        y * math::cos(heading) - x * math::sin(heading)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flight::distance_m;
+    use proptest::prelude::*;
+
+    #[test]
+    fn airplanes_that_turn_alike_share_the_rate_of_the_slowest() {
+        let rates = common_rates(&[1.0, 70.0, 1.3, 10.0, 2.0, 9.9]);
+        assert_eq!(rates, [1.0, 10.0, 1.0, 10.0, 1.0, 1.0]);
+        assert_eq!(common_rates(&[0.3; 4]), [0.3; 4]);
+    }
+
+    proptest! {
+        /// Whatever gusts do within the bound, also the worst at any time, an airplane stays so near
+        /// its orbit that it need not be named.
+        #[test]
+        fn whoever_holds_an_orbit_strays_no_farther_than_the_bound(
+            part in 0.01f64..0.275, left in any::<bool>(), dtau in prop::sample::select(vec![1.0, 2.5, 5.0]),
+            gusts in prop::collection::vec(-1.0f64..1.0, 300), worst in 0u8..4,
+        ) {
+            let (dt_s, v_m_s, omega_max_rad_s) = (5.0, 35.0, 4f64.to_radians());
+            let model = Model { v_m_s, omega_max_rad_s, separation_m: 500.0, turns: 5 };
+            let gust_rad = part * omega_max_rad_s * dt_s;
+            let bounds = Bounds { position_m: 0.0, heading_rad: gust_rad };
+            let rate = bounds.holds_rad_s(&model, dt_s).expect("within what can be held");
+            let start = Pose { at: [0.0, 0.0], heading_rad: 1.0 };
+            let mut now = Holding::new(start, start, &model, rate, Side::BOTH[usize::from(left)]);
+            let steps = (dt_s / dtau) as usize;
+            for (k, gust) in gusts.iter().enumerate() {
+                // Outward, by turns, always to one side, or by chance.
+                let gust = match worst {
+                    0 => now.left_m().signum(),
+                    1 => if k / 9 % 2 == 0 { 1.0 } else { -1.0 },
+                    2 => 1.0,
+                    _ => *gust,
+                };
+                now.pose.heading_rad += gust_rad * gust;
+                let off_rad = math::wrap_angle(now.pose.heading_rad - now.held.heading_rad);
+                prop_assert!(off_rad.abs() <= 2.0 * gust_rad + 1e-9, "{off_rad}");
+                let strays_m = distance_m(now.pose.at, now.held.at);
+                prop_assert!(strays_m <= bounds.strays_m(v_m_s, dt_s), "{strays_m} after {k}");
+                for omega in now.hold(steps, dtau, gust_rad) {
+                    prop_assert!(omega.abs() <= omega_max_rad_s);
+                    now.pose = now.pose.step(v_m_s, omega, dtau);
+                    now.held = now.held.step(v_m_s, now.orbit_rad_s, dtau);
+                    let strays_m = distance_m(now.pose.at, now.held.at);
+                    prop_assert!(strays_m <= bounds.error_m(v_m_s, dt_s), "{strays_m} in {k}");
+                }
+            }
+        }
+    }
+}

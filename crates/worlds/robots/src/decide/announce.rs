@@ -1,0 +1,150 @@
+//! Wandering with a radio: robots announce where they will be, and give way to each other.
+
+use super::{Behaviour, Decision, Heard, Memory, Percept, Sector, Wander};
+use crate::effector::{ActionId, FORWARD, HEADINGS, LEFT, RIGHT, STAY};
+use sidestep_kernel::stream::Draws;
+
+/// Wanders, and broadcasts the place where its action is meant to end. It turns before a robot that
+/// it hears of, as before one that it senses, and waits where a robot with a smaller id is about to
+/// enter the same boxes. Without radio it is [`Wander`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Announce {
+    /// The behavior that chooses the way.
+    pub wander: Wander,
+    /// Side of the robot, in boxes.
+    pub size: u32,
+}
+
+/// The square in which a robot stands, and its heading: the content of a word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Place {
+    col: i32,
+    row: i32,
+    heading: u8,
+    size: i32,
+}
+
+impl Behaviour for Announce {
+    fn decide(&self, percept: &Percept<'_>, memory: &mut Memory, draws: &mut Draws) -> Decision {
+        let here = Place {
+            col: percept.at.0 as i32,
+            row: percept.at.1 as i32,
+            heading: percept.heading,
+            size: self.size as i32,
+        };
+        let next = here.after(FORWARD);
+        let mut nearest_in = percept.nearest_in;
+        if places(percept.heard).any(|(_, other)| other.meets(next)) {
+            nearest_in[Sector::Ahead as usize] = 0;
+        }
+        let wanted = self.wander.decide(&Percept { nearest_in, ..*percept }, memory, draws);
+        let mut first = places(percept.heard).filter(|(sender, _)| *sender < percept.id);
+        let gives_way =
+            wanted.action == FORWARD && first.any(|(_, other)| other.after(FORWARD).meets(next));
+        let action = if gives_way { STAY } else { wanted.action };
+        Decision { action, broadcast: Some(here.after(action).word()), ..wanted }
+    }
+}
+
+/// Returns the announced places, each with its sender.
+fn places(heard: &[Heard]) -> impl Iterator<Item = (u32, Place)> + '_ {
+    heard.iter().map(|heard| (heard.sender, Place::of_word(heard.word)))
+}
+
+impl Place {
+    /// Returns the place after one of the standard actions, if nothing goes wrong.
+    fn after(self, action: ActionId) -> Self {
+        let (east, north) = HEADINGS[usize::from(self.heading % 4)];
+        match action {
+            FORWARD => Self { col: self.col + east, row: self.row + north, ..self },
+            LEFT => Self { heading: (self.heading + 1) % 4, ..self },
+            RIGHT => Self { heading: (self.heading + 3) % 4, ..self },
+            _ => self,
+        }
+    }
+
+    /// Returns whether two squares share a box.
+    fn meets(self, other: Self) -> bool {
+        let overlap = |a: i32, b: i32| a < b + other.size && b < a + self.size;
+        overlap(self.col, other.col) && overlap(self.row, other.row)
+    }
+
+    /// Returns the place in one word: 16 bits each for column, row, heading and size. Columns and
+    /// rows are below 32,768, and may be -1 where a robot faces a wall at the edge of the map.
+    fn word(self) -> u64 {
+        let parts = [self.col as u16, self.row as u16, u16::from(self.heading), self.size as u16];
+        parts.iter().rev().fold(0, |word, &part| word << 16 | u64::from(part))
+    }
+
+    fn of_word(word: u64) -> Self {
+        let part = |k: u32| i32::from((word >> (16 * k)) as u16 as i16);
+        Self { col: part(0), row: part(1), heading: (part(2) % 4) as u8, size: part(3) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::decide::UNSEEN;
+    use sidestep_kernel::Seed;
+    use sidestep_kernel::stream::{Purpose, Streams};
+
+    const EAST: u8 = 0;
+    const WEST: u8 = 2;
+
+    fn place(col: i32, heading: u8) -> Place {
+        Place { col, row: 0, heading, size: 2 }
+    }
+
+    /// Returns the decision of robot 5, which heads east from column 0 and senses nothing.
+    fn decide(heard: &[Heard]) -> Decision {
+        let percept = Percept {
+            now: 0,
+            id: 5,
+            readings: &[],
+            sectors: &[],
+            nearest_in: [UNSEEN; 4],
+            contact: None,
+            at: (0, 0),
+            heading: EAST,
+            heard,
+        };
+        let mut draws = Streams::new(Seed(1)).draws(5, 0, Purpose(3));
+        let announce = Announce { wander: Wander::default(), size: 2 };
+        announce.decide(&percept, &mut Memory::default(), &mut draws)
+    }
+
+    fn of(sender: u32, place: Place) -> Heard {
+        Heard { sender, word: place.word() }
+    }
+
+    #[test]
+    fn a_place_comes_back_from_its_word() {
+        for (col, heading) in [(0, 0), (-1, 2), (32_759, 3)] {
+            assert_eq!(Place::of_word(place(col, heading).word()), place(col, heading));
+        }
+    }
+
+    #[test]
+    fn a_robot_announces_where_its_action_is_meant_to_end() {
+        let decision = decide(&[]);
+        assert_eq!(decision.action, FORWARD);
+        assert_eq!(decision.broadcast.map(Place::of_word), Some(place(1, EAST)));
+    }
+
+    #[test]
+    fn the_larger_id_waits_where_two_are_about_to_enter_the_same_boxes() {
+        let faces = place(3, WEST);
+        assert_eq!(decide(&[of(3, faces)]).action, STAY);
+        assert_eq!(decide(&[of(7, faces)]).action, FORWARD);
+        assert_eq!(decide(&[of(3, place(3, EAST))]).action, FORWARD, "it goes away");
+    }
+
+    #[test]
+    fn a_robot_turns_before_one_that_it_hears_of_but_does_not_sense() {
+        for sender in [3, 7] {
+            let action = decide(&[of(sender, place(2, EAST))]).action;
+            assert!([LEFT, RIGHT].contains(&action), "{action}");
+        }
+    }
+}

@@ -1,0 +1,134 @@
+//! The cheapest way through the places around a robot, to where the way of the static map goes on.
+
+use super::View;
+use super::sight::{Places, REACH, SIDE};
+use crate::effector::HEADINGS;
+
+const PLACES: usize = (SIDE * SIDE) as usize;
+/// Price of a first step away from the goal that goes straight back, or gives up a sidestep. It is
+/// there because a robot sees little of a wide obstacle, and would otherwise go to and fro before it.
+const PRICE_OF_CHANGE: u16 = 4;
+const UNREACHED: u16 = u16::MAX;
+
+/// Prices of a search, in actions.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Prices {
+    /// Price of a place that is blocked now; what blocks it may go away.
+    pub(super) blocked: u16,
+    /// Extra price of a place beside a blocked one, where a slip ends in a contact.
+    pub(super) beside: u16,
+    /// Extra price of a place where something may be.
+    pub(super) vague: u16,
+    /// Direction of the last step.
+    pub(super) moved: Option<u8>,
+    /// Whether that step did not lead nearer to the goal.
+    pub(super) is_sidestep: bool,
+}
+
+/// A way that is known to a place.
+#[derive(Debug, Clone, Copy)]
+struct Label {
+    cost: u16,
+    /// Distance to the goal on the static map, less that of the robot's own place.
+    rise: i16,
+    /// Direction of the first step.
+    first: u8,
+    /// Direction of the last one.
+    last: u8,
+}
+
+/// Returns the direction of the first step; none where every way out is walled in.
+pub(super) fn first_step(view: &View<'_>, prices: Prices) -> Option<u8> {
+    let start = Label { cost: 0, rise: 0, first: 4, last: view.heading };
+    let mut labels = [Label { cost: UNREACHED, ..start }; PLACES];
+    let center = Places::number(0, 0)?;
+    labels[center] = start;
+    // Labels are corrected until none changes; there are few of them.
+    let (mut waiting, mut next) = (1u128 << center, 0u128);
+    while waiting != 0 {
+        let n = waiting.trailing_zeros() as usize;
+        waiting &= waiting - 1;
+        next |= spread(view, prices, &mut labels, n);
+        if waiting == 0 {
+            waiting = std::mem::take(&mut next);
+        }
+    }
+    let out = (0..PLACES).filter(|&n| n != center && is_exit(view, n));
+    let known = out.map(|n| labels[n]).filter(|label| label.cost != UNREACHED);
+    let best =
+        known.min_by_key(|l| (i32::from(l.cost) + i32::from(l.rise), l.first != view.heading));
+    best.map(|label| label.first)
+}
+
+/// Spreads a label to the neighbors of its place, and returns those that have changed.
+fn spread(view: &View<'_>, prices: Prices, labels: &mut [Label; PLACES], n: usize) -> u128 {
+    let (from, (col, row)) = (labels[n], place(n));
+    let mut changed = 0;
+    // First ahead, then to the right: of equal ways the first is kept, and robots that meet head on
+    // both keep to the right.
+    for turn in [0, 3, 1, 2] {
+        let direction = (from.last + turn) % 4;
+        let (east, north) = HEADINGS[usize::from(direction)];
+        let Some(next) = Places::number(col + east, row + north) else { continue };
+        let at = view.offset(col, row);
+        let Some(rise) = view.field.rise(at.0, at.1, direction) else { continue };
+        let is_first = from.first == 4;
+        let gives_up = |moved: u8| match (4 + direction - moved) % 4 {
+            0 => false,
+            2 => true,
+            _ => prices.is_sidestep,
+        };
+        let is_change = is_first && rise >= 0 && prices.moved.is_some_and(gives_up);
+        let change = if is_change { PRICE_OF_CHANGE } else { 0 };
+        let lane = u16::from(is_left_lane(view, place(next), direction));
+        let cost =
+            from.cost + 1 + quarters(turn) + change + lane + price(view, prices, place(next));
+        if cost < labels[next].cost {
+            let first = if is_first { direction } else { from.first };
+            labels[next] =
+                Label { cost, rise: from.rise + i16::from(rise), first, last: direction };
+            changed |= 1 << next;
+        }
+    }
+    changed
+}
+
+/// Returns the price of standing in a place, beside the step.
+fn price(view: &View<'_>, prices: Prices, (col, row): (i32, i32)) -> u16 {
+    if view.blocked.has(col, row) {
+        return prices.blocked;
+    }
+    let beside = HEADINGS.iter().any(|(east, north)| view.blocked.has(col + east, row + north));
+    prices.beside * u16::from(beside) + prices.vague * u16::from(view.vague.has(col, row))
+}
+
+/// Returns whether a place is in the left lane of a passage: there is a wall to the left, and room
+/// to the right. Whoever comes the other way then finds its own right lane taken.
+fn is_left_lane(view: &View<'_>, (col, row): (i32, i32), direction: u8) -> bool {
+    let at = view.offset(col, row);
+    let is_wall = |side: u8| view.field.rise(at.0, at.1, (direction + side) % 4).is_none();
+    is_wall(1) && !is_wall(3)
+}
+
+fn quarters(turn: u8) -> u16 {
+    u16::from(turn.min(4 - turn))
+}
+
+/// Returns whether the static map's way may be followed from a place on: at a goal, and where it
+/// leads out of what is planned, or along its edge. Where it leads back in there is no way round.
+fn is_exit(view: &View<'_>, n: usize) -> bool {
+    let (col, row) = place(n);
+    let at = view.offset(col, row);
+    if view.field.is_goal(at.0, at.1) {
+        return true;
+    }
+    let Some(direction) = view.field.direction(at.0, at.1) else { return false };
+    let (east, north) = HEADINGS[usize::from(direction)];
+    let ring = |col: i32, row: i32| col.abs().max(row.abs());
+    ring(col, row) == REACH && ring(col + east, row + north) >= REACH
+}
+
+/// Returns column and row of a place from the robot.
+fn place(n: usize) -> (i32, i32) {
+    (n as i32 % SIDE - REACH, n as i32 / SIDE - REACH)
+}

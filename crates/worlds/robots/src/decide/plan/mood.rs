@@ -1,0 +1,146 @@
+//! The memory of a planning robot, in two words.
+
+use super::super::Memory;
+use super::super::ask::{self, ASKING, Ask};
+
+/// Index of the first word; the second is shared with the robot's request.
+const MOOD: usize = 1;
+
+/// Everything that a planning robot remembers between its actions, beside its progress on its list.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct Mood {
+    /// Its own rank among those who ask; 0 before it is drawn.
+    pub(super) rank: u8,
+    /// Actions without progress, less those with progress; up to 255.
+    pub(super) stuck: u8,
+    /// Column and row at its last decision, modulo 16 each.
+    pub(super) place: u8,
+    /// Direction of its last move plus 1; 0 before the first.
+    pub(super) moved: u8,
+    /// Direction in which it touched something.
+    pub(super) bump: u8,
+    /// Decisions for which the touched thing is still believed to be there; up to 7.
+    pub(super) bump_left: u8,
+    /// Its request as a word, 0 for none.
+    pub(super) request: u32,
+    /// Decisions for which it makes room, or keeps away from the room it has made; up to 15.
+    pub(super) yield_left: u8,
+    /// Direction in which it makes room.
+    pub(super) yield_to: u8,
+    /// Whether it still has to move for that.
+    pub(super) yield_pending: bool,
+    /// Rank of the request that it follows, in steps of 8; what it asks for itself has that rank.
+    pub(super) yield_rank: u8,
+    /// Decisions to stand still before something since the last move; up to 7.
+    pub(super) waited: u8,
+    /// Actions left of a walk at random out of a deadlock; up to 15.
+    pub(super) stray_left: u8,
+}
+
+impl Mood {
+    /// Unpacks a memory.
+    pub(super) fn of(memory: &Memory) -> Self {
+        let mut one = Bits(memory.words[MOOD]);
+        let mut two = Bits(memory.words[ASKING]);
+        Self {
+            rank: one.take(8),
+            stuck: one.take(8),
+            place: one.take(8),
+            moved: one.take(3),
+            bump: one.take(2),
+            bump_left: one.take(3),
+            request: two.take_wide(ask::BITS),
+            yield_left: two.take(3),
+            yield_to: two.take(2),
+            yield_pending: two.take(1) == 1,
+            yield_rank: two.take(5),
+            waited: two.take(3),
+            stray_left: two.take(4),
+        }
+    }
+
+    /// Packs it into a memory.
+    pub(super) fn store(&self, memory: &mut Memory) {
+        let mut one = Packed::default();
+        one.put(self.rank, 8);
+        one.put(self.stuck, 8);
+        one.put(self.place, 8);
+        one.put(self.moved, 3);
+        one.put(self.bump, 2);
+        one.put(self.bump_left, 3);
+        memory.words[MOOD] = one.word;
+        let mut two = Packed { word: self.request, used: ask::BITS };
+        two.put(self.yield_left, 3);
+        two.put(self.yield_to, 2);
+        two.put(u8::from(self.yield_pending), 1);
+        two.put(self.yield_rank, 5);
+        two.put(self.waited, 3);
+        two.put(self.stray_left, 4);
+        memory.words[ASKING] = two.word;
+    }
+
+    /// Asks whoever stands in a direction to make room.
+    pub(super) fn ask(&mut self, rank: u8, toward: u8, then: Option<u8>) {
+        self.request = Ask { rank: rank.max(1), toward, then }.word();
+    }
+}
+
+/// A word whose low bits are read first.
+struct Bits(u32);
+
+impl Bits {
+    fn take_wide(&mut self, bits: u32) -> u32 {
+        let value = self.0 & ((1 << bits) - 1);
+        self.0 >>= bits;
+        value
+    }
+
+    fn take(&mut self, bits: u32) -> u8 {
+        self.take_wide(bits) as u8
+    }
+}
+
+/// A word that is filled from its low bits; values that are too large count as the largest one.
+#[derive(Default)]
+struct Packed {
+    word: u32,
+    used: u32,
+}
+
+impl Packed {
+    fn put(&mut self, value: u8, bits: u32) {
+        self.word |= u32::from(value).min((1 << bits) - 1) << self.used;
+        self.used += bits;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mood_survives_its_memory_and_large_counts_stop_at_their_largest() {
+        let mut mood = Mood {
+            rank: 200,
+            stuck: 77,
+            place: 0xa5,
+            moved: 4,
+            bump: 3,
+            bump_left: 7,
+            request: 0,
+            yield_left: 6,
+            yield_to: 2,
+            yield_pending: true,
+            yield_rank: 31,
+            waited: 5,
+            stray_left: 15,
+        };
+        mood.ask(9, 1, Some(2));
+        let mut memory = Memory::default();
+        mood.store(&mut memory);
+        assert_eq!(Mood::of(&memory), mood);
+        Mood { waited: 200, ..mood }.store(&mut memory);
+        assert_eq!(Mood::of(&memory), Mood { waited: 7, ..mood });
+        assert_eq!(memory.words[0], 0);
+    }
+}

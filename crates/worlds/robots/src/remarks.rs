@@ -1,0 +1,65 @@
+//! Remarks on a valid scenario: what will surprise its author. `sidestep check` shows them.
+
+use super::scenario::Compiled;
+use super::sensor::NOTHING;
+use super::world::{MountedSensor, RobotsWorld, Role};
+use sidestep_scenario::Remark;
+use std::collections::BTreeMap;
+
+/// Number of the kind `wall`.
+const WALL: usize = 1;
+
+/// Returns the remarks, warnings first.
+pub(super) fn remarks(compiled: &Compiled) -> Vec<Remark> {
+    let mut remarks = compiled.remarks.clone();
+    for sensor in mounted(&compiled.world) {
+        remarks.extend(unseen(&compiled.world, sensor));
+        remarks.extend(never_true(sensor));
+    }
+    // Sorting is stable: among equals the order of the scenario stays.
+    remarks.sort_by_key(|remark| remark.severity);
+    remarks
+}
+
+/// Returns the sensors in use, each once.
+fn mounted(world: &RobotsWorld) -> impl Iterator<Item = &MountedSensor> {
+    let sensors = world.types.iter().flat_map(|ty| match &ty.role {
+        Role::Robot(model) => model.body.sensors.as_slice(),
+        _ => &[],
+    });
+    let by_name: BTreeMap<&str, &MountedSensor> =
+        sensors.map(|sensor| (sensor.model.name.as_str(), sensor)).collect();
+    by_name.into_values()
+}
+
+/// Returns a note on the kinds that a sensor reads as nothing.
+fn unseen(world: &RobotsWorld, sensor: &MountedSensor) -> Option<Remark> {
+    let bodies = world.bodies.iter().map(|body| usize::from(world.type_of(body.id).kind));
+    let mut is_met = vec![false; world.kinds.len()];
+    bodies.chain([WALL]).for_each(|kind| is_met[kind] = true);
+    let model = &sensor.model;
+    let unseen = (WALL..world.kinds.len()).filter(|&k| is_met[k] && model.designates[k] == NOTHING);
+    let names: Vec<&str> = unseen.map(|k| world.kinds[k].as_str()).collect();
+    (!names.is_empty()).then(|| {
+        let names = names.join(", ");
+        let words = format!("it does not see {names}, nor anything that is hidden behind");
+        Remark::note(format!("sensors.{}", model.name), words)
+    })
+}
+
+/// Returns a note on the distance classes in which no box ever is.
+fn never_true(sensor: &MountedSensor) -> Option<Remark> {
+    let model = &sensor.model;
+    let classes = || sensor.boxes[0].iter().flat_map(|crossed| crossed.classes);
+    let never = (0..model.distance_classes.len()).filter(|&k| !classes().any(|c| c == k as u8));
+    let names: Vec<&str> = never.map(|k| model.distance_classes[k].as_str()).collect();
+    (!names.is_empty()).then(|| {
+        let words = format!(
+            "no box within its range of {} m is ever at the distance class {}: see \
+             distance_edges_m and map.box_size_m",
+            model.range_m,
+            names.join(", "),
+        );
+        Remark::note(format!("sensors.{}", model.name), words)
+    })
+}

@@ -1,0 +1,118 @@
+//! Remarks that need the sections of a scenario: on effectors, and on goals out of reach.
+
+use super::super::RobotsFile;
+use super::bodies::Group;
+use super::*;
+
+/// Returns warnings of effectors that move otherwise than their author may think.
+pub(super) fn on_effectors(
+    file: &RobotsFile,
+    box_size_m: f64,
+    effectors: &BTreeMap<String, Located<EffectorSection>>,
+) -> Vec<Remark> {
+    let sections = file.robots.0.iter().enumerate();
+    let remarks = sections.flat_map(|(k, section)| {
+        let name = section.get_ref().effector.as_ref().map(Spanned::get_ref);
+        let found = name.and_then(|name| Some((name, effectors.get(name)?)));
+        let words = found.map_or(vec![], |(name, at)| {
+            let mut words = not_as_meant(name, at);
+            words.extend(misfit(name, at.section.get_ref(), box_size_m));
+            words
+        });
+        words.into_iter().map(move |words| Remark::warning(format!("robots.{k}.effector"), words))
+    });
+    remarks.collect()
+}
+
+/// Behaviors that never say anything.
+const SILENT: [&str; 5] = ["wander", "shuttle", "goto", "replay", "random"];
+
+/// Returns a note on a radio over which nobody speaks.
+pub(super) fn on_radio(file: &RobotsFile) -> Option<Remark> {
+    let speaks = |section: &Spanned<RobotSection>| {
+        let behaviour = section.get_ref().behaviour.as_ref();
+        behaviour.is_some_and(|b| !SILENT.contains(&b.get_ref().kind.as_str()))
+    };
+    let is_idle = file.radio.is_some() && !file.robots.0.iter().any(speaks);
+    is_idle.then(|| Remark::note("radio", "nobody speaks: no robot has a behavior that broadcasts"))
+}
+
+/// Returns words for an effector that was learned for boxes of another size.
+fn misfit(name: &str, section: &EffectorSection, map_m: f64) -> Option<String> {
+    let box_m = section.box_m?.get();
+    ((box_m - map_m).abs() > 1e-9 * map_m).then(|| {
+        format!(
+            "`{name}` was learned for boxes of {box_m} m, and those of the map are {map_m} m: its \
+             slips are as many boxes, and so other lengths. Learn it with --box {map_m}, or set \
+             map.box_size_m = {box_m}"
+        )
+    })
+}
+
+/// Returns words for each action that mostly comes to something else than its first transition.
+fn not_as_meant(name: &str, at: &Located<EffectorSection>) -> Vec<String> {
+    let Ok(model) = tables::effector(name, at) else { return Vec::new() };
+    let actions = model.actions.iter().zip(&model.transitions);
+    let wrong = actions.filter_map(|(action, transitions)| {
+        let meant = &transitions[0];
+        let likeliest = transitions.iter().max_by(|a, b| a.p.total_cmp(&b.p))?;
+        (likeliest.p > meant.p).then(|| {
+            format!(
+                "`{action}` of `{name}` mostly comes to {} ({}), not to {} ({}), which is meant \
+                 because it is its first transition",
+                in_words(likeliest),
+                percent(likeliest.p),
+                in_words(meant),
+                percent(meant.p),
+            )
+        })
+    });
+    wrong.collect()
+}
+
+fn in_words(transition: &Transition) -> String {
+    let path: String = transition.path.iter().map(|side| side.letter()).collect();
+    let turn_deg = [0, 90, 180, -90][usize::from(transition.turn % 4)];
+    match (path.as_str(), turn_deg) {
+        ("", 0) => "staying in place".into(),
+        ("", _) => format!("a turn of {turn_deg} degrees"),
+        (_, 0) => format!("the path {path:?}"),
+        _ => format!("the path {path:?} and a turn of {turn_deg} degrees"),
+    }
+}
+
+fn percent(share: f64) -> String {
+    format!("{:.0} %", 100.0 * share)
+}
+
+impl Compiler<'_> {
+    /// Warns of robots that cannot reach all their goals; `groups` are those of the sections of
+    /// robots, in order, and each comes with the id of its first body.
+    pub(super) fn warn_of_goals<'g>(
+        &mut self,
+        groups: impl Iterator<Item = (&'g Group, EntityId)>,
+    ) {
+        for (k, (group, first)) in groups.enumerate() {
+            let ids = first..first + group.count as EntityId;
+            let missed: Vec<usize> = ids.map(|id| self.goals_out_of_reach(id)).collect();
+            let robots = missed.iter().filter(|goals| **goals > 0).count();
+            if robots > 0 {
+                let (all, goals) = (group.count, missed.iter().sum::<usize>());
+                let words = format!(
+                    "{robots} of {all} robots cannot reach a goal, {goals} goals in all: walls are \
+                     between it and their start, or the way is too narrow for them"
+                );
+                self.remarks.push(Remark::warning(format!("robots.{k}"), words));
+            }
+        }
+    }
+
+    fn goals_out_of_reach(&self, id: EntityId) -> usize {
+        let Role::Robot(model) = &self.types[usize::from(self.bodies[id as usize].ty)].role else {
+            return 0;
+        };
+        // Ways lead back as well, so whoever reaches a goal from its start reaches it from others.
+        let (col, row) = self.start[id as usize].0;
+        model.behaviour.ways().iter().filter(|way| !way.reaches_goal(col, row)).count()
+    }
+}
