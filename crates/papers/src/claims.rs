@@ -120,10 +120,14 @@ impl Comparison {
 
     fn of(estimate: &Estimate, threshold: f64, agrees: impl Fn(f64) -> bool) -> Self {
         let p = estimate.p_value(threshold).filter(|_| estimate.n >= LEAST_RUNS);
-        // Values that are all the threshold itself are surely not on the side of the claim.
-        let is_threshold = estimate.interval.is_some_and(|i| i.low == i.high) && p == Some(1.0);
-        let agrees = estimate.mean.is_some_and(agrees);
-        Self { agrees, p: if is_threshold { Some(0.0) } else { p } }
+        // Values that are all the threshold itself, but for rounding, are surely not on the side of
+        // the claim.
+        let is_threshold =
+            |i: &Interval| i.low == i.high && (i.low - threshold).abs() <= 1e-12 * threshold.abs();
+        if p.is_some() && estimate.interval.as_ref().is_some_and(is_threshold) {
+            return Self { agrees: false, p: Some(0.0) };
+        }
+        Self { agrees: estimate.mean.is_some_and(agrees), p }
     }
 
     /// Compares a claim's "in more than so large a share of all runs".
@@ -222,6 +226,8 @@ mod tests {
         assert_eq!(of(values(2.0, 0.1, 4)), Verdict::Undecided);
         assert_eq!(of(values(2.0, 0.0, 6)), Verdict::Held, "always the same");
         assert_eq!(of(values(1.0, 0.0, 6)), Verdict::Refuted, "never more");
+        let twice = Estimate::ratio(&[Some(0.2); 6], &[Some(0.1); 6]);
+        assert_eq!(judged([Comparison::above(&twice, 2.0)]), Verdict::Refuted, "nor by rounding");
         assert_eq!(judged([Comparison::below(&values(1.0, 0.0, 6), 1.0)]), Verdict::Refuted);
         assert_eq!(judged([]), Verdict::Undecided);
         let interval = |low, high| Comparison::interval_above(Some(Interval { low, high }), 0.0);
