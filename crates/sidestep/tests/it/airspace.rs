@@ -204,7 +204,7 @@ fn wrong_scenarios_are_refused_with_a_remedy() {
         (
             "[airspace]\ndeployment = \"team\"\n\
              network = { silent = [{ airplane = 1, from_s = 9, until_s = 3 }] }\n",
-            "until_s after from_s",
+            "the end after the start",
         ),
         (
             "[[airplanes]]\ntrack = [[0, 0, 0, 0], [1e-9, 1000, 0, 0], [9, 0, 0, 0]]\n",

@@ -22,8 +22,12 @@ type Policy = (&'static str, fn() -> Random);
 const UNIFORM: Policy = ("{ kind = \"random\" }", Random::uniform);
 const AHEAD: Policy =
     ("{ kind = \"replay\", actions = [\"forward\"], repeat = true }", || Random::always(FORWARD));
-/// Without sensors and voluntary turns the paper's basic behaviour bounces.
-const BOUNCE: Policy = ("{ kind = \"wander\", turn_every = 4000000000 }", Random::bounce);
+/// The paper's basic behavior without sensors and voluntary turns.
+const BOUNCE: Policy = (
+    "{ kind = \"random\", weights = { forward = 1 }, \
+     weights_after_contact = { left = 1, right = 1 } }",
+    Random::bounce,
+);
 /// Minds contacts, and mixes under every law: a robot that only bounces stands before a wall
 /// for ever where blocked transitions are struck out and so never become contacts.
 const EXPLORE: Policy = (

@@ -180,7 +180,7 @@ impl Compiler<'_> {
                 None => return Err(error(self.unknown_behaviour(other))),
             },
         };
-        let waits = ["wander", "shuttle", "goto", "random"].contains(&s.kind.as_str());
+        let waits = ["wander", "shuttle", "goto"].contains(&s.kind.as_str());
         let is_waiting = waits && !behaviour.asks() && self.has_no_contacts(body);
         Ok(if is_waiting { Arc::new(Patient { inner: behaviour }) } else { behaviour })
     }
