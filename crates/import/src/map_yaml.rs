@@ -15,7 +15,7 @@ pub(super) const MAX_YAML_BYTES: u64 = 64 << 10;
 const MAX_LINE_BYTES: usize = 1000;
 
 /// The largest turn of an image in radians: a whole turn, with room for rounding.
-const MAX_YAW_RAD: f64 = 6.2832;
+const MAX_YAW_RAD: f64 = std::f64::consts::TAU + 1e-3;
 
 /// The content of the YAML file.
 #[derive(Debug, PartialEq)]

@@ -5,7 +5,8 @@
 //! second derivative changes. Where these show that the first derivative only rises or only falls,
 //! it has at most one zero, which is found to rounding; else the interval is halved. So no approach
 //! is missed, however short. Two straight legs need neither halving nor a second guess: the zero of
-//! a linear function has a closed form.
+//! a linear function has a closed form. So do two legs of one turn rate, and have to: the distance
+//! in a formation never changes, so that no halving would show which way it turns.
 
 use super::motion::{Point, Pose, sinc};
 use sidestep_kernel::math;
@@ -13,10 +14,16 @@ use sidestep_kernel::math;
 /// Turn rate in radians per second below which a leg counts as straight: in a whole day it would
 /// turn by less than a tenth of a microradian.
 const STRAIGHT_RAD_S: f64 = 1e-12;
+/// Turn rate in radians per second from which on circles are small enough for exact centers.
+const ROUND_RAD_S: f64 = 1e-6;
 /// Difference of headings in radians below which they count as the same.
 const SAME_RAD: f64 = 1e-9;
 /// Length in seconds below which an interval is no longer halved.
 const FINEST_S: f64 = 1e-7;
+/// Length in seconds below which an interval may be given up because the distance hardly varies in it.
+const FLAT_S: f64 = 0.05;
+/// Meters by which the distance may vary in such an interval.
+const FLAT_M: f64 = 1e-7;
 /// Difference in seconds below which a moment is found.
 const FOUND_S: f64 = 1e-11;
 /// Meters by which two airplanes may seem too near because of rounding.
@@ -245,8 +252,40 @@ impl Pair<'_> {
     /// Adds the moments within an interval at which the distance turns from shrinking to growing or
     /// back, in order.
     fn turning_points(&self, (from_s, until_s): (f64, f64), found: &mut Vec<f64>) {
+        if self.turns_as_one() {
+            return self.alignments((from_s, until_s), found);
+        }
         let ends = [self.slope(from_s).0, self.slope(until_s).0];
         self.search((from_s, until_s), ends, self.most_bend(from_s, until_s), found);
+    }
+
+    /// Returns whether both turn at one rate in the same air, so that one is on a circle as the other sees it.
+    fn turns_as_one(&self) -> bool {
+        let Pair { a, b } = self;
+        let rates = |leg: &Leg| (leg.omega_rad_s, leg.drift_m_s);
+        rates(a) == rates(b) && a.omega_rad_s.abs() >= ROUND_RAD_S
+    }
+
+    /// Adds the moments at which one, on its circle about the other, is on the line through the other and the
+    /// circle's center: there the distance turns.
+    fn alignments(&self, (from_s, until_s): (f64, f64), found: &mut Vec<f64>) {
+        let omega_rad_s = self.a.omega_rad_s;
+        let Motion { at, velocity: [vx, vy], .. } = self.motion(from_s);
+        let radius = [vy / omega_rad_s, -vx / omega_rad_s];
+        let center = [at[0] - radius[0], at[1] - radius[1]];
+        let least_m2 = dot(radius, radius).min(dot(center, center));
+        // The distance varies by twice the lesser of the two lengths.
+        if 4.0 * least_m2 < ROUNDED_M * ROUNDED_M {
+            return;
+        }
+        let cross = radius[0] * center[1] - radius[1] * center[0];
+        let half_turn_s = std::f64::consts::PI / omega_rad_s.abs();
+        let first_s = math::atan2(cross, dot(radius, center)) / omega_rad_s;
+        let mut s = if first_s < 0.0 { first_s + half_turn_s } else { first_s };
+        while s < until_s - from_s {
+            found.push(from_s + s);
+            s += half_turn_s;
+        }
     }
 
     /// Returns a bound on how fast half of the second derivative changes in an interval.
@@ -282,6 +321,12 @@ impl Pair<'_> {
                 let slope = |t_s: f64| self.slope(t_s);
                 found.push(zero_s((from_s, until_s), ends[0] < 0.0, slope));
             }
+            return;
+        }
+        // Half the squared distance varies by no more than this. In a formation that is next to nothing long
+        // before the interval is as short as can be.
+        let varies_m2 = 2.0 * half_s * (at_middle.abs() + half_s * (change.abs() + bend * half_s));
+        if half_s < FLAT_S && varies_m2 < FLAT_M * self.apart_m(middle_s) {
             return;
         }
         self.search((from_s, middle_s), [ends[0], at_middle], bend, found);
@@ -373,6 +418,17 @@ mod tests {
         assert_eq!(approach(&still, &beside.climbing(300.0, 0.0), ZONE).nearest_m, f64::INFINITY);
     }
 
+    #[test]
+    fn a_formation_keeps_its_distance_in_every_turn() {
+        for (omega_rad_s, apart_m) in [(0.05, 0.0), (-0.1, 40.0), (1e-7, 0.0), (1e-7, 700.0)] {
+            let a = leg([0.0, 0.0], 0.3, 250.0, omega_rad_s);
+            let b = leg([apart_m, 0.0], 0.3, 250.0, omega_rad_s);
+            let found = approach(&a, &b, ZONE);
+            assert!((found.nearest_m - apart_m).abs() < 1e-6, "{omega_rad_s}: {found:?}");
+            assert_eq!(found.losses, u32::from(apart_m < ZONE.gap_m));
+        }
+    }
+
     proptest! {
         /// However two airplanes turn, dense sampling finds no nearer moment, and as much time below
         /// the separation.
@@ -381,7 +437,9 @@ mod tests {
             x in -2000.0f64..2000.0, y in -2000.0f64..2000.0, heading_rad in -3.2f64..3.2,
             v in prop::array::uniform2(5.0f64..120.0), omega in prop::array::uniform2(-0.2f64..0.2),
             wind in prop::array::uniform2(-9.0f64..9.0), gap_m in 1.0f64..900.0,
+            as_one in any::<bool>(),
         ) {
+            let (omega, wind) = if as_one { ([omega[0]; 2], [0.0; 2]) } else { (omega, wind) };
             let a = leg([0.0, 0.0], 0.0, v[0], omega[0]);
             let b = leg([x, y], heading_rad, v[1], omega[1]).in_wind(wind);
             let found = approach(&a, &b, Zone { gap_m, ..ZONE });

@@ -12,10 +12,8 @@ use std::f64::consts::TAU;
 
 /// Returns the metrics of a flight to its end, and checks the promise of the shield.
 fn flown(name: &str, text: &str, shield: &str, method: &str) -> Metrics {
-    let mut set = vec![
-        format!("airspace.shield=\"{shield}\""),
-        format!("airspace.method=\"{method}\""),
-    ];
+    let mut set =
+        vec![format!("airspace.shield=\"{shield}\""), format!("airspace.method=\"{method}\"")];
     if text.contains("\ntrack = ") {
         set.push("airspace.replay_until_s=0".into());
     }
