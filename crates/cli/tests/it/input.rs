@@ -136,7 +136,7 @@ const PGM: &str = "P2\n3 2\n255\n254 254 254\n254 254 254\n";
 fn a_damaged_map_is_refused_by_run_and_by_map() {
     let cases = [
         ("truncated image", YAML.to_string(), "P2\n3 2\n255\n254 254\n".to_string(), "m.pgm"),
-        ("rotated map", YAML.replace("0, 0, 0", "0, 0, 0.7"), PGM.into(), "m.yaml:3:"),
+        ("a turn of many turns", YAML.replace("0, 0, 0", "0, 0, 70"), PGM.into(), "m.yaml:3:"),
         ("a resolution of 0", YAML.replace("0.5", "0.0"), PGM.into(), "m.yaml:2:"),
         ("absurd image", YAML.into(), PGM.replace("3 2", "4000000000 4000000000"), "m.pgm"),
         ("absurd boxes", YAML.replace("0.5", "1e9"), PGM.into(), "boxes"),

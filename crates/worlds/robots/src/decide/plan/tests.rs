@@ -201,7 +201,6 @@ fn where_contacts_are_impossible_robots_that_wait_for_one_find_a_way_on() {
     let map = room(20, 5);
     for behaviour in [
         "{ kind = \"wander\" }",
-        "{ kind = \"random\", weights = { forward = 1 }, weights_after_contact = { left = 1 } }",
         "{ kind = \"shuttle\", a = [1, 1, 2, 5], b = [19, 1, 2, 5], avoidance = \"touch\" }",
     ] {
         let mut run = start(

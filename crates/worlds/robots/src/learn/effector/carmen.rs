@@ -211,7 +211,7 @@ mod tests {
     fn odometry_that_slips_sideways_is_warned_of_with_both_figures() {
         let warnings = |slip| learned(&slipping(slip)).report.warnings;
         assert!(warnings(0.03)[0].contains("slips sideways by 3.6 %"), "{:?}", warnings(0.03));
-        assert!(warnings(0.03)[0].contains("3.4 % by the standard deviation of all"));
+        assert!(warnings(0.03)[0].contains("3.3 % by the standard deviation of all"));
         assert_eq!(warnings(0.01), Vec::<String>::new());
     }
 
