@@ -215,7 +215,7 @@ mod tests {
 
     #[test]
     fn boxes_keep_the_plane_the_size_and_the_rows_from_the_bottom() {
-        let plane = Plane { origin_m: [-3.0, 4.0], yaw_rad: 3.14 };
+        let plane = Plane { origin_m: [-3.0, 4.0], yaw_rad: 3.0 };
         let map = PixelMap::new(1, 2, 0.5, plane, vec![Wall, Free]);
         let boxes = map.to_boxes(0.5, UnknownPolicy::Wall).expect("boxes");
         assert_eq!((boxes.plane, boxes.box_size_m), (plane, 0.5));

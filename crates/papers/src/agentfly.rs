@@ -6,8 +6,8 @@
 //! here. Both deployments choose the same controls, so flights are the same.
 //!
 //! Time is that of deciding, which is measured, and of transmission, which follows from the messages
-//! and bytes that are counted: every airplane has one transmitter of [`LINK_BIT_S`], and a message is
-//! under way for [`LATENCY_S`]. A coordinator's hops follow one another; agents of a team send at the
+//! and bytes that are counted: every airplane has one transmitter of 100 Mbit/s, and a message is
+//! under way for 1 ms. A coordinator's hops follow one another; agents of a team send at the
 //! same time, everybody to each of the others in turn.
 
 use crate::cells::{Cell, Columns, Run, Runs, Value, column, figure, series};

@@ -47,7 +47,7 @@ pub struct SensorModel {
 
 impl SensorModel {
     /// Returns the class of a distance in boxes of side `box_size_m`. A distance equal to an edge is
-    /// in the upper class, see [`reaches`].
+    /// in the upper class.
     pub fn class_of(&self, distance: f64, box_size_m: f64) -> u8 {
         let is_beyond = |&&edge_m: &&f64| reaches(distance, edge_m / box_size_m);
         self.distance_edges_m.iter().filter(is_beyond).count() as u8

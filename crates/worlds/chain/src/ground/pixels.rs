@@ -281,7 +281,7 @@ mod tests {
     #[test]
     fn a_turned_map_has_its_walls_where_the_world_has_them() {
         let pixels = [Cell::Free, Cell::Wall, Cell::Free, Cell::Free, Cell::Free, Cell::Free];
-        for yaw_rad in [0.0, 0.5, 3.14] {
+        for yaw_rad in [0.0, 0.5, 3.0] {
             let plane = Plane { origin_m: [1.0, 2.0], yaw_rad };
             let map = PixelMap::new(3, 2, 0.5, plane, pixels.to_vec());
             let floor = Floor::of_map(&map, UnknownPolicy::Wall);
