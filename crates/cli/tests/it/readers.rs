@@ -175,7 +175,7 @@ world = "airspace"
 name = "traffic"
 cycles = 90
 [airspace]
-method = "mvp"
+method = "none"
 shield = "off"
 wind_m_s = [4.0, -3.0]
 replay_until_s = inf
