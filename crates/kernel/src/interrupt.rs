@@ -33,9 +33,17 @@ struct Interrupted;
 #[derive(Debug)]
 struct Deserted;
 
+/// The interrupt that a thread heeds. Looks are counted by the thread alone, so that workers which look all the
+/// time do not wait for each other's cache lines.
+#[derive(Debug)]
+struct Heed {
+    interrupt: Interrupt,
+    looks: u64,
+}
+
 thread_local! {
     /// The interrupt that the present computation of this thread heeds.
-    static HEEDED: RefCell<Option<Interrupt>> = const { RefCell::new(None) };
+    static HEEDED: RefCell<Option<Heed>> = const { RefCell::new(None) };
 }
 
 /// Looks at the interrupt that this thread heeds, if it heeds any. A computation calls it at least
@@ -46,9 +54,16 @@ thread_local! {
 /// from that of a bug.
 #[inline]
 pub fn look() {
-    let is_raised = HEEDED.with_borrow(|heeded| heeded.as_ref().is_some_and(Interrupt::seen));
+    let is_raised = HEEDED.with_borrow_mut(|heeded| heeded.as_mut().is_some_and(Heed::look));
     if is_raised {
         resume_unwind(Box::new(Interrupted));
+    }
+}
+
+impl Heed {
+    fn look(&mut self) -> bool {
+        self.looks += 1;
+        self.interrupt.0.is_raised.load(Relaxed)
     }
 }
 
@@ -60,15 +75,10 @@ impl Interrupt {
 
     /// Lets this thread heed the interrupt until the answer is dropped.
     pub fn heeded_here(&self) -> Heeded {
-        Heeded { before: HEEDED.replace(Some(self.clone())) }
+        Heeded { before: HEEDED.replace(Some(Heed { interrupt: self.clone(), looks: 0 })) }
     }
 
-    fn seen(&self) -> bool {
-        self.0.looks.fetch_add(1, Relaxed);
-        self.0.is_raised.load(Relaxed)
-    }
-
-    /// Number of looks so far, for tests of how often a computation looks.
+    /// Number of looks by threads that no longer heed it, for tests of how often a computation looks.
     pub fn looks(&self) -> u64 {
         self.0.looks.load(Relaxed)
     }
@@ -84,12 +94,14 @@ impl Interrupt {
 /// A while in which a thread heeds an interrupt.
 #[derive(Debug)]
 pub struct Heeded {
-    before: Option<Interrupt>,
+    before: Option<Heed>,
 }
 
 impl Drop for Heeded {
     fn drop(&mut self) {
-        HEEDED.set(self.before.take());
+        if let Some(Heed { interrupt, looks }) = HEEDED.replace(self.before.take()) {
+            interrupt.0.looks.fetch_add(looks, Relaxed);
+        }
     }
 }
 

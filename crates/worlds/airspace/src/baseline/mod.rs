@@ -51,3 +51,18 @@ fn minus(a: Point, b: Point) -> Point {
 fn length(a: Point) -> f64 {
     math::hypot(a[0], a[1])
 }
+
+/// Returns an airplane at 35 m/s that wants to keep its heading, as tests of all methods have it.
+#[cfg(test)]
+fn moving(slot: Slot, at: Point, heading_rad: f64) -> Moving {
+    Moving {
+        slot,
+        at,
+        heading_rad,
+        velocity: [35.0 * math::cos(heading_rad), 35.0 * math::sin(heading_rad)],
+        preferred_rad: heading_rad,
+        separation_m: 500.0,
+        levels: Levels::at(0.0),
+        yields: true,
+    }
+}

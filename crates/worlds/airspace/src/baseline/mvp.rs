@@ -132,23 +132,10 @@ fn is_on(own: &Moving, other: &Moving, settings: Reactive) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::flight::Levels;
+    use super::super::moving;
     use super::*;
 
     const SETTINGS: Reactive = Reactive { look_ahead_s: 90.0, margin: 1.0 };
-
-    fn moving(slot: Slot, at: Point, heading_rad: f64) -> Moving {
-        Moving {
-            slot,
-            at,
-            heading_rad,
-            velocity: [35.0 * math::cos(heading_rad), 35.0 * math::sin(heading_rad)],
-            preferred_rad: heading_rad,
-            separation_m: 500.0,
-            levels: Levels::at(0.0),
-            yields: true,
-        }
-    }
 
     fn looked(all: &[Moving], memory: &mut [Resolving]) -> Vec<Option<f64>> {
         headings(all, memory, SETTINGS, |_, _| true)

@@ -86,26 +86,13 @@ fn half_plane(own: &Moving, other: &Moving, settings: Reactive, step_s: f64) -> 
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::flight::Levels;
+    use super::super::moving;
     use super::*;
     use dodgy_2d::{Agent, AvoidanceOptions, Vec2};
     use proptest::prelude::*;
     use std::borrow::Cow;
 
     const SETTINGS: Reactive = Reactive { look_ahead_s: 60.0, margin: 1.05 };
-
-    fn moving(slot: u32, at: Point, heading_rad: f64) -> Moving {
-        Moving {
-            slot,
-            at,
-            heading_rad,
-            velocity: [35.0 * math::cos(heading_rad), 35.0 * math::sin(heading_rad)],
-            preferred_rad: heading_rad,
-            separation_m: 500.0,
-            levels: Levels::at(0.0),
-            yields: true,
-        }
-    }
 
     /// The velocity that another implementation chooses, without a limit of speed.
     fn by_library(own: &Moving, other: &Moving) -> Point {

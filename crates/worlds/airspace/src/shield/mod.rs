@@ -53,7 +53,7 @@ mod plan;
 #[cfg(test)]
 mod price;
 #[cfg(test)]
-mod promise;
+pub(crate) mod promise;
 mod search;
 #[cfg(test)]
 mod tests;

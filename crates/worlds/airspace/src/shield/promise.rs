@@ -21,10 +21,10 @@ fn plane(at: [f64; 2], heading_deg: f64, goal: [f64; 2], more: &str) -> String {
     )
 }
 
-type Pairs = BTreeSet<(u32, u32)>;
+pub(crate) type Pairs = BTreeSet<(u32, u32)>;
 
 /// Returns the pairs that lost separation, and those that were named, also for their errors.
-fn lost_and_named(run: &AirspaceRun) -> (Pairs, Pairs) {
+pub(crate) fn lost_and_named(run: &AirspaceRun) -> (Pairs, Pairs) {
     let ledger = &run.books().ledger;
     let lost = ledger.pairs.iter().filter(|(_, record)| record.losses > 0).map(|(pair, _)| *pair);
     let errs = |id: &u32| ledger.beyond_bound.contains_key(id);
