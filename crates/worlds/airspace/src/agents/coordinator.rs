@@ -31,6 +31,7 @@ use crate::objective::{Options, couple, own_costs};
 pub use migration::{Journey, Migration};
 use serde::{Deserialize, Serialize};
 use sidestep_collectives::{Estimator, PairwiseGame, Player, optimize};
+use sidestep_kernel::interrupt;
 
 /// A coordinator's data about one airplane.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -236,6 +237,7 @@ fn sampled(team: &mut [Coordinator], (block, ageing): (usize, f64), migration: &
     let hosts = migration.hosts;
     let settings = migration.settings();
     loop {
+        interrupt::look();
         let mut above = gather(team, migration, Some(block));
         let change = learn(&mut above, &hosts[0], (block, ageing));
         above.calm = settings.stop.calm(above.calm, change);

@@ -10,6 +10,7 @@ use crate::purpose;
 use crate::state::AirspaceState;
 use crate::world::AirspaceWorld;
 use sidestep_kernel::distr::Chance;
+use sidestep_kernel::interrupt;
 use sidestep_kernel::math;
 use sidestep_kernel::ports::{Envelope, MemoryTransport, Transport};
 use sidestep_kernel::stream::Streams;
@@ -173,6 +174,7 @@ pub(super) fn run<A: Agent>(
     endpoints.iter_mut().for_each(|endpoint| endpoint.start(&mut transport, begin));
     let mut now = begin;
     while !endpoints.iter().all(Endpoint::is_done) {
+        interrupt::look();
         let timers = endpoints.iter().filter_map(Endpoint::next_timer);
         let next = timers.chain(transport.memory.next_arrival()).min().unwrap_or(end);
         now = next.min(end);

@@ -14,8 +14,6 @@ use sidestep_kernel::math;
 /// Turn rate in radians per second below which a leg counts as straight: in a whole day it would
 /// turn by less than a tenth of a microradian.
 const STRAIGHT_RAD_S: f64 = 1e-12;
-/// Turn rate in radians per second from which on circles are small enough for exact centers.
-const ROUND_RAD_S: f64 = 1e-6;
 /// Difference of headings in radians below which they count as the same.
 const SAME_RAD: f64 = 1e-9;
 /// Length in seconds below which an interval is no longer halved.
@@ -250,39 +248,43 @@ impl Pair<'_> {
     }
 
     /// Adds the moments within an interval at which the distance turns from shrinking to growing or
-    /// back, in order.
-    fn turning_points(&self, (from_s, until_s): (f64, f64), found: &mut Vec<f64>) {
+    /// back, in order. Returns the number of intervals that it took.
+    fn turning_points(&self, (from_s, until_s): (f64, f64), found: &mut Vec<f64>) -> u64 {
         if self.turns_as_one() {
-            return self.alignments((from_s, until_s), found);
+            self.alignments((from_s, until_s), found);
+            return 1;
         }
         let ends = [self.slope(from_s).0, self.slope(until_s).0];
-        self.search((from_s, until_s), ends, self.most_bend(from_s, until_s), found);
+        self.search((from_s, until_s), ends, self.most_bend(from_s, until_s), found)
     }
 
     /// Returns whether both turn at one rate in the same air, so that one is on a circle as the other sees it.
     fn turns_as_one(&self) -> bool {
         let Pair { a, b } = self;
         let rates = |leg: &Leg| (leg.omega_rad_s, leg.drift_m_s);
-        rates(a) == rates(b) && a.omega_rad_s.abs() >= ROUND_RAD_S
+        rates(a) == rates(b) && a.omega_rad_s != 0.0
     }
 
     /// Adds the moments at which one, on its circle about the other, is on the line through the other and the
     /// circle's center: there the distance turns.
+    ///
+    /// The relative velocity `w` turns as both do, so that half of the first derivative of the squared distance
+    /// from `d` is `d·w cos(ωs) + (d×w + w²/ω) sin(ωs)` (`d×w` with the normal that `w` turns to). Its zeros are
+    /// computed without the center, which is far away where both fly almost straight.
     fn alignments(&self, (from_s, until_s): (f64, f64), found: &mut Vec<f64>) {
-        let omega_rad_s = self.a.omega_rad_s;
+        let (omega_rad_s, long_s) = (self.a.omega_rad_s, until_s - from_s);
         let Motion { at, velocity: [vx, vy], .. } = self.motion(from_s);
-        let radius = [vy / omega_rad_s, -vx / omega_rad_s];
-        let center = [at[0] - radius[0], at[1] - radius[1]];
-        let least_m2 = dot(radius, radius).min(dot(center, center));
-        // The distance varies by twice the lesser of the two lengths.
-        if 4.0 * least_m2 < ROUNDED_M * ROUNDED_M {
+        let cos_part = -omega_rad_s * dot(at, [vx, vy]);
+        let sin_part = omega_rad_s * dot(at, [-vy, vx]) + dot([vx, vy], [vx, vy]);
+        let half_turn_s = std::f64::consts::PI / omega_rad_s.abs();
+        // Half the squared distance varies by no more than this: in a formation by nothing but rounding.
+        let steepest_m2_s = math::hypot(cos_part, sin_part) / omega_rad_s.abs();
+        if is_flat(steepest_m2_s * long_s.min(half_turn_s), math::hypot(at[0], at[1])) {
             return;
         }
-        let cross = radius[0] * center[1] - radius[1] * center[0];
-        let half_turn_s = std::f64::consts::PI / omega_rad_s.abs();
-        let first_s = math::atan2(cross, dot(radius, center)) / omega_rad_s;
+        let first_s = math::atan2(cos_part * sin_part.signum(), sin_part.abs()) / omega_rad_s;
         let mut s = if first_s < 0.0 { first_s + half_turn_s } else { first_s };
-        while s < until_s - from_s {
+        while s < long_s {
             found.push(from_s + s);
             s += half_turn_s;
         }
@@ -290,28 +292,48 @@ impl Pair<'_> {
 
     /// Returns a bound on how fast half of the second derivative changes in an interval.
     fn most_bend(&self, from_s: f64, until_s: f64) -> f64 {
-        let sum = |of: fn(&Leg) -> f64| of(self.a) + of(self.b);
-        let pull = sum(|leg| leg.v_m_s * leg.omega_rad_s.abs());
-        if pull == 0.0 {
-            return 0.0;
-        }
-        let jerk = sum(|leg| leg.v_m_s * leg.omega_rad_s * leg.omega_rad_s);
-        let (start, s) = (self.motion(from_s), until_s - from_s);
-        let speed_m_s = math::hypot(start.velocity[0], start.velocity[1]) + pull * s;
+        let s = until_s - from_s;
+        let [speed_m_s, pull, jerk] = self.most_apart(from_s, until_s);
+        let start = self.motion(from_s);
+        let speed_m_s = speed_m_s.min(math::hypot(start.velocity[0], start.velocity[1]) + pull * s);
         let apart_m = math::hypot(start.at[0], start.at[1]) + speed_m_s * s;
         3.0 * speed_m_s * pull + apart_m * jerk
     }
 
+    /// Returns bounds on the relative velocity, acceleration and jerk in an interval. These are differences of
+    /// two turning vectors, which are small where the vectors have almost one length and direction, as those of
+    /// airplanes that fly almost in formation.
+    fn most_apart(&self, from_s: f64, until_s: f64) -> [f64; 3] {
+        let Pair { a, b } = self;
+        let heading_rad =
+            |leg: &Leg| leg.pose.heading_rad + leg.omega_rad_s * (from_s - leg.from_s);
+        let between_rad = math::wrap_angle(heading_rad(b) - heading_rad(a)).abs()
+            + (b.omega_rad_s - a.omega_rad_s).abs() * (until_s - from_s);
+        let bound = |length: fn(&Leg) -> f64| {
+            let (a, b) = (length(a), length(b));
+            let least = a.abs().min(b.abs());
+            (a.abs() + b.abs()).min((a - b).abs() + least * between_rad)
+        };
+        let wind_m_s =
+            math::hypot(b.drift_m_s[0] - a.drift_m_s[0], b.drift_m_s[1] - a.drift_m_s[1]);
+        [
+            wind_m_s + bound(|leg| leg.v_m_s),
+            bound(|leg| leg.v_m_s * leg.omega_rad_s),
+            bound(|leg| leg.v_m_s * leg.omega_rad_s * leg.omega_rad_s),
+        ]
+    }
+
+    /// Adds the zeros of the slope. Returns the number of intervals that it took.
     fn search(
         &self,
         (from_s, until_s): (f64, f64),
         ends: [f64; 2],
         bend: f64,
         found: &mut Vec<f64>,
-    ) {
+    ) -> u64 {
         let half_s = 0.5 * (until_s - from_s);
         if half_s < FINEST_S {
-            return;
+            return 1;
         }
         let middle_s = from_s + half_s;
         let (at_middle, change) = self.slope(middle_s);
@@ -321,16 +343,16 @@ impl Pair<'_> {
                 let slope = |t_s: f64| self.slope(t_s);
                 found.push(zero_s((from_s, until_s), ends[0] < 0.0, slope));
             }
-            return;
+            return 1;
         }
         // Half the squared distance varies by no more than this. In a formation that is next to nothing long
         // before the interval is as short as can be.
         let varies_m2 = 2.0 * half_s * (at_middle.abs() + half_s * (change.abs() + bend * half_s));
-        if half_s < FLAT_S && varies_m2 < FLAT_M * self.apart_m(middle_s) {
-            return;
+        if half_s < FLAT_S && is_flat(varies_m2, self.apart_m(middle_s)) {
+            return 1;
         }
-        self.search((from_s, middle_s), [ends[0], at_middle], bend, found);
-        self.search((middle_s, until_s), [at_middle, ends[1]], bend, found);
+        let before = self.search((from_s, middle_s), [ends[0], at_middle], bend, found);
+        before + self.search((middle_s, until_s), [at_middle, ends[1]], bend, found)
     }
 
     /// Returns when the distance passes `gap_m` in an interval in which it only grows or only
@@ -341,6 +363,11 @@ impl Pair<'_> {
             (0.5 * (dot(at, at) - gap_m * gap_m), dot(at, velocity))
         })
     }
+}
+
+/// Returns whether a distance is next to constant, by how much half its square varies.
+fn is_flat(varies_m2: f64, apart_m: f64) -> bool {
+    varies_m2 < FLAT_M * apart_m.max(0.5 * FLAT_M)
 }
 
 fn dot(a: Point, b: Point) -> f64 {
@@ -420,12 +447,48 @@ mod tests {
 
     #[test]
     fn a_formation_keeps_its_distance_in_every_turn() {
-        for (omega_rad_s, apart_m) in [(0.05, 0.0), (-0.1, 40.0), (1e-7, 0.0), (1e-7, 700.0)] {
+        for (omega_rad_s, apart_m) in
+            [(0.05, 0.0), (-0.1, 40.0), (1e-7, 0.0), (-1e-7, 700.0), (1e-11, 40.0)]
+        {
             let a = leg([0.0, 0.0], 0.3, 250.0, omega_rad_s);
             let b = leg([apart_m, 0.0], 0.3, 250.0, omega_rad_s);
             let found = approach(&a, &b, ZONE);
             assert!((found.nearest_m - apart_m).abs() < 1e-6, "{omega_rad_s}: {found:?}");
             assert_eq!(found.losses, u32::from(apart_m < ZONE.gap_m));
+        }
+    }
+
+    #[test]
+    fn next_to_a_formation_few_intervals_are_looked_at() {
+        for omega_rad_s in [0.05, -0.1, 1e-7] {
+            for off in [1e-3, 1e-6, 1e-9, 1e-12] {
+                for apart_m in [0.0, 1e-3, 40.0] {
+                    let a = leg([0.0, 0.0], 0.3, 250.0, omega_rad_s);
+                    let b = leg([apart_m, 0.0], 0.3 + off, 250.0, omega_rad_s * (1.0 + off));
+                    let pair = Pair { a: &a, b: &b };
+                    let looks = pair.turning_points((0.0, 60.0), &mut Vec::new());
+                    assert!(looks < 20_000, "{omega_rad_s} {off} {apart_m}: {looks} intervals");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn almost_straight_airplanes_of_one_turn_rate_pass_as_straight_ones() {
+        for omega_rad_s in [1e-5, 1e-7, -1e-9, 1e-11] {
+            let a = leg([0.0, 0.0], 0.0, 35.0, omega_rad_s);
+            let b = leg([1007.0, 30.0], 3.0, 30.0, omega_rad_s);
+            let straight = approach(
+                &leg([0.0, 0.0], 0.0, 35.0, 0.0),
+                &leg([1007.0, 30.0], 3.0, 30.0, 0.0),
+                ZONE,
+            );
+            let found = approach(&a, &b, ZONE);
+            let off_m = 1e4 * omega_rad_s.abs() * 60.0 + 1e-9;
+            assert!(
+                (found.nearest_m - straight.nearest_m).abs() < off_m,
+                "{omega_rad_s}: {found:?}, {straight:?}"
+            );
         }
     }
 
