@@ -1,12 +1,14 @@
 //! The command line: options of every command, and examples.
 
-use crate::commands::Command;
-use clap::Parser;
+use crate::commands::{Command, GROUPS};
+use clap::builder::Styles;
+use clap::{CommandFactory, FromArgMatches, Parser};
+use std::fmt::Write;
 
 /// Display order of global options: after those of each command.
 const LAST: usize = 900;
 
-/// Simulate and compare decentralized multi-agent motion, with noisy sensors and slipping wheels.
+/// Simulate and compare decentralized motion of many agents that must not collide.
 #[derive(Debug, Parser)]
 #[command(name = "sidestep", version = sidestep::BUILD, after_help = EXAMPLES, arg_required_else_help = true)]
 pub(crate) struct Cli {
@@ -28,5 +30,67 @@ Get started:
   sidestep check first.toml           see what it describes
   sidestep run first.toml --out runs/first
 
-Exit codes: 0 done, 1 the command failed or the answer is no, 2 the input is wrong,
-130 interrupted.";
+Exit codes: 0 done, 1 the command failed or the answer is no, \
+2 the input is wrong, 130 interrupted.";
+
+impl Cli {
+    /// Returns the arguments of this process; ends it when they are wrong, or ask for help.
+    pub(crate) fn of_process() -> Self {
+        let matches = command().get_matches();
+        Self::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
+    }
+}
+
+/// Returns the command line, whose help lists the commands by what people do with them.
+pub(crate) fn command() -> clap::Command {
+    let command = Cli::command();
+    let listed = listed(&command);
+    command.help_template(format!(
+        "{{about-with-newline}}\n{{usage-heading}} {{usage}}\n\n{listed}{}\n{{options}}{{after-help}}",
+        heading("Options")
+    ))
+}
+
+fn heading(words: &str) -> String {
+    let style = *Styles::styled().get_header();
+    format!("{style}{words}:{style:#}")
+}
+
+fn listed(command: &clap::Command) -> String {
+    let style = *Styles::styled().get_literal();
+    let mut text = String::new();
+    for (group, names) in GROUPS {
+        let _ = writeln!(text, "{}", heading(group));
+        for name in *names {
+            let about = command.find_subcommand(name).and_then(clap::Command::get_about);
+            let about = about.map(ToString::to_string).unwrap_or_default();
+            let _ = writeln!(text, "  {style}{name:<11}{style:#} {about}");
+        }
+        text.push('\n');
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_command_is_listed_once_in_80_columns() {
+        let command = command();
+        let mut listed: Vec<&str> = GROUPS.iter().flat_map(|(_, names)| *names).copied().collect();
+        let mut all: Vec<&str> = command.get_subcommands().map(clap::Command::get_name).collect();
+        listed.sort_unstable();
+        all.sort_unstable();
+        assert_eq!(listed, all);
+        for one in command.get_subcommands() {
+            let about = one.get_about().expect("every command says what it does").to_string();
+            assert!(about.len() <= 80 - 14, "{}: {} columns", one.get_name(), about.len());
+        }
+    }
+
+    #[test]
+    fn the_command_line_is_without_contradictions() {
+        command().debug_assert();
+    }
+}

@@ -22,11 +22,10 @@ mod report;
 mod sweep;
 mod watch;
 
-use clap::Parser;
 use exit::ExitCode;
 
 fn main() -> std::process::ExitCode {
-    let cli = args::Cli::parse();
+    let cli = args::Cli::of_process();
     let console = console::Console::new(cli.json, cli.quiet);
     match commands::execute(cli.command, &console) {
         Ok(code) => code.into(),

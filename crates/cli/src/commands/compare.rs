@@ -14,7 +14,7 @@ use sidestep_report::markdown;
 const EXAMPLES: &str = "\
 Examples:
   sidestep compare scenarios/airspace/superconflict.toml --runs 20
-  sidestep compare superconflict.toml --methods pc,mvp --set airspace.shield=off --json";
+  sidestep compare sky.toml --methods pc,mvp --set airspace.shield=off --json";
 
 /// Compare collision avoidance methods on the same air traffic.
 #[derive(Debug, Args)]

@@ -18,12 +18,12 @@ const EXAMPLES: &str = "\
 Examples:
   sidestep exact scenarios/robots/one-robot.toml
   sidestep exact office.toml --set robots.count=1 --policy bounce --json
-  sidestep exact one-robot.toml --runs 2000 --cycles 50     compare the simulator with it
+  sidestep exact one-robot.toml --runs 2000 --cycles 50  compare the simulator
   sidestep exact one-robot.toml --pomdp model.pomdp --goal 5,3 --beam sonar-8:0
 
-The scenario has one robot; doors stay closed, and nobody else moves. The policy replaces the
-robot's behavior: `uniform` takes each standard action with the same probability, `forward` goes
-ahead, `bounce` goes ahead and turns after a contact. A simulator that disagrees ends with exit
+The scenario has one robot; doors stay closed, and nobody else moves. The policy replaces the \
+robot's behavior: `uniform` takes each standard action with the same probability, `forward` goes \
+ahead, `bounce` goes ahead and turns after a contact. A simulator that disagrees ends with exit \
 code 1.";
 
 /// Compute the exact Markov chain of a scenario with one robot.

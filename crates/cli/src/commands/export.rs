@@ -15,14 +15,14 @@ use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
 Examples:
-  sidestep export runs/office --to csv                     runs/office-csv/, a file per table
+  sidestep export runs/office --to csv              runs/office-csv/
   sidestep export runs/office --to parquet --table trajectories
-  sidestep export runs/office --to mcap --every 10         runs/office.mcap, for Foxglove
+  sidestep export runs/office --to mcap --every 10  runs/office.mcap, for Foxglove
   sidestep export runs/office --to gif --from 1000 --until 2000
-  sidestep export runs/office --to png --from 1234         the state at the start of this cycle
-  sidestep export office.mcap --to mp4-frames              frames, and the ffmpeg call that joins them
+  sidestep export runs/office --to png --from 1234  one moment
+  sidestep export office.mcap --to mp4-frames       frames, and a call of ffmpeg
 
-Tables are copied from the run folder. Everything else is computed again from the recorded
+Tables are copied from the run folder. Everything else is computed again from the recorded \
 scenario; an export that includes the recorded end confirms the recorded digest there.";
 
 /// The output formats.

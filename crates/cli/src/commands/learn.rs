@@ -17,32 +17,35 @@ use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
 Examples:
-  sidestep learn sensor --mrclam logs/mrclam7 --profile create.toml --name camera
-  sidestep learn effector --mrclam logs/mrclam7 --box 0.25 --profile create.toml --name create
+  sidestep learn sensor --mrclam logs/hall --profile my.toml --name camera
+  sidestep learn effector --mrclam logs/hall --box 0.25 \\
+      --profile my.toml --name create
   sidestep learn effector --carmen intel.log.gz --json | jq .transitions
 
-A scenario uses what was learned with profiles = [\"create.toml\"], sensors = [\"camera\"] and
+A scenario uses what was learned with profiles = [\"my.toml\"], sensors = [\"camera\"] and \
 effector = \"create\". Files may be packed with gzip.";
 
 const SENSOR_EXAMPLES: &str = "\
 Examples:
-  sidestep learn sensor --mrclam logs/mrclam7
-  sidestep learn sensor --mrclam logs/mrclam7 --edges 2,4 --classes very-near,near,far
-  sidestep learn sensor --csv readings.csv --range 3.75 --profile mine.toml --name sonar
-  sidestep learn sensor --run runs/hall --edges 0.3,1.5 --classes near,medium,far
+  sidestep learn sensor --mrclam logs/hall
+  sidestep learn sensor --mrclam logs/hall --edges 2,4 --classes near,medium,far
+  sidestep learn sensor --csv readings.csv --range 3.75 \\
+      --profile my.toml --name sonar
+  sidestep learn sensor --run runs/hall --edges 0.3,1.5 --classes near,mid,far
 
-CSV columns: true, reported (one word each; `nothing` for no observation), and true_distance_m,
+CSV columns: true, reported (one word each; `nothing` for no observation), and true_distance_m, \
 reported_distance_m, or true_class, reported_class.";
 
 const EFFECTOR_EXAMPLES: &str = "\
 Examples:
-  sidestep learn effector --mrclam logs/mrclam7 --box 0.25
-  sidestep learn effector --carmen intel.log.gz --profile intel.toml --name pioneer
+  sidestep learn effector --mrclam logs/hall --box 0.25
+  sidestep learn effector --carmen intel.log.gz --profile my.toml --name pioneer
   sidestep learn effector --csv motions.csv --json
-  sidestep learn effector --run runs/hall       recorded with --set record.calibration=true
+  sidestep learn effector --run runs/hall
 
-CSV columns: action (forward, left, right, stay), ahead_boxes, left_boxes, turn_deg.
-Moves that an obstacle cut short are left out: record logs in an open place.";
+CSV columns: action (forward, left, right, stay), ahead_boxes, left_boxes, turn_deg. Moves that an \
+obstacle cut short are left out: record logs in an open place. A run is recorded with \
+--set record.calibration=true.";
 
 /// Learn the error models of a real robot's sensors and wheels from its logs.
 #[derive(Debug, Args)]

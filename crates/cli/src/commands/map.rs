@@ -19,7 +19,7 @@ Examples:
   sidestep map arena.map --width 60
   sidestep map building.yaml --box 0.5 --json
 
-Reads ROS map_server (.yaml), MovingAI (.map) and character maps (.txt), each also with .gz.
+Reads ROS map_server (.yaml), MovingAI (.map) and character maps (.txt), each also with .gz. \
 In the terminal: # wall, . free, ? unknown; a wide map is drawn smaller and loses no wall.";
 
 /// Show a map as the simulator sees it, in the terminal or as PNG.

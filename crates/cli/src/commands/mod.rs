@@ -3,12 +3,14 @@
 mod arm;
 mod check;
 mod compare;
+mod completions;
 mod exact;
 mod export;
 mod finish;
 mod fk;
 mod ik;
 mod learn;
+mod man;
 mod map;
 mod new;
 mod replay;
@@ -22,6 +24,15 @@ use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
 use clap::Subcommand;
 
+/// The commands by what people do with them, in the order in which they meet them.
+pub(crate) const GROUPS: &[(&str, &[&str])] = &[
+    ("Prepare", &["new", "check", "map", "learn"]),
+    ("Run and look at it", &["run", "resume", "replay", "report", "export"]),
+    ("Study", &["sweep", "compare", "exact", "reproduce"]),
+    ("Robot arms", &["fk", "ik"]),
+    ("This command", &["completions", "man"]),
+];
+
 /// The commands of `sidestep`.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
@@ -33,17 +44,17 @@ pub(crate) enum Command {
     New(new::NewArgs),
     /// Show a map as the simulator sees it, in the terminal or as PNG
     Map(map::MapArgs),
-    /// Learn the error models of a real robot's sensors and wheels from its logs
+    /// Learn error models of sensors and wheels from a robot's logs
     Learn(learn::LearnArgs),
     /// Compute the exact Markov chain of a scenario with one robot
     Exact(exact::ExactArgs),
-    /// Run a parameter sweep: many variants of a scenario, each with many seeds
+    /// Run many variants of a scenario, each with many seeds
     Sweep(Box<sweep::SweepArgs>),
     /// Compare collision avoidance methods on the same air traffic
     Compare(compare::CompareArgs),
-    /// Forward kinematics: compute the positions of a robot arm's tip and connectors
+    /// Forward kinematics: where an arm's tip and connectors are
     Fk(fk::FkArgs),
-    /// Inverse kinematics: compute joint values that bring a robot arm's tip to a target
+    /// Inverse kinematics: joint values that bring the tip to a target
     Ik(ik::IkArgs),
     /// Continue a recorded run or a sweep that was stopped or killed
     Resume(resume::ResumeArgs),
@@ -53,8 +64,12 @@ pub(crate) enum Command {
     Reproduce(reproduce::ReproduceArgs),
     /// Compute a recorded run again and compare it with the recording
     Replay(replay::ReplayArgs),
-    /// Export a recorded run as tables, pictures, animations or recordings for viewers
+    /// Export a recorded run as tables, pictures, films or recordings
     Export(export::ExportArgs),
+    /// Print the completions of a shell
+    Completions(completions::CompletionsArgs),
+    /// Write manual pages, one for each command
+    Man(man::ManArgs),
 }
 
 /// Executes a command and returns its exit code.
@@ -78,5 +93,7 @@ pub(crate) fn execute(command: Command, console: &Console) -> Result<ExitCode, F
         Command::Reproduce(args) => reproduce::reproduce(&args, *console),
         Command::Replay(args) => replay::replay(&args, *console),
         Command::Export(args) => export::export(&args, *console),
+        Command::Completions(args) => completions::completions(&args, *console),
+        Command::Man(args) => man::man(&args, *console),
     }
 }

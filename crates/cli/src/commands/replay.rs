@@ -14,15 +14,15 @@ use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
 Examples:
-  sidestep replay runs/office                       run it again and compare the digests
-  sidestep replay office.mcap                       the same, from a recording for viewers
+  sidestep replay runs/office           run it again and compare the digests
+  sidestep replay office.mcap           the same, from a recording for viewers
   sidestep replay runs/office --cycle 1234
   sidestep replay runs/office --cycle 1234 --png moment.png
   sidestep replay runs/office --cycle 1234 --json | jq '.bodies[0]'
 
-Without --cycle the whole run is computed again from the recorded scenario, and the digest of
-its last state is compared with the recorded one. With --cycle the state is computed from the
-last checkpoint before the cycle, or from the start, and compared with the recorded poses of
+Without --cycle the whole run is computed again from the recorded scenario, and the digest of \
+its last state is compared with the recorded one. With --cycle the state is computed from the \
+last checkpoint before the cycle, or from the start, and compared with the recorded poses of \
 that cycle. If they differ, the exit code is 1.";
 
 /// Compute a recorded run again, and compare it with the recording.

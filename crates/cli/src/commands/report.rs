@@ -13,11 +13,11 @@ use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
 Examples:
-  sidestep report runs/office                  runs/office/report.html and report.md
+  sidestep report runs/office           runs/office/report.html and report.md
   sidestep report runs/office --out office.html
-  sidestep report sweeps/methods               all runs: intervals, comparisons, figures
+  sidestep report sweeps/methods        all runs: intervals, comparisons, figures
 
-The page is one file that needs no network. A run that is not complete can be reported too; its
+The page is one file that needs no network. A run that is not complete can be reported too; its \
 report says so.";
 
 /// Write a report of a run or a sweep: one HTML file, and Markdown.

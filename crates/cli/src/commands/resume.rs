@@ -18,7 +18,7 @@ Examples:
   sidestep resume runs/office
   sidestep resume sweeps/methods
   sidestep resume runs/office --workers 8
-  sidestep resume runs/office --cycles 20000     continue to cycle 20000 only, still incomplete
+  sidestep resume runs/office --cycles 20000     to cycle 20000 only
 
 The result has the same digest and the same rows as an uninterrupted run.";
 

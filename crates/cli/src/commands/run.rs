@@ -17,15 +17,15 @@ const EXAMPLES: &str = "\
 Examples:
   sidestep run scenarios/robots/office.toml --out runs/office
   sidestep run office.toml --cycles 50000 --seed 7 --workers 4
-  sidestep run office.toml --regime sensors --set robots.0.count=40 --set map.box_size_m=0.2
-  sidestep run office.toml --replicate 100 --vary regime=reliable,both   see `sidestep sweep`
+  sidestep run office.toml --regime sensors --set robots.0.count=40
+  sidestep run office.toml --replicate 100 --vary regime=reliable,both
   sidestep run office.toml --json | jq .metrics.contacts
-  sidestep run office.toml --mcap office.mcap               for Foxglove and other viewers
-  sidestep run tracks.csv                                   replay recorded traffic
-  sidestep run tracks.csv --set airspace.replay_until_s=600 simulate it from that time on
+  sidestep run office.toml --mcap office.mcap    for Foxglove and other viewers
+  sidestep run tracks.csv              replay recorded traffic
+  sidestep run tracks.csv --set airspace.replay_until_s=600
 
-Without --out and --mcap nothing is written. The folder holds scenario.toml (complete), summary.json,
-trajectories/ and events/ (Parquet), trajectories.svg and .png, and a checkpoint.";
+Without --out and --mcap nothing is written. The folder holds scenario.toml (complete), \
+summary.json, trajectories/ and events/ (Parquet), trajectories.svg and .png, and a checkpoint.";
 
 /// Run a scenario; record it with --out.
 #[derive(Debug, Args)]
@@ -34,9 +34,6 @@ trajectories/ and events/ (Parquet), trajectories.svg and .png, and a checkpoint
 pub(crate) struct RunArgs {
     #[command(flatten)]
     scenario: ScenarioArgs,
-
-    #[command(flatten)]
-    many: ManyArgs,
 
     #[command(flatten)]
     workers: WorkersArg,
@@ -57,6 +54,10 @@ pub(crate) struct RunArgs {
     /// Overwrite an earlier run in DIR, and FILE
     #[arg(long, requires = "written")]
     replace: bool,
+
+    // Last, for its heading is that of all options that follow.
+    #[command(flatten)]
+    many: ManyArgs,
 }
 
 /// Runs the command.

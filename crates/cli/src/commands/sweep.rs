@@ -17,18 +17,19 @@ use std::path::{Path, PathBuf};
 const EXAMPLES: &str = "\
 Examples:
   sidestep sweep methods.toml --out sweeps/methods       a sweep file
-  sidestep sweep office.toml --vary robots.0.count=10,20,40 --replicate 20 --out sweeps/office
-  sidestep sweep superconflict.toml --vary airspace.method=none,mvp,pc --baseline airspace.method=none
-  sidestep sweep office.toml --until ci=0.05 --max 1000 --metrics contacts_per_action
+  sidestep sweep office.toml --vary robots.0.count=10,20,40 --out sweeps/office
+  sidestep sweep sky.toml --vary airspace.method=none,mvp,pc \\
+      --baseline airspace.method=none
+  sidestep sweep office.toml --until ci=0.05 --max 1000 --metrics contacts
 
 On a cluster (docs/clusters.md has a Slurm array and a Kubernetes job):
   sidestep sweep plan methods.toml --out sweeps/methods
   sidestep sweep run sweeps/methods --shard 0/8          any scheduler runs 0/8 to 7/8
   sidestep sweep collect sweeps/methods
 
-A sweep file is TOML: format = 1, scenario = \"FILE\", replicates, [set], [vary], [[variant]],
-[latin_hypercube], [until], metrics, baseline; scenarios/sweeps/ has commented ones. Replicate k of
-every variant has the same seed. DIR/results.parquet has one row per run. The same command again
+A sweep file is TOML: format = 1, scenario = \"FILE\", replicates, [set], [vary], [[variant]], \
+[latin_hypercube], [until], metrics, baseline; scenarios/sweeps/ has commented ones. Replicate k of \
+every variant has the same seed. DIR/results.parquet has one row per run. The same command again \
 continues where a killed one stopped, as does `sidestep resume DIR`; no finished run is repeated.";
 
 /// Run a parameter sweep: many variants of a scenario, each with many seeds.
@@ -46,14 +47,15 @@ pub(crate) struct SweepArgs {
     changes: ChangeArgs,
 
     #[command(flatten)]
-    many: ManyArgs,
-
-    #[command(flatten)]
     workers: WorkersArg,
 
     /// Output folder; it must be new, empty, or hold this same sweep
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+
+    // Last, for its heading is that of all options that follow.
+    #[command(flatten)]
+    many: ManyArgs,
 }
 
 #[derive(Debug, Subcommand)]
@@ -75,12 +77,13 @@ struct PlanArgs {
     #[command(flatten)]
     changes: ChangeArgs,
 
-    #[command(flatten)]
-    many: ManyArgs,
-
     /// Folder of the sweep; it must be new or empty
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+
+    // Last, for its heading is that of all options that follow.
+    #[command(flatten)]
+    many: ManyArgs,
 }
 
 #[derive(Debug, Args)]

@@ -51,3 +51,93 @@ fn wrong_words_are_wrong_input() {
         assert!(!ended.err().is_empty());
     }
 }
+
+/// Every command, and every step of one, as its words.
+const ALL: [&[&str]; 24] = [
+    &[],
+    &["new"],
+    &["check"],
+    &["map"],
+    &["learn"],
+    &["learn", "sensor"],
+    &["learn", "effector"],
+    &["run"],
+    &["resume"],
+    &["replay"],
+    &["report"],
+    &["export"],
+    &["sweep"],
+    &["sweep", "plan"],
+    &["sweep", "run"],
+    &["sweep", "collect"],
+    &["compare"],
+    &["exact"],
+    &["reproduce"],
+    &["reproduce", "loria"],
+    &["fk"],
+    &["ik"],
+    &["completions"],
+    &["man"],
+];
+
+/// Returns what a command prints where a terminal has so many columns.
+fn at_width(place: &Place, args: &[&str], columns: &str) -> String {
+    let output = place.command(args).env("COLUMNS", columns).output().expect("the binary starts");
+    String::from_utf8(output.stdout).expect("text")
+}
+
+#[test]
+fn help_fits_80_columns_and_no_example_is_broken() {
+    let place = Place::new();
+    for words in ALL {
+        let args: Vec<&str> = words.iter().copied().chain(["--help"]).collect();
+        let help = at_width(&place, &args, "80");
+        for line in help.lines() {
+            assert!(line.chars().count() <= 80, "{words:?}: {line}");
+        }
+        // In wider help an example that does not fit is whole.
+        let wide = at_width(&place, &args, "100");
+        for example in wide.lines().filter(|line| line.starts_with("  sidestep ")) {
+            assert!(help.contains(example), "{words:?}: {example}");
+        }
+    }
+}
+
+#[test]
+fn commands_are_listed_by_what_people_do() {
+    let help = Place::new().run(&["--help"]).out();
+    let places: Vec<usize> =
+        ["Prepare:", "Run and look at it:", "Study:", "Robot arms:", "Options:"]
+            .iter()
+            .map(|group| help.find(group).unwrap_or_else(|| panic!("{group} in {help}")))
+            .collect();
+    assert!(places.is_sorted(), "{help}");
+    assert!(!help.contains('\u{1b}'), "no colors where nobody asks for them");
+}
+
+#[test]
+fn options_of_one_run_are_not_listed_under_many_runs() {
+    let help = Place::new().run(&["run", "--help"]).out();
+    let many = help.find("Many runs:").expect("a heading");
+    for option in ["--out <", "--mcap <", "--workers <", "--replace"] {
+        assert!(help.find(option).expect(option) < many, "{option}");
+    }
+}
+
+#[test]
+fn shells_complete_the_commands_and_manual_pages_are_written() {
+    let place = Place::new();
+    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
+        let script = place.run(&["completions", shell]);
+        assert_eq!(script.code(), 0);
+        assert!(script.out().contains("reproduce"));
+    }
+    let told = place.run(&["man", "pages"]);
+    assert_eq!(told.code(), 0, "{}", told.err());
+    let page = std::fs::read_to_string(place.path("pages/sidestep-run.1")).expect("a page");
+    assert!(page.contains("recorded run") && page.contains(".TH"), "{page}");
+    std::fs::write(place.path("file"), "").expect("a file");
+    let told = place.run(&["man", "file"]);
+    assert_eq!(told.code(), 2);
+    assert!(told.err().contains("a folder where you may write"), "{}", told.err());
+}

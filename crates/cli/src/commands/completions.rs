@@ -1,0 +1,42 @@
+//! `sidestep completions`: what a shell completes after `sidestep`.
+
+use crate::args;
+use crate::console::Console;
+use crate::exit::{ExitCode, Failure};
+use clap::Args;
+use clap_complete::Shell;
+use serde::Serialize;
+
+const EXAMPLES: &str = "\
+Examples:
+  sidestep completions bash > ~/.local/share/bash-completion/completions/sidestep
+  sidestep completions zsh > ~/.zfunc/_sidestep     with ~/.zfunc in fpath
+  sidestep completions fish > ~/.config/fish/completions/sidestep.fish";
+
+/// Print the completions of a shell.
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct CompletionsArgs {
+    /// Shell to complete in
+    shell: Shell,
+}
+
+/// The result for programs.
+#[derive(Debug, Serialize)]
+struct Printed {
+    shell: String,
+    script: String,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Never; all commands have one face.
+pub(crate) fn completions(args: &CompletionsArgs, console: Console) -> Result<ExitCode, Failure> {
+    let mut script = Vec::new();
+    clap_complete::generate(args.shell, &mut args::command(), "sidestep", &mut script);
+    let script = String::from_utf8(script).expect("scripts are text");
+    let printed = Printed { shell: args.shell.to_string(), script };
+    console.result(&printed, || printed.script.clone());
+    Ok(ExitCode::Done)
+}
