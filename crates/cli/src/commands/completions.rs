@@ -9,7 +9,7 @@ use serde::Serialize;
 
 const EXAMPLES: &str = "\
 Examples:
-  sidestep completions bash > ~/.local/share/bash-completion/completions/sidestep
+  sidestep completions bash > ~/.bash_completion
   sidestep completions zsh > ~/.zfunc/_sidestep     with ~/.zfunc in fpath
   sidestep completions fish > ~/.config/fish/completions/sidestep.fish";
 

@@ -17,7 +17,7 @@ const EXAMPLES: &str = "\
 Examples:
   sidestep export runs/office --to csv              runs/office-csv/
   sidestep export runs/office --to parquet --table trajectories
-  sidestep export runs/office --to mcap --every 10  runs/office.mcap, for Foxglove
+  sidestep export runs/office --to mcap --every 10  for Foxglove
   sidestep export runs/office --to gif --from 1000 --until 2000
   sidestep export runs/office --to png --from 1234  one moment
   sidestep export office.mcap --to mp4-frames       frames, and a call of ffmpeg

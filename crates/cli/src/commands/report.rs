@@ -15,7 +15,7 @@ const EXAMPLES: &str = "\
 Examples:
   sidestep report runs/office           runs/office/report.html and report.md
   sidestep report runs/office --out office.html
-  sidestep report sweeps/methods        all runs: intervals, comparisons, figures
+  sidestep report sweeps/methods        intervals, comparisons, figures
 
 The page is one file that needs no network. A run that is not complete can be reported too; its \
 report says so.";

@@ -24,7 +24,7 @@ Examples:
 
 On a cluster (docs/clusters.md has a Slurm array and a Kubernetes job):
   sidestep sweep plan methods.toml --out sweeps/methods
-  sidestep sweep run sweeps/methods --shard 0/8          any scheduler runs 0/8 to 7/8
+  sidestep sweep run sweeps/methods --shard 0/8   and so on to 7/8
   sidestep sweep collect sweeps/methods
 
 A sweep file is TOML: format = 1, scenario = \"FILE\", replicates, [set], [vary], [[variant]], \

@@ -23,7 +23,7 @@ use std::path::Path;
 const EXAMPLES: &str = "\
 Examples:
   sidestep reproduce loria --quick              a trial of a few seconds
-  sidestep reproduce loria --out runs/loria     some minutes: report, figures, all numbers
+  sidestep reproduce loria --out runs/loria     report, figures, all numbers
   sidestep reproduce loria --seeds 40 --json > loria.json
   sidestep reproduce agentfly --quick
   sidestep reproduce serpentine --out runs/serpentine";
