@@ -30,7 +30,9 @@ mod skeleton;
 mod tests;
 
 pub use bend::BendLimit;
-pub use inverse::{ArmAnswer, ArmGoal, ArmReason, Hit, Sphere};
+pub use inverse::{
+    ArmAnswer, ArmGoal, ArmReason, Asked, Axis, Hit, MOST_SOLUTIONS, Posture, Sphere, Turn,
+};
 pub use pose::{Pose, Vector};
 pub use recover::{RecoverError, Recovered};
 pub use serial::{Frames, Motion, SerialChain, Variable};
