@@ -68,7 +68,8 @@ impl Descender<'_> {
         let mut damping = FIRST_DAMPING;
         let (mut mark, mut since, mut steps) = (look.merit(), 0, 0);
         let mut is_new = true;
-        while steps < effort.steps && since < effort.patience && !self.is_met(&look) {
+        let goes_on = |steps, since| n > 0 && steps < effort.steps && since < effort.patience;
+        while goes_on(steps, since) && !self.is_met(&look) {
             steps += 1;
             if is_new {
                 self.scene.slopes(&look, n, &mut self.stepper.rows);

@@ -119,8 +119,8 @@ impl Stepper {
         matrix.clear();
         matrix.resize(m * m, 0.0);
         let mut trace = 0.0;
-        for (i, a) in rows.chunks_exact(n.max(1)).enumerate() {
-            for (j, b) in rows.chunks_exact(n.max(1)).enumerate().take(i + 1) {
+        for (i, a) in rows.chunks_exact(n).enumerate() {
+            for (j, b) in rows.chunks_exact(n).enumerate().take(i + 1) {
                 let products = a.iter().zip(b).zip(is_free.iter());
                 let of_free = products.map(|((x, y), free)| if *free { x * y } else { 0.0 });
                 matrix[i * m + j] = of_free.sum();
@@ -134,7 +134,7 @@ impl Stepper {
         cholesky_solve(matrix, y);
         moves.clear();
         moves.resize(n, 0.0);
-        for (row, y) in rows.chunks_exact(n.max(1)).zip(y.iter()) {
+        for (row, y) in rows.chunks_exact(n).zip(y.iter()) {
             moves.iter_mut().zip(row).for_each(|(moves, slope)| *moves += slope * y);
         }
         is_free.contains(&true)

@@ -1,3 +1,5 @@
+mod poses;
+
 use super::rows::Scene;
 use super::step::Bounds;
 use super::*;
@@ -5,7 +7,7 @@ use crate::arms::ik::Engine;
 use crate::arms::kinematics::RecoverError;
 use crate::arms::kinematics::{Pose, Vector};
 use proptest::prelude::*;
-use sidestep_import::urdf::{Model, Origin};
+use sidestep_import::urdf::Model;
 use sidestep_kernel::geometry::{norm, sub};
 use sidestep_testing::robot_model as shared;
 use std::f64::consts::PI;
@@ -38,10 +40,6 @@ fn arm() -> SerialChain {
 
 fn apart_m(a: Vector, b: Vector) -> f64 {
     norm(sub(a, b))
-}
-
-fn rpy(xyz_m: Vector, rpy_rad: Vector) -> Pose {
-    Pose::from_origin(&Origin { xyz_m, rpy_rad })
 }
 
 fn inside(chain: &SerialChain, shares: &[f64]) -> Vec<f64> {
