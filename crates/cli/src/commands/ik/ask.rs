@@ -1,9 +1,10 @@
 //! Options of `sidestep ik` -> goals.
 
-use super::super::arm::numbers;
+use super::super::arm::{Arm, numbers};
 use clap::{Args, ValueEnum};
 use sidestep::import::urdf::Origin;
 use sidestep::kernel::InputError;
+use sidestep::worlds::chain::body::ArmBody;
 use sidestep::worlds::chain::ik::Engine;
 use sidestep::worlds::chain::kinematics::{
     ArmGoal, Asked, Axis, MOST_SOLUTIONS, Pose, Sphere, Turn, Vector,
@@ -52,6 +53,10 @@ pub(super) struct GoalArgs {
     #[arg(long = "obstacle", value_name = "X,Y,Z,R", allow_hyphen_values = true)]
     obstacles: Vec<String>,
 
+    /// The arm that obstacles and itself count for
+    #[arg(long, value_name = "BODY", default_value = "shapes")]
+    body: BodyName,
+
     /// Ignore joint limits
     #[arg(long)]
     ignore_limits: bool,
@@ -66,6 +71,17 @@ enum EngineName {
     Chain,
     /// Damped least squares on the joints
     Dls,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum BodyName {
+    /// Thin rods between the connectors
+    Rods,
+    /// The links' collision shapes; rods where a link has none
+    Shapes,
+    /// The same, and links must not touch each other, unless a joint connects them or the SRDF file
+    /// disables their collision
+    Own,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -111,11 +127,35 @@ impl Target {
 }
 
 impl GoalArgs {
-    /// Returns the goal of a target.
+    /// Returns the arm's body if it counts, and remarks on it.
+    ///
+    /// # Errors
+    /// When its own links shall not touch, and it has no shapes.
+    pub(super) fn body(&self, arm: &Arm) -> Result<(Option<ArmBody>, Vec<String>), InputError> {
+        let is_own = self.body == BodyName::Own;
+        let counts = is_own || (self.body == BodyName::Shapes && !self.obstacles.is_empty());
+        if !counts {
+            return Ok((None, Vec::new()));
+        }
+        let (body, remarks) = arm.body();
+        if is_own && body.is_empty() {
+            let cause = ["no link has a collision shape that can be read".to_owned()];
+            let cause = [&cause[..], &remarks[..]].concat().join("; ");
+            let remedy = "give the links boxes, cylinders, spheres or STL meshes";
+            return Err(InputError::new("--body", cause, remedy));
+        }
+        Ok((Some(body), remarks))
+    }
+
+    /// Returns the goal of a target, for an arm with this body.
     ///
     /// # Errors
     /// When an option is out of range.
-    pub(super) fn goal(&self, target: Target) -> Result<ArmGoal, InputError> {
+    pub(super) fn goal(
+        &self,
+        target: Target,
+        body: &Option<ArmBody>,
+    ) -> Result<ArmGoal, InputError> {
         above_zero("--tolerance-m", self.tolerance_m, "m", "a length")?;
         above_zero("--tolerance-rad", self.tolerance_rad, "rad", "an angle")?;
         above_zero("--apart", self.apart, "rad", "an angle")?;
@@ -138,6 +178,8 @@ impl GoalArgs {
             nearest: self.nearest,
             apart: self.apart,
             ignore_limits: self.ignore_limits,
+            body: body.clone(),
+            own_body: self.body == BodyName::Own,
             spheres: self.obstacles.iter().map(sphere).collect::<Result<_, _>>()?,
             ..ArmGoal::pose(target.pose)
         })

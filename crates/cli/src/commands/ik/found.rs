@@ -26,6 +26,8 @@ pub(super) struct Found {
     /// All postures found that reach the target, the one of `joints` first; empty if it is not
     /// reached.
     solutions: Vec<Solution>,
+    /// Meshes that stand as boxes, and shapes that could not be read.
+    pub(super) remarks: Vec<String>,
     /// Number of postures asked for.
     #[serde(skip)]
     wanted: usize,
@@ -67,6 +69,7 @@ impl Found {
             iterations: answer.iterations,
             starts: answer.starts,
             solutions: all.map(solution).collect(),
+            remarks: Vec::new(),
             wanted: goal.solutions,
             placed: arm.at(&answer.values),
         }

@@ -42,9 +42,12 @@ angle that moves the tip as far at full reach. They are listed by their distance
 --nearest makes all restarts and draws each posture toward the start, and so finds the answer that
 moves the joints least.
 
-Obstacles are spheres (center and radius in m) that no rod between two connectors may enter: rods
-are thin lines, so add the arm's thickness to the radius. The answer is a posture; the path to it is
-not checked. Its joint values can be passed to `sidestep fk --joints`.
+Obstacles are spheres (center and radius in m) that no link's collision shape may enter: boxes,
+cylinders, spheres, and STL meshes as their bounding boxes. Links without a shape that can be read
+count as rods between connectors, which are thin lines, so add the arm's thickness to the radius; what
+is left out is told. With `--body own` links must not touch each other either, except neighbors
+and the pairs whose collisions --srdf disables. The answer is a posture; the path to it is not
+checked. Its joint values can be passed to `sidestep fk --joints`.
 
 --targets reads a table (CSV) with the columns x,y,z, and for orientations roll,pitch,yaw or
 qx,qy,qz,qw, and prints a table with a row for each target, in the order of the file.
@@ -95,9 +98,11 @@ pub(crate) fn ik(args: &IkArgs, console: Console) -> Result<ExitCode, Failure> {
     if let Some(path) = &args.targets {
         return targets::answer(path, &arm, &args.goal, console);
     }
-    let goal = args.goal.goal(args.pose()?)?;
+    let (body, remarks) = args.goal.body(&arm)?;
+    let goal = args.goal.goal(args.pose()?, &body)?;
     let answer = arm.chain.solve(&goal, &arm.values)?;
-    let found = Found::new(&arm, &goal, answer);
+    remarks.iter().for_each(|remark| console.note(remark));
+    let found = Found { remarks, ..Found::new(&arm, &goal, answer) };
     console.result(&found, || found.text());
     Ok(if found.reached { ExitCode::Done } else { ExitCode::Failed })
 }

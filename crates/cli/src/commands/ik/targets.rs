@@ -23,6 +23,8 @@ const MOST: f64 = 1e7;
 struct Answers {
     targets: usize,
     reached: usize,
+    /// Meshes that stand as boxes, and shapes that could not be read.
+    remarks: Vec<String>,
     /// Names of the joints whose values each answer has.
     joint_names: Vec<String>,
     /// CPU time of the search in us per target. It is no part of the results.
@@ -55,7 +57,8 @@ pub(super) fn answer(
     args: &GoalArgs,
     console: Console,
 ) -> Result<ExitCode, Failure> {
-    let goals = read(path)?.into_iter().map(|target| args.goal(target));
+    let (body, remarks) = args.body(arm)?;
+    let goals = read(path)?.into_iter().map(|target| args.goal(target, &body));
     let goals = goals.collect::<Result<Vec<_>, InputError>>()?;
     let started = ProcessTime::now();
     let solved = goals.iter().map(|goal| arm.chain.solve(goal, &arm.values));
@@ -64,12 +67,14 @@ pub(super) fn answer(
     let answers = Answers {
         targets: goals.len(),
         reached: solved.iter().filter(|answer| answer.reached).count(),
+        remarks,
         joint_names: arm.chain.variables.iter().map(|v| v.name.clone()).collect(),
         cpu_us_per_target: cpu_us / goals.len().max(1) as f64,
         answers: solved.into_iter().map(Row::new).collect(),
     };
     console.result(&answers, || answers.table());
-    let Answers { targets, reached, cpu_us_per_target, .. } = &answers;
+    let Answers { targets, reached, cpu_us_per_target, remarks, .. } = &answers;
+    remarks.iter().for_each(|remark| console.note(remark));
     console.note(format!("{reached} of {targets} reached, {cpu_us_per_target:.0} us each"));
     Ok(if reached == targets { ExitCode::Done } else { ExitCode::Failed })
 }

@@ -31,9 +31,11 @@ mod tests;
 
 pub use bend::BendLimit;
 pub use inverse::{
-    ArmAnswer, ArmGoal, ArmReason, Asked, Axis, Hit, MOST_SOLUTIONS, Posture, Sphere, Turn,
+    Against, ArmAnswer, ArmGoal, ArmReason, Asked, Axis, Hit, MOST_SOLUTIONS, Part, Posture,
+    Sphere, Turn,
 };
 pub use pose::{Pose, Vector};
 pub use recover::{RecoverError, Recovered};
+pub(crate) use serial::Drive;
 pub use serial::{Frames, Motion, SerialChain, Variable};
 pub use skeleton::{Rod, Skeleton};

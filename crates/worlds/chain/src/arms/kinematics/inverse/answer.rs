@@ -5,7 +5,8 @@ use crate::arms::ik::Engine;
 /// The answer to a goal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ArmAnswer {
-    /// Whether the goal is met, with all joints inside their limits and no rod in a sphere.
+    /// Whether the goal is met, with all joints inside their limits and no part where it must not
+    /// be.
     pub reached: bool,
     /// Distance of the tip from the target in m, along the axes that count, by forward kinematics at
     /// the values.
@@ -40,15 +41,38 @@ pub struct Posture {
     pub error_rad: f64,
 }
 
-/// A rod that is in a sphere.
-#[derive(Debug, Clone, PartialEq)]
+/// A part of the arm that is where it must not be.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{part} would be {depth_m:.6} m deep in {against}")]
 pub struct Hit {
-    /// Index of the connector (from 0) from which the rod leads to the next.
-    pub rod: usize,
-    /// Index of the sphere.
-    pub sphere: usize,
+    /// The part.
+    pub part: Part,
+    /// The thing that it is in.
+    pub against: Against,
     /// Depth in m.
     pub depth_m: f64,
+}
+
+/// A part of an arm.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Part {
+    /// The rod from the connector of this index (from 0) to the next.
+    #[error("the rod from connector {}", .0 + 1)]
+    Rod(usize),
+    /// A shape of the link of this name.
+    #[error("link `{0}`")]
+    Link(String),
+}
+
+/// A thing that an arm must not touch.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Against {
+    /// The sphere of this index (from 0).
+    #[error("obstacle {}", .0 + 1)]
+    Sphere(usize),
+    /// The arm's own link of this name.
+    #[error("link `{0}`")]
+    Link(String),
 }
 
 /// The reason why a goal is not met.
@@ -86,8 +110,8 @@ pub enum ArmReason {
         /// Highest value allowed.
         upper: f64,
     },
-    /// The target can be reached, but only with a rod in a sphere.
-    #[error("the rod from connector {} would be {:.6} m deep in obstacle {}", .0.rod + 1, .0.depth_m, .0.sphere + 1)]
+    /// The target can be reached, but only with a part in a sphere or in another part.
+    #[error("{0}")]
     Blocked(Hit),
     /// The tip gets to the target, but no posture was found in which it is turned as asked.
     #[error(

@@ -55,7 +55,7 @@ impl Descender<'_> {
         const SLACK: f64 = 1.0 - 1e-9;
         look.tip_m <= SLACK * self.goal.tolerance_m
             && look.turn_rad <= SLACK * self.goal.tolerance_rad
-            && look.hit.is_none()
+            && look.touched.hit.is_none()
     }
 
     /// Makes damped steps from a start, until the goal is met or there is no more gain.

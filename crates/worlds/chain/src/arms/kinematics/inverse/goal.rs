@@ -1,6 +1,7 @@
 //! Goals of an arm.
 
 use super::super::pose::{Pose, Vector};
+use crate::arms::body::ArmBody;
 use crate::arms::ik::Engine;
 use sidestep_kernel::InputError;
 
@@ -97,6 +98,10 @@ pub struct ArmGoal {
     pub ignore_limits: bool,
     /// Spheres that the arm may not enter.
     pub spheres: Vec<Sphere>,
+    /// The shapes of the arm's links; without them, and where links have none, the arm is its rods.
+    pub body: Option<ArmBody>,
+    /// Whether links of the body must not touch each other, but for those that may.
+    pub own_body: bool,
 }
 
 impl ArmGoal {
@@ -123,6 +128,8 @@ impl ArmGoal {
             apart: 0.1,
             ignore_limits: false,
             spheres: Vec::new(),
+            body: None,
+            own_body: false,
         }
     }
 

@@ -33,7 +33,7 @@ mod step;
 #[cfg(test)]
 mod tests;
 
-pub use answer::{ArmAnswer, ArmReason, Hit, Posture};
+pub use answer::{Against, ArmAnswer, ArmReason, Hit, Part, Posture};
 pub use goal::{ArmGoal, Asked, Axis, MOST_SOLUTIONS, Sphere, Turn};
 
 use super::serial::SerialChain;

@@ -7,8 +7,7 @@
 use super::super::pose::{Pose, Vector};
 use super::super::serial::SerialChain;
 use super::super::skeleton::Skeleton;
-use super::answer::Hit;
-use super::contacts::{Contact, Contacts};
+use super::contacts::{Contacts, Touched};
 use super::goal::{ArmGoal, Turn};
 use super::quick::{Placed, Quick, turn_between};
 use sidestep_kernel::geometry::{cross, dot, norm, perpendicular, scaled, sub, unit};
@@ -35,11 +34,9 @@ pub(super) struct Look {
     pub(super) wanted: Vec<f64>,
     /// Axes about which the tip's orientation counts, each for a row.
     about: Vec<Vector>,
-    contacts: Vec<Contact>,
+    pub(super) touched: Touched,
     pub(super) tip_m: f64,
     pub(super) turn_rad: f64,
-    /// The part that is deepest in something.
-    pub(super) hit: Option<Hit>,
 }
 
 impl Look {
@@ -67,10 +64,9 @@ impl<'a> Scene<'a> {
             placed: Placed::of(chain),
             wanted: Vec::new(),
             about: Vec::new(),
-            contacts: Vec::new(),
+            touched: Touched::default(),
             tip_m: f64::INFINITY,
             turn_rad: f64::INFINITY,
-            hit: None,
         }
     }
 
@@ -83,8 +79,8 @@ impl<'a> Scene<'a> {
         look.wanted.extend(self.along.iter().map(|axis| dot(missing, *axis)));
         look.tip_m = look.merit().sqrt();
         self.look_at_turn(&tip, look);
-        look.hit = self.contacts.find(&look.placed, &mut look.contacts);
-        look.wanted.extend(look.contacts.iter().map(|contact| contact.wanted_m));
+        self.contacts.find(values, &look.placed, &mut look.touched);
+        look.wanted.extend(look.touched.contacts.iter().map(|contact| contact.wanted_m));
     }
 
     fn look_at_turn(&self, tip: &Pose, look: &mut Look) {
@@ -145,7 +141,7 @@ impl<'a> Scene<'a> {
                 row[variable] += self.radian_m * dot(turns, *about);
             }
         });
-        for (row, contact) in of_contacts.chunks_exact_mut(n).zip(&look.contacts) {
+        for (row, contact) in of_contacts.chunks_exact_mut(n).zip(&look.touched.contacts) {
             for pull in &contact.pulls {
                 let away = scaled(contact.away, pull.share);
                 self.quick.each_joint(lines, pull.link, pull.at_m, |variable, moves| {

@@ -153,14 +153,14 @@ impl<'a> Search<'a> {
         let Descender { goal, .. } = &self.by;
         let look = &best.descent.look;
         let is_there = look.tip_m <= goal.tolerance_m && look.turn_rad <= goal.tolerance_rad;
-        if let Some(hit) = look.hit.clone().filter(|_| is_there) {
+        if let Some(hit) = look.touched.hit.clone().filter(|_| is_there) {
             return ArmReason::Blocked(hit);
         }
         let few = ArmGoal { restarts: goal.restarts.min(FEW), ..(*goal).clone() };
         if let Some(reason) = self.without_limits(&few, best) {
             return reason;
         }
-        if let Some(hit) = self.without_spheres(&few, best) {
+        if let Some(hit) = self.without_contacts(&few, best) {
             return ArmReason::Blocked(hit);
         }
         let (starts, error_m, error_rad) = (best.starts, look.tip_m, look.turn_rad);
@@ -183,15 +183,17 @@ impl<'a> Search<'a> {
         Some(ArmReason::OutsideLimits { joint, value, lower, upper })
     }
 
-    fn without_spheres(&self, few: &ArmGoal, best: &Best) -> Option<Hit> {
-        if few.spheres.is_empty() {
+    /// Returns the hit in a posture that would do if nothing could be hit.
+    fn without_contacts(&self, few: &ArmGoal, best: &Best) -> Option<Hit> {
+        if few.spheres.is_empty() && !few.own_body {
             return None;
         }
         let spheres: Vec<Sphere> = Vec::new();
-        let values = self.instead(&ArmGoal { spheres, ..few.clone() }, best)?;
+        let bare = ArmGoal { spheres, body: None, own_body: false, ..few.clone() };
+        let values = self.instead(&bare, best)?;
         let mut look = Scene::blank(self.by.chain);
         self.by.scene.look(&values, &mut look);
-        look.hit
+        look.touched.hit
     }
 
     /// Returns values that meet another goal, starting from the best posture.

@@ -125,7 +125,7 @@ fn reasons_name_the_joint_the_obstacle_or_the_reach() {
     let spheres = vec![Sphere { center_m: target, radius_m: 0.2 }];
     let blocked = solve(&ArmGoal { spheres, restarts: 10, ..ArmGoal::new(target) });
     let Some(ArmReason::Blocked(hit)) = &blocked.reason else { panic!("{blocked:?}") };
-    assert_eq!(hit.sphere, 0);
+    assert_eq!(hit.against, Against::Sphere(0));
 }
 
 #[test]
