@@ -153,7 +153,7 @@ fn wrong_poses_are_answered_with_what_would_be_right() {
         (&["--free", "up"], ["`up`", "rz"]),
         (&["--rpy", "0,0,0", "--tolerance-rad", "0"], ["--tolerance-rad", "above 0"]),
         (&["--solutions", "0"], ["--solutions", "1 to"]),
-        (&["--apart", "-1"], ["--apart", "above 0"]),
+        (&["--apart", "0"], ["--apart", "above 0"]),
         (&["--targets", "q.csv"], ["--targets", "cannot be used"]),
     ] {
         let ended = place.run(&[&to[..], args].concat());
@@ -172,4 +172,75 @@ fn wrong_poses_are_answered_with_what_would_be_right() {
         assert_eq!((ended.code(), ended.out().as_str()), (2, ""), "{file}");
         assert!(ended.err().contains(reason), "{file}: {}", ended.err());
     }
+}
+
+/// The arm with bars as links, of which the last is a mesh.
+fn with_shapes(mesh: &str) -> String {
+    let bar = |link: &str, size: &str| {
+        let shape =
+            format!("<collision><origin xyz='0 0 0.2'/><geometry>{size}</geometry></collision>");
+        (format!("<link name=\"{link}\"/>"), format!("<link name=\"{link}\">{shape}</link>"))
+    };
+    let bars = [
+        bar("base", "<cylinder radius='0.1' length='0.3'/>"),
+        bar("l2", "<box size='0.1 0.1 0.3'/>"),
+        bar("l3", "<cylinder radius='0.05' length='0.2'/>"),
+        bar("l6", &format!("<mesh filename='{mesh}' scale='0.001 0.001 0.001'/>")),
+    ];
+    bars.iter().fold(SIX.to_owned(), |text, (old, new)| text.replace(old, new))
+}
+
+/// A mesh in mm: a triangle from -50 to 50 along x and y, and 100 along z.
+const MESH: &str = "solid t\nfacet normal 0 0 1\nouter loop\nvertex -50 -50 0\nvertex 50 50 0\n\
+    vertex 0 0 100\nendloop\nendfacet\nendsolid t\n";
+
+#[test]
+fn shapes_of_links_count_for_obstacles_and_meshes_as_their_boxes() {
+    let place = place();
+    place.write("tool.stl", MESH);
+    place.write("bars.urdf", with_shapes("tool.stl"));
+    place.write("lost.urdf", with_shapes("package://six/no/such.stl"));
+    // Beside the column: no rod is there, but the cylinder of the base is.
+    let beside = ["--obstacle", "0.13,0,0.2,0.05", "--target", "0.5,0.2,0.5"];
+    let ask = |model: &'static str, more: &[&'static str]| {
+        place.run(&[&["ik", model, "--json", "--restarts", "10"], &beside[..], more].concat())
+    };
+    let blocked = ask("bars.urdf", &[]);
+    assert_eq!(blocked.code(), 1, "{}", blocked.out());
+    let reason = blocked.json()["reason"].to_string();
+    assert!(reason.contains("link `base`") && reason.contains("obstacle 1"), "{reason}");
+    assert_eq!(blocked.json()["remarks"], json!(["meshes stand as their bounding boxes: 1"]));
+    assert_eq!(ask("bars.urdf", &["--body", "rods"]).code(), 0);
+    let lost = ask("lost.urdf", &[]).json()["remarks"].to_string();
+    assert!(lost.contains("`l6`") && lost.contains("absent"), "{lost}");
+    let words = place.run(&[&["ik", "lost.urdf"], &beside[..]].concat());
+    assert!(words.err().contains("absent"), "{}", words.err());
+}
+
+#[test]
+fn links_keep_off_each_other_unless_the_srdf_lets_them() {
+    let place = place();
+    place.write("tool.stl", MESH);
+    place.write("bars.urdf", with_shapes("tool.stl"));
+    place.write("none.srdf", "<robot name='six'/>");
+    place.write(
+        "masks.srdf",
+        "<robot name='six'><disable_collisions link1='l6' link2='base'/>\
+         <disable_collisions link1='l6' link2='l2'/></robot>",
+    );
+    // The tool inside the column of the base.
+    let inside = ["--target", "0,0.02,0.25", "--body", "own", "--ignore-limits", "--json"];
+    let ask = |srdf: &'static str| {
+        place.run(&[&["ik", "bars.urdf", "--srdf", srdf, "--restarts", "20"], &inside[..]].concat())
+    };
+    let kept = ask("none.srdf");
+    assert_eq!(kept.code(), 1, "{}", kept.out());
+    let reason = kept.json()["reason"].to_string();
+    assert!(reason.contains("deep in link"), "{reason}");
+    let let_in = ask("masks.srdf");
+    assert_eq!(let_in.code(), 0, "{}", let_in.out());
+    // Without any shape, its own body means nothing.
+    let bare = place.run(&["ik", "six.urdf", "--target", "0.5,0,0.5", "--body", "own"]);
+    assert_eq!((bare.code(), bare.out().as_str()), (2, ""));
+    assert!(bare.err().contains("--body") && bare.err().contains("boxes"), "{}", bare.err());
 }

@@ -48,10 +48,12 @@ impl Look {
 
 impl<'a> Scene<'a> {
     pub(super) fn new(chain: &'a SerialChain, skeleton: &'a Skeleton, goal: &'a ArmGoal) -> Self {
+        // If all axes count it does not matter which, and these cost no digits.
+        let axes = if goal.asked.whole_position() { &Pose::IDENTITY } else { &goal.target };
         let counts = (0..3).filter(|&axis| goal.asked.along[axis]);
         Self {
             quick: Quick::new(chain),
-            along: counts.map(|axis| goal.target.axis(axis)).collect(),
+            along: counts.map(|axis| axes.axis(axis)).collect(),
             contacts: Contacts::new(skeleton, goal),
             radian_m: RADIAN * skeleton.reach_m.max(f64::MIN_POSITIVE),
             goal,
