@@ -6,8 +6,7 @@ use serde::Serialize;
 use sidestep::import::urdf::srdf::Semantics;
 use sidestep::import::urdf::{Model, Solids};
 use sidestep::kernel::InputError;
-use sidestep::worlds::chain::body::ArmBody;
-use sidestep::worlds::chain::kinematics::{Pose, Rod, SerialChain, Variable, Vector};
+use sidestep::worlds::chain::kinematics::{ArmBody, Pose, Rod, SerialChain, Variable, Vector};
 use std::path::PathBuf;
 
 /// The options that choose an arm and its posture.

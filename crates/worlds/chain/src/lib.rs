@@ -45,7 +45,7 @@ mod view;
 mod words;
 mod world;
 
-pub use arms::{body, ik, kinematics};
+pub use arms::{ik, kinematics};
 pub use kind::Chains;
 pub use motion::escape::{Escape, Escaped, Escaper};
 pub use motion::replan::{Climbed, Ladder, Rungs, Situation};

@@ -4,10 +4,9 @@ use super::super::arm::{Arm, numbers};
 use clap::{Args, ValueEnum};
 use sidestep::import::urdf::Origin;
 use sidestep::kernel::InputError;
-use sidestep::worlds::chain::body::ArmBody;
 use sidestep::worlds::chain::ik::Engine;
 use sidestep::worlds::chain::kinematics::{
-    ArmGoal, Asked, Axis, MOST_SOLUTIONS, Pose, Sphere, Turn, Vector,
+    ArmBody, ArmGoal, Asked, Axis, MOST_SOLUTIONS, Pose, Sphere, Turn, Vector,
 };
 
 /// The options that all targets share.

@@ -3,12 +3,10 @@
 //!
 //! ```text
 //! kinematics/: joints -> connectors -> joints     ik/: postures of chains that reach a target
-//! body/: collision shapes of links
 //! arm.rs: an arm with a place in the world, as a chain
 //! ```
 
 pub(crate) mod arm;
-pub mod body;
 pub mod ik;
 pub mod kinematics;
 

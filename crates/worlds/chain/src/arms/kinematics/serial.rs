@@ -45,7 +45,7 @@ pub enum Motion {
 
 impl Motion {
     /// Returns the motion of joints of a kind that a single value moves.
-    pub(crate) fn of(kind: JointKind) -> Option<Self> {
+    pub(super) fn of(kind: JointKind) -> Option<Self> {
         match kind {
             JointKind::Revolute | JointKind::Continuous => Some(Self::Turn),
             JointKind::Prismatic => Some(Self::Slide),
@@ -54,7 +54,7 @@ impl Motion {
     }
 
     /// Returns the motion by `value` about or along the unit vector `axis`.
-    pub(crate) fn moved(self, axis: Vector, value: f64) -> Pose {
+    pub(super) fn moved(self, axis: Vector, value: f64) -> Pose {
         match self {
             Self::Turn => Pose::turn(axis, value),
             Self::Slide => Pose::shift(scaled(axis, value)),
@@ -84,14 +84,14 @@ pub(super) struct MovingJoint {
 
 /// A joint's value: `multiplier * values[variable] + offset`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Drive {
+pub(super) struct Drive {
     pub(super) variable: usize,
     pub(super) multiplier: f64,
     pub(super) offset: f64,
 }
 
 impl Drive {
-    pub(crate) fn value(&self, values: &[f64]) -> f64 {
+    pub(super) fn value(&self, values: &[f64]) -> f64 {
         self.multiplier * values[self.variable] + self.offset
     }
 
@@ -187,7 +187,7 @@ impl SerialChain {
 
     /// Returns how a joint of the model, on the way to the tip or beside it, follows the variables;
     /// none if it does not.
-    pub(crate) fn drive(&self, model: &Model, joint: usize) -> Option<Drive> {
+    pub(super) fn drive(&self, model: &Model, joint: usize) -> Option<Drive> {
         let (driver, multiplier, offset) = driver(model, joint);
         let name = &model.joints[driver].name;
         let variable = self.variables.iter().position(|variable| variable.name == *name)?;

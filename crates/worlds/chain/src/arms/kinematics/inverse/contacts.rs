@@ -1,11 +1,11 @@
 //! Parts of an arm that are in something, or nearly so.
 
+use super::super::body::{self, ArmBody, Near};
 use super::super::pose::Vector;
 use super::super::skeleton::{Anchor, Skeleton};
 use super::answer::{Against, Hit, Part};
 use super::goal::{ArmGoal, Sphere};
 use super::quick::Placed;
-use crate::arms::body::{self, ArmBody, Near};
 use crate::rods::geometry::nearest_on_segment;
 use sidestep_kernel::geometry::{dot, norm, scaled, sub};
 

@@ -1,7 +1,7 @@
 //! Goals of an arm.
 
+use super::super::body::ArmBody;
 use super::super::pose::{Pose, Vector};
-use crate::arms::body::ArmBody;
 use crate::arms::ik::Engine;
 use sidestep_kernel::InputError;
 

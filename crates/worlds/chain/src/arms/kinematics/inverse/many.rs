@@ -3,7 +3,7 @@
 use super::super::serial::Motion;
 use super::answer::Posture;
 use super::descent::{Descent, Effort};
-use super::search::Search;
+use super::search::{Found, Search};
 use sidestep_kernel::math::wrap_angle;
 use std::f64::consts::TAU;
 
@@ -14,13 +14,6 @@ const FIRST_PART: f64 = 0.5;
 const LEAST_PART: f64 = 0.02;
 /// Least part of the distance that a step must save.
 const LEAST_GAIN: f64 = 1e-4;
-
-/// The postures that were found, the nearest to the start first, and the effort.
-pub(super) struct Found {
-    pub(super) postures: Vec<Posture>,
-    pub(super) steps: usize,
-    pub(super) starts: usize,
-}
 
 impl Search<'_> {
     /// Descends from `first` and from random postures, and keeps what meets the goal and is

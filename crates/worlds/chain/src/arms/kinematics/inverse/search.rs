@@ -6,7 +6,6 @@ use super::answer::{ArmAnswer, ArmReason, Hit, Posture};
 use super::descent::{Descender, Descent, Effort};
 use super::goal::{ArmGoal, Asked, Sphere, Turn};
 use super::guide;
-use super::many::Found;
 use super::rows::Scene;
 use super::step::{Bounds, Stepper};
 use crate::arms::ik::Engine;
@@ -33,6 +32,13 @@ struct Best {
     steps: usize,
     starts: usize,
     is_met: bool,
+}
+
+/// The postures that were found, the nearest to the start first, and the effort.
+pub(super) struct Found {
+    pub(super) postures: Vec<Posture>,
+    pub(super) steps: usize,
+    pub(super) starts: usize,
 }
 
 impl<'a> Search<'a> {

@@ -1,6 +1,7 @@
 //! Where a link of a model is, at a posture of an arm of it.
 
-use super::super::kinematics::{Drive, Motion, Pose, SerialChain};
+use super::super::pose::Pose;
+use super::super::serial::{Drive, Motion, SerialChain};
 use sidestep_import::urdf::Model;
 
 /// A frame that hangs on a link of the arm, at joints of its own where it is beside the arm.

@@ -14,7 +14,8 @@ mod pairs;
 #[cfg(test)]
 mod tests;
 
-use super::kinematics::{Frames, Pose, SerialChain, Vector};
+use super::pose::{Pose, Vector};
+use super::serial::{Frames, SerialChain};
 use mount::Mounts;
 use parry3d_f64::math::{Pose as ParryPose, Rotation, Vector as ParryVector};
 use parry3d_f64::query::{self, Contact};
@@ -51,21 +52,21 @@ enum Core {
 
 /// A part at a posture.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Placed {
+pub(super) struct Placed {
     pose: ParryPose,
     center_m: Vector,
 }
 
 /// Two things that are nearer to each other than a distance.
-pub(crate) struct Near {
+pub(super) struct Near {
     /// The point of the first that is nearest to the second, or deepest in it.
-    pub(crate) first_m: Vector,
+    pub(super) first_m: Vector,
     /// The point of the second.
-    pub(crate) second_m: Vector,
+    pub(super) second_m: Vector,
     /// The unit vector in which the first gets away.
-    pub(crate) away: Vector,
+    pub(super) away: Vector,
     /// Their distance in m; negative if they overlap.
-    pub(crate) apart_m: f64,
+    pub(super) apart_m: f64,
 }
 
 impl ArmBody {
@@ -124,34 +125,34 @@ impl ArmBody {
     }
 
     /// Whether a link of the arm, counted as [`Frames::links`] are, has a shape.
-    pub(crate) fn covers(&self, link: usize) -> bool {
+    pub(super) fn covers(&self, link: usize) -> bool {
         self.parts.iter().any(|part| part.mount.link == link)
     }
 
-    pub(crate) fn name(&self, part: usize) -> &str {
+    pub(super) fn name(&self, part: usize) -> &str {
         &self.parts[part].link
     }
 
     /// Returns the link of the arm that a part moves with.
-    pub(crate) fn link(&self, part: usize) -> usize {
+    pub(super) fn link(&self, part: usize) -> usize {
         self.parts[part].mount.link
     }
 
-    pub(crate) fn len(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         self.parts.len()
     }
 
-    pub(crate) fn own_pairs(&self) -> &[(usize, usize)] {
+    pub(super) fn own_pairs(&self) -> &[(usize, usize)] {
         &self.pairs
     }
 
     /// Computes where all parts are.
-    pub(crate) fn place(&self, frames: &Frames, values: &[f64], placed: &mut Vec<Placed>) {
+    pub(super) fn place(&self, frames: &Frames, values: &[f64], placed: &mut Vec<Placed>) {
         self.place_on(&frames.links, values, placed);
     }
 
     /// Computes where all parts are if the arm's links are at `links`.
-    pub(crate) fn place_on(&self, links: &[Pose], values: &[f64], placed: &mut Vec<Placed>) {
+    pub(super) fn place_on(&self, links: &[Pose], values: &[f64], placed: &mut Vec<Placed>) {
         placed.clear();
         placed.extend(self.parts.iter().map(|part| {
             let pose = part.mount.at(links, values);
@@ -161,7 +162,7 @@ impl ArmBody {
     }
 
     /// Returns how two parts are to each other, if they are nearer than `within_m`.
-    pub(crate) fn near(
+    pub(super) fn near(
         &self,
         placed: &[Placed],
         a: usize,
@@ -177,7 +178,7 @@ impl ArmBody {
     }
 
     /// Returns how a part is to a ball, if they are nearer than `within_m`.
-    pub(crate) fn near_ball(
+    pub(super) fn near_ball(
         &self,
         placed: &[Placed],
         part: usize,
