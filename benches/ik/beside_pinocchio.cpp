@@ -1,4 +1,4 @@
-// Damped least squares with restarts on pinocchio, in C++: the yardstick of `pinocchio.py`, which
+// Damped least squares with restarts on pinocchio, in C++: the yardstick of `beside_pinocchio.py`, which
 // compiles and calls it. Reads a model that `saveToText` wrote and poses (x y z qx qy qz qw, one a line), prints one JSON object.
 //
 // pinocchio MODEL TIP POSES RESTARTS STEPS DAMPING STEP_LENGTH TOLERANCE_M TOLERANCE_RAD

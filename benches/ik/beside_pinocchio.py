@@ -3,12 +3,12 @@
 
     pip install pin cmeel-eigen numpy
     cargo build --release
-    python benches/ik/pinocchio.py [--poses 1000] [--arms ../shared/data/urdf] [--sidestep target/release/sidestep]
+    python benches/ik/beside_pinocchio.py [--poses 1000] [--arms ../shared/data/urdf] [--sidestep target/release/sidestep]
 
 Each arm gets the same random poses that it can take: joint values drawn inside the limits, their pose by
 pinocchio. Both sides start from the posture nearest to zero, then from random ones (at most 100), stay
 inside the limits, and must come as near as the tolerances say. What Sidestep answers is judged by
-pinocchio's forward kinematics. pinocchio's side is C++ (`pinocchio.cpp`, compiled with -O2), with that of eight
+pinocchio's forward kinematics. pinocchio's side is C++ (`beside_pinocchio.cpp`, compiled with -O2), with that of eight
 settings (damping, length and number of steps) which is the quickest on 100 other poses among those that
 solve the most; `python` is the same loop in Python with the same setting, on the first 100 poses, where
 most of the time is the interpreter's. CPU time, one thread.
@@ -122,7 +122,7 @@ def compiled(folder):
     program = folder / "pinocchio"
     subprocess.run([
         os.environ.get("CXX", "g++"), "-std=c++17", "-O2", "-DNDEBUG", "-w",
-        "-DBOOST_MPL_LIMIT_LIST_SIZE=30", "-DBOOST_MPL_CFG_NO_PREPROCESSED_HEADERS", HERE / "pinocchio.cpp", "-o", program,
+        "-DBOOST_MPL_LIMIT_LIST_SIZE=30", "-DBOOST_MPL_CFG_NO_PREPROCESSED_HEADERS", HERE / "beside_pinocchio.cpp", "-o", program,
         f"-I{prefix}/include", f"-I{prefix}/include/eigen3", f"-L{prefix}/lib", f"-Wl,-rpath,{prefix}/lib",
         f"-Wl,-rpath-link,{prefix}/lib", "-lpinocchio_default", "-lboost_serialization",
     ], check=True)
@@ -141,7 +141,7 @@ def by_cpp(program, arm, poses, setting, folder):
 
 
 def by_python(arm, poses, setting):
-    """The loop of `pinocchio.cpp`."""
+    """The loop of `beside_pinocchio.cpp`."""
     damping, length, most = setting
     model, data, generator = arm.model, arm.data, np.random.default_rng(7)
     bounded = [j for j in list(model.joints)[1:] if j.nq == j.nv]
