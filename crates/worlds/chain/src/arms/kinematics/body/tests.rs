@@ -69,7 +69,7 @@ fn overlaps_are_as_deep_as_computed_by_hand() {
     let overlaps = body.overlaps(&chain, &[0.0, turn, turn, 0.0]);
     // Its center is 0.0866 m beside the axis of the first bar, which is 0.05 m thick, at 0.05 m:
     // 0.05 m before the bar's end at 0.1 m.
-    let gap = ((0.1f64 * 3f64.sqrt() / 2.0 - 0.05).powi(2) + 0.05 * 0.05).sqrt();
+    let gap = norm([0.1 * 3f64.sqrt() / 2.0 - 0.05, 0.05]);
     let of_a: Vec<_> = overlaps.iter().filter(|(a, b, _)| (*a, *b) == ("a", "c")).collect();
     let [(_, _, depth_m)] = of_a[..] else { panic!("{overlaps:?}") };
     assert!((depth_m - (0.1 - gap)).abs() < 1e-6, "{depth_m} {gap}");
