@@ -52,6 +52,12 @@ checked. Its joint values can be passed to `sidestep fk --joints`.
 --targets reads a table (CSV) with the columns x,y,z, and for orientations roll,pitch,yaw or
 qx,qy,qz,qw, and prints a table with a row for each target, in the order of the file.
 
+--json prints reached, error_m, error_rad, reason, target, target_quaternion (x,y,z,w), engine,
+iterations, starts, solutions (joints, error_m and error_rad of each posture), remarks (meshes that
+stand as boxes, shapes that are left out), and of the first posture what `sidestep fk --json` prints.
+With --targets it prints targets, reached, joint_names and answers (of each the same, joints and
+others), and cpu_us_per_target, which is no part of the results.
+
 The exit code is 0 if the target is reached (of several, each) and 1 if not: then the nearest posture
 found is printed, and what is in the way.";
 
