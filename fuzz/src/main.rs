@@ -9,7 +9,7 @@ use sidestep::experiment::sweep::Sweep;
 use sidestep::import::table::CsvTable;
 use sidestep::import::urdf::{Model, srdf::Semantics};
 use sidestep::import::{
-    ascii, bluesky, carmen, image::Bitmap, movingai, mrclam, rosmap, stage, traffic,
+    ascii, bluesky, carmen, image::Bitmap, movingai, mrclam, rosmap, stage, stl, traffic,
 };
 use sidestep::kernel::checkpoint;
 use sidestep::learn::{effector, sensor};
@@ -24,7 +24,7 @@ use std::sync::LazyLock;
 /// A reader of text or bytes, by its name. A folder of the same name in `seeds` has inputs to begin with.
 type Target = (&'static str, fn(&[u8]));
 
-const TARGETS: [Target; 24] = [
+const TARGETS: [Target; 25] = [
     ("scenario", |data| text(data, scenario)),
     ("override", |data| text(data, overridden)),
     ("script", |data| text(data, script)),
@@ -37,6 +37,7 @@ const TARGETS: [Target; 24] = [
     ("stage", |data| drop(stage::load(&file("f.world", data)))),
     ("urdf", |data| text(data, |t| drop(Model::parse("f", t)))),
     ("srdf", |data| text(data, srdf)),
+    ("stl", |data| drop(stl::parse("f", data))),
     ("bluesky", |data| text(data, |t| drop(bluesky::parse(&"f", t)))),
     ("traffic", |data| text(data, |t| drop(traffic::parse(&"f", t)))),
     ("translate", |data| drop(WORLDS.translate(&file("f.scn", data)))),

@@ -18,6 +18,7 @@ mod pixel_map;
 pub mod rosmap;
 mod rows;
 pub mod stage;
+pub mod stl;
 pub mod table;
 pub mod traffic;
 pub mod urdf;

@@ -105,6 +105,13 @@ impl<'a> Element<'a> {
         nodes.map(move |node| Element { node, ..self })
     }
 
+    /// Returns its first direct child that has no prefix.
+    pub(super) fn first_child(self) -> Option<Element<'a>> {
+        let mut nodes = self.node.children();
+        let found = nodes.find(|n| n.is_element() && n.tag_name().namespace().is_none());
+        found.map(|node| Element { node, ..self })
+    }
+
     /// Returns its direct child called `name`, if there is one.
     pub(super) fn child(self, name: &'a str) -> Result<Option<Element<'a>>, InputError> {
         let mut found = self.children(name);

@@ -26,6 +26,12 @@ unary! {
     log10 = log10, "Logarithm to base 10.";
 }
 
+/// Sine and cosine of an angle in radians, for less than both cost alone.
+#[inline]
+pub fn sin_cos(x: f64) -> (f64, f64) {
+    libm::sincos(x)
+}
+
 /// Angle in radians of the vector (`x`, `y`), in (-pi, pi].
 #[inline]
 pub fn atan2(y: f64, x: f64) -> f64 {

@@ -3,10 +3,10 @@
 use crate::console::aligned;
 use clap::Args;
 use serde::Serialize;
-use sidestep::import::urdf::Model;
 use sidestep::import::urdf::srdf::Semantics;
+use sidestep::import::urdf::{Model, Solids};
 use sidestep::kernel::InputError;
-use sidestep::worlds::chain::kinematics::{Pose, Rod, SerialChain, Variable, Vector};
+use sidestep::worlds::chain::kinematics::{ArmBody, Pose, Rod, SerialChain, Variable, Vector};
 use std::path::PathBuf;
 
 /// The options that choose an arm and its posture.
@@ -24,7 +24,7 @@ pub(crate) struct ArmArgs {
     #[arg(long, value_name = "LINK")]
     tip: Option<String>,
 
-    /// SRDF file with groups and named postures
+    /// SRDF file with groups, named postures, and pairs of links that may touch
     #[arg(long, value_name = "FILE")]
     srdf: Option<PathBuf>,
 
@@ -43,7 +43,10 @@ pub(crate) struct ArmArgs {
 
 /// An arm in a posture.
 pub(crate) struct Arm {
-    pub(crate) robot: String,
+    pub(crate) model: Model,
+    /// Pairs of links that may touch, as the SRDF says.
+    may_touch: Vec<(usize, usize)>,
+    urdf: PathBuf,
     pub(crate) chain: SerialChain,
     pub(crate) values: Vec<f64>,
 }
@@ -66,7 +69,9 @@ impl ArmArgs {
             _ => ("--joints", chain.rest()),
         };
         chain.check_count(place, &values)?;
-        Ok(Arm { robot: model.name, chain, values })
+        let masks = semantics.map(|semantics| semantics.disabled_collisions).unwrap_or_default();
+        let may_touch = masks.iter().map(|mask| mask.links).collect();
+        Ok(Arm { model, may_touch, urdf: self.urdf.clone(), chain, values })
     }
 
     fn chain(
@@ -146,6 +151,12 @@ struct RodSize {
 }
 
 impl Arm {
+    /// Returns the shapes of its links, and remarks on those that are not among them.
+    pub(crate) fn body(&self) -> (ArmBody, Vec<String>) {
+        let Solids { solids, remarks } = self.model.solids(&self.urdf);
+        (ArmBody::new(&self.model, &self.chain, &solids, &self.may_touch), remarks)
+    }
+
     /// Returns the positions of the arm at these joint values.
     pub(crate) fn at(&self, values: &[f64]) -> Placed {
         let chain = &self.chain;
@@ -153,7 +164,7 @@ impl Arm {
         let skeleton = chain.skeleton();
         let Pose { rotation, origin_m } = frames.tip;
         Placed {
-            robot: self.robot.clone(),
+            robot: self.model.name.clone(),
             base_link: chain.base.clone(),
             tip_link: chain.tip.clone(),
             tip: origin_m,

@@ -13,6 +13,7 @@ mod export;
 mod fk;
 mod help;
 mod ik;
+mod ik_poses;
 mod input;
 mod learn;
 mod pictures;

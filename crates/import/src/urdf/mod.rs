@@ -1,17 +1,21 @@
 //! Robot models: URDF (links and joints) and SRDF (groups, named postures).
 //!
-//! Only kinematics is read: joints with their origins, axes, limits and mimicry. Masses, shapes and
-//! meshes are ignored, so a missing mesh is not an error. Lengths are meters, angles radians.
+//! Kinematics is read (joints with their origins, axes, limits and mimicry) and the shapes of links
+//! that count for collisions. Masses and visual shapes are ignored, and meshes are only opened by
+//! [`Model::solids`], so a missing mesh is not an error. Lengths are meters, angles radians.
 //! Formats: <https://wiki.ros.org/urdf/XML>, <https://wiki.ros.org/srdf>.
 //!
 //! The XML is read with `roxmltree` instead of `urdf-rs`, because errors of the latter name no
 //! line, it does not read SRDF, and it would add an XML reader of its own.
 
 mod read;
+mod shapes;
 pub mod srdf;
 #[cfg(test)]
 pub(crate) mod tests;
 mod tree;
+
+pub use shapes::{Collision, Shape, Solid, Solids};
 
 use std::path::Path;
 
@@ -29,6 +33,8 @@ pub struct Model {
     pub name: String,
     /// Names of the links, in the order of the file.
     pub links: Vec<String>,
+    /// The shapes of each link that count for collisions, in the order of the file.
+    pub collisions: Vec<Vec<Collision>>,
     /// The joints, in the order of the file. Parents and children index [`Model::links`].
     pub joints: Vec<Joint>,
     /// The link that is not the child of any joint.

@@ -1,7 +1,7 @@
 //! URDF text -> [`Model`].
 
 use super::tree;
-use super::{Joint, JointKind, Limits, Mimic, Model, Origin};
+use super::{Collision, Joint, JointKind, Limits, Mimic, Model, Origin, Shape};
 use crate::xml::{Element, Value, XmlFile};
 use sidestep_kernel::InputError;
 use sidestep_scenario::nearest;
@@ -49,7 +49,8 @@ pub(super) fn model(place: &str, text: &str) -> Result<Model, InputError> {
     }
     read_mimics(&elements, &mut joints, &names)?;
     let root = tree::root(robot, &elements, &links.in_order, &joints)?;
-    Ok(Model { name, links: links.in_order, joints, root })
+    let collisions = robot.children("link").map(collisions).collect::<Result<_, _>>()?;
+    Ok(Model { name, links: links.in_order, collisions, joints, root })
 }
 
 /// Moves `error` to the position of another.
@@ -110,6 +111,49 @@ fn links(robot: Element) -> Result<Links, InputError> {
         return Err(robot.error("the robot has no links", "add <link name=\"...\"/>"));
     }
     Ok(links)
+}
+
+/// Reads the shapes of a link that count for collisions.
+fn collisions(link: Element) -> Result<Vec<Collision>, InputError> {
+    let read = |element: Element| {
+        // Empty elements, and those of other programs, are no shapes.
+        let Some(kind) = element.child("geometry")?.and_then(Element::first_child) else {
+            return Ok(None);
+        };
+        Ok(Some(Collision { origin: origin(element)?, shape: shape(kind)? }))
+    };
+    link.children("collision").filter_map(|element| read(element).transpose()).collect()
+}
+
+fn shape(element: Element) -> Result<Shape, InputError> {
+    let length = |name| size(element.required(name)?, |value| Ok([value.number()?; 3]));
+    Ok(match element.name() {
+        "sphere" => Shape::Sphere { radius_m: length("radius")?[0] },
+        "cylinder" => {
+            Shape::Cylinder { radius_m: length("radius")?[0], length_m: length("length")?[0] }
+        }
+        "box" => Shape::Box { size_m: size(element.required("size")?, |value| value.triple())? },
+        "mesh" => Shape::Mesh {
+            file: element.required("filename")?.text().to_owned(),
+            scale: element.attribute("scale").map_or(Ok([1.0; 3]), bounded)?,
+        },
+        kind => Shape::Other { kind: kind.to_owned() },
+    })
+}
+
+/// Reads lengths that are not negative.
+fn size<'a>(
+    value: Value<'a>,
+    read: impl Fn(&Value<'a>) -> Result<[f64; 3], InputError>,
+) -> Result<[f64; 3], InputError> {
+    let lengths = read(&value)?;
+    match lengths.into_iter().find(|x| !(0.0..=MAX_COORDINATE).contains(x)) {
+        None => Ok(lengths),
+        Some(x) => {
+            let cause = format!("{x} m is no length");
+            Err(value.error(cause, format!("give meters from 0 to {MAX_COORDINATE:e}")))
+        }
+    }
 }
 
 fn joint(element: Element, links: &Links) -> Result<Joint, InputError> {

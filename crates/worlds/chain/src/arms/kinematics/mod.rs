@@ -7,6 +7,7 @@
 //! skeleton    joint axes -> connectors and rods
 //! bend        joint limits -> bend limits, where one joint alone bends a connector
 //! recover     connectors -> joint values
+//! body/       collision shapes of links
 //! inverse/    a target -> joint values, inside limits
 //! ```
 //!
@@ -21,6 +22,7 @@
 //! joints at all.
 
 mod bend;
+mod body;
 mod inverse;
 mod pose;
 mod recover;
@@ -30,7 +32,11 @@ mod skeleton;
 mod tests;
 
 pub use bend::BendLimit;
-pub use inverse::{ArmAnswer, ArmGoal, ArmReason, Hit, Sphere};
+pub use body::ArmBody;
+pub use inverse::{
+    Against, ArmAnswer, ArmGoal, ArmReason, Asked, Axis, Hit, MOST_SOLUTIONS, Part, Posture,
+    Sphere, Turn,
+};
 pub use pose::{Pose, Vector};
 pub use recover::{RecoverError, Recovered};
 pub use serial::{Frames, Motion, SerialChain, Variable};

@@ -44,6 +44,23 @@ pub enum Motion {
 }
 
 impl Motion {
+    /// Returns the motion of joints of a kind that a single value moves.
+    pub(super) fn of(kind: JointKind) -> Option<Self> {
+        match kind {
+            JointKind::Revolute | JointKind::Continuous => Some(Self::Turn),
+            JointKind::Prismatic => Some(Self::Slide),
+            JointKind::Fixed | JointKind::Floating | JointKind::Planar => None,
+        }
+    }
+
+    /// Returns the motion by `value` about or along the unit vector `axis`.
+    pub(super) fn moved(self, axis: Vector, value: f64) -> Pose {
+        match self {
+            Self::Turn => Pose::turn(axis, value),
+            Self::Slide => Pose::shift(scaled(axis, value)),
+        }
+    }
+
     /// Returns the unit of its values.
     pub fn unit(self) -> &'static str {
         match self {
@@ -86,10 +103,7 @@ impl Drive {
 impl MovingJoint {
     /// Returns the motion of the joint at `value`.
     pub(super) fn moved(&self, value: f64) -> Pose {
-        match self.motion {
-            Motion::Turn => Pose::turn(self.axis, value),
-            Motion::Slide => Pose::shift(scaled(self.axis, value)),
-        }
+        self.motion.moved(self.axis, value)
     }
 
     /// Returns its axis, if the link before it stands at `before`.
@@ -144,18 +158,14 @@ impl SerialChain {
     ) -> Result<(), InputError> {
         let joint = &model.joints[index];
         let origin = self.to_tip.then(&Pose::from_origin(&joint.origin));
-        let motion = match joint.kind {
-            JointKind::Fixed => {
-                self.to_tip = origin;
-                return Ok(());
-            }
-            JointKind::Revolute | JointKind::Continuous => Motion::Turn,
-            JointKind::Prismatic => Motion::Slide,
-            JointKind::Floating | JointKind::Planar => {
-                let cause = format!("joint `{}` moves in more than one way", joint.name);
-                return Err(InputError::new(place, cause, "choose base and tip on one side of it"));
-            }
-        };
+        if joint.kind == JointKind::Fixed {
+            self.to_tip = origin;
+            return Ok(());
+        }
+        let motion = Motion::of(joint.kind).ok_or_else(|| {
+            let cause = format!("joint `{}` moves in more than one way", joint.name);
+            InputError::new(place, cause, "choose base and tip on one side of it")
+        })?;
         let (driver, multiplier, offset) = driver(model, index);
         let known = drivers.iter().position(|&known| known == driver);
         let variable = known.unwrap_or_else(|| {
@@ -173,6 +183,15 @@ impl SerialChain {
         });
         self.to_tip = Pose::IDENTITY;
         Ok(())
+    }
+
+    /// Returns how a joint of the model, on the way to the tip or beside it, follows the variables;
+    /// none if it does not.
+    pub(super) fn drive(&self, model: &Model, joint: usize) -> Option<Drive> {
+        let (driver, multiplier, offset) = driver(model, joint);
+        let name = &model.joints[driver].name;
+        let variable = self.variables.iter().position(|variable| variable.name == *name)?;
+        Some(Drive { variable, multiplier, offset })
     }
 
     /// Computes forward kinematics: the poses of links and tip at these values of the variables,

@@ -1,11 +1,15 @@
-//! Goals of an arm, and the answers.
+//! Goals of an arm.
 
-use super::super::pose::Vector;
+use super::super::body::ArmBody;
+use super::super::pose::{Pose, Vector};
 use crate::arms::ik::Engine;
 use sidestep_kernel::InputError;
 
-/// A sphere that no rod of the arm may enter. Rods are thin lines, so the radius must include the
-/// arm's thickness.
+/// The most postures that one goal may ask for.
+pub const MOST_SOLUTIONS: usize = 1000;
+
+/// A sphere that no part of the arm may enter. Where the arm's links have no shapes, its rods are
+/// thin lines, so the radius must include the arm's thickness.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sphere {
     /// Center in m, in the base's frame.
@@ -14,13 +18,65 @@ pub struct Sphere {
     pub radius_m: f64,
 }
 
+/// An axis of a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Axis {
+    /// The first.
+    X,
+    /// The second.
+    Y,
+    /// The third.
+    Z,
+}
+
+impl Axis {
+    /// The three axes in their order.
+    pub const ALL: [Self; 3] = [Self::X, Self::Y, Self::Z];
+}
+
+/// The part of the tip's orientation that counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Turn {
+    /// Nothing: the tip may be turned in any way.
+    Free,
+    /// The direction of one axis: the tip may turn about it.
+    Axis(Axis),
+    /// All of it.
+    Whole,
+}
+
+/// The part of a target's pose that counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Asked {
+    /// Whether the position along the axes x, y and z of the target's frame counts.
+    pub along: [bool; 3],
+    /// The part of the orientation that counts.
+    pub turn: Turn,
+}
+
+impl Asked {
+    /// The position alone.
+    pub const POSITION: Self = Self { along: [true; 3], turn: Turn::Free };
+    /// Position and orientation.
+    pub const POSE: Self = Self { along: [true; 3], turn: Turn::Whole };
+
+    /// Whether all of the position counts.
+    pub fn whole_position(self) -> bool {
+        self.along == [true; 3]
+    }
+}
+
 /// A target for the tip of an arm.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ArmGoal {
-    /// Target in m, in the base's frame.
-    pub target_m: Vector,
+    /// Frame that the tip is to take, in the base's frame.
+    pub target: Pose,
+    /// The part of it that counts.
+    pub asked: Asked,
     /// Distance at which the target counts as reached, in m.
     pub tolerance_m: f64,
+    /// Angle at which the orientation counts as reached, in rad.
+    pub tolerance_rad: f64,
     /// The engine. [`Engine::Chain`] starts from the connectors' solution; all others work on the
     /// joints from the first step.
     pub engine: Engine,
@@ -28,35 +84,86 @@ pub struct ArmGoal {
     pub restarts: usize,
     /// Random seed of these postures.
     pub seed: u64,
+    /// Number of postures wanted. From 2 on, the search goes on from posture to posture until it has
+    /// found as many that are [distinct](ArmGoal::apart), and the answer is the nearest to the start
+    /// of those.
+    pub solutions: usize,
+    /// Whether the postures nearest to the start are wanted: then all restarts are made, and each
+    /// posture found is drawn toward the start as far as the goal allows.
+    pub nearest: bool,
+    /// Least difference of distinct postures: of one joint at least, in rad, full turns apart; a
+    /// slide counts as the angle that moves the tip as far at the arm's full reach.
+    pub apart: f64,
     /// Whether joints may be outside their limits.
     pub ignore_limits: bool,
-    /// Spheres that no rod may enter.
+    /// Spheres that the arm may not enter.
     pub spheres: Vec<Sphere>,
+    /// The shapes of the arm's links; without them, and where links have none, the arm is its rods.
+    pub body: Option<ArmBody>,
+    /// Whether links of the body must not touch each other, but for those that may.
+    pub own_body: bool,
 }
 
 impl ArmGoal {
-    /// Returns a goal for the tip at `target_m` to 1e-6 m, with 100 restarts, inside the limits.
+    /// Returns a goal for the tip at `target_m`, turned in any way, to 1e-6 m, with 100 restarts,
+    /// inside the limits.
     pub fn new(target_m: Vector) -> Self {
+        let target = Pose { origin_m: target_m, ..Pose::IDENTITY };
+        Self { asked: Asked::POSITION, ..Self::pose(target) }
+    }
+
+    /// Returns a goal for the position and the orientation of the tip, to 1e-6 m and 1e-6 rad, with
+    /// 100 restarts, inside the limits.
+    pub fn pose(target: Pose) -> Self {
         Self {
-            target_m,
+            target,
+            asked: Asked::POSE,
             tolerance_m: 1e-6,
+            tolerance_rad: 1e-6,
             engine: Engine::Auto,
             restarts: 100,
             seed: 0,
+            solutions: 1,
+            nearest: false,
+            apart: 0.1,
             ignore_limits: false,
             spheres: Vec::new(),
+            body: None,
+            own_body: false,
         }
     }
 
     pub(super) fn check(&self) -> Result<(), InputError> {
-        if !self.target_m.iter().all(|x| x.abs() <= 1e7) {
-            let cause = format!("is {:?}", self.target_m);
+        let Pose { origin_m, rotation } = &self.target;
+        if !origin_m.iter().all(|x| x.abs() <= 1e7) {
+            let cause = format!("is {origin_m:?}");
             return Err(InputError::new("target", cause, "give finite coordinates up to 1e7 m"));
         }
-        if !(self.tolerance_m > 0.0 && self.tolerance_m.is_finite()) {
-            let cause = format!("is {} m", self.tolerance_m);
-            return Err(InputError::new("tolerance", cause, "give a length above 0"));
+        if !self.target.is_turned() {
+            let cause = format!("has {rotation:?} as its orientation, which is no rotation");
+            return Err(InputError::new("target", cause, "give three orthogonal unit vectors"));
         }
+        if self.asked.along == [false; 3] && self.asked.turn == Turn::Free {
+            let cause = "neither position nor orientation counts";
+            return Err(InputError::new("target", cause, "ask for some of it"));
+        }
+        above_zero("tolerance", self.tolerance_m, "m", "a length")?;
+        above_zero("tolerance", self.tolerance_rad, "rad", "an angle")?;
+        above_zero("apart", self.apart, "rad", "an angle")?;
+        if !(1..=MOST_SOLUTIONS).contains(&self.solutions) {
+            let cause = format!("is {}", self.solutions);
+            let remedy = format!("give a number from 1 to {MOST_SOLUTIONS}");
+            return Err(InputError::new("solutions", cause, remedy));
+        }
+        self.check_spheres()
+    }
+
+    /// Whether one posture after the other is looked for, instead of the first that does.
+    pub(super) fn wants_many(&self) -> bool {
+        self.solutions > 1 || self.nearest
+    }
+
+    fn check_spheres(&self) -> Result<(), InputError> {
         let is_right = |s: &Sphere| {
             s.center_m.iter().chain([&s.radius_m]).all(|x| x.abs() <= 1e7) && s.radius_m >= 0.0
         };
@@ -71,81 +178,9 @@ impl ArmGoal {
     }
 }
 
-/// The answer to a goal.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ArmAnswer {
-    /// Whether the goal is met, with all joints inside their limits and no rod in a sphere.
-    pub reached: bool,
-    /// Distance of the tip from the target in m, by forward kinematics at the values.
-    pub error_m: f64,
-    /// A value for each variable, inside the limits unless they are ignored; if the goal is not
-    /// met, the values that came nearest.
-    pub values: Vec<f64>,
-    /// The engine that found the answer; [`Engine::Chain`] if the connectors led to it.
-    pub engine: Engine,
-    /// Steps over all starts.
-    pub iterations: usize,
-    /// Postures that it started from.
-    pub starts: usize,
-    /// The reason why the goal is not met; `None` if it is.
-    pub reason: Option<ArmReason>,
-}
-
-/// A rod that is in a sphere.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Hit {
-    /// Index of the connector (from 0) from which the rod leads to the next.
-    pub rod: usize,
-    /// Index of the sphere.
-    pub sphere: usize,
-    /// Depth in m.
-    pub depth_m: f64,
-}
-
-/// The reason why a goal is not met.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum ArmReason {
-    /// The rods are too short.
-    #[error(
-        "the target is {far_m:.6} m from the arm's first connector, and its rods reach {reach_m:.6} m"
-    )]
-    TooFar {
-        /// Distance of the target from the first connector in m.
-        far_m: f64,
-        /// The sum of the rods' greatest lengths in m.
-        reach_m: f64,
-    },
-    /// One rod is longer than all the others together.
-    #[error(
-        "the target is {far_m:.6} m from the arm's first connector, and the tip comes no nearer than {hole_m:.6} m"
-    )]
-    TooNear {
-        /// Distance of the target from the first connector in m.
-        far_m: f64,
-        /// The least that the rods allow in m.
-        hole_m: f64,
-    },
-    /// The target can be reached, but only with a joint outside its limits.
-    #[error("joint `{joint}` would have to be at {value:.6}, outside {lower:.6} to {upper:.6}")]
-    OutsideLimits {
-        /// Its name.
-        joint: String,
-        /// Its value in rad or m.
-        value: f64,
-        /// Lowest value allowed.
-        lower: f64,
-        /// Highest value allowed.
-        upper: f64,
-    },
-    /// The target can be reached, but only with a rod in a sphere.
-    #[error("the rod from connector {} would be {:.6} m deep in obstacle {}", .0.rod + 1, .0.depth_m, .0.sphere + 1)]
-    Blocked(Hit),
-    /// No start led to the target.
-    #[error("no posture was found from {starts} starts; the nearest is {error_m:.6} m off")]
-    NotFound {
-        /// Postures that it started from.
-        starts: usize,
-        /// Distance of the nearest from the target in m.
-        error_m: f64,
-    },
+fn above_zero(place: &str, value: f64, unit: &str, quantity: &str) -> Result<(), InputError> {
+    if value > 0.0 && value.is_finite() {
+        return Ok(());
+    }
+    Err(InputError::new(place, format!("is {value} {unit}"), format!("give {quantity} above 0")))
 }

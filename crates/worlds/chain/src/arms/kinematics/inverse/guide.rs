@@ -35,7 +35,7 @@ pub(super) fn posture(
         tolerance_m: 0.5 * goal.tolerance_m,
         restarts: RESTARTS,
         seed: goal.seed,
-        ..Goal::new(tip, before, goal.target_m)
+        ..Goal::new(tip, before, goal.target.origin_m)
     };
     let answer = Solver::new(Rules::default()).solve(&chain, &obstacles, &wanted).ok()?;
     if !answer.reached {
@@ -55,7 +55,7 @@ fn chain_of(
 ) -> Result<(Chain<3>, usize), InputError> {
     let mut points = connectors.to_vec();
     let longest_m =
-        LONGEST * (skeleton.reach_m + goal.target_m.iter().map(|x| x.abs()).sum::<f64>());
+        LONGEST * (skeleton.reach_m + goal.target.origin_m.iter().map(|x| x.abs()).sum::<f64>());
     let mut rods: Vec<Rod> = skeleton
         .rods
         .iter()

@@ -1,130 +1,155 @@
 //! Errors of a posture, and how the joints change them.
+//!
+//! Every row of the Jacobian is an error in m: of the tip along an axis that counts, of its
+//! orientation about an axis that counts (an angle times [`RADIAN`] of the arm's reach), or a part
+//! of the arm that is in something.
 
-use super::super::pose::{Line, Vector};
-use super::super::serial::{Frames, Motion, SerialChain};
-use super::super::skeleton::{Anchor, Skeleton};
-use super::apart_m;
-use super::goal::{ArmGoal, Hit, Sphere};
-use crate::rods::geometry::nearest_on_segment;
-use sidestep_kernel::geometry::{cross, dot, scaled, sub};
+use super::super::pose::{Pose, Vector};
+use super::super::serial::SerialChain;
+use super::super::skeleton::Skeleton;
+use super::contacts::{Contacts, Touched};
+use super::goal::{ArmGoal, Turn};
+use super::quick::{Placed, Quick, turn_between};
+use sidestep_kernel::geometry::{cross, dot, norm, perpendicular, scaled, sub, unit};
+use sidestep_kernel::math::atan2;
 
-/// Distance from spheres that steps aim at, in parts of the reach.
-const MARGIN: f64 = 1e-4;
+/// The length that an error of 1 rad counts as, in parts of the arm's reach.
+const RADIAN: f64 = 0.3;
 
 /// The criteria for a posture.
 pub(super) struct Scene<'a> {
-    chain: &'a SerialChain,
-    anchors: &'a [Anchor],
-    target_m: Vector,
-    spheres: &'a [Sphere],
-    margin_m: f64,
+    quick: Quick,
+    goal: &'a ArmGoal,
+    contacts: Contacts<'a>,
+    /// The axes along which the tip's position counts, in the base's frame.
+    along: Vec<Vector>,
+    radian_m: f64,
 }
 
-/// Errors of a posture in m, one for each row of the Jacobian.
-pub(super) struct Errors {
-    /// Wanted changes of the rows.
+/// A posture as it was looked at.
+#[derive(Debug, Clone)]
+pub(super) struct Look {
+    pub(super) placed: Placed,
+    /// Wanted changes of the rows: those of the tip, then one for each contact.
     pub(super) wanted: Vec<f64>,
-    /// Rows of the Jacobian, each with an entry for each variable.
-    pub(super) rows: Vec<Vec<f64>>,
+    /// Axes about which the tip's orientation counts, each for a row.
+    about: Vec<Vector>,
+    pub(super) touched: Touched,
     pub(super) tip_m: f64,
-    /// The rod that is deepest in a sphere.
-    pub(super) hit: Option<Hit>,
+    pub(super) turn_rad: f64,
 }
 
-impl Errors {
-    /// Returns the quantity that steps must reduce.
+impl Look {
+    /// Returns the square of the quantity that steps must reduce.
     pub(super) fn merit(&self) -> f64 {
-        self.wanted.iter().map(|x| x * x).sum::<f64>().sqrt()
+        self.wanted.iter().map(|x| x * x).sum()
     }
 }
 
 impl<'a> Scene<'a> {
     pub(super) fn new(chain: &'a SerialChain, skeleton: &'a Skeleton, goal: &'a ArmGoal) -> Self {
+        // If all axes count it does not matter which, and these cost no digits.
+        let axes = if goal.asked.whole_position() { &Pose::IDENTITY } else { &goal.target };
+        let counts = (0..3).filter(|&axis| goal.asked.along[axis]);
         Self {
-            chain,
-            anchors: &skeleton.connectors,
-            target_m: goal.target_m,
-            spheres: &goal.spheres,
-            margin_m: MARGIN * skeleton.reach_m,
+            quick: Quick::new(chain),
+            along: counts.map(|axis| axes.axis(axis)).collect(),
+            contacts: Contacts::new(skeleton, goal),
+            radian_m: RADIAN * skeleton.reach_m.max(f64::MIN_POSITIVE),
+            goal,
         }
     }
 
-    pub(super) fn errors(&self, values: &[f64]) -> Errors {
-        let frames = self.chain.forward(values);
-        let lines: Vec<Line> =
-            self.chain.joints.iter().zip(&frames.links).map(|(j, link)| j.line(link)).collect();
-        let tip = frames.tip.origin_m;
-        let missing = sub(self.target_m, tip);
-        let mut errors = Errors {
-            wanted: missing.to_vec(),
-            rows: vec![vec![0.0; values.len()]; 3],
-            tip_m: apart_m(self.target_m, tip),
-            hit: None,
+    /// Returns a look at nothing, to be used by [`Scene::look`].
+    pub(super) fn blank(chain: &SerialChain) -> Look {
+        Look {
+            placed: Placed::of(chain),
+            wanted: Vec::new(),
+            about: Vec::new(),
+            touched: Touched::default(),
+            tip_m: f64::INFINITY,
+            turn_rad: f64::INFINITY,
+        }
+    }
+
+    /// Computes the errors of a posture.
+    pub(super) fn look(&self, values: &[f64], look: &mut Look) {
+        self.quick.place(values, &mut look.placed);
+        let tip = look.placed.tip;
+        let missing = sub(self.goal.target.origin_m, tip.origin_m);
+        look.wanted.clear();
+        look.wanted.extend(self.along.iter().map(|axis| dot(missing, *axis)));
+        look.tip_m = look.merit().sqrt();
+        self.look_at_turn(&tip, look);
+        self.contacts.find(values, &look.placed, &mut look.touched);
+        look.wanted.extend(look.touched.contacts.iter().map(|contact| contact.wanted_m));
+    }
+
+    fn look_at_turn(&self, tip: &Pose, look: &mut Look) {
+        look.about.clear();
+        let target = &self.goal.target;
+        match self.goal.asked.turn {
+            Turn::Free => look.turn_rad = 0.0,
+            Turn::Whole => {
+                let turn = turn_between(&tip.rotation, &target.rotation);
+                look.turn_rad = norm(turn);
+                look.about.extend(Pose::IDENTITY.rotation);
+                look.wanted.extend(turn.map(|x| x * self.radian_m));
+            }
+            Turn::Axis(axis) => {
+                let [own, wanted] = [tip.axis(axis as usize), target.axis(axis as usize)];
+                let normal = cross(own, wanted);
+                look.turn_rad = atan2(norm(normal), dot(own, wanted));
+                // Where the axes are parallel, any normal will do.
+                let about = unit(normal).unwrap_or_else(|| perpendicular(own));
+                look.about.extend([about, cross(own, about)]);
+                look.wanted.extend([look.turn_rad * self.radian_m, 0.0]);
+            }
+        }
+    }
+
+    /// Returns the distance of a tip from the target in m, along the axes that count, and the angle
+    /// by which it is turned otherwise than asked.
+    pub(super) fn errors(&self, tip: &Pose) -> (f64, f64) {
+        let missing = sub(self.goal.target.origin_m, tip.origin_m);
+        let squares = self.along.iter().map(|axis| dot(missing, *axis) * dot(missing, *axis));
+        let target = &self.goal.target;
+        let turn_rad = match self.goal.asked.turn {
+            Turn::Free => 0.0,
+            Turn::Whole => norm(turn_between(&tip.rotation, &target.rotation)),
+            Turn::Axis(axis) => {
+                let [own, wanted] = [tip, target].map(|frame| frame.axis(axis as usize));
+                atan2(norm(cross(own, wanted)), dot(own, wanted))
+            }
         };
-        self.each_joint(&lines, self.chain.joints.len(), tip, |variable, moves| {
-            for (row, moves) in errors.rows.iter_mut().zip(moves) {
-                row[variable] += moves;
+        (squares.sum::<f64>().sqrt(), turn_rad)
+    }
+
+    /// Computes the Jacobian at a posture that was looked at: rows of an entry for each of `n`
+    /// variables, one row after the other.
+    pub(super) fn slopes(&self, look: &Look, n: usize, rows: &mut Vec<f64>) {
+        rows.clear();
+        rows.resize(look.wanted.len() * n, 0.0);
+        let Placed { lines, tip, .. } = &look.placed;
+        let (of_tip, others) = rows.split_at_mut(self.along.len() * n);
+        self.quick.each_joint(lines, lines.len(), tip.origin_m, |variable, moves| {
+            for (row, axis) in of_tip.chunks_exact_mut(n).zip(&self.along) {
+                row[variable] += dot(moves, *axis);
             }
         });
-        self.add_hits(&frames, &lines, &mut errors);
-        errors
-    }
-
-    /// Calls a function with the motion of a point of link `link` for each of the joints before
-    /// that link.
-    fn each_joint(
-        &self,
-        lines: &[Line],
-        link: usize,
-        p_m: Vector,
-        mut tell: impl FnMut(usize, Vector),
-    ) {
-        for (joint, line) in self.chain.joints[..link].iter().zip(lines) {
-            let moves = match joint.motion {
-                Motion::Turn => cross(line.along, sub(p_m, line.through_m)),
-                Motion::Slide => line.along,
-            };
-            tell(joint.drive.variable, scaled(moves, joint.drive.multiplier));
-        }
-    }
-
-    /// Adds a row for each rod that is in a sphere or nearly so.
-    fn add_hits(&self, frames: &Frames, lines: &[Line], errors: &mut Errors) {
-        for (rod, pair) in self.anchors.windows(2).enumerate() {
-            let ends = [pair[0].position_m(frames), pair[1].position_m(frames)];
-            for (sphere, &Sphere { center_m, radius_m }) in self.spheres.iter().enumerate() {
-                let nearest = nearest_on_segment(center_m, ends[0], ends[1]);
-                let apart = apart_m(nearest, center_m);
-                let depth_m = radius_m - apart;
-                if depth_m + self.margin_m <= 0.0 {
-                    continue;
-                }
-                let away = if apart > 0.0 {
-                    scaled(sub(nearest, center_m), 1.0 / apart)
-                } else {
-                    [0.0, 0.0, 1.0]
-                };
-                let part = share(nearest, ends);
-                let mut row = vec![0.0; errors.rows[0].len()];
-                for (anchor, (at, share)) in pair.iter().zip(ends.iter().zip([1.0 - part, part])) {
-                    self.each_joint(lines, anchor.first, *at, |variable, moves| {
-                        row[variable] += share * dot(moves, away);
-                    });
-                }
-                errors.wanted.push(depth_m + self.margin_m);
-                errors.rows.push(row);
-                let is_deepest = errors.hit.as_ref().is_none_or(|hit| depth_m > hit.depth_m);
-                if depth_m > 0.0 && is_deepest {
-                    errors.hit = Some(Hit { rod, sphere, depth_m });
-                }
+        let (of_turn, of_contacts) = others.split_at_mut(look.about.len() * n);
+        self.quick.each_turn(lines, |variable, turns| {
+            for (row, about) in of_turn.chunks_exact_mut(n).zip(&look.about) {
+                row[variable] += self.radian_m * dot(turns, *about);
+            }
+        });
+        for (row, contact) in of_contacts.chunks_exact_mut(n).zip(&look.touched.contacts) {
+            for pull in &contact.pulls {
+                let away = scaled(contact.away, pull.share);
+                self.quick.each_joint(lines, pull.link, pull.at_m, |variable, moves| {
+                    row[variable] += dot(moves, away);
+                });
             }
         }
     }
-}
-
-/// Returns the position of a point along a segment, in [0, 1].
-fn share(p_m: Vector, [a, b]: [Vector; 2]) -> f64 {
-    let d = sub(b, a);
-    let square = dot(d, d);
-    if square > 0.0 { (dot(sub(p_m, a), d) / square).clamp(0.0, 1.0) } else { 0.0 }
 }

@@ -1,7 +1,6 @@
-//! A damped step of the joints inside their limits.
+//! Damped steps of the joints inside their limits.
 
 use super::super::serial::SerialChain;
-use super::rows::Errors;
 
 /// The range of each variable.
 pub(super) struct Bounds {
@@ -51,73 +50,113 @@ impl Bounds {
         all.map(|((v, &value), &[lower, upper])| (v.name.clone(), value, lower, upper))
             .find(|(_, value, lower, upper)| value < lower || value > upper)
     }
+}
 
-    /// Returns `values` after one damped step toward smaller errors. A variable that would leave
-    /// its range stops at its end, and the others do without it.
-    pub(super) fn step(&self, values: &[f64], errors: &Errors, damping: f64) -> Vec<f64> {
-        let mut moved = vec![0.0; values.len()];
-        let mut is_free = vec![true; values.len()];
-        let mut wanted = errors.wanted.clone();
-        loop {
-            let moves = least_squares(errors, &wanted, &is_free, damping);
-            let stops = |i: usize| {
-                let [lower, upper] = self.ranges[i];
-                let to = values[i] + moves[i];
-                (is_free[i] && (to < lower || to > upper)).then(|| (i, to.min(upper).max(lower)))
-            };
-            let stopped: Vec<(usize, f64)> = (0..values.len()).filter_map(stops).collect();
-            for &(i, at) in &stopped {
-                is_free[i] = false;
-                moved[i] = at - values[i];
-                for (wanted, row) in wanted.iter_mut().zip(&errors.rows) {
-                    *wanted -= row[i] * moved[i];
-                }
-            }
-            if stopped.is_empty() {
-                let all = values.iter().zip(&moved).zip(moves.iter().zip(&is_free));
-                return all
-                    .map(|((v, m), (free, is_free))| v + if *is_free { *free } else { *m })
-                    .collect();
+/// The matrices of a step, kept so that steps allocate nothing.
+#[derive(Default)]
+pub(super) struct Stepper {
+    /// The Jacobian: rows of an entry for each variable, one row after the other.
+    pub(super) rows: Vec<f64>,
+    is_free: Vec<bool>,
+    wanted: Vec<f64>,
+    moves: Vec<f64>,
+    matrix: Vec<f64>,
+    y: Vec<f64>,
+}
+
+impl Stepper {
+    /// Puts `values` after one damped step toward the wanted changes of the rows into `next`. A
+    /// variable that would leave its range stops at its end, and the others do without it.
+    pub(super) fn step(
+        &mut self,
+        values: &[f64],
+        wanted: &[f64],
+        damping: f64,
+        bounds: &Bounds,
+        next: &mut Vec<f64>,
+    ) {
+        let n = values.len();
+        next.clear();
+        next.extend_from_slice(values);
+        self.is_free.clear();
+        self.is_free.resize(n, true);
+        self.wanted.clear();
+        self.wanted.extend_from_slice(wanted);
+        while self.least_squares(n, damping) && self.stop_at_ends(values, bounds, next) {}
+        for ((next, moves), is_free) in next.iter_mut().zip(&self.moves).zip(&self.is_free) {
+            if *is_free {
+                *next += moves;
             }
         }
     }
-}
 
-/// Returns the least moves of the free variables that produce the wanted changes, damped:
-/// `J^T (J J^T + damping)^-1 wanted`. `J J^T` has only a few rows, one for each error.
-fn least_squares(errors: &Errors, wanted: &[f64], is_free: &[bool], damping: f64) -> Vec<f64> {
-    let rows = &errors.rows;
-    let product = |a: &[f64], b: &[f64]| -> f64 {
-        a.iter().zip(b).zip(is_free).filter(|(_, free)| **free).map(|((x, y), _)| x * y).sum()
-    };
-    let mut matrix: Vec<Vec<f64>> =
-        rows.iter().map(|a| rows.iter().map(|b| product(a, b)).collect()).collect();
-    let mean = (0..rows.len()).map(|i| matrix[i][i]).sum::<f64>() / rows.len() as f64;
-    for (i, row) in matrix.iter_mut().enumerate() {
-        row[i] += (damping * mean).max(f64::MIN_POSITIVE.sqrt());
+    /// Puts the variables that would leave their ranges at their ends, takes what that changes off
+    /// what is wanted, and returns whether there were any.
+    fn stop_at_ends(&mut self, values: &[f64], bounds: &Bounds, next: &mut [f64]) -> bool {
+        let n = values.len();
+        let mut any = false;
+        for (i, &[lower, upper]) in bounds.ranges.iter().enumerate() {
+            let to = values[i] + self.moves[i];
+            if !self.is_free[i] || (to >= lower && to <= upper) {
+                continue;
+            }
+            any = true;
+            self.is_free[i] = false;
+            next[i] = to.min(upper).max(lower);
+            for (wanted, row) in self.wanted.iter_mut().zip(self.rows.chunks_exact(n)) {
+                *wanted -= row[i] * (next[i] - values[i]);
+            }
+        }
+        any
     }
-    let y = cholesky_solve(&mut matrix, wanted);
-    let change = |i: usize| -> f64 { rows.iter().zip(&y).map(|(row, y)| row[i] * y).sum() };
-    is_free.iter().enumerate().map(|(i, free)| if *free { change(i) } else { 0.0 }).collect()
+
+    /// Computes the least moves of the free variables that produce the wanted changes, damped:
+    /// `J^T (J J^T + damping)^-1 wanted`. `J J^T` has only a few rows, one for each error. Returns
+    /// whether any variable is free.
+    fn least_squares(&mut self, n: usize, damping: f64) -> bool {
+        let Self { rows, is_free, wanted, moves, matrix, y } = self;
+        let m = wanted.len();
+        matrix.clear();
+        matrix.resize(m * m, 0.0);
+        let mut trace = 0.0;
+        for (i, a) in rows.chunks_exact(n).enumerate() {
+            for (j, b) in rows.chunks_exact(n).enumerate().take(i + 1) {
+                let products = a.iter().zip(b).zip(is_free.iter());
+                let of_free = products.map(|((x, y), free)| if *free { x * y } else { 0.0 });
+                matrix[i * m + j] = of_free.sum();
+            }
+            trace += matrix[i * m + i];
+        }
+        let added = (damping * trace / m as f64).max(f64::MIN_POSITIVE.sqrt());
+        (0..m).for_each(|i| matrix[i * m + i] += added);
+        y.clear();
+        y.extend_from_slice(wanted);
+        cholesky_solve(matrix, y);
+        moves.clear();
+        moves.resize(n, 0.0);
+        for (row, y) in rows.chunks_exact(n).zip(y.iter()) {
+            moves.iter_mut().zip(row).for_each(|(moves, slope)| *moves += slope * y);
+        }
+        is_free.contains(&true)
+    }
 }
 
-/// Solves a symmetric, positive definite system, overwriting its matrix.
-fn cholesky_solve(matrix: &mut [Vec<f64>], right: &[f64]) -> Vec<f64> {
-    let n = right.len();
-    let mut x = right.to_vec();
+/// Solves a symmetric, positive definite system, of which the lower half is read; overwrites its
+/// matrix, and its right side with the solution.
+fn cholesky_solve(matrix: &mut [f64], x: &mut [f64]) {
+    let n = x.len();
     for i in 0..n {
         for j in 0..=i {
-            let known: f64 = (0..j).map(|k| matrix[i][k] * matrix[j][k]).sum();
-            let left = matrix[i][j] - known;
-            matrix[i][j] =
-                if i == j { left.max(f64::MIN_POSITIVE).sqrt() } else { left / matrix[j][j] };
+            let known: f64 = (0..j).map(|k| matrix[i * n + k] * matrix[j * n + k]).sum();
+            let left = matrix[i * n + j] - known;
+            matrix[i * n + j] =
+                if i == j { left.max(f64::MIN_POSITIVE).sqrt() } else { left / matrix[j * n + j] };
         }
-        let known: f64 = (0..i).map(|k| matrix[i][k] * x[k]).sum();
-        x[i] = (x[i] - known) / matrix[i][i];
+        let known: f64 = (0..i).map(|k| matrix[i * n + k] * x[k]).sum();
+        x[i] = (x[i] - known) / matrix[i * n + i];
     }
     for i in (0..n).rev() {
-        let known: f64 = (i + 1..n).map(|k| matrix[k][i] * x[k]).sum();
-        x[i] = (x[i] - known) / matrix[i][i];
+        let known: f64 = (i + 1..n).map(|k| matrix[k * n + i] * x[k]).sum();
+        x[i] = (x[i] - known) / matrix[i * n + i];
     }
-    x
 }

@@ -1,8 +1,16 @@
+mod poses;
+
+use super::rows::Scene;
+use super::step::Bounds;
 use super::*;
+use crate::arms::ik::Engine;
 use crate::arms::kinematics::RecoverError;
+use crate::arms::kinematics::{Pose, Vector};
 use proptest::prelude::*;
 use sidestep_import::urdf::Model;
+use sidestep_kernel::geometry::{norm, sub};
 use sidestep_testing::robot_model as shared;
+use std::f64::consts::PI;
 
 fn arm_of(text: &str) -> SerialChain {
     let model = Model::parse("arm", text).expect("a model");
@@ -28,6 +36,10 @@ fn arm() -> SerialChain {
          <link name='tip'/><joint name='mount' type='fixed'><parent link='f'/><child link='tip'/>\
          <origin xyz='0.3 0 0.1'/></joint></robot>",
     )
+}
+
+fn apart_m(a: Vector, b: Vector) -> f64 {
+    norm(sub(a, b))
 }
 
 fn inside(chain: &SerialChain, shares: &[f64]) -> Vec<f64> {
@@ -59,27 +71,37 @@ proptest! {
     }
 
     #[test]
-    fn the_jacobian_is_the_slope_of_forward_kinematics(
+    fn the_jacobian_is_the_slope_of_the_errors(
         there in prop::array::uniform4(0.0..1.0f64),
+        target in prop::array::uniform4(0.0..1.0f64),
         variable in 0usize..4,
+        turn in prop::sample::select(vec![
+            Turn::Free, Turn::Axis(Axis::X), Turn::Axis(Axis::Z), Turn::Whole,
+        ]),
     ) {
         let arm = arm();
         let skeleton = arm.skeleton();
+        let [values, target] = [there, target].map(|shares| inside(&arm, &shares));
         let spheres = vec![Sphere { center_m: [0.4, 0.3, 0.6], radius_m: 3.0 }];
-        let goal = ArmGoal { spheres, ..ArmGoal::new([0.0; 3]) };
+        let asked = Asked { along: [true, false, true], turn };
+        let goal = ArmGoal { spheres, asked, ..ArmGoal::pose(arm.forward(&target).tip) };
         let scene = Scene::new(&arm, &skeleton, &goal);
-        let values = inside(&arm, &there);
-        let shifted = |by: f64| {
+        let look_at = |by: f64| {
             let mut values = values.clone();
             values[variable] += by;
-            scene.errors(&values).wanted
+            let mut look = Scene::blank(&arm);
+            scene.look(&values, &mut look);
+            look
         };
-        let errors = scene.errors(&values);
-        let (before, after) = (shifted(-1e-6), shifted(1e-6));
-        for (row, (a, b)) in errors.rows.iter().zip(before.iter().zip(&after)) {
-            // Rows say how what is wanted gets less.
-            prop_assert!((row[variable] + (b - a) / 2e-6).abs() < 1e-5);
-        }
+        let (here, mut rows) = (look_at(0.0), Vec::new());
+        // At half a turn the errors have a kink.
+        prop_assume!(here.turn_rad < 3.1);
+        scene.slopes(&here, 4, &mut rows);
+        // Rows say how what is wanted gets less.
+        let products = rows.chunks_exact(4).zip(&here.wanted).map(|(row, w)| row[variable] * w);
+        let by_rows = -2.0 * products.sum::<f64>();
+        let by_differences = (look_at(1e-6).merit() - look_at(-1e-6).merit()) / 2e-6;
+        prop_assert!((by_rows - by_differences).abs() < 1e-6, "{by_rows} {by_differences}");
     }
 }
 
@@ -103,7 +125,7 @@ fn reasons_name_the_joint_the_obstacle_or_the_reach() {
     let spheres = vec![Sphere { center_m: target, radius_m: 0.2 }];
     let blocked = solve(&ArmGoal { spheres, restarts: 10, ..ArmGoal::new(target) });
     let Some(ArmReason::Blocked(hit)) = &blocked.reason else { panic!("{blocked:?}") };
-    assert_eq!(hit.sphere, 0);
+    assert_eq!(hit.against, Against::Sphere(0));
 }
 
 #[test]
@@ -112,7 +134,13 @@ fn wrong_goals_are_named() {
     let right = ArmGoal::new([0.5, 0.0, 0.5]);
     let bad_sphere = Sphere { center_m: [0.0; 3], radius_m: -1.0 };
     for (goal, place) in [
-        (ArmGoal { target_m: [f64::NAN, 0.0, 0.0], ..right.clone() }, "target"),
+        (ArmGoal::new([f64::NAN, 0.0, 0.0]), "target"),
+        (ArmGoal::pose(Pose { rotation: [[1.0; 3]; 3], ..Pose::IDENTITY }), "target"),
+        (
+            ArmGoal { asked: Asked { along: [false; 3], turn: Turn::Free }, ..right.clone() },
+            "target",
+        ),
+        (ArmGoal { tolerance_rad: 0.0, ..right.clone() }, "tolerance"),
         (ArmGoal { tolerance_m: -1.0, ..right.clone() }, "tolerance"),
         (ArmGoal { spheres: vec![bad_sphere], ..right.clone() }, "obstacle 1"),
     ] {

@@ -1,0 +1,263 @@
+//! Options of `sidestep ik` -> goals.
+
+use super::super::arm::{Arm, numbers};
+use clap::{Args, ValueEnum};
+use sidestep::import::urdf::Origin;
+use sidestep::kernel::InputError;
+use sidestep::worlds::chain::ik::Engine;
+use sidestep::worlds::chain::kinematics::{
+    ArmBody, ArmGoal, Asked, Axis, MOST_SOLUTIONS, Pose, Sphere, Turn, Vector,
+};
+
+/// The options that all targets share.
+#[derive(Debug, Args)]
+pub(super) struct GoalArgs {
+    /// Axes of the target's frame that do not count: x, y, z (position), rx, ry, rz (turn)
+    #[arg(long, value_name = "AXES", value_delimiter = ',')]
+    free: Vec<FreeAxis>,
+
+    /// Solver
+    #[arg(long, value_name = "ENGINE", default_value = "auto")]
+    engine: EngineName,
+
+    /// Largest distance in m at which the target counts as reached
+    #[arg(long, value_name = "M", default_value_t = 1e-6)]
+    tolerance_m: f64,
+
+    /// Largest angle in rad at which the orientation counts as reached
+    #[arg(long, value_name = "RAD", default_value_t = 1e-6)]
+    tolerance_rad: f64,
+
+    /// Number of distinct postures to find
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    solutions: usize,
+
+    /// Least difference of distinct postures, in rad of one joint
+    #[arg(long, value_name = "RAD", default_value_t = 0.1)]
+    apart: f64,
+
+    /// Find the postures that are nearest to the one it starts from (--joints, --posture)
+    #[arg(long)]
+    nearest: bool,
+
+    /// Number of random postures to start from after the first
+    #[arg(long, value_name = "N", default_value_t = 100)]
+    restarts: usize,
+
+    /// Random seed of these postures
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+
+    /// Spherical obstacle (center and radius in m); repeatable
+    #[arg(long = "obstacle", value_name = "X,Y,Z,R", allow_hyphen_values = true)]
+    obstacles: Vec<String>,
+
+    /// The arm that obstacles and itself count for
+    #[arg(long, value_name = "BODY", default_value = "shapes")]
+    body: BodyName,
+
+    /// Ignore joint limits
+    #[arg(long)]
+    ignore_limits: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum EngineName {
+    /// The faster one, which is dls
+    Auto,
+    /// Connectors first, by the rules of the chain (FABRIK on links of fixed length), then the joints
+    #[value(alias = "fabrik")]
+    Chain,
+    /// Damped least squares on the joints
+    Dls,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum BodyName {
+    /// Thin rods between the connectors
+    Rods,
+    /// The links' collision shapes; rods where a link has none
+    Shapes,
+    /// The same, and links must not touch each other, unless a joint connects them or the SRDF file
+    /// disables their collision
+    Own,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum FreeAxis {
+    X,
+    Y,
+    Z,
+    Rx,
+    Ry,
+    Rz,
+}
+
+impl FreeAxis {
+    const ALONG: [Self; 3] = [Self::X, Self::Y, Self::Z];
+    const ABOUT: [Self; 3] = [Self::Rx, Self::Ry, Self::Rz];
+}
+
+/// A place of the tip, and its orientation if one is asked for.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Target {
+    pub(super) pose: Pose,
+    pub(super) is_turned: bool,
+}
+
+impl Target {
+    pub(super) fn position(position_m: Vector) -> Self {
+        Self { pose: Pose { origin_m: position_m, ..Pose::IDENTITY }, is_turned: false }
+    }
+
+    pub(super) fn rpy(position_m: Vector, rpy_rad: Vector) -> Self {
+        let pose = Pose::from_origin(&Origin { xyz_m: position_m, rpy_rad });
+        Self { pose, is_turned: true }
+    }
+
+    pub(super) fn quaternion(
+        place: &str,
+        position_m: Vector,
+        xyzw: [f64; 4],
+    ) -> Result<Self, InputError> {
+        let pose = Pose::from_quaternion(place, position_m, xyzw)?;
+        Ok(Self { pose, is_turned: true })
+    }
+}
+
+impl GoalArgs {
+    /// Returns the arm's body if it counts, and remarks on it.
+    ///
+    /// # Errors
+    /// When its own links shall not touch, and it has no shapes.
+    pub(super) fn body(&self, arm: &Arm) -> Result<(Option<ArmBody>, Vec<String>), InputError> {
+        let is_own = self.body == BodyName::Own;
+        let counts = is_own || (self.body == BodyName::Shapes && !self.obstacles.is_empty());
+        if !counts {
+            return Ok((None, Vec::new()));
+        }
+        let (body, remarks) = arm.body();
+        if is_own && body.is_empty() {
+            let cause = ["no link has a collision shape that can be read".to_owned()];
+            let cause = [&cause[..], &remarks[..]].concat().join("; ");
+            let remedy = "give the links boxes, cylinders, spheres or STL meshes";
+            return Err(InputError::new("--body", cause, remedy));
+        }
+        Ok((Some(body), remarks))
+    }
+
+    /// Returns the goal of a target, for an arm with this body.
+    ///
+    /// # Errors
+    /// When an option is out of range.
+    pub(super) fn goal(
+        &self,
+        target: Target,
+        body: &Option<ArmBody>,
+    ) -> Result<ArmGoal, InputError> {
+        above_zero("--tolerance-m", self.tolerance_m, "m", "a length")?;
+        above_zero("--tolerance-rad", self.tolerance_rad, "rad", "an angle")?;
+        above_zero("--apart", self.apart, "rad", "an angle")?;
+        if !(1..=MOST_SOLUTIONS).contains(&self.solutions) {
+            let remedy = format!("ask for 1 to {MOST_SOLUTIONS} postures");
+            return Err(InputError::new("--solutions", format!("is {}", self.solutions), remedy));
+        }
+        Ok(ArmGoal {
+            asked: self.asked(target.is_turned)?,
+            tolerance_m: self.tolerance_m,
+            tolerance_rad: self.tolerance_rad,
+            engine: match self.engine {
+                EngineName::Auto => Engine::Auto,
+                EngineName::Chain => Engine::Chain,
+                EngineName::Dls => Engine::Dls,
+            },
+            restarts: self.restarts,
+            seed: self.seed,
+            solutions: self.solutions,
+            nearest: self.nearest,
+            apart: self.apart,
+            ignore_limits: self.ignore_limits,
+            body: body.clone(),
+            own_body: self.body == BodyName::Own,
+            spheres: self.obstacles.iter().map(sphere).collect::<Result<_, _>>()?,
+            ..ArmGoal::pose(target.pose)
+        })
+    }
+
+    /// Returns the part of a target's pose that counts.
+    fn asked(&self, is_turned: bool) -> Result<Asked, InputError> {
+        let refused = |cause: &str, remedy: &str| Err(InputError::new("--free", cause, remedy));
+        let is_free = |axis: FreeAxis| self.free.contains(&axis);
+        let free_turns: Vec<Axis> = FreeAxis::ABOUT
+            .into_iter()
+            .zip(Axis::ALL)
+            .filter_map(|(free, axis)| is_free(free).then_some(axis))
+            .collect();
+        if !is_turned && !free_turns.is_empty() {
+            return refused("a turn is free, and none is asked for", "add --rpy or --quaternion");
+        }
+        let turn = match free_turns[..] {
+            _ if !is_turned => Turn::Free,
+            [] => Turn::Whole,
+            [axis] => Turn::Axis(axis),
+            [_, _, _] => Turn::Free,
+            _ => {
+                let remedy = "free one turn, which leaves the direction of its axis, or all three";
+                return refused("two turns are free", remedy);
+            }
+        };
+        let along = FreeAxis::ALONG.map(|axis| !is_free(axis));
+        if along == [false; 3] && turn == Turn::Free {
+            return refused("everything is free", "leave something that the tip shall do");
+        }
+        Ok(Asked { along, turn })
+    }
+}
+
+fn above_zero(option: &str, value: f64, unit: &str, quantity: &str) -> Result<(), InputError> {
+    if value > 0.0 && value.is_finite() {
+        return Ok(());
+    }
+    Err(InputError::new(option, format!("is {value} {unit}"), format!("give {quantity} above 0")))
+}
+
+fn sphere(text: &String) -> Result<Sphere, InputError> {
+    let [x, y, z, radius_m] = place("--obstacle", "x,y,z,radius", text)?;
+    if radius_m < 0.0 {
+        let cause = format!("`{text}` has a negative radius");
+        return Err(InputError::new("--obstacle", cause, "give a radius of 0 or more"));
+    }
+    Ok(Sphere { center_m: [x, y, z], radius_m })
+}
+
+/// Reads the `N` numbers that an option takes, each of a size that a place in m can have.
+pub(super) fn place<const N: usize>(
+    option: &str,
+    form: &str,
+    text: &str,
+) -> Result<[f64; N], InputError> {
+    let example = ["0.3", "0.1", "0.4", "0.05"][..N].join(",");
+    fixed(option, text, &format!("write {form} in m, such as {example}"))
+}
+
+/// Reads roll, pitch and yaw.
+pub(super) fn angles(option: &str, text: &str) -> Result<Vector, InputError> {
+    fixed(option, text, "write roll,pitch,yaw in rad, such as 3.1416,0,0.5")
+}
+
+/// Reads a quaternion.
+pub(super) fn quaternion(option: &str, text: &str) -> Result<[f64; 4], InputError> {
+    fixed(option, text, "write x,y,z,w, scalar last, such as 0,0,0,1 for no turn at all")
+}
+
+fn fixed<const N: usize>(option: &str, text: &str, remedy: &str) -> Result<[f64; N], InputError> {
+    let found = numbers(option, text)?;
+    let all: [f64; N] = found.try_into().map_err(|found: Vec<f64>| {
+        let cause = format!("`{text}` has {} of {N} numbers", found.len());
+        InputError::new(option, cause, remedy)
+    })?;
+    match all.iter().find(|x| !(-1e7..=1e7).contains(*x)) {
+        None => Ok(all),
+        Some(x) => Err(InputError::new(option, format!("{x} is out of range"), remedy)),
+    }
+}

@@ -1,0 +1,177 @@
+//! Many targets from a table, and the table of their answers.
+
+use super::super::arm::Arm;
+use super::ask::{GoalArgs, Target};
+use crate::console::Console;
+use crate::exit::{ExitCode, Failure};
+use cpu_time::ProcessTime;
+use serde::Serialize;
+use sidestep::import::table::{CsvRow, CsvTable};
+use sidestep::kernel::InputError;
+use sidestep::worlds::chain::kinematics::ArmAnswer;
+use std::path::Path;
+
+/// Names of the columns of positions and orientations.
+const POSITION: [&str; 3] = ["x", "y", "z"];
+const RPY: [&str; 3] = ["roll", "pitch", "yaw"];
+const QUATERNION: [&str; 4] = ["qx", "qy", "qz", "qw"];
+/// The largest number in a table: a place in m, or an angle in rad.
+const MOST: f64 = 1e7;
+
+/// The answers to all targets.
+#[derive(Debug, Serialize)]
+struct Answers {
+    targets: usize,
+    reached: usize,
+    /// Meshes that stand as boxes, and shapes that could not be read.
+    remarks: Vec<String>,
+    /// Names of the joints whose values each answer has.
+    joint_names: Vec<String>,
+    /// CPU time of the search in us per target. It is no part of the results.
+    cpu_us_per_target: f64,
+    answers: Vec<Row>,
+}
+
+/// The answer to a target.
+#[derive(Debug, Serialize)]
+struct Row {
+    reached: bool,
+    error_m: f64,
+    error_rad: f64,
+    iterations: usize,
+    starts: usize,
+    /// Joint values from the base out, in rad or m; if it is not reached, those that came nearest.
+    joints: Vec<f64>,
+    /// Joint values of further postures.
+    others: Vec<Vec<f64>>,
+    reason: Option<String>,
+}
+
+/// Answers all targets of a table.
+///
+/// # Errors
+/// When the table or an option is wrong.
+pub(super) fn answer(
+    path: &Path,
+    arm: &Arm,
+    args: &GoalArgs,
+    console: Console,
+) -> Result<ExitCode, Failure> {
+    let (body, remarks) = args.body(arm)?;
+    let goals = read(path)?.into_iter().map(|target| args.goal(target, &body));
+    let goals = goals.collect::<Result<Vec<_>, InputError>>()?;
+    let started = ProcessTime::now();
+    let solved = goals.iter().map(|goal| arm.chain.solve(goal, &arm.values));
+    let solved = solved.collect::<Result<Vec<_>, InputError>>()?;
+    let cpu_us = started.elapsed().as_secs_f64() * 1e6;
+    let answers = Answers {
+        targets: goals.len(),
+        reached: solved.iter().filter(|answer| answer.reached).count(),
+        remarks,
+        joint_names: arm.chain.variables.iter().map(|v| v.name.clone()).collect(),
+        cpu_us_per_target: cpu_us / goals.len().max(1) as f64,
+        answers: solved.into_iter().map(Row::new).collect(),
+    };
+    console.result(&answers, || answers.table());
+    let Answers { targets, reached, cpu_us_per_target, remarks, .. } = &answers;
+    remarks.iter().for_each(|remark| console.note(remark));
+    console.note(format!("{reached} of {targets} reached, {cpu_us_per_target:.0} us each"));
+    Ok(if reached == targets { ExitCode::Done } else { ExitCode::Failed })
+}
+
+impl Row {
+    fn new(answer: ArmAnswer) -> Self {
+        Self {
+            reached: answer.reached,
+            error_m: answer.error_m,
+            error_rad: answer.error_rad,
+            iterations: answer.iterations,
+            starts: answer.starts,
+            joints: answer.values,
+            others: answer.others.into_iter().map(|posture| posture.values).collect(),
+            reason: answer.reason.map(|reason| reason.to_string()),
+        }
+    }
+
+    /// Returns the row as CSV, with the number of its target.
+    fn line(&self, target: usize, joints: &[f64]) -> String {
+        let Self { reached, error_m, error_rad, iterations, starts, .. } = self;
+        let joints: String = joints.iter().map(|value| format!(",{value}")).collect();
+        let reason = self.reason.as_deref().unwrap_or_default().replace('"', "\"\"");
+        format!(
+            "{target},{reached},{error_m},{error_rad},{iterations},{starts}{joints},\"{reason}\"\n"
+        )
+    }
+}
+
+impl Answers {
+    /// Returns the answers as CSV: a row for each posture, with the number of its target from 1.
+    fn table(&self) -> String {
+        let names: String = self
+            .joint_names
+            .iter()
+            .map(|name| format!(",\"{}\"", name.replace('"', "\"\"")))
+            .collect();
+        let mut text =
+            format!("target,reached,error_m,error_rad,iterations,starts{names},reason\n");
+        for (i, row) in self.answers.iter().enumerate() {
+            for joints in std::iter::once(&row.joints).chain(&row.others) {
+                text += &row.line(i + 1, joints);
+            }
+        }
+        text
+    }
+}
+
+/// Reads the targets.
+fn read(path: &Path) -> Result<Vec<Target>, InputError> {
+    let table = CsvTable::read(path)?;
+    let position = columns(&table, POSITION)?;
+    let has = |name| table.find(name).is_some();
+    let (turned, of_quaternion) = (RPY.into_iter().any(has), QUATERNION.into_iter().any(has));
+    if turned && of_quaternion {
+        let cause = "the header has both angles and quaternions";
+        let remedy = "keep roll,pitch,yaw or qx,qy,qz,qw";
+        return Err(InputError::new(table.place(), cause, remedy).at(1, 1));
+    }
+    let rpy = turned.then(|| columns(&table, RPY)).transpose()?;
+    let quaternion = of_quaternion.then(|| columns(&table, QUATERNION)).transpose()?;
+    let target = |row: CsvRow| {
+        let position_m = values(&table, row, position)?;
+        match (rpy, quaternion) {
+            (Some(rpy), _) => Ok(Target::rpy(position_m, values(&table, row, rpy)?)),
+            (None, Some(columns)) => {
+                let place = row.field(columns[0]);
+                Target::quaternion(table.place(), position_m, values(&table, row, columns)?)
+                    .map_err(|error| error.at(place.line, place.column))
+            }
+            (None, None) => Ok(Target::position(position_m)),
+        }
+    };
+    table.rows().map(target).collect()
+}
+
+fn columns<const N: usize>(table: &CsvTable, names: [&str; N]) -> Result<[usize; N], InputError> {
+    let mut found = [0; N];
+    for (index, name) in found.iter_mut().zip(names) {
+        *index = table.column(name)?;
+    }
+    Ok(found)
+}
+
+fn values<const N: usize>(
+    table: &CsvTable,
+    row: CsvRow,
+    columns: [usize; N],
+) -> Result<[f64; N], InputError> {
+    let mut found = [0.0; N];
+    for (value, column) in found.iter_mut().zip(columns) {
+        let word = row.field(column);
+        *value = word.number(&table.place())?;
+        if value.abs() > MOST {
+            let cause = format!("{value} is out of range");
+            return Err(word.error(&table.place(), cause, "give places in m and angles in rad"));
+        }
+    }
+    Ok(found)
+}

@@ -1,0 +1,120 @@
+//! Bounding boxes of STL meshes, binary and ASCII.
+//!
+//! Only the box is wanted, which takes fewer lines than any mesh library's interface: 80 bytes of
+//! header, the number of triangles, and 50 bytes for each; or words, of which three numbers follow
+//! each `vertex`.
+
+use sidestep_kernel::InputError;
+use sidestep_scenario::file::read_bytes;
+use std::path::Path;
+
+/// The maximum size of a mesh in bytes after unpacking: some 10 times the largest known.
+const MAX_MESH_BYTES: u64 = 1 << 28;
+/// Bytes before the first triangle, and of each.
+const HEAD: usize = 84;
+const TRIANGLE: usize = 50;
+
+/// Returns the lowest and the highest coordinates of a mesh, in its own unit.
+///
+/// # Errors
+/// When the file cannot be read, is cut short, or has no vertex with finite coordinates.
+pub fn bounds(path: &Path) -> Result<[[f64; 3]; 2], InputError> {
+    let bytes = read_bytes(path, MAX_MESH_BYTES)?;
+    parse(&path.display().to_string(), &bytes)
+}
+
+/// Returns the lowest and the highest coordinates of the mesh in `bytes`; errors call it `place`.
+///
+/// # Errors
+/// Those of [`bounds`], except for reading.
+pub fn parse(place: &str, bytes: &[u8]) -> Result<[[f64; 3]; 2], InputError> {
+    let vertices = match binary(bytes) {
+        Some(vertices) => vertices,
+        None => ascii(bytes).ok_or_else(|| wrong(place, "is no STL mesh, or cut short"))?,
+    };
+    let mut found: Option<[[f64; 3]; 2]> = None;
+    for vertex in vertices {
+        if !vertex.iter().all(|x| x.abs() <= 1e9) {
+            return Err(wrong(place, "has a vertex that is no place"));
+        }
+        let [low, high] = found.unwrap_or([vertex; 2]);
+        let each = |of: fn(f64, f64) -> f64, a: [f64; 3]| [0, 1, 2].map(|i| of(a[i], vertex[i]));
+        found = Some([each(f64::min, low), each(f64::max, high)]);
+    }
+    found.ok_or_else(|| wrong(place, "has no triangles"))
+}
+
+fn wrong(place: &str, cause: &str) -> InputError {
+    InputError::new(place, cause, "save the mesh again as binary or ASCII STL")
+}
+
+/// Reads a binary mesh; none if its size is not that of its triangles. Some begin with the word
+/// `solid` like ASCII ones, so that only the size tells.
+fn binary(bytes: &[u8]) -> Option<Vec<[f64; 3]>> {
+    let count = u32::from_le_bytes(bytes.get(80..HEAD)?.try_into().ok()?) as usize;
+    if bytes.len() != count.checked_mul(TRIANGLE)?.checked_add(HEAD)? {
+        return None;
+    }
+    let number = |at: &[u8]| f64::from(f32::from_le_bytes([at[0], at[1], at[2], at[3]]));
+    let vertex = |at: &[u8]| [number(at), number(&at[4..]), number(&at[8..])];
+    let triangles = bytes[HEAD..].chunks_exact(TRIANGLE);
+    Some(triangles.flat_map(|t| [vertex(&t[12..]), vertex(&t[24..]), vertex(&t[36..])]).collect())
+}
+
+/// Reads an ASCII mesh; none if it is not one.
+fn ascii(bytes: &[u8]) -> Option<Vec<[f64; 3]>> {
+    let text = std::str::from_utf8(bytes).ok()?;
+    let mut words = text.split_ascii_whitespace();
+    if words.next()? != "solid" {
+        return None;
+    }
+    let (mut vertices, mut has_end) = (Vec::new(), false);
+    while let Some(word) = words.next() {
+        has_end |= word == "endsolid";
+        if word == "vertex" {
+            let mut number = || words.next()?.parse::<f64>().ok();
+            vertices.push([number()?, number()?, number()?]);
+        }
+    }
+    has_end.then_some(vertices)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ASCII: &str = "solid wedge\n facet normal 0 0 1\n  outer loop\n   vertex 0 0 0.5\n   \
+        vertex 1e-1 -2 0\n   vertex 3 0 0\n  endloop\n endfacet\nendsolid wedge\n";
+
+    fn packed(vertices: &[[f32; 3]; 3]) -> Vec<u8> {
+        // Exporters write `solid` into headers of binary files.
+        let mut bytes = b"solid but binary".to_vec();
+        bytes.resize(80, 0);
+        bytes.extend(1u32.to_le_bytes());
+        bytes.extend([0; 12]);
+        bytes.extend(vertices.iter().flatten().flat_map(|x| x.to_le_bytes()));
+        bytes.extend([0; 2]);
+        bytes
+    }
+
+    #[test]
+    fn ascii_and_binary_meshes_have_the_same_box() {
+        let expected = [[0.0, -2.0, 0.0], [3.0, 0.0, 0.5]];
+        assert_eq!(parse("a", ASCII.as_bytes()), Ok(expected));
+        let bytes = packed(&[[0.0, 0.0, 0.5], [0.25, -2.0, 0.0], [3.0, 0.0, 0.0]]);
+        assert_eq!(parse("b", &bytes), Ok(expected));
+    }
+
+    #[test]
+    fn damaged_meshes_are_errors() {
+        let whole = packed(&[[0.0; 3]; 3]);
+        let infinite = packed(&[[f32::INFINITY; 3]; 3]);
+        let empty = [&[0u8; 84][..]].concat();
+        for bytes in [&whole[..133], &whole[..20], &[], &infinite, &empty, b"solid x vertex 1 2"] {
+            let error = parse("mesh.stl", bytes).expect_err("wrong");
+            assert_eq!(error.place(), "mesh.stl");
+        }
+        let cut = &ASCII.as_bytes()[..60];
+        assert!(parse("mesh.stl", cut).expect_err("wrong").cause().contains("cut short"));
+    }
+}

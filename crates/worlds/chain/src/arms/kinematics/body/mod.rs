@@ -1,0 +1,266 @@
+//! The body of an arm: the collision shapes of a model's links, and which of them may touch.
+//!
+//! ```text
+//! mount  where a link of the model is, at a posture of the arm
+//! pairs  the pairs of parts that must not touch
+//! ```
+//!
+//! All links of the model count, those beside the arm as well (a second finger, the column that an
+//! arm stands on): they stay where their joints are at rest, unless these follow joints of the arm.
+//! Distances are those of the crate `parry3d-f64`.
+
+mod mount;
+mod pairs;
+#[cfg(test)]
+mod tests;
+
+use super::pose::{Pose, Vector};
+use super::serial::{Frames, SerialChain};
+use mount::Mounts;
+use parry3d_f64::math::{Pose as ParryPose, Rotation, Vector as ParryVector};
+use parry3d_f64::query::{self, Contact};
+use parry3d_f64::shape::{Ball, Cuboid, Cylinder, Shape as ParryShape};
+use sidestep_import::urdf::{Model, Shape, Solid};
+use sidestep_kernel::geometry::norm;
+
+/// The shapes of an arm's links, and of all that hangs on them or that it hangs on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ArmBody {
+    parts: Vec<Part>,
+    /// Pairs of parts that must not touch.
+    pairs: Vec<(usize, usize)>,
+}
+
+/// A shape that is fixed in a link.
+#[derive(Debug, Clone, PartialEq)]
+struct Part {
+    /// Name of its link.
+    link: String,
+    /// Its place in the model.
+    mount: mount::Mount,
+    core: Core,
+    /// Radius of a ball about its center that holds it, in m.
+    radius_m: f64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Core {
+    Ball(Ball),
+    Cylinder(Cylinder),
+    Box(Cuboid),
+}
+
+/// A part at a posture.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Placed {
+    pose: ParryPose,
+    center_m: Vector,
+}
+
+/// Two things that are nearer to each other than a distance.
+pub(super) struct Near {
+    /// The point of the first that is nearest to the second, or deepest in it.
+    pub(super) first_m: Vector,
+    /// The point of the second.
+    pub(super) second_m: Vector,
+    /// The unit vector in which the first gets away.
+    pub(super) away: Vector,
+    /// Their distance in m; negative if they overlap.
+    pub(super) apart_m: f64,
+}
+
+impl ArmBody {
+    /// Returns the body of an arm between two links of `model`. `solids` are the model's shapes, and
+    /// `may_touch` pairs of its links, by index, that need no check beside those that a joint
+    /// connects, as SRDF names them.
+    pub fn new(
+        model: &Model,
+        chain: &SerialChain,
+        solids: &[Solid],
+        may_touch: &[(usize, usize)],
+    ) -> Self {
+        let mounts = Mounts::new(model, chain);
+        let part = |solid: &Solid| {
+            let own = Pose::from_origin(&solid.origin);
+            let center = Pose { origin_m: solid.center_m, ..Pose::IDENTITY };
+            let core = core(&solid.shape)?;
+            Some(Part {
+                link: model.links[solid.link].clone(),
+                mount: mounts.of(solid.link, own.then(&center)),
+                radius_m: core.radius_m(),
+                core,
+            })
+        };
+        let parts: Vec<(usize, Part)> =
+            solids.iter().filter_map(|solid| Some((solid.link, part(solid)?))).collect();
+        let links: Vec<usize> = parts.iter().map(|(link, _)| *link).collect();
+        let pairs = pairs::that_must_not_touch(model, &mounts, &links, may_touch);
+        Self { parts: parts.into_iter().map(|(_, part)| part).collect(), pairs }
+    }
+
+    /// Whether it has no shapes at all.
+    pub fn is_empty(&self) -> bool {
+        self.parts.is_empty()
+    }
+
+    /// Returns the pairs of links that must not touch, by name, each once.
+    pub fn pairs(&self) -> Vec<(&str, &str)> {
+        let mut names: Vec<(&str, &str)> =
+            self.pairs.iter().map(|&(a, b)| (self.name(a), self.name(b))).collect();
+        names.sort_unstable();
+        names.dedup();
+        names
+    }
+
+    /// Returns the depth in m of each pair of links that must not touch and overlaps at these joint
+    /// values.
+    pub fn overlaps(&self, chain: &SerialChain, values: &[f64]) -> Vec<(&str, &str, f64)> {
+        let mut placed = Vec::new();
+        self.place(&chain.forward(values), values, &mut placed);
+        let overlap = |&(a, b): &(usize, usize)| {
+            let near = self.near(&placed, a, b, 0.0).filter(|near| near.apart_m < 0.0)?;
+            Some((self.name(a), self.name(b), -near.apart_m))
+        };
+        self.pairs.iter().filter_map(overlap).collect()
+    }
+
+    /// Whether a link of the arm, counted as [`Frames::links`] are, has a shape.
+    pub(super) fn covers(&self, link: usize) -> bool {
+        self.parts.iter().any(|part| part.mount.link == link)
+    }
+
+    pub(super) fn name(&self, part: usize) -> &str {
+        &self.parts[part].link
+    }
+
+    /// Returns the link of the arm that a part moves with.
+    pub(super) fn link(&self, part: usize) -> usize {
+        self.parts[part].mount.link
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.parts.len()
+    }
+
+    pub(super) fn own_pairs(&self) -> &[(usize, usize)] {
+        &self.pairs
+    }
+
+    /// Computes where all parts are.
+    pub(super) fn place(&self, frames: &Frames, values: &[f64], placed: &mut Vec<Placed>) {
+        self.place_on(&frames.links, values, placed);
+    }
+
+    /// Computes where all parts are if the arm's links are at `links`.
+    pub(super) fn place_on(&self, links: &[Pose], values: &[f64], placed: &mut Vec<Placed>) {
+        placed.clear();
+        placed.extend(self.parts.iter().map(|part| {
+            let pose = part.mount.at(links, values);
+            let upright = part.core.upright(&pose);
+            Placed { pose: upright, center_m: pose.origin_m }
+        }));
+    }
+
+    /// Returns how two parts are to each other, if they are nearer than `within_m`.
+    pub(super) fn near(
+        &self,
+        placed: &[Placed],
+        a: usize,
+        b: usize,
+        within_m: f64,
+    ) -> Option<Near> {
+        let far_m = self.parts[a].radius_m + self.parts[b].radius_m + within_m;
+        if apart_m(placed[a].center_m, placed[b].center_m) > far_m {
+            return None;
+        }
+        let shapes = [a, b].map(|part| self.parts[part].core.shape());
+        near(&placed[a].pose, shapes[0], &placed[b].pose, shapes[1], within_m)
+    }
+
+    /// Returns how a part is to a ball, if they are nearer than `within_m`.
+    pub(super) fn near_ball(
+        &self,
+        placed: &[Placed],
+        part: usize,
+        (center_m, radius_m): (Vector, f64),
+        within_m: f64,
+    ) -> Option<Near> {
+        let far_m = self.parts[part].radius_m + radius_m + within_m;
+        if apart_m(placed[part].center_m, center_m) > far_m {
+            return None;
+        }
+        let at = ParryPose::from_parts(vector(center_m), Rotation::IDENTITY);
+        near(&placed[part].pose, self.parts[part].core.shape(), &at, &Ball::new(radius_m), within_m)
+    }
+}
+
+impl Core {
+    fn shape(&self) -> &dyn ParryShape {
+        match self {
+            Self::Ball(ball) => ball,
+            Self::Cylinder(cylinder) => cylinder,
+            Self::Box(cuboid) => cuboid,
+        }
+    }
+
+    fn radius_m(&self) -> f64 {
+        match self {
+            Self::Ball(ball) => ball.radius,
+            Self::Cylinder(c) => norm([c.half_height, c.radius]),
+            Self::Box(cuboid) => norm(point(cuboid.half_extents)),
+        }
+    }
+
+    /// Returns the pose in which parry draws it: cylinders of models are along z, those of parry
+    /// along y.
+    fn upright(&self, pose: &Pose) -> ParryPose {
+        const UP: Pose = Pose {
+            rotation: [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]],
+            origin_m: [0.0; 3],
+        };
+        let pose = if matches!(self, Self::Cylinder(_)) { pose.then(&UP) } else { *pose };
+        let [x, y, z, w] = pose.quaternion();
+        ParryPose::from_parts(vector(pose.origin_m), Rotation::from_xyzw(x, y, z, w))
+    }
+}
+
+fn core(shape: &Shape) -> Option<Core> {
+    match shape {
+        Shape::Sphere { radius_m } => Some(Core::Ball(Ball::new(*radius_m))),
+        Shape::Cylinder { radius_m, length_m } => {
+            Some(Core::Cylinder(Cylinder::new(0.5 * length_m, *radius_m)))
+        }
+        Shape::Box { size_m } => Some(Core::Box(Cuboid::new(vector(size_m.map(|x| 0.5 * x))))),
+        // Solids are none of these.
+        Shape::Mesh { .. } | Shape::Other { .. } => None,
+    }
+}
+
+fn near(
+    at: &ParryPose,
+    shape: &dyn ParryShape,
+    other_at: &ParryPose,
+    other: &dyn ParryShape,
+    within_m: f64,
+) -> Option<Near> {
+    let found = query::contact(at, shape, other_at, other, within_m);
+    let Contact { point1, point2, normal2, dist, .. } = found.expect("convex shapes")?;
+    Some(Near {
+        first_m: point(point1),
+        second_m: point(point2),
+        away: point(normal2),
+        apart_m: dist,
+    })
+}
+
+fn vector(p: Vector) -> ParryVector {
+    ParryVector::new(p[0], p[1], p[2])
+}
+
+fn point(v: ParryVector) -> Vector {
+    [v.x, v.y, v.z]
+}
+
+fn apart_m(a: Vector, b: Vector) -> f64 {
+    norm([a[0] - b[0], a[1] - b[1], a[2] - b[2]])
+}

@@ -1,0 +1,49 @@
+//! Pairs of parts that must not touch.
+
+use super::mount::Mounts;
+use sidestep_import::urdf::{JointKind, Model};
+use std::collections::BTreeSet;
+
+/// Returns the pairs of parts that can move against each other, are not connected by a joint, and
+/// may not touch. `links` are the links of the parts, by their index in the model.
+pub(super) fn that_must_not_touch(
+    model: &Model,
+    mounts: &Mounts,
+    links: &[usize],
+    may_touch: &[(usize, usize)],
+) -> Vec<(usize, usize)> {
+    let rigid = rigid_groups(model);
+    let sorted = |a: usize, b: usize| (a.min(b), a.max(b));
+    let joined: BTreeSet<_> =
+        model.joints.iter().map(|joint| sorted(rigid[joint.parent], rigid[joint.child])).collect();
+    let masked: BTreeSet<_> = may_touch.iter().map(|&(a, b)| sorted(a, b)).collect();
+    let moves = |a: usize, b: usize| {
+        let (a, b) = (mounts.link(a), mounts.link(b));
+        a.link != b.link || !a.is_rigid() || !b.is_rigid()
+    };
+    let all = (0..links.len()).flat_map(|b| (0..b).map(move |a| (a, b)));
+    all.filter(|&(a, b)| {
+        let (a, b) = (links[a], links[b]);
+        let (ra, rb) = (rigid[a], rigid[b]);
+        ra != rb
+            && moves(a, b)
+            && !joined.contains(&sorted(ra, rb))
+            && !masked.contains(&sorted(a, b))
+    })
+    .collect()
+}
+
+/// Returns for each link the first of those that fixed joints connect it with.
+fn rigid_groups(model: &Model) -> Vec<usize> {
+    let leader = |link: usize| {
+        let mut at = link;
+        while let Some(joint) = model.joint_above(at).map(|joint| &model.joints[joint]) {
+            if joint.kind != JointKind::Fixed {
+                break;
+            }
+            at = joint.parent;
+        }
+        at
+    };
+    (0..model.links.len()).map(leader).collect()
+}

@@ -1,0 +1,171 @@
+//! Forward kinematics of many postures of one arm: what does not depend on the posture is computed
+//! once, and nothing is allocated per posture.
+
+use super::super::pose::{Line, Pose, Vector, multiply};
+use super::super::serial::{Drive, Motion, SerialChain};
+use sidestep_kernel::geometry::{add, along, dot, scaled};
+use sidestep_kernel::math::sin_cos;
+
+/// An arm, prepared.
+pub(super) struct Quick {
+    joints: Vec<QuickJoint>,
+    to_tip: Pose,
+}
+
+/// A joint whose frame in the link before it is turned by `still + cos(q) cosine + sin(q) sine`
+/// (Rodrigues' formula, with the constant origin multiplied in).
+struct QuickJoint {
+    motion: Motion,
+    drive: Drive,
+    /// The origin's rotation if the joint slides.
+    still: [Vector; 3],
+    cosine: [Vector; 3],
+    sine: [Vector; 3],
+    origin_m: Vector,
+    /// The axis in the link before.
+    axis: Vector,
+}
+
+/// The poses of links and axes at a posture.
+#[derive(Debug, Clone)]
+pub(super) struct Placed {
+    /// Link 0 (the base), then the link that each joint carries.
+    pub(super) links: Vec<Pose>,
+    /// The joints' axes.
+    pub(super) lines: Vec<Line>,
+    pub(super) tip: Pose,
+}
+
+impl Placed {
+    pub(super) fn of(chain: &SerialChain) -> Self {
+        let n = chain.joints.len();
+        let line = Line { through_m: [0.0; 3], along: [0.0; 3] };
+        Self { links: vec![Pose::IDENTITY; n + 1], lines: vec![line; n], tip: Pose::IDENTITY }
+    }
+}
+
+impl Quick {
+    pub(super) fn new(chain: &SerialChain) -> Self {
+        let joint = |joint: &super::super::serial::MovingJoint| {
+            let rotation = joint.origin.rotation;
+            let at = |angle| joint.origin.then(&Pose::turn(joint.axis, angle)).rotation;
+            let still = match joint.motion {
+                Motion::Turn => half(&add_all(&at(0.0), &at(std::f64::consts::PI))),
+                Motion::Slide => rotation,
+            };
+            let minus = |a: &[Vector; 3]| add_all(a, &still.map(|row| scaled(row, -1.0)));
+            QuickJoint {
+                motion: joint.motion,
+                drive: joint.drive,
+                cosine: minus(&rotation),
+                sine: minus(&at(std::f64::consts::FRAC_PI_2)),
+                still,
+                origin_m: joint.origin.origin_m,
+                axis: joint.origin.direction(joint.axis),
+            }
+        };
+        Self { joints: chain.joints.iter().map(joint).collect(), to_tip: chain.to_tip }
+    }
+
+    /// Computes the poses at these values of the variables.
+    pub(super) fn place(&self, values: &[f64], placed: &mut Placed) {
+        for (i, joint) in self.joints.iter().enumerate() {
+            let q = joint.drive.value(values);
+            let before = &placed.links[i];
+            let axis = before.direction(joint.axis);
+            let through_m = before.point(joint.origin_m);
+            let pose = match joint.motion {
+                Motion::Turn => {
+                    let rotation = multiply(&before.rotation, &joint.rotation(q));
+                    Pose { rotation, origin_m: through_m }
+                }
+                Motion::Slide => Pose {
+                    rotation: multiply(&before.rotation, &joint.still),
+                    origin_m: along(through_m, axis, q),
+                },
+            };
+            placed.lines[i] = Line { through_m, along: axis };
+            placed.links[i + 1] = pose;
+        }
+        placed.tip = placed.links[self.joints.len()].then(&self.to_tip);
+    }
+
+    /// Calls a function with each joint before link `link`, with the velocity of the point `p_m` of
+    /// that link if the joint's variable changes by 1 per second.
+    #[inline]
+    pub(super) fn each_joint(
+        &self,
+        lines: &[Line],
+        link: usize,
+        p_m: Vector,
+        mut tell: impl FnMut(usize, Vector),
+    ) {
+        for (joint, line) in self.joints[..link].iter().zip(lines) {
+            let moves = match joint.motion {
+                Motion::Turn => line.velocity_at(p_m),
+                Motion::Slide => line.along,
+            };
+            tell(joint.drive.variable, scaled(moves, joint.drive.multiplier));
+        }
+    }
+
+    /// Calls a function with each joint and the angular velocity of the tip if the joint's variable
+    /// changes by 1 per second.
+    #[inline]
+    pub(super) fn each_turn(&self, lines: &[Line], mut tell: impl FnMut(usize, Vector)) {
+        for (joint, line) in self.joints.iter().zip(lines) {
+            if joint.motion == Motion::Turn {
+                tell(joint.drive.variable, scaled(line.along, joint.drive.multiplier));
+            }
+        }
+    }
+}
+
+impl QuickJoint {
+    fn rotation(&self, angle_rad: f64) -> [Vector; 3] {
+        let (s, c) = sin_cos(angle_rad);
+        let row = |i: usize| along(along(self.still[i], self.cosine[i], c), self.sine[i], s);
+        [row(0), row(1), row(2)]
+    }
+}
+
+fn add_all(a: &[Vector; 3], b: &[Vector; 3]) -> [Vector; 3] {
+    [0, 1, 2].map(|i| add(a[i], b[i]))
+}
+
+fn half(a: &[Vector; 3]) -> [Vector; 3] {
+    a.map(|row| scaled(row, 0.5))
+}
+
+/// Returns the rotation by which `from` becomes `to`, as its axis times its angle in rad.
+pub(super) fn turn_between(from: &[Vector; 3], to: &[Vector; 3]) -> Vector {
+    // Entries of `to * from^T`.
+    let entry = |i: usize, j: usize| dot(to[i], from[j]);
+    let skew = [entry(2, 1) - entry(1, 2), entry(0, 2) - entry(2, 0), entry(1, 0) - entry(0, 1)];
+    let twice_cosine = entry(0, 0) + entry(1, 1) + entry(2, 2) - 1.0;
+    let twice_sine = dot(skew, skew).sqrt();
+    let angle_rad = sidestep_kernel::math::atan2(twice_sine, twice_cosine);
+    // Below, the angle is twice_sine / 2 to the last bit but a few; beyond, the axis is lost in the
+    // difference of nearly equal entries.
+    if twice_cosine > 0.0 && twice_sine < 1e-9 {
+        return scaled(skew, 0.5);
+    }
+    if twice_cosine < 0.0 && twice_sine < 1e-4 {
+        return half_turn(entry, angle_rad, skew);
+    }
+    scaled(skew, angle_rad / twice_sine)
+}
+
+/// Returns a turn by nearly half a turn: its axis is the largest column of `R + R^T + (1 - tr) I`.
+fn half_turn(entry: impl Fn(usize, usize) -> f64, angle_rad: f64, skew: Vector) -> Vector {
+    let trace = entry(0, 0) + entry(1, 1) + entry(2, 2);
+    let symmetric = |i: usize, j: usize| {
+        let diagonal = if i == j { 1.0 - trace } else { 0.0 };
+        entry(i, j) + entry(j, i) + diagonal
+    };
+    let columns = [0, 1, 2].map(|j| [0, 1, 2].map(|i| symmetric(i, j)));
+    let longest = columns.into_iter().max_by(|a, b| dot(*a, *a).total_cmp(&dot(*b, *b)));
+    let axis = longest.and_then(sidestep_kernel::geometry::unit).unwrap_or([1.0, 0.0, 0.0]);
+    let sign = if dot(axis, skew) < 0.0 { -1.0 } else { 1.0 };
+    scaled(axis, sign * angle_rad)
+}
