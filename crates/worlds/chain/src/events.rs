@@ -110,6 +110,8 @@ pub(crate) struct Event {
     pub(crate) reason: Option<Reason>,
     /// The obstacle concerned, if any.
     pub(crate) obstacle: Option<u32>,
+    /// Number of parts that are missing in a gap that is too long; 0 for other events.
+    pub(crate) missing: u32,
     /// See [`EventKind`]; 0 where a kind has none.
     pub(crate) value: f64,
 }

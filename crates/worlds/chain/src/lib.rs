@@ -31,6 +31,7 @@ mod motion;
 mod navigate;
 mod perceive;
 mod progress;
+mod put_off;
 pub mod rods;
 mod rows;
 mod run;

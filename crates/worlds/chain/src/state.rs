@@ -3,6 +3,7 @@
 use super::driver::{Driving, Task};
 use super::formation::{Robot, Solid};
 use super::metrics::Tally;
+use super::put_off::PutOff;
 use super::rods::chain::Chain;
 use super::rods::geometry::{Bounds, Point, in_dimensions, unit};
 use super::script::Motion;
@@ -51,6 +52,8 @@ pub struct Body<const D: usize> {
     pub tally: Tally,
     /// The motions of the present script, which follow from the place where it started.
     pub(crate) motions: Vec<Motion>,
+    /// Motions that the chain has yet to follow; none whenever somebody looks.
+    pub(crate) put_off: PutOff<D>,
 }
 
 /// Parts of a broken chain.
@@ -102,9 +105,15 @@ impl<const D: usize> Body<D> {
             scattered: None,
             tally: Tally::default(),
             motions: Vec::new(),
+            put_off: PutOff::default(),
         };
         body.motions = spec.motions(&body.driving)?;
         Ok(body)
+    }
+
+    /// Lets the chain follow motions that were put off.
+    pub(crate) fn catch_up(&mut self) {
+        self.put_off.catch_up(&mut self.chain, &mut self.tally);
     }
 
     /// Returns the solid parts that others see: the chain's robots, or its connectors if it has
@@ -165,7 +174,8 @@ impl<const D: usize> Body<D> {
         let motions = spec.motions(&record.driving).map_err(|_| CheckpointError::Damaged)?;
         let (driving, scattered) = (record.driving.clone(), record.scattered.clone());
         let (robots, robot_radius_m) = (record.robots.clone(), spec.robot_radius_m());
-        Ok(Self { chain, driving, scattered, robots, robot_radius_m, tally, motions })
+        let put_off = PutOff::default();
+        Ok(Self { chain, driving, scattered, robots, robot_radius_m, tally, motions, put_off })
     }
 }
 
@@ -224,6 +234,17 @@ impl<const D: usize> ChainState<D> {
 
     /// Locks one chain for reading.
     pub fn body(&self, slot: usize) -> RwLockReadGuard<'_, Body<D>> {
+        let body = self.leading(slot);
+        if body.put_off.is_empty() {
+            return body;
+        }
+        drop(body);
+        self.body_mut(slot).catch_up();
+        self.leading(slot)
+    }
+
+    /// Locks one chain for reading whose connectors, but the initiator, may have motions to follow.
+    pub(crate) fn leading(&self, slot: usize) -> RwLockReadGuard<'_, Body<D>> {
         self.cells[slot].body.read().unwrap_or_else(PoisonError::into_inner)
     }
 

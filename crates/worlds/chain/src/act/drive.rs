@@ -123,6 +123,7 @@ impl<const D: usize> Acting<'_, D> {
     /// Ends the present task, done or given up, and starts the next.
     pub(super) fn next_task(&mut self, how: EventKind) {
         let Some(task) = self.task() else { return };
+        self.body.catch_up();
         let driving = &mut self.body.driving;
         let next = self.spec.tasks.get(driving.task as usize + 1).unwrap_or(task);
         let ended = f64::from(driving.task);
