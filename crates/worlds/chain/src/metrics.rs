@@ -73,6 +73,10 @@ pub struct RungTally {
     pub pulled_back: u64,
     /// Climbs that reached the end of the ladder without success.
     pub stuck: u64,
+    /// Ways that a planner found,
+    pub planned: u64,
+    /// and searches that found none.
+    pub not_planned: u64,
 }
 
 impl RungTally {
@@ -98,6 +102,8 @@ impl RungTally {
             waited: self.waited + other.waited,
             pulled_back: self.pulled_back + other.pulled_back,
             stuck: self.stuck + other.stuck,
+            planned: self.planned + other.planned,
+            not_planned: self.not_planned + other.not_planned,
         }
     }
 }

@@ -228,6 +228,8 @@ pub(crate) fn entry(event: &Event) -> Entry {
         EventKind::Target => (Level::Info, format!("has reached target {value}")),
         EventKind::Done => (Level::Info, format!("has done task {value}")),
         EventKind::GivenUp => (Level::Warning, format!("has given up task {value}")),
+        EventKind::Planned => (Level::Info, format!("follows a plan of {value} pieces")),
+        EventKind::NotPlanned => (Level::Warning, format!("has no plan to target {value}")),
     };
     let who = format!("connector/{}/{}", event.chain, event.connector);
     Entry { cycle: event.cycle, level, who, words }

@@ -135,6 +135,8 @@ fn after_vetoes(m: &Metrics) -> Lines {
         (rungs.waited, "waited"),
         (rungs.pulled_back, "pulled by the other end"),
         (rungs.stuck, "stuck"),
+        (rungs.planned, "ways planned"),
+        (rungs.not_planned, "plans without a way"),
     ]);
     let escaped = some(&[
         (escapes.moves, "parts moved away"),

@@ -29,6 +29,8 @@ pub(crate) mod purpose {
     pub(crate) const SCATTER: Purpose = Purpose(3);
     /// Direction of a wandering initiator that is stuck.
     pub(crate) const TURN_AWAY: Purpose = Purpose(5);
+    /// Random postures of a planner.
+    pub(crate) const PLAN: Purpose = Purpose(6);
     /// Errors of a laser.
     pub(crate) const LASER: Purpose = Purpose(4);
 }

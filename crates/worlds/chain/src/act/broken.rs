@@ -24,6 +24,7 @@ impl<const D: usize> Acting<'_, D> {
 
     fn apply(&mut self, change: &Change<D>) {
         self.body.catch_up();
+        self.body.plan = None;
         change.constrain(&mut self.body.chain);
         match &change.what {
             What::Failed { connector, .. }

@@ -194,6 +194,7 @@ impl<const D: usize> Acting<'_, D> {
                 let given_up = f64::from(self.body.driving.task);
                 let event = self.event(EventKind::GivenUp, by, given_up);
                 self.scratch.events.push(Event { reason, ..event });
+                self.body.plan = None;
                 self.body.driving.next_part();
             }
             _ => self.next_task(EventKind::GivenUp),

@@ -4,6 +4,7 @@
 //! broken.rs -> bounds.rs (out of the way) -> drive.rs -> go.rs, wheels.rs -> bounds.rs (back into the claim)
 //!           -> follow.rs -> measure.rs
 //! broken.rs -> drive.rs -> go.rs, later.rs         where nothing can object
+//!              drive.rs -> plan.rs                 where local rules come no nearer
 //! ```
 
 mod bounds;
@@ -13,6 +14,7 @@ mod follow;
 mod go;
 mod later;
 mod measure;
+mod plan;
 mod wheels;
 
 use super::driver::Task;

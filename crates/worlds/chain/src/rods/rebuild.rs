@@ -13,7 +13,7 @@ use super::obstacle::Obstacles;
 use super::pass::Direction;
 use super::propagate::Propagator;
 use super::scene::fits;
-use super::span::{annulus_m, joints};
+use super::span::joints;
 use super::veto::Request;
 use sidestep_kernel::InputError;
 use std::ops::RangeInclusive;
@@ -84,7 +84,7 @@ pub fn reform<const D: usize>(
     }
     let before = chain.points().to_vec();
     let (low, high) = (first - 1, last + 1);
-    let [_, have_m] = annulus_m(&chain.rods()[low..high]);
+    let have_m: f64 = chain.rods()[low..high].iter().map(|r| r.max_m).sum();
     let need_m = distance(chain.points()[low], chain.points()[high]);
     if need_m > have_m + LENGTH_TOLERANCE_M {
         match may_come {

@@ -1,5 +1,4 @@
-//! Rods one after the other between two places: the distances that they span, and places for their
-//! joints, both in closed form.
+//! Rods one after the other between two places: places for their joints, in closed form.
 //!
 //! Rods of lengths in intervals reach from one place to another exactly if no side of the polygon
 //! that they make with the gap has to be longer than all others together. The gap is the longest
@@ -10,20 +9,13 @@ use super::geometry::{
     Point, add, along, between, distance, first_axis, perpendicular, scaled, sub, unit,
 };
 
-/// Returns the least and the greatest distance that rods span, meters.
-pub(super) fn annulus_m(rods: &[Rod]) -> [f64; 2] {
-    let most_m: f64 = rods.iter().map(|rod| rod.max_m).sum();
-    let folded_m = |rod: &Rod| rod.min_m - (most_m - rod.max_m);
-    [rods.iter().map(folded_m).fold(0.0, f64::max), most_m]
-}
-
 /// Returns places for the joints of rods from `a` to `b`; rods that span another distance are as
 /// near to it as they can be. They lie straight if they can be so short, and as a triangle
 /// otherwise.
 pub(super) fn joints<const D: usize>(a: Point<D>, b: Point<D>, rods: &[Rod]) -> Vec<Point<D>> {
     let gap_m = distance(a, b);
     let least_m: f64 = rods.iter().map(|rod| rod.min_m).sum();
-    let [_, most_m] = annulus_m(rods);
+    let most_m: f64 = rods.iter().map(|rod| rod.max_m).sum();
     if gap_m < least_m {
         return triangle(a, b, &folded_m(rods, gap_m));
     }
@@ -97,7 +89,14 @@ mod tests {
     use proptest::prelude::*;
     use sidestep_kernel::math;
 
-    /// The annulus by another way: rod after rod, the nearest and farthest place of the last end.
+    /// Returns the least and the greatest distance that rods span, meters.
+    fn annulus_m(rods: &[Rod]) -> [f64; 2] {
+        let most_m: f64 = rods.iter().map(|rod| rod.max_m).sum();
+        let folded_m = |rod: &Rod| rod.min_m - (most_m - rod.max_m);
+        [rods.iter().map(folded_m).fold(0.0, f64::max), most_m]
+    }
+
+    /// The same by another way: rod after rod, the nearest and farthest place of the last end.
     fn rod_by_rod_m(rods: &[Rod]) -> [f64; 2] {
         rods.iter().fold([0.0, 0.0], |[near_m, far_m], rod| {
             let folded_m = (near_m - rod.max_m).max(rod.min_m - far_m).max(0.0);
