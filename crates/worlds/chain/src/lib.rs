@@ -20,6 +20,7 @@ mod act;
 pub mod arms;
 mod bundle;
 mod claim;
+pub mod convoy;
 mod driver;
 mod events;
 mod formation;

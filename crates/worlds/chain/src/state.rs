@@ -197,7 +197,17 @@ impl<const D: usize> Body<D> {
         let (driving, scattered) = (record.driving.clone(), record.scattered.clone());
         let (robots, robot_radius_m) = (record.robots.clone(), spec.robot_radius_m());
         let (plan, put_off) = (None, PutOff::default());
-        Ok(Self { chain, driving, scattered, robots, robot_radius_m, tally, motions, plan, put_off })
+        Ok(Self {
+            chain,
+            driving,
+            scattered,
+            robots,
+            robot_radius_m,
+            tally,
+            motions,
+            plan,
+            put_off,
+        })
     }
 }
 

@@ -3,9 +3,9 @@
 use super::Acting;
 use crate::driver::{Driver, Task};
 use crate::motion::replan::Climbed;
+use crate::rods::chain::MAX_COORDINATE_M;
 use crate::rods::geometry::{Point, distance};
 use crate::rods::veto::Moved;
-use crate::rods::chain::MAX_COORDINATE_M;
 
 impl<const D: usize> Acting<'_, D> {
     /// Whether the chain may follow the initiator's motion of this cycle later. The first cycle
@@ -43,7 +43,8 @@ impl<const D: usize> Acting<'_, D> {
                 body.catch_up();
             }
         }
-        let nothing = Moved { touched: 0..0, changed: 0, rotated: 0, max_slave_step_m: 0.0, cut_short: None };
+        let nothing =
+            Moved { touched: 0..0, changed: 0, rotated: 0, max_slave_step_m: 0.0, cut_short: None };
         Climbed::Straight(nothing)
     }
 }

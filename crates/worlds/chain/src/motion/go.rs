@@ -53,7 +53,8 @@ fn held<const D: usize>(
             vetoed @ Outcome::Vetoed(_) => return Ok(vetoed),
         };
         let (by, longest_m) = longest(&before, chain.points());
-        let slowed = Veto { by, reason: Reason::StepLimit, reached: chain.points()[order.k], ..*objection };
+        let slowed =
+            Veto { by, reason: Reason::StepLimit, reached: chain.points()[order.k], ..*objection };
         if longest_m <= most_m {
             let cut_short = (part < 1.0).then_some(slowed);
             return Ok(Outcome::Moved(Moved { cut_short, ..moved }));
@@ -178,7 +179,7 @@ mod tests {
         arm
     }
 
-    /// Drags the tool straight away from the base; returns the longest way of any connector in a
+    /// Drags the tool out to 0.1 mm less than the reach; returns the longest way of any connector in a
     /// request, and how far from the base the tool comes.
     fn dragged_out(joint_step_max_m: f64) -> (f64, f64) {
         let (mut chain, step_m) = (arm(), 0.01);
@@ -186,7 +187,7 @@ mod tests {
         let mut most_m = 0.0;
         for _ in 0..400 {
             let (before, at) = (chain.points().to_vec(), chain.points()[2]);
-            let to = crate::rods::geometry::towards(at, [1.4142, 1.4142], step_m);
+            let to = crate::rods::geometry::towards(at, [1.199_94, 1.599_92], step_m);
             let motion = Motion::Connector { k: 2, to };
             let request = Request { motion, source: Source::Autonomous, mode: Mode::Exact };
             go(&mut propagator, &mut chain, &Obstacles::default(), &request).unwrap();
@@ -201,6 +202,6 @@ mod tests {
         assert!(free_m > 0.04, "without a limit the elbow goes {free_m} m for 0.01 m of the tool");
         let (limited_m, reached_m) = dragged_out(0.02);
         assert!(limited_m <= 0.02, "{limited_m}");
-        assert!(reached_m > 1.9999, "{reached_m} of 2 m");
+        assert!(reached_m > 1.9998, "{reached_m} of 2 m");
     }
 }

@@ -80,7 +80,12 @@ struct Sweep<const D: usize> {
 impl<const D: usize> Sweep<D> {
     /// Moves the next slave; returns false, now and ever after, once the motion ends.
     #[inline(always)]
-    fn advance<const NEARLY: bool>(&mut self, points: &mut [Point<D>], rods: &[Rod], least_move_m: f64) -> bool {
+    fn advance<const NEARLY: bool>(
+        &mut self,
+        points: &mut [Point<D>],
+        rods: &[Rod],
+        least_move_m: f64,
+    ) -> bool {
         let Some(slave) = self.direction.next(self.master, points.len()) else { return false };
         let so = points[slave];
         let rod = rods[slave.min(self.master)];

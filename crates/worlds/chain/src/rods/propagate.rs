@@ -7,8 +7,8 @@
 use super::candidates::{Candidate, Work};
 use super::chain::{Chain, is_in_range, out_of_range};
 use super::geometry::{Bounds, Point, between, distance};
-use super::obstacle::{Obstacles, swept};
 use super::leeway::Leeway;
+use super::obstacle::{Obstacles, swept};
 use super::open::{self, Stays};
 use super::own_body::OwnBody;
 use super::pass::{Direction, Tally};

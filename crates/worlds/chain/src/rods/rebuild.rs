@@ -297,8 +297,7 @@ mod tests {
     fn parts_on_a_line_fold_where_they_are_too_long_for_the_gap() {
         let rod = Rod::fixed(1.0, 0.0);
         let points: Vec<Point<3>> = (0..8).map(|i| [0.7 * i as f64, 0.0, 0.0]).collect();
-        let mut chain =
-            Chain::broken(points, vec![Connector::free(0.0); 8], vec![rod; 7]).unwrap();
+        let mut chain = Chain::broken(points, vec![Connector::free(0.0); 8], vec![rod; 7]).unwrap();
         let came = reform(&mut chain, 1..=6, MayCome::Nobody).unwrap();
         assert!(matches!(came, Reformed::Whole { .. }), "{came:?}");
         assert!(chain.max_rod_violation_m() <= 1e-9);

@@ -106,7 +106,8 @@ mod tests {
 
     fn rods() -> impl Strategy<Value = Vec<Rod>> {
         let rod = (0.1..3.0f64, prop_oneof![Just(0.0), 0.0..1.0f64]);
-        let rod = rod.prop_map(|(min_m, more_m)| Rod { min_m, max_m: min_m + more_m, radius_m: 0.0 });
+        let rod =
+            rod.prop_map(|(min_m, more_m)| Rod { min_m, max_m: min_m + more_m, radius_m: 0.0 });
         let long = Rod { min_m: 9.0, max_m: 9.5, radius_m: 0.0 };
         (prop::collection::vec(rod, 1..9), prop::option::of(0usize..9)).prop_map(
             move |(mut rods, at)| {

@@ -70,10 +70,7 @@ pub(crate) struct Measured {
 
 /// Moves the first connector of a plain chain through at most [`LANES`] heads, each farther from the
 /// one before than the least move.
-pub(crate) fn pull_measured<const D: usize>(
-    chain: &mut Chain<D>,
-    heads: &[Point<D>],
-) -> Measured {
+pub(crate) fn pull_measured<const D: usize>(chain: &mut Chain<D>, heads: &[Point<D>]) -> Measured {
     pull_lanes::<D, true>(chain, heads)
 }
 
@@ -243,7 +240,8 @@ impl<const D: usize, const MEASURES: bool> Motions<D, MEASURES> {
                 continue;
             }
             let [mo, mn, so] = [next.get(w), now.get(w + 1), now.get(w)];
-            let rod = Rod { min_m: self.limits.min_m[w], max_m: self.limits.max_m[w], radius_m: 0.0 };
+            let rod =
+                Rod { min_m: self.limits.min_m[w], max_m: self.limits.max_m[w], radius_m: 0.0 };
             // As a sweep ends: at a slave that stays, if the rod beyond is good as it is.
             self.ended[w] |= self.rests[w] && fits(rod, distance(mn, so));
             if self.ended[w] {

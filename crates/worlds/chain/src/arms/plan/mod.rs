@@ -20,9 +20,9 @@ use crate::rods::chain::Chain;
 use crate::rods::geometry::Point;
 use crate::rods::obstacle::Obstacles;
 use crate::rods::rules::Rules;
-pub(crate) use space::Space;
 use sidestep_kernel::InputError;
 use sidestep_kernel::stream::Draws;
+pub(crate) use space::Space;
 
 /// Postures at the target from which the second tree grows.
 const GOALS: u64 = 4;
