@@ -6,12 +6,13 @@
 
 use sidestep::kernel::Seed;
 use sidestep::kernel::stream::Streams;
+use sidestep::worlds::chain::convoy::{Convoy, Measures, Plan, Surroundings};
 use sidestep::worlds::chain::geometry::{Point, distance};
 use sidestep::worlds::chain::ground::corridor::{Corridor, WALL_PIECE_M};
 use sidestep::worlds::chain::swarm::drive::Drive;
 use sidestep::worlds::chain::swarm::laser::LASER_NOISE;
 use sidestep::worlds::chain::swarm::leader::{LeaveRule, Turning};
-use sidestep::worlds::chain::swarm::{Convoy, Follower, Leaving, Measures, Plan, Pose};
+use sidestep::worlds::chain::swarm::{Follower, Leaving, Pose};
 use sidestep::worlds::chain::{Obstacle, Obstacles, Rod};
 use std::error::Error;
 use std::f64::consts::PI;
@@ -76,14 +77,14 @@ struct Run {
 }
 
 fn run(plan: &Plan, course: &Course) -> Result<Run, Box<dyn Error>> {
-    let mut convoy = Convoy::new(plan.clone(), course.start)?;
-    let streams = Streams::new(Seed(1));
+    let (obstacles, target) = (course.obstacles.clone(), course.target);
+    let around = Surroundings { obstacles, target, seed: 1 };
+    let mut convoy = Convoy::new(plan.clone(), course.start, around)?;
     let mut measures = Measures::default();
-    for cycle in 0..(course.limit_s / plan.dt_s) as u64 {
-        let mut noise = streams.draws(0, cycle, LASER_NOISE);
-        let tick = convoy.tick(&course.obstacles, course.target, &mut noise)?;
+    for _ in 0..(course.limit_s / plan.dt_s) as u64 {
+        let tick = convoy.tick();
         measures.note(&convoy, &course.obstacles, &tick);
-        if distance(convoy.leader().pose.at, course.finish) <= course.finish_radius_m {
+        if distance(convoy.leader().at, course.finish) <= course.finish_radius_m {
             return Ok(Run { arrived: true, measures });
         }
     }

@@ -265,6 +265,18 @@ fn every_scenario_of_chains_that_is_shipped_is_right_and_penetrates_nothing() {
 }
 
 #[test]
+fn missing_parts_of_a_broken_chain_are_told_by_their_number() {
+    let scenario = format!("{FOLDER}/broken.toml");
+    let wide = ["run", &scenario, "--set", "chains.0.changes.0.apart_m=[-3.0, 0.0]"];
+    let told = Place::new().json(&[&wide[..], &["--cycles", "200"]].concat());
+    let metrics = &told["metrics"];
+    assert_eq!(metrics["not_reformed"], 1);
+    assert_eq!(metrics["missing_parts"], 3, "3 m of rods of 1.1 m");
+    let words = Place::new().run(&[&wide[..], &["--cycles", "200"]].concat()).out();
+    assert!(words.contains("1 times; 3 parts are missing"), "{words}");
+}
+
+#[test]
 fn a_broken_chain_is_whole_in_the_end_and_goes_on() {
     let told = Place::new().json(&["run", &format!("{FOLDER}/broken.toml")]);
     let metrics = &told["metrics"];

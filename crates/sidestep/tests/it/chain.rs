@@ -4,7 +4,7 @@
 use sidestep::kernel::Simulation;
 use sidestep::kernel::ports::{MemoryRecorder, Recorder, Values};
 use sidestep::scenario::Source;
-use sidestep::worlds::chain::metrics::Metrics;
+use sidestep::worlds::chain::metrics::{ChainMetrics, Metrics};
 use sidestep::worlds::chain::{ChainRun, ChainState, ChainWorld, chain_run};
 use sidestep_kernel::math::hypot;
 use std::any::Any;
@@ -173,6 +173,77 @@ tolerance_m = 0.05
 patience_s = 1.0
 ";
 
+/// A chain to which nothing can object, so that it may follow several motions at once: anywhere, to
+/// places, as a script says, with a connector that fails and works again, and a slack tail.
+const OPEN: &str = "
+[chain]
+dimensions = 3
+dt_s = 0.05
+self_collision = false
+[[chains]]
+connectors = 60
+at_m = [0.0, 0.0, 0.0]
+rod_m = [0.2, 0.3]
+radius_m = 0.05
+[[chains.changes]]
+at_s = 4.0
+connector = 30
+failed = true
+[[chains.changes]]
+at_s = 4.5
+connector = 30
+failed = false
+[[chains.tasks]]
+kind = \"wander\"
+turn_deg = 60
+lasts_s = 6.0
+[[chains.tasks]]
+kind = \"targets\"
+targets_m = [[1.0, 1.0, 0.0], [0.0, 1.0, 1.0]]
+[[chains.tasks]]
+kind = \"script\"
+script = \"forward 0.31 wait 0.2 turn 90 forward 0.4 turn 180 forward 0.6\"
+";
+
+/// The same in a chain's own way: tight turns, so that its parts come near each other.
+const COILED: &str = "
+[chain]
+dt_s = 0.05
+[[chains]]
+connectors = 40
+at_m = [0.0, 0.0]
+rod_m = [0.2, 0.3]
+radius_m = 0.08
+[[chains.tasks]]
+kind = \"wander\"
+turn_deg = 90
+within_m = [[-1.5, -1.5], [1.5, 1.5]]
+patience_s = 1000.0
+";
+
+/// An arm whose tool is behind a wall of which it knows no way round but by a plan.
+const PLANNED: &str = "
+[chain]
+dt_s = 0.05
+[[obstacles]]
+ends_m = [[0.5, 0.35], [2.5, 0.35]]
+radius_m = 0.05
+[[chains]]
+connectors = 6
+points_m = [[0.0, 0.0], [0.0, -0.4], [0.4, -0.4], [0.4, 0.0], [0.8, 0.0], [1.2, 0.0]]
+rod_m = 0.4
+radius_m = 0.03
+[[chains.limits]]
+connector = 0
+mobility = \"fixed\"
+[[chains.tasks]]
+kind = \"targets\"
+connector = 5
+targets_m = [[1.0, 0.9]]
+tolerance_m = 0.005
+planner = \"rrt-connect\"
+";
+
 pub(crate) fn source(seed: u64, text: &str) -> Source {
     let text = format!("format = 1\nworld = \"chain\"\nseed = {seed}\n{text}");
     Source::new("s.toml", text, "")
@@ -265,6 +336,7 @@ fn assert_d1<const D: usize>(text: &str, cycles: u64, stops: &[u64]) {
     }
     let (kept, rows) = recorded::<D>(&source, 1, cycles);
     assert_eq!(kept.digest(), alone.digest(), "recorded, {text}");
+    assert_eq!(outcome(&kept), outcome(&alone), "recorded, {text}");
     let (_, same) = recorded::<D>(&source, 3, cycles);
     assert!(rows == same, "rows differ for 3 workers, {text}");
     let mut first = run::<D>(&source, 2);
@@ -308,6 +380,51 @@ fn a_snake_in_space_has_the_same_bits_however_it_is_run() {
 fn broken_chains_and_changes_have_the_same_bits_however_they_are_run() {
     assert_d1::<2>(BROKEN, 120, &[9, 10, 11, 19, 20, 21, 40, 80]);
     assert_d1::<2>(TOLD, 400, &[0, 39, 40, 41, 60, 61, 200]);
+}
+
+#[test]
+fn a_chain_that_follows_several_motions_at_once_has_the_same_bits_however_it_is_run() {
+    assert_d1::<3>(OPEN, 300, &[0, 1, 7, 79, 80, 95, 121, 200, 299]);
+    assert_d1::<2>(COILED, 200, &[0, 1, 99]);
+}
+
+/// With a limit of sub-steps, though it has no effect, every motion is made by itself; with a pebble
+/// far away every part is looked at. All that comes of it is the same.
+#[test]
+fn what_is_put_off_or_proven_is_what_single_motions_do() {
+    let single = OPEN.replace("[chain]", "[chain]\nstep_m = 1.0");
+    let pebble = format!("{COILED}\n[[obstacles]]\nat_m = [900.0, 900.0]\nradius_m = 0.1\n");
+    for seed in 0..6 {
+        assert_same_end::<3>(seed, OPEN, &single, 300);
+        assert_same_end::<2>(seed, COILED, &pebble, 200);
+    }
+}
+
+/// Whether two scenarios lead the first chain to the same places with the same counts.
+fn assert_same_end<const D: usize>(seed: u64, one: &str, other: &str, cycles: u64) {
+    let [one, other] = [one, other].map(|text| {
+        let mut run = run::<D>(&source(seed, text), 1);
+        advance_to(&mut run, cycles);
+        let points: Vec<_> = run.state().body(0).chain.points().to_vec();
+        (points, run.world().metrics_of(run.state(), 0))
+    });
+    assert_eq!(one.0, other.0, "{seed}");
+    let counts =
+        |m: &ChainMetrics| (m.tally.moved, m.tally.max_slave_step_m, m.tally.max_speed_m_s);
+    assert_eq!(counts(&one.1), counts(&other.1), "{seed}");
+    assert_eq!(one.1.tally.way_m, other.1.tally.way_m, "{seed}");
+}
+
+#[test]
+fn an_arm_that_follows_a_plan_reaches_its_target_and_has_the_same_bits_however_it_is_run() {
+    let mut run = run::<2>(&source(3, PLANNED), 1);
+    advance_to(&mut run, 1000);
+    let metrics = run.metrics();
+    assert_eq!((metrics.progress, metrics.penetrations), (1.0, 0), "{metrics:?}");
+    assert!(metrics.rungs.planned >= 1, "{metrics:?}");
+    assert!(metrics.max_speed_m_s <= 1.0 + 1e-9, "no joint is faster than twice the tool");
+    let end = run.cycle();
+    assert_d1::<2>(PLANNED, 1000, &[0, end / 4, end / 2, end - 10]);
 }
 
 #[test]
@@ -608,6 +725,20 @@ fn a_vetoed_order_is_told_and_leaves_every_bit_until_patience_ends() {
     );
     assert_eq!(given_up.nearest_m, 1.0);
     assert_eq!(metrics.progress, 0.0, "what was given up is not done");
+}
+
+#[test]
+fn a_gap_too_long_is_told_with_the_number_of_missing_parts() {
+    let text = BROKEN.replace("by_m = 2.0", "by_m = 2.0\napart_m = [-2.5, 0.0]");
+    let (run, rows) = recorded::<2>(&source(1, &text), 1, 60);
+    let told = events(&run, &rows);
+    let gap = told.iter().position(|event| event.1 == "gap-too-long").expect("a gap");
+    assert!((told[gap].4 - 2.5).abs() < 1e-9, "{told:?}");
+    let Some(Values::U32(missing)) = rows.column("events", "missing") else { panic!("no column") };
+    // 2.5 m of rods of 1.1 m; of other events nothing is missing.
+    assert_eq!(missing.iter().sum::<u32>(), 3, "{missing:?}");
+    assert_eq!(missing[gap], 3);
+    assert_eq!(run.metrics().missing_parts, 3);
 }
 
 /// The second of three targets is inside a pillar.

@@ -10,8 +10,10 @@ use sidestep_kernel::{Cycle, Slot, Turn};
 /// Makes the claim of one chain.
 pub(crate) fn claim<const D: usize>(turn: &mut Turn<'_, ChainWorld<D>>, slot: usize) {
     let &mut Turn { world, state, now, .. } = turn;
-    let claim = reach(world, &world.chains[slot], &state.body(slot), now);
-    state.set_claim(slot, claim);
+    // A chain alone is in nobody's way, wherever it goes.
+    if !world.is_open() {
+        state.set_claim(slot, reach(world, &world.chains[slot], &state.body(slot), now));
+    }
     let decision = Looking { world, state, now, scratch: turn.scratch }.decide(slot as Slot);
     state.set_decision(slot, decision);
 }

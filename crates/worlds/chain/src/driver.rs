@@ -30,6 +30,9 @@ pub(crate) struct Task<const D: usize> {
     pub(crate) lasts_s: f64,
     /// How long a vetoed motion is retried before the task is given up, s.
     pub(crate) patience_s: f64,
+    /// How long its local rules may come no nearer to a target before a way is planned, s; none if
+    /// nothing is ever planned.
+    pub(crate) plans_after_s: Option<f64>,
 }
 
 /// Kinds of goals for an initiator.

@@ -47,11 +47,15 @@ pub enum EventKind {
     Done,
     /// A task was given up; the value is its number.
     GivenUp,
+    /// A planner has found a way to a target; the value is the number of its straight pieces.
+    Planned,
+    /// A planner has found no way to a target; the value is the target's number.
+    NotPlanned,
 }
 
 impl EventKind {
     /// All kinds.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 19] = [
         Self::Veto,
         Self::Penetration,
         Self::Clear,
@@ -69,6 +73,8 @@ impl EventKind {
         Self::Target,
         Self::Done,
         Self::GivenUp,
+        Self::Planned,
+        Self::NotPlanned,
     ];
 
     /// Returns its name in files.
@@ -91,6 +97,8 @@ impl EventKind {
             Self::Target => "target",
             Self::Done => "done",
             Self::GivenUp => "given-up",
+            Self::Planned => "planned",
+            Self::NotPlanned => "not-planned",
         }
     }
 }
@@ -110,6 +118,8 @@ pub(crate) struct Event {
     pub(crate) reason: Option<Reason>,
     /// The obstacle concerned, if any.
     pub(crate) obstacle: Option<u32>,
+    /// Number of parts that are missing in a gap that is too long; 0 for other events.
+    pub(crate) missing: u32,
     /// See [`EventKind`]; 0 where a kind has none.
     pub(crate) value: f64,
 }

@@ -46,6 +46,8 @@ pub struct Tally {
     pub reformed: u64,
     /// and that they could not be.
     pub not_reformed: u64,
+    /// Greatest number of parts that were missing then.
+    pub missing_parts: u64,
     /// Steps in which each layer of a navigator acted, layer 1 first.
     pub layers: [u64; 6],
     /// Counts for the robots on wheels.
@@ -71,6 +73,10 @@ pub struct RungTally {
     pub pulled_back: u64,
     /// Climbs that reached the end of the ladder without success.
     pub stuck: u64,
+    /// Ways that a planner found,
+    pub planned: u64,
+    /// and searches that found none.
+    pub not_planned: u64,
 }
 
 impl RungTally {
@@ -96,6 +102,8 @@ impl RungTally {
             waited: self.waited + other.waited,
             pulled_back: self.pulled_back + other.pulled_back,
             stuck: self.stuck + other.stuck,
+            planned: self.planned + other.planned,
+            not_planned: self.not_planned + other.not_planned,
         }
     }
 }
@@ -219,6 +227,7 @@ impl Default for Tally {
             given_up: Vec::new(),
             reformed: 0,
             not_reformed: 0,
+            missing_parts: 0,
             layers: [0; 6],
             robots: RobotTally::default(),
             rungs: RungTally::default(),
@@ -278,6 +287,8 @@ pub struct Metrics {
     pub reformed: u64,
     /// and that they could not be: the gap was too long, or no way was found.
     pub not_reformed: u64,
+    /// Number of parts that were missing in the gaps that were too long, the most of each chain.
+    pub missing_parts: u64,
     /// Arms whose joints cannot reproduce their connectors' positions, and why; by chain.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub joints_errors: BTreeMap<EntityId, String>,
@@ -381,6 +392,7 @@ impl Metrics {
             done: sum(|t| t.done),
             reformed: sum(|t| t.reformed),
             not_reformed: sum(|t| t.not_reformed),
+            missing_parts: sum(|t| t.missing_parts),
             joints_errors: BTreeMap::new(),
             given_up: given_up.collect(),
             rungs: tallies.iter().fold(RungTally::default(), |all, t| all.add(&t.rungs)),

@@ -37,7 +37,7 @@ impl<'a, const D: usize> Looking<'a, D> {
     /// Returns a navigator's perception; its laser's ranges are in the scratch.
     pub(crate) fn sight(&mut self, slot: Slot) -> Option<Sight<'a>> {
         let Self { world, state, now, .. } = *self;
-        let body = state.body(slot as usize);
+        let body = state.leading(slot as usize);
         let task = world.chains[slot as usize].tasks.get(body.driving.task as usize)?;
         let Driver::Navigate(navigator) = &task.driver else { return None };
         let leader = body.leader(task);

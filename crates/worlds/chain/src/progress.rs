@@ -46,7 +46,7 @@ impl<const D: usize> ChainWorld<D> {
     /// Whether all tasks of all chains are done and everything is whole.
     pub(crate) fn all_is_done(&self, state: &ChainState<D>) -> bool {
         self.chains.iter().enumerate().all(|(slot, spec)| {
-            let body = state.body(slot);
+            let body = state.leading(slot);
             let is_done = body.driving.task as usize >= spec.tasks.len();
             is_done && body.scattered.is_none()
         })

@@ -71,6 +71,7 @@ fn events() -> Table<Event> {
         .label("reason", "why, of vetoes", reasons, move |e| e.reason.as_ref().map_or(0, reason))
         .u32("obstacle", "the obstacle; 4294967295 for none", |e| e.obstacle.unwrap_or(NO_OBSTACLE))
         .f64("value", "meters, radians or a number, by event", |e| e.value)
+        .u32("missing", "parts missing in a gap that is too long; else 0", |e| e.missing)
 }
 
 /// Rows that wait to be recorded.

@@ -153,6 +153,7 @@ struct RulesSection {
     rotation: RotationWord,
     self_collision: Option<bool>,
     slave_step_max_m: Option<Number<StepMost>>,
+    joint_speed_m_s: Option<Number<Unbounded>>,
     step_m: Option<Measure>,
     backtracks: Option<usize>,
     look_m: Option<Measure>,
@@ -301,6 +302,7 @@ impl<const D: usize> Compiler<'_, D> {
         let radius_m = chains.iter().flat_map(|spec| spec.start.connectors()).map(|c| c.radius_m);
         let look_m = 4.0 * radius_m.fold(0.05, f64::max);
         let escape = self.escape(&chains, &ground.movers, dt_s);
+        let joint_speed_m_s = self.joint_speed_m_s(&chains);
         Ok(ChainWorld {
             chains,
             cycles,
@@ -309,7 +311,7 @@ impl<const D: usize> Compiler<'_, D> {
             obstacles: ground.obstacles,
             movers: ground.movers,
             dt_s,
-            rules: self.rules(escape.as_ref()),
+            rules: self.rules(escape.as_ref(), joint_speed_m_s * dt_s),
             look_m: section.look_m.map_or(look_m, f64::from),
             streams: Streams::new(Seed(self.head.seed)),
         })
@@ -349,7 +351,15 @@ impl<const D: usize> Compiler<'_, D> {
         Err(self.source.idle(&format!("chain.{key}"), &format!("with escape = {because}")))
     }
 
-    fn rules(&self, escape: Option<&Escape>) -> Rules {
+    /// Returns the greatest speed of the joints of chains with a fixed base, m/s; by default twice
+    /// that at which one is led.
+    fn joint_speed_m_s(&self, chains: &[ChainSpec<D>]) -> f64 {
+        let led = chains.iter().flat_map(|spec| &spec.tasks).map(|task| task.speed_m_s);
+        let usual_m_s = 2.0 * led.fold(0.0, f64::max);
+        self.file.chain.joint_speed_m_s.map_or(usual_m_s, f64::from)
+    }
+
+    fn rules(&self, escape: Option<&Escape>, joint_step_max_m: f64) -> Rules {
         let section = &self.file.chain;
         let slave_step_max_m = section.slave_step_max_m.map_or(f64::INFINITY, f64::from);
         Rules {
@@ -363,6 +373,7 @@ impl<const D: usize> Compiler<'_, D> {
             slave_step_max_m: escape.map_or(slave_step_max_m, |escape| {
                 slave_step_max_m.min(escape.speed_max_m_s * escape.dt_s)
             }),
+            joint_step_max_m,
             backtracks: section.backtracks.unwrap_or(Rules::default().backtracks),
             step_m: section.step_m.map(f64::from),
         }

@@ -3,6 +3,7 @@
 use super::driver::{Driving, Task};
 use super::formation::{Robot, Solid};
 use super::metrics::Tally;
+use super::put_off::PutOff;
 use super::rods::chain::Chain;
 use super::rods::geometry::{Bounds, Point, in_dimensions, unit};
 use super::script::Motion;
@@ -13,7 +14,8 @@ use serde::{Deserialize, Serialize};
 use sidestep_kernel::checkpoint::CheckpointError;
 use sidestep_kernel::digest::Hasher;
 use sidestep_kernel::math::atan2;
-use sidestep_kernel::{Cycle, Digest, InputError};
+use sidestep_kernel::{Cycle, Digest, EntityId, InputError};
+use std::collections::VecDeque;
 use std::sync::{Mutex, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
 
 /// The state of a world of chains; slots are ids.
@@ -51,6 +53,10 @@ pub struct Body<const D: usize> {
     pub tally: Tally,
     /// The motions of the present script, which follow from the place where it started.
     pub(crate) motions: Vec<Motion>,
+    /// The way that it follows because local rules came no nearer.
+    pub(crate) plan: Option<Plan<D>>,
+    /// Motions that the chain has yet to follow; none whenever somebody looks.
+    pub(crate) put_off: PutOff<D>,
 }
 
 /// Parts of a broken chain.
@@ -65,6 +71,22 @@ pub struct Scattered {
     /// and the places where all connectors will be joined again, coordinate after coordinate; empty
     /// while the parts lie where they are.
     pub goals_m: Vec<f64>,
+}
+
+/// A way to a target: postures, each straight from the one before.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Plan<const D: usize> {
+    /// The postures that are not reached yet; at least one.
+    pub(crate) way: VecDeque<Vec<Point<D>>>,
+}
+
+/// A plan in a snapshot.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PlanRecord {
+    /// The chain.
+    pub chain: EntityId,
+    /// Its postures that are not reached yet, each coordinate after coordinate.
+    pub way_m: Vec<Vec<f64>>,
 }
 
 /// One chain in a snapshot.
@@ -87,6 +109,8 @@ pub struct Snapshot {
     pub cycle: Cycle,
     /// The chains by id.
     pub chains: Vec<ChainRecord>,
+    /// Their plans, of those that have one; by id.
+    pub plans: Vec<PlanRecord>,
 }
 
 impl<const D: usize> Body<D> {
@@ -102,9 +126,16 @@ impl<const D: usize> Body<D> {
             scattered: None,
             tally: Tally::default(),
             motions: Vec::new(),
+            plan: None,
+            put_off: PutOff::default(),
         };
         body.motions = spec.motions(&body.driving)?;
         Ok(body)
+    }
+
+    /// Lets the chain follow motions that were put off.
+    pub(crate) fn catch_up(&mut self) {
+        self.put_off.catch_up(&mut self.chain, &mut self.tally);
     }
 
     /// Returns the solid parts that others see: the chain's robots, or its connectors if it has
@@ -165,7 +196,18 @@ impl<const D: usize> Body<D> {
         let motions = spec.motions(&record.driving).map_err(|_| CheckpointError::Damaged)?;
         let (driving, scattered) = (record.driving.clone(), record.scattered.clone());
         let (robots, robot_radius_m) = (record.robots.clone(), spec.robot_radius_m());
-        Ok(Self { chain, driving, scattered, robots, robot_radius_m, tally, motions })
+        let (plan, put_off) = (None, PutOff::default());
+        Ok(Self {
+            chain,
+            driving,
+            scattered,
+            robots,
+            robot_radius_m,
+            tally,
+            motions,
+            plan,
+            put_off,
+        })
     }
 }
 
@@ -208,7 +250,11 @@ impl<const D: usize> ChainState<D> {
         let all = world.chains.iter().zip(&snapshot.chains).zip(tallies);
         let bodies =
             all.map(|((spec, record), tally)| Body::restore(spec, record, tally, snapshot.cycle));
-        let bodies = bodies.collect::<Result<Vec<_>, _>>()?;
+        let mut bodies = bodies.collect::<Result<Vec<_>, _>>()?;
+        for record in &snapshot.plans {
+            let body = bodies.get_mut(record.chain as usize).ok_or(CheckpointError::Damaged)?;
+            body.plan = Some(Plan::restore(record, body.chain.points().len())?);
+        }
         Ok(Self::of(bodies.into_iter()))
     }
 
@@ -224,6 +270,17 @@ impl<const D: usize> ChainState<D> {
 
     /// Locks one chain for reading.
     pub fn body(&self, slot: usize) -> RwLockReadGuard<'_, Body<D>> {
+        let body = self.leading(slot);
+        if body.put_off.is_empty() {
+            return body;
+        }
+        drop(body);
+        self.body_mut(slot).catch_up();
+        self.leading(slot)
+    }
+
+    /// Locks one chain for reading whose connectors, but the initiator, may have motions to follow.
+    pub(crate) fn leading(&self, slot: usize) -> RwLockReadGuard<'_, Body<D>> {
         self.cells[slot].body.read().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -252,7 +309,9 @@ impl<const D: usize> ChainState<D> {
 
     /// Returns the state after `cycle` cycles.
     pub fn snapshot(&self, cycle: Cycle) -> Snapshot {
-        Snapshot { cycle, chains: (0..self.len()).map(|slot| self.body(slot).record()).collect() }
+        let chains = (0..self.len()).map(|slot| self.body(slot).record()).collect();
+        let plan = |slot| Some(self.body(slot).plan.as_ref()?.record(slot as EntityId));
+        Snapshot { cycle, chains, plans: (0..self.len()).filter_map(plan).collect() }
     }
 
     /// Returns the counts of each chain so far.
@@ -261,17 +320,42 @@ impl<const D: usize> ChainState<D> {
     }
 }
 
+impl<const D: usize> Plan<D> {
+    fn record(&self, chain: EntityId) -> PlanRecord {
+        PlanRecord { chain, way_m: self.way.iter().map(|posture| flat(posture)).collect() }
+    }
+
+    /// Returns the plan that a record describes, of a chain of `n` connectors.
+    fn restore(record: &PlanRecord, n: usize) -> Result<Self, CheckpointError> {
+        if record.way_m.is_empty() || record.way_m.iter().any(|posture| posture.len() != n * D) {
+            return Err(CheckpointError::Damaged);
+        }
+        let point = |at: &[f64]| std::array::from_fn(|i| at[i]);
+        let posture = |m: &Vec<f64>| m.chunks_exact(D).map(point).collect();
+        Ok(Self { way: record.way_m.iter().map(posture).collect() })
+    }
+}
+
 impl Snapshot {
     /// Returns the digest of this state: it covers every value, by id.
     pub fn digest(&self) -> Digest {
         let mut hasher = Hasher::default();
-        let bytes = postcard::to_stdvec(self).expect("a snapshot is plain data");
-        bytes.chunks(8).for_each(|chunk| {
-            let mut word = [0; 8];
-            word[..chunk.len()].copy_from_slice(chunk);
-            hasher.u64(u64::from_le_bytes(word));
-        });
-        hasher.u64(bytes.len() as u64);
+        add(&mut hasher, &(self.cycle, &self.chains));
+        // Worlds in which nobody plans have the digests that they had before there were plans.
+        if !self.plans.is_empty() {
+            add(&mut hasher, &self.plans);
+        }
         hasher.finish()
     }
+}
+
+/// Adds plain data to a digest.
+fn add(hasher: &mut Hasher, data: &impl Serialize) {
+    let bytes = postcard::to_stdvec(data).expect("a snapshot is plain data");
+    bytes.chunks(8).for_each(|chunk| {
+        let mut word = [0; 8];
+        word[..chunk.len()].copy_from_slice(chunk);
+        hasher.u64(u64::from_le_bytes(word));
+    });
+    hasher.u64(bytes.len() as u64);
 }

@@ -221,18 +221,23 @@ pub(crate) fn entry(event: &Event) -> Entry {
         EventKind::Broken => (Level::Error, format!("breaks, {value} parts are scattered")),
         EventKind::Reforming => (Level::Info, "sets out to be joined again".into()),
         EventKind::Reformed => (Level::Info, "is joined again".into()),
-        EventKind::GapTooLong => {
-            (Level::Warning, format!("has a gap that is {value:.3} m too long"))
-        }
+        EventKind::GapTooLong => (Level::Warning, gap_in_words(value, event.missing)),
         EventKind::NotReformed => {
             (Level::Warning, format!("cannot be joined, off by {value:.3} m"))
         }
         EventKind::Target => (Level::Info, format!("has reached target {value}")),
         EventKind::Done => (Level::Info, format!("has done task {value}")),
         EventKind::GivenUp => (Level::Warning, format!("has given up task {value}")),
+        EventKind::Planned => (Level::Info, format!("follows a plan of {value} pieces")),
+        EventKind::NotPlanned => (Level::Warning, format!("has no plan to target {value}")),
     };
     let who = format!("connector/{}/{}", event.chain, event.connector);
     Entry { cycle: event.cycle, level, who, words }
+}
+
+fn gap_in_words(wanting_m: f64, missing: u32) -> String {
+    let parts = if missing == 1 { "part is" } else { "parts are" };
+    format!("has a gap that is {wanting_m:.3} m too long: {missing} {parts} missing")
 }
 
 fn obstacle_in_words(id: u32) -> String {

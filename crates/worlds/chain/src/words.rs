@@ -97,7 +97,7 @@ pub(super) fn outcome(m: &Metrics) -> Lines {
         lines.push(line("re-formed", format!("{} times", grouped(m.reformed))));
     }
     if m.not_reformed > 0 {
-        lines.push(line("NOT re-formed", format!("{} times", grouped(m.not_reformed))));
+        lines.push(line("NOT re-formed", not_reformed(m)));
     }
     lines.extend(m.joints_errors.iter().map(|(chain, error)| {
         line("joints", format!("of chain {chain} cannot follow its connectors: {error}"))
@@ -108,6 +108,15 @@ pub(super) fn outcome(m: &Metrics) -> Lines {
         lines.push(line("given up", format!("and {more} more")));
     }
     lines
+}
+
+fn not_reformed(m: &Metrics) -> String {
+    let times = format!("{} times", grouped(m.not_reformed));
+    match m.missing_parts {
+        0 => times,
+        1 => format!("{times}; 1 part is missing"),
+        n => format!("{times}; {} parts are missing", grouped(n)),
+    }
 }
 
 /// Returns how initiators continued after vetoes, and the results of getting out of the way; no
@@ -126,6 +135,8 @@ fn after_vetoes(m: &Metrics) -> Lines {
         (rungs.waited, "waited"),
         (rungs.pulled_back, "pulled by the other end"),
         (rungs.stuck, "stuck"),
+        (rungs.planned, "ways planned"),
+        (rungs.not_planned, "plans without a way"),
     ]);
     let escaped = some(&[
         (escapes.moves, "parts moved away"),

@@ -29,6 +29,8 @@ pub(crate) mod purpose {
     pub(crate) const SCATTER: Purpose = Purpose(3);
     /// Direction of a wandering initiator that is stuck.
     pub(crate) const TURN_AWAY: Purpose = Purpose(5);
+    /// Random postures of a planner.
+    pub(crate) const PLAN: Purpose = Purpose(6);
     /// Errors of a laser.
     pub(crate) const LASER: Purpose = Purpose(4);
 }
@@ -185,6 +187,12 @@ impl<const D: usize> ChainSpec<D> {
 }
 
 impl<const D: usize> ChainWorld<D> {
+    /// Whether nothing is in the way of the only chain, not even itself.
+    pub(crate) fn is_open(&self) -> bool {
+        let is_empty = self.obstacles.is_empty() && self.movers.is_empty();
+        is_empty && self.chains.len() == 1 && !self.rules.self_collision
+    }
+
     /// Returns the seconds from the start of the run to the start of a cycle.
     pub fn starts_s(&self, now: Cycle) -> f64 {
         now as f64 * self.dt_s

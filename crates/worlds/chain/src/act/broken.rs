@@ -2,7 +2,7 @@
 //! F3).
 
 use super::Acting;
-use crate::events::EventKind;
+use crate::events::{Event, EventKind};
 use crate::rods::geometry::{Point, add, distance, towards};
 use crate::rods::rebuild::{MayCome, Reformed, reform};
 use crate::state::{Scattered, flat};
@@ -23,6 +23,8 @@ impl<const D: usize> Acting<'_, D> {
     }
 
     fn apply(&mut self, change: &Change<D>) {
+        self.body.catch_up();
+        self.body.plan = None;
         change.constrain(&mut self.body.chain);
         match &change.what {
             What::Failed { connector, .. }
@@ -77,11 +79,22 @@ impl<const D: usize> Acting<'_, D> {
                 }
                 (EventKind::Reforming, double_passes as f64)
             }
-            Reformed::GapTooLong { have_m, need_m } => (EventKind::GapTooLong, need_m - have_m),
+            Reformed::GapTooLong { have_m, need_m, missing } => {
+                return self.gap_is_too_long(first, need_m - have_m, missing);
+            }
             Reformed::NotReached { off_m } => (EventKind::NotReformed, off_m),
         };
         self.body.tally.not_reformed += u64::from(kind != EventKind::Reforming);
         self.tell(kind, first, value);
+    }
+
+    /// Tells the length and the number of parts that are wanting.
+    fn gap_is_too_long(&mut self, first: usize, wanting_m: f64, missing: usize) {
+        let tally = &mut self.body.tally;
+        tally.not_reformed += 1;
+        tally.missing_parts = tally.missing_parts.max(missing as u64);
+        let event = self.event(EventKind::GapTooLong, first, wanting_m);
+        self.scratch.events.push(Event { missing: missing as u32, ..event });
     }
 
     /// Returns where the connectors would be if the chain were whole, and whether it can be.

@@ -15,6 +15,8 @@ enum Wish<const D: usize> {
     Rest,
     /// The initiator at another place.
     Go(Point<D>),
+    /// The whole chain farther along its plan.
+    Follow,
     /// A robot on wheels at another pose.
     Steer(Pose),
     /// Its task is done.
@@ -32,6 +34,7 @@ impl<const D: usize> Acting<'_, D> {
             Wish::Go(to) => {
                 self.go(task, to);
             }
+            Wish::Follow => self.follow_plan(task),
             Wish::Steer(pose) => self.go_on_wheels(task, pose),
             Wish::Done => return self.next_task(EventKind::Done),
         }
@@ -86,8 +89,13 @@ impl<const D: usize> Acting<'_, D> {
         };
         driving.nearest_m = driving.nearest_m.min(left_m);
         if left_m > targets.tolerance_m {
-            return Wish::Go(towards(at, target, step_m));
+            self.plan_if_late(task, targets);
+            return match self.body.plan {
+                Some(_) => Wish::Follow,
+                None => Wish::Go(towards(at, target, step_m)),
+            };
         }
+        self.body.plan = None;
         self.tell(EventKind::Target, task.agent, f64::from(self.body.driving.next));
         self.body.tally.done += 1;
         self.body.driving.next_part();
@@ -123,6 +131,8 @@ impl<const D: usize> Acting<'_, D> {
     /// Ends the present task, done or given up, and starts the next.
     pub(super) fn next_task(&mut self, how: EventKind) {
         let Some(task) = self.task() else { return };
+        self.body.catch_up();
+        self.body.plan = None;
         let driving = &mut self.body.driving;
         let next = self.spec.tasks.get(driving.task as usize + 1).unwrap_or(task);
         let ended = f64::from(driving.task);

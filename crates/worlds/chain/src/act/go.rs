@@ -26,6 +26,20 @@ impl<const D: usize> Acting<'_, D> {
     /// Moves the initiator, as it wants or as the ladder allows.
     pub(super) fn go(&mut self, task: &Task<D>, to: Point<D>) -> Went {
         let at = self.body.chain.points()[task.agent];
+        let climbed = match self.puts_off {
+            true => self.lead(task, to),
+            false => self.climb(task, to),
+        };
+        let way = sub(self.body.chain.points()[task.agent], at);
+        self.body.driving.way_m.wanted += distance(at, to);
+        self.body.driving.way_m.gone += norm(way);
+        self.body.tally.way_m += norm(way);
+        self.take_note(task, &climbed, way)
+    }
+
+    /// Requests a motion of the whole chain.
+    fn climb(&mut self, task: &Task<D>, to: Point<D>) -> Climbed<D> {
+        let at = self.body.chain.points()[task.agent];
         let motion = Motion::Connector { k: task.agent, to };
         let request = Request { motion, source: task.source(), mode: Mode::Exact };
         let situation = self.situation(task);
@@ -46,11 +60,14 @@ impl<const D: usize> Acting<'_, D> {
         if let Some(veto) = &objection {
             self.vetoed(veto);
         }
-        let way = sub(self.body.chain.points()[task.agent], at);
-        self.body.driving.way_m.wanted += distance(at, to);
-        self.body.driving.way_m.gone += norm(way);
-        self.body.tally.way_m += norm(way);
-        self.take_note(task, &climbed, way)
+        climbed
+    }
+
+    /// Returns the distance of an initiator from its target, if it has one.
+    pub(super) fn goal_distance_m(&self, task: &Task<D>) -> Option<f64> {
+        let Driver::Targets(targets) = &task.driver else { return None };
+        let place = targets.places.get(self.body.driving.next as usize);
+        place.map(|place| distance(self.body.chain.points()[task.agent], *place))
     }
 
     /// Returns an initiator's knowledge beside its neighborhood.
@@ -59,13 +76,7 @@ impl<const D: usize> Acting<'_, D> {
         let near_m = self.world.look_m + MOVER_NEAR_M;
         let is_near =
             |o: &Obstacle<D>| o.core.nearest_to_point(at).distance_m - o.radius_m < near_m;
-        let goal_distance_m = match &task.driver {
-            Driver::Targets(targets) => {
-                let place = targets.places.get(self.body.driving.next as usize);
-                place.map(|place| distance(at, *place))
-            }
-            _ => None,
-        };
+        let goal_distance_m = self.goal_distance_m(task);
         let (can_turn, keeps_heading) = match &task.driver {
             Driver::Navigate(navigator) => (navigator.can_turn_on_the_spot(), true),
             _ => (false, false),
@@ -183,6 +194,7 @@ impl<const D: usize> Acting<'_, D> {
                 let given_up = f64::from(self.body.driving.task);
                 let event = self.event(EventKind::GivenUp, by, given_up);
                 self.scratch.events.push(Event { reason, ..event });
+                self.body.plan = None;
                 self.body.driving.next_part();
             }
             _ => self.next_task(EventKind::GivenUp),

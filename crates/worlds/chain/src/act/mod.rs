@@ -3,6 +3,8 @@
 //! ```text
 //! broken.rs -> bounds.rs (out of the way) -> drive.rs -> go.rs, wheels.rs -> bounds.rs (back into the claim)
 //!           -> follow.rs -> measure.rs
+//! broken.rs -> drive.rs -> go.rs, later.rs         where nothing can object
+//!              drive.rs -> plan.rs                 where local rules come no nearer
 //! ```
 
 mod bounds;
@@ -10,7 +12,9 @@ mod broken;
 mod drive;
 mod follow;
 mod go;
+mod later;
 mod measure;
+mod plan;
 mod wheels;
 
 use super::driver::Task;
@@ -34,6 +38,8 @@ pub(crate) struct Acting<'a, const D: usize> {
     claim: Bounds<D>,
     body: &'a mut Body<D>,
     scratch: &'a mut Scratch<D>,
+    /// Whether only the initiator moves for now.
+    puts_off: bool,
 }
 
 /// Lets the chains of one conflict group act, one after the other.
@@ -54,6 +60,7 @@ pub(crate) fn act<const D: usize>(turn: &mut Turn<'_, ChainWorld<D>>, group: &mu
             claim,
             body: &mut body,
             scratch: turn.scratch,
+            puts_off: false,
         };
         acting.act();
     }
@@ -63,6 +70,13 @@ impl<'a, const D: usize> Acting<'a, D> {
     /// Makes one cycle of the chain, which stays in its claim.
     fn act(&mut self) {
         self.change();
+        self.puts_off = self.may_put_off();
+        if self.puts_off {
+            self.drive();
+            self.body.tally.steps += 1;
+            return;
+        }
+        self.body.catch_up();
         self.scratch.before.clear();
         self.scratch.before.extend_from_slice(self.body.chain.points());
         self.scratch.escaped.clone_from(&self.scratch.before);
@@ -86,7 +100,7 @@ impl<'a, const D: usize> Acting<'a, D> {
     /// Returns an event of this chain.
     fn event(&self, kind: EventKind, connector: usize, value: f64) -> Event {
         let (cycle, chain, connector) = (self.now, self.slot, connector as u32);
-        Event { cycle, chain, kind, connector, reason: None, obstacle: None, value }
+        Event { cycle, chain, kind, connector, reason: None, obstacle: None, missing: 0, value }
     }
 
     /// Records an event.

@@ -6,8 +6,8 @@ use crate::driver::{Driver, Task};
 use crate::formation::Robot;
 use crate::navigate::{Goal, Navigator};
 use crate::rods::geometry::{Point, distance, in_dimensions};
-use crate::swarm::convoy;
 use crate::swarm::drive::Pose;
+use crate::swarm::follower::pace;
 use sidestep_kernel::math::{cos, sin};
 
 impl<const D: usize> Acting<'_, D> {
@@ -68,6 +68,6 @@ impl<const D: usize> Acting<'_, D> {
         let Some(robots) = &self.spec.robots else { return 1.0 };
         let lag_m = |(robot, at): (&Robot, &Point<D>)| distance(robot.pose.at, in_dimensions(*at));
         let lags_m = self.body.robots.iter().zip(self.body.chain.points()).map(lag_m);
-        convoy::pace(lags_m.fold(0.0, f64::max), robots.lag_limit_m)
+        pace(lags_m.fold(0.0, f64::max), robots.lag_limit_m)
     }
 }

@@ -4,10 +4,12 @@
 //! ```text
 //! kinematics/: joints -> connectors -> joints     ik/: postures of chains that reach a target
 //! arm.rs: an arm with a place in the world, as a chain
+//! plan/: ways among obstacles from one posture to another
 //! ```
 
 pub(crate) mod arm;
 pub mod ik;
 pub mod kinematics;
+pub(crate) mod plan;
 
 pub use arm::Arm;

@@ -2,7 +2,7 @@
 
 use crate::arms::ik::{Engine, Goal, Solver};
 use crate::rods::chain::Chain;
-use crate::rods::geometry::{Point, distance};
+use crate::rods::geometry::{Point, between, distance};
 use crate::rods::obstacle::Obstacles;
 use crate::rods::passage::passed;
 use crate::rods::propagate::Propagator;
@@ -30,16 +30,72 @@ pub(super) fn go<const D: usize>(
         return Ok(outcome);
     }
     let order = Reach { k, target: to, base: veto.by, tolerance_m: TOLERANCE_M };
+    held(propagator, chain, obstacles, &order, veto)
+}
+
+/// Moves a chain whose base objects as far as the limit of its joints allows. Near a singular
+/// posture they go much farther than the initiator, which therefore goes less far.
+fn held<const D: usize>(
+    propagator: &mut Propagator<D>,
+    chain: &mut Chain<D>,
+    obstacles: &Obstacles<D>,
+    order: &Reach<D>,
+    objection: &Veto<D>,
+) -> Result<Outcome<D>, InputError> {
+    let (most_m, before) = (propagator.rules.joint_step_max_m, chain.points().to_vec());
+    let from = before[order.k];
+    let (mut part, mut fastest) = (1.0, order.k);
+    for _ in 0..MOST_SLOWED {
+        let target = if part < 1.0 { between(from, order.target, part) } else { order.target };
+        let order = Reach { target, ..*order };
+        let moved = match reached(propagator, chain, obstacles, &order, objection)? {
+            Outcome::Moved(moved) => moved,
+            vetoed @ Outcome::Vetoed(_) => return Ok(vetoed),
+        };
+        let (by, longest_m) = longest(&before, chain.points());
+        let slowed =
+            Veto { by, reason: Reason::StepLimit, reached: chain.points()[order.k], ..*objection };
+        if longest_m <= most_m {
+            let cut_short = (part < 1.0).then_some(slowed);
+            return Ok(Outcome::Moved(Moved { cut_short, ..moved }));
+        }
+        chain.points_mut().copy_from_slice(&before);
+        (part, fastest) = (part * SLOWED * most_m / longest_m, by);
+    }
+    let reason = Reason::StepLimit;
+    Ok(Outcome::Vetoed(Veto { by: fastest, reason, reached: from, ..*objection }))
+}
+
+/// Returns the connector that has moved farthest, and its way, meters.
+fn longest<const D: usize>(before: &[Point<D>], points: &[Point<D>]) -> (usize, f64) {
+    let ways_m = before.iter().zip(points).map(|(a, b)| distance(*a, *b)).enumerate();
+    ways_m.fold((0, 0.0), |most, way| if way.1 > most.1 { way } else { most })
+}
+
+/// Moves a chain whose base objects by passes there and back, or straight to a posture.
+fn reached<const D: usize>(
+    propagator: &mut Propagator<D>,
+    chain: &mut Chain<D>,
+    obstacles: &Obstacles<D>,
+    order: &Reach<D>,
+    objection: &Veto<D>,
+) -> Result<Outcome<D>, InputError> {
     let before = chain.points().to_vec();
-    Ok(match reach(propagator, chain, obstacles, &order)? {
-        Reached::There { .. } => Outcome::Moved(moved_since(&before, chain, k)),
+    Ok(match reach(propagator, chain, obstacles, order)? {
+        Reached::There { .. } => Outcome::Moved(moved_since(&before, chain, order.k)),
         Reached::Short { veto: Some(veto), .. } => Outcome::Vetoed(veto),
         Reached::Short { nearest, veto: None } => {
-            let objection = Veto { reached: nearest, ..*veto };
-            by_posture(propagator.rules, chain, obstacles, &order, objection)?
+            let objection = Veto { reached: nearest, ..*objection };
+            by_posture(propagator.rules, chain, obstacles, order, objection)?
         }
     })
 }
+
+/// Most attempts to find how far an initiator may go.
+const MOST_SLOWED: usize = 16;
+/// Part of the limit that an attempt aims at, because near singular postures joints slow down less
+/// than the initiator.
+const SLOWED: f64 = 0.9;
 
 /// Finds a posture, or reports that the target is out of reach. Passes converge slowly if a chain
 /// is nearly straight, so damped least squares find the nearest posture that gets there, and the
@@ -104,5 +160,48 @@ fn moved_since<const D: usize>(before: &[Point<D>], chain: &Chain<D>, k: usize) 
         rotated: 0,
         max_slave_step_m: slaves.map(|(_, way_m)| way_m).fold(0.0, f64::max),
         cut_short: None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rods::chain::{Connector, Mobility, Rod};
+    use crate::rods::veto::{Mode, Source};
+
+    /// An arm of two rods, bent a little; the base is fixed.
+    fn arm() -> Chain<2> {
+        let points = vec![[0.0, 0.0], [0.0, 1.0], [1.0, 1.0]];
+        let mut arm =
+            Chain::new(points, vec![Connector::free(0.05); 3], vec![Rod::fixed(1.0, 0.02); 2])
+                .unwrap();
+        arm.set_mobility(0, Mobility::Fixed).unwrap();
+        arm
+    }
+
+    /// Drags the tool out to 0.1 mm less than the reach; returns the longest way of any connector in a
+    /// request, and how far from the base the tool comes.
+    fn dragged_out(joint_step_max_m: f64) -> (f64, f64) {
+        let (mut chain, step_m) = (arm(), 0.01);
+        let mut propagator = Propagator::new(Rules { joint_step_max_m, ..Rules::default() });
+        let mut most_m = 0.0;
+        for _ in 0..400 {
+            let (before, at) = (chain.points().to_vec(), chain.points()[2]);
+            let to = crate::rods::geometry::towards(at, [1.199_94, 1.599_92], step_m);
+            let motion = Motion::Connector { k: 2, to };
+            let request = Request { motion, source: Source::Autonomous, mode: Mode::Exact };
+            go(&mut propagator, &mut chain, &Obstacles::default(), &request).unwrap();
+            most_m = f64::max(most_m, longest(&before, chain.points()).1);
+        }
+        (most_m, distance(chain.points()[2], [0.0; 2]))
+    }
+
+    #[test]
+    fn joints_keep_their_limit_near_a_singular_posture_and_the_tool_still_gets_there() {
+        let (free_m, _) = dragged_out(f64::INFINITY);
+        assert!(free_m > 0.04, "without a limit the elbow goes {free_m} m for 0.01 m of the tool");
+        let (limited_m, reached_m) = dragged_out(0.02);
+        assert!(limited_m <= 0.02, "{limited_m}");
+        assert!(reached_m > 1.9998, "{reached_m} of 2 m");
     }
 }

@@ -11,7 +11,7 @@ use std::f64::consts::PI;
 pub(crate) const LENGTH_TOLERANCE_M: f64 = 1e-9;
 
 /// Largest coordinate: farther from the origin, rounding is no longer small against the tolerances.
-const MAX_COORDINATE_M: f64 = 1e6;
+pub(crate) const MAX_COORDINATE_M: f64 = 1e6;
 
 /// Whether a connector may be at a point at all: it must be finite, and at most 1e6 m from the
 /// origin along every axis.
@@ -138,6 +138,7 @@ pub struct Chain<const D: usize> {
 struct StillMeasures {
     longest_m: f64,
     least_m: f64,
+    thickest_m: f64,
 }
 
 impl<const D: usize> Chain<D> {
@@ -195,7 +196,8 @@ impl<const D: usize> Chain<D> {
         let longest_m = rods.iter().map(|r| r.max_m).fold(0.0, f64::max);
         let radii = connectors.iter().map(|c| c.radius_m).filter(|&r| r > 0.0);
         let least_m = rods.iter().map(|r| r.min_m).chain(radii).fold(f64::INFINITY, f64::min);
-        let still = StillMeasures { longest_m, least_m };
+        let thickest_m = connectors.iter().map(|c| c.radius_m).fold(0.0, f64::max);
+        let still = StillMeasures { longest_m, least_m, thickest_m };
         Ok(Self { points, connectors, rods, special, still })
     }
 
@@ -286,6 +288,16 @@ impl<const D: usize> Chain<D> {
     /// of the least rod or radius.
     pub fn step_m(&self) -> f64 {
         0.25 * self.still.least_m
+    }
+
+    /// Returns the greatest length of any rod, meters.
+    pub(super) fn longest_m(&self) -> f64 {
+        self.still.longest_m
+    }
+
+    /// Returns the greatest radius of any part, meters; no rod is thicker than its connectors.
+    pub(super) fn thickest_m(&self) -> f64 {
+        self.still.thickest_m
     }
 
     /// Whether every connector is free and bends without limit.

@@ -6,9 +6,9 @@
 //! propagate.rs -> candidates.rs -> scene.rs     one motion: sweeps, a slave's choices, their judge
 //!                 interval.rs, search.rs        free directions: exact in the plane, searched in space
 //!                 sweep.rs, own_body.rs         nothing is passed through; the chain's own parts
-//!                 open.rs, pass.rs              the same where nothing is in the way
+//!                 open.rs, pass.rs, leeway.rs   the same where nothing is in the way, or comes near
 //! wavefront.rs: many motions at once            passage.rs: passages between two states
-//! reach.rs: a base that keeps its place         rebuild.rs: broken chains
+//! reach.rs: a base that keeps its place         rebuild.rs, span.rs: broken chains
 //! ```
 
 mod candidates;
@@ -16,6 +16,7 @@ pub(crate) mod chain;
 pub mod geometry;
 mod grid;
 mod interval;
+mod leeway;
 pub(crate) mod obstacle;
 mod open;
 pub(crate) mod own_body;
@@ -27,6 +28,7 @@ pub mod rebuild;
 pub(crate) mod rules;
 pub(crate) mod scene;
 mod search;
+mod span;
 mod sweep;
 pub(crate) mod veto;
 pub mod wavefront;

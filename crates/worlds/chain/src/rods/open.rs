@@ -11,8 +11,32 @@ use super::geometry::{Point, distance, dot, sub};
 use super::pass::{Direction, Tally};
 use super::scene::fits;
 
+/// When a slave counts as staying where it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Stays {
+    /// If its new place is the old one, bit for bit.
+    Exactly,
+    /// If it would move by no more than the least move: the rule of chains with something nearby.
+    Nearly,
+}
+
 /// Moves connector `k`, and all connectors that must follow.
 pub(super) fn pull<const D: usize>(
+    chain: &mut Chain<D>,
+    k: usize,
+    to: Point<D>,
+    stays: Stays,
+    tally: &mut Tally,
+) {
+    match stays {
+        Stays::Exactly => sweep::<D, false>(chain, k, to, tally),
+        Stays::Nearly => sweep::<D, true>(chain, k, to, tally),
+    }
+}
+
+/// Makes both sweeps. A parameter of the type, because the loop is too short for a test that is
+/// always the same.
+fn sweep<const D: usize, const NEARLY: bool>(
     chain: &mut Chain<D>,
     k: usize,
     to: Point<D>,
@@ -30,9 +54,12 @@ pub(super) fn pull<const D: usize>(
         longest2: 0.0,
     });
     let [up, down] = &mut sweeps;
-    while up.advance(points, rods, least_move_m) && down.advance(points, rods, least_move_m) {}
-    while up.advance(points, rods, least_move_m) {}
-    while down.advance(points, rods, least_move_m) {}
+    let advance = |sweep: &mut Sweep<D>, points: &mut [Point<D>]| {
+        sweep.advance::<NEARLY>(points, rods, least_move_m)
+    };
+    while advance(up, points) && advance(down, points) {}
+    while advance(up, points) {}
+    while advance(down, points) {}
     tally.touch(down.master..up.master + 1);
     tally.changed += 1 + up.changed + down.changed;
     tally.slave_went(up.longest2.max(down.longest2).sqrt());
@@ -53,11 +80,19 @@ struct Sweep<const D: usize> {
 impl<const D: usize> Sweep<D> {
     /// Moves the next slave; returns false, now and ever after, once the motion ends.
     #[inline(always)]
-    fn advance(&mut self, points: &mut [Point<D>], rods: &[Rod], least_move_m: f64) -> bool {
+    fn advance<const NEARLY: bool>(
+        &mut self,
+        points: &mut [Point<D>],
+        rods: &[Rod],
+        least_move_m: f64,
+    ) -> bool {
         let Some(slave) = self.direction.next(self.master, points.len()) else { return false };
         let so = points[slave];
         let rod = rods[slave.min(self.master)];
-        let new = guided([self.was, self.is, so], rod, least_move_m);
+        let mut new = guided([self.was, self.is, so], rod, least_move_m);
+        if NEARLY && distance(new, so) <= least_move_m {
+            new = so;
+        }
         if new == so && self.may_end_at(slave, points, rods) {
             return false;
         }

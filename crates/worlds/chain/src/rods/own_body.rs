@@ -2,9 +2,10 @@
 //!
 //! Neighbors along the chain are neighbors in space, so the tree over the index needs no sorting
 //! and never changes its shape. A rod that moves gets its new box at once; the boxes above it grow
-//! as far as they must and shrink when the tree is rebuilt, which every motion does.
+//! as far as they must, and shrink at the start of the next motion, which refits what has changed.
 
 use super::geometry::Bounds;
+use std::ops::Range;
 
 /// Rods per leaf.
 const LEAF: usize = 4;
@@ -16,9 +17,25 @@ pub(crate) struct OwnBody<const D: usize> {
     /// A binary heap: node 1 is the root, `leaves..2 * leaves` are the leaves.
     nodes: Vec<Bounds<D>>,
     leaves: usize,
+    /// Leaves whose boxes, or the ones above, may be larger than they must.
+    loose: Range<usize>,
 }
 
 impl<const D: usize> OwnBody<D> {
+    /// Fits the tree to boxes: all of it if their number is new, otherwise around those that differ.
+    pub(crate) fn refit(&mut self, boxes: impl ExactSizeIterator<Item = Bounds<D>>) {
+        if boxes.len() != self.rods.len() {
+            return self.rebuild(boxes);
+        }
+        for (rod, bounds) in boxes.enumerate() {
+            if self.rods[rod] != bounds {
+                self.rods[rod] = bounds;
+                self.loosen(rod / LEAF);
+            }
+        }
+        self.fit();
+    }
+
     /// Builds the tree anew.
     pub(crate) fn rebuild(&mut self, boxes: impl Iterator<Item = Bounds<D>>) {
         self.rods.clear();
@@ -26,11 +43,32 @@ impl<const D: usize> OwnBody<D> {
         self.leaves = self.rods.len().div_ceil(LEAF).next_power_of_two();
         self.nodes.clear();
         self.nodes.resize(2 * self.leaves, Bounds::nothing());
-        for leaf in 0..self.leaves {
+        self.loose = 0..self.leaves;
+        self.fit();
+    }
+
+    fn loosen(&mut self, leaf: usize) {
+        self.loose = match self.loose.is_empty() {
+            true => leaf..leaf + 1,
+            false => self.loose.start.min(leaf)..self.loose.end.max(leaf + 1),
+        };
+    }
+
+    /// Fits the loose leaves, and everything above them.
+    fn fit(&mut self) {
+        let loose = std::mem::take(&mut self.loose);
+        if loose.is_empty() {
+            return;
+        }
+        for leaf in loose.clone() {
             self.nodes[self.leaves + leaf] = self.around_leaf(leaf);
         }
-        for node in (1..self.leaves).rev() {
-            self.nodes[node] = self.nodes[2 * node].joined(&self.nodes[2 * node + 1]);
+        let (mut from, mut to) = (self.leaves + loose.start, self.leaves + loose.end - 1);
+        while from > 1 {
+            (from, to) = (from / 2, to / 2);
+            for node in from..=to {
+                self.nodes[node] = self.nodes[2 * node].joined(&self.nodes[2 * node + 1]);
+            }
         }
     }
 
@@ -43,6 +81,7 @@ impl<const D: usize> OwnBody<D> {
     /// Updates the box of a rod that has moved.
     pub(crate) fn set(&mut self, rod: usize, bounds: Bounds<D>) {
         self.rods[rod] = bounds;
+        self.loosen(rod / LEAF);
         let mut node = self.leaves + rod / LEAF;
         // If a node contains the box, so do all above it.
         while node > 0 && !self.nodes[node].contains(&bounds) {
@@ -97,11 +136,25 @@ mod tests {
                 *last = Bounds::of(&[moved]).grown(1.0);
                 tree.set(boxes.len() - 1, *boxes.last().unwrap());
             }
-            let near = Bounds::of(&[at]).grown(2.0);
-            let mut seen = Vec::new();
-            tree.visit(&near, |k| seen.push(k));
-            let expected: Vec<_> = (0..boxes.len()).filter(|&k| boxes[k].meets(&near)).collect();
-            prop_assert_eq!(seen, expected);
+            check(&tree, &boxes, at)?;
+            // The next motion starts there, and moves another part.
+            if let Some(first) = boxes.first_mut() {
+                *first = Bounds::of(&[at]).grown(0.1);
+            }
+            tree.refit(boxes.iter().copied());
+            check(&tree, &boxes, at)?;
+            let mut anew = OwnBody::default();
+            anew.rebuild(boxes.iter().copied());
+            prop_assert_eq!(tree.nodes, anew.nodes);
         }
+    }
+
+    fn check(tree: &OwnBody<2>, boxes: &[Bounds<2>], at: [f64; 2]) -> Result<(), TestCaseError> {
+        let near = Bounds::of(&[at]).grown(2.0);
+        let mut seen = Vec::new();
+        tree.visit(&near, |k| seen.push(k));
+        let expected: Vec<_> = (0..boxes.len()).filter(|&k| boxes[k].meets(&near)).collect();
+        prop_assert_eq!(seen, expected);
+        Ok(())
     }
 }

@@ -25,6 +25,14 @@ impl Tally {
         (self.from, self.to) = (self.from.min(run.start), self.to.max(run.end));
     }
 
+    /// Adds the results of a motion of its own.
+    pub(super) fn add(&mut self, motion: &Self) {
+        self.touch(motion.from..motion.to);
+        self.changed += motion.changed;
+        self.rotated += motion.rotated;
+        self.slave_went(motion.max_slave_step_m);
+    }
+
     /// Counts a connector other than the initiator that moved by `way_m`.
     #[inline]
     pub(super) fn slave_went(&mut self, way_m: f64) {

@@ -7,8 +7,9 @@
 use super::candidates::{Candidate, Work};
 use super::chain::{Chain, is_in_range, out_of_range};
 use super::geometry::{Bounds, Point, between, distance};
+use super::leeway::Leeway;
 use super::obstacle::{Obstacles, swept};
-use super::open;
+use super::open::{self, Stays};
 use super::own_body::OwnBody;
 use super::pass::{Direction, Tally};
 use super::rules::{Rotation, Rules};
@@ -21,13 +22,14 @@ use std::ops::Range;
 const MAX_SUB_STEPS: f64 = 1e6;
 
 /// Moves chains by the rules. It owns the buffers of a motion, so that no motion allocates, and
-/// remembers nothing from one motion to the next.
+/// remembers nothing from one motion to the next that a result depends on.
 #[derive(Debug, Clone, Default)]
 pub struct Propagator<const D: usize> {
     /// Rules by which chains react.
     pub rules: Rules,
     overlay: Overlay<D>,
     own: OwnBody<D>,
+    leeway: Leeway<D>,
     work: Work<D>,
     untried: Vec<Untried<D>>,
     /// Positions before the request, for the run of connectors that have moved.
@@ -103,7 +105,8 @@ impl<const D: usize> Propagator<D> {
             let part = k as f64 / n as f64;
             let to = [0, 1]
                 .map(|h| if k == n { heads.to[h] } else { between(from[h], heads.to[h], part) });
-            if let Err((by, refusal)) = self.sub_step(chain, obstacles, Heads { to, ..heads }) {
+            let heads = Heads { to, ..heads };
+            if let Err((by, refusal)) = self.sub_step(chain, obstacles, heads, k < n) {
                 let veto = veto(chain, heads.first, by, refusal);
                 return Ok(self.stopped(chain, request.mode, veto));
             }
@@ -150,12 +153,13 @@ impl<const D: usize> Propagator<D> {
         Moved { touched: from..to, changed, rotated, max_slave_step_m, cut_short }
     }
 
-    /// Makes one short motion: all of it, or none.
+    /// Makes one short motion, after which the request goes on or ends: all of it, or none.
     fn sub_step(
         &mut self,
         chain: &mut Chain<D>,
         obstacles: &Obstacles<D>,
         heads: Heads<D>,
+        goes_on: bool,
     ) -> Result<(), Objection> {
         let is_there = |(h, k): (usize, usize)| {
             distance(heads.to[h], chain.points()[k]) <= chain.least_move_m()
@@ -163,14 +167,18 @@ impl<const D: usize> Propagator<D> {
         if heads.indices().enumerate().all(is_there) {
             return Ok(());
         }
-        if obstacles.is_empty() && !self.rules.self_collision && chain.is_plain() && heads.n == 1 {
-            open::pull(chain, heads.first, heads.to[0], &mut self.tally);
+        let is_open = obstacles.is_empty() && chain.is_plain() && heads.n == 1;
+        if is_open && !self.rules.self_collision {
+            open::pull(chain, heads.first, heads.to[0], Stays::Exactly, &mut self.tally);
+            return Ok(());
+        }
+        if is_open && self.pull_apart(chain, &heads, goes_on) {
             return Ok(());
         }
         self.overlay.start(chain.points().len(), heads.first);
         if self.rules.self_collision {
-            self.own
-                .rebuild((0..chain.rods().len()).map(|i| rod_box(chain, i, |k| chain.points()[k])));
+            let rods = 0..chain.rods().len();
+            self.own.refit(rods.map(|i| rod_box(chain, i, |k| chain.points()[k])));
         }
         self.place_heads(chain, obstacles, &heads)?;
         let rotated = self.tally.rotated;
@@ -182,6 +190,41 @@ impl<const D: usize> Propagator<D> {
             Err(_) => self.tally.rotated = rotated,
         }
         followed
+    }
+
+    /// Makes a motion in which no part comes near another, if it is one; then nothing can object,
+    /// and the chain moves as if it were not in its own way.
+    fn pull_apart(&mut self, chain: &mut Chain<D>, heads: &Heads<D>, goes_on: bool) -> bool {
+        if !Leeway::is_for(chain) {
+            return false;
+        }
+        self.leeway.note(chain);
+        let mut tally = Tally::start(heads.first);
+        let head_m = distance(chain.points()[heads.first], heads.to[0]);
+        open::pull(chain, heads.first, heads.to[0], Stays::Nearly, &mut tally);
+        let way_m = head_m.max(tally.max_slave_step_m);
+        let may = tally.max_slave_step_m <= self.rules.slave_step_max_m
+            && self.leeway.allows(chain, way_m);
+        if may {
+            if goes_on {
+                self.remember(heads.first, tally.from..tally.to);
+            }
+            self.tally.add(&tally);
+        } else {
+            let run = tally.from..tally.to;
+            chain.points_mut()[run.clone()].copy_from_slice(&self.leeway.noted()[run]);
+        }
+        self.leeway.ended(chain, way_m, !may);
+        may
+    }
+
+    /// Keeps the positions before a motion that the request may have to take back.
+    fn remember(&mut self, head: usize, run: Range<usize>) {
+        for i in (head..run.end).chain((run.start..head).rev()) {
+            if self.before.get(i).is_none() {
+                self.before.set(i, self.leeway.noted()[i]);
+            }
+        }
     }
 
     fn place_heads(

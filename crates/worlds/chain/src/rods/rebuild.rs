@@ -2,8 +2,9 @@
 //! them are missing.
 //!
 //! Passes from one stub to the other and back, each slave by push, pull and resize, bring every rod
-//! into its limits; the whole ends keep every bit. If the gap is longer than the remaining parts,
-//! one end must come, and only an end that may.
+//! into its limits; the whole ends keep every bit. Parts that only just reach would take passes
+//! without end, and are laid out instead. If the gap is longer than the remaining parts, one end must
+//! come, and only an end that may.
 
 use super::candidates::guided;
 use super::chain::{Chain, LENGTH_TOLERANCE_M, Rod};
@@ -12,11 +13,13 @@ use super::obstacle::Obstacles;
 use super::pass::Direction;
 use super::propagate::Propagator;
 use super::scene::fits;
+use super::span::joints;
 use super::veto::Request;
 use sidestep_kernel::InputError;
 use std::ops::RangeInclusive;
 
-/// Most double passes before re-forming is given up. The worst case measured took 120.
+/// Most double passes before the parts are laid out. Where they reach with room to spare, the worst
+/// case measured took 120.
 const MAX_DOUBLE_PASSES: usize = 1_000;
 /// Ratio of the gap to the reach of the scattered parts from which on they are stretched out.
 const STRETCHED: f64 = 0.999;
@@ -48,8 +51,11 @@ pub enum Reformed {
         have_m: f64,
         /// Reach that they would need, meters.
         need_m: f64,
+        /// Least number of further parts, each on the longest of their rods, that would do.
+        missing: usize,
     },
-    /// Passes did not join the parts; nothing has changed.
+    /// The parts cannot be joined, because one rod is longer than the gap and all other rods, or an
+    /// end that may come did not; nothing has changed.
     NotReached {
         /// Error of the worst rod, meters.
         off_m: f64,
@@ -82,22 +88,45 @@ pub fn reform<const D: usize>(
     let need_m = distance(chain.points()[low], chain.points()[high]);
     if need_m > have_m + LENGTH_TOLERANCE_M {
         match may_come {
-            MayCome::Nobody => return Ok(Reformed::GapTooLong { have_m, need_m }),
+            MayCome::Nobody => {
+                let missing = missing(&chain.rods()[low..high], need_m - have_m);
+                return Ok(Reformed::GapTooLong { have_m, need_m, missing });
+            }
             MayCome::First => pull_end(chain, 0..=low, high, have_m)?,
             MayCome::Last => pull_end(chain, high..=chain.points().len() - 1, low, have_m)?,
         }
     }
     lay_out(chain, low, high, have_m);
-    for double_passes in 0..=MAX_DOUBLE_PASSES {
-        if (low..high).all(|i| fits(chain.rods()[i], chain.length_m(i))) {
+    for double_passes in 0..MAX_DOUBLE_PASSES {
+        if is_whole(chain, low, high) {
             return Ok(Reformed::Whole { double_passes });
         }
         pass(chain, low, high, Direction::Up);
         pass(chain, high, low, Direction::Down);
     }
+    if !is_whole(chain, low, high) {
+        let [a, b] = [chain.points()[low], chain.points()[high]];
+        let places = joints(a, b, &chain.rods()[low..high]);
+        chain.points_mut()[first..=last].copy_from_slice(&places);
+    }
+    if is_whole(chain, low, high) {
+        return Ok(Reformed::Whole { double_passes: MAX_DOUBLE_PASSES });
+    }
     let off_m = chain.max_rod_violation_m();
     chain.points_mut().copy_from_slice(&before);
     Ok(Reformed::NotReached { off_m })
+}
+
+/// Whether all rods between two connectors are within their limits.
+fn is_whole<const D: usize>(chain: &Chain<D>, low: usize, high: usize) -> bool {
+    (low..high).all(|i| fits(chain.rods()[i], chain.length_m(i)))
+}
+
+/// Returns the least number of rods, each as long as the longest, that fill a gap.
+fn missing(rods: &[Rod], gap_m: f64) -> usize {
+    let longest_m = rods.iter().map(|rod| rod.max_m).fold(0.0, f64::max);
+    // A gap of a whole number of rods is no part longer because of rounding.
+    ((gap_m - LENGTH_TOLERANCE_M) / longest_m).ceil().max(1.0) as usize
 }
 
 /// Lays the parts on the straight line between the stubs if they only just reach across the gap,
@@ -221,13 +250,56 @@ mod tests {
         }
         let before = chain.clone();
         let told = reform(&mut chain, 18..=21, MayCome::Nobody).unwrap();
-        let Reformed::GapTooLong { have_m, need_m } = told else { panic!("{told:?}") };
+        let Reformed::GapTooLong { have_m, need_m, missing } = told else { panic!("{told:?}") };
         assert!((have_m - 5.5).abs() < 1e-12 && (need_m - 7.0).abs() < 1e-12);
+        assert_eq!(missing, 2, "1.5 m of rods of 1.1 m");
         assert_eq!(chain, before);
         let came = reform(&mut chain, 18..=21, MayCome::Last).unwrap();
         assert!(matches!(came, Reformed::Whole { .. }), "{came:?}");
         assert!(chain.max_rod_violation_m() <= 1e-9);
         assert_eq!(chain.points()[..18], before.points()[..18]);
         assert!(reform(&mut chain, 0..=3, MayCome::Nobody).is_err());
+    }
+
+    /// Chains of which parts are wanting, so that those left reach across the gap with `part` of
+    /// their length.
+    fn wanting<const D: usize>(seed: u64, part: f64) -> Chain<D> {
+        let mut numbers = Numbers::new(seed);
+        let parts = 3 + seed as usize % 18;
+        let gap_m = part * 1.1 * (parts + 1) as f64;
+        let mut points: Vec<Point<D>> = (0..parts + 6).map(|_| numbers.point(5.0)).collect();
+        for k in 0..3 {
+            for (at, x_m) in [(k, k as f64), (parts + 3 + k, 2.0 + gap_m + k as f64)] {
+                points[at] = [0.0; D];
+                points[at][0] = x_m;
+            }
+        }
+        let n = points.len();
+        let rod = Rod { min_m: 0.9, max_m: 1.1, radius_m: 0.0 };
+        Chain::broken(points, vec![Connector::free(0.0); n], vec![rod; n - 1]).unwrap()
+    }
+
+    #[test]
+    fn all_that_just_reach_are_joined_and_all_that_do_not_are_refused() {
+        for seed in 0..400 {
+            let part = 1.01 - 0.02 * (seed as f64 / 400.0) * (seed as f64 / 400.0);
+            let mut chain = wanting::<2>(seed, part);
+            let scattered = 3..=chain.points().len() - 4;
+            let came = reform(&mut chain, scattered, MayCome::Nobody).unwrap();
+            let reaches = part <= 1.0;
+            assert_eq!(matches!(came, Reformed::Whole { .. }), reaches, "{seed}: {part}, {came:?}");
+            assert!(!reaches || chain.max_rod_violation_m() <= 1e-9);
+        }
+    }
+
+    /// Passes along a line never leave it, so they cannot fold rods of fixed length.
+    #[test]
+    fn parts_on_a_line_fold_where_they_are_too_long_for_the_gap() {
+        let rod = Rod::fixed(1.0, 0.0);
+        let points: Vec<Point<3>> = (0..8).map(|i| [0.7 * i as f64, 0.0, 0.0]).collect();
+        let mut chain = Chain::broken(points, vec![Connector::free(0.0); 8], vec![rod; 7]).unwrap();
+        let came = reform(&mut chain, 1..=6, MayCome::Nobody).unwrap();
+        assert!(matches!(came, Reformed::Whole { .. }), "{came:?}");
+        assert!(chain.max_rod_violation_m() <= 1e-9);
     }
 }

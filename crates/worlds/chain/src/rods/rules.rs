@@ -24,6 +24,9 @@ pub struct Rules {
     pub self_collision: bool,
     /// Longest move of a slave in one sub-step, meters; infinite for no limit.
     pub slave_step_max_m: f64,
+    /// Longest move of any connector in one request that a fixed base answers, meters; infinite for
+    /// no limit. Near singular postures the initiator goes as much less far as that takes.
+    pub joint_step_max_m: f64,
     /// Number of times that one sweep may try another direction for an earlier slave.
     pub backtracks: usize,
     /// Longest move of an initiator in one sub-step, meters. By default it is a quarter of the
@@ -37,6 +40,7 @@ impl Default for Rules {
             rotation: Rotation::Union,
             self_collision: false,
             slave_step_max_m: f64::INFINITY,
+            joint_step_max_m: f64::INFINITY,
             backtracks: 64,
             step_m: None,
         }

@@ -11,8 +11,9 @@
 
 use super::candidates::{clamped, guided};
 use super::chain::{Chain, Rod, is_in_range, out_of_range};
-use super::geometry::Point;
+use super::geometry::{Point, distance, dot, sub};
 use super::propagate::Propagator;
+use super::scene::fits;
 use super::veto::Request;
 use super::{Obstacles, Rules};
 use sidestep_kernel::InputError;
@@ -46,7 +47,7 @@ pub fn pull_first<const D: usize>(
     let mut propagator = Propagator::new(Rules::default());
     for group in heads.chunks(LANES) {
         if group.len() >= WORTH_IT {
-            pull_lanes(chain, group);
+            pull_lanes::<D, false>(chain, group);
             continue;
         }
         for head in group {
@@ -54,6 +55,23 @@ pub fn pull_first<const D: usize>(
         }
     }
     Ok(())
+}
+
+/// Measures of several motions, as if the chain had been measured after each.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Measured {
+    /// Connectors that have changed, the initiator included, summed over the motions.
+    pub(crate) changed: u64,
+    /// Longest way of a connector other than the initiator, meters.
+    pub(crate) longest_m: f64,
+    /// Greatest amount by which a rod that moved was outside its limits, meters.
+    pub(crate) max_rod_violation_m: f64,
+}
+
+/// Moves the first connector of a plain chain through at most [`LANES`] heads, each farther from the
+/// one before than the least move.
+pub(crate) fn pull_measured<const D: usize>(chain: &mut Chain<D>, heads: &[Point<D>]) -> Measured {
+    pull_lanes::<D, true>(chain, heads)
 }
 
 /// One coordinate of the connectors that lanes are at: lane `w` has its slave at `w` and its
@@ -105,84 +123,198 @@ impl Limits {
     }
 }
 
-/// Computes the reaction of every lane's slave: [`guided`], lane by lane. Before the call, `next`
-/// holds the positions of one connector ago; after it, those of the slaves that now become masters.
-#[inline]
-fn react<const D: usize>(now: &Front<D>, next: &mut Front<D>, limits: &Limits, least_move_m: f64) {
-    let mut g = [[0.0; LANES]; D];
-    let mut square = [0.0; LANES];
-    for i in 0..D {
-        for w in 0..LANES {
-            g[i][w] = now.rows[i][w] - now.rows[i][w + 1];
-            square[w] += g[i][w] * g[i][w];
-        }
-    }
-    let d = square.map(f64::sqrt);
-    if any(d.map(|d| d == 0.0)) {
-        return react_one_by_one(now, next, limits, least_move_m);
-    }
-    let (mut part, mut stays) = ([0.0; LANES], [false; LANES]);
-    for w in 0..LANES {
-        let t = clamped(d[w], limits.min_m[w], limits.max_m[w]);
-        stays[w] = (t - d[w]).abs() <= least_move_m;
-        part[w] = t / d[w];
-    }
-    for i in 0..D {
-        for w in 0..LANES {
-            next.rows[i][w + 1] = now.rows[i][w + 1] + g[i][w] * part[w];
-        }
-    }
-    if any(stays) {
-        for w in (0..LANES).filter(|&w| stays[w]) {
-            next.set(w + 1, now.get(w));
-        }
-    }
-}
-
-/// Whether any lane is true; looks at all lanes at once, because a search would branch at each.
-#[inline]
-fn any(lanes: [bool; LANES]) -> bool {
-    lanes.iter().fold(false, |any, &is| any | is)
-}
-
-#[cold]
-fn react_one_by_one<const D: usize>(
-    now: &Front<D>,
-    next: &mut Front<D>,
-    limits: &Limits,
+/// The motions of a group: lane `w` makes motion `w`.
+struct Motions<const D: usize, const MEASURES: bool> {
+    /// Number of motions.
+    n: usize,
+    /// Number of connectors.
+    connectors: usize,
+    limits: Limits,
     least_move_m: f64,
-) {
-    // Downward, because lane w - 1 still needs its master's old position, at w - 1.
-    for w in (0..LANES).rev() {
-        let places = [next.get(w), now.get(w + 1), now.get(w)];
-        let rod = Rod { min_m: limits.min_m[w], max_m: limits.max_m[w], radius_m: 0.0 };
-        next.set(w + 1, guided(places, rod, least_move_m));
+    /// Whether a lane's last slave stayed, and whether its motion has ended.
+    rests: [bool; LANES],
+    ended: [bool; LANES],
+    /// Measures by lane: the square of the longest way, and the greatest violation.
+    longest2: [f64; LANES],
+    violation_m: [f64; LANES],
+    changed: u64,
+}
+
+impl<const D: usize, const MEASURES: bool> Motions<D, MEASURES> {
+    fn new(chain: &Chain<D>, n: usize) -> Self {
+        Self {
+            n,
+            connectors: chain.points().len(),
+            limits: Limits { min_m: [1.0; LANES], max_m: [1.0; LANES], alike: LANES },
+            least_move_m: chain.least_move_m(),
+            rests: [false; LANES],
+            ended: [false; LANES],
+            longest2: [0.0; LANES],
+            violation_m: [0.0; LANES],
+            changed: n as u64,
+        }
+    }
+
+    /// Whether a lane is at a slave when lane 0 is at connector `j`.
+    fn is_at_slave(&self, w: usize, j: usize) -> bool {
+        w < self.n && w < j && j - w < self.connectors
+    }
+
+    /// Computes the reaction of every lane's slave when lane 0 is at connector `j`: [`guided`], lane
+    /// by lane. Before the call, `next` holds the positions of one connector ago; after it, those of
+    /// the slaves that now become masters.
+    #[inline]
+    fn react(&mut self, now: &Front<D>, next: &mut Front<D>, j: usize) {
+        let mut g = [[0.0; LANES]; D];
+        let mut square = [0.0; LANES];
+        for i in 0..D {
+            for w in 0..LANES {
+                g[i][w] = now.rows[i][w] - now.rows[i][w + 1];
+                square[w] += g[i][w] * g[i][w];
+            }
+        }
+        let d = square.map(f64::sqrt);
+        let (mut part, mut stays) = ([0.0; LANES], [false; LANES]);
+        for w in 0..LANES {
+            let t = clamped(d[w], self.limits.min_m[w], self.limits.max_m[w]);
+            stays[w] = (t - d[w]).abs() <= self.least_move_m || d[w] == 0.0;
+            part[w] = t / d[w];
+        }
+        let mut new = [[0.0; LANES]; D];
+        let mut same = [true; LANES];
+        for i in 0..D {
+            for w in 0..LANES {
+                new[i][w] = now.rows[i][w + 1] + g[i][w] * part[w];
+                same[w] &= new[i][w] == now.rows[i][w];
+            }
+        }
+        if !self.all_move(&stays, &same, j) {
+            return self.react_one_by_one(now, next, j);
+        }
+        for i in 0..D {
+            next.rows[i][1..].copy_from_slice(&new[i]);
+        }
+        if MEASURES {
+            self.measure(now, &new);
+        }
+    }
+
+    /// Whether every lane is at a slave that moves; looks at all lanes at once, because a search
+    /// would branch at each.
+    #[inline]
+    fn all_move(&self, stays: &[bool; LANES], same: &[bool; LANES], j: usize) -> bool {
+        let mut still = false;
+        for w in 0..LANES {
+            still |= w < self.n && (stays[w] | same[w] | self.rests[w] | self.ended[w]);
+        }
+        !still && j >= self.n && j < self.connectors
+    }
+
+    /// Measures all lanes at once.
+    #[inline]
+    fn measure(&mut self, now: &Front<D>, new: &[[f64; LANES]; D]) {
+        let (mut way2, mut length2) = ([0.0; LANES], [0.0; LANES]);
+        for i in 0..D {
+            for w in 0..LANES {
+                let (way, rod) = (new[i][w] - now.rows[i][w], now.rows[i][w + 1] - new[i][w]);
+                way2[w] += way * way;
+                length2[w] += rod * rod;
+            }
+        }
+        for w in 0..LANES {
+            let length_m = length2[w].sqrt();
+            let outside_m = (length_m - self.limits.max_m[w]).max(self.limits.min_m[w] - length_m);
+            self.violation_m[w] = self.violation_m[w].max(outside_m);
+            self.longest2[w] = self.longest2[w].max(way2[w]);
+        }
+        self.changed += self.n as u64;
+    }
+
+    /// The same by single lanes, some of which rest, have ended, or are at no slave.
+    #[cold]
+    fn react_one_by_one(&mut self, now: &Front<D>, next: &mut Front<D>, j: usize) {
+        // Downward, because lane w - 1 still needs its master's old position, at w - 1.
+        for w in (0..LANES).rev() {
+            if !self.is_at_slave(w, j) {
+                next.set(w + 1, now.get(w));
+                continue;
+            }
+            let [mo, mn, so] = [next.get(w), now.get(w + 1), now.get(w)];
+            let rod =
+                Rod { min_m: self.limits.min_m[w], max_m: self.limits.max_m[w], radius_m: 0.0 };
+            // As a sweep ends: at a slave that stays, if the rod beyond is good as it is.
+            self.ended[w] |= self.rests[w] && fits(rod, distance(mn, so));
+            if self.ended[w] {
+                next.set(w + 1, so);
+                continue;
+            }
+            let new = guided([mo, mn, so], rod, self.least_move_m);
+            self.rests[w] = new == so;
+            next.set(w + 1, new);
+            if MEASURES {
+                self.measure_one(w, [mn, so, new], rod);
+            }
+        }
+    }
+
+    fn measure_one(&mut self, w: usize, [mn, so, new]: [Point<D>; 3], rod: Rod) {
+        let (way, length_m) = (sub(new, so), distance(mn, new));
+        let outside_m = (length_m - rod.max_m).max(rod.min_m - length_m);
+        self.violation_m[w] = self.violation_m[w].max(outside_m);
+        self.longest2[w] = self.longest2[w].max(dot(way, way));
+        self.changed += u64::from(new != so);
+    }
+
+    /// Whether no motion goes on.
+    fn have_ended(&self) -> bool {
+        self.ended[..self.n].iter().all(|&ended| ended)
+    }
+
+    fn measured(&self) -> Measured {
+        let most = |by_lane: &[f64]| by_lane[..self.n].iter().copied().fold(0.0, f64::max);
+        Measured {
+            changed: self.changed,
+            longest_m: most(&self.longest2).sqrt(),
+            max_rod_violation_m: most(&self.violation_m),
+        }
     }
 }
 
 /// Makes as many motions as there are heads, at most one per lane. Lanes without a head, not yet at
-/// a connector, or past the last one compute values that nothing reads.
-fn pull_lanes<const D: usize>(chain: &mut Chain<D>, heads: &[Point<D>]) {
-    let least_move_m = chain.least_move_m();
+/// a connector, or past the last one hold values that nothing reads.
+fn pull_lanes<const D: usize, const MEASURES: bool>(
+    chain: &mut Chain<D>,
+    heads: &[Point<D>],
+) -> Measured {
+    let n = heads.len();
+    let mut motions = Motions::<D, MEASURES>::new(chain, n);
     let (points, rods) = chain.parts_mut();
     let nobody = Rod { min_m: 1.0, max_m: 1.0, radius_m: 0.0 };
-    let mut limits = Limits { min_m: [1.0; LANES], max_m: [1.0; LANES], alike: LANES };
     let (mut now, mut next) = (Front::nobody(), Front::nobody());
-    for j in 0..points.len() + heads.len() - 1 {
+    for j in 0..points.len() + n - 1 {
         // Past the last, never at the place before, so that no rod has length zero.
         let beyond = || super::geometry::scaled(super::geometry::first_axis(), 4.0 * j as f64);
         now.set(0, points.get(j).copied().unwrap_or_else(beyond));
-        limits.shift(rods.get(j.wrapping_sub(1)).copied().unwrap_or(nobody));
-        react(&now, &mut next, &limits, least_move_m);
+        motions.limits.shift(rods.get(j.wrapping_sub(1)).copied().unwrap_or(nobody));
+        motions.react(&now, &mut next, j);
         if let Some(head) = heads.get(j) {
             // Lane j is at connector 0, which goes to its head.
             next.set(j + 1, *head);
         }
-        if j + 1 >= heads.len() {
-            points[j + 1 - heads.len()] = next.get(heads.len());
+        if j + 1 >= n {
+            points[j + 1 - n] = next.get(n);
+            if motions.have_ended() {
+                // Nothing changes what earlier lanes have left behind.
+                let count = points.len();
+                for w in (0..n - 1).filter(|&w| j - w < count) {
+                    points[j - w] = next.get(w + 1);
+                }
+                break;
+            }
         }
         std::mem::swap(&mut now, &mut next);
     }
+    motions.measured()
 }
 
 #[cfg(test)]
@@ -209,8 +341,59 @@ mod tests {
             let request = Request::exact(0, *head);
             propagator.propagate(&mut one_by_one, &Obstacles::default(), &request).unwrap();
         }
+        let start = at_once.clone();
         pull_first(&mut at_once, &heads).unwrap();
         assert_eq!(at_once.points(), one_by_one.points());
+        measures_as_single_motions_do(start, &heads);
+    }
+
+    /// What lanes measure is what is measured motion by motion.
+    fn measures_as_single_motions_do<const D: usize>(start: Chain<D>, heads: &[Point<D>]) {
+        for group in heads.chunks(LANES) {
+            let (mut at_once, mut single) = (start.clone(), start.clone());
+            let mut expected = Measured::default();
+            for head in group {
+                let request = Request::exact(0, *head);
+                let mut propagator = Propagator::default();
+                let outcome =
+                    propagator.propagate(&mut single, &Obstacles::default(), &request).unwrap();
+                let moved = outcome.moved().unwrap();
+                expected.changed += moved.changed as u64;
+                expected.longest_m = expected.longest_m.max(moved.max_slave_step_m);
+                expected.max_rod_violation_m =
+                    expected.max_rod_violation_m.max(single.max_rod_violation_m());
+            }
+            let measured = pull_measured(&mut at_once, group);
+            assert_eq!(at_once.points(), single.points());
+            assert_eq!(measured.changed, expected.changed);
+            assert_eq!(measured.longest_m.to_bits(), expected.longest_m.to_bits());
+            // Rods that nothing moved are measured once, before.
+            let most_m = measured.max_rod_violation_m.max(start.max_rod_violation_m());
+            let expected_m = expected.max_rod_violation_m.max(start.max_rod_violation_m());
+            assert_eq!(most_m.to_bits(), expected_m.to_bits());
+        }
+    }
+
+    /// A motion ends at the first slave that need not move, though rods beyond it may be off by less
+    /// than the tolerance.
+    #[test]
+    fn lanes_end_where_single_motions_end() {
+        let rod = Rod { min_m: 0.5, max_m: 1.0, radius_m: 0.0 };
+        let points: Vec<_> = (0..40).map(|i| [-(1.0 + 1e-11) * f64::from(i), 0.0]).collect();
+        let mut points_slack = points.clone();
+        points_slack[..20].iter_mut().for_each(|p| p[0] *= 0.8);
+        points_slack[20..].iter_mut().for_each(|p| p[0] += 4.0);
+        let connectors = vec![Connector::free(0.0); 40];
+        let start = Chain::new(points_slack, connectors, vec![rod; 39]).unwrap();
+        let heads: Vec<_> = (1..=9).map(|k| [0.05 * f64::from(k), 0.0]).collect();
+        let (mut at_once, mut single) = (start.clone(), start.clone());
+        pull_first(&mut at_once, &heads).unwrap();
+        for head in &heads {
+            let request = Request::exact(0, *head);
+            Propagator::default().propagate(&mut single, &Obstacles::default(), &request).unwrap();
+        }
+        assert_eq!(at_once.points(), single.points());
+        assert_eq!(at_once.points()[30..], start.points()[30..]);
     }
 
     proptest! {

@@ -222,7 +222,7 @@ impl<const D: usize> Compiler<'_, D> {
         way_m: f64,
         at: Range<usize>,
     ) -> Result<(), InputError> {
-        let step_m = self.rules(None).step_m.unwrap_or(chain.step_m());
+        let step_m = self.rules(None, f64::INFINITY).step_m.unwrap_or(chain.step_m());
         if way_m <= MAX_STEPS * step_m {
             return Ok(());
         }

@@ -14,6 +14,8 @@ use toml::Spanned;
 const SPEED_M_S: f64 = 0.5;
 /// Distance at which a target counts as reached, meters.
 const TOLERANCE_M: f64 = 1e-3;
+/// Time without coming nearer to a target after which a way is planned, s.
+const PLANS_AFTER_S: f64 = 0.5;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -23,6 +25,16 @@ enum Kind {
     Script,
     Targets,
     Navigate,
+}
+
+/// The planner of ways among obstacles.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum PlannerWord {
+    /// Local rules only.
+    None,
+    /// Two trees of postures that grow toward each other.
+    RrtConnect,
 }
 
 #[derive(Debug, Deserialize)]
@@ -41,6 +53,8 @@ pub(super) struct TaskSection<const D: usize> {
     targets_m: Option<Vec<Place<D>>>,
     tolerance_m: Option<Measure>,
     navigator: Option<Spanned<NavigatorSection>>,
+    planner: Option<PlannerWord>,
+    plans_after_s: Option<Measure>,
 }
 
 impl<const D: usize> TaskSection<D> {
@@ -51,6 +65,11 @@ impl<const D: usize> TaskSection<D> {
 
     fn speed_m_s(&self) -> f64 {
         self.speed_m_s.map_or(SPEED_M_S, f64::from)
+    }
+
+    /// Whether it plans ways.
+    pub(super) fn plans(&self) -> bool {
+        self.planner == Some(PlannerWord::RrtConnect)
     }
 
     /// Whether it drives on wheels.
@@ -77,6 +96,7 @@ impl<const D: usize> Compiler<'_, D> {
             speed_m_s: s.speed_m_s(),
             lasts_s: s.lasts_s.map_or(f64::INFINITY, f64::from),
             patience_s: s.patience_s.map_or(5.0, f64::from),
+            plans_after_s: s.plans().then(|| s.plans_after_s.map_or(PLANS_AFTER_S, f64::from)),
             driver: self.driver(s, at)?,
         })
     }
@@ -165,9 +185,12 @@ impl<const D: usize> Compiler<'_, D> {
             ("targets_m", s.targets_m.is_some(), Kind::Targets),
             ("tolerance_m", s.tolerance_m.is_some(), Kind::Targets),
             ("navigator", s.navigator.is_some(), Kind::Navigate),
+            ("planner", s.planner.is_some(), Kind::Targets),
         ];
         let keys = keys.map(|(key, is_given, kind)| (key, is_given, kind == s.kind));
         let of = format!("in a task of kind {:?}", s.kind).to_lowercase();
-        self.has_no_idle_key(&keys, &of, at)
+        self.has_no_idle_key(&keys, &of, at.clone())?;
+        let keys = [("plans_after_s", s.plans_after_s.is_some(), s.plans())];
+        self.has_no_idle_key(&keys, "without a planner", at)
     }
 }

@@ -157,6 +157,16 @@ impl Follower {
     }
 }
 
+/// Returns the part of its speed at which a leader may go, given the largest lag of a follower: it
+/// slows down from half the limit on.
+///
+/// A connector that is pulled round a sharp corner goes up to three times as fast as the leader,
+/// too fast for wheels. A late follower cuts the corner and gets stuck there. Therefore each robot
+/// reports its lag to the robot before it, as it would report a veto, and the leader slows down.
+pub(crate) fn pace(worst_lag_m: f64, limit_m: f64) -> f64 {
+    (2.0 - 2.0 * worst_lag_m / limit_m).clamp(0.0, 1.0)
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::ray::tests::any_core;

@@ -38,6 +38,18 @@ pub enum Layer {
     KeepMoving = 6,
 }
 
+impl Layer {
+    /// All layers, layer 1 first.
+    pub const ALL: [Self; 6] = [
+        Self::CloseLeft,
+        Self::CloseRight,
+        Self::FarLeft,
+        Self::FarRight,
+        Self::TargetCheck,
+        Self::KeepMoving,
+    ];
+}
+
 /// The rule for when a wall counts as being left. The slides do not say.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Leaving {

@@ -7,24 +7,19 @@
 //! ```text
 //! leader.rs:    perceive (laser.rs, ray.rs) -> Percept -> decide -> wheels and the layer that acted
 //! follower.rs:  perceive (proximity.rs)     -> gaps    -> decide -> wheels
-//! drive.rs:     wheels -> pose              convoy.rs: all of it, a tick at a time
-//!                                           measures.rs: sums over a run
+//! drive.rs:     wheels -> pose
 //! ```
+//!
+//! `act/` lets them act in a run; `convoy/` is a run of one swarm without a scenario.
 
-pub(crate) mod convoy;
 pub mod drive;
 pub(crate) mod follower;
 pub mod laser;
 pub mod leader;
-pub(crate) mod measures;
 pub(crate) mod proximity;
 pub(crate) mod ray;
-#[cfg(test)]
-mod tests;
 
-pub use convoy::{Convoy, Plan};
 pub use drive::{Drive, Pose, Wheels};
 pub use follower::Follower;
 pub use laser::{Body, Laser, Scan};
 pub use leader::{Leader, Leaving, Percept};
-pub use measures::Measures;

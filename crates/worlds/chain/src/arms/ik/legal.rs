@@ -10,16 +10,16 @@ use std::f64::consts::PI;
 
 /// A chain and its constraints.
 #[derive(Clone, Copy)]
-pub(super) struct Judge<'a, const D: usize> {
-    pub(super) chain: &'a Chain<D>,
-    pub(super) obstacles: &'a Obstacles<D>,
-    pub(super) self_collision: bool,
+pub(in crate::arms) struct Judge<'a, const D: usize> {
+    pub(in crate::arms) chain: &'a Chain<D>,
+    pub(in crate::arms) obstacles: &'a Obstacles<D>,
+    pub(in crate::arms) self_collision: bool,
 }
 
 impl<const D: usize> Judge<'_, D> {
     /// Returns the first objection to a posture, in the order of the connectors. Parts that are
     /// where they were in the chain are not judged.
-    pub(super) fn objection(&self, points: &[Point<D>], k: usize) -> Option<Veto<D>> {
+    pub(in crate::arms) fn objection(&self, points: &[Point<D>], k: usize) -> Option<Veto<D>> {
         let veto =
             |(by, reason, obstacle)| Veto { by, from: k, reason, obstacle, reached: points[k] };
         (0..points.len())

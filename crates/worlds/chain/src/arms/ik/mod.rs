@@ -21,7 +21,7 @@ mod direct;
 mod dls;
 mod goal;
 mod guarded;
-mod legal;
+pub(super) mod legal;
 mod limb;
 mod motion;
 mod relax;

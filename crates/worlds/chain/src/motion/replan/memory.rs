@@ -1,6 +1,8 @@
 //! The memory of a ladder from tick to tick.
 
+use super::Rungs;
 use crate::rods::geometry::Point;
+use crate::rods::veto::Source;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::math::atan2;
 use std::collections::VecDeque;
@@ -67,6 +69,19 @@ impl Memory {
         if self.best_m.is_none_or(|best_m| goal_m < best_m - CELL_M) {
             self.best_m = Some(goal_m);
             self.hand_overs = 0;
+        }
+    }
+
+    /// Whether the other end leads.
+    pub(crate) fn is_pulling_back(&self) -> bool {
+        self.pulling_back > 0
+    }
+
+    /// Notes a motion as wanted, to which nothing could object.
+    pub(crate) fn was_free(&mut self, source: Source, goal_m: Option<f64>, rungs: &Rungs) {
+        if source == Source::Autonomous {
+            self.note_goal(goal_m);
+            self.went_straight(rungs.straight);
         }
     }
 

@@ -35,6 +35,7 @@ use crate::rods::veto::Source;
 use crate::scenes::{Numbers, Wanderer, ball_field, clearance_m, own_clearance_m};
 use proptest::prelude::*;
 
+mod apart;
 mod corridor;
 mod degenerate;
 mod laws;

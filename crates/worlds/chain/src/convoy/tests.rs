@@ -1,15 +1,10 @@
 //! Whole runs: the leader alone, and with its followers (slides E2, N6).
 
-use super::convoy::{Convoy, Plan};
-use super::drive::{Drive, Pose};
-use super::laser::{LASER_NOISE, Laser};
-use super::leader::{Leaving, Turning};
-use super::measures::Measures;
-use crate::rods::geometry::{Point, distance};
-use crate::rods::{Obstacle, Obstacles};
+use super::*;
+use crate::rods::Obstacle;
 use crate::scenes::{Numbers, corridor_line, corridor_walls};
-use sidestep_kernel::Seed;
-use sidestep_kernel::stream::Streams;
+use crate::swarm::Laser;
+use crate::swarm::leader::{Leaving, Turning};
 use std::f64::consts::PI;
 
 struct Course {
@@ -57,16 +52,15 @@ struct Run {
 
 fn run(plan: Plan, start: Pose, course: &Course, seed: u64) -> Run {
     let dt_s = plan.dt_s;
-    let mut convoy = Convoy::new(plan, start).unwrap();
-    let streams = Streams::new(Seed(seed));
+    let (obstacles, target) = (course.obstacles.clone(), course.target);
+    let mut convoy = Convoy::new(plan, start, Surroundings { obstacles, target, seed }).unwrap();
     let mut measures = Measures::default();
     let mut arrived = false;
-    for cycle in 0..(course.limit_s / dt_s) as u64 {
-        let mut noise = streams.draws(0, cycle, LASER_NOISE);
-        let tick = convoy.tick(&course.obstacles, course.target, &mut noise).unwrap();
+    for _ in 0..(course.limit_s / dt_s) as u64 {
+        let tick = convoy.tick();
         measures.note(&convoy, &course.obstacles, &tick);
         assert!(convoy.chain().max_rod_violation_m() <= 1e-9);
-        arrived = distance(convoy.leader().pose.at, course.finish) <= course.finish_radius_m;
+        arrived = distance(convoy.leader().at, course.finish) <= course.finish_radius_m;
         if arrived {
             break;
         }
@@ -253,7 +247,7 @@ fn a_leader_that_is_blocked_stands_or_turns_on_the_spot() {
         plan.leader.turning = turning;
         let Run { measures, convoy, .. } = run(plan, at(0.0, 0.0), &course, 1);
         assert!(measures.leader_clearance_m >= -1e-9 && measures.vetoes > 100);
-        let pose = convoy.leader().pose;
+        let pose = convoy.leader();
         assert!(pose.at[0].abs() <= 0.05 + 1e-6 && pose.at[1].abs() <= 0.05 + 1e-6);
         assert_eq!(measures.vetoes < measures.ticks - 50, turns, "{measures:?}");
     }

@@ -1,6 +1,6 @@
 //! Measures of a convoy's run.
 
-use super::convoy::{Convoy, Tick};
+use super::{Convoy, Tick};
 use crate::rods::Obstacles;
 use crate::rods::geometry::{Point, distance};
 
@@ -63,7 +63,7 @@ impl Measures {
     pub fn note(&mut self, convoy: &Convoy, obstacles: &Obstacles<2>, tick: &Tick) {
         self.ticks += 1;
         self.layers[tick.layer as usize - 1] += 1;
-        self.vetoes += usize::from(tick.veto.is_some());
+        self.vetoes += usize::from(tick.is_vetoed);
         self.slowed += usize::from(tick.pace < 1.0);
         self.bumped += tick.bumped;
         self.held += tick.held;
@@ -72,7 +72,7 @@ impl Measures {
         let radius_m = plan.follower.ring.radius_m;
         let air_m = |at: Point<2>, radius_m| obstacles.clearance_m([at; 2], radius_m, 1.0);
         self.leader_clearance_m = self.leader_clearance_m.min(air_m(points[0], radius_m));
-        let mut ahead = convoy.leader().pose;
+        let mut ahead = convoy.leader();
         for (i, follower) in (1..).zip(convoy.followers()) {
             let body_m = air_m(follower.at, radius_m);
             self.follower_clearance_m = self.follower_clearance_m.min(body_m);

@@ -1,0 +1,139 @@
+//! Postures of a chain with a fixed base, and the straight way between two.
+
+use super::Posture;
+use crate::arms::ik::legal::Judge;
+use crate::rods::chain::Chain;
+use crate::rods::geometry::{
+    Point, add, along, between, distance, first_axis, norm, norm2, scaled, sub, unit,
+};
+use crate::rods::obstacle::Obstacles;
+use sidestep_kernel::InputError;
+use sidestep_kernel::distr::normal;
+use sidestep_kernel::stream::Draws;
+use std::f64::consts::PI;
+
+/// The postures of one chain among obstacles.
+pub(crate) struct Space<'a, const D: usize> {
+    judge: Judge<'a, D>,
+    /// The connectors from the one that keeps its place outward, to the end of the chain.
+    limb: Vec<usize>,
+    k: usize,
+    /// Longest way of a connector between two postures that are checked, meters.
+    step_m: f64,
+}
+
+impl<'a, const D: usize> Space<'a, D> {
+    /// Returns the postures that connector `k` can bring a chain to.
+    ///
+    /// # Errors
+    /// When no other connector keeps its place.
+    pub(crate) fn new(
+        chain: &'a Chain<D>,
+        obstacles: &'a Obstacles<D>,
+        self_collision: bool,
+        k: usize,
+    ) -> Result<Self, InputError> {
+        let n = chain.points().len();
+        let is_still = |i: &usize| chain.connectors()[*i].is_still();
+        let below = (0..k).rev().find(is_still);
+        let limb = match (below, (k + 1..n).find(is_still)) {
+            (Some(base), _) => (base..n).collect(),
+            (None, Some(base)) => (0..=base).rev().collect(),
+            (None, None) => {
+                let remedy = "give a connector mobility = \"fixed\"";
+                return Err(InputError::new("planner", "the chain has no fixed base", remedy));
+            }
+        };
+        let judge = Judge { chain, obstacles, self_collision };
+        Ok(Self { judge, limb, k, step_m: chain.step_m() })
+    }
+
+    /// Returns the present posture.
+    pub(crate) fn present(&self) -> Posture<D> {
+        self.judge.chain.points().to_vec()
+    }
+
+    pub(super) fn base(&self) -> usize {
+        self.limb[0]
+    }
+
+    /// Returns the length of the limb when it is stretched out, meters.
+    pub(super) fn length_m(&self) -> f64 {
+        let rods = self.limb.windows(2);
+        rods.map(|pair| self.judge.chain.rod_between(pair[0], pair[1]).max_m).sum()
+    }
+
+    /// Whether a posture is good in itself.
+    pub(super) fn is_free(&self, posture: &[Point<D>]) -> bool {
+        self.judge.objection(posture, self.k).is_none()
+    }
+
+    /// Returns the longest way of a connector between two postures, meters.
+    pub(crate) fn apart_m(&self, a: &[Point<D>], b: &[Point<D>]) -> f64 {
+        self.limb.iter().map(|&i| distance(a[i], b[i])).fold(0.0, f64::max)
+    }
+
+    /// Returns a measure of nearness: the sum of the squared ways of all connectors.
+    pub(super) fn spread2(&self, a: &[Point<D>], b: &[Point<D>]) -> f64 {
+        self.limb.iter().map(|&i| norm2(sub(a[i], b[i]))).sum()
+    }
+
+    /// Returns the posture at a part of the straight way from one to another: every rod turns and
+    /// changes its length evenly.
+    pub(crate) fn at(&self, a: &[Point<D>], b: &[Point<D>], part: f64) -> Posture<D> {
+        if part >= 1.0 {
+            return b.to_vec();
+        }
+        let mut posture = a.to_vec();
+        for pair in self.limb.windows(2) {
+            let [inner, outer] = [pair[0], pair[1]];
+            let [from, to] = [a, b].map(|points| sub(points[outer], points[inner]));
+            let [from_m, to_m] = [norm(from), norm(to)];
+            let mean = between(scaled(from, 1.0 / from_m), scaled(to, 1.0 / to_m), part);
+            // Opposite directions have no mean; just beside it they turn one way or the other.
+            let u = unit(mean).or(unit(from)).unwrap_or(first_axis());
+            posture[outer] = along(posture[inner], u, from_m + part * (to_m - from_m));
+        }
+        posture
+    }
+
+    /// Whether the chain can go straight from one good posture to another.
+    pub(crate) fn is_way_free(&self, a: &[Point<D>], b: &[Point<D>]) -> bool {
+        let n = (self.apart_m(a, b) / self.step_m).ceil().max(1.0) as usize;
+        let mut before = a.to_vec();
+        (1..=n).all(|step| {
+            let next = self.at(a, b, step as f64 / n as f64);
+            // Rods that nearly turn round jump in between.
+            let is_near = self.apart_m(&before, &next) <= MOST_STEPS * self.step_m;
+            before = next;
+            is_near && self.is_free(&before)
+        })
+    }
+
+    /// Returns any posture, good or not: a walk of random stiffness.
+    pub(super) fn any(&self, draws: &mut Draws) -> Posture<D> {
+        let mut posture = self.present();
+        let stiffness = STIFFNESS[draws.below(STIFFNESS.len() as u32) as usize];
+        let mut u: Point<D> = direction(draws);
+        for pair in self.limb.windows(2) {
+            let [inner, outer] = [pair[0], pair[1]];
+            let rod = self.judge.chain.rod_between(inner, outer);
+            let length_m = rod.min_m + draws.uniform() * (rod.max_m - rod.min_m);
+            posture[outer] = along(posture[inner], u, length_m);
+            let side = scaled(direction(draws), stiffness * PI);
+            u = unit(add(u, side)).unwrap_or(u);
+        }
+        posture
+    }
+}
+
+/// Longest way of a connector between two postures that are checked, in steps: turning evenly, the
+/// middle of a wide turn is faster than its ends.
+const MOST_STEPS: f64 = 3.0;
+/// How much a rod of a random posture may differ in direction from the one before.
+const STIFFNESS: [f64; 4] = [0.05, 0.15, 0.3, 1.0];
+
+fn direction<const D: usize>(draws: &mut Draws) -> Point<D> {
+    let drawn: Point<D> = std::array::from_fn(|_| normal(draws));
+    unit(drawn).unwrap_or(first_axis())
+}

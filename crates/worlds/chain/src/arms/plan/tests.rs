@@ -1,0 +1,73 @@
+//! Ways among obstacles, each checked posture by posture by another measure than the planner's.
+
+use super::*;
+use crate::rods::chain::{Connector, Mobility, Rod};
+use crate::rods::obstacle::Obstacle;
+use crate::scenes::clearance_m;
+use sidestep_kernel::Seed;
+use sidestep_kernel::stream::{Purpose, Streams};
+
+fn draws(seed: u64) -> Draws {
+    Streams::new(Seed(seed)).draws(0, 0, Purpose(9))
+}
+
+/// An arm of five rods along the first axis.
+fn arm() -> Chain<2> {
+    let rod = Rod::fixed(0.4, 0.02);
+    let mut arm = Chain::straight([0.0; 2], [1.0, 0.0], 5, rod, Connector::free(0.03)).unwrap();
+    arm.set_mobility(0, Mobility::Fixed).unwrap();
+    arm
+}
+
+/// A wall beside the arm, with a hole near the base: the tool must be drawn back to come behind it.
+fn wall() -> Obstacles<2> {
+    let wall = Obstacle::capsule(0, [[0.5, 0.35], [2.5, 0.35]], 0.05);
+    Obstacles::new(vec![wall], 1.0).unwrap()
+}
+
+const BEHIND: Errand<2> = Errand { k: 5, target: [1.0, 0.9], tolerance_m: 1e-3 };
+
+#[test]
+fn a_way_round_a_wall_is_found_and_free_all_along() {
+    let (chain, obstacles) = (arm(), wall());
+    for seed in 0..20 {
+        let way = plan(&chain, &obstacles, Rules::default(), &BEHIND, &mut draws(seed)).unwrap();
+        let way = way.unwrap_or_else(|| panic!("{seed}: no way"));
+        let space = Space::new(&chain, &obstacles, false, 5).unwrap();
+        let mut at = chain.clone();
+        for next in &way {
+            let from = at.points().to_vec();
+            for part in 1..=200 {
+                at.points_mut().copy_from_slice(&space.at(&from, next, f64::from(part) / 200.0));
+                assert!(clearance_m(&at, &obstacles) > -5e-3, "{seed}");
+                assert!(at.max_rod_violation_m() < 1e-9 && at.points()[0] == [0.0; 2], "{seed}");
+            }
+        }
+        let left_m = crate::rods::geometry::distance(at.points()[5], BEHIND.target);
+        assert!(left_m <= BEHIND.tolerance_m, "{seed}: {left_m}");
+    }
+}
+
+#[test]
+fn the_same_draws_give_the_same_way() {
+    let once = |seed| plan(&arm(), &wall(), Rules::default(), &BEHIND, &mut draws(seed)).unwrap();
+    assert_eq!(once(3), once(3));
+    assert_ne!(once(3), once(4));
+}
+
+#[test]
+fn no_way_leads_into_an_obstacle_or_out_of_reach() {
+    for target in [[1.0, 0.35], [0.0, 3.0]] {
+        let errand = Errand { target, ..BEHIND };
+        let way = plan(&arm(), &wall(), Rules::default(), &errand, &mut draws(1)).unwrap();
+        assert_eq!(way, None);
+    }
+}
+
+#[test]
+fn a_chain_without_a_base_has_no_plan() {
+    let rod = Rod::fixed(0.4, 0.02);
+    let chain = Chain::straight([0.0; 2], [1.0, 0.0], 5, rod, Connector::free(0.03)).unwrap();
+    let error = plan(&chain, &wall(), Rules::default(), &BEHIND, &mut draws(1)).unwrap_err();
+    assert_eq!(error.place(), "planner");
+}

@@ -1,0 +1,120 @@
+//! Two trees of postures that grow toward each other.
+
+use super::{Posture, Space};
+use crate::rods::geometry::Point;
+use sidestep_kernel::stream::Draws;
+
+/// Most random postures that the trees grow toward.
+const MOST_DRAWN: usize = 2_000;
+/// Longest way of a connector between two postures of a tree, in lengths of the chain.
+const STRIDE: f64 = 0.1;
+/// Longest straight way of a connector, in lengths of the chain.
+const MOST_WAY: f64 = 4.0;
+/// Attempts to shorten a way.
+const SHORTCUTS: usize = 120;
+
+/// Postures, each with the one that it grew from.
+struct Tree<const D: usize> {
+    postures: Vec<Posture<D>>,
+    from: Vec<Option<usize>>,
+}
+
+impl<const D: usize> Tree<D> {
+    fn new(roots: Vec<Posture<D>>) -> Self {
+        Self { from: vec![None; roots.len()], postures: roots }
+    }
+
+    /// Returns the posture nearest to another; of equal ones the first.
+    fn nearest(&self, space: &Space<'_, D>, to: &[Point<D>]) -> usize {
+        let spread2 = |i: usize| space.spread2(&self.postures[i], to);
+        let all = (0..self.postures.len()).map(|i| (spread2(i), i));
+        all.min_by(|a, b| a.0.total_cmp(&b.0)).map_or(0, |(_, i)| i)
+    }
+
+    /// Grows toward a posture stride by stride, as far as the way is free; returns the last posture
+    /// and whether it is that one, or `None` if there was no stride at all.
+    fn grow(
+        &mut self,
+        space: &Space<'_, D>,
+        to: &[Point<D>],
+        stride_m: f64,
+        most: usize,
+    ) -> Option<(usize, bool)> {
+        let mut last = self.nearest(space, to);
+        for stride in 0..most {
+            let from = &self.postures[last];
+            let part = stride_m / space.apart_m(from, to).max(f64::MIN_POSITIVE);
+            let next = space.at(from, to, part);
+            if !space.is_way_free(from, &next) {
+                return (stride > 0).then_some((last, false));
+            }
+            self.postures.push(next);
+            self.from.push(Some(last));
+            last = self.postures.len() - 1;
+            if part >= 1.0 {
+                return Some((last, true));
+            }
+        }
+        Some((last, false))
+    }
+
+    /// Returns the postures from one back to its root.
+    fn back(&self, mut i: usize) -> Vec<Posture<D>> {
+        let mut way = vec![self.postures[i].clone()];
+        while let Some(from) = self.from[i] {
+            i = from;
+            way.push(self.postures[i].clone());
+        }
+        way
+    }
+}
+
+/// Returns postures from the present one to one of the goals, both included.
+pub(super) fn way<const D: usize>(
+    space: &Space<'_, D>,
+    goals: Vec<Posture<D>>,
+    draws: &mut Draws,
+) -> Option<Vec<Posture<D>>> {
+    let present = space.present();
+    let stride_m = STRIDE * space.length_m();
+    let most = (MOST_WAY / STRIDE).ceil() as usize;
+    let mut trees = [Tree::new(vec![present.clone()]), Tree::new(goals.clone())];
+    let towards_goals = goals.into_iter().map(|goal| (goal, most));
+    let drawn = std::iter::repeat_with(|| None).take(MOST_DRAWN);
+    for (i, toward) in towards_goals.map(Some).chain(drawn).enumerate() {
+        // The trees take turns; the first tries are straight to the goals.
+        let (one, other) = if toward.is_some() { (0, 1) } else { (i % 2, 1 - i % 2) };
+        let (to, strides) = toward.unwrap_or_else(|| (space.any(draws), 1));
+        let Some((tip, _)) = trees[one].grow(space, &to, stride_m, strides) else { continue };
+        let tip_posture = trees[one].postures[tip].clone();
+        let Some((meeting, true)) = trees[other].grow(space, &tip_posture, stride_m, most) else {
+            continue;
+        };
+        let ends = if one == 0 { [tip, meeting] } else { [meeting, tip] };
+        let mut way = trees[0].back(ends[0]);
+        way.reverse();
+        way.extend(trees[1].back(ends[1]).into_iter().skip(1));
+        return Some(way);
+    }
+    None
+}
+
+/// Returns the way after its first posture, with straight ways between random places of it where
+/// they are free.
+pub(super) fn shortened<const D: usize>(
+    space: &Space<'_, D>,
+    mut way: Vec<Posture<D>>,
+    draws: &mut Draws,
+) -> Vec<Posture<D>> {
+    for _ in 0..SHORTCUTS {
+        if way.len() < 3 {
+            break;
+        }
+        let [i, j] = [0, 1].map(|_| draws.below(way.len() as u32) as usize);
+        let [i, j] = [i.min(j), i.max(j)];
+        if j > i + 1 && space.is_way_free(&way[i], &way[j]) {
+            way.drain(i + 1..j);
+        }
+    }
+    way.split_off(1)
+}

@@ -1,0 +1,159 @@
+//! Rods one after the other between two places: places for their joints, in closed form.
+//!
+//! Rods of lengths in intervals reach from one place to another exactly if no side of the polygon
+//! that they make with the gap has to be longer than all others together. The gap is the longest
+//! side where the rods are stretched out; a rod can be where it has to fold back.
+
+use super::chain::Rod;
+use super::geometry::{
+    Point, add, along, between, distance, first_axis, perpendicular, scaled, sub, unit,
+};
+
+/// Returns places for the joints of rods from `a` to `b`; rods that span another distance are as
+/// near to it as they can be. They lie straight if they can be so short, and as a triangle
+/// otherwise.
+pub(super) fn joints<const D: usize>(a: Point<D>, b: Point<D>, rods: &[Rod]) -> Vec<Point<D>> {
+    let gap_m = distance(a, b);
+    let least_m: f64 = rods.iter().map(|rod| rod.min_m).sum();
+    let most_m: f64 = rods.iter().map(|rod| rod.max_m).sum();
+    if gap_m < least_m {
+        return triangle(a, b, &folded_m(rods, gap_m));
+    }
+    let part = (gap_m - least_m) / (most_m - least_m).max(f64::MIN_POSITIVE);
+    let lengths_m: Vec<f64> = rods.iter().map(|rod| length_m(rod, part)).collect();
+    on_line([a, b], &lengths_m)
+}
+
+/// Returns a length of a rod: the least for part 0, the greatest for part 1.
+fn length_m(rod: &Rod, part: f64) -> f64 {
+    rod.min_m + part.clamp(0.0, 1.0) * (rod.max_m - rod.min_m)
+}
+
+/// Returns lengths for rods that are too long to lie straight: the least, unless one rod is longer
+/// than the gap and all others, which then get as long as they must.
+fn folded_m(rods: &[Rod], gap_m: f64) -> Vec<f64> {
+    let longest = (0..rods.len()).max_by(|&i, &j| rods[i].min_m.total_cmp(&rods[j].min_m));
+    let others = || (0..rods.len()).filter(|&i| Some(i) != longest).map(|i| &rods[i]);
+    let longest_m = longest.map_or(0.0, |k| rods[k].min_m);
+    let lack_m = longest_m - gap_m - others().map(|rod| rod.min_m).sum::<f64>();
+    let room_m: f64 = others().map(|rod| rod.max_m - rod.min_m).sum();
+    let part = lack_m / room_m.max(f64::MIN_POSITIVE);
+    let of = |i: usize| length_m(&rods[i], if Some(i) == longest { 0.0 } else { part });
+    (0..rods.len()).map(of).collect()
+}
+
+/// Returns the joints between rods that lie one after the other from one place to the other.
+fn on_line<const D: usize>([a, b]: [Point<D>; 2], lengths_m: &[f64]) -> Vec<Point<D>> {
+    let whole_m: f64 = lengths_m.iter().sum();
+    let ends_m = lengths_m.iter().scan(0.0, |way_m, length_m| {
+        *way_m += length_m;
+        Some(*way_m)
+    });
+    let joints = lengths_m.len().saturating_sub(1);
+    ends_m.take(joints).map(|way_m| between(a, b, way_m / whole_m)).collect()
+}
+
+/// Returns the joints of rods that lie as a triangle. Its first side is the gap, extended beyond `a`
+/// by as many rods as half of the perimeter has room for; its second is the next rod; the others
+/// make the third. So none is longer than the two others together.
+fn triangle<const D: usize>(a: Point<D>, b: Point<D>, lengths_m: &[f64]) -> Vec<Point<D>> {
+    let gap_m = distance(a, b);
+    let half_m = 0.5 * (gap_m + lengths_m.iter().sum::<f64>());
+    let ahead = unit(sub(b, a)).unwrap_or(first_axis());
+    let (mut joints, mut back_m) = (Vec::with_capacity(lengths_m.len()), 0.0);
+    for length_m in lengths_m {
+        if gap_m + back_m + length_m > half_m {
+            break;
+        }
+        back_m += length_m;
+        joints.push(along(a, ahead, -back_m));
+    }
+    let corner = joints.last().copied().unwrap_or(a);
+    let Some((second_m, rest)) = lengths_m[joints.len()..].split_first() else { return joints };
+    if rest.is_empty() {
+        return joints;
+    }
+    let (first_m, third_m) = (gap_m + back_m, rest.iter().sum::<f64>());
+    let foot_m = (second_m - third_m) * (second_m + third_m) / first_m.max(f64::MIN_POSITIVE);
+    let foot_m = (0.5 * (foot_m + first_m)).clamp(-second_m, *second_m);
+    let side_m = (second_m * second_m - foot_m * foot_m).max(0.0).sqrt();
+    let apex = add(along(corner, ahead, foot_m), scaled(perpendicular(ahead), side_m));
+    joints.push(apex);
+    joints.extend(on_line([apex, b], rest));
+    joints
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use sidestep_kernel::math;
+
+    /// Returns the least and the greatest distance that rods span, meters.
+    fn annulus_m(rods: &[Rod]) -> [f64; 2] {
+        let most_m: f64 = rods.iter().map(|rod| rod.max_m).sum();
+        let folded_m = |rod: &Rod| rod.min_m - (most_m - rod.max_m);
+        [rods.iter().map(folded_m).fold(0.0, f64::max), most_m]
+    }
+
+    /// The same by another way: rod after rod, the nearest and farthest place of the last end.
+    fn rod_by_rod_m(rods: &[Rod]) -> [f64; 2] {
+        rods.iter().fold([0.0, 0.0], |[near_m, far_m], rod| {
+            let folded_m = (near_m - rod.max_m).max(rod.min_m - far_m).max(0.0);
+            [folded_m, far_m + rod.max_m]
+        })
+    }
+
+    fn rods() -> impl Strategy<Value = Vec<Rod>> {
+        let rod = (0.1..3.0f64, prop_oneof![Just(0.0), 0.0..1.0f64]);
+        let rod =
+            rod.prop_map(|(min_m, more_m)| Rod { min_m, max_m: min_m + more_m, radius_m: 0.0 });
+        let long = Rod { min_m: 9.0, max_m: 9.5, radius_m: 0.0 };
+        (prop::collection::vec(rod, 1..9), prop::option::of(0usize..9)).prop_map(
+            move |(mut rods, at)| {
+                if let Some(at) = at {
+                    rods.insert(at.min(rods.len()), long);
+                }
+                rods
+            },
+        )
+    }
+
+    fn worst_m<const D: usize>(a: Point<D>, b: Point<D>, rods: &[Rod]) -> f64 {
+        let mut points = vec![a];
+        points.extend(joints(a, b, rods));
+        points.push(b);
+        assert_eq!(points.len(), rods.len() + 1);
+        let outside_m = |(ends, rod): (&[Point<D>], &Rod)| {
+            let length_m = distance(ends[0], ends[1]);
+            (length_m - rod.max_m).max(rod.min_m - length_m)
+        };
+        points.windows(2).zip(rods).map(outside_m).fold(0.0, f64::max)
+    }
+
+    proptest! {
+        #[test]
+        fn rods_span_exactly_the_distances_of_their_annulus(
+            rods in rods(), part in prop_oneof![Just(0.0), Just(1.0), 0.0..1.0f64],
+            turn_rad in 0.0..6.0f64,
+        ) {
+            let [near_m, far_m] = annulus_m(&rods);
+            let [n_m, f_m] = rod_by_rod_m(&rods);
+            prop_assert!((near_m - n_m).abs() < 1e-12 && (far_m - f_m).abs() < 1e-12);
+            let gap_m = near_m + part * (far_m - near_m);
+            let (s, c) = (math::sin(turn_rad), math::cos(turn_rad));
+            let plane_m = worst_m([1.0, 2.0], [1.0 + gap_m * c, 2.0 + gap_m * s], &rods);
+            let space_m = worst_m([0.0; 3], [0.0, gap_m * s, gap_m * c], &rods);
+            prop_assert!(plane_m.max(space_m) < 1e-9, "{plane_m} {space_m}, {gap_m} m");
+        }
+
+        #[test]
+        fn no_rods_span_another_distance(rods in rods(), by_m in 1e-6..1.0f64) {
+            let [near_m, far_m] = annulus_m(&rods);
+            prop_assert!(worst_m([0.0; 2], [far_m + by_m, 0.0], &rods) > 1e-8);
+            if near_m > by_m {
+                prop_assert!(worst_m([0.0; 2], [near_m - by_m, 0.0], &rods) > 1e-8);
+            }
+        }
+    }
+}
