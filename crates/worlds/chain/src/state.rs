@@ -3,6 +3,7 @@
 use super::driver::{Driving, Task};
 use super::formation::{Robot, Solid};
 use super::metrics::Tally;
+use super::motion::escape::WayOut;
 use super::rods::chain::Chain;
 use super::rods::geometry::{Bounds, Point, in_dimensions, unit};
 use super::script::Motion;
@@ -49,6 +50,8 @@ pub struct Body<const D: usize> {
     pub(crate) robot_radius_m: f64,
     /// Counts so far.
     pub tally: Tally,
+    /// Memory of how it gets out of where it was caught.
+    pub(crate) way_out: WayOut,
     /// The motions of the present script, which follow from the place where it started.
     pub(crate) motions: Vec<Motion>,
 }
@@ -87,6 +90,8 @@ pub struct Snapshot {
     pub cycle: Cycle,
     /// The chains by id.
     pub chains: Vec<ChainRecord>,
+    /// Chains that are on a way out of where they were caught, by id.
+    pub(crate) ways_out: Vec<(u32, WayOut)>,
 }
 
 impl<const D: usize> Body<D> {
@@ -101,6 +106,7 @@ impl<const D: usize> Body<D> {
             chain,
             scattered: None,
             tally: Tally::default(),
+            way_out: WayOut::default(),
             motions: Vec::new(),
         };
         body.motions = spec.motions(&body.driving)?;
@@ -165,7 +171,8 @@ impl<const D: usize> Body<D> {
         let motions = spec.motions(&record.driving).map_err(|_| CheckpointError::Damaged)?;
         let (driving, scattered) = (record.driving.clone(), record.scattered.clone());
         let (robots, robot_radius_m) = (record.robots.clone(), spec.robot_radius_m());
-        Ok(Self { chain, driving, scattered, robots, robot_radius_m, tally, motions })
+        let way_out = WayOut::default();
+        Ok(Self { chain, driving, scattered, robots, robot_radius_m, tally, way_out, motions })
     }
 }
 
@@ -208,7 +215,11 @@ impl<const D: usize> ChainState<D> {
         let all = world.chains.iter().zip(&snapshot.chains).zip(tallies);
         let bodies =
             all.map(|((spec, record), tally)| Body::restore(spec, record, tally, snapshot.cycle));
-        let bodies = bodies.collect::<Result<Vec<_>, _>>()?;
+        let mut bodies = bodies.collect::<Result<Vec<_>, _>>()?;
+        for (slot, way_out) in &snapshot.ways_out {
+            let body = bodies.get_mut(*slot as usize).ok_or(CheckpointError::Damaged)?;
+            body.way_out = *way_out;
+        }
         Ok(Self::of(bodies.into_iter()))
     }
 
@@ -252,7 +263,12 @@ impl<const D: usize> ChainState<D> {
 
     /// Returns the state after `cycle` cycles.
     pub fn snapshot(&self, cycle: Cycle) -> Snapshot {
-        Snapshot { cycle, chains: (0..self.len()).map(|slot| self.body(slot).record()).collect() }
+        let ways_out = (0..self.len()).map(|slot| (slot as u32, self.body(slot).way_out));
+        Snapshot {
+            cycle,
+            chains: (0..self.len()).map(|slot| self.body(slot).record()).collect(),
+            ways_out: ways_out.filter(|(_, way_out)| !way_out.is_none()).collect(),
+        }
     }
 
     /// Returns the counts of each chain so far.
@@ -265,7 +281,12 @@ impl Snapshot {
     /// Returns the digest of this state: it covers every value, by id.
     pub fn digest(&self) -> Digest {
         let mut hasher = Hasher::default();
-        let bytes = postcard::to_stdvec(self).expect("a snapshot is plain data");
+        let plain = "a snapshot is plain data";
+        let mut bytes = postcard::to_stdvec(&(self.cycle, &self.chains)).expect(plain);
+        // Nothing is added for nobody, so that digests of worlds without ways out stay.
+        if !self.ways_out.is_empty() {
+            bytes.extend(postcard::to_stdvec(&self.ways_out).expect(plain));
+        }
         bytes.chunks(8).for_each(|chunk| {
             let mut word = [0; 8];
             word[..chunk.len()].copy_from_slice(chunk);

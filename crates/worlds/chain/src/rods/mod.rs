@@ -27,7 +27,7 @@ pub mod rebuild;
 pub(crate) mod rules;
 pub(crate) mod scene;
 mod search;
-mod sweep;
+pub(crate) mod sweep;
 pub(crate) mod veto;
 pub mod wavefront;
 
