@@ -9,7 +9,7 @@ use sidestep::kernel::{InputError, Seed, math};
 use sidestep::worlds::chain::geometry::{Bounds, Point, along, distance, dot, scaled, sub, unit};
 use sidestep::worlds::chain::{
     Chain, Connector, Escape, Escaper, Obstacle, Obstacles, Outcome, Propagator, Request, Rod,
-    Rules,
+    Rules, WayOut,
 };
 use std::f64::consts::TAU;
 
@@ -196,7 +196,13 @@ fn run(cell: &Cell, seed: u64, tally: &mut Tally) -> Result<(), InputError> {
             keep_apart(&mut obstacles);
         }
         if cell.reaction != Reaction::None {
-            let escaped = escaper.escape(&mut chain, &obstacles, &mut propagator, &start)?;
+            let escaped = escaper.escape(
+                &mut chain,
+                &obstacles,
+                &mut propagator,
+                &start,
+                &mut WayOut::default(),
+            )?;
             tally.capped += escaped.capped;
         }
         measure(&chain, &obstacles, &start, tally);

@@ -34,6 +34,39 @@ within_m = [[-2.5, -2.5], [2.5, 2.5]]
 patience_s = 1000.0
 ";
 
+/// Two chains, each between two discs that go through each other.
+const CAUGHT: &str = r#"
+[chain]
+dt_s = 0.02
+escape_speed_m_s = 1.0
+[[obstacles]]
+at_m = [0.1, 1.5]
+radius_m = 0.4
+velocity_m_s = [0.0, -0.5]
+[[obstacles]]
+at_m = [0.1, -1.5]
+radius_m = 0.4
+velocity_m_s = [0.0, 0.5]
+[[obstacles]]
+at_m = [0.3, 9.5]
+radius_m = 0.3
+velocity_m_s = [0.0, -0.5]
+[[obstacles]]
+at_m = [0.3, 6.5]
+radius_m = 0.5
+velocity_m_s = [0.0, 0.5]
+[[chains]]
+connectors = 12
+at_m = [4.0, 0.0]
+rod_m = [0.6, 0.8]
+radius_m = 0.25
+rod_radius_m = 0.05
+count = 2
+apart_m = [0.0, 8.0]
+[[chains.tasks]]
+kind = "rest"
+"#;
+
 /// One chain that balls fly at, and that gets out of their way.
 const DODGING: &str = "
 [chain]
@@ -363,6 +396,14 @@ fn a_chain_that_dodges_has_the_same_bits_however_it_is_run() {
     assert_d1::<2>(DODGING, 100, &[0, 1, 33, 99]);
     assert_d1::<2>(&DODGING.replace("dt_s = 0.05", "dt_s = 0.05\nescape = \"touch\""), 100, &[50]);
     assert_d1::<2>(&DODGING.replace("dt_s = 0.05", "dt_s = 0.05\nescape = \"off\""), 100, &[50]);
+    let literal = "dt_s = 0.05\nescape_by = \"literal\"";
+    assert_d1::<2>(&DODGING.replace("dt_s = 0.05", literal), 100, &[33]);
+}
+
+/// Discs close like tongs; the chain is on its way through one of them when the run is resumed.
+#[test]
+fn a_chain_that_is_caught_has_the_same_bits_however_it_is_run() {
+    assert_d1::<2>(CAUGHT, 160, &[0, 80, 90, 100, 110, 120, 159]);
 }
 
 #[test]

@@ -49,7 +49,7 @@ mod world;
 
 pub use arms::{ik, kinematics};
 pub use kind::Chains;
-pub use motion::escape::{Escape, Escaped, Escaper};
+pub use motion::escape::{Escape, Escaped, Escaper, Method, WayOut};
 pub use motion::replan::{Climbed, Ladder, Rungs, Situation};
 pub use rods::{
     BEND_TOLERANCE_RAD, Chain, Connector, Mobility, Mode, Motion, Moved, Obstacle, Obstacles,

@@ -3,6 +3,7 @@
 use super::driver::{Driving, Task};
 use super::formation::{Robot, Solid};
 use super::metrics::Tally;
+use super::motion::escape::WayOut;
 use super::put_off::PutOff;
 use super::rods::chain::Chain;
 use super::rods::geometry::{Bounds, Point, in_dimensions, unit};
@@ -51,6 +52,8 @@ pub struct Body<const D: usize> {
     pub(crate) robot_radius_m: f64,
     /// Counts so far.
     pub tally: Tally,
+    /// Memory of how it gets out of where it was caught.
+    pub(crate) way_out: WayOut,
     /// The motions of the present script, which follow from the place where it started.
     pub(crate) motions: Vec<Motion>,
     /// The way that it follows because local rules came no nearer.
@@ -111,6 +114,8 @@ pub struct Snapshot {
     pub chains: Vec<ChainRecord>,
     /// Their plans, of those that have one; by id.
     pub plans: Vec<PlanRecord>,
+    /// Chains that are on a way out of where they were caught, by id.
+    pub(crate) ways_out: Vec<(u32, WayOut)>,
 }
 
 impl<const D: usize> Body<D> {
@@ -125,6 +130,7 @@ impl<const D: usize> Body<D> {
             chain,
             scattered: None,
             tally: Tally::default(),
+            way_out: WayOut::default(),
             motions: Vec::new(),
             plan: None,
             put_off: PutOff::default(),
@@ -196,7 +202,7 @@ impl<const D: usize> Body<D> {
         let motions = spec.motions(&record.driving).map_err(|_| CheckpointError::Damaged)?;
         let (driving, scattered) = (record.driving.clone(), record.scattered.clone());
         let (robots, robot_radius_m) = (record.robots.clone(), spec.robot_radius_m());
-        let (plan, put_off) = (None, PutOff::default());
+        let (way_out, plan, put_off) = (WayOut::default(), None, PutOff::default());
         Ok(Self {
             chain,
             driving,
@@ -204,6 +210,7 @@ impl<const D: usize> Body<D> {
             robots,
             robot_radius_m,
             tally,
+            way_out,
             motions,
             plan,
             put_off,
@@ -254,6 +261,10 @@ impl<const D: usize> ChainState<D> {
         for record in &snapshot.plans {
             let body = bodies.get_mut(record.chain as usize).ok_or(CheckpointError::Damaged)?;
             body.plan = Some(Plan::restore(record, body.chain.points().len())?);
+        }
+        for (slot, way_out) in &snapshot.ways_out {
+            let body = bodies.get_mut(*slot as usize).ok_or(CheckpointError::Damaged)?;
+            body.way_out = *way_out;
         }
         Ok(Self::of(bodies.into_iter()))
     }
@@ -309,9 +320,15 @@ impl<const D: usize> ChainState<D> {
 
     /// Returns the state after `cycle` cycles.
     pub fn snapshot(&self, cycle: Cycle) -> Snapshot {
-        let chains = (0..self.len()).map(|slot| self.body(slot).record()).collect();
+        let slots = 0..self.len();
         let plan = |slot| Some(self.body(slot).plan.as_ref()?.record(slot as EntityId));
-        Snapshot { cycle, chains, plans: (0..self.len()).filter_map(plan).collect() }
+        let ways_out = slots.clone().map(|slot| (slot as EntityId, self.body(slot).way_out));
+        Snapshot {
+            cycle,
+            chains: slots.clone().map(|slot| self.body(slot).record()).collect(),
+            plans: slots.filter_map(plan).collect(),
+            ways_out: ways_out.filter(|(_, way_out)| !way_out.is_none()).collect(),
+        }
     }
 
     /// Returns the counts of each chain so far.
@@ -341,9 +358,12 @@ impl Snapshot {
     pub fn digest(&self) -> Digest {
         let mut hasher = Hasher::default();
         add(&mut hasher, &(self.cycle, &self.chains));
-        // Worlds in which nobody plans have the digests that they had before there were plans.
+        // Nothing is added for nobody, so that worlds without plans and ways out keep their digests.
         if !self.plans.is_empty() {
             add(&mut hasher, &self.plans);
+        }
+        if !self.ways_out.is_empty() {
+            add(&mut hasher, &self.ways_out);
         }
         hasher.finish()
     }

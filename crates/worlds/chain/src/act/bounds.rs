@@ -17,6 +17,7 @@ impl<const D: usize> Acting<'_, D> {
             &self.scratch.obstacles,
             &mut self.scratch.propagator,
             &self.scratch.before,
+            &mut self.body.way_out,
         );
         // Out of the range of coordinates nothing escapes.
         let Ok(escaped) = escaped else { return };
@@ -30,6 +31,7 @@ impl<const D: usize> Acting<'_, D> {
             self.scratch.events.push(Event { obstacle: Some(obstacle), ..event });
         }
         self.body.tally.is_escaping = escaped.moves > 0;
+        self.gives_way = escaped.is_pressed;
     }
 
     /// Takes back moves that would leave the claim, because other chains do not expect the chain

@@ -31,6 +31,7 @@ impl<const D: usize> Acting<'_, D> {
         self.body.driving.cycles += 1;
         match self.wish(task) {
             Wish::Rest => {}
+            Wish::Go(_) | Wish::Steer(_) if self.gives_way => self.give_way(task),
             Wish::Go(to) => {
                 self.go(task, to);
             }

@@ -70,6 +70,14 @@ impl<const D: usize> Acting<'_, D> {
         place.map(|place| distance(self.body.chain.points()[task.agent], *place))
     }
 
+    /// Lets the initiator wait while the chain needs all its speed to get out of the way.
+    pub(super) fn give_way(&mut self, task: &Task<D>) {
+        let way_m = task.speed_m_s * self.world.dt_s;
+        self.body.driving.way_m.wanted += way_m;
+        let n = self.body.driving.idle.saturating_add(1);
+        self.take_note(task, &Climbed::Waiting { n }, [0.0; D]);
+    }
+
     /// Returns an initiator's knowledge beside its neighborhood.
     fn situation(&self, task: &Task<D>) -> Situation {
         let at = self.body.chain.points()[task.agent];

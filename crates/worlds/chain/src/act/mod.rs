@@ -36,6 +36,8 @@ pub(crate) struct Acting<'a, const D: usize> {
     decision: Option<Decision>,
     /// The box that it stays in.
     claim: Bounds<D>,
+    /// Whether its initiator gives way to parts that get out of something's way.
+    gives_way: bool,
     body: &'a mut Body<D>,
     scratch: &'a mut Scratch<D>,
     /// Whether only the initiator moves for now.
@@ -58,6 +60,7 @@ pub(crate) fn act<const D: usize>(turn: &mut Turn<'_, ChainWorld<D>>, group: &mu
             now,
             decision: state.decision(slot as usize),
             claim,
+            gives_way: false,
             body: &mut body,
             scratch: turn.scratch,
             puts_off: false,

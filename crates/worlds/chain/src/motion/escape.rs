@@ -1,31 +1,41 @@
 //! Escape: getting out of the way of moving obstacles (slides P2, R4).
 //!
-//! After the obstacles of a tick have moved, parts of the chain that are too near to one become
-//! initiators, the deepest first, and go where nothing gets deeper. The slides set no limit to
-//! that. Here no connector, slaves included, is farther from its place at the start of the tick
-//! than its speed allows, and a part that only this limit keeps from escaping is reported.
+//! ```text
+//! literal.rs       the slides' own way: one part after the other, the deepest first
+//! simultaneous/    all parts of a tick at once, and a way out for a part that is caught
+//! threat.rs        the parts near an obstacle
+//! ```
 //!
-//! The sweep `scenarios/papers/serpentine/movers.sweep.toml` measures what that can do: among discs
-//! that leave room for a robot between them, a chain with twice their speed is never in one. Two
-//! obstacles that close in on a chain from both sides hold it like a pair of tongs, at any speed:
-//! it cannot pass through them, and only a jump over them gets it free.
+//! Two obstacles that close in on a chain from both sides hold it like a pair of tongs, at any
+//! speed. The literal escape leaves it there. The simultaneous one takes it through the obstacle
+//! that it is behind of soonest, by roll-outs of a few ways.
 
+mod literal;
+mod simultaneous;
 #[cfg(test)]
 mod tests;
 mod threat;
 
 use crate::rods::chain::Chain;
-use crate::rods::geometry::{Point, along, distance, dot, norm, perpendicular, scaled, sub, unit};
+use crate::rods::geometry::{Point, norm};
 use crate::rods::obstacle::{Obstacle, Obstacles};
-use crate::rods::own_body::OwnBody;
 use crate::rods::propagate::Propagator;
-use crate::rods::reach::{Reach, Reached, reach};
-use crate::rods::scene::TOLERANCE_M;
-use crate::rods::veto::{Mode, Motion, Outcome, Reason, Request, Source, Veto};
+use crate::rods::veto::Veto;
+use literal::Literal;
 use sidestep_kernel::InputError;
-use sidestep_kernel::math::{cos, sin};
+use simultaneous::Simultaneous;
+pub use simultaneous::WayOut;
 pub(crate) use threat::Part;
-use threat::{Nearness, Threat, collect, nearness};
+
+/// The method by which a chain gets out of the way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Method {
+    /// One part after the other becomes an initiator, the deepest first (slide P2).
+    #[default]
+    Literal,
+    /// All constraints of a tick are solved at once; who is caught is led out.
+    Simultaneous,
+}
 
 /// Rules for getting out of the way.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,14 +48,18 @@ pub struct Escape {
     /// Number of ticks before contact at which parts give way, with 0.05 m to spare; 0 for only on
     /// contact.
     pub ticks_ahead: f64,
-    /// Most violations handled in a tick; at least half of them are contacts.
+    /// Most violations that the literal escape handles in a tick; at least half of them are
+    /// contacts.
     pub most: usize,
+    /// The method.
+    pub method: Method,
 }
 
 impl Escape {
-    /// Returns rules with a look-ahead of 20 ticks and up to 40 violations a tick.
+    /// Returns rules of the literal escape with a look-ahead of 20 ticks and up to 40 violations
+    /// a tick.
     pub fn new(dt_s: f64, speed_max_m_s: f64) -> Self {
-        Self { dt_s, speed_max_m_s, ticks_ahead: 20.0, most: 40 }
+        Self { dt_s, speed_max_m_s, ticks_ahead: 20.0, most: 40, method: Method::Literal }
     }
 
     fn check(&self) -> Result<(), InputError> {
@@ -67,10 +81,18 @@ impl Escape {
     fn most_m(&self) -> f64 {
         self.speed_max_m_s * self.dt_s
     }
+
+    fn look_ahead(&self) -> Margin {
+        if self.ticks_ahead > 0.0 {
+            Margin { ahead_s: self.ticks_ahead * self.dt_s, spare_m: SPARE_M }
+        } else {
+            Margin::NONE
+        }
+    }
 }
 
 /// Outcome of an escape.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Escaped<const D: usize> {
     /// Motions that brought a part farther away.
     pub moves: usize,
@@ -85,6 +107,9 @@ pub struct Escaped<const D: usize> {
     /// The first part that got away: its connector, or the one at the start of its rod, and the
     /// obstacle that it got away from.
     pub first: Option<(usize, u32)>,
+    /// Whether the chain is pressed: it needs all its speed to get away, so whoever leads should
+    /// give way. Only the simultaneous escape tells.
+    pub is_pressed: bool,
 }
 
 /// A part that is still in a moving obstacle.
@@ -98,16 +123,13 @@ pub struct Left<const D: usize> {
     pub veto: Option<Veto<D>>,
 }
 
-/// Leads chains out of the way. It owns its buffers and remembers nothing from tick to tick.
+/// Leads chains out of the way. It owns its buffers and remembers nothing from tick to tick; what
+/// has to be remembered of a chain is in its [`WayOut`].
 #[derive(Debug, Clone)]
 pub struct Escaper<const D: usize> {
-    /// Its rules.
-    pub rules: Escape,
-    body: OwnBody<D>,
-    threats: Vec<Threat>,
-    vetoes: Vec<(Threat, Veto<D>)>,
-    /// The chain as it was before the motion under trial.
-    before: Vec<Point<D>>,
+    rules: Escape,
+    literal: Literal<D>,
+    simultaneous: Simultaneous<D>,
 }
 
 /// The working data of a tick.
@@ -136,27 +158,20 @@ impl Margin {
 
 /// Gap that is kept beyond the way of the obstacle, meters.
 const SPARE_M: f64 = 0.05;
-/// Distance by which a push goes beyond what is needed, meters.
-const BEYOND_M: f64 = 1e-6;
-/// Least gain of a helpful motion, as a part of its length.
-const LEAST_GAIN: f64 = 0.05;
-/// Least motion of the point of contact, as a part of the way of a rod's end, for a helpful end.
-const LEAST_LEVER: f64 = 0.1;
-/// Parts of the push that are tried, each in all directions.
-const PARTS: [f64; 3] = [1.0, 0.5, 0.25];
-/// Directions that are tried, rad, from straight away to nearly across; the first of both signs
-/// leads off the obstacle's way.
-const TURNS_RAD: [f64; 7] = [0.0, 0.5, -0.5, 1.0, -1.0, 1.5, -1.5];
-
 impl<const D: usize> Escaper<D> {
     /// Returns an escaper for rules.
     pub fn new(rules: Escape) -> Self {
-        let (body, threats, vetoes, before) = Default::default();
-        Self { rules, body, threats, vetoes, before }
+        Self { rules, literal: Literal::new(rules), simultaneous: Simultaneous::new(rules) }
+    }
+
+    /// Returns its rules.
+    pub fn rules(&self) -> &Escape {
+        &self.rules
     }
 
     /// Moves the parts of a chain that are too near to a moving obstacle. `start` holds the
-    /// connectors' positions at the start of the tick.
+    /// connectors' positions at the start of the tick, `way_out` the chain's memory: the default
+    /// at first, and then as the last tick left it.
     ///
     /// # Errors
     /// When a tick is not positive, a speed limit is below 0, or `start` belongs to another chain.
@@ -166,300 +181,22 @@ impl<const D: usize> Escaper<D> {
         obstacles: &Obstacles<D>,
         propagator: &mut Propagator<D>,
         start: &[Point<D>],
+        way_out: &mut WayOut,
     ) -> Result<Escaped<D>, InputError> {
         self.rules.check()?;
         if start.len() != chain.points().len() {
             let cause = format!("has {} places for {}", start.len(), chain.points().len());
             return Err(InputError::new("start of the tick", cause, "give one a connector"));
         }
+        if self.rules.method == Method::Simultaneous {
+            let rules = propagator.rules;
+            return Ok(self.simultaneous.escape(chain, obstacles, &rules, start, way_out));
+        }
         let step_max_m = propagator.rules.slave_step_max_m;
         propagator.rules.slave_step_max_m = step_max_m.min(self.rules.most_m());
         let mut tick = Tick { chain, obstacles, propagator, start };
-        let escaped = self.escape_in(&mut tick);
+        let escaped = self.literal.escape(&mut tick);
         propagator.rules.slave_step_max_m = step_max_m;
         escaped
     }
-
-    fn escape_in(&mut self, tick: &mut Tick<'_, D>) -> Result<Escaped<D>, InputError> {
-        let ahead = self.look_ahead();
-        let reach_m = 2.0 * self.longest_way_m(tick);
-        let within_m = |o: &Obstacle<D>| ahead.around(o) + reach_m;
-        collect(tick.chain, tick.obstacles, &mut self.body, within_m, &mut self.threats);
-        let mut told =
-            Escaped { moves: 0, vetoes: 0, capped: 0, deepest_m: 0.0, left: None, first: None };
-        if self.threats.is_empty() {
-            return Ok(told);
-        }
-        self.before.clear();
-        self.before.extend_from_slice(tick.chain.points());
-        let mut tries = self.rules.most / 2;
-        if ahead != Margin::NONE {
-            self.round(tick, ahead, &mut tries, &mut told)?;
-        }
-        tries += self.rules.most.div_ceil(2);
-        self.round(tick, Margin::NONE, &mut tries, &mut told)?;
-        self.tell_what_is_left(tick, &mut told);
-        Ok(told)
-    }
-
-    fn look_ahead(&self) -> Margin {
-        if self.rules.ticks_ahead > 0.0 {
-            Margin { ahead_s: self.rules.ticks_ahead * self.rules.dt_s, spare_m: SPARE_M }
-        } else {
-            Margin::NONE
-        }
-    }
-
-    /// Returns how far from its start a connector may be, or already is, meters.
-    fn longest_way_m(&self, tick: &Tick<'_, D>) -> f64 {
-        let ways_m = tick.start.iter().zip(tick.chain.points()).map(|(s, p)| distance(*s, *p));
-        ways_m.fold(self.rules.most_m(), f64::max)
-    }
-
-    /// Relieves violations of one margin, the deepest first.
-    fn round(
-        &mut self,
-        tick: &mut Tick<'_, D>,
-        margin: Margin,
-        tries: &mut usize,
-        told: &mut Escaped<D>,
-    ) -> Result<(), InputError> {
-        self.threats.iter_mut().for_each(|t| t.given_up = false);
-        self.vetoes.clear();
-        while *tries > 0 {
-            self.measure(tick, margin);
-            let Some(deepest) = self.deepest() else { break };
-            *tries -= 1;
-            match self.relieve(tick, margin, deepest)? {
-                Ok(()) => {
-                    told.moves += 1;
-                    let Threat { part, mover, .. } = self.threats[deepest];
-                    let obstacle = tick.obstacles.moving()[mover].id;
-                    told.first = told.first.or(Some((part.connector(), obstacle)));
-                }
-                Err(veto) => {
-                    told.vetoes += 1;
-                    told.capped += usize::from(veto.reason == Reason::StepLimit);
-                    self.threats[deepest].given_up = true;
-                    self.vetoes.push((self.threats[deepest], veto));
-                }
-            }
-        }
-        Ok(())
-    }
-
-    fn measure(&mut self, tick: &Tick<'_, D>, margin: Margin) {
-        for threat in &mut self.threats {
-            threat.depth_m = depth_of(tick, threat, margin);
-        }
-    }
-
-    /// Returns the deepest violation; of equals the first by part and obstacle.
-    fn deepest(&self) -> Option<usize> {
-        let order = |&a: &usize, &b: &usize| {
-            let (a, b) = (&self.threats[a], &self.threats[b]);
-            a.depth_m.total_cmp(&b.depth_m).then((b.part, b.mover).cmp(&(a.part, a.mover)))
-        };
-        (0..self.threats.len())
-            .filter(|&k| !self.threats[k].given_up && self.threats[k].depth_m > TOLERANCE_M)
-            .max_by(order)
-    }
-
-    /// Tries to reduce one violation; returns the objection if nothing works. A base that objects
-    /// is led back to its place by a return pass, so the elbows of an arm get out of the way too.
-    fn relieve(
-        &mut self,
-        tick: &mut Tick<'_, D>,
-        margin: Margin,
-        which: usize,
-    ) -> Result<Result<(), Veto<D>>, InputError> {
-        let threat = self.threats[which];
-        let mover = tick.obstacles.moving()[threat.mover];
-        let near = nearness(tick.chain, threat.part, &mover);
-        let mut why = nobody(tick.chain, threat.part, mover.id);
-        for (k, lever) in agents(tick.chain, threat.part, &near).into_iter().flatten() {
-            let push_m = ((threat.depth_m + BEYOND_M) / lever).min(self.room_m(tick, k));
-            for way in ways(near.away, mover.velocity_m_s) {
-                let to = along(tick.chain.points()[k], way, push_m);
-                match self.attempt(tick, margin, which, k, to)? {
-                    Ok(()) => return Ok(Ok(())),
-                    // If the speed limit was the only obstacle, that says more than any other
-                    // reason.
-                    Err(veto) if why.reason != Reason::StepLimit => why = veto,
-                    Err(_) => (),
-                }
-            }
-        }
-        Ok(Err(why))
-    }
-
-    /// Returns how far from its start a connector may be, meters: as far as its speed allows, or as
-    /// far as it already is.
-    fn room_m(&self, tick: &Tick<'_, D>, k: usize) -> f64 {
-        self.rules.most_m().max(distance(tick.start[k], self.before[k]))
-    }
-
-    /// Moves one connector, if that helps; otherwise every bit is as before.
-    fn attempt(
-        &mut self,
-        tick: &mut Tick<'_, D>,
-        margin: Margin,
-        which: usize,
-        k: usize,
-        to: Point<D>,
-    ) -> Result<Result<(), Veto<D>>, InputError> {
-        let at = tick.chain.points()[k];
-        let to = clipped(tick.start[k], to, self.room_m(tick, k));
-        if distance(to, at) <= TOLERANCE_M {
-            return Ok(Err(objection(tick.chain, k, Reason::StepLimit, None)));
-        }
-        let request = Request {
-            motion: Motion::Connector { k, to },
-            source: Source::Autonomous,
-            mode: Mode::AsFarAsPossible,
-        };
-        let touched = match tick.propagator.propagate(tick.chain, tick.obstacles, &request)? {
-            Outcome::Moved(moved) => moved.touched,
-            Outcome::Vetoed(veto)
-                if veto.by != k && tick.chain.connectors()[veto.by].is_still() =>
-            {
-                let order = Reach { k, target: to, base: veto.by, tolerance_m: 0.5 * BEYOND_M };
-                match reach(tick.propagator, tick.chain, tick.obstacles, &order)? {
-                    Reached::There { .. } => 0..tick.start.len(),
-                    Reached::Short { .. } => return Ok(Err(veto)),
-                }
-            }
-            Outcome::Vetoed(veto) => return Ok(Err(veto)),
-        };
-        let refused = self
-            .too_far(tick, touched.clone())
-            .map(|by| Veto { by, ..objection(tick.chain, k, Reason::StepLimit, None) })
-            .or_else(|| self.no_help(tick, margin, which, k, distance(to, at)));
-        let (from, to) = match refused {
-            Some(_) => (&self.before[touched.clone()], &mut tick.chain.points_mut()[touched]),
-            None => (&tick.chain.points()[touched.clone()], &mut self.before[touched]),
-        };
-        to.copy_from_slice(from);
-        Ok(refused.map_or(Ok(()), Err))
-    }
-
-    /// Returns the first connector that went farther than its speed allows.
-    fn too_far(&self, tick: &Tick<'_, D>, touched: std::ops::Range<usize>) -> Option<usize> {
-        touched.into_iter().find(|&i| {
-            distance(tick.start[i], tick.chain.points()[i]) > self.room_m(tick, i) + 1e-12
-        })
-    }
-
-    /// Returns an objection if a motion did not bring the part farther away, or brought another as
-    /// deep.
-    fn no_help(
-        &self,
-        tick: &Tick<'_, D>,
-        margin: Margin,
-        which: usize,
-        k: usize,
-        way_m: f64,
-    ) -> Option<Veto<D>> {
-        let depth_m = self.threats[which].depth_m;
-        let bound_m = depth_m - LEAST_GAIN * way_m.min(depth_m);
-        let worse = self.threats.iter().enumerate().find(|(i, threat)| {
-            let allowed_m = if *i == which { bound_m } else { threat.depth_m.max(bound_m) };
-            depth_of(tick, threat, margin) > allowed_m
-        });
-        worse.map(|(_, threat)| {
-            let id = tick.obstacles.moving()[threat.mover].id;
-            objection(tick.chain, k, Reason::TargetBlocked, id)
-        })
-    }
-
-    fn tell_what_is_left(&mut self, tick: &Tick<'_, D>, told: &mut Escaped<D>) {
-        self.threats.iter_mut().for_each(|t| t.given_up = false);
-        self.measure(tick, Margin::NONE);
-        let Some(deepest) = self.deepest() else { return };
-        let threat = self.threats[deepest];
-        told.deepest_m = threat.depth_m;
-        let veto = self
-            .vetoes
-            .iter()
-            .find(|(t, _)| (t.part, t.mover) == (threat.part, threat.mover))
-            .map(|(_, veto)| *veto);
-        let obstacle = tick.obstacles.moving()[threat.mover].id;
-        told.left = Some(Left { part: threat.part, obstacle, veto });
-    }
-}
-
-fn depth_of<const D: usize>(tick: &Tick<'_, D>, threat: &Threat, margin: Margin) -> f64 {
-    let mover = &tick.obstacles.moving()[threat.mover];
-    margin.around(mover) - nearness(tick.chain, threat.part, mover).gap_m
-}
-
-/// Returns the connectors that may move for a part, and how much of their way the point of contact
-/// moves: for a rod the end nearer to the contact, then the other.
-fn agents<const D: usize>(
-    chain: &Chain<D>,
-    part: Part,
-    near: &Nearness<D>,
-) -> [Option<(usize, f64)>; 2] {
-    let a = near.along_rod;
-    let ends = match part {
-        Part::Connector(i) => [Some((i, 1.0)), None],
-        Part::Rod(i) if a < 0.5 => [Some((i, 1.0 - a)), Some((i + 1, a))],
-        Part::Rod(i) => [Some((i + 1, a)), Some((i, 1.0 - a))],
-    };
-    let may_move =
-        |&(k, lever): &(usize, f64)| lever >= LEAST_LEVER && !chain.connectors()[k].is_still();
-    ends.map(|end| end.filter(may_move))
-}
-
-/// Returns the objection of a part that nothing may move.
-fn nobody<const D: usize>(chain: &Chain<D>, part: Part, obstacle: u32) -> Veto<D> {
-    let (Part::Connector(k) | Part::Rod(k)) = part;
-    let reason = if chain.connectors()[k].failed { Reason::Failed } else { Reason::Fixed };
-    objection(chain, k, reason, obstacle)
-}
-
-/// Returns the ways that are tried, as parts of the push: all of it in every direction, then half.
-fn ways<const D: usize>(away: Point<D>, velocity: Point<D>) -> impl Iterator<Item = Point<D>> {
-    let planes = planes(away, velocity);
-    let turned = move |turn_rad: f64| {
-        let n = if turn_rad == 0.0 { 1 } else { D - 1 };
-        planes
-            .into_iter()
-            .take(n)
-            .map(move |across| along(scaled(away, cos(turn_rad)), across, sin(turn_rad)))
-    };
-    let all = move |part: f64| TURNS_RAD.into_iter().flat_map(turned).map(move |u| scaled(u, part));
-    PARTS.into_iter().flat_map(all)
-}
-
-/// Returns directions across `away`, to turn it toward: the first off the obstacle's way.
-fn planes<const D: usize>(away: Point<D>, velocity: Point<D>) -> [Point<D>; 2] {
-    let off = unit(velocity)
-        .map(|v| along(away, v, -dot(away, v)))
-        .and_then(|off| unit(along(off, away, -dot(off, away))));
-    let first = off.unwrap_or_else(|| perpendicular(away));
-    [first, across(away, first)]
-}
-
-/// Returns the vector across two that are perpendicular; in the plane there is none, and the result
-/// is not used.
-fn across<const D: usize>(u: Point<D>, v: Point<D>) -> Point<D> {
-    let at = |i: usize| u[(i + 1) % D] * v[(i + 2) % D] - u[(i + 2) % D] * v[(i + 1) % D];
-    std::array::from_fn(at)
-}
-
-/// Returns the point of a ball around `center` that is nearest to `to`.
-fn clipped<const D: usize>(center: Point<D>, to: Point<D>, radius_m: f64) -> Point<D> {
-    let way_m = distance(center, to);
-    if way_m <= radius_m { to } else { along(center, sub(to, center), radius_m / way_m) }
-}
-
-fn objection<const D: usize>(
-    chain: &Chain<D>,
-    from: usize,
-    reason: Reason,
-    obstacle: impl Into<Option<u32>>,
-) -> Veto<D> {
-    let obstacle = obstacle.into();
-    Veto { by: from, from, reason, obstacle, reached: chain.points()[from] }
 }

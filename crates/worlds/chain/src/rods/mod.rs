@@ -29,7 +29,7 @@ pub(crate) mod rules;
 pub(crate) mod scene;
 mod search;
 mod span;
-mod sweep;
+pub(crate) mod sweep;
 pub(crate) mod veto;
 pub mod wavefront;
 

@@ -10,7 +10,7 @@ use super::geometry::{Core, Point, along, between, cross_2d, cross_each_other, d
 
 /// A moving rod: master and slave, before and after.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Sweep<const D: usize> {
+pub(crate) struct Sweep<const D: usize> {
     /// The rod before: master, slave.
     pub(crate) from: [Point<D>; 2],
     /// The rod after.
@@ -34,7 +34,7 @@ impl<const D: usize> Sweep<D> {
 
     /// Whether the rod passes no point of the core on its way; in space, whether it stays half as
     /// far away as `keep_m`, the distance that it must keep at rest.
-    pub(super) fn is_clear(&self, core: &Core<D>, keep_m: f64) -> bool {
+    pub(crate) fn is_clear(&self, core: &Core<D>, keep_m: f64) -> bool {
         let way_m = self.longest_way_m();
         core.is_clear_of_segment(self.to, Self::sure_m(way_m, keep_m))
             || self.is_clear_on_the_way(core, keep_m, way_m)

@@ -1,6 +1,9 @@
 use super::*;
 use crate::rods::chain::{Connector, Mobility, Rod};
+use crate::rods::geometry::{distance, scaled, unit};
 use crate::rods::rules::Rules;
+use crate::rods::scene::TOLERANCE_M;
+use crate::rods::veto::Reason;
 use crate::scenes::{Numbers, clearance_m};
 
 const DT_S: f64 = 0.02;
@@ -39,17 +42,18 @@ fn tick<const D: usize>(
     propagator: &mut Propagator<D>,
 ) -> Escaped<D> {
     let start = chain.points().to_vec();
-    obstacles.advance(escaper.rules.dt_s);
-    let told = escaper.escape(chain, obstacles, propagator, &start).unwrap();
+    obstacles.advance(escaper.rules().dt_s);
+    let told =
+        escaper.escape(chain, obstacles, propagator, &start, &mut WayOut::default()).unwrap();
     for (k, (from, to)) in start.iter().zip(chain.points()).enumerate() {
-        assert!(distance(*from, *to) <= escaper.rules.most_m() + 1e-12, "connector {k}");
+        assert!(distance(*from, *to) <= escaper.rules().most_m() + 1e-12, "connector {k}");
         assert!(from == to || !chain.connectors()[k].is_still());
     }
     assert!(chain.max_rod_violation_m() <= 1e-9);
     let deepest_m = (-clearance_m(chain, obstacles)).max(0.0);
     assert!((told.deepest_m - deepest_m).abs() <= TOLERANCE_M, "{told:?} but {deepest_m}");
     assert_eq!(told.left.is_some(), told.deepest_m > 0.0);
-    assert!(told.moves + told.vetoes <= escaper.rules.most);
+    assert!(told.moves + told.vetoes <= escaper.rules().most);
     told
 }
 
@@ -96,7 +100,9 @@ fn the_limit_counts_what_a_connector_has_moved_before_in_the_tick() {
     let mut start = chain.points().to_vec();
     start[0][0] += 0.015;
     let mut escaper = Escaper::new(Escape { ticks_ahead: 0.0, ..Escape::new(DT_S, 1.0) });
-    escaper.escape(&mut chain, &obstacles, &mut Propagator::default(), &start).unwrap();
+    escaper
+        .escape(&mut chain, &obstacles, &mut Propagator::default(), &start, &mut WayOut::default())
+        .unwrap();
     assert!((distance(chain.points()[0], start[0]) - 0.02).abs() <= 1e-9);
 }
 
@@ -153,7 +159,9 @@ fn a_connector_in_the_middle_of_a_mover_leaves_to_the_left_of_its_way() {
     let (mut chain, obstacles) = (swarm::<2>(0), mover([0.0, 0.0], 0.4, [0.0, -0.5]));
     let mut escaper = Escaper::new(Escape::new(DT_S, f64::INFINITY));
     let start = chain.points().to_vec();
-    let told = escaper.escape(&mut chain, &obstacles, &mut Propagator::default(), &start).unwrap();
+    let told = escaper
+        .escape(&mut chain, &obstacles, &mut Propagator::default(), &start, &mut WayOut::default())
+        .unwrap();
     assert_eq!(told.deepest_m, 0.0);
     let [x, y] = chain.points()[0];
     assert!(x > 0.65 && y.abs() < 1e-12, "{x} {y}");
@@ -198,7 +206,15 @@ fn walls_stop_an_escape_and_are_not_passed() {
     for _ in 0..300 {
         obstacles.advance(DT_S);
         let start = chain.points().to_vec();
-        escaper.escape(&mut chain, &obstacles, &mut Propagator::default(), &start).unwrap();
+        escaper
+            .escape(
+                &mut chain,
+                &obstacles,
+                &mut Propagator::default(),
+                &start,
+                &mut WayOut::default(),
+            )
+            .unwrap();
         assert!(chain.points().iter().all(|p| p[1] >= -0.05 - 1e-9));
     }
 }
@@ -210,7 +226,7 @@ fn where_nothing_moves_nothing_changes() {
     let obstacles = Obstacles::new(vec![Obstacle::ball(1, [0.0, 0.2], 0.3)], 1.0).unwrap();
     let start = chain.points().to_vec();
     let told = Escaper::new(Escape::new(DT_S, 1.0))
-        .escape(&mut chain, &obstacles, &mut Propagator::default(), &start)
+        .escape(&mut chain, &obstacles, &mut Propagator::default(), &start, &mut WayOut::default())
         .unwrap();
     assert_eq!((told.moves, told.left, &chain), (0, None, &before));
 }
@@ -221,7 +237,13 @@ fn wrong_numbers_are_named() {
     let start = chain.points().to_vec();
     let mut place = |rules: Escape, start: &[Point<2>]| {
         Escaper::new(rules)
-            .escape(&mut chain, &Obstacles::default(), &mut Propagator::default(), start)
+            .escape(
+                &mut chain,
+                &Obstacles::default(),
+                &mut Propagator::default(),
+                start,
+                &mut WayOut::default(),
+            )
             .unwrap_err()
             .place()
             .to_string()

@@ -68,7 +68,7 @@ pub(super) fn nearness<const D: usize>(
 }
 
 /// Returns the direction across the way of an obstacle, to its left.
-fn left_of<const D: usize>(mover: &Obstacle<D>) -> Point<D> {
+pub(super) fn left_of<const D: usize>(mover: &Obstacle<D>) -> Point<D> {
     perpendicular(unit(mover.velocity_m_s).unwrap_or(first_axis()))
 }
 

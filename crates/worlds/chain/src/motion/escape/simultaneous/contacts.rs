@@ -1,0 +1,145 @@
+//! Everything that the parts of a chain may touch in a tick.
+
+use super::super::threat::{Threat, collect};
+use super::super::{Margin, Part};
+use super::posture::ends;
+use crate::rods::chain::Chain;
+use crate::rods::geometry::{Bounds, Core, Nearest, Point, between_segments, distance};
+use crate::rods::obstacle::{Obstacle, Obstacles};
+use crate::rods::own_body::OwnBody;
+
+/// A part near something that stands still.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Wall<const D: usize> {
+    pub(super) part: Part,
+    pub(super) core: Core<D>,
+    /// Distance from the core to be kept, meters: that of touching, or less if it was less.
+    pub(super) keep_m: f64,
+}
+
+/// Two parts of the chain near each other.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Pair {
+    pub(super) parts: [Part; 2],
+    /// Distance to be kept, meters: that of touching, or less if it was less.
+    pub(super) keep_m: f64,
+}
+
+/// The contacts of a tick.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Contacts<const D: usize> {
+    /// Parts near an obstacle that moves.
+    pub(super) threats: Vec<Threat>,
+    pub(super) walls: Vec<Wall<D>>,
+    pub(super) pairs: Vec<Pair>,
+    body: OwnBody<D>,
+}
+
+impl<const D: usize> Contacts<D> {
+    /// Collects the parts near obstacles that move. Connectors move by `way_m` at most.
+    pub(super) fn look_for_movers(
+        &mut self,
+        chain: &Chain<D>,
+        obstacles: &Obstacles<D>,
+        (margin, way_m): (Margin, f64),
+    ) {
+        let within_m = |o: &Obstacle<D>| margin.around(o) + REACH * way_m;
+        collect(chain, obstacles, &mut self.body, within_m, &mut self.threats);
+    }
+
+    /// Collects walls and own parts that connectors may reach on a way of `way_m`.
+    pub(super) fn look_around(
+        &mut self,
+        chain: &Chain<D>,
+        obstacles: &Obstacles<D>,
+        (own, way_m): (bool, f64),
+    ) {
+        let reach_m = REACH * way_m;
+        self.walls.clear();
+        self.pairs.clear();
+        for part in parts(chain) {
+            let (ends, radius_m) = (ends(chain.points(), part), radius_m(chain, part));
+            obstacles.visit(&Bounds::of(&ends).grown(radius_m + reach_m), |o| {
+                let apart_m = o.core.nearest_to_segment(ends).distance_m;
+                let touch_m = radius_m + o.radius_m;
+                if !o.is_moving() && apart_m < touch_m + reach_m {
+                    self.walls.push(Wall { part, core: o.core, keep_m: touch_m.min(apart_m) });
+                }
+            });
+        }
+        if own {
+            self.pair_up(chain, reach_m);
+        }
+    }
+
+    fn pair_up(&mut self, chain: &Chain<D>, reach_m: f64) {
+        let n = chain.rods().len();
+        let boxes = |i: usize| {
+            let [a, b] = [i, i + 1].map(|k| chain.connectors()[k].radius_m);
+            Bounds::of(&chain.points()[i..i + 2]).grown(a.max(b) + 0.5 * reach_m)
+        };
+        self.body.rebuild((0..n).map(boxes));
+        let Self { body, pairs, .. } = self;
+        for rod in 0..n {
+            body.visit(&boxes(rod), |other| {
+                if other > rod {
+                    let last = (other + 1 == n).then_some(other + 1);
+                    for parts in candidates(rod, other, last).into_iter().flatten() {
+                        pairs.extend(near(chain, parts, reach_m));
+                    }
+                }
+            });
+        }
+    }
+}
+
+/// Distance within which something is a contact, as a multiple of the way of a connector.
+const REACH: f64 = 4.0;
+
+fn parts<const D: usize>(chain: &Chain<D>) -> impl Iterator<Item = Part> + use<D> {
+    let n = chain.rods().len();
+    (0..=n).map(Part::Connector).chain((0..n).map(Part::Rod))
+}
+
+/// Returns the radius of a part, meters.
+pub(super) fn radius_m<const D: usize>(chain: &Chain<D>, part: Part) -> f64 {
+    match part {
+        Part::Connector(k) => chain.connectors()[k].radius_m,
+        Part::Rod(i) => chain.rods()[i].radius_m,
+    }
+}
+
+/// Returns the pairs that two rods and their connectors make. As in any motion, neighbors are
+/// exempt: connectors one index apart, rods two.
+fn candidates(rod: usize, other: usize, last: Option<usize>) -> [Option<[Part; 2]>; 6] {
+    let connectors = |c: usize| (c > rod + 1).then_some([Part::Connector(rod), Part::Connector(c)]);
+    let on_rod = |c: usize| (c > rod + 2).then_some([Part::Rod(rod), Part::Connector(c)]);
+    [
+        connectors(other),
+        last.and_then(connectors),
+        on_rod(other),
+        last.and_then(on_rod),
+        (rod + 1 < other).then_some([Part::Connector(rod), Part::Rod(other)]),
+        (other > rod + 2).then_some([Part::Rod(rod), Part::Rod(other)]),
+    ]
+}
+
+fn near<const D: usize>(chain: &Chain<D>, parts: [Part; 2], reach_m: f64) -> Option<Pair> {
+    let apart_m = nearest(chain.points(), parts).distance_m;
+    let touch_m = parts.map(|part| radius_m(chain, part)).iter().sum::<f64>();
+    (apart_m < touch_m + reach_m).then(|| Pair { parts, keep_m: touch_m.min(apart_m) })
+}
+
+/// Returns the nearest points of two parts.
+pub(super) fn nearest<const D: usize>(points: &[Point<D>], parts: [Part; 2]) -> Nearest<D> {
+    match parts {
+        [Part::Connector(a), Part::Connector(b)] => Nearest::of(points[a], points[b]),
+        _ => between_segments(ends(points, parts[0]), ends(points, parts[1])),
+    }
+}
+
+/// Returns where on a part a point lies: 0 at its first end, 1 at its second.
+pub(super) fn along_rod<const D: usize>(ends: [Point<D>; 2], at: Point<D>) -> f64 {
+    let length_m = distance(ends[0], ends[1]);
+    if length_m > 0.0 { (distance(ends[0], at) / length_m).min(1.0) } else { 0.0 }
+}

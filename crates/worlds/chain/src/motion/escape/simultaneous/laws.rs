@@ -1,0 +1,93 @@
+//! The laws that every motion keeps, whatever comes.
+
+use super::super::threat::Part;
+use super::contacts::{Contacts, nearest};
+use super::posture::{Posture, ends};
+use super::solve::Given;
+use crate::rods::chain::{Chain, LENGTH_TOLERANCE_M};
+use crate::rods::geometry::{Point, angle_rad, distance, sub, unit};
+use crate::rods::scene::{BEND_TOLERANCE_RAD, TOLERANCE_M};
+use crate::rods::sweep::Sweep;
+use sidestep_kernel::math::cos;
+
+/// A bend limit: that of a connector, or its bend before the tick where that was sharper.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Bend {
+    connector: usize,
+    most_rad: f64,
+}
+
+impl Bend {
+    /// Returns the limit of an inner connector.
+    pub(super) fn at<const D: usize>(chain: &Chain<D>, connector: usize) -> Option<Self> {
+        let limit_rad = chain.connectors()[connector].max_bend_rad;
+        let most_rad = chain.bend_rad(connector)?.max(limit_rad);
+        Some(Self { connector, most_rad })
+    }
+
+    /// Moves the neighbors of a connector apart that bends too far; returns the correction,
+    /// meters.
+    pub(super) fn correct<const D: usize>(&self, posture: &mut Posture<'_, D>) -> f64 {
+        let [a, b, c] = [0, 1, 2].map(|k| posture.points[self.connector - 1 + k]);
+        let (into_m, out_m) = (distance(a, b), distance(b, c));
+        let least2 = into_m * into_m + out_m * out_m + 2.0 * into_m * out_m * cos(self.most_rad);
+        let short_m = least2.max(0.0).sqrt() * (1.0 + SPARE) - distance(a, c);
+        let Some(away) = unit(sub(c, a)).filter(|_| short_m > 0.0) else { return 0.0 };
+        let neighbors = [self.connector - 1, self.connector + 1].map(Part::Connector);
+        posture.part((neighbors[0], 0.0), (neighbors[1], 0.0), (away, short_m));
+        short_m
+    }
+
+    fn holds<const D: usize>(&self, points: &[Point<D>]) -> bool {
+        let [a, b, c] = [0, 1, 2].map(|k| points[self.connector - 1 + k]);
+        angle_rad(sub(b, a), sub(c, b)) <= self.most_rad + BEND_TOLERANCE_RAD
+    }
+}
+
+/// Part by which corrected bends stay below their limits.
+const SPARE: f64 = 1e-6;
+/// Rounding of ways, meters.
+const ROUNDING_M: f64 = 1e-12;
+
+/// Places that are checked.
+pub(super) struct Laws<'a, 'b, const D: usize> {
+    pub(super) given: &'a Given<'b, D>,
+    pub(super) points: &'a [Point<D>],
+}
+
+impl<const D: usize> Laws<'_, '_, D> {
+    /// Whether all laws hold.
+    pub(super) fn hold(&self, contacts: &Contacts<D>, bends: &[Bend]) -> bool {
+        self.lengths_hold()
+            && self.ways_hold()
+            && bends.iter().all(|bend| bend.holds(self.points))
+            && contacts.pairs.iter().all(|pair| {
+                nearest(self.points, pair.parts).distance_m >= pair.keep_m - TOLERANCE_M
+            })
+            && contacts.walls.iter().all(|wall| {
+                let to = ends(self.points, wall.part);
+                let apart_m = wall.core.nearest_to_segment(to).distance_m;
+                let from = ends(self.given.chain.points(), wall.part);
+                apart_m >= wall.keep_m - TOLERANCE_M
+                    && Sweep { from, to }.is_clear(&wall.core, wall.keep_m)
+            })
+    }
+
+    fn lengths_hold(&self) -> bool {
+        let ways = self.points.windows(2).map(|w| distance(w[0], w[1]));
+        ways.zip(self.given.chain.rods()).all(|(length_m, rod)| {
+            let allowed = rod.min_m - LENGTH_TOLERANCE_M..=rod.max_m + LENGTH_TOLERANCE_M;
+            allowed.contains(&length_m)
+        })
+    }
+
+    fn ways_hold(&self) -> bool {
+        let Given { chain, start, .. } = *self.given;
+        self.points.iter().enumerate().all(|(k, p)| {
+            let (connector, was) = (&chain.connectors()[k], chain.points()[k]);
+            distance(start[k], *p) <= self.given.room_m(k) + ROUNDING_M
+                && connector.mobility.allows(*p, was)
+                && (!connector.is_still() || *p == was)
+        })
+    }
+}

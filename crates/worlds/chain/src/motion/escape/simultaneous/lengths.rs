@@ -1,0 +1,105 @@
+//! The lengths of all rods at once.
+//!
+//! The rods of a chain depend only on their neighbors, so the equations for the corrections of all
+//! lengths are a band of three, solved in time linear in the rods. One by one, corrections would
+//! need as many passes as there are rods to get from one end of the chain to the other.
+
+use super::posture::Posture;
+use crate::rods::chain::Rod;
+use crate::rods::geometry::{Point, along, dot, norm, sub};
+
+/// Brings rods back within their limits; owns its buffers.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Lengths<const D: usize> {
+    /// Direction of each rod that is at a limit or beyond; zero for others.
+    directions: Vec<Point<D>>,
+    /// Main diagonal, then pivots; side diagonal toward the rod before; lengths beyond the limits.
+    diagonal: Vec<f64>,
+    side: Vec<f64>,
+    beyond_m: Vec<f64>,
+}
+
+/// Part of a rod's play that is left free at either limit, and the most of it, meters.
+const SPARE: f64 = 0.25;
+const SPARE_M: f64 = 1e-7;
+/// Distance from a limit at which a rod counts as being there, meters.
+const AT_LIMIT_M: f64 = 1e-6;
+/// Keeps the equations solvable if a straight chain is held at both ends.
+const DAMPING: f64 = 1e-9;
+/// Corrections of a restoration at most, and the error at which it ends, meters.
+const MOST: usize = 8;
+const EXACT_M: f64 = 1e-12;
+
+impl<const D: usize> Lengths<D> {
+    /// Corrects until all lengths are within their limits, if they get there.
+    pub(super) fn restore(&mut self, posture: &mut Posture<'_, D>, rods: &[Rod]) {
+        for _ in 0..MOST {
+            if self.correct(posture, rods) <= EXACT_M {
+                break;
+            }
+        }
+    }
+
+    /// Makes one correction of all lengths; returns the greatest error before it, meters.
+    pub(super) fn correct(&mut self, posture: &mut Posture<'_, D>, rods: &[Rod]) -> f64 {
+        let worst_m = self.measure(posture, rods);
+        if worst_m > EXACT_M {
+            self.set_up(posture);
+            self.eliminate();
+            self.apply(posture);
+        }
+        worst_m
+    }
+
+    fn measure(&mut self, posture: &Posture<'_, D>, rods: &[Rod]) -> f64 {
+        self.directions.clear();
+        self.beyond_m.clear();
+        let mut worst_m = 0.0_f64;
+        for (i, rod) in rods.iter().enumerate() {
+            let way = sub(posture.points[i + 1], posture.points[i]);
+            let length_m = norm(way);
+            let spare_m = SPARE_M.min(SPARE * (rod.max_m - rod.min_m));
+            let (low_m, high_m) = (rod.min_m + spare_m, rod.max_m - spare_m);
+            let beyond_m = length_m - length_m.clamp(low_m, high_m);
+            let is_free = length_m > low_m + AT_LIMIT_M && length_m < high_m - AT_LIMIT_M;
+            let counts = !is_free && length_m > 0.0;
+            self.directions.push(if counts { way.map(|x| x / length_m) } else { [0.0; D] });
+            self.beyond_m.push(if counts { beyond_m } else { 0.0 });
+            worst_m = worst_m.max(beyond_m.abs());
+        }
+        worst_m
+    }
+
+    fn set_up(&mut self, posture: &Posture<'_, D>) {
+        self.diagonal.clear();
+        self.side.clear();
+        for (i, u) in self.directions.iter().enumerate() {
+            let ease = dot(*u, *u) * (posture.ease[i] + posture.ease[i + 1]);
+            self.diagonal.push(if ease > 0.0 { ease + DAMPING } else { 1.0 });
+            let before = i.checked_sub(1).map_or([0.0; D], |b| self.directions[b]);
+            self.side.push(-posture.ease[i] * dot(before, *u));
+        }
+    }
+
+    /// Solves the equations; the solution replaces the errors.
+    fn eliminate(&mut self) {
+        let Self { diagonal, side, beyond_m, .. } = self;
+        for i in 1..diagonal.len() {
+            let factor = side[i] / diagonal[i - 1];
+            diagonal[i] -= factor * side[i];
+            beyond_m[i] -= factor * beyond_m[i - 1];
+        }
+        for i in (0..diagonal.len()).rev() {
+            let after = if i + 1 < diagonal.len() { side[i + 1] * beyond_m[i + 1] } else { 0.0 };
+            beyond_m[i] = (beyond_m[i] - after) / diagonal[i];
+        }
+    }
+
+    fn apply(&self, posture: &mut Posture<'_, D>) {
+        for (i, (u, by_m)) in self.directions.iter().zip(&self.beyond_m).enumerate() {
+            let ease = [posture.ease[i], posture.ease[i + 1]];
+            posture.points[i] = along(posture.points[i], *u, ease[0] * by_m);
+            posture.points[i + 1] = along(posture.points[i + 1], *u, -ease[1] * by_m);
+        }
+    }
+}

@@ -1,0 +1,174 @@
+//! Escape by a simultaneous solve of all constraints of a tick.
+//!
+//! ```text
+//! solve.rs       where all parts go: contacts.rs, lengths.rs, and the laws.rs that hold whatever comes
+//! way_out.rs     what is done for parts that are caught: roll-outs of ways through an obstacle
+//! posture.rs     positions under trial
+//! ```
+//!
+//! One part that flees alone is held by its neighbors, which nobody asks to move. Here all of them
+//! move, own parts push each other, and what approaches is avoided by a margin as wide as its way
+//! in the look-ahead. If a part is caught all the same, because obstacles close like tongs or the
+//! chain is taut, it leaves through one of them, by the way that roll-outs find shortest.
+
+mod contacts;
+mod laws;
+mod lengths;
+mod posture;
+mod solve;
+#[cfg(test)]
+mod tests;
+mod way_out;
+
+use super::threat::Threat;
+use super::{Escape, Escaped, Left, Margin};
+use crate::rods::chain::Chain;
+use crate::rods::geometry::{Point, distance};
+use crate::rods::obstacle::Obstacles;
+use crate::rods::rules::Rules;
+use crate::rods::veto::{Reason, Veto};
+use solve::{Given, Solver, Through, Wishes};
+pub use way_out::WayOut;
+
+/// Leads all parts of a chain out of the way at once. It owns its buffers.
+#[derive(Debug, Clone)]
+pub(super) struct Simultaneous<const D: usize> {
+    rules: Escape,
+    solver: Solver<D>,
+    best: Vec<Point<D>>,
+    start: Vec<Point<D>>,
+}
+
+/// Most steps of a tick, each at most as long as the thinnest part, so that nothing is jumped over.
+const MOST_STEPS: f64 = 8.0;
+/// Rounds of a solve with margins, and rounds without.
+const ROUNDS: [usize; 2] = [24, 40];
+/// Part of its speed from which on a chain counts as pressed.
+const PRESSED: f64 = 0.9;
+/// Penetration that counts as contact, meters.
+const TOUCH_M: f64 = 1e-9;
+
+impl<const D: usize> Simultaneous<D> {
+    /// Returns an escape that remembers nothing yet.
+    pub(super) fn new(rules: Escape) -> Self {
+        Self { rules, solver: Solver::default(), best: Vec::new(), start: Vec::new() }
+    }
+
+    /// Moves the chain out of the way.
+    pub(super) fn escape(
+        &mut self,
+        chain: &mut Chain<D>,
+        obstacles: &Obstacles<D>,
+        rules: &Rules,
+        start: &[Point<D>],
+        way_out: &mut WayOut,
+    ) -> Escaped<D> {
+        let thinnest_m = 4.0 * chain.step_m();
+        let most_m = self.rules.most_m().min(MOST_STEPS * thinnest_m);
+        let steps = (most_m / thinnest_m).ceil().max(1.0);
+        let mut told = Escaped::default();
+        way_out.tick();
+        for step in 1..=steps as usize {
+            let most_m = most_m * step as f64 / steps;
+            let mut at = std::mem::take(&mut self.start);
+            at.clear();
+            at.extend_from_slice(start);
+            let given = Given { chain, obstacles, rules, start: &at, most_m };
+            let goes_on = self.step(&given, way_out, &mut told);
+            if goes_on {
+                chain.points_mut().copy_from_slice(&self.best);
+            }
+            self.start = at;
+            if !goes_on || told.left.is_none() {
+                break;
+            }
+        }
+        let ways_m = start.iter().zip(chain.points()).map(|(a, b)| distance(*a, *b));
+        let longest_m = ways_m.fold(0.0, f64::max);
+        told.is_pressed =
+            told.left.is_some() || way_out.is_passing() || longest_m > PRESSED * most_m;
+        told
+    }
+
+    /// Finds the places of one step, in `best`; returns whether there are any.
+    fn step(&mut self, given: &Given<'_, D>, way_out: &mut WayOut, told: &mut Escaped<D>) -> bool {
+        let margin = self.rules.look_ahead();
+        if !self.solver.look(given, margin) {
+            *way_out = WayOut::default();
+            return false;
+        }
+        way_out.forget_what_is_passed(given, &self.solver);
+        let (before_m, nearest) = self.solver.least_gap(given, given.chain.points());
+        if before_m >= margin_around(given, margin, nearest) && !way_out.is_passing() {
+            return false;
+        }
+        let mut gap_m = self.attempt(given, way_out.through(), before_m);
+        if way_out.plan(&self.rules, given, &self.solver, gap_m) {
+            gap_m = self.attempt(given, way_out.through(), before_m);
+        }
+        self.tell(given, gap_m, nearest, told)
+    }
+
+    /// Solves with the margins of the look-ahead and, if that leaves a part inside, without; the
+    /// better one is in `best`. Returns its least gap, meters; that of now if nothing is better.
+    fn attempt(&mut self, given: &Given<'_, D>, through: Option<Through<D>>, before_m: f64) -> f64 {
+        self.best.clear();
+        self.best.extend_from_slice(given.chain.points());
+        // On the way through an obstacle depth is no measure.
+        let mut best_m = if through.is_some() { f64::NEG_INFINITY } else { before_m };
+        for margin in [self.rules.look_ahead(), Margin::NONE] {
+            if !self.solver.solve(given, &Wishes { margin, through, rounds: ROUNDS }) {
+                continue;
+            }
+            let (gap_m, _) = self.solver.least_gap(given, &self.solver.points);
+            if gap_m > best_m || gap_m >= -TOUCH_M {
+                best_m = gap_m;
+                self.best.copy_from_slice(&self.solver.points);
+            }
+            if gap_m >= -TOUCH_M {
+                break;
+            }
+        }
+        if best_m == f64::NEG_INFINITY { before_m } else { best_m }
+    }
+
+    fn tell(
+        &self,
+        given: &Given<'_, D>,
+        gap_m: f64,
+        nearest: Option<Threat>,
+        told: &mut Escaped<D>,
+    ) -> bool {
+        let moved = self.best != given.chain.points();
+        if let Some(threat) = nearest.filter(|_| moved) {
+            told.moves = 1;
+            let obstacle = given.obstacles.moving()[threat.mover].id;
+            told.first = told.first.or(Some((threat.part.connector(), obstacle)));
+        }
+        (told.deepest_m, told.left) = (0.0, None);
+        let (gap_m, deepest) = (gap_m, self.solver.least_gap(given, &self.best).1);
+        if let Some(threat) = deepest.filter(|_| gap_m < -TOUCH_M) {
+            let k = threat.part.connector();
+            let goes_m = distance(given.start[k], self.best[k]);
+            let is_capped = goes_m > PRESSED * given.most_m;
+            (told.vetoes, told.capped) = (1, usize::from(is_capped));
+            let reason = if is_capped { Reason::StepLimit } else { Reason::Inside };
+            let obstacle = given.obstacles.moving()[threat.mover].id;
+            let reached = self.best[k];
+            let veto = Veto { by: k, from: k, reason, obstacle: Some(obstacle), reached };
+            told.deepest_m = -gap_m;
+            told.left = Some(Left { part: threat.part, obstacle, veto: Some(veto) });
+        }
+        moved
+    }
+}
+
+/// Returns the margin around the obstacle of a threat, meters.
+fn margin_around<const D: usize>(
+    given: &Given<'_, D>,
+    margin: Margin,
+    threat: Option<Threat>,
+) -> f64 {
+    let mover = threat.map(|threat| &given.obstacles.moving()[threat.mover]);
+    mover.map_or(0.0, |mover| margin.around(mover))
+}

@@ -1,0 +1,280 @@
+//! One simultaneous solve: where all parts go in a tick.
+//!
+//! First rounds of corrections with margins around what moves, then rounds without, then only the
+//! laws: rods, speed, walls, own parts. A solve whose result breaks a law is given up, so that
+//! obstacles may be in conflict with laws, and never the other way round.
+
+use super::super::Margin;
+use super::super::threat::{Threat, left_of};
+use super::contacts::{Contacts, along_rod, nearest, radius_m};
+use super::laws::{Bend, Laws};
+use super::lengths::Lengths;
+use super::posture::{Posture, ends};
+use crate::rods::chain::Chain;
+use crate::rods::geometry::{
+    Nearest, Point, along, between, distance, perpendicular, scaled, sub, unit,
+};
+use crate::rods::obstacle::{Obstacle, Obstacles};
+use crate::rods::rules::Rules;
+use std::f64::consts::PI;
+
+/// The givens of a solve.
+#[derive(Clone, Copy)]
+pub(super) struct Given<'a, const D: usize> {
+    pub(super) chain: &'a Chain<D>,
+    pub(super) obstacles: &'a Obstacles<D>,
+    pub(super) rules: &'a Rules,
+    /// Positions from which ways count.
+    pub(super) start: &'a [Point<D>],
+    /// The longest way of a connector, meters.
+    pub(super) most_m: f64,
+}
+
+impl<const D: usize> Given<'_, D> {
+    /// Returns how far from its start a connector may be, meters: as far as its speed allows, or
+    /// as far as it already is.
+    pub(super) fn room_m(&self, k: usize) -> f64 {
+        self.most_m.max(distance(self.start[k], self.chain.points()[k]))
+    }
+}
+
+/// A way through an obstacle: parts in it leave in one direction, whatever is nearer.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Through<const D: usize> {
+    pub(super) obstacle: u32,
+    /// Unit vector.
+    pub(super) toward: Point<D>,
+}
+
+/// The wishes of a solve, beside the laws.
+#[derive(Clone, Copy)]
+pub(super) struct Wishes<const D: usize> {
+    pub(super) margin: Margin,
+    pub(super) through: Option<Through<D>>,
+    /// Rounds with margins, and rounds without.
+    pub(super) rounds: [usize; 2],
+}
+
+/// Finds places for all connectors. It owns its buffers.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Solver<const D: usize> {
+    pub(super) contacts: Contacts<D>,
+    /// The places found.
+    pub(super) points: Vec<Point<D>>,
+    ease: Vec<f64>,
+    bends: Vec<Bend>,
+    lengths: Lengths<D>,
+}
+
+/// Distance around an obstacle in which the chain goes along on a way through it, as a multiple of
+/// its longest rod.
+const ALONG: f64 = 2.0;
+/// Part of a margin's violation that a round corrects.
+const SOFTLY: f64 = 0.3;
+/// Rounds in which only laws count, and the number of them between two checks.
+const SETTLING: usize = 48;
+const CHECK_EVERY: usize = 8;
+/// Parts of the motion that are tried if all of it breaks a law.
+const PARTS: [f64; 3] = [1.0, 0.5, 0.2];
+/// Distance beyond contact that corrections aim at, at most, meters; and as a part of the distance.
+const SLACK_M: f64 = 1e-4;
+const SLACK: f64 = 0.01;
+/// Correction below which all is settled, meters.
+const SETTLED_M: f64 = 1e-6;
+/// Part of its longest way that a connector leaves free for the last corrections.
+const RESERVE: f64 = 1e-4;
+
+impl<const D: usize> Solver<D> {
+    /// Collects the contacts of a tick; returns whether anything that moves is near.
+    pub(super) fn look(&mut self, given: &Given<'_, D>, margin: Margin) -> bool {
+        let Given { chain, obstacles, rules, most_m, .. } = *given;
+        self.contacts.look_for_movers(chain, obstacles, (margin, most_m));
+        if self.contacts.threats.is_empty() {
+            return false;
+        }
+        self.contacts.look_around(chain, obstacles, (rules.self_collision, most_m));
+        self.ease.clear();
+        self.ease.extend(chain.connectors().iter().map(|c| f64::from(u8::from(!c.is_still()))));
+        self.bends.clear();
+        let limited = chain.connectors().iter().enumerate().filter(|(_, c)| c.max_bend_rad < PI);
+        self.bends.extend(limited.filter_map(|(k, _)| Bend::at(chain, k)));
+        true
+    }
+
+    /// Finds places by some wishes; returns whether they keep the laws.
+    pub(super) fn solve(&mut self, given: &Given<'_, D>, wishes: &Wishes<D>) -> bool {
+        self.points.clear();
+        self.points.extend_from_slice(given.chain.points());
+        self.set_out(given, wishes.through);
+        let [wishing, avoiding] = wishes.rounds;
+        for round in 0..wishing + avoiding {
+            let soft = (round < wishing).then_some(wishes.margin).filter(|m| *m != Margin::NONE);
+            let fled_m = self.flee(given, wishes.through, soft);
+            let held_m = self.hold();
+            self.lengths.correct(&mut posture(&mut self.points, &self.ease), given.chain.rods());
+            self.bound(given);
+            if fled_m.max(held_m) < SETTLED_M {
+                break;
+            }
+        }
+        self.settle(given)
+    }
+
+    /// Lets the chain around an obstacle that it goes through set out together, for parts that are
+    /// only dragged along come late.
+    fn set_out(&mut self, given: &Given<'_, D>, through: Option<Through<D>>) {
+        let Some(through) = through else { return };
+        let moving = given.obstacles.moving();
+        let Some(mover) = moving.iter().find(|o| o.id == through.obstacle) else { return };
+        let longest_m = given.chain.rods().iter().map(|rod| rod.max_m).fold(0.0, f64::max);
+        for (point, ease) in self.points.iter_mut().zip(&self.ease) {
+            let apart_m = mover.core.nearest_to_point(*point).distance_m - mover.radius_m;
+            if apart_m < ALONG * longest_m {
+                *point = along(*point, through.toward, ease * given.most_m);
+            }
+        }
+    }
+
+    /// Leads parts away from what moves; returns the greatest correction, meters.
+    fn flee(
+        &mut self,
+        given: &Given<'_, D>,
+        through: Option<Through<D>>,
+        soft: Option<Margin>,
+    ) -> f64 {
+        let Self { contacts, points, ease, .. } = self;
+        let mut posture = posture(points, ease);
+        let mut most_m = 0.0_f64;
+        for threat in &contacts.threats {
+            let mover = &given.obstacles.moving()[threat.mover];
+            let ends = posture.ends(threat.part);
+            let nearest = mover.core.nearest_to_segment(ends);
+            let gap_m = nearest.distance_m - mover.radius_m - radius_m(given.chain, threat.part);
+            let through = through.filter(|through| through.obstacle == mover.id);
+            let keep_m = match (through, soft) {
+                (None, Some(margin)) => margin.around(mover),
+                _ => SLACK_M,
+            };
+            if gap_m >= keep_m {
+                continue;
+            }
+            let by = match through {
+                Some(through) => scaled(through.toward, given.most_m),
+                None => {
+                    let part = if soft.is_some() { SOFTLY } else { 1.0 };
+                    scaled(away_from(mover, &nearest), part * (keep_m - gap_m))
+                }
+            };
+            posture.shift(threat.part, along_rod(ends, nearest.on_body), by);
+            most_m = most_m.max(keep_m - gap_m);
+        }
+        most_m
+    }
+
+    /// Leads parts out of walls and apart, and bends back; returns the greatest correction,
+    /// meters.
+    fn hold(&mut self) -> f64 {
+        let Self { contacts, points, ease, bends, .. } = self;
+        let mut posture = posture(points, ease);
+        let mut most_m = 0.0_f64;
+        for wall in &contacts.walls {
+            let ends = posture.ends(wall.part);
+            let nearest = wall.core.nearest_to_segment(ends);
+            let short_m = wall.keep_m + slack_m(wall.keep_m) - nearest.distance_m;
+            let Some(away) = unit(sub(nearest.on_body, nearest.on_core)) else { continue };
+            if short_m > 0.0 {
+                let along_rod = along_rod(ends, nearest.on_body);
+                posture.shift(wall.part, along_rod, scaled(away, short_m));
+                most_m = most_m.max(short_m);
+            }
+        }
+        for pair in &contacts.pairs {
+            let nearest = nearest(posture.points, pair.parts);
+            let short_m = pair.keep_m + slack_m(pair.keep_m) - nearest.distance_m;
+            if short_m > 0.0 {
+                let [one, other] = pair.parts;
+                let along_one = along_rod(posture.ends(one), nearest.on_body);
+                let along_other = along_rod(posture.ends(other), nearest.on_core);
+                let across = || perpendicular(crate::rods::geometry::first_axis());
+                let away = unit(sub(nearest.on_core, nearest.on_body)).unwrap_or_else(across);
+                posture.part((one, along_one), (other, along_other), (away, short_m));
+                most_m = most_m.max(short_m);
+            }
+        }
+        bends.iter().fold(most_m, |most_m, bend| most_m.max(bend.correct(&mut posture)))
+    }
+
+    /// Keeps every connector within its speed, and where it may be.
+    fn bound(&mut self, given: &Given<'_, D>) {
+        for (k, point) in self.points.iter_mut().enumerate() {
+            if self.ease[k] > 0.0 {
+                let room_m = given.room_m(k) * (1.0 - RESERVE);
+                let connector = &given.chain.connectors()[k];
+                let allowed = connector.mobility.project(*point, given.chain.points()[k]);
+                *point = clipped(given.start[k], allowed, room_m);
+            }
+        }
+    }
+
+    /// Corrects until the laws hold, if necessary for a part of the motion; returns whether they
+    /// do.
+    fn settle(&mut self, given: &Given<'_, D>) -> bool {
+        PARTS.iter().any(|&part| {
+            if part < 1.0 {
+                for (point, from) in self.points.iter_mut().zip(given.chain.points()) {
+                    *point = between(*from, *point, part);
+                }
+            }
+            (0..SETTLING).any(|round| {
+                self.hold();
+                self.bound(given);
+                let mut posture = posture(&mut self.points, &self.ease);
+                self.lengths.restore(&mut posture, given.chain.rods());
+                round % CHECK_EVERY == 0 && self.keeps_laws(given)
+            })
+        })
+    }
+
+    fn keeps_laws(&self, given: &Given<'_, D>) -> bool {
+        let Self { contacts, points, bends, .. } = self;
+        Laws { given, points }.hold(contacts, bends)
+    }
+
+    /// Returns the least gap between the chain at some places and what moves, meters, and the
+    /// threat that has it.
+    pub(super) fn least_gap(
+        &self,
+        given: &Given<'_, D>,
+        points: &[Point<D>],
+    ) -> (f64, Option<Threat>) {
+        let mut least = (f64::INFINITY, None);
+        for threat in &self.contacts.threats {
+            let mover = &given.obstacles.moving()[threat.mover];
+            let apart_m = mover.core.nearest_to_segment(ends(points, threat.part)).distance_m;
+            let gap_m = apart_m - mover.radius_m - radius_m(given.chain, threat.part);
+            if gap_m < least.0 {
+                least = (gap_m, Some(*threat));
+            }
+        }
+        least
+    }
+}
+
+fn posture<'a, const D: usize>(points: &'a mut [Point<D>], ease: &'a [f64]) -> Posture<'a, D> {
+    Posture { points, ease }
+}
+
+/// Returns the direction from an obstacle to the nearest point of a part.
+pub(super) fn away_from<const D: usize>(mover: &Obstacle<D>, nearest: &Nearest<D>) -> Point<D> {
+    unit(sub(nearest.on_body, nearest.on_core)).unwrap_or_else(|| left_of(mover))
+}
+
+fn slack_m(keep_m: f64) -> f64 {
+    SLACK_M.min(SLACK * keep_m)
+}
+
+/// Returns the point of a ball around `center` that is nearest to `to`.
+fn clipped<const D: usize>(center: Point<D>, to: Point<D>, radius_m: f64) -> Point<D> {
+    let way_m = distance(center, to);
+    if way_m <= radius_m { to } else { along(center, sub(to, center), radius_m / way_m) }
+}
