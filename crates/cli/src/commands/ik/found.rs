@@ -27,7 +27,7 @@ pub(super) struct Found {
     /// reached.
     solutions: Vec<Solution>,
     /// Meshes that stand as boxes, and shapes that could not be read.
-    pub(super) remarks: Vec<String>,
+    remarks: Vec<String>,
     /// Number of postures asked for.
     #[serde(skip)]
     wanted: usize,
@@ -44,7 +44,7 @@ struct Solution {
 }
 
 impl Found {
-    pub(super) fn new(arm: &Arm, goal: &ArmGoal, answer: ArmAnswer) -> Self {
+    pub(super) fn new(arm: &Arm, goal: &ArmGoal, answer: ArmAnswer, remarks: Vec<String>) -> Self {
         let is_turned = goal.asked.turn != Turn::Free;
         let angle = |error_rad: f64| is_turned.then_some(error_rad);
         let solution = |posture: &Posture| Solution {
@@ -69,7 +69,7 @@ impl Found {
             iterations: answer.iterations,
             starts: answer.starts,
             solutions: all.map(solution).collect(),
-            remarks: Vec::new(),
+            remarks,
             wanted: goal.solutions,
             placed: arm.at(&answer.values),
         }

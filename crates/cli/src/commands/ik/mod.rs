@@ -108,7 +108,7 @@ pub(crate) fn ik(args: &IkArgs, console: Console) -> Result<ExitCode, Failure> {
     let goal = args.goal.goal(args.pose()?, &body)?;
     let answer = arm.chain.solve(&goal, &arm.values)?;
     remarks.iter().for_each(|remark| console.note(remark));
-    let found = Found { remarks, ..Found::new(&arm, &goal, answer) };
+    let found = Found::new(&arm, &goal, answer, remarks);
     console.result(&found, || found.text());
     Ok(if found.reached { ExitCode::Done } else { ExitCode::Failed })
 }
