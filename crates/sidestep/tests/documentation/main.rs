@@ -50,12 +50,14 @@ fn named_paths(text: &str) -> Vec<&str> {
     spans.filter(is_path).filter(is_ours).collect()
 }
 
-/// Returns the targets of links and pictures within the repository.
+/// Returns the targets of links and pictures within the repository; `::` is in links to documented items.
 fn linked_paths(text: &str) -> Vec<&str> {
     let prose = text.split("```").step_by(2);
     let targets = prose.flat_map(|part| part.split("](").skip(1));
     let targets = targets.filter_map(|rest| rest.split([')', '#']).next());
-    targets.filter(|target| !target.is_empty() && !target.contains("://")).collect()
+    targets
+        .filter(|target| !target.is_empty() && !target.contains("://") && !target.contains("::"))
+        .collect()
 }
 
 /// Returns the contents of the blocks in a language.
@@ -151,6 +153,6 @@ fn the_code_that_the_book_shows_stands_in_an_example_that_is_compiled() {
 fn only_what_looks_like_a_path_is_taken_for_one() {
     let text = "`a/b.rs`, `cargo run x/y`, `runs/office`, `../shared`, ```\n`c/d`\n``` and `e/`";
     assert_eq!(named_paths(text), ["a/b.rs", "e/"]);
-    assert_eq!(linked_paths("[a](b.md#c) [d](https://e) ![f](g.png)"), ["b.md", "g.png"]);
+    assert_eq!(linked_paths("[a](b.md#c) [d](https://e) ![f](g.png) [h](a::B)"), ["b.md", "g.png"]);
     assert_eq!(blocks("```sh\nx\n```\n```toml\ny\n```\n", "toml"), ["y\n"]);
 }
