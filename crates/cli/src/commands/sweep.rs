@@ -22,7 +22,7 @@ Examples:
       --baseline airspace.method=none
   sidestep sweep office.toml --until ci=0.05 --max 1000 --metrics contacts
 
-On a cluster (docs/clusters.md has a Slurm array and a Kubernetes job):
+On a cluster (docs/src/clusters.md has a Slurm array and a Kubernetes job):
   sidestep sweep plan methods.toml --out sweeps/methods
   sidestep sweep run sweeps/methods --shard 0/8   and so on to 7/8
   sidestep sweep collect sweeps/methods

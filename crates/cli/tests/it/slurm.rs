@@ -1,4 +1,4 @@
-//! The array of `docs/clusters.md` on a real Slurm of one machine.
+//! The array of `docs/src/clusters.md` on a real Slurm of one machine.
 
 use crate::support::{Place, requires, wait_for};
 use crate::sweep::place;
@@ -112,7 +112,7 @@ fn free_ports() -> [u16; 2] {
 
 /// The script of the page, for four tasks of one processor.
 fn script(binary: &Path) -> String {
-    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/clusters.md");
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/src/clusters.md");
     let page = std::fs::read_to_string(page).expect("the page");
     let begin = page.find("#!/bin/sh").expect("a script");
     let script = &page[begin..begin + page[begin..].find("```").expect("its end")];

@@ -1,0 +1,80 @@
+//! Every command that the README and the book show runs as it stands, from a fresh copy of what a clone has.
+//!
+//! Commands are the lines of blocks in the language `sh` that begin with `sidestep` or
+//! `cargo run --release --`. A block that no test can run is marked `sh ignore`, and its page says why.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+const BINARY: &str = env!("CARGO_BIN_EXE_sidestep");
+/// What commands of the pages read.
+const INPUTS: [&str; 2] = ["examples", "scenarios"];
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+/// Returns the commands of a page in their order, each on one line.
+fn commands(page: &str) -> Vec<String> {
+    // Every other part is a block, and begins with its language.
+    let blocks = page.split("```").skip(1).step_by(2);
+    let shell = blocks.filter_map(|block| block.strip_prefix("sh\n"));
+    let joined = shell.map(|block| block.replace("\\\n", " ")).collect::<String>();
+    let from_source = |line: &str| line.replacen("cargo run --release --", "sidestep", 1);
+    let lines = joined.lines().map(from_source);
+    lines.filter(|line| line.starts_with("sidestep ")).collect()
+}
+
+fn copy(from: &Path, to: &Path) {
+    std::fs::create_dir(to).expect("a new folder");
+    for entry in std::fs::read_dir(from).expect("a folder") {
+        let path = entry.expect("an entry").path();
+        let copied = to.join(path.file_name().expect("a name"));
+        if path.is_dir() {
+            copy(&path, &copied);
+        } else {
+            std::fs::copy(&path, copied).expect("copied");
+        }
+    }
+}
+
+/// Runs the commands of a page as a shell would, in a folder of its own; returns how many there are.
+fn run_all(page: &Path) -> usize {
+    let place = tempfile::tempdir().expect("a temporary folder");
+    for input in INPUTS {
+        copy(&root().join(input), &place.path().join(input));
+    }
+    let binaries = Path::new(BINARY).parent().expect("a folder").display();
+    let path = format!("{binaries}:{}", std::env::var("PATH").unwrap_or_default());
+    let all = commands(&std::fs::read_to_string(page).expect("the page"));
+    for line in &all {
+        let mut shell = Command::new("sh");
+        shell.args(["-c", line]).current_dir(place.path()).env("PATH", &path);
+        let ended = shell.output().expect("a shell");
+        let said = String::from_utf8_lossy(&ended.stderr);
+        assert!(ended.status.success(), "{}: `{line}`: {said}", page.display());
+    }
+    all.len()
+}
+
+#[test]
+fn every_command_of_the_readme_runs() {
+    assert!(run_all(&root().join("README.md")) > 15, "the README shows what there is");
+}
+
+#[test]
+fn every_command_of_the_book_runs() {
+    let pages = std::fs::read_dir(root().join("docs/src")).expect("the book");
+    let mut pages: Vec<PathBuf> = pages.map(|page| page.expect("an entry").path()).collect();
+    pages.retain(|page| page.extension().is_some_and(|extension| extension == "md"));
+    pages.sort();
+    let commands: usize = pages.iter().map(|page| run_all(page)).sum();
+    assert!(commands > 15, "the book shows how: {commands}");
+}
+
+#[test]
+fn commands_are_found_in_blocks_of_shell_only() {
+    let page = "sidestep a\n```sh\nsidestep run \\\n  x # why\nmkdir y\ncargo run --release -- new z\n```\n\
+                ```sh ignore\nsidestep b\n```\n```text\nsidestep c\n```\n";
+    assert_eq!(commands(page), ["sidestep run    x # why", "sidestep new z"]);
+}

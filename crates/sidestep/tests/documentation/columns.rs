@@ -1,0 +1,123 @@
+//! The book's chapter of columns says what the program declares: no column more, none less, with its unit.
+//!
+//! The tables between the marks of the chapter are written by `SIDESTEP_WRITE=columns cargo test -p sidestep
+//! --test documentation`; meanings of metrics are written by hand.
+
+use super::{read, root};
+use serde_json::Value;
+use sidestep::kernel::Simulation;
+use sidestep::kernel::ports::table::split_unit;
+use sidestep::kernel::ports::{ColumnSpec, TableSchema};
+use sidestep::scenario::Source;
+use sidestep::worlds::WORLDS;
+use std::fmt::Write;
+
+const CHAPTER: &str = "docs/src/columns.md";
+
+/// A scenario of each world that records every table there is.
+const SCENARIOS: [(&str, &str); 3] = [
+    (
+        "robots",
+        "[map]\nascii = \"....\\n....\"\n[robots]\ncount = 1\nsensors = [\"sonar-8\"]\neffector = \"nomad\"\n\
+         [record]\ncalibration = true\n",
+    ),
+    ("airspace", "[airspace.generator]\nkind = \"superconflict\"\nn = 2\n"),
+    (
+        "chain",
+        "[[obstacles]]\nat_m = [3.0, 2.0]\nradius_m = 0.2\npatrol_m = [[3.0, 2.0], [3.0, 3.0]]\nspeed_m_s = 0.1\n\
+         [[chains]]\nconnectors = 3\nat_m = [0.0, 0.0]\nrod_m = 0.7\nrobots = { radius_m = 0.2 }\n\
+         [[chains.tasks]]\nkind = \"navigate\"\n",
+    ),
+];
+
+fn started(world: &str, scenario: &str) -> Box<dyn Simulation> {
+    let text = format!("format = 1\nworld = \"{world}\"\n{scenario}");
+    let source = Source::new(world, &text, root());
+    let compiled = WORLDS.compile(&source).unwrap_or_else(|error| panic!("{error}"));
+    let mut run = compiled.start(&source, 1);
+    run.begin_recording();
+    // Some metrics are there from the first cycle on only.
+    run.advance(1);
+    run
+}
+
+/// Returns the part of the chapter between the marks of a name.
+fn marked<'a>(chapter: &'a str, name: &str) -> &'a str {
+    let begin = format!("<!-- {name} -->\n");
+    let from = chapter.find(&begin).unwrap_or_else(|| panic!("{CHAPTER} has no mark {begin}"));
+    let rest = &chapter[from + begin.len()..];
+    &rest[..rest.find("<!-- end -->").expect("the end of a marked part")]
+}
+
+fn row(column: &ColumnSpec) -> String {
+    let (unit, ty) = (column.unit().unwrap_or(""), column.ty.name());
+    let missing = if column.is_nullable { "; may be missing" } else { "" };
+    format!("| `{}` | {ty} | {unit} | {}{missing} |\n", column.name, column.meaning)
+}
+
+fn rendered(schemas: &[TableSchema]) -> String {
+    let mut text = String::new();
+    for schema in schemas {
+        write!(text, "\n### `{}`\n\n| column | type | unit | meaning |\n", schema.name)
+            .expect("text");
+        text += "| --- | --- | --- | --- |\n";
+        schema.columns.iter().for_each(|column| text += &row(column));
+    }
+    text + "\n"
+}
+
+/// Returns the names of a run's metrics; counts by kind of something are one, by reason too.
+fn metrics(value: &Value, path: &str) -> Vec<String> {
+    let is_leaf = path.contains("_by_") || value.as_object().is_none();
+    if is_leaf {
+        return vec![path.trim_start_matches('.').to_string()];
+    }
+    let members = value.as_object().into_iter().flatten();
+    members.flat_map(|(key, value)| metrics(value, &format!("{path}.{key}"))).collect()
+}
+
+#[test]
+fn the_chapter_of_columns_has_the_tables_that_a_run_declares() {
+    let mut chapter = read(CHAPTER);
+    let is_written = std::env::var("SIDESTEP_WRITE").is_ok_and(|what| what == "columns");
+    for (world, scenario) in SCENARIOS {
+        let expected = rendered(&started(world, scenario).schemas());
+        let found = marked(&chapter, &format!("tables of {world}")).to_string();
+        if is_written {
+            chapter = chapter.replace(&found, &expected);
+            std::fs::write(root().join(CHAPTER), &chapter).expect("written");
+        } else {
+            assert_eq!(found, expected, "to write it: see the head of {}", file!());
+        }
+    }
+}
+
+#[test]
+fn the_chapter_of_columns_names_every_event_and_no_other() {
+    let chapter = read(CHAPTER);
+    for (world, scenario) in SCENARIOS {
+        let schemas = started(world, scenario).schemas();
+        let events = schemas.iter().find(|schema| schema.name == "events").expect("events");
+        let event = events.columns.iter().find(|column| column.name == "event").expect("a kind");
+        let rows = marked(&chapter, &format!("events of {world}")).lines();
+        let name = |row: &str| row.strip_prefix("| `")?.split('`').next().map(String::from);
+        let named: Vec<String> = rows.filter_map(name).collect();
+        assert_eq!(named, event.labels, "events of {world}");
+    }
+}
+
+#[test]
+fn the_chapter_of_columns_has_every_metric_with_its_unit() {
+    let chapter = read(CHAPTER);
+    for (world, scenario) in SCENARIOS {
+        let row = |name: &String| format!("| `{name}` | {} |", split_unit(name).1.unwrap_or(""));
+        let mut expected: Vec<String> =
+            metrics(&started(world, scenario).metrics(), "").iter().map(row).collect();
+        let rows = marked(&chapter, &format!("metrics of {world}")).lines();
+        let begin = |row: &str| row.splitn(4, '|').take(3).collect::<Vec<_>>().join("|") + "|";
+        let mut found: Vec<String> = rows.filter(|row| row.starts_with("| `")).map(begin).collect();
+        expected.sort();
+        found.sort();
+        assert_eq!(found, expected, "metrics of {world}");
+    }
+}
