@@ -22,43 +22,44 @@ use std::path::PathBuf;
 const EXAMPLES: &str = "\
 Examples:
   sidestep ik arm.urdf --target 0.3,0.1,0.4
-  sidestep ik arm.urdf --target 0.3,0.1,0.4 --rpy 3.1416,0,0             turned as asked, too
-  sidestep ik arm.urdf --target 0.3,0.1,0.4 --rpy 3.1416,0,0 --free rz   only the tool's axis z
-  sidestep ik arm.urdf --target 0.3,0.1,0.4 --quaternion 1,0,0,0 --solutions 8 --json
-  sidestep ik panda.urdf --srdf panda.srdf --group arm --posture default --target 0.4,0,0.5 --nearest
+  sidestep ik arm.urdf --target 0.3,0.1,0.4 --rpy 3.1416,0,0        turned so, too
+  sidestep ik arm.urdf --target 0.3,0.1,0.4 --rpy 3.1416,0,0 --free rz
+  sidestep ik arm.urdf --target 0.3,0.1,0.4 --quaternion 1,0,0,0 --solutions 8
+  sidestep ik panda.urdf --srdf panda.srdf --group arm --posture default \\
+      --target 0.4,0,0.5 --nearest
   sidestep ik arm.urdf --targets poses.csv > answers.csv
-  sidestep ik arm.urdf --target 0.3,0.1,0.4 --obstacle 0.2,0,0.3,0.05 --obstacle 0,0.2,0.3,0.05
+  sidestep ik arm.urdf --target 0.3,0.1,0.4 --obstacle 0.2,0,0.3,0.05
 
-The target is the tip's frame in the frame of the base: its position in m, and with --rpy or
---quaternion its orientation. --free names what of it does not count, in the target's own axes: x, y,
-z (the position along them), rx, ry, rz (the turn about them). One free turn leaves the direction of
-that axis: `--free rz` makes a tool's axis z point as asked. All three free turns ask for the position
+The target is the tip's frame in the frame of the base: its position in m, and with --rpy or \
+--quaternion its orientation. --free names what of it does not count, in the target's own axes: x, y, \
+z (the position along them), rx, ry, rz (the turn about them). One free turn leaves the direction of \
+that axis: `--free rz` makes a tool's axis z point as asked. All three free turns ask for the position \
 alone, `--free x,y,z` for the orientation alone.
 
-The search starts from --joints or --posture (otherwise from rest) and continues from random postures;
-joints stay inside their limits. With --solutions N it goes on until it has N distinct postures: of
-every two, some joint differs by 0.1 rad or more (--apart), full turns aside; a slide counts as the
-angle that moves the tip as far at full reach. They are listed by their distance from the start.
---nearest makes all restarts and draws each posture toward the start, and so finds the answer that
+The search starts from --joints or --posture (otherwise from rest) and continues from random postures; \
+joints stay inside their limits. With --solutions N it goes on until it has N distinct postures: of \
+every two, some joint differs by 0.1 rad or more (--apart), full turns aside; a slide counts as the \
+angle that moves the tip as far at full reach. They are listed by their distance from the start. \
+--nearest makes all restarts and draws each posture toward the start, and so finds the answer that \
 moves the joints least.
 
-Obstacles are spheres (center and radius in m) that no link's collision shape may enter: boxes,
-cylinders, spheres, and STL meshes as their bounding boxes. Links without a shape that can be read
-count as rods between connectors, which are thin lines, so add the arm's thickness to the radius; what
-is left out is told. With `--body own` links must not touch each other either, except neighbors
-and the pairs whose collisions --srdf disables. The answer is a posture; the path to it is not
+Obstacles are spheres (center and radius in m) that no link's collision shape may enter: boxes, \
+cylinders, spheres, and STL meshes as their bounding boxes. Links without a shape that can be read \
+count as rods between connectors, which are thin lines, so add the arm's thickness to the radius; what \
+is left out is told. With `--body own` links must not touch each other either, except neighbors \
+and the pairs whose collisions --srdf disables. The answer is a posture; the path to it is not \
 checked. Its joint values can be passed to `sidestep fk --joints`.
 
---targets reads a table (CSV) with the columns x,y,z, and for orientations roll,pitch,yaw or
+--targets reads a table (CSV) with the columns x,y,z, and for orientations roll,pitch,yaw or \
 qx,qy,qz,qw, and prints a table with a row for each target, in the order of the file.
 
---json prints reached, error_m, error_rad, reason, target, target_quaternion (x,y,z,w), engine,
-iterations, starts, solutions (joints, error_m and error_rad of each posture), remarks (meshes that
-stand as boxes, shapes that are left out), and of the first posture what `sidestep fk --json` prints.
-With --targets it prints targets, reached, joint_names and answers (of each the same, joints and
+--json prints reached, error_m, error_rad, reason, target, target_quaternion (x,y,z,w), engine, \
+iterations, starts, solutions (joints, error_m and error_rad of each posture), remarks (meshes that \
+stand as boxes, shapes that are left out), and of the first posture what `sidestep fk --json` prints. \
+With --targets it prints targets, reached, joint_names and answers (of each the same, joints and \
 others), and cpu_us_per_target, which is no part of the results.
 
-The exit code is 0 if the target is reached (of several, each) and 1 if not: then the nearest posture
+The exit code is 0 if the target is reached (of several, each) and 1 if not: then the nearest posture \
 found is printed, and what is in the way.";
 
 /// Inverse kinematics: compute joint values that bring a robot arm's tip to a target.
