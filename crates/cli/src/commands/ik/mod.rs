@@ -22,7 +22,7 @@ use std::path::PathBuf;
 const EXAMPLES: &str = "\
 Examples:
   sidestep ik arm.urdf --target 0.3,0.1,0.4
-  sidestep ik arm.urdf --target 0.3,0.1,0.4 --rpy 3.1416,0,0        turned so, too
+  sidestep ik arm.urdf --target 0.3,0.1,0.4 --rpy 3.1416,0,0
   sidestep ik arm.urdf --target 0.3,0.1,0.4 --rpy 3.1416,0,0 --free rz
   sidestep ik arm.urdf --target 0.3,0.1,0.4 --quaternion 1,0,0,0 --solutions 8
   sidestep ik panda.urdf --srdf panda.srdf --group arm --posture default \\
