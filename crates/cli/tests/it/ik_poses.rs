@@ -176,16 +176,16 @@ fn wrong_poses_are_answered_with_what_would_be_right() {
 
 /// The arm with bars as links, of which the last is a mesh.
 fn with_shapes(mesh: &str) -> String {
-    let bar = |link: &str, size: &str| {
-        let shape =
-            format!("<collision><origin xyz='0 0 0.2'/><geometry>{size}</geometry></collision>");
-        (format!("<link name=\"{link}\"/>"), format!("<link name=\"{link}\">{shape}</link>"))
+    let bar = |link: &str, z: f64, shape: &str| {
+        let at = format!("<origin xyz='0 0 {z}'/><geometry>{shape}</geometry>");
+        let whole = format!("<link name=\"{link}\"><collision>{at}</collision></link>");
+        (format!("<link name=\"{link}\"/>"), whole)
     };
     let bars = [
-        bar("base", "<cylinder radius='0.1' length='0.3'/>"),
-        bar("l2", "<box size='0.1 0.1 0.3'/>"),
-        bar("l3", "<cylinder radius='0.05' length='0.2'/>"),
-        bar("l6", &format!("<mesh filename='{mesh}' scale='0.001 0.001 0.001'/>")),
+        bar("base", 0.2, "<cylinder radius='0.1' length='0.3'/>"),
+        bar("l2", 0.2, "<box size='0.1 0.1 0.3'/>"),
+        bar("l3", 0.2, "<cylinder radius='0.05' length='0.2'/>"),
+        bar("l6", 0.06, &format!("<mesh filename='{mesh}' scale='0.001 0.001 0.001'/>")),
     ];
     bars.iter().fold(SIX.to_owned(), |text, (old, new)| text.replace(old, new))
 }
