@@ -2,8 +2,8 @@
 
 use super::super::threat::Part;
 use super::contacts::{Contacts, nearest};
+use super::given::Given;
 use super::posture::{Posture, ends};
-use super::solve::Given;
 use crate::rods::chain::{Chain, LENGTH_TOLERANCE_M};
 use crate::rods::geometry::{Point, angle_rad, distance, sub, unit};
 use crate::rods::scene::{BEND_TOLERANCE_RAD, TOLERANCE_M};

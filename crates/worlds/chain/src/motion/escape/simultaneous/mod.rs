@@ -12,6 +12,7 @@
 //! chain is taut, it leaves through one of them, by the way that roll-outs find shortest.
 
 mod contacts;
+mod given;
 mod laws;
 mod lengths;
 mod posture;
@@ -27,7 +28,8 @@ use crate::rods::geometry::{Point, distance};
 use crate::rods::obstacle::Obstacles;
 use crate::rods::rules::Rules;
 use crate::rods::veto::{Reason, Veto};
-use solve::{Given, Solver, Through, Wishes};
+use given::{Given, Through, Wishes};
+use solve::Solver;
 pub use way_out::WayOut;
 
 /// Leads all parts of a chain out of the way at once. It owns its buffers.
@@ -146,7 +148,7 @@ impl<const D: usize> Simultaneous<D> {
             told.first = told.first.or(Some((threat.part.connector(), obstacle)));
         }
         (told.deepest_m, told.left) = (0.0, None);
-        let (gap_m, deepest) = (gap_m, self.solver.least_gap(given, &self.best).1);
+        let deepest = self.solver.least_gap(given, &self.best).1;
         if let Some(threat) = deepest.filter(|_| gap_m < -TOUCH_M) {
             let k = threat.part.connector();
             let goes_m = distance(given.start[k], self.best[k]);

@@ -7,53 +7,15 @@
 use super::super::Margin;
 use super::super::threat::{Threat, left_of};
 use super::contacts::{Contacts, along_rod, nearest, radius_m};
+use super::given::{Given, Through, Wishes};
 use super::laws::{Bend, Laws};
 use super::lengths::Lengths;
 use super::posture::{Posture, ends};
-use crate::rods::chain::Chain;
 use crate::rods::geometry::{
-    Nearest, Point, along, between, distance, perpendicular, scaled, sub, unit,
+    Nearest, Point, along, between, distance, first_axis, perpendicular, scaled, sub, unit,
 };
-use crate::rods::obstacle::{Obstacle, Obstacles};
-use crate::rods::rules::Rules;
+use crate::rods::obstacle::Obstacle;
 use std::f64::consts::PI;
-
-/// The givens of a solve.
-#[derive(Clone, Copy)]
-pub(super) struct Given<'a, const D: usize> {
-    pub(super) chain: &'a Chain<D>,
-    pub(super) obstacles: &'a Obstacles<D>,
-    pub(super) rules: &'a Rules,
-    /// Positions from which ways count.
-    pub(super) start: &'a [Point<D>],
-    /// The longest way of a connector, meters.
-    pub(super) most_m: f64,
-}
-
-impl<const D: usize> Given<'_, D> {
-    /// Returns how far from its start a connector may be, meters: as far as its speed allows, or
-    /// as far as it already is.
-    pub(super) fn room_m(&self, k: usize) -> f64 {
-        self.most_m.max(distance(self.start[k], self.chain.points()[k]))
-    }
-}
-
-/// A way through an obstacle: parts in it leave in one direction, whatever is nearer.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Through<const D: usize> {
-    pub(super) obstacle: u32,
-    /// Unit vector.
-    pub(super) toward: Point<D>,
-}
-
-/// The wishes of a solve, beside the laws.
-#[derive(Clone, Copy)]
-pub(super) struct Wishes<const D: usize> {
-    pub(super) margin: Margin,
-    pub(super) through: Option<Through<D>>,
-    /// Rounds with margins, and rounds without.
-    pub(super) rounds: [usize; 2],
-}
 
 /// Finds places for all connectors. It owns its buffers.
 #[derive(Debug, Clone, Default)]
@@ -195,7 +157,7 @@ impl<const D: usize> Solver<D> {
                 let [one, other] = pair.parts;
                 let along_one = along_rod(posture.ends(one), nearest.on_body);
                 let along_other = along_rod(posture.ends(other), nearest.on_core);
-                let across = || perpendicular(crate::rods::geometry::first_axis());
+                let across = || perpendicular(first_axis());
                 let away = unit(sub(nearest.on_core, nearest.on_body)).unwrap_or_else(across);
                 posture.part((one, along_one), (other, along_other), (away, short_m));
                 most_m = most_m.max(short_m);

@@ -7,10 +7,11 @@
 
 use super::super::threat::Part;
 use super::super::{Escape, Margin};
+use super::TOUCH_M;
 use super::contacts::radius_m;
+use super::given::{Given, Through, Wishes};
 use super::posture::ends;
-use super::solve::{Given, Solver, Through, Wishes, away_from};
-use crate::metrics::PENETRATION_M;
+use super::solve::{Solver, away_from};
 use crate::rods::chain::Chain;
 use crate::rods::geometry::{
     Point, add, along, cross, in_dimensions, norm, perpendicular, scaled, unit,
@@ -260,7 +261,7 @@ impl<'a, const D: usize> Stage<'a, D> {
             };
             let gap_m = self.tick(&given, &mut solver, &mut through);
             chain.points_mut().copy_from_slice(&solver.points);
-            clear = if gap_m < -PENETRATION_M { 0 } else { clear + 1 };
+            clear = if gap_m < -TOUCH_M { 0 } else { clear + 1 };
             if clear == 0 {
                 cost += 1.0 - DEPTH_COST * gap_m;
             }
