@@ -3,6 +3,8 @@
 //! Commands are the lines of blocks in the language `sh` that begin with `sidestep` or
 //! `cargo run --release --`. A block that no test can run is marked `sh ignore`, and its page says why.
 
+use crate::support::Place;
+use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -77,4 +79,31 @@ fn commands_are_found_in_blocks_of_shell_only() {
     let page = "sidestep a\n```sh\nsidestep run \\\n  x # why\nmkdir y\ncargo run --release -- new z\n```\n\
                 ```sh ignore\nsidestep b\n```\n```text\nsidestep c\n```\n";
     assert_eq!(commands(page), ["sidestep run    x # why", "sidestep new z"]);
+}
+
+#[test]
+fn the_chapter_of_columns_has_every_column_of_a_sweep() {
+    let place = Place::new();
+    place.json(&[
+        "sweep",
+        "s.toml",
+        "--vary",
+        "robots.0.count=1,2",
+        "--cycles",
+        "50",
+        "--out",
+        "d",
+    ]);
+    let chapter = std::fs::read_to_string(root().join("docs/src/columns.md")).expect("the chapter");
+    for table in ["results", "timings", "cells"] {
+        let path = place.path(&format!("d/{table}.parquet"));
+        let read = sidestep_record::whole::read::<Value>(&path).expect("a table");
+        for column in read.columns.iter().filter(|column| column.role != "parameter") {
+            // Metrics that are maps or lists have a column for each key, or for their length.
+            let map = column.name.find("_by_").and_then(|_| column.name.split('.').next());
+            let name = map.unwrap_or(&column.name);
+            let name = name.strip_suffix("_count").unwrap_or(name);
+            assert!(chapter.contains(&format!("`{name}`")), "{table}: {}", column.name);
+        }
+    }
 }
