@@ -1,16 +1,18 @@
 //! Ways that are planned once local rules come no nearer to a target.
 
 use super::Acting;
-use crate::arms::plan::{Errand, Space, plan};
+use crate::arms::plan::{Errand, Posture, Space, plan};
 use crate::driver::{Targets, Task};
 use crate::events::EventKind;
-use crate::rods::geometry::distance;
+use crate::rods::geometry::{Point, distance};
 use crate::rods::passage::passed;
 use crate::state::Plan;
 use crate::world::purpose;
 
 /// Least part of a piece of the way that a cycle is worth.
 const LEAST_PART: f64 = 1e-6;
+/// Part of the limit that a step along a plan aims at.
+const SLOWER: f64 = 0.99;
 
 impl<const D: usize> Acting<'_, D> {
     /// Plans a way to the next target if local rules have come no nearer for long enough; if there
@@ -46,46 +48,58 @@ impl<const D: usize> Acting<'_, D> {
     /// Goes on along the planned way: the initiator at its speed at most, no joint faster than it
     /// may be. A plan in whose way something has come is dropped.
     pub(super) fn follow_plan(&mut self, task: &Task<D>) {
-        let Some(plan) = &mut self.body.plan else { return };
-        let (chain, rules) = (&mut self.body.chain, &self.world.rules);
-        let Ok(space) =
-            Space::new(chain, &self.scratch.obstacles, rules.self_collision, task.agent)
-        else {
-            return self.body.plan = None;
+        let Some(mut plan) = self.body.plan.take() else { return };
+        let (rules, obstacles) = (&self.world.rules, &self.scratch.obstacles);
+        let chain = &self.body.chain;
+        let Ok(space) = Space::new(chain, obstacles, rules.self_collision, task.agent) else {
+            return;
         };
-        let (from, to) = (space.present(), &plan.way[0]);
-        let step_m = task.speed_m_s * self.world.dt_s;
-        let mut part = 1.0_f64;
-        let mut next = to.clone();
-        loop {
-            let led_m = distance(from[task.agent], next[task.agent]) / step_m;
-            let most = led_m.max(space.apart_m(&from, &next) / rules.joint_step_max_m);
-            if most <= 1.0 || part < LEAST_PART {
-                break;
-            }
-            part *= SLOWER / most;
-            next = space.at(&from, to, part);
+        let Some(to) = plan.way.front() else { return };
+        let most_m = Most { led: task.speed_m_s * self.world.dt_s, joint: rules.joint_step_max_m };
+        let (from, (next, is_there)) = (space.present(), step(&space, task.agent, to, &most_m));
+        if !space.is_way_free(&from, &next) {
+            return;
         }
-        let is_free = space.is_way_free(&from, &next);
-        if is_free {
-            chain.points_mut().copy_from_slice(&next);
-        }
-        if !is_free || passed(chain, &from, &self.scratch.obstacles, 0.0).is_some() {
+        let chain = &mut self.body.chain;
+        chain.points_mut().copy_from_slice(&next);
+        if passed(chain, &from, obstacles, 0.0).is_some() {
             chain.points_mut().copy_from_slice(&from);
-            return self.body.plan = None;
+            return;
         }
-        if part == 1.0 {
+        self.body.tally.way_m += distance(from[task.agent], next[task.agent]);
+        self.body.tally.moved += from.iter().zip(&next).filter(|(a, b)| a != b).count() as u64;
+        if is_there {
             plan.way.pop_front();
         }
-        let way_m = distance(from[task.agent], next[task.agent]);
-        let moved = from.iter().zip(&next).filter(|(a, b)| a != b).count();
-        if plan.way.is_empty() {
-            self.body.plan = None;
-        }
-        self.body.tally.way_m += way_m;
-        self.body.tally.moved += moved as u64;
+        self.body.plan = Some(plan).filter(|plan| !plan.way.is_empty());
     }
 }
 
-/// Part of the limit that a step along a plan aims at.
-const SLOWER: f64 = 0.99;
+/// Longest ways in a cycle, meters.
+struct Most {
+    /// Of the initiator,
+    led: f64,
+    /// and of any connector.
+    joint: f64,
+}
+
+/// Returns the posture on the way to another that a cycle is enough for, and whether it is that one.
+fn step<const D: usize>(
+    space: &Space<'_, D>,
+    agent: usize,
+    to: &[Point<D>],
+    most_m: &Most,
+) -> (Posture<D>, bool) {
+    let from = space.present();
+    let (mut part, mut next) = (1.0, to.to_vec());
+    while part >= LEAST_PART {
+        let led = distance(from[agent], next[agent]) / most_m.led;
+        let excess = led.max(space.apart_m(&from, &next) / most_m.joint);
+        if excess <= 1.0 {
+            break;
+        }
+        part *= SLOWER / excess;
+        next = space.at(&from, to, part);
+    }
+    (next, part == 1.0)
+}

@@ -42,7 +42,12 @@ fn held<const D: usize>(
     order: &Reach<D>,
     objection: &Veto<D>,
 ) -> Result<Outcome<D>, InputError> {
-    let (most_m, before) = (propagator.rules.joint_step_max_m, chain.points().to_vec());
+    // A connector that has failed is no base of an arm: what hangs on it swings as it did.
+    let most_m = match objection.reason {
+        Reason::Fixed => propagator.rules.joint_step_max_m,
+        _ => f64::INFINITY,
+    };
+    let before = chain.points().to_vec();
     let from = before[order.k];
     let (mut part, mut fastest) = (1.0, order.k);
     for _ in 0..MOST_SLOWED {

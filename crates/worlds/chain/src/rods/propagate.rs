@@ -192,41 +192,6 @@ impl<const D: usize> Propagator<D> {
         followed
     }
 
-    /// Makes a motion in which no part comes near another, if it is one; then nothing can object,
-    /// and the chain moves as if it were not in its own way.
-    fn pull_apart(&mut self, chain: &mut Chain<D>, heads: &Heads<D>, goes_on: bool) -> bool {
-        if !Leeway::is_for(chain) {
-            return false;
-        }
-        self.leeway.note(chain);
-        let mut tally = Tally::start(heads.first);
-        let head_m = distance(chain.points()[heads.first], heads.to[0]);
-        open::pull(chain, heads.first, heads.to[0], Stays::Nearly, &mut tally);
-        let way_m = head_m.max(tally.max_slave_step_m);
-        let may = tally.max_slave_step_m <= self.rules.slave_step_max_m
-            && self.leeway.allows(chain, way_m);
-        if may {
-            if goes_on {
-                self.remember(heads.first, tally.from..tally.to);
-            }
-            self.tally.add(&tally);
-        } else {
-            let run = tally.from..tally.to;
-            chain.points_mut()[run.clone()].copy_from_slice(&self.leeway.noted()[run]);
-        }
-        self.leeway.ended(chain, way_m, !may);
-        may
-    }
-
-    /// Keeps the positions before a motion that the request may have to take back.
-    fn remember(&mut self, head: usize, run: Range<usize>) {
-        for i in (head..run.end).chain((run.start..head).rev()) {
-            if self.before.get(i).is_none() {
-                self.before.set(i, self.leeway.noted()[i]);
-            }
-        }
-    }
-
     fn place_heads(
         &mut self,
         chain: &Chain<D>,
@@ -570,5 +535,6 @@ fn check<const D: usize>(chain: &Chain<D>, heads: &Heads<D>) -> Result<(), Input
     heads.to.iter().find(|to| !is_in_range(to)).map_or(Ok(()), |to| Err(out_of_range(to)))
 }
 
+mod apart;
 #[cfg(test)]
 mod tests;
