@@ -110,10 +110,14 @@ proptest! {
         seed in 0u64..1_000_000, n in 1u32..14, speed_m_s in 0.1..1.5f64, cap in 0.2..3.0f64,
     ) {
         let mut plane = Case::new(straight::<2>(10, SWARM, 0.25), balls(seed, n, speed_m_s), cap);
-        (0..120).for_each(|_| drop(plane.tick()));
+        for _ in 0..120 {
+            plane.tick();
+        }
         let snake = straight::<3>(30, Rod::fixed(0.2, 0.02), 0.05);
         let mut space = Case::new(snake, balls(seed, n, speed_m_s), cap);
-        (0..60).for_each(|_| drop(space.tick()));
+        for _ in 0..60 {
+            space.tick();
+        }
     }
 }
 
