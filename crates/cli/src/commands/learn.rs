@@ -36,6 +36,11 @@ Examples:
 CSV columns: true, reported (one word each; `nothing` for no observation), and true_distance_m, \
 reported_distance_m, or true_class, reported_class.";
 
+/// As it would be made, but in lines that fit.
+const EFFECTOR_USAGE: &str = "\
+sidestep learn effector [OPTIONS]
+           <--mrclam <DIR>|--carmen <FILE>|--csv <FILE>|--run <DIR>>";
+
 const EFFECTOR_EXAMPLES: &str = "\
 Examples:
   sidestep learn effector --mrclam logs/hall --box 0.25
@@ -115,7 +120,7 @@ struct SensorLog {
 
 /// The log to learn an effector from, and how.
 #[derive(Debug, Args)]
-#[command(after_help = EFFECTOR_EXAMPLES)]
+#[command(after_help = EFFECTOR_EXAMPLES, override_usage = EFFECTOR_USAGE)]
 struct EffectorArgs {
     #[command(flatten)]
     log: EffectorLog,

@@ -107,7 +107,7 @@ const TABLE: &[(&str, &str, &str, &str)] = &[
     ("foreign key", "speed_m_s = 0.5", "turn_deg = 5.0", "does nothing"),
     ("escape that is off", "dt_s = 0.1", "dt_s = 0.1\nescape = \"off\"\nescape_speed_m_s = 1.0", "does nothing with escape = \"off\""),
     ("look-ahead of a touch", "dt_s = 0.1", "dt_s = 0.1\nescape = \"touch\"\nescape_ahead_s = 1.0", "does nothing with escape = \"touch\""),
-    ("unknown method of escape", "dt_s = 0.1", "dt_s = 0.1\nescape_by = \"both\"", "expected `simultaneous` or `literal`"),
+    ("unknown method of escape", "dt_s = 0.1", "dt_s = 0.1\nescape_by = \"both\"", "known are: simultaneous, literal"),
     ("no task", "[[chains.tasks]]\nkind = \"targets\"\ntargets_m = [[1.0, 0.0]]\nspeed_m_s = 0.5\n", "", "without a task"),
     ("dimensions", "dt_s = 0.1", "dimensions = 4", "dimensions = 4"),
     ("three dimensions", "dt_s = 0.1", "dimensions = 3", "chain.dimensions is 3"),
