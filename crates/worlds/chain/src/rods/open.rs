@@ -36,6 +36,7 @@ pub(super) fn pull<const D: usize>(
 
 /// Makes both sweeps. A parameter of the type, because the loop is too short for a test that is
 /// always the same.
+#[inline]
 fn sweep<const D: usize, const NEARLY: bool>(
     chain: &mut Chain<D>,
     k: usize,
@@ -54,12 +55,11 @@ fn sweep<const D: usize, const NEARLY: bool>(
         longest2: 0.0,
     });
     let [up, down] = &mut sweeps;
-    let advance = |sweep: &mut Sweep<D>, points: &mut [Point<D>]| {
-        sweep.advance::<NEARLY>(points, rods, least_move_m)
-    };
-    while advance(up, points) && advance(down, points) {}
-    while advance(up, points) {}
-    while advance(down, points) {}
+    while up.advance::<NEARLY>(points, rods, least_move_m)
+        && down.advance::<NEARLY>(points, rods, least_move_m)
+    {}
+    while up.advance::<NEARLY>(points, rods, least_move_m) {}
+    while down.advance::<NEARLY>(points, rods, least_move_m) {}
     tally.touch(down.master..up.master + 1);
     tally.changed += 1 + up.changed + down.changed;
     tally.slave_went(up.longest2.max(down.longest2).sqrt());
@@ -89,10 +89,8 @@ impl<const D: usize> Sweep<D> {
         let Some(slave) = self.direction.next(self.master, points.len()) else { return false };
         let so = points[slave];
         let rod = rods[slave.min(self.master)];
-        let mut new = guided([self.was, self.is, so], rod, least_move_m);
-        if NEARLY && distance(new, so) <= least_move_m {
-            new = so;
-        }
+        let guided = guided([self.was, self.is, so], rod, least_move_m);
+        let new = if NEARLY && distance(guided, so) <= least_move_m { so } else { guided };
         if new == so && self.may_end_at(slave, points, rods) {
             return false;
         }

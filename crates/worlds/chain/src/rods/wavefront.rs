@@ -10,7 +10,7 @@
 )]
 
 use super::candidates::{clamped, guided};
-use super::chain::{Chain, Rod, is_in_range, out_of_range};
+use super::chain::{Chain, MAX_COORDINATE_M, Rod, is_in_range, out_of_range};
 use super::geometry::{Point, distance, dot, sub};
 use super::propagate::Propagator;
 use super::scene::fits;
@@ -20,6 +20,10 @@ use sidestep_kernel::InputError;
 
 /// Motions at once: enough to keep the units for roots and divisions busy.
 pub const LANES: usize = 12;
+
+/// Length in meters above which no move is lost to rounding: coordinates of up to 1e6 m are sums of numbers with
+/// errors below 2^-51 of that, and of three coordinates one has more than half of a move.
+const ROUNDED_M: f64 = MAX_COORDINATE_M * 3.6e-15;
 
 /// Number of motions below which one after the other is faster.
 const WORTH_IT: usize = 3;
@@ -131,9 +135,13 @@ struct Motions<const D: usize, const MEASURES: bool> {
     connectors: usize,
     limits: Limits,
     least_move_m: f64,
+    /// Length of a move above which a slave surely moves; -1 in lanes without a motion, which nothing asks.
+    surely_m: [f64; LANES],
     /// Whether a lane's last slave stayed, and whether its motion has ended.
     rests: [bool; LANES],
     ended: [bool; LANES],
+    /// Whether some lane rests or has ended.
+    is_mixed: bool,
     /// Measures by lane: the square of the longest way, and the greatest violation.
     longest2: [f64; LANES],
     violation_m: [f64; LANES],
@@ -142,13 +150,16 @@ struct Motions<const D: usize, const MEASURES: bool> {
 
 impl<const D: usize, const MEASURES: bool> Motions<D, MEASURES> {
     fn new(chain: &Chain<D>, n: usize) -> Self {
+        let surely_m = chain.least_move_m().max(ROUNDED_M);
         Self {
             n,
             connectors: chain.points().len(),
             limits: Limits { min_m: [1.0; LANES], max_m: [1.0; LANES], alike: LANES },
             least_move_m: chain.least_move_m(),
+            surely_m: std::array::from_fn(|w| if w < n { surely_m } else { -1.0 }),
             rests: [false; LANES],
             ended: [false; LANES],
+            is_mixed: false,
             longest2: [0.0; LANES],
             violation_m: [0.0; LANES],
             changed: n as u64,
@@ -174,49 +185,35 @@ impl<const D: usize, const MEASURES: bool> Motions<D, MEASURES> {
             }
         }
         let d = square.map(f64::sqrt);
-        let (mut part, mut stays) = ([0.0; LANES], [false; LANES]);
+        // Whether every lane is at a slave that moves. All lanes are looked at, for a search would branch at each.
+        let mut one_by_one = self.is_mixed || j < self.n || j >= self.connectors;
+        let mut part = [0.0; LANES];
         for w in 0..LANES {
             let t = clamped(d[w], self.limits.min_m[w], self.limits.max_m[w]);
-            stays[w] = (t - d[w]).abs() <= self.least_move_m || d[w] == 0.0;
+            one_by_one |= (t - d[w]).abs().min(d[w]) <= self.surely_m[w];
             part[w] = t / d[w];
         }
-        let mut new = [[0.0; LANES]; D];
-        let mut same = [true; LANES];
-        for i in 0..D {
-            for w in 0..LANES {
-                new[i][w] = now.rows[i][w + 1] + g[i][w] * part[w];
-                same[w] &= new[i][w] == now.rows[i][w];
-            }
-        }
-        if !self.all_move(&stays, &same, j) {
+        if one_by_one {
             return self.react_one_by_one(now, next, j);
         }
         for i in 0..D {
-            next.rows[i][1..].copy_from_slice(&new[i]);
+            for w in 0..LANES {
+                next.rows[i][w + 1] = now.rows[i][w + 1] + g[i][w] * part[w];
+            }
         }
         if MEASURES {
-            self.measure(now, &new);
+            self.measure(now, next);
         }
-    }
-
-    /// Whether every lane is at a slave that moves; looks at all lanes at once, because a search
-    /// would branch at each.
-    #[inline]
-    fn all_move(&self, stays: &[bool; LANES], same: &[bool; LANES], j: usize) -> bool {
-        let mut still = false;
-        for w in 0..LANES {
-            still |= w < self.n && (stays[w] | same[w] | self.rests[w] | self.ended[w]);
-        }
-        !still && j >= self.n && j < self.connectors
     }
 
     /// Measures all lanes at once.
     #[inline]
-    fn measure(&mut self, now: &Front<D>, new: &[[f64; LANES]; D]) {
+    fn measure(&mut self, now: &Front<D>, next: &Front<D>) {
         let (mut way2, mut length2) = ([0.0; LANES], [0.0; LANES]);
         for i in 0..D {
             for w in 0..LANES {
-                let (way, rod) = (new[i][w] - now.rows[i][w], now.rows[i][w + 1] - new[i][w]);
+                let new = next.rows[i][w + 1];
+                let (way, rod) = (new - now.rows[i][w], now.rows[i][w + 1] - new);
                 way2[w] += way * way;
                 length2[w] += rod * rod;
             }
@@ -230,7 +227,7 @@ impl<const D: usize, const MEASURES: bool> Motions<D, MEASURES> {
         self.changed += self.n as u64;
     }
 
-    /// The same by single lanes, some of which rest, have ended, or are at no slave.
+    /// The same as [`Motions::react`] by single lanes, some of which rest, have ended, or are at no slave.
     #[cold]
     fn react_one_by_one(&mut self, now: &Front<D>, next: &mut Front<D>, j: usize) {
         // Downward, because lane w - 1 still needs its master's old position, at w - 1.
@@ -255,6 +252,7 @@ impl<const D: usize, const MEASURES: bool> Motions<D, MEASURES> {
                 self.measure_one(w, [mn, so, new], rod);
             }
         }
+        self.is_mixed = (0..self.n).any(|w| self.rests[w] || self.ended[w]);
     }
 
     fn measure_one(&mut self, w: usize, [mn, so, new]: [Point<D>; 3], rod: Rod) {
@@ -267,7 +265,7 @@ impl<const D: usize, const MEASURES: bool> Motions<D, MEASURES> {
 
     /// Whether no motion goes on.
     fn have_ended(&self) -> bool {
-        self.ended[..self.n].iter().all(|&ended| ended)
+        self.is_mixed && self.ended[..self.n].iter().all(|&ended| ended)
     }
 
     fn measured(&self) -> Measured {
