@@ -23,7 +23,11 @@ pub fn replace(
         .map_err(|e| Error::write(path, &e))
 }
 
+/// Fills a file, in a folder that is made if there is none.
 fn fill(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> Result<()>) -> Result<()> {
+    if let Some(folder) = path.parent() {
+        std::fs::create_dir_all(folder)?;
+    }
     let mut file = BufWriter::new(File::create(path)?);
     write(&mut file)?;
     file.flush()?;
@@ -46,5 +50,13 @@ mod tests {
         assert!(fails.is_err());
         assert_eq!(std::fs::read(&path).expect("read"), b"old");
         assert_eq!(std::fs::read_dir(folder.path()).expect("read").count(), 1);
+    }
+
+    #[test]
+    fn the_folder_of_a_file_is_made_with_it() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a/b/c.txt");
+        replace(&path, |f| f.write_all(b"new")).expect("written");
+        assert_eq!(std::fs::read(&path).expect("read"), b"new");
     }
 }

@@ -199,24 +199,32 @@ pub(crate) fn learn(args: &LearnArgs, console: Console) -> Result<ExitCode, Fail
     match &args.what {
         What::Sensor(args) => {
             let model = learn_sensor(args)?;
-            args.target.add(|place, text, name| profile::with_sensor(place, text, name, &model))?;
-            tell(&model.report, &args.target, console);
+            let add = |place: &str, text: &str, name: &str| {
+                profile::with_sensor(place, text, name, &model)
+            };
+            tell(&model.report, &args.target.add("sensors", add)?, console);
         }
         What::Effector(args) => {
             let model = learn_effector(args, console)?;
-            args.target
-                .add(|place, text, name| profile::with_effector(place, text, name, &model))?;
-            tell(&model.report, &args.target, console);
+            let add = |place: &str, text: &str, name: &str| {
+                profile::with_effector(place, text, name, &model)
+            };
+            tell(&model.report, &args.target.add("effectors", add)?, console);
         }
     }
     Ok(ExitCode::Done)
 }
 
-fn tell(report: &(impl Serialize + Display), target: &TargetArgs, console: Console) {
-    let written = target.profile.as_ref().map_or_else(String::new, |path| {
-        format!("\nAdded `{}` to {}\n", target.name, path.display())
-    });
-    console.result(report, || format!("{report}{written}"));
+/// Prints what was learned and `written`, the line about the profile; if quiet, that line alone.
+fn tell(report: &(impl Serialize + Display), written: &str, console: Console) {
+    console.result_or_short(
+        report,
+        || written.to_owned(),
+        || match written {
+            "" => report.to_string(),
+            _ => format!("{report}\n{written}"),
+        },
+    );
 }
 
 fn learn_sensor(args: &SensorArgs) -> Result<SensorModel, InputError> {
@@ -262,16 +270,23 @@ const MAX_PROFILE_BYTES: u64 = 64 << 20;
 
 impl TargetArgs {
     /// Adds a section to the profile, if one is named. The file is replaced in one step.
+    /// Adds a section to the profile, if one is named. Returns a line that says what was done.
     fn add(
         &self,
+        group: &str,
         section: impl FnOnce(&str, &str, &str) -> Result<String, InputError>,
-    ) -> Result<(), Failure> {
-        let Some(path) = &self.profile else { return Ok(()) };
+    ) -> Result<String, Failure> {
+        let Some(path) = &self.profile else { return Ok(String::new()) };
         let text = match path.exists() {
             true => read_text(path, MAX_PROFILE_BYTES)?,
             false => profile::empty(&path.file_stem().unwrap_or_default().to_string_lossy()),
         };
-        let text = section(&path.display().to_string(), &text, &self.name)?;
-        replace(path, |file| file.write_all(text.as_bytes()))
+        let new = section(&path.display().to_string(), &text, &self.name)?;
+        replace(path, |file| file.write_all(new.as_bytes()))?;
+        let (name, path) = (&self.name, path.display());
+        Ok(match profile::has(&text, group, name) {
+            true => format!("Replaced `{name}` in {path}\n"),
+            false => format!("Added `{name}` to {path}\n"),
+        })
     }
 }

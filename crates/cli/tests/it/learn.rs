@@ -104,6 +104,23 @@ fn one_profile_takes_sensor_and_effector_and_a_scenario_loads_it() {
 }
 
 #[test]
+fn a_name_that_stands_in_the_profile_is_told_to_be_replaced_and_quiet_says_nothing_else() {
+    let place = Place::new();
+    place.write("readings.csv", READINGS);
+    place.write("motions.csv", MOTIONS);
+    let learn = |what: &str, csv: &str| {
+        let to = ["--profile", "new/p.toml", "--name", "eye", "-q"];
+        let ended = place.run(&[&["learn", what, "--csv", csv][..], &to].concat());
+        assert_eq!(ended.code(), 0, "{}", ended.err());
+        ended.out()
+    };
+    assert_eq!(learn("sensor", "readings.csv"), "Added `eye` to new/p.toml\n");
+    // An effector may be called as a sensor is.
+    assert_eq!(learn("effector", "motions.csv"), "Added `eye` to new/p.toml\n");
+    assert_eq!(learn("sensor", "readings.csv"), "Replaced `eye` in new/p.toml\n");
+}
+
+#[test]
 fn a_wrong_log_or_profile_writes_nothing() {
     let place = Place::new();
     place.write("readings.csv", READINGS);

@@ -50,6 +50,12 @@ pub fn with_effector(
     with_section(place, text, ["effectors", name], effector(model))
 }
 
+/// Returns whether the profile `text` has a section `name` among the `group` "sensors" or "effectors".
+pub fn has(text: &str, group: &str, name: &str) -> bool {
+    let section = |document: DocumentMut| document.get(group)?.get(name).map(|_| ());
+    text.parse().ok().and_then(section).is_some()
+}
+
 fn with_section(
     place: &str,
     text: &str,
