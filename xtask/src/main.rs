@@ -2,6 +2,8 @@
 
 mod arguments;
 mod counts;
+#[cfg(test)]
+mod features;
 mod lines;
 mod measures;
 mod members;
