@@ -13,9 +13,9 @@ use super::rods::wavefront::{LANES, pull_measured};
 /// Motions of connector 0 that wait.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct PutOff<const D: usize> {
-    /// The place of connector 0 before the first,
+    /// The place of connector 0 before the first motion that waits.
     from: Option<Point<D>>,
-    /// and after each.
+    /// The places of connector 0 after each of them.
     heads: Vec<Point<D>>,
     /// Duration of a cycle, s.
     dt_s: f64,

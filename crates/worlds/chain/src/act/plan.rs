@@ -77,9 +77,9 @@ impl<const D: usize> Acting<'_, D> {
 
 /// Longest ways in a cycle, meters.
 struct Most {
-    /// Of the initiator,
+    /// Longest way of the initiator.
     led: f64,
-    /// and of any connector.
+    /// Longest way of any connector.
     joint: f64,
 }
 

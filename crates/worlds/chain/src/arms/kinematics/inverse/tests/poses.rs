@@ -61,10 +61,6 @@ const KNOWN: [Known; 4] = [
     ),
 ];
 
-fn inside(chain: &SerialChain, shares: &[f64]) -> Vec<f64> {
-    super::inside(chain, shares)
-}
-
 /// The angle between two orientations by the trace, which the solver does not use.
 fn angle_rad(a: &Pose, b: &Pose) -> f64 {
     let trace: f64 =
