@@ -58,12 +58,14 @@ fn digest(here: &Path) -> io::Result<String> {
     Ok(hasher.finalize().to_hex()[..12].to_string())
 }
 
+/// Adds code and the presets that are compiled into it.
 fn find_sources(folder: &Path, found: &mut Vec<PathBuf>) -> io::Result<()> {
     for entry in fs::read_dir(folder)? {
         let path = entry?.path();
         if path.is_dir() {
             find_sources(&path, found)?;
-        } else if path.extension().is_some_and(|extension| extension == "rs") {
+        } else if path.extension().is_some_and(|extension| extension == "rs" || extension == "toml")
+        {
             found.push(path);
         }
     }

@@ -3,7 +3,7 @@
 //! Crates are known by their folders; a rule about one that is not there holds by itself.
 
 use std::collections::BTreeSet;
-use std::path::Path;
+use std::path::{Component, Path};
 
 use toml::{Table, Value};
 
@@ -11,6 +11,7 @@ use crate::arguments;
 use crate::measures::{circles, functions};
 use crate::members::{self, Member};
 use crate::paths;
+use crate::source::Role;
 
 /// Circles that are known, in the format of `cargo xtask shape --circles`.
 const KNOWN: &str = include_str!("../circles.txt");
@@ -132,6 +133,43 @@ fn threads(members: &[Member]) -> Vec<String> {
     wrong
 }
 
+/// Returns where a file outside of its crate's folder is compiled in: a package has no such file.
+fn reaches_out(members: &[Member]) -> Vec<String> {
+    let mut wrong = Vec::new();
+    for member in members {
+        for source in member.sources.iter().filter(|source| source.role == Role::Code) {
+            let folder = source.path.parent().unwrap_or(Path::new(""));
+            for line in source.lines.iter().filter(|line| !line.is_test) {
+                for file in compiled_in(&line.text).filter(|file| !lies_within(folder, file)) {
+                    let path = member.folder.join(&source.path);
+                    wrong.push(format!("{} compiles in {file}: not in the crate", path.display()));
+                }
+            }
+        }
+    }
+    wrong
+}
+
+/// Returns the files that `include_str!` and `include_bytes!` name on a line.
+fn compiled_in(line: &str) -> impl Iterator<Item = &str> {
+    let named = ["include_str!(\"", "include_bytes!(\""];
+    let rests = named.into_iter().flat_map(|start| line.split(start).skip(1));
+    rests.filter_map(|rest| rest.split('"').next())
+}
+
+/// Whether a path beside a folder of the crate stays within the crate.
+fn lies_within(folder: &Path, file: &str) -> bool {
+    let mut depth = folder.components().count();
+    Path::new(file).components().all(|part| match part {
+        Component::ParentDir => depth.checked_sub(1).inspect(|above| depth = *above).is_some(),
+        Component::Normal(_) => {
+            depth += 1;
+            true
+        }
+        _ => true,
+    })
+}
+
 fn std_thread() -> [String; 2] {
     ["std", "thread"].map(String::from)
 }
@@ -162,6 +200,7 @@ fn the_rules_of_the_house_hold() {
         trespassers(&members),
         knows_worlds(&members),
         threads(&members),
+        reaches_out(&members),
         differing(&circles::listed(&members), KNOWN),
     ]
     .concat();
@@ -216,6 +255,16 @@ mod small {
         assert_eq!(
             threads(&members),
             ["crates/a/src/lib.rs names std::thread", "crates/b/src/lib.rs names std::thread"]
+        );
+    }
+
+    #[test]
+    fn files_outside_of_the_package_are_found_and_those_within_are_not() {
+        let text = "const A: &str = include_str!(\"../README.md\");\n\
+                    const B: &[u8] = include_bytes!(\"../../maps/a.png\");";
+        assert_eq!(
+            reaches_out(&[member("crates/a", "", text)]),
+            ["crates/a/src/lib.rs compiles in ../../maps/a.png: not in the crate"]
         );
     }
 

@@ -76,8 +76,8 @@ const LINKS_BIT_S: [f64; 4] = [1e6, 1e7, LINK_BIT_S, 1e9];
 const MANY: u64 = 5;
 const BOTH: [&str; 2] = ["team", "pim"];
 
-const SCENARIO: &str = include_str!("../../../scenarios/papers/agentfly/superconflict.toml");
-const SWEEP: &str = include_str!("../../../scenarios/papers/agentfly/superconflict.sweep.toml");
+const SCENARIO: &str = include_str!("../scenarios/agentfly/superconflict.toml");
+const SWEEP: &str = include_str!("../scenarios/agentfly/superconflict.sweep.toml");
 const AIRPLANES: &str = "airspace.generator.n";
 
 const COLUMNS: Columns = Columns {

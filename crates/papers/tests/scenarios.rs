@@ -18,7 +18,7 @@ fn is_sweep(path: &Path) -> bool {
 
 #[test]
 fn every_scenario_compiles_and_so_do_the_variants_of_every_sweep() {
-    let all = files(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios/papers"));
+    let all = files(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios"));
     assert!(all.iter().filter(|path| is_sweep(path)).count() >= 5, "{all:?}");
     for path in all {
         if !is_sweep(&path) {

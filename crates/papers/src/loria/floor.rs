@@ -6,9 +6,9 @@ use sidestep::office::{Office, OfficeSpec};
 use std::sync::Arc;
 
 /// The floors: boxes of 0.25 m, of which the paper's robot, 0.53 m across, covers 2 x 2.
-const SMALL: &str = include_str!("../../../../scenarios/papers/loria/small.toml");
-const MEDIUM: &str = include_str!("../../../../scenarios/papers/loria/medium.toml");
-const LARGE: &str = include_str!("../../../../scenarios/papers/loria/large.toml");
+const SMALL: &str = include_str!("../../scenarios/loria/small.toml");
+const MEDIUM: &str = include_str!("../../scenarios/loria/medium.toml");
+const LARGE: &str = include_str!("../../scenarios/loria/large.toml");
 
 /// Boxes at each end of a corridor that count as its end.
 const END_BOXES: u32 = 4;

@@ -15,7 +15,7 @@ use std::convert::Infallible;
 use std::sync::Arc;
 
 /// The medium floor, with sensors and effectors of an equal error level.
-const EQUAL: &str = include_str!("../../../../scenarios/papers/loria/equal.toml");
+const EQUAL: &str = include_str!("../../scenarios/loria/equal.toml");
 
 /// The tables by which sensors and effectors err.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

@@ -15,8 +15,8 @@ use sidestep::worlds::robots::scenario::{Behaviours, Compiled, StorageOrder};
 use std::hint::black_box;
 use std::sync::Arc;
 
-const SMALL: &str = include_str!("../../../../scenarios/papers/loria/wander-small.toml");
-const LARGE: &str = include_str!("../../../../scenarios/papers/loria/wander-large.toml");
+const SMALL: &str = include_str!("../../scenarios/loria/wander-small.toml");
+const LARGE: &str = include_str!("../../scenarios/loria/wander-large.toml");
 
 /// Robots that wander on a floor among people and doors, at a given density and cost.
 #[derive(Debug, Clone, Serialize)]

@@ -11,9 +11,8 @@ use sidestep::worlds::chain::{ChainRun, chain_run};
 use sidestep_document::{Figure, Table};
 
 /// The scenario.
-pub(super) const SCENARIO: &str =
-    include_str!("../../../../scenarios/papers/serpentine/corridor.toml");
-const SWEEP: &str = include_str!("../../../../scenarios/papers/serpentine/corridor.sweep.toml");
+pub(super) const SCENARIO: &str = include_str!("../../scenarios/serpentine/corridor.toml");
+const SWEEP: &str = include_str!("../../scenarios/serpentine/corridor.sweep.toml");
 
 /// Keys that are varied.
 pub(super) const WIDTH: &str = "ground.corridor.width_m";

@@ -17,7 +17,7 @@ use sidestep_document::{Figure, Table};
 use std::f64::consts::TAU;
 use toml::Value;
 
-const SCENARIO: &str = include_str!("../../../../scenarios/papers/serpentine/field.toml");
+const SCENARIO: &str = include_str!("../../scenarios/serpentine/field.toml");
 
 /// Half the side of the field.
 const HALF_M: f64 = 10.0;

@@ -15,7 +15,7 @@ use sidestep::worlds::chain::{
 };
 use sidestep_document::Table;
 
-const FAILING: &str = include_str!("../../../../scenarios/papers/serpentine/failing.toml");
+const FAILING: &str = include_str!("../../scenarios/serpentine/failing.toml");
 
 /// Connectors of the chain: an arm as redundant as the slides' snake of 25 degrees of freedom.
 const CONNECTORS: usize = 26;

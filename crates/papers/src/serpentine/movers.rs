@@ -11,8 +11,8 @@ use sidestep::kernel::InputError;
 use sidestep_document::figure::Scale;
 use sidestep_document::{Figure, Table};
 
-const SCENARIO: &str = include_str!("../../../../scenarios/papers/serpentine/movers.toml");
-const SWEEP: &str = include_str!("../../../../scenarios/papers/serpentine/movers.sweep.toml");
+const SCENARIO: &str = include_str!("../../scenarios/serpentine/movers.toml");
+const SWEEP: &str = include_str!("../../scenarios/serpentine/movers.sweep.toml");
 const DISCS: &str = "fields.n";
 const SPEED: &str = "fields.speed_m_s";
 

@@ -12,8 +12,8 @@ use sidestep::worlds::chain::{ChainRun, chain_run};
 use sidestep_document::figure::Point;
 use sidestep_document::{Figure, Series, Table};
 
-const SCENARIO: &str = include_str!("../../../../scenarios/papers/serpentine/rotation.toml");
-const SWEEP: &str = include_str!("../../../../scenarios/papers/serpentine/rotation.sweep.toml");
+const SCENARIO: &str = include_str!("../../scenarios/serpentine/rotation.toml");
+const SWEEP: &str = include_str!("../../scenarios/serpentine/rotation.sweep.toml");
 const STEP: &str = "chain.step_m";
 
 /// The rules; the second is the slides'.

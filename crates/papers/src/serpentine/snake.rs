@@ -11,9 +11,8 @@ use sidestep::kernel::InputError;
 use sidestep_document::Table;
 
 /// The scenario.
-pub(super) const SCENARIO: &str =
-    include_str!("../../../../scenarios/papers/serpentine/snake.toml");
-const SWEEP: &str = include_str!("../../../../scenarios/papers/serpentine/snake.sweep.toml");
+pub(super) const SCENARIO: &str = include_str!("../../scenarios/serpentine/snake.toml");
+const SWEEP: &str = include_str!("../../scenarios/serpentine/snake.sweep.toml");
 const CONNECTORS: &str = "chains.connectors";
 
 const COLUMNS: Columns = Columns {

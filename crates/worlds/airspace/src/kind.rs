@@ -26,7 +26,7 @@ impl Kind for Airspace {
     }
 
     fn default_scenario(&self) -> &'static str {
-        include_str!("../../../../scenarios/airspace/default.toml")
+        include_str!("default.toml")
     }
 
     fn translate(&self, file: &Path) -> Result<Option<Foreign>, InputError> {

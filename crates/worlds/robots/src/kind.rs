@@ -25,7 +25,7 @@ impl Kind for Robots {
     }
 
     fn default_scenario(&self) -> &'static str {
-        include_str!("../../../../scenarios/robots/default.toml")
+        include_str!("default.toml")
     }
 
     fn compile(&self, source: &Source) -> Result<Box<dyn AnyCompiled>, InputError> {
