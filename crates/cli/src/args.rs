@@ -3,6 +3,7 @@
 use crate::commands::{Command, GROUPS};
 use clap::builder::Styles;
 use clap::{CommandFactory, FromArgMatches, Parser};
+use std::ffi::OsString;
 use std::fmt::Write;
 
 /// Display order of global options: after those of each command.
@@ -36,9 +37,21 @@ Exit codes: 0 done, 1 the command failed or the answer is no, \
 impl Cli {
     /// Returns the arguments of this process; ends it when they are wrong, or ask for help.
     pub(crate) fn of_process() -> Self {
-        let matches = command().get_matches();
+        let matches = command().get_matches_from(without_help_of_help(std::env::args_os()));
         Self::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
     }
+}
+
+/// Returns the arguments with `help --help` as `help`: the command `help` has no options of its own.
+fn without_help_of_help(words: impl Iterator<Item = OsString>) -> Vec<OsString> {
+    let mut words: Vec<OsString> = words.collect();
+    if let [_, first, second] = words.as_slice()
+        && first == "help"
+        && (second == "--help" || second == "-h")
+    {
+        words.pop();
+    }
+    words
 }
 
 /// Returns the command line, whose help lists the commands by what people do with them.

@@ -28,5 +28,5 @@ mod xml;
 #[cfg(test)]
 mod shared_data;
 
-pub use map_file::map_file;
+pub use map_file::{AsBoxes, map_file, pixel_map};
 pub use pixel_map::{MAX_PIXELS, PixelMap};

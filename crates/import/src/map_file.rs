@@ -4,30 +4,78 @@ use std::path::Path;
 
 use sidestep_kernel::InputError;
 
-use super::{ascii, movingai, rosmap};
+use super::{PixelMap, ascii, movingai, rosmap};
 use sidestep_map::{GridMap, UnknownPolicy};
 
-/// Reads the map at `path` into boxes with a side of `box_size_m` meters. The extension determines
-/// the format: `.yaml` and `.yml` for ROS `map_server`, `.map` for MovingAI, `.txt` for characters,
-/// each of them also followed by `.gz`. `unknown` decides on unknown boxes.
+/// The way in which a file becomes boxes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AsBoxes {
+    /// Side of a box in meters.
+    pub box_size_m: f64,
+    /// Side of a pixel in meters. A plain image needs it; that of a ROS map has to be the same.
+    pub resolution_m: Option<f64>,
+    /// The decision on unknown boxes.
+    pub unknown: UnknownPolicy,
+}
+
+/// Reads the map at `path` into boxes. The extension determines the format: `.yaml` and `.yml` for ROS
+/// `map_server`, `.png` and `.pgm` for a plain image (dark is wall, light is free, as in a ROS map without
+/// thresholds), `.map` for MovingAI, `.txt` for characters, each of them also followed by `.gz`.
 ///
-/// A `map_server` map is resampled to `box_size_m`; in the other two formats a character is a box.
+/// Pixels are resampled to boxes; in the last two formats a character is a box.
 ///
 /// # Errors
-/// When the extension is another one, and those of [`rosmap::load`] with
-/// [`PixelMap::to_boxes`](super::PixelMap::to_boxes), [`movingai::load_map`], [`ascii::load`].
-pub fn map_file(
-    path: &Path,
-    box_size_m: f64,
-    unknown: UnknownPolicy,
-) -> Result<GridMap, InputError> {
-    let map = match extension(path).as_str() {
-        "yaml" | "yml" => rosmap::load(path)?.to_boxes(box_size_m, unknown)?,
-        "map" => movingai::load_map(path, box_size_m)?,
-        "txt" => ascii::load(path, box_size_m)?,
-        _ => return Err(not_read(path)),
+/// When the extension is another one, a resolution is missing or contradicts the file, and those of
+/// [`rosmap::load`] with [`PixelMap::to_boxes`], [`movingai::load_map`], [`ascii::load`].
+pub fn map_file(path: &Path, boxes: AsBoxes) -> Result<GridMap, InputError> {
+    let map = match pixel_map(path, boxes.resolution_m)? {
+        Some(pixels) => pixels.to_boxes(boxes.box_size_m, boxes.unknown)?,
+        None => character_map(path, boxes)?,
     };
-    Ok(map.with_unknown(unknown))
+    Ok(map.with_unknown(boxes.unknown))
+}
+
+/// Reads the file at `path` if it is a map of pixels: a ROS map or a plain image.
+///
+/// # Errors
+/// Those of [`map_file`].
+pub fn pixel_map(path: &Path, resolution_m: Option<f64>) -> Result<Option<PixelMap>, InputError> {
+    match (extension(path).as_str(), resolution_m) {
+        ("yaml" | "yml", None) => rosmap::load(path).map(Some),
+        ("yaml" | "yml", Some(said_m)) => agreeing(path, rosmap::load(path)?, said_m).map(Some),
+        ("png" | "pgm", Some(resolution_m)) => rosmap::load_image(path, resolution_m).map(Some),
+        ("png" | "pgm", None) => {
+            let cause = "an image does not say how large its pixels are";
+            let remedy = "give the side of a pixel in meters: `--resolution 0.05`, in a scenario \
+                          `map.resolution_m = 0.05`";
+            Err(InputError::new(path.display(), cause, remedy))
+        }
+        _ => Ok(None),
+    }
+}
+
+fn agreeing(path: &Path, pixels: PixelMap, said_m: f64) -> Result<PixelMap, InputError> {
+    let own_m = pixels.resolution_m();
+    if (own_m - said_m).abs() <= 1e-9 * own_m {
+        return Ok(pixels);
+    }
+    let cause = format!("its pixels are {own_m} m, not {said_m} m");
+    Err(InputError::new(path.display(), cause, "leave the resolution out: the file says it"))
+}
+
+fn character_map(path: &Path, boxes: AsBoxes) -> Result<GridMap, InputError> {
+    let extension = extension(path);
+    if !["map", "txt"].contains(&extension.as_str()) {
+        return Err(not_read(path));
+    }
+    if boxes.resolution_m.is_some() {
+        let cause = "a character is a box: there are no pixels";
+        return Err(InputError::new(path.display(), cause, "leave the resolution out"));
+    }
+    match extension.as_str() {
+        "map" => movingai::load_map(path, boxes.box_size_m),
+        _ => ascii::load(path, boxes.box_size_m),
+    }
 }
 
 /// Returns the extension in lower case, the one before `.gz` where that is the last.
@@ -41,8 +89,8 @@ fn not_read(path: &Path) -> InputError {
     InputError::new(
         path.display(),
         "the file name does not say which kind of map this is",
-        "give a .yaml or .yml (ROS map_server), a .map (MovingAI) or a .txt (characters) file, \
-         each also with .gz",
+        "give a .yaml or .yml (ROS map_server), a .png or .pgm (image), a .map (MovingAI) or a .txt \
+         (characters) file, each also with .gz",
     )
 }
 
@@ -55,7 +103,41 @@ mod tests {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let path = folder.path().join(name);
         std::fs::write(&path, text).expect("written");
-        map_file(&path, 0.5, UnknownPolicy::Free)
+        map_file(&path, BOXES)
+    }
+
+    const BOXES: AsBoxes =
+        AsBoxes { box_size_m: 0.5, resolution_m: None, unknown: UnknownPolicy::Free };
+
+    #[test]
+    fn an_image_is_a_map_once_it_is_said_how_large_its_pixels_are() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("plan.pgm");
+        std::fs::write(&path, "P2 2 2 255 0 255 255 205").expect("written");
+        let boxes = AsBoxes { resolution_m: Some(0.5), unknown: UnknownPolicy::Keep, ..BOXES };
+        let map = map_file(&path, boxes).expect("read");
+        // The last line of an image is south, where maps begin.
+        assert_eq!(map.cells(), [Cell::Free, Cell::Unknown, Cell::Wall, Cell::Free]);
+        assert_eq!(map.plane.origin_m, [0.0, 0.0]);
+        let error = map_file(&path, BOXES).expect_err("no resolution");
+        assert!(error.remedy().contains("--resolution"), "{error}");
+        let error = map_file(&path, AsBoxes { resolution_m: Some(0.0), ..BOXES }).expect_err("0 m");
+        assert!(error.to_string().contains("0 m"), "{error}");
+    }
+
+    #[test]
+    fn a_resolution_that_contradicts_the_file_is_refused() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let place = |name: &str| folder.path().join(name);
+        std::fs::write(place("a.pgm"), "P2 1 1 255 255").expect("written");
+        let yaml = "image: a.pgm\nresolution: 0.5\norigin: [0, 0, 0]\nnegate: 0\n\
+                    occupied_thresh: 0.65\nfree_thresh: 0.196\n";
+        std::fs::write(place("a.yaml"), yaml).expect("written");
+        std::fs::write(place("a.txt"), "..\n").expect("written");
+        let read = |name, m| map_file(&place(name), AsBoxes { resolution_m: Some(m), ..BOXES });
+        assert!(read("a.yaml", 0.5).is_ok());
+        assert!(read("a.yaml", 0.25).expect_err("other").to_string().contains("not 0.25 m"));
+        assert!(read("a.txt", 0.5).expect_err("boxes").to_string().contains("no pixels"));
     }
 
     #[test]
@@ -75,9 +157,9 @@ mod tests {
 
     #[test]
     fn an_unknown_extension_lists_what_is_read() {
-        for name in ["map.pgm", "map", "map.gz", ".gz"] {
+        for name in ["map.bmp", "map", "map.gz", ".gz"] {
             let error = read(name, "").expect_err(name);
-            for known in [".yaml", ".yml", ".map", ".txt", ".gz"] {
+            for known in [".yaml", ".yml", ".png", ".pgm", ".map", ".txt", ".gz"] {
                 assert!(error.remedy().contains(known), "{error}");
             }
         }

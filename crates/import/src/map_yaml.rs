@@ -224,6 +224,10 @@ pub(super) struct Reading {
 }
 
 impl Reading {
+    /// The reading of most ROS maps, and of images without a YAML file.
+    pub(super) const USUAL: Self =
+        Self { mode: Mode::Trinary, negate: false, occupied_thresh: 0.65, free_thresh: 0.196 };
+
     pub(super) fn cell(&self, brightness: f64) -> Cell {
         let shade = if self.negate { brightness } else { 255.0 - brightness };
         match self.mode {

@@ -19,10 +19,11 @@
 use std::path::Path;
 
 use sidestep_kernel::InputError;
+use sidestep_kernel::view::Plane;
 
 use super::PixelMap;
 use super::image::Bitmap;
-use super::map_yaml::{MAX_YAML_BYTES, Metadata};
+use super::map_yaml::{MAX_YAML_BYTES, Metadata, Reading};
 use sidestep_scenario::file::read_text;
 
 /// Reads the map whose YAML file is at `path`. YAML file and image may be packed with gzip; an
@@ -36,26 +37,41 @@ pub fn load(path: &Path) -> Result<PixelMap, InputError> {
     let text = read_text(path, MAX_YAML_BYTES)?;
     let meta = Metadata::parse(&place, &text, path.parent().unwrap_or(Path::new("")))?;
     let image = Bitmap::load(&meta.image)?;
-    Ok(pixel_map(&meta, &image))
+    Ok(pixel_map(meta.resolution_m, meta.plane, meta.reading, &image))
 }
 
-fn pixel_map(meta: &Metadata, image: &Bitmap) -> PixelMap {
-    let from_top = image.map_brightness(|brightness| meta.reading.cell(brightness));
+/// Reads a plain image as `map_server` would with its usual thresholds: the corner in the south-west is
+/// the origin, a pixel with `p > 0.65` is occupied, one with `p < 0.196` free.
+///
+/// # Errors
+/// When the file is missing, damaged or absurdly large, or the side of a pixel is not positive.
+pub fn load_image(path: &Path, resolution_m: f64) -> Result<PixelMap, InputError> {
+    if !(resolution_m.is_finite() && resolution_m > 0.0) {
+        let cause = format!("a resolution of {resolution_m} m per pixel");
+        let remedy = "give the side of a pixel in meters, such as 0.05";
+        return Err(InputError::new(path.display(), cause, remedy));
+    }
+    let image = Bitmap::load(path)?;
+    let plane = Plane { origin_m: [0.0, 0.0], yaw_rad: 0.0 };
+    Ok(pixel_map(resolution_m, plane, Reading::USUAL, &image))
+}
+
+fn pixel_map(resolution_m: f64, plane: Plane, reading: Reading, image: &Bitmap) -> PixelMap {
+    let from_top = image.map_brightness(|brightness| reading.cell(brightness));
     let from_bottom = from_top.rchunks(image.width() as usize).flatten().copied().collect();
-    PixelMap::new(image.width(), image.height(), meta.resolution_m, meta.plane, from_bottom)
+    PixelMap::new(image.width(), image.height(), resolution_m, plane, from_bottom)
 }
 
 #[cfg(test)]
 mod tests {
     use std::path::PathBuf;
 
-    use super::super::map_yaml::{Mode, Reading};
+    use super::super::map_yaml::Mode;
     use super::*;
     use Cell::{Free, Unknown, Wall};
     use sidestep_map::Cell;
 
-    const READING: Reading =
-        Reading { mode: Mode::Trinary, negate: false, occupied_thresh: 0.65, free_thresh: 0.196 };
+    const READING: Reading = Reading::USUAL;
 
     fn cells(reading: Reading, brightnesses: &[f64]) -> Vec<Cell> {
         brightnesses.iter().map(|&brightness| reading.cell(brightness)).collect()

@@ -41,6 +41,7 @@ pub fn pgm(width: u32, height: u32, grays: impl Iterator<Item = u8>) -> Vec<u8> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::AsBoxes;
     use crate::map_file;
     use sidestep_map::{GridMap, UnknownPolicy};
 
@@ -53,7 +54,12 @@ mod tests {
         for (name, bytes) in map_files([3, 2], map.box_size_m, map.plane, map.cells()) {
             std::fs::write(folder.path().join(name), bytes).expect("written");
         }
-        let back = map_file(&folder.path().join("map.yaml"), map.box_size_m, UnknownPolicy::Keep);
+        let as_boxes = AsBoxes {
+            box_size_m: map.box_size_m,
+            resolution_m: None,
+            unknown: UnknownPolicy::Keep,
+        };
+        let back = map_file(&folder.path().join("map.yaml"), as_boxes);
         assert_eq!(back, Ok(map));
     }
 }

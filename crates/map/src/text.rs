@@ -10,7 +10,7 @@ impl GridMap {
     /// of boxes and follows the rule that makes boxes of pixels (wall where any of them is a wall,
     /// else unknown where any is unknown), so that no wall is lost.
     pub fn to_text(&self, max_cols: u32) -> String {
-        let step = self.width().div_ceil(max_cols.max(1));
+        let step = self.step(max_cols);
         let cols = self.width().div_ceil(step);
         let rows = self.height().div_ceil(step);
         let mut text = String::with_capacity((cols as usize + 1) * rows as usize);
@@ -19,6 +19,29 @@ impl GridMap {
             text.push('\n');
         }
         text
+    }
+
+    /// Returns the number of boxes along each side of the square that a character stands for.
+    fn step(&self, max_cols: u32) -> u32 {
+        self.width().div_ceil(max_cols.max(1))
+    }
+
+    /// Returns the map as [`GridMap::to_text`] does, with rulers: the row of boxes before every fifth line,
+    /// the column of boxes below every tenth character, both counted from the south-west.
+    pub fn to_text_with_rulers(&self, max_cols: u32) -> String {
+        let margin = self.height().to_string().len() + 1;
+        let max_cols = max_cols.saturating_sub(margin as u32);
+        let (step, map) = (self.step(max_cols), self.to_text(max_cols));
+        let rows = map.lines().count() as u32;
+        let mut text = String::new();
+        for (line, row) in map.lines().zip((0..rows).rev()) {
+            let label = if row % 5 == 0 { (row * step).to_string() } else { String::new() };
+            text += &format!("{label:>width$} {line}\n", width = margin - 1);
+        }
+        let cols = map.lines().next().map_or(0, str::len) as u32;
+        let ruler = (0..cols).step_by(10).map(|col| format!("{:<10}", col * step));
+        let ruler = " ".repeat(margin) + &ruler.collect::<String>();
+        text + ruler.trim_end() + "\n"
     }
 
     /// Returns the combined cell of the square of `side` boxes with the lower-left box (`col`,
@@ -55,6 +78,19 @@ mod tests {
     fn north_is_up() {
         let map = GridMap::new(2, 2, 1.0, vec![Free, Wall, Unknown, Free]);
         assert_eq!(map.to_text(80), "?.\n.#\n");
+    }
+
+    #[test]
+    fn rulers_count_boxes_from_the_south_west() {
+        let map = GridMap::new(12, 6, 1.0, vec![Free; 72]);
+        let expected = "5 ............\n  ............\n  ............\n  ............\n  ............\n\
+                        0 ............\n  0         10\n";
+        assert_eq!(map.to_text_with_rulers(80), expected);
+        assert_eq!(
+            map.to_text_with_rulers(8),
+            "  ......\n  ......\n0 ......\n  0\n",
+            "half as large"
+        );
     }
 
     #[test]

@@ -258,7 +258,7 @@ pub(crate) fn check_vacant(path: &Path, existing: Existing) -> Result<(), InputE
         (false, _, _) | (true, true, Existing::Replace) => Ok(()),
         (true, true, Existing::Refuse) => refuse(
             "the folder holds a run already",
-            "resume that run, name another folder, or ask for the old run to be replaced",
+            "resume that run, name another folder, or replace the old run (--replace)",
         ),
         (true, false, _) => {
             let what = match crate::sweep::SweepFolder::<()>::is_at(path) {

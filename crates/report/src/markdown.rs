@@ -28,11 +28,6 @@ pub(crate) fn text(document: &Document, folder: &str, pictures: &[SvgFile]) -> S
     parts.join("\n\n") + "\n"
 }
 
-/// Returns a document as text for a place that shows no pictures, such as a terminal.
-pub fn without_pictures(document: &Document) -> String {
-    text(document, "", &[])
-}
-
 /// Returns a table, with its title as a heading of the third level.
 pub fn table(table: &Table) -> String {
     let columns: Vec<String> = table.columns.iter().map(|c| cell(c)).collect();

@@ -41,7 +41,7 @@ pub use files::replace;
 pub use film::{Ending, Film, McapFilm};
 pub use journey::{Journey, Keep};
 pub use picture::write_png;
-pub use recorded::csv_table;
+pub use recorded::{csv_table, stored_summary};
 pub use recording::Recording;
 pub use replay::{Replayed, replay_all, replay_to};
 pub use rerun::Recorded;

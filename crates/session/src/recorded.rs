@@ -1,5 +1,6 @@
 //! Tables of a recorded run, also as CSV, the format of logs to learn from.
 
+use serde_json::Value;
 use sidestep::import::table::CsvTable;
 use sidestep::kernel::InputError;
 use sidestep::kernel::view::{Frame, PlaceRows, Scenery, Trail};
@@ -71,4 +72,18 @@ pub(crate) fn has_rows(folder: &Path, table: &str) -> bool {
         let entries = std::fs::read_dir(folder.join(table));
         entries.is_ok_and(|mut all| all.any(|e| e.is_ok_and(|e| is_part(&e.file_name()))))
     })
+}
+
+/// Returns the content of `summary.json`, which a run writes at its end, if it is there.
+///
+/// # Errors
+/// Text that is not JSON.
+pub fn stored_summary(folder: &Path) -> Result<Option<Value>, InputError> {
+    let path = folder.join("summary.json");
+    let Ok(text) = std::fs::read_to_string(&path) else { return Ok(None) };
+    let damaged = |e: serde_json::Error| {
+        let remedy = "restore the file, or run the scenario again in a new folder";
+        InputError::new(path.display(), format!("this is no summary: {e}"), remedy)
+    };
+    serde_json::from_str(&text).map(Some).map_err(damaged)
 }

@@ -6,6 +6,7 @@ use crate::interrupt;
 use crate::report::text;
 use crate::watch::Watch;
 use sidestep_session::{Journey, Status, Summary};
+use std::path::Path;
 
 /// Drives the run to its end (or until Ctrl-C), and stores and prints the summary.
 ///
@@ -19,8 +20,15 @@ pub(super) fn travel(journey: Journey, console: Console) -> Result<ExitCode, Fai
 }
 
 fn ending(summary: &Summary, console: Console) -> ExitCode {
-    if summary.status == Status::Incomplete && summary.folder.is_some() {
-        console.note("The run is marked as incomplete; `sidestep resume DIR` continues it.");
+    if let Some(folder) = summary.folder.as_deref().map(Path::display) {
+        console.note(match summary.status {
+            Status::Complete => {
+                format!("Next: `sidestep report {folder}` writes a page with pictures and numbers.")
+            }
+            Status::Incomplete => {
+                format!("The run is marked as incomplete; `sidestep resume {folder}` continues it.")
+            }
+        });
     }
     match interrupt::requested() && summary.status == Status::Incomplete {
         true => ExitCode::Interrupted,

@@ -4,7 +4,7 @@ use crate::console::{Console, columns};
 use crate::exit::{ExitCode, Failure};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
-use sidestep::import::{map_file, rosmap};
+use sidestep::import::{AsBoxes, map_file, pixel_map};
 use sidestep::kernel::InputError;
 use sidestep::kernel::view::{Frame, Scenery};
 use sidestep::map::{CellCounts, GridMap, UnknownPolicy};
@@ -16,11 +16,14 @@ const EXAMPLES: &str = "\
 Examples:
   sidestep map building.yaml --box 0.25
   sidestep map building.yaml --box 0.25 --unknown wall --png building.png
+  sidestep map plan.png --resolution 0.05
   sidestep map arena.map --width 60
   sidestep map building.yaml --box 0.5 --json
 
-Reads ROS map_server (.yaml), MovingAI (.map) and character maps (.txt), each also with .gz. \
-In the terminal: # wall, . free, ? unknown; a wide map is drawn smaller and loses no wall.";
+Reads ROS map_server (.yaml), images (.png, .pgm: dark is wall, light is free, between is \
+unknown), MovingAI (.map) and character maps (.txt), each also with .gz. \
+In the terminal: # wall, . free, ? unknown, numbers count boxes; a wide map is drawn smaller and \
+loses no wall.";
 
 /// Show a map as the simulator sees it, in the terminal or as PNG.
 #[derive(Debug, Args)]
@@ -33,6 +36,10 @@ pub(crate) struct MapArgs {
     /// Side of a box in meters
     #[arg(long = "box", value_name = "B", default_value_t = 0.25)]
     box_size_m: f64,
+
+    /// Side of a pixel in meters, for a plain image; a ROS map says its own
+    #[arg(long = "resolution", value_name = "R")]
+    resolution_m: Option<f64>,
 
     /// How to treat unmapped (unknown) boxes; in scenarios the default is wall
     #[arg(long, value_enum, default_value_t = Unknown::Keep)]
@@ -91,29 +98,23 @@ pub(crate) fn map(args: &MapArgs, console: Console) -> Result<ExitCode, Failure>
         draw_boxes(&map, &args.file, png)?;
     }
     let width = args.width.unwrap_or_else(columns);
-    console.result(&counts, || map.to_text(width.into()) + &words(&counts));
+    console.result(&counts, || map.to_text_with_rulers(width.into()) + &words(&counts));
     Ok(ExitCode::Done)
 }
 
 fn read(args: &MapArgs) -> Result<(Counts, GridMap), InputError> {
     let policy = args.unknown.into();
-    if !is_yaml(&args.file) {
-        let map = map_file(&args.file, args.box_size_m, UnknownPolicy::Keep)?;
+    let Some(pixels) = pixel_map(&args.file, args.resolution_m)? else {
+        let (resolution_m, unknown) = (args.resolution_m, UnknownPolicy::Keep);
+        let boxes = AsBoxes { box_size_m: args.box_size_m, resolution_m, unknown };
+        let map = map_file(&args.file, boxes)?;
         let pixels = map.counts();
         let map = map.with_unknown(policy);
         return Ok((counts(&map, (map.width(), map.height()), pixels, map.box_size_m), map));
-    }
-    let pixels = rosmap::load(&args.file)?;
+    };
     let map = pixels.to_boxes(args.box_size_m, policy)?;
     let size = (pixels.width(), pixels.height());
     Ok((counts(&map, size, pixels.counts(), pixels.resolution_m()), map))
-}
-
-/// Whether the map is a ROS map: only these have pixels that differ from boxes in size.
-fn is_yaml(file: &Path) -> bool {
-    let name = file.to_string_lossy().to_lowercase();
-    let name = name.strip_suffix(".gz").unwrap_or(&name);
-    name.ends_with(".yaml") || name.ends_with(".yml")
 }
 
 fn counts(

@@ -9,8 +9,9 @@ use crate::sweep::go_on;
 use clap::Args;
 use sidestep::kernel::{Cycle, InputError};
 use sidestep::worlds::WORLDS;
-use sidestep_session::Journey;
+use sidestep_record::{RunView, Status};
 use sidestep_session::sweep::Folder;
+use sidestep_session::{Journey, stored_summary};
 use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
@@ -20,7 +21,8 @@ Examples:
   sidestep resume runs/office --workers 8
   sidestep resume runs/office --cycles 20000     to cycle 20000 only
 
-The result has the same digest and the same rows as an uninterrupted run.";
+The result has the same digest and the same rows as an uninterrupted run. Of a run that is complete \
+already, the result is told and nothing is written.";
 
 /// Continue a recorded run or a sweep that was stopped or killed.
 #[derive(Debug, Args)]
@@ -46,6 +48,10 @@ pub(crate) fn resume(args: &ResumeArgs, console: Console) -> Result<ExitCode, Fa
     if Folder::is_at(&args.folder) {
         return resume_sweep(args, console);
     }
+    let view = RunView::open(&args.folder)?;
+    if view.manifest.status == Status::Complete && args.cycles.is_none() {
+        return nothing_left(&view, console);
+    }
     let workers = args.workers.count();
     interrupt::listen()?;
     let journey = Journey::resume(WORLDS, &args.folder, workers, args.cycles)?;
@@ -54,15 +60,23 @@ pub(crate) fn resume(args: &ResumeArgs, console: Console) -> Result<ExitCode, Fa
     travel(journey, console)
 }
 
+/// Tells what a finished run came to: whoever resumes all of their runs need not know which had ended.
+fn nothing_left(view: &RunView, console: Console) -> Result<ExitCode, Failure> {
+    let folder = view.path.display();
+    let cycles = grouped(view.manifest.cycles_done);
+    console.note(format!(
+        "{folder} is complete ({cycles} cycles): nothing is left to run. `sidestep report {folder}` writes \
+         its page."
+    ));
+    let digest = view.manifest.digest.as_deref().unwrap_or_default();
+    console.result(&stored_summary(&view.path)?, || format!("{digest}\n"));
+    Ok(ExitCode::Done)
+}
+
 fn resume_sweep(args: &ResumeArgs, console: Console) -> Result<ExitCode, Failure> {
     if args.cycles.is_some() {
         let remedy = "leave --cycles out: the runs of a sweep go to their ends";
         return Err(InputError::new("--cycles", "this is the folder of a sweep", remedy).into());
     }
-    let folder = Folder::open(&args.folder)?;
-    if folder.is_complete() {
-        let remedy = "read results.parquet, or see `sidestep report DIR`";
-        return Err(InputError::new(args.folder.display(), "the sweep is done", remedy).into());
-    }
-    go_on(&folder, args.workers.count(), console)
+    go_on(&Folder::open(&args.folder)?, args.workers.count(), console)
 }

@@ -156,7 +156,7 @@ fn a_folder_holds_one_sweep() {
     assert_eq!(other.code(), 2);
     assert!(other.err().contains("another sweep"), "{}", other.err());
     let done = place.run(&["resume", "d"]);
-    assert!(done.code() == 2 && done.err().contains("done"), "{}", done.err());
+    assert!(done.code() == 0 && done.err().contains("finished already"), "{}", done.err());
     let planned = place.run(&["sweep", "plan", "sweep.toml", "--out", "d"]);
     assert!(planned.err().contains("holds a sweep already"), "{}", planned.err());
     let none = place.run(&["sweep", "collect", "."]);

@@ -77,7 +77,7 @@ impl McapRecorder {
         match fs::metadata(path) {
             Ok(found) if !found.is_file() => refuse("this is no file", "name a new file"),
             Ok(_) if existing == Existing::Refuse => {
-                refuse("the file exists already", "name another file, or ask for it to be replaced")
+                refuse("the file exists already", "name another file, or replace it (--replace)")
             }
             _ if path.file_name().is_none() => refuse("this is no file name", "name a new file"),
             _ => Ok(()),

@@ -3,6 +3,7 @@
 
 use super::words::{count, duration};
 use super::{events, metrics, recorded};
+use crate::stored_summary;
 use serde_json::Value;
 use sidestep::kernel::InputError;
 use sidestep_document::Document;
@@ -20,7 +21,7 @@ const ONE_RUN: &str = "**One run, n = 1**: these numbers have no interval, and s
 /// When it is no run folder, or something in it is damaged.
 pub(super) fn document(folder: &Path) -> Result<Document, InputError> {
     let view = RunView::open(folder)?;
-    let summary = summary(folder)?;
+    let summary = stored_summary(folder)?;
     let name = name(&view, summary.as_ref());
     let mut document = Document::new(format!("{name}, seed {}", view.manifest.seed), lead(&view));
     if let Some(warning) = unfinished(&view) {
@@ -128,17 +129,6 @@ pub(super) fn quoted(path: &str) -> String {
         return path.into();
     }
     format!("'{}'", path.replace('\'', "'\\''"))
-}
-
-/// Returns `summary.json`, which a run writes at its end.
-fn summary(folder: &Path) -> Result<Option<Value>, InputError> {
-    let path = folder.join("summary.json");
-    let Ok(text) = std::fs::read_to_string(&path) else { return Ok(None) };
-    let damaged = |e: serde_json::Error| {
-        let remedy = "restore the file, or run the scenario again in a new folder";
-        InputError::new(path.display(), format!("this is no summary: {e}"), remedy)
-    };
-    serde_json::from_str(&text).map(Some).map_err(damaged)
 }
 
 fn tell_metrics(document: &mut Document, manifest: &Manifest, summary: &Value) {

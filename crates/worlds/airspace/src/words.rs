@@ -3,9 +3,10 @@
 use super::metrics::{BeyondBound, Metrics, TooClose};
 use super::scenario::Compiled;
 use super::state::{AirplaneRecord, Snapshot};
+use super::world::AirspaceWorld;
 use serde_json::json;
 use sidestep_kernel::Cycle;
-use sidestep_kernel::words::{Lines, Said, grouped, line};
+use sidestep_kernel::words::{Lines, Said, aligned, grouped, line};
 
 /// Returns the contents of a compiled scenario.
 pub(super) fn contents(compiled: &Compiled) -> Said {
@@ -25,25 +26,65 @@ pub(super) fn contents(compiled: &Compiled) -> Said {
         "deployment": world.deployment.name(),
         "shield": shield,
         "dt_s": world.timing.dt_s,
+        "horizon_s": world.timing.horizon_s(),
+        "cycles": compiled.cycles,
+        "seed": compiled.seed,
         "too_close": compiled.too_close,
         "recorded": recorded,
         "replay_until_s": (recorded > 0).then_some(until_s),
     });
-    let mut text = format!(
-        "  airplanes        {}\n  method           {}, {}, shield {shield}\n",
-        grouped(world.airplanes.len() as u64),
-        world.method.name(),
-        world.deployment.name(),
-    );
+    let mut lines = vec![line("airplanes", grouped(world.airplanes.len() as u64))];
+    if intruders > 0 {
+        lines.push(line("intruders", grouped(intruders)));
+    }
+    lines.extend(abilities(world));
+    lines.push(line(
+        "method",
+        format!("{}, {}, shield {shield}", world.method.name(), world.deployment.name()),
+    ));
     if recorded > 0 {
         let until = if until_s.is_finite() { format!("until {until_s} s") } else { "all".into() };
-        text.push_str(&format!("  recorded         {}, replayed {until}\n", grouped(recorded)));
+        lines.push(line("recorded", format!("{}, replayed {until}", grouped(recorded))));
     }
-    if intruders > 0 {
-        text.push_str(&format!("  intruders        {}\n", grouped(intruders)));
+    let timing = &world.timing;
+    let (cycles, lasts_s) = (grouped(compiled.cycles), compiled.cycles as f64 * timing.dt_s);
+    lines.extend([
+        line(
+            "time",
+            format!("decides every {} s, looks {} s ahead", timing.dt_s, timing.horizon_s()),
+        ),
+        line("run", format!("at most {cycles} cycles ({lasts_s} s), seed {}", compiled.seed)),
+    ]);
+    lines.extend(too_close(&compiled.too_close));
+    Said { json, text: aligned(&lines) }
+}
+
+/// Returns the separations, speeds and turn rates of the airplanes.
+fn abilities(world: &AirspaceWorld) -> Lines {
+    let models = || world.airplanes.iter().map(|airplane| &airplane.model);
+    let height_m = world.vertical_m.round();
+    vec![
+        line(
+            "separation",
+            format!("{} m, or {height_m} m of height", range(models().map(|m| m.separation_m))),
+        ),
+        line("speed", format!("{} m/s", range(models().map(|m| m.v_m_s)))),
+        line(
+            "turn rate",
+            format!("{} deg/s", range(models().map(|m| m.omega_max_rad_s.to_degrees()))),
+        ),
+    ]
+}
+
+/// Returns a number that all have, or the least and the greatest, to a tenth.
+fn range(numbers: impl Iterator<Item = f64>) -> String {
+    let (least, greatest) =
+        numbers.fold((f64::INFINITY, 0.0_f64), |(least, most), x| (least.min(x), most.max(x)));
+    let rounded = |x: f64| ((x * 10.0).round() / 10.0).to_string();
+    match (rounded(least), rounded(greatest)) {
+        (one, other) if one == other => one,
+        (one, other) => format!("{one} to {other}"),
     }
-    text.push_str(&too_close(&compiled.too_close));
-    Said { json, text }
 }
 
 /// Returns the outcome of a run.
@@ -69,9 +110,9 @@ pub(super) fn poses(snapshot: &Snapshot) -> Said {
 }
 
 /// Returns the pairs whose first fallbacks are not apart, in words.
-fn too_close(pairs: &[(u32, u32)]) -> String {
+fn too_close(pairs: &[(u32, u32)]) -> Lines {
     let warn = |(a, b): &(u32, u32)| {
-        format!("  warning          airplanes {a} and {b} start too close for the shield\n")
+        line("warning", format!("airplanes {a} and {b} start too close for the shield"))
     };
     pairs.iter().map(warn).collect()
 }

@@ -5,7 +5,7 @@ use super::scenario::Compiled;
 use super::state::Snapshot;
 use serde_json::{Value, json};
 use sidestep_kernel::World;
-use sidestep_kernel::words::{Lines, Said, grouped, line};
+use sidestep_kernel::words::{Lines, Said, aligned, grouped, line};
 
 /// Returns the contents of a compiled scenario.
 pub(super) fn contents<const D: usize>(compiled: &Compiled<D>) -> Said {
@@ -25,15 +25,36 @@ pub(super) fn contents<const D: usize>(compiled: &Compiled<D>) -> Said {
         "dimensions": D,
         "dt_s": world.dt_s,
     });
-    let text = format!(
-        "  chains           {}, of {} connectors in {D} dimensions\n  \
-         obstacles        {}, and {} that move\n",
-        grouped(world.chains.len() as u64),
-        grouped(connectors as u64),
-        grouped(world.obstacles.still().len() as u64),
-        grouped(world.movers.len() as u64),
-    );
-    Said { json, text }
+    let count = |n: usize| grouped(n as u64);
+    let lasts_s = plan.cycles as f64 * world.dt_s;
+    let lines = [
+        line(
+            "chains",
+            format!(
+                "{}, of {} connectors in {D} dimensions",
+                count(world.chains.len()),
+                count(connectors as usize)
+            ),
+        ),
+        line(
+            "obstacles",
+            format!(
+                "{}, and {} that move",
+                count(world.obstacles.still().len()),
+                count(world.movers.len())
+            ),
+        ),
+        line(
+            "run",
+            format!(
+                "{} cycles of {} s ({lasts_s} s), seed {}",
+                grouped(plan.cycles),
+                world.dt_s,
+                plan.seed
+            ),
+        ),
+    ];
+    Said { json, text: aligned(&lines) }
 }
 
 /// Returns the position of every connector.

@@ -21,6 +21,9 @@ pub fn resolve(source: &Source, compiled: &Compiled) -> Result<Resolved, InputEr
     bundle.set("regime", format_args!("{:?}", compiled.world.regime.name()));
     if !file["map"]["file"].is_null() {
         add_map(&mut bundle, &compiled.world.map);
+        if !file["map"]["resolution_m"].is_null() {
+            bundle.set("map.resolution_m", format_args!("{:?}", compiled.world.map.box_size_m));
+        }
     }
     add_profiles(&mut bundle, &file["profiles"])?;
     add_starts(&mut bundle, &file["robots"])?;

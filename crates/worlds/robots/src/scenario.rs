@@ -77,6 +77,7 @@ pub(super) struct MapSection {
     pub(super) ascii: Option<String>,
     pub(super) office: Option<Spanned<OfficeSpec>>,
     pub(super) box_size_m: Option<Number<BoxSide>>,
+    pub(super) resolution_m: Option<Positive>,
     #[serde(default)]
     pub(super) unknown: UnknownPolicy,
 }

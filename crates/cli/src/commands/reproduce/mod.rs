@@ -15,7 +15,6 @@ use sidestep_document::claim::{Claim, tally};
 use sidestep_document::document::Picture;
 use sidestep_draw::{DrawError, Options, Style, draw};
 use sidestep_papers::Scene;
-use sidestep_report::markdown::without_pictures;
 use sidestep_session::replace;
 use std::io::Write;
 use std::path::Path;
@@ -97,22 +96,22 @@ fn deliver(
         replace(&folder.join("report.json"), |file| file.write_all(&json))?;
         pages.store(&outcome.document, Raster::AlsoPng)?;
     }
-    console.result(report, || match out {
-        None => without_pictures(&outcome.document),
-        Some(folder) => summary(outcome, folder),
-    });
+    console.result(report, || summary(outcome, out));
     Ok(ExitCode::Done)
 }
 
 /// Returns the verdicts in a few lines, and where the report is.
-fn summary(outcome: &Outcome<'_>, folder: &Path) -> String {
+fn summary(outcome: &Outcome<'_>, out: Option<&Path>) -> String {
     let lines: Vec<_> = outcome.claims.iter().map(claim_line).collect();
+    let report = match out {
+        Some(folder) => format!("Report: {}", folder.join("report.html").display()),
+        None => "No report was kept: --out DIR keeps it, with all figures and numbers.".into(),
+    };
     format!(
-        "{}{}\n{}Report: {}\n",
+        "{}{}\n{}{report}\n",
         tally(outcome.claims),
         if outcome.quick { " A rehearsal: without weight." } else { "" },
         aligned(&lines),
-        folder.join("report.html").display()
     )
 }
 

@@ -1,6 +1,7 @@
 //! From the map section to boxes.
 
 use super::*;
+use sidestep_import::AsBoxes;
 
 /// Farthest corner of a map: poses are recorded with 15 bits per coordinate.
 const MAX_SIDE: u32 = (1 << 15) - 2 * MAX_PATH as u32;
@@ -31,10 +32,20 @@ fn read_map(
     section: &Spanned<MapSection>,
 ) -> Result<(GridMap, Vec<Rect>), InputError> {
     let s = section.get_ref();
+    if let (Some(_), None) = (&s.resolution_m, &s.file) {
+        let cause = "`resolution_m` is the side of a pixel, and there is no image";
+        return Err(source.error(
+            section.span(),
+            cause,
+            "leave it out, or name an image as `file`",
+        ));
+    }
     let box_size_m = s.box_size_m.map_or(0.25, f64::from);
     match (&s.file, &s.ascii, &s.office) {
         (Some(file), None, None) => {
-            let map = sidestep_import::map_file(&source.path(file), box_size_m, s.unknown)?;
+            let resolution_m = s.resolution_m.map(f64::from);
+            let boxes = AsBoxes { box_size_m, resolution_m, unknown: s.unknown };
+            let map = sidestep_import::map_file(&source.path(file), boxes)?;
             Ok((map, Vec::new()))
         }
         (None, Some(art), None) => {
