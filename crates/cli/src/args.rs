@@ -11,7 +11,7 @@ const LAST: usize = 900;
 
 /// Simulate and compare decentralized motion of many agents that must not collide.
 #[derive(Debug, Parser)]
-#[command(name = "sidestep", version = sidestep::BUILD, after_help = EXAMPLES, arg_required_else_help = true)]
+#[command(name = "sidestep", version = sidestep_session::build(), after_help = EXAMPLES, arg_required_else_help = true)]
 pub(crate) struct Cli {
     /// Print one JSON object to standard output and nothing else
     #[arg(long, global = true, display_order = LAST)]

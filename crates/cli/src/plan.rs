@@ -1,10 +1,10 @@
 //! A scenario file and the options of the command line -> a valid scenario.
 
+use crate::worlds;
 use clap::Args;
 use sidestep::kernel::{InputError, workers};
 use sidestep::scenario::Compiled;
 use sidestep::scenario::Source;
-use sidestep::worlds::WORLDS;
 use sidestep_session::read;
 use std::path::PathBuf;
 
@@ -65,7 +65,7 @@ impl ScenarioArgs {
     /// # Errors
     /// When anything in it is wrong.
     pub(crate) fn compile(&self) -> Result<(Source, Box<dyn Compiled>), InputError> {
-        read(WORLDS, &self.file, &self.all_overrides())
+        read(worlds(), &self.file, &self.all_overrides())
     }
 
     fn all_overrides(&self) -> Vec<String> {

@@ -30,6 +30,8 @@ pub struct Run<W: World> {
     groups_before: GroupSizes,
     cycle: Cycle,
     clock: SystemClock,
+    /// Whether rows are kept for a recorder.
+    records: bool,
 }
 
 impl<W: World> Run<W> {
@@ -46,7 +48,8 @@ impl<W: World> Run<W> {
         let scenario = *Digest::of(scenario.as_bytes()).as_bytes();
         let clock = SystemClock::default();
         let groups_before = GroupSizes::default();
-        Self { world, plan, scenario, state, books, engine, groups_before, cycle: 0, clock }
+        let (cycle, records) = (0, false);
+        Self { world, plan, scenario, state, books, engine, groups_before, cycle, clock, records }
     }
 
     /// Uses all workers even where one would be faster; for tests and benchmarks.
@@ -220,6 +223,7 @@ impl<W: World> Simulation for Run<W> {
     }
 
     fn begin_recording(&mut self) {
+        self.records = true;
         self.world.begin_recording(&mut self.state, &mut self.books, self.cycle);
         self.prepare();
     }
@@ -229,6 +233,11 @@ impl<W: World> Simulation for Run<W> {
     }
 
     fn record(&mut self, recorder: &mut dyn Recorder) -> Result<(), RecordError> {
+        // Rows of cycles that are over cannot be had any more: an empty recording would hide that.
+        if !self.records {
+            let cause = "no rows were kept; call `begin_recording` before the first `advance`";
+            return Err(RecordError::new(format!("the recording of `{}`", self.plan.name), cause));
+        }
         self.gather();
         self.world.record(&mut self.state, &mut self.books, self.cycle, recorder)
     }

@@ -66,7 +66,7 @@ pub trait Simulation: Any + Send {
     /// Hands all rows since the last call to a recorder.
     ///
     /// # Errors
-    /// When the recorder cannot store it.
+    /// When the recorder cannot store it, or [`Simulation::begin_recording`] was never called.
     fn record(&mut self, recorder: &mut dyn Recorder) -> Result<(), RecordError>;
 
     /// The scenery: everything that stays as it is during the run.

@@ -3,6 +3,21 @@
 use sidestep::kernel::InputError;
 use sidestep::{BUILD, VERSION};
 use std::path::Path;
+use std::sync::OnceLock;
+
+/// The identity of a program that adds code of its own, for the whole process.
+static OWN: OnceLock<String> = OnceLock::new();
+
+/// Returns the identity of this program: the library's build, and the code that was added to it.
+pub fn build() -> &'static str {
+    OWN.get().map_or(BUILD, String::as_str)
+}
+
+/// Declares that this program adds code from which results follow, known by a digest of it. The first
+/// digest stays.
+pub fn adds_code(digest: &str) {
+    OWN.get_or_init(|| format!("{BUILD}.own-{}", &digest[..digest.len().min(12)]));
+}
 
 /// The program that made a run or a sweep, as recorded.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -27,8 +42,8 @@ impl Maker {
         remedy: impl FnOnce(&str) -> String,
     ) -> Result<(), InputError> {
         let (wrote, reads) = match &self.build {
-            Some(build) => (build, BUILD),
-            None => (&self.version, VERSION),
+            Some(made) => (made.as_str(), build()),
+            None => (self.version.as_str(), VERSION),
         };
         if wrote == reads {
             return Ok(());

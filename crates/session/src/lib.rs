@@ -39,6 +39,7 @@ pub use driver::{Effort, Sinks, drive};
 pub use error::Error;
 pub use files::replace;
 pub use film::{Ending, Film, McapFilm};
+pub use identity::{adds_code, build};
 pub use journey::{Journey, Keep};
 pub use picture::write_png;
 pub use recorded::{csv_table, stored_summary};

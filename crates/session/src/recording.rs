@@ -1,11 +1,12 @@
 //! The folder of a run while it is written.
 
 use crate::Error;
+use crate::identity::build;
+use sidestep::VERSION;
 use sidestep::kernel::Simulation;
 use sidestep::kernel::ports::{RecordError, Recorder};
 use sidestep::kernel::{Cycle, InputError};
 use sidestep::scenario::Resolved;
-use sidestep::{BUILD, VERSION};
 use sidestep_record::{Existing, NewRun, Origin, ParquetRecorder, ResumePoint, RunFolder};
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -37,7 +38,7 @@ impl Recording {
         let plan = run.plan();
         let new = NewRun {
             world: run.world().into(),
-            build: BUILD.into(),
+            build: build().into(),
             origin: Origin {
                 program_version: VERSION.into(),
                 scenario: resolved.text.clone(),

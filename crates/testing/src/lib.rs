@@ -1,6 +1,24 @@
 //! Helpers that the tests of several crates share.
 
+use std::fmt::Display;
+use std::fs::OpenOptions;
+use std::io::Write;
 use std::path::{Path, PathBuf};
+
+/// Says that a test is skipped and why. Where `SIDESTEP_SKIPPED` names a file, it gets a line as well, of
+/// which `cargo xtask test` tells at its end: the output of tests that pass is not shown.
+///
+/// # Panics
+/// When that file cannot be written.
+pub fn skip(why: impl Display) {
+    println!("skipped: {why}");
+    if let Some(path) = std::env::var_os("SIDESTEP_SKIPPED") {
+        let file = OpenOptions::new().create(true).append(true).open(path);
+        // One call writes the whole line: tests run side by side.
+        file.and_then(|mut file| file.write_all(format!("{why}\n").as_bytes()))
+            .expect("a place for skips");
+    }
+}
 
 /// Returns the folder of the repository.
 pub fn root() -> &'static Path {
@@ -12,7 +30,7 @@ pub fn root() -> &'static Path {
 pub fn shared_data(name: &str) -> Option<PathBuf> {
     let path = root().join("../shared/data").join(name);
     if !path.exists() {
-        println!("skipped: ../shared/data is not here");
+        skip("../shared/data is not here");
         return None;
     }
     Some(path)

@@ -3,11 +3,11 @@
 use crate::console::{Console, aligned};
 use crate::exit::{ExitCode, Failure};
 use crate::plan::ScenarioArgs;
+use crate::worlds;
 use clap::Args;
 use serde_json::Value;
 use sidestep::kernel::words::Said;
 use sidestep::scenario::{Compiled, Foreign, Remark, Source};
-use sidestep::worlds::WORLDS;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -33,7 +33,7 @@ pub(crate) struct CheckArgs {
 /// # Errors
 /// When the scenario is wrong.
 pub(crate) fn check(args: &CheckArgs, console: Console) -> Result<ExitCode, Failure> {
-    let foreign = WORLDS.translate(&args.scenario.file)?;
+    let foreign = worlds().translate(&args.scenario.file)?;
     if let Some(Foreign { scenario: Err(error), json, lines }) = foreign {
         // The report says what was found in the file, and the error why it cannot be run.
         let mut json = json;

@@ -5,10 +5,10 @@ use crate::exit::{ExitCode, Failure};
 use crate::interrupt;
 use crate::plan::WorkersArg;
 use crate::watch::Watch;
+use crate::worlds;
 use clap::{Args, ValueEnum};
 use serde_json::json;
 use sidestep::kernel::{Cycle, InputError};
-use sidestep::worlds::WORLDS;
 use sidestep_session::Recorded;
 use sidestep_session::export::{self, Export, Film, Written};
 use std::path::{Path, PathBuf};
@@ -127,7 +127,7 @@ pub(crate) struct ExportArgs {
 /// what was recorded.
 pub(crate) fn export(args: &ExportArgs, console: Console) -> Result<ExitCode, Failure> {
     check_options(args)?;
-    let recorded = Recorded::open(WORLDS, &args.recorded)?;
+    let recorded = Recorded::open(worlds(), &args.recorded)?;
     interrupt::listen()?;
     if args.to.is_table() && recorded.folder.is_some() && !recorded.is_complete {
         console.warn("the run is not complete: its rows end at the last checkpoint");

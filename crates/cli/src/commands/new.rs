@@ -2,12 +2,12 @@
 
 use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
+use crate::worlds;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use serde_json::json;
 use sidestep::kernel::InputError;
 use sidestep::scenario::Kind;
-use sidestep::worlds::WORLDS;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -22,7 +22,7 @@ Examples:
 #[command(after_help = EXAMPLES)]
 pub(crate) struct NewArgs {
     /// World of the scenario
-    #[arg(value_name = "WORLD", value_parser = worlds())]
+    #[arg(value_name = "WORLD", value_parser = names())]
     world: String,
 
     /// Output file; an existing one is never overwritten [default: WORLD.toml]
@@ -31,9 +31,9 @@ pub(crate) struct NewArgs {
 }
 
 /// The names of the worlds, each with a description.
-fn worlds() -> PossibleValuesParser {
+fn names() -> PossibleValuesParser {
     let named = |kind: &&dyn Kind| PossibleValue::new(kind.name()).help(kind.about());
-    PossibleValuesParser::new(WORLDS.0.iter().map(named))
+    PossibleValuesParser::new(worlds().0.iter().map(named))
 }
 
 /// Runs the command.
@@ -41,7 +41,7 @@ fn worlds() -> PossibleValuesParser {
 /// # Errors
 /// When the file is there already or cannot be written.
 pub(crate) fn new(args: &NewArgs, console: Console) -> Result<ExitCode, Failure> {
-    let kind = WORLDS.named(&args.world).expect("the parser takes these names alone");
+    let kind = worlds().named(&args.world).expect("the parser takes these names alone");
     let default = || PathBuf::from(format!("{}.toml", kind.name()));
     let path = args.file.clone().unwrap_or_else(default);
     write_new(&path, kind.default_scenario())?;

@@ -5,10 +5,10 @@ use crate::exit::{ExitCode, Failure};
 use crate::interrupt;
 use crate::plan::WorkersArg;
 use crate::watch::Watch;
+use crate::worlds;
 use clap::Args;
 use serde_json::json;
 use sidestep::kernel::Cycle;
-use sidestep::worlds::WORLDS;
 use sidestep_session::{Recorded, Replayed, replay_all, replay_to};
 use std::path::PathBuf;
 
@@ -50,7 +50,7 @@ pub(crate) struct ReplayArgs {
 /// # Errors
 /// When the folder or the cycle is wrong, or the state differs from the recorded one.
 pub(crate) fn replay(args: &ReplayArgs, console: Console) -> Result<ExitCode, Failure> {
-    let recorded = Recorded::open(WORLDS, &args.recorded)?;
+    let recorded = Recorded::open(worlds(), &args.recorded)?;
     let (workers, watch) = (args.workers.count(), Watch::new(console));
     interrupt::listen()?;
     let replayed = match args.cycle {

@@ -4,10 +4,10 @@ use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
 use crate::pages::{Pages, Raster};
 use crate::watch::Watch;
+use crate::worlds;
 use clap::Args;
 use serde_json::json;
 use sidestep::kernel::InputError;
-use sidestep::worlds::WORLDS;
 use sidestep_session::report::document;
 use std::path::PathBuf;
 
@@ -40,7 +40,7 @@ pub(crate) struct ReportArgs {
 /// written.
 pub(crate) fn report(args: &ReportArgs, console: Console) -> Result<ExitCode, Failure> {
     let pages = pages(args)?;
-    let document = document(WORLDS, &args.folder, &Watch::new(console))?;
+    let document = document(worlds(), &args.folder, &Watch::new(console))?;
     pages.store(&document, Raster::None)?;
     let (html, markdown) = (pages.html.display(), pages.markdown());
     let json = json!({ "html": html.to_string(), "markdown": markdown.display().to_string() });

@@ -6,9 +6,9 @@ use crate::exit::{ExitCode, Failure};
 use crate::interrupt;
 use crate::plan::WorkersArg;
 use crate::sweep::go_on;
+use crate::worlds;
 use clap::Args;
 use sidestep::kernel::{Cycle, InputError};
-use sidestep::worlds::WORLDS;
 use sidestep_record::{RunView, Status};
 use sidestep_session::sweep::Folder;
 use sidestep_session::{Journey, stored_summary};
@@ -54,7 +54,7 @@ pub(crate) fn resume(args: &ResumeArgs, console: Console) -> Result<ExitCode, Fa
     }
     let workers = args.workers.count();
     interrupt::listen()?;
-    let journey = Journey::resume(WORLDS, &args.folder, workers, args.cycles)?;
+    let journey = Journey::resume(worlds(), &args.folder, workers, args.cycles)?;
     let cycle = grouped(journey.cycle());
     console.note(format!("Continuing {} at cycle {cycle}", args.folder.display()));
     travel(journey, console)

@@ -7,9 +7,9 @@ use crate::exit::{ExitCode, Failure};
 use crate::interrupt;
 use crate::plan::{ScenarioArgs, WorkersArg};
 use crate::sweep::ManyArgs;
+use crate::worlds;
 use clap::{ArgGroup, Args};
 use sidestep::kernel::{Cycle, InputError};
-use sidestep::worlds::WORLDS;
 use sidestep_session::{Journey, Keep};
 use std::path::PathBuf;
 
@@ -77,7 +77,7 @@ pub(crate) fn run(args: &RunArgs, console: Console) -> Result<ExitCode, Failure>
     }
     args.many.check_one_run()?;
     let (source, compiled) = args.scenario.compile()?;
-    let told = WORLDS.translate(&args.scenario.file)?;
+    let told = worlds().translate(&args.scenario.file)?;
     let workers = args.workers.count();
     let keep = Keep {
         folder: args.out.as_deref(),

@@ -6,11 +6,11 @@ use crate::interrupt;
 use crate::plan::{ChangeArgs, WorkersArg};
 use crate::sweep::{ManyArgs, Told, go_on, tell, tell_share};
 use crate::watch::Watch;
+use crate::worlds;
 use clap::{Args, Subcommand};
 use serde_json::json;
 use sidestep::experiment::sweep::Shard;
 use sidestep::kernel::InputError;
-use sidestep::worlds::WORLDS;
 use sidestep_session::sweep::{self, Folder};
 use std::path::{Path, PathBuf};
 
@@ -142,16 +142,16 @@ pub(super) fn many_runs(
     interrupt::listen()?;
     let watch = Watch::new(console);
     let Some(out) = out else {
-        let (plan, ended) = sweep::in_memory(WORLDS, &wanted, workers, &watch)?;
+        let (plan, ended) = sweep::in_memory(worlds(), &wanted, workers, &watch)?;
         return tell(Told { plan: &plan, folder: None, console }, ended, "");
     };
-    go_on(&sweep::planned_or_there(WORLDS, &wanted, out, &watch)?, workers, console)
+    go_on(&sweep::planned_or_there(worlds(), &wanted, out, &watch)?, workers, console)
 }
 
 fn share(args: &ShareArgs, console: Console) -> Result<ExitCode, Failure> {
     let (folder, workers) = (Folder::open(&args.folder)?, args.workers.count());
     interrupt::listen()?;
-    let ended = sweep::share(WORLDS, &folder, args.shard, workers, &Watch::new(console))?;
+    let ended = sweep::share(worlds(), &folder, args.shard, workers, &Watch::new(console))?;
     let told = Told { plan: folder.plan(), folder: Some(&folder), console };
     Ok(tell_share(told, args.shard, ended))
 }
@@ -166,7 +166,7 @@ fn collect(args: &CollectArgs, console: Console) -> Result<ExitCode, Failure> {
 fn plan(args: &PlanArgs, console: Console) -> Result<ExitCode, Failure> {
     let wanted = args.many.sweep(&args.file, &args.changes)?;
     interrupt::listen()?;
-    let folder = sweep::planned(WORLDS, &wanted, &args.out, &Watch::new(console))?;
+    let folder = sweep::planned(worlds(), &wanted, &args.out, &Watch::new(console))?;
     let plan = folder.plan();
     let json = json!({
         "folder": args.out,

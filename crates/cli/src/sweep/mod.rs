@@ -11,9 +11,9 @@ use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
 use crate::interrupt;
 use crate::watch::Watch;
+use crate::worlds;
 pub(crate) use ask::ManyArgs;
 pub(crate) use say::{Told, tell, tell_share};
-use sidestep::worlds::WORLDS;
 use sidestep_session::sweep::{self, Folder};
 
 /// Runs all cells of a sweep's folder that are not finished.
@@ -26,7 +26,7 @@ pub(crate) fn go_on(
     console: Console,
 ) -> Result<ExitCode, Failure> {
     interrupt::listen()?;
-    let ended = sweep::go_on(WORLDS, folder, workers, &Watch::new(console))?;
+    let ended = sweep::go_on(worlds(), folder, workers, &Watch::new(console))?;
     let told = Told { plan: folder.plan(), folder: Some(folder), console };
     tell(told, ended, "All runs are finished already.")
 }

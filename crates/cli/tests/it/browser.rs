@@ -21,7 +21,9 @@ pub(crate) fn chromium() -> Option<Browser> {
     }
     let required = std::env::var("SIDESTEP_REQUIRE").unwrap_or_default();
     assert!(!required.split(',').any(|word| word == "chromium"), "`{program}` does not run");
-    println!("skipped: `{program}` does not run here; SIDESTEP_CHROMIUM names another");
+    sidestep_testing::skip(format!(
+        "`{program}` does not run here; SIDESTEP_CHROMIUM names another"
+    ));
     None
 }
 

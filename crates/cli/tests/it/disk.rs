@@ -8,7 +8,7 @@ fn a_full_disk_fails_the_run_which_resumes_when_there_is_room() {
     let place = Place::new();
     let at = place.path("disk");
     let Some(disk) = SmallDisk::mount(&at, "200k") else {
-        println!("skipped: this user may not mount a small disk");
+        sidestep_testing::skip("this user may not mount a small disk");
         return;
     };
     let run = ["run", "s.toml", "--cycles", "60000"];
@@ -28,7 +28,7 @@ fn a_full_disk_fails_a_recording_for_viewers_and_keeps_no_space() {
     let place = Place::new();
     let at = place.path("disk");
     let Some(_disk) = SmallDisk::mount(&at, "200k") else {
-        println!("skipped: this user may not mount a small disk");
+        sidestep_testing::skip("this user may not mount a small disk");
         return;
     };
     let ended = place.run(&["run", "s.toml", "--cycles", "60000", "--mcap", "disk/x.mcap"]);

@@ -17,6 +17,7 @@ mod ik;
 mod ik_poses;
 mod input;
 mod learn;
+mod own;
 mod pictures;
 mod readers;
 mod report;

@@ -60,7 +60,7 @@ fn has(modules: &str) -> bool {
     let required = std::env::var("SIDESTEP_REQUIRE").unwrap_or_default();
     let is_required = required.split(',').any(|word| word.trim() == "python");
     assert!(!is_required, "python with {modules} is required: {said}");
-    println!("skipped: python with {modules} is not here: {said}");
+    sidestep_testing::skip(format!("python with {modules} is not here: {said}"));
     false
 }
 

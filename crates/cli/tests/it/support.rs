@@ -183,5 +183,5 @@ fn mount(options: &[&str], at: &Path) -> bool {
 pub(crate) fn requires(what: &str, why: &str) {
     let required = std::env::var("SIDESTEP_REQUIRE").unwrap_or_default();
     assert!(!required.split(',').any(|word| word.trim() == what), "{what} is required: {why}");
-    println!("skipped: {why}");
+    sidestep_testing::skip(why);
 }

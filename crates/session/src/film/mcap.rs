@@ -2,11 +2,12 @@
 
 use super::Film;
 use crate::Error;
+use crate::identity::build;
+use sidestep::VERSION;
 use sidestep::kernel::Cycle;
 use sidestep::kernel::Simulation;
 use sidestep::kernel::view::Look;
 use sidestep::scenario::Resolved;
-use sidestep::{BUILD, VERSION};
 use sidestep_record::{McapEnd, McapOrigin, McapRecorder, Origin, Status};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -49,7 +50,7 @@ impl McapFilm {
         files.sort();
         let about = McapOrigin {
             world: run.world().into(),
-            build: BUILD.into(),
+            build: build().into(),
             origin: Origin {
                 program_version: VERSION.into(),
                 scenario: resolved.text,

@@ -4,14 +4,15 @@ use super::effort::Effort;
 use super::prepare::prepare;
 use super::work::{Take, Work};
 use crate::identity::Maker;
+use crate::identity::build;
 use crate::{Error, Watcher};
+use sidestep::VERSION;
 use sidestep::experiment::sweep::rounds::Rounds;
 use sidestep::experiment::sweep::{
     Cell, Outcome, Plan, Role, Rows, RunTable, Shard, Sweep, rows::cells,
 };
 use sidestep::kernel::InputError;
 use sidestep::scenario::{Source, Worlds};
-use sidestep::{BUILD, VERSION};
 use sidestep_record::WholeTable;
 use sidestep_record::sweep::{Share, SweepFolder, fingerprint};
 use std::collections::BTreeSet;
@@ -89,7 +90,7 @@ pub fn planned(
     out: &Path,
     watcher: &dyn Watcher,
 ) -> Result<Folder, Error> {
-    Folder::create(out, VERSION, BUILD, |staging| {
+    Folder::create(out, VERSION, build(), |staging| {
         let mut fingerprints = Vec::new();
         let plan = prepare(worlds, sweep, watcher, |k, source, compiled| {
             let resolved = compiled.resolve(source)?;

@@ -134,9 +134,9 @@ fn every_whole_scenario_that_a_page_shows_compiles() {
 
 #[test]
 fn the_code_that_the_book_shows_stands_in_an_example_that_is_compiled() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
-    let files =
-        std::fs::read_dir(folder).expect("examples").map(|file| file.expect("a file").path());
+    let folders = ["crates/sidestep/examples", "crates/cli/examples"].map(|path| root().join(path));
+    let files = folders.iter().flat_map(|folder| std::fs::read_dir(folder).expect("examples"));
+    let files = files.map(|file| file.expect("a file").path());
     let examples: Vec<String> =
         files.map(|file| std::fs::read_to_string(file).expect("an example")).collect();
     let mut shown = 0;

@@ -46,6 +46,15 @@ fn crowd_under(policy: &str) -> Source {
 }
 
 #[test]
+fn a_recording_that_was_never_begun_is_an_error_and_not_empty() {
+    let mut run = simulation(&source(CROWD, &[]), 1);
+    run.advance(10);
+    let mut recorder = MemoryRecorder::new(&run.schemas());
+    let error = run.record(&mut recorder).expect_err("no rows were kept");
+    assert!(error.to_string().contains("begin_recording"), "{error}");
+}
+
+#[test]
 fn every_number_of_workers_gives_the_same_bits_under_every_policy() {
     for policy in POLICIES {
         let source = crowd_under(policy);

@@ -133,7 +133,9 @@ fn bluesky_itself_flies_as_was_measured() {
     let python = std::env::var("SIDESTEP_PYTHON").unwrap_or_else(|_| "python3".into());
     let has = Command::new(&python).args(["-c", "import bluesky"]).output();
     if !has.is_ok_and(|output| output.status.success()) {
-        println!("skipped: {python} has no bluesky (pip install bluesky-simulator==1.1.1)");
+        sidestep_testing::skip(format!(
+            "{python} has no bluesky (pip install bluesky-simulator==1.1.1)"
+        ));
         return;
     }
     let Fixture { limits, mut flown } = fixture();

@@ -8,8 +8,28 @@ use sidestep_scenario::{Compiled as AnyCompiled, Kind, Remark, Resolved, Source}
 use std::any::Any;
 
 /// Situated agents on a grid.
-#[derive(Debug, Clone, Copy)]
-pub struct Robots;
+#[derive(Debug, Clone)]
+pub struct Robots {
+    own: Behaviours,
+}
+
+impl Robots {
+    /// Returns the world with its own behaviors only.
+    pub const fn new() -> Self {
+        Self { own: Behaviours::new() }
+    }
+
+    /// Returns the world with further behaviors, which scenarios call by these names.
+    pub const fn with(own: Behaviours) -> Self {
+        Self { own }
+    }
+}
+
+impl Default for Robots {
+    fn default() -> Self {
+        Self::new()
+    }
+}
 
 impl Kind for Robots {
     fn name(&self) -> &'static str {
@@ -29,7 +49,7 @@ impl Kind for Robots {
     }
 
     fn compile(&self, source: &Source) -> Result<Box<dyn AnyCompiled>, InputError> {
-        let compiled = Compiled::new(source, &Behaviours::new(), StorageOrder::Spatial)?;
+        let compiled = Compiled::new(source, &self.own, StorageOrder::Spatial)?;
         Ok(Box::new(compiled))
     }
 }

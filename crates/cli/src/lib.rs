@@ -1,0 +1,65 @@
+//! The `sidestep` command: arguments -> plan -> session -> words.
+//!
+//! ```text
+//! args.rs      the command line                  commands/*.rs   one file per command
+//! plan.rs      options -> a scenario             sweep/          options -> a sweep; its results
+//! watch.rs     progress and Ctrl-C for sessions  progress.rs     progress bars
+//! report.rs    a run's summary as text           pages.rs        documents as files
+//! exit.rs      exit codes and failures           console.rs      standard output and error
+//! ```
+//!
+//! The crate `sidestep-session` drives the runs.
+//!
+//! A program with robots' behaviors of its own has the whole command line by [`main_with`]: it checks, runs,
+//! sweeps, films and replays scenarios that name them.
+
+mod args;
+mod commands;
+mod console;
+mod exit;
+mod interrupt;
+mod pages;
+mod plan;
+mod progress;
+mod report;
+mod sweep;
+mod watch;
+
+use exit::ExitCode;
+use sidestep::kernel::Digest;
+use sidestep::scenario::Worlds;
+use sidestep::worlds::robots::scenario::Behaviours;
+use sidestep::worlds::{WORLDS, with_behaviours};
+use std::sync::OnceLock;
+
+/// The worlds of this program, once they are not the usual ones.
+static OWN_WORLDS: OnceLock<Worlds> = OnceLock::new();
+
+/// Returns the worlds of this program.
+fn worlds() -> Worlds {
+    OWN_WORLDS.get().copied().unwrap_or(WORLDS)
+}
+
+/// Runs the command that the arguments of this process ask for, with further behaviors of robots, which
+/// scenarios call by these names. Recordings belong to the program that made them: another program, or
+/// this one with other code, does not continue them.
+pub fn main_with(own: Behaviours) -> std::process::ExitCode {
+    // Results follow from the added code, of which the program itself is all there is to see.
+    let program = std::env::current_exe().and_then(std::fs::read).unwrap_or_default();
+    sidestep_session::adds_code(&Digest::of(&program).to_string());
+    OWN_WORLDS.get_or_init(|| with_behaviours(own));
+    main()
+}
+
+/// Runs the command that the arguments of this process ask for.
+pub fn main() -> std::process::ExitCode {
+    let cli = args::Cli::of_process();
+    let console = console::Console::new(cli.json, cli.quiet);
+    match commands::execute(cli.command, &console) {
+        Ok(code) => code.into(),
+        Err(failure) => {
+            console.error(&failure);
+            ExitCode::from(&failure).into()
+        }
+    }
+}
