@@ -52,33 +52,23 @@ fn wrong_words_are_wrong_input() {
     }
 }
 
-/// Every command, and every step of one, as its words.
-const ALL: [&[&str]; 24] = [
-    &[],
-    &["new"],
-    &["check"],
-    &["map"],
-    &["learn"],
-    &["learn", "sensor"],
-    &["learn", "effector"],
-    &["run"],
-    &["resume"],
-    &["replay"],
-    &["report"],
-    &["export"],
-    &["sweep"],
-    &["sweep", "plan"],
-    &["sweep", "run"],
-    &["sweep", "collect"],
-    &["compare"],
-    &["exact"],
-    &["reproduce"],
-    &["reproduce", "loria"],
-    &["fk"],
-    &["ik"],
-    &["completions"],
-    &["man"],
-];
+/// Returns every command, and every step of one, as its words: the help lists them.
+fn all(place: &Place) -> Vec<Vec<String>> {
+    let mut found = vec![Vec::new()];
+    let mut next = 0;
+    while let Some(words) = found.get(next).cloned() {
+        let args: Vec<&str> = words.iter().map(String::as_str).chain(["--help"]).collect();
+        let help = at_width(place, &args, "200");
+        let listed = help.lines().take_while(|line| !["Options:", "Arguments:"].contains(line));
+        // Names stand two columns to the right, and `help` has no steps of its own.
+        let names = listed.filter_map(|line| line.strip_prefix("  ")?.split_whitespace().next());
+        let names = names.filter(|name| name.starts_with(|c: char| c.is_ascii_lowercase()));
+        let steps = names.filter(|name| !["help", "sidestep"].contains(name));
+        found.extend(steps.map(|name| words.iter().cloned().chain([name.to_owned()]).collect()));
+        next += 1;
+    }
+    found
+}
 
 /// Returns what a command prints where a terminal has so many columns.
 fn at_width(place: &Place, args: &[&str], columns: &str) -> String {
@@ -89,8 +79,10 @@ fn at_width(place: &Place, args: &[&str], columns: &str) -> String {
 #[test]
 fn help_fits_80_columns_and_no_example_is_broken() {
     let place = Place::new();
-    for words in ALL {
-        let args: Vec<&str> = words.iter().copied().chain(["--help"]).collect();
+    let all = all(&place);
+    assert!(all.contains(&vec!["reproduce".into(), "agentfly".into()]), "{all:?}");
+    for words in all {
+        let args: Vec<&str> = words.iter().map(String::as_str).chain(["--help"]).collect();
         let help = at_width(&place, &args, "80");
         for line in help.lines() {
             assert!(line.chars().count() <= 80, "{words:?}: {line}");
@@ -100,6 +92,15 @@ fn help_fits_80_columns_and_no_example_is_broken() {
         for example in wide.lines().filter(|line| line.starts_with("  sidestep ")) {
             assert!(help.contains(example), "{words:?}: {example}");
         }
+    }
+}
+
+#[test]
+fn help_of_help_is_help() {
+    let place = Place::new();
+    for args in [&["help", "--help"][..], &["help", "-h"], &["help"]] {
+        let ended = place.run(args);
+        assert_eq!((ended.code(), ended.out()), (0, place.run(&["--help"]).out()), "{args:?}");
     }
 }
 
