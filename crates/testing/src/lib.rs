@@ -20,6 +20,11 @@ pub fn skip(why: impl Display) {
     }
 }
 
+/// Returns the Python that reads what was written: that of `SIDESTEP_PYTHON`, else `python3`.
+pub fn python() -> PathBuf {
+    std::env::var_os("SIDESTEP_PYTHON").map_or("python3".into(), PathBuf::from)
+}
+
 /// Returns the folder of the repository.
 pub fn root() -> &'static Path {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))

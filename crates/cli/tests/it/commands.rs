@@ -8,7 +8,8 @@ fn a_recorded_run_leaves_what_the_readme_lists() {
     let place = Place::new();
     let ended = place.run(&["run", "s.toml", "--out", "deep/r"]);
     assert_eq!(ended.code(), 0, "{}", ended.err());
-    assert_eq!(ended.err(), "", "no bar without a terminal");
+    let next = "Next: `sidestep report deep/r` writes a page with pictures and numbers.\n";
+    assert_eq!(ended.err(), next, "and no bar without a terminal");
     let files = names(&place.path("deep/r"));
     let listed = [
         "checkpoint.bin",
@@ -125,10 +126,11 @@ fn map_draws_to_the_terminal_and_to_a_file() {
     let place = Place::new();
     place.write("m.txt", "####\n#..#\n#.?#\n####\n");
     let ended = place.run(&["map", "m.txt", "--box", "0.5", "--png", "m.png"]);
-    assert!(ended.out().starts_with("####\n#..#\n#.?#\n####\n4 x 4 pixels"), "{}", ended.out());
+    let drawn = "  ####\n  #..#\n  #.?#\n0 ####\n  0\n4 x 4 pixels";
+    assert!(ended.out().starts_with(drawn), "{}", ended.out());
     assert!(std::fs::read(place.path("m.png")).expect("a file").starts_with(b"\x89PNG"));
-    let narrow = place.run(&["map", "m.txt", "--width", "2", "--unknown", "free"]).out();
-    assert!(narrow.starts_with("##\n##\n"), "{narrow}");
+    let narrow = place.run(&["map", "m.txt", "--width", "4", "--unknown", "free"]).out();
+    assert!(narrow.starts_with("  ##\n0 ##\n"), "{narrow}");
 }
 
 #[test]

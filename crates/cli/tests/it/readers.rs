@@ -4,7 +4,8 @@
 
 use crate::support::Place;
 use serde_json::{Value, json};
-use std::path::{Path, PathBuf};
+use sidestep_testing::python;
+use std::path::Path;
 use std::process::Command;
 
 /// Chains of a few connectors that wander among moving balls.
@@ -44,10 +45,6 @@ method = "mvp"
 kind = "superconflict"
 n = 6
 "#;
-
-fn python() -> PathBuf {
-    std::env::var_os("SIDESTEP_PYTHON").map_or("python3".into(), PathBuf::from)
-}
 
 /// Whether the modules are here; says why not, or fails where they must be.
 fn has(modules: &str) -> bool {

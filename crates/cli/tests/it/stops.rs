@@ -140,7 +140,7 @@ fn what_cannot_be_resumed_is_refused_with_the_reason() {
         assert_eq!((ended.code(), ended.out().as_str()), (2, ""), "{}", ended.err());
         assert!(ended.err().contains(reason), "{}", ended.err());
     };
-    refused(&["resume", "r"], "complete");
+    refused(&["resume", "r", "--cycles", "4000"], "complete");
     refused(&["resume", "nowhere"], "nowhere");
     refused(&["resume", "."], "no run folder");
     let other = Place::new();

@@ -19,9 +19,10 @@ print(pq.read_metadata(sys.argv[1] + '/part-000000000000000.parquet').metadata[b
 
 #[test]
 fn pyarrow_reads_a_folder_of_parts_as_one_table() {
-    let has_pyarrow = Command::new("python3").args(["-c", "import pyarrow.parquet"]).output();
+    let python = sidestep_testing::python();
+    let has_pyarrow = Command::new(&python).args(["-c", "import pyarrow.parquet"]).output();
     if !has_pyarrow.is_ok_and(|o| o.status.success()) {
-        sidestep_testing::skip("python3 with pyarrow is not here");
+        sidestep_testing::skip(format!("{} has no pyarrow", python.display()));
         return;
     }
     let folder = tempfile::tempdir().unwrap();
@@ -31,7 +32,7 @@ fn pyarrow_reads_a_folder_of_parts_as_one_table() {
     recorder.append(0, &rows(500, 1000)).unwrap();
     recorder.finish().unwrap();
     let table = folder.path().join("trajectories");
-    let output = Command::new("python3").args(["-c", SCRIPT]).arg(&table).output().unwrap();
+    let output = Command::new(&python).args(["-c", SCRIPT]).arg(&table).output().unwrap();
     let said = String::from_utf8_lossy(&output.stdout);
     let error = String::from_utf8_lossy(&output.stderr);
     let lines: Vec<_> = said.lines().collect();

@@ -130,11 +130,12 @@ fn conflicts_are_remembered_over_a_checkpoint() {
 
 #[test]
 fn bluesky_itself_flies_as_was_measured() {
-    let python = std::env::var("SIDESTEP_PYTHON").unwrap_or_else(|_| "python3".into());
+    let python = sidestep_testing::python();
     let has = Command::new(&python).args(["-c", "import bluesky"]).output();
     if !has.is_ok_and(|output| output.status.success()) {
         sidestep_testing::skip(format!(
-            "{python} has no bluesky (pip install bluesky-simulator==1.1.1)"
+            "{} has no bluesky (pip install bluesky-simulator==1.1.1)",
+            python.display()
         ));
         return;
     }
