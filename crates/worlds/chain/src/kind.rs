@@ -1,10 +1,10 @@
 //! The world's entry in the list of worlds, for code that runs scenarios without knowing any world.
 
 use super::scenario::{AnyCompiled as EitherCompiled, Compiled};
-use super::{bundle, words, world::ChainWorld};
+use super::{bundle, remarks, words, world::ChainWorld};
 use sidestep_kernel::words::Said;
 use sidestep_kernel::{InputError, Plan, Simulation, World};
-use sidestep_scenario::{Compiled as AnyCompiled, Kind, Resolved, Source};
+use sidestep_scenario::{Compiled as AnyCompiled, Kind, Remark, Resolved, Source};
 use std::any::Any;
 
 /// Chains of connectors and rods, in the plane or in space.
@@ -51,6 +51,10 @@ impl<const D: usize> AnyCompiled for Compiled<D> {
 
     fn contents(&self, _: &Source) -> Said {
         words::contents(self)
+    }
+
+    fn remarks(&self) -> Vec<Remark> {
+        remarks::remarks(self)
     }
 
     fn resolve(&self, source: &Source) -> Result<Resolved, InputError> {

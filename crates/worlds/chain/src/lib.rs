@@ -33,6 +33,7 @@ mod navigate;
 mod perceive;
 mod progress;
 mod put_off;
+mod remarks;
 pub mod rods;
 mod rows;
 mod run;
