@@ -38,31 +38,32 @@ pub(super) fn contents(compiled: &Compiled) -> Said {
         lines.push(line("intruders", grouped(intruders)));
     }
     lines.extend(abilities(world));
-    lines.push(line(
-        "method",
-        format!("{}, {}, shield {shield}", world.method.name(), world.deployment.name()),
-    ));
     if recorded > 0 {
         let until = if until_s.is_finite() { format!("until {until_s} s") } else { "all".into() };
         lines.push(line("recorded", format!("{}, replayed {until}", grouped(recorded))));
     }
-    let timing = &world.timing;
-    let (cycles, lasts_s) = (grouped(compiled.cycles), compiled.cycles as f64 * timing.dt_s);
-    lines.extend([
-        line(
-            "time",
-            format!("decides every {} s, looks {} s ahead", timing.dt_s, timing.horizon_s()),
-        ),
-        line("run", format!("at most {cycles} cycles ({lasts_s} s), seed {}", compiled.seed)),
-    ]);
+    lines.extend(times(compiled));
     lines.extend(too_close(&compiled.too_close));
     Said { json, text: aligned(&lines) }
 }
 
-/// Returns the separations, speeds and turn rates of the airplanes.
+/// Returns how often the airplanes decide, and for how long they fly.
+fn times(compiled: &Compiled) -> Lines {
+    let timing = &compiled.world.timing;
+    let (cycles, lasts_s) = (grouped(compiled.cycles), compiled.cycles as f64 * timing.dt_s);
+    let (dt_s, horizon_s) = (timing.dt_s, timing.horizon_s());
+    vec![
+        line("time", format!("decides every {dt_s} s, looks {horizon_s} s ahead")),
+        line("run", format!("at most {cycles} cycles ({lasts_s} s), seed {}", compiled.seed)),
+    ]
+}
+
+/// Returns the separations, speeds and turn rates of the airplanes, and how they decide.
 fn abilities(world: &AirspaceWorld) -> Lines {
     let models = || world.airplanes.iter().map(|airplane| &airplane.model);
     let height_m = world.vertical_m.round();
+    let (method, deployment) = (world.method.name(), world.deployment.name());
+    let shield = if world.shield { "on" } else { "off" };
     vec![
         line(
             "separation",
@@ -73,6 +74,7 @@ fn abilities(world: &AirspaceWorld) -> Lines {
             "turn rate",
             format!("{} deg/s", range(models().map(|m| m.omega_max_rad_s.to_degrees()))),
         ),
+        line("method", format!("{method}, {deployment}, shield {shield}")),
     ]
 }
 

@@ -1,6 +1,6 @@
 //! Texts for people: a scenario's contents, a run's outcome, and all positions.
 
-use super::metrics::{ChainGivenUp, Metrics};
+use super::metrics::{ChainGivenUp, Metrics, RobotMetrics};
 use super::scenario::Compiled;
 use super::state::Snapshot;
 use serde_json::{Value, json};
@@ -26,33 +26,14 @@ pub(super) fn contents<const D: usize>(compiled: &Compiled<D>) -> Said {
         "dt_s": world.dt_s,
     });
     let count = |n: usize| grouped(n as u64);
-    let lasts_s = plan.cycles as f64 * world.dt_s;
+    let (chains, dt_s) = (count(world.chains.len()), world.dt_s);
+    let parts = count(connectors as usize);
+    let (still, moving) = (count(world.obstacles.still().len()), count(world.movers.len()));
+    let (cycles, lasts_s) = (grouped(plan.cycles), plan.cycles as f64 * dt_s);
     let lines = [
-        line(
-            "chains",
-            format!(
-                "{}, of {} connectors in {D} dimensions",
-                count(world.chains.len()),
-                count(connectors as usize)
-            ),
-        ),
-        line(
-            "obstacles",
-            format!(
-                "{}, and {} that move",
-                count(world.obstacles.still().len()),
-                count(world.movers.len())
-            ),
-        ),
-        line(
-            "run",
-            format!(
-                "{} cycles of {} s ({lasts_s} s), seed {}",
-                grouped(plan.cycles),
-                world.dt_s,
-                plan.seed
-            ),
-        ),
+        line("chains", format!("{chains}, of {parts} connectors in {D} dimensions")),
+        line("obstacles", format!("{still}, and {moving} that move")),
+        line("run", format!("{cycles} cycles of {dt_s} s ({lasts_s} s), seed {}", plan.seed)),
     ];
     Said { json, text: aligned(&lines) }
 }
@@ -75,44 +56,8 @@ pub(super) fn poses<const D: usize>(snapshot: &Snapshot) -> Said {
 
 /// Returns the outcome of a run.
 pub(super) fn outcome(m: &Metrics) -> Lines {
-    let clearance = match m.min_clearance_m {
-        None => "nothing came near".into(),
-        Some(c) if c.abs() < TOUCH_M => "touched".into(),
-        Some(c) => format!("{c:.4} m"),
-    };
-    let penetrations = match m.penetrations {
-        0 => "none".into(),
-        n => format!("{} steps with a part in an obstacle", grouped(n)),
-    };
-    let mut lines = vec![
-        line("progress", format!("{:.1} %", 100.0 * m.progress)),
-        line("vetoes", vetoes(m)),
-        line("penetrations", penetrations),
-        line("least clearance", clearance),
-        line("rods", format!("within their limits to {:.1e} m", m.max_rod_violation_m)),
-        line(
-            "effort",
-            format!(
-                "{:.1} connectors moved per step, {} rods turned",
-                m.moved_per_step,
-                grouped(m.rotations)
-            ),
-        ),
-        line("greatest speed", format!("{:.3} m/s", m.max_speed_m_s)),
-    ];
-    if let Some(robots) = &m.robots {
-        let bumpers = match robots.bumper_events {
-            0 => "no bumper pressed".into(),
-            n => format!("bumpers pressed {} times", grouped(n)),
-        };
-        lines.push(line(
-            "robots",
-            format!(
-                "{bumpers}; behind their connectors by {:.2} m on average, {:.2} m at most",
-                robots.mean_lag_m, robots.max_lag_m
-            ),
-        ));
-    }
+    let mut lines = motion(m);
+    lines.extend(m.robots.as_ref().map(robots));
     lines.extend(after_vetoes(m));
     if m.reformed > 0 {
         lines.push(line("re-formed", format!("{} times", grouped(m.reformed))));
@@ -129,6 +74,44 @@ pub(super) fn outcome(m: &Metrics) -> Lines {
         lines.push(line("given up", format!("and {more} more")));
     }
     lines
+}
+
+/// Returns how far the chains came, at what cost, and what they kept.
+fn motion(m: &Metrics) -> Lines {
+    let clearance = match m.min_clearance_m {
+        None => "nothing came near".into(),
+        Some(c) if c.abs() < TOUCH_M => "touched".into(),
+        Some(c) => format!("{c:.4} m"),
+    };
+    let penetrations = match m.penetrations {
+        0 => "none".into(),
+        n => format!("{} steps with a part in an obstacle", grouped(n)),
+    };
+    let (moved, turned) = (m.moved_per_step, grouped(m.rotations));
+    vec![
+        line("progress", format!("{:.1} %", 100.0 * m.progress)),
+        line("vetoes", vetoes(m)),
+        line("penetrations", penetrations),
+        line("least clearance", clearance),
+        line("rods", format!("within their limits to {:.1e} m", m.max_rod_violation_m)),
+        line("effort", format!("{moved:.1} connectors moved per step, {turned} rods turned")),
+        line("greatest speed", format!("{:.3} m/s", m.max_speed_m_s)),
+    ]
+}
+
+/// Returns how well the robots of swarms kept to their connectors.
+fn robots(robots: &RobotMetrics) -> (String, String) {
+    let bumpers = match robots.bumper_events {
+        0 => "no bumper pressed".into(),
+        n => format!("bumpers pressed {} times", grouped(n)),
+    };
+    let (mean_m, max_m) = (robots.mean_lag_m, robots.max_lag_m);
+    line(
+        "robots",
+        format!(
+            "{bumpers}; behind their connectors by {mean_m:.2} m on average, {max_m:.2} m at most"
+        ),
+    )
 }
 
 fn not_reformed(m: &Metrics) -> String {
