@@ -29,7 +29,29 @@ impl From<[f64; 3]> for Pose {
     }
 }
 
+impl From<TruePose> for Pose {
+    fn from(TruePose { position_m: [x_m, y_m], heading_rad, .. }: TruePose) -> Self {
+        Self { x_m, y_m, heading_rad }
+    }
+}
+
+impl From<Pose> for [f64; 3] {
+    fn from(pose: Pose) -> Self {
+        [pose.x_m, pose.y_m, pose.heading_rad]
+    }
+}
+
 impl Pose {
+    /// Returns the pose after a motion from here.
+    pub(crate) fn after(&self, motion: &Motion) -> Pose {
+        let (s, c) = (sin(self.heading_rad), cos(self.heading_rad));
+        Pose {
+            x_m: self.x_m + c * motion.ahead_m - s * motion.left_m,
+            y_m: self.y_m + s * motion.ahead_m + c * motion.left_m,
+            heading_rad: wrap_angle(self.heading_rad + motion.turn_rad),
+        }
+    }
+
     /// Returns the motion from here to `to`.
     pub(crate) fn motion_to(&self, to: &Pose) -> Motion {
         let (dx, dy) = (to.x_m - self.x_m, to.y_m - self.y_m);
@@ -71,6 +93,21 @@ fn between(start: &TruePose, end: &TruePose, fraction: f64) -> Pose {
     }
 }
 
+/// The gaps of a track: the times after which a pose follows too late to tell what was between.
+pub(crate) struct Gaps(Vec<f64>);
+
+impl Gaps {
+    pub(crate) fn of(track: &[TruePose]) -> Self {
+        let gap = |pair: &[TruePose]| pair[1].t_secs - pair[0].t_secs > BRACKET_SECS_MAX;
+        Self(track.windows(2).filter(|pair| gap(pair)).map(|pair| pair[0].t_secs).collect())
+    }
+
+    /// Returns the number of gaps that begin before a time.
+    pub(crate) fn before(&self, t_secs: f64) -> usize {
+        self.0.partition_point(|begin| *begin < t_secs)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -106,6 +143,8 @@ mod tests {
         assert!((motion.ahead_m - 2.0).abs() < 1e-12);
         assert!((motion.left_m - 1.0).abs() < 1e-12);
         assert!((motion.turn_rad - FRAC_PI_2).abs() < 1e-12);
+        let end = start.after(&motion);
+        assert!((end.x_m - 0.0).abs() < 1e-12 && (end.y_m - 3.0).abs() < 1e-12, "{end:?}");
         let (range_m, bearing_rad) = start.sees([0.0, 1.0]);
         assert!((range_m - 1.0).abs() < 1e-12 && (bearing_rad - FRAC_PI_2).abs() < 1e-12);
     }
