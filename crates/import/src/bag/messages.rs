@@ -23,6 +23,7 @@ named! {
     Odometry "nav_msgs/msg/Odometry" "definitions/Odometry.msg"
     PoseStamped "geometry_msgs/msg/PoseStamped" "definitions/PoseStamped.msg"
     LaserScan "sensor_msgs/msg/LaserScan" "definitions/LaserScan.msg"
+    TfMessage "tf2_msgs/msg/TFMessage" "definitions/TFMessage.msg"
 }
 
 message!(

@@ -25,7 +25,7 @@ use sidestep_kernel::InputError;
 use sidestep_kernel::view::Pose;
 
 use self::frames::Track;
-use self::messages::{LaserScan, Message};
+use self::messages::{LaserScan, Message, TfMessage};
 use self::poses::Placed;
 use self::storage::RawMessage;
 use crate::mrclam::TruePose;
@@ -183,7 +183,7 @@ impl Content {
             check_type(bag, raw, &poses::SCHEMAS)?;
             let found = poses::placed(raw.schema, raw.number, raw.bytes).map_err(damaged)?;
             self.poses.entry(raw.topic.into()).or_default().extend(found);
-        } else if raw.schema == poses::TRANSFORMS {
+        } else if raw.schema == TfMessage::NAME {
             let found = poses::placed(raw.schema, raw.number, raw.bytes).map_err(damaged)?;
             self.statics.extend(found);
         }

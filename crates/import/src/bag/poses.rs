@@ -16,10 +16,8 @@ pub(super) const SCHEMAS: [&str; 5] = [
     PoseStamped::NAME,
     "geometry_msgs/msg/PoseWithCovarianceStamped",
     "geometry_msgs/msg/TransformStamped",
-    TRANSFORMS,
+    TfMessage::NAME,
 ];
-/// The type of messages that place several frames at once.
-pub(super) const TRANSFORMS: &str = "tf2_msgs/msg/TFMessage";
 /// An orientation with a smaller norm than this is none.
 const NORM_MIN: f64 = 1e-3;
 

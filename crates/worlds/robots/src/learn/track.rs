@@ -75,7 +75,7 @@ impl Pose {
 pub(crate) fn pose_at(track: &[TruePose], t_secs: f64) -> Option<Pose> {
     let after = track.partition_point(|sample| sample.t_secs < t_secs);
     let end = track.get(after)?;
-    if after == 0 {
+    if after == 0 || end.t_secs == t_secs {
         return (end.t_secs == t_secs).then(|| between(end, end, 0.0));
     }
     let start = &track[after - 1];
@@ -93,13 +93,22 @@ fn between(start: &TruePose, end: &TruePose, fraction: f64) -> Pose {
     }
 }
 
+/// A step of a track is a gap when it is so many times the usual one, and longer than poses are told between.
+const GAP_STEPS: f64 = 3.0;
+
 /// The gaps of a track: the times after which a pose follows too late to tell what was between.
 pub(crate) struct Gaps(Vec<f64>);
 
 impl Gaps {
     pub(crate) fn of(track: &[TruePose]) -> Self {
-        let gap = |pair: &[TruePose]| pair[1].t_secs - pair[0].t_secs > BRACKET_SECS_MAX;
-        Self(track.windows(2).filter(|pair| gap(pair)).map(|pair| pair[0].t_secs).collect())
+        let step_secs = |pair: &[TruePose]| pair[1].t_secs - pair[0].t_secs;
+        let mut steps_secs: Vec<f64> = track.windows(2).map(step_secs).collect();
+        steps_secs.sort_by(f64::total_cmp);
+        // A simulation with a cycle a second has no gaps between its cycles.
+        let usual_secs = steps_secs.get(steps_secs.len() / 2).copied().unwrap_or(0.0);
+        let most_secs = BRACKET_SECS_MAX.max(GAP_STEPS * usual_secs);
+        let gaps = track.windows(2).filter(|pair| step_secs(pair) > most_secs);
+        Self(gaps.map(|pair| pair[0].t_secs).collect())
     }
 
     /// Returns the number of gaps that begin before a time.
