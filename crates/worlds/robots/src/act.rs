@@ -199,7 +199,11 @@ impl<T: BoxWord> Scene<'_, T> {
 
     /// Records the result of an action in a log for learning: the steps and the turn that were
     /// really made, not those that the drawn transition would have made in free space.
+    /// People have no effector to learn, so theirs are left out.
     fn sample_motion(&self, walk: &Walk, verdict: Verdict, cell: &BodyCell, scratch: &mut Scratch) {
+        if matches!(self.type_of(cell).role, Role::Mover(_)) {
+            return;
+        }
         let (mut ahead, mut left) = (0, 0);
         for step in &walk.steps[..verdict.steps] {
             step.side.add_to(&mut ahead, &mut left);
