@@ -6,6 +6,7 @@
 //! with file, line and column.
 
 pub mod ascii;
+pub mod bag;
 pub mod bluesky;
 pub mod carmen;
 pub mod image;
@@ -17,6 +18,7 @@ pub mod mrclam;
 mod pixel_map;
 pub mod rosmap;
 mod rows;
+mod sight;
 pub mod stage;
 pub mod stl;
 pub mod table;
@@ -30,3 +32,4 @@ mod shared_data;
 
 pub use map_file::{AsBoxes, map_file, pixel_map};
 pub use pixel_map::{MAX_PIXELS, PixelMap};
+pub use sight::Sight;

@@ -72,11 +72,11 @@ pub trait Simulation: Any + Send {
     /// The scenery: everything that stays as it is during the run.
     fn scenery(&self) -> Scenery;
 
-    /// Starts to keep events for the next [`Simulation::frame`]; no result depends on it.
+    /// Starts to keep events and odometry for the next [`Simulation::frame`]; no result depends on it.
     fn watch(&mut self);
 
-    /// Returns the present frame, with the events since the last call (none without
-    /// [`Simulation::watch`]). No result depends on it.
+    /// Returns the present frame, with the events since the last call and what wheels claim since
+    /// [`Simulation::watch`] (none without it). No result depends on it.
     fn frame(&mut self, look: Look) -> Frame;
 
     /// The recorded tables and columns that hold the places of bodies.

@@ -151,7 +151,7 @@ pub trait World: Phases<State: Send> + Send + 'static {
     /// Starts to keep the rows that [`World::record`] hands over.
     fn begin_recording(&self, state: &mut Self::State, books: &mut Self::Books, now: Cycle);
 
-    /// Starts to keep events for frames.
+    /// Starts to keep events and odometry for frames.
     fn watch(&self, books: &mut Self::Books);
 
     /// Sets up a worker's scratch for gathering rows and events, after [`World::begin_recording`]

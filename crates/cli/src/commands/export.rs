@@ -18,6 +18,7 @@ Examples:
   sidestep export runs/office --to csv              runs/office-csv/
   sidestep export runs/office --to parquet --table trajectories
   sidestep export runs/office --to mcap --every 10  for Foxglove
+  sidestep export runs/office --to rosbag           odometry and scans for ROS 2
   sidestep export runs/office --to gif --from 1000 --until 2000
   sidestep export runs/office --to png --from 1234  one moment
   sidestep export office.mcap --to mp4-frames       frames, and a call of ffmpeg
@@ -34,6 +35,9 @@ enum Form {
     Parquet,
     /// Recording for Foxglove and other viewers: bodies, scans, events
     Mcap,
+    /// ROS 2 bag: odometry, true poses and scans of robots, and the map
+    #[value(name = "rosbag")]
+    RosBag,
     /// Picture of the run, or of one cycle, as SVG
     Svg,
     /// The same picture as PNG
@@ -51,6 +55,7 @@ impl Form {
             Self::Csv => "csv",
             Self::Parquet => "parquet",
             Self::Mcap => "mcap",
+            Self::RosBag => "rosbag",
             Self::Svg => "svg",
             Self::Png => "png",
             Self::Gif => "gif",
@@ -147,6 +152,7 @@ fn wanted(args: &ExportArgs) -> Export<'_> {
         Form::Csv => export::Form::Csv(args.table.clone()),
         Form::Parquet => export::Form::Parquet(args.table.clone()),
         Form::Mcap => export::Form::Mcap,
+        Form::RosBag => export::Form::RosBag,
         Form::Svg => export::Form::Svg,
         Form::Png => export::Form::Png { width_px: args.width },
         Form::Gif => export::Form::Gif(film),

@@ -4,16 +4,17 @@ use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
 use clap::{Args, Subcommand};
 use serde::Serialize;
+use sidestep::import::bag::{Source, Wanted};
 use sidestep::kernel::InputError;
 use sidestep::learn::EstimateOptions;
 use sidestep::learn::effector::{self, EffectorModel};
 use sidestep::learn::profile;
-use sidestep::learn::sensor::{self, SensorModel, SensorOptions};
+use sidestep::learn::sensor::{self, Scanner, SensorModel, SensorOptions};
 use sidestep::scenario::file::read_text;
 use sidestep_session::{csv_table, replace};
 use std::fmt::Display;
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -21,6 +22,7 @@ Examples:
   sidestep learn effector --mrclam logs/hall --box 0.25 \\
       --profile my.toml --name create
   sidestep learn effector --carmen intel.log.gz --json | jq .transitions
+  sidestep learn effector --bag hall.mcap --odom /odom --truth /vicon/pose
 
 A scenario uses what was learned with profiles = [\"my.toml\"], sensors = [\"camera\"] and \
 effector = \"create\". Files may be packed with gzip.";
@@ -32,6 +34,12 @@ Examples:
   sidestep learn sensor --csv readings.csv --range 3.75 \\
       --profile my.toml --name sonar
   sidestep learn sensor --run runs/hall --edges 0.3,1.5 --classes near,mid,far
+  sidestep learn sensor --bag hall.mcap --truth /amcl_pose --odom /odom \\
+      --scan /scan --map hall.yaml
+
+A bag is an MCAP file or a folder of `ros2 bag record`. Truth is an Odometry, PoseStamped, \
+PoseWithCovarianceStamped, TransformStamped or, with two frames, a TFMessage topic, in the frame of the \
+map: /tf:map:base_link. The scanner's place on the robot is read from /tf_static.
 
 CSV columns: true, reported (one word each; `nothing` for no observation), and true_distance_m, \
 reported_distance_m, or true_class, reported_class.";
@@ -39,18 +47,22 @@ reported_distance_m, or true_class, reported_class.";
 /// As it would be made, but in lines that fit.
 const EFFECTOR_USAGE: &str = "\
 sidestep learn effector [OPTIONS]
-           <--mrclam <DIR>|--carmen <FILE>|--csv <FILE>|--run <DIR>>";
+           <--mrclam <DIR>|--carmen <FILE>|--bag <PATH>|--csv <FILE>|--run <DIR>>";
 
 const EFFECTOR_EXAMPLES: &str = "\
 Examples:
   sidestep learn effector --mrclam logs/hall --box 0.25
   sidestep learn effector --carmen intel.log.gz --profile my.toml --name pioneer
+  sidestep learn effector --bag hall.mcap --odom /odom --truth /vicon/pose --box 0.5
+  sidestep learn effector --bag run/ --odom /tf:odom:base_link \\
+      --truth /tf:map:base_link
   sidestep learn effector --csv motions.csv --json
   sidestep learn effector --run runs/hall
 
 CSV columns: action (forward, left, right, stay), ahead_boxes, left_boxes, turn_deg. Moves that an \
 obstacle cut short are left out: record logs in an open place. A run is recorded with \
---set record.calibration=true.";
+--set record.calibration=true. A bag is an MCAP file or a folder of `ros2 bag record`; poses are of type \
+Odometry, PoseStamped, PoseWithCovarianceStamped, TransformStamped or TFMessage.";
 
 /// Learn the error models of a real robot's sensors and wheels from its logs.
 #[derive(Debug, Args)]
@@ -92,8 +104,19 @@ struct SensorArgs {
     range: Option<f64>,
 
     /// Name of the sensor, if the log has several
-    #[arg(long, value_name = "SENSOR", conflicts_with = "mrclam")]
+    #[arg(long, value_name = "SENSOR", conflicts_with_all = ["mrclam", "bag"])]
     sensor: Option<String>,
+
+    #[command(flatten)]
+    topics: TopicArgs,
+
+    /// Topic of the scans (with --bag)
+    #[arg(long, value_name = "TOPIC", requires = "bag")]
+    scan: Option<String>,
+
+    /// Map that the scans are compared with (with --bag)
+    #[arg(long, value_name = "MAP.yaml", requires = "bag")]
+    map: Option<PathBuf>,
 
     #[command(flatten)]
     estimate: EstimateArgs,
@@ -108,6 +131,10 @@ struct SensorLog {
     /// A UTIAS MRCLAM folder
     #[arg(long, value_name = "DIR")]
     mrclam: Option<PathBuf>,
+
+    /// ROS 2 bag: an MCAP file, or a folder
+    #[arg(long, value_name = "PATH", requires_all = ["truth", "scan", "map"])]
+    bag: Option<PathBuf>,
 
     /// CSV file of readings with their true values
     #[arg(long, value_name = "FILE")]
@@ -125,7 +152,11 @@ struct EffectorArgs {
     #[command(flatten)]
     log: EffectorLog,
 
-    /// Side of a box in meters, for --mrclam (other logs give moves in boxes) [default: 0.25]
+    #[command(flatten)]
+    topics: TopicArgs,
+
+    /// Side of a box in meters, for --mrclam [default: 0.25] and --bag [default: 1] (other logs
+    /// give moves in boxes)
     #[arg(long = "box", value_name = "B")]
     box_size_m: Option<f64>,
 
@@ -147,6 +178,10 @@ struct EffectorLog {
     #[arg(long, value_name = "FILE")]
     carmen: Option<PathBuf>,
 
+    /// ROS 2 bag: an MCAP file, or a folder
+    #[arg(long, value_name = "PATH", requires_all = ["odom", "truth"])]
+    bag: Option<PathBuf>,
+
     /// CSV file of measured displacements
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
@@ -154,6 +189,29 @@ struct EffectorLog {
     /// A run recorded with record.calibration = true
     #[arg(long, value_name = "DIR")]
     run: Option<PathBuf>,
+}
+
+/// The topics of a bag that say where the robot was.
+#[derive(Debug, Args)]
+struct TopicArgs {
+    /// Topic of odometry (with --bag), e.g. /odom; of transforms with frames: /tf:odom:base_link
+    #[arg(long, value_name = "TOPIC", requires = "bag")]
+    odom: Option<String>,
+
+    /// Topic of true poses (with --bag), e.g. /amcl_pose; of transforms: /tf:map:base_link
+    #[arg(long, value_name = "TOPIC", requires = "bag")]
+    truth: Option<String>,
+}
+
+impl TopicArgs {
+    fn wanted(&self, scans: Option<&String>) -> Result<Wanted, InputError> {
+        let parse = |text: &Option<String>| text.as_deref().map(Source::parse).transpose();
+        Ok(Wanted {
+            odometry: parse(&self.odom)?,
+            truth: parse(&self.truth)?.ok_or_else(no_log)?,
+            scans: scans.cloned(),
+        })
+    }
 }
 
 /// How counts become probabilities.
@@ -238,26 +296,44 @@ fn learn_sensor(args: &SensorArgs) -> Result<SensorModel, InputError> {
         sensor: args.sensor.clone(),
     };
     let log = &args.log;
-    match (&log.mrclam, &log.csv, &log.run) {
+    match (&log.mrclam, &log.bag, &log.csv, &log.run) {
         (Some(folder), ..) => sensor::from_mrclam(folder, &options),
-        (_, Some(file), _) => sensor::from_csv(file, &options),
-        (_, _, Some(folder)) => sensor::learn_csv(&csv_table(folder, "readings")?, &options),
-        (None, None, None) => Err(no_log()),
+        (_, Some(bag), ..) => learn_scanner(args, bag, &options),
+        (_, _, Some(file), _) => sensor::from_csv(file, &options),
+        (.., Some(folder)) => sensor::learn_csv(&csv_table(folder, "readings")?, &options),
+        (None, None, None, None) => Err(no_log()),
     }
+}
+
+fn learn_scanner(
+    args: &SensorArgs,
+    bag: &Path,
+    options: &SensorOptions,
+) -> Result<SensorModel, InputError> {
+    let scanner = Scanner {
+        map: args.map.as_deref().ok_or_else(no_log)?,
+        range_m: args.range,
+        bearings_deg: args.bearings.as_deref(),
+    };
+    sensor::from_bag(bag, &args.topics.wanted(args.scan.as_ref())?, &scanner, options)
 }
 
 fn learn_effector(args: &EffectorArgs, console: Console) -> Result<EffectorModel, InputError> {
     let options = args.estimate.options();
-    if args.box_size_m.is_some() && args.log.mrclam.is_none() {
+    let log = &args.log;
+    if args.box_size_m.is_some() && log.mrclam.is_none() && log.bag.is_none() {
         console.warn("--box changes nothing here: this log tells moves in units of the command");
     }
-    let (log, box_size_m) = (&args.log, args.box_size_m.unwrap_or(0.25));
-    match (&log.mrclam, &log.carmen, &log.csv, &log.run) {
-        (Some(folder), ..) => effector::from_mrclam(folder, box_size_m, &options),
+    let box_m = |default_m: f64| args.box_size_m.unwrap_or(default_m);
+    match (&log.mrclam, &log.carmen, &log.bag, &log.csv, &log.run) {
+        (Some(folder), ..) => effector::from_mrclam(folder, box_m(0.25), &options),
         (_, Some(file), ..) => effector::from_carmen(file, &options),
-        (_, _, Some(file), _) => effector::from_csv(file, &options),
+        (_, _, Some(bag), ..) => {
+            effector::from_bag(bag, &args.topics.wanted(None)?, box_m(1.0), &options)
+        }
+        (.., Some(file), _) => effector::from_csv(file, &options),
         (.., Some(folder)) => effector::learn_csv(&csv_table(folder, "motions")?, &options),
-        (None, None, None, None) => Err(no_log()),
+        (None, None, None, None, None) => Err(no_log()),
     }
 }
 
@@ -269,8 +345,7 @@ fn no_log() -> InputError {
 const MAX_PROFILE_BYTES: u64 = 64 << 20;
 
 impl TargetArgs {
-    /// Adds a section to the profile, if one is named. The file is replaced in one step.
-    /// Adds a section to the profile, if one is named. Returns a line that says what was done.
+    /// Adds a section to the profile, if one is named, in one step. Returns a line that says what was done.
     fn add(
         &self,
         group: &str,

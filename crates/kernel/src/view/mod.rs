@@ -82,6 +82,10 @@ pub struct Frame {
     pub bodies: Vec<Body>,
     /// The present readings of sensors.
     pub scans: Vec<Scan>,
+    /// The poses that bodies' wheels claim, each in the frame in which the body was when watching began; none in
+    /// worlds without wheels that err.
+    #[serde(default)]
+    pub odometry: Vec<(Who, Pose)>,
     /// The events since the frame before, by time.
     pub log: Vec<Entry>,
     /// Entries that were left out because there were too many.
@@ -99,6 +103,11 @@ impl Look {
     /// A frame with bodies and events, without scans.
     pub const BODIES: Self = Self { scanning_bodies: 0 };
 }
+
+/// Largest difference in rad between steps of beams that count as evenly spaced.
+const EVEN_RAD: f64 = 1e-6;
+/// Step in rad of the raster for beams that are not evenly spaced.
+const RASTER_RAD: f64 = std::f64::consts::PI / 180.0;
 
 /// Ranges of one sensor, all around or in a sector.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -126,5 +135,69 @@ impl Scan {
             None => format!("{kind}/{number}"),
         };
         format!("{of}/{}", self.sensor)
+    }
+
+    /// Returns the first and last bearing, and ranges at equal steps between them. Beams that are not
+    /// evenly spaced are put into a raster of degrees, in which directions without a beam have the
+    /// range `no_beam`.
+    pub fn evenly_spaced(&self, no_beam: f64) -> (f64, f64, Vec<f64>) {
+        let Self { bearings_rad, ranges_m, .. } = self;
+        let (Some(&first), Some(&last)) = (bearings_rad.first(), bearings_rad.last()) else {
+            return (0.0, 0.0, Vec::new());
+        };
+        let step_rad = (last - first) / (bearings_rad.len().max(2) - 1) as f64;
+        let is_even = (0..).zip(bearings_rad).all(|(k, bearing_rad): (u32, &f64)| {
+            (first + f64::from(k) * step_rad - bearing_rad).abs() < EVEN_RAD
+        });
+        if is_even {
+            return (first, last, ranges_m.clone());
+        }
+        let low = bearings_rad.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = bearings_rad.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let place = |bearing_rad: f64| ((bearing_rad - low) / RASTER_RAD).round() as usize;
+        let mut raster = vec![f64::NAN; place(high) + 1];
+        for (&bearing_rad, &range_m) in bearings_rad.iter().zip(ranges_m) {
+            let seen_m = &mut raster[place(bearing_rad)];
+            *seen_m = seen_m.min(range_m);
+        }
+        raster.iter_mut().filter(|range_m| range_m.is_nan()).for_each(|range_m| *range_m = no_beam);
+        (low, low + (raster.len() - 1) as f64 * RASTER_RAD, raster)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::FRAC_PI_2;
+
+    fn scan(bearings_rad: &[f64], ranges_m: &[f64]) -> Scan {
+        Scan {
+            of: (Kind::Robot, 0, None),
+            sensor: "eye".into(),
+            pose: Pose::at([0.0; 3]),
+            bearings_rad: bearings_rad.to_vec(),
+            ranges_m: ranges_m.to_vec(),
+            range_m: 9.0,
+        }
+    }
+
+    #[test]
+    fn evenly_spaced_beams_stay_as_they_are() {
+        let bearings: Vec<f64> = (0..4).map(|k| f64::from(k) * FRAC_PI_2).collect();
+        let (first, last, ranges) = scan(&bearings, &[1.0, 2.0, 3.0, 4.0]).evenly_spaced(9.0);
+        assert_eq!((first, last), (0.0, 3.0 * FRAC_PI_2));
+        assert_eq!(ranges, [1.0, 2.0, 3.0, 4.0]);
+        assert_eq!(scan(&[0.5], &[1.0]).evenly_spaced(9.0), (0.5, 0.5, vec![1.0]));
+        assert_eq!(scan(&[], &[]).evenly_spaced(9.0).2, Vec::<f64>::new());
+    }
+
+    #[test]
+    fn other_beams_keep_their_direction_in_a_raster_of_degrees() {
+        let bearings = [90.0, 0.0, -10.0].map(f64::to_radians);
+        let (first, last, ranges) = scan(&bearings, &[3.0, 2.0, 1.0]).evenly_spaced(f64::INFINITY);
+        assert!((first + 10f64.to_radians()).abs() < 1e-12);
+        assert!((last - 90f64.to_radians()).abs() < 1e-12);
+        assert_eq!((ranges.len(), ranges[0], ranges[10], ranges[100]), (101, 1.0, 2.0, 3.0));
+        assert_eq!(ranges.iter().filter(|r| r.is_finite()).count(), 3);
     }
 }

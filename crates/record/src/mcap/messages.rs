@@ -16,10 +16,6 @@ use sidestep_kernel::view::{
 use super::WORLD;
 
 const NS_PER_S: u64 = 1_000_000_000;
-/// Largest difference in rad between steps of beams that count as evenly spaced.
-const EVEN_RAD: f64 = 1e-6;
-/// Step in rad of the raster for beams that are not evenly spaced.
-const RASTER_RAD: f64 = std::f64::consts::PI / 180.0;
 
 /// Converts simulated seconds to nanoseconds.
 pub(super) fn to_ns(time_s: f64) -> u64 {
@@ -230,7 +226,7 @@ pub(super) fn poses(frame: &Frame, kind: Kind) -> Option<PosesInFrame> {
 
 /// Returns a scan with evenly spaced beams, as the schema requires.
 pub(super) fn laser_scan(scan: &Scan, now_ns: u64) -> LaserScan {
-    let (start_angle, end_angle, ranges) = evenly_spaced(&scan.bearings_rad, &scan.ranges_m);
+    let (start_angle, end_angle, ranges) = scan.evenly_spaced(f64::INFINITY);
     LaserScan {
         timestamp: timestamp(now_ns),
         frame_id: WORLD.into(),
@@ -240,31 +236,6 @@ pub(super) fn laser_scan(scan: &Scan, now_ns: u64) -> LaserScan {
         ranges,
         intensities: Vec::new(),
     }
-}
-
-/// Returns the first and last bearing, and ranges at equal steps between them. Beams that are not
-/// evenly spaced are put into a raster of degrees, in which directions without a beam have no
-/// range.
-fn evenly_spaced(bearings_rad: &[f64], ranges_m: &[f64]) -> (f64, f64, Vec<f64>) {
-    let (Some(&first), Some(&last)) = (bearings_rad.first(), bearings_rad.last()) else {
-        return (0.0, 0.0, Vec::new());
-    };
-    let step_rad = (last - first) / (bearings_rad.len().max(2) - 1) as f64;
-    let is_even = (0..).zip(bearings_rad).all(|(k, bearing_rad): (u32, &f64)| {
-        (first + f64::from(k) * step_rad - bearing_rad).abs() < EVEN_RAD
-    });
-    if is_even {
-        return (first, last, ranges_m.to_vec());
-    }
-    let low = bearings_rad.iter().copied().fold(f64::INFINITY, f64::min);
-    let high = bearings_rad.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let place = |bearing_rad: f64| ((bearing_rad - low) / RASTER_RAD).round() as usize;
-    let mut raster = vec![f64::INFINITY; place(high) + 1];
-    for (&bearing_rad, &range_m) in bearings_rad.iter().zip(ranges_m) {
-        let seen_m = &mut raster[place(bearing_rad)];
-        *seen_m = seen_m.min(range_m);
-    }
-    (low, low + (raster.len() - 1) as f64 * RASTER_RAD, raster)
 }
 
 /// Returns the events of a frame, and how many are left out.
@@ -295,27 +266,6 @@ pub(super) fn log(frame: &Frame, cycle_s: f64) -> Vec<Log> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::f64::consts::FRAC_PI_2;
-
-    #[test]
-    fn evenly_spaced_beams_stay_as_they_are() {
-        let bearings: Vec<f64> = (0..4).map(|k| f64::from(k) * FRAC_PI_2).collect();
-        let (first, last, ranges) = evenly_spaced(&bearings, &[1.0, 2.0, 3.0, 4.0]);
-        assert_eq!((first, last), (0.0, 3.0 * FRAC_PI_2));
-        assert_eq!(ranges, [1.0, 2.0, 3.0, 4.0]);
-        assert_eq!(evenly_spaced(&[0.5], &[1.0]), (0.5, 0.5, vec![1.0]));
-        assert_eq!(evenly_spaced(&[], &[]).2, Vec::<f64>::new());
-    }
-
-    #[test]
-    fn other_beams_keep_their_direction_in_a_raster_of_degrees() {
-        let bearings = [90.0, 0.0, -10.0].map(f64::to_radians);
-        let (first, last, ranges) = evenly_spaced(&bearings, &[3.0, 2.0, 1.0]);
-        assert!((first + 10f64.to_radians()).abs() < 1e-12);
-        assert!((last - 90f64.to_radians()).abs() < 1e-12);
-        assert_eq!((ranges.len(), ranges[0], ranges[10], ranges[100]), (101, 1.0, 2.0, 3.0));
-        assert_eq!(ranges.iter().filter(|r| r.is_finite()).count(), 3);
-    }
 
     #[test]
     fn every_kind_has_the_colors_that_pictures_have() {

@@ -17,10 +17,12 @@
 //! metadata record `sidestep` describes the run and how it ended. While it is incomplete, the file
 //! is called `NAME.partial`. Equal runs give equal bytes.
 
+mod bag;
 mod messages;
 mod reader;
 mod writer;
 
+pub use bag::{BagSchema, BagWriter};
 pub use reader::{McapRun, is_mcap};
 pub use writer::{McapEnd, McapOrigin, McapRecorder};
 

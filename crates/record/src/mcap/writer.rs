@@ -94,12 +94,7 @@ impl McapRecorder {
         let failed = |cause: String| RecordError::new(path.display(), cause);
         let file = fs::create_dir_all(disk::parent(path)).and_then(|()| File::create(&growing));
         let file = file.map_err(|e| failed(e.to_string()))?;
-        // Several threads would compress to bytes that differ from those of one.
-        let options = WriteOptions::new()
-            .compression(Some(Compression::Zstd))
-            .compression_threads(0)
-            .chunk_size(Some(CHUNK_BYTES))
-            .library(format!("sidestep {}", origin.origin.program_version));
+        let options = options(&origin.origin.program_version);
         let writer = options.create(BufWriter::new(file)).map_err(|e| failed(said(e)));
         let writer = writer.inspect_err(|_| drop(fs::remove_file(&growing)))?;
         let mut recorder = Self {
@@ -277,8 +272,18 @@ impl Drop for McapRecorder {
     }
 }
 
+/// Returns the way in which files are written by a version of the program.
+pub(super) fn options(version: &str) -> WriteOptions {
+    // Several threads would compress to bytes that differ from those of one.
+    WriteOptions::new()
+        .compression(Some(Compression::Zstd))
+        .compression_threads(0)
+        .chunk_size(Some(CHUNK_BYTES))
+        .library(format!("sidestep {version}"))
+}
+
 /// Returns the system's message, without the library's wrapping.
-fn said(error: McapError) -> String {
+pub(super) fn said(error: McapError) -> String {
     match error {
         McapError::Io(error) => error.to_string(),
         other => other.to_string(),

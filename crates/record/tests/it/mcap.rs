@@ -69,7 +69,15 @@ fn frame(cycle: u64) -> Frame {
         words: "touches a wall".into(),
     };
     let log = cycle.checked_sub(1).map(entry).into_iter().collect();
-    Frame { cycle, time_s: cycle as f64 * 0.1, bodies, scans: vec![scan], log, log_left_out: 3 }
+    Frame {
+        cycle,
+        time_s: cycle as f64 * 0.1,
+        bodies,
+        scans: vec![scan],
+        log,
+        log_left_out: 3,
+        ..Frame::default()
+    }
 }
 
 fn end(status: Status) -> McapEnd {

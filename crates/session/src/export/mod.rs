@@ -6,7 +6,7 @@ mod tables;
 mod target;
 
 use crate::driver::{Sinks, drive};
-use crate::film::{Ending, McapFilm};
+use crate::film::{BagFilm, Ending, McapFilm};
 use crate::{Error, Recorded, Watcher};
 use sidestep::kernel::{Cycle, InputError, Simulation};
 use std::path::{Path, PathBuf};
@@ -21,6 +21,8 @@ pub enum Form {
     Parquet(Option<String>),
     /// Bodies, scans and events, for Foxglove and other viewers.
     Mcap,
+    /// ROS 2 bag: odometry, true poses and scans of robots, with the map.
+    RosBag,
     /// Picture of the run, or of one cycle.
     Svg,
     /// The same picture as PNG.
@@ -95,6 +97,7 @@ pub fn export(
         Form::Csv(table) => tables::export(&job, tables::Form::Csv, table.as_deref()),
         Form::Parquet(table) => tables::export(&job, tables::Form::Parquet, table.as_deref()),
         Form::Mcap => export_mcap(&job),
+        Form::RosBag => export_bag(&job),
         Form::Svg => pictures::export_svg(&job),
         Form::Png { width_px } => pictures::export_png(&job, *width_px),
         Form::Gif(film) => pictures::export_gif(&job, *film),
@@ -166,4 +169,19 @@ fn export_mcap(job: &Job<'_>) -> Result<Written, Error> {
     let is_whole = span.from == 0 && is_confirmed && recorded.is_complete;
     let ending = if is_whole { Ending::Complete } else { Ending::Extract };
     Ok(Written::one(film.finish(run.as_ref(), ending)?, is_confirmed))
+}
+
+fn export_bag(job: &Job<'_>) -> Result<Written, Error> {
+    let Job { recorded, wanted, span, .. } = job;
+    let target = Target::folder(job, "-rosbag", &["mcap", "yaml", "pgm"])?;
+    let mut run = job.run_up_to(span.from)?;
+    let every = wanted.every.unwrap_or(1);
+    let is_confirmed = target.make_folder(|folder| {
+        let mut film = BagFilm::begin(folder, every, run.as_mut())?;
+        let sinks = Sinks { film: Some(&mut film), ..Sinks::default() };
+        job.drive(run.as_mut(), span.until, sinks)?;
+        film.finish()?;
+        recorded.confirm(run.as_ref())
+    })?;
+    Ok(Written::one(target.path(), is_confirmed))
 }

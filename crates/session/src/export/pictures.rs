@@ -56,7 +56,7 @@ pub(super) fn export_gif(job: &Job<'_>, options: Options) -> Result<Written, Err
 
 /// Exports an animation as numbered pictures in a folder.
 pub(super) fn export_frames(job: &Job<'_>, options: Options) -> Result<Written, Error> {
-    let target = Target::folder(job, "-frames", "png")?;
+    let target = Target::folder(job, "-frames", &["png"])?;
     export_film(job, options, &target, |film| {
         let width_px = options.width_px.unwrap_or(FRAME_PX);
         target.make_folder(|folder| film.write_frames(width_px, folder))

@@ -42,7 +42,7 @@ pub(super) fn export(job: &Job<'_>, form: Form, only: Option<&str>) -> Result<Wr
         }
         None => {
             let names = tables(folder)?;
-            let target = Target::folder(job, &format!("-{ending}"), ending)?;
+            let target = Target::folder(job, &format!("-{ending}"), &[ending])?;
             target.make_folder(|growing| {
                 names.iter().try_for_each(|name| {
                     source.write(name, &growing.join(format!("{name}.{ending}")))

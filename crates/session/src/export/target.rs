@@ -32,11 +32,11 @@ impl Target {
         }
     }
 
-    /// Returns a folder; one that is replaced may hold only files with the extension `holds`.
+    /// Returns a folder; one that is replaced may hold only files with an extension out of `holds`.
     ///
     /// # Errors
     /// When the folder exists and may not be replaced, or holds something else.
-    pub(super) fn folder(job: &Job<'_>, ending: &str, holds: &str) -> Result<Self, InputError> {
+    pub(super) fn folder(job: &Job<'_>, ending: &str, holds: &[&str]) -> Result<Self, InputError> {
         let target = Self::named(job, ending);
         let Ok(mut entries) = std::fs::read_dir(&target.path) else {
             return match target.path.exists() {
@@ -46,14 +46,16 @@ impl Target {
         };
         let is_ours = |entry: std::io::Result<std::fs::DirEntry>| {
             entry.is_ok_and(|e| {
-                e.path().is_file() && e.path().extension() == Some(OsStr::new(holds))
+                let path = e.path();
+                path.is_file() && holds.iter().any(|end| path.extension() == Some(OsStr::new(end)))
             })
         };
         if !job.wanted.replace {
             return Err(target.refuse(EXISTS, REPLACE));
         }
         if !entries.all(is_ours) {
-            let cause = format!("the folder holds something else than .{holds} files");
+            let listed = holds.join(", .");
+            let cause = format!("the folder holds something else than .{listed} files");
             return Err(target.refuse(&cause, "name a new folder"));
         }
         Ok(target)

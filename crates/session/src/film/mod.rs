@@ -1,9 +1,11 @@
 //! Recordings for viewers and animations, made from frames while a run advances.
 
+mod bag;
 mod gif;
 mod mcap;
 mod pictures;
 
+pub(crate) use bag::BagFilm;
 pub(crate) use gif::write_gif;
 pub use mcap::{Ending, McapFilm};
 pub(crate) use pictures::Pictures;

@@ -180,6 +180,7 @@ impl World for AirspaceWorld {
             time_s: self.starts_s(now),
             bodies: view::visible_bodies(self, state, now),
             scans: Vec::new(),
+            odometry: Vec::new(),
             log: events.iter().map(view::entry).collect(),
             log_left_out,
         }

@@ -187,6 +187,7 @@ impl<const D: usize> World for ChainWorld<D> {
             time_s: self.starts_s(now),
             bodies: self.visible_bodies(state, now),
             scans: self.scans(state, now, look.scanning_bodies),
+            odometry: Vec::new(),
             log: events.iter().map(entry).collect(),
             log_left_out,
         }

@@ -48,7 +48,7 @@ impl<T: BoxWord> Scene<'_, T> {
         let walk = &action.walks[drawn];
         if all_free(self.floor, self.base(cell), &walk.whole.enter) {
             self.make_whole(walk, slot);
-            if scratch.keep_samples {
+            if scratch.keep_motions {
                 let verdict = Verdict { steps: walk.steps.len(), contact: None };
                 self.sample_motion(walk, verdict, cell, scratch);
             }
@@ -96,7 +96,7 @@ impl<T: BoxWord> Scene<'_, T> {
         if is_mover {
             return;
         }
-        if scratch.keep_samples {
+        if scratch.keep_motions {
             let made = Verdict { steps: made, ..verdict };
             self.sample_motion(walk, made, cell, scratch);
         }
@@ -199,15 +199,14 @@ impl<T: BoxWord> Scene<'_, T> {
 
     /// Records the result of an action in a log for learning: the steps and the turn that were
     /// really made, not those that the drawn transition would have made in free space.
+    /// People have no effector to learn, so theirs are left out.
     fn sample_motion(&self, walk: &Walk, verdict: Verdict, cell: &BodyCell, scratch: &mut Scratch) {
+        if matches!(self.type_of(cell).role, Role::Mover(_)) {
+            return;
+        }
         let (mut ahead, mut left) = (0, 0);
         for step in &walk.steps[..verdict.steps] {
-            match step.side {
-                Side::Front => ahead += 1,
-                Side::Back => ahead -= 1,
-                Side::Left => left += 1,
-                Side::Right => left -= 1,
-            }
+            step.side.add_to(&mut ahead, &mut left);
         }
         scratch.motion_samples.push(MotionSample {
             cycle: self.now,

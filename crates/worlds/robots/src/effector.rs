@@ -48,6 +48,16 @@ impl Side {
         }
     }
 
+    /// Adds a step to this side to numbers of boxes ahead and to the left.
+    pub(super) fn add_to(self, ahead: &mut i32, left: &mut i32) {
+        match self {
+            Self::Front => *ahead += 1,
+            Self::Back => *ahead -= 1,
+            Self::Left => *left += 1,
+            Self::Right => *left -= 1,
+        }
+    }
+
     /// Returns its letter in paths, see [`Self::from_letter`].
     pub fn letter(self) -> char {
         ['F', 'L', 'B', 'R'][self as usize]

@@ -24,6 +24,7 @@ mod kind;
 mod law;
 pub mod learn;
 pub mod metrics;
+mod odometry;
 mod perceive;
 pub mod policy;
 mod purpose;
@@ -126,7 +127,8 @@ pub struct Scratch {
     order: Vec<join::Place>,
     bids: Vec<auction::Bid>,
     keep_events: bool,
-    keep_samples: bool,
+    keep_readings: bool,
+    keep_motions: bool,
     events: Vec<Event>,
     sensor_samples: Vec<SensorSample>,
     motion_samples: Vec<MotionSample>,

@@ -100,7 +100,7 @@ impl<T: BoxWord> Scene<'_, T> {
             cast(self, sensor, cell, truths);
             let words = |block| self.world.streams.block(id, self.now, purpose::sense(s), block);
             report(sensor, truths, words, readings.iter_mut().zip(sectors), &mut nearest);
-            if scratch.keep_samples {
+            if scratch.keep_readings {
                 let samples = truths.iter().zip(&*readings).map(|(&row, &reported)| {
                     let (truth, sensor) = (sensor.table.truth(row), s as u16);
                     SensorSample { cycle: self.now, robot: id, sensor, truth, reported }

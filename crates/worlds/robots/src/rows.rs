@@ -1,6 +1,7 @@
 //! The tables that a run records, and the rows that wait to be recorded.
 
 use super::effector::Side;
+use super::odometry::Claimed;
 use super::perceive::name_of;
 use super::scenario::RecordSection;
 use super::sensor::SensorModel;
@@ -140,6 +141,8 @@ pub struct Books {
     gathered: Vec<Event>,
     /// and those that wait for the next frame.
     pub(super) log: Log<Event>,
+    /// What the wheels of each robot claim, by id, while somebody watches.
+    odometry: Option<Vec<Claimed>>,
     sensor_samples: Vec<SensorSample>,
     motion_samples: Vec<MotionSample>,
 }
@@ -174,10 +177,23 @@ impl Books {
         }
     }
 
+    /// Starts to keep what frames tell of the time between them.
+    pub(super) fn watch(&mut self, world: &RobotsWorld) {
+        self.log.is_kept = true;
+        // Robots have the first ids.
+        self.odometry.get_or_insert_with(|| vec![Claimed::default(); world.robots.len()]);
+    }
+
+    /// Returns what the wheels of each robot claim, by id; nothing unless somebody watches.
+    pub(super) fn odometry(&self) -> &[Claimed] {
+        self.odometry.as_deref().unwrap_or_default()
+    }
+
     /// Makes a worker keep the events and samples that are wanted.
     pub(super) fn prepare(&self, scratch: &mut Scratch) {
         scratch.keep_events = self.log.is_kept || self.rows.events.is_kept();
-        scratch.keep_samples = self.rows.readings.is_kept();
+        scratch.keep_readings = self.rows.readings.is_kept();
+        scratch.keep_motions = self.rows.motions.is_kept() || self.odometry.is_some();
     }
 
     /// Takes a worker's events and samples over.
@@ -188,10 +204,17 @@ impl Books {
     }
 
     /// Files the gathered rows in an order that does not depend on the workers that saw them.
-    pub(super) fn book(&mut self) {
+    pub(super) fn book(&mut self, world: &RobotsWorld) {
         self.gathered.sort_unstable_by_key(|e| (e.cycle, e.body));
         self.gathered.iter().for_each(|&event| self.log.push(event));
         self.rows.events.extend(self.gathered.drain(..));
+        self.motion_samples.sort_unstable_by_key(|s| (s.cycle, s.robot));
+        for sample in &self.motion_samples {
+            if let Some(claimed) = &mut self.odometry {
+                claimed[sample.robot as usize].add(world, sample);
+            }
+        }
+        self.rows.motions.extend(self.motion_samples.drain(..));
     }
 
     /// Returns the tables that are recorded.
@@ -217,8 +240,6 @@ impl Books {
             let samples = self.sensor_samples.drain(..);
             self.rows.readings.extend(samples.filter_map(|s| vocabulary.reading(world, &s)));
         }
-        self.motion_samples.sort_unstable_by_key(|s| (s.cycle, s.robot));
-        self.rows.motions.extend(self.motion_samples.drain(..));
         self.recorded = now;
         self.rows.record(recorder)
     }

@@ -93,7 +93,7 @@ impl World for RobotsWorld {
     }
 
     fn book(&self, books: &mut Books) {
-        books.book();
+        books.book(self);
     }
 
     fn begin_recording(&self, state: &mut RobotsState, books: &mut Books, now: Cycle) {
@@ -101,7 +101,7 @@ impl World for RobotsWorld {
     }
 
     fn watch(&self, books: &mut Books) {
-        books.log.is_kept = true;
+        books.watch(self);
     }
 
     fn prepare(&self, books: &Books, scratch: &mut Scratch) {
@@ -152,6 +152,7 @@ impl World for RobotsWorld {
             time_s: now as f64 * CYCLE_S,
             bodies: self.visible_bodies(state),
             scans: self.scans(state, now, look.scanning_bodies),
+            odometry: self.claimed_poses(books.odometry()),
             log: events.iter().map(|event| self.entry(event)).collect(),
             log_left_out,
         }

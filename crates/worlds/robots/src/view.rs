@@ -1,13 +1,14 @@
 //! The visible part of a building: floor, bodies, sensors' readings, and events in words.
 
 use super::effector::Side;
+use super::odometry::Claimed;
 use super::scene::with_scene;
 use super::sensor::{NOTHING, Reading, SensorModel};
 use super::state::{BodyCell, RobotsState};
 use super::world::{MountedSensor, Role};
 use super::{Event, EventKind, RobotsWorld, Scratch};
 use sidestep_kernel::math::{cos, sin};
-use sidestep_kernel::view::{self, Body, Condition, Entry, Kind, Level, Pose, Scan, Shape};
+use sidestep_kernel::view::{self, Body, Condition, Entry, Kind, Level, Pose, Scan, Shape, Who};
 use sidestep_kernel::{Cycle, EntityId, Phases};
 use std::f64::consts::FRAC_PI_2;
 
@@ -133,6 +134,14 @@ impl RobotsWorld {
             scan(&sensor.model, own, self.side_m(id), id, pose)
         };
         model.body.sensors.iter().map(scan).collect()
+    }
+
+    /// Returns the poses that the robots' wheels claim, given by id.
+    pub(super) fn claimed_poses(&self, claimed: &[Claimed]) -> Vec<(Who, Pose)> {
+        let of = |(id, claimed): (EntityId, &Claimed)| {
+            ((Kind::Robot, id, None), claimed.pose(self.map.box_size_m))
+        };
+        (0..).zip(claimed).map(of).collect()
     }
 
     /// Returns an event in words.

@@ -29,7 +29,29 @@ impl From<[f64; 3]> for Pose {
     }
 }
 
+impl From<TruePose> for Pose {
+    fn from(TruePose { position_m: [x_m, y_m], heading_rad, .. }: TruePose) -> Self {
+        Self { x_m, y_m, heading_rad }
+    }
+}
+
+impl From<Pose> for [f64; 3] {
+    fn from(pose: Pose) -> Self {
+        [pose.x_m, pose.y_m, pose.heading_rad]
+    }
+}
+
 impl Pose {
+    /// Returns the pose after a motion from here.
+    pub(crate) fn after(&self, motion: &Motion) -> Pose {
+        let (s, c) = (sin(self.heading_rad), cos(self.heading_rad));
+        Pose {
+            x_m: self.x_m + c * motion.ahead_m - s * motion.left_m,
+            y_m: self.y_m + s * motion.ahead_m + c * motion.left_m,
+            heading_rad: wrap_angle(self.heading_rad + motion.turn_rad),
+        }
+    }
+
     /// Returns the motion from here to `to`.
     pub(crate) fn motion_to(&self, to: &Pose) -> Motion {
         let (dx, dy) = (to.x_m - self.x_m, to.y_m - self.y_m);
@@ -53,7 +75,7 @@ impl Pose {
 pub(crate) fn pose_at(track: &[TruePose], t_secs: f64) -> Option<Pose> {
     let after = track.partition_point(|sample| sample.t_secs < t_secs);
     let end = track.get(after)?;
-    if after == 0 {
+    if after == 0 || end.t_secs == t_secs {
         return (end.t_secs == t_secs).then(|| between(end, end, 0.0));
     }
     let start = &track[after - 1];
@@ -68,6 +90,30 @@ fn between(start: &TruePose, end: &TruePose, fraction: f64) -> Pose {
         x_m: mix(start.position_m[0], end.position_m[0]),
         y_m: mix(start.position_m[1], end.position_m[1]),
         heading_rad: wrap_angle(start.heading_rad + fraction * arc_rad),
+    }
+}
+
+/// A step of a track is a gap when it is so many times the usual one, and longer than poses are told between.
+const GAP_STEPS: f64 = 3.0;
+
+/// The gaps of a track: the times after which a pose follows too late to tell what was between.
+pub(crate) struct Gaps(Vec<f64>);
+
+impl Gaps {
+    pub(crate) fn of(track: &[TruePose]) -> Self {
+        let step_secs = |pair: &[TruePose]| pair[1].t_secs - pair[0].t_secs;
+        let mut steps_secs: Vec<f64> = track.windows(2).map(step_secs).collect();
+        steps_secs.sort_by(f64::total_cmp);
+        // A simulation with a cycle a second has no gaps between its cycles.
+        let usual_secs = steps_secs.get(steps_secs.len() / 2).copied().unwrap_or(0.0);
+        let most_secs = BRACKET_SECS_MAX.max(GAP_STEPS * usual_secs);
+        let gaps = track.windows(2).filter(|pair| step_secs(pair) > most_secs);
+        Self(gaps.map(|pair| pair[0].t_secs).collect())
+    }
+
+    /// Returns the number of gaps that begin before a time.
+    pub(crate) fn before(&self, t_secs: f64) -> usize {
+        self.0.partition_point(|begin| *begin < t_secs)
     }
 }
 
@@ -106,6 +152,8 @@ mod tests {
         assert!((motion.ahead_m - 2.0).abs() < 1e-12);
         assert!((motion.left_m - 1.0).abs() < 1e-12);
         assert!((motion.turn_rad - FRAC_PI_2).abs() < 1e-12);
+        let end = start.after(&motion);
+        assert!((end.x_m - 0.0).abs() < 1e-12 && (end.y_m - 3.0).abs() < 1e-12, "{end:?}");
         let (range_m, bearing_rad) = start.sees([0.0, 1.0]);
         assert!((range_m - 1.0).abs() < 1e-12 && (bearing_rad - FRAC_PI_2).abs() < 1e-12);
     }

@@ -1,7 +1,10 @@
 //! Odometry against corrected poses (rule L6).
+//!
+//! [`learn`] takes a CARMEN log; [`learn_by`] whatever gives pairs of poses, such as a bag.
 
 use super::EffectorModel;
 use super::events::{Events, Move, Turn};
+use super::report::EffectorReport;
 use crate::learn::EstimateOptions;
 use crate::learn::track::{Motion, Pose};
 use sidestep_import::carmen::{CorrectedLog, Scan};
@@ -11,12 +14,8 @@ use sidestep_statistics::{Moments, percentile};
 
 /// A move with more turn than this is not a move ahead.
 const FORWARD_TURN_MAX_DEG: f64 = 10.0;
-/// A shorter move does not count as a move.
-const FORWARD_MIN_M: f64 = 0.3;
 /// A smaller turn does not count as a turn.
 const TURN_MIN_DEG: f64 = 20.0;
-/// A turn with a longer path is not a turn in place.
-const TURN_PATH_MAX_M: f64 = 0.3;
 /// A shorter step of odometry is too short to show its slip.
 const SLIP_STEP_MIN_M: f64 = 0.03;
 /// A step of odometry as long as this, or a turn as wide, is none: the pose has jumped.
@@ -33,29 +32,46 @@ const RULE: &str = "odometry against corrected poses, displacement over commande
     phase-averaged (L6), outcomes beyond the five spread in proportion; turns in place, true \
     over commanded taken for the share of a quarter turn, phase-averaged; every count plus alpha";
 
+/// What tells moves from turns, and how a result is described.
+pub(super) struct Rule {
+    /// The rule in words, for the profile.
+    pub(super) words: &'static str,
+    /// A shorter move does not count as a move, and a turn with a longer path is not a turn in place.
+    pub(super) path_m: f64,
+    /// The remedy where there is no move.
+    pub(super) remedy: &'static str,
+}
+
+const CARMEN: Rule =
+    Rule { words: RULE, path_m: 0.3, remedy: "name a corrected log with ODOM messages" };
+
 pub(super) fn learn(
     source: &str,
     log: &CorrectedLog,
     options: &EstimateOptions,
 ) -> Result<EffectorModel, InputError> {
+    learn_by(&CARMEN, source, log, options)
+}
+
+/// Learns from a log by a rule that may differ from that for CARMEN logs.
+pub(super) fn learn_by(
+    rule: &Rule,
+    source: &str,
+    log: &CorrectedLog,
+    options: &EstimateOptions,
+) -> Result<EffectorModel, InputError> {
     let pairs: Vec<Pair> = log.scans.windows(2).filter_map(Pair::of).collect();
+    let ahead: Vec<&Pair> = pairs.iter().filter(|pair| pair.is_ahead(rule.path_m)).collect();
     let events = Events {
-        moves: pairs.iter().filter_map(Pair::as_move).collect(),
-        turns: pairs.iter().filter_map(Pair::as_turn).collect(),
+        moves: ahead.iter().map(|pair| pair.as_move()).collect(),
+        turns: pairs.iter().filter_map(|pair| pair.as_turn(rule.path_m)).collect(),
     };
     if events.moves.is_empty() {
-        let cause = "odometry claims no move of 0.3 m ahead between two scans";
-        return Err(InputError::new(source, cause, "name a corrected log with ODOM messages"));
+        let cause = format!("odometry claims no move of {} m ahead between two poses", rule.path_m);
+        return Err(InputError::new(source, cause, rule.remedy));
     }
     let mut report = events.report(source, options);
-    let steps = odometry_steps(log);
-    report.lateral_slip = Moments::of(steps.iter().filter_map(slip_ratio));
-    report.lateral_slip_sd = report.lateral_slip.map(|slip| slip.sd);
-    let whole = steps.iter().filter(|step| !is_jump(step));
-    report.lateral_slip_robust_sd = robust_spread(whole.filter_map(slip_ratio).collect());
-    let spreads = report.lateral_slip_robust_sd.zip(report.lateral_slip_sd);
-    report.warnings.extend(spreads.and_then(|(robust, plain)| slip_warning(robust, plain)));
-    let ahead: Vec<&Pair> = pairs.iter().filter(|pair| pair.is_ahead()).collect();
+    tell_slip(&mut report, &odometry_steps(log));
     let of = |value: fn(&&Pair) -> f64| Moments::of(ahead.iter().map(value));
     let moments = [
         ("odometry_forward_m", of(|pair| pair.claimed.ahead_m)),
@@ -64,7 +80,17 @@ pub(super) fn learn(
     ];
     let known = moments.into_iter().filter_map(|(name, m)| Some((name.to_string(), m?)));
     report.moments.extend(known);
-    Ok(EffectorModel { report, profile: events.profile(RULE, options) })
+    Ok(EffectorModel { report, profile: events.profile(rule.words, options) })
+}
+
+/// Adds what the steps of odometry say of its slip, and the warning where it is too large.
+fn tell_slip(report: &mut EffectorReport, steps: &[Motion]) {
+    report.lateral_slip = Moments::of(steps.iter().filter_map(slip_ratio));
+    report.lateral_slip_sd = report.lateral_slip.map(|slip| slip.sd);
+    let whole = steps.iter().filter(|step| !is_jump(step));
+    report.lateral_slip_robust_sd = robust_spread(whole.filter_map(slip_ratio).collect());
+    let spreads = report.lateral_slip_robust_sd.zip(report.lateral_slip_sd);
+    report.warnings.extend(spreads.and_then(|(robust, plain)| slip_warning(robust, plain)));
 }
 
 /// The motion between two scans, in the frame of the first.
@@ -89,26 +115,26 @@ impl Pair {
         })
     }
 
-    fn is_ahead(&self) -> bool {
+    fn is_ahead(&self, path_min_m: f64) -> bool {
         self.claimed.turn_rad.abs() <= FORWARD_TURN_MAX_DEG.to_radians()
-            && self.claimed.ahead_m >= FORWARD_MIN_M
+            && self.claimed.ahead_m >= path_min_m
     }
 
-    fn as_move(&self) -> Option<Move> {
-        self.is_ahead().then(|| Move {
+    fn as_move(&self) -> Move {
+        Move {
             ahead_boxes: self.corrected.ahead_m / self.claimed.ahead_m,
             left_boxes: self.corrected.left_m / self.claimed.ahead_m,
             turn_error_rad: wrap_angle(self.corrected.turn_rad - self.claimed.turn_rad),
             duration_s: Some(self.duration_s),
-        })
+        }
     }
 
-    fn as_turn(&self) -> Option<Turn> {
+    fn as_turn(&self, path_max_m: f64) -> Option<Turn> {
         let path_m = hypot(self.claimed.ahead_m, self.claimed.left_m);
         let is_turn = self.claimed.turn_rad.abs() >= TURN_MIN_DEG.to_radians();
         let (claimed, corrected) = (self.claimed.turn_rad, self.corrected.turn_rad);
         let turn = Turn::new(claimed, corrected, Some(self.duration_s));
-        (is_turn && path_m <= TURN_PATH_MAX_M).then_some(turn)
+        (is_turn && path_m <= path_max_m).then_some(turn)
     }
 }
 
@@ -185,10 +211,10 @@ mod tests {
         let turned =
             Pair::of(&[scan(0.0, [0.0; 3], &[[0.1, 0.0, 0.6]]), scan(1.0, [0.1, 0.0, 0.5], &[])]);
         let turned = turned.unwrap();
-        assert_eq!((turned.as_move(), turned.as_turn().unwrap().true_rad), (None, 0.5));
+        assert_eq!((turned.is_ahead(0.3), turned.as_turn(0.3).unwrap().true_rad), (false, 0.5));
         let arc =
             Pair::of(&[scan(0.0, [0.0; 3], &[[1.0, 0.0, 0.6]]), scan(1.0, [1.0, 0.0, 0.5], &[])]);
-        assert_eq!((arc.unwrap().as_move(), arc.unwrap().as_turn()), (None, None));
+        assert_eq!((arc.unwrap().is_ahead(0.3), arc.unwrap().as_turn(0.3)), (false, None));
     }
 
     /// Steps of half a meter that slip to either side by up to 1.6 times a share of that.

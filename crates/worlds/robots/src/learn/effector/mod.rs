@@ -1,7 +1,8 @@
 //! The real motion of a robot after a commanded move or turn.
 //!
 //! [`from_mrclam`] compares velocity commands with motion capture (L5, L7), [`from_carmen`]
-//! odometry with a corrected log (L6); [`from_csv`] takes displacements that were already measured.
+//! odometry with a corrected log (L6), [`from_bag`] odometry with the true poses of a ROS 2 bag by the same
+//! rule; [`from_csv`] takes displacements that were already measured.
 //! A displacement is given in the frame of the pose it starts from: ahead, left, and turn (+ =
 //! left).
 //!
@@ -17,6 +18,7 @@
 //!
 //! A displacement becomes grid transitions by *phase averaging*, see [`phase`].
 
+mod bag;
 mod carmen;
 mod csv;
 mod events;
@@ -31,8 +33,21 @@ pub use transitions::{EffectorProfile, Transition};
 use std::path::Path;
 
 use super::EstimateOptions;
+use sidestep_import::bag::Wanted;
 use sidestep_import::table::CsvTable;
 use sidestep_kernel::InputError;
+
+/// Sides of a box that make sense for a robot, in m.
+const BOX_M: std::ops::RangeInclusive<f64> = 0.001..=1000.0;
+
+/// Refuses a box that makes no sense for a robot.
+fn check_box(box_m: f64) -> Result<(), InputError> {
+    if BOX_M.contains(&box_m) {
+        return Ok(());
+    }
+    let cause = format!("a box of {box_m} m");
+    Err(InputError::new("box", cause, "give a side from 0.001 to 1000 m"))
+}
 
 /// A learned effector: its counts, and the transitions from which a simulation draws.
 #[derive(Debug, Clone, PartialEq)]
@@ -69,6 +84,31 @@ pub fn from_carmen(file: &Path, options: &EstimateOptions) -> Result<EffectorMod
     options.check()?;
     let log = sidestep_import::carmen::read(file)?;
     carmen::learn(&file.display().to_string(), &log, options)
+}
+
+/// Learns moves and turns from odometry and true poses in a ROS 2 bag.
+///
+/// A window ends at the first true pose at which odometry claims a path of `box_m` meters since the window began, or
+/// a turn of half a radian, and the next begins there; across a gap of odometry of more than 0.5 s there is none.
+/// Windows are judged as those of a CARMEN log between two scans, with paths in proportion to `box_m` in place of
+/// 1 m, after which the mapping programs of such logs take a scan.
+///
+/// # Errors
+/// Those of [`bag::read`](sidestep_import::bag::read); when `options` are not valid, `box_m` is not from 0.001 to
+/// 1000 m, odometry is not wanted, or no move is long enough.
+pub fn from_bag(
+    path: &Path,
+    wanted: &Wanted,
+    box_m: f64,
+    options: &EstimateOptions,
+) -> Result<EffectorModel, InputError> {
+    options.check()?;
+    bag::learn(
+        &path.display().to_string(),
+        &sidestep_import::bag::read(path, wanted)?,
+        box_m,
+        options,
+    )
 }
 
 /// Learns any actions from a CSV file.

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::EffectorModel;
 use super::events::{Events, Move, Turn};
+use super::{EffectorModel, check_box};
 use crate::learn::EstimateOptions;
 use crate::learn::track::{Motion, pose_at};
 use sidestep_import::mrclam::{Command, Dataset, RobotLog};
@@ -18,8 +18,6 @@ const FORWARD_TURN_MAX_DEG: f64 = 10.0;
 const TURN_RATE_MIN_RADPS: f64 = 0.1;
 /// A turn ends when this much is commanded.
 const TURN_DEG: f64 = 45.0;
-/// Sides of a box that make sense for a robot, in m.
-const BOX_M: std::ops::RangeInclusive<f64> = 0.001..=1000.0;
 
 /// The rule by which events become transitions.
 const RULE: &str = "commands integrated to one box ahead against motion capture, \
@@ -33,10 +31,7 @@ pub(super) fn learn(
     box_m: f64,
     options: &EstimateOptions,
 ) -> Result<EffectorModel, InputError> {
-    if !BOX_M.contains(&box_m) {
-        let cause = format!("a box of {box_m} m");
-        return Err(InputError::new("box", cause, "give a side from 0.001 to 1000 m"));
-    }
+    check_box(box_m)?;
     let mut events = Events::default();
     let mut rejected = BTreeMap::new();
     for robot in dataset.robots.values() {

@@ -20,20 +20,28 @@ pub(super) fn learn(
     classes: &DistanceClasses,
 ) -> Result<SensorModel, InputError> {
     let (observations, readings) = read(table, options.sensor.as_deref(), classes)?;
-    let log = ReadingLog { observations, classes, readings };
-    let report = log.report(table.place(), options);
-    Ok(SensorModel { report, profile: log.profile(options) })
+    Ok(ReadingLog { observations, classes, readings, rule: RULE }.model(table.place(), options))
 }
+
+/// The rule by which counts become rows.
+const RULE: &str = "counts of true against reported, every count plus alpha";
 
 /// All readings of one sensor.
-struct ReadingLog<'a> {
+pub(super) struct ReadingLog<'a> {
     /// `nothing`, then the others by name.
-    observations: Vec<String>,
-    classes: &'a DistanceClasses,
-    readings: Vec<Reading>,
+    pub(super) observations: Vec<String>,
+    pub(super) classes: &'a DistanceClasses,
+    pub(super) readings: Vec<Reading>,
+    /// The rule in words, for the profile.
+    pub(super) rule: &'static str,
 }
 
-impl<'a> ReadingLog<'a> {
+impl ReadingLog<'_> {
+    /// Returns what the readings say of the sensor.
+    pub(super) fn model(&self, source: &str, options: &SensorOptions) -> SensorModel {
+        SensorModel { report: self.report(source, options), profile: self.profile(options) }
+    }
+
     fn report(&self, source: &str, options: &SensorOptions) -> SensorReport {
         let n = self.readings.len() as u64;
         let all: Vec<&Reading> = self.readings.iter().collect();
@@ -59,6 +67,7 @@ impl<'a> ReadingLog<'a> {
             errors: self.errors(),
             per_observer: BTreeMap::new(),
             detection: None,
+            against_map: None,
             probabilities: tables.iter().flat_map(|table| table.estimates()).collect(),
             thin: tables.iter().flat_map(|t| t.thin(options.estimate.thin_below)).collect(),
             hold_out: self.hold_out(options),
@@ -158,7 +167,7 @@ impl<'a> ReadingLog<'a> {
             confusion,
             distance_confusion: distance_rows(&distance, &self.beyond(), alpha, &mut assumed),
             assumed,
-            rule: "counts of true against reported, every count plus alpha".to_string(),
+            rule: self.rule.to_string(),
         }
     }
 

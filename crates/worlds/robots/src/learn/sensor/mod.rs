@@ -1,7 +1,7 @@
 //! The reports of a sensor compared with the truth.
 //!
-//! [`from_mrclam`] judges barcode readings by motion capture (rules L1 to L4 below); [`from_csv`]
-//! takes readings whose true values are already known.
+//! [`from_mrclam`] judges barcode readings by motion capture (rules L1 to L4 below); [`from_bag`] judges the
+//! ranges of a scanner by a map; [`from_csv`] takes readings whose true values are already known.
 //!
 //! - L1, pose at a time: linear between the motion-capture samples around it; refused
 //!   outside the track and in gaps wider than 0.5 s.
@@ -15,6 +15,7 @@
 //!   sightings whose subject was read correctly. The true range is center to center.
 //! - L4, detection: per second, whether a subject in view was read; see [`Detection`].
 
+mod bag;
 mod camera;
 mod csv;
 mod detection;
@@ -28,10 +29,11 @@ mod tables;
 pub use camera::{NamedRow, SensorProfile};
 pub use detection::Detection;
 pub use options::SensorOptions;
-pub use report::{ErrorMoments, SensorReport};
+pub use report::{AgainstMap, ErrorMoments, SensorReport};
 
 use std::path::Path;
 
+use sidestep_import::bag::Wanted;
 use sidestep_import::table::CsvTable;
 use sidestep_kernel::InputError;
 
@@ -52,6 +54,45 @@ pub fn from_mrclam(folder: &Path, options: &SensorOptions) -> Result<SensorModel
     let classes = options.check()?;
     let dataset = sidestep_import::mrclam::read(folder)?;
     mrclam::learn(&folder.display().to_string(), &dataset, options, &classes)
+}
+
+/// The scanner to learn from a bag.
+#[derive(Debug, Clone, Copy)]
+pub struct Scanner<'a> {
+    /// The file of the map in whose frame the true poses are: a ROS map, or an image of one.
+    pub map: &'a Path,
+    /// Range of the profile's sensor in meters; `None` for that of the scans.
+    pub range_m: Option<f64>,
+    /// Bearings of the profile's beams in degrees; `None` for at most sixteen of the scans'.
+    pub bearings_deg: Option<&'a [f64]>,
+}
+
+/// Learns a scanner from the scans and true poses in a ROS 2 bag.
+///
+/// A beam is expected to end at the first wall of the map, from the true pose at its time (L1; where true poses are
+/// farther apart, odometry tells the way since the last one, up to a meter). Beams that run into what is not
+/// mapped are skipped, and so are ranges below the least that the scanner measures.
+///
+/// # Errors
+/// Those of [`bag::read`](sidestep_import::bag::read) and [`pixel_map`](sidestep_import::pixel_map); when scans
+/// are not wanted, no beam can be judged, or `options` are not valid.
+pub fn from_bag(
+    path: &Path,
+    wanted: &Wanted,
+    scanner: &Scanner<'_>,
+    options: &SensorOptions,
+) -> Result<SensorModel, InputError> {
+    let map = sidestep_import::pixel_map(scanner.map, None)?.ok_or_else(|| {
+        let remedy = "name the .yaml file of a ROS map";
+        InputError::new(scanner.map.display(), "this is no map of pixels", remedy)
+    })?;
+    let (source, log) = (path.display().to_string(), sidestep_import::bag::read(path, wanted)?);
+    let Some(scan) = log.scans.first() else {
+        return Err(InputError::new(source, "no scans were read", "name the topic of the scans"));
+    };
+    let options = bag::fan(options, scan, scanner.range_m, scanner.bearings_deg);
+    let classes = options.check()?;
+    bag::learn(&source, &log, &map, &options, &classes)
 }
 
 /// Learns a sensor from a CSV file.

@@ -101,6 +101,7 @@ impl<'a> JudgedLog<'a> {
             warnings: Vec::new(),
             distance_counts: CountMatrix(all_distances.clone()),
             detection: Some(detection.clone()),
+            against_map: None,
             kinds: Some(kinds.clone()),
             confusion,
         }

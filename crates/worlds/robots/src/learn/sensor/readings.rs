@@ -28,6 +28,12 @@ impl Reading {
     pub(super) fn right_distances(&self) -> Option<(Distance, Distance)> {
         (self.truth == self.reported).then_some((self.true_at?, self.reported_at?))
     }
+
+    /// Returns true and reported range in meters, where there was something.
+    pub(super) fn ranges_m(&self) -> (Option<f64>, Option<f64>) {
+        let range_m = |at: Option<Distance>| at.and_then(|distance| distance.range_m);
+        (range_m(self.true_at), range_m(self.reported_at))
+    }
 }
 
 /// A distance as the file gives it.

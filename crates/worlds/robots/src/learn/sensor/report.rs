@@ -6,6 +6,7 @@ use std::fmt;
 use serde::Serialize;
 
 use super::detection::Detection;
+use super::sighting::is_consistent;
 use crate::learn::display::{self, Heading};
 use crate::learn::holdout::Fit;
 use crate::learn::{CountMatrix, Counts, Estimate, EstimateOptions, ThinRow};
@@ -55,6 +56,9 @@ pub struct SensorReport {
     pub per_observer: BTreeMap<u32, ErrorMoments>,
     /// Counts of subjects in view that were read or missed.
     pub detection: Option<Detection>,
+    /// Counts of beams by how they agree with a map.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub against_map: Option<AgainstMap>,
     /// Every estimated probability with its count and interval. Of `confusion`, only the cells with
     /// counts.
     pub probabilities: Vec<Estimate>,
@@ -80,6 +84,74 @@ pub struct ErrorMoments {
     pub bearing_error_rad: Option<Moments>,
 }
 
+/// Numbers of beams by what they met against what the map has there. A range agrees with the map as that of a
+/// sighting with its subject: within half a meter, or a quarter of the range.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct AgainstMap {
+    /// The wall was met where it is, or nothing where nothing is.
+    pub agreeing: u64,
+    /// Nothing was met where a wall is.
+    pub missed: u64,
+    /// Something was met far behind the wall, as through glass.
+    pub seen_through: u64,
+    /// Something was met far before the wall.
+    pub in_front: u64,
+    /// Something was met where nothing is.
+    pub not_there: u64,
+}
+
+impl AgainstMap {
+    /// Counts expected against measured ranges in meters; `None` stands for nothing.
+    pub(super) fn of(ranges_m: impl Iterator<Item = (Option<f64>, Option<f64>)>) -> Self {
+        let mut counts = Self::default();
+        for pair in ranges_m {
+            *match pair {
+                (Some(_), None) => &mut counts.missed,
+                (None, Some(_)) => &mut counts.not_there,
+                (Some(wall_m), Some(met_m)) if !is_consistent(wall_m, met_m) => {
+                    match met_m < wall_m {
+                        true => &mut counts.in_front,
+                        false => &mut counts.seen_through,
+                    }
+                }
+                _ => &mut counts.agreeing,
+            } += 1;
+        }
+        counts
+    }
+
+    fn total(&self) -> u64 {
+        self.agreeing + self.missed + self.seen_through + self.in_front + self.not_there
+    }
+
+    /// Returns a warning where more than a share of beams ends before the walls.
+    pub(super) fn warning(&self, most: f64) -> Option<String> {
+        let share = self.in_front as f64 / self.total().max(1) as f64;
+        (share > most).then(|| {
+            format!(
+                "{:.1} % of the beams end far before the wall of the map: people, or things that are not on \
+                 it, are learned as errors of the sensor; record in the building as it was mapped, and check \
+                 that the truth is in the frame of the map",
+                100.0 * share
+            )
+        })
+    }
+}
+
+impl fmt::Display for AgainstMap {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let rows = [
+            (self.agreeing, "as the map has it"),
+            (self.missed, "a wall that was missed"),
+            (self.seen_through, "something far behind the wall"),
+            (self.in_front, "something far before the wall"),
+            (self.not_there, "something where nothing is"),
+        ];
+        let share = |n: u64| 100.0 * n as f64 / self.total().max(1) as f64;
+        rows.iter().try_for_each(|(n, what)| writeln!(f, "  {n:>9} {:>6.2} %  {what}", share(*n)))
+    }
+}
+
 impl fmt::Display for SensorReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "Sensor learned from {}", self.source)?;
@@ -90,6 +162,9 @@ impl fmt::Display for SensorReport {
         )?;
         for (cause, count) in &self.skipped_by_cause {
             writeln!(f, "  skipped {count}: {}", cause.replace('_', " "))?;
+        }
+        if let Some(beams) = &self.against_map {
+            write!(f, "{beams}")?;
         }
         display::warnings(f, &self.warnings)?;
         let moments = [

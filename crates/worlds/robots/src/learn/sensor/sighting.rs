@@ -127,17 +127,18 @@ fn consistent(
         .collect()
 }
 
+/// Whether a measured range may be that of something at a true range.
+pub(super) fn is_consistent(true_m: f64, measured_m: f64) -> bool {
+    let tolerance_m = RANGE_TOLERANCE_M.max(RANGE_TOLERANCE_SHARE * true_m);
+    (measured_m - true_m).abs() <= tolerance_m
+}
+
 fn weigh(subject: u32, range_m: f64, bearing_rad: f64, reading: &Measurement) -> Option<Candidate> {
     let off_rad = wrap_angle(reading.bearing_rad - bearing_rad).abs();
     let off_m = (reading.range_m - range_m).abs();
-    let tolerance_m = RANGE_TOLERANCE_M.max(RANGE_TOLERANCE_SHARE * range_m);
     let (u, v) = (off_rad / BEARING_SPREAD_RAD, off_m / (RANGE_SPREAD_SHARE * range_m));
-    (off_rad <= BEARING_TOLERANCE_RAD && off_m <= tolerance_m).then_some(Candidate {
-        subject,
-        range_m,
-        bearing_rad,
-        misfit: u * u + v * v,
-    })
+    let is_near = off_rad <= BEARING_TOLERANCE_RAD && is_consistent(range_m, reading.range_m);
+    is_near.then_some(Candidate { subject, range_m, bearing_rad, misfit: u * u + v * v })
 }
 
 /// Returns all subjects but `observer`: robots, then landmarks.

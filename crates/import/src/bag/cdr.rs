@@ -1,0 +1,294 @@
+//! CDR, the encoding of ROS 2 messages: values one after the other, each aligned to its own size.
+//!
+//! The first four bytes of a message tell the encoding and the order of bytes; offsets of alignment count
+//! from behind them. What a message is made of is said once, by [`message!`], and serves reading and writing.
+
+/// The first four bytes of messages that are written here: plain CDR, little end first.
+const LITTLE_ENDIAN: [u8; 4] = [0, 1, 0, 0];
+
+/// Reads one message from its bytes, the header included.
+///
+/// # Errors
+/// When the encoding is another one, or the bytes end too early.
+pub fn decode<T: Cdr>(bytes: &[u8]) -> Result<T, CdrError> {
+    let (head, body) = bytes.split_first_chunk::<4>().ok_or(CdrError::Cut { at: bytes.len() })?;
+    let is_little = match head[..2] {
+        [0, 0] => false,
+        [0, 1] => true,
+        _ => return Err(CdrError::Encoding([head[0], head[1]])),
+    };
+    T::read(&mut Reader { body, at: 0, is_little })
+}
+
+/// Returns a message as bytes, the header included.
+pub fn encode<T: Cdr>(message: &T) -> Vec<u8> {
+    let mut writer = Writer { bytes: LITTLE_ENDIAN.to_vec() };
+    message.write(&mut writer);
+    writer.bytes
+}
+
+/// The reason why bytes are no message.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum CdrError {
+    /// The encoding is none that is read here; its two bytes.
+    Encoding([u8; 2]),
+    /// A value or its list lies beyond the end.
+    Cut {
+        /// The offset of the value behind the header.
+        at: usize,
+    },
+    /// A text is no UTF-8, or does not end with a zero.
+    Text {
+        /// The offset of the text behind the header.
+        at: usize,
+    },
+}
+
+impl std::fmt::Display for CdrError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Encoding([a, b]) => write!(f, "its encoding is {a:02x}{b:02x}, not plain CDR"),
+            Self::Cut { at } => write!(f, "it ends before its value at byte {at}"),
+            Self::Text { at } => write!(f, "the text at byte {at} is damaged"),
+        }
+    }
+}
+
+/// A value that can be read from CDR and written to it.
+pub trait Cdr: Sized {
+    /// The least number of bytes that a value takes, so that no list can claim more values than there
+    /// are bytes for.
+    const LEAST_BYTES: usize;
+
+    /// Reads a value.
+    ///
+    /// # Errors
+    /// When the bytes end too early.
+    fn read(reader: &mut Reader<'_>) -> Result<Self, CdrError>;
+
+    /// Appends the value.
+    fn write(&self, writer: &mut Writer);
+}
+
+/// The bytes of a message that is being read.
+pub struct Reader<'a> {
+    body: &'a [u8],
+    at: usize,
+    is_little: bool,
+}
+
+impl<'a> Reader<'a> {
+    /// Returns the next bytes, which begin at a multiple of `alignment`.
+    fn take(&mut self, n: usize, alignment: usize) -> Result<&'a [u8], CdrError> {
+        let start = self.at.next_multiple_of(alignment);
+        let taken = self.body.get(start..).and_then(|rest| rest.get(..n));
+        let taken = taken.ok_or(CdrError::Cut { at: start })?;
+        self.at = start + n;
+        Ok(taken)
+    }
+
+    fn number<const N: usize>(&mut self) -> Result<[u8; N], CdrError> {
+        let mut bytes = [0; N];
+        bytes.copy_from_slice(self.take(N, N)?);
+        if !self.is_little {
+            bytes.reverse();
+        }
+        Ok(bytes)
+    }
+}
+
+/// The bytes of a message that is being written.
+pub struct Writer {
+    bytes: Vec<u8>,
+}
+
+impl Writer {
+    fn number<const N: usize>(&mut self, bytes: [u8; N]) {
+        let body = self.bytes.len() - LITTLE_ENDIAN.len();
+        let padding = body.next_multiple_of(N) - body;
+        self.bytes.extend(std::iter::repeat_n(0, padding));
+        self.bytes.extend(bytes);
+    }
+
+    /// A longer list than can be counted is no message of a robot.
+    fn length(&mut self, length: usize) {
+        u32::try_from(length).expect("fewer than four billion values").write(self);
+    }
+}
+
+macro_rules! number {
+    ($($type:ty),*) => {$(
+        impl Cdr for $type {
+            const LEAST_BYTES: usize = size_of::<Self>();
+
+            fn read(reader: &mut Reader<'_>) -> Result<Self, CdrError> {
+                reader.number().map(Self::from_le_bytes)
+            }
+
+            fn write(&self, writer: &mut Writer) {
+                writer.number(self.to_le_bytes());
+            }
+        }
+    )*};
+}
+
+number!(f32, f64, i32, u32);
+
+impl Cdr for String {
+    const LEAST_BYTES: usize = 4;
+
+    fn read(reader: &mut Reader<'_>) -> Result<Self, CdrError> {
+        let length = u32::read(reader)? as usize;
+        let (at, bytes) = (reader.at, reader.take(length, 1)?);
+        // Some programs write an empty text without the zero at its end.
+        let Some((&0, text)) = bytes.split_last() else {
+            return if bytes.is_empty() { Ok(Self::new()) } else { Err(CdrError::Text { at }) };
+        };
+        std::str::from_utf8(text).map(Self::from).map_err(|_| CdrError::Text { at })
+    }
+
+    fn write(&self, writer: &mut Writer) {
+        writer.length(self.len() + 1);
+        writer.bytes.extend(self.as_bytes());
+        writer.bytes.push(0);
+    }
+}
+
+impl<T: Cdr> Cdr for Vec<T> {
+    const LEAST_BYTES: usize = 4;
+
+    fn read(reader: &mut Reader<'_>) -> Result<Self, CdrError> {
+        let length = u32::read(reader)? as usize;
+        let left = reader.body.len() - reader.at;
+        if length > left / T::LEAST_BYTES {
+            return Err(CdrError::Cut { at: reader.at });
+        }
+        (0..length).map(|_| T::read(reader)).collect()
+    }
+
+    fn write(&self, writer: &mut Writer) {
+        writer.length(self.len());
+        self.iter().for_each(|value| value.write(writer));
+    }
+}
+
+impl<T: Cdr + Copy + Default, const N: usize> Cdr for [T; N] {
+    const LEAST_BYTES: usize = N * T::LEAST_BYTES;
+
+    fn read(reader: &mut Reader<'_>) -> Result<Self, CdrError> {
+        let mut values = [T::default(); N];
+        for value in &mut values {
+            *value = T::read(reader)?;
+        }
+        Ok(values)
+    }
+
+    fn write(&self, writer: &mut Writer) {
+        self.iter().for_each(|value| value.write(writer));
+    }
+}
+
+/// Declares a message by its fields, in their order in ROS.
+macro_rules! message {
+    ($(#[$doc:meta])* $name:ident { $($(#[$of:meta])* $field:ident: $type:ty),* $(,)? }) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, PartialEq)]
+        pub struct $name {
+            $($(#[$of])* pub $field: $type),*
+        }
+
+        impl Cdr for $name {
+            const LEAST_BYTES: usize = 0 $(+ <$type as Cdr>::LEAST_BYTES)*;
+
+            fn read(reader: &mut Reader<'_>) -> Result<Self, CdrError> {
+                $(let $field = Cdr::read(reader)?;)*
+                Ok(Self { $($field),* })
+            }
+
+            fn write(&self, writer: &mut Writer) {
+                $(self.$field.write(writer);)*
+            }
+        }
+    };
+}
+
+pub(super) use message;
+
+#[cfg(test)]
+#[allow(unreachable_pub, reason = "messages are public wherever they are declared")]
+mod tests {
+    use super::*;
+
+    message!(
+        /// A message with gaps.
+        Sample { flag: u32, value: f64, name: String, list: Vec<f32>, pair: [f64; 2] }
+    );
+
+    fn sample() -> Sample {
+        Sample { flag: 7, value: 0.5, name: "ab".into(), list: vec![1.0, 2.0], pair: [3.0, 4.0] }
+    }
+
+    /// As the example of the standard: values begin at multiples of their size.
+    const LITTLE: [u8; 60] = [
+        0, 1, 0, 0, 7, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0xe0, 0x3f, 3, 0, 0, 0, b'a', b'b',
+        0, 0, 2, 0, 0, 0, 0, 0, 0x80, 0x3f, 0, 0, 0, 0x40, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 8, 0x40,
+        0, 0, 0, 0, 0, 0, 0x10, 0x40,
+    ];
+
+    #[test]
+    fn values_are_aligned_to_their_own_size() {
+        let bytes = encode(&sample());
+        assert_eq!(decode::<Sample>(&bytes), Ok(sample()));
+        assert_eq!(bytes[4..12], [7, 0, 0, 0, 0, 0, 0, 0]);
+        assert_eq!(bytes.len(), 4 + 8 + 8 + 4 + 3 + 1 + 4 + 8 + 16);
+        assert_eq!(bytes[..28], LITTLE[..28]);
+    }
+
+    #[test]
+    fn numbers_with_the_big_end_first_are_read_too() {
+        let big = [0, 0, 0, 0, 0, 0, 0, 7, 0, 0, 0, 0, 0x3f, 0xe0, 0, 0, 0, 0, 0, 0];
+        message!(
+            /// Two numbers.
+            Two { flag: u32, value: f64 }
+        );
+        assert_eq!(decode(&big), Ok(Two { flag: 7, value: 0.5 }));
+    }
+
+    #[test]
+    fn another_encoding_and_a_cut_message_are_errors() {
+        let bytes = encode(&sample());
+        for end in 0..bytes.len() {
+            let found = decode::<Sample>(&bytes[..end]);
+            assert!(matches!(found, Err(CdrError::Cut { .. })), "{end}: {found:?}");
+        }
+        let parameters = [&[0, 3], &bytes[2..]].concat();
+        assert_eq!(decode::<Sample>(&parameters), Err(CdrError::Encoding([0, 3])));
+    }
+
+    #[test]
+    fn a_list_longer_than_the_message_takes_no_memory() {
+        let bytes = [0, 1, 0, 0, 0xff, 0xff, 0xff, 0xff, 0, 0, 0, 0];
+        assert_eq!(decode::<Vec<f64>>(&bytes), Err(CdrError::Cut { at: 4 }));
+        assert_eq!(decode::<String>(&bytes), Err(CdrError::Cut { at: 4 }));
+    }
+
+    #[test]
+    fn a_text_ends_with_a_zero_and_is_utf8() {
+        let text = |bytes: &[u8]| {
+            let length = u32::try_from(bytes.len()).unwrap().to_le_bytes();
+            decode::<String>(&[&[0, 1, 0, 0], &length[..], bytes].concat())
+        };
+        assert_eq!(text(b"a\0"), Ok("a".into()));
+        assert_eq!(text(b""), Ok(String::new()));
+        assert_eq!(text(b"a"), Err(CdrError::Text { at: 4 }));
+        assert_eq!(text(b"\xff\0"), Err(CdrError::Text { at: 4 }));
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn any_bytes_are_a_message_or_an_error(mut bytes: Vec<u8>, is_little: bool) {
+            bytes.splice(0..0, [0, u8::from(is_little), 0, 0]);
+            let _ = decode::<Vec<Sample>>(&bytes);
+        }
+    }
+}

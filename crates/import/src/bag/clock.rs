@@ -1,0 +1,91 @@
+//! The clocks by which messages are stamped.
+
+use sidestep_kernel::InputError;
+
+use super::messages::LaserScan;
+use super::poses::Placed;
+use crate::mrclam::TruePose;
+
+/// Messages may overtake each other by this much; a stamp further back is a clock that was set back.
+const BACK_MAX_SECS: f64 = 0.5;
+/// A stamp this far ahead of the one before is a clock that was set forward.
+const AHEAD_MAX_SECS: f64 = 3600.0;
+
+/// Something with a time.
+pub(super) trait Stamped {
+    /// Returns the time in s.
+    fn t_secs(&self) -> f64;
+    /// Returns the number of its message, from 1.
+    fn message(&self) -> u64;
+}
+
+impl Stamped for &Placed {
+    fn t_secs(&self) -> f64 {
+        self.t_secs
+    }
+
+    fn message(&self) -> u64 {
+        self.message
+    }
+}
+
+impl Stamped for (u64, LaserScan) {
+    fn t_secs(&self) -> f64 {
+        self.1.header.stamp.secs()
+    }
+
+    fn message(&self) -> u64 {
+        self.0
+    }
+}
+
+/// Returns messages, given as they were recorded, in the order of their stamps.
+///
+/// # Errors
+/// When the clock jumps.
+pub(super) fn in_order<T: Stamped + Clone>(place: &str, all: &[T]) -> Result<Vec<T>, InputError> {
+    let mut latest = f64::NEG_INFINITY;
+    for stamped in all {
+        let step_secs = stamped.t_secs() - latest;
+        let is_first = latest == f64::NEG_INFINITY;
+        if !is_first && !(-BACK_MAX_SECS..=AHEAD_MAX_SECS).contains(&step_secs) {
+            return Err(jump(place, stamped.message(), step_secs));
+        }
+        latest = latest.max(stamped.t_secs());
+    }
+    let mut sorted = all.to_vec();
+    sorted.sort_by(|a, b| a.t_secs().total_cmp(&b.t_secs()));
+    Ok(sorted)
+}
+
+fn jump(place: &str, message: u64, step_secs: f64) -> InputError {
+    let side = if step_secs < 0.0 { "before" } else { "after" };
+    let cause = format!(
+        "the clock jumps: message {message} is stamped {:.3} s {side} an earlier one",
+        step_secs.abs()
+    );
+    let remedy = "cut the bag at the jump, or record it again once the clock is set; a bag that was played in \
+                  a loop has to be recorded once only";
+    InputError::new(place, cause, remedy)
+}
+
+/// Checks that two tracks have some time in common.
+///
+/// # Errors
+/// When they have none.
+pub(super) fn check_overlap(
+    bag: &str,
+    [(a_name, a), (b_name, b)]: [(&str, &[TruePose]); 2],
+) -> Result<(), InputError> {
+    let ends = |track: &[TruePose]| Some((track.first()?.t_secs, track.last()?.t_secs));
+    let (Some(first), Some(second)) = (ends(a), ends(b)) else { return Ok(()) };
+    if first.0 <= second.1 && second.0 <= first.1 {
+        return Ok(());
+    }
+    let cause = format!(
+        "{a_name} ({:.1} to {:.1} s) and {b_name} ({:.1} to {:.1} s) have no time in common",
+        first.0, first.1, second.0, second.1
+    );
+    let remedy = "stamp both by one clock: synchronize the machines, or set use_sim_time in all nodes or in none";
+    Err(InputError::new(bag, cause, remedy))
+}

@@ -1,0 +1,172 @@
+//! The messages of ROS 2 that are read and written, field by field as ROS defines them.
+
+use super::cdr::{Cdr, CdrError, Reader, Writer, message};
+
+/// A message that is recorded under a name.
+pub trait Message: Cdr {
+    /// The name of its type in ROS 2.
+    const NAME: &'static str;
+    /// Its definition in the format `ros2msg`, with those of the messages in it.
+    const DEFINITION: &'static str;
+}
+
+macro_rules! named {
+    ($($type:ident $name:literal $file:literal)*) => {$(
+        impl Message for $type {
+            const NAME: &'static str = $name;
+            const DEFINITION: &'static str = include_str!($file);
+        }
+    )*};
+}
+
+named! {
+    Odometry "nav_msgs/msg/Odometry" "definitions/Odometry.msg"
+    PoseStamped "geometry_msgs/msg/PoseStamped" "definitions/PoseStamped.msg"
+    LaserScan "sensor_msgs/msg/LaserScan" "definitions/LaserScan.msg"
+    TfMessage "tf2_msgs/msg/TFMessage" "definitions/TFMessage.msg"
+}
+
+message!(
+    /// A moment, since 1970 or since the start of a simulation.
+    Time {
+        /// Whole seconds.
+        sec: i32,
+        /// The rest in nanoseconds.
+        nanosec: u32,
+    }
+);
+
+message!(
+    /// The time and the frame of reference of a message.
+    Header {
+        /// The time of the measurement.
+        stamp: Time,
+        /// The frame of reference.
+        frame_id: String,
+    }
+);
+
+message!(
+    /// Position and orientation.
+    Pose {
+        /// The position in meters.
+        position: [f64; 3],
+        /// The orientation, a unit quaternion x, y, z, w.
+        orientation: [f64; 4],
+    }
+);
+
+message!(
+    /// A pose with its uncertainty.
+    PoseWithCovariance {
+        /// The pose.
+        pose: Pose,
+        /// Covariance of x, y, z and the turns about them, row by row.
+        covariance: [f64; 36],
+    }
+);
+
+message!(
+    /// A velocity with its uncertainty.
+    TwistWithCovariance {
+        /// The velocity along x, y, z in m/s.
+        linear_mps: [f64; 3],
+        /// The rates of turning about x, y, z in rad/s.
+        angular_radps: [f64; 3],
+        /// Covariance of the six, row by row.
+        covariance: [f64; 36],
+    }
+);
+
+message!(
+    /// `nav_msgs/msg/Odometry`: the pose that a robot's wheels claim.
+    Odometry {
+        /// The time, and the frame of the pose.
+        header: Header,
+        /// The frame of the velocity.
+        child_frame_id: String,
+        /// The claimed pose.
+        pose: PoseWithCovariance,
+        /// The claimed velocity.
+        twist: TwistWithCovariance,
+    }
+);
+
+message!(
+    /// `geometry_msgs/msg/PoseStamped`: a pose at a time.
+    PoseStamped {
+        /// The time, and the frame of the pose.
+        header: Header,
+        /// The pose.
+        pose: Pose,
+    }
+);
+
+message!(
+    /// `geometry_msgs/msg/PoseWithCovarianceStamped`, as of a localization program.
+    PoseWithCovarianceStamped {
+        /// The time, and the frame of the pose.
+        header: Header,
+        /// The pose.
+        pose: PoseWithCovariance,
+    }
+);
+
+message!(
+    /// `geometry_msgs/msg/TransformStamped`, as of motion capture.
+    TransformStamped {
+        /// The time, and the frame of the transform.
+        header: Header,
+        /// The frame that is placed.
+        child_frame_id: String,
+        /// The pose of the child in its parent.
+        transform: Pose,
+    }
+);
+
+message!(
+    /// `tf2_msgs/msg/TFMessage`: frames in other frames.
+    TfMessage {
+        /// The transforms.
+        transforms: Vec<TransformStamped>,
+    }
+);
+
+message!(
+    /// `sensor_msgs/msg/LaserScan`: ranges at equal steps of bearing, counterclockwise.
+    LaserScan {
+        /// The time of the first beam, and the frame of the scanner.
+        header: Header,
+        /// The bearing of the first beam.
+        angle_min_rad: f32,
+        /// The bearing of the last beam.
+        angle_max_rad: f32,
+        /// The step between beams.
+        angle_increment_rad: f32,
+        /// The time between beams.
+        time_increment_s: f32,
+        /// The time between scans.
+        scan_time_s: f32,
+        /// The least range that the scanner measures.
+        range_min_m: f32,
+        /// The greatest range that the scanner measures.
+        range_max_m: f32,
+        /// The ranges; infinite where there is nothing.
+        ranges_m: Vec<f32>,
+        /// The strengths of the echoes, or nothing.
+        intensities: Vec<f32>,
+    }
+);
+
+impl Time {
+    /// Returns the time of a moment given in nanoseconds.
+    pub fn from_ns(ns: u64) -> Self {
+        let sec = i32::try_from(ns / 1_000_000_000).unwrap_or(i32::MAX);
+        Self { sec, nanosec: (ns % 1_000_000_000) as u32 }
+    }
+
+    /// Returns the moment in seconds.
+    pub fn secs(&self) -> f64 {
+        f64::from(self.sec) + 1e-9 * f64::from(self.nanosec)
+    }
+}

@@ -1,0 +1,127 @@
+//! Poses in messages: odometry, motion capture, localization, transforms.
+
+use sidestep_kernel::math::atan2;
+use sidestep_kernel::view::Pose as Turned;
+
+use super::cdr::{CdrError, decode};
+use super::messages::{
+    Header, Message, Odometry, Pose, PoseStamped, PoseWithCovarianceStamped, TfMessage,
+    TransformStamped,
+};
+use crate::mrclam::TruePose;
+
+/// The types of messages that hold poses.
+pub(super) const SCHEMAS: [&str; 5] = [
+    Odometry::NAME,
+    PoseStamped::NAME,
+    "geometry_msgs/msg/PoseWithCovarianceStamped",
+    "geometry_msgs/msg/TransformStamped",
+    TfMessage::NAME,
+];
+/// An orientation with a smaller norm than this is none.
+const NORM_MIN: f64 = 1e-3;
+
+/// A pose at a time, of one frame in another.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Placed {
+    /// The number of its message on its topic, from 1.
+    pub(super) message: u64,
+    pub(super) t_secs: f64,
+    pub(super) parent: String,
+    /// Empty where the message does not say.
+    pub(super) child: String,
+    pub(super) pose: Turned,
+}
+
+impl Placed {
+    fn new(header: Header, child: String, pose: Pose) -> Self {
+        let t_secs = header.stamp.secs();
+        let pose = Turned { at_m: pose.position, turn: pose.orientation };
+        Self { message: 0, t_secs, parent: header.frame_id, child, pose }
+    }
+
+    fn of_transform(transform: TransformStamped) -> Self {
+        Self::new(transform.header, transform.child_frame_id, transform.transform)
+    }
+
+    /// Returns the pose with an orientation of norm 1; says what is wrong with it otherwise.
+    fn checked(mut self) -> Result<Self, &'static str> {
+        let numbers = self.pose.at_m.iter().chain(&self.pose.turn);
+        if !numbers.copied().all(f64::is_finite) {
+            return Err("its pose has a number that is not finite");
+        }
+        let norm = self.pose.turn.iter().map(|q| q * q).sum::<f64>().sqrt();
+        if norm < NORM_MIN {
+            return Err("its orientation is 0, 0, 0, 0, which is none");
+        }
+        self.pose.turn = self.pose.turn.map(|q| q / norm);
+        Ok(self)
+    }
+
+    /// Returns where the frame is and looks in the plane.
+    pub(super) fn planar(&self) -> TruePose {
+        let [x_m, y_m, _] = self.pose.at_m;
+        let ahead = self.pose.turned([1.0, 0.0, 0.0]);
+        let heading_rad = atan2(ahead[1], ahead[0]);
+        TruePose { t_secs: self.t_secs, position_m: [x_m, y_m], heading_rad }
+    }
+}
+
+/// Returns the poses in message number `message` of its topic, which is of one of [`SCHEMAS`].
+pub(super) fn placed(schema: &str, message: u64, bytes: &[u8]) -> Result<Vec<Placed>, String> {
+    let found = decoded(schema, bytes).map_err(|e| e.to_string())?;
+    let numbered = found.into_iter().map(|placed| Placed { message, ..placed });
+    Ok(numbered.map(Placed::checked).collect::<Result<_, _>>()?)
+}
+
+fn decoded(schema: &str, bytes: &[u8]) -> Result<Vec<Placed>, CdrError> {
+    Ok(match SCHEMAS.iter().position(|known| *known == schema) {
+        Some(0) => {
+            let message: Odometry = decode(bytes)?;
+            vec![Placed::new(message.header, message.child_frame_id, message.pose.pose)]
+        }
+        Some(1) => {
+            let message: PoseStamped = decode(bytes)?;
+            vec![Placed::new(message.header, String::new(), message.pose)]
+        }
+        Some(2) => {
+            let message: PoseWithCovarianceStamped = decode(bytes)?;
+            vec![Placed::new(message.header, String::new(), message.pose.pose)]
+        }
+        Some(3) => vec![Placed::of_transform(decode(bytes)?)],
+        _ => {
+            let message: TfMessage = decode(bytes)?;
+            message.transforms.into_iter().map(Placed::of_transform).collect()
+        }
+    })
+}
+
+/// Returns the pose in the outermost frame of what has the pose `inner` in a frame that has the pose `outer`.
+pub(super) fn compose(outer: &Turned, inner: &Turned) -> Turned {
+    let [ax, ay, az, aw] = outer.turn;
+    let [bx, by, bz, bw] = inner.turn;
+    Turned {
+        at_m: outer.place(inner.at_m),
+        turn: [
+            aw * bx + ax * bw + ay * bz - az * by,
+            aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw,
+            aw * bw - ax * bx - ay * by - az * bz,
+        ],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::FRAC_PI_2;
+
+    #[test]
+    fn poses_one_in_the_other_are_placed_and_turned_by_both() {
+        let outer = Turned::heading([1.0, 2.0, 0.0], FRAC_PI_2);
+        let whole = compose(&outer, &Turned::heading([3.0, 0.0, 0.5], FRAC_PI_2));
+        assert!((whole.at_m[0] - 1.0).abs() < 1e-12 && (whole.at_m[1] - 5.0).abs() < 1e-12);
+        let back = whole.turned([1.0, 0.0, 0.0]);
+        assert!((back[0] + 1.0).abs() < 1e-12, "{back:?}");
+    }
+}

@@ -1,0 +1,205 @@
+//! A run as a ROS 2 bag: what its robots would have recorded, and the truth.
+
+use super::Film;
+use super::mcap::LOOK;
+use crate::Error;
+use sidestep::import::bag::cdr::encode;
+use sidestep::import::bag::messages::{
+    Header, LaserScan, Message, Odometry, Pose as RosPose, PoseStamped, PoseWithCovariance,
+    TfMessage, Time, TransformStamped, TwistWithCovariance,
+};
+use sidestep::import::write::map_files;
+use sidestep::kernel::math::wrap_angle;
+use sidestep::kernel::view::{Floor, Frame, Occupancy, Pose, Scan, Who};
+use sidestep::kernel::{Cycle, InputError, Simulation};
+use sidestep::{Cell, VERSION};
+use sidestep_record::{BagSchema, BagWriter};
+use std::path::Path;
+
+/// The frame of the true poses.
+const MAP: &str = "map";
+
+/// A bag that is written while a run advances.
+pub(crate) struct BagFilm {
+    writer: BagWriter,
+    every: Cycle,
+    /// Odometry of the frame before, with its time.
+    before: Option<(f64, Vec<(Who, Pose)>)>,
+}
+
+impl BagFilm {
+    /// Starts a bag in a folder, with the map of the run; from now on wheels are watched.
+    ///
+    /// # Errors
+    /// An I/O error.
+    pub(crate) fn begin(
+        folder: &Path,
+        every: Cycle,
+        run: &mut dyn Simulation,
+    ) -> Result<Self, Error> {
+        if let Some(floor) = &run.scenery().floor {
+            for (name, bytes) in files_of(floor) {
+                let path = folder.join(name);
+                std::fs::write(&path, bytes).map_err(|e| Error::write(&path, &e))?;
+            }
+        }
+        run.watch();
+        Ok(Self { writer: BagWriter::create(folder, VERSION)?, every, before: None })
+    }
+
+    /// Finishes the bag.
+    ///
+    /// # Errors
+    /// An I/O error.
+    pub(crate) fn finish(self) -> Result<(), Error> {
+        Ok(self.writer.finish()?)
+    }
+
+    fn write<T: Message>(&mut self, topic: &str, time_s: f64, message: &T) -> Result<(), Error> {
+        let schema = BagSchema { name: T::NAME, definition: T::DEFINITION };
+        Ok(self.writer.write(topic, schema, ns(time_s), &encode(message))?)
+    }
+
+    fn write_odometry(&mut self, frame: &Frame) -> Result<(), Error> {
+        let mut transforms = Vec::new();
+        for (who, claimed) in &frame.odometry {
+            let message = Odometry {
+                header: header(frame.time_s, odometry_frame(*who)),
+                child_frame_id: base_frame(*who),
+                pose: PoseWithCovariance { pose: ros_pose(claimed), covariance: [0.0; 36] },
+                twist: self.twist(frame, *who, claimed),
+            };
+            self.write(&format!("/{}/odom", namespace(*who)), frame.time_s, &message)?;
+            transforms.push(TransformStamped {
+                header: message.header,
+                child_frame_id: message.child_frame_id,
+                transform: message.pose.pose,
+            });
+        }
+        self.write("/tf", frame.time_s, &TfMessage { transforms })
+    }
+
+    /// Returns the mean velocity since the frame before, in the frame of the robot then.
+    fn twist(&self, frame: &Frame, who: Who, claimed: &Pose) -> TwistWithCovariance {
+        let mut twist = TwistWithCovariance {
+            linear_mps: [0.0; 3],
+            angular_radps: [0.0; 3],
+            covariance: [0.0; 36],
+        };
+        let Some((time_s, odometry)) = &self.before else { return twist };
+        let before = odometry.iter().find(|(other, _)| *other == who);
+        if let (Some((_, before)), true) = (before, frame.time_s > *time_s) {
+            let step_s = frame.time_s - time_s;
+            let way: [f64; 3] = std::array::from_fn(|i| claimed.at_m[i] - before.at_m[i]);
+            let [x, y, z, w] = before.turn;
+            let back = Pose { at_m: [0.0; 3], turn: [-x, -y, -z, w] };
+            twist.linear_mps = back.turned(way).map(|along| along / step_s);
+            twist.angular_radps[2] = wrap_angle(yaw_rad(claimed) - yaw_rad(before)) / step_s;
+        }
+        twist
+    }
+
+    fn write_truth(&mut self, frame: &Frame) -> Result<(), Error> {
+        for (who, _) in &frame.odometry {
+            let body = frame.bodies.iter().find(|body| (body.kind, body.number, body.part) == *who);
+            let Some(body) = body else { continue };
+            // A floor has no height, whatever pictures show.
+            let [x_m, y_m, _] = body.pose.at_m;
+            let pose = ros_pose(&Pose { at_m: [x_m, y_m, 0.0], ..body.pose });
+            let message = PoseStamped { header: header(frame.time_s, MAP.into()), pose };
+            self.write(&format!("/{}/ground_truth", namespace(*who)), frame.time_s, &message)?;
+        }
+        Ok(())
+    }
+
+    fn write_scans(&mut self, frame: &Frame) -> Result<(), Error> {
+        for scan in &frame.scans {
+            let topic = format!("/{}/{}", namespace(scan.of), ros_name(&scan.sensor));
+            self.write(&topic, frame.time_s, &laser_scan(frame.time_s, scan))?;
+        }
+        Ok(())
+    }
+}
+
+impl Film for BagFilm {
+    fn every(&self) -> Cycle {
+        self.every
+    }
+
+    fn shoot(&mut self, run: &mut dyn Simulation) -> Result<(), Error> {
+        let frame = run.frame(LOOK);
+        if frame.odometry.is_empty() {
+            let cause = format!("the world {} has no robots with odometry", run.world());
+            let remedy = "export a run of the world robots, or use --to mcap";
+            return Err(InputError::new("--to rosbag", cause, remedy).into());
+        }
+        self.write_odometry(&frame)?;
+        self.write_truth(&frame)?;
+        self.write_scans(&frame)?;
+        self.before = Some((frame.time_s, frame.odometry));
+        Ok(())
+    }
+}
+
+fn files_of(floor: &Floor) -> [(&'static str, Vec<u8>); 2] {
+    let cell = |occupancy: &Occupancy| match occupancy {
+        Occupancy::Free => Cell::Free,
+        Occupancy::Wall => Cell::Wall,
+        Occupancy::Unknown => Cell::Unknown,
+    };
+    let cells: Vec<Cell> = floor.boxes.iter().map(cell).collect();
+    map_files([floor.width, floor.height], floor.box_m, floor.plane, &cells)
+}
+
+fn ns(time_s: f64) -> u64 {
+    (time_s.max(0.0) * 1e9).round() as u64
+}
+
+fn header(time_s: f64, frame_id: String) -> Header {
+    Header { stamp: Time::from_ns(ns(time_s)), frame_id }
+}
+
+/// Returns the name of a body in topics and frames.
+fn namespace((kind, number, _): Who) -> String {
+    format!("{kind}_{number}")
+}
+
+fn odometry_frame(who: Who) -> String {
+    format!("{}/odom", namespace(who))
+}
+
+fn base_frame(who: Who) -> String {
+    format!("{}/base_link", namespace(who))
+}
+
+/// Returns a name with nothing in it that a topic may not have.
+fn ros_name(name: &str) -> String {
+    name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect()
+}
+
+fn ros_pose(pose: &Pose) -> RosPose {
+    RosPose { position: pose.at_m, orientation: pose.turn }
+}
+
+fn yaw_rad(pose: &Pose) -> f64 {
+    let ahead = pose.turned([1.0, 0.0, 0.0]);
+    sidestep::kernel::math::atan2(ahead[1], ahead[0])
+}
+
+/// Returns a scan, whose beams sit in the middle of the robot; directions without a beam have no number.
+fn laser_scan(time_s: f64, scan: &Scan) -> LaserScan {
+    let (first_rad, last_rad, ranges_m) = scan.evenly_spaced(f64::NAN);
+    let steps = ranges_m.len().max(2) - 1;
+    LaserScan {
+        header: header(time_s, base_frame(scan.of)),
+        angle_min_rad: first_rad as f32,
+        angle_max_rad: last_rad as f32,
+        angle_increment_rad: ((last_rad - first_rad) / steps as f64) as f32,
+        time_increment_s: 0.0,
+        scan_time_s: 0.0,
+        range_min_m: 0.0,
+        range_max_m: scan.range_m as f32,
+        ranges_m: ranges_m.into_iter().map(|range_m| range_m as f32).collect(),
+        intensities: Vec::new(),
+    }
+}
