@@ -69,8 +69,8 @@ pub(crate) type Paint = Cow<'static, str>;
 /// The symbol before a legend's label.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Symbol {
-    /// A stretch of line, perhaps with its marker.
-    Line { color: Paint, marker: Option<Marker> },
+    /// A stretch of line, perhaps with its marker, and its dashes as an attribute.
+    Line { color: Paint, marker: Option<Marker>, dash: &'static str },
     /// A marker alone.
     Marker { color: &'static str, marker: Marker },
     /// The dashes of a reference line.
@@ -146,8 +146,9 @@ impl Legend {
         let size = self.font_px;
         let (end, center) = ((x + 2.0 * size, y), (x + size, y));
         match symbol {
-            Symbol::Line { color, marker } => {
-                svg.line((x, y), end, format_args!(r#"stroke="{color}" stroke-width="2""#));
+            Symbol::Line { color, marker, dash } => {
+                let look = format_args!(r#"stroke="{color}" stroke-width="2"{dash}"#);
+                svg.line((x, y), end, look);
                 if let Some(marker) = marker {
                     marker.draw(svg, center, 0.32 * size, color);
                 }

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::trails::agents;
 use super::{Scene, bodies};
 use crate::legend::{Entry, Symbol};
-use crate::style::hex;
+use crate::style::{body_dash, hex};
 use sidestep_kernel::Cycle;
 use sidestep_kernel::view::{Frame, Kind, Occupancy, Scenery, Trail, UNKNOWN, WALL, color_of};
 
@@ -103,13 +103,13 @@ fn named(scene: &Scene<'_>) -> Vec<Entry> {
         let color = hex(color_of(number)).into();
         let symbol = match width_m {
             Some(_) => Symbol::Swatch { fill: color, rim: "none".into(), opacity: RIBBON },
-            None => Symbol::Line { color, marker: None },
+            None => Symbol::Line { color, marker: None, dash: body_dash(number) },
         };
         Entry::new(symbol, name(scene, kind, number))
     };
     let mut entries: Vec<Entry> = all.iter().take(MOST_NAMED).map(entry).collect();
     if all.len() > MOST_NAMED {
-        let symbol = Symbol::Line { color: hex(ANY).into(), marker: None };
+        let symbol = Symbol::Line { color: hex(ANY).into(), marker: None, dash: "" };
         entries.push(Entry::new(symbol, format!("and {} more", all.len() - MOST_NAMED)));
     }
     entries
