@@ -48,7 +48,7 @@
   // ---- Room for columns ----
 
   // Fewer columns than these say too little; such rows become cards.
-  const FEWEST = 2;
+  const FEWEST = 3;
   const rules = document.createElement("style");
   document.head.append(rules);
   let known = 0;
