@@ -79,6 +79,8 @@ pub(crate) enum Symbol {
     Swatch { fill: Paint, rim: Paint, opacity: f64 },
     /// The mark at a track's start.
     Ring,
+    /// The mark of who leads.
+    Leader,
 }
 
 /// An entry of a legend.
@@ -168,6 +170,7 @@ impl Legend {
                     format_args!(r#"fill="{fill}" fill-opacity="{opacity}" stroke="{rim}""#),
                 );
             }
+            Symbol::Leader => leader_mark(svg, center, 0.36 * size, FAINT_INK),
             Symbol::Ring => start_mark(svg, center, 0.36 * size, FAINT_INK),
         }
     }
@@ -185,6 +188,12 @@ pub(crate) fn start_mark(svg: &mut Svg, center: (f64, f64), radius: f64, color: 
         radius,
         format_args!(r##"fill="#FFFFFF" stroke="{color}" stroke-width="2""##),
     );
+}
+
+/// Draws the mark of who leads: a ring around a dot.
+pub(crate) fn leader_mark(svg: &mut Svg, center: (f64, f64), radius: f64, color: &str) {
+    start_mark(svg, center, radius, color);
+    svg.circle(center, 0.45 * radius, format_args!(r#"class="leader" fill="{color}""#));
 }
 
 /// Draws the mark where a track ends.
