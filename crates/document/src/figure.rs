@@ -125,13 +125,21 @@ pub struct Table {
     pub columns: Vec<String>,
     /// Cells, row by row.
     pub rows: Vec<Vec<String>>,
+    /// Whether a page shows only the title until a reader opens it.
+    pub is_folded: bool,
 }
 
 impl Table {
     /// Returns a table without rows.
     pub fn new(title: impl Into<String>, note: impl Into<String>, columns: &[&str]) -> Self {
         let columns = columns.iter().map(|c| (*c).to_string()).collect();
-        Self { title: title.into(), note: note.into(), columns, rows: Vec::new() }
+        Self { title: title.into(), note: note.into(), columns, rows: Vec::new(), is_folded: false }
+    }
+
+    /// Returns the same table, of which a page shows the title alone until it is opened.
+    #[must_use]
+    pub fn folded(self) -> Self {
+        Self { is_folded: true, ..self }
     }
 
     /// Appends a row; cells that are missing stay empty.

@@ -69,8 +69,8 @@ pub(crate) type Paint = Cow<'static, str>;
 /// The symbol before a legend's label.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Symbol {
-    /// A stretch of line, perhaps with its marker.
-    Line { color: Paint, marker: Option<Marker> },
+    /// A stretch of line, perhaps with its marker, and its dashes as an attribute.
+    Line { color: Paint, marker: Option<Marker>, dash: &'static str },
     /// A marker alone.
     Marker { color: &'static str, marker: Marker },
     /// The dashes of a reference line.
@@ -79,6 +79,8 @@ pub(crate) enum Symbol {
     Swatch { fill: Paint, rim: Paint, opacity: f64 },
     /// The mark at a track's start.
     Ring,
+    /// The mark of who leads.
+    Leader,
 }
 
 /// An entry of a legend.
@@ -146,8 +148,9 @@ impl Legend {
         let size = self.font_px;
         let (end, center) = ((x + 2.0 * size, y), (x + size, y));
         match symbol {
-            Symbol::Line { color, marker } => {
-                svg.line((x, y), end, format_args!(r#"stroke="{color}" stroke-width="2""#));
+            Symbol::Line { color, marker, dash } => {
+                let look = format_args!(r#"stroke="{color}" stroke-width="2"{dash}"#);
+                svg.line((x, y), end, look);
                 if let Some(marker) = marker {
                     marker.draw(svg, center, 0.32 * size, color);
                 }
@@ -167,6 +170,7 @@ impl Legend {
                     format_args!(r#"fill="{fill}" fill-opacity="{opacity}" stroke="{rim}""#),
                 );
             }
+            Symbol::Leader => leader_mark(svg, center, 0.36 * size, FAINT_INK),
             Symbol::Ring => start_mark(svg, center, 0.36 * size, FAINT_INK),
         }
     }
@@ -184,6 +188,12 @@ pub(crate) fn start_mark(svg: &mut Svg, center: (f64, f64), radius: f64, color: 
         radius,
         format_args!(r##"fill="#FFFFFF" stroke="{color}" stroke-width="2""##),
     );
+}
+
+/// Draws the mark of who leads: a ring around a dot.
+pub(crate) fn leader_mark(svg: &mut Svg, center: (f64, f64), radius: f64, color: &str) {
+    start_mark(svg, center, radius, color);
+    svg.circle(center, 0.45 * radius, format_args!(r#"class="leader" fill="{color}""#));
 }
 
 /// Draws the mark where a track ends.

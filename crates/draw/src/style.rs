@@ -1,7 +1,7 @@
 //! Sizes and colors that all pictures share.
 
 use crate::error::DrawError;
-use sidestep_kernel::view::Color;
+use sidestep_kernel::view::{COLORS, Color};
 
 /// Okabe and Ito's palette without its yellow, which is unreadable on white: distinct for every
 /// common color blindness.
@@ -18,6 +18,34 @@ pub(crate) const GRID: &str = "#E4E4E4";
 /// Returns the color of the series (or track) with this number; colors repeat after seven.
 pub(crate) fn series_color(index: usize) -> &'static str {
     SERIES_COLORS[index % SERIES_COLORS.len()]
+}
+
+/// Dashes of lines, as attributes: the first time through the colors they have none.
+const DASHES: [&str; 4] = [
+    "",
+    r#" stroke-dasharray="7 4""#,
+    r#" stroke-dasharray="2 4""#,
+    r#" stroke-dasharray="7 3 2 3""#,
+];
+
+/// Returns the dashes of the line of a series, which differ where colors repeat.
+pub(crate) fn series_dash(index: usize) -> &'static str {
+    DASHES[index / SERIES_COLORS.len() % DASHES.len()]
+}
+
+/// Returns the dashes of the way of a body, which differ where colors repeat.
+pub(crate) fn body_dash(number: u32) -> &'static str {
+    DASHES[number as usize / COLORS.len() % DASHES.len()]
+}
+
+/// Returns the opacity of the bars of a series, and the color of their rim: bars of one color differ in
+/// both.
+pub(crate) fn series_fill(index: usize) -> (f64, &'static str) {
+    match index / SERIES_COLORS.len() {
+        0 => (1.0, "none"),
+        1 => (0.5, INK),
+        _ => (0.15, INK),
+    }
 }
 
 /// Returns a color in SVG notation.

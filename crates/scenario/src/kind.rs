@@ -1,6 +1,6 @@
 //! The interface of a world for programs that run scenarios and know no world.
 
-use crate::{Remark, Resolved, Source, nearest};
+use crate::{Meaning, Remark, Resolved, Source, nearest};
 use sidestep_kernel::words::{Lines, Said};
 use sidestep_kernel::{InputError, Plan, Simulation};
 use std::any::Any;
@@ -19,6 +19,11 @@ pub trait Kind: Sync {
 
     /// A commented scenario with every key.
     fn default_scenario(&self) -> &'static str;
+
+    /// Its metrics in words. Reports split the names of those that are not listed.
+    fn meanings(&self) -> &'static [Meaning] {
+        &[]
+    }
 
     /// Translates a file of another program into a scenario; `None` for files that this world does
     /// not read.

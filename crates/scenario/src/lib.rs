@@ -13,6 +13,7 @@ mod explain;
 pub mod file;
 mod keys;
 pub mod kind;
+mod meaning;
 mod overrides;
 mod remark;
 mod sections;
@@ -26,6 +27,7 @@ pub use checked::{
 pub use explain::nearest;
 pub use keys::Key;
 pub use kind::{Compiled, Foreign, Kind, Worlds};
+pub use meaning::{Meaning, Told, told};
 pub use remark::{Remark, Severity};
 pub use sections::Sections;
 pub use source::{FORMAT, Head, Preamble, Source};

@@ -98,7 +98,10 @@ fn slice(
     let frame_due = sinks.film.as_ref().map_or(until, |f| next(f.every(), run.cycle()).min(until));
     let asked = pace.cycles().min(rows_due.min(frame_due) - run.cycle());
     let started = Instant::now();
-    let done = run.advance(asked);
+    let done = match sinks.film.as_mut().and_then(|film| Some((film.follows_every()?, film))) {
+        Some((step, film)) => followed(run, asked, step, &mut **film),
+        None => run.advance(asked),
+    };
     pace.note(done, started.elapsed());
     // A run may be over exactly at the end of a slice: then there is no further slice.
     let is_due = |due: Cycle, run: &dyn Simulation| run.cycle() == due || run.is_over();
@@ -113,6 +116,19 @@ fn slice(
         film.shoot(run)?;
     }
     Ok(())
+}
+
+/// Advances by at most `asked` cycles, and lets a film look at every `step`-th of them.
+fn followed(run: &mut dyn Simulation, asked: Cycle, step: Cycle, film: &mut dyn Film) -> Cycle {
+    let from = run.cycle();
+    while run.cycle() - from < asked && !run.is_over() {
+        let left = asked - (run.cycle() - from);
+        if run.advance(left.min(step)) == 0 {
+            break;
+        }
+        film.follow(run);
+    }
+    run.cycle() - from
 }
 
 /// The number of cycles of a slice.

@@ -12,6 +12,7 @@
 //! quantile.rs    percentiles, and their intervals by order statistics
 //! bootstrap.rs   BCa intervals of the mean and of any other statistic
 //! paired.rs      two treatments of the same cases: differences, ratios, signs, p-values, Holm
+//! rank.rs        rank correlation of two quantities
 //! least_squares.rs  linear models fitted to measurements
 //! stopping.rs    how many runs are enough
 //! ```
@@ -26,6 +27,7 @@
 //! | a typical run (median), a bad run (95th percentile) | [`quantile_interval`] | always, whatever the distribution; it reports its exact coverage | it is absent below 6 runs (median) or 72 runs (5th, 95th): no interval would be honest |
 //! | is A better than B | [`Pairs`]: run both on the same seeds | the interval of the difference; `k of n pairs` needs no assumption | the two separate intervals: their overlap says nothing about pairs |
 //! | by which factor does A differ from B | [`Pairs::ratio`] (Fieller) | with a baseline whose mean is well away from 0 | a ratio to a mean that may be 0: it is absent |
+//! | does one quantity go with another | [`rank_correlation`] | from some 10 pairs on; it sees any steady rise or fall | for a rise that turns into a fall: it may be 0 |
 //! | which of many variants differ | [`holm`] on the p-values | the adjusted ones | the smallest of twenty raw p-values |
 //!
 //! Where Student's interval and the bootstrap's differ much, the values are skewed and n is small:
@@ -42,6 +44,7 @@ pub mod least_squares;
 mod moments;
 mod paired;
 mod quantile;
+mod rank;
 mod stopping;
 
 pub use bootstrap::Bootstrap;
@@ -52,6 +55,7 @@ pub use interval::{
 pub use moments::{Moments, Sample, mean, percentile, sample_sd};
 pub use paired::{Pairs, holm};
 pub use quantile::{QuantileInterval, quantile_interval, runs_for_quantile};
+pub use rank::{Correlation, rank_correlation};
 pub use stopping::{Next, Reason, StoppingRule};
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};

@@ -5,7 +5,7 @@ use crate::chart::error_bar;
 use crate::chart::frame::{Across, Frame, Words, most_ticks};
 use crate::error::DrawError;
 use crate::legend::{Entry, Symbol};
-use crate::style::{INK, Style, series_color};
+use crate::style::{INK, Style, series_color, series_fill};
 use crate::svg::Rect;
 
 /// The part of a category's slot that its bars fill.
@@ -148,8 +148,9 @@ impl BarChart {
 
     fn legend(&self) -> Vec<Entry> {
         let entry = |(index, series): (usize, &BarSeries)| {
-            let (fill, rim) = (series_color(index).into(), "none".into());
-            Entry::new(Symbol::Swatch { fill, rim, opacity: 1.0 }, &series.label)
+            let (opacity, rim) = series_fill(index);
+            let (fill, rim) = (series_color(index).into(), rim.into());
+            Entry::new(Symbol::Swatch { fill, rim, opacity }, &series.label)
         };
         self.series.iter().enumerate().map(entry).collect()
     }
@@ -163,16 +164,16 @@ impl BarChart {
         for (category, bar) in series.bars.iter().enumerate() {
             if self.y.holds(bar.value) {
                 let center = frame.area.x + (category as f64 + 0.5) * slot + aside;
-                draw_bar(frame, bar, center, width, series_color(index));
+                draw_bar(frame, bar, center, width, index);
             }
         }
     }
 }
 
 /// Draws `bar` around `center`; a little of its `width` stays free beside the next one.
-fn draw_bar(frame: &mut Frame, bar: &Bar, center: f64, width: f64, color: &str) {
+fn draw_bar(frame: &mut Frame, bar: &Bar, center: f64, width: f64, index: usize) {
     let filled = width - (0.06 * width).min(1.5);
-    column(frame, (center - filled / 2.0, filled), bar.value, color);
+    column(frame, (center - filled / 2.0, filled), bar.value, index);
     if let Some((low, high)) = bar.interval.filter(|(l, h)| l.is_finite() && h.is_finite()) {
         let ends = (frame.y.px(low), frame.y.px(high));
         error_bar(&mut frame.svg, center, ends, (0.2 * width).min(5.0), INK);
@@ -180,8 +181,13 @@ fn draw_bar(frame: &mut Frame, bar: &Bar, center: f64, width: f64, color: &str) 
 }
 
 /// Draws a filled column from the axis's base to `value`.
-pub(crate) fn column(frame: &mut Frame, (x, width): (f64, f64), value: f64, color: &str) {
+pub(crate) fn column(frame: &mut Frame, (x, width): (f64, f64), value: f64, index: usize) {
     let (base, end) = (frame.y.base_px(), frame.y.px(value));
     let column = Rect { x, y: base.min(end), width, height: (base - end).abs() };
-    frame.svg.rect(column, format_args!(r#"fill="{color}""#));
+    let (color, (opacity, rim)) = (series_color(index), series_fill(index));
+    let look = match opacity {
+        1.0 => format!(r#"fill="{color}""#),
+        _ => format!(r#"fill="{color}" fill-opacity="{opacity}" stroke="{rim}""#),
+    };
+    frame.svg.rect(column, look);
 }

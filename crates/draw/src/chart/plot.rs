@@ -5,7 +5,7 @@ use crate::chart::error_bar;
 use crate::chart::frame::{Across, Frame, Words, most_ticks, polyline};
 use crate::error::DrawError;
 use crate::legend::{Entry, Marker, Symbol, dashes};
-use crate::style::{FAINT_INK, Style, series_color};
+use crate::style::{FAINT_INK, Style, series_color, series_dash};
 
 /// Straight pieces of an ideal line, which is a curve if one axis is logarithmic.
 const IDEAL_PIECES: u32 = 64;
@@ -201,7 +201,7 @@ impl Plot {
                 Mark::Points => Symbol::Marker { color, marker },
                 Mark::Line | Mark::Band => {
                     let marker = series.shows_markers().then_some(marker);
-                    Symbol::Line { color: color.into(), marker }
+                    Symbol::Line { color: color.into(), marker, dash: series_dash(index) }
                 }
             };
             Entry::new(symbol, &series.label)
@@ -227,7 +227,8 @@ impl Plot {
             for run in series.points.split(|p| !self.holds(p)).filter(|run| run.len() > 1) {
                 let data = polyline(thinned(run.iter().map(|p| (x.px(p.x), y.px(p.y)))));
                 let look = r#"fill="none" stroke-width="2" stroke-linejoin="round""#;
-                frame.svg.path(&data, format_args!(r#"stroke="{color}" {look}"#));
+                let dash = series_dash(index);
+                frame.svg.path(&data, format_args!(r#"stroke="{color}" {look}{dash}"#));
             }
         }
         for point in series.points.iter().filter(|p| self.holds(p)) {

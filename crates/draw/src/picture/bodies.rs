@@ -4,10 +4,12 @@ use std::fmt::Write as _;
 
 use super::Scene;
 use super::canvas::{Canvas, Px, corners, dot};
-use crate::legend::start_mark;
+use crate::legend::leader_mark;
 use crate::style::{INK, hex};
-use crate::svg::{Num, Svg};
-use sidestep_kernel::view::{Body, Color, Condition, Kind, Place, Pose, Scenery, Shape, WALL};
+use crate::svg::{Anchor, Num, Svg, TextLook};
+use sidestep_kernel::view::{
+    Body, Color, Condition, Kind, Place, Pose, Scenery, Shape, WALL, color_of,
+};
 
 /// Least width of a line, because thinner ones would vanish.
 const LEAST_LINE_PX: f64 = 1.4;
@@ -19,6 +21,15 @@ const LEAST_DART_PX: f64 = 9.0;
 const LEADER_PX: [f64; 2] = [3.0, 5.0];
 /// Least radius of a goal.
 const LEAST_GOAL_PX: f64 = 3.5;
+/// Length of a target's cross beyond its ring, and the size of its number.
+const TARGET_PX: f64 = 3.0;
+const TARGET_LETTERS_PX: f64 = 11.0;
+/// Most targets with numbers: with more there is no room.
+const MOST_NUMBERED: usize = 12;
+/// Number of balls in space above which those of one size and about one depth are one path, without rims.
+const MOST_BALLS: usize = 400;
+/// Shades of such balls.
+const SHADES: f64 = 24.0;
 /// Time whose way a moving body's arrow shows, seconds.
 const ARROW_S: f64 = 1.0;
 /// Corners of a circle that is seen from the side.
@@ -84,14 +95,62 @@ pub(super) fn draw_by_depth<'a>(
     }
     // The sort is stable: of bodies at the same depth, the one named first is drawn first.
     parts.sort_by(|a, b| a.0.total_cmp(&b.0));
-    for (_, body, segment) in parts {
-        match (&body.shape, segment) {
-            (Shape::Line { points_m, .. }, Some(k)) => {
-                draw_line(svg, scene, canvas, body, &points_m[k..k + 2]);
-            }
-            _ => draw_body(svg, scene, canvas, body),
+    let are_many = parts.iter().filter(|(_, body, _)| is_ball(body)).count() > MOST_BALLS;
+    let like =
+        |a: &Body, b: &Body| is_ball(a) && is_ball(b) && dot_look(canvas, a) == dot_look(canvas, b);
+    for alike in parts.chunk_by(|(_, a, _), (_, b, _)| are_many && like(a, b)) {
+        match alike {
+            [(_, first, _), ..] if are_many && is_ball(first) => draw_dots(svg, canvas, alike),
+            _ => alike.iter().for_each(|part| draw_part(svg, scene, canvas, part)),
         }
     }
+}
+
+fn draw_part(
+    svg: &mut Svg,
+    scene: &Scene<'_>,
+    canvas: &Canvas,
+    (_, body, segment): &(f64, &Body, Option<usize>),
+) {
+    match (&body.shape, segment) {
+        (Shape::Line { points_m, .. }, &Some(k)) => {
+            draw_line(svg, scene, canvas, body, &points_m[k..k + 2]);
+        }
+        _ => draw_body(svg, scene, canvas, body),
+    }
+}
+
+/// Whether a body is an obstacle of which there may be thousands.
+fn is_ball(body: &Body) -> bool {
+    body.kind == Kind::Obstacle && matches!(body.shape, Shape::Sphere { .. })
+}
+
+/// Returns the look of a ball among many.
+fn dot_look(canvas: &Canvas, body: &Body) -> String {
+    let radius_m = if let Shape::Sphere { radius_m } = body.shape { radius_m } else { 0.0 };
+    let look = body.appearance(3);
+    let shade = (canvas.nearness(body.pose.at_m) * SHADES).round() / SHADES;
+    let (color, opacity) = (hex(paler(look.color, shade)), look.opacity);
+    let width = Num(2.0 * (radius_m * canvas.px_per_m).max(LEAST_RADIUS_PX));
+    format!(
+        r#"fill="none" stroke="{color}" stroke-opacity="{opacity}" stroke-width="{width}" stroke-linecap="round""#
+    )
+}
+
+/// Draws balls of one look as one path: thousands of circles would be most of a picture's bytes.
+fn draw_dots(svg: &mut Svg, canvas: &Canvas, balls: &[(f64, &Body, Option<usize>)]) {
+    let mut data = String::new();
+    for (_, ball, _) in balls {
+        let (x, y) = canvas.at(ball.pose.at_m);
+        // A stroke of no length is not drawn. Writing into a String cannot fail.
+        let _ = write!(
+            data,
+            "M{} {}h.01",
+            Num((x * 10.0).round() / 10.0),
+            Num((y * 10.0).round() / 10.0)
+        );
+    }
+    svg.path(&data, dot_look(canvas, balls[0].1));
 }
 
 fn depth(canvas: &Canvas, at: Place) -> f64 {
@@ -102,7 +161,10 @@ fn depth(canvas: &Canvas, at: Place) -> f64 {
 fn fill(scene: &Scene<'_>, canvas: &Canvas, body: &Body) -> (Color, f64) {
     let look = body.appearance(scene.scenery.dimensions);
     let acts = body.kind.is_agent() || body.kind == Kind::Rods;
-    if acts && body.state == Condition::Plain && scene.is_beside_trails(body) {
+    if acts
+        && matches!(body.state, Condition::Plain | Condition::Leading)
+        && scene.is_beside_trails(body)
+    {
         return (DARK, look.opacity);
     }
     if body.kind == Kind::Obstacle && !canvas.is_above() {
@@ -212,19 +274,41 @@ pub(super) fn draw_marks(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas) {
         let to = std::array::from_fn(|k| from[k] + ARROW_S * body.velocity_m_s[k]);
         arrow(svg, canvas.at(from), canvas.at(to));
     }
+    let goals = || bodies().filter(|body| body.kind == Kind::Goal && body.part.is_some());
+    let are_few = goals().count() <= MOST_NUMBERED;
+    for goal in goals() {
+        draw_target(svg, canvas, goal, goal.part.filter(|_| are_few).map(|part| part + 1));
+    }
     for body in bodies().filter(|body| leads(body)) {
         if let Shape::Sphere { radius_m } = body.shape {
             let least_px = LEADER_PX[usize::from(!canvas.is_above())];
             let radius_px = (0.7 * radius_m * canvas.px_per_m).max(least_px);
             let (color, _) = fill(scene, canvas, body);
-            start_mark(svg, canvas.at(body.pose.at_m), radius_px, &hex(color));
+            leader_mark(svg, canvas.at(body.pose.at_m), radius_px, &hex(color));
         }
     }
 }
 
-/// Whether a body leads: the first connector of a chain does.
+/// Whether a body leads the others.
 pub(super) fn leads(body: &Body) -> bool {
-    body.kind == Kind::Connector && body.part == Some(0)
+    body.state == Condition::Leading
+}
+
+/// Draws a target over everything that hides it: a ring with a cross, and its number if there are few.
+fn draw_target(svg: &mut Svg, canvas: &Canvas, goal: &Body, number: Option<u32>) {
+    let Shape::Sphere { radius_m } = goal.shape else { return };
+    let (x, y) = canvas.at(goal.pose.at_m);
+    let (radius_px, color) =
+        ((radius_m * canvas.px_per_m).max(LEAST_GOAL_PX), hex(darker(color_of(goal.number))));
+    let look = format!(r#"stroke="{color}" stroke-width="1.3""#);
+    svg.circle((x, y), radius_px, format_args!(r#"class="target" fill="none" {look}"#));
+    let reach = radius_px + TARGET_PX;
+    svg.line((x - reach, y), (x + reach, y), &look);
+    svg.line((x, y - reach), (x, y + reach), &look);
+    if let Some(number) = number {
+        let words = TextLook { halo: true, ..TextLook::new(TARGET_LETTERS_PX, Anchor::Start) };
+        svg.text(x + reach, y - radius_px, &number.to_string(), &words);
+    }
 }
 
 /// Returns the middle of a body, wherever its pose is.

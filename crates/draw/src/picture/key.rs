@@ -5,9 +5,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::trails::agents;
 use super::{Scene, bodies};
 use crate::legend::{Entry, Symbol};
-use crate::style::hex;
+use crate::style::{body_dash, hex};
 use sidestep_kernel::Cycle;
-use sidestep_kernel::view::{Frame, Kind, Occupancy, Scenery, Trail, UNKNOWN, WALL, color_of};
+use sidestep_kernel::view::{
+    Body, Frame, Kind, Occupancy, Scenery, Trail, UNKNOWN, WALL, color_of,
+};
 
 /// Most things with a color of their own in the legend; more share one line.
 const MOST_NAMED: usize = 10;
@@ -80,9 +82,9 @@ pub(super) fn entries(scene: &Scene<'_>) -> Vec<Entry> {
     let words = kinds.into_iter().map(|((_, words), (color, opacity))| (words, color, opacity));
     entries.extend(words.map(|(words, color, opacity)| Entry::new(swatch(color, opacity), words)));
     if scene.frame.bodies.iter().any(bodies::leads) {
-        entries.push(Entry::new(Symbol::Ring, "leader"));
+        entries.push(Entry::new(Symbol::Leader, "leader"));
     }
-    if scene.trails.iter().any(|trail| trail.width_m.is_some()) {
+    if !scene.trails.is_empty() {
         entries.push(Entry::new(Symbol::Ring, "beginning of a track"));
     }
     entries.extend(named(scene));
@@ -92,7 +94,8 @@ pub(super) fn entries(scene: &Scene<'_>) -> Vec<Entry> {
 /// Returns an entry for everything with a color of its own: agents with a trail, and chains.
 fn named(scene: &Scene<'_>) -> Vec<Entry> {
     let trails = scene.trails.iter().map(|trail| (trail.of.1, (trail.of.0, trail.width_m)));
-    let chains = scene.frame.bodies.iter().filter(|body| bodies::leads(body));
+    let is_first = |body: &&Body| body.kind == Kind::Connector && body.part == Some(0);
+    let chains = scene.frame.bodies.iter().filter(is_first);
     let chains = chains
         .filter(|body| {
             scene.trails.is_empty() || scene.trails.iter().any(|t| t.of.1 == body.number)
@@ -103,13 +106,13 @@ fn named(scene: &Scene<'_>) -> Vec<Entry> {
         let color = hex(color_of(number)).into();
         let symbol = match width_m {
             Some(_) => Symbol::Swatch { fill: color, rim: "none".into(), opacity: RIBBON },
-            None => Symbol::Line { color, marker: None },
+            None => Symbol::Line { color, marker: None, dash: body_dash(number) },
         };
         Entry::new(symbol, name(scene, kind, number))
     };
     let mut entries: Vec<Entry> = all.iter().take(MOST_NAMED).map(entry).collect();
     if all.len() > MOST_NAMED {
-        let symbol = Symbol::Line { color: hex(ANY).into(), marker: None };
+        let symbol = Symbol::Line { color: hex(ANY).into(), marker: None, dash: "" };
         entries.push(Entry::new(symbol, format!("and {} more", all.len() - MOST_NAMED)));
     }
     entries

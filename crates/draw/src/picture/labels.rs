@@ -1,10 +1,11 @@
 //! Names beside the bodies with trails, placed where they cover neither each other nor any body.
 
 use super::canvas::{Canvas, Px};
+use super::trails::Shown;
 use super::{Scene, key};
 use crate::legend::{end_mark, start_mark};
 use crate::style::{Style, hex};
-use crate::svg::{Anchor, Rect, Svg, TextLook};
+use crate::svg::{Anchor, Num, Rect, Svg, TextLook};
 use crate::text::{self, Weight};
 use sidestep_kernel::view::{Body, Kind, Shape};
 
@@ -12,6 +13,9 @@ use sidestep_kernel::view::{Body, Kind, Shape};
 const MOST_LABELS: usize = 12;
 /// Distance between a name and the named body.
 const GAP_PX: f64 = 4.0;
+/// Radius of the mark at the start of a line, and length of the head that tells its direction.
+const LINE_START_PX: f64 = 2.6;
+const HEAD_PX: f64 = 8.0;
 /// Distances at which room is searched, in gaps.
 const FURTHER: [f64; 4] = [1.0, 3.0, 6.0, 10.0];
 
@@ -28,8 +32,16 @@ pub(super) fn draw(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, room: Rect
         let radius_px = body.map_or(0.0, |body| radius_m(body) * canvas.px_per_m);
         let mark_px = (0.56 * radius_px).clamp(3.0, 6.0);
         // If the body itself is drawn there, it needs no mark.
-        if trail.width_m.is_some() && contains(room, start) {
-            start_mark(svg, start, mark_px, &color);
+        if contains(room, start) {
+            start_mark(
+                svg,
+                start,
+                if trail.width_m.is_some() { mark_px } else { LINE_START_PX },
+                &color,
+            );
+        }
+        if trail.width_m.is_none() {
+            draw_direction(svg, trail, canvas, &color);
         }
         if body.is_none() && contains(room, end) {
             end_mark(svg, end, 3.0, &color);
@@ -54,6 +66,32 @@ pub(super) fn draw(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, room: Rect
     for (at, clear_px, words) in wanted {
         write(svg, (at, clear_px), &words, room, &mut taken, style);
     }
+}
+
+/// Draws an arrowhead in the middle of a line, which tells where it goes.
+fn draw_direction(svg: &mut Svg, trail: &Shown<'_>, canvas: &Canvas, color: &str) {
+    let points: Vec<Px> = trail.way.iter().map(|&(_, at)| canvas.at(at)).collect();
+    let length = |pair: &[Px]| (pair[1].0 - pair[0].0).hypot(pair[1].1 - pair[0].1);
+    let half = 0.5 * points.windows(2).map(length).sum::<f64>();
+    // A short line has no room for a head.
+    if half < 3.0 * HEAD_PX {
+        return;
+    }
+    let mut gone = 0.0;
+    let middle = points.windows(2).find(|pair| {
+        gone += length(pair);
+        gone >= half && length(pair) > 0.0
+    });
+    let Some(&[(x0, y0), (x, y)]) = middle else { return };
+    let far = length(&[(x0, y0), (x, y)]);
+    let (ux, uy) = (HEAD_PX * (x - x0) / far, HEAD_PX * (y - y0) / far);
+    let wing = |side: f64| (x - ux + side * 0.5 * uy, y - uy - side * 0.5 * ux);
+    let [(ax, ay), (bx, by)] = [wing(1.0), wing(-1.0)].map(|(x, y)| (Num(x), Num(y)));
+    let data = format!("M{ax} {ay}L{} {}L{bx} {by}Z", Num(x), Num(y));
+    svg.path(
+        &data,
+        format_args!(r##"class="direction" fill="{color}" stroke="#FFFFFF" stroke-width="0.6""##),
+    );
 }
 
 fn radius_m(body: &Body) -> f64 {

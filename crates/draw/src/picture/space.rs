@@ -8,8 +8,11 @@ use crate::legend::{Legend, faint, paragraph, title_look};
 use crate::style::{FAINT_INK, GRID, Style};
 use crate::svg::{Anchor, Rect, Svg, TextLook};
 use crate::text::{self, Weight};
-use crate::ticks::{decimals, label, nice_step};
+use crate::ticks::{Ticks, decimals, label, nice_step};
 use sidestep_kernel::view::Place;
+
+/// Room along an edge for a number.
+const NUMBER_ROOM_PX: f64 = 60.0;
 
 pub(super) fn draw(scene: &Scene<'_>, options: &Options) -> Result<String, DrawError> {
     let style = &options.style;
@@ -38,8 +41,8 @@ pub(super) fn draw(scene: &Scene<'_>, options: &Options) -> Result<String, DrawE
 fn canvas(box_m: [Place; 2], style: &Style, top: f64) -> (Canvas, f64) {
     let camera = Camera::CORNER;
     let [lo, hi] = extent::seen(camera, box_m);
-    // Room for the letters at the axes.
-    let margin = EDGE_PX + 1.5 * style.font_px;
+    // Room for the numbers at the axes.
+    let margin = EDGE_PX + 3.2 * style.font_px;
     let (width, height) =
         ((style.width_px - 2.0 * margin).max(10.0), (style.height_px - 2.0 * margin).max(10.0));
     let px_per_m = (width / (hi[0] - lo[0])).min(height / (hi[1] - lo[1]));
@@ -68,10 +71,41 @@ fn draw_box(svg: &mut Svg, canvas: &Canvas, box_m: [Place; 2], style: &Style) {
     for (name, [from, to]) in [("x", [0, 1]), ("y", [1, 3]), ("z", [0, 4])] {
         let (from, to) = (canvas.at(all[from]), canvas.at(all[to]));
         svg.line(from, to, format_args!(r#"stroke="{FAINT_INK}" stroke-width="1.2""#));
-        let length = ((to.0 - from.0).powi(2) + (to.1 - from.1).powi(2)).sqrt().max(1.0);
-        let out = style.font_px / length;
+        let length = (to.0 - from.0).hypot(to.1 - from.1).max(1.0);
+        let out = 1.6 * style.font_px / length;
         let at = (to.0 + out * (to.0 - from.0), to.1 + out * (to.1 - from.1));
-        svg.text(at.0, at.1 + look.middle_px(), name, &look);
+        let longest_m = (0..3).map(|k| box_m[1][k] - box_m[0][k]).fold(0.0, f64::max);
+        svg.text(at.0, at.1 + look.middle_px(), &format!("{name} ({})", unit(longest_m).0), &look);
+    }
+    (0..3).for_each(|k| draw_numbers(svg, canvas, box_m, k, style));
+}
+
+/// Writes numbers along an edge of the box, on the side where nothing is.
+fn draw_numbers(svg: &mut Svg, canvas: &Canvas, box_m: [Place; 2], k: usize, style: &Style) {
+    let longest_m = (0..3).map(|k| box_m[1][k] - box_m[0][k]).fold(0.0, f64::max);
+    let unit_m = unit(longest_m).1;
+    // The edge of y begins where that of x ends.
+    let mut place = box_m[0];
+    if k == 1 {
+        place[0] = box_m[1][0];
+    }
+    let at = |value: f64| {
+        let mut on_edge = place;
+        on_edge[k] = value * unit_m;
+        canvas.at(on_edge)
+    };
+    let (low, high) = (box_m[0][k] / unit_m, box_m[1][k] / unit_m);
+    let (from, to) = (at(low), at(high));
+    let room_px = (to.0 - from.0).hypot(to.1 - from.1);
+    let ticks = Ticks::linear(low, high, ((room_px / NUMBER_ROOM_PX) as usize).clamp(1, 8));
+    let (anchor, [dx, dy]) =
+        [(Anchor::End, [-0.5, 0.9]), (Anchor::Start, [0.5, 0.9]), (Anchor::End, [-0.6, 0.0])][k];
+    let look = TextLook { fill: FAINT_INK, ..TextLook::new(style.small_px(), anchor) };
+    for (value, label) in &ticks.major {
+        let (x, y) = at(*value);
+        let (dx, dy) = (dx * style.small_px(), dy * style.small_px());
+        svg.line((x, y), (x + 0.6 * dx, y + 0.6 * dy), format_args!(r#"stroke="{FAINT_INK}""#));
+        svg.text(x + dx, y + dy + look.middle_px(), label, &look);
     }
 }
 

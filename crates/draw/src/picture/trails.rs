@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use sidestep_kernel::Cycle;
 use sidestep_kernel::view::{
-    Body, COLORS, Color, Floor, Frame, Kind, Place, Scenery, Shape, Trail, Who, color_of,
+    Body, COLORS, Color, Condition, Floor, Frame, Kind, Place, Scenery, Shape, Trail, Who, color_of,
 };
 
 /// Most lines in a picture: they are thin, so more of them than there are colors can be
@@ -38,7 +38,7 @@ impl Shown<'_> {
 }
 
 /// Returns agents whose ways can be distinguished in one picture: at most one of each color, or
-/// sixty if ways are thin lines; for chains the first and the last connector.
+/// sixty if ways are thin lines; for chains who leads and the other end.
 pub fn worth_a_trail(scenery: &Scenery, frame: &Frame) -> Vec<Who> {
     let agents = agents(scenery, frame);
     let kind = agents.first().map(|&(kind, _)| kind);
@@ -68,12 +68,16 @@ pub(super) fn agents(scenery: &Scenery, frame: &Frame) -> BTreeSet<(Kind, u32)> 
     here.chain(starts.map(|start| (Kind::Airplane, start.number))).collect()
 }
 
-/// Returns the first and the last connector of a chain.
+/// Returns the leader of a chain, or its first connector, and the other end.
 fn ends(frame: &Frame, number: u32) -> Vec<Who> {
     let is_its = |body: &&Body| body.kind == Kind::Connector && body.number == number;
     let mut parts = frame.bodies.iter().filter(is_its).map(Body::who);
+    let leader = frame.bodies.iter().filter(is_its).find(|body| body.state == Condition::Leading);
     let first = parts.next();
-    first.into_iter().chain(parts.next_back()).collect()
+    let leader = leader.map(Body::who).or(first);
+    let last = parts.next_back().filter(|last| Some(*last) != leader).or(first);
+    let ends = [leader, last.filter(|last| Some(*last) != leader)];
+    ends.into_iter().flatten().collect()
 }
 
 /// Returns at most one number of each color, at about equal steps, including the first.

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use super::canvas::{Canvas, Px};
 use super::trails::Shown;
-use crate::style::hex;
+use crate::style::{body_dash, hex};
 use crate::svg::{Num, Svg};
 use sidestep_kernel::view::Color;
 
@@ -35,6 +35,7 @@ pub(super) fn draw(svg: &mut Svg, trail: &Shown<'_>, canvas: &Canvas) {
         }
         None => (LINE_PX, r#"stroke-linecap="round" stroke-linejoin="round""#),
     };
+    let dash = if trail.width_m.is_none() { body_dash(trail.of.1) } else { "" };
     let points = trail.way.iter().map(|&(_, at)| canvas.at(at));
     let shades = trail.way.iter().map(|(cycle, _)| trail.shade(*cycle, SHADES));
     let points: Vec<(usize, Px)> = match trail.width_m {
@@ -43,7 +44,7 @@ pub(super) fn draw(svg: &mut Svg, trail: &Shown<'_>, canvas: &Canvas) {
     };
     let (width, opacity) = (Num(width_px), OPACITY[usize::from(trail.width_m.is_none())]);
     svg.raw(format_args!(
-        r#"<g class="trail" opacity="{opacity}" fill="none" stroke-width="{width}" {ends}>"#
+        r#"<g class="trail" opacity="{opacity}" fill="none" stroke-width="{width}" {ends}{dash}>"#
     ));
     for (shade, data) in path_data(&points).into_iter().enumerate() {
         if !data.is_empty() {

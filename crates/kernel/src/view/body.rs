@@ -138,6 +138,8 @@ impl fmt::Display for Kind {
 pub enum Condition {
     /// Nothing special.
     Plain,
+    /// The part that leads the others.
+    Leading,
     /// Open (doors).
     Open,
     /// In contact with something, or too close to another agent.

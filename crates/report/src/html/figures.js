@@ -325,6 +325,14 @@ const figures = (() => {
   };
   const dashOf = ({ colors }, index) => DASHES[Math.floor(index / colors.length) % DASHES.length];
 
+  // What fills a bar; where colors repeat, bars differ in their opacity and have a rim.
+  const fillOf = (chart, index) => {
+    const round = Math.floor(index / chart.colors.length);
+    const fill = colorOf(chart, index);
+    if (round === 0) return { fill };
+    return { fill, "fill-opacity": round === 1 ? 0.5 : 0.15, stroke: "currentColor" };
+  };
+
   function seriesMarks(chart, { series, points }, layout) {
     const { figure } = chart;
     const color = colorOf(chart, series.index);
@@ -332,7 +340,7 @@ const figures = (() => {
     const sure = there.filter((point) => point.ends);
     const group = drawn("g", { class: "series" });
     if (categoriesOf(figure)) {
-      group.append(...bars(there, sure, layout, figure.y_scale === "log", color));
+      group.append(...bars(there, sure, layout, figure.y_scale === "log", fillOf(chart, series.index)));
       return group;
     }
     if (isBanded(figure)) group.append(...bands(points, color));
@@ -361,18 +369,18 @@ const figures = (() => {
   }
 
   // Bars from zero, or from the low end of a logarithmic axis, and the line that they stand on.
-  function bars(there, sure, { area, y, toY }, isLog, color) {
+  function bars(there, sure, { area, y, toY }, isLog, look) {
     const foot = toY(isLog ? y[0] : Math.max(y[0], 0));
     const half = Math.min(0.2 * (there[0]?.width ?? 0), 5);
     const ends = { x1: area.left, y1: foot, x2: area.left + area.width, y2: foot };
     return [
-      ...there.map((point) => bar(point, foot, color)),
+      ...there.map((point) => bar(point, foot, look)),
       ...sure.map((point) => errorBar(point, half, { class: "interval ink" })),
       drawn("line", { class: "axis", ...ends }),
     ];
   }
 
-  function bar({ x, y, width }, base, fill) {
+  function bar({ x, y, width }, base, look) {
     const filled = width - Math.min(0.06 * width, 1.5);
     const box = {
       x: x - filled / 2,
@@ -380,7 +388,7 @@ const figures = (() => {
       width: filled,
       height: Math.abs(base - y),
     };
-    return drawn("rect", { class: "bar", fill, ...box });
+    return drawn("rect", { class: "bar", ...look, ...box });
   }
 
   // Draws the figure anew, for its width, its zoom and the series that are switched on.
@@ -435,7 +443,7 @@ const figures = (() => {
       "aria-hidden": "true",
     });
     if (categoriesOf(figure))
-      picture.append(drawn("rect", { x: 2, y: 1, width: 20, height: 10, fill: color }));
+      picture.append(drawn("rect", { x: 2, y: 1, width: 20, height: 10, ...fillOf(chart, series.index) }));
     if (isBanded(figure))
       picture.append(
         drawn("rect", { class: "band", x: 0, y: 0, width: 24, height: 12, fill: color }),

@@ -1,4 +1,5 @@
-// Sorts tables by a click on a head. Without it they keep their own order.
+// Sorts tables by a click on a head, and gives wide ones the columns that have room; the others are shown
+// on demand. Without it tables keep their own order, and scroll.
 (() => {
   "use strict";
 
@@ -44,5 +45,81 @@
     });
   }
 
+  // ---- Room for columns ----
+
+  // Fewer columns than these say too little; such rows become cards.
+  const FEWEST = 3;
+  const rules = document.createElement("style");
+  document.head.append(rules);
+  let known = 0;
+
+  // Hides all columns but the first: one change of style, however many rows there are.
+  function show(table, count, all) {
+    for (; known < all; known += 1) {
+      rules.sheet.insertRule(`table[data-shown="${known}"] tr > :nth-child(n + ${known + 1}) { display: none; }`);
+    }
+    if (count < all) table.dataset.shown = count;
+    else delete table.dataset.shown;
+  }
+
+  function fitted(place) {
+    const [table, room] = [place.querySelector("table"), place.querySelector(".scrolled")];
+    const heads = [...table.tHead.rows[0].cells].map((head) => head.textContent);
+    for (const row of table.tBodies[0].rows) {
+      [...row.cells].forEach((cell, k) => cell.setAttribute("data-head", heads[k]));
+    }
+    const more = document.createElement("button");
+    more.type = "button";
+    more.className = "more";
+    more.hidden = true;
+    place.append(more);
+    let isOpen = false;
+    const fits = () => table.offsetWidth <= room.clientWidth && room.scrollWidth <= room.clientWidth;
+    const fit = () => {
+      if (room.clientWidth === 0) return;
+      table.classList.remove("cards");
+      let count = heads.length;
+      show(table, count, heads.length);
+      while (count > FEWEST && !fits()) show(table, (count -= 1), heads.length);
+      const left = heads.length - count;
+      const isNarrow = !fits() || (left > 0 && table.matches(".claims"));
+      if (isNarrow || (isOpen && left > 0)) {
+        show(table, heads.length, heads.length);
+        table.classList.add("cards");
+      }
+      more.hidden = left === 0 || isNarrow;
+      more.textContent = isOpen ? "Fewer columns" : `${left} more column${left > 1 ? "s" : ""}: ${heads.slice(count).join(", ")}`;
+      more.setAttribute("aria-expanded", String(isOpen));
+    };
+    more.addEventListener("click", () => {
+      isOpen = !isOpen;
+      fit();
+    });
+    let before = -1;
+    new ResizeObserver(() => {
+      if (room.clientWidth !== before) {
+        before = room.clientWidth;
+        fit();
+      }
+    }).observe(room);
+    fit();
+  }
+
+  // A link to something folded opens it.
+  function open() {
+    const named = document.getElementById(decodeURIComponent(location.hash.slice(1)));
+    if (named?.matches("details")) named.open = true;
+  }
+
   document.querySelectorAll("table.sortable").forEach(sortable);
+  document.querySelectorAll(".wide").forEach(fitted);
+  window.addEventListener("hashchange", open);
+  open();
+  // Paper has room for all columns.
+  window.addEventListener("beforeprint", () => {
+    document.querySelectorAll(".wide table").forEach((table) => {
+      table.classList.remove("cards");
+      delete table.dataset.shown;
+    });
+  });
 })();

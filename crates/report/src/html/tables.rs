@@ -6,12 +6,24 @@ use sidestep_document::Table;
 use sidestep_document::claim::{self, Claim, Verdict};
 use sidestep_document::document::Text;
 
-/// Returns a table that can be sorted by a click on a heading, and scrolls if it is wide.
+/// Returns a table that can be sorted by a click on a heading. What has no room waits behind a button; a
+/// folded table is shown by a click on its title.
 pub(super) fn table(table: &Table, id: &str) -> Markup {
+    let note = html! {
+        @if !table.note.is_empty() { p .note { (text(&Text::marked(&table.note))) } }
+    };
     html! {
-        div .table id=(id) {
-            (scrolled(&table.title, grid(table, Some(&table.title))))
-            @if !table.note.is_empty() { p .note { (text(&Text::marked(&table.note))) } }
+        @if table.is_folded {
+            details .table id=(id) {
+                summary { (table.title) }
+                (wide(&table.title, grid(table, None)))
+                (note)
+            }
+        } @else {
+            div .table id=(id) {
+                (wide(&table.title, grid(table, Some(&table.title))))
+                (note)
+            }
         }
     }
 }
@@ -63,9 +75,10 @@ fn kept(cell: &str) -> String {
     if cell.contains('[') { cell.replace(", ", ",\u{a0}") } else { cell.into() }
 }
 
-/// Returns a scrolling block that has a name and can be reached by keyboard.
-fn scrolled(name: &str, inside: Markup) -> Markup {
-    html! { div .scrolled role="region" tabindex="0" aria-label=(name) { (inside) } }
+/// Returns the place of a table: the page's script takes the last columns away where they have no room,
+/// and offers them. Without scripts it scrolls, and so it has a name and can be reached by keyboard.
+pub(super) fn wide(name: &str, inside: Markup) -> Markup {
+    html! { div .wide { div .scrolled role="region" tabindex="0" aria-label=(name) { (inside) } } }
 }
 
 /// Whether every cell that is not empty starts like a number.
@@ -119,7 +132,7 @@ pub(super) fn claims(claims: &[Claim]) -> Markup {
                 (badge(verdict)) " " strong { (claim::count(claims, verdict)) } " "
             }
         }
-        (scrolled("Claims", table))
+        (wide("Claims", table))
         p .note { (text(&Text::marked(claim::NOTE))) }
     }
 }

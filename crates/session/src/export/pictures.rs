@@ -72,7 +72,8 @@ fn export_film(
     let span = job.span;
     let mut run = job.run_up_to(span.from)?;
     let usual = (span.until - span.from).div_ceil(MOST_PICTURES - 1).max(1);
-    let mut pictures = Pictures::new(run.as_ref(), job.wanted.every.unwrap_or(usual));
+    let mut pictures =
+        Pictures::new(run.as_ref(), job.wanted.every.unwrap_or(usual), span.until - span.from);
     let sinks = Sinks { film: Some(&mut pictures), ..Sinks::default() };
     job.drive(run.as_mut(), span.until, sinks)?;
     let is_confirmed = job.recorded.confirm(run.as_ref())?;

@@ -25,4 +25,13 @@ pub trait Film {
     /// # Errors
     /// When it cannot be stored.
     fn shoot(&mut self, run: &mut dyn Simulation) -> Result<(), Error>;
+
+    /// Returns the number of cycles between looks at the run by [`Film::follow`]; `None` if nothing
+    /// between frames matters.
+    fn follows_every(&self) -> Option<Cycle> {
+        None
+    }
+
+    /// Looks at the run between two frames.
+    fn follow(&mut self, _run: &mut dyn Simulation) {}
 }

@@ -4,13 +4,16 @@
 use super::Film;
 use crate::Error;
 use sidestep::kernel::Simulation;
-use sidestep::kernel::view::{Frame, Look, Scenery, Trail, Who};
+use sidestep::kernel::view::{Body, Frame, Look, Place, Scenery, Trail, Who, corner};
 use sidestep::kernel::words::grouped;
 use sidestep::kernel::{Cycle, InputError};
 use sidestep_draw::{Film as View, Still, worth_a_trail};
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Largest number of bodies in all frames; more would take too much memory.
 const MOST_BODIES: usize = 4_000_000;
+/// Number of cycles of which every place of a way is kept: sixty ways of them take some hundred megabytes.
+const MOST_CYCLES: Cycle = 50_000;
 /// Number of frames before a picture whose tracks are shown.
 const TRAIL: usize = 30;
 
@@ -20,12 +23,51 @@ pub(crate) struct Pictures {
     every: Cycle,
     frames: Vec<Frame>,
     bodies: usize,
+    /// Cycles between places of ways: one, unless a film is very long.
+    step: Cycle,
+    ways: BTreeMap<Who, Way>,
+}
+
+/// The places of a body, and its last heading in quarter turns.
+#[derive(Default)]
+struct Way {
+    places: Vec<(Cycle, Place)>,
+    heading: u32,
 }
 
 impl Pictures {
-    /// Returns an animation of a run with a frame every `every` cycles.
-    pub(crate) fn new(run: &dyn Simulation, every: Cycle) -> Self {
-        Self { scenery: run.scenery(), every, frames: Vec::new(), bodies: 0 }
+    /// Returns an animation of a run with a frame every `every` cycles, `cycles` long.
+    pub(crate) fn new(run: &dyn Simulation, every: Cycle, cycles: Cycle) -> Self {
+        let step = cycles.div_ceil(MOST_CYCLES).clamp(1, every.max(1));
+        let (scenery, frames, ways) = (run.scenery(), Vec::new(), BTreeMap::new());
+        Self { scenery, every, frames, bodies: 0, step, ways }
+    }
+
+    /// Notes where those are whose ways are shown.
+    fn note(&mut self, frame: &Frame) {
+        let whose: BTreeSet<Who> = worth_a_trail(&self.scenery, frame).into_iter().collect();
+        for body in frame.bodies.iter().filter(|body| whose.contains(&body.who())) {
+            let way = self.ways.entry(body.who()).or_default();
+            if way.places.last().is_some_and(|(cycle, _)| *cycle >= frame.cycle) {
+                continue;
+            }
+            let from = way.places.last().map(|(_, at)| (*at, way.heading));
+            let between = from.and_then(|from| slipped(&self.scenery, body, from));
+            way.places.extend(between.map(|at| (frame.cycle, at)));
+            way.places.push((frame.cycle, body.pose.at_m));
+            way.heading = quarters(&self.scenery, body);
+        }
+    }
+
+    /// Returns the way of a body that led to a frame; empty if it is not there.
+    fn trail(&self, of: Who, index: usize) -> Trail {
+        let frame = &self.frames[index];
+        let from = self.frames[index.saturating_sub(TRAIL)].cycle;
+        let is_here = frame.bodies.iter().any(|body| body.who() == of);
+        let places = self.ways.get(&of).filter(|_| is_here).map_or(&[][..], |way| &way.places);
+        let begin = places.partition_point(|(cycle, _)| *cycle < from);
+        let end = places.partition_point(|(cycle, _)| *cycle <= frame.cycle);
+        Trail { of, way: places[begin..end.max(begin)].to_vec() }
     }
 
     /// Returns the number of frames.
@@ -47,9 +89,8 @@ impl Pictures {
     /// When it cannot be drawn.
     pub(crate) fn draw(&self, view: &View, index: usize) -> Result<Still, Error> {
         let frame = &self.frames[index];
-        let frames = &self.frames[index.saturating_sub(TRAIL)..=index];
         let whose = worth_a_trail(&self.scenery, frame);
-        let trails: Vec<Trail> = whose.into_iter().map(|of| trail(of, frames)).collect();
+        let trails: Vec<Trail> = whose.into_iter().map(|of| self.trail(of, index)).collect();
         Ok(view.still(frame, &trails, &self.caption(frame))?)
     }
 
@@ -79,17 +120,40 @@ impl Film for Pictures {
             let remedy = "take fewer pictures: a larger --every, or a part with --from and --until";
             return Err(InputError::new(format!("--every {}", self.every), cause, remedy).into());
         }
+        self.note(&frame);
         self.frames.push(frame);
         Ok(())
     }
+
+    fn follows_every(&self) -> Option<Cycle> {
+        Some(self.step)
+    }
+
+    fn follow(&mut self, run: &mut dyn Simulation) {
+        let frame = run.frame(Look::BODIES);
+        self.note(&frame);
+    }
 }
 
-/// Returns the track of a body in these frames; empty if it is not in the last of them.
-fn trail(of: Who, frames: &[Frame]) -> Trail {
-    let find = |frame: &Frame| {
-        frame.bodies.iter().find(|body| body.who() == of).map(|body| body.pose.at_m)
+/// Returns the place where a body was if it went ahead before it slipped to a side; `None` for a straight
+/// way, and for bodies that do not stand on boxes.
+fn slipped(scenery: &Scenery, body: &Body, from: (Place, u32)) -> Option<Place> {
+    let plane = &scenery.floor.as_ref()?.plane;
+    let flat = |[x, y, z]: Place| {
+        let [x, y] = plane.point([x, y]);
+        [x, y, z]
     };
-    let is_here = frames.last().is_some_and(|frame| find(frame).is_some());
-    let frames = frames.iter().filter(|_| is_here);
-    Trail { of, way: frames.filter_map(|frame| Some((frame.cycle, find(frame)?))).collect() }
+    let (was, is) = (flat(from.0), flat(body.pose.at_m));
+    let moved = |k: usize| (was[k] - is[k]).abs() > 1e-9;
+    let [x, y, z] = corner(was, from.1, is);
+    let [x, y] = plane.place([x, y]);
+    (moved(0) && moved(1)).then_some([x, y, z])
+}
+
+/// Returns the heading of a body in quarter turns from the floor's first axis.
+fn quarters(scenery: &Scenery, body: &Body) -> u32 {
+    let Some(floor) = &scenery.floor else { return 0 };
+    let [x, y, _] = body.pose.turned([1.0, 0.0, 0.0]);
+    let ([x0, y0], [x1, y1]) = (floor.plane.point([0.0; 2]), floor.plane.point([x, y]));
+    u32::from((y1 - y0).abs() > (x1 - x0).abs())
 }

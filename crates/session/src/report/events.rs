@@ -150,7 +150,8 @@ fn first_rows(recorded: &Recorded) -> Table {
     let columns = &recorded.schema.columns;
     let names: Vec<&str> = columns.iter().map(|c| c.name.as_str()).collect();
     let shown = recorded.rows().min(MOST_ROWS);
-    let mut table = Table::new("Events one by one", left_out(recorded.rows(), shown), &names);
+    let mut table =
+        Table::new("Events one by one", left_out(recorded.rows(), shown), &names).folded();
     for row in 0..shown {
         let cells = columns.iter().zip(&recorded.columns);
         table.row(cells.map(|(column, values)| cell(column, values, row)));

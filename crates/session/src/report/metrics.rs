@@ -2,6 +2,8 @@
 
 use super::words::count;
 use serde_json::{Map, Value};
+use sidestep::kernel::ports::table::split_unit;
+use sidestep::scenario::{Meaning, Told, told};
 use sidestep_document::Table;
 
 /// Largest number of rows; the number of rows left out is shown.
@@ -9,47 +11,37 @@ const MOST_ROWS: usize = 200;
 /// Largest number of values of a list that are shown; longer lists are only counted.
 const MOST_VALUES: usize = 16;
 
-/// Endings of names that stand for a unit; longer ones first.
-const UNITS: [(&str, &str); 18] = [
-    ("_m_s", "m/s"),
-    ("_percent", "%"),
-    ("_boxes", "boxes"),
-    ("_cycles", "cycles"),
-    ("_bytes", "bytes"),
-    ("_deg", "\u{b0}"),
-    ("_rad", "rad"),
-    ("_hz", "Hz"),
-    ("_mm", "mm"),
-    ("_km", "km"),
-    ("_ms", "ms"),
-    ("_us", "us"),
-    ("_ns", "ns"),
-    ("_kn", "kn"),
-    ("_ft", "ft"),
-    ("_nm", "NM"),
-    ("_m", "m"),
-    ("_s", "s"),
-];
-
-/// Returns the unit that a name ends in, or nothing: `steps_per_cpu_s` is a number per second.
+/// Returns the unit that a name ends in, or nothing.
 pub(super) fn unit(name: &str) -> String {
-    let unit = UNITS.iter().find(|(end, _)| name.ends_with(end)).map_or("", |(_, unit)| unit);
-    let is_rate = name.contains("_per_") && !unit.is_empty();
-    if is_rate { format!("1/{unit}") } else { unit.into() }
+    split_unit(name).1.unwrap_or_default().into()
 }
 
-/// Returns a tree of values as one row for each leaf, with its path; `None` without any.
-pub(super) fn flat(title: &str, tree: &Value) -> Option<Table> {
-    let mut table = Table::new(title, "", &["metric", "value", "unit"]);
+/// Returns a tree of values as one row for each leaf, in the words of its world: first those that tell
+/// something, then, folded, those that stayed 0 or have no value.
+pub(super) fn flat(title: &str, tree: &Value, meanings: &[Meaning]) -> Vec<Table> {
+    let columns = ["metric", "value", "unit", "meaning", "name in summary.json"];
+    let note = "Counts that stayed 0, and what has no value.";
+    let mut telling = Table::new(title, "", &columns);
+    let mut silent = Table::new(format!("{title} that stayed 0"), note, &columns).folded();
     for (path, value) in leaves(tree) {
-        let unit = unit(&path);
-        table.row([path, value, unit]);
+        let Told { words, unit, meaning } = told(meanings, &path);
+        let is_silent = ["0", "-", "none", "false"].contains(&value.as_str());
+        let unit = unit.unwrap_or_default().to_string();
+        let table = if is_silent { &mut silent } else { &mut telling };
+        table.row([capital(&words), value, unit, meaning.to_string(), path]);
     }
-    (!table.rows.is_empty()).then_some(table)
+    [telling, silent].into_iter().filter(|table| !table.rows.is_empty()).collect()
+}
+
+/// Returns words with a capital, as a sentence begins.
+fn capital(words: &str) -> String {
+    let mut letters = words.chars();
+    let first = letters.next().map(|c| c.to_uppercase().to_string()).unwrap_or_default();
+    first + letters.as_str()
 }
 
 /// Returns a list of trees as one row for each of them, with a column for each of their leaves.
-pub(super) fn listed(title: &str, list: &Value) -> Option<Table> {
+pub(super) fn listed(title: &str, list: &Value, meanings: &[Meaning]) -> Option<Table> {
     let rows: Vec<Vec<(String, String)>> = list.as_array()?.iter().map(leaves).collect();
     let shown = &rows[..rows.len().min(MOST_ROWS)];
     let mut columns: Vec<&str> = Vec::new();
@@ -62,7 +54,9 @@ pub(super) fn listed(title: &str, list: &Value) -> Option<Table> {
         return None;
     }
     let note = left_out(rows.len(), shown.len());
-    let mut table = Table::new(title, note, &without_shared_head(&columns));
+    let heads: Vec<String> = columns.iter().map(|name| head(name, meanings)).collect();
+    let heads: Vec<&str> = heads.iter().map(String::as_str).collect();
+    let mut table = Table::new(title, note, &heads).folded();
     for row in shown {
         let cell = |column: &&str| row.iter().find(|(path, _)| path == column);
         table.row(columns.iter().map(|c| cell(c).map_or("-".into(), |(_, value)| value.clone())));
@@ -70,18 +64,10 @@ pub(super) fn listed(title: &str, list: &Value) -> Option<Table> {
     Some(table)
 }
 
-/// Returns paths without the first step that all longer ones share, if they stay distinct without
-/// it.
-fn without_shared_head<'a>(paths: &[&'a str]) -> Vec<&'a str> {
-    let head = |path: &&'a str| path.split_once('.').map(|(head, _)| head);
-    let mut heads: Vec<&str> = paths.iter().filter_map(head).collect();
-    heads.dedup();
-    let tail = |path: &&'a str| path.split_once('.').map_or(*path, |(_, tail)| tail);
-    let tails: Vec<&str> = paths.iter().map(tail).collect();
-    let mut apart = tails.clone();
-    apart.sort_unstable();
-    apart.dedup();
-    if heads.len() == 1 && apart.len() == paths.len() { tails } else { paths.to_vec() }
+/// Returns the head of a column: the metric in words, with its unit.
+fn head(name: &str, meanings: &[Meaning]) -> String {
+    let Told { words, unit, .. } = told(meanings, name);
+    unit.map_or_else(|| words.clone(), |unit| format!("{words} ({unit})"))
 }
 
 /// Returns how many rows are not shown, as text; empty if all are.
@@ -157,34 +143,34 @@ mod tests {
     use super::*;
     use serde_json::json;
 
+    const MEANINGS: [Meaning; 2] = [
+        Meaning { name: "gap_m", words: "least gap", unit: "", meaning: "between two" },
+        Meaning { name: "hits.*", words: "hits of a *", unit: "", meaning: "times" },
+    ];
+
     #[test]
-    fn leaves_are_named_by_their_path_and_units_follow_from_names() {
-        let tree = json!({"a": {"gap_m": 0.123456789, "n": 3}, "list": [1, 2], "none": null});
-        let table = flat("t", &tree).unwrap();
+    fn metrics_are_told_in_words_and_those_that_say_nothing_are_folded() {
+        let tree = json!({"gap_m": 0.123456789, "hits": {"wall": 3, "door": 0}, "none": null});
+        let [telling, silent] = &flat("t", &tree, &MEANINGS)[..] else { panic!("two tables") };
         let rows = [
-            ["a.gap_m", "0.123457", "m"],
-            ["a.n", "3", ""],
-            ["list", "1, 2", ""],
-            ["none", "-", ""],
+            ["Least gap", "0.123457", "m", "between two", "gap_m"],
+            ["Hits of a wall", "3", "", "times", "hits.wall"],
         ];
-        assert_eq!(table.rows, rows.map(|row| row.map(String::from).to_vec()));
-        let names =
-            ["speed_m_s", "min_separation_m", "losses", "steps_per_cpu_s", "contacts_per_action"];
-        assert_eq!(names.map(unit), ["m/s", "m", "", "1/s", ""]);
-        assert_eq!(flat("t", &Value::Null), None);
+        assert_eq!(telling.rows, rows.map(|row| row.map(String::from).to_vec()));
+        let names: Vec<&str> = silent.rows.iter().map(|row| row[4].as_str()).collect();
+        assert_eq!((names, silent.is_folded), (vec!["hits.door", "none"], true));
+        assert!(flat("t", &Value::Null, &MEANINGS).is_empty());
     }
 
     #[test]
     fn rows_that_differ_share_their_columns_and_what_is_left_out_is_told() {
-        let table = listed("t", &json!([{"a": 1}, {"a": 2, "b": {"c": true}}])).unwrap();
-        assert_eq!(table.columns, ["a", "c"]);
+        let list = json!([{"a": 1}, {"a": 2, "b": {"gap_m": true}}]);
+        let table = listed("t", &list, &MEANINGS).unwrap();
+        assert_eq!(table.columns, ["a", "least gap (m)"]);
         assert_eq!(table.rows, [["1", "-"], ["2", "true"]]);
-        assert_eq!(without_shared_head(&["id", "n.a", "n.b.c"]), ["id", "a", "b.c"]);
-        assert_eq!(without_shared_head(&["a", "n.a"]), ["a", "n.a"]);
-        assert_eq!(without_shared_head(&["m.a", "n.b"]), ["m.a", "n.b"]);
-        let many = listed("t", &json!(vec![json!({"a": 1}); 250])).unwrap();
+        let many = listed("t", &json!(vec![json!({"a": 1}); 250]), &[]).unwrap();
         assert_eq!((many.rows.len(), many.note.contains("50 are left out")), (MOST_ROWS, true));
-        assert_eq!(listed("t", &json!([])), None);
+        assert_eq!(listed("t", &json!([]), &[]), None);
     }
 
     #[test]

@@ -29,6 +29,6 @@ pub use words::duration;
 pub fn document(worlds: Worlds, folder: &Path, watcher: &dyn Watcher) -> Result<Document, Error> {
     match Folder::is_at(folder) {
         true => sweep::document(worlds, &Folder::open(folder)?, watcher),
-        false => Ok(run::document(folder)?),
+        false => Ok(run::document(worlds, folder)?),
     }
 }

@@ -36,7 +36,7 @@ pub(super) fn names(folder: &Path) -> Result<Vec<String>, InputError> {
 pub(super) fn tell(document: &mut Document, folder: &Path) -> Result<(), InputError> {
     let note = "Parquet files below the run folder, one folder a table.";
     let columns = ["table", "column", "type", "unit", "meaning"];
-    let mut table = Table::new("Columns", note, &columns);
+    let mut table = Table::new("Columns", note, &columns).folded();
     for name in names(folder)? {
         // The first rows are enough for the schema; the whole table may be large.
         let first = read_table(folder, &name, ..1).or_else(|_| read_table(folder, &name, ..))?;

@@ -6,6 +6,7 @@ use super::{events, metrics, recorded};
 use crate::stored_summary;
 use serde_json::Value;
 use sidestep::kernel::InputError;
+use sidestep::scenario::{Meaning, Worlds};
 use sidestep_document::Document;
 use sidestep_document::document::{Block, Code, Picture, Text};
 use sidestep_record::{Manifest, RunView, Status};
@@ -19,7 +20,7 @@ const ONE_RUN: &str = "**One run, n = 1**: these numbers have no interval, and s
 ///
 /// # Errors
 /// When it is no run folder, or something in it is damaged.
-pub(super) fn document(folder: &Path) -> Result<Document, InputError> {
+pub(super) fn document(worlds: Worlds, folder: &Path) -> Result<Document, InputError> {
     let view = RunView::open(folder)?;
     let summary = stored_summary(folder)?;
     let name = name(&view, summary.as_ref());
@@ -27,22 +28,23 @@ pub(super) fn document(folder: &Path) -> Result<Document, InputError> {
     if let Some(warning) = unfinished(&view) {
         document.warning(warning);
     }
+    if let Some(picture) = picture(folder)? {
+        document.section("Where everybody went").pictures([picture]);
+    }
+    if let Some(summary) = &summary {
+        let meanings = worlds.named(&view.manifest.world).map_or(&[][..], |kind| kind.meanings());
+        tell_metrics(&mut document, &view.manifest, summary, meanings);
+    }
+    for table in recorded::names(folder)? {
+        events::tell(&mut document, folder, &table)?;
+    }
     document.section("What was run").push(Block::Facts(facts(&view, summary.as_ref())));
+    document.commands("How to run it again", again(&view));
     document.push(Block::Code(Code {
         title: "The scenario, complete in itself (scenario.toml)".into(),
         language: "toml",
         text: view.scenario.clone(),
     }));
-    document.commands("How to run it again", again(&view));
-    if let Some(summary) = &summary {
-        tell_metrics(&mut document, &view.manifest, summary);
-    }
-    if let Some(picture) = picture(folder)? {
-        document.section("Where everybody went").pictures([picture]);
-    }
-    for table in recorded::names(folder)? {
-        events::tell(&mut document, folder, &table)?;
-    }
     recorded::tell(&mut document, folder)?;
     Ok(document)
 }
@@ -131,14 +133,19 @@ pub(super) fn quoted(path: &str) -> String {
     format!("'{}'", path.replace('\'', "'\\''"))
 }
 
-fn tell_metrics(document: &mut Document, manifest: &Manifest, summary: &Value) {
+fn tell_metrics(
+    document: &mut Document,
+    manifest: &Manifest,
+    summary: &Value,
+    meanings: &[Meaning],
+) {
     let cycles = summary.get("cycles").and_then(Value::as_u64).unwrap_or(manifest.cycles_done);
     let of = format!(" After {} cycles.", count(cycles));
     document.section("Results").paragraph(Text::marked(&format!("{ONE_RUN}{of}")));
     let get = |key| summary.get(key).unwrap_or(&Value::Null);
-    document.tables(metrics::flat("Metrics", get("metrics")));
-    document.tables(metrics::listed("Metrics of every agent", get("per_agent")));
-    document.tables(metrics::listed("Metrics of pairs of agents", get("per_pair")));
+    document.tables(metrics::flat("Metrics", get("metrics"), meanings));
+    document.tables(metrics::listed("Metrics of every agent", get("per_agent"), meanings));
+    document.tables(metrics::listed("Metrics of pairs of agents", get("per_pair"), meanings));
 }
 
 /// Returns the picture in the run folder.

@@ -34,15 +34,6 @@ pub(super) fn document(
     if !is_complete {
         document.warning(unfinished(folder, &table));
     }
-    document.section("What was run").push(Block::Facts(facts(folder, &table)));
-    document.tables(variants(plan, &table));
-    document.tables(why_enough(plan, &table));
-    document.commands("How to run it again", again(folder));
-    let scenario = std::fs::read_to_string(folder.scenario(0));
-    if let Ok(text) = scenario {
-        let title = format!("The scenario of the first variant: {}", plan.names()[0]);
-        document.push(Block::Code(Code { title, language: "toml", text }));
-    }
     tell_results(&mut document, &summary);
     tell_failures(&mut document, plan, &table);
     let pictures = pictures(worlds, folder, &table, watcher)?;
@@ -51,6 +42,8 @@ pub(super) fn document(
         let text = "The run of the first seed, of the first variants.";
         document.paragraph(text).pictures(pictures);
     }
+    tell_methods(&mut document, &summary);
+    tell_plan(&mut document, folder, &table);
     Ok(document)
 }
 
@@ -163,19 +156,44 @@ fn again(folder: &Folder) -> String {
     )
 }
 
-/// Appends every metric in a section of its own: its figures, then its tables.
+/// Appends one table of everything, then every metric in a section of its own: its figures, and its tables
+/// folded.
 fn tell_results(document: &mut Document, summary: &Summary) {
+    document.section("Results").tables([summary.overview()]);
+    summary.notes.iter().for_each(|note| {
+        document.paragraph(note.as_str());
+    });
     for section in summary.sections() {
-        document.section(section.title).figures(section.figures).tables(section.tables);
-    }
-    let notes: Vec<&str> = summary.notes.iter().map(String::as_str).collect();
-    if !notes.is_empty() {
-        document.section("Notes");
-        notes.into_iter().for_each(|note| {
-            document.paragraph(note);
+        document.section(section.title);
+        let name = Text::code(section.name);
+        document.paragraph(match section.meaning {
+            "" => name.and("."),
+            meaning => name.and(format!(": {meaning}.")),
         });
+        document.figures(section.figures).tables(section.tables);
     }
-    document.tables(summary.left_out());
+}
+
+/// Appends what all tables have in common, and the metrics that are not shown.
+fn tell_methods(document: &mut Document, summary: &Summary) {
+    document.section("How the numbers were made");
+    summary.footnotes().into_iter().for_each(|note| {
+        document.paragraph(Text::marked(note));
+    });
+    document.tables(summary.left_out().map(Table::folded));
+}
+
+/// Appends what was run, and how to run it again.
+fn tell_plan(document: &mut Document, folder: &Folder, table: &RunTable) {
+    let plan = folder.plan();
+    document.section("What was run").push(Block::Facts(facts(folder, table)));
+    document.tables(variants(plan, table).map(Table::folded));
+    document.tables(why_enough(plan, table).map(Table::folded));
+    document.commands("How to run it again", again(folder));
+    if let Ok(text) = std::fs::read_to_string(folder.scenario(0)) {
+        let title = format!("The scenario of the first variant: {}", plan.names()[0]);
+        document.push(Block::Code(Code { title, language: "toml", text }));
+    }
 }
 
 fn tell_failures(document: &mut Document, plan: &Plan, table: &RunTable) {

@@ -19,6 +19,8 @@ type Place = Point<2, FromTo<-1_000_000_000, 1_000_000_000>>;
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct AirplaneSection {
+    #[serde(default)]
+    pub(super) name: String,
     pub(super) at_m: Option<Place>,
     pub(super) heading_deg: Option<Value>,
     way_points_m: Option<Vec<Place>>,

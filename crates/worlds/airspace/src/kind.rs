@@ -4,7 +4,7 @@ use super::scenario::Compiled;
 use super::{AirspaceWorld, bundle, foreign, words};
 use sidestep_kernel::words::Said;
 use sidestep_kernel::{InputError, Plan, Simulation, World};
-use sidestep_scenario::{Compiled as AnyCompiled, Foreign, Kind, Resolved, Source};
+use sidestep_scenario::{Compiled as AnyCompiled, Foreign, Kind, Meaning, Resolved, Source};
 use std::any::Any;
 use std::path::Path;
 
@@ -27,6 +27,10 @@ impl Kind for Airspace {
 
     fn default_scenario(&self) -> &'static str {
         include_str!("default.toml")
+    }
+
+    fn meanings(&self) -> &'static [Meaning] {
+        super::meanings::MEANINGS
     }
 
     fn translate(&self, file: &Path) -> Result<Option<Foreign>, InputError> {

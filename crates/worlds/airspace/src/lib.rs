@@ -27,6 +27,7 @@ mod generate;
 mod intruder;
 mod join;
 mod kind;
+mod meanings;
 mod memory;
 pub mod metrics;
 pub mod objective;

@@ -193,9 +193,10 @@ fn write_aircraft(text: &mut String, aircraft: &ScnAircraft, plane: &LocalPlane)
     // Writing to a string cannot fail.
     let _ = write!(
         text,
-        "\n[[airplanes]]\nat_m = {at_m:?}\nheading_deg = {heading_deg:?}\n\
+        "\n[[airplanes]]\nname = {}\nat_m = {at_m:?}\nheading_deg = {heading_deg:?}\n\
          way_points_m = {way_points_m:?}\naltitude_m = {altitude_m:?}\n\
-         appears_s = {appears_s:?}\nv_m_s = {v_m_s:?}\nomega_max_deg_s = {omega_deg_s:?}\n"
+         appears_s = {appears_s:?}\nv_m_s = {v_m_s:?}\nomega_max_deg_s = {omega_deg_s:?}\n",
+        quoted(&aircraft.id)
     );
     if orders.is_empty() {
         return;
@@ -300,12 +301,14 @@ fn write_track(text: &mut String, track: &Track, plane: &LocalPlane, begins_s: f
     let speed_kt =
         track.samples.iter().map(|s| s.ground_speed_kt).sum::<f64>() / track.samples.len() as f64;
     let omega_deg_s = banked_deg_s((speed_kt * KNOT_M_S).max(1.0));
-    let label = format!("{} {}", track.icao24, track.callsign);
+    let callsign = track.callsign.trim();
+    let name = if callsign.is_empty() { track.icao24.trim() } else { callsign };
     // Writing to a string cannot fail. A name with a line end would end the comment.
     let _ = write!(
         text,
-        "\n[[airplanes]] # {}\nomega_max_deg_s = {omega_deg_s:?}\ntrack = [\n",
-        label.trim().escape_debug()
+        "\n[[airplanes]] # {}\nname = {}\nomega_max_deg_s = {omega_deg_s:?}\ntrack = [\n",
+        track.icao24.trim().escape_debug(),
+        quoted(name)
     );
     for sample in &track.samples {
         let [x, y] = plane.to_plane_m(sample.position);
@@ -313,6 +316,12 @@ fn write_track(text: &mut String, track: &Track, plane: &LocalPlane, begins_s: f
         let _ = writeln!(text, "  [{t_s:?}, {x:?}, {y:?}, {altitude_m:?}],");
     }
     text.push_str("]\n");
+}
+
+/// Returns a name as a TOML string, without what such a string may not hold.
+fn quoted(name: &str) -> String {
+    let plain: String = name.chars().filter(|c| !c.is_control() && !"\"\\".contains(*c)).collect();
+    format!("\"{plain}\"")
 }
 
 fn banked_deg_s(v_m_s: f64) -> f64 {

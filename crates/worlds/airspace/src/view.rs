@@ -39,8 +39,14 @@ pub(super) fn scenery(world: &AirspaceWorld, name: &str) -> Scenery {
         cycle_s: world.timing.dt_s,
         floor: None,
         bodies: starts.chain((0..).zip(&world.airplanes).filter_map(goal)).collect(),
-        names: Vec::new(),
+        names: names(world),
     }
+}
+
+/// Returns the names of those airplanes that have one.
+fn names(world: &AirspaceWorld) -> Vec<(Kind, u32, String)> {
+    let named = (0..).zip(&world.airplanes).filter(|(_, airplane)| !airplane.name.is_empty());
+    named.map(|(id, airplane)| (Kind::Airplane, id, airplane.name.clone())).collect()
 }
 
 /// Returns how recorded poses give the places of airplanes.

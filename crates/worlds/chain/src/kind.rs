@@ -4,7 +4,7 @@ use super::scenario::{AnyCompiled as EitherCompiled, Compiled};
 use super::{bundle, remarks, words, world::ChainWorld};
 use sidestep_kernel::words::Said;
 use sidestep_kernel::{InputError, Plan, Simulation, World};
-use sidestep_scenario::{Compiled as AnyCompiled, Kind, Remark, Resolved, Source};
+use sidestep_scenario::{Compiled as AnyCompiled, Kind, Meaning, Remark, Resolved, Source};
 use std::any::Any;
 
 /// Chains of connectors and rods, in the plane or in space.
@@ -26,6 +26,10 @@ impl Kind for Chains {
 
     fn default_scenario(&self) -> &'static str {
         include_str!("default.toml")
+    }
+
+    fn meanings(&self) -> &'static [Meaning] {
+        super::meanings::MEANINGS
     }
 
     fn compile(&self, source: &Source) -> Result<Box<dyn AnyCompiled>, InputError> {

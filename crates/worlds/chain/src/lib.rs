@@ -27,6 +27,7 @@ mod formation;
 pub mod ground;
 mod join;
 mod kind;
+mod meanings;
 pub mod metrics;
 mod motion;
 mod navigate;

@@ -137,11 +137,13 @@ fn push_chain<const D: usize>(
         let line = Shape::Line { points_m, thickness_m: 2.0 * radius_m };
         bodies.push(Body::new(Kind::Rods, id, Pose::at([0.0; 3]), line).part(part));
     }
-    let connectors = (0..).zip(chain.connectors()).zip(&points_m);
+    let leader = leader(spec, body);
+    let connectors = (0_u32..).zip(chain.connectors()).zip(&points_m);
     bodies.extend(connectors.map(|((part, connector), at_m)| {
         let radius_m = if connector.radius_m > 0.0 { connector.radius_m } else { least_m };
         Body::new(Kind::Connector, id, Pose::at(*at_m), Shape::Sphere { radius_m })
             .part(part)
+            .when(leader == Some(part as usize), Condition::Leading)
             .when(connector.failed, Condition::Failed)
     }));
     bodies.extend((0..).zip(&body.robots).map(|(part, robot)| {
@@ -150,6 +152,12 @@ fn push_chain<const D: usize>(
         let disc = Shape::Cylinder { radius_m: body.robot_radius_m, height_m: HEIGHT_M };
         Body::new(Kind::Robot, id, pose, disc).part(part).when(robot.is_bumped, Condition::Touching)
     }));
+}
+
+/// Returns the connector that the present task moves, or moved if all are done; none where nobody leads.
+fn leader<const D: usize>(spec: &ChainSpec<D>, body: &ChainBody<D>) -> Option<usize> {
+    let present = spec.tasks.get(body.driving.task as usize).or(spec.tasks.last())?;
+    (!matches!(present.driver, Driver::Rest)).then_some(present.agent)
 }
 
 /// Returns runs of connectors that are joined, because a broken chain has rods that hold nothing.

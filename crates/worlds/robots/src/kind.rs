@@ -4,7 +4,7 @@ use super::scenario::{Behaviours, Compiled, StorageOrder};
 use super::{RobotsWorld, bundle, remarks, words};
 use sidestep_kernel::words::Said;
 use sidestep_kernel::{InputError, Plan, Simulation, World};
-use sidestep_scenario::{Compiled as AnyCompiled, Kind, Remark, Resolved, Source};
+use sidestep_scenario::{Compiled as AnyCompiled, Kind, Meaning, Remark, Resolved, Source};
 use std::any::Any;
 
 /// Situated agents on a grid.
@@ -46,6 +46,10 @@ impl Kind for Robots {
 
     fn default_scenario(&self) -> &'static str {
         include_str!("default.toml")
+    }
+
+    fn meanings(&self) -> &'static [Meaning] {
+        super::meanings::MEANINGS
     }
 
     fn compile(&self, source: &Source) -> Result<Box<dyn AnyCompiled>, InputError> {

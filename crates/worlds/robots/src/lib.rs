@@ -23,6 +23,7 @@ mod join;
 mod kind;
 mod law;
 pub mod learn;
+mod meanings;
 pub mod metrics;
 mod odometry;
 mod perceive;

@@ -3,7 +3,8 @@
 //! A numeric parameter gives lines, one for each combination of the other parameters; if there are
 //! more than [`SERIES`] of these, numeric parameters among them are averaged over, then also
 //! parameters of words. A parameter of words gives bars. Averages are only taken in full grids. If
-//! no line would have two points, as in a Latin hypercube, the variants are points. Without
+//! variants are samples of a box, as in a Latin hypercube, they are points: in the box itself, if it
+//! has two sides, and over each side. Without
 //! parameters the variants are bars, and a single variant is shown by its distribution over runs.
 
 use super::Label;
@@ -19,10 +20,16 @@ use std::collections::BTreeMap;
 /// Largest number of series in a figure: more cannot be distinguished.
 const SERIES: usize = 8;
 
+/// Names of the thirds of a sample, from its least values on.
+const THIRDS: [&str; 3] = ["lower", "middle", "upper"];
+
 /// Largest number of steps of a distribution.
 const STEPS: usize = 200;
 
 pub(super) fn figures(groups: &Groups<'_>, metric: &RunColumn) -> Vec<Figure> {
+    if is_scattered(groups) {
+        return samples(groups, metric);
+    }
     let over = |p| over_parameter(groups, metric, p);
     let over: Vec<Figure> = (0..groups.parameters.len()).filter_map(over).collect();
     match (groups.parameters.len(), groups.variants.len()) {
@@ -33,12 +40,21 @@ pub(super) fn figures(groups: &Groups<'_>, metric: &RunColumn) -> Vec<Figure> {
     }
 }
 
-/// Whether variants share so few values that no two of them lie on a line.
+/// Whether variants are samples of a box of parameters: no two of them lie on a line, or there are many
+/// and some number is another in each of them, as in a Latin hypercube whose other sides are whole
+/// numbers.
 pub(super) fn is_scattered(groups: &Groups<'_>) -> bool {
-    let numeric: Vec<usize> =
-        (0..groups.parameters.len()).filter(|p| groups.parameters[*p].numeric).collect();
+    let numeric = numeric(groups);
+    let variants = groups.variants.len();
     let alone = |p: &usize| grouped(groups, &others(groups, *p)).values().all(|g| g.len() < 2);
-    numeric.len() > 1 && numeric.iter().all(alone)
+    let is_own = |p: &usize| groups.parameters[*p].levels.len() == variants;
+    let is_sampled = variants > SERIES && numeric.iter().any(is_own);
+    numeric.len() > 1 && (is_sampled || numeric.iter().all(alone))
+}
+
+/// Returns the parameters that are numbers.
+pub(super) fn numeric(groups: &Groups<'_>) -> Vec<usize> {
+    (0..groups.parameters.len()).filter(|p| groups.parameters[*p].numeric).collect()
 }
 
 fn others(groups: &Groups<'_>, parameter: usize) -> Vec<usize> {
@@ -97,14 +113,13 @@ fn over_parameter(groups: &Groups<'_>, metric: &RunColumn, parameter: usize) -> 
     };
     let averaged = apart.len() + 1 < groups.parameters.len();
     let over = Label::of(&axis.name);
-    let title = format!(
-        "{} over {}{} (means with 95 % intervals, {})",
-        sentence(&Label { unit: None, ..Label::of(&metric.name) }),
-        over.text,
-        if averaged { ", mean over other parameters" } else { "" },
-        runs(groups),
-    );
-    Some(figure(title, over.to_string(), metric, kind, series.collect()))
+    let title = format!("{} over {}", sentence(&groups.label(metric)), over.text);
+    let note = match averaged {
+        true => format!("{} Means over the other parameters, too.", means(groups)),
+        false => means(groups),
+    };
+    let figure = figure(groups, metric, title, over.to_string());
+    Some(Figure { note, kind, series: series.collect(), ..figure })
 }
 
 /// Returns the position of a level on the axis.
@@ -124,26 +139,66 @@ fn scatter(groups: &Groups<'_>, metric: &RunColumn, parameter: usize) -> Figure 
     };
     let points = (0..groups.variants.len()).filter_map(point).collect();
     let over = Label::of(&axis.name);
-    let title = format!(
-        "{} over {}, one point a variant (means with 95 % intervals, {})",
-        sentence(&Label { unit: None, ..Label::of(&metric.name) }),
-        over.text,
-        runs(groups),
-    );
+    let title = format!("{} over {}", sentence(&groups.label(metric)), over.text);
+    let note = format!("A point is a variant. {}", means(groups));
     let series = vec![Series { name: String::new(), points }];
-    figure(title, over.to_string(), metric, FigureKind::Points, series)
+    let figure = figure(groups, metric, title, over.to_string());
+    Figure { note, kind: FigureKind::Points, series, ..figure }
+}
+
+/// Returns samples of a box of parameters as figures: the box itself, if it has two sides, and the metric
+/// over each side.
+fn samples(groups: &Groups<'_>, metric: &RunColumn) -> Vec<Figure> {
+    let sides = numeric(groups);
+    let over = sides.iter().map(|p| scatter(groups, metric, *p));
+    let plane = match sides[..] {
+        [across, upward] => plane(groups, metric, [across, upward]),
+        _ => None,
+    };
+    plane.into_iter().chain(over).collect()
+}
+
+/// Returns the samples where they are in a box of two sides: thirds of the metric are series of their
+/// own.
+fn plane(groups: &Groups<'_>, metric: &RunColumn, sides: [usize; 2]) -> Option<Figure> {
+    let value = |v: usize| Some((groups.mean_over(metric, &[v]).mean?, v));
+    let mut values: Vec<(f64, usize)> = (0..groups.variants.len()).filter_map(value).collect();
+    values.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let third = values.len().div_ceil(THIRDS.len()).max(1);
+    let at = |v: usize, p: usize| place(groups, p, groups.parameters[p].of_variant[v]);
+    let point = |&(_, v): &(f64, usize)| Point::new(at(v, sides[0]), at(v, sides[1]));
+    let series = values.chunks(third).zip(THIRDS).map(|(part, words)| {
+        let (low, high) = (part[0].0, part[part.len() - 1].0);
+        let name = format!("{words} third: {} to {}", brief(low), brief(high));
+        Series { name, points: part.iter().map(point).collect() }
+    });
+    let series: Vec<Series> = series.collect();
+    let [across, upward] = sides.map(|p| Label::of(&groups.parameters[p].name));
+    (series.len() == THIRDS.len()).then(|| Figure {
+        title: format!("{} where the samples are", sentence(&groups.label(metric))),
+        note: "A point is a variant; its mark says in which third of all variants its mean is."
+            .into(),
+        x_label: across.to_string(),
+        y_label: upward.to_string(),
+        kind: FigureKind::Points,
+        series,
+        ..Figure::default()
+    })
+}
+
+/// Returns a number with three digits.
+fn brief(value: f64) -> String {
+    let rounded: f64 = format!("{value:.2e}").parse().unwrap_or(value);
+    rounded.to_string()
 }
 
 fn of_variants(groups: &Groups<'_>, metric: &RunColumn) -> Figure {
     let point = |variant: usize| groups.mean_over(metric, &[variant]).point(variant as f64);
     let points = (0..groups.variants.len()).filter_map(point).collect();
-    let title = format!(
-        "{} (means with 95 % intervals, {})",
-        sentence(&Label { unit: None, ..Label::of(&metric.name) }),
-        runs(groups),
-    );
+    let figure = figure(groups, metric, sentence(&groups.label(metric)), "variant".into());
     let kind = FigureKind::Bars { categories: groups.variants.clone() };
-    figure(title, "variant".into(), metric, kind, vec![Series { name: String::new(), points }])
+    let series = vec![Series { name: String::new(), points }];
+    Figure { note: means(groups), kind, series, ..figure }
 }
 
 /// Returns the share of runs up to each value, with Wilson's intervals; `None` for a share of runs.
@@ -161,31 +216,29 @@ fn distribution(groups: &Groups<'_>, metric: &RunColumn) -> Option<Figure> {
             .with_interval(Some((interval.low, interval.high)))
             .of_runs(n)
     };
-    let title = format!(
-        "Distribution of {} over runs (95 % intervals, n = {n})",
-        Label { unit: None, ..Label::of(&metric.name) }
-    );
+    let label = groups.label(metric);
     let points = (0..steps).map(point).collect();
     Some(Figure {
-        title,
-        x_label: Label::of(&metric.name).to_string(),
+        title: format!("Distribution of {label} over runs"),
+        note: format!("95 % intervals, n = {n}."),
+        x_label: label.to_string(),
         y_label: "share of runs up to it".into(),
         series: vec![Series { name: String::new(), points }],
         ..Figure::default()
     })
 }
 
-fn figure(
-    title: String,
-    x_label: String,
-    metric: &RunColumn,
-    kind: FigureKind,
-    series: Vec<Series>,
-) -> Figure {
+/// Returns a figure of a metric without its points.
+fn figure(groups: &Groups<'_>, metric: &RunColumn, title: String, x_label: String) -> Figure {
     let share = matches!(metric.values, Values::Bool(_));
-    let label = Label::of(&metric.name);
+    let label = groups.label(metric);
     let y_label = if share { format!("{label}: share of runs") } else { label.to_string() };
-    Figure { title, x_label, y_label, kind, series, ..Figure::default() }
+    Figure { title, x_label, y_label, ..Figure::default() }
+}
+
+/// Returns the note on means.
+fn means(groups: &Groups<'_>) -> String {
+    format!("Means with 95 % intervals, {}.", runs(groups))
 }
 
 /// Returns the number of runs of the variants as text.
@@ -194,7 +247,7 @@ fn runs(groups: &Groups<'_>) -> String {
     let all = 0..groups.variants.len();
     let (least, most) = (all.clone().map(of).min().unwrap_or(0), all.map(of).max().unwrap_or(0));
     if least == most {
-        format!("{most} runs a variant")
+        format!("{most} run{} a variant", if most == 1 { "" } else { "s" })
     } else {
         format!("{least} to {most} runs a variant")
     }

@@ -1,12 +1,17 @@
 //! Runs by variant and replicate.
 
+use super::Label;
 use super::table::{Role, RunColumn, RunTable};
+use crate::scenario::{Meaning, told};
 use crate::statistics::{Sample, wilson};
 use serde::Serialize;
 use sidestep_document::Estimate;
 use sidestep_kernel::InputError;
 use sidestep_kernel::ports::Values;
 use std::collections::{BTreeMap, BTreeSet};
+
+/// Most characters of a value in the name of a level that stands for several parameters.
+const LONGEST_NAME: usize = 40;
 
 /// A value of a parameter.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -52,13 +57,18 @@ pub(super) struct Groups<'a> {
     /// Whether equal replicates of two variants are related by a common seed.
     pub(super) paired: bool,
     pub(super) parameters: Vec<Parameter>,
+    /// The metrics in words.
+    meanings: &'static [Meaning],
     /// The run of each variant and replicate.
     run: BTreeMap<(usize, i64), usize>,
 }
 
 impl<'a> Groups<'a> {
-    /// Groups the runs of `table`.
-    pub(super) fn of(table: &'a RunTable) -> Result<Self, InputError> {
+    /// Groups the runs of `table`; `meanings` are its metrics in words.
+    pub(super) fn of(
+        table: &'a RunTable,
+        meanings: &'static [Meaning],
+    ) -> Result<Self, InputError> {
         table.check()?;
         let runs = ordered(table);
         let label = |run: usize| variant_name(table, run);
@@ -87,7 +97,17 @@ impl<'a> Groups<'a> {
         let parameters = parameters(table, &run_of, variants.len());
         let paired = replicate.is_some();
         let replicates = replicates.into_iter().collect();
-        Ok(Self { table, variants, replicates, paired, parameters, run: run_of })
+        Ok(Self { table, variants, replicates, paired, parameters, meanings, run: run_of })
+    }
+
+    /// Returns the label of a metric.
+    pub(super) fn label(&self, metric: &RunColumn) -> Label {
+        Label::of_metric(&metric.name, self.meanings)
+    }
+
+    /// Returns what a metric counts or measures; empty where its world does not say.
+    pub(super) fn meaning(&self, metric: &RunColumn) -> &'static str {
+        told(self.meanings, &metric.name).meaning
     }
 
     /// Returns the number of runs of a variant.
@@ -228,5 +248,46 @@ fn parameters(
         let name = column.name.clone();
         (levels.len() > 1).then_some(Parameter { name, numeric, levels, of_variant })
     };
-    table.of_role(Role::Parameter).filter_map(varied).collect()
+    together(table.of_role(Role::Parameter).filter_map(varied))
+}
+
+/// Returns the parameters, of which those that always change together are one: their variants are the
+/// same, and share an axis. Numbers stay apart, because each is an axis of its own.
+fn together(parameters: impl Iterator<Item = Parameter>) -> Vec<Parameter> {
+    let mut apart: Vec<Parameter> = Vec::new();
+    for parameter in parameters {
+        match apart.iter_mut().find(|other| other.goes_with(&parameter)) {
+            Some(other) => other.absorb(&parameter),
+            None => apart.push(parameter),
+        }
+    }
+    apart
+}
+
+impl Parameter {
+    /// Whether two parameters, not both of them numbers, tell the same variants apart.
+    fn goes_with(&self, other: &Self) -> bool {
+        let mut pairs: Vec<_> = self.of_variant.iter().zip(&other.of_variant).collect();
+        pairs.sort_unstable();
+        pairs.dedup();
+        let is_one_to_one =
+            self.levels.len() == other.levels.len() && pairs.len() == self.levels.len();
+        is_one_to_one && !(self.numeric && other.numeric)
+    }
+
+    /// Adds the values of a parameter that changes together with this one.
+    fn absorb(&mut self, other: &Self) {
+        let level = |l: usize| {
+            let own = self.levels[l].name();
+            let variant = self.of_variant.iter().position(|of| *of == l);
+            let others =
+                variant.map_or(String::new(), |v| other.levels[other.of_variant[v]].name());
+            // A whole list of things is no name of a bar.
+            let is_short = !others.is_empty() && others.chars().count() <= LONGEST_NAME;
+            Level::Text(if is_short { format!("{own}, {others}") } else { own })
+        };
+        self.levels = (0..self.levels.len()).map(level).collect();
+        self.name = format!("{}, {}", self.name, other.name);
+        self.numeric = false;
+    }
 }

@@ -1,5 +1,6 @@
 //! Names with units in them, split into words and unit.
 
+use crate::scenario::{Meaning, told};
 use serde::Serialize;
 use sidestep_kernel::ports::table::split_unit;
 use std::fmt;
@@ -20,6 +21,12 @@ impl Label {
         let (quantity, unit) = split_unit(name);
         let text = if name.contains('.') { quantity.into() } else { quantity.replace('_', " ") };
         Self { text, unit }
+    }
+
+    /// Returns the label of a metric, in the words of its world.
+    pub fn of_metric(name: &str, meanings: &[Meaning]) -> Self {
+        let told = told(meanings, name);
+        Self { text: told.words, unit: told.unit }
     }
 }
 

@@ -5,6 +5,7 @@ use super::file::{Sweep, Until};
 use super::summary::{Summary, SummaryOptions};
 use super::table::{Role, RunTable};
 use crate::scenario::nearest;
+use crate::worlds::WORLDS;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::InputError;
 use sidestep_kernel::ports::Values;
@@ -176,6 +177,7 @@ impl Plan {
                 .baseline
                 .filter(|variant| has_runs(runs, *variant))
                 .map(|variant| names[variant as usize].clone()),
+            meanings: WORLDS.named(&self.world).map_or(&[], |world| world.meanings()),
             ..SummaryOptions::default()
         };
         Summary::of(&named, &options)

@@ -15,10 +15,10 @@ use super::compare::{Comparison, comparisons};
 use super::groups::{Groups, Level, Parameter};
 use super::table::{Role, RunColumn, RunTable};
 use super::{charts, text};
-use crate::scenario::nearest;
+use crate::scenario::{Meaning, nearest};
 use crate::statistics::{
-    Bootstrap, Interval, QuantileInterval, Sample, mean, mean_interval, percentile,
-    quantile_interval, runs_for_half_width, sample_sd, wilson,
+    Bootstrap, Correlation, Interval, QuantileInterval, Sample, mean, mean_interval, percentile,
+    quantile_interval, rank_correlation, runs_for_half_width, sample_sd, wilson,
 };
 use serde::Serialize;
 use sidestep_document::{Estimate, Figure, Table};
@@ -47,11 +47,19 @@ pub struct SummaryOptions {
     pub baseline: Option<String>,
     /// Options of bootstrap intervals.
     pub bootstrap: Bootstrap,
+    /// The metrics in words.
+    pub meanings: &'static [Meaning],
 }
 
 impl Default for SummaryOptions {
     fn default() -> Self {
-        Self { metrics: None, max_metrics: 12, baseline: None, bootstrap: Bootstrap::default() }
+        Self {
+            metrics: None,
+            max_metrics: 12,
+            baseline: None,
+            bootstrap: Bootstrap::default(),
+            meanings: &[],
+        }
     }
 }
 
@@ -163,6 +171,8 @@ pub struct MetricSummary {
     pub name: String,
     /// Its label, with its unit.
     pub label: Label,
+    /// What was counted or measured; empty where the world does not say.
+    pub meaning: &'static str,
     /// Whether it is a share of runs.
     pub is_share: bool,
     /// Share of its variance that lies between variants, adjusted; at least 0. It is used as a
@@ -174,6 +184,20 @@ pub struct MetricSummary {
     pub comparisons: Vec<Comparison>,
     /// Main effects, if there are several parameters in a full grid.
     pub effects: Vec<Effect>,
+}
+
+/// How a metric goes with a parameter over samples of a box.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Trend {
+    /// Name of the metric's column.
+    pub metric: String,
+    /// The parameter.
+    pub parameter: String,
+    /// Spearman's rank correlation over the variants, with its 95 % interval; absent where one of both
+    /// is constant.
+    pub rank_correlation: Option<Correlation>,
+    /// Number of variants that have a mean of the metric.
+    pub n: usize,
 }
 
 /// A metric that is not shown.
@@ -200,6 +224,9 @@ pub struct Summary {
     pub metrics: Vec<MetricSummary>,
     /// The metrics that are not shown.
     pub left_out: Vec<LeftOut>,
+    /// How metrics go with parameters, if the variants are samples of a box of them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub trends: Vec<Trend>,
     /// Remarks that a reader must know.
     pub notes: Vec<String>,
     #[serde(skip)]
@@ -209,8 +236,12 @@ pub struct Summary {
 /// The part of the summary about one metric.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Section {
+    /// Name of its column.
+    pub name: String,
     /// The metric as text.
     pub title: String,
+    /// What was counted or measured; may be empty.
+    pub meaning: &'static str,
     /// Its figures.
     pub figures: Vec<Figure>,
     /// Its tables.
@@ -224,7 +255,7 @@ impl Summary {
     /// When columns differ in length, a variant has a replicate twice, or a metric or the
     /// baseline does not exist.
     pub fn of(table: &RunTable, options: &SummaryOptions) -> Result<Self, InputError> {
-        let groups = Groups::of(table)?;
+        let groups = Groups::of(table, options.meanings)?;
         let (columns, left_out) = chosen(&groups, options)?;
         let scattered = charts::is_scattered(&groups);
         let baseline = baseline(&groups, options, scattered)?;
@@ -241,6 +272,7 @@ impl Summary {
             baseline: baseline.map(|b| groups.variants[b].clone()),
             metrics,
             left_out,
+            trends: if scattered { trends(&groups, &columns) } else { Vec::new() },
             notes: Vec::new(),
             figures,
             parameters: groups.parameters.clone(),
@@ -259,17 +291,33 @@ impl Summary {
         text::brief(self)
     }
 
+    /// Returns the whole summary in one table: of every metric and variant the mean, the difference from
+    /// the baseline, p and n; of samples of a box of parameters how each metric goes with each of them.
+    pub fn overview(&self) -> Table {
+        match self.trends.is_empty() {
+            true => text::overview(self),
+            false => text::trends(self),
+        }
+    }
+
+    /// Returns what all tables of metrics have in common, to be told once.
+    pub fn footnotes(&self) -> Vec<&'static str> {
+        text::footnotes(self)
+    }
+
     /// Returns the summary metric by metric.
     pub fn sections(&self) -> Vec<Section> {
         let section = |metric: &MetricSummary| Section {
-            title: super::label::sentence(&Label { unit: None, ..metric.label.clone() }),
+            name: metric.name.clone(),
+            title: super::label::sentence(&metric.label),
+            meaning: metric.meaning,
             figures: self
                 .figures
                 .iter()
                 .filter(|(of, _)| *of == metric.name)
                 .map(|(_, f)| f.clone())
                 .collect(),
-            tables: text::of_metric(self, metric),
+            tables: text::of_metric(self, metric).into_iter().map(Table::folded).collect(),
         };
         self.metrics.iter().map(section).collect()
     }
@@ -283,6 +331,26 @@ impl Summary {
     pub fn figures(&self) -> Vec<Figure> {
         self.figures.iter().map(|(_, figure)| figure.clone()).collect()
     }
+}
+
+/// Returns how each metric goes with each parameter that is a number.
+fn trends(groups: &Groups<'_>, columns: &[&RunColumn]) -> Vec<Trend> {
+    let parameters = charts::numeric(groups);
+    let trend = |column: &&RunColumn, p: usize| {
+        let parameter = &groups.parameters[p];
+        let pair = |v: usize| match parameter.levels[parameter.of_variant[v]] {
+            Level::Number(x) => Some((x, groups.mean_over(column, &[v]).mean?)),
+            Level::Text(_) => None,
+        };
+        let pairs: Vec<(f64, f64)> = (0..groups.variants.len()).filter_map(pair).collect();
+        Trend {
+            metric: column.name.clone(),
+            parameter: parameter.name.clone(),
+            rank_correlation: rank_correlation(&pairs),
+            n: pairs.len(),
+        }
+    };
+    columns.iter().flat_map(|column| parameters.iter().map(move |p| trend(column, *p))).collect()
 }
 
 fn variant(groups: &Groups<'_>, variant: usize) -> Variant {
@@ -409,7 +477,8 @@ fn summed(
     let describe = |v| described(groups, column, v, bootstrap);
     MetricSummary {
         name: column.name.clone(),
-        label: Label::of(&column.name),
+        label: groups.label(column),
+        meaning: groups.meaning(column),
         is_share: matches!(column.values, Values::Bool(_)),
         explained: explained(groups, column),
         variants: variants.map(describe).collect(),

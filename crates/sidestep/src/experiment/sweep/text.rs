@@ -1,5 +1,6 @@
 //! The summary as tables.
 
+use super::Label;
 use super::compare::Comparison;
 use super::label::sentence;
 use super::summary::{
@@ -27,13 +28,10 @@ fn brief_of(summary: &Summary, metric: &MetricSummary) -> Table {
     let mut columns = vec!["variant", "n", mean];
     columns.extend(against.as_deref());
     columns.extend(against.as_ref().map(|_| "p (Holm)"));
-    let mut table = Table::new(sentence(&metric.label), "", &columns);
+    let title = format!("{}: {}", sentence(&metric.label), metric.name);
+    let mut table = Table::new(title, "", &columns);
     for variant in &metric.variants {
-        let value = match &variant.values {
-            Described::Numbers(numbers) => with_interval(numbers.mean, numbers.interval),
-            Described::Share(share) => with_interval(share.share, Some(share.interval)),
-        };
-        let mut row = vec![variant.variant.clone(), variant.n.to_string(), value];
+        let mut row = vec![variant.variant.clone(), variant.n.to_string(), center(variant)];
         if let Some(c) = metric.comparisons.iter().find(|c| c.variant == variant.variant) {
             row.push(format!("{} n={}", with_interval(c.difference, c.interval), c.pairs));
             row.push(c.p_holm.map_or("-".into(), p_value));
@@ -42,6 +40,106 @@ fn brief_of(summary: &Summary, metric: &MetricSummary) -> Table {
     }
     table
 }
+
+/// Returns the mean of a metric, or its share, with its interval.
+fn center(variant: &VariantMetric) -> String {
+    match &variant.values {
+        Described::Numbers(numbers) => with_interval(numbers.mean, numbers.interval),
+        Described::Share(share) => with_interval(share.share, Some(share.interval)),
+    }
+}
+
+/// Returns a table of all metrics in all variants: mean, difference from the baseline, p and n.
+pub(super) fn overview(summary: &Summary) -> Table {
+    let title = match &summary.baseline {
+        Some(name) => format!("All metrics, compared with {name}"),
+        None => "All metrics".into(),
+    };
+    let mut columns = vec!["metric", "variant", "mean"];
+    if summary.baseline.is_some() {
+        columns.extend(["difference", "p (Holm)"]);
+    }
+    columns.push("n");
+    let mut table = Table::new(title, "", &columns);
+    for metric in &summary.metrics {
+        for variant in &metric.variants {
+            let mut row = vec![sentence(&metric.label), variant.variant.clone(), center(variant)];
+            if summary.baseline.is_some() {
+                row.extend(against(metric, &variant.variant));
+            }
+            table.row(row.into_iter().chain([variant.n.to_string()]));
+        }
+    }
+    table
+}
+
+/// Returns the difference of a variant from the baseline and its p; both empty for the baseline itself.
+fn against(metric: &MetricSummary, variant: &str) -> [String; 2] {
+    let Some(found) = metric.comparisons.iter().find(|c| c.variant == variant) else {
+        return [String::new(), String::new()];
+    };
+    let p = found.p_holm.map_or("-".into(), p_value);
+    [with_interval(found.difference, found.interval), p]
+}
+
+/// Returns a table of how each metric goes with each parameter.
+pub(super) fn trends(summary: &Summary) -> Table {
+    let note = "Spearman's rank correlation over the variants, from -1 to 1: near 1 the metric rises with \
+                the parameter, near -1 it falls. 95 % intervals by Fisher's transformation.";
+    let columns = ["metric", "goes with", "rank correlation", "n"];
+    let mut table = Table::new("What the metrics depend on", note, &columns);
+    for trend in &summary.trends {
+        let metric = summary.metrics.iter().find(|metric| metric.name == trend.metric);
+        let words = metric.map_or_else(|| trend.metric.clone(), |m| sentence(&m.label));
+        let value = match trend.rank_correlation {
+            Some(found) => with_interval(Some(found.value), found.interval),
+            None => "-".into(),
+        };
+        let over = Label::of(&trend.parameter).to_string();
+        table.row([words, over, value, trend.n.to_string()]);
+    }
+    table
+}
+
+/// Returns what the tables of all metrics have in common.
+pub(super) fn footnotes(summary: &Summary) -> Vec<&'static str> {
+    let mut notes = Vec::new();
+    let has = |is_share: bool| summary.metrics.iter().any(|m| m.is_share == is_share);
+    if has(false) {
+        notes.push(NUMBERS);
+    }
+    if has(true) {
+        notes.push(SHARES);
+    }
+    if summary.baseline.is_some() {
+        notes.push(DIFFERENCES);
+    }
+    if summary.metrics.iter().any(|metric| !metric.effects.is_empty()) {
+        notes.push(EFFECTS);
+    }
+    notes
+}
+
+const NUMBERS: &str = "95 % intervals stand in brackets: of a mean by Student's t and by the bootstrap \
+                       (BCa), of quantiles by order statistics; `-` where n is too small for one. n: runs \
+                       with a value. sd, min and max describe these very runs. `for ±5 %`: runs that would \
+                       narrow Student's interval to 5 % of the mean to either side, if runs go on to vary by \
+                       this sd.";
+
+const SHARES: &str = "Of a metric that is yes or no, the share of runs of which it is true, with Wilson's \
+                      95 % interval.";
+
+const DIFFERENCES: &str = "Differences are variant minus baseline, replicate by replicate on the same seeds; \
+                           95 % intervals by Student's t, then by the bootstrap (BCa); of the ratio of means \
+                           by Fieller's method, where no value is negative and the baseline's mean is well \
+                           away from 0. `lower`, `higher`: pairs in which the variant is. p: of no difference \
+                           by Student's paired test (of shares the exact sign test, McNemar's), adjusted by \
+                           Holm over the comparisons of one metric; over several metrics chances add up. `-`: \
+                           the pairs do not give it.";
+
+const EFFECTS: &str = "Main effects are means over all variants that have the level; n: replicates of which all \
+                       these variants have a value. Each replicate counts as one, since its variants share \
+                       their seeds.";
 
 /// Returns the tables of a metric.
 pub(super) fn of_metric(summary: &Summary, metric: &MetricSummary) -> Vec<Table> {
@@ -60,28 +158,23 @@ fn values(metric: &MetricSummary) -> Table {
 }
 
 fn numbers(metric: &MetricSummary) -> Table {
-    let note = "95 % intervals in brackets: of the mean by Student's t and by the bootstrap (BCa), \
-                of quantiles by order statistics; `-` where n is too small for one. n: runs with a \
-                value. sd, min and max describe these very runs. `for ±5 %`: runs that would narrow \
-                Student's interval to 5 % of the mean to either side, if runs go on to vary by this \
-                sd.";
     let columns = [
         "variant",
         "n",
-        "missing",
         "mean",
-        "bootstrap",
         "median",
+        "sd",
+        "min",
+        "max",
+        "bootstrap",
         "5 %",
         "25 %",
         "75 %",
         "95 %",
-        "sd",
-        "min",
-        "max",
+        "missing",
         "for ±5 %",
     ];
-    let mut table = Table::new(sentence(&metric.label), note, &columns);
+    let mut table = Table::new(format!("{}: all numbers", sentence(&metric.label)), "", &columns);
     for variant in &metric.variants {
         if let Described::Numbers(numbers) = &variant.values {
             table.row(number_row(variant, numbers));
@@ -99,17 +192,17 @@ fn number_row(variant: &VariantMetric, numbers: &Numbers) -> Vec<String> {
     vec![
         variant.variant.clone(),
         variant.n.to_string(),
-        variant.missing.to_string(),
         with_interval(numbers.mean, numbers.interval),
-        bootstrap,
         quantile(2),
+        plain(numbers.sd),
+        plain(numbers.min),
+        plain(numbers.max),
+        bootstrap,
         quantile(0),
         quantile(1),
         quantile(3),
         quantile(4),
-        plain(numbers.sd),
-        plain(numbers.min),
-        plain(numbers.max),
+        variant.missing.to_string(),
         needed,
     ]
 }
@@ -122,46 +215,35 @@ fn quantile(quantile: &Quantile, width: Option<f64>) -> String {
 }
 
 fn shares(metric: &MetricSummary) -> Table {
-    let note =
-        "Share of runs of which it is true, with Wilson's 95 % interval. n: runs with a value.";
-    let columns = ["variant", "n", "missing", "runs", "share"];
-    let mut table = Table::new(sentence(&metric.label), note, &columns);
+    let columns = ["variant", "n", "share", "runs", "missing"];
+    let title = format!("{}: all numbers", sentence(&metric.label));
+    let mut table = Table::new(title, "", &columns);
     for variant in &metric.variants {
         if let Described::Share(Share { yes, share, interval }) = variant.values {
-            let counts = [variant.n, variant.missing, yes].map(|count| count.to_string());
+            let [n, yes, missing] =
+                [variant.n, yes, variant.missing].map(|count| count.to_string());
             let share = with_interval(share, Some(interval));
-            table.row([variant.variant.clone()].into_iter().chain(counts).chain([share]));
+            table.row([variant.variant.clone(), n, share, yes, missing]);
         }
     }
     table
 }
 
 fn differences(metric: &MetricSummary, baseline: &str) -> Table {
-    let family = metric.comparisons.iter().filter(|c| c.p.is_some()).count();
-    let test =
-        if metric.is_share { "the exact sign test (McNemar's)" } else { "Student's paired test" };
-    let note = format!(
-        "Variant minus `{baseline}`, replicate by replicate on the same seeds. 95 % intervals in \
-         brackets: by Student's t, then by the bootstrap (BCa); of the ratio of means by Fieller's \
-         method, where no value is negative and the baseline's mean is well away from 0. `lower`, \
-         `higher`: pairs in which the variant is. p: of no difference by {test}, adjusted by Holm over \
-         the {family} comparisons of this metric; over several metrics chances add up. `-`: the pairs \
-         do not give it."
-    );
     let columns = [
         "variant",
         "pairs",
-        "incomplete",
         "difference",
-        "bootstrap",
-        "ratio",
-        "bootstrap",
+        "p (Holm)",
         "lower",
         "higher",
-        "p (Holm)",
+        "ratio",
+        "bootstrap",
+        "bootstrap of ratio",
+        "incomplete",
     ];
     let mut table =
-        Table::new(format!("{}: against {baseline}", sentence(&metric.label)), note, &columns);
+        Table::new(format!("{}: against {baseline}", sentence(&metric.label)), "", &columns);
     metric.comparisons.iter().for_each(|c| table.row(difference_row(c)));
     table
 }
@@ -172,24 +254,20 @@ fn difference_row(comparison: &Comparison) -> Vec<String> {
     vec![
         comparison.variant.clone(),
         comparison.pairs.to_string(),
-        comparison.incomplete.to_string(),
         with_interval(comparison.difference, comparison.interval),
-        interval(comparison.bootstrap),
-        with_interval(comparison.ratio, comparison.ratio_interval),
-        interval(comparison.ratio_bootstrap),
+        comparison.p_holm.map_or("-".into(), p_value),
         of_pairs(comparison.lower),
         of_pairs(comparison.higher),
-        comparison.p_holm.map_or("-".into(), p_value),
+        with_interval(comparison.ratio, comparison.ratio_interval),
+        interval(comparison.bootstrap),
+        interval(comparison.ratio_bootstrap),
+        comparison.incomplete.to_string(),
     ]
 }
 
 fn effects(metric: &MetricSummary) -> Table {
-    let note = "Means over all variants that have the level, with 95 % intervals; n: replicates of \
-                which all these variants have a value. Each replicate counts as one, since its \
-                variants share their seeds.";
     let columns = ["parameter", "level", "variants", "marginal mean", "n"];
-    let mut table =
-        Table::new(format!("{}: main effects", sentence(&metric.label)), note, &columns);
+    let mut table = Table::new(format!("{}: main effects", sentence(&metric.label)), "", &columns);
     for effect in &metric.effects {
         for level in &effect.levels {
             let Estimate { mean, interval, n, .. } = level.estimate;

@@ -8,6 +8,8 @@ use sidestep_kernel::Slot;
 /// One airplane at its start.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Airplane {
+    /// Its name, such as a callsign; may be empty.
+    pub name: String,
     /// Its abilities.
     pub model: Model,
     /// Its first pose.

@@ -1,0 +1,76 @@
+//! Rank correlation.
+
+use crate::{Interval, mean};
+use serde::Serialize;
+use sidestep_kernel::math;
+
+/// A correlation with its 95 % confidence interval.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Correlation {
+    /// From -1 to 1.
+    pub value: f64,
+    /// Its interval, by Fisher's transformation with the variance of Bonett and Wright (2000); absent
+    /// with fewer than four pairs, or where the order is perfect.
+    pub interval: Option<Interval>,
+}
+
+/// Returns Spearman's rank correlation of pairs; `None` where one of both is constant.
+pub fn rank_correlation(pairs: &[(f64, f64)]) -> Option<Correlation> {
+    let (x, y): (Vec<f64>, Vec<f64>) = pairs.iter().copied().unzip();
+    let (x, y) = (ranks(&x), ranks(&y));
+    let (middle_x, middle_y) = (mean(&x)?, mean(&y)?);
+    let sum = |of: &dyn Fn(f64, f64) -> f64| -> f64 {
+        x.iter().zip(&y).map(|(a, b)| of(a - middle_x, b - middle_y)).sum()
+    };
+    let (across, xx, yy) = (sum(&|a, b| a * b), sum(&|a, _| a * a), sum(&|_, b| b * b));
+    let value = across / (xx * yy).sqrt();
+    let interval = (x.len() > 3 && value.abs() < 1.0).then(|| {
+        const NORMAL_95: f64 = 1.959_963_984_540_054;
+        let half = NORMAL_95 * ((1.0 + 0.5 * value * value) / (x.len() as f64 - 3.0)).sqrt();
+        let middle = 0.5 * math::ln((1.0 + value) / (1.0 - value));
+        let back = |z: f64| 1.0 - 2.0 / (math::exp(2.0 * z) + 1.0);
+        Interval { low: back(middle - half), high: back(middle + half) }
+    });
+    value.is_finite().then_some(Correlation { value, interval })
+}
+
+/// Returns the ranks of values from 1 on; equal values share the middle of their ranks.
+fn ranks(values: &[f64]) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..values.len()).collect();
+    order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
+    let mut ranks = vec![0.0; values.len()];
+    let mut first = 0;
+    for group in order.chunk_by(|a, b| values[*a] == values[*b]) {
+        let rank = first as f64 + 0.5 * (group.len() as f64 + 1.0);
+        group.iter().for_each(|k| ranks[*k] = rank);
+        first += group.len();
+    }
+    ranks
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::close;
+
+    #[test]
+    fn ranks_count_and_not_distances() {
+        let squares: Vec<(f64, f64)> =
+            (0..9_i32).map(|k| (f64::from(k), f64::from(k * k))).collect();
+        assert_eq!(rank_correlation(&squares), Some(Correlation { value: 1.0, interval: None }));
+        assert_eq!(rank_correlation(&[(1.0, 2.0), (2.0, 2.0)]), None, "one of both is constant");
+        assert_eq!(ranks(&[3.0, 1.0, 3.0, 2.0]), [3.5, 1.0, 3.5, 2.0]);
+    }
+
+    #[test]
+    fn the_correlation_of_a_textbook_is_found() {
+        // Ranks with squared differences of 194 in all, of 10 pairs: 1 - 6 * 194 / 990.
+        let iq = [86.0, 97.0, 99.0, 100.0, 101.0, 103.0, 106.0, 110.0, 112.0, 113.0];
+        let hours = [2.0, 20.0, 28.0, 27.0, 50.0, 29.0, 7.0, 17.0, 6.0, 12.0];
+        let pairs: Vec<(f64, f64)> = iq.into_iter().zip(hours).collect();
+        let found = rank_correlation(&pairs).expect("a correlation");
+        close(found.value, 1.0 - 6.0 * 194.0 / 990.0, 1e-12);
+        let interval = found.interval.expect("of ten pairs");
+        assert!(interval.contains(0.0) && interval.contains(found.value), "{interval:?}");
+    }
+}
