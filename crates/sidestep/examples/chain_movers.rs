@@ -8,8 +8,8 @@ use sidestep::kernel::stream::{Purpose, Streams};
 use sidestep::kernel::{InputError, Seed, math};
 use sidestep::worlds::chain::geometry::{Bounds, Point, along, distance, dot, scaled, sub, unit};
 use sidestep::worlds::chain::{
-    Chain, Connector, Escape, Escaper, Obstacle, Obstacles, Outcome, Propagator, Request, Rod,
-    Rules, WayOut,
+    Chain, Connector, Escape, Escaper, Method, Obstacle, Obstacles, Outcome, Propagator, Request,
+    Rod, Rules, WayOut,
 };
 use std::f64::consts::TAU;
 
@@ -177,7 +177,8 @@ fn run(cell: &Cell, seed: u64, tally: &mut Tally) -> Result<(), InputError> {
         Reaction::None => 0.0,
         Reaction::Escape(ticks) => ticks,
     };
-    let mut escaper = Escaper::new(Escape { ticks_ahead, ..Escape::new(DT_S, cell.limit_m_s) });
+    let usual = Escape::new(DT_S, cell.limit_m_s);
+    let mut escaper = Escaper::new(Escape { ticks_ahead, method: Method::Literal, ..usual });
     let mut leader = Leader { heading_rad: 0.0 };
     for _ in 0..TICKS {
         let start = chain.points().to_vec();

@@ -96,7 +96,7 @@ pub struct Plan {
 }
 
 impl Default for Plan {
-    /// The full plan: half an hour on two processors, most of it for snakes among balls that fly.
+    /// The full plan: ten minutes on two processors, most of it for discs that move.
     fn default() -> Self {
         Self {
             seeds: 10,

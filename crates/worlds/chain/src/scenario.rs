@@ -158,7 +158,7 @@ struct RulesSection {
     backtracks: Option<usize>,
     look_m: Option<Measure>,
     escape: EscapeWord,
-    escape_by: MethodWord,
+    escape_by: Method,
     escape_speed_m_s: Option<Measure>,
     escape_ahead_s: Option<Measure>,
     may_start_inside: bool,
@@ -175,17 +175,6 @@ enum EscapeWord {
     Touch,
     /// Not at all.
     Off,
-}
-
-/// The method by which chains get out of the way.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-enum MethodWord {
-    /// All parts of a tick at once.
-    #[default]
-    Simultaneous,
-    /// One part after the other, as in the slides.
-    Literal,
 }
 
 /// The tables that a run records.
@@ -348,11 +337,7 @@ impl<const D: usize> Compiler<'_, D> {
         let ahead_s = section.escape_ahead_s.map_or(usual.ticks_ahead * dt_s, f64::from);
         let looks_ahead = section.escape == EscapeWord::LookAhead;
         let ticks_ahead = if looks_ahead { ahead_s / dt_s } else { 0.0 };
-        let method = match section.escape_by {
-            MethodWord::Simultaneous => Method::Simultaneous,
-            MethodWord::Literal => Method::Literal,
-        };
-        Some(Escape { ticks_ahead, method, ..usual })
+        Some(Escape { ticks_ahead, method: section.escape_by, ..usual })
     }
 
     /// Refuses keys of escapes that the kind of escape leaves without effect.

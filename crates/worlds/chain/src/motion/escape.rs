@@ -22,19 +22,21 @@ use crate::rods::obstacle::{Obstacle, Obstacles};
 use crate::rods::propagate::Propagator;
 use crate::rods::veto::Veto;
 use literal::Literal;
+use serde::Deserialize;
 use sidestep_kernel::InputError;
 use simultaneous::Simultaneous;
 pub use simultaneous::WayOut;
 pub(crate) use threat::Part;
 
 /// The method by which a chain gets out of the way.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Method {
-    /// One part after the other becomes an initiator, the deepest first (slide P2).
-    #[default]
-    Literal,
     /// All constraints of a tick are solved at once; who is caught is led out.
+    #[default]
     Simultaneous,
+    /// One part after the other becomes an initiator, the deepest first (slide P2).
+    Literal,
 }
 
 /// Rules for getting out of the way.
@@ -56,10 +58,10 @@ pub struct Escape {
 }
 
 impl Escape {
-    /// Returns rules of the literal escape with a look-ahead of 20 ticks and up to 40 violations
-    /// a tick.
+    /// Returns rules of the usual method with a look-ahead of 20 ticks and, where it counts them, up
+    /// to 40 violations a tick.
     pub fn new(dt_s: f64, speed_max_m_s: f64) -> Self {
-        Self { dt_s, speed_max_m_s, ticks_ahead: 20.0, most: 40, method: Method::Literal }
+        Self { dt_s, speed_max_m_s, ticks_ahead: 20.0, most: 40, method: Method::default() }
     }
 
     fn check(&self) -> Result<(), InputError> {

@@ -43,7 +43,7 @@ fn held<const D: usize>(
     objection: &Veto<D>,
 ) -> Result<Outcome<D>, InputError> {
     // A connector that has failed is no base of an arm: what hangs on it swings as it did.
-    let most_m = match objection.reason {
+    let joints_m = match objection.reason {
         Reason::Fixed => propagator.rules.joint_step_max_m,
         _ => f64::INFINITY,
     };
@@ -53,10 +53,13 @@ fn held<const D: usize>(
     for _ in 0..MOST_SLOWED {
         let target = if part < 1.0 { between(from, order.target, part) } else { order.target };
         let order = Reach { target, ..*order };
-        let moved = match reached(propagator, chain, obstacles, &order, objection)? {
+        let (outcome, jump_m) =
+            reached(propagator, (chain, &before), obstacles, &order, objection)?;
+        let moved = match outcome {
             Outcome::Moved(moved) => moved,
             vetoed @ Outcome::Vetoed(_) => return Ok(vetoed),
         };
+        let most_m = joints_m.min(jump_m);
         let (by, longest_m) = longest(&before, chain.points());
         let slowed =
             Veto { by, reason: Reason::StepLimit, reached: chain.points()[order.k], ..*objection };
@@ -77,21 +80,26 @@ fn longest<const D: usize>(before: &[Point<D>], points: &[Point<D>]) -> (usize, 
     ways_m.fold((0, 0.0), |most, way| if way.1 > most.1 { way } else { most })
 }
 
-/// Moves a chain whose base objects by passes there and back, or straight to a posture.
+/// Moves a chain whose base objects by passes there and back, or straight to a posture; returns also
+/// the longest way of a connector for which the outcome counts as a motion, meters.
 fn reached<const D: usize>(
     propagator: &mut Propagator<D>,
-    chain: &mut Chain<D>,
+    (chain, before): (&mut Chain<D>, &[Point<D>]),
     obstacles: &Obstacles<D>,
     order: &Reach<D>,
     objection: &Veto<D>,
-) -> Result<Outcome<D>, InputError> {
-    let before = chain.points().to_vec();
+) -> Result<(Outcome<D>, f64), InputError> {
     Ok(match reach(propagator, chain, obstacles, order)? {
-        Reached::There { .. } => Outcome::Moved(moved_since(&before, chain, order.k)),
-        Reached::Short { veto: Some(veto), .. } => Outcome::Vetoed(veto),
+        Reached::There { .. } => {
+            (Outcome::Moved(moved_since(before, chain, order.k)), f64::INFINITY)
+        }
+        Reached::Short { veto: Some(veto), .. } => (Outcome::Vetoed(veto), f64::INFINITY),
         Reached::Short { nearest, veto: None } => {
             let objection = Veto { reached: nearest, ..*objection };
-            by_posture(propagator.rules, chain, obstacles, order, objection)?
+            let rules = propagator.rules;
+            let longest_m = chain.rods().iter().map(|rod| rod.max_m).fold(0.0, f64::max);
+            let jump_m = rules.slave_step_max_m.min(LONGEST_JUMP * longest_m);
+            (by_posture(rules, (chain, before), obstacles, order, objection)?, jump_m)
         }
     })
 }
@@ -103,11 +111,12 @@ const MOST_SLOWED: usize = 16;
 const SLOWED: f64 = 0.9;
 
 /// Finds a posture, or reports that the target is out of reach. Passes converge slowly if a chain
-/// is nearly straight, so damped least squares find the nearest posture that gets there, and the
-/// chain goes straight to it if neither the posture nor the way to it is blocked.
+/// is nearly straight, and not at all along a straight line, so damped least squares find the nearest
+/// posture that gets there, and the chain goes straight to it if neither the posture nor the way to it
+/// is blocked.
 fn by_posture<const D: usize>(
     rules: Rules,
-    chain: &mut Chain<D>,
+    (chain, before): (&mut Chain<D>, &[Point<D>]),
     obstacles: &Obstacles<D>,
     order: &Reach<D>,
     objection: Veto<D>,
@@ -119,21 +128,14 @@ fn by_posture<const D: usize>(
     if far_m(target) > reach_m + tolerance_m && objection.reason == Reason::Fixed {
         return Ok(Outcome::Vetoed(Veto { reason: Reason::OutOfReach, ..objection }));
     }
-    if far_m(chain.points()[k]) <= STRETCHED * reach_m {
-        return Ok(Outcome::Vetoed(objection));
-    }
     let goal = Goal { engine: Engine::Dls, restarts: 0, tolerance_m, ..Goal::new(k, base, target) };
     let answer = Solver::new(rules).solve(chain, obstacles, &goal)?;
-    let before = chain.points().to_vec();
-    let longest_m = chain.rods().iter().map(|rod| rod.max_m).fold(0.0, f64::max);
-    let most_m = rules.slave_step_max_m.min(LONGEST_JUMP * longest_m);
-    let is_near = |(a, b): (&Point<D>, &Point<D>)| distance(*a, *b) <= most_m;
-    if !answer.reached || !before.iter().zip(&answer.points).all(is_near) {
+    if !answer.reached {
         return Ok(Outcome::Vetoed(objection));
     }
     chain.points_mut().copy_from_slice(&answer.points);
-    if let Some(passed) = passed(chain, &before, obstacles, 0.0) {
-        chain.points_mut().copy_from_slice(&before);
+    if let Some(passed) = passed(chain, before, obstacles, 0.0) {
+        chain.points_mut().copy_from_slice(before);
         let (by, obstacle) = (passed.rod, Some(passed.obstacle));
         return Ok(Outcome::Vetoed(Veto {
             by,
@@ -142,11 +144,8 @@ fn by_posture<const D: usize>(
             ..objection
         }));
     }
-    Ok(Outcome::Moved(moved_since(&before, chain, k)))
+    Ok(Outcome::Moved(moved_since(before, chain, k)))
 }
-
-/// Part of its reach from which on a chain counts as nearly straight.
-const STRETCHED: f64 = 0.95;
 
 /// Longest move of a connector, as a part of the longest rod, for which a posture is accepted as a
 /// motion.

@@ -38,6 +38,9 @@ pub(super) struct Work<const D: usize> {
     pub(super) found: Vec<Candidate<D>>,
     /// Whether one side has not been examined yet.
     pub(super) has_other_side: bool,
+    /// Whether any rod has found a way by turning since this was last reset; if none has, trying all
+    /// lengths finds the same places.
+    pub(super) has_turned: bool,
 }
 
 /// Pushes, pulls or resizes one rod; returns the slave's new place, bit-identical if it stays.
@@ -69,6 +72,9 @@ pub(super) fn clamped(d: f64, min_m: f64, max_m: f64) -> f64 {
 
 /// Most rounds that bring a place into a box and back onto a rod's lengths.
 const TURNS_INTO_A_BOX: usize = 200;
+
+/// Relative rounding of ways.
+const ROUNDING: f64 = 1e-9;
 
 /// Direction of the guide line (A1), or of the old rod if the master is at the slave's place.
 fn guide_line<const D: usize>(step: &Step<D>) -> Point<D> {
@@ -228,6 +234,7 @@ impl<const D: usize> Scene<'_, D> {
         }
         sort(step, &mut work.found);
         if !work.found.is_empty() {
+            work.has_turned = true;
             return Ok(());
         }
         let inside = inside.map(|name| Refusal::by(Reason::Inside, name));
@@ -245,7 +252,7 @@ impl<const D: usize> Scene<'_, D> {
         let u0 = guide_line(step);
         let Work { blocks, arcs, found, has_other_side, .. } = work;
         let look_on = work.all_lengths || work.both_sides;
-        let mut add = |u: Point<D>| {
+        let mut add = |u: Point<D>, why: &mut Option<Refusal>| {
             let at = along(step.mn, u, length_m);
             match self.judge_place(step, at) {
                 Ok(()) => {
@@ -256,7 +263,7 @@ impl<const D: usize> Scene<'_, D> {
                     // A free direction that fails for another reason is more informative than the
                     // first objection.
                     if !matches!(refusal.reason, Reason::BothSidesBlocked | Reason::BendLimit) {
-                        *why = why.or(Some(refusal));
+                        why.get_or_insert(refusal);
                     }
                     false
                 }
@@ -265,8 +272,10 @@ impl<const D: usize> Scene<'_, D> {
         if D == 2 {
             let plane = Plane { step, length_m, u0: plane(u0), blocks };
             let mut sides = plane.sides(arcs);
-            while let Some(u) = sides.next() {
-                if add(u) && !look_on {
+            while let Some(u) =
+                sides.next(|u| why.is_some() && self.is_too_far(step, along(step.mn, u, length_m)))
+            {
+                if add(u, why) && !look_on {
                     *has_other_side = sides.has_more();
                     break;
                 }
@@ -278,13 +287,18 @@ impl<const D: usize> Scene<'_, D> {
         blocks.retain(|b| !contains_master(step, b));
         let search = Search { step, length_m, blocks };
         let turned = search.turn_away(u0);
-        if !turned.is_some_and(&mut add) {
+        if !turned.is_some_and(|u| add(u, why)) {
             let is_good = |u| self.judge_place(step, along(step.mn, u, length_m)).is_ok();
             if let Some(u) = search.rings(u0, is_good) {
-                add(u);
+                add(u, why);
             }
         }
         inside
+    }
+
+    /// Whether a place is surely farther from the slave than it may go in one step.
+    fn is_too_far(&self, step: &Step<D>, at: Point<D>) -> bool {
+        distance(step.so, at) > self.rules.slave_step_max_m * (1.0 + ROUNDING)
     }
 
     /// Collects everything that a rod of a length may meet on any side. The order is that of the
@@ -349,8 +363,7 @@ impl<const D: usize> Plane<'_, D> {
     }
 
     /// Adds the arcs of all blocks that a rod in a direction meets; returns whether there were any.
-    fn learns(&self, u: Point<2>, known: &mut Arcs) -> bool {
-        let u: Point<D> = std::array::from_fn(|i| u[i]);
+    fn learns(&self, u: Point<D>, known: &mut Arcs) -> bool {
         let s = along(self.step.mn, u, self.length_m);
         let mut learns = false;
         for (k, block) in self.blocks.iter().enumerate() {
@@ -407,7 +420,9 @@ impl<const D: usize> Sides<'_, D> {
         self.is_open != [false; 2]
     }
 
-    fn next(&mut self) -> Option<Point<D>> {
+    /// Returns the next free direction; none once `is_vain` says that a direction, and so any that
+    /// is farther from the start, is of no use.
+    fn next(&mut self, is_vain: impl Fn(Point<D>) -> bool) -> Option<Point<D>> {
         loop {
             let turns_rad = [Side::Left, Side::Right].map(|side| {
                 let is_open = self.is_open[side as usize];
@@ -420,10 +435,14 @@ impl<const D: usize> Sides<'_, D> {
                 [None, Some(right)] => (Side::Right, right),
                 [None, None] => return None,
             };
-            let u = interval::turned(self.plane.u0, turn_rad, side);
+            let turned = interval::turned(self.plane.u0, turn_rad, side);
+            let u: Point<D> = std::array::from_fn(|i| turned[i]);
+            if is_vain(u) {
+                return None;
+            }
             if !self.plane.learns(u, self.known) {
                 self.is_open[side as usize] = false;
-                return Some(std::array::from_fn(|i| u[i]));
+                return Some(u);
             }
         }
     }

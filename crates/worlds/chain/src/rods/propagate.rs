@@ -227,7 +227,7 @@ impl<const D: usize> Propagator<D> {
 
     /// Sweeps from a head outward. Rods keep their lengths when they turn, which is cheap and
     /// nearly always enough; if that ends in a veto, the sweep is repeated with every length they
-    /// may have.
+    /// may have. Without a rod that has turned the repetition would end in the same veto.
     fn sweep(
         &mut self,
         chain: &Chain<D>,
@@ -236,11 +236,12 @@ impl<const D: usize> Propagator<D> {
         direction: Direction,
     ) -> Result<(), Objection> {
         let rotated = self.tally.rotated;
-        self.work.all_lengths = false;
+        (self.work.all_lengths, self.work.has_turned) = (false, false);
         let followed = self.follow(chain, obstacles, head, direction);
         let Some(first) = direction.next(head, chain.points().len()) else { return followed };
         if followed.is_ok()
             || self.rules.rotation != Rotation::Union
+            || !self.work.has_turned
             || !may_go_elsewhere(chain, head, direction)
         {
             return followed;

@@ -152,7 +152,7 @@ impl<const D: usize> Compiler<'_, D> {
     ) -> Result<ChainSpec<D>, InputError> {
         let (s, at) = (section.get_ref(), section.span());
         let (start, arm) = self.shape(s, site, at.clone())?;
-        let tasks = self.tasks(s, start.points().len(), at.clone())?;
+        let tasks = self.tasks(s, &start, at.clone())?;
         let changes = self.changes(s, &start, dt_s, at.clone())?;
         let speed_m_s = tasks.iter().map(|task| task.speed_m_s).fold(0.0, f64::max);
         self.check_steps(&start, speed_m_s * dt_s, at.clone())?;
@@ -172,11 +172,11 @@ impl<const D: usize> Compiler<'_, D> {
     fn tasks(
         &self,
         s: &ChainSection<D>,
-        n: usize,
+        start: &Chain<D>,
         at: Range<usize>,
     ) -> Result<Vec<Task<D>>, InputError> {
         let tasks =
-            s.tasks.0.iter().map(|task| self.task(task, n)).collect::<Result<Vec<_>, _>>()?;
+            s.tasks.0.iter().map(|task| self.task(task, start)).collect::<Result<Vec<_>, _>>()?;
         let is_endless = |task: &Task<D>| {
             let has_an_end = match &task.driver {
                 Driver::Rest | Driver::Wander(_) => false,

@@ -4,6 +4,7 @@ use super::super::driver::{Driver, MAX_MOTIONS, Targets, Task, Wander};
 use super::super::script::{Motion, Script, Turtle};
 use super::navigators::NavigatorSection;
 use super::{Compiler, MOST, Measure, Place, Room};
+use crate::rods::chain::{Chain, Mobility};
 use serde::Deserialize;
 use sidestep_kernel::InputError;
 use std::ops::Range;
@@ -67,9 +68,12 @@ impl<const D: usize> TaskSection<D> {
         self.speed_m_s.map_or(SPEED_M_S, f64::from)
     }
 
-    /// Whether it plans ways.
-    pub(super) fn plans(&self) -> bool {
-        self.planner == Some(PlannerWord::RrtConnect)
+    /// Whether it plans ways, on a chain that has a fixed base or has none.
+    fn plans(&self, has_base: bool) -> bool {
+        match self.planner {
+            Some(planner) => planner == PlannerWord::RrtConnect,
+            None => has_base && self.kind == Kind::Targets,
+        }
     }
 
     /// Whether it drives on wheels.
@@ -79,24 +83,26 @@ impl<const D: usize> TaskSection<D> {
 }
 
 impl<const D: usize> Compiler<'_, D> {
-    /// Returns a task of a chain of `n` connectors.
+    /// Returns a task of a chain.
     pub(super) fn task(
         &self,
         section: &Spanned<TaskSection<D>>,
-        n: usize,
+        chain: &Chain<D>,
     ) -> Result<Task<D>, InputError> {
         let (s, at) = (section.get_ref(), section.span());
+        let n = chain.points().len();
+        let plans = s.plans(chain.connectors().iter().any(|c| c.mobility == Mobility::Fixed));
         if s.connector >= n {
             let cause = format!("connector = {} of a chain of {n}", s.connector);
             return Err(self.source.error(at, cause, "count from 0"));
         }
-        self.has_only_its_own(s, at.clone())?;
+        self.has_only_its_own(s, plans, at.clone())?;
         Ok(Task {
             agent: s.connector,
             speed_m_s: s.speed_m_s(),
             lasts_s: s.lasts_s.map_or(f64::INFINITY, f64::from),
             patience_s: s.patience_s.map_or(5.0, f64::from),
-            plans_after_s: s.plans().then(|| s.plans_after_s.map_or(PLANS_AFTER_S, f64::from)),
+            plans_after_s: plans.then(|| s.plans_after_s.map_or(PLANS_AFTER_S, f64::from)),
             driver: self.driver(s, at)?,
         })
     }
@@ -176,7 +182,12 @@ impl<const D: usize> Compiler<'_, D> {
     }
 
     /// Refuses keys that have no effect in a task of this kind.
-    fn has_only_its_own(&self, s: &TaskSection<D>, at: Range<usize>) -> Result<(), InputError> {
+    fn has_only_its_own(
+        &self,
+        s: &TaskSection<D>,
+        plans: bool,
+        at: Range<usize>,
+    ) -> Result<(), InputError> {
         let keys = [
             ("turn_deg", s.turn_deg.is_some(), Kind::Wander),
             ("within_m", s.within_m.is_some(), Kind::Wander),
@@ -190,7 +201,7 @@ impl<const D: usize> Compiler<'_, D> {
         let keys = keys.map(|(key, is_given, kind)| (key, is_given, kind == s.kind));
         let of = format!("in a task of kind {:?}", s.kind).to_lowercase();
         self.has_no_idle_key(&keys, &of, at.clone())?;
-        let keys = [("plans_after_s", s.plans_after_s.is_some(), s.plans())];
+        let keys = [("plans_after_s", s.plans_after_s.is_some(), plans)];
         self.has_no_idle_key(&keys, "without a planner", at)
     }
 }

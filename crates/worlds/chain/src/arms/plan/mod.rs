@@ -24,8 +24,9 @@ use sidestep_kernel::InputError;
 use sidestep_kernel::stream::Draws;
 pub(crate) use space::Space;
 
-/// Postures at the target from which the second tree grows.
-const GOALS: u64 = 4;
+/// Most postures at the target from which the second tree grows, and searches for them.
+const GOALS: usize = 4;
+const SEARCHES: usize = 12;
 /// Restarts of the search for one of them.
 const RESTARTS: usize = 25;
 
@@ -56,22 +57,40 @@ pub(crate) fn plan<const D: usize>(
     draws: &mut Draws,
 ) -> Result<Option<Vec<Posture<D>>>, InputError> {
     let space = Space::new(chain, obstacles, rules.self_collision, errand.k)?;
+    let goals = goals(&space, rules, errand, draws)?;
+    if goals.is_empty() {
+        return Ok(None);
+    }
+    Ok(tree::way(&space, goals, draws).map(|way| tree::shortened(&space, way, draws)))
+}
+
+/// Returns good postures that reach the target: the first sought from the present posture, the others
+/// from any, because those near the present one may be cut off from it by the chain's own body.
+fn goals<const D: usize>(
+    space: &Space<'_, D>,
+    rules: Rules,
+    errand: &Errand<D>,
+    draws: &mut Draws,
+) -> Result<Vec<Posture<D>>, InputError> {
     let mut solver = Solver::new(rules);
+    let mut from = space.chain().clone();
     let mut goals: Vec<Posture<D>> = Vec::new();
-    for _ in 0..GOALS {
+    for search in 1..=SEARCHES {
         let goal = Goal {
             tolerance_m: errand.tolerance_m,
             restarts: RESTARTS,
             seed: draws.next_u64(),
             ..Goal::new(errand.k, space.base(), errand.target)
         };
-        let answer = solver.solve(chain, obstacles, &goal)?;
+        let answer = solver.solve(&from, space.obstacles(), &goal)?;
         if answer.reached && space.is_free(&answer.points) && !goals.contains(&answer.points) {
             goals.push(answer.points);
         }
+        // Where the first searches find nothing there is hardly anything to be found.
+        if goals.len() == GOALS || goals.is_empty() && search == GOALS {
+            break;
+        }
+        from.points_mut().copy_from_slice(&space.any(draws));
     }
-    if goals.is_empty() {
-        return Ok(None);
-    }
-    Ok(tree::way(&space, goals, draws).map(|way| tree::shortened(&space, way, draws)))
+    Ok(goals)
 }

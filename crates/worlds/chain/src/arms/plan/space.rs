@@ -53,6 +53,14 @@ impl<'a, const D: usize> Space<'a, D> {
         self.judge.chain.points().to_vec()
     }
 
+    pub(super) fn chain(&self) -> &'a Chain<D> {
+        self.judge.chain
+    }
+
+    pub(super) fn obstacles(&self) -> &'a Obstacles<D> {
+        self.judge.obstacles
+    }
+
     pub(super) fn base(&self) -> usize {
         self.limb[0]
     }

@@ -9,6 +9,11 @@ use crate::scenes::{Numbers, clearance_m};
 const DT_S: f64 = 0.02;
 const SWARM: Rod = Rod { min_m: 0.6, max_m: 0.8, radius_m: 0.05 };
 
+/// The rules of the slides' own escape.
+fn literal(dt_s: f64, speed_max_m_s: f64) -> Escape {
+    Escape { method: Method::Literal, ..Escape::new(dt_s, speed_max_m_s) }
+}
+
 fn swarm<const D: usize>(n_rods: usize) -> Chain<D> {
     let mut start = [0.0; D];
     start[0] = 0.4 * n_rods as f64;
@@ -63,7 +68,7 @@ fn a_chain_gets_out_of_the_way_of_a_ball_that_crosses_it() {
         let (mut center, mut velocity_m_s) = ([0.0; D], [0.0; D]);
         (center[0], center[1], velocity_m_s[1]) = (at_x, 2.0, -0.5);
         let (mut chain, mut obstacles) = (swarm::<D>(8), mover(center, 0.4, velocity_m_s));
-        let mut escaper = Escaper::new(Escape { ticks_ahead, ..Escape::new(DT_S, 1.5) });
+        let mut escaper = Escaper::new(Escape { ticks_ahead, ..literal(DT_S, 1.5) });
         for _ in 0..600 {
             let told = tick(&mut chain, &mut obstacles, &mut escaper, &mut Propagator::default());
             assert_eq!(told.deepest_m, 0.0, "{told:?}");
@@ -81,7 +86,7 @@ fn a_chain_gets_out_of_the_way_of_a_ball_that_crosses_it() {
 fn among_many_movers_no_connector_is_faster_than_its_limit_and_runs_are_equal() {
     fn run<const D: usize>(limit_m_s: f64, ticks: usize) -> Vec<Point<D>> {
         let (mut chain, mut obstacles) = (swarm::<D>(10), movers(3, 12, 0.8));
-        let mut escaper = Escaper::new(Escape::new(DT_S, limit_m_s));
+        let mut escaper = Escaper::new(literal(DT_S, limit_m_s));
         for _ in 0..ticks {
             tick(&mut chain, &mut obstacles, &mut escaper, &mut Propagator::default());
         }
@@ -99,7 +104,7 @@ fn the_limit_counts_what_a_connector_has_moved_before_in_the_tick() {
     let (mut chain, obstacles) = (swarm::<2>(0), mover([0.5, 0.0], 0.4, [-1.0, 0.0]));
     let mut start = chain.points().to_vec();
     start[0][0] += 0.015;
-    let mut escaper = Escaper::new(Escape { ticks_ahead: 0.0, ..Escape::new(DT_S, 1.0) });
+    let mut escaper = Escaper::new(Escape { ticks_ahead: 0.0, ..literal(DT_S, 1.0) });
     escaper
         .escape(&mut chain, &obstacles, &mut Propagator::default(), &start, &mut WayOut::default())
         .unwrap();
@@ -109,7 +114,7 @@ fn the_limit_counts_what_a_connector_has_moved_before_in_the_tick() {
 #[test]
 fn it_is_told_when_only_the_speed_limit_is_in_the_way() {
     let (mut chain, mut obstacles) = (swarm::<2>(4), mover([0.0, 0.8], 0.4, [0.0, -4.0]));
-    let mut escaper = Escaper::new(Escape { ticks_ahead: 0.0, ..Escape::new(DT_S, 0.5) });
+    let mut escaper = Escaper::new(Escape { ticks_ahead: 0.0, ..literal(DT_S, 0.5) });
     let mut told = Vec::new();
     for _ in 0..6 {
         told.push(tick(&mut chain, &mut obstacles, &mut escaper, &mut Propagator::default()));
@@ -127,7 +132,7 @@ fn who_never_moves_is_told_and_nothing_changes() {
         chain.set_failed(k, true);
     }
     let before = chain.clone();
-    let mut escaper = Escaper::new(Escape::new(DT_S, 1.0));
+    let mut escaper = Escaper::new(literal(DT_S, 1.0));
     let mut told = None;
     for _ in 0..20 {
         told = Some(tick(&mut chain, &mut obstacles, &mut escaper, &mut Propagator::default()));
@@ -145,7 +150,7 @@ fn an_arm_bends_away_and_its_base_keeps_every_bit() {
         let mut chain = Chain::new(points, vec![Connector::free(0.08); 5], vec![rod; 4]).unwrap();
         chain.set_mobility(0, Mobility::Fixed).unwrap();
         let mut obstacles = mover([1.0, y], 0.2, [0.0, velocity]);
-        let mut escaper = Escaper::new(Escape::new(DT_S, 1.5));
+        let mut escaper = Escaper::new(literal(DT_S, 1.5));
         for _ in 0..300 {
             let told = tick(&mut chain, &mut obstacles, &mut escaper, &mut Propagator::default());
             assert_eq!(told.deepest_m, 0.0, "{told:?}");
@@ -157,7 +162,7 @@ fn an_arm_bends_away_and_its_base_keeps_every_bit() {
 #[test]
 fn a_connector_in_the_middle_of_a_mover_leaves_to_the_left_of_its_way() {
     let (mut chain, obstacles) = (swarm::<2>(0), mover([0.0, 0.0], 0.4, [0.0, -0.5]));
-    let mut escaper = Escaper::new(Escape::new(DT_S, f64::INFINITY));
+    let mut escaper = Escaper::new(literal(DT_S, f64::INFINITY));
     let start = chain.points().to_vec();
     let told = escaper
         .escape(&mut chain, &obstacles, &mut Propagator::default(), &start, &mut WayOut::default())
@@ -170,7 +175,7 @@ fn a_connector_in_the_middle_of_a_mover_leaves_to_the_left_of_its_way() {
 #[test]
 fn who_starts_inside_gets_out_little_by_little() {
     let (mut chain, mut obstacles) = (swarm::<2>(6), mover([0.1, 0.3], 0.4, [0.0, -0.2]));
-    let mut escaper = Escaper::new(Escape::new(DT_S, 1.0));
+    let mut escaper = Escaper::new(literal(DT_S, 1.0));
     let mut before_m = f64::INFINITY;
     for _ in 0..60 {
         let told = tick(&mut chain, &mut obstacles, &mut escaper, &mut Propagator::default());
@@ -185,7 +190,7 @@ fn with_self_collision_the_chain_does_not_run_into_itself() {
     let mut propagator = Propagator::new(Rules { self_collision: true, ..Rules::default() });
     for seed in 1..5 {
         let (mut chain, mut obstacles) = (swarm::<2>(10), movers(seed, 10, 0.5));
-        let mut escaper = Escaper::new(Escape::new(DT_S, 1.5));
+        let mut escaper = Escaper::new(literal(DT_S, 1.5));
         for _ in 0..400 {
             tick(&mut chain, &mut obstacles, &mut escaper, &mut propagator);
             for (i, a) in chain.points().iter().enumerate() {
@@ -202,7 +207,7 @@ fn walls_stop_an_escape_and_are_not_passed() {
     let ball = Obstacle { velocity_m_s: [0.0, -0.3], ..Obstacle::ball(2, [0.1, 1.0], 0.3) };
     let mut obstacles = Obstacles::new(vec![wall, ball], 1.0).unwrap();
     let mut chain = swarm::<2>(2);
-    let mut escaper = Escaper::new(Escape::new(DT_S, 1.5));
+    let mut escaper = Escaper::new(literal(DT_S, 1.5));
     for _ in 0..300 {
         obstacles.advance(DT_S);
         let start = chain.points().to_vec();
@@ -225,7 +230,7 @@ fn where_nothing_moves_nothing_changes() {
     let before = chain.clone();
     let obstacles = Obstacles::new(vec![Obstacle::ball(1, [0.0, 0.2], 0.3)], 1.0).unwrap();
     let start = chain.points().to_vec();
-    let told = Escaper::new(Escape::new(DT_S, 1.0))
+    let told = Escaper::new(literal(DT_S, 1.0))
         .escape(&mut chain, &obstacles, &mut Propagator::default(), &start, &mut WayOut::default())
         .unwrap();
     assert_eq!((told.moves, told.left, &chain), (0, None, &before));
@@ -248,9 +253,9 @@ fn wrong_numbers_are_named() {
             .place()
             .to_string()
     };
-    assert_eq!(place(Escape::new(0.0, 1.0), &start), "escape");
-    assert_eq!(place(Escape::new(0.1, f64::NAN), &start), "escape");
-    let blind = Escape { ticks_ahead: -1.0, ..Escape::new(0.1, 1.0) };
+    assert_eq!(place(literal(0.0, 1.0), &start), "escape");
+    assert_eq!(place(literal(0.1, f64::NAN), &start), "escape");
+    let blind = Escape { ticks_ahead: -1.0, ..literal(0.1, 1.0) };
     assert_eq!(place(blind, &start), "escape");
-    assert_eq!(place(Escape::new(0.1, 1.0), &start[1..]), "start of the tick");
+    assert_eq!(place(literal(0.1, 1.0), &start[1..]), "start of the tick");
 }

@@ -1,4 +1,4 @@
-use super::super::{Escaper, Method};
+use super::super::Escaper;
 use super::*;
 use crate::rods::chain::{Connector, Mobility, Rod};
 use crate::rods::geometry::{Core, cross_each_other, scaled, unit};
@@ -17,10 +17,6 @@ const SOLID: Rules = Rules {
     backtracks: 64,
     step_m: None,
 };
-
-fn rules(speed_max_m_s: f64) -> Escape {
-    Escape { method: Method::Simultaneous, ..Escape::new(DT_S, speed_max_m_s) }
-}
 
 fn straight<const D: usize>(n_rods: usize, rod: Rod, radius_m: f64) -> Chain<D> {
     let mut start = [0.0; D];
@@ -56,7 +52,7 @@ struct Case<const D: usize> {
 impl<const D: usize> Case<D> {
     fn new(chain: Chain<D>, obstacles: Vec<Obstacle<D>>, speed_max_m_s: f64) -> Self {
         let obstacles = Obstacles::new(obstacles, 1.0).unwrap();
-        let escaper = Escaper::new(rules(speed_max_m_s));
+        let escaper = Escaper::new(Escape::new(DT_S, speed_max_m_s));
         Self { chain, obstacles, escaper, way_out: WayOut::default() }
     }
 
@@ -207,7 +203,7 @@ fn inside_by(way: Option<Through<2>>, from: usize) -> usize {
     let discs = vec![ball(1, [0.2, 2.0], [0.0, -0.5]), ball(2, [0.2, -2.0], [0.0, 0.5])];
     let mut obstacles = Obstacles::new(discs, 1.0).unwrap();
     let (mut chain, mut solver) = (straight::<2>(14, SWARM, 0.25), Solver::default());
-    let margin = rules(1.0).look_ahead();
+    let margin = Escape::new(DT_S, 1.0).look_ahead();
     let mut inside = 0;
     for tick in 0..400 {
         obstacles.advance(DT_S);
