@@ -25,7 +25,7 @@ pub use checked::{
 };
 pub use explain::nearest;
 pub use keys::Key;
-pub use kind::{Compiled, Foreign, Kind, Worlds};
+pub use kind::{Compiled, Foreign, Kind, Seeds, Worlds};
 pub use remark::{Remark, Severity};
 pub use sections::Sections;
 pub use source::{FORMAT, Head, Preamble, Source};

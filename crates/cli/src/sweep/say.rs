@@ -83,7 +83,7 @@ fn interrupted(told: Told<'_>, finished: usize) -> ExitCode {
     match path.map(Path::display) {
         None => console.note("Interrupted; nothing is kept without --out DIR."),
         Some(path) => {
-            let all = plan.len();
+            let all = plan.runs();
             let of = if plan.until.is_some() { String::new() } else { format!(" of {all}") };
             console.note(format!(
                 "{finished}{of} runs are finished; `sidestep resume {path}` goes on."

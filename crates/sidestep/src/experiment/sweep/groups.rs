@@ -1,6 +1,7 @@
 //! Runs by variant and replicate.
 
 use super::table::{Role, RunColumn, RunTable};
+use super::variant::DEFAULT;
 use crate::statistics::{Sample, wilson};
 use serde::Serialize;
 use sidestep_document::Estimate;
@@ -22,7 +23,7 @@ impl Level {
     pub(super) fn name(&self) -> String {
         match self {
             Self::Number(value) => value.to_string(),
-            Self::Text(text) if text.is_empty() => "(default)".into(),
+            Self::Text(text) if text.is_empty() => DEFAULT.into(),
             Self::Text(text) => text.clone(),
         }
     }
@@ -52,13 +53,15 @@ pub(super) struct Groups<'a> {
     /// Whether equal replicates of two variants are related by a common seed.
     pub(super) paired: bool,
     pub(super) parameters: Vec<Parameter>,
+    /// For each variant, whether seeds change nothing in it.
+    pub(super) seedless: Vec<bool>,
     /// The run of each variant and replicate.
     run: BTreeMap<(usize, i64), usize>,
 }
 
 impl<'a> Groups<'a> {
     /// Groups the runs of `table`.
-    pub(super) fn of(table: &'a RunTable) -> Result<Self, InputError> {
+    pub(super) fn of(table: &'a RunTable, seedless: &BTreeSet<String>) -> Result<Self, InputError> {
         table.check()?;
         let runs = ordered(table);
         let label = |run: usize| variant_name(table, run);
@@ -87,7 +90,8 @@ impl<'a> Groups<'a> {
         let parameters = parameters(table, &run_of, variants.len());
         let paired = replicate.is_some();
         let replicates = replicates.into_iter().collect();
-        Ok(Self { table, variants, replicates, paired, parameters, run: run_of })
+        let seedless = variants.iter().map(|name| seedless.contains(name)).collect();
+        Ok(Self { seedless, table, variants, replicates, paired, parameters, run: run_of })
     }
 
     /// Returns the number of runs of a variant.
@@ -100,14 +104,18 @@ impl<'a> Groups<'a> {
         self.run.range((variant, i64::MIN)..=(variant, i64::MAX)).map(|(_, run)| *run)
     }
 
-    /// Returns the values of a variant, one for each of its runs.
+    /// Returns the values of a variant, one for each of its runs; one where seeds change nothing.
     pub(super) fn values(&self, metric: &RunColumn, variant: usize) -> Vec<Option<f64>> {
-        self.rows(variant).map(|run| metric.values.number(run)).collect()
+        let most = if self.seedless[variant] { 1 } else { usize::MAX };
+        self.rows(variant).take(most).map(|run| metric.values.number(run)).collect()
     }
 
-    /// Returns the values of a variant, one for each replicate of the whole table.
+    /// Returns the values of a variant, one for each replicate of the whole table. Where seeds change
+    /// nothing, all have that of the first run.
     pub(super) fn by_replicate(&self, metric: &RunColumn, variant: usize) -> Vec<Option<f64>> {
-        let value = |r: &i64| metric.values.number(*self.run.get(&(variant, *r))?);
+        let same = self.rows(variant).next().filter(|_| self.seedless[variant]);
+        let run_of = |r: &i64| same.or_else(|| self.run.get(&(variant, *r)).copied());
+        let value = |r: &i64| metric.values.number(run_of(r)?);
         self.replicates.iter().map(value).collect()
     }
 
@@ -121,7 +129,7 @@ impl<'a> Groups<'a> {
         if let [variant] = group {
             let values = self.values(metric, *variant);
             if matches!(metric.values, Values::Bool(_)) {
-                return share(&values);
+                return share(&values, self.seedless[*variant]);
             }
             return Estimate::of(values);
         }
@@ -131,7 +139,9 @@ impl<'a> Groups<'a> {
             let of_all: Option<Vec<f64>> = columns.iter().map(|c| finite(c[r])).collect();
             crate::statistics::mean(&of_all?)
         };
-        Estimate::of((0..self.replicates.len()).map(mean))
+        // Where all are seedless, every replicate gives the same number.
+        let all = if group.iter().all(|v| self.seedless[*v]) { 1 } else { usize::MAX };
+        Estimate::of((0..self.replicates.len().min(all)).map(mean))
     }
 
     /// Whether every level of `parameter` occurs with the same levels of all others, as in a full
@@ -156,11 +166,11 @@ impl<'a> Groups<'a> {
     }
 }
 
-fn share(values: &[Option<f64>]) -> Estimate {
+fn share(values: &[Option<f64>], seedless: bool) -> Estimate {
     let values = Sample::of(values.iter().copied()).values;
     let (yes, n) = (values.iter().sum::<f64>(), values.len());
     let mut share = Estimate::of(values.into_iter().map(Some));
-    share.interval = (n > 0).then(|| wilson(yes, n as f64));
+    share.interval = (n > 0 && !seedless).then(|| wilson(yes, n as f64));
     share
 }
 

@@ -30,12 +30,13 @@ fn brief_of(summary: &Summary, metric: &MetricSummary) -> Table {
     let mut table = Table::new(sentence(&metric.label), "", &columns);
     for variant in &metric.variants {
         let value = match &variant.values {
-            Described::Numbers(numbers) => with_interval(numbers.mean, numbers.interval),
-            Described::Share(share) => with_interval(share.share, Some(share.interval)),
+            Described::Numbers(numbers) => center(variant, numbers.mean, numbers.interval),
+            Described::Share(share) => center(variant, share.share, share.interval),
         };
         let mut row = vec![variant.variant.clone(), variant.n.to_string(), value];
         if let Some(c) = metric.comparisons.iter().find(|c| c.variant == variant.variant) {
-            row.push(format!("{} n={}", with_interval(c.difference, c.interval), c.pairs));
+            let n = if c.pairs > 1 { format!(" n={}", c.pairs) } else { String::new() };
+            row.push(format!("{}{n}", with_interval(c.difference, c.interval)));
             row.push(c.p_holm.map_or("-".into(), p_value));
         }
         table.row(row);
@@ -100,7 +101,7 @@ fn number_row(variant: &VariantMetric, numbers: &Numbers) -> Vec<String> {
         variant.variant.clone(),
         variant.n.to_string(),
         variant.missing.to_string(),
-        with_interval(numbers.mean, numbers.interval),
+        center(variant, numbers.mean, numbers.interval),
         bootstrap,
         quantile(2),
         quantile(0),
@@ -129,7 +130,7 @@ fn shares(metric: &MetricSummary) -> Table {
     for variant in &metric.variants {
         if let Described::Share(Share { yes, share, interval }) = variant.values {
             let counts = [variant.n, variant.missing, yes].map(|count| count.to_string());
-            let share = with_interval(share, Some(interval));
+            let share = center(variant, share, interval);
             table.row([variant.variant.clone()].into_iter().chain(counts).chain([share]));
         }
     }
@@ -210,6 +211,14 @@ pub(super) fn left_out(summary: &Summary) -> Option<Table> {
         .filter(asked)
         .for_each(|l| table.row([l.metric.clone(), l.reason.clone()]));
     (!table.rows.is_empty()).then_some(table)
+}
+
+/// Returns the mean of a variant with its interval; alone where seeds change nothing.
+fn center(variant: &VariantMetric, value: Option<f64>, interval: Option<Interval>) -> String {
+    match value {
+        Some(value) if variant.seedless => number(value, None),
+        value => with_interval(value, interval),
+    }
 }
 
 /// `12.3 [11.9, 12.7]`; `-` for what is absent.
