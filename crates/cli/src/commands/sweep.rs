@@ -175,7 +175,7 @@ fn plan(args: &PlanArgs, console: Console) -> Result<ExitCode, Failure> {
         "cells": plan.runs(),
         "agents": plan.agents,
     });
-    console.result(&json, || {
+    console.result_or_short(&json, String::new, || {
         let dir = args.out.display();
         let lines = [
             ("variants", grouped(plan.variants.len() as u64)),

@@ -21,13 +21,25 @@ pub(super) fn brief(summary: &Summary) -> Vec<Table> {
     summary.metrics.iter().map(|metric| brief_of(summary, metric)).collect()
 }
 
+/// Largest number of characters of a heading.
+const MOST_OF_HEADING: usize = 24;
+
 fn brief_of(summary: &Summary, metric: &MetricSummary) -> Table {
-    let against = summary.baseline.as_ref().map(|name| format!("minus {name}"));
+    let minus = summary.baseline.as_ref().map(|name| format!("minus {name}"));
+    // A long name stands in the title.
+    let is_long = |words: &&String| words.chars().count() > MOST_OF_HEADING;
+    let (title, against) = match minus.as_ref().filter(is_long) {
+        Some(words) => {
+            let title = format!("{}, difference: {words}", sentence(&metric.label));
+            (title, Some("difference".to_string()))
+        }
+        None => (sentence(&metric.label), minus),
+    };
     let mean = if metric.is_share { "share of runs" } else { "mean" };
     let mut columns = vec!["variant", "n", mean];
     columns.extend(against.as_deref());
     columns.extend(against.as_ref().map(|_| "p (Holm)"));
-    let mut table = Table::new(sentence(&metric.label), "", &columns);
+    let mut table = Table::new(title, "", &columns);
     for variant in &metric.variants {
         let value = match &variant.values {
             Described::Numbers(numbers) => center(variant, numbers.mean, numbers.interval),
