@@ -17,7 +17,7 @@ pub(crate) struct Cli {
     #[arg(long, global = true, display_order = LAST)]
     pub(crate) json: bool,
 
-    /// Show no progress bar, and print only the digest of a run
+    /// Show no progress bar, and print only the result: the digest of a run, the table of a sweep
     #[arg(long, short, global = true, display_order = LAST)]
     pub(crate) quiet: bool,
 

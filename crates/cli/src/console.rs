@@ -4,8 +4,9 @@ use serde::Serialize;
 use sidestep_document::Table;
 use std::fmt::Display;
 use std::io::{IsTerminal, Write};
+use std::ops::Range;
 
-pub(crate) use sidestep::kernel::words::{aligned, grouped};
+pub(crate) use sidestep::kernel::words::{LINE_COLS, aligned, grouped, wrapped};
 pub(crate) use sidestep_session::report::duration;
 
 /// Columns of text if the terminal does not report its width.
@@ -78,22 +79,98 @@ fn write_out(text: &str) {
     let _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());
 }
 
-/// Returns a table as text in columns, with numbers aligned to the right.
+/// Returns a table as text in columns, numbers aligned to the right: in several blocks, each with the
+/// first column, where it is wider than a line.
 pub(crate) fn in_columns(table: &Table) -> String {
     let rows: Vec<Vec<&str>> = table.rows.iter().map(|row| table.cells(row).collect()).collect();
     let head: Vec<&str> = table.columns.iter().map(String::as_str).collect();
-    let width = |k: usize| {
-        let all = std::iter::once(&head).chain(&rows);
-        all.map(|row| row[k].chars().count()).max().unwrap_or(0)
+    let lines: Vec<Vec<&str>> = std::iter::once(head).chain(rows).collect();
+    let blocks = blocks(&widths(&lines));
+    let text = |block: &Range<usize>| block_text(&lines, block);
+    blocks.iter().map(text).collect::<Vec<_>>().join("\n")
+}
+
+/// Columns between two columns of a table.
+const GAP: usize = 3;
+
+/// Largest width of a first column that stands beside the others.
+const MOST_BESIDE: usize = 40;
+
+fn widths(lines: &[Vec<&str>]) -> Vec<usize> {
+    let width = |k: usize| lines.iter().map(|line| line[k].chars().count()).max().unwrap_or(0);
+    (0..lines.first().map_or(0, Vec::len)).map(width).collect()
+}
+
+/// Returns the columns beside the first of each block: as many as a line has room for.
+fn blocks(widths: &[usize]) -> Vec<Range<usize>> {
+    let first = widths.first().copied().filter(|w| *w <= MOST_BESIDE).unwrap_or(0);
+    let mut blocks: Vec<Range<usize>> = Vec::new();
+    let mut used = usize::MAX;
+    for (k, width) in widths.iter().enumerate().skip(1) {
+        let more = GAP + width;
+        match blocks.last_mut() {
+            Some(block) if used.saturating_add(more) <= LINE_COLS => {
+                block.end = k + 1;
+                used += more;
+            }
+            _ => {
+                blocks.push(k..k + 1);
+                used = 2 + first + more;
+            }
+        }
+    }
+    if blocks.is_empty() {
+        blocks.push(1..1);
+    }
+    blocks
+}
+
+/// Returns the first column and those of a block; a first column that is too wide stands on lines of
+/// its own.
+fn block_text(lines: &[Vec<&str>], block: &Range<usize>) -> String {
+    let widths = widths(lines);
+    let first = widths.first().copied().unwrap_or(0);
+    let line = |line: &Vec<&str>| {
+        let cell = |k: usize| format!("{:GAP$}{:>width$}", "", line[k], width = widths[k]);
+        let cells: String = block.clone().map(cell).collect();
+        match first <= MOST_BESIDE {
+            true => format!("  {}\n", format!("{:<first$}{cells}", line[0]).trim_end()),
+            false => format!("  {}\n  {}\n", line[0], cells.trim_end()),
+        }
     };
-    let widths: Vec<usize> = (0..head.len()).map(width).collect();
-    let line = |row: &Vec<&str>| {
-        let cell = |(k, text): (usize, &&str)| match k {
-            0 => format!("{text:<width$}", width = widths[k]),
-            _ => format!("{text:>width$}", width = widths[k]),
-        };
-        let cells: Vec<String> = row.iter().enumerate().map(cell).collect();
-        format!("  {}\n", cells.join("   ").trim_end())
-    };
-    std::iter::once(&head).chain(&rows).map(line).collect()
+    lines.iter().map(line).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn table(first: &str, columns: usize) -> Table {
+        let heads: Vec<String> = (0..columns).map(|k| format!("heading {k}")).collect();
+        let heads: Vec<&str> =
+            std::iter::once("what").chain(heads.iter().map(String::as_str)).collect();
+        let mut table = Table::new("t", "", &heads);
+        let cells = (0..columns).map(|k| format!("{k}.5 [{k}.25, {k}.75]"));
+        table.row(std::iter::once(first.to_string()).chain(cells));
+        table
+    }
+
+    #[test]
+    fn a_table_that_fits_is_one_block() {
+        assert_eq!(
+            in_columns(&table("pc", 2)),
+            "  what           heading 0           heading 1\n  pc     0.5 [0.25, 0.75]   1.5 [1.25, \
+             1.75]\n"
+        );
+    }
+
+    #[test]
+    fn no_line_of_a_wide_table_is_longer_than_80_columns_and_no_cell_is_lost() {
+        for first in ["pc", &"a long name of a variant".repeat(3)] {
+            let text = in_columns(&table(first, 9));
+            assert!(text.lines().all(|line| line.chars().count() <= 80), "{text}");
+            assert!((0..9).all(|k| text.contains(&format!("{k}.5 [{k}.25"))), "{text}");
+            assert_eq!(text.matches(first).count(), text.matches("what").count(), "{text}");
+        }
+    }
 }

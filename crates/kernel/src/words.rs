@@ -29,10 +29,44 @@ pub fn grouped(number: u64) -> String {
     head.into_iter().chain(groups).collect::<Vec<_>>().join(" ")
 }
 
-/// Returns lines of names and values, the values below each other.
+/// Columns of a line of text.
+pub const LINE_COLS: usize = 80;
+
+/// Returns lines of names and values, the values below each other and broken into lines of
+/// [`LINE_COLS`] columns where they have spaces.
 pub fn aligned(rows: &[(String, String)]) -> String {
     let width = rows.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0);
-    rows.iter().map(|(name, value)| format!("  {name:<width$}  {value}\n")).collect()
+    let line = |(name, value): &(String, String)| {
+        let words = wrapped(value, LINE_COLS.saturating_sub(width + 4));
+        format!(
+            "  {name:<width$}  {}\n",
+            words.join(&format!("\n{:indent$}", "", indent = width + 4))
+        )
+    };
+    rows.iter().map(line).collect()
+}
+
+/// Returns text in lines of at most `cols` columns, broken at spaces; a longer word is a line. Text
+/// that fits, and each line feed in it, stays as it is.
+pub fn wrapped(text: &str, cols: usize) -> Vec<String> {
+    text.split('\n').flat_map(|line| wrapped_line(line, cols)).collect()
+}
+
+fn wrapped_line(text: &str, cols: usize) -> Vec<String> {
+    if text.chars().count() <= cols {
+        return vec![text.into()];
+    }
+    let mut lines: Vec<String> = Vec::new();
+    for word in text.split(' ') {
+        match lines.last_mut() {
+            Some(line) if line.chars().count() + 1 + word.chars().count() <= cols => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => lines.push(word.into()),
+        }
+    }
+    lines
 }
 
 #[cfg(test)]
@@ -43,6 +77,17 @@ mod tests {
     fn values_stand_below_each_other() {
         let rows = [line("a", "1"), line("long", "2")];
         assert_eq!(aligned(&rows), "  a     1\n  long  2\n");
+    }
+
+    #[test]
+    fn long_values_are_broken_at_spaces_and_stand_below_their_first_line() {
+        let words = vec!["seventeen_columns"; 6].join(" ");
+        let told = aligned(&[line("name", words)]);
+        let lines: Vec<&str> = told.lines().collect();
+        assert_eq!(lines.len(), 2, "{told}");
+        assert!(lines[1].starts_with("        seventeen") && lines.iter().all(|l| l.len() <= 80));
+        assert_eq!(wrapped(&"x".repeat(99), 80), ["x".repeat(99)], "a word is never broken");
+        assert_eq!(wrapped("a  b\nc", 80), ["a  b", "c"]);
     }
 
     #[test]

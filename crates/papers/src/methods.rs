@@ -3,13 +3,14 @@
 use crate::cells;
 use crate::study::{Progress, all_of, setting};
 use serde::Serialize;
-use sidestep::experiment::sweep::Setting;
-use sidestep::kernel::{InputError, Simulation};
-use sidestep::scenario::Source;
+use sidestep::kernel::{Digest, InputError, Simulation};
+use sidestep::scenario::{Seeds, Source};
 use sidestep::statistics::{Interval, wilson};
 use sidestep::worlds::airspace::airspace_run;
 use sidestep::worlds::airspace::metrics::Metrics;
+use sidestep::worlds::airspace::scenario::Compiled;
 use sidestep::worlds::airspace::world::Method;
+use sidestep_document::estimate::short;
 use sidestep_document::{Estimate, Table};
 
 /// Results of a method over all runs.
@@ -19,10 +20,12 @@ pub struct MethodResult {
     pub method: &'static str,
     /// Runs; run `k` of every method has the same traffic.
     pub runs: usize,
+    /// What another seed changes; where it changes nothing, there is one run.
+    pub seeds: Seeds,
     /// Runs without any loss of separation, and the 95 % interval of their share (Wilson).
     pub loss_free: usize,
-    /// See `loss_free`.
-    pub loss_free_interval: Interval,
+    /// See `loss_free`; absent where seeds change nothing.
+    pub loss_free_interval: Option<Interval>,
     /// Losses of separation per run.
     pub losses: Estimate,
     /// Closest approach over all runs, meters.
@@ -42,7 +45,8 @@ pub struct MethodResult {
 }
 
 /// Runs `source` with each method and `runs` seeds, starting at its own, until all airplanes have
-/// arrived or its cycles are over.
+/// arrived or its cycles are over; once where no random number is drawn, and where two runs with
+/// different seeds end in the same state.
 ///
 /// # Errors
 /// When the scenario is wrong.
@@ -55,36 +59,81 @@ pub fn compare(
 ) -> Result<Vec<MethodResult>, InputError> {
     let mut results = Vec::new();
     for method in methods {
-        let seeds: Vec<u64> = (seed..seed + runs as u64).collect();
-        let run = |seed: &u64| {
-            let settings =
-                [setting("airspace.method", method.name()), setting("seed", *seed as i64)];
-            flown(&source.clone().with(&settings.map(|s| Setting::to_override(&s)))?)
-        };
+        let source =
+            source.clone().with(&[setting("airspace.method", method.name()).to_override()])?;
         let report = |share| progress(method.name(), share);
-        results.push(result(method.name(), &all_of(&seeds, workers, report, run)?));
+        let flights = Flights { source: &source, workers };
+        let (seeds, all) = flights.all((seed, runs), report)?;
+        results.push(result(method.name(), seeds, &all));
     }
     Ok(results)
 }
 
+/// A scenario to be flown with several seeds.
+struct Flights<'a> {
+    source: &'a Source,
+    workers: usize,
+}
+
+/// Number of flights that tell whether seeds change anything, where the world cannot tell.
+const TRIALS: usize = 2;
+
+impl Flights<'_> {
+    /// Flies with as many seeds as are of use, and returns what they change.
+    fn all(
+        &self,
+        (seed, runs): (u64, usize),
+        mut report: impl FnMut(f64),
+    ) -> Result<(Seeds, Vec<Metrics>), InputError> {
+        let seeds: Vec<u64> = (seed..seed + runs as u64).collect();
+        let first = match Compiled::new(self.source)?.seeds {
+            Seeds::Nothing => return Ok((Seeds::Nothing, ends(&self.fly(&seeds[..1], report)?))),
+            Seeds::Perhaps if runs > TRIALS => self.fly(&seeds[..TRIALS], &mut report)?,
+            Seeds::Perhaps | Seeds::Decide => Vec::new(),
+        };
+        if let [(one, digest), (_, other)] = &first[..]
+            && digest == other
+        {
+            return Ok((Seeds::Perhaps, vec![one.clone()]));
+        }
+        let rest = self.fly(&seeds[first.len()..], report)?;
+        Ok((Seeds::Decide, ends(&[first, rest].concat())))
+    }
+
+    fn fly(
+        &self,
+        seeds: &[u64],
+        report: impl FnMut(f64),
+    ) -> Result<Vec<(Metrics, Digest)>, InputError> {
+        let run = |seed: &u64| flown(&self.source.clone().with(&[format!("seed={seed}")])?);
+        all_of(seeds, self.workers, report, run)
+    }
+}
+
+fn ends(flights: &[(Metrics, Digest)]) -> Vec<Metrics> {
+    flights.iter().map(|(metrics, _)| metrics.clone()).collect()
+}
+
 /// Runs a scenario to its end.
-fn flown(source: &Source) -> Result<Metrics, InputError> {
+fn flown(source: &Source) -> Result<(Metrics, Digest), InputError> {
     let mut run = airspace_run(source, 1)?;
     let cycles = run.plan().cycles;
     while run.cycle() < cycles && !run.is_over() {
         run.advance(cycles - run.cycle());
     }
-    Ok(run.metrics())
+    Ok((run.metrics(), run.digest()))
 }
 
-fn result(method: &'static str, all: &[Metrics]) -> MethodResult {
+fn result(method: &'static str, seeds: Seeds, all: &[Metrics]) -> MethodResult {
     let of = |value: fn(&Metrics) -> Option<f64>| Estimate::of(all.iter().map(value));
     let loss_free = all.iter().filter(|m| m.losses_of_separation == 0).count();
     MethodResult {
         method,
         runs: all.len(),
+        seeds,
         loss_free,
-        loss_free_interval: wilson(loss_free as f64, all.len() as f64),
+        loss_free_interval: (seeds == Seeds::Decide)
+            .then(|| wilson(loss_free as f64, all.len() as f64)),
         losses: of(|m| Some(m.losses_of_separation as f64)),
         min_separation_m: all.iter().filter_map(|m| m.min_separation_m).reduce(f64::min),
         arrived: of(|m| Some(m.arrived as f64 / m.airplanes.max(1) as f64)),
@@ -98,35 +147,90 @@ fn result(method: &'static str, all: &[Metrics]) -> MethodResult {
 
 /// Returns a table of the results side by side.
 pub fn table(title: &str, results: &[MethodResult]) -> Table {
-    let note = "Means over runs with their 95 % intervals; every method flies the same traffic.";
-    let loss_free = |r: &MethodResult| {
-        let Interval { low, high } = r.loss_free_interval;
-        format!("{}/{} [{low:.2}, {high:.2}]", r.loss_free, r.runs)
-    };
     cells::table(
         title,
-        note,
+        note(results),
         results,
         &[
             ("method", &|r| r.method.to_string()),
             ("runs without loss", &|r| loss_free(r)),
-            ("losses", &|r| r.losses.to_string()),
+            ("losses", &|r| of_runs(r, &r.losses)),
             ("nearest of all runs, m", &|r| {
                 r.min_separation_m.map_or("-".into(), |d| format!("{d:.1}"))
             }),
-            ("arrived", &|r| r.arrived.to_string()),
-            ("delay, %", &|r| r.delay_percent.to_string()),
-            ("deciding, s", &|r| r.optimise_cpu_s.to_string()),
-            ("messages", &|r| r.messages.to_string()),
-            ("bytes", &|r| r.bytes.to_string()),
-            ("changed by the shield", &|r| r.shield_overrides.to_string()),
+            ("arrived", &|r| of_runs(r, &r.arrived)),
+            ("delay, %", &|r| of_runs(r, &r.delay_percent)),
+            ("deciding, s", &|r| of_runs(r, &r.optimise_cpu_s)),
+            ("messages", &|r| of_runs(r, &r.messages)),
+            ("bytes", &|r| of_runs(r, &r.bytes)),
+            ("changed by the shield", &|r| of_runs(r, &r.shield_overrides)),
         ],
     )
+}
+
+fn loss_free(result: &MethodResult) -> String {
+    let runs = format!("{}/{}", result.loss_free, result.runs);
+    match result.loss_free_interval {
+        Some(Interval { low, high }) => format!("{runs} [{low:.2}, {high:.2}]"),
+        None => runs,
+    }
+}
+
+/// Returns a mean over runs; the number alone where there is one.
+fn of_runs(result: &MethodResult, estimate: &Estimate) -> String {
+    match (result.seeds, estimate.mean) {
+        (Seeds::Nothing | Seeds::Perhaps, Some(mean)) => short(mean),
+        _ => estimate.to_string(),
+    }
+}
+
+/// Returns what a reader must know about the runs.
+fn note(results: &[MethodResult]) -> String {
+    let of = |seeds: Seeds| -> Option<String> {
+        let names = results.iter().filter(|r| r.seeds == seeds).map(|r| r.method);
+        let names = names.collect::<Vec<_>>().join(", ");
+        (!names.is_empty()).then_some(names)
+    };
+    let mut words = vec!["Every method flies the same traffic.".to_string()];
+    if of(Seeds::Decide).is_some() {
+        words.push("Means over runs, with their 95 % intervals.".into());
+    }
+    if let Some(names) = of(Seeds::Nothing) {
+        words.push(format!(
+            "Seeds change nothing with {names}: no random number is drawn. So there is one run, and \
+             no interval."
+        ));
+    }
+    if let Some(names) = of(Seeds::Perhaps) {
+        words.push(format!(
+            "Seeds are taken to change nothing with {names}: two runs with different seeds ended in \
+             the same state, to the bit. So there is no interval."
+        ));
+    }
+    words.join(" ")
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn traffic_that_no_seed_changes_is_flown_once_and_has_no_interval() {
+        let text = "format = 1\nworld = \"airspace\"\n[airspace]\nshield = \"off\"\n\
+                    [[airplanes]]\nat_m = [0, 0]\nway_points_m = [[9000, 0]]\n\
+                    [[airplanes]]\nat_m = [9000, 500]\nway_points_m = [[0, 500]]\n";
+        let source = Source::new("two", text, "");
+        let found = compare(&source, &Method::ALL, (1, 5), 2, &mut |_, _| ()).expect("valid");
+        let table = table("t", &found);
+        for (result, row) in found.iter().zip(&table.rows) {
+            assert_eq!((result.runs, result.losses.n), (1, 1), "{}", result.method);
+            assert!(result.loss_free_interval.is_none());
+            let has_mark = |cell: &String| cell.contains("[") || cell.contains("n=");
+            assert!(!row.iter().any(has_mark), "{row:?}");
+        }
+        assert!(table.note.contains("no random number is drawn"), "{}", table.note);
+        assert!(table.note.contains("nothing with pc: two runs"), "{}", table.note);
+    }
 
     #[test]
     fn methods_fly_the_same_traffic_and_doing_nothing_is_no_method() {

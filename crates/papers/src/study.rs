@@ -7,7 +7,7 @@
 use serde_json::{Map, Value};
 use sidestep::experiment::sweep::work::run_cells;
 use sidestep::experiment::sweep::{
-    Cell, Outcome, Plan, Rows, RunTable, Setting, Shard, Sweep, Variant, start,
+    Base, Cell, Outcome, Plan, Rows, RunTable, Setting, Shard, Sweep, Variant, start,
 };
 use sidestep::kernel::{Cycle, InputError, Simulation};
 use sidestep::scenario::Source;
@@ -68,7 +68,7 @@ pub(crate) fn source(text: &str, settings: &[Setting]) -> Result<Source, InputEr
 pub(crate) struct Study {
     scenario: &'static str,
     sweep: Sweep,
-    variants: Vec<Vec<Setting>>,
+    variants: Vec<Variant>,
 }
 
 impl Study {
@@ -85,6 +85,7 @@ impl Study {
     /// Returns variants that no sweep file can describe, because they set no keys of a scenario.
     pub(crate) fn of_variants(scenario: &'static str, variants: Vec<Vec<Setting>>) -> Self {
         let sweep = Sweep::of_scenario("a case of this experiment");
+        let variants = variants.into_iter().map(Variant::from).collect();
         Self { scenario, sweep, variants }
     }
 
@@ -93,7 +94,7 @@ impl Study {
         self.sweep.replicates = seeds as u32;
         self.sweep.first_seed = Some(1);
         // A variant that sets its own number of cycles keeps it.
-        let is_open = |v: &Vec<Setting>| v.iter().all(|s| s.key != "cycles");
+        let is_open = |v: &Variant| v.value("cycles").is_none();
         if let Some(cycles) = cycles.filter(|_| self.variants.iter().all(is_open)) {
             self.sweep.fixed.push(setting("cycles", cycles as i64));
         }
@@ -102,7 +103,7 @@ impl Study {
 
     /// Keeps the variants for which this holds.
     pub(crate) fn keep(mut self, holds: impl Fn(&Variant) -> bool) -> Self {
-        self.variants.retain(|settings| holds(&Variant { settings: settings.clone() }));
+        self.variants.retain(holds);
         self
     }
 
@@ -161,7 +162,8 @@ impl Study {
         run: impl Fn(&Scenario<'_>, &Variant, &Cell) -> Result<Outcome, InputError> + Sync,
     ) -> Result<Results, InputError> {
         let base = source(self.scenario, &self.sweep.fixed)?;
-        let plan = Plan::new(&self.sweep, self.variants.clone(), ("", 1))?;
+        let own = Base { world: "", seed: 1, source: &base };
+        let plan = Plan::new(&self.sweep, self.variants.clone(), own)?;
         let cells: Vec<Cell> = plan.share(Shard::ALL).collect();
         let outcomes = all_of(
             &cells,

@@ -27,8 +27,9 @@ fn every_scenario_compiles_and_so_do_the_variants_of_every_sweep() {
             continue;
         }
         let sweep = Sweep::read(&path).expect("a right sweep");
-        for settings in sweep.design.variants(&sweep.place).expect("right variants") {
-            let overrides: Vec<String> = settings.iter().map(Setting::to_override).collect();
+        for variant in sweep.design.variants(&sweep.place).expect("right variants") {
+            let settings = variant.settings.iter();
+            let overrides: Vec<String> = settings.map(Setting::to_override).collect();
             let source = Source::read(&sweep.scenario, &overrides).expect("settings that fit");
             WORLDS.compile(&source).expect("a right variant");
         }

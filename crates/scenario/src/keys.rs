@@ -6,8 +6,8 @@
 use crate::Source;
 use sidestep_kernel::InputError;
 use std::ops::Range;
-use toml::Spanned;
 use toml::de::{DeTable, DeValue};
+use toml::{Spanned, Value};
 
 /// A key of a table.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -27,6 +27,26 @@ impl Source {
         let mut keys = found.unwrap_or_default();
         keys.sort_by_key(|key| key.span.start);
         keys
+    }
+
+    /// Returns the value of a key, if the text has it.
+    pub fn value(&self, path: &str) -> Option<Value> {
+        let mut found = Value::Table(self.text.parse().ok()?);
+        for part in path.split('.') {
+            if let Value::Array(many) = &mut found
+                && part.parse::<usize>().is_err()
+                && many.len() == 1
+            {
+                found = many.remove(0);
+            }
+            found = match (found, part.parse::<usize>()) {
+                (Value::Array(many), Ok(index)) => many.into_iter().nth(index)?,
+                (found @ Value::Table(_), Ok(0)) => found,
+                (Value::Table(mut table), _) => table.remove(part)?,
+                _ => return None,
+            };
+        }
+        Some(found)
     }
 
     /// Creates an error at a key; without a position where the key is not in the text.
@@ -117,6 +137,17 @@ mod tests {
         let names: Vec<String> = source.keys("t").into_iter().map(|key| key.name).collect();
         assert_eq!(names, ["z", "b"]);
         assert_eq!((source.keys("t.z"), source.keys("u")), (vec![], vec![]));
+    }
+
+    #[test]
+    fn values_are_found_as_overrides_name_them() {
+        let source = Source::new("s.toml", TEXT, "");
+        let of = |path| source.value(path).map(|value| value.to_string());
+        assert_eq!((of("a"), of("robots.0.count")), (Some("1".into()), Some("2".into())));
+        assert_eq!((of("people.n"), of("people.0.n")), (Some("1".into()), Some("1".into())));
+        assert_eq!((of("robots.count"), of("robots.2.count"), of("a.b")), (None, None, None));
+        let single = Source::new("s.toml", "[[robots]]\ncount = 2\n", "");
+        assert_eq!(single.value("robots.count"), Some(Value::Integer(2)));
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! The interface of a world for programs that run scenarios and know no world.
 
 use crate::{Meaning, Remark, Resolved, Source, nearest};
+use serde::{Deserialize, Serialize};
 use sidestep_kernel::words::{Lines, Said};
 use sidestep_kernel::{InputError, Plan, Simulation};
 use std::any::Any;
@@ -60,6 +61,11 @@ pub trait Compiled: Send + Sync {
         Vec::new()
     }
 
+    /// Returns what another seed changes.
+    fn seeds(&self) -> Seeds {
+        Seeds::Decide
+    }
+
     /// Returns the scenario as it is stored in a run folder: complete, with all its files.
     ///
     /// # Errors
@@ -71,6 +77,19 @@ pub trait Compiled: Send + Sync {
 
     /// Returns the world's own type, for features of one world alone.
     fn as_any(&self) -> &dyn Any;
+}
+
+/// What another seed changes in the runs of a scenario.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Seeds {
+    /// Nothing: no random number is drawn.
+    Nothing,
+    /// Draws only guide a search, which may find the same with all: runs tell.
+    Perhaps,
+    /// The run; also where a world does not know.
+    #[default]
+    Decide,
 }
 
 /// The translation of a file of another program.

@@ -26,7 +26,7 @@ pub use checked::{
 };
 pub use explain::nearest;
 pub use keys::Key;
-pub use kind::{Compiled, Foreign, Kind, Worlds};
+pub use kind::{Compiled, Foreign, Kind, Seeds, Worlds};
 pub use meaning::{Meaning, Told, told};
 pub use remark::{Remark, Severity};
 pub use sections::Sections;

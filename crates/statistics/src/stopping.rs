@@ -77,6 +77,8 @@ pub enum Reason {
     TooFewValues,
     /// No run of the first round has a value.
     NoValues,
+    /// Seeds change nothing, so one run says all.
+    Seedless,
 }
 
 impl Reason {
@@ -91,6 +93,7 @@ impl Reason {
                  enough: ask for an absolute half-width"
             }
             Self::TooFewValues => "the maximum of runs is reached; fewer than two have a value",
+            Self::Seedless => "seeds change nothing",
             Self::NoValues => "none of them has come to a value",
         }
     }

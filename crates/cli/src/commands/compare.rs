@@ -1,6 +1,6 @@
 //! `sidestep compare`: collision avoidance methods on the same traffic, side by side.
 
-use crate::console::Console;
+use crate::console::{Console, LINE_COLS, in_columns, wrapped};
 use crate::exit::{ExitCode, Failure};
 use crate::plan::{ScenarioArgs, WorkersArg, of_world};
 use crate::progress::Stages;
@@ -8,8 +8,8 @@ use clap::{Args, ValueEnum};
 use serde_json::json;
 use sidestep::worlds::airspace::scenario::Compiled;
 use sidestep::worlds::airspace::world::Method;
+use sidestep_document::Table;
 use sidestep_papers::methods::{compare as run_all, table};
-use sidestep_report::markdown;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -75,6 +75,14 @@ pub(crate) fn compare(args: &CompareArgs, console: Console) -> Result<ExitCode, 
     stages.clear();
     let results = results?;
     let json = json!({ "name": compiled.name, "seed": compiled.seed, "methods": results });
-    console.result(&json, || markdown::table(&table(&compiled.name, &results)));
+    console.result(&json, || text(&table(&compiled.name, &results)));
     Ok(ExitCode::Done)
+}
+
+/// Returns the results for people: a few measures beside each other, the rest below.
+fn text(table: &Table) -> String {
+    let title =
+        if table.title.is_empty() { String::new() } else { format!("# {}\n\n", table.title) };
+    let note = wrapped(&table.note, LINE_COLS).join("\n");
+    format!("{title}{}\n{note}\n", in_columns(table))
 }

@@ -172,14 +172,14 @@ fn plan(args: &PlanArgs, console: Console) -> Result<ExitCode, Failure> {
         "folder": args.out,
         "variants": plan.variants.len(),
         "replicates": plan.replicates,
-        "cells": plan.len(),
+        "cells": plan.runs(),
         "agents": plan.agents,
     });
-    console.result(&json, || {
+    console.result_or_short(&json, String::new, || {
         let dir = args.out.display();
         let lines = [
             ("variants", grouped(plan.variants.len() as u64)),
-            ("runs", format!("{} of each, {} in all", plan.replicates, grouped(plan.len()))),
+            ("runs", format!("{} of each, {} in all", plan.replicates, grouped(plan.runs()))),
             ("run them", format!("sidestep sweep run {dir} --shard 0/1")),
             ("join them", format!("sidestep sweep collect {dir}")),
         ];

@@ -3,7 +3,7 @@
 use crate::plan::ChangeArgs;
 use clap::Args;
 use sidestep::experiment::sweep::file::MAX_RUNS;
-use sidestep::experiment::sweep::{Factor, Setting, Sweep, Until};
+use sidestep::experiment::sweep::{Factor, Setting, Sweep, Until, Wanted};
 use sidestep::kernel::InputError;
 use std::path::Path;
 
@@ -32,7 +32,8 @@ pub(crate) struct ManyArgs {
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     pub(crate) metrics: Vec<String>,
 
-    /// Baseline: compare every variant with the one that has this value, seed by seed
+    /// Baseline: compare every variant, seed by seed, with the one that has this value, or this
+    /// name, and is equal in all else
     #[arg(long, value_name = "KEY=V")]
     pub(crate) baseline: Vec<String>,
 
@@ -99,13 +100,24 @@ impl ManyArgs {
             until.metrics.clone_from(&sweep.metrics);
         }
         if !self.baseline.is_empty() {
-            sweep.baseline = settings(&self.baseline)?;
+            sweep.baseline = wanted(&self.baseline)?;
         }
         sweep.first_seed = changes.seed.or(sweep.first_seed);
         sweep.record |= self.record_runs;
         sweep.check()?;
         Ok(sweep)
     }
+}
+
+/// Returns the baseline: values, and the name of a variant where there is no `=`.
+fn wanted(texts: &[String]) -> Result<Wanted, InputError> {
+    let (values, names): (Vec<String>, Vec<String>) =
+        texts.iter().cloned().partition(|text| text.contains('='));
+    if let [first, second, ..] = &names[..] {
+        let cause = format!("`{first}` and `{second}` are both names of variants");
+        return Err(InputError::new("--baseline", cause, "give one name, or values as KEY=V"));
+    }
+    Ok(Wanted { name: names.into_iter().next(), settings: settings(&values)? })
 }
 
 fn settings(texts: &[String]) -> Result<Vec<Setting>, InputError> {

@@ -1,12 +1,12 @@
 //! The results of a sweep, as text and as JSON.
 
-use crate::console::{Console, aligned, duration, grouped, in_columns};
+use crate::console::{Console, LINE_COLS, aligned, duration, grouped, in_columns, wrapped};
 use crate::exit::{ExitCode, Failure};
 use serde_json::json;
 use sidestep::experiment::sweep::rounds::{Stopped, stopped};
 use sidestep::experiment::sweep::{LeftOut, Plan, RunTable, Shard, Summary};
+use sidestep_document::Table;
 use sidestep_session::sweep::{Done, Effort, Ended, Folder};
-use std::fmt::Write;
 use std::path::Path;
 
 /// Largest number of failed runs that are listed.
@@ -72,7 +72,11 @@ pub(crate) fn tell(told: Told<'_>, ended: Ended, already: &str) -> Result<ExitCo
         "results": folder.map(Folder::results_file),
         "summary": summary,
     });
-    console.result(&json, || text(plan, &table, &summary, &stopped, effort, folder));
+    let short = || match folder {
+        Some(folder) => format!("{}\n", folder.results_file().display()),
+        None => tables(&summary),
+    };
+    console.result_or_short(&json, short, || text(told, &table, &summary, &stopped, effort));
     Ok(if failed == 0 { ExitCode::Done } else { ExitCode::Failed })
 }
 
@@ -83,7 +87,7 @@ fn interrupted(told: Told<'_>, finished: usize) -> ExitCode {
     match path.map(Path::display) {
         None => console.note("Interrupted; nothing is kept without --out DIR."),
         Some(path) => {
-            let all = plan.len();
+            let all = plan.runs();
             let of = if plan.until.is_some() { String::new() } else { format!(" of {all}") };
             console.note(format!(
                 "{finished}{of} runs are finished; `sidestep resume {path}` goes on."
@@ -95,25 +99,30 @@ fn interrupted(told: Told<'_>, finished: usize) -> ExitCode {
     ExitCode::Interrupted
 }
 
+/// Returns the tables of all metrics.
+fn tables(summary: &Summary) -> String {
+    let text = |table: &Table| {
+        let title = wrapped(&table.title, LINE_COLS).join("\n");
+        format!("{title}\n{}", in_columns(table))
+    };
+    summary.brief().iter().map(text).collect::<Vec<_>>().join("\n")
+}
+
 fn text(
-    plan: &Plan,
+    Told { plan, folder, .. }: Told<'_>,
     table: &RunTable,
     summary: &Summary,
     stopped: &[Stopped],
     effort: Effort,
-    folder: Option<&Folder>,
 ) -> String {
     let name = if plan.name.is_empty() { &plan.world } else { &plan.name };
-    let mut text = format!(
-        "# {name}: {} runs of {} variants, seeds from {} on\n",
-        grouped(table.runs() as u64),
-        grouped(plan.variants.len() as u64),
-        plan.first_seed
+    let text = format!(
+        "# {name}: {} of {}, seeds from {} on\n\n{}",
+        counted(table.runs(), "run"),
+        counted(plan.variants.len(), "variant"),
+        plan.first_seed,
+        tables(summary)
     );
-    for table in summary.brief() {
-        // Writing to a string cannot fail.
-        let _ = write!(text, "\n{}\n{}", table.title, in_columns(&table));
-    }
     let mut lines = Vec::new();
     // Metrics that the user did not ask for need no remark.
     if plan.metrics.is_empty()
@@ -136,6 +145,11 @@ fn text(
         lines.push(("look at it".to_string(), report));
     }
     format!("{text}\n{}", aligned(&lines))
+}
+
+/// Returns a number of things: `1 run`, `2 000 runs`.
+fn counted(n: usize, what: &str) -> String {
+    format!("{} {what}{}", grouped(n as u64), if n == 1 { "" } else { "s" })
 }
 
 /// Returns which metrics have no table, and why.
@@ -201,7 +215,7 @@ pub(crate) fn tell_share(told: Told<'_>, shard: Shard, ended: Ended) -> ExitCode
         "failed": failed,
         "took": (effort.runs > 0).then(|| time_json(&effort)),
     });
-    console.result(&json, || {
+    console.result_or_short(&json, String::new, || {
         let time = (effort.runs > 0).then(|| ("time".to_string(), time_words(&effort)));
         let time: Vec<_> = time.into_iter().collect();
         let runs = grouped(table.runs() as u64);

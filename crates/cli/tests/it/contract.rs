@@ -51,15 +51,16 @@ fn check_says_what_it_found() {
 #[test]
 fn check_says_what_will_surprise() {
     let place = Place::new();
-    let wheels = "\n[effectors.wheels]\nbox_m = 0.5\nforward = [{ p = 1.0, path = \"F\" }]\n";
-    place.write("s.toml", SCENARIO.replacen("\"nomad\"", "\"wheels\"", 1) + wheels);
+    let slips = "[{ p = 0.4, path = \"F\" }, { p = 0.6, turn = -90 }]";
+    let wheels = format!("\n[effectors.wheels]\nforward = {slips}\n");
+    place.write("s.toml", SCENARIO.replacen("\"nomad\"", "\"wheels\"", 1) + &wheels);
     let remarks = &place.json(&["check", "s.toml"])["remarks"];
     assert_eq!(
         (&remarks[0]["severity"], &remarks[0]["key"]),
         (&"warning".into(), &"robots.0.effector".into())
     );
     let told = place.run(&["check", "s.toml"]).out();
-    assert!(told.contains("\nwarning: robots.0.effector\n") && told.contains("0.5 m"), "{told}");
+    assert!(told.contains("\nwarning: robots.0.effector\n") && told.contains("60 %"), "{told}");
 }
 
 #[test]

@@ -83,7 +83,7 @@ mod tests {
 
     #[test]
     fn a_room_without_balls_is_filled_by_nothing_not_by_less() {
-        let none = of_fields(&Variant { settings: Vec::new() }, "part");
+        let none = of_fields(&Variant::default(), "part");
         assert_eq!(none.to_string(), "0");
     }
 }

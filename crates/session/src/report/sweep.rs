@@ -67,7 +67,7 @@ fn lead(plan: &Plan, table: &RunTable) -> Text {
 }
 
 fn unfinished(folder: &Folder, table: &RunTable) -> Text {
-    let (done, all) = (count(table.runs() as u64), count(folder.plan().len()));
+    let (done, all) = (count(table.runs() as u64), count(folder.plan().runs()));
     let text = format!("**This sweep is not done.** {done} of at most {all} runs are finished. ");
     let resume = format!("sidestep resume {}", quoted(&folder.path().display().to_string()));
     Text::marked(&text).and(Text::code(resume)).and(" goes on with it.")

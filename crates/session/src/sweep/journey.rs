@@ -8,6 +8,7 @@ use crate::identity::build;
 use crate::{Error, Watcher};
 use sidestep::VERSION;
 use sidestep::experiment::sweep::rounds::Rounds;
+use sidestep::experiment::sweep::seeds::Trials;
 use sidestep::experiment::sweep::{
     Cell, Outcome, Plan, Role, Rows, RunTable, Shard, Sweep, rows::cells,
 };
@@ -258,9 +259,9 @@ pub fn collect(folder: &Folder) -> Result<Ended, Error> {
     let plan = folder.plan();
     let mut log = Log::new(plan);
     gather(folder, None, |outcome| log.note(outcome))?;
-    let missing = log.open().len();
+    let missing = if log.rounds.is_some() { log.open() } else { log.missing() }.len();
     if missing > 0 {
-        let cause = format!("{missing} of {} runs are missing", plan.len());
+        let cause = format!("{missing} of {} runs are missing", plan.runs());
         let remedy = "run the shares that are not finished (finished ones are not run again), or \
                       run the rest here: sidestep resume DIR";
         return Err(Error::stopped(cause, remedy));
@@ -331,6 +332,7 @@ struct Log<'a> {
     plan: &'a Plan,
     rows: Rows,
     rounds: Option<Rounds<'a>>,
+    trials: Trials<'a>,
 }
 
 /// Stores an outcome, if there is a place for it.
@@ -339,22 +341,29 @@ type Keep<'a> = dyn FnMut(&Outcome) -> Result<(), Error> + Send + 'a;
 impl<'a> Log<'a> {
     fn new(plan: &'a Plan) -> Self {
         let rounds = plan.until.as_ref().map(|until| Rounds::new(plan, until));
-        Self { plan, rows: Rows::default(), rounds }
+        Self { plan, rows: Rows::default(), rounds, trials: Trials::new(plan) }
     }
 
     fn note(&mut self, outcome: Outcome) {
         if let Some(rounds) = &mut self.rounds {
             rounds.note(&outcome);
         }
+        self.trials.note(&outcome);
         self.rows.push(outcome);
     }
 
-    /// Returns the cells that are not finished: of the next round, or all.
+    /// Returns the cells to run next: of the next round, or all, trials first.
     fn open(&self) -> Vec<Cell> {
         match &self.rounds {
             Some(rounds) => rounds.next(),
-            None => self.unfinished(self.plan.share(Shard::ALL)),
+            None => self.trials.first_of(self.missing()),
         }
+    }
+
+    /// Returns the cells of a fixed number of runs that are not finished.
+    fn missing(&self) -> Vec<Cell> {
+        let cells = self.plan.share(Shard::ALL);
+        self.unfinished(cells.filter(|cell| self.trials.asks_for(cell)))
     }
 
     fn unfinished(&self, cells: impl Iterator<Item = Cell>) -> Vec<Cell> {
@@ -383,10 +392,7 @@ impl<'a> Log<'a> {
         keep: &mut Keep<'_>,
     ) -> Result<Effort, Error> {
         let open = self.unfinished(cells.iter().copied());
-        let before = match &self.rounds {
-            Some(_) => self.rows.len(),
-            None => cells.len() - open.len(),
-        } as u64;
+        let before = self.rows.len() as u64;
         let mut effort = Effort::begin();
         let mut take = |outcome: Outcome| {
             keep(&outcome)?;

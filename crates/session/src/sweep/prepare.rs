@@ -5,7 +5,7 @@ use crate::scenario::source_of;
 use crate::watcher::{Progress, Watched};
 use crate::{Error, Watcher};
 use sidestep::experiment::sweep::cell::metric_names;
-use sidestep::experiment::sweep::{Plan, Setting, Sweep, Variant};
+use sidestep::experiment::sweep::{Base, Plan, Setting, Sweep, Variant};
 use sidestep::kernel::InputError;
 use sidestep::scenario::{Compiled, Source, Worlds, nearest};
 
@@ -21,17 +21,18 @@ pub(super) fn prepare(
 ) -> Result<Plan, Error> {
     let fixed: Vec<String> = sweep.fixed.iter().map(Setting::to_override).collect();
     let base = source_of(worlds, &sweep.scenario, &fixed)?;
-    let variants = sweep.design.variants(&sweep.place)?;
+    let mut variants = sweep.design.variants(&sweep.place)?;
     Plan::check_size(variants.len(), sweep.replicates, &sweep.place)?;
     let (mut agents, mut first) = (0, None);
     let (count, watched) = (variants.len(), Watched(watcher));
-    for (k, settings) in (0u32..).zip(&variants) {
+    for (k, wanted) in (0u32..).zip(&mut variants) {
         if !watcher.go_on() {
             return Err(Error::Interrupted);
         }
         let share = f64::from(k) / count as f64;
         watched.at(Progress::Stage { what: "checking variants", share });
-        let (source, compiled) = variant(worlds, &base, settings)?;
+        let (source, compiled) = variant(worlds, &base, wanted)?;
+        wanted.seeds = compiled.seeds();
         agents = agents.max(compiled.bodies() as u64);
         if first.is_none() {
             first = Some((compiled.world(), compiled.plan().seed));
@@ -39,8 +40,9 @@ pub(super) fn prepare(
         }
         each(k, &source, compiled.as_ref())?;
     }
-    let first = first.expect("a design has at least one variant");
-    Ok(Plan { agents, ..Plan::new(sweep, variants, first)? })
+    let (world, seed) = first.expect("a design has at least one variant");
+    let base = Base { world, seed, source: &base };
+    Ok(Plan { agents, ..Plan::new(sweep, variants, base)? })
 }
 
 /// Checks that the requested metrics exist: it is better to know before all runs than after them.
@@ -68,19 +70,18 @@ fn check_metrics(
 fn variant(
     worlds: Worlds,
     base: &Source,
-    settings: &[Setting],
+    wanted: &Variant,
 ) -> Result<(Source, Box<dyn Compiled>), InputError> {
-    let overrides: Vec<String> = settings.iter().map(Setting::to_override).collect();
+    let overrides: Vec<String> = wanted.settings.iter().map(Setting::to_override).collect();
     let compiled = base.clone().with(&overrides).and_then(|source| {
         let compiled = worlds.compile(&source)?;
         Ok((source, compiled))
     });
     compiled.map_err(|e| {
-        if settings.is_empty() {
+        if wanted.settings.is_empty() {
             return e;
         }
-        let variant = Variant { settings: settings.to_vec() };
-        let place = format!("{}, where {variant}", e.place());
+        let place = format!("{}, where {wanted}", e.place());
         let error = InputError::new(place, e.cause(), e.remedy());
         e.position().map_or(error.clone(), |(line, column)| error.at(line, column))
     })

@@ -4,7 +4,7 @@ use super::scenario::Compiled;
 use super::{AirspaceWorld, bundle, foreign, words};
 use sidestep_kernel::words::Said;
 use sidestep_kernel::{InputError, Plan, Simulation, World};
-use sidestep_scenario::{Compiled as AnyCompiled, Foreign, Kind, Meaning, Resolved, Source};
+use sidestep_scenario::{Compiled as AnyCompiled, Foreign, Kind, Meaning, Resolved, Seeds, Source};
 use std::any::Any;
 use std::path::Path;
 
@@ -57,6 +57,10 @@ impl AnyCompiled for Compiled {
 
     fn contents(&self, _: &Source) -> Said {
         words::contents(self)
+    }
+
+    fn seeds(&self) -> Seeds {
+        self.seeds
     }
 
     fn resolve(&self, source: &Source) -> Result<Resolved, InputError> {

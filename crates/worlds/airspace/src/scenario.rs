@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 use settings::{LegsSection, ReactiveSection, Switch, Times};
 use sidestep_collectives::{Choice, Estimator, Order, Update, Utility};
 use sidestep_kernel::InputError;
-use sidestep_scenario::{FromTo, Number, Point, Rule, Sections, Source};
+use sidestep_scenario::{FromTo, Number, Point, Rule, Sections, Seeds, Source};
 use std::sync::Arc;
 use toml::Spanned;
 use values::{
@@ -136,6 +136,8 @@ pub struct Compiled {
     pub seed: u64,
     /// Largest number of cycles; a run ends when all have arrived.
     pub cycles: u64,
+    /// What another seed changes.
+    pub seeds: Seeds,
     /// The tables to keep.
     pub record: RecordSection,
     /// Sides of the first fallbacks.

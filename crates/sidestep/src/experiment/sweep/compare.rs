@@ -11,6 +11,8 @@ use sidestep_kernel::ports::Values;
 pub struct Comparison {
     /// The variant.
     pub variant: String,
+    /// The variant that it is compared with.
+    pub baseline: String,
     /// Number of pairs in which both have a value.
     pub pairs: usize,
     /// Number of replicates in which only one has a value.
@@ -44,33 +46,44 @@ pub struct Comparison {
     pub p_sign: Option<f64>,
 }
 
-/// Returns the comparison of every other variant with `baseline` in one metric.
+/// What each variant is compared with.
+pub(super) struct Reference {
+    /// Its name in tables.
+    pub(super) name: String,
+    /// The variant that each variant is compared with, if there is one.
+    pub(super) of: Vec<Option<usize>>,
+}
+
+/// Returns the comparison of every variant with that which corresponds to it, in one metric.
 pub(super) fn comparisons(
     groups: &Groups<'_>,
     metric: &RunColumn,
-    baseline: usize,
+    reference: &Reference,
     bootstrap: Option<&Bootstrap>,
 ) -> Vec<Comparison> {
-    let base = groups.by_replicate(metric, baseline);
     let is_share = matches!(metric.values, Values::Bool(_));
-    let others = (0..groups.variants.len()).filter(|v| *v != baseline);
-    let mut all: Vec<Comparison> = others
-        .map(|variant| {
-            // Replicates that neither has are not pairs.
-            let own = groups.by_replicate(metric, variant);
-            let there = own.iter().zip(&base).filter(|(a, b)| a.is_some() || b.is_some());
-            let (own, base): (Vec<_>, Vec<_>) = there.map(|(a, b)| (*a, *b)).unzip();
-            let pairs = Pairs::of(&own, &base);
-            compared(groups.variants[variant].clone(), &pairs, is_share, bootstrap)
-        })
-        .collect();
+    let pairs_of = |variant: usize| {
+        let baseline = reference.of[variant]?;
+        let (own, base) =
+            (groups.by_replicate(metric, variant), groups.by_replicate(metric, baseline));
+        // Where seeds change neither, there is one pair; replicates that neither has are none.
+        let most = match groups.seedless[variant] && groups.seedless[baseline] {
+            true => 1,
+            false => usize::MAX,
+        };
+        let there = own.iter().zip(&base).take(most).filter(|(a, b)| a.is_some() || b.is_some());
+        let (own, base): (Vec<_>, Vec<_>) = there.map(|(a, b)| (*a, *b)).unzip();
+        let names = [variant, baseline].map(|v| groups.variants[v].clone());
+        Some(compared(names, &Pairs::of(&own, &base), is_share, bootstrap))
+    };
+    let mut all: Vec<Comparison> = (0..groups.variants.len()).filter_map(pairs_of).collect();
     let adjusted = holm(&all.iter().map(|c| c.p).collect::<Vec<_>>());
     all.iter_mut().zip(adjusted).for_each(|(c, p)| c.p_holm = p);
     all
 }
 
 fn compared(
-    variant: String,
+    [variant, baseline]: [String; 2],
     pairs: &Pairs,
     is_share: bool,
     bootstrap: Option<&Bootstrap>,
@@ -79,6 +92,7 @@ fn compared(
     let ratio = pairs.ratio();
     Comparison {
         variant,
+        baseline,
         pairs: pairs.n(),
         incomplete: pairs.incomplete(),
         difference: pairs.difference(),

@@ -1,8 +1,9 @@
 //! The variants of a scenario that a sweep runs.
 
-use serde::{Deserialize, Serialize};
+use super::variant::{Setting, Variant, parse_value};
 use sidestep_kernel::math::{exp, ln};
 use sidestep_kernel::{InputError, Seed, stream::Purpose, stream::Streams};
+use std::collections::BTreeSet;
 use toml::Value;
 
 /// Largest number of variants of a sweep.
@@ -10,38 +11,6 @@ pub const MAX_VARIANTS: usize = 1_000_000;
 
 /// The random stream of a hypercube's permutations and places.
 const PLACES: Purpose = Purpose(0);
-
-/// A key of the scenario, and the value that it is set to.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Setting {
-    /// Path of the key, e.g. `robots.count`.
-    pub key: String,
-    /// The value.
-    pub value: Value,
-}
-
-impl Setting {
-    /// Parses `key=value`, where the value is TOML, or otherwise text.
-    ///
-    /// # Errors
-    /// When `=` or the key is missing.
-    pub fn parse(text: &str) -> Result<Self, InputError> {
-        let remedy = "write key=value, e.g. robots.count=20";
-        let wrong = |cause: &str| InputError::new(text, cause, remedy);
-        let (key, value) = text.split_once('=').ok_or_else(|| wrong("there is no `=`"))?;
-        let key = key.trim();
-        if key.split('.').any(str::is_empty) {
-            return Err(wrong("a part of the key is empty"));
-        }
-        Ok(Self { key: key.into(), value: parse_value(value.trim()) })
-    }
-
-    /// Returns the setting as an override of a scenario, see
-    /// [`Source::with`](crate::scenario::Source::with).
-    pub fn to_override(&self) -> String {
-        format!("{}={}", self.key, self.value)
-    }
-}
 
 /// A key and all values that it takes.
 #[derive(Debug, Clone, PartialEq)]
@@ -82,13 +51,6 @@ fn parse_values(text: &str) -> Vec<Value> {
         return values.clone();
     }
     text.split(',').map(|word| parse_value(word.trim())).collect()
-}
-
-/// Returns a TOML value, or otherwise a word.
-fn parse_value(word: &str) -> Value {
-    let table = format!("v = {word}").parse::<toml::Table>().ok();
-    let only = table.filter(|t| t.len() == 1).and_then(|mut t| t.remove("v"));
-    only.unwrap_or_else(|| Value::String(word.into()))
 }
 
 /// Latin hypercube sampling: of each range, every n-th part is used once (McKay, Beckman, Conover,
@@ -138,7 +100,7 @@ impl Range {
 
 impl Hypercube {
     /// Returns all samples, in order.
-    fn samples(&self) -> Vec<Vec<Setting>> {
+    fn samples(&self) -> Vec<Variant> {
         let streams = Streams::new(Seed(self.seed));
         let sides: Vec<Vec<Value>> = (0u32..)
             .zip(&self.ranges)
@@ -163,6 +125,7 @@ impl Hypercube {
         };
         (0..self.samples)
             .map(|k| self.ranges.iter().zip(&sides).map(|pair| setting(k, pair)).collect())
+            .map(|settings: Vec<Setting>| settings.into())
             .collect()
     }
 }
@@ -172,7 +135,7 @@ impl Hypercube {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Design {
     /// Variants that are listed one by one.
-    pub list: Vec<Vec<Setting>>,
+    pub list: Vec<Variant>,
     /// Samples of a hypercube.
     pub hypercube: Option<Hypercube>,
     /// Keys that are varied independently; the last one changes first.
@@ -187,11 +150,11 @@ impl Design {
         self.factors.iter().try_fold(start, |n, factor| n.checked_mul(factor.values.len()))
     }
 
-    /// Returns the settings of each variant.
+    /// Returns the variants.
     ///
     /// # Errors
     /// When a key is set twice in a variant, or there are more than [`MAX_VARIANTS`].
-    pub fn variants(&self, place: &str) -> Result<Vec<Vec<Setting>>, InputError> {
+    pub fn variants(&self, place: &str) -> Result<Vec<Variant>, InputError> {
         let wrong = |cause: String, remedy: &str| InputError::new(place, cause, remedy);
         match self.len() {
             Some(1..=MAX_VARIANTS) => {}
@@ -208,17 +171,21 @@ impl Design {
                 "give every value once; --replicate runs it again",
             )
         })?;
-        let mut variants = product(vec![Vec::new()], &self.list);
+        let mut variants = self.list.clone();
+        if variants.is_empty() {
+            variants.push(Variant::default());
+        }
         if let Some(hypercube) = &self.hypercube {
             variants = product(variants, &hypercube.samples());
         }
         for factor in &self.factors {
-            let setting =
-                |value: &Value| vec![Setting { key: factor.key.clone(), value: value.clone() }];
+            let setting = |value: &Value| {
+                vec![Setting { key: factor.key.clone(), value: value.clone() }].into()
+            };
             variants = product(variants, &factor.values.iter().map(setting).collect::<Vec<_>>());
         }
         for variant in &variants {
-            check_keys(variant).map_err(|key| {
+            check_keys(&variant.settings).map_err(|key| {
                 wrong(format!("`{key}` is set twice in one variant"), "vary every key in one place")
             })?;
         }
@@ -230,30 +197,33 @@ impl Design {
     /// Checks that nothing is requested twice. Samples of a hypercube may coincide, because whole
     /// numbers are few.
     fn check_different(&self) -> Result<(), String> {
-        for (k, entry) in self.list.iter().enumerate() {
-            if self.list[..k].contains(entry) {
-                let words: Vec<String> = entry.iter().map(Setting::to_override).collect();
-                return Err(format!("the variant `{}`", words.join(", ")));
-            }
+        let words = |v: &Variant| v.settings.iter().map(Setting::to_override).collect::<Vec<_>>();
+        let listed = self.list.iter().map(|variant| words(variant).join(", "));
+        if let Some(twice) = first_twice(listed) {
+            return Err(format!("the variant `{twice}`"));
+        }
+        let names = self.list.iter().filter_map(|variant| variant.name.clone());
+        if let Some(twice) = first_twice(names) {
+            return Err(format!("a variant with the name `{twice}`"));
         }
         for Factor { key, values } in &self.factors {
-            for (k, value) in values.iter().enumerate() {
-                if values[..k].contains(value) {
-                    return Err(format!("`{key}` = {value}"));
-                }
+            if let Some(twice) = first_twice(values.iter().map(Value::to_string)) {
+                return Err(format!("`{key}` = {twice}"));
             }
         }
         Ok(())
     }
 }
 
-/// Returns every one of `firsts` with every one of `seconds`; the firsts if there are no seconds.
-fn product(firsts: Vec<Vec<Setting>>, seconds: &[Vec<Setting>]) -> Vec<Vec<Setting>> {
-    if seconds.is_empty() {
-        return firsts;
-    }
-    let joined = |a: &Vec<Setting>, b: &Vec<Setting>| [a.clone(), b.clone()].concat();
-    firsts.iter().flat_map(|a| seconds.iter().map(move |b| joined(a, b))).collect()
+/// Returns the first word that was there before.
+fn first_twice(mut words: impl Iterator<Item = String>) -> Option<String> {
+    let mut seen = BTreeSet::new();
+    words.find(|word| !seen.insert(word.clone()))
+}
+
+/// Returns every one of `firsts` with every one of `seconds`.
+fn product(firsts: Vec<Variant>, seconds: &[Variant]) -> Vec<Variant> {
+    firsts.iter().flat_map(|a| seconds.iter().map(move |b| a.and(b))).collect()
 }
 
 /// Checks that no key is set twice; the error is the first such key.
@@ -272,7 +242,7 @@ mod tests {
 
     fn keys(design: &Design) -> Vec<String> {
         let variants = design.variants("test").expect("valid");
-        let words = |v: &Vec<Setting>| v.iter().map(Setting::to_override).collect::<Vec<_>>();
+        let words = |v: &Variant| v.settings.iter().map(Setting::to_override).collect::<Vec<_>>();
         variants.iter().map(|v| words(v).join(" ")).collect()
     }
 
@@ -307,7 +277,7 @@ mod tests {
     #[test]
     fn a_list_is_combined_with_a_grid() {
         let list = [("a", 1), ("a", 2)]
-            .map(|(key, n)| vec![Setting { key: key.into(), value: Value::Integer(n) }]);
+            .map(|(key, n)| vec![Setting { key: key.into(), value: Value::Integer(n) }].into());
         let design = Design { list: list.to_vec(), ..factors(&["b=3,4"]) };
         assert_eq!(keys(&design), ["a=1 b=3", "a=1 b=4", "a=2 b=3", "a=2 b=4"]);
     }
@@ -329,7 +299,7 @@ mod tests {
             ..Design::default()
         };
         let variants = design.variants("test").expect("valid");
-        let column = |k: usize| variants.iter().map(move |v| &v[k].value);
+        let column = |k: usize| variants.iter().map(move |v| &v.settings[k].value);
         let part = |x: f64| (x * n as f64) as usize;
         let mut a: Vec<_> =
             column(0).map(|v| part((v.as_float().expect("float") - 1.0) / 9.0)).collect();
@@ -348,7 +318,7 @@ mod tests {
     fn what_is_asked_for_twice_is_refused() {
         let error = factors(&["m=none,pc,none"]).variants("here").expect_err("twice");
         assert!(error.cause().contains("`m` = \"none\" is there twice"), "{error}");
-        let entry = || vec![Setting { key: "a".into(), value: Value::Integer(1) }];
+        let entry = || vec![Setting { key: "a".into(), value: Value::Integer(1) }].into();
         let design = Design { list: vec![entry(), entry()], ..Design::default() };
         assert!(design.variants("here").expect_err("twice").cause().contains("`a=1`"));
     }

@@ -1,6 +1,8 @@
 //! A sweep file: the scenario, its variants, and the number of runs.
 
-use super::design::{self, Design, Factor, Hypercube, Setting};
+use super::baseline::Wanted;
+use super::design::{self, Design, Factor, Hypercube};
+use super::variant::{Setting, Variant};
 use crate::scenario::{FORMAT, Source};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::InputError;
@@ -37,8 +39,8 @@ pub struct Sweep {
     pub until: Option<Until>,
     /// The metrics to report; all that vary if empty.
     pub metrics: Vec<String>,
-    /// Settings of the variant that others are compared with; empty for no comparison.
-    pub baseline: Vec<Setting>,
+    /// What others are compared with; empty for no comparison.
+    pub baseline: Wanted,
     /// Whether every run is recorded in a folder of its own.
     pub record: bool,
 }
@@ -94,8 +96,7 @@ struct SweepFile {
     until: Option<Spanned<UntilSection>>,
     #[serde(default)]
     metrics: Vec<String>,
-    #[serde(default)]
-    baseline: toml::Table,
+    baseline: Option<Spanned<Value>>,
     #[serde(default)]
     record: bool,
 }
@@ -148,7 +149,7 @@ impl Sweep {
             first_seed: None,
             until: None,
             metrics: Vec::new(),
-            baseline: Vec::new(),
+            baseline: Wanted::default(),
             record: false,
         }
     }
@@ -205,7 +206,7 @@ impl Sweep {
             scenario: source.path(&file.scenario),
             fixed: settings(&file.set),
             design: Design {
-                list: file.variant.iter().map(|table| settings(table.get_ref())).collect(),
+                list: file.variant.iter().map(|t| reader.listed(t)).collect::<Result<_, _>>()?,
                 hypercube: file
                     .latin_hypercube
                     .as_ref()
@@ -220,7 +221,7 @@ impl Sweep {
             first_seed: file.first_seed,
             until,
             metrics: file.metrics,
-            baseline: settings(&file.baseline),
+            baseline: file.baseline.as_ref().map_or(Ok(Wanted::default()), |b| reader.wanted(b))?,
             name: file.name,
             record: file.record,
         })
@@ -232,7 +233,8 @@ impl Sweep {
     /// When seeds are varied as if they were a parameter.
     pub fn check(&self) -> Result<(), InputError> {
         let design = &self.design;
-        let listed = design.list.iter().flatten().chain(&self.fixed).map(|s| &s.key);
+        let listed =
+            design.list.iter().flat_map(|v| &v.settings).chain(&self.fixed).map(|s| &s.key);
         let ranges = design.hypercube.iter().flat_map(|h| &h.ranges).map(|r| &r.key);
         let mut keys = listed.chain(ranges).chain(design.factors.iter().map(|f| &f.key));
         if keys.any(|key| key == "seed") {
@@ -280,6 +282,34 @@ impl Reader<'_> {
             }
         };
         leaves(table.get_ref(), &|_| false).into_iter().map(factor).collect()
+    }
+
+    /// Returns an entry of the list; its `name` names it, and is no setting.
+    fn listed(&self, table: &Spanned<toml::Table>) -> Result<Variant, InputError> {
+        let mut own = table.get_ref().clone();
+        match own.remove("name") {
+            None => Ok(settings(&own).into()),
+            Some(Value::String(name)) if !name.is_empty() => {
+                Ok(Variant::called(name, settings(&own)))
+            }
+            Some(name) => {
+                let cause = format!("`name` = {name} is no name of a variant");
+                Err(self.source.error(Some(table.span()), cause, "give a word, in quotes"))
+            }
+        }
+    }
+
+    /// Returns the baseline: a table of settings, or the name of a variant.
+    fn wanted(&self, value: &Spanned<Value>) -> Result<Wanted, InputError> {
+        match value.get_ref() {
+            Value::String(name) => Ok(Wanted { name: Some(name.clone()), settings: Vec::new() }),
+            Value::Table(table) => Ok(Wanted { name: None, settings: settings(table) }),
+            _ => {
+                let remedy = "give the values of one or several keys, { regime = \"both\" }, or the \
+                              name of a variant, in quotes";
+                Err(self.source.error(Some(value.span()), "this is no baseline", remedy))
+            }
+        }
     }
 
     fn hypercube(&self, section: &Spanned<HypercubeSection>) -> Result<Hypercube, InputError> {
@@ -380,7 +410,7 @@ max_runs = 200
         let keys: Vec<&str> = sweep.design.factors.iter().map(|f| f.key.as_str()).collect();
         assert_eq!(keys, ["airspace.generator.n", "airspace.method"]);
         assert_eq!((sweep.replicates, sweep.until.map(|u| u.half_width)), (200, Some(0.05)));
-        assert_eq!(sweep.baseline[0].key, "airspace.method");
+        assert_eq!(sweep.baseline.settings[0].key, "airspace.method");
     }
 
     #[test]

@@ -1,7 +1,9 @@
 //! Runs by variant and replicate.
 
 use super::Label;
+use super::summary::SummaryOptions;
 use super::table::{Role, RunColumn, RunTable};
+use super::variant::DEFAULT;
 use crate::scenario::{Meaning, told};
 use crate::statistics::{Sample, wilson};
 use serde::Serialize;
@@ -27,7 +29,7 @@ impl Level {
     pub(super) fn name(&self) -> String {
         match self {
             Self::Number(value) => value.to_string(),
-            Self::Text(text) if text.is_empty() => "(default)".into(),
+            Self::Text(text) if text.is_empty() => DEFAULT.into(),
             Self::Text(text) => text.clone(),
         }
     }
@@ -59,16 +61,16 @@ pub(super) struct Groups<'a> {
     pub(super) parameters: Vec<Parameter>,
     /// The metrics in words.
     meanings: &'static [Meaning],
+    /// For each variant, whether seeds change nothing in it.
+    pub(super) seedless: Vec<bool>,
     /// The run of each variant and replicate.
     run: BTreeMap<(usize, i64), usize>,
 }
 
 impl<'a> Groups<'a> {
-    /// Groups the runs of `table`; `meanings` are its metrics in words.
-    pub(super) fn of(
-        table: &'a RunTable,
-        meanings: &'static [Meaning],
-    ) -> Result<Self, InputError> {
+    /// Groups the runs of `table`, of which the options name the variants in which seeds change nothing,
+    /// and tell the metrics in words.
+    pub(super) fn of(table: &'a RunTable, options: &SummaryOptions) -> Result<Self, InputError> {
         table.check()?;
         let runs = ordered(table);
         let label = |run: usize| variant_name(table, run);
@@ -97,7 +99,18 @@ impl<'a> Groups<'a> {
         let parameters = parameters(table, &run_of, variants.len());
         let paired = replicate.is_some();
         let replicates = replicates.into_iter().collect();
-        Ok(Self { table, variants, replicates, paired, parameters, meanings, run: run_of })
+        let seedless = variants.iter().map(|name| options.seedless.contains(name)).collect();
+        let meanings = options.meanings;
+        Ok(Self {
+            table,
+            variants,
+            replicates,
+            paired,
+            parameters,
+            meanings,
+            seedless,
+            run: run_of,
+        })
     }
 
     /// Returns the label of a metric.
@@ -120,14 +133,18 @@ impl<'a> Groups<'a> {
         self.run.range((variant, i64::MIN)..=(variant, i64::MAX)).map(|(_, run)| *run)
     }
 
-    /// Returns the values of a variant, one for each of its runs.
+    /// Returns the values of a variant, one for each of its runs; one where seeds change nothing.
     pub(super) fn values(&self, metric: &RunColumn, variant: usize) -> Vec<Option<f64>> {
-        self.rows(variant).map(|run| metric.values.number(run)).collect()
+        let most = if self.seedless[variant] { 1 } else { usize::MAX };
+        self.rows(variant).take(most).map(|run| metric.values.number(run)).collect()
     }
 
-    /// Returns the values of a variant, one for each replicate of the whole table.
+    /// Returns the values of a variant, one for each replicate of the whole table. Where seeds change
+    /// nothing, all have that of the first run.
     pub(super) fn by_replicate(&self, metric: &RunColumn, variant: usize) -> Vec<Option<f64>> {
-        let value = |r: &i64| metric.values.number(*self.run.get(&(variant, *r))?);
+        let same = self.rows(variant).next().filter(|_| self.seedless[variant]);
+        let run_of = |r: &i64| same.or_else(|| self.run.get(&(variant, *r)).copied());
+        let value = |r: &i64| metric.values.number(run_of(r)?);
         self.replicates.iter().map(value).collect()
     }
 
@@ -141,7 +158,7 @@ impl<'a> Groups<'a> {
         if let [variant] = group {
             let values = self.values(metric, *variant);
             if matches!(metric.values, Values::Bool(_)) {
-                return share(&values);
+                return share(&values, self.seedless[*variant]);
             }
             return Estimate::of(values);
         }
@@ -151,7 +168,9 @@ impl<'a> Groups<'a> {
             let of_all: Option<Vec<f64>> = columns.iter().map(|c| finite(c[r])).collect();
             crate::statistics::mean(&of_all?)
         };
-        Estimate::of((0..self.replicates.len()).map(mean))
+        // Where all are seedless, every replicate gives the same number.
+        let all = if group.iter().all(|v| self.seedless[*v]) { 1 } else { usize::MAX };
+        Estimate::of((0..self.replicates.len().min(all)).map(mean))
     }
 
     /// Whether every level of `parameter` occurs with the same levels of all others, as in a full
@@ -176,11 +195,11 @@ impl<'a> Groups<'a> {
     }
 }
 
-fn share(values: &[Option<f64>]) -> Estimate {
+fn share(values: &[Option<f64>], seedless: bool) -> Estimate {
     let values = Sample::of(values.iter().copied()).values;
     let (yes, n) = (values.iter().sum::<f64>(), values.len());
     let mut share = Estimate::of(values.into_iter().map(Some));
-    share.interval = (n > 0).then(|| wilson(yes, n as f64));
+    share.interval = (n > 0 && !seedless).then(|| wilson(yes, n as f64));
     share
 }
 

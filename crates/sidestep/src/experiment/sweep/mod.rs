@@ -2,9 +2,12 @@
 //!
 //! ```text
 //! file.rs      a sweep file (TOML) -> Sweep, with errors that point
+//! variant.rs   a scenario and a variant of it: settings, and perhaps a name
 //! design.rs    the variants: a full grid, a list, a Latin hypercube, or products of them
+//! baseline.rs  what each variant is compared with, within the other factors
 //! plan.rs      variants x replicates -> cells, and shares of them
 //! cell.rs      one cell -> one outcome: a deterministic run, so a lost one is simply run again
+//! seeds.rs     variants in which seeds change nothing
 //! work.rs      cells -> results, many at once
 //! rounds.rs    the next cells, if a requested precision decides when to stop
 //! rows.rs      outcomes -> a table of runs, the same for any order of arrival
@@ -23,6 +26,7 @@
 //! Nothing here writes files or starts processes: a row is a function of its cell alone, whoever
 //! computes it, where and in what order.
 
+pub mod baseline;
 pub mod cell;
 mod charts;
 pub mod compare;
@@ -33,21 +37,25 @@ pub mod label;
 pub mod plan;
 pub mod rounds;
 pub mod rows;
+pub mod seeds;
 pub mod summary;
 pub mod table;
 mod text;
+pub mod variant;
 pub mod work;
 
+pub use baseline::{Baseline, Wanted};
 pub use cell::{Outcome, Started, start};
 pub use compare::Comparison;
-pub use design::{Design, Factor, Hypercube, Range, Setting};
+pub use design::{Design, Factor, Hypercube, Range};
 pub use file::{Sweep, Until};
 pub use groups::{Level, Parameter};
 pub use label::Label;
-pub use plan::{Cell, Plan, Shard, Variant};
+pub use plan::{Cell, Plan, Shard};
 pub use rows::Rows;
-pub use summary::{LeftOut, Summary, SummaryOptions};
+pub use summary::{Against, LeftOut, Summary, SummaryOptions};
 pub use table::{Role, RunColumn, RunTable};
+pub use variant::{Base, Setting, Variant};
 
 #[cfg(test)]
 mod tests;

@@ -1,10 +1,12 @@
 //! The cells of a sweep, and their shares.
 
-use super::design::Setting;
+use super::baseline::{Baseline, Search};
 use super::file::{Sweep, Until};
-use super::summary::{Summary, SummaryOptions};
+use super::seeds;
+use super::summary::{Against, Summary, SummaryOptions};
 use super::table::{Role, RunTable};
-use crate::scenario::nearest;
+use super::variant::{Base, Setting, Variant};
+use crate::scenario::Seeds;
 use crate::worlds::WORLDS;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::InputError;
@@ -36,53 +38,16 @@ pub struct Plan {
     pub until: Option<Until>,
     /// The metrics to report; all that vary if empty.
     pub metrics: Vec<String>,
-    /// The variant that others are compared with.
-    pub baseline: Option<u32>,
+    /// What the variants are compared with.
+    pub baseline: Option<Baseline>,
     /// Number of agents of the largest variant.
     pub agents: u64,
     /// Whether every run is recorded in a folder of its own.
     pub record: bool,
 }
 
-/// One variant of the scenario.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Variant {
-    /// Its settings, beside those that all variants share.
-    pub settings: Vec<Setting>,
-}
-
 /// Largest number of runs of a sweep: joining a table of ten million takes some gigabytes.
 const MOST_RUNS: u64 = 10_000_000;
-
-impl Variant {
-    /// Returns the value of a parameter, if this variant sets it.
-    pub fn value(&self, key: &str) -> Option<&toml::Value> {
-        self.settings.iter().find(|s| s.key == key).map(|s| &s.value)
-    }
-
-    /// Whether the variant has this setting; 2 and 2.0 are the same.
-    fn has(&self, setting: &Setting) -> bool {
-        let number = |v: &toml::Value| v.as_float().or(v.as_integer().map(|n| n as f64));
-        self.value(&setting.key).is_some_and(|value| {
-            *value == setting.value
-                || number(value).is_some_and(|n| Some(n) == number(&setting.value))
-        })
-    }
-}
-
-/// Writes the settings as text: `robots.count = 10, regime = "both"`.
-impl fmt::Display for Variant {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.settings.is_empty() {
-            return f.write_str("the scenario as it is");
-        }
-        for (k, Setting { key, value }) in self.settings.iter().enumerate() {
-            let separator = if k == 0 { "" } else { ", " };
-            write!(f, "{separator}{key} = {value}")?;
-        }
-        Ok(())
-    }
-}
 
 /// The unit of work: a variant with a seed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -101,59 +66,68 @@ impl Plan {
     /// Returns a plan of these variants, which are known to be valid.
     ///
     /// # Errors
-    /// When seeds overflow, or the baseline is no variant or matches several.
-    pub fn new(
-        sweep: &Sweep,
-        variants: Vec<Vec<Setting>>,
-        (world, seed): (&str, u64),
-    ) -> Result<Self, InputError> {
+    /// When seeds overflow, or the baseline is no variant.
+    pub fn new(sweep: &Sweep, variants: Vec<Variant>, base: Base<'_>) -> Result<Self, InputError> {
         let mut parameters: Vec<String> = Vec::new();
-        for setting in variants.iter().flatten() {
+        for setting in variants.iter().flat_map(|v| &v.settings) {
             if !parameters.contains(&setting.key) {
                 parameters.push(setting.key.clone());
             }
         }
-        let first_seed = sweep.first_seed.unwrap_or(seed);
+        let first_seed = sweep.first_seed.unwrap_or(base.seed);
         let last = first_seed.checked_add(u64::from(sweep.replicates));
         if last.is_none_or(|last| last > i64::MAX as u64) {
             let cause = format!("{} seeds from {first_seed} on run over", sweep.replicates);
             return Err(InputError::new(&sweep.place, cause, "begin with a smaller seed"));
         }
-        let variants: Vec<Variant> =
-            variants.into_iter().map(|settings| Variant { settings }).collect();
-        let baseline = baseline(&sweep.baseline, &variants, &sweep.place)?;
-        Ok(Self {
+        let mut plan = Self {
             name: sweep.name.clone(),
-            world: world.into(),
+            world: base.world.into(),
             parameters,
             variants,
             replicates: sweep.replicates,
             first_seed,
             until: sweep.until.clone(),
             metrics: sweep.metrics.clone(),
-            baseline,
+            baseline: None,
             agents: 0,
             record: sweep.record,
-        })
+        };
+        plan.baseline = plan.baseline_of(sweep, base)?;
+        Ok(plan)
+    }
+
+    /// Returns the baseline that is asked for, among the plan's variants.
+    fn baseline_of(&self, sweep: &Sweep, base: Base<'_>) -> Result<Option<Baseline>, InputError> {
+        let search = Search {
+            wanted: &sweep.baseline,
+            variants: &self.variants,
+            parameters: &self.parameters,
+            base,
+            place: &sweep.place,
+        };
+        search.found(|k| self.names().swap_remove(k), |setting| self.word(setting))
     }
 
     /// Returns the names of the variants in tables and figures: their parameters, in short
     /// (`method=pc, n=8`).
     pub fn names(&self) -> Vec<String> {
-        let last = |key: &str| key.rsplit('.').next().unwrap_or(key).to_string();
-        let is_alone =
-            |key: &str| self.parameters.iter().filter(|k| last(k) == last(key)).count() == 1;
-        let named = |s: &Setting| {
-            let key = if is_alone(&s.key) { last(&s.key) } else { s.key.clone() };
-            let value = s.value.as_str().map_or_else(|| s.value.to_string(), str::to_string);
-            format!("{key}={value}")
-        };
-        let name = |v: &Variant| v.settings.iter().map(named).collect::<Vec<_>>().join(", ");
-        let mut names: Vec<String> = self.variants.iter().map(name).collect();
+        let mut names: Vec<String> =
+            self.variants.iter().map(|v| v.label(|s| self.word(s))).collect();
         let plain = if names.len() == 1 { "all runs" } else { "as in the scenario" };
         names.iter_mut().filter(|name| name.is_empty()).for_each(|name| *name = plain.into());
         number_twins(&mut names);
         names
+    }
+
+    /// Returns a setting in short, `method=pc`: with the whole path of its key only where another
+    /// parameter ends like it.
+    fn word(&self, Setting { key, value }: &Setting) -> String {
+        let last = |key: &str| key.rsplit('.').next().unwrap_or(key).to_string();
+        let alike = self.parameters.iter().filter(|k| last(k) == last(key)).count();
+        let key = if alike > 1 { key.clone() } else { last(key) };
+        let value = value.as_str().map_or_else(|| value.to_string(), str::to_string);
+        format!("{key}={value}")
     }
 
     /// Returns the summary of the runs of this plan, with its metrics and baseline.
@@ -170,17 +144,17 @@ impl Plan {
             };
             column.values = Values::Text((0..runs.runs()).map(name).collect());
         }
+        let same = seeds::seedless(self, runs);
         let options = SummaryOptions {
             metrics: (!self.metrics.is_empty()).then(|| self.metrics.clone()),
-            // A sweep in progress may have no run of the baseline yet.
-            baseline: self
-                .baseline
-                .filter(|variant| has_runs(runs, *variant))
-                .map(|variant| names[variant as usize].clone()),
+            seedless: (0..names.len()).filter(|k| same[*k]).map(|k| names[k].clone()).collect(),
+            against: self.baseline.as_ref().map(|baseline| against(baseline, &names)),
             meanings: WORLDS.named(&self.world).map_or(&[], |world| world.meanings()),
             ..SummaryOptions::default()
         };
-        Summary::of(&named, &options)
+        let mut summary = Summary::of(&named, &options)?;
+        summary.notes.splice(0..0, seeds::notes(self, runs));
+        Ok(summary)
     }
 
     /// Checks that there are not too many runs for the memory of a machine.
@@ -196,7 +170,22 @@ impl Plan {
         Err(InputError::new(place, format!("there are {runs} runs"), remedy))
     }
 
-    /// Returns the largest number of cells.
+    /// Returns what seeds change in the runs of a variant.
+    pub(super) fn seeds(&self, variant: u32) -> Seeds {
+        self.variants[variant as usize].seeds
+    }
+
+    /// Returns the number of runs of a variant, at most: one where seeds change nothing.
+    pub fn runs_of(&self, variant: u32) -> u32 {
+        if self.seeds(variant) == Seeds::Nothing { 1 } else { self.replicates }
+    }
+
+    /// Returns the number of runs, at most.
+    pub fn runs(&self) -> u64 {
+        (0..self.variants.len() as u32).map(|v| u64::from(self.runs_of(v))).sum()
+    }
+
+    /// Returns the number of cells; not all are run where seeds change nothing.
     pub fn len(&self) -> u64 {
         self.variants.len() as u64 * u64::from(self.replicates)
     }
@@ -231,14 +220,17 @@ impl Plan {
         let variants = self.variants.len() as u32;
         let cells = (0..self.replicates)
             .flat_map(move |replicate| (0..variants).map(move |v| self.cell(v, replicate)));
+        let cells = cells.filter(|c| c.replicate < self.runs_of(c.variant));
         cells.filter(move |c| (u64::from(c.variant) + u64::from(c.replicate)) % count == index)
     }
 }
 
-/// Whether the table has a run of a variant.
-fn has_runs(runs: &RunTable, variant: u32) -> bool {
-    let mut columns = runs.of_role(Role::Variant);
-    columns.any(|c| (0..runs.runs()).any(|k| c.values.number(k) == Some(f64::from(variant))))
+/// Returns the baseline by the names of variants.
+fn against(baseline: &Baseline, names: &[String]) -> Against {
+    let pair =
+        |(k, of): (usize, &Option<u32>)| Some((names[k].clone(), names[(*of)? as usize].clone()));
+    let of = baseline.of.iter().enumerate().filter_map(pair).collect();
+    Against::Matched { name: baseline.name.clone(), of, alone: baseline.alone }
 }
 
 /// Numbers equal names from the second on, because samples of whole numbers may coincide.
@@ -252,61 +244,6 @@ fn number_twins(names: &mut [String]) {
         }
     }
 }
-
-/// Returns the variant that has all these settings.
-fn baseline(
-    wanted: &[Setting],
-    variants: &[Variant],
-    place: &str,
-) -> Result<Option<u32>, InputError> {
-    if wanted.is_empty() {
-        return Ok(None);
-    }
-    let fits = |v: &Variant| wanted.iter().all(|s| v.has(s));
-    let found: Vec<usize> = (0..variants.len()).filter(|&k| fits(&variants[k])).collect();
-    match found[..] {
-        [one] => Ok(Some(one as u32)),
-        [] => Err(no_baseline(wanted, variants, place)),
-        _ => {
-            let cause = format!("{} variants have the settings of the baseline", found.len());
-            Err(InputError::new(place, cause, "give the value of every key that is varied"))
-        }
-    }
-}
-
-/// Returns an error that names the settings that no variant has, and the existing values.
-fn no_baseline(wanted: &[Setting], variants: &[Variant], place: &str) -> InputError {
-    let is_missing = |s: &&Setting| !variants.iter().any(|v| v.has(s));
-    let Some(Setting { key, value }) = wanted.iter().find(is_missing) else {
-        let cause = "no variant has all settings of the baseline at once";
-        return InputError::new(place, cause, "give those of one variant");
-    };
-    let mut values: Vec<String> = Vec::new();
-    for value in variants.iter().filter_map(|v| v.value(key)).map(toml::Value::to_string) {
-        if !values.contains(&value) && values.len() < MOST_NAMED {
-            values.push(value);
-        }
-    }
-    if !values.is_empty() {
-        let cause = format!("the baseline has `{key}` = {value}, which no variant has");
-        return InputError::new(place, cause, format!("it is varied over {}", values.join(", ")));
-    }
-    let mut keys: Vec<&str> = Vec::new();
-    for setting in variants.iter().flat_map(|v| &v.settings) {
-        if !keys.contains(&setting.key.as_str()) {
-            keys.push(&setting.key);
-        }
-    }
-    let cause = format!("the baseline has `{key}`, which is not varied");
-    let remedy = match keys.is_empty() {
-        true => format!("vary it, e.g. --vary {key}={value},..."),
-        false => nearest(key, &keys),
-    };
-    InputError::new(place, cause, remedy)
-}
-
-/// Largest number of values that an error lists.
-const MOST_NAMED: usize = 20;
 
 /// A share of the cells: number `index` of `count`, from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -345,6 +282,7 @@ impl fmt::Display for Shard {
 mod tests {
     use super::*;
     use crate::experiment::sweep::Factor;
+    use crate::scenario::Source;
     use proptest::prelude::*;
     use std::collections::BTreeSet;
 
@@ -354,7 +292,9 @@ mod tests {
         sweep.design.factors = vec![Factor::parse(&format!("n={values}")).expect("valid")];
         sweep.replicates = replicates;
         let variants = sweep.design.variants("test").expect("valid");
-        Plan::new(&sweep, variants, ("robots", 7)).expect("valid")
+        let source = Source::new("s.toml", "", "");
+        let base = Base { world: "robots", seed: 7, source: &source };
+        Plan::new(&sweep, variants, base).expect("valid")
     }
 
     proptest! {

@@ -90,11 +90,14 @@ impl<'a> Rounds<'a> {
     }
 
     fn ask(&self, variant: u32) -> Next {
+        if self.plan.runs_of(variant) == 1 && !self.done[variant as usize].is_empty() {
+            return Next::Enough(1, Reason::Seedless);
+        }
         let rule = StoppingRule {
             half_width: self.until.half_width,
             relative: self.until.is_relative,
             min_runs: MIN_RUNS,
-            max_runs: self.plan.replicates as usize,
+            max_runs: self.plan.runs_of(variant) as usize,
         };
         let done = &self.done[variant as usize];
         // Only runs without a gap count: an interrupted round is completed first.
@@ -149,7 +152,8 @@ fn is_there(value: &Option<f64>) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiment::sweep::{Factor, Sweep};
+    use crate::experiment::sweep::{Base, Factor, Sweep};
+    use crate::scenario::Source;
     use serde_json::json;
 
     fn plan(max_runs: u32) -> Plan {
@@ -157,7 +161,9 @@ mod tests {
         sweep.design.factors = vec![Factor::parse("n=1,2").expect("valid")];
         sweep.replicates = max_runs;
         let variants = sweep.design.variants("test").expect("valid");
-        Plan::new(&sweep, variants, ("robots", 1)).expect("valid")
+        let source = Source::new("s.toml", "", "");
+        let base = Base { world: "robots", seed: 1, source: &source };
+        Plan::new(&sweep, variants, base).expect("valid")
     }
 
     /// Variant 0 is sure at once, variant 1 varies a lot.

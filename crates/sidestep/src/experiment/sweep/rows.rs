@@ -1,8 +1,10 @@
 //! Outcomes -> a table of runs, the same for any order of arrival.
 
 use super::cell::Outcome;
-use super::plan::Plan;
+use super::plan::{Plan, Shard};
+use super::seeds::Trials;
 use super::table::{Role, RunColumn, RunTable};
+use super::variant::Variant;
 use serde_json::Value;
 use sidestep_kernel::InputError;
 use sidestep_kernel::ports::{ColumnType, Values};
@@ -95,12 +97,24 @@ impl Rows {
         order.sort_by_key(|&row| (self.cells[row], row));
         self.check_twins(&order)?;
         order.dedup_by_key(|row| self.cells[*row]);
+        self.leave_out_settled(plan, &mut order);
         self.columns.sort_by_key(|c| (c.column.role, c.first));
         let mut columns = identity(plan, order.iter().map(|&row| self.cells[row]));
         for Growing { column, .. } in self.columns {
             columns.push(RunColumn { values: column.values.pick(&order), ..column });
         }
         Ok(RunTable { columns })
+    }
+
+    /// Leaves out runs beyond the trials of settled variants, which a share cannot know of.
+    fn leave_out_settled(&self, plan: &Plan, order: &mut Vec<usize>) {
+        let digest = self.columns.iter().find(|c| c.column.role == Role::Digest);
+        let mut trials = Trials::new(plan);
+        for &row in order.iter() {
+            let end = digest.map_or_else(String::new, |c| c.column.values.text(row));
+            trials.end(Some(self.cells[row]), end);
+        }
+        order.retain(|&row| plan.cell_of(self.cells[row]).is_some_and(|c| trials.asks_for(&c)));
     }
 
     /// Checks that cells that were run twice have the same outcome.
@@ -163,7 +177,9 @@ impl RunTable {
 
 /// Returns the table of all cells of a plan: one row for each future run.
 pub fn cells(plan: &Plan) -> RunTable {
-    RunTable { columns: identity(plan, 0..plan.len()) }
+    let mut cells: Vec<u64> = plan.share(Shard::ALL).map(|cell| cell.id).collect();
+    cells.sort_unstable();
+    RunTable { columns: identity(plan, cells.into_iter()) }
 }
 
 /// Returns the identity of runs: the columns that follow from their cells.
@@ -191,7 +207,7 @@ fn identity(plan: &Plan, cells: impl Iterator<Item = u64>) -> Vec<RunColumn> {
 
 /// Returns the parameter's value in every variant: if numbers and words mix, all are words.
 fn levels(plan: &Plan, name: &str) -> Vec<Value> {
-    let of = |variant: &super::Variant| variant.value(name).map_or(Value::Null, json);
+    let of = |variant: &Variant| variant.value(name).map_or(Value::Null, json);
     let levels: Vec<Value> = plan.variants.iter().map(of).collect();
     let has_words = levels.iter().any(Value::is_string);
     let level = |v: Value| if has_words && !v.is_null() { words(&v).into() } else { v };
@@ -262,7 +278,8 @@ fn widen(values: &mut Values, value: &Value) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiment::sweep::{Factor, Sweep};
+    use crate::experiment::sweep::{Base, Factor, Sweep};
+    use crate::scenario::Source;
     use proptest::prelude::*;
     use serde_json::json;
 
@@ -271,7 +288,9 @@ mod tests {
         sweep.design.factors = vec![Factor::parse("n=1,2.5,word").expect("valid")];
         sweep.replicates = 4;
         let variants = sweep.design.variants("test").expect("valid");
-        Plan::new(&sweep, variants, ("robots", 7)).expect("valid")
+        let source = Source::new("s.toml", "", "");
+        let base = Base { world: "robots", seed: 7, source: &source };
+        Plan::new(&sweep, variants, base).expect("valid")
     }
 
     /// Outcomes whose fields differ in number and type from cell to cell.

@@ -11,7 +11,7 @@
 //! every metric that is not shown, and why.
 
 use super::Label;
-use super::compare::{Comparison, comparisons};
+use super::compare::{Comparison, Reference, comparisons};
 use super::groups::{Groups, Level, Parameter};
 use super::table::{Role, RunColumn, RunTable};
 use super::{charts, text};
@@ -24,6 +24,7 @@ use serde::Serialize;
 use sidestep_document::{Estimate, Figure, Table};
 use sidestep_kernel::InputError;
 use sidestep_kernel::ports::Values;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// The quantiles that are reported.
 pub const QUANTILES: [f64; 5] = [0.05, 0.25, 0.5, 0.75, 0.95];
@@ -42,13 +43,38 @@ pub struct SummaryOptions {
     pub metrics: Option<Vec<String>>,
     /// Largest number of metrics shown if none are requested.
     pub max_metrics: usize,
-    /// Name of the variant that the others are compared with; `None` for the first, except in
-    /// scattered designs, which have none.
-    pub baseline: Option<String>,
+    /// What variants are compared with; `None` for the first variant, but for nothing in grids of
+    /// several parameters and in scattered designs, where the first is like no other.
+    pub against: Option<Against>,
+    /// Variants in which seeds change nothing: their one value has no interval.
+    pub seedless: BTreeSet<String>,
     /// Options of bootstrap intervals.
     pub bootstrap: Bootstrap,
     /// The metrics in words.
     pub meanings: &'static [Meaning],
+}
+
+/// What variants are compared with.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Against {
+    /// The variant of this name.
+    Variant(String),
+    /// Each with a variant of its own.
+    Matched {
+        /// The name of these in tables.
+        name: String,
+        /// The names of variants, and of those that they are compared with.
+        of: BTreeMap<String, String>,
+        /// Number of variants to which none corresponds.
+        alone: usize,
+    },
+}
+
+impl Against {
+    /// Whether there are variants that are compared with nothing.
+    fn leaves_out(&self) -> bool {
+        matches!(self, Self::Matched { alone: 1.., .. })
+    }
 }
 
 impl Default for SummaryOptions {
@@ -56,7 +82,8 @@ impl Default for SummaryOptions {
         Self {
             metrics: None,
             max_metrics: 12,
-            baseline: None,
+            against: None,
+            seedless: BTreeSet::new(),
             bootstrap: Bootstrap::default(),
             meanings: &[],
         }
@@ -115,8 +142,8 @@ pub struct Share {
     pub yes: usize,
     /// Their share; absent without runs.
     pub share: Option<f64>,
-    /// Wilson's 95 % confidence interval.
-    pub interval: Interval,
+    /// Wilson's 95 % confidence interval; absent where seeds change nothing.
+    pub interval: Option<Interval>,
 }
 
 /// The values of a metric, by kind.
@@ -140,6 +167,8 @@ pub struct VariantMetric {
     pub missing: usize,
     /// Number of those runs without a value whose value is infinite or not a number.
     pub not_finite: usize,
+    /// Whether seeds change nothing in the variant.
+    pub seedless: bool,
     /// The description of the values.
     pub values: Described,
 }
@@ -218,7 +247,7 @@ pub struct Summary {
     pub variants: Vec<Variant>,
     /// The parameters that differ between variants.
     pub parameters: Vec<Parameter>,
-    /// The variant that others are compared with.
+    /// The name of what variants are compared with; each comparison has the variant itself.
     pub baseline: Option<String>,
     /// The metrics shown.
     pub metrics: Vec<MetricSummary>,
@@ -255,11 +284,10 @@ impl Summary {
     /// When columns differ in length, a variant has a replicate twice, or a metric or the
     /// baseline does not exist.
     pub fn of(table: &RunTable, options: &SummaryOptions) -> Result<Self, InputError> {
-        let groups = Groups::of(table, options.meanings)?;
+        let groups = Groups::of(table, options)?;
         let (columns, left_out) = chosen(&groups, options)?;
-        let scattered = charts::is_scattered(&groups);
-        let baseline = baseline(&groups, options, scattered)?;
-        let metric = |c: &&RunColumn| summed(&groups, c, baseline, &options.bootstrap);
+        let reference = reference(&groups, options)?;
+        let metric = |c: &&RunColumn| summed(&groups, c, reference.as_ref(), &options.bootstrap);
         let metrics: Vec<MetricSummary> = columns.iter().map(metric).collect();
         let named = |c: &&RunColumn, f: Figure| (c.name.clone(), f);
         let figures = columns
@@ -269,15 +297,19 @@ impl Summary {
         let mut summary = Self {
             runs: table.runs(),
             variants: (0..groups.variants.len()).map(|v| variant(&groups, v)).collect(),
-            baseline: baseline.map(|b| groups.variants[b].clone()),
+            baseline: reference.map(|r| r.name),
             metrics,
             left_out,
-            trends: if scattered { trends(&groups, &columns) } else { Vec::new() },
+            trends: if charts::is_scattered(&groups) {
+                trends(&groups, &columns)
+            } else {
+                Vec::new()
+            },
             notes: Vec::new(),
             figures,
             parameters: groups.parameters.clone(),
         };
-        summary.notes = notes(&summary, &groups);
+        summary.notes = notes(&summary, &groups, options.against.as_ref());
         Ok(summary)
     }
 
@@ -362,26 +394,47 @@ fn variant(groups: &Groups<'_>, variant: usize) -> Variant {
     }
 }
 
-fn baseline(
+fn reference(
     groups: &Groups<'_>,
     options: &SummaryOptions,
-    scattered: bool,
-) -> Result<Option<usize>, InputError> {
-    let Some(name) = &options.baseline else {
-        let compared = groups.paired && groups.variants.len() > 1 && !scattered;
-        return Ok(compared.then_some(0));
+) -> Result<Option<Reference>, InputError> {
+    let variants = groups.variants.len();
+    let all_with = |one: usize| Reference {
+        name: groups.variants[one].clone(),
+        of: (0..variants).map(|v| (v != one).then_some(one)).collect(),
     };
-    let place = || format!("baseline {name}");
-    let known: Vec<&str> = groups.variants.iter().map(String::as_str).collect();
-    let Some(found) = known.iter().position(|v| v == name) else {
-        let cause = format!("there is no variant `{name}`");
-        return Err(InputError::new(place(), cause, nearest(name, &known)));
+    let Some(against) = &options.against else {
+        let is_compared =
+            groups.paired && variants > 1 && !is_grid(groups) && !charts::is_scattered(groups);
+        return Ok(is_compared.then(|| all_with(0)));
     };
     if !groups.paired {
         let cause = "the table has no column of replicates, so runs have no counterparts";
-        return Err(InputError::new(place(), cause, "leave out the baseline"));
+        return Err(InputError::new("baseline", cause, "leave out the baseline"));
     }
-    Ok(Some(found))
+    match against {
+        Against::Variant(name) => {
+            let known: Vec<&str> = groups.variants.iter().map(String::as_str).collect();
+            let found = known.iter().position(|v| v == name).ok_or_else(|| {
+                let cause = format!("there is no variant `{name}`");
+                InputError::new(format!("baseline {name}"), cause, nearest(name, &known))
+            })?;
+            Ok(Some(all_with(found)))
+        }
+        Against::Matched { name, of, .. } => {
+            let places: BTreeMap<&String, usize> = groups.variants.iter().zip(0..).collect();
+            // A sweep in progress may have no run of a baseline yet.
+            let of_one = |variant| places.get(of.get(variant)?).copied();
+            let of = groups.variants.iter().map(of_one).collect();
+            Ok(Some(Reference { name: name.clone(), of }))
+        }
+    }
+}
+
+/// Whether several parameters are varied independently.
+fn is_grid(groups: &Groups<'_>) -> bool {
+    let parameters = groups.parameters.len();
+    parameters > 1 && (0..parameters).all(|p| groups.is_balanced(p))
 }
 
 type Chosen<'a> = (Vec<&'a RunColumn>, Vec<LeftOut>);
@@ -468,7 +521,7 @@ fn explained(groups: &Groups<'_>, column: &RunColumn) -> Option<f64> {
 fn summed(
     groups: &Groups<'_>,
     column: &RunColumn,
-    baseline: Option<usize>,
+    reference: Option<&Reference>,
     bootstrap: &Bootstrap,
 ) -> MetricSummary {
     let variants = 0..groups.variants.len();
@@ -482,7 +535,7 @@ fn summed(
         is_share: matches!(column.values, Values::Bool(_)),
         explained: explained(groups, column),
         variants: variants.map(describe).collect(),
-        comparisons: baseline.map_or(Vec::new(), |b| comparisons(groups, column, b, bootstrap)),
+        comparisons: reference.map_or(Vec::new(), |r| comparisons(groups, column, r, bootstrap)),
         effects: effects(groups, column),
     }
 }
@@ -495,7 +548,7 @@ fn described(
 ) -> VariantMetric {
     let sample = Sample::of(groups.values(column, variant));
     let values = if matches!(column.values, Values::Bool(_)) {
-        Described::Share(share(&sample.values))
+        Described::Share(share(&sample.values, groups.seedless[variant]))
     } else {
         Described::Numbers(numbers(&sample, bootstrap))
     };
@@ -504,13 +557,14 @@ fn described(
         n: sample.values.len(),
         missing: sample.missing,
         not_finite: sample.not_finite,
+        seedless: groups.seedless[variant],
         values,
     }
 }
 
-fn share(values: &[f64]) -> Share {
+fn share(values: &[f64], seedless: bool) -> Share {
     let yes = values.iter().filter(|v| **v > 0.5).count();
-    let interval = wilson(yes as f64, values.len() as f64);
+    let interval = (!seedless).then(|| wilson(yes as f64, values.len() as f64));
     Share { yes, share: mean(values), interval }
 }
 
@@ -558,8 +612,23 @@ fn effects(groups: &Groups<'_>, column: &RunColumn) -> Vec<Effect> {
     balanced.filter(|p| groups.with_level(*p, 0).len() > 1).map(effect).collect()
 }
 
-fn notes(summary: &Summary, groups: &Groups<'_>) -> Vec<String> {
+fn notes(summary: &Summary, groups: &Groups<'_>, against: Option<&Against>) -> Vec<String> {
     let mut notes = Vec::new();
+    if let Some(Against::Matched { name, alone, .. }) = against.filter(|a| a.leaves_out()) {
+        notes.push(format!(
+            "No variant with {name} is equal to {alone} of the others in all else: these are not \
+             compared."
+        ));
+    }
+    if against.is_none() && groups.paired && is_grid(groups) {
+        let p = &groups.parameters[0];
+        notes.push(format!(
+            "Nothing is compared: several keys vary. A baseline is compared within the others, e.g. \
+             --baseline {}={}",
+            p.name,
+            p.levels[0].name()
+        ));
+    }
     let hidden: Vec<&LeftOut> =
         summary.left_out.iter().filter(|l| l.reason.starts_with("beyond")).collect();
     if !hidden.is_empty() {
@@ -581,7 +650,7 @@ fn notes(summary: &Summary, groups: &Groups<'_>) -> Vec<String> {
         ));
     }
     let parameters = groups.parameters.len();
-    if parameters > 1 && !(0..parameters).all(|p| groups.is_balanced(p)) {
+    if parameters > 1 && !is_grid(groups) {
         notes.push(
             "The variants are no full grid: the marginal mean of a parameter would mix in the \
              others, and is not given where it does."

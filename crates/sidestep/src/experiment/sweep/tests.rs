@@ -92,7 +92,8 @@ fn what_parameters_move_comes_first_and_what_is_left_out_is_told() {
 
 #[test]
 fn pairs_cancel_what_replicates_have_in_common() {
-    let summary = summed(&grid());
+    let against = Some(Against::Variant("calm 10".into()));
+    let summary = Summary::of(&grid(), &SummaryOptions { against, ..Default::default() }).unwrap();
     assert_eq!(summary.baseline.as_deref(), Some("calm 10"));
     let delay = of(&summary, "mean_delay_percent");
     let Described::Numbers(alone) = &delay.variants[0].values else { panic!("numbers") };
@@ -127,7 +128,7 @@ fn a_column_of_yes_and_no_is_a_share_with_wilsons_interval() {
     let arrived = of(&summary, "arrived");
     assert!(arrived.is_share);
     let Described::Share(share) = &arrived.variants[0].values else { panic!("a share") };
-    assert_eq!(share.interval, crate::statistics::wilson(share.yes as f64, 20.0));
+    assert_eq!(share.interval, Some(crate::statistics::wilson(share.yes as f64, 20.0)));
     let comparison = &arrived.comparisons[0];
     assert_eq!(comparison.p, comparison.p_sign, "McNemar's test");
 }
@@ -237,8 +238,8 @@ fn the_order_of_rows_is_no_part_of_a_summary() {
 #[test]
 fn wrong_names_and_tables_are_refused_with_a_remedy() {
     let refused = |options: SummaryOptions| Summary::of(&grid(), &options).unwrap_err();
-    let baseline = Some("calm 11".to_string());
-    let error = refused(SummaryOptions { baseline, ..Default::default() });
+    let against = Some(Against::Variant("calm 11".into()));
+    let error = refused(SummaryOptions { against, ..Default::default() });
     assert_eq!(error.cause(), "there is no variant `calm 11`");
     let metrics = Some(vec!["noise".to_string()]);
     let error = refused(SummaryOptions { metrics, ..Default::default() });

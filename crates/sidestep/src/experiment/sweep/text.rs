@@ -22,18 +22,28 @@ pub(super) fn brief(summary: &Summary) -> Vec<Table> {
     summary.metrics.iter().map(|metric| brief_of(summary, metric)).collect()
 }
 
+/// Largest number of characters of a heading.
+const MOST_OF_HEADING: usize = 24;
+
 fn brief_of(summary: &Summary, metric: &MetricSummary) -> Table {
-    let against = summary.baseline.as_ref().map(|name| format!("minus {name}"));
+    let minus = summary.baseline.as_ref().map(|name| format!("minus {name}"));
+    let titled = format!("{}: {}", sentence(&metric.label), metric.name);
+    // A long name stands in the title.
+    let is_long = |words: &&String| words.chars().count() > MOST_OF_HEADING;
+    let (title, against) = match minus.as_ref().filter(is_long) {
+        Some(words) => (format!("{titled}, difference: {words}"), Some("difference".into())),
+        None => (titled, minus),
+    };
     let mean = if metric.is_share { "share of runs" } else { "mean" };
     let mut columns = vec!["variant", "n", mean];
     columns.extend(against.as_deref());
     columns.extend(against.as_ref().map(|_| "p (Holm)"));
-    let title = format!("{}: {}", sentence(&metric.label), metric.name);
     let mut table = Table::new(title, "", &columns);
     for variant in &metric.variants {
         let mut row = vec![variant.variant.clone(), variant.n.to_string(), center(variant)];
         if let Some(c) = metric.comparisons.iter().find(|c| c.variant == variant.variant) {
-            row.push(format!("{} n={}", with_interval(c.difference, c.interval), c.pairs));
+            let n = if c.pairs > 1 { format!(" n={}", c.pairs) } else { String::new() };
+            row.push(format!("{}{n}", with_interval(c.difference, c.interval)));
             row.push(c.p_holm.map_or("-".into(), p_value));
         }
         table.row(row);
@@ -43,9 +53,14 @@ fn brief_of(summary: &Summary, metric: &MetricSummary) -> Table {
 
 /// Returns the mean of a metric, or its share, with its interval.
 fn center(variant: &VariantMetric) -> String {
-    match &variant.values {
-        Described::Numbers(numbers) => with_interval(numbers.mean, numbers.interval),
-        Described::Share(share) => with_interval(share.share, Some(share.interval)),
+    let (value, interval) = match &variant.values {
+        Described::Numbers(numbers) => (numbers.mean, numbers.interval),
+        Described::Share(share) => (share.share, share.interval),
+    };
+    match value {
+        // What no seed changes has no spread.
+        Some(value) if variant.seedless => number(value, None),
+        value => with_interval(value, interval),
     }
 }
 
@@ -192,7 +207,7 @@ fn number_row(variant: &VariantMetric, numbers: &Numbers) -> Vec<String> {
     vec![
         variant.variant.clone(),
         variant.n.to_string(),
-        with_interval(numbers.mean, numbers.interval),
+        center(variant),
         quantile(2),
         plain(numbers.sd),
         plain(numbers.min),
@@ -219,11 +234,10 @@ fn shares(metric: &MetricSummary) -> Table {
     let title = format!("{}: all numbers", sentence(&metric.label));
     let mut table = Table::new(title, "", &columns);
     for variant in &metric.variants {
-        if let Described::Share(Share { yes, share, interval }) = variant.values {
+        if let Described::Share(Share { yes, .. }) = variant.values {
             let [n, yes, missing] =
                 [variant.n, yes, variant.missing].map(|count| count.to_string());
-            let share = with_interval(share, Some(interval));
-            table.row([variant.variant.clone(), n, share, yes, missing]);
+            table.row([variant.variant.clone(), n, center(variant), yes, missing]);
         }
     }
     table

@@ -13,7 +13,7 @@ use crate::state::AirspaceState;
 use crate::world::{AirspaceWorld, Disturbance, Method};
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{InputError, Seed};
-use sidestep_scenario::{Head, Source};
+use sidestep_scenario::{Head, Seeds, Source};
 use std::sync::Arc;
 use toml::Spanned;
 
@@ -57,6 +57,7 @@ impl Compiler<'_> {
         world.first_fallbacks.clone_from(&fallbacks);
         let cycles = self.head.cycles.unwrap_or_else(|| enough_cycles(&world));
         let compiled = Compiled {
+            seeds: self.seeds(&world),
             world: Arc::new(world),
             name: self.head.name.clone(),
             seed: self.head.seed,
@@ -67,6 +68,21 @@ impl Compiler<'_> {
         };
         self.fits_memory(&compiled)?;
         Ok(compiled)
+    }
+
+    /// Returns what another seed changes: traffic, errors and faults of messages are drawn; samples
+    /// of the optimizer only guide its search.
+    fn seeds(&self, world: &AirspaceWorld) -> Seeds {
+        let Disturbance { position_m, heading_rad } = world.disturbance;
+        let is_drawn = self.file.airspace.generator.is_some()
+            || position_m > 0.0
+            || heading_rad > 0.0
+            || world.network.is_some();
+        match (is_drawn, world.method) {
+            (true, _) => Seeds::Decide,
+            (false, Method::Pc) => Seeds::Perhaps,
+            (false, Method::Mvp | Method::Orca | Method::None) => Seeds::Nothing,
+        }
     }
 
     fn world(&self) -> Result<AirspaceWorld, InputError> {

@@ -4,7 +4,7 @@ use std::fmt::{Formatter, Result};
 
 use super::holdout::Fit;
 use super::{Estimate, ThinRow};
-use sidestep_statistics::Moments;
+use sidestep_statistics::{Moments, holm};
 
 /// The names of a table's rows and columns.
 pub(super) struct Heading {
@@ -23,17 +23,28 @@ pub(super) fn moments(f: &mut Formatter<'_>, named: &[(String, Option<Moments>)]
         return Ok(());
     }
     let heads = ["n", "mean", "sd", "p01", "p05", "p50", "p95", "p99"];
-    write!(f, "\n{:26} {:>6}", "", heads[0])?;
-    heads[1..].iter().try_for_each(|head| write!(f, " {head:>9}"))?;
+    write!(f, "\n{:20} {:>5}", "", heads[0])?;
+    heads[1..].iter().try_for_each(|head| write!(f, " {head:>6}"))?;
     writeln!(f)?;
     for (name, m) in named {
         let Some(m) = m else { continue };
-        write!(f, "{name:26} {:>6}", m.n)?;
+        write!(f, "{name:20} {:>5}", m.n)?;
         let values = [m.mean, m.sd, m.p01, m.p05, m.p50, m.p95, m.p99];
-        values.iter().try_for_each(|value| write!(f, " {value:>9.4}"))?;
+        values.iter().try_for_each(|value| write!(f, " {:>6}", six(*value)))?;
         writeln!(f)?;
     }
     Ok(())
+}
+
+/// Returns a number in six characters where it has room in them.
+fn six(value: f64) -> String {
+    let decimals = match value.abs() {
+        a if a < 10.0 => 3,
+        a if a < 100.0 => 2,
+        a if a < 1000.0 => 1,
+        _ => 0,
+    };
+    format!("{value:.decimals$}")
 }
 
 /// Writes estimates, one table for each name; cells without counts are left out.
@@ -96,5 +107,76 @@ pub(super) fn hold_out(f: &mut Formatter<'_>, fits: &[Fit]) -> Result {
             shown(fit.log_loss_floor)
         )?;
     }
-    Ok(())
+    verdicts(fits).iter().try_for_each(|words| writeln!(f, "{words}"))
+}
+
+/// Largest probability, over all tables together, at which a difference is not taken for chance.
+const LEVEL: f64 = 0.05;
+
+/// Returns what the tests say: a line for each table whose parts differ, or one for all.
+fn verdicts(fits: &[Fit]) -> Vec<String> {
+    let tested: Vec<&Fit> = fits.iter().filter(|fit| fit.degrees_of_freedom > 0).collect();
+    let adjusted = holm(&tested.iter().map(|fit| Some(fit.p_value)).collect::<Vec<_>>());
+    let differs = tested.iter().zip(adjusted).filter(|(_, p)| p.is_some_and(|p| p < LEVEL));
+    let mut words: Vec<String> = differs
+        .map(|(fit, _)| {
+            format!(
+                "WARNING: {}: the parts of the log differ by more than chance (p = {}).\nWhat was \
+                 learned may not hold elsewhere: the robot or its place changed meanwhile,\nor \
+                 events depend on each other.",
+                fit.table,
+                shown_p(fit.p_value)
+            )
+        })
+        .collect();
+    let untested = fits.len() - tested.len();
+    if words.is_empty() && !tested.is_empty() {
+        words.push("Both parts of the log agree as far as these counts can tell.".into());
+    }
+    if untested > 0 {
+        words.push(format!("Too few counts to test: {untested} of {} tables.", fits.len()));
+    }
+    words
+}
+
+fn shown_p(p: f64) -> String {
+    if p < 0.0001 { "< 0.0001".into() } else { format!("{p:.4}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn fit(p_value: f64, degrees_of_freedom: usize) -> Fit {
+        Fit {
+            table: "moves".into(),
+            trained_on: 100.0,
+            held_out: 100.0,
+            chi_square: 1.0,
+            degrees_of_freedom,
+            p_value,
+            log_loss: None,
+            log_loss_floor: None,
+        }
+    }
+
+    #[test]
+    fn a_small_p_is_a_verdict_and_chance_over_many_tables_is_not() {
+        let told = |fits: &[Fit]| verdicts(fits).join("\n");
+        assert!(told(&[fit(0.0067, 4)]).contains("moves: the parts of the log differ"));
+        let mut many = vec![fit(0.9, 4); 9];
+        many.push(fit(0.0067, 4));
+        assert!(told(&many).starts_with("Both parts of the log agree"), "{}", told(&many));
+        assert_eq!(told(&[fit(1.0, 0)]), "Too few counts to test: 1 of 1 tables.");
+        let lines = told(&[fit(0.00001, 4)]);
+        assert!(lines.lines().all(|line| line.chars().count() <= 80), "{lines}");
+    }
+
+    #[test]
+    fn numbers_take_six_characters() {
+        assert_eq!(
+            [0.02489, -0.2346, -90.0, 123.456].map(six),
+            ["0.025", "-0.235", "-90.00", "123.5"]
+        );
+    }
 }

@@ -122,7 +122,8 @@ impl<'a> Compiler<'a> {
         idle::refuse(&source, &file, own, !office_doors.is_empty())?;
         let kinds = Kinds::new(&source, &file)?;
         check_tables(&kinds, &sensors, &effectors)?;
-        let mut remarks = remarks::on_effectors(&file, map.box_size_m, &effectors);
+        remarks::refuse_other_boxes(&source, &file, map.box_size_m, &effectors)?;
+        let mut remarks = remarks::on_effectors(&file, &effectors);
         remarks.extend(remarks::on_radio(&file));
         let streams = Streams::new(Seed(head.seed));
         let floor = Floor::new(&map);

@@ -180,9 +180,22 @@ fn goals_out_of_reach_are_told_with_their_number() {
 }
 
 #[test]
+fn an_effector_that_was_learned_for_other_boxes_is_refused() {
+    let of = |box_m: f64| {
+        let learned = "[robots]\ncount = 1\neffector = \"wheels\"\n[effectors.wheels]\n";
+        text("", &format!("{learned}box_m = {box_m}\nforward = [{{ p = 1, path = \"F\" }}]\n"))
+    };
+    assert!(remarks(&of(0.5), Path::new("")).is_empty());
+    let error = compiled(&of(0.25), Path::new("")).err().expect("another box");
+    assert!(error.position().is_some(), "{error}");
+    assert!(error.cause().contains("boxes of 0.25 m, and those of the map are 0.5 m"), "{error}");
+    assert!(error.remedy().contains("--box 0.5"), "{error}");
+}
+
+#[test]
 fn an_author_is_told_what_will_surprise() {
     let surprising = "[[robots]]\ncount = 1\neffector = \"wheels\"\nsensors = [\"eye\"]\n\
-        [people]\ncount = 1\n[effectors.wheels]\nbox_m = 0.25\n\
+        [people]\ncount = 1\n[effectors.wheels]\nbox_m = 0.5\n\
         forward = [{ p = 0.4, path = \"F\" }, { p = 0.6, turn = -90 }]\n";
     let eye = sensor(
         &["nothing", "wall", "robot"],
@@ -190,10 +203,9 @@ fn an_author_is_told_what_will_surprise() {
     );
     let told = remarks(&text("", &(surprising.to_string() + &eye)), Path::new(""));
     let keys: Vec<&str> = told.iter().map(|remark| remark.key.as_str()).collect();
-    assert_eq!(keys, ["robots.0.effector", "robots.0.effector", "sensors.eye", "sensors.eye"]);
+    assert_eq!(keys, ["robots.0.effector", "sensors.eye", "sensors.eye"]);
     let parts = [
         "`forward` of `wheels` mostly comes to a turn of -90 degrees (60 %)",
-        "boxes of 0.25 m, and those of the map are 0.5 m",
         "does not see person",
         "at the distance class class2",
     ];

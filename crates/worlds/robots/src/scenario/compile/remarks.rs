@@ -7,18 +7,13 @@ use super::*;
 /// Returns warnings of effectors that move otherwise than their author may think.
 pub(super) fn on_effectors(
     file: &RobotsFile,
-    box_size_m: f64,
     effectors: &BTreeMap<String, Located<EffectorSection>>,
 ) -> Vec<Remark> {
     let sections = file.robots.0.iter().enumerate();
     let remarks = sections.flat_map(|(k, section)| {
         let name = section.get_ref().effector.as_ref().map(Spanned::get_ref);
         let found = name.and_then(|name| Some((name, effectors.get(name)?)));
-        let words = found.map_or(vec![], |(name, at)| {
-            let mut words = not_as_meant(name, at);
-            words.extend(misfit(name, at.section.get_ref(), box_size_m));
-            words
-        });
+        let words = found.map_or(vec![], |(name, at)| not_as_meant(name, at));
         words.into_iter().map(move |words| Remark::warning(format!("robots.{k}.effector"), words))
     });
     remarks.collect()
@@ -37,16 +32,31 @@ pub(super) fn on_radio(file: &RobotsFile) -> Option<Remark> {
     is_idle.then(|| Remark::note("radio", "nobody speaks: no robot has a behavior that broadcasts"))
 }
 
-/// Returns words for an effector that was learned for boxes of another size.
-fn misfit(name: &str, section: &EffectorSection, map_m: f64) -> Option<String> {
-    let box_m = section.box_m?.get();
-    ((box_m - map_m).abs() > 1e-9 * map_m).then(|| {
-        format!(
-            "`{name}` was learned for boxes of {box_m} m, and those of the map are {map_m} m: its \
-             slips are as many boxes, and so other lengths. Learn it with --box {map_m}, or set \
-             map.box_size_m = {box_m}"
-        )
-    })
+/// Refuses effectors that were learned for boxes of another size: a slip of a box is another length
+/// there, and how often it happens depends on the box.
+pub(super) fn refuse_other_boxes(
+    source: &Source,
+    file: &RobotsFile,
+    map_m: f64,
+    effectors: &BTreeMap<String, Located<EffectorSection>>,
+) -> Result<(), InputError> {
+    let named = file.robots.0.iter().filter_map(|section| section.get_ref().effector.as_ref());
+    for name in named {
+        let learned = effectors.get(name.get_ref()).and_then(|at| at.section.get_ref().box_m);
+        let Some(box_m) = learned.map(|m| m.get()) else { continue };
+        if (box_m - map_m).abs() > 1e-9 * map_m {
+            let cause = format!(
+                "the effector `{}` was learned for boxes of {box_m} m, and those of the map are \
+                 {map_m} m: its slips would be other lengths",
+                name.get_ref()
+            );
+            let remedy = format!(
+                "learn it from the same log with --box {map_m}, or set map.box_size_m = {box_m}"
+            );
+            return Err(source.error(Some(name.span()), cause, remedy));
+        }
+    }
+    Ok(())
 }
 
 /// Returns words for each action that mostly comes to something else than its first transition.

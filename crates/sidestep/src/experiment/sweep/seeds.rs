@@ -1,0 +1,117 @@
+//! Variants in which seeds change nothing: one run says all.
+//!
+//! Where a scenario draws no random number, its world says so, and there is one run. Where draws
+//! only guide a search, the first two runs tell: if they end in the same state to the bit, with the
+//! same cycles, seeds are taken to change nothing, and there are no more runs.
+
+use super::cell::Outcome;
+use super::plan::{Cell, Plan};
+use super::table::{Role, RunTable};
+use crate::scenario::Seeds;
+use std::collections::BTreeMap;
+
+/// Number of runs of a variant whose world cannot tell, before the others.
+const TRIALS: u32 = 2;
+
+/// The first runs of variants whose world cannot tell.
+#[derive(Debug)]
+pub struct Trials<'a> {
+    plan: &'a Plan,
+    /// The ends of trials, by variant.
+    ends: BTreeMap<u32, BTreeMap<u32, String>>,
+}
+
+impl<'a> Trials<'a> {
+    /// Returns the trials before any run.
+    pub fn new(plan: &'a Plan) -> Self {
+        Self { plan, ends: BTreeMap::new() }
+    }
+
+    /// Returns the trials of a table of runs.
+    pub(super) fn of(plan: &'a Plan, runs: &RunTable) -> Self {
+        let mut trials = Self::new(plan);
+        if let (Some(cells), Some(digests)) =
+            (runs.of_role(Role::Cell).next(), runs.of_role(Role::Digest).next())
+        {
+            for row in 0..runs.runs() {
+                let cell = cells.values.number(row).map(|id| id as u64);
+                trials.end(cell, digests.values.text(row));
+            }
+        }
+        trials
+    }
+
+    /// Adds an outcome.
+    pub fn note(&mut self, outcome: &Outcome) {
+        self.end(Some(outcome.cell), outcome.digest.clone());
+    }
+
+    pub(super) fn end(&mut self, cell: Option<u64>, digest: String) {
+        let Some(cell) = cell.and_then(|id| self.plan.cell_of(id)) else { return };
+        let asks = self.plan.until.is_none() && self.plan.seeds(cell.variant) == Seeds::Perhaps;
+        if asks && cell.replicate < TRIALS && !digest.is_empty() {
+            self.ends.entry(cell.variant).or_default().insert(cell.replicate, digest);
+        }
+    }
+
+    /// Whether all trials of a variant ended alike.
+    pub fn is_settled(&self, variant: u32) -> bool {
+        let Some(ends) = self.ends.get(&variant) else { return false };
+        let mut ends = ends.values();
+        let first = ends.next();
+        ends.len() + 1 == TRIALS as usize && ends.all(|end| Some(end) == first)
+    }
+
+    /// Whether a cell is of use: it is not where its variant is settled without it.
+    pub fn asks_for(&self, cell: &Cell) -> bool {
+        cell.replicate < TRIALS || !self.is_settled(cell.variant)
+    }
+
+    /// Returns the cells to run next: those of which the others may depend, if there are any.
+    pub fn first_of(&self, open: Vec<Cell>) -> Vec<Cell> {
+        let cannot_tell = |v: u32| self.plan.seeds(v) == Seeds::Perhaps;
+        if !open.iter().any(|c| c.replicate < TRIALS && cannot_tell(c.variant)) {
+            return open.into_iter().filter(|c| self.asks_for(c)).collect();
+        }
+        open.into_iter().filter(|c| c.replicate < TRIALS).collect()
+    }
+}
+
+/// Returns for each variant whether seeds change nothing in it.
+pub(super) fn seedless(plan: &Plan, runs: &RunTable) -> Vec<bool> {
+    let trials = Trials::of(plan, runs);
+    let is_same = |v: u32| plan.seeds(v) == Seeds::Nothing || trials.is_settled(v);
+    (0..plan.variants.len() as u32).map(is_same).collect()
+}
+
+/// Returns what a reader must know about the seeds of these runs.
+pub(super) fn notes(plan: &Plan, runs: &RunTable) -> Vec<String> {
+    let trials = Trials::of(plan, runs);
+    let all = plan.variants.len() as u32;
+    let count = |holds: &dyn Fn(u32) -> bool| (0..all).filter(|v| holds(*v)).count();
+    let of_all = |n: usize| match n == all as usize {
+        true => String::new(),
+        false => format!(" in {n} of {all} variants"),
+    };
+    let mut notes = Vec::new();
+    let undrawn = count(&|v| plan.seeds(v) == Seeds::Nothing);
+    if undrawn > 0 {
+        notes.push(format!(
+            "Seeds change nothing{}: no random number is drawn. So there is one run of each, and no \
+             interval.",
+            of_all(undrawn)
+        ));
+    }
+    let settled = count(&|v| trials.is_settled(v));
+    if settled > 0 {
+        let seeds = [plan.first_seed, plan.first_seed + 1];
+        notes.push(format!(
+            "Seeds are taken to change nothing{}: the runs with the seeds {} and {} ended in the same \
+             state, to the bit. So there are no more runs, and no interval.",
+            of_all(settled),
+            seeds[0],
+            seeds[1]
+        ));
+    }
+    notes
+}
