@@ -24,7 +24,7 @@ const BEAMS_MAX: usize = 16;
 /// The longest way in meters that odometry alone tells since the last true pose.
 const RECKONED_MAX_M: f64 = 1.0;
 /// A scanner on which this share of beams ends before the wall sees what is not on the map.
-const IN_FRONT_MAX: f64 = 0.05;
+const IN_FRONT_MAX: f64 = 0.1;
 
 /// The rule by which counts become rows.
 const RULE: &str = "range to the first wall of the map from the true pose against measured range, no wall or \
