@@ -129,6 +129,32 @@ fn equal_runs_give_equal_bags_and_other_worlds_none() {
 }
 
 #[test]
+fn the_bag_of_the_examples_is_what_its_commands_make() {
+    let place = Place::new();
+    let examples = sidestep_testing::root().join("examples");
+    let building = examples.join("building.toml");
+    let one = ["robots.0.count=1", "robots.1.count=0", "people.count=0"];
+    let settings: Vec<&str> = one.iter().flat_map(|setting| ["--set", setting]).collect();
+    let run = ["run", building.to_str().expect("text"), "--cycles", "1200", "--out", "r"];
+    place.json(&[&run[..], &settings].concat());
+    place.json(&["export", "r", "--to", "rosbag", "--out", "bag"]);
+    for name in ["metadata.yaml", "map.yaml", "map.pgm"] {
+        let bytes = |path| std::fs::read(path).expect("read");
+        assert!(
+            bytes(place.path("bag").join(name)) == bytes(examples.join("logs/rounds").join(name))
+        );
+    }
+    // How chunks are packed is up to a library; what is in them is not.
+    let learned = |bag: &Path| {
+        let bag = ["learn", "effector", "--bag", bag.to_str().expect("text"), "--box", "0.25"];
+        let mut report = place.json(&[&bag[..], &ODOM, &TRUTH].concat());
+        report["source"] = Value::Null;
+        report
+    };
+    assert_eq!(learned(&place.path("bag")), learned(&examples.join("logs/rounds")));
+}
+
+#[test]
 fn a_bag_that_is_wrong_is_refused_with_what_is_right() {
     let place = exported("60");
     let bytes = std::fs::read(place.path("bag/bag_0.mcap")).expect("read");
