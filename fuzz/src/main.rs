@@ -9,7 +9,7 @@ use sidestep::experiment::sweep::Sweep;
 use sidestep::import::table::CsvTable;
 use sidestep::import::urdf::{Model, srdf::Semantics};
 use sidestep::import::{
-    ascii, bluesky, carmen, image::Bitmap, movingai, mrclam, rosmap, stage, stl, traffic,
+    ascii, bag, bluesky, carmen, image::Bitmap, movingai, mrclam, rosmap, stage, stl, traffic,
 };
 use sidestep::kernel::checkpoint;
 use sidestep::learn::{effector, sensor};
@@ -24,7 +24,7 @@ use std::sync::LazyLock;
 /// A reader of text or bytes, by its name. A folder of the same name in `seeds` has inputs to begin with.
 type Target = (&'static str, fn(&[u8]));
 
-const TARGETS: [Target; 25] = [
+const TARGETS: [Target; 27] = [
     ("scenario", |data| text(data, scenario)),
     ("override", |data| text(data, overridden)),
     ("script", |data| text(data, script)),
@@ -43,6 +43,8 @@ const TARGETS: [Target; 25] = [
     ("translate", |data| drop(WORLDS.translate(&file("f.scn", data)))),
     ("carmen", |data| text(data, |t| drop(carmen::parse("f", t)))),
     ("learn_carmen", |data| drop(effector::from_carmen(&file("f.log", data), &Default::default()))),
+    ("bag", |data| drop(bag::read(&file("f.mcap", data), &all_of_a_bag()))),
+    ("cdr", |data| messages(data)),
     ("mrclam", |data| drop(mrclam::read(&mrclam_folder(data)))),
     ("learn_csv", |data| text(data, learned)),
     ("checkpoint", |data| drop(checkpoint::decode_header(data))),
@@ -114,6 +116,22 @@ fn srdf(text: &str) {
         Model::parse("arm.urdf", urdf).expect("our own arm")
     });
     drop(Semantics::parse("f", text, &ARM));
+}
+
+/// The topics of the seeds.
+fn all_of_a_bag() -> bag::Wanted {
+    let source = |topic: &str| bag::Source { topic: topic.into(), frames: None };
+    bag::Wanted {
+        odometry: Some(source("/robot_0/odom")),
+        truth: source("/robot_0/ground_truth"),
+        scans: Some("/robot_0/sonar_ring".into()),
+    }
+}
+
+fn messages(data: &[u8]) {
+    drop(bag::cdr::decode::<bag::messages::Odometry>(data));
+    drop(bag::cdr::decode::<bag::messages::LaserScan>(data));
+    drop(bag::cdr::decode::<bag::messages::TfMessage>(data));
 }
 
 fn learned(text: &str) {

@@ -47,13 +47,15 @@ reported_distance_m, or true_class, reported_class.";
 /// As it would be made, but in lines that fit.
 const EFFECTOR_USAGE: &str = "\
 sidestep learn effector [OPTIONS]
-           <--mrclam <DIR>|--carmen <FILE>|--bag <PATH>|--csv <FILE>|--run <DIR>>";
+           <--mrclam <DIR>|--carmen <FILE>|--bag <PATH>|--csv <FILE>|
+            --run <DIR>>";
 
 const EFFECTOR_EXAMPLES: &str = "\
 Examples:
   sidestep learn effector --mrclam logs/hall --box 0.25
   sidestep learn effector --carmen intel.log.gz --profile my.toml --name pioneer
-  sidestep learn effector --bag hall.mcap --odom /odom --truth /vicon/pose --box 0.5
+  sidestep learn effector --bag hall.mcap --box 0.5 \\
+      --odom /odom --truth /vicon/pose
   sidestep learn effector --bag run/ --odom /tf:odom:base_link \\
       --truth /tf:map:base_link
   sidestep learn effector --csv motions.csv --json

@@ -1,6 +1,7 @@
 //! Tests of the real program from outside: its output, its files and its exit codes.
 
 mod airspace;
+mod bags;
 mod book;
 mod browser;
 mod chain;

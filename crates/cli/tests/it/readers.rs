@@ -47,7 +47,7 @@ n = 6
 "#;
 
 /// Whether the modules are here; says why not, or fails where they must be.
-fn has(modules: &str) -> bool {
+pub(crate) fn has(modules: &str) -> bool {
     let tried = Command::new(python()).args(["-c", &format!("import {modules}")]).output();
     let said = match tried {
         Ok(output) if output.status.success() => return true,
@@ -62,7 +62,7 @@ fn has(modules: &str) -> bool {
 }
 
 /// What a script says.
-fn script(name: &str, args: &[&Path]) -> Value {
+pub(crate) fn script(name: &str, args: &[&Path]) -> Value {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python").join(name);
     let output = Command::new(python()).arg(path).args(args).output().expect("python starts");
     let error = String::from_utf8_lossy(&output.stderr);

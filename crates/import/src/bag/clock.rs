@@ -43,9 +43,9 @@ impl Stamped for (u64, LaserScan) {
 ///
 /// # Errors
 /// When the clock jumps.
-pub(super) fn in_order<T: Stamped + Clone>(place: &str, all: &[T]) -> Result<Vec<T>, InputError> {
+pub(super) fn in_order<T: Stamped>(place: &str, mut all: Vec<T>) -> Result<Vec<T>, InputError> {
     let mut latest = f64::NEG_INFINITY;
-    for stamped in all {
+    for stamped in &all {
         let step_secs = stamped.t_secs() - latest;
         let is_first = latest == f64::NEG_INFINITY;
         if !is_first && !(-BACK_MAX_SECS..=AHEAD_MAX_SECS).contains(&step_secs) {
@@ -53,9 +53,8 @@ pub(super) fn in_order<T: Stamped + Clone>(place: &str, all: &[T]) -> Result<Vec
         }
         latest = latest.max(stamped.t_secs());
     }
-    let mut sorted = all.to_vec();
-    sorted.sort_by(|a, b| a.t_secs().total_cmp(&b.t_secs()));
-    Ok(sorted)
+    all.sort_by(|a, b| a.t_secs().total_cmp(&b.t_secs()));
+    Ok(all)
 }
 
 fn jump(place: &str, message: u64, step_secs: f64) -> InputError {

@@ -34,6 +34,9 @@ pub(super) fn track(bag: &str, source: &Source, all: &[Placed]) -> Result<Track,
     let refuse = |cause: String, remedy: String| {
         Err(InputError::new(format!("{bag}: {}", source.topic), cause, remedy))
     };
+    if pairs.is_empty() {
+        return refuse("its messages hold no transforms".into(), "name another topic".into());
+    }
     let chain = match &source.frames {
         Some((parent, child)) => chain(&edges, parent, child),
         None if pairs.len() == 1 => pairs.first().map(|(_, child)| vec![*child]),
@@ -49,8 +52,10 @@ pub(super) fn track(bag: &str, source: &Source, all: &[Placed]) -> Result<Track,
         return refuse(cause, format!("it has {}", listed(&pairs)));
     };
     let place = format!("{bag}: {}", source.topic);
-    let links: Vec<Vec<&Placed>> =
-        chain.iter().map(|child| in_order(&place, &edges[child])).collect::<Result<_, _>>()?;
+    let links: Vec<Vec<&Placed>> = chain
+        .iter()
+        .map(|child| in_order(&place, edges[child].clone()))
+        .collect::<Result<_, _>>()?;
     let child = chain.last().map_or_else(String::new, |child| (*child).to_owned());
     Ok(Track { poses: joined(&links), child })
 }

@@ -167,6 +167,6 @@ impl Time {
 
     /// Returns the moment in seconds.
     pub fn secs(&self) -> f64 {
-        f64::from(self.sec) + 1e-9 * f64::from(self.nanosec)
+        f64::from(self.sec) + f64::from(self.nanosec) / 1e9
     }
 }

@@ -27,10 +27,8 @@ use sidestep_kernel::view::Pose;
 use self::frames::Track;
 use self::messages::{LaserScan, Message, TfMessage};
 use self::poses::Placed;
-use self::storage::RawMessage;
+use self::storage::{RawMessage, Topic};
 use crate::mrclam::TruePose;
-
-pub use self::storage::Topic;
 
 /// Most topics that an error lists.
 const LISTED_MAX: usize = 20;
@@ -194,9 +192,10 @@ impl Content {
         self.poses.get(topic).map_or(&[], Vec::as_slice)
     }
 
-    fn scans(&self, bag: &str, wanted: &Wanted) -> Result<Vec<LaserScan>, InputError> {
+    /// Takes the scans out, by time.
+    fn scans(&mut self, bag: &str, wanted: &Wanted) -> Result<Vec<LaserScan>, InputError> {
         let place = format!("{bag}: {}", wanted.scans.as_deref().unwrap_or_default());
-        let sorted = clock::in_order(&place, &self.scans)?;
+        let sorted = clock::in_order(&place, std::mem::take(&mut self.scans))?;
         Ok(sorted.into_iter().map(|(_, scan)| scan).collect())
     }
 

@@ -29,14 +29,13 @@ pub(super) struct RawMessage<'a> {
 }
 
 /// What is recorded under a topic.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Topic {
+#[derive(Debug, Default)]
+pub(super) struct Topic {
     /// The name of the type of its messages.
-    pub schema: String,
-    /// The encoding of its messages.
-    pub encoding: String,
+    pub(super) schema: String,
+    encoding: String,
     /// Number of messages.
-    pub messages: u64,
+    pub(super) messages: u64,
 }
 
 /// Passes on every message on a topic that `is_wanted`, and returns all topics of the bag.

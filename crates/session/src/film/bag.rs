@@ -10,7 +10,7 @@ use sidestep::import::bag::messages::{
 };
 use sidestep::import::write::map_files;
 use sidestep::kernel::math::wrap_angle;
-use sidestep::kernel::view::{Floor, Frame, Occupancy, Pose, Scan, Who};
+use sidestep::kernel::view::{Floor, Frame, Occupancy, Plane, Pose, Scan, Who};
 use sidestep::kernel::{Cycle, InputError, Simulation};
 use sidestep::{Cell, VERSION};
 use sidestep_record::{BagSchema, BagWriter};
@@ -112,10 +112,24 @@ impl BagFilm {
         Ok(())
     }
 
+    /// Places the scanners in the middle of their robots, from where ranges are told.
+    fn write_mounts(&mut self, frame: &Frame) -> Result<(), Error> {
+        let mount = |scan: &Scan| TransformStamped {
+            header: header(frame.time_s, base_frame(scan.of)),
+            child_frame_id: scan_frame(scan),
+            transform: ros_pose(&Pose::at([0.0; 3])),
+        };
+        let transforms = frame.scans.iter().map(mount).collect();
+        self.write("/tf_static", frame.time_s, &TfMessage { transforms })
+    }
+
     fn write_scans(&mut self, frame: &Frame) -> Result<(), Error> {
         for scan in &frame.scans {
-            let topic = format!("/{}/{}", namespace(scan.of), ros_name(&scan.sensor));
-            self.write(&topic, frame.time_s, &laser_scan(frame.time_s, scan))?;
+            self.write(
+                &format!("/{}", scan_frame(scan)),
+                frame.time_s,
+                &laser_scan(frame.time_s, scan),
+            )?;
         }
         Ok(())
     }
@@ -133,6 +147,9 @@ impl Film for BagFilm {
             let remedy = "export a run of the world robots, or use --to mcap";
             return Err(InputError::new("--to rosbag", cause, remedy).into());
         }
+        if self.before.is_none() {
+            self.write_mounts(&frame)?;
+        }
         self.write_odometry(&frame)?;
         self.write_truth(&frame)?;
         self.write_scans(&frame)?;
@@ -141,14 +158,21 @@ impl Film for BagFilm {
     }
 }
 
+/// Returns the map with a wall around it, for nothing leaves the floor and no beam does.
 fn files_of(floor: &Floor) -> [(&'static str, Vec<u8>); 2] {
     let cell = |occupancy: &Occupancy| match occupancy {
         Occupancy::Free => Cell::Free,
         Occupancy::Wall => Cell::Wall,
         Occupancy::Unknown => Cell::Unknown,
     };
-    let cells: Vec<Cell> = floor.boxes.iter().map(cell).collect();
-    map_files([floor.width, floor.height], floor.box_m, floor.plane, &cells)
+    let [width, height] = [floor.width + 2, floor.height + 2];
+    let mut cells = vec![Cell::Wall; width as usize * height as usize];
+    let inside = cells.chunks_exact_mut(width as usize).skip(1);
+    for (row, boxes) in inside.zip(floor.boxes.chunks_exact(floor.width.max(1) as usize)) {
+        row.iter_mut().skip(1).zip(boxes).for_each(|(to, from)| *to = cell(from));
+    }
+    let origin_m = floor.plane.place([-floor.box_m; 2]);
+    map_files([width, height], floor.box_m, Plane { origin_m, ..floor.plane }, &cells)
 }
 
 fn ns(time_s: f64) -> u64 {
@@ -172,6 +196,10 @@ fn base_frame(who: Who) -> String {
     format!("{}/base_link", namespace(who))
 }
 
+fn scan_frame(scan: &Scan) -> String {
+    format!("{}/{}", namespace(scan.of), ros_name(&scan.sensor))
+}
+
 /// Returns a name with nothing in it that a topic may not have.
 fn ros_name(name: &str) -> String {
     name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect()
@@ -186,12 +214,12 @@ fn yaw_rad(pose: &Pose) -> f64 {
     sidestep::kernel::math::atan2(ahead[1], ahead[0])
 }
 
-/// Returns a scan, whose beams sit in the middle of the robot; directions without a beam have no number.
+/// Returns a scan; directions without a beam have no number.
 fn laser_scan(time_s: f64, scan: &Scan) -> LaserScan {
     let (first_rad, last_rad, ranges_m) = scan.evenly_spaced(f64::NAN);
     let steps = ranges_m.len().max(2) - 1;
     LaserScan {
-        header: header(time_s, base_frame(scan.of)),
+        header: header(time_s, scan_frame(scan)),
         angle_min_rad: first_rad as f32,
         angle_max_rad: last_rad as f32,
         angle_increment_rad: ((last_rad - first_rad) / steps as f64) as f32,

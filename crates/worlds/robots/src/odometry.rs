@@ -51,3 +51,43 @@ fn motion(transition: &Transition) -> (i32, i32, u8) {
     }
     (ahead, left, transition.turn)
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::robots_run;
+    use sidestep_kernel::Simulation;
+    use sidestep_kernel::view::Look;
+    use sidestep_scenario::Source;
+
+    /// A robot in a corridor whose wheels do nothing half of the time.
+    fn frames(cycles: u64) -> Vec<([f64; 2], [f64; 2])> {
+        let text = format!(
+            "format = 1\nworld = \"robots\"\nseed = 4\n[map]\nbox_size_m = 0.5\nascii = \"\"\"\n{}\n\"\"\"\n\
+             [effectors.wheels]\n\
+             forward = [{{ p = 0.5, path = \"F\" }}, {{ p = 0.5 }}]\n\
+             left = [{{ p = 1.0, turn = 90 }}]\nright = [{{ p = 1.0, turn = -90 }}]\n\
+             [robots]\nat = [[0, 0, 0]]\neffector = \"wheels\"\n\
+             behaviour = {{ kind = \"replay\", actions = [\"forward\"], repeat = true }}\n",
+            ".".repeat(60)
+        );
+        let mut run = robots_run(&Source::new("corridor.toml", text, ""), 1)
+            .unwrap_or_else(|e| panic!("{e}"));
+        run.watch();
+        let mut seen = Vec::new();
+        for _ in 0..=cycles {
+            let frame = run.frame(Look::BODIES);
+            let [x, y, _] = frame.odometry[0].1.at_m;
+            let [true_x, true_y, _] = frame.bodies[0].pose.at_m;
+            seen.push(([x, y], [true_x - 0.25, true_y - 0.25]));
+            run.advance(1);
+        }
+        seen
+    }
+
+    #[test]
+    fn wheels_claim_what_was_meant_and_feel_no_slip() {
+        let seen = frames(20);
+        assert!((0..).zip(&seen).all(|(k, (claimed, _))| *claimed == [0.5 * f64::from(k), 0.0]));
+        assert!(seen[20].1[0] < 8.0, "about half of the way: {seen:?}");
+    }
+}

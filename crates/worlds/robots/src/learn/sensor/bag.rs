@@ -24,7 +24,7 @@ const BEAMS_MAX: usize = 16;
 /// The longest way in meters that odometry alone tells since the last true pose.
 const RECKONED_MAX_M: f64 = 1.0;
 /// A scanner on which this share of beams ends before the wall sees what is not on the map.
-const IN_FRONT_MAX: f64 = 0.05;
+const IN_FRONT_MAX: f64 = 0.1;
 
 /// The rule by which counts become rows.
 const RULE: &str = "range to the first wall of the map from the true pose against measured range, no wall or \
@@ -218,5 +218,137 @@ impl Mount {
         let Pose { x_m, y_m, heading_rad } = self.place;
         let from_m = [robot.x_m + c * x_m - s * y_m, robot.y_m + s * x_m + c * y_m];
         (from_m, robot.heading_rad + heading_rad + self.side * bearing_rad)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sidestep_import::bag::messages::{Header, Time};
+    use sidestep_import::mrclam::TruePose;
+    use sidestep_kernel::view::Plane;
+    use sidestep_map::Cell;
+    use std::f64::consts::{FRAC_PI_2, PI};
+
+    /// A room of 6 x 4 m with walls of a meter around it.
+    fn room() -> PixelMap {
+        let is_wall = |col: u32, row: u32| col == 0 || col == 7 || row == 0 || row == 5;
+        let cell = |k: u32| if is_wall(k % 8, k / 8) { Cell::Wall } else { Cell::Free };
+        let plane = Plane { origin_m: [-1.0, -1.0], yaw_rad: 0.0 };
+        PixelMap::new(8, 6, 1.0, plane, (0..48).map(cell).collect())
+    }
+
+    /// Beams to the right, ahead and to the left.
+    fn scan(t_s: u64, ranges_m: [f32; 3]) -> LaserScan {
+        LaserScan {
+            header: Header { stamp: Time::from_ns(t_s * 1_000_000_000), frame_id: "laser".into() },
+            angle_min_rad: -FRAC_PI_2 as f32,
+            angle_max_rad: FRAC_PI_2 as f32,
+            angle_increment_rad: FRAC_PI_2 as f32,
+            time_increment_s: 0.0,
+            scan_time_s: 0.0,
+            range_min_m: 0.2,
+            range_max_m: 4.5,
+            ranges_m: ranges_m.to_vec(),
+            intensities: Vec::new(),
+        }
+    }
+
+    fn pose(t_secs: f64, x_m: f64) -> TruePose {
+        TruePose { t_secs, position_m: [x_m, 1.0], heading_rad: 0.0 }
+    }
+
+    /// A robot that stands at (1, 1) and looks along x.
+    fn log(scans: Vec<LaserScan>) -> BagLog {
+        let truth = (0..5).map(|k| pose(f64::from(k), 1.0)).collect();
+        BagLog { odometry: Vec::new(), truth, scans, mount: Some(view::Pose::at([0.0; 3])) }
+    }
+
+    fn learned(log: &BagLog) -> Result<SensorModel, InputError> {
+        let own = fan(&SensorOptions::default(), &log.scans[0], None, None);
+        let options = SensorOptions { distance_edges_m: vec![2.0], ..own };
+        learn("f", log, &room(), &options, &options.check()?)
+    }
+
+    #[test]
+    fn what_was_missed_and_what_is_not_there_is_told_by_the_map() {
+        // Walls stand at 1 m, beyond the range (at 5 m), and at 3 m.
+        let nothing = f32::INFINITY;
+        let scans = vec![
+            scan(0, [1.0, nothing, 3.0]),
+            scan(1, [nothing, 2.0, 1.0]),
+            scan(2, [1.1, 4.5, 4.4]),
+        ];
+        let model = learned(&log(scans)).unwrap();
+        let against =
+            AgainstMap { agreeing: 5, missed: 1, seen_through: 1, in_front: 1, not_there: 1 };
+        assert_eq!(model.report.against_map, Some(against));
+        assert_eq!(model.report.confusion.cells(), [[2.0, 1.0], [1.0, 5.0]]);
+        assert_eq!(model.report.distance_counts.0.cells(), [[2.0, 0.0], [1.0, 2.0]]);
+        assert!(model.report.warnings[0].starts_with("11.1 % of the beams"));
+        let designates = &model.profile.designates;
+        assert!(designates.iter().all(|(_, seen)| seen == WALL) && designates.len() == 3);
+        assert_eq!(
+            (model.profile.range_m, &*model.profile.bearings_deg),
+            (4.5, &[-90.0, 0.0, 90.0][..])
+        );
+    }
+
+    #[test]
+    fn what_cannot_be_judged_is_told_by_its_cause() {
+        let scans = vec![scan(0, [f32::NAN, f32::NEG_INFINITY, 3.0]), scan(9, [1.0; 3])];
+        let report = learned(&log(scans)).unwrap().report;
+        let causes = [("nearer_than_measured", 1), ("no_number", 1), ("no_true_pose", 3)];
+        assert_eq!(report.skipped_by_cause, causes.map(|(cause, n)| (cause.to_string(), n)).into());
+        assert_eq!((report.measurements, report.sightings, report.skipped), (6, 1, 5));
+        let error = learned(&log(vec![scan(9, [1.0; 3])])).unwrap_err();
+        assert!(error.cause().contains("3 no true pose"), "{error}");
+        let far = BagLog { truth: vec![pose(0.0, 99.0)], ..log(vec![scan(0, [1.0; 3])]) };
+        assert!(learned(&far).unwrap_err().cause().contains("3 unmapped"));
+    }
+
+    #[test]
+    fn a_scanner_is_where_it_is_mounted_and_may_hang_upside_down() {
+        // Ahead of the middle, turned by half a turn about x: left is right.
+        let mount = view::Pose { at_m: [0.4, 0.0, 0.0], turn: [1.0, 0.0, 0.0, 0.0] };
+        let hanging = BagLog { mount: Some(mount), ..log(vec![scan(0, [3.0, 4.4, 1.0])]) };
+        let report = learned(&hanging).unwrap().report;
+        assert_eq!(report.against_map.map(|beams| (beams.agreeing, beams.not_there)), Some((2, 1)));
+        assert!(report.errors.range_error_m.unwrap().sd < 1e-6);
+        let behind = Mount::of(view::Pose::heading([0.0, 1.0, 0.0], PI));
+        let (from_m, direction_rad) = behind.beam(&Pose::from([2.0, 1.0, FRAC_PI_2]), 0.0);
+        assert!((from_m[0] - 1.0).abs() < 1e-9 && (direction_rad - 1.5 * PI).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_scanner_that_nothing_places_is_warned_of() {
+        let unplaced = BagLog { mount: None, ..log(vec![scan(0, [1.0, 9.0, 3.0])]) };
+        assert!(learned(&unplaced).unwrap().report.warnings[0].contains("`laser`"));
+    }
+
+    #[test]
+    fn odometry_tells_the_way_since_the_last_true_pose_up_to_a_meter() {
+        let way = |far_m: f64| {
+            let odometry =
+                (0..30).map(|k| pose(0.1 * f64::from(k), far_m * f64::from(k) / 20.0)).collect();
+            // At 2 s the robot is `far_m` ahead of the last true pose, so that the wall is nearer.
+            let truth = vec![pose(0.0, 1.0), pose(9.0, 1.0)];
+            let scans = vec![scan(2, [1.0, (5.0 - far_m) as f32, 3.0])];
+            learned(&BagLog { odometry, truth, ..log(scans) })
+        };
+        let report = way(0.8).unwrap().report;
+        assert_eq!(report.against_map.map(|beams| beams.agreeing), Some(3), "{report:?}");
+        assert!(way(1.2).unwrap_err().cause().contains("no true pose"));
+    }
+
+    #[test]
+    fn a_scan_of_many_beams_becomes_a_fan_of_few_around_the_same_middle() {
+        let mut wide = scan(0, [1.0; 3]);
+        (wide.ranges_m, wide.angle_min_rad) = (vec![1.0; 360], -PI as f32);
+        wide.angle_increment_rad = (PI / 180.0) as f32;
+        let fan = fan(&SensorOptions::default(), &wide, Some(3.0), None);
+        assert_eq!((fan.bearings_deg.len(), fan.range_m), (16, 3.0));
+        assert!((fan.bearings_deg[8] - 15.0).abs() < 2.0, "{:?}", fan.bearings_deg);
+        assert!(matches!(room().sight([1.0, 1.0], 0.0, 9.0), Sight::Wall(_)));
     }
 }
