@@ -1,7 +1,7 @@
 //! Speed of the chain world's core.
 //!
 //! `cargo bench -p sidestep-chain [-- PART ...]` with the parts `open`, `middle`, `wavefront`,
-//! `field`, `corridor`, and `corridors` for the table of all pinned corridors; CPU time. In brackets what the prototype took.
+//! `own`, `field`, `corridor`, and `corridors` for the table of all pinned corridors; CPU time. In brackets what the prototype took.
 
 use cpu_time::ProcessTime;
 use sidestep_chain::geometry::{Point, add, along, first_axis, norm, scaled, sub, unit};
@@ -103,6 +103,41 @@ fn pull_open(
         1e3 * us / touched,
         100.0 * touched / n as f64
     );
+}
+
+/// The same chain with its own parts as obstacles, beside the time without that: alone, and with a ball
+/// far away, where every motion looks at all parts that it comes near.
+fn own() {
+    for (n, motions) in [(450, 2000), (10_000, 100), (100_000, 10)] {
+        for far in [false, true] {
+            let [without_us, with_us] =
+                [false, true].map(|self_collision| pull_beside(n, motions, self_collision, far));
+            println!(
+                "own body, {n} connectors, {}: {with_us:.1} us per motion, {:.2} times as without [3 times]",
+                if far { "a ball far away" } else { "alone" },
+                with_us / without_us,
+            );
+        }
+    }
+}
+
+/// Microseconds per motion.
+fn pull_beside(n: usize, motions: usize, self_collision: bool, far: bool) -> f64 {
+    let balls = if far { vec![Obstacle::ball(1, [0.0, 0.0, 1e4], 0.5)] } else { Vec::new() };
+    let obstacles = Obstacles::new(balls, 0.15).expect("right");
+    let mut chain = snake(n);
+    let mut propagator = Propagator::default();
+    propagator.rules.self_collision = self_collision;
+    let mut k = 0;
+    let s = best_s(7, || {
+        for _ in 0..motions {
+            k += 1;
+            let request = Request::exact(0, head(k));
+            let outcome = propagator.propagate(&mut chain, &obstacles, &request).expect("right");
+            assert!(outcome.moved().is_some(), "nothing is in the way");
+        }
+    });
+    1e6 * s / motions as f64
 }
 
 fn lanes() {
@@ -308,10 +343,11 @@ fn corridors() {
 
 fn main() {
     let asked: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
-    let parts: [(&str, fn()); 6] = [
+    let parts: [(&str, fn()); 7] = [
         ("open", open),
         ("middle", middle),
         ("wavefront", lanes),
+        ("own", own),
         ("field", field),
         ("corridor", corridor),
         ("corridors", corridors),

@@ -1,6 +1,6 @@
 //! D1 for chains: the same build, scenario and seed give identical bits for 1, 2, 3 and 8
 //! workers, recorded or not, resumed or not (bits.rs); laws and metrics (recount.rs); what a run says of
-//! itself (told.rs).
+//! itself (told.rs); targets of arms (arms.rs).
 
 use sidestep::kernel::Simulation;
 use sidestep::kernel::ports::{MemoryRecorder, Recorder, Values};
@@ -11,6 +11,7 @@ use sidestep_kernel::math::hypot;
 use std::any::Any;
 use std::ops::{Deref, DerefMut};
 
+mod arms;
 mod bits;
 mod recount;
 mod told;

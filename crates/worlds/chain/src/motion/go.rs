@@ -201,6 +201,28 @@ mod tests {
     }
 
     #[test]
+    fn a_straight_arm_is_drawn_inward_and_no_joint_is_faster_than_it_may_be() {
+        let joint_step_max_m = 0.08;
+        let rules = Rules { joint_step_max_m, ..Rules::default() };
+        for n_rods in [3, 7, 11, 25] {
+            let rod = Rod::fixed(1.0, 0.03);
+            let mut arm =
+                Chain::straight([0.0; 2], [1.0, 0.0], n_rods, rod, Connector::free(0.05)).unwrap();
+            arm.set_mobility(0, Mobility::Fixed).unwrap();
+            let target = [0.5 * n_rods as f64, 0.0];
+            for _ in 0..4000 {
+                let before = arm.points().to_vec();
+                let to = crate::rods::geometry::towards(before[n_rods], target, 0.04);
+                let request = Request::exact(n_rods, to);
+                go(&mut Propagator::new(rules), &mut arm, &Obstacles::default(), &request).unwrap();
+                assert!(longest(&before, arm.points()).1 <= joint_step_max_m);
+            }
+            let left_m = distance(arm.points()[n_rods], target);
+            assert!(left_m < 1e-6, "{n_rods} rods: {left_m} m are left");
+        }
+    }
+
+    #[test]
     fn joints_keep_their_limit_near_a_singular_posture_and_the_tool_still_gets_there() {
         let (free_m, _) = dragged_out(f64::INFINITY);
         assert!(free_m > 0.04, "without a limit the elbow goes {free_m} m for 0.01 m of the tool");

@@ -48,6 +48,25 @@ fn a_way_round_a_wall_is_found_and_free_all_along() {
     }
 }
 
+/// Three rods folded like a Z beside the target: the postures near the present one are cut off from it
+/// by the chain's own body.
+#[test]
+fn a_folded_arm_finds_a_posture_that_it_can_get_to() {
+    let points = vec![[0.0, 0.0], [0.69383, 0.72014], [-0.29946, 0.83574], [0.70042, 0.82014]];
+    let rods: Vec<_> = points
+        .windows(2)
+        .map(|w| Rod::fixed(crate::rods::geometry::distance(w[0], w[1]), 0.03))
+        .collect();
+    let mut arm = Chain::new(points, vec![Connector::free(0.05); 4], rods).unwrap();
+    arm.set_mobility(0, Mobility::Fixed).unwrap();
+    let rules = Rules { self_collision: true, ..Rules::default() };
+    let errand = Errand { k: 3, target: [0.630_251_8, 0.731_368_6], tolerance_m: 5e-4 };
+    for seed in 0..10 {
+        let way = plan(&arm, &Obstacles::default(), rules, &errand, &mut draws(seed)).unwrap();
+        assert!(way.is_some(), "{seed}: no way");
+    }
+}
+
 #[test]
 fn the_same_draws_give_the_same_way() {
     let once = |seed| plan(&arm(), &wall(), Rules::default(), &BEHIND, &mut draws(seed)).unwrap();
