@@ -194,6 +194,8 @@ mod tests {
                 assert!(moved(0).max(moved(1)) < 0.51 && moved(0).min(moved(1)) < 1e-9, "{pair:?}");
             }
         }
-        assert!(pictures.trail((sidestep::kernel::view::Kind::Robot, 9, None), last).way.is_empty());
+        assert!(
+            pictures.trail((sidestep::kernel::view::Kind::Robot, 9, None), last).way.is_empty()
+        );
     }
 }
