@@ -51,7 +51,7 @@ impl Print {
     }
 
     fn style(&self) -> Style {
-        let [width_px, height_px] = self.size_mm.map(|mm| mm * PX_PER_MM);
+        let [width_px, height_px] = self.size_mm.map(|mm| (mm * PX_PER_MM).round());
         Style { width_px, height_px, font_px: self.font_pt * PX_PER_PT }
     }
 
